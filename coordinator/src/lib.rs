@@ -1,0 +1,1 @@
+//! Glues subsystems into one simulation: scenario, host, contact detection, gluing strategies, recording.

@@ -1,0 +1,1 @@
+//! Pressure and shear laws of soils with tangents and inverses, evaluated over batches of nodes.

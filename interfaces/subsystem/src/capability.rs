@@ -1,0 +1,62 @@
+//! What a subsystem can do beyond `advance`; a strategy that lacks something is refused at load time.
+
+/// A set of capabilities; plain bits, so that it crosses the C ABI unchanged.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub struct Capabilities(pub u32);
+
+impl Capabilities {
+    /// `advance` takes [`crate::Input::Force`].
+    pub const FORCE: Self = Self(1);
+    /// `advance` takes [`crate::Input::Motion`].
+    pub const MOTION: Self = Self(2);
+    /// `advance` takes [`crate::Input::Impedance`].
+    pub const IMPEDANCE: Self = Self(4);
+    /// `estimate_forces` is implemented.
+    pub const ESTIMATE: Self = Self(8);
+    /// `solve_compatibility` is implemented.
+    pub const SOLVE: Self = Self(16);
+    /// `interface_jacobian` is implemented.
+    pub const DERIVATIVES: Self = Self(32);
+    /// Trials do not disturb the committed state and can be repeated.
+    pub const RETRY: Self = Self(64);
+    /// `save_state` and `restore_state` are implemented.
+    pub const STATE: Self = Self(128);
+    /// `serialize` and `deserialize` are implemented.
+    pub const SERIALIZE: Self = Self(256);
+    /// Makes steps of its own inside a communication step.
+    pub const SUBCYCLES: Self = Self(512);
+    /// Outputs depend directly on inputs of the same time.
+    pub const FEEDTHROUGH: Self = Self(1024);
+
+    /// All names, for messages and listings.
+    pub const NAMES: [(Self, &'static str); 11] = [
+        (Self::FORCE, "force input"),
+        (Self::MOTION, "motion input"),
+        (Self::IMPEDANCE, "impedance input"),
+        (Self::ESTIMATE, "estimate_forces"),
+        (Self::SOLVE, "solve_compatibility"),
+        (Self::DERIVATIVES, "interface_jacobian"),
+        (Self::RETRY, "repeatable trials"),
+        (Self::STATE, "save and restore"),
+        (Self::SERIALIZE, "serialize"),
+        (Self::SUBCYCLES, "sub-cycles"),
+        (Self::FEEDTHROUGH, "direct feed-through"),
+    ];
+
+    /// Whether all of `other` is in this set.
+    pub const fn has(self, other: Self) -> bool {
+        self.0 & other.0 == other.0
+    }
+
+    /// The names of what is in the set.
+    pub fn names(self) -> impl Iterator<Item = &'static str> {
+        Self::NAMES.iter().filter(move |(c, _)| self.has(*c)).map(|(_, name)| *name)
+    }
+}
+
+impl std::ops::BitOr for Capabilities {
+    type Output = Self;
+    fn bitor(self, other: Self) -> Self {
+        Self(self.0 | other.0)
+    }
+}

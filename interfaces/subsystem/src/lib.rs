@@ -1,0 +1,51 @@
+//! What everything that the coordinator steps agrees on: bodies, soils, controllers, FMUs.
+//!
+//! A plugin author reads this crate and nothing else. There are two traits: [`Module`], the static side
+//! (what it is, which parameters it takes, how to make one), and [`Subsystem`], an instance.
+//!
+//! # Life of a subsystem
+//! 1. [`Module::schema`] says which parameters exist; the host checks the scenario against it.
+//! 2. [`Module::instantiate`] may allocate and read files below [`Host::folder`]. No later call does,
+//!    except when a count exceeds every earlier one.
+//! 3. Every step [t, t + h]: inputs are set; [`Subsystem::set_ports`]; any number of **trials**
+//!    ([`Subsystem::estimate_forces`], [`Subsystem::solve_compatibility`], [`Subsystem::advance`]), each
+//!    from the committed state at t, in any order, none visible from outside; then one
+//!    [`Subsystem::commit`], which makes the last trial of `advance` or `solve_compatibility` the state at t + h.
+//! 4. `get`, `poses`, fields and `energy` speak of the committed state only.
+//!
+//! # Packed vectors
+//! T, X, V and A hold one entry per carried component of every port in the order of [`Step::ports`]; port p
+//! owns `first .. first + mask.count_ones()`, in the order n, t1, t2, mn, mt1, mt2. T is the wrench on
+//! side 1 (N, N m); side 2 feels −T. X, V, A are the subsystem's own motion in the port frame, from its
+//! origin (m, rad as rotation vector, per s, per s²). Derivatives are per wrench **on itself**: positive
+//! semi-definite for a passive subsystem on either side.
+//!
+//! SI units everywhere; the world frame is right-handed with z up.
+
+mod capability;
+mod config;
+pub mod cooperation;
+mod energy;
+mod error;
+mod field;
+mod host;
+mod port;
+mod scene;
+mod schema;
+mod subsystem;
+mod trial;
+pub mod unit;
+mod variable;
+
+pub use capability::Capabilities;
+pub use config::Config;
+pub use energy::Energy;
+pub use error::{Error, Result};
+pub use field::{FieldInfo, FieldTile, TileValues};
+pub use host::{Host, LogLevel, Standalone, Terrain, TerrainTile};
+pub use port::{Law, Node, Port, PortKind, component};
+pub use scene::{BodyState, Geometry, Pose, Scene, SceneBody, SceneShape};
+pub use schema::{Kind, Parameter, ParameterType, Schema};
+pub use subsystem::{Module, Subsystem};
+pub use trial::{Estimate, Hold, Input, Level, Motion, Response, Step, flag};
+pub use variable::{Action, Causality, Effect, ValueType, Values, ValuesMut, Variable};

@@ -1,0 +1,131 @@
+//! What goes into and comes out of the calls of a step: the step itself, inputs, responses, the estimate.
+
+use crate::port::{Node, Port};
+
+/// One communication step as this subsystem sees it. Borrowed: nothing in it outlives the call.
+#[derive(Clone, Copy, Debug)]
+pub struct Step<'a> {
+    /// Time at the start of the step, s.
+    pub t: f64,
+    /// Length, s. 0: accelerations at t only, X and V stay (start of a run, new joint).
+    pub h: f64,
+    /// Accepted steps before this one.
+    pub index: u64,
+    /// Number of the trial in this step.
+    pub trial: u32,
+    /// Grows when a port appears, goes or changes its mask.
+    pub epoch: u32,
+    /// Length of packed vectors.
+    pub n: u32,
+    /// All ports of this subsystem in ascending order of key.
+    pub ports: &'a [Port],
+    /// Ground nodes of all ports.
+    pub nodes: &'a [Node],
+}
+
+impl Step<'_> {
+    /// A plain step without ports.
+    pub const fn free(t: f64, h: f64, index: u64) -> Step<'static> {
+        Step { t, h, index, trial: 0, epoch: 0, n: 0, ports: &[], nodes: &[] }
+    }
+}
+
+/// What acts on the ports during a trial; packed.
+#[derive(Clone, Copy, Debug)]
+pub enum Input<'a> {
+    /// The wrench T. For components that a constitutive law answers (shear and moments of a soil), `motion`
+    /// carries the partner's motion at t + h: a soil then answers `x` = its surface under the normal force
+    /// and `t` = the whole wrench that its law gives at that motion. Bodies ignore `motion`.
+    Force {
+        /// Wrench on side 1.
+        t: &'a [f64],
+        /// How T runs inside the step.
+        hold: Hold,
+        /// The partner's motion where it is known.
+        motion: Option<Motion<'a>>,
+    },
+    /// Motion of the other side at t + h.
+    Motion(Motion<'a>),
+    /// A linearised partner: T = f0 − z·X.
+    Impedance {
+        /// Wrench at X = 0.
+        f0: &'a [f64],
+        /// Column-major n × n stiffness.
+        z: &'a [f64],
+    },
+}
+
+/// T inside the step.
+#[repr(u32)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Hold {
+    /// Its end value only matters (implicit integrators).
+    End = 0,
+    /// Constant.
+    Constant = 1,
+    /// Linear from the committed T.
+    Linear = 2,
+}
+
+/// Level at which a derivative is asked for.
+#[repr(u32)]
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+pub enum Level {
+    /// Positions X.
+    Position = 0,
+    /// Velocities V.
+    Velocity = 1,
+    /// Accelerations A.
+    Acceleration = 2,
+}
+
+/// Motion of the other side; packed.
+#[derive(Clone, Copy, Debug)]
+pub struct Motion<'a> {
+    /// Displacement from the port's origin, m and rad.
+    pub x: &'a [f64],
+    /// Velocity, m/s and rad/s.
+    pub v: &'a [f64],
+}
+
+/// Answer of a trial at its end; packed. Comes filled with NaN: what stays NaN is an error of the subsystem.
+#[derive(Debug)]
+pub struct Response<'a> {
+    /// Own displacement X.
+    pub x: &'a mut [f64],
+    /// Own velocity V.
+    pub v: &'a mut [f64],
+    /// Own acceleration A.
+    pub a: &'a mut [f64],
+    /// T at the end: the input for bodies under force, the law's answer for a soil.
+    pub t: &'a mut [f64],
+    /// Time reached, s; < t + h: ended early, all sides repeat the trial up to the earliest.
+    pub reached: f64,
+    /// Bits of [`flag`].
+    pub flags: u32,
+}
+
+/// Bits of [`Response::flags`].
+pub mod flag {
+    /// Something happened at `reached`.
+    pub const EVENT: u32 = 1;
+    /// The subsystem asks for the end of the run.
+    pub const TERMINATE: u32 = 2;
+    /// A port yields.
+    pub const YIELDED: u32 = 4;
+}
+
+/// The rigid-contact estimate T*; packed. gap_free = x_free − x2 along n, x2 = the soil's answer to `set_ports`.
+#[derive(Debug)]
+pub struct Estimate<'a> {
+    /// T*: the wrenches that would hold every contact rigidly, of minimum norm. Never applied.
+    pub t_star: &'a mut [f64],
+    /// Own X at t + h if no contact port carried a wrench.
+    pub x_free: &'a mut [f64],
+    /// n × n, column-major: dX(t + h)/d(wrench on itself).
+    pub g: &'a mut [f64],
+    /// Per port: 1 where T*_n > 0.
+    pub active: &'a mut [u8],
+    /// Whether T* is the only solution.
+    pub unique: bool,
+}

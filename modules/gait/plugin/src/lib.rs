@@ -1,0 +1,1 @@
+//! The module gait as a dynamic library.

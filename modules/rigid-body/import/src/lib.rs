@@ -1,0 +1,1 @@
+//! Reads robot files (URDF) into a checked tree of bodies, joints and shapes.

@@ -1,0 +1,1 @@
+//! Sparse symmetric factorisation of the joint system in tree order; the one crate that compiles faer.

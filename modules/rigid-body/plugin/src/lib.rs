@@ -1,0 +1,1 @@
+//! The module rigid-body as a dynamic library.

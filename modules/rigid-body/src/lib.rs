@@ -1,0 +1,1 @@
+//! Rigid bodies in maximal coordinates with Lagrange multipliers and complementarity contact.

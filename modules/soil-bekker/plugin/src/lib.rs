@@ -1,0 +1,1 @@
+//! The module soil-bekker as a dynamic library.

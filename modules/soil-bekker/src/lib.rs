@@ -1,0 +1,1 @@
+//! Soil after Bekker with unloading, Mohr-Coulomb strength and Janosi-Hanamoto shear.

@@ -1,0 +1,1 @@
+//! The module soil-cellular-automaton as a dynamic library.

@@ -1,0 +1,1 @@
+//! The module soil-column as a dynamic library.

@@ -1,1 +1,19 @@
-//! Glues subsystems into one simulation: scenario, host, contact detection, gluing strategies, recording.
+//! Glues subsystems into one simulation of a whole mission.
+//!
+//! [`Testbed`] is the entry: `build` a [`scenario::Scenario`], `step` it, look at it through an
+//! [`observer::Observer`]. Several live side by side in one process; there are no globals.
+
+pub mod contact;
+pub mod error;
+pub mod gluing;
+pub mod host;
+pub mod observer;
+pub mod recording;
+pub mod scenario;
+pub mod signals;
+pub mod terrain;
+pub mod testbed;
+
+pub use error::{Error, Result};
+pub use terraglue_subsystem as subsystem;
+pub use testbed::Testbed;

@@ -1,0 +1,53 @@
+//! Errors of the coordinator, split by whose turn it is: the author of the input, or the simulation.
+
+/// What stops a run.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The scenario or another input is wrong (exit code 2). Rendered with file, line and the offending text.
+    #[error(transparent)]
+    Input(#[from] Box<crate::scenario::InputError>),
+    /// A subsystem failed (exit code 1).
+    #[error("{subsystem} ({module}): {function} failed at t = {time_s} s: {message}")]
+    Module {
+        /// Name in the scenario.
+        subsystem: String,
+        /// Module name.
+        module: String,
+        /// Function of the interface.
+        function: &'static str,
+        /// Simulated time, s.
+        time_s: f64,
+        /// What it said.
+        message: String,
+    },
+    /// The gluing did not converge (exit code 1).
+    #[error("gluing by `{strategy}` did not converge at t = {time_s} s: {message}")]
+    NotConverged {
+        /// Strategy.
+        strategy: &'static str,
+        /// Simulated time, s.
+        time_s: f64,
+        /// Residual, port and advice.
+        message: String,
+    },
+    /// The simulation cannot go on for another reason (exit code 1).
+    #[error("simulation failed at t = {time_s} s: {message}")]
+    Simulation {
+        /// Simulated time, s.
+        time_s: f64,
+        /// What happened.
+        message: String,
+    },
+    /// A file could not be read or written (exit code 1).
+    #[error("{path}: {source}")]
+    File {
+        /// Path as the user knows it.
+        path: String,
+        /// Why.
+        source: std::io::Error,
+    },
+}
+
+/// Result with the coordinator's error.
+pub type Result<T = ()> = std::result::Result<T, Error>;

@@ -1,0 +1,5 @@
+//! One file per strategy.
+
+mod report;
+
+pub use report::{PortReport, StepReport};

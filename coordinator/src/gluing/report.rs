@@ -1,0 +1,63 @@
+//! What a strategy did in one step; the same for all strategies, so that they can be compared.
+
+/// Figures of one step of one group. Reused from step to step: no allocation once the ports are known.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct StepReport {
+    /// Evaluations (`advance` or `solve_compatibility`) of the bodies.
+    pub evaluations_bodies: u32,
+    /// Evaluations of the soils.
+    pub evaluations_soil: u32,
+    /// Of these, evaluations spent in line searches.
+    pub evaluations_line_search: u32,
+    /// Of these, evaluations spent on finite differences.
+    pub evaluations_jacobian: u32,
+    /// Fresh interface Jacobians.
+    pub jacobian_refreshes: u32,
+    /// How often the step was halved.
+    pub halvings: u32,
+    /// Whether the strategy reached its tolerance (a single pass always does).
+    pub converged: bool,
+    /// Whether the X-T form ran (else T-T, or a single pass).
+    pub xt_form: bool,
+    /// Largest |x1 − x2| along n over the closed ports after commit, m.
+    pub max_gap_m: f64,
+    /// Largest difference of the wrench on the two sides along n, N.
+    pub max_action_reaction_gap_n: f64,
+    /// |Λe|∞ / T_ref at the end.
+    pub residual: f64,
+    /// max(|min(T, L·w)|) over unilateral ports at the end, N.
+    pub complementarity_n: f64,
+    /// Largest eigenvalue estimate of K·G1.
+    pub kappa_max: f64,
+    /// Largest |T* − T1| along n, N.
+    pub estimate_gap_n: f64,
+    /// Work of T on side 1 plus work of −T on side 2 in the step, J.
+    pub interface_work_error_j: f64,
+    /// Rank of Λ and its size, for the last Jacobian; 0 when none was formed.
+    pub rank: (u32, u32),
+    /// All ports of the step.
+    pub ports: Vec<PortReport>,
+}
+
+/// One port at the end of the step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct PortReport {
+    /// Stable key.
+    pub key: u64,
+    /// Index of the body's subsystem in the view.
+    pub subsystem: u32,
+    /// Index of the body in its scene.
+    pub body: u32,
+    /// Id of the shape.
+    pub shape: u32,
+    /// World origin, m.
+    pub origin: [f64; 3],
+    /// n, t1, t2 in the world.
+    pub frame: [f64; 9],
+    /// Committed wrench on the body: n, t1, t2, mn, mt1, mt2 (zero where not carried).
+    pub wrench: [f64; 6],
+    /// T*_n, N.
+    pub t_star_n: f64,
+    /// Signed gap x1 − x2 along n after commit, m; > 0 apart.
+    pub gap_m: f64,
+}

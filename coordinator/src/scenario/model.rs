@@ -1,0 +1,221 @@
+//! A checked scenario: plain data that the testbed is built from.
+
+use serde_json::{Map, Value};
+use std::path::PathBuf;
+
+/// Everything a run needs.
+#[derive(Clone, Debug)]
+pub struct Scenario {
+    /// File stem, e.g. `moon_walk`.
+    pub name: String,
+    /// Folder of the file; relative paths refer to it.
+    pub folder: PathBuf,
+    /// `[time]`.
+    pub time: Time,
+    /// `[world]`.
+    pub world: World,
+    /// `[terrain]`.
+    pub terrain: Option<TerrainSpec>,
+    /// `[gluing]`.
+    pub gluing: GluingSpec,
+    /// `[recording]`.
+    pub recording: RecordingSpec,
+    /// `[report]`.
+    pub report: ReportSpec,
+    /// Subsystems in the order of their names.
+    pub subsystems: Vec<SubsystemSpec>,
+    /// `[[connect]]`.
+    pub connections: Vec<Connection>,
+    /// `[[event]]` in the order of the file.
+    pub events: Vec<EventSpec>,
+    /// The text it came from, for errors found later (unknown variables, units).
+    pub source: super::Source,
+}
+
+/// `[time]`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Time {
+    /// Communication step h, s.
+    pub step_s: f64,
+    /// Simulated time, s.
+    pub duration_s: f64,
+}
+
+/// `[world]`.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct World {
+    /// Gravity, m/s².
+    pub gravity_m_s2: [f64; 3],
+    /// Seed of everything random.
+    pub seed: u64,
+}
+
+/// `[terrain]`: centred on the world's origin.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TerrainSpec {
+    /// Extent along x and y, m (files bring their own).
+    pub size_m: [f64; 2],
+    /// Lattice spacing, m.
+    pub spacing_m: f64,
+    /// Shape.
+    pub kind: TerrainKind,
+}
+
+/// Shapes of terrain.
+#[derive(Clone, Debug, PartialEq)]
+pub enum TerrainKind {
+    /// z = height_m.
+    Flat {
+        /// Height, m.
+        height_m: f64,
+    },
+    /// A plane through the origin that rises along `heading_rad` by `angle_rad`.
+    Slope {
+        /// Angle against the horizontal, rad.
+        angle_rad: f64,
+        /// Direction of steepest ascent from +x, rad.
+        heading_rad: f64,
+    },
+    /// A sum of waves of random direction and phase.
+    Undulating {
+        /// Root mean square of the height, m.
+        rms_m: f64,
+        /// Shortest and longest wavelength, m.
+        wavelengths_m: [f64; 2],
+        /// Seed; the world's where absent.
+        seed: Option<u64>,
+        /// Radius around the origin that is blended to flat ground, m (0: none).
+        flat_radius_m: f64,
+    },
+    /// A bowl with a raised rim.
+    Crater {
+        /// Diameter from crest to crest, m.
+        diameter_m: f64,
+        /// Depth of the floor below the crest, m.
+        depth_m: f64,
+        /// Height of the crest above the surrounding plain, m.
+        rim_height_m: f64,
+        /// Steepest slope that the shape may reach, rad.
+        max_slope_rad: f64,
+        /// Centre of the crater, m.
+        centre_m: [f64; 2],
+    },
+    /// ESRI ASCII grid.
+    EsriAscii {
+        /// File.
+        file: PathBuf,
+        /// Height that replaces NODATA; refused when absent.
+        fill_m: Option<f64>,
+    },
+    /// GeoTIFF with one band.
+    Geotiff {
+        /// File.
+        file: PathBuf,
+        /// Height that replaces NODATA; refused when absent.
+        fill_m: Option<f64>,
+    },
+}
+
+/// `[gluing]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GluingSpec {
+    /// `cooperative` or `iterative`.
+    pub strategy: String,
+    /// `auto`, `tt` or `xt` (iterative only).
+    pub form: String,
+    /// τ in |Λe|∞ ≤ τ·max(T_ref, |T|∞).
+    pub tolerance: f64,
+    /// Most iterations of one step before it is halved.
+    pub max_iterations: u32,
+    /// What the iteration starts from: `estimate` (min(T*, F)) or `zero` (to show what the estimate saves).
+    pub start: String,
+    /// Contacts are made when a shape can come this near within the step, m.
+    pub contact_margin_m: f64,
+}
+
+/// `[recording]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct RecordingSpec {
+    /// Every how many steps the ground is written (dirty tiles).
+    pub ground_every_steps: u64,
+    /// Every how many steps variables and poses are written.
+    pub every_steps: u64,
+}
+
+/// `[report]`.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct ReportSpec {
+    /// `subsystem.body` that distance, roll and pitch speak of; the first body of the first robot when empty.
+    pub body: Option<String>,
+    /// `subsystem.variable` with the commanded speed, m/s.
+    pub commanded_speed: Option<String>,
+    /// `subsystem.joint` whose torque, velocity and angle are plotted.
+    pub joint: Option<String>,
+}
+
+/// A subsystem's table.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SubsystemSpec {
+    /// Name of the table.
+    pub name: String,
+    /// `module`, as written.
+    pub module: String,
+    /// Steps of the testbed per step of the subsystem.
+    pub step_multiple: u32,
+    /// All parameters, nested tables as objects: the host's keys are taken out.
+    pub parameters: Map<String, Value>,
+    /// Numbers of a named soil row that are offered to the module, not demanded of it.
+    pub offered: Map<String, Value>,
+}
+
+/// `[[connect]]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Connection {
+    /// `subsystem.variable`, each `*` matches one dotted part or a piece of it.
+    pub from: String,
+    /// The same; its `*` take what matched in `from`.
+    pub to: String,
+    /// Byte range of the table in the source.
+    pub span: std::ops::Range<usize>,
+}
+
+/// `[[event]]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct EventSpec {
+    /// When.
+    pub trigger: Trigger,
+    /// `subsystem.variable` = value, in the order of the file.
+    pub set: Vec<(String, Value)>,
+    /// `subsystem.action`.
+    pub act: Vec<String>,
+    /// Byte range of the table in the source.
+    pub span: std::ops::Range<usize>,
+}
+
+/// When an event fires; once.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Trigger {
+    /// At the first communication point with t ≥ at_s.
+    At(f64),
+    /// At the first communication point where the comparison holds.
+    When {
+        /// `subsystem.variable`.
+        variable: String,
+        /// `<`, `<=`, `>`, `>=`, `==` or `!=`.
+        comparison: Comparison,
+        /// Right-hand side.
+        value: f64,
+    },
+}
+
+/// A comparison of a variable with a number.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Comparison {
+    Less,
+    LessEqual,
+    Greater,
+    GreaterEqual,
+    Equal,
+    NotEqual,
+}

@@ -1,0 +1,105 @@
+//! What can be seen and hit: shapes with stable ids, described once, and the state of the bodies that carry them.
+
+/// Position and orientation: `world_from_x` or `body_from_x` as the name of the value says.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pose {
+    /// Translation, m.
+    pub position: [f64; 3],
+    /// Unit quaternion w, x, y, z.
+    pub orientation: [f64; 4],
+}
+
+impl Pose {
+    /// No displacement.
+    pub const IDENTITY: Self = Self { position: [0.0; 3], orientation: [1.0, 0.0, 0.0, 0.0] };
+}
+
+/// Committed pose and twist of a body's frame.
+#[repr(C)]
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BodyState {
+    /// Pose of the body frame in the world.
+    pub world_from_body: Pose,
+    /// Velocity of the origin of the body frame, world axes, m/s.
+    pub linear_velocity: [f64; 3],
+    /// Angular velocity, world axes, rad/s.
+    pub angular_velocity: [f64; 3],
+}
+
+impl BodyState {
+    /// At rest at the origin.
+    pub const REST: Self =
+        Self { world_from_body: Pose::IDENTITY, linear_velocity: [0.0; 3], angular_velocity: [0.0; 3] };
+}
+
+/// Geometry of a shape in its own frame, m.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Geometry {
+    /// Centre at the origin.
+    Sphere {
+        /// Radius.
+        radius: f64,
+    },
+    /// Centre at the origin.
+    Box {
+        /// Half lengths along x, y, z.
+        half_extents: [f64; 3],
+    },
+    /// Segment along z from −half_length to half_length, swollen by radius.
+    Capsule {
+        /// Half length of the segment.
+        half_length: f64,
+        /// Radius.
+        radius: f64,
+    },
+    /// Axis along z, centre at the origin.
+    Cylinder {
+        /// Half length along z.
+        half_length: f64,
+        /// Radius.
+        radius: f64,
+    },
+    /// Convex hull of points; the triangles index the points and face outwards.
+    ConvexMesh {
+        /// Corners.
+        points: Vec<[f64; 3]>,
+        /// Faces, counter-clockwise seen from outside.
+        triangles: Vec<[u32; 3]>,
+    },
+}
+
+/// Something that moves as a whole.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneBody {
+    /// Name, unique in the subsystem.
+    pub name: String,
+    /// Total mass, kg (for reports; 0: unknown or fixed).
+    pub mass: f64,
+}
+
+/// A shape fixed to a body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SceneShape {
+    /// Stable id, unique in the subsystem.
+    pub id: u32,
+    /// Index into [`Scene::bodies`].
+    pub body: u32,
+    /// Name for people; the name of the body where it has one shape.
+    pub name: String,
+    /// Geometry in the shape's frame.
+    pub geometry: Geometry,
+    /// Pose of the shape in the body.
+    pub body_from_shape: Pose,
+    /// Whether it can be hit; otherwise it is only seen.
+    pub collides: bool,
+}
+
+/// All bodies and shapes of a subsystem; constant over the life of an instance.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct Scene {
+    /// Bodies in the order of [`crate::Subsystem::body_states`].
+    pub bodies: Vec<SceneBody>,
+    /// Shapes in ascending order of id.
+    pub shapes: Vec<SceneShape>,
+}

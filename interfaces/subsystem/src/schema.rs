@@ -1,0 +1,137 @@
+//! What a module is and which parameters it takes; the scenario is checked against it, docs are made from it.
+
+use serde::{Deserialize, Serialize};
+
+/// What kind of subsystem a module makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+#[repr(u32)]
+pub enum Kind {
+    /// Owns ground and answers contact ports on side 2.
+    Soil = 1,
+    /// Bodies with shapes; side 1 of contact ports.
+    Robot = 2,
+    /// Signals only.
+    Controller = 3,
+    /// Pressure and shear over arrays of nodes, state owned by the host.
+    Law = 4,
+}
+
+/// Static description of a module.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Schema {
+    /// Module name, e.g. `soil-bekker`.
+    pub name: String,
+    /// What it makes.
+    pub kind: Kind,
+    /// One line for people.
+    pub help: String,
+    /// Parameters it takes from its scenario table.
+    pub parameters: Vec<Parameter>,
+}
+
+/// One parameter of a module.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Parameter {
+    /// Key in the scenario; dotted for sub-tables. A trailing `.*` admits any key below.
+    pub name: String,
+    /// Type.
+    #[serde(rename = "type")]
+    pub parameter_type: ParameterType,
+    /// SI unit; empty: pure number.
+    #[serde(default)]
+    pub unit: String,
+    /// One line for people.
+    pub help: String,
+    /// Value when the scenario is silent; null: required unless `optional`.
+    #[serde(default)]
+    pub default: serde_json::Value,
+    /// May be left out although there is no default.
+    #[serde(default)]
+    pub optional: bool,
+    /// Smallest number accepted.
+    #[serde(default)]
+    pub min: Option<f64>,
+    /// Largest number accepted.
+    #[serde(default)]
+    pub max: Option<f64>,
+    /// Whether the value `min` itself is refused.
+    #[serde(default)]
+    pub above_min: bool,
+    /// Texts accepted; empty: any.
+    #[serde(default)]
+    pub choices: Vec<String>,
+}
+
+/// Type of a parameter.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ParameterType {
+    /// A floating-point number.
+    Number,
+    /// A whole number.
+    Integer,
+    /// true or false.
+    Bool,
+    /// Text.
+    Text,
+    /// A path relative to the scenario file; must exist.
+    Path,
+    /// A list of numbers.
+    Numbers,
+    /// A table of numbers by name.
+    NumberTable,
+}
+
+impl Parameter {
+    /// A number with a default.
+    pub fn number(name: &str, unit: &str, default: f64, help: &str) -> Self {
+        Self { unit: unit.into(), default: default.into(), ..Self::of(name, ParameterType::Number, help) }
+    }
+
+    /// A parameter of any type without a default: required.
+    pub fn of(name: &str, parameter_type: ParameterType, help: &str) -> Self {
+        Self {
+            name: name.into(),
+            parameter_type,
+            unit: String::new(),
+            help: help.into(),
+            default: serde_json::Value::Null,
+            optional: false,
+            min: None,
+            max: None,
+            above_min: false,
+            choices: Vec::new(),
+        }
+    }
+
+    /// The same with a default.
+    pub fn or(mut self, default: impl Into<serde_json::Value>) -> Self {
+        self.default = default.into();
+        self
+    }
+
+    /// The same, may be left out.
+    pub fn optional(mut self) -> Self {
+        self.optional = true;
+        self
+    }
+
+    /// The same with inclusive bounds.
+    pub fn within(mut self, min: f64, max: f64) -> Self {
+        (self.min, self.max) = (min.is_finite().then_some(min), max.is_finite().then_some(max));
+        self
+    }
+
+    /// The same, larger than zero.
+    pub fn positive(mut self) -> Self {
+        (self.min, self.above_min) = (Some(0.0), true);
+        self
+    }
+
+    /// The same with a closed list of texts.
+    pub fn choices(mut self, choices: &[&str]) -> Self {
+        self.choices = choices.iter().map(|c| (*c).into()).collect();
+        self
+    }
+}

@@ -1,0 +1,140 @@
+//! The two traits: a module makes instances; an instance is stepped.
+
+use crate::capability::Capabilities;
+use crate::config::Config;
+use crate::energy::Energy;
+use crate::error::{Error, Result};
+use crate::field::{FieldInfo, FieldTile};
+use crate::host::Host;
+use crate::port::Law;
+use crate::scene::{BodyState, Scene};
+use crate::schema::Schema;
+use crate::trial::{Estimate, Input, Level, Motion, Response, Step};
+use crate::variable::{Action, Values, ValuesMut, Variable};
+use std::sync::Arc;
+
+/// The static side of a module: what `export_subsystem!` takes.
+pub trait Module {
+    /// Name, kind and parameters.
+    fn schema() -> Schema;
+    /// Makes an instance. May allocate and read files below `host.folder()`. The terrain of the host may be
+    /// read during this call only.
+    fn instantiate(config: &Config, host: Arc<dyn Host>) -> Result<Box<dyn Subsystem>>;
+}
+
+/// An instance. Only `capabilities` and `advance` are required; what else is offered is declared as a capability.
+///
+/// Calls come from one thread at a time.
+pub trait Subsystem: Send {
+    /// What this instance can do.
+    fn capabilities(&self) -> Capabilities;
+
+    /// Paper, step 1. The ports of this step (grounds are asked first). Answers with the committed X, V and,
+    /// for a soil, t = the wrench of its law at that X. A ground may narrow `laws` (mu = tan φ, t_max), one
+    /// per port; a ground's `x` along n is its own continuous surface x2 below the body, from its unrounded state.
+    fn set_ports(&mut self, _step: &Step, _laws: &mut [Law], _now: &mut Response) -> Result {
+        Ok(())
+    }
+
+    /// Paper, step 2. If the other side of every contact were rigid and stood at `partner` at t + h: which
+    /// wrenches? Solved, not applied.
+    fn estimate_forces(&mut self, _step: &Step, _partner: &Motion, _out: &mut Estimate) -> Result {
+        Err(Error::Unsupported)
+    }
+
+    /// Paper, step 3. Given the estimate: `out.t` = T1, `out.x` = own surface under it. A trial.
+    fn solve_compatibility(&mut self, _step: &Step, _estimate: &Estimate, _out: &mut Response) -> Result {
+        Err(Error::Unsupported)
+    }
+
+    /// Paper, steps 3 and 4. A trial from the committed state; without ports, a plain step.
+    fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result;
+
+    /// Derivatives at the last trial, n × n, column-major. After `Force`: G = dX/d(wrench on itself) at `level`.
+    /// After `Motion`: K = d(wrench on itself)/dX (position) or /dV (velocity), sign as for a spring: the
+    /// wrench on a soil grows with the motion that presses it, K is positive semi-definite. After `Force` with
+    /// motion: column n of a port is dX_n/dT_n and dT_t/dT_n, columns t and m are dT/dX as after `Motion`.
+    fn interface_jacobian(&mut self, _step: &Step, _level: Level, _out: &mut [f64]) -> Result {
+        Err(Error::Unsupported)
+    }
+
+    /// Paper, step 5. The last trial is accepted under T; the other side has moved to `partner`.
+    fn commit(&mut self, _step: &Step, _t: &[f64], _partner: &Motion) -> Result {
+        Ok(())
+    }
+
+    /// The committed state, exactly, into one of `host.slots()` numbered slots.
+    fn save_state(&mut self, _slot: u32) -> Result {
+        Err(Error::Unsupported)
+    }
+
+    /// Back to the state of a slot.
+    fn restore_state(&mut self, _slot: u32) -> Result {
+        Err(Error::Unsupported)
+    }
+
+    /// The committed state as bytes with a version, for another process or day.
+    fn serialize(&self) -> Result<Vec<u8>> {
+        Err(Error::Unsupported)
+    }
+
+    /// Back to a state made by `serialize`.
+    fn deserialize(&mut self, _bytes: &[u8]) -> Result {
+        Err(Error::Unsupported)
+    }
+
+    /// All variables of this instance, in ascending order of id; constant over its life.
+    fn variables(&self) -> &[Variable] {
+        &[]
+    }
+
+    /// Committed values of the variables `ids`, all of the type of `out`.
+    fn get(&self, _ids: &[u32], _out: ValuesMut) -> Result {
+        Err(Error::Unsupported)
+    }
+
+    /// New values for the variables `ids`; effective from the next step on.
+    fn set(&mut self, _ids: &[u32], _values: Values) -> Result {
+        Err(Error::Unsupported)
+    }
+
+    /// All actions of this instance.
+    fn actions(&self) -> &[Action] {
+        &[]
+    }
+
+    /// Does an action; `arguments` is a JSON object.
+    fn act(&mut self, _action: &str, _arguments: &str) -> Result {
+        Err(Error::Unsupported)
+    }
+
+    /// Time of the next event known beforehand, s; ∞: none.
+    fn next_event_time(&self) -> f64 {
+        f64::INFINITY
+    }
+
+    /// Bodies and shapes; constant over the life of the instance.
+    fn scene(&self) -> Scene {
+        Scene::default()
+    }
+
+    /// Committed states of the scene's bodies, in its order.
+    fn body_states(&self, _out: &mut [BodyState]) -> Result {
+        Ok(())
+    }
+
+    /// Fields over the ground. `height`, where offered, is the surface that contact detection reads.
+    fn fields(&self) -> &[FieldInfo] {
+        &[]
+    }
+
+    /// Tile (a, b) of field number `field`.
+    fn field_tile(&self, _field: usize, _a: u32, _b: u32) -> Result<FieldTile<'_>> {
+        Err(Error::Unsupported)
+    }
+
+    /// Energies of the committed state.
+    fn energy(&self) -> Energy {
+        Energy::default()
+    }
+}

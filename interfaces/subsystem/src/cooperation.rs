@@ -11,7 +11,14 @@ use crate::port::Port;
 /// T1_n = min(T*_n, F_n, t_max) ≥ 0. The soil's whole wrench is scaled with T1_n/F_n. The tangential force has
 /// the direction of the estimate, so it can stop the slip and never reverses it; moments are clipped by those
 /// of the estimate likewise.
-pub fn plain_pass(port: &Port, t_star: &[f64], law_wrench: &[f64], shear_strength: f64, mu: f64, t1: &mut [f64]) {
+pub fn plain_pass(
+    port: &Port,
+    t_star: &[f64],
+    law_wrench: &[f64],
+    shear_strength: f64,
+    mu: f64,
+    t1: &mut [f64],
+) {
     let first = port.first as usize;
     let f_n = law_wrench[first].min(port.law.t_max).max(0.0);
     let t_n = t_star[first].min(f_n).max(0.0);

@@ -104,7 +104,10 @@ impl dyn Host + '_ {
     /// The terrain, or an error that says that this module needs one.
     pub fn required_terrain(&self) -> Result<&dyn Terrain> {
         self.terrain().ok_or_else(|| {
-            Error::Failed("needs ground, but the scenario has no [terrain] table; add [terrain] with kind = \"flat\"".into())
+            Error::Failed(
+                "needs ground, but the scenario has no [terrain] table; add [terrain] with kind = \"flat\""
+                    .into(),
+            )
         })
     }
 }

@@ -65,7 +65,8 @@ pub struct Law {
 
 impl Law {
     /// A contact without a cap; friction is narrowed by the ground.
-    pub const UNILATERAL: Self = Self { t_min: 0.0, t_max: f64::INFINITY, mu: f64::INFINITY, compliance: 0.0 };
+    pub const UNILATERAL: Self =
+        Self { t_min: 0.0, t_max: f64::INFINITY, mu: f64::INFINITY, compliance: 0.0 };
     /// A joint.
     pub const BILATERAL: Self =
         Self { t_min: f64::NEG_INFINITY, t_max: f64::INFINITY, mu: f64::INFINITY, compliance: 0.0 };

@@ -69,7 +69,8 @@ impl Unit {
             Some((name, power)) => (name, power.parse::<i8>().map_err(|_| unknown(symbol))?),
             None => (symbol, 1),
         };
-        let (_, exponents, factor) = SYMBOLS.iter().find(|(s, ..)| *s == name).ok_or_else(|| unknown(symbol))?;
+        let (_, exponents, factor) =
+            SYMBOLS.iter().find(|(s, ..)| *s == name).ok_or_else(|| unknown(symbol))?;
         for (sum, e) in self.exponents.iter_mut().zip(exponents) {
             *sum = sum.saturating_add(e.saturating_mul(power).saturating_mul(sign));
         }

@@ -1,31 +1,29 @@
 //! A scenario file: TOML in, checked [`Scenario`] out, errors with file, line and key.
+//!
+//! The keys of the reserved tables stand once, in [`keys`]; the parser, the JSON Schema and the documentation
+//! are made from there. Parameters of modules are checked by [`check_parameters`] once their schemas are known.
 
+mod check;
+mod events;
+pub mod keys;
+mod load;
 mod model;
+mod nearest;
+mod node;
+mod parameters;
+pub mod schema;
+mod section;
+mod set;
+mod soil_row;
+mod source;
+mod subsystems;
+mod terrain;
+#[cfg(test)]
+mod tests;
 
 pub use model::*;
-
-/// A scenario's text, kept for errors.
-#[derive(Clone, Debug, Default)]
-pub struct Source {
-    /// Path as the user gave it.
-    pub path: String,
-    /// Contents after `--set`.
-    pub text: String,
-}
-
-/// Wrong input: what, where, and the way out.
-#[derive(Debug, thiserror::Error, miette::Diagnostic)]
-#[error("{message}")]
-pub struct InputError {
-    /// What is wrong, with the offending value.
-    pub message: String,
-    /// File with its text.
-    #[source_code]
-    pub source_code: miette::NamedSource<String>,
-    /// Where.
-    #[label("here")]
-    pub span: Option<miette::SourceSpan>,
-    /// The way out, e.g. the nearest valid name.
-    #[help]
-    pub help: Option<String>,
-}
+pub use nearest::{did_you_mean, nearest};
+pub use parameters::{SHIPPED_MODULES, check_parameters, check_parameters_among};
+pub use set::split as split_set;
+pub use soil_row::{SoilRow, find_soil_table, read_soil_table};
+pub use source::{InputError, Source};

@@ -1,0 +1,144 @@
+//! `[[connect]]` and `[[event]]`.
+
+use super::keys::{self, Table};
+use super::model::{Comparison, Connection, EventSpec, Trigger};
+use super::node::{Node, Raw};
+use super::section::Section;
+use super::source::{InputError, Source};
+use super::subsystems::check_reference;
+use serde_json::Value;
+
+type Checked<T> = Result<T, Box<InputError>>;
+
+/// All connections in the order of the file.
+pub fn connections(source: &Source, names: &[&str]) -> Checked<Vec<Connection>> {
+    each(source, "connect", |s, node| {
+        for key in ["from", "to"] {
+            check_reference(&s.text(key), names).map_err(|c| s.error(key, c.message, c.help))?;
+        }
+        let [stars_from, stars_to] = ["from", "to"].map(|k| s.text(k).matches('*').count());
+        if stars_to > stars_from {
+            let message = format!("`to` has {stars_to} `*`, `from` only {stars_from} to fill them");
+            return Err(s.error("to", message, None));
+        }
+        Ok(Connection { from: s.text("from"), to: s.text("to"), span: node.extent() })
+    })
+}
+
+/// All events in the order of the file.
+pub fn events(source: &Source, names: &[&str]) -> Checked<Vec<EventSpec>> {
+    each(source, "event", |s, node| {
+        let trigger = trigger(s, names)?;
+        let set = assignments(source, s, names)?;
+        let act = actions(s, names)?;
+        if set.is_empty() && act.is_empty() {
+            let help = Some(
+                "give `set = { \"robot.LF_j2.max_torque\" = 0.0 }` or `act = \"robot.LF_j2.break\"`".into(),
+            );
+            return Err(source.error(&node.at, "an event that does nothing", help));
+        }
+        Ok(EventSpec { trigger, set, act, span: node.extent() })
+    })
+}
+
+fn each<T>(source: &Source, name: &str, read: impl Fn(&Section, &Node) -> Checked<T>) -> Checked<Vec<T>> {
+    let (Some(table), Some(node)) = (keys::table(name), source.root.get(name)) else { return Ok(Vec::new()) };
+    let Raw::List(items) = &node.value else { return Err(not_repeated(source, &table, node)) };
+    items.iter().map(|item| read(&Section::check(source, &table, Some(item))?, item)).collect()
+}
+
+fn not_repeated(source: &Source, table: &Table, node: &Node) -> Box<InputError> {
+    let message = format!("`{0}` is written `[[{0}]]`, with two brackets", table.name);
+    source.error(&node.at, message, Some(table.help.into()))
+}
+
+fn trigger(s: &Section, names: &[&str]) -> Checked<Trigger> {
+    match (s.optional_number("at_s"), s.optional_text("when")) {
+        (Some(at), None) => Ok(Trigger::At(at)),
+        (None, Some(text)) => when(s, &text, names),
+        (Some(_), Some(_)) => Err(s.error("when", "an event has `at_s` or `when`, not both".into(), None)),
+        (None, None) => {
+            let help = Some("at_s = 3.0, or when = \"robot.body.z < 0.1\"".into());
+            Err(s.error("set", "an event needs `at_s` or `when`".into(), help))
+        }
+    }
+}
+
+const OPERATORS: [(&str, Comparison); 6] = [
+    ("<=", Comparison::LessEqual),
+    (">=", Comparison::GreaterEqual),
+    ("==", Comparison::Equal),
+    ("!=", Comparison::NotEqual),
+    ("<", Comparison::Less),
+    (">", Comparison::Greater),
+];
+
+fn when(s: &Section, text: &str, names: &[&str]) -> Checked<Trigger> {
+    let refuse = |what: String| {
+        let help = Some("write `subsystem.variable < number`; operators: < <= > >= == !=".into());
+        s.error("when", what, help)
+    };
+    let split = OPERATORS
+        .iter()
+        .find_map(|(symbol, c)| text.split_once(symbol).map(|(l, r)| (l.trim(), *c, r.trim())));
+    let Some((variable, comparison, right)) = split else {
+        return Err(refuse(format!("`{text}` is no comparison")));
+    };
+    let value = match right.parse::<f64>() {
+        Ok(x) if x.is_finite() => x,
+        _ => match right {
+            "true" => 1.0,
+            "false" => 0.0,
+            _ => return Err(refuse(format!("`{right}` in `{text}` is no number"))),
+        },
+    };
+    check_reference(variable, names).map_err(|c| s.error("when", c.message, c.help))?;
+    if variable.contains('*') || variable.contains(char::is_whitespace) {
+        return Err(refuse(format!("`{variable}` in `{text}` is no name of one variable")));
+    }
+    Ok(Trigger::When { variable: variable.into(), comparison, value })
+}
+
+fn assignments(source: &Source, s: &Section, names: &[&str]) -> Checked<Vec<(String, Value)>> {
+    let mut all = Vec::new();
+    if let Some(node) = s.entry("set") {
+        flatten(source, "", node, names, &mut all)?;
+    }
+    Ok(all)
+}
+
+/// `{ "robot.a.b" = 1 }` and `{ robot.a.b = 1 }` mean the same.
+fn flatten(
+    source: &Source,
+    prefix: &str,
+    node: &Node,
+    names: &[&str],
+    all: &mut Vec<(String, Value)>,
+) -> Checked<()> {
+    for (key, entry) in node.entries() {
+        let name = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
+        if entry.is_table() {
+            flatten(source, &name, entry, names, all)?;
+            continue;
+        }
+        check_reference(&name, names).map_err(|c| source.error(&entry.key, c.message, c.help))?;
+        let value = entry.to_json();
+        if value.is_null() {
+            return Err(source.error(&entry.at, format!("`{name}` takes a finite value"), None));
+        }
+        all.push((name, value));
+    }
+    Ok(())
+}
+
+fn actions(s: &Section, names: &[&str]) -> Checked<Vec<String>> {
+    let texts = match s.value("act") {
+        Value::String(text) => vec![text],
+        Value::Array(items) => items.iter().filter_map(|v| v.as_str().map(str::to_owned)).collect(),
+        _ => Vec::new(),
+    };
+    for text in &texts {
+        check_reference(text, names).map_err(|c| s.error("act", c.message, c.help))?;
+    }
+    Ok(texts)
+}

@@ -1,0 +1,282 @@
+//! Every key of the reserved tables, once: the parser, the JSON Schema and `docs/scenario.md` are made from here.
+
+use super::check::allowed;
+use terraglue_subsystem::{Parameter, ParameterType};
+
+/// A reserved table of a scenario.
+pub struct Table {
+    /// Name.
+    pub name: &'static str,
+    /// Written as `[[name]]`, any number of times.
+    pub repeated: bool,
+    /// Must be there.
+    pub required: bool,
+    /// One line for people.
+    pub help: &'static str,
+    /// Its keys.
+    pub keys: Vec<Key>,
+}
+
+/// A key of a reserved table.
+pub struct Key {
+    /// Name, type, range, default, help.
+    pub parameter: Parameter,
+    /// What else the value may look like.
+    pub form: Form,
+    /// Values of `kind` that know this key; empty: all.
+    pub only: &'static [&'static str],
+}
+
+/// Shapes of values beyond what a [`Parameter`] describes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// As the parameter says.
+    Plain,
+    /// A list of exactly so many numbers.
+    Count(usize),
+    /// Text or a list of texts.
+    Texts,
+    /// A table of values by variable name.
+    Assignments,
+}
+
+impl Key {
+    /// Length that a list must have.
+    pub fn count(&self) -> Option<usize> {
+        match self.form {
+            Form::Count(n) => Some(n),
+            _ => None,
+        }
+    }
+
+    /// The allowed values in words.
+    pub fn allowed(&self) -> String {
+        match self.form {
+            Form::Texts => "text in quotes or a list of texts".into(),
+            Form::Assignments => "a table { \"subsystem.variable\" = value }".into(),
+            _ => allowed(&self.parameter, self.count()),
+        }
+    }
+
+    fn only(mut self, kinds: &'static [&'static str]) -> Self {
+        self.only = kinds;
+        self
+    }
+
+    fn form(mut self, form: Form) -> Self {
+        self.form = form;
+        self
+    }
+}
+
+impl From<Parameter> for Key {
+    fn from(parameter: Parameter) -> Self {
+        Self { parameter, form: Form::Plain, only: &[] }
+    }
+}
+
+/// The strategies of this version.
+pub const STRATEGIES: &[&str] = &["cooperative", "iterative"];
+/// The kinds of terrain of this version.
+pub const TERRAIN_KINDS: &[&str] = &["flat", "slope", "undulating", "crater", "esri-ascii", "geotiff"];
+/// Kinds of terrain that are made, not read.
+const MADE: &[&str] = &["flat", "slope", "undulating", "crater"];
+/// Kinds of terrain that come from a file.
+const READ: &[&str] = &["esri-ascii", "geotiff"];
+
+/// All reserved tables in the order of the documentation.
+pub fn tables() -> Vec<Table> {
+    vec![time(), world(), terrain(), gluing(), recording(), report(), connect(), event()]
+}
+
+/// The reserved table of that name.
+pub fn table(name: &str) -> Option<Table> {
+    tables().into_iter().find(|t| t.name == name)
+}
+
+fn of(name: &'static str, help: &'static str, keys: Vec<Key>) -> Table {
+    Table { name, repeated: false, required: false, help, keys }
+}
+
+fn time() -> Table {
+    let keys = vec![
+        number("step_s", "s", 0.001, "communication step h").positive().within_max(1.0).into(),
+        required("duration_s", "s", "simulated time; a multiple of `step_s`").positive().into(),
+    ];
+    Table { required: true, ..of("time", "How long and in which steps.", keys) }
+}
+
+fn world() -> Table {
+    let gravity =
+        Parameter { unit: "m/s^2".into(), ..list("gravity_m_s2", "gravity in the world frame, z up") };
+    let seed = Parameter::of("seed", ParameterType::Integer, "seed of everything random");
+    let keys = vec![
+        Key::from(gravity.or(vec![0.0, 0.0, -9.81])).form(Form::Count(3)),
+        seed.or(1).within(0.0, f64::INFINITY).into(),
+    ];
+    of("world", "What holds everywhere.", keys)
+}
+
+fn terrain() -> Table {
+    let kind = Parameter::of("kind", ParameterType::Text, "shape").choices(TERRAIN_KINDS);
+    let size =
+        Parameter { unit: "m".into(), ..list("size_m", "extent along x and y, centred on the origin") };
+    let waves = Parameter { unit: "m".into(), ..list("wavelengths_m", "shortest and longest wavelength") };
+    let centre = Parameter { unit: "m".into(), ..list("centre_m", "centre of the crater") };
+    let seed = Parameter::of("seed", ParameterType::Integer, "seed of the waves; `world.seed` where absent");
+    let half_pi = std::f64::consts::FRAC_PI_2;
+    let keys = vec![
+        kind.into(),
+        Key::from(size.positive()).form(Form::Count(2)).only(MADE),
+        Key::from(required("spacing_m", "m", "distance of neighbouring lattice nodes").positive()).only(MADE),
+        Key::from(number("height_m", "m", 0.0, "height of the plane")).only(&["flat"]),
+        Key::from(required("angle_rad", "rad", "angle against the horizontal").within(-half_pi, half_pi))
+            .only(&["slope"]),
+        Key::from(number("heading_rad", "rad", 0.0, "direction of steepest ascent, from +x"))
+            .only(&["slope"]),
+        Key::from(number("rms_m", "m", 0.015, "root mean square of the height").within(0.0, f64::INFINITY))
+            .only(&["undulating"]),
+        Key::from(waves.or(vec![0.3, 3.0]).positive()).form(Form::Count(2)).only(&["undulating"]),
+        Key::from(seed.optional().within(0.0, f64::INFINITY)).only(&["undulating"]),
+        Key::from(
+            number("flat_radius_m", "m", 0.0, "radius around the origin blended to flat ground")
+                .within(0.0, f64::INFINITY),
+        )
+        .only(&["undulating"]),
+        Key::from(required("diameter_m", "m", "diameter from crest to crest").positive()).only(&["crater"]),
+        Key::from(required("depth_m", "m", "depth of the floor below the crest").positive())
+            .only(&["crater"]),
+        Key::from(
+            number("rim_height_m", "m", 0.0, "height of the crest above the plain")
+                .within(0.0, f64::INFINITY),
+        )
+        .only(&["crater"]),
+        Key::from(number("max_slope_rad", "rad", half_pi, "steepest slope of the shape").positive())
+            .only(&["crater"]),
+        Key::from(centre.or(vec![0.0, 0.0])).form(Form::Count(2)).only(&["crater"]),
+        Key::from(Parameter::of("file", ParameterType::Path, "elevation file, relative to the scenario"))
+            .only(READ),
+        Key::from(
+            Parameter::of(
+                "fill_m",
+                ParameterType::Number,
+                "height that replaces missing data; refused when absent",
+            )
+            .optional(),
+        )
+        .only(READ),
+    ];
+    of("terrain", "The ground at the start; built by the coordinator, owned by the soil from then on.", keys)
+}
+
+fn gluing() -> Table {
+    let strategy = Parameter::of("strategy", ParameterType::Text, "how the groups are glued");
+    let form = Parameter::of("form", ParameterType::Text, "form of the iteration (iterative only)");
+    let start =
+        Parameter::of("start", ParameterType::Text, "what the iteration starts from (iterative only)");
+    let most =
+        Parameter::of("max_iterations", ParameterType::Integer, "iterations before the step is halved");
+    let keys = vec![
+        strategy.or("cooperative").choices(STRATEGIES).into(),
+        form.or("auto").choices(&["auto", "tt", "xt"]).into(),
+        number("tolerance", "", 1e-8, "residual relative to the largest of weight and force")
+            .positive()
+            .within_max(1.0)
+            .into(),
+        most.or(20).within(1.0, 10_000.0).into(),
+        start.or("estimate").choices(&["estimate", "zero"]).into(),
+        number(
+            "contact_margin_m",
+            "m",
+            1e-3,
+            "contacts are made when a shape can come this near in the step",
+        )
+        .within(0.0, f64::INFINITY)
+        .into(),
+    ];
+    of("gluing", "How subsystems are glued together.", keys)
+}
+
+fn recording() -> Table {
+    let every = |name, help| Parameter::of(name, ParameterType::Integer, help).within(1.0, 1e9);
+    let keys = vec![
+        every("every_steps", "steps between two records of variables and poses").or(10).into(),
+        every("ground_every_steps", "steps between two records of the ground that changed").or(100).into(),
+    ];
+    of("recording", "What is written to `recording.mcap`.", keys)
+}
+
+fn report() -> Table {
+    let text = |name, help| Parameter::of(name, ParameterType::Text, help).optional();
+    let keys = vec![
+        text("body", "`subsystem.body` of distance, roll and pitch; the first body of the first robot")
+            .into(),
+        text("commanded_speed", "`subsystem.variable` with the commanded speed, m/s").into(),
+        text("joint", "`subsystem.joint` whose torque, velocity and angle are plotted").into(),
+    ];
+    of("report", "What the summary and the report speak of.", keys)
+}
+
+fn connect() -> Table {
+    let text = |name, help| Parameter::of(name, ParameterType::Text, help);
+    let keys = vec![
+        text("from", "`subsystem.variable`; each `*` matches within one dotted part").into(),
+        text("to", "the same; its `*` take what matched in `from`").into(),
+    ];
+    Table { repeated: true, ..of("connect", "An output that feeds an input, once per step.", keys) }
+}
+
+fn event() -> Table {
+    let text = |name, help| Parameter::of(name, ParameterType::Text, help).optional();
+    let at = Parameter::of("at_s", ParameterType::Number, "simulated time; either this or `when`").optional();
+    let set =
+        Parameter::of("set", ParameterType::NumberTable, "new values by `\"subsystem.variable\"`").optional();
+    let keys = vec![
+        Key::from(Parameter { unit: "s".into(), ..at.within(0.0, f64::INFINITY) }),
+        text("when", "a comparison, e.g. `robot.body.z < 0.1`; fires once").into(),
+        Key::from(set).form(Form::Assignments),
+        Key::from(text("act", "`subsystem.action`, e.g. `robot.LF_j2.break`")).form(Form::Texts),
+    ];
+    Table {
+        repeated: true,
+        ..of("event", "Something that happens once: a fault, an operator's change.", keys)
+    }
+}
+
+/// Keys of the host in the table of a subsystem; everything else there is a parameter of the module.
+pub fn subsystem_keys() -> Vec<Key> {
+    let multiple = "steps of the testbed per step of this subsystem";
+    let module = "a module's name, or the path of a shared library relative to the scenario";
+    let row = "a row of the soil table, whose numbers are offered to the module";
+    vec![
+        Parameter::of("module", ParameterType::Text, module).into(),
+        Parameter::of("step_multiple", ParameterType::Integer, multiple).or(1).within(1.0, 1e6).into(),
+        Parameter::of("parameters", ParameterType::Text, row).optional().into(),
+        Parameter::of("parameters_file", ParameterType::Path, "soil table other than `models/soils.csv`")
+            .optional()
+            .into(),
+    ]
+}
+
+fn number(name: &str, unit: &str, default: f64, help: &str) -> Parameter {
+    Parameter::number(name, unit, default, help)
+}
+
+fn required(name: &str, unit: &str, help: &str) -> Parameter {
+    Parameter { unit: unit.into(), ..Parameter::of(name, ParameterType::Number, help) }
+}
+
+fn list(name: &str, help: &str) -> Parameter {
+    Parameter::of(name, ParameterType::Numbers, help)
+}
+
+/// An upper bound beside an exclusive lower one.
+trait WithinMax {
+    fn within_max(self, max: f64) -> Self;
+}
+
+impl WithinMax for Parameter {
+    fn within_max(self, max: f64) -> Self {
+        Self { max: Some(max), ..self }
+    }
+}

@@ -1,0 +1,179 @@
+//! From the text to the [`Scenario`].
+
+use super::events::{connections, events};
+use super::keys::{self, Table};
+use super::model::*;
+use super::nearest::did_you_mean;
+use super::node::{Node, Place, Raw};
+use super::section::Section;
+use super::set::{Edit, edit_text};
+use super::source::{InputError, Source};
+use super::{subsystems, terrain};
+use std::path::Path;
+use std::sync::Arc;
+use toml_edit::Document;
+
+type Checked<T> = Result<T, Box<InputError>>;
+
+impl Scenario {
+    /// Reads and checks a scenario file, edited by `sets` (key path and value).
+    ///
+    /// # Errors
+    /// Wrong input, with the place in the file or in the edit. Parameters of modules are checked later, by
+    /// [`super::check_parameters`].
+    pub fn load(path: &Path, sets: &[(String, String)]) -> Checked<Self> {
+        let text = std::fs::read_to_string(path).map_err(|e| unreadable(path, &e))?;
+        Self::parse(&text, &path.display().to_string(), sets)
+    }
+
+    /// The same for a text; `path` gives its name and folder.
+    pub fn parse(text: &str, path: &str, sets: &[(String, String)]) -> Checked<Self> {
+        let source = read_source(text, path, sets)?;
+        check_top_level(&source)?;
+        let specs = subsystems::all(&source)?;
+        let names: Vec<&str> = specs.iter().map(|s| s.name.as_str()).collect();
+        let time = with_section(&source, "time", read_time)?;
+        let world = with_section(&source, "world", |s| {
+            Ok(World { gravity_m_s2: s.numbers("gravity_m_s2"), seed: s.count("seed") })
+        })?;
+        let terrain = match source.root.get("terrain") {
+            Some(_) => Some(with_section(&source, "terrain", terrain::read)?),
+            None => None,
+        };
+        let gluing = with_section(&source, "gluing", read_gluing)?;
+        let recording = with_section(&source, "recording", |s| {
+            Ok(RecordingSpec {
+                every_steps: s.count("every_steps"),
+                ground_every_steps: s.count("ground_every_steps"),
+            })
+        })?;
+        let report = with_section(&source, "report", |s| read_report(s, &names))?;
+        let connections = connections(&source, &names)?;
+        let events = events(&source, &names)?;
+        let stem = Path::new(path).file_stem().map(|s| s.to_string_lossy().into_owned());
+        Ok(Self {
+            name: stem.unwrap_or_else(|| "scenario".into()),
+            folder: source.folder(),
+            time,
+            world,
+            terrain,
+            gluing,
+            recording,
+            report,
+            subsystems: specs,
+            connections,
+            events,
+            source,
+        })
+    }
+}
+
+fn unreadable(path: &Path, error: &std::io::Error) -> Box<InputError> {
+    let message = format!("cannot read the scenario `{}`: {error}", path.display());
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let mut files: Vec<String> = std::fs::read_dir(folder)
+        .into_iter()
+        .flatten()
+        .flatten()
+        .map(|e| e.file_name().to_string_lossy().into_owned())
+        .filter(|name| name.ends_with(".toml"))
+        .collect();
+    files.sort();
+    let wanted = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+    InputError::plain(message, did_you_mean(&wanted, files.iter().map(String::as_str)))
+}
+
+fn read_source(text: &str, path: &str, sets: &[(String, String)]) -> Checked<Source> {
+    let mut source = Source {
+        path: path.into(),
+        text: text.into(),
+        file_text: text.into(),
+        sets: sets.iter().map(|(key, value)| edit_text(key, value)).collect(),
+        root: Arc::default(),
+    };
+    if text.trim().is_empty() {
+        let help = Some("docs/scenario.md shows what a scenario holds".into());
+        return Err(source.error(&Place::default(), format!("the scenario `{path}` is empty"), help));
+    }
+    let document = Document::parse(text.to_owned()).map_err(|e| {
+        let message = format!("not TOML: {}", e.message().lines().collect::<Vec<_>>().join("; "));
+        source.error_at(e.span().unwrap_or(0..0), message, None)
+    })?;
+    let mut root = Node::of_document(document.as_table());
+    let mut document = document.into_mut();
+    for (number, (key, value)) in sets.iter().enumerate() {
+        let edit = Edit::parse(number, key, value)?;
+        edit.apply(&mut root);
+        edit.apply_to_text(&mut document);
+    }
+    source.text = document.to_string();
+    source.root = Arc::new(root);
+    Ok(source)
+}
+
+/// Every top-level key is a reserved table or a subsystem.
+fn check_top_level(source: &Source) -> Checked<()> {
+    let tables = keys::tables();
+    let reserved: Vec<&str> = tables.iter().map(|t| t.name).collect();
+    for (name, node) in source.root.entries() {
+        if reserved.contains(&name.as_str()) || node.get("module").is_some() {
+            continue;
+        }
+        let message = match &node.value {
+            Raw::Table(_) if node.get("fmu").is_some() => {
+                format!("`[{name}]` is an FMU; this version runs modules only")
+            }
+            Raw::Table(_) => {
+                format!("unknown table `[{name}]`: no table of a scenario, and a subsystem needs `module`")
+            }
+            Raw::List(items) if items.iter().all(Node::is_table) && !items.is_empty() => {
+                format!("unknown table `[[{name}]]`")
+            }
+            _ => format!("unknown key `{name}` outside of any table"),
+        };
+        return Err(source.error(&node.key, message, did_you_mean(name, reserved.iter().copied())));
+    }
+    Ok(())
+}
+
+fn with_section<T>(source: &Source, name: &str, read: impl FnOnce(&Section) -> Checked<T>) -> Checked<T> {
+    let empty = || Table { name: "", repeated: false, required: false, help: "", keys: Vec::new() };
+    let table = keys::table(name).unwrap_or_else(empty);
+    read(&Section::check(source, &table, source.root.get(name))?)
+}
+
+fn read_time(s: &Section) -> Checked<Time> {
+    let time = Time { step_s: s.number("step_s"), duration_s: s.number("duration_s") };
+    let steps = time.duration_s / time.step_s;
+    if (steps - steps.round()).abs() > 1e-6 * steps.max(1.0) || steps.round() < 1.0 {
+        let below = (steps.floor() * time.step_s).max(time.step_s);
+        let message =
+            format!("`duration_s` = {} is no multiple of `step_s` = {}", time.duration_s, time.step_s);
+        return Err(s.error("duration_s", message, Some(format!("e.g. {below}"))));
+    }
+    Ok(time)
+}
+
+fn read_gluing(s: &Section) -> Checked<GluingSpec> {
+    Ok(GluingSpec {
+        strategy: s.text("strategy"),
+        form: s.text("form"),
+        tolerance: s.number("tolerance"),
+        max_iterations: u32::try_from(s.count("max_iterations")).unwrap_or(u32::MAX),
+        start: s.text("start"),
+        contact_margin_m: s.number("contact_margin_m"),
+    })
+}
+
+fn read_report(s: &Section, names: &[&str]) -> Checked<ReportSpec> {
+    for key in ["body", "commanded_speed", "joint"] {
+        if let Some(text) = s.optional_text(key) {
+            subsystems::check_reference(&text, names).map_err(|c| s.error(key, c.message, c.help))?;
+        }
+    }
+    Ok(ReportSpec {
+        body: s.optional_text("body"),
+        commanded_speed: s.optional_text("commanded_speed"),
+        joint: s.optional_text("joint"),
+    })
+}

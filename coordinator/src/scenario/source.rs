@@ -1,0 +1,161 @@
+//! The text of a scenario, kept so that every error can show file, line and the offending words.
+
+use super::node::{Node, Place, Raw};
+use miette::{NamedSource, SourceSpan};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+
+/// A scenario's text, kept for errors.
+#[derive(Clone, Debug, Default)]
+pub struct Source {
+    /// Path as the user gave it.
+    pub path: String,
+    /// Contents after `--set`: a scenario file that gives the same run.
+    pub text: String,
+    /// Contents of the file; spans refer to it.
+    pub(super) file_text: Arc<str>,
+    /// Edits by `--set`, as `key.path=value`.
+    pub(super) sets: Arc<[String]>,
+    /// The parsed text after the edits.
+    pub(super) root: Arc<Node>,
+}
+
+/// Wrong input: what, where, and the way out.
+#[derive(Debug, thiserror::Error, miette::Diagnostic)]
+#[error("{message}")]
+pub struct InputError {
+    /// What is wrong, with the offending value.
+    pub message: String,
+    /// File with its text.
+    #[source_code]
+    pub source_code: NamedSource<String>,
+    /// Where.
+    #[label("here")]
+    pub span: Option<SourceSpan>,
+    /// The way out, e.g. the nearest valid name.
+    #[help]
+    pub help: Option<String>,
+}
+
+impl InputError {
+    /// An error about an input that has no text to show, e.g. a file that cannot be read.
+    pub fn plain(message: impl Into<String>, help: Option<String>) -> Box<Self> {
+        let source_code = NamedSource::new("", String::new());
+        Box::new(Self { message: message.into(), source_code, span: None, help })
+    }
+
+    /// An error about line `line` (from 1) of another input file, e.g. an elevation grid or a robot.
+    pub fn in_file(path: &Path, text: &str, line: usize, message: impl Into<String>) -> Box<Self> {
+        let start: usize = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum();
+        let length = text.get(start..).and_then(|rest| rest.lines().next()).map_or(0, str::len);
+        Box::new(Self {
+            message: message.into(),
+            source_code: NamedSource::new(path.display().to_string(), text.to_owned()),
+            span: Some((start..start + length).into()),
+            help: None,
+        })
+    }
+}
+
+impl Source {
+    /// An error at a byte range of the file.
+    pub fn error_at(
+        &self,
+        span: Range<usize>,
+        message: impl Into<String>,
+        help: Option<String>,
+    ) -> Box<InputError> {
+        self.error(&Place { set: None, range: span }, message, help)
+    }
+
+    /// An error at the first occurrence of `words` in a byte range of the file, or at the whole range; an edit
+    /// by `--set` that contains the words is shown instead.
+    pub fn error_within(
+        &self,
+        span: Range<usize>,
+        words: &str,
+        message: impl Into<String>,
+        help: Option<String>,
+    ) -> Box<InputError> {
+        let found = self.file_text.get(span.clone()).and_then(|text| text.find(words));
+        let place = match found {
+            Some(at) => Place { set: None, range: span.start + at..span.start + at + words.len() },
+            None => self.place_in_sets(words).unwrap_or(Place { set: None, range: span }),
+        };
+        self.error(&place, message, help)
+    }
+
+    /// An error at the value of a key path, e.g. `["robot", "model"]`; at the nearest table above when absent.
+    pub fn error_at_value(
+        &self,
+        path: &[&str],
+        message: impl Into<String>,
+        help: Option<String>,
+    ) -> Box<InputError> {
+        self.error(&self.value_place(path), message, help)
+    }
+
+    /// The folder of the file; relative paths refer to it.
+    pub fn folder(&self) -> PathBuf {
+        match Path::new(&self.path).parent() {
+            Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
+            _ => PathBuf::from("."),
+        }
+    }
+
+    pub(super) fn error(
+        &self,
+        place: &Place,
+        message: impl Into<String>,
+        help: Option<String>,
+    ) -> Box<InputError> {
+        let (name, text) = match place.set.and_then(|i| self.sets.get(i)) {
+            Some(set) => ("--set", set.as_str()),
+            None => (self.path.as_str(), self.file_text.as_ref()),
+        };
+        let end = place.range.end.min(text.len());
+        Box::new(InputError {
+            message: message.into(),
+            source_code: NamedSource::new(name, text.to_owned()),
+            span: Some((place.range.start.min(end)..end).into()),
+            help,
+        })
+    }
+
+    /// Place of the value at a path, or of the deepest table on the way that exists.
+    pub(super) fn value_place(&self, path: &[&str]) -> Place {
+        self.deepest(path).0.at.clone()
+    }
+
+    /// Place of the key at a path, or of the deepest table on the way that exists.
+    pub(super) fn key_place(&self, path: &[&str]) -> Place {
+        let (node, complete) = self.deepest(path);
+        if complete { node.key.clone() } else { node.at.clone() }
+    }
+
+    /// Whether the file or an edit has this path.
+    pub(super) fn has(&self, path: &[&str]) -> bool {
+        self.deepest(path).1
+    }
+
+    fn deepest(&self, path: &[&str]) -> (&Node, bool) {
+        let mut node = self.root.as_ref();
+        for key in path {
+            match &node.value {
+                Raw::Table(_) => match node.get(key) {
+                    Some(below) => node = below,
+                    None => return (node, false),
+                },
+                _ => return (node, false),
+            }
+        }
+        (node, true)
+    }
+
+    fn place_in_sets(&self, words: &str) -> Option<Place> {
+        self.sets.iter().enumerate().find_map(|(i, set)| {
+            set.find(words).map(|at| Place { set: Some(i), range: at..at + words.len() })
+        })
+    }
+}

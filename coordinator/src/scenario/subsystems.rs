@@ -1,0 +1,95 @@
+//! Tables with `module`: subsystems. The host's keys are taken out, the rest are parameters of the module.
+
+use super::check::Complaint;
+use super::keys::subsystem_keys;
+use super::model::SubsystemSpec;
+use super::nearest::did_you_mean;
+use super::node::{Node, Raw};
+use super::section::check_entry;
+use super::soil_row;
+use super::source::{InputError, Source};
+use serde_json::{Map, Value};
+
+/// All subsystems in the order of their names.
+pub fn all(source: &Source) -> Result<Vec<SubsystemSpec>, Box<InputError>> {
+    let reserved = super::keys::tables();
+    let is_subsystem = |(name, node): &&(String, Node)| {
+        node.get("module").is_some() && !reserved.iter().any(|t| t.name == name.as_str())
+    };
+    let entries = source.root.entries().iter().filter(is_subsystem);
+    let mut specs = entries.map(|(name, node)| one(source, name, node)).collect::<Result<Vec<_>, _>>()?;
+    if specs.is_empty() {
+        let help = Some("a subsystem is a table with `module`, e.g. [soil] module = \"soil-bekker\"".into());
+        return Err(source.error_at(0..0, "the scenario has no subsystem", help));
+    }
+    specs.sort_by(|a, b| a.name.cmp(&b.name));
+    Ok(specs)
+}
+
+fn one(source: &Source, name: &str, node: &Node) -> Result<SubsystemSpec, Box<InputError>> {
+    if name.contains('.') || name.contains('*') {
+        let message = format!("`{name}` is no name for a subsystem: it may not hold `.` or `*`");
+        return Err(source.error(&node.key, message, None));
+    }
+    let host_keys = subsystem_keys();
+    for key in &host_keys {
+        if let Some(entry) = node.get(&key.parameter.name) {
+            check_entry(source, key, entry)?;
+        }
+    }
+    let module = text(node, "module").unwrap_or_default();
+    if module.trim().is_empty() {
+        return Err(source.error_at_value(&[name, "module"], format!("`[{name}]` names no module"), None));
+    }
+    let is_host_key = |key: &str| host_keys.iter().any(|k| k.parameter.name == key);
+    Ok(SubsystemSpec {
+        name: name.into(),
+        step_multiple: node.get("step_multiple").and_then(|n| n.to_json().as_u64()).unwrap_or(1) as u32,
+        parameters: parameters(node, &module, is_host_key),
+        offered: soil_row::offered(source, name, node)?,
+        module,
+    })
+}
+
+/// The module's parameters; those in the sub-table that bears the module's name come on top.
+fn parameters(node: &Node, module: &str, is_host_key: impl Fn(&str) -> bool) -> Map<String, Value> {
+    let entries = node.entries().iter().filter(|(key, _)| !is_host_key(key) && key != module);
+    let mut all: Map<String, Value> = entries.map(|(key, n)| (key.clone(), n.to_json())).collect();
+    match node.get(module) {
+        Some(own) if own.is_table() => merge(&mut all, own),
+        Some(other) => drop(all.insert(module.into(), other.to_json())),
+        None => {}
+    }
+    all
+}
+
+fn merge(all: &mut Map<String, Value>, own: &Node) {
+    for (key, node) in own.entries() {
+        match (all.get_mut(key), node.is_table()) {
+            (Some(Value::Object(below)), true) => merge(below, node),
+            _ => drop(all.insert(key.clone(), node.to_json())),
+        }
+    }
+}
+
+/// Text of an entry.
+pub fn text(node: &Node, key: &str) -> Option<String> {
+    match &node.get(key)?.value {
+        Raw::Text(text) => Some(text.clone()),
+        _ => None,
+    }
+}
+
+/// Complains when `subsystem.something` names no subsystem of the scenario, or nothing below it.
+pub fn check_reference(reference: &str, names: &[&str]) -> Result<(), Complaint> {
+    let Some((subsystem, rest)) = reference.split_once('.').filter(|(_, rest)| !rest.is_empty()) else {
+        let message = format!("`{reference}` is not of the form `subsystem.name`");
+        return Err(Complaint { message, help: did_you_mean(reference, names.iter().copied()) });
+    };
+    debug_assert!(!rest.is_empty());
+    if subsystem.contains('*') || names.contains(&subsystem) {
+        return Ok(());
+    }
+    let message = format!("`{reference}`: there is no subsystem `{subsystem}`");
+    Err(Complaint { message, help: did_you_mean(subsystem, names.iter().copied()) })
+}

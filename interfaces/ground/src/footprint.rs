@@ -1,0 +1,211 @@
+//! The lattice nodes below a shape, each with the part of its cell that the shape covers.
+
+use crate::Surface;
+use crate::coverage::{disc_in_rectangle, polygon_in_rectangle};
+use crate::math::point;
+use crate::shape::Placed;
+use terraglue_subsystem::{Geometry, Node};
+
+/// Sub-samples along each side of a cell at the edge of an outline without closed form.
+const SAMPLES: i32 = 8;
+
+/// Outline of a shape seen from above.
+enum Outline {
+    /// Centre and radius.
+    Disc([f64; 2], f64),
+    /// Corners, counter-clockwise, and their number.
+    Polygon([[f64; 2]; 8], usize),
+    /// By asking the shape point by point.
+    Sampled,
+}
+
+/// Appends the nodes whose cells the shape covers and whose surface lies less than `margin` (m, vertical) below
+/// the shape's underside, row by row.
+///
+/// `area` is the covered part of the cell: exact for spheres, boxes and upright cylinders and capsules, from
+/// 8 × 8 points otherwise. `lower` is the exact underside at the node; where the vertical line through the node
+/// misses the shape, that of the nearest covered point.
+pub fn nodes_below<S: Surface + ?Sized>(shape: &Placed, surface: &S, margin: f64, out: &mut Vec<Node>) {
+    let lattice = surface.lattice();
+    let bounds = shape.aabb();
+    let outline = Outline::of(shape);
+    let (i0, i1) = lattice.cell_range(0, bounds.min[0], bounds.max[0]);
+    let (j0, j1) = lattice.cell_range(1, bounds.min[1], bounds.max[1]);
+    for j in j0..=j1 {
+        for i in i0..=i1 {
+            let reach = surface.height(i, j) + margin;
+            if bounds.min[2] >= reach {
+                continue;
+            }
+            let cell = Cell { at: lattice.position(i, j), half: 0.5 * lattice.spacing };
+            if let Some((area, lower)) = outline.node(shape, &cell, reach) {
+                out.push(Node { i, j, area, lower });
+            }
+        }
+    }
+}
+
+/// A square of side 2·half around a node.
+struct Cell {
+    at: [f64; 2],
+    half: f64,
+}
+
+impl Cell {
+    fn low(&self) -> [f64; 2] {
+        self.at.map(|c| c - self.half)
+    }
+
+    fn high(&self) -> [f64; 2] {
+        self.at.map(|c| c + self.half)
+    }
+
+    fn area(&self) -> f64 {
+        4.0 * self.half * self.half
+    }
+
+    /// Whether the shape covers all corners and so, being convex, the whole cell.
+    fn inside(&self, shape: &Placed) -> bool {
+        let (low, high) = (self.low(), self.high());
+        [[low[0], low[1]], [high[0], low[1]], [low[0], high[1]], [high[0], high[1]]]
+            .iter()
+            .all(|c| shape.lower(c[0], c[1]).is_some())
+    }
+
+    /// Number of covered sample points and the covered one nearest to the node.
+    fn sample(&self, shape: &Placed) -> (i32, f64) {
+        let step = 2.0 * self.half / f64::from(SAMPLES);
+        let (mut count, mut nearest, mut lower) = (0, f64::INFINITY, f64::INFINITY);
+        for b in 0..SAMPLES {
+            for a in 0..SAMPLES {
+                let offset = |k: i32| (f64::from(k) + 0.5) * step - self.half;
+                let (dx, dy) = (offset(a), offset(b));
+                if let Some(z) = shape.lower(self.at[0] + dx, self.at[1] + dy) {
+                    count += 1;
+                    if dx * dx + dy * dy < nearest {
+                        (nearest, lower) = (dx * dx + dy * dy, z);
+                    }
+                }
+            }
+        }
+        (count, lower)
+    }
+}
+
+impl Outline {
+    fn of(shape: &Placed) -> Self {
+        let centre = [shape.pose().position[0], shape.pose().position[1]];
+        let upright = shape.rotation().0[2][2].abs() > 1.0 - 1e-14;
+        match shape.geometry() {
+            Geometry::Sphere { radius } => Self::Disc(centre, *radius),
+            Geometry::Cylinder { radius, .. } | Geometry::Capsule { radius, .. } if upright => {
+                Self::Disc(centre, *radius)
+            }
+            Geometry::Box { half_extents } => box_outline(shape, *half_extents),
+            _ => Self::Sampled,
+        }
+    }
+
+    /// Covered area and lower surface of a node that is covered and lower than `reach`.
+    fn node(&self, shape: &Placed, cell: &Cell, reach: f64) -> Option<(f64, f64)> {
+        let hit = shape.lower(cell.at[0], cell.at[1]);
+        if hit.is_some_and(|z| z >= reach) {
+            return None;
+        }
+        let (area, lower) = match self {
+            Self::Disc(centre, radius) => disc_node(shape, cell, *centre, *radius, hit),
+            Self::Polygon(corners, count) => polygon_node(shape, cell, &corners[..*count], hit),
+            Self::Sampled => sampled_node(shape, cell, hit),
+        };
+        (area > 0.0 && lower < reach).then_some((area, lower))
+    }
+}
+
+fn disc_node(shape: &Placed, cell: &Cell, centre: [f64; 2], radius: f64, hit: Option<f64>) -> (f64, f64) {
+    let (dx, dy) = (cell.at[0] - centre[0], cell.at[1] - centre[1]);
+    let (far_x, far_y) = (dx.abs() + cell.half, dy.abs() + cell.half);
+    if let (true, Some(lower)) = (far_x * far_x + far_y * far_y <= radius * radius, hit) {
+        return (cell.area(), lower);
+    }
+    let area = disc_in_rectangle(centre, radius, cell.low(), cell.high());
+    // The rim, drawn in by a rounding error's width.
+    let rim = || {
+        let s = radius * (1.0 - 1e-12) / (dx * dx + dy * dy).sqrt();
+        shape.lower(centre[0] + s * dx, centre[1] + s * dy).unwrap_or(shape.pose().position[2])
+    };
+    (area, hit.unwrap_or_else(rim))
+}
+
+fn polygon_node(shape: &Placed, cell: &Cell, corners: &[[f64; 2]], hit: Option<f64>) -> (f64, f64) {
+    if let (Some(lower), true) = (hit, cell.inside(shape)) {
+        return (cell.area(), lower);
+    }
+    let area = polygon_in_rectangle(corners, cell.low(), cell.high());
+    let lower = hit.or_else(|| {
+        let [x, y] = nearest_on(corners, cell.at);
+        shape.lower(x, y)
+    });
+    match lower {
+        Some(lower) if area > 1e-12 * cell.area() => (area, lower),
+        _ => (0.0, f64::INFINITY),
+    }
+}
+
+fn sampled_node(shape: &Placed, cell: &Cell, hit: Option<f64>) -> (f64, f64) {
+    if let (Some(lower), true) = (hit, cell.inside(shape)) {
+        return (cell.area(), lower);
+    }
+    let (count, nearest) = cell.sample(shape);
+    (cell.area() * f64::from(count) / f64::from(SAMPLES * SAMPLES), hit.unwrap_or(nearest))
+}
+
+/// The point of a polygon's edge nearest to p, drawn a little towards the middle.
+fn nearest_on(corners: &[[f64; 2]], p: [f64; 2]) -> [f64; 2] {
+    let (mut best, mut distance, mut middle) = (p, f64::INFINITY, [0.0; 2]);
+    for (k, a) in corners.iter().enumerate() {
+        let b = corners[(k + 1) % corners.len()];
+        let (ex, ey) = (b[0] - a[0], b[1] - a[1]);
+        let length2 = ex * ex + ey * ey;
+        let along = (p[0] - a[0]) * ex + (p[1] - a[1]) * ey;
+        let s = if length2 > 0.0 { (along / length2).clamp(0.0, 1.0) } else { 0.0 };
+        let q = [a[0] + s * ex, a[1] + s * ey];
+        let d2 = (q[0] - p[0]) * (q[0] - p[0]) + (q[1] - p[1]) * (q[1] - p[1]);
+        if d2 < distance {
+            (best, distance) = (q, d2);
+        }
+        middle = [middle[0] + a[0], middle[1] + a[1]];
+    }
+    let n = corners.len().max(1) as f64;
+    std::array::from_fn(|k| best[k] + 1e-9 * (middle[k] / n - best[k]))
+}
+
+/// Hull of the eight corners seen from above (Andrew's monotone chain, 1979), in place.
+fn box_outline(shape: &Placed, half: [f64; 3]) -> Outline {
+    let mut corners: [[f64; 2]; 8] = std::array::from_fn(|k| {
+        let sign = |bit: usize| if k >> bit & 1 == 1 { 1.0 } else { -1.0 };
+        let p = point(shape.pose(), shape.rotation(), [0, 1, 2].map(|c| sign(c) * half[c]));
+        [p[0], p[1]]
+    });
+    corners.sort_unstable_by(|a, b| a[0].total_cmp(&b[0]).then(a[1].total_cmp(&b[1])));
+    let mut hull = [[0.0; 2]; 18];
+    let mut count = 0;
+    let turn =
+        |a: [f64; 2], b: [f64; 2], c: [f64; 2]| (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]);
+    for pass in 0..2 {
+        let start = count;
+        for k in 0..8 {
+            let p = if pass == 0 { corners[k] } else { corners[7 - k] };
+            while count >= start + 2 && turn(hull[count - 2], hull[count - 1], p) <= 0.0 {
+                count -= 1;
+            }
+            hull[count] = p;
+            count += 1;
+        }
+        // The last corner of each half is the first of the other.
+        count -= 1;
+    }
+    let count = count.min(8);
+    let mut out = [[0.0; 2]; 8];
+    out[..count].copy_from_slice(&hull[..count]);
+    Outline::Polygon(out, count)
+}

@@ -1,0 +1,153 @@
+//! A shape at a pose: what contact detection, soils and sensors ask of it.
+
+mod lower;
+mod support;
+
+use crate::math::{Rotation, cross, dot, point};
+use terraglue_subsystem::{Geometry, Pose};
+
+/// A plane of a convex mesh: outward unit normal and offset, normal·p ≤ offset inside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Face {
+    pub normal: [f64; 3],
+    pub offset: f64,
+}
+
+/// An axis-parallel box in the world.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Aabb {
+    /// Smallest coordinates, m.
+    pub min: [f64; 3],
+    /// Largest coordinates, m.
+    pub max: [f64; 3],
+}
+
+impl Aabb {
+    /// Centre, m.
+    pub fn centre(&self) -> [f64; 3] {
+        std::array::from_fn(|k| 0.5 * (self.min[k] + self.max[k]))
+    }
+
+    /// Distance from the centre to a corner, m.
+    pub fn radius(&self) -> f64 {
+        let half: [f64; 3] = std::array::from_fn(|k| 0.5 * (self.max[k] - self.min[k]));
+        dot(half, half).sqrt()
+    }
+}
+
+/// A geometry at a pose. Cheap to make for all but convex meshes, whose faces are computed once: keep it and
+/// [`Placed::move_to`] it.
+#[derive(Clone, Debug)]
+pub struct Placed {
+    geometry: Geometry,
+    world_from_shape: Pose,
+    rotation: Rotation,
+    faces: Vec<Face>,
+}
+
+impl Placed {
+    /// A copy of `geometry` whose frame lies at `world_from_shape`.
+    pub fn new(geometry: &Geometry, world_from_shape: &Pose) -> Self {
+        let rotation = Rotation::from_quaternion(world_from_shape.orientation);
+        let faces = faces_of(geometry);
+        Self { geometry: geometry.clone(), world_from_shape: *world_from_shape, rotation, faces }
+    }
+
+    /// The same shape at another pose; does not allocate.
+    pub fn move_to(&mut self, world_from_shape: &Pose) {
+        self.world_from_shape = *world_from_shape;
+        self.rotation = Rotation::from_quaternion(world_from_shape.orientation);
+    }
+
+    /// Its geometry.
+    pub fn geometry(&self) -> &Geometry {
+        &self.geometry
+    }
+
+    /// Its pose.
+    pub fn pose(&self) -> &Pose {
+        &self.world_from_shape
+    }
+
+    /// Its axes.
+    pub fn rotation(&self) -> &Rotation {
+        &self.rotation
+    }
+
+    /// Smallest axis-parallel box around it, world.
+    pub fn aabb(&self) -> Aabb {
+        let axes = &self.rotation.0;
+        let half: [f64; 3] = match &self.geometry {
+            Geometry::Sphere { radius } => [*radius; 3],
+            Geometry::Box { half_extents: h } => {
+                std::array::from_fn(|k| (0..3).map(|c| axes[c][k].abs() * h[c]).sum())
+            }
+            Geometry::Capsule { half_length, radius } => {
+                std::array::from_fn(|k| axes[2][k].abs() * half_length + radius)
+            }
+            Geometry::Cylinder { half_length, radius } => std::array::from_fn(|k| {
+                let a = axes[2][k];
+                a.abs() * half_length + radius * (1.0 - a * a).max(0.0).sqrt()
+            }),
+            Geometry::ConvexMesh { points, .. } => return self.mesh_box(points),
+        };
+        let c = self.world_from_shape.position;
+        Aabb { min: std::array::from_fn(|k| c[k] - half[k]), max: std::array::from_fn(|k| c[k] + half[k]) }
+    }
+
+    fn mesh_box(&self, points: &[[f64; 3]]) -> Aabb {
+        let mut out = Aabb { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
+        for p in points {
+            let w = point(&self.world_from_shape, &self.rotation, *p);
+            for k in 0..3 {
+                out.min[k] = out.min[k].min(w[k]);
+                out.max[k] = out.max[k].max(w[k]);
+            }
+        }
+        out
+    }
+}
+
+/// World height of the underside of a shape above (x, y), m; `None` where the vertical line misses it.
+///
+/// For many points of one shape make a [`Placed`] and ask [`Placed::lower`].
+pub fn lower_surface(geometry: &Geometry, world_from_shape: &Pose, x: f64, y: f64) -> Option<f64> {
+    Placed::new(geometry, world_from_shape).lower(x, y)
+}
+
+/// Smallest axis-parallel box around a shape, world.
+pub fn aabb(geometry: &Geometry, world_from_shape: &Pose) -> Aabb {
+    Placed::new(geometry, world_from_shape).aabb()
+}
+
+/// The different planes of a convex mesh's triangles; triangles without area have none.
+fn faces_of(geometry: &Geometry) -> Vec<Face> {
+    let Geometry::ConvexMesh { points, triangles } = geometry else {
+        return Vec::new();
+    };
+    let mut faces: Vec<Face> = Vec::new();
+    for triangle in triangles {
+        let corner = |k: usize| points.get(triangle[k] as usize).copied();
+        let (Some(a), Some(b), Some(c)) = (corner(0), corner(1), corner(2)) else {
+            continue;
+        };
+        let Some(face) = face(a, b, c) else { continue };
+        let same =
+            |f: &Face| dot(f.normal, face.normal) > 1.0 - 1e-14 && (f.offset - face.offset).abs() < 1e-12;
+        if !faces.iter().any(same) {
+            faces.push(face);
+        }
+    }
+    faces
+}
+
+fn face(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> Option<Face> {
+    let edge = |p: [f64; 3]| -> [f64; 3] { std::array::from_fn(|k| p[k] - a[k]) };
+    let (u, v) = (edge(b), edge(c));
+    let normal = cross(u, v);
+    let length = dot(normal, normal).sqrt();
+    (length > 1e-14 * (dot(u, u) + dot(v, v))).then(|| {
+        let normal = normal.map(|x| x / length);
+        Face { normal, offset: dot(normal, a) }
+    })
+}

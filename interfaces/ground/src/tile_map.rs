@@ -1,0 +1,175 @@
+//! State per node in tiles: what soils remember (sinkage, shear, yield) without paying for untouched ground.
+
+use crate::lattice::{Lattice, TILE_NODES};
+use crate::pool::Pool;
+use terraglue_subsystem::{FieldTile, TileValues};
+
+const ABSENT: u32 = u32::MAX;
+
+/// A value of type T for every node of a lattice. A tile exists from its first write on; a node of an absent
+/// tile reads as the default. Reading and writing are O(1) by index, at any age.
+#[derive(Clone, Debug)]
+pub struct TileMap<T> {
+    lattice: Lattice,
+    tiles: Vec<u32>,
+    generations: Vec<u64>,
+    touched: Vec<u32>,
+    pool: Pool<T>,
+    default: T,
+}
+
+/// Exact copy of the tiles of a [`TileMap`] that exist; refilled without allocation once it was large enough.
+#[derive(Clone, Debug)]
+pub struct TileMapSnapshot<T> {
+    touched: Vec<u32>,
+    values: Vec<T>,
+}
+
+impl<T> Default for TileMapSnapshot<T> {
+    fn default() -> Self {
+        Self { touched: Vec::new(), values: Vec::new() }
+    }
+}
+
+impl<T: Copy> TileMap<T> {
+    /// All nodes at `default`. `reserve` tiles can be touched before memory is allocated again.
+    pub fn new(lattice: Lattice, default: T, reserve: usize) -> Self {
+        let count = lattice.tile_count();
+        let mut pool = Pool::new(default);
+        pool.reserve(reserve.min(count));
+        let touched = Vec::with_capacity(count);
+        Self { lattice, tiles: vec![ABSENT; count], generations: vec![0; count], touched, pool, default }
+    }
+
+    /// Where the nodes lie.
+    pub fn lattice(&self) -> &Lattice {
+        &self.lattice
+    }
+
+    /// Value of node (i, j); indices outside read the nearest node of the edge.
+    #[inline]
+    pub fn get(&self, i: i32, j: i32) -> T {
+        let (i, j) = self.lattice.clamp(i, j);
+        let (tile, k) = self.lattice.locate(i, j);
+        match self.tiles[tile] {
+            ABSENT => self.default,
+            slot => self.pool.value(slot, k),
+        }
+    }
+
+    /// Node (i, j) for writing; its tile exists from now on. Indices outside mean the nearest node of the edge.
+    #[inline]
+    pub fn get_mut(&mut self, i: i32, j: i32) -> &mut T {
+        let (i, j) = self.lattice.clamp(i, j);
+        let (tile, k) = self.lattice.locate(i, j);
+        &mut self.tile_mut(tile)[k]
+    }
+
+    /// Writes node (i, j).
+    #[inline]
+    pub fn set(&mut self, i: i32, j: i32, value: T) {
+        *self.get_mut(i, j) = value;
+    }
+
+    /// The nodes of a tile, x fastest; `None` while all are at the default.
+    #[inline]
+    pub fn tile(&self, tile: usize) -> Option<&[T]> {
+        match self.tiles[tile] {
+            ABSENT => None,
+            slot => Some(self.pool.tile(slot)),
+        }
+    }
+
+    /// The nodes of a tile for writing; it exists from now on.
+    #[inline]
+    pub fn tile_mut(&mut self, tile: usize) -> &mut [T] {
+        self.generations[tile] += 1;
+        if self.tiles[tile] == ABSENT {
+            let slot = self.pool.take();
+            self.pool.tile_mut(slot).fill(self.default);
+            self.tiles[tile] = slot;
+            self.touched.push(tile as u32);
+        }
+        self.pool.tile_mut(self.tiles[tile])
+    }
+
+    /// Numbers of the tiles that exist, in the order of their first write.
+    pub fn touched(&self) -> &[u32] {
+        &self.touched
+    }
+
+    /// Grows with every write to the tile.
+    pub fn generation(&self, tile: usize) -> u64 {
+        self.generations[tile]
+    }
+
+    /// All nodes back to the default.
+    pub fn clear(&mut self) {
+        self.drop_tiles();
+    }
+
+    /// Copies all tiles that exist into `out`.
+    pub fn save(&self, out: &mut TileMapSnapshot<T>) {
+        out.touched.clear();
+        out.values.clear();
+        out.touched.extend_from_slice(&self.touched);
+        for tile in &self.touched {
+            out.values.extend_from_slice(self.pool.tile(self.tiles[*tile as usize]));
+        }
+    }
+
+    /// Back to a state made by [`TileMap::save`] of this map or of one on the same lattice.
+    pub fn restore(&mut self, snapshot: &TileMapSnapshot<T>) {
+        self.drop_tiles();
+        let count = self.tiles.len();
+        for (tile, values) in snapshot.tiles().filter(|(tile, _)| (*tile as usize) < count) {
+            self.tile_mut(tile as usize).copy_from_slice(values);
+        }
+    }
+
+    fn drop_tiles(&mut self) {
+        for tile in self.touched.drain(..) {
+            self.pool.release(self.tiles[tile as usize]);
+            self.tiles[tile as usize] = ABSENT;
+            self.generations[tile as usize] += 1;
+        }
+    }
+}
+
+impl<T> TileMapSnapshot<T> {
+    /// (number, values of the 32 × 32 nodes) of every tile, for serialisation.
+    pub fn tiles(&self) -> impl Iterator<Item = (u32, &[T])> {
+        self.touched.iter().copied().zip(self.values.chunks_exact(TILE_NODES))
+    }
+
+    /// Adds a tile, for deserialisation; `values` are its 32 × 32 nodes. False when the length is wrong.
+    pub fn push(&mut self, tile: u32, values: impl IntoIterator<Item = T>) -> bool {
+        let before = self.values.len();
+        self.values.extend(values);
+        let right = self.values.len() == before + TILE_NODES;
+        if right {
+            self.touched.push(tile);
+        } else {
+            self.values.truncate(before);
+        }
+        right
+    }
+}
+
+impl TileMap<f64> {
+    /// Tile (a, b) as a field shows it.
+    pub fn field_tile(&self, a: u32, b: u32) -> FieldTile<'_> {
+        let tile = (b * self.lattice.tiles()[0] + a) as usize;
+        let values = self.tile(tile).map_or(TileValues::Uniform(self.default), TileValues::F64);
+        FieldTile { generation: self.generations[tile], values }
+    }
+}
+
+impl TileMap<f32> {
+    /// Tile (a, b) as a field shows it.
+    pub fn field_tile(&self, a: u32, b: u32) -> FieldTile<'_> {
+        let tile = (b * self.lattice.tiles()[0] + a) as usize;
+        let values = self.tile(tile).map_or(TileValues::Uniform(f64::from(self.default)), TileValues::F32);
+        FieldTile { generation: self.generations[tile], values }
+    }
+}

@@ -1,0 +1,109 @@
+//! Nodes of a contact patch: covered areas, depths, and the plane below it.
+
+use terraglue_ground::{HeightField, Lattice, Placed, Surface, disc_in_rectangle, fit_plane, nodes_below};
+use terraglue_subsystem::{Geometry, Node, Pose};
+
+fn flat() -> HeightField {
+    let lattice = Lattice { origin: [-1.0, -1.0], spacing: 0.01, size: [201, 201] };
+    HeightField::flat(lattice, 0.0).expect("in range")
+}
+
+fn nodes(geometry: &Geometry, pose: &Pose, margin: f64) -> Vec<Node> {
+    let mut out = Vec::new();
+    nodes_below(&Placed::new(geometry, pose), &flat(), margin, &mut out);
+    out
+}
+
+fn at(x: f64, y: f64, z: f64) -> Pose {
+    Pose { position: [x, y, z], ..Pose::IDENTITY }
+}
+
+fn area(nodes: &[Node]) -> f64 {
+    nodes.iter().map(|n| n.area).sum()
+}
+
+#[test]
+fn areas_of_standing_shapes_are_exact_wherever_they_stand() {
+    let disc = Geometry::Cylinder { half_length: 0.05, radius: 0.083 };
+    let plate = Geometry::Box { half_extents: [0.051, 0.033, 0.01] };
+    for k in 0..20 {
+        let (x, y, turn) = (0.0013 * f64::from(k), -0.0027 * f64::from(k), 0.05 * f64::from(k));
+        let covered = area(&nodes(&disc, &at(x, y, 0.04), 0.0));
+        assert!((covered / (std::f64::consts::PI * 0.083 * 0.083) - 1.0).abs() < 1e-9, "{covered}");
+        let turned = Pose { orientation: [turn.cos(), 0.0, 0.0, turn.sin()], ..at(x, y, 0.005) };
+        let covered = area(&nodes(&plate, &turned, 0.0));
+        assert!((covered / (4.0 * 0.051 * 0.033) - 1.0).abs() < 1e-9, "{covered}");
+    }
+}
+
+#[test]
+fn area_of_a_slightly_tilted_cylinder_is_within_one_percent() {
+    let disc = Geometry::Cylinder { half_length: 0.05, radius: 0.083 };
+    let tilted = Pose { orientation: [1.0, 1e-4, 0.0, 0.0], ..at(0.003, 0.001, 0.04) };
+    let covered = area(&nodes(&disc, &tilted, 0.0));
+    assert!((covered / (std::f64::consts::PI * 0.083 * 0.083) - 1.0).abs() < 0.01, "{covered}");
+}
+
+#[test]
+fn disc_area_splits_over_cells_without_remainder() {
+    let (centre, radius) = ([0.013, -0.002], 0.0314);
+    let total: f64 = (-10..10)
+        .flat_map(|j| (-10..10).map(move |i| [f64::from(i) * 0.01, f64::from(j) * 0.01]))
+        .map(|low| disc_in_rectangle(centre, radius, low, [low[0] + 0.01, low[1] + 0.01]))
+        .sum();
+    assert!((total - std::f64::consts::PI * radius * radius).abs() < 1e-15);
+    let quarter = disc_in_rectangle([0.0; 2], 1.0, [0.0; 2], [2.0; 2]);
+    assert!((quarter - std::f64::consts::FRAC_PI_4).abs() < 1e-15);
+}
+
+#[test]
+fn a_sphere_lists_the_nodes_of_its_contact_circle_only() {
+    let sphere = Geometry::Sphere { radius: 0.03 };
+    let found = nodes(&sphere, &at(0.002, 0.001, 0.027), 0.0);
+    // Contact circle of 3 mm depth: √(0.03² − 0.027²) = 13 mm.
+    for n in &found {
+        let p = flat().lattice().position(n.i, n.j);
+        let d2 = (p[0] - 0.002).powi(2) + (p[1] - 0.001).powi(2);
+        assert!((n.lower - (0.027 - (0.0009 - d2).sqrt())).abs() < 1e-12);
+        assert!(n.lower < 0.0 && d2 < 0.0133 * 0.0133);
+        assert!((n.area - 1e-4).abs() < 1e-15, "inner cells are covered");
+    }
+    // The centre, its four neighbours and the node at (10, 10) mm, 12.04 mm away.
+    assert_eq!(found.len(), 6);
+    assert!(nodes(&sphere, &at(0.0, 0.0, 0.031), 0.0).is_empty());
+    assert!(!nodes(&sphere, &at(0.0, 0.0, 0.031), 0.002).is_empty());
+}
+
+#[test]
+fn a_cell_that_is_covered_beside_its_node_gets_the_nearest_underside() {
+    // A plate whose edge ends 3 mm beyond a cell's border and 2 mm short of its node.
+    let plate = Geometry::Box { half_extents: [0.023, 0.02, 0.01] };
+    let found = nodes(&plate, &at(0.005, 0.0, 0.0), 0.0);
+    let edge = found.iter().find(|n| n.i == 103 && n.j == 100).expect("covered in part");
+    assert!((edge.area - 0.003 * 0.01).abs() < 1e-12, "{}", edge.area);
+    assert!((edge.lower + 0.01).abs() < 1e-9);
+}
+
+#[test]
+fn plane_fit_is_exact_on_a_slope_and_level_outside() {
+    struct Slope(Lattice);
+    impl Surface for Slope {
+        fn lattice(&self) -> &Lattice {
+            &self.0
+        }
+        fn height(&self, i: i32, j: i32) -> f64 {
+            let (i, j) = self.0.clamp(i, j);
+            let [x, y] = self.0.position(i as i32, j as i32);
+            100.0 + 0.3 * x - 0.1 * y
+        }
+    }
+    let slope = Slope(*flat().lattice());
+    for (x, y, radius) in [(0.0, 0.0, 0.0), (0.2137, -0.4, 0.03), (-0.99, 0.995, 0.05), (0.1, 0.3, 0.4)] {
+        let plane = fit_plane(&slope, x, y, radius);
+        let length = (1.0f64 + 0.09 + 0.01).sqrt();
+        assert!((plane.height - (100.0 + 0.3 * x - 0.1 * y)).abs() < 1e-9);
+        assert!((plane.normal[0] + 0.3 / length).abs() < 1e-9);
+        assert!((plane.normal[1] - 0.1 / length).abs() < 1e-9);
+    }
+    assert_eq!(fit_plane(&slope, 5.0, 5.0, 0.1).normal, [0.0, 0.0, 1.0]);
+}

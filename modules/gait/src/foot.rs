@@ -1,0 +1,140 @@
+//! The path of one foot in the body frame: against the body's twist on the ground, through the air to the next stance.
+//!
+//! In the air x and y follow a cycloid and z a raised cosine, so that the foot leaves and meets the ground at rest
+//! in the body frame.
+
+use std::f64::consts::TAU;
+
+/// Planar velocity of the body in its own frame.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Twist {
+    /// Forward, m/s.
+    pub speed: f64,
+    /// Turn to the left, rad/s.
+    pub turn_rate: f64,
+}
+
+impl Twist {
+    /// The same twist times a factor.
+    pub fn scaled(self, factor: f64) -> Self {
+        Self { speed: self.speed * factor, turn_rate: self.turn_rate * factor }
+    }
+
+    /// Speed at which the ground passes below the point `p` of the body frame, m/s.
+    pub fn speed_at(self, p: [f64; 2]) -> f64 {
+        libm::hypot(self.speed - self.turn_rate * p[1], self.turn_rate * p[0])
+    }
+
+    /// Where a point at rest in the world is seen from the body `dt` seconds later (earlier when negative), m.
+    /// Exact for a constant twist.
+    pub fn pass_below(self, p: [f64; 2], dt: f64) -> [f64; 2] {
+        let angle = self.turn_rate * dt;
+        let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+        let [along, across] = mean_direction(angle, sin, cos);
+        let way = self.speed * dt;
+        let (x, y) = (p[0] - way * along, p[1] - way * across);
+        [cos * x + sin * y, cos * y - sin * x]
+    }
+}
+
+/// (sin θ/θ, (1 − cos θ)/θ): the mean heading while turning by θ.
+fn mean_direction(angle: f64, sin: f64, cos: f64) -> [f64; 2] {
+    if angle.abs() < 1e-4 {
+        [1.0 - angle * angle / 6.0, angle / 2.0]
+    } else {
+        [sin / angle, (1.0 - cos) / angle]
+    }
+}
+
+/// State of a foot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Foot {
+    /// Phase in the leg's own cycle, 0 … 1.
+    pub phase: f64,
+    /// Whether it is in the air.
+    pub airborne: bool,
+    /// Position in the body frame, m.
+    pub position: [f64; 2],
+    /// Height above the plane of the standing feet, m.
+    pub height: f64,
+    lift_off: [f64; 2],
+    lift: f64,
+}
+
+/// What holds for all feet during a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cycle {
+    /// Duration, s.
+    pub period: f64,
+    /// Part on the ground.
+    pub duty: f64,
+    /// Height of the swing, m; a foot takes it at lift-off.
+    pub lift: f64,
+    /// Velocity of the body.
+    pub twist: Twist,
+    /// Whether standing feet may leave the ground.
+    pub stepping: bool,
+}
+
+impl Foot {
+    /// Standing at a point of the body frame, m.
+    pub fn standing(position: [f64; 2], phase: f64) -> Self {
+        Self { phase, airborne: false, position, height: 0.0, lift_off: position, lift: 0.0 }
+    }
+
+    /// Moves on by `dt` s; events inside the step are met exactly. `neutral` is the middle of the stance, m.
+    pub fn advance(&mut self, cycle: &Cycle, neutral: [f64; 2], dt: f64) {
+        let mut left = dt;
+        while left > 0.0 {
+            left = if self.airborne { self.fly(cycle, neutral, left) } else { self.stand(cycle, left) };
+        }
+    }
+
+    /// Where the next stance begins: half a stance ahead of the neutral point, m.
+    fn touch_down(cycle: &Cycle, neutral: [f64; 2]) -> [f64; 2] {
+        cycle.twist.pass_below(neutral, -0.5 * cycle.duty * cycle.period)
+    }
+
+    /// Up to the next event or by `dt`; the time that is left, s.
+    fn stand(&mut self, cycle: &Cycle, dt: f64) -> f64 {
+        if !cycle.stepping {
+            self.position = cycle.twist.pass_below(self.position, dt);
+            return 0.0;
+        }
+        // A foot whose cycle begins in the air waits on the ground for its first lift-off.
+        let ends = if self.phase <= cycle.duty { cycle.duty } else { 1.0 };
+        let until = (ends - self.phase) * cycle.period;
+        let passed = until.min(dt);
+        self.position = cycle.twist.pass_below(self.position, passed);
+        if until > dt {
+            self.phase += dt / cycle.period;
+            return 0.0;
+        }
+        if ends == 1.0 {
+            self.phase = 0.0;
+        } else {
+            self.phase = cycle.duty;
+            self.airborne = true;
+            self.lift_off = self.position;
+            self.lift = cycle.lift;
+        }
+        dt - passed
+    }
+
+    fn fly(&mut self, cycle: &Cycle, neutral: [f64; 2], dt: f64) -> f64 {
+        let until = (1.0 - self.phase) * cycle.period;
+        let target = Self::touch_down(cycle, neutral);
+        if until <= dt {
+            *self = Self { lift: self.lift, ..Self::standing(target, 0.0) };
+            return dt - until;
+        }
+        self.phase += dt / cycle.period;
+        let u = ((self.phase - cycle.duty) / (1.0 - cycle.duty)).clamp(0.0, 1.0);
+        let along = u - libm::sin(TAU * u) / TAU;
+        for k in 0..2 {
+            self.position[k] = self.lift_off[k] + (target[k] - self.lift_off[k]) * along;
+        }
+        self.height = self.lift * 0.5 * (1.0 - libm::cos(TAU * u));
+        0.0
+    }
+}

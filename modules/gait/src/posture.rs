@@ -1,0 +1,70 @@
+//! The loop that is closed through the robot: measured tilt and heading correct the feet.
+//!
+//! Tilt: roll and pitch are smoothed, and a proportional and an integral part tilt the plane of the feet in the body
+//! frame against them: the low side is pushed out, the high side drawn in. Heading: the error turns the body.
+
+/// Gains and limits.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gains {
+    /// Time constant of the smoothing of roll and pitch, s.
+    pub smoothing_s: f64,
+    /// Proportional gain of the tilt, dimensionless.
+    pub tilt: f64,
+    /// Integral gain of the tilt, 1/s.
+    pub tilt_integral: f64,
+    /// Largest tilt of the plane of the feet, rad.
+    pub tilt_limit: f64,
+    /// Turn rate per heading error, 1/s.
+    pub heading: f64,
+    /// Largest turn rate of the heading correction, rad/s.
+    pub turn_limit: f64,
+}
+
+/// Smoothed tilt and its integral.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Posture {
+    smooth: [f64; 2],
+    integral: [f64; 2],
+    /// Tilt of the plane of the feet about x and y in the body frame that is in force, rad.
+    pub correction: [f64; 2],
+}
+
+impl Posture {
+    /// Moves on by `dt` s with the measured roll and pitch (rad). Switched off, the correction fades out with the
+    /// time constant of the smoothing.
+    pub fn advance(&mut self, gains: &Gains, enabled: bool, tilt: [f64; 2], dt: f64) {
+        let share = dt / (gains.smoothing_s + dt);
+        for (axis, measured) in tilt.into_iter().enumerate() {
+            self.smooth[axis] += share * (measured - self.smooth[axis]);
+            if enabled {
+                let sum = self.integral[axis] + gains.tilt_integral * self.smooth[axis] * dt;
+                self.integral[axis] = sum.clamp(-gains.tilt_limit, gains.tilt_limit);
+                let wanted = self.integral[axis] + gains.tilt * self.smooth[axis];
+                self.approach(axis, wanted.clamp(-gains.tilt_limit, gains.tilt_limit), share);
+            } else {
+                self.integral[axis] -= share * self.integral[axis];
+                self.approach(axis, 0.0, share);
+            }
+        }
+    }
+
+    fn approach(&mut self, axis: usize, wanted: f64, share: f64) {
+        self.correction[axis] += share * (wanted - self.correction[axis]);
+    }
+
+    /// By how much the foot at `p` (body frame, m) is raised, m. Positive roll lifts the left side (y > 0): its feet
+    /// are drawn in. Positive pitch lowers the nose (x > 0): its feet are pushed out.
+    pub fn raise(&self, p: [f64; 2]) -> f64 {
+        self.correction[0] * p[1] - self.correction[1] * p[0]
+    }
+}
+
+/// Turn rate that corrects a heading error, rad/s; the error is taken the short way round.
+pub fn turn_towards(gains: &Gains, heading: f64, yaw: f64) -> f64 {
+    (gains.heading * wrap(heading - yaw)).clamp(-gains.turn_limit, gains.turn_limit)
+}
+
+/// An angle as −π … π, rad.
+pub fn wrap(angle: f64) -> f64 {
+    libm::atan2(libm::sin(angle), libm::cos(angle))
+}

@@ -1,0 +1,188 @@
+//! The walking machine: command in, joint angles out; standing, walking and stopping.
+
+use crate::foot::{Cycle, Foot, Twist};
+use crate::geometry::{JOINTS, LEGS};
+use crate::parameters::Settings;
+use crate::pattern::Pattern;
+use crate::posture::{Posture, turn_towards, wrap};
+
+/// What is asked of the walker and what it measures; may change before every step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Command {
+    /// Forward speed, m/s.
+    pub speed: f64,
+    /// Turn rate, rad/s; the heading to be held turns with it.
+    pub turn_rate: f64,
+    /// Heading in the world at the start, rad.
+    pub heading: f64,
+    /// Height of the swing, m.
+    pub lift: f64,
+    /// Pattern; a change stops the robot first.
+    pub pattern: Pattern,
+    /// Whether the tilt corrects the feet.
+    pub posture_feedback: bool,
+    /// Whether the heading error turns the robot.
+    pub heading_feedback: bool,
+    /// Measured roll, pitch and yaw of the body, rad.
+    pub attitude: [f64; 3],
+}
+
+/// What the machine is doing.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Mode {
+    /// All feet rest; walking starts when the time (s) has passed and a speed is commanded.
+    Standing(f64),
+    /// The cycle runs.
+    Walking,
+    /// Feet in the air come down, the body comes to rest.
+    Stopping,
+}
+
+/// Everything that changes from step to step; a copy of it is a snapshot.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Walker {
+    /// What it is doing.
+    pub mode: Mode,
+    /// Pattern in force.
+    pub pattern: Pattern,
+    /// Feet in the order of the legs.
+    pub feet: [Foot; LEGS],
+    /// Correction of the tilt.
+    pub posture: Posture,
+    /// Twist that the feet make, after limits and ramps.
+    pub twist: Twist,
+    /// Targets of all joints, legs one after the other, rad.
+    pub targets: [f64; LEGS * JOINTS],
+    /// Number of legs whose foot had to be pulled into reach.
+    pub out_of_reach: u32,
+    /// Phase of the cycle, 0 … 1.
+    pub phase: f64,
+    ramp: f64,
+    slewed: Twist,
+    turned: f64,
+}
+
+impl Walker {
+    /// Standing with all feet at their neutral points.
+    pub fn new(settings: &Settings, command: &Command) -> Self {
+        let phases = command.pattern.phases();
+        let feet = std::array::from_fn(|leg| Foot::standing(settings.neutral[leg], phases[leg]));
+        let mut walker = Self {
+            mode: Mode::Standing(settings.stand_s),
+            pattern: command.pattern,
+            feet,
+            posture: Posture::default(),
+            twist: Twist::default(),
+            targets: [0.0; LEGS * JOINTS],
+            out_of_reach: 0,
+            phase: 0.0,
+            ramp: 0.0,
+            slewed: Twist { speed: command.speed, turn_rate: command.turn_rate },
+            turned: 0.0,
+        };
+        walker.aim(settings);
+        walker
+    }
+
+    /// Moves on by `dt` s under a command that holds over the step.
+    pub fn advance(&mut self, settings: &Settings, command: &Command, dt: f64) {
+        if dt <= 0.0 {
+            return;
+        }
+        let tilt = [command.attitude[0], command.attitude[1]];
+        self.posture.advance(&settings.gains, command.posture_feedback, tilt, dt);
+        self.slew(settings, command, dt);
+        let left = self.wait(settings, command, dt);
+        if left > 0.0 && !matches!(self.mode, Mode::Standing(_)) {
+            self.walk(settings, command, left);
+        }
+        self.aim(settings);
+    }
+
+    /// Stands still for what remains of the waiting time; the time of the step that is left for walking, s.
+    fn wait(&mut self, settings: &Settings, command: &Command, dt: f64) -> f64 {
+        let Mode::Standing(wait) = self.mode else { return dt };
+        if wait >= dt || !moves(command) {
+            self.mode = Mode::Standing((wait - dt).max(0.0));
+            self.twist = Twist::default();
+            return 0.0;
+        }
+        self.start(command);
+        dt - wait
+    }
+
+    fn start(&mut self, command: &Command) {
+        self.mode = Mode::Walking;
+        self.pattern = command.pattern;
+        self.ramp = 0.0;
+        self.phase = 0.0;
+        let phases = self.pattern.phases();
+        for (foot, phase) in self.feet.iter_mut().zip(phases) {
+            *foot = Foot::standing(foot.position, phase);
+        }
+    }
+
+    fn walk(&mut self, settings: &Settings, command: &Command, dt: f64) {
+        if command.pattern != self.pattern || !moves(command) {
+            self.mode = Mode::Stopping;
+        }
+        let stepping = self.mode == Mode::Walking;
+        let before = self.ramp;
+        let rate = if stepping { 1.0 / settings.ramp_s } else { -2.0 / settings.ramp_s };
+        self.ramp = (before + rate * dt).clamp(0.0, 1.0);
+        self.twist = self.limited(settings).scaled(0.5 * (before + self.ramp));
+        self.turned = wrap(self.turned + self.ramp * command.turn_rate * dt);
+        let cycle = Cycle {
+            period: settings.cycle_s(self.pattern),
+            duty: settings.duty(self.pattern),
+            lift: command.lift,
+            twist: self.twist,
+            stepping,
+        };
+        for (foot, neutral) in self.feet.iter_mut().zip(settings.neutral) {
+            foot.advance(&cycle, neutral, dt);
+        }
+        if stepping {
+            self.phase = (self.phase + dt / cycle.period).fract();
+        } else if self.ramp <= 0.0 && self.feet.iter().all(|f| !f.airborne) {
+            self.mode = Mode::Standing(0.0);
+        }
+    }
+
+    /// Speed and turn rate follow the command with a bounded acceleration.
+    fn slew(&mut self, settings: &Settings, command: &Command, dt: f64) {
+        let change = |from: f64, to: f64, rate: f64| from + (to - from).clamp(-rate * dt, rate * dt);
+        self.slewed.speed = change(self.slewed.speed, command.speed, settings.acceleration);
+        let correction = if command.heading_feedback {
+            turn_towards(&settings.gains, command.heading + self.turned, command.attitude[2])
+        } else {
+            0.0
+        };
+        let wanted = command.turn_rate + correction;
+        self.slewed.turn_rate = change(self.slewed.turn_rate, wanted, settings.turn_acceleration);
+    }
+
+    /// The twist scaled down so that no foot has to make a longer stride than the legs reach.
+    fn limited(&self, settings: &Settings) -> Twist {
+        let stance = settings.duty(self.pattern) * settings.cycle_s(self.pattern);
+        let fastest = settings.neutral.iter().map(|p| self.slewed.speed_at(*p)).fold(0.0, f64::max);
+        let allowed = settings.stride_limit / stance;
+        if fastest > allowed { self.slewed.scaled(allowed / fastest) } else { self.slewed }
+    }
+
+    /// Inverse kinematics of all legs.
+    fn aim(&mut self, settings: &Settings) {
+        self.out_of_reach = 0;
+        for (leg, (foot, geometry)) in self.feet.iter().zip(&settings.legs).enumerate() {
+            let [x, y] = foot.position;
+            let z = foot.height - settings.body_height + self.posture.raise(foot.position);
+            let solution = geometry.inverse([x, y, z]);
+            self.out_of_reach += u32::from(solution.clipped);
+            self.targets[leg * JOINTS..][..JOINTS].copy_from_slice(&solution.angles);
+        }
+    }
+}
+
+fn moves(command: &Command) -> bool {
+    command.speed != 0.0 || command.turn_rate != 0.0
+}

@@ -131,9 +131,7 @@ impl Foot {
         self.phase += dt / cycle.period;
         let u = ((self.phase - cycle.duty) / (1.0 - cycle.duty)).clamp(0.0, 1.0);
         let along = u - libm::sin(TAU * u) / TAU;
-        for k in 0..2 {
-            self.position[k] = self.lift_off[k] + (target[k] - self.lift_off[k]) * along;
-        }
+        self.position = std::array::from_fn(|k| self.lift_off[k] + (target[k] - self.lift_off[k]) * along);
         self.height = self.lift * 0.5 * (1.0 - libm::cos(TAU * u));
         0.0
     }

@@ -10,8 +10,9 @@ pub const LEGS: usize = 6;
 /// Joints of a leg.
 pub const JOINTS: usize = 4;
 
-/// Part of the full reach that is left unused, so that the knee never straightens or folds completely.
-const REACH_MARGIN: f64 = 2e-3;
+/// Part of the full reach that is left unused, so that the knee never straightens or folds completely:
+/// near that the joint rates grow without bound.
+const REACH_MARGIN: f64 = 0.03;
 
 /// Lengths and mounting of one leg.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,7 +58,7 @@ impl Leg {
         let (dx, dy) = (foot[0] - self.hip[0], foot[1] - self.hip[1]);
         let (outward, sideways) = (cos * dx + sin * dy, cos * dy - sin * dx);
         let radius = libm::hypot(outward, sideways);
-        let (wrist, clipped) = self.into_reach([radius - l1, foot[2] - self.hip[2] + l4]);
+        let (wrist, clipped) = self.pulled_into_reach([radius - l1, foot[2] - self.hip[2] + l4]);
         let square = wrist[0] * wrist[0] + wrist[1] * wrist[1];
         let knee = -libm::acos(((square - l2 * l2 - l3 * l3) / (2.0 * l2 * l3)).clamp(-1.0, 1.0));
         let lead = libm::atan2(l3 * libm::sin(knee), l2 + l3 * libm::cos(knee));
@@ -81,7 +82,7 @@ impl Leg {
         root(radius * radius - outward * outward)
     }
 
-    fn into_reach(&self, wrist: [f64; 2]) -> ([f64; 2], bool) {
+    fn pulled_into_reach(&self, wrist: [f64; 2]) -> ([f64; 2], bool) {
         let [least, largest] = self.reach();
         let distance = libm::hypot(wrist[0], wrist[1]);
         if distance >= least && distance <= largest {

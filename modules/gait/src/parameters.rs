@@ -192,7 +192,7 @@ fn legs(config: &Config) -> Result<([Leg; LEGS], [[f64; 2]; LEGS])> {
 /// tilt may ask for, m.
 fn stride_reach(leg: &Leg, gains: &Gains, neutral: [f64; 2], body_height: f64) -> Result<f64> {
     let outward = (neutral[1] - leg.hip[1]).abs();
-    let slack = gains.tilt_limit * neutral[0].abs().max(neutral[1].abs());
+    let slack = gains.tilt_limit * libm::hypot(neutral[0], neutral[1]);
     let standing = leg.inverse([neutral[0], neutral[1], -body_height]);
     if standing.clipped || outward <= 0.0 {
         return Err(Error::Refused(format!(

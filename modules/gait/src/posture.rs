@@ -34,22 +34,21 @@ impl Posture {
     /// time constant of the smoothing.
     pub fn advance(&mut self, gains: &Gains, enabled: bool, tilt: [f64; 2], dt: f64) {
         let share = dt / (gains.smoothing_s + dt);
-        for (axis, measured) in tilt.into_iter().enumerate() {
-            self.smooth[axis] += share * (measured - self.smooth[axis]);
+        let mut wanted = [0.0; 2];
+        for axis in 0..2 {
+            self.smooth[axis] += share * (tilt[axis] - self.smooth[axis]);
             if enabled {
-                let sum = self.integral[axis] + gains.tilt_integral * self.smooth[axis] * dt;
-                self.integral[axis] = sum.clamp(-gains.tilt_limit, gains.tilt_limit);
-                let wanted = self.integral[axis] + gains.tilt * self.smooth[axis];
-                self.approach(axis, wanted.clamp(-gains.tilt_limit, gains.tilt_limit), share);
+                self.integral[axis] += gains.tilt_integral * self.smooth[axis] * dt;
+                wanted[axis] = self.integral[axis] + gains.tilt * self.smooth[axis];
             } else {
                 self.integral[axis] -= share * self.integral[axis];
-                self.approach(axis, 0.0, share);
             }
         }
-    }
-
-    fn approach(&mut self, axis: usize, wanted: f64, share: f64) {
-        self.correction[axis] += share * (wanted - self.correction[axis]);
+        self.integral = within(self.integral, gains.tilt_limit);
+        let wanted = within(wanted, gains.tilt_limit);
+        for (correction, wanted) in self.correction.iter_mut().zip(wanted) {
+            *correction += share * (wanted - *correction);
+        }
     }
 
     /// By how much the foot at `p` (body frame, m) is raised, m. Positive roll lifts the left side (y > 0): its feet
@@ -57,6 +56,12 @@ impl Posture {
     pub fn raise(&self, p: [f64; 2]) -> f64 {
         self.correction[0] * p[1] - self.correction[1] * p[0]
     }
+}
+
+/// The vector, shortened to the limit.
+fn within(tilt: [f64; 2], limit: f64) -> [f64; 2] {
+    let size = libm::hypot(tilt[0], tilt[1]);
+    if size > limit { tilt.map(|t| t * (limit / size)) } else { tilt }
 }
 
 /// Turn rate that corrects a heading error, rad/s; the error is taken the short way round.

@@ -92,7 +92,7 @@ impl Walker {
         let tilt = [command.attitude[0], command.attitude[1]];
         self.posture.advance(&settings.gains, command.posture_feedback, tilt, dt);
         self.slew(settings, command, dt);
-        let left = self.wait(settings, command, dt);
+        let left = self.wait(command, dt);
         if left > 0.0 && !matches!(self.mode, Mode::Standing(_)) {
             self.walk(settings, command, left);
         }
@@ -100,7 +100,7 @@ impl Walker {
     }
 
     /// Stands still for what remains of the waiting time; the time of the step that is left for walking, s.
-    fn wait(&mut self, settings: &Settings, command: &Command, dt: f64) -> f64 {
+    fn wait(&mut self, command: &Command, dt: f64) -> f64 {
         let Mode::Standing(wait) = self.mode else { return dt };
         if wait >= dt || !moves(command) {
             self.mode = Mode::Standing((wait - dt).max(0.0));

@@ -118,7 +118,7 @@ fn wrong_parameters_are_refused_with_their_name() {
 #[test]
 fn the_schema_has_a_default_for_all_but_the_optional_parameters() {
     let schema = Gait::schema();
-    assert!(schema.parameters.iter().all(|p| p.optional != !p.default.is_null()));
+    assert!(schema.parameters.iter().all(|p| p.optional == p.default.is_null()));
     let host = Arc::new(Standalone::default());
     Gait::instantiate(&Config::default(), host).expect("a gait without parameters");
 }

@@ -200,7 +200,7 @@ fn gluing() -> Table {
 fn recording() -> Table {
     let every = |name, help| Parameter::of(name, ParameterType::Integer, help).within(1.0, 1e9);
     let keys = vec![
-        every("every_steps", "steps between two records of variables and poses").or(10).into(),
+        every("every_steps", "steps between two records of variables and poses").or(5).into(),
         every("ground_every_steps", "steps between two records of the ground that changed").or(100).into(),
     ];
     of("recording", "What is written to `recording.mcap`.", keys)

@@ -1,1 +1,16 @@
 //! Pressure and shear laws of soils with tangents and inverses, evaluated over batches of nodes.
+//!
+//! No grid, no bodies: a node is a depth, a largest depth and a shear displacement. What lies around it is the
+//! business of whoever calls. SI units; depths and pressures grow into the soil, pressure is never negative.
+
+mod batch;
+mod parameters;
+mod pressure;
+mod shear;
+mod table;
+
+pub use batch::{pressures, total_force};
+pub use parameters::{DEFAULT_ELASTIC_STIFFNESS, SoilParameters};
+pub use pressure::{PressureCurve, PressureLaw};
+pub use shear::{ShearLaw, ShearResponse, ShearState};
+pub use table::{COLUMNS, SoilRow, SoilTable, TableError};

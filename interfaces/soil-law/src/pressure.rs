@@ -1,0 +1,232 @@
+//! Pressure under a loaded area as a function of sinkage, with elastic unloading.
+//!
+//! Virgin loading follows a power law p = K·zⁿ (Bekker 1956: K = k_c/b + k_φ). Below the largest depth reached the
+//! soil is elastic: p = p_max − k_u·(z_max − z), never tension (Wong 1984, "repetitive normal load").
+//! No soil is stiffer in virgin loading than in unloading, so for n < 1, where the power law starts with an
+//! infinite slope, the line p = k_u·z holds up to where it meets the power law.
+
+/// A family of pressure–sinkage laws; [`PressureLaw::curve`] fixes one for the size of a contact.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum PressureLaw {
+    /// p = (k_c/b + k_φ)·zⁿ (Bekker 1956).
+    Bekker {
+        /// Cohesive modulus k_c, N/m^(n+1).
+        k_c: f64,
+        /// Frictional modulus k_φ, N/m^(n+2).
+        k_phi: f64,
+        /// Exponent n.
+        n: f64,
+    },
+}
+
+impl PressureLaw {
+    /// The curve under a contact of smaller dimension `b` (m; radius of a disc, short side of a rectangle) with
+    /// the unloading stiffness `k_u` (Pa/m).
+    pub fn curve(&self, b: f64, k_u: f64) -> PressureCurve {
+        match *self {
+            Self::Bekker { k_c, k_phi, n } => PressureCurve::new(k_c / b + k_phi, n, k_u),
+        }
+    }
+}
+
+/// p(z) for one contact: a power law, elastic below the largest depth.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PressureCurve {
+    modulus: f64,
+    exponent: f64,
+    unloading: f64,
+    /// Depth up to which the elastic line holds in virgin loading, m; 0 for n ≥ 1.
+    elastic_limit: f64,
+}
+
+impl PressureCurve {
+    /// p = modulus·z^exponent with unloading stiffness `k_u` (Pa/m).
+    pub fn new(modulus: f64, exponent: f64, k_u: f64) -> Self {
+        let elastic_limit =
+            if exponent < 1.0 { libm::pow(modulus / k_u, 1.0 / (1.0 - exponent)) } else { 0.0 };
+        let modulus = if exponent == 1.0 { modulus.min(0.99 * k_u) } else { modulus };
+        Self { modulus, exponent, unloading: k_u, elastic_limit }
+    }
+
+    /// K, N/m^(n+2): tells curves of one soil apart.
+    pub fn modulus(&self) -> f64 {
+        self.modulus
+    }
+
+    /// Stiffness of unloading and reloading, Pa/m.
+    pub fn unloading(&self) -> f64 {
+        self.unloading
+    }
+
+    /// Pressure of first loading at depth z, Pa; 0 for z ≤ 0.
+    #[inline]
+    pub fn virgin(&self, z: f64) -> f64 {
+        if z <= self.elastic_limit {
+            self.unloading * z.max(0.0)
+        } else if self.exponent == 1.0 {
+            self.modulus * z
+        } else {
+            self.modulus * libm::pow(z, self.exponent)
+        }
+    }
+
+    /// Slope of first loading where the pressure at depth z is p, Pa/m; 0 for z < 0 and for n > 1 at z = 0.
+    #[inline]
+    pub fn virgin_slope(&self, z: f64, p: f64) -> f64 {
+        if z < 0.0 {
+            0.0
+        } else if z <= self.elastic_limit {
+            self.unloading
+        } else if self.exponent == 1.0 {
+            self.modulus
+        } else if z == 0.0 {
+            0.0
+        } else {
+            self.exponent * p / z
+        }
+    }
+
+    /// Depth at which first loading gives the pressure p ≥ 0, m.
+    pub fn virgin_depth(&self, p: f64) -> f64 {
+        if p <= self.unloading * self.elastic_limit {
+            p.max(0.0) / self.unloading
+        } else if self.exponent == 1.0 {
+            p / self.modulus
+        } else {
+            libm::pow(p / self.modulus, 1.0 / self.exponent)
+        }
+    }
+
+    /// Work of first loading from 0 to depth z per area, J/m², where p = virgin(z): ∫p dz.
+    pub fn virgin_work(&self, z: f64, p: f64) -> f64 {
+        if z <= self.elastic_limit {
+            return 0.5 * p * z.max(0.0);
+        }
+        let e = self.elastic_limit;
+        let below = self.unloading * e * e;
+        0.5 * below + (z * p - below) / (self.exponent + 1.0)
+    }
+
+    /// Pressure and slope dp/dz at depth z of soil pressed to z_max before, where p_max = virgin(z_max).
+    #[inline]
+    pub fn at(&self, z: f64, z_max: f64, p_max: f64) -> (f64, f64) {
+        if z > z_max {
+            let p = self.virgin(z);
+            return (p, self.virgin_slope(z, p));
+        }
+        let p = p_max - self.unloading * (z_max - z);
+        if p > 0.0 { (p, self.unloading) } else { (0.0, 0.0) }
+    }
+
+    /// Depth of the unloaded surface after loading to z_max: what stays, m.
+    #[inline]
+    pub fn permanent(&self, z_max: f64, p_max: f64) -> f64 {
+        (z_max - p_max / self.unloading).max(0.0)
+    }
+
+    /// Largest depth that leaves `permanent` (m) behind: where the elastic line p = k_u·(z − permanent) meets first
+    /// loading. Lets soil remember what stays rather than under which curve it was pressed, so that the law is
+    /// continuous when the size of a contact changes.
+    pub fn largest_depth(&self, permanent: f64, guess: f64) -> f64 {
+        if permanent <= 0.0 {
+            return 0.0;
+        }
+        let (k, e) = (self.unloading, self.exponent);
+        if e == 1.0 {
+            return k * permanent / (k - self.modulus);
+        }
+        // the difference is convex for n < 1 (Newton from the right) and concave for n > 1 (from the left)
+        let mut z = if e < 1.0 { guess.max(permanent).max(self.elastic_limit) } else { permanent };
+        for _ in 0..20 {
+            let p = self.virgin(z);
+            let slope = k - e * p / z;
+            let change = (k * (z - permanent) - p) / slope.max(0.01 * k);
+            z -= change;
+            if change.abs() <= 1e-15 * z {
+                break;
+            }
+        }
+        z.max(permanent)
+    }
+
+    /// Depth at which soil pressed to z_max before gives the pressure p > 0, m; the free surface for p = 0.
+    pub fn depth(&self, p: f64, z_max: f64) -> f64 {
+        let p_max = self.virgin(z_max);
+        if p > p_max { self.virgin_depth(p) } else { z_max - (p_max - p.max(0.0)) / self.unloading }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn curves() -> impl Strategy<Value = PressureCurve> {
+        (3.0e4..2.0e7, 0.11..1.7).prop_map(|(k, n)| PressureCurve::new(k, n, 4e8))
+    }
+
+    proptest! {
+        #[test]
+        fn the_inverse_undoes_the_law(curve in curves(), z in 1e-9..0.2f64, z_max in 0.0..0.1f64) {
+            let (p, _) = curve.at(z, z_max, curve.virgin(z_max));
+            if p > 0.0 {
+                let back = curve.depth(p, z_max);
+                prop_assert!((back - z).abs() <= 1e-12 + 1e-12 * z, "{back} {z}");
+            }
+        }
+
+        #[test]
+        fn the_slope_is_the_derivative(curve in curves(), z in 1e-3..0.2f64, z_max in 0.0..0.1f64) {
+            let p_max = curve.virgin(z_max);
+            let d = 1e-7;
+            prop_assume!((z - z_max).abs() > 2.0 * d && (z - curve.elastic_limit).abs() > 2.0 * d);
+            prop_assume!((z - curve.permanent(z_max, p_max)).abs() > 2.0 * d);
+            let (_, slope) = curve.at(z, z_max, p_max);
+            let numeric = (curve.at(z + d, z_max, p_max).0 - curve.at(z - d, z_max, p_max).0) / (2.0 * d);
+            prop_assert!((slope - numeric).abs() <= 1e-4 * slope.abs() + 1.0, "{slope} {numeric}");
+        }
+
+        #[test]
+        fn pressure_is_monotone_and_never_tension(curve in curves(), a in -0.1..0.2f64, b in -0.1..0.2f64,
+                                                  z_max in 0.0..0.1f64) {
+            let p_max = curve.virgin(z_max);
+            let (low, high) = (curve.at(a.min(b), z_max, p_max).0, curve.at(a.max(b), z_max, p_max).0);
+            prop_assert!(0.0 <= low && low <= high);
+        }
+
+        #[test]
+        fn what_stays_tells_the_largest_depth(curve in curves(), z_max in 1e-4..0.2f64, off in 0.9..1.1f64) {
+            let p_max = curve.virgin(z_max);
+            let permanent = curve.permanent(z_max, p_max);
+            prop_assume!(permanent > 1e-9);
+            let back = curve.largest_depth(permanent, z_max * off);
+            prop_assert!((back - z_max).abs() < 1e-10 * z_max + 1e-13, "{back} {z_max}");
+        }
+
+        #[test]
+        fn work_is_the_integral(curve in curves(), z in 1e-3..0.1f64) {
+            let steps = 20_000;
+            let sum: f64 = (0..steps).map(|k| curve.virgin((f64::from(k) + 0.5) * z / f64::from(steps))).sum();
+            let numeric = sum * z / f64::from(steps);
+            let exact = curve.virgin_work(z, curve.virgin(z));
+            prop_assert!((exact - numeric).abs() < 2e-3 * exact, "{exact} {numeric}");
+        }
+
+        #[test]
+        fn loading_dissipates(curve in curves(), a in 0.0..0.1f64, d in 0.0..0.1f64) {
+            let free = |z: f64| {
+                let p = curve.virgin(z);
+                curve.virgin_work(z, p) - 0.5 * p * p / curve.unloading()
+            };
+            prop_assert!(free(a + d) >= free(a) - 1e-9 * free(a).abs());
+        }
+    }
+
+    #[test]
+    fn bekker_at_one_centimetre() {
+        let law = PressureLaw::Bekker { k_c: 1400.0, k_phi: 820_000.0, n: 1.0 };
+        let p = law.curve(0.05, 4e8).virgin(0.01);
+        assert!((p - 8480.0).abs() < 1e-9, "{p}");
+    }
+}

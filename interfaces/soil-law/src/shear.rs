@@ -1,0 +1,234 @@
+//! Shear of the soil under a loaded area: Mohr–Coulomb strength, mobilised by slip, elastic before it slips.
+//!
+//! Strength S = c + p·tan φ (Coulomb 1776). Janosi and Hanamoto (1961) give the stress of a monotone shear
+//! displacement j as S·(1 − e^(−j/K)). Taken literally this creeps under a constant load and never sticks, so it
+//! is used here as the hardening of an elastic–plastic law: the stress is elastic, τ = k_t·u, up to the yield stress
+//! Y(j) = S·(1 − e^(−j/K)), where j is the accumulated slip; above it the slip grows until |τ| = Y(j + Δj)
+//! (backward Euler, radial return; Simo and Hughes 1998, §1.4 for isotropic hardening). Monotone loading follows
+//! Janosi and Hanamoto up to the elastic part τ/k_t of the displacement (relative deviation S/(K·k_t), below 1e-3);
+//! on reversal the soil is stiff, and under a constant load nothing moves.
+//! k_t = 0.82·k_u: tangential over normal stiffness of an elastic contact, 2(1 − ν)/(2 − ν) with ν = 0.3
+//! (Mindlin 1949).
+
+/// Ratio of tangential to normal elastic stiffness, 2(1 − ν)/(2 − ν) at ν = 0.3 (Mindlin 1949).
+const MINDLIN_RATIO: f64 = 1.4 / 1.7;
+
+/// Parameters of the shear law.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ShearLaw {
+    /// Cohesion c, Pa.
+    pub cohesion: f64,
+    /// tan φ.
+    pub friction: f64,
+    /// Shear deformation modulus K, m.
+    pub modulus: f64,
+    /// Elastic tangential stiffness k_t, Pa/m.
+    pub stiffness: f64,
+}
+
+/// Shear history of a node. The default is untouched soil, and soil after lift-off.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct ShearState {
+    /// Elastic displacement of the foot against the soil along t1 and t2, m; the stress on the soil is k_t times it.
+    pub elastic: [f64; 2],
+    /// Accumulated slip j, m.
+    pub slip: f64,
+}
+
+/// Answer of the shear law to a displacement increment.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct ShearResponse {
+    /// Stress on the soil along t1, t2, Pa.
+    pub stress: [f64; 2],
+    /// dτ/ds, Pa/m: (11, 12, 22), symmetric.
+    pub tangent: [f64; 3],
+    /// dτ/dp at fixed displacement.
+    pub by_pressure: [f64; 2],
+    /// History afterwards.
+    pub state: ShearState,
+    /// Energy turned into heat per area, J/m².
+    pub dissipated: f64,
+}
+
+impl ShearLaw {
+    /// From cohesion (Pa), angle of friction (rad), deformation modulus (m) and normal elastic stiffness k_u (Pa/m).
+    pub fn new(cohesion: f64, phi: f64, modulus: f64, k_u: f64) -> Self {
+        Self { cohesion, friction: libm::tan(phi), modulus, stiffness: MINDLIN_RATIO * k_u }
+    }
+
+    /// Full strength S at pressure p and its derivative, Pa. Cohesion builds up over the first c/10 of pressure,
+    /// so that the strength does not jump where the foot begins to touch.
+    #[inline]
+    pub fn strength(&self, p: f64) -> (f64, f64) {
+        const BUILD_UP: f64 = 10.0;
+        let p = p.max(0.0);
+        if BUILD_UP * p < self.cohesion {
+            (p * (self.friction + BUILD_UP), self.friction + BUILD_UP)
+        } else {
+            (self.cohesion + p * self.friction, self.friction)
+        }
+    }
+
+    /// Share of the strength that a slip j has mobilised, 1 − e^(−j/K).
+    #[inline]
+    pub fn mobilised(&self, slip: f64) -> f64 {
+        if slip == 0.0 { 0.0 } else { -libm::expm1(-slip / self.modulus) }
+    }
+
+    /// Stress, tangents and new history after the foot has moved by `s` (m, along t1, t2) under the pressure p.
+    pub fn respond(&self, state: &ShearState, p: f64, s: [f64; 2]) -> ShearResponse {
+        if p <= 0.0 {
+            return ShearResponse::default();
+        }
+        let u = [state.elastic[0] + s[0], state.elastic[1] + s[1]];
+        let length = (u[0] * u[0] + u[1] * u[1]).sqrt();
+        let trial = self.stiffness * length;
+        let (strength, by_p) = self.strength(p);
+        if trial <= strength * self.mobilised(state.slip) {
+            return self.elastic(u, state.slip);
+        }
+        let (slip, left) = self.return_map(trial, strength, state.slip);
+        self.plastic(u, length, state.slip, slip, left * strength, (1.0 - left) * by_p)
+    }
+
+    fn elastic(&self, u: [f64; 2], slip: f64) -> ShearResponse {
+        ShearResponse {
+            stress: [self.stiffness * u[0], self.stiffness * u[1]],
+            tangent: [self.stiffness, 0.0, self.stiffness],
+            by_pressure: [0.0; 2],
+            state: ShearState { elastic: u, slip },
+            dissipated: 0.0,
+        }
+    }
+
+    /// Solves trial − k_t·Δj = S·(1 − e^(−(j + Δj)/K)) for the slip increment Δj. The left side minus the right is
+    /// convex and falling, so Newton from Δj = 0 climbs to the root without passing it. Returns Δj and
+    /// e^(−(j + Δj)/K).
+    fn return_map(&self, trial: f64, strength: f64, slip: f64) -> (f64, f64) {
+        let mut step = 0.0;
+        let mut left = libm::exp(-slip / self.modulus);
+        for _ in 0..30 {
+            let residual = trial - self.stiffness * step - strength * (1.0 - left);
+            let change = residual / (self.stiffness + strength / self.modulus * left);
+            step += change;
+            left = libm::exp(-(slip + step) / self.modulus);
+            if change <= 1e-15 * step {
+                break;
+            }
+        }
+        (step, left)
+    }
+
+    /// `rest` is S·e^(−j/K), `by_p` d(yield)/dp at fixed slip.
+    fn plastic(
+        &self,
+        u: [f64; 2],
+        length: f64,
+        before: f64,
+        step: f64,
+        rest: f64,
+        by_p: f64,
+    ) -> ShearResponse {
+        let k = self.stiffness;
+        let stress = (k * (length - step)).max(0.0);
+        let hardening = rest / self.modulus;
+        let along = k * hardening / (k + hardening);
+        let across = stress / length;
+        let e = [u[0] / length, u[1] / length];
+        let d = along - across;
+        let scale = k / (k + hardening) * by_p;
+        ShearResponse {
+            stress: [stress * e[0], stress * e[1]],
+            tangent: [across + d * e[0] * e[0], d * e[0] * e[1], across + d * e[1] * e[1]],
+            by_pressure: [scale * e[0], scale * e[1]],
+            state: ShearState { elastic: [stress / k * e[0], stress / k * e[1]], slip: before + step },
+            dissipated: stress * step,
+        }
+    }
+
+    /// Elastic energy per area, J/m².
+    pub fn elastic_energy(&self, state: &ShearState) -> f64 {
+        0.5 * self.stiffness * (state.elastic[0] * state.elastic[0] + state.elastic[1] * state.elastic[1])
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    fn lunar() -> ShearLaw {
+        ShearLaw::new(170.0, 35f64.to_radians(), 0.018, 4e8)
+    }
+
+    #[test]
+    fn monotone_loading_follows_janosi_and_hanamoto() {
+        let (law, p) = (lunar(), 5000.0);
+        let s = 170.0 + p * 35f64.to_radians().tan();
+        let mut state = ShearState::default();
+        for k in 1..=500 {
+            let r = law.respond(&state, p, [0.8e-4, 0.6e-4]);
+            state = r.state;
+            let j = f64::from(k) * 1e-4;
+            let expected = s * (1.0 - (-j / 0.018f64).exp());
+            let stress = r.stress[0].hypot(r.stress[1]);
+            assert!((stress - expected).abs() < 1.5e-3 * expected, "{j}: {stress} {expected}");
+            assert!((r.stress[0] * 0.6 - r.stress[1] * 0.8).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn reversal_is_stiff_and_a_held_load_stays() {
+        let (law, p) = (lunar(), 5000.0);
+        let state = law.respond(&ShearState::default(), p, [0.005, 0.0]).state;
+        let back = law.respond(&state, p, [-1e-7, 0.0]);
+        assert_eq!(back.state.slip, state.slip);
+        assert!((back.tangent[0] - law.stiffness).abs() < 1e-6);
+        let held = law.respond(&state, p, [0.0, 0.0]);
+        assert!((held.state.elastic[0] - state.elastic[0]).abs() < 1e-15);
+        assert!(held.state.slip - state.slip < 1e-15);
+    }
+
+    #[test]
+    fn lift_off_forgets() {
+        let law = lunar();
+        let state = law.respond(&ShearState::default(), 5000.0, [0.005, 0.0]).state;
+        assert_eq!(law.respond(&state, 0.0, [0.0, 0.0]).state, ShearState::default());
+    }
+
+    proptest! {
+        #[test]
+        fn tangents_are_derivatives(a in -0.01..0.01f64, b in -0.01..0.01f64, slip in 0.0..0.02f64,
+                                    ua in -1e-5..1e-5f64, p in 50.0..20000.0f64) {
+            let law = lunar();
+            let state = ShearState { elastic: [ua, 0.3 * ua], slip };
+            let r = law.respond(&state, p, [a, b]);
+            let d = 1e-9;
+            let x = law.respond(&state, p, [a + d, b]);
+            let m = law.respond(&state, p, [a - d, b]);
+            prop_assume!((x.state.slip > slip) == (m.state.slip > slip));
+            for k in 0..2 {
+                let numeric = (x.stress[k] - m.stress[k]) / (2.0 * d);
+                let exact = r.tangent[k];
+                prop_assert!((numeric - exact).abs() < 1e-3 * law.stiffness.min(r.tangent[0].abs() + 1e4));
+            }
+            let (x, m) = (law.respond(&state, p + 0.01, [a, b]), law.respond(&state, p - 0.01, [a, b]));
+            prop_assume!((x.state.slip > slip) == (m.state.slip > slip));
+            for k in 0..2 {
+                let numeric = (x.stress[k] - m.stress[k]) / 0.02;
+                prop_assert!((numeric - r.by_pressure[k]).abs() < 1e-4, "{numeric} {}", r.by_pressure[k]);
+            }
+        }
+
+        #[test]
+        fn stress_never_exceeds_the_strength_and_slip_dissipates(
+            a in -0.05..0.05f64, b in -0.05..0.05f64, slip in 0.0..0.05f64, p in 0.0..20000.0f64) {
+            let law = lunar();
+            let r = law.respond(&ShearState { elastic: [0.0; 2], slip }, p, [a, b]);
+            let stress = r.stress[0].hypot(r.stress[1]);
+            prop_assert!(stress <= law.strength(p).0 * (1.0 + 1e-12));
+            let before = if p > 0.0 { slip } else { 0.0 };
+            prop_assert!(r.dissipated >= 0.0 && r.state.slip >= before);
+        }
+    }
+}

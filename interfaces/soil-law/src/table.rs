@@ -1,0 +1,159 @@
+//! The table of soils, `models/soils.csv`, read from its text: named rows, and rows refused with a reason.
+
+/// Columns with numbers, which are also the keys that a scenario can override.
+pub const COLUMNS: [&str; 7] = ["n", "k_c", "k_phi", "c_pa", "phi_rad", "K_m", "density_kg_m3"];
+
+/// Columns that a usable row may leave empty.
+const OPTIONAL: &str = "density_kg_m3";
+
+/// What is wrong with a table or a name.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum TableError {
+    /// The table itself cannot be read.
+    Malformed {
+        /// Line of the text, from 1.
+        line: usize,
+        /// What is wrong.
+        what: String,
+    },
+    /// No row has this name.
+    Unknown {
+        /// The name asked for.
+        name: String,
+        /// All names, in the order of the table.
+        known: Vec<String>,
+    },
+    /// The row exists but cannot be used as it stands.
+    Refused {
+        /// Name of the row.
+        name: String,
+        /// Why, and what would help.
+        reason: String,
+    },
+}
+
+impl std::fmt::Display for TableError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        match self {
+            Self::Malformed { line, what } => write!(f, "line {line} of the soil table: {what}"),
+            Self::Unknown { name, known } => {
+                write!(f, "no soil is called `{name}`; known are {}", known.join(", "))
+            }
+            Self::Refused { name, reason } => write!(f, "soil `{name}` cannot be used: {reason}"),
+        }
+    }
+}
+
+impl std::error::Error for TableError {}
+
+/// One soil.
+#[derive(Clone, Debug, PartialEq)]
+pub struct SoilRow {
+    /// Name.
+    pub name: String,
+    /// Numbers in the order of [`COLUMNS`]; `None` where the source gives no single number.
+    pub values: [Option<f64>; COLUMNS.len()],
+    /// Where the numbers come from.
+    pub source: String,
+    /// Why the row cannot be used as it stands.
+    pub refused: Option<String>,
+}
+
+impl SoilRow {
+    /// Value of a column; `None` where there is none.
+    pub fn value(&self, column: &str) -> Option<f64> {
+        COLUMNS.iter().position(|c| *c == column).and_then(|k| self.values[k])
+    }
+
+    /// The numbers that the row offers as (key, value). Refused while a needed number is missing from the row
+    /// that `overridden` does not name.
+    pub fn offered(&self, overridden: &[&str]) -> Result<Vec<(&'static str, f64)>, TableError> {
+        let lacking =
+            |(c, v): (&&str, &Option<f64>)| v.is_none() && *c != OPTIONAL && !overridden.contains(c);
+        if COLUMNS.iter().zip(&self.values).any(lacking) {
+            let reason = self.refused.clone().unwrap_or_else(|| "a number is missing".into());
+            return Err(TableError::Refused { name: self.name.clone(), reason });
+        }
+        Ok(COLUMNS.iter().zip(&self.values).filter_map(|(c, v)| v.map(|v| (*c, v))).collect())
+    }
+}
+
+/// All rows.
+#[derive(Clone, Debug, PartialEq, Default)]
+pub struct SoilTable {
+    /// In the order of the file.
+    pub rows: Vec<SoilRow>,
+}
+
+impl SoilTable {
+    /// Reads comma-separated text with a header line. Cells hold no commas.
+    pub fn parse(text: &str) -> Result<Self, TableError> {
+        let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty());
+        let header: Vec<&str> = match lines.next() {
+            Some((_, line)) => line.split(',').map(str::trim).collect(),
+            None => return Err(malformed(0, "the table is empty")),
+        };
+        let columns = Columns::find(&header)?;
+        let rows = lines.map(|(k, line)| columns.row(k, line, header.len())).collect::<Result<_, _>>()?;
+        Ok(Self { rows })
+    }
+
+    /// The row of a name, usable or not.
+    pub fn row(&self, name: &str) -> Result<&SoilRow, TableError> {
+        self.rows.iter().find(|r| r.name == name).ok_or_else(|| TableError::Unknown {
+            name: name.into(),
+            known: self.rows.iter().map(|r| r.name.clone()).collect(),
+        })
+    }
+}
+
+fn malformed(line: usize, what: impl Into<String>) -> TableError {
+    TableError::Malformed { line: line + 1, what: what.into() }
+}
+
+/// Where the columns stand in the header.
+struct Columns {
+    name: usize,
+    numbers: [usize; COLUMNS.len()],
+    source: usize,
+    refused: usize,
+}
+
+impl Columns {
+    fn find(header: &[&str]) -> Result<Self, TableError> {
+        let at = |name: &str| {
+            header
+                .iter()
+                .position(|h| *h == name)
+                .ok_or_else(|| malformed(0, format!("column `{name}` is missing")))
+        };
+        let mut numbers = [0; COLUMNS.len()];
+        for (place, name) in numbers.iter_mut().zip(COLUMNS) {
+            *place = at(name)?;
+        }
+        Ok(Self { name: at("name")?, numbers, source: at("source")?, refused: at("refused")? })
+    }
+
+    fn row(&self, line: usize, text: &str, width: usize) -> Result<SoilRow, TableError> {
+        let cells: Vec<&str> = text.split(',').map(str::trim).collect();
+        if cells.len() != width {
+            return Err(malformed(line, format!("{} cells instead of {width}", cells.len())));
+        }
+        let mut values = [None; COLUMNS.len()];
+        for ((value, place), column) in values.iter_mut().zip(self.numbers).zip(COLUMNS) {
+            *value = number(cells[place]).map_err(|()| {
+                malformed(line, format!("`{}` in column `{column}` is not a number", cells[place]))
+            })?;
+        }
+        let refused = Some(cells[self.refused].to_string()).filter(|r| !r.is_empty());
+        Ok(SoilRow { name: cells[self.name].into(), values, source: cells[self.source].into(), refused })
+    }
+}
+
+fn number(cell: &str) -> Result<Option<f64>, ()> {
+    if cell.is_empty() {
+        return Ok(None);
+    }
+    cell.parse().ok().filter(|v: &f64| v.is_finite()).map(Some).ok_or(())
+}

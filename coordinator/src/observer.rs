@@ -37,7 +37,7 @@ pub struct View<'a> {
 }
 
 /// Something that happened or was changed, written so that it can go back into a scenario.
-#[derive(Clone, Debug, PartialEq, serde::Serialize)]
+#[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
 pub struct Happening {
     /// Simulated time, s.
     pub t_s: f64,

@@ -1,0 +1,92 @@
+//! `variables.csv`, all scalar variables over time, and `timing.csv`, what a clock measured.
+
+use crate::error::Result;
+use crate::recording::layout::{TIMING, VARIABLES, at, other_at};
+use crate::recording::snapshot::{ScalarKind, Snapshot};
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Writes `t_s,robot.LF_j2.angle,…`, one row per recorded communication point.
+pub(crate) struct VariablesCsv {
+    path: PathBuf,
+    rows: csv::Writer<File>,
+    number: Vec<u8>,
+}
+
+impl VariablesCsv {
+    /// Creates the file with its head line.
+    pub fn create(folder: &Path, snapshot: &Snapshot) -> Result<Self> {
+        let path = folder.join(VARIABLES);
+        let mut rows = csv::Writer::from_writer(File::create(&path).map_err(at(&path))?);
+        let names = snapshot
+            .subsystems
+            .iter()
+            .flat_map(|s| s.columns.iter().map(move |c| format!("{}.{}", s.name, c.name)));
+        rows.write_record(std::iter::once("t_s".to_owned()).chain(names)).map_err(other_at(&path))?;
+        Ok(Self { path, rows, number: Vec::new() })
+    }
+
+    /// One row.
+    pub fn row(&mut self, t_s: f64, snapshot: &Snapshot) -> Result {
+        self.write(t_s, snapshot).map_err(other_at(&self.path))
+    }
+
+    fn write(&mut self, t_s: f64, snapshot: &Snapshot) -> csv::Result<()> {
+        self.field(t_s, true)?;
+        for scalars in &snapshot.subsystems {
+            for (column, value) in scalars.columns.iter().zip(&scalars.values) {
+                self.field(*value, column.kind == ScalarKind::Real)?;
+            }
+        }
+        self.rows.write_record(None::<&[u8]>)
+    }
+
+    fn field(&mut self, value: f64, real: bool) -> csv::Result<()> {
+        self.number.clear();
+        if !real {
+            let _ = write!(self.number, "{}", value as i64);
+        } else if value.is_finite() {
+            let _ = serde_json::to_writer(&mut self.number, &value);
+        } else {
+            let _ = write!(self.number, "{value}");
+        }
+        self.rows.write_field(&self.number)
+    }
+
+    /// Hands everything to the operating system.
+    pub fn flush(&mut self) -> Result {
+        self.rows.flush().map_err(at(&self.path))
+    }
+}
+
+/// Time spent in one part of the step loop.
+#[derive(Clone, Debug, PartialEq)]
+pub struct TimingRow {
+    /// Part of the step, e.g. `estimate_forces`.
+    pub section: String,
+    /// Wall time in all steps, s.
+    pub wall_s: f64,
+    /// CPU time in all steps, s.
+    pub cpu_s: f64,
+    /// How often the part ran.
+    pub calls: u64,
+}
+
+/// Writes `timing.csv`. Nothing that a clock measured stands in any other file but `summary.json`.
+pub fn write_timing(folder: &Path, rows: &[TimingRow]) -> Result {
+    let path = folder.join(TIMING);
+    let mut table = csv::Writer::from_writer(File::create(&path).map_err(at(&path))?);
+    table
+        .write_record(["section", "wall_s", "cpu_s", "calls", "cpu_per_call_us"])
+        .map_err(other_at(&path))?;
+    for row in rows {
+        let per_call = if row.calls == 0 { 0.0 } else { row.cpu_s / row.calls as f64 * 1e6 };
+        let figures = [row.wall_s, row.cpu_s].map(|s| format!("{s:.6}"));
+        let [wall, cpu] = &figures;
+        table
+            .write_record([&row.section, wall, cpu, &row.calls.to_string(), &format!("{per_call:.3}")])
+            .map_err(other_at(&path))?;
+    }
+    table.flush().map_err(at(&path))
+}

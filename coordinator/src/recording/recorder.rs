@@ -1,0 +1,166 @@
+//! The recorder: one observer that fills the results folder of a run.
+
+use crate::error::{Error, Result};
+use crate::observer::{Happening, Observer, View};
+use crate::recording::csv::VariablesCsv;
+use crate::recording::final_ground;
+use crate::recording::layout::{FINAL_GROUND, at};
+use crate::recording::mcap_writer::{FLUSH_STEPS, McapWriter};
+use crate::recording::snapshot::Snapshot;
+use crate::recording::summary::{Status, Summary};
+use crate::recording::summary_observer::SummaryObserver;
+use crate::scenario::Scenario;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What is written beside the recording.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct RecorderOptions {
+    /// Also write `variables.csv`.
+    pub csv: bool,
+}
+
+/// Records a run into a folder.
+///
+/// Variables, poses, energies and gluing are written at the start, every `recording.every_steps` steps and at
+/// the end (advised: 5, which at h = 1 ms gives 200 Hz, twice what the legs of a walker can excite, and costs
+/// a fifth; the extremes of the steps in between are kept in `/gluing`); events when they happen; changed
+/// ground every `recording.ground_every_steps` steps.
+pub struct Recorder {
+    folder: PathBuf,
+    options: RecorderOptions,
+    every_steps: u64,
+    ground_every_steps: u64,
+    mcap: McapWriter,
+    csv: Option<VariablesCsv>,
+    snapshot: Snapshot,
+    summary: SummaryObserver,
+    recorded_step: Option<u64>,
+}
+
+/// What a report needs to know of the scenario; stands at the head of the recording.
+fn about(scenario: &Scenario) -> BTreeMap<String, String> {
+    let list = scenario.subsystems.iter().map(|s| format!("{}={}", s.name, s.module)).collect::<Vec<_>>();
+    let mut about = BTreeMap::from([
+        ("scenario", scenario.name.clone()),
+        ("scenario_text", scenario.source.text.clone()),
+        ("strategy", scenario.gluing.strategy.clone()),
+        ("form", scenario.gluing.form.clone()),
+        ("step_s", scenario.time.step_s.to_string()),
+        ("duration_s", scenario.time.duration_s.to_string()),
+        ("gravity_m_s2", format!("{:?}", scenario.world.gravity_m_s2)),
+        ("seed", scenario.world.seed.to_string()),
+        ("subsystems", list.join("\n")),
+    ]);
+    for (key, value) in [("report_body", &scenario.report.body), ("report_joint", &scenario.report.joint)] {
+        if let Some(value) = value {
+            about.insert(key, value.clone());
+        }
+    }
+    about.into_iter().map(|(k, v)| (k.to_owned(), v)).collect()
+}
+
+impl Recorder {
+    /// Makes the folder where it is missing and opens the recording in it.
+    pub fn create(folder: &Path, scenario: &Scenario, options: RecorderOptions) -> Result<Self> {
+        std::fs::create_dir_all(folder).map_err(at(folder))?;
+        Ok(Self {
+            folder: folder.to_owned(),
+            options,
+            every_steps: scenario.recording.every_steps.max(1),
+            ground_every_steps: scenario.recording.ground_every_steps.max(1),
+            mcap: McapWriter::create(folder, about(scenario))?,
+            csv: None,
+            snapshot: Snapshot::default(),
+            summary: SummaryObserver::new(scenario),
+            recorded_step: None,
+        })
+    }
+
+    fn record(&mut self, view: &View) -> Result {
+        self.snapshot.read(view)?;
+        self.mcap.record(view, &self.snapshot)?;
+        if let Some(csv) = &mut self.csv {
+            csv.row(view.t_s, &self.snapshot)?;
+        }
+        self.recorded_step = Some(view.step_index);
+        Ok(())
+    }
+
+    fn record_end(&mut self, view: &View) -> Result {
+        if self.recorded_step != Some(view.step_index) {
+            self.record(view)?;
+        }
+        self.mcap.whole_ground(view)?;
+        self.write_final_ground(view)
+    }
+
+    fn write_final_ground(&self, view: &View) -> Result {
+        let Some(ground) = self.mcap.ground() else { return Ok(()) };
+        let heights = ground.heights(&view.subsystems[ground.subsystem], view.t_s)?;
+        let path = self.folder.join(FINAL_GROUND);
+        final_ground::write(&path, &ground.info, &heights)
+    }
+
+    /// Closes all files and writes `summary.json`. `wall_s` and `cpu_s` are the times of the step loop, s.
+    pub fn finish(
+        &mut self,
+        wall_s: f64,
+        cpu_s: f64,
+        error: Option<&Error>,
+        status: Status,
+    ) -> Result<Summary> {
+        self.mcap.close()?;
+        if let Some(csv) = &mut self.csv {
+            csv.flush()?;
+        }
+        let summary = self.summary.summary(wall_s, cpu_s, error, status);
+        summary.write(&self.folder)?;
+        Ok(summary)
+    }
+
+    /// The figures so far.
+    pub fn summary(&self) -> &SummaryObserver {
+        &self.summary
+    }
+}
+
+impl Observer for Recorder {
+    fn started(&mut self, view: &View) -> Result {
+        self.snapshot = Snapshot::new(view);
+        if self.options.csv {
+            self.csv = Some(VariablesCsv::create(&self.folder, &self.snapshot)?);
+        }
+        self.summary.started(view)?;
+        self.mcap.started(view, &self.snapshot)?;
+        self.record(view)?;
+        self.mcap.flush()
+    }
+
+    fn stepped(&mut self, view: &View) -> Result {
+        self.mcap.count(view.gluing);
+        self.summary.stepped(view)?;
+        if view.step_index.is_multiple_of(self.every_steps) {
+            self.record(view)?;
+        }
+        if view.step_index.is_multiple_of(self.ground_every_steps) {
+            self.mcap.changed_ground(view)?;
+        }
+        if view.step_index.is_multiple_of(FLUSH_STEPS) {
+            self.mcap.flush()?;
+        }
+        Ok(())
+    }
+
+    fn happened(&mut self, happening: &Happening) -> Result {
+        self.summary.happened(happening)?;
+        self.mcap.happened(happening)
+    }
+
+    fn finished(&mut self, view: &View, error: Option<&Error>) -> Result {
+        // After a failure the last state may be unreadable; the recording is closed all the same.
+        let end = self.record_end(view);
+        self.mcap.close()?;
+        if error.is_some() { Ok(()) } else { end }
+    }
+}

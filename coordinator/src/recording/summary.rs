@@ -1,0 +1,141 @@
+//! `summary.json`: the figures of a run that scripts read.
+
+use crate::error::{Error, Result};
+use crate::observer::Happening;
+use crate::recording::layout::{SUMMARY, at, other_at};
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Status {
+    /// All of the simulated time was reached.
+    Done,
+    /// An error stopped it.
+    Failed,
+    /// The user stopped it.
+    Stopped,
+}
+
+/// What stopped a run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FailureRecord {
+    /// Module that failed; null where no module did.
+    pub module: Option<String>,
+    /// Function of the interface that failed.
+    pub function: Option<String>,
+    /// Simulated time, s.
+    pub time_s: Option<f64>,
+    /// What happened.
+    pub message: String,
+}
+
+impl From<&Error> for FailureRecord {
+    fn from(error: &Error) -> Self {
+        let mut record = Self { module: None, function: None, time_s: None, message: error.to_string() };
+        match error {
+            Error::Module { module, function, time_s, .. } => {
+                record.module = Some(module.clone());
+                record.function = Some((*function).into());
+                record.time_s = Some(*time_s);
+            }
+            Error::NotConverged { time_s, .. } | Error::Simulation { time_s, .. } => {
+                record.time_s = Some(*time_s);
+            }
+            _ => {}
+        }
+        record
+    }
+}
+
+/// Figures of a run. Numbers that do not apply (no robot, no soil, no commanded speed) are null.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Summary {
+    /// How the run ended.
+    pub status: Status,
+    /// What stopped it; null unless `failed`.
+    pub error: Option<FailureRecord>,
+    /// Events, changes and warnings in order of time.
+    pub events: Vec<Happening>,
+    /// Name of the scenario.
+    pub scenario: String,
+    /// Gluing strategy.
+    pub strategy: String,
+    /// Module of the soil.
+    pub soil_module: Option<String>,
+    /// Accepted steps.
+    pub steps: u64,
+    /// Simulated time, s.
+    pub simulated_s: f64,
+    /// Wall time of the step loop, s.
+    pub wall_s: f64,
+    /// CPU time of the step loop, s.
+    pub cpu_s: f64,
+    /// simulated_s / wall_s.
+    pub real_time_factor: f64,
+    /// Horizontal displacement of the reported body along its initial heading, m.
+    pub distance_m: Option<f64>,
+    /// Integral of the commanded speed over time, m.
+    pub commanded_distance_m: Option<f64>,
+    /// Largest magnitude of the roll angle (z-y-x Euler), rad.
+    pub max_roll_rad: Option<f64>,
+    /// Largest magnitude of the pitch angle (z-y-x Euler), rad.
+    pub max_pitch_rad: Option<f64>,
+    /// Largest committed depth under a foot below the initial surface, m.
+    pub max_sinkage_m: Option<f64>,
+    /// Magnitude of the mechanical energy at the motors, Σ |τ·ω|·h, J.
+    pub energy_j: f64,
+    /// energy_j / (m·g·|distance|), dimensionless.
+    pub cost_of_transport: Option<f64>,
+    /// Evaluations of the bodies per step, mean; 1 for a single pass.
+    pub evaluations_mean: f64,
+    /// Evaluations of the bodies per step, largest.
+    pub evaluations_max: u32,
+    /// Steps that did not reach the tolerance.
+    pub steps_not_converged: u64,
+    /// Largest |C| over closed ports after commit, m.
+    pub max_gap_m: f64,
+    /// Largest difference of the wrench on the two sides, N.
+    pub max_action_reaction_gap_n: f64,
+    /// Relative error of the soil's mass; null where the soil moves no material.
+    pub soil_mass_error_relative: Option<f64>,
+    /// File name of the recording beside this file.
+    pub recording: String,
+    /// File name of the report beside this file.
+    pub report: String,
+    /// Form of the iteration that ran: `single pass`, `T-T`, `X-T` or `T-T and X-T`.
+    pub form: String,
+    /// Evaluations of the bodies per step that 95 % of the steps do not exceed.
+    pub evaluations_p95: u32,
+    /// Evaluations of the soils per step, mean.
+    pub evaluations_soil_mean: f64,
+    /// Evaluations of the soils per step, largest.
+    pub evaluations_soil_max: u32,
+    /// Largest |T* − T1| along n, N.
+    pub max_estimate_gap_n: f64,
+    /// Sum over the steps of the magnitude of the work that the interface gains, J.
+    pub interface_work_error_j: f64,
+    /// Drift of the energy book: change of (kinetic + potential + dissipated − actuator work) of all
+    /// subsystems since the start, J.
+    pub energy_balance_j: f64,
+    /// CPU time per step, s.
+    pub cpu_per_step_s: f64,
+}
+
+impl Summary {
+    /// Writes `summary.json` into a results folder.
+    pub fn write(&self, folder: &Path) -> Result {
+        let path = folder.join(SUMMARY);
+        let mut text = serde_json::to_string_pretty(self).map_err(other_at(&path))?;
+        text.push('\n');
+        std::fs::write(&path, text).map_err(at(&path))
+    }
+
+    /// Reads `summary.json` of a results folder.
+    pub fn read(folder: &Path) -> Result<Self> {
+        let path = folder.join(SUMMARY);
+        let text = std::fs::read(&path).map_err(at(&path))?;
+        serde_json::from_slice(&text).map_err(other_at(&path))
+    }
+}

@@ -1,0 +1,216 @@
+//! Tests of recording, reading, mending and summing up on a synthetic testbed in closed form.
+
+mod rig;
+
+use super::*;
+use rig::*;
+use std::path::Path;
+
+fn record(folder: &Path, strategy: &str, steps: u64) -> Summary {
+    let mut rig = Rig::new(strategy);
+    let mut recorder =
+        Recorder::create(folder, &rig.scenario, RecorderOptions { csv: true }).expect("created");
+    rig.run(&mut recorder, steps).expect("ran");
+    recorder.finish(2.0, 1.5, None, Status::Done).expect("finished")
+}
+
+fn folder() -> tempfile::TempDir {
+    tempfile::tempdir().expect("temporary folder")
+}
+
+#[test]
+fn equal_runs_give_equal_bytes() {
+    let (a, b) = (folder(), folder());
+    record(a.path(), "cooperative", 730);
+    record(b.path(), "cooperative", 730);
+    for file in [RECORDING, VARIABLES, FINAL_GROUND, SUMMARY] {
+        let read = |f: &Path| std::fs::read(f.join(file)).expect("written");
+        assert!(read(a.path()) == read(b.path()), "{file} differs");
+    }
+    let bytes = std::fs::read(a.path().join(RECORDING)).expect("written");
+    let path = a.path().to_string_lossy().into_owned().into_bytes();
+    assert!(!bytes.windows(path.len()).any(|w| w == path), "the folder's name is in the recording");
+}
+
+#[test]
+fn what_was_written_is_read_back() {
+    let f = folder();
+    record(f.path(), "iterative", 1003);
+    let r = Recording::open(f.path()).expect("readable");
+    assert!(r.complete);
+    assert_eq!(r.header.get("strategy"), "iterative");
+    assert_eq!(r.header.subsystems().collect::<Vec<_>>()[2], ("soil", "soil-bekker"));
+    let (t, x) = r.series("robot.body.x").expect("recorded");
+    // Steps 0, 5, …, 1000 and the last one, 1003.
+    assert_eq!(t.len(), 202);
+    assert!((t.last().expect("rows") - 1.003).abs() < 1e-12);
+    for (t, x) in t.iter().zip(x) {
+        assert!((x - SPEED * t).abs() < 1e-15);
+    }
+    assert_eq!(r.unit("robot.LF_j2.torque"), "N m");
+    assert!(r.series("robot.LF_j2.max_torque").expect("recorded").1.iter().all(|v| v.is_nan()));
+    assert_eq!(r.series("robot.LF_j2.broken").expect("recorded").1.last(), Some(&1.0));
+    assert_eq!(r.gluing.len(), 202);
+    assert_eq!(r.gluing[1].since_last.steps, 5);
+    assert_eq!(r.gluing[201].since_last.steps, 3);
+    assert_eq!((r.gluing[1].ports[0].body.as_str(), r.gluing[1].ports.len()), ("LF4", 6));
+    assert_eq!(r.events.len(), 1);
+    assert_eq!(r.poses["robot/body"].t_s.len(), 202);
+    let kinetic = r.energy.column("robot.kinetic").expect("recorded");
+    assert_eq!(r.energy.column("kinetic"), Some(kinetic));
+    assert!((r.end_s() - 1.003).abs() < 1e-12);
+}
+
+#[test]
+fn patches_of_ground_add_up_to_the_whole() {
+    let f = folder();
+    record(f.path(), "cooperative", 400);
+    let bytes = std::fs::read(f.path().join(RECORDING)).expect("written");
+    let whole = Recording::read(&bytes).expect("readable");
+    let (initial, end) = (whole.initial_ground.expect("there"), whole.final_ground.expect("there"));
+    assert_eq!(initial.size, [150, 100]);
+    assert!(initial.sinkage.iter().all(|s| *s == 0.0));
+    let deepest = end.sinkage.iter().fold(0.0_f32, |a, b| a.max(*b));
+    assert!((0.8 * DEPTH as f32..=DEPTH as f32).contains(&deepest), "{deepest}");
+    for ((h0, h1), s) in initial.height.iter().zip(&end.height).zip(&end.sinkage) {
+        assert!((h0 - h1 - s).abs() < 1e-6);
+    }
+    let asc = std::fs::read_to_string(f.path().join(FINAL_GROUND)).expect("written");
+    let north_west: f32 = asc.lines().nth(6).and_then(|l| l.split(' ').next()?.parse().ok()).expect("number");
+    assert_eq!(north_west, end.height[99 * 150]);
+}
+
+#[test]
+fn a_recording_cut_anywhere_can_be_read_and_mended() {
+    let f = folder();
+    record(f.path(), "cooperative", 800);
+    let path = f.path().join(RECORDING);
+    let bytes = std::fs::read(&path).expect("written");
+    let whole = Recording::read(&bytes).expect("readable");
+    let mut longest = 0;
+    for tenth in 1..=10 {
+        let cut = bytes.len() * tenth / 11;
+        let r = Recording::read(&bytes[..cut]).expect("readable");
+        assert!(!r.complete);
+        assert!(r.gluing.len() >= longest && r.gluing[..] == whole.gluing[..r.gluing.len()]);
+        longest = r.gluing.len();
+        std::fs::write(&path, &bytes[..cut]).expect("cut");
+        assert!(mend(f.path()).expect("mended"));
+        let mended = Recording::open(f.path()).expect("readable");
+        assert!(mended.complete && mended.header == r.header);
+        let all = |r: &Recording| format!("{:?} {:?} {:?}", r.variables, r.gluing, r.final_ground);
+        assert!(all(&mended) == all(&r));
+        assert!(!mend(f.path()).expect("complete"));
+    }
+    assert!(longest > 0);
+}
+
+#[test]
+fn what_was_flushed_is_on_disk_before_the_end() {
+    let f = folder();
+    let mut rig = Rig::new("cooperative");
+    let mut recorder =
+        Recorder::create(f.path(), &rig.scenario, RecorderOptions::default()).expect("created");
+    rig.view(0, &mut |v| crate::observer::Observer::started(&mut recorder, v)).expect("started");
+    for k in 1..=250 {
+        rig.parts.iter_mut().for_each(|p| p.1.t = k as f64 * H);
+        rig.view(k, &mut |v| crate::observer::Observer::stepped(&mut recorder, v)).expect("stepped");
+    }
+    let r = Recording::open(f.path()).expect("readable");
+    assert!((r.end_s() - 0.2).abs() < 1e-12);
+}
+
+#[test]
+fn every_message_and_schema_is_json() {
+    let f = folder();
+    record(f.path(), "iterative", 105);
+    let bytes = std::fs::read(f.path().join(RECORDING)).expect("written");
+    let mut topics = std::collections::BTreeMap::new();
+    for message in mcap::MessageStream::new(&bytes).expect("complete") {
+        let message = message.expect("whole");
+        let schema = message.channel.schema.clone().expect("has a schema");
+        let schema: serde_json::Value = serde_json::from_slice(&schema.data).expect("schema is JSON");
+        let value: serde_json::Value = serde_json::from_slice(&message.data).expect("message is JSON");
+        let promised = schema["properties"].as_object().expect("properties");
+        for key in value.as_object().expect("an object").keys() {
+            let known = promised.contains_key(key) || message.channel.topic == "/energy";
+            assert!(known, "{} has `{key}`, which its schema lacks", message.channel.topic);
+        }
+        *topics.entry(message.channel.topic.clone()).or_insert(0) += 1;
+    }
+    let names: Vec<_> = topics.keys().map(String::as_str).collect();
+    assert_eq!(names, ["/energy", "/gait", "/gluing", "/ground", "/robot", "/scene", "/soil", "/tf"]);
+    assert_eq!((topics["/robot"], topics["/scene"]), (22, 1));
+}
+
+#[test]
+fn the_summary_holds_the_figures_of_the_closed_form() {
+    let f = folder();
+    let s = record(f.path(), "iterative", 1000);
+    let near = |a: Option<f64>, b: f64| assert!((a.expect("known") - b).abs() < 1e-9, "{a:?} {b}");
+    assert_eq!((s.steps, s.simulated_s, s.real_time_factor), (1000, 1.0, 0.5));
+    near(s.distance_m, SPEED);
+    near(s.commanded_distance_m, SPEED);
+    assert!((s.max_roll_rad.expect("known") - ROLL).abs() < 1e-6);
+    near(s.max_pitch_rad, 0.0);
+    let ground = Recording::open(f.path()).expect("readable").final_ground.expect("there");
+    let deepest = ground.sinkage.iter().fold(0.0_f32, |a, b| a.max(*b));
+    assert_eq!(s.max_sinkage_m.map(|s| s as f32), Some(deepest));
+    // 4 N m times the mean of |cos|: 4·0.3·2π·2/π J in one second.
+    assert!((s.energy_j - 4.8).abs() < 1e-4, "{}", s.energy_j);
+    near(s.cost_of_transport, s.energy_j / (25.0 * 1.62 * SPEED));
+    assert_eq!((s.evaluations_max, s.evaluations_p95, s.steps_not_converged), (4, 4, 0));
+    assert_eq!(s.form, "T-T");
+    assert!((s.interface_work_error_j - 1e-3).abs() < 1e-12);
+    assert_eq!(s.soil_mass_error_relative, Some(1e-12));
+    let again = Summary::read(f.path()).expect("written");
+    near(again.max_sinkage_m, s.max_sinkage_m.expect("known"));
+    assert_eq!((again.status, &again.events, again.steps), (s.status, &s.events, s.steps));
+    let text = std::fs::read_to_string(f.path().join(SUMMARY)).expect("written");
+    let keys = ["status", "error", "events", "scenario", "strategy", "soil_module", "steps", "simulated_s"];
+    let places: Vec<_> = keys.map(|k| text.find(&format!("\"{k}\"")).expect("there")).into();
+    assert!(places.is_sorted());
+}
+
+#[test]
+fn a_nan_is_refused_by_name_and_the_recording_stays_complete() {
+    let f = folder();
+    let mut rig = Rig::new("cooperative");
+    let mut recorder =
+        Recorder::create(f.path(), &rig.scenario, RecorderOptions::default()).expect("created");
+    rig.run(&mut recorder, 0).expect("started");
+    let mut recorder =
+        Recorder::create(f.path(), &rig.scenario, RecorderOptions::default()).expect("created");
+    rig.view(0, &mut |v| crate::observer::Observer::started(&mut recorder, v)).expect("started");
+    rig.parts[1].1.nan = true;
+    let error =
+        rig.view(5, &mut |v| crate::observer::Observer::stepped(&mut recorder, v)).expect_err("refused");
+    let text = error.to_string();
+    assert!(text.contains("robot") && text.contains("body.x") && text.contains("NaN"), "{text}");
+    let error = Some(&error);
+    rig.view(5, &mut |v| crate::observer::Observer::finished(&mut recorder, v, error)).expect("closed");
+    let summary = recorder.finish(1.0, 1.0, error, Status::Failed).expect("finished");
+    assert_eq!(summary.error.and_then(|e| e.module).as_deref(), Some("rigid-body"));
+    let r = Recording::open(f.path()).expect("readable");
+    assert!(r.complete && r.gluing.len() == 1);
+}
+
+#[test]
+fn the_table_of_variables_has_a_head_and_all_rows() {
+    let f = folder();
+    record(f.path(), "cooperative", 20);
+    let text = std::fs::read_to_string(f.path().join(VARIABLES)).expect("written");
+    let lines: Vec<_> = text.lines().collect();
+    assert!(lines[0].starts_with("t_s,gait.speed,robot.body.x,robot.LF_j2.angle,"), "{}", lines[0]);
+    assert_eq!(lines.len(), 6);
+    assert!(lines[2].starts_with("0.005,0.15,0.00075,"), "{}", lines[2]);
+}
+
+#[test]
+fn timing_is_written_apart() {
+    let f = folder();
+    let row = TimingRow { section: "advance".into(), wall_s: 0.5, cpu_s: 0.25, calls: 1000 };
+    write_timing(f.path(), &[row]).expect("written");
+    let text = std::fs::read_to_string(f.path().join(TIMING)).expect("written");
+    assert_eq!(text.lines().nth(1), Some("advance,0.500000,0.250000,1000,250.000"));
+}

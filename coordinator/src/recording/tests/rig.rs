@@ -191,6 +191,8 @@ pub fn scenario(strategy: &str) -> Scenario {
         parameters: Default::default(),
         offered: Default::default(),
     };
+    let mut source = Source::default();
+    (source.path, source.text) = ("/nowhere/synthetic_walk.toml".into(), text);
     Scenario {
         name: "synthetic_walk".into(),
         folder: "scenarios".into(),
@@ -214,7 +216,7 @@ pub fn scenario(strategy: &str) -> Scenario {
         subsystems: vec![part("gait", "gait"), part("robot", "rigid-body"), part("soil", "soil-bekker")],
         connections: Vec::new(),
         events: Vec::new(),
-        source: Source { path: "/nowhere/synthetic_walk.toml".into(), text },
+        source,
     }
 }
 

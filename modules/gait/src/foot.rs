@@ -1,7 +1,7 @@
 //! The path of one foot in the body frame: against the body's twist on the ground, through the air to the next stance.
 //!
-//! In the air x and y follow a cycloid and z a raised cosine, so that the foot leaves and meets the ground at rest
-//! in the body frame.
+//! In the air x and y follow a cycloid and z a raised cosine, so that the foot leaves and meets the ground at rest:
+//! at rest in the body frame, or, as it should be on soft ground, at rest in the world.
 
 use std::f64::consts::TAU;
 
@@ -46,6 +46,15 @@ fn mean_direction(angle: f64, sin: f64, cos: f64) -> [f64; 2] {
     }
 }
 
+/// In which frame a swing begins and ends at rest.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Swing {
+    /// In the body: while it lifts and lands, the foot is dragged over the ground with the body's speed.
+    Body,
+    /// In the world: the foot lifts and lands without dragging.
+    Ground,
+}
+
 /// State of a foot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Foot {
@@ -74,6 +83,8 @@ pub struct Cycle {
     pub twist: Twist,
     /// Whether standing feet may leave the ground.
     pub stepping: bool,
+    /// Where the swing begins and ends at rest.
+    pub swing: Swing,
 }
 
 impl Foot {
@@ -129,6 +140,14 @@ impl Foot {
             return dt - until;
         }
         self.phase += dt / cycle.period;
+        let target = match cycle.swing {
+            Swing::Body => target,
+            Swing::Ground => {
+                // Both ends of the swing are points of the ground, seen from the moving body.
+                self.lift_off = cycle.twist.pass_below(self.lift_off, dt);
+                cycle.twist.pass_below(target, (self.phase - 1.0) * cycle.period)
+            }
+        };
         let u = ((self.phase - cycle.duty) / (1.0 - cycle.duty)).clamp(0.0, 1.0);
         let along = u - libm::sin(TAU * u) / TAU;
         self.position = std::array::from_fn(|k| self.lift_off[k] + (target[k] - self.lift_off[k]) * along);

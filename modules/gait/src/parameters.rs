@@ -1,5 +1,6 @@
 //! Parameters of the module: the schema that the host checks a scenario against, and the checked values.
 
+use crate::foot::Swing;
 use crate::geometry::{LEGS, Leg};
 use crate::pattern::{NAMES, Pattern};
 use crate::posture::Gains;
@@ -18,6 +19,8 @@ pub struct Settings {
     pub body_height: f64,
     /// Longest way of a foot on the ground in the body frame, m: the parameter or what the legs reach.
     pub stride_limit: f64,
+    /// In which frame a swing begins and ends at rest.
+    pub swing: Swing,
     /// Time of standing at the start, s.
     pub stand_s: f64,
     /// Time in which the speed grows from zero, s.
@@ -68,6 +71,9 @@ fn commands() -> Vec<Parameter> {
         number("turn_rate_rad_s", "rad/s", 0.0, "Commanded turn rate, left positive").within(-2.0, 2.0),
         number("heading_rad", "rad", 0.0, "Heading in the world that is held, from +x towards +y"),
         number("lift_m", "m", 0.08, "Height of the swing of a foot").within(0.0, 0.2),
+        Parameter::of("swing", ParameterType::Text, "A foot lifts and lands at rest relative to this")
+            .or("ground")
+            .choices(&["ground", "body"]),
         Parameter::of("cycle_s", ParameterType::Number, "Duration of a cycle; silent: 1.2, 1.8, 3 by gait")
             .optional()
             .positive(),
@@ -126,6 +132,7 @@ pub fn settings(config: &Config) -> Result<(Settings, Command)> {
         neutral,
         body_height,
         stride_limit: number("stride_max_m")?.min(reach),
+        swing: if config.text("swing")? == "body" { Swing::Body } else { Swing::Ground },
         stand_s: number("stand_s")?,
         ramp_s: number("ramp_s")?,
         acceleration: number("acceleration_m_s2")?,

@@ -138,6 +138,7 @@ impl Walker {
             lift: command.lift,
             twist: self.twist,
             stepping,
+            swing: settings.swing,
         };
         for (foot, neutral) in self.feet.iter_mut().zip(settings.neutral) {
             foot.advance(&cycle, neutral, dt);

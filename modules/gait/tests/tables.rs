@@ -8,7 +8,7 @@ fn worst(table: &str, pattern: &str, period: f64, duty: f64) -> f64 {
     let speed = 0.12 / (duty * period);
     let mut gait = gait(&format!(
         r#"{{"gait": "{pattern}", "speed_m_s": {speed}, "stand_s": 0, "ramp_s": 0.01,
-            "posture_feedback": false, "heading_feedback": false}}"#
+            "swing": "body", "posture_feedback": false, "heading_feedback": false}}"#
     ));
     let rows: Vec<Vec<f64>> = table
         .lines()

@@ -86,6 +86,30 @@ fn feet_on_the_ground_move_with_the_commanded_speed() {
     assert!((read(&gait, "speed_reached") - 0.15).abs() < 1e-12);
 }
 
+/// Largest speed over the ground of a foot that is less than 2 mm high, m/s.
+fn drag(swing: &str) -> f64 {
+    let mut gait =
+        gait(&format!(r#"{{"speed_m_s": 0.15, "turn_rate_rad_s": 0.1, "swing": "{swing}", {STEADY}}}"#));
+    run(&mut gait, 4.0);
+    let mut worst = 0.0_f64;
+    for _ in 0..1200 {
+        let before = gait.walker().feet;
+        step(&mut gait, H);
+        for (a, b) in before.iter().zip(gait.walker().feet).filter(|(a, b)| a.height.max(b.height) < 2e-3) {
+            let rest = gait.walker().twist.pass_below(a.position, H);
+            worst = worst.max((b.position[0] - rest[0]).hypot(b.position[1] - rest[1]) / H);
+        }
+    }
+    worst
+}
+
+#[test]
+fn feet_that_swing_over_the_ground_do_not_drag() {
+    let (ground, body) = (drag("ground"), drag("body"));
+    assert!(ground < 0.025, "{ground} m/s");
+    assert!(body > 0.12, "{body} m/s: the body-fixed swing drags with the speed of the body");
+}
+
 #[test]
 fn speed_beyond_reach_is_cut_and_said() {
     let mut gait = gait(&format!(r#"{{"speed_m_s": 1.0, {STEADY}}}"#));
@@ -103,7 +127,7 @@ fn speed_beyond_reach_is_cut_and_said() {
 #[test]
 fn targets_do_not_jump_at_changes_of_command() {
     let mut gait = gait(r#"{"speed_m_s": 0.15}"#);
-    let bound = 0.012; // A joint at 12 rad/s; a jump would be ten times as large.
+    let bound = 0.02; // A joint at 20 rad/s, at the edge of reach; a jump would be ten times as large.
     let mut worst = largest_jump(&mut gait, 3.3);
     for (name, value) in [
         ("speed", 0.25),

@@ -1,0 +1,228 @@
+//! Procedural terrain against its numbers; elevation files against what is in them and what is wrong with them.
+
+use super::*;
+use std::path::{Path, PathBuf};
+use terraglue_ground::HeightField;
+
+fn spec(kind: TerrainKind) -> TerrainSpec {
+    TerrainSpec { size_m: [6.0, 4.0], spacing_m: 0.02, kind }
+}
+
+fn heights(terrain: &dyn Terrain) -> Vec<f64> {
+    let [nx, ny] = terrain.size().map(|n| n as usize);
+    let mut out = vec![0.0; nx * ny];
+    terrain.heights(0, 0, nx, ny, &mut out);
+    out
+}
+
+fn reference(name: &str) -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/reference/terrain").join(name)
+}
+
+fn failure<T>(result: Result<T>) -> String {
+    match result {
+        Err(crate::Error::Input(e)) => format!("{}; {}", e.message, e.help.clone().unwrap_or_default()),
+        Err(e) => panic!("another kind of error: {e}"),
+        Ok(_) => panic!("accepted"),
+    }
+}
+
+#[test]
+fn flat_ground_is_centred_and_uniform() {
+    let ground = build(&spec(TerrainKind::Flat { height_m: 0.3 }), 1).expect("sound");
+    assert_eq!((ground.size(), ground.origin()), ([301, 201], [-3.0, -2.0]));
+    let mut out = [0.0; 6];
+    let tile = ground.heights(-2, 199, 2, 3, &mut out);
+    assert_eq!((tile, out), (terraglue_subsystem::TerrainTile::Uniform(0.3), [0.3; 6]));
+}
+
+#[test]
+fn a_slope_rises_along_its_heading() {
+    let kind = TerrainKind::Slope { angle_rad: 0.2, heading_rad: std::f64::consts::FRAC_PI_2 };
+    let h = heights(&*build(&spec(kind), 1).expect("sound"));
+    assert!((h[200 * 301 + 150] - 2.0 * 0.2f64.tan()).abs() < 1e-12);
+    assert!((h[100 * 301] - 0.0).abs() < 1e-12);
+}
+
+fn undulating(seed: u64, flat_radius_m: f64) -> Vec<f64> {
+    let kind =
+        TerrainKind::Undulating { rms_m: 0.015, wavelengths_m: [0.3, 3.0], seed: Some(seed), flat_radius_m };
+    heights(&*build(&spec(kind), 1).expect("sound"))
+}
+
+#[test]
+fn undulating_ground_has_its_rms_seed_and_wavelengths() {
+    let h = undulating(5, 0.0);
+    let rms = (h.iter().map(|h| h * h).sum::<f64>() / h.len() as f64).sqrt();
+    assert!((rms - 0.015).abs() < 1e-15, "{rms}");
+    assert_eq!(h, undulating(5, 0.0));
+    assert_ne!(h, undulating(6, 0.0));
+    // Waves of at least 0.3 m bound the curvature: |h''| ≤ Σ a·k², far below that of a wave of two cells.
+    let bend = |i: usize| (h[i + 1] - 2.0 * h[i] + h[i - 1]).abs();
+    let largest = (1..300).map(|i| bend(100 * 301 + i)).fold(0.0, f64::max);
+    assert!(largest > 1e-6 && largest < 0.06 * (TAU_OVER_SHORTEST * 0.02) * (TAU_OVER_SHORTEST * 0.02));
+}
+const TAU_OVER_SHORTEST: f64 = std::f64::consts::TAU / 0.3;
+
+#[test]
+fn undulating_ground_is_flat_around_the_start_when_asked() {
+    let h = undulating(5, 0.5);
+    assert_eq!(h[100 * 301 + 150], 0.0);
+    assert_eq!(h[100 * 301 + 150 + 24], 0.0);
+    let rms = (h.iter().map(|h| h * h).sum::<f64>() / h.len() as f64).sqrt();
+    assert!((rms - 0.015).abs() < 1e-15);
+    let kind =
+        TerrainKind::Undulating { rms_m: 0.01, wavelengths_m: [0.3, 3.0], seed: None, flat_radius_m: 9.0 };
+    assert!(failure(build(&spec(kind), 1)).contains("flat_radius_m = 9"));
+    let kind =
+        TerrainKind::Undulating { rms_m: 0.01, wavelengths_m: [0.03, 3.0], seed: None, flat_radius_m: 0.0 };
+    assert!(failure(build(&spec(kind), 1)).contains("from 0.04 m on"));
+}
+
+#[test]
+fn a_crater_keeps_depth_rim_and_slope() {
+    let max_slope_rad = 15.0f64.to_radians();
+    let profile = Profile::new(3.0, 0.4, 0.1, max_slope_rad).expect("fits");
+    assert!((profile.height(0.0) + 0.3).abs() < 1e-12 && (profile.height(1.5) - 0.1).abs() < 1e-12);
+    assert_eq!(profile.height(10.0), 0.0);
+    let slope =
+        |k: i32| (profile.height(f64::from(k + 1) * 1e-3) - profile.height(f64::from(k) * 1e-3)) / 1e-3;
+    let steepest = (0..3000).map(|k| slope(k).abs()).fold(0.0, f64::max);
+    assert!(steepest <= max_slope_rad.tan() + 1e-9 && steepest > 0.26);
+    assert!((profile.steepest() - steepest).abs() < 1e-6);
+    let message = failure(Profile::new(3.0, 0.5, 0.1, max_slope_rad));
+    assert!(
+        message.contains("max_slope_rad above 0.3218") && message.contains("depth_m below 0.4019"),
+        "{message}"
+    );
+    // What the message advises is accepted.
+    assert!(
+        Profile::new(3.0, 0.5, 0.1, 0.3219).is_ok() && Profile::new(3.0, 0.4019, 0.1, max_slope_rad).is_ok()
+    );
+}
+
+#[test]
+fn an_esri_grid_is_read_north_up_and_centred() {
+    let raster = read_esri_ascii(&reference("hill.asc"), None).expect("whole");
+    assert_eq!((raster.size, raster.step, raster.corner), ([4, 3], [0.5, 0.5], [100.25, 200.25]));
+    assert_eq!(raster.heights[0], 9.0);
+    assert_eq!(raster.heights[11], 4.0);
+    let kind = TerrainKind::EsriAscii { file: reference("hill.asc"), fill_m: None };
+    let ground = build(&TerrainSpec { size_m: [0.0; 2], spacing_m: 0.0, kind }, 1).expect("sound");
+    assert_eq!((ground.size(), ground.origin(), ground.spacing()), ([4, 3], [-0.75, -0.5], 0.5));
+    assert!(HeightField::from_terrain(&*ground).is_ok());
+}
+
+#[test]
+fn broken_esri_grids_say_file_line_and_numbers() {
+    let message = failure(read_esri_ascii(&reference("truncated.asc"), None));
+    assert!(message.contains("truncated.asc:8: expected 12 values (4 × 3), found 7"), "{message}");
+    let message = failure(read_esri_ascii(&reference("hole.asc"), None));
+    assert!(message.contains("hole.asc:8: missing data (-9999)") && message.contains("fill_m"), "{message}");
+    assert_eq!(read_esri_ascii(&reference("hole.asc"), Some(0.5)).expect("filled").heights[5], 0.5);
+    let folder = tempfile::tempdir().expect("folder");
+    let bad = |text: &str| {
+        let path = folder.path().join("bad.asc");
+        std::fs::write(&path, text).expect("written");
+        failure(read_esri_ascii(&path, None))
+    };
+    assert!(bad("ncols 2\nnrows 2\ncellsize 1\n1 2\n3 x\n").contains("bad.asc:5: `x` is not a number"));
+    assert!(bad("ncols 2\nnrows 2\ncellsize 0\n1 2\n3 4\n").contains("bad.asc:3: `cellsize` = 0"));
+    assert!(bad("ncols 2\nnrows 2.5\ncellsize 1\n").contains("bad.asc:2: `nrows` = 2.5"));
+    assert!(bad("ncols 2\nnrows 2\n1 2 3 4\n").contains("no `cellsize`"));
+    assert!(bad("ncolumns 2\n").contains("unknown key `ncolumns`"));
+    assert!(bad("").contains("no `ncols`"));
+    assert!(failure(read_esri_ascii(&reference("absent.asc"), None)).contains("absent.asc"));
+}
+
+#[test]
+fn a_written_grid_reads_back() {
+    let lattice = lattice_of([70, 40], 0.01);
+    let mut field = HeightField::flat(lattice, 0.0).expect("in range");
+    for k in 0..40 {
+        field.add_units(k + 20, k, 1000 * k - 700);
+    }
+    let folder = tempfile::tempdir().expect("folder");
+    let path = folder.path().join("ground.asc");
+    write_esri_ascii(&path, &field.height_info(), |a, b| Ok(field.height_tile(a, b))).expect("written");
+    let raster = read_esri_ascii(&path, None).expect("whole");
+    assert_eq!(raster.size, [70, 40]);
+    assert!((raster.corner[0] - lattice.origin[0]).abs() < 1e-12);
+    for (k, h) in raster.heights.iter().enumerate() {
+        assert!((h - field.height(k as i32 % 70, k as i32 / 70)).abs() <= 0.6e-7);
+    }
+}
+
+#[test]
+fn resampling_is_bilinear_and_stays_centred() {
+    let raster = Raster {
+        size: [5, 4],
+        step: [1.0, 0.5],
+        corner: [0.0; 2],
+        heights: (0..20).map(|k| 2.0 * f64::from(k % 5) + 3.0 * 0.5 * f64::from(k / 5)).collect(),
+    };
+    assert!(failure(resample("dem.tif", raster.clone(), 0.0)).contains("not square"));
+    let grid = resample("dem.tif", raster, 0.25).expect("fits");
+    assert_eq!(grid.lattice.size, [17, 7]);
+    for j in 0..7 {
+        for i in 0..17 {
+            let [x, y] = grid.lattice.position(i, j);
+            let exact = 2.0 * (x + 2.0) + 3.0 * (y + 0.75);
+            assert!((grid.height(i.into(), j.into()) - exact).abs() < 1e-12);
+        }
+    }
+}
+
+fn write_tiff(path: &Path, keys: &[u16], nodata: &str, values: &[f32]) {
+    use tiff::encoder::{TiffEncoder, colortype::Gray32Float};
+    use tiff::tags::Tag;
+    let mut encoder = TiffEncoder::new(std::fs::File::create(path).expect("created")).expect("tiff");
+    let mut image = encoder.new_image::<Gray32Float>(3, 2).expect("image");
+    image.encoder().write_tag(Tag::ModelPixelScaleTag, &[0.5, 0.5, 0.0][..]).expect("tag");
+    image.encoder().write_tag(Tag::ModelTiepointTag, &[0.0, 0.0, 0.0, 7.0, 9.0, 0.0][..]).expect("tag");
+    image.encoder().write_tag(Tag::GeoKeyDirectoryTag, keys).expect("tag");
+    image.encoder().write_tag(Tag::GdalNodata, nodata).expect("tag");
+    image.write_data(values).expect("data");
+}
+
+#[test]
+fn a_geotiff_is_read_and_its_faults_are_named() {
+    let folder = tempfile::tempdir().expect("folder");
+    let path = folder.path().join("dem.tif");
+    let metres = [1, 1, 0, 1, 1024, 0, 1, 1];
+    write_tiff(&path, &metres, "-3.4028234663852886e+38", &[1.0, 2.0, 3.0, 4.0, 5.0, f32::MIN]);
+    assert!(failure(read_geotiff(&path, None)).contains("missing data"));
+    let raster = read_geotiff(&path, Some(0.25)).expect("filled");
+    assert_eq!(raster.heights, [4.0, 5.0, 0.25, 1.0, 2.0, 3.0]);
+    assert_eq!((raster.size, raster.step, raster.corner), ([3, 2], [0.5, 0.5], [7.0, 8.5]));
+    let whole = std::fs::read(&path).expect("read");
+    write_tiff(&path, &[1, 1, 0, 1, 1024, 0, 1, 2], "-1", &[1.0; 6]);
+    assert!(failure(read_geotiff(&path, None)).contains("degrees"));
+    std::fs::write(&path, &whole[..40]).expect("written");
+    assert!(failure(read_geotiff(&path, None)).contains("dem.tif"));
+    std::fs::write(&path, "no image").expect("written");
+    assert!(failure(read_geotiff(&path, None)).contains("not a TIFF file"));
+}
+
+#[test]
+fn heights_far_above_zero_are_taken_relative_to_the_middle() {
+    let raster = Raster {
+        size: [2, 2],
+        step: [1.0; 2],
+        corner: [0.0; 2],
+        heights: vec![1500.5, 1501.0, 1502.0, 1503.0],
+    };
+    let ground = from_file("high.asc", raster, 0.0).expect("lowered");
+    assert_eq!(heights(&*ground), [-2.5, -2.0, -1.0, 0.0]);
+    let raster =
+        Raster { size: [2, 2], step: [1.0; 2], corner: [0.0; 2], heights: vec![0.0, 0.0, 0.0, 3000.0] };
+    assert!(failure(from_file("steep.asc", raster, 0.0).map(drop)).contains("steep.asc"));
+}
+
+#[test]
+fn the_generator_keeps_its_sequence() {
+    // First outputs for seed 1234567, as published with the reference implementation.
+    let mut random = SplitMix64::new(1_234_567);
+    let found: Vec<u64> = (0..3).map(|_| random.next_u64()).collect();
+    assert_eq!(found, [6_457_827_717_110_365_317, 3_203_168_211_198_807_973, 9_817_491_932_198_370_423]);
+}

@@ -71,7 +71,8 @@ impl SoilParameters {
         parameters.check().map(|()| parameters)
     }
 
-    fn check(&self) -> Result {
+    /// Refuses numbers with which the laws make no sense.
+    pub fn check(&self) -> Result {
         for (name, value) in [
             ("n", self.n),
             ("k_phi", self.k_phi),

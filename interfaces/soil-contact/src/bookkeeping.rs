@@ -1,0 +1,156 @@
+//! Commit: the foot's motion becomes depths, slip and heat; the nodes that it left forget their contact.
+
+use crate::assemble::displacement;
+use crate::ground::{Covered, Ground, NodeState};
+use crate::patch::{Laws, Patch, Patches};
+use terraglue_soil_law::ShearState;
+use terraglue_subsystem::Port;
+
+/// Sums over the run and what the last commit found. Part of the committed state.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Book {
+    /// Number of commits.
+    pub stamp: u64,
+    /// Elastic energy of the loaded nodes, J.
+    pub elastic: f64,
+    /// Heat since the start, J.
+    pub dissipated: f64,
+    /// Work of the feet on the soil since the start, J.
+    pub port_work: f64,
+    /// Largest committed depth of a loaded node below the initial surface since the start, m.
+    pub max_sinkage: f64,
+    /// Loaded nodes.
+    pub loaded: u32,
+    /// Smallest number of loaded nodes of a patch with any; 0: none is loaded.
+    pub fewest: u32,
+}
+
+/// Work lists of a commit; reused.
+#[derive(Clone, Debug, Default)]
+pub struct Lists {
+    /// Nodes below the feet.
+    pub covered: Vec<Covered>,
+    /// Nodes that were loaded at the commit before.
+    pub loaded: Vec<[i32; 2]>,
+    previous: Vec<[i32; 2]>,
+    /// Nodes that were loaded before and are not any more.
+    pub released: Vec<[i32; 2]>,
+}
+
+impl Lists {
+    /// Room for `count` nodes each.
+    pub fn reserve(&mut self, count: usize) {
+        self.covered.reserve(count);
+        self.loaded.reserve(count);
+        self.previous.reserve(count);
+        self.released.reserve(count);
+    }
+}
+
+/// The patches of a step and the laws that act on them.
+pub struct Scene<'a> {
+    /// Patches built for the step.
+    pub patches: &'a Patches,
+    /// Laws.
+    pub laws: &'a Laws,
+}
+
+/// A node that the foot presses: its number in the arrays, depth and displacement.
+struct Pressed {
+    k: usize,
+    depth: f64,
+    pressure: f64,
+    slip: [f64; 2],
+}
+
+impl Scene<'_> {
+    /// Takes the committed motion `x` of all feet, under the wrenches `t`, into the node states.
+    pub fn commit(
+        &self,
+        ports: &[Port],
+        t: &[f64],
+        x: &[f64],
+        ground: &mut Ground,
+        lists: &mut Lists,
+        book: &mut Book,
+    ) {
+        book.stamp += 1;
+        (book.elastic, book.loaded, book.fewest) = (0.0, 0, 0);
+        std::mem::swap(&mut lists.loaded, &mut lists.previous);
+        lists.loaded.clear();
+        lists.covered.clear();
+        for (patch, port) in self.patches.ports.iter().zip(ports) {
+            book.port_work -= port.range().map(|k| t[k] * x[k]).sum::<f64>();
+            let loaded = self.commit_patch(patch, &patch.unpack(x), ground, lists, book);
+            if loaded > 0 {
+                book.fewest = if book.fewest == 0 { loaded } else { book.fewest.min(loaded) };
+            }
+            book.loaded += loaded;
+        }
+        release(ground, lists, book.stamp);
+    }
+
+    fn commit_patch(
+        &self,
+        patch: &Patch,
+        x: &[f64; 6],
+        ground: &mut Ground,
+        lists: &mut Lists,
+        book: &mut Book,
+    ) -> u32 {
+        let n = &self.patches.nodes;
+        let mut loaded = 0;
+        for k in patch.nodes.clone().filter(|k| n.area[*k] > 0.0) {
+            let moved = displacement(n.arm[k], x);
+            let depth = n.depth[k] - moved[0];
+            let (pressure, _) = patch.curve.at(depth, n.z_max[k], n.p_max[k]);
+            let [i, j] = n.index[k];
+            if pressure > 0.0 {
+                loaded += 1;
+                self.press(patch, &Pressed { k, depth, pressure, slip: [moved[1], moved[2]] }, ground, book);
+                lists.loaded.push([i, j]);
+            }
+            let virgin = patch.curve.virgin(depth);
+            let depth = depth / patch.slope;
+            let lower = ground.initial(i, j) + ground.nodes.get(i, j).raised - depth;
+            lists.covered.push(Covered { i, j, lower, depth, pressure, virgin });
+        }
+        loaded
+    }
+
+    /// One loaded node: plastic depth, slip, heat and elastic energy.
+    fn press(&self, patch: &Patch, node: &Pressed, ground: &mut Ground, book: &mut Book) {
+        let Pressed { k, depth, pressure, slip } = *node;
+        let (n, curve) = (&self.patches.nodes, &patch.curve);
+        let area = n.area[k];
+        let shear = self.laws.shear.respond(&n.shear[k], pressure, slip);
+        let squeezed = 0.5 * pressure * pressure / curve.unloading();
+        book.dissipated += area * shear.dissipated;
+        book.elastic += area * (self.laws.shear.elastic_energy(&shear.state) + squeezed);
+        let [i, j] = n.index[k];
+        let state = ground.nodes.get_mut(i, j);
+        state.largest = n.z_max[k];
+        if depth > n.z_max[k] {
+            let (before, p) = (n.z_max[k], n.p_max[k]);
+            let kept = curve.virgin_work(before, p) - 0.5 * p * p / curve.unloading();
+            book.dissipated += area * (curve.virgin_work(depth, pressure) - squeezed - kept).max(0.0);
+            state.permanent = curve.permanent(depth, pressure) / patch.slope;
+            state.largest = depth;
+        }
+        state.curve = [curve.modulus(), patch.slope];
+        (state.pressure, state.shear, state.stamp) = (pressure, shear.state, book.stamp);
+        book.max_sinkage = book.max_sinkage.max(depth / patch.slope - state.raised);
+    }
+}
+
+/// Lift-off: the nodes that were loaded before and are not now forget pressure and shear.
+fn release(ground: &mut Ground, lists: &mut Lists, stamp: u64) {
+    lists.released.clear();
+    for [i, j] in &lists.previous {
+        let state: &mut NodeState = ground.nodes.get_mut(*i, *j);
+        if state.stamp != stamp {
+            (state.pressure, state.shear) = (0.0, ShearState::default());
+            lists.released.push([*i, *j]);
+        }
+    }
+}

@@ -1,0 +1,291 @@
+//! The contact patches of a step: per port the curve of its pressure law, per node depth, area and history.
+//!
+//! Built once per step from the committed state into flat arrays, so that trials touch neither the lattice nor
+//! the allocator.
+
+use crate::ground::{Ground, NodeState};
+use terraglue_soil_law::{PressureCurve, PressureLaw, ShearLaw, ShearState};
+use terraglue_subsystem::{Node, Port, Step};
+
+/// One port's share of the arrays and what is constant during the step.
+#[derive(Clone, Debug)]
+pub struct Patch {
+    /// First node in the arrays and one past the last.
+    pub nodes: std::ops::Range<usize>,
+    /// Place of the components n, t1, t2, mn, mt1, mt2 in packed vectors; `None`: not carried.
+    pub place: [Option<usize>; 6],
+    /// n_z.
+    pub slope: f64,
+    /// Pressure law under this contact.
+    pub curve: PressureCurve,
+    /// Surface along n under the body: 0 in contact, −gap otherwise, m.
+    pub surface: f64,
+    /// Wrench of the law on the body at X = 0: n, t1, t2, mn, mt1, mt2.
+    pub force: [f64; 6],
+    /// Largest tangential force at X = 0, N.
+    pub strength: f64,
+    /// Start for the inverse of the normal law: the last solution in this step.
+    pub warm: f64,
+}
+
+impl Patch {
+    /// Whether the port carries moments.
+    pub fn carries_moments(&self) -> bool {
+        self.place[3..].iter().any(Option::is_some)
+    }
+
+    /// Components of a packed vector; those not carried are 0.
+    pub fn unpack(&self, packed: &[f64]) -> [f64; 6] {
+        self.place.map(|p| p.map_or(0.0, |p| packed[p]))
+    }
+
+    /// Writes the carried components into a packed vector.
+    pub fn pack(&self, values: &[f64; 6], packed: &mut [f64]) {
+        for (place, value) in self.place.iter().zip(values) {
+            if let Some(p) = place {
+                packed[*p] = *value;
+            }
+        }
+    }
+}
+
+/// The nodes of all patches, one array per quantity.
+#[derive(Clone, Debug, Default)]
+pub struct PatchNodes {
+    /// Lattice indices.
+    pub index: Vec<[i32; 2]>,
+    /// Depth below the reference level along n at X = 0, m.
+    pub depth: Vec<f64>,
+    /// Largest depth along n so far, m.
+    pub z_max: Vec<f64>,
+    /// Pressure at the largest depth, Pa.
+    pub p_max: Vec<f64>,
+    /// Depth of the unloaded surface along n, m.
+    pub permanent: Vec<f64>,
+    /// Area in the tangent plane, m²; 0 where another port presses deeper.
+    pub area: Vec<f64>,
+    /// From the port's origin to the underside at the node along n, t1, t2, m.
+    pub arm: Vec<[f64; 3]>,
+    /// Shear history.
+    pub shear: Vec<ShearState>,
+    /// Depth with the rotation of a trial; scratch.
+    pub turned: Vec<f64>,
+}
+
+impl PatchNodes {
+    fn clear(&mut self) {
+        self.index.clear();
+        self.depth.clear();
+        self.z_max.clear();
+        self.p_max.clear();
+        self.permanent.clear();
+        self.area.clear();
+        self.arm.clear();
+        self.shear.clear();
+    }
+
+    /// Room for `count` nodes, so that later steps do not allocate.
+    pub fn reserve(&mut self, count: usize) {
+        self.index.reserve(count);
+        self.arm.reserve(count);
+        self.shear.reserve(count);
+        for v in [
+            &mut self.depth,
+            &mut self.z_max,
+            &mut self.p_max,
+            &mut self.permanent,
+            &mut self.area,
+            &mut self.turned,
+        ] {
+            v.reserve(count);
+        }
+    }
+}
+
+/// The soil's laws.
+#[derive(Clone, Copy, Debug)]
+pub struct Laws {
+    /// Pressure.
+    pub pressure: PressureLaw,
+    /// Shear.
+    pub shear: ShearLaw,
+    /// Elastic stiffness, Pa/m.
+    pub elastic: f64,
+}
+
+/// All patches of a step.
+#[derive(Clone, Debug, Default)]
+pub struct Patches {
+    /// In the order of the step's ports.
+    pub ports: Vec<Patch>,
+    /// Their nodes, port after port.
+    pub nodes: PatchNodes,
+    built_for: Option<(u64, u64, usize, usize)>,
+}
+
+impl Patches {
+    /// Makes the next call of [`Patches::build`] work: the committed state has changed.
+    pub fn forget(&mut self) {
+        self.built_for = None;
+    }
+
+    /// Reads the committed state below all ports, unless that was done for this step already.
+    pub fn build(&mut self, step: &Step, ground: &Ground, laws: &Laws) {
+        let key = (step.t.to_bits(), step.index, step.ports.len(), step.nodes.len());
+        if self.built_for == Some(key) {
+            return;
+        }
+        self.ports.clear();
+        self.nodes.clear();
+        for port in step.ports {
+            let patch = self.read_port(port, port.nodes(step.nodes), ground, laws);
+            self.ports.push(patch);
+        }
+        self.share_nodes(step);
+        for p in 0..self.ports.len() {
+            self.evaluate_at_rest(p, &laws.shear);
+        }
+        self.built_for = Some(key);
+    }
+
+    fn read_port(&mut self, port: &Port, nodes: &[Node], ground: &Ground, laws: &Laws) -> Patch {
+        let first = self.nodes.index.len();
+        let n_z = port.frame[2];
+        for node in nodes {
+            self.read_node(port, node, ground);
+        }
+        let range = first..self.nodes.index.len();
+        let b = contact_size(port, nodes, &self.nodes, range.clone(), ground.heights.lattice().spacing);
+        let curve = laws.pressure.curve(b, laws.elastic);
+        for (k, node) in range.clone().zip(nodes) {
+            let state = ground.nodes.get(node.i, node.j);
+            self.nodes.z_max[k] = largest_depth(&state, &curve, n_z);
+            self.nodes.p_max[k] = curve.unloading() * (self.nodes.z_max[k] - self.nodes.permanent[k]);
+        }
+        let mut place = [None; 6];
+        port.components().for_each(|(i, c)| place[c] = Some(i));
+        Patch {
+            nodes: range,
+            place,
+            slope: n_z,
+            curve,
+            surface: 0.0,
+            force: [0.0; 6],
+            strength: 0.0,
+            warm: 0.0,
+        }
+    }
+
+    fn read_node(&mut self, port: &Port, node: &Node, ground: &Ground) {
+        let state = ground.nodes.get(node.i, node.j);
+        let n_z = port.frame[2];
+        let [x, y] = ground.heights.lattice().position(node.i, node.j);
+        let reference = ground.initial(node.i, node.j) + state.raised;
+        let offset = [x - port.origin[0], y - port.origin[1], node.lower - port.origin[2]];
+        let along = |c: usize| port.direction(c).iter().zip(&offset).map(|(a, b)| a * b).sum::<f64>();
+        let nodes = &mut self.nodes;
+        nodes.index.push([node.i, node.j]);
+        nodes.depth.push((reference - node.lower) * n_z);
+        nodes.z_max.push(0.0);
+        nodes.p_max.push(0.0);
+        nodes.permanent.push(state.permanent * n_z);
+        nodes.area.push(node.area / n_z);
+        nodes.arm.push([along(0), along(1), along(2)]);
+        nodes.shear.push(state.shear);
+    }
+
+    /// Where two ports cover a node, the deeper one presses; the other one's area there becomes 0.
+    fn share_nodes(&mut self, step: &Step) {
+        for b in 1..self.ports.len() {
+            for a in 0..b {
+                let (nodes_a, nodes_b) = (step.ports[a].nodes(step.nodes), step.ports[b].nodes(step.nodes));
+                if overlap(nodes_a, nodes_b) {
+                    self.share_pair(self.ports[a].nodes.clone(), self.ports[b].nodes.clone());
+                }
+            }
+        }
+    }
+
+    fn share_pair(&mut self, a: std::ops::Range<usize>, b: std::ops::Range<usize>) {
+        for k in a {
+            let Some(l) = b.clone().find(|l| self.nodes.index[*l] == self.nodes.index[k]) else { continue };
+            let loser = if self.nodes.depth[k] >= self.nodes.depth[l] { l } else { k };
+            self.nodes.area[loser] = 0.0;
+        }
+    }
+
+    fn evaluate_at_rest(&mut self, p: usize, shear: &ShearLaw) {
+        let force = self.wrench(p, &[0.0; 6], shear);
+        let patch = &self.ports[p];
+        let (mut highest, mut strength) = (f64::NEG_INFINITY, 0.0);
+        for k in patch.nodes.clone().filter(|k| self.nodes.area[*k] > 0.0) {
+            highest = highest.max(self.nodes.depth[k] - self.nodes.permanent[k]);
+            let (pressure, _) = patch.curve.at(self.nodes.depth[k], self.nodes.z_max[k], self.nodes.p_max[k]);
+            if pressure > 0.0 {
+                let mobilised = shear.mobilised(self.nodes.shear[k].slip);
+                strength += self.nodes.area[k] * shear.strength(pressure).0 * mobilised;
+            }
+        }
+        let patch = &mut self.ports[p];
+        patch.force = force;
+        patch.strength = strength;
+        patch.surface = if force[0] > 0.0 { 0.0 } else { highest.clamp(-FAR, 0.0) };
+    }
+}
+
+/// Gap that is reported below a port without nodes, m.
+const FAR: f64 = 1.0;
+
+fn largest_depth(state: &NodeState, curve: &PressureCurve, n_z: f64) -> f64 {
+    if state.permanent <= 0.0 {
+        0.0
+    } else if state.curve == [curve.modulus(), n_z] {
+        state.largest
+    } else {
+        curve.largest_depth(state.permanent * n_z, state.largest)
+    }
+}
+
+/// Whether the index ranges of two node lists meet.
+fn overlap(a: &[Node], b: &[Node]) -> bool {
+    let bounds = |nodes: &[Node]| {
+        nodes.iter().fold([i32::MAX, i32::MIN, i32::MAX, i32::MIN], |r, n| {
+            [r[0].min(n.i), r[1].max(n.i), r[2].min(n.j), r[3].max(n.j)]
+        })
+    };
+    let (a, b) = (bounds(a), bounds(b));
+    a[0] <= b[1] && b[0] <= a[1] && a[2] <= b[3] && b[2] <= a[3]
+}
+
+/// b of the pressure law, m, constant during a step.
+///
+/// Sphere: radius of the contact circle, from the displaced volume V = ½·π·b²·δ_max of a paraboloid cap, which
+/// grows smoothly where the number of touching nodes would jump; at least half a spacing. Otherwise from the
+/// half lengths e of the footprint and the covered share f = A/(4·e1·e2): R of a disc (f = π/4), the short
+/// side of a rectangle (f = 1), linear between.
+fn contact_size(
+    port: &Port,
+    nodes: &[Node],
+    arrays: &PatchNodes,
+    range: std::ops::Range<usize>,
+    spacing: f64,
+) -> f64 {
+    let floor = 0.5 * spacing;
+    let [e1, e2] = port.extent;
+    if e1 > 0.0 && e2 > 0.0 {
+        let disc = std::f64::consts::FRAC_PI_4;
+        let covered: f64 = nodes.iter().map(|n| n.area).sum::<f64>() / port.frame[2];
+        let share = ((covered / (4.0 * e1 * e2) - disc) / (1.0 - disc)).clamp(0.0, 1.0);
+        return (e1.min(e2) * (1.0 + share)).max(floor);
+    }
+    let (mut volume, mut deepest) = (0.0, 0.0_f64);
+    for k in range {
+        let depth = arrays.depth[k].max(0.0);
+        volume += arrays.area[k] * depth;
+        deepest = deepest.max(depth);
+    }
+    if deepest <= 0.0 {
+        return floor;
+    }
+    (2.0 * volume / (std::f64::consts::PI * deepest)).sqrt().max(floor)
+}

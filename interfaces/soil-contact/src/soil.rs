@@ -1,0 +1,293 @@
+//! A subsystem from the shared contact machinery and a soil's own rule for its material.
+
+use crate::bookkeeping::{self, Book, Lists};
+use crate::ground::{Covered, Ground};
+use crate::patch::{Laws, Patches};
+use crate::state::Slots;
+use crate::trial::Last;
+use crate::values;
+use std::sync::Arc;
+use terraglue_soil_law::SoilParameters;
+use terraglue_subsystem::{
+    Capabilities, Config, Energy, Error, Estimate, FieldInfo, FieldTile, Host, Input, Law, Level, LogLevel,
+    Motion, Response, Result, Step, Subsystem, Values, ValuesMut, Variable, cooperation,
+};
+
+/// Sinkage beyond which the plate tests behind the laws say nothing, m.
+const DEEPEST_M: f64 = 0.3;
+/// Contact that is this small for so many commits in a row is worth a warning.
+const FEW_NODES: u32 = 3;
+const FEW_NODES_COMMITS: u32 = 100;
+
+/// Where the material under and around a foot goes.
+pub trait Material: Send {
+    /// Exact copy of its own committed state.
+    type Saved: Default + Send;
+
+    /// Its variables, numbered from `first`; all are f64.
+    fn variables(&self, _first: u32) -> Vec<Variable> {
+        Vec::new()
+    }
+    /// Value of its variable number k.
+    fn value(&self, _k: u32, _ground: &Ground) -> f64 {
+        f64::NAN
+    }
+    /// New value, within its bounds, for its variable number k.
+    fn set_value(&mut self, _k: u32, _value: f64) -> Result {
+        Err(Error::Refused("this value can only be read".into()))
+    }
+    /// The laws' parameters have changed.
+    fn parameters_changed(&mut self, _parameters: &SoilParameters) {}
+    /// After the laws have taken a step of h seconds: puts the material where it belongs. `covered` are the nodes
+    /// below feet, `released` those that a foot has just left.
+    fn settle(&mut self, ground: &mut Ground, covered: &[Covered], released: &[[i32; 2]], h: f64);
+    /// Copies the state into `out`.
+    fn save(&self, _out: &mut Self::Saved) {}
+    /// Back to a saved state.
+    fn restore(&mut self, _saved: &Self::Saved) {}
+}
+
+/// A soil on a height field.
+pub struct FieldSoil<M: Material> {
+    host: Arc<dyn Host>,
+    parameters: SoilParameters,
+    laws: Laws,
+    ground: Ground,
+    material: M,
+    patches: Patches,
+    lists: Lists,
+    book: Book,
+    last: Last,
+    law_force: Vec<f64>,
+    fields: [FieldInfo; 2],
+    variables: Vec<Variable>,
+    slots: Slots<M::Saved>,
+    few_nodes: u32,
+    warned: [bool; 2],
+}
+
+impl<M: Material> FieldSoil<M> {
+    /// A soil on the host's terrain. Refused: parameters without sense, a scenario without ground.
+    pub fn new(config: &Config, host: Arc<dyn Host>, material: M) -> Result<Self> {
+        let parameters = SoilParameters::from_config(config)?;
+        let ground = Ground::new(host.required_terrain()?)?;
+        let mut variables = values::shared();
+        variables.extend(material.variables(values::SHARED));
+        let nodes = host.max_nodes() as usize;
+        let (mut patches, mut lists) = (Patches::default(), Lists::default());
+        patches.nodes.reserve(nodes);
+        lists.reserve(nodes);
+        Ok(Self {
+            laws: laws_of(&parameters),
+            fields: [ground.heights.height_info(), ground.heights.sinkage_info()],
+            slots: Slots::new(host.slots()),
+            book: Book::default(),
+            last: Last::default(),
+            law_force: Vec::new(),
+            few_nodes: 0,
+            warned: [false; 2],
+            host,
+            parameters,
+            ground,
+            material,
+            patches,
+            lists,
+            variables,
+        })
+    }
+
+    /// The ground, for tests and drawings.
+    pub fn ground(&self) -> &Ground {
+        &self.ground
+    }
+
+    /// The material rule.
+    pub fn material(&self) -> &M {
+        &self.material
+    }
+
+    fn build(&mut self, step: &Step) {
+        self.patches.build(step, &self.ground, &self.laws);
+    }
+
+    /// Fills x, v, a with the committed surface: along n as `set_ports` says, at rest otherwise.
+    fn show_surface(&self, now: &mut Response) {
+        now.x.fill(0.0);
+        now.v.fill(0.0);
+        now.a.fill(0.0);
+        for patch in &self.patches.ports {
+            patch.pack(&[patch.surface, 0.0, 0.0, 0.0, 0.0, 0.0], now.x);
+        }
+    }
+
+    fn warn(&mut self, which: usize, text: &str) {
+        if !std::mem::replace(&mut self.warned[which], true) {
+            self.host.log(LogLevel::Warning, text);
+        }
+    }
+
+    fn watch_range(&mut self) {
+        let few = self.book.fewest > 0 && self.book.fewest < FEW_NODES;
+        self.few_nodes = if few { self.few_nodes + 1 } else { 0 };
+        if self.few_nodes >= FEW_NODES_COMMITS {
+            self.warn(0, "a contact spans fewer than three cells; a finer spacing resolves it better");
+        }
+        if self.book.max_sinkage > DEEPEST_M {
+            self.warn(1, "a foot sinks deeper than 0.3 m, beyond the range of the pressure law");
+        }
+    }
+}
+
+fn laws_of(p: &SoilParameters) -> Laws {
+    Laws { pressure: p.pressure(), shear: p.shear(), elastic: p.elastic_stiffness_pa_m }
+}
+
+impl<M: Material> Subsystem for FieldSoil<M> {
+    fn capabilities(&self) -> Capabilities {
+        Capabilities::FORCE
+            | Capabilities::MOTION
+            | Capabilities::SOLVE
+            | Capabilities::DERIVATIVES
+            | Capabilities::RETRY
+            | Capabilities::STATE
+    }
+
+    fn set_ports(&mut self, step: &Step, laws: &mut [Law], now: &mut Response) -> Result {
+        self.build(step);
+        self.last.clear();
+        for law in laws {
+            law.mu = law.mu.min(self.laws.shear.friction);
+        }
+        self.show_surface(now);
+        for patch in &self.patches.ports {
+            patch.pack(&patch.force, now.t);
+        }
+        now.reached = step.t;
+        Ok(())
+    }
+
+    fn solve_compatibility(&mut self, step: &Step, estimate: &Estimate, out: &mut Response) -> Result {
+        self.build(step);
+        self.last.clear();
+        self.law_force.resize(step.n as usize, 0.0);
+        self.show_surface(out);
+        for (port, patch) in step.ports.iter().zip(&self.patches.ports) {
+            patch.pack(&patch.force, &mut self.law_force);
+            let mu = port.law.mu.min(self.laws.shear.friction);
+            cooperation::plain_pass(port, estimate.t_star, &self.law_force, patch.strength, mu, out.t);
+        }
+        out.reached = step.t + step.h;
+        Ok(())
+    }
+
+    fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result {
+        self.build(step);
+        let shear = &self.laws.shear;
+        match input {
+            Input::Motion(motion) => self.last.motion(&mut self.patches, shear, motion, out),
+            Input::Force { t, motion, .. } => {
+                self.last.force(&mut self.patches, shear, t, motion.as_ref(), out);
+            }
+            Input::Impedance { .. } => return Err(Error::Unsupported),
+        }
+        out.a.fill(0.0);
+        out.reached = step.t + step.h;
+        Ok(())
+    }
+
+    fn interface_jacobian(&mut self, step: &Step, level: Level, out: &mut [f64]) -> Result {
+        self.build(step);
+        self.last.jacobian(&mut self.patches, &self.laws.shear, step.n as usize, level, out)
+    }
+
+    fn commit(&mut self, step: &Step, t: &[f64], partner: &Motion) -> Result {
+        if let Some(k) = partner.x.iter().position(|x| !x.is_finite()) {
+            return Err(Error::Failed(format!("the foot's motion, component {k}, is not a number")));
+        }
+        self.build(step);
+        let scene = bookkeeping::Scene { patches: &self.patches, laws: &self.laws };
+        scene.commit(step.ports, t, partner.x, &mut self.ground, &mut self.lists, &mut self.book);
+        self.material.settle(&mut self.ground, &self.lists.covered, &self.lists.released, step.h);
+        self.patches.forget();
+        self.last.clear();
+        self.watch_range();
+        Ok(())
+    }
+
+    fn save_state(&mut self, slot: u32) -> Result {
+        let saved = self.slots.save(slot, &self.ground, &self.lists.loaded, &self.book)?;
+        self.material.save(saved);
+        Ok(())
+    }
+
+    fn restore_state(&mut self, slot: u32) -> Result {
+        let saved = self.slots.restore(slot, &mut self.ground, &mut self.lists.loaded, &mut self.book)?;
+        self.material.restore(saved);
+        self.patches.forget();
+        self.last.clear();
+        Ok(())
+    }
+
+    fn variables(&self) -> &[Variable] {
+        &self.variables
+    }
+
+    fn get(&self, ids: &[u32], out: ValuesMut) -> Result {
+        let ValuesMut::F64(out) = out else {
+            return Err(Error::Refused("all values of a soil are f64".into()));
+        };
+        for (id, out) in ids.iter().zip(out) {
+            if *id as usize >= self.variables.len() {
+                return Err(Error::Refused(format!("no variable has the number {id}")));
+            }
+            *out = values::get(*id, &self.book, &self.parameters)
+                .unwrap_or_else(|| self.material.value(*id - values::SHARED, &self.ground));
+        }
+        Ok(())
+    }
+
+    fn set(&mut self, ids: &[u32], new: Values) -> Result {
+        let Values::F64(new) = new else {
+            return Err(Error::Refused("all values of a soil are f64".into()));
+        };
+        for (id, value) in ids.iter().zip(new) {
+            let variable = self
+                .variables
+                .get(*id as usize)
+                .ok_or_else(|| Error::Refused(format!("no variable has the number {id}")))?;
+            if *id < values::SHARED {
+                values::set(variable, *value, &mut self.parameters)?;
+            } else {
+                values::check(variable, *value)?;
+                self.material.set_value(*id - values::SHARED, *value)?;
+            }
+        }
+        self.laws = laws_of(&self.parameters);
+        self.material.parameters_changed(&self.parameters);
+        self.patches.forget();
+        Ok(())
+    }
+
+    fn fields(&self) -> &[FieldInfo] {
+        &self.fields
+    }
+
+    fn field_tile(&self, field: usize, a: u32, b: u32) -> Result<FieldTile<'_>> {
+        let [nx, ny] = self.ground.heights.lattice().tiles();
+        match field {
+            0 | 1 if a >= nx || b >= ny => Err(Error::Refused(format!("no tile ({a}, {b})"))),
+            0 => Ok(self.ground.heights.height_tile(a, b)),
+            1 => Ok(self.ground.heights.sinkage_tile(a, b)),
+            _ => Err(Error::Refused(format!("no field number {field}"))),
+        }
+    }
+
+    fn energy(&self) -> Energy {
+        Energy {
+            potential: self.book.elastic,
+            dissipated: self.book.dissipated,
+            port_work: self.book.port_work,
+            ..Energy::default()
+        }
+    }
+}

@@ -1,1 +1,89 @@
 //! The C ABI of a module: the table of functions, its header, and the conversion both ways.
+//!
+//! No Rust type and no panic crosses the border: [`abi`] holds plain C types, `export_subsystem!` wraps a Rust
+//! [`terraglue_subsystem::Module`] into the table, [`ForeignModule`] makes any table, written in Rust or in C,
+//! a module again. `include/terraglue.h` says the same to C; it is generated from [`abi`].
+//!
+//! ```ignore
+//! //! The module my-soil as a dynamic library (crate-type = ["cdylib"]).
+//! terraglue_plugin::export_subsystem!(my_soil::MySoil);
+//! ```
+//!
+//! Unsafe code stands here because pointers of foreign code are read and written; every block says why it holds.
+#![allow(unsafe_code)]
+
+pub mod abi;
+mod convert;
+mod export;
+mod foreign;
+mod text;
+
+pub use export::table;
+pub use foreign::{ForeignModule, ForeignSubsystem, TableError};
+
+/// Name of the one symbol that a module exports; its type is [`abi::TgEntry`].
+pub const ENTRY: &str = "terraglue_subsystem";
+
+/// Name of the section of the library that describes the module: lines `terraglue module`, `name=…`,
+/// `version=…`, `abi=MAJOR.MINOR`, closed by a zero byte. It can be read without running the library.
+pub const SECTION: &str = ".terraglue";
+
+/// A table that can be kept in a static.
+#[doc(hidden)]
+pub struct Table(pub abi::TgSubsystem);
+// SAFETY: a table is constant and its pointers refer to constant memory.
+unsafe impl Send for Table {}
+// SAFETY: as above.
+unsafe impl Sync for Table {}
+
+/// Version of the ABI as a literal, for [`export_subsystem`].
+#[doc(hidden)]
+#[macro_export]
+macro_rules! abi_version {
+    () => {
+        "1.0"
+    };
+}
+
+/// Exports a type that implements [`terraglue_subsystem::Module`] as the module of this dynamic library.
+///
+/// The crate is a `cdylib` named `<module name>-plugin` and holds nothing else.
+#[macro_export]
+macro_rules! export_subsystem {
+    ($module:ty) => {
+        #[cfg(panic = "abort")]
+        compile_error!("a module must be built with panic = \"unwind\": aborting would end the host");
+
+        /// What this library is, readable without running it.
+        #[allow(unsafe_code)]
+        // SAFETY: a section of our own name; nothing else reads or writes it.
+        #[unsafe(link_section = ".terraglue")]
+        #[used]
+        static TERRAGLUE_DESCRIPTION: [u8; TERRAGLUE_TEXT.len()] = {
+            let mut bytes = [0; TERRAGLUE_TEXT.len()];
+            bytes.copy_from_slice(TERRAGLUE_TEXT.as_bytes());
+            bytes
+        };
+        const TERRAGLUE_TEXT: &str = concat!(
+            "terraglue module\nname=",
+            env!("CARGO_PKG_NAME"),
+            "\nversion=",
+            env!("CARGO_PKG_VERSION"),
+            "\nabi=",
+            $crate::abi_version!(),
+            "\n\0"
+        );
+
+        /// The entry that the host looks for.
+        #[allow(unsafe_code)]
+        // SAFETY: the only symbol of this name in the library; the type is `TgEntry`.
+        #[unsafe(no_mangle)]
+        pub extern "C" fn terraglue_subsystem() -> *const $crate::abi::TgSubsystem {
+            static TABLE: ::std::sync::OnceLock<$crate::Table> = ::std::sync::OnceLock::new();
+            let table = TABLE.get_or_init(|| {
+                $crate::Table($crate::table::<$module>(env!("CARGO_PKG_NAME"), &TERRAGLUE_DESCRIPTION))
+            });
+            &raw const table.0
+        }
+    };
+}

@@ -1,0 +1,18 @@
+//! The C ABI: plain types that both sides of the border agree on. `include/terraglue.h` is made from this
+//! folder (`cargo xtask header`). Within a major version these types only grow at the end of [`TgSubsystem`]
+//! and [`TgHost`], which carry their size; all others are frozen.
+
+mod constants;
+mod host;
+mod layout;
+mod scene;
+mod step;
+mod table;
+mod variable;
+
+pub use constants::*;
+pub use host::{TgHost, TgJob, TgTerrain};
+pub use scene::{TgBody, TgBodyState, TgEnergy, TgField, TgFieldTile, TgPose, TgScene, TgShape};
+pub use step::{TgEstimate, TgInput, TgLaw, TgMotion, TgNode, TgPort, TgResponse, TgStep};
+pub use table::{TgEntry, TgSubsystem};
+pub use variable::{TgAction, TgBytes, TgValues, TgVariable};

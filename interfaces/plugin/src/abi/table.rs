@@ -1,0 +1,189 @@
+//! The table of functions that a module hands out.
+use super::constants::TgStatus;
+use super::host::TgHost;
+use super::scene::{TgBodyState, TgEnergy, TgField, TgFieldTile, TgScene};
+use super::step::{TgEstimate, TgInput, TgLaw, TgMotion, TgResponse, TgStep};
+use super::variable::{TgAction, TgBytes, TgValues, TgVariable};
+use std::ffi::{c_char, c_void};
+
+/// A module: what `terraglue_subsystem()` returns. Constant; lives as long as the process.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct TgSubsystem {
+    /// sizeof(tg_subsystem) of the module. Entries beyond it count as null.
+    pub size: u32,
+    /// TG_ABI_MAJOR of the module.
+    pub abi_major: u32,
+    /// TG_ABI_MINOR of the module.
+    pub abi_minor: u32,
+    /// TG_SOIL, TG_ROBOT, TG_CONTROLLER or TG_LAW.
+    pub kind: u32,
+    /// Module name, e.g. "soil-bekker".
+    pub id: *const c_char,
+    /// The text of the section .terraglue (see TG_DESCRIBE), or null.
+    pub description: *const c_char,
+    /// JSON: {"name", "kind": "soil"|"robot"|"controller"|"law", "help", "parameters": [{"name", "type":
+    /// "number"|"integer"|"bool"|"text"|"path"|"numbers"|"number-table", "unit", "help", "default", "optional",
+    /// "min", "max", "above_min", "choices"}]}. Constant; null on failure.
+    pub schema: Option<unsafe extern "C" fn() -> *const c_char>,
+    /// Makes an instance. `config` is a JSON object with a value for every parameter of the schema that the
+    /// scenario sets or that has a default. May allocate, read files below host->folder and read the terrain.
+    /// On failure *instance stays null and last_error(NULL) says why.
+    pub instantiate: Option<
+        unsafe extern "C" fn(
+            host: *const TgHost,
+            config: *const c_char,
+            instance: *mut *mut c_void,
+        ) -> TgStatus,
+    >,
+    /// Ends an instance.
+    pub free: Option<unsafe extern "C" fn(instance: *mut c_void)>,
+    /// Bits TG_CAN_...: what this instance can do.
+    pub capabilities: Option<unsafe extern "C" fn(instance: *mut c_void) -> u32>,
+    /// Paper, steps 3 and 4. A trial from the committed state; without ports, a plain step.
+    pub advance: Option<
+        unsafe extern "C" fn(
+            instance: *mut c_void,
+            step: *const TgStep,
+            input: *const TgInput,
+            out: *mut TgResponse,
+        ) -> TgStatus,
+    >,
+    /// Why the last call failed; UTF-8, valid until the next call of the instance. NULL: why `instantiate`
+    /// or `schema` failed on this thread.
+    pub last_error: Option<unsafe extern "C" fn(instance: *mut c_void) -> *const c_char>,
+
+    /// Required up to here; below, null means: not offered.
+    ///
+    /// Paper, step 1. The ports of this step (grounds are asked first). Answers with the committed X, V and,
+    /// for a soil, t = the wrench of its law at that X. A ground may narrow `laws` (mu = tan phi, t_max), one
+    /// per port; a ground's x along n is its own surface x2 under the body.
+    pub set_ports: Option<
+        unsafe extern "C" fn(
+            instance: *mut c_void,
+            step: *const TgStep,
+            laws: *mut TgLaw,
+            now: *mut TgResponse,
+        ) -> TgStatus,
+    >,
+    /// Paper, step 2. If the other side of every contact were rigid and stood at `partner` at t + h: which
+    /// wrenches? Solved, not applied.
+    pub estimate_forces: Option<
+        unsafe extern "C" fn(
+            instance: *mut c_void,
+            step: *const TgStep,
+            partner: *const TgMotion,
+            out: *mut TgEstimate,
+        ) -> TgStatus,
+    >,
+    /// Paper, step 3. Given the estimate: out->t = T1, out->x = own surface under it. A trial.
+    pub solve_compatibility: Option<
+        unsafe extern "C" fn(
+            instance: *mut c_void,
+            step: *const TgStep,
+            estimate: *const TgEstimate,
+            out: *mut TgResponse,
+        ) -> TgStatus,
+    >,
+    /// Derivatives at the last trial, n x n, column-major. After TG_FORCE: dX/d(wrench on itself) at `level`.
+    /// After TG_MOTION: d(wrench on itself)/dX (TG_POSITION) or /dV (TG_VELOCITY), sign as for a spring.
+    /// After TG_FORCE with x and v: column n of a port is dX_n/dT_n and dT_t/dT_n, columns t and m as after
+    /// TG_MOTION.
+    pub interface_jacobian: Option<
+        unsafe extern "C" fn(
+            instance: *mut c_void,
+            step: *const TgStep,
+            level: u32,
+            out: *mut f64,
+        ) -> TgStatus,
+    >,
+    /// Paper, step 5. The last trial is accepted under t; the other side has moved to `partner`.
+    pub commit: Option<
+        unsafe extern "C" fn(
+            instance: *mut c_void,
+            step: *const TgStep,
+            t: *const f64,
+            partner: *const TgMotion,
+        ) -> TgStatus,
+    >,
+    /// The committed state, exactly, into slot 0 ... host->slots - 1.
+    pub save_state: Option<unsafe extern "C" fn(instance: *mut c_void, slot: u32) -> TgStatus>,
+    /// Back to the state of a slot.
+    pub restore_state: Option<unsafe extern "C" fn(instance: *mut c_void, slot: u32) -> TgStatus>,
+    /// The committed state as bytes with a version; they stay valid until the next call of the instance.
+    pub serialize: Option<unsafe extern "C" fn(instance: *mut c_void, out: *mut TgBytes) -> TgStatus>,
+    /// Back to a state made by `serialize`.
+    pub deserialize: Option<unsafe extern "C" fn(instance: *mut c_void, bytes: TgBytes) -> TgStatus>,
+    /// All variables in ascending order of id, and their number; valid and constant until `free`.
+    pub variables:
+        Option<unsafe extern "C" fn(instance: *mut c_void, first: *mut *const TgVariable) -> usize>,
+    /// Committed values.
+    pub get: Option<unsafe extern "C" fn(instance: *mut c_void, values: *const TgValues) -> TgStatus>,
+    /// New values, effective from the next step on.
+    pub set: Option<unsafe extern "C" fn(instance: *mut c_void, values: *const TgValues) -> TgStatus>,
+    /// All actions, and their number; valid and constant until `free`.
+    pub actions: Option<unsafe extern "C" fn(instance: *mut c_void, first: *mut *const TgAction) -> usize>,
+    /// Does an action; `arguments` is a JSON object.
+    pub act: Option<
+        unsafe extern "C" fn(
+            instance: *mut c_void,
+            action: *const c_char,
+            arguments: *const c_char,
+        ) -> TgStatus,
+    >,
+    /// Time of the next event known beforehand, s; inf: none.
+    pub next_event_time: Option<unsafe extern "C" fn(instance: *mut c_void) -> f64>,
+    /// Bodies and shapes; valid and constant until `free`.
+    pub scene: Option<unsafe extern "C" fn(instance: *mut c_void, out: *mut TgScene) -> TgStatus>,
+    /// Committed states of the scene's n bodies, in its order.
+    pub body_states:
+        Option<unsafe extern "C" fn(instance: *mut c_void, n: usize, out: *mut TgBodyState) -> TgStatus>,
+    /// All fields, and their number; valid and constant until `free`.
+    pub fields: Option<unsafe extern "C" fn(instance: *mut c_void, first: *mut *const TgField) -> usize>,
+    /// Tile (a, b) of a field: nodes (a * tile_edge ..., b * tile_edge ...).
+    pub field_tile: Option<
+        unsafe extern "C" fn(
+            instance: *mut c_void,
+            field: usize,
+            a: u32,
+            b: u32,
+            out: *mut TgFieldTile,
+        ) -> TgStatus,
+    >,
+    /// Energies of the committed state.
+    pub energy: Option<unsafe extern "C" fn(instance: *mut c_void, out: *mut TgEnergy) -> TgStatus>,
+
+    /// Reserved for modules of kind TG_LAW, null in ABI 1.0: pressure (Pa) and its tangent (Pa/m) at the
+    /// sinkages (m) of n nodes below a contact of width `b` (m); `state` holds law_state_doubles per node.
+    pub pressure: Option<
+        unsafe extern "C" fn(
+            instance: *mut c_void,
+            n: usize,
+            sinkage: *const f64,
+            b: f64,
+            state: *mut f64,
+            pressure: *mut f64,
+            tangent: *mut f64,
+        ) -> TgStatus,
+    >,
+    /// Reserved for modules of kind TG_LAW, null in ABI 1.0: shear stress (Pa) along two tangents at the
+    /// pressures (Pa) and shear displacements (m, two per node) of n nodes.
+    pub shear: Option<
+        unsafe extern "C" fn(
+            instance: *mut c_void,
+            n: usize,
+            pressure: *const f64,
+            displacement: *const f64,
+            state: *mut f64,
+            stress: *mut f64,
+            tangent: *mut f64,
+        ) -> TgStatus,
+    >,
+    /// Reserved for modules of kind TG_LAW: doubles of state per node, owned by the host.
+    pub law_state_doubles: u32,
+    /// 0.
+    pub reserved: u32,
+}
+
+/// What a module exports under the name `terraglue_subsystem`.
+pub type TgEntry = unsafe extern "C" fn() -> *const TgSubsystem;

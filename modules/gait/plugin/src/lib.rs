@@ -1,1 +1,2 @@
 //! The module gait as a dynamic library.
+terraglue_plugin::export_subsystem!(terraglue_gait::Gait);

@@ -1,0 +1,384 @@
+//! An instance under supervision: answers are checked, failures get name, function and time.
+
+use super::check;
+use crate::error::{Error, Result};
+use std::cell::Cell;
+use terraglue_subsystem::{
+    Action, BodyState, Capabilities, Energy, Error as Failure, Estimate, FieldInfo, FieldTile, Input, Kind,
+    Law, Level, Motion, Response, Scene, Step, Subsystem, Values, ValuesMut, Variable,
+};
+
+/// How far a trial went.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Progress {
+    /// To t + h.
+    Complete,
+    /// It ended early: all sides repeat the trial up to this time.
+    Early {
+        /// Simulated time reached, s; later than the start of the step.
+        reached_s: f64,
+    },
+}
+
+/// Answer to `set` and `act`.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub enum Reply {
+    /// Done.
+    Accepted,
+    /// Not acceptable, and why; nothing has changed.
+    Refused(String),
+}
+
+/// A subsystem of a run.
+pub struct Instance {
+    name: String,
+    module: String,
+    kind: Kind,
+    capabilities: Capabilities,
+    subsystem: Box<dyn Subsystem>,
+    scene: Scene,
+    time_s: Cell<f64>,
+    dead: Cell<bool>,
+}
+
+impl Instance {
+    /// Takes a subsystem under supervision; `name` is that of the scenario.
+    pub fn new(name: &str, module: &str, kind: Kind, subsystem: Box<dyn Subsystem>) -> Self {
+        Self {
+            name: name.to_owned(),
+            module: module.to_owned(),
+            kind,
+            capabilities: subsystem.capabilities(),
+            scene: subsystem.scene(),
+            subsystem,
+            time_s: Cell::new(0.0),
+            dead: Cell::new(false),
+        }
+    }
+
+    /// Name in the scenario.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Module name.
+    pub fn module(&self) -> &str {
+        &self.module
+    }
+
+    /// Kind.
+    pub fn kind(&self) -> Kind {
+        self.kind
+    }
+
+    /// What it can do.
+    pub fn capabilities(&self) -> Capabilities {
+        self.capabilities
+    }
+
+    /// Bodies and shapes.
+    pub fn scene(&self) -> &Scene {
+        &self.scene
+    }
+
+    /// For observers: committed values only.
+    pub fn subsystem(&self) -> &dyn Subsystem {
+        self.subsystem.as_ref()
+    }
+
+    /// An error of this instance in a function of the interface at the last time it was called with, s.
+    #[cold]
+    pub fn error(&self, function: &'static str, message: impl Into<String>) -> Error {
+        Error::Module {
+            subsystem: self.name.clone(),
+            module: self.module.clone(),
+            function,
+            time_s: self.time_s.get(),
+            message: message.into(),
+        }
+    }
+
+    #[cold]
+    fn failed(&self, function: &'static str, failure: Failure) -> Error {
+        let text = match failure {
+            Failure::Fatal(text) => {
+                self.dead.set(true);
+                text
+            }
+            other => other.to_string(),
+        };
+        self.error(function, text)
+    }
+
+    /// Whether it may still be called.
+    #[inline]
+    fn alive(&self, function: &'static str) -> Result {
+        if self.dead.get() {
+            return Err(self.error(function, "not called: it failed for good before"));
+        }
+        Ok(())
+    }
+
+    #[inline]
+    fn outcome<T>(&self, function: &'static str, result: terraglue_subsystem::Result<T>) -> Result<T> {
+        result.map_err(|failure| self.failed(function, failure))
+    }
+
+    #[inline]
+    fn all_finite(&self, function: &'static str, wrong: Option<String>) -> Result {
+        wrong.map_or(Ok(()), |text| Err(self.error(function, text)))
+    }
+
+    /// Paper, step 1. X and V must be answered, by a soil T too.
+    pub fn set_ports(&mut self, step: &Step, laws: &mut [Law], now: &mut Response) -> Result {
+        const NAME: &str = "set_ports";
+        self.time_s.set(step.t);
+        self.alive(NAME)?;
+        prepare(step, now);
+        let result = self.subsystem.set_ports(step, laws, now);
+        self.outcome(NAME, result)?;
+        self.all_finite(NAME, check::packed(step, "x", now.x))?;
+        self.all_finite(NAME, check::packed(step, "v", now.v))?;
+        if self.kind == Kind::Soil {
+            self.all_finite(NAME, check::packed(step, "t", now.t))?;
+        }
+        match laws.iter().position(|l| l.mu.is_nan() || l.t_min.is_nan() || l.t_max.is_nan()) {
+            Some(p) => Err(self.error(NAME, format!("the law of port {p} is NaN"))),
+            None => Ok(()),
+        }
+    }
+
+    /// Paper, step 2.
+    pub fn estimate_forces(&mut self, step: &Step, partner: &Motion, out: &mut Estimate) -> Result<Progress> {
+        const NAME: &str = "estimate_forces";
+        self.time_s.set(step.t);
+        self.alive(NAME)?;
+        for vector in [&mut *out.t_star, &mut *out.x_free, &mut *out.g] {
+            vector.fill(f64::NAN);
+        }
+        out.active.fill(0);
+        match self.subsystem.estimate_forces(step, partner, out) {
+            Err(Failure::Discard { reached }) => return self.early(NAME, step, reached),
+            result => self.outcome(NAME, result)?,
+        }
+        self.all_finite(NAME, check::packed(step, "t_star", out.t_star))?;
+        self.all_finite(NAME, check::packed(step, "x_free", out.x_free))?;
+        self.all_finite(NAME, check::matrix(step.n as usize, "g", out.g))?;
+        Ok(Progress::Complete)
+    }
+
+    /// Paper, step 3.
+    pub fn solve_compatibility(
+        &mut self,
+        step: &Step,
+        estimate: &Estimate,
+        out: &mut Response,
+    ) -> Result<Progress> {
+        self.trial("solve_compatibility", step, out, |s, out| s.solve_compatibility(step, estimate, out))
+    }
+
+    /// Paper, steps 3 and 4.
+    pub fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result<Progress> {
+        self.trial("advance", step, out, |s, out| s.advance(step, input, out))
+    }
+
+    /// Runs a trial on vectors filled with NaN and looks for what stayed so.
+    fn trial(
+        &mut self,
+        name: &'static str,
+        step: &Step,
+        out: &mut Response,
+        call: impl FnOnce(&mut dyn Subsystem, &mut Response) -> terraglue_subsystem::Result,
+    ) -> Result<Progress> {
+        self.time_s.set(step.t);
+        self.alive(name)?;
+        prepare(step, out);
+        match call(self.subsystem.as_mut(), out) {
+            Err(Failure::Discard { reached }) => {
+                out.reached = reached;
+                return self.early(name, step, reached);
+            }
+            result => self.outcome(name, result)?,
+        }
+        self.all_finite(name, check::packed(step, "x", out.x))?;
+        self.all_finite(name, check::packed(step, "v", out.v))?;
+        self.all_finite(name, check::packed(step, "a", out.a))?;
+        self.all_finite(name, check::packed(step, "t", out.t))?;
+        let end = step.t + step.h;
+        if out.reached < end - 1e-9 * step.h || out.reached.is_nan() {
+            return self.early(name, step, out.reached);
+        }
+        Ok(Progress::Complete)
+    }
+
+    #[cold]
+    fn early(&self, name: &'static str, step: &Step, reached: f64) -> Result<Progress> {
+        if reached > step.t && reached < step.t + step.h {
+            return Ok(Progress::Early { reached_s: reached });
+        }
+        let message = format!("ended early at t = {reached} s, outside the step of h = {} s", step.h);
+        Err(self.error(name, message))
+    }
+
+    /// Derivatives at the last trial.
+    pub fn interface_jacobian(&mut self, step: &Step, level: Level, out: &mut [f64]) -> Result {
+        const NAME: &str = "interface_jacobian";
+        self.alive(NAME)?;
+        out.fill(f64::NAN);
+        let result = self.subsystem.interface_jacobian(step, level, out);
+        self.outcome(NAME, result)?;
+        self.all_finite(NAME, check::matrix(step.n as usize, "the derivative", out))
+    }
+
+    /// Paper, step 5.
+    pub fn commit(&mut self, step: &Step, t: &[f64], partner: &Motion) -> Result {
+        self.alive("commit")?;
+        let result = self.subsystem.commit(step, t, partner);
+        self.outcome("commit", result)?;
+        self.time_s.set(step.t + step.h);
+        Ok(())
+    }
+
+    /// The committed state into a numbered slot.
+    pub fn save_state(&mut self, slot: u32) -> Result {
+        self.alive("save_state")?;
+        let result = self.subsystem.save_state(slot);
+        self.outcome("save_state", result)
+    }
+
+    /// Back to the state of a slot.
+    pub fn restore_state(&mut self, slot: u32) -> Result {
+        self.alive("restore_state")?;
+        let result = self.subsystem.restore_state(slot);
+        self.outcome("restore_state", result)
+    }
+
+    /// The committed state as bytes.
+    pub fn serialize(&self) -> Result<Vec<u8>> {
+        self.alive("serialize")?;
+        self.outcome("serialize", self.subsystem.serialize())
+    }
+
+    /// Back to a state made by `serialize`.
+    pub fn deserialize(&mut self, bytes: &[u8]) -> Result {
+        self.alive("deserialize")?;
+        let result = self.subsystem.deserialize(bytes);
+        self.outcome("deserialize", result)
+    }
+
+    /// All variables.
+    pub fn variables(&self) -> &[Variable] {
+        self.subsystem.variables()
+    }
+
+    /// Committed values. Numbers that are not finite are an error.
+    pub fn get(&self, ids: &[u32], mut out: ValuesMut) -> Result {
+        self.alive("get")?;
+        if let ValuesMut::F64(values) = &mut out {
+            values.fill(f64::NAN);
+            let result = self.subsystem.get(ids, ValuesMut::F64(values));
+            self.outcome("get", result)?;
+            return match values.iter().position(|v| v.is_nan()) {
+                Some(k) => Err(self.error("get", self.nan_variable(ids, k))),
+                None => Ok(()),
+            };
+        }
+        self.outcome("get", self.subsystem.get(ids, out))
+    }
+
+    #[cold]
+    fn nan_variable(&self, ids: &[u32], element: usize) -> String {
+        let mut first = 0;
+        for id in ids {
+            let Some(variable) = self.variables().iter().find(|v| v.id == *id) else { break };
+            first += variable.len();
+            if element < first {
+                return format!("the variable `{}` is NaN", variable.name);
+            }
+        }
+        format!("value {element} is NaN")
+    }
+
+    /// New values, or why not.
+    pub fn set(&mut self, ids: &[u32], values: Values) -> Result<Reply> {
+        self.alive("set")?;
+        let result = self.subsystem.set(ids, values);
+        self.reply("set", result)
+    }
+
+    /// All actions.
+    pub fn actions(&self) -> &[Action] {
+        self.subsystem.actions()
+    }
+
+    /// Does an action; `arguments` is a JSON object.
+    pub fn act(&mut self, action: &str, arguments: &str) -> Result<Reply> {
+        self.alive("act")?;
+        let result = self.subsystem.act(action, arguments);
+        self.reply("act", result)
+    }
+
+    fn reply(&self, function: &'static str, result: terraglue_subsystem::Result) -> Result<Reply> {
+        match result {
+            Ok(()) => Ok(Reply::Accepted),
+            Err(Failure::Refused(reason)) => Ok(Reply::Refused(reason)),
+            Err(failure) => Err(self.failed(function, failure)),
+        }
+    }
+
+    /// Time of the next event known beforehand, s; ∞: none.
+    pub fn next_event_time(&self) -> Result<f64> {
+        self.alive("next_event_time")?;
+        let t = self.subsystem.next_event_time();
+        if t.is_nan() { Err(self.error("next_event_time", "answered NaN")) } else { Ok(t) }
+    }
+
+    /// Committed states of the bodies; all must be finite.
+    pub fn body_states(&self, out: &mut [BodyState]) -> Result {
+        self.alive("body_states")?;
+        let result = self.subsystem.body_states(out);
+        self.outcome("body_states", result)?;
+        let numbers = |s: &BodyState| {
+            let pose = s.world_from_body;
+            let all = pose.position.into_iter().chain(pose.orientation).chain(s.linear_velocity);
+            all.chain(s.angular_velocity).all(f64::is_finite)
+        };
+        match out.iter().position(|s| !numbers(s)) {
+            Some(k) => {
+                let body = self.scene.bodies.get(k).map_or("?", |b| &b.name);
+                Err(self.error("body_states", format!("the state of body `{body}` is not finite")))
+            }
+            None => Ok(()),
+        }
+    }
+
+    /// Fields over the ground.
+    pub fn fields(&self) -> &[FieldInfo] {
+        self.subsystem.fields()
+    }
+
+    /// A tile of a field.
+    pub fn field_tile(&self, field: usize, a: u32, b: u32) -> Result<FieldTile<'_>> {
+        self.alive("field_tile")?;
+        self.outcome("field_tile", self.subsystem.field_tile(field, a, b))
+    }
+
+    /// Energies of the committed state.
+    pub fn energy(&self) -> Result<Energy> {
+        self.alive("energy")?;
+        let e = self.subsystem.energy();
+        let all = [e.kinetic, e.potential, e.dissipated, e.port_work, e.actuator_work];
+        if all.iter().all(|v| v.is_finite()) {
+            return Ok(e);
+        }
+        Err(self.error("energy", "an energy is not finite"))
+    }
+}
+
+/// Fills a response with NaN, to find what a subsystem does not answer.
+fn prepare(step: &Step, out: &mut Response) {
+    for vector in [&mut *out.x, &mut *out.v, &mut *out.a, &mut *out.t] {
+        vector.fill(f64::NAN);
+    }
+    (out.reached, out.flags) = (step.t + step.h, 0);
+}

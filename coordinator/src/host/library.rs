@@ -1,0 +1,213 @@
+//! Modules from shared libraries and modules linked into the program.
+#![allow(unsafe_code)] // Loading a library runs its constructors and calls its entry.
+
+use super::elf::{Description, is_elf};
+use super::error::LoadError;
+use super::search::{SearchPath, file_name, is_path};
+use super::{HostServices, Instance};
+use libloading::os::unix::{Library as Handle, RTLD_LOCAL, RTLD_NOW, Symbol};
+use std::error::Error as _;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use terraglue_plugin::ForeignModule;
+use terraglue_plugin::abi::{TG_ABI_MAJOR, TgEntry};
+use terraglue_subsystem::{Config, Error as Failure, Host, Module, Result, Schema, Subsystem};
+
+type Instantiate = fn(&Config, Arc<dyn Host>) -> Result<Box<dyn Subsystem>>;
+
+#[derive(Clone)]
+enum Origin {
+    Builtin(Instantiate),
+    Foreign(Arc<ForeignModule>, PathBuf),
+}
+
+/// A module that is ready to make instances.
+#[derive(Clone)]
+pub struct LoadedModule {
+    schema: Arc<Schema>,
+    origin: Origin,
+}
+
+impl LoadedModule {
+    /// A module linked into the program.
+    pub fn builtin<M: Module>() -> Self {
+        Self { schema: Arc::new(M::schema()), origin: Origin::Builtin(M::instantiate) }
+    }
+
+    /// Loads a library. Checked in this order: it is a library; its section, where it has one, names our ABI; the
+    /// system loads it; it has the entry; its table can be used; it describes itself.
+    pub fn load(path: &Path) -> std::result::Result<Self, LoadError> {
+        let path = path.to_path_buf();
+        inspect(&path)?;
+        let table = entry(&path)?;
+        // SAFETY: the symbol is the entry of a Terraglue module, whose contract is terraglue.h; the library is
+        // never unloaded.
+        let module = unsafe { ForeignModule::new(table()) };
+        let module = module.map_err(|source| LoadError::Table { path: path.clone(), source })?;
+        let schema =
+            module.schema().map_err(|e| LoadError::Schema { path: path.clone(), message: e.to_string() })?;
+        log::info!("module {} from {}", schema.name, path.display());
+        Ok(Self { schema: Arc::new(schema), origin: Origin::Foreign(Arc::new(module), path) })
+    }
+
+    /// Name, kind and parameters.
+    pub fn schema(&self) -> &Schema {
+        &self.schema
+    }
+
+    /// File; None: linked into the program.
+    pub fn path(&self) -> Option<&Path> {
+        match &self.origin {
+            Origin::Builtin(_) => None,
+            Origin::Foreign(_, path) => Some(path),
+        }
+    }
+
+    /// Makes an instance; what the configuration leaves out gets the default of the schema.
+    pub fn instantiate(
+        &self,
+        instance_name: &str,
+        config: Config,
+        services: &HostServices,
+    ) -> std::result::Result<Instance, LoadError> {
+        let config = config.with_defaults(&self.schema);
+        let host = services.for_instance(instance_name);
+        let made = match &self.origin {
+            Origin::Builtin(instantiate) => instantiate(&config, host),
+            Origin::Foreign(module, _) => {
+                module.instantiate(&config, host).map(|s| Box::new(s) as Box<dyn Subsystem>)
+            }
+        };
+        let (subsystem, module) = (instance_name.to_owned(), self.schema.name.clone());
+        match made {
+            Ok(made) => Ok(Instance::new(instance_name, &module, self.schema.kind, made)),
+            Err(Failure::Refused(message)) => Err(LoadError::Refused { subsystem, module, message }),
+            Err(Failure::Fatal(message)) => Err(LoadError::Instantiate { subsystem, module, message }),
+            Err(other) => Err(LoadError::Instantiate { subsystem, module, message: other.to_string() }),
+        }
+    }
+}
+
+impl std::fmt::Debug for LoadedModule {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("LoadedModule").field("name", &self.schema.name).field("path", &self.path()).finish()
+    }
+}
+
+/// Whether a file can be a module, as far as its bytes say without running it.
+fn inspect(path: &Path) -> std::result::Result<(), LoadError> {
+    let path_buf = || path.to_path_buf();
+    if !path.is_file() {
+        return Err(LoadError::MissingFile { path: path_buf() });
+    }
+    let bytes = std::fs::read(path)
+        .map_err(|e| LoadError::NotALibrary { path: path_buf(), reason: e.to_string() })?;
+    if !is_elf(&bytes) {
+        let reason = if bytes.is_empty() { "the file is empty" } else { "it has no ELF header" };
+        return Err(LoadError::NotALibrary { path: path_buf(), reason: reason.into() });
+    }
+    match Description::of(&bytes) {
+        Some(d) if d.abi_major() != Some(TG_ABI_MAJOR) => {
+            Err(LoadError::Version { path: path_buf(), found: d.abi })
+        }
+        _ => Ok(()),
+    }
+}
+
+/// Loads a library for good and finds its entry.
+fn entry(path: &Path) -> std::result::Result<TgEntry, LoadError> {
+    // A bare file name would be searched by the system, so the path is made absolute.
+    let full = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    // SAFETY: the user asked for this library in the scenario; its constructors run.
+    let handle = unsafe { Handle::open(Some(&full), RTLD_NOW | RTLD_LOCAL) };
+    let handle = handle.map_err(|e| LoadError::CannotLoad { path: path.to_path_buf(), reason: cause(&e) })?;
+    // SAFETY: a symbol of this name has this type, by the contract of terraglue.h.
+    let symbol: std::result::Result<Symbol<TgEntry>, _> =
+        unsafe { handle.get(terraglue_plugin::ENTRY.as_bytes()) };
+    let entry = symbol
+        .map(|s| *s)
+        .map_err(|e| LoadError::MissingSymbol { path: path.to_path_buf(), reason: cause(&e) });
+    // Never unloaded: instances, texts and thread-local destructors of the module stay valid.
+    std::mem::forget(handle);
+    entry
+}
+
+/// The system's own words: the top message of libloading hides them.
+fn cause(error: &libloading::Error) -> String {
+    error.source().map_or_else(|| error.to_string(), ToString::to_string)
+}
+
+/// Modules by name: those linked into the program first, then those on the search path.
+#[derive(Clone, Debug, Default)]
+pub struct Library {
+    builtins: Vec<LoadedModule>,
+}
+
+impl Library {
+    /// Nothing linked in.
+    pub fn new() -> Self {
+        Self::default()
+    }
+
+    /// The same with a module linked into the program; it hides files of its name.
+    pub fn with<M: Module>(mut self) -> Self {
+        self.builtins.push(LoadedModule::builtin::<M>());
+        self
+    }
+
+    /// The module that a scenario names. A value with `/` or ending in `.so` is a path relative to `folder`, the
+    /// scenario's; any other is a name: soil-bekker is the file libsoil_bekker_plugin.so on the search path.
+    pub fn find(
+        &self,
+        name: &str,
+        search: &SearchPath,
+        folder: &Path,
+    ) -> std::result::Result<LoadedModule, LoadError> {
+        if is_path(name) {
+            return LoadedModule::load(&folder.join(name));
+        }
+        if let Some(module) = self.builtins.iter().find(|m| m.schema.name == name) {
+            return Ok(module.clone());
+        }
+        match search.locate(name) {
+            Some(path) => LoadedModule::load(&path),
+            None => Err(self.unknown(name, search)),
+        }
+    }
+
+    #[cold]
+    fn unknown(&self, name: &str, search: &SearchPath) -> LoadError {
+        let found = search.all().into_iter().map(|(n, _)| n);
+        let names = self.builtins.iter().map(|m| m.schema.name.clone()).chain(found);
+        let near = names
+            .map(|n| (strsim::normalized_damerau_levenshtein(&n, name), n))
+            .filter(|(likeness, _)| *likeness > 0.4)
+            .max_by(|a, b| a.0.total_cmp(&b.0));
+        LoadError::Unknown {
+            name: name.into(),
+            file: file_name(name),
+            looked: search.folders().to_vec(),
+            nearest: near.map(|(_, n)| n),
+        }
+    }
+}
+
+/// A module on the search path.
+#[derive(Debug)]
+pub struct AvailableModule {
+    /// Name by its file.
+    pub name: String,
+    /// File.
+    pub path: PathBuf,
+    /// Name, kind, help and parameters, or why the file cannot be used.
+    pub schema: std::result::Result<Schema, LoadError>,
+}
+
+/// All modules on the search path, by name. Each is loaded to ask for its schema.
+pub fn available_modules(search: &SearchPath) -> Vec<AvailableModule> {
+    let module = |(name, path): (String, PathBuf)| {
+        let schema = LoadedModule::load(&path).map(|m| m.schema().clone());
+        AvailableModule { name, path, schema }
+    };
+    search.all().into_iter().map(module).collect()
+}

@@ -1,0 +1,110 @@
+//! The host on real libraries: the column soil through its table against the same code linked in, and bad
+//! libraries made by the system's C compiler.
+
+use super::*;
+use soil_column::SoilColumnModule;
+use std::path::Path;
+use terraglue_subsystem::{Config, Hold, Input, Kind, Law, Level, Motion, Port, Response, Step, component};
+
+fn port(key: u64, first: u32, z: f64) -> Port {
+    Port {
+        key,
+        kind: 0,
+        side: -1,
+        mask: component::FORCE,
+        first,
+        body: 0,
+        shape: 0,
+        first_node: 0,
+        node_count: 0,
+        origin: [0.1 * key as f64, 0.0, z],
+        frame: [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0],
+        extent: [0.0; 2],
+        law: Law::UNILATERAL,
+    }
+}
+
+/// Vectors of a response.
+struct Buffers([Vec<f64>; 4]);
+
+impl Buffers {
+    fn new(n: usize) -> Self {
+        Self([0; 4].map(|_| vec![0.0; n]))
+    }
+
+    fn response(&mut self) -> Response<'_> {
+        let [x, v, a, t] = &mut self.0;
+        Response { x, v, a, t, reached: 0.0, flags: 0 }
+    }
+
+    fn bits(&self) -> Vec<u64> {
+        self.0.iter().flatten().map(|v| v.to_bits()).collect()
+    }
+}
+
+/// Drives a soil through a few steps of two feet and collects the bits of every answer.
+fn drive(soil: &mut Instance) -> Vec<u64> {
+    let mut bits = Vec::new();
+    let (mut out, mut g, mut laws) = (Buffers::new(6), vec![0.0; 36], [Law::UNILATERAL; 2]);
+    for k in 0..20u64 {
+        let ports = [port(1, 0, -1e-4 * k as f64), port(2, 3, -2e-4 * (10.0 - k as f64).abs())];
+        let step = Step {
+            t: 1e-3 * k as f64,
+            h: 1e-3,
+            index: k,
+            epoch: 1,
+            n: 6,
+            ports: &ports,
+            ..Step::free(0.0, 0.0, 0)
+        };
+        soil.set_ports(&step, &mut laws, &mut out.response()).expect("set_ports");
+        bits.extend(out.bits());
+        bits.extend(laws.iter().map(|l| l.mu.to_bits()));
+        let (x, v) = ([-1e-4, 2e-5, -1e-5, 3e-5, 1e-4, 0.0], [0.0; 6]);
+        let motion = Motion { x: &x, v: &v };
+        let t = [5.0 + k as f64, 1.0, 0.5, 3.0, 0.0, 0.1];
+        for input in [
+            Input::Force { t: &t, hold: Hold::End, motion: None },
+            Input::Force { t: &t, hold: Hold::End, motion: Some(motion) },
+            Input::Motion(motion),
+        ] {
+            assert_eq!(
+                soil.advance(&step, &input, &mut out.response()).expect("advance"),
+                Progress::Complete
+            );
+            bits.extend(out.bits());
+            soil.interface_jacobian(&step, Level::Position, &mut g).expect("derivative");
+            bits.extend(g.iter().map(|v| v.to_bits()));
+        }
+        soil.commit(&step, &t, &motion).expect("commit");
+        if k == 5 {
+            soil.save_state(1).expect("save");
+        }
+        if k == 12 {
+            soil.restore_state(1).expect("restore");
+        }
+    }
+    bits.extend(soil.serialize().expect("serialize").iter().map(|b| u64::from(*b)));
+    bits
+}
+
+fn services() -> HostServices {
+    HostServices::new(1, Path::new("."))
+}
+
+#[test]
+fn through_the_table_and_linked_in_give_the_same_bits() {
+    let config = || Config::parse(r#"{"K": 8340.0, "n": 1.2}"#).expect("config");
+    let search = SearchPath::standard(&[], Path::new("."));
+    let foreign = Library::new().find("soil-column", &search, Path::new(".")).expect("found");
+    assert!(foreign.path().is_some());
+    assert_eq!(foreign.schema().kind, Kind::Soil);
+    let linked = Library::new().with::<SoilColumnModule>().find("soil-column", &search, Path::new("."));
+    let linked = linked.expect("linked in");
+    assert_eq!(linked.path(), None);
+    assert_eq!(linked.schema(), foreign.schema());
+    let mut a = linked.instantiate("soil", config(), &services()).expect("instance");
+    let mut b = foreign.instantiate("soil", config(), &services()).expect("instance");
+    let (a, b) = (drive(&mut a), drive(&mut b));
+    assert!(a.len() > 1000 && a == b);
+}

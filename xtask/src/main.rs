@@ -1,1 +1,55 @@
-fn main() {}
+//! The developer commands, the same as in CI: `cargo xtask test | validate | schema | install`.
+
+mod install;
+mod process;
+mod schema;
+mod test;
+mod validate;
+
+use clap::{Parser, Subcommand};
+use process::Outcome;
+use std::path::PathBuf;
+use std::process::ExitCode;
+
+/// Developer commands.
+#[derive(Parser, Debug)]
+#[command(name = "cargo xtask", disable_help_subcommand = true)]
+struct Arguments {
+    #[command(subcommand)]
+    command: Command,
+}
+
+#[derive(Subcommand, Debug)]
+enum Command {
+    /// Run every test: Rust, Python, and the quick figures.
+    Test,
+    /// Measure the figures that the areas promise and hold them against their limits.
+    Validate(validate::Arguments),
+    /// Write docs/scenario.schema.json and the key tables of docs/scenario.md.
+    Schema {
+        /// Change nothing; fail when a file is out of date.
+        #[arg(long)]
+        check: bool,
+    },
+    /// Build and lay out bin, lib, include and share below PREFIX.
+    Install {
+        /// Where to, e.g. ~/.local.
+        prefix: PathBuf,
+    },
+}
+
+fn main() -> ExitCode {
+    let done: Outcome = match Arguments::parse().command {
+        Command::Test => test::test(),
+        Command::Validate(arguments) => validate::validate(&arguments),
+        Command::Schema { check } => schema::write_files(check),
+        Command::Install { prefix } => install::install(&prefix),
+    };
+    match done {
+        Ok(()) => ExitCode::SUCCESS,
+        Err(message) => {
+            eprintln!("error: {message}");
+            ExitCode::FAILURE
+        }
+    }
+}

@@ -4,6 +4,7 @@
 //! are made from there. Parameters of modules are checked by [`check_parameters`] once their schemas are known.
 
 mod check;
+pub mod docs;
 mod events;
 pub mod keys;
 mod load;
@@ -25,5 +26,5 @@ pub use model::*;
 pub use nearest::{did_you_mean, nearest};
 pub use parameters::{SHIPPED_MODULES, check_parameters, check_parameters_among};
 pub use set::split as split_set;
-pub use soil_row::{SoilRow, find_soil_table, read_soil_table};
+pub use soil_row::{find_soil_table, read_soil_table};
 pub use source::{InputError, Source};

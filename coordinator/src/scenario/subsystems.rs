@@ -46,7 +46,7 @@ fn one(source: &Source, name: &str, node: &Node) -> Result<SubsystemSpec, Box<In
         name: name.into(),
         step_multiple: node.get("step_multiple").and_then(|n| n.to_json().as_u64()).unwrap_or(1) as u32,
         parameters: parameters(node, &module, is_host_key),
-        offered: soil_row::offered(source, name, node)?,
+        offered: soil_row::offered(source, name, node, &module)?,
         module,
     })
 }

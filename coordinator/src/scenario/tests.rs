@@ -244,7 +244,7 @@ fn a_soil_row_is_offered_and_refused_rows_say_why() {
     let folder = tempfile::tempdir().expect("folder");
     let path = folder.path().join("walk.toml");
     std::fs::create_dir(folder.path().join("models")).expect("made");
-    let table = "name,n,k_c,k_phi,c_pa,phi_rad,K_m,density_kg_m3,source,refused\nmoon,1.0,1400,820000,170,0.61,0.018,,book,\nclay,,,,,,,,book,K is a range\n";
+    let table = "name,n,k_c,k_phi,c_pa,phi_rad,K_m,density_kg_m3,source,refused\nmoon,1.0,1400,820000,170,0.61,0.018,,book,\nclay,0.5,13190,692150,4140,0.22,,,book,K_m is a range\n";
     std::fs::write(folder.path().join("models/soils.csv"), table).expect("written");
     let text = |row: &str| GOOD.replacen("k_phi = 8.2e5", &format!("parameters = \"{row}\""), 1);
     let read = |row: &str| Scenario::parse(&text(row), &path.display().to_string(), &[]);
@@ -255,10 +255,11 @@ fn a_soil_row_is_offered_and_refused_rows_say_why() {
         &rendered(&read("mon").expect_err("typo")),
         &["there is no soil `mon`", "did you mean `moon`?"],
     );
-    assert_holds(
-        &rendered(&read("clay").expect_err("refused")),
-        &["the soil `clay` cannot be used: K is a range"],
-    );
+    let refused = rendered(&read("clay").expect_err("refused"));
+    assert_holds(&refused, &["`clay` cannot be used: K_m is a range"]);
+    let given = [("soil.K_m".to_owned(), "0.01".to_owned())];
+    let given = Scenario::parse(&text("clay"), &path.display().to_string(), &given);
+    assert_eq!(given.expect("the missing number is given").subsystems[1].offered["n"], json!(0.5));
 }
 
 #[test]

@@ -1,0 +1,176 @@
+//! Holds `docs/architecture.md` true: the arrows between crates, where unsafe code may stand, what numeric crates
+//! may not touch, and that every file says what it is.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+fn root() -> PathBuf {
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().expect("the workspace")
+}
+
+/// All files below a folder with that extension, as paths relative to the root.
+fn files(folder: &str, extension: &str) -> Vec<PathBuf> {
+    let mut found = Vec::new();
+    let mut open = vec![root().join(folder)];
+    while let Some(folder) = open.pop() {
+        for entry in std::fs::read_dir(&folder).expect("a folder").flatten() {
+            let path = entry.path();
+            match path.is_dir() {
+                true if path.file_name().is_some_and(|n| n != "target") => open.push(path),
+                false if path.extension().is_some_and(|e| e == extension) => {
+                    found.push(path.strip_prefix(root()).expect("below").to_owned());
+                }
+                _ => {}
+            }
+        }
+    }
+    found.sort();
+    found
+}
+
+fn rust_files() -> Vec<PathBuf> {
+    let folders = ["interfaces", "coordinator", "modules", "tests", "xtask"];
+    folders.iter().flat_map(|folder| files(folder, "rs")).collect()
+}
+
+fn read(path: &Path) -> String {
+    std::fs::read_to_string(root().join(path)).expect("readable")
+}
+
+/// Crate name → (folder, names of its dependencies on crates of the workspace, tests excepted).
+fn crates() -> BTreeMap<String, (PathBuf, Vec<String>)> {
+    let manifests = ["interfaces", "coordinator", "modules", "tests"].iter().flat_map(|f| files(f, "toml"));
+    let mut all: BTreeMap<String, (PathBuf, Vec<String>)> = manifests
+        .filter(|path| path.file_name().is_some_and(|n| n == "Cargo.toml"))
+        .map(|path| {
+            let manifest: toml::Table = read(&path).parse().expect("TOML");
+            let name = manifest["package"]["name"].as_str().expect("a name").to_owned();
+            let keys = |table: &str| {
+                manifest.get(table).and_then(|t| t.as_table()).into_iter().flat_map(|t| t.keys())
+            };
+            let dependencies = keys("dependencies").chain(keys("build-dependencies")).cloned().collect();
+            (name, (path.parent().expect("a folder").to_owned(), dependencies))
+        })
+        .collect();
+    let names: Vec<String> = all.keys().cloned().collect();
+    for (_, dependencies) in all.values_mut() {
+        dependencies.retain(|d| names.contains(d));
+    }
+    all
+}
+
+/// `modules/NAME` or `tests/modules/NAME` of a crate inside a module.
+fn module_of(folder: &Path) -> Option<PathBuf> {
+    let parts: Vec<_> = folder.components().map(|c| c.as_os_str().to_owned()).collect();
+    let at = parts.iter().position(|p| p == "modules")?;
+    (parts.len() > at + 1).then(|| parts[..at + 2].iter().collect())
+}
+
+#[test]
+fn arrows_point_from_modules_and_coordinator_to_interfaces() {
+    let all = crates();
+    assert!(all.len() > 10, "found {} crates only", all.len());
+    let mut wrong = Vec::new();
+    for (name, (folder, dependencies)) in &all {
+        for dependency in dependencies {
+            let target = &all[dependency].0;
+            let allowed = match (module_of(folder), folder.starts_with("interfaces")) {
+                (Some(own), _) => target.starts_with("interfaces") || target.starts_with(&own),
+                (None, true) => target.starts_with("interfaces"),
+                // The coordinator lists plugins only so that cargo builds them.
+                (None, false) if folder.starts_with("coordinator") => {
+                    target.starts_with("interfaces") || target.ends_with("plugin")
+                }
+                (None, false) => true,
+            };
+            if !allowed {
+                wrong.push(format!("{name} -> {dependency}"));
+            }
+        }
+    }
+    assert!(wrong.is_empty(), "forbidden arrows: {wrong:#?}");
+}
+
+#[test]
+fn the_coordinator_uses_no_plugin_in_code() {
+    let plugins =
+        ["rigid_body_plugin", "soil_cellular_automaton_plugin", "soil_bekker_plugin", "gait_plugin"];
+    for path in files("coordinator/src", "rs") {
+        let text = read(&path);
+        for line in text.lines().filter(|l| l.trim_start().starts_with("use ")) {
+            assert!(!plugins.iter().any(|p| line.contains(p)), "{}: {line}", path.display());
+        }
+    }
+}
+
+/// Lines of a file without comments and without what `//` and string quotes hide.
+fn code_lines(text: &str) -> impl Iterator<Item = (usize, &str)> {
+    text.lines().enumerate().map(|(i, line)| (i + 1, line.split("//").next().unwrap_or_default()))
+}
+
+fn has_word(line: &str, word: &str) -> bool {
+    line.split(|c: char| !c.is_alphanumeric() && c != '_').any(|w| w == word)
+}
+
+#[test]
+fn unsafe_code_stands_only_at_the_borders() {
+    let borders = ["interfaces/plugin", "interfaces/fmi", "coordinator/src/host", "tests/acceptance"];
+    for path in rust_files().iter().filter(|p| !borders.iter().any(|b| p.starts_with(b))) {
+        let text = read(path);
+        let found = code_lines(&text).find(|(_, line)| has_word(line, "unsafe"));
+        assert!(found.is_none(), "{}:{}: unsafe code", path.display(), found.map_or(0, |f| f.0));
+    }
+}
+
+#[test]
+fn numeric_crates_touch_no_clock_no_file_and_no_thread() {
+    let forbidden = ["Instant", "SystemTime", "std::fs", "std::thread", "HashMap", "std::net", "std::env"];
+    let numeric = ["interfaces/ground/src", "interfaces/soil-law/src", "modules"];
+    let exceptions = ["modules/rigid-body/import"];
+    let is_test = |p: &PathBuf| {
+        p.components()
+            .any(|c| matches!(c.as_os_str().to_str(), Some("tests" | "tests.rs" | "benches" | "examples")))
+    };
+    let all = numeric.iter().flat_map(|folder| files(folder, "rs"));
+    for path in all.filter(|p| !is_test(p) && !exceptions.iter().any(|e| p.starts_with(e))) {
+        let text = read(&path);
+        let before_tests = text.split("#[cfg(test)]").next().unwrap_or_default();
+        for (number, line) in code_lines(before_tests) {
+            let found = forbidden.iter().find(|f| match f.contains(':') {
+                true => line.contains(*f),
+                false => has_word(line, f),
+            });
+            assert!(found.is_none(), "{}:{number}: {}", path.display(), found.unwrap_or(&""));
+        }
+    }
+}
+
+#[test]
+fn every_file_says_what_it_is() {
+    for path in rust_files() {
+        let text = read(&path);
+        assert!(text.starts_with("//!"), "{} does not open with `//!`", path.display());
+        assert!(!text.starts_with("//! Filled in below"), "{} is empty", path.display());
+    }
+}
+
+#[test]
+fn files_stay_readable() {
+    for path in rust_files() {
+        let lines = read(&path).lines().count();
+        assert!(lines <= 700, "{} has {lines} lines: split it", path.display());
+    }
+}
+
+#[test]
+fn the_map_names_only_what_exists() {
+    let map = read(Path::new("docs/architecture.md"));
+    let named =
+        map.split('`').skip(1).step_by(2).filter(|w| w.contains('/') && !w.contains([' ', '<', '*', '…']));
+    let mut count = 0;
+    for name in named {
+        assert!(root().join(name).exists(), "docs/architecture.md names `{name}`, which does not exist");
+        count += 1;
+    }
+    assert!(count > 15, "only {count} folders found in the map");
+}

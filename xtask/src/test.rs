@@ -1,0 +1,50 @@
+//! `cargo xtask test`: every test, the Python ones in a virtual environment of their own.
+
+use crate::process::{Outcome, cargo, command, must, program, read, root, target, write};
+use crate::validate;
+use std::path::PathBuf;
+
+/// Builds once, then runs Rust tests, Python tests and the quick figures.
+pub fn test() -> Outcome {
+    must(&mut cargo(&["build", "--workspace"]))?;
+    must(&mut cargo(&["test", "--workspace"]))?;
+    let python = virtual_environment()?;
+    let tests = ["-m", "pytest", "-q", "tests/python"];
+    must(command(python, &tests).env("TERRAGLUE_BIN", program("debug")).env("PYTHONDONTWRITEBYTECODE", "1"))?;
+    validate::validate(&validate::Arguments::quick_without_timing())
+}
+
+/// The Python of `target/venv`, with what `tests/python/requirements.txt` asks for.
+fn virtual_environment() -> Outcome<PathBuf> {
+    let venv = target().join("venv");
+    let python = venv.join("bin/python");
+    let requirements = root().join("tests/python/requirements.txt");
+    let wanted = read(&requirements)?;
+    let stamp = venv.join("requirements.txt");
+    if python.is_file() && std::fs::read_to_string(&stamp).is_ok_and(|installed| installed == wanted) {
+        return Ok(python);
+    }
+    make(&venv)?;
+    let file = requirements.display().to_string();
+    must(&mut command(
+        &python,
+        &["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r", &file],
+    ))?;
+    write(&stamp, &wanted)?;
+    Ok(python)
+}
+
+fn make(venv: &std::path::Path) -> Outcome {
+    let probe = command("python3", &["-c", "import sys, venv, ensurepip; assert sys.version_info >= (3, 9)"])
+        .stderr(std::process::Stdio::null())
+        .status();
+    match probe {
+        Err(e) => Err(format!("cannot start python3 ({e}): install the package `python3`")),
+        Ok(status) if !status.success() => {
+            Err("this Python (3.9 or newer is needed) cannot make virtual environments: install the package \
+             `python3-venv` (Debian, Ubuntu: sudo apt install python3-venv)"
+                .into())
+        }
+        Ok(_) => must(&mut command("python3", &["-m", "venv", "--clear", &venv.display().to_string()])),
+    }
+}

@@ -1,0 +1,111 @@
+//! One measured figure and its limit.
+
+use std::fmt;
+
+/// What a figure is held against.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Limit {
+    /// value ≤ limit.
+    AtMost(f64),
+    /// value ≥ limit.
+    AtLeast(f64),
+    /// value = limit, exactly.
+    Equal(f64),
+    /// Printed for comparison, never fails.
+    None,
+}
+
+impl Limit {
+    fn holds(self, value: f64) -> bool {
+        match self {
+            Self::AtMost(limit) => value <= limit,
+            Self::AtLeast(limit) => value >= limit,
+            Self::Equal(limit) => value == limit,
+            Self::None => !value.is_nan(),
+        }
+    }
+}
+
+impl fmt::Display for Limit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::AtMost(x) => write!(f, "<= {x}"),
+            Self::AtLeast(x) => write!(f, ">= {x}"),
+            Self::Equal(x) => write!(f, "= {x}"),
+            Self::None => write!(f, "-"),
+        }
+    }
+}
+
+/// A figure of an area.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Figure {
+    /// Stable name, e.g. `walk.soil-bekker.iterative.distance`.
+    pub id: String,
+    /// What was measured; none: not measured here.
+    pub value: Option<f64>,
+    /// What it is held against.
+    pub limit: Limit,
+    /// Whether it holds; none: not judged.
+    pub pass: Option<bool>,
+    /// What it is, with its unit.
+    pub what: String,
+}
+
+impl Figure {
+    /// A measured figure.
+    pub fn new(id: impl Into<String>, value: f64, limit: Limit, what: impl Into<String>) -> Self {
+        Self { id: id.into(), value: Some(value), limit, pass: Some(limit.holds(value)), what: what.into() }
+    }
+
+    /// A figure that does not apply or cannot be measured here.
+    pub fn skipped(id: impl Into<String>, why: impl Into<String>) -> Self {
+        Self { id: id.into(), value: None, limit: Limit::None, pass: None, what: why.into() }
+    }
+
+    /// The value in words.
+    pub fn value_text(&self) -> String {
+        match self.value {
+            None => "-".into(),
+            Some(x) if x == 0.0 || (1e-3..1e6).contains(&x.abs()) => {
+                let text = format!("{x:.4}");
+                text.trim_end_matches('0').trim_end_matches('.').to_owned()
+            }
+            Some(x) => format!("{x:.3e}"),
+        }
+    }
+
+    /// `pass`, `fail` or `skip`.
+    pub fn verdict(&self) -> &'static str {
+        match self.pass {
+            Some(true) => "pass",
+            Some(false) => "fail",
+            None => "skip",
+        }
+    }
+
+    /// The line that is printed.
+    pub fn line(&self) -> String {
+        [&self.id, &self.value_text(), &self.limit.to_string(), self.verdict(), &self.what].join("\t")
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_line_has_five_fields() {
+        let figure = Figure::new("a.b", 0.25, Limit::AtMost(0.2), "share of x");
+        assert_eq!(figure.line(), "a.b\t0.25\t<= 0.2\tfail\tshare of x");
+        assert_eq!(Figure::skipped("a", "no soil").line(), "a\t-\t-\tskip\tno soil");
+        assert_eq!(Figure::new("a", 1.5e-9, Limit::None, "").value_text(), "1.500e-9");
+    }
+
+    #[test]
+    fn what_is_not_a_number_fails() {
+        for limit in [Limit::AtMost(1.0), Limit::AtLeast(1.0), Limit::Equal(1.0), Limit::None] {
+            assert_eq!(Figure::new("a", f64::NAN, limit, "").pass, Some(false));
+        }
+    }
+}

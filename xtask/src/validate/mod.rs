@@ -1,0 +1,109 @@
+//! `cargo xtask validate`: the figures that each area promises, measured and held against their limits.
+//!
+//! One line per figure, tab-separated: `id value limit pass|fail|skip what`. A failure that
+//! `tests/known-failures.tsv` (id, figure reached, reason) lists is tolerated; a listed one that passes is not.
+
+mod documents;
+mod figure;
+mod known;
+mod timing;
+mod walk;
+
+pub use figure::{Figure, Limit};
+
+use crate::process::{Outcome, cargo, must, program, root};
+use known::KnownFailures;
+use std::path::PathBuf;
+
+/// What to validate.
+#[derive(clap::Args, Debug, Clone, Default)]
+pub struct Arguments {
+    /// One area only.
+    #[arg(value_parser = area_names())]
+    area: Option<String>,
+    /// Leave out figures that a clock measures.
+    #[arg(long)]
+    no_timing: bool,
+    /// Shorter runs.
+    #[arg(long)]
+    quick: bool,
+    /// Write the tables of docs/.
+    #[arg(long)]
+    write_docs: bool,
+}
+
+impl Arguments {
+    /// What `cargo xtask test` runs.
+    pub fn quick_without_timing() -> Self {
+        Self { no_timing: true, quick: true, ..Self::default() }
+    }
+}
+
+/// What an area needs to measure its figures.
+pub struct Context {
+    /// The program to run.
+    pub program: PathBuf,
+    /// Whether a clock may be read.
+    pub timing: bool,
+    /// Whether to keep it short.
+    pub quick: bool,
+    /// A folder for results, empty at the start.
+    pub scratch: PathBuf,
+}
+
+type Measure = fn(&Context) -> Outcome<Vec<Figure>>;
+
+/// Areas with their figures; an area without any says so.
+const AREAS: [(&str, Option<Measure>); 6] = [
+    ("walk", Some(walk::figures)),
+    ("rigid-body", None),
+    ("soil", None),
+    ("gluing", None),
+    ("fmi", None),
+    ("plugins", None),
+];
+
+fn area_names() -> Vec<&'static str> {
+    AREAS.iter().map(|(name, _)| *name).collect()
+}
+
+/// Measures, prints and judges.
+pub fn validate(arguments: &Arguments) -> Outcome {
+    if !arguments.no_timing && cfg!(debug_assertions) {
+        return again_in_release(arguments);
+    }
+    let profile = if arguments.no_timing { "debug" } else { "release" };
+    let build: &[&str] = if arguments.no_timing { &["build"] } else { &["build", "--release"] };
+    must(cargo(build).args(["--package", "terraglue"]))?;
+    let scratch = crate::process::target().join("validate");
+    let _ = std::fs::remove_dir_all(&scratch);
+    let context =
+        Context { program: program(profile), timing: !arguments.no_timing, quick: arguments.quick, scratch };
+    let mut known = KnownFailures::read(&root().join("tests/known-failures.tsv"))?;
+    let mut complaints = Vec::new();
+    for (area, measure) in
+        AREAS.iter().filter(|(name, _)| arguments.area.as_deref().is_none_or(|a| a == *name))
+    {
+        let figures = match measure {
+            Some(measure) => measure(&context)?,
+            None => vec![Figure::skipped(format!("{area}.figures"), "this area promises no figure yet")],
+        };
+        for figure in &figures {
+            println!("{}", figure.line());
+            complaints.extend(known.judge(figure));
+        }
+        if arguments.write_docs && measure.is_some() {
+            documents::write_area(area, &figures)?;
+        }
+    }
+    if complaints.is_empty() { Ok(()) } else { Err(complaints.join("\n       ")) }
+}
+
+/// Timing figures count in the release profile only.
+fn again_in_release(arguments: &Arguments) -> Outcome {
+    let mut command = cargo(&["run", "--release", "--package", "xtask", "--", "validate"]);
+    command.args(&arguments.area);
+    let flags = [(arguments.quick, "--quick"), (arguments.write_docs, "--write-docs")];
+    command.args(flags.iter().filter(|(on, _)| *on).map(|(_, flag)| flag));
+    must(&mut command)
+}

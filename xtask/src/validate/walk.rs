@@ -1,0 +1,158 @@
+//! Area `walk`: `scenarios/moon_walk.toml` with both soils and both strategies, run as a user runs it.
+
+use super::timing::{calibration_s, median};
+use super::{Context, Figure, Limit};
+use crate::process::{Outcome, command};
+use serde_json::Value;
+use std::path::PathBuf;
+
+const SCENARIO: &str = "scenarios/moon_walk.toml";
+const SOILS: [&str; 2] = ["soil-cellular-automaton", "soil-bekker"];
+const STRATEGIES: [&str; 2] = ["cooperative", "iterative"];
+
+/// One run of the program.
+struct Run<'a> {
+    context: &'a Context,
+    name: String,
+    options: Vec<String>,
+}
+
+/// All figures of the area.
+pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
+    let mut all = Vec::new();
+    let combinations: Vec<_> =
+        SOILS.iter().flat_map(|soil| STRATEGIES.map(|strategy| (*soil, strategy))).collect();
+    let summaries: Vec<Outcome<Value>> = in_parallel(&combinations, |(soil, strategy)| {
+        let duration = if context.quick { "4" } else { "10" };
+        run(context, &format!("{soil}.{strategy}"), soil, strategy, duration, "1").summary()
+    });
+    for ((soil, strategy), summary) in combinations.iter().zip(summaries) {
+        all.extend(quality(&format!("walk.{soil}.{strategy}"), &summary?));
+    }
+    for soil in SOILS {
+        all.push(same_bytes(context, soil)?);
+    }
+    for (soil, strategy) in combinations {
+        all.extend(speed(context, soil, strategy)?);
+    }
+    Ok(all)
+}
+
+fn quality(id: &str, s: &Value) -> Vec<Figure> {
+    let number = |key: &str| s[key].as_f64().unwrap_or(f64::NAN);
+    let figure =
+        |name: &str, value: f64, limit, what: &str| Figure::new(format!("{id}.{name}"), value, limit, what);
+    let degrees = |key: &str| number(key).to_degrees();
+    let ratio = number("distance_m") / number("commanded_distance_m");
+    let mass = match s["soil_mass_error_relative"].as_f64() {
+        Some(error) => {
+            figure("mass_error", error.abs(), Limit::Equal(0.0), "relative error of the soil's mass")
+        }
+        None => Figure::skipped(format!("{id}.mass_error"), "this soil moves no material"),
+    };
+    vec![
+        figure("distance", ratio, Limit::AtLeast(0.8), "distance walked / commanded"),
+        figure("roll", degrees("max_roll_rad"), Limit::AtMost(15.0), "largest roll, degrees"),
+        figure("pitch", degrees("max_pitch_rad"), Limit::AtMost(15.0), "largest pitch, degrees"),
+        figure("sinkage_min", 1e3 * number("max_sinkage_m"), Limit::AtLeast(2.0), "largest sinkage, mm"),
+        figure("sinkage_max", 1e3 * number("max_sinkage_m"), Limit::AtMost(60.0), "largest sinkage, mm"),
+        figure(
+            "not_converged",
+            number("steps_not_converged"),
+            Limit::Equal(0.0),
+            "steps that did not converge",
+        ),
+        mass,
+    ]
+}
+
+/// The same run with one and with two threads, and once more: recordings equal byte for byte.
+fn same_bytes(context: &Context, soil: &str) -> Outcome<Figure> {
+    let duration = if context.quick { "0.5" } else { "2" };
+    let runs = [("a", "1"), ("b", "1"), ("c", "2")];
+    let bytes = in_parallel(&runs, |(name, threads)| {
+        run(context, &format!("bytes.{soil}.{name}"), soil, "iterative", duration, threads).recording()
+    });
+    let bytes = bytes.into_iter().collect::<Outcome<Vec<_>>>()?;
+    let different = bytes[1..].iter().filter(|b| **b != bytes[0]).count();
+    let what = "recordings that differ among three runs with 1, 1 and 2 threads";
+    Ok(Figure::new(format!("walk.{soil}.different_bytes"), different as f64, Limit::Equal(0.0), what))
+}
+
+/// CPU time of the stepping thread, median of five short runs one after the other.
+fn speed(context: &Context, soil: &str, strategy: &str) -> Outcome<Vec<Figure>> {
+    let id = format!("walk.{soil}.{strategy}");
+    if !context.timing {
+        return Ok(vec![Figure::skipped(format!("{id}.real_time_factor"), "timing was left out")]);
+    }
+    let duration = if context.quick { "0.5" } else { "2" };
+    let calibration = calibration_s();
+    let mut per_step = Vec::new();
+    let mut factors = Vec::new();
+    for k in 0..5 {
+        let s =
+            run(context, &format!("speed.{soil}.{strategy}.{k}"), soil, strategy, duration, "1").summary()?;
+        let number = |key: &str| s[key].as_f64().unwrap_or(f64::NAN);
+        factors.push(number("simulated_s") / number("cpu_s"));
+        per_step.push(number("cpu_s") / number("steps"));
+    }
+    let ratio = median(per_step) / calibration;
+    Ok(vec![
+        Figure::new(
+            format!("{id}.real_time_factor"),
+            median(factors),
+            Limit::AtLeast(1.0),
+            "simulated time / CPU time",
+        ),
+        Figure::new(format!("{id}.cost"), ratio, Limit::None, "CPU time of a step / a million multiply-adds"),
+    ])
+}
+
+fn run<'a>(
+    context: &'a Context,
+    name: &str,
+    soil: &str,
+    strategy: &str,
+    duration: &str,
+    threads: &str,
+) -> Run<'a> {
+    let soil = format!("soil.module={soil}");
+    let strategy = format!("gluing.strategy={strategy}");
+    let options = ["--set", &soil, "--set", &strategy, "--duration", duration, "--threads", threads];
+    Run { context, name: name.into(), options: options.map(str::to_owned).to_vec() }
+}
+
+impl Run<'_> {
+    fn folder(&self) -> PathBuf {
+        self.context.scratch.join(&self.name)
+    }
+
+    /// Runs and reads `summary.json` from standard output.
+    fn summary(&self) -> Outcome<Value> {
+        let folder = self.folder().display().to_string();
+        let mut child = command(&self.context.program, &["run", SCENARIO, "--json", "--out", &folder]);
+        let output = child.args(&self.options).output().map_err(|e| format!("{}: {e}", self.name))?;
+        serde_json::from_slice(&output.stdout).map_err(|_| {
+            format!("{} gave no summary: {}", self.name, String::from_utf8_lossy(&output.stderr).trim())
+        })
+    }
+
+    fn recording(&self) -> Outcome<Vec<u8>> {
+        self.summary()?;
+        let path = self.folder().join("recording.mcap");
+        std::fs::read(&path).map_err(|e| format!("{}: {e}", path.display()))
+    }
+}
+
+/// The results of `job` in the order of `items`, on as many threads as there are cores.
+fn in_parallel<T: Sync, R: Send>(items: &[T], job: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let mut results = Vec::new();
+    for chunk in items.chunks(cores) {
+        std::thread::scope(|scope| {
+            let handles: Vec<_> = chunk.iter().map(|item| scope.spawn(|| job(item))).collect();
+            results.extend(handles.into_iter().filter_map(|h| h.join().ok()));
+        });
+    }
+    results
+}

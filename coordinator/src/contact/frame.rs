@@ -1,0 +1,84 @@
+//! Frame, origin and extent of a contact patch.
+
+use terraglue_ground::{Placed, Surface, fit_plane};
+use terraglue_subsystem::{Geometry, Node, component};
+
+/// Smallest upward part of a normal that is reckoned with; steeper ground is no height field any more.
+const STEEPEST: f64 = 0.2;
+
+/// Where a shape stands on the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Patch {
+    /// The shape's lowest point along −n, world, m.
+    pub origin: [f64; 3],
+    /// Upward unit normal of the ground.
+    pub normal: [f64; 3],
+    /// Height of the ground's plane at the origin, m.
+    pub ground: f64,
+}
+
+impl Patch {
+    /// Lowest point and normal depend on each other: two rounds, from the vertical, settle both.
+    pub fn find<S: Surface + ?Sized>(shape: &Placed, surface: &S) -> Self {
+        let bounds = shape.aabb();
+        // Twice the half width: mostly ground beyond the print that the shape itself has made.
+        let radius = (bounds.max[0] - bounds.min[0]).min(bounds.max[1] - bounds.min[1]);
+        let mut normal = [0.0, 0.0, 1.0];
+        let mut ground = 0.0;
+        for _ in 0..2 {
+            let origin = shape.patch_origin(normal);
+            let plane = fit_plane(surface, origin[0], origin[1], radius);
+            (normal, ground) = (plane.normal, plane.height);
+        }
+        Self { origin: shape.patch_origin(normal), normal, ground }
+    }
+
+    /// Vertical distance in which a motion of `reach` (m) along the normal shows.
+    pub fn vertical(&self, reach: f64) -> f64 {
+        reach / self.normal[2].max(STEEPEST)
+    }
+
+    /// n, t1, t2: t1 is world x made orthogonal to n, t2 = n × t1.
+    pub fn frame(&self) -> [f64; 9] {
+        let n = self.normal;
+        let across = [1.0 - n[0] * n[0], -n[0] * n[1], -n[0] * n[2]];
+        let length = across.iter().map(|c| c * c).sum::<f64>().sqrt();
+        let t1 = if length > 1e-6 { across.map(|c| c / length) } else { [0.0, 1.0, 0.0] };
+        let t2 = [n[1] * t1[2] - n[2] * t1[1], n[2] * t1[0] - n[0] * t1[2], n[0] * t1[1] - n[1] * t1[0]];
+        [n[0], n[1], n[2], t1[0], t1[1], t1[2], t2[0], t2[1], t2[2]]
+    }
+}
+
+/// Components that a contact of this shape carries.
+pub fn mask(geometry: &Geometry) -> u32 {
+    match geometry {
+        Geometry::Sphere { .. } => component::FORCE,
+        _ => component::WRENCH,
+    }
+}
+
+/// Half lengths of the patch along t1 and t2: how far its nodes reach from the origin, at most half the shape's
+/// width, at least half a cell. Zero for a sphere.
+pub fn extent<S: Surface + ?Sized>(
+    shape: &Placed,
+    surface: &S,
+    patch: &Patch,
+    frame: &[f64; 9],
+    nodes: &[Node],
+) -> [f64; 2] {
+    if matches!(shape.geometry(), Geometry::Sphere { .. }) {
+        return [0.0; 2];
+    }
+    let lattice = surface.lattice();
+    let half = 0.5 * lattice.spacing;
+    [3, 6].map(|k| {
+        let t = [frame[k], frame[k + 1], frame[k + 2]];
+        let along = |n: &Node| {
+            let p = lattice.position(n.i, n.j);
+            let d = [p[0] - patch.origin[0], p[1] - patch.origin[1], n.lower - patch.origin[2]];
+            (d[0] * t[0] + d[1] * t[1] + d[2] * t[2]).abs()
+        };
+        let reach = nodes.iter().map(along).fold(0.0, f64::max) + half;
+        reach.min(shape.half_width(t)).max(half.min(shape.half_width(t)))
+    })
+}

@@ -1,0 +1,218 @@
+//! A ground as contact detection reads it: the field `height` of a soil, tile by tile, with cached bounds.
+
+use crate::error::{Error, Result};
+use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
+use parry3d_f64::math::Vector;
+use std::cell::Cell;
+use terraglue_ground::{HeightField, Lattice, Surface, TILE_EDGE};
+use terraglue_subsystem::{FieldTile, Subsystem, Terrain};
+
+/// What stays the same of a ground over a run, and the bounds of its tiles.
+pub struct Ground {
+    /// Index of the subsystem that owns it.
+    pub subsystem: u32,
+    pub lattice: Lattice,
+    source: Source,
+    edge: u32,
+    bounds: Vec<Bound>,
+}
+
+enum Source {
+    /// Number of the field `height`.
+    Field(usize),
+    /// The scenario's terrain, for a soil that shows no heights.
+    Fixed(Box<HeightField>),
+}
+
+/// Lowest and highest node of a tile at a generation.
+#[derive(Clone, Copy)]
+struct Bound {
+    generation: Option<u64>,
+    low: f64,
+    high: f64,
+}
+
+impl Ground {
+    pub fn new(subsystem: u32, instance: &dyn Subsystem, terrain: Option<&dyn Terrain>) -> Result<Self> {
+        let failed = |message: String| Error::Simulation { time_s: 0.0, message };
+        let field = instance.fields().iter().enumerate().find(|(_, f)| f.name == "height");
+        let (lattice, edge, source) = match (field, terrain) {
+            (Some((number, info)), _) => {
+                let lattice = Lattice { origin: info.origin, spacing: info.spacing, size: info.size };
+                (lattice, info.tile_edge, Source::Field(number))
+            }
+            (None, Some(terrain)) => {
+                let field = HeightField::from_terrain(terrain).map_err(|e| failed(e.to_string()))?;
+                (*field.lattice(), TILE_EDGE, Source::Fixed(Box::new(field)))
+            }
+            (None, None) => {
+                return Err(failed("a soil shows no field `height` and there is no [terrain]".into()));
+            }
+        };
+        if edge == 0 || lattice.node_count() == 0 || lattice.spacing.is_nan() || lattice.spacing <= 0.0 {
+            return Err(failed(format!("the field `height` has no lattice: {lattice:?}, tiles of {edge}")));
+        }
+        let tiles = lattice.size.map(|n| n.div_ceil(edge) as usize);
+        let unknown = Bound { generation: None, low: 0.0, high: 0.0 };
+        Ok(Self { subsystem, lattice, source, edge, bounds: vec![unknown; tiles[0] * tiles[1]] })
+    }
+
+    /// The ground now, and its bounds for updating.
+    pub fn read<'a>(&'a mut self, instance: &'a dyn Subsystem) -> (Reader<'a>, Bounds<'a>) {
+        let reader = Reader {
+            lattice: &self.lattice,
+            source: &self.source,
+            instance,
+            edge: self.edge,
+            recent: Default::default(),
+            trouble: Cell::new(None),
+        };
+        (reader, Bounds { tiles: &mut self.bounds })
+    }
+}
+
+/// What cannot be read.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Trouble {
+    /// The soil refused tile (a, b).
+    Tile(u32, u32),
+    /// Node (i, j) is not a number.
+    Node(u32, u32),
+}
+
+impl std::fmt::Display for Trouble {
+    fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
+        match self {
+            Self::Tile(a, b) => write!(f, "tile ({a}, {b}) of the field `height` cannot be read"),
+            Self::Node(i, j) => write!(f, "the field `height` is not a number at node ({i}, {j})"),
+        }
+    }
+}
+
+/// Number of recently read tiles that are remembered along each axis.
+const RECENT: u32 = 4;
+
+/// Reads nodes through the tiles of the last few reads.
+pub struct Reader<'a> {
+    lattice: &'a Lattice,
+    source: &'a Source,
+    instance: &'a dyn Subsystem,
+    edge: u32,
+    recent: [Cell<Option<([u32; 2], FieldTile<'a>)>>; (RECENT * RECENT) as usize],
+    trouble: Cell<Option<Trouble>>,
+}
+
+impl<'a> Reader<'a> {
+    /// The first thing that could not be read.
+    pub fn trouble(&self) -> Option<Trouble> {
+        self.trouble.get()
+    }
+
+    fn tile(&self, a: u32, b: u32) -> Option<FieldTile<'a>> {
+        let slot = &self.recent[(b % RECENT * RECENT + a % RECENT) as usize];
+        if let Some((at, tile)) = slot.get() {
+            if at == [a, b] {
+                return Some(tile);
+            }
+        }
+        let tile = match self.source {
+            Source::Field(field) => self.instance.field_tile(*field, a, b).ok(),
+            Source::Fixed(field) => Some(field.height_tile(a, b)),
+        };
+        match tile {
+            Some(tile) => slot.set(Some(([a, b], tile))),
+            None => self.fail(Trouble::Tile(a, b)),
+        }
+        tile
+    }
+
+    fn fail(&self, trouble: Trouble) {
+        if self.trouble.get().is_none() {
+            self.trouble.set(Some(trouble));
+        }
+    }
+
+    /// Lowest and highest node of a range inside tile (a, b); i and j inclusive.
+    fn range_bound(&self, i: (u32, u32), j: (u32, u32)) -> (f64, f64) {
+        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+        for j in j.0..=j.1 {
+            for i in i.0..=i.1 {
+                let h = self.height(i as i32, j as i32);
+                (low, high) = (low.min(h), high.max(h));
+            }
+        }
+        (low, high)
+    }
+}
+
+impl Surface for Reader<'_> {
+    fn lattice(&self) -> &Lattice {
+        self.lattice
+    }
+
+    #[inline]
+    fn height(&self, i: i32, j: i32) -> f64 {
+        let (i, j) = self.lattice.clamp(i, j);
+        let Some(tile) = self.tile(i / self.edge, j / self.edge) else { return 0.0 };
+        let height = tile.values.at(((j % self.edge) * self.edge + i % self.edge) as usize);
+        if !height.is_finite() {
+            self.fail(Trouble::Node(i, j));
+            return 0.0;
+        }
+        height
+    }
+}
+
+/// Bounds of tiles, valid as long as the tile's generation stays.
+pub struct Bounds<'a> {
+    tiles: &'a mut [Bound],
+}
+
+impl Bounds<'_> {
+    /// Whether a box in the world (already enlarged by what can move within the step) meets the ground.
+    ///
+    /// Tiles are boxes from far below up to their highest node. A tile that changed is looked at node by node
+    /// where the box covers little of it, and measured anew otherwise.
+    pub fn meets(&mut self, ground: &Reader, shape: &Aabb) -> bool {
+        let lattice = ground.lattice;
+        let (i0, i1) = lattice.cell_range(0, shape.mins.x, shape.maxs.x);
+        let (j0, j1) = lattice.cell_range(1, shape.mins.y, shape.maxs.y);
+        if i0 > i1 || j0 > j1 {
+            return false;
+        }
+        let edge = ground.edge;
+        let (i0, i1, j0, j1) = (i0 as u32, i1 as u32, j0 as u32, j1 as u32);
+        for b in j0 / edge..=j1 / edge {
+            for a in i0 / edge..=i1 / edge {
+                let i = (i0.max(a * edge), i1.min(a * edge + edge - 1));
+                let j = (j0.max(b * edge), j1.min(b * edge + edge - 1));
+                let (_, high) = self.bound(ground, [a, b], i, j);
+                let top = Aabb::new(
+                    Vector::new(shape.mins.x, shape.mins.y, f64::MIN),
+                    Vector::new(shape.maxs.x, shape.maxs.y, high),
+                );
+                if top.intersects(shape) {
+                    return true;
+                }
+            }
+        }
+        false
+    }
+
+    fn bound(&mut self, ground: &Reader, [a, b]: [u32; 2], i: (u32, u32), j: (u32, u32)) -> (f64, f64) {
+        let edge = ground.edge;
+        let generation = ground.tile(a, b).map(|t| t.generation);
+        let bound = &mut self.tiles[(b * ground.lattice.size[0].div_ceil(edge) + a) as usize];
+        if generation.is_some() && bound.generation == generation {
+            return (bound.low, bound.high);
+        }
+        let asked = (i.1 - i.0 + 1) * (j.1 - j.0 + 1);
+        if 4 * asked < edge * edge {
+            return ground.range_bound(i, j);
+        }
+        let last = |k: usize, t: u32| (t * edge + edge - 1).min(ground.lattice.size[k] - 1);
+        let (low, high) = ground.range_bound((a * edge, last(0, a)), (b * edge, last(1, b)));
+        *bound = Bound { generation, low, high };
+        (low, high)
+    }
+}

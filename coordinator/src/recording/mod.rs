@@ -10,8 +10,8 @@
 //! | `timing.csv` | what a clock measured, apart from everything else |
 //! | `final_ground.asc` | the ground at the end as ESRI ASCII grid |
 //!
-//! [`Recording`] reads any recording, also one that was cut off.
-//! [`mend`] gives such a file its footer.
+//! [`Recording`] reads any recording, also one that was cut off ([`mend`] gives such a file its footer);
+//! [`report::write`] makes the report from it.
 
 mod csv;
 mod final_ground;
@@ -29,6 +29,8 @@ mod snapshot;
 mod summary;
 mod summary_observer;
 mod table;
+
+pub mod report;
 
 #[cfg(test)]
 mod tests;

@@ -22,6 +22,10 @@ pub struct Recording {
     pub units: BTreeMap<String, BTreeMap<String, String>>,
     /// Poses by frame, e.g. `robot/body`.
     pub poses: BTreeMap<String, PoseSeries>,
+    /// The first frame of the recording.
+    pub first_frame: Option<String>,
+    /// Radius of the first sphere of every body that has one, by frame, m.
+    pub radii: BTreeMap<String, f64>,
     /// How the steps were glued.
     pub gluing: Vec<GluingRecord>,
     /// Energies, J: `kinetic`, …, and `<subsystem>.kinetic`, ….
@@ -124,6 +128,22 @@ struct Transform {
 }
 
 #[derive(Deserialize)]
+struct SceneMessage {
+    entities: Vec<Entity>,
+}
+
+#[derive(Deserialize)]
+struct Entity {
+    frame_id: String,
+    spheres: Vec<Sphere>,
+}
+
+#[derive(Deserialize)]
+struct Sphere {
+    size: Vector,
+}
+
+#[derive(Deserialize)]
 struct GridMessage<'a> {
     pose: GridPose,
     column_count: usize,
@@ -187,7 +207,7 @@ impl Recording {
             "/events" => self.events.extend(serde_json::from_slice::<Happening>(data).ok()),
             // A message that does not parse is left out; the table stays rectangular.
             "/energy" => drop(self.energy.push(data)),
-            "/scene" => {}
+            "/scene" => self.take_scene(data),
             topic => {
                 let name = topic.trim_start_matches('/');
                 if !self.units.contains_key(name) {
@@ -201,11 +221,19 @@ impl Recording {
     fn take_transforms(&mut self, data: &[u8], t_s: f64) {
         let Ok(all) = serde_json::from_slice::<Transforms>(data) else { return };
         for t in all.transforms {
+            self.first_frame.get_or_insert_with(|| t.child_frame_id.clone());
             let series = self.poses.entry(t.child_frame_id).or_default();
             series.t_s.push(t_s);
             series.position.push([t.translation.x, t.translation.y, t.translation.z]);
             series.orientation.push([t.rotation.w, t.rotation.x, t.rotation.y, t.rotation.z]);
         }
+    }
+
+    fn take_scene(&mut self, data: &[u8]) {
+        let Ok(scene) = serde_json::from_slice::<SceneMessage>(data) else { return };
+        let spheres =
+            scene.entities.iter().filter_map(|e| Some((e.frame_id.clone(), e.spheres.first()?.size.x / 2.0)));
+        self.radii.extend(spheres);
     }
 
     fn take_ground(&mut self, data: &[u8], t_s: f64) {
@@ -217,6 +245,19 @@ impl Recording {
             }
             Some(now) => now.patch(&record),
         }
+    }
+
+    /// Radius of a body's first sphere, m.
+    pub fn radius(&self, subsystem: &str, body: &str) -> Option<f64> {
+        self.radii.get(&format!("{subsystem}/{body}")).copied()
+    }
+
+    /// Frame and motion of the body that the report speaks of: that of the scenario, else the first one.
+    pub fn reported_body(&self) -> Option<(&str, &PoseSeries)> {
+        let wanted = self.header.get("report_body").replacen('.', "/", 1);
+        let found = self.poses.get_key_value(&wanted);
+        let (name, poses) = found.or_else(|| self.poses.get_key_value(self.first_frame.as_ref()?))?;
+        Some((name, poses))
     }
 
     /// Time and values of `subsystem.variable`.

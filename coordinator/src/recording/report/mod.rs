@@ -1,1 +1,57 @@
-//! The report page.
+//! `report.html`: one self-contained page about a run, made from its recording.
+//!
+//! Nothing is loaded from anywhere: style, scripts, curves and the picture of the ground are inside the file.
+
+mod cards;
+mod colour_map;
+pub(crate) mod figure;
+mod figures;
+mod footprints;
+mod ground_map;
+pub(crate) mod html;
+pub(crate) mod page;
+mod picture;
+mod setup;
+
+use crate::error::Result;
+use crate::recording::layout::{REPORT, at};
+use crate::recording::reader::Recording;
+use crate::recording::summary::Summary;
+use std::path::{Path, PathBuf};
+
+/// Makes the report of a results folder from its recording and, where it is there, `summary.json`. The
+/// recording may be cut off ([`crate::recording::mend`] gives it its footer). Returns the path of the page.
+pub fn write(folder: &Path) -> Result<PathBuf> {
+    let recording = Recording::open(folder)?;
+    let summary = Summary::read(folder).ok();
+    let path = folder.join(REPORT);
+    std::fs::write(&path, render(&recording, summary.as_ref())?).map_err(at(&path))?;
+    Ok(path)
+}
+
+/// The page as text.
+pub fn render(recording: &Recording, summary: Option<&Summary>) -> Result<String> {
+    let legs = footprints::legs(recording);
+    let mut page = page::Page::new(&title(recording));
+    page.header(&setup::headline(recording, summary));
+    page.section("At a glance", "figures", &cards::render(recording, summary));
+    page.section("What was simulated", "setup", &setup::render(recording));
+    if let Some(map) = ground_map::data(recording, &legs)? {
+        page.section("The ground from above", "ground", ground_map::FRAME);
+        page.data("map", map);
+    }
+    for figure in figures::all(recording, &legs) {
+        page.figure(figure);
+    }
+    let events: Vec<_> =
+        summary.map_or(&recording.events, |s| &s.events).iter().map(|e| (e.t_s, e.what.as_str())).collect();
+    page.events(&events);
+    Ok(page.finish())
+}
+
+fn title(recording: &Recording) -> String {
+    match recording.header.get("scenario") {
+        "" => "Run".into(),
+        name => name.into(),
+    }
+}

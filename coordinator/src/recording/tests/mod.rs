@@ -214,3 +214,53 @@ fn timing_is_written_apart() {
     let text = std::fs::read_to_string(f.path().join(TIMING)).expect("written");
     assert_eq!(text.lines().nth(1), Some("advance,0.500000,0.250000,1000,250.000"));
 }
+
+#[test]
+fn the_report_is_one_file_that_asks_nothing_of_a_network() {
+    let f = folder();
+    record(f.path(), "iterative", 4000);
+    let path = report::write(f.path()).expect("written");
+    let html = std::fs::read_to_string(&path).expect("written");
+    let own = html.replace("http://www.w3.org/2000/svg", "");
+    assert!(!own.contains("http") && !own.contains("src=") && !own.contains("@import"));
+    for id in ["figures", "setup", "ground", "body", "forces", "joint", "gluing", "energy", "soil", "events"]
+    {
+        assert!(html.contains(&format!("<section id=\"{id}\">")), "{id} is missing");
+    }
+    assert!(html.contains("Six feet on synthetic regolith") && html.contains("data:image/png;base64,"));
+    let data = html.split("id=\"data\">").nth(1).and_then(|d| d.split("</script>").next()).expect("data");
+    let data: serde_json::Value = serde_json::from_str(data).expect("JSON");
+    assert_eq!(data["map"]["legs"].as_array().map(Vec::len), Some(6));
+    if let Ok(keep) = std::env::var("TERRAGLUE_KEEP_REPORT") {
+        std::fs::copy(&path, keep).expect("kept");
+    }
+}
+
+#[test]
+fn a_report_leaves_out_what_was_not_simulated() {
+    let f = folder();
+    let mut rig = Rig::new("cooperative");
+    rig.parts.truncate(1);
+    (rig.scenario.report, rig.feet) = (Default::default(), 0);
+    let mut recorder =
+        Recorder::create(f.path(), &rig.scenario, RecorderOptions::default()).expect("created");
+    rig.run(&mut recorder, 50).expect("ran");
+    let summary = recorder.finish(1.0, 1.0, None, Status::Done).expect("finished");
+    assert_eq!((summary.distance_m, summary.max_sinkage_m, summary.soil_module), (None, None, None));
+    let html = std::fs::read_to_string(report::write(f.path()).expect("written")).expect("written");
+    for id in ["ground", "body", "forces", "joint", "soil", "events"] {
+        assert!(!html.contains(&format!("<section id=\"{id}\">")), "{id} is there");
+    }
+}
+
+#[test]
+fn a_report_can_be_made_of_a_run_that_was_cut_off() {
+    let f = folder();
+    record(f.path(), "cooperative", 800);
+    let path = f.path().join(RECORDING);
+    let bytes = std::fs::read(&path).expect("written");
+    std::fs::write(&path, &bytes[..bytes.len() / 2]).expect("cut");
+    std::fs::remove_file(f.path().join(SUMMARY)).expect("removed");
+    let html = std::fs::read_to_string(report::write(f.path()).expect("written")).expect("written");
+    assert!(html.contains("cut off") && html.contains("<section id=\"forces\">"));
+}

@@ -174,6 +174,7 @@ impl Subsystem for Synthetic {
 pub struct Rig {
     pub scenario: Scenario,
     pub parts: Vec<(&'static str, Synthetic)>,
+    pub feet: usize,
     scene: Scene,
     iterations: u32,
 }
@@ -242,7 +243,13 @@ impl Rig {
             ("robot", Synthetic::robot()),
             ("soil", Synthetic::soil([150, 100], 0.02)),
         ];
-        Self { scenario: scenario(strategy), parts, scene, iterations: u32::from(strategy == "iterative") }
+        Self {
+            scenario: scenario(strategy),
+            parts,
+            feet: FEET.len(),
+            scene,
+            iterations: u32::from(strategy == "iterative"),
+        }
     }
 
     /// World position of a foot and whether it stands: tripods of 0.5 s.
@@ -270,7 +277,7 @@ impl Rig {
         report.estimate_gap_n = 1.5 * report.max_action_reaction_gap_n;
         report.interface_work_error_j = 1e-6;
         report.rank = (6 * self.iterations, 6 * self.iterations);
-        for k in 0..FEET.len() {
+        for k in 0..self.feet {
             let (origin, stands) = Self::foot(k, t);
             let phase = (t + if k % 2 == 0 { 0.0 } else { 0.5 }).fract();
             let load =

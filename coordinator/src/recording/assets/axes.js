@@ -1,0 +1,68 @@
+// What plots and map share: packed numbers, SVG elements, ticks, numbers as text.
+"use strict";
+const data = JSON.parse(document.getElementById("data").textContent);
+
+function unpack(text) {
+  const bytes = Uint8Array.from(atob(text), (c) => c.charCodeAt(0));
+  return new Float32Array(bytes.buffer);
+}
+
+function svgElement(parent, name, attributes = {}) {
+  const element = document.createElementNS("http://www.w3.org/2000/svg", name);
+  for (const [key, value] of Object.entries(attributes)) element.setAttribute(key, value);
+  parent.append(element);
+  return element;
+}
+
+function htmlElement(parent, name, className, text = "") {
+  const element = document.createElement(name);
+  if (className) element.className = className;
+  element.textContent = text;
+  parent.append(element);
+  return element;
+}
+
+const colourOf = (k) => `var(--c${k % 8})`;
+
+// Round numbers in [low, high], about `count` of them.
+function niceTicks(low, high, count) {
+  const raw = (high - low) / Math.max(count, 1);
+  const power = 10 ** Math.floor(Math.log10(raw));
+  const step = [1, 2, 5, 10].map((m) => m * power).find((s) => s >= raw * 0.999) ?? raw;
+  const ticks = [];
+  for (let k = Math.ceil(low / step - 1e-9); k * step <= high + step * 1e-9; k++) ticks.push(k * step);
+  return { ticks, decimals: Math.max(0, -Math.floor(Math.log10(step) + 1e-9)) };
+}
+
+// Powers of ten in [low, high], thinned to about `count`.
+function decadeTicks(low, high, count) {
+  const [a, b] = [Math.ceil(Math.log10(low) - 1e-9), Math.floor(Math.log10(high) + 1e-9)];
+  const every = Math.max(1, Math.ceil((b - a + 1) / count));
+  const ticks = [];
+  for (let e = a; e <= b; e++) if ((e - b) % every === 0) ticks.push(10 ** e);
+  return ticks;
+}
+
+const minus = (text) => text.replace(/-/g, "−");
+const raised = (n) => String(n).replace(/./g, (c) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)]);
+const decade = (v) => `10${raised(Math.round(Math.log10(v)))}`;
+
+// SI prefix in which a magnitude has one to three digits before the point. Pure numbers get none.
+function prefixFor(magnitude, unit) {
+  if (!unit || !(magnitude > 0)) return { symbol: "", factor: 1 };
+  const table = [["M", 1e6], ["k", 1e3], ["", 1], ["m", 1e-3], ["µ", 1e-6], ["n", 1e-9], ["p", 1e-12], ["f", 1e-15]];
+  const [symbol, factor] = table.find(([, f]) => magnitude >= f * 0.9) ?? table.at(-1);
+  // Two digits behind the point read better than a prefix.
+  return factor === 1e-3 && magnitude >= 0.1 ? { symbol: "", factor: 1 } : { symbol, factor };
+}
+
+function short(value, digits = 4) {
+  if (!Number.isFinite(value)) return "–";
+  if (value === 0) return "0";
+  const size = Math.abs(value);
+  if (size >= 1e5 || size < 1e-3) {
+    const [mantissa, exponent] = value.toExponential(Math.max(digits - 2, 0)).split("e");
+    return minus(`${mantissa}·10`) + raised(Number(exponent));
+  }
+  return minus(value.toPrecision(digits));
+}

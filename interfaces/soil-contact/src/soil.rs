@@ -3,7 +3,7 @@
 use crate::bookkeeping::{self, Book, Lists};
 use crate::ground::{Covered, Ground};
 use crate::patch::{Laws, Patches};
-use crate::state::Slots;
+use crate::state::{Committed, Slots};
 use crate::trial::Last;
 use crate::values;
 use std::sync::Arc;
@@ -24,6 +24,8 @@ pub trait Material: Send {
     /// Exact copy of its own committed state.
     type Saved: Default + Send;
 
+    /// Looks at the ground before the first step.
+    fn begin(&mut self, _ground: &Ground, _parameters: &SoilParameters) {}
     /// Its variables, numbered from `first`; all are f64.
     fn variables(&self, _first: u32) -> Vec<Variable> {
         Vec::new()
@@ -68,9 +70,10 @@ pub struct FieldSoil<M: Material> {
 
 impl<M: Material> FieldSoil<M> {
     /// A soil on the host's terrain. Refused: parameters without sense, a scenario without ground.
-    pub fn new(config: &Config, host: Arc<dyn Host>, material: M) -> Result<Self> {
+    pub fn new(config: &Config, host: Arc<dyn Host>, mut material: M) -> Result<Self> {
         let parameters = SoilParameters::from_config(config)?;
         let ground = Ground::new(host.required_terrain()?)?;
+        material.begin(&ground, &parameters);
         let mut variables = values::shared();
         variables.extend(material.variables(values::SHARED));
         let nodes = host.max_nodes() as usize;
@@ -215,14 +218,25 @@ impl<M: Material> Subsystem for FieldSoil<M> {
     }
 
     fn save_state(&mut self, slot: u32) -> Result {
-        let saved = self.slots.save(slot, &self.ground, &self.lists.loaded, &self.book)?;
-        self.material.save(saved);
+        let state = Committed {
+            ground: &mut self.ground,
+            loaded: &mut self.lists.loaded,
+            book: &mut self.book,
+            parameters: &mut self.parameters,
+        };
+        self.material.save(self.slots.save(slot, &state)?);
         Ok(())
     }
 
     fn restore_state(&mut self, slot: u32) -> Result {
-        let saved = self.slots.restore(slot, &mut self.ground, &mut self.lists.loaded, &mut self.book)?;
-        self.material.restore(saved);
+        let mut state = Committed {
+            ground: &mut self.ground,
+            loaded: &mut self.lists.loaded,
+            book: &mut self.book,
+            parameters: &mut self.parameters,
+        };
+        self.material.restore(self.slots.restore(slot, &mut state)?);
+        self.laws = laws_of(&self.parameters);
         self.patches.forget();
         self.last.clear();
         Ok(())

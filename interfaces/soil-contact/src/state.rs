@@ -3,6 +3,7 @@
 use crate::bookkeeping::Book;
 use crate::ground::{Ground, NodeState};
 use terraglue_ground::{HeightSnapshot, TileMapSnapshot};
+use terraglue_soil_law::SoilParameters;
 use terraglue_subsystem::{Error, Result};
 
 /// One saved state.
@@ -12,8 +13,20 @@ struct Slot<S> {
     nodes: TileMapSnapshot<NodeState>,
     loaded: Vec<[i32; 2]>,
     book: Book,
+    parameters: Option<SoilParameters>,
     material: S,
-    used: bool,
+}
+
+/// What a slot holds beside the material's own state.
+pub struct Committed<'a> {
+    /// Heights and node states.
+    pub ground: &'a mut Ground,
+    /// Loaded nodes.
+    pub loaded: &'a mut Vec<[i32; 2]>,
+    /// Sums over the run.
+    pub book: &'a mut Book,
+    /// The laws' numbers, which may be changed during a run.
+    pub parameters: &'a mut SoilParameters,
 }
 
 /// All slots of an instance.
@@ -28,32 +41,25 @@ impl<S: Default> Slots<S> {
         Self { slots: (0..count).map(|_| Slot::default()).collect() }
     }
 
-    /// Copies the ground and the book into a slot; the place for the material's own state is returned.
-    pub fn save(&mut self, slot: u32, ground: &Ground, loaded: &[[i32; 2]], book: &Book) -> Result<&mut S> {
+    /// Copies the state into a slot; the place for the material's own state is returned.
+    pub fn save(&mut self, slot: u32, state: &Committed) -> Result<&mut S> {
         let s = self.slots.get_mut(slot as usize).ok_or_else(|| unknown(slot))?;
-        ground.heights.save(&mut s.heights);
-        ground.nodes.save(&mut s.nodes);
-        s.loaded.clear();
-        s.loaded.extend_from_slice(loaded);
-        s.book = *book;
-        s.used = true;
+        state.ground.heights.save(&mut s.heights);
+        state.ground.nodes.save(&mut s.nodes);
+        s.loaded.clone_from(state.loaded);
+        s.book = *state.book;
+        s.parameters = Some(*state.parameters);
         Ok(&mut s.material)
     }
 
     /// Copies a slot back; the material's own state is returned.
-    pub fn restore(
-        &self,
-        slot: u32,
-        ground: &mut Ground,
-        loaded: &mut Vec<[i32; 2]>,
-        book: &mut Book,
-    ) -> Result<&S> {
-        let s = self.slots.get(slot as usize).filter(|s| s.used).ok_or_else(|| unknown(slot))?;
-        ground.heights.restore(&s.heights);
-        ground.nodes.restore(&s.nodes);
-        loaded.clear();
-        loaded.extend_from_slice(&s.loaded);
-        *book = s.book;
+    pub fn restore(&self, slot: u32, state: &mut Committed) -> Result<&S> {
+        let s = self.slots.get(slot as usize).ok_or_else(|| unknown(slot))?;
+        *state.parameters = s.parameters.ok_or_else(|| unknown(slot))?;
+        state.ground.heights.restore(&s.heights);
+        state.ground.nodes.restore(&s.nodes);
+        state.loaded.clone_from(&s.loaded);
+        *state.book = s.book;
         Ok(&s.material)
     }
 }

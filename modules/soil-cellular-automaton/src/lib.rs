@@ -1,1 +1,82 @@
 //! Soil as a cellular automaton: angle of repose, curvature, active nodes, force-equivalent height.
+//!
+//! The automaton moves material between the nodes of the height field in whole units of fixed point, so that
+//! nothing is lost; the forces on a foot come from the pressure and shear laws that all soils share
+//! (`terraglue-soil-contact`). Two rules act on the free surface (Rossmann, Jung and Rast 2010, section IV):
+//!
+//! * **Repose**, per face between the cells i and j: with g_n = h_i − h_j, the transverse slope g_t (mean of the
+//!   central differences of both cells) and g = √(g_n² + g_t²), the flux from i to j is
+//!   q = trunc(¼·(g − Δ·tan φ_r)₊·g_n/g). A plane of slope tan φ_r is at rest at any azimuth.
+//! * **Curvature**, per triple a–0–b of opposing neighbours in four directions at distance d: with
+//!   c = h_a − 2h_0 + h_b and e = (|c| − κ_max·d²)₊, q = trunc(e/24) goes from 0 to each end (c < 0), or from each
+//!   end to 0 (c > 0). e/6 would repair a single triple exactly; 1/24 is what twelve overlapping ones admit.
+//!
+//! Both are odd functions of one snapshot: the order in which nodes are visited cannot be seen.
+//!
+//! # Load
+//! A pressure p weighs as much as p/(N·ρ·g) of soil, N(z, b) = p_law(z, b)/(ρ·g·z): the force-equivalent height
+//! is z·p/p_law(z), so a node at the depth that the law asks for stands at its reference level and is in
+//! balance with the ground around it. Pressed deeper, it is too high by what it was pressed: this material
+//! leaves it within the commit and goes to the nearest free nodes in eight directions, weighted with 1/distance².
+//! Nothing flows into a node that carries a foot, and into a node below a foot only what fits under it.
+
+mod active;
+mod automaton;
+mod cell;
+mod displace;
+mod rules;
+mod values;
+
+pub use automaton::{Automaton, Settings};
+pub use rules::{curvature_flux, face_flux};
+
+use std::sync::Arc;
+use terraglue_soil_contact::FieldSoil;
+use terraglue_soil_law::SoilParameters;
+use terraglue_subsystem::{Config, Host, Kind, Module, Parameter, ParameterType, Result, Schema, Subsystem};
+
+/// The module.
+pub struct SoilCellularAutomaton;
+
+impl Module for SoilCellularAutomaton {
+    fn schema() -> Schema {
+        let mut parameters = SoilParameters::schema();
+        parameters.extend([
+            Parameter::number(
+                "curvature_max_per_m",
+                "",
+                automaton::DEFAULT_CURVATURE,
+                "largest curvature of the surface, 1/m",
+            )
+            .positive(),
+            Parameter {
+                unit: "rad".into(),
+                ..Parameter::of(
+                    "angle_of_repose_rad",
+                    ParameterType::Number,
+                    "angle of repose; phi_rad where it is left out",
+                )
+                .within(0.01, 1.4)
+                .optional()
+            },
+            Parameter::of(
+                "sweeps_per_step",
+                ParameterType::Integer,
+                "sweeps of the automaton per communication step; 8 per ms and cm of spacing where it is left out",
+            )
+            .within(0.0, 1e6)
+            .optional(),
+        ]);
+        Schema {
+            name: "soil-cellular-automaton".into(),
+            kind: Kind::Soil,
+            help: "cellular automaton that moves material; pressure and shear by the shared soil laws".into(),
+            parameters,
+        }
+    }
+
+    fn instantiate(config: &Config, host: Arc<dyn Host>) -> Result<Box<dyn Subsystem>> {
+        let automaton = Automaton::new(Settings::from_config(config)?, host.max_nodes());
+        Ok(Box::new(FieldSoil::new(config, host, automaton)?))
+    }
+}

@@ -1,0 +1,102 @@
+//! Heaps of loose material: angle of repose, curvature, mass, and silence at rest.
+
+#[path = "../../../interfaces/soil-contact/tests/support/mod.rs"]
+mod support;
+
+use support::{LUNAR, Shown, read, soil};
+use terraglue_ground::{Surface, UNIT_M};
+use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
+use terraglue_subsystem::{Motion, Step, Subsystem};
+
+const PHI: f64 = 0.610865238198;
+
+fn column(x: f64, y: f64) -> f64 {
+    // volume of a cone of radius 16 cells and slope tan φ on 9 × 9 cells of 1 cm
+    let volume = std::f64::consts::FRAC_PI_3 * 0.16f64.powi(3) * PHI.tan();
+    if x.abs() < 0.045 && y.abs() < 0.045 { volume / 81e-4 } else { 0.0 }
+}
+
+fn ramp(x: f64, _: f64) -> f64 {
+    if x < 0.0 { 0.0 } else { 0.2 }
+}
+
+fn steps(soil: &mut dyn Subsystem, most: u64) -> u64 {
+    for k in 0..most {
+        let none = Motion { x: &[], v: &[] };
+        soil.commit(&Step::free(k as f64 * 1e-3, 1e-3, k), &[], &none).expect("a plain step");
+        if read(soil, "visited_nodes") == 0.0 {
+            return k;
+        }
+    }
+    panic!("not at rest after {most} steps");
+}
+
+/// Slope along a ray from the middle: straight-line fit between 0.2 and 0.85 of the foot's radius.
+fn slope(surface: &Shown, angle: f64) -> f64 {
+    let d = surface.lattice.spacing;
+    let middle = 0.5 * f64::from(surface.lattice.size[0] - 1);
+    let at = |r: f64| {
+        let (x, y) = (middle + r * angle.cos(), middle + r * angle.sin());
+        let (i, j, fx, fy) = (x.floor() as i32, y.floor() as i32, x.fract(), y.fract());
+        let h = |a, b| surface.height(i + a, j + b);
+        (h(0, 0) * (1.0 - fx) + h(1, 0) * fx) * (1.0 - fy) + (h(0, 1) * (1.0 - fx) + h(1, 1) * fx) * fy
+    };
+    let peak = at(0.0);
+    let foot = (0..400).map(|k| 0.25 * f64::from(k)).find(|r| at(*r) < 0.02 * peak).expect("a foot");
+    let points: Vec<(f64, f64)> = (0..400)
+        .map(|k| 0.25 * f64::from(k))
+        .filter(|r| *r > 0.2 * foot && *r < 0.85 * foot)
+        .map(|r| (r * d, at(r)))
+        .collect();
+    let n = points.len() as f64;
+    let (mx, my) = (points.iter().map(|p| p.0).sum::<f64>() / n, points.iter().map(|p| p.1).sum::<f64>() / n);
+    let sxy: f64 = points.iter().map(|p| (p.0 - mx) * (p.1 - my)).sum();
+    let sxx: f64 = points.iter().map(|p| (p.0 - mx).powi(2)).sum();
+    -sxy / sxx
+}
+
+fn total(soil: &dyn Subsystem) -> i64 {
+    let s = Shown::new(soil);
+    let n = s.lattice.size[0] as i32;
+    (0..n).flat_map(|j| (0..n).map(move |i| (i, j))).map(|(i, j)| (s.height(i, j) / UNIT_M) as i64).sum()
+}
+
+#[test]
+fn a_column_collapses_to_a_cone_at_the_angle_of_repose() {
+    let mut soil = soil::<SoilCellularAutomaton>(LUNAR, 65, 0.01, column);
+    let before = total(&*soil);
+    let rest = steps(&mut *soil, 4000);
+    assert_eq!(total(&*soil), before, "material was lost");
+    assert_eq!(read(&*soil, "mass_error_units"), 0.0);
+    let shown = Shown::new(&*soil);
+    let slopes: Vec<f64> =
+        (0..360).map(|k| slope(&shown, f64::from(k).to_radians()).atan().to_degrees()).collect();
+    let mean = slopes.iter().sum::<f64>() / 360.0;
+    let (low, high) = slopes.iter().fold((90.0_f64, 0.0_f64), |(a, b), s| (a.min(*s), b.max(*s)));
+    println!("at rest after {rest} steps, slope {mean:.2}°, {low:.2} … {high:.2}");
+    assert!((mean - 35.0).abs() < 1.0, "{mean}");
+    assert_eq!(read(&*soil, "active_nodes"), 0.0);
+}
+
+#[test]
+fn no_triple_is_more_curved_than_allowed() {
+    let mut soil = soil::<SoilCellularAutomaton>(LUNAR, 65, 0.01, ramp);
+    steps(&mut *soil, 20_000);
+    let s = Shown::new(&*soil);
+    let mut worst: f64 = 0.0;
+    for j in 1..64 {
+        for i in 1..64 {
+            for ([a, b], d2) in [([1, 0], 1e-4), ([0, 1], 1e-4), ([1, 1], 2e-4), ([1, -1], 2e-4)] {
+                let c = s.height(i - a, j - b) - 2.0 * s.height(i, j) + s.height(i + a, j + b);
+                worst = worst.max((c.abs() - 24.0 * UNIT_M) / d2);
+            }
+        }
+    }
+    assert!(worst <= 40.0, "{worst} per m");
+}
+
+#[test]
+fn flat_ground_sleeps_from_the_start() {
+    let mut soil = soil::<SoilCellularAutomaton>(LUNAR, 65, 0.01, support::flat);
+    assert_eq!(steps(&mut *soil, 1), 0);
+}

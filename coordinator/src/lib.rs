@@ -13,6 +13,7 @@ pub mod scenario;
 pub mod signals;
 pub mod terrain;
 pub mod testbed;
+pub mod timing;
 
 pub use error::{Error, Result};
 pub use terraglue_subsystem as subsystem;

@@ -1,4 +1,453 @@
-//! The step loop; the paper's five steps can be read here by name.
+//! The step loop; the paper's five steps can be read here and in [`crate::gluing`] by name.
+//!
+//! Order of a communication step, all subsystems: (1) events and `set`; (2) outputs of t become inputs;
+//! (3) a trial of every subsystem without glue; (4) the group of glued subsystems by its strategy;
+//! (5) commit of all, in the order of their names. Reads see committed values only.
 
-/// A simulation of a whole mission.
-pub struct Testbed {}
+use crate::contact::{ContactDetector, Now};
+use crate::gluing::{self, Exchange, Instant, Outcome, PortReport, StepReport, Strategy};
+use crate::host::{Instance, Progress, Reply};
+use crate::observer::{Happening, Observer, SubsystemView, View};
+use crate::signals::{Directory, Link, TimeLine};
+use crate::timing::{Part, Timings};
+use crate::{Error, Result};
+use serde_json::Value;
+use std::path::PathBuf;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Instant as Clock;
+use terraglue_subsystem::{BodyState, Energy, Input, Motion, Response, Step};
+
+mod build;
+
+/// How often a step may be halved before the run stops.
+const MAX_HALVINGS: u32 = 4;
+
+/// What a run needs beside its scenario.
+#[derive(Clone, Debug, Default)]
+pub struct Options {
+    /// Threads for `parallel_for`; 0: as many as there are cores. Results do not depend on it.
+    pub threads: usize,
+    /// Folders searched for modules before all others.
+    pub module_paths: Vec<PathBuf>,
+    /// Set from outside to stop the run at the next communication point.
+    pub cancel: Arc<AtomicBool>,
+}
+
+/// What the coordinator knows of an instance beside the instance itself.
+#[derive(Debug)]
+struct Member {
+    states: Vec<BodyState>,
+    /// Steps of the testbed per step of this subsystem.
+    step_multiple: u64,
+    glued: bool,
+}
+
+/// Subsystems that share ports, with their strategy.
+struct Group {
+    exchange: Exchange,
+    strategy: Box<dyn Strategy>,
+    /// Keys of the ports that carried a normal force in the last step.
+    closed: Vec<u64>,
+}
+
+/// A simulation of a whole mission. Several live side by side; there are no globals.
+pub struct Testbed {
+    instances: Vec<Instance>,
+    members: Vec<Member>,
+    group: Option<Group>,
+    detector: ContactDetector,
+    links: Vec<Link>,
+    time_line: TimeLine,
+    directory: Directory,
+    happenings: Vec<Happening>,
+    no_glue: StepReport,
+    timings: Timings,
+    gravity: [f64; 3],
+    contact_margin_m: f64,
+    cancel: Arc<AtomicBool>,
+    step_s: f64,
+    /// Nominal steps done.
+    nominal: u64,
+    /// Communication steps done, halves counted.
+    index: u64,
+    t: f64,
+    last_h: f64,
+    halvings: u32,
+}
+
+/// Where a testbed stood; see [`Testbed::snapshot`].
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    slot: u32,
+    nominal: u64,
+    index: u64,
+    t: f64,
+    fired: Vec<bool>,
+    closed: Vec<u64>,
+}
+
+impl Testbed {
+    /// Simulated time, s.
+    pub fn t_s(&self) -> f64 {
+        self.t
+    }
+
+    /// Communication steps done so far.
+    pub fn step_index(&self) -> u64 {
+        self.index
+    }
+
+    /// All variables by full name.
+    pub fn directory(&self) -> &Directory {
+        &self.directory
+    }
+
+    /// All instances in the order of their names.
+    pub fn instances(&self) -> &[Instance] {
+        &self.instances
+    }
+
+    /// How the last step was glued.
+    pub fn report(&self) -> &StepReport {
+        self.group.as_ref().map_or(&self.no_glue, |g| &g.exchange.report)
+    }
+
+    /// Goes to the next nominal communication point t + h.
+    pub fn step(&mut self) -> Result {
+        let end = (self.nominal + 1) as f64 * self.step_s;
+        let mut h = self.step_s;
+        self.halvings = 0;
+        while end - self.t > 1e-6 * self.step_s {
+            let start = Clock::now();
+            self.apply_events()?;
+            self.transfer_signals()?;
+            self.timings.charge(Part::Signals, start);
+            let h_now = h.min(end - self.t);
+            match self.communication_step(h_now, end)? {
+                Outcome::Converged => {
+                    self.index += 1;
+                    self.last_h = h_now;
+                    self.t += h_now;
+                }
+                Outcome::NotConverged(why) if self.halvings == MAX_HALVINGS => return Err(self.gave_up(why)),
+                Outcome::NotConverged(_) => {
+                    self.halvings += 1;
+                    h = 0.5 * h_now;
+                }
+            }
+        }
+        self.nominal += 1;
+        self.t = end;
+        Ok(())
+    }
+
+    /// (1) What the time line has for this communication point.
+    fn apply_events(&mut self) -> Result {
+        while let Some(due) = self.time_line.next_due(self.t, self.step_s, &self.instances) {
+            for (name, value) in &due.set {
+                self.set(name, value)?;
+            }
+            for action in &due.act {
+                self.act(action, "{}")?;
+            }
+        }
+        Ok(())
+    }
+
+    /// (2) Outputs of t become inputs of the step.
+    fn transfer_signals(&mut self) -> Result {
+        self.links.iter_mut().try_for_each(|l| l.transfer(&mut self.instances))
+    }
+
+    /// (3) to (5) for one step of length h; nothing is committed unless it converged.
+    fn communication_step(&mut self, h: f64, end: f64) -> Result<Outcome> {
+        let start = Clock::now();
+        self.advance_unglued(h, end)?;
+        self.timings.charge(Part::Unglued, start);
+        let at = Instant { t: self.t, h, index: self.index, trial: 0, epoch: 0 };
+        if let Some(group) = &mut self.group {
+            // paper, step 1: collision detection and the constraints of rigid contact
+            let start = Clock::now();
+            let now = Now { t: self.t, h, gravity: self.gravity, margin: self.contact_margin_m };
+            let (members, instances) = (&self.members, &mut self.instances);
+            let ports = self.detector.detect(
+                &now,
+                |slot| &members[slot as usize].states,
+                |slot| instances[slot as usize].subsystem(),
+            )?;
+            group.exchange.begin(at, ports);
+            self.timings.charge(Part::Contact, start);
+            group.exchange.set_ports(instances)?;
+            group.measure_gap();
+            // paper, steps 2 to 4: estimate, compatibility, the bodies under the soil's force
+            let outcome = group.strategy.solve(&mut group.exchange, instances)?;
+            if outcome != Outcome::Converged {
+                return Ok(outcome);
+            }
+            // paper, step 5: integrate
+            group.exchange.commit(instances)?;
+            group.describe(ports, self.halvings);
+        }
+        self.commit_unglued(h, end)?;
+        self.read_states()?;
+        Ok(Outcome::Converged)
+    }
+
+    /// (3) A trial of every subsystem without glue.
+    fn advance_unglued(&mut self, h: f64, end: f64) -> Result {
+        for (instance, member) in self.instances.iter_mut().zip(&self.members) {
+            if let Some(step) = member.own_step(self.t, h, end, self.nominal, self.step_s, self.index) {
+                let none = Input::Force { t: &[], hold: gluing::HOLD, motion: None };
+                let mut out = Response {
+                    x: &mut [],
+                    v: &mut [],
+                    a: &mut [],
+                    t: &mut [],
+                    reached: step.t + step.h,
+                    flags: 0,
+                };
+                if let Progress::Early { reached_s } = instance.advance(&step, &none, &mut out)? {
+                    let message =
+                        format!("ended the step early, at t = {reached_s} s; make time.step_s shorter");
+                    return Err(instance.error("advance", message));
+                }
+            }
+        }
+        Ok(())
+    }
+
+    /// (5) for subsystems without glue.
+    fn commit_unglued(&mut self, h: f64, end: f64) -> Result {
+        let still = Motion { x: &[], v: &[] };
+        for (instance, member) in self.instances.iter_mut().zip(&self.members) {
+            if let Some(step) = member.own_step(self.t, h, end, self.nominal, self.step_s, self.index) {
+                instance.commit(&step, &[], &still)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn read_states(&mut self) -> Result {
+        for (instance, member) in self.instances.iter().zip(&mut self.members) {
+            if !member.states.is_empty() {
+                instance.body_states(&mut member.states)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn gave_up(&self, message: String) -> Error {
+        Error::NotConverged {
+            strategy: self.group.as_ref().map_or("none", |g| g.strategy.name()),
+            time_s: self.t,
+            message: format!(
+                "{message}; the step was halved {MAX_HALVINGS} times. Try a smaller time.step_s, another \
+                 gluing.form, or the strategy `cooperative`"
+            ),
+        }
+    }
+
+    /// Steps until `until_s`, an error, or the cancel flag; tells the observers. The observers' `finished` is
+    /// left to the caller, who knows whether the run goes on.
+    pub fn run_until(&mut self, until_s: f64, observers: &mut [&mut dyn Observer]) -> Result {
+        while until_s - self.t > 1e-6 * self.step_s && !self.cancelled() {
+            let stepped = self.step();
+            for happening in self.happenings.drain(..) {
+                for observer in observers.iter_mut() {
+                    observer.happened(&happening)?;
+                }
+            }
+            stepped?;
+            self.view(|view| observers.iter_mut().try_for_each(|o| o.stepped(view)))?;
+        }
+        Ok(())
+    }
+
+    /// Where the time of all steps went.
+    pub fn timings(&self) -> Timings {
+        let mut sum = self.timings.clone();
+        if let Some(group) = &self.group {
+            sum.add(&group.exchange.timings);
+        }
+        sum
+    }
+
+    /// Whether somebody asked to stop.
+    pub fn cancelled(&self) -> bool {
+        self.cancel.load(Ordering::Relaxed)
+    }
+
+    /// Shows the committed state.
+    pub fn view<R>(&self, look: impl FnOnce(&View) -> R) -> R {
+        let subsystems: Vec<SubsystemView> = self
+            .instances
+            .iter()
+            .zip(&self.members)
+            .map(|(instance, member)| SubsystemView {
+                name: instance.name(),
+                module: instance.module(),
+                kind: instance.kind(),
+                scene: instance.scene(),
+                body_states: &member.states,
+                instance: instance.subsystem(),
+            })
+            .collect();
+        look(&View {
+            t_s: self.t,
+            step_index: self.index,
+            h_s: self.last_h,
+            subsystems: &subsystems,
+            gluing: self.report(),
+            energy: self.energy(),
+        })
+    }
+
+    /// Sum over all subsystems.
+    pub fn energy(&self) -> Energy {
+        self.instances.iter().fold(Energy::default(), |sum, i| {
+            let e = i.subsystem().energy();
+            Energy {
+                kinetic: sum.kinetic + e.kinetic,
+                potential: sum.potential + e.potential,
+                dissipated: sum.dissipated + e.dissipated,
+                port_work: sum.port_work + e.port_work,
+                actuator_work: sum.actuator_work + e.actuator_work,
+            }
+        })
+    }
+
+    /// Committed value of a scalar number by full name; `None` where there is no such variable.
+    pub fn read(&self, name: &str) -> Option<f64> {
+        self.directory.find(name)?.number(&self.instances).ok()
+    }
+
+    /// Sets a variable by full name: effective in the next step, logged as an event. Refuses with the reason.
+    pub fn set(&mut self, name: &str, value: &Value) -> Result {
+        let refused = |reason: String| Error::Simulation {
+            time_s: self.t,
+            message: format!("cannot set `{name}` = {value}: {reason}"),
+        };
+        let Some(variable) = self.directory.find(name) else {
+            let hint = self.directory.nearest(name).map(|n| format!("; did you mean `{n}`?"));
+            return Err(refused(format!("there is no such variable{}", hint.unwrap_or_default())));
+        };
+        let was = variable.number(&self.instances).map(|x| format!(" (was {x})")).unwrap_or_default();
+        if let Reply::Refused(reason) = variable.set(&mut self.instances, self.index > 0, value)? {
+            return Err(refused(reason));
+        }
+        self.happenings.push(Happening { t_s: self.t, what: format!("set {name} = {value}{was}") });
+        Ok(())
+    }
+
+    /// Calls an action `subsystem.action`; logged as an event.
+    pub fn act(&mut self, action: &str, arguments: &str) -> Result {
+        let (subsystem, name) = action.split_once('.').unwrap_or((action, ""));
+        let time_s = self.t;
+        let Some(instance) = self.instances.iter_mut().find(|i| i.name() == subsystem) else {
+            let message = format!("action `{action}`: there is no subsystem `{subsystem}`");
+            return Err(Error::Simulation { time_s, message });
+        };
+        if let Reply::Refused(reason) = instance.act(name, arguments)? {
+            return Err(instance.error("act", format!("`{action}` was refused: {reason}")));
+        }
+        self.happenings.push(Happening { t_s: self.t, what: format!("act {action}") });
+        Ok(())
+    }
+
+    /// Keeps the committed state of everything under a number.
+    pub fn snapshot(&mut self, slot: u32) -> Result<Snapshot> {
+        self.instances.iter_mut().try_for_each(|i| i.save_state(slot))?;
+        Ok(Snapshot {
+            slot,
+            nominal: self.nominal,
+            index: self.index,
+            t: self.t,
+            fired: self.time_line.fired(),
+            closed: self.group.as_ref().map(|g| g.closed.clone()).unwrap_or_default(),
+        })
+    }
+
+    /// Back to a snapshot, exactly.
+    pub fn restore(&mut self, snapshot: &Snapshot) -> Result {
+        self.instances.iter_mut().try_for_each(|i| i.restore_state(snapshot.slot))?;
+        (self.nominal, self.index, self.t) = (snapshot.nominal, snapshot.index, snapshot.t);
+        self.time_line.set_fired(&snapshot.fired);
+        if let Some(group) = &mut self.group {
+            group.closed.clone_from(&snapshot.closed);
+        }
+        self.read_states()
+    }
+}
+
+impl Member {
+    /// The step that this subsystem makes by itself now, if any: one of `step_multiple` nominal steps is made
+    /// when its last part is reached, so its outputs never run ahead.
+    fn own_step(
+        &self,
+        t: f64,
+        h: f64,
+        end: f64,
+        nominal: u64,
+        step_s: f64,
+        index: u64,
+    ) -> Option<Step<'static>> {
+        if self.glued {
+            return None;
+        }
+        if self.step_multiple == 1 {
+            return Some(Step::free(t, h, index));
+        }
+        let at_end = end - (t + h) <= 1e-6 * step_s;
+        let whole = (nominal + 1).is_multiple_of(self.step_multiple);
+        let length = self.step_multiple as f64 * step_s;
+        (at_end && whole).then(|| Step::free(end - length, length, (nominal + 1) / self.step_multiple - 1))
+    }
+}
+
+impl Group {
+    /// The gap that the last commit left, told by the soil itself in its answer to `set_ports`.
+    fn measure_gap(&mut self) {
+        let exchange = &mut self.exchange;
+        for port in &exchange.ports {
+            if self.closed.binary_search(&port.key).is_ok() {
+                let gap = exchange.x2[port.first as usize].abs();
+                exchange.report.max_gap_m = exchange.report.max_gap_m.max(gap);
+            }
+        }
+    }
+
+    /// Fills the report's ports after commit.
+    fn describe(&mut self, found: &crate::contact::PortSet, halvings: u32) {
+        let exchange = &mut self.exchange;
+        exchange.report.halvings = halvings;
+        self.closed.clear();
+        let mut work = 0.0;
+        for (port, owner) in exchange.ports.iter().zip(&found.owners) {
+            let n = port.first as usize;
+            let mut wrench = [0.0; 6];
+            for (i, c) in port.components() {
+                wrench[c] = exchange.t[i];
+                work += exchange.t[i] * (exchange.x1[i] - exchange.x2[i]);
+            }
+            if wrench[0] > 0.0 {
+                self.closed.push(port.key);
+            }
+            let t_star_n = exchange.estimate.t_star[n];
+            let report = &mut exchange.report;
+            report.estimate_gap_n = report.estimate_gap_n.max((t_star_n - wrench[0]).abs());
+            report.ports.push(PortReport {
+                key: port.key,
+                subsystem: owner.subsystem,
+                body: owner.body,
+                shape: owner.shape,
+                origin: port.origin,
+                frame: port.frame,
+                wrench,
+                t_star_n,
+                gap_m: exchange.x1[n] - exchange.x2[n],
+            });
+        }
+        exchange.report.interface_work_error_j = work.abs();
+    }
+}

@@ -61,3 +61,12 @@ pub struct PortReport {
     /// Signed gap x1 − x2 along n after commit, m; > 0 apart.
     pub gap_m: f64,
 }
+
+impl StepReport {
+    /// Back to zero; the storage for ports stays.
+    pub fn clear(&mut self) {
+        let mut ports = std::mem::take(&mut self.ports);
+        ports.clear();
+        *self = Self { ports, ..Self::default() };
+    }
+}

@@ -1,1 +1,11 @@
-//! Filled in below.
+//! What flows between subsystems besides glue: connections between variables, and the time line of events that
+//! set variables or call actions. Faults are events.
+
+mod access;
+mod connection;
+mod event;
+pub mod pattern;
+
+pub use access::{Directory, VariableRef};
+pub use connection::{Link, connect};
+pub use event::{Due, TimeLine};

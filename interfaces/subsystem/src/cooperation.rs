@@ -22,7 +22,11 @@ pub fn plain_pass(
     let first = port.first as usize;
     let f_n = law_wrench[first].min(port.law.t_max).max(0.0);
     let t_n = t_star[first].min(f_n).max(0.0);
-    let scale = if f_n > 0.0 { t_n / f_n } else { 0.0 };
+    if t_n == 0.0 {
+        t1[port.range()].fill(0.0);
+        return;
+    }
+    let scale = t_n / f_n;
     let bound = (shear_strength * scale).min(mu * t_n);
     let wanted = tangential_norm(port, t_star);
     let share = if wanted > bound { bound / wanted } else { 1.0 };

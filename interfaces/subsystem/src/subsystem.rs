@@ -32,7 +32,11 @@ pub trait Subsystem: Send {
     /// Paper, step 1. The ports of this step (grounds are asked first). Answers with the committed X, V and,
     /// for a soil, t = the wrench of its law at that X. A ground may narrow `laws` (mu = tan φ, t_max), one
     /// per port; a ground's `x` along n is its own continuous surface x2 below the body, from its unrounded state.
-    fn set_ports(&mut self, _step: &Step, _laws: &mut [Law], _now: &mut Response) -> Result {
+    /// The default suits a body: its origin lies on itself, and it has no force of its own.
+    fn set_ports(&mut self, _step: &Step, _laws: &mut [Law], now: &mut Response) -> Result {
+        for values in [&mut *now.x, &mut *now.v, &mut *now.a, &mut *now.t] {
+            values.fill(0.0);
+        }
         Ok(())
     }
 

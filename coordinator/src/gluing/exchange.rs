@@ -1,0 +1,351 @@
+//! The group's side of the exchange: packed vectors over all ports and the paper's calls on all members.
+
+use super::estimate::RigidContact;
+use super::report::StepReport;
+use super::side::{Answer, Instant, Side};
+use crate::Result;
+use crate::contact::PortSet;
+use crate::host::Instance;
+use crate::timing::{Part, Timings};
+use std::time::Instant as Clock;
+use terraglue_subsystem::{Capabilities, Node, Port, cooperation};
+
+/// T*, x_free and G1 over the group's ports.
+#[derive(Debug, Default)]
+pub struct GroupEstimate {
+    /// Rigid-contact wrench, packed.
+    pub t_star: Vec<f64>,
+    /// End-of-step displacement without contact wrenches, packed.
+    pub x_free: Vec<f64>,
+    /// dX1/dT, column-major n × n.
+    pub g: Vec<f64>,
+    /// Per port.
+    pub active: Vec<u8>,
+    /// Whether T* is the only solution.
+    pub unique: bool,
+}
+
+/// Subsystems glued to each other, with everything that one step passes between them.
+#[derive(Debug, Default)]
+pub struct Exchange {
+    /// Time and trial.
+    pub at: Instant,
+    /// All ports of the group in ascending order of key.
+    pub ports: Vec<Port>,
+    nodes: Vec<Node>,
+    bodies: Vec<Side>,
+    grounds: Vec<Side>,
+    /// The estimate of step 2.
+    pub estimate: GroupEstimate,
+    /// Surface of the grounds (answer to step 1 and to every trial), packed.
+    pub x2: Vec<f64>,
+    /// Force of the grounds' laws at the committed state, packed.
+    pub f_law: Vec<f64>,
+    /// The wrench on the bodies; after a strategy the one to commit.
+    pub t: Vec<f64>,
+    /// Wrench of the soil's law at the last trial.
+    pub f: Vec<f64>,
+    /// End-of-step displacement of the bodies at the last trial.
+    pub x1: Vec<f64>,
+    /// Velocity of the bodies at the last trial.
+    pub v1: Vec<f64>,
+    zeros: Vec<f64>,
+    rigid: RigidContact,
+    /// Where the time went.
+    pub timings: Timings,
+    /// What happened.
+    pub report: StepReport,
+    /// Weight of the glued bodies, N (1 N without gravity): scale of the tolerance.
+    pub t_ref: f64,
+}
+
+impl Exchange {
+    /// A group of bodies and grounds, given by their instance indices.
+    pub fn new(bodies: &[usize], grounds: &[usize], t_ref: f64) -> Self {
+        Self {
+            bodies: bodies.iter().map(|s| Side::new(*s, 1)).collect(),
+            grounds: grounds.iter().map(|s| Side::new(*s, -1)).collect(),
+            t_ref,
+            ..Self::default()
+        }
+    }
+
+    /// Number of components.
+    pub fn n(&self) -> usize {
+        self.t.len()
+    }
+
+    /// Instances of the group, bodies first.
+    pub fn members(&self) -> impl Iterator<Item = usize> + '_ {
+        self.bodies.iter().chain(&self.grounds).map(|s| s.slot)
+    }
+
+    /// Instances on the side of the grounds.
+    pub fn ground_slots(&self) -> impl Iterator<Item = usize> + '_ {
+        self.grounds.iter().map(|s| s.slot)
+    }
+
+    /// Instances on the side of the bodies.
+    pub fn body_slots(&self) -> impl Iterator<Item = usize> + '_ {
+        self.bodies.iter().map(|s| s.slot)
+    }
+
+    /// Takes over the ports that contact detection found.
+    pub fn begin(&mut self, at: Instant, found: &PortSet) {
+        self.at = Instant { epoch: found.epoch, ..at };
+        self.ports.clear();
+        self.ports.extend_from_slice(&found.ports);
+        self.nodes.clear();
+        self.nodes.extend_from_slice(&found.nodes);
+        let n = self.ports.iter().map(Port::len).sum();
+        let owners = &found.owners;
+        for side in &mut self.bodies {
+            let slot = side.slot as u32;
+            side.take_ports(&self.ports, |p| (owners[p].subsystem == slot).then_some(owners[p].body));
+        }
+        for side in &mut self.grounds {
+            let slot = side.slot as u32;
+            side.take_ports(&self.ports, |p| (owners[p].ground == slot).then_some(0));
+        }
+        let e = &mut self.estimate;
+        for buffer in [
+            &mut e.t_star,
+            &mut e.x_free,
+            &mut self.x2,
+            &mut self.f_law,
+            &mut self.t,
+            &mut self.f,
+            &mut self.x1,
+            &mut self.v1,
+            &mut self.zeros,
+        ] {
+            buffer.clear();
+            buffer.resize(n, 0.0);
+        }
+        e.g.clear();
+        e.g.resize(n * n, 0.0);
+        e.active.clear();
+        e.active.resize(self.ports.len(), 0);
+        e.unique = true;
+        self.report.clear();
+    }
+
+    /// Paper, step 1: the constraints of rigid contact. Grounds answer first and narrow the laws.
+    pub fn set_ports(&mut self, instances: &mut [Instance]) -> Result {
+        let start = Clock::now();
+        for side in &mut self.grounds {
+            let (x, f) = (Some(self.x2.as_mut_slice()), Some(self.f_law.as_mut_slice()));
+            side.set_ports(&mut instances[side.slot], &self.nodes, &self.at, &mut self.ports, x, f)?;
+        }
+        for side in &mut self.bodies {
+            side.set_ports(&mut instances[side.slot], &self.nodes, &self.at, &mut self.ports, None, None)?;
+        }
+        self.timings.charge(Part::Ports, start);
+        Ok(())
+    }
+
+    /// Paper, step 2: solve for T*, do not animate.
+    pub fn estimate_forces(&mut self, instances: &mut [Instance]) -> Result {
+        let start = Clock::now();
+        for k in 0..self.bodies.len() {
+            let slot = self.bodies[k].slot;
+            if instances[slot].capabilities().has(Capabilities::ESTIMATE) {
+                let partner = (self.x2.as_slice(), self.zeros.as_slice());
+                let (side, out) = (&mut self.bodies[k], &mut self.estimate);
+                side.estimate(&mut instances[slot], &self.nodes, &self.at, partner, out)?;
+            } else {
+                self.estimate_from_trials(k, instances)?;
+            }
+        }
+        self.timings.charge(Part::Estimate, start);
+        Ok(())
+    }
+
+    /// The default estimate for bodies that only know `advance`: free motion, Jacobian, rigid contact.
+    fn estimate_from_trials(&mut self, k: usize, instances: &mut [Instance]) -> Result {
+        let instance = &mut instances[self.bodies[k].slot];
+        let side = &mut self.bodies[k];
+        let out = Answer { x: Some(&mut self.estimate.x_free), ..Answer::default() };
+        side.advance_under_force(instance, &self.nodes, &self.at, &self.zeros, None, out)?;
+        if !side.jacobian(instance, &self.nodes, &self.at, &mut self.estimate.g)? {
+            self.difference_bodies(k, instances)?;
+        }
+        self.rigid.solve(&self.ports, &self.x2, &mut self.estimate);
+        Ok(())
+    }
+
+    /// G1 by finite differences of `advance`; exact for bodies that are linear within the step.
+    fn difference_bodies(&mut self, k: usize, instances: &mut [Instance]) -> Result {
+        let n = self.n();
+        let side = &mut self.bodies[k];
+        for column in 0..n {
+            let delta = 1e-6 * self.t_ref.max(1.0);
+            self.f.fill(0.0);
+            self.f[column] = delta;
+            self.x1.copy_from_slice(&self.estimate.x_free);
+            let out = Answer { x: Some(&mut self.x1), ..Answer::default() };
+            side.advance_under_force(&mut instances[side.slot], &self.nodes, &self.at, &self.f, None, out)?;
+            self.report.evaluations_jacobian += 1;
+            for row in 0..n {
+                self.estimate.g[column * n + row] = (self.x1[row] - self.estimate.x_free[row]) / delta;
+            }
+        }
+        Ok(())
+    }
+
+    /// Paper, step 3: the soil solves with the estimate. T1 goes to `t`, its surface to `x2`.
+    pub fn solve_compatibility(&mut self, instances: &mut [Instance]) -> Result {
+        let start = Clock::now();
+        for port in &self.ports {
+            let (t_star, mu) = (&self.estimate.t_star, port.law.mu);
+            cooperation::plain_pass(port, t_star, &self.f_law, f64::INFINITY, mu, &mut self.t);
+        }
+        for side in &mut self.grounds {
+            let instance = &mut instances[side.slot];
+            let (t, x2) = (&mut self.t, &mut self.x2);
+            if side.solve_compatibility(instance, &self.nodes, &self.at, &self.estimate, t, x2)? {
+                self.report.evaluations_soil += 1;
+            }
+        }
+        self.timings.charge(Part::Grounds, start);
+        Ok(())
+    }
+
+    /// Paper, step 4: the bodies re-solved without the contact constraints, under T as external force.
+    pub fn advance_bodies(&mut self, instances: &mut [Instance]) -> Result {
+        let start = Clock::now();
+        self.at.trial += 1;
+        for side in &mut self.bodies {
+            let out = Answer { x: Some(&mut self.x1), v: Some(&mut self.v1), t: None };
+            side.advance_under_force(&mut instances[side.slot], &self.nodes, &self.at, &self.t, None, out)?;
+        }
+        self.report.evaluations_bodies += 1;
+        self.timings.charge(Part::Bodies, start);
+        Ok(())
+    }
+
+    /// A trial of the grounds under the motion X1: the wrench of their law goes to `f`.
+    pub fn advance_grounds_under_motion(&mut self, instances: &mut [Instance]) -> Result {
+        let start = Clock::now();
+        let partner = (self.x1.as_slice(), self.v1.as_slice());
+        for side in &mut self.grounds {
+            let out = Answer { t: Some(&mut self.f), ..Answer::default() };
+            side.advance_under_motion(&mut instances[side.slot], &self.nodes, &self.at, partner, out)?;
+        }
+        self.report.evaluations_soil += 1;
+        self.timings.charge(Part::Grounds, start);
+        Ok(())
+    }
+
+    /// A trial of the grounds under the normal forces in `t` and the motion X1: their surface goes to `x2`,
+    /// the wrench of their law to `f`.
+    pub fn advance_grounds_under_force(&mut self, instances: &mut [Instance]) -> Result {
+        let start = Clock::now();
+        let partner = (self.x1.as_slice(), self.v1.as_slice());
+        for side in &mut self.grounds {
+            let out = Answer { x: Some(&mut self.x2), v: None, t: Some(&mut self.f) };
+            let instance = &mut instances[side.slot];
+            side.advance_under_force(instance, &self.nodes, &self.at, &self.t, Some(partner), out)?;
+        }
+        self.report.evaluations_soil += 1;
+        self.timings.charge(Part::Grounds, start);
+        Ok(())
+    }
+
+    /// The grounds' Jacobian at their last trial into `out` (n × n, column-major); by finite differences where
+    /// a module has none.
+    pub fn ground_jacobian(&mut self, instances: &mut [Instance], xt: bool, out: &mut Vec<f64>) -> Result {
+        let start = Clock::now();
+        let n = self.n();
+        out.clear();
+        out.resize(n * n, 0.0);
+        for k in 0..self.grounds.len() {
+            let side = &mut self.grounds[k];
+            let slot = side.slot;
+            if !side.jacobian(&mut instances[slot], &self.nodes, &self.at, out)? {
+                if xt {
+                    self.difference_motion(instances, out)?
+                } else {
+                    self.difference_force(instances, out)?
+                }
+                break;
+            }
+        }
+        self.report.jacobian_refreshes += 1;
+        self.timings.charge(Part::Jacobian, start);
+        Ok(())
+    }
+
+    /// K = −dF/dX1 by forward differences of 1 nm towards the soil, one component of all ports at a time.
+    fn difference_motion(&mut self, instances: &mut [Instance], out: &mut [f64]) -> Result {
+        let n = self.n();
+        let delta = -1e-9;
+        self.zeros.copy_from_slice(&self.f);
+        for column in 0..n {
+            self.x1[column] += delta;
+            self.advance_grounds_under_motion(instances)?;
+            self.x1[column] -= delta;
+            self.count_difference();
+            for row in 0..n {
+                out[column * n + row] = -(self.f[row] - self.zeros[row]) / delta;
+            }
+        }
+        self.f.copy_from_slice(&self.zeros);
+        self.zeros.fill(0.0);
+        Ok(())
+    }
+
+    /// The mixed Jacobian after force: normal columns by ΔT, the others by ΔX.
+    fn difference_force(&mut self, instances: &mut [Instance], out: &mut [f64]) -> Result {
+        let n = self.n();
+        let (f, x2) = (self.f.clone(), self.x2.clone());
+        for p in 0..self.ports.len() {
+            for (column, c) in self.ports[p].components() {
+                let delta = if c == 0 { 1e-6 * self.t[column].abs().max(1.0) } else { -1e-9 };
+                let target = if c == 0 { &mut self.t[column] } else { &mut self.x1[column] };
+                let kept = *target;
+                *target += delta;
+                self.advance_grounds_under_force(instances)?;
+                if c == 0 {
+                    self.t[column] = kept
+                } else {
+                    self.x1[column] = kept
+                }
+                self.count_difference();
+                for (row, r) in self.ports[p].components() {
+                    out[column * n + row] = match (r, c) {
+                        (0, 0) => -(self.x2[row] - x2[row]) / delta,
+                        (0, _) => 0.0,
+                        (_, 0) => (self.f[row] - f[row]) / delta,
+                        _ => -(self.f[row] - f[row]) / delta,
+                    };
+                }
+            }
+        }
+        self.f.copy_from_slice(&f);
+        self.x2.copy_from_slice(&x2);
+        Ok(())
+    }
+
+    fn count_difference(&mut self) {
+        self.report.evaluations_soil -= 1;
+        self.report.evaluations_jacobian += 1;
+    }
+
+    /// Paper, step 5: every member takes its last trial as the state at t + h.
+    pub fn commit(&mut self, instances: &mut [Instance]) -> Result {
+        let start = Clock::now();
+        for side in &mut self.bodies {
+            let partner = (self.x2.as_slice(), self.zeros.as_slice());
+            side.commit(&mut instances[side.slot], &self.nodes, &self.at, &self.t, partner)?;
+        }
+        self.timings.charge(Part::CommitBodies, start);
+        let start = Clock::now();
+        for side in &mut self.grounds {
+            let partner = (self.x1.as_slice(), self.v1.as_slice());
+            side.commit(&mut instances[side.slot], &self.nodes, &self.at, &self.t, partner)?;
+        }
+        self.timings.charge(Part::CommitGrounds, start);
+        Ok(())
+    }
+}

@@ -1,0 +1,161 @@
+//! The generic iterative T-T strategy (Tseng and Hulbert 2001; Wang, Ma and Hulbert 2003), full Newton.
+//!
+//! Every trial starts from the committed state. Two forms of one iteration, at position level with an
+//! end-of-step hold:
+//! - [`tt`]: wrenches in, motions out on both sides; T ← T − Λ·e with e = x1 − x2 along the normals, where
+//!   Λ = (G1 + G2)⁻¹ is full and unilateral contact is an active set on the linearised problem;
+//! - [`xt`]: the soil takes the motion and answers the wrench; r = T − F(X1(T)), J = I + K·G1.
+//!
+//! `auto` takes X-T where κ = λmax(K·G1) ≤ 0.3 or where the soil takes motion only, T-T otherwise, and the other
+//! one on failure. The start is the co-operational answer min(T*, F), never the T of the step before, which
+//! lands on the wrong side of the unloading kink by rounding.
+
+mod tt;
+mod xt;
+
+use super::exchange::Exchange;
+use super::{Outcome, Strategy, linear};
+use crate::Result;
+use crate::host::Instance;
+use crate::scenario::GluingSpec;
+use terraglue_subsystem::Capabilities;
+
+/// Name in the scenario.
+pub const NAME: &str = "iterative";
+
+/// Largest κ at which `auto` prefers the X-T form.
+const KAPPA_XT: f64 = 0.3;
+
+/// Which of the two forms runs.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Form {
+    Tt,
+    Xt,
+}
+
+/// What both forms iterate with.
+#[derive(Clone, Copy, Debug)]
+struct Limits {
+    /// τ of the stopping rule.
+    tolerance: f64,
+    max_iterations: u32,
+}
+
+impl Limits {
+    /// τ·max(T_ref, |T|∞), N.
+    fn threshold(&self, exchange: &Exchange) -> f64 {
+        self.tolerance * exchange.t_ref.max(linear::max_norm(&exchange.t))
+    }
+}
+
+/// The strategy with its buffers.
+#[derive(Debug)]
+pub struct Iterative {
+    form: Option<Form>,
+    from_estimate: bool,
+    limits: Limits,
+    tt: tt::TtForm,
+    xt: xt::XtForm,
+    start: Vec<f64>,
+    kappa: f64,
+}
+
+impl Iterative {
+    /// From the scenario's `[gluing]`.
+    pub fn new(spec: &GluingSpec) -> Self {
+        let form = match spec.form.as_str() {
+            "tt" => Some(Form::Tt),
+            "xt" => Some(Form::Xt),
+            _ => None,
+        };
+        Self {
+            form,
+            from_estimate: spec.start != "zero",
+            limits: Limits { tolerance: spec.tolerance, max_iterations: spec.max_iterations },
+            tt: tt::TtForm::default(),
+            xt: xt::XtForm::default(),
+            start: Vec::new(),
+            kappa: 0.0,
+        }
+    }
+
+    fn preferred(&self, exchange: &Exchange, instances: &[Instance]) -> Form {
+        let takes = |c| exchange.ground_slots().all(|s| instances[s].capabilities().has(c));
+        match self.form {
+            Some(form) => form,
+            None if !takes(Capabilities::FORCE) => Form::Xt,
+            None if !takes(Capabilities::MOTION) || self.kappa > KAPPA_XT => Form::Tt,
+            None => Form::Xt,
+        }
+    }
+
+    fn run(&mut self, form: Form, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
+        exchange.t.copy_from_slice(&self.start);
+        exchange.report.xt_form = form == Form::Xt;
+        let outcome = match form {
+            Form::Tt => self.tt.solve(&self.limits, exchange, instances)?,
+            Form::Xt => self.xt.solve(&self.limits, exchange, instances)?,
+        };
+        self.kappa = exchange.report.kappa_max;
+        Ok(outcome)
+    }
+}
+
+impl Strategy for Iterative {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn needs(&self) -> (Capabilities, Capabilities) {
+        let ground = match self.form {
+            Some(Form::Tt) => Capabilities::FORCE,
+            Some(Form::Xt) => Capabilities::MOTION,
+            None => Capabilities::default(),
+        };
+        (Capabilities::FORCE | Capabilities::RETRY, ground | Capabilities::RETRY)
+    }
+
+    fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
+        exchange.estimate_forces(instances)?;
+        if self.from_estimate {
+            exchange.solve_compatibility(instances)?;
+            exchange.report.evaluations_soil = 0; // the start is not an evaluation of the iteration
+        } else {
+            exchange.t.fill(0.0);
+        }
+        self.start.clear();
+        self.start.extend_from_slice(&exchange.t);
+        let first = self.preferred(exchange, instances);
+        let outcome = self.run(first, exchange, instances)?;
+        if outcome == Outcome::Converged || self.form.is_some() {
+            return Ok(outcome);
+        }
+        let other = if first == Form::Tt { Form::Xt } else { Form::Tt };
+        let needed = if other == Form::Tt { Capabilities::FORCE } else { Capabilities::MOTION };
+        if exchange.ground_slots().any(|s| !instances[s].capabilities().has(needed)) {
+            return Ok(outcome);
+        }
+        self.run(other, exchange, instances)
+    }
+}
+
+/// Power iteration (three products) for λmax of K·G on the start vector of ones; an estimate for the report.
+fn largest_eigenvalue(k: &[f64], g: &[f64], x: &mut Vec<f64>, y: &mut Vec<f64>, n: usize) -> f64 {
+    x.clear();
+    x.resize(n, 1.0);
+    let mut value = 0.0;
+    for _ in 0..3 {
+        let norm = linear::max_norm(x);
+        if norm == 0.0 {
+            return 0.0;
+        }
+        x.iter_mut().for_each(|v| *v /= norm);
+        y.clear();
+        y.resize(n, 0.0);
+        linear::multiply_add(g, x, y);
+        x.fill(0.0);
+        linear::multiply_add(k, y, x);
+        value = linear::max_norm(x);
+    }
+    value
+}

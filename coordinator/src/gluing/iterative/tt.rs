@@ -1,0 +1,207 @@
+//! The T-T form: both sides take the normal force and answer their motion.
+//!
+//! Normal rows: e = x1 − x2, complementary to t_min ≤ T_n ≤ t_max. Tangential and moment rows: the soil's law at
+//! the bodies' motion, r = T_t − F_t(X1, T_n). The linearised problem is solved to the end by an active set; the
+//! step along it is accepted when the energy still falls, else shortened by a bracketed secant (Illinois).
+
+use super::super::Outcome;
+use super::super::complementarity::{BoundedProblem, BoundedSolver};
+use super::super::exchange::Exchange;
+use super::super::linear::max_norm;
+use super::{Limits, largest_eigenvalue};
+use crate::Result;
+use crate::host::Instance;
+use terraglue_subsystem::Port;
+
+/// Trials of one line search.
+const MAX_TRIALS: u32 = 12;
+
+/// Buffers.
+#[derive(Debug, Default)]
+pub struct TtForm {
+    /// The soils' mixed Jacobian: compliance in the normal columns, stiffness in the others.
+    mixed: Vec<f64>,
+    /// Λ⁻¹ for all rows, row-major.
+    matrix: Vec<f64>,
+    /// Stiffness of the soil alone, for κ.
+    k: Vec<f64>,
+    e: Vec<f64>,
+    d: Vec<f64>,
+    base: Vec<f64>,
+    work: Vec<f64>,
+    lower: Vec<f64>,
+    upper: Vec<f64>,
+    solver: BoundedSolver,
+}
+
+impl TtForm {
+    /// Iterates from `exchange.t`.
+    pub fn solve(
+        &mut self,
+        limits: &Limits,
+        exchange: &mut Exchange,
+        instances: &mut [Instance],
+    ) -> Result<Outcome> {
+        self.bounds(&exchange.ports);
+        self.evaluate(exchange, instances)?;
+        let mut size = f64::INFINITY;
+        for _ in 0..=limits.max_iterations {
+            let solved = self.newton_step(exchange, instances)?;
+            size = max_norm(&self.d);
+            if size <= limits.threshold(exchange) {
+                return Ok(self.converged(exchange, size));
+            }
+            if !solved {
+                break;
+            }
+            self.step(exchange, instances)?;
+        }
+        exchange.report.residual = size / exchange.t_ref;
+        Ok(Outcome::NotConverged(format!(
+            "T-T form: |Λ·e| = {size:.3e} N after {} iterations, tolerance {:.3e} N",
+            limits.max_iterations,
+            limits.threshold(exchange)
+        )))
+    }
+
+    fn bounds(&mut self, ports: &[Port]) {
+        self.lower.clear();
+        self.upper.clear();
+        for port in ports {
+            for (_, c) in port.components() {
+                let (lower, upper) = if c == 0 {
+                    (port.law.t_min, port.law.t_max)
+                } else {
+                    (f64::NEG_INFINITY, f64::INFINITY)
+                };
+                self.lower.push(lower);
+                self.upper.push(upper);
+            }
+        }
+    }
+
+    /// One evaluation of both sides and the residual of every row.
+    fn evaluate(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result {
+        exchange.advance_bodies(instances)?;
+        exchange.advance_grounds_under_force(instances)?;
+        self.e.clear();
+        for port in &exchange.ports {
+            let compliance = port.law.compliance;
+            for (i, c) in port.components() {
+                self.e.push(match c {
+                    0 => exchange.x1[i] - exchange.x2[i] + compliance * exchange.t[i],
+                    _ => exchange.t[i] - exchange.f[i],
+                });
+            }
+        }
+        Ok(())
+    }
+
+    /// The solution of the linearised problem at the last trial; `false` if none was found.
+    fn newton_step(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<bool> {
+        let n = exchange.n();
+        exchange.ground_jacobian(instances, false, &mut self.mixed)?;
+        self.assemble(exchange);
+        let matrix = &self.matrix;
+        let problem = BoundedProblem {
+            a: |r: usize, c: usize| matrix[r * n + c],
+            e: &self.e,
+            t: &exchange.t,
+            lower: &self.lower,
+            upper: &self.upper,
+        };
+        self.d.clear();
+        self.d.resize(n, 0.0);
+        let solved = self.solver.solve(&problem, &mut self.d);
+        exchange.report.rank = (self.solver.rank() as u32, n as u32);
+        let kappa = largest_eigenvalue(&self.k, &exchange.estimate.g, &mut self.base, &mut self.work, n);
+        exchange.report.kappa_max = exchange.report.kappa_max.max(kappa);
+        Ok(solved)
+    }
+
+    /// d(e)/dT: normal rows G1 + G2 + compliance; the others I + K·G1 with the soil's own coupling to T_n.
+    fn assemble(&mut self, exchange: &Exchange) {
+        let n = exchange.n();
+        let g = &exchange.estimate.g;
+        self.matrix.clear();
+        self.matrix.resize(n * n, 0.0);
+        self.k.clear();
+        self.k.resize(n * n, 0.0);
+        for port in &exchange.ports {
+            for (row, r) in port.components() {
+                let out = &mut self.matrix[row * n..][..n];
+                out[row] += if r == 0 { port.law.compliance } else { 1.0 };
+                if r == 0 {
+                    (0..n).for_each(|column| out[column] += g[column * n + row]);
+                }
+                for (other, c) in port.components() {
+                    let entry = self.mixed[other * n + row];
+                    match (r, c) {
+                        (0, 0) => {
+                            out[other] += entry;
+                            self.k[row * n + row] = if entry > 0.0 { 1.0 / entry } else { 0.0 };
+                        }
+                        (0, _) => {}
+                        (_, 0) => out[other] -= entry,
+                        _ => {
+                            (0..n).for_each(|column| out[column] += entry * g[column * n + other]);
+                            self.k[other * n + row] = entry;
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    /// Takes the step d: whole when the energy still falls at its end, else the first share s with
+    /// |g(s)| ≤ ½|g(0)|, g(s) = dᵀ·e(T + s·d) over the normal rows.
+    fn step(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result {
+        self.base.clear();
+        self.base.extend_from_slice(&exchange.t);
+        let start = self.slope(exchange);
+        let (mut low, mut g_low, mut high, mut g_high) = (0.0, start, 1.0, 0.0);
+        let mut share = 1.0;
+        for trial in 0..MAX_TRIALS {
+            for ((t, base), d) in exchange.t.iter_mut().zip(&self.base).zip(&self.d) {
+                *t = base + share * d;
+            }
+            self.evaluate(exchange, instances)?;
+            exchange.report.evaluations_line_search += u32::from(trial > 0);
+            let g = self.slope(exchange);
+            if start >= 0.0 || (trial == 0 && g <= 0.0) || g.abs() <= 0.5 * start.abs() {
+                return Ok(());
+            }
+            if g > 0.0 {
+                (high, g_high) = (share, g);
+                g_low *= if trial > 0 { 0.5 } else { 1.0 };
+            } else {
+                (low, g_low) = (share, g);
+                g_high *= 0.5;
+            }
+            share = (low * g_high - high * g_low) / (g_high - g_low);
+            if !(share > low.min(high) && share < low.max(high)) {
+                share = 0.5 * (low + high);
+            }
+        }
+        Ok(())
+    }
+
+    fn slope(&self, exchange: &Exchange) -> f64 {
+        exchange.ports.iter().map(|p| self.d[p.first as usize] * self.e[p.first as usize]).sum()
+    }
+
+    fn converged(&self, exchange: &mut Exchange, size: f64) -> Outcome {
+        let report = &mut exchange.report;
+        report.residual = size / exchange.t_ref;
+        for port in &exchange.ports {
+            let i = port.first as usize;
+            if exchange.t[i] > 0.0 {
+                report.max_gap_m = report.max_gap_m.max(self.e[i].abs());
+            }
+            let complementarity = exchange.t[i].min(self.e[i] / self.matrix[i * exchange.t.len() + i]).abs();
+            report.complementarity_n = report.complementarity_n.max(complementarity);
+        }
+        report.converged = true;
+        Outcome::Converged
+    }
+}

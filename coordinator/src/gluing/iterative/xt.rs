@@ -1,0 +1,118 @@
+//! The X-T form: the soil takes the motion of the bodies and answers the wrench of its law.
+//!
+//! r(T) = T − F(X1(T)), Newton with J = I + K·G1, K = −dF/dX1 of the soil at the last trial. Unilateral and
+//! yielding laws are inside F, so no active set is needed. At the kink of unloading the step is halved until
+//! |r| falls.
+
+use super::super::Outcome;
+use super::super::exchange::Exchange;
+use super::super::linear::{Lu, max_norm};
+use super::{Limits, largest_eigenvalue};
+use crate::Result;
+use crate::host::Instance;
+
+/// Halvings of one Newton step before it is taken as it is.
+const MAX_HALVINGS: u32 = 8;
+
+/// Buffers.
+#[derive(Debug, Default)]
+pub struct XtForm {
+    k: Vec<f64>,
+    kg: Vec<f64>,
+    residual: Vec<f64>,
+    d: Vec<f64>,
+    base: Vec<f64>,
+    work: Vec<f64>,
+    lu: Lu,
+}
+
+impl XtForm {
+    /// Iterates from `exchange.t`.
+    pub fn solve(
+        &mut self,
+        limits: &Limits,
+        exchange: &mut Exchange,
+        instances: &mut [Instance],
+    ) -> Result<Outcome> {
+        let mut norm = self.evaluate(exchange, instances)?;
+        for _ in 0..limits.max_iterations {
+            if norm <= limits.threshold(exchange) {
+                return Ok(self.converged(exchange, norm));
+            }
+            self.newton_step(exchange, instances)?;
+            norm = self.step(norm, exchange, instances)?;
+        }
+        if norm <= limits.threshold(exchange) {
+            return Ok(self.converged(exchange, norm));
+        }
+        exchange.report.residual = norm / exchange.t_ref;
+        Ok(Outcome::NotConverged(format!(
+            "X-T form: |T - F| = {norm:.3e} N after {} iterations, tolerance {:.3e} N",
+            limits.max_iterations,
+            limits.threshold(exchange)
+        )))
+    }
+
+    /// One evaluation of both sides; |r|∞.
+    fn evaluate(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<f64> {
+        exchange.advance_bodies(instances)?;
+        exchange.advance_grounds_under_motion(instances)?;
+        self.residual.clear();
+        self.residual.extend(exchange.t.iter().zip(&exchange.f).map(|(t, f)| t - f));
+        Ok(max_norm(&self.residual))
+    }
+
+    /// d = −(I + K·G1)⁻¹·r at the last trial.
+    fn newton_step(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result {
+        let n = exchange.n();
+        exchange.ground_jacobian(instances, true, &mut self.k)?;
+        let (k, g) = (&self.k, &exchange.estimate.g);
+        self.kg.clear();
+        self.kg.resize(n * n, 0.0);
+        for column in 0..n {
+            let out = &mut self.kg[column * n..][..n];
+            super::super::linear::multiply_add(k, &g[column * n..][..n], out);
+        }
+        let kg = &self.kg;
+        let rank = self.lu.factor(n, |r, c| kg[c * n + r] + if r == c { 1.0 } else { 0.0 });
+        self.d.clear();
+        self.d.extend(self.residual.iter().map(|r| -r));
+        self.lu.solve(&mut self.d);
+        let kappa = largest_eigenvalue(k, g, &mut self.base, &mut self.work, n);
+        exchange.report.kappa_max = exchange.report.kappa_max.max(kappa);
+        exchange.report.rank = (rank as u32, n as u32);
+        Ok(())
+    }
+
+    /// Takes the Newton step, halved until the residual falls; the new |r|∞.
+    fn step(&mut self, norm: f64, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<f64> {
+        self.base.clear();
+        self.base.extend_from_slice(&exchange.t);
+        let mut share = 1.0;
+        for halving in 0..=MAX_HALVINGS {
+            for ((t, base), d) in exchange.t.iter_mut().zip(&self.base).zip(&self.d) {
+                *t = base + share * d;
+            }
+            let new = self.evaluate(exchange, instances)?;
+            exchange.report.evaluations_line_search += u32::from(halving > 0);
+            if new < norm || halving == MAX_HALVINGS {
+                return Ok(new);
+            }
+            share *= 0.5;
+        }
+        Ok(norm)
+    }
+
+    fn converged(&self, exchange: &mut Exchange, norm: f64) -> Outcome {
+        let report = &mut exchange.report;
+        report.residual = norm / exchange.t_ref;
+        for port in &exchange.ports {
+            let r = self.residual[port.first as usize].abs();
+            report.max_action_reaction_gap_n = report.max_action_reaction_gap_n.max(r);
+        }
+        report.converged = true;
+        // motion was imposed on the soil: its surface is where the body is
+        exchange.x2.copy_from_slice(&exchange.x1);
+        Outcome::Converged
+    }
+}

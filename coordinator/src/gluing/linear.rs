@@ -1,0 +1,119 @@
+//! Dense linear systems of the size of an interface (n ≲ 100), solved in place without allocation.
+
+/// LU factors with partial pivoting of a row-major n × n matrix; the storage is reused.
+#[derive(Debug, Default)]
+pub struct Lu {
+    factors: Vec<f64>,
+    pivots: Vec<usize>,
+    n: usize,
+}
+
+impl Lu {
+    /// Factors the matrix whose entry (row, column) is `entry(row, column)`. Returns its numerical rank: the
+    /// number of pivots above 1e-14 of the largest; smaller pivots are replaced, so that a solve stays finite.
+    pub fn factor(&mut self, n: usize, mut entry: impl FnMut(usize, usize) -> f64) -> usize {
+        self.n = n;
+        self.factors.clear();
+        self.pivots.clear();
+        for row in 0..n {
+            self.factors.extend((0..n).map(|column| entry(row, column)));
+        }
+        let scale = self.factors.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+        let tiny = (1e-14 * scale).max(f64::MIN_POSITIVE);
+        (0..n).filter(|k| self.eliminate(*k, tiny)).count()
+    }
+
+    fn eliminate(&mut self, k: usize, tiny: f64) -> bool {
+        let (n, a) = (self.n, &mut self.factors);
+        let mut pivot = k;
+        for row in k + 1..n {
+            if a[row * n + k].abs() > a[pivot * n + k].abs() {
+                pivot = row;
+            }
+        }
+        self.pivots.push(pivot);
+        for column in 0..if pivot == k { 0 } else { n } {
+            a.swap(k * n + column, pivot * n + column);
+        }
+        let regular = a[k * n + k].abs() > tiny;
+        if !regular {
+            a[k * n + k] = tiny.copysign(a[k * n + k]);
+        }
+        let (upper, lower) = a.split_at_mut((k + 1) * n);
+        let pivot_row = &upper[k * n..];
+        for row in lower.chunks_exact_mut(n) {
+            let factor = row[k] / pivot_row[k];
+            row[k] = factor;
+            for (value, above) in row[k + 1..].iter_mut().zip(&pivot_row[k + 1..]) {
+                *value -= factor * above;
+            }
+        }
+        regular
+    }
+
+    /// Solves A·x = b in place.
+    pub fn solve(&self, b: &mut [f64]) {
+        let n = self.n;
+        for (k, pivot) in self.pivots.iter().enumerate() {
+            b.swap(k, *pivot);
+        }
+        for row in 1..n {
+            let (head, tail) = b.split_at_mut(row);
+            tail[0] -= dot(&self.factors[row * n..row * n + row], head);
+        }
+        for row in (0..n).rev() {
+            let (head, tail) = b.split_at_mut(row + 1);
+            let sum = dot(&self.factors[row * n + row + 1..(row + 1) * n], tail);
+            head[row] = (head[row] - sum) / self.factors[row * n + row];
+        }
+    }
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(x, y)| x * y).sum()
+}
+
+/// y += A·x for a column-major n × n matrix.
+pub fn multiply_add(a: &[f64], x: &[f64], y: &mut [f64]) {
+    for (column, factor) in a.chunks_exact(y.len()).zip(x) {
+        for (sum, entry) in y.iter_mut().zip(column) {
+            *sum += entry * factor;
+        }
+    }
+}
+
+/// max |a_i|.
+pub fn max_norm(a: &[f64]) -> f64 {
+    a.iter().fold(0.0, |m, v| m.max(v.abs()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn solutions_satisfy_the_system(a in prop::collection::vec(-1.0..1.0_f64, 36), x in prop::collection::vec(-1.0..1.0_f64, 6)) {
+            let dominant = |r: usize, c: usize| a[6 * r + c] + if r == c { 7.0 } else { 0.0 };
+            let mut b: Vec<f64> = (0..6).map(|r| (0..6).map(|c| dominant(r, c) * x[c]).sum()).collect();
+            let mut lu = Lu::default();
+            prop_assert_eq!(lu.factor(6, dominant), 6);
+            lu.solve(&mut b);
+            for (got, want) in b.iter().zip(&x) {
+                prop_assert!((got - want).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn a_zero_on_the_diagonal_is_pivoted_and_rank_is_counted() {
+        let mut lu = Lu::default();
+        let m = [[0.0, 2.0], [3.0, 0.0]];
+        assert_eq!(lu.factor(2, |r, c| m[r][c]), 2);
+        let mut b = [4.0, 9.0];
+        lu.solve(&mut b);
+        assert_eq!(b, [3.0, 2.0]);
+        assert_eq!(lu.factor(2, |_, _| 1.0), 1);
+    }
+}

@@ -1,0 +1,370 @@
+//! One subsystem's view of the glue of a group: its own ports, and the way between its packed vectors and the
+//! group's.
+
+use crate::Result;
+use crate::host::{Instance, Progress};
+use terraglue_subsystem::{Capabilities, Estimate, Input, Law, Level, Motion, Node, Port, Response, Step};
+
+/// Time and number of the present trial.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Instant {
+    /// Start of the step, s.
+    pub t: f64,
+    /// Length, s.
+    pub h: f64,
+    /// Accepted steps before.
+    pub index: u64,
+    /// Number of the trial in the step.
+    pub trial: u32,
+    /// Epoch of the set of ports.
+    pub epoch: u32,
+}
+
+/// A member of a group with its buffers; all are reused from step to step.
+#[derive(Debug, Default)]
+pub struct Side {
+    /// Index of the instance in the testbed.
+    pub slot: usize,
+    /// +1: bodies, on which T acts; −1: grounds, on which −T acts.
+    pub sign: i32,
+    ports: Vec<Port>,
+    /// Group port of each own port.
+    port_index: Vec<usize>,
+    /// Group component of each own component.
+    index: Vec<usize>,
+    laws: Vec<Law>,
+    x: Vec<f64>,
+    v: Vec<f64>,
+    a: Vec<f64>,
+    t: Vec<f64>,
+    partner_x: Vec<f64>,
+    partner_v: Vec<f64>,
+    matrix: Vec<f64>,
+    active: Vec<u8>,
+}
+
+impl Side {
+    /// A member without ports yet.
+    pub fn new(slot: usize, sign: i32) -> Self {
+        Self { slot, sign, ..Self::default() }
+    }
+
+    /// Number of own components.
+    pub fn n(&self) -> usize {
+        self.index.len()
+    }
+
+    /// Takes from the group's ports those of this member.
+    pub fn take_ports(&mut self, group: &[Port], belongs: impl Fn(usize) -> Option<u32>) {
+        self.ports.clear();
+        self.port_index.clear();
+        self.index.clear();
+        for (p, port) in group.iter().enumerate() {
+            if let Some(body) = belongs(p) {
+                let first = self.index.len() as u32;
+                self.ports.push(Port { side: self.sign, first, body, ..*port });
+                self.port_index.push(p);
+                self.index.extend(port.range());
+            }
+        }
+        let n = self.n();
+        for buffer in
+            [&mut self.x, &mut self.v, &mut self.a, &mut self.t, &mut self.partner_x, &mut self.partner_v]
+        {
+            buffer.clear();
+            buffer.resize(n, 0.0);
+        }
+        self.laws.clear();
+        self.laws.extend(self.ports.iter().map(|p| p.law));
+        self.active.clear();
+        self.active.resize(self.ports.len(), 0);
+    }
+
+    fn step<'a>(ports: &'a [Port], n: usize, nodes: &'a [Node], at: &Instant) -> Step<'a> {
+        Step {
+            t: at.t,
+            h: at.h,
+            index: at.index,
+            trial: at.trial,
+            epoch: at.epoch,
+            n: n as u32,
+            ports,
+            nodes,
+        }
+    }
+
+    fn gather(own: &mut [f64], index: &[usize], group: &[f64]) {
+        for (value, i) in own.iter_mut().zip(index) {
+            *value = group[*i];
+        }
+    }
+
+    fn scatter(own: &[f64], index: &[usize], group: &mut [f64]) {
+        for (value, i) in own.iter().zip(index) {
+            group[*i] = *value;
+        }
+    }
+
+    /// Tells the ports; answers with own motion and force, and narrows the group's laws.
+    pub fn set_ports(
+        &mut self,
+        instance: &mut Instance,
+        nodes: &[Node],
+        at: &Instant,
+        group_ports: &mut [Port],
+        mut x: Option<&mut [f64]>,
+        mut force: Option<&mut [f64]>,
+    ) -> Result {
+        for (own, p) in self.ports.iter_mut().zip(&self.port_index) {
+            own.law = group_ports[*p].law;
+        }
+        self.laws.clear();
+        self.laws.extend(self.ports.iter().map(|p| p.law));
+        let step = Self::step(&self.ports, self.index.len(), nodes, at);
+        let mut now = Response {
+            x: &mut self.x,
+            v: &mut self.v,
+            a: &mut self.a,
+            t: &mut self.t,
+            reached: at.t,
+            flags: 0,
+        };
+        instance.set_ports(&step, &mut self.laws, &mut now)?;
+        for ((own, p), law) in self.ports.iter_mut().zip(&self.port_index).zip(&self.laws) {
+            own.law = *law;
+            group_ports[*p].law = *law;
+        }
+        if let Some(x) = x.as_deref_mut() {
+            Self::scatter(&self.x, &self.index, x);
+        }
+        if let Some(force) = force.as_deref_mut() {
+            Self::scatter(&self.t, &self.index, force);
+        }
+        Ok(())
+    }
+
+    /// Asks the bodies for T*, x_free and G1.
+    pub fn estimate(
+        &mut self,
+        instance: &mut Instance,
+        nodes: &[Node],
+        at: &Instant,
+        partner: (&[f64], &[f64]),
+        out: &mut super::exchange::GroupEstimate,
+    ) -> Result {
+        let n = self.n();
+        self.matrix.clear();
+        self.matrix.resize(n * n, 0.0);
+        Self::gather(&mut self.partner_x, &self.index, partner.0);
+        Self::gather(&mut self.partner_v, &self.index, partner.1);
+        let step = Self::step(&self.ports, n, nodes, at);
+        let mut estimate = Estimate {
+            t_star: &mut self.t,
+            x_free: &mut self.x,
+            g: &mut self.matrix,
+            active: &mut self.active,
+            unique: true,
+        };
+        let partner = Motion { x: &self.partner_x, v: &self.partner_v };
+        let progress = instance.estimate_forces(&step, &partner, &mut estimate)?;
+        complete(instance, "estimate_forces", progress)?;
+        out.unique &= estimate.unique;
+        Self::scatter(&self.t, &self.index, &mut out.t_star);
+        Self::scatter(&self.x, &self.index, &mut out.x_free);
+        for (p, active) in self.port_index.iter().zip(&self.active) {
+            out.active[*p] = *active;
+        }
+        self.scatter_matrix(&mut out.g);
+        Ok(())
+    }
+
+    /// Asks the soil for T1 under the estimate, where it can; else `false`.
+    pub fn solve_compatibility(
+        &mut self,
+        instance: &mut Instance,
+        nodes: &[Node],
+        at: &Instant,
+        estimate: &super::exchange::GroupEstimate,
+        t1: &mut [f64],
+        x2: &mut [f64],
+    ) -> Result<bool> {
+        if !instance.capabilities().has(Capabilities::SOLVE) {
+            return Ok(false);
+        }
+        let n = self.n();
+        Self::gather(&mut self.partner_x, &self.index, &estimate.t_star);
+        Self::gather(&mut self.partner_v, &self.index, &estimate.x_free);
+        self.gather_matrix(&estimate.g, estimate.t_star.len());
+        for (own, p) in self.active.iter_mut().zip(&self.port_index) {
+            *own = estimate.active[*p];
+        }
+        let step = Self::step(&self.ports, n, nodes, at);
+        let estimate = Estimate {
+            t_star: &mut self.partner_x,
+            x_free: &mut self.partner_v,
+            g: &mut self.matrix,
+            active: &mut self.active,
+            unique: estimate.unique,
+        };
+        let mut out = Response {
+            x: &mut self.x,
+            v: &mut self.v,
+            a: &mut self.a,
+            t: &mut self.t,
+            reached: f64::NAN,
+            flags: 0,
+        };
+        let progress = instance.solve_compatibility(&step, &estimate, &mut out)?;
+        complete(instance, "solve_compatibility", progress)?;
+        Self::scatter(&self.t, &self.index, t1);
+        Self::scatter(&self.x, &self.index, x2);
+        Ok(true)
+    }
+
+    /// A trial under T (and the partner's motion, where given): own X, V and the wrench at the end.
+    pub fn advance_under_force(
+        &mut self,
+        instance: &mut Instance,
+        nodes: &[Node],
+        at: &Instant,
+        t: &[f64],
+        partner: Option<(&[f64], &[f64])>,
+        out: Answer,
+    ) -> Result {
+        Self::gather(&mut self.t, &self.index, t);
+        self.matrix.clear();
+        self.matrix.extend_from_slice(&self.t);
+        if let Some((x, v)) = partner {
+            Self::gather(&mut self.partner_x, &self.index, x);
+            Self::gather(&mut self.partner_v, &self.index, v);
+        }
+        let motion = partner.map(|_| Motion { x: &self.partner_x, v: &self.partner_v });
+        let input = Input::Force { t: &self.matrix, hold: super::HOLD, motion };
+        let step = Self::step(&self.ports, self.index.len(), nodes, at);
+        let mut response = Response {
+            x: &mut self.x,
+            v: &mut self.v,
+            a: &mut self.a,
+            t: &mut self.t,
+            reached: at.t + at.h,
+            flags: 0,
+        };
+        let progress = instance.advance(&step, &input, &mut response)?;
+        complete(instance, "advance", progress)?;
+        self.answer(out);
+        Ok(())
+    }
+
+    /// A trial of a soil under the bodies' motion.
+    pub fn advance_under_motion(
+        &mut self,
+        instance: &mut Instance,
+        nodes: &[Node],
+        at: &Instant,
+        partner: (&[f64], &[f64]),
+        out: Answer,
+    ) -> Result {
+        Self::gather(&mut self.partner_x, &self.index, partner.0);
+        Self::gather(&mut self.partner_v, &self.index, partner.1);
+        let input = Input::Motion(Motion { x: &self.partner_x, v: &self.partner_v });
+        let step = Self::step(&self.ports, self.index.len(), nodes, at);
+        let mut response = Response {
+            x: &mut self.x,
+            v: &mut self.v,
+            a: &mut self.a,
+            t: &mut self.t,
+            reached: at.t + at.h,
+            flags: 0,
+        };
+        let progress = instance.advance(&step, &input, &mut response)?;
+        complete(instance, "advance", progress)?;
+        self.answer(out);
+        Ok(())
+    }
+
+    fn answer(&self, out: Answer) {
+        if let Some(x) = out.x {
+            Self::scatter(&self.x, &self.index, x);
+        }
+        if let Some(v) = out.v {
+            Self::scatter(&self.v, &self.index, v);
+        }
+        if let Some(t) = out.t {
+            Self::scatter(&self.t, &self.index, t);
+        }
+    }
+
+    /// The module's own Jacobian at the last trial, into the group's matrix; `false` if it has none.
+    pub fn jacobian(
+        &mut self,
+        instance: &mut Instance,
+        nodes: &[Node],
+        at: &Instant,
+        out: &mut [f64],
+    ) -> Result<bool> {
+        if !instance.capabilities().has(Capabilities::DERIVATIVES) {
+            return Ok(false);
+        }
+        let n = self.n();
+        self.matrix.clear();
+        self.matrix.resize(n * n, 0.0);
+        let step = Self::step(&self.ports, n, nodes, at);
+        instance.interface_jacobian(&step, Level::Position, &mut self.matrix)?;
+        self.scatter_matrix(out);
+        Ok(true)
+    }
+
+    /// The last trial becomes the state at t + h.
+    pub fn commit(
+        &mut self,
+        instance: &mut Instance,
+        nodes: &[Node],
+        at: &Instant,
+        t: &[f64],
+        partner: (&[f64], &[f64]),
+    ) -> Result {
+        Self::gather(&mut self.t, &self.index, t);
+        Self::gather(&mut self.partner_x, &self.index, partner.0);
+        Self::gather(&mut self.partner_v, &self.index, partner.1);
+        let step = Self::step(&self.ports, self.index.len(), nodes, at);
+        instance.commit(&step, &self.t, &Motion { x: &self.partner_x, v: &self.partner_v })
+    }
+
+    fn scatter_matrix(&self, group: &mut [f64]) {
+        let n_group = group.len().isqrt();
+        for (own_column, column) in self.matrix.chunks_exact(self.n().max(1)).zip(&self.index) {
+            Self::scatter(own_column, &self.index, &mut group[column * n_group..][..n_group]);
+        }
+    }
+
+    fn gather_matrix(&mut self, group: &[f64], n_group: usize) {
+        let n = self.n();
+        self.matrix.clear();
+        self.matrix.resize(n * n, 0.0);
+        for (own_column, column) in self.matrix.chunks_exact_mut(n.max(1)).zip(&self.index) {
+            Self::gather(own_column, &self.index, &group[column * n_group..][..n_group]);
+        }
+    }
+}
+
+/// Glued subsystems go to the end of the step together; one that cannot is an error of its own.
+fn complete(instance: &Instance, function: &'static str, progress: Progress) -> Result {
+    match progress {
+        Progress::Complete => Ok(()),
+        Progress::Early { reached_s } => Err(instance.error(
+            function,
+            format!("ended the step early, at t = {reached_s} s; make time.step_s shorter"),
+        )),
+    }
+}
+
+/// Where a trial's answer goes; packed over the group.
+#[derive(Default)]
+pub struct Answer<'a> {
+    /// X.
+    pub x: Option<&'a mut [f64]>,
+    /// V.
+    pub v: Option<&'a mut [f64]>,
+    /// T.
+    pub t: Option<&'a mut [f64]>,
+}

@@ -1,0 +1,118 @@
+//! Connections: outputs of t become inputs of the step, with units checked once and converted every step.
+
+use super::access::{Directory, VariableRef};
+use super::pattern;
+use crate::Result;
+use crate::host::{Instance, Reply};
+use crate::scenario::{Connection, InputError, Source};
+use terraglue_subsystem::unit::Unit;
+use terraglue_subsystem::{Causality, ValueType, Values, ValuesMut};
+
+/// All f64 connections from one subsystem to another, copied in one call each way.
+#[derive(Debug)]
+pub struct Link {
+    from: usize,
+    to: usize,
+    from_ids: Vec<u32>,
+    to_ids: Vec<u32>,
+    /// value_to = a·value_from + b.
+    conversion: Vec<(f64, f64)>,
+    values: Vec<f64>,
+}
+
+impl Link {
+    /// Copies the committed values.
+    pub fn transfer(&mut self, instances: &mut [Instance]) -> Result {
+        instances[self.from].get(&self.from_ids, ValuesMut::F64(&mut self.values))?;
+        for (value, (a, b)) in self.values.iter_mut().zip(&self.conversion) {
+            *value = a * *value + b;
+        }
+        let target = &mut instances[self.to];
+        match target.set(&self.to_ids, Values::F64(&self.values))? {
+            Reply::Accepted => Ok(()),
+            Reply::Refused(reason) => Err(target.error("set", reason)),
+        }
+    }
+}
+
+/// Resolves all connections of a scenario into links, in the order of the file.
+pub fn connect(
+    connections: &[Connection],
+    directory: &Directory,
+    instances: &[Instance],
+    source: &Source,
+) -> std::result::Result<Vec<Link>, Box<InputError>> {
+    let mut links: Vec<Link> = Vec::new();
+    for connection in connections {
+        let mut matched = false;
+        for (name, from) in directory.iter() {
+            let Some(target) = pattern::rewrite(&connection.from, &connection.to, name) else { continue };
+            matched = true;
+            let to = directory.find(&target).ok_or_else(|| {
+                let message = format!("`{name}` is connected to `{target}`, which does not exist");
+                source.error_at(connection.span.clone(), message, hint(directory, &target))
+            })?;
+            let conversion = check(instances, (name, from), (&target, to))
+                .map_err(|message| source.error_at(connection.span.clone(), message, None))?;
+            add(&mut links, instances, from, to, conversion);
+        }
+        if !matched {
+            let message = format!("no variable matches `{}`", connection.from);
+            let help = hint(directory, &connection.from);
+            return Err(source.error_at(connection.span.clone(), message, help));
+        }
+    }
+    Ok(links)
+}
+
+fn hint(directory: &Directory, name: &str) -> Option<String> {
+    directory.nearest(name).map(|n| format!("did you mean `{n}`?"))
+}
+
+fn check(
+    instances: &[Instance],
+    (from_name, from): (&str, VariableRef),
+    (to_name, to): (&str, VariableRef),
+) -> std::result::Result<(f64, f64), String> {
+    let (a, b) = (from.describe(instances), to.describe(instances));
+    if a.value_type != ValueType::F64 || b.value_type != ValueType::F64 || a.len() != 1 || b.len() != 1 {
+        return Err(format!("`{from_name}` → `{to_name}`: only scalar f64 variables can be connected"));
+    }
+    if !matches!(b.causality, Causality::Input | Causality::Parameter) {
+        return Err(format!("`{to_name}` is not an input and cannot be connected to"));
+    }
+    if a.unit.is_empty() || b.unit.is_empty() {
+        return Ok((1.0, 0.0));
+    }
+    let parse = |name: &str, unit: &str| Unit::parse(unit).map_err(|e| format!("unit of `{name}`: {e}"));
+    let (unit_a, unit_b) = (parse(from_name, &a.unit)?, parse(to_name, &b.unit)?);
+    unit_a.conversion_to(&unit_b).ok_or_else(|| {
+        format!("`{from_name}` is in {} and `{to_name}` in {}: these cannot be connected", a.unit, b.unit)
+    })
+}
+
+fn add(
+    links: &mut Vec<Link>,
+    instances: &[Instance],
+    from: VariableRef,
+    to: VariableRef,
+    conversion: (f64, f64),
+) {
+    let position = links.iter().position(|l| l.from == from.slot && l.to == to.slot);
+    let k = position.unwrap_or_else(|| {
+        links.push(Link {
+            from: from.slot,
+            to: to.slot,
+            from_ids: Vec::new(),
+            to_ids: Vec::new(),
+            conversion: Vec::new(),
+            values: Vec::new(),
+        });
+        links.len() - 1
+    });
+    let link = &mut links[k];
+    link.from_ids.push(from.describe(instances).id);
+    link.to_ids.push(to.describe(instances).id);
+    link.conversion.push(conversion);
+    link.values.push(0.0);
+}

@@ -1,0 +1,132 @@
+//! The time line: events fire once, at a communication point, and set variables or call actions.
+
+use super::access::{Directory, VariableRef};
+use crate::host::Instance;
+use crate::scenario::{Comparison, EventSpec, InputError, Source, Trigger};
+use serde_json::Value;
+
+/// An event with its names resolved.
+#[derive(Debug)]
+struct Event {
+    trigger: Resolved,
+    due: Due,
+    fired: bool,
+}
+
+#[derive(Debug)]
+enum Resolved {
+    At(f64),
+    When(VariableRef, Comparison, f64),
+}
+
+/// What an event does.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Due {
+    /// Full name and new value.
+    pub set: Vec<(String, Value)>,
+    /// `subsystem.action`.
+    pub act: Vec<String>,
+}
+
+/// All events of a scenario.
+#[derive(Debug, Default)]
+pub struct TimeLine {
+    events: Vec<Event>,
+}
+
+impl TimeLine {
+    /// Resolves and checks names; what an event would set is tried for existence, not for its value.
+    pub fn new(
+        specs: &[EventSpec],
+        directory: &Directory,
+        instances: &[Instance],
+        source: &Source,
+    ) -> Result<Self, Box<InputError>> {
+        let variable = |name: &str, spec: &EventSpec| {
+            directory.find(name).ok_or_else(|| {
+                let help = directory.nearest(name).map(|n| format!("did you mean `{n}`?"));
+                source.error_at(spec.span.clone(), format!("variable `{name}` does not exist"), help)
+            })
+        };
+        let mut events = Vec::new();
+        for spec in specs {
+            for (name, _) in &spec.set {
+                variable(name, spec)?;
+            }
+            for action in &spec.act {
+                check_action(action, instances)
+                    .map_err(|(message, help)| source.error_at(spec.span.clone(), message, help))?;
+            }
+            let trigger = match &spec.trigger {
+                Trigger::At(t) => Resolved::At(*t),
+                Trigger::When { variable: name, comparison, value } => {
+                    Resolved::When(variable(name, spec)?, *comparison, *value)
+                }
+            };
+            let due = Due { set: spec.set.clone(), act: spec.act.clone() };
+            events.push(Event { trigger, due, fired: false });
+        }
+        Ok(Self { events })
+    }
+
+    /// The next event that is due at the communication point t; call until `None`.
+    pub fn next_due(&mut self, t: f64, h: f64, instances: &[Instance]) -> Option<Due> {
+        let event = self.events.iter_mut().find(|e| !e.fired && e.trigger.holds(t, h, instances))?;
+        event.fired = true;
+        Some(event.due.clone())
+    }
+
+    /// Which events have fired, for a snapshot.
+    pub fn fired(&self) -> Vec<bool> {
+        self.events.iter().map(|e| e.fired).collect()
+    }
+
+    /// Back to a snapshot.
+    pub fn set_fired(&mut self, fired: &[bool]) {
+        for (event, fired) in self.events.iter_mut().zip(fired) {
+            event.fired = *fired;
+        }
+    }
+}
+
+impl Resolved {
+    fn holds(&self, t: f64, h: f64, instances: &[Instance]) -> bool {
+        match self {
+            // t is a multiple of h up to rounding
+            Self::At(at) => t >= at - 1e-9 * h,
+            Self::When(variable, comparison, value) => {
+                variable.number(instances).is_ok_and(|x| compare(*comparison, x, *value))
+            }
+        }
+    }
+}
+
+fn compare(comparison: Comparison, a: f64, b: f64) -> bool {
+    match comparison {
+        Comparison::Less => a < b,
+        Comparison::LessEqual => a <= b,
+        Comparison::Greater => a > b,
+        Comparison::GreaterEqual => a >= b,
+        Comparison::Equal => a == b,
+        Comparison::NotEqual => a != b,
+    }
+}
+
+fn check_action(action: &str, instances: &[Instance]) -> Result<(), (String, Option<String>)> {
+    let (subsystem, name) = action.split_once('.').unwrap_or((action, ""));
+    let Some(instance) = instances.iter().find(|i| i.name() == subsystem) else {
+        let help = format!("subsystems are {}", names(instances.iter().map(Instance::name)));
+        return Err((format!("action `{action}`: there is no subsystem `{subsystem}`"), Some(help)));
+    };
+    let actions = instance.subsystem().actions();
+    if actions.iter().any(|a| a.name == name) {
+        return Ok(());
+    }
+    let nearest = actions.iter().min_by_key(|a| strsim::damerau_levenshtein(&a.name, name));
+    let help = nearest.map(|a| format!("did you mean `{subsystem}.{}`?", a.name));
+    Err((format!("`{subsystem}` has no action `{name}`"), help))
+}
+
+fn names<'a>(all: impl Iterator<Item = &'a str>) -> String {
+    all.collect::<Vec<_>>().join(", ")
+}

@@ -1,0 +1,179 @@
+//! From a checked scenario to a testbed: terrain, modules, instances, the group of glued subsystems, signals.
+
+use super::{Group, Member, Options, Testbed};
+use crate::contact::{BodySide, ContactDetector, GroundSide};
+use crate::gluing::{self, Exchange, StepReport};
+use crate::host::{HostServices, Instance, Library, LoadError, LoadedModule, SearchPath, Workers};
+use crate::scenario::{self, InputError, Scenario, SubsystemSpec};
+use crate::signals::{self, Directory, TimeLine};
+use crate::timing::Timings;
+use crate::{Error, Result, terrain};
+use std::sync::Arc;
+use terraglue_subsystem::{BodyState, Capabilities, Kind, Terrain};
+
+impl Testbed {
+    /// Builds a scenario with modules found as libraries.
+    ///
+    /// # Errors
+    /// Wrong input ([`Error::Input`]): a module that is not found, a parameter, a name in a connection or event.
+    pub fn build(scenario: &Scenario, options: &Options) -> Result<Self> {
+        Self::build_with(scenario, options, &Library::new())
+    }
+
+    /// The same; modules linked into the program come first.
+    pub fn build_with(scenario: &Scenario, options: &Options, library: &Library) -> Result<Self> {
+        let terrain: Option<Arc<dyn Terrain>> = match &scenario.terrain {
+            Some(spec) => Some(Arc::from(terrain::build(spec, scenario.world.seed)?)),
+            None => None,
+        };
+        let services = HostServices {
+            gravity: scenario.world.gravity_m_s2,
+            terrain: terrain.clone(),
+            workers: Arc::new(Workers::new(options.threads)),
+            cancel: options.cancel.clone(),
+            ..HostServices::new(scenario.world.seed, &scenario.folder)
+        };
+        let instances = instantiate(scenario, options, library, &services)?;
+        let directory = Directory::new(&instances);
+        let links = signals::connect(&scenario.connections, &directory, &instances, &scenario.source)?;
+        let time_line = TimeLine::new(&scenario.events, &directory, &instances, &scenario.source)?;
+        check_report(scenario, &directory, &instances)?;
+        let group = group(scenario, &instances)?;
+        let detector = detector(group.as_ref(), &instances, terrain.as_deref())?;
+        let mut testbed = Self {
+            members: members(scenario, &instances, group.as_ref()),
+            detector,
+            gravity: services.gravity,
+            contact_margin_m: scenario.gluing.contact_margin_m,
+            group,
+            links,
+            time_line,
+            directory,
+            instances,
+            happenings: Vec::new(),
+            no_glue: StepReport { converged: true, ..StepReport::default() },
+            timings: Timings::default(),
+            cancel: options.cancel.clone(),
+            step_s: scenario.time.step_s,
+            nominal: 0,
+            index: 0,
+            t: 0.0,
+            last_h: 0.0,
+            halvings: 0,
+        };
+        testbed.read_states()?;
+        Ok(testbed)
+    }
+}
+
+fn instantiate(
+    scenario: &Scenario,
+    options: &Options,
+    library: &Library,
+    services: &HostServices,
+) -> Result<Vec<Instance>> {
+    let search = SearchPath::standard(&options.module_paths, &scenario.folder);
+    let mut instances = Vec::new();
+    for spec in &scenario.subsystems {
+        let wrong = |e: LoadError| Error::Input(module_error(scenario, spec, &e));
+        let module: LoadedModule = library.find(&spec.module, &search, &scenario.folder).map_err(wrong)?;
+        let config = scenario::check_parameters(module.schema(), spec, &scenario.source)?;
+        instances.push(module.instantiate(&spec.name, config, services).map_err(wrong)?);
+    }
+    Ok(instances)
+}
+
+fn module_error(scenario: &Scenario, spec: &SubsystemSpec, error: &LoadError) -> Box<InputError> {
+    let help = error.nearest().map(|n| format!("did you mean `{n}`?"));
+    let key = match error {
+        LoadError::Refused { .. } | LoadError::Instantiate { .. } => vec![spec.name.as_str()],
+        _ => vec![spec.name.as_str(), "module"],
+    };
+    scenario.source.error_at_value(&key, error.to_string(), help)
+}
+
+fn members(scenario: &Scenario, instances: &[Instance], group: Option<&Group>) -> Vec<Member> {
+    let glued = |slot| group.is_some_and(|g| g.exchange.members().any(|m| m == slot));
+    let member = |(slot, (spec, instance)): (usize, (&SubsystemSpec, &Instance))| Member {
+        states: vec![BodyState::REST; instance.scene().bodies.len()],
+        step_multiple: u64::from(spec.step_multiple.max(1)),
+        glued: glued(slot),
+    };
+    scenario.subsystems.iter().zip(instances).enumerate().map(member).collect()
+}
+
+/// All bodies that can touch the ground and the ground: one group with the scenario's strategy.
+fn group(scenario: &Scenario, instances: &[Instance]) -> Result<Option<Group>> {
+    let of = |f: &dyn Fn(&Instance) -> bool| -> Vec<usize> {
+        instances.iter().enumerate().filter(|(_, i)| f(i)).map(|(slot, _)| slot).collect()
+    };
+    let grounds = of(&|i| i.kind() == Kind::Soil);
+    let bodies = of(&|i| {
+        i.kind() == Kind::Robot
+            && i.capabilities().has(Capabilities::FORCE)
+            && i.scene().shapes.iter().any(|s| s.collides)
+    });
+    if let [first, second, ..] = grounds[..] {
+        let message = format!(
+            "`{}` and `{}` are both soils, but the terrain can belong to one only",
+            instances[first].name(),
+            instances[second].name()
+        );
+        let source = &scenario.source;
+        return Err(source.error_at_value(&[instances[second].name()], message, None).into());
+    }
+    if grounds.is_empty() || bodies.is_empty() {
+        return Ok(None);
+    }
+    let gravity = scenario.world.gravity_m_s2.iter().map(|g| g * g).sum::<f64>().sqrt();
+    let mass: f64 = bodies.iter().flat_map(|b| &instances[*b].scene().bodies).map(|b| b.mass).sum();
+    let weight = mass * gravity;
+    let exchange = Exchange::new(&bodies, &grounds, if weight > 0.0 { weight } else { 1.0 });
+    let strategy = gluing::strategy(&scenario.gluing);
+    if let Some(reason) = gluing::refusal(strategy.as_ref(), &exchange, instances) {
+        let help = format!("strategies are {}", gluing::STRATEGIES.join(", "));
+        return Err(scenario.source.error_at_value(&["gluing", "strategy"], reason, Some(help)).into());
+    }
+    Ok(Some(Group { exchange, strategy, closed: Vec::new() }))
+}
+
+fn detector(
+    group: Option<&Group>,
+    instances: &[Instance],
+    terrain: Option<&dyn Terrain>,
+) -> Result<ContactDetector> {
+    let Some(group) = group else { return ContactDetector::new(&[], &[], terrain) };
+    let body = |slot: usize| BodySide {
+        subsystem: slot as u32,
+        name: instances[slot].name(),
+        scene: instances[slot].scene(),
+    };
+    let ground = |slot: usize| GroundSide { subsystem: slot as u32, instance: instances[slot].subsystem() };
+    let bodies: Vec<_> = group.exchange.body_slots().map(body).collect();
+    let grounds: Vec<_> = group.exchange.ground_slots().map(ground).collect();
+    ContactDetector::new(&bodies, &grounds, terrain)
+}
+
+/// The names that the report speaks of must exist.
+fn check_report(scenario: &Scenario, directory: &Directory, instances: &[Instance]) -> Result {
+    let source = &scenario.source;
+    if let Some(name) = &scenario.report.commanded_speed
+        && directory.find(name).is_none()
+    {
+        let help = directory.nearest(name).map(|n| format!("did you mean `{n}`?"));
+        let message = format!("variable `{name}` does not exist");
+        return Err(source.error_at_value(&["report", "commanded_speed"], message, help).into());
+    }
+    if let Some(name) = &scenario.report.body {
+        let bodies: Vec<String> = instances
+            .iter()
+            .flat_map(|i| i.scene().bodies.iter().map(move |b| format!("{}.{}", i.name(), b.name)))
+            .collect();
+        if !bodies.iter().any(|b| b == name) {
+            let help = scenario::did_you_mean(name, bodies.iter().map(String::as_str));
+            let message = format!("body `{name}` does not exist");
+            return Err(source.error_at_value(&["report", "body"], message, help).into());
+        }
+    }
+    Ok(())
+}

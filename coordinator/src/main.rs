@@ -1,2 +1,7 @@
-//! The command line.
-fn main() {}
+//! The program `terraglue`: arguments in, tables and files out. The simulation is in the library.
+
+mod cli;
+
+fn main() -> std::process::ExitCode {
+    cli::main()
+}

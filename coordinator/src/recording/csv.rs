@@ -67,10 +67,10 @@ pub struct TimingRow {
     pub section: String,
     /// Wall time in all steps, s.
     pub wall_s: f64,
-    /// CPU time in all steps, s.
-    pub cpu_s: f64,
-    /// How often the part ran.
-    pub calls: u64,
+    /// CPU time in all steps, s, where it was measured.
+    pub cpu_s: Option<f64>,
+    /// Steps.
+    pub steps: u64,
 }
 
 /// Writes `timing.csv`. Nothing that a clock measured stands in any other file but `summary.json`.
@@ -78,15 +78,19 @@ pub fn write_timing(folder: &Path, rows: &[TimingRow]) -> Result {
     let path = folder.join(TIMING);
     let mut table = csv::Writer::from_writer(File::create(&path).map_err(at(&path))?);
     table
-        .write_record(["section", "wall_s", "cpu_s", "calls", "cpu_per_call_us"])
+        .write_record(["section", "wall_s", "cpu_s", "steps", "wall_per_step_us"])
         .map_err(other_at(&path))?;
     for row in rows {
-        let per_call = if row.calls == 0 { 0.0 } else { row.cpu_s / row.calls as f64 * 1e6 };
-        let figures = [row.wall_s, row.cpu_s].map(|s| format!("{s:.6}"));
-        let [wall, cpu] = &figures;
-        table
-            .write_record([&row.section, wall, cpu, &row.calls.to_string(), &format!("{per_call:.3}")])
-            .map_err(other_at(&path))?;
+        let per_step = if row.steps == 0 { 0.0 } else { row.wall_s / row.steps as f64 * 1e6 };
+        let cpu = row.cpu_s.map(|s| format!("{s:.6}")).unwrap_or_default();
+        let fields = [
+            &row.section,
+            &format!("{:.6}", row.wall_s),
+            &cpu,
+            &row.steps.to_string(),
+            &format!("{per_step:.3}"),
+        ];
+        table.write_record(fields).map_err(other_at(&path))?;
     }
     table.flush().map_err(at(&path))
 }

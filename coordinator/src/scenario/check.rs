@@ -98,7 +98,12 @@ fn describe(value: &Value) -> String {
     }
 }
 
-/// The allowed values in words, e.g. `a number greater than 0 m`.
+/// The allowed values of a parameter in words, e.g. `a number greater than 0 m`.
+pub fn allowed_values(p: &Parameter) -> String {
+    allowed(p, None)
+}
+
+/// The same for a list of `count` numbers.
 pub fn allowed(p: &Parameter, count: Option<usize>) -> String {
     let range = range(p);
     match (p.parameter_type, count) {
@@ -119,7 +124,7 @@ pub fn allowed(p: &Parameter, count: Option<usize>) -> String {
 
 /// ` from 0 to 1 m`, ` greater than 0`, or nothing.
 fn range(p: &Parameter) -> String {
-    let unit = if p.unit.is_empty() { String::new() } else { format!(" {}", p.unit) };
+    let unit = if ["", "1"].contains(&p.unit.as_str()) { String::new() } else { format!(" {}", p.unit) };
     match (p.min, p.max) {
         (Some(min), Some(max)) if p.above_min => format!(" greater than {min} and at most {max}{unit}"),
         (Some(min), Some(max)) => format!(" from {min} to {max}{unit}"),

@@ -82,7 +82,7 @@ pub const TERRAIN_KINDS: &[&str] = &["flat", "slope", "undulating", "crater", "e
 /// Kinds of terrain that are made, not read.
 const MADE: &[&str] = &["flat", "slope", "undulating", "crater"];
 /// Kinds of terrain that come from a file.
-const READ: &[&str] = &["esri-ascii", "geotiff"];
+pub const READ: &[&str] = &["esri-ascii", "geotiff"];
 
 /// All reserved tables in the order of the documentation.
 pub fn tables() -> Vec<Table> {
@@ -121,6 +121,11 @@ fn terrain() -> Table {
     let kind = Parameter::of("kind", ParameterType::Text, "shape").choices(TERRAIN_KINDS);
     let size =
         Parameter { unit: "m".into(), ..list("size_m", "extent along x and y, centred on the origin") };
+    let spacing = required(
+        "spacing_m",
+        "m",
+        "distance of lattice nodes; may be left out for a file, which keeps its own",
+    );
     let waves = Parameter { unit: "m".into(), ..list("wavelengths_m", "shortest and longest wavelength") };
     let centre = Parameter { unit: "m".into(), ..list("centre_m", "centre of the crater") };
     let seed = Parameter::of("seed", ParameterType::Integer, "seed of the waves; `world.seed` where absent");
@@ -128,7 +133,7 @@ fn terrain() -> Table {
     let keys = vec![
         kind.into(),
         Key::from(size.positive()).form(Form::Count(2)).only(MADE),
-        Key::from(required("spacing_m", "m", "distance of neighbouring lattice nodes").positive()).only(MADE),
+        spacing.optional().positive().into(),
         Key::from(number("height_m", "m", 0.0, "height of the plane")).only(&["flat"]),
         Key::from(required("angle_rad", "rad", "angle against the horizontal").within(-half_pi, half_pi))
             .only(&["slope"]),

@@ -22,6 +22,7 @@ mod terrain;
 #[cfg(test)]
 mod tests;
 
+pub use check::allowed_values;
 pub use model::*;
 pub use nearest::{did_you_mean, nearest};
 pub use parameters::{SHIPPED_MODULES, check_parameters, check_parameters_among};

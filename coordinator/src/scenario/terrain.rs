@@ -1,5 +1,6 @@
 //! `[terrain]`.
 
+use super::keys::READ;
 use super::model::{TerrainKind, TerrainSpec};
 use super::section::Section;
 use super::source::InputError;
@@ -22,6 +23,10 @@ pub fn read(s: &Section) -> Result<TerrainSpec, Box<InputError>> {
         "geotiff" => TerrainKind::Geotiff { file: s.file("file"), fill_m: s.optional_number("fill_m") },
         _ => TerrainKind::Flat { height_m: s.number("height_m") },
     };
+    if s.optional_number("spacing_m").is_none() && !READ.contains(&s.text("kind").as_str()) {
+        let help = Some("spacing_m: distance of lattice nodes, e.g. spacing_m = 0.01".into());
+        return Err(s.error("", "`terrain` lacks `spacing_m`".into(), help));
+    }
     let spec = TerrainSpec { size_m: s.numbers("size_m"), spacing_m: s.number("spacing_m"), kind };
     check_lattice(s, &spec)?;
     Ok(spec)

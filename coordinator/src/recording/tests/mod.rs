@@ -209,10 +209,10 @@ fn the_table_of_variables_has_a_head_and_all_rows() {
 #[test]
 fn timing_is_written_apart() {
     let f = folder();
-    let row = TimingRow { section: "advance".into(), wall_s: 0.5, cpu_s: 0.25, calls: 1000 };
+    let row = TimingRow { section: "advance".into(), wall_s: 0.5, cpu_s: Some(0.25), steps: 1000 };
     write_timing(f.path(), &[row]).expect("written");
     let text = std::fs::read_to_string(f.path().join(TIMING)).expect("written");
-    assert_eq!(text.lines().nth(1), Some("advance,0.500000,0.250000,1000,250.000"));
+    assert_eq!(text.lines().nth(1), Some("advance,0.500000,0.250000,1000,500.000"));
 }
 
 #[test]

@@ -1,2 +1,1 @@
 //! The module soil-bekker as a dynamic library.
-terraglue_plugin::export_subsystem!(terraglue_soil_bekker::SoilBekker);

@@ -1,2 +1,1 @@
 //! The module soil-cellular-automaton as a dynamic library.
-terraglue_plugin::export_subsystem!(terraglue_soil_cellular_automaton::SoilCellularAutomaton);

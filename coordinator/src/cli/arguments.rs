@@ -1,0 +1,104 @@
+//! The arguments and their help.
+
+use clap::{Args, Parser, Subcommand};
+use std::path::PathBuf;
+
+/// Simulates robots on deformable ground: rigid bodies, soils and controllers, glued into one run.
+#[derive(Parser, Debug)]
+#[command(name = "terraglue", version, after_help = EXAMPLES, disable_help_subcommand = true)]
+pub struct Arguments {
+    /// What to do.
+    #[command(subcommand)]
+    pub command: Command,
+}
+
+const EXAMPLES: &str = "\
+Examples:
+  terraglue run scenarios/moon_walk.toml
+  terraglue run scenarios/moon_walk.toml --set soil.module=soil-bekker --out runs/bekker
+  terraglue variables scenarios/moon_walk.toml     what can be read, connected and set
+
+Exit codes: 0 done, 1 the simulation or a check failed, 2 the input is wrong, 130 interrupted.";
+
+/// The commands.
+#[derive(Subcommand, Debug)]
+pub enum Command {
+    /// Run a scenario and write recording, summary and report.
+    Run(RunArguments),
+    /// Make the report of a recording again, also of one that was cut off.
+    Report {
+        /// Folder of the run, e.g. runs/moon_walk.
+        #[arg(value_name = "DIR")]
+        folder: PathBuf,
+    },
+    /// Check a scenario and everything that it refers to, without running it.
+    Check(ScenarioArguments),
+    /// List the modules that are found, with their parameters.
+    Modules {
+        /// Search this folder first; may be repeated.
+        #[arg(long, value_name = "DIR")]
+        module_path: Vec<PathBuf>,
+        /// Print JSON instead of a table.
+        #[arg(long)]
+        json: bool,
+    },
+    /// List the variables and actions of a scenario's subsystems.
+    Variables(ScenarioArguments),
+    /// List the soils that a scenario can name, and those that are refused with the reason.
+    Soils {
+        /// Another soil table.
+        #[arg(long, value_name = "CSV")]
+        file: Option<PathBuf>,
+    },
+}
+
+/// A scenario with its edits.
+#[derive(Args, Debug, Clone)]
+pub struct ScenarioArguments {
+    /// Scenario file (TOML).
+    pub scenario: PathBuf,
+    /// Edit the scenario before it is checked; a bare word is text. May be repeated.
+    #[arg(long = "set", value_name = "KEY.PATH=VALUE", value_parser = parse_set)]
+    pub sets: Vec<(String, String)>,
+    /// Search this folder for modules first; may be repeated.
+    #[arg(long, value_name = "DIR")]
+    pub module_path: Vec<PathBuf>,
+}
+
+/// What `run` takes.
+#[derive(Args, Debug, Clone)]
+pub struct RunArguments {
+    /// The scenario.
+    #[command(flatten)]
+    pub scenario: ScenarioArguments,
+    /// Folder for the results [default: runs/<scenario>; an earlier run there is renamed].
+    #[arg(long, value_name = "DIR")]
+    pub out: Option<PathBuf>,
+    /// Simulated time in seconds, instead of the scenario's.
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
+    pub duration: Option<String>,
+    /// Threads for the loops inside modules; 0: one per core. Results do not depend on it.
+    #[arg(long, value_name = "N", default_value_t = 1)]
+    pub threads: usize,
+    /// Also write variables.csv.
+    #[arg(long)]
+    pub csv: bool,
+    /// No progress bar, no table.
+    #[arg(long)]
+    pub quiet: bool,
+    /// Print the summary as JSON on standard output, and nothing else there.
+    #[arg(long)]
+    pub json: bool,
+}
+
+impl RunArguments {
+    /// The edits, `--duration` among them.
+    pub fn sets(&self) -> Vec<(String, String)> {
+        let duration = self.duration.iter().map(|s| ("time.duration_s".to_owned(), s.clone()));
+        self.scenario.sets.iter().cloned().chain(duration).collect()
+    }
+}
+
+fn parse_set(text: &str) -> Result<(String, String), String> {
+    terraglue::scenario::split_set(text).ok_or_else(|| "there is no `=`: write KEY.PATH=VALUE".into())
+}

@@ -1,0 +1,46 @@
+//! `terraglue check`: everything that can be checked without running.
+
+use super::arguments::ScenarioArguments;
+use super::run::build;
+use super::{Exit, show};
+use terraglue::Result;
+use terraglue::host::{Library, SearchPath};
+use terraglue::scenario::{Scenario, SubsystemSpec};
+use terraglue::testbed::Options;
+
+/// Loads the scenario, its modules and files, and resolves all names.
+pub fn check(arguments: &ScenarioArguments) -> Result<Exit> {
+    let scenario = Scenario::load(&arguments.scenario, &arguments.sets)?;
+    let options = Options { module_paths: arguments.module_path.clone(), ..Options::default() };
+    let testbed = build(&scenario, &options)?;
+    let mut table = show::table(&["subsystem", "module", "bodies", "variables", "note"]);
+    testbed.view(|view| {
+        for (s, spec) in view.subsystems.iter().zip(&scenario.subsystems) {
+            let [bodies, variables] =
+                [s.scene.bodies.len(), s.instance.variables().len()].map(|n| n.to_string());
+            table.add_row([s.name, s.module, &bodies, &variables, &note(&scenario, spec, &options)]);
+        }
+    });
+    println!("{table}");
+    println!(
+        "{} is good: {} connections, {} events, {} s in steps of {} s, gluing `{}`",
+        arguments.scenario.display(),
+        scenario.connections.len(),
+        scenario.events.len(),
+        scenario.time.duration_s,
+        scenario.time.step_s,
+        scenario.gluing.strategy
+    );
+    Ok(Exit::Done)
+}
+
+/// Numbers of the soil row that the module does not take.
+fn note(scenario: &Scenario, spec: &SubsystemSpec, options: &Options) -> String {
+    let search = SearchPath::standard(&options.module_paths, &scenario.folder);
+    let Ok(module) = Library::new().find(&spec.module, &search, &scenario.folder) else {
+        return String::new();
+    };
+    let takes = |name: &str| module.schema().parameters.iter().any(|p| p.name == name);
+    let unused: Vec<&str> = spec.offered.keys().map(String::as_str).filter(|name| !takes(name)).collect();
+    if unused.is_empty() { String::new() } else { format!("offered, not used: {}", unused.join(", ")) }
+}

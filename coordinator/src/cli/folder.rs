@@ -1,0 +1,51 @@
+//! The folder for results: an earlier run is renamed, never overwritten.
+
+use std::path::{Path, PathBuf};
+use terraglue::{Error, Result};
+
+/// The folder of `--out`, or `runs/<name>` after an earlier run there was renamed to `.1`, `.2`, …
+pub fn results_folder(out: Option<&Path>, name: &str) -> Result<PathBuf> {
+    let folder = match out {
+        Some(folder) => folder.to_owned(),
+        None => {
+            let folder = Path::new("runs").join(name);
+            set_aside(&folder)?;
+            folder
+        }
+    };
+    std::fs::create_dir_all(&folder).map_err(|e| at(&folder, e))?;
+    Ok(folder)
+}
+
+/// Renames a folder to the first free of `folder.1`, `folder.2`, …
+fn set_aside(folder: &Path) -> Result {
+    if !folder.exists() {
+        return Ok(());
+    }
+    let numbered = |n: u32| PathBuf::from(format!("{}.{n}", folder.display()));
+    let free = (1..).map(numbered).find(|f| !f.exists()).unwrap_or_else(|| numbered(u32::MAX));
+    std::fs::rename(folder, &free).map_err(|e| at(folder, e))
+}
+
+fn at(path: &Path, source: std::io::Error) -> Error {
+    Error::File { path: path.display().to_string(), source }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn earlier_runs_get_numbers() {
+        let temporary = tempfile::tempdir().expect("folder");
+        let folder = temporary.path().join("walk");
+        for text in ["a", "b", "c"] {
+            set_aside(&folder).expect("renamed");
+            std::fs::create_dir(&folder).expect("made");
+            std::fs::write(folder.join("x"), text).expect("written");
+        }
+        let read =
+            |name: &str| std::fs::read_to_string(temporary.path().join(name).join("x")).expect("there");
+        assert_eq!([read("walk"), read("walk.1"), read("walk.2")], ["c", "a", "b"]);
+    }
+}

@@ -1,0 +1,139 @@
+//! `terraglue modules`, `variables` and `soils`: what there is to choose from.
+
+use super::arguments::ScenarioArguments;
+use super::run::build;
+use super::{Exit, show};
+use std::path::{Path, PathBuf};
+use terraglue::Result;
+use terraglue::host::{AvailableModule, SearchPath, available_modules};
+use terraglue::scenario::{InputError, Scenario, allowed_values, find_soil_table, read_soil_table};
+use terraglue::subsystem::{Causality, Effect, Kind, Schema, ValueType, Variable};
+use terraglue::testbed::Options;
+
+/// Every variable and action of the scenario's subsystems.
+pub fn variables(arguments: &ScenarioArguments) -> Result<Exit> {
+    let scenario = Scenario::load(&arguments.scenario, &arguments.sets)?;
+    let options = Options { module_paths: arguments.module_path.clone(), ..Options::default() };
+    let testbed = build(&scenario, &options)?;
+    let mut table = show::table(&["variable", "type", "unit", "role", "change", "range", "help"]);
+    let mut actions = show::table(&["action", "help"]);
+    testbed.view(|view| {
+        for s in view.subsystems {
+            for v in s.instance.variables() {
+                table.add_row(variable_row(s.name, v));
+            }
+            for a in s.instance.actions() {
+                actions.add_row([format!("{}.{}", s.name, a.name), a.help.clone()]);
+            }
+        }
+    });
+    println!("{table}");
+    if actions.row_count() > 0 {
+        println!("{actions}");
+    }
+    Ok(Exit::Done)
+}
+
+fn variable_row(subsystem: &str, v: &Variable) -> [String; 7] {
+    let role = match v.causality {
+        Causality::Parameter => "parameter",
+        Causality::Input => "input",
+        Causality::Output => "output",
+        Causality::Local => "local",
+    };
+    let change = match v.effect {
+        Effect::Live => "at any time",
+        Effect::NeedsReset => "before the start",
+        Effect::ReadOnly => "never",
+    };
+    let name = format!("{subsystem}.{}", v.name);
+    [name, type_name(v), v.unit.clone(), role.into(), change.into(), range(v), v.help.clone()]
+}
+
+fn type_name(v: &Variable) -> String {
+    let base = match v.value_type {
+        ValueType::Enumeration => v.enumeration.join(" | "),
+        other => format!("{other:?}").to_lowercase(),
+    };
+    let dims: String = v.dims.iter().map(|d| format!("[{d}]")).collect();
+    base + &dims
+}
+
+fn range(v: &Variable) -> String {
+    match (v.min.is_finite(), v.max.is_finite()) {
+        (true, true) => format!("{} … {}", v.min, v.max),
+        (true, false) => format!("≥ {}", v.min),
+        (false, true) => format!("≤ {}", v.max),
+        (false, false) => String::new(),
+    }
+}
+
+/// The soil table.
+pub fn soils(file: Option<&Path>) -> Result<Exit> {
+    let path = file.map(Path::to_owned).or_else(|| find_soil_table(Path::new(".")));
+    let path = path.ok_or_else(|| {
+        let help = Some("name a table with --file".into());
+        InputError::plain("no soil table: models/soils.csv is not there", help)
+    })?;
+    let rows = read_soil_table(&path).map_err(|message| InputError::plain(message, None))?.rows;
+    let mut table =
+        show::table(&["soil", "n", "k_c", "k_phi", "c, Pa", "phi, rad", "K, m", "density, kg/m³", "source"]);
+    let mut refused = show::table(&["refused", "reason"]);
+    for row in &rows {
+        if let Some(reason) = &row.refused {
+            refused.add_row([&row.name, reason]);
+            continue;
+        }
+        let cells = row.values.iter().map(|v| v.map_or_else(|| "–".to_owned(), |x| x.to_string()));
+        table.add_row(std::iter::once(row.name.clone()).chain(cells).chain([row.source.clone()]));
+    }
+    println!("{table}");
+    if refused.row_count() > 0 {
+        println!("{refused}");
+    }
+    println!("from {}", path.display());
+    Ok(Exit::Done)
+}
+
+/// The modules on the search path.
+pub fn modules(module_path: &[PathBuf], json: bool) -> Result<Exit> {
+    let found = available_modules(&SearchPath::standard(module_path, Path::new(".")));
+    if json {
+        let describe = |m: &AvailableModule| match &m.schema {
+            Ok(schema) => serde_json::json!({ "name": m.name, "path": m.path, "schema": schema }),
+            Err(e) => serde_json::json!({ "name": m.name, "path": m.path, "error": e.to_string() }),
+        };
+        println!("{}", serde_json::Value::Array(found.iter().map(describe).collect()));
+        return Ok(Exit::Done);
+    }
+    for module in &found {
+        match &module.schema {
+            Err(e) => println!("{}: cannot be used: {e}\n", module.name),
+            Ok(schema) => describe(module, schema),
+        }
+    }
+    if found.is_empty() {
+        println!("no module found; see --module-path");
+    }
+    Ok(Exit::Done)
+}
+
+fn describe(module: &AvailableModule, schema: &Schema) {
+    let kind = match schema.kind {
+        Kind::Soil => "soil",
+        Kind::Robot => "robot",
+        Kind::Controller => "controller",
+        Kind::Law => "law",
+    };
+    println!("{} ({kind}): {}\n{}", schema.name, schema.help, module.path.display());
+    let mut table = show::table(&["parameter", "takes", "default", "help"]);
+    for p in &schema.parameters {
+        let default = match (&p.default, p.optional) {
+            (serde_json::Value::Null, true) => "–".to_owned(),
+            (serde_json::Value::Null, false) => "required".to_owned(),
+            (value, _) => value.to_string(),
+        };
+        table.add_row([p.name.clone(), allowed_values(p), default, p.help.clone()]);
+    }
+    println!("{table}\n");
+}

@@ -1,0 +1,69 @@
+//! The command line. No simulation logic: it reads arguments, drives the library and prints.
+//!
+//! Exit codes: 0 done, 1 the simulation or a check failed, 2 the input is wrong, 130 interrupted.
+
+mod arguments;
+mod check;
+mod folder;
+mod interrupt;
+mod list;
+mod progress;
+mod report;
+mod run;
+mod show;
+
+use arguments::{Arguments, Command};
+use clap::Parser;
+use std::process::ExitCode;
+use terraglue::Error;
+
+/// How a command ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exit {
+    /// Done; diverged rows of a comparison are data.
+    Done,
+    /// The simulation or a check failed.
+    Failed,
+    /// The input is wrong.
+    WrongInput,
+    /// The user stopped it; the recording is closed.
+    Interrupted,
+}
+
+impl From<Exit> for ExitCode {
+    fn from(exit: Exit) -> Self {
+        ExitCode::from(match exit {
+            Exit::Done => 0,
+            Exit::Failed => 1,
+            Exit::WrongInput => 2,
+            Exit::Interrupted => 130,
+        })
+    }
+}
+
+/// Reads the arguments and does the command.
+pub fn main() -> ExitCode {
+    let done = match Arguments::parse().command {
+        Command::Run(arguments) => run::run(&arguments),
+        Command::Report { folder } => report::report(&folder),
+        Command::Check(arguments) => check::check(&arguments),
+        Command::Modules { module_path, json } => list::modules(&module_path, json),
+        Command::Variables(arguments) => list::variables(&arguments),
+        Command::Soils { file } => list::soils(file.as_deref()),
+    };
+    match done {
+        Ok(exit) => exit.into(),
+        Err(error) => {
+            show::error(&error);
+            exit_of(&error).into()
+        }
+    }
+}
+
+/// Exit of a command that an error ended.
+pub fn exit_of(error: &Error) -> Exit {
+    match error {
+        Error::Input(_) => Exit::WrongInput,
+        _ => Exit::Failed,
+    }
+}

@@ -1,0 +1,122 @@
+//! `terraglue run`: one scenario from file to report.
+
+use super::arguments::RunArguments;
+use super::folder::results_folder;
+use super::progress::{self, Progress};
+use super::{Exit, exit_of, interrupt, show};
+use std::path::Path;
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use std::time::Instant;
+use terraglue::observer::Observer;
+use terraglue::recording::{self, Recorder, RecorderOptions, Status, Summary, TimingRow, write_timing};
+use terraglue::scenario::{InputError, Scenario};
+use terraglue::testbed::{Options, Testbed};
+use terraglue::{Error, Result};
+
+/// What a run leaves behind beside its files.
+pub struct Outcome {
+    /// Figures.
+    pub summary: Summary,
+    /// What stopped it early.
+    pub error: Option<Error>,
+}
+
+impl Outcome {
+    /// How the program ends after it.
+    pub fn exit(&self) -> Exit {
+        match (&self.error, self.summary.status) {
+            (Some(error), _) => exit_of(error),
+            (None, Status::Stopped) => Exit::Interrupted,
+            (None, _) => Exit::Done,
+        }
+    }
+}
+
+/// Runs a scenario as the arguments say.
+pub fn run(arguments: &RunArguments) -> Result<Exit> {
+    let scenario = Scenario::load(&arguments.scenario.scenario, &arguments.sets())?;
+    let options = options(arguments, &interrupt::cancel_flag());
+    let testbed = build(&scenario, &options)?;
+    let folder = results_folder(arguments.out.as_deref(), &scenario.name)?;
+    let steps = (scenario.time.duration_s / scenario.time.step_s).round() as u64;
+    let bar = progress::bar(steps, arguments.quiet);
+    let mut progress = Progress::new(bar.clone(), scenario.time.duration_s, "");
+    let outcome = run_testbed(testbed, &scenario, &folder, arguments.csv, &mut progress)?;
+    bar.finish_and_clear();
+    let report = recording::report::write(&folder)?;
+    print(arguments, &outcome, &report)?;
+    Ok(outcome.exit())
+}
+
+/// Options of the testbed.
+pub fn options(arguments: &RunArguments, cancel: &Arc<AtomicBool>) -> Options {
+    Options {
+        threads: arguments.threads,
+        module_paths: arguments.scenario.module_path.clone(),
+        cancel: Arc::clone(cancel),
+    }
+}
+
+/// Builds a testbed. Whatever stops it, a module that refuses its files among them, is wrong input.
+pub fn build(scenario: &Scenario, options: &Options) -> Result<Testbed> {
+    Testbed::build(scenario, options).map_err(|error| match error {
+        Error::Input(_) => error,
+        other => Error::Input(InputError::plain(other.to_string(), None)),
+    })
+}
+
+/// Steps a testbed to the end of its scenario and records it into `folder`.
+pub fn run_testbed(
+    mut testbed: Testbed,
+    scenario: &Scenario,
+    folder: &Path,
+    csv: bool,
+    progress: &mut dyn Observer,
+) -> Result<Outcome> {
+    let mut recorder = Recorder::create(folder, scenario, RecorderOptions { csv })?;
+    testbed.view(|view| recorder.started(view))?;
+    let (wall, cpu) = (Instant::now(), cpu_s());
+    let ran = testbed.run_until(scenario.time.duration_s, &mut [&mut recorder, progress]);
+    let (wall_s, cpu_s) = (wall.elapsed().as_secs_f64(), cpu_s() - cpu);
+    let error = ran.err();
+    testbed.view(|view| recorder.finished(view, error.as_ref()))?;
+    let status = match &error {
+        Some(_) => Status::Failed,
+        None if testbed.cancelled() => Status::Stopped,
+        None => Status::Done,
+    };
+    write_timing(folder, &timing_rows(&testbed, wall_s, cpu_s))?;
+    let summary = recorder.finish(wall_s, cpu_s, error.as_ref(), status)?;
+    Ok(Outcome { summary, error })
+}
+
+/// The parts of a step, and all of them together.
+fn timing_rows(testbed: &Testbed, wall_s: f64, cpu_s: f64) -> Vec<TimingRow> {
+    let steps = testbed.step_index();
+    let timings = testbed.timings();
+    let parts = timings.rows().map(|(section, wall_s)| (section, wall_s, None));
+    let all = parts.chain([("step loop with recording", wall_s, Some(cpu_s))]);
+    all.map(|(section, wall_s, cpu_s)| TimingRow { section: section.into(), wall_s, cpu_s, steps }).collect()
+}
+
+fn print(arguments: &RunArguments, outcome: &Outcome, report: &Path) -> Result {
+    if arguments.json {
+        let text = serde_json::to_string_pretty(&outcome.summary)
+            .map_err(|e| Error::File { path: "standard output".into(), source: e.into() })?;
+        println!("{text}");
+    } else if !arguments.quiet {
+        println!("{}", show::summary(&outcome.summary));
+        println!("report: {}", report.display());
+    }
+    if let Some(error) = &outcome.error {
+        show::error(error);
+    }
+    Ok(())
+}
+
+/// CPU time of this thread, s; 0 where the system does not tell.
+pub fn cpu_s() -> f64 {
+    let t = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    t.tv_sec as f64 + 1e-9 * t.tv_nsec as f64
+}

@@ -1,0 +1,73 @@
+//! What is printed: errors with their place, tables.
+
+use comfy_table::{ContentArrangement, Table, presets};
+use miette::GraphicalReportHandler;
+use terraglue::Error;
+use terraglue::recording::Summary;
+
+/// An error on standard error; wrong input with file, line and the offending text.
+pub fn error(error: &Error) {
+    match error {
+        Error::Input(input) => {
+            let mut text = String::new();
+            match GraphicalReportHandler::new().render_report(&mut text, input.as_ref()) {
+                Ok(()) => eprint!("{text}"),
+                Err(_) => eprintln!("error: {input}"),
+            }
+        }
+        other => eprintln!("error: {other}"),
+    }
+}
+
+/// A table as wide as the terminal.
+pub fn table(headers: &[&str]) -> Table {
+    let mut table = Table::new();
+    table.load_preset(presets::UTF8_FULL_CONDENSED).set_content_arrangement(ContentArrangement::Dynamic);
+    table.set_header(headers.iter().copied());
+    table
+}
+
+/// The figures of a run.
+pub fn summary(s: &Summary) -> Table {
+    let mut t = table(&["figure", "value"]);
+    let mut row = |name: &str, value: String| {
+        t.add_row([name.to_owned(), value]);
+    };
+    row("scenario", s.scenario.clone());
+    row("gluing", format!("{} ({})", s.strategy, s.form));
+    row("soil", s.soil_module.clone().unwrap_or_else(|| "none".into()));
+    row("simulated", format!("{:.3} s in {} steps", s.simulated_s, s.steps));
+    row("real-time factor", format!("{:.2} ({:.2} s of wall time)", s.real_time_factor, s.wall_s));
+    row("distance", distance(s));
+    row("largest roll, pitch", format!("{}, {}", degrees(s.max_roll_rad), degrees(s.max_pitch_rad)));
+    row("largest sinkage", s.max_sinkage_m.map_or_else(none, |z| format!("{:.1} mm", 1e3 * z)));
+    row("energy at the motors", format!("{:.1} J", s.energy_j));
+    row("cost of transport", s.cost_of_transport.map_or_else(none, |c| format!("{c:.2}")));
+    row(
+        "evaluations of the bodies",
+        format!("{:.2} mean, {} at most", s.evaluations_mean, s.evaluations_max),
+    );
+    row("steps not converged", s.steps_not_converged.to_string());
+    row("largest gap", format!("{:.2e} m", s.max_gap_m));
+    row("largest action–reaction gap", format!("{:.2e} N", s.max_action_reaction_gap_n));
+    row("error of the soil's mass", s.soil_mass_error_relative.map_or_else(none, |e| format!("{e:.1e}")));
+    t
+}
+
+fn none() -> String {
+    "–".into()
+}
+
+fn degrees(angle: Option<f64>) -> String {
+    angle.map_or_else(none, |a| format!("{:.1}°", a.to_degrees()))
+}
+
+fn distance(s: &Summary) -> String {
+    match (s.distance_m, s.commanded_distance_m) {
+        (Some(d), Some(c)) if c.abs() > 1e-9 => {
+            format!("{d:.3} m of {c:.3} m commanded ({:.0} %)", 100.0 * d / c)
+        }
+        (Some(d), _) => format!("{d:.3} m"),
+        _ => none(),
+    }
+}

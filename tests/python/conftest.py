@@ -1,0 +1,43 @@
+"""Runs the program as a user would: short scenarios into temporary folders."""
+
+import json
+import os
+import pathlib
+import subprocess
+
+import pytest
+
+ROOT = pathlib.Path(__file__).resolve().parents[2]
+PROGRAM = os.environ.get("TERRAGLUE_BIN", str(ROOT / "target" / "debug" / "terraglue"))
+MOON_WALK = ROOT / "scenarios" / "moon_walk.toml"
+
+
+def terraglue(*arguments, cwd=ROOT, timeout=300):
+    """The finished process; output as text."""
+    command = [PROGRAM, *map(str, arguments)]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=timeout)
+
+
+@pytest.fixture(scope="session")
+def short_run(tmp_path_factory):
+    """Half a second of moon_walk: (folder, summary as printed, process)."""
+    folder = tmp_path_factory.mktemp("run") / "out"
+    process = terraglue("run", MOON_WALK, "--duration", "0.5", "--out", folder, "--json", "--csv")
+    assert process.returncode == 0, process.stderr
+    return folder, json.loads(process.stdout), process
+
+
+@pytest.fixture
+def edited(tmp_path):
+    """Writes moon_walk with one replacement beside links to models; returns its path."""
+
+    def edit(old, new):
+        text = MOON_WALK.read_text()
+        assert old in text
+        (tmp_path / "models").exists() or (tmp_path / "models").symlink_to(ROOT / "models")
+        (tmp_path / "scenarios").mkdir(exist_ok=True)
+        path = tmp_path / "scenarios" / "walk.toml"
+        path.write_text(text.replace(old, new, 1))
+        return path
+
+    return edit

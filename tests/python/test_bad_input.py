@@ -1,0 +1,86 @@
+"""Wrong input ends with exit code 2 and a message with file, line, the offending text and the way out."""
+
+import pytest
+from conftest import MOON_WALK, ROOT, terraglue
+
+
+def refused(*arguments):
+    process = terraglue(*arguments)
+    assert process.returncode == 2, (process.returncode, process.stderr)
+    assert "panicked" not in process.stderr
+    return process.stderr
+
+
+def test_missing_unreadable_and_empty_scenarios(tmp_path):
+    assert "moon_walk.toml" in refused("run", ROOT / "scenarios" / "moon_wlk.toml")
+    assert "cannot read the scenario" in refused("run", tmp_path)
+    empty = tmp_path / "empty.toml"
+    empty.write_text("")
+    assert "is empty" in refused("run", empty)
+    binary = tmp_path / "binary.toml"
+    binary.write_bytes(b"\xff\xfe\x00")
+    assert "cannot read the scenario" in refused("run", binary)
+
+
+@pytest.mark.parametrize(
+    "old, new, expected",
+    [
+        ("[gluing]", "[glueing]", ["unknown table `[glueing]`", "`gluing`"]),
+        ("strategy", "stratgy", ["unknown key `stratgy`", "`strategy`"]),
+        ('strategy = "cooperative"', 'strategy = "coop"', ["unknown strategy `coop`", "`cooperative`", "`iterative`"]),
+        ('strategy = "cooperative"', "strategy = 3", ["`strategy` takes", "not 3"]),
+        ("spacing_m = 0.01", "spacing_m = -0.01", ["-0.01 is out of range", "greater than 0 m"]),
+        ("step_s = 0.001", "step_s = 0.0", ["0.0 is out of range"]),
+        ('module = "soil-cellular-automaton"', 'module = "soil-celular-automaton"', ["`soil-cellular-automaton`"]),
+        ("gait.*.angle_target", "gait.*.angle_targt", ["angle_targt"]),
+        ("lunar_nominal_Apollo", "lunar_nominal_Apolo", ["there is no soil", "`lunar_nominal_Apollo`"]),
+    ],
+)
+def test_mistakes_in_a_scenario(edited, old, new, expected):
+    message = refused("check", edited(old, new))
+    assert "walk.toml:" in message
+    for text in expected:
+        assert text in message, message
+
+
+def test_events_and_connections_that_make_no_sense(edited):
+    event = '[[event]]\nat_s = 1.0\nset = { "robot.LF_j2.max_torqe" = 0.0 }\n\n[gluing]'
+    message = refused("check", edited("[gluing]", event))
+    assert "robot.LF_j2.max_torque" in message and "walk.toml:" in message
+    connect = '[[connect]]\nfrom = "robot.body.z"\nto = "robot.LF_j1.angle_target"\n\n[gluing]'
+    message = refused("check", edited("[gluing]", connect))
+    assert "rad" in message and "walk.toml:" in message
+
+
+def test_edits_are_shown_as_they_were_written():
+    message = refused("run", MOON_WALK, "--set", "soil.modle=soil-bekker")
+    assert "--set" in message and "soil.modle=soil-bekker" in message
+    assert refused("run", MOON_WALK, "--set", "gluing.strategy")
+
+
+def test_a_robot_with_zero_inertia_is_refused(edited, tmp_path):
+    text = (ROOT / "models" / "hexapod.urdf").read_text()
+    start = text.index("<inertia ")
+    end = text.index("/>", start)
+    zero = '<inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"'
+    (tmp_path / "zero.urdf").write_text(text[:start] + zero + text[end:])
+    message = refused("check", edited("../models/hexapod.urdf", "../zero.urdf"))
+    assert "inertia" in message and "zero.urdf" in message
+
+
+def test_a_truncated_elevation_file_is_refused(edited, tmp_path):
+    grid = "ncols 4\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 0.5\n0 0 0 0\n0 0\n"
+    (tmp_path / "cut.asc").write_text(grid)
+    path = edited("[gluing]", "[gluing]")
+    lines = path.read_text().splitlines()
+    begin = lines.index("[terrain]")
+    end = next(i for i in range(begin + 1, len(lines)) if lines[i].startswith("["))
+    lines[begin:end] = ["[terrain]", 'kind = "esri-ascii"', 'file = "../cut.asc"', ""]
+    path.write_text("\n".join(lines))
+    assert "cut.asc" in refused("check", path)
+
+
+def test_wrong_usage():
+    assert "Usage" in refused("run")
+    assert refused("run", MOON_WALK, "--no-such-option")
+    assert "recording.mcap" in refused("report", ROOT / "docs")

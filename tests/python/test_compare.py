@@ -1,0 +1,44 @@
+"""The comparison as a user's script reads it, and the listings."""
+
+import csv
+import json
+
+from conftest import MOON_WALK, ROOT, terraglue
+
+SOILS = ["soil-cellular-automaton", "soil-bekker"]
+STRATEGIES = ["cooperative", "iterative"]
+
+
+def test_compare_writes_a_row_per_combination(tmp_path):
+    process = terraglue("compare", MOON_WALK, "--duration", "0.1", "--out", tmp_path, "--quiet",
+                        "--strategies", ",".join(STRATEGIES), "--soils", ",".join(SOILS))
+    assert process.returncode == 0, process.stderr
+    comparison = json.loads((tmp_path / "compare.json").read_text())
+    rows = comparison["rows"] if isinstance(comparison, dict) else comparison
+    found = {(row["strategy"], row["soil_module"]) for row in rows}
+    assert found == {(strategy, soil) for strategy in STRATEGIES for soil in SOILS}
+    assert len(rows) == 4
+    with open(tmp_path / "compare.csv", newline="") as file:
+        assert len(list(csv.DictReader(file))) == 4
+    assert (tmp_path / "compare.html").is_file()
+
+
+def test_compare_refuses_unknown_names():
+    for option, name in (("--strategies", "iterativ"), ("--soils", "soil-beker")):
+        process = terraglue("compare", MOON_WALK, option, name)
+        assert process.returncode == 2 and name in process.stderr
+
+
+def test_listings():
+    soils = terraglue("soils")
+    assert soils.returncode == 0 and "lunar_nominal_Apollo" in soils.stdout
+    modules = terraglue("modules", "--json")
+    names = {module["name"] for module in json.loads(modules.stdout)}
+    assert {"rigid-body", "gait", *SOILS} <= names
+    variables = terraglue("variables", MOON_WALK)
+    assert variables.returncode == 0, variables.stderr
+    for name in ("robot.LF_j2.max_torque", "gait.LF_j2.angle_target", "robot.LF_j2.break"):
+        assert name in variables.stdout
+    check = terraglue("check", MOON_WALK)
+    assert check.returncode == 0 and "is good" in check.stdout
+    assert (ROOT / "docs" / "scenario.schema.json").is_file()

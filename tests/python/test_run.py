@@ -1,0 +1,170 @@
+"""Reads what a run leaves behind, as a user's script would."""
+
+import csv
+import json
+import math
+import os
+import signal
+import subprocess
+import time
+
+from conftest import MOON_WALK, PROGRAM, ROOT, terraglue
+from mcap.stream_reader import StreamReader
+from mcap.records import Channel, Message, Schema
+
+SUMMARY_KEYS = """status error events scenario strategy soil_module steps simulated_s wall_s cpu_s real_time_factor
+distance_m commanded_distance_m max_roll_rad max_pitch_rad max_sinkage_m energy_j cost_of_transport evaluations_mean
+evaluations_max steps_not_converged max_gap_m max_action_reaction_gap_n soil_mass_error_relative recording
+report""".split()
+
+
+def records(path):
+    with open(path, "rb") as file:
+        yield from StreamReader(file).records
+
+
+def test_summary_holds_the_promised_figures(short_run):
+    folder, printed, _ = short_run
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary == printed
+    assert [key for key in SUMMARY_KEYS if key not in summary] == []
+    assert summary["status"] == "done" and summary["error"] is None
+    assert summary["scenario"] == "moon_walk"
+    assert summary["steps"] == 500 and math.isclose(summary["simulated_s"], 0.5)
+    assert summary["steps_not_converged"] == 0
+    assert summary["soil_mass_error_relative"] == 0.0
+    assert summary["evaluations_mean"] == 1.0 and summary["evaluations_max"] == 1
+    for name in ("recording", "report"):
+        assert (folder / summary[name]).is_file()
+
+
+def test_no_number_is_missing_or_wrong(short_run):
+    _, summary, _ = short_run
+    assert 0.0 < summary["max_sinkage_m"] < 0.06
+    assert abs(summary["max_roll_rad"]) < math.radians(15)
+    assert summary["real_time_factor"] > 0 and summary["cpu_s"] > 0
+
+
+def test_recording_has_the_promised_topics(short_run):
+    folder, _, _ = short_run
+    channels, counts, last = {}, {}, {}
+    schemas = {}
+    for record in records(folder / "recording.mcap"):
+        if isinstance(record, Schema):
+            schemas[record.id] = record.name
+        elif isinstance(record, Channel):
+            channels[record.id] = record
+        elif isinstance(record, Message):
+            topic = channels[record.channel_id].topic
+            counts[topic] = counts.get(topic, 0) + 1
+            last[topic] = record
+    for topic in ("/robot", "/soil", "/gait", "/tf", "/scene", "/ground", "/gluing"):
+        assert counts.get(topic, 0) > 0, f"{topic} is missing from {sorted(counts)}"
+    # Time stamps are simulated time, in order.
+    assert last["/robot"].log_time == 500_000_000
+    robot = json.loads(last["/robot"].data)
+    assert robot and all(isinstance(v, (int, float, bool, str, list, dict)) for v in robot.values())
+
+
+def test_csv_has_time_and_dotted_names(short_run):
+    folder, _, _ = short_run
+    with open(folder / "variables.csv", newline="") as file:
+        rows = list(csv.DictReader(file))
+    assert "t_s" in rows[0] and "robot.LF_j2.angle" in rows[0]
+    times = [float(row["t_s"]) for row in rows]
+    assert times[0] == 0.0 and math.isclose(times[-1], 0.5)
+    assert all(a < b for a, b in zip(times, times[1:]))
+    assert all(math.isfinite(float(row["robot.body.z"])) for row in rows)
+
+
+def test_final_ground_is_an_esri_grid(short_run):
+    folder, _, _ = short_run
+    lines = (folder / "final_ground.asc").read_text().splitlines()
+    head = {words[0].lower(): float(words[1]) for words in map(str.split, lines[:6])}
+    columns, rows = int(head["ncols"]), int(head["nrows"])
+    values = [float(v) for line in lines[5:] if line[0] not in "NnCcXxYy" for v in line.split()]
+    assert len(values) == columns * rows and all(map(math.isfinite, values))
+
+
+def test_report_needs_no_network(short_run):
+    folder, _, _ = short_run
+    page = (folder / "report.html").read_text()
+    assert page.lstrip().lower().startswith("<!doctype html")
+    for needle in ('src="http', "src='http", "@import", 'rel="stylesheet" href="http'):
+        assert needle not in page
+
+
+def test_quiet_run_prints_nothing_and_json_only_json(short_run, tmp_path):
+    _, _, process = short_run
+    assert process.stdout.lstrip().startswith("{")
+    quiet = terraglue("run", MOON_WALK, "--duration", "0.01", "--out", tmp_path / "q", "--quiet")
+    assert (quiet.returncode, quiet.stdout) == (0, "")
+
+
+def test_earlier_runs_are_renamed(tmp_path):
+    scenario = str(MOON_WALK)
+    for _ in range(3):
+        assert terraglue("run", scenario, "--duration", "0.01", "--quiet", cwd=tmp_path).returncode == 0
+    assert sorted(p.name for p in (tmp_path / "runs").iterdir()) == ["moon_walk", "moon_walk.1", "moon_walk.2"]
+
+
+def start(folder, *arguments):
+    command = [PROGRAM, "run", str(MOON_WALK), "--out", str(folder), "--quiet", *arguments]
+    return subprocess.Popen(command, cwd=ROOT, stdout=subprocess.PIPE, stderr=subprocess.PIPE)
+
+
+def wait_for_bytes(path, size, process):
+    for _ in range(600):
+        if path.exists() and path.stat().st_size > size:
+            return
+        assert process.poll() is None, process.stderr.read()
+        time.sleep(0.1)
+    raise AssertionError(f"{path} did not grow")
+
+
+def test_a_killed_run_can_still_be_reported(tmp_path):
+    folder = tmp_path / "killed"
+    process = start(folder, "--duration", "600")
+    wait_for_bytes(folder / "recording.mcap", 200_000, process)
+    process.kill()
+    process.wait()
+    process.stdout.close(), process.stderr.close()
+    cut = sum(isinstance(r, Message) for r in records_of_cut_file(folder / "recording.mcap"))
+    assert cut > 0
+    report = terraglue("report", folder)
+    assert report.returncode == 0, report.stderr
+    assert (folder / "report.html").is_file()
+    mended = sum(isinstance(r, Message) for r in records(folder / "recording.mcap"))
+    assert mended >= cut > 0
+
+
+def records_of_cut_file(path):
+    with open(path, "rb") as file:
+        try:
+            yield from StreamReader(file).records
+        except Exception:  # the reader raises at the cut; what came before counts
+            return
+
+
+def test_an_interrupted_run_closes_its_recording(tmp_path):
+    folder = tmp_path / "stopped"
+    process = start(folder, "--duration", "600")
+    wait_for_bytes(folder / "recording.mcap", 100_000, process)
+    process.send_signal(signal.SIGINT)
+    process.communicate(timeout=60)
+    assert process.returncode == 130
+    summary = json.loads((folder / "summary.json").read_text())
+    assert summary["status"] == "stopped" and 0 < summary["simulated_s"] < 600
+    assert sum(isinstance(r, Message) for r in records(folder / "recording.mcap")) > 0
+
+
+def test_threads_do_not_change_a_byte(tmp_path):
+    recordings = []
+    for threads in ("1", "2"):
+        folder = tmp_path / threads
+        run = terraglue("run", MOON_WALK, "--duration", "0.2", "--threads", threads, "--out", folder, "--quiet")
+        assert run.returncode == 0, run.stderr
+        recordings.append((folder / "recording.mcap").read_bytes())
+    assert recordings[0] == recordings[1]
+    assert os.uname().nodename.encode() not in recordings[0]
+    assert str(tmp_path).encode() not in recordings[0]

@@ -11,7 +11,7 @@
 //! | `final_ground.asc` | the ground at the end as ESRI ASCII grid |
 //!
 //! [`Recording`] reads any recording, also one that was cut off ([`mend`] gives such a file its footer);
-//! [`report::write`] makes the report from it.
+//! [`report::write`] makes the report from it, [`compare::write`] puts several runs side by side.
 
 mod csv;
 mod final_ground;
@@ -30,6 +30,7 @@ mod summary;
 mod summary_observer;
 mod table;
 
+pub mod compare;
 pub mod report;
 
 #[cfg(test)]

@@ -1,1 +1,107 @@
-//! Several runs side by side.
+//! Several runs side by side: a table in the terminal, `compare.html`, `compare.csv` and `compare.json`.
+//!
+//! A run that diverged is data: its row says so and when, and keeps the figures up to then.
+
+mod columns;
+mod page;
+mod table;
+
+use crate::error::Result;
+use crate::recording::layout::{at, other_at};
+use crate::recording::summary::{Status, Summary};
+use serde_json::{Map, Value};
+use std::path::{Path, PathBuf};
+
+/// The comparison as a page.
+pub const COMPARE_PAGE: &str = "compare.html";
+/// The comparison as a table for other programs.
+pub const COMPARE_TABLE: &str = "compare.csv";
+/// The comparison with all of every summary.
+pub const COMPARE_JSON: &str = "compare.json";
+
+/// One run of a comparison.
+#[derive(Clone, Debug, PartialEq)]
+pub struct CompareRow {
+    /// Gluing strategy.
+    pub strategy: String,
+    /// Soil module.
+    pub soil: String,
+    /// Its figures; `None` where the run could not even start.
+    pub summary: Option<Summary>,
+    /// Its results folder, for the curves and the link to its report.
+    pub folder: Option<PathBuf>,
+    /// What went wrong.
+    pub error: Option<String>,
+    /// Mean evaluations of the bodies per step when the iteration does not start from the estimate.
+    pub cold_start_mean: Option<f64>,
+}
+
+impl CompareRow {
+    /// Name of the run.
+    pub fn name(&self) -> String {
+        if self.soil.is_empty() {
+            self.strategy.clone()
+        } else {
+            format!("{} · {}", self.strategy, self.soil)
+        }
+    }
+
+    /// `diverged at t = … s: …`; `None` where the run reached its end.
+    pub fn failure(&self) -> Option<String> {
+        let recorded = self.summary.as_ref().and_then(|s| s.error.as_ref());
+        let message = self.error.as_deref().or(recorded.map(|e| e.message.as_str()));
+        match (&self.summary, message) {
+            (Some(s), message) if s.status == Status::Failed => {
+                let t_s = recorded.and_then(|e| e.time_s).unwrap_or(s.simulated_s);
+                Some(format!("diverged at t = {t_s:.4} s: {}", message.unwrap_or("no message")))
+            }
+            (Some(s), None) if s.status == Status::Stopped => {
+                Some(format!("stopped at t = {:.4} s", s.simulated_s))
+            }
+            (_, Some(message)) => Some(message.to_owned()),
+            (None, None) => Some("no result".into()),
+            (Some(_), None) => None,
+        }
+    }
+}
+
+/// Writes `compare.html`, `compare.csv` and `compare.json` into a folder.
+pub fn write(folder: &Path, rows: &[CompareRow]) -> Result {
+    std::fs::create_dir_all(folder).map_err(at(folder))?;
+    let path = folder.join(COMPARE_TABLE);
+    table::write_csv(&path, rows).map_err(other_at(&path))?;
+    let path = folder.join(COMPARE_JSON);
+    let mut text = serde_json::to_string_pretty(&json(folder, rows)).map_err(other_at(&path))?;
+    text.push('\n');
+    std::fs::write(&path, text).map_err(at(&path))?;
+    let path = folder.join(COMPARE_PAGE);
+    std::fs::write(&path, page::render(folder, rows)).map_err(at(&path))
+}
+
+/// The comparison for a terminal: one column per run, the best figure of each line marked with `*`.
+pub fn terminal_table(rows: &[CompareRow]) -> String {
+    table::terminal(rows)
+}
+
+/// The folder of a row as it is seen from the comparison's folder.
+fn relative(folder: &Path, row: &CompareRow) -> Option<String> {
+    let inside = row.folder.as_deref()?.strip_prefix(folder).ok()?;
+    Some(inside.to_string_lossy().replace('\\', "/"))
+}
+
+fn json(folder: &Path, rows: &[CompareRow]) -> Value {
+    let one = |row: &CompareRow| {
+        let mut object = Map::new();
+        object.insert("strategy".into(), row.strategy.as_str().into());
+        object.insert("soil".into(), row.soil.as_str().into());
+        object.insert("error".into(), row.failure().into());
+        for column in columns::ALL {
+            object.insert(column.key.into(), (column.value)(row).into());
+        }
+        object.insert("folder".into(), relative(folder, row).into());
+        object.insert("summary".into(), serde_json::to_value(&row.summary).unwrap_or_default());
+        Value::Object(object)
+    };
+    let scenario = rows.iter().find_map(|r| r.summary.as_ref()).map(|s| s.scenario.as_str());
+    serde_json::json!({ "scenario": scenario, "rows": rows.iter().map(one).collect::<Vec<_>>() })
+}

@@ -83,7 +83,7 @@ fn joints(recording: &Recording) -> Option<Figure> {
             let name = part.replace('_', " ");
             known.then(|| Curve { dashed, ..Curve::new(name, colour, t, y.to_vec()) })
         };
-        let rows: [(&str, &str, [(&str, bool); 2]); 3] = [
+        let rows = [
             ("torque", "N m", [("torque", false), ("torque_target", true)]),
             ("angular velocity", "rad/s", [("velocity", false), ("velocity_target", true)]),
             ("angle", "rad", [("angle", false), ("angle_target", true)]),

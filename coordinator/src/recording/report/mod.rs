@@ -6,7 +6,7 @@ mod cards;
 mod colour_map;
 pub(crate) mod figure;
 mod figures;
-mod footprints;
+pub(crate) mod footprints;
 mod ground_map;
 pub(crate) mod html;
 pub(crate) mod page;

@@ -256,7 +256,7 @@ impl Rig {
     fn foot(k: usize, t: f64) -> ([f64; 3], bool) {
         let side = if k < 3 { 0.32 } else { -0.32 };
         let along = [0.28, 0.0, -0.28][k % 3];
-        let phase = t + if k % 2 == 0 { 0.0 } else { 0.5 };
+        let phase = t + if k.is_multiple_of(2) { 0.0 } else { 0.5 };
         let (cycle, share) = (phase.floor(), phase.fract());
         let stride = SPEED;
         let (x, stands) = match share {
@@ -279,7 +279,7 @@ impl Rig {
         report.rank = (6 * self.iterations, 6 * self.iterations);
         for k in 0..self.feet {
             let (origin, stands) = Self::foot(k, t);
-            let phase = (t + if k % 2 == 0 { 0.0 } else { 0.5 }).fract();
+            let phase = (t + if k.is_multiple_of(2) { 0.0 } else { 0.5 }).fract();
             let load =
                 if stands { 13.5 * libm::sin((phase * 2.0) * std::f64::consts::PI).sqrt() } else { 0.0 };
             report.ports.push(PortReport {

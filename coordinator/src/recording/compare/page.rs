@@ -1,0 +1,148 @@
+//! `compare.html`: the table with the best figure of each column marked, and curves of all runs in one picture.
+
+use crate::recording::compare::{CompareRow, columns, relative, table};
+use crate::recording::reader::Recording;
+use crate::recording::report::figure::{Curve, Figure, Panel};
+use crate::recording::report::footprints::{self, Leg};
+use crate::recording::report::html::escape;
+use crate::recording::report::page::Page;
+use crate::recording::{REPORT, WindowRecord};
+use std::fmt::Write;
+use std::path::Path;
+
+/// A run with what its recording shows.
+struct Run {
+    name: String,
+    colour: usize,
+    recording: Recording,
+    legs: Vec<Leg>,
+}
+
+/// The page as text.
+pub(crate) fn render(folder: &Path, rows: &[CompareRow]) -> String {
+    let scenario = rows.iter().find_map(|r| r.summary.as_ref()).map_or("", |s| &s.scenario);
+    let mut page = Page::new(&format!("{scenario}: comparison"));
+    let ended = rows.iter().filter(|r| r.failure().is_none()).count();
+    page.header(&format!(
+        "<p class=\"lead\"><span>{} runs of <b>{}</b>, {ended} reached their end</span></p>",
+        rows.len(),
+        escape(scenario)
+    ));
+    page.section("Figures", "figures", &html_table(folder, rows));
+    let runs: Vec<Run> = rows.iter().enumerate().filter_map(|(k, row)| open(k, row)).collect();
+    for figure in [gluing(&runs), forces(&runs), body(&runs)].into_iter().flatten() {
+        page.figure(figure);
+    }
+    page.finish()
+}
+
+/// A recording that cannot be read leaves its row without curves; the table says what went wrong with the run.
+fn open(colour: usize, row: &CompareRow) -> Option<Run> {
+    let recording = Recording::open(row.folder.as_deref()?).ok()?;
+    let legs = footprints::legs(&recording);
+    Some(Run { name: row.name(), colour, recording, legs })
+}
+
+fn html_table(folder: &Path, rows: &[CompareRow]) -> String {
+    let shown: Vec<&columns::Column> =
+        columns::ALL.iter().filter(|c| rows.iter().any(|r| (c.value)(r).is_some())).collect();
+    let marks: Vec<Vec<bool>> = shown.iter().map(|c| columns::best(c, rows)).collect();
+    let mut out = String::from("<div class=\"wide\"><table class=\"rows\"><thead><tr>");
+    out.push_str("<th class=\"name\">strategy</th><th class=\"name\">soil</th><th class=\"name\">form</th>");
+    for column in &shown {
+        let _ = write!(out, "<th>{}</th>", escape(column.title));
+    }
+    out.push_str("</tr></thead><tbody>");
+    for (k, row) in rows.iter().enumerate() {
+        let failure = row.failure();
+        let _ = write!(out, "<tr{}>", if failure.is_some() { " class=\"failed\"" } else { "" });
+        let strategy = match relative(folder, row) {
+            Some(place) => format!("<a href=\"{}/{REPORT}\">{}</a>", escape(&place), escape(&row.strategy)),
+            None => escape(&row.strategy),
+        };
+        let form = row.summary.as_ref().map_or("–", |s| &s.form);
+        for text in [strategy, escape(&row.soil), escape(form)] {
+            let _ = write!(out, "<td class=\"name\">{text}</td>");
+        }
+        for (column, best) in shown.iter().zip(&marks) {
+            let class = if best[k] { " class=\"best\"" } else { "" };
+            let _ = write!(out, "<td{class}>{}</td>", escape(&table::cell((column.value)(row), column.unit)));
+        }
+        out.push_str("</tr>");
+        if let Some(failure) = failure {
+            let span = shown.len() + 3;
+            let _ = write!(
+                out,
+                "<tr class=\"failed\"><td class=\"why\" colspan=\"{span}\">{}</td></tr>",
+                escape(&failure)
+            );
+        }
+    }
+    out.push_str("</tbody></table></div><p class=\"hint\">● best of its column among the runs that reached their end.</p>");
+    out
+}
+
+fn panel(runs: &[Run], quantity: &str, unit: &str, steps: bool, f: fn(&WindowRecord) -> f64) -> Panel {
+    let curve = |run: &Run| {
+        let rows = || run.recording.gluing.iter().filter(|g| g.since_last.steps > 0);
+        let t: Vec<f64> = rows().map(|g| g.t).collect();
+        let y = rows().map(|g| f(&g.since_last)).collect();
+        Curve { steps, ..Curve::new(run.name.clone(), run.colour, &t, y) }
+    };
+    Panel::new(quantity, unit, runs.iter().map(curve).collect())
+}
+
+fn gluing(runs: &[Run]) -> Option<Figure> {
+    if runs.iter().all(|r| r.recording.gluing.len() < 2) {
+        return None;
+    }
+    let panels = vec![
+        panel(runs, "evaluations of bodies", "", true, |w| f64::from(w.evaluations_bodies_max)),
+        panel(runs, "evaluations of soil", "", true, |w| f64::from(w.evaluations_soil_max)),
+        panel(runs, "gap", "m", false, |w| w.max_gap_m).log(true),
+        panel(runs, "action–reaction gap", "N", false, |w| w.max_action_reaction_gap_n).log(true),
+    ];
+    let note = "Per step; the largest of all steps since the record before.".into();
+    Some(Figure { id: "gluing", title: "Gluing".into(), note, panels, ..Figure::default() })
+}
+
+/// One picture per foot, all runs in it.
+fn forces(runs: &[Run]) -> Option<Figure> {
+    let mut feet: Vec<String> = runs.iter().flat_map(|r| r.legs.iter().map(|l| l.body.clone())).collect();
+    feet.sort();
+    feet.dedup();
+    if feet.is_empty() {
+        return None;
+    }
+    let panel = |(choice, foot): (usize, &String)| {
+        let curve = |run: &Run| {
+            let leg = run.legs.iter().find(|l| l.body == *foot)?;
+            let t: Vec<f64> = run.recording.gluing.iter().map(|g| g.t).collect();
+            Some(Curve::new(run.name.clone(), run.colour, &t, leg.normal_n.clone()))
+        };
+        let curves = runs.iter().filter_map(curve).collect();
+        Panel { choice: Some(choice), ..Panel::new(&format!("normal force on {foot}"), "N", curves) }
+    };
+    let panels = feet.iter().enumerate().map(panel).collect();
+    let note = "Force that the ground exerts along its normal on one foot, in every run.".into();
+    Some(Figure { id: "forces", title: "Foot force".into(), note, choices: feet, chosen: 0, panels })
+}
+
+fn body(runs: &[Run]) -> Option<Figure> {
+    let along = |axis: usize| {
+        let curve = |run: &Run| {
+            let (_, poses) = run.recording.reported_body()?;
+            let y = poses.position.iter().map(|p| p[axis]).collect();
+            Some(Curve::new(run.name.clone(), run.colour, &poses.t_s, y))
+        };
+        runs.iter().filter_map(curve).collect::<Vec<_>>()
+    };
+    let panels = vec![
+        Panel::new("height", "m", along(2)),
+        Panel::new("position x", "m", along(0)),
+        Panel::new("position y", "m", along(1)),
+    ];
+    let note = "Origin of the reported body in the world.".into();
+    let figure = Figure { id: "body", title: "Body".into(), note, panels, ..Figure::default() };
+    (!figure.panels[0].curves.is_empty()).then_some(figure)
+}

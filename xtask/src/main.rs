@@ -1,5 +1,6 @@
-//! The developer commands, the same as in CI: `cargo xtask test | validate | schema | install`.
+//! The developer commands, the same as in CI: `cargo xtask test | validate | header | schema | install`.
 
+mod header;
 mod install;
 mod process;
 mod schema;
@@ -25,6 +26,12 @@ enum Command {
     Test,
     /// Measure the figures that the areas promise and hold them against their limits.
     Validate(validate::Arguments),
+    /// Write interfaces/plugin/include/terraglue.h from the Rust definitions of the C ABI.
+    Header {
+        /// Change nothing; fail when the file is out of date.
+        #[arg(long)]
+        check: bool,
+    },
     /// Write docs/scenario.schema.json and the key tables of docs/scenario.md.
     Schema {
         /// Change nothing; fail when a file is out of date.
@@ -42,6 +49,7 @@ fn main() -> ExitCode {
     let done: Outcome = match Arguments::parse().command {
         Command::Test => test::test(),
         Command::Validate(arguments) => validate::validate(&arguments),
+        Command::Header { check } => header::run(check),
         Command::Schema { check } => schema::write_files(check),
         Command::Install { prefix } => install::install(&prefix),
     };

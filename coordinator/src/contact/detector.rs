@@ -6,7 +6,7 @@ use super::port_set::{PortOwner, PortSet, port_key};
 use crate::error::{Error, Result};
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Vector;
-use terraglue_ground::{Placed, Surface, compose, nodes_below};
+use terraglue_ground::{Aabb as Bounding, Placed, Surface, compose, nodes_below};
 use terraglue_subsystem::{
     BodyState, Law, Node, Port, PortKind, Pose, Scene, SceneShape, Subsystem, Terrain,
 };
@@ -63,6 +63,8 @@ struct Shape {
     mask: u32,
     body_from_shape: Pose,
     placed: Placed,
+    /// Its box in the world at the start of the step.
+    bounds: Bounding,
 }
 
 impl ContactDetector {
@@ -140,13 +142,17 @@ impl ContactDetector {
 
 /// Shapes that can be hit, in ascending order of id.
 fn shapes_of(scene: &Scene) -> Vec<Shape> {
-    let shape = |s: &SceneShape| Shape {
-        id: s.id,
-        body: s.body,
-        name: s.name.clone(),
-        mask: mask(&s.geometry),
-        body_from_shape: s.body_from_shape,
-        placed: Placed::new(&s.geometry, &s.body_from_shape),
+    let shape = |s: &SceneShape| {
+        let placed = Placed::new(&s.geometry, &s.body_from_shape);
+        Shape {
+            id: s.id,
+            body: s.body,
+            name: s.name.clone(),
+            mask: mask(&s.geometry),
+            body_from_shape: s.body_from_shape,
+            bounds: placed.aabb(),
+            placed,
+        }
     };
     let mut shapes: Vec<Shape> = scene.shapes.iter().filter(|s| s.collides).map(shape).collect();
     shapes.sort_by_key(|s| s.id);
@@ -169,6 +175,7 @@ impl Bodies {
                 return Err(failed(now, message));
             }
             shape.placed.move_to(&compose(&state.world_from_body, &shape.body_from_shape));
+            shape.bounds = shape.placed.aabb();
         }
         Ok(())
     }
@@ -229,7 +236,7 @@ impl Bodies {
 impl Shape {
     /// How far any point of the shape can get within the step, and the margin: |v|h + ½|g|h² + margin.
     fn reach(&self, now: &Now, state: &BodyState) -> f64 {
-        let bounds = self.placed.aabb();
+        let bounds = &self.bounds;
         let c = bounds.centre();
         let r: [f64; 3] = std::array::from_fn(|k| c[k] - state.world_from_body.position[k]);
         let (v, w) = (state.linear_velocity, state.angular_velocity);
@@ -244,7 +251,7 @@ impl Shape {
 
     /// Its box enlarged by `reach`, sideways not beyond what lies under it.
     fn swept(&self, reach: f64) -> Aabb {
-        let bounds = self.placed.aabb();
+        let bounds = &self.bounds;
         let [x0, y0, z0] = bounds.min;
         let [x1, y1, z1] = bounds.max;
         // A height field hit along its normal is hit vertically within five times that (slopes up to 78°).
@@ -253,7 +260,7 @@ impl Shape {
 
     /// The port without key and node range, whose nodes are appended; `None` when it cannot touch.
     fn port(&self, reader: &Reader, reach: f64, nodes: &mut Vec<Node>) -> Option<Port> {
-        let patch = Patch::find(&self.placed, reader);
+        let patch = Patch::find(&self.placed, &self.bounds, reader);
         let vertical = patch.vertical(reach);
         let first = nodes.len();
         nodes_below(&self.placed, reader, vertical, nodes);
@@ -284,7 +291,7 @@ impl Shape {
     /// A shape smaller than a cell can slip between the nodes: then the nearest one carries it.
     fn node_between(&self, reader: &Reader, patch: &Patch) -> Option<Node> {
         let lattice = reader.lattice();
-        let bounds = self.placed.aabb();
+        let bounds = &self.bounds;
         let (width, depth) = (bounds.max[0] - bounds.min[0], bounds.max[1] - bounds.min[1]);
         let small = width < 2.0 * lattice.spacing && depth < 2.0 * lattice.spacing;
         let [i, j] = lattice.coordinates(patch.origin[0], patch.origin[1]).map(|c| c.round() as i32);

@@ -1,6 +1,6 @@
 //! Frame, origin and extent of a contact patch.
 
-use terraglue_ground::{Placed, Surface, fit_plane};
+use terraglue_ground::{Aabb, Placed, Surface, fit_plane};
 use terraglue_subsystem::{Geometry, Node, component};
 
 /// Smallest upward part of a normal that is reckoned with; steeper ground is no height field any more.
@@ -19,8 +19,7 @@ pub struct Patch {
 
 impl Patch {
     /// Lowest point and normal depend on each other: two rounds, from the vertical, settle both.
-    pub fn find<S: Surface + ?Sized>(shape: &Placed, surface: &S) -> Self {
-        let bounds = shape.aabb();
+    pub fn find<S: Surface + ?Sized>(shape: &Placed, bounds: &Aabb, surface: &S) -> Self {
         // Twice the half width: mostly ground beyond the print that the shape itself has made.
         let radius = (bounds.max[0] - bounds.min[0]).min(bounds.max[1] - bounds.min[1]);
         let mut normal = [0.0, 0.0, 1.0];

@@ -24,11 +24,10 @@ enum Source {
     Fixed(Box<HeightField>),
 }
 
-/// Lowest and highest node of a tile at a generation.
+/// Highest node of a tile at a generation.
 #[derive(Clone, Copy)]
 struct Bound {
     generation: Option<u64>,
-    low: f64,
     high: f64,
 }
 
@@ -53,7 +52,7 @@ impl Ground {
             return Err(failed(format!("the field `height` has no lattice: {lattice:?}, tiles of {edge}")));
         }
         let tiles = lattice.size.map(|n| n.div_ceil(edge) as usize);
-        let unknown = Bound { generation: None, low: 0.0, high: 0.0 };
+        let unknown = Bound { generation: None, high: 0.0 };
         Ok(Self { subsystem, lattice, source, edge, bounds: vec![unknown; tiles[0] * tiles[1]] })
     }
 
@@ -64,6 +63,7 @@ impl Ground {
             source: &self.source,
             instance,
             edge: self.edge,
+            last: Cell::new(None),
             recent: Default::default(),
             trouble: Cell::new(None),
         };
@@ -92,13 +92,17 @@ impl std::fmt::Display for Trouble {
 /// Number of recently read tiles that are remembered along each axis.
 const RECENT: u32 = 4;
 
+/// A tile with its number, or with its first node.
+type Recent<'a> = ([u32; 2], FieldTile<'a>);
+
 /// Reads nodes through the tiles of the last few reads.
 pub struct Reader<'a> {
     lattice: &'a Lattice,
     source: &'a Source,
     instance: &'a dyn Subsystem,
     edge: u32,
-    recent: [Cell<Option<([u32; 2], FieldTile<'a>)>>; (RECENT * RECENT) as usize],
+    last: Cell<Option<Recent<'a>>>,
+    recent: [Cell<Option<Recent<'a>>>; (RECENT * RECENT) as usize],
     trouble: Cell<Option<Trouble>>,
 }
 
@@ -110,10 +114,10 @@ impl<'a> Reader<'a> {
 
     fn tile(&self, a: u32, b: u32) -> Option<FieldTile<'a>> {
         let slot = &self.recent[(b % RECENT * RECENT + a % RECENT) as usize];
-        if let Some((at, tile)) = slot.get() {
-            if at == [a, b] {
-                return Some(tile);
-            }
+        if let Some((at, tile)) = slot.get()
+            && at == [a, b]
+        {
+            return Some(tile);
         }
         let tile = match self.source {
             Source::Field(field) => self.instance.field_tile(*field, a, b).ok(),
@@ -132,16 +136,27 @@ impl<'a> Reader<'a> {
         }
     }
 
-    /// Lowest and highest node of a range inside tile (a, b); i and j inclusive.
-    fn range_bound(&self, i: (u32, u32), j: (u32, u32)) -> (f64, f64) {
-        let (mut low, mut high) = (f64::INFINITY, f64::NEG_INFINITY);
+    #[inline]
+    fn checked(&self, height: f64, i: u32, j: u32) -> f64 {
+        if height.is_finite() {
+            return height;
+        }
+        self.fail(Trouble::Node(i, j));
+        0.0
+    }
+
+    /// Highest node of a range (inclusive); what is above `enough` ends the search.
+    fn highest(&self, i: (u32, u32), j: (u32, u32), enough: f64) -> f64 {
+        let mut high = f64::NEG_INFINITY;
         for j in j.0..=j.1 {
             for i in i.0..=i.1 {
-                let h = self.height(i as i32, j as i32);
-                (low, high) = (low.min(h), high.max(h));
+                high = high.max(self.height(i as i32, j as i32));
+            }
+            if high > enough {
+                return high;
             }
         }
-        (low, high)
+        high
     }
 }
 
@@ -153,13 +168,18 @@ impl Surface for Reader<'_> {
     #[inline]
     fn height(&self, i: i32, j: i32) -> f64 {
         let (i, j) = self.lattice.clamp(i, j);
-        let Some(tile) = self.tile(i / self.edge, j / self.edge) else { return 0.0 };
-        let height = tile.values.at(((j % self.edge) * self.edge + i % self.edge) as usize);
-        if !height.is_finite() {
-            self.fail(Trouble::Node(i, j));
-            return 0.0;
+        // Most reads stay in the tile of the one before: no division.
+        if let Some(([i0, j0], tile)) = self.last.get() {
+            let (a, b) = (i.wrapping_sub(i0), j.wrapping_sub(j0));
+            if a < self.edge && b < self.edge {
+                return self.checked(tile.values.at((b * self.edge + a) as usize), i, j);
+            }
         }
-        height
+        let (a, b) = (i / self.edge, j / self.edge);
+        let Some(tile) = self.tile(a, b) else { return 0.0 };
+        let first = [a * self.edge, b * self.edge];
+        self.last.set(Some((first, tile)));
+        self.checked(tile.values.at(((j - first[1]) * self.edge + i - first[0]) as usize), i, j)
     }
 }
 
@@ -186,7 +206,7 @@ impl Bounds<'_> {
             for a in i0 / edge..=i1 / edge {
                 let i = (i0.max(a * edge), i1.min(a * edge + edge - 1));
                 let j = (j0.max(b * edge), j1.min(b * edge + edge - 1));
-                let (_, high) = self.bound(ground, [a, b], i, j);
+                let high = self.highest(ground, [a, b], i, j, shape.mins.z);
                 let top = Aabb::new(
                     Vector::new(shape.mins.x, shape.mins.y, f64::MIN),
                     Vector::new(shape.maxs.x, shape.maxs.y, high),
@@ -199,20 +219,28 @@ impl Bounds<'_> {
         false
     }
 
-    fn bound(&mut self, ground: &Reader, [a, b]: [u32; 2], i: (u32, u32), j: (u32, u32)) -> (f64, f64) {
+    /// At least the height of the highest node of a range inside tile (a, b).
+    fn highest(
+        &mut self,
+        ground: &Reader,
+        [a, b]: [u32; 2],
+        i: (u32, u32),
+        j: (u32, u32),
+        enough: f64,
+    ) -> f64 {
         let edge = ground.edge;
         let generation = ground.tile(a, b).map(|t| t.generation);
         let bound = &mut self.tiles[(b * ground.lattice.size[0].div_ceil(edge) + a) as usize];
         if generation.is_some() && bound.generation == generation {
-            return (bound.low, bound.high);
+            return bound.high;
         }
         let asked = (i.1 - i.0 + 1) * (j.1 - j.0 + 1);
         if 4 * asked < edge * edge {
-            return ground.range_bound(i, j);
+            return ground.highest(i, j, enough);
         }
         let last = |k: usize, t: u32| (t * edge + edge - 1).min(ground.lattice.size[k] - 1);
-        let (low, high) = ground.range_bound((a * edge, last(0, a)), (b * edge, last(1, b)));
-        *bound = Bound { generation, low, high };
-        (low, high)
+        let high = ground.highest((a * edge, last(0, a)), (b * edge, last(1, b)), f64::INFINITY);
+        *bound = Bound { generation, high };
+        high
     }
 }

@@ -123,10 +123,10 @@ fn a_sphere_on_a_slope_gets_its_normal_and_lowest_point() {
         let port = &set.ports[0];
         assert_eq!((port.mask, port.side, port.body, port.shape), (component::FORCE, 1, 0, 10));
         assert_eq!(port.key, 2 << 48 | 3 << 32 | 10);
-        for k in 0..3 {
-            assert!((port.frame[k] - n[k]).abs() < 1e-6, "{angle}: {:?}", port.frame);
+        for (k, n) in n.iter().enumerate() {
+            assert!((port.frame[k] - n).abs() < 1e-6, "{angle}: {:?}", port.frame);
             let centre = state.world_from_body.position[k];
-            assert!((port.origin[k] - (centre - 0.03 * n[k])).abs() < 1e-7);
+            assert!((port.origin[k] - (centre - 0.03 * n)).abs() < 1e-7);
         }
         // The smallest vertical gap over the nodes, times n_z, is the gap along the normal.
         let gap = (port.origin[2] - port.origin[0] * angle.tan()) * n[2];

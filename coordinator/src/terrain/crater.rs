@@ -3,6 +3,9 @@
 use crate::error::Result;
 use crate::scenario::InputError;
 
+/// Bounds above this are none: their tangent is only large.
+const STEEPEST_RAD: f64 = 1.57;
+
 /// A crater's height over the distance from its centre. The surrounding plain is at 0.
 ///
 /// Both walls have the same shape: the slope grows linearly from 0, stays, and falls linearly to 0 (three
@@ -43,8 +46,7 @@ impl Profile {
             return Err(InputError::plain(message, Some(help.into())).into());
         }
         let radius = 0.5 * diameter;
-        // A bound of 90° is none; its tangent is only large.
-        let steepest = libm::tan(max_slope.min(1.5707));
+        let steepest = libm::tan(max_slope.min(STEEPEST_RAD));
         let share = (1.0 - depth / (radius * steepest)).min(0.5);
         if share <= 0.0 {
             return Err(too_steep(diameter, depth, max_slope).into());

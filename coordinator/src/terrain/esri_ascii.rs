@@ -73,7 +73,6 @@ impl<'a> File<'a> {
     }
 }
 
-#[derive(Default)]
 struct Header {
     size: [usize; 2],
     cell: f64,
@@ -86,56 +85,62 @@ impl Header {
     fn count(&self) -> usize {
         self.size[0].saturating_mul(self.size[1])
     }
+
+    /// Whether all keys are there; what is not stated is 0 (`cellsize`: not a number).
+    fn check(&self, file: &File, cell_line: usize, end: usize) -> Result {
+        let missing = |key: &str| Err(file.error(end, format!("the header has no `{key}`"), None));
+        match (self.size, self.cell) {
+            ([0, _], _) => missing("ncols"),
+            ([_, 0], _) => missing("nrows"),
+            (_, cell) if cell.is_nan() => missing("cellsize"),
+            (_, cell) if cell <= 0.0 => {
+                Err(file.error(cell_line, format!("`cellsize` = {cell} is not positive"), None))
+            }
+            _ => Ok(()),
+        }
+    }
 }
 
 /// The header and the number of the first line after it.
 fn read_header(file: &File) -> Result<(Header, usize)> {
-    let mut header = Header::default();
-    let mut seen: Vec<(String, usize)> = Vec::new();
-    let mut centred = [true; 2];
+    let mut header = Header { size: [0; 2], cell: f64::NAN, corner: [0.0; 2], missing: None };
+    let mut corner_of_cell = [false; 2];
+    let mut cell_line = 1;
     let mut end = 1;
     for (number, line) in file.lines() {
         let mut words = line.split_whitespace();
         let Some(key) = words.next().map(str::to_ascii_lowercase) else { continue };
+        // `nan` starts with a letter but is a value.
         if !key.starts_with(|c: char| c.is_ascii_alphabetic()) || key.parse::<f64>().is_ok() {
             end = number;
             break;
         }
-        let value = words
-            .next()
-            .and_then(|w| w.parse::<f64>().ok())
-            .filter(|v| v.is_finite() || key.starts_with("nodata"));
+        let value = words.next().and_then(|w| w.parse::<f64>().ok());
+        let value = value.filter(|v| v.is_finite() || key == "nodata_value");
         let value = value.ok_or_else(|| file.error(number, format!("`{key}` has no number"), None))?;
         match key.as_str() {
             "ncols" => header.size[0] = count(file, number, &key, value)?,
             "nrows" => header.size[1] = count(file, number, &key, value)?,
-            "cellsize" => header.cell = value,
-            "xllcorner" => (header.corner[0], centred[0]) = (value, false),
-            "yllcorner" => (header.corner[1], centred[1]) = (value, false),
+            "cellsize" => (header.cell, cell_line) = (value, number),
+            "xllcorner" => (header.corner[0], corner_of_cell[0]) = (value, true),
+            "yllcorner" => (header.corner[1], corner_of_cell[1]) = (value, true),
             "xllcenter" => header.corner[0] = value,
             "yllcenter" => header.corner[1] = value,
             "nodata_value" => header.missing = Some(value),
-            _ => {
-                let help = "ncols, nrows, xllcorner, yllcorner, cellsize and NODATA_value".to_owned();
-                return Err(file.error(number, format!("unknown key `{key}` in the header"), Some(help)));
-            }
+            _ => return Err(unknown_key(file, number, &key)),
         }
-        seen.push((key, number));
         end = number + 1;
     }
-    for key in ["ncols", "nrows", "cellsize"] {
-        if !seen.iter().any(|(k, _)| k == key) {
-            return Err(file.error(end, format!("the header has no `{key}`"), None));
-        }
-    }
-    if header.cell <= 0.0 {
-        let line = seen.iter().find(|(k, _)| k == "cellsize").map_or(1, |(_, n)| *n);
-        return Err(file.error(line, format!("`cellsize` = {} is not positive", header.cell), None));
-    }
-    for (corner, centred) in header.corner.iter_mut().zip(centred) {
-        *corner += if centred { 0.0 } else { 0.5 * header.cell };
+    header.check(file, cell_line, end)?;
+    for (corner, at_corner) in header.corner.iter_mut().zip(corner_of_cell) {
+        *corner += if at_corner { 0.5 * header.cell } else { 0.0 };
     }
     Ok((header, end))
+}
+
+fn unknown_key(file: &File, line: usize, key: &str) -> Error {
+    let help = "ncols, nrows, xllcorner, yllcorner, cellsize and NODATA_value".to_owned();
+    file.error(line, format!("unknown key `{key}` in the header"), Some(help))
 }
 
 fn count(file: &File, line: usize, key: &str, value: f64) -> Result<usize> {

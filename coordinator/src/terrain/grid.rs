@@ -14,6 +14,7 @@ pub struct Grid {
 
 impl Grid {
     /// Height of node (i, j), m; indices outside read the nearest node of the edge.
+    #[inline]
     pub fn height(&self, i: i64, j: i64) -> f64 {
         let limit = |k: i64, n: u32| k.clamp(0, i64::from(n) - 1) as usize;
         let [nx, ny] = self.lattice.size;

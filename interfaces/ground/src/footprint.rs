@@ -72,8 +72,14 @@ impl Cell {
             .all(|c| shape.lower(c[0], c[1]).is_some())
     }
 
-    /// Number of covered sample points and the covered one nearest to the node.
-    fn sample(&self, shape: &Placed) -> (i32, f64) {
+    /// Distance of the corner farthest from a point, m.
+    fn farthest(&self, p: [f64; 2]) -> f64 {
+        let [x, y] = [0, 1].map(|k| (self.at[k] - p[k]).abs() + self.half);
+        (x * x + y * y).sqrt()
+    }
+
+    /// Covered part by sample points, and the underside at the covered one nearest to the node.
+    fn sample(&self, shape: &Placed) -> (f64, f64) {
         let step = 2.0 * self.half / f64::from(SAMPLES);
         let (mut count, mut nearest, mut lower) = (0, f64::INFINITY, f64::INFINITY);
         for b in 0..SAMPLES {
@@ -88,7 +94,7 @@ impl Cell {
                 }
             }
         }
-        (count, lower)
+        (f64::from(count) / f64::from(SAMPLES * SAMPLES), lower)
     }
 }
 
@@ -106,57 +112,54 @@ impl Outline {
         }
     }
 
-    /// Covered area and lower surface of a node that is covered and lower than `reach`.
+    /// Covered area and lower surface of a node that is covered and lower than `reach`. The area, which costs
+    /// most, is asked for last.
     fn node(&self, shape: &Placed, cell: &Cell, reach: f64) -> Option<(f64, f64)> {
         let hit = shape.lower(cell.at[0], cell.at[1]);
-        if hit.is_some_and(|z| z >= reach) {
+        let (lower, sampled) = match (hit, self) {
+            (Some(lower), _) => (lower, None),
+            (None, Self::Disc(centre, radius)) => (below_rim(shape, cell, *centre, *radius), None),
+            (None, Self::Polygon(corners, count)) => {
+                let [x, y] = nearest_on(&corners[..*count], cell.at);
+                (shape.lower(x, y)?, None)
+            }
+            (None, Self::Sampled) => {
+                let (share, nearest) = cell.sample(shape);
+                (nearest, Some(share))
+            }
+        };
+        if lower >= reach {
             return None;
         }
-        let (area, lower) = match self {
-            Self::Disc(centre, radius) => disc_node(shape, cell, *centre, *radius, hit),
-            Self::Polygon(corners, count) => polygon_node(shape, cell, &corners[..*count], hit),
-            Self::Sampled => sampled_node(shape, cell, hit),
+        let share = match sampled {
+            Some(share) => share,
+            None => self.share(shape, cell),
         };
-        (area > 0.0 && lower < reach).then_some((area, lower))
+        // Slivers of rounding are no contact.
+        (share > 1e-12).then(|| (share * cell.area(), lower))
+    }
+
+    /// Covered part of a cell, 0 … 1.
+    fn share(&self, shape: &Placed, cell: &Cell) -> f64 {
+        match self {
+            Self::Disc(centre, radius) if cell.farthest(*centre) <= *radius => 1.0,
+            Self::Disc(centre, radius) => {
+                disc_in_rectangle(*centre, *radius, cell.low(), cell.high()) / cell.area()
+            }
+            _ if cell.inside(shape) => 1.0,
+            Self::Polygon(corners, count) => {
+                polygon_in_rectangle(&corners[..*count], cell.low(), cell.high()) / cell.area()
+            }
+            Self::Sampled => cell.sample(shape).0,
+        }
     }
 }
 
-fn disc_node(shape: &Placed, cell: &Cell, centre: [f64; 2], radius: f64, hit: Option<f64>) -> (f64, f64) {
+/// Underside at the point of a disc's rim nearest to a node outside it, drawn in by a rounding error's width.
+fn below_rim(shape: &Placed, cell: &Cell, centre: [f64; 2], radius: f64) -> f64 {
     let (dx, dy) = (cell.at[0] - centre[0], cell.at[1] - centre[1]);
-    let (far_x, far_y) = (dx.abs() + cell.half, dy.abs() + cell.half);
-    if let (true, Some(lower)) = (far_x * far_x + far_y * far_y <= radius * radius, hit) {
-        return (cell.area(), lower);
-    }
-    let area = disc_in_rectangle(centre, radius, cell.low(), cell.high());
-    // The rim, drawn in by a rounding error's width.
-    let rim = || {
-        let s = radius * (1.0 - 1e-12) / (dx * dx + dy * dy).sqrt();
-        shape.lower(centre[0] + s * dx, centre[1] + s * dy).unwrap_or(shape.pose().position[2])
-    };
-    (area, hit.unwrap_or_else(rim))
-}
-
-fn polygon_node(shape: &Placed, cell: &Cell, corners: &[[f64; 2]], hit: Option<f64>) -> (f64, f64) {
-    if let (Some(lower), true) = (hit, cell.inside(shape)) {
-        return (cell.area(), lower);
-    }
-    let area = polygon_in_rectangle(corners, cell.low(), cell.high());
-    let lower = hit.or_else(|| {
-        let [x, y] = nearest_on(corners, cell.at);
-        shape.lower(x, y)
-    });
-    match lower {
-        Some(lower) if area > 1e-12 * cell.area() => (area, lower),
-        _ => (0.0, f64::INFINITY),
-    }
-}
-
-fn sampled_node(shape: &Placed, cell: &Cell, hit: Option<f64>) -> (f64, f64) {
-    if let (Some(lower), true) = (hit, cell.inside(shape)) {
-        return (cell.area(), lower);
-    }
-    let (count, nearest) = cell.sample(shape);
-    (cell.area() * f64::from(count) / f64::from(SAMPLES * SAMPLES), hit.unwrap_or(nearest))
+    let s = radius * (1.0 - 1e-12) / (dx * dx + dy * dy).sqrt();
+    shape.lower(centre[0] + s * dx, centre[1] + s * dy).unwrap_or(shape.pose().position[2])
 }
 
 /// The point of a polygon's edge nearest to p, drawn a little towards the middle.

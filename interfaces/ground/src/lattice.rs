@@ -71,12 +71,14 @@ impl Lattice {
     }
 
     /// Smallest and largest world x, y of the nodes, m.
+    #[inline]
     pub fn extent(&self) -> [[f64; 2]; 2] {
         let last = |k: usize| f64::from(self.size[k].saturating_sub(1)) * self.spacing;
         [self.origin, [self.origin[0] + last(0), self.origin[1] + last(1)]]
     }
 
     /// Whether a world point lies between the first and the last nodes.
+    #[inline]
     pub fn contains(&self, x: f64, y: f64) -> bool {
         let [low, high] = self.extent();
         x >= low[0] && x <= high[0] && y >= low[1] && y <= high[1]
@@ -103,6 +105,7 @@ impl Lattice {
 
     /// Smallest and largest index along axis k of the nodes whose cells meet the interval [low, high] (m);
     /// first > last when there are none.
+    #[inline]
     pub fn cell_range(&self, k: usize, low: f64, high: f64) -> (i32, i32) {
         let index = |v: f64| (v - self.origin[k]) / self.spacing;
         let last = f64::from(self.size[k]) - 1.0;

@@ -12,7 +12,7 @@ pub struct Plane {
 }
 
 /// Nodes along a half axis of the fit; larger footprints are sampled every few nodes.
-const HALF_SAMPLES: f64 = 8.0;
+const HALF_SAMPLES: f64 = 4.0;
 
 /// Fits a plane to the ground around (x, y) within `radius` (m, raised to two cells).
 ///
@@ -22,7 +22,7 @@ const HALF_SAMPLES: f64 = 8.0;
 pub fn fit_plane<S: Surface + ?Sized>(surface: &S, x: f64, y: f64, radius: f64) -> Plane {
     let lattice = surface.lattice();
     let reach = radius.max(2.0 * lattice.spacing) + 0.5 * lattice.spacing;
-    let stride = ((reach / lattice.spacing / HALF_SAMPLES).floor() as i32).max(1);
+    let stride = ((reach / lattice.spacing / HALF_SAMPLES).ceil() as i32).max(1);
     let (i0, i1) = lattice.cell_range(0, x - reach, x + reach);
     let (j0, j1) = lattice.cell_range(1, y - reach, y + reach);
     let mut sums = Sums::default();

@@ -1,1 +1,33 @@
 //! Rigid bodies in maximal coordinates with Lagrange multipliers and complementarity contact.
+//!
+//! [`RigidBody`] is the module; everything else is reached through the subsystem interface. The map:
+//!
+//! | file | what |
+//! |---|---|
+//! | `module`, `schema`, `placement` | from parameters and a robot file to an instance on the ground |
+//! | `robot` | an instance and the calls of the interface |
+//! | `model`, `state` | what stays and what changes |
+//! | `dynamics` | one step: joint rows, gyroscopic term, the whole KKT matrix, corrections |
+//! | `drive` | motors, limits and brakes of an axis |
+//! | `contact` | ports, the rigid estimate T*, contacts among own bodies |
+//! | `lcp` | Lemke's algorithm |
+//! | `variables`, `scene` | what can be read, set, done and seen |
+//!
+//! Deliberately absent: ground and soil. The robot knows its ports, never what lies behind them.
+
+mod contact;
+mod dense;
+mod drive;
+mod dynamics;
+pub mod lcp;
+mod math;
+mod model;
+mod module;
+mod placement;
+mod robot;
+mod scene;
+mod schema;
+mod state;
+mod variables;
+
+pub use module::RigidBody;

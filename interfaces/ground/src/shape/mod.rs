@@ -99,10 +99,8 @@ impl Placed {
         let mut out = Aabb { min: [f64::INFINITY; 3], max: [f64::NEG_INFINITY; 3] };
         for p in points {
             let w = point(&self.world_from_shape, &self.rotation, *p);
-            for k in 0..3 {
-                out.min[k] = out.min[k].min(w[k]);
-                out.max[k] = out.max[k].max(w[k]);
-            }
+            out.min = std::array::from_fn(|k| out.min[k].min(w[k]));
+            out.max = std::array::from_fn(|k| out.max[k].max(w[k]));
         }
         out
     }

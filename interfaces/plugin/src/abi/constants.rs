@@ -8,17 +8,17 @@ pub const TG_ABI_MINOR: u32 = 0;
 /// What a call answers; anything else than the values below counts as `TG_FATAL`.
 pub type TgStatus = i32;
 /// Success.
-pub const TG_OK: TgStatus = 0;
+pub const TG_OK: i32 = 0;
 /// The step is too long: `reached` (s) says how far it could go. The host may repeat with a shorter step.
-pub const TG_DISCARD: TgStatus = 1;
+pub const TG_DISCARD: i32 = 1;
 /// A value, name or argument is not acceptable; the instance is unchanged and usable. Text: `last_error`.
-pub const TG_REFUSED: TgStatus = 2;
+pub const TG_REFUSED: i32 = 2;
 /// The call failed; the committed state is intact. Text: `last_error`.
-pub const TG_ERROR: TgStatus = -1;
+pub const TG_ERROR: i32 = -1;
 /// The call, the kind of input or the level is not offered.
-pub const TG_UNSUPPORTED: TgStatus = -2;
+pub const TG_UNSUPPORTED: i32 = -2;
 /// The call failed and the instance must not be called again, `last_error` and `free` excepted.
-pub const TG_FATAL: TgStatus = -3;
+pub const TG_FATAL: i32 = -3;
 
 /// `tg_subsystem.kind`: owns ground, answers contact ports on side 2.
 pub const TG_SOIL: u32 = 1;

@@ -1,0 +1,109 @@
+//! Checks of single links: mass, inertia, shapes.
+
+use crate::error::{Error, Source};
+use crate::model::{Shape, ShapeGeometry};
+use nalgebra::{Isometry3, Matrix3, SymmetricEigen, Translation3, UnitQuaternion, Vector3};
+use urdf_rs::{Geometry, Link, Pose};
+
+/// Mass, centre of mass and inertia about it in link axes; none where the link has no mass at all.
+pub(crate) type Inertial = Option<(f64, Vector3<f64>, Matrix3<f64>)>;
+
+/// Roll, pitch, yaw about fixed axes, as URDF has it.
+pub(crate) fn isometry(pose: &Pose) -> Isometry3<f64> {
+    let [x, y, z] = pose.xyz.0;
+    let [roll, pitch, yaw] = pose.rpy.0;
+    Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_euler_angles(roll, pitch, yaw))
+}
+
+/// Reads and checks the inertial of a link.
+pub(crate) fn inertial(source: &Source, link: &Link) -> Result<Inertial, Error> {
+    let (mass, i) = (link.inertial.mass.value, &link.inertial.inertia);
+    let tensor = Matrix3::new(i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz);
+    if mass == 0.0 && tensor == Matrix3::zeros() {
+        return Ok(None);
+    }
+    if !(mass > 0.0 && mass.is_finite()) {
+        let problem =
+            format!("mass {mass} kg is not positive; give it a mass, or leave <inertial> out and fix it");
+        return Err(source.link(&link.name, problem));
+    }
+    physical(&tensor).map_err(|problem| source.link(&link.name, problem))?;
+    let frame = isometry(&link.inertial.origin);
+    let r = frame.rotation.to_rotation_matrix();
+    Ok(Some((mass, frame.translation.vector, r * tensor * r.transpose())))
+}
+
+/// Principal moments must be positive and each at most the sum of the others (with 1e-6 for rounding in files).
+fn physical(tensor: &Matrix3<f64>) -> Result<(), String> {
+    if !tensor.iter().all(|v| v.is_finite()) {
+        return Err("the inertia is not finite; write numbers in kg m²".into());
+    }
+    let mut p = SymmetricEigen::new(*tensor).eigenvalues;
+    p.as_mut_slice().sort_by(f64::total_cmp);
+    let shown = format!("principal moments {:.6e}, {:.6e}, {:.6e} kg m²", p[0], p[1], p[2]);
+    if p[0] <= 1e-12 * p[2] || p[2] <= 0.0 {
+        return Err(format!(
+            "{shown}: the inertia is not positive; a solid body of its mass and size has one"
+        ));
+    }
+    if p[2] > (p[0] + p[1]) * (1.0 + 1e-6) {
+        return Err(format!(
+            "{shown}: no body has such an inertia, each moment is at most the sum of the other two; \
+             check the axes and units of <inertia>"
+        ));
+    }
+    Ok(())
+}
+
+/// All shapes of a link in its own frame; what is seen and hit appears once.
+pub(crate) fn shapes(source: &Source, link: &Link) -> Result<Vec<Shape>, Error> {
+    let mut shapes: Vec<Shape> = Vec::new();
+    for c in &link.collision {
+        shapes.push(shape(source, link, c.name.as_deref(), &c.origin, &c.geometry, true)?);
+    }
+    for v in &link.visual {
+        let seen = match shape(source, link, v.name.as_deref(), &v.origin, &v.geometry, false) {
+            Ok(seen) => seen,
+            // A picture that cannot be drawn does no harm to the simulation.
+            Err(_) if matches!(v.geometry, Geometry::Mesh { .. }) => continue,
+            Err(e) => return Err(e),
+        };
+        if !shapes.iter().any(|s| s.geometry == seen.geometry && s.body_from_shape == seen.body_from_shape) {
+            shapes.push(seen);
+        }
+    }
+    Ok(shapes)
+}
+
+fn shape(
+    source: &Source,
+    link: &Link,
+    name: Option<&str>,
+    origin: &Pose,
+    geometry: &Geometry,
+    collides: bool,
+) -> Result<Shape, Error> {
+    let (geometry, sizes) = match geometry {
+        Geometry::Sphere { radius } => (ShapeGeometry::Sphere { radius: *radius }, vec![*radius]),
+        Geometry::Box { size } => {
+            (ShapeGeometry::Box { half_extents: size.0.map(|s| s / 2.0) }, size.0.to_vec())
+        }
+        Geometry::Cylinder { radius, length } => {
+            (ShapeGeometry::Cylinder { half_length: length / 2.0, radius: *radius }, vec![*radius, *length])
+        }
+        Geometry::Capsule { radius, length } => {
+            (ShapeGeometry::Capsule { half_length: length / 2.0, radius: *radius }, vec![*radius, *length])
+        }
+        Geometry::Mesh { filename, .. } => {
+            let problem = format!(
+                "the mesh `{filename}` cannot be used for collision; replace it by spheres, boxes or cylinders"
+            );
+            return Err(source.link(&link.name, problem));
+        }
+    };
+    if let Some(bad) = sizes.iter().find(|s| !(**s > 0.0 && s.is_finite())) {
+        return Err(source.link(&link.name, format!("a shape has the size {bad} m; sizes are positive")));
+    }
+    let name = name.filter(|n| !n.is_empty()).unwrap_or(&link.name).into();
+    Ok(Shape { name, geometry, body_from_shape: isometry(origin), collides })
+}

@@ -1,0 +1,88 @@
+//! What can be wrong with a robot file; every message names the place, the value and a way out.
+
+/// A robot file that cannot be simulated.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The file cannot be read.
+    #[error("{file}: the robot file cannot be read: {reason}")]
+    Read {
+        /// Path.
+        file: String,
+        /// What the operating system said.
+        reason: String,
+    },
+    /// The text is not URDF.
+    #[error("{file}: this is not URDF: {reason}")]
+    Syntax {
+        /// Path.
+        file: String,
+        /// What the reader said.
+        reason: String,
+    },
+    /// A link is wrong.
+    #[error("{file}:{line}: link `{link}`: {problem}")]
+    Link {
+        /// Path.
+        file: String,
+        /// Line of the element, from 1; 0: unknown.
+        line: usize,
+        /// Name.
+        link: String,
+        /// Value and way out.
+        problem: String,
+    },
+    /// A joint is wrong.
+    #[error("{file}:{line}: joint `{joint}`: {problem}")]
+    Joint {
+        /// Path.
+        file: String,
+        /// Line of the element, from 1; 0: unknown.
+        line: usize,
+        /// Name.
+        joint: String,
+        /// Value and way out.
+        problem: String,
+    },
+    /// Links and joints do not form one tree.
+    #[error("{file}: {problem}")]
+    Tree {
+        /// Path.
+        file: String,
+        /// What is not a tree and a way out.
+        problem: String,
+    },
+}
+
+/// File name and text, for errors that point to a line.
+pub(crate) struct Source<'a> {
+    pub(crate) file: &'a str,
+    pub(crate) text: &'a str,
+}
+
+impl Source<'_> {
+    pub(crate) fn link(&self, link: &str, problem: impl Into<String>) -> Error {
+        let (file, line) = (self.file.into(), self.line("<link", link));
+        Error::Link { file, line, link: link.into(), problem: problem.into() }
+    }
+
+    pub(crate) fn joint(&self, joint: &str, problem: impl Into<String>) -> Error {
+        let (file, line) = (self.file.into(), self.line("<joint", joint));
+        Error::Joint { file, line, joint: joint.into(), problem: problem.into() }
+    }
+
+    pub(crate) fn tree(&self, problem: impl Into<String>) -> Error {
+        Error::Tree { file: self.file.into(), problem: problem.into() }
+    }
+
+    /// Line of the first element `tag` with this name.
+    fn line(&self, tag: &str, name: &str) -> usize {
+        let wanted = [format!("name=\"{name}\""), format!("name='{name}'")];
+        let found = self.text.match_indices(tag).find(|(at, _)| {
+            let element = &self.text[*at..];
+            let end = element.find('>').unwrap_or(element.len());
+            wanted.iter().any(|w| element[..end].contains(w))
+        });
+        found.map_or(0, |(at, _)| self.text[..at].matches('\n').count() + 1)
+    }
+}

@@ -1,0 +1,114 @@
+//! The checked robot: plain data, SI units, parents before children.
+
+use nalgebra::{Isometry3, Matrix3, Unit, Vector3};
+
+/// A tree of bodies.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Robot {
+    /// Name in the file.
+    pub name: String,
+    /// How the root stands in the world.
+    pub base: Base,
+    /// Bodies, each after its parent.
+    pub bodies: Vec<Body>,
+    /// Joints in the order of their child bodies.
+    pub joints: Vec<Joint>,
+}
+
+/// Root of the tree.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Base {
+    /// Body 0 moves freely; pose of its frame in the frame of the file's root link.
+    Free(Isometry3<f64>),
+    /// The root link is the world: joints without a parent hang from it.
+    World,
+}
+
+/// One rigid body; its frame is that of its link.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Body {
+    /// Name of the link.
+    pub name: String,
+    /// Mass, kg.
+    pub mass: f64,
+    /// Centre of mass in the body frame, m.
+    pub com: Vector3<f64>,
+    /// Inertia about the centre of mass in the axes of the body frame, kg m².
+    pub inertia: Matrix3<f64>,
+    /// What can be seen or hit.
+    pub shapes: Vec<Shape>,
+}
+
+/// A shape fixed to a body.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Shape {
+    /// Name in the file, or of the link.
+    pub name: String,
+    /// Geometry.
+    pub geometry: ShapeGeometry,
+    /// Pose in the body frame.
+    pub body_from_shape: Isometry3<f64>,
+    /// Whether it can be hit; otherwise it is only seen.
+    pub collides: bool,
+}
+
+/// Geometry in the shape's frame, centre at the origin, m.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum ShapeGeometry {
+    /// Sphere.
+    Sphere {
+        /// Radius.
+        radius: f64,
+    },
+    /// Box.
+    Box {
+        /// Half lengths.
+        half_extents: [f64; 3],
+    },
+    /// Axis along z.
+    Cylinder {
+        /// Half length along z.
+        half_length: f64,
+        /// Radius.
+        radius: f64,
+    },
+    /// Segment along z, swollen.
+    Capsule {
+        /// Half length of the segment.
+        half_length: f64,
+        /// Radius.
+        radius: f64,
+    },
+}
+
+/// A joint between a body and its parent.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Joint {
+    /// Name.
+    pub name: String,
+    /// Kind.
+    pub kind: JointKind,
+    /// Index of the parent body; none: the world.
+    pub parent: Option<usize>,
+    /// Index of the child body.
+    pub child: usize,
+    /// Joint frame in the parent body (in the frame of the root link where the parent is the world).
+    pub parent_from_joint: Isometry3<f64>,
+    /// Joint frame in the child body; moves along or about `axis` against the one on the parent.
+    pub child_from_joint: Isometry3<f64>,
+    /// Axis in the joint frame.
+    pub axis: Unit<Vector3<f64>>,
+    /// Smallest and largest coordinate, rad or m; none: unlimited.
+    pub limits: Option<[f64; 2]>,
+}
+
+/// What a joint leaves free.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum JointKind {
+    /// Turns about its axis.
+    Revolute,
+    /// Slides along its axis.
+    Prismatic,
+    /// Nothing.
+    Fixed,
+}

@@ -1,0 +1,198 @@
+//! From the text of a URDF file to the checked robot; links without mass are merged into their neighbours.
+
+use crate::check::{Inertial, inertial, isometry, shapes};
+use crate::error::{Error, Source};
+use crate::model::{Base, Body, Joint, JointKind, Robot, Shape};
+use crate::tree::{Place, order};
+use nalgebra::{Isometry3, Unit, Vector3};
+use std::path::Path;
+use urdf_rs::JointType;
+
+/// Reads a file. `fixed_base`: a root link without mass is the world; with mass, the caller fixes it.
+pub fn read_urdf(path: &Path, fixed_base: bool) -> Result<Robot, Error> {
+    let file = path.display().to_string();
+    let text = std::fs::read_to_string(path)
+        .map_err(|e| Error::Read { file: file.clone(), reason: e.to_string() })?;
+    read_urdf_text(&file, &text, fixed_base)
+}
+
+/// Reads the text of a file; `file` appears in messages.
+pub fn read_urdf_text(file: &str, text: &str, fixed_base: bool) -> Result<Robot, Error> {
+    let source = Source { file, text };
+    let robot = urdf_rs::read_from_string(text).map_err(|e| not_urdf(&source, &e.to_string()))?;
+    let order = order(&source, &robot)?;
+    let inertials = robot.links.iter().map(|l| inertial(&source, l)).collect::<Result<Vec<_>, _>>()?;
+    let merged = merge(&robot, &order, &inertials);
+    build(&source, &robot, &order, &inertials, &merged, fixed_base)
+}
+
+fn not_urdf(source: &Source, reason: &str) -> Error {
+    let kinds = "floating, planar and spherical are kinds that this reader knows but cannot simulate; \
+                 revolute, continuous, prismatic and fixed work";
+    let reason = if reason.contains("variant") { format!("{reason} ({kinds})") } else { reason.to_owned() };
+    Error::Syntax { file: source.file.into(), reason }
+}
+
+/// Links that move as one: at most one of them has mass and gives name and frame.
+struct Merged {
+    /// Per link: its group.
+    group: Vec<usize>,
+    /// Per link: its frame in the frame of the group's first link.
+    group_from_link: Vec<Isometry3<f64>>,
+    /// Per group: the link with mass.
+    massive: Vec<Option<usize>>,
+    /// Per group: its first link and the joint above it.
+    first: Vec<(usize, Option<usize>)>,
+}
+
+fn merge(robot: &urdf_rs::Robot, order: &[Place], inertials: &[Inertial]) -> Merged {
+    let n = robot.links.len();
+    let mut m = Merged {
+        group: vec![0; n],
+        group_from_link: vec![Isometry3::identity(); n],
+        massive: Vec::new(),
+        first: Vec::new(),
+    };
+    for place in order {
+        let massive = inertials[place.link].is_some().then_some(place.link);
+        let joint = place.joint.map(|j| &robot.joints[j]).filter(|j| j.joint_type == JointType::Fixed);
+        let parent = joint.and_then(|j| robot.links.iter().position(|l| l.name == j.parent.link));
+        if let (Some(joint), Some(parent)) = (joint, parent) {
+            let group = m.group[parent];
+            if massive.is_none() || m.massive[group].is_none() {
+                m.group[place.link] = group;
+                m.group_from_link[place.link] = m.group_from_link[parent] * isometry(&joint.origin);
+                m.massive[group] = m.massive[group].or(massive);
+                continue;
+            }
+        }
+        m.group[place.link] = m.massive.len();
+        m.massive.push(massive);
+        m.first.push((place.link, place.joint));
+    }
+    m
+}
+
+impl Merged {
+    /// Frame of a link in the frame of its group's body.
+    fn body_from_link(&self, link: usize) -> Isometry3<f64> {
+        let body = self.massive[self.group[link]].unwrap_or(self.first[self.group[link]].0);
+        self.group_from_link[body].inverse() * self.group_from_link[link]
+    }
+}
+
+fn build(
+    source: &Source,
+    robot: &urdf_rs::Robot,
+    order: &[Place],
+    inertials: &[Inertial],
+    merged: &Merged,
+    fixed_base: bool,
+) -> Result<Robot, Error> {
+    let world = merged.massive[0].is_none();
+    if world {
+        check_world(source, robot, merged, fixed_base)?;
+    }
+    let shift = usize::from(world);
+    let (mut bodies, mut joints) = (Vec::new(), Vec::new());
+    for group in shift..merged.massive.len() {
+        let (first, above) = merged.first[group];
+        let Some((link, (mass, com, inertia))) =
+            merged.massive[group].and_then(|l| inertials[l].map(|i| (l, i)))
+        else {
+            let problem =
+                "moves on a joint but has no mass; give it an <inertial>, or make a joint next to it fixed";
+            return Err(source.link(&robot.links[first].name, problem));
+        };
+        if let Some(j) = above {
+            joints.push(joint(source, robot, merged, j, first, bodies.len(), shift)?);
+        }
+        bodies.push(Body { name: robot.links[link].name.clone(), mass, com, inertia, shapes: Vec::new() });
+    }
+    for place in order.iter().filter(|p| merged.group[p.link] >= shift) {
+        let frame = merged.body_from_link(place.link);
+        let found = shapes(source, &robot.links[place.link])?;
+        let moved = found.into_iter().map(|s| Shape { body_from_shape: frame * s.body_from_shape, ..s });
+        bodies[merged.group[place.link] - shift].shapes.extend(moved);
+    }
+    let base = match merged.massive[0] {
+        Some(link) => Base::Free(merged.group_from_link[link]),
+        None => Base::World,
+    };
+    Ok(Robot { name: robot.name.clone(), base, bodies, joints })
+}
+
+fn check_world(
+    source: &Source,
+    robot: &urdf_rs::Robot,
+    merged: &Merged,
+    fixed_base: bool,
+) -> Result<(), Error> {
+    let root = &robot.links[merged.first[0].0].name;
+    if merged.massive.len() == 1 {
+        return Err(source.link(root, "the robot has no mass at all; give at least one link an <inertial>"));
+    }
+    if root == "world" || fixed_base {
+        return Ok(());
+    }
+    let problem = "the root has no mass and cannot move; give it an <inertial>, name it `world`, \
+                   or set fixed_base = true";
+    Err(source.link(root, problem))
+}
+
+fn joint(
+    source: &Source,
+    robot: &urdf_rs::Robot,
+    merged: &Merged,
+    j: usize,
+    child_link: usize,
+    child: usize,
+    shift: usize,
+) -> Result<Joint, Error> {
+    let joint = &robot.joints[j];
+    let (kind, limited) = kind(source, joint)?;
+    let parent_link = robot.links.iter().position(|l| l.name == joint.parent.link).unwrap_or(0);
+    let axis = Vector3::from(joint.axis.xyz.0);
+    if kind != JointKind::Fixed && !(axis.norm() > 1e-9 && axis.norm().is_finite()) {
+        let problem =
+            format!("the axis {:?} has no direction; write e.g. <axis xyz=\"0 0 1\"/>", joint.axis.xyz.0);
+        return Err(source.joint(&joint.name, problem));
+    }
+    let axis = if kind == JointKind::Fixed { Vector3::x() } else { axis };
+    let parent = merged.group[parent_link].checked_sub(shift);
+    Ok(Joint {
+        name: joint.name.clone(),
+        kind,
+        parent,
+        child,
+        parent_from_joint: merged.body_from_link(parent_link) * isometry(&joint.origin),
+        child_from_joint: merged.body_from_link(child_link),
+        axis: Unit::new_normalize(axis),
+        limits: if limited { Some(limits(source, joint)?) } else { None },
+    })
+}
+
+fn kind(source: &Source, joint: &urdf_rs::Joint) -> Result<(JointKind, bool), Error> {
+    match joint.joint_type {
+        JointType::Revolute => Ok((JointKind::Revolute, true)),
+        JointType::Continuous => Ok((JointKind::Revolute, false)),
+        JointType::Prismatic => Ok((JointKind::Prismatic, true)),
+        JointType::Fixed => Ok((JointKind::Fixed, false)),
+        ref other => Err(source.joint(
+            &joint.name,
+            format!("type `{other:?}` cannot be simulated; use revolute, continuous, prismatic or fixed"),
+        )),
+    }
+}
+
+fn limits(source: &Source, joint: &urdf_rs::Joint) -> Result<[f64; 2], Error> {
+    let (lower, upper) = (joint.limit.lower, joint.limit.upper);
+    if lower < upper {
+        return Ok([lower, upper]);
+    }
+    let problem = format!(
+        "the limits {lower} … {upper} leave no room; write <limit lower= upper= …> with lower < upper, \
+         or make it continuous or fixed"
+    );
+    Err(source.joint(&joint.name, problem))
+}

@@ -1,0 +1,238 @@
+//! T*: the wrenches that would hold every contact rigidly at the end of the step.
+//!
+//! First the normals: 0 ≤ T ⟂ x_free + G·T − x2 ≥ 0 by Lemke. Six feet on one body make G singular (rank 3), so
+//! the problem is solved with G + ε·1 and then by proximal steps (gap − ε·T_previous), which lead to the normals of
+//! smallest norm whatever the order of the feet (Rockafellar 1976). Then normals and sticking components
+//! together, starting from there, each port within its friction |T_t| ≤ μ·T_n and, for patches, its moments
+//! within the footprint; what would exceed a bound is put on it.
+
+use crate::dense::{cholesky, cholesky_solve, rank};
+use crate::lcp::{Lemke, Outcome};
+use terraglue_subsystem::Port;
+
+/// ε as a share of the mean diagonal of G.
+const REGULARISATION: f64 = 1e-4;
+/// Proximal steps: at least, at most, and the relative change at which they end.
+const PROXIMAL_MIN: usize = 4;
+const PROXIMAL_MAX: usize = 40;
+const PROXIMAL_CHANGE: f64 = 1e-12;
+/// Rounds in which ports change between open, sticking and slipping.
+const MAX_ROUNDS: usize = 24;
+
+/// What a component does at present.
+#[derive(Clone, Copy, PartialEq, Eq, Debug)]
+enum Status {
+    /// No wrench: the port is open.
+    Open,
+    /// Unknown of the linear system: motion equals the partner's.
+    Held,
+    /// On its friction bound.
+    Slipping,
+}
+
+/// The contact problem in hand. All slices are packed; signs are those of the wrench on side 1.
+pub(crate) struct Problem<'a> {
+    pub ports: &'a [Port],
+    /// d(x1 − x2)/dT, n × n, column-major.
+    pub g: &'a [f64],
+    /// x_free − x2.
+    pub gap: &'a [f64],
+}
+
+/// Buffers of the estimate.
+#[derive(Default)]
+pub(crate) struct Estimator {
+    lemke: Lemke,
+    status: Vec<Status>,
+    /// Per component: ε of its class.
+    epsilon: Vec<f64>,
+    unknowns: Vec<usize>,
+    matrix: Vec<f64>,
+    rhs: Vec<f64>,
+    normals: Vec<usize>,
+    normal_gap: Vec<f64>,
+    normal_rhs: Vec<f64>,
+    solution: Vec<f64>,
+}
+
+fn unilateral(port: &Port) -> bool {
+    port.law.t_min >= 0.0
+}
+
+impl Estimator {
+    /// Solves for T*; `Err` tells why there is none. Returns whether the normals are unique.
+    pub fn solve(&mut self, p: &Problem, t: &mut [f64]) -> Result<bool, &'static str> {
+        t.fill(0.0);
+        self.classify(p);
+        self.solve_normals(p, t)?;
+        let unique = self.normals_unique(p, t);
+        for port in p.ports {
+            let open = unilateral(port) && t[port.first as usize] <= 0.0;
+            self.status[port.range()].fill(if open { Status::Open } else { Status::Held });
+        }
+        for _ in 0..MAX_ROUNDS {
+            self.solve_held(p, t)?;
+            if !self.change_status(p, t) {
+                break;
+            }
+        }
+        Ok(unique)
+    }
+
+    fn classify(&mut self, p: &Problem) {
+        let n = p.gap.len();
+        self.status.clear();
+        self.status.resize(n, Status::Open);
+        self.normals.clear();
+        let normals = p.ports.iter().filter(|q| unilateral(q) && q.mask & 1 != 0);
+        self.normals.extend(normals.map(|q| q.first as usize));
+        // Means of the diagonal of normals, tangential forces, moments.
+        let class = |c: usize| [0, 1, 1, 2, 2, 2][c];
+        let (mut sum, mut count) = ([0.0; 3], [0.0; 3]);
+        for (i, c) in p.ports.iter().flat_map(Port::components) {
+            sum[class(c)] += p.g[i * n + i];
+            count[class(c)] += 1.0;
+        }
+        self.epsilon.clear();
+        self.epsilon.resize(n, 0.0);
+        for (i, c) in p.ports.iter().flat_map(Port::components) {
+            self.epsilon[i] = REGULARISATION * sum[class(c)] / count[class(c)];
+        }
+    }
+
+    /// The normals alone, of minimum norm.
+    fn solve_normals(&mut self, p: &Problem, t: &mut [f64]) -> Result<(), &'static str> {
+        let (n, m) = (p.gap.len(), self.normals.len());
+        let normals = &self.normals;
+        let entry = |r: usize, c: usize| p.g[normals[c] * n + normals[r]];
+        self.matrix.clear();
+        for c in 0..m {
+            let epsilon = self.epsilon[normals[c]];
+            self.matrix.extend((0..m).map(|r| entry(r, c) + if r == c { epsilon } else { 0.0 }));
+        }
+        self.normal_gap.clear();
+        self.normal_gap.extend(normals.iter().map(|i| p.gap[*i]));
+        self.solution.clear();
+        self.solution.resize(m, 0.0);
+        for _ in 0..=PROXIMAL_MIN {
+            self.normal_rhs.clear();
+            let steps = self.normal_gap.iter().zip(&self.solution).zip(normals);
+            self.normal_rhs.extend(steps.map(|((gap, t), i)| gap - self.epsilon[*i] * t));
+            match self.lemke.solve(&self.matrix, &self.normal_rhs, &mut self.solution) {
+                Outcome::Solved(_) => {}
+                Outcome::Ray(_) => return Err("the contact problem has no solution (secondary ray)"),
+                Outcome::PivotLimit(_) => return Err("the contact problem is too badly scaled to be solved"),
+            }
+        }
+        normals.iter().zip(&self.solution).for_each(|(i, s)| t[*i] = *s);
+        Ok(())
+    }
+
+    fn normals_unique(&mut self, p: &Problem, t: &[f64]) -> bool {
+        let n = p.gap.len();
+        self.unknowns.clear();
+        self.unknowns.extend(self.normals.iter().copied().filter(|i| t[*i] > 0.0));
+        self.matrix.clear();
+        for c in &self.unknowns {
+            self.matrix.extend(self.unknowns.iter().map(|r| p.g[c * n + r]));
+        }
+        let m = self.unknowns.len();
+        rank(m, &mut self.matrix, 1e-9) == m
+    }
+
+    /// Motion of all held components equals the partner's; the proximal point nearest to the present T.
+    fn solve_held(&mut self, p: &Problem, t: &mut [f64]) -> Result<(), &'static str> {
+        let n = p.gap.len();
+        self.unknowns.clear();
+        self.unknowns.extend((0..n).filter(|i| self.status[*i] == Status::Held));
+        let m = self.unknowns.len();
+        if m == 0 {
+            return Ok(());
+        }
+        self.matrix.clear();
+        for c in &self.unknowns {
+            let column =
+                self.unknowns.iter().map(|r| p.g[c * n + r] + if r == c { self.epsilon[*c] } else { 0.0 });
+            self.matrix.extend(column);
+        }
+        if !cholesky(m, &mut self.matrix) {
+            return Err("the compliance of the contacts is not positive definite");
+        }
+        for step in 0..PROXIMAL_MAX {
+            // In increments: (G + ε)·dT = −(x_free + G·T − x2), exact to rounding at any size of T.
+            self.rhs.clear();
+            self.rhs.extend(self.unknowns.iter().map(|i| -residual(p, t, *i)));
+            cholesky_solve(m, &self.matrix, &mut self.rhs);
+            self.unknowns.iter().zip(&self.rhs).for_each(|(i, d)| t[*i] += d);
+            let largest = |v: &mut dyn Iterator<Item = f64>| v.fold(0.0_f64, |a, x| a.max(x.abs()));
+            let change = largest(&mut self.rhs.iter().copied());
+            let size = largest(&mut t.iter().copied());
+            if step >= PROXIMAL_MIN && change <= PROXIMAL_CHANGE * size {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    /// Opens, closes, clips; true when something changed noticeably.
+    fn change_status(&mut self, p: &Problem, t: &mut [f64]) -> bool {
+        let size = t.iter().fold(0.0_f64, |a, x| a.max(x.abs()));
+        let mut changed = false;
+        for port in p.ports {
+            let first = port.first as usize;
+            if unilateral(port) {
+                let open = self.status[first] == Status::Open;
+                if !open && t[first] < 0.0 {
+                    self.status[port.range()].fill(Status::Open);
+                    t[port.range()].fill(0.0);
+                    changed = true;
+                    continue;
+                }
+                if open {
+                    let diagonal = p.g[first * p.gap.len() + first];
+                    if residual(p, t, first) < -1e-9 * diagonal * size {
+                        self.status[port.range()].fill(Status::Held);
+                        changed = true;
+                    }
+                    continue;
+                }
+                changed |= self.clip(port, t, 1e-10 * size);
+            }
+        }
+        changed
+    }
+
+    /// Puts the tangential force and the moments of a closed port within their bounds.
+    fn clip(&mut self, port: &Port, t: &mut [f64], noticeable: f64) -> bool {
+        let normal = t[port.first as usize].max(0.0);
+        let extent = port.extent[0].max(port.extent[1]);
+        let bounds = [
+            (0b000110, port.law.mu * normal),
+            (0b001000, port.law.mu * normal * extent),
+            (0b010000, normal * port.extent[1]),
+            (0b100000, normal * port.extent[0]),
+        ];
+        let mut changed = false;
+        for (mask, bound) in bounds {
+            let of = move |c: &(usize, usize)| mask & (1 << c.1) != 0;
+            let squares: f64 = port.components().filter(of).map(|(i, _)| t[i] * t[i]).sum();
+            let size = squares.sqrt();
+            let slipping = port.components().filter(of).any(|(i, _)| self.status[i] == Status::Slipping);
+            if size <= 0.0 || !bound.is_finite() || (size <= bound && !slipping) {
+                continue;
+            }
+            for (i, _) in port.components().filter(of) {
+                t[i] *= bound / size;
+                self.status[i] = Status::Slipping;
+            }
+            changed |= !slipping || (size - bound).abs() > noticeable;
+        }
+        changed
+    }
+}
+
+/// x_free + G·T − x2 of component i.
+fn residual(p: &Problem, t: &[f64], i: usize) -> f64 {
+    let n = p.gap.len();
+    p.gap[i] + (0..n).map(|k| p.g[k * n + i] * t[k]).sum::<f64>()
+}

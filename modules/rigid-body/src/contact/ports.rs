@@ -1,0 +1,171 @@
+//! Ports of the step: how impulses there act on the bodies, how the bodies move there, and the compliance G.
+
+use crate::dynamics::Dynamics;
+use crate::math::{V3, cayley, cayley_vector};
+use crate::state::Motion;
+use terraglue_subsystem::{Port, Response};
+
+/// One packed component: a generalised direction on one body.
+#[derive(Clone, Copy, Debug)]
+struct Component {
+    body: usize,
+    /// +1 where T acts on the body, −1 where −T does.
+    side: f64,
+    /// World force and moment about the centre of mass of a unit wrench on the body; also rates → own motion.
+    row: [f64; 6],
+}
+
+/// Ports of the step with the factor's answer to each component.
+#[derive(Default)]
+pub(crate) struct Ports {
+    components: Vec<Component>,
+    /// L⁻¹ of each component's right-hand side; zero outside its path.
+    forward: Vec<f64>,
+    g: Vec<f64>,
+    /// Number of the factorisation that `g` belongs to; 0: none.
+    g_of: u64,
+}
+
+impl Ports {
+    /// Takes over the ports; false when one names a body that does not exist or packs badly.
+    pub fn assign(&mut self, ports: &[Port], n: usize, bodies: &[Motion]) -> bool {
+        let idle = Component { body: 0, side: 1.0, row: [0.0; 6] };
+        self.components.clear();
+        self.components.resize(n, idle);
+        self.g_of = 0;
+        for port in ports {
+            let Some(motion) = bodies.get(port.body as usize).filter(|_| port.range().end <= n) else {
+                return false;
+            };
+            let arm = V3::from(port.origin) - motion.c;
+            for (i, c) in port.components() {
+                let d = V3::from(port.direction(c));
+                let (force, moment) = if c < 3 { (d, arm.cross(&d)) } else { (V3::zeros(), d) };
+                let row = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
+                self.components[i] =
+                    Component { body: port.body as usize, side: f64::from(port.side.signum()), row };
+            }
+        }
+        true
+    }
+
+    /// Number of packed components.
+    pub fn len(&self) -> usize {
+        self.components.len()
+    }
+
+    /// +1 where T acts on the own body.
+    pub fn side(&self, i: usize) -> f64 {
+        self.components[i].side
+    }
+
+    /// dX_r/d(wrench c), as last computed by [`Ports::compliance`].
+    pub fn g(&self, r: usize, c: usize) -> f64 {
+        self.g[c * self.components.len() + r]
+    }
+
+    /// Writes the impulses h·T into the external impulses of a trial.
+    pub fn load(&self, dynamics: &mut Dynamics, t: &[f64]) {
+        dynamics.external.fill(0.0);
+        for (component, t) in self.components.iter().zip(t).filter(|(_, t)| **t != 0.0) {
+            let at = dynamics.kkt.body_at[component.body];
+            let impulse = dynamics.h * component.side * t;
+            let target = &mut dynamics.external[at..at + 6];
+            target.iter_mut().zip(&component.row).for_each(|(e, r)| *e += impulse * r);
+        }
+    }
+
+    /// G = dX/d(wrench on itself) = h²·J·K⁻¹·Jᵀ for the current factor, column-major.
+    ///
+    /// Only half a solve per component, and only along the path from its body to the root:
+    /// J·K⁻¹·Jᵀ = (L⁻¹Jᵀ)ᵀ·D⁻¹·(L⁻¹Jᵀ).
+    pub fn compliance(&mut self, dynamics: &Dynamics) -> &[f64] {
+        let (n, unknowns) = (self.components.len(), dynamics.kkt.len());
+        if self.g_of == dynamics.factor_count && !dynamics.self_contact.pressing() && self.g.len() == n * n {
+            return &self.g;
+        }
+        let solver = &dynamics.kkt.solver;
+        self.forward.clear();
+        self.forward.resize(n * unknowns, 0.0);
+        for (component, y) in self.components.iter().zip(self.forward.chunks_exact_mut(unknowns.max(1))) {
+            let at = dynamics.kkt.body_at[component.body];
+            y[at..at + 6].copy_from_slice(&component.row);
+            solver.forward_on_path(at, y);
+        }
+        self.g.clear();
+        self.g.resize(n * n, 0.0);
+        let h2 = dynamics.h * dynamics.h;
+        for i in 0..n {
+            let at = dynamics.kkt.body_at[self.components[i].body];
+            let y = &self.forward[i * unknowns..][..unknowns];
+            for k in 0..=i {
+                let z = &self.forward[k * unknowns..][..unknowns];
+                let sum: f64 = solver.path(at).map(|u| y[u] * z[u] / solver.pivot(u)).sum();
+                self.g[k * n + i] = h2 * sum;
+                self.g[i * n + k] = h2 * sum;
+            }
+        }
+        self.g_of = dynamics.factor_count;
+        if dynamics.self_contact.pressing() {
+            let components = &self.components;
+            let rate = |p: usize, v: &[f64]| {
+                let at = dynamics.kkt.body_at[components[p].body];
+                dynamics.h * components[p].row.iter().zip(&v[at..at + 6]).map(|(r, v)| r * v).sum::<f64>()
+            };
+            dynamics.self_contact.stiffen(n, &mut self.g, unknowns, &rate);
+            self.g_of = 0;
+        }
+        &self.g
+    }
+}
+
+/// Own motion at the ports: committed (X = 0).
+pub(crate) fn committed(ports: &[Port], bodies: &[Motion], out: &mut Response) {
+    for port in ports {
+        let motion = &bodies[port.body as usize];
+        let arm = V3::from(port.origin) - motion.c;
+        let v = motion.v + motion.w.cross(&arm);
+        for (i, c) in port.components() {
+            let d = V3::from(port.direction(c));
+            out.x[i] = 0.0;
+            out.v[i] = if c < 3 { v.dot(&d) } else { motion.w.dot(&d) };
+            out.a[i] = 0.0;
+            out.t[i] = 0.0;
+        }
+    }
+}
+
+/// Own displacement at the ports at the end of the trial: of the material point at the origin, and rotation.
+pub(crate) fn displacement(ports: &[Port], dynamics: &Dynamics, x: &mut [f64]) {
+    for port in ports {
+        let b = port.body as usize;
+        let arm = V3::from(port.origin) - dynamics.starts()[b].c;
+        // (R − 1)·arm without cancellation.
+        let q = cayley(&dynamics.turns[b]);
+        let twice = 2.0 * q.imag().cross(&arm);
+        let shift = dynamics.h * dynamics.ends[b].v + q.w * twice + q.imag().cross(&twice);
+        let turn = cayley_vector(&dynamics.turns[b]);
+        for (i, c) in port.components() {
+            let d = V3::from(port.direction(c));
+            x[i] = if c < 3 { shift.dot(&d) } else { turn.dot(&d) };
+        }
+    }
+}
+
+/// Own displacement, velocity and mean acceleration at the end of the trial.
+pub(crate) fn response(ports: &[Port], dynamics: &Dynamics, out: &mut Response) {
+    displacement(ports, dynamics, out.x);
+    for port in ports {
+        let b = port.body as usize;
+        let (start, end) = (&dynamics.starts()[b], &dynamics.ends[b]);
+        let arm = V3::from(port.origin) - start.c;
+        let before = start.v + start.w.cross(&arm);
+        let after = end.v + end.w.cross(&(cayley(&dynamics.turns[b]) * arm));
+        for (i, c) in port.components() {
+            let d = V3::from(port.direction(c));
+            let (v0, v1) = if c < 3 { (before, after) } else { (start.w, end.w) };
+            out.v[i] = v1.dot(&d);
+            out.a[i] = (v1 - v0).dot(&d) / dynamics.h;
+        }
+    }
+}

@@ -1,0 +1,109 @@
+//! Rows of a joint: six directions, their Jacobians on both bodies, and how far the joint is out of place.
+//!
+//! Rows 0–2: translation of the child's anchor against the parent's along axis, t1, t2; rows 3–5: rotation about
+//! them. The frame is the parent's. One of them is free in a revolute (3) or prismatic (0) joint.
+
+use crate::math::{Q, V3, unwrap_angle};
+use crate::model::{Joint, Kind};
+use crate::state::Motion;
+
+/// Jacobians of the six rows: rates of centre of mass (3) and rotation (3) in world axes.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct JointRows {
+    pub child: [[f64; 6]; 6],
+    pub parent: [[f64; 6]; 6],
+}
+
+fn world() -> Motion {
+    Motion::at(V3::zeros(), Q::identity())
+}
+
+/// Motion of the parent; the world is at rest in the origin.
+fn parent_of(joint: &Joint, bodies: &[Motion]) -> Motion {
+    joint.parent.map_or_else(world, |p| bodies[p])
+}
+
+impl JointRows {
+    /// At the given poses.
+    pub fn new(joint: &Joint, bodies: &[Motion]) -> Self {
+        let (parent, child) = (parent_of(joint, bodies), &bodies[joint.child]);
+        let frame = (parent.q * joint.parent_frame).to_rotation_matrix();
+        let anchor = child.q * joint.child_anchor;
+        let lever = child.c + anchor - parent.c;
+        let mut rows = Self::default();
+        for k in 0..3 {
+            let d: V3 = frame.matrix().column(k).into();
+            let (on_child, on_parent) = (anchor.cross(&d), lever.cross(&d));
+            for i in 0..3 {
+                rows.child[k][i] = d[i];
+                rows.child[k][3 + i] = on_child[i];
+                rows.child[3 + k][3 + i] = d[i];
+                rows.parent[k][i] = -d[i];
+                rows.parent[k][3 + i] = -on_parent[i];
+                rows.parent[3 + k][3 + i] = -d[i];
+            }
+        }
+        rows
+    }
+
+    /// J·v of one row.
+    pub fn rate(&self, row: usize, child: &[f64], parent: Option<&[f64]>) -> f64 {
+        let dot = |a: &[f64; 6], v: &[f64]| a.iter().zip(v).map(|(a, v)| a * v).sum::<f64>();
+        dot(&self.child[row], child) + parent.map_or(0.0, |p| dot(&self.parent[row], p))
+    }
+}
+
+/// How far the joint is out of place, in the rows' order, m and rad; the free row is 0.
+pub(crate) fn gap(joint: &Joint, bodies: &[Motion]) -> [f64; 6] {
+    let (parent, child) = (parent_of(joint, bodies), &bodies[joint.child]);
+    let frame = parent.q * joint.parent_frame;
+    let apart = frame
+        .inverse_transform_vector(&(child.point(&joint.child_anchor) - parent.point(&joint.parent_anchor)));
+    let relative = frame.inverse() * (child.q * joint.child_frame);
+    let turned = if joint.kind == Kind::Revolute {
+        // u_parent × u_child, in the frame of the parent: the axis alone has to agree.
+        let axis = relative * V3::x();
+        V3::new(0.0, -axis.z, axis.y)
+    } else {
+        relative.imag() * (2.0_f64.copysign(relative.w))
+    };
+    let mut gap = [apart.x, apart.y, apart.z, turned.x, turned.y, turned.z];
+    if let Some(free) = joint.free_row() {
+        gap[free] = 0.0;
+    }
+    gap
+}
+
+/// Coordinate of the joint, rad (continued from `near` over full turns) or m.
+pub(crate) fn coordinate(joint: &Joint, bodies: &[Motion], near: f64) -> f64 {
+    let (parent, child) = (parent_of(joint, bodies), &bodies[joint.child]);
+    let frame = parent.q * joint.parent_frame;
+    match joint.kind {
+        Kind::Fixed => 0.0,
+        Kind::Prismatic => {
+            frame
+                .inverse_transform_vector(
+                    &(child.point(&joint.child_anchor) - parent.point(&joint.parent_anchor)),
+                )
+                .x
+        }
+        Kind::Revolute => {
+            let relative = frame.inverse() * (child.q * joint.child_frame);
+            unwrap_angle(2.0 * libm::atan2(relative.i, relative.w), near)
+        }
+    }
+}
+
+/// Pose of the child (centre of mass and orientation) for a coordinate.
+pub(crate) fn place_child(joint: &Joint, parent: Option<&Motion>, coordinate: f64) -> Motion {
+    let parent = parent.copied().unwrap_or_else(world);
+    let frame = parent.q * joint.parent_frame;
+    let (slide, turn) = match joint.kind {
+        Kind::Fixed => (0.0, 0.0),
+        Kind::Prismatic => (coordinate, 0.0),
+        Kind::Revolute => (0.0, coordinate),
+    };
+    let q = frame * Q::from_axis_angle(&V3::x_axis(), turn) * joint.child_frame.inverse();
+    let anchor = parent.point(&joint.parent_anchor) + frame * V3::new(slide, 0.0, 0.0);
+    Motion::at(anchor - q * joint.child_anchor, q)
+}

@@ -1,0 +1,326 @@
+//! One step of the bodies in maximal coordinates.
+//!
+//! Unknowns are the rates v⁺ of all bodies and the impulses λ of all joint rows:
+//! M·v⁺ = M·v + h·f + Jᵀλ, J·v⁺ + C·λ = b. Positions follow as x⁺ = x + h·v⁺ (semi-implicit Euler) and the joints
+//! hold **at the end of the step**: the rows are linearised about the force-free motion and the rest is taken out
+//! by a few corrections with the same factor, which enter rates and positions alike. That is the SHAKE scheme
+//! (Ryckaert, Ciccotti and Berendsen 1977), symplectic (Leimkuhler and Skeel 1994): joints neither open nor
+//! brake. Rotation: the angular momentum is updated by the impulses, orientation by the Cayley transform of the
+//! midpoint rate, see [`gyro`].
+
+mod gyro;
+pub(crate) mod joint_rows;
+pub(crate) mod kkt;
+
+use crate::contact::self_contact::SelfContact;
+use crate::drive::{Axis, Law, Mode};
+use crate::math::{M3, V3, cayley};
+use crate::model::Model;
+use crate::state::{Motion, State};
+use joint_rows::{JointRows, gap};
+use kkt::Kkt;
+use terraglue_linear_solver::Error as SolverError;
+
+/// Joints are closed to this at the end of every step, m and rad.
+const GAP_TOLERANCE: f64 = 1e-11;
+/// Most corrections per solve.
+const MAX_CORRECTIONS: usize = 6;
+/// Rounds in which all axes change branch at once; after them one at a time.
+const FREE_ROUNDS: usize = 8;
+
+/// Why a trial has no result.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+pub(crate) enum Failure {
+    #[error("the joint system cannot be solved: {0}")]
+    Solver(#[from] SolverError),
+    #[error("motors and joint limits found no consistent state in {rounds} rounds; a shorter step may help")]
+    Branches { rounds: usize },
+    #[error("joint `{joint}` stays open by {gap:e} (m or rad); a shorter step may help")]
+    Gap { joint: String, gap: f64 },
+    #[error("contact among the robot's own bodies has no solution; a shorter step may help")]
+    SelfContact,
+}
+
+/// Everything about the step in hand and the last trial; buffers are reused.
+pub(crate) struct Dynamics {
+    pub model: Model,
+    pub kkt: Kkt,
+    pub self_contact: SelfContact,
+    pub h: f64,
+    starts: Vec<Motion>,
+    inertia: Vec<M3>,
+    /// World rates of free rotation in the middle and at the end of the step.
+    middle_rate: Vec<V3>,
+    free_rate: Vec<V3>,
+    rows: Vec<JointRows>,
+    pub axes: Vec<Axis>,
+    broken: Vec<bool>,
+    base_rhs: Vec<f64>,
+    compliance: Vec<[Option<f64>; 6]>,
+    /// Branches of all axes for which the factor stands.
+    pub modes: Vec<Mode>,
+    next_modes: Vec<Mode>,
+    factored: bool,
+    /// Counts factorisations; tells whether a compliance matrix is still valid.
+    pub factor_count: u64,
+    /// External impulses of the trial, laid out as the unknowns.
+    pub external: Vec<f64>,
+    rhs: Vec<f64>,
+    correction: Vec<f64>,
+    /// Rates and (negative) impulses of the trial.
+    pub solution: Vec<f64>,
+    /// Motion at the end of the trial and rotation vector (before the Cayley transform) of each body.
+    pub ends: Vec<Motion>,
+    pub turns: Vec<V3>,
+}
+
+impl Dynamics {
+    pub fn new(model: Model, bodies: &[Motion]) -> Result<Self, SolverError> {
+        let kkt = Kkt::new(&model)?;
+        let (nb, nj, n) = (model.bodies.len(), model.joints.len(), kkt.len());
+        let rest = Motion::at(V3::zeros(), crate::math::Q::identity());
+        let idle = Axis {
+            law: Law::Impulse(0.0),
+            bound: 0.0,
+            limits: [f64::NEG_INFINITY, f64::INFINITY],
+            brake: None,
+        };
+        Ok(Self {
+            self_contact: SelfContact::new(&model, bodies),
+            kkt,
+            h: 0.0,
+            starts: vec![rest; nb],
+            inertia: vec![M3::zeros(); nb],
+            middle_rate: vec![V3::zeros(); nb],
+            free_rate: vec![V3::zeros(); nb],
+            rows: vec![JointRows::default(); nj],
+            axes: vec![idle; nj],
+            broken: vec![false; nj],
+            base_rhs: vec![0.0; n],
+            compliance: vec![[None; 6]; nj],
+            modes: vec![Mode::Free; nj],
+            next_modes: vec![Mode::Free; nj],
+            factored: false,
+            factor_count: 0,
+            external: vec![0.0; n],
+            rhs: vec![0.0; n],
+            correction: vec![0.0; n],
+            solution: vec![0.0; n],
+            ends: vec![rest; nb],
+            turns: vec![V3::zeros(); nb],
+            model,
+        })
+    }
+
+    /// Linearises the step of length h from a state; the factor is made by the first trial.
+    pub fn prepare(&mut self, state: &State, h: f64) {
+        self.h = h;
+        self.starts.clone_from(&state.bodies);
+        self.prepare_bodies(state);
+        self.prepare_joints(state);
+        self.self_contact.detect(&self.starts, h);
+        self.factored = false;
+    }
+
+    fn prepare_bodies(&mut self, state: &State) {
+        let h = self.h;
+        for (b, body) in self.model.bodies.iter().enumerate() {
+            let m = &self.starts[b];
+            let r = m.q.to_rotation_matrix();
+            self.inertia[b] = r * body.inertia * r.transpose();
+            let (middle, end) = gyro::free_rotation(&body.inertia, &m.q.inverse_transform_vector(&m.w), h);
+            // Rates at the end are given in the axes of the turned body.
+            self.middle_rate[b] = m.q * middle;
+            self.free_rate[b] = cayley(&(h * self.middle_rate[b])) * (m.q * end);
+            let push = body.mass * m.v + h * (body.mass * self.model.gravity + state.forces[b]);
+            let spin = self.inertia[b] * self.free_rate[b];
+            let at = self.kkt.body_at[b];
+            self.base_rhs[at..at + 3].copy_from_slice(push.as_slice());
+            self.base_rhs[at + 3..at + 6].copy_from_slice(spin.as_slice());
+        }
+    }
+
+    fn prepare_joints(&mut self, state: &State) {
+        // The force-free motion is the point of linearisation.
+        for b in 0..self.starts.len() {
+            let at = self.kkt.body_at[b];
+            self.solution[at..at + 3].copy_from_slice(self.starts[b].v.as_slice());
+            self.solution[at + 3..at + 6].copy_from_slice(self.free_rate[b].as_slice());
+        }
+        self.find_ends();
+        for (j, joint) in self.model.joints.iter().enumerate() {
+            let s = &state.joints[j];
+            self.broken[j] = s.broken;
+            self.rows[j] = JointRows::new(joint, &self.starts);
+            self.axes[j] = Axis::new(s, joint.limits, self.h);
+            self.modes[j] = self.axes[j].start(s.mode);
+            let open = gap(joint, &self.ends);
+            let at = self.kkt.joint_at[j];
+            for r in 0..6 {
+                let hold = self.rate(j, r, &self.solution) - open[r] / self.h;
+                self.base_rhs[at + r] = if s.broken || joint.free_row() == Some(r) { 0.0 } else { hold };
+            }
+        }
+    }
+
+    /// J·v of row r of joint j.
+    fn rate(&self, j: usize, r: usize, v: &[f64]) -> f64 {
+        let joint = &self.model.joints[j];
+        let of = |b: usize| &v[self.kkt.body_at[b]..][..6];
+        self.rows[j].rate(r, of(joint.child), joint.parent.map(of))
+    }
+
+    /// Rate and impulse of the free axis of joint j in the trial; none where nothing moves or it is broken.
+    pub fn axis_result(&self, j: usize) -> Option<(f64, f64)> {
+        let free = self.model.joints[j].free_row().filter(|_| !self.broken[j])?;
+        let rate = self.rate(j, free, &self.solution);
+        let row = self.axes[j].row(self.modes[j]).is_some();
+        let impulse = if row {
+            -self.solution[self.kkt.joint_at[j] + free]
+        } else {
+            self.axes[j].impulse(self.modes[j])
+        };
+        Some((rate, impulse))
+    }
+
+    fn factor(&mut self) -> Result<(), SolverError> {
+        for (j, joint) in self.model.joints.iter().enumerate() {
+            for r in 0..6 {
+                self.compliance[j][r] = match joint.free_row() {
+                    _ if self.broken[j] => None,
+                    Some(free) if free == r => self.axes[j].row(self.modes[j]).map(|(c, _)| c),
+                    _ => Some(0.0),
+                };
+            }
+        }
+        self.kkt.factor(&self.model, &self.inertia, &self.rows, &self.compliance)?;
+        self.factored = true;
+        self.factor_count += 1;
+        Ok(())
+    }
+
+    /// Makes the factor for the current branches if there is none.
+    pub fn ensure_factor(&mut self) -> Result<(), Failure> {
+        if !self.factored {
+            self.factor()?;
+        }
+        Ok(())
+    }
+
+    /// Solves the step under `external`; the result is in `solution`, `ends`, `turns` and `modes`.
+    pub fn solve(&mut self) -> Result<(), Failure> {
+        let rounds = FREE_ROUNDS + 8 * self.axes.len() + 8;
+        for round in 0..rounds {
+            self.ensure_factor()?;
+            self.assemble();
+            self.kkt.solver.solve(&self.rhs, &mut self.solution)?;
+            if !self.self_contact.resolve(&self.kkt.solver, &self.kkt.body_at, &mut self.solution) {
+                return Err(Failure::SelfContact);
+            }
+            self.close_joints()?;
+            if !self.change_branches(round >= FREE_ROUNDS) {
+                return Ok(());
+            }
+        }
+        Err(Failure::Branches { rounds })
+    }
+
+    fn assemble(&mut self) {
+        for ((rhs, base), external) in self.rhs.iter_mut().zip(&self.base_rhs).zip(&self.external) {
+            *rhs = base + external;
+        }
+        for (j, joint) in self.model.joints.iter().enumerate() {
+            let Some(free) = joint.free_row().filter(|_| !self.broken[j]) else { continue };
+            if let Some((_, b)) = self.axes[j].row(self.modes[j]) {
+                self.rhs[self.kkt.joint_at[j] + free] = b;
+                continue;
+            }
+            let impulse = self.axes[j].impulse(self.modes[j]);
+            if impulse == 0.0 {
+                continue;
+            }
+            let mut add = |body: usize, row: &[f64; 6]| {
+                let at = self.kkt.body_at[body];
+                self.rhs[at..at + 6].iter_mut().zip(row).for_each(|(r, j)| *r += impulse * j);
+            };
+            add(joint.child, &self.rows[j].child[free]);
+            if let Some(parent) = joint.parent {
+                add(parent, &self.rows[j].parent[free]);
+            }
+        }
+    }
+
+    /// Takes out what is left of the joints' gaps at the end of the step.
+    fn close_joints(&mut self) -> Result<(), Failure> {
+        for _ in 0..MAX_CORRECTIONS {
+            self.find_ends();
+            if self.gaps_into_correction().1 <= GAP_TOLERANCE {
+                return Ok(());
+            }
+            self.kkt.solver.substitute(&mut self.correction);
+            self.solution.iter_mut().zip(&self.correction).for_each(|(s, c)| *s += c);
+        }
+        self.find_ends();
+        match self.gaps_into_correction() {
+            (_, gap) if gap <= 1e3 * GAP_TOLERANCE => Ok(()),
+            (j, gap) => Err(Failure::Gap { joint: self.model.joints[j].name.clone(), gap }),
+        }
+    }
+
+    /// Right-hand side of a correction; the worst joint and its gap.
+    fn gaps_into_correction(&mut self) -> (usize, f64) {
+        let mut worst = (0, 0.0);
+        self.correction.fill(0.0);
+        for (j, joint) in self.model.joints.iter().enumerate().filter(|(j, _)| !self.broken[*j]) {
+            let at = self.kkt.joint_at[j];
+            for (r, open) in gap(joint, &self.ends).iter().enumerate() {
+                self.correction[at + r] = -open / self.h;
+                // Written so that a NaN counts as the worst.
+                if !(open.abs() <= worst.1) {
+                    worst = (j, open.abs());
+                }
+            }
+        }
+        worst
+    }
+
+    /// Positions and rates at the end of the step from `solution`.
+    fn find_ends(&mut self) {
+        for b in 0..self.ends.len() {
+            let (start, at) = (&self.starts[b], self.kkt.body_at[b]);
+            let v = V3::from_column_slice(&self.solution[at..at + 3]);
+            let w = V3::from_column_slice(&self.solution[at + 3..at + 6]);
+            let turn = self.h * (w + self.middle_rate[b] - self.free_rate[b]);
+            let q = cayley(&turn) * start.q;
+            // The impulses change the angular momentum; the rate follows with the inertia of the new orientation.
+            let momentum = self.inertia[b] * (w - self.free_rate[b] + start.w);
+            let rate = q * (self.model.bodies[b].inverse_inertia * q.inverse_transform_vector(&momentum));
+            self.turns[b] = turn;
+            self.ends[b] = Motion { c: start.c + self.h * v, q, v, w: rate };
+        }
+    }
+
+    /// Moves axes to the branch on which their solution lies; false when all are there.
+    fn change_branches(&mut self, one_at_a_time: bool) -> bool {
+        let mut changed = false;
+        self.next_modes.clone_from(&self.modes);
+        for j in 0..self.axes.len() {
+            let Some((rate, impulse)) = self.axis_result(j) else { continue };
+            let next = self.axes[j].next(self.modes[j], rate, impulse);
+            if next != self.modes[j] && !(one_at_a_time && changed) {
+                self.next_modes[j] = next;
+                changed = true;
+            }
+        }
+        if changed {
+            std::mem::swap(&mut self.modes, &mut self.next_modes);
+            self.factored = false;
+        }
+        changed
+    }
+
+    /// Motion at the start of the step.
+    pub fn starts(&self) -> &[Motion] {
+        &self.starts
+    }
+}

@@ -1,0 +1,84 @@
+//! Small rotations and matrices that the dynamics needs.
+
+use nalgebra::{Matrix3, Quaternion, Unit, UnitQuaternion, Vector3};
+
+/// Vector, world axes unless said otherwise.
+pub(crate) type V3 = Vector3<f64>;
+/// 3 × 3 matrix.
+pub(crate) type M3 = Matrix3<f64>;
+/// Rotation.
+pub(crate) type Q = UnitQuaternion<f64>;
+
+/// Rotation by the Cayley transform of a rotation vector r (rad): half angle atan(|r|/2). Differs from the
+/// exponential by |r|³/12, needs no transcendental function, and conserves energy and momentum of a free body
+/// together with the midpoint rule (Austin, Krishnaprasad and Wang 1993).
+pub(crate) fn cayley(r: &V3) -> Q {
+    Unit::new_normalize(Quaternion::new(1.0, 0.5 * r.x, 0.5 * r.y, 0.5 * r.z))
+}
+
+/// Rotation vector (rad) of the Cayley transform of r.
+pub(crate) fn cayley_vector(r: &V3) -> V3 {
+    let half = 0.5 * r.norm();
+    let factor = if half < 1e-4 { 1.0 - half * half / 3.0 } else { libm::atan(half) / half };
+    r * factor
+}
+
+/// x× as a matrix.
+pub(crate) fn skew(v: &V3) -> M3 {
+    v.cross_matrix()
+}
+
+/// Roll, pitch, yaw (z-y-x Euler angles), rad.
+pub(crate) fn euler(q: &Q) -> [f64; 3] {
+    let (w, x, y, z) = (q.w, q.i, q.j, q.k);
+    let roll = libm::atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y));
+    let pitch = libm::asin((2.0 * (w * y - z * x)).clamp(-1.0, 1.0));
+    let yaw = libm::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z));
+    [roll, pitch, yaw]
+}
+
+/// A right-handed frame whose x is `axis`.
+pub(crate) fn frame_along(axis: &V3) -> Q {
+    let smallest = axis.iamin();
+    let t1 = V3::ith(smallest, 1.0).cross(axis).normalize();
+    let m = M3::from_columns(&[*axis, t1, axis.cross(&t1)]);
+    Q::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(m))
+}
+
+/// The angle of `angle + 2πk` that lies nearest to `near`.
+pub(crate) fn unwrap_angle(angle: f64, near: f64) -> f64 {
+    let turn = std::f64::consts::TAU;
+    angle + turn * ((near - angle) / turn).round()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn euler_angles_come_back() {
+        let q = Q::from_euler_angles(0.3, -0.7, 2.0);
+        for (a, b) in euler(&q).iter().zip([0.3, -0.7, 2.0]) {
+            assert!((a - b).abs() < 1e-14);
+        }
+    }
+
+    #[test]
+    fn a_frame_along_any_axis_is_right_handed() {
+        for axis in [V3::x(), -V3::x(), V3::y(), -V3::z(), V3::new(0.6, -0.48, 0.64)] {
+            assert!((frame_along(&axis) * V3::x() - axis).norm() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn the_rotation_vector_of_a_cayley_transform_is_its_own_logarithm() {
+        for r in [V3::new(1e-6, 2e-6, 0.0), V3::new(0.2, -0.1, 0.4)] {
+            assert!((cayley(&r).scaled_axis() - cayley_vector(&r)).norm() < 1e-15);
+        }
+    }
+
+    #[test]
+    fn angles_continue_over_full_turns() {
+        assert!((unwrap_angle(-3.0, 3.2) - (std::f64::consts::TAU - 3.0)).abs() < 1e-15);
+    }
+}

@@ -1,0 +1,150 @@
+//! What stays constant over the life of an instance: bodies, joints, shapes.
+
+use crate::math::{M3, Q, V3, frame_along};
+use nalgebra::Isometry3;
+use terraglue_robot_import as import;
+
+/// A body about its centre of mass.
+#[derive(Clone, Debug)]
+pub(crate) struct Body {
+    pub name: String,
+    pub mass: f64,
+    /// Centre of mass in the body frame, m.
+    pub com: V3,
+    /// Inertia about the centre of mass in body axes, and its inverse.
+    pub inertia: M3,
+    pub inverse_inertia: M3,
+    pub shapes: Vec<import::Shape>,
+}
+
+/// What a joint leaves free.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Kind {
+    Revolute,
+    Prismatic,
+    Fixed,
+}
+
+/// A joint between a body and its parent (or the world).
+#[derive(Clone, Debug)]
+pub(crate) struct Joint {
+    pub name: String,
+    pub kind: Kind,
+    pub parent: Option<usize>,
+    pub child: usize,
+    /// Joint's origin from the parent's centre of mass in its axes (in the world without a parent), m.
+    pub parent_anchor: V3,
+    /// Joint's origin from the child's centre of mass in its axes, m.
+    pub child_anchor: V3,
+    /// Orientation of the joint's frame, x along the axis, in parent and child.
+    pub parent_frame: Q,
+    pub child_frame: Q,
+    pub limits: Option<[f64; 2]>,
+}
+
+impl Joint {
+    /// Which of the six rows (three translations, three rotations, each along axis, t1, t2) is the free one.
+    pub fn free_row(&self) -> Option<usize> {
+        match self.kind {
+            Kind::Prismatic => Some(0),
+            Kind::Revolute => Some(3),
+            Kind::Fixed => None,
+        }
+    }
+
+    /// Whether it has a coordinate.
+    pub fn moves(&self) -> bool {
+        self.kind != Kind::Fixed
+    }
+
+    /// Unit of its coordinate.
+    pub fn unit(&self) -> &'static str {
+        if self.kind == Kind::Prismatic { "m" } else { "rad" }
+    }
+}
+
+/// The whole robot.
+#[derive(Clone, Debug)]
+pub(crate) struct Model {
+    pub bodies: Vec<Body>,
+    pub joints: Vec<Joint>,
+    /// Joint above each body.
+    pub joint_above: Vec<Option<usize>>,
+    pub gravity: V3,
+    /// Pose of body 0 at the file's root frame = origin; `None`: the root frame is the world.
+    pub free_base: Option<Isometry3<f64>>,
+}
+
+impl Model {
+    /// From the checked robot. `base`: pose of the file's root frame in the world, used where something is fixed
+    /// to the world. `fixed_base` fixes a root that has mass by a joint called `base`.
+    pub fn new(robot: &import::Robot, base: &Isometry3<f64>, fixed_base: bool, gravity: V3) -> Self {
+        let bodies: Vec<Body> = robot.bodies.iter().map(body).collect();
+        let mut joints: Vec<Joint> = robot.joints.iter().map(|j| joint(j, &bodies, base)).collect();
+        let free_base = match robot.base {
+            import::Base::World => None,
+            import::Base::Free(root) if fixed_base => {
+                joints.insert(0, weld(&bodies[0], &(base * root)));
+                None
+            }
+            import::Base::Free(root) => Some(root),
+        };
+        let mut joint_above = vec![None; bodies.len()];
+        joints.iter().enumerate().for_each(|(i, j)| joint_above[j.child] = Some(i));
+        Self { bodies, joints, joint_above, gravity, free_base }
+    }
+
+    /// Total mass, kg.
+    pub fn mass(&self) -> f64 {
+        self.bodies.iter().map(|b| b.mass).sum()
+    }
+}
+
+fn body(b: &import::Body) -> Body {
+    Body {
+        name: b.name.clone(),
+        mass: b.mass,
+        com: b.com,
+        inertia: b.inertia,
+        // The import has checked that the inertia is positive.
+        inverse_inertia: b.inertia.try_inverse().unwrap_or_else(M3::zeros),
+        shapes: b.shapes.clone(),
+    }
+}
+
+fn joint(j: &import::Joint, bodies: &[Body], base: &Isometry3<f64>) -> Joint {
+    let along = frame_along(&j.axis);
+    let (parent, parent_anchor) = match j.parent {
+        Some(p) => (j.parent_from_joint, j.parent_from_joint.translation.vector - bodies[p].com),
+        None => (base * j.parent_from_joint, (base * j.parent_from_joint).translation.vector),
+    };
+    Joint {
+        name: j.name.clone(),
+        kind: match j.kind {
+            import::JointKind::Revolute => Kind::Revolute,
+            import::JointKind::Prismatic => Kind::Prismatic,
+            import::JointKind::Fixed => Kind::Fixed,
+        },
+        parent: j.parent,
+        child: j.child,
+        parent_anchor,
+        child_anchor: j.child_from_joint.translation.vector - bodies[j.child].com,
+        parent_frame: parent.rotation * along,
+        child_frame: j.child_from_joint.rotation * along,
+        limits: j.limits,
+    }
+}
+
+fn weld(body: &Body, pose: &Isometry3<f64>) -> Joint {
+    Joint {
+        name: "base".into(),
+        kind: Kind::Fixed,
+        parent: None,
+        child: 0,
+        parent_anchor: pose * nalgebra::Point3::from(body.com) - nalgebra::Point3::origin(),
+        child_anchor: V3::zeros(),
+        parent_frame: pose.rotation,
+        child_frame: Q::identity(),
+        limits: None,
+    }
+}

@@ -1,0 +1,104 @@
+//! The module: from parameters to an instance.
+
+use crate::drive::{Mode, Motor};
+use crate::dynamics::Dynamics;
+use crate::math::V3;
+use crate::model::Model;
+use crate::placement::{at_rest, base_pose, clearance, coordinates};
+use crate::robot::Robot;
+use crate::state::{JointState, Motion, State};
+use nalgebra::Isometry3;
+use std::path::Path;
+use std::sync::Arc;
+use terraglue_robot_import::read_urdf;
+use terraglue_subsystem::{Config, Energy, Error, Host, LogLevel, Module, Result, Schema, Subsystem};
+
+/// Rigid bodies with joints and motors, read from a robot file.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct RigidBody;
+
+impl Module for RigidBody {
+    fn schema() -> Schema {
+        crate::schema::schema()
+    }
+
+    fn instantiate(config: &Config, host: Arc<dyn Host>) -> Result<Box<dyn Subsystem>> {
+        let config = config.clone().with_defaults(&Self::schema());
+        let fixed = config.flag("fixed_base")?;
+        let path = Path::new(host.folder()).join(config.text("model")?);
+        let file = read_urdf(&path, fixed).map_err(|e| Error::Refused(e.to_string()))?;
+        let position = config.numbers("position_m")?;
+        if position.len() != 3 || position.iter().any(|p| !p.is_finite()) {
+            return Err(Error::Refused(format!(
+                "parameter `position_m` = {position:?} is not a list of x, y, z"
+            )));
+        }
+        let base = base_pose(&position, config.number("heading_rad")?);
+        let model = Model::new(&file, &base, fixed, V3::from(host.gravity()));
+        let angles = coordinates(&model, &config.number_table("joints")?)?;
+        let bodies = start(&config, &*host, &model, base, &angles)?;
+        let joints = joint_states(&config, &angles)?;
+        let state = State {
+            forces: vec![V3::zeros(); bodies.len()],
+            contact_normal: vec![0.0; bodies.len()],
+            bodies,
+            joints,
+            energy: Energy::default(),
+        };
+        let text = format!(
+            "{}: {} bodies, {} joints, {:.6} kg",
+            file.name,
+            model.bodies.len(),
+            model.joints.len(),
+            model.mass()
+        );
+        host.log(LogLevel::Info, &text);
+        let dynamics = Dynamics::new(model, &state.bodies).map_err(|e| Error::Failed(e.to_string()))?;
+        Ok(Box::new(Robot::new(host, dynamics, state)))
+    }
+}
+
+/// Bodies at rest in the initial pose, on the ground where that is wanted and there is one.
+fn start(
+    config: &Config,
+    host: &dyn Host,
+    model: &Model,
+    mut base: Isometry3<f64>,
+    angles: &[f64],
+) -> Result<Vec<Motion>> {
+    let bodies = at_rest(model, &base, angles);
+    let Some(terrain) = host.terrain().filter(|_| model.free_base.is_some()) else { return Ok(bodies) };
+    if !config.flag("place_on_ground")? {
+        return Ok(bodies);
+    }
+    match clearance(model, &bodies, terrain) {
+        Some(gap) => {
+            base.translation.vector.z -= gap;
+            Ok(at_rest(model, &base, angles))
+        }
+        None => Ok(bodies),
+    }
+}
+
+fn joint_states(config: &Config, angles: &[f64]) -> Result<Vec<JointState>> {
+    let name = config.text("motor")?;
+    let motor = Motor::from_name(name).ok_or_else(|| {
+        Error::Refused(format!("parameter `motor` = `{name}` is none of {:?}", Motor::NAMES))
+    })?;
+    let first = JointState {
+        angle: 0.0,
+        velocity: 0.0,
+        torque: 0.0,
+        angle_target: 0.0,
+        velocity_target: 0.0,
+        torque_target: 0.0,
+        max_torque: config.number("max_torque")?,
+        stiffness: config.number("stiffness")?,
+        damping: config.number("damping")?,
+        motor,
+        blocked: None,
+        broken: false,
+        mode: Mode::Free,
+    };
+    Ok(angles.iter().map(|a| JointState { angle: *a, angle_target: *a, ..first }).collect())
+}

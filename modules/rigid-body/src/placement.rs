@@ -1,0 +1,136 @@
+//! Where the robot starts: joint coordinates by name pattern, pose of the root, feet on the ground.
+
+use crate::contact::self_contact::{parry_local, parry_shape};
+use crate::dynamics::joint_rows::place_child;
+use crate::math::V3;
+use crate::model::Model;
+use crate::state::Motion;
+use nalgebra::{Isometry3, Translation3};
+use parry3d_f64::math::{Pose, Vector};
+use parry3d_f64::query::{Ray, RayCast};
+use terraglue_subsystem::{Error, Result, Terrain};
+
+/// Coordinates of all joints from a table of patterns: an exact name wins, else the longest pattern that matches.
+pub(crate) fn coordinates(model: &Model, table: &[(String, f64)]) -> Result<Vec<f64>> {
+    for (pattern, _) in table {
+        let known = model.joints.iter().any(|j| j.moves() && matches(pattern, &j.name));
+        if !known {
+            return Err(Error::Refused(format!(
+                "parameter `joints`: no moving joint is called `{pattern}`{}",
+                nearest(model, pattern)
+            )));
+        }
+    }
+    model.joints.iter().map(|joint| coordinate(joint, table)).collect()
+}
+
+fn coordinate(joint: &crate::model::Joint, table: &[(String, f64)]) -> Result<f64> {
+    let best = table
+        .iter()
+        .filter(|(pattern, _)| matches(pattern, &joint.name))
+        .max_by_key(|(pattern, _)| (*pattern == joint.name, pattern.len()));
+    let Some((pattern, value)) = best.filter(|_| joint.moves()) else {
+        return Ok(0.0);
+    };
+    match joint.limits {
+        Some([lower, upper]) if !(lower..=upper).contains(value) => Err(Error::Refused(format!(
+            "parameter `joints`: {pattern} = {value} is outside the limits {lower} … {upper} {} of joint `{}`",
+            joint.unit(),
+            joint.name
+        ))),
+        _ => Ok(*value),
+    }
+}
+
+fn nearest(model: &Model, name: &str) -> String {
+    let names = model.joints.iter().filter(|j| j.moves()).map(|j| j.name.as_str());
+    let near = names.min_by_key(|j| strsim::damerau_levenshtein(j, name));
+    near.map(|j| format!("; did you mean `{j}`?")).unwrap_or_default()
+}
+
+/// Whether a name matches a pattern in which `*` stands for any text.
+fn matches(pattern: &str, name: &str) -> bool {
+    let Some((head, rest)) = pattern.split_once('*') else { return pattern == name };
+    let Some(name) = name.strip_prefix(head) else { return false };
+    (0..=name.len()).any(|k| name.is_char_boundary(k) && matches(rest, &name[k..]))
+}
+
+/// Motion at rest of all bodies for a pose of the root frame and joint coordinates.
+pub(crate) fn at_rest(model: &Model, base: &Isometry3<f64>, coordinates: &[f64]) -> Vec<Motion> {
+    let mut bodies: Vec<Motion> = Vec::with_capacity(model.bodies.len());
+    for (b, body) in model.bodies.iter().enumerate() {
+        let motion = match model.joint_above[b] {
+            Some(j) => {
+                let joint = &model.joints[j];
+                place_child(joint, joint.parent.map(|p| &bodies[p]), coordinates[j])
+            }
+            None => {
+                let pose = base * model.free_base.unwrap_or_else(Isometry3::identity);
+                Motion::at(
+                    pose * nalgebra::Point3::from(body.com) - nalgebra::Point3::origin(),
+                    pose.rotation,
+                )
+            }
+        };
+        bodies.push(motion);
+    }
+    bodies
+}
+
+/// Smallest vertical distance between all collision shapes and the ground, m; none without shapes above it.
+pub(crate) fn clearance(model: &Model, bodies: &[Motion], terrain: &dyn Terrain) -> Option<f64> {
+    let mut smallest: Option<f64> = None;
+    for (body, motion) in model.bodies.iter().zip(bodies) {
+        for shape in body.shapes.iter().filter(|s| s.collides) {
+            let local = Translation3::from(-body.com) * parry_local(shape);
+            let pose: Pose = (Isometry3::from_parts(Translation3::from(motion.c), motion.q) * local).into();
+            let found = shape_clearance(&*parry_shape(shape), &pose, terrain);
+            smallest = Some(smallest.map_or(found, |s| s.min(found)));
+        }
+    }
+    smallest
+}
+
+/// Of one shape: over the lattice nodes below it, where the soil will feel it, and below its lowest corner.
+fn shape_clearance(shape: &dyn parry3d_f64::shape::Shape, pose: &Pose, terrain: &dyn Terrain) -> f64 {
+    let aabb = shape.compute_aabb(pose);
+    let (origin, spacing) = (terrain.origin(), terrain.spacing());
+    let index = |x: f64, axis: usize| ((x - origin[axis]) / spacing).floor() as i64;
+    let (i0, j0) = (index(aabb.mins.x, 0), index(aabb.mins.y, 1));
+    let (ni, nj) = ((index(aabb.maxs.x, 0) - i0 + 2) as usize, (index(aabb.maxs.y, 1) - j0 + 2) as usize);
+    let mut heights = vec![0.0; ni * nj];
+    terrain.heights(i0, j0, ni, nj, &mut heights);
+    let below = aabb.mins.z - 1.0;
+    let mut smallest = f64::INFINITY;
+    let mut highest = f64::NEG_INFINITY;
+    for (k, height) in heights.iter().enumerate() {
+        highest = highest.max(*height);
+        let x = origin[0] + (i0 + (k % ni) as i64) as f64 * spacing;
+        let y = origin[1] + (j0 + (k / ni) as i64) as f64 * spacing;
+        let ray = Ray::new(Vector::new(x, y, below), Vector::new(0.0, 0.0, 1.0));
+        if let Some(time) = RayCast::cast_ray(shape, pose, &ray, f64::MAX, true) {
+            smallest = smallest.min(below + time - height);
+        }
+    }
+    // A shape between the nodes rests on the highest of its neighbours.
+    if smallest.is_finite() { smallest } else { aabb.mins.z - highest }
+}
+
+/// Pose of the root frame.
+pub(crate) fn base_pose(position: &[f64], heading: f64) -> Isometry3<f64> {
+    let q = crate::math::Q::from_axis_angle(&V3::z_axis(), heading);
+    Isometry3::from_parts(Translation3::new(position[0], position[1], position[2]), q)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn patterns_match_names() {
+        assert!(
+            matches("*_j2", "LF_j2") && matches("L*_j*", "LM_j4") && matches("a", "a") && matches("*", "x")
+        );
+        assert!(!matches("*_j2", "LF_j3") && !matches("LF", "LF_j2"));
+    }
+}

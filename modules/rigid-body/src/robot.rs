@@ -1,0 +1,377 @@
+//! An instance: committed state, the step in hand, and the calls of the subsystem interface.
+
+use crate::contact::estimate::{Estimator, Problem};
+use crate::contact::ports::{Ports, committed, displacement, response};
+use crate::dynamics::joint_rows::coordinate;
+use crate::dynamics::{Dynamics, Failure};
+use crate::model::Model;
+use crate::scene;
+use crate::state::State;
+use crate::variables;
+use std::sync::Arc;
+use terraglue_subsystem::{
+    Action, BodyState, Capabilities, Energy, Error, Estimate, Host, Input, Law, Level, Motion, Port,
+    Response, Result, Scene, Step, Subsystem, Values, ValuesMut, Variable,
+};
+
+/// A robot in a run.
+pub(crate) struct Robot {
+    /// Kept alive as long as the instance.
+    _host: Arc<dyn Host>,
+    dynamics: Dynamics,
+    state: State,
+    slots: Vec<State>,
+    variables: Vec<Variable>,
+    actions: Vec<Action>,
+    ports: Ports,
+    estimator: Estimator,
+    /// Step for which `dynamics` and `ports` are prepared.
+    prepared: Option<Prepared>,
+    step_ports: Vec<Port>,
+    /// Grows whenever the state changes.
+    revision: u64,
+    /// Whether the last trial was an `advance` that can be committed.
+    trial: bool,
+    scratch: Scratch,
+}
+
+/// What a preparation depends on besides the ports.
+#[derive(Clone, Copy, PartialEq)]
+struct Prepared {
+    revision: u64,
+    h: f64,
+}
+
+/// Packed vectors of the estimate.
+#[derive(Default)]
+struct Scratch {
+    g: Vec<f64>,
+    gap: Vec<f64>,
+    free: Vec<f64>,
+}
+
+fn failed(failure: Failure) -> Error {
+    Error::Failed(failure.to_string())
+}
+
+impl Robot {
+    pub fn new(host: Arc<dyn Host>, dynamics: Dynamics, state: State) -> Self {
+        let slots = (0..host.slots()).map(|_| State::default()).collect();
+        Self {
+            _host: host,
+            variables: variables::describe(&dynamics.model),
+            actions: variables::actions(&dynamics.model),
+            dynamics,
+            state,
+            slots,
+            ports: Ports::default(),
+            estimator: Estimator::default(),
+            prepared: None,
+            step_ports: Vec::new(),
+            revision: 0,
+            trial: false,
+            scratch: Scratch::default(),
+        }
+    }
+
+    fn model(&self) -> &Model {
+        &self.dynamics.model
+    }
+
+    fn changed(&mut self) {
+        self.revision += 1;
+        self.trial = false;
+    }
+
+    /// Linearises the step unless that has been done for the same state, length and ports.
+    fn prepare(&mut self, step: &Step) -> Result {
+        if !(step.h > 0.0 && step.h.is_finite()) {
+            return Err(Error::Refused(format!(
+                "a step of {} s is not possible; it must be longer than 0",
+                step.h
+            )));
+        }
+        let wanted = Prepared { revision: self.revision, h: step.h };
+        let stepped = self.prepared != Some(wanted);
+        if stepped {
+            self.dynamics.prepare(&self.state, step.h);
+            self.prepared = Some(wanted);
+        }
+        if stepped || self.step_ports != step.ports || self.ports.len() != step.n as usize {
+            self.step_ports.clear();
+            self.step_ports.extend_from_slice(step.ports);
+            if !self.ports.assign(step.ports, step.n as usize, &self.state.bodies) {
+                self.prepared = None;
+                return Err(Error::Refused("a port names a body that the robot does not have".into()));
+            }
+        }
+        Ok(())
+    }
+
+    /// Solves the step under the wrenches t.
+    fn try_wrenches(&mut self, t: &[f64]) -> Result {
+        self.ports.load(&mut self.dynamics, t);
+        self.dynamics.solve().map_err(failed)
+    }
+
+    /// Fills `scratch.g` with d(x1 − x2)/dT and `scratch.gap` with x_free − x2 in the sign of side 1.
+    fn linear_contact(&mut self, x_free: &[f64], partner: &Motion) {
+        let n = self.ports.len();
+        let g = self.ports.compliance(&self.dynamics);
+        self.scratch.g.clear();
+        self.scratch.g.extend_from_slice(g);
+        for c in 0..n {
+            for r in 0..n {
+                self.scratch.g[c * n + r] *= self.ports.side(r) * self.ports.side(c);
+            }
+        }
+        self.scratch.gap.clear();
+        let gaps = (0..n).map(|i| self.ports.side(i) * (x_free[i] - partner.x[i]));
+        self.scratch.gap.extend(gaps);
+    }
+
+    /// x_free as it would be on the branches of the motors under T*: x(T*) − G·T*.
+    fn extrapolate_free(&mut self, step: &Step, t: &[f64], x_free: &mut [f64]) {
+        let n = self.ports.len();
+        displacement(step.ports, &self.dynamics, x_free);
+        self.ports.compliance(&self.dynamics);
+        for (r, x) in x_free.iter_mut().enumerate() {
+            let moved: f64 = (0..n).map(|c| self.ports.g(r, c) * self.ports.side(c) * t[c]).sum();
+            *x -= moved;
+        }
+    }
+
+    fn book_joints(&mut self) {
+        let Self { dynamics, state, .. } = self;
+        let h = dynamics.h;
+        for (j, joint) in dynamics.model.joints.iter().enumerate() {
+            let Some((rate, impulse)) = dynamics.axis_result(j) else { continue };
+            let mode = dynamics.modes[j];
+            let motor = dynamics.axes[j].motor_impulse(mode, rate, impulse);
+            let s = &mut state.joints[j];
+            state.energy.actuator_work += motor * rate;
+            // A brake or a stop that catches a moving joint turns its energy into heat.
+            let stop = if dynamics.axes[j].row(mode).is_some() { impulse - motor } else { 0.0 };
+            state.energy.dissipated += (-0.5 * stop * (rate + s.velocity)).max(0.0);
+            s.angle = coordinate(joint, &dynamics.ends, s.angle);
+            s.velocity = rate;
+            s.torque = (motor / h).clamp(-s.max_torque, s.max_torque);
+            s.mode = mode;
+        }
+    }
+
+    fn book_ports(&mut self, step: &Step, t: &[f64]) {
+        self.state.contact_normal.fill(0.0);
+        displacement(step.ports, &self.dynamics, &mut self.scratch.free);
+        for port in step.ports {
+            for (i, c) in port.components() {
+                self.state.energy.port_work += self.ports.side(i) * t[i] * self.scratch.free[i];
+                if c == 0 {
+                    self.state.contact_normal[port.body as usize] += t[i];
+                }
+            }
+        }
+    }
+
+    fn set_one(&mut self, id: u32, values: &Values, k: usize) -> Result {
+        let Self { dynamics, state, .. } = self;
+        let model = &dynamics.model;
+        match values {
+            Values::F64(v) => variables::set_number(model, state, id, v[k]),
+            Values::Bool(v) => variables::set_flag(model, state, id, v[k]),
+            Values::Enumeration(v) => variables::set_motor(model, state, id, v[k]),
+            _ => Err(Error::Refused(format!("variable number {id} is of another type"))),
+        }
+    }
+}
+
+fn value_count(values: &Values) -> usize {
+    match values {
+        Values::F64(v) => v.len(),
+        Values::Bool(v) => v.len(),
+        Values::Enumeration(v) => v.len(),
+        _ => 0,
+    }
+}
+
+impl Subsystem for Robot {
+    fn capabilities(&self) -> Capabilities {
+        Capabilities::FORCE
+            | Capabilities::ESTIMATE
+            | Capabilities::DERIVATIVES
+            | Capabilities::RETRY
+            | Capabilities::STATE
+    }
+
+    fn set_ports(&mut self, step: &Step, _laws: &mut [Law], now: &mut Response) -> Result {
+        if let Some(port) = step.ports.iter().find(|p| p.body as usize >= self.state.bodies.len()) {
+            return Err(Error::Refused(format!(
+                "port {} names body {}, which does not exist",
+                port.key, port.body
+            )));
+        }
+        committed(step.ports, &self.state.bodies, now);
+        now.reached = step.t;
+        Ok(())
+    }
+
+    fn estimate_forces(&mut self, step: &Step, partner: &Motion, out: &mut Estimate) -> Result {
+        self.prepare(step)?;
+        self.trial = false;
+        let n = self.ports.len();
+        out.t_star.fill(0.0);
+        self.try_wrenches(out.t_star)?;
+        self.scratch.free.resize(n, 0.0);
+        displacement(step.ports, &self.dynamics, out.x_free);
+        out.unique = true;
+        // Motors may change branch under T*; then the free motion is taken on the new branches.
+        for _ in 0..4 {
+            self.linear_contact(out.x_free, partner);
+            let problem = Problem { ports: step.ports, g: &self.scratch.g, gap: &self.scratch.gap };
+            out.unique = self.estimator.solve(&problem, out.t_star).map_err(|e| Error::Failed(e.into()))?;
+            let factor = self.dynamics.factor_count;
+            self.try_wrenches(out.t_star)?;
+            if self.dynamics.factor_count == factor {
+                break;
+            }
+            self.extrapolate_free(step, out.t_star, out.x_free);
+        }
+        out.g.copy_from_slice(self.ports.compliance(&self.dynamics));
+        for (active, port) in out.active.iter_mut().zip(step.ports) {
+            *active = u8::from(out.t_star[port.first as usize] > 0.0);
+        }
+        Ok(())
+    }
+
+    fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result {
+        let Input::Force { t, .. } = input else { return Err(Error::Unsupported) };
+        self.prepare(step)?;
+        self.trial = false;
+        if let Some(bad) = t.iter().position(|t| !t.is_finite()) {
+            return Err(Error::Refused(format!("component {bad} of the wrench is not a finite number")));
+        }
+        self.try_wrenches(t)?;
+        response(step.ports, &self.dynamics, out);
+        out.t.copy_from_slice(t);
+        out.reached = step.t + step.h;
+        self.trial = true;
+        Ok(())
+    }
+
+    fn interface_jacobian(&mut self, step: &Step, level: Level, out: &mut [f64]) -> Result {
+        self.prepare(step)?;
+        self.dynamics.ensure_factor().map_err(failed)?;
+        let per = match level {
+            Level::Position => 1.0,
+            Level::Velocity => 1.0 / step.h,
+            Level::Acceleration => 1.0 / (step.h * step.h),
+        };
+        let g = self.ports.compliance(&self.dynamics);
+        out.iter_mut().zip(g).for_each(|(o, g)| *o = per * g);
+        Ok(())
+    }
+
+    fn commit(&mut self, step: &Step, t: &[f64], _partner: &Motion) -> Result {
+        if !self.trial {
+            return Err(Error::Failed("commit without a trial of this step".into()));
+        }
+        self.scratch.free.resize(step.n as usize, 0.0);
+        self.book_ports(step, t);
+        self.book_joints();
+        self.state.bodies.clone_from(&self.dynamics.ends);
+        self.changed();
+        Ok(())
+    }
+
+    fn save_state(&mut self, slot: u32) -> Result {
+        let Self { slots, state, .. } = self;
+        let slot = slots.get_mut(slot as usize).ok_or_else(|| no_slot(slot))?;
+        slot.copy_from(state);
+        Ok(())
+    }
+
+    fn restore_state(&mut self, slot: u32) -> Result {
+        let Self { slots, state, .. } = self;
+        let saved = slots.get(slot as usize).filter(|s| !s.bodies.is_empty()).ok_or_else(|| no_slot(slot))?;
+        state.copy_from(saved);
+        self.changed();
+        Ok(())
+    }
+
+    fn variables(&self) -> &[Variable] {
+        &self.variables
+    }
+
+    fn get(&self, ids: &[u32], out: ValuesMut) -> Result {
+        let (model, state) = (self.model(), &self.state);
+        match out {
+            ValuesMut::F64(out) => out
+                .iter_mut()
+                .zip(ids)
+                .try_for_each(|(o, id)| variables::number(model, state, *id).map(|v| *o = v)),
+            ValuesMut::Bool(out) => out
+                .iter_mut()
+                .zip(ids)
+                .try_for_each(|(o, id)| variables::flag_value(model, state, *id).map(|v| *o = v)),
+            ValuesMut::Enumeration(out) => out
+                .iter_mut()
+                .zip(ids)
+                .try_for_each(|(o, id)| variables::motor(model, state, *id).map(|v| *o = v)),
+            _ => Err(Error::Refused("numbers are f64, flags bool, motors enumerations".into())),
+        }
+    }
+
+    fn set(&mut self, ids: &[u32], values: Values) -> Result {
+        if value_count(&values) != ids.len() {
+            return Err(Error::Refused(
+                "numbers are f64, flags bool, motors enumerations; one value per variable".into(),
+            ));
+        }
+        self.changed();
+        ids.iter().enumerate().try_for_each(|(k, id)| self.set_one(*id, &values, k))
+    }
+
+    fn actions(&self) -> &[Action] {
+        &self.actions
+    }
+
+    fn act(&mut self, action: &str, _arguments: &str) -> Result {
+        let unknown = || Error::Refused(format!("there is no action `{action}`"));
+        let (name, what) = action.rsplit_once('.').ok_or_else(unknown)?;
+        let joint = self.model().joints.iter().position(|j| j.name == name).ok_or_else(unknown)?;
+        let moves = self.model().joints[joint].moves();
+        match what {
+            "break" => variables::break_joint(&mut self.state, joint),
+            "block" if moves => variables::block(&mut self.state, joint, true),
+            "release" if moves => variables::block(&mut self.state, joint, false),
+            _ => return Err(unknown()),
+        }
+        self.changed();
+        Ok(())
+    }
+
+    fn scene(&self) -> Scene {
+        scene::scene(self.model())
+    }
+
+    fn body_states(&self, out: &mut [BodyState]) -> Result {
+        for ((out, body), motion) in out.iter_mut().zip(&self.model().bodies).zip(&self.state.bodies) {
+            *out = scene::body_state(body, motion);
+        }
+        Ok(())
+    }
+
+    fn energy(&self) -> Energy {
+        let (mut kinetic, mut potential) = (0.0, 0.0);
+        for (body, m) in self.model().bodies.iter().zip(&self.state.bodies) {
+            let w = m.q.inverse_transform_vector(&m.w);
+            kinetic += 0.5 * (body.mass * m.v.norm_squared() + w.dot(&(body.inertia * w)));
+            potential -= body.mass * self.model().gravity.dot(&m.c);
+        }
+        Energy { kinetic, potential, ..self.state.energy }
+    }
+}
+
+fn no_slot(slot: u32) -> Error {
+    Error::Refused(format!("nothing was saved in slot {slot}"))
+}

@@ -1,0 +1,45 @@
+//! Name and parameters of the module.
+
+use terraglue_subsystem::{Kind, Parameter, ParameterType, Schema};
+
+/// What a scenario may say about a robot.
+pub(crate) fn schema() -> Schema {
+    let motors = crate::drive::Motor::NAMES;
+    Schema {
+        name: "rigid-body".into(),
+        kind: Kind::Robot,
+        help: "Rigid bodies with joints and motors, read from a robot file (URDF)".into(),
+        parameters: vec![
+            Parameter::of("model", ParameterType::Path, "Robot file (URDF)"),
+            Parameter {
+                unit: "m".into(),
+                ..Parameter::of("position_m", ParameterType::Numbers, "Initial x, y, z of the root link's frame")
+                    .or(vec![0.0, 0.0, 0.0])
+            },
+            Parameter::number("heading_rad", "rad", 0.0, "Initial rotation of the robot about z"),
+            Parameter {
+                unit: "rad".into(),
+                ..Parameter::of(
+                    "joints",
+                    ParameterType::NumberTable,
+                    "Initial coordinate by joint name (rad or m); `*` stands for any text; others start at 0",
+                )
+                .optional()
+            },
+            Parameter::of("fixed_base", ParameterType::Bool, "Fix the root link to the world").or(false),
+            Parameter::of(
+                "place_on_ground",
+                ParameterType::Bool,
+                "Lower or lift the robot until its lowest shape touches the scenario's terrain (ignored without \
+                 terrain or with a fixed base)",
+            )
+            .or(true),
+            Parameter::of("motor", ParameterType::Text, "How the motors of all joints are driven at the start")
+                .or("position")
+                .choices(&motors),
+            Parameter::number("stiffness", "N m/rad", 600.0, "Stiffness of position motors").within(0.0, f64::INFINITY),
+            Parameter::number("damping", "N m s/rad", 10.0, "Damping of position motors").within(0.0, f64::INFINITY),
+            Parameter::number("max_torque", "N m", 60.0, "Largest torque of every motor").within(0.0, f64::INFINITY),
+        ],
+    }
+}

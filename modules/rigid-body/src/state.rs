@@ -1,0 +1,70 @@
+//! The committed state: motion of the bodies, settings and memory of the joints, energy book.
+
+use crate::drive::{Mode, Motor};
+use crate::math::{Q, V3};
+use terraglue_subsystem::Energy;
+
+/// Motion of a body: centre of mass, orientation, and their rates in world axes.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Motion {
+    pub c: V3,
+    pub q: Q,
+    pub v: V3,
+    pub w: V3,
+}
+
+impl Motion {
+    pub const fn at(c: V3, q: Q) -> Self {
+        Self { c, q, v: V3::new(0.0, 0.0, 0.0), w: V3::new(0.0, 0.0, 0.0) }
+    }
+
+    /// Position in the world of a point given from the centre of mass in body axes.
+    pub fn point(&self, p: &V3) -> V3 {
+        self.c + self.q * p
+    }
+}
+
+/// Settings, inputs and memory of a joint.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct JointState {
+    /// Committed coordinate and rate, rad or m.
+    pub angle: f64,
+    pub velocity: f64,
+    /// What the motor gave in the last step, N m or N.
+    pub torque: f64,
+    pub angle_target: f64,
+    pub velocity_target: f64,
+    pub torque_target: f64,
+    pub max_torque: f64,
+    pub stiffness: f64,
+    pub damping: f64,
+    pub motor: Motor,
+    /// Coordinate at which it is blocked.
+    pub blocked: Option<f64>,
+    pub broken: bool,
+    /// Branch of the axis in the last step, where the next step starts looking.
+    pub mode: Mode,
+}
+
+/// All that changes from step to step.
+#[derive(Debug, PartialEq, Default)]
+pub(crate) struct State {
+    pub bodies: Vec<Motion>,
+    pub joints: Vec<JointState>,
+    /// External force at the centre of mass, N.
+    pub forces: Vec<V3>,
+    /// Normal force of all ports of a body, N.
+    pub contact_normal: Vec<f64>,
+    pub energy: Energy,
+}
+
+impl State {
+    /// Takes over another state without allocating once the sizes are equal.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.bodies.clone_from(&other.bodies);
+        self.joints.clone_from(&other.joints);
+        self.forces.clone_from(&other.forces);
+        self.contact_normal.clone_from(&other.contact_normal);
+        self.energy = other.energy;
+    }
+}

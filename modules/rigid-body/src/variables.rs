@@ -1,0 +1,266 @@
+//! Variables and actions of the robot: numbering, description, reading, writing.
+
+use crate::drive::Motor;
+use crate::math::euler;
+use crate::model::{Kind, Model};
+use crate::state::State;
+use terraglue_subsystem::{Action, Causality, Effect, Error, Result, ValueType, Variable};
+
+/// Ids per body and per joint.
+const BODY_STRIDE: u32 = 16;
+const JOINT_STRIDE: u32 = 16;
+
+/// What an id means.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Meaning {
+    Body { body: usize, item: u32 },
+    Joint { joint: usize, item: u32 },
+}
+
+/// Items of a body: 0–11 motion, 12 contact force, 13–15 external force.
+const BODY_ITEMS: [(&str, &str, &str); 16] = [
+    ("x", "m", "Position of the body frame"),
+    ("y", "m", "Position of the body frame"),
+    ("z", "m", "Position of the body frame"),
+    ("roll", "rad", "z-y-x Euler angle about x"),
+    ("pitch", "rad", "z-y-x Euler angle about y"),
+    ("yaw", "rad", "z-y-x Euler angle about z"),
+    ("vx", "m/s", "Velocity of the body frame's origin, world axes"),
+    ("vy", "m/s", "Velocity of the body frame's origin, world axes"),
+    ("vz", "m/s", "Velocity of the body frame's origin, world axes"),
+    ("wx", "rad/s", "Angular velocity, world axes"),
+    ("wy", "rad/s", "Angular velocity, world axes"),
+    ("wz", "rad/s", "Angular velocity, world axes"),
+    ("contact_normal", "N", "Sum of the normal forces of the ground on the body"),
+    ("force_x", "N", "External force at the centre of mass, world axes"),
+    ("force_y", "N", "External force at the centre of mass, world axes"),
+    ("force_z", "N", "External force at the centre of mass, world axes"),
+];
+
+const ANGLE: u32 = 0;
+const VELOCITY: u32 = 1;
+const TORQUE: u32 = 2;
+const ANGLE_TARGET: u32 = 3;
+const VELOCITY_TARGET: u32 = 4;
+const TORQUE_TARGET: u32 = 5;
+const MAX_TORQUE: u32 = 6;
+const STIFFNESS: u32 = 7;
+const DAMPING: u32 = 8;
+const MOTOR: u32 = 9;
+const BLOCKED: u32 = 10;
+const BROKEN: u32 = 11;
+
+/// All variables of a robot in ascending order of id.
+pub(crate) fn describe(model: &Model) -> Vec<Variable> {
+    let mut all = Vec::new();
+    for (b, body) in model.bodies.iter().enumerate() {
+        for (item, (name, unit, help)) in BODY_ITEMS.iter().enumerate() {
+            let causality = if item < 13 { Causality::Output } else { Causality::Input };
+            let id = b as u32 * BODY_STRIDE + item as u32;
+            all.push(Variable::real(id, format!("{}.{name}", body.name), unit, causality, help));
+        }
+    }
+    let first = model.bodies.len() as u32 * BODY_STRIDE;
+    for (j, joint) in model.joints.iter().enumerate() {
+        let id = first + j as u32 * JOINT_STRIDE;
+        if joint.moves() {
+            describe_moving(id, &joint.name, joint.kind, &mut all);
+        }
+        all.push(Variable {
+            effect: Effect::ReadOnly,
+            ..flag(
+                id + BROKEN,
+                &joint.name,
+                "broken",
+                Causality::Output,
+                "Whether the joint is gone for ever",
+            )
+        });
+    }
+    all
+}
+
+fn describe_moving(id: u32, name: &str, kind: Kind, all: &mut Vec<Variable>) {
+    let slides = kind == Kind::Prismatic;
+    let pick = |turns: &'static str, slides_unit: &'static str| if slides { slides_unit } else { turns };
+    let (angle, rate, torque) = (pick("rad", "m"), pick("rad/s", "m/s"), pick("N m", "N"));
+    let (stiffness, damping) = (pick("N m/rad", "N/m"), pick("N m s/rad", "N s/m"));
+    let mut real = |item: u32, what: &str, unit: &str, causality: Causality, help: &str| {
+        let v = Variable::real(id + item, format!("{name}.{what}"), unit, causality, help);
+        all.push(if causality == Causality::Parameter { v.within(0.0, f64::INFINITY) } else { v });
+    };
+    real(ANGLE, "angle", angle, Causality::Output, "Coordinate of the joint");
+    real(VELOCITY, "velocity", rate, Causality::Output, "Rate of the joint");
+    real(TORQUE, "torque", torque, Causality::Output, "What the motor gave in the last step");
+    real(ANGLE_TARGET, "angle_target", angle, Causality::Input, "Where a position motor wants to be");
+    real(VELOCITY_TARGET, "velocity_target", rate, Causality::Input, "Rate that the motor wants");
+    real(TORQUE_TARGET, "torque_target", torque, Causality::Input, "What a torque motor gives");
+    real(MAX_TORQUE, "max_torque", torque, Causality::Parameter, "Largest magnitude of the motor's torque");
+    real(STIFFNESS, "stiffness", stiffness, Causality::Parameter, "Stiffness of the position motor");
+    real(DAMPING, "damping", damping, Causality::Parameter, "Damping of the position motor");
+    let motor =
+        Variable::real(id + MOTOR, format!("{name}.motor"), "", Causality::Parameter, "How it is driven");
+    all.push(motor.named(&Motor::NAMES));
+    all.push(flag(id + BLOCKED, name, "blocked", Causality::Parameter, "Held at its coordinate"));
+}
+
+fn flag(id: u32, joint: &str, what: &str, causality: Causality, help: &str) -> Variable {
+    Variable::real(id, format!("{joint}.{what}"), "", causality, help).typed(ValueType::Bool)
+}
+
+/// All actions of a robot.
+pub(crate) fn actions(model: &Model) -> Vec<Action> {
+    let action =
+        |name: &str, what: &str, help: &str| Action { name: format!("{name}.{what}"), help: help.into() };
+    let mut all = Vec::new();
+    for joint in &model.joints {
+        all.push(action(&joint.name, "break", "Remove the joint for ever"));
+        if joint.moves() {
+            all.push(action(&joint.name, "block", "Hold the joint at its coordinate"));
+            all.push(action(&joint.name, "release", "Let a blocked joint move again"));
+        }
+    }
+    all
+}
+
+/// What an id means in this model.
+pub(crate) fn meaning(model: &Model, id: u32) -> Result<Meaning> {
+    let first = model.bodies.len() as u32 * BODY_STRIDE;
+    let unknown = || Error::Refused(format!("there is no variable number {id}"));
+    if id < first {
+        return Ok(Meaning::Body { body: (id / BODY_STRIDE) as usize, item: id % BODY_STRIDE });
+    }
+    let (joint, item) = (((id - first) / JOINT_STRIDE) as usize, (id - first) % JOINT_STRIDE);
+    let known = model.joints.get(joint).is_some_and(|j| item == BROKEN || (j.moves() && item < BROKEN));
+    if known { Ok(Meaning::Joint { joint, item }) } else { Err(unknown()) }
+}
+
+fn wrong_type(id: u32) -> Error {
+    Error::Refused(format!("variable number {id} is of another type"))
+}
+
+/// Reads a number.
+pub(crate) fn number(model: &Model, state: &State, id: u32) -> Result<f64> {
+    match meaning(model, id)? {
+        Meaning::Body { body, item } => Ok(body_number(model, state, body, item)),
+        Meaning::Joint { joint, item } => {
+            let j = &state.joints[joint];
+            match item {
+                ANGLE => Ok(j.angle),
+                VELOCITY => Ok(j.velocity),
+                TORQUE => Ok(j.torque),
+                ANGLE_TARGET => Ok(j.angle_target),
+                VELOCITY_TARGET => Ok(j.velocity_target),
+                TORQUE_TARGET => Ok(j.torque_target),
+                MAX_TORQUE => Ok(j.max_torque),
+                STIFFNESS => Ok(j.stiffness),
+                DAMPING => Ok(j.damping),
+                _ => Err(wrong_type(id)),
+            }
+        }
+    }
+}
+
+fn body_number(model: &Model, state: &State, body: usize, item: u32) -> f64 {
+    let m = &state.bodies[body];
+    let k = item as usize % 3;
+    match item {
+        0..3 => m.point(&-model.bodies[body].com)[k],
+        3..6 => euler(&m.q)[k],
+        6..9 => (m.v - m.w.cross(&(m.q * model.bodies[body].com)))[k],
+        9..12 => m.w[k],
+        12 => state.contact_normal[body],
+        _ => state.forces[body][item as usize - 13],
+    }
+}
+
+/// Writes a number.
+pub(crate) fn set_number(model: &Model, state: &mut State, id: u32, value: f64) -> Result {
+    if !value.is_finite() {
+        return Err(Error::Refused(format!("{value} is not a finite number")));
+    }
+    match meaning(model, id)? {
+        Meaning::Body { body, item: 13..16 } => {
+            state.forces[body][(id % BODY_STRIDE) as usize - 13] = value;
+            Ok(())
+        }
+        Meaning::Body { .. } => Err(Error::Refused("the motion of a body can be read only".into())),
+        Meaning::Joint { joint, item } => {
+            let j = &mut state.joints[joint];
+            let (slot, lowest) = match item {
+                ANGLE_TARGET => (&mut j.angle_target, f64::NEG_INFINITY),
+                VELOCITY_TARGET => (&mut j.velocity_target, f64::NEG_INFINITY),
+                TORQUE_TARGET => (&mut j.torque_target, f64::NEG_INFINITY),
+                MAX_TORQUE => (&mut j.max_torque, 0.0),
+                STIFFNESS => (&mut j.stiffness, 0.0),
+                DAMPING => (&mut j.damping, 0.0),
+                ANGLE..=TORQUE => {
+                    return Err(Error::Refused("the motion of a joint can be read only".into()));
+                }
+                _ => return Err(wrong_type(id)),
+            };
+            if value < lowest {
+                return Err(Error::Refused(format!("{value} is negative")));
+            }
+            *slot = value;
+            Ok(())
+        }
+    }
+}
+
+/// Reads a flag.
+pub(crate) fn flag_value(model: &Model, state: &State, id: u32) -> Result<bool> {
+    match meaning(model, id)? {
+        Meaning::Joint { joint, item: BLOCKED } => Ok(state.joints[joint].blocked.is_some()),
+        Meaning::Joint { joint, item: BROKEN } => Ok(state.joints[joint].broken),
+        _ => Err(wrong_type(id)),
+    }
+}
+
+/// Writes a flag.
+pub(crate) fn set_flag(model: &Model, state: &mut State, id: u32, value: bool) -> Result {
+    match meaning(model, id)? {
+        Meaning::Joint { joint, item: BLOCKED } => {
+            block(state, joint, value);
+            Ok(())
+        }
+        Meaning::Joint { item: BROKEN, .. } => {
+            Err(Error::Refused("use the action `break`; nothing mends it".into()))
+        }
+        _ => Err(wrong_type(id)),
+    }
+}
+
+/// Blocks a joint where it stands, or lets it go.
+pub(crate) fn block(state: &mut State, joint: usize, hold: bool) {
+    let j = &mut state.joints[joint];
+    j.blocked = match (hold, j.blocked) {
+        (true, Some(held)) => Some(held),
+        (true, None) => Some(j.angle),
+        (false, _) => None,
+    };
+}
+
+/// Removes a joint for ever.
+pub(crate) fn break_joint(state: &mut State, joint: usize) {
+    let j = &mut state.joints[joint];
+    (j.broken, j.velocity, j.torque, j.blocked) = (true, 0.0, 0.0, None);
+}
+
+/// Reads the drive of a motor.
+pub(crate) fn motor(model: &Model, state: &State, id: u32) -> Result<i64> {
+    match meaning(model, id)? {
+        Meaning::Joint { joint, item: MOTOR } => Ok(state.joints[joint].motor.index()),
+        _ => Err(wrong_type(id)),
+    }
+}
+
+/// Changes the drive of a motor.
+pub(crate) fn set_motor(model: &Model, state: &mut State, id: u32, value: i64) -> Result {
+    let Meaning::Joint { joint, item: MOTOR } = meaning(model, id)? else { return Err(wrong_type(id)) };
+    let drive = Motor::from_index(value);
+    let drive =
+        drive.ok_or_else(|| Error::Refused(format!("there is no motor drive number {value} (0 to 3)")))?;
+    state.joints[joint].motor = drive;
+    Ok(())
+}

@@ -119,6 +119,7 @@ impl HeightField {
     }
 
     /// Where the nodes lie.
+    #[inline]
     pub fn lattice(&self) -> &Lattice {
         &self.lattice
     }
@@ -186,6 +187,7 @@ impl HeightField {
     }
 
     /// Makes a tile ready for writing: (pool tile of heights, pool tile of sinkage).
+    #[inline]
     pub(crate) fn touch(&mut self, tile: usize) -> (u32, u32) {
         let t = &mut self.tiles[tile];
         t.generation += 1;
@@ -293,6 +295,7 @@ impl HeightField {
 }
 
 impl Surface for HeightField {
+    #[inline]
     fn lattice(&self) -> &Lattice {
         &self.lattice
     }

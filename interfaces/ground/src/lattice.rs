@@ -54,6 +54,7 @@ impl Lattice {
     }
 
     /// Number of tiles along x and y.
+    #[inline]
     pub const fn tiles(&self) -> [u32; 2] {
         [self.size[0].div_ceil(TILE_EDGE), self.size[1].div_ceil(TILE_EDGE)]
     }

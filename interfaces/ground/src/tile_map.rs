@@ -42,6 +42,7 @@ impl<T: Copy> TileMap<T> {
     }
 
     /// Where the nodes lie.
+    #[inline]
     pub fn lattice(&self) -> &Lattice {
         &self.lattice
     }

@@ -33,6 +33,8 @@ pub struct Lists {
     /// Nodes that were loaded at the commit before.
     pub loaded: Vec<[i32; 2]>,
     previous: Vec<[i32; 2]>,
+    /// Slip of loaded nodes after it was carried along; scratch.
+    carried: Vec<f64>,
     /// Nodes that were loaded before and are not any more.
     pub released: Vec<[i32; 2]>,
 }
@@ -43,6 +45,7 @@ impl Lists {
         self.covered.reserve(count);
         self.loaded.reserve(count);
         self.previous.reserve(count);
+        self.carried.reserve(count);
         self.released.reserve(count);
     }
 }
@@ -81,7 +84,7 @@ impl Scene<'_> {
         lists.covered.clear();
         for (patch, port) in self.patches.ports.iter().zip(ports) {
             book.port_work -= port.range().map(|k| t[k] * x[k]).sum::<f64>();
-            let loaded = self.commit_patch(patch, &patch.unpack(x), ground, lists, book);
+            let loaded = self.commit_patch(patch, port, &patch.unpack(x), ground, lists, book);
             if loaded > 0 {
                 book.fewest = if book.fewest == 0 { loaded } else { book.fewest.min(loaded) };
             }
@@ -93,12 +96,15 @@ impl Scene<'_> {
     fn commit_patch(
         &self,
         patch: &Patch,
+        port: &Port,
         x: &[f64; 6],
         ground: &mut Ground,
         lists: &mut Lists,
         book: &mut Book,
     ) -> u32 {
         let n = &self.patches.nodes;
+        let first = lists.loaded.len();
+        let mut slid = [0.0; 2];
         let mut loaded = 0;
         for k in patch.nodes.clone().filter(|k| n.area[*k] > 0.0) {
             let moved = displacement(n.arm[k], x);
@@ -107,7 +113,9 @@ impl Scene<'_> {
             let [i, j] = n.index[k];
             if pressure > 0.0 {
                 loaded += 1;
-                self.press(patch, &Pressed { k, depth, pressure, slip: [moved[1], moved[2]] }, ground, book);
+                let node = Pressed { k, depth, pressure, slip: [moved[1], moved[2]] };
+                let plastic = self.press(patch, &node, ground, book);
+                slid = [slid[0] + plastic[0], slid[1] + plastic[1]];
                 lists.loaded.push([i, j]);
             }
             let virgin = patch.curve.virgin(depth);
@@ -115,11 +123,14 @@ impl Scene<'_> {
             let lower = ground.initial(i, j) + ground.nodes.get(i, j).raised - depth;
             lists.covered.push(Covered { i, j, lower, depth, pressure, virgin });
         }
+        let mean = slid.map(|s| s / f64::from(loaded.max(1)));
+        carry_slip(ground, lists, first, in_world(port, mean), book.stamp);
         loaded
     }
 
-    /// One loaded node: plastic depth, slip, heat and elastic energy.
-    fn press(&self, patch: &Patch, node: &Pressed, ground: &mut Ground, book: &mut Book) {
+    /// One loaded node: plastic depth, slip, heat and elastic energy. Returns how far the foot slipped over the soil
+    /// along t1 and t2, m.
+    fn press(&self, patch: &Patch, node: &Pressed, ground: &mut Ground, book: &mut Book) -> [f64; 2] {
         let Pressed { k, depth, pressure, slip } = *node;
         let (n, curve) = (&self.patches.nodes, &patch.curve);
         let area = n.area[k];
@@ -140,6 +151,45 @@ impl Scene<'_> {
         state.curve = [curve.modulus(), patch.slope];
         (state.pressure, state.shear, state.stamp) = (pressure, shear.state, book.stamp);
         book.max_sinkage = book.max_sinkage.max(depth / patch.slope - state.raised);
+        let elastic = |c: usize| shear.state.elastic[c] - n.shear[k].elastic[c];
+        if shear.state.slip > n.shear[k].slip {
+            [slip[0] - elastic(0), slip[1] - elastic(1)]
+        } else {
+            [0.0; 2]
+        }
+    }
+}
+
+/// Horizontal world components of a vector along t1, t2.
+fn in_world(port: &Port, [a, b]: [f64; 2]) -> [f64; 2] {
+    let (t1, t2) = (port.direction(1), port.direction(2));
+    [a * t1[0] + b * t2[0], a * t1[1] + b * t2[1]]
+}
+
+/// Accumulated slip belongs to the points of the foot (Janosi and Hanamoto 1961 count it from where a point
+/// enters the contact): where the foot slides over the lattice by `slid` (m, world x, y), the slip of the loaded
+/// nodes from `first` on moves with it, ∂j/∂t + v·∇j = 0, first order upwind. What slides in from outside brings
+/// nothing; a rolling foot, whose points do not slide, carries nothing along.
+fn carry_slip(ground: &mut Ground, lists: &mut Lists, first: usize, slid: [f64; 2], stamp: u64) {
+    if slid == [0.0; 2] {
+        return;
+    }
+    let spacing = ground.heights.lattice().spacing;
+    let share = slid.map(|s| s.abs() / spacing);
+    let scale = 1.0 / (share[0] + share[1]).max(1.0);
+    let behind = slid.map(|s| if s > 0.0 { -1 } else { 1 });
+    let nodes = &lists.loaded[first..];
+    lists.carried.clear();
+    lists.carried.extend(nodes.iter().map(|[i, j]| {
+        let own = ground.nodes.get(*i, *j).shear.slip;
+        let gain = |i: i32, j: i32, share: f64| {
+            let there = ground.nodes.get(i, j);
+            if there.stamp == stamp { share * scale * (there.shear.slip - own) } else { 0.0 }
+        };
+        own + gain(i + behind[0], *j, share[0]) + gain(*i, j + behind[1], share[1])
+    }));
+    for ([i, j], slip) in nodes.iter().zip(&lists.carried) {
+        ground.nodes.get_mut(*i, *j).shear.slip = *slip;
     }
 }
 

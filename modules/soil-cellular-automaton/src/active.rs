@@ -4,8 +4,7 @@
 //! as something in that neighbourhood changed since it was visited; sweeping the list gives what sweeping the
 //! whole field would give.
 
-use crate::cell::Cell;
-use terraglue_ground::TileMap;
+use terraglue_ground::{TILE_EDGE, TileMap};
 
 /// Nodes that a change at (0, 0) can set in motion: the eight neighbours (faces, diagonal triples) and the far
 /// ends of triples.
@@ -45,24 +44,38 @@ impl ActiveList {
         self.number = number;
     }
 
-    /// Notes a node.
+    /// Notes a node. `noted` holds for each node the number of the list that noted it last.
     #[inline]
-    pub fn note(&mut self, cells: &mut TileMap<Cell>, i: i32, j: i32) {
-        if !cells.lattice().has(i, j) {
+    pub fn note(&mut self, noted: &mut TileMap<u32>, i: i32, j: i32) {
+        if !noted.lattice().has(i, j) {
             return;
         }
-        let cell = cells.get_mut(i, j);
-        if cell.noted != self.number {
-            cell.noted = self.number;
+        let number = noted.get_mut(i, j);
+        if *number != self.number {
+            *number = self.number;
             self.nodes.push([i, j]);
         }
     }
 
     /// Notes all nodes that a change at (i, j) can set in motion.
     #[inline]
-    pub fn wake(&mut self, cells: &mut TileMap<Cell>, i: i32, j: i32) {
+    pub fn wake(&mut self, noted: &mut TileMap<u32>, i: i32, j: i32) {
+        let edge = TILE_EDGE as i32;
+        let (x, y) = (i % edge, j % edge);
+        let lattice = noted.lattice();
+        let inner = x >= 2 && y >= 2 && x < edge - 2 && y < edge - 2 && lattice.has(i + 2, j + 2);
+        if !inner {
+            REACH.iter().for_each(|[a, b]| self.note(noted, i + a, j + b));
+            return;
+        }
+        let (tile, k) = lattice.locate(i as u32, j as u32);
+        let numbers = noted.tile_mut(tile);
         for [a, b] in REACH {
-            self.note(cells, i + a, j + b);
+            let number = &mut numbers[(k as i32 + b * edge + a) as usize];
+            if *number != self.number {
+                *number = self.number;
+                self.nodes.push([i + a, j + b]);
+            }
         }
     }
 }

@@ -2,7 +2,8 @@
 
 use crate::active::ActiveList;
 use crate::cell::{Cell, OPEN, QUANTUM};
-use crate::displace::displace;
+use crate::displace::Site;
+use crate::levels::{EDGE, Levels, MIDDLE};
 use crate::rules::{curvature_flux, face_flux};
 use crate::values;
 use terraglue_ground::{Lattice, TileMap, TileMapSnapshot, UNIT_M};
@@ -69,7 +70,7 @@ struct Limits {
     /// Δ·tan φ_r.
     repose: f64,
     /// κ_max·d² for straight and diagonal triples.
-    curvature: [f64; 2],
+    curvature: [i32; 2],
 }
 
 /// The material rule of the soil.
@@ -78,6 +79,8 @@ pub struct Automaton {
     friction_angle: f64,
     limits: Limits,
     cells: TileMap<Cell>,
+    levels: Levels,
+    noted: TileMap<u32>,
     active: ActiveList,
     next: ActiveList,
     changes: Vec<i32>,
@@ -99,6 +102,8 @@ impl Automaton {
             friction_angle: 0.5,
             limits: Limits::default(),
             cells: TileMap::new(nowhere, Cell::default(), 0),
+            levels: Levels::new(nowhere, 0),
+            noted: TileMap::new(nowhere, 0, 0),
             active: ActiveList::default(),
             next: ActiveList::default(),
             changes: Vec::new(),
@@ -134,9 +139,9 @@ impl Automaton {
 
     fn set_limits(&mut self, lattice: &Lattice) {
         let d = lattice.spacing;
-        let curvature = self.settings.curvature_max * d * d / UNIT_M;
+        let curvature = (self.settings.curvature_max * d * d / UNIT_M).min(5e8) as i32;
         self.limits =
-            Limits { repose: d * libm::tan(self.repose()) / UNIT_M, curvature: [curvature, 2.0 * curvature] };
+            Limits { repose: d * libm::tan(self.repose()) / UNIT_M, curvature: [curvature, 2 * curvature] };
     }
 
     /// Wakes every node that one of the rules would move.
@@ -158,30 +163,21 @@ impl Automaton {
                 for i in first[0]..first[0] + inside[0] {
                     let (i, j) = (i as i32, j as i32);
                     if self.repose_change(ground, i, j) != 0 || self.curvature_change(ground, i, j) != 0 {
-                        self.active.wake(&mut self.cells, i, j);
+                        self.active.wake(&mut self.noted, i, j);
                     }
                 }
             }
         }
     }
 
-    /// Height with load, units.
-    #[inline]
-    fn loaded_height(&self, ground: &Ground, i: i32, j: i32) -> i32 {
-        ground.heights.units(i, j) + self.cells.get(i, j).load
-    }
-
     /// What the repose rule adds to node (i, j), units: the fluxes over its four faces.
     fn repose_change(&self, ground: &Ground, i: i32, j: i32) -> i32 {
-        let h = |a: i32, b: i32| self.loaded_height(ground, i + a, j + b);
-        let block: [[i32; 3]; 3] =
-            std::array::from_fn(|b| std::array::from_fn(|a| h(a as i32 - 1, b as i32 - 1)));
-        let centre = block[1][1];
+        let block = self.levels.around(i, j, &ground.heights);
+        let at = |x: i32, y: i32| block[(MIDDLE as i32 + y * EDGE as i32 + x) as usize];
         let mut change = 0;
         for (a, b) in [(1, 0), (-1, 0), (0, 1), (0, -1)] {
-            let at = |x: i32, y: i32| block[(1 + y) as usize][(1 + x) as usize];
             let across = at(b, a) - at(-b, -a) + at(a + b, b + a) - at(a - b, b - a);
-            let flux = face_flux(centre - at(a, b), across, self.limits.repose);
+            let flux = face_flux(at(0, 0) - at(a, b), across, self.limits.repose);
             if flux != 0 {
                 change -= self.admitted(flux, [i, j], [i + a, j + b]);
             }
@@ -201,11 +197,13 @@ impl Automaton {
 
     /// What the curvature rule adds to node (i, j), units: as the middle of four triples and the end of eight.
     fn curvature_change(&self, ground: &Ground, i: i32, j: i32) -> i32 {
+        let block = self.levels.around(i, j, &ground.heights);
         let mut change = 0;
         for (k, [a, b]) in TRIPLES.into_iter().enumerate() {
             let limit = self.limits.curvature[k / 2];
-            let h = |s: i32| self.loaded_height(ground, i + s * a, j + s * b);
-            let line = [h(-2), h(-1), h(0), h(1), h(2)];
+            let line: [i32; 5] = std::array::from_fn(|s| {
+                block[(MIDDLE as i32 + (s as i32 - 2) * (b * EDGE as i32 + a)) as usize]
+            });
             for (middle, share) in [(-1, -1), (0, 2), (1, -1)] {
                 let m = (2 + middle) as usize;
                 let flux = curvature_flux(line[m - 1] - 2 * line[m] + line[m + 1], limit);
@@ -240,12 +238,12 @@ impl Automaton {
         let first = self.pass(ground, &visit, &mut woken, Self::repose_change);
         let by_first = woken.nodes.len();
         for [i, j] in &visit.nodes {
-            woken.note(&mut self.cells, *i, *j);
+            woken.note(&mut self.noted, *i, *j);
         }
         restart(&mut visit, &mut self.lists);
         let second = self.pass(ground, &woken, &mut visit, Self::curvature_change);
         for [i, j] in &woken.nodes[..by_first] {
-            visit.note(&mut self.cells, *i, *j);
+            visit.note(&mut self.noted, *i, *j);
         }
         (self.active, self.next) = (visit, woken);
         self.counts.sweeps += 1;
@@ -267,7 +265,7 @@ impl Automaton {
         let mut largest = 0;
         for ([i, j], change) in visit.nodes.iter().zip(&changes).filter(|(_, change)| **change != 0) {
             self.apply(ground, [*i, *j], *change);
-            woken.wake(&mut self.cells, *i, *j);
+            woken.wake(&mut self.noted, *i, *j);
             largest = largest.max(change.abs());
         }
         self.changes = changes;
@@ -275,6 +273,8 @@ impl Automaton {
     }
 
     fn apply(&mut self, ground: &mut Ground, [i, j]: [i32; 2], change: i32) {
+        self.levels.ensure([i, j], &ground.heights);
+        self.levels.add(i, j, change);
         ground.add_material(i, j, change);
         self.counts.gained += i64::from(change);
         self.counts.moved += i64::from(change.max(0));
@@ -289,22 +289,25 @@ impl Automaton {
         std::mem::swap(&mut self.covered, &mut self.uncovered);
         self.covered.clear();
         for node in covered {
+            self.levels.ensure([node.i, node.j], &ground.heights);
             let cell = self.cells.get_mut(node.i, node.j);
             let before = *cell;
             cell.load = load_units(node);
+            self.levels.add(node.i, node.j, cell.load - before.load);
             cell.room = room_units(node, ground.heights.height(node.i, node.j));
             cell.covered = self.commits;
             let changed = cell.load != before.load || cell.inlet() != before.inlet();
             self.covered.push([node.i, node.j]);
             if changed {
-                self.active.wake(&mut self.cells, node.i, node.j);
+                self.active.wake(&mut self.noted, node.i, node.j);
             }
         }
         for [i, j] in &self.uncovered {
             let cell = self.cells.get_mut(*i, *j);
             if cell.covered != self.commits {
+                self.levels.add(*i, *j, -cell.load);
                 (cell.room, cell.load) = (OPEN, 0);
-                self.active.wake(&mut self.cells, *i, *j);
+                self.active.wake(&mut self.noted, *i, *j);
             }
         }
     }
@@ -314,9 +317,15 @@ impl Automaton {
         for node in covered.iter().filter(|n| n.pressure > 0.0) {
             let excess = ground.heights.units(node.i, node.j) - ground.surface_units(node.i, node.j);
             if excess > 0 {
-                let at = [node.i, node.j];
                 let before = ground.heights.units(node.i, node.j);
-                let moved = displace(ground, &mut self.cells, &mut self.active, at, excess, self.commits);
+                let mut site = Site {
+                    ground,
+                    cells: &mut self.cells,
+                    levels: &mut self.levels,
+                    active: &mut self.active,
+                    noted: &mut self.noted,
+                };
+                let moved = site.displace([node.i, node.j], excess, self.commits);
                 let left = before - ground.heights.units(node.i, node.j);
                 self.counts.gained += i64::from(moved - left);
                 self.counts.moved += i64::from(moved);
@@ -360,6 +369,7 @@ pub struct Saved {
     settings: Option<Settings>,
     friction_angle: f64,
     cells: TileMapSnapshot<Cell>,
+    levels: TileMapSnapshot<i32>,
     active: ActiveList,
     covered: Vec<[i32; 2]>,
     lists: u32,
@@ -375,6 +385,8 @@ impl Material for Automaton {
         self.friction_angle = parameters.phi_rad;
         let lattice = *ground.heights.lattice();
         self.cells = TileMap::new(lattice, Cell::default(), RESERVE_TILES);
+        self.levels = Levels::new(lattice, RESERVE_TILES);
+        self.noted = TileMap::new(lattice, 0, RESERVE_TILES);
         let nodes = (32 * self.reserve).min(lattice.node_count() + 32);
         self.active.nodes.reserve(nodes);
         self.next.nodes.reserve(nodes);
@@ -432,6 +444,7 @@ impl Material for Automaton {
         out.settings = Some(self.settings);
         out.friction_angle = self.friction_angle;
         self.cells.save(&mut out.cells);
+        self.levels.save(&mut out.levels);
         out.active.nodes.clone_from(&self.active.nodes);
         out.active.number = self.active.number;
         out.covered.clone_from(&self.covered);
@@ -443,8 +456,14 @@ impl Material for Automaton {
         self.settings = saved.settings.unwrap_or(self.settings);
         self.friction_angle = saved.friction_angle;
         self.cells.restore(&saved.cells);
+        self.levels.restore(&saved.levels);
         self.active.nodes.clone_from(&saved.active.nodes);
+        // the numbers of the nodes are not kept: forget them and note the awake ones again
+        self.noted.clear();
         self.active.number = saved.active.number;
+        for [i, j] in &self.active.nodes {
+            self.noted.set(*i, *j, self.active.number);
+        }
         self.covered.clone_from(&saved.covered);
         (self.lists, self.commits, self.counts) = (saved.lists, saved.commits, saved.counts);
         self.rescan = saved.rescan;

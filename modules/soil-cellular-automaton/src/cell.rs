@@ -1,4 +1,4 @@
-//! What the automaton knows of a node beyond its height: load, room below a foot, whether it is awake.
+//! What the automaton knows of a node beyond its height: load and room below a foot.
 
 /// Room of a node with open sky, units.
 pub const OPEN: i32 = i32::MAX;
@@ -12,15 +12,13 @@ pub struct Cell {
     pub room: i32,
     /// Force-equivalent height, units.
     pub load: i32,
-    /// Number of the list in which the node was noted last.
-    pub noted: u32,
     /// Number of the commit that last found a foot above.
     pub covered: u32,
 }
 
 impl Default for Cell {
     fn default() -> Self {
-        Self { room: OPEN, load: 0, noted: 0, covered: 0 }
+        Self { room: OPEN, load: 0, covered: 0 }
     }
 }
 

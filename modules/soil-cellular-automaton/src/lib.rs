@@ -24,6 +24,7 @@ mod active;
 mod automaton;
 mod cell;
 mod displace;
+mod levels;
 mod rules;
 mod values;
 

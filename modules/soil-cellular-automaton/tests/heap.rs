@@ -88,7 +88,7 @@ fn no_triple_is_more_curved_than_allowed() {
         for i in 1..64 {
             for ([a, b], d2) in [([1, 0], 1e-4), ([0, 1], 1e-4), ([1, 1], 2e-4), ([1, -1], 2e-4)] {
                 let c = s.height(i - a, j - b) - 2.0 * s.height(i, j) + s.height(i + a, j + b);
-                worst = worst.max((c.abs() - 24.0 * UNIT_M) / d2);
+                worst = worst.max((c.abs() - 96.0 * UNIT_M) / d2);
             }
         }
     }

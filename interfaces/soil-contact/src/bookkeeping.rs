@@ -33,6 +33,8 @@ pub struct Lists {
     /// Nodes that were loaded at the commit before.
     pub loaded: Vec<[i32; 2]>,
     previous: Vec<[i32; 2]>,
+    /// Per loaded node whether the part of the foot there slid in from inside the contact.
+    slid_in: Vec<bool>,
     /// Slip of loaded nodes after it was carried along; scratch.
     carried: Vec<f64>,
     /// Nodes that were loaded before and are not any more.
@@ -46,6 +48,7 @@ impl Lists {
         self.loaded.reserve(count);
         self.previous.reserve(count);
         self.carried.reserve(count);
+        self.slid_in.reserve(count);
         self.released.reserve(count);
     }
 }
@@ -81,6 +84,7 @@ impl Scene<'_> {
         (book.elastic, book.loaded, book.fewest) = (0.0, 0, 0);
         std::mem::swap(&mut lists.loaded, &mut lists.previous);
         lists.loaded.clear();
+        lists.slid_in.clear();
         lists.covered.clear();
         for (patch, port) in self.patches.ports.iter().zip(ports) {
             book.port_work -= port.range().map(|k| t[k] * x[k]).sum::<f64>();
@@ -113,6 +117,9 @@ impl Scene<'_> {
             let [i, j] = n.index[k];
             if pressure > 0.0 {
                 loaded += 1;
+                let fresh = ground.nodes.get(i, j).stamp + 1 != book.stamp;
+                // a point that has just come down from above is no deeper than its own descent
+                lists.slid_in.push(fresh && depth > -2.0 * moved[0]);
                 let node = Pressed { k, depth, pressure, slip: [moved[1], moved[2]] };
                 let plastic = self.press(patch, &node, ground, book);
                 slid = [slid[0] + plastic[0], slid[1] + plastic[1]];
@@ -168,20 +175,25 @@ fn in_world(port: &Port, [a, b]: [f64; 2]) -> [f64; 2] {
 
 /// Accumulated slip belongs to the points of the foot (Janosi and Hanamoto 1961 count it from where a point
 /// enters the contact): where the foot slides over the lattice by `slid` (m, world x, y), the slip of the loaded
-/// nodes from `first` on moves with it, ∂j/∂t + v·∇j = 0, first order upwind. What slides in from outside brings
-/// nothing; a rolling foot, whose points do not slide, carries nothing along.
+/// nodes from `first` on moves with it, ∂j/∂t + v·∇j = 0, first order upwind. A node onto which the foot slid from
+/// inside the contact takes the mean slip of the contact, weighted with the pressure; what enters from above or
+/// from outside brings nothing. A rolling foot, whose points do not slide, carries nothing along.
 fn carry_slip(ground: &mut Ground, lists: &mut Lists, first: usize, slid: [f64; 2], stamp: u64) {
     if slid == [0.0; 2] {
         return;
     }
-    let spacing = ground.heights.lattice().spacing;
-    let share = slid.map(|s| s.abs() / spacing);
+    let nodes = &lists.loaded[first..];
+    let slid_in = &lists.slid_in[first..];
+    let mean = mean_slip(ground, nodes, slid_in);
+    let share = slid.map(|s| s.abs() / ground.heights.lattice().spacing);
     let scale = 1.0 / (share[0] + share[1]).max(1.0);
     let behind = slid.map(|s| if s > 0.0 { -1 } else { 1 });
-    let nodes = &lists.loaded[first..];
     lists.carried.clear();
-    lists.carried.extend(nodes.iter().map(|[i, j]| {
+    lists.carried.extend(nodes.iter().zip(slid_in).map(|([i, j], slid_in)| {
         let own = ground.nodes.get(*i, *j).shear.slip;
+        if *slid_in {
+            return own.max(mean);
+        }
         let gain = |i: i32, j: i32, share: f64| {
             let there = ground.nodes.get(i, j);
             if there.stamp == stamp { share * scale * (there.shear.slip - own) } else { 0.0 }
@@ -191,6 +203,16 @@ fn carry_slip(ground: &mut Ground, lists: &mut Lists, first: usize, slid: [f64; 
     for ([i, j], slip) in nodes.iter().zip(&lists.carried) {
         ground.nodes.get_mut(*i, *j).shear.slip = *slip;
     }
+}
+
+/// Mean slip of the nodes that were in contact before, weighted with the pressure, m.
+fn mean_slip(ground: &Ground, nodes: &[[i32; 2]], slid_in: &[bool]) -> f64 {
+    let before = nodes.iter().zip(slid_in).filter(|(_, slid_in)| !**slid_in);
+    let (sum, weights) = before.fold((0.0, 0.0), |(sum, weights), ([i, j], _)| {
+        let state = ground.nodes.get(*i, *j);
+        (sum + state.pressure * state.shear.slip, weights + state.pressure)
+    });
+    if weights > 0.0 { sum / weights } else { 0.0 }
 }
 
 /// Lift-off: the nodes that were loaded before and are not now forget pressure and shear.

@@ -32,7 +32,8 @@ pub fn ball_rests<M: Module>(config: &str, iterative: bool) {
 }
 
 /// Plates under prescribed motion follow the closed form p = (k_c/b + k_φ)·zⁿ.
-pub fn plates_follow_bekker<M: Module>(config: &str, [n, k_c, k_phi]: [f64; 3]) {
+/// Where material `stays`, the plate meets the same soil again after it was lifted.
+pub fn plates_follow_bekker<M: Module>(config: &str, [n, k_c, k_phi]: [f64; 3], stays: bool) {
     for (geometry, b, area) in [
         (
             Geometry::Cylinder { half_length: 0.1, radius: 0.0537 },
@@ -59,7 +60,7 @@ pub fn plates_follow_bekker<M: Module>(config: &str, [n, k_c, k_phi]: [f64; 3]) 
         assert_eq!(rig.prescribed_step(&[0.002, 0.0, 0.0, 0.0, 0.0, 0.0])[0], 0.0);
         // reloading comes back to the same force at the same depth
         let again = rig.prescribed_step(&[-0.002 - back, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
-        assert!((again / top - 1.0).abs() < 1e-6, "{again} {top}");
+        assert!(!stays || (again / top - 1.0).abs() < 1e-6, "{again} {top}");
     }
 }
 

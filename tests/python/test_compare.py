@@ -15,7 +15,7 @@ def test_compare_writes_a_row_per_combination(tmp_path):
     assert process.returncode == 0, process.stderr
     comparison = json.loads((tmp_path / "compare.json").read_text())
     rows = comparison["rows"] if isinstance(comparison, dict) else comparison
-    found = {(row["strategy"], row["soil_module"]) for row in rows}
+    found = {(row["strategy"], row["soil"]) for row in rows}
     assert found == {(strategy, soil) for strategy in STRATEGIES for soil in SOILS}
     assert len(rows) == 4
     with open(tmp_path / "compare.csv", newline="") as file:

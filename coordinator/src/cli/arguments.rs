@@ -16,6 +16,7 @@ const EXAMPLES: &str = "\
 Examples:
   terraglue run scenarios/moon_walk.toml
   terraglue run scenarios/moon_walk.toml --set soil.module=soil-bekker --out runs/bekker
+  terraglue compare scenarios/moon_walk.toml --strategies cooperative,iterative
   terraglue variables scenarios/moon_walk.toml     what can be read, connected and set
 
 Exit codes: 0 done, 1 the simulation or a check failed, 2 the input is wrong, 130 interrupted.";
@@ -25,6 +26,8 @@ Exit codes: 0 done, 1 the simulation or a check failed, 2 the input is wrong, 13
 pub enum Command {
     /// Run a scenario and write recording, summary and report.
     Run(RunArguments),
+    /// Run a scenario with several strategies and soils and put them side by side.
+    Compare(CompareArguments),
     /// Make the report of a recording again, also of one that was cut off.
     Report {
         /// Folder of the run, e.g. runs/moon_walk.
@@ -65,7 +68,7 @@ pub struct ScenarioArguments {
     pub module_path: Vec<PathBuf>,
 }
 
-/// What `run` takes.
+/// What `run` and `compare` take.
 #[derive(Args, Debug, Clone)]
 pub struct RunArguments {
     /// The scenario.
@@ -90,6 +93,28 @@ pub struct RunArguments {
     #[arg(long)]
     pub json: bool,
 }
+
+/// What `compare` takes.
+#[derive(Args, Debug, Clone)]
+#[command(after_help = COMPARE_EXAMPLES)]
+pub struct CompareArguments {
+    /// As for `run`.
+    #[command(flatten)]
+    pub run: RunArguments,
+    /// Strategies, separated by commas [default: all].
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    pub strategies: Vec<String>,
+    /// Soil modules, separated by commas [default: that of the scenario].
+    #[arg(long, value_delimiter = ',', value_name = "MODULES")]
+    pub soils: Vec<String>,
+}
+
+const COMPARE_EXAMPLES: &str = "\
+Example:
+  terraglue compare scenarios/moon_walk.toml --strategies cooperative,iterative \\
+      --soils soil-cellular-automaton,soil-bekker
+
+Writes compare.html, compare.csv and compare.json, and each run into a folder of its own beside them.";
 
 impl RunArguments {
     /// The edits, `--duration` among them.

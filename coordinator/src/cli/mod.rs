@@ -4,6 +4,7 @@
 
 mod arguments;
 mod check;
+mod compare;
 mod folder;
 mod interrupt;
 mod list;
@@ -45,6 +46,7 @@ impl From<Exit> for ExitCode {
 pub fn main() -> ExitCode {
     let done = match Arguments::parse().command {
         Command::Run(arguments) => run::run(&arguments),
+        Command::Compare(arguments) => compare::compare(&arguments),
         Command::Report { folder } => report::report(&folder),
         Command::Check(arguments) => check::check(&arguments),
         Command::Modules { module_path, json } => list::modules(&module_path, json),

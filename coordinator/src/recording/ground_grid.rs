@@ -3,7 +3,7 @@
 use crate::error::Result;
 use crate::observer::{SubsystemView, View};
 use crate::recording::snapshot::failed;
-use terraglue_subsystem::FieldInfo;
+use terraglue_subsystem::{FieldInfo, FieldTile};
 
 /// Nodes i0 ≤ i < i1, j0 ≤ j < j1.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -114,11 +114,14 @@ impl GroundGrid {
         }
     }
 
-    /// Heights of all nodes, m, row by row along x from the smallest y.
-    pub fn heights(&self, soil: &SubsystemView, t_s: f64) -> Result<Vec<f64>> {
-        let mut heights = Vec::with_capacity((self.info.size[0] as usize) * self.info.size[1] as usize);
-        self.visit(soil, self.height, self.all(), t_s, |_, z| heights.push(z))?;
-        Ok(heights)
+    /// Tile (a, b) of the height field.
+    pub fn height_tile<'a>(
+        &self,
+        soil: &SubsystemView<'a>,
+        a: u32,
+        b: u32,
+    ) -> terraglue_subsystem::Result<FieldTile<'a>> {
+        soil.instance.field_tile(self.height, a, b)
     }
 
     /// Largest sinkage of the four nodes around a point, m; 0 outside the lattice.

@@ -14,7 +14,6 @@
 //! [`report::write`] makes the report from it, [`compare::write`] puts several runs side by side.
 
 mod csv;
-mod final_ground;
 mod ground_grid;
 mod json;
 mod layout;

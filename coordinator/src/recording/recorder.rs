@@ -3,13 +3,13 @@
 use crate::error::{Error, Result};
 use crate::observer::{Happening, Observer, View};
 use crate::recording::csv::VariablesCsv;
-use crate::recording::final_ground;
 use crate::recording::layout::{FINAL_GROUND, at};
 use crate::recording::mcap_writer::{FLUSH_STEPS, McapWriter};
 use crate::recording::snapshot::Snapshot;
 use crate::recording::summary::{Status, Summary};
 use crate::recording::summary_observer::SummaryObserver;
 use crate::scenario::Scenario;
+use crate::terrain::write_esri_ascii;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
@@ -97,9 +97,9 @@ impl Recorder {
 
     fn write_final_ground(&self, view: &View) -> Result {
         let Some(ground) = self.mcap.ground() else { return Ok(()) };
-        let heights = ground.heights(&view.subsystems[ground.subsystem], view.t_s)?;
+        let soil = &view.subsystems[ground.subsystem];
         let path = self.folder.join(FINAL_GROUND);
-        final_ground::write(&path, &ground.info, &heights)
+        write_esri_ascii(&path, &ground.info, |a, b| ground.height_tile(soil, a, b))
     }
 
     /// Closes all files and writes `summary.json`. `wall_s` and `cpu_s` are the times of the step loop, s.

@@ -18,6 +18,8 @@ pub(crate) enum Best {
 pub(crate) struct Column {
     /// Name in the files.
     pub key: &'static str,
+    /// Head over neighbouring columns; empty: none.
+    pub group: &'static str,
     /// Head for people.
     pub title: &'static str,
     /// SI unit; empty for a pure number.
@@ -26,48 +28,58 @@ pub(crate) struct Column {
     pub value: fn(&CompareRow) -> Option<f64>,
 }
 
+impl Column {
+    /// Group and title in one line.
+    pub fn name(&self) -> String {
+        if self.group.is_empty() { self.title.into() } else { format!("{}, {}", self.group, self.title) }
+    }
+}
+
 fn of(row: &CompareRow, f: impl Fn(&Summary) -> f64) -> Option<f64> {
     row.summary.as_ref().map(f).filter(|v| v.is_finite())
 }
 
 macro_rules! column {
-    ($key:literal, $title:literal, $unit:literal, $best:ident, $value:expr) => {
-        Column { key: $key, title: $title, unit: $unit, best: Best::$best, value: $value }
+    ($key:literal, $group:literal, $title:literal, $unit:literal, $best:ident, $value:expr) => {
+        Column { key: $key, group: $group, title: $title, unit: $unit, best: Best::$best, value: $value }
     };
 }
 
 /// All figures in the order of the table.
 pub(crate) const ALL: &[Column] = &[
-    column!("evaluations_mean", "evaluations of bodies, mean", "", Smallest, |r| of(r, |s| s
+    column!("evaluations_mean", "evaluations of bodies", "mean", "", Smallest, |r| of(r, |s| s
         .evaluations_mean)),
-    column!("evaluations_p95", "evaluations of bodies, 95 %", "", Smallest, |r| {
+    column!("evaluations_p95", "evaluations of bodies", "95 %", "", Smallest, |r| {
         of(r, |s| f64::from(s.evaluations_p95))
     }),
-    column!("evaluations_max", "evaluations of bodies, max", "", Smallest, |r| {
+    column!("evaluations_max", "evaluations of bodies", "max", "", Smallest, |r| {
         of(r, |s| f64::from(s.evaluations_max))
     }),
-    column!("evaluations_soil_mean", "evaluations of soil, mean", "", Smallest, |r| {
+    column!("cold_start_mean", "evaluations of bodies", "mean without the estimate", "", Neither, |r| r
+        .cold_start_mean),
+    column!("evaluations_soil_mean", "evaluations of soil", "mean", "", Smallest, |r| {
         of(r, |s| s.evaluations_soil_mean)
     }),
-    column!("evaluations_soil_max", "evaluations of soil, max", "", Smallest, |r| {
+    column!("evaluations_soil_max", "evaluations of soil", "max", "", Smallest, |r| {
         of(r, |s| f64::from(s.evaluations_soil_max))
     }),
-    column!("cold_start_mean", "evaluations without the estimate, mean", "", Neither, |r| r.cold_start_mean),
-    column!("steps_not_converged", "steps not converged", "", Smallest, |r| {
+    column!("steps_not_converged", "", "steps not converged", "", Smallest, |r| {
         of(r, |s| s.steps_not_converged as f64)
     }),
-    column!("max_gap_m", "largest gap", "m", Smallest, |r| of(r, |s| s.max_gap_m)),
-    column!("max_action_reaction_gap_n", "action–reaction gap", "N", Smallest, |r| {
+    column!("max_gap_m", "", "largest gap", "m", Smallest, |r| of(r, |s| s.max_gap_m)),
+    column!("max_action_reaction_gap_n", "", "action–reaction gap", "N", Smallest, |r| {
         of(r, |s| s.max_action_reaction_gap_n)
     }),
-    column!("max_estimate_gap_n", "largest |T* − T1|", "N", Neither, |r| of(r, |s| s.max_estimate_gap_n)),
-    column!("max_sinkage_m", "deepest print", "m", Neither, |r| r.summary.as_ref()?.max_sinkage_m),
-    column!("distance_m", "distance", "m", Largest, |r| r.summary.as_ref()?.distance_m),
-    column!("energy_balance_j", "drift of the energy book", "J", Neither, |r| of(r, |s| s.energy_balance_j)),
-    column!("interface_work_error_j", "interface work error", "J", Smallest, |r| {
+    column!("max_estimate_gap_n", "", "largest |T* − T1|", "N", Neither, |r| of(r, |s| s
+        .max_estimate_gap_n)),
+    column!("max_sinkage_m", "", "deepest print", "m", Neither, |r| r.summary.as_ref()?.max_sinkage_m),
+    column!("distance_m", "", "distance", "m", Largest, |r| r.summary.as_ref()?.distance_m),
+    column!("energy_balance_j", "", "drift of the energy book", "J", Neither, |r| of(r, |s| s
+        .energy_balance_j)),
+    column!("interface_work_error_j", "", "interface work error", "J", Smallest, |r| {
         of(r, |s| s.interface_work_error_j)
     }),
-    column!("cpu_per_step_s", "CPU time per step", "s", Smallest, |r| of(r, |s| s.cpu_per_step_s)),
+    column!("cpu_per_step_s", "", "CPU time per step", "s", Smallest, |r| of(r, |s| s.cpu_per_step_s)),
 ];
 
 /// For every row whether it holds the best figure of a column. Runs that did not reach their end do not

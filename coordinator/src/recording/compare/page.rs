@@ -21,14 +21,14 @@ struct Run {
 /// The page as text.
 pub(crate) fn render(folder: &Path, rows: &[CompareRow]) -> String {
     let scenario = rows.iter().find_map(|r| r.summary.as_ref()).map_or("", |s| &s.scenario);
-    let mut page = Page::new(&format!("{scenario}: comparison"));
+    let mut page = Page::wide(&format!("{scenario}: comparison"));
     let ended = rows.iter().filter(|r| r.failure().is_none()).count();
     page.header(&format!(
         "<p class=\"lead\"><span>{} runs of <b>{}</b>, {ended} reached their end</span></p>",
         rows.len(),
         escape(scenario)
     ));
-    page.section("Figures", "figures", &html_table(folder, rows));
+    page.section("At a glance", "figures", &html_table(folder, rows));
     let runs: Vec<Run> = rows.iter().enumerate().filter_map(|(k, row)| open(k, row)).collect();
     for figure in [gluing(&runs), forces(&runs), body(&runs)].into_iter().flatten() {
         page.figure(figure);
@@ -48,10 +48,7 @@ fn html_table(folder: &Path, rows: &[CompareRow]) -> String {
         columns::ALL.iter().filter(|c| rows.iter().any(|r| (c.value)(r).is_some())).collect();
     let marks: Vec<Vec<bool>> = shown.iter().map(|c| columns::best(c, rows)).collect();
     let mut out = String::from("<div class=\"wide\"><table class=\"rows\"><thead><tr>");
-    out.push_str("<th class=\"name\">strategy</th><th class=\"name\">soil</th><th class=\"name\">form</th>");
-    for column in &shown {
-        let _ = write!(out, "<th>{}</th>", escape(column.title));
-    }
+    head(&mut out, &shown);
     out.push_str("</tr></thead><tbody>");
     for (k, row) in rows.iter().enumerate() {
         let failure = row.failure();
@@ -80,6 +77,24 @@ fn html_table(folder: &Path, rows: &[CompareRow]) -> String {
     }
     out.push_str("</tbody></table></div><p class=\"hint\">● best of its column among the runs that reached their end.</p>");
     out
+}
+
+/// Two lines of heads: groups over their columns, single columns over both lines.
+fn head(out: &mut String, shown: &[&columns::Column]) {
+    for name in ["strategy", "soil", "form"] {
+        let _ = write!(out, "<th class=\"name\" rowspan=\"2\">{name}</th>");
+    }
+    for group in shown.chunk_by(|a, b| a.group == b.group && !a.group.is_empty()) {
+        let (n, first) = (group.len(), group[0]);
+        let _ = match first.group {
+            "" => write!(out, "<th rowspan=\"2\">{}</th>", escape(first.title)),
+            name => write!(out, "<th class=\"group\" colspan=\"{n}\">{}</th>", escape(name)),
+        };
+    }
+    out.push_str("</tr><tr>");
+    for column in shown.iter().filter(|c| !c.group.is_empty()) {
+        let _ = write!(out, "<th>{}</th>", escape(column.title));
+    }
 }
 
 fn panel(runs: &[Run], quantity: &str, unit: &str, steps: bool, f: fn(&WindowRecord) -> f64) -> Panel {

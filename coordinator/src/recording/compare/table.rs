@@ -36,7 +36,7 @@ pub(crate) fn terminal(rows: &[CompareRow]) -> String {
             let text = cell((column.value)(r), column.unit);
             if best { format!("* {text}") } else { text }
         });
-        table.add_row(line(column.title, cells.collect()));
+        table.add_row(line(&column.name(), cells.collect()));
     }
     for column in table.column_iter_mut().skip(1) {
         column.set_cell_alignment(CellAlignment::Right);

@@ -14,6 +14,7 @@ const MAP: &str = include_str!("../assets/map.js");
 /// A page under construction.
 pub(crate) struct Page {
     title: String,
+    class: &'static str,
     header: String,
     body: String,
     contents: Vec<(String, String)>,
@@ -28,6 +29,7 @@ impl Page {
     pub fn new(title: &str) -> Self {
         Self {
             title: title.into(),
+            class: "",
             header: String::new(),
             body: String::new(),
             contents: Vec::new(),
@@ -36,6 +38,11 @@ impl Page {
             data: Map::new(),
             times: Times::default(),
         }
+    }
+
+    /// An empty page for a table with many columns.
+    pub fn wide(title: &str) -> Self {
+        Self { class: " class=\"broad\"", ..Self::new(title) }
     }
 
     /// HTML below the title.
@@ -107,13 +114,14 @@ impl Page {
         format!(
             "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
-             <title>{title} · Terraglue</title>\n<style>\n{STYLE}</style>\n<script>\n{THEME}</script>\n</head>\n<body>\n\
+             <title>{title} · Terraglue</title>\n<style>\n{STYLE}</style>\n<script>\n{THEME}</script>\n</head>\n<body{class}>\n\
              <header class=\"top\"><div class=\"bar\"><span class=\"brand\">Terraglue</span><nav>{contents}</nav>\
              <button type=\"button\" id=\"theme\" aria-label=\"switch between light and dark\">◐</button></div></header>\n\
              <main>\n<h1>{title}</h1>\n{header}\n{body}</main>\n\
              <footer>Made by Terraglue from the recording beside this file. All quantities in SI units; z is up.</footer>\n\
              <script type=\"application/json\" id=\"data\">{data}</script>\n\
              <script>\n{AXES}{PLOT}{MAP}</script>\n</body>\n</html>\n",
+            class = self.class,
             header = self.header,
             body = self.body,
         )

@@ -260,7 +260,7 @@ impl Shape {
 
     /// The port without key and node range, whose nodes are appended; `None` when it cannot touch.
     fn port(&self, reader: &Reader, reach: f64, nodes: &mut Vec<Node>) -> Option<Port> {
-        let patch = Patch::find(&self.placed, &self.bounds, reader);
+        let patch = Patch::find(&self.placed, &self.bounds, &reader.undisturbed(), reader);
         let vertical = patch.vertical(reach);
         let first = nodes.len();
         nodes_below(&self.placed, reader, vertical, nodes);

@@ -18,18 +18,24 @@ pub struct Patch {
 }
 
 impl Patch {
-    /// Lowest point and normal depend on each other: two rounds, from the vertical, settle both.
-    pub fn find<S: Surface + ?Sized>(shape: &Placed, bounds: &Aabb, surface: &S) -> Self {
-        // Twice the half width: mostly ground beyond the print that the shape itself has made.
+    /// Lowest point and normal depend on each other: two rounds, from the vertical, settle both. The normal is
+    /// that of the `undisturbed` ground, the height that of the present `surface`.
+    pub fn find<U: Surface + ?Sized, S: Surface + ?Sized>(
+        shape: &Placed,
+        bounds: &Aabb,
+        undisturbed: &U,
+        surface: &S,
+    ) -> Self {
+        // Twice the half width: enough ground beyond the foot itself.
         let radius = (bounds.max[0] - bounds.min[0]).min(bounds.max[1] - bounds.min[1]);
         let mut normal = [0.0, 0.0, 1.0];
-        let mut ground = 0.0;
         for _ in 0..2 {
             let origin = shape.patch_origin(normal);
-            let plane = fit_plane(surface, origin[0], origin[1], radius);
-            (normal, ground) = (plane.normal, plane.height);
+            normal = fit_plane(undisturbed, origin[0], origin[1], radius).normal;
         }
-        Self { origin: shape.patch_origin(normal), normal, ground }
+        let origin = shape.patch_origin(normal);
+        let [u, v] = surface.lattice().coordinates(origin[0], origin[1]).map(|c| c.round() as i32);
+        Self { origin, normal, ground: surface.height(u, v) }
     }
 
     /// Vertical distance in which a motion of `reach` (m) along the normal shows.

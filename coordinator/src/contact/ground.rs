@@ -5,7 +5,7 @@ use parry3d_f64::bounding_volume::{Aabb, BoundingVolume};
 use parry3d_f64::math::Vector;
 use std::cell::Cell;
 use terraglue_ground::{HeightField, Lattice, Surface, TILE_EDGE};
-use terraglue_subsystem::{FieldTile, Subsystem, Terrain};
+use terraglue_subsystem::{FieldInfo, FieldTile, Subsystem, Terrain};
 
 /// What stays the same of a ground over a run, and the bounds of its tiles.
 pub struct Ground {
@@ -18,8 +18,8 @@ pub struct Ground {
 }
 
 enum Source {
-    /// Number of the field `height`.
-    Field(usize),
+    /// Number of the field `height`, and of `sinkage` where the soil shows one on the same lattice.
+    Field(usize, Option<usize>),
     /// The scenario's terrain, for a soil that shows no heights.
     Fixed(Box<HeightField>),
 }
@@ -38,7 +38,11 @@ impl Ground {
         let (lattice, edge, source) = match (field, terrain) {
             (Some((number, info)), _) => {
                 let lattice = Lattice { origin: info.origin, spacing: info.spacing, size: info.size };
-                (lattice, info.tile_edge, Source::Field(number))
+                let same = |f: &&FieldInfo| {
+                    (f.size, f.origin, f.tile_edge) == (info.size, info.origin, info.tile_edge)
+                };
+                let sinkage = instance.fields().iter().position(|f| f.name == "sinkage" && same(&f));
+                (lattice, info.tile_edge, Source::Field(number, sinkage))
             }
             (None, Some(terrain)) => {
                 let field = HeightField::from_terrain(terrain).map_err(|e| failed(e.to_string()))?;
@@ -65,6 +69,7 @@ impl Ground {
             edge: self.edge,
             last: Cell::new(None),
             recent: Default::default(),
+            sunk: Default::default(),
             trouble: Cell::new(None),
         };
         (reader, Bounds { tiles: &mut self.bounds })
@@ -95,6 +100,9 @@ const RECENT: u32 = 4;
 /// A tile with its number, or with its first node.
 type Recent<'a> = ([u32; 2], FieldTile<'a>);
 
+/// Recently read tiles of one field.
+type Shelf<'a> = [Cell<Option<Recent<'a>>>; (RECENT * RECENT) as usize];
+
 /// Reads nodes through the tiles of the last few reads.
 pub struct Reader<'a> {
     lattice: &'a Lattice,
@@ -102,7 +110,8 @@ pub struct Reader<'a> {
     instance: &'a dyn Subsystem,
     edge: u32,
     last: Cell<Option<Recent<'a>>>,
-    recent: [Cell<Option<Recent<'a>>>; (RECENT * RECENT) as usize],
+    recent: Shelf<'a>,
+    sunk: Shelf<'a>,
     trouble: Cell<Option<Trouble>>,
 }
 
@@ -112,17 +121,32 @@ impl<'a> Reader<'a> {
         self.trouble.get()
     }
 
+    /// The ground as it was at the start.
+    pub fn undisturbed(&self) -> Undisturbed<'_, 'a> {
+        Undisturbed(self)
+    }
+
     fn tile(&self, a: u32, b: u32) -> Option<FieldTile<'a>> {
-        let slot = &self.recent[(b % RECENT * RECENT + a % RECENT) as usize];
+        self.recall(&self.recent, a, b, || match self.source {
+            Source::Field(field, _) => self.instance.field_tile(*field, a, b).ok(),
+            Source::Fixed(field) => Some(field.height_tile(a, b)),
+        })
+    }
+
+    fn recall(
+        &self,
+        shelf: &Shelf<'a>,
+        a: u32,
+        b: u32,
+        look: impl FnOnce() -> Option<FieldTile<'a>>,
+    ) -> Option<FieldTile<'a>> {
+        let slot = &shelf[(b % RECENT * RECENT + a % RECENT) as usize];
         if let Some((at, tile)) = slot.get()
             && at == [a, b]
         {
             return Some(tile);
         }
-        let tile = match self.source {
-            Source::Field(field) => self.instance.field_tile(*field, a, b).ok(),
-            Source::Fixed(field) => Some(field.height_tile(a, b)),
-        };
+        let tile = look();
         match tile {
             Some(tile) => slot.set(Some(([a, b], tile))),
             None => self.fail(Trouble::Tile(a, b)),
@@ -180,6 +204,30 @@ impl Surface for Reader<'_> {
         let first = [a * self.edge, b * self.edge];
         self.last.set(Some((first, tile)));
         self.checked(tile.values.at(((j - first[1]) * self.edge + i - first[0]) as usize), i, j)
+    }
+}
+
+/// The ground before anything pressed it: current height plus sinkage, where the soil shows its sinkage.
+///
+/// Its slope gives the normal of a patch. The slope of the print that the foot itself is making would feed back
+/// on the direction of its own force.
+pub struct Undisturbed<'r, 'a>(&'r Reader<'a>);
+
+impl Surface for Undisturbed<'_, '_> {
+    fn lattice(&self) -> &Lattice {
+        self.0.lattice
+    }
+
+    #[inline]
+    fn height(&self, i: i32, j: i32) -> f64 {
+        let reader = self.0;
+        let now = reader.height(i, j);
+        let Source::Field(_, Some(field)) = reader.source else { return now };
+        let (i, j) = reader.lattice.clamp(i, j);
+        let (a, b) = (i / reader.edge, j / reader.edge);
+        let look = || reader.instance.field_tile(*field, a, b).ok();
+        let Some(tile) = reader.recall(&reader.sunk, a, b, look) else { return now };
+        now + tile.values.at(((j % reader.edge) * reader.edge + i % reader.edge) as usize)
     }
 }
 

@@ -3,7 +3,7 @@
 use std::path::Path;
 use terraglue::Testbed;
 use terraglue::observer::Observer;
-use terraglue::recording::{Recorder, RecorderOptions};
+use terraglue::recording::{Recorder, RecorderOptions, Status};
 use terraglue::scenario::Scenario;
 use terraglue::testbed::Options;
 use terraglue_acceptance::shipped;
@@ -28,7 +28,7 @@ impl Run {
 
     fn finish(mut self, folder: &Path) -> Vec<u8> {
         self.testbed.view(|v| self.recorder.finished(v, None)).expect("finished");
-        self.recorder.finish(0.0, 0.0, None, Default::default()).expect("closed");
+        self.recorder.finish(0.0, 0.0, None, Status::Done).expect("closed");
         std::fs::read(folder.join("recording.mcap")).expect("recording")
     }
 }

@@ -44,6 +44,7 @@ impl Module for RigidBody {
             bodies,
             joints,
             energy: Energy::default(),
+            stagger: 0.0,
         };
         let text = format!(
             "{}: {} bodies, {} joints, {:.6} kg",

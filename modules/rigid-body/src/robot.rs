@@ -4,6 +4,7 @@ use crate::contact::estimate::{Estimator, Problem};
 use crate::contact::ports::{Ports, committed, displacement, response};
 use crate::dynamics::joint_rows::coordinate;
 use crate::dynamics::{Dynamics, Failure};
+use crate::math::V3;
 use crate::model::Model;
 use crate::scene;
 use crate::state::State;
@@ -145,19 +146,24 @@ impl Robot {
         let Self { dynamics, state, .. } = self;
         let h = dynamics.h;
         for (j, joint) in dynamics.model.joints.iter().enumerate() {
-            let Some((rate, impulse)) = dynamics.axis_result(j) else { continue };
+            let Some(axis) = dynamics.axis_result(j) else { continue };
             let mode = dynamics.modes[j];
-            let motor = dynamics.axes[j].motor_impulse(mode, rate, impulse);
+            let motor = dynamics.axes[j].motor_impulse(mode, axis.rate, axis.impulse);
             let s = &mut state.joints[j];
-            state.energy.actuator_work += motor * rate;
+            state.energy.actuator_work += motor * axis.mean_rate;
             // A brake or a stop that catches a moving joint turns its energy into heat.
-            let stop = if dynamics.axes[j].row(mode).is_some() { impulse - motor } else { 0.0 };
-            state.energy.dissipated += (-0.5 * stop * (rate + s.velocity)).max(0.0);
+            let stop = if dynamics.axes[j].row(mode).is_some() { axis.impulse - motor } else { 0.0 };
+            state.energy.dissipated -= stop * axis.mean_rate;
             s.angle = coordinate(joint, &dynamics.ends, s.angle);
-            s.velocity = rate;
+            s.velocity = axis.rate;
             s.torque = (motor / h).clamp(-s.max_torque, s.max_torque);
             s.mode = mode;
         }
+        for (b, force) in state.forces.iter().enumerate() {
+            let mean = V3::from_row_slice(&dynamics.kick(b)[..3]) * -0.5 + dynamics.ends[b].v;
+            state.energy.actuator_work += h * force.dot(&mean);
+        }
+        state.stagger = 0.5 * h;
     }
 
     fn book_ports(&mut self, step: &Step, t: &[f64]) {
@@ -165,7 +171,10 @@ impl Robot {
         displacement(step.ports, &self.dynamics, &mut self.scratch.free);
         for port in step.ports {
             for (i, c) in port.components() {
-                self.state.energy.port_work += self.ports.side(i) * t[i] * self.scratch.free[i];
+                // The work on both sides is T·X; what an impact kicks out of the body is lost.
+                let push = self.ports.side(i) * t[i];
+                self.state.energy.port_work += push * self.scratch.free[i];
+                self.state.energy.dissipated += 0.5 * push * self.dynamics.h * self.ports.kick(&self.dynamics, i);
                 if c == 0 {
                     self.state.contact_normal[port.body as usize] += t[i];
                 }
@@ -366,7 +375,8 @@ impl Subsystem for Robot {
         for (body, m) in self.model().bodies.iter().zip(&self.state.bodies) {
             let w = m.q.inverse_transform_vector(&m.w);
             kinetic += 0.5 * (body.mass * m.v.norm_squared() + w.dot(&(body.inertia * w)));
-            potential -= body.mass * self.model().gravity.dot(&m.c);
+            // Rates and positions of the scheme are half a step apart; the book is kept at the time of the rates.
+            potential -= body.mass * self.model().gravity.dot(&(m.c - self.state.stagger * m.v));
         }
         Energy { kinetic, potential, ..self.state.energy }
     }

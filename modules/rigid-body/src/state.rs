@@ -56,6 +56,8 @@ pub(crate) struct State {
     /// Normal force of all ports of a body, N.
     pub contact_normal: Vec<f64>,
     pub energy: Energy,
+    /// By how much positions are ahead of rates, s: half the last step, 0 at the start.
+    pub stagger: f64,
 }
 
 impl State {
@@ -65,6 +67,6 @@ impl State {
         self.joints.clone_from(&other.joints);
         self.forces.clone_from(&other.forces);
         self.contact_normal.clone_from(&other.contact_normal);
-        self.energy = other.energy;
+        (self.energy, self.stagger) = (other.energy, other.stagger);
     }
 }

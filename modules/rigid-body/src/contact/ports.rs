@@ -59,6 +59,12 @@ impl Ports {
         self.components[i].side
     }
 
+    /// Change of the rate along component i by the impulses of the trial.
+    pub fn kick(&self, dynamics: &Dynamics, i: usize) -> f64 {
+        let Component { body, row, .. } = &self.components[i];
+        dynamics.kick(*body).iter().zip(row).map(|(k, r)| k * r).sum()
+    }
+
     /// dX_r/d(wrench c), as last computed by [`Ports::compliance`].
     pub fn g(&self, r: usize, c: usize) -> f64 {
         self.g[c * self.components.len() + r]

@@ -17,7 +17,7 @@ use crate::drive::{Axis, Law, Mode};
 use crate::math::{M3, V3, cayley};
 use crate::model::Model;
 use crate::state::{Motion, State};
-use joint_rows::{JointRows, gap};
+use joint_rows::{JointRows, coordinate, gap};
 use kkt::Kkt;
 use terraglue_linear_solver::Error as SolverError;
 
@@ -41,6 +41,17 @@ pub(crate) enum Failure {
     SelfContact,
 }
 
+/// A free axis at the end of a trial.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct AxisResult {
+    /// Change of the coordinate over h.
+    pub rate: f64,
+    /// Mean of J·v before and after the impulses; times an impulse it is the impulse's work.
+    pub mean_rate: f64,
+    /// Total impulse along the axis.
+    pub impulse: f64,
+}
+
 /// Everything about the step in hand and the last trial; buffers are reused.
 pub(crate) struct Dynamics {
     pub model: Model,
@@ -54,8 +65,12 @@ pub(crate) struct Dynamics {
     free_rate: Vec<V3>,
     rows: Vec<JointRows>,
     pub axes: Vec<Axis>,
+    /// Per axis: change of the coordinate over h less J·v⁺, from the curvature of the motion.
+    curvature: Vec<f64>,
     broken: Vec<bool>,
     base_rhs: Vec<f64>,
+    /// Rates of the force-free motion.
+    free: Vec<f64>,
     compliance: Vec<[Option<f64>; 6]>,
     /// Branches of all axes for which the factor stands.
     pub modes: Vec<Mode>,
@@ -95,8 +110,10 @@ impl Dynamics {
             free_rate: vec![V3::zeros(); nb],
             rows: vec![JointRows::default(); nj],
             axes: vec![idle; nj],
+            curvature: vec![0.0; nj],
             broken: vec![false; nj],
             base_rhs: vec![0.0; n],
+            free: vec![0.0; n],
             compliance: vec![[None; 6]; nj],
             modes: vec![Mode::Free; nj],
             next_modes: vec![Mode::Free; nj],
@@ -144,9 +161,10 @@ impl Dynamics {
         // The force-free motion is the point of linearisation.
         for b in 0..self.starts.len() {
             let at = self.kkt.body_at[b];
-            self.solution[at..at + 3].copy_from_slice(self.starts[b].v.as_slice());
-            self.solution[at + 3..at + 6].copy_from_slice(self.free_rate[b].as_slice());
+            self.free[at..at + 3].copy_from_slice(self.starts[b].v.as_slice());
+            self.free[at + 3..at + 6].copy_from_slice(self.free_rate[b].as_slice());
         }
+        self.solution.copy_from_slice(&self.free);
         self.find_ends();
         for (j, joint) in self.model.joints.iter().enumerate() {
             let s = &state.joints[j];
@@ -156,6 +174,10 @@ impl Dynamics {
             self.modes[j] = self.axes[j].start(s.mode);
             let open = gap(joint, &self.ends);
             let at = self.kkt.joint_at[j];
+            if let Some(free) = joint.free_row() {
+                let travel = coordinate(joint, &self.ends, s.angle) - s.angle;
+                self.curvature[j] = travel / self.h - self.rate(j, free, &self.free);
+            }
             for r in 0..6 {
                 let hold = self.rate(j, r, &self.solution) - open[r] / self.h;
                 self.base_rhs[at + r] = if s.broken || joint.free_row() == Some(r) { 0.0 } else { hold };
@@ -170,17 +192,24 @@ impl Dynamics {
         self.rows[j].rate(r, of(joint.child), joint.parent.map(of))
     }
 
-    /// Rate and impulse of the free axis of joint j in the trial; none where nothing moves or it is broken.
-    pub fn axis_result(&self, j: usize) -> Option<(f64, f64)> {
+    /// The free axis of joint j in the trial; none where nothing moves or it is broken.
+    pub fn axis_result(&self, j: usize) -> Option<AxisResult> {
         let free = self.model.joints[j].free_row().filter(|_| !self.broken[j])?;
         let rate = self.rate(j, free, &self.solution);
+        let mean_rate = 0.5 * (rate + self.rate(j, free, &self.free));
         let row = self.axes[j].row(self.modes[j]).is_some();
         let impulse = if row {
             -self.solution[self.kkt.joint_at[j] + free]
         } else {
             self.axes[j].impulse(self.modes[j])
         };
-        Some((rate, impulse))
+        Some(AxisResult { rate: rate + self.curvature[j], mean_rate, impulse })
+    }
+
+    /// Change of the rates of a body by all impulses of the trial.
+    pub fn kick(&self, body: usize) -> [f64; 6] {
+        let at = self.kkt.body_at[body];
+        std::array::from_fn(|k| self.solution[at + k] - self.free[at + k])
     }
 
     fn factor(&mut self) -> Result<(), SolverError> {
@@ -232,7 +261,7 @@ impl Dynamics {
         for (j, joint) in self.model.joints.iter().enumerate() {
             let Some(free) = joint.free_row().filter(|_| !self.broken[j]) else { continue };
             if let Some((_, b)) = self.axes[j].row(self.modes[j]) {
-                self.rhs[self.kkt.joint_at[j] + free] = b;
+                self.rhs[self.kkt.joint_at[j] + free] = b - self.curvature[j];
                 continue;
             }
             let impulse = self.axes[j].impulse(self.modes[j]);
@@ -291,7 +320,8 @@ impl Dynamics {
             let v = V3::from_column_slice(&self.solution[at..at + 3]);
             let w = V3::from_column_slice(&self.solution[at + 3..at + 6]);
             let turn = self.h * (w + self.middle_rate[b] - self.free_rate[b]);
-            let q = cayley(&turn) * start.q;
+            let mut q = cayley(&turn) * start.q;
+            q.renormalize_fast();
             // The impulses change the angular momentum; the rate follows with the inertia of the new orientation.
             let momentum = self.inertia[b] * (w - self.free_rate[b] + start.w);
             let rate = q * (self.model.bodies[b].inverse_inertia * q.inverse_transform_vector(&momentum));
@@ -305,8 +335,8 @@ impl Dynamics {
         let mut changed = false;
         self.next_modes.clone_from(&self.modes);
         for j in 0..self.axes.len() {
-            let Some((rate, impulse)) = self.axis_result(j) else { continue };
-            let next = self.axes[j].next(self.modes[j], rate, impulse);
+            let Some(axis) = self.axis_result(j) else { continue };
+            let next = self.axes[j].next(self.modes[j], axis.rate, axis.impulse);
             if next != self.modes[j] && !(one_at_a_time && changed) {
                 self.next_modes[j] = next;
                 changed = true;

@@ -200,10 +200,10 @@ impl Rig {
         self.scene.bodies.iter().map(|b| b.mass).sum()
     }
 
-    /// Kinetic plus potential energy less all work put in: falls by numerical damping and stops only.
+    /// Kinetic plus potential energy and heat less all work put in: constant but for errors of the scheme.
     pub fn balance(&self) -> f64 {
         let e = self.robot.energy();
-        e.mechanical() - e.port_work - e.actuator_work
+        e.mechanical() + e.dissipated - e.port_work - e.actuator_work
     }
 }
 

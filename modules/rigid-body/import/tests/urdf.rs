@@ -1,0 +1,135 @@
+//! Good robot files come out as trees; bad ones are refused with place, value and way out.
+#![allow(clippy::unwrap_used, missing_docs)]
+
+use std::path::Path;
+use terraglue_robot_import::{Base, JointKind, Robot, ShapeGeometry, read_urdf, read_urdf_text};
+
+fn read(text: &str) -> Result<Robot, String> {
+    read_urdf_text("robot.urdf", text, false).map_err(|e| e.to_string())
+}
+
+fn body(name: &str, mass: f64, moments: [f64; 3]) -> String {
+    let [x, y, z] = moments;
+    format!(
+        "<link name=\"{name}\"><inertial><mass value=\"{mass}\"/>\n<inertia ixx=\"{x}\" iyy=\"{y}\" izz=\"{z}\" \
+         ixy=\"0\" ixz=\"0\" iyz=\"0\"/></inertial></link>\n"
+    )
+}
+
+fn good(name: &str) -> String {
+    body(name, 1.0, [0.1, 0.1, 0.1])
+}
+
+fn joint(name: &str, kind: &str, parent: &str, child: &str) -> String {
+    format!(
+        "<joint name=\"{name}\" type=\"{kind}\"><parent link=\"{parent}\"/><child link=\"{child}\"/>\
+         <origin xyz=\"1 0 0\" rpy=\"0 0 0\"/><axis xyz=\"0 0 1\"/></joint>\n"
+    )
+}
+
+fn robot(parts: &[String]) -> String {
+    format!("<robot name=\"r\">\n{}</robot>", parts.concat())
+}
+
+fn refused(parts: &[String], expected: &[&str]) {
+    let message = read(&robot(parts)).expect_err("a bad robot");
+    assert!(message.starts_with("robot.urdf"), "{message}");
+    expected.iter().for_each(|e| assert!(message.contains(e), "`{e}` is not in: {message}"));
+}
+
+#[test]
+fn the_hexapod_is_read() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../models/hexapod.urdf");
+    let robot = read_urdf(&path, false).unwrap();
+    assert_eq!((robot.bodies.len(), robot.joints.len()), (25, 24));
+    let mass: f64 = robot.bodies.iter().map(|b| b.mass).sum();
+    assert!((mass - 25.02).abs() < 1e-9);
+    assert!(robot.joints.iter().all(|j| j.kind == JointKind::Revolute && j.limits.is_some()));
+    assert!(robot.joints.iter().all(|j| j.parent.is_some_and(|p| p < j.child)));
+    assert!(matches!(robot.base, Base::Free(_)));
+    // A foot is seen and hit, its leg only seen.
+    let foot = robot.bodies.iter().find(|b| b.name == "LF4").unwrap();
+    let hit: Vec<bool> = foot.shapes.iter().map(|s| s.collides).collect();
+    assert_eq!(hit, [true, false]);
+    assert_eq!(foot.shapes[0].geometry, ShapeGeometry::Sphere { radius: 0.03 });
+    assert_eq!(robot.bodies[0].shapes.len(), 1);
+}
+
+#[test]
+fn a_chain_hangs_from_the_world() {
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../tests/reference/multibody/chain8.urdf");
+    let robot = read_urdf(&path, false).unwrap();
+    assert_eq!((robot.bodies.len(), robot.joints.len(), robot.base), (8, 8, Base::World));
+    assert_eq!(robot.joints[0].parent, None);
+    assert_eq!(robot.joints[1].limits, None);
+}
+
+#[test]
+fn links_without_mass_are_merged() {
+    let text = robot(&[
+        "<link name=\"footprint\"/>".into(),
+        good("base"),
+        "<link name=\"camera\"><visual><geometry><box size=\"0.1 0.1 0.1\"/></geometry></visual></link>".into(),
+        joint("a", "fixed", "footprint", "base"),
+        joint("b", "fixed", "base", "camera"),
+    ]);
+    let robot = read(&text).unwrap();
+    assert_eq!((robot.bodies.len(), robot.joints.len()), (1, 0));
+    let Base::Free(pose) = robot.base else { panic!("free") };
+    assert_eq!(pose.translation.vector.x, 1.0);
+    assert_eq!(robot.bodies[0].shapes[0].body_from_shape.translation.vector.x, 1.0);
+}
+
+#[test]
+fn bodies_that_are_fixed_to_each_other_stay_two() {
+    let robot = read(&robot(&[good("a"), good("b"), joint("weld", "fixed", "a", "b")])).unwrap();
+    assert_eq!((robot.bodies.len(), robot.joints[0].kind), (2, JointKind::Fixed));
+}
+
+#[test]
+fn inertia_that_no_body_has_is_refused() {
+    refused(&[body("a", 1.0, [0.0; 3])], &["robot.urdf:2", "link `a`", "not positive"]);
+    refused(&[body("a", 1.0, [0.1, 0.1, -0.1])], &["link `a`", "-1.000000e-1", "not positive"]);
+    refused(&[body("a", 1.0, [0.1, 0.1, 0.5])], &["link `a`", "5.000000e-1", "sum of the other two"]);
+    refused(&[body("a", -2.0, [0.1; 3])], &["link `a`", "mass -2 kg"]);
+    refused(&[body("a", 0.0, [0.1; 3])], &["link `a`", "mass 0 kg"]);
+}
+
+#[test]
+fn what_is_not_a_tree_is_refused() {
+    let (ab, bc, ca) =
+        (joint("ab", "continuous", "a", "b"), joint("bc", "continuous", "b", "c"), joint("ca", "continuous", "c", "a"));
+    let links = [good("a"), good("b"), good("c")].concat();
+    refused(&[links.clone(), ab.clone(), bc.clone(), ca.clone()], &["loop"]);
+    let second = joint("ac", "continuous", "a", "c");
+    refused(&[links.clone(), ab.clone(), bc, second], &["joint `ac`", "`c`", "already hangs below joint `bc`", "loop"]);
+    refused(&[links.clone(), ab.clone()], &["link `c`", "not connected"]);
+    refused(&[links.clone(), joint("ab", "continuous", "a", "bb")], &["joint `ab`", "no link `bb`", "did you mean `b`"]);
+    refused(&[links, good("a")], &["link `a`", "used twice"]);
+    let island = [good("a"), good("b"), good("c"), joint("bc", "continuous", "b", "c"), joint("cb", "continuous", "c", "b")];
+    refused(&island, &["link `b`", "loop"]);
+}
+
+#[test]
+fn joints_and_shapes_that_make_no_sense_are_refused() {
+    let two = [good("a"), good("b")].concat();
+    refused(&[two.clone(), joint("j", "floating", "a", "b")], &["joint `j`", "Floating", "revolute"]);
+    refused(&[two.clone(), joint("j", "bent", "a", "b")], &["bent"]);
+    refused(&[two.clone(), joint("j", "revolute", "a", "b")], &["joint `j`", "0 … 0", "continuous"]);
+    refused(&[two, joint("j", "continuous", "a", "b").replace("0 0 1", "0 0 0")], &["joint `j`", "axis"]);
+    let ball = good("a").replace("</link>", "<collision><geometry><sphere radius=\"-1\"/></geometry></collision></link>");
+    refused(&[ball], &["link `a`", "-1 m"]);
+    let mesh = good("a").replace("</link>", "<collision><geometry><mesh filename=\"x.stl\"/></geometry></collision></link>");
+    refused(&[mesh], &["link `a`", "x.stl", "spheres"]);
+    refused(&["<link name=\"a\"/>".into()], &["link `a`", "no mass"]);
+    refused(&[good("a"), "<link name=\"b\"/>".into(), joint("j", "continuous", "a", "b")], &["link `b`", "no mass"]);
+}
+
+#[test]
+fn what_cannot_be_read_is_refused() {
+    let missing = read_urdf(Path::new("no/such.urdf"), false).expect_err("missing").to_string();
+    assert!(missing.starts_with("no/such.urdf: the robot file cannot be read"), "{missing}");
+    for text in ["", "not xml", "<robot>", "<sdf></sdf>"] {
+        assert!(read(text).is_err(), "{text}");
+    }
+}

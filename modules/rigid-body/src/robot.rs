@@ -174,7 +174,8 @@ impl Robot {
                 // The work on both sides is T·X; what an impact kicks out of the body is lost.
                 let push = self.ports.side(i) * t[i];
                 self.state.energy.port_work += push * self.scratch.free[i];
-                self.state.energy.dissipated += 0.5 * push * self.dynamics.h * self.ports.kick(&self.dynamics, i);
+                self.state.energy.dissipated +=
+                    0.5 * push * self.dynamics.h * self.ports.kick(&self.dynamics, i);
                 if c == 0 {
                     self.state.contact_normal[port.body as usize] += t[i];
                 }

@@ -77,7 +77,12 @@ fn a_broken_leg_falls_away_and_the_body_stays_up() {
     rig.robot.get(&[rig.id("LF_j2.broken")], ValuesMut::Bool(&mut broken)).unwrap();
     assert!(broken[0]);
     walk_in_place(&mut rig, 1000);
-    assert!(rig.get("body.z") > 0.25 && rig.get("LF2.z") < 0.33, "{} {}", rig.get("body.z"), rig.get("LF2.z"));
+    assert!(
+        rig.get("body.z") > 0.25 && rig.get("LF2.z") < 0.33,
+        "{} {}",
+        rig.get("body.z"),
+        rig.get("LF2.z")
+    );
     assert!(rig.get("body.roll").abs() < 0.3);
     // The leg lies with its foot on the ground, which still is a contact of it.
     assert!(rig.get("LF4.contact_normal") >= 0.0 && rig.get("LF4.z").is_finite());

@@ -47,7 +47,17 @@ fn murtys_exponential_problem_is_solved() {
 }
 
 fn lower(n: usize) -> Vec<f64> {
-    (0..n * n).map(|e| if e % n == e / n { 1.0 } else if e % n > e / n { 2.0 } else { 0.0 }).collect()
+    (0..n * n)
+        .map(|e| {
+            if e % n == e / n {
+                1.0
+            } else if e % n > e / n {
+                2.0
+            } else {
+                0.0
+            }
+        })
+        .collect()
 }
 
 #[test]

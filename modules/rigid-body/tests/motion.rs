@@ -54,7 +54,8 @@ fn exact_period(amplitude: f64) -> f64 {
 fn the_period_of_a_pendulum_is_the_elliptic_integral() {
     // The bob hangs at angle π/2 about y; it starts one radian away.
     let start = std::f64::consts::FRAC_PI_2 - 1.0;
-    let errors = [2e-3, 1e-3].map(|h| period(&mut pendulum(&format!("period{h}"), start, h)) / exact_period(1.0) - 1.0);
+    let errors = [2e-3, 1e-3]
+        .map(|h| period(&mut pendulum(&format!("period{h}"), start, h)) / exact_period(1.0) - 1.0);
     assert!(errors[1].abs() < 1e-6, "{errors:?}");
 }
 
@@ -104,12 +105,14 @@ fn tip(rig: &Rig) -> [f64; 3] {
     let state = rig.states()[7];
     let q = state.world_from_body.orientation;
     let q = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(q[0], q[1], q[2], q[3]));
-    (nalgebra::Vector3::from(state.world_from_body.position) + q * nalgebra::Vector3::new(0.25, 0.0, 0.0)).into()
+    (nalgebra::Vector3::from(state.world_from_body.position) + q * nalgebra::Vector3::new(0.25, 0.0, 0.0))
+        .into()
 }
 
 fn chain_error(file: &str, joints: &str, h: f64, expected: [f64; 3]) -> f64 {
-    let parameters =
-        format!(r#"{{"model": "tests/reference/multibody/{file}.urdf", "motor": "off", "joints": {joints}}}"#);
+    let parameters = format!(
+        r#"{{"model": "tests/reference/multibody/{file}.urdf", "motor": "off", "joints": {joints}}}"#
+    );
     let mut rig = Rig::new(&parameters, G, h);
     (0..(1.0 / h).round() as usize).for_each(|_| rig.free_step());
     let tip = tip(&rig);
@@ -147,7 +150,8 @@ fn a_swinging_chain_stays_together_and_finite() {
     for pair in states.windows(2) {
         let q = pair[0].world_from_body.orientation;
         let q = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(q[0], q[1], q[2], q[3]));
-        let end = nalgebra::Vector3::from(pair[0].world_from_body.position) + q * nalgebra::Vector3::new(0.25, 0.0, 0.0);
+        let end = nalgebra::Vector3::from(pair[0].world_from_body.position)
+            + q * nalgebra::Vector3::new(0.25, 0.0, 0.0);
         assert!((end - nalgebra::Vector3::from(pair[1].world_from_body.position)).norm() < 1e-10);
     }
 }
@@ -174,9 +178,11 @@ fn a_gait_without_gravity_moves_no_momentum() {
         let mut momentum = nalgebra::Vector3::zeros();
         for ((s, m), c) in rig.states().iter().zip(&masses).zip(&coms) {
             let q = s.world_from_body.orientation;
-            let q = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(q[0], q[1], q[2], q[3]));
+            let q =
+                nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(q[0], q[1], q[2], q[3]));
             let w = nalgebra::Vector3::from(s.angular_velocity);
-            momentum += *m * (nalgebra::Vector3::from(s.linear_velocity) + w.cross(&(q * nalgebra::Vector3::from(*c))));
+            momentum += *m
+                * (nalgebra::Vector3::from(s.linear_velocity) + w.cross(&(q * nalgebra::Vector3::from(*c))));
         }
         assert!(momentum.norm() < 1e-10, "{momentum}");
     }

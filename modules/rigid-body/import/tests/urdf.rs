@@ -69,7 +69,8 @@ fn links_without_mass_are_merged() {
     let text = robot(&[
         "<link name=\"footprint\"/>".into(),
         good("base"),
-        "<link name=\"camera\"><visual><geometry><box size=\"0.1 0.1 0.1\"/></geometry></visual></link>".into(),
+        "<link name=\"camera\"><visual><geometry><box size=\"0.1 0.1 0.1\"/></geometry></visual></link>"
+            .into(),
         joint("a", "fixed", "footprint", "base"),
         joint("b", "fixed", "base", "camera"),
     ]);
@@ -97,16 +98,31 @@ fn inertia_that_no_body_has_is_refused() {
 
 #[test]
 fn what_is_not_a_tree_is_refused() {
-    let (ab, bc, ca) =
-        (joint("ab", "continuous", "a", "b"), joint("bc", "continuous", "b", "c"), joint("ca", "continuous", "c", "a"));
+    let (ab, bc, ca) = (
+        joint("ab", "continuous", "a", "b"),
+        joint("bc", "continuous", "b", "c"),
+        joint("ca", "continuous", "c", "a"),
+    );
     let links = [good("a"), good("b"), good("c")].concat();
     refused(&[links.clone(), ab.clone(), bc.clone(), ca.clone()], &["loop"]);
     let second = joint("ac", "continuous", "a", "c");
-    refused(&[links.clone(), ab.clone(), bc, second], &["joint `ac`", "`c`", "already hangs below joint `bc`", "loop"]);
+    refused(
+        &[links.clone(), ab.clone(), bc, second],
+        &["joint `ac`", "`c`", "already hangs below joint `bc`", "loop"],
+    );
     refused(&[links.clone(), ab.clone()], &["link `c`", "not connected"]);
-    refused(&[links.clone(), joint("ab", "continuous", "a", "bb")], &["joint `ab`", "no link `bb`", "did you mean `b`"]);
+    refused(
+        &[links.clone(), joint("ab", "continuous", "a", "bb")],
+        &["joint `ab`", "no link `bb`", "did you mean `b`"],
+    );
     refused(&[links, good("a")], &["link `a`", "used twice"]);
-    let island = [good("a"), good("b"), good("c"), joint("bc", "continuous", "b", "c"), joint("cb", "continuous", "c", "b")];
+    let island = [
+        good("a"),
+        good("b"),
+        good("c"),
+        joint("bc", "continuous", "b", "c"),
+        joint("cb", "continuous", "c", "b"),
+    ];
     refused(&island, &["link `b`", "loop"]);
 }
 
@@ -117,12 +133,17 @@ fn joints_and_shapes_that_make_no_sense_are_refused() {
     refused(&[two.clone(), joint("j", "bent", "a", "b")], &["bent"]);
     refused(&[two.clone(), joint("j", "revolute", "a", "b")], &["joint `j`", "0 … 0", "continuous"]);
     refused(&[two, joint("j", "continuous", "a", "b").replace("0 0 1", "0 0 0")], &["joint `j`", "axis"]);
-    let ball = good("a").replace("</link>", "<collision><geometry><sphere radius=\"-1\"/></geometry></collision></link>");
+    let ball = good("a")
+        .replace("</link>", "<collision><geometry><sphere radius=\"-1\"/></geometry></collision></link>");
     refused(&[ball], &["link `a`", "-1 m"]);
-    let mesh = good("a").replace("</link>", "<collision><geometry><mesh filename=\"x.stl\"/></geometry></collision></link>");
+    let mesh = good("a")
+        .replace("</link>", "<collision><geometry><mesh filename=\"x.stl\"/></geometry></collision></link>");
     refused(&[mesh], &["link `a`", "x.stl", "spheres"]);
     refused(&["<link name=\"a\"/>".into()], &["link `a`", "no mass"]);
-    refused(&[good("a"), "<link name=\"b\"/>".into(), joint("j", "continuous", "a", "b")], &["link `b`", "no mass"]);
+    refused(
+        &[good("a"), "<link name=\"b\"/>".into(), joint("j", "continuous", "a", "b")],
+        &["link `b`", "no mass"],
+    );
 }
 
 #[test]

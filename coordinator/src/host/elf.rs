@@ -19,6 +19,27 @@ pub(super) fn is_elf(bytes: &[u8]) -> bool {
     bytes.starts_with(b"\x7fELF")
 }
 
+/// Number of the kind of machine in the file header, where it is not this one.
+pub(super) fn foreign_machine(bytes: &[u8]) -> Option<usize> {
+    const OWN: usize = if cfg!(target_arch = "aarch64") { 183 } else { 62 };
+    number::<2>(bytes, 0x12).filter(|machine| *machine != OWN)
+}
+
+/// Length that the file must have for its sections and loaded segments, or None: not a 64-bit little-endian ELF
+/// file with complete headers. A shorter file must not be loaded: the system maps the segments without looking,
+/// and the first touch beyond the end is a bus error.
+pub(super) fn needed_length(bytes: &[u8]) -> Option<usize> {
+    let header = Header::of(bytes)?;
+    let mut end = header.sections.checked_add(header.section_count.checked_mul(header.section_size)?)?;
+    for k in 0..header.segment_count {
+        let at = header.segments.checked_add(k.checked_mul(header.segment_size)?)?;
+        let (offset, size) =
+            (number::<8>(bytes, at.checked_add(0x08)?)?, number::<8>(bytes, at.checked_add(0x20)?)?);
+        end = end.max(offset.checked_add(size)?);
+    }
+    Some(end)
+}
+
 impl Description {
     /// From a file; None: unreadable, no such section, or not of our form.
     pub fn read(path: &Path) -> Option<Self> {
@@ -51,25 +72,52 @@ impl Description {
     }
 }
 
-/// Bytes of a section by name. Offsets after the ELF-64 specification, section header table.
-fn section<'a>(bytes: &'a [u8], name: &str) -> Option<&'a [u8]> {
-    const CLASS_64: u8 = 2;
-    const LITTLE_ENDIAN: u8 = 1;
-    if !is_elf(bytes) || bytes.get(4) != Some(&CLASS_64) || bytes.get(5) != Some(&LITTLE_ENDIAN) {
-        return None;
+/// Where the tables of a file lie. Offsets after the ELF-64 specification, file header.
+struct Header {
+    segments: usize,
+    segment_size: usize,
+    segment_count: usize,
+    sections: usize,
+    section_size: usize,
+    section_count: usize,
+    section_names: usize,
+}
+
+impl Header {
+    fn of(bytes: &[u8]) -> Option<Self> {
+        const CLASS_64: u8 = 2;
+        const LITTLE_ENDIAN: u8 = 1;
+        if !is_elf(bytes) || bytes.get(4) != Some(&CLASS_64) || bytes.get(5) != Some(&LITTLE_ENDIAN) {
+            return None;
+        }
+        Some(Self {
+            segments: number::<8>(bytes, 0x20)?,
+            segment_size: number::<2>(bytes, 0x36)?,
+            segment_count: number::<2>(bytes, 0x38)?,
+            sections: number::<8>(bytes, 0x28)?,
+            section_size: number::<2>(bytes, 0x3a)?,
+            section_count: number::<2>(bytes, 0x3c)?,
+            section_names: number::<2>(bytes, 0x3e)?,
+        })
     }
-    let table = number::<8>(bytes, 0x28)?;
-    let size = number::<2>(bytes, 0x3a)?;
-    let count = number::<2>(bytes, 0x3c)?;
-    let names = number::<2>(bytes, 0x3e)?;
-    let header = |k: usize| table.checked_add(k.checked_mul(size)?);
+
+    /// Offset of the header of section k.
+    fn section(&self, k: usize) -> Option<usize> {
+        self.sections.checked_add(k.checked_mul(self.section_size)?)
+    }
+}
+
+/// Bytes of a section by name. Offsets after the ELF-64 specification, section header.
+fn section<'a>(bytes: &'a [u8], name: &str) -> Option<&'a [u8]> {
+    let header = Header::of(bytes)?;
     let content = |at: usize| {
-        let (offset, length) = (number::<8>(bytes, at + 0x18)?, number::<8>(bytes, at + 0x20)?);
-        bytes.get(offset..offset.checked_add(length)?)
+        let (offset, size) =
+            (number::<8>(bytes, at.checked_add(0x18)?)?, number::<8>(bytes, at.checked_add(0x20)?)?);
+        bytes.get(offset..offset.checked_add(size)?)
     };
-    let names = content(header(names)?)?;
-    for k in 0..count {
-        let at = header(k)?;
+    let names = content(header.section(header.section_names)?)?;
+    for k in 0..header.section_count {
+        let at = header.section(k)?;
         let own = names.get(number::<4>(bytes, at)?..)?;
         if own.strip_prefix(name.as_bytes()).is_some_and(|rest| rest.first() == Some(&0)) {
             return content(at);
@@ -99,5 +147,8 @@ mod tests {
         for length in [4, 0x3f, 0x40, 200] {
             assert_eq!(section(&own[..length], ".text"), None);
         }
+        let needed = needed_length(&own).expect("an ELF file");
+        assert!(needed <= own.len() && needed > own.len() / 2, "{needed} of {}", own.len());
+        assert_eq!(needed_length(&own[..0x30]), None);
     }
 }

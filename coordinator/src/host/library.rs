@@ -1,7 +1,7 @@
 //! Modules from shared libraries and modules linked into the program.
 #![allow(unsafe_code)] // Loading a library runs its constructors and calls its entry.
 
-use super::elf::{Description, is_elf};
+use super::elf::{Description, foreign_machine, is_elf, needed_length};
 use super::error::LoadError;
 use super::search::{SearchPath, file_name, is_path};
 use super::{HostServices, Instance};
@@ -105,6 +105,15 @@ fn inspect(path: &Path) -> std::result::Result<(), LoadError> {
     if !is_elf(&bytes) {
         let reason = if bytes.is_empty() { "the file is empty" } else { "it has no ELF header" };
         return Err(LoadError::NotALibrary { path: path_buf(), reason: reason.into() });
+    }
+    let whole = needed_length(&bytes).unwrap_or(usize::MAX);
+    if whole > bytes.len() {
+        let reason = format!("it is cut off after {} bytes", bytes.len());
+        return Err(LoadError::NotALibrary { path: path_buf(), reason });
+    }
+    if let Some(machine) = foreign_machine(&bytes) {
+        let reason = format!("it is made for another kind of machine (ELF number {machine})");
+        return Err(LoadError::CannotLoad { path: path_buf(), reason });
     }
     match Description::of(&bytes) {
         Some(d) if d.abi_major() != Some(TG_ABI_MAJOR) => {

@@ -1,9 +1,12 @@
 //! The host on real libraries: the column soil through its table against the same code linked in, and bad
 //! libraries made by the system's C compiler.
 
+mod bad_libraries;
+mod c_soil;
+
 use super::*;
 use soil_column::SoilColumnModule;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use terraglue_subsystem::{Config, Hold, Input, Kind, Law, Level, Motion, Port, Response, Step, component};
 
 fn port(key: u64, first: u32, z: f64) -> Port {
@@ -22,6 +25,27 @@ fn port(key: u64, first: u32, z: f64) -> Port {
         extent: [0.0; 2],
         law: Law::UNILATERAL,
     }
+}
+
+/// A step of 1 ms at t = 1 s.
+fn step_of(ports: &[Port], n: u32) -> Step<'_> {
+    Step { epoch: 1, n, ports, ..Step::free(1.0, 1e-3, 0) }
+}
+
+/// Compiles a module in C into `folder`, as a user would.
+fn compile(folder: &Path, name: &str, source: &str, defines: &[&str]) -> PathBuf {
+    let include = Path::new(env!("CARGO_MANIFEST_DIR")).join("../interfaces/plugin/include");
+    let (code, library) = (folder.join(format!("{name}.c")), folder.join(format!("lib{name}_plugin.so")));
+    std::fs::write(&code, source).expect("written");
+    let mut command = std::process::Command::new("cc");
+    command
+        .args(["-std=c11", "-O2", "-Wall", "-Wextra", "-Werror", "-fPIC", "-shared"])
+        .arg("-I")
+        .arg(include);
+    command.args(defines.iter().map(|d| format!("-D{d}"))).arg(&code).arg("-o").arg(&library).arg("-lm");
+    let done = command.output().expect("the system's C compiler `cc`");
+    assert!(done.status.success(), "{}", String::from_utf8_lossy(&done.stderr));
+    library
 }
 
 /// Vectors of a response.
@@ -48,15 +72,7 @@ fn drive(soil: &mut Instance) -> Vec<u64> {
     let (mut out, mut g, mut laws) = (Buffers::new(6), vec![0.0; 36], [Law::UNILATERAL; 2]);
     for k in 0..20u64 {
         let ports = [port(1, 0, -1e-4 * k as f64), port(2, 3, -2e-4 * (10.0 - k as f64).abs())];
-        let step = Step {
-            t: 1e-3 * k as f64,
-            h: 1e-3,
-            index: k,
-            epoch: 1,
-            n: 6,
-            ports: &ports,
-            ..Step::free(0.0, 0.0, 0)
-        };
+        let step = Step { t: 1e-3 * k as f64, index: k, ..step_of(&ports, 6) };
         soil.set_ports(&step, &mut laws, &mut out.response()).expect("set_ports");
         bits.extend(out.bits());
         bits.extend(laws.iter().map(|l| l.mu.to_bits()));

@@ -315,3 +315,29 @@ fn a_comparison_marks_the_best_and_says_what_diverged_and_when() {
         std::fs::write(keep, html + "<!--" + &terminal + "-->").expect("kept");
     }
 }
+
+/// CPU time of recording a robot with 700 variables; printed, not judged: machines differ.
+#[test]
+#[ignore = "a measurement"]
+fn cost_of_recording() {
+    let f = folder();
+    let mut rig = Rig::new("cooperative");
+    rig.parts[1].1.widen(700);
+    let mut recorder =
+        Recorder::create(f.path(), &rig.scenario, RecorderOptions::default()).expect("created");
+    rig.view(0, &mut |v| crate::observer::Observer::started(&mut recorder, v)).expect("started");
+    let (mut in_recorder, n) = (std::time::Duration::ZERO, 5000);
+    for index in 1..=n {
+        rig.parts.iter_mut().for_each(|p| p.1.t = index as f64 * H);
+        rig.view(index, &mut |v| {
+            let start = std::time::Instant::now();
+            let r = crate::observer::Observer::stepped(&mut recorder, v);
+            in_recorder += start.elapsed();
+            r
+        })
+        .expect("stepped");
+    }
+    recorder.finish(1.0, 1.0, None, Status::Done).expect("finished");
+    let size = std::fs::metadata(f.path().join(RECORDING)).expect("written").len();
+    println!("{:.1} µs per step, {} bytes per step", in_recorder.as_secs_f64() * 1e6 / n as f64, size / n);
+}

@@ -49,6 +49,13 @@ impl Synthetic {
         Self::of(Kind::Robot, robot_variables())
     }
 
+    /// Adds `n` variables that change all the time.
+    pub fn widen(&mut self, n: u32) {
+        let more =
+            |k| Variable::real(100 + k, format!("extra_{k}.angle"), "rad", Causality::Output, "synthetic");
+        self.variables.extend((0..n).map(more));
+    }
+
     pub fn controller() -> Self {
         let speed = Variable::real(0, "speed", "m/s", Causality::Parameter, "commanded speed");
         Self::of(Kind::Controller, vec![speed])
@@ -120,6 +127,7 @@ impl Synthetic {
             (Kind::Robot, 2) => 0.3 * w * libm::cos(w * self.t),
             (Kind::Robot, 3) => 4.0,
             (Kind::Robot, 4) => f64::INFINITY,
+            (Kind::Robot, id) if id >= 100 => libm::sin(self.t * f64::from(id)),
             (Kind::Controller, 0) => SPEED,
             _ => 1e-12,
         }

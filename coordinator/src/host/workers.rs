@@ -1,36 +1,178 @@
 //! The threads of a run: modules make none of their own, they ask for `parallel_for`.
+//!
+//! A pool of our own, because the step loop must not allocate: queues of general pools take memory block by
+//! block. Threads sleep between loops (no spinning, which costs the more the busier the machine is), and a thread
+//! that wakes late delays nobody: the caller takes the pieces itself until none is left.
+#![allow(unsafe_code)] // The pieces of a loop borrow from the caller, who waits for all threads.
 
-use rayon::prelude::*;
+use std::any::Any;
+use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, TryLockError};
+use std::thread::JoinHandle;
 
 /// A pool of a fixed number of threads; one thread means the caller's own.
 pub struct Workers {
-    pool: Option<rayon::ThreadPool>,
+    shared: Arc<Shared>,
+    threads: Vec<JoinHandle<()>>,
+    /// Held during a loop: a loop inside a loop, or from another thread meanwhile, runs on its caller alone.
+    busy: Mutex<()>,
 }
+
+struct Shared {
+    state: Mutex<State>,
+    begun: Condvar,
+    ended: Condvar,
+    /// The next piece to take.
+    next: AtomicUsize,
+}
+
+#[derive(Default)]
+struct State {
+    /// The loop in flight.
+    current: Option<Loop>,
+    /// Grows with every loop, so that no thread enters one twice.
+    number: u64,
+    /// Threads inside the loop.
+    inside: usize,
+    stop: bool,
+    panicked: Option<Box<dyn Any + Send>>,
+}
+
+#[derive(Clone, Copy)]
+struct Loop {
+    job: *const (dyn Fn(usize) + Sync),
+    n: usize,
+}
+
+// SAFETY: the job is Sync; the pointer is used only while `parallel_for` waits.
+unsafe impl Send for Loop {}
 
 impl Workers {
     /// `threads` = 0 takes one per processor.
     pub fn new(threads: usize) -> Self {
-        let threads = if threads == 0 {
-            std::thread::available_parallelism().map_or(1, std::num::NonZero::get)
-        } else {
-            threads
+        let processors = || std::thread::available_parallelism().map_or(1, std::num::NonZero::get);
+        let threads = if threads == 0 { processors() } else { threads };
+        let shared = Arc::new(Shared {
+            state: Mutex::default(),
+            begun: Condvar::new(),
+            ended: Condvar::new(),
+            next: AtomicUsize::new(0),
+        });
+        let spawn = |k: usize| {
+            let shared = shared.clone();
+            std::thread::Builder::new().name(format!("terraglue {k}")).spawn(move || shared.work()).ok()
         };
-        let pool = (threads > 1)
-            .then(|| rayon::ThreadPoolBuilder::new().num_threads(threads).build().ok())
-            .flatten();
-        Self { pool }
+        let threads = (1..threads).filter_map(spawn).collect();
+        Self { shared, threads, busy: Mutex::default() }
     }
 
-    /// Number of threads.
+    /// Number of threads, the caller's included.
     pub fn threads(&self) -> usize {
-        self.pool.as_ref().map_or(1, rayon::ThreadPool::current_num_threads)
+        self.threads.len() + 1
     }
 
-    /// Runs job(0) … job(n − 1) in any order; returns when all are done.
+    /// Runs job(0) … job(n − 1) in any order; returns when all are done. A panic of a job goes on in the caller.
     pub fn parallel_for(&self, n: usize, job: &(dyn Fn(usize) + Sync)) {
-        match &self.pool {
-            Some(pool) if n > 1 => pool.install(|| (0..n).into_par_iter().for_each(job)),
-            _ => (0..n).for_each(job),
+        let alone = self.threads.is_empty() || n < 2;
+        let Some(_busy) = (!alone).then(|| self.enter()).flatten() else {
+            return (0..n).for_each(job);
+        };
+        // SAFETY: only the lifetime is erased; `finish` does not return before every thread has left the loop.
+        let job: &'static (dyn Fn(usize) + Sync) = unsafe { std::mem::transmute(job) };
+        self.shared.next.store(0, Ordering::Relaxed);
+        let this = Loop { job, n };
+        {
+            let mut state = self.shared.lock();
+            state.current = Some(this);
+            state.number += 1;
+        }
+        self.shared.begun.notify_all();
+        self.shared.take_pieces(this);
+        self.shared.finish();
+    }
+}
+
+impl Workers {
+    /// The right to run a loop on all threads; None: one is running.
+    fn enter(&self) -> Option<MutexGuard<'_, ()>> {
+        match self.busy.try_lock() {
+            Ok(guard) => Some(guard),
+            // A job panicked; its loop was finished before the panic went on.
+            Err(TryLockError::Poisoned(poisoned)) => Some(poisoned.into_inner()),
+            Err(TryLockError::WouldBlock) => None,
+        }
+    }
+}
+
+impl Drop for Workers {
+    fn drop(&mut self) {
+        self.shared.lock().stop = true;
+        self.shared.begun.notify_all();
+        for thread in self.threads.drain(..) {
+            // A thread ends by `stop` alone; its jobs' panics were handed to their callers.
+            let _ = thread.join();
+        }
+    }
+}
+
+impl Shared {
+    fn lock(&self) -> MutexGuard<'_, State> {
+        self.state.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Life of a thread.
+    fn work(&self) {
+        let mut last = 0;
+        let mut state = self.lock();
+        loop {
+            match state.current {
+                _ if state.stop => return,
+                Some(current) if state.number != last => {
+                    last = state.number;
+                    state.inside += 1;
+                    drop(state);
+                    self.take_pieces(current);
+                    state = self.lock();
+                    state.inside -= 1;
+                    if state.inside == 0 {
+                        self.ended.notify_one();
+                    }
+                }
+                _ => state = self.begun.wait(state).unwrap_or_else(PoisonError::into_inner),
+            }
+        }
+    }
+
+    /// Takes pieces until none is left; after a panic of its own a thread takes no more.
+    fn take_pieces(&self, current: Loop) {
+        // SAFETY: the caller of `parallel_for` keeps the job alive until every thread has left the loop.
+        let job = unsafe { &*current.job };
+        let pieces = || {
+            loop {
+                let k = self.next.fetch_add(1, Ordering::Relaxed);
+                if k >= current.n {
+                    return;
+                }
+                job(k);
+            }
+        };
+        if let Err(payload) = catch_unwind(AssertUnwindSafe(pieces)) {
+            self.lock().panicked.get_or_insert(payload);
+        }
+    }
+
+    /// Closes the loop to threads that wake late, waits for those inside, and passes a panic on.
+    fn finish(&self) {
+        let mut state = self.lock();
+        state.current = None;
+        while state.inside > 0 {
+            state = self.ended.wait(state).unwrap_or_else(PoisonError::into_inner);
+        }
+        let panicked = state.panicked.take();
+        drop(state);
+        if let Some(payload) = panicked {
+            resume_unwind(payload);
         }
     }
 }
@@ -38,7 +180,6 @@ impl Workers {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::atomic::{AtomicUsize, Ordering};
 
     #[test]
     fn every_index_runs_once_on_any_number_of_threads() {
@@ -46,10 +187,50 @@ mod tests {
             let workers = Workers::new(threads);
             assert_eq!(workers.threads(), threads);
             let runs: Vec<AtomicUsize> = (0..1000).map(|_| AtomicUsize::new(0)).collect();
-            workers.parallel_for(runs.len(), &|k| {
-                runs[k].fetch_add(1, Ordering::Relaxed);
-            });
-            assert!(runs.iter().all(|r| r.load(Ordering::Relaxed) == 1));
+            for round in 1..=50 {
+                workers.parallel_for(runs.len(), &|k| {
+                    runs[k].fetch_add(1, Ordering::Relaxed);
+                });
+                assert!(runs.iter().all(|r| r.load(Ordering::Relaxed) == round));
+            }
         }
+    }
+
+    #[test]
+    fn pieces_run_beside_each_other() {
+        let workers = Workers::new(2);
+        let met = std::sync::Barrier::new(2);
+        // Ends only if two threads are in the loop at once.
+        workers.parallel_for(2, &|_| {
+            met.wait();
+        });
+    }
+
+    #[test]
+    fn a_loop_inside_a_loop_runs_on_its_thread() {
+        let workers = Workers::new(3);
+        let sum = AtomicUsize::new(0);
+        workers.parallel_for(10, &|a| {
+            workers.parallel_for(10, &|b| {
+                sum.fetch_add(10 * a + b, Ordering::Relaxed);
+            });
+        });
+        assert_eq!(sum.into_inner(), (0..100).sum::<usize>());
+    }
+
+    #[test]
+    fn a_panic_reaches_the_caller_and_the_pool_goes_on() {
+        let workers = Workers::new(2);
+        for bad in [0, 57, 99] {
+            let caught = catch_unwind(AssertUnwindSafe(|| {
+                workers.parallel_for(100, &|k| assert!(k != bad, "piece {k}"));
+            }));
+            let text = caught.expect_err("a panic").downcast_ref::<String>().cloned();
+            assert_eq!(text, Some(format!("piece {bad}")));
+        }
+        let met = std::sync::Barrier::new(2);
+        workers.parallel_for(2, &|_| {
+            met.wait();
+        });
     }
 }

@@ -124,3 +124,53 @@ fn through_the_table_and_linked_in_give_the_same_bits() {
     let (a, b) = (drive(&mut a), drive(&mut b));
     assert!(a.len() > 1000 && a == b);
 }
+
+/// A module that panics in its third trial.
+struct Panicking(u32);
+
+impl terraglue_subsystem::Module for Panicking {
+    fn schema() -> terraglue_subsystem::Schema {
+        SoilColumnModule::schema()
+    }
+    fn instantiate(
+        _: &Config,
+        _: std::sync::Arc<dyn terraglue_subsystem::Host>,
+    ) -> terraglue_subsystem::Result<Box<dyn terraglue_subsystem::Subsystem>> {
+        Ok(Box::new(Self(0)))
+    }
+}
+
+impl terraglue_subsystem::Subsystem for Panicking {
+    fn capabilities(&self) -> terraglue_subsystem::Capabilities {
+        terraglue_subsystem::Capabilities::MOTION
+    }
+    fn advance(&mut self, _: &Step, _: &Input, out: &mut Response) -> terraglue_subsystem::Result {
+        self.0 += 1;
+        assert!(self.0 < 3, "no third trial");
+        for vector in [&mut *out.x, &mut *out.v, &mut *out.a, &mut *out.t] {
+            vector.fill(0.0);
+        }
+        Ok(())
+    }
+}
+
+#[test]
+fn a_panic_behind_the_table_is_an_error_with_name_call_and_time() {
+    let table = Box::leak(Box::new(terraglue_plugin::table::<Panicking>("panicking", b"\0")));
+    #[allow(unsafe_code)]
+    // SAFETY: a table of our own making that lives as long as the process.
+    let module = unsafe { terraglue_plugin::ForeignModule::new(table) }.expect("table");
+    let made = module.instantiate(&Config::default(), services().for_instance("soil")).expect("instance");
+    let mut soil = Instance::new("soil", "panicking", Kind::Soil, Box::new(made));
+    let mut out = Buffers::new(0);
+    let mut trial = |t| {
+        let input = Input::Motion(Motion { x: &[], v: &[] });
+        soil.advance(&Step::free(t, 1e-3, 0), &input, &mut out.response()).map_err(|e| e.to_string())
+    };
+    assert_eq!([trial(0.0), trial(0.001)], [Ok(Progress::Complete), Ok(Progress::Complete)]);
+    let told = Err("soil (panicking): advance failed at t = 0.002 s: panicked: no third trial".into());
+    assert_eq!(trial(0.002), told);
+    let dead =
+        Err("soil (panicking): advance failed at t = 0.003 s: not called: it failed for good before".into());
+    assert_eq!(trial(0.003), dead);
+}

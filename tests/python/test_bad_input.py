@@ -26,7 +26,7 @@ def test_missing_unreadable_and_empty_scenarios(tmp_path):
     "old, new, expected",
     [
         ("[gluing]", "[glueing]", ["unknown table `[glueing]`", "`gluing`"]),
-        ("strategy", "stratgy", ["unknown key `stratgy`", "`strategy`"]),
+        ("strategy = ", "stratgy = ", ["unknown key `stratgy`", "`strategy`"]),
         ('strategy = "cooperative"', 'strategy = "coop"', ["unknown strategy `coop`", "`cooperative`", "`iterative`"]),
         ('strategy = "cooperative"', "strategy = 3", ["`strategy` takes", "not 3"]),
         ("spacing_m = 0.01", "spacing_m = -0.01", ["-0.01 is out of range", "greater than 0 m"]),

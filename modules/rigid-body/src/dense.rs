@@ -10,8 +10,7 @@ pub(crate) fn cholesky(n: usize, a: &mut [f64]) -> bool {
             }
         }
         let pivot = a[j * n + j];
-        // Written so that a NaN is not definite either.
-        if !(pivot > 0.0) {
+        if pivot <= 0.0 || pivot.is_nan() {
             return false;
         }
         let inverse = 1.0 / pivot.sqrt();

@@ -168,7 +168,7 @@ fn a_gait_without_gravity_moves_no_momentum() {
     let masses: Vec<f64> = rig.scene.bodies.iter().map(|b| b.mass).collect();
     assert_eq!((masses.len(), joints.len()), (25, 24));
     assert!((rig.mass() - 25.02).abs() < 1e-9);
-    let coms: Vec<[f64; 3]> = (0..25).map(|b| com(b)).collect();
+    let coms: Vec<[f64; 3]> = (0..25).map(com).collect();
     for _ in 0..1000 {
         for (k, (joint, q)) in joints.iter().zip(&start).enumerate() {
             let target = q + 0.3 * libm::sin(6.0 * rig.t + k as f64) - 0.3 * libm::sin(k as f64);

@@ -168,8 +168,9 @@ impl Solver {
         let (ptr, rows) = (self.pattern.col_ptr(), self.pattern.row_idx());
         let mut terms = scale;
         for j in 0..self.n {
-            for k in ptr[j]..ptr[j + 1] {
-                let (i, a) = (rows[k], self.values[k]);
+            let column = ptr[j]..ptr[j + 1];
+            for (i, a) in rows[column.clone()].iter().zip(&self.values[column]) {
+                let i = *i;
                 r[i] -= a * x[j];
                 terms = terms.max((a * x[j]).abs());
                 if i != j {

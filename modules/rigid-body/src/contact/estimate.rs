@@ -106,8 +106,8 @@ impl Estimator {
         let normals = &self.normals;
         let entry = |r: usize, c: usize| p.g[normals[c] * n + normals[r]];
         self.matrix.clear();
-        for c in 0..m {
-            let epsilon = self.epsilon[normals[c]];
+        for (c, column) in normals.iter().enumerate() {
+            let epsilon = self.epsilon[*column];
             self.matrix.extend((0..m).map(|r| entry(r, c) + if r == c { epsilon } else { 0.0 }));
         }
         self.normal_gap.clear();

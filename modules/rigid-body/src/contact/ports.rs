@@ -22,6 +22,7 @@ pub(crate) struct Ports {
     /// L⁻¹ of each component's right-hand side; zero outside its path.
     forward: Vec<f64>,
     g: Vec<f64>,
+    scratch: Vec<f64>,
     /// Number of the factorisation that `g` belongs to; 0: none.
     g_of: u64,
 }
@@ -118,7 +119,7 @@ impl Ports {
                 let at = dynamics.kkt.body_at[components[p].body];
                 dynamics.h * components[p].row.iter().zip(&v[at..at + 6]).map(|(r, v)| r * v).sum::<f64>()
             };
-            dynamics.self_contact.stiffen(n, &mut self.g, unknowns, &rate);
+            dynamics.self_contact.stiffen(n, &mut self.g, unknowns, &rate, &mut self.scratch);
             self.g_of = 0;
         }
         &self.g

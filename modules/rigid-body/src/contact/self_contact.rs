@@ -4,6 +4,7 @@
 //! Trinkle 1996), without friction. Neighbours in the tree and shapes that overlap in the initial pose are left
 //! alone: a leg may stand in the box that stands for the body.
 
+use crate::dense::{cholesky, cholesky_solve};
 use crate::lcp::{Lemke, Outcome};
 use crate::math::V3;
 use crate::model::Model;
@@ -208,19 +209,41 @@ impl SelfContact {
 
     /// Takes the pressing contacts into account in a compliance matrix g = P·K⁻¹·Pᵀ (n × n): they hold within
     /// the step, so g loses g_ps·D_ss⁻¹·g_sp. `rate(p, v)` is row p of P applied to v.
-    pub fn stiffen(&self, n: usize, g: &mut [f64], unknowns: usize, rate: &dyn Fn(usize, &[f64]) -> f64) {
-        let active: Vec<usize> = (0..self.impulses.len()).filter(|k| self.impulses[*k] > 0.0).collect();
-        let m = self.constraints.len();
-        let d = nalgebra::DMatrix::from_fn(active.len(), active.len(), |r, c| {
-            self.delassus[active[c] * m + active[r]]
-        });
-        let scale = d.diagonal().amax();
-        let regular = d + nalgebra::DMatrix::identity(active.len(), active.len()) * (1e-12 * scale);
-        let Some(factor) = regular.cholesky() else { return };
-        let response = |k: usize| &self.responses[k * unknowns..][..unknowns];
-        let coupling = nalgebra::DMatrix::from_fn(active.len(), n, |s, p| rate(p, response(active[s])));
-        let loss = coupling.transpose() * factor.solve(&coupling);
-        g.iter_mut().zip(loss.iter()).for_each(|(g, l)| *g -= l);
+    pub fn stiffen(
+        &self,
+        n: usize,
+        g: &mut [f64],
+        unknowns: usize,
+        rate: &dyn Fn(usize, &[f64]) -> f64,
+        scratch: &mut Vec<f64>,
+    ) {
+        let active = || (0..self.impulses.len()).filter(|k| self.impulses[*k] > 0.0);
+        let (m, count) = (self.constraints.len(), active().count());
+        // D_ss, then the columns g_sp and D_ss⁻¹·g_sp, one pair for each port component.
+        scratch.clear();
+        for c in active() {
+            // A little compliance, as redundant contacts between two bodies would need.
+            let compliance = 1e-12 * self.delassus[c * m + c];
+            scratch
+                .extend(active().map(|r| self.delassus[c * m + r] + if r == c { compliance } else { 0.0 }));
+        }
+        if !cholesky(count, scratch) {
+            return;
+        }
+        for p in 0..n {
+            for _ in 0..2 {
+                scratch.extend(active().map(|s| rate(p, &self.responses[s * unknowns..][..unknowns])));
+            }
+            let (factor, column) = scratch.split_at_mut(count * count + (2 * p + 1) * count);
+            cholesky_solve(count, &factor[..count * count], column);
+        }
+        let column = |k: usize| &scratch[count * count + k * count..][..count];
+        for c in 0..n {
+            for r in 0..n {
+                let loss = column(2 * r).iter().zip(column(2 * c + 1));
+                g[c * n + r] -= loss.map(|(a, b)| a * b).sum::<f64>();
+            }
+        }
     }
 }
 

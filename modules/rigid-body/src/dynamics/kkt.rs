@@ -73,9 +73,9 @@ impl Kkt {
                 }
             }
             if let Some(j) = model.joint_above[b] {
-                for r in 0..6 {
+                for (r, row) in compliance[j].iter().enumerate() {
                     (0..6).for_each(|c| put(if alive(j, r) { rows[j].child[r][c] } else { 0.0 }));
-                    put(-compliance[j][r].unwrap_or(1.0));
+                    put(-row.unwrap_or(1.0));
                 }
             }
         }

@@ -178,8 +178,8 @@ impl Dynamics {
                 let travel = coordinate(joint, &self.ends, s.angle) - s.angle;
                 self.curvature[j] = travel / self.h - self.rate(j, free, &self.free);
             }
-            for r in 0..6 {
-                let hold = self.rate(j, r, &self.solution) - open[r] / self.h;
+            for (r, open) in open.iter().enumerate() {
+                let hold = self.rate(j, r, &self.free) - open / self.h;
                 self.base_rhs[at + r] = if s.broken || joint.free_row() == Some(r) { 0.0 } else { hold };
             }
         }
@@ -304,8 +304,8 @@ impl Dynamics {
             let at = self.kkt.joint_at[j];
             for (r, open) in gap(joint, &self.ends).iter().enumerate() {
                 self.correction[at + r] = -open / self.h;
-                // Written so that a NaN counts as the worst.
-                if !(open.abs() <= worst.1) {
+                // A NaN is the worst and stays it.
+                if open.abs() > worst.1 || open.is_nan() {
                     worst = (j, open.abs());
                 }
             }

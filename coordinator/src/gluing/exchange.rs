@@ -49,6 +49,8 @@ pub struct Exchange {
     pub x1: Vec<f64>,
     /// Velocity of the bodies at the last trial.
     pub v1: Vec<f64>,
+    /// T, X1 and V1 of the last trial of the bodies.
+    base: [Vec<f64>; 3],
     zeros: Vec<f64>,
     rigid: RigidContact,
     /// Where the time went.
@@ -219,9 +221,29 @@ impl Exchange {
             let out = Answer { x: Some(&mut self.x1), v: Some(&mut self.v1), t: None };
             side.advance_under_force(&mut instances[side.slot], &self.nodes, &self.at, &self.t, None, out)?;
         }
+        for (base, value) in self.base.iter_mut().zip([&self.t, &self.x1, &self.v1]) {
+            base.clear();
+            base.extend_from_slice(value);
+        }
         self.report.evaluations_bodies += 1;
         self.timings.charge(Part::Bodies, start);
         Ok(())
+    }
+
+    /// X1 and V1 for the present T by the bodies' own linearisation about their last trial: no evaluation.
+    pub fn predict_bodies(&mut self) {
+        let [t, x, v] = &self.base;
+        self.x1.copy_from_slice(x);
+        self.v1.copy_from_slice(v);
+        let rate = if self.at.h > 0.0 { 1.0 / self.at.h } else { 0.0 };
+        let n = self.t.len();
+        for (column, (new, old)) in self.estimate.g.chunks_exact(n.max(1)).zip(self.t.iter().zip(t)) {
+            let change = new - old;
+            for ((x, v), g) in self.x1.iter_mut().zip(&mut self.v1).zip(column) {
+                *x += g * change;
+                *v += rate * g * change;
+            }
+        }
     }
 
     /// A trial of the grounds under the motion X1: the wrench of their law goes to `f`.

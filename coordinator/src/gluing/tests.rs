@@ -198,7 +198,7 @@ fn spec(strategy: &str, form: &str, start: &str) -> GluingSpec {
     }
 }
 
-/// Mean and largest number of evaluations, T of foot 0 and the heave at the end.
+/// Mean and largest number of evaluations of the soil, T of foot 0 and the heave at the end.
 fn run(spec: &GluingSpec, factor: f64, h: f64, rock: bool) -> (f64, u32, f64, f64) {
     let duration = if h < 0.002 { 0.02 } else { 0.1 };
     let found = ports();
@@ -217,8 +217,11 @@ fn run(spec: &GluingSpec, factor: f64, h: f64, rock: bool) -> (f64, u32, f64, f6
         exchange.commit(&mut instances).expect("commit");
         // the mean of the feet without offset is the heave at the table's centre
         heave -= (0..6).map(|i| exchange.x1[i]).sum::<f64>() / 6.0;
-        sum += exchange.report.evaluations_bodies;
-        most = most.max(exchange.report.evaluations_bodies);
+        let report = &exchange.report;
+        assert!(strategy.name() == cooperative::NAME || report.evaluations_bodies <= 4, "{report:?}");
+        let evaluations = report.evaluations_soil.max(1);
+        sum += evaluations;
+        most = most.max(evaluations);
     }
     (f64::from(sum) / steps as f64, most, exchange.t[0], heave)
 }
@@ -241,7 +244,8 @@ fn tt_form_reaches_the_reference_within_the_evaluations_of_a_full_newton() {
         let (mean, most, t, _) = run(&spec(iterative::NAME, "tt", "estimate"), factor, h, rock);
         println!("tt factor {factor} h {h} rock {rock}: mean {mean} max {most} T0 {t}");
         assert!((t - t0).abs() < 1e-6, "factor {factor}, h {h}: T0 = {t}, not {t0}");
-        assert!(mean <= 6.0 && most <= 12, "factor {factor}, h {h}: {mean} mean, {most} max");
+        // a plain Newton on both sides needs at most 6 and 12; the check of the bodies adds one of the soil
+        assert!(mean <= 7.0 && most <= 12, "factor {factor}, h {h}: {mean} mean, {most} max");
     }
 }
 

@@ -24,7 +24,7 @@ use terraglue_subsystem::Capabilities;
 pub const NAME: &str = "iterative";
 
 /// Largest κ at which `auto` prefers the X-T form.
-const KAPPA_XT: f64 = 0.3;
+const KAPPA_XT: f64 = 10.0;
 
 /// Which of the two forms runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

@@ -3,6 +3,7 @@
 //! Normal rows: e = x1 − x2, complementary to t_min ≤ T_n ≤ t_max. Tangential and moment rows: the soil's law at
 //! the bodies' motion, r = T_t − F_t(X1, T_n). The linearised problem is solved to the end by an active set; the
 //! step along it is accepted when the energy still falls, else shortened by a bracketed secant (Illinois).
+//! As in the X-T form, the iteration runs inside against the linearised bodies and the bodies confirm.
 
 use super::super::Outcome;
 use super::super::complementarity::{BoundedProblem, BoundedSolver};
@@ -43,9 +44,10 @@ impl TtForm {
         instances: &mut [Instance],
     ) -> Result<Outcome> {
         self.bounds(&exchange.ports);
-        self.evaluate(exchange, instances)?;
         let mut size = f64::INFINITY;
         for _ in 0..=limits.max_iterations {
+            exchange.advance_bodies(instances)?;
+            self.evaluate_grounds(exchange, instances)?;
             let solved = self.newton_step(exchange, instances)?;
             size = max_norm(&self.d);
             if size <= limits.threshold(exchange) {
@@ -54,7 +56,7 @@ impl TtForm {
             if !solved {
                 break;
             }
-            self.step(exchange, instances)?;
+            self.solve_linearised(limits, exchange, instances)?;
         }
         exchange.report.residual = size / exchange.t_ref;
         Ok(Outcome::NotConverged(format!(
@@ -62,6 +64,23 @@ impl TtForm {
             limits.max_iterations,
             limits.threshold(exchange)
         )))
+    }
+
+    /// Newton with X1 linear in T, from the step d: evaluations of the soil only.
+    fn solve_linearised(
+        &mut self,
+        limits: &Limits,
+        exchange: &mut Exchange,
+        instances: &mut [Instance],
+    ) -> Result {
+        for _ in 0..limits.max_iterations {
+            self.step(exchange, instances)?;
+            let solved = self.newton_step(exchange, instances)?;
+            if !solved || max_norm(&self.d) <= 0.1 * limits.threshold(exchange) {
+                break;
+            }
+        }
+        Ok(())
     }
 
     fn bounds(&mut self, ports: &[Port]) {
@@ -80,9 +99,8 @@ impl TtForm {
         }
     }
 
-    /// One evaluation of both sides and the residual of every row.
-    fn evaluate(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result {
-        exchange.advance_bodies(instances)?;
+    /// One evaluation of the soils at the bodies' present motion and the residual of every row.
+    fn evaluate_grounds(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result {
         exchange.advance_grounds_under_force(instances)?;
         self.e.clear();
         for port in &exchange.ports {
@@ -165,7 +183,8 @@ impl TtForm {
             for ((t, base), d) in exchange.t.iter_mut().zip(&self.base).zip(&self.d) {
                 *t = base + share * d;
             }
-            self.evaluate(exchange, instances)?;
+            exchange.predict_bodies();
+            self.evaluate_grounds(exchange, instances)?;
             exchange.report.evaluations_line_search += u32::from(trial > 0);
             let g = self.slope(exchange);
             if start >= 0.0 || (trial == 0 && g <= 0.0) || g.abs() <= 0.5 * start.abs() {

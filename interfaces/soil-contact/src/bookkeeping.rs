@@ -127,7 +127,7 @@ impl Scene<'_> {
             }
             let virgin = patch.curve.virgin(depth);
             let depth = depth / patch.slope;
-            let lower = ground.initial(i, j) + ground.nodes.get(i, j).raised - depth;
+            let lower = ground.reference(i, j, &ground.nodes.get(i, j)) - depth;
             lists.covered.push(Covered { i, j, lower, depth, pressure, virgin });
         }
         let mean = slid.map(|s| s / f64::from(loaded.max(1)));
@@ -146,7 +146,11 @@ impl Scene<'_> {
         book.dissipated += area * shear.dissipated;
         book.elastic += area * (self.laws.shear.elastic_energy(&shear.state) + squeezed);
         let [i, j] = n.index[k];
+        let (initial, height) = (ground.initial(i, j), ground.heights.height(i, j));
         let state = ground.nodes.get_mut(i, j);
+        if state.permanent <= 0.0 {
+            state.raised = height - initial;
+        }
         state.largest = n.z_max[k];
         if depth > n.z_max[k] {
             let (before, p) = (n.z_max[k], n.p_max[k]);

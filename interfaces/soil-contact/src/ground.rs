@@ -10,7 +10,7 @@ const RESERVE_TILES: usize = 256;
 /// What the soil remembers at a node. The default is untouched ground.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct NodeState {
-    /// Reference level minus the height at the start, m: changed by material that came or went.
+    /// Reference level minus the height at the start where the node was pressed (`permanent` > 0), m.
     pub raised: f64,
     /// Depth of the unloaded surface below the reference level, m, vertical.
     pub permanent: f64,
@@ -66,30 +66,42 @@ impl Ground {
         f64::from(self.heights.initial_units(i, j)) * UNIT_M
     }
 
+    /// Reference level of a node, m: the surface itself where the soil was never pressed.
+    #[inline]
+    pub fn reference(&self, i: i32, j: i32, state: &NodeState) -> f64 {
+        if state.permanent > 0.0 { self.initial(i, j) + state.raised } else { self.heights.height(i, j) }
+    }
+
     /// Height of the unloaded surface at a node in units, from its unrounded state.
     #[inline]
     pub fn surface_units(&self, i: i32, j: i32) -> i32 {
         let state = self.nodes.get(i, j);
+        if state.permanent <= 0.0 {
+            return self.heights.units(i, j);
+        }
         let offset = (state.raised - state.permanent) / UNIT_M;
         self.heights.initial_units(i, j) + offset.round() as i32
     }
 
-    /// Books `units` of material that came to an unloaded node (or went, < 0) on its reference level. What comes
-    /// lies loose: it first fills the hollow that was pressed before and takes its compaction away.
+    /// Books `units` of material that came to an unloaded node (or went, < 0). What comes lies loose: it first fills
+    /// the hollow that was pressed before and takes its compaction away; beyond that it raises the reference level.
+    #[inline]
     pub fn add_material(&mut self, i: i32, j: i32, units: i32) {
         if units == 0 || !self.heights.lattice().has(i, j) {
             return;
         }
         self.heights.add_units(i, j, units);
-        let change = f64::from(units) * UNIT_M;
-        let state = self.nodes.get_mut(i, j);
-        if change > 0.0 && state.permanent > 0.0 {
-            let filled = change.min(state.permanent);
-            state.permanent -= filled;
-            state.raised += change - filled;
-            state.curve = [0.0; 2];
-        } else {
-            state.raised += change;
+        if self.nodes.get(i, j).permanent > 0.0 {
+            self.nodes.get_mut(i, j).add_loose(f64::from(units) * UNIT_M);
         }
+    }
+}
+
+impl NodeState {
+    fn add_loose(&mut self, change: f64) {
+        let filled = change.clamp(0.0, self.permanent);
+        self.permanent -= filled;
+        self.raised += change - filled;
+        self.curve = [0.0; 2];
     }
 }

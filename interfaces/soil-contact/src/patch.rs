@@ -180,7 +180,7 @@ impl Patches {
         let state = ground.nodes.get(node.i, node.j);
         let n_z = port.frame[2];
         let [x, y] = ground.heights.lattice().position(node.i, node.j);
-        let reference = ground.initial(node.i, node.j) + state.raised;
+        let reference = ground.reference(node.i, node.j, &state);
         let offset = [x - port.origin[0], y - port.origin[1], node.lower - port.origin[2]];
         let along = |c: usize| port.direction(c).iter().zip(&offset).map(|(a, b)| a * b).sum::<f64>();
         let nodes = &mut self.nodes;

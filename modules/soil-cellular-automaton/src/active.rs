@@ -1,81 +1,149 @@
-//! The list of awake nodes: nothing else is visited.
+//! The nodes that are awake, as one bit per node in the tiles of the ground: nothing else is visited.
 //!
-//! A node's next change is a function of the heights within two nodes of it. It is therefore awake exactly as long
-//! as something in that neighbourhood changed since it was visited; sweeping the list gives what sweeping the
-//! whole field would give.
+//! A node's next change is a function of the heights around it: the eight neighbours for the rule of repose, the
+//! ends of triples two nodes away as well for the rule of curvature. A node is awake for a rule exactly as long
+//! as something there changed since the rule visited it; sweeping the awake nodes gives what sweeping the whole
+//! field would give.
 
-use terraglue_ground::{TILE_EDGE, TileMap};
+use terraglue_ground::{Lattice, TILE_EDGE};
 
-/// Nodes that a change at (0, 0) can set in motion: the eight neighbours (faces, diagonal triples) and the far
-/// ends of triples.
-const REACH: [[i32; 2]; 17] = [
-    [0, 0],
-    [1, 0],
-    [-1, 0],
-    [0, 1],
-    [0, -1],
-    [1, 1],
-    [-1, 1],
-    [1, -1],
-    [-1, -1],
-    [2, 0],
-    [-2, 0],
-    [0, 2],
-    [0, -2],
-    [2, 2],
-    [-2, 2],
-    [2, -2],
-    [-2, -2],
-];
+const EDGE: i32 = TILE_EDGE as i32;
 
-/// Awake nodes, each once.
-#[derive(Clone, Debug, Default)]
-pub struct ActiveList {
-    /// The nodes.
-    pub nodes: Vec<[i32; 2]>,
-    /// Number of this list; cells remember the last list that noted them.
-    pub number: u32,
+/// Which nodes around a change one rule has to visit: per row from −2 to 2 the columns from −2 (bit 0) to 2.
+pub type Reach = [u32; 5];
+/// The eight neighbours.
+pub const NEIGHBOURS: Reach = [0, 0b01110, 0b01110, 0b01110, 0];
+/// The neighbours and the far ends of triples.
+pub const TRIPLES: Reach = [0b10101, 0b01110, 0b11111, 0b01110, 0b10101];
+
+/// Awake nodes of a tile: a word per row, and which rows have any.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct TileBits {
+    /// Bit x of row y.
+    pub rows: [u32; TILE_EDGE as usize],
+    /// Bit y: row y has awake nodes.
+    pub any: u32,
 }
 
-impl ActiveList {
-    /// Empties the list.
-    pub fn restart(&mut self, number: u32) {
-        self.nodes.clear();
-        self.number = number;
+/// Awake nodes of a ground.
+#[derive(Clone, Debug)]
+pub struct ActiveSet {
+    lattice: Lattice,
+    bits: Vec<TileBits>,
+    /// Tiles with awake nodes, in the order in which they woke up.
+    pub tiles: Vec<u32>,
+}
+
+impl ActiveSet {
+    /// Nobody is awake.
+    pub fn new(lattice: Lattice) -> Self {
+        let count = lattice.tile_count();
+        Self { lattice, bits: vec![TileBits::default(); count], tiles: Vec::with_capacity(count) }
     }
 
-    /// Notes a node. `noted` holds for each node the number of the list that noted it last.
-    #[inline]
-    pub fn note(&mut self, noted: &mut TileMap<u32>, i: i32, j: i32) {
-        if !noted.lattice().has(i, j) {
-            return;
-        }
-        let number = noted.get_mut(i, j);
-        if *number != self.number {
-            *number = self.number;
-            self.nodes.push([i, j]);
+    /// Awake nodes of a tile.
+    pub fn tile(&self, tile: u32) -> &TileBits {
+        &self.bits[tile as usize]
+    }
+
+    /// Number of awake nodes.
+    pub fn len(&self) -> usize {
+        self.tiles.iter().flat_map(|t| &self.bits[*t as usize].rows).map(|r| r.count_ones() as usize).sum()
+    }
+
+    /// Whether all sleep.
+    pub fn is_empty(&self) -> bool {
+        self.tiles.is_empty()
+    }
+
+    /// All go to sleep.
+    pub fn clear(&mut self) {
+        for tile in self.tiles.drain(..) {
+            self.bits[tile as usize] = TileBits::default();
         }
     }
 
-    /// Notes all nodes that a change at (i, j) can set in motion.
+    /// Wakes the nodes that a change at node (i, j) of the lattice reaches.
     #[inline]
-    pub fn wake(&mut self, noted: &mut TileMap<u32>, i: i32, j: i32) {
-        let edge = TILE_EDGE as i32;
-        let (x, y) = (i % edge, j % edge);
-        let lattice = noted.lattice();
-        let inner = x >= 2 && y >= 2 && x < edge - 2 && y < edge - 2 && lattice.has(i + 2, j + 2);
-        if !inner {
-            REACH.iter().for_each(|[a, b]| self.note(noted, i + a, j + b));
-            return;
-        }
-        let (tile, k) = lattice.locate(i as u32, j as u32);
-        let numbers = noted.tile_mut(tile);
-        for [a, b] in REACH {
-            let number = &mut numbers[(k as i32 + b * edge + a) as usize];
-            if *number != self.number {
-                *number = self.number;
-                self.nodes.push([i + a, j + b]);
+    pub fn wake(&mut self, i: i32, j: i32, reach: &Reach) {
+        let (a, x) = (i / EDGE, i % EDGE);
+        let rows = j - 2..=j + 2;
+        for (row, pattern) in rows.zip(reach) {
+            if *pattern == 0 || row < 0 || row >= self.lattice.size[1] as i32 {
+                continue;
             }
+            // bit b of the word is column b − 2 of the tile
+            let word = u64::from(*pattern) << x;
+            self.set(a, row, (word >> 2) as u32);
+            if word & 3 != 0 {
+                self.set(a - 1, row, ((word & 3) as u32) << (EDGE - 2));
+            }
+            if word >> (EDGE + 2) != 0 {
+                self.set(a + 1, row, (word >> (EDGE + 2)) as u32);
+            }
+        }
+    }
+
+    #[inline]
+    fn set(&mut self, a: i32, row: i32, columns: u32) {
+        let [nx, _] = self.lattice.tiles();
+        if a < 0 || a >= nx as i32 {
+            return;
+        }
+        let inside = (self.lattice.size[0] as i32 - a * EDGE).min(EDGE) as u32;
+        let columns = columns & (u32::MAX >> (TILE_EDGE - inside));
+        let tile = (row / EDGE) as u32 * nx + a as u32;
+        let bits = &mut self.bits[tile as usize];
+        if columns == 0 {
+            return;
+        }
+        if bits.any == 0 {
+            self.tiles.push(tile);
+        }
+        bits.any |= 1 << (row % EDGE);
+        bits.rows[(row % EDGE) as usize] |= columns;
+    }
+
+    /// Copies the awake tiles into `out`.
+    pub fn save(&self, out: &mut Vec<(u32, TileBits)>) {
+        out.clear();
+        out.extend(self.tiles.iter().map(|t| (*t, self.bits[*t as usize])));
+    }
+
+    /// Back to saved tiles.
+    pub fn restore(&mut self, saved: &[(u32, TileBits)]) {
+        self.clear();
+        for (tile, bits) in saved {
+            self.tiles.push(*tile);
+            self.bits[*tile as usize] = *bits;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn waking_finds_the_nodes_in_reach_and_no_others(i in 0..70i32, j in 0..70i32) {
+            let lattice = Lattice { origin: [0.0; 2], spacing: 1.0, size: [70, 70] };
+            let mut set = ActiveSet::new(lattice);
+            set.wake(i, j, &TRIPLES);
+            let mut expected = 0;
+            for y in 0..70 {
+                for x in 0..70 {
+                    let (dx, dy) = ((x - i).abs(), (y - j).abs());
+                    let far = dx.max(dy) == 2 && (dx == 0 || dy == 0 || dx == dy);
+                    let reached = dx.max(dy) < 2 || far;
+                    expected += usize::from(reached);
+                    let (tile, k) = lattice.locate(x as u32, y as u32);
+                    let awake = set.tile(tile as u32).rows[k / 32] >> (k % 32) & 1 == 1;
+                    prop_assert_eq!(awake, reached);
+                }
+            }
+            prop_assert_eq!(set.len(), expected);
         }
     }
 }

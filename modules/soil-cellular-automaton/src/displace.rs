@@ -1,6 +1,6 @@
 //! Displacement: what a foot presses out of a node goes to the nearest free nodes.
 
-use crate::active::ActiveList;
+use crate::awake::Awake;
 use crate::cell::{Cell, OPEN, QUANTUM};
 use crate::levels::Levels;
 use terraglue_ground::TileMap;
@@ -29,9 +29,7 @@ pub struct Site<'a> {
     /// Heights with load.
     pub levels: &'a mut Levels,
     /// Awake nodes.
-    pub active: &'a mut ActiveList,
-    /// Numbers of the lists that noted the nodes last.
-    pub noted: &'a mut TileMap<u32>,
+    pub awake: &'a mut Awake,
 }
 
 impl Site<'_> {
@@ -64,7 +62,7 @@ impl Site<'_> {
         if moved > 0 {
             self.ground.heights.add_units(i, j, -moved);
             self.levels.add(i, j, -moved);
-            self.active.wake(self.noted, i, j);
+            self.awake.wake(i, j);
         }
         moved
     }
@@ -95,7 +93,7 @@ impl Site<'_> {
         }
         self.ground.add_material(i, j, units);
         self.levels.add(i, j, units);
-        self.active.wake(self.noted, i, j);
+        self.awake.wake(i, j);
         units
     }
 }

@@ -2,13 +2,14 @@
 
 use terraglue_ground::{HeightField, Lattice, TILE_EDGE, TileMap, TileMapSnapshot};
 
-/// Nodes along the edge of a neighbourhood.
-pub const EDGE: usize = 5;
-/// Position of the middle of a neighbourhood.
-pub const MIDDLE: usize = 12;
+const TILE: usize = TILE_EDGE as usize;
+/// Nodes around a tile that a window shows.
+pub const MARGIN: usize = 2;
+/// Nodes along the edge of a window.
+pub const STRIDE: usize = TILE + 2 * MARGIN;
 
-/// Levels of the 5 × 5 nodes around a node, x fastest.
-pub type Neighbourhood = [i32; EDGE * EDGE];
+/// Levels of a tile and of two nodes around it, x fastest; beyond the edge of the ground it repeats the nearest node.
+pub type Window = [i32; STRIDE * STRIDE];
 
 /// Height plus force-equivalent height of every node, units. A tile that is absent has no load.
 #[derive(Clone, Debug)]
@@ -22,10 +23,10 @@ impl Levels {
         Self { tiles: TileMap::new(lattice, 0, reserve) }
     }
 
-    /// Makes the tile of a node present.
+    /// Makes the tile of a node of the lattice present.
+    #[inline]
     pub fn ensure(&mut self, [i, j]: [i32; 2], heights: &HeightField) {
-        let (i, j) = heights.lattice().clamp(i, j);
-        let (tile, _) = heights.lattice().locate(i, j);
+        let (tile, _) = heights.lattice().locate(i as u32, j as u32);
         if self.tiles.tile(tile).is_none() {
             match heights.tile(tile) {
                 Ok(units) => self.tiles.tile_mut(tile).copy_from_slice(units),
@@ -38,7 +39,7 @@ impl Levels {
     #[inline]
     pub fn add(&mut self, i: i32, j: i32, change: i32) {
         let lattice = self.tiles.lattice();
-        if !lattice.has(i, j) {
+        if change == 0 || !lattice.has(i, j) {
             return;
         }
         let (tile, k) = lattice.locate(i as u32, j as u32);
@@ -47,41 +48,61 @@ impl Levels {
         }
     }
 
-    #[inline]
-    fn level(&self, i: i32, j: i32, heights: &HeightField) -> i32 {
-        let (i, j) = heights.lattice().clamp(i, j);
-        let (tile, k) = heights.lattice().locate(i, j);
-        match self.tiles.tile(tile) {
-            Some(levels) => levels[k],
-            None => heights.units(i as i32, j as i32),
+    /// Reads the rows `first` to `last` of a tile, two more on either side, into `out`; left and right of the tile
+    /// only where `sides` says so.
+    pub fn window(
+        &self,
+        tile: u32,
+        [first, last]: [usize; 2],
+        sides: [bool; 2],
+        heights: &HeightField,
+        out: &mut Window,
+    ) {
+        let lattice = heights.lattice();
+        let nx = lattice.tiles()[0];
+        let (a, b) = (tile % nx, tile / nx);
+        let inside = (lattice.size[0] - a * TILE_EDGE).min(TILE_EDGE) as usize;
+        for y in first..=last + 2 * MARGIN {
+            let j =
+                ((b * TILE_EDGE) as i64 + y as i64 - MARGIN as i64).clamp(0, i64::from(lattice.size[1]) - 1);
+            let row = &mut out[y * STRIDE..(y + 1) * STRIDE];
+            self.row(a, j as u32, heights, &mut row[MARGIN..MARGIN + TILE]);
+            let edge = row[MARGIN + inside - 1];
+            row[MARGIN + inside..].fill(edge);
+            if sides[0] {
+                let left = (a > 0).then(|| self.pair(a - 1, j as u32, TILE - MARGIN, heights));
+                let left = left.unwrap_or([row[MARGIN]; MARGIN]);
+                row[..MARGIN].copy_from_slice(&left);
+            }
+            if sides[1] && a + 1 < nx {
+                row[MARGIN + TILE..].copy_from_slice(&self.pair(a + 1, j as u32, 0, heights));
+                if lattice.size[0] - (a + 1) * TILE_EDGE == 1 {
+                    row[STRIDE - 1] = row[STRIDE - 2];
+                }
+            }
         }
     }
 
-    /// The neighbourhood of a node of the lattice; beyond the edge it repeats the nearest node.
     #[inline]
-    pub fn around(&self, i: i32, j: i32, heights: &HeightField) -> Neighbourhood {
-        let mut out = [0; EDGE * EDGE];
-        let edge = TILE_EDGE as i32;
-        let (x, y) = (i % edge, j % edge);
-        let lattice = heights.lattice();
-        let inner = x >= 2 && y >= 2 && x < edge - 2 && y < edge - 2 && lattice.has(i + 2, j + 2);
-        let (tile, k) = lattice.locate(i as u32, j as u32);
-        if let (true, Some(levels)) = (inner, self.tiles.tile(tile)) {
-            let first = k - 2 * TILE_EDGE as usize - 2;
-            let rows = levels[first..first + 4 * TILE_EDGE as usize + EDGE].chunks(TILE_EDGE as usize);
-            for (row, out) in rows.zip(out.as_chunks_mut::<EDGE>().0) {
-                if let Some(five) = row.first_chunk::<EDGE>() {
-                    *out = *five;
-                }
-            }
-            return out;
+    fn row(&self, a: u32, j: u32, heights: &HeightField, out: &mut [i32]) {
+        let tile = (j / TILE_EDGE * heights.lattice().tiles()[0] + a) as usize;
+        let first = (j % TILE_EDGE) as usize * TILE;
+        match (self.tiles.tile(tile), heights.tile(tile)) {
+            (Some(levels), _) => out.copy_from_slice(&levels[first..first + TILE]),
+            (None, Ok(units)) => out.copy_from_slice(&units[first..first + TILE]),
+            (None, Err(units)) => out.fill(units),
         }
-        for (row, out) in out.chunks_exact_mut(EDGE).enumerate() {
-            for (column, out) in out.iter_mut().enumerate() {
-                *out = self.level(i + column as i32 - 2, j + row as i32 - 2, heights);
-            }
+    }
+
+    #[inline]
+    fn pair(&self, a: u32, j: u32, column: usize, heights: &HeightField) -> [i32; MARGIN] {
+        let tile = (j / TILE_EDGE * heights.lattice().tiles()[0] + a) as usize;
+        let first = (j % TILE_EDGE) as usize * TILE + column;
+        match (self.tiles.tile(tile), heights.tile(tile)) {
+            (Some(levels), _) => [levels[first], levels[first + 1]],
+            (None, Ok(units)) => [units[first], units[first + 1]],
+            (None, Err(units)) => [units; MARGIN],
         }
-        out
     }
 
     /// Copies the tiles into `out`.

@@ -22,10 +22,12 @@
 
 mod active;
 mod automaton;
+mod awake;
 mod cell;
 mod displace;
 mod levels;
 mod rules;
+mod sweep;
 mod values;
 
 pub use automaton::{Automaton, Settings};

@@ -208,20 +208,34 @@ impl Sweeper {
     }
 
     /// The rule of curvature: the node as the middle of four triples and the end of eight.
-    fn curvature_change(&self, at: usize, [i, j]: [i32; 2]) -> i32 {
+    fn curvature_change(&self, at: usize, node: [i32; 2]) -> i32 {
         let block = &self.window[at - 2 * STRIDE - 2..at + 2 * STRIDE + 3];
+        let h = |x: usize, y: usize| block[y * STRIDE + x];
+        let lines: [[i32; 5]; 4] = [
+            std::array::from_fn(|s| h(s, 2)),
+            std::array::from_fn(|s| h(2, s)),
+            std::array::from_fn(|s| h(s, s)),
+            std::array::from_fn(|s| h(s, 4 - s)),
+        ];
         let mut change = 0;
-        for (k, [a, b]) in TRIPLES.into_iter().enumerate() {
+        for (k, line) in lines.iter().enumerate() {
+            let curvatures: [i32; 3] = std::array::from_fn(|m| line[m] - 2 * line[m + 1] + line[m + 2]);
             let limit = self.limits.curvature[k / 2];
-            let step = b * STRIDE as i32 + a;
-            let line: [i32; 5] =
-                std::array::from_fn(|s| block[(2 * STRIDE as i32 + 2 + (s as i32 - 2) * step) as usize]);
-            for (middle, share) in [(-1, -1), (0, 2), (1, -1)] {
-                let m = (2 + middle) as usize;
-                let flux = curvature_flux(line[m - 1] - 2 * line[m] + line[m + 1], limit);
-                if flux != 0 {
-                    change += share * self.exchanged(flux, [i + middle * a, j + middle * b], [a, b]);
-                }
+            let [a, b, c] = curvatures.map(i32::abs);
+            if a.max(b).max(c) > limit {
+                change += self.line_change(&curvatures, limit, TRIPLES[k], node);
+            }
+        }
+        change
+    }
+
+    /// What the three triples along one direction that hold the node add to it.
+    fn line_change(&self, curvatures: &[i32; 3], limit: i32, [a, b]: [i32; 2], [i, j]: [i32; 2]) -> i32 {
+        let mut change = 0;
+        for (curvature, (middle, share)) in curvatures.iter().zip([(-1, -1), (0, 2), (1, -1)]) {
+            let flux = curvature_flux(*curvature, limit);
+            if flux != 0 {
+                change += share * self.exchanged(flux, [i + middle * a, j + middle * b], [a, b]);
             }
         }
         change
@@ -238,5 +252,97 @@ impl Sweeper {
         let inlet = |n: [i32; 2]| self.cells.get(n[0], n[1]).inlet();
         let inlet = if flux > 0 { inlet(middle) } else { inlet(ends[0]).min(inlet(ends[1])) };
         flux.clamp(-inlet, inlet)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use terraglue_subsystem::{Terrain, TerrainTile};
+
+    /// Ground of 70 × 50 nodes with blocks of pseudo-random height.
+    struct Rough(u64);
+
+    impl Terrain for Rough {
+        fn origin(&self) -> [f64; 2] {
+            [0.0; 2]
+        }
+        fn spacing(&self) -> f64 {
+            0.01
+        }
+        fn size(&self) -> [u32; 2] {
+            [70, 50]
+        }
+        fn heights(&self, i0: i64, j0: i64, ni: usize, nj: usize, out: &mut [f64]) -> TerrainTile {
+            for (k, out) in out[..ni * nj].iter_mut().enumerate() {
+                let (i, j) = ((i0 + (k % ni) as i64).min(69) / 7, (j0 + (k / ni) as i64).min(49) / 5);
+                let mixed = ((i * 31 + j * 17 + 1) as u64).wrapping_mul(self.0 | 1);
+                *out = ((mixed.wrapping_mul(0x9E37_79B9_7F4A_7C15) >> 40) % 64) as f64 * 1e-3;
+            }
+            TerrainTile::Varied
+        }
+    }
+
+    fn heights(ground: &Ground) -> Vec<i32> {
+        (0..50).flat_map(|j| (0..70).map(move |i| (i, j))).map(|(i, j)| ground.heights.units(i, j)).collect()
+    }
+
+    fn sweeper(ground: &Ground) -> Sweeper {
+        let mut sweeper = Sweeper::new(*ground.heights.lattice(), 8);
+        sweeper.set_limits(0.6, 40.0);
+        sweeper.scan(ground);
+        sweeper
+    }
+
+    fn wake_all(sweeper: &mut Sweeper, backwards: bool) {
+        for k in 0..70 * 50 {
+            let k = if backwards { 70 * 50 - 1 - k } else { k };
+            sweeper.awake.wake(k % 70, k / 70);
+        }
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(12))]
+        #[test]
+        fn neither_order_nor_sleep_can_be_seen(seed in 0..u64::MAX, feet in prop::collection::vec(0..3500i32, 0..40)) {
+            let mut grounds: [Ground; 3] = std::array::from_fn(|_| Ground::new(&Rough(seed)).expect("ground"));
+            let mut sweepers = [0, 1, 2].map(|k| sweeper(&grounds[k]));
+            for (sweeper, ground) in sweepers.iter_mut().zip(&grounds) {
+                for (n, k) in feet.iter().enumerate() {
+                    let room = [0, 700, 9000][n % 3];
+                    let cell = Cell { room, load: if room == 0 { 20_480 } else { 0 }, covered: 1 };
+                    sweeper.put_cell(ground, [k % 70, k / 70], cell);
+                }
+            }
+            let before = grounds[0].heights.total_units();
+            for _ in 0..30 {
+                wake_all(&mut sweepers[1], false);
+                wake_all(&mut sweepers[2], true);
+                for (sweeper, ground) in sweepers.iter_mut().zip(&mut grounds) {
+                    sweeper.sweep(ground);
+                }
+            }
+            prop_assert!(heights(&grounds[0]) == heights(&grounds[1]), "sleep");
+            prop_assert!(heights(&grounds[1]) == heights(&grounds[2]), "order");
+            prop_assert_eq!(grounds[0].heights.total_units(), before);
+            prop_assert_eq!(sweepers[0].counts.gained, 0);
+            prop_assert!(sweepers[0].counts.visited <= sweepers[1].counts.visited);
+        }
+
+        #[test]
+        fn nothing_flows_under_a_foot_that_stands(seed in 0..u64::MAX, foot in 0..3500i32) {
+            let mut ground = Ground::new(&Rough(seed)).expect("ground");
+            let mut sweeper = sweeper(&ground);
+            let (standing, hovering) = ([foot % 70, foot / 70], [(foot + 35) % 70, foot / 70]);
+            sweeper.put_cell(&ground, standing, Cell { room: 0, load: 0, covered: 1 });
+            sweeper.put_cell(&ground, hovering, Cell { room: 5000, load: 0, covered: 1 });
+            let start = [standing, hovering].map(|[i, j]| ground.heights.units(i, j));
+            for _ in 0..100 {
+                sweeper.sweep(&mut ground);
+                prop_assert!(ground.heights.units(standing[0], standing[1]) <= start[0]);
+                prop_assert!(ground.heights.units(hovering[0], hovering[1]) <= start[1] + 5000);
+            }
+        }
     }
 }

@@ -32,8 +32,8 @@ pub fn check_parameters_among(
     modules: &[&str],
 ) -> Result<Config, Box<InputError>> {
     let check = Check { schema, spec, source, modules };
-    check.table("", &spec.parameters)?;
-    let mut values = spec.parameters.clone();
+    let mut values = check.with_own_table();
+    check.table("", &values)?;
     values.retain(|key, value| !check.is_of_another_module(key, value));
     check.take_offered(&mut values)?;
     check.required(&values)?;
@@ -50,6 +50,18 @@ struct Check<'a> {
 }
 
 impl Check<'_> {
+    /// The parameters; a module named by its path has its own sub-table under the name in its schema.
+    fn with_own_table(&self) -> Map<String, Value> {
+        let mut values = self.spec.parameters.clone();
+        let name = self.schema.name.as_str();
+        if self.parameter(name).is_none() && !self.is_prefix(name) {
+            if let Some(Value::Object(own)) = values.remove(name) {
+                values.extend(own);
+            }
+        }
+        values
+    }
+
     fn table(&self, prefix: &str, values: &Map<String, Value>) -> Result<(), Box<InputError>> {
         for (key, value) in values {
             let name = if prefix.is_empty() { key.clone() } else { format!("{prefix}.{key}") };
@@ -134,12 +146,11 @@ impl Check<'_> {
 
     /// Where a parameter was written: in the module's own sub-table, or directly in the subsystem's.
     fn path<'b>(&'b self, name: &'b str) -> Vec<&'b str> {
-        let own: Vec<&str> =
-            [self.spec.name.as_str(), &self.spec.module].into_iter().chain(name.split('.')).collect();
-        if self.source.has(&own) {
-            return own;
-        }
-        std::iter::once(self.spec.name.as_str()).chain(name.split('.')).collect()
+        let below = |table: &[&'b str]| table.iter().copied().chain(name.split('.')).collect::<Vec<_>>();
+        let subsystem = self.spec.name.as_str();
+        let own = [&self.spec.module, &self.schema.name].map(|module| below(&[subsystem, module]));
+        let found = own.into_iter().find(|path| self.source.has(path));
+        found.unwrap_or_else(|| below(&[subsystem]))
     }
 }
 

@@ -231,6 +231,54 @@ fn parameters_of_a_module_are_checked_against_its_schema() {
 }
 
 #[test]
+fn a_module_named_by_its_path_has_a_sub_table_too() {
+    let text = GOOD.replacen("\"rigid-body\"", "\"../my/libbody.so\"", 1);
+    let robot = |own: &str| parse(&text.replacen("mass_kg = 5.0", own, 1)).expect("parses");
+    let s = robot("[robot.rigid-body]\nmass_kg = 7.0");
+    let config = check_parameters(&schema(), &s.subsystems[0], &s.source).expect("good");
+    assert_eq!(config.number("mass_kg"), Ok(7.0));
+    let s = robot("[robot.rigid-body]\nmas_kg = 7.0");
+    let error = check_parameters(&schema(), &s.subsystems[0], &s.source).expect_err("typo");
+    assert_holds(&rendered(&error), &["unknown key `mas_kg`", ":14:1"]);
+}
+
+#[test]
+fn no_damaged_text_makes_the_reader_panic() {
+    let text = format!("# é – ü\n{GOOD}");
+    let outcome = |damaged: &str| parse(damaged).map_err(|e| rendered(&e)).is_ok();
+    let ends = text.char_indices().map(|(i, _)| i);
+    let cut = ends.clone().filter(|end| outcome(&text[..*end])).count();
+    let dropped = ends.filter(|i| {
+        let c = text[*i..].chars().next().map_or(1, char::len_utf8);
+        outcome(&format!("{}{}", &text[..*i], &text[i + c..]))
+    });
+    let dropped = dropped.count();
+    assert!(cut > 0 && dropped > 0, "some damage leaves a scenario");
+    assert!(cut < text.len() / 2 && dropped < text.len(), "and some does not");
+}
+
+#[test]
+fn edits_of_anything_to_anything_do_not_panic() {
+    let keys = [
+        "time",
+        "time.step_s",
+        "time.step_s.x",
+        "event",
+        "event.0",
+        "event.7.at_s",
+        "event.0.set.x.y",
+        "soil",
+    ];
+    let values = ["1", "nan", "\"x\"", "word", "[1, 2", "{ a = 1 }", "[]", "", "-1e400", "2020-01-01"];
+    for (key, value) in keys.iter().flat_map(|k| values.map(|v| (*k, v))) {
+        let sets = [(key.to_owned(), value.to_owned())];
+        if let Err(error) = Scenario::parse(GOOD, "walk.toml", &sets) {
+            assert!(!rendered(&error).is_empty());
+        }
+    }
+}
+
+#[test]
 fn a_required_parameter_is_asked_for() {
     let mut needs = schema();
     needs.parameters[0] = Parameter::of("mass_kg", ParameterType::Number, "mass");

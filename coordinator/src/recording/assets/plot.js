@@ -24,8 +24,10 @@ class Plot {
   static margin = { left: 62, right: 14, top: 16, bottom: 22 };
 
   constructor(parent, panel, axis, times, last) {
-    Object.assign(this, { panel, axis, last, log: panel.log === true });
+    Object.assign(this, { panel, axis, last });
     this.curves = panel.curves.map((c) => ({ ...c, t: times[c.t], y: unpack(c.y), on: true }));
+    // Curves that are zero throughout have no logarithm: they are shown as the zero line that they are.
+    this.log = panel.log === true && this.curves.some((c) => c.y.some((v) => v > 0));
     this.box = htmlElement(parent, "figure", "panel");
     this.box.style.margin = "0";
     this.buildHead();
@@ -170,7 +172,9 @@ class Plot {
     if (this.log) return decadeTicks(...this.range, 6).map((v) => [v, decade(v)]);
     const f = this.prefix.factor;
     let { ticks, decimals } = niceTicks(this.range[0] / f, this.range[1] / f, this.inner / 32);
-    if (!this.panel.unit) ticks = ticks.filter((v) => this.curves.every((c) => !c.steps) || Number.isInteger(v));
+    if (this.curves.every((c) => c.steps) && !this.panel.unit) {
+      [ticks, decimals] = [ticks.filter(Number.isInteger), 0];
+    }
     return ticks.map((v) => [v * f, minus(v.toFixed(decimals))]);
   }
 

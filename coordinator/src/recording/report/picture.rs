@@ -28,7 +28,7 @@ pub(crate) fn draw(ground: &GroundRecord, scale_m: f64) -> Result<Vec<u8>, png::
             let (i, j) = (column * stride, row * stride);
             let share = strongest(ground, i, j, stride) / scale_m.max(1e-12);
             let mut lab = colour_map::colour(share);
-            lab[0] *= 0.62 + 0.38 * relief.light(i, j) / LIGHT[2];
+            lab[0] *= 0.68 + 0.32 * relief.light(i, j) / LIGHT[2];
             rgb.extend_from_slice(&colour_map::to_rgb(lab));
         }
     }
@@ -85,6 +85,9 @@ impl<'a> Relief<'a> {
     /// Lambert's cosine of the light on the surface, 0 … 1.
     fn light(&self, i: usize, j: usize) -> f64 {
         let [sx, sy] = self.slope(i, j).map(|s| s * self.exaggeration);
+        // Walls of prints must not swallow the colour: steep slopes are drawn as if they were 45° at most.
+        let flatten = 1.0 / (1.0 + sx * sx + sy * sy).sqrt();
+        let (sx, sy) = (sx * flatten, sy * flatten);
         let length = (sx * sx + sy * sy + 1.0).sqrt();
         ((-sx * LIGHT[0] - sy * LIGHT[1] + LIGHT[2]) / length).clamp(0.0, 1.0)
     }

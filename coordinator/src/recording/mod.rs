@@ -10,6 +10,20 @@
 //! | `timing.csv` | what a clock measured, apart from everything else |
 //! | `final_ground.asc` | the ground at the end as ESRI ASCII grid |
 //!
+//! Topics of the recording; all messages are JSON, log times are simulated nanoseconds:
+//!
+//! | topic | schema | what |
+//! |---|---|---|
+//! | `/<subsystem>` | its own, with units | `t` and all scalar variables by name; `null` where one has no bound |
+//! | `/tf` | `foxglove.FrameTransforms` | pose of every body, frame `subsystem/body` in `world` |
+//! | `/scene` | `foxglove.SceneUpdate` | shapes, once, locked to the frames |
+//! | `/ground` | `foxglove.Grid` | `height` and `sinkage` as f32: all at the start and the end, in between what changed |
+//! | `/energy` | `terraglue.Energy` | energies and works, the sum and each subsystem, J |
+//! | `/gluing` | `terraglue.StepReport` | the recorded step with its ports, and `since_last`: extremes of all steps between |
+//! | `/events` | `foxglove.Log` | what happened (`t_s`, `what`) |
+//!
+//! A metadata record `terraglue` at the head holds the scenario's text after all edits, strategy and modules.
+//!
 //! [`Recording`] reads any recording, also one that was cut off ([`mend`] gives such a file its footer);
 //! [`report::write`] makes the report from it, [`compare::write`] puts several runs side by side.
 

@@ -190,13 +190,14 @@ class Plot {
     }
   }
 
-  // First, lowest, highest and last value of every pixel column: no peak is lost, no point is drawn twice.
+  // First, lowest, highest and last value of every pixel column: no peak is lost. A point without neighbours
+  // is a dot: the stroke of no length that every piece begins with.
   pathOf(curve) {
     const parts = [];
     let [pen, column, points] = [false, null, []];
     const put = (x, v) => {
       const y = this.y(v).toFixed(1);
-      parts.push(pen ? (curve.steps ? `H${x.toFixed(1)}V${y}` : `L${x.toFixed(1)} ${y}`) : `M${x.toFixed(1)} ${y}`);
+      parts.push(pen ? (curve.steps ? `H${x.toFixed(1)}V${y}` : `L${x.toFixed(1)} ${y}`) : `M${x.toFixed(1)} ${y}h.01`);
       pen = true;
     };
     const flush = () => {

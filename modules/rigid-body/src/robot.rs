@@ -22,6 +22,8 @@ pub(crate) struct Robot {
     dynamics: Dynamics,
     state: State,
     slots: Vec<State>,
+    /// State before a `set`.
+    backup: State,
     variables: Vec<Variable>,
     actions: Vec<Action>,
     ports: Ports,
@@ -65,6 +67,7 @@ impl Robot {
             dynamics,
             state,
             slots,
+            backup: State::default(),
             ports: Ports::default(),
             estimator: Estimator::default(),
             prepared: None,
@@ -338,7 +341,13 @@ impl Subsystem for Robot {
             ));
         }
         self.changed();
-        ids.iter().enumerate().try_for_each(|(k, id)| self.set_one(*id, &values, k))
+        // All or nothing: a refusal leaves the robot as it was.
+        self.backup.copy_from(&self.state);
+        let done = ids.iter().enumerate().try_for_each(|(k, id)| self.set_one(*id, &values, k));
+        if done.is_err() {
+            self.state.copy_from(&self.backup);
+        }
+        done
     }
 
     fn actions(&self) -> &[Action] {
@@ -352,8 +361,8 @@ impl Subsystem for Robot {
         let moves = self.model().joints[joint].moves();
         match what {
             "break" => variables::break_joint(&mut self.state, joint),
-            "block" if moves => variables::block(&mut self.state, joint, true),
-            "release" if moves => variables::block(&mut self.state, joint, false),
+            "block" if moves => variables::block(&mut self.state, joint, true)?,
+            "release" if moves => variables::block(&mut self.state, joint, false)?,
             _ => return Err(unknown()),
         }
         self.changed();

@@ -220,10 +220,7 @@ pub(crate) fn flag_value(model: &Model, state: &State, id: u32) -> Result<bool> 
 /// Writes a flag.
 pub(crate) fn set_flag(model: &Model, state: &mut State, id: u32, value: bool) -> Result {
     match meaning(model, id)? {
-        Meaning::Joint { joint, item: BLOCKED } => {
-            block(state, joint, value);
-            Ok(())
-        }
+        Meaning::Joint { joint, item: BLOCKED } => block(state, joint, value),
         Meaning::Joint { item: BROKEN, .. } => {
             Err(Error::Refused("use the action `break`; nothing mends it".into()))
         }
@@ -232,13 +229,17 @@ pub(crate) fn set_flag(model: &Model, state: &mut State, id: u32, value: bool) -
 }
 
 /// Blocks a joint where it stands, or lets it go.
-pub(crate) fn block(state: &mut State, joint: usize, hold: bool) {
+pub(crate) fn block(state: &mut State, joint: usize, hold: bool) -> Result {
     let j = &mut state.joints[joint];
+    if j.broken {
+        return Err(Error::Refused("the joint is broken: there is nothing to block or release".into()));
+    }
     j.blocked = match (hold, j.blocked) {
         (true, Some(held)) => Some(held),
         (true, None) => Some(j.angle),
         (false, _) => None,
     };
+    Ok(())
 }
 
 /// Removes a joint for ever.

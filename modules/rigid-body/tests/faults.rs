@@ -187,4 +187,10 @@ fn what_cannot_be_set_is_refused() {
     assert!(rig.robot.set(&[motor], Values::Enumeration(&[7])).is_err());
     assert!(rig.robot.act("LF_j9.break", "{}").is_err());
     assert!(rig.commit(&[], &[]).is_err());
+    // All or nothing, and nothing on what is gone.
+    let before = rig.get("LF_j1.max_torque");
+    assert!(rig.robot.set(&[bound, x], Values::F64(&[1.0, 1.0])).is_err());
+    assert_eq!(rig.get("LF_j1.max_torque"), before);
+    rig.robot.act("LF_j1.break", "{}").unwrap();
+    assert!(rig.robot.act("LF_j1.block", "{}").is_err());
 }

@@ -89,7 +89,7 @@ pub(crate) fn best(column: &Column, rows: &[CompareRow]) -> Vec<bool> {
         rows.iter().map(|r| r.failure().is_none().then(|| (column.value)(r)).flatten()).collect();
     let known = || values.iter().flatten().copied();
     let (low, high) = (known().fold(f64::INFINITY, f64::min), known().fold(f64::NEG_INFINITY, f64::max));
-    if !(low < high) {
+    if low >= high {
         return vec![false; rows.len()];
     }
     let wanted = match column.best {

@@ -46,8 +46,8 @@ impl Terrain for Plane {
         [5, 6]
     }
     fn heights(&self, i0: i64, j0: i64, ni: usize, nj: usize, out: &mut [f64]) -> TerrainTile {
-        for k in 0..ni * nj {
-            out[k] = (i0 + (k % ni) as i64) as f64 + 0.1 * (j0 + (k / ni) as i64) as f64;
+        for (k, height) in out[..ni * nj].iter_mut().enumerate() {
+            *height = (i0 + (k % ni) as i64) as f64 + 0.1 * (j0 + (k / ni) as i64) as f64;
         }
         TerrainTile::Varied
     }

@@ -28,7 +28,7 @@ pub fn check_value(parameter: &Parameter, count: Option<usize>, value: &Value) -
             let ok = value.as_object().is_some_and(|o| o.values().all(Value::is_number));
             typed(parameter, count, ok, value)?;
             let values = value.as_object().into_iter().flat_map(|o| o.values());
-            values.map(|v| in_range(parameter, count, v.as_f64().unwrap_or(f64::NAN), v)).collect()
+            values.into_iter().try_for_each(|v| in_range(parameter, count, v.as_f64().unwrap_or(f64::NAN), v))
         }
     }
 }

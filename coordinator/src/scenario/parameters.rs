@@ -54,10 +54,11 @@ impl Check<'_> {
     fn with_own_table(&self) -> Map<String, Value> {
         let mut values = self.spec.parameters.clone();
         let name = self.schema.name.as_str();
-        if self.parameter(name).is_none() && !self.is_prefix(name) {
-            if let Some(Value::Object(own)) = values.remove(name) {
-                values.extend(own);
-            }
+        if self.parameter(name).is_none()
+            && !self.is_prefix(name)
+            && let Some(Value::Object(own)) = values.remove(name)
+        {
+            values.extend(own);
         }
         values
     }

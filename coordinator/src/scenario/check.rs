@@ -46,7 +46,7 @@ fn check_number(
 fn check_list(p: &Parameter, count: Option<usize>, value: &Value) -> Result<(), Complaint> {
     let list = value.as_array().filter(|l| l.iter().all(Value::is_number));
     typed(p, count, list.is_some_and(|l| count.is_none_or(|n| n == l.len())), value)?;
-    list.into_iter().flatten().map(|v| in_range(p, count, v.as_f64().unwrap_or(f64::NAN), value)).collect()
+    list.into_iter().flatten().try_for_each(|v| in_range(p, count, v.as_f64().unwrap_or(f64::NAN), value))
 }
 
 fn check_text(p: &Parameter, count: Option<usize>, value: &Value) -> Result<(), Complaint> {

@@ -11,7 +11,9 @@
 //!   c = h_a − 2h_0 + h_b and e = (|c| − κ_max·d²)₊, q = trunc(e/24) goes from 0 to each end (c < 0), or from each
 //!   end to 0 (c > 0). e/6 would repair a single triple exactly; 1/24 is what twelve overlapping ones admit.
 //!
-//! Both are odd functions of one snapshot: the order in which nodes are visited cannot be seen.
+//! Both are odd functions of one snapshot: the order in which nodes are visited cannot be seen. A flux below 1 µm
+//! does not flow. A sweep applies repose, every second one curvature as well; sweeps per step are bounded, what is
+//! not at rest then goes on in the next step.
 //!
 //! # Load
 //! A pressure p weighs as much as p/(N·ρ·g) of soil, N(z, b) = p_law(z, b)/(ρ·g·z): the force-equivalent height

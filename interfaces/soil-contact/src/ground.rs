@@ -91,7 +91,8 @@ impl Ground {
             return;
         }
         self.heights.add_units(i, j, units);
-        if self.nodes.get(i, j).permanent > 0.0 {
+        let (tile, k) = self.heights.lattice().locate(i as u32, j as u32);
+        if self.nodes.tile(tile).is_some_and(|nodes| nodes[k].permanent > 0.0) {
             self.nodes.get_mut(i, j).add_loose(f64::from(units) * UNIT_M);
         }
     }

@@ -35,8 +35,12 @@ struct Limits {
     curvature: [i32; 2],
 }
 
-/// One of the rules: what it adds to the node at position `at` of a window, which is node (i, j), units.
-type Rule = fn(&Sweeper, usize, [i32; 2]) -> i32;
+/// One of the rules.
+#[derive(Clone, Copy, PartialEq, Eq)]
+enum Rule {
+    Repose,
+    Curvature,
+}
 
 /// Levels, cells and awake nodes of a ground, and the rules that act on them.
 pub struct Sweeper {
@@ -105,7 +109,7 @@ impl Sweeper {
             let (_, [columns, rows]) = lattice.tile_nodes(tile as usize);
             let mut bits = TileBits { any: u32::MAX >> (TILE_EDGE - rows), ..TileBits::default() };
             bits.rows[..rows as usize].fill(u32::MAX >> (TILE_EDGE - columns));
-            for rule in [Self::repose_change as Rule, Self::curvature_change] {
+            for rule in [Rule::Repose, Rule::Curvature] {
                 self.changes.clear();
                 self.evaluate(ground, tile, &bits, rule);
                 for ([i, j], _) in &self.changes {
@@ -120,12 +124,12 @@ impl Sweeper {
     pub fn sweep(&mut self, ground: &mut Ground) -> i32 {
         self.counts.sweeps += 1;
         std::mem::swap(&mut self.awake.repose, &mut self.spare);
-        let first = self.pass(ground, Self::repose_change);
+        let first = self.pass(ground, Rule::Repose);
         if self.counts.sweeps.is_multiple_of(2) {
             return first;
         }
         std::mem::swap(&mut self.awake.curvature, &mut self.spare);
-        let second = self.pass(ground, Self::curvature_change);
+        let second = self.pass(ground, Rule::Curvature);
         first.max(second)
     }
 
@@ -159,19 +163,50 @@ impl Sweeper {
         self.levels.window(tile, rows, sides, &ground.heights, &mut self.window);
         let nx = ground.heights.lattice().tiles()[0];
         let corner = [(tile % nx * TILE_EDGE) as i32, (tile / nx * TILE_EDGE) as i32];
+        let too_curved = match rule {
+            Rule::Repose => [u64::MAX; STRIDE],
+            Rule::Curvature => self.too_curved(rows, columns),
+        };
         for y in rows[0]..=rows[1] {
-            let mut row = bits.rows[y];
-            self.counts.visited += u64::from(row.count_ones());
+            self.counts.visited += u64::from(bits.rows[y].count_ones());
+            let near = too_curved[y + 1] | too_curved[y + 2] | too_curved[y + 3];
+            let mut row = bits.rows[y] & ((near << 1 | near | near >> 1) >> MARGIN) as u32;
             while row != 0 {
                 let x = row.trailing_zeros() as usize;
                 row &= row - 1;
                 let node = [corner[0] + x as i32, corner[1] + y as i32];
-                let change = rule(self, (y + MARGIN) * STRIDE + x + MARGIN, node);
+                let at = (y + MARGIN) * STRIDE + x + MARGIN;
+                let change = match rule {
+                    Rule::Repose => self.repose_change(at, node),
+                    Rule::Curvature => self.curvature_change(at, node),
+                };
                 if change != 0 {
                     self.changes.push((node, change));
                 }
             }
         }
+    }
+
+    /// Per row of the window a bit for each node in the middle of a triple with too much curvature, among the rows
+    /// `first` to `last` of the tile and the `columns`, one more on every side: only next to such a node does the rule
+    /// do anything.
+    fn too_curved(&self, [first, last]: [usize; 2], columns: u32) -> [u64; STRIDE] {
+        let (left, right) = (columns.trailing_zeros() as usize, 31 - columns.leading_zeros() as usize);
+        let [straight, diagonal] = self.limits.curvature;
+        let mut bits = [0; STRIDE];
+        for (y, bits) in bits.iter_mut().enumerate().skip(first + 1).take(last - first + 3) {
+            let [below, here, above] = [y - 1, y, y + 1].map(|y| &self.window[y * STRIDE..(y + 1) * STRIDE]);
+            for x in left + 1..=right + 3 {
+                let twice = 2 * here[x];
+                let along = (here[x - 1] + here[x + 1] - twice).abs();
+                let across = (below[x] + above[x] - twice).abs();
+                let rising = (below[x - 1] + above[x + 1] - twice).abs();
+                let falling = (below[x + 1] + above[x - 1] - twice).abs();
+                let too_much = along.max(across) > straight || rising.max(falling) > diagonal;
+                *bits |= u64::from(too_much) << x;
+            }
+        }
+        bits
     }
 
     fn apply(&mut self, ground: &mut Ground, [i, j]: [i32; 2], change: i32) {

@@ -1,6 +1,15 @@
 //! A foot at rest: the soil carries exactly its weight and it does not creep.
 
+use std::sync::Arc;
+use terraglue::Testbed;
+use terraglue::host::Library;
+use terraglue::testbed::Options;
 use terraglue_acceptance::{SOILS, build, foot, scenario, steps};
+use terraglue_soil_bekker::SoilBekker;
+use terraglue_subsystem::{
+    Capabilities, Config, Estimate, Host, Input, Law, Module, Motion, Response, Result, Schema, Step,
+    Subsystem,
+};
 
 const WEIGHT: f64 = 5.0 * 9.81;
 
@@ -40,5 +49,51 @@ fn columns_hold_the_foot_to_a_picometre() {
         println!("{strategy} columns: error {error:e}, drift {drift:e} m, sinkage {sinkage} m");
         assert!(error <= 1e-8, "{strategy}: relative error {error:e}");
         assert!(drift <= 1e-12, "{strategy}: drift {drift:e} m");
+    }
+}
+
+/// The negative control: a soil that hands the rigid estimate back, T1 = T*.
+struct Unyielding(Box<dyn Subsystem>);
+
+impl Module for Unyielding {
+    fn schema() -> Schema {
+        Schema { name: "soil-unyielding".into(), ..SoilBekker::schema() }
+    }
+    fn instantiate(config: &Config, host: Arc<dyn Host>) -> Result<Box<dyn Subsystem>> {
+        Ok(Box::new(Self(SoilBekker::instantiate(config, host)?)))
+    }
+}
+
+impl Subsystem for Unyielding {
+    fn capabilities(&self) -> Capabilities {
+        Capabilities::SOLVE | Capabilities::FORCE
+    }
+    fn set_ports(&mut self, step: &Step, laws: &mut [Law], now: &mut Response) -> Result {
+        self.0.set_ports(step, laws, now)
+    }
+    fn solve_compatibility(&mut self, step: &Step, estimate: &Estimate, out: &mut Response) -> Result {
+        out.t.copy_from_slice(estimate.t_star);
+        [&mut *out.x, &mut *out.v, &mut *out.a].into_iter().for_each(|values| values.fill(0.0));
+        out.reached = step.t + step.h;
+        Ok(())
+    }
+    fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result {
+        self.0.advance(step, input, out)
+    }
+    fn commit(&mut self, step: &Step, t: &[f64], partner: &Motion) -> Result {
+        self.0.commit(step, t, partner)
+    }
+}
+
+#[test]
+fn the_negative_control_never_sinks() {
+    let soil = "[soil]\nmodule = \"soil-unyielding\"\nparameters = \"lunar_nominal_Apollo\"";
+    let library = Library::new().with::<Unyielding>();
+    let built = Testbed::build_with(&scenario(&foot("cooperative", soil)), &Options::default(), &library);
+    let mut testbed = built.unwrap_or_else(|e| panic!("{e}"));
+    for _ in 0..2000 {
+        steps(&mut testbed, 1);
+        let sinkage = 0.03 - testbed.read("foot.ball.z").expect("height");
+        assert!(sinkage.abs() < 1e-9, "sank by {sinkage} m");
     }
 }

@@ -37,6 +37,7 @@ pub struct Side {
     v: Vec<f64>,
     a: Vec<f64>,
     t: Vec<f64>,
+    given_t: Vec<f64>,
     partner_x: Vec<f64>,
     partner_v: Vec<f64>,
     matrix: Vec<f64>,
@@ -231,28 +232,10 @@ impl Side {
         partner: Option<(&[f64], &[f64])>,
         out: Answer,
     ) -> Result {
-        Self::gather(&mut self.t, &self.index, t);
-        self.matrix.clear();
-        self.matrix.extend_from_slice(&self.t);
-        if let Some((x, v)) = partner {
-            Self::gather(&mut self.partner_x, &self.index, x);
-            Self::gather(&mut self.partner_v, &self.index, v);
-        }
-        let motion = partner.map(|_| Motion { x: &self.partner_x, v: &self.partner_v });
-        let input = Input::Force { t: &self.matrix, hold: super::HOLD, motion };
-        let step = Self::step(&self.ports, self.index.len(), nodes, at);
-        let mut response = Response {
-            x: &mut self.x,
-            v: &mut self.v,
-            a: &mut self.a,
-            t: &mut self.t,
-            reached: at.t + at.h,
-            flags: 0,
-        };
-        let progress = instance.advance(&step, &input, &mut response)?;
-        complete(instance, "advance", progress)?;
-        self.answer(out);
-        Ok(())
+        self.given_t.clear();
+        self.given_t.resize(self.n(), 0.0);
+        Self::gather(&mut self.given_t, &self.index, t);
+        self.advance(instance, nodes, at, Given::Force { with_motion: partner.is_some() }, partner, out)
     }
 
     /// A trial of a soil under the bodies' motion.
@@ -264,9 +247,31 @@ impl Side {
         partner: (&[f64], &[f64]),
         out: Answer,
     ) -> Result {
-        Self::gather(&mut self.partner_x, &self.index, partner.0);
-        Self::gather(&mut self.partner_v, &self.index, partner.1);
-        let input = Input::Motion(Motion { x: &self.partner_x, v: &self.partner_v });
+        self.advance(instance, nodes, at, Given::Motion, Some(partner), out)
+    }
+
+    fn advance(
+        &mut self,
+        instance: &mut Instance,
+        nodes: &[Node],
+        at: &Instant,
+        given: Given,
+        partner: Option<(&[f64], &[f64])>,
+        out: Answer,
+    ) -> Result {
+        if let Some((x, v)) = partner {
+            Self::gather(&mut self.partner_x, &self.index, x);
+            Self::gather(&mut self.partner_v, &self.index, v);
+        }
+        let motion = Motion { x: &self.partner_x, v: &self.partner_v };
+        let input = match given {
+            Given::Motion => Input::Motion(motion),
+            Given::Force { with_motion } => Input::Force {
+                t: &self.given_t,
+                hold: super::HOLD,
+                motion: with_motion.then_some(motion),
+            },
+        };
         let step = Self::step(&self.ports, self.index.len(), nodes, at);
         let mut response = Response {
             x: &mut self.x,
@@ -356,6 +361,15 @@ fn complete(instance: &Instance, function: &'static str, progress: Progress) -> 
             format!("ended the step early, at t = {reached_s} s; make time.step_s shorter"),
         )),
     }
+}
+
+/// What a trial is given.
+#[derive(Clone, Copy)]
+enum Given {
+    /// The wrench in `given_t`.
+    Force { with_motion: bool },
+    /// The partner's motion.
+    Motion,
 }
 
 /// Where a trial's answer goes; packed over the group.

@@ -46,6 +46,16 @@ impl Limits {
     fn threshold(&self, exchange: &Exchange) -> f64 {
         self.tolerance * exchange.t_ref.max(linear::max_norm(&exchange.t))
     }
+
+    /// The end of an iteration that did not reach its threshold; `measure` (N) is what was left.
+    fn give_up(&self, exchange: &mut Exchange, what: &str, measure: f64) -> Outcome {
+        exchange.report.residual = measure / exchange.t_ref;
+        Outcome::NotConverged(format!(
+            "{what} = {measure:.3e} N after {} iterations, tolerance {:.3e} N",
+            self.max_iterations,
+            self.threshold(exchange)
+        ))
+    }
 }
 
 /// The strategy with its buffers.

@@ -58,12 +58,7 @@ impl TtForm {
             }
             self.solve_linearised(limits, exchange, instances)?;
         }
-        exchange.report.residual = size / exchange.t_ref;
-        Ok(Outcome::NotConverged(format!(
-            "T-T form: |Λ·e| = {size:.3e} N after {} iterations, tolerance {:.3e} N",
-            limits.max_iterations,
-            limits.threshold(exchange)
-        )))
+        Ok(limits.give_up(exchange, "T-T form: |Λ·e|", size))
     }
 
     /// Newton with X1 linear in T, from the step d: evaluations of the soil only.

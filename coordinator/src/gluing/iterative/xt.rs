@@ -48,12 +48,7 @@ impl XtForm {
         if norm <= limits.threshold(exchange) {
             return Ok(self.converged(exchange, norm));
         }
-        exchange.report.residual = norm / exchange.t_ref;
-        Ok(Outcome::NotConverged(format!(
-            "X-T form: |T - F| = {norm:.3e} N after {} iterations, tolerance {:.3e} N",
-            limits.max_iterations,
-            limits.threshold(exchange)
-        )))
+        Ok(limits.give_up(exchange, "X-T form: |T - F|", norm))
     }
 
     /// Newton on T − F(X1(T)) = 0 with X1 linear in T: evaluations of the soil only.

@@ -39,6 +39,7 @@ pub fn summary(s: &Summary) -> Table {
     row("simulated", format!("{:.3} s in {} steps", s.simulated_s, s.steps));
     row("real-time factor", format!("{:.2} ({:.2} s of wall time)", s.real_time_factor, s.wall_s));
     row("distance", distance(s));
+    row("height gained", s.height_gained_m.map_or_else(none, |h| format!("{:+.1} mm{}", 1e3 * h, stall(s))));
     row("largest roll, pitch", format!("{}, {}", degrees(s.max_roll_rad), degrees(s.max_pitch_rad)));
     row("largest sinkage", s.max_sinkage_m.map_or_else(none, |z| format!("{:.1} mm", 1e3 * z)));
     row("energy at the motors", format!("{:.1} J", s.energy_j));
@@ -52,6 +53,12 @@ pub fn summary(s: &Summary) -> Table {
     row("largest action–reaction gap", format!("{:.2e} N", s.max_action_reaction_gap_n));
     row("error of the soil's mass", s.soil_mass_error_relative.map_or_else(none, |e| format!("{e:.1e}")));
     t
+}
+
+fn stall(s: &Summary) -> String {
+    s.stalled.map_or_else(String::new, |p| {
+        format!("; stalled since {:.1} s at x = {:.2} m, y = {:.2} m", p.t_s, p.x_m, p.y_m)
+    })
 }
 
 fn none() -> String {

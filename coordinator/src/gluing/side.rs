@@ -266,11 +266,9 @@ impl Side {
         let motion = Motion { x: &self.partner_x, v: &self.partner_v };
         let input = match given {
             Given::Motion => Input::Motion(motion),
-            Given::Force { with_motion } => Input::Force {
-                t: &self.given_t,
-                hold: super::HOLD,
-                motion: with_motion.then_some(motion),
-            },
+            Given::Force { with_motion } => {
+                Input::Force { t: &self.given_t, hold: super::HOLD, motion: with_motion.then_some(motion) }
+            }
         };
         let step = Self::step(&self.ports, self.index.len(), nodes, at);
         let mut response = Response {

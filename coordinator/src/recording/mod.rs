@@ -27,6 +27,7 @@
 //! [`Recording`] reads any recording, also one that was cut off ([`mend`] gives such a file its footer);
 //! [`report::write`] makes the report from it, [`compare::write`] puts several runs side by side.
 
+mod body_track;
 mod csv;
 mod ground_grid;
 mod json;
@@ -55,6 +56,6 @@ pub use mend::mend;
 pub use messages::{GluingRecord, PortRecord, WindowRecord};
 pub use reader::{GroundRecord, Header, PoseSeries, Recording};
 pub use recorder::{Recorder, RecorderOptions};
-pub use summary::{FailureRecord, Status, Summary};
+pub use summary::{FailureRecord, Stall, Status, Summary};
 pub use summary_observer::SummaryObserver;
 pub use table::Table;

@@ -121,6 +121,21 @@ pub struct Summary {
     pub energy_balance_j: f64,
     /// CPU time per step, s.
     pub cpu_per_step_s: f64,
+    /// Height of the reported body at the end above that at the start, m.
+    pub height_gained_m: Option<f64>,
+    /// Where the body has stood still, if it did so for the last 5 s or longer; null: it came on.
+    pub stalled: Option<Stall>,
+}
+
+/// Since when and where less than a tenth of the commanded distance was made.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Stall {
+    /// Simulated time, s.
+    pub t_s: f64,
+    /// World x of the body then, m.
+    pub x_m: f64,
+    /// World y of the body then, m.
+    pub y_m: f64,
 }
 
 impl Summary {

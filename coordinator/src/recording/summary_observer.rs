@@ -3,12 +3,13 @@
 use crate::error::{Error, Result};
 use crate::gluing::StepReport;
 use crate::observer::{Happening, Observer, SubsystemView, View};
+use crate::recording::body_track::BodyTrack;
 use crate::recording::ground_grid::GroundGrid;
 use crate::recording::layout::{RECORDING, REPORT};
 use crate::recording::snapshot::{failed, real, real_id};
 use crate::recording::summary::{FailureRecord, Status, Summary};
 use crate::scenario::Scenario;
-use terraglue_subsystem::{Kind, Pose, ValuesMut};
+use terraglue_subsystem::{Kind, ValuesMut};
 
 /// Follows a run and adds up its figures.
 pub struct SummaryObserver {
@@ -29,18 +30,6 @@ pub struct SummaryObserver {
     energy_j: f64,
     energy_book: Option<(f64, f64)>,
     gluing: GluingFigures,
-}
-
-/// Displacement and attitude of the reported body.
-struct BodyTrack {
-    subsystem: usize,
-    body: usize,
-    start: [f64; 2],
-    heading: [f64; 2],
-    mass_kg: f64,
-    distance_m: f64,
-    max_roll_rad: f64,
-    max_pitch_rad: f64,
 }
 
 /// Integral of a variable over time, taken with its value at the start of each step.
@@ -79,59 +68,6 @@ struct GluingFigures {
     max_action_reaction_gap_n: f64,
     max_estimate_gap_n: f64,
     interface_work_error_j: f64,
-}
-
-/// Roll, pitch and yaw (z-y-x Euler angles, rad) of a unit quaternion w, x, y, z.
-pub(crate) fn roll_pitch_yaw(q: &[f64; 4]) -> [f64; 3] {
-    let [w, x, y, z] = *q;
-    let roll = libm::atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y));
-    let pitch = libm::asin((2.0 * (w * y - z * x)).clamp(-1.0, 1.0));
-    let yaw = libm::atan2(2.0 * (w * z + x * y), 1.0 - 2.0 * (y * y + z * z));
-    [roll, pitch, yaw]
-}
-
-/// Subsystem and body by `subsystem.body`; the first body of the first robot where no name is given.
-pub(crate) fn find_body(view: &View, name: Option<&str>) -> Option<(usize, usize)> {
-    let Some(name) = name else {
-        let robot =
-            view.subsystems.iter().position(|s| s.kind == Kind::Robot && !s.scene.bodies.is_empty())?;
-        return Some((robot, 0));
-    };
-    let (subsystem, body) = name.split_once('.')?;
-    let s = view.subsystems.iter().position(|s| s.name == subsystem)?;
-    let b = view.subsystems[s].scene.bodies.iter().position(|b| b.name == body)?;
-    Some((s, b))
-}
-
-impl BodyTrack {
-    fn find(view: &View, name: Option<&str>) -> Option<Self> {
-        let (subsystem, body) = find_body(view, name)?;
-        let s = &view.subsystems[subsystem];
-        let pose = &s.body_states.get(body)?.world_from_body;
-        let yaw = roll_pitch_yaw(&pose.orientation)[2];
-        Some(Self {
-            subsystem,
-            body,
-            start: [pose.position[0], pose.position[1]],
-            heading: [libm::cos(yaw), libm::sin(yaw)],
-            mass_kg: s.scene.bodies.iter().map(|b| b.mass).sum(),
-            distance_m: 0.0,
-            max_roll_rad: 0.0,
-            max_pitch_rad: 0.0,
-        })
-    }
-
-    fn follow(&mut self, view: &View) {
-        let states = view.subsystems[self.subsystem].body_states;
-        let Some(Pose { position, orientation }) = states.get(self.body).map(|s| s.world_from_body) else {
-            return;
-        };
-        self.distance_m =
-            (position[0] - self.start[0]) * self.heading[0] + (position[1] - self.start[1]) * self.heading[1];
-        let [roll, pitch, _] = roll_pitch_yaw(&orientation);
-        self.max_roll_rad = self.max_roll_rad.max(roll.abs());
-        self.max_pitch_rad = self.max_pitch_rad.max(pitch.abs());
-    }
 }
 
 impl Deepest {
@@ -331,6 +267,8 @@ impl SummaryObserver {
             interface_work_error_j: g.interface_work_error_j,
             energy_balance_j: self.energy_book.map_or(0.0, |(first, last)| last - first),
             cpu_per_step_s: per(cpu_s, self.steps as f64),
+            height_gained_m: body.map(BodyTrack::height_gained_m),
+            stalled: body.and_then(BodyTrack::stall),
         }
     }
 }
@@ -346,7 +284,7 @@ impl Observer for SummaryObserver {
         self.mass_error = soils(view).find_map(mass);
         self.motors = view.subsystems.iter().enumerate().filter_map(|(k, s)| Motors::find(k, s)).collect();
         if let Some(body) = &mut self.body {
-            body.follow(view);
+            body.follow(view, 0.0);
         }
         self.follow_energy(view)
     }
@@ -354,12 +292,12 @@ impl Observer for SummaryObserver {
     fn stepped(&mut self, view: &View) -> Result {
         (self.steps, self.t_s) = (view.step_index, view.t_s);
         self.gluing.add(view.gluing);
-        if let Some(body) = &mut self.body {
-            body.follow(view);
-        }
         if let Some(speed) = &mut self.speed {
             speed.sum += speed.before * view.h_s;
             speed.before = real(&view.subsystems[speed.subsystem], speed.id, view.t_s)?;
+        }
+        if let Some(body) = &mut self.body {
+            body.follow(view, self.speed.as_ref().map_or(0.0, |s| s.sum));
         }
         if let Some(sinkage) = &mut self.sinkage {
             sinkage.follow(view)?;

@@ -1,9 +1,9 @@
 //! The plots of a report, each from what the recording happens to hold; what is missing is left out.
 
+use crate::recording::body_track::roll_pitch_yaw;
 use crate::recording::reader::Recording;
 use crate::recording::report::figure::{Curve, Figure, Panel};
 use crate::recording::report::footprints::Leg;
-use crate::recording::summary_observer::roll_pitch_yaw;
 
 /// All figures that the recording has data for.
 pub(crate) fn all(recording: &Recording, legs: &[Leg]) -> Vec<Figure> {

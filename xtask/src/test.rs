@@ -7,7 +7,7 @@ use std::path::PathBuf;
 /// Builds once, then runs Rust tests, Python tests and the quick figures.
 pub fn test() -> Outcome {
     must(&mut cargo(&["build", "--workspace"]))?;
-    must(&mut cargo(&["test", "--workspace"]))?;
+    must(&mut cargo(&["test", "--workspace", "--no-fail-fast"]))?;
     let python = virtual_environment()?;
     let tests = ["-m", "pytest", "-q", "tests/python"];
     must(command(python, &tests).env("TERRAGLUE_BIN", program("debug")).env("PYTHONDONTWRITEBYTECODE", "1"))?;

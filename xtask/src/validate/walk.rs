@@ -80,13 +80,13 @@ fn same_bytes(context: &Context, soil: &str) -> Outcome<Figure> {
     Ok(Figure::new(format!("walk.{soil}.different_bytes"), different as f64, Limit::Equal(0.0), what))
 }
 
-/// CPU time of the stepping thread, median of five short runs one after the other.
+/// CPU time of the stepping thread, median of five runs one after the other.
 fn speed(context: &Context, soil: &str, strategy: &str) -> Outcome<Vec<Figure>> {
     let id = format!("walk.{soil}.{strategy}");
     if !context.timing {
         return Ok(vec![Figure::skipped(format!("{id}.real_time_factor"), "timing was left out")]);
     }
-    let duration = if context.quick { "0.5" } else { "2" };
+    let duration = if context.quick { "2" } else { "10" };
     let calibration = calibration_s();
     let mut per_step = Vec::new();
     let mut factors = Vec::new();

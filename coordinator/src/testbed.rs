@@ -165,33 +165,43 @@ impl Testbed {
         let start = Clock::now();
         self.advance_unglued(h, end)?;
         self.timings.charge(Part::Unglued, start);
+        let outcome = self.glue(h)?;
+        if outcome == Outcome::Converged {
+            self.commit_unglued(h, end)?;
+            self.read_states()?;
+        }
+        Ok(outcome)
+    }
+
+    /// (4) The group of glued subsystems: the five steps of the paper.
+    fn glue(&mut self, h: f64) -> Result<Outcome> {
         let at = Instant { t: self.t, h, index: self.index, trial: 0, epoch: 0 };
-        if let Some(group) = &mut self.group {
-            // paper, step 1: collision detection and the constraints of rigid contact
-            let start = Clock::now();
-            let now = Now { t: self.t, h, gravity: self.gravity, margin: self.contact_margin_m };
-            let (members, instances) = (&self.members, &mut self.instances);
-            let ports = self.detector.detect(
-                &now,
-                |slot| &members[slot as usize].states,
-                |slot| instances[slot as usize].subsystem(),
-            )?;
-            group.exchange.begin(at, ports);
-            self.timings.charge(Part::Contact, start);
-            group.exchange.set_ports(instances)?;
-            group.measure_gap();
-            // paper, steps 2 to 4: estimate, compatibility, the bodies under the soil's force
-            let outcome = group.strategy.solve(&mut group.exchange, instances)?;
-            if outcome != Outcome::Converged {
-                return Ok(outcome);
-            }
-            // paper, step 5: integrate
+        let start = Clock::now();
+        // step 1: collision detection and the constraints of rigid contact
+        self.detect_contacts(h)?;
+        let Some(group) = &mut self.group else { return Ok(Outcome::Converged) };
+        let (ports, instances) = (self.detector.ports(), &mut self.instances);
+        group.exchange.begin(at, ports);
+        self.timings.charge(Part::Contact, start);
+        group.exchange.set_ports(instances)?;
+        group.measure_gap();
+        // steps 2 to 4: estimate, compatibility, the bodies under the soil's force
+        let outcome = group.strategy.solve(&mut group.exchange, instances)?;
+        if outcome == Outcome::Converged {
+            // step 5: integrate
             group.exchange.commit(instances)?;
             group.describe(ports, self.halvings);
         }
-        self.commit_unglued(h, end)?;
-        self.read_states()?;
-        Ok(Outcome::Converged)
+        Ok(outcome)
+    }
+
+    /// Where bodies may touch ground in a step of length h; the ports are then in the detector.
+    fn detect_contacts(&mut self, h: f64) -> Result {
+        let now = Now { t: self.t, h, gravity: self.gravity, margin: self.contact_margin_m };
+        let (members, instances) = (&self.members, &self.instances);
+        let states = |slot: u32| members[slot as usize].states.as_slice();
+        self.detector.detect(&now, states, |slot| instances[slot as usize].subsystem())?;
+        Ok(())
     }
 
     /// (3) A trial of every subsystem without glue.

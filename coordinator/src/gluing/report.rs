@@ -19,7 +19,8 @@ pub struct StepReport {
     pub converged: bool,
     /// Whether the X-T form ran (else T-T, or a single pass).
     pub xt_form: bool,
-    /// Largest |x1 − x2| along n over the closed ports after commit, m.
+    /// Largest |x1 − x2| along n over the ports that were closed after the commit before, m: what the soil itself
+    /// says of its surface under the body, so it holds what the lattice makes of a sliding foot too.
     pub max_gap_m: f64,
     /// Largest difference of the wrench on the two sides along n, N.
     pub max_action_reaction_gap_n: f64,

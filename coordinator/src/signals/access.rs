@@ -90,17 +90,11 @@ impl VariableRef {
         }
     }
 
-    /// Sets a value from a scenario, an operator or a script. Refuses with the reason: read-only, out of range,
-    /// wrong type, or too late.
-    pub fn set(self, instances: &mut [Instance], started: bool, value: &Value) -> crate::Result<Reply> {
-        let instance = &mut instances[self.slot];
-        let v = instance.subsystem().variables()[self.variable].clone();
-        match v.effect {
-            Effect::ReadOnly => return refuse(format!("`{}` is read-only", v.name)),
-            Effect::NeedsReset if started => {
-                return refuse(format!("`{}` can only be set before the first step", v.name));
-            }
-            _ => {}
+    /// What a value from a scenario, an operator or a script is as a number of this variable; the reason where
+    /// it cannot be set: read-only, out of range or of the wrong type. Texts have no number.
+    fn number_for(v: &Variable, value: &Value) -> std::result::Result<Option<f64>, String> {
+        if v.effect == Effect::ReadOnly {
+            return Err(format!("`{}` is read-only", v.name));
         }
         let refused = || {
             let range = if v.min > f64::NEG_INFINITY || v.max < f64::INFINITY {
@@ -108,63 +102,83 @@ impl VariableRef {
             } else {
                 String::new()
             };
-            refuse(format!("`{}` takes {}{range}, not {value}", v.name, type_name(&v)))
+            format!("`{}` takes {}{range}, not {value}", v.name, type_name(v))
         };
-        if let ValueType::String = v.value_type {
-            let Some(text) = value.as_str() else { return refused() };
-            return instance.set(&[v.id], Values::String(&[text.to_owned()]));
-        }
-        let number = match value {
-            Value::Bool(b) if v.value_type == ValueType::Bool => f64::from(u8::from(*b)),
-            Value::String(name) => {
-                let Some(k) = v.enumeration.iter().position(|n| n == name) else { return refused() };
-                k as f64
+        let number = match (value, v.value_type) {
+            (Value::String(_), ValueType::String) => return Ok(None),
+            (_, ValueType::String | ValueType::Binary | ValueType::Clock) => return Err(refused()),
+            (Value::Bool(b), ValueType::Bool) => f64::from(u8::from(*b)),
+            (Value::String(name), _) => {
+                v.enumeration.iter().position(|n| n == name).ok_or_else(refused)? as f64
             }
-            other => {
-                let Some(number) = other.as_f64() else { return refused() };
-                number
-            }
+            (other, _) => other.as_f64().ok_or_else(refused)?,
         };
-        if !(number >= v.min && number <= v.max) {
-            return refused();
+        if number >= v.min && number <= v.max && fits(v, number) { Ok(Some(number)) } else { Err(refused()) }
+    }
+
+    /// Why a value could never be set, if so.
+    pub fn objection(self, instances: &[Instance], value: &Value) -> Option<String> {
+        Self::number_for(self.describe(instances), value).err()
+    }
+
+    /// Sets a value from a scenario, an operator or a script. Refuses with the reason: read-only, out of range,
+    /// wrong type, or too late.
+    pub fn set(self, instances: &mut [Instance], started: bool, value: &Value) -> crate::Result<Reply> {
+        let v = self.describe(instances).clone();
+        let instance = &mut instances[self.slot];
+        if started && v.effect == Effect::NeedsReset {
+            let reason = format!("`{}` can only be set before the first step", v.name);
+            return Ok(Reply::Refused(reason));
         }
-        write_number(instance, &v, number).unwrap_or_else(refused)
+        match Self::number_for(&v, value) {
+            Err(reason) => Ok(Reply::Refused(reason)),
+            Ok(Some(number)) => write_number(instance, &v, number),
+            Ok(None) => {
+                let text = value.as_str().unwrap_or_default().to_owned();
+                instance.set(&[v.id], Values::String(&[text]))
+            }
+        }
     }
 }
 
-fn refuse(reason: String) -> crate::Result<Reply> {
-    Ok(Reply::Refused(reason))
+/// Whether the variable's type can hold the number exactly.
+fn fits(v: &Variable, number: f64) -> bool {
+    let (low, high) = match v.value_type {
+        ValueType::F64 | ValueType::F32 => return true,
+        ValueType::I8 => (f64::from(i8::MIN), f64::from(i8::MAX)),
+        ValueType::I16 => (f64::from(i16::MIN), f64::from(i16::MAX)),
+        ValueType::I32 => (f64::from(i32::MIN), f64::from(i32::MAX)),
+        ValueType::I64 => (i64::MIN as f64, i64::MAX as f64),
+        ValueType::U8 => (0.0, f64::from(u8::MAX)),
+        ValueType::U16 => (0.0, f64::from(u16::MAX)),
+        ValueType::U32 => (0.0, f64::from(u32::MAX)),
+        ValueType::U64 => (0.0, u64::MAX as f64),
+        ValueType::Bool => (0.0, 1.0),
+        ValueType::Enumeration => (0.0, v.enumeration.len() as f64 - 1.0),
+        ValueType::String | ValueType::Binary | ValueType::Clock => return false,
+    };
+    number.fract() == 0.0 && number >= low && number <= high
 }
 
-/// Writes a number in the variable's own type; `None` where the type cannot hold it.
-fn write_number(instance: &mut Instance, v: &Variable, number: f64) -> Option<crate::Result<Reply>> {
-    let whole = number.fract() == 0.0;
-    let (id, s) = ([v.id], instance);
-    macro_rules! write {
-        ($variant:ident, $t:ty) => {{
-            let fits = whole && number >= <$t>::MIN as f64 && number <= <$t>::MAX as f64;
-            fits.then(|| s.set(&id, Values::$variant(&[number as $t])))
-        }};
-    }
+/// Writes a number that [`fits`] in the variable's own type.
+fn write_number(instance: &mut Instance, v: &Variable, number: f64) -> crate::Result<Reply> {
+    let id = [v.id];
     match v.value_type {
-        ValueType::F64 => Some(s.set(&id, Values::F64(&[number]))),
-        ValueType::F32 => Some(s.set(&id, Values::F32(&[number as f32]))),
-        ValueType::I8 => write!(I8, i8),
-        ValueType::I16 => write!(I16, i16),
-        ValueType::I32 => write!(I32, i32),
-        ValueType::I64 => write!(I64, i64),
-        ValueType::U8 => write!(U8, u8),
-        ValueType::U16 => write!(U16, u16),
-        ValueType::U32 => write!(U32, u32),
-        ValueType::U64 => write!(U64, u64),
-        ValueType::Bool => {
-            (number == 0.0 || number == 1.0).then(|| s.set(&id, Values::Bool(&[number == 1.0])))
+        ValueType::F64 => instance.set(&id, Values::F64(&[number])),
+        ValueType::F32 => instance.set(&id, Values::F32(&[number as f32])),
+        ValueType::I8 => instance.set(&id, Values::I8(&[number as i8])),
+        ValueType::I16 => instance.set(&id, Values::I16(&[number as i16])),
+        ValueType::I32 => instance.set(&id, Values::I32(&[number as i32])),
+        ValueType::I64 => instance.set(&id, Values::I64(&[number as i64])),
+        ValueType::U8 => instance.set(&id, Values::U8(&[number as u8])),
+        ValueType::U16 => instance.set(&id, Values::U16(&[number as u16])),
+        ValueType::U32 => instance.set(&id, Values::U32(&[number as u32])),
+        ValueType::U64 => instance.set(&id, Values::U64(&[number as u64])),
+        ValueType::Bool => instance.set(&id, Values::Bool(&[number == 1.0])),
+        ValueType::Enumeration => instance.set(&id, Values::Enumeration(&[number as i64])),
+        ValueType::String | ValueType::Binary | ValueType::Clock => {
+            Ok(Reply::Refused(format!("`{}` is no number", v.name)))
         }
-        ValueType::Enumeration => {
-            let known = whole && number >= 0.0 && (number as usize) < v.enumeration.len();
-            known.then(|| s.set(&id, Values::Enumeration(&[number as i64])))
-        }
-        ValueType::String | ValueType::Binary | ValueType::Clock => None,
     }
 }
 

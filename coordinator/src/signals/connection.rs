@@ -43,6 +43,7 @@ pub fn connect(
     source: &Source,
 ) -> std::result::Result<Vec<Link>, Box<InputError>> {
     let mut links: Vec<Link> = Vec::new();
+    let mut fed: Vec<(String, VariableRef)> = Vec::new();
     for connection in connections {
         let mut matched = false;
         for (name, from) in directory.iter() {
@@ -54,6 +55,11 @@ pub fn connect(
             })?;
             let conversion = check(instances, (name, from), (&target, to))
                 .map_err(|message| source.error_at(connection.span.clone(), message, None))?;
+            if let Some((other, _)) = fed.iter().find(|(_, input)| *input == to) {
+                let message = format!("`{target}` is fed by `{other}` already and cannot take `{name}` too");
+                return Err(source.error_at(connection.span.clone(), message, None));
+            }
+            fed.push((name.to_owned(), to));
             add(&mut links, instances, from, to, conversion);
         }
         if !matched {
@@ -77,6 +83,9 @@ fn check(
     let (a, b) = (from.describe(instances), to.describe(instances));
     if a.value_type != ValueType::F64 || b.value_type != ValueType::F64 || a.len() != 1 || b.len() != 1 {
         return Err(format!("`{from_name}` → `{to_name}`: only scalar f64 variables can be connected"));
+    }
+    if a.causality == Causality::Input {
+        return Err(format!("`{from_name}` is an input and cannot feed another variable"));
     }
     if !matches!(b.causality, Causality::Input | Causality::Parameter) {
         return Err(format!("`{to_name}` is not an input and cannot be connected to"));

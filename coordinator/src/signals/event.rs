@@ -35,7 +35,7 @@ pub struct TimeLine {
 }
 
 impl TimeLine {
-    /// Resolves and checks names; what an event would set is tried for existence, not for its value.
+    /// Resolves names and checks what the events would set.
     pub fn new(
         specs: &[EventSpec],
         directory: &Directory,
@@ -50,8 +50,10 @@ impl TimeLine {
         };
         let mut events = Vec::new();
         for spec in specs {
-            for (name, _) in &spec.set {
-                variable(name, spec)?;
+            for (name, value) in &spec.set {
+                if let Some(reason) = variable(name, spec)?.objection(instances, value) {
+                    return Err(source.error_within(spec.span.clone(), name, reason, None));
+                }
             }
             for action in &spec.act {
                 check_action(action, instances)

@@ -62,6 +62,9 @@ impl Testbed {
             halvings: 0,
         };
         testbed.read_states()?;
+        if let Err(Error::Simulation { message, .. }) = testbed.detect_contacts(scenario.time.step_s) {
+            return Err(InputError::plain(format!("at the start: {message}"), None).into());
+        }
         Ok(testbed)
     }
 }
@@ -163,6 +166,14 @@ fn check_report(scenario: &Scenario, directory: &Directory, instances: &[Instanc
         let help = directory.nearest(name).map(|n| format!("did you mean `{n}`?"));
         let message = format!("variable `{name}` does not exist");
         return Err(source.error_at_value(&["report", "commanded_speed"], message, help).into());
+    }
+    if let Some(name) = &scenario.report.joint
+        && directory.find(&format!("{name}.angle")).is_none()
+    {
+        let joints: Vec<&str> = directory.names().iter().filter_map(|n| n.strip_suffix(".angle")).collect();
+        let help = scenario::did_you_mean(name, joints.iter().copied());
+        let message = format!("joint `{name}` does not exist");
+        return Err(source.error_at_value(&["report", "joint"], message, help).into());
     }
     if let Some(name) = &scenario.report.body {
         let bodies: Vec<String> = instances

@@ -12,6 +12,11 @@ use terraglue_subsystem::Port;
 
 /// ε as a share of the mean diagonal of G.
 const REGULARISATION: f64 = 1e-4;
+/// Mean diagonal of G (m/N, rad/(N m)) up to which a force moves nothing: guides and velocity motors hold it.
+const IMMOBILE: f64 = 1e-12;
+/// ε there. What a rigid ground and a rigid motor do to each other is unbounded; with this it is a force that
+/// exceeds any motor, so that the motor's bound decides in the next round.
+const IMMOBILE_REGULARISATION: f64 = 1e-9;
 /// Proximal steps: at least, at most, and the relative change at which they end.
 const PROXIMAL_MIN: usize = 4;
 const PROXIMAL_MAX: usize = 40;
@@ -96,7 +101,8 @@ impl Estimator {
         self.epsilon.clear();
         self.epsilon.resize(n, 0.0);
         for (i, c) in p.ports.iter().flat_map(Port::components) {
-            self.epsilon[i] = REGULARISATION * sum[class(c)] / count[class(c)];
+            let mean = sum[class(c)] / count[class(c)];
+            self.epsilon[i] = if mean > IMMOBILE { REGULARISATION * mean } else { IMMOBILE_REGULARISATION };
         }
     }
 

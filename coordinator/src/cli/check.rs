@@ -1,8 +1,9 @@
 //! `terraglue check`: everything that can be checked without running.
 
 use super::arguments::ScenarioArguments;
+use super::output::outln;
 use super::run::build;
-use super::{Exit, show};
+use super::{Exit, show, soil_module};
 use terraglue::Result;
 use terraglue::host::{Library, SearchPath};
 use terraglue::scenario::{Scenario, SubsystemSpec};
@@ -11,6 +12,7 @@ use terraglue::testbed::Options;
 /// Loads the scenario, its modules and files, and resolves all names.
 pub fn check(arguments: &ScenarioArguments) -> Result<Exit> {
     let scenario = Scenario::load(&arguments.scenario, &arguments.sets)?;
+    soil_module::check(&scenario, arguments)?;
     let options = Options { module_paths: arguments.module_path.clone(), ..Options::default() };
     let testbed = build(&scenario, &options)?;
     let mut table = show::table(&["subsystem", "module", "bodies", "variables", "note"]);
@@ -21,8 +23,8 @@ pub fn check(arguments: &ScenarioArguments) -> Result<Exit> {
             table.add_row([s.name, s.module, &bodies, &variables, &note(&scenario, spec, &options)]);
         }
     });
-    println!("{table}");
-    println!(
+    outln!("{table}");
+    outln!(
         "{} is good: {} connections, {} events, {} s in steps of {} s, gluing `{}`",
         arguments.scenario.display(),
         scenario.connections.len(),

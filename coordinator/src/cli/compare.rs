@@ -2,8 +2,9 @@
 
 use super::arguments::{CompareArguments, RunArguments};
 use super::folder::results_folder;
+use super::output::outln;
 use super::progress::{self, Progress};
-use super::{Exit, interrupt, run};
+use super::{Exit, interrupt, run, soil_module};
 use indicatif::ProgressBar;
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -63,6 +64,10 @@ impl Plan {
 fn plan(arguments: &CompareArguments) -> Result<Vec<Plan>> {
     let file = &arguments.run.scenario.scenario;
     let base = Scenario::load(file, &arguments.run.sets())?;
+    soil_module::check(&base, &arguments.run.scenario)?;
+    for module in &arguments.soils {
+        soil_module::require_soil(module, &base, &arguments.run.scenario)?;
+    }
     let strategies =
         or_default(&arguments.strategies, || STRATEGIES.iter().map(|s| (*s).to_owned()).collect());
     if let Some(unknown) = strategies.iter().find(|s| !STRATEGIES.contains(&s.as_str())) {
@@ -200,7 +205,7 @@ fn recorded(
     Ok(outcome)
 }
 
-/// Mean evaluations of the bodies of the same run when the iteration starts from zero; none where that fails.
+/// Mean evaluations of the soils of the same run when the iteration starts from zero; none where that fails.
 fn cold_start_mean(
     plan: &Plan,
     arguments: &RunArguments,
@@ -215,17 +220,17 @@ fn cold_start_mean(
     testbed.view(|view| figures.started(view)).ok()?;
     testbed.run_until(scenario.time.duration_s, &mut [&mut figures, &mut progress]).ok()?;
     testbed.view(|view| figures.finished(view, None)).ok()?;
-    (!testbed.cancelled()).then(|| figures.summary(0.0, 0.0, None, Status::Done).evaluations_mean)
+    (!testbed.cancelled()).then(|| figures.summary(0.0, 0.0, None, Status::Done).evaluations_soil_mean)
 }
 
 fn print(arguments: &RunArguments, folder: &Path, rows: &[CompareRow]) -> Result {
     if arguments.json {
         let path = folder.join(COMPARE_JSON);
         let at = |source| Error::File { path: path.display().to_string(), source };
-        print!("{}", std::fs::read_to_string(&path).map_err(at)?);
+        outln!("{}", std::fs::read_to_string(&path).map_err(at)?.trim_end());
     } else if !arguments.quiet {
-        println!("{}", compare::terminal_table(rows));
-        println!("comparison: {}", folder.join(COMPARE_PAGE).display());
+        outln!("{}", compare::terminal_table(rows));
+        outln!("comparison: {}", folder.join(COMPARE_PAGE).display());
     }
     Ok(())
 }

@@ -1,6 +1,7 @@
 //! The folder for results: an earlier run is renamed, never overwritten.
 
 use std::path::{Path, PathBuf};
+use terraglue::scenario::InputError;
 use terraglue::{Error, Result};
 
 /// The folder of `--out`, or `runs/<name>` after an earlier run there was renamed to `.1`, `.2`, …
@@ -28,12 +29,26 @@ fn set_aside(folder: &Path) -> Result {
 }
 
 fn at(path: &Path, source: std::io::Error) -> Error {
-    Error::File { path: path.display().to_string(), source }
+    let message = format!("`{}` cannot be made the folder for the results: {source}", path.display());
+    InputError::plain(message, Some("name another folder with --out".into())).into()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_folder_that_cannot_be_made_is_wrong_input() {
+        let temporary = tempfile::tempdir().expect("folder");
+        let file = temporary.path().join("taken");
+        std::fs::write(&file, "text").expect("written");
+        for out in [file.clone(), file.join("below")] {
+            let error = results_folder(Some(&out), "walk").expect_err("refused");
+            assert!(matches!(error, Error::Input(_)), "{error}");
+            assert!(error.to_string().contains(&out.display().to_string()), "{error}");
+        }
+        assert_eq!(std::fs::read_to_string(&file).expect("there"), "text");
+    }
 
     #[test]
     fn earlier_runs_get_numbers() {

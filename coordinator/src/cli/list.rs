@@ -1,6 +1,7 @@
 //! `terraglue modules`, `variables` and `soils`: what there is to choose from.
 
 use super::arguments::ScenarioArguments;
+use super::output::outln;
 use super::run::build;
 use super::{Exit, show};
 use std::path::{Path, PathBuf};
@@ -27,9 +28,9 @@ pub fn variables(arguments: &ScenarioArguments) -> Result<Exit> {
             }
         }
     });
-    println!("{table}");
+    outln!("{table}");
     if actions.row_count() > 0 {
-        println!("{actions}");
+        outln!("{actions}");
     }
     Ok(Exit::Done)
 }
@@ -87,11 +88,11 @@ pub fn soils(file: Option<&Path>) -> Result<Exit> {
         let cells = row.values.iter().map(|v| v.map_or_else(|| "–".to_owned(), |x| x.to_string()));
         table.add_row(std::iter::once(row.name.clone()).chain(cells).chain([row.source.clone()]));
     }
-    println!("{table}");
+    outln!("{table}");
     if refused.row_count() > 0 {
-        println!("{refused}");
+        outln!("{refused}");
     }
-    println!("from {}", path.display());
+    outln!("from {}", path.display());
     Ok(Exit::Done)
 }
 
@@ -103,17 +104,17 @@ pub fn modules(module_path: &[PathBuf], json: bool) -> Result<Exit> {
             Ok(schema) => serde_json::json!({ "name": m.name, "path": m.path, "schema": schema }),
             Err(e) => serde_json::json!({ "name": m.name, "path": m.path, "error": e.to_string() }),
         };
-        println!("{}", serde_json::Value::Array(found.iter().map(describe).collect()));
+        outln!("{}", serde_json::Value::Array(found.iter().map(describe).collect()));
         return Ok(Exit::Done);
     }
     for module in &found {
         match &module.schema {
-            Err(e) => println!("{}: cannot be used: {e}\n", module.name),
+            Err(e) => outln!("{}: cannot be used: {e}\n", module.name),
             Ok(schema) => describe(module, schema),
         }
     }
     if found.is_empty() {
-        println!("no module found; see --module-path");
+        outln!("no module found; see --module-path");
     }
     Ok(Exit::Done)
 }
@@ -125,7 +126,7 @@ fn describe(module: &AvailableModule, schema: &Schema) {
         Kind::Controller => "controller",
         Kind::Law => "law",
     };
-    println!("{} ({kind}): {}\n{}", schema.name, schema.help, module.path.display());
+    outln!("{} ({kind}): {}\n{}", schema.name, schema.help, module.path.display());
     let mut table = show::table(&["parameter", "takes", "default", "help"]);
     for p in &schema.parameters {
         let default = match (&p.default, p.optional) {
@@ -135,5 +136,5 @@ fn describe(module: &AvailableModule, schema: &Schema) {
         };
         table.add_row([p.name.clone(), allowed_values(p), default, p.help.clone()]);
     }
-    println!("{table}\n");
+    outln!("{table}\n");
 }

@@ -8,10 +8,12 @@ mod compare;
 mod folder;
 mod interrupt;
 mod list;
+mod output;
 mod progress;
 mod report;
 mod run;
 mod show;
+mod soil_module;
 
 use arguments::{Arguments, Command};
 use clap::Parser;

@@ -1,9 +1,10 @@
 //! `terraglue report`: the report of any recording, also of one that was cut off.
 
 use super::Exit;
+use super::output::outln;
 use std::path::Path;
 use terraglue::Result;
-use terraglue::recording::{self, RECORDING};
+use terraglue::recording::{self, RECORDING, Recording};
 use terraglue::scenario::InputError;
 
 /// Mends the recording of a folder where its end is missing, then writes the report.
@@ -14,6 +15,11 @@ pub fn report(folder: &Path) -> Result<Exit> {
         return Err(InputError::plain(message, help).into());
     }
     recording::mend(folder)?;
-    println!("report: {}", recording::report::write(folder)?.display());
+    let damaged = Recording::open(folder)?.damaged;
+    if damaged > 0 {
+        let path = folder.join(RECORDING);
+        eprintln!("warning: `{}` is damaged: {damaged} parts of it are left out", path.display());
+    }
+    outln!("report: {}", recording::report::write(folder)?.display());
     Ok(Exit::Done)
 }

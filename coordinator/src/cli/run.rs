@@ -2,8 +2,9 @@
 
 use super::arguments::RunArguments;
 use super::folder::results_folder;
+use super::output::outln;
 use super::progress::{self, Progress};
-use super::{Exit, exit_of, interrupt, show};
+use super::{Exit, exit_of, interrupt, show, soil_module};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -36,6 +37,7 @@ impl Outcome {
 /// Runs a scenario as the arguments say.
 pub fn run(arguments: &RunArguments) -> Result<Exit> {
     let scenario = Scenario::load(&arguments.scenario.scenario, &arguments.sets())?;
+    soil_module::check(&scenario, &arguments.scenario)?;
     let options = options(arguments, &interrupt::cancel_flag());
     let testbed = build(&scenario, &options)?;
     let folder = results_folder(arguments.out.as_deref(), &scenario.name)?;
@@ -104,10 +106,10 @@ fn print(arguments: &RunArguments, outcome: &Outcome, report: &Path) -> Result {
     if arguments.json {
         let text = serde_json::to_string_pretty(&outcome.summary)
             .map_err(|e| Error::File { path: "standard output".into(), source: e.into() })?;
-        println!("{text}");
+        outln!("{text}");
     } else if !arguments.quiet {
-        println!("{}", show::summary(&outcome.summary));
-        println!("report: {}", report.display());
+        outln!("{}", show::summary(&outcome.summary));
+        outln!("report: {}", report.display());
     }
     if let Some(error) = &outcome.error {
         show::error(error);

@@ -51,6 +51,7 @@ pub fn summary(s: &Summary) -> Table {
     row("steps not converged", s.steps_not_converged.to_string());
     row("largest gap", format!("{:.2e} m", s.max_gap_m));
     row("largest action–reaction gap", format!("{:.2e} N", s.max_action_reaction_gap_n));
+    row("drift of the energy book", format!("{:+.2e} J", s.energy_balance_j));
     row("error of the soil's mass", s.soil_mass_error_relative.map_or_else(none, |e| format!("{e:.1e}")));
     t
 }
@@ -76,5 +77,22 @@ fn distance(s: &Summary) -> String {
         }
         (Some(d), _) => format!("{d:.3} m"),
         _ => none(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use terraglue::recording::{Status, SummaryObserver};
+    use terraglue::scenario::Scenario;
+
+    #[test]
+    fn the_table_shows_the_drift_of_the_energy_book() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenarios/plate_sinkage.toml");
+        let scenario = Scenario::load(path.as_ref(), &[]).expect("good");
+        let mut summary = SummaryObserver::new(&scenario).summary(1.0, 1.0, None, Status::Done);
+        summary.energy_balance_j = -0.0125;
+        let table = super::summary(&summary).to_string();
+        let line = table.lines().find(|l| l.contains("drift of the energy book")).expect("row");
+        assert!(line.contains("-1.25e-2 J"), "{line}");
     }
 }

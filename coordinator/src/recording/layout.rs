@@ -1,6 +1,6 @@
 //! Names of the files in a results folder, and errors that carry them.
 
-use crate::error::Error;
+use crate::error::{Error, Result};
 use std::path::Path;
 
 /// Everything simulated.
@@ -15,6 +15,20 @@ pub const TIMING: &str = "timing.csv";
 pub const FINAL_GROUND: &str = "final_ground.asc";
 /// The report page.
 pub const REPORT: &str = "report.html";
+
+/// Removes the files of an earlier run, so that none of them stays beside the new ones. Touches nothing in a
+/// folder that holds no run.
+pub(crate) fn remove_earlier_run(folder: &Path) -> Result {
+    if ![RECORDING, SUMMARY].iter().any(|f| folder.join(f).exists()) {
+        return Ok(());
+    }
+    for path in [VARIABLES, REPORT, SUMMARY, TIMING, FINAL_GROUND, RECORDING].map(|f| folder.join(f)) {
+        if path.exists() {
+            std::fs::remove_file(&path).map_err(at(&path))?;
+        }
+    }
+    Ok(())
+}
 
 /// Says which file an input/output error is about.
 pub(crate) fn at(path: &Path) -> impl Fn(std::io::Error) -> Error + '_ {

@@ -3,8 +3,9 @@
 use crate::error::Result;
 use crate::recording::layout::{RECORDING, at, other_at};
 use crate::recording::mcap_writer;
-use mcap::read::{LinearReader, MessageStream, Options};
-use mcap::records::{MessageHeader, Record};
+use crate::recording::records::{Piece, Records};
+use crate::scenario::InputError;
+use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
 use std::collections::BTreeMap;
 use std::fs::File;
@@ -12,32 +13,44 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 /// Rewrites `recording.mcap` of a results folder with all messages that arrived whole and a footer. Does
-/// nothing to a complete recording. Returns whether anything was mended.
+/// nothing to a complete recording, nor to one that is damaged before its end: rewritten, it would lose what
+/// another program may still read. Returns whether anything was mended.
+///
+/// # Errors
+/// [`Error::Input`](crate::Error::Input) when the file is empty or no MCAP recording; it is left as it is.
 pub fn mend(folder: &Path) -> Result<bool> {
     let path = folder.join(RECORDING);
     let bytes = std::fs::read(&path).map_err(at(&path))?;
+    let Some(mut records) = Records::new(&bytes) else {
+        let what = if bytes.is_empty() { "is empty" } else { "is not an MCAP recording" };
+        let help = Some("the file was left as it is".into());
+        return Err(InputError::plain(format!("`{}` {what}", path.display()), help).into());
+    };
     if mcap::read::footer(&bytes).is_ok() {
         return Ok(false);
     }
     let mended = folder.join("recording.mcap.mended");
-    copy(&bytes, &mended).map_err(other_at(&path))?;
+    let copied = copy(&mut records, &mended).map_err(other_at(&path));
+    if copied.is_err() || records.damaged > 0 {
+        std::fs::remove_file(&mended).map_err(at(&mended))?;
+        return copied.map(|()| false);
+    }
     std::fs::rename(&mended, &path).map_err(at(&path))?;
     Ok(true)
 }
 
-fn copy(bytes: &[u8], to: &Path) -> mcap::McapResult<()> {
+fn copy(records: &mut Records, to: &Path) -> mcap::McapResult<()> {
     let out = NoSeek::new(BufWriter::new(File::create(to)?));
     let mut sink = mcap_writer::options().create(out)?;
-    for record in LinearReader::new_with_options(bytes, Options::IgnoreEndMagic.into())? {
-        match record {
-            Ok(Record::Metadata(metadata)) => sink.write_metadata(&metadata)?,
-            Ok(_) => {}
-            Err(_) => break,
-        }
-    }
     let mut channels = BTreeMap::new();
-    for message in MessageStream::new_with_options(bytes, Options::IgnoreEndMagic.into())? {
-        let Ok(message) = message else { break };
+    for piece in records {
+        let message = match piece {
+            Piece::Message(message) => message,
+            Piece::Metadata(metadata) => {
+                sink.write_metadata(&metadata)?;
+                continue;
+            }
+        };
         let channel_id = match channels.get(&message.channel.id) {
             Some(id) => *id,
             None => {

@@ -37,6 +37,7 @@ mod mend;
 mod messages;
 mod reader;
 mod recorder;
+mod records;
 mod scene_message;
 mod schemas;
 mod snapshot;

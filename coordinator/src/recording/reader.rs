@@ -1,12 +1,12 @@
-//! Reads a recording, also one that was cut off in the middle: whatever arrived whole is there.
+//! Reads a recording, also one that was cut off or damaged in the middle: whatever arrived whole is there.
 
 use crate::error::{Error, Result};
 use crate::observer::Happening;
 use crate::recording::layout::{RECORDING, at};
 use crate::recording::messages::GluingRecord;
+use crate::recording::records::{Piece, Records};
 use crate::recording::table::Table;
 use base64::Engine;
-use mcap::read::{LinearReader, MessageStream, Options};
 use serde::Deserialize;
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -38,6 +38,8 @@ pub struct Recording {
     pub final_ground: Option<GroundRecord>,
     /// Whether the file has its footer; otherwise it was cut off.
     pub complete: bool,
+    /// Parts that are damaged and left out.
+    pub damaged: usize,
 }
 
 /// What was simulated; all texts as in the scenario.
@@ -183,17 +185,19 @@ impl Recording {
 
     /// Reads a recording from memory; `None` where it does not even begin like one.
     pub fn read(bytes: &[u8]) -> Option<Self> {
-        if !bytes.starts_with(mcap::MAGIC) {
-            return None;
-        }
+        let mut records = Records::new(bytes)?;
         let mut recording = Self { complete: mcap::read::footer(bytes).is_ok(), ..Self::default() };
-        recording.header.entries = metadata(bytes);
-        if let Ok(messages) = MessageStream::new_with_options(bytes, Options::IgnoreEndMagic.into()) {
-            // The first error is the end of a file that was cut off.
-            for message in messages.map_while(std::result::Result::ok) {
-                recording.take(&message);
+        for piece in &mut records {
+            match piece {
+                Piece::Message(message) => recording.take(&message),
+                Piece::Metadata(about) if about.name == "terraglue" => {
+                    recording.header.entries = about.metadata
+                }
+                Piece::Metadata(_) => {}
             }
         }
+        // With a footer, what ends early is not cut off: a length before it is wrong.
+        recording.damaged = records.damaged + usize::from(recording.complete && !records.ended);
         Some(recording)
     }
 
@@ -279,21 +283,6 @@ impl Recording {
         let poses = self.poses.values().map(|p| last(&p.t_s));
         tables.chain(poses).chain(self.gluing.last().map(|g| g.t)).fold(last(&self.energy.t_s), f64::max)
     }
-}
-
-/// The description at the head of the recording.
-fn metadata(bytes: &[u8]) -> BTreeMap<String, String> {
-    let Ok(records) = LinearReader::new_with_options(bytes, Options::IgnoreEndMagic.into()) else {
-        return BTreeMap::new();
-    };
-    for record in records.map_while(std::result::Result::ok) {
-        if let mcap::records::Record::Metadata(m) = record
-            && m.name == "terraglue"
-        {
-            return m.metadata;
-        }
-    }
-    BTreeMap::new()
 }
 
 /// Units from the JSON schema of a channel.

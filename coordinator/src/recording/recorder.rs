@@ -3,7 +3,7 @@
 use crate::error::{Error, Result};
 use crate::observer::{Happening, Observer, View};
 use crate::recording::csv::VariablesCsv;
-use crate::recording::layout::{FINAL_GROUND, at};
+use crate::recording::layout::{FINAL_GROUND, at, remove_earlier_run};
 use crate::recording::mcap_writer::{FLUSH_STEPS, McapWriter};
 use crate::recording::snapshot::Snapshot;
 use crate::recording::summary::{Status, Summary};
@@ -61,9 +61,10 @@ fn about(scenario: &Scenario) -> BTreeMap<String, String> {
 }
 
 impl Recorder {
-    /// Makes the folder where it is missing and opens the recording in it.
+    /// Makes the folder where it is missing, removes the files of an earlier run and opens the recording.
     pub fn create(folder: &Path, scenario: &Scenario, options: RecorderOptions) -> Result<Self> {
         std::fs::create_dir_all(folder).map_err(at(folder))?;
+        remove_earlier_run(folder)?;
         Ok(Self {
             folder: folder.to_owned(),
             options,

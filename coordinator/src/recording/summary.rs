@@ -86,7 +86,7 @@ pub struct Summary {
     pub max_sinkage_m: Option<f64>,
     /// Magnitude of the mechanical energy at the motors, Σ |τ·ω|·h, J.
     pub energy_j: f64,
-    /// energy_j / (m·g·|distance|), dimensionless.
+    /// energy_j / (m·g·|distance|), dimensionless; null below 1 mm.
     pub cost_of_transport: Option<f64>,
     /// Evaluations of the bodies per step, mean; 1 for a single pass.
     pub evaluations_mean: f64,

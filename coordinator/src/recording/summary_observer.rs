@@ -11,6 +11,9 @@ use crate::recording::summary::{FailureRecord, Status, Summary};
 use crate::scenario::Scenario;
 use terraglue_subsystem::{Kind, ValuesMut};
 
+/// Over a shorter way, m, the energy per distance says nothing.
+const SMALLEST_DISTANCE_M: f64 = 1e-3;
+
 /// Follows a run and adds up its figures.
 pub struct SummaryObserver {
     scenario: String,
@@ -231,6 +234,7 @@ impl SummaryObserver {
         let body = self.body.as_ref();
         let weight_n = body.map_or(0.0, |b| b.mass_kg * self.gravity_m_s2);
         let work_j = body.map_or(0.0, |b| weight_n * b.distance_m.abs());
+        let moved = body.is_some_and(|b| b.distance_m.abs() >= SMALLEST_DISTANCE_M);
         let g = &self.gluing;
         Summary {
             status,
@@ -250,7 +254,7 @@ impl SummaryObserver {
             max_pitch_rad: body.map(|b| b.max_pitch_rad),
             max_sinkage_m: self.sinkage.as_ref().map(Deepest::largest),
             energy_j: self.energy_j,
-            cost_of_transport: (work_j > 0.0).then(|| self.energy_j / work_j),
+            cost_of_transport: (moved && work_j > 0.0).then(|| self.energy_j / work_j),
             evaluations_mean: g.mean(g.bodies),
             evaluations_max: g.histogram.len().saturating_sub(1) as u32,
             steps_not_converged: g.not_converged,

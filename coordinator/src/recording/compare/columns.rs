@@ -55,11 +55,11 @@ pub(crate) const ALL: &[Column] = &[
     column!("evaluations_max", "evaluations of bodies", "max", "", Smallest, |r| {
         of(r, |s| f64::from(s.evaluations_max))
     }),
-    column!("cold_start_mean", "evaluations of bodies", "mean without the estimate", "", Neither, |r| r
-        .cold_start_mean),
     column!("evaluations_soil_mean", "evaluations of soil", "mean", "", Smallest, |r| {
         of(r, |s| s.evaluations_soil_mean)
     }),
+    column!("cold_start_mean", "evaluations of soil", "mean without the estimate", "", Neither, |r| r
+        .cold_start_mean),
     column!("evaluations_soil_max", "evaluations of soil", "max", "", Smallest, |r| {
         of(r, |s| f64::from(s.evaluations_soil_max))
     }),

@@ -32,7 +32,7 @@ pub struct CompareRow {
     pub folder: Option<PathBuf>,
     /// What went wrong.
     pub error: Option<String>,
-    /// Mean evaluations of the bodies per step when the iteration does not start from the estimate.
+    /// Mean evaluations of the soils per step when the iteration does not start from the estimate.
     pub cold_start_mean: Option<f64>,
 }
 

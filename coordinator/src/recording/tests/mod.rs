@@ -106,6 +106,68 @@ fn a_recording_cut_anywhere_can_be_read_and_mended() {
 }
 
 #[test]
+fn a_damaged_recording_is_read_around_the_damage() {
+    let f = folder();
+    record(f.path(), "cooperative", 800);
+    let path = f.path().join(RECORDING);
+    let bytes = std::fs::read(&path).expect("written");
+    let whole = Recording::read(&bytes).expect("readable");
+    assert_eq!(whole.damaged, 0);
+    let mut behind = 0;
+    for place in (64..bytes.len() - 4096).step_by(bytes.len() / 97) {
+        let mut damaged = bytes.clone();
+        damaged[place..place + 16].iter_mut().for_each(|b| *b ^= 0xff);
+        let r = Recording::read(&damaged).expect("readable");
+        assert!(r.gluing.iter().all(|g| whole.gluing.contains(g)));
+        behind += usize::from(r.damaged > 0 && r.end_s() == whole.end_s());
+        std::fs::write(&path, &damaged).expect("damaged");
+        assert!(!mend(f.path()).expect("left alone"));
+        assert!(std::fs::read(&path).expect("there") == damaged);
+    }
+    assert!(behind > 40, "{behind}");
+}
+
+#[test]
+fn what_is_no_recording_is_left_as_it_is() {
+    let f = folder();
+    let path = f.path().join(RECORDING);
+    for content in [&b""[..], b"text", &mcap::MAGIC[..5]] {
+        std::fs::write(&path, content).expect("written");
+        let error = mend(f.path()).expect_err("refused");
+        assert!(matches!(error, crate::Error::Input(_)) && error.to_string().contains(RECORDING), "{error}");
+        assert_eq!(std::fs::read(&path).expect("kept"), content);
+    }
+}
+
+#[test]
+fn no_file_of_an_earlier_run_stays() {
+    let f = folder();
+    record(f.path(), "cooperative", 20);
+    for name in [REPORT, TIMING] {
+        std::fs::write(f.path().join(name), "earlier").expect("written");
+    }
+    std::fs::write(f.path().join("notes.txt"), "mine").expect("written");
+    let rig = Rig::new("cooperative");
+    Recorder::create(f.path(), &rig.scenario, RecorderOptions::default()).expect("created");
+    for name in [VARIABLES, REPORT, SUMMARY, TIMING, FINAL_GROUND] {
+        assert!(!f.path().join(name).exists(), "{name} stays");
+    }
+    assert!(f.path().join("notes.txt").exists() && f.path().join(RECORDING).exists());
+    let other = folder();
+    std::fs::write(other.path().join(VARIABLES), "mine").expect("written");
+    Recorder::create(other.path(), &rig.scenario, RecorderOptions::default()).expect("created");
+    assert!(other.path().join(VARIABLES).exists());
+}
+
+#[test]
+fn a_way_too_short_has_no_cost_of_transport() {
+    let f = folder();
+    // 0.15 m/s: 0.9 mm after 6 steps, 1.05 mm after 7.
+    assert_eq!(record(f.path(), "cooperative", 6).cost_of_transport, None);
+    assert!(record(f.path(), "cooperative", 7).cost_of_transport.is_some());
+}
+
+#[test]
 fn what_was_flushed_is_on_disk_before_the_end() {
     let f = folder();
     let mut rig = Rig::new("cooperative");

@@ -8,6 +8,7 @@ mod compare;
 mod folder;
 mod interrupt;
 mod list;
+mod logger;
 mod output;
 mod progress;
 mod report;
@@ -46,6 +47,7 @@ impl From<Exit> for ExitCode {
 
 /// Reads the arguments and does the command.
 pub fn main() -> ExitCode {
+    logger::install();
     let done = match Arguments::parse().command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Compare(arguments) => compare::compare(&arguments),

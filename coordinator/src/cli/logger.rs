@@ -1,0 +1,27 @@
+//! Log lines of modules and of the library on standard error: warnings and errors, and all with `TERRAGLUE_LOG=info`.
+
+use log::{LevelFilter, Log, Metadata, Record};
+
+struct Logger;
+
+impl Log for Logger {
+    fn enabled(&self, metadata: &Metadata) -> bool {
+        metadata.target().starts_with("terraglue")
+    }
+
+    fn log(&self, record: &Record) {
+        if self.enabled(record.metadata()) {
+            eprintln!("{}: {}", record.level().as_str().to_lowercase(), record.args());
+        }
+    }
+
+    fn flush(&self) {}
+}
+
+/// Shows log lines from now on.
+pub fn install() {
+    let asked = std::env::var("TERRAGLUE_LOG").ok().and_then(|level| level.parse().ok());
+    if log::set_logger(&Logger).is_ok() {
+        log::set_max_level(asked.unwrap_or(LevelFilter::Warn));
+    }
+}

@@ -113,8 +113,8 @@ impl Side {
         nodes: &[Node],
         at: &Instant,
         group_ports: &mut [Port],
-        mut x: Option<&mut [f64]>,
-        mut force: Option<&mut [f64]>,
+        x: Option<&mut [f64]>,
+        force: Option<&mut [f64]>,
     ) -> Result {
         for (own, p) in self.ports.iter_mut().zip(&self.port_index) {
             own.law = group_ports[*p].law;
@@ -135,10 +135,10 @@ impl Side {
             own.law = *law;
             group_ports[*p].law = *law;
         }
-        if let Some(x) = x.as_deref_mut() {
+        if let Some(x) = x {
             Self::scatter(&self.x, &self.index, x);
         }
-        if let Some(force) = force.as_deref_mut() {
+        if let Some(force) = force {
             Self::scatter(&self.t, &self.index, force);
         }
         Ok(())

@@ -1,7 +1,7 @@
 //! T* for bodies that do not know contact themselves: minimum-norm normals, then clipped stick forces.
 
 use super::complementarity::{BoundedProblem, BoundedSolver};
-use super::exchange::GroupEstimate;
+use super::group_estimate::GroupEstimate;
 use super::linear::Lu;
 use terraglue_subsystem::Port;
 

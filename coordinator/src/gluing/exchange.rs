@@ -1,6 +1,7 @@
 //! The group's side of the exchange: packed vectors over all ports and the paper's calls on all members.
 
 use super::estimate::RigidContact;
+use super::group_estimate::GroupEstimate;
 use super::report::StepReport;
 use super::side::{Answer, Instant, Side};
 use crate::Result;
@@ -9,21 +10,6 @@ use crate::host::Instance;
 use crate::timing::{Part, Timings};
 use std::time::Instant as Clock;
 use terraglue_subsystem::{Capabilities, Node, Port, cooperation};
-
-/// T*, x_free and G1 over the group's ports.
-#[derive(Debug, Default)]
-pub struct GroupEstimate {
-    /// Rigid-contact wrench, packed.
-    pub t_star: Vec<f64>,
-    /// End-of-step displacement without contact wrenches, packed.
-    pub x_free: Vec<f64>,
-    /// dX1/dT, column-major n × n.
-    pub g: Vec<f64>,
-    /// Per port.
-    pub active: Vec<u8>,
-    /// Whether T* is the only solution.
-    pub unique: bool,
-}
 
 /// Subsystems glued to each other, with everything that one step passes between them.
 #[derive(Debug, Default)]

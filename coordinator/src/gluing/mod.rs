@@ -9,6 +9,7 @@ mod complementarity;
 pub mod cooperative;
 mod estimate;
 mod exchange;
+mod group_estimate;
 pub mod iterative;
 mod linear;
 mod report;
@@ -16,7 +17,8 @@ mod side;
 #[cfg(test)]
 mod tests;
 
-pub use exchange::{Exchange, GroupEstimate};
+pub use exchange::Exchange;
+pub use group_estimate::GroupEstimate;
 pub use report::{PortReport, StepReport};
 pub use side::Instant;
 /// How wrenches run inside a step: only their end value counts for the integrators in use.

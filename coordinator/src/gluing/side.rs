@@ -151,7 +151,7 @@ impl Side {
         nodes: &[Node],
         at: &Instant,
         partner: (&[f64], &[f64]),
-        out: &mut super::exchange::GroupEstimate,
+        out: &mut super::group_estimate::GroupEstimate,
     ) -> Result {
         let n = self.n();
         self.matrix.clear();
@@ -185,7 +185,7 @@ impl Side {
         instance: &mut Instance,
         nodes: &[Node],
         at: &Instant,
-        estimate: &super::exchange::GroupEstimate,
+        estimate: &super::group_estimate::GroupEstimate,
         t1: &mut [f64],
         x2: &mut [f64],
     ) -> Result<bool> {

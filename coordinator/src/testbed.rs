@@ -339,7 +339,7 @@ impl Testbed {
             message: format!("cannot set `{name}` = {value}: {reason}"),
         };
         let Some(variable) = self.directory.find(name) else {
-            let hint = self.directory.nearest(name).map(|n| format!("; did you mean `{n}`?"));
+            let hint = self.directory.hint(name).map(|h| format!("; {h}"));
             return Err(refused(format!("there is no such variable{}", hint.unwrap_or_default())));
         };
         let was = variable.number(&self.instances).map(|x| format!(" (was {x})")).unwrap_or_default();

@@ -43,10 +43,10 @@ impl Directory {
         self.names.iter().position(|n| n == name).map(|k| self.refs[k])
     }
 
-    /// The full name that looks most like `name`.
-    pub fn nearest(&self, name: &str) -> Option<&str> {
+    /// A line of help for a name that does not exist: the one that looks most like it.
+    pub fn hint(&self, name: &str) -> Option<String> {
         let distance = |n: &&String| strsim::damerau_levenshtein(n, name);
-        self.names.iter().min_by_key(distance).map(String::as_str)
+        self.names.iter().min_by_key(distance).map(|n| format!("did you mean `{n}`?"))
     }
 
     /// Names and variables in order.

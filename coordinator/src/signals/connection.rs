@@ -51,7 +51,7 @@ pub fn connect(
             matched = true;
             let to = directory.find(&target).ok_or_else(|| {
                 let message = format!("`{name}` is connected to `{target}`, which does not exist");
-                source.error_at(connection.span.clone(), message, hint(directory, &target))
+                source.error_at(connection.span.clone(), message, directory.hint(&target))
             })?;
             let conversion = check(instances, (name, from), (&target, to))
                 .map_err(|message| source.error_at(connection.span.clone(), message, None))?;
@@ -64,15 +64,11 @@ pub fn connect(
         }
         if !matched {
             let message = format!("no variable matches `{}`", connection.from);
-            let help = hint(directory, &connection.from);
+            let help = directory.hint(&connection.from);
             return Err(source.error_at(connection.span.clone(), message, help));
         }
     }
     Ok(links)
-}
-
-fn hint(directory: &Directory, name: &str) -> Option<String> {
-    directory.nearest(name).map(|n| format!("did you mean `{n}`?"))
 }
 
 fn check(

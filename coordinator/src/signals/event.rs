@@ -44,8 +44,8 @@ impl TimeLine {
     ) -> Result<Self, Box<InputError>> {
         let variable = |name: &str, spec: &EventSpec| {
             directory.find(name).ok_or_else(|| {
-                let help = directory.nearest(name).map(|n| format!("did you mean `{n}`?"));
-                source.error_at(spec.span.clone(), format!("variable `{name}` does not exist"), help)
+                let message = format!("variable `{name}` does not exist");
+                source.error_at(spec.span.clone(), message, directory.hint(name))
             })
         };
         let mut events = Vec::new();

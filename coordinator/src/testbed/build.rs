@@ -163,7 +163,7 @@ fn check_report(scenario: &Scenario, directory: &Directory, instances: &[Instanc
     if let Some(name) = &scenario.report.commanded_speed
         && directory.find(name).is_none()
     {
-        let help = directory.nearest(name).map(|n| format!("did you mean `{n}`?"));
+        let help = directory.hint(name);
         let message = format!("variable `{name}` does not exist");
         return Err(source.error_at_value(&["report", "commanded_speed"], message, help).into());
     }

@@ -1,9 +1,8 @@
 //! Commit: the foot's motion becomes depths, slip and heat; the nodes that it left forget their contact.
 
 use crate::assemble::displacement;
-use crate::ground::{Covered, Ground, NodeState};
+use crate::ground::{Covered, Ground};
 use crate::patch::{Laws, Patch, Patches};
-use terraglue_soil_law::ShearState;
 use terraglue_subsystem::Port;
 
 /// Sums over the run and what the last commit found. Part of the committed state.
@@ -117,7 +116,8 @@ impl Scene<'_> {
             let [i, j] = n.index[k];
             if pressure > 0.0 {
                 loaded += 1;
-                let fresh = ground.nodes.get(i, j).stamp + 1 != book.stamp;
+                let before = ground.nodes.get(i, j);
+                let fresh = !before.loaded() || before.stamp + 1 != book.stamp;
                 // a point that has just come down from above is no deeper than its own descent
                 lists.slid_in.push(fresh && depth > -2.0 * moved[0]);
                 let node = Pressed { k, depth, pressure, slip: [moved[1], moved[2]] };
@@ -146,11 +146,8 @@ impl Scene<'_> {
         book.dissipated += area * shear.dissipated;
         book.elastic += area * (self.laws.shear.elastic_energy(&shear.state) + squeezed);
         let [i, j] = n.index[k];
-        let (initial, height) = (ground.initial(i, j), ground.heights.height(i, j));
-        let state = ground.nodes.get_mut(i, j);
-        if state.permanent <= 0.0 {
-            state.raised = height - initial;
-        }
+        let initial = ground.initial(i, j);
+        let state = ground.enter(i, j);
         state.largest = n.z_max[k];
         if depth > n.z_max[k] {
             let (before, p) = (n.z_max[k], n.p_max[k]);
@@ -161,7 +158,7 @@ impl Scene<'_> {
         }
         state.curve = [curve.modulus(), patch.slope];
         (state.pressure, state.shear, state.stamp) = (pressure, shear.state, book.stamp);
-        book.max_sinkage = book.max_sinkage.max(depth / patch.slope - state.raised);
+        book.max_sinkage = book.max_sinkage.max(depth / patch.slope - (state.reference - initial));
         let elastic = |c: usize| shear.state.elastic[c] - n.shear[k].elastic[c];
         if shear.state.slip > n.shear[k].slip {
             [slip[0] - elastic(0), slip[1] - elastic(1)]
@@ -205,7 +202,9 @@ fn carry_slip(ground: &mut Ground, lists: &mut Lists, first: usize, slid: [f64; 
         own + gain(i + behind[0], *j, share[0]) + gain(*i, j + behind[1], share[1])
     }));
     for ([i, j], slip) in nodes.iter().zip(&lists.carried) {
-        ground.nodes.get_mut(*i, *j).shear.slip = *slip;
+        if let Some(state) = ground.nodes.get_mut(*i, *j) {
+            state.shear.slip = *slip;
+        }
     }
 }
 
@@ -223,9 +222,8 @@ fn mean_slip(ground: &Ground, nodes: &[[i32; 2]], slid_in: &[bool]) -> f64 {
 fn release(ground: &mut Ground, lists: &mut Lists, stamp: u64) {
     lists.released.clear();
     for [i, j] in &lists.previous {
-        let state: &mut NodeState = ground.nodes.get_mut(*i, *j);
-        if state.stamp != stamp {
-            (state.pressure, state.shear) = (0.0, ShearState::default());
+        if ground.nodes.get(*i, *j).stamp != stamp {
+            ground.leave(*i, *j);
             lists.released.push([*i, *j]);
         }
     }

@@ -13,6 +13,7 @@
 mod assemble;
 mod bookkeeping;
 mod ground;
+mod nodes;
 mod normal;
 mod patch;
 mod soil;
@@ -20,5 +21,6 @@ mod state;
 mod trial;
 mod values;
 
-pub use ground::{Covered, Ground, NodeState};
+pub use ground::{Covered, Ground};
+pub use nodes::{NodeState, NodeStates, NodesSnapshot};
 pub use soil::{FieldSoil, Material};

@@ -3,7 +3,8 @@
 //! Built once per step from the committed state into flat arrays, so that trials touch neither the lattice nor
 //! the allocator.
 
-use crate::ground::{Ground, NodeState};
+use crate::ground::Ground;
+use crate::nodes::NodeState;
 use terraglue_soil_law::{PressureCurve, PressureLaw, ShearLaw, ShearState};
 use terraglue_subsystem::{Node, Port, Step};
 

@@ -1,8 +1,9 @@
 //! Numbered slots with exact copies of the committed state.
 
 use crate::bookkeeping::Book;
-use crate::ground::{Ground, NodeState};
-use terraglue_ground::{HeightSnapshot, TileMapSnapshot};
+use crate::ground::Ground;
+use crate::nodes::NodesSnapshot;
+use terraglue_ground::HeightSnapshot;
 use terraglue_soil_law::SoilParameters;
 use terraglue_subsystem::{Error, Result};
 
@@ -10,7 +11,7 @@ use terraglue_subsystem::{Error, Result};
 #[derive(Debug, Default)]
 struct Slot<S> {
     heights: HeightSnapshot,
-    nodes: TileMapSnapshot<NodeState>,
+    nodes: NodesSnapshot,
     loaded: Vec<[i32; 2]>,
     book: Book,
     parameters: Option<SoilParameters>,

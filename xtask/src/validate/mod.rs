@@ -6,6 +6,7 @@
 mod documents;
 mod figure;
 mod known;
+mod soil;
 mod timing;
 mod walk;
 
@@ -57,7 +58,7 @@ type Measure = fn(&Context) -> Outcome<Vec<Figure>>;
 const AREAS: [(&str, Option<Measure>); 6] = [
     ("walk", Some(walk::figures)),
     ("rigid-body", None),
-    ("soil", None),
+    ("soil", Some(soil::figures)),
     ("gluing", None),
     ("fmi", None),
     ("plugins", None),

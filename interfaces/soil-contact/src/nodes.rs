@@ -1,0 +1,311 @@
+//! What the soil remembers at its nodes: everything where a foot stands, one number where one has stood.
+//!
+//! Ground that was pressed outnumbers ground that is being pressed by far, so only the depth that stays is kept for
+//! every node; the history of a contact lives in a list as long as the contact does.
+
+use terraglue_ground::{Lattice, TILE_NODES, TileMap, TileMapSnapshot, UNIT_M};
+use terraglue_soil_law::ShearState;
+
+/// Tiles of pressed ground, and nodes below feet, for which memory is asked at the start.
+const RESERVE_TILES: usize = 256;
+const RESERVE_NODES: usize = 4096;
+const RESERVE_INDEX: usize = 64;
+const ABSENT: u32 = u32::MAX;
+
+/// What the soil remembers at a node. The default is untouched ground.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct NodeState {
+    /// Reference level while a foot stands here, m, not rounded; see [`crate::Ground::reference`].
+    pub reference: f64,
+    /// Unrounded height of the surface minus the booked one where no foot stands, m.
+    pub remainder: f64,
+    /// Depth of the unloaded surface below the reference level, m, vertical.
+    pub permanent: f64,
+    /// Largest depth along the normal that belongs to `permanent` under `curve`, m; a cache.
+    pub largest: f64,
+    /// Modulus of the pressure curve and n_z for which `largest` holds.
+    pub curve: [f64; 2],
+    /// Committed pressure, Pa; > 0: a foot stands here.
+    pub pressure: f64,
+    /// Shear history of the present contact.
+    pub shear: ShearState,
+    /// Number of the commit at which the node was last loaded; 0: no foot stands here.
+    pub stamp: u64,
+}
+
+impl NodeState {
+    /// Whether a foot stands here.
+    #[inline]
+    pub fn loaded(&self) -> bool {
+        self.stamp != 0
+    }
+
+    fn add_loose(&mut self, change: f64) {
+        let filled = change.clamp(0.0, self.permanent);
+        self.permanent -= filled;
+        self.reference += change - filled;
+        self.curve = [0.0; 2];
+    }
+}
+
+/// What is kept of a node that no foot stands on, in 32 bits: the permanent depth in halves of a unit of height
+/// (23 bits, to 1 m) and the remainder of the surface in 1/512 of a unit (9 bits). A foot that comes back finds its
+/// pressure to about 0.1 Pa.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+struct Kept(u32);
+
+impl Kept {
+    const HALF: f64 = 0.5 * UNIT_M;
+    const FINE: f64 = UNIT_M / 512.0;
+    const DEEPEST: f64 = 8_388_607.0;
+
+    fn new(permanent: f64, remainder: f64) -> Self {
+        let halves = (permanent / Self::HALF).round().clamp(0.0, Self::DEEPEST) as u32;
+        if halves == 0 {
+            return Self(0);
+        }
+        let fine = (remainder / Self::FINE).round().clamp(-256.0, 255.0) as i32 + 256;
+        Self(halves << 9 | fine as u32)
+    }
+
+    fn permanent(self) -> f64 {
+        f64::from(self.0 >> 9) * Self::HALF
+    }
+
+    fn remainder(self) -> f64 {
+        if self.0 == 0 { 0.0 } else { f64::from((self.0 & 511) as i32 - 256) * Self::FINE }
+    }
+
+    /// After `units` of loose material have filled the hollow.
+    fn filled(self, units: i32) -> Self {
+        let left = (self.0 >> 9).saturating_sub(2 * units.max(0) as u32);
+        if left == 0 { Self(0) } else { Self(left << 9 | self.0 & 511) }
+    }
+}
+
+/// Numbers of the contacts in a tile.
+#[derive(Clone, Debug)]
+struct Index {
+    tile: u32,
+    used: u32,
+    places: Box<[u32; TILE_NODES]>,
+}
+
+/// The states of all nodes.
+#[derive(Clone, Debug)]
+pub struct NodeStates {
+    kept: TileMap<Kept>,
+    /// Per tile of the lattice its index; [`ABSENT`]: no foot stands in it.
+    tiles: Vec<u32>,
+    indices: Vec<Index>,
+    spare: Vec<Index>,
+    nodes: Vec<[i32; 2]>,
+    contacts: Vec<NodeState>,
+}
+
+/// Exact copy of all states.
+#[derive(Clone, Debug, Default)]
+pub struct NodesSnapshot {
+    kept: TileMapSnapshot<Kept>,
+    nodes: Vec<[i32; 2]>,
+    contacts: Vec<NodeState>,
+}
+
+impl NodeStates {
+    /// Untouched ground.
+    pub fn new(lattice: Lattice) -> Self {
+        let index = || Index { tile: 0, used: 0, places: Box::new([ABSENT; TILE_NODES]) };
+        let count = lattice.tile_count();
+        let mut spare = Vec::with_capacity(2 * RESERVE_INDEX);
+        spare.extend((0..RESERVE_INDEX.min(count)).map(|_| index()));
+        Self {
+            kept: TileMap::new(lattice, Kept::default(), RESERVE_TILES),
+            tiles: vec![ABSENT; count],
+            indices: Vec::with_capacity(2 * RESERVE_INDEX),
+            spare,
+            nodes: Vec::with_capacity(RESERVE_NODES),
+            contacts: Vec::with_capacity(RESERVE_NODES),
+        }
+    }
+
+    #[inline]
+    fn place(&self, i: i32, j: i32) -> (usize, usize, u32) {
+        let lattice = self.kept.lattice();
+        let (i, j) = lattice.clamp(i, j);
+        let (tile, k) = lattice.locate(i, j);
+        let place = match self.tiles[tile] {
+            ABSENT => ABSENT,
+            index => self.indices[index as usize].places[k],
+        };
+        (tile, k, place)
+    }
+
+    /// State of node (i, j); indices outside read the nearest node of the edge.
+    #[inline]
+    pub fn get(&self, i: i32, j: i32) -> NodeState {
+        let (tile, k, place) = self.place(i, j);
+        if place != ABSENT {
+            return self.contacts[place as usize];
+        }
+        let kept = self.kept.tile(tile).map_or(Kept::default(), |tile| tile[k]);
+        NodeState { permanent: kept.permanent(), remainder: kept.remainder(), ..NodeState::default() }
+    }
+
+    /// The state of a node where a foot stands, for writing; made when it is not there.
+    #[inline]
+    pub fn enter(&mut self, i: i32, j: i32) -> &mut NodeState {
+        let (tile, k, mut place) = self.place(i, j);
+        if place == ABSENT {
+            let state = self.get(i, j);
+            place = self.contacts.len() as u32;
+            self.contacts.push(state);
+            self.nodes.push([i, j]);
+            self.list(tile, k, place);
+        }
+        &mut self.contacts[place as usize]
+    }
+
+    /// The state of a node where a foot stands, for writing.
+    #[inline]
+    pub fn get_mut(&mut self, i: i32, j: i32) -> Option<&mut NodeState> {
+        let (_, _, place) = self.place(i, j);
+        self.contacts.get_mut(place as usize)
+    }
+
+    fn list(&mut self, tile: usize, k: usize, place: u32) {
+        if self.tiles[tile] == ABSENT {
+            let index = self.spare.pop();
+            let mut index =
+                index.unwrap_or_else(|| Index { tile: 0, used: 0, places: Box::new([ABSENT; TILE_NODES]) });
+            index.tile = tile as u32;
+            self.tiles[tile] = self.indices.len() as u32;
+            self.indices.push(index);
+        }
+        let index = &mut self.indices[self.tiles[tile] as usize];
+        index.used += u32::from(index.places[k] == ABSENT);
+        index.places[k] = place;
+    }
+
+    /// The foot has left node (i, j), whose booked height is `height` (m): only the depth that stays is kept.
+    pub fn leave(&mut self, i: i32, j: i32, height: f64) {
+        let (tile, k, place) = self.place(i, j);
+        if place == ABSENT {
+            return;
+        }
+        self.nodes.swap_remove(place as usize);
+        let state = self.contacts.swap_remove(place as usize);
+        if let Some([i, j]) = self.nodes.get(place as usize).copied() {
+            let (tile, k, _) = self.place(i, j);
+            self.list(tile, k, place);
+        }
+        self.unlist(tile, k);
+        let remainder = state.reference - state.permanent - height;
+        self.keep(tile, k, Kept::new(state.permanent, remainder));
+    }
+
+    fn keep(&mut self, tile: usize, k: usize, kept: Kept) {
+        if kept != Kept::default() || self.kept.tile(tile).is_some() {
+            self.kept.tile_mut(tile)[k] = kept;
+        }
+    }
+
+    fn unlist(&mut self, tile: usize, k: usize) {
+        let number = self.tiles[tile];
+        let index = &mut self.indices[number as usize];
+        index.places[k] = ABSENT;
+        index.used -= 1;
+        if index.used == 0 {
+            self.tiles[tile] = ABSENT;
+            self.spare.push(self.indices.swap_remove(number as usize));
+            if let Some(moved) = self.indices.get(number as usize) {
+                self.tiles[moved.tile as usize] = number;
+            }
+        }
+    }
+
+    /// `units` of material came to node (i, j) or went (< 0).
+    #[inline]
+    pub fn add_loose(&mut self, i: i32, j: i32, units: i32) {
+        let (tile, k, place) = self.place(i, j);
+        if place != ABSENT {
+            self.contacts[place as usize].add_loose(f64::from(units) * UNIT_M);
+        } else if units > 0 && self.kept.tile(tile).is_some_and(|tile| tile[k] != Kept::default()) {
+            let kept = &mut self.kept.tile_mut(tile)[k];
+            *kept = kept.filled(units);
+        }
+    }
+
+    /// Copies all states into `out`.
+    pub fn save(&self, out: &mut NodesSnapshot) {
+        self.kept.save(&mut out.kept);
+        out.nodes.clone_from(&self.nodes);
+        out.contacts.clone_from(&self.contacts);
+    }
+
+    /// Back to a saved state.
+    pub fn restore(&mut self, saved: &NodesSnapshot) {
+        self.kept.restore(&saved.kept);
+        for mut index in self.indices.drain(..) {
+            self.tiles[index.tile as usize] = ABSENT;
+            index.places.fill(ABSENT);
+            index.used = 0;
+            self.spare.push(index);
+        }
+        self.nodes.clone_from(&saved.nodes);
+        self.contacts.clone_from(&saved.contacts);
+        for place in 0..self.nodes.len() {
+            let [i, j] = self.nodes[place];
+            let (tile, k, _) = self.place(i, j);
+            self.list(tile, k, place as u32);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+    use std::collections::BTreeMap;
+
+    proptest! {
+        #[test]
+        fn contacts_come_and_go_and_leave_their_depth(
+            actions in prop::collection::vec((0..40i32, 0..40i32, 0..4u32, 0.0..0.1f64), 1..300),
+        ) {
+            let lattice = Lattice { origin: [0.0; 2], spacing: 0.01, size: [40, 40] };
+            let mut states = NodeStates::new(lattice);
+            let mut model: BTreeMap<(i32, i32), (bool, f64)> = BTreeMap::new();
+            let mut saved = (NodesSnapshot::default(), model.clone());
+            states.save(&mut saved.0);
+            for (i, j, action, depth) in actions {
+                let entry = model.entry((i, j)).or_default();
+                match action {
+                    0 | 1 => {
+                        let state = states.enter(i, j);
+                        (state.permanent, state.reference, state.stamp) = (depth, depth, 1);
+                        *entry = (true, depth);
+                    }
+                    2 => {
+                        states.leave(i, j, 0.0);
+                        *entry = (false, Kept::new(entry.1, 0.0).permanent());
+                    }
+                    _ if depth < 0.01 => {
+                        states.restore(&saved.0);
+                        model = saved.1.clone();
+                    }
+                    _ => {
+                        states.save(&mut saved.0);
+                        saved.1.clone_from(&model);
+                    }
+                }
+            }
+            for j in 0..40 {
+                for i in 0..40 {
+                    let (loaded, depth) = model.get(&(i, j)).copied().unwrap_or_default();
+                    prop_assert_eq!(states.get(i, j).loaded(), loaded);
+                    prop_assert_eq!(states.get(i, j).permanent, depth);
+                }
+            }
+        }
+    }
+}

@@ -1,12 +1,20 @@
-//! Sparse symmetric factorisation of the joint system in tree order; the one crate that compiles faer.
+//! Exact elimination of the joint system [[M, Jᵀ], [J, −C]] of trees of bodies.
 //!
-//! The matrix [[M, Jᵀ], [J, −C]] of a tree of bodies is quasi-definite. Numbered from the leaves to the root
-//! (each body before the joint to its parent, the joint before the parent) its LDLᵀ has no fill outside the
-//! blocks that it already has and needs no pivoting (Baraff 1996, "Linear-time dynamics using Lagrange
-//! multipliers"; Vanderbei 1995 on quasi-definite matrices). The analysis is done once, [`Solver::factor`] is
-//! repeated with new values. The interface is not generic, so faer is compiled here and nowhere else.
+//! * [`Tree`] eliminates each body and the joint above it from the leaves to the root in blocks of fixed size:
+//!   O(n), no pivoting, every pivot positive. It serves any number of trees at once.
+//! * [`Path`] answers "how does a wrench on this body move that body" by the path to the root alone, which is all
+//!   that contacts need of the inverse.
+//! * [`Rows`] is the geometry of a joint: six directions, each rigid, compliant or free.
+//!
+//! The numbering of the unknowns: six rates for each body, then six impulses for each joint. Nothing here knows
+//! time, motors or contacts.
 
-mod solver;
-mod triangular;
+mod path;
+mod rows;
+mod spatial;
+mod tree;
 
-pub use solver::{Error, Solver};
+pub use path::Path;
+pub use rows::Rows;
+pub use spatial::Wrench;
+pub use tree::{Error, Link, Tree};

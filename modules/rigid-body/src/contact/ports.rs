@@ -3,6 +3,7 @@
 use crate::dynamics::Dynamics;
 use crate::math::{V3, cayley, cayley_vector};
 use crate::state::Motion;
+use terraglue_linear_solver::Path;
 use terraglue_subsystem::{Port, Response};
 
 /// One packed component: a generalised direction on one body.
@@ -19,8 +20,9 @@ struct Component {
 #[derive(Default)]
 pub(crate) struct Ports {
     components: Vec<Component>,
-    /// L⁻¹ of each component's right-hand side; zero outside its path.
-    forward: Vec<f64>,
+    /// Answer of the factor to each component, along its path to the root; `stride` entries each.
+    answers: Vec<f64>,
+    stride: usize,
     g: Vec<f64>,
     scratch: Vec<f64>,
     /// Number of the factorisation that `g` belongs to; 0: none.
@@ -84,30 +86,31 @@ impl Ports {
 
     /// G = dX/d(wrench on itself) = h²·J·K⁻¹·Jᵀ for the current factor, column-major.
     ///
-    /// Only half a solve per component, and only along the path from its body to the root:
-    /// J·K⁻¹·Jᵀ = (L⁻¹Jᵀ)ᵀ·D⁻¹·(L⁻¹Jᵀ).
+    /// Only along the paths of the bodies to the root: see [`Path`].
     pub fn compliance(&mut self, dynamics: &Dynamics) -> &[f64] {
-        let (n, unknowns) = (self.components.len(), dynamics.kkt.len());
+        let n = self.components.len();
         if self.g_of == dynamics.factor_count && !dynamics.self_contact.pressing() && self.g.len() == n * n {
             return &self.g;
         }
-        let solver = &dynamics.kkt.solver;
-        self.forward.clear();
-        self.forward.resize(n * unknowns, 0.0);
-        for (component, y) in self.components.iter().zip(self.forward.chunks_exact_mut(unknowns.max(1))) {
-            let at = dynamics.kkt.body_at[component.body];
-            y[at..at + 6].copy_from_slice(&component.row);
-            solver.forward_on_path(at, y);
+        let tree = &dynamics.kkt.solver;
+        self.stride = self.components.iter().map(|c| Path::len(tree, c.body)).max().unwrap_or(0);
+        self.answers.clear();
+        self.answers.resize(n * self.stride, 0.0);
+        for (component, y) in self.components.iter().zip(self.answers.chunks_exact_mut(self.stride.max(1))) {
+            Path::respond(tree, component.body, &component.row, y);
         }
         self.g.clear();
         self.g.resize(n * n, 0.0);
         let h2 = dynamics.h * dynamics.h;
+        let (mut pair, mut shared) = ([usize::MAX; 2], 0);
         for i in 0..n {
-            let at = dynamics.kkt.body_at[self.components[i].body];
-            let y = &self.forward[i * unknowns..][..unknowns];
             for k in 0..=i {
-                let z = &self.forward[k * unknowns..][..unknowns];
-                let sum: f64 = solver.path(at).map(|u| y[u] * z[u] / solver.pivot(u)).sum();
+                let bodies = [self.components[i].body, self.components[k].body];
+                if bodies != pair {
+                    (pair, shared) = (bodies, Path::shared(tree, bodies[0], bodies[1]));
+                }
+                let answer = |c: usize| &self.answers[c * self.stride..];
+                let sum = Path::dot(shared, answer(i), answer(k));
                 self.g[k * n + i] = h2 * sum;
                 self.g[i * n + k] = h2 * sum;
             }
@@ -119,7 +122,7 @@ impl Ports {
                 let at = dynamics.kkt.body_at[components[p].body];
                 dynamics.h * components[p].row.iter().zip(&v[at..at + 6]).map(|(r, v)| r * v).sum::<f64>()
             };
-            dynamics.self_contact.stiffen(n, &mut self.g, unknowns, &rate, &mut self.scratch);
+            dynamics.self_contact.stiffen(n, &mut self.g, dynamics.kkt.len(), &rate, &mut self.scratch);
             self.g_of = 0;
         }
         &self.g

@@ -13,7 +13,7 @@ use nalgebra::{Isometry3, Translation3};
 use parry3d_f64::math::Pose;
 use parry3d_f64::query;
 use parry3d_f64::shape::SharedShape;
-use terraglue_linear_solver::Solver;
+use terraglue_linear_solver::Tree;
 use terraglue_robot_import::{Shape, ShapeGeometry};
 
 /// Pairs that come nearer than this within the step are watched, m.
@@ -164,7 +164,7 @@ impl SelfContact {
     }
 
     /// Adds the impulses that keep the constraints to a solution of the system. False: no solution was found.
-    pub fn resolve(&mut self, solver: &Solver, body_at: &[usize], solution: &mut [f64]) -> bool {
+    pub fn resolve(&mut self, solver: &Tree, body_at: &[usize], solution: &mut [f64]) -> bool {
         self.impulses.fill(0.0);
         let (m, n) = (self.constraints.len(), solution.len());
         if m == 0 {
@@ -191,7 +191,7 @@ impl SelfContact {
         true
     }
 
-    fn fill_responses(&mut self, solver: &Solver, body_at: &[usize], n: usize) {
+    fn fill_responses(&mut self, solver: &Tree, body_at: &[usize], n: usize) {
         self.responses.clear();
         self.responses.resize(self.constraints.len() * n, 0.0);
         for (c, response) in self.constraints.iter().zip(self.responses.chunks_exact_mut(n)) {

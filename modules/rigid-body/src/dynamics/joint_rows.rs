@@ -6,13 +6,7 @@
 use crate::math::{Q, V3, unwrap_angle};
 use crate::model::{Joint, Kind};
 use crate::state::Motion;
-
-/// Jacobians of the six rows: rates of centre of mass (3) and rotation (3) in world axes.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct JointRows {
-    pub child: [[f64; 6]; 6],
-    pub parent: [[f64; 6]; 6],
-}
+use terraglue_linear_solver::Rows;
 
 fn world() -> Motion {
     Motion::at(V3::zeros(), Q::identity())
@@ -23,34 +17,13 @@ fn parent_of(joint: &Joint, bodies: &[Motion]) -> Motion {
     joint.parent.map_or_else(world, |p| bodies[p])
 }
 
-impl JointRows {
-    /// At the given poses.
-    pub fn new(joint: &Joint, bodies: &[Motion]) -> Self {
-        let (parent, child) = (parent_of(joint, bodies), &bodies[joint.child]);
-        let frame = (parent.q * joint.parent_frame).to_rotation_matrix();
-        let anchor = child.q * joint.child_anchor;
-        let lever = child.c + anchor - parent.c;
-        let mut rows = Self::default();
-        for k in 0..3 {
-            let d: V3 = frame.matrix().column(k).into();
-            let (on_child, on_parent) = (anchor.cross(&d), lever.cross(&d));
-            for i in 0..3 {
-                rows.child[k][i] = d[i];
-                rows.child[k][3 + i] = on_child[i];
-                rows.child[3 + k][3 + i] = d[i];
-                rows.parent[k][i] = -d[i];
-                rows.parent[k][3 + i] = -on_parent[i];
-                rows.parent[3 + k][3 + i] = -d[i];
-            }
-        }
-        rows
-    }
-
-    /// J·v of one row.
-    pub fn rate(&self, row: usize, child: &[f64], parent: Option<&[f64]>) -> f64 {
-        let dot = |a: &[f64; 6], v: &[f64]| a.iter().zip(v).map(|(a, v)| a * v).sum::<f64>();
-        dot(&self.child[row], child) + parent.map_or(0.0, |p| dot(&self.parent[row], p))
-    }
+/// Directions of the rows at the given poses.
+pub(crate) fn rows(joint: &Joint, bodies: &[Motion]) -> Rows {
+    let (parent, child) = (parent_of(joint, bodies), &bodies[joint.child]);
+    let frame = (parent.q * joint.parent_frame).to_rotation_matrix();
+    let direction = |k: usize| frame.matrix().column(k).into();
+    let anchor = child.q * joint.child_anchor;
+    Rows { directions: std::array::from_fn(|r| direction(r % 3)), anchor, lever: child.c + anchor - parent.c }
 }
 
 /// How far the joint is out of place, in the rows' order, m and rad; the free row is 0.

@@ -17,9 +17,9 @@ use crate::drive::{Axis, Law, Mode};
 use crate::math::{M3, V3, cayley};
 use crate::model::Model;
 use crate::state::{Motion, State};
-use joint_rows::{JointRows, coordinate, gap};
+use joint_rows::{coordinate, gap};
 use kkt::Kkt;
-use terraglue_linear_solver::Error as SolverError;
+use terraglue_linear_solver::{Error as SolverError, Rows};
 
 /// Joints are closed to this at the end of every step, m and rad.
 const GAP_TOLERANCE: f64 = 1e-11;
@@ -63,7 +63,7 @@ pub(crate) struct Dynamics {
     /// World rates of free rotation in the middle and at the end of the step.
     middle_rate: Vec<V3>,
     free_rate: Vec<V3>,
-    rows: Vec<JointRows>,
+    rows: Vec<Rows>,
     pub axes: Vec<Axis>,
     /// Per axis: change of the coordinate over h less J·v⁺, from the curvature of the motion.
     curvature: Vec<f64>,
@@ -108,7 +108,7 @@ impl Dynamics {
             inertia: vec![M3::zeros(); nb],
             middle_rate: vec![V3::zeros(); nb],
             free_rate: vec![V3::zeros(); nb],
-            rows: vec![JointRows::default(); nj],
+            rows: vec![Rows::default(); nj],
             axes: vec![idle; nj],
             curvature: vec![0.0; nj],
             broken: vec![false; nj],
@@ -169,34 +169,35 @@ impl Dynamics {
         for (j, joint) in self.model.joints.iter().enumerate() {
             let s = &state.joints[j];
             self.broken[j] = s.broken;
-            self.rows[j] = JointRows::new(joint, &self.starts);
+            self.rows[j] = joint_rows::rows(joint, &self.starts);
             self.axes[j] = Axis::new(s, joint.limits, self.h);
             self.modes[j] = self.axes[j].start(s.mode);
             let open = gap(joint, &self.ends);
+            let rates = self.rates(j, &self.free);
             let at = self.kkt.joint_at[j];
             if let Some(free) = joint.free_row() {
                 let travel = coordinate(joint, &self.ends, s.angle) - s.angle;
-                self.curvature[j] = travel / self.h - self.rate(j, free, &self.free);
+                self.curvature[j] = travel / self.h - rates[free];
             }
             for (r, open) in open.iter().enumerate() {
-                let hold = self.rate(j, r, &self.free) - open / self.h;
+                let hold = rates[r] - open / self.h;
                 self.base_rhs[at + r] = if s.broken || joint.free_row() == Some(r) { 0.0 } else { hold };
             }
         }
     }
 
-    /// J·v of row r of joint j.
-    fn rate(&self, j: usize, r: usize, v: &[f64]) -> f64 {
+    /// J·v of all rows of joint j.
+    fn rates(&self, j: usize, v: &[f64]) -> [f64; 6] {
         let joint = &self.model.joints[j];
         let of = |b: usize| &v[self.kkt.body_at[b]..][..6];
-        self.rows[j].rate(r, of(joint.child), joint.parent.map(of))
+        self.rows[j].rates(of(joint.child), joint.parent.map(of))
     }
 
     /// The free axis of joint j in the trial; none where nothing moves or it is broken.
     pub fn axis_result(&self, j: usize) -> Option<AxisResult> {
         let free = self.model.joints[j].free_row().filter(|_| !self.broken[j])?;
-        let rate = self.rate(j, free, &self.solution);
-        let mean_rate = 0.5 * (rate + self.rate(j, free, &self.free));
+        let rate = self.rates(j, &self.solution)[free];
+        let mean_rate = 0.5 * (rate + self.rates(j, &self.free)[free]);
         let row = self.axes[j].row(self.modes[j]).is_some();
         let impulse = if row {
             -self.solution[self.kkt.joint_at[j] + free]
@@ -222,7 +223,7 @@ impl Dynamics {
                 };
             }
         }
-        self.kkt.factor(&self.model, &self.inertia, &self.rows, &self.compliance)?;
+        self.kkt.factor(&self.inertia, &self.rows, &self.compliance)?;
         self.factored = true;
         self.factor_count += 1;
         Ok(())
@@ -268,13 +269,13 @@ impl Dynamics {
             if impulse == 0.0 {
                 continue;
             }
-            let mut add = |body: usize, row: &[f64; 6]| {
+            let mut add = |body: usize, row: [f64; 6]| {
                 let at = self.kkt.body_at[body];
                 self.rhs[at..at + 6].iter_mut().zip(row).for_each(|(r, j)| *r += impulse * j);
             };
-            add(joint.child, &self.rows[j].child[free]);
+            add(joint.child, self.rows[j].on_child(free));
             if let Some(parent) = joint.parent {
-                add(parent, &self.rows[j].parent[free]);
+                add(parent, self.rows[j].on_parent(free));
             }
         }
     }

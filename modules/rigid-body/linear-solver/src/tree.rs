@@ -1,0 +1,319 @@
+//! Factor and solution of [[M, Jᵀ], [J, −C]]·(v, μ) = (f, b) for trees of bodies.
+//!
+//! Each body and the joint above it are eliminated together, leaf to root. With A the inertia of the body and all
+//! that hangs below, S the motions that the joint's rows allow and K = 1/C along them, the parent feels
+//! Xᵀ(A − A·S·(SᵀAS + K)⁻¹·SᵀA)X: the Schur complement of body and rows in the whole matrix, which for K = 0 is the
+//! articulated-body inertia of Featherstone (1983); that it is block elimination of the system with multipliers
+//! is due to Baraff (1996). The directions are taken out one at a time, so each pivot SᵀAS + K is a positive
+//! number, and no block is ever inverted.
+
+use crate::rows::Rows;
+use crate::spatial::{
+    Inertia, Wrench, add, add_shifted, at, deflate, dot, of_body, rates_further, times, wrench_back,
+};
+use nalgebra::{Matrix3, Vector3};
+
+/// What can go wrong.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// A parent does not come before its child.
+    #[error("body {body} comes before its parent")]
+    Order {
+        /// The child.
+        body: usize,
+    },
+    /// A pivot is not positive: a body without inertia, or masses too far apart for the number format.
+    #[error("the pivot of body {body} is {pivot}; its inertia is not positive, or masses lie too far apart")]
+    Pivot {
+        /// Index of the body.
+        body: usize,
+        /// What should have been positive.
+        pivot: f64,
+    },
+    /// The right-hand side is not finite.
+    #[error("the right-hand side or the solution is not finite")]
+    NotFinite,
+}
+
+/// How a body hangs in its tree.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Link {
+    /// The body above; none: the world, or nothing.
+    pub parent: Option<usize>,
+    /// The joint above; none: the body is free.
+    pub joint: Option<usize>,
+}
+
+/// A direction in which a body can move against its parent.
+#[derive(Clone, Copy, Debug, Default)]
+struct Freedom {
+    /// Row of the joint.
+    row: usize,
+    /// Rates of the body for a unit rate along the row.
+    motion: Wrench,
+    /// A·motion, with the freedoms before it taken out.
+    response: Wrench,
+    /// 1/(motionᵀ·response + K).
+    inverse: f64,
+    /// K: 1/compliance of the row; 0: free.
+    stiffness: f64,
+}
+
+/// Numbers of one body and the joint above it.
+#[derive(Clone, Copy, Debug, Default)]
+struct Node {
+    parent: Option<usize>,
+    joint: Option<usize>,
+    /// Whether the joint holds at all; without, the body is a root.
+    hangs: bool,
+    inertia: Inertia,
+    /// From the parent's centre of mass to its own.
+    shift: Vector3<f64>,
+    rows: Rows,
+    rigid: [bool; 6],
+    freedoms: [Freedom; 6],
+    count: usize,
+    /// Freedoms of this body and all above it.
+    path_len: usize,
+}
+
+/// Trees of bodies.
+#[derive(Clone, Debug)]
+pub struct Tree {
+    nodes: Vec<Node>,
+    joints: usize,
+}
+
+impl Tree {
+    /// From the links of all bodies, parents first, and the number of joints.
+    pub fn new(links: &[Link], joints: usize) -> Result<Self, Error> {
+        let late = links.iter().enumerate().find(|(b, l)| l.parent.is_some_and(|p| p >= *b));
+        if let Some((body, _)) = late {
+            return Err(Error::Order { body });
+        }
+        let node = |l: &Link| Node { parent: l.parent, joint: l.joint, ..Node::default() };
+        Ok(Self { nodes: links.iter().map(node).collect(), joints })
+    }
+
+    /// Number of unknowns.
+    pub fn len(&self) -> usize {
+        6 * (self.nodes.len() + self.joints)
+    }
+
+    /// Whether there are no unknowns.
+    pub fn is_empty(&self) -> bool {
+        self.nodes.is_empty()
+    }
+
+    /// First unknown of a body: its six rates.
+    pub fn body_at(&self, body: usize) -> usize {
+        6 * body
+    }
+
+    /// First unknown of a joint: its six impulses with the sign of μ (an impulse on the child is −Jᵀμ).
+    pub fn joint_at(&self, joint: usize) -> usize {
+        6 * (self.nodes.len() + joint)
+    }
+
+    /// Factorises. Per body its mass (kg) and inertia about the centre of mass (kg m², world axes); per joint its
+    /// rows and their compliance: `Some(0)` rigid, `Some(c)` compliant, `None` no row at all.
+    pub fn factor(
+        &mut self,
+        masses: &[f64],
+        inertia: &[Matrix3<f64>],
+        rows: &[Rows],
+        compliance: &[[Option<f64>; 6]],
+    ) -> Result<(), Error> {
+        for (b, node) in self.nodes.iter_mut().enumerate() {
+            node.inertia = of_body(masses[b], &inertia[b]);
+            node.set_rows(rows, compliance);
+        }
+        for b in (0..self.nodes.len()).rev() {
+            let mut left = self.nodes[b].inertia;
+            self.nodes[b].eliminate(&mut left).map_err(|pivot| Error::Pivot { body: b, pivot })?;
+            let Node { parent, hangs, shift, .. } = self.nodes[b];
+            if let Some(p) = parent.filter(|_| hangs) {
+                add_shifted(&mut self.nodes[p].inertia, &left, &shift);
+            }
+        }
+        for b in 0..self.nodes.len() {
+            self.nodes[b].path_len =
+                self.above(b).map_or(0, |p| self.nodes[p].path_len) + self.nodes[b].count;
+        }
+        Ok(())
+    }
+
+    /// The body that b hangs on at present.
+    pub(crate) fn above(&self, b: usize) -> Option<usize> {
+        self.nodes[b].parent.filter(|_| self.nodes[b].hangs)
+    }
+
+    pub(crate) fn path_len(&self, b: usize) -> usize {
+        self.nodes[b].path_len
+    }
+
+    /// Takes the freedoms of body b out of a wrench on it and hands the rest to the body above. `each` receives
+    /// every freedom's share, divided by the root of its pivot, last freedom of the row order last.
+    pub(crate) fn pass_up(&self, b: usize, p: &mut Wrench, mut each: impl FnMut(f64)) -> Option<usize> {
+        let node = &self.nodes[b];
+        for f in &node.freedoms[..node.count] {
+            let share = dot(&f.motion, p) * f.inverse;
+            each(share / f.inverse.sqrt());
+            add(p, -share, &f.response);
+        }
+        *p = wrench_back(p, &node.shift);
+        self.above(b)
+    }
+
+    /// Overwrites the right-hand side (f, b) by the solution (v, μ). Rows that do not exist get μ = 0; the
+    /// right-hand side there is of no effect.
+    pub fn substitute(&self, x: &mut [f64]) {
+        for (b, node) in self.nodes.iter().enumerate().rev() {
+            let rest = node.forward(b, x, 6 * self.nodes.len());
+            if let Some(p) = node.parent.filter(|_| node.hangs) {
+                x[6 * p..6 * p + 6].iter_mut().zip(rest).for_each(|(x, r)| *x += r);
+            }
+        }
+        for (b, node) in self.nodes.iter().enumerate() {
+            node.backward(b, x, 6 * self.nodes.len());
+        }
+    }
+
+    /// The same for a right-hand side that is kept; says so when the solution is not finite.
+    pub fn solve(&self, rhs: &[f64], x: &mut [f64]) -> Result<(), Error> {
+        x.copy_from_slice(rhs);
+        self.substitute(x);
+        // A sum is finite only if all its terms are.
+        if x.iter().sum::<f64>().is_finite() { Ok(()) } else { Err(Error::NotFinite) }
+    }
+}
+
+impl Node {
+    fn set_rows(&mut self, rows: &[Rows], compliance: &[[Option<f64>; 6]]) {
+        let given = self.joint.map(|j| (&rows[j], &compliance[j]));
+        self.count = 0;
+        self.rigid = [false; 6];
+        let Some((rows, compliance)) = given.filter(|(_, c)| c.iter().any(Option::is_some)) else {
+            self.hangs = false;
+            for k in 0..6 {
+                self.freedoms[k] = Freedom { row: k, ..Freedom::default() };
+                self.freedoms[k].motion[k] = 1.0;
+            }
+            (self.count, self.shift) = (6, Vector3::zeros());
+            return;
+        };
+        self.hangs = true;
+        self.rows = *rows;
+        self.shift = rows.lever - rows.anchor;
+        for (r, c) in compliance.iter().enumerate() {
+            match c {
+                Some(c) if *c <= 0.0 => self.rigid[r] = true,
+                _ => {
+                    let stiffness = c.map_or(0.0, |c| 1.0 / c);
+                    self.freedoms[self.count] =
+                        Freedom { row: r, motion: rows.motion(r), stiffness, ..Freedom::default() };
+                    self.count += 1;
+                }
+            }
+        }
+    }
+
+    /// Takes the freedoms out of `a`; the pivot that was not positive, if any.
+    fn eliminate(&mut self, a: &mut Inertia) -> Result<(), f64> {
+        for f in &mut self.freedoms[..self.count] {
+            f.response = times(a, &f.motion);
+            let pivot = dot(&f.motion, &f.response) + f.stiffness;
+            if !(pivot > 0.0 && pivot.is_finite()) {
+                return Err(pivot);
+            }
+            f.inverse = 1.0 / pivot;
+            deflate(a, f.inverse, &f.response);
+        }
+        Ok(())
+    }
+
+    /// Rates of the body that the rigid rows ask for against a parent at rest.
+    #[inline]
+    fn asked(&self, b: &Wrench) -> Option<Wrench> {
+        let mut asked = [0.0; 6];
+        let mut any = false;
+        for r in 0..6 {
+            if self.rigid[r] && b[r] != 0.0 {
+                add(&mut asked, b[r], &self.rows.motion(r));
+                any = true;
+            }
+        }
+        any.then_some(asked)
+    }
+
+    /// Eliminates the body from the right-hand side; what is left for the parent. Leaves each freedom's own share
+    /// in its row, or for a root in its rates.
+    #[inline]
+    fn forward(&self, b: usize, x: &mut [f64], joints_at: usize) -> Wrench {
+        let mut p = at(x, 6 * b);
+        let Some(joint) = self.joint.filter(|_| self.hangs) else {
+            for f in &self.freedoms[..self.count] {
+                let share = p[f.row] * f.inverse;
+                add(&mut p, -share, &f.response);
+                x[6 * b + f.row] = share;
+            }
+            return p;
+        };
+        let row_at = joints_at + 6 * joint;
+        let rhs = at(x, row_at);
+        if let Some(asked) = self.asked(&rhs) {
+            add(&mut p, -1.0, &times(&self.inertia, &asked));
+        }
+        for f in &self.freedoms[..self.count] {
+            let share = (dot(&f.motion, &p) + f.stiffness * rhs[f.row]) * f.inverse;
+            add(&mut p, -share, &f.response);
+            x[row_at + f.row] = share;
+        }
+        wrench_back(&p, &self.shift)
+    }
+
+    /// Rates of the body from those of its parent, and the impulses of its joint.
+    #[inline]
+    fn backward(&self, b: usize, x: &mut [f64], joints_at: usize) {
+        let Some(joint) = self.joint.filter(|_| self.hangs) else {
+            for k in (0..6).rev() {
+                let f = &self.freedoms[k];
+                let later: f64 = (k + 1..6).map(|i| f.response[i] * x[6 * b + i]).sum();
+                x[6 * b + k] -= f.inverse * later;
+            }
+            if let Some(joint) = self.joint {
+                x[joints_at + 6 * joint..joints_at + 6 * joint + 6].fill(0.0);
+            }
+            return;
+        };
+        let row_at = joints_at + 6 * joint;
+        let p = at(x, 6 * b);
+        let carried = match self.parent {
+            Some(parent) => rates_further(&at(x, 6 * parent), &self.shift),
+            None => [0.0; 6],
+        };
+        let mut v = carried;
+        for f in self.freedoms[..self.count].iter().rev() {
+            let rate = x[row_at + f.row] - f.inverse * dot(&f.response, &v);
+            add(&mut v, rate, &f.motion);
+        }
+        if let Some(asked) = self.asked(&at(x, row_at)) {
+            add(&mut v, 1.0, &asked);
+        }
+        // What the joint carries: Jᵀμ = p − A·v.
+        let mut carried = p;
+        add(&mut carried, -1.0, &times(&self.inertia, &v));
+        let exists: [bool; 6] = self.exists();
+        for r in 0..6 {
+            x[row_at + r] = if exists[r] { dot(&self.rows.motion(r), &carried) } else { 0.0 };
+        }
+        x[6 * b..6 * b + 6].copy_from_slice(&v);
+    }
+
+    fn exists(&self) -> [bool; 6] {
+        let mut exists = self.rigid;
+        self.freedoms[..self.count].iter().for_each(|f| exists[f.row] |= f.stiffness > 0.0);
+        exists
+    }
+}

@@ -296,7 +296,13 @@ impl Shape {
         let small = width < 2.0 * lattice.spacing && depth < 2.0 * lattice.spacing;
         let [i, j] = lattice.coordinates(patch.origin[0], patch.origin[1]).map(|c| c.round() as i32);
         let area = (width * depth).min(lattice.spacing * lattice.spacing);
-        (small && lattice.has(i, j)).then_some(Node { i, j, area, lower: patch.origin[2] })
+        (small && lattice.has(i, j)).then_some(Node {
+            i,
+            j,
+            area,
+            lower: patch.origin[2],
+            slope: self.placed.underside_slope(patch.origin),
+        })
     }
 }
 

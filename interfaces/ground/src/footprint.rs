@@ -38,8 +38,9 @@ pub fn nodes_below<S: Surface + ?Sized>(shape: &Placed, surface: &S, margin: f64
                 continue;
             }
             let cell = Cell { at: lattice.position(i, j), half: 0.5 * lattice.spacing };
-            if let Some((area, lower)) = outline.node(shape, &cell, reach) {
-                out.push(Node { i, j, area, lower });
+            if let Some((area, [x, y, lower])) = outline.node(shape, &cell, reach) {
+                let slope = shape.underside_slope([x, y, lower]);
+                out.push(Node { i, j, area, lower, slope });
             }
         }
     }
@@ -78,23 +79,24 @@ impl Cell {
         (x * x + y * y).sqrt()
     }
 
-    /// Covered part by sample points, and the underside at the covered one nearest to the node.
-    fn sample(&self, shape: &Placed) -> (f64, f64) {
+    /// Covered part by sample points, and the point of the underside at the covered one nearest to the node.
+    fn sample(&self, shape: &Placed) -> (f64, [f64; 3]) {
         let step = 2.0 * self.half / f64::from(SAMPLES);
-        let (mut count, mut nearest, mut lower) = (0, f64::INFINITY, f64::INFINITY);
+        let (mut count, mut nearest, mut point) = (0, f64::INFINITY, [self.at[0], self.at[1], f64::INFINITY]);
         for b in 0..SAMPLES {
             for a in 0..SAMPLES {
                 let offset = |k: i32| (f64::from(k) + 0.5) * step - self.half;
                 let (dx, dy) = (offset(a), offset(b));
-                if let Some(z) = shape.lower(self.at[0] + dx, self.at[1] + dy) {
+                let (x, y) = (self.at[0] + dx, self.at[1] + dy);
+                if let Some(z) = shape.lower(x, y) {
                     count += 1;
                     if dx * dx + dy * dy < nearest {
-                        (nearest, lower) = (dx * dx + dy * dy, z);
+                        (nearest, point) = (dx * dx + dy * dy, [x, y, z]);
                     }
                 }
             }
         }
-        (f64::from(count) / f64::from(SAMPLES * SAMPLES), lower)
+        (f64::from(count) / f64::from(SAMPLES * SAMPLES), point)
     }
 }
 
@@ -112,23 +114,23 @@ impl Outline {
         }
     }
 
-    /// Covered area and lower surface of a node that is covered and lower than `reach`. The area, which costs
-    /// most, is asked for last.
-    fn node(&self, shape: &Placed, cell: &Cell, reach: f64) -> Option<(f64, f64)> {
+    /// Covered area and point of the lower surface of a node that is covered and lower than `reach`. The area,
+    /// which costs most, is asked for last.
+    fn node(&self, shape: &Placed, cell: &Cell, reach: f64) -> Option<(f64, [f64; 3])> {
         let hit = shape.lower(cell.at[0], cell.at[1]);
-        let (lower, sampled) = match (hit, self) {
-            (Some(lower), _) => (lower, None),
+        let (point, sampled) = match (hit, self) {
+            (Some(lower), _) => ([cell.at[0], cell.at[1], lower], None),
             (None, Self::Disc(centre, radius)) => (below_rim(shape, cell, *centre, *radius), None),
             (None, Self::Polygon(corners, count)) => {
                 let [x, y] = nearest_on(&corners[..*count], cell.at);
-                (shape.lower(x, y)?, None)
+                ([x, y, shape.lower(x, y)?], None)
             }
             (None, Self::Sampled) => {
                 let (share, nearest) = cell.sample(shape);
                 (nearest, Some(share))
             }
         };
-        if lower >= reach {
+        if point[2] >= reach {
             return None;
         }
         let share = match sampled {
@@ -136,7 +138,7 @@ impl Outline {
             None => self.share(shape, cell),
         };
         // Slivers of rounding are no contact.
-        (share > 1e-12).then(|| (share * cell.area(), lower))
+        (share > 1e-12).then(|| (share * cell.area(), point))
     }
 
     /// Covered part of a cell, 0 … 1.
@@ -156,10 +158,11 @@ impl Outline {
 }
 
 /// Underside at the point of a disc's rim nearest to a node outside it, drawn in by a rounding error's width.
-fn below_rim(shape: &Placed, cell: &Cell, centre: [f64; 2], radius: f64) -> f64 {
+fn below_rim(shape: &Placed, cell: &Cell, centre: [f64; 2], radius: f64) -> [f64; 3] {
     let (dx, dy) = (cell.at[0] - centre[0], cell.at[1] - centre[1]);
     let s = radius * (1.0 - 1e-12) / (dx * dx + dy * dy).sqrt();
-    shape.lower(centre[0] + s * dx, centre[1] + s * dy).unwrap_or(shape.pose().position[2])
+    let (x, y) = (centre[0] + s * dx, centre[1] + s * dy);
+    [x, y, shape.lower(x, y).unwrap_or(shape.pose().position[2])]
 }
 
 /// The point of a polygon's edge nearest to p, drawn a little towards the middle.

@@ -27,7 +27,7 @@ pub use height_field::{HeightError, HeightField, UNIT_M};
 pub use lattice::{Lattice, TILE_EDGE, TILE_NODES};
 pub use math::{Rotation, compose};
 pub use plane::{Plane, fit_plane};
-pub use shape::{Aabb, Placed, aabb, lower_surface};
+pub use shape::{Aabb, Placed, STEEPEST_SLOPE, aabb, lower_surface};
 pub use snapshot::HeightSnapshot;
 pub use tile_map::{TileMap, TileMapSnapshot};
 

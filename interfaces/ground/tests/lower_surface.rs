@@ -149,3 +149,30 @@ fn reference_point_of_a_plate_moves_smoothly_to_its_edge() {
     }
     assert!(before > 0.145);
 }
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(64))]
+    #[test]
+    fn the_slope_is_the_derivative_of_the_underside(
+        q in prop::array::uniform4(-1.0..1.0f64).prop_filter("length", |q| q.iter().map(|c| c * c).sum::<f64>() > 0.01),
+        at in prop::array::uniform2(-0.08..0.08f64),
+    ) {
+        let pose = pose_from(q, [0.3, -0.2, 0.5]);
+        let d = 1e-7;
+        for geometry in &shapes() {
+            let placed = Placed::new(geometry, &pose);
+            let (x, y) = (0.3 + at[0], -0.2 + at[1]);
+            let around = [placed.lower(x, y), placed.lower(x + d, y), placed.lower(x - d, y),
+                          placed.lower(x, y + d), placed.lower(x, y - d)];
+            let [Some(z), Some(e), Some(w), Some(n), Some(s)] = around else { continue };
+            // an edge within reach has no derivative, a wall more than is reported
+            let bend = (e - 2.0 * z + w).abs().max((n - 2.0 * z + s).abs());
+            let numeric = [(e - w) / (2.0 * d), (n - s) / (2.0 * d)];
+            if bend > 1e-10 || numeric[0].hypot(numeric[1]) > 5.0 { continue }
+            let slope = placed.underside_slope([x, y, z]);
+            for k in 0..2 {
+                prop_assert!((slope[k] - numeric[k]).abs() < 1e-4, "{geometry:?} {slope:?} {numeric:?}");
+            }
+        }
+    }
+}

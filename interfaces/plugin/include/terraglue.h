@@ -38,7 +38,7 @@
 #include <stdint.h>
 
 /* Version of the ABI that breaks: host and module must agree. */
-#define TG_ABI_MAJOR 1
+#define TG_ABI_MAJOR 2
 /* Version of the ABI that grows: new fields at the end of `tg_subsystem` and `tg_host`. */
 #define TG_ABI_MINOR 0
 /* Success. */
@@ -252,6 +252,8 @@ typedef struct {
     double area;
     /* World height of the shape's underside at the node at t, m. */
     double lower;
+    /* d lower/dx and d lower/dy of the underside there (world): the body's inward normal is (-slope, 1). */
+    double slope[2];
 } tg_node;
 
 /* One communication step as this subsystem sees it. */

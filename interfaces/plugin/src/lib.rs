@@ -41,7 +41,7 @@ unsafe impl Sync for Table {}
 #[macro_export]
 macro_rules! abi_version {
     () => {
-        "1.0"
+        "2.0"
     };
 }
 

@@ -127,8 +127,10 @@ fn ports() -> [Port; 2] {
     [port(7, 0, component::FORCE), port(1 << 40, 3, component::N)]
 }
 
-const NODES: [Node; 2] =
-    [Node { i: -4, j: 9, area: 1e-4, lower: -0.02 }, Node { i: 5, j: -6, area: 5e-5, lower: 0.7 }];
+const NODES: [Node; 2] = [
+    Node { i: -4, j: 9, area: 1e-4, lower: -0.02, slope: [0.1, -0.2] },
+    Node { i: 5, j: -6, area: 5e-5, lower: 0.7, slope: [0.0; 2] },
+];
 const N: usize = 4;
 
 fn step(ports: &[Port]) -> Step<'_> {

@@ -2,7 +2,7 @@
 
 use crate::assemble::displacement;
 use crate::ground::{Covered, Ground};
-use crate::patch::{Laws, Patch, Patches};
+use crate::patch::{Laws, Patch, Patches, key};
 use terraglue_subsystem::Port;
 
 /// Sums over the run and what the last commit found. Part of the committed state.
@@ -156,7 +156,7 @@ impl Scene<'_> {
             state.permanent = curve.permanent(depth, pressure) / patch.slope;
             state.largest = depth;
         }
-        state.curve = [curve.modulus(), patch.slope];
+        state.curve = key(curve, patch.slope);
         (state.pressure, state.shear, state.stamp) = (pressure, shear.state, book.stamp);
         book.max_sinkage = book.max_sinkage.max(depth / patch.slope - (state.reference - initial));
         let elastic = |c: usize| shear.state.elastic[c] - n.shear[k].elastic[c];

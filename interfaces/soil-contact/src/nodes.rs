@@ -24,7 +24,7 @@ pub struct NodeState {
     /// Largest depth along the normal that belongs to `permanent` under `curve`, m; a cache.
     pub largest: f64,
     /// Modulus of the pressure curve and n_z for which `largest` holds.
-    pub curve: [f64; 2],
+    pub curve: [f64; 3],
     /// Committed pressure, Pa; > 0: a foot stands here.
     pub pressure: f64,
     /// Shear history of the present contact.
@@ -44,7 +44,7 @@ impl NodeState {
         let filled = change.clamp(0.0, self.permanent);
         self.permanent -= filled;
         self.reference += change - filled;
-        self.curve = [0.0; 2];
+        self.curve = [0.0; 3];
     }
 }
 

@@ -237,10 +237,16 @@ impl Patches {
 /// Gap that is reported below a port without nodes, m.
 const FAR: f64 = 1.0;
 
+/// Tells for which curve and normal a largest depth holds.
+pub fn key(curve: &PressureCurve, n_z: f64) -> [f64; 3] {
+    let [a, b] = curve.key();
+    [a, b, n_z]
+}
+
 fn largest_depth(state: &NodeState, curve: &PressureCurve, n_z: f64) -> f64 {
     if state.permanent <= 0.0 {
         0.0
-    } else if state.curve == [curve.modulus(), n_z] {
+    } else if state.curve == key(curve, n_z) {
         state.largest
     } else {
         curve.largest_depth(state.permanent * n_z, state.largest)

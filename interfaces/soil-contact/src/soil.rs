@@ -71,7 +71,7 @@ pub struct FieldSoil<M: Material> {
 impl<M: Material> FieldSoil<M> {
     /// A soil on the host's terrain. Refused: parameters without sense, a scenario without ground.
     pub fn new(config: &Config, host: Arc<dyn Host>, mut material: M) -> Result<Self> {
-        let parameters = SoilParameters::from_config(config)?;
+        let parameters = SoilParameters::from_config(config, length(host.gravity()))?;
         let ground = Ground::new(host.required_terrain()?)?;
         material.begin(&ground, &parameters);
         let mut variables = values::shared();
@@ -139,6 +139,10 @@ impl<M: Material> FieldSoil<M> {
             self.warn(1, "a foot sinks deeper than 0.3 m, beyond the range of the pressure law");
         }
     }
+}
+
+fn length(v: [f64; 3]) -> f64 {
+    v.iter().map(|c| c * c).sum::<f64>().sqrt()
 }
 
 fn laws_of(p: &SoilParameters) -> Laws {

@@ -7,10 +7,12 @@ mod batch;
 mod parameters;
 mod pressure;
 mod shear;
+mod slip_sinkage;
 mod table;
 
 pub use batch::{pressures, total_force};
-pub use parameters::{DEFAULT_ELASTIC_STIFFNESS, SoilParameters};
-pub use pressure::{PressureCurve, PressureLaw};
+pub use parameters::{DEFAULT_ELASTIC_STIFFNESS, Family, SoilParameters};
+pub use pressure::{PRESSURE_LAWS, PressureCurve, PressureLaw};
 pub use shear::{ShearLaw, ShearResponse, ShearState};
+pub use slip_sinkage::{SLIP_SINKAGES, SlipSinkage};
 pub use table::{COLUMNS, SoilRow, SoilTable, TableError};

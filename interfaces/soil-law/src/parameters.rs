@@ -1,7 +1,8 @@
 //! The numbers of one soil and the laws made from them.
 
-use crate::pressure::PressureLaw;
+use crate::pressure::{PRESSURE_LAWS, PressureLaw};
 use crate::shear::ShearLaw;
+use crate::slip_sinkage::{SLIP_SINKAGES, SlipSinkage};
 use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};
 
 /// Elastic stiffness of unloading where a scenario is silent, Pa/m.
@@ -11,22 +12,57 @@ pub const DEFAULT_ELASTIC_STIFFNESS: f64 = 4e8;
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[allow(non_snake_case)]
 pub struct SoilParameters {
+    /// Which pressure–sinkage law, with the numbers that it alone has.
+    pub family: Family,
     /// Exponent of the pressure–sinkage law.
     pub n: f64,
-    /// Cohesive modulus, N/m^(n+1).
+    /// Cohesive modulus of Bekker's law, N/m^(n+1); 0 for the others.
     pub k_c: f64,
-    /// Frictional modulus, N/m^(n+2).
+    /// Frictional modulus of Bekker's law, N/m^(n+2); 0 for the others.
     pub k_phi: f64,
     /// Cohesion, Pa.
     pub c_pa: f64,
     /// Angle of internal friction, rad.
     pub phi_rad: f64,
-    /// Shear deformation modulus, m.
+    /// Shear deformation modulus, m; along the way of a rolling contact.
     pub K_m: f64,
+    /// Shear deformation modulus across the way of a rolling contact, m.
+    pub K_across_m: f64,
     /// Bulk density where known, kg/m³.
     pub density_kg_m3: Option<f64>,
     /// Stiffness of unloading and reloading, Pa/m.
     pub elastic_stiffness_pa_m: f64,
+    /// How slip deepens the sinkage.
+    pub slip_sinkage: SlipSinkage,
+    /// Place of the largest stress under a rolling contact as a share of the entry angle, (a_0, a_1) of
+    /// (a_0 + a_1·s)·θ_f (Wong and Reece 1967); 0: at the lowest point, where the depth is largest.
+    pub stress_peak: [f64; 2],
+    /// Acceleration of gravity, m/s²: makes a weight of the density.
+    pub gravity: f64,
+}
+
+/// A pressure–sinkage law and the numbers that it alone has.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum Family {
+    /// [`PressureLaw::Bekker`] with `k_c` and `k_phi`.
+    Bekker,
+    /// [`PressureLaw::Reece`] with the dimensionless k_c' and k_φ'.
+    Reece {
+        /// k_c'.
+        k_c: f64,
+        /// k_φ'.
+        k_phi: f64,
+    },
+    /// [`PressureLaw::Bearing`].
+    Bearing {
+        /// N_c at the reference depth.
+        n_c: f64,
+        /// N_γ at the reference depth, per width b.
+        n_gamma: f64,
+        /// z_r, m.
+        reference: f64,
+    },
 }
 
 impl SoilParameters {
@@ -36,13 +72,27 @@ impl SoilParameters {
             unit: unit.into(),
             ..Parameter::of(name, ParameterType::Number, help)
         };
+        let text = |name, help| Parameter::of(name, ParameterType::Text, help);
         vec![
-            number("n", "", "exponent of p = (k_c/b + k_phi) z^n").within(0.05, 3.0),
-            number("k_c", "", "cohesive modulus, N/m^(n+1)").within(0.0, 1e9),
-            number("k_phi", "", "frictional modulus, N/m^(n+2)").positive(),
+            text("pressure_law", "pressure-sinkage law").or(PRESSURE_LAWS[0]).choices(&PRESSURE_LAWS),
+            number("n", "", "exponent of the pressure-sinkage law").within(0.05, 3.0),
+            number("k_c", "", "bekker: cohesive modulus, N/m^(n+1)").within(0.0, 1e9).optional(),
+            number("k_phi", "", "bekker: frictional modulus, N/m^(n+2)").within(0.0, 1e12).optional(),
+            number("k_c_prime", "", "reece: k_c' of (c k_c' + gamma b k_phi') (z/b)^n")
+                .within(0.0, 1e9)
+                .optional(),
+            number("k_phi_prime", "", "reece: k_phi'").within(0.0, 1e9).optional(),
+            number("N_c", "", "bearing: N_c of (c N_c + gamma b N_gamma) (z/z_r)^n")
+                .within(0.0, 1e9)
+                .optional(),
+            number("N_gamma", "", "bearing: N_gamma").within(0.0, 1e9).optional(),
+            Parameter::number("reference_depth_m", "m", 0.1, "bearing: reference depth z_r").positive(),
             number("c_pa", "Pa", "cohesion").within(0.0, 1e7),
             number("phi_rad", "rad", "angle of internal friction").within(0.01, 1.2),
             number("K_m", "m", "shear deformation modulus of Janosi and Hanamoto").positive(),
+            number("K_across_m", "m", "the same across the way of a wheel; K_m where it is left out")
+                .positive()
+                .optional(),
             number("density_kg_m3", "kg/m^3", "bulk density").positive().optional(),
             Parameter::number(
                 "elastic_stiffness_pa_m",
@@ -51,22 +101,39 @@ impl SoilParameters {
                 "stiffness of unloading and reloading",
             )
             .positive(),
+            text("slip_sinkage", "how slip deepens the sinkage").or(SLIP_SINKAGES[0]).choices(&SLIP_SINKAGES),
+            number("slip_exponent", "", "ding: n_1 of n = n_0 + n_1 s").within(0.0, 3.0).optional(),
+            Parameter::number(
+                "stress_peak_a0",
+                "",
+                0.0,
+                "wheels: the largest stress lies at (a0 + a1 s) times the entry angle (Wong and Reece)",
+            )
+            .within(0.0, 0.9),
+            Parameter::number("stress_peak_a1", "", 0.0, "wheels: growth of that share with the slip s")
+                .within(-0.9, 0.9),
         ]
     }
 
-    /// Reads the parameters of an instance. Refused: a missing or non-positive number where one is needed.
-    pub fn from_config(config: &Config) -> Result<Self> {
+    /// Reads the parameters of an instance under `gravity` (m/s²). Refused: a missing or non-positive number where
+    /// one is needed.
+    pub fn from_config(config: &Config, gravity: f64) -> Result<Self> {
+        let number = |name| config.optional_number(name);
+        let modulus = config.number("K_m")?;
         let parameters = Self {
+            family: Family::from_config(config)?,
             n: config.number("n")?,
-            k_c: config.number("k_c")?,
-            k_phi: config.number("k_phi")?,
+            k_c: number("k_c")?.unwrap_or(0.0),
+            k_phi: number("k_phi")?.unwrap_or(0.0),
             c_pa: config.number("c_pa")?,
             phi_rad: config.number("phi_rad")?,
-            K_m: config.number("K_m")?,
-            density_kg_m3: config.optional_number("density_kg_m3")?,
-            elastic_stiffness_pa_m: config
-                .optional_number("elastic_stiffness_pa_m")?
-                .unwrap_or(DEFAULT_ELASTIC_STIFFNESS),
+            K_m: modulus,
+            K_across_m: number("K_across_m")?.unwrap_or(modulus),
+            density_kg_m3: number("density_kg_m3")?,
+            elastic_stiffness_pa_m: number("elastic_stiffness_pa_m")?.unwrap_or(DEFAULT_ELASTIC_STIFFNESS),
+            slip_sinkage: slip_sinkage(config)?,
+            stress_peak: [number("stress_peak_a0")?.unwrap_or(0.0), number("stress_peak_a1")?.unwrap_or(0.0)],
+            gravity,
         };
         parameters.check().map(|()| parameters)
     }
@@ -75,30 +142,96 @@ impl SoilParameters {
     pub fn check(&self) -> Result {
         for (name, value) in [
             ("n", self.n),
-            ("k_phi", self.k_phi),
             ("phi_rad", self.phi_rad),
             ("K_m", self.K_m),
+            ("K_across_m", self.K_across_m),
             ("elastic_stiffness_pa_m", self.elastic_stiffness_pa_m),
         ] {
             if !(value.is_finite() && value > 0.0) {
                 return Err(Error::Refused(format!("`{name}` = {value} must be larger than zero")));
             }
         }
-        for (name, value) in [("k_c", self.k_c), ("c_pa", self.c_pa)] {
+        for (name, value) in [("k_c", self.k_c), ("k_phi", self.k_phi), ("c_pa", self.c_pa)] {
             if !(value.is_finite() && value >= 0.0) {
                 return Err(Error::Refused(format!("`{name}` = {value} must not be negative")));
             }
         }
-        Ok(())
+        let modulus = self.pressure().curve(0.1, self.elastic_stiffness_pa_m).virgin(0.01);
+        if modulus.is_finite() && modulus > 0.0 {
+            return Ok(());
+        }
+        Err(Error::Refused(match self.family {
+            Family::Bekker => "`k_phi` is missing or zero: the soil would carry nothing".into(),
+            _ => "the soil would carry nothing: the law needs `c_pa` with its factor, or `density_kg_m3` and gravity \
+                  with the other one"
+                .into(),
+        }))
     }
 
     /// The pressure law.
     pub fn pressure(&self) -> PressureLaw {
-        PressureLaw::Bekker { k_c: self.k_c, k_phi: self.k_phi, n: self.n }
+        let weight = self.density_kg_m3.unwrap_or(0.0) * self.gravity;
+        match self.family {
+            Family::Bekker => PressureLaw::Bekker { k_c: self.k_c, k_phi: self.k_phi, n: self.n },
+            Family::Reece { k_c, k_phi } => {
+                PressureLaw::Reece { cohesive: self.c_pa * k_c, frictional: weight * k_phi, n: self.n }
+            }
+            Family::Bearing { n_c, n_gamma, reference } => PressureLaw::Bearing {
+                cohesive: self.c_pa * n_c,
+                frictional: weight * n_gamma,
+                reference,
+                n: self.n,
+            },
+        }
     }
 
     /// The shear law.
     pub fn shear(&self) -> ShearLaw {
         ShearLaw::new(self.c_pa, self.phi_rad, self.K_m, self.elastic_stiffness_pa_m)
     }
+}
+
+impl Family {
+    fn from_config(config: &Config) -> Result<Self> {
+        let name = config.get("pressure_law").and_then(|v| v.as_str()).unwrap_or(PRESSURE_LAWS[0]);
+        Ok(match name {
+            "bekker" => {
+                config.number("k_c")?;
+                config.number("k_phi")?;
+                Self::Bekker
+            }
+            "reece" => {
+                Self::Reece { k_c: config.number("k_c_prime")?, k_phi: weighed(config, "k_phi_prime")? }
+            }
+            "bearing" => Self::Bearing {
+                n_c: config.number("N_c")?,
+                n_gamma: weighed(config, "N_gamma")?,
+                reference: config.optional_number("reference_depth_m")?.unwrap_or(0.1),
+            },
+            other => return Err(unknown("pressure_law", other, &PRESSURE_LAWS)),
+        })
+    }
+}
+
+/// A factor of the soil's weight, which needs a density.
+fn weighed(config: &Config, name: &str) -> Result<f64> {
+    let value = config.number(name)?;
+    if value > 0.0 && config.optional_number("density_kg_m3")?.is_none() {
+        let text = format!("`{name}` multiplies the weight of the soil: `density_kg_m3` is needed with it");
+        return Err(Error::Refused(text));
+    }
+    Ok(value)
+}
+
+fn slip_sinkage(config: &Config) -> Result<SlipSinkage> {
+    match config.get("slip_sinkage").and_then(|v| v.as_str()).unwrap_or(SLIP_SINKAGES[0]) {
+        "none" => Ok(SlipSinkage::None),
+        "ding" => Ok(SlipSinkage::Ding { n1: config.number("slip_exponent")? }),
+        "lyasko" => Ok(SlipSinkage::Lyasko),
+        other => Err(unknown("slip_sinkage", other, &SLIP_SINKAGES)),
+    }
+}
+
+fn unknown(key: &str, value: &str, known: &[&str]) -> Error {
+    Error::Refused(format!("`{key}` = \"{value}\" is not known; take one of {}", known.join(", ")))
 }

@@ -2,8 +2,11 @@
 //!
 //! Virgin loading follows a power law p = K·zⁿ (Bekker 1956: K = k_c/b + k_φ). Below the largest depth reached the
 //! soil is elastic: p = p_max − k_u·(z_max − z), never tension (Wong 1984, "repetitive normal load").
+//! The families differ in how the power law depends on the size b of the contact; see [`PressureLaw`].
 //! No soil is stiffer in virgin loading than in unloading, so for n < 1, where the power law starts with an
 //! infinite slope, the line p = k_u·z holds up to where it meets the power law.
+
+use crate::slip_sinkage::SlipSinkage;
 
 /// A family of pressure–sinkage laws; [`PressureLaw::curve`] fixes one for the size of a contact.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -18,15 +21,53 @@ pub enum PressureLaw {
         /// Exponent n.
         n: f64,
     },
+    /// p = (c·k_c' + γ·b·k_φ')·(z/b)ⁿ (Reece 1965, eq. 6): for n < 1 the pressure at a depth rises with the size,
+    /// for n > 1 it falls.
+    Reece {
+        /// c·k_c', Pa.
+        cohesive: f64,
+        /// γ·k_φ', Pa/m.
+        frictional: f64,
+        /// Exponent n.
+        n: f64,
+    },
+    /// p = (c·N_c + γ·b·N_γ)·(z/z_r)ⁿ: the cohesion and the width term of bearing capacity (Terzaghi 1943, ch. VIII)
+    /// mobilised with the depth, whatever the size. At a given depth the pressure rises with the size at any n, as
+    /// plates on dry sand show; Bekker with k_c ≥ 0 cannot do that.
+    Bearing {
+        /// c·N_c, pressure at the depth z_r under a contact without width, Pa.
+        cohesive: f64,
+        /// γ·N_γ, Pa/m.
+        frictional: f64,
+        /// Reference depth z_r, m.
+        reference: f64,
+        /// Exponent n.
+        n: f64,
+    },
 }
+
+/// Names of the families as a scenario writes them.
+pub const PRESSURE_LAWS: [&str; 3] = ["bekker", "reece", "bearing"];
 
 impl PressureLaw {
     /// The curve under a contact of smaller dimension `b` (m; radius of a disc, short side of a rectangle) with
     /// the unloading stiffness `k_u` (Pa/m).
     pub fn curve(&self, b: f64, k_u: f64) -> PressureCurve {
-        match *self {
-            Self::Bekker { k_c, k_phi, n } => PressureCurve::new(k_c / b + k_phi, n, k_u),
-        }
+        self.curve_in_slip(b, k_u, &SlipSinkage::None, 0.0)
+    }
+
+    /// The same under a contact that slips by `slip` (0: rolls or stands, 1: spins on the spot), which sinks deeper
+    /// as `sinkage` says.
+    pub fn curve_in_slip(&self, b: f64, k_u: f64, sinkage: &SlipSinkage, slip: f64) -> PressureCurve {
+        let (modulus, n) = match *self {
+            Self::Bekker { k_c, k_phi, n } => (k_c / b + k_phi, n),
+            Self::Reece { cohesive, frictional, n } => ((cohesive + frictional * b) * libm::pow(b, -n), n),
+            Self::Bearing { cohesive, frictional, reference, n } => {
+                ((cohesive + frictional * b) * libm::pow(reference, -n), n)
+            }
+        };
+        let (modulus, n) = sinkage.apply(modulus, n, slip);
+        PressureCurve::new(modulus, n, k_u)
     }
 }
 
@@ -49,9 +90,9 @@ impl PressureCurve {
         Self { modulus, exponent, unloading: k_u, elastic_limit }
     }
 
-    /// K, N/m^(n+2): tells curves of one soil apart.
-    pub fn modulus(&self) -> f64 {
-        self.modulus
+    /// Tells curves of one soil apart.
+    pub fn key(&self) -> [f64; 2] {
+        [self.modulus, self.exponent]
     }
 
     /// Stiffness of unloading and reloading, Pa/m.
@@ -140,7 +181,7 @@ impl PressureCurve {
         let mut z = if e < 1.0 { guess.max(permanent).max(self.elastic_limit) } else { permanent };
         for _ in 0..20 {
             let p = self.virgin(z);
-            let slope = k - e * p / z;
+            let slope = k - self.virgin_slope(z, p);
             let change = (k * (z - permanent) - p) / slope.max(0.01 * k);
             z -= change;
             if change.abs() <= 1e-15 * z {
@@ -223,6 +264,17 @@ mod tests {
             let rounding = 1e-14 * curve.virgin_work(a + d, curve.virgin(a + d));
             prop_assert!(free(a + d) >= free(a) - rounding);
         }
+    }
+
+    #[test]
+    fn reece_and_bearing_are_their_formulas() {
+        let (b, z, n) = (0.04, 0.013, 1.3);
+        let reece = PressureLaw::Reece { cohesive: 900.0, frictional: 4e5, n }.curve(b, 4e8).virgin(z);
+        assert!((reece / ((900.0 + 4e5 * b) * (z / b).powf(n)) - 1.0).abs() < 1e-12, "{reece}");
+        let law = PressureLaw::Bearing { cohesive: 2e4, frictional: 1e6, reference: 0.1, n };
+        let bearing = law.curve(b, 4e8).virgin(z);
+        assert!((bearing / ((2e4 + 1e6 * b) * (z / 0.1).powf(n)) - 1.0).abs() < 1e-12, "{bearing}");
+        assert!(law.curve(0.05, 4e8).virgin(z) > bearing);
     }
 
     #[test]

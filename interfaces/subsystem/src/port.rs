@@ -150,4 +150,6 @@ pub struct Node {
     pub area: f64,
     /// World height of the shape's underside at the node at t, m.
     pub lower: f64,
+    /// ∂lower/∂x and ∂lower/∂y of the underside there (world): the body's inward normal is (−slope, 1).
+    pub slope: [f64; 2],
 }

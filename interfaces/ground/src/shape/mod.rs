@@ -1,7 +1,10 @@
 //! A shape at a pose: what contact detection, soils and sensors ask of it.
 
 mod lower;
+mod slope;
 mod support;
+
+pub use slope::STEEPEST_SLOPE;
 
 use crate::math::{Rotation, cross, dot, point};
 use terraglue_subsystem::{Geometry, Pose};

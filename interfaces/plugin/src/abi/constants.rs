@@ -1,7 +1,7 @@
 //! Numbers that cross the border: versions, statuses, kinds.
 
 /// Version of the ABI that breaks: host and module must agree.
-pub const TG_ABI_MAJOR: u32 = 1;
+pub const TG_ABI_MAJOR: u32 = 2;
 /// Version of the ABI that grows: new fields at the end of `tg_subsystem` and `tg_host`.
 pub const TG_ABI_MINOR: u32 = 0;
 

@@ -16,7 +16,7 @@ macro_rules! same_layout {
 }
 
 same_layout!(Law, TgLaw, t_min, t_max, mu, compliance);
-same_layout!(Node, TgNode, i, j, area, lower);
+same_layout!(Node, TgNode, i, j, area, lower, slope);
 same_layout!(
     Port, TgPort, key, kind, side, mask, first, body, shape, first_node, node_count, origin, frame, extent,
     law

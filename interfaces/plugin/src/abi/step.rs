@@ -61,6 +61,8 @@ pub struct TgNode {
     pub area: f64,
     /// World height of the shape's underside at the node at t, m.
     pub lower: f64,
+    /// d lower/dx and d lower/dy of the underside there (world): the body's inward normal is (-slope, 1).
+    pub slope: [f64; 2],
 }
 
 /// One communication step as this subsystem sees it.

@@ -1,0 +1,78 @@
+//! The slope of the underside of every shape: which way a body presses the soil at a node.
+
+use super::Placed;
+use crate::math::dot;
+use terraglue_subsystem::Geometry;
+
+/// Largest slope that is reported (84°); the side of a shape is a wall and no underside.
+pub const STEEPEST_SLOPE: f64 = 10.0;
+
+/// Faces whose distance from the point differs by less than this (m) count as equally near: an edge.
+const EDGE: f64 = 1e-9;
+
+impl Placed {
+    /// ∂z/∂x and ∂z/∂y of the underside at its point `p` (world, m), at most [`STEEPEST_SLOPE`] steep. On an edge,
+    /// that of the flatter face.
+    pub fn underside_slope(&self, p: [f64; 3]) -> [f64; 2] {
+        let centre = self.world_from_shape.position;
+        let local = self.rotation.to_shape(std::array::from_fn(|k| p[k] - centre[k]));
+        let mut face = Downwards { placed: self, distance: f64::NEG_INFINITY, normal: [0.0, 0.0, -1.0] };
+        match &self.geometry {
+            Geometry::Sphere { .. } => face.offer(local, 0.0),
+            Geometry::Capsule { half_length, .. } => {
+                face.offer([local[0], local[1], local[2] - local[2].clamp(-half_length, *half_length)], 0.0);
+            }
+            Geometry::Cylinder { half_length, radius } => {
+                let across = (local[0] * local[0] + local[1] * local[1]).sqrt();
+                face.offer([local[0], local[1], 0.0], across - radius);
+                face.offer([0.0, 0.0, 1.0], local[2] - half_length);
+                face.offer([0.0, 0.0, -1.0], -local[2] - half_length);
+            }
+            Geometry::Box { half_extents } => {
+                for k in 0..3 {
+                    for sign in [1.0, -1.0] {
+                        let normal = std::array::from_fn(|c| if c == k { sign } else { 0.0 });
+                        face.offer(normal, sign * local[k] - half_extents[k]);
+                    }
+                }
+            }
+            Geometry::ConvexMesh { .. } => {
+                for f in &self.faces {
+                    face.offer(f.normal, dot(f.normal, local) - f.offset);
+                }
+            }
+        }
+        face.slope()
+    }
+}
+
+/// The nearest face that looks down.
+struct Downwards<'a> {
+    placed: &'a Placed,
+    distance: f64,
+    /// Outward, world; any length.
+    normal: [f64; 3],
+}
+
+impl Downwards<'_> {
+    fn offer(&mut self, normal: [f64; 3], distance: f64) {
+        let normal = self.placed.rotation.to_world(normal);
+        let better = distance > self.distance + EDGE
+            || distance > self.distance - EDGE && steepness(normal) < steepness(self.normal);
+        if normal[2] < 0.0 && better {
+            (self.distance, self.normal) = (distance, normal);
+        }
+    }
+
+    fn slope(&self) -> [f64; 2] {
+        let n = self.normal;
+        let size = (n[0] * n[0] + n[1] * n[1]).sqrt();
+        let down = n[2].abs().max(size / STEEPEST_SLOPE);
+        if down > 0.0 { [n[0] / down, n[1] / down] } else { [0.0; 2] }
+    }
+}
+
+/// Squared slope.
+fn steepness(n: [f64; 3]) -> f64 {
+    (n[0] * n[0] + n[1] * n[1]) / (n[2] * n[2])
+}

@@ -10,7 +10,7 @@
 //! | `dynamics` | one step: joint rows, gyroscopic term, the whole KKT matrix, corrections |
 //! | `drive` | motors, limits and brakes of an axis |
 //! | `contact` | ports, the rigid estimate T*, contacts among own bodies |
-//! | `lcp` | Lemke's algorithm |
+//! | `lcp` | pivoting methods, from the crate `contact-solver` |
 //! | `variables`, `scene` | what can be read, set, done and seen |
 //!
 //! Deliberately absent: ground and soil. The robot knows its ports, never what lies behind them.
@@ -19,7 +19,7 @@ mod contact;
 mod dense;
 mod drive;
 mod dynamics;
-pub mod lcp;
+pub use terraglue_contact_solver::lcp;
 mod math;
 mod model;
 mod module;

@@ -6,6 +6,7 @@
 mod documents;
 mod figure;
 mod known;
+mod rigid_body;
 mod soil;
 mod timing;
 mod walk;
@@ -57,7 +58,7 @@ type Measure = fn(&Context) -> Outcome<Vec<Figure>>;
 /// Areas with their figures; an area without any says so.
 const AREAS: [(&str, Option<Measure>); 6] = [
     ("walk", Some(walk::figures)),
-    ("rigid-body", None),
+    ("rigid-body", Some(rigid_body::figures)),
     ("soil", Some(soil::figures)),
     ("gluing", None),
     ("fmi", None),

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use proptest::prelude::*;
-use terraglue_rigid_body::lcp::{Lemke, Outcome};
+use terraglue_contact_solver::lcp::{Lemke, Outcome};
 
 fn solve(m: &[f64], q: &[f64]) -> (Outcome, Vec<f64>) {
     let mut z = vec![f64::NAN; q.len()];

@@ -1,5 +1,7 @@
 //! The module: from parameters to an instance.
 
+use crate::contact::bodies::Surface;
+use crate::contact::plane::Plane;
 use crate::drive::{Mode, Motor};
 use crate::dynamics::Dynamics;
 use crate::math::V3;
@@ -54,9 +56,31 @@ impl Module for RigidBody {
             model.mass()
         );
         host.log(LogLevel::Info, &text);
-        let dynamics = Dynamics::new(model, &state.bodies).map_err(|e| Error::Failed(e.to_string()))?;
+        let mut dynamics = Dynamics::new(model, &state.bodies).map_err(|e| Error::Failed(e.to_string()))?;
+        dynamics.contacts.set_surroundings(surface(&config)?, ground(&config)?);
         Ok(Box::new(Robot::new(host, dynamics, state)))
     }
+}
+
+/// Friction and restitution among bodies and with rigid ground.
+fn surface(config: &Config) -> Result<Surface> {
+    Ok(Surface { friction: config.number("friction")?, restitution: config.number("restitution")? })
+}
+
+/// The rigid ground, if there is one.
+fn ground(config: &Config) -> Result<Option<Plane>> {
+    if config.text("ground")? == "none" {
+        return Ok(None);
+    }
+    let n = config.numbers("ground_normal")?;
+    let refused = || Error::Refused(format!("parameter `ground_normal` = {n:?} is not a direction x, y, z"));
+    let [x, y, z] = n[..] else { return Err(refused()) };
+    let normal = V3::new(x, y, z);
+    let length = normal.norm();
+    if !length.is_finite() || length < 1e-9 {
+        return Err(refused());
+    }
+    Ok(Some(Plane { normal: normal / length, offset: config.number("ground_height_m")? }))
 }
 
 /// Bodies at rest in the initial pose, on the ground where that is wanted and there is one.

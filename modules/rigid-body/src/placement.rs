@@ -1,6 +1,6 @@
 //! Where the robot starts: joint coordinates by name pattern, pose of the root, feet on the ground.
 
-use crate::contact::self_contact::{parry_local, parry_shape};
+use crate::contact::shapes::{parry_local, parry_shape};
 use crate::dynamics::joint_rows::place_child;
 use crate::math::V3;
 use crate::model::Model;

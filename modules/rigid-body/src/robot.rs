@@ -171,6 +171,7 @@ impl Robot {
 
     fn book_ports(&mut self, step: &Step, t: &[f64]) {
         self.state.contact_normal.fill(0.0);
+        self.dynamics.contacts.add_normal_forces(self.dynamics.h, &mut self.state.contact_normal);
         displacement(step.ports, &self.dynamics, &mut self.scratch.free);
         for port in step.ports {
             for (i, c) in port.components() {

@@ -40,6 +40,16 @@ pub(crate) fn schema() -> Schema {
             Parameter::number("stiffness", "N m/rad", 600.0, "Stiffness of position motors").within(0.0, f64::INFINITY),
             Parameter::number("damping", "N m s/rad", 10.0, "Damping of position motors").within(0.0, f64::INFINITY),
             Parameter::number("max_torque", "N m", 60.0, "Largest torque of every motor").within(0.0, f64::INFINITY),
+            Parameter::of("ground", ParameterType::Text, "Rigid ground under the robot: no soil is needed")
+                .or("none")
+                .choices(&["none", "half-space"]),
+            Parameter::number("ground_height_m", "m", 0.0, "Distance of the rigid ground from the origin along its normal"),
+            Parameter::of("ground_normal", ParameterType::Numbers, "Direction out of the rigid ground: x, y, z")
+                .or(vec![0.0, 0.0, 1.0]),
+            Parameter::number("friction", "1", 0.8, "Coulomb friction among bodies and with rigid ground")
+                .within(0.0, f64::INFINITY),
+            Parameter::number("restitution", "1", 0.0, "Newton's coefficient of restitution among bodies and with rigid ground")
+                .within(0.0, 1.0),
         ],
     }
 }

@@ -1,5 +1,9 @@
-//! Contact: ports to the ground, the rigid estimate, and contacts among the robot's own bodies.
+//! Contact: ports to the ground, the rigid estimate, and the contacts that are settled inside the subsystem, among
+//! the bodies and with rigid ground.
 
+pub(crate) mod bodies;
+pub(crate) mod detection;
 pub(crate) mod estimate;
+pub(crate) mod plane;
 pub(crate) mod ports;
-pub(crate) mod self_contact;
+pub(crate) mod shapes;

@@ -89,7 +89,7 @@ impl Ports {
     /// Only along the paths of the bodies to the root: see [`Path`].
     pub fn compliance(&mut self, dynamics: &Dynamics) -> &[f64] {
         let n = self.components.len();
-        if self.g_of == dynamics.factor_count && !dynamics.self_contact.pressing() && self.g.len() == n * n {
+        if self.g_of == dynamics.factor_count && !dynamics.contacts.pressing() && self.g.len() == n * n {
             return &self.g;
         }
         let tree = &dynamics.kkt.solver;
@@ -116,13 +116,19 @@ impl Ports {
             }
         }
         self.g_of = dynamics.factor_count;
-        if dynamics.self_contact.pressing() {
+        if dynamics.contacts.pressing() {
             let components = &self.components;
             let rate = |p: usize, v: &[f64]| {
                 let at = dynamics.kkt.body_at[components[p].body];
                 dynamics.h * components[p].row.iter().zip(&v[at..at + 6]).map(|(r, v)| r * v).sum::<f64>()
             };
-            dynamics.self_contact.stiffen(n, &mut self.g, dynamics.kkt.len(), &rate, &mut self.scratch);
+            dynamics.contacts.stiffen(
+                n,
+                &mut self.g,
+                (tree, &dynamics.kkt.body_at),
+                &rate,
+                &mut self.scratch,
+            );
             self.g_of = 0;
         }
         &self.g

@@ -12,7 +12,7 @@ mod gyro;
 pub(crate) mod joint_rows;
 pub(crate) mod kkt;
 
-use crate::contact::self_contact::SelfContact;
+use crate::contact::bodies::BodyContacts;
 use crate::drive::{Axis, Law, Mode};
 use crate::math::{M3, V3, cayley};
 use crate::model::Model;
@@ -37,8 +37,8 @@ pub(crate) enum Failure {
     Branches { rounds: usize },
     #[error("joint `{joint}` stays open by {gap:e} (m or rad); a shorter step may help")]
     Gap { joint: String, gap: f64 },
-    #[error("contact among the robot's own bodies has no solution; a shorter step may help")]
-    SelfContact,
+    #[error("contact among the bodies or with rigid ground found no solution; a shorter step may help")]
+    Contact,
 }
 
 /// A free axis at the end of a trial.
@@ -56,7 +56,7 @@ pub(crate) struct AxisResult {
 pub(crate) struct Dynamics {
     pub model: Model,
     pub kkt: Kkt,
-    pub self_contact: SelfContact,
+    pub contacts: BodyContacts,
     pub h: f64,
     starts: Vec<Motion>,
     inertia: Vec<M3>,
@@ -101,7 +101,7 @@ impl Dynamics {
             brake: None,
         };
         Ok(Self {
-            self_contact: SelfContact::new(&model, bodies),
+            contacts: BodyContacts::new(&model, bodies),
             kkt,
             h: 0.0,
             starts: vec![rest; nb],
@@ -135,7 +135,7 @@ impl Dynamics {
         self.starts.clone_from(&state.bodies);
         self.prepare_bodies(state);
         self.prepare_joints(state);
-        self.self_contact.detect(&self.starts, h);
+        self.contacts.detect(&self.starts, h);
         self.factored = false;
     }
 
@@ -244,8 +244,8 @@ impl Dynamics {
             self.ensure_factor()?;
             self.assemble();
             self.kkt.solver.solve(&self.rhs, &mut self.solution)?;
-            if !self.self_contact.resolve(&self.kkt.solver, &self.kkt.body_at, &mut self.solution) {
-                return Err(Failure::SelfContact);
+            if !self.contacts.resolve(&self.kkt.solver, &self.kkt.body_at, &mut self.solution) {
+                return Err(Failure::Contact);
             }
             self.close_joints()?;
             if !self.change_branches(round >= FREE_ROUNDS) {

@@ -181,6 +181,13 @@ impl Rig {
         Ok(())
     }
 
+    /// External force on a body during the next step, then none.
+    pub fn push(&mut self, body: &str, force: [f64; 3]) {
+        for (axis, f) in ["x", "y", "z"].iter().zip(force) {
+            self.set(&format!("{body}.force_{axis}"), f);
+        }
+    }
+
     /// A step without ground.
     pub fn free_step(&mut self) {
         self.advance(&[], &[]).expect("a step");

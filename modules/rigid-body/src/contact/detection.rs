@@ -1,0 +1,201 @@
+//! Contact points of a step: pairs of shapes by parry's manifolds, shapes on rigid ground in closed form.
+//!
+//! Points are speculative: all that can touch within the step are found, touching or not. Neighbours in the tree and
+//! shapes that overlap in the initial pose are left alone: a leg may stand in the box that stands for the body.
+
+use crate::contact::plane::{Plane, support_points};
+use crate::contact::shapes::{parry_local, parry_shape};
+use crate::math::V3;
+use crate::model::Model;
+use crate::state::Motion;
+use nalgebra::{Isometry3, Point3, Translation3};
+use parry3d_f64::math::{Pose, Vector};
+use parry3d_f64::query::{self, ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
+use parry3d_f64::shape::SharedShape;
+use terraglue_robot_import::ShapeGeometry;
+
+/// Shapes that come nearer than this within the step are watched, m.
+const MARGIN: f64 = 2e-3;
+
+/// Shapes that overlap by no more than this in the initial pose only touch, m.
+const TOUCHING: f64 = 1e-4;
+
+/// Points of one manifold nearer than this are one point, m.
+const SAME_POINT: f64 = 1e-5;
+
+struct Collider {
+    body: usize,
+    /// Pose against the centre of mass in body axes, of the shape and of parry's.
+    local: Isometry3<f64>,
+    parry_local: Isometry3<f64>,
+    geometry: ShapeGeometry,
+    shape: SharedShape,
+    /// Largest distance of the shape from the centre of mass, m.
+    reach: f64,
+    /// Radius of the shape's own bounding sphere about `centre` (body axes, from the centre of mass), m.
+    radius: f64,
+    centre: V3,
+}
+
+/// Two shapes that may meet, with parry's memory of them.
+struct Pair {
+    colliders: [usize; 2],
+    manifolds: Vec<ContactManifold<(), ()>>,
+}
+
+/// A point where two bodies, or the ground and a body, can touch within the step.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct ContactPoint {
+    /// Body a (none: the ground) and body b.
+    pub bodies: [Option<usize>; 2],
+    /// Out of a into b: normal, tangent 1, tangent 2.
+    pub frame: [V3; 3],
+    /// Where it is on a and on b, m in the world.
+    pub points: [V3; 2],
+    /// Distance, negative where they overlap, m.
+    pub gap: f64,
+}
+
+/// All shapes that collide and the pairs that may meet.
+pub(crate) struct Detector {
+    colliders: Vec<Collider>,
+    pairs: Vec<Pair>,
+    pub ground: Option<Plane>,
+}
+
+fn vector(v: Vector) -> V3 {
+    V3::new(v.x, v.y, v.z)
+}
+
+/// A right-handed frame whose tangents do not jump while the normal turns a little.
+pub(crate) fn frame(n: V3) -> [V3; 3] {
+    let along = if n.x.abs() < 0.8 { V3::x() } else { V3::y() };
+    let t1 = (along - n * n.dot(&along)).normalize();
+    [n, t1, n.cross(&t1)]
+}
+
+impl Detector {
+    /// Chooses the pairs at the initial pose.
+    pub fn new(model: &Model, bodies: &[Motion]) -> Self {
+        let mut me = Self { colliders: Vec::new(), pairs: Vec::new(), ground: None };
+        for (b, body) in model.bodies.iter().enumerate() {
+            for shape in body.shapes.iter().filter(|s| s.collides) {
+                let to_centre = Translation3::from(-body.com);
+                let (local, parry_local) =
+                    (to_centre * shape.body_from_shape, to_centre * parry_local(shape));
+                let parry = parry_shape(shape);
+                let sphere = parry.compute_local_bounding_sphere();
+                let centre = (parry_local * Point3::from(vector(sphere.center))).coords;
+                me.colliders.push(Collider {
+                    body: b,
+                    local,
+                    parry_local,
+                    geometry: shape.geometry,
+                    reach: centre.norm() + sphere.radius,
+                    radius: sphere.radius,
+                    centre,
+                    shape: parry,
+                });
+            }
+        }
+        for i in 0..me.colliders.len() {
+            for k in i + 1..me.colliders.len() {
+                if me.may_meet(model, bodies, i, k) {
+                    me.pairs.push(Pair { colliders: [i, k], manifolds: Vec::new() });
+                }
+            }
+        }
+        me
+    }
+
+    fn may_meet(&self, model: &Model, bodies: &[Motion], i: usize, k: usize) -> bool {
+        let (a, b) = (self.colliders[i].body, self.colliders[k].body);
+        let neighbours =
+            |a: usize, b: usize| model.joint_above[a].is_some_and(|j| model.joints[j].parent == Some(b));
+        if a == b || neighbours(a, b) || neighbours(b, a) {
+            return false;
+        }
+        let pose = |i: usize| -> Pose { self.colliders[i].parry_pose(bodies).into() };
+        let (p, q) = (pose(i), pose(k));
+        let near = query::contact(&p, &*self.colliders[i].shape, &q, &*self.colliders[k].shape, MARGIN);
+        near.is_ok_and(|c| c.is_none_or(|c| c.dist > -TOUCHING))
+    }
+
+    /// Adds the contact points of a step of length h from the committed motion.
+    pub fn detect(&mut self, bodies: &[Motion], h: f64, out: &mut Vec<ContactPoint>) {
+        if let Some(plane) = self.ground {
+            self.colliders.iter().for_each(|c| on_ground(&plane, c, bodies, h, out));
+        }
+        let Self { colliders, pairs, .. } = self;
+        for pair in pairs {
+            let [a, b] = pair.colliders.map(|i| &colliders[i]);
+            between(a, b, &mut pair.manifolds, bodies, h, out);
+        }
+    }
+}
+
+impl Collider {
+    fn pose(&self, bodies: &[Motion]) -> Isometry3<f64> {
+        let m = &bodies[self.body];
+        Isometry3::from_parts(Translation3::from(m.c), m.q) * self.local
+    }
+
+    fn parry_pose(&self, bodies: &[Motion]) -> Isometry3<f64> {
+        let m = &bodies[self.body];
+        Isometry3::from_parts(Translation3::from(m.c), m.q) * self.parry_local
+    }
+}
+
+fn on_ground(plane: &Plane, c: &Collider, bodies: &[Motion], h: f64, out: &mut Vec<ContactPoint>) {
+    let m = &bodies[c.body];
+    let reach = MARGIN + 2.0 * h * (m.v.norm() + m.w.norm() * c.reach);
+    let height = plane.normal.dot(&m.point(&c.centre)) - plane.offset;
+    if height > c.radius + reach {
+        return;
+    }
+    support_points(&c.geometry, &c.pose(bodies), &plane.normal, |p| {
+        let gap = plane.normal.dot(&p) - plane.offset;
+        if gap < reach {
+            let points = [p - gap * plane.normal, p];
+            out.push(ContactPoint { bodies: [None, Some(c.body)], frame: frame(plane.normal), points, gap });
+        }
+    });
+}
+
+fn between(
+    a: &Collider,
+    b: &Collider,
+    manifolds: &mut Vec<ContactManifold<(), ()>>,
+    bodies: &[Motion],
+    h: f64,
+    out: &mut Vec<ContactPoint>,
+) {
+    let (ma, mb) = (&bodies[a.body], &bodies[b.body]);
+    let reach = MARGIN + 2.0 * h * ((ma.v - mb.v).norm() + ma.w.norm() * a.reach + mb.w.norm() * b.reach);
+    if (ma.point(&a.centre) - mb.point(&b.centre)).norm() > a.radius + b.radius + reach {
+        return;
+    }
+    let (pose_a, pose_b) = (a.parry_pose(bodies), b.parry_pose(bodies));
+    // Without its memory parry would keep old points while a pair moves little, and contacts would creep.
+    manifolds.iter_mut().for_each(|m| m.points.clear());
+    let relative: Pose = (pose_a.inverse() * pose_b).into();
+    let found = DefaultQueryDispatcher
+        .contact_manifolds(&relative, &*a.shape, &*b.shape, reach, manifolds, &mut None);
+    if found.is_err() {
+        return;
+    }
+    for manifold in manifolds.iter() {
+        let n = pose_a.rotation * vector(manifold.local_n1);
+        let first = out.len();
+        for point in manifold.points.iter().filter(|p| p.dist < reach) {
+            let on_a = (pose_a * Point3::from(vector(point.local_p1))).coords;
+            let on_b = (pose_b * Point3::from(vector(point.local_p2))).coords;
+            // Where edges and corners coincide parry gives the same point more than once.
+            if out[first..].iter().any(|o| (o.points[0] - on_a).norm_squared() < SAME_POINT * SAME_POINT) {
+                continue;
+            }
+            let bodies = [Some(a.body), Some(b.body)];
+            out.push(ContactPoint { bodies, frame: frame(n), points: [on_a, on_b], gap: point.dist });
+        }
+    }
+}

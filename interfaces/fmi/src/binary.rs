@@ -1,0 +1,105 @@
+//! Finds and loads the shared library of a unit.
+#![allow(unsafe_code)] // Loading a library runs its constructors.
+
+use crate::description::Version;
+use crate::error::{Error, Result};
+use crate::fmu::Fmu;
+use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_LOCAL, RTLD_NOW};
+use std::error::Error as _;
+use std::path::Path;
+
+/// Library of a unit in this process; unloaded when dropped.
+#[derive(Debug)]
+pub struct Loaded {
+    pub library: Library,
+}
+
+/// Name of this platform in an archive.
+pub fn platform(version: Version) -> &'static str {
+    match (version, cfg!(target_arch = "aarch64")) {
+        (Version::V2, false) => "linux64",
+        (Version::V3, false) => "x86_64-linux",
+        (_, true) => "aarch64-linux",
+    }
+}
+
+/// Platforms that an archive with these entries has a library for.
+pub fn platforms<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
+    let mut all: Vec<String> = names
+        .filter_map(|n| n.strip_prefix("binaries/")?.split_once('/'))
+        .filter(|(_, file)| !file.is_empty())
+        .map(|(platform, _)| platform.to_owned())
+        .collect();
+    all.sort();
+    all.dedup();
+    all
+}
+
+/// Loads the library of an extracted unit.
+pub fn load(fmu: &Fmu) -> Result<Loaded> {
+    let fail = |message: String| Error::Library { path: fmu.path().into(), message };
+    let description = fmu.description();
+    let folder = fmu.folder().join("binaries").join(platform(description.version));
+    let name = format!("{}.so", description.identifier);
+    let path = folder.join(&name);
+    if !path.is_file() {
+        return Err(fail(missing(fmu, &name)));
+    }
+    inspect(&path).map_err(|why| fail(format!("`{name}` cannot be loaded: {why}")))?;
+    open(&path)
+        .map(|library| Loaded { library })
+        .map_err(|why| fail(format!("`{name}` cannot be loaded: {why}")))
+}
+
+fn missing(fmu: &Fmu, name: &str) -> String {
+    let entries = std::fs::read_dir(fmu.folder().join("binaries")).into_iter().flatten().flatten();
+    let mut found: Vec<String> = entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect();
+    found.sort();
+    let wanted = platform(fmu.description().version);
+    let has = match (found.is_empty(), fmu.folder().join("sources").is_dir()) {
+        (true, true) => "it holds source code only".to_owned(),
+        (true, false) => "it holds no library at all".to_owned(),
+        (false, _) => format!("it holds libraries for {}", found.join(", ")),
+    };
+    format!("has no library `binaries/{wanted}/{name}` for this platform; {has}")
+}
+
+/// Whether the file can be a library of this machine, as far as its bytes say.
+fn inspect(path: &Path) -> std::result::Result<(), String> {
+    use std::io::Read;
+    let mut head = [0_u8; 20];
+    let read = std::fs::File::open(path).and_then(|mut f| f.read_exact(&mut head));
+    if read.is_err() || &head[..4] != b"\x7fELF" {
+        return Err("it is no shared library (no ELF header)".into());
+    }
+    let machine = u16::from_le_bytes([head[18], head[19]]);
+    let own = if cfg!(target_arch = "aarch64") { 183 } else { 62 };
+    if head[4] != 2 || machine != own {
+        return Err(format!("it is made for another kind of machine (ELF number {machine})"));
+    }
+    Ok(())
+}
+
+/// Opens a library. Some units forget to link the mathematics library: they get a second try with it.
+fn open(path: &Path) -> std::result::Result<Library, String> {
+    // SAFETY: the user asked for this unit; its constructors run.
+    let once = || unsafe { Library::open(Some(path), RTLD_NOW | RTLD_LOCAL) };
+    let first = match once() {
+        Ok(library) => return Ok(library),
+        Err(e) => cause(&e),
+    };
+    if !first.contains("undefined symbol") {
+        return Err(first);
+    }
+    // SAFETY: the mathematics library of the system.
+    match unsafe { Library::open(Some("libm.so.6"), RTLD_NOW | RTLD_GLOBAL) } {
+        Ok(mathematics) => std::mem::forget(mathematics),
+        Err(_) => return Err(first),
+    }
+    once().map_err(|e| cause(&e))
+}
+
+/// The system's own words: the top message of libloading hides them.
+fn cause(error: &libloading::Error) -> String {
+    error.source().map_or_else(|| error.to_string(), ToString::to_string)
+}

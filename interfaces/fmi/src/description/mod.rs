@@ -1,0 +1,150 @@
+//! What a unit says of itself: `modelDescription.xml` of FMI 2.0 and 3.0 as one plain structure.
+
+mod element;
+mod model;
+mod structure;
+mod terminals;
+mod types;
+mod variables;
+
+pub use model::*;
+
+use crate::error::{Error, Result};
+use element::{Element, Reader};
+use roxmltree::{Document, ParsingOptions};
+use std::path::Path;
+
+/// Most elements of a description.
+const NODES: u32 = 20_000_000;
+
+/// Reads and checks a description.
+///
+/// # Errors
+/// The first thing that makes the unit unusable, with line and element. What is odd but harmless is listed in
+/// [`ModelDescription::problems`].
+pub fn read(path: &Path, bytes: &[u8], terminals: Option<&[u8]>) -> Result<ModelDescription> {
+    let reader = Reader { path, file: "modelDescription.xml" };
+    let text = reader.text(bytes)?;
+    let document = parse(&reader, text)?;
+    let root = Element { reader: &reader, document: &document, node: document.root_element() };
+    let mut description = read_root(&root)?;
+    if let Some(bytes) = terminals {
+        match terminals::read(path, bytes, &description) {
+            Ok(found) => description.terminals = found,
+            Err(e) => description.problems.push(e.to_string()),
+        }
+    }
+    Ok(description)
+}
+
+fn parse<'a>(reader: &Reader, text: &'a str) -> Result<Document<'a>> {
+    let options = ParsingOptions { allow_dtd: false, nodes_limit: NODES, ..ParsingOptions::default() };
+    reader.depth(text)?;
+    Document::parse_with_options(text, options).map_err(|e| reader.error(e.pos().row, "xml", e.to_string()))
+}
+
+fn read_root(root: &Element) -> Result<ModelDescription> {
+    if root.name() != "fmiModelDescription" {
+        return Err(root.error("the root is not <fmiModelDescription>: it is no FMU"));
+    }
+    let version = version(root)?;
+    let token = match version {
+        Version::V2 => root.required("guid")?,
+        Version::V3 => root.required("instantiationToken")?,
+    };
+    let co_simulation = co_simulation(root)?;
+    let (identifier, capabilities) = capabilities(&co_simulation, version)?;
+    let mut description = ModelDescription {
+        version,
+        model_name: root.required("modelName")?.to_owned(),
+        token: token.to_owned(),
+        description: root.text("description").to_owned(),
+        author: root.text("author").to_owned(),
+        generation_tool: root.text("generationTool").to_owned(),
+        identifier,
+        capabilities,
+        model_exchange: root.child("ModelExchange").is_some(),
+        scheduled_execution: root.child("ScheduledExecution").is_some(),
+        experiment: experiment(root)?,
+        units: types::units(root)?,
+        types: types::types(root, version)?,
+        ..ModelDescription::default()
+    };
+    variables::read(root, &mut description)?;
+    structure::read(root, &mut description)?;
+    Ok(description)
+}
+
+fn version(root: &Element) -> Result<Version> {
+    match root.required("fmiVersion")? {
+        "2.0" => Ok(Version::V2),
+        v if v.starts_with("3.0") => Ok(Version::V3),
+        "1.0" => Err(root.unsupported("it is an FMU of FMI 1.0; FMI 2.0 and 3.0 are run here")),
+        other => Err(root.error(format!("fmiVersion = \"{}\": FMI 2.0 and 3.0 are known", printable(other)))),
+    }
+}
+
+fn co_simulation<'a>(root: &Element<'a>) -> Result<Element<'a>> {
+    if let Some(element) = root.child("CoSimulation") {
+        return Ok(element);
+    }
+    let name = root.text("modelName");
+    Err(root.unsupported(match (root.child("ScheduledExecution"), root.child("ModelExchange")) {
+        (Some(_), _) => format!("`{name}` is made for scheduled execution; co-simulation is run here"),
+        (None, Some(_)) => format!(
+            "`{name}` is made for model exchange and brings no solver; export it again for co-simulation"
+        ),
+        (None, None) => return Err(root.error("has neither <CoSimulation> nor <ModelExchange>")),
+    }))
+}
+
+fn capabilities(element: &Element, version: Version) -> Result<(String, Capabilities)> {
+    let identifier = element.required("modelIdentifier")?;
+    if !is_identifier(identifier) {
+        let message = format!("modelIdentifier = \"{}\" is no identifier of C", printable(identifier));
+        return Err(element.error(message));
+    }
+    let flag = |name| element.flag(name);
+    let own = |v2, v3| element.flag(if version == Version::V2 { v2 } else { v3 });
+    let capabilities = Capabilities {
+        state: own("canGetAndSetFMUstate", "canGetAndSetFMUState")?,
+        serialize: own("canSerializeFMUstate", "canSerializeFMUState")?,
+        directional_derivatives: own("providesDirectionalDerivative", "providesDirectionalDerivatives")?,
+        adjoint_derivatives: flag("providesAdjointDerivatives")?,
+        variable_step: flag("canHandleVariableCommunicationStepSize")?,
+        fixed_step: element.optional_number("fixedInternalStepSize")?,
+        once_per_process: flag("canBeInstantiatedOnlyOncePerProcess")?,
+        needs_tool: flag("needsExecutionTool")?,
+        event_mode: flag("hasEventMode")?,
+        may_return_early: flag("mightReturnEarlyFromDoStep")?,
+        intermediate_update: flag("providesIntermediateUpdate")?,
+        interpolates_inputs: flag("canInterpolateInputs")?,
+    };
+    Ok((identifier.to_owned(), capabilities))
+}
+
+fn experiment(root: &Element) -> Result<Experiment> {
+    let Some(element) = root.child("DefaultExperiment") else { return Ok(Experiment::default()) };
+    Ok(Experiment {
+        start: element.optional_number("startTime")?,
+        stop: element.optional_number("stopTime")?,
+        tolerance: element.optional_number("tolerance")?,
+        step: element.optional_number("stepSize")?,
+    })
+}
+
+fn is_identifier(text: &str) -> bool {
+    let mut characters = text.chars();
+    let first = characters.next().is_some_and(|c| c.is_ascii_alphabetic() || c == '_');
+    first && text.len() <= 200 && characters.all(|c| c.is_ascii_alphanumeric() || c == '_')
+}
+
+/// Foreign text for a message: short and without control characters.
+pub(crate) fn printable(text: &str) -> String {
+    text.chars().take(80).map(|c| if c.is_control() { '\u{fffd}' } else { c }).collect()
+}
+
+/// The error of a file without usable text.
+pub(crate) fn wrong(path: &Path, file: &'static str, line: u32, element: &str, message: String) -> Error {
+    Error::Description { path: path.into(), file, line, element: printable(element), message }
+}

@@ -1,0 +1,265 @@
+//! The structure that both versions are read into.
+
+use terraglue_subsystem::unit::Unit;
+use terraglue_subsystem::{Causality as Role, ValueType};
+
+/// Version of the standard.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Version {
+    /// FMI 2.0.
+    #[default]
+    V2,
+    /// FMI 3.0.
+    V3,
+}
+
+/// All that a unit says of itself.
+#[derive(Clone, Debug, Default)]
+pub struct ModelDescription {
+    /// Version of the standard.
+    pub version: Version,
+    /// Name of the model.
+    pub model_name: String,
+    /// `guid` or `instantiationToken`.
+    pub token: String,
+    /// One line for people.
+    pub description: String,
+    /// Who made the model.
+    pub author: String,
+    /// What made the unit.
+    pub generation_tool: String,
+    /// Name of its library.
+    pub identifier: String,
+    /// What it can do.
+    pub capabilities: Capabilities,
+    /// Whether it also is for model exchange.
+    pub model_exchange: bool,
+    /// Whether it also is for scheduled execution.
+    pub scheduled_execution: bool,
+    /// What it wants to be run with.
+    pub experiment: Experiment,
+    /// Its units by name.
+    pub units: Vec<(String, Unit)>,
+    /// Its declared types.
+    pub types: Vec<DeclaredType>,
+    /// Variables in the order of the file, aliases of FMI 3 among them.
+    pub variables: Vec<Variable>,
+    /// Positions of the outputs of the model structure, with what they depend on.
+    pub outputs: Vec<Unknown>,
+    /// Positions of the initial unknowns, likewise.
+    pub initial_unknowns: Vec<Unknown>,
+    /// Terminals of FMI 3.
+    pub terminals: Vec<Terminal>,
+    /// What is odd but harmless.
+    pub problems: Vec<String>,
+}
+
+/// What a unit can do.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Capabilities {
+    /// Its state can be saved and restored.
+    pub state: bool,
+    /// Its state can be turned into bytes.
+    pub serialize: bool,
+    /// Directional derivatives.
+    pub directional_derivatives: bool,
+    /// Adjoint derivatives.
+    pub adjoint_derivatives: bool,
+    /// Steps of any length.
+    pub variable_step: bool,
+    /// Length of its inner step where it is fixed, s.
+    pub fixed_step: Option<f64>,
+    /// One instance per process only.
+    pub once_per_process: bool,
+    /// Needs the tool that made it.
+    pub needs_tool: bool,
+    /// Event mode (FMI 3).
+    pub event_mode: bool,
+    /// May end a step early (FMI 3).
+    pub may_return_early: bool,
+    /// Intermediate update (FMI 3).
+    pub intermediate_update: bool,
+    /// Takes derivatives of its inputs (FMI 2).
+    pub interpolates_inputs: bool,
+}
+
+/// What a unit wants to be run with.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Experiment {
+    /// s.
+    pub start: Option<f64>,
+    /// s.
+    pub stop: Option<f64>,
+    /// Relative.
+    pub tolerance: Option<f64>,
+    /// s.
+    pub step: Option<f64>,
+}
+
+/// A declared type.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DeclaredType {
+    /// Name.
+    pub name: String,
+    /// Unit of its values.
+    pub unit: Option<String>,
+    /// Names and values of an enumeration.
+    pub items: Vec<(String, i64)>,
+    /// Smallest value.
+    pub min: Option<f64>,
+    /// Largest value.
+    pub max: Option<f64>,
+}
+
+/// Causality of a variable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Causality {
+    Parameter,
+    CalculatedParameter,
+    StructuralParameter,
+    Input,
+    Output,
+    Local,
+    Independent,
+}
+
+impl Causality {
+    /// Role in a scenario.
+    pub fn role(self) -> Role {
+        match self {
+            Self::Parameter | Self::StructuralParameter => Role::Parameter,
+            Self::Input => Role::Input,
+            Self::Output => Role::Output,
+            Self::CalculatedParameter | Self::Local | Self::Independent => Role::Local,
+        }
+    }
+}
+
+/// Variability of a variable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Variability {
+    Constant,
+    Fixed,
+    Tunable,
+    Discrete,
+    Continuous,
+}
+
+/// Initial of a variable.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[allow(missing_docs)]
+pub enum Initial {
+    Exact,
+    Approx,
+    Calculated,
+}
+
+/// Start value.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub enum Start {
+    /// None given.
+    #[default]
+    None,
+    /// Numbers, also truth values and enumerations.
+    Numbers(Vec<f64>),
+    /// Whole numbers, exactly.
+    Integers(Vec<i128>),
+    /// Texts.
+    Texts(Vec<String>),
+    /// Bytes.
+    Bytes(Vec<Vec<u8>>),
+}
+
+/// A dimension of an array.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Dimension {
+    /// So many elements.
+    Fixed(u64),
+    /// The value of the structural parameter with this reference.
+    Parameter(u32),
+}
+
+/// A variable.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Variable {
+    /// Name.
+    pub name: String,
+    /// Number in calls.
+    pub reference: u32,
+    /// Type of an element.
+    pub value_type: ValueType,
+    /// Role.
+    pub causality: Causality,
+    /// When it may change.
+    pub variability: Variability,
+    /// How it starts.
+    pub initial: Option<Initial>,
+    /// Start value.
+    pub start: Start,
+    /// Smallest value, −∞: none.
+    pub min: f64,
+    /// Largest value, ∞: none.
+    pub max: f64,
+    /// Name of its unit.
+    pub unit: Option<String>,
+    /// Names and values of an enumeration.
+    pub items: Vec<(String, i64)>,
+    /// Dimensions; empty: a scalar.
+    pub dimensions: Vec<Dimension>,
+    /// Sizes of the dimensions with the start values of the structural parameters.
+    pub sizes: Vec<u32>,
+    /// One line for people.
+    pub description: String,
+    /// Line in the description.
+    pub line: u32,
+    /// Whether this is another name of an earlier variable.
+    pub alias: bool,
+}
+
+impl Variable {
+    /// Number of elements.
+    pub fn len(&self) -> usize {
+        self.sizes.iter().map(|d| *d as usize).product()
+    }
+
+    /// Whether a dimension is zero.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// Whether a value may be set while the model is initialised.
+    pub fn has_start(&self) -> bool {
+        self.start != Start::None || matches!(self.causality, Causality::Input | Causality::Parameter)
+    }
+}
+
+/// An unknown of the model structure.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Unknown {
+    /// Position in [`ModelDescription::variables`].
+    pub variable: usize,
+    /// Positions of what it depends on; none: of everything.
+    pub dependencies: Option<Vec<usize>>,
+}
+
+/// A terminal of FMI 3.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Terminal {
+    /// Name.
+    pub name: String,
+    /// Kind, e.g. `org.terraglue.foot`.
+    pub kind: String,
+    /// Rule by which members are matched.
+    pub rule: String,
+    /// Member name and position of its variable.
+    pub members: Vec<(String, usize)>,
+}
+
+impl ModelDescription {
+    /// Position of a variable.
+    pub fn position(&self, name: &str) -> Option<usize> {
+        self.variables.iter().position(|v| v.name == name)
+    }
+}

@@ -1,0 +1,58 @@
+//! Units and declared types.
+
+use super::element::Element;
+use super::model::{DeclaredType, Version};
+use crate::error::Result;
+use terraglue_subsystem::unit::Unit;
+
+const BASE: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
+
+/// Units whose base unit is given; the others are names without a meaning.
+pub fn units(root: &Element) -> Result<Vec<(String, Unit)>> {
+    let mut all = Vec::new();
+    let Some(list) = root.child("UnitDefinitions") else { return Ok(all) };
+    for element in list.children().filter(|e| e.name() == "Unit") {
+        let name = element.required("name")?;
+        let Some(base) = element.child("BaseUnit") else { continue };
+        let mut unit = Unit::ONE;
+        for (exponent, symbol) in unit.exponents.iter_mut().zip(BASE) {
+            *exponent = base.whole(symbol, "a small whole number")?.unwrap_or(0);
+        }
+        unit.factor = base.optional_number("factor")?.unwrap_or(1.0);
+        unit.offset = base.optional_number("offset")?.unwrap_or(0.0);
+        if !unit.factor.is_finite() || unit.factor == 0.0 || !unit.offset.is_finite() {
+            return Err(base.error(format!("the unit `{name}` has no usable factor and offset")));
+        }
+        all.push((name.to_owned(), unit));
+    }
+    Ok(all)
+}
+
+/// Declared types of both versions.
+pub fn types(root: &Element, version: Version) -> Result<Vec<DeclaredType>> {
+    let Some(list) = root.child("TypeDefinitions") else { return Ok(Vec::new()) };
+    list.children().map(|e| one(&e, version)).filter_map(Result::transpose).collect()
+}
+
+fn one(element: &Element, version: Version) -> Result<Option<DeclaredType>> {
+    let name = element.required("name")?.to_owned();
+    // FMI 2.0 wraps the type, FMI 3.0 is the type.
+    let inner = match version {
+        Version::V2 => element.children().next(),
+        Version::V3 => Some(*element),
+    };
+    let Some(inner) = inner else { return Ok(None) };
+    let mut items = Vec::new();
+    for item in inner.children().filter(|e| e.name() == "Item") {
+        let value = item.whole("value", "a whole number")?;
+        let value = value.ok_or_else(|| item.error("lacks the attribute `value`"))?;
+        items.push((item.required("name")?.to_owned(), value));
+    }
+    Ok(Some(DeclaredType {
+        name,
+        unit: inner.attribute("unit").map(str::to_owned),
+        items,
+        min: inner.optional_number("min")?,
+        max: inner.optional_number("max")?,
+    }))
+}

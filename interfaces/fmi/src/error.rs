@@ -1,0 +1,84 @@
+//! What can be wrong with a unit, split by what has to be mended: archive, description, library, behaviour.
+
+use std::path::PathBuf;
+
+/// Why a unit cannot be used or does not go on.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum Error {
+    /// The archive is refused before anything of it is written or run.
+    #[error("{}: {}{message}", path.display(), entry.as_ref().map(|e| format!("entry `{e}`: ")).unwrap_or_default())]
+    Archive {
+        /// File.
+        path: PathBuf,
+        /// Entry of the archive.
+        entry: Option<String>,
+        /// What is wrong.
+        message: String,
+    },
+    /// `modelDescription.xml` breaks the standard.
+    #[error("{}: {file}:{line}: <{element}>: {message}", path.display())]
+    Description {
+        /// File.
+        path: PathBuf,
+        /// File inside the archive.
+        file: &'static str,
+        /// Line, from 1.
+        line: u32,
+        /// Element.
+        element: String,
+        /// What is wrong.
+        message: String,
+    },
+    /// It is a good unit, but of a kind that is not run here.
+    #[error("{}: {message}", path.display())]
+    Unsupported {
+        /// File.
+        path: PathBuf,
+        /// What it is.
+        message: String,
+    },
+    /// Its shared library is missing or cannot be loaded.
+    #[error("{}: {message}", path.display())]
+    Library {
+        /// File.
+        path: PathBuf,
+        /// What is wrong.
+        message: String,
+    },
+    /// A function did not succeed.
+    #[error("{function} {outcome}{}", said(log))]
+    Call {
+        /// Function of the C interface.
+        function: &'static str,
+        /// Status or what else was wrong with its answer.
+        outcome: String,
+        /// Last lines that the unit logged.
+        log: Vec<String>,
+        /// Whether nothing of the instance may be called any more.
+        fatal: bool,
+    },
+    /// `doStep` refused the step as too long.
+    #[error("{function} discarded the step; it came to t = {reached} s{}", said(log))]
+    Discard {
+        /// Function of the C interface.
+        function: &'static str,
+        /// Last successful time, s.
+        reached: f64,
+        /// Last lines that the unit logged.
+        log: Vec<String>,
+    },
+    /// The unit does not offer what was asked for.
+    #[error("{0}")]
+    Refused(String),
+}
+
+/// Result with this crate's error.
+pub type Result<T = ()> = std::result::Result<T, Error>;
+
+fn said(log: &[String]) -> String {
+    match log {
+        [] => String::new(),
+        lines => format!("; it says: {}", lines.join(" | ")),
+    }
+}

@@ -1,0 +1,134 @@
+//! A unit on disk: its archive extracted into a folder of its own, its description read.
+
+use crate::archive::{Archive, Limits};
+use crate::binary::{self, Loaded};
+use crate::description::{self, ModelDescription};
+use crate::error::{Error, Result};
+use std::fs::{File, TryLockError};
+use std::path::{Path, PathBuf};
+use std::sync::{Arc, Mutex, PoisonError, Weak};
+use tempfile::TempDir;
+
+/// Beginning of the names of our folders below the system's temporary folder.
+const PREFIX: &str = "terraglue-fmu-";
+/// File in such a folder that its process holds locked.
+const LOCK: &str = ".terraglue-lock";
+
+/// A checked and extracted unit. Its folder goes when the last instance and this handle are gone.
+#[derive(Debug)]
+pub struct Fmu {
+    path: PathBuf,
+    description: ModelDescription,
+    loaded: Mutex<Weak<Loaded>>,
+    // After everything that may use the folder.
+    folder: Folder,
+}
+
+impl Fmu {
+    /// Checks, reads and extracts a unit. None of its code runs.
+    ///
+    /// # Errors
+    /// What is wrong with archive or description, with entry or line.
+    pub fn open(path: &Path) -> Result<Arc<Self>> {
+        Self::open_within(path, Limits::default())
+    }
+
+    /// The same with other limits.
+    pub fn open_within(path: &Path, limits: Limits) -> Result<Arc<Self>> {
+        let mut archive = Archive::open(path, limits)?;
+        let description = Self::describe(path, &mut archive)?;
+        let folder = Folder::new().map_err(|e| Error::Archive {
+            path: path.into(),
+            entry: None,
+            message: format!("no temporary folder can be made: {e}"),
+        })?;
+        archive.extract(folder.path())?;
+        Ok(Arc::new(Self { path: path.into(), description, loaded: Mutex::default(), folder }))
+    }
+
+    /// Reads the description alone; nothing is written.
+    pub fn inspect(path: &Path) -> Result<(ModelDescription, Vec<String>)> {
+        let mut archive = Archive::open(path, Limits::default())?;
+        let description = Self::describe(path, &mut archive)?;
+        let mut names: Vec<String> = archive.names().map(str::to_owned).collect();
+        names.sort();
+        Ok((description, names))
+    }
+
+    fn describe(path: &Path, archive: &mut Archive) -> Result<ModelDescription> {
+        let bytes = archive.text("modelDescription.xml")?.unwrap_or_default();
+        let terminals = match archive.text("terminalsAndIcons/terminalsAndIcons.xml")? {
+            None => archive.text("icons/terminalsAndIcons.xml")?,
+            found => found,
+        };
+        description::read(path, &bytes, terminals.as_deref())
+    }
+
+    /// File that it came from.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// What it says of itself.
+    pub fn description(&self) -> &ModelDescription {
+        &self.description
+    }
+
+    /// Folder that it was extracted into.
+    pub fn folder(&self) -> &Path {
+        self.folder.path()
+    }
+
+    /// Its library, loaded at the first call and unloaded with the last instance.
+    pub(crate) fn library(&self) -> Result<Arc<Loaded>> {
+        let mut slot = self.loaded.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(loaded) = slot.upgrade() {
+            return Ok(loaded);
+        }
+        let loaded = Arc::new(binary::load(self)?);
+        *slot = Arc::downgrade(&loaded);
+        Ok(loaded)
+    }
+}
+
+/// A temporary folder that is locked while its process lives.
+#[derive(Debug)]
+struct Folder {
+    folder: TempDir,
+    _lock: File,
+}
+
+impl Folder {
+    fn new() -> std::io::Result<Self> {
+        sweep();
+        loop {
+            let folder = tempfile::Builder::new().prefix(PREFIX).tempdir()?;
+            let path = folder.path().join(LOCK);
+            let lock = File::create(&path)?;
+            lock.lock()?;
+            // Another process may have swept it between these two lines.
+            if path.exists() {
+                return Ok(Self { folder, _lock: lock });
+            }
+        }
+    }
+
+    fn path(&self) -> &Path {
+        self.folder.path()
+    }
+}
+
+/// Removes the folders of processes that were killed before they could.
+fn sweep() {
+    let Ok(entries) = std::fs::read_dir(std::env::temp_dir()) else { return };
+    for entry in entries.flatten() {
+        if !entry.file_name().to_string_lossy().starts_with(PREFIX) {
+            continue;
+        }
+        let Ok(lock) = File::open(entry.path().join(LOCK)) else { continue };
+        match lock.try_lock() {
+            Ok(()) => drop(std::fs::remove_dir_all(entry.path())),
+            Err(TryLockError::WouldBlock | TryLockError::Error(_)) => {}
+        }
+    }
+}

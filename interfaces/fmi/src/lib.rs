@@ -1,0 +1,22 @@
+//! Functional mock-up units (FMUs) of FMI 2.0 and 3.0, co-simulation.
+//!
+//! [`Fmu::open`] checks an archive, extracts it into a folder that is gone afterwards, and reads its description;
+//! none of its code runs. [`Slave`] is an instance of it, driven through the C interface of its version. The types
+//! and functions of the C interfaces are declared here from the text of the standards (Modelica Association, FMI
+//! 2.0.4 and 3.0.2).
+//!
+//! Every status of every call is looked at. What is not success becomes an [`Error`] that names the file, the
+//! function, the time and what the unit logged last; after `fatal` nothing of the instance is called again.
+
+mod archive;
+mod binary;
+pub mod description;
+mod error;
+mod fmu;
+pub mod slave;
+
+pub use archive::Limits;
+pub use description::{ModelDescription, Version};
+pub use error::{Error, Result};
+pub use fmu::Fmu;
+pub use slave::{Advance, LogLine, Slave, SlaveOptions, SlaveState, Stepped};

@@ -1,0 +1,130 @@
+//! One call of the C interface: looked at before, and its status after.
+
+use super::functions::Component;
+use super::{Slave, goes_on};
+use crate::error::{Error, Result};
+use std::ffi::c_int;
+
+/// Whether an instance may be called.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Health {
+    /// Yes.
+    Good,
+    /// It answered `error`: only reset, state and free are allowed.
+    Erroneous,
+    /// It answered `fatal`: nothing is allowed.
+    Dead,
+}
+
+/// Status of a call.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    /// Done.
+    Ok,
+    /// Done, with something to say.
+    Warning,
+    /// Not done, and nothing has changed.
+    Discard,
+    /// Failed.
+    Error,
+    /// Failed for good.
+    Fatal,
+    /// Still at work (FMI 2.0 only).
+    Pending,
+    /// None of the standard.
+    Unknown(c_int),
+}
+
+impl From<c_int> for Status {
+    fn from(status: c_int) -> Self {
+        match status {
+            0 => Self::Ok,
+            1 => Self::Warning,
+            2 => Self::Discard,
+            3 => Self::Error,
+            4 => Self::Fatal,
+            5 => Self::Pending,
+            other => Self::Unknown(other),
+        }
+    }
+}
+
+impl Slave {
+    /// Calls a function that must succeed.
+    pub(super) fn call<F>(
+        &self,
+        function: &'static str,
+        f: Option<F>,
+        run: impl FnOnce(F, Component) -> c_int,
+    ) -> Result {
+        match self.status(function, f, run)? {
+            status if goes_on(status) => Ok(()),
+            status => Err(self.failed(function, status)),
+        }
+    }
+
+    /// The same where the standard lets an instance be called that answered `error`.
+    pub(super) fn call_after_error<F>(
+        &self,
+        function: &'static str,
+        f: Option<F>,
+        run: impl FnOnce(F, Component) -> c_int,
+    ) -> Result {
+        let before = self.health.get();
+        if before == Health::Erroneous {
+            self.health.set(Health::Good);
+        }
+        let done = self.call(function, f, run);
+        if done.is_err() && self.health.get() == Health::Good {
+            self.health.set(before);
+        }
+        done
+    }
+
+    /// Calls a function and answers its status; what may not be called is an error.
+    pub(super) fn status<F>(
+        &self,
+        function: &'static str,
+        f: Option<F>,
+        run: impl FnOnce(F, Component) -> c_int,
+    ) -> Result<Status> {
+        if self.health.get() != Health::Good {
+            let outcome = "was not called: the instance failed before".into();
+            return Err(Error::Call { function, outcome, log: Vec::new(), fatal: true });
+        }
+        let Some(f) = f else {
+            return Err(Error::Refused(format!("its library has no function `{function}`")));
+        };
+        self.log.begin();
+        let status = Status::from(run(f, self.component));
+        if status == Status::Warning {
+            self.warnings.set(self.warnings.get() + 1);
+        }
+        Ok(status)
+    }
+
+    /// The error of a status that is no success, remembered where the standard asks for it.
+    #[cold]
+    pub(super) fn failed(&self, function: &'static str, status: Status) -> Error {
+        let (health, outcome) = match status {
+            Status::Error => (Health::Erroneous, "answered the status error".to_owned()),
+            Status::Fatal => (Health::Dead, "answered the status fatal".to_owned()),
+            Status::Discard => (Health::Good, "answered the status discard".to_owned()),
+            Status::Pending => {
+                let text = "answered the status pending, although nothing was to be done in the background";
+                (Health::Dead, text.to_owned())
+            }
+            Status::Unknown(n) => (Health::Dead, format!("answered {n}, which is no status of the standard")),
+            Status::Ok | Status::Warning => (Health::Good, "succeeded".to_owned()),
+        };
+        self.health.set(health);
+        Error::Call { function, outcome, log: self.log.last(), fatal: health != Health::Good }
+    }
+
+    /// An error in what a function answered.
+    #[cold]
+    pub(super) fn lied(&self, function: &'static str, outcome: String) -> Error {
+        self.health.set(Health::Erroneous);
+        Error::Call { function, outcome, log: self.log.last(), fatal: true }
+    }
+}

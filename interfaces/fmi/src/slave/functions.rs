@@ -1,0 +1,196 @@
+//! The functions of the C interfaces, by hand from the text of the standards.
+//!
+//! Every function is optional here: a missing one is an error of the call that needs it, or at load time where the
+//! standard demands it or the description promises it.
+
+use crate::error::{Error, Result};
+use crate::fmu::Fmu;
+use libloading::os::unix::Library;
+use std::ffi::{c_char, c_int, c_void};
+
+/// An instance on the other side.
+pub type Component = *mut c_void;
+/// A saved state on the other side.
+pub type State = *mut c_void;
+/// A reference to a variable.
+pub type Vr = u32;
+type Text = *const c_char;
+
+macro_rules! table {
+    ($(#[$doc:meta])* $name:ident { $($field:ident = $symbol:literal : fn($($argument:ty),*) $(-> $ret:ty)?;)* }) => {
+        $(#[$doc])*
+        #[derive(Clone, Copy, Debug)]
+        #[allow(missing_docs)]
+        pub struct $name { $(pub $field: Option<unsafe extern "C" fn($($argument),*) $(-> $ret)?>,)* }
+
+        impl $name {
+            /// Looks all functions up.
+            pub fn find(library: &Library) -> Self {
+                // SAFETY: a function of this name has this type, by the standard.
+                unsafe {
+                    Self { $($field: library.get(concat!($symbol, "\0").as_bytes()).ok().map(|s| *s),)* }
+                }
+            }
+
+            /// Names of those that are not there.
+            pub fn missing(&self) -> Vec<&'static str> {
+                let all = [$(($symbol, self.$field.is_some()),)*];
+                all.into_iter().filter(|(_, there)| !there).map(|(symbol, _)| symbol).collect()
+            }
+        }
+    };
+}
+
+/// The logger of FMI 2.0, which is variadic; only its address is handed over.
+pub type Logger2 = unsafe extern "C" fn(*mut c_void, Text, c_int, Text, Text, ...);
+
+/// `fmi2CallbackFunctions`.
+#[repr(C)]
+#[derive(Debug)]
+#[allow(missing_docs)]
+pub struct Callbacks2 {
+    pub logger: Logger2,
+    pub allocate: unsafe extern "C" fn(usize, usize) -> *mut c_void,
+    pub free: unsafe extern "C" fn(*mut c_void),
+    pub step_finished: Option<unsafe extern "C" fn(*mut c_void, c_int)>,
+    pub environment: *mut c_void,
+}
+
+/// `fmi3LogMessageCallback`.
+pub type Logger3 = unsafe extern "C" fn(*mut c_void, c_int, Text, Text);
+
+table! {
+    /// FMI 2.0 for co-simulation.
+    Two {
+        instantiate = "fmi2Instantiate": fn(Text, c_int, Text, Text, *const Callbacks2, c_int, c_int) -> Component;
+        free = "fmi2FreeInstance": fn(Component);
+        setup = "fmi2SetupExperiment": fn(Component, c_int, f64, f64, c_int, f64) -> c_int;
+        enter_initialization = "fmi2EnterInitializationMode": fn(Component) -> c_int;
+        exit_initialization = "fmi2ExitInitializationMode": fn(Component) -> c_int;
+        terminate = "fmi2Terminate": fn(Component) -> c_int;
+        reset = "fmi2Reset": fn(Component) -> c_int;
+        get_real = "fmi2GetReal": fn(Component, *const Vr, usize, *mut f64) -> c_int;
+        get_integer = "fmi2GetInteger": fn(Component, *const Vr, usize, *mut c_int) -> c_int;
+        get_boolean = "fmi2GetBoolean": fn(Component, *const Vr, usize, *mut c_int) -> c_int;
+        get_string = "fmi2GetString": fn(Component, *const Vr, usize, *mut Text) -> c_int;
+        set_real = "fmi2SetReal": fn(Component, *const Vr, usize, *const f64) -> c_int;
+        set_integer = "fmi2SetInteger": fn(Component, *const Vr, usize, *const c_int) -> c_int;
+        set_boolean = "fmi2SetBoolean": fn(Component, *const Vr, usize, *const c_int) -> c_int;
+        set_string = "fmi2SetString": fn(Component, *const Vr, usize, *const Text) -> c_int;
+        do_step = "fmi2DoStep": fn(Component, f64, f64, c_int) -> c_int;
+        get_real_status = "fmi2GetRealStatus": fn(Component, c_int, *mut f64) -> c_int;
+        get_boolean_status = "fmi2GetBooleanStatus": fn(Component, c_int, *mut c_int) -> c_int;
+        get_state = "fmi2GetFMUstate": fn(Component, *mut State) -> c_int;
+        set_state = "fmi2SetFMUstate": fn(Component, State) -> c_int;
+        free_state = "fmi2FreeFMUstate": fn(Component, *mut State) -> c_int;
+        state_size = "fmi2SerializedFMUstateSize": fn(Component, State, *mut usize) -> c_int;
+        serialize = "fmi2SerializeFMUstate": fn(Component, State, *mut c_char, usize) -> c_int;
+        deserialize = "fmi2DeSerializeFMUstate": fn(Component, *const c_char, usize, *mut State) -> c_int;
+        directional = "fmi2GetDirectionalDerivative":
+            fn(Component, *const Vr, usize, *const Vr, usize, *const f64, *mut f64) -> c_int;
+    }
+}
+
+table! {
+    /// FMI 3.0 for co-simulation.
+    Three {
+        instantiate = "fmi3InstantiateCoSimulation": fn(
+            Text, Text, Text, bool, bool, bool, bool, *const Vr, usize, *mut c_void, Logger3, *const c_void
+        ) -> Component;
+        free = "fmi3FreeInstance": fn(Component);
+        enter_initialization = "fmi3EnterInitializationMode": fn(Component, bool, f64, f64, bool, f64) -> c_int;
+        exit_initialization = "fmi3ExitInitializationMode": fn(Component) -> c_int;
+        enter_event_mode = "fmi3EnterEventMode": fn(Component) -> c_int;
+        enter_step_mode = "fmi3EnterStepMode": fn(Component) -> c_int;
+        update_discrete = "fmi3UpdateDiscreteStates": fn(
+            Component, *mut bool, *mut bool, *mut bool, *mut bool, *mut bool, *mut f64
+        ) -> c_int;
+        terminate = "fmi3Terminate": fn(Component) -> c_int;
+        reset = "fmi3Reset": fn(Component) -> c_int;
+        get_f64 = "fmi3GetFloat64": fn(Component, *const Vr, usize, *mut f64, usize) -> c_int;
+        get_f32 = "fmi3GetFloat32": fn(Component, *const Vr, usize, *mut f32, usize) -> c_int;
+        get_i8 = "fmi3GetInt8": fn(Component, *const Vr, usize, *mut i8, usize) -> c_int;
+        get_u8 = "fmi3GetUInt8": fn(Component, *const Vr, usize, *mut u8, usize) -> c_int;
+        get_i16 = "fmi3GetInt16": fn(Component, *const Vr, usize, *mut i16, usize) -> c_int;
+        get_u16 = "fmi3GetUInt16": fn(Component, *const Vr, usize, *mut u16, usize) -> c_int;
+        get_i32 = "fmi3GetInt32": fn(Component, *const Vr, usize, *mut i32, usize) -> c_int;
+        get_u32 = "fmi3GetUInt32": fn(Component, *const Vr, usize, *mut u32, usize) -> c_int;
+        get_i64 = "fmi3GetInt64": fn(Component, *const Vr, usize, *mut i64, usize) -> c_int;
+        get_u64 = "fmi3GetUInt64": fn(Component, *const Vr, usize, *mut u64, usize) -> c_int;
+        get_bool = "fmi3GetBoolean": fn(Component, *const Vr, usize, *mut u8, usize) -> c_int;
+        get_string = "fmi3GetString": fn(Component, *const Vr, usize, *mut Text, usize) -> c_int;
+        get_binary = "fmi3GetBinary": fn(Component, *const Vr, usize, *mut usize, *mut *const u8, usize) -> c_int;
+        set_f64 = "fmi3SetFloat64": fn(Component, *const Vr, usize, *const f64, usize) -> c_int;
+        set_f32 = "fmi3SetFloat32": fn(Component, *const Vr, usize, *const f32, usize) -> c_int;
+        set_i8 = "fmi3SetInt8": fn(Component, *const Vr, usize, *const i8, usize) -> c_int;
+        set_u8 = "fmi3SetUInt8": fn(Component, *const Vr, usize, *const u8, usize) -> c_int;
+        set_i16 = "fmi3SetInt16": fn(Component, *const Vr, usize, *const i16, usize) -> c_int;
+        set_u16 = "fmi3SetUInt16": fn(Component, *const Vr, usize, *const u16, usize) -> c_int;
+        set_i32 = "fmi3SetInt32": fn(Component, *const Vr, usize, *const i32, usize) -> c_int;
+        set_u32 = "fmi3SetUInt32": fn(Component, *const Vr, usize, *const u32, usize) -> c_int;
+        set_i64 = "fmi3SetInt64": fn(Component, *const Vr, usize, *const i64, usize) -> c_int;
+        set_u64 = "fmi3SetUInt64": fn(Component, *const Vr, usize, *const u64, usize) -> c_int;
+        set_bool = "fmi3SetBoolean": fn(Component, *const Vr, usize, *const bool, usize) -> c_int;
+        set_string = "fmi3SetString": fn(Component, *const Vr, usize, *const Text, usize) -> c_int;
+        set_binary = "fmi3SetBinary":
+            fn(Component, *const Vr, usize, *const usize, *const *const u8, usize) -> c_int;
+        do_step = "fmi3DoStep": fn(
+            Component, f64, f64, bool, *mut bool, *mut bool, *mut bool, *mut f64
+        ) -> c_int;
+        get_state = "fmi3GetFMUState": fn(Component, *mut State) -> c_int;
+        set_state = "fmi3SetFMUState": fn(Component, State) -> c_int;
+        free_state = "fmi3FreeFMUState": fn(Component, *mut State) -> c_int;
+        state_size = "fmi3SerializedFMUStateSize": fn(Component, State, *mut usize) -> c_int;
+        serialize = "fmi3SerializeFMUState": fn(Component, State, *mut u8, usize) -> c_int;
+        deserialize = "fmi3DeserializeFMUState": fn(Component, *const u8, usize, *mut State) -> c_int;
+        directional = "fmi3GetDirectionalDerivative":
+            fn(Component, *const Vr, usize, *const Vr, usize, *const f64, usize, *mut f64, usize) -> c_int;
+    }
+}
+
+/// Functions of one version.
+#[derive(Clone, Copy, Debug)]
+pub enum Api {
+    /// FMI 2.0.
+    Two(&'static str, Two),
+    /// FMI 3.0.
+    Three(&'static str, Three),
+}
+
+/// Finds the functions of a unit and checks that those are there which the standard demands of every co-simulation
+/// unit and which the description promises.
+pub fn find(fmu: &Fmu, library: &Library) -> Result<Api> {
+    use crate::description::Version;
+    let (api, missing) = match fmu.description().version {
+        Version::V2 => {
+            let two = Two::find(library);
+            (Api::Two("fmi2", two), two.missing())
+        }
+        Version::V3 => {
+            let three = Three::find(library);
+            (Api::Three("fmi3", three), three.missing())
+        }
+    };
+    let c = &fmu.description().capabilities;
+    let needed = |symbol: &&str| {
+        let name = &symbol[4..];
+        let always = ["FreeInstance", "EnterInitializationMode", "ExitInitializationMode", "DoStep"];
+        let instantiate = name.starts_with("Instantiate") || name == "SetupExperiment";
+        let state = name.ends_with("FMUstate") || name.ends_with("FMUState") || name.contains("FMUstateSize");
+        let bytes = name.contains("erialize");
+        always.contains(&name)
+            || instantiate
+            || bytes && c.serialize
+            || state && !bytes && c.state
+            || name == "GetDirectionalDerivative" && c.directional_derivatives
+    };
+    match missing.iter().find(|s| needed(s)) {
+        None => Ok(api),
+        Some(symbol) => Err(Error::Library {
+            path: fmu.path().into(),
+            message: format!(
+                "its library has no function `{symbol}`, which the standard or its description promises"
+            ),
+        }),
+    }
+}

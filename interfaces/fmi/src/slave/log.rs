@@ -1,0 +1,157 @@
+//! What a unit logs: kept for errors, handed on with a limit, because some units log without end.
+
+use std::collections::VecDeque;
+use std::ffi::{c_char, c_int, c_void};
+use std::sync::{Mutex, PoisonError};
+use terraglue_subsystem::LogLevel;
+
+/// A line of a unit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct LogLine {
+    /// Severity by its status.
+    pub level: LogLevel,
+    /// Text with its category.
+    pub text: String,
+}
+
+/// Takes the lines that are let through.
+pub type Sink = Box<dyn Fn(&LogLine) + Send + Sync>;
+
+/// Lines of one call that are handed on.
+const PER_CALL: u32 = 20;
+/// Lines of one run that are handed on.
+const PER_RUN: u64 = 1000;
+/// Lines kept for an error.
+const KEPT: usize = 5;
+/// Characters of a line.
+const LENGTH: usize = 1000;
+
+/// The log of an instance; its address is the environment of the call-backs.
+pub struct LogBook {
+    sink: Sink,
+    lines: Mutex<Lines>,
+}
+
+#[derive(Default)]
+struct Lines {
+    kept: VecDeque<String>,
+    this_call: u32,
+    handed_on: u64,
+    held_back: u64,
+}
+
+impl LogBook {
+    pub fn new(sink: Sink) -> Self {
+        Self { sink, lines: Mutex::default() }
+    }
+
+    /// A call begins: its lines count anew.
+    pub fn begin(&self) {
+        let mut lines = self.lines.lock().unwrap_or_else(PoisonError::into_inner);
+        lines.this_call = 0;
+        lines.kept.clear();
+    }
+
+    /// What the call that failed has said.
+    pub fn last(&self) -> Vec<String> {
+        let lines = self.lines.lock().unwrap_or_else(PoisonError::into_inner);
+        lines.kept.iter().cloned().collect()
+    }
+
+    /// Lines that were not handed on.
+    pub fn held_back(&self) -> u64 {
+        self.lines.lock().unwrap_or_else(PoisonError::into_inner).held_back
+    }
+
+    fn take(&self, status: c_int, category: &str, text: &str) {
+        let mut lines = self.lines.lock().unwrap_or_else(PoisonError::into_inner);
+        let trimmed: String = text.trim().chars().take(LENGTH).collect();
+        let text: String = trimmed.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();
+        let text = if category.is_empty() { text } else { format!("[{category}] {text}") };
+        if lines.kept.len() == KEPT {
+            lines.kept.pop_front();
+        }
+        lines.kept.push_back(text.clone());
+        if lines.this_call >= PER_CALL || lines.handed_on >= PER_RUN {
+            lines.held_back += 1;
+            return;
+        }
+        lines.this_call += 1;
+        lines.handed_on += 1;
+        let last = lines.this_call == PER_CALL || lines.handed_on == PER_RUN;
+        drop(lines);
+        let level = match status {
+            0 => LogLevel::Info,
+            1 | 2 => LogLevel::Warning,
+            _ => LogLevel::Error,
+        };
+        let note = if last { " (further lines are held back)" } else { "" };
+        (self.sink)(&LogLine { level, text: format!("{text}{note}") });
+    }
+}
+
+/// Text of a unit, however broken; at most some thousand bytes are looked at.
+///
+/// # Safety
+/// `text` is null or points at bytes up to a zero.
+unsafe fn foreign(text: *const c_char) -> String {
+    if text.is_null() {
+        return String::new();
+    }
+    let mut bytes = Vec::new();
+    for k in 0..4 * LENGTH {
+        // SAFETY: no byte beyond the zero is read.
+        let byte = unsafe { *text.add(k) } as u8;
+        if byte == 0 {
+            break;
+        }
+        bytes.push(byte);
+    }
+    String::from_utf8_lossy(&bytes).into_owned()
+}
+
+/// Called by the C part of the logger of FMI 2.0, and by that of FMI 3.0.
+///
+/// # Safety
+/// `environment` is the [`LogBook`] handed to the unit, alive as long as its instance.
+// SAFETY: a name of our own; logger.c calls it.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn terraglue_fmi_log(
+    environment: *mut c_void,
+    status: c_int,
+    category: *const c_char,
+    text: *const c_char,
+) {
+    // SAFETY: see above; a unit that hands on something else than it was given cannot be helped.
+    let Some(book) = (unsafe { environment.cast::<LogBook>().as_ref() }) else { return };
+    // A panic must not cross; nothing here is left half done.
+    let done = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+        // SAFETY: texts of the unit end in a zero.
+        let (category, text) = unsafe { (foreign(category), foreign(text)) };
+        book.take(status, &category, &text);
+    }));
+    drop(done);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+    use std::sync::atomic::{AtomicU32, Ordering};
+
+    #[test]
+    fn a_flood_is_held_back_and_the_end_is_kept() {
+        let count = Arc::new(AtomicU32::new(0));
+        let seen = count.clone();
+        let book = LogBook::new(Box::new(move |_| drop(seen.fetch_add(1, Ordering::Relaxed))));
+        for call in 0..100 {
+            book.begin();
+            for k in 0..1000 {
+                book.take(3, "x", &format!("line {k} of {call}"));
+            }
+        }
+        assert_eq!(u64::from(count.load(Ordering::Relaxed)), PER_RUN);
+        assert_eq!(book.last().last().map(String::as_str), Some("[x] line 999 of 99"));
+        assert_eq!(book.held_back(), 100_000 - PER_RUN);
+    }
+}

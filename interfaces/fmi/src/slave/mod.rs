@@ -1,0 +1,299 @@
+//! An instance of a unit, driven through its C interface.
+//!
+//! The order of calls is the standard's: instantiate, start values, initialisation, steps, terminate, free. An
+//! instance that answered `error` is only freed, one that answered `fatal` is not called at all any more.
+#![allow(unsafe_code)] // Functions of foreign libraries are called.
+
+mod call;
+mod functions;
+mod log;
+mod state;
+mod step;
+mod values;
+
+pub use log::{LogLine, Sink};
+pub use state::SlaveState;
+pub use step::{Advance, Stepped};
+
+use crate::binary::Loaded;
+use crate::error::{Error, Result};
+use crate::fmu::Fmu;
+use call::{Health, Status};
+use functions::{Api, Callbacks2, Component};
+use log::LogBook;
+use std::cell::Cell;
+use std::ffi::{CString, c_char, c_int, c_void};
+use std::sync::Arc;
+
+// SAFETY: the variadic logger of logger.c, linked with this crate.
+unsafe extern "C" {
+    fn terraglue_fmi2_logger(
+        environment: *mut c_void,
+        instance: *const c_char,
+        status: c_int,
+        category: *const c_char,
+        message: *const c_char,
+        ...
+    );
+}
+
+/// What an instance is made with.
+pub struct SlaveOptions {
+    /// Name of the instance.
+    pub name: String,
+    /// Whether the unit shall log details.
+    pub verbose: bool,
+    /// Whether events are handled in event mode (FMI 3, where the unit has it).
+    pub event_mode: bool,
+    /// Where its log goes.
+    pub sink: Sink,
+}
+
+/// Where an instance is in its life.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    Instantiated,
+    Initializing,
+    Stepping,
+    Terminated,
+}
+
+/// An instance of a unit.
+pub struct Slave {
+    api: Api,
+    component: Component,
+    health: Cell<Health>,
+    phase: Phase,
+    event_mode: bool,
+    warnings: Cell<u64>,
+    // The order matters: call-backs and log outlive the instance, the library both, the folder all.
+    log: Box<LogBook>,
+    _callbacks: Option<Box<Callbacks2>>,
+    loaded: Arc<Loaded>,
+    fmu: Arc<Fmu>,
+}
+
+// SAFETY: the standard lets an instance be used from any thread, one at a time.
+unsafe impl Send for Slave {}
+
+impl Slave {
+    /// Loads the library where that was not done yet, and makes an instance.
+    pub fn instantiate(fmu: &Arc<Fmu>, options: SlaveOptions) -> Result<Self> {
+        let description = fmu.description();
+        if description.capabilities.needs_tool {
+            log_needs_tool(&options.sink, description);
+        }
+        let loaded = fmu.library()?;
+        let api = functions::find(fmu, &loaded.library)?;
+        let log = Box::new(LogBook::new(options.sink));
+        let event_mode = options.event_mode && description.capabilities.event_mode;
+        let environment = (&raw const *log).cast_mut().cast::<c_void>();
+        let text =
+            |text: &str| CString::new(text).map_err(|_| Error::Refused(format!("`{text}` has a zero in it")));
+        let (name, token) = (text(&options.name)?, text(&description.token)?);
+        let resources = fmu.folder().join("resources");
+        if let Err(e) = std::fs::create_dir_all(&resources) {
+            return Err(Error::Refused(format!("{}: {e}", resources.display())));
+        }
+        let path = resources.display().to_string();
+        let mut callbacks = None;
+        let component = match &api {
+            Api::Two(_, two) => {
+                let place = callbacks.insert(Box::new(Callbacks2 {
+                    logger: terraglue_fmi2_logger,
+                    allocate: libc::calloc,
+                    free: libc::free,
+                    step_finished: None,
+                    environment,
+                }));
+                let resources = text(&file_uri(&path))?;
+                let (make, verbose) = (two.instantiate, c_int::from(options.verbose));
+                // SAFETY: the arguments are those of the standard and live long enough.
+                make.map(|f| unsafe {
+                    f(name.as_ptr(), 1, token.as_ptr(), resources.as_ptr(), &raw const **place, 0, verbose)
+                })
+            }
+            Api::Three(_, three) => {
+                let resources = text(&format!("{path}/"))?;
+                let (verbose, none) = (options.verbose, std::ptr::null::<u32>());
+                // SAFETY: the arguments are those of the standard and live long enough.
+                three.instantiate.map(|f| unsafe {
+                    f(
+                        name.as_ptr(),
+                        token.as_ptr(),
+                        resources.as_ptr(),
+                        false,
+                        verbose,
+                        event_mode,
+                        false,
+                        none,
+                        0,
+                        environment,
+                        log::terraglue_fmi_log,
+                        std::ptr::null(),
+                    )
+                })
+            }
+        };
+        let component = component.unwrap_or(std::ptr::null_mut());
+        if component.is_null() {
+            let function =
+                if matches!(api, Api::Two(..)) { "fmi2Instantiate" } else { "fmi3InstantiateCoSimulation" };
+            let outcome = "made no instance (it returned NULL)".into();
+            return Err(Error::Call { function, outcome, log: log.last(), fatal: true });
+        }
+        Ok(Self {
+            api,
+            component,
+            health: Cell::new(Health::Good),
+            phase: Phase::Instantiated,
+            event_mode,
+            warnings: Cell::new(0),
+            log,
+            _callbacks: callbacks,
+            loaded,
+            fmu: fmu.clone(),
+        })
+    }
+
+    /// The unit.
+    pub fn fmu(&self) -> &Arc<Fmu> {
+        &self.fmu
+    }
+
+    /// Calls that ended with a warning.
+    pub fn warnings(&self) -> u64 {
+        self.warnings.get()
+    }
+
+    /// Whether nothing of the instance may be called any more.
+    pub fn is_dead(&self) -> bool {
+        self.health.get() == Health::Dead
+    }
+
+    /// Enters initialisation mode, after start values were set.
+    pub fn enter_initialization(&mut self, start: f64, stop: Option<f64>, tolerance: Option<f64>) -> Result {
+        let (has_tolerance, tolerance) = (tolerance.is_some(), tolerance.unwrap_or(0.0));
+        let (has_stop, stop) = (stop.is_some(), stop.unwrap_or(0.0));
+        match self.api {
+            Api::Two(_, two) => {
+                let (tolerant, stops) = (c_int::from(has_tolerance), c_int::from(has_stop));
+                self.call("fmi2SetupExperiment", two.setup, |f, c| unsafe {
+                    f(c, tolerant, tolerance, start, stops, stop)
+                })?;
+                self.call("fmi2EnterInitializationMode", two.enter_initialization, |f, c| unsafe { f(c) })?;
+            }
+            Api::Three(_, three) => {
+                self.call("fmi3EnterInitializationMode", three.enter_initialization, |f, c| unsafe {
+                    f(c, has_tolerance, tolerance, start, has_stop, stop)
+                })?;
+            }
+        }
+        self.phase = Phase::Initializing;
+        Ok(())
+    }
+
+    /// Leaves initialisation mode; the unit can be stepped.
+    pub fn exit_initialization(&mut self) -> Result {
+        match self.api {
+            Api::Two(_, two) => {
+                self.call("fmi2ExitInitializationMode", two.exit_initialization, |f, c| unsafe { f(c) })?;
+            }
+            Api::Three(_, three) => {
+                self.call("fmi3ExitInitializationMode", three.exit_initialization, |f, c| unsafe { f(c) })?;
+                if self.event_mode {
+                    self.settle_events()?;
+                    self.call("fmi3EnterStepMode", three.enter_step_mode, |f, c| unsafe { f(c) })?;
+                }
+            }
+        }
+        self.phase = Phase::Stepping;
+        Ok(())
+    }
+
+    /// Whether it is in initialisation mode.
+    pub fn is_initializing(&self) -> bool {
+        self.phase == Phase::Initializing
+    }
+
+    /// Ends the simulation; values can still be read.
+    pub fn terminate(&mut self) -> Result {
+        if self.phase != Phase::Stepping {
+            return Ok(());
+        }
+        self.phase = Phase::Terminated;
+        match self.api {
+            Api::Two(_, two) => self.call("fmi2Terminate", two.terminate, |f, c| unsafe { f(c) }),
+            Api::Three(_, three) => self.call("fmi3Terminate", three.terminate, |f, c| unsafe { f(c) }),
+        }
+    }
+
+    /// Back to the state after instantiation.
+    pub fn reset(&mut self) -> Result {
+        match self.api {
+            Api::Two(_, two) => self.call_after_error("fmi2Reset", two.reset, |f, c| unsafe { f(c) })?,
+            Api::Three(_, three) => {
+                self.call_after_error("fmi3Reset", three.reset, |f, c| unsafe { f(c) })?
+            }
+        }
+        self.phase = Phase::Instantiated;
+        self.health.set(Health::Good);
+        Ok(())
+    }
+}
+
+impl Drop for Slave {
+    fn drop(&mut self) {
+        if self.health.get() == Health::Dead {
+            // Nothing of it may be called, so what it still holds must stay loaded.
+            std::mem::forget(self.loaded.clone());
+            return;
+        }
+        if self.health.get() == Health::Good {
+            // The run is over; what it says to this is in its log.
+            drop(self.terminate());
+        }
+        if self.health.get() == Health::Dead {
+            std::mem::forget(self.loaded.clone());
+            return;
+        }
+        let free = match &self.api {
+            Api::Two(_, two) => two.free,
+            Api::Three(_, three) => three.free,
+        };
+        if let Some(free) = free {
+            // SAFETY: a live instance, freed once.
+            unsafe { free(self.component) };
+        }
+    }
+}
+
+impl std::fmt::Debug for Slave {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("Slave").field("fmu", &self.fmu.path()).field("phase", &self.phase).finish()
+    }
+}
+
+fn log_needs_tool(sink: &Sink, description: &crate::ModelDescription) {
+    let text = format!("needs the tool that made it ({}) to be installed", description.generation_tool);
+    sink(&LogLine { level: terraglue_subsystem::LogLevel::Warning, text });
+}
+
+/// A path as the URI that FMI 2.0 asks for.
+fn file_uri(path: &str) -> String {
+    let mut uri = String::from("file://");
+    for byte in path.bytes() {
+        match byte {
+            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'-' | b'_' | b'.' | b'~' => {
+                uri.push(char::from(byte))
+            }
+            other => uri.push_str(&format!("%{other:02X}")),
+        }
+    }
+    uri
+}
+
+/// Whether a status lets the caller go on.
+pub(crate) fn goes_on(status: Status) -> bool {
+    matches!(status, Status::Ok | Status::Warning)
+}

@@ -1,0 +1,147 @@
+//! Saved states of an instance, their bytes, and directional derivatives.
+
+use super::Slave;
+use super::functions::{Api, State};
+use crate::error::{Error, Result};
+
+/// A saved state; belongs to the instance that made it and is given back to it.
+#[derive(Debug)]
+pub struct SlaveState(State);
+
+// SAFETY: a handle that only its instance looks into.
+unsafe impl Send for SlaveState {}
+
+impl Default for SlaveState {
+    fn default() -> Self {
+        Self(std::ptr::null_mut())
+    }
+}
+
+impl SlaveState {
+    /// Whether nothing was saved yet.
+    pub fn is_empty(&self) -> bool {
+        self.0.is_null()
+    }
+}
+
+impl Slave {
+    fn can(&self, what: bool, name: &str) -> Result {
+        if what { Ok(()) } else { Err(Error::Refused(format!("the unit does not offer {name}"))) }
+    }
+
+    /// Saves the state; the memory of an earlier one in `state` is used again.
+    pub fn save(&self, state: &mut SlaveState) -> Result {
+        self.can(self.fmu.description().capabilities.state, "to save its state")?;
+        let place = &raw mut state.0;
+        // SAFETY: `state` is null or a state of this instance, here and below.
+        match self.api {
+            Api::Two(_, two) => self.call("fmi2GetFMUstate", two.get_state, |f, c| unsafe { f(c, place) })?,
+            Api::Three(_, three) => {
+                self.call("fmi3GetFMUState", three.get_state, |f, c| unsafe { f(c, place) })?;
+            }
+        }
+        if state.0.is_null() {
+            return Err(self.lied("getFMUState", "saved nothing (its state is NULL)".into()));
+        }
+        Ok(())
+    }
+
+    /// Back to a saved state.
+    pub fn restore(&self, state: &SlaveState) -> Result {
+        if state.is_empty() {
+            return Err(Error::Refused("no state was saved".into()));
+        }
+        let state = state.0;
+        match self.api {
+            Api::Two(_, two) => {
+                self.call_after_error("fmi2SetFMUstate", two.set_state, |f, c| unsafe { f(c, state) })
+            }
+            Api::Three(_, three) => {
+                self.call_after_error("fmi3SetFMUState", three.set_state, |f, c| unsafe { f(c, state) })
+            }
+        }
+    }
+
+    /// Gives a saved state back.
+    pub fn release(&self, state: &mut SlaveState) -> Result {
+        if state.is_empty() || self.is_dead() {
+            return Ok(());
+        }
+        let place = &raw mut state.0;
+        let done = match self.api {
+            Api::Two(_, two) => {
+                self.call_after_error("fmi2FreeFMUstate", two.free_state, |f, c| unsafe { f(c, place) })
+            }
+            Api::Three(_, three) => {
+                self.call_after_error("fmi3FreeFMUState", three.free_state, |f, c| unsafe { f(c, place) })
+            }
+        };
+        state.0 = std::ptr::null_mut();
+        done
+    }
+
+    /// A saved state as bytes.
+    pub fn serialize(&self, state: &SlaveState) -> Result<Vec<u8>> {
+        self.can(self.fmu.description().capabilities.serialize, "to serialise its state")?;
+        let state = state.0;
+        let mut size = 0_usize;
+        let place = &raw mut size;
+        match self.api {
+            Api::Two(_, two) => {
+                self.call("fmi2SerializedFMUstateSize", two.state_size, |f, c| unsafe { f(c, state, place) })?
+            }
+            Api::Three(_, three) => {
+                self.call("fmi3SerializedFMUStateSize", three.state_size, |f, c| unsafe {
+                    f(c, state, place)
+                })?
+            }
+        }
+        let mut bytes = vec![0_u8; size];
+        let out = bytes.as_mut_ptr();
+        match self.api {
+            Api::Two(_, two) => self.call("fmi2SerializeFMUstate", two.serialize, |f, c| unsafe {
+                f(c, state, out.cast(), size)
+            })?,
+            Api::Three(_, three) => {
+                self.call("fmi3SerializeFMUState", three.serialize, |f, c| unsafe { f(c, state, out, size) })?
+            }
+        }
+        Ok(bytes)
+    }
+
+    /// A state from bytes.
+    pub fn deserialize(&self, bytes: &[u8], state: &mut SlaveState) -> Result {
+        self.can(self.fmu.description().capabilities.serialize, "to serialise its state")?;
+        let (place, data, n) = (&raw mut state.0, bytes.as_ptr(), bytes.len());
+        match self.api {
+            Api::Two(_, two) => self.call("fmi2DeSerializeFMUstate", two.deserialize, |f, c| unsafe {
+                f(c, data.cast(), n, place)
+            }),
+            Api::Three(_, three) => self
+                .call("fmi3DeserializeFMUState", three.deserialize, |f, c| unsafe { f(c, data, n, place) }),
+        }
+    }
+
+    /// d(unknowns)/d(knowns)·seed, all of type f64.
+    pub fn directional_derivative(
+        &self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        out: &mut [f64],
+    ) -> Result {
+        self.can(self.fmu.description().capabilities.directional_derivatives, "directional derivatives")?;
+        let (z, n_z, v, n_v) = (unknowns.as_ptr(), unknowns.len(), knowns.as_ptr(), knowns.len());
+        let (s, n_s, o, n_o) = (seed.as_ptr(), seed.len(), out.as_mut_ptr(), out.len());
+        match self.api {
+            Api::Two(_, two) => self.call("fmi2GetDirectionalDerivative", two.directional, |f, c| unsafe {
+                f(c, z, n_z, v, n_v, s, o)
+            }),
+            Api::Three(_, three) => {
+                self.call("fmi3GetDirectionalDerivative", three.directional, |f, c| unsafe {
+                    f(c, z, n_z, v, n_v, s, n_s, o, n_o)
+                })
+            }
+        }
+    }
+}

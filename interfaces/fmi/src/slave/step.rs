@@ -1,0 +1,160 @@
+//! `doStep`, events between steps, and what both answer.
+
+use super::call::Status;
+use super::functions::Api;
+use super::{Phase, Slave, goes_on};
+use crate::error::{Error, Result};
+use std::ffi::c_int;
+
+/// `fmi2LastSuccessfulTime` of `fmi2StatusKind`.
+const LAST_SUCCESSFUL_TIME: c_int = 2;
+/// `fmi2Terminated` of `fmi2StatusKind`.
+const TERMINATED: c_int = 3;
+/// Rounds of discrete updates at one time before a unit is taken to loop for ever.
+const ROUNDS: u32 = 1000;
+
+/// A communication step to do.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Advance {
+    /// Start, s.
+    pub t: f64,
+    /// Length, s.
+    pub h: f64,
+    /// Whether no state from before `t` is ever set again.
+    pub for_good: bool,
+}
+
+/// How a communication step ended.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Stepped {
+    /// Time reached, s.
+    pub reached: f64,
+    /// Whether the unit asks for the end of the simulation.
+    pub terminate: bool,
+    /// Events that were handled.
+    pub events: u32,
+}
+
+impl Slave {
+    /// Goes from t to t + h.
+    ///
+    /// # Errors
+    /// [`Error::Discard`] where the unit could not go so far; it is then at `reached` and cannot be stepped on
+    /// before a state is restored.
+    pub fn do_step(&mut self, step: Advance) -> Result<Stepped> {
+        if self.phase != Phase::Stepping {
+            return Err(Error::Refused("doStep before the end of the initialisation".into()));
+        }
+        match self.api {
+            Api::Two(..) => self.do_step_2(step),
+            Api::Three(..) => self.do_step_3(step),
+        }
+    }
+
+    fn do_step_2(&mut self, step: Advance) -> Result<Stepped> {
+        const NAME: &str = "fmi2DoStep";
+        let Api::Two(_, two) = self.api else { return Err(Error::Refused(NAME.into())) };
+        let for_good = c_int::from(step.for_good);
+        // SAFETY: the arguments are those of the standard, here and below.
+        let status = self.status(NAME, two.do_step, |f, c| unsafe { f(c, step.t, step.h, for_good) })?;
+        let end = step.t + step.h;
+        if goes_on(status) {
+            return Ok(Stepped { reached: end, terminate: false, events: 0 });
+        }
+        if status != Status::Discard {
+            return Err(self.failed(NAME, status));
+        }
+        let log = self.log.last();
+        let mut reached = f64::NAN;
+        let answer = self.status("fmi2GetRealStatus", two.get_real_status, |f, c| unsafe {
+            f(c, LAST_SUCCESSFUL_TIME, &raw mut reached)
+        });
+        let reached = match answer {
+            Ok(s) if goes_on(s) && reached >= step.t && reached <= end => reached,
+            _ => step.t,
+        };
+        let mut terminated = 0;
+        let answer = self.status("fmi2GetBooleanStatus", two.get_boolean_status, |f, c| unsafe {
+            f(c, TERMINATED, &raw mut terminated)
+        });
+        if answer.is_ok_and(goes_on) && terminated != 0 {
+            return Ok(Stepped { reached, terminate: true, events: 0 });
+        }
+        Err(Error::Discard { function: NAME, reached, log })
+    }
+
+    fn do_step_3(&mut self, step: Advance) -> Result<Stepped> {
+        const NAME: &str = "fmi3DoStep";
+        let Api::Three(_, three) = self.api else { return Err(Error::Refused(NAME.into())) };
+        let end = step.t + step.h;
+        let (mut t, mut events) = (step.t, 0);
+        loop {
+            let (mut event, mut terminate, mut early, mut last) = (false, false, false, f64::NAN);
+            let for_good = step.for_good;
+            let status = self.status(NAME, three.do_step, |f, c| unsafe {
+                f(c, t, end - t, for_good, &raw mut event, &raw mut terminate, &raw mut early, &raw mut last)
+            })?;
+            if status == Status::Discard {
+                let reached = if last >= step.t && last <= end { last } else { step.t };
+                return Err(Error::Discard { function: NAME, reached, log: self.log.last() });
+            }
+            if !goes_on(status) {
+                return Err(self.failed(NAME, status));
+            }
+            let tolerance = 1e-9 * step.h + 4.0 * f64::EPSILON * end.abs();
+            let at_end = (last - end).abs() <= tolerance;
+            if !at_end && !early || last.is_nan() || last < t - tolerance || last > end + tolerance {
+                let outcome = format!("says that it came to t = {last} s in the step from {t} s to {end} s");
+                return Err(self.lied(NAME, outcome));
+            }
+            if terminate {
+                return Ok(Stepped { reached: last, terminate, events });
+            }
+            if event && self.event_mode {
+                events += 1;
+                self.call("fmi3EnterEventMode", three.enter_event_mode, |f, c| unsafe { f(c) })?;
+                if self.settle_events()? {
+                    return Ok(Stepped { reached: last, terminate: true, events });
+                }
+                self.call("fmi3EnterStepMode", three.enter_step_mode, |f, c| unsafe { f(c) })?;
+            }
+            if at_end {
+                return Ok(Stepped { reached: end, terminate: false, events });
+            }
+            if !event && last <= t {
+                let outcome = format!("came no further than t = {last} s in the step to {end} s");
+                return Err(self.lied(NAME, outcome));
+            }
+            if events > ROUNDS {
+                return Err(self.lied(NAME, format!("found more than {ROUNDS} events in one step")));
+            }
+            t = last;
+        }
+    }
+
+    /// Updates discrete states until nothing changes; whether the unit asks for the end.
+    pub(super) fn settle_events(&mut self) -> Result<bool> {
+        const NAME: &str = "fmi3UpdateDiscreteStates";
+        let Api::Three(_, three) = self.api else { return Ok(false) };
+        for _ in 0..ROUNDS {
+            let (mut again, mut terminate, mut nominals, mut values, mut defined) =
+                (false, false, false, false, false);
+            let mut next = f64::INFINITY;
+            self.call(NAME, three.update_discrete, |f, c| unsafe {
+                f(
+                    c,
+                    &raw mut again,
+                    &raw mut terminate,
+                    &raw mut nominals,
+                    &raw mut values,
+                    &raw mut defined,
+                    &raw mut next,
+                )
+            })?;
+            if terminate || !again {
+                return Ok(terminate);
+            }
+        }
+        Err(self.lied(NAME, format!("asks for more than {ROUNDS} rounds at one time")))
+    }
+}

@@ -5,6 +5,7 @@
 
 pub mod contact;
 pub mod error;
+pub mod fmu;
 pub mod gluing;
 pub mod host;
 pub mod observer;

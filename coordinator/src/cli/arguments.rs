@@ -48,6 +48,9 @@ pub enum Command {
     },
     /// List the variables and actions of a scenario's subsystems.
     Variables(ScenarioArguments),
+    /// Run, show or check a functional mock-up unit (FMI 2.0 and 3.0, co-simulation).
+    #[command(subcommand)]
+    Fmu(FmuCommand),
     /// List the soils that a scenario can name, and those that are refused with the reason.
     Soils {
         /// Another soil table.
@@ -127,4 +130,55 @@ impl RunArguments {
 
 fn parse_set(text: &str) -> Result<(String, String), String> {
     terraglue::scenario::split_set(text).ok_or_else(|| "there is no `=`: write KEY.PATH=VALUE".into())
+}
+
+/// What can be done with a functional mock-up unit.
+#[derive(Subcommand, Debug)]
+pub enum FmuCommand {
+    /// Run a unit alone and write its outputs as a table.
+    Run(FmuRunArguments),
+    /// Show what is inside a unit; none of its code runs.
+    Info {
+        /// The unit.
+        unit: PathBuf,
+    },
+    /// List what is wrong with a unit; none of its code runs.
+    Check {
+        /// The unit.
+        unit: PathBuf,
+    },
+}
+
+/// What `fmu run` takes.
+#[derive(Args, Debug, Clone)]
+pub struct FmuRunArguments {
+    /// The unit.
+    pub unit: PathBuf,
+    /// Write the table here [default: standard output].
+    #[arg(long, value_name = "FILE")]
+    pub csv: Option<PathBuf>,
+    /// Inputs over time: a header with `time` and names, straight lines between the rows.
+    #[arg(long, value_name = "FILE")]
+    pub input: Option<PathBuf>,
+    /// A start value. May be repeated.
+    #[arg(long = "start", value_name = "NAME=VALUE", value_parser = parse_set)]
+    pub start: Vec<(String, String)>,
+    /// Time at the start, s [default: what the unit wants, else 0].
+    #[arg(long, value_name = "S")]
+    pub start_time: Option<f64>,
+    /// Time at the end, s [default: what the unit wants, else 1].
+    #[arg(long, value_name = "S")]
+    pub stop: Option<f64>,
+    /// Communication step, s [default: what the unit wants, else a 500th of the run].
+    #[arg(long, value_name = "S")]
+    pub step: Option<f64>,
+    /// Relative tolerance.
+    #[arg(long)]
+    pub tolerance: Option<f64>,
+    /// Names to write, separated by commas [default: all outputs].
+    #[arg(long, value_delimiter = ',', value_name = "NAMES")]
+    pub output: Vec<String>,
+    /// Handle events in event mode (FMI 3).
+    #[arg(long, value_parser = clap::builder::BoolishValueParser::new(), default_value = "off")]
+    pub event_mode: bool,
 }

@@ -5,6 +5,7 @@
 mod arguments;
 mod check;
 mod compare;
+mod fmu;
 mod folder;
 mod interrupt;
 mod list;
@@ -55,6 +56,7 @@ pub fn main() -> ExitCode {
         Command::Check(arguments) => check::check(&arguments),
         Command::Modules { module_path, json } => list::modules(&module_path, json),
         Command::Variables(arguments) => list::variables(&arguments),
+        Command::Fmu(command) => fmu::fmu(&command),
         Command::Soils { file } => list::soils(file.as_deref()),
     };
     match done {

@@ -49,7 +49,7 @@ impl HostServices {
     }
 
     /// The services as an instance of this name sees them.
-    pub(super) fn for_instance(&self, name: &str) -> Arc<dyn Host> {
+    pub(crate) fn for_instance(&self, name: &str) -> Arc<dyn Host> {
         Arc::new(InstanceHost {
             name: name.to_owned(),
             seed: instance_seed(self.world_seed, name),

@@ -252,9 +252,11 @@ fn event() -> Table {
 pub fn subsystem_keys() -> Vec<Key> {
     let multiple = "steps of the testbed per step of this subsystem";
     let module = "a module's name, or the path of a shared library relative to the scenario";
+    let unit = "a functional mock-up unit instead of a module; other keys are its start values, `on_nan`, `event_mode`, `rollback`";
     let row = "a row of the soil table, whose numbers are offered to the module";
     vec![
         Parameter::of("module", ParameterType::Text, module).into(),
+        Parameter::of("fmu", ParameterType::Path, unit).optional().into(),
         Parameter::of("step_multiple", ParameterType::Integer, multiple).or(1).within(1.0, 1e6).into(),
         Parameter::of("parameters", ParameterType::Text, row).optional().into(),
         Parameter::of("parameters_file", ParameterType::Path, "soil table other than `models/soils.csv`")

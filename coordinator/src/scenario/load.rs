@@ -116,15 +116,14 @@ fn check_top_level(source: &Source) -> Checked<()> {
     let tables = keys::tables();
     let reserved: Vec<&str> = tables.iter().map(|t| t.name).collect();
     for (name, node) in source.root.entries() {
-        if reserved.contains(&name.as_str()) || node.get("module").is_some() {
+        if reserved.contains(&name.as_str()) || node.get("module").is_some() || node.get("fmu").is_some() {
             continue;
         }
         let message = match &node.value {
-            Raw::Table(_) if node.get("fmu").is_some() => {
-                format!("`[{name}]` is an FMU; this version runs modules only")
-            }
             Raw::Table(_) => {
-                format!("unknown table `[{name}]`: no table of a scenario, and a subsystem needs `module`")
+                format!(
+                    "unknown table `[{name}]`: no table of a scenario, and a subsystem needs `module` or `fmu`"
+                )
             }
             Raw::List(items) if items.iter().all(Node::is_table) && !items.is_empty() => {
                 format!("unknown table `[[{name}]]`")

@@ -14,7 +14,8 @@ use serde_json::{Map, Value};
 pub fn all(source: &Source) -> Result<Vec<SubsystemSpec>, Box<InputError>> {
     let reserved = super::keys::tables();
     let is_subsystem = |(name, node): &&(String, Node)| {
-        node.get("module").is_some() && !reserved.iter().any(|t| t.name == name.as_str())
+        (node.get("module").is_some() || node.get("fmu").is_some())
+            && !reserved.iter().any(|t| t.name == name.as_str())
     };
     let entries = source.root.entries().iter().filter(is_subsystem);
     let mut specs = entries.map(|(name, node)| one(source, name, node)).collect::<Result<Vec<_>, _>>()?;
@@ -37,7 +38,14 @@ fn one(source: &Source, name: &str, node: &Node) -> Result<SubsystemSpec, Box<In
             check_entry(source, key, entry)?;
         }
     }
-    let module = text(node, "module").unwrap_or_default();
+    let module = match (node.get("module"), node.get("fmu")) {
+        (None, Some(unit)) => unit_path(source, unit)?,
+        (Some(_), Some(unit)) => {
+            let message = format!("`[{name}]` is either a `module` or an `fmu`");
+            return Err(source.error(&unit.key, message, None));
+        }
+        _ => text(node, "module").unwrap_or_default(),
+    };
     if module.trim().is_empty() {
         return Err(source.error_at_value(&[name, "module"], format!("`[{name}]` names no module"), None));
     }
@@ -49,6 +57,16 @@ fn one(source: &Source, name: &str, node: &Node) -> Result<SubsystemSpec, Box<In
         offered: soil_row::offered(source, name, node, &module)?,
         module,
     })
+}
+
+/// The path of a unit as it was written; the file must exist and be named `….fmu`.
+fn unit_path(source: &Source, node: &Node) -> Result<String, Box<InputError>> {
+    let path = match &node.value {
+        Raw::Text(path) if crate::fmu::is_fmu(path) => path.clone(),
+        _ => return Err(source.error(&node.at, "`fmu` takes the path of a file `….fmu` in quotes", None)),
+    };
+    super::section::must_exist(source, &path).map_err(|c| source.error(&node.at, c.message, c.help))?;
+    Ok(path)
 }
 
 /// The module's parameters; those in the sub-table that bears the module's name come on top.

@@ -79,11 +79,26 @@ fn instantiate(
     let mut instances = Vec::new();
     for spec in &scenario.subsystems {
         let wrong = |e: LoadError| Error::Input(module_error(scenario, spec, &e));
+        if crate::fmu::is_fmu(&spec.module) {
+            instances.push(unit(scenario, spec, services)?);
+            continue;
+        }
         let module: LoadedModule = library.find(&spec.module, &search, &scenario.folder).map_err(wrong)?;
         let config = scenario::check_parameters(module.schema(), spec, &scenario.source)?;
         instances.push(module.instantiate(&spec.name, config, services).map_err(wrong)?);
     }
     Ok(instances)
+}
+
+/// A functional mock-up unit as an instance.
+fn unit(scenario: &Scenario, spec: &SubsystemSpec, services: &HostServices) -> Result<Instance> {
+    let path = scenario.folder.join(&spec.module);
+    let made = crate::fmu::FmuSubsystem::new(&path, &spec.parameters, services.for_instance(&spec.name));
+    let made = made.map_err(|e| {
+        let message = format!("{} ({}): {e}", spec.name, spec.module);
+        scenario.source.error_at_value(&[&spec.name, "fmu"], message, None)
+    })?;
+    Ok(Instance::new(&spec.name, &spec.module, Kind::Controller, Box::new(made)))
 }
 
 fn module_error(scenario: &Scenario, spec: &SubsystemSpec, error: &LoadError) -> Box<InputError> {

@@ -23,6 +23,11 @@ pub fn platform(version: Version) -> &'static str {
     }
 }
 
+/// Entry of the archive that holds the library for this platform.
+pub fn library_entry(description: &crate::ModelDescription) -> String {
+    format!("binaries/{}/{}.so", platform(description.version), description.identifier)
+}
+
 /// Platforms that an archive with these entries has a library for.
 pub fn platforms<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
     let mut all: Vec<String> = names

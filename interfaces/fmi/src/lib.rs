@@ -16,6 +16,7 @@ mod fmu;
 pub mod slave;
 
 pub use archive::Limits;
+pub use binary::{library_entry, platforms};
 pub use description::{ModelDescription, Version};
 pub use error::{Error, Result};
 pub use fmu::Fmu;

@@ -152,9 +152,9 @@ table! {
 #[derive(Clone, Copy, Debug)]
 pub enum Api {
     /// FMI 2.0.
-    Two(&'static str, Two),
+    Two(Two),
     /// FMI 3.0.
-    Three(&'static str, Three),
+    Three(Three),
 }
 
 /// Finds the functions of a unit and checks that those are there which the standard demands of every co-simulation
@@ -164,11 +164,11 @@ pub fn find(fmu: &Fmu, library: &Library) -> Result<Api> {
     let (api, missing) = match fmu.description().version {
         Version::V2 => {
             let two = Two::find(library);
-            (Api::Two("fmi2", two), two.missing())
+            (Api::Two(two), two.missing())
         }
         Version::V3 => {
             let three = Three::find(library);
-            (Api::Three("fmi3", three), three.missing())
+            (Api::Three(three), three.missing())
         }
     };
     let c = &fmu.description().capabilities;

@@ -59,6 +59,7 @@ impl LogBook {
     }
 
     /// Lines that were not handed on.
+    #[cfg(test)]
     pub fn held_back(&self) -> u64 {
         self.lines.lock().unwrap_or_else(PoisonError::into_inner).held_back
     }

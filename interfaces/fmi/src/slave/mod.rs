@@ -98,7 +98,7 @@ impl Slave {
         let path = resources.display().to_string();
         let mut callbacks = None;
         let component = match &api {
-            Api::Two(_, two) => {
+            Api::Two(two) => {
                 let place = callbacks.insert(Box::new(Callbacks2 {
                     logger: terraglue_fmi2_logger,
                     allocate: libc::calloc,
@@ -113,7 +113,7 @@ impl Slave {
                     f(name.as_ptr(), 1, token.as_ptr(), resources.as_ptr(), &raw const **place, 0, verbose)
                 })
             }
-            Api::Three(_, three) => {
+            Api::Three(three) => {
                 let resources = text(&format!("{path}/"))?;
                 let (verbose, none) = (options.verbose, std::ptr::null::<u32>());
                 // SAFETY: the arguments are those of the standard and live long enough.
@@ -176,14 +176,14 @@ impl Slave {
         let (has_tolerance, tolerance) = (tolerance.is_some(), tolerance.unwrap_or(0.0));
         let (has_stop, stop) = (stop.is_some(), stop.unwrap_or(0.0));
         match self.api {
-            Api::Two(_, two) => {
+            Api::Two(two) => {
                 let (tolerant, stops) = (c_int::from(has_tolerance), c_int::from(has_stop));
                 self.call("fmi2SetupExperiment", two.setup, |f, c| unsafe {
                     f(c, tolerant, tolerance, start, stops, stop)
                 })?;
                 self.call("fmi2EnterInitializationMode", two.enter_initialization, |f, c| unsafe { f(c) })?;
             }
-            Api::Three(_, three) => {
+            Api::Three(three) => {
                 self.call("fmi3EnterInitializationMode", three.enter_initialization, |f, c| unsafe {
                     f(c, has_tolerance, tolerance, start, has_stop, stop)
                 })?;
@@ -196,10 +196,10 @@ impl Slave {
     /// Leaves initialisation mode; the unit can be stepped.
     pub fn exit_initialization(&mut self) -> Result {
         match self.api {
-            Api::Two(_, two) => {
+            Api::Two(two) => {
                 self.call("fmi2ExitInitializationMode", two.exit_initialization, |f, c| unsafe { f(c) })?;
             }
-            Api::Three(_, three) => {
+            Api::Three(three) => {
                 self.call("fmi3ExitInitializationMode", three.exit_initialization, |f, c| unsafe { f(c) })?;
                 if self.event_mode {
                     self.settle_events()?;
@@ -223,18 +223,16 @@ impl Slave {
         }
         self.phase = Phase::Terminated;
         match self.api {
-            Api::Two(_, two) => self.call("fmi2Terminate", two.terminate, |f, c| unsafe { f(c) }),
-            Api::Three(_, three) => self.call("fmi3Terminate", three.terminate, |f, c| unsafe { f(c) }),
+            Api::Two(two) => self.call("fmi2Terminate", two.terminate, |f, c| unsafe { f(c) }),
+            Api::Three(three) => self.call("fmi3Terminate", three.terminate, |f, c| unsafe { f(c) }),
         }
     }
 
     /// Back to the state after instantiation.
     pub fn reset(&mut self) -> Result {
         match self.api {
-            Api::Two(_, two) => self.call_after_error("fmi2Reset", two.reset, |f, c| unsafe { f(c) })?,
-            Api::Three(_, three) => {
-                self.call_after_error("fmi3Reset", three.reset, |f, c| unsafe { f(c) })?
-            }
+            Api::Two(two) => self.call_after_error("fmi2Reset", two.reset, |f, c| unsafe { f(c) })?,
+            Api::Three(three) => self.call_after_error("fmi3Reset", three.reset, |f, c| unsafe { f(c) })?,
         }
         self.phase = Phase::Instantiated;
         self.health.set(Health::Good);
@@ -258,8 +256,8 @@ impl Drop for Slave {
             return;
         }
         let free = match &self.api {
-            Api::Two(_, two) => two.free,
-            Api::Three(_, three) => three.free,
+            Api::Two(two) => two.free,
+            Api::Three(three) => three.free,
         };
         if let Some(free) = free {
             // SAFETY: a live instance, freed once.

@@ -35,8 +35,8 @@ impl Slave {
         let place = &raw mut state.0;
         // SAFETY: `state` is null or a state of this instance, here and below.
         match self.api {
-            Api::Two(_, two) => self.call("fmi2GetFMUstate", two.get_state, |f, c| unsafe { f(c, place) })?,
-            Api::Three(_, three) => {
+            Api::Two(two) => self.call("fmi2GetFMUstate", two.get_state, |f, c| unsafe { f(c, place) })?,
+            Api::Three(three) => {
                 self.call("fmi3GetFMUState", three.get_state, |f, c| unsafe { f(c, place) })?;
             }
         }
@@ -53,10 +53,10 @@ impl Slave {
         }
         let state = state.0;
         match self.api {
-            Api::Two(_, two) => {
+            Api::Two(two) => {
                 self.call_after_error("fmi2SetFMUstate", two.set_state, |f, c| unsafe { f(c, state) })
             }
-            Api::Three(_, three) => {
+            Api::Three(three) => {
                 self.call_after_error("fmi3SetFMUState", three.set_state, |f, c| unsafe { f(c, state) })
             }
         }
@@ -69,10 +69,10 @@ impl Slave {
         }
         let place = &raw mut state.0;
         let done = match self.api {
-            Api::Two(_, two) => {
+            Api::Two(two) => {
                 self.call_after_error("fmi2FreeFMUstate", two.free_state, |f, c| unsafe { f(c, place) })
             }
-            Api::Three(_, three) => {
+            Api::Three(three) => {
                 self.call_after_error("fmi3FreeFMUState", three.free_state, |f, c| unsafe { f(c, place) })
             }
         };
@@ -87,10 +87,10 @@ impl Slave {
         let mut size = 0_usize;
         let place = &raw mut size;
         match self.api {
-            Api::Two(_, two) => {
+            Api::Two(two) => {
                 self.call("fmi2SerializedFMUstateSize", two.state_size, |f, c| unsafe { f(c, state, place) })?
             }
-            Api::Three(_, three) => {
+            Api::Three(three) => {
                 self.call("fmi3SerializedFMUStateSize", three.state_size, |f, c| unsafe {
                     f(c, state, place)
                 })?
@@ -99,10 +99,10 @@ impl Slave {
         let mut bytes = vec![0_u8; size];
         let out = bytes.as_mut_ptr();
         match self.api {
-            Api::Two(_, two) => self.call("fmi2SerializeFMUstate", two.serialize, |f, c| unsafe {
+            Api::Two(two) => self.call("fmi2SerializeFMUstate", two.serialize, |f, c| unsafe {
                 f(c, state, out.cast(), size)
             })?,
-            Api::Three(_, three) => {
+            Api::Three(three) => {
                 self.call("fmi3SerializeFMUState", three.serialize, |f, c| unsafe { f(c, state, out, size) })?
             }
         }
@@ -114,10 +114,10 @@ impl Slave {
         self.can(self.fmu.description().capabilities.serialize, "to serialise its state")?;
         let (place, data, n) = (&raw mut state.0, bytes.as_ptr(), bytes.len());
         match self.api {
-            Api::Two(_, two) => self.call("fmi2DeSerializeFMUstate", two.deserialize, |f, c| unsafe {
+            Api::Two(two) => self.call("fmi2DeSerializeFMUstate", two.deserialize, |f, c| unsafe {
                 f(c, data.cast(), n, place)
             }),
-            Api::Three(_, three) => self
+            Api::Three(three) => self
                 .call("fmi3DeserializeFMUState", three.deserialize, |f, c| unsafe { f(c, data, n, place) }),
         }
     }
@@ -134,10 +134,10 @@ impl Slave {
         let (z, n_z, v, n_v) = (unknowns.as_ptr(), unknowns.len(), knowns.as_ptr(), knowns.len());
         let (s, n_s, o, n_o) = (seed.as_ptr(), seed.len(), out.as_mut_ptr(), out.len());
         match self.api {
-            Api::Two(_, two) => self.call("fmi2GetDirectionalDerivative", two.directional, |f, c| unsafe {
+            Api::Two(two) => self.call("fmi2GetDirectionalDerivative", two.directional, |f, c| unsafe {
                 f(c, z, n_z, v, n_v, s, o)
             }),
-            Api::Three(_, three) => {
+            Api::Three(three) => {
                 self.call("fmi3GetDirectionalDerivative", three.directional, |f, c| unsafe {
                     f(c, z, n_z, v, n_v, s, n_s, o, n_o)
                 })

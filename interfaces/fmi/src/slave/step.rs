@@ -53,7 +53,7 @@ impl Slave {
 
     fn do_step_2(&mut self, step: Advance) -> Result<Stepped> {
         const NAME: &str = "fmi2DoStep";
-        let Api::Two(_, two) = self.api else { return Err(Error::Refused(NAME.into())) };
+        let Api::Two(two) = self.api else { return Err(Error::Refused(NAME.into())) };
         let for_good = c_int::from(step.for_good);
         // SAFETY: the arguments are those of the standard, here and below.
         let status = self.status(NAME, two.do_step, |f, c| unsafe { f(c, step.t, step.h, for_good) })?;
@@ -85,7 +85,7 @@ impl Slave {
 
     fn do_step_3(&mut self, step: Advance) -> Result<Stepped> {
         const NAME: &str = "fmi3DoStep";
-        let Api::Three(_, three) = self.api else { return Err(Error::Refused(NAME.into())) };
+        let Api::Three(three) = self.api else { return Err(Error::Refused(NAME.into())) };
         let end = step.t + step.h;
         let (mut t, mut events) = (step.t, 0);
         loop {
@@ -135,7 +135,7 @@ impl Slave {
     /// Updates discrete states until nothing changes; whether the unit asks for the end.
     pub(super) fn settle_events(&mut self) -> Result<bool> {
         const NAME: &str = "fmi3UpdateDiscreteStates";
-        let Api::Three(_, three) = self.api else { return Ok(false) };
+        let Api::Three(three) = self.api else { return Ok(false) };
         for _ in 0..ROUNDS {
             let (mut again, mut terminate, mut nominals, mut values, mut defined) =
                 (false, false, false, false, false);

@@ -19,7 +19,7 @@ impl Slave {
     /// Values of f64 variables.
     pub fn get_f64(&self, references: &[u32], out: &mut [f64]) -> Result {
         match self.api {
-            Api::Two(_, two) => {
+            Api::Two(two) => {
                 if out.len() < references.len() {
                     return Err(wrong_length(references, out.len()));
                 }
@@ -27,14 +27,14 @@ impl Slave {
                 // SAFETY: as many values as references.
                 self.call("fmi2GetReal", two.get_real, |f, c| unsafe { f(c, r, n, p) })
             }
-            Api::Three(_, three) => plain!(self, "fmi3GetFloat64", three.get_f64, references, out.as_mut_ptr),
+            Api::Three(three) => plain!(self, "fmi3GetFloat64", three.get_f64, references, out.as_mut_ptr),
         }
     }
 
     /// New values of f64 variables.
     pub fn set_f64(&self, references: &[u32], values: &[f64]) -> Result {
         match self.api {
-            Api::Two(_, two) => {
+            Api::Two(two) => {
                 if values.len() < references.len() {
                     return Err(wrong_length(references, values.len()));
                 }
@@ -42,7 +42,7 @@ impl Slave {
                 // SAFETY: as many values as references.
                 self.call("fmi2SetReal", two.set_real, |f, c| unsafe { f(c, r, n, p) })
             }
-            Api::Three(_, three) => plain!(self, "fmi3SetFloat64", three.set_f64, references, values.as_ptr),
+            Api::Three(three) => plain!(self, "fmi3SetFloat64", three.set_f64, references, values.as_ptr),
         }
     }
 
@@ -69,7 +69,7 @@ impl Slave {
     }
 
     fn get_2(&self, references: &[u32], out: ValuesMut) -> Result {
-        let Api::Two(_, two) = self.api else { return Err(Error::Refused("not of FMI 2.0".into())) };
+        let Api::Two(two) = self.api else { return Err(Error::Refused("not of FMI 2.0".into())) };
         let (r, n) = (references.as_ptr(), references.len());
         let mut integers = vec![0_i32; n];
         let p = integers.as_mut_ptr();
@@ -101,7 +101,7 @@ impl Slave {
     }
 
     fn set_2(&self, references: &[u32], values: Values) -> Result {
-        let Api::Two(_, two) = self.api else { return Err(Error::Refused("not of FMI 2.0".into())) };
+        let Api::Two(two) = self.api else { return Err(Error::Refused("not of FMI 2.0".into())) };
         let (r, n) = (references.as_ptr(), references.len());
         let fits = |len: usize| if len == n { Ok(()) } else { Err(wrong_length(references, len)) };
         match values {
@@ -138,7 +138,7 @@ impl Slave {
     }
 
     fn get_3(&self, references: &[u32], out: ValuesMut) -> Result {
-        let Api::Three(_, three) = self.api else { return Err(Error::Refused("not of FMI 3.0".into())) };
+        let Api::Three(three) = self.api else { return Err(Error::Refused("not of FMI 3.0".into())) };
         match out {
             ValuesMut::F64(out) => self.get_f64(references, out),
             ValuesMut::F32(out) => plain!(self, "fmi3GetFloat32", three.get_f32, references, out.as_mut_ptr),
@@ -170,7 +170,7 @@ impl Slave {
 
     fn get_binary(&self, references: &[u32], out: &mut [Vec<u8>]) -> Result {
         const NAME: &str = "fmi3GetBinary";
-        let Api::Three(_, three) = self.api else { return Err(Error::Refused("not of FMI 3.0".into())) };
+        let Api::Three(three) = self.api else { return Err(Error::Refused("not of FMI 3.0".into())) };
         let (r, n, m) = (references.as_ptr(), references.len(), out.len());
         let mut sizes = vec![0_usize; m];
         let mut places = vec![std::ptr::null::<u8>(); m];
@@ -191,7 +191,7 @@ impl Slave {
     }
 
     fn set_3(&self, references: &[u32], values: Values) -> Result {
-        let Api::Three(_, three) = self.api else { return Err(Error::Refused("not of FMI 3.0".into())) };
+        let Api::Three(three) = self.api else { return Err(Error::Refused("not of FMI 3.0".into())) };
         match values {
             Values::F64(v) => self.set_f64(references, v),
             Values::F32(v) => plain!(self, "fmi3SetFloat32", three.set_f32, references, v.as_ptr),

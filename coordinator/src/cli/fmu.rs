@@ -1,0 +1,181 @@
+//! `terraglue fmu run | info | check`: one functional mock-up unit.
+
+use super::arguments::{FmuCommand, FmuRunArguments};
+use super::output::outln;
+use super::{Exit, show};
+use std::fmt::Debug;
+use std::io::Write;
+use std::path::Path;
+use terraglue::fmu::simulate::{self, Settings, Table};
+use terraglue::scenario::InputError;
+use terraglue::{Error, Result};
+use terraglue_fmi::description::ModelDescription;
+use terraglue_fmi::{Error as FmiError, Fmu};
+
+/// Does the command.
+pub fn fmu(command: &FmuCommand) -> Result<Exit> {
+    match command {
+        FmuCommand::Run(arguments) => run(arguments),
+        FmuCommand::Info { unit } => info(unit),
+        FmuCommand::Check { unit } => check(unit),
+    }
+}
+
+fn input(message: impl ToString) -> Error {
+    InputError::plain(message.to_string(), None).into()
+}
+
+fn run(arguments: &FmuRunArguments) -> Result<Exit> {
+    let fmu = Fmu::open(&arguments.unit).map_err(input)?;
+    let settings = Settings {
+        start: arguments.start.clone(),
+        start_time: arguments.start_time,
+        stop: arguments.stop,
+        step: arguments.step,
+        tolerance: arguments.tolerance,
+        outputs: arguments.output.clone(),
+        event_mode: arguments.event_mode,
+        input: arguments.input.as_deref().map(table).transpose()?.unwrap_or_default(),
+    };
+    let mut file = None;
+    if let Some(path) = &arguments.csv {
+        let created = std::fs::File::create(path);
+        let created = created.map_err(|source| Error::File { path: path.display().to_string(), source })?;
+        file = Some(std::io::BufWriter::new(created));
+    }
+    let sink = Box::new(|line: &terraglue_fmi::LogLine| {
+        log::log!(target: "terraglue::fmu", level(line), "{}", line.text);
+    });
+    let mut row = |text: &str| match &mut file {
+        None => {
+            outln!("{text}");
+            Ok(())
+        }
+        Some(file) => writeln!(file, "{text}").map_err(|e| FmiError::Refused(format!("the table: {e}"))),
+    };
+    let ran = simulate::run(&fmu, &settings, sink, &mut row);
+    if let Some(file) = &mut file {
+        file.flush().map_err(|source| Error::File { path: "the table".into(), source })?;
+    }
+    match ran {
+        Ok(()) => Ok(Exit::Done),
+        Err(error) => {
+            eprintln!("error: {}: {error}", arguments.unit.display());
+            Ok(Exit::Failed)
+        }
+    }
+}
+
+fn level(line: &terraglue_fmi::LogLine) -> log::Level {
+    use terraglue::subsystem::LogLevel;
+    match line.level {
+        LogLevel::Error => log::Level::Error,
+        LogLevel::Warning => log::Level::Warn,
+        LogLevel::Info => log::Level::Info,
+        LogLevel::Debug => log::Level::Debug,
+    }
+}
+
+fn table(path: &Path) -> Result<Table> {
+    let wrong = |e: &dyn std::fmt::Display| input(format!("{}: {e}", path.display()));
+    let mut reader = csv::Reader::from_path(path).map_err(|e| wrong(&e))?;
+    let header = reader.headers().map_err(|e| wrong(&e))?.clone();
+    if header.get(0) != Some("time") {
+        return Err(wrong(&"the first column is not `time`"));
+    }
+    let mut rows: Vec<Vec<f64>> = Vec::new();
+    for record in reader.records() {
+        let record = record.map_err(|e| wrong(&e))?;
+        let row: Option<Vec<f64>> =
+            record.iter().map(|t| t.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
+        let row = row.ok_or_else(|| wrong(&format!("line {}: not all are numbers", rows.len() + 2)))?;
+        if rows.last().is_some_and(|before| before[0] >= row[0]) {
+            return Err(wrong(&format!("line {}: the time does not grow", rows.len() + 2)));
+        }
+        rows.push(row);
+    }
+    Ok(Table { names: header.iter().skip(1).map(str::to_owned).collect(), rows })
+}
+
+fn info(unit: &Path) -> Result<Exit> {
+    let (d, entries) = Fmu::inspect(unit).map_err(input)?;
+    let platforms = terraglue_fmi::platforms(entries.iter().map(String::as_str));
+    outln!("{}: `{}`, {}", unit.display(), d.model_name, words(&d.version));
+    let facts = [("made by", &d.generation_tool), ("about", &d.description), ("author", &d.author)];
+    for (name, text) in facts.iter().filter(|(_, text)| !text.is_empty()) {
+        outln!("{name}: {text}");
+    }
+    outln!("platforms: {}", if platforms.is_empty() { "none".into() } else { platforms.join(", ") });
+    outln!("experiment: {}", words(&d.experiment));
+    outln!("capabilities: {}", words(&d.capabilities));
+    let mut table =
+        show::table(&["variable", "reference", "type", "causality", "variability", "unit", "start"]);
+    for v in &d.variables {
+        let kind = if v.sizes.is_empty() {
+            words(&v.value_type)
+        } else {
+            format!("{:?}{:?}", v.value_type, v.sizes)
+        };
+        let unit = v.unit.clone().unwrap_or_default();
+        let start = words(&v.start);
+        let reference = v.reference.to_string();
+        table.add_row([
+            &v.name,
+            &reference,
+            &kind,
+            &words(&v.causality),
+            &words(&v.variability),
+            &unit,
+            &start,
+        ]);
+    }
+    outln!("{table}");
+    for t in &d.terminals {
+        let members: Vec<&str> = t.members.iter().map(|(_, k)| d.variables[*k].name.as_str()).collect();
+        outln!("terminal `{}` ({}): {}", t.name, t.kind, members.join(", "));
+    }
+    Ok(Exit::Done)
+}
+
+fn words(value: &impl Debug) -> String {
+    format!("{value:?}")
+}
+
+fn check(unit: &Path) -> Result<Exit> {
+    let (d, entries) = Fmu::inspect(unit).map_err(input)?;
+    let problems = problems(&d, &entries);
+    for problem in &problems {
+        outln!("{problem}");
+    }
+    let name = unit.display();
+    if problems.is_empty() {
+        outln!("{name}: no problem found");
+        return Ok(Exit::Done);
+    }
+    Ok(Exit::Failed)
+}
+
+fn problems(d: &ModelDescription, entries: &[String]) -> Vec<String> {
+    let mut all = d.problems.clone();
+    let library = terraglue_fmi::library_entry(d);
+    if !entries.iter().any(|e| *e == library) {
+        let found = terraglue_fmi::platforms(entries.iter().map(String::as_str));
+        all.push(format!("there is no library `{library}`; platforms: {}", found.join(", ")));
+    }
+    for v in &d.variables {
+        if v.has_start()
+            && v.start == terraglue_fmi::description::Start::None
+            && !v.alias
+            && v.value_type != terraglue::subsystem::ValueType::Clock
+        {
+            all.push(format!("line {}: `{}` needs a start value", v.line, v.name));
+        }
+        if let Some(unit) = v.unit.as_ref().filter(|u| !d.units.iter().any(|(n, _)| n == *u)) {
+            all.push(format!(
+                "line {}: `{}` has the unit `{unit}`, whose base units are not given",
+                v.line, v.name
+            ));
+        }
+    }
+    all
+}

@@ -1,0 +1,420 @@
+//! A unit as a subsystem: trials by its saved states, values by name, every error with what the unit said.
+
+use super::map::{self, Place};
+use crate::scenario::did_you_mean;
+use serde_json::{Map, Value};
+use std::cell::{Cell, RefCell};
+use std::path::Path;
+use std::sync::Arc;
+use terraglue_fmi::{Advance, Error as FmiError, Fmu, Slave, SlaveOptions, SlaveState};
+use terraglue_subsystem::{
+    Capabilities, Error, Host, Input, LogLevel, Motion, Response, Result, Step, Subsystem, ValueType, Values,
+    ValuesMut, Variable,
+};
+
+/// What a value that is no number does.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum OnNan {
+    /// It stops the run.
+    Stop,
+    /// It is logged; what reads it decides.
+    Warn,
+}
+
+/// Whether a module of a scenario is a functional mock-up unit.
+pub fn is_fmu(module: &str) -> bool {
+    Path::new(module).extension().is_some_and(|e| e.eq_ignore_ascii_case("fmu"))
+}
+
+/// An instance of a unit as a subsystem.
+pub struct FmuSubsystem {
+    slave: Slave,
+    host: Arc<dyn Host>,
+    variables: Vec<Variable>,
+    places: Vec<Place>,
+    /// State at the start of the step, where the unit can save it.
+    before: SlaveState,
+    can_go_back: bool,
+    /// Whether a trial was made that is not committed.
+    open: bool,
+    /// Whether the initialisation is over.
+    running: bool,
+    slots: Vec<SlaveState>,
+    on_nan: OnNan,
+    warned: Cell<bool>,
+    references: RefCell<Vec<u32>>,
+}
+
+impl FmuSubsystem {
+    /// Opens a unit, sets `start` and enters initialisation mode; the first step ends it, so that values which are
+    /// connected at the start are set while the unit initialises. Host keys: `on_nan`, `event_mode`, `rollback`.
+    ///
+    /// # Errors
+    /// What is wrong with the unit, or a start value that it does not take.
+    pub fn new(path: &Path, parameters: &Map<String, Value>, host: Arc<dyn Host>) -> Result<Self> {
+        let fmu = Fmu::open(path).map_err(error)?;
+        let (options, start) = options(parameters)?;
+        for problem in &fmu.description().problems {
+            host.log(LogLevel::Warning, problem);
+        }
+        let sink = host.clone();
+        let slave = Slave::instantiate(
+            &fmu,
+            SlaveOptions {
+                name: host.name().to_owned(),
+                verbose: false,
+                event_mode: options.event_mode,
+                sink: Box::new(move |line| sink.log(line.level, &line.text)),
+            },
+        );
+        let capabilities = fmu.description().capabilities;
+        let (variables, places) = map::variables(fmu.description());
+        let mut subsystem = Self {
+            slave: slave.map_err(error)?,
+            variables,
+            places,
+            before: SlaveState::default(),
+            can_go_back: capabilities.state && options.rollback,
+            open: false,
+            running: false,
+            slots: (0..host.slots()).map(|_| SlaveState::default()).collect(),
+            on_nan: options.on_nan,
+            warned: Cell::new(false),
+            references: RefCell::default(),
+            host,
+        };
+        for (name, value) in start {
+            subsystem.set_start(&name, &value)?;
+        }
+        subsystem.slave.enter_initialization(0.0, None, None).map_err(error)?;
+        Ok(subsystem)
+    }
+
+    fn set_start(&mut self, name: &str, value: &Value) -> Result {
+        let Some(k) = self.variables.iter().position(|v| v.name == name) else {
+            let hint = did_you_mean(name, self.variables.iter().map(|v| v.name.as_str()));
+            let hint = hint.map(|h| format!("; {h}")).unwrap_or_default();
+            return Err(Error::Refused(format!("the unit has no variable `{name}`{hint}")));
+        };
+        if self.variables[k].effect == terraglue_subsystem::Effect::ReadOnly {
+            return Err(Error::Refused(format!("`{name}` of the unit cannot be set")));
+        }
+        let v = &self.variables[k];
+        let wrong = || Error::Refused(format!("`{name}` of the unit does not take {value}"));
+        let (number, whole, id) = (value.as_f64(), value.as_i64(), [v.id]);
+        macro_rules! narrow {
+            ($variant:ident) => {
+                self.set(&id, Values::$variant(&[whole.and_then(|w| w.try_into().ok()).ok_or_else(wrong)?]))
+            };
+        }
+        match v.value_type {
+            ValueType::F64 => self.set(&id, Values::F64(&[number.ok_or_else(wrong)?])),
+            ValueType::F32 => self.set(&id, Values::F32(&[number.ok_or_else(wrong)? as f32])),
+            ValueType::Bool => self.set(&id, Values::Bool(&[value.as_bool().ok_or_else(wrong)?])),
+            ValueType::String => {
+                self.set(&id, Values::String(&[value.as_str().ok_or_else(wrong)?.to_owned()]))
+            }
+            ValueType::Enumeration => {
+                let named = value.as_str().and_then(|t| v.enumeration.iter().position(|n| n == t));
+                let index = named.map(|k| k as i64).or(whole).ok_or_else(wrong)?;
+                self.set(&id, Values::Enumeration(&[index]))
+            }
+            ValueType::I8 => narrow!(I8),
+            ValueType::I16 => narrow!(I16),
+            ValueType::I32 => narrow!(I32),
+            ValueType::I64 => narrow!(I64),
+            ValueType::U8 => narrow!(U8),
+            ValueType::U16 => narrow!(U16),
+            ValueType::U32 => narrow!(U32),
+            ValueType::U64 => self.set(&id, Values::U64(&[value.as_u64().ok_or_else(wrong)?])),
+            ValueType::Binary | ValueType::Clock => Err(wrong()),
+        }
+    }
+
+    fn place(&self, id: u32) -> Result<&Place> {
+        self.places.get(id as usize).ok_or_else(|| Error::Refused(format!("no variable has the number {id}")))
+    }
+
+    /// Item values of an enumeration where they are not simply 0, 1, 2, …
+    fn items(&self, place: &Place) -> &[(String, i64)] {
+        &self.slave.fmu().description().variables[place.variable].items
+    }
+
+    fn check_numbers(&self, ids: &[u32], values: &[f64]) -> Result {
+        let Some(k) = values.iter().position(|v| !v.is_finite()) else { return Ok(()) };
+        let name = ids.get(k).and_then(|id| self.variables.get(*id as usize)).map_or("?", |v| &v.name);
+        let text = format!("the variable `{name}` is {}", values[k]);
+        match self.on_nan {
+            OnNan::Stop => Err(Error::Failed(format!("{text}; on_nan = \"warn\" lets the run go on"))),
+            OnNan::Warn => {
+                if !self.warned.replace(true) {
+                    self.host.log(LogLevel::Warning, &text);
+                }
+                Ok(())
+            }
+        }
+    }
+
+    /// References of variables that are all scalars; false where one is an element of an array.
+    fn collect(&self, ids: &[u32], references: &mut Vec<u32>) -> Result<bool> {
+        references.clear();
+        for id in ids {
+            let place = self.place(*id)?;
+            if place.count != 1 {
+                return Ok(false);
+            }
+            references.push(place.reference);
+        }
+        Ok(true)
+    }
+}
+
+/// Keys of the host in the table of a unit.
+struct Options {
+    on_nan: OnNan,
+    event_mode: bool,
+    rollback: bool,
+}
+
+/// The host's keys and the start values, whose nested tables become dotted names.
+fn options(parameters: &Map<String, Value>) -> Result<(Options, Vec<(String, Value)>)> {
+    let mut options = Options { on_nan: OnNan::Stop, event_mode: false, rollback: true };
+    let mut start = Vec::new();
+    for (key, value) in parameters {
+        let wrong = |takes: &str| Error::Refused(format!("`{key}` takes {takes}, not {value}"));
+        match (key.as_str(), value) {
+            ("on_nan", Value::String(t)) if t == "stop" => options.on_nan = OnNan::Stop,
+            ("on_nan", Value::String(t)) if t == "warn" => options.on_nan = OnNan::Warn,
+            ("on_nan", _) => return Err(wrong("\"stop\" or \"warn\"")),
+            ("event_mode", Value::Bool(on)) => options.event_mode = *on,
+            ("event_mode", _) => return Err(wrong("true or false")),
+            ("rollback", Value::Bool(on)) => options.rollback = *on,
+            ("rollback", _) => return Err(wrong("true or false")),
+            ("start", Value::Object(below)) => {
+                below.iter().for_each(|(k, v)| flatten(k.clone(), v, &mut start));
+            }
+            _ => flatten(key.clone(), value, &mut start),
+        }
+    }
+    Ok((options, start))
+}
+
+fn flatten(name: String, value: &Value, all: &mut Vec<(String, Value)>) {
+    match value {
+        Value::Object(below) => below.iter().for_each(|(k, v)| flatten(format!("{name}.{k}"), v, all)),
+        Value::Array(items) => {
+            items.iter().enumerate().for_each(|(k, v)| all.push((format!("{name}[{}]", k + 1), v.clone())));
+        }
+        other => all.push((name, other.clone())),
+    }
+}
+
+/// An error of a unit as an error of a subsystem.
+fn error(error: FmiError) -> Error {
+    match error {
+        FmiError::Call { fatal: true, .. } => Error::Fatal(error.to_string()),
+        FmiError::Call { .. } => Error::Failed(error.to_string()),
+        other => Error::Refused(other.to_string()),
+    }
+}
+
+impl Subsystem for FmuSubsystem {
+    fn capabilities(&self) -> Capabilities {
+        let c = self.slave.fmu().description().capabilities;
+        let retry = if self.can_go_back {
+            Capabilities::RETRY | Capabilities::STATE
+        } else {
+            Capabilities::default()
+        };
+        let bytes = if c.serialize { Capabilities::SERIALIZE } else { Capabilities::default() };
+        retry | bytes
+    }
+
+    fn advance(&mut self, step: &Step, _: &Input, out: &mut Response) -> Result {
+        if self.slave.is_initializing() {
+            self.slave.exit_initialization().map_err(error)?;
+            self.running = true;
+        }
+        if self.open && !self.can_go_back {
+            let text =
+                "a step had to be repeated, but the unit cannot save its state; make time.step_s shorter";
+            return Err(Error::Failed(text.into()));
+        }
+        if self.open {
+            self.slave.restore(&self.before).map_err(error)?;
+        } else if self.can_go_back {
+            self.slave.save(&mut self.before).map_err(error)?;
+        }
+        self.open = true;
+        let step_now = Advance { t: step.t, h: step.h, for_good: !self.can_go_back };
+        match self.slave.do_step(step_now) {
+            Ok(done) if done.terminate => {
+                let reached = done.reached;
+                Err(Error::Failed(format!("the unit asks for the end of the simulation at t = {reached} s")))
+            }
+            Ok(_) => {
+                out.reached = step.t + step.h;
+                Ok(())
+            }
+            Err(discard @ FmiError::Discard { .. }) => {
+                let variable = self.slave.fmu().description().capabilities.variable_step;
+                if !self.can_go_back || !variable {
+                    let lack = if variable { "save its state" } else { "make steps of another length" };
+                    return Err(Error::Failed(format!(
+                        "{discard}; the step cannot be halved: it cannot {lack}"
+                    )));
+                }
+                self.host.log(LogLevel::Info, &discard.to_string());
+                Err(Error::Discard { reached: step.t + 0.5 * step.h })
+            }
+            Err(other) => Err(error(other)),
+        }
+    }
+
+    fn commit(&mut self, _: &Step, _: &[f64], _: &Motion) -> Result {
+        self.open = false;
+        Ok(())
+    }
+
+    fn save_state(&mut self, slot: u32) -> Result {
+        let state = self.slots.get_mut(slot as usize).ok_or(Error::Unsupported)?;
+        self.slave.save(state).map_err(error)
+    }
+
+    fn restore_state(&mut self, slot: u32) -> Result {
+        let state = self.slots.get(slot as usize).ok_or(Error::Unsupported)?;
+        self.open = false;
+        self.slave.restore(state).map_err(error)
+    }
+
+    fn serialize(&self) -> Result<Vec<u8>> {
+        let mut state = SlaveState::default();
+        self.slave.save(&mut state).map_err(error)?;
+        let bytes = self.slave.serialize(&state).map_err(error);
+        self.slave.release(&mut state).map_err(error)?;
+        bytes
+    }
+
+    fn deserialize(&mut self, bytes: &[u8]) -> Result {
+        let mut state = SlaveState::default();
+        self.slave.deserialize(bytes, &mut state).map_err(error)?;
+        let done = self.slave.restore(&state).map_err(error);
+        self.slave.release(&mut state).map_err(error)?;
+        done
+    }
+
+    fn variables(&self) -> &[Variable] {
+        &self.variables
+    }
+
+    fn get(&self, ids: &[u32], out: ValuesMut) -> Result {
+        let mut references = self.references.borrow_mut();
+        if self.collect(ids, &mut references)? {
+            return match out {
+                ValuesMut::F64(out) => {
+                    self.slave.get_f64(&references, out).map_err(error)?;
+                    self.check_numbers(ids, out)
+                }
+                ValuesMut::Enumeration(out) => {
+                    self.slave.get(&references, ValuesMut::Enumeration(out)).map_err(error)?;
+                    for (id, value) in ids.iter().zip(out) {
+                        let items = self.items(self.place(*id)?);
+                        *value = items.iter().position(|(_, v)| v == value).map_or(*value, |k| k as i64);
+                    }
+                    Ok(())
+                }
+                other => self.slave.get(&references, other).map_err(error),
+            };
+        }
+        drop(references);
+        macro_rules! elements {
+            ($variant:ident, $out:expr, $zero:expr) => {{
+                for (id, out) in ids.iter().zip($out.iter_mut()) {
+                    let place = *self.place(*id)?;
+                    let mut whole = vec![$zero; place.count];
+                    self.slave.get(&[place.reference], ValuesMut::$variant(&mut whole)).map_err(error)?;
+                    *out = whole.swap_remove(place.element);
+                }
+                Ok(())
+            }};
+        }
+        match out {
+            ValuesMut::F64(out) => {
+                let done: Result = elements!(F64, out, 0.0);
+                done.and_then(|()| self.check_numbers(ids, out))
+            }
+            ValuesMut::F32(out) => elements!(F32, out, 0.0),
+            ValuesMut::I8(out) => elements!(I8, out, 0),
+            ValuesMut::I16(out) => elements!(I16, out, 0),
+            ValuesMut::I32(out) => elements!(I32, out, 0),
+            ValuesMut::I64(out) => elements!(I64, out, 0),
+            ValuesMut::U8(out) => elements!(U8, out, 0),
+            ValuesMut::U16(out) => elements!(U16, out, 0),
+            ValuesMut::U32(out) => elements!(U32, out, 0),
+            ValuesMut::U64(out) => elements!(U64, out, 0),
+            ValuesMut::Bool(out) => elements!(Bool, out, false),
+            ValuesMut::String(out) => elements!(String, out, String::new()),
+            ValuesMut::Binary(out) => elements!(Binary, out, Vec::new()),
+            ValuesMut::Enumeration(out) => elements!(Enumeration, out, 0),
+        }
+    }
+
+    fn set(&mut self, ids: &[u32], values: Values) -> Result {
+        for id in ids.iter().filter(|_| self.running) {
+            if !self.place(*id)?.live {
+                let name = &self.variables[*id as usize].name;
+                return Err(Error::Refused(format!("`{name}` can only be set before the first step")));
+            }
+        }
+        let mut references = self.references.borrow_mut();
+        if self.collect(ids, &mut references)? {
+            if let Values::Enumeration(indices) = values {
+                let item = |(id, k): (&u32, &i64)| -> Result<i64> {
+                    let items = self.items(self.place(*id)?);
+                    Ok(usize::try_from(*k).ok().and_then(|k| items.get(k)).map_or(*k, |(_, v)| *v))
+                };
+                let own = ids.iter().zip(indices).map(item).collect::<Result<Vec<i64>>>()?;
+                return self.slave.set(&references, Values::Enumeration(&own)).map_err(error);
+            }
+            return self.slave.set(&references, values).map_err(error);
+        }
+        drop(references);
+        macro_rules! elements {
+            ($variant:ident, $values:expr, $zero:expr) => {{
+                for (id, value) in ids.iter().zip($values) {
+                    let place = *self.place(*id)?;
+                    let mut whole = vec![$zero; place.count];
+                    self.slave.get(&[place.reference], ValuesMut::$variant(&mut whole)).map_err(error)?;
+                    whole[place.element] = value.clone();
+                    self.slave.set(&[place.reference], Values::$variant(&whole)).map_err(error)?;
+                }
+                Ok(())
+            }};
+        }
+        match values {
+            Values::F64(v) => elements!(F64, v, 0.0),
+            Values::F32(v) => elements!(F32, v, 0.0),
+            Values::I8(v) => elements!(I8, v, 0),
+            Values::I16(v) => elements!(I16, v, 0),
+            Values::I32(v) => elements!(I32, v, 0),
+            Values::I64(v) => elements!(I64, v, 0),
+            Values::U8(v) => elements!(U8, v, 0),
+            Values::U16(v) => elements!(U16, v, 0),
+            Values::U32(v) => elements!(U32, v, 0),
+            Values::U64(v) => elements!(U64, v, 0),
+            Values::Bool(v) => elements!(Bool, v, false),
+            Values::String(v) => elements!(String, v, String::new()),
+            Values::Binary(v) => elements!(Binary, v, Vec::new()),
+            Values::Enumeration(v) => elements!(Enumeration, v, 0),
+        }
+    }
+}
+
+impl Drop for FmuSubsystem {
+    fn drop(&mut self) {
+        for state in self.slots.iter_mut().chain([&mut self.before]) {
+            // The instance goes next; what it says to this is in its log.
+            drop(self.slave.release(state));
+        }
+    }
+}

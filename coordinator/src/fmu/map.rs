@@ -1,0 +1,88 @@
+//! FMI variables as variables of a scenario: array elements get names of their own, `foot.position[2,1]`.
+
+use terraglue_fmi::description::{self as fmi, ModelDescription, Variability};
+use terraglue_subsystem::unit::Unit;
+use terraglue_subsystem::{Effect, ValueType, Variable};
+
+/// Where the value of a variable of the scenario lies in the unit.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// Position in the description.
+    pub variable: usize,
+    /// Element, row by row.
+    pub element: usize,
+    /// Elements of the whole variable.
+    pub count: usize,
+    /// Number in calls.
+    pub reference: u32,
+    /// Whether it may be set after the initialisation.
+    pub live: bool,
+}
+
+/// All variables that a scenario can see, and where they lie.
+pub fn variables(description: &ModelDescription) -> (Vec<Variable>, Vec<Place>) {
+    let (mut all, mut places) = (Vec::new(), Vec::new());
+    for (k, v) in description.variables.iter().enumerate() {
+        let seen = !matches!(v.value_type, ValueType::Clock) && v.causality != fmi::Causality::Independent;
+        if !seen {
+            continue;
+        }
+        for element in 0..v.len() {
+            let effect = effect(v);
+            let id = all.len() as u32;
+            all.push(Variable {
+                id,
+                name: element_name(v, element),
+                value_type: v.value_type,
+                causality: v.causality.role(),
+                effect,
+                unit: unit(description, v),
+                help: v.description.clone(),
+                min: v.min,
+                max: v.max,
+                dims: Vec::new(),
+                enumeration: v.items.iter().map(|(name, _)| name.clone()).collect(),
+            });
+            let live = effect == Effect::Live;
+            places.push(Place { variable: k, element, count: v.len(), reference: v.reference, live });
+        }
+    }
+    (all, places)
+}
+
+/// `name`, or `name[i,j]` from 1 for an element of an array.
+pub fn element_name(v: &fmi::Variable, element: usize) -> String {
+    if v.sizes.is_empty() {
+        return v.name.clone();
+    }
+    let mut rest = element;
+    let mut index = vec![0; v.sizes.len()];
+    for (k, size) in v.sizes.iter().enumerate().rev() {
+        index[k] = rest % *size as usize + 1;
+        rest /= *size as usize;
+    }
+    let index: Vec<String> = index.iter().map(usize::to_string).collect();
+    format!("{}[{}]", v.name, index.join(","))
+}
+
+fn effect(v: &fmi::Variable) -> Effect {
+    match (v.causality, v.variability) {
+        (fmi::Causality::Input, _) | (fmi::Causality::Parameter, Variability::Tunable) => Effect::Live,
+        (fmi::Causality::Parameter, _) => Effect::NeedsReset,
+        _ if v.initial == Some(fmi::Initial::Exact) && v.variability != Variability::Constant => {
+            Effect::NeedsReset
+        }
+        _ => Effect::ReadOnly,
+    }
+}
+
+/// The unit where our own reading of its name agrees with the unit's definition; nothing otherwise, so that no
+/// connection converts by a guess.
+fn unit(description: &ModelDescription, v: &fmi::Variable) -> String {
+    let Some(name) = &v.unit else { return String::new() };
+    let Ok(ours) = Unit::parse(name) else { return String::new() };
+    match description.units.iter().find(|(n, _)| n == name) {
+        Some((_, theirs)) if *theirs != ours => String::new(),
+        _ => name.clone(),
+    }
+}

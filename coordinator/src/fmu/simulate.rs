@@ -1,0 +1,251 @@
+//! One unit alone: from its start to its end in equal steps, its outputs as rows of a table.
+
+use super::map::element_name;
+use crate::scenario::did_you_mean;
+use std::sync::Arc;
+use terraglue_fmi::description::{Causality, Variable};
+use terraglue_fmi::slave::Sink;
+use terraglue_fmi::{Advance, Error, Fmu, Result, Slave, SlaveOptions, SlaveState};
+use terraglue_subsystem::{ValueType, Values, ValuesMut};
+
+/// How a unit is run.
+pub struct Settings {
+    /// Start values by name, as text.
+    pub start: Vec<(String, String)>,
+    /// s; none: what the unit wants.
+    pub start_time: Option<f64>,
+    /// s.
+    pub stop: Option<f64>,
+    /// s.
+    pub step: Option<f64>,
+    /// Relative.
+    pub tolerance: Option<f64>,
+    /// Names to write; empty: all outputs.
+    pub outputs: Vec<String>,
+    /// Whether events are handled in event mode.
+    pub event_mode: bool,
+    /// Inputs over time.
+    pub input: Table,
+}
+
+/// Inputs over time: first column is the time, s.
+#[derive(Clone, Debug, Default)]
+pub struct Table {
+    /// Names after `time`.
+    pub names: Vec<String>,
+    /// Rows of time and values, ascending.
+    pub rows: Vec<Vec<f64>>,
+}
+
+impl Table {
+    /// Values at t by straight lines between the rows; the first and last row hold beyond.
+    fn at(&self, t: f64, column: usize, hold: bool) -> f64 {
+        let next = self.rows.partition_point(|r| r[0] <= t);
+        match (next.checked_sub(1).map(|k| &self.rows[k]), self.rows.get(next)) {
+            (Some(a), Some(b)) if !hold => {
+                let s = (t - a[0]) / (b[0] - a[0]);
+                a[column + 1] + s * (b[column + 1] - a[column + 1])
+            }
+            (Some(row), _) | (None, Some(row)) => row[column + 1],
+            (None, None) => 0.0,
+        }
+    }
+}
+
+/// Longest run, in steps.
+const STEPS: f64 = 1e9;
+
+/// Runs a unit and hands `row` each line of the table, the header first.
+///
+/// # Errors
+/// What the unit or its input does wrong, with the time.
+pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, row: &mut dyn FnMut(&str) -> Result) -> Result {
+    let experiment = fmu.description().experiment;
+    let start = settings.start_time.or(experiment.start).unwrap_or(0.0);
+    let stop = settings.stop.or(experiment.stop).unwrap_or(start + 1.0);
+    let step = settings.step.or(experiment.step).or(fmu.description().capabilities.fixed_step);
+    let step = step.unwrap_or((stop - start) / 500.0);
+    let steps = ((stop - start) / step).round();
+    if !(step > 0.0 && steps >= 1.0 && steps <= STEPS) {
+        return Err(Error::Refused(format!("from {start} s to {stop} s in steps of {step} s cannot be run")));
+    }
+    let columns = columns(fmu, &settings.outputs)?;
+    let options = SlaveOptions { name: "unit".into(), verbose: false, event_mode: settings.event_mode, sink };
+    let mut slave = Slave::instantiate(fmu, options)?;
+    for (name, text) in &settings.start {
+        set_text(&slave, find(fmu, name)?, text)?;
+    }
+    slave.enter_initialization(start, Some(stop), settings.tolerance.or(experiment.tolerance))?;
+    set_inputs(&slave, settings, start)?;
+    slave.exit_initialization()?;
+    row(&header(&columns))?;
+    row(&line(&slave, start, &columns)?)?;
+    let mut state = SlaveState::default();
+    let outcome = (0..steps as u64).try_for_each(|k| {
+        let (t, end) = (start + k as f64 * step, start + (k + 1) as f64 * step);
+        let at = |e: Error| named(e, t);
+        set_inputs(&slave, settings, t).map_err(at)?;
+        halving(&mut slave, &mut state, t, end).map_err(at)?;
+        row(&line(&slave, end, &columns).map_err(|e| named(e, end))?)
+    });
+    drop(slave.release(&mut state));
+    outcome?;
+    slave.terminate()
+}
+
+/// A step, in halves where the unit discards it and can go back.
+fn halving(slave: &mut Slave, state: &mut SlaveState, start: f64, end: f64) -> Result {
+    let c = slave.fmu().description().capabilities;
+    let (mut t, mut h, mut halvings) = (start, end - start, 0);
+    while end - t > 1e-9 * (end - start) {
+        if c.state {
+            slave.save(state)?;
+        }
+        match slave.do_step(Advance { t, h: h.min(end - t), for_good: !c.state }) {
+            Ok(done) if done.terminate => {
+                return Err(Error::Refused(format!("the unit asks for the end at t = {} s", done.reached)));
+            }
+            Ok(_) => t = if h >= end - t { end } else { t + h },
+            Err(Error::Discard { .. }) if c.state && c.variable_step && halvings < 10 => {
+                slave.restore(state)?;
+                (h, halvings) = (0.5 * h, halvings + 1);
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
+}
+
+fn named(error: Error, t: f64) -> Error {
+    Error::Refused(format!("at t = {t} s: {error}"))
+}
+
+fn find<'a>(fmu: &'a Fmu, name: &str) -> Result<&'a Variable> {
+    let all = &fmu.description().variables;
+    all.iter().find(|v| v.name == name).ok_or_else(|| {
+        let hint = did_you_mean(name, all.iter().map(|v| v.name.as_str()));
+        Error::Refused(format!(
+            "there is no variable `{name}`{}",
+            hint.map(|h| format!("; {h}")).unwrap_or_default()
+        ))
+    })
+}
+
+fn columns<'a>(fmu: &'a Fmu, names: &[String]) -> Result<Vec<&'a Variable>> {
+    if !names.is_empty() {
+        return names.iter().map(|n| find(fmu, n)).collect();
+    }
+    let output = |v: &&Variable| v.causality == Causality::Output && v.value_type != ValueType::Clock;
+    Ok(fmu.description().variables.iter().filter(output).collect())
+}
+
+fn header(columns: &[&Variable]) -> String {
+    let names = columns.iter().flat_map(|v| (0..v.len()).map(|k| quoted(&element_name(v, k))));
+    std::iter::once("time".to_owned()).chain(names).collect::<Vec<_>>().join(",")
+}
+
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}
+
+/// One line of the table; numbers are written so that reading them gives the same bits.
+fn line(slave: &Slave, t: f64, columns: &[&Variable]) -> Result<String> {
+    let mut text = t.to_string();
+    for v in columns {
+        for value in read(slave, v)? {
+            text.push(',');
+            text.push_str(&quoted(&value));
+        }
+    }
+    Ok(text)
+}
+
+fn read(slave: &Slave, v: &Variable) -> Result<Vec<String>> {
+    macro_rules! values {
+        ($variant:ident, $zero:expr, $show:expr) => {{
+            let mut out = vec![$zero; v.len()];
+            slave.get(&[v.reference], ValuesMut::$variant(&mut out))?;
+            Ok(out.iter().map($show).collect())
+        }};
+    }
+    match v.value_type {
+        ValueType::F64 => {
+            let mut out = vec![f64::NAN; v.len()];
+            slave.get_f64(&[v.reference], &mut out)?;
+            if let Some(wrong) = out.iter().find(|x| !x.is_finite()) {
+                return Err(Error::Refused(format!("the variable `{}` is {wrong}", v.name)));
+            }
+            Ok(out.iter().map(f64::to_string).collect())
+        }
+        ValueType::F32 => values!(F32, 0.0, |x: &f32| x.to_string()),
+        ValueType::I8 => values!(I8, 0, |x: &i8| x.to_string()),
+        ValueType::I16 => values!(I16, 0, |x: &i16| x.to_string()),
+        ValueType::I32 => values!(I32, 0, |x: &i32| x.to_string()),
+        ValueType::I64 => values!(I64, 0, |x: &i64| x.to_string()),
+        ValueType::U8 => values!(U8, 0, |x: &u8| x.to_string()),
+        ValueType::U16 => values!(U16, 0, |x: &u16| x.to_string()),
+        ValueType::U32 => values!(U32, 0, |x: &u32| x.to_string()),
+        ValueType::U64 => values!(U64, 0, |x: &u64| x.to_string()),
+        ValueType::Bool => values!(Bool, false, |x: &bool| u8::from(*x).to_string()),
+        ValueType::Enumeration => values!(Enumeration, 0, |x: &i64| x.to_string()),
+        ValueType::String => values!(String, String::new(), |x: &String| x.clone()),
+        ValueType::Binary => values!(Binary, Vec::new(), |x: &Vec<u8>| {
+            x.iter().map(|b| format!("{b:02x}")).collect::<String>()
+        }),
+        ValueType::Clock => Ok(Vec::new()),
+    }
+}
+
+/// Sets a variable from text; arrays take their elements separated by spaces.
+fn set_text(slave: &Slave, v: &Variable, text: &str) -> Result {
+    let wrong =
+        || Error::Refused(format!("`{}` = {text}: it takes {} values of another kind", v.name, v.len()));
+    let words: Vec<&str> = text.split_whitespace().collect();
+    macro_rules! parsed {
+        ($variant:ident, $t:ty) => {{
+            let values: Option<Vec<$t>> = words.iter().map(|w| w.parse().ok()).collect();
+            let values = values.filter(|x| x.len() == v.len()).ok_or_else(wrong)?;
+            slave.set(&[v.reference], Values::$variant(&values))
+        }};
+    }
+    match v.value_type {
+        ValueType::F64 => parsed!(F64, f64),
+        ValueType::F32 => parsed!(F32, f32),
+        ValueType::I8 => parsed!(I8, i8),
+        ValueType::I16 => parsed!(I16, i16),
+        ValueType::I32 => parsed!(I32, i32),
+        ValueType::I64 => parsed!(I64, i64),
+        ValueType::U8 => parsed!(U8, u8),
+        ValueType::U16 => parsed!(U16, u16),
+        ValueType::U32 => parsed!(U32, u32),
+        ValueType::U64 => parsed!(U64, u64),
+        ValueType::Enumeration => parsed!(Enumeration, i64),
+        ValueType::Bool => {
+            let value = match text {
+                "true" | "1" => true,
+                "false" | "0" => false,
+                _ => return Err(wrong()),
+            };
+            slave.set(&[v.reference], Values::Bool(&[value]))
+        }
+        ValueType::String => slave.set(&[v.reference], Values::String(&[text.to_owned()])),
+        ValueType::Binary | ValueType::Clock => Err(wrong()),
+    }
+}
+
+fn set_inputs(slave: &Slave, settings: &Settings, t: f64) -> Result {
+    for (column, name) in settings.input.names.iter().enumerate() {
+        let v = find(slave.fmu(), name)?;
+        let float = matches!(v.value_type, ValueType::F64 | ValueType::F32);
+        let value = settings.input.at(t, column, !float);
+        match v.value_type {
+            ValueType::F64 => slave.set_f64(&[v.reference], &[value])?,
+            _ => set_text(slave, v, &value.to_string())?,
+        }
+    }
+    Ok(())
+}

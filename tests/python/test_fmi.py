@@ -1,0 +1,170 @@
+"""Functional mock-up units made here in C, and archives that are no units."""
+
+import csv
+import pathlib
+import subprocess
+import tempfile
+import zipfile
+
+import pytest
+
+from conftest import terraglue
+
+DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="m" guid="g">
+<CoSimulation modelIdentifier="m"/><ModelVariables/><ModelStructure/></fmiModelDescription>
+"""
+
+VARIABLES = """<ModelVariables>
+<ScalarVariable name="k" valueReference="0" causality="parameter" variability="tunable"><Real start="1"/></ScalarVariable>
+<ScalarVariable name="x" valueReference="1" causality="output" initial="calculated"><Real/></ScalarVariable>
+<ScalarVariable name="mode" valueReference="2" causality="parameter"><Real start="0"/></ScalarVariable>
+</ModelVariables><ModelStructure><Outputs><Unknown index="2"/></Outputs></ModelStructure>"""
+
+# x' = -k x by Euler's explicit rule; after t = 0.25 s it does what `mode` says: 1 NaN, 2 error, 3 fatal, 4 discards
+# steps longer than 0.1 s, 5 answers a status that does not exist.
+CODE = r"""
+#include <math.h>
+#include <stdlib.h>
+#include <string.h>
+typedef struct { double v[3]; int dead; } Unit;
+typedef struct { void (*log)(void *, const char *, int, const char *, const char *, ...); void *a, *f, *s, *e; } Back;
+static Back back;
+void *fmi2Instantiate(const char *n, int t, const char *g, const char *r, const Back *b, int v, int l) {
+    Unit *u = calloc(1, sizeof *u); back = *b; u->v[0] = u->v[1] = 1; return u; }
+void fmi2FreeInstance(Unit *u) { if (u->dead) abort(); free(u); }
+int fmi2SetupExperiment(Unit *u, int a, double b, double c, int d, double e) { return 0; }
+int fmi2EnterInitializationMode(Unit *u) { return 0; }
+int fmi2ExitInitializationMode(Unit *u) { return 0; }
+int fmi2Terminate(Unit *u) { if (u->dead) abort(); return 0; }
+int fmi2GetReal(Unit *u, const unsigned *r, size_t n, double *x) { while (n--) x[n] = u->v[r[n]]; return 0; }
+int fmi2SetReal(Unit *u, const unsigned *r, size_t n, const double *x) { while (n--) u->v[r[n]] = x[n]; return 0; }
+int fmi2GetFMUstate(Unit *u, void **s) { if (!*s) *s = malloc(sizeof *u); memcpy(*s, u, sizeof *u); return 0; }
+int fmi2SetFMUstate(Unit *u, void *s) { memcpy(u, s, sizeof *u); return 0; }
+int fmi2FreeFMUstate(Unit *u, void **s) { free(*s); *s = 0; return 0; }
+int fmi2DoStep(Unit *u, double t, double h, int p) {
+    int m = t > 0.25 ? (int)u->v[2] : 0;
+    if (m == 4 && h > 0.1) return 2;
+    u->v[1] -= h * u->v[0] * u->v[1];
+    if (m == 1) u->v[1] = NAN;
+    if (m == 2) { back.log(back.e, "u", 3, "solver", "pressure %d is too high", 42); return 3; }
+    if (m == 3) { u->dead = 1; return 4; }
+    return m == 5 ? 77 : 0;
+}
+"""
+
+
+@pytest.fixture(scope="session")
+def decay(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("decay")
+    (folder / "m.c").write_text(CODE)
+    command = ["cc", "-shared", "-fPIC", "-w", "m.c", "-o", "m.so", "-lm"]
+    subprocess.run(command, cwd=folder, check=True, capture_output=True)
+    flags = 'modelIdentifier="m" canGetAndSetFMUstate="true" canHandleVariableCommunicationStepSize="true"'
+    text = DESCRIPTION.replace('modelIdentifier="m"', flags)
+    text = text.replace("<ModelVariables/><ModelStructure/>", VARIABLES)
+    with zipfile.ZipFile(folder / "decay.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", text)
+        archive.write(folder / "m.so", "binaries/linux64/m.so")
+    return folder / "decay.fmu"
+
+
+def left_behind():
+    return set(pathlib.Path(tempfile.gettempdir()).glob("terraglue-fmu-*"))
+
+
+@pytest.mark.parametrize(
+    ("mode", "says"),
+    [
+        (1, "`x` is NaN"),
+        (2, "pressure 42 is too high"),
+        (3, "status fatal"),
+        (5, "77, which is no status"),
+    ],
+)
+def test_a_unit_that_fails_stops_the_run_and_is_named(decay, tmp_path, mode, says):
+    path = tmp_path / "decay.toml"
+    path.write_text(
+        f'[time]\nstep_s = 0.125\nduration_s = 1.0\n[recording]\nevery_steps = 1\n'
+        f'[decay]\nfmu = "{decay}"\nmode = {mode}\n'
+    )
+    runs = [
+        terraglue("fmu", "run", decay, "--stop", "1", "--step", "0.125", "--start", f"mode={mode}"),
+        terraglue("run", path, "--out", tmp_path / "out", "--csv", "--quiet"),
+    ]
+    for done in runs:
+        assert done.returncode == 1, done.stderr
+        assert says in done.stderr and "0.375" in done.stderr or "0.5" in done.stderr, done.stderr
+        assert "decay" in done.stderr
+    rows = list(csv.reader((tmp_path / "out" / "variables.csv").open()))
+    assert len(rows) >= 4, "the recording up to the failure is readable"
+
+
+def test_a_discarded_step_is_halved(decay):
+    done = terraglue("fmu", "run", decay, "--stop", "1", "--step", "0.125", "--start", "mode=4")
+    assert done.returncode == 0, done.stderr
+    last = done.stdout.splitlines()[-1].split(",")
+    assert float(last[1]) == pytest.approx(0.875**3 * 0.9375**10, rel=1e-14)
+
+
+def test_a_unit_runs_alone(decay, tmp_path):
+    out = tmp_path / "out.csv"
+    done = terraglue("fmu", "run", decay, "--stop", "1", "--step", "0.125", "--start", "k=2", "--csv", out)
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader(out.open()))
+    x = 1.0
+    for row in rows[1:]:
+        x = x - 0.125 * 2 * x
+        assert float(row["x"]) == x
+    assert len(rows) == 9
+
+
+def test_nothing_is_left_behind(decay):
+    before = left_behind()
+    for mode in (0, 2, 3):
+        terraglue("fmu", "run", decay, "--stop", "1", "--step", "0.125", "--start", f"mode={mode}")
+    assert left_behind() <= before
+
+
+def test_a_unit_is_a_subsystem(decay, tmp_path):
+    path = tmp_path / "decay.toml"
+    path.write_text(f"""
+[time]
+step_s = 0.125
+duration_s = 1.0
+[recording]
+every_steps = 1
+[decay]
+fmu = "{decay}"
+k = 2.0
+""")
+    done = terraglue("run", path, "--out", tmp_path / "out", "--csv", "--quiet")
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.reader((tmp_path / "out" / "variables.csv").open()))
+    column = next(i for i, name in enumerate(rows[0]) if name.startswith("decay.x"))
+    assert float(rows[-1][column]) == 0.75**8
+
+
+@pytest.mark.parametrize(
+    ("entries", "says"),
+    [
+        ({"a.txt": ""}, "no modelDescription.xml"),
+        ({"../x": "", "modelDescription.xml": DESCRIPTION}, "leads out"),
+        ({"/x": "", "modelDescription.xml": DESCRIPTION}, "absolute path"),
+        ({"modelDescription.xml": DESCRIPTION}, "no library"),
+        ({"modelDescription.xml": DESCRIPTION.replace('modelIdentifier="m"', 'modelIdentifier="$(id)"')}, "identifier"),
+        ({"modelDescription.xml": DESCRIPTION.replace("2.0", "9")}, "fmiVersion"),
+        ({"modelDescription.xml": DESCRIPTION.encode("utf-16")}, "UTF-16"),
+        ({"modelDescription.xml": "<a>" * 100_000}, "nested"),
+        ({"modelDescription.xml": '<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>'}, "DTD"),
+    ],
+)
+def test_an_archive_that_is_no_unit_is_refused(tmp_path, entries, says):
+    path = tmp_path / "x.fmu"
+    with zipfile.ZipFile(path, "w") as archive:
+        for name, text in entries.items():
+            archive.writestr(name, text)
+    done = terraglue("fmu", "run", path)
+    assert done.returncode in (1, 2)
+    assert says in done.stderr, done.stderr
+    assert "panicked" not in done.stderr

@@ -1,7 +1,7 @@
 //! Wrench and stiffness of a patch at a motion of its foot.
 
-use crate::patch::Patches;
-use terraglue_soil_law::ShearLaw;
+use crate::patch::{Facing, Patches};
+use terraglue_soil_law::{ShearLaw, ShearResponse};
 
 /// A 6 × 6 stiffness, rows: components of the wrench on the soil, columns: components of X.
 pub type Stiffness = [[f64; 6]; 6];
@@ -11,9 +11,15 @@ impl Patches {
     pub fn wrench(&self, p: usize, x: &[f64; 6], shear: &ShearLaw) -> [f64; 6] {
         let mut sum = [0.0; 6];
         self.each_loaded(p, x, |k, pressure, _, moved| {
+            let facing = &self.nodes.facing[k];
             let tau = shear.respond(&self.nodes.shear[k], pressure, moved).stress;
             let area = self.nodes.area[k];
-            add_force(&mut sum, self.nodes.arm[k], [area * pressure, -area * tau[0], -area * tau[1]]);
+            let inclined = area * facing.stretch;
+            let force = std::array::from_fn(|c| {
+                area * pressure * facing.press[c]
+                    - inclined * (tau[0] * facing.along[0][c] + tau[1] * facing.along[1][c])
+            });
+            add_force(&mut sum, self.nodes.arm[k], force);
         });
         sum
     }
@@ -24,27 +30,23 @@ impl Patches {
         let moments = self.ports[p].carries_moments();
         self.each_loaded(p, x, |k, pressure, slope, moved| {
             let r = shear.respond(&self.nodes.shear[k], pressure, moved);
-            let (a, c) = (self.nodes.area[k], r.tangent);
-            let node = [
-                [a * slope, 0.0, 0.0],
-                [-a * slope * r.by_pressure[0], a * c[0], a * c[1]],
-                [-a * slope * r.by_pressure[1], a * c[1], a * c[2]],
-            ];
+            let node = node_stiffness(&self.nodes.facing[k], self.nodes.area[k], slope, &r);
             add_stiffness(&mut sum, self.nodes.arm[k], &node, moments);
         });
         sum
     }
 
-    /// Calls `visit(node, pressure, slope, tangential displacement)` for the nodes with pressure.
+    /// Calls `visit(node, pressure, slope, displacement along the underside)` for the nodes with pressure.
     #[inline]
-    fn each_loaded(&self, p: usize, x: &[f64; 6], mut visit: impl FnMut(usize, f64, f64, [f64; 2])) {
+    pub fn each_loaded(&self, p: usize, x: &[f64; 6], mut visit: impl FnMut(usize, f64, f64, [f64; 2])) {
         let patch = &self.ports[p];
         let n = &self.nodes;
         for k in patch.nodes.clone().filter(|k| n.area[*k] > 0.0) {
             let moved = displacement(n.arm[k], x);
-            let (pressure, slope) = patch.curve.at(n.depth[k] - moved[0], n.z_max[k], n.p_max[k]);
+            let deeper = -dot(n.facing[k].press, moved);
+            let (pressure, slope) = patch.curve.at(n.depth[k] + deeper, n.z_max[k], n.p_max[k]);
             if pressure > 0.0 {
-                visit(k, pressure, slope, [moved[1], moved[2]]);
+                visit(k, pressure, slope, n.facing[k].slide(moved));
             }
         }
     }
@@ -56,6 +58,26 @@ pub fn displacement(arm: [f64; 3], x: &[f64; 6]) -> [f64; 3] {
     let [u_n, u_1, u_2, w_n, w_1, w_2] = *x;
     let [r_n, r_1, r_2] = arm;
     [u_n + w_1 * r_2 - w_2 * r_1, u_1 + w_2 * r_n - w_n * r_2, u_2 + w_n * r_1 - w_1 * r_n]
+}
+
+/// Scalar product of vectors along n, t1, t2.
+#[inline]
+pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+/// d(force on the soil)/d(displacement) of a node: area·p acts along `press` and p falls with the displacement along
+/// it; the shear acts on the inclined area.
+pub fn node_stiffness(facing: &Facing, area: f64, slope: f64, r: &ShearResponse) -> [[f64; 3]; 3] {
+    let (g, [e, f], c) = (facing.press, facing.along, r.tangent);
+    let inclined = area * facing.stretch;
+    std::array::from_fn(|a| {
+        std::array::from_fn(|b| {
+            let tangent = e[a] * (c[0] * e[b] + c[1] * f[b]) + f[a] * (c[1] * e[b] + c[2] * f[b]);
+            let by_pressure = r.by_pressure[0] * e[a] + r.by_pressure[1] * f[a];
+            area * slope * g[a] * g[b] + inclined * (tangent - by_pressure * slope * g[b])
+        })
+    })
 }
 
 /// Adds the wrench of a force at `arm`: (f, arm × f).

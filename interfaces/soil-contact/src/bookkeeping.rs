@@ -1,6 +1,6 @@
 //! Commit: the foot's motion becomes depths, slip and heat; the nodes that it left forget their contact.
 
-use crate::assemble::displacement;
+use crate::assemble::{displacement, dot};
 use crate::ground::{Covered, Ground};
 use crate::patch::{Laws, Patch, Patches, key};
 use terraglue_subsystem::Port;
@@ -110,8 +110,9 @@ impl Scene<'_> {
         let mut slid = [0.0; 2];
         let mut loaded = 0;
         for k in patch.nodes.clone().filter(|k| n.area[*k] > 0.0) {
-            let moved = displacement(n.arm[k], x);
-            let depth = n.depth[k] - moved[0];
+            let (moved, facing) = (displacement(n.arm[k], x), &n.facing[k]);
+            let rise = dot(facing.press, moved);
+            let depth = n.depth[k] - rise;
             let (pressure, _) = patch.curve.at(depth, n.z_max[k], n.p_max[k]);
             let [i, j] = n.index[k];
             if pressure > 0.0 {
@@ -119,8 +120,8 @@ impl Scene<'_> {
                 let before = ground.nodes.get(i, j);
                 let fresh = !before.loaded() || before.stamp + 1 != book.stamp;
                 // a point that has just come down from above is no deeper than its own descent
-                lists.slid_in.push(fresh && depth > -2.0 * moved[0]);
-                let node = Pressed { k, depth, pressure, slip: [moved[1], moved[2]] };
+                lists.slid_in.push(fresh && depth > -2.0 * rise);
+                let node = Pressed { k, depth, pressure, slip: facing.slide(moved) };
                 let plastic = self.press(patch, &node, ground, book);
                 slid = [slid[0] + plastic[0], slid[1] + plastic[1]];
                 lists.loaded.push([i, j]);
@@ -141,10 +142,11 @@ impl Scene<'_> {
         let Pressed { k, depth, pressure, slip } = *node;
         let (n, curve) = (&self.patches.nodes, &patch.curve);
         let area = n.area[k];
+        let inclined = area * n.facing[k].stretch;
         let shear = self.laws.shear.respond(&n.shear[k], pressure, slip);
         let squeezed = 0.5 * pressure * pressure / curve.unloading();
-        book.dissipated += area * shear.dissipated;
-        book.elastic += area * (self.laws.shear.elastic_energy(&shear.state) + squeezed);
+        book.dissipated += inclined * shear.dissipated;
+        book.elastic += inclined * self.laws.shear.elastic_energy(&shear.state) + area * squeezed;
         let [i, j] = n.index[k];
         let initial = ground.initial(i, j);
         let state = ground.enter(i, j);
@@ -161,7 +163,9 @@ impl Scene<'_> {
         book.max_sinkage = book.max_sinkage.max(depth / patch.slope - (state.reference - initial));
         let elastic = |c: usize| shear.state.elastic[c] - n.shear[k].elastic[c];
         if shear.state.slip > n.shear[k].slip {
-            [slip[0] - elastic(0), slip[1] - elastic(1)]
+            let [a, b] = [slip[0] - elastic(0), slip[1] - elastic(1)];
+            let along = &n.facing[k].along;
+            [1, 2].map(|c| a * along[0][c] + b * along[1][c])
         } else {
             [0.0; 2]
         }

@@ -1,19 +1,20 @@
 //! The inverse of the normal law: how deep is the foot under a normal force?
 
-use crate::assemble::displacement;
+use crate::assemble::{displacement, dot, node_stiffness};
 use crate::patch::Patches;
-use terraglue_soil_law::total_force;
+use terraglue_soil_law::ShearLaw;
 
 /// Relative accuracy of the force.
 const TOLERANCE: f64 = 1e-14;
 
 impl Patches {
-    /// X_n of the soil's surface under the normal force `force` (N) when the foot of patch `p` is turned as the
-    /// moments' part of `x` says; for `force` ≤ 0 the height at which the foot just leaves the soil.
+    /// X_n of the soil's surface under the normal force `force` (N) when the other components of the motion of the
+    /// foot of patch `p` are those of `x`; for `force` ≤ 0 the height at which the foot just leaves the soil.
     ///
-    /// The force grows monotonely with the depth: Newton from the last solution of the step, kept inside a
-    /// bracket whose lower end carries nothing and whose upper end carries at least `force` on every node.
-    pub fn surface_under(&mut self, p: usize, force: f64, x: &[f64; 6]) -> f64 {
+    /// The force grows with the depth: Newton from the last solution of the step, kept inside a bracket whose lower
+    /// end carries nothing. Its upper end carries `force` by pressure alone; where shear on inclined undersides
+    /// lifts the foot, it moves further down.
+    pub fn surface_under(&mut self, p: usize, force: f64, x: &[f64; 6], shear: &ShearLaw) -> f64 {
         self.turn(p, x);
         let (free, full) = match self.bracket(p, force) {
             Some(bracket) => bracket,
@@ -22,14 +23,22 @@ impl Patches {
         if force <= 0.0 {
             return -free;
         }
+        let mut at = *x;
         let (mut low, mut high) = (free, full);
+        for _ in 0..60 {
+            at[0] = -high;
+            if self.wrench(p, &at, shear)[0] >= force {
+                break;
+            }
+            (low, high) = (high, high + (high - free) + 1e-9);
+        }
         let mut shift = -self.ports[p].warm;
         for _ in 0..200 {
             if !(shift > low && shift < high) {
                 shift = 0.5 * (low + high);
             }
-            let (value, stiffness) = self.normal_force(p, shift);
-            let residual = value - force;
+            at[0] = -shift;
+            let residual = self.wrench(p, &at, shear)[0] - force;
             if residual.abs() <= TOLERANCE * force || high - low <= f64::EPSILON * shift.abs() {
                 break;
             }
@@ -38,6 +47,7 @@ impl Patches {
             } else {
                 low = shift
             }
+            let stiffness = self.normal_stiffness(p, &at, shear);
             let next = if stiffness > 0.0 { shift - residual / stiffness } else { f64::NAN };
             if next == shift {
                 break;
@@ -48,51 +58,42 @@ impl Patches {
         -shift
     }
 
-    /// Force (N) and stiffness (N/m) when all nodes are `shift` deeper; after [`Patches::turn`].
-    fn normal_force(&self, p: usize, shift: f64) -> (f64, f64) {
-        let (patch, n) = (&self.ports[p], &self.nodes);
-        let r = patch.nodes.clone();
-        total_force(
-            &patch.curve,
-            shift,
-            &n.turned[r.clone()],
-            &n.z_max[r.clone()],
-            &n.p_max[r.clone()],
-            &n.area[r],
-        )
-    }
-
     fn turn(&mut self, p: usize, x: &[f64; 6]) {
         let n = &mut self.nodes;
         n.turned.resize(n.depth.len(), 0.0);
-        let rotation = [0.0, 0.0, 0.0, x[3], x[4], x[5]];
+        let aside = [0.0, x[1], x[2], x[3], x[4], x[5]];
         for k in self.ports[p].nodes.clone() {
-            n.turned[k] = n.depth[k] - displacement(n.arm[k], &rotation)[0];
+            n.turned[k] = n.depth[k] - dot(n.facing[k].press, displacement(n.arm[k], &aside));
         }
     }
 
-    /// Shift at which the foot just touches, and one at which it carries `force` for certain; `None` without nodes.
+    /// Shift at which the foot just touches, and one at which the pressure carries `force` for certain; `None`
+    /// without nodes.
     fn bracket(&self, p: usize, force: f64) -> Option<(f64, f64)> {
         let (patch, n) = (&self.ports[p], &self.nodes);
         let loaded = || patch.nodes.clone().filter(|k| n.area[*k] > 0.0);
-        let area: f64 = loaded().map(|k| n.area[k]).sum();
+        let area: f64 = loaded().map(|k| n.area[k] * n.facing[k].press[0]).sum();
         let pressure = force.max(0.0) / area;
         let virgin = patch.curve.virgin_depth(pressure);
         let elastic = pressure / patch.curve.unloading();
         let (mut free, mut full) = (f64::INFINITY, f64::NEG_INFINITY);
         for k in loaded() {
-            free = free.min(n.permanent[k] - n.turned[k]);
-            full = full.max(virgin.max(n.permanent[k] + elastic) - n.turned[k]);
+            let down = n.facing[k].press[0];
+            free = free.min((n.permanent[k] - n.turned[k]) / down);
+            full = full.max((virgin.max(n.permanent[k] + elastic) - n.turned[k]) / down);
         }
         let margin = 1e-12 * (1.0 + full.abs());
         (area > 0.0).then_some((free, full + margin))
     }
-}
 
-impl Patches {
     /// dW_n/dX_n at `x`, N/m.
-    pub fn normal_stiffness(&mut self, p: usize, x: &[f64; 6]) -> f64 {
-        self.turn(p, x);
-        self.normal_force(p, -x[0]).1
+    pub fn normal_stiffness(&self, p: usize, x: &[f64; 6], shear: &ShearLaw) -> f64 {
+        let mut sum = 0.0;
+        self.each_loaded(p, x, |k, pressure, slope, moved| {
+            let (n, facing) = (&self.nodes, &self.nodes.facing[k]);
+            let r = shear.respond(&n.shear[k], pressure, moved);
+            sum += node_stiffness(facing, n.area[k], slope, &r)[0][0];
+        });
+        sum
     }
 }

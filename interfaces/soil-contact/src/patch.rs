@@ -3,6 +3,7 @@
 //! Built once per step from the committed state into flat arrays, so that trials touch neither the lattice nor
 //! the allocator.
 
+use crate::assemble::dot;
 use crate::ground::Ground;
 use crate::nodes::NodeState;
 use terraglue_soil_law::{PressureCurve, PressureLaw, ShearLaw, ShearState};
@@ -50,6 +51,45 @@ impl Patch {
     }
 }
 
+/// How the underside faces the soil at a node; vectors along n, t1, t2.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Facing {
+    /// ν·n_z/ν_z with the body's inward normal ν: pressure·area acts along it on the body, and a displacement d of
+    /// the body changes the depth by −press·d, so that the force does the work that the soil takes up.
+    pub press: [f64; 3],
+    /// Unit vectors in the underside: t1 and t2 turned with n onto ν.
+    pub along: [[f64; 3]; 2],
+    /// Area of the underside over that in the tangent plane, |press|.
+    pub stretch: f64,
+}
+
+/// Smallest part of `press` along n: an underside that looks away from the soil is met edgewise.
+const EDGEWISE: f64 = 0.05;
+
+impl Facing {
+    fn new(port: &Port, slope: [f64; 2]) -> Self {
+        let n_z = port.frame[2];
+        let inward = [-slope[0] * n_z, -slope[1] * n_z, n_z];
+        let mut press: [f64; 3] = std::array::from_fn(|c| dot(port.direction(c), inward));
+        press[0] = press[0].max(EDGEWISE);
+        let stretch = dot(press, press).sqrt();
+        let nu = press.map(|c| c / stretch);
+        let turned = |c: usize| {
+            let s = nu[c] / (1.0 + nu[0]);
+            let mut e = [-s * (1.0 + nu[0]), -s * nu[1], -s * nu[2]];
+            e[c] += 1.0;
+            e
+        };
+        Self { press, along: [turned(1), turned(2)], stretch }
+    }
+
+    /// Displacement along the underside.
+    #[inline]
+    pub fn slide(&self, moved: [f64; 3]) -> [f64; 2] {
+        self.along.map(|e| dot(e, moved))
+    }
+}
+
 /// The nodes of all patches, one array per quantity.
 #[derive(Clone, Debug, Default)]
 pub struct PatchNodes {
@@ -67,6 +107,8 @@ pub struct PatchNodes {
     pub area: Vec<f64>,
     /// From the port's origin to the underside at the node along n, t1, t2, m.
     pub arm: Vec<[f64; 3]>,
+    /// How the underside faces the soil.
+    pub facing: Vec<Facing>,
     /// Shear history.
     pub shear: Vec<ShearState>,
     /// Depth with the rotation of a trial; scratch.
@@ -83,6 +125,7 @@ impl PatchNodes {
         self.area.clear();
         self.arm.clear();
         self.shear.clear();
+        self.facing.clear();
     }
 
     /// Room for `count` nodes, so that later steps do not allocate.
@@ -90,6 +133,7 @@ impl PatchNodes {
         self.index.reserve(count);
         self.arm.reserve(count);
         self.shear.reserve(count);
+        self.facing.reserve(count);
         for v in [
             &mut self.depth,
             &mut self.z_max,
@@ -193,6 +237,7 @@ impl Patches {
         nodes.area.push(node.area / n_z);
         nodes.arm.push([along(0), along(1), along(2)]);
         nodes.shear.push(state.shear);
+        nodes.facing.push(Facing::new(port, node.slope));
     }
 
     /// Where two ports cover a node, the deeper one presses; the other one's area there becomes 0.
@@ -220,11 +265,13 @@ impl Patches {
         let patch = &self.ports[p];
         let (mut highest, mut strength) = (f64::NEG_INFINITY, 0.0);
         for k in patch.nodes.clone().filter(|k| self.nodes.area[*k] > 0.0) {
-            highest = highest.max(self.nodes.depth[k] - self.nodes.permanent[k]);
+            highest =
+                highest.max((self.nodes.depth[k] - self.nodes.permanent[k]) / self.nodes.facing[k].press[0]);
             let (pressure, _) = patch.curve.at(self.nodes.depth[k], self.nodes.z_max[k], self.nodes.p_max[k]);
             if pressure > 0.0 {
                 let mobilised = shear.mobilised(self.nodes.shear[k].slip);
-                strength += self.nodes.area[k] * shear.strength(pressure).0 * mobilised;
+                let inclined = self.nodes.area[k] * self.nodes.facing[k].stretch;
+                strength += inclined * shear.strength(pressure).0 * mobilised;
             }
         }
         let patch = &mut self.ports[p];

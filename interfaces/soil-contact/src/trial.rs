@@ -47,7 +47,7 @@ impl Last {
             if wrench[0] > 0.0 {
                 patches.ports[p].pack(&patches.ports[p].unpack(motion.v), out.v);
             } else {
-                surface[0] = patches.surface_under(p, 0.0, &x);
+                surface[0] = patches.surface_under(p, 0.0, &x, shear);
             }
             patches.ports[p].pack(&surface, out.x);
             patches.ports[p].pack(&wrench, out.t);
@@ -72,7 +72,7 @@ impl Last {
         for p in 0..patches.ports.len() {
             let force = patches.ports[p].unpack(t)[0].max(0.0);
             let mut x = motion.map_or([0.0; 6], |m| patches.ports[p].unpack(m.x));
-            x[0] = patches.surface_under(p, force, &x);
+            x[0] = patches.surface_under(p, force, &x, shear);
             let mut wrench = patches.wrench(p, &x, shear);
             wrench[0] = force;
             patches.ports[p].pack(&x, out.x);
@@ -104,7 +104,7 @@ impl Last {
             let k = patches.stiffness(p, &self.x[p], shear);
             let block = match self.kind {
                 Kind::Motion => k,
-                kind => hybrid(&k, self.normal_stiffness(patches, p, &k), kind == Kind::Hybrid),
+                kind => hybrid(&k, self.normal_stiffness(patches, p, &k, shear), kind == Kind::Hybrid),
             };
             scatter(&patches.ports[p], &block, n, out);
         }
@@ -112,13 +112,13 @@ impl Last {
     }
 
     /// dW_n/dX_n, that of a small force where the foot carries none.
-    fn normal_stiffness(&self, patches: &mut Patches, p: usize, k: &Stiffness) -> f64 {
+    fn normal_stiffness(&self, patches: &mut Patches, p: usize, k: &Stiffness, shear: &ShearLaw) -> f64 {
         if self.normal[p] >= SMALLEST_FORCE_N && k[0][0] > 0.0 {
             return k[0][0];
         }
         let mut x = self.x[p];
-        x[0] = patches.surface_under(p, SMALLEST_FORCE_N, &x);
-        patches.normal_stiffness(p, &x)
+        x[0] = patches.surface_under(p, SMALLEST_FORCE_N, &x, shear);
+        patches.normal_stiffness(p, &x, shear)
     }
 }
 

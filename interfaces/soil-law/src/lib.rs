@@ -14,5 +14,5 @@ pub use batch::{pressures, total_force};
 pub use parameters::{DEFAULT_ELASTIC_STIFFNESS, Family, SoilParameters};
 pub use pressure::{PRESSURE_LAWS, PressureCurve, PressureLaw};
 pub use shear::{ShearLaw, ShearResponse, ShearState};
-pub use slip_sinkage::{SLIP_SINKAGES, SlipSinkage};
+pub use slip_sinkage::SlipSinkage;
 pub use table::{COLUMNS, SoilRow, SoilTable, TableError};

@@ -2,7 +2,6 @@
 
 use crate::pressure::{PRESSURE_LAWS, PressureLaw};
 use crate::shear::ShearLaw;
-use crate::slip_sinkage::{SLIP_SINKAGES, SlipSinkage};
 use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};
 
 /// Elastic stiffness of unloading where a scenario is silent, Pa/m.
@@ -24,19 +23,12 @@ pub struct SoilParameters {
     pub c_pa: f64,
     /// Angle of internal friction, rad.
     pub phi_rad: f64,
-    /// Shear deformation modulus, m; along the way of a rolling contact.
+    /// Shear deformation modulus, m.
     pub K_m: f64,
-    /// Shear deformation modulus across the way of a rolling contact, m.
-    pub K_across_m: f64,
     /// Bulk density where known, kg/m³.
     pub density_kg_m3: Option<f64>,
     /// Stiffness of unloading and reloading, Pa/m.
     pub elastic_stiffness_pa_m: f64,
-    /// How slip deepens the sinkage.
-    pub slip_sinkage: SlipSinkage,
-    /// Place of the largest stress under a rolling contact as a share of the entry angle, (a_0, a_1) of
-    /// (a_0 + a_1·s)·θ_f (Wong and Reece 1967); 0: at the lowest point, where the depth is largest.
-    pub stress_peak: [f64; 2],
     /// Acceleration of gravity, m/s²: makes a weight of the density.
     pub gravity: f64,
 }
@@ -90,9 +82,6 @@ impl SoilParameters {
             number("c_pa", "Pa", "cohesion").within(0.0, 1e7),
             number("phi_rad", "rad", "angle of internal friction").within(0.01, 1.2),
             number("K_m", "m", "shear deformation modulus of Janosi and Hanamoto").positive(),
-            number("K_across_m", "m", "the same across the way of a wheel; K_m where it is left out")
-                .positive()
-                .optional(),
             number("density_kg_m3", "kg/m^3", "bulk density").positive().optional(),
             Parameter::number(
                 "elastic_stiffness_pa_m",
@@ -101,17 +90,6 @@ impl SoilParameters {
                 "stiffness of unloading and reloading",
             )
             .positive(),
-            text("slip_sinkage", "how slip deepens the sinkage").or(SLIP_SINKAGES[0]).choices(&SLIP_SINKAGES),
-            number("slip_exponent", "", "ding: n_1 of n = n_0 + n_1 s").within(0.0, 3.0).optional(),
-            Parameter::number(
-                "stress_peak_a0",
-                "",
-                0.0,
-                "wheels: the largest stress lies at (a0 + a1 s) times the entry angle (Wong and Reece)",
-            )
-            .within(0.0, 0.9),
-            Parameter::number("stress_peak_a1", "", 0.0, "wheels: growth of that share with the slip s")
-                .within(-0.9, 0.9),
         ]
     }
 
@@ -119,7 +97,6 @@ impl SoilParameters {
     /// one is needed.
     pub fn from_config(config: &Config, gravity: f64) -> Result<Self> {
         let number = |name| config.optional_number(name);
-        let modulus = config.number("K_m")?;
         let parameters = Self {
             family: Family::from_config(config)?,
             n: config.number("n")?,
@@ -127,12 +104,9 @@ impl SoilParameters {
             k_phi: number("k_phi")?.unwrap_or(0.0),
             c_pa: config.number("c_pa")?,
             phi_rad: config.number("phi_rad")?,
-            K_m: modulus,
-            K_across_m: number("K_across_m")?.unwrap_or(modulus),
+            K_m: config.number("K_m")?,
             density_kg_m3: number("density_kg_m3")?,
             elastic_stiffness_pa_m: number("elastic_stiffness_pa_m")?.unwrap_or(DEFAULT_ELASTIC_STIFFNESS),
-            slip_sinkage: slip_sinkage(config)?,
-            stress_peak: [number("stress_peak_a0")?.unwrap_or(0.0), number("stress_peak_a1")?.unwrap_or(0.0)],
             gravity,
         };
         parameters.check().map(|()| parameters)
@@ -144,7 +118,6 @@ impl SoilParameters {
             ("n", self.n),
             ("phi_rad", self.phi_rad),
             ("K_m", self.K_m),
-            ("K_across_m", self.K_across_m),
             ("elastic_stiffness_pa_m", self.elastic_stiffness_pa_m),
         ] {
             if !(value.is_finite() && value > 0.0) {
@@ -221,15 +194,6 @@ fn weighed(config: &Config, name: &str) -> Result<f64> {
         return Err(Error::Refused(text));
     }
     Ok(value)
-}
-
-fn slip_sinkage(config: &Config) -> Result<SlipSinkage> {
-    match config.get("slip_sinkage").and_then(|v| v.as_str()).unwrap_or(SLIP_SINKAGES[0]) {
-        "none" => Ok(SlipSinkage::None),
-        "ding" => Ok(SlipSinkage::Ding { n1: config.number("slip_exponent")? }),
-        "lyasko" => Ok(SlipSinkage::Lyasko),
-        other => Err(unknown("slip_sinkage", other, &SLIP_SINKAGES)),
-    }
 }
 
 fn unknown(key: &str, value: &str, known: &[&str]) -> Error {

@@ -1,8 +1,5 @@
 //! Slip sinkage: a contact that slips digs itself in, so the pressure law softens with the slip.
 
-/// Names of the models as a scenario writes them.
-pub const SLIP_SINKAGES: [&str; 3] = ["none", "ding", "lyasko"];
-
 /// How the law of first loading depends on the slip s of a contact, 0 ≤ s ≤ 1.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 #[non_exhaustive]
@@ -30,11 +27,6 @@ impl SlipSinkage {
             Self::Ding { n1 } => (modulus, n + n1 * s),
             Self::Lyasko => (modulus * libm::pow((1.0 - 0.5 * s) / (1.0 + s), n), n),
         }
-    }
-
-    /// Whether the law depends on the slip.
-    pub fn is_active(&self) -> bool {
-        !matches!(self, Self::None)
     }
 }
 

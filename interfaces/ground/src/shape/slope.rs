@@ -4,8 +4,8 @@ use super::Placed;
 use crate::math::dot;
 use terraglue_subsystem::Geometry;
 
-/// Largest slope that is reported (84°); the side of a shape is a wall and no underside.
-pub const STEEPEST_SLOPE: f64 = 10.0;
+/// Largest slope that is reported (72°); the side of a shape is a wall and no underside.
+pub const STEEPEST_SLOPE: f64 = 3.0;
 
 /// Faces whose distance from the point differs by less than this (m) count as equally near: an edge.
 const EDGE: f64 = 1e-9;

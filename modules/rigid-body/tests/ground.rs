@@ -3,6 +3,7 @@
 
 mod common;
 use common::{Rig, STAND, temporary_urdf};
+use proptest::prelude::*;
 
 const G: f64 = 9.81;
 
@@ -161,4 +162,33 @@ fn an_unknown_ground_is_refused() {
     };
     let text = refused(r#""ground": "half-space", "ground_normal": [0, 0, 0]"#);
     assert!(text.contains("ground_normal"), "{text}");
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig { cases: 12, failure_persistence: None, ..ProptestConfig::default() })]
+
+    #[test]
+    fn what_is_dropped_never_gains_energy(
+        seed in prop::collection::vec((0.05..0.2_f64, 0.1..10.0_f64, any::<bool>()), 2..4),
+        spin in -300.0..300.0_f64,
+    ) {
+        let mut z = 0.1;
+        let bodies: Vec<_> = seed.iter().enumerate().map(|(k, (size, mass, ball))| {
+            let name = format!("b{k}");
+            z += 0.3;
+            (if *ball { sphere_link(&name, *mass, *size) } else { box_link(&name, *mass, [*size, 0.1, 0.15]) }, z)
+        }).collect();
+        let mut rig = loose("dropped", &bodies, "");
+        rig.push("b0", [spin, 0.5 * spin, 0.0]);
+        rig.free_step();
+        rig.push("b0", [0.0; 3]);
+        let mut before = rig.robot.energy().mechanical();
+        for _ in 0..500 {
+            rig.free_step();
+            let after = rig.robot.energy().mechanical();
+            prop_assert!(after.is_finite() && after - before < 1e-3 * (1.0 + before.abs()), "{before} {after}");
+            before = after;
+        }
+        prop_assert!(rig.states().iter().skip(1).all(|b| b.world_from_body.position[2] > -1e-2));
+    }
 }

@@ -74,6 +74,8 @@ pub struct Testbed {
     t: f64,
     last_h: f64,
     halvings: u32,
+    hold: terraglue_subsystem::Hold,
+    started: bool,
 }
 
 /// Where a testbed stood; see [`Testbed::snapshot`].
@@ -115,6 +117,10 @@ impl Testbed {
 
     /// Goes to the next nominal communication point t + h.
     pub fn step(&mut self) -> Result {
+        if self.index == 0 && self.t == 0.0 && !self.started {
+            self.started = true;
+            self.start_joints()?;
+        }
         let end = (self.nominal + 1) as f64 * self.step_s;
         let mut h = self.step_s;
         self.halvings = 0;
@@ -140,6 +146,22 @@ impl Testbed {
         self.nominal += 1;
         self.t = end;
         Ok(())
+    }
+
+    /// The forces of joints and the accelerations at the start: a step of h = 0.
+    fn start_joints(&mut self) -> Result {
+        let joints =
+            self.group.as_ref().is_some_and(|g| g.strategy.starts_joints() && g.exchange.glue.has_joints());
+        if !joints {
+            return Ok(());
+        }
+        match self.glue(0.0)? {
+            Outcome::Converged => Ok(()),
+            Outcome::NotConverged(why) => {
+                let message = format!("at the start, for the forces of the joints: {why}");
+                Err(Error::Simulation { time_s: self.t, message })
+            }
+        }
     }
 
     /// (1) What the time line has for this communication point.
@@ -178,12 +200,13 @@ impl Testbed {
 
     /// (4) The group of glued subsystems: the five steps of the paper.
     fn glue(&mut self, h: f64) -> Result<Outcome> {
-        let at = Instant { t: self.t, h, index: self.index, trial: 0, epoch: 0 };
+        let at = Instant { t: self.t, h, index: self.index, hold: self.hold, ..Instant::default() };
         let start = Clock::now();
         // step 1: collision detection and the constraints of rigid contact
         self.detect_contacts(h)?;
         let Some(group) = &mut self.group else { return Ok(Outcome::Converged) };
-        let (ports, instances) = (self.detector.ports(), &mut self.instances);
+        let (ports, instances, members) = (self.detector.ports(), &mut self.instances, &self.members);
+        group.exchange.glue.place(|slot, body| members[slot].states[body as usize]);
         group.exchange.begin(at, ports);
         self.timings.charge(Part::Contact, start);
         group.exchange.set_ports(instances)?;
@@ -425,6 +448,9 @@ impl Group {
     fn measure_gap(&mut self) {
         let exchange = &mut self.exchange;
         for port in &exchange.ports {
+            if exchange.rows[port.first as usize] == gluing::Row::Joint {
+                continue; // the strategy itself measures the gap of joints
+            }
             if self.closed.binary_search(&port.key).is_ok() {
                 let gap = exchange.x2[port.first as usize].abs();
                 exchange.report.max_gap_m = exchange.report.max_gap_m.max(gap);
@@ -438,12 +464,14 @@ impl Group {
         exchange.report.halvings = halvings;
         self.closed.clear();
         let mut work = 0.0;
-        for (port, owner) in exchange.ports.iter().zip(&found.owners) {
+        for (p, port) in exchange.ports.iter().enumerate() {
+            let owner =
+                found.owners.get(p).copied().unwrap_or_else(|| exchange.glue.owner(p - found.owners.len()));
             let n = port.first as usize;
             let mut wrench = [0.0; 6];
             for (i, c) in port.components() {
                 wrench[c] = exchange.t[i];
-                work += exchange.t[i] * (exchange.x1[i] - exchange.x2[i]);
+                work += exchange.t[i] * (exchange.x1[i] - exchange.x2[i] + exchange.gap[i]);
             }
             if wrench[0] > 0.0 {
                 self.closed.push(port.key);
@@ -460,7 +488,7 @@ impl Group {
                 frame: port.frame,
                 wrench,
                 t_star_n,
-                gap_m: exchange.x1[n] - exchange.x2[n],
+                gap_m: exchange.x1[n] - exchange.x2[n] + exchange.gap[n],
             });
         }
         exchange.report.interface_work_error_j = work.abs();

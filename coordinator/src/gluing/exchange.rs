@@ -1,18 +1,30 @@
 //! The group's side of the exchange: packed vectors over all ports and the paper's calls on all members.
 
 use super::estimate::RigidContact;
+use super::glue::{Glue, Row};
 use super::group_estimate::GroupEstimate;
 use super::report::StepReport;
-use super::side::{Answer, Instant, Side};
+use super::side::{Answer, End, Instant, Side};
 use crate::Result;
 use crate::contact::PortSet;
 use crate::host::Instance;
 use crate::timing::{Part, Timings};
 use std::time::Instant as Clock;
-use terraglue_subsystem::{Capabilities, Node, Port, cooperation};
+use terraglue_subsystem::{Capabilities, Level, Node, Port, cooperation};
+
+/// Where the bodies' interface Jacobian comes from.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Derivatives {
+    /// The modules' own, by differences where one has none.
+    Analytic,
+    /// Central differences: the directional derivative along every component.
+    Central,
+    /// Forward differences, all columns in one exchange.
+    Forward,
+}
 
 /// Subsystems glued to each other, with everything that one step passes between them.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct Exchange {
     /// Time and trial.
     pub at: Instant,
@@ -35,9 +47,28 @@ pub struct Exchange {
     pub x1: Vec<f64>,
     /// Velocity of the bodies at the last trial.
     pub v1: Vec<f64>,
+    /// Velocity of side 2 of joints at the last trial.
+    pub v2: Vec<f64>,
+    /// Accelerations of both sides of joints at the last trial.
+    pub a1: Vec<f64>,
+    /// The same of side 2.
+    pub a2: Vec<f64>,
+    /// What every component is.
+    pub rows: Vec<Row>,
+    /// Where the points of both sides of a joint lay apart at t, packed.
+    pub gap: Vec<f64>,
+    /// Glue of the scenario.
+    pub glue: Glue,
+    /// Level of the condition at joints.
+    pub level: Level,
+    /// Share of the position error taken out per step at velocity level.
+    pub stabilisation: f64,
     /// T, X1 and V1 of the last trial of the bodies.
     base: [Vec<f64>; 3],
     zeros: Vec<f64>,
+    /// Committed wrench of every port of the step before, by key.
+    pub last: Vec<(u64, [f64; 6])>,
+    work: Vec<f64>,
     rigid: RigidContact,
     /// Where the time went.
     pub timings: Timings,
@@ -51,10 +82,34 @@ impl Exchange {
     /// A group of bodies and grounds, given by their instance indices.
     pub fn new(bodies: &[usize], grounds: &[usize], t_ref: f64) -> Self {
         Self {
-            bodies: bodies.iter().map(|s| Side::new(*s, 1)).collect(),
-            grounds: grounds.iter().map(|s| Side::new(*s, -1)).collect(),
+            bodies: bodies.iter().map(|s| Side::new(*s)).collect(),
+            grounds: grounds.iter().map(|s| Side::new(*s)).collect(),
             t_ref,
-            ..Self::default()
+            at: Instant::default(),
+            ports: Vec::new(),
+            nodes: Vec::new(),
+            estimate: GroupEstimate::default(),
+            x2: Vec::new(),
+            f_law: Vec::new(),
+            t: Vec::new(),
+            f: Vec::new(),
+            x1: Vec::new(),
+            v1: Vec::new(),
+            v2: Vec::new(),
+            a1: Vec::new(),
+            a2: Vec::new(),
+            rows: Vec::new(),
+            gap: Vec::new(),
+            glue: Glue::default(),
+            level: Level::Position,
+            stabilisation: 0.0,
+            base: Default::default(),
+            zeros: Vec::new(),
+            last: Vec::new(),
+            work: Vec::new(),
+            rigid: RigidContact::default(),
+            timings: Timings::default(),
+            report: StepReport::default(),
         }
     }
 
@@ -83,17 +138,33 @@ impl Exchange {
         self.at = Instant { epoch: found.epoch, ..at };
         self.ports.clear();
         self.ports.extend_from_slice(&found.ports);
+        let found_ports = found.ports.len();
+        self.glue.append(&mut self.ports);
         self.nodes.clear();
         self.nodes.extend_from_slice(&found.nodes);
         let n = self.ports.iter().map(Port::len).sum();
-        let owners = &found.owners;
-        for side in &mut self.bodies {
-            let slot = side.slot as u32;
-            side.take_ports(&self.ports, |p| (owners[p].subsystem == slot).then_some(owners[p].body));
+        let (owners, glue) = (&found.owners, &self.glue);
+        let ends = |p: usize, slot: usize, ground: bool, origin: [f64; 3]| match owners.get(p) {
+            Some(o) if !ground => {
+                (o.subsystem as usize == slot).then_some(End { side: 1, body: o.body, origin })
+            }
+            Some(o) => (o.ground as usize == slot).then_some(End { side: -1, body: 0, origin }),
+            None => glue.end_of(p - found_ports, slot),
+        };
+        for (sides, ground) in [(&mut self.bodies, false), (&mut self.grounds, true)] {
+            for side in sides {
+                let (slot, ports) = (side.slot, &self.ports);
+                side.take_ports(ports, |p| ends(p, slot, ground, ports[p].origin));
+            }
         }
-        for side in &mut self.grounds {
-            let slot = side.slot as u32;
-            side.take_ports(&self.ports, |p| (owners[p].ground == slot).then_some(0));
+        self.rows.clear();
+        self.gap.clear();
+        for (p, port) in self.ports.iter().enumerate() {
+            let glued = p.checked_sub(found_ports).and_then(|k| glue.joint(k));
+            for (_, c) in port.components() {
+                self.rows.push(glued.map_or(if c == 0 { Row::Normal } else { Row::Law }, |j| j.row(c)));
+                self.gap.push(glued.map_or(0.0, |j| j.gap(port, c)));
+            }
         }
         let e = &mut self.estimate;
         for buffer in [
@@ -105,6 +176,9 @@ impl Exchange {
             &mut self.f,
             &mut self.x1,
             &mut self.v1,
+            &mut self.v2,
+            &mut self.a1,
+            &mut self.a2,
             &mut self.zeros,
         ] {
             buffer.clear();
@@ -204,8 +278,12 @@ impl Exchange {
         let start = Clock::now();
         self.at.trial += 1;
         for side in &mut self.bodies {
-            let out = Answer { x: Some(&mut self.x1), v: Some(&mut self.v1), t: None };
-            side.advance_under_force(&mut instances[side.slot], &self.nodes, &self.at, &self.t, None, out)?;
+            let instance = &mut instances[side.slot];
+            side.advance_under_force(instance, &self.nodes, &self.at, &self.t, None, Answer::default())?;
+            side.motion_by_side(
+                [&mut self.x1, &mut self.v1, &mut self.a1],
+                [&mut self.x2, &mut self.v2, &mut self.a2],
+            );
         }
         for (base, value) in self.base.iter_mut().zip([&self.t, &self.x1, &self.v1]) {
             base.clear();
@@ -230,6 +308,165 @@ impl Exchange {
                 *v += rate * g * change;
             }
         }
+    }
+
+    /// x1 − x2 with the distance of the points at t, of the rows that are not a soil's law; at h = 0 and at the
+    /// velocity level the derivative that the condition speaks of. T/k_c of a compliant glue is added.
+    pub fn mismatch(&self, i: usize, compliance: f64) -> f64 {
+        let position = self.x1[i] - self.x2[i] + self.gap[i];
+        let compliant = compliance * self.t[i];
+        if self.at.h == 0.0 {
+            return if compliance > 0.0 { position + compliant } else { self.a1[i] - self.a2[i] };
+        }
+        match self.level {
+            Level::Velocity if self.rows[i] == Row::Joint => {
+                self.v1[i] - self.v2[i] + (self.stabilisation * self.gap[i] + compliant) / self.at.h
+            }
+            _ => position + compliant,
+        }
+    }
+
+    /// Level of the interface Jacobian that fits [`Exchange::mismatch`].
+    fn level_now(&self) -> Level {
+        if self.at.h == 0.0 { Level::Acceleration } else { self.level }
+    }
+
+    /// Compliance of the glue by component, as it enters the derivative of [`Exchange::mismatch`].
+    pub fn glue_compliance(&self, port: &Port) -> f64 {
+        match self.level_now() {
+            Level::Velocity => port.law.compliance / self.at.h,
+            _ => port.law.compliance,
+        }
+    }
+
+    /// Whether the bodies' Jacobian comes from their trials: no member estimates contact forces where joints or
+    /// contacts other than with a soil are glued.
+    pub fn needs_linearisation(&self) -> bool {
+        self.rows.iter().any(|r| matches!(r, Row::Joint | Row::Coulomb)) || self.grounds.is_empty()
+    }
+
+    /// Whether a soil is among the members.
+    pub fn has_grounds(&self) -> bool {
+        !self.grounds.is_empty()
+    }
+
+    /// T of the step before at joints; at contacts the soil's own force, as the step before lands on the wrong
+    /// side of the unloading kink by rounding.
+    pub fn start_from_last(&mut self) {
+        for port in &self.ports {
+            for (i, _) in port.components() {
+                let joint = matches!(self.rows[i], Row::Joint | Row::Coulomb) || self.grounds.is_empty();
+                self.t[i] = if joint {
+                    self.last
+                        .iter()
+                        .find(|(key, _)| *key == port.key)
+                        .map_or(0.0, |(_, t)| t[i - port.first as usize])
+                } else {
+                    self.f_law[i]
+                };
+            }
+        }
+    }
+
+    /// Whether subsystems share joints; else all ports are contacts found or declared.
+    pub fn has_joints(&self) -> bool {
+        self.rows.contains(&Row::Joint)
+    }
+
+    /// d(x1 − x2)/dT of all bodies at their last trial into `estimate.g`, from the modules' derivatives.
+    pub fn linearise_bodies(&mut self, source: Derivatives, instances: &mut [Instance]) -> Result {
+        let start = Clock::now();
+        let level = self.level_now();
+        self.estimate.g.fill(0.0);
+        let mut complete = source == Derivatives::Analytic;
+        for side in &mut self.bodies {
+            if complete {
+                let (instance, g) = (&mut instances[side.slot], &mut self.estimate.g);
+                complete = side.add_compliance(instance, &self.nodes, &self.at, level, g)?;
+            }
+        }
+        if !complete {
+            self.difference_trials(source == Derivatives::Central, instances)?;
+        }
+        for i in (0..self.n()).filter(|_| self.at.h == 0.0) {
+            let port = self.ports.iter().find(|p| p.range().contains(&i));
+            if port.is_some_and(|p| p.law.compliance > 0.0) {
+                // a spring's force at t is given by positions alone
+                let n = self.n();
+                (0..n).for_each(|c| self.estimate.g[c * n + i] = 0.0);
+            }
+        }
+        self.report.jacobian_refreshes += 1;
+        self.timings.charge(Part::Jacobian, start);
+        Ok(())
+    }
+
+    /// The same by differences of trials: δT = 1e-6·max(1, |T|), forward or central. The bodies' last trial is
+    /// then another one: a strategy advances them again before it ends.
+    fn difference_trials(&mut self, central: bool, instances: &mut [Instance]) -> Result {
+        let n = self.n();
+        let answers = |e: &Self| -> Vec<f64> { (0..n).map(|i| e.mismatch(i, 0.0)).collect() };
+        let kept = (self.t.clone(), answers(self), self.report.evaluations_bodies);
+        let saved = [&self.x1, &self.v1, &self.a1, &self.x2, &self.v2, &self.a2].map(Clone::clone);
+        for column in 0..n {
+            let delta = 1e-6 * kept.0[column].abs().max(1.0);
+            self.t[column] = kept.0[column] + delta;
+            self.advance_bodies(instances)?;
+            let plus = answers(self);
+            let (minus, width) = if central {
+                self.t[column] = kept.0[column] - delta;
+                self.advance_bodies(instances)?;
+                (answers(self), 2.0 * delta)
+            } else {
+                (kept.1.clone(), delta)
+            };
+            self.t[column] = kept.0[column];
+            for row in 0..n {
+                self.estimate.g[column * n + row] = (plus[row] - minus[row]) / width;
+            }
+        }
+        self.report.evaluations_jacobian += self.report.evaluations_bodies - kept.2;
+        self.report.evaluations_bodies = kept.2;
+        let [x1, v1, a1, x2, v2, a2] = saved;
+        (self.x1, self.v1, self.a1, self.x2, self.v2, self.a2) = (x1, v1, a1, x2, v2, a2);
+        Ok(())
+    }
+
+    /// A trial of the bodies that stand on side 1 only, under T.
+    pub fn advance_first_under_force(&mut self, instances: &mut [Instance]) -> Result {
+        self.at.trial += 1;
+        for side in self.bodies.iter_mut().filter(|s| !s.is_second()) {
+            let instance = &mut instances[side.slot];
+            side.advance_under_force(instance, &self.nodes, &self.at, &self.t, None, Answer::default())?;
+            side.motion_by_side(
+                [&mut self.x1, &mut self.v1, &mut self.a1],
+                [&mut self.x2, &mut self.v2, &mut self.a2],
+            );
+        }
+        self.report.evaluations_bodies += 1;
+        Ok(())
+    }
+
+    /// A trial of all side 2, bodies and soils, under the motion X1: the wrench that it takes goes to `f`.
+    pub fn advance_second_under_motion(&mut self, instances: &mut [Instance]) -> Result {
+        if !self.grounds.is_empty() {
+            self.advance_grounds_under_motion(instances)?;
+        }
+        // the partner's motion from its own origin
+        self.work.clear();
+        self.work.extend(self.x1.iter().zip(&self.gap).map(|(x, gap)| x + gap));
+        for side in self.bodies.iter_mut().filter(|s| s.is_second()) {
+            let partner = (self.work.as_slice(), self.v1.as_slice());
+            let out = Answer { t: Some(&mut self.f), ..Answer::default() };
+            side.advance_under_motion(&mut instances[side.slot], &self.nodes, &self.at, partner, out)?;
+        }
+        self.x2.copy_from_slice(&self.work);
+        Ok(())
+    }
+
+    /// Bodies on side 2, which `advance_second_under_motion` drives.
+    pub fn second_slots(&self) -> impl Iterator<Item = usize> + '_ {
+        self.bodies.iter().filter(|s| s.is_second()).map(|s| s.slot).chain(self.ground_slots())
     }
 
     /// A trial of the grounds under the motion X1: the wrench of their law goes to `f`.
@@ -354,6 +591,12 @@ impl Exchange {
             side.commit(&mut instances[side.slot], &self.nodes, &self.at, &self.t, partner)?;
         }
         self.timings.charge(Part::CommitGrounds, start);
+        self.last.clear();
+        for port in &self.ports {
+            let mut wrench = [0.0; 6];
+            wrench[..port.len()].copy_from_slice(&self.t[port.range()]);
+            self.last.push((port.key, wrench));
+        }
         Ok(())
     }
 }

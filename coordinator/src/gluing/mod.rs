@@ -9,15 +9,18 @@ mod complementarity;
 pub mod cooperative;
 mod estimate;
 mod exchange;
+pub mod glue;
 mod group_estimate;
 pub mod iterative;
 mod linear;
+mod refresh;
 mod report;
 mod side;
 #[cfg(test)]
 mod tests;
 
-pub use exchange::Exchange;
+pub use exchange::{Derivatives, Exchange};
+pub use glue::{Glue, Row};
 pub use group_estimate::GroupEstimate;
 pub use report::{PortReport, StepReport};
 pub use side::Instant;
@@ -45,6 +48,16 @@ pub trait Strategy: Send {
 
     /// What a member on the side of the bodies and one on the side of the grounds must be able to do.
     fn needs(&self) -> (Capabilities, Capabilities);
+
+    /// Whether it solves a step of h = 0 for the forces of joints at the start.
+    fn starts_joints(&self) -> bool {
+        false
+    }
+
+    /// Why it cannot glue this group, whatever its members can do.
+    fn refuses(&self, _exchange: &Exchange) -> Option<String> {
+        None
+    }
 
     /// Finds the wrenches of the step.
     fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome>;

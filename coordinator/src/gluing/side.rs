@@ -3,10 +3,12 @@
 
 use crate::Result;
 use crate::host::{Instance, Progress};
-use terraglue_subsystem::{Capabilities, Estimate, Input, Law, Level, Motion, Node, Port, Response, Step};
+use terraglue_subsystem::{
+    Capabilities, Estimate, Hold, Input, Law, Level, Motion, Node, Port, Response, Step,
+};
 
 /// Time and number of the present trial.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct Instant {
     /// Start of the step, s.
     pub t: f64,
@@ -18,6 +20,25 @@ pub struct Instant {
     pub trial: u32,
     /// Epoch of the set of ports.
     pub epoch: u32,
+    /// How T runs inside the step.
+    pub hold: Hold,
+}
+
+impl Default for Instant {
+    fn default() -> Self {
+        Self { t: 0.0, h: 0.0, index: 0, trial: 0, epoch: 0, hold: super::HOLD }
+    }
+}
+
+/// One end of a port: which side it is, and the material point in its own subsystem.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct End {
+    /// +1: T acts on it; −1: −T does.
+    pub side: i32,
+    /// Body, cell or terminal.
+    pub body: u32,
+    /// World place of the point at t, m.
+    pub origin: [f64; 3],
 }
 
 /// A member of a group with its buffers; all are reused from step to step.
@@ -25,8 +46,10 @@ pub struct Instant {
 pub struct Side {
     /// Index of the instance in the testbed.
     pub slot: usize,
-    /// +1: bodies, on which T acts; −1: grounds, on which −T acts.
-    pub sign: i32,
+    /// Whether −T acts on it at every port.
+    second: bool,
+    /// Sign of T on it by own component.
+    signs: Vec<f64>,
     ports: Vec<Port>,
     /// Group port of each own port.
     port_index: Vec<usize>,
@@ -46,8 +69,13 @@ pub struct Side {
 
 impl Side {
     /// A member without ports yet.
-    pub fn new(slot: usize, sign: i32) -> Self {
-        Self { slot, sign, ..Self::default() }
+    pub fn new(slot: usize) -> Self {
+        Self { slot, ..Self::default() }
+    }
+
+    /// Whether −T acts on it at every port: it can be driven by the motion of its partners.
+    pub fn is_second(&self) -> bool {
+        self.second
     }
 
     /// Number of own components.
@@ -56,18 +84,22 @@ impl Side {
     }
 
     /// Takes from the group's ports those of this member.
-    pub fn take_ports(&mut self, group: &[Port], belongs: impl Fn(usize) -> Option<u32>) {
+    /// `belongs` answers which side of a port this member is: +1 or −1, with its body and origin there.
+    pub fn take_ports(&mut self, group: &[Port], belongs: impl Fn(usize) -> Option<End>) {
         self.ports.clear();
         self.port_index.clear();
         self.index.clear();
+        self.signs.clear();
         for (p, port) in group.iter().enumerate() {
-            if let Some(body) = belongs(p) {
+            if let Some(End { side, body, origin }) = belongs(p) {
                 let first = self.index.len() as u32;
-                self.ports.push(Port { side: self.sign, first, body, ..*port });
+                self.ports.push(Port { side, first, body, origin, ..*port });
+                self.signs.extend(port.range().map(|_| f64::from(side)));
                 self.port_index.push(p);
                 self.index.extend(port.range());
             }
         }
+        self.second = !self.ports.is_empty() && self.ports.iter().all(|p| p.side < 0);
         let n = self.n();
         for buffer in
             [&mut self.x, &mut self.v, &mut self.a, &mut self.t, &mut self.partner_x, &mut self.partner_v]
@@ -267,7 +299,7 @@ impl Side {
         let input = match given {
             Given::Motion => Input::Motion(motion),
             Given::Force { with_motion } => {
-                Input::Force { t: &self.given_t, hold: super::HOLD, motion: with_motion.then_some(motion) }
+                Input::Force { t: &self.given_t, hold: at.hold, motion: with_motion.then_some(motion) }
             }
         };
         let step = Self::step(&self.ports, self.index.len(), nodes, at);
@@ -283,6 +315,15 @@ impl Side {
         complete(instance, "advance", progress)?;
         self.answer(out);
         Ok(())
+    }
+
+    /// Own motion after the last trial to `first` where T acts on it, to `second` where −T does.
+    pub fn motion_by_side(&self, first: [&mut [f64]; 3], second: [&mut [f64]; 3]) {
+        for ((own, first), second) in [&self.x, &self.v, &self.a].into_iter().zip(first).zip(second) {
+            for ((value, i), sign) in own.iter().zip(&self.index).zip(&self.signs) {
+                if *sign > 0.0 { first[*i] = *value } else { second[*i] = *value }
+            }
+        }
     }
 
     fn answer(&self, out: Answer) {
@@ -314,6 +355,31 @@ impl Side {
         let step = Self::step(&self.ports, n, nodes, at);
         instance.interface_jacobian(&step, Level::Position, &mut self.matrix)?;
         self.scatter_matrix(out);
+        Ok(true)
+    }
+
+    /// Adds the module's own Jacobian at the last trial to d(x1 − x2)/dT of the group; `false` if it has none.
+    pub fn add_compliance(
+        &mut self,
+        instance: &mut Instance,
+        nodes: &[Node],
+        at: &Instant,
+        level: Level,
+        out: &mut [f64],
+    ) -> Result<bool> {
+        if !instance.capabilities().has(Capabilities::DERIVATIVES) {
+            return Ok(false);
+        }
+        let (n, n_group) = (self.n(), out.len().isqrt());
+        self.matrix.clear();
+        self.matrix.resize(n * n, 0.0);
+        let step = Self::step(&self.ports, n, nodes, at);
+        instance.interface_jacobian(&step, level, &mut self.matrix)?;
+        for (c, column) in self.matrix.chunks_exact(n.max(1)).enumerate() {
+            for (r, value) in column.iter().enumerate() {
+                out[self.index[c] * n_group + self.index[r]] += self.signs[r] * self.signs[c] * value;
+            }
+        }
         Ok(true)
     }
 

@@ -194,7 +194,7 @@ fn spec(strategy: &str, form: &str, start: &str) -> GluingSpec {
         tolerance: 1e-10,
         max_iterations: 60,
         start: start.into(),
-        contact_margin_m: 1e-3,
+        ..GluingSpec::default()
     }
 }
 
@@ -210,7 +210,7 @@ fn run(spec: &GluingSpec, factor: f64, h: f64, rock: bool) -> (f64, u32, f64, f6
     let steps = (duration / h).round() as u64;
     let (mut sum, mut most, mut heave) = (0, 0, 0.0);
     for index in 0..steps {
-        exchange.begin(Instant { t: index as f64 * h, h, index, trial: 0, epoch: 0 }, &found);
+        exchange.begin(Instant { t: index as f64 * h, h, index, ..Instant::default() }, &found);
         exchange.set_ports(&mut instances).expect("ports");
         let outcome = strategy.solve(&mut exchange, &mut instances).expect("no module error");
         assert_eq!(outcome, Outcome::Converged, "step {index} {:?}", exchange.report);

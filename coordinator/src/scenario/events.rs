@@ -1,7 +1,7 @@
-//! `[[connect]]` and `[[event]]`.
+//! `[[connect]]`, `[[glue]]` and `[[event]]`.
 
 use super::keys::{self, Table};
-use super::model::{Comparison, Connection, EventSpec, Trigger};
+use super::model::{Comparison, Connection, EventSpec, GlueSpec, Trigger};
 use super::node::{Node, Raw};
 use super::section::Section;
 use super::source::{InputError, Source};
@@ -23,6 +23,51 @@ pub fn connections(source: &Source, names: &[&str]) -> Checked<Vec<Connection>> 
         }
         Ok(Connection { from: s.text("from"), to: s.text("to"), span: node.extent() })
     })
+}
+
+const COMPONENTS: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
+
+/// All glue in the order of the file.
+pub fn glue(source: &Source, names: &[&str]) -> Checked<Vec<GlueSpec>> {
+    each(source, "glue", |s, node| {
+        for key in ["side_1", "side_2"] {
+            let text = s.text(key);
+            if key == "side_1" || text != "world" {
+                check_reference(&text, names).map_err(|c| s.error(key, c.message, c.help))?;
+            }
+        }
+        let contact = s.text("kind") == "contact";
+        let mu = s.number("mu");
+        Ok(GlueSpec {
+            sides: [s.text("side_1"), s.text("side_2")],
+            contact,
+            at_m: s.entry("at_m").map(|_| s.numbers("at_m")),
+            mask: if contact { if mu > 0.0 { 7 } else { 1 } } else { mask(s)? },
+            turning: s.text("axes") == "body",
+            normal: s.numbers("normal"),
+            compliance: s.number("compliance_m_n"),
+            t_max: s.optional_number("t_max_n").unwrap_or(f64::INFINITY),
+            mu,
+            span: node.extent(),
+        })
+    })
+}
+
+fn mask(s: &Section) -> Checked<u32> {
+    let names: Vec<String> = match s.value("components") {
+        Value::String(text) => vec![text],
+        Value::Array(items) => items.iter().filter_map(|v| v.as_str().map(str::to_owned)).collect(),
+        _ => COMPONENTS.map(str::to_owned).to_vec(),
+    };
+    let mut mask = 0;
+    for name in &names {
+        let Some(k) = COMPONENTS.iter().position(|c| c == name) else {
+            let help = Some(format!("components are {}", COMPONENTS.join(", ")));
+            return Err(s.error("components", format!("unknown component `{name}`"), help));
+        };
+        mask |= 1 << k;
+    }
+    if mask == 0 { Err(s.error("components", "glue that carries nothing".into(), None)) } else { Ok(mask) }
 }
 
 /// All events in the order of the file.

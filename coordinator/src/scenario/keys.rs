@@ -76,7 +76,7 @@ impl From<Parameter> for Key {
 }
 
 /// The strategies of this version.
-pub const STRATEGIES: &[&str] = &["cooperative", "iterative"];
+pub const STRATEGIES: &[&str] = &crate::gluing::STRATEGIES;
 /// The kinds of terrain of this version.
 pub const TERRAIN_KINDS: &[&str] = &["flat", "slope", "undulating", "crater", "esri-ascii", "geotiff"];
 /// Kinds of terrain that are made, not read.
@@ -86,7 +86,7 @@ pub const READ: &[&str] = &["esri-ascii", "geotiff"];
 
 /// All reserved tables in the order of the documentation.
 pub fn tables() -> Vec<Table> {
-    vec![time(), world(), terrain(), gluing(), recording(), report(), connect(), event()]
+    vec![time(), world(), terrain(), gluing(), recording(), report(), connect(), glue(), event()]
 }
 
 /// The reserved table of that name.
@@ -190,6 +190,29 @@ fn gluing() -> Table {
             .into(),
         most.or(20).within(1.0, 10_000.0).into(),
         start.or("estimate").choices(&["estimate", "zero"]).into(),
+        Parameter::of("relaxation", ParameterType::Text, "how the fixed point is accelerated (relaxed only)")
+            .or("anderson")
+            .choices(&["none", "aitken", "anderson", "broyden"])
+            .into(),
+        Parameter::of("jacobian", ParameterType::Text, "where the bodies' interface Jacobian comes from")
+            .or("analytic")
+            .choices(&["analytic", "directional", "finite-differences", "frozen"])
+            .into(),
+        Parameter::of("level", ParameterType::Text, "level of the condition at joints")
+            .or("position")
+            .choices(&["position", "velocity"])
+            .into(),
+        Parameter::of(
+            "hold",
+            ParameterType::Text,
+            "how T runs inside the step of a subsystem that sub-cycles",
+        )
+        .or("end")
+        .choices(&["end", "constant", "linear"])
+        .into(),
+        number("stabilisation", "", 0.0, "share of the position error taken out per step at velocity level")
+            .within(0.0, 1.0)
+            .into(),
         number(
             "contact_margin_m",
             "m",
@@ -229,6 +252,47 @@ fn connect() -> Table {
         text("to", "the same; its `*` take what matched in `from`").into(),
     ];
     Table { repeated: true, ..of("connect", "An output that feeds an input, once per step.", keys) }
+}
+
+fn glue() -> Table {
+    let text = |name, help| Parameter::of(name, ParameterType::Text, help);
+    let vector = |name, unit: &str, help| Parameter { unit: unit.into(), ..list(name, help).optional() };
+    let bound =
+        |name, help| Parameter { unit: "N".into(), ..Parameter::of(name, ParameterType::Number, help) };
+    let sign = text("kind", "joint: bilateral; contact: side 2 only pushes, along `normal`");
+    let keys = vec![
+        text("side_1", "`subsystem.body` on which T acts").into(),
+        text("side_2", "`subsystem.body` on which −T acts, or `world`").into(),
+        sign.or("joint").choices(&["joint", "contact"]).into(),
+        Key::from(vector(
+            "at_m",
+            "m",
+            "world point that is glued, at the start; each body's own origin where absent",
+        ))
+        .form(Form::Count(3)),
+        Key::from(text("components", "of a joint: x, y, z, rx, ry, rz; all where absent").optional())
+            .form(Form::Texts),
+        text("axes", "world: fixed axes; body: they turn with side 1")
+            .or("world")
+            .choices(&["world", "body"])
+            .into(),
+        Key::from(vector("normal", "", "of a contact, from side 2 to side 1").or(vec![0.0, 0.0, 1.0]))
+            .form(Form::Count(3)),
+        number("compliance_m_n", "m/N", 0.0, "of the glue itself: 1/stiffness of a spring")
+            .within(0.0, f64::INFINITY)
+            .into(),
+        bound("t_max_n", "largest normal force; side 2 yields there")
+            .optional()
+            .within(0.0, f64::INFINITY)
+            .into(),
+        number("mu", "", 0.0, "Coulomb coefficient of a contact; 0: the normal force only")
+            .within(0.0, f64::INFINITY)
+            .into(),
+    ];
+    Table {
+        repeated: true,
+        ..of("glue", "Two bodies glued together: a cut joint, or a contact known beforehand.", keys)
+    }
 }
 
 fn event() -> Table {

@@ -1,6 +1,6 @@
 //! From the text to the [`Scenario`].
 
-use super::events::{connections, events};
+use super::events::{connections, events, glue};
 use super::keys::{self, Table};
 use super::model::*;
 use super::nearest::did_you_mean;
@@ -49,6 +49,7 @@ impl Scenario {
         })?;
         let report = with_section(&source, "report", |s| read_report(s, &names))?;
         let connections = connections(&source, &names)?;
+        let glue = glue(&source, &names)?;
         let events = events(&source, &names)?;
         let stem = Path::new(path).file_stem().map(|s| s.to_string_lossy().into_owned());
         Ok(Self {
@@ -62,6 +63,7 @@ impl Scenario {
             report,
             subsystems: specs,
             connections,
+            glue,
             events,
             source,
         })
@@ -160,6 +162,11 @@ fn read_gluing(s: &Section) -> Checked<GluingSpec> {
         tolerance: s.number("tolerance"),
         max_iterations: u32::try_from(s.count("max_iterations")).unwrap_or(u32::MAX),
         start: s.text("start"),
+        relaxation: s.text("relaxation"),
+        jacobian: s.text("jacobian"),
+        level: s.text("level"),
+        hold: s.text("hold"),
+        stabilisation: s.number("stabilisation"),
         contact_margin_m: s.number("contact_margin_m"),
     })
 }

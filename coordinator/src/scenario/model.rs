@@ -26,6 +26,8 @@ pub struct Scenario {
     pub subsystems: Vec<SubsystemSpec>,
     /// `[[connect]]`.
     pub connections: Vec<Connection>,
+    /// `[[glue]]` in the order of the file.
+    pub glue: Vec<GlueSpec>,
     /// `[[event]]` in the order of the file.
     pub events: Vec<EventSpec>,
     /// The text it came from, for errors found later (unknown variables, units).
@@ -119,7 +121,7 @@ pub enum TerrainKind {
 /// `[gluing]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GluingSpec {
-    /// `cooperative` or `iterative`.
+    /// One of [`crate::gluing::STRATEGIES`].
     pub strategy: String,
     /// `auto`, `tt` or `xt` (iterative only).
     pub form: String,
@@ -129,6 +131,17 @@ pub struct GluingSpec {
     pub max_iterations: u32,
     /// What the iteration starts from: `estimate` (min(T*, F)) or `zero` (to show what the estimate saves).
     pub start: String,
+    /// How `relaxed` accelerates its fixed point: `none`, `aitken`, `anderson` or `broyden`.
+    pub relaxation: String,
+    /// Where the bodies' interface Jacobian comes from: `analytic`, `directional` (central differences),
+    /// `finite-differences`, or `frozen` (a control: never refreshed).
+    pub jacobian: String,
+    /// Level of the condition at joints: `position` or `velocity`.
+    pub level: String,
+    /// How T runs inside the step: `end`, `constant` or `linear`.
+    pub hold: String,
+    /// Share of the position error that is taken out per step at velocity level.
+    pub stabilisation: f64,
     /// Contacts are made when a shape can come this near within the step, m.
     pub contact_margin_m: f64,
 }
@@ -175,6 +188,49 @@ pub struct Connection {
     pub from: String,
     /// The same; its `*` take what matched in `from`.
     pub to: String,
+    /// Byte range of the table in the source.
+    pub span: std::ops::Range<usize>,
+}
+
+impl Default for GluingSpec {
+    fn default() -> Self {
+        Self {
+            strategy: "cooperative".into(),
+            form: "auto".into(),
+            tolerance: 1e-8,
+            max_iterations: 20,
+            start: "estimate".into(),
+            relaxation: "anderson".into(),
+            jacobian: "analytic".into(),
+            level: "position".into(),
+            hold: "end".into(),
+            stabilisation: 0.0,
+            contact_margin_m: 1e-3,
+        }
+    }
+}
+
+/// `[[glue]]`: two bodies glued together.
+#[derive(Clone, Debug, PartialEq)]
+pub struct GlueSpec {
+    /// `subsystem.body` of both sides; the second may be `world`.
+    pub sides: [String; 2],
+    /// Unilateral along `normal`; else a joint.
+    pub contact: bool,
+    /// World point at the start; absent: each body's own origin.
+    pub at_m: Option<[f64; 3]>,
+    /// Mask of carried components in the order of the axes.
+    pub mask: u32,
+    /// The axes turn with side 1.
+    pub turning: bool,
+    /// Normal of a contact.
+    pub normal: [f64; 3],
+    /// Compliance of the glue, m/N.
+    pub compliance: f64,
+    /// Largest normal force, N.
+    pub t_max: f64,
+    /// Coulomb coefficient.
+    pub mu: f64,
     /// Byte range of the table in the source.
     pub span: std::ops::Range<usize>,
 }

@@ -2,14 +2,15 @@
 
 use super::{Group, Member, Options, Testbed};
 use crate::contact::{BodySide, ContactDetector, GroundSide};
-use crate::gluing::{self, Exchange, StepReport};
+use crate::gluing::glue::Recipe;
+use crate::gluing::{self, Exchange, Glue, StepReport};
 use crate::host::{HostServices, Instance, Library, LoadError, LoadedModule, SearchPath, Workers};
-use crate::scenario::{self, InputError, Scenario, SubsystemSpec};
+use crate::scenario::{self, GlueSpec, InputError, Scenario, SubsystemSpec};
 use crate::signals::{self, Directory, TimeLine};
 use crate::timing::Timings;
 use crate::{Error, Result, terrain};
 use std::sync::Arc;
-use terraglue_subsystem::{BodyState, Capabilities, Kind, Terrain};
+use terraglue_subsystem::{BodyState, Capabilities, Hold, Kind, Law, Level, Terrain};
 
 impl Testbed {
     /// Builds a scenario with modules found as libraries.
@@ -60,6 +61,8 @@ impl Testbed {
             t: 0.0,
             last_h: 0.0,
             halvings: 0,
+            hold: hold(&scenario.gluing.hold),
+            started: false,
         };
         testbed.read_states()?;
         if let Err(Error::Simulation { message, .. }) = testbed.detect_contacts(scenario.time.step_s) {
@@ -125,11 +128,19 @@ fn group(scenario: &Scenario, instances: &[Instance]) -> Result<Option<Group>> {
     let of = |f: &dyn Fn(&Instance) -> bool| -> Vec<usize> {
         instances.iter().enumerate().filter(|(_, i)| f(i)).map(|(slot, _)| slot).collect()
     };
+    let named = |i: &Instance| {
+        scenario
+            .glue
+            .iter()
+            .any(|g| g.sides.iter().any(|s| s.split_once('.').is_some_and(|(n, _)| n == i.name())))
+    };
     let grounds = of(&|i| i.kind() == Kind::Soil);
     let bodies = of(&|i| {
-        i.kind() == Kind::Robot
-            && i.capabilities().has(Capabilities::FORCE)
-            && i.scene().shapes.iter().any(|s| s.collides)
+        i.kind() != Kind::Soil && named(i)
+            || i.kind() == Kind::Robot
+                && !grounds.is_empty()
+                && i.capabilities().has(Capabilities::FORCE)
+                && i.scene().shapes.iter().any(|s| s.collides)
     });
     if let [first, second, ..] = grounds[..] {
         let message = format!(
@@ -140,19 +151,107 @@ fn group(scenario: &Scenario, instances: &[Instance]) -> Result<Option<Group>> {
         let source = &scenario.source;
         return Err(source.error_at_value(&[instances[second].name()], message, None).into());
     }
-    if grounds.is_empty() || bodies.is_empty() {
+    if bodies.is_empty() || grounds.is_empty() && scenario.glue.is_empty() {
         return Ok(None);
     }
     let gravity = scenario.world.gravity_m_s2.iter().map(|g| g * g).sum::<f64>().sqrt();
     let mass: f64 = bodies.iter().flat_map(|b| &instances[*b].scene().bodies).map(|b| b.mass).sum();
     let weight = mass * gravity;
-    let exchange = Exchange::new(&bodies, &grounds, if weight > 0.0 { weight } else { 1.0 });
+    let mut exchange = Exchange::new(&bodies, &grounds, if weight > 0.0 { weight } else { 1.0 });
+    exchange.glue = glue(scenario, instances)?;
+    exchange.stabilisation = scenario.gluing.stabilisation;
+    if scenario.gluing.level == "velocity" {
+        exchange.level = Level::Velocity;
+    } else if scenario.gluing.hold == "linear" {
+        let message = "a linear hold with the condition at position level grows by 2 + √3 = 3.73 per step";
+        let help = Some("use hold = \"end\" or \"constant\", or level = \"velocity\"".into());
+        return Err(scenario.source.error_at_value(&["gluing", "hold"], message, help).into());
+    }
     let strategy = gluing::strategy(&scenario.gluing);
     if let Some(reason) = gluing::refusal(strategy.as_ref(), &exchange, instances) {
         let help = format!("strategies are {}", gluing::STRATEGIES.join(", "));
         return Err(scenario.source.error_at_value(&["gluing", "strategy"], reason, Some(help)).into());
     }
     Ok(Some(Group { exchange, strategy, closed: Vec::new() }))
+}
+
+fn hold(text: &str) -> Hold {
+    match text {
+        "constant" => Hold::Constant,
+        "linear" => Hold::Linear,
+        _ => Hold::End,
+    }
+}
+
+/// The glue that the scenario declares, between bodies that exist.
+fn glue(scenario: &Scenario, instances: &[Instance]) -> Result<Glue> {
+    let mut glue = Glue::default();
+    let source = &scenario.source;
+    let wrong = |spec: &GlueSpec, message: String, help: Option<String>| {
+        Error::from(source.error_at(spec.span.clone(), message, help))
+    };
+    let mut states: Vec<Vec<BodyState>> = Vec::new();
+    for instance in instances {
+        let mut own = vec![BodyState::REST; instance.scene().bodies.len()];
+        instance.body_states(&mut own)?;
+        states.push(own);
+    }
+    for spec in &scenario.glue {
+        let mut ends = [None; 2];
+        for (end, side) in ends.iter_mut().zip(&spec.sides).filter(|(_, side)| *side != "world") {
+            let (name, body) = side.split_once('.').unwrap_or((side, ""));
+            let slot = instances.iter().position(|i| i.name() == name);
+            let found = slot
+                .and_then(|s| Some((s, instances[s].scene().bodies.iter().position(|b| b.name == body)?)));
+            let Some((slot, k)) = found else {
+                let names: Vec<&str> = slot
+                    .iter()
+                    .flat_map(|s| instances[*s].scene().bodies.iter().map(|b| b.name.as_str()))
+                    .collect();
+                let help = scenario::did_you_mean(body, names.iter().copied());
+                return Err(wrong(spec, format!("glue: body `{side}` does not exist"), help));
+            };
+            *end = Some((slot, k as u32));
+        }
+        let soil_at = |e: usize| ends[e].is_some_and(|(s, _)| instances[s].kind() == Kind::Soil);
+        if soil_at(0) || soil_at(1) && !spec.contact {
+            let message = "a soil is side 2 of glue of kind `contact`".into();
+            return Err(wrong(spec, message, None));
+        }
+        if ends[0].map(|e| e.0) == ends[1].map(|e| e.0) {
+            return Err(wrong(spec, "glue joins two different subsystems".into(), None));
+        }
+        let law = Law {
+            t_min: if spec.contact { 0.0 } else { f64::NEG_INFINITY },
+            t_max: spec.t_max,
+            mu: if spec.contact { spec.mu } else { f64::INFINITY },
+            compliance: spec.compliance,
+        };
+        let axes =
+            if spec.contact { axes(spec.normal) } else { [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0] };
+        let at = spec.at_m.or(if spec.contact && soil_at(1) {
+            ends[0].map(|(s, b)| states[s][b as usize].world_from_body.position)
+        } else {
+            None
+        });
+        let (mask, turning, soil) = (spec.mask, spec.turning, soil_at(1));
+        let recipe = Recipe { ends, at, mask, axes, turning, law, contact: spec.contact, soil };
+        glue.add(&recipe, |slot, body| states[slot][body as usize]);
+    }
+    Ok(glue)
+}
+
+/// n along a vector and two tangents: the first in the plane of n and x where that exists.
+fn axes(normal: [f64; 3]) -> [f64; 9] {
+    let size = normal.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let n = normal.map(|x| if size > 0.0 { x / size } else { 0.0 });
+    let seed = if n[0].abs() < 0.9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+    let along: f64 = (0..3).map(|k| seed[k] * n[k]).sum();
+    let t = [0, 1, 2].map(|k| seed[k] - along * n[k]);
+    let length = t.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let t = t.map(|x| x / length);
+    let b = [n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]];
+    [n[0], n[1], n[2], t[0], t[1], t[2], b[0], b[1], b[2]]
 }
 
 fn detector(
@@ -167,8 +266,14 @@ fn detector(
         scene: instances[slot].scene(),
     };
     let ground = |slot: usize| GroundSide { subsystem: slot as u32, instance: instances[slot].subsystem() };
+    // a soil that shows no ground is met by declared glue only
+    let shown = |slot: &usize| {
+        terrain.is_some()
+            || instances[*slot].fields().iter().any(|f| f.name == "height")
+            || group.exchange.glue.is_empty()
+    };
     let bodies: Vec<_> = group.exchange.body_slots().map(body).collect();
-    let grounds: Vec<_> = group.exchange.ground_slots().map(ground).collect();
+    let grounds: Vec<_> = group.exchange.ground_slots().filter(shown).map(ground).collect();
     ContactDetector::new(&bodies, &grounds, terrain)
 }
 

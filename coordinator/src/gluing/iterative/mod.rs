@@ -14,6 +14,7 @@ mod tt;
 mod xt;
 
 use super::exchange::Exchange;
+use super::refresh::Refresh;
 use super::{Outcome, Strategy, linear};
 use crate::Result;
 use crate::host::Instance;
@@ -82,7 +83,7 @@ impl Iterative {
             form,
             from_estimate: spec.start != "zero",
             limits: Limits { tolerance: spec.tolerance, max_iterations: spec.max_iterations },
-            tt: tt::TtForm::default(),
+            tt: tt::TtForm::new(Refresh::new(&spec.jacobian)),
             xt: xt::XtForm::default(),
             start: Vec::new(),
             kappa: 0.0,
@@ -92,6 +93,7 @@ impl Iterative {
     fn preferred(&self, exchange: &Exchange, instances: &[Instance]) -> Form {
         let takes = |c| exchange.ground_slots().all(|s| instances[s].capabilities().has(c));
         match self.form {
+            _ if exchange.needs_linearisation() => Form::Tt,
             Some(form) => form,
             None if !takes(Capabilities::FORCE) => Form::Xt,
             None if !takes(Capabilities::MOTION) || self.kappa > KAPPA_XT => Form::Tt,
@@ -125,7 +127,18 @@ impl Strategy for Iterative {
         (Capabilities::FORCE | Capabilities::RETRY, ground | Capabilities::RETRY)
     }
 
+    fn starts_joints(&self) -> bool {
+        true
+    }
+
     fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
+        if exchange.needs_linearisation() {
+            // joints start from the force of the step before, contacts from the soil's own
+            exchange.start_from_last();
+            self.start.clear();
+            self.start.extend_from_slice(&exchange.t);
+            return self.run(Form::Tt, exchange, instances);
+        }
         exchange.estimate_forces(instances)?;
         if self.from_estimate {
             exchange.solve_compatibility(instances)?;

@@ -8,11 +8,12 @@
 use super::super::Outcome;
 use super::super::complementarity::{BoundedProblem, BoundedSolver};
 use super::super::exchange::Exchange;
+use super::super::glue::Row;
 use super::super::linear::max_norm;
+use super::super::refresh::Refresh;
 use super::{Limits, largest_eigenvalue};
 use crate::Result;
 use crate::host::Instance;
-use terraglue_subsystem::Port;
 
 /// Trials of one line search.
 const MAX_TRIALS: u32 = 12;
@@ -33,9 +34,15 @@ pub struct TtForm {
     lower: Vec<f64>,
     upper: Vec<f64>,
     solver: BoundedSolver,
+    jacobian: Refresh,
 }
 
 impl TtForm {
+    /// With the interface Jacobian from there.
+    pub fn new(jacobian: Refresh) -> Self {
+        Self { jacobian, ..Self::default() }
+    }
+
     /// Iterates from `exchange.t`.
     pub fn solve(
         &mut self,
@@ -43,11 +50,18 @@ impl TtForm {
         exchange: &mut Exchange,
         instances: &mut [Instance],
     ) -> Result<Outcome> {
-        self.bounds(&exchange.ports);
-        let mut size = f64::INFINITY;
+        let (mut size, mut before) = (f64::INFINITY, f64::NAN);
+        let own_start = exchange.needs_linearisation();
         for _ in 0..=limits.max_iterations {
             exchange.advance_bodies(instances)?;
             self.evaluate_grounds(exchange, instances)?;
+            let left = max_norm(&self.e);
+            if own_start && self.jacobian.is_stale(left, before, exchange) {
+                exchange.linearise_bodies(self.jacobian.source(), instances)?;
+                self.jacobian.keep(exchange);
+            }
+            before = left;
+            self.bounds(exchange);
             let solved = self.newton_step(exchange, instances)?;
             size = max_norm(&self.d);
             if size <= limits.threshold(exchange) {
@@ -56,7 +70,11 @@ impl TtForm {
             if !solved {
                 break;
             }
-            self.solve_linearised(limits, exchange, instances)?;
+            if exchange.has_grounds() {
+                self.solve_linearised(limits, exchange, instances)?;
+            } else {
+                exchange.t.iter_mut().zip(&self.d).for_each(|(t, d)| *t += d);
+            }
         }
         Ok(limits.give_up(exchange, "T-T form: |Λ·e|", size))
     }
@@ -78,15 +96,19 @@ impl TtForm {
         Ok(())
     }
 
-    fn bounds(&mut self, ports: &[Port]) {
+    /// Bounds of every component; Coulomb's follow the normal force of the last trial.
+    fn bounds(&mut self, exchange: &Exchange) {
         self.lower.clear();
         self.upper.clear();
-        for port in ports {
-            for (_, c) in port.components() {
-                let (lower, upper) = if c == 0 {
-                    (port.law.t_min, port.law.t_max)
-                } else {
-                    (f64::NEG_INFINITY, f64::INFINITY)
+        for port in &exchange.ports {
+            for (i, _) in port.components() {
+                let (lower, upper) = match exchange.rows[i] {
+                    Row::Normal => (port.law.t_min, port.law.t_max),
+                    Row::Coulomb => {
+                        let bound = port.law.mu * exchange.t[port.first as usize].max(0.0);
+                        (-bound, bound)
+                    }
+                    Row::Law | Row::Joint => (f64::NEG_INFINITY, f64::INFINITY),
                 };
                 self.lower.push(lower);
                 self.upper.push(upper);
@@ -96,14 +118,16 @@ impl TtForm {
 
     /// One evaluation of the soils at the bodies' present motion and the residual of every row.
     fn evaluate_grounds(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result {
-        exchange.advance_grounds_under_force(instances)?;
+        if exchange.has_grounds() {
+            exchange.advance_grounds_under_force(instances)?;
+        }
         self.e.clear();
         for port in &exchange.ports {
             let compliance = port.law.compliance;
-            for (i, c) in port.components() {
-                self.e.push(match c {
-                    0 => exchange.x1[i] - exchange.x2[i] + compliance * exchange.t[i],
-                    _ => exchange.t[i] - exchange.f[i],
+            for (i, _) in port.components() {
+                self.e.push(match exchange.rows[i] {
+                    Row::Law => exchange.t[i] - exchange.f[i],
+                    _ => exchange.mismatch(i, compliance),
                 });
             }
         }
@@ -143,9 +167,13 @@ impl TtForm {
         for port in &exchange.ports {
             for (row, r) in port.components() {
                 let out = &mut self.matrix[row * n..][..n];
-                out[row] += if r == 0 { port.law.compliance } else { 1.0 };
-                if r == 0 {
+                let law = exchange.rows[row] == Row::Law;
+                out[row] += if law { 1.0 } else { exchange.glue_compliance(port) };
+                if !law {
                     (0..n).for_each(|column| out[column] += g[column * n + row]);
+                }
+                if matches!(exchange.rows[row], Row::Joint | Row::Coulomb) {
+                    continue;
                 }
                 for (other, c) in port.components() {
                     let entry = self.mixed[other * n + row];
@@ -209,8 +237,11 @@ impl TtForm {
         report.residual = size / exchange.t_ref;
         for port in &exchange.ports {
             let i = port.first as usize;
-            if exchange.t[i] > 0.0 {
+            if exchange.t[i] > 0.0 || exchange.rows[i] == Row::Joint {
                 report.max_gap_m = report.max_gap_m.max(self.e[i].abs());
+            }
+            if exchange.rows[i] == Row::Joint {
+                continue;
             }
             let complementarity = exchange.t[i].min(self.e[i] / self.matrix[i * exchange.t.len() + i]).abs();
             report.complementarity_n = report.complementarity_n.max(complementarity);

@@ -215,6 +215,7 @@ pub fn scenario(strategy: &str) -> Scenario {
             max_iterations: 20,
             start: "estimate".into(),
             contact_margin_m: 1e-3,
+            ..GluingSpec::default()
         },
         recording: RecordingSpec { ground_every_steps: 100, every_steps: 5 },
         report: ReportSpec {
@@ -223,6 +224,7 @@ pub fn scenario(strategy: &str) -> Scenario {
             joint: Some("robot.LF_j2".into()),
         },
         subsystems: vec![part("gait", "gait"), part("robot", "rigid-body"), part("soil", "soil-bekker")],
+        glue: Vec::new(),
         connections: Vec::new(),
         events: Vec::new(),
         source,

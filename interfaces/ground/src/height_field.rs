@@ -186,6 +186,28 @@ impl HeightField {
         self.pool.tile_mut(sinkage).iter_mut().zip(changes).for_each(|(s, c)| *s -= c);
     }
 
+    /// Puts the nodes `first` … of a tile, all in one row, at the heights `new` (units); `changes` receives what each
+    /// gained. False when none did: then the tile stays untouched.
+    #[inline]
+    pub fn write_row(&mut self, tile: usize, first: usize, new: &[i32], changes: &mut [i32]) -> bool {
+        let range = first..first + new.len();
+        match self.tiles[tile].heights {
+            Heights::Uniform(u) => new.iter().zip(&mut *changes).for_each(|(n, c)| *c = n.wrapping_sub(u)),
+            Heights::Stored(slot) => {
+                let old = &self.pool.tile(slot)[range.clone()];
+                new.iter().zip(old).zip(&mut *changes).for_each(|((n, o), c)| *c = n.wrapping_sub(*o));
+            }
+        }
+        if changes[..new.len()].iter().all(|c| *c == 0) {
+            return false;
+        }
+        let (heights, sinkage) = self.touch(tile);
+        self.pool.tile_mut(heights)[range.clone()].copy_from_slice(new);
+        let sunk = &mut self.pool.tile_mut(sinkage)[range];
+        sunk.iter_mut().zip(&*changes).for_each(|(s, c)| *s = s.wrapping_sub(*c));
+        true
+    }
+
     /// Makes a tile ready for writing: (pool tile of heights, pool tile of sinkage).
     #[inline]
     pub(crate) fn touch(&mut self, tile: usize) -> (u32, u32) {

@@ -1,7 +1,7 @@
 //! The ground of a soil: heights of its material and what it remembers at each node.
 
 use crate::nodes::{NodeState, NodeStates};
-use terraglue_ground::{HeightField, UNIT_M};
+use terraglue_ground::{HeightField, TILE_EDGE, UNIT_M};
 use terraglue_subsystem::{Result, Terrain};
 
 /// A node below a foot, as committed.
@@ -91,5 +91,27 @@ impl Ground {
         }
         self.heights.add_units(i, j, units);
         self.nodes.add_loose(i, j, units);
+    }
+
+    /// Puts the nodes from (i, j) on along x at `heights` (units), as [`Ground::add_material`] books it. All are nodes
+    /// of the lattice. Returns what they gained together and the sum of what single ones gained.
+    pub fn put_row(&mut self, i: i32, j: i32, heights: &[i32]) -> [i64; 2] {
+        let (mut gained, mut moved) = (0, 0);
+        let (mut i, mut rest) = (i, heights);
+        let mut changes = [0; TILE_EDGE as usize];
+        while !rest.is_empty() {
+            let (tile, first) = self.heights.lattice().locate(i as u32, j as u32);
+            let n = rest.len().min(TILE_EDGE as usize - first % TILE_EDGE as usize);
+            let (part, left) = rest.split_at(n);
+            if self.heights.write_row(tile, first, part, &mut changes) {
+                self.nodes.add_loose_row(tile, first, &changes[..n]);
+                for change in &changes[..n] {
+                    gained += i64::from(*change);
+                    moved += i64::from((*change).max(0));
+                }
+            }
+            (i, rest) = (i + n as i32, left);
+        }
+        [gained, moved]
     }
 }

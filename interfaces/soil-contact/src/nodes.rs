@@ -235,6 +235,25 @@ impl NodeStates {
         }
     }
 
+    /// The same for nodes of a tile from place `first` on.
+    pub fn add_loose_row(&mut self, tile: usize, first: usize, units: &[i32]) {
+        if self.tiles[tile] != ABSENT {
+            let index = &self.indices[self.tiles[tile] as usize];
+            for (place, units) in index.places[first..].iter().zip(units) {
+                if *units != 0 && *place != ABSENT {
+                    self.contacts[*place as usize].add_loose(f64::from(*units) * UNIT_M);
+                }
+            }
+        }
+        // where a foot stands the kept depth is not read until it leaves, which writes it
+        if units.iter().any(|u| *u > 0) && self.kept.tile(tile).is_some() {
+            let kept = &mut self.kept.tile_mut(tile)[first..];
+            for (kept, units) in kept.iter_mut().zip(units) {
+                *kept = kept.filled(*units);
+            }
+        }
+    }
+
     /// Copies all states into `out`.
     pub fn save(&self, out: &mut NodesSnapshot) {
         self.kept.save(&mut out.kept);

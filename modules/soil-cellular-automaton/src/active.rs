@@ -1,85 +1,102 @@
 //! The nodes that are awake, as one bit per node in the tiles of the ground: nothing else is visited.
 //!
 //! A node's next change is a function of the heights around it: the eight neighbours for the rule of repose, the
-//! ends of triples two nodes away as well for the rule of curvature. A node is awake for a rule exactly as long
-//! as something there changed since the rule visited it; sweeping the awake nodes gives what sweeping the whole
-//! field would give.
+//! ends of triples two nodes away as well for the rule of curvature. A node sleeps for a rule when nothing there has
+//! changed since the rule visited it; sweeping the awake nodes gives what sweeping the whole field would give.
 
 use terraglue_ground::{Lattice, TILE_EDGE};
 
 const EDGE: i32 = TILE_EDGE as i32;
 
-/// Which nodes around a change one rule has to visit: per row from −2 to 2 the columns from −2 (bit 0) to 2.
-pub type Reach = [u32; 5];
-/// The eight neighbours.
-pub const NEIGHBOURS: Reach = [0, 0b01110, 0b01110, 0b01110, 0];
-/// The neighbours and the far ends of triples.
-pub const TRIPLES: Reach = [0b10101, 0b01110, 0b11111, 0b01110, 0b10101];
-
-/// Awake nodes of a tile: a word per row, and which rows have any.
+/// Bits of the nodes of a tile: a word per row, and which rows have any.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct TileBits {
     /// Bit x of row y.
     pub rows: [u32; TILE_EDGE as usize],
-    /// Bit y: row y has awake nodes.
+    /// Bit y: row y has a bit.
     pub any: u32,
 }
 
-/// Awake nodes of a ground.
+/// A set of nodes of a ground.
 #[derive(Clone, Debug)]
-pub struct ActiveSet {
+pub struct Marks {
     lattice: Lattice,
     bits: Vec<TileBits>,
-    /// Tiles with awake nodes, in the order in which they woke up.
+    /// Tiles with nodes of the set, in the order in which they got the first.
     pub tiles: Vec<u32>,
 }
 
-impl ActiveSet {
-    /// Nobody is awake.
+impl Marks {
+    /// Empty.
     pub fn new(lattice: Lattice) -> Self {
         let count = lattice.tile_count();
         Self { lattice, bits: vec![TileBits::default(); count], tiles: Vec::with_capacity(count) }
     }
 
-    /// Awake nodes of a tile.
+    /// The nodes in a tile.
     pub fn tile(&self, tile: u32) -> &TileBits {
         &self.bits[tile as usize]
     }
 
-    /// Number of awake nodes.
+    /// Number of nodes.
     pub fn len(&self) -> usize {
         self.tiles.iter().flat_map(|t| &self.bits[*t as usize].rows).map(|r| r.count_ones() as usize).sum()
     }
 
-    /// Whether all sleep.
+    /// Whether there is none.
     pub fn is_empty(&self) -> bool {
         self.tiles.is_empty()
     }
 
-    /// All go to sleep.
+    /// Takes all out.
     pub fn clear(&mut self) {
         for tile in self.tiles.drain(..) {
             self.bits[tile as usize] = TileBits::default();
         }
     }
 
-    /// Wakes the nodes that a change at node (i, j) of the lattice reaches.
+    /// Adds a node of the lattice.
     #[inline]
-    pub fn wake(&mut self, i: i32, j: i32, reach: &Reach) {
-        let (a, x) = (i / EDGE, i % EDGE);
-        let rows = j - 2..=j + 2;
-        for (row, pattern) in rows.zip(reach) {
-            if *pattern == 0 || row < 0 || row >= self.lattice.size[1] as i32 {
-                continue;
-            }
-            // bit b of the word is column b − 2 of the tile
-            let word = u64::from(*pattern) << x;
-            self.set(a, row, (word >> 2) as u32);
-            if word & 3 != 0 {
-                self.set(a - 1, row, ((word & 3) as u32) << (EDGE - 2));
-            }
-            if word >> (EDGE + 2) != 0 {
-                self.set(a + 1, row, (word >> (EDGE + 2)) as u32);
+    pub fn mark(&mut self, [i, j]: [i32; 2]) {
+        self.set(i / EDGE, j, 1 << (i % EDGE));
+    }
+
+    /// Adds the nodes i0 … i1 − 1 of row j.
+    pub fn mark_row(&mut self, i0: i32, i1: i32, j: i32) {
+        let mut i = i0;
+        while i < i1 {
+            let (a, x) = (i / EDGE, i % EDGE);
+            let n = (EDGE - x).min(i1 - i);
+            self.set(a, j, (u32::MAX >> (EDGE - n)) << x);
+            i += n;
+        }
+    }
+
+    /// Adds all nodes within `reach` rows and columns of those of `other`.
+    pub fn mark_around(&mut self, other: &Self, reach: i32) {
+        let nx = self.lattice.tiles()[0];
+        for tile in &other.tiles {
+            let (a, b) = ((tile % nx) as i32, (tile / nx) as i32);
+            let bits = other.bits[*tile as usize];
+            let mut any = bits.any;
+            while any != 0 {
+                let y = any.trailing_zeros();
+                any &= any - 1;
+                // bit b of the word is column b − 2 of the tile
+                let mut word = u64::from(bits.rows[y as usize]) << 2;
+                for _ in 0..reach {
+                    word |= word << 1 | word >> 1;
+                }
+                let row = b * EDGE + y as i32;
+                for row in (row - reach).max(0)..=(row + reach).min(self.lattice.size[1] as i32 - 1) {
+                    self.set(a, row, (word >> 2) as u32);
+                    if word & 3 != 0 {
+                        self.set(a - 1, row, ((word & 3) as u32) << (EDGE - 2));
+                    }
+                    if word >> (EDGE + 2) != 0 {
+                        self.set(a + 1, row, (word >> (EDGE + 2)) as u32);
+                    }
+                }
             }
         }
     }
@@ -104,13 +121,13 @@ impl ActiveSet {
         bits.rows[(row % EDGE) as usize] |= columns;
     }
 
-    /// Copies the awake tiles into `out`.
+    /// Copies the set into `out`.
     pub fn save(&self, out: &mut Vec<(u32, TileBits)>) {
         out.clear();
         out.extend(self.tiles.iter().map(|t| (*t, self.bits[*t as usize])));
     }
 
-    /// Back to saved tiles.
+    /// Back to a saved set.
     pub fn restore(&mut self, saved: &[(u32, TileBits)]) {
         self.clear();
         for (tile, bits) in saved {
@@ -125,25 +142,39 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
+    const LATTICE: Lattice = Lattice { origin: [0.0; 2], spacing: 1.0, size: [70, 70] };
+
+    fn has(set: &Marks, x: i32, y: i32) -> bool {
+        let (tile, k) = LATTICE.locate(x as u32, y as u32);
+        set.tile(tile as u32).rows[k / 32] >> (k % 32) & 1 == 1
+    }
+
     proptest! {
         #[test]
-        fn waking_finds_the_nodes_in_reach_and_no_others(i in 0..70i32, j in 0..70i32) {
-            let lattice = Lattice { origin: [0.0; 2], spacing: 1.0, size: [70, 70] };
-            let mut set = ActiveSet::new(lattice);
-            set.wake(i, j, &TRIPLES);
-            let mut expected = 0;
+        fn what_is_marked_around_is_near_and_nothing_else(
+            nodes in prop::collection::vec((0..70i32, 0..70i32), 1..6), reach in 1..3i32,
+        ) {
+            let (mut changed, mut set) = (Marks::new(LATTICE), Marks::new(LATTICE));
+            nodes.iter().for_each(|(i, j)| changed.mark([*i, *j]));
+            set.mark_around(&changed, reach);
+            let mut count = 0;
             for y in 0..70 {
                 for x in 0..70 {
-                    let (dx, dy) = ((x - i).abs(), (y - j).abs());
-                    let far = dx.max(dy) == 2 && (dx == 0 || dy == 0 || dx == dy);
-                    let reached = dx.max(dy) < 2 || far;
-                    expected += usize::from(reached);
-                    let (tile, k) = lattice.locate(x as u32, y as u32);
-                    let awake = set.tile(tile as u32).rows[k / 32] >> (k % 32) & 1 == 1;
-                    prop_assert_eq!(awake, reached);
+                    let near = nodes.iter().any(|(i, j)| (x - i).abs().max((y - j).abs()) <= reach);
+                    count += usize::from(near);
+                    prop_assert_eq!(has(&set, x, y), near);
                 }
             }
-            prop_assert_eq!(set.len(), expected);
+            prop_assert_eq!(set.len(), count);
+        }
+
+        #[test]
+        fn a_marked_row_ends_where_it_should(i0 in 0..69i32, n in 1..70i32, j in 0..70i32) {
+            let mut set = Marks::new(LATTICE);
+            let i1 = (i0 + n).min(70);
+            set.mark_row(i0, i1, j);
+            prop_assert_eq!(set.len() as i32, i1 - i0);
+            prop_assert!(has(&set, i0, j) && has(&set, i1 - 1, j));
         }
     }
 }

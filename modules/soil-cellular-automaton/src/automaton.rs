@@ -1,21 +1,22 @@
 //! The automaton as the material rule of a soil: load, displacement, a bounded number of sweeps a step.
 
-use crate::awake::SavedAwake;
-use crate::cell::{Cell, QUANTUM};
+use crate::compaction::{Compaction, SavedCompaction};
 use crate::displace::Site;
-use crate::sweep::{Counts, Sweeper};
+use crate::feet::Foot;
+use crate::sweep::{Counts, SavedAwake, Sweeper};
 use crate::values;
-use terraglue_ground::{Lattice, TileMapSnapshot, UNIT_M};
+use std::sync::Arc;
+use terraglue_ground::Lattice;
 use terraglue_soil_contact::{Covered, Ground, Material};
 use terraglue_soil_law::SoilParameters;
-use terraglue_subsystem::{Config, Error, Result, Variable};
+use terraglue_subsystem::{Config, Error, Host, Result, Variable};
 
 /// κ_max where a scenario is silent, 1/m: a ridge rounded at 2.5 cm.
 pub const DEFAULT_CURVATURE: f64 = 40.0;
-/// Sweeps per second at a spacing of 1 m: 8 per ms at 1 cm.
-const SWEEPS_PER_S_AND_M: f64 = 80.0;
-/// Tiles that can be touched before memory is asked for again.
-const RESERVE_TILES: usize = 256;
+/// Share of the pressed volume that becomes denser where a scenario is silent.
+pub const DEFAULT_COMPACTION: f64 = 0.25;
+/// Speed of the front of a slide where a scenario is silent, m/s: two sweeps per ms at 1 cm.
+const FRONT_SPEED: f64 = 20.0;
 
 /// Parameters of the automaton.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,6 +27,8 @@ pub struct Settings {
     pub angle_of_repose: Option<f64>,
     /// Sweeps per step at most; `None`: in proportion to the step and the spacing.
     pub sweeps_per_step: Option<f64>,
+    /// Share of the pressed volume that becomes denser, 0 … 1.
+    pub compacted_fraction: f64,
 }
 
 impl Settings {
@@ -35,6 +38,7 @@ impl Settings {
             curvature_max: config.optional_number("curvature_max_per_m")?.unwrap_or(DEFAULT_CURVATURE),
             angle_of_repose: config.optional_number("angle_of_repose_rad")?,
             sweeps_per_step: config.optional_number("sweeps_per_step")?.filter(|s| *s > 0.0),
+            compacted_fraction: config.optional_number("compacted_fraction")?.unwrap_or(DEFAULT_COMPACTION),
         };
         let angle = settings.angle_of_repose.unwrap_or(0.5);
         if !(settings.curvature_max > 0.0 && angle > 0.0 && angle < 1.5) {
@@ -51,27 +55,32 @@ impl Settings {
 pub struct Automaton {
     settings: Settings,
     friction_angle: f64,
+    spacing: f64,
     sweeper: Sweeper,
-    covered: Vec<[i32; 2]>,
-    uncovered: Vec<[i32; 2]>,
+    compaction: Compaction,
+    /// Sweeps that the steps so far have earned and not used.
+    credit: f64,
     commits: u32,
     rescan: bool,
     reserve: usize,
+    host: Arc<dyn Host>,
 }
 
 impl Automaton {
-    /// An automaton without ground yet; `nodes` is the largest number of nodes below feet.
-    pub fn new(settings: Settings, nodes: u32) -> Self {
+    /// An automaton without ground yet.
+    pub fn new(settings: Settings, host: Arc<dyn Host>) -> Self {
         let nowhere = Lattice { origin: [0.0; 2], spacing: 1.0, size: [1, 1] };
         Self {
             settings,
             friction_angle: 0.5,
-            sweeper: Sweeper::new(nowhere, 0),
-            covered: Vec::new(),
-            uncovered: Vec::new(),
+            spacing: 1.0,
+            sweeper: Sweeper::new(nowhere, host.clone(), 0),
+            compaction: Compaction::new(nowhere, 0.0),
+            credit: 0.0,
             commits: 0,
             rescan: false,
-            reserve: nodes as usize,
+            reserve: host.max_nodes() as usize,
+            host,
         }
     }
 
@@ -90,31 +99,19 @@ impl Automaton {
         &self.sweeper.counts
     }
 
+    /// Material that became denser.
+    pub fn compaction(&self) -> &Compaction {
+        &self.compaction
+    }
+
     /// Nodes that the next sweep will visit.
     pub fn active_nodes(&self) -> usize {
-        self.sweeper.awake.len()
+        self.sweeper.awake()
     }
 
     fn limit(&mut self) {
-        self.sweeper.set_limits(self.repose(), self.settings.curvature_max);
-    }
-
-    /// Notes which nodes lie below feet, with load and room; wakes those where it matters.
-    fn take_feet(&mut self, ground: &Ground, covered: &[Covered]) {
-        std::mem::swap(&mut self.covered, &mut self.uncovered);
-        self.covered.clear();
-        for node in covered {
-            let at = [node.i, node.j];
-            let height = ground.heights.height(node.i, node.j);
-            let now = Cell { load: load_units(node), room: room_units(node, height), covered: self.commits };
-            self.sweeper.put_cell(ground, at, now);
-            self.covered.push(at);
-        }
-        for at in &self.uncovered {
-            if self.sweeper.cells.get(at[0], at[1]).covered != self.commits {
-                self.sweeper.put_cell(ground, *at, Cell { covered: self.commits, ..Cell::default() });
-            }
-        }
+        self.sweeper.set_limits(self.repose(), self.settings.curvature_max, self.spacing);
+        self.compaction.set_fraction(self.settings.compacted_fraction);
     }
 
     /// Moves what the feet have pressed out of their nodes to free ones.
@@ -128,39 +125,28 @@ impl Automaton {
             let sweeper = &mut self.sweeper;
             let mut site = Site {
                 ground,
-                cells: &mut sweeper.cells,
-                levels: &mut sweeper.levels,
-                awake: &mut sweeper.awake,
+                feet: &sweeper.feet,
+                compaction: &mut self.compaction,
+                changed: &mut sweeper.changed,
             };
+            let dense = site.compaction.total();
             let moved = site.displace([node.i, node.j], excess, self.commits);
+            let dense = self.compaction.total() - dense;
             let left = before - ground.heights.units(node.i, node.j);
-            sweeper.counts.gained += i64::from(moved - left);
+            sweeper.counts.gained += i64::from(moved - left) + dense;
             sweeper.counts.moved += i64::from(moved);
         }
     }
 
-    /// Sweeps of a step of h seconds at most.
-    fn budget(&self, h: f64) -> u32 {
-        let spacing = self.sweeper.cells.lattice().spacing;
-        let sweeps = self.settings.sweeps_per_step.unwrap_or(SWEEPS_PER_S_AND_M * h / spacing);
-        // a hair less, so that rounding does not add a sweep
-        if h > 0.0 { (sweeps - 1e-9).ceil() as u32 } else { 0 }
+    /// Sweeps of a step of h seconds at most: what the steps have earned, so that halving h does not double them.
+    fn budget(&mut self, h: f64) -> u32 {
+        let earned = self.settings.sweeps_per_step.unwrap_or(FRONT_SPEED * h / self.spacing);
+        self.credit += if h > 0.0 { earned } else { 0.0 };
+        // a hair more, so that rounding does not drop a sweep
+        let whole = (self.credit + 1e-9).floor();
+        self.credit = (self.credit - whole).max(0.0);
+        whole as u32
     }
-}
-
-/// Force-equivalent height p/(N·ρ·g) = z·p/p_law(z) in units, in steps of [`QUANTUM`].
-fn load_units(node: &Covered) -> i32 {
-    if node.pressure <= 0.0 || node.virgin <= 0.0 {
-        return 0;
-    }
-    let height = node.depth * (node.pressure / node.virgin).min(1.0);
-    (height / (UNIT_M * f64::from(QUANTUM))).round() as i32 * QUANTUM
-}
-
-/// What fits between the ground and a foot that does not touch it, units.
-fn room_units(node: &Covered, height: f64) -> i32 {
-    const LARGEST: f64 = 65_536.0;
-    if node.pressure > 0.0 { 0 } else { ((node.lower - height) / UNIT_M).clamp(1.0, LARGEST) as i32 }
 }
 
 /// Exact copy of the automaton's state.
@@ -168,12 +154,11 @@ fn room_units(node: &Covered, height: f64) -> i32 {
 pub struct Saved {
     settings: Option<Settings>,
     friction_angle: f64,
-    cells: TileMapSnapshot<Cell>,
-    levels: TileMapSnapshot<i32>,
     awake: SavedAwake,
-    covered: Vec<[i32; 2]>,
+    feet: Vec<Foot>,
+    compaction: SavedCompaction,
+    credit: f64,
     commits: u32,
-    counts: Counts,
     rescan: bool,
 }
 
@@ -181,10 +166,11 @@ impl Material for Automaton {
     type Saved = Saved;
 
     fn begin(&mut self, ground: &Ground, parameters: &SoilParameters) {
+        let lattice = *ground.heights.lattice();
         self.friction_angle = parameters.phi_rad;
-        self.sweeper = Sweeper::new(*ground.heights.lattice(), RESERVE_TILES);
-        self.covered.reserve(self.reserve);
-        self.uncovered.reserve(self.reserve);
+        self.spacing = lattice.spacing;
+        self.sweeper = Sweeper::new(lattice, self.host.clone(), self.reserve);
+        self.compaction = Compaction::new(lattice, self.settings.compacted_fraction);
         self.limit();
         self.sweeper.scan(ground);
     }
@@ -202,6 +188,7 @@ impl Material for Automaton {
             6 => self.settings.curvature_max = value,
             7 => self.settings.angle_of_repose = Some(value),
             8 => self.settings.sweeps_per_step = Some(value).filter(|v| *v > 0.0),
+            9 => self.settings.compacted_fraction = value,
             _ => return Err(Error::Refused("this value can only be read".into())),
         }
         self.rescan = true;
@@ -220,36 +207,29 @@ impl Material for Automaton {
             self.limit();
             self.sweeper.scan(ground);
         }
-        self.take_feet(ground, covered);
+        let sweeper = &mut self.sweeper;
+        sweeper.feet.take(ground, covered, &mut sweeper.changed);
         self.displace(ground, covered);
-        for _ in 0..self.budget(h) {
-            if self.sweeper.awake.is_empty() {
-                break;
-            }
-            self.sweeper.sweep(ground);
-        }
+        let most = self.budget(h);
+        self.sweeper.sweep(ground, most);
     }
 
     fn save(&self, out: &mut Saved) {
         out.settings = Some(self.settings);
         out.friction_angle = self.friction_angle;
-        self.sweeper.cells.save(&mut out.cells);
-        self.sweeper.levels.save(&mut out.levels);
-        self.sweeper.awake.save(&mut out.awake);
-        out.covered.clone_from(&self.covered);
-        (out.commits, out.counts) = (self.commits, self.sweeper.counts);
-        out.rescan = self.rescan;
+        self.sweeper.save(&mut out.awake);
+        self.sweeper.feet.save(&mut out.feet);
+        self.compaction.save(&mut out.compaction);
+        (out.credit, out.commits, out.rescan) = (self.credit, self.commits, self.rescan);
     }
 
     fn restore(&mut self, saved: &Saved) {
         self.settings = saved.settings.unwrap_or(self.settings);
         self.friction_angle = saved.friction_angle;
-        self.sweeper.cells.restore(&saved.cells);
-        self.sweeper.levels.restore(&saved.levels);
-        self.sweeper.awake.restore(&saved.awake);
-        self.covered.clone_from(&saved.covered);
-        (self.commits, self.sweeper.counts) = (saved.commits, saved.counts);
-        self.rescan = saved.rescan;
+        self.sweeper.restore(&saved.awake);
+        self.sweeper.feet.restore(&saved.feet);
+        self.compaction.restore(&saved.compaction);
+        (self.credit, self.commits, self.rescan) = (saved.credit, saved.commits, saved.rescan);
         self.limit();
     }
 }

@@ -1,9 +1,8 @@
-//! Displacement: what a foot presses out of a node goes to the nearest free nodes.
+//! Displacement: what a foot presses out of a node is compacted in part; the rest goes to the ring around the foot.
 
-use crate::awake::Awake;
-use crate::cell::{Cell, OPEN, QUANTUM};
-use crate::levels::Levels;
-use terraglue_ground::TileMap;
+use crate::active::Marks;
+use crate::compaction::Compaction;
+use crate::feet::Feet;
 use terraglue_soil_contact::Ground;
 
 /// The eight directions with the squared distance of one step.
@@ -17,83 +16,95 @@ const DIRECTIONS: [([i32; 2], f64); 8] = [
     ([0, -1], 1.0),
     ([1, -1], 2.0),
 ];
-/// Nodes that are looked at along a direction.
-const FARTHEST: i32 = 200;
 
 /// What displacement changes.
 pub struct Site<'a> {
     /// Ground.
     pub ground: &'a mut Ground,
-    /// Cells.
-    pub cells: &'a mut TileMap<Cell>,
-    /// Heights with load.
-    pub levels: &'a mut Levels,
-    /// Awake nodes.
-    pub awake: &'a mut Awake,
+    /// Nodes below feet: none of them takes material.
+    pub feet: &'a Feet,
+    /// Material that became denser.
+    pub compaction: &'a mut Compaction,
+    /// Nodes that have changed.
+    pub changed: &'a mut Marks,
 }
 
 impl Site<'_> {
-    /// Moves `excess` units out of the loaded node (i, j). Returns how many found a place; the others stay and are
-    /// tried again at the next commit. `turn` rotates the direction that gets the units that cannot be split.
+    /// Takes `excess` units out of the loaded node (i, j): its compacted part, and the rest to the nearest nodes without
+    /// a foot in eight directions, weighted with 1/distance². Returns how many units were moved; those without a place
+    /// stay and are tried again at the next commit. `turn` rotates the direction that gets what cannot be split.
     pub fn displace(&mut self, [i, j]: [i32; 2], excess: i32, turn: u32) -> i32 {
+        let dense = self.compaction.take([i, j], excess);
+        let loose = excess - dense;
         let mut places = [None; 8];
         let mut sum = 0.0;
         for (place, (direction, squared)) in places.iter_mut().zip(DIRECTIONS) {
             *place = self.nearest_free([i, j], direction).map(|(at, steps)| {
-                let weight = 1.0 / (squared * f64::from(steps * steps));
+                let weight = 1.0 / (squared * f64::from(steps) * f64::from(steps));
                 sum += weight;
                 (at, weight)
             });
         }
+        let mut left = loose;
         if sum == 0.0 {
-            return 0;
-        }
-        let mut left = excess;
-        for (at, weight) in places.iter().flatten() {
-            let share = (f64::from(excess) * weight / sum) as i32;
-            left -= self.give(*at, share.min(left));
-        }
-        for k in 0..8 {
-            if let Some((at, _)) = places[(turn as usize + k) % 8] {
+            if let Some(at) = self.nearest_anywhere([i, j]) {
                 left -= self.give(at, left);
             }
+        } else {
+            for (at, weight) in places.iter().flatten() {
+                let share = (f64::from(loose) * weight / sum) as i32;
+                left -= self.give(*at, share.min(left));
+            }
+            let last = (0..8).find_map(|k| places[(turn as usize + k) % 8]);
+            left -= last.map_or(0, |(at, _)| self.give(at, left));
         }
-        let moved = excess - left;
-        if moved > 0 {
-            self.ground.heights.add_units(i, j, -moved);
-            self.levels.add(i, j, -moved);
-            self.awake.wake(i, j);
+        let gone = excess - left;
+        if gone > 0 {
+            self.ground.heights.add_units(i, j, -gone);
+            self.changed.mark([i, j]);
         }
-        moved
+        loose - left
     }
 
-    /// The first node along a direction that takes material, and its distance in steps.
+    fn free(&self, at: [i32; 2]) -> bool {
+        !self.feet.above(at[0], at[1])
+    }
+
+    /// The first node along a direction that no foot covers, and its distance in steps.
     fn nearest_free(&self, from: [i32; 2], direction: [i32; 2]) -> Option<([i32; 2], i32)> {
-        for steps in 1..=FARTHEST {
+        let lattice = self.ground.heights.lattice();
+        for steps in 1.. {
             let at = [from[0] + steps * direction[0], from[1] + steps * direction[1]];
-            if !self.cells.lattice().has(at[0], at[1]) {
+            if !lattice.has(at[0], at[1]) {
                 return None;
             }
-            if self.cells.get(at[0], at[1]).room >= QUANTUM {
+            if self.free(at) {
                 return Some((at, steps));
             }
         }
         None
     }
 
-    /// Puts up to `units` onto a free node, no more than fits below a foot; returns how many.
+    /// A nearest free node by rings of growing size: for a foot in a corner that no direction leads out of.
+    fn nearest_anywhere(&self, [i, j]: [i32; 2]) -> Option<[i32; 2]> {
+        let lattice = self.ground.heights.lattice();
+        let farthest = lattice.size[0].max(lattice.size[1]) as i32;
+        for r in 1..=farthest {
+            for d in -r..=r {
+                let ring = [[i + d, j - r], [i + d, j + r], [i - r, j + d], [i + r, j + d]];
+                if let Some(at) = ring.into_iter().find(|at| lattice.has(at[0], at[1]) && self.free(*at)) {
+                    return Some(at);
+                }
+            }
+        }
+        None
+    }
+
     fn give(&mut self, [i, j]: [i32; 2], units: i32) -> i32 {
-        let cell = self.cells.get(i, j);
-        let units = units.min(cell.room);
-        if units <= 0 {
-            return 0;
+        if units > 0 {
+            self.ground.add_material(i, j, units);
+            self.changed.mark([i, j]);
         }
-        if cell.room != OPEN {
-            self.cells.get_mut(i, j).room -= units;
-        }
-        self.ground.add_material(i, j, units);
-        self.levels.add(i, j, units);
-        self.awake.wake(i, j);
-        units
+        units.max(0)
     }
 }

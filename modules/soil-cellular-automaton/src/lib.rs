@@ -24,16 +24,19 @@
 
 mod active;
 mod automaton;
-mod awake;
-mod cell;
+mod compaction;
 mod displace;
-mod levels;
-mod rules;
+mod feet;
+mod kernel;
+mod regions;
+mod span;
 mod sweep;
 mod values;
+mod window;
 
 pub use automaton::{Automaton, Settings};
-pub use rules::{curvature_flux, face_flux};
+pub use compaction::Compaction;
+pub use sweep::{Counts, Sweeper};
 
 use std::sync::Arc;
 use terraglue_soil_contact::FieldSoil;
@@ -67,10 +70,17 @@ impl Module for SoilCellularAutomaton {
             Parameter::of(
                 "sweeps_per_step",
                 ParameterType::Integer,
-                "sweeps of the automaton per communication step; 8 per ms and cm of spacing where it is left out",
+                "sweeps of the automaton per communication step; where it is left out a slide's front runs 20 m/s",
             )
             .within(0.0, 1e6)
             .optional(),
+            Parameter::number(
+                "compacted_fraction",
+                "",
+                automaton::DEFAULT_COMPACTION,
+                "share of the pressed volume that becomes denser instead of moving to the rim",
+            )
+            .within(0.0, 1.0),
         ]);
         Schema {
             name: "soil-cellular-automaton".into(),
@@ -81,7 +91,7 @@ impl Module for SoilCellularAutomaton {
     }
 
     fn instantiate(config: &Config, host: Arc<dyn Host>) -> Result<Box<dyn Subsystem>> {
-        let automaton = Automaton::new(Settings::from_config(config)?, host.max_nodes());
+        let automaton = Automaton::new(Settings::from_config(config)?, host.clone());
         Ok(Box::new(FieldSoil::new(config, host, automaton)?))
     }
 }

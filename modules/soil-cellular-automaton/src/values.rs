@@ -13,7 +13,12 @@ pub fn variables(first: u32) -> Vec<Variable> {
         out(0, "active_nodes", "", "nodes that the next step will visit"),
         out(1, "visited_nodes", "", "visits of nodes in the last step; 0 on ground at rest"),
         out(2, "sweeps", "", "sweeps of the last step"),
-        out(3, "mass_error_units", "", "units of material gained since the start; 0: none was lost"),
+        out(
+            3,
+            "mass_error_units",
+            "",
+            "units of material gained or not booked since the start; 0: none was lost",
+        ),
         out(4, "mass_error_relative", "", "material gained since the start over material moved"),
         out(
             5,
@@ -23,8 +28,10 @@ pub fn variables(first: u32) -> Vec<Variable> {
         ),
         live(6, "curvature_max_per_m", "", "largest curvature of the surface, 1/m").within(0.1, 1e6),
         live(7, "angle_of_repose_rad", "rad", "angle of repose").within(0.01, 1.4),
-        live(8, "sweeps_per_step", "", "sweeps per step at most; 0: 8 per ms and cm of spacing")
+        live(8, "sweeps_per_step", "", "sweeps per step at most; 0: a slide's front runs 20 m/s")
             .within(0.0, 1e6),
+        live(9, "compacted_fraction", "", "share of the pressed volume that becomes denser").within(0.0, 1.0),
+        out(10, "compacted_volume", "m^3", "volume that became denser under feet since the start"),
     ]
 }
 
@@ -42,6 +49,8 @@ pub fn value(automaton: &Automaton, k: u32, ground: &Ground) -> f64 {
         6 => automaton.settings().curvature_max,
         7 => automaton.repose(),
         8 => automaton.settings().sweeps_per_step.unwrap_or(0.0),
+        9 => automaton.settings().compacted_fraction,
+        10 => automaton.compaction().total() as f64 * UNIT_M * spacing * spacing,
         _ => f64::NAN,
     }
 }

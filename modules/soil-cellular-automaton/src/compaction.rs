@@ -1,0 +1,110 @@
+//! Material that became denser under feet: it leaves the height field and is booked, unit for unit.
+
+use terraglue_ground::{Lattice, TileMap, TileMapSnapshot, UNIT_M};
+
+/// Compaction is booked in grains of so many units of height (7.6 µm): 16 bits a node reach to 0.5 m.
+const GRAIN: i32 = 32;
+/// Tiles that can be touched before memory is asked for again.
+const RESERVE_TILES: usize = 256;
+
+/// Compacted material by node.
+#[derive(Clone, Debug)]
+pub struct Compaction {
+    fraction: f64,
+    grains: TileMap<u16>,
+    /// What whole grains have left over of the fraction so far, units.
+    carried: f64,
+    total: i64,
+}
+
+/// Exact copy.
+#[derive(Clone, Debug, Default)]
+pub struct SavedCompaction {
+    fraction: f64,
+    grains: TileMapSnapshot<u16>,
+    carried: f64,
+    total: i64,
+}
+
+impl Compaction {
+    /// None so far; `fraction` (0 … 1) of what is pressed out of a node stays in it, denser.
+    pub fn new(lattice: Lattice, fraction: f64) -> Self {
+        let grains = TileMap::new(lattice, 0, RESERVE_TILES);
+        Self { fraction, grains, carried: 0.0, total: 0 }
+    }
+
+    /// Share of the pressed volume that is compacted.
+    pub fn fraction(&self) -> f64 {
+        self.fraction
+    }
+
+    /// New share from now on.
+    pub fn set_fraction(&mut self, fraction: f64) {
+        self.fraction = fraction;
+    }
+
+    /// Books the compacted part of `excess` units at node (i, j) and returns it: over many calls the set fraction.
+    pub fn take(&mut self, [i, j]: [i32; 2], excess: i32) -> i32 {
+        if self.fraction <= 0.0 {
+            return 0;
+        }
+        let wanted = f64::from(excess) * self.fraction + self.carried;
+        let most = i32::from(u16::MAX - self.grains.get(i, j)).min(excess / GRAIN);
+        let grains = ((wanted / f64::from(GRAIN)) as i32).clamp(0, most);
+        // a node that cannot take more hands over no more than a grain
+        self.carried = (wanted - f64::from(grains * GRAIN)).min(f64::from(4 * GRAIN));
+        if grains > 0 {
+            *self.grains.get_mut(i, j) += grains as u16;
+            self.total += i64::from(grains * GRAIN);
+        }
+        grains * GRAIN
+    }
+
+    /// Units of height that were compacted since the start, over all nodes.
+    pub fn total(&self) -> i64 {
+        self.total
+    }
+
+    /// Height that was compacted at a node, m.
+    pub fn height(&self, i: i32, j: i32) -> f64 {
+        f64::from(i32::from(self.grains.get(i, j)) * GRAIN) * UNIT_M
+    }
+
+    /// Copies the state.
+    pub fn save(&self, out: &mut SavedCompaction) {
+        (out.fraction, out.carried, out.total) = (self.fraction, self.carried, self.total);
+        self.grains.save(&mut out.grains);
+    }
+
+    /// Back to a saved state.
+    pub fn restore(&mut self, saved: &SavedCompaction) {
+        (self.fraction, self.carried, self.total) = (saved.fraction, saved.carried, saved.total);
+        self.grains.restore(&saved.grains);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        #[test]
+        fn the_fraction_is_kept_and_every_unit_is_booked(
+            pressed in prop::collection::vec((0..9i32, 1..2000i32), 100..400), fraction in 0.0..0.9f64,
+        ) {
+            let lattice = Lattice { origin: [0.0; 2], spacing: 0.01, size: [9, 1] };
+            let mut compaction = Compaction::new(lattice, fraction);
+            let (mut taken, mut all) = (0, 0);
+            for (i, excess) in pressed {
+                let dense = compaction.take([i, 0], excess);
+                prop_assert!(dense >= 0 && dense <= excess);
+                (taken, all) = (taken + dense, all + excess);
+            }
+            prop_assert_eq!(i64::from(taken), compaction.total());
+            let by_node: f64 = (0..9).map(|i| compaction.height(i, 0) / UNIT_M).sum();
+            prop_assert_eq!(by_node, f64::from(taken));
+            prop_assert!((f64::from(taken) - fraction * f64::from(all)).abs() < 0.02 * f64::from(all) + 200.0);
+        }
+    }
+}

@@ -1,0 +1,42 @@
+//! Half-open ranges of columns, one per row of a window: where a rule has something to do.
+
+/// Columns lo … hi − 1; empty when lo ≥ hi.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Span {
+    /// First column.
+    pub lo: usize,
+    /// One past the last.
+    pub hi: usize,
+}
+
+impl Span {
+    /// No column.
+    pub const NONE: Self = Self { lo: usize::MAX, hi: 0 };
+
+    /// Whether there is no column.
+    #[inline]
+    pub fn is_empty(self) -> bool {
+        self.lo >= self.hi
+    }
+
+    /// Number of columns.
+    #[inline]
+    pub fn len(self) -> usize {
+        self.hi.saturating_sub(self.lo)
+    }
+
+    /// Smallest span around both.
+    #[inline]
+    pub fn hull(self, other: Self) -> Self {
+        Self { lo: self.lo.min(other.lo), hi: self.hi.max(other.hi) }
+    }
+
+    /// `by` columns more on either side, within `bounds`; an empty span stays empty.
+    #[inline]
+    pub fn grown(self, by: usize, bounds: Self) -> Self {
+        if self.is_empty() {
+            return Self::NONE;
+        }
+        Self { lo: self.lo.saturating_sub(by).max(bounds.lo), hi: (self.hi + by).min(bounds.hi) }
+    }
+}

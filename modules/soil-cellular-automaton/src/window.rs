@@ -1,0 +1,554 @@
+//! A rectangle of the ground in one piece of memory, in which sweeps run without looking anywhere else.
+//!
+//! It holds the awake nodes and as many around them as the sweeps of a round can reach, so that windows of one round
+//! neither see nor disturb each other and their number and shape cannot be seen in the result.
+
+use crate::feet::{Foot, OPEN_INLET, inlet};
+use crate::kernel::{LANES, admit, faces_across, faces_along, triples};
+use crate::span::Span;
+use terraglue_ground::{Lattice, TILE_EDGE};
+use terraglue_soil_contact::Ground;
+
+/// Nodes around what is evaluated that are read.
+const HALO: usize = 2;
+/// Columns before the first node, so that groups of lanes never leave the row.
+const LEFT: usize = 16;
+const RIGHT: usize = 2 * LANES;
+/// Three times four directions of triples and the changes.
+const WORK_ROWS: usize = 13;
+
+/// The rules in units of height on one lattice.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Limits {
+    /// Δ·tan φ_r.
+    pub repose: f32,
+    /// κ_max·d² for straight and diagonal triples.
+    pub curvature: [i32; 2],
+}
+
+/// Nodes first … last of the lattice along x and y.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Rectangle {
+    /// Smallest indices.
+    pub first: [i32; 2],
+    /// Largest indices.
+    pub last: [i32; 2],
+}
+
+/// A foot's node inside the window.
+#[derive(Clone, Copy, Debug)]
+struct Below {
+    at: usize,
+    foot: usize,
+    load: i32,
+    room: i32,
+    level: i32,
+    filled: bool,
+}
+
+/// The rectangle with its working memory.
+#[derive(Clone, Debug, Default)]
+pub struct Window {
+    /// Lattice node of column [`LEFT`] of row 0.
+    origin: [i32; 2],
+    width: usize,
+    height: usize,
+    stride: usize,
+    levels: Vec<i32>,
+    inlets: Vec<i32>,
+    /// Rows with nodes that do not admit everything.
+    limited: Vec<bool>,
+    below: Vec<Below>,
+    /// Columns and rows that lie on the lattice and have a full halo.
+    columns: Option<Span>,
+    rows: Option<Span>,
+    /// Sides where the lattice ends inside the window: left, right, lower, upper.
+    borders: [bool; 4],
+    /// What the rules have to visit, per row.
+    pub repose: Vec<Span>,
+    /// See `repose`.
+    pub curvature: Vec<Span>,
+    next: Vec<Span>,
+    dirty: Vec<Span>,
+    /// Rows of fluxes and changes.
+    work: Vec<Vec<i32>>,
+    /// Nodes visited since the window was filled.
+    pub visited: u64,
+    /// Largest change of the last sweep, units.
+    pub largest: i32,
+}
+
+impl Window {
+    /// Copies the ground around `area`, `reach` nodes farther on every side, with the load of the feet.
+    pub fn fill(&mut self, ground: &Ground, feet: &[Foot], area: Rectangle, reach: usize) {
+        let lattice = *ground.heights.lattice();
+        let around = (reach + HALO) as i32;
+        self.origin = area.first.map(|k| k - around);
+        let side = |k: usize| (area.last[k] - area.first[k] + 1 + 2 * around) as usize;
+        (self.width, self.height) = (side(0), side(1));
+        self.stride = LEFT + self.width.next_multiple_of(LANES) + RIGHT;
+        self.reset();
+        self.find_borders(&lattice);
+        self.copy_heights(ground);
+        self.repeat_borders();
+        self.put_feet(feet);
+    }
+
+    fn reset(&mut self) {
+        let (rows, nodes) = (self.height, self.stride * self.height);
+        self.levels.resize(nodes.max(self.levels.len()), 0);
+        for spans in [&mut self.repose, &mut self.curvature, &mut self.next, &mut self.dirty] {
+            spans.clear();
+            spans.resize(rows, Span::NONE);
+        }
+        self.limited.clear();
+        self.limited.resize(rows, false);
+        self.below.clear();
+        self.work.resize(WORK_ROWS, Vec::new());
+        for row in &mut self.work {
+            row.resize(self.stride.max(row.len()), 0);
+        }
+        self.visited = 0;
+    }
+
+    fn find_borders(&mut self, lattice: &Lattice) {
+        let inside = |k: usize, n: usize| {
+            let first = (-self.origin[k]).max(HALO as i32) as usize;
+            let end = (lattice.size[k] as i32 - self.origin[k]).min((n - HALO) as i32).max(0) as usize;
+            Span { lo: first, hi: end }
+        };
+        let (x, y) = (inside(0, self.width), inside(1, self.height));
+        self.columns = Some(Span { lo: x.lo + LEFT, hi: x.hi + LEFT });
+        self.rows = Some(y);
+        let beyond = |k: usize, n: usize| self.origin[k] + n as i32 > lattice.size[k] as i32;
+        self.borders =
+            [self.origin[0] < 0, beyond(0, self.width), self.origin[1] < 0, beyond(1, self.height)];
+        if self.borders.contains(&true) {
+            self.limit_everything();
+            self.close_outside(lattice);
+        }
+    }
+
+    fn limit_everything(&mut self) {
+        self.inlets.resize(self.levels.len(), 0);
+        self.inlets[..self.stride * self.height].fill(OPEN_INLET);
+    }
+
+    /// Nothing flows to where there is no lattice.
+    fn close_outside(&mut self, lattice: &Lattice) {
+        self.limited.fill(true);
+        for y in 0..self.height {
+            let j = self.origin[1] + y as i32;
+            let row = &mut self.inlets[y * self.stride..(y + 1) * self.stride];
+            if j < 0 || j >= lattice.size[1] as i32 {
+                row.fill(0);
+                continue;
+            }
+            let first = LEFT as i32 - self.origin[0];
+            row[..first.max(0) as usize].fill(0);
+            let end = first + lattice.size[0] as i32;
+            if (end as usize) < self.stride {
+                row[end.max(0) as usize..].fill(0);
+            }
+        }
+    }
+
+    fn copy_heights(&mut self, ground: &Ground) {
+        let lattice = ground.heights.lattice();
+        let edge = TILE_EDGE as i32;
+        let [nx, _] = lattice.tiles();
+        let bound = |k: usize, n: usize| {
+            (self.origin[k].max(0), (self.origin[k] + n as i32).min(lattice.size[k] as i32))
+        };
+        let ((i0, i1), (j0, j1)) = (bound(0, self.width), bound(1, self.height));
+        if i0 >= i1 || j0 >= j1 {
+            return;
+        }
+        for b in j0 / edge..=(j1 - 1) / edge {
+            for a in i0 / edge..=(i1 - 1) / edge {
+                let tile = ground.heights.tile((b * nx as i32 + a) as usize);
+                let (x0, x1) = (i0.max(a * edge), i1.min((a + 1) * edge));
+                let n = (x1 - x0) as usize;
+                for j in j0.max(b * edge)..j1.min((b + 1) * edge) {
+                    let at = self.at(x0, j);
+                    let from = ((j - b * edge) * edge + x0 - a * edge) as usize;
+                    match tile {
+                        Ok(units) => self.levels[at..at + n].copy_from_slice(&units[from..from + n]),
+                        Err(units) => self.levels[at..at + n].fill(units),
+                    }
+                }
+            }
+        }
+    }
+
+    /// Place of a lattice node.
+    #[inline]
+    fn at(&self, i: i32, j: i32) -> usize {
+        (j - self.origin[1]) as usize * self.stride + (i - self.origin[0]) as usize + LEFT
+    }
+
+    /// Beyond the lattice the nearest node repeats itself.
+    fn repeat_borders(&mut self) {
+        if !self.borders.contains(&true) {
+            return;
+        }
+        let (Some(x), Some(y)) = (self.columns, self.rows) else { return };
+        if x.is_empty() || y.is_empty() {
+            return;
+        }
+        for row in self.levels.chunks_exact_mut(self.stride).take(self.height) {
+            if self.borders[0] {
+                let edge = row[x.lo];
+                row[x.lo - HALO..x.lo].fill(edge);
+            }
+            if self.borders[1] {
+                let edge = row[x.hi - 1];
+                row[x.hi..x.hi + HALO].fill(edge);
+            }
+        }
+        let (s, n) = (self.stride, HALO);
+        for k in 1..=n {
+            if self.borders[2] {
+                self.levels.copy_within(y.lo * s..(y.lo + 1) * s, (y.lo - k) * s);
+            }
+            if self.borders[3] {
+                self.levels.copy_within((y.hi - 1) * s..y.hi * s, (y.hi - 1 + k) * s);
+            }
+        }
+    }
+
+    fn put_feet(&mut self, feet: &[Foot]) {
+        let last_row = self.origin[1] + self.height as i32;
+        let first = feet.partition_point(|f| f.node[1] < self.origin[1]);
+        for (k, foot) in feet.iter().enumerate().skip(first) {
+            let [i, j] = foot.node;
+            if j >= last_row {
+                break;
+            }
+            let x = i - self.origin[0];
+            if x < 0 || x >= self.width as i32 {
+                continue;
+            }
+            if self.below.is_empty() && !self.borders.contains(&true) {
+                self.limit_everything();
+            }
+            let at = self.at(i, j);
+            self.levels[at] = self.levels[at].wrapping_add(foot.load);
+            self.inlets[at] = inlet(foot.room);
+            self.limited[(j - self.origin[1]) as usize] = true;
+            let level = self.levels[at];
+            self.below.push(Below { at, foot: k, load: foot.load, room: foot.room, level, filled: false });
+        }
+    }
+
+    /// Wakes the columns of a row of the lattice (first node and a bit per node) for one of the rules.
+    pub fn wake(&mut self, curvature: bool, [i, j]: [i32; 2], bits: u32) {
+        if bits == 0 {
+            return;
+        }
+        // the tile may begin to the left of the window, its bits do not
+        let column = |bit: u32| (i - self.origin[0] + LEFT as i32 + bit as i32) as usize;
+        let span = Span { lo: column(bits.trailing_zeros()), hi: column(32 - bits.leading_zeros()) };
+        let rows = if curvature { &mut self.curvature } else { &mut self.repose };
+        let row = &mut rows[(j - self.origin[1]) as usize];
+        *row = row.hull(span);
+    }
+
+    /// Wakes everything.
+    pub fn wake_all(&mut self) {
+        let (Some(columns), Some(rows)) = (self.columns, self.rows) else { return };
+        self.repose[rows.lo..rows.hi].fill(columns);
+        self.curvature[rows.lo..rows.hi].fill(columns);
+    }
+
+    /// Applies the rule of repose once; without `apply` only notes what would change. Returns the largest change.
+    #[inline(always)]
+    pub fn repose_pass(&mut self, limits: &Limits, apply: bool) -> i32 {
+        let rows = self.rows.unwrap_or(Span::NONE);
+        let mut work = std::mem::take(&mut self.work);
+        let [along, lower, upper, change, waiting] = &mut work[..5] else { return 0 };
+        self.next.fill(Span::NONE);
+        let (mut before, mut pending, mut largest) = (Span::NONE, Span::NONE, 0);
+        for y in rows.lo..rows.hi {
+            let span = self.repose[y];
+            if !span.is_empty() {
+                if before.lo > span.lo || before.hi < span.hi {
+                    // the row below did not need all of these faces
+                    self.across(y - 1, span, limits.repose, lower);
+                }
+                self.along(y, span, limits.repose, along);
+                self.visited += span.len() as u64;
+            }
+            // the row below is not read any more
+            largest = largest.max(self.finish(y.wrapping_sub(1), pending, waiting, apply));
+            let next = if y + 1 < rows.hi { self.repose[y + 1] } else { Span::NONE };
+            let faces = span.hull(next);
+            if !faces.is_empty() {
+                self.across(y, faces, limits.repose, upper);
+            }
+            if !span.is_empty() {
+                sum_faces(span, along, lower, upper, change);
+            }
+            pending = span;
+            before = faces;
+            std::mem::swap(change, waiting);
+            std::mem::swap(lower, upper);
+        }
+        largest = largest.max(self.finish(rows.hi.wrapping_sub(1), pending, waiting, apply));
+        self.work = work;
+        std::mem::swap(&mut self.repose, &mut self.next);
+        self.after_pass(apply);
+        largest
+    }
+
+    #[inline(always)]
+    fn row(&self, y: usize) -> &[i32] {
+        &self.levels[y * self.stride..(y + 1) * self.stride]
+    }
+
+    /// Fluxes over the faces along row y on either side of the nodes of `span`.
+    #[inline(always)]
+    fn along(&self, y: usize, span: Span, thr: f32, out: &mut [i32]) {
+        let range = [span.lo - 1, span.hi];
+        faces_along([self.row(y - 1), self.row(y), self.row(y + 1)], range, thr, out);
+        if self.limited[y] {
+            let inlets = &self.inlets[y * self.stride..(y + 1) * self.stride];
+            admit(
+                &mut out[range[0]..range[1]],
+                &inlets[range[0]..range[1]],
+                &inlets[range[0] + 1..=range[1]],
+            );
+        }
+    }
+
+    /// Fluxes from row y to row y + 1.
+    #[inline(always)]
+    fn across(&self, y: usize, span: Span, thr: f32, out: &mut [i32]) {
+        faces_across(self.row(y), self.row(y + 1), [span.lo, span.hi], thr, out);
+        if self.limited[y] || self.limited[y + 1] {
+            let at = |y: usize| &self.inlets[y * self.stride + span.lo..y * self.stride + span.hi];
+            admit(&mut out[span.lo..span.hi], at(y), at(y + 1));
+        }
+    }
+
+    /// Adds the changes of row y, notes them and wakes what they reach. Returns the largest.
+    #[inline(always)]
+    fn finish(&mut self, y: usize, span: Span, change: &mut [i32], apply: bool) -> i32 {
+        if span.is_empty() {
+            return 0;
+        }
+        let mut largest = 0;
+        let end = span.lo + span.len().next_multiple_of(LANES);
+        change[span.hi..end].fill(0);
+        let row = &mut self.levels[y * self.stride..(y + 1) * self.stride];
+        let mut changed = Span::NONE;
+        for x in (span.lo..end).step_by(LANES) {
+            let group = &change[x..x + LANES];
+            let mut most = 0;
+            for change in group {
+                most = most.max(change.wrapping_abs());
+            }
+            if most != 0 {
+                changed = changed.hull(Span { lo: x, hi: x + LANES });
+                largest = largest.max(most);
+                if apply {
+                    for (level, change) in row[x..x + LANES].iter_mut().zip(group) {
+                        *level = level.wrapping_add(*change);
+                    }
+                }
+            }
+        }
+        if !changed.is_empty() {
+            self.note(y, trimmed(changed, span, change));
+        }
+        largest
+    }
+
+    /// Row y has changed in `span`.
+    #[inline(always)]
+    fn note(&mut self, y: usize, span: Span) {
+        let (columns, rows) = (self.columns.unwrap_or(Span::NONE), self.rows.unwrap_or(Span::NONE));
+        self.dirty[y] = self.dirty[y].hull(span);
+        let near = span.grown(1, columns);
+        for row in (y - 1).max(rows.lo)..(y + 2).min(rows.hi) {
+            self.next[row] = self.next[row].hull(near);
+        }
+        let far = span.grown(2, columns);
+        for row in (y - 2).max(rows.lo)..(y + 3).min(rows.hi) {
+            self.curvature[row] = self.curvature[row].hull(far);
+        }
+    }
+
+    fn after_pass(&mut self, apply: bool) {
+        if apply {
+            self.repeat_borders();
+            for node in &mut self.below {
+                let change = self.levels[node.at].wrapping_sub(node.level);
+                if change != 0 && node.room != 0 {
+                    node.level += change;
+                    node.filled = true;
+                    node.room = node.room.saturating_sub(change).max(1);
+                    self.inlets[node.at] = inlet(node.room);
+                }
+            }
+        }
+    }
+
+    /// Applies the rule of curvature once; otherwise as [`Window::repose_pass`].
+    #[inline(always)]
+    pub fn curvature_pass(&mut self, limits: &Limits, apply: bool) -> i32 {
+        let rows = self.rows.unwrap_or(Span::NONE);
+        let mut work = std::mem::take(&mut self.work);
+        let mut visit = std::mem::take(&mut self.next);
+        std::mem::swap(&mut visit, &mut self.curvature);
+        self.curvature.resize(visit.len(), Span::NONE);
+        self.curvature.fill(Span::NONE);
+        // what was awake for the rule of repose stays so
+        self.next = std::mem::take(&mut self.repose);
+        let mut largest = 0;
+        let mut any = [false; 3];
+        let span_of = |y: usize| if y >= rows.lo && y < rows.hi { visit[y] } else { Span::NONE };
+        for y in rows.lo - 1..rows.hi + 1 {
+            // the triples with their middle in row y, needed by the rows y − 1, y and y + 1
+            let needed = span_of(y.wrapping_sub(1)).hull(span_of(y)).hull(span_of(y + 1));
+            let place = y % 3;
+            any[place] = false;
+            let inside = y + 1 < self.height;
+            if !needed.is_empty() && inside {
+                any[place] = self.middles(y, needed, limits, &mut work[4 * place..4 * place + 4]);
+            }
+            self.visited += span_of(y).len() as u64;
+            let done = y.wrapping_sub(1);
+            let span = span_of(done);
+            if span.is_empty() {
+                continue;
+            }
+            if any.iter().any(|a| *a) {
+                let (fluxes, others) = work.split_at_mut(12);
+                let change = &mut others[0];
+                sum_triples(span, done, any, fluxes, change);
+                // no triple of the rows that follow reads this row
+                largest = largest.max(self.finish(done, span, change, apply));
+            }
+        }
+        self.work = work;
+        std::mem::swap(&mut self.repose, &mut self.next);
+        self.next = visit;
+        self.after_pass(apply);
+        largest
+    }
+
+    /// The four directions of triples with their middle in row y. Returns whether any gives or takes.
+    #[inline(always)]
+    fn middles(&self, y: usize, span: Span, limits: &Limits, out: &mut [Vec<i32>]) -> bool {
+        let [below, here, above] = [self.row(y - 1), self.row(y), self.row(y + 1)];
+        let range = [span.lo - 1, span.hi + 1];
+        let [straight, diagonal] = limits.curvature;
+        let cases = [
+            ([here, here, here], [-1, 1], straight, [0, 0]),
+            ([below, here, above], [0, 0], straight, [-1, 1]),
+            ([below, here, above], [-1, 1], diagonal, [-1, 1]),
+            ([above, here, below], [-1, 1], diagonal, [1, -1]),
+        ];
+        let limited = self.limited[y - 1] || self.limited[y] || self.limited[y + 1];
+        let mut any = false;
+        for ((rows, shift, limit, step), out) in cases.into_iter().zip(out) {
+            let moves = triples(rows, shift, range, limit, out);
+            any |= moves;
+            if moves && limited {
+                let inlet = |dy: isize, dx: isize, x: usize| {
+                    self.inlets[y.wrapping_add_signed(dy) * self.stride + x.wrapping_add_signed(dx)]
+                };
+                for x in range[0]..range[1] {
+                    let ends = inlet(step[0], shift[0], x).min(inlet(step[1], shift[1], x));
+                    let least = ends.min(inlet(0, 0, x));
+                    out[x] = out[x].clamp(-least, least);
+                }
+            }
+        }
+        any
+    }
+
+    /// Calls `row(first node, heights)` for every row that has changed, and gives the feet's rooms back.
+    pub fn empty(&mut self, feet: &mut [Foot], mut row: impl FnMut([i32; 2], &[i32])) {
+        for node in &self.below {
+            self.levels[node.at] = self.levels[node.at].wrapping_sub(node.load);
+            if node.filled {
+                feet[node.foot].room = node.room;
+            }
+        }
+        for (y, span) in self.dirty.iter().enumerate().filter(|(_, span)| !span.is_empty()) {
+            let first = [self.origin[0] + (span.lo - LEFT) as i32, self.origin[1] + y as i32];
+            row(first, &self.levels[y * self.stride + span.lo..y * self.stride + span.hi]);
+        }
+    }
+
+    /// Calls `span(for curvature, first node, end)` for every row that is awake.
+    pub fn awake(&self, mut span: impl FnMut(bool, [i32; 2], i32)) {
+        for (curvature, rows) in [(false, &self.repose), (true, &self.curvature)] {
+            for (y, s) in rows.iter().enumerate().filter(|(_, s)| !s.is_empty()) {
+                let column = |x: usize| self.origin[0] + x as i32 - LEFT as i32;
+                span(curvature, [column(s.lo), self.origin[1] + y as i32], column(s.hi));
+            }
+        }
+    }
+
+    /// Whether nobody is awake.
+    pub fn sleeps(&self) -> bool {
+        self.repose.iter().chain(&self.curvature).all(|s| s.is_empty())
+    }
+}
+
+/// Change of each node of `span` from the fluxes over its four faces.
+#[inline(always)]
+fn sum_faces(span: Span, along: &[i32], lower: &[i32], upper: &[i32], change: &mut [i32]) {
+    for x in (span.lo..span.hi).step_by(LANES) {
+        let (left, right) = (&along[x - 1..x - 1 + LANES], &along[x..x + LANES]);
+        let (lower, upper) = (&lower[x..x + LANES], &upper[x..x + LANES]);
+        let out = &mut change[x..x + LANES];
+        for k in 0..LANES {
+            out[k] = left[k].wrapping_sub(right[k]).wrapping_add(lower[k].wrapping_sub(upper[k]));
+        }
+    }
+}
+
+/// Change of each node of row y from the triples that hold it; fluxes of middles in row r lie in `fluxes[4·(r % 3)]` ….
+#[inline(always)]
+fn sum_triples(span: Span, y: usize, any: [bool; 3], fluxes: &[Vec<i32>], change: &mut [i32]) {
+    change[span.lo..span.lo + span.len().next_multiple_of(LANES)].fill(0);
+    let rows = [y - 1, y, y + 1].map(|r| r % 3);
+    let [lower, here, upper] = rows.map(|r| &fluxes[4 * r..4 * r + 4]);
+    let range = span.lo..span.hi;
+    if any[rows[1]] {
+        let [h, v, d, e] = here else { return };
+        for x in range.clone() {
+            let own = h[x] + v[x] + d[x] + e[x];
+            change[x] += 2 * own - h[x - 1] - h[x + 1];
+        }
+    }
+    if any[rows[0]] {
+        let [_, v, d, e] = lower else { return };
+        for x in range.clone() {
+            change[x] -= v[x] + d[x - 1] + e[x + 1];
+        }
+    }
+    if any[rows[2]] {
+        let [_, v, d, e] = upper else { return };
+        for x in range {
+            change[x] -= v[x] + d[x + 1] + e[x - 1];
+        }
+    }
+}
+
+/// The part of `changed` inside `span` without zeros at its ends.
+#[inline(always)]
+fn trimmed(changed: Span, span: Span, change: &[i32]) -> Span {
+    let (mut lo, mut hi) = (changed.lo, changed.hi.min(span.hi));
+    while lo < hi && change[lo] == 0 {
+        lo += 1;
+    }
+    while hi > lo && change[hi - 1] == 0 {
+        hi -= 1;
+    }
+    Span { lo, hi }
+}

@@ -94,7 +94,7 @@ def test_a_unit_that_fails_stops_the_run_and_is_named(decay, tmp_path, mode, say
     ]
     for done in runs:
         assert done.returncode == 1, done.stderr
-        assert says in done.stderr and "0.375" in done.stderr or "0.5" in done.stderr, done.stderr
+        assert says in done.stderr and ("0.375" in done.stderr or "0.5" in done.stderr), done.stderr
         assert "decay" in done.stderr
     rows = list(csv.reader((tmp_path / "out" / "variables.csv").open()))
     assert len(rows) >= 4, "the recording up to the failure is readable"

@@ -153,8 +153,7 @@ impl Scene<'_> {
         state.largest = n.z_max[k];
         if depth > n.z_max[k] {
             let (before, p) = (n.z_max[k], n.p_max[k]);
-            let kept = curve.virgin_work(before, p) - 0.5 * p * p / curve.unloading();
-            book.dissipated += area * (curve.virgin_work(depth, pressure) - squeezed - kept).max(0.0);
+            book.dissipated += area * curve.plastic_work(before, p, depth, pressure);
             state.permanent = curve.permanent(depth, pressure) / patch.slope;
             state.largest = depth;
         }

@@ -269,9 +269,8 @@ impl Patches {
                 highest.max((self.nodes.depth[k] - self.nodes.permanent[k]) / self.nodes.facing[k].press[0]);
             let (pressure, _) = patch.curve.at(self.nodes.depth[k], self.nodes.z_max[k], self.nodes.p_max[k]);
             if pressure > 0.0 {
-                let mobilised = shear.mobilised(self.nodes.shear[k].slip);
                 let inclined = self.nodes.area[k] * self.nodes.facing[k].stretch;
-                strength += inclined * shear.strength(pressure).0 * mobilised;
+                strength += inclined * shear.yield_stress(pressure, self.nodes.shear[k].slip);
             }
         }
         let patch = &mut self.ports[p];

@@ -7,7 +7,7 @@ use crate::state::{Committed, Slots};
 use crate::trial::Last;
 use crate::values;
 use std::sync::Arc;
-use terraglue_soil_law::SoilParameters;
+use terraglue_soil_law::{PressureLaw, SoilExpressions, SoilParameters};
 use terraglue_subsystem::{
     Capabilities, Config, Energy, Error, Estimate, FieldInfo, FieldTile, Host, Input, Law, Level, LogLevel,
     Motion, Response, Result, Step, Subsystem, Values, ValuesMut, Variable, cooperation,
@@ -53,6 +53,7 @@ pub trait Material: Send {
 pub struct FieldSoil<M: Material> {
     host: Arc<dyn Host>,
     parameters: SoilParameters,
+    expressions: Option<SoilExpressions>,
     laws: Laws,
     ground: Ground,
     material: M,
@@ -72,6 +73,7 @@ impl<M: Material> FieldSoil<M> {
     /// A soil on the host's terrain. Refused: parameters without sense, a scenario without ground.
     pub fn new(config: &Config, host: Arc<dyn Host>, mut material: M) -> Result<Self> {
         let parameters = SoilParameters::from_config(config, length(host.gravity()))?;
+        let expressions = SoilExpressions::from_config(config)?;
         let ground = Ground::new(host.required_terrain()?)?;
         material.begin(&ground, &parameters);
         let mut variables = values::shared();
@@ -81,7 +83,8 @@ impl<M: Material> FieldSoil<M> {
         patches.nodes.reserve(nodes);
         lists.reserve(nodes);
         Ok(Self {
-            laws: laws_of(&parameters),
+            laws: laws_of(&parameters, expressions.as_ref())?,
+            expressions,
             fields: [ground.heights.height_info(), ground.heights.sinkage_info()],
             slots: Slots::new(host.slots()),
             book: Book::default(),
@@ -145,8 +148,18 @@ fn length(v: [f64; 3]) -> f64 {
     v.iter().map(|c| c * c).sum::<f64>().sqrt()
 }
 
-fn laws_of(p: &SoilParameters) -> Laws {
-    Laws { pressure: p.pressure(), shear: p.shear(), elastic: p.elastic_stiffness_pa_m }
+/// The laws with these numbers; what the scenario writes as text takes the place of the built-in law.
+fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>) -> Result<Laws> {
+    let mut laws = Laws { pressure: p.pressure(), shear: p.shear(), elastic: p.elastic_stiffness_pa_m };
+    if let Some(texts) = texts {
+        if let Some(law) = texts.pressure(p)? {
+            laws.pressure = PressureLaw::Expression(law);
+        }
+        if let Some(law) = texts.shear(p)? {
+            laws.shear = laws.shear.with_expression(law);
+        }
+    }
+    Ok(laws)
 }
 
 impl<M: Material> Subsystem for FieldSoil<M> {
@@ -240,7 +253,7 @@ impl<M: Material> Subsystem for FieldSoil<M> {
             parameters: &mut self.parameters,
         };
         self.material.restore(self.slots.restore(slot, &mut state)?);
-        self.laws = laws_of(&self.parameters);
+        self.laws = laws_of(&self.parameters, self.expressions.as_ref())?;
         self.patches.forget();
         self.last.clear();
         Ok(())
@@ -268,6 +281,7 @@ impl<M: Material> Subsystem for FieldSoil<M> {
         let Values::F64(new) = new else {
             return Err(Error::Refused("all values of a soil are f64".into()));
         };
+        let before = self.parameters;
         for (id, value) in ids.iter().zip(new) {
             let variable = self
                 .variables
@@ -280,7 +294,13 @@ impl<M: Material> Subsystem for FieldSoil<M> {
                 self.material.set_value(*id - values::SHARED, *value)?;
             }
         }
-        self.laws = laws_of(&self.parameters);
+        match laws_of(&self.parameters, self.expressions.as_ref()) {
+            Ok(laws) => self.laws = laws,
+            Err(refused) => {
+                self.parameters = before;
+                return Err(refused);
+            }
+        }
         self.material.parameters_changed(&self.parameters);
         self.patches.forget();
         Ok(())

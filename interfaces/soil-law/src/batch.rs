@@ -1,5 +1,6 @@
 //! The pressure law over slices of nodes: one call per patch instead of one per node.
 
+use crate::expression::{Nodes, for_each_node};
 use crate::pressure::PressureCurve;
 
 /// Pressures (Pa) and slopes (Pa/m) of nodes at depths `depth` that were pressed to `z_max` before, where
@@ -12,6 +13,10 @@ pub fn pressures(
     p: &mut [f64],
     slope: &mut [f64],
 ) {
+    if let Some(program) = curve.program() {
+        let nodes = Nodes { shift: 0.0, depth, z_max, p_max };
+        return for_each_node(curve, program, &nodes, |k, value, by_z| (p[k], slope[k]) = (value, by_z));
+    }
     let nodes = depth.iter().zip(z_max).zip(p_max);
     for (((z, z_max), p_max), (p, slope)) in nodes.zip(p.iter_mut().zip(slope)) {
         (*p, *slope) = curve.at(*z, *z_max, *p_max);
@@ -30,6 +35,13 @@ pub fn total_force(
     area: &[f64],
 ) -> (f64, f64) {
     let (mut force, mut stiffness) = (0.0, 0.0);
+    if let Some(program) = curve.program() {
+        for_each_node(curve, program, &Nodes { shift, depth, z_max, p_max }, |k, p, slope| {
+            force += area[k] * p;
+            stiffness += area[k] * slope;
+        });
+        return (force, stiffness);
+    }
     for (((z, z_max), p_max), area) in depth.iter().zip(z_max).zip(p_max).zip(area) {
         let (p, slope) = curve.at(z + shift, *z_max, *p_max);
         force += area * p;

@@ -4,6 +4,7 @@
 //! business of whoever calls. SI units; depths and pressures grow into the soil, pressure is never negative.
 
 mod batch;
+pub mod expression;
 mod parameters;
 mod pressure;
 mod shear;
@@ -11,6 +12,7 @@ mod slip_sinkage;
 mod table;
 
 pub use batch::{pressures, total_force};
+pub use expression::{ExpressionError, PressureExpression, ShearExpression, SoilExpressions};
 pub use parameters::{DEFAULT_ELASTIC_STIFFNESS, Family, SoilParameters};
 pub use pressure::{PRESSURE_LAWS, PressureCurve, PressureLaw};
 pub use shear::{ShearLaw, ShearResponse, ShearState};

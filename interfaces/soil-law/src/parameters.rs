@@ -1,5 +1,6 @@
 //! The numbers of one soil and the laws made from them.
 
+use crate::expression::SoilExpressions;
 use crate::pressure::{PRESSURE_LAWS, PressureLaw};
 use crate::shear::ShearLaw;
 use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};
@@ -57,6 +58,24 @@ pub enum Family {
     },
 }
 
+impl Default for SoilParameters {
+    /// Nominal lunar soil (Apollo model): n = 1, k_c 1400, k_φ 820 000, c 170 Pa, φ 35°, K 18 mm.
+    fn default() -> Self {
+        Self {
+            family: Family::Bekker,
+            n: 1.0,
+            k_c: 1400.0,
+            k_phi: 820_000.0,
+            c_pa: 170.0,
+            phi_rad: 35f64.to_radians(),
+            K_m: 0.018,
+            density_kg_m3: None,
+            elastic_stiffness_pa_m: DEFAULT_ELASTIC_STIFFNESS,
+            gravity: 1.62,
+        }
+    }
+}
+
 impl SoilParameters {
     /// What a module that uses these laws takes from its scenario table.
     pub fn schema() -> Vec<Parameter> {
@@ -65,7 +84,7 @@ impl SoilParameters {
             ..Parameter::of(name, ParameterType::Number, help)
         };
         let text = |name, help| Parameter::of(name, ParameterType::Text, help);
-        vec![
+        let mut parameters = vec![
             text("pressure_law", "pressure-sinkage law").or(PRESSURE_LAWS[0]).choices(&PRESSURE_LAWS),
             number("n", "", "exponent of the pressure-sinkage law").within(0.05, 3.0),
             number("k_c", "", "bekker: cohesive modulus, N/m^(n+1)").within(0.0, 1e9).optional(),
@@ -90,7 +109,9 @@ impl SoilParameters {
                 "stiffness of unloading and reloading",
             )
             .positive(),
-        ]
+        ];
+        parameters.extend(SoilExpressions::schema());
+        parameters
     }
 
     /// Reads the parameters of an instance under `gravity` (m/s²). Refused: a missing or non-positive number where

@@ -6,6 +6,7 @@
 //! No soil is stiffer in virgin loading than in unloading, so for n < 1, where the power law starts with an
 //! infinite slope, the line p = k_u·z holds up to where it meets the power law.
 
+use crate::expression::{self, PressureExpression, Program};
 use crate::slip_sinkage::SlipSinkage;
 
 /// A family of pressure–sinkage laws; [`PressureLaw::curve`] fixes one for the size of a contact.
@@ -44,6 +45,8 @@ pub enum PressureLaw {
         /// Exponent n.
         n: f64,
     },
+    /// Written in the scenario, see [`crate::expression`].
+    Expression(PressureExpression),
 }
 
 /// Names of the families as a scenario writes them.
@@ -65,13 +68,20 @@ impl PressureLaw {
             Self::Bearing { cohesive, frictional, reference, n } => {
                 ((cohesive + frictional * b) * libm::pow(reference, -n), n)
             }
+            Self::Expression(law) => {
+                let program = law.at_size(b);
+                match program.power_law() {
+                    Some(law) => law,
+                    None => return PressureCurve::of_program(program, k_u),
+                }
+            }
         };
         let (modulus, n) = sinkage.apply(modulus, n, slip);
         PressureCurve::new(modulus, n, k_u)
     }
 }
 
-/// p(z) for one contact: a power law, elastic below the largest depth.
+/// p(z) for one contact: a power law or a program, elastic below the largest depth.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PressureCurve {
     modulus: f64,
@@ -79,6 +89,9 @@ pub struct PressureCurve {
     unloading: f64,
     /// Depth up to which the elastic line holds in virgin loading, m; 0 for n ≥ 1.
     elastic_limit: f64,
+    /// First loading beyond the elastic limit, where it is no power law; `modulus` and `exponent` are then those of
+    /// the power law that touches it at 1 cm.
+    program: Option<Program>,
 }
 
 impl PressureCurve {
@@ -87,7 +100,34 @@ impl PressureCurve {
         let elastic_limit =
             if exponent < 1.0 { libm::pow(modulus / k_u, 1.0 / (1.0 - exponent)) } else { 0.0 };
         let modulus = if exponent == 1.0 { modulus.min(0.99 * k_u) } else { modulus };
-        Self { modulus, exponent, unloading: k_u, elastic_limit }
+        Self { modulus, exponent, unloading: k_u, elastic_limit, program: None }
+    }
+
+    /// First loading by a program of z with unloading stiffness `k_u` (Pa/m). A power law becomes the built-in one.
+    pub fn of_program(program: Program, k_u: f64) -> Self {
+        const TYPICAL_DEPTH: f64 = 0.01;
+        if let Some((modulus, exponent)) = program.power_law() {
+            return Self::new(modulus, exponent, k_u);
+        }
+        let (p, [slope]) = program.eval([TYPICAL_DEPTH]);
+        let exponent = slope * TYPICAL_DEPTH / p;
+        Self {
+            modulus: p * libm::pow(TYPICAL_DEPTH, -exponent),
+            exponent,
+            unloading: k_u,
+            elastic_limit: expression::curve::elastic_limit(&program, k_u),
+            program: Some(program),
+        }
+    }
+
+    /// The program of first loading, where it is no power law.
+    pub fn program(&self) -> Option<&Program> {
+        self.program.as_ref()
+    }
+
+    /// Depth up to which first loading is elastic, m.
+    pub fn elastic_limit(&self) -> f64 {
+        self.elastic_limit
     }
 
     /// Tells curves of one soil apart.
@@ -105,6 +145,8 @@ impl PressureCurve {
     pub fn virgin(&self, z: f64) -> f64 {
         if z <= self.elastic_limit {
             self.unloading * z.max(0.0)
+        } else if let Some(program) = &self.program {
+            program.eval([z]).0
         } else if self.exponent == 1.0 {
             self.modulus * z
         } else {
@@ -119,6 +161,8 @@ impl PressureCurve {
             0.0
         } else if z <= self.elastic_limit {
             self.unloading
+        } else if let Some(program) = &self.program {
+            program.eval([z]).1[0]
         } else if self.exponent == 1.0 {
             self.modulus
         } else if z == 0.0 {
@@ -132,6 +176,8 @@ impl PressureCurve {
     pub fn virgin_depth(&self, p: f64) -> f64 {
         if p <= self.unloading * self.elastic_limit {
             p.max(0.0) / self.unloading
+        } else if let Some(program) = &self.program {
+            expression::curve::depth(program, p, self.elastic_limit)
         } else if self.exponent == 1.0 {
             p / self.modulus
         } else {
@@ -145,14 +191,35 @@ impl PressureCurve {
             return 0.5 * p * z.max(0.0);
         }
         let e = self.elastic_limit;
+        if let Some(program) = &self.program {
+            return 0.5 * self.unloading * e * e + expression::curve::work(program, e, z);
+        }
         let below = self.unloading * e * e;
         0.5 * below + (z * p - below) / (self.exponent + 1.0)
+    }
+
+    /// Energy per area that first loading from `from` to `to` turns into heat, J/m²: work minus what the elastic line
+    /// keeps; `p_from` and `p_to` are the pressures there.
+    pub fn plastic_work(&self, from: f64, p_from: f64, to: f64, p_to: f64) -> f64 {
+        let elastic = |p: f64| 0.5 * p * p / self.unloading;
+        if let Some(program) = &self.program {
+            let plastic = from.max(self.elastic_limit);
+            let line = 0.5 * self.unloading * (plastic * plastic - from * from).max(0.0);
+            let work = if to > plastic { expression::curve::work(program, plastic, to) } else { 0.0 };
+            return (line + work - elastic(p_to) + elastic(p_from)).max(0.0);
+        }
+        let kept = self.virgin_work(from, p_from) - elastic(p_from);
+        (self.virgin_work(to, p_to) - elastic(p_to) - kept).max(0.0)
     }
 
     /// Pressure and slope dp/dz at depth z of soil pressed to z_max before, where p_max = virgin(z_max).
     #[inline]
     pub fn at(&self, z: f64, z_max: f64, p_max: f64) -> (f64, f64) {
         if z > z_max {
+            if let Some(program) = self.program.as_ref().filter(|_| z > self.elastic_limit) {
+                let (p, [slope]) = program.eval([z]);
+                return (p, slope);
+            }
             let p = self.virgin(z);
             return (p, self.virgin_slope(z, p));
         }
@@ -174,6 +241,9 @@ impl PressureCurve {
             return 0.0;
         }
         let (k, e) = (self.unloading, self.exponent);
+        if let Some(program) = &self.program {
+            return expression::curve::largest_depth(program, k, permanent, self.elastic_limit, guess);
+        }
         if e == 1.0 {
             return k * permanent / (k - self.modulus);
         }

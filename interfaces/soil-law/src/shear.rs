@@ -13,6 +13,8 @@
 /// Ratio of tangential to normal elastic stiffness, 2(1 − ν)/(2 − ν) at ν = 0.3 (Mindlin 1949).
 const MINDLIN_RATIO: f64 = 1.4 / 1.7;
 
+use crate::expression::ShearExpression;
+
 /// Parameters of the shear law.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ShearLaw {
@@ -24,6 +26,8 @@ pub struct ShearLaw {
     pub modulus: f64,
     /// Elastic tangential stiffness k_t, Pa/m.
     pub stiffness: f64,
+    /// Written in the scenario: takes the place of cohesion, friction and modulus in the yield stress.
+    pub expression: Option<ShearExpression>,
 }
 
 /// Shear history of a node. The default is untouched soil, and soil after lift-off.
@@ -53,7 +57,21 @@ pub struct ShearResponse {
 impl ShearLaw {
     /// From cohesion (Pa), angle of friction (rad), deformation modulus (m) and normal elastic stiffness k_u (Pa/m).
     pub fn new(cohesion: f64, phi: f64, modulus: f64, k_u: f64) -> Self {
-        Self { cohesion, friction: libm::tan(phi), modulus, stiffness: MINDLIN_RATIO * k_u }
+        let (friction, stiffness) = (libm::tan(phi), MINDLIN_RATIO * k_u);
+        Self { cohesion, friction, modulus, stiffness, expression: None }
+    }
+
+    /// The same with a yield stress of its own, see [`crate::expression`].
+    pub fn with_expression(self, law: ShearExpression) -> Self {
+        Self { cohesion: law.cohesion, friction: law.friction, expression: Some(law), ..self }
+    }
+
+    /// Stress up to which soil under the pressure p that has slipped by `slip` is elastic, Pa.
+    pub fn yield_stress(&self, p: f64, slip: f64) -> f64 {
+        match &self.expression {
+            Some(law) => law.strength(p, slip).0,
+            None => self.strength(p).0 * self.mobilised(slip),
+        }
     }
 
     /// Full strength S at pressure p and its derivative, Pa. Cohesion builds up over the first c/10 of pressure,
@@ -83,12 +101,45 @@ impl ShearLaw {
         let u = [state.elastic[0] + s[0], state.elastic[1] + s[1]];
         let length = (u[0] * u[0] + u[1] * u[1]).sqrt();
         let trial = self.stiffness * length;
+        if let Some(law) = &self.expression {
+            return self.respond_by(law, state, p, u);
+        }
         let (strength, by_p) = self.strength(p);
         if trial <= strength * self.mobilised(state.slip) {
             return self.elastic(u, state.slip);
         }
         let (slip, left) = self.return_map(trial, strength, state.slip);
-        self.plastic(u, length, state.slip, slip, left * strength, (1.0 - left) * by_p)
+        self.plastic(u, length, state.slip, slip, left * strength / self.modulus, (1.0 - left) * by_p)
+    }
+
+    /// The same with the yield stress of an expression: trial − k_t·Δj = Y(p, j + Δj), Newton inside a bracket.
+    fn respond_by(&self, law: &ShearExpression, state: &ShearState, p: f64, u: [f64; 2]) -> ShearResponse {
+        let length = (u[0] * u[0] + u[1] * u[1]).sqrt();
+        let trial = self.stiffness * length;
+        let (mut y, mut by) = law.strength(p, state.slip);
+        if trial <= y {
+            return self.elastic(u, state.slip);
+        }
+        let (mut low, mut high, mut step) = (0.0, length, 0.0);
+        for _ in 0..60 {
+            let residual = trial - self.stiffness * step - y;
+            if residual > 0.0 {
+                low = step
+            } else {
+                high = step
+            }
+            let mut next = step + residual / (self.stiffness + by[1].max(0.0));
+            if !(next >= low && next <= high) {
+                next = 0.5 * (low + high);
+            }
+            let change = (next - step).abs();
+            step = next;
+            (y, by) = law.strength(p, state.slip + step);
+            if change <= 1e-15 * step {
+                break;
+            }
+        }
+        self.plastic(u, length, state.slip, step, by[1].max(0.0), by[0])
     }
 
     fn elastic(&self, u: [f64; 2], slip: f64) -> ShearResponse {
@@ -119,19 +170,18 @@ impl ShearLaw {
         (step, left)
     }
 
-    /// `rest` is S·e^(−j/K), `by_p` d(yield)/dp at fixed slip.
+    /// `hardening` is d(yield)/dj, `by_p` d(yield)/dp at fixed slip.
     fn plastic(
         &self,
         u: [f64; 2],
         length: f64,
         before: f64,
         step: f64,
-        rest: f64,
+        hardening: f64,
         by_p: f64,
     ) -> ShearResponse {
         let k = self.stiffness;
         let stress = (k * (length - step)).max(0.0);
-        let hardening = rest / self.modulus;
         let along = k * hardening / (k + hardening);
         let across = stress / length;
         let e = [u[0] / length, u[1] / length];

@@ -1,0 +1,324 @@
+//! A law as a short list of operations on a few registers, with exact derivatives (forward mode, Wengert 1964).
+//!
+//! Plain data of fixed size: made, copied and evaluated without allocation. A batch runs each operation over a
+//! chunk of nodes, so that the list is read once per chunk.
+
+use super::build::Builder;
+use super::parse::Function;
+
+/// Most operations of a law after constants are folded.
+pub const LONGEST: usize = 32;
+/// Registers.
+const REGISTERS: usize = 12;
+/// Nodes that are evaluated together.
+pub const CHUNK: usize = 32;
+
+/// One operation; operands are registers (numbers of operations while it is built).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Operation {
+    /// A value.
+    Constant(f64),
+    /// Variable number k.
+    Variable(u8),
+    /// a + b.
+    Add(u8, u8),
+    /// a + c.
+    AddConstant(u8, f64),
+    /// a − b.
+    Sub(u8, u8),
+    /// a·b.
+    Mul(u8, u8),
+    /// a·c.
+    Scale(u8, f64),
+    /// a/b.
+    Div(u8, u8),
+    /// a^c.
+    Power(u8, f64),
+    /// a^b.
+    PowerOf(u8, u8),
+    /// The smaller.
+    Min(u8, u8),
+    /// The larger.
+    Max(u8, u8),
+    /// f(a).
+    Function(Function, u8),
+}
+
+impl Operation {
+    /// Equal bit for bit.
+    pub(super) fn same(&self, other: &Self) -> bool {
+        match (self, other) {
+            (Self::Constant(a), Self::Constant(b)) => a.to_bits() == b.to_bits(),
+            _ => self == other,
+        }
+    }
+
+    fn operands(&self) -> [Option<u8>; 2] {
+        match *self {
+            Self::Constant(_) | Self::Variable(_) => [None, None],
+            Self::AddConstant(a, _) | Self::Scale(a, _) | Self::Power(a, _) | Self::Function(_, a) => {
+                [Some(a), None]
+            }
+            Self::Add(a, b)
+            | Self::Sub(a, b)
+            | Self::Mul(a, b)
+            | Self::Div(a, b)
+            | Self::PowerOf(a, b)
+            | Self::Min(a, b)
+            | Self::Max(a, b) => [Some(a), Some(b)],
+        }
+    }
+
+    fn with_operands(mut self, place: impl Fn(u8) -> u8) -> Self {
+        match &mut self {
+            Self::Constant(_) | Self::Variable(_) => {}
+            Self::AddConstant(a, _) | Self::Scale(a, _) | Self::Power(a, _) | Self::Function(_, a) => {
+                *a = place(*a);
+            }
+            Self::Add(a, b)
+            | Self::Sub(a, b)
+            | Self::Mul(a, b)
+            | Self::Div(a, b)
+            | Self::PowerOf(a, b)
+            | Self::Min(a, b)
+            | Self::Max(a, b) => (*a, *b) = (place(*a), place(*b)),
+        }
+        self
+    }
+}
+
+/// A law ready to be evaluated.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Program {
+    steps: [(Operation, u8); LONGEST],
+    length: usize,
+    registers: usize,
+}
+
+impl Program {
+    /// Leaves out what the root does not need and gives every value a register; `None`: too many are needed at once.
+    pub fn new(builder: &Builder, root: u8) -> Option<Self> {
+        let operations = builder.operations();
+        let mut last_use = [0usize; LONGEST];
+        let mut needed = [false; LONGEST];
+        needed[root as usize] = true;
+        last_use[root as usize] = usize::MAX;
+        for k in (0..operations.len()).rev().filter(|k| *k <= root as usize) {
+            if !needed[k] {
+                continue;
+            }
+            for operand in operations[k].operands().into_iter().flatten() {
+                needed[operand as usize] = true;
+                last_use[operand as usize] = last_use[operand as usize].max(k);
+            }
+        }
+        let mut place = [0u8; LONGEST];
+        let mut holder = [None::<usize>; REGISTERS];
+        let mut out = Self { steps: [(Operation::Constant(0.0), 0); LONGEST], length: 0, registers: 0 };
+        for k in (0..operations.len()).filter(|k| needed[*k]) {
+            let free = |h: &Option<usize>| h.is_none_or(|held| last_use[held] < k);
+            let to = holder.iter().position(free)?;
+            holder[to] = Some(k);
+            place[k] = to as u8;
+            let step = operations[k].with_operands(|o| place[o as usize]);
+            out.steps[out.length] = (step, to as u8);
+            out.length += 1;
+            out.registers = out.registers.max(to + 1);
+        }
+        Some(out)
+    }
+
+    fn steps(&self) -> &[(Operation, u8)] {
+        &self.steps[..self.length]
+    }
+
+    /// (c, n) of a law that is c·x^n of variable 0.
+    pub fn power_law(&self) -> Option<(f64, f64)> {
+        let mut law = None;
+        for (step, _) in self.steps() {
+            law = match (law, *step) {
+                (None, Operation::Variable(0)) => Some((1.0, 1.0)),
+                (Some((1.0, 1.0)), Operation::Power(_, n)) => Some((1.0, n)),
+                (Some((1.0, 1.0)), Operation::Mul(a, b)) if a == b => Some((1.0, 2.0)),
+                (Some((1.0, 1.0)), Operation::Function(Function::Sqrt, _)) => Some((1.0, 0.5)),
+                (Some((1.0, n)), Operation::Scale(_, c)) => Some((c, n)),
+                _ => return None,
+            };
+        }
+        law
+    }
+
+    /// The value at the variables `x` and its derivative by each of them.
+    #[inline]
+    pub fn eval<const N: usize>(&self, x: [f64; N]) -> (f64, [f64; N]) {
+        let mut v = [0.0; REGISTERS];
+        let mut d = [[0.0; N]; REGISTERS];
+        let mut last = 0;
+        for (step, to) in self.steps() {
+            let (value, slope) = scalar(step, &x, &v, &d);
+            last = *to as usize;
+            (v[last], d[last]) = (value, slope);
+        }
+        (v[last], d[last])
+    }
+
+    /// Values and derivatives of a law of one variable at up to [`CHUNK`] places.
+    pub fn eval_chunk(&self, x: &[f64; CHUNK], out: &mut [f64; CHUNK], slope: &mut [f64; CHUNK]) {
+        match self.registers {
+            0..=2 => self.chunk::<2>(x, out, slope),
+            3..=5 => self.chunk::<5>(x, out, slope),
+            _ => self.chunk::<REGISTERS>(x, out, slope),
+        }
+    }
+
+    fn chunk<const R: usize>(&self, x: &[f64; CHUNK], out: &mut [f64; CHUNK], slope: &mut [f64; CHUNK]) {
+        let mut v = [[0.0; CHUNK]; R];
+        let mut d = [[0.0; CHUNK]; R];
+        let mut last = 0;
+        for (step, to) in self.steps() {
+            last = *to as usize;
+            if last < R {
+                lanes(step, last, x, &mut v, &mut d);
+            }
+        }
+        (*out, *slope) = (v[last], d[last]);
+    }
+}
+
+/// x^c with its derivative; at 0 the limit from the right.
+#[inline]
+fn power(x: f64, c: f64) -> (f64, f64) {
+    let value = libm::pow(x, c);
+    let slope = if x != 0.0 {
+        c * value / x
+    } else if c > 1.0 {
+        0.0
+    } else {
+        c * libm::pow(x, c - 1.0)
+    };
+    (value, slope)
+}
+
+/// a^b with its derivatives by a and by b.
+#[inline]
+fn power_of(a: f64, b: f64) -> (f64, f64, f64) {
+    let (value, by_a) = power(a, b);
+    (value, by_a, if a > 0.0 { value * libm::log(a) } else { 0.0 })
+}
+
+#[inline]
+fn scalar<const N: usize>(
+    step: &Operation,
+    x: &[f64; N],
+    v: &[f64; REGISTERS],
+    d: &[[f64; N]; REGISTERS],
+) -> (f64, [f64; N]) {
+    let at = |k: u8| (v[k as usize], d[k as usize]);
+    let times = |d: [f64; N], c: f64| d.map(|d| d * c);
+    let sum = |a: [f64; N], p: f64, b: [f64; N], q: f64| std::array::from_fn(|k| a[k] * p + b[k] * q);
+    match *step {
+        Operation::Constant(c) => (c, [0.0; N]),
+        Operation::Variable(k) => {
+            (x[k as usize], std::array::from_fn(|i| if i == k as usize { 1.0 } else { 0.0 }))
+        }
+        Operation::Add(a, b) => (at(a).0 + at(b).0, sum(at(a).1, 1.0, at(b).1, 1.0)),
+        Operation::AddConstant(a, c) => (at(a).0 + c, at(a).1),
+        Operation::Sub(a, b) => (at(a).0 - at(b).0, sum(at(a).1, 1.0, at(b).1, -1.0)),
+        Operation::Mul(a, b) => {
+            let ((a, da), (b, db)) = (at(a), at(b));
+            (a * b, sum(da, b, db, a))
+        }
+        Operation::Scale(a, c) => (at(a).0 * c, times(at(a).1, c)),
+        Operation::Div(a, b) => {
+            let ((a, da), (b, db)) = (at(a), at(b));
+            (a / b, sum(da, 1.0 / b, db, -a / (b * b)))
+        }
+        Operation::Power(a, c) => {
+            let (value, slope) = power(at(a).0, c);
+            (value, times(at(a).1, slope))
+        }
+        Operation::PowerOf(a, b) => {
+            let (value, by_a, by_b) = power_of(at(a).0, at(b).0);
+            (value, sum(at(a).1, by_a, at(b).1, by_b))
+        }
+        Operation::Min(a, b) => {
+            if at(a).0 <= at(b).0 {
+                at(a)
+            } else {
+                at(b)
+            }
+        }
+        Operation::Max(a, b) => {
+            if at(a).0 >= at(b).0 {
+                at(a)
+            } else {
+                at(b)
+            }
+        }
+        Operation::Function(f, a) => {
+            let value = f.value(at(a).0);
+            (value, times(at(a).1, f.slope(at(a).0, value)))
+        }
+    }
+}
+
+/// One operation over a chunk. Operands are copied out first: a register may be its own operand.
+#[inline(always)]
+fn lanes<const R: usize>(
+    step: &Operation,
+    to: usize,
+    x: &[f64; CHUNK],
+    v: &mut [[f64; CHUNK]; R],
+    d: &mut [[f64; CHUNK]; R],
+) {
+    let one = |v: &mut [[f64; CHUNK]; R], d: &mut [[f64; CHUNK]; R], a: u8, f: &dyn Fn(f64) -> (f64, f64)| {
+        let (va, da) = (v[a as usize], d[a as usize]);
+        for l in 0..CHUNK {
+            let (value, slope) = f(va[l]);
+            (v[to][l], d[to][l]) = (value, slope * da[l]);
+        }
+    };
+    macro_rules! two {
+        ($a:expr, $b:expr, |$p:ident, $q:ident| $f:expr) => {{
+            let (va, da, vb, db) = (v[$a as usize], d[$a as usize], v[$b as usize], d[$b as usize]);
+            for l in 0..CHUNK {
+                let ($p, $q) = (va[l], vb[l]);
+                let (value, by_a, by_b): (f64, f64, f64) = $f;
+                (v[to][l], d[to][l]) = (value, by_a * da[l] + by_b * db[l]);
+            }
+        }};
+    }
+    macro_rules! affine {
+        ($a:expr, |$p:ident| $f:expr, $scale:expr) => {{
+            let (va, da) = (v[$a as usize], d[$a as usize]);
+            for l in 0..CHUNK {
+                let $p = va[l];
+                (v[to][l], d[to][l]) = ($f, da[l] * $scale);
+            }
+        }};
+    }
+    match *step {
+        Operation::Constant(c) => (v[to], d[to]) = ([c; CHUNK], [0.0; CHUNK]),
+        Operation::Variable(_) => (v[to], d[to]) = (*x, [1.0; CHUNK]),
+        Operation::Add(a, b) => two!(a, b, |p, q| (p + q, 1.0, 1.0)),
+        Operation::AddConstant(a, c) => affine!(a, |p| p + c, 1.0),
+        Operation::Sub(a, b) => two!(a, b, |p, q| (p - q, 1.0, -1.0)),
+        Operation::Mul(a, b) => two!(a, b, |p, q| (p * q, q, p)),
+        Operation::Scale(a, c) => affine!(a, |p| p * c, c),
+        Operation::Div(a, b) => two!(a, b, |p, q| (p / q, 1.0 / q, -p / (q * q))),
+        Operation::Power(a, c) => {
+            let (va, da) = (v[a as usize], d[a as usize]);
+            for l in 0..CHUNK {
+                let (value, slope) = power(va[l], c);
+                (v[to][l], d[to][l]) = (value, slope * da[l]);
+            }
+        }
+        Operation::PowerOf(a, b) => two!(a, b, |p, q| power_of(p, q)),
+        Operation::Min(a, b) => two!(a, b, |p, q| if p <= q { (p, 1.0, 0.0) } else { (q, 0.0, 1.0) }),
+        Operation::Max(a, b) => two!(a, b, |p, q| if p >= q { (p, 1.0, 0.0) } else { (q, 0.0, 1.0) }),
+        Operation::Function(f, a) => one(v, d, a, &|p| {
+            let value = f.value(p);
+            (value, f.slope(p, value))
+        }),
+    }
+}

@@ -4,6 +4,7 @@ use crate::contact::bodies::Surface;
 use crate::contact::plane::Plane;
 use crate::drive::{Mode, Motor};
 use crate::dynamics::Dynamics;
+use crate::dynamics::scheme::{Acceleration, Integrator, Weights};
 use crate::math::V3;
 use crate::model::Model;
 use crate::placement::{at_rest, base_pose, clearance, coordinates};
@@ -43,6 +44,8 @@ impl Module for RigidBody {
         let state = State {
             forces: vec![V3::zeros(); bodies.len()],
             contact_normal: vec![0.0; bodies.len()],
+            accelerations: vec![Acceleration::default(); bodies.len()],
+            accelerated: false,
             bodies,
             joints,
             energy: Energy::default(),
@@ -56,8 +59,14 @@ impl Module for RigidBody {
             model.mass()
         );
         host.log(LogLevel::Info, &text);
-        let mut dynamics = Dynamics::new(model, &state.bodies).map_err(|e| Error::Failed(e.to_string()))?;
-        dynamics.contacts.set_surroundings(surface(&config)?, ground(&config)?);
+        let integrator = integrator(&config)?;
+        let mut dynamics =
+            Dynamics::new(model, integrator, &state.bodies).map_err(|e| Error::Failed(e.to_string()))?;
+        let ground = ground(&config)?;
+        if integrator.is_second_order() {
+            without_impacts(&*host, ground.is_some(), dynamics.contacts.watches())?;
+        }
+        dynamics.contacts.set_surroundings(surface(&config)?, ground);
         Ok(Box::new(Robot::new(host, dynamics, state)))
     }
 }
@@ -81,6 +90,31 @@ fn ground(config: &Config) -> Result<Option<Plane>> {
         return Err(refused());
     }
     Ok(Some(Plane { normal: normal / length, offset: config.number("ground_height_m")? }))
+}
+
+fn integrator(config: &Config) -> Result<Integrator> {
+    let rho = config.number("rho_infinity")?;
+    Ok(match config.text("integrator")? {
+        "generalized-alpha" => Integrator::GeneralizedAlpha(Weights::new(rho)),
+        _ => Integrator::SymplecticEuler,
+    })
+}
+
+/// Impacts need impulses, which the second-order option does not have.
+fn without_impacts(host: &dyn Host, ground: bool, pairs: bool) -> Result<()> {
+    if ground {
+        return Err(Error::Refused(
+            "parameter `integrator` = \"generalized-alpha\" does not go with rigid `ground`: what hits needs \
+             \"symplectic-euler\""
+                .into(),
+        ));
+    }
+    if pairs {
+        let text = "integrator = \"generalized-alpha\" does not keep the robot's own bodies apart; \
+                    \"symplectic-euler\" does";
+        host.log(LogLevel::Warning, text);
+    }
+    Ok(())
 }
 
 /// Bodies at rest in the initial pose, on the ground where that is wanted and there is one.

@@ -98,7 +98,8 @@ impl Robot {
         let wanted = Prepared { revision: self.revision, h: step.h };
         let stepped = self.prepared != Some(wanted);
         if stepped {
-            self.dynamics.prepare(&self.state, step.h);
+            self.prepared = None;
+            self.dynamics.prepare(&self.state, step.h).map_err(failed)?;
             self.prepared = Some(wanted);
         }
         if stepped || self.step_ports != step.ports || self.ports.len() != step.n as usize {
@@ -158,15 +159,21 @@ impl Robot {
             let stop = if dynamics.axes[j].row(mode).is_some() { axis.impulse - motor } else { 0.0 };
             state.energy.dissipated -= stop * axis.mean_rate;
             s.angle = coordinate(joint, &dynamics.ends, s.angle);
-            s.velocity = axis.rate;
+            s.velocity = axis.end_rate;
             s.torque = (motor / h).clamp(-s.max_torque, s.max_torque);
             s.mode = mode;
         }
         for (b, force) in state.forces.iter().enumerate() {
-            let mean = V3::from_row_slice(&dynamics.kick(b)[..3]) * -0.5 + dynamics.ends[b].v;
+            let mut mean = V3::from_row_slice(&dynamics.solution[dynamics.kkt.body_at[b]..][..3]);
+            if !dynamics.integrator.is_second_order() {
+                mean -= 0.5 * V3::from_row_slice(&dynamics.kick(b)[..3]);
+            }
             state.energy.actuator_work += h * force.dot(&mean);
         }
-        state.stagger = 0.5 * h;
+        // Positions of the first-order scheme are half a step ahead of its rates.
+        state.stagger = if dynamics.integrator.is_second_order() { 0.0 } else { 0.5 * h };
+        state.accelerations.clone_from(&dynamics.end_accelerations);
+        state.accelerated = true;
     }
 
     fn book_ports(&mut self, step: &Step, t: &[f64]) {
@@ -178,8 +185,10 @@ impl Robot {
                 // The work on both sides is T·X; what an impact kicks out of the body is lost.
                 let push = self.ports.side(i) * t[i];
                 self.state.energy.port_work += push * self.scratch.free[i];
-                self.state.energy.dissipated +=
-                    0.5 * push * self.dynamics.h * self.ports.kick(&self.dynamics, i);
+                if !self.dynamics.integrator.is_second_order() {
+                    self.state.energy.dissipated +=
+                        0.5 * push * self.dynamics.h * self.ports.kick(&self.dynamics, i);
+                }
                 if c == 0 {
                     self.state.contact_normal[port.body as usize] += t[i];
                 }
@@ -277,8 +286,8 @@ impl Subsystem for Robot {
         self.dynamics.ensure_factor().map_err(failed)?;
         let per = match level {
             Level::Position => 1.0,
-            Level::Velocity => 1.0 / step.h,
-            Level::Acceleration => 1.0 / (step.h * step.h),
+            Level::Velocity => self.dynamics.integrator.rate_weight() / step.h,
+            Level::Acceleration => 1.0 / (step.h * self.dynamics.impulse_per_force()),
         };
         let g = self.ports.compliance(&self.dynamics);
         out.iter_mut().zip(g).for_each(|(o, g)| *o = per * g);

@@ -34,6 +34,16 @@ pub(crate) fn schema() -> Schema {
                  terrain or with a fixed base)",
             )
             .or(true),
+            Parameter::of(
+                "integrator",
+                ParameterType::Text,
+                "How the bodies are stepped: `symplectic-euler` (first order, for anything that hits) or \
+                 `generalized-alpha` (second order, for smooth forces)",
+            )
+            .or("symplectic-euler")
+            .choices(&crate::dynamics::scheme::Integrator::NAMES),
+            Parameter::number("rho_infinity", "", 0.8, "Generalized-alpha: what stays of the fastest vibration per step")
+                .within(0.0, 1.0),
             Parameter::of("motor", ParameterType::Text, "How the motors of all joints are driven at the start")
                 .or("position")
                 .choices(&motors),

@@ -1,6 +1,7 @@
 //! The committed state: motion of the bodies, settings and memory of the joints, energy book.
 
 use crate::drive::{Mode, Motor};
+use crate::dynamics::scheme::Acceleration;
 use crate::math::{Q, V3};
 use terraglue_subsystem::Energy;
 
@@ -58,6 +59,10 @@ pub(crate) struct State {
     pub energy: Energy,
     /// By how much positions are ahead of rates, s: half the last step, 0 at the start.
     pub stagger: f64,
+    /// Accelerations at t, where the integrator keeps them.
+    pub accelerations: Vec<Acceleration>,
+    /// Whether they are known; until then the first step finds them.
+    pub accelerated: bool,
 }
 
 impl State {
@@ -67,6 +72,8 @@ impl State {
         self.joints.clone_from(&other.joints);
         self.forces.clone_from(&other.forces);
         self.contact_normal.clone_from(&other.contact_normal);
+        self.accelerations.clone_from(&other.accelerations);
+        self.accelerated = other.accelerated;
         (self.energy, self.stagger) = (other.energy, other.stagger);
     }
 }

@@ -78,6 +78,11 @@ impl BodyContacts {
         }
     }
 
+    /// Whether any bodies can meet.
+    pub fn watches(&self) -> bool {
+        self.detector.watches()
+    }
+
     /// Friction, restitution and the rigid ground.
     pub fn set_surroundings(&mut self, surface: Surface, ground: Option<crate::contact::plane::Plane>) {
         self.surface = surface;

@@ -75,6 +75,11 @@ pub(crate) fn frame(n: V3) -> [V3; 3] {
 }
 
 impl Detector {
+    /// Whether any bodies can meet.
+    pub fn watches(&self) -> bool {
+        !self.pairs.is_empty()
+    }
+
     /// Chooses the pairs at the initial pose.
     pub fn new(model: &Model, bodies: &[Motion]) -> Self {
         let mut me = Self { colliders: Vec::new(), pairs: Vec::new(), ground: None };

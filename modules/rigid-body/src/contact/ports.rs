@@ -78,7 +78,7 @@ impl Ports {
         dynamics.external.fill(0.0);
         for (component, t) in self.components.iter().zip(t).filter(|(_, t)| **t != 0.0) {
             let at = dynamics.kkt.body_at[component.body];
-            let impulse = dynamics.h * component.side * t;
+            let impulse = dynamics.impulse_per_force() * component.side * t;
             let target = &mut dynamics.external[at..at + 6];
             target.iter_mut().zip(&component.row).for_each(|(e, r)| *e += impulse * r);
         }
@@ -101,7 +101,7 @@ impl Ports {
         }
         self.g.clear();
         self.g.resize(n * n, 0.0);
-        let h2 = dynamics.h * dynamics.h;
+        let h2 = dynamics.h * dynamics.impulse_per_force();
         let (mut pair, mut shared) = ([usize::MAX; 2], 0);
         for i in 0..n {
             for k in 0..=i {
@@ -159,7 +159,8 @@ pub(crate) fn displacement(ports: &[Port], dynamics: &Dynamics, x: &mut [f64]) {
         // (R − 1)·arm without cancellation.
         let q = cayley(&dynamics.turns[b]);
         let twice = 2.0 * q.imag().cross(&arm);
-        let shift = dynamics.h * dynamics.ends[b].v + q.w * twice + q.imag().cross(&twice);
+        let mean = &dynamics.solution[dynamics.kkt.body_at[b]..];
+        let shift = dynamics.h * V3::new(mean[0], mean[1], mean[2]) + q.w * twice + q.imag().cross(&twice);
         let turn = cayley_vector(&dynamics.turns[b]);
         for (i, c) in port.components() {
             let d = V3::from(port.direction(c));
@@ -182,6 +183,23 @@ pub(crate) fn response(ports: &[Port], dynamics: &Dynamics, out: &mut Response) 
             let (v0, v1) = if c < 3 { (before, after) } else { (start.w, end.w) };
             out.v[i] = v1.dot(&d);
             out.a[i] = (v1 - v0).dot(&d) / dynamics.h;
+            if dynamics.integrator.is_second_order() {
+                out.a[i] = acceleration(port, dynamics, c);
+            }
         }
+    }
+}
+
+/// Acceleration of the material point at the port's origin (angular: of the body) at the end of the trial.
+fn acceleration(port: &Port, dynamics: &Dynamics, c: usize) -> f64 {
+    let b = port.body as usize;
+    let (end, real) = (&dynamics.ends[b], &dynamics.end_accelerations[b].real);
+    let (linear, angular) = (V3::from_row_slice(&real[..3]), V3::from_row_slice(&real[3..]));
+    let arm = cayley(&dynamics.turns[b]) * (V3::from(port.origin) - dynamics.starts()[b].c);
+    let d = V3::from(port.direction(c));
+    if c < 3 {
+        (linear + angular.cross(&arm) + end.w.cross(&end.w.cross(&arm))).dot(&d)
+    } else {
+        angular.dot(&d)
     }
 }

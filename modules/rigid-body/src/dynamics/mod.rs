@@ -6,11 +6,13 @@
 //! by a few corrections with the same factor, which enter rates and positions alike. That is the SHAKE scheme
 //! (Ryckaert, Ciccotti and Berendsen 1977), symplectic (Leimkuhler and Skeel 1994): joints neither open nor
 //! brake. Rotation: the angular momentum is updated by the impulses, orientation by the Cayley transform of the
-//! midpoint rate, see [`gyro`].
+//! midpoint rate, see [`gyro`]. The second-order option is in [`alpha`], what both share in [`scheme`].
 
+mod alpha;
 mod gyro;
 pub(crate) mod joint_rows;
 pub(crate) mod kkt;
+pub(crate) mod scheme;
 
 use crate::contact::bodies::BodyContacts;
 use crate::drive::{Axis, Law, Mode};
@@ -19,6 +21,7 @@ use crate::model::Model;
 use crate::state::{Motion, State};
 use joint_rows::{coordinate, gap};
 use kkt::Kkt;
+use scheme::{Acceleration, Integrator};
 use terraglue_linear_solver::{Error as SolverError, Rows};
 
 /// Joints are closed to this at the end of every step, m and rad.
@@ -37,6 +40,11 @@ pub(crate) enum Failure {
     Branches { rounds: usize },
     #[error("joint `{joint}` stays open by {gap:e} (m or rad); a shorter step may help")]
     Gap { joint: String, gap: f64 },
+    #[error(
+        "the step of generalized-alpha did not converge in {corrections} corrections; shorten the step, or take \
+         integrator = \"symplectic-euler\" where something hits or sticks"
+    )]
+    NotConverged { corrections: usize },
     #[error("contact among the bodies or with rigid ground found no solution; a shorter step may help")]
     Contact,
 }
@@ -46,9 +54,11 @@ pub(crate) enum Failure {
 pub(crate) struct AxisResult {
     /// Change of the coordinate over h.
     pub rate: f64,
+    /// Rate of the coordinate at the end.
+    pub end_rate: f64,
     /// Mean of J·v before and after the impulses; times an impulse it is the impulse's work.
     pub mean_rate: f64,
-    /// Total impulse along the axis.
+    /// Total impulse along the axis, h × the force at the end.
     pub impulse: f64,
 }
 
@@ -58,7 +68,13 @@ pub(crate) struct Dynamics {
     pub kkt: Kkt,
     pub contacts: BodyContacts,
     pub h: f64,
+    pub integrator: Integrator,
     starts: Vec<Motion>,
+    /// Accelerations at both ends of the step and what else the second-order option reads of the state.
+    start_accelerations: Vec<Acceleration>,
+    pub end_accelerations: Vec<Acceleration>,
+    angles: Vec<f64>,
+    forces: Vec<V3>,
     inertia: Vec<M3>,
     /// World rates of free rotation in the middle and at the end of the step.
     middle_rate: Vec<V3>,
@@ -90,7 +106,7 @@ pub(crate) struct Dynamics {
 }
 
 impl Dynamics {
-    pub fn new(model: Model, bodies: &[Motion]) -> Result<Self, SolverError> {
+    pub fn new(model: Model, integrator: Integrator, bodies: &[Motion]) -> Result<Self, SolverError> {
         let kkt = Kkt::new(&model)?;
         let (nb, nj, n) = (model.bodies.len(), model.joints.len(), kkt.len());
         let rest = Motion::at(V3::zeros(), crate::math::Q::identity());
@@ -104,7 +120,12 @@ impl Dynamics {
             contacts: BodyContacts::new(&model, bodies),
             kkt,
             h: 0.0,
+            integrator,
             starts: vec![rest; nb],
+            start_accelerations: vec![Acceleration::default(); nb],
+            end_accelerations: vec![Acceleration::default(); nb],
+            angles: vec![0.0; nj],
+            forces: vec![V3::zeros(); nb],
             inertia: vec![M3::zeros(); nb],
             middle_rate: vec![V3::zeros(); nb],
             free_rate: vec![V3::zeros(); nb],
@@ -130,13 +151,22 @@ impl Dynamics {
     }
 
     /// Linearises the step of length h from a state; the factor is made by the first trial.
-    pub fn prepare(&mut self, state: &State, h: f64) {
+    pub fn prepare(&mut self, state: &State, h: f64) -> Result<(), Failure> {
         self.h = h;
         self.starts.clone_from(&state.bodies);
+        self.factored = false;
+        if self.integrator.is_second_order() {
+            return self.prepare_second_order(state);
+        }
         self.prepare_bodies(state);
         self.prepare_joints(state);
         self.contacts.detect(&self.starts, h);
-        self.factored = false;
+        Ok(())
+    }
+
+    /// Impulse of a unit force of the step in the system for the mean rates, s.
+    pub fn impulse_per_force(&self) -> f64 {
+        self.integrator.force_weight() * self.h
     }
 
     fn prepare_bodies(&mut self, state: &State) {
@@ -195,7 +225,11 @@ impl Dynamics {
 
     /// The free axis of joint j in the trial; none where nothing moves or it is broken.
     pub fn axis_result(&self, j: usize) -> Option<AxisResult> {
-        let free = self.model.joints[j].free_row().filter(|_| !self.broken[j])?;
+        let joint = &self.model.joints[j];
+        let free = joint.free_row().filter(|_| !self.broken[j])?;
+        if self.integrator.is_second_order() {
+            return Some(self.axis_result_second_order(j, free));
+        }
         let rate = self.rates(j, &self.solution)[free];
         let mean_rate = 0.5 * (rate + self.rates(j, &self.free)[free]);
         let row = self.axes[j].row(self.modes[j]).is_some();
@@ -204,7 +238,8 @@ impl Dynamics {
         } else {
             self.axes[j].impulse(self.modes[j])
         };
-        Some(AxisResult { rate: rate + self.curvature[j], mean_rate, impulse })
+        let rate = rate + self.curvature[j];
+        Some(AxisResult { rate, end_rate: rate, mean_rate, impulse })
     }
 
     /// Change of the rates of a body by all impulses of the trial.
@@ -214,11 +249,12 @@ impl Dynamics {
     }
 
     fn factor(&mut self) -> Result<(), SolverError> {
+        let weight = self.integrator.force_weight();
         for (j, joint) in self.model.joints.iter().enumerate() {
             for r in 0..6 {
                 self.compliance[j][r] = match joint.free_row() {
                     _ if self.broken[j] => None,
-                    Some(free) if free == r => self.axes[j].row(self.modes[j]).map(|(c, _)| c),
+                    Some(free) if free == r => self.axes[j].row(self.modes[j]).map(|(c, _)| c / weight),
                     _ => Some(0.0),
                 };
             }
@@ -242,17 +278,26 @@ impl Dynamics {
         let rounds = FREE_ROUNDS + 8 * self.axes.len() + 8;
         for round in 0..rounds {
             self.ensure_factor()?;
-            self.assemble();
-            self.kkt.solver.solve(&self.rhs, &mut self.solution)?;
-            if !self.contacts.resolve(&self.kkt.solver, &self.kkt.body_at, &mut self.solution) {
-                return Err(Failure::Contact);
+            if self.integrator.is_second_order() {
+                self.solve_branch_second_order()?;
+            } else {
+                self.solve_branch()?;
             }
-            self.close_joints()?;
             if !self.change_branches(round >= FREE_ROUNDS) {
                 return Ok(());
             }
         }
         Err(Failure::Branches { rounds })
+    }
+
+    /// The step on the present branches.
+    fn solve_branch(&mut self) -> Result<(), Failure> {
+        self.assemble();
+        self.kkt.solver.solve(&self.rhs, &mut self.solution)?;
+        if !self.contacts.resolve(&self.kkt.solver, &self.kkt.body_at, &mut self.solution) {
+            return Err(Failure::Contact);
+        }
+        self.close_joints()
     }
 
     fn assemble(&mut self) {

@@ -351,6 +351,7 @@ impl Testbed {
                 dissipated: sum.dissipated + e.dissipated,
                 port_work: sum.port_work + e.port_work,
                 actuator_work: sum.actuator_work + e.actuator_work,
+                electrical: sum.electrical + e.electrical,
             }
         })
     }

@@ -367,7 +367,7 @@ impl Instance {
     pub fn energy(&self) -> Result<Energy> {
         self.alive("energy")?;
         let e = self.subsystem.energy();
-        let all = [e.kinetic, e.potential, e.dissipated, e.port_work, e.actuator_work];
+        let all = [e.kinetic, e.potential, e.dissipated, e.port_work, e.actuator_work, e.electrical];
         if all.iter().all(|v| v.is_finite()) {
             return Ok(e);
         }

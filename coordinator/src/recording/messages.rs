@@ -167,6 +167,7 @@ pub(crate) fn write_energy(json: &mut JsonBuffer, view: &View) {
             ("dissipated", e.dissipated),
             ("port_work", e.port_work),
             ("actuator_work", e.actuator_work),
+            ("electrical", e.electrical),
         ];
         for (name, value) in parts {
             json.element().raw("\"").raw(prefix).raw(if prefix.is_empty() { "" } else { "." });

@@ -184,6 +184,7 @@ pub(crate) fn energy() -> Topic {
         "dissipated": joule("turned into heat since the start"),
         "port_work": joule("work done on the subsystems through their ports since the start"),
         "actuator_work": joule("mechanical work of the motors since the start"),
+        "electrical": joule("electrical energy drawn by the motors since the start"),
     }));
     Topic::new("/energy", "terraglue.Energy", titled("terraglue.Energy", body))
 }

@@ -30,6 +30,18 @@ pub fn check_value(parameter: &Parameter, count: Option<usize>, value: &Value) -
             let values = value.as_object().into_iter().flat_map(|o| o.values());
             values.into_iter().try_for_each(|v| in_range(parameter, count, v.as_f64().unwrap_or(f64::NAN), v))
         }
+        ParameterType::NumberByName => {
+            by_name(value).try_for_each(|v| check_number(parameter, count, v.as_f64(), v))
+        }
+        ParameterType::TextByName => by_name(value).try_for_each(|v| check_text(parameter, count, v)),
+    }
+}
+
+/// The values of a table, or the value itself.
+fn by_name(value: &Value) -> Box<dyn Iterator<Item = &Value> + '_> {
+    match value {
+        Value::Object(table) => Box::new(table.values()),
+        one => Box::new(std::iter::once(one)),
     }
 }
 
@@ -119,6 +131,11 @@ pub fn allowed(p: &Parameter, count: Option<usize>) -> String {
         (ParameterType::Numbers, Some(n)) => format!("a list of {n} numbers{range}"),
         (ParameterType::Numbers, None) => format!("a list of numbers{range}"),
         (ParameterType::NumberTable, _) => format!("a table of numbers{range}"),
+        (ParameterType::NumberByName, _) => format!("a number{range}, or a table of them by name"),
+        (ParameterType::TextByName, _) => {
+            let quoted: Vec<String> = p.choices.iter().map(|c| format!("\"{c}\"")).collect();
+            format!("{}, or a table of them by name", quoted.join(" or "))
+        }
     }
 }
 

@@ -84,7 +84,15 @@ fn plain(p: &Parameter) -> Value {
         ParameterType::NumberTable => {
             json!({ "type": "object", "additionalProperties": number(p, "number") })
         }
+        ParameterType::NumberByName => either(number(p, "number")),
+        ParameterType::TextByName if !p.choices.is_empty() => either(json!({ "enum": p.choices })),
+        ParameterType::TextByName => either(json!({ "type": "string" })),
     }
+}
+
+/// One value, or a table of them by name.
+fn either(one: Value) -> Value {
+    json!({ "anyOf": [one, { "type": "object", "additionalProperties": one }] })
 }
 
 fn number(p: &Parameter, kind: &str) -> Value {

@@ -14,6 +14,8 @@ pub struct Energy {
     pub port_work: f64,
     /// Mechanical work that its own motors have put in since the start (Σ τ·ω·h, signed).
     pub actuator_work: f64,
+    /// Electrical energy that its motors have drawn since the start.
+    pub electrical: f64,
 }
 
 impl Energy {

@@ -81,6 +81,10 @@ pub enum ParameterType {
     Numbers,
     /// A table of numbers by name.
     NumberTable,
+    /// A number for all, or a table of numbers by name pattern (`*` stands for any text).
+    NumberByName,
+    /// A text for all, or a table of texts by name pattern.
+    TextByName,
 }
 
 impl Parameter {

@@ -1,10 +1,14 @@
-//! The free axis of a joint: motor, limits and brake as one monotone relation between its impulse and its rate.
+//! The free axis of a joint: everything that acts along it as one monotone relation between impulse and rate.
 //!
-//! Implicit PD drive: τ⁺ = kp·(q_des − q − h·u) − kd·(u − u_des) at the rate u of the end of the step is the row
+//! Implicit PD drive: τ⁺ = kp·(q_des − q − h·u) + kd·(u_des − u) at the rate u of the end of the step is the row
 //! u + C·λ = b with λ = h·τ⁺, C = 1/(h·kd + h²·kp), b = C·h·(kp·(q_des − q) + kd·u_des). It adds stiffness and
-//! damping to the system matrix and is stable for any gain (Baraff and Witkin 1998; Tan, Liu and Turk 2011).
-//! |λ| ≤ h·max_torque: a row at its bound leaves the system and its bound acts as an external impulse.
+//! damping to the system matrix and is stable for any gain (Baraff and Witkin 1998; Tan, Liu and Turk 2011). Windings,
+//! gears, friction, springs and armature enter in the same way, see [`crate::actuator`]. |λ| ≤ h·max_torque whatever
+//! drives the joint: a row at its bound leaves the system and its bound acts as an external impulse.
 
+pub(crate) use crate::actuator::curve::Mode;
+use crate::actuator::curve::{Curve, Line, RATE_TOLERANCE, Tag};
+use crate::actuator::{Item, friction, winding};
 use crate::state::JointState;
 
 /// How the motor of a joint is driven. The numbers are the values of the variable `motor`.
@@ -14,11 +18,15 @@ pub(crate) enum Motor {
     Position,
     Velocity,
     Torque,
+    RigidPosition,
+    Voltage,
 }
 
 impl Motor {
-    pub const NAMES: [&'static str; 4] = ["off", "position", "velocity", "torque"];
-    const ALL: [Self; 4] = [Self::Off, Self::Position, Self::Velocity, Self::Torque];
+    pub const NAMES: [&'static str; 6] =
+        ["off", "position", "velocity", "torque", "rigid-position", "voltage"];
+    const ALL: [Self; 6] =
+        [Self::Off, Self::Position, Self::Velocity, Self::Torque, Self::RigidPosition, Self::Voltage];
 
     pub fn from_index(i: i64) -> Option<Self> {
         usize::try_from(i).ok().and_then(|i| Self::ALL.get(i).copied())
@@ -33,152 +41,168 @@ impl Motor {
     }
 }
 
-/// Branch of the relation on which an axis is.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Mode {
-    /// The motor's impulse is given; no row.
-    Free,
-    /// The motor follows its law: a row.
-    Drive,
-    /// At −h·max_torque; no row.
-    Low,
-    /// At +h·max_torque; no row.
-    High,
-    /// At the lower limit: a rigid row.
-    LowerLimit,
-    /// At the upper limit: a rigid row.
-    UpperLimit,
-    /// Held by the brake: a rigid row.
-    Blocked,
-}
-
-/// What the motor wants.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) enum Law {
-    /// A given impulse, N m s.
-    Impulse(f64),
-    /// u + c·λ = b; c = 0 for a velocity motor.
-    Row { c: f64, b: f64 },
-}
+/// At and above this, N m, a block gives way to nothing.
+pub(crate) const FULL_BLOCK: f64 = 1e12;
 
 /// The axis during one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Axis {
-    pub law: Law,
-    /// Largest impulse of the motor, N m s.
-    pub bound: f64,
-    /// Rates that lead exactly to the limits at the end of the step.
-    pub limits: [f64; 2],
-    /// Rate that leads back to where the brake holds.
-    pub brake: Option<f64>,
+    total: Curve,
+    motor: Curve,
+    friction: Curve,
+    /// Armature, spring and damper.
+    passive: [Line; 3],
+    /// Rate of the last step.
+    rate: f64,
+    /// Whether a brake of bounded torque acts.
+    slips: bool,
 }
 
-/// Rates nearer than this to a limit count as at it, rad/s or m/s.
-const RATE_TOLERANCE: f64 = 1e-10;
+/// Who gives which part of the impulse of an axis, N m s.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub(crate) struct Shares {
+    pub motor: f64,
+    pub friction: f64,
+    pub armature: f64,
+    pub spring: f64,
+    pub damper: f64,
+    /// End stops and brake.
+    pub stop: f64,
+}
 
 impl Axis {
-    /// The relation for a step of length h; `limits` of the coordinate.
-    pub fn new(j: &JointState, limits: Option<[f64; 2]>, h: f64) -> Self {
+    /// Nothing acts.
+    pub fn idle() -> Self {
+        let nothing = Curve::line(Line::ZERO, Tag::Law);
+        Self {
+            total: nothing,
+            motor: nothing,
+            friction: nothing,
+            passive: [Line::ZERO; 3],
+            rate: 0.0,
+            slips: false,
+        }
+    }
+
+    /// The relation for a step of length h; `limits` of the coordinate; voltage that the supply can give, V.
+    pub fn new(j: &JointState, limits: Option<[f64; 2]>, supply_v: f64, h: f64) -> Self {
+        if j.broken {
+            return Self::idle();
+        }
+        let a = &j.actuator;
         let bound = h * j.max_torque;
-        let gain = h * j.damping + h * h * j.stiffness;
-        let law = match j.motor {
-            _ if bound <= 0.0 || j.broken => Law::Impulse(0.0),
-            Motor::Off => Law::Impulse(0.0),
-            Motor::Torque => Law::Impulse((h * j.torque_target).clamp(-bound, bound)),
-            Motor::Velocity => Law::Row { c: 0.0, b: j.velocity_target },
-            Motor::Position if gain <= 0.0 => Law::Impulse(0.0),
-            Motor::Position => {
-                let wanted = j.stiffness * (j.angle_target - j.angle) + j.damping * j.velocity_target;
-                Law::Row { c: 1.0 / gain, b: h * wanted / gain }
-            }
-        };
-        let [lower, upper] = limits.unwrap_or([f64::NEG_INFINITY, f64::INFINITY]);
-        let limits = [(lower - j.angle) / h, (upper - j.angle) / h];
-        Self { law, bound, limits, brake: j.blocked.map(|held| (held - j.angle) / h) }
+        let motor = if bound > 0.0 { motor(j, supply_v, h) } else { Curve::line(Line::ZERO, Tag::Law) };
+        let friction = friction::curve(a, h);
+        let (inertia, k) = (a.inertia(), a[Item::SpringStiffness]);
+        let passive = [
+            Line { at_zero: inertia * j.velocity, slope: inertia },
+            Line { at_zero: h * k * (a[Item::SpringReference] - j.angle), slope: h * h * k },
+            Line { at_zero: 0.0, slope: h * a[Item::ViscousFriction] },
+        ];
+        let mut total = motor;
+        if let Some(friction) = &friction {
+            total.add(friction);
+        }
+        passive.iter().filter(|l| **l != Line::ZERO).for_each(|l| total.add_line(*l));
+        let friction = friction.unwrap_or_else(|| Curve::line(Line::ZERO, Tag::Friction));
+        add_stops(&mut total, j, limits, h);
+        let slips = j.blocked.is_some() && a[Item::BlockTorque] < FULL_BLOCK;
+        Self { total, motor, friction, passive, rate: j.velocity, slips }
     }
 
     /// The branch to begin with, as near as possible to the last one.
     pub fn start(&self, last: Mode) -> Mode {
-        match (self.brake, self.law, last) {
-            (Some(_), _, _) => Mode::Blocked,
-            (None, _, Mode::LowerLimit | Mode::UpperLimit) => last,
-            (None, Law::Impulse(_), _) => Mode::Free,
-            (None, Law::Row { .. }, Mode::Low | Mode::High) => last,
-            (None, Law::Row { .. }, _) => Mode::Drive,
-        }
+        self.total.start(last, self.rate)
     }
 
     /// (compliance, right-hand side) of the row on a branch; none: no row.
     pub fn row(&self, mode: Mode) -> Option<(f64, f64)> {
-        match (mode, self.law) {
-            (Mode::Drive, Law::Row { c, b }) => Some((c, b)),
-            (Mode::LowerLimit, _) => Some((0.0, self.limits[0])),
-            (Mode::UpperLimit, _) => Some((0.0, self.limits[1])),
-            (Mode::Blocked, _) => Some((0.0, self.brake.unwrap_or(0.0))),
-            _ => None,
-        }
+        self.total.row(mode)
     }
 
     /// Impulse that acts from outside on a branch without a row.
     pub fn impulse(&self, mode: Mode) -> f64 {
-        match (mode, self.law) {
-            (Mode::Low, _) => -self.bound,
-            (Mode::High, _) => self.bound,
-            (Mode::Free, Law::Impulse(impulse)) => impulse,
-            _ => 0.0,
-        }
-    }
-
-    /// Impulse of the motor alone at the rate u where the axis has the total impulse λ.
-    pub fn motor_impulse(&self, mode: Mode, u: f64, lambda: f64) -> f64 {
-        match (mode, self.law) {
-            (Mode::Drive, _) => lambda.clamp(-self.bound, self.bound),
-            (Mode::Free | Mode::Low | Mode::High, _) => self.impulse(mode),
-            (_, Law::Impulse(impulse)) => impulse,
-            (_, Law::Row { c, b }) if c > 0.0 => ((b - u) / c).clamp(-self.bound, self.bound),
-            // A velocity motor against a stop pushes with all it has.
-            (_, Law::Row { b, .. }) if (b - u).abs() > RATE_TOLERANCE => self.bound.copysign(b - u),
-            _ => 0.0,
-        }
+        self.total.impulse(mode)
     }
 
     /// The branch on which (u, λ), the solution on `mode`, belongs.
     pub fn next(&self, mode: Mode, u: f64, lambda: f64) -> Mode {
+        self.total.next(mode, u, lambda)
+    }
+
+    /// Whether the voltage of the supply limits the motor.
+    pub fn starved(&self, u: f64) -> bool {
+        matches!(self.motor.tag_at(u), Tag::SupplyHigh | Tag::SupplyLow)
+    }
+
+    /// Who gives which part of the impulse λ at the rate u.
+    pub fn shares(&self, mode: Mode, u: f64, lambda: f64) -> Shares {
+        let [armature, spring, damper] = self.passive.map(|l| l.at(u));
+        let rest = lambda - armature - spring - damper;
+        let all = Shares { armature, spring, damper, ..Shares::default() };
+        let within = |curve: &Curve, x: f64| {
+            let (high, low) = curve.span(u);
+            x.max(low).min(high)
+        };
         match mode {
-            Mode::Blocked => mode,
-            Mode::LowerLimit if lambda - self.motor_impulse(mode, u, lambda) >= -self.slack() => mode,
-            Mode::UpperLimit if lambda - self.motor_impulse(mode, u, lambda) <= self.slack() => mode,
-            Mode::LowerLimit | Mode::UpperLimit => self.branch_of_motor(u),
-            _ if u < self.limits[0] - RATE_TOLERANCE => Mode::LowerLimit,
-            _ if u > self.limits[1] + RATE_TOLERANCE => Mode::UpperLimit,
-            Mode::Drive if lambda > self.bound + self.slack() => Mode::High,
-            Mode::Drive if lambda < -self.bound - self.slack() => Mode::Low,
-            Mode::High if self.wants(u) < self.bound => Mode::Drive,
-            Mode::Low if self.wants(u) > -self.bound => Mode::Drive,
-            _ => mode,
+            Mode::Kink { tag: Tag::Friction, .. } => {
+                let motor = self.motor.value(u);
+                Shares { motor, friction: within(&self.friction, rest - motor), ..all }
+            }
+            Mode::Kink { tag: Tag::LowerLimit | Tag::UpperLimit | Tag::Brake, .. } => {
+                let (motor, friction) = (self.motor.value(u), self.friction.value(u));
+                Shares { motor, friction, stop: rest - motor - friction, ..all }
+            }
+            _ => {
+                let friction = self.friction.value(u);
+                let motor = within(&self.motor, rest - friction);
+                let stop = if self.slips { rest - friction - motor } else { 0.0 };
+                Shares { motor, friction, stop, ..all }
+            }
         }
     }
+}
 
-    /// Impulse of the law at the rate u without the bound; ±∞ for a velocity motor off its target.
-    fn wants(&self, u: f64) -> f64 {
-        match self.law {
-            Law::Impulse(impulse) => impulse,
-            Law::Row { c, b } if c > 0.0 => (b - u) / c,
-            Law::Row { b, .. } if b == u => 0.0,
-            Law::Row { b, .. } => f64::INFINITY.copysign(b - u),
+/// The motor alone: law, supply, gear, bound.
+fn motor(j: &JointState, supply_v: f64, h: f64) -> Curve {
+    let law = match j.motor {
+        Motor::Off | Motor::Voltage => Curve::line(Line::ZERO, Tag::Law),
+        Motor::Torque => Curve::line(Line::level(h * j.torque_target), Tag::Law),
+        Motor::Velocity => Curve::rigid(j.velocity_target, Tag::Law),
+        Motor::RigidPosition => {
+            let most = j.actuator[Item::ApproachRate];
+            let wanted = (j.angle_target - j.angle) / j.actuator[Item::ApproachTime].max(h);
+            Curve::rigid(wanted.clamp(-most, most), Tag::Law)
         }
-    }
-
-    fn branch_of_motor(&self, u: f64) -> Mode {
-        match self.law {
-            Law::Impulse(_) => Mode::Free,
-            Law::Row { .. } if self.wants(u) >= self.bound => Mode::High,
-            Law::Row { .. } if self.wants(u) <= -self.bound => Mode::Low,
-            Law::Row { .. } => Mode::Drive,
+        Motor::Position => {
+            let wanted = j.stiffness * (j.angle_target - j.angle) + j.damping * j.velocity_target;
+            Curve::line(Line { at_zero: h * wanted, slope: h * j.damping + h * h * j.stiffness }, Tag::Law)
         }
-    }
+    };
+    let bound = h * j.max_torque;
+    winding::through_winding(law, j, supply_v, h)
+        .at_most(Line::level(bound), Tag::High)
+        .at_least(Line::level(-bound), Tag::Low)
+}
 
-    fn slack(&self) -> f64 {
-        1e-13 * self.bound
+/// End stops and brake. A full block holds the coordinate, a partial one the rate up to its torque.
+fn add_stops(total: &mut Curve, j: &JointState, limits: Option<[f64; 2]>, h: f64) {
+    let most = j.actuator[Item::BlockTorque];
+    match j.blocked {
+        Some(held) if most >= FULL_BLOCK => {
+            let rate = (held - j.angle) / h;
+            return total.add_step(rate, f64::INFINITY, f64::NEG_INFINITY, Tag::Brake);
+        }
+        Some(_) => total.add_step(0.0, h * most, -h * most, Tag::Brake),
+        None => {}
     }
+    if let Some([lower, upper]) = limits {
+        total.add_step((lower - j.angle) / h, f64::INFINITY, 0.0, Tag::LowerLimit);
+        total.add_step((upper - j.angle) / h, 0.0, f64::NEG_INFINITY, Tag::UpperLimit);
+    }
+}
+
+/// Whether two rates count as the same.
+pub(crate) fn at_rest(u: f64) -> bool {
+    u.abs() <= RATE_TOLERANCE
 }

@@ -8,13 +8,15 @@
 //! | `robot` | an instance and the calls of the interface |
 //! | `model`, `state` | what stays and what changes |
 //! | `dynamics` | one step: joint rows, gyroscopic term, the whole KKT matrix, corrections |
-//! | `drive` | motors, limits and brakes of an axis |
+//! | `drive` | what acts along the free axis of a joint: motor, friction, limits, brake |
+//! | `actuator` | windings, gears, friction, heat, battery, energy |
 //! | `contact` | ports, the rigid estimate T*, contacts among own bodies |
 //! | `lcp` | pivoting methods, from the crate `contact-solver` |
 //! | `variables`, `scene` | what can be read, set, done and seen |
 //!
 //! Deliberately absent: ground and soil. The robot knows its ports, never what lies behind them.
 
+mod actuator;
 mod contact;
 mod dense;
 mod drive;

@@ -1,5 +1,6 @@
 //! The module: from parameters to an instance.
 
+use crate::actuator::{Actuator, configure};
 use crate::contact::bodies::Surface;
 use crate::contact::plane::Plane;
 use crate::drive::{Mode, Motor};
@@ -40,7 +41,7 @@ impl Module for RigidBody {
         let model = Model::new(&file, &base, fixed, V3::from(host.gravity()));
         let angles = coordinates(&model, &config.number_table("joints")?)?;
         let bodies = start(&config, &*host, &model, base, &angles)?;
-        let joints = joint_states(&config, &angles)?;
+        let joints = joint_states(&config, &model, &angles)?;
         let state = State {
             forces: vec![V3::zeros(); bodies.len()],
             contact_normal: vec![0.0; bodies.len()],
@@ -49,6 +50,8 @@ impl Module for RigidBody {
             bodies,
             joints,
             energy: Energy::default(),
+            supply: configure::supply(&config)?,
+            start: None,
             stagger: 0.0,
         };
         let text = format!(
@@ -139,25 +142,35 @@ fn start(
     }
 }
 
-fn joint_states(config: &Config, angles: &[f64]) -> Result<Vec<JointState>> {
-    let name = config.text("motor")?;
+fn joint_states(config: &Config, model: &Model, angles: &[f64]) -> Result<Vec<JointState>> {
+    model
+        .joints
+        .iter()
+        .zip(angles)
+        .map(|(joint, angle)| joint_state(config, model, &joint.name, *angle))
+        .collect()
+}
+
+fn joint_state(config: &Config, model: &Model, joint: &str, angle: f64) -> Result<JointState> {
+    let name = configure::text(config, model, "motor", joint)?.unwrap_or("off");
     let motor = Motor::from_name(name).ok_or_else(|| {
         Error::Refused(format!("parameter `motor` = `{name}` is none of {:?}", Motor::NAMES))
     })?;
-    let first = JointState {
-        angle: 0.0,
+    let number = |name: &str| Ok::<f64, Error>(configure::number(config, model, name, joint)?.unwrap_or(0.0));
+    Ok(JointState {
+        angle,
         velocity: 0.0,
         torque: 0.0,
-        angle_target: 0.0,
+        angle_target: angle,
         velocity_target: 0.0,
         torque_target: 0.0,
-        max_torque: config.number("max_torque")?,
-        stiffness: config.number("stiffness")?,
-        damping: config.number("damping")?,
+        max_torque: number("max_torque")?,
+        stiffness: number("stiffness")?,
+        damping: number("damping")?,
         motor,
         blocked: None,
         broken: false,
         mode: Mode::Free,
-    };
-    Ok(angles.iter().map(|a| JointState { angle: *a, angle_target: *a, ..first }).collect())
+        actuator: configure::actuator(config, model, joint, Actuator::default())?,
+    })
 }

@@ -49,7 +49,7 @@ fn nearest(model: &Model, name: &str) -> String {
 }
 
 /// Whether a name matches a pattern in which `*` stands for any text.
-fn matches(pattern: &str, name: &str) -> bool {
+pub(crate) fn matches(pattern: &str, name: &str) -> bool {
     let Some((head, rest)) = pattern.split_once('*') else { return pattern == name };
     let Some(name) = name.strip_prefix(head) else { return false };
     (0..=name.len()).any(|k| name.is_char_boundary(k) && matches(rest, &name[k..]))

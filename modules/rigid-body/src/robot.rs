@@ -1,7 +1,10 @@
 //! An instance: committed state, the step in hand, and the calls of the subsystem interface.
 
+use crate::actuator::battery::Draw;
+use crate::actuator::book::Outcome;
 use crate::contact::estimate::{Estimator, Problem};
 use crate::contact::ports::{Ports, committed, displacement, response};
+use crate::drive::Motor;
 use crate::dynamics::joint_rows::coordinate;
 use crate::dynamics::{Dynamics, Failure};
 use crate::math::V3;
@@ -62,7 +65,7 @@ impl Robot {
         let slots = (0..host.slots()).map(|_| State::default()).collect();
         Self {
             _host: host,
-            variables: variables::describe(&dynamics.model),
+            variables: variables::describe(&dynamics.model, &state),
             actions: variables::actions(&dynamics.model),
             dynamics,
             state,
@@ -149,20 +152,34 @@ impl Robot {
     fn book_joints(&mut self) {
         let Self { dynamics, state, .. } = self;
         let h = dynamics.h;
+        let (supply_v, mut draw) = (state.supply.limit, Draw::default());
         for (j, joint) in dynamics.model.joints.iter().enumerate() {
             let Some(axis) = dynamics.axis_result(j) else { continue };
             let mode = dynamics.modes[j];
-            let motor = dynamics.axes[j].motor_impulse(mode, axis.rate, axis.impulse);
+            let shares = dynamics.axes[j].shares(mode, axis.rate, axis.impulse);
             let s = &mut state.joints[j];
-            state.energy.actuator_work += motor * axis.mean_rate;
-            // A brake or a stop that catches a moving joint turns its energy into heat.
-            let stop = if dynamics.axes[j].row(mode).is_some() { axis.impulse - motor } else { 0.0 };
-            state.energy.dissipated -= stop * axis.mean_rate;
+            let (spring, _) = s.actuator.stored(s.angle);
             s.angle = coordinate(joint, &dynamics.ends, s.angle);
             s.velocity = axis.end_rate;
-            s.torque = (motor / h).clamp(-s.max_torque, s.max_torque);
+            s.torque = (shares.motor / h).clamp(-s.max_torque, s.max_torque);
             s.mode = mode;
+            let outcome = Outcome {
+                shares,
+                rate: axis.rate,
+                mean_rate: axis.mean_rate,
+                starved: dynamics.axes[j].starved(axis.rate),
+                motor_off: s.motor == Motor::Off || s.max_torque <= 0.0,
+            };
+            s.actuator.commit(&outcome, supply_v, h, &mut draw);
+            let e = &mut state.energy;
+            e.actuator_work += shares.motor * axis.mean_rate;
+            // A brake or a stop that catches a moving joint turns its energy into heat, and so does friction; the
+            // implicit spring loses what it does not store.
+            let passive = shares.stop + shares.friction + shares.damper + shares.spring;
+            e.dissipated -= passive * axis.mean_rate + s.actuator.stored(s.angle).0 - spring;
+            e.electrical += s.actuator.book.electrical_power * h;
         }
+        state.supply.advance(&draw, h);
         for (b, force) in state.forces.iter().enumerate() {
             let mut mean = V3::from_row_slice(&dynamics.solution[dynamics.kkt.body_at[b]..][..3]);
             if !dynamics.integrator.is_second_order() {
@@ -174,6 +191,9 @@ impl Robot {
         state.stagger = if dynamics.integrator.is_second_order() { 0.0 } else { 0.5 * h };
         state.accelerations.clone_from(&dynamics.end_accelerations);
         state.accelerated = true;
+        if state.start.is_none() {
+            state.start = state.bodies.first().map(|b| b.c);
+        }
     }
 
     fn book_ports(&mut self, step: &Step, t: &[f64]) {
@@ -397,6 +417,12 @@ impl Subsystem for Robot {
             kinetic += 0.5 * (body.mass * m.v.norm_squared() + w.dot(&(body.inertia * w)));
             // Rates and positions of the scheme are half a step apart; the book is kept at the time of the rates.
             potential -= body.mass * self.model().gravity.dot(&(m.c - self.state.stagger * m.v));
+        }
+        for (s, joint) in self.state.joints.iter().zip(&self.model().joints).filter(|(s, _)| !s.broken) {
+            if joint.moves() {
+                let (spring, armature) = s.actuator.stored(s.angle);
+                (potential, kinetic) = (potential + spring, kinetic + armature);
+            }
         }
         Energy { kinetic, potential, ..self.state.energy }
     }

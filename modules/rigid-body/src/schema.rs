@@ -44,12 +44,12 @@ pub(crate) fn schema() -> Schema {
             .choices(&crate::dynamics::scheme::Integrator::NAMES),
             Parameter::number("rho_infinity", "", 0.8, "Generalized-alpha: what stays of the fastest vibration per step")
                 .within(0.0, 1.0),
-            Parameter::of("motor", ParameterType::Text, "How the motors of all joints are driven at the start")
+            Parameter::of("motor", ParameterType::TextByName, "How the motors are driven at the start, for all joints or by name")
                 .or("position")
                 .choices(&motors),
-            Parameter::number("stiffness", "N m/rad", 600.0, "Stiffness of position motors").within(0.0, f64::INFINITY),
-            Parameter::number("damping", "N m s/rad", 10.0, "Damping of position motors").within(0.0, f64::INFINITY),
-            Parameter::number("max_torque", "N m", 60.0, "Largest torque of every motor").within(0.0, f64::INFINITY),
+            by_name("stiffness", "N m/rad", 600.0, "Stiffness of position motors, for all joints or by name"),
+            by_name("damping", "N m s/rad", 10.0, "Damping of position motors, for all joints or by name"),
+            by_name("max_torque", "N m", 60.0, "Largest torque of the motors, for all joints or by name"),
             Parameter::of("ground", ParameterType::Text, "Rigid ground under the robot: no soil is needed")
                 .or("none")
                 .choices(&["none", "half-space"]),
@@ -60,6 +60,14 @@ pub(crate) fn schema() -> Schema {
                 .within(0.0, f64::INFINITY),
             Parameter::number("restitution", "1", 0.0, "Newton's coefficient of restitution among bodies and with rigid ground")
                 .within(0.0, 1.0),
-        ],
+        ]
+        .into_iter()
+        .chain(crate::actuator::configure::parameters())
+        .collect(),
     }
+}
+
+fn by_name(name: &str, unit: &str, default: f64, help: &str) -> Parameter {
+    let of = Parameter::of(name, ParameterType::NumberByName, help).or(default);
+    Parameter { unit: unit.into(), ..of.within(0.0, f64::INFINITY) }
 }

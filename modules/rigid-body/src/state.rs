@@ -1,5 +1,7 @@
 //! The committed state: motion of the bodies, settings and memory of the joints, energy book.
 
+use crate::actuator::Actuator;
+use crate::actuator::battery::Supply;
 use crate::drive::{Mode, Motor};
 use crate::dynamics::scheme::Acceleration;
 use crate::math::{Q, V3};
@@ -45,6 +47,7 @@ pub(crate) struct JointState {
     pub broken: bool,
     /// Branch of the axis in the last step, where the next step starts looking.
     pub mode: Mode,
+    pub actuator: Actuator,
 }
 
 /// All that changes from step to step.
@@ -57,6 +60,9 @@ pub(crate) struct State {
     /// Normal force of all ports of a body, N.
     pub contact_normal: Vec<f64>,
     pub energy: Energy,
+    pub supply: Supply,
+    /// Where body 0 was at the start; distances are counted from there.
+    pub start: Option<V3>,
     /// By how much positions are ahead of rates, s: half the last step, 0 at the start.
     pub stagger: f64,
     /// Accelerations at t, where the integrator keeps them.
@@ -75,5 +81,6 @@ impl State {
         self.accelerations.clone_from(&other.accelerations);
         self.accelerated = other.accelerated;
         (self.energy, self.stagger) = (other.energy, other.stagger);
+        (self.supply, self.start) = (other.supply, other.start);
     }
 }

@@ -1,20 +1,30 @@
 //! Variables and actions of the robot: numbering, description, reading, writing.
 
+use crate::actuator::SETTINGS;
+use crate::actuator::settings::{Group, Range};
 use crate::drive::Motor;
 use crate::math::euler;
 use crate::model::{Kind, Model};
-use crate::state::State;
-use terraglue_subsystem::{Action, Causality, Effect, Error, Result, ValueType, Variable};
+use crate::state::{JointState, State};
+use terraglue_subsystem::{Action, Causality, Error, Result, ValueType, Variable};
 
 /// Ids per body and per joint.
 const BODY_STRIDE: u32 = 16;
-const JOINT_STRIDE: u32 = 16;
+const JOINT_STRIDE: u32 = 128;
 
 /// What an id means.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) enum Meaning {
-    Body { body: usize, item: u32 },
-    Joint { joint: usize, item: u32 },
+    Body {
+        body: usize,
+        item: u32,
+    },
+    Joint {
+        joint: usize,
+        item: u32,
+    },
+    /// Of the whole robot: place in [`ROBOT_ITEMS`].
+    Robot(usize),
 }
 
 /// Items of a body: 0–11 motion, 12 contact force, 13–15 external force.
@@ -49,9 +59,58 @@ const DAMPING: u32 = 8;
 const MOTOR: u32 = 9;
 const BLOCKED: u32 = 10;
 const BROKEN: u32 = 11;
+const VOLTAGE_TARGET: u32 = 12;
+/// First of [`ACTUATOR_ITEMS`] and of the settings of the actuator.
+const ACTUATOR: u32 = 16;
+const SETTING: u32 = 48;
+
+/// What an actuator tells: name, unit (of a joint that turns), who has it, help, where it stands.
+type ActuatorItem = (&'static str, &'static str, Group, &'static str, fn(&JointState) -> f64);
+
+const ACTUATOR_ITEMS: [ActuatorItem; 14] = [
+    ("power", "W", Group::All, "Mechanical power of the motor in the last step", |j| j.actuator.book.power),
+    ("work", "J", Group::All, "Mechanical work of the motor since the start, signed", |j| {
+        j.actuator.book.work
+    }),
+    ("electrical_power", "W", Group::All, "Power drawn in the last step", |j| {
+        j.actuator.book.electrical_power
+    }),
+    ("electrical_energy", "J", Group::All, "Energy drawn since the start", |j| j.actuator.book.electrical),
+    ("friction_torque", "N m", Group::Friction, "Friction in the last step", |j| j.actuator.book.friction),
+    ("stop_torque", "N m", Group::Friction, "End stop and brake in the last step", |j| j.actuator.book.stop),
+    ("friction_heat", "J", Group::Friction, "Lost in the joint's friction since the start", |j| {
+        j.actuator.book.friction_heat
+    }),
+    ("current", "A", Group::Formula, "Current of the motor", |j| j.actuator.current),
+    ("voltage", "V", Group::Formula, "Voltage at the motor", |j| j.actuator.voltage),
+    ("motor_heat", "J", Group::Formula, "Drawn energy that is neither work nor stored", |j| {
+        j.actuator.book.heat
+    }),
+    ("winding_heat", "J", Group::Dc, "Heat of the winding since the start", |j| j.actuator.book.winding_heat),
+    ("gear_heat", "J", Group::Dc, "Heat of the gear since the start", |j| j.actuator.book.gear_heat),
+    ("winding_temperature", "K", Group::Thermal, "Temperature of the winding", |j| j.actuator.winding_k),
+    ("housing_temperature", "K", Group::Thermal, "Temperature of the housing", |j| j.actuator.housing_k),
+];
+
+/// What the robot as a whole tells.
+const ROBOT_ITEMS: [(&str, &str, &str); 9] = [
+    ("energy.motor_work", "J", "Mechanical work of all motors since the start"),
+    ("energy.electrical", "J", "Electrical energy drawn by all motors since the start"),
+    ("energy.distance", "m", "Horizontal distance of the first body from its start"),
+    ("energy.per_metre", "J/m", "Electrical energy / distance; 0 until 1 cm has been made"),
+    ("supply.voltage", "V", "Voltage that feeds the motors"),
+    ("supply.current", "A", "Current drawn from the supply in the last step"),
+    ("battery.charge", "", "Share of the capacity that is left"),
+    ("battery.lost", "J", "Lost in the internal resistance since the start"),
+    ("battery.missing", "J", "Asked for beyond what the battery could give"),
+];
+/// Those before are there without a battery.
+const WITHOUT_BATTERY: usize = 6;
+/// Nearer than this an energy per metre says nothing, m.
+const SHORTEST: f64 = 1e-2;
 
 /// All variables of a robot in ascending order of id.
-pub(crate) fn describe(model: &Model) -> Vec<Variable> {
+pub(crate) fn describe(model: &Model, state: &State) -> Vec<Variable> {
     let mut all = Vec::new();
     for (b, body) in model.bodies.iter().enumerate() {
         for (item, (name, unit, help)) in BODY_ITEMS.iter().enumerate() {
@@ -66,18 +125,63 @@ pub(crate) fn describe(model: &Model) -> Vec<Variable> {
         if joint.moves() {
             describe_moving(id, &joint.name, joint.kind, &mut all);
         }
-        all.push(Variable {
-            effect: Effect::ReadOnly,
-            ..flag(
-                id + BROKEN,
-                &joint.name,
-                "broken",
-                Causality::Output,
-                "Whether the joint is gone for ever",
-            )
-        });
+        let help = "Whether the joint is gone for ever; true breaks it";
+        all.push(flag(id + BROKEN, &joint.name, "broken", Causality::Parameter, help));
+        if joint.moves() {
+            describe_actuator(id, &joint.name, joint.kind, &state.joints[j], &mut all);
+        }
+    }
+    let first = first + model.joints.len() as u32 * JOINT_STRIDE;
+    let count = if state.supply.is_battery() { ROBOT_ITEMS.len() } else { WITHOUT_BATTERY };
+    for (item, (name, unit, help)) in ROBOT_ITEMS[..count].iter().enumerate() {
+        all.push(Variable::real(first + item as u32, *name, unit, Causality::Output, help));
     }
     all
+}
+
+/// What an actuator tells, and its data.
+fn describe_actuator(id: u32, name: &str, kind: Kind, j: &JointState, all: &mut Vec<Variable>) {
+    let unit = |of: &'static str| if kind == Kind::Prismatic { for_sliding(of) } else { of };
+    let a = &j.actuator;
+    let formula = a.has(Group::Formula) || a.has(Group::Dc);
+    let has = |group: Group| if group == Group::Formula { formula } else { a.has(group) };
+    let target = Variable::real(
+        id + VOLTAGE_TARGET,
+        format!("{name}.voltage_target"),
+        "V",
+        Causality::Input,
+        "What a motor in the mode `voltage` gets at its terminals",
+    );
+    all.extend(Some(target).filter(|_| a.has(Group::Dc)));
+    for (item, (what, of, _, help, _)) in ACTUATOR_ITEMS.iter().enumerate().filter(|(_, i)| has(i.2)) {
+        let id = id + ACTUATOR + item as u32;
+        all.push(Variable::real(id, format!("{name}.{what}"), unit(of), Causality::Output, help));
+    }
+    for (item, s) in SETTINGS.iter().enumerate().filter(|(_, s)| a.has(s.group)) {
+        let (id, name) = (id + SETTING + item as u32, format!("{name}.{}", s.key));
+        let variable = Variable::real(id, name, unit(s.unit), Causality::Parameter, s.help);
+        all.push(match s.range {
+            Range::NotNegative | Range::Positive => variable.within(0.0, f64::INFINITY),
+            Range::Share => variable.within(0.0, 1.0),
+            Range::Any => variable,
+        });
+    }
+}
+
+/// The unit of a joint that slides for that of one that turns.
+fn for_sliding(unit: &'static str) -> &'static str {
+    match unit {
+        "N m" => "N",
+        "rad" => "m",
+        "rad/s" => "m/s",
+        "N m/rad" => "N/m",
+        "N m s/rad" => "N s/m",
+        "kg m^2" => "kg",
+        "A/(N m)" => "A/N",
+        "A s/rad" => "A s/m",
+        "N m/A" => "N m/A",
+        other => other,
+    }
 }
 
 fn describe_moving(id: u32, name: &str, kind: Kind, all: &mut Vec<Variable>) {
@@ -131,7 +235,14 @@ pub(crate) fn meaning(model: &Model, id: u32) -> Result<Meaning> {
         return Ok(Meaning::Body { body: (id / BODY_STRIDE) as usize, item: id % BODY_STRIDE });
     }
     let (joint, item) = (((id - first) / JOINT_STRIDE) as usize, (id - first) % JOINT_STRIDE);
-    let known = model.joints.get(joint).is_some_and(|j| item == BROKEN || (j.moves() && item < BROKEN));
+    if joint >= model.joints.len() {
+        let item = (id - first) as usize - model.joints.len() * JOINT_STRIDE as usize;
+        return if item < ROBOT_ITEMS.len() { Ok(Meaning::Robot(item)) } else { Err(unknown()) };
+    }
+    let told = ACTUATOR..ACTUATOR + ACTUATOR_ITEMS.len() as u32;
+    let settings = SETTING..SETTING + SETTINGS.len() as u32;
+    let of_moving = item <= VOLTAGE_TARGET || told.contains(&item) || settings.contains(&item);
+    let known = model.joints.get(joint).is_some_and(|j| item == BROKEN || (j.moves() && of_moving));
     if known { Ok(Meaning::Joint { joint, item }) } else { Err(unknown()) }
 }
 
@@ -155,9 +266,32 @@ pub(crate) fn number(model: &Model, state: &State, id: u32) -> Result<f64> {
                 MAX_TORQUE => Ok(j.max_torque),
                 STIFFNESS => Ok(j.stiffness),
                 DAMPING => Ok(j.damping),
-                _ => Err(wrong_type(id)),
+                VOLTAGE_TARGET => Ok(j.actuator.voltage_target),
+                MOTOR..=BROKEN => Err(wrong_type(id)),
+                ACTUATOR..SETTING => Ok(ACTUATOR_ITEMS[(item - ACTUATOR) as usize].4(j)),
+                _ => Ok(j.actuator.settings[(item - SETTING) as usize]),
             }
         }
+        Meaning::Robot(item) => Ok(robot_number(state, item)),
+    }
+}
+
+fn robot_number(state: &State, item: usize) -> f64 {
+    let distance = || match (state.start, state.bodies.first()) {
+        (Some(start), Some(body)) => (body.c - start).xy().norm(),
+        _ => 0.0,
+    };
+    match item {
+        0 => state.joints.iter().map(|j| j.actuator.book.work).sum(),
+        1 => state.energy.electrical,
+        2 => distance(),
+        3 if distance() < SHORTEST => 0.0,
+        3 => state.energy.electrical / distance(),
+        4 => state.supply.limit,
+        5 => state.supply.current,
+        6 => state.supply.charge,
+        7 => state.supply.lost,
+        _ => state.supply.missing,
     }
 }
 
@@ -185,6 +319,19 @@ pub(crate) fn set_number(model: &Model, state: &mut State, id: u32, value: f64) 
             Ok(())
         }
         Meaning::Body { .. } => Err(Error::Refused("the motion of a body can be read only".into())),
+        Meaning::Robot(_) => Err(Error::Refused("what the robot as a whole tells can be read only".into())),
+        Meaning::Joint { joint, item: SETTING.. } => {
+            let place = ((id - model.bodies.len() as u32 * BODY_STRIDE) % JOINT_STRIDE - SETTING) as usize;
+            let s = &SETTINGS[place];
+            if !s.range.accepts(value) {
+                return Err(Error::Refused(format!("`{}` cannot be {value}: {}", s.key, s.help)));
+            }
+            state.joints[joint].actuator.settings[place] = value;
+            Ok(())
+        }
+        Meaning::Joint { item: ACTUATOR..SETTING, .. } => {
+            Err(Error::Refused("what an actuator tells can be read only".into()))
+        }
         Meaning::Joint { joint, item } => {
             let j = &mut state.joints[joint];
             let (slot, lowest) = match item {
@@ -194,6 +341,7 @@ pub(crate) fn set_number(model: &Model, state: &mut State, id: u32, value: f64) 
                 MAX_TORQUE => (&mut j.max_torque, 0.0),
                 STIFFNESS => (&mut j.stiffness, 0.0),
                 DAMPING => (&mut j.damping, 0.0),
+                VOLTAGE_TARGET => (&mut j.actuator.voltage_target, f64::NEG_INFINITY),
                 ANGLE..=TORQUE => {
                     return Err(Error::Refused("the motion of a joint can be read only".into()));
                 }
@@ -221,9 +369,14 @@ pub(crate) fn flag_value(model: &Model, state: &State, id: u32) -> Result<bool> 
 pub(crate) fn set_flag(model: &Model, state: &mut State, id: u32, value: bool) -> Result {
     match meaning(model, id)? {
         Meaning::Joint { joint, item: BLOCKED } => block(state, joint, value),
-        Meaning::Joint { item: BROKEN, .. } => {
-            Err(Error::Refused("use the action `break`; nothing mends it".into()))
+        Meaning::Joint { joint, item: BROKEN } if value => {
+            break_joint(state, joint);
+            Ok(())
         }
+        Meaning::Joint { joint, item: BROKEN } if state.joints[joint].broken => {
+            Err(Error::Refused("the joint is broken: nothing mends it".into()))
+        }
+        Meaning::Joint { item: BROKEN, .. } => Ok(()),
         _ => Err(wrong_type(id)),
     }
 }
@@ -245,7 +398,13 @@ pub(crate) fn block(state: &mut State, joint: usize, hold: bool) -> Result {
 /// Removes a joint for ever.
 pub(crate) fn break_joint(state: &mut State, joint: usize) {
     let j = &mut state.joints[joint];
+    if !j.broken {
+        // What spring and armature hold is lost with the joint.
+        let (spring, armature) = j.actuator.stored(j.angle);
+        state.energy.dissipated += spring + armature;
+    }
     (j.broken, j.velocity, j.torque, j.blocked) = (true, 0.0, 0.0, None);
+    j.actuator.stop();
 }
 
 /// Reads the drive of a motor.
@@ -261,7 +420,7 @@ pub(crate) fn set_motor(model: &Model, state: &mut State, id: u32, value: i64) -
     let Meaning::Joint { joint, item: MOTOR } = meaning(model, id)? else { return Err(wrong_type(id)) };
     let drive = Motor::from_index(value);
     let drive =
-        drive.ok_or_else(|| Error::Refused(format!("there is no motor drive number {value} (0 to 3)")))?;
+        drive.ok_or_else(|| Error::Refused(format!("there is no motor drive number {value} (0 to 5)")))?;
     state.joints[joint].motor = drive;
     Ok(())
 }

@@ -171,6 +171,7 @@ impl Subsystem for Synthetic {
                 dissipated: 1.1 * self.t,
                 port_work: -0.8 * self.t,
                 actuator_work: 2.0 * self.t,
+                electrical: 3.0 * self.t,
             },
             Kind::Soil => Energy { dissipated: 0.7 * self.t, port_work: 0.75 * self.t, ..Energy::default() },
             _ => Energy::default(),
@@ -353,6 +354,7 @@ impl Rig {
             energy.dissipated += e.dissipated;
             energy.port_work += e.port_work;
             energy.actuator_work += e.actuator_work;
+            energy.electrical += e.electrical;
         }
         let h_s = if index == 0 { 0.0 } else { H };
         look(&View { t_s: t, step_index: index, h_s, subsystems: &views, gluing: &gluing, energy })

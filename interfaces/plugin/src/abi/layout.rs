@@ -23,4 +23,4 @@ same_layout!(
 );
 same_layout!(Pose, TgPose, position, orientation);
 same_layout!(BodyState, TgBodyState, world_from_body, linear_velocity, angular_velocity);
-same_layout!(Energy, TgEnergy, kinetic, potential, dissipated, port_work, actuator_work);
+same_layout!(Energy, TgEnergy, kinetic, potential, dissipated, port_work, actuator_work, electrical);

@@ -128,4 +128,6 @@ pub struct TgEnergy {
     pub port_work: f64,
     /// Mechanical work that its own motors have put in since the start.
     pub actuator_work: f64,
+    /// Electrical energy that its motors have drawn since the start.
+    pub electrical: f64,
 }

@@ -360,6 +360,7 @@ impl Subsystem for ForeignSubsystem {
                     dissipated: nan,
                     port_work: nan,
                     actuator_work: nan,
+                    electrical: nan,
                 };
             }
         }

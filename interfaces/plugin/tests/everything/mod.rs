@@ -366,6 +366,7 @@ impl Subsystem for Everything {
             dissipated: sum as f64,
             port_work: f64::from(u8::from(self.host.cancelled())),
             actuator_work: f64::from(self.host.max_nodes()),
+            electrical: 7.0,
         }
     }
 }

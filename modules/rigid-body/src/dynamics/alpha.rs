@@ -58,7 +58,7 @@ impl Dynamics {
             let s = &state.joints[j];
             self.broken[j] = s.broken;
             self.rows[j] = rows(joint, &self.ends);
-            self.axes[j] = Axis::new(s, joint.limits, self.h);
+            self.axes[j] = Axis::new(s, joint.limits, state.supply.limit, self.h);
             self.modes[j] = self.axes[j].start(s.mode);
         }
         Ok(())
@@ -192,7 +192,7 @@ impl Dynamics {
         for (j, joint) in self.model.joints.iter().enumerate() {
             let s = &state.joints[j];
             self.rows[j] = rows(joint, &state.bodies);
-            let axis = Axis::new(s, joint.limits, dt);
+            let axis = Axis::new(s, joint.limits, state.supply.limit, dt);
             let mode = axis.start(s.mode);
             for r in 0..6 {
                 self.compliance[j][r] = if s.broken { None } else { Some(0.0) };

@@ -15,7 +15,7 @@ pub(crate) mod kkt;
 pub(crate) mod scheme;
 
 use crate::contact::bodies::BodyContacts;
-use crate::drive::{Axis, Law, Mode};
+use crate::drive::{Axis, Mode};
 use crate::math::{M3, V3, cayley};
 use crate::model::Model;
 use crate::state::{Motion, State};
@@ -110,12 +110,6 @@ impl Dynamics {
         let kkt = Kkt::new(&model)?;
         let (nb, nj, n) = (model.bodies.len(), model.joints.len(), kkt.len());
         let rest = Motion::at(V3::zeros(), crate::math::Q::identity());
-        let idle = Axis {
-            law: Law::Impulse(0.0),
-            bound: 0.0,
-            limits: [f64::NEG_INFINITY, f64::INFINITY],
-            brake: None,
-        };
         Ok(Self {
             contacts: BodyContacts::new(&model, bodies),
             kkt,
@@ -130,7 +124,7 @@ impl Dynamics {
             middle_rate: vec![V3::zeros(); nb],
             free_rate: vec![V3::zeros(); nb],
             rows: vec![Rows::default(); nj],
-            axes: vec![idle; nj],
+            axes: vec![Axis::idle(); nj],
             curvature: vec![0.0; nj],
             broken: vec![false; nj],
             base_rhs: vec![0.0; n],
@@ -200,7 +194,7 @@ impl Dynamics {
             let s = &state.joints[j];
             self.broken[j] = s.broken;
             self.rows[j] = joint_rows::rows(joint, &self.starts);
-            self.axes[j] = Axis::new(s, joint.limits, self.h);
+            self.axes[j] = Axis::new(s, joint.limits, state.supply.limit, self.h);
             self.modes[j] = self.axes[j].start(s.mode);
             let open = gap(joint, &self.ends);
             let rates = self.rates(j, &self.free);

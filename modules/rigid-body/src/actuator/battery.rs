@@ -1,0 +1,140 @@
+//! What feeds all motors of a robot: an ideal source, or a battery with an open-circuit voltage over its charge and an
+//! internal resistance.
+//!
+//! U = U0(charge) − R·I with P = U·I, the upper root of U² − U0·U + R·P = 0. The motors of a step see the voltage that
+//! follows from the step before; motors that the voltage limits draw less at a lower one, which is taken into account
+//! in its prediction, so that a weak battery cannot make it swing.
+
+/// Most points of the open-circuit voltage.
+pub(crate) const POINTS: usize = 16;
+
+/// Data and state of the supply. Without capacity it is an ideal source of `voltage`.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub(crate) struct Supply {
+    /// Open-circuit voltage at evenly spaced charges from 0 to 1, V.
+    pub open_circuit: [f64; POINTS],
+    pub points: usize,
+    /// Ω.
+    pub resistance: f64,
+    /// A s; 0: no battery.
+    pub capacity: f64,
+    /// Share of the capacity.
+    pub charge: f64,
+    /// Voltage that the motors see in the next step, V.
+    pub limit: f64,
+    /// Voltage and current of the last step, V and A.
+    pub voltage: f64,
+    pub current: f64,
+    /// Energy delivered, lost in the internal resistance, and asked for beyond what it can give, J.
+    pub delivered: f64,
+    pub lost: f64,
+    pub missing: f64,
+}
+
+/// What the motors drew in a step.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Draw {
+    /// All power, W.
+    pub power: f64,
+    /// Power of motors that the voltage limits, W, and by how much their current falls with it, A/V.
+    pub starved: f64,
+    pub conductance: f64,
+}
+
+impl Supply {
+    /// An ideal source.
+    pub fn ideal(voltage: f64) -> Self {
+        Self { limit: voltage, voltage, charge: 1.0, ..Self::default() }
+    }
+
+    /// Whether it is a battery.
+    pub fn is_battery(&self) -> bool {
+        self.capacity > 0.0
+    }
+
+    /// Open-circuit voltage at the present charge, V; 0 when it is empty.
+    pub fn open_circuit_v(&self) -> f64 {
+        if self.charge <= 0.0 {
+            return 0.0;
+        }
+        let x = self.charge.min(1.0) * self.points.saturating_sub(1) as f64;
+        let i = (x as usize).min(self.points.saturating_sub(2));
+        let (a, b) = (self.open_circuit[i], self.open_circuit[(i + 1).min(POINTS - 1)]);
+        if self.points < 2 { a } else { a + (b - a) * (x - i as f64) }
+    }
+
+    /// Books a step of length h and predicts the voltage of the next one.
+    pub fn advance(&mut self, draw: &Draw, h: f64) {
+        if !self.is_battery() {
+            self.current = if self.voltage > 0.0 { draw.power / self.voltage } else { 0.0 };
+            self.delivered += draw.power * h;
+            return;
+        }
+        let (u0, r) = (self.open_circuit_v(), self.resistance);
+        let root = u0 * u0 - 4.0 * r * draw.power;
+        self.voltage = 0.5 * (u0 + root.max(0.0).sqrt());
+        let power = if root < 0.0 { 0.25 * u0 * u0 / r } else { draw.power };
+        self.current = if self.voltage > 0.0 { power / self.voltage } else { 0.0 };
+        self.missing += (draw.power - power) * h;
+        self.delivered += power * h;
+        self.lost += r * self.current * self.current * h;
+        self.charge = (self.charge - self.current * h / self.capacity).clamp(0.0, 1.0);
+        self.limit = self.predict(draw);
+    }
+
+    /// (1 + R·G)·U² − (U0 − R·(I_s − G·U_n))·U + R·P = 0 with the starved motors' current I_s + G·(U − U_n).
+    fn predict(&self, draw: &Draw) -> f64 {
+        let (u0, r, before) = (self.open_circuit_v(), self.resistance, self.limit);
+        let starved = if before > 0.0 { draw.starved / before } else { 0.0 };
+        let a = 1.0 + r * draw.conductance;
+        let b = u0 - r * (starved - draw.conductance * before);
+        let c = r * (draw.power - draw.starved);
+        (0.5 * (b + (b * b - 4.0 * a * c).max(0.0).sqrt()) / a).max(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn battery() -> Supply {
+        let mut open_circuit = [0.0; POINTS];
+        open_circuit[..3].copy_from_slice(&[20.0, 24.0, 28.0]);
+        let full =
+            Supply { open_circuit, points: 3, resistance: 0.5, capacity: 3600.0, ..Supply::ideal(28.0) };
+        Supply { charge: 1.0, ..full }
+    }
+
+    #[test]
+    fn voltage_sags_by_the_closed_form_and_charge_is_counted() {
+        let mut b = battery();
+        let draw = Draw { power: 100.0, ..Draw::default() };
+        let u0 = b.open_circuit_v();
+        b.advance(&draw, 1e-3);
+        let current = (u0 - (u0 * u0 - 4.0 * 0.5 * 100.0_f64).sqrt()) / (2.0 * 0.5);
+        assert!((b.current - current).abs() < 1e-12 && (b.voltage - (u0 - 0.5 * current)).abs() < 1e-12);
+        assert!((1.0 - b.charge - current * 1e-3 / 3600.0).abs() < 1e-15);
+        // What the chemistry gives is what arrives plus what the resistance loses.
+        assert!((u0 * current * 1e-3 - b.delivered - b.lost).abs() < 1e-12);
+    }
+
+    #[test]
+    fn starved_motors_settle_at_the_divider_however_weak_the_battery_is() {
+        let mut b = Supply { resistance: 5.0, ..battery() };
+        // A stalled motor of 0.5 Ω takes U/0.5.
+        for _ in 0..3 {
+            let power = b.limit * b.limit / 0.5;
+            b.advance(&Draw { power, starved: power, conductance: 2.0 }, 1e-3);
+        }
+        assert!((b.limit / (28.0 * 0.5 / 5.5) - 1.0).abs() < 1e-4, "{}", b.limit);
+    }
+
+    #[test]
+    fn what_it_cannot_give_is_said() {
+        let mut b = battery();
+        b.advance(&Draw { power: 1000.0, ..Draw::default() }, 1.0);
+        assert!((b.missing - (1000.0 - 28.0 * 28.0 / 2.0)).abs() < 1e-9 && b.voltage == 14.0);
+        b.charge = 0.0;
+        assert_eq!(b.open_circuit_v(), 0.0);
+    }
+}

@@ -1,0 +1,510 @@
+//! A monotone relation between the impulse of an axis and its rate, piecewise linear.
+//!
+//! Everything that acts along the free axis of a joint (motor law, supply and torque limits, gear losses, friction,
+//! springs, armature, end stops, brake) never gives more impulse at a higher rate. Such a relation is a maximal
+//! monotone graph: lines λ = a − s·u between kinks, and vertical pieces where the impulse may jump. Minimum,
+//! maximum and sum of such graphs are such graphs again, so a drive is built from its parts without a special case
+//! for any pair of them. On a line the axis is a row u + λ/s = a/s of the step's linear system (no row where s = 0),
+//! on a vertical piece a rigid row; the right piece is found by an active set over all axes.
+
+/// Most kinks of a curve; parts add up to 19.
+const KINKS: usize = 24;
+
+/// λ = at_zero − slope·u. An infinite `at_zero` lies beyond an end stop.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Line {
+    pub at_zero: f64,
+    pub slope: f64,
+}
+
+impl Line {
+    pub const ZERO: Self = Self { at_zero: 0.0, slope: 0.0 };
+
+    pub const fn level(at_zero: f64) -> Self {
+        Self { at_zero, slope: 0.0 }
+    }
+
+    pub fn at(&self, u: f64) -> f64 {
+        if self.at_zero.is_finite() { self.at_zero - self.slope * u } else { self.at_zero }
+    }
+
+    fn plus(&self, other: &Self) -> Self {
+        if self.at_zero.is_finite() && other.at_zero.is_finite() {
+            Self { at_zero: self.at_zero + other.at_zero, slope: self.slope + other.slope }
+        } else {
+            Self::level(if self.at_zero.is_finite() { other.at_zero } else { self.at_zero })
+        }
+    }
+
+    fn times(&self, factor: f64) -> Self {
+        if self.at_zero.is_finite() {
+            Self { at_zero: factor * self.at_zero, slope: factor * self.slope }
+        } else {
+            *self
+        }
+    }
+}
+
+/// What makes a piece or a kink of a curve what it is; the next step starts looking there.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Tag {
+    /// The motor follows its law.
+    Law,
+    /// At the largest or smallest torque.
+    High,
+    Low,
+    /// At the largest or smallest voltage of the supply.
+    SupplyHigh,
+    SupplyLow,
+    /// At the largest or smallest current.
+    CurrentHigh,
+    CurrentLow,
+    /// Held by the losses of the gear.
+    Gear,
+    /// Held by friction.
+    Friction,
+    /// At an end stop.
+    LowerLimit,
+    UpperLimit,
+    /// Held by the brake.
+    Brake,
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Piece {
+    line: Line,
+    tag: Tag,
+}
+
+/// Where on a curve an axis is.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Mode {
+    /// Not known yet.
+    Free,
+    /// On line number `index`.
+    Line { index: usize, tag: Tag },
+    /// On the vertical piece of kink number `index`.
+    Kink { index: usize, tag: Tag },
+}
+
+impl Mode {
+    pub fn tag(self) -> Option<Tag> {
+        match self {
+            Self::Free => None,
+            Self::Line { tag, .. } | Self::Kink { tag, .. } => Some(tag),
+        }
+    }
+}
+
+/// Rates nearer than this to a kink count as at it, rad/s or m/s.
+pub(crate) const RATE_TOLERANCE: f64 = 1e-10;
+
+/// The graph: line i holds between kinks i − 1 and i.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Curve {
+    count: usize,
+    kinks: [(f64, Tag); KINKS],
+    pieces: [Piece; KINKS + 1],
+}
+
+impl Curve {
+    /// One line.
+    pub fn line(line: Line, tag: Tag) -> Self {
+        Self { count: 0, kinks: [(0.0, tag); KINKS], pieces: [Piece { line, tag }; KINKS + 1] }
+    }
+
+    /// Any impulse at one rate.
+    pub fn rigid(rate: f64, tag: Tag) -> Self {
+        let mut curve = Self::line(Line::level(f64::INFINITY), tag);
+        curve.push((rate, tag), Piece { line: Line::level(f64::NEG_INFINITY), tag });
+        curve
+    }
+
+    /// Straight between points in ascending order of the rate, level beyond them.
+    pub fn polygon(points: &[(f64, f64)], tag: Tag) -> Self {
+        let (Some(first), Some(last)) = (points.first(), points.last()) else {
+            return Self::line(Line::ZERO, tag);
+        };
+        let mut curve = Self::line(Line::level(first.1), tag);
+        for pair in points.windows(2) {
+            let ((u, a), (v, b)) = (pair[0], pair[1]);
+            let slope = (a - b) / (v - u);
+            curve.push((u, tag), Piece { line: Line { at_zero: a + slope * u, slope }, tag });
+        }
+        curve.push((last.0, tag), Piece { line: Line::level(last.1), tag });
+        curve
+    }
+
+    /// What the line at a rate is.
+    pub fn tag_at(&self, u: f64) -> Tag {
+        self.pieces[self.index_at(u)].tag
+    }
+
+    fn push(&mut self, kink: (f64, Tag), piece: Piece) {
+        if self.count < KINKS {
+            self.kinks[self.count] = kink;
+            self.count += 1;
+            self.pieces[self.count] = piece;
+        }
+    }
+
+    fn range(&self, i: usize) -> (f64, f64) {
+        let low = if i == 0 { f64::NEG_INFINITY } else { self.kinks[i - 1].0 };
+        let high = if i == self.count { f64::INFINITY } else { self.kinks[i].0 };
+        (low, high)
+    }
+
+    /// Index of the line at a rate; at a kink the one on its left.
+    fn index_at(&self, u: f64) -> usize {
+        self.kinks[..self.count].partition_point(|k| k.0 < u)
+    }
+
+    /// Makes sure that there is a kink at `u`; its number.
+    fn split(&mut self, u: f64, tag: Tag) -> usize {
+        let i = self.index_at(u);
+        if i < self.count && self.kinks[i].0 == u || self.count == KINKS {
+            return i.min(self.count.saturating_sub(1));
+        }
+        self.kinks.copy_within(i..self.count, i + 1);
+        self.pieces.copy_within(i..=self.count, i + 1);
+        self.kinks[i] = (u, tag);
+        self.count += 1;
+        i
+    }
+
+    /// Replaces every part above (true) or below (false) `by`.
+    fn cut(&self, by: Line, mut choose: impl FnMut(Piece, bool, f64) -> Piece, tag: Tag) -> Self {
+        let mut out: Option<Self> = None;
+        let mut emit = |kink: (f64, Tag), piece: Piece| match &mut out {
+            None => out = Some(Self { pieces: [piece; KINKS + 1], ..Self::line(piece.line, piece.tag) }),
+            Some(curve) => {
+                if curve.pieces[curve.count] != piece {
+                    curve.push(kink, piece);
+                }
+            }
+        };
+        for i in 0..=self.count {
+            let (low, high) = self.range(i);
+            let piece = self.pieces[i];
+            let start = if i == 0 { (low, tag) } else { self.kinks[i - 1] };
+            let slopes = piece.line.slope - by.slope;
+            let crossing = (piece.line.at_zero - by.at_zero) / slopes;
+            if slopes != 0.0 && crossing > low && crossing < high {
+                let inside = |a: f64, b: f64| middle(a, b);
+                emit(start, choose(piece, slopes > 0.0, inside(low, crossing)));
+                emit((crossing, tag), choose(piece, slopes < 0.0, inside(crossing, high)));
+            } else {
+                let u = middle(low, high);
+                emit(start, choose(piece, piece.line.at(u) > by.at(u), u));
+            }
+        }
+        out.unwrap_or(*self)
+    }
+
+    /// The smaller of the curve and a line.
+    pub fn at_most(&self, line: Line, tag: Tag) -> Self {
+        self.cut(line, |piece, above, _| if above { Piece { line, tag } } else { piece }, tag)
+    }
+
+    /// The larger of the curve and a line.
+    pub fn at_least(&self, line: Line, tag: Tag) -> Self {
+        self.cut(line, |piece, above, _| if above { piece } else { Piece { line, tag } }, tag)
+    }
+
+    /// All impulses times a factor that depends on their sign and that of the rate: `factor(driving)`.
+    pub fn through_gear(&self, factor: impl Fn(bool) -> f64) -> Self {
+        let mut split = *self;
+        split.split(0.0, Tag::Gear);
+        let scale = |piece: Piece, above: bool, u: f64| Piece {
+            line: piece.line.times(factor(above == (u > 0.0))),
+            ..piece
+        };
+        split.cut(Line::ZERO, scale, Tag::Gear)
+    }
+
+    /// All impulses times a factor.
+    pub fn times(mut self, factor: f64) -> Self {
+        self.pieces[..=self.count].iter_mut().for_each(|p| p.line = p.line.times(factor));
+        self
+    }
+
+    /// The sum with a line.
+    pub fn add_line(&mut self, line: Line) {
+        self.pieces[..=self.count].iter_mut().for_each(|p| p.line = p.line.plus(&line));
+    }
+
+    /// The sum with a step from `left` down to `right` at the rate `u`.
+    pub fn add_step(&mut self, u: f64, left: f64, right: f64, tag: Tag) {
+        let k = self.split(u, tag);
+        self.kinks[k].1 = tag;
+        for (i, piece) in self.pieces[..=self.count].iter_mut().enumerate() {
+            piece.line = piece.line.plus(&Line::level(if i <= k { left } else { right }));
+        }
+    }
+
+    /// The sum with a curve.
+    pub fn add(&mut self, other: &Self) {
+        for (u, tag) in &other.kinks[..other.count] {
+            self.split(*u, *tag);
+        }
+        for i in 0..=self.count {
+            let (low, high) = self.range(i);
+            let line = other.pieces[other.index_at(middle(low, high))].line;
+            self.pieces[i].line = self.pieces[i].line.plus(&line);
+        }
+    }
+
+    /// Impulses just left and just right of a rate: the larger and the smaller of what is possible there.
+    pub fn span(&self, u: f64) -> (f64, f64) {
+        let left = self.kinks[..self.count].partition_point(|k| k.0 < u - RATE_TOLERANCE);
+        let right = self.kinks[..self.count].partition_point(|k| k.0 <= u + RATE_TOLERANCE);
+        (self.pieces[left].line.at(u), self.pieces[right].line.at(u))
+    }
+
+    /// Impulse at a rate; where there is a choice, the smallest in magnitude.
+    pub fn value(&self, u: f64) -> f64 {
+        let (high, low) = self.span(u);
+        if low.is_finite() || high.is_finite() { 0.0_f64.max(low).min(high) } else { 0.0 }
+    }
+
+    /// (compliance, right-hand side) of the row of a mode; none: no row.
+    pub fn row(&self, mode: Mode) -> Option<(f64, f64)> {
+        match mode {
+            Mode::Line { index, .. } => {
+                let Line { at_zero, slope } = self.pieces[index].line;
+                (slope > 0.0).then(|| (1.0 / slope, at_zero / slope))
+            }
+            Mode::Kink { index, .. } => Some((0.0, self.kinks[index].0)),
+            Mode::Free => None,
+        }
+    }
+
+    /// Impulse that acts from outside in a mode without a row.
+    pub fn impulse(&self, mode: Mode) -> f64 {
+        match mode {
+            Mode::Line { index, .. } if self.pieces[index].line.slope <= 0.0 => {
+                self.pieces[index].line.at_zero
+            }
+            _ => 0.0,
+        }
+    }
+
+    fn on_line(&self, index: usize) -> Mode {
+        Mode::Line { index, tag: self.pieces[index].tag }
+    }
+
+    fn on_kink(&self, index: usize) -> Mode {
+        Mode::Kink { index, tag: self.kinks[index].1 }
+    }
+
+    fn is_vertical(&self, k: usize) -> bool {
+        let u = self.kinks[k].0;
+        let (left, right) = (self.pieces[k].line.at(u), self.pieces[k + 1].line.at(u));
+        left - right > self.slack(k, k + 1)
+    }
+
+    /// Rounding of impulses near two lines.
+    fn slack(&self, i: usize, k: usize) -> f64 {
+        let size =
+            |i: usize| Some(self.pieces[i].line.at_zero.abs()).filter(|a| a.is_finite()).unwrap_or(0.0);
+        1e-13 * (size(i) + size(k))
+    }
+
+    /// Where the axis is at a rate.
+    fn locate(&self, u: f64) -> Mode {
+        let i = self.index_at(u);
+        let line = self.pieces[i].line.at_zero;
+        if line == f64::INFINITY && i < self.count {
+            self.on_kink(i)
+        } else if line == f64::NEG_INFINITY && i > 0 {
+            self.on_kink(i - 1)
+        } else {
+            self.on_line(i)
+        }
+    }
+
+    /// The mode to begin with: what the last one was, nearest to the last rate.
+    pub fn start(&self, last: Mode, rate: f64) -> Mode {
+        let Some(wanted) = last.tag() else { return self.first(rate) };
+        let kinks = (0..self.count).filter(|k| self.kinks[*k].1 == wanted && self.is_vertical(*k));
+        let lines = (0..=self.count)
+            .filter(|i| self.pieces[*i].tag == wanted && self.pieces[*i].line.at_zero.is_finite());
+        let away = |i: usize| {
+            let (low, high) = self.range(i);
+            (low - rate).max(rate - high).max(0.0)
+        };
+        let lines = lines.map(|i| (self.on_line(i), away(i)));
+        let kinks = kinks.map(|k| (self.on_kink(k), (self.kinks[k].0 - rate).abs()));
+        let kinked = matches!(last, Mode::Kink { .. });
+        let best = lines.chain(kinks).min_by(|a, b| {
+            let same = |m: &Mode| matches!(m, Mode::Kink { .. }) != kinked;
+            same(&a.0).cmp(&same(&b.0)).then(a.1.total_cmp(&b.1))
+        });
+        best.map_or_else(|| self.first(rate), |(mode, _)| mode)
+    }
+
+    /// Without memory: on the motor's law where it has one.
+    fn first(&self, rate: f64) -> Mode {
+        let law = (0..self.count).find(|k| self.kinks[*k].1 == Tag::Law && self.is_vertical(*k));
+        match law {
+            Some(k) => self.on_kink(k),
+            None => self.start_on_law(rate),
+        }
+    }
+
+    fn start_on_law(&self, rate: f64) -> Mode {
+        let away = |i: &usize| {
+            let (low, high) = self.range(*i);
+            (low - rate).max(rate - high).max(0.0)
+        };
+        (0..=self.count)
+            .filter(|i| self.pieces[*i].tag == Tag::Law && self.pieces[*i].line.at_zero.is_finite())
+            .min_by(|a, b| away(a).total_cmp(&away(b)))
+            .map_or_else(|| self.locate(rate), |i| self.on_line(i))
+    }
+
+    /// The mode on which (u, λ), the solution in `mode`, belongs.
+    pub fn next(&self, mode: Mode, u: f64, lambda: f64) -> Mode {
+        match mode {
+            Mode::Free => self.locate(u),
+            Mode::Kink { index, .. } => {
+                let at = self.kinks[index].0;
+                let (left, right) = (self.pieces[index].line.at(at), self.pieces[index + 1].line.at(at));
+                let slack = self.slack(index, index + 1);
+                if lambda > left + slack {
+                    self.on_line(index)
+                } else if lambda < right - slack {
+                    self.on_line(index + 1)
+                } else {
+                    mode
+                }
+            }
+            Mode::Line { index, .. } => {
+                let (low, high) = self.range(index);
+                if u > high {
+                    self.walk(mode, index, u, 1)
+                } else if u < low {
+                    self.walk(mode, index, u, -1)
+                } else {
+                    mode
+                }
+            }
+        }
+    }
+
+    /// From line `from` towards `u`: to the line there, or to the first vertical piece on the way.
+    fn walk(&self, mode: Mode, from: usize, u: f64, direction: isize) -> Mode {
+        let up = direction > 0;
+        let mut i = from;
+        loop {
+            let end = if up { i == self.count } else { i == 0 };
+            let k = if up { i } else { i.wrapping_sub(1) };
+            if end || (self.kinks[k].0 - u) * direction as f64 >= 0.0 {
+                break;
+            }
+            if self.is_vertical(k) {
+                let near = (u - self.kinks[k].0).abs() <= RATE_TOLERANCE;
+                return if near && i == from { mode } else { self.on_kink(k) };
+            }
+            i = i.wrapping_add_signed(direction);
+        }
+        // By how much the impulse is wrong on the line where it is now.
+        let wrong = (self.pieces[i].line.at(u) - self.pieces[from].line.at(u)).abs();
+        if wrong <= self.slack(i, from) { mode } else { self.on_line(i) }
+    }
+}
+
+/// A rate between two others.
+fn middle(low: f64, high: f64) -> f64 {
+    match (low.is_finite(), high.is_finite()) {
+        (true, true) => low + 0.5 * (high - low),
+        (true, false) => low + low.abs().max(1.0),
+        (false, true) => high - high.abs().max(1.0),
+        (false, false) => 0.0,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Finds (u, λ) with λ = (u − v)·m, the impulse that changes the rate of a mass m from v to u.
+    fn balance(curve: &Curve, m: f64, v: f64) -> (f64, f64) {
+        let mut mode = curve.start(Mode::Free, v);
+        for _ in 0..60 {
+            let (u, lambda) = match curve.row(mode) {
+                Some((c, b)) => {
+                    let lambda = (b - v) / (c + 1.0 / m);
+                    (v + lambda / m, lambda)
+                }
+                None => (v + curve.impulse(mode) / m, curve.impulse(mode)),
+            };
+            let next = curve.next(mode, u, lambda);
+            if next == mode {
+                return (u, lambda);
+            }
+            mode = next;
+        }
+        panic!("no balance for {v}");
+    }
+
+    fn drive() -> Curve {
+        let law = Curve::line(Line { at_zero: 1.0, slope: 10.0 }, Tag::Law);
+        let bounded = law.at_most(Line { at_zero: 0.6, slope: 0.1 }, Tag::SupplyHigh);
+        let bounded = bounded.at_least(Line { at_zero: -0.6, slope: 0.1 }, Tag::SupplyLow);
+        let mut all = bounded.through_gear(|driving| if driving { 0.8 } else { 1.0 / 0.7 });
+        all = all.at_most(Line::level(0.4), Tag::High).at_least(Line::level(-0.4), Tag::Low);
+        all.add_step(0.0, 0.05, -0.05, Tag::Friction);
+        all.add_line(Line { at_zero: 0.02, slope: 0.3 });
+        all.add_step(-2.0, f64::INFINITY, 0.0, Tag::LowerLimit);
+        all.add_step(3.0, 0.0, f64::NEG_INFINITY, Tag::UpperLimit);
+        all
+    }
+
+    #[test]
+    fn a_curve_of_many_parts_falls_everywhere() {
+        let curve = drive();
+        let mut last = f64::INFINITY;
+        for k in -400..600 {
+            let u = 0.005 * f64::from(k);
+            let (high, low) = curve.span(u);
+            assert!(low <= high && high <= last + 1e-12, "{u}: {low} {high} {last}");
+            last = low;
+        }
+    }
+
+    #[test]
+    fn the_balance_with_a_mass_is_found_and_lies_on_the_curve() {
+        let curve = drive();
+        for m in [1e-3, 0.1, 3.0, 1e3] {
+            for k in -60..60 {
+                let v = 0.1 * f64::from(k) + 0.003;
+                let (u, lambda) = balance(&curve, m, v);
+                let (high, low) = curve.span(u);
+                assert!(lambda <= high + 1e-9 && lambda >= low - 1e-9, "{m} {v}: {u} {lambda} {low} {high}");
+                assert!((lambda - m * (u - v)).abs() < 1e-9 * m.max(1.0));
+            }
+        }
+    }
+
+    #[test]
+    fn a_gear_scales_by_the_direction_of_the_power() {
+        let curve = Curve::line(Line { at_zero: 1.0, slope: 1.0 }, Tag::Law)
+            .through_gear(|driving| if driving { 0.5 } else { 4.0 });
+        assert_eq!(curve.value(0.5), 0.25);
+        assert_eq!(curve.value(2.0), -4.0);
+        assert_eq!(curve.value(-1.0), 8.0);
+        assert_eq!(curve.span(0.0), (4.0, 0.5));
+    }
+
+    #[test]
+    fn a_rigid_motor_gives_what_it_needs_up_to_its_bound() {
+        let curve = Curve::rigid(1.0, Tag::Law)
+            .at_most(Line::level(0.5), Tag::High)
+            .at_least(Line::level(-0.5), Tag::Low);
+        let (u, lambda) = balance(&curve, 2.0, 0.9);
+        assert!((u - 1.0).abs() < 1e-15 && (lambda - 0.2).abs() < 1e-12);
+        assert_eq!(balance(&curve, 2.0, 0.0), (0.25, 0.5));
+        assert_eq!(curve.value(7.0), -0.5);
+    }
+}

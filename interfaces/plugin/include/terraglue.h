@@ -514,6 +514,8 @@ typedef struct {
     double port_work;
     /* Mechanical work that its own motors have put in since the start. */
     double actuator_work;
+    /* Electrical energy that its motors have drawn since the start. */
+    double electrical;
 } tg_energy;
 
 /* One piece of a parallel loop. */

@@ -197,7 +197,9 @@ fn calls(s: &mut dyn Subsystem, bits: &mut Vec<u64>) {
         bits.extend((0..4).map(|k| tile.values.at(k).to_bits()));
     }
     let e = s.energy();
-    bits.extend([e.kinetic, e.potential, e.dissipated, e.port_work, e.actuator_work, e.electrical].map(f64::to_bits));
+    bits.extend(
+        [e.kinetic, e.potential, e.dissipated, e.port_work, e.actuator_work, e.electrical].map(f64::to_bits),
+    );
     bits.push(s.next_event_time().to_bits());
 }
 

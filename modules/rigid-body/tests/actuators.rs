@@ -187,17 +187,21 @@ fn coulomb_friction_sticks_exactly_and_breaks_away_at_its_torque() {
     {
         let friction = format!(r#""coulomb_friction": 1.0, "static_friction": 1.5{bristles}"#);
         let mut rig = rotor(name, &friction, r#", "motor": "torque", "max_torque": 100"#);
-        rig.set("j.torque_target", 1.45);
-        steps(&mut rig, 2000);
+        // Slowly: the torque at which LuGre friction breaks away falls with the rate of the torque.
+        for k in 1..=2000 {
+            rig.set("j.torque_target", 1.3 * f64::from(k) / 2000.0);
+            rig.free_step();
+        }
+        steps(&mut rig, 200);
         let held = rig.get("j.angle");
         if bristles.is_empty() {
             assert_eq!((held, rig.get("j.velocity")), (0.0, 0.0));
         } else {
-            // It gives way by no more than the bristles bend (1.45/2000 rad, and creeps towards g/σ0), then stays.
-            assert!(held > 1.45 / 2000.0 * 0.9 && held < 2e-2, "{held}");
+            // It gives way by no more than the bristles bend (1.3/2000 rad at first, more near the break-away), then stays.
+            assert!(held > 1.3 / 2000.0 * 0.9 && held < 2e-2, "{held}");
             assert!(rig.get("j.velocity").abs() < 1e-3, "{}", rig.get("j.velocity"));
         }
-        close(rig.get("j.friction_torque"), -1.45, 1e-2);
+        close(rig.get("j.friction_torque"), -1.3, 1e-2);
         rig.set("j.torque_target", 1.6);
         steps(&mut rig, 1000);
         // Sliding: acceleration (1.6 − F_c)/I once it has left the Stribeck range.

@@ -48,38 +48,57 @@ impl NodeState {
     }
 }
 
-/// What is kept of a node that no foot stands on, in 32 bits: the permanent depth in halves of a unit of height
-/// (23 bits, to 1 m) and the remainder of the surface in 1/512 of a unit (9 bits). A foot that comes back finds its
-/// pressure to about 0.1 Pa.
+/// What is kept of a node that no foot stands on, in 40 bits: the permanent depth in sixteenths of a unit of height (26
+/// bits, to 1 m) and the remainder of the surface in 1/16384 of a unit (14 bits). A foot that comes back finds its
+/// pressure to 1e-6 from a depth of a centimetre on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-struct Kept(u32);
+struct Kept([u8; 5]);
 
 impl Kept {
-    const HALF: f64 = 0.5 * UNIT_M;
-    const FINE: f64 = UNIT_M / 512.0;
-    const DEEPEST: f64 = 8_388_607.0;
+    const STEP: f64 = UNIT_M / 16.0;
+    const DEEPEST: f64 = 67_108_863.0;
+    const FINE: f64 = UNIT_M / 16_384.0;
+    const FINE_BITS: u32 = 14;
+    const HALF: i64 = 1 << (Self::FINE_BITS - 1);
 
     fn new(permanent: f64, remainder: f64) -> Self {
-        let halves = (permanent / Self::HALF).round().clamp(0.0, Self::DEEPEST) as u32;
-        if halves == 0 {
-            return Self(0);
-        }
-        let fine = (remainder / Self::FINE).round().clamp(-256.0, 255.0) as i32 + 256;
-        Self(halves << 9 | fine as u32)
+        let steps = (permanent / Self::STEP).round().clamp(0.0, Self::DEEPEST) as u64;
+        let half = Self::HALF as f64;
+        let fine = (remainder / Self::FINE).round().clamp(-half, half - 1.0) as i64 + Self::HALF;
+        Self::pack(steps, fine as u64)
+    }
+
+    /// Without depth nothing is kept.
+    #[inline]
+    fn pack(steps: u64, fine: u64) -> Self {
+        let [a, b, c, d, e, ..] = (steps << Self::FINE_BITS | fine).to_le_bytes();
+        if steps == 0 { Self::default() } else { Self([a, b, c, d, e]) }
+    }
+
+    /// (steps of depth, fine steps of the remainder above their lowest).
+    #[inline]
+    fn unpack(self) -> (u64, u64) {
+        let [a, b, c, d, e] = self.0;
+        let all = u64::from_le_bytes([a, b, c, d, e, 0, 0, 0]);
+        (all >> Self::FINE_BITS, all & ((1 << Self::FINE_BITS) - 1))
     }
 
     fn permanent(self) -> f64 {
-        f64::from(self.0 >> 9) * Self::HALF
+        self.unpack().0 as f64 * Self::STEP
     }
 
     fn remainder(self) -> f64 {
-        if self.0 == 0 { 0.0 } else { f64::from((self.0 & 511) as i32 - 256) * Self::FINE }
+        match self.unpack() {
+            (0, _) => 0.0,
+            (_, fine) => (fine as i64 - Self::HALF) as f64 * Self::FINE,
+        }
     }
 
     /// After `units` of loose material have filled the hollow.
+    #[inline]
     fn filled(self, units: i32) -> Self {
-        let left = (self.0 >> 9).saturating_sub(2 * units.max(0) as u32);
-        if left == 0 { Self(0) } else { Self(left << 9 | self.0 & 511) }
+        let (steps, fine) = self.unpack();
+        Self::pack(steps.saturating_sub(16 * u64::from(units.max(0) as u32)), fine)
     }
 }
 

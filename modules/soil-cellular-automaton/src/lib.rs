@@ -11,8 +11,8 @@
 //!   c = h_a − 2h_0 + h_b and e = (|c| − κ_max·d²)₊, q = trunc(e/24) goes from 0 to each end (c < 0), or from each
 //!   end to 0 (c > 0). e/6 would repair a single triple exactly; 1/24 is what twelve overlapping ones admit.
 //!
-//! Both are odd functions of one snapshot: the order in which nodes are visited cannot be seen. A flux below 1 µm
-//! does not flow. A sweep applies repose, every second one curvature as well; sweeps per step are bounded, what is
+//! Both are odd functions of one snapshot: the order in which nodes are visited cannot be seen. A flux is rounded down
+//! to whole units (0.24 µm). A sweep applies repose, every second one curvature as well; sweeps per step are bounded, what is
 //! not at rest then goes on in the next step.
 //!
 //! # Load

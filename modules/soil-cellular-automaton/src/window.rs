@@ -90,8 +90,9 @@ impl Window {
         self.reset();
         self.find_borders(&lattice);
         self.copy_heights(ground);
-        self.repeat_borders();
         self.put_feet(feet);
+        // with the load of feet at the edge
+        self.repeat_borders();
     }
 
     fn reset(&mut self) {

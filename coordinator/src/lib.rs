@@ -10,6 +10,7 @@ pub mod gluing;
 pub mod host;
 pub mod observer;
 pub mod recording;
+pub mod scaffold;
 pub mod scenario;
 pub mod signals;
 pub mod terrain;

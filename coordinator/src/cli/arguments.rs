@@ -2,6 +2,7 @@
 
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
+use terraglue::scaffold::{Kind, Language};
 
 /// Simulates robots on deformable ground: rigid bodies, soils and controllers, glued into one run.
 #[derive(Parser, Debug)]
@@ -51,6 +52,8 @@ pub enum Command {
     /// Run, show or check a functional mock-up unit (FMI 2.0 and 3.0, co-simulation).
     #[command(subcommand)]
     Fmu(FmuCommand),
+    /// Make the folder of a new module that builds and runs at once.
+    New(NewArguments),
     /// List the soils that a scenario can name, and those that are refused with the reason.
     Soils {
         /// Another soil table.
@@ -96,6 +99,31 @@ pub struct RunArguments {
     /// Print the summary as JSON on standard output, and nothing else there.
     #[arg(long)]
     pub json: bool,
+}
+
+/// What `new` takes.
+#[derive(Args, Debug, Clone)]
+pub struct NewArguments {
+    /// What to make.
+    #[arg(value_parser = one_of(Kind::ALL, Kind::word))]
+    pub kind: Kind,
+    /// Name of the module and of its folder, e.g. my-soil.
+    pub name: String,
+    /// Language.
+    #[arg(long, default_value = "rust", value_parser = one_of(Language::ALL, Language::word))]
+    pub lang: Language,
+}
+
+/// Takes the word of one of a few values.
+fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
+    all: [T; N],
+    word: fn(T) -> &'static str,
+) -> impl clap::builder::TypedValueParser<Value = T> {
+    use clap::builder::TypedValueParser;
+    clap::builder::PossibleValuesParser::new(all.map(word)).map(move |text| {
+        // The parser before has admitted these words only.
+        all.into_iter().find(|value| word(*value) == text).unwrap_or(all[0])
+    })
 }
 
 /// What `compare` takes.

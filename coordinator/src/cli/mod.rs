@@ -10,6 +10,7 @@ mod folder;
 mod interrupt;
 mod list;
 mod logger;
+mod new;
 mod output;
 mod progress;
 mod report;
@@ -57,6 +58,7 @@ pub fn main() -> ExitCode {
         Command::Modules { module_path, json } => list::modules(&module_path, json),
         Command::Variables(arguments) => list::variables(&arguments),
         Command::Fmu(command) => fmu::fmu(&command),
+        Command::New(arguments) => new::new(&arguments),
         Command::Soils { file } => list::soils(file.as_deref()),
     };
     match done {

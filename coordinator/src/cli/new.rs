@@ -1,0 +1,21 @@
+//! `terraglue new`: the folder of a new module.
+
+use super::Exit;
+use super::arguments::NewArguments;
+use super::output::outln;
+use std::path::Path;
+use terraglue::Result;
+use terraglue::scaffold::{Place, scaffold};
+use terraglue::scenario::InputError;
+
+/// Writes the folder and says what to type next.
+pub fn new(arguments: &NewArguments) -> Result<Exit> {
+    let wrong = |e: terraglue::scaffold::ScaffoldError| InputError::plain(e.to_string(), None);
+    let made = scaffold(arguments.kind, arguments.lang, &arguments.name, &Place::here()).map_err(wrong)?;
+    let folder = Path::new(&arguments.name);
+    made.write(folder).map_err(wrong)?;
+    outln!("{} files in {}. Next:\n", made.files.len(), folder.display());
+    let [build, run] = &made.commands;
+    outln!("  cd {} && {build}\n  {run}", folder.display());
+    Ok(Exit::Done)
+}

@@ -1,0 +1,110 @@
+//! Makes the folder of a new module that builds, runs and is checked at once: `terraglue new`.
+//!
+//! The texts below `templates/` are whole programs in which the name `my-module` (`my_module` in file names) and the
+//! words between at signs are replaced.
+
+mod place;
+mod template;
+
+pub use place::Place;
+pub use template::{Kind, Language};
+
+use std::path::{Path, PathBuf};
+
+/// A folder to be written.
+#[derive(Debug)]
+pub struct Scaffold {
+    /// Files with their texts, relative to the folder.
+    pub files: Vec<(String, String)>,
+    /// What to type next, inside the folder.
+    pub commands: [String; 2],
+}
+
+/// Why a folder cannot be made.
+#[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
+pub enum ScaffoldError {
+    /// The name is not one that files, crates and scenarios can all carry.
+    #[error(
+        "`{0}` is no name for a module: use lower-case letters, digits and single hyphens, a letter first, e.g. my-soil"
+    )]
+    Name(String),
+    /// A module of the program has the name.
+    #[error("`{0}` is a module of Terraglue itself; choose another name")]
+    Taken(String),
+    /// This kind cannot be written in this language.
+    #[error("a {kind} in {language} is not offered; languages: {offered}")]
+    Language {
+        /// What was to be made.
+        kind: &'static str,
+        /// In what.
+        language: &'static str,
+        /// What is offered.
+        offered: String,
+    },
+    /// The sources of the interface crates are not at hand.
+    #[error(
+        "the crates terraglue-plugin and terraglue-subsystem are not beside this program; \
+         set TERRAGLUE_INTERFACES to the folder `interfaces` of the source"
+    )]
+    NoCrates,
+    /// There is something in the way.
+    #[error("{0} exists already; nothing was written")]
+    Exists(PathBuf),
+    /// A file cannot be written.
+    #[error("cannot write {path}: {reason}")]
+    Write {
+        /// The file.
+        path: PathBuf,
+        /// The system's words.
+        reason: String,
+    },
+}
+
+/// The files of a new module.
+///
+/// # Errors
+/// A name that cannot be used, a language that is not offered, crates that are not found.
+pub fn scaffold(
+    kind: Kind,
+    language: Language,
+    name: &str,
+    place: &Place,
+) -> Result<Scaffold, ScaffoldError> {
+    check_name(name)?;
+    template::fill(kind, language, name, place)
+}
+
+fn check_name(name: &str) -> Result<(), ScaffoldError> {
+    let parts_good = name.split('-').all(|part| !part.is_empty());
+    let letters_good = name.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-');
+    if !(parts_good && letters_good && name.starts_with(|c: char| c.is_ascii_lowercase())) {
+        return Err(ScaffoldError::Name(name.into()));
+    }
+    if crate::scenario::SHIPPED_MODULES.contains(&name) {
+        return Err(ScaffoldError::Taken(name.into()));
+    }
+    Ok(())
+}
+
+impl Scaffold {
+    /// Writes the files into a folder that does not exist yet.
+    ///
+    /// # Errors
+    /// The folder exists, or a file cannot be written.
+    pub fn write(&self, folder: &Path) -> Result<(), ScaffoldError> {
+        if folder.exists() {
+            return Err(ScaffoldError::Exists(folder.into()));
+        }
+        for (file, text) in &self.files {
+            let path = folder.join(file);
+            let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
+            made.and_then(|()| std::fs::write(&path, text))
+                .map_err(|e| ScaffoldError::Write { path: path.clone(), reason: e.to_string() })?;
+        }
+        Ok(())
+    }
+}
+
+#[cfg(test)]
+mod tests;

@@ -1,0 +1,181 @@
+//! Which files a kind of module has in which language, and what is filled into them.
+
+use super::{Place, Scaffold, ScaffoldError};
+
+/// What can be made.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Kind {
+    /// Ground.
+    Soil,
+    /// Bodies.
+    Robot,
+    /// Signals.
+    Controller,
+}
+
+/// In which language.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Language {
+    /// Rust.
+    Rust,
+    /// C11.
+    C,
+}
+
+impl Kind {
+    /// All, in the order in which they are listed.
+    pub const ALL: [Self; 1] = [Self::Soil];
+
+    /// As a word of the command line.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Soil => "soil",
+            Self::Robot => "robot",
+            Self::Controller => "controller",
+        }
+    }
+
+    fn starts(self) -> &'static str {
+        match self {
+            Self::Soil => "It starts as flat ground that yields like a spring and holds a foot by friction.",
+            Self::Robot => "It starts as a ball that falls and rests with T* = m g.",
+            Self::Controller => "It starts as a motor target that goes smoothly to a set-point.",
+        }
+    }
+
+    fn place_of_physics(self, source: &str) -> String {
+        match self {
+            Self::Soil => format!(
+                "Your physics goes into `law` of `{source}`, what it has to remember into the state of a foot."
+            ),
+            Self::Robot => format!("Your bodies go into `advance` of `{source}`: forces in, motion out."),
+            Self::Controller => {
+                format!("Your control law goes into `advance` of `{source}`: inputs in, outputs out.")
+            }
+        }
+    }
+}
+
+impl Language {
+    /// All.
+    pub const ALL: [Self; 2] = [Self::Rust, Self::C];
+
+    /// As people write it.
+    pub fn title(self) -> &'static str {
+        match self {
+            Self::Rust => "Rust",
+            Self::C => "C",
+        }
+    }
+
+    /// As a word of the command line.
+    pub fn word(self) -> &'static str {
+        match self {
+            Self::Rust => "rust",
+            Self::C => "c",
+        }
+    }
+}
+
+/// A file of a new folder: its path with `my_module` for the name, what it is, and its text.
+type File = (&'static str, &'static str, &'static str);
+
+const HEADER: File = (
+    "terraglue.h",
+    "what a module looks like to C",
+    include_str!("../../../interfaces/plugin/include/terraglue.h"),
+);
+const MAKEFILE: File =
+    ("Makefile", "builds (`make`) and checks (`make check`)", include_str!("templates/Makefile.in"));
+const BALL: File = ("ball.urdf", "the body that falls on it", include_str!("templates/ball.urdf.in"));
+const RUST: [File; 2] = [
+    ("Cargo.toml", "build file", include_str!("templates/Cargo.toml.in")),
+    (
+        "tests/check.rs",
+        "puts the module through the checker (`cargo test`)",
+        include_str!("templates/check.rs.in"),
+    ),
+];
+
+/// The source file of a kind in a language; None: not offered.
+fn source(kind: Kind, language: Language) -> Option<File> {
+    Some(match (kind, language) {
+        (Kind::Soil, Language::Rust) => ("src/lib.rs", "the soil", include_str!("templates/soil.rs.in")),
+        (Kind::Soil, Language::C) => ("my_module.c", "the soil", include_str!("templates/soil.c.in")),
+        _ => return None,
+    })
+}
+
+fn scenario(kind: Kind) -> &'static [File] {
+    match kind {
+        Kind::Soil => {
+            &[("scenario.toml", "a ball falls on it", include_str!("templates/scenario-soil.toml.in")), BALL]
+        }
+        Kind::Robot | Kind::Controller => &[],
+    }
+}
+
+/// Fills the templates.
+pub(super) fn fill(
+    kind: Kind,
+    language: Language,
+    name: &str,
+    place: &Place,
+) -> Result<Scaffold, ScaffoldError> {
+    let Some(source) = source(kind, language) else {
+        let offered: Vec<_> =
+            Language::ALL.iter().filter(|l| self::source(kind, **l).is_some()).map(|l| l.word()).collect();
+        return Err(ScaffoldError::Language {
+            kind: kind.word(),
+            language: language.title(),
+            offered: offered.join(", "),
+        });
+    };
+    let mut files = vec![source];
+    match language {
+        Language::Rust => files.extend(RUST),
+        Language::C => files.extend([HEADER, MAKEFILE]),
+    }
+    files.extend(scenario(kind));
+    let interfaces = match (&place.interfaces, language) {
+        (Some(folder), _) => folder.to_string_lossy().into_owned(),
+        (None, Language::Rust) => return Err(ScaffoldError::NoCrates),
+        (None, _) => String::new(),
+    };
+    let snake = name.replace('-', "_");
+    let library = format!("lib{snake}_plugin.so");
+    let (build, module) = match language {
+        Language::Rust => ("cargo build", format!("./target/debug/{library}")),
+        Language::C => ("make", format!("./{library}")),
+    };
+    let listing: Vec<_> = files.iter().map(|(path, what, _)| format!("| `{path}` | {what} |")).collect();
+    let words = [
+        ("@files@", listing.join("\n")),
+        ("@variables@", "CFLAGS ?= -std=c11 -O2 -Wall -Wextra".into()),
+        ("@compile@", "$(CC) $(CFLAGS) -fPIC -shared $< -o $@ -lm".into()),
+        ("@source@", source.0.into()),
+        ("@where@", kind.place_of_physics(source.0)),
+        ("@starts@", kind.starts().into()),
+        ("@kind@", kind.word().into()),
+        ("@table@", kind.word().into()),
+        ("@language@", language.title().into()),
+        ("@interfaces@", interfaces),
+        ("@build@", build.into()),
+        ("@module@", module),
+        ("@terraglue@", place.program.clone()),
+        ("my-module", name.into()),
+        ("my_module", snake),
+    ];
+    files.push(("README.md", "this page", include_str!("templates/README.md.in")));
+    let replaced = |text: &str| words.iter().fold(text.to_owned(), |text, (word, by)| text.replace(word, by));
+    let mut out: Vec<(String, String)> =
+        files.iter().map(|(path, _, text)| (replaced(path), replaced(text))).collect();
+    out.extend(lock_file(language, place));
+    Ok(Scaffold { files: out, commands: [build.into(), format!("{} run scenario.toml", place.program)] })
+}
+
+/// The versions of the crates that the program was built with, so that what is cached is used.
+fn lock_file(language: Language, place: &Place) -> Option<(String, String)> {
+    let folder = place.interfaces.as_ref().filter(|_| language == Language::Rust)?;
+    Some(("Cargo.lock".into(), std::fs::read_to_string(folder.join("../Cargo.lock")).ok()?))
+}

@@ -1,0 +1,49 @@
+//! Names, languages and the number of files; the acceptance tests build, run and check what is made.
+
+use super::*;
+
+fn place() -> Place {
+    Place { program: "terraglue".into(), interfaces: Some("/src/interfaces".into()) }
+}
+
+#[test]
+fn names_that_files_and_crates_can_carry() {
+    for good in ["my-soil", "soil2", "a"] {
+        assert!(check_name(good).is_ok(), "{good}");
+    }
+    for bad in ["", "-a", "a-", "a--b", "Soil", "my_soil", "2soil", "a/b", "ä"] {
+        assert!(matches!(check_name(bad), Err(ScaffoldError::Name(_))), "{bad}");
+    }
+    assert!(matches!(check_name("soil-bekker"), Err(ScaffoldError::Taken(_))));
+}
+
+#[test]
+fn at_most_eight_files_and_nothing_left_to_fill_in() {
+    for kind in Kind::ALL {
+        for language in Language::ALL {
+            let made = scaffold(kind, language, "loose-sand", &place()).expect("offered");
+            assert!(made.files.len() <= 8, "{kind:?} {language:?}");
+            for (path, text) in &made.files {
+                for word in ["my-module", "my_module", "@terraglue@", "@module@", "@kind@", "@source@"] {
+                    assert!(
+                        !text.contains(word) && !path.contains(word),
+                        "{kind:?} {language:?} {path}: {word}"
+                    );
+                }
+            }
+            let readme = &made.files.iter().find(|(path, _)| path == "README.md").expect("a page").1;
+            assert!((15..=28).contains(&readme.lines().count()), "{}", readme.lines().count());
+        }
+    }
+}
+
+#[test]
+fn rust_needs_the_crates_and_nothing_is_overwritten() {
+    let nowhere = Place { interfaces: None, ..place() };
+    assert!(matches!(scaffold(Kind::Soil, Language::Rust, "a", &nowhere), Err(ScaffoldError::NoCrates)));
+    let made = scaffold(Kind::Soil, Language::C, "a", &nowhere).expect("C needs no crates");
+    let folder = tempfile::tempdir().expect("folder");
+    assert!(matches!(made.write(folder.path()), Err(ScaffoldError::Exists(_))));
+    made.write(&folder.path().join("a")).expect("written");
+    assert!(folder.path().join("a/terraglue.h").is_file());
+}

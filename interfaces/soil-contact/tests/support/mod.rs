@@ -117,6 +117,8 @@ pub struct Rig {
     pub time: f64,
     pub index: u64,
     pub normal: [f64; 3],
+    /// Quaternion of the foot, w x y z.
+    pub orientation: [f64; 4],
     pub nodes: Vec<Node>,
     pub ports: Vec<Port>,
     pub t: Vec<f64>,
@@ -138,6 +140,7 @@ impl Rig {
             time: 0.0,
             index: 0,
             normal: [0.0, 0.0, 1.0],
+            orientation: [1.0, 0.0, 0.0, 0.0],
             nodes: Vec::new(),
             ports: Vec::new(),
             t: vec![0.0; 6],
@@ -146,13 +149,21 @@ impl Rig {
         }
     }
 
+    /// Turns foot and contact frame about y onto ground that falls with x at `angle`, touching at the origin.
+    pub fn tilt(&mut self, angle: f64) {
+        self.normal = [angle.sin(), 0.0, angle.cos()];
+        self.orientation = [(0.5 * angle).cos(), 0.0, (0.5 * angle).sin(), 0.0];
+        let above = self.position[2];
+        self.position = self.normal.map(|c| above * c);
+    }
+
     pub fn components(&self) -> usize {
         if matches!(self.geometry, Geometry::Sphere { .. }) { 3 } else { 6 }
     }
 
     /// Finds the patch at the present pose.
     pub fn detect(&mut self) {
-        let pose = Pose { position: self.position, orientation: [1.0, 0.0, 0.0, 0.0] };
+        let pose = Pose { position: self.position, orientation: self.orientation };
         let placed = Placed::new(&self.geometry, &pose);
         self.nodes.clear();
         nodes_below(&placed, &Shown::new(&*self.soil), 0.02, &mut self.nodes);

@@ -35,7 +35,9 @@ fn mass_under_a_dragged_ball(context: &Context) -> Figure {
     let cell = 0.01 * 0.01 * UNIT_M;
     let compacted = (read(&*rig.soil, "compacted_volume") / cell).round() as i64;
     let error = total(&*rig.soil) + compacted - before;
-    let what = format!("units of mass gained, compaction counted, over {steps} steps of a ball that is pressed and dragged");
+    let what = format!(
+        "units of mass gained, compaction counted, over {steps} steps of a ball that is pressed and dragged"
+    );
     let booked = read(&*rig.soil, "mass_error_units");
     Figure::new("soil.automaton.mass.dragged_ball", error as f64 + booked, Limit::Equal(0.0), what)
 }

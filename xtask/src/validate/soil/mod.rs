@@ -1,16 +1,25 @@
 //! Area `soil`: what both soils promise, part by part.
 
 mod automaton;
+mod plates;
 #[path = "../../../../interfaces/soil-contact/tests/support/mod.rs"]
 mod rig;
+mod rows;
+mod stick;
+mod wong_reece;
 
 use super::{Context, Figure};
 use crate::process::Outcome;
+use plates::{Maker, level};
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::{Mutex, PoisonError};
+use terraglue_soil_bekker::SoilBekker;
+use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
 
 type Part = fn(&Context) -> Outcome<Vec<Figure>>;
 
 /// The parts, in the order of the table.
-const PARTS: [Part; 1] = [automaton::figures];
+const PARTS: [Part; 4] = [automaton::figures, plates::figures, stick::figures, wong_reece::figures];
 
 /// All figures of the area.
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
@@ -19,4 +28,29 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
         all.extend(part(context)?);
     }
     Ok(all)
+}
+
+/// Both soils: name in the figures and how an instance is made.
+const MODULES: [(&str, Maker); 2] =
+    [("automaton", level::<SoilCellularAutomaton>), ("bekker", level::<SoilBekker>)];
+
+/// `job` on every item, on as many threads as there are processors; answers in the order of the items.
+fn in_parallel<T: Sync, R: Send>(items: &[T], job: impl Fn(&T) -> R + Sync) -> Vec<R> {
+    let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::new()));
+    let work = || {
+        while let Some((k, item)) =
+            Some(next.fetch_add(1, Ordering::Relaxed)).and_then(|k| Some((k, items.get(k)?)))
+        {
+            let answer = job(item);
+            done.lock().unwrap_or_else(PoisonError::into_inner).push((k, answer));
+        }
+    };
+    std::thread::scope(|scope| {
+        for _ in 0..std::thread::available_parallelism().map_or(1, usize::from) {
+            scope.spawn(work);
+        }
+    });
+    let mut answers = done.into_inner().unwrap_or_else(PoisonError::into_inner);
+    answers.sort_by_key(|(k, _)| *k);
+    answers.into_iter().map(|(_, answer)| answer).collect()
 }

@@ -1,0 +1,139 @@
+//! Plates pressed into level ground: the soils give the pressure that their law promises, whatever the grid.
+
+use super::rig::{Rig, flat, soil};
+use super::rows::{Row, eight};
+use super::{MODULES, in_parallel};
+use crate::process::Outcome;
+use crate::validate::{Context, Figure, Limit};
+use terraglue_subsystem::{Geometry, Subsystem};
+
+/// Makes an instance of a soil: configuration, nodes along a side, spacing.
+pub type Maker = fn(&str, u32, f64) -> Box<dyn Subsystem>;
+
+/// An instance of the module `M` on level ground.
+pub fn level<M: terraglue_subsystem::Module>(config: &str, size: u32, spacing: f64) -> Box<dyn Subsystem> {
+    soil::<M>(config, size, spacing, flat)
+}
+
+/// Name, geometry, b of the law and area of the plates.
+fn shapes() -> [(&'static str, Geometry, f64, f64); 6] {
+    let disc = |name, radius: f64| {
+        (
+            name,
+            Geometry::Cylinder { half_length: 0.1, radius },
+            radius,
+            std::f64::consts::PI * radius * radius,
+        )
+    };
+    let rectangle = |name, a: f64, b: f64| {
+        (name, Geometry::Box { half_extents: [0.5 * a, 0.5 * b, 0.1] }, a.min(b), a * b)
+    };
+    [
+        disc("disc_r3cm", 0.03),
+        disc("disc_r5cm", 0.05),
+        disc("disc_r15cm", 0.15),
+        rectangle("plate_10x10cm", 0.1, 0.1),
+        rectangle("plate_20x5cm", 0.2, 0.05),
+        rectangle("plate_40x10cm", 0.4, 0.1),
+    ]
+}
+
+const SPACINGS: [f64; 3] = [0.02, 0.01, 0.005];
+/// Width of the ground, m.
+const GROUND: f64 = 1.0;
+/// Where the middle of the plate lies: on no symmetry of the lattice.
+const OFFSET: [f64; 2] = [0.0031, -0.0017];
+const SPEED: f64 = 0.01;
+
+/// One plate on one soil and grid.
+#[derive(Clone)]
+struct Case {
+    make: Maker,
+    row: Row,
+    shape: usize,
+    spacing: f64,
+    quick: bool,
+}
+
+impl Case {
+    fn rig(&self, mass: f64) -> Rig {
+        let size = (GROUND / self.spacing).round() as u32 + 1;
+        let (_, geometry, ..) = shapes()[self.shape].clone();
+        let mut rig = Rig::new((self.make)(&self.row.config, size, self.spacing), geometry, mass, 0.1);
+        (rig.position[0], rig.position[1]) = (OFFSET[0], OFFSET[1]);
+        rig
+    }
+
+    /// Half the width of the plate over the spacing.
+    fn resolution(&self) -> f64 {
+        let (_, geometry, b, _) = shapes()[self.shape].clone();
+        let half = if matches!(geometry, Geometry::Box { .. }) { 0.5 * b } else { b };
+        half / self.spacing
+    }
+
+    /// Largest relative error of the pressure from 10 mm to 50 mm, every 5 mm.
+    fn pressed(&self) -> f64 {
+        let (.., b, area) = shapes()[self.shape].clone();
+        // the law knows no rate: a quick run takes longer strides
+        let h = if self.quick { 1e-2 } else { 1e-3 };
+        let stride = SPEED * h;
+        let mut rig = self.rig(1.0);
+        rig.h = h;
+        let (every, last) = ((0.005 / stride).round() as u32, (0.05 / stride).round() as u32);
+        let mut worst = 0.0_f64;
+        for k in 1..=last {
+            let force = rig.prescribed_step(&[-stride, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
+            let z = stride * f64::from(k);
+            if k % every == 0 && z > 0.0099 {
+                worst = worst.max((force / area / self.row.pressure(z, b) - 1.0).abs());
+            }
+        }
+        worst
+    }
+}
+
+/// All figures.
+pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
+    let mut all = Vec::new();
+    for (module, make) in MODULES {
+        let cases = cases(context, make)?;
+        let errors = in_parallel(&cases, Case::pressed);
+        for (shape, (name, ..)) in shapes().iter().enumerate() {
+            let worst = |from: f64, to: f64| {
+                let of_shape = cases.iter().zip(&errors).filter(|(c, _)| c.shape == shape);
+                let fitting =
+                    of_shape.filter(|(c, _)| c.resolution() >= from - 1e-9 && c.resolution() < to - 1e-9);
+                fitting.map(|(_, e)| *e).reduce(|a, b| if b.is_nan() || b > a { b } else { a })
+            };
+            for (part, from, to, limit) in
+                [("fine", 10.0, f64::INFINITY, 1.0), ("coarse", 3.0, 10.0, 3.0), ("few_cells", 0.0, 3.0, 0.0)]
+            {
+                let Some(error) = worst(from, to) else { continue };
+                let limit = if limit > 0.0 { Limit::AtMost(limit) } else { Limit::None };
+                let what = format!(
+                    "largest error of the pressure, %, {} soils, 10 to 50 mm, R/spacing {from} to {to}",
+                    if context.quick { 2 } else { 8 }
+                );
+                all.push(Figure::new(format!("soil.{module}.{name}.{part}"), 100.0 * error, limit, what));
+            }
+        }
+    }
+    Ok(all)
+}
+
+/// Every soil, shape and grid; quickly two soils and the two grids that show most.
+fn cases(context: &Context, make: Maker) -> Outcome<Vec<Case>> {
+    let mut cases = Vec::new();
+    for (number, row) in eight()?.into_iter().enumerate() {
+        for shape in 0..shapes().len() {
+            for spacing in SPACINGS {
+                let case = Case { make, row: row.clone(), shape, spacing, quick: context.quick };
+                let small = shapes()[shape].3 < 0.02;
+                if !context.quick || (number == 1 || number == 7) && (spacing > 0.009 || small) {
+                    cases.push(case);
+                }
+            }
+        }
+    }
+    Ok(cases)
+}

@@ -43,6 +43,7 @@ pub fn summary(s: &Summary) -> Table {
     row("largest roll, pitch", format!("{}, {}", degrees(s.max_roll_rad), degrees(s.max_pitch_rad)));
     row("largest sinkage", s.max_sinkage_m.map_or_else(none, |z| format!("{:.1} mm", 1e3 * z)));
     row("energy at the motors", format!("{:.1} J", s.energy_j));
+    row("electrical energy", electrical(s));
     row("cost of transport", s.cost_of_transport.map_or_else(none, |c| format!("{c:.2}")));
     row(
         "evaluations of the bodies",
@@ -54,6 +55,11 @@ pub fn summary(s: &Summary) -> Table {
     row("drift of the energy book", format!("{:+.2e} J", s.energy_balance_j));
     row("error of the soil's mass", s.soil_mass_error_relative.map_or_else(none, |e| format!("{e:.1e}")));
     t
+}
+
+fn electrical(s: &Summary) -> String {
+    let per_metre = s.electrical_energy_j_per_m.map_or_else(String::new, |e| format!(", {e:.1} J/m"));
+    format!("{:.1} J{per_metre}", s.electrical_energy_j)
 }
 
 fn stall(s: &Summary) -> String {

@@ -125,6 +125,12 @@ pub struct Summary {
     pub height_gained_m: Option<f64>,
     /// Where the body has stood still, if it did so for the last 5 s or longer; null: it came on.
     pub stalled: Option<Stall>,
+    /// Electrical energy that the motors drew, J.
+    #[serde(default)]
+    pub electrical_energy_j: f64,
+    /// electrical_energy_j / |distance|, J/m; null below 1 mm.
+    #[serde(default)]
+    pub electrical_energy_j_per_m: Option<f64>,
 }
 
 /// Since when and where less than a tenth of the commanded distance was made.

@@ -31,6 +31,7 @@ pub struct SummaryObserver {
     mass_error: Option<(usize, u32, f64)>,
     motors: Vec<Motors>,
     energy_j: f64,
+    electrical_j: f64,
     energy_book: Option<(f64, f64)>,
     gluing: GluingFigures,
 }
@@ -203,6 +204,7 @@ impl SummaryObserver {
             mass_error: None,
             motors: Vec::new(),
             energy_j: 0.0,
+            electrical_j: 0.0,
             energy_book: None,
             gluing: GluingFigures::default(),
         }
@@ -223,6 +225,7 @@ impl SummaryObserver {
         for motors in &mut self.motors {
             self.energy_j += motors.power(view)? * view.h_s;
         }
+        self.electrical_j = view.energy.electrical;
         let book = view.energy.mechanical() + view.energy.dissipated - view.energy.actuator_work;
         self.energy_book = Some((self.energy_book.map_or(book, |b| b.0), book));
         Ok(())
@@ -273,6 +276,8 @@ impl SummaryObserver {
             cpu_per_step_s: per(cpu_s, self.steps as f64),
             height_gained_m: body.map(BodyTrack::height_gained_m),
             stalled: body.and_then(BodyTrack::stall),
+            electrical_energy_j: self.electrical_j,
+            electrical_energy_j_per_m: body.filter(|_| moved).map(|b| self.electrical_j / b.distance_m.abs()),
         }
     }
 }

@@ -79,6 +79,13 @@ fn from_summary(s: &Summary) -> Vec<Card> {
         };
         cards.push(Card::new("Motor energy", with_prefix(s.energy_j, "J", 4), more));
     }
+    if s.electrical_energy_j > 0.0 {
+        let more = s.electrical_energy_j_per_m.map_or_else(
+            || "drawn by the motors".into(),
+            |e| format!("{} per metre", text(with_prefix(e, "J", 4))),
+        );
+        cards.push(Card::new("Electrical energy", with_prefix(s.electrical_energy_j, "J", 4), more));
+    }
     let more = format!("bodies, at most {}; soil {}", s.evaluations_max, number(s.evaluations_soil_mean, 3));
     cards.push(Card::new("Evaluations a step", pure(s.evaluations_mean, 3), more));
     let not = match s.steps_not_converged {

@@ -1,5 +1,8 @@
 //! The cellular automaton: mass, slopes, curvature, reproducibility, cost.
 
+mod cone;
+mod field;
+
 use super::rig::{LUNAR, Rig, Shown, flat, read, soil};
 use crate::process::Outcome;
 use crate::validate::{Context, Figure, Limit};
@@ -7,9 +10,15 @@ use terraglue_ground::{Surface, UNIT_M};
 use terraglue_soil_cellular_automaton::SoilCellularAutomaton as Automaton;
 use terraglue_subsystem::{Geometry, Subsystem};
 
+/// κ_max where a scenario is silent, 1/m.
+const CURVATURE: f64 = 40.0;
+
 /// All figures.
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
-    Ok(vec![mass_under_a_dragged_ball(context)])
+    let mut all = cone::cones(context)?;
+    all.extend(cone::planes(context)?);
+    all.push(mass_under_a_dragged_ball(context));
+    Ok(all)
 }
 
 /// Sum of all heights, units.

@@ -157,12 +157,20 @@ impl Outline {
     }
 }
 
-/// Underside at the point of a disc's rim nearest to a node outside it, drawn in by a rounding error's width.
+/// Part of a radius by which a rim lies below the widest circle: the underside still looks down there.
+const BELOW_WIDEST: f64 = 1e-9;
+
+/// Underside at the point of a disc's rim nearest to a node outside it, read off the shape: the square root in
+/// [`Placed::lower`] turns a rounding error of the position into picometres there, which a stiff soil feels.
 fn below_rim(shape: &Placed, cell: &Cell, centre: [f64; 2], radius: f64) -> [f64; 3] {
     let (dx, dy) = (cell.at[0] - centre[0], cell.at[1] - centre[1]);
-    let s = radius * (1.0 - 1e-12) / (dx * dx + dy * dy).sqrt();
-    let (x, y) = (centre[0] + s * dx, centre[1] + s * dy);
-    [x, y, shape.lower(x, y).unwrap_or(shape.pose().position[2])]
+    let s = radius / (dx * dx + dy * dy).sqrt();
+    let below = match shape.geometry() {
+        Geometry::Cylinder { half_length, .. } => *half_length,
+        Geometry::Capsule { half_length, .. } => half_length + BELOW_WIDEST * radius,
+        _ => BELOW_WIDEST * radius,
+    };
+    [centre[0] + s * dx, centre[1] + s * dy, shape.pose().position[2] - below]
 }
 
 /// The point of a polygon's edge nearest to p, drawn a little towards the middle.

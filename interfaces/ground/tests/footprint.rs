@@ -107,3 +107,23 @@ fn plane_fit_is_exact_on_a_slope_and_level_outside() {
     }
     assert_eq!(fit_plane(&slope, 5.0, 5.0, 0.1).normal, [0.0, 0.0, 1.0]);
 }
+
+#[test]
+fn a_rim_beside_its_nodes_moves_with_the_shape_and_not_by_rounding() {
+    for geometry in [Geometry::Sphere { radius: 0.03 }, Geometry::Capsule { half_length: 0.02, radius: 0.03 }]
+    {
+        let here = nodes(&geometry, &at(0.0, 0.0, 0.003), 0.1);
+        for k in 1..200 {
+            // far less than a force that matters, far more than rounding
+            let shifted = nodes(&geometry, &at(1e-17 * f64::from(k), 0.0, 0.003), 0.1);
+            assert_eq!(here.len(), shifted.len());
+            let outside = |n: &&Node| {
+                let [x, y] = flat().lattice().position(n.i, n.j);
+                x.hypot(y) > 0.0301
+            };
+            for (a, b) in here.iter().zip(&shifted).filter(|(a, _)| outside(a)) {
+                assert!((a.lower - b.lower).abs() < 1e-15, "{a:?} {b:?}");
+            }
+        }
+    }
+}

@@ -8,7 +8,7 @@ use crate::dynamics::Dynamics;
 use crate::dynamics::scheme::{Acceleration, Integrator, Weights};
 use crate::math::V3;
 use crate::model::Model;
-use crate::placement::{at_rest, base_pose, clearance, coordinates};
+use crate::placement::{StartRates, at_rest, base_pose, clearance, coordinates, joint_rates, set_moving};
 use crate::robot::Robot;
 use crate::state::{JointState, Motion, State};
 use nalgebra::Isometry3;
@@ -31,17 +31,16 @@ impl Module for RigidBody {
         let fixed = config.flag("fixed_base")?;
         let path = Path::new(host.folder()).join(config.text("model")?);
         let file = read_urdf(&path, fixed).map_err(|e| Error::Refused(e.to_string()))?;
-        let position = config.numbers("position_m")?;
-        if position.len() != 3 || position.iter().any(|p| !p.is_finite()) {
-            return Err(Error::Refused(format!(
-                "parameter `position_m` = {position:?} is not a list of x, y, z"
-            )));
-        }
-        let base = base_pose(&position, config.number("heading_rad")?);
+        let base = base_pose(&vector(&config, "position_m")?, config.number("heading_rad")?);
         let model = Model::new(&file, &base, fixed, V3::from(host.gravity()));
         let angles = coordinates(&model, &config.number_table("joints")?)?;
-        let bodies = start(&config, &*host, &model, base, &angles)?;
-        let joints = joint_states(&config, &model, &angles)?;
+        let rates = StartRates {
+            velocity: vector(&config, "velocity_m_s")?,
+            rotation: vector(&config, "rotation_rate_rad_s")?,
+            joints: joint_rates(&model, &config.number_table("joint_rates")?)?,
+        };
+        let bodies = start(&config, &*host, &model, base, (&angles, &rates))?;
+        let joints = joint_states(&config, &model, &angles, &rates.joints)?;
         let state = State {
             forces: vec![V3::zeros(); bodies.len()],
             contact_normal: vec![0.0; bodies.len()],
@@ -95,6 +94,14 @@ fn ground(config: &Config) -> Result<Option<Plane>> {
     Ok(Some(Plane { normal: normal / length, offset: config.number("ground_height_m")? }))
 }
 
+/// A parameter with x, y, z.
+fn vector(config: &Config, name: &str) -> Result<V3> {
+    match config.numbers(name)?[..] {
+        [x, y, z] if x.is_finite() && y.is_finite() && z.is_finite() => Ok(V3::new(x, y, z)),
+        ref other => Err(Error::Refused(format!("parameter `{name}` = {other:?} is not a list of x, y, z"))),
+    }
+}
+
 fn integrator(config: &Config) -> Result<Integrator> {
     let rho = config.number("rho_infinity")?;
     Ok(match config.text("integrator")? {
@@ -120,35 +127,30 @@ fn without_impacts(host: &dyn Host, ground: bool, pairs: bool) -> Result<()> {
     Ok(())
 }
 
-/// Bodies at rest in the initial pose, on the ground where that is wanted and there is one.
+/// Bodies in the initial pose with their rates, on the ground where that is wanted and there is one.
 fn start(
     config: &Config,
     host: &dyn Host,
     model: &Model,
     mut base: Isometry3<f64>,
-    angles: &[f64],
+    (angles, rates): (&[f64], &StartRates),
 ) -> Result<Vec<Motion>> {
-    let bodies = at_rest(model, &base, angles);
-    let Some(terrain) = host.terrain().filter(|_| model.free_base.is_some()) else { return Ok(bodies) };
-    if !config.flag("place_on_ground")? {
-        return Ok(bodies);
+    let mut bodies = at_rest(model, &base, angles);
+    let terrain = host.terrain().filter(|_| model.free_base.is_some());
+    if let Some(terrain) = terrain.filter(|_| config.flag("place_on_ground").unwrap_or(true)) {
+        base.translation.vector.z -= clearance(model, &bodies, terrain).unwrap_or(0.0);
+        bodies = at_rest(model, &base, angles);
     }
-    match clearance(model, &bodies, terrain) {
-        Some(gap) => {
-            base.translation.vector.z -= gap;
-            Ok(at_rest(model, &base, angles))
-        }
-        None => Ok(bodies),
-    }
+    set_moving(model, &base, rates, &mut bodies);
+    Ok(bodies)
 }
 
-fn joint_states(config: &Config, model: &Model, angles: &[f64]) -> Result<Vec<JointState>> {
-    model
-        .joints
-        .iter()
-        .zip(angles)
-        .map(|(joint, angle)| joint_state(config, model, &joint.name, *angle))
-        .collect()
+fn joint_states(config: &Config, model: &Model, angles: &[f64], rates: &[f64]) -> Result<Vec<JointState>> {
+    let states = model.joints.iter().zip(angles.iter().zip(rates));
+    let start = |(joint, (angle, rate)): (&crate::model::Joint, (&f64, &f64))| {
+        Ok(JointState { velocity: *rate, ..joint_state(config, model, &joint.name, *angle)? })
+    };
+    states.map(start).collect()
 }
 
 fn joint_state(config: &Config, model: &Model, joint: &str, angle: f64) -> Result<JointState> {

@@ -1,9 +1,9 @@
 //! Where the robot starts: joint coordinates by name pattern, pose of the root, feet on the ground.
 
 use crate::contact::shapes::{parry_local, parry_shape};
-use crate::dynamics::joint_rows::place_child;
+use crate::dynamics::joint_rows::{place_child, rates_of_child};
 use crate::math::V3;
-use crate::model::Model;
+use crate::model::{Joint, Model};
 use crate::state::Motion;
 use nalgebra::{Isometry3, Translation3};
 use parry3d_f64::math::{Pose, Vector};
@@ -12,24 +12,40 @@ use terraglue_subsystem::{Error, Result, Terrain};
 
 /// Coordinates of all joints from a table of patterns: an exact name wins, else the longest pattern that matches.
 pub(crate) fn coordinates(model: &Model, table: &[(String, f64)]) -> Result<Vec<f64>> {
-    for (pattern, _) in table {
-        let known = model.joints.iter().any(|j| j.moves() && matches(pattern, &j.name));
-        if !known {
-            return Err(Error::Refused(format!(
-                "parameter `joints`: no moving joint is called `{pattern}`{}",
-                nearest(model, pattern)
-            )));
-        }
-    }
+    known(model, "joints", table)?;
     model.joints.iter().map(|joint| coordinate(joint, table)).collect()
 }
 
-fn coordinate(joint: &crate::model::Joint, table: &[(String, f64)]) -> Result<f64> {
-    let best = table
-        .iter()
-        .filter(|(pattern, _)| matches(pattern, &joint.name))
-        .max_by_key(|(pattern, _)| (*pattern == joint.name, pattern.len()));
-    let Some((pattern, value)) = best.filter(|_| joint.moves()) else {
+/// Rates of all joints from the same kind of table, rad/s or m/s.
+pub(crate) fn joint_rates(model: &Model, table: &[(String, f64)]) -> Result<Vec<f64>> {
+    known(model, "joint_rates", table)?;
+    Ok(model.joints.iter().map(|joint| best(joint, table).map_or(0.0, |(_, rate)| *rate)).collect())
+}
+
+fn known(model: &Model, parameter: &str, table: &[(String, f64)]) -> Result<()> {
+    for (pattern, value) in table {
+        if !model.joints.iter().any(|j| j.moves() && matches(pattern, &j.name)) {
+            return Err(Error::Refused(format!(
+                "parameter `{parameter}`: no moving joint is called `{pattern}`{}",
+                nearest(model, pattern)
+            )));
+        }
+        if !value.is_finite() {
+            return Err(Error::Refused(format!(
+                "parameter `{parameter}`: {pattern} = {value} is not finite"
+            )));
+        }
+    }
+    Ok(())
+}
+
+fn best<'a>(joint: &Joint, table: &'a [(String, f64)]) -> Option<&'a (String, f64)> {
+    let fitting = table.iter().filter(|(pattern, _)| joint.moves() && matches(pattern, &joint.name));
+    fitting.max_by_key(|(pattern, _)| (*pattern == joint.name, pattern.len()))
+}
+
+fn coordinate(joint: &Joint, table: &[(String, f64)]) -> Result<f64> {
+    let Some((pattern, value)) = best(joint, table) else {
         return Ok(0.0);
     };
     match joint.limits {
@@ -77,6 +93,27 @@ pub(crate) fn at_rest(model: &Model, base: &Isometry3<f64>, coordinates: &[f64])
     bodies
 }
 
+/// How everything moves at the start.
+pub(crate) struct StartRates {
+    /// Velocity of the root frame's origin, world axes, m/s.
+    pub velocity: V3,
+    /// Rotation of the root, axes of its frame, rad/s.
+    pub rotation: V3,
+    /// Of all joints, rad/s or m/s.
+    pub joints: Vec<f64>,
+}
+
+/// Gives bodies at rest their rates at the start.
+pub(crate) fn set_moving(model: &Model, base: &Isometry3<f64>, rates: &StartRates, bodies: &mut [Motion]) {
+    let w = base.rotation * rates.rotation;
+    for b in 0..bodies.len() {
+        (bodies[b].v, bodies[b].w) = match model.joint_above[b] {
+            Some(j) => rates_of_child(&model.joints[j], bodies, rates.joints[j]),
+            None => (rates.velocity + w.cross(&(bodies[b].c - base.translation.vector)), w),
+        };
+    }
+}
+
 /// Smallest vertical distance between all collision shapes and the ground, m; none without shapes above it.
 pub(crate) fn clearance(model: &Model, bodies: &[Motion], terrain: &dyn Terrain) -> Option<f64> {
     let mut smallest: Option<f64> = None;
@@ -117,9 +154,9 @@ fn shape_clearance(shape: &dyn parry3d_f64::shape::Shape, pose: &Pose, terrain: 
 }
 
 /// Pose of the root frame.
-pub(crate) fn base_pose(position: &[f64], heading: f64) -> Isometry3<f64> {
+pub(crate) fn base_pose(position: &V3, heading: f64) -> Isometry3<f64> {
     let q = crate::math::Q::from_axis_angle(&V3::z_axis(), heading);
-    Isometry3::from_parts(Translation3::new(position[0], position[1], position[2]), q)
+    Isometry3::from_parts(Translation3::from(*position), q)
 }
 
 #[cfg(test)]

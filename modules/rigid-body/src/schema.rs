@@ -26,6 +26,33 @@ pub(crate) fn schema() -> Schema {
                 )
                 .optional()
             },
+            Parameter {
+                unit: "m/s".into(),
+                ..Parameter::of(
+                    "velocity_m_s",
+                    ParameterType::Numbers,
+                    "Initial velocity of the root link's origin, world axes",
+                )
+                .or(vec![0.0, 0.0, 0.0])
+            },
+            Parameter {
+                unit: "rad/s".into(),
+                ..Parameter::of(
+                    "rotation_rate_rad_s",
+                    ParameterType::Numbers,
+                    "Initial rotation rate of the root link, its own axes",
+                )
+                .or(vec![0.0, 0.0, 0.0])
+            },
+            Parameter {
+                unit: "rad/s".into(),
+                ..Parameter::of(
+                    "joint_rates",
+                    ParameterType::NumberTable,
+                    "Initial rate by joint name (rad/s or m/s); `*` stands for any text; others are at rest",
+                )
+                .optional()
+            },
             Parameter::of("fixed_base", ParameterType::Bool, "Fix the root link to the world").or(false),
             Parameter::of(
                 "place_on_ground",

@@ -80,3 +80,18 @@ pub(crate) fn place_child(joint: &Joint, parent: Option<&Motion>, coordinate: f6
     let anchor = parent.point(&joint.parent_anchor) + frame * V3::new(slide, 0.0, 0.0);
     Motion::at(anchor - q * joint.child_anchor, q)
 }
+
+/// Velocity of the centre of mass and rotation rate of the child, for a rate of the coordinate.
+pub(crate) fn rates_of_child(joint: &Joint, bodies: &[Motion], rate: f64) -> (V3, V3) {
+    let parent = parent_of(joint, bodies);
+    let axis = parent.q * (joint.parent_frame * V3::x());
+    let (slide, turn) = match joint.kind {
+        Kind::Fixed => (0.0, 0.0),
+        Kind::Prismatic => (rate, 0.0),
+        Kind::Revolute => (0.0, rate),
+    };
+    let child = &bodies[joint.child];
+    let anchor = child.point(&joint.child_anchor);
+    let w = parent.w + turn * axis;
+    (parent.v + parent.w.cross(&(anchor - parent.c)) + slide * axis + w.cross(&(child.c - anchor)), w)
+}

@@ -1,11 +1,15 @@
 //! Area `rigid-body`, part by part.
 
 mod contact;
+mod rig;
+mod solver;
 
 use super::{Context, Figure};
 use crate::process::Outcome;
 
 /// All figures of the area.
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
-    contact::figures(context)
+    let mut all = contact::figures(context)?;
+    all.extend(solver::figures(context)?);
+    Ok(all)
 }

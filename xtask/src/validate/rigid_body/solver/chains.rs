@@ -1,0 +1,96 @@
+//! Passive chains of eight links against references in reduced coordinates.
+
+use crate::process::Outcome;
+use crate::validate::rigid_body::rig::{G, Rig, pose};
+use crate::validate::{Figure, Limit};
+use nalgebra::Vector3;
+
+const SPATIAL: &str = r#"{"j2": 0.2, "j4": 0.2, "j6": 0.2, "j8": 0.2}"#;
+const HEAVY: &str = r#"{"j1": -1.0707963267948966}"#;
+const TIP: [(&str, &str, [f64; 3]); 4] = [
+    ("chain8", SPATIAL, [-1.640621154, -0.580129864, -0.919078146]),
+    ("chain8_planar", "{}", [-1.763829172, 0.0, -0.929046757]),
+    ("chain8_m100", HEAVY, [-0.576683260, 0.0, -1.915025000]),
+    ("chain8_m1000", HEAVY, [-0.566796969, 0.0, -1.918003510]),
+];
+const LINK: Vector3<f64> = Vector3::new(0.25, 0.0, 0.0);
+
+/// What a run leaves.
+struct Run {
+    /// Distance of the tip from the reference at 1 s, m.
+    tip: f64,
+    /// Largest |ΔE| and ΔE at the end, J.
+    energy: [f64; 2],
+    /// Largest distance of two anchors, m.
+    gap: f64,
+}
+
+/// All chains.
+pub fn figures() -> Outcome<Vec<Figure>> {
+    let mut all = Vec::new();
+    let (file, joints, tip) = TIP[0];
+    let first = run(file, joints, tip, "symplectic-euler", 1e-3, 10.0)?;
+    let id = "rigid-body.chain8";
+    let figure = |name: &str, value: f64, limit: Limit, what: &str| {
+        Figure::new(format!("{id}.{name}"), value, limit, what)
+    };
+    let what = "spatial chain, first order, 10 s: largest |ΔE|, J";
+    all.push(figure("first-order.energy", first.energy[0], Limit::AtMost(10.0), what));
+    let what = "spatial chain, first order: ΔE at 10 s, J";
+    all.push(figure("first-order.energy_end", first.energy[1], Limit::None, what));
+    all.push(figure("first-order.tip", 1e3 * first.tip, Limit::None, "tip at 1 s, mm from the reference"));
+    let [coarse, fine] = [1e-3, 5e-4].map(|h| run(file, joints, tip, "generalized-alpha", h, 10.0));
+    let (coarse, fine) = (coarse?, fine?);
+    let what = "spatial chain, second order, 10 s: largest |ΔE|, J";
+    all.push(figure("second-order.energy", coarse.energy[0], Limit::AtMost(0.05), what));
+    let what = "the same: ΔE at the end, J";
+    all.push(figure("second-order.energy_end", coarse.energy[1], Limit::None, what));
+    let what = "largest |ΔE| at h over that at h/2";
+    all.push(figure("second-order.ratio", coarse.energy[0] / fine.energy[0], Limit::AtLeast(3.0), what));
+    for (file, joints, tip) in TIP {
+        let run = run(file, joints, tip, "generalized-alpha", 1e-3, 1.0)?;
+        let what = "second order: tip at 1 s, mm from the reference";
+        all.push(Figure::new(
+            format!("rigid-body.{file}.second-order.tip"),
+            1e3 * run.tip,
+            Limit::AtMost(0.02),
+            what,
+        ));
+    }
+    for (file, joints, tip) in &TIP[2..] {
+        let run = run(file, joints, *tip, "generalized-alpha", 1e-3, 10.0)?;
+        let id = format!("rigid-body.{file}.second-order");
+        let what = "a heavy end on light links, second order, 10 s: largest gap of a joint, mm";
+        all.push(Figure::new(format!("{id}.gap"), 1e3 * run.gap, Limit::AtMost(1e-6), what));
+        let what = "the same: largest |ΔE|, J";
+        all.push(Figure::new(format!("{id}.energy"), run.energy[0], Limit::AtMost(0.05), what));
+    }
+    Ok(all)
+}
+
+fn run(file: &str, joints: &str, tip: [f64; 3], integrator: &str, h: f64, until: f64) -> Outcome<Run> {
+    let parameters = format!(
+        r#"{{"model": "tests/reference/multibody/{file}.urdf", "motor": "off", "joints": {joints},
+        "integrator": "{integrator}"}}"#
+    );
+    let mut rig = Rig::new(&parameters, [0.0, 0.0, -G], h)?;
+    let start = rig.energy().mechanical();
+    let mut result = Run { tip: f64::NAN, energy: [0.0; 2], gap: 0.0 };
+    let second = (1.0 / h).round();
+    rig.run(until, |rig| {
+        let states = rig.states()?;
+        let mut end = Vector3::zeros();
+        for state in &states {
+            let (p, q) = pose(state);
+            result.gap = result.gap.max((p - end).norm());
+            end = p + q * LINK;
+        }
+        if (rig.t() / h).round() == second {
+            result.tip = (end - Vector3::from(tip)).norm();
+        }
+        let change = rig.energy().mechanical() - start;
+        result.energy = [result.energy[0].max(change.abs()), change];
+        Ok(())
+    })?;
+    Ok(result)
+}

@@ -1,0 +1,161 @@
+//! The hexapod with its tripod gait: joints, momentum in zero gravity, a blocked joint.
+
+use crate::process::{Outcome, root};
+use crate::validate::rigid_body::rig::{G, Rig, pose, table};
+use crate::validate::{Figure, Limit};
+use nalgebra::Vector3;
+use terraglue_robot_import::{JointKind, Robot, read_urdf};
+
+const STAND: [f64; 4] = [0.0, 0.958_192_178_746_274_4, -1.379_634_180_263_838_4, -1.149_354_325_277_333_1];
+const CYCLE: f64 = 1.2;
+
+/// The robot with its drive (PD of 600 N m/rad and 10 N m s/rad, 60 N m) and the gait's targets.
+struct Walker {
+    rig: Rig,
+    robot: Robot,
+    targets: Vec<u32>,
+    rows: Vec<Vec<f64>>,
+}
+
+impl Walker {
+    fn new(z: f64, gravity: f64, ground: &str) -> Outcome<Self> {
+        let parameters = format!(
+            r#"{{"model": "models/hexapod.urdf", "position_m": [0, 0, {z}], "ground": "{ground}", "friction": 0.8,
+            "joints": {{"*_j2": {}, "*_j3": {}, "*_j4": {}}}}}"#,
+            STAND[1], STAND[2], STAND[3]
+        );
+        let rig = Rig::new(&parameters, [0.0, 0.0, -gravity], 1e-3)?;
+        let robot = read_urdf(&root().join("models/hexapod.urdf"), false).map_err(|e| e.to_string())?;
+        let moving = robot.joints.iter().filter(|j| j.kind == JointKind::Revolute);
+        let targets = moving.map(|j| rig.id(&format!("{}.angle_target", j.name))).collect::<Outcome<_>>()?;
+        Ok(Self { rig, robot, targets, rows: table("gait_tripod.csv")? })
+    }
+
+    /// Targets at the start of the step, the step.
+    fn step(&mut self) -> Outcome {
+        let t = self.rig.t();
+        let blend = (t - 0.5).clamp(0.0, 1.0);
+        let place = ((t - 0.5).max(0.0) % CYCLE) / CYCLE * (self.rows.len() - 1) as f64;
+        let k = (place as usize).min(self.rows.len() - 2);
+        let part = place - k as f64;
+        let values: Vec<f64> = (0..self.targets.len())
+            .map(|j| {
+                let gait = (1.0 - part) * self.rows[k][j + 1] + part * self.rows[k + 1][j + 1];
+                STAND[j % 4] + blend * (gait - STAND[j % 4])
+            })
+            .collect();
+        self.rig.set(&self.targets, &values)?;
+        self.rig.step()
+    }
+
+    /// Largest distance of two anchors (m) and sine between two axes.
+    fn joints(&self) -> Outcome<[f64; 2]> {
+        let states = self.rig.states()?;
+        let mut worst = [0.0_f64; 2];
+        for joint in &self.robot.joints {
+            let Some(parent) = joint.parent else { continue };
+            let ((pp, pq), (cp, cq)) = (pose(&states[parent]), pose(&states[joint.child]));
+            let there = pp + pq * joint.parent_from_joint.translation.vector;
+            let here = cp + cq * joint.child_from_joint.translation.vector;
+            worst[0] = worst[0].max((here - there).norm());
+            let axes = (pq * (joint.parent_from_joint * *joint.axis))
+                .cross(&(cq * (joint.child_from_joint * *joint.axis)));
+            worst[1] = worst[1].max(axes.norm());
+        }
+        Ok(worst)
+    }
+
+    /// Momentum and angular momentum about the centre of mass.
+    fn momentum(&self) -> Outcome<[f64; 2]> {
+        let states = self.rig.states()?;
+        let (mut p, mut l, mut centre, mut mass) =
+            (Vector3::zeros(), Vector3::zeros(), Vector3::zeros(), 0.0);
+        for (body, state) in self.robot.bodies.iter().zip(&states) {
+            let (origin, q) = pose(state);
+            let w = Vector3::from(state.angular_velocity);
+            let arm = q * body.com;
+            let (c, v) = (origin + arm, Vector3::from(state.linear_velocity) + w.cross(&arm));
+            let spin = q * (body.inertia * q.inverse_transform_vector(&w));
+            (p, mass, centre) = (p + body.mass * v, mass + body.mass, centre + body.mass * c);
+            l += c.cross(&(body.mass * v)) + spin;
+        }
+        Ok([p.norm(), (l - (centre / mass).cross(&p)).norm()])
+    }
+}
+
+/// All of them.
+pub fn figures() -> Outcome<Vec<Figure>> {
+    let mut all = on_ground()?;
+    all.extend(in_space()?);
+    all.push(blocked()?);
+    Ok(all)
+}
+
+fn on_ground() -> Outcome<Vec<Figure>> {
+    let mut walker = Walker::new(0.33, G, "half-space")?;
+    let mut worst = [0.0_f64; 2];
+    while walker.rig.t() < 10.0 - 1e-9 {
+        walker.step()?;
+        let now = walker.joints()?;
+        (0..2).for_each(|k| worst[k] = worst[k].max(now[k]));
+    }
+    let x = pose(&walker.rig.states()?[0]).0.x;
+    let id = "rigid-body.gait";
+    Ok(vec![
+        Figure::new(
+            format!("{id}.joint_gap"),
+            1e3 * worst[0],
+            Limit::AtMost(1e-6),
+            "tripod gait on rigid ground, 10 s: largest distance of two anchors, mm",
+        ),
+        Figure::new(
+            format!("{id}.axis_error"),
+            1e3 * worst[1],
+            Limit::AtMost(1e-6),
+            "the same: largest angle between two axes, mrad",
+        ),
+        Figure::new(format!("{id}.distance"), x, Limit::AtLeast(1.5), "the same: distance walked, m"),
+    ])
+}
+
+fn in_space() -> Outcome<Vec<Figure>> {
+    let mut walker = Walker::new(5.0, 0.0, "none")?;
+    let mut worst = [0.0_f64; 2];
+    while walker.rig.t() < 10.0 - 1e-9 {
+        walker.step()?;
+        let now = walker.momentum()?;
+        (0..2).for_each(|k| worst[k] = worst[k].max(now[k]));
+    }
+    let id = "rigid-body.zero-gravity";
+    Ok(vec![
+        Figure::new(
+            format!("{id}.momentum"),
+            worst[0],
+            Limit::AtMost(1e-12),
+            "tripod gait in zero gravity, 10 s: largest momentum, N s",
+        ),
+        Figure::new(
+            format!("{id}.angular_momentum"),
+            worst[1],
+            Limit::AtMost(1e-6),
+            "the same: largest angular momentum about the centre of mass, N m s",
+        ),
+    ])
+}
+
+fn blocked() -> Outcome<Figure> {
+    let mut walker = Walker::new(0.33, G, "half-space")?;
+    while walker.rig.t() < 3.0 - 1e-9 {
+        walker.step()?;
+    }
+    let id = walker.rig.id("LF_j3.angle")?;
+    let held = walker.rig.get(id)?;
+    walker.rig.act("LF_j3.block")?;
+    let mut worst = 0.0_f64;
+    while walker.rig.t() < 8.0 - 1e-9 {
+        walker.step()?;
+        worst = worst.max((walker.rig.get(id)? - held).abs());
+    }
+    let what = "LF_j3 blocked at 3 s, gait to 8 s: largest deviation, mrad";
+    Ok(Figure::new("rigid-body.blocked_joint", 1e3 * worst, Limit::AtMost(1e-6), what))
+}

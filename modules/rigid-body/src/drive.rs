@@ -86,17 +86,23 @@ impl Axis {
 
     /// The relation for a step of length h; `limits` of the coordinate; voltage that the supply can give, V.
     pub fn new(j: &JointState, limits: Option<[f64; 2]>, supply_v: f64, h: f64) -> Self {
+        Self::at(j, limits, supply_v, h, 1.0)
+    }
+
+    /// The same where springs and position motors act with the coordinate at the share `when` of the step, and the
+    /// rate at its end is the old one plus (mean − old)/`when`.
+    pub fn at(j: &JointState, limits: Option<[f64; 2]>, supply_v: f64, h: f64, when: f64) -> Self {
         if j.broken {
             return Self::idle();
         }
         let a = &j.actuator;
         let bound = h * j.max_torque;
-        let motor = if bound > 0.0 { motor(j, supply_v, h) } else { Curve::line(Line::ZERO, Tag::Law) };
+        let motor = if bound > 0.0 { motor(j, supply_v, h, when) } else { Curve::line(Line::ZERO, Tag::Law) };
         let friction = friction::curve(a, h);
         let (inertia, k) = (a.inertia(), a[Item::SpringStiffness]);
         let passive = [
-            Line { at_zero: inertia * j.velocity, slope: inertia },
-            Line { at_zero: h * k * (a[Item::SpringReference] - j.angle), slope: h * h * k },
+            Line { at_zero: inertia / when * j.velocity, slope: inertia / when },
+            Line { at_zero: h * k * (a[Item::SpringReference] - j.angle), slope: when * h * h * k },
             Line { at_zero: 0.0, slope: h * a[Item::ViscousFriction] },
         ];
         let mut total = motor;
@@ -164,7 +170,7 @@ impl Axis {
 }
 
 /// The motor alone: law, supply, gear, bound.
-fn motor(j: &JointState, supply_v: f64, h: f64) -> Curve {
+fn motor(j: &JointState, supply_v: f64, h: f64, when: f64) -> Curve {
     let law = match j.motor {
         Motor::Off | Motor::Voltage => Curve::line(Line::ZERO, Tag::Law),
         Motor::Torque => Curve::line(Line::level(h * j.torque_target), Tag::Law),
@@ -176,7 +182,10 @@ fn motor(j: &JointState, supply_v: f64, h: f64) -> Curve {
         }
         Motor::Position => {
             let wanted = j.stiffness * (j.angle_target - j.angle) + j.damping * j.velocity_target;
-            Curve::line(Line { at_zero: h * wanted, slope: h * j.damping + h * h * j.stiffness }, Tag::Law)
+            Curve::line(
+                Line { at_zero: h * wanted, slope: h * j.damping + when * h * h * j.stiffness },
+                Tag::Law,
+            )
         }
     };
     let bound = h * j.max_torque;
@@ -185,7 +194,7 @@ fn motor(j: &JointState, supply_v: f64, h: f64) -> Curve {
         .at_least(Line::level(-bound), Tag::Low)
 }
 
-/// End stops and brake. A full block holds the coordinate, a partial one the rate up to its torque.
+/// End stops and brake: a block holds the coordinate, a partial one up to its torque.
 fn add_stops(total: &mut Curve, j: &JointState, limits: Option<[f64; 2]>, h: f64) {
     let most = j.actuator[Item::BlockTorque];
     match j.blocked {
@@ -193,7 +202,7 @@ fn add_stops(total: &mut Curve, j: &JointState, limits: Option<[f64; 2]>, h: f64
             let rate = (held - j.angle) / h;
             return total.add_step(rate, f64::INFINITY, f64::NEG_INFINITY, Tag::Brake);
         }
-        Some(_) => total.add_step(0.0, h * most, -h * most, Tag::Brake),
+        Some(held) => total.add_step((held - j.angle) / h, h * most, -h * most, Tag::Brake),
         None => {}
     }
     if let Some([lower, upper]) = limits {

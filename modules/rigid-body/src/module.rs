@@ -106,6 +106,7 @@ fn integrator(config: &Config) -> Result<Integrator> {
     let rho = config.number("rho_infinity")?;
     Ok(match config.text("integrator")? {
         "generalized-alpha" => Integrator::GeneralizedAlpha(Weights::new(rho)),
+        "energy-momentum" => Integrator::EnergyMomentum,
         _ => Integrator::SymplecticEuler,
     })
 }
@@ -114,13 +115,12 @@ fn integrator(config: &Config) -> Result<Integrator> {
 fn without_impacts(host: &dyn Host, ground: bool, pairs: bool) -> Result<()> {
     if ground {
         return Err(Error::Refused(
-            "parameter `integrator` = \"generalized-alpha\" does not go with rigid `ground`: what hits needs \
-             \"symplectic-euler\""
+            "an `integrator` of second order does not go with rigid `ground`: what hits needs \"symplectic-euler\""
                 .into(),
         ));
     }
     if pairs {
-        let text = "integrator = \"generalized-alpha\" does not keep the robot's own bodies apart; \
+        let text = "an integrator of second order does not keep the robot's own bodies apart; \
                     \"symplectic-euler\" does";
         host.log(LogLevel::Warning, text);
     }

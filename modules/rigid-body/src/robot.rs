@@ -1,10 +1,11 @@
 //! An instance: committed state, the step in hand, and the calls of the subsystem interface.
 
+use crate::actuator::Item;
 use crate::actuator::battery::Draw;
 use crate::actuator::book::Outcome;
 use crate::contact::estimate::{Estimator, Problem};
 use crate::contact::ports::{Ports, committed, displacement, response};
-use crate::drive::Motor;
+use crate::drive::{FULL_BLOCK, Motor};
 use crate::dynamics::joint_rows::coordinate;
 use crate::dynamics::{Dynamics, Failure};
 use crate::math::V3;
@@ -17,6 +18,9 @@ use terraglue_subsystem::{
     Action, BodyState, Capabilities, Energy, Error, Estimate, Host, Input, Law, Level, Motion, Port,
     Response, Result, Scene, Step, Subsystem, Values, ValuesMut, Variable,
 };
+
+/// A partial block that is off by more than this has given way, rad or m.
+const GIVEN_WAY: f64 = 1e-9;
 
 /// A robot in a run.
 pub(crate) struct Robot {
@@ -162,6 +166,11 @@ impl Robot {
             s.angle = coordinate(joint, &dynamics.ends, s.angle);
             s.velocity = axis.end_rate;
             s.torque = (shares.motor / h).clamp(-s.max_torque, s.max_torque);
+            // A partial block that has given way holds on where it is now.
+            let slipped = s.blocked.is_some_and(|held| (s.angle - held).abs() > GIVEN_WAY);
+            if slipped && s.actuator[Item::BlockTorque] < FULL_BLOCK {
+                s.blocked = Some(s.angle);
+            }
             s.mode = mode;
             let outcome = Outcome {
                 shares,

@@ -64,8 +64,8 @@ pub(crate) fn schema() -> Schema {
             Parameter::of(
                 "integrator",
                 ParameterType::Text,
-                "How the bodies are stepped: `symplectic-euler` (first order, for anything that hits) or \
-                 `generalized-alpha` (second order, for smooth forces)",
+                "How the bodies are stepped: `symplectic-euler` (first order, for anything that hits); of second order, for \
+                 smooth forces: `generalized-alpha` (damps what the step cannot resolve) or `energy-momentum` (damps nothing)",
             )
             .or("symplectic-euler")
             .choices(&crate::dynamics::scheme::Integrator::NAMES),

@@ -25,7 +25,10 @@ fn tip(rig: &Rig) -> nalgebra::Vector3<f64> {
 
 /// Error of the tip at 1 s, m, and the largest energy error until `end`, J.
 fn run(file: &str, joints: &str, h: f64, end: f64, expected: [f64; 3]) -> (f64, f64) {
-    let mut rig = chain(file, joints, h);
+    watch(chain(file, joints, h), h, end, expected)
+}
+
+fn watch(mut rig: Rig, h: f64, end: f64, expected: [f64; 3]) -> (f64, f64) {
     let start = rig.robot.energy().mechanical();
     let (mut worst, mut error) = (0.0_f64, f64::NAN);
     for i in 1..=(end / h).round() as usize {
@@ -58,6 +61,20 @@ fn the_energy_of_a_spatial_chain_converges_with_the_step() {
     let expected = [-1.640621154, -0.580129864, -0.919078146];
     let [energy, half] = [1e-3, 5e-4].map(|h| run("chain8", SPATIAL, h, 4.0, expected).1);
     assert!(energy / half > 3.0, "{energy} {half}");
+}
+
+#[test]
+fn the_scheme_that_conserves_energy_does_so_and_converges() {
+    let expected = [-1.640621154, -0.580129864, -0.919078146];
+    let [coarse, fine] = [1e-3, 5e-4].map(|h| {
+        let parameters = format!(
+            r#"{{"model": "tests/reference/multibody/chain8.urdf", "motor": "off", "joints": {SPATIAL},
+            "integrator": "energy-momentum"}}"#
+        );
+        watch(Rig::new(&parameters, G, h), h, 2.0, expected)
+    });
+    assert!(coarse.1 < 1e-8 && fine.1 < 1e-8, "{coarse:?} {fine:?}");
+    assert!(coarse.0 < 2e-5 && coarse.0 / fine.0 > 3.0, "{coarse:?} {fine:?}");
 }
 
 #[test]

@@ -26,6 +26,20 @@ pub(crate) fn rows(joint: &Joint, bodies: &[Motion]) -> Rows {
     Rows { directions: std::array::from_fn(|r| direction(r % 3)), anchor, lever: child.c + anchor - parent.c }
 }
 
+/// Rows whose product with the mean rates times h is the change of the joint's equations over a step, for poses at its
+/// two ends: all vectors are means, and the rotational rows of a revolute joint are those of −t2·axis and t1·axis.
+pub(crate) fn mean_rows(joint: &Joint, starts: &[Motion], ends: &[Motion]) -> Rows {
+    let (before, after) = (rows(joint, starts), rows(joint, ends));
+    let mean = |a: &V3, b: &V3| 0.5 * (a + b);
+    let mut directions: [V3; 6] = std::array::from_fn(|r| mean(&before.directions[r], &after.directions[r]));
+    if joint.kind == Kind::Revolute {
+        let axis = |bodies: &[Motion]| bodies[joint.child].q * (joint.child_frame * V3::x());
+        let axis = mean(&axis(starts), &axis(ends));
+        (directions[4], directions[5]) = (directions[2].cross(&axis), axis.cross(&directions[1]));
+    }
+    Rows { directions, anchor: mean(&before.anchor, &after.anchor), lever: mean(&before.lever, &after.lever) }
+}
+
 /// How far the joint is out of place, in the rows' order, m and rad; the free row is 0.
 pub(crate) fn gap(joint: &Joint, bodies: &[Motion]) -> [f64; 6] {
     let (parent, child) = (parent_of(joint, bodies), &bodies[joint.child]);

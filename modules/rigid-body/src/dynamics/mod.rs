@@ -6,13 +6,16 @@
 //! by a few corrections with the same factor, which enter rates and positions alike. That is the SHAKE scheme
 //! (Ryckaert, Ciccotti and Berendsen 1977), symplectic (Leimkuhler and Skeel 1994): joints neither open nor
 //! brake. Rotation: the angular momentum is updated by the impulses, orientation by the Cayley transform of the
-//! midpoint rate, see [`gyro`]. The second-order option is in [`alpha`], what both share in [`scheme`].
+//! midpoint rate, see [`gyro`]. The second-order options are
+//! [`alpha`] and [`midpoint`] over [`second_order`]; what all share is in [`scheme`].
 
 mod alpha;
 mod gyro;
 pub(crate) mod joint_rows;
 pub(crate) mod kkt;
+mod midpoint;
 pub(crate) mod scheme;
+mod second_order;
 
 use crate::contact::bodies::BodyContacts;
 use crate::drive::{Axis, Mode};

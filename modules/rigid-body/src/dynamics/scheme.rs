@@ -20,16 +20,19 @@ pub(crate) enum Integrator {
     SymplecticEuler,
     /// Second order; needs forces that change smoothly.
     GeneralizedAlpha(Weights),
+    /// Second order; conserves energy and momentum to the last.
+    EnergyMomentum,
 }
 
 impl Integrator {
-    pub const NAMES: [&'static str; 2] = ["symplectic-euler", "generalized-alpha"];
+    pub const NAMES: [&'static str; 3] = ["symplectic-euler", "generalized-alpha", "energy-momentum"];
 
     /// θ: what a force of the step weighs in the system for u.
     pub fn force_weight(&self) -> f64 {
         match self {
             Self::SymplecticEuler => 1.0,
             Self::GeneralizedAlpha(w) => w.theta(),
+            Self::EnergyMomentum => 0.5,
         }
     }
 
@@ -38,12 +41,18 @@ impl Integrator {
         match self {
             Self::SymplecticEuler => 1.0,
             Self::GeneralizedAlpha(w) => w.gamma / w.beta,
+            Self::EnergyMomentum => 2.0,
         }
+    }
+
+    /// When within the step forces along joint axes are taken, as share of the step.
+    pub fn force_time(&self) -> f64 {
+        if matches!(self, Self::EnergyMomentum) { 0.5 } else { 1.0 }
     }
 
     /// Whether accelerations belong to the state.
     pub fn is_second_order(&self) -> bool {
-        matches!(self, Self::GeneralizedAlpha(_))
+        !matches!(self, Self::SymplecticEuler)
     }
 }
 

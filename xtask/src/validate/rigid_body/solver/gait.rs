@@ -88,6 +88,8 @@ pub fn figures() -> Outcome<Vec<Figure>> {
     let mut all = on_ground()?;
     all.extend(in_space()?);
     all.push(blocked()?);
+    all.extend(partly_blocked()?);
+    all.push(repeated()?);
     Ok(all)
 }
 
@@ -158,4 +160,57 @@ fn blocked() -> Outcome<Figure> {
     }
     let what = "LF_j3 blocked at 3 s, gait to 8 s: largest deviation, mrad";
     Ok(Figure::new("rigid-body.blocked_joint", 1e3 * worst, Limit::AtMost(1e-6), what))
+}
+
+/// The largest torque that the block needs to hold, and how far it slips with half as much.
+fn partly_blocked() -> Outcome<Vec<Figure>> {
+    let slip = |torque: f64| -> Outcome<[f64; 2]> {
+        let mut walker = Walker::new(0.33, G, "half-space")?;
+        while walker.rig.t() < 3.0 - 1e-9 {
+            walker.step()?;
+        }
+        let [angle, stop] = [walker.rig.id("LF_j3.angle")?, walker.rig.id("LF_j3.stop_torque")?];
+        let (held, limit) = (walker.rig.get(angle)?, walker.rig.id("LF_j3.block_torque")?);
+        walker.rig.set(&[limit], &[torque])?;
+        walker.rig.act("LF_j3.block")?;
+        let mut worst = [0.0_f64; 2];
+        while walker.rig.t() < 5.0 - 1e-9 {
+            walker.step()?;
+            worst[0] = worst[0].max((walker.rig.get(angle)? - held).abs());
+            worst[1] = worst[1].max(walker.rig.get(stop)?.abs());
+        }
+        Ok(worst)
+    };
+    let needed = slip(1e3)?[1];
+    let (strong, weak) = (slip(1.05 * needed)?, slip(0.5 * needed)?);
+    let what = format!("partial block above the {needed:.1} N m that it needs: largest slip in 2 s, mrad");
+    let above = Figure::new("rigid-body.partial_block.above", 1e3 * strong[0], Limit::AtMost(1e-6), what);
+    let what = "partial block with half of that: largest slip, mrad";
+    let below = Figure::new("rigid-body.partial_block.below", 1e3 * weak[0], Limit::AtLeast(1.0), what);
+    let what = "the same: largest torque over the torque of the block";
+    let torque = weak[1] / (0.5 * needed);
+    let bound = Figure::new("rigid-body.partial_block.torque", torque, Limit::AtMost(1.0 + 1e-9), what);
+    Ok(vec![above, below, bound])
+}
+
+/// Numbers that differ between two runs.
+fn repeated() -> Outcome<Figure> {
+    let run = || -> Outcome<Vec<u64>> {
+        let mut walker = Walker::new(0.33, G, "half-space")?;
+        let mut bits = Vec::new();
+        while walker.rig.t() < 2.0 - 1e-9 {
+            walker.step()?;
+            for s in walker.rig.states()? {
+                let pose = s.world_from_body;
+                bits.extend(pose.position.iter().chain(&pose.orientation).map(|x| x.to_bits()));
+                bits.extend(s.linear_velocity.iter().chain(&s.angular_velocity).map(|x| x.to_bits()));
+            }
+        }
+        Ok(bits)
+    };
+    let (first, second) = (run()?, run()?);
+    let different = first.iter().zip(&second).filter(|(a, b)| a != b).count();
+    let what =
+        format!("gait, 2 s: numbers out of {} that differ in their bits between two runs", first.len());
+    Ok(Figure::new("rigid-body.repeated_run", different as f64, Limit::Equal(0.0), what))
 }

@@ -32,6 +32,13 @@ enum Command {
         #[arg(long)]
         check: bool,
     },
+    /// Print a hash of the automaton's state after a fixed run: `validate soil` runs this in another environment.
+    #[command(hide = true)]
+    SoilHash {
+        /// A shorter run.
+        #[arg(long)]
+        quick: bool,
+    },
     /// Write docs/scenario.schema.json and the key tables of docs/scenario.md.
     Schema {
         /// Change nothing; fail when a file is out of date.
@@ -50,6 +57,10 @@ fn main() -> ExitCode {
         Command::Test => test::test(),
         Command::Validate(arguments) => validate::validate(&arguments),
         Command::Header { check } => header::run(check),
+        Command::SoilHash { quick } => {
+            validate::print_soil_hash(quick);
+            Ok(())
+        }
         Command::Schema { check } => schema::write_files(check),
         Command::Install { prefix } => install::install(&prefix),
     };

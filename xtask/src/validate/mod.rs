@@ -12,6 +12,7 @@ mod timing;
 mod walk;
 
 pub use figure::{Figure, Limit};
+pub use soil::print_hash as print_soil_hash;
 
 use crate::process::{Outcome, cargo, must, program, root};
 use known::KnownFailures;

@@ -8,6 +8,8 @@ mod rows;
 mod stick;
 mod wong_reece;
 
+pub use automaton::print_hash;
+
 use super::{Context, Figure};
 use crate::process::Outcome;
 use plates::{Maker, level};

@@ -90,6 +90,30 @@ impl Case {
         }
         worst
     }
+
+    /// Largest relative error of the sinkage under 5 … 200 N, until the plate rests.
+    fn loaded(&self) -> f64 {
+        let (.., b, area) = shapes()[self.shape].clone();
+        let mut worst = 0.0_f64;
+        for load in [5.0, 10.0, 20.0, 50.0, 100.0, 200.0] {
+            let z = self.row.depth(load / area, b);
+            if z < 0.1 {
+                // a light plate, its load laid on smoothly: a heavy one would plunge deeper than it rests
+                let mut rig = self.rig(0.1);
+                rig.gravity = 0.0;
+                let ramp = if self.quick { 300.0 } else { 1000.0 };
+                for k in 0..ramp as u32 + 100 {
+                    let share = (f64::from(k) / ramp).min(1.0);
+                    rig.force[2] = -0.5 * load * (1.0 - (std::f64::consts::PI * share).cos());
+                    rig.iterative_step();
+                }
+                let speed = rig.velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
+                let error = if speed < 1e-5 { (rig.sunk() / z - 1.0).abs() } else { f64::NAN };
+                worst = if error.is_nan() { f64::NAN } else { worst.max(error) };
+            }
+        }
+        worst
+    }
 }
 
 /// All figures.
@@ -117,6 +141,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
                 all.push(Figure::new(format!("soil.{module}.{name}.{part}"), 100.0 * error, limit, what));
             }
         }
+        all.push(load_control(context, module, make)?);
     }
     Ok(all)
 }
@@ -136,4 +161,16 @@ fn cases(context: &Context, make: Maker) -> Outcome<Vec<Case>> {
         }
     }
     Ok(cases)
+}
+
+fn load_control(context: &Context, module: &str, make: Maker) -> Outcome<Figure> {
+    let rows = eight()?;
+    let rows = if context.quick { vec![rows[2].clone(), rows[7].clone()] } else { rows };
+    let shapes: &[usize] = if context.quick { &[1] } else { &[0, 1, 2, 3, 4, 5] };
+    let case = |row: &Row, shape| Case { make, row: row.clone(), shape, spacing: 0.01, quick: context.quick };
+    let cases: Vec<Case> = rows.iter().flat_map(|row| shapes.iter().map(move |s| case(row, *s))).collect();
+    let errors = in_parallel(&cases, Case::loaded);
+    let worst = errors.into_iter().reduce(|a, b| if b.is_nan() || b > a { b } else { a }).unwrap_or(f64::NAN);
+    let what = "largest error of the sinkage under 5 to 200 N, %, 1 cm grid";
+    Ok(Figure::new(format!("soil.{module}.load_control"), 100.0 * worst, Limit::AtMost(2.0), what))
 }

@@ -40,6 +40,11 @@ impl Row {
     pub fn pressure(&self, z: f64, b: f64) -> f64 {
         self.modulus(b) * z.powf(self.value("n"))
     }
+
+    /// Depth at which Bekker's law gives the pressure p, m.
+    pub fn depth(&self, p: f64, b: f64) -> f64 {
+        (p / self.modulus(b)).powf(1.0 / self.value("n"))
+    }
 }
 
 /// The eight soils.

@@ -13,6 +13,7 @@ pub mod recording;
 pub mod scaffold;
 pub mod scenario;
 pub mod signals;
+pub mod soil_fit;
 pub mod terrain;
 pub mod testbed;
 pub mod timing;

@@ -3,6 +3,7 @@
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use terraglue::scaffold::{Kind, Language};
+use terraglue_soil_law::PRESSURE_LAWS;
 
 /// Simulates robots on deformable ground: rigid bodies, soils and controllers, glued into one run.
 #[derive(Parser, Debug)]
@@ -54,8 +55,13 @@ pub enum Command {
     Fmu(FmuCommand),
     /// Make the folder of a new module that builds and runs at once.
     New(NewArguments),
+    /// Find the parameters of a soil from plate tests.
+    FitSoil(FitSoilArguments),
     /// List the soils that a scenario can name, and those that are refused with the reason.
     Soils {
+        /// Everything about this one.
+        #[arg(value_name = "NAME")]
+        name: Option<String>,
         /// Another soil table.
         #[arg(long, value_name = "CSV")]
         file: Option<PathBuf>,
@@ -125,6 +131,52 @@ fn one_of<T: Copy + Send + Sync + 'static, const N: usize>(
         all.into_iter().find(|value| word(*value) == text).unwrap_or(all[0])
     })
 }
+
+/// What `fit-soil` takes.
+#[derive(Args, Debug, Clone)]
+#[command(after_help = FIT_EXAMPLES)]
+pub struct FitSoilArguments {
+    /// Plate tests: columns sinkage_mm, pressure_kPa and plate_diam_mm or b_mm (also in m); equal cells in the other
+    /// columns make one press.
+    pub data: PathBuf,
+    /// Pressure-sinkage law.
+    #[arg(long, default_value = "bearing", value_parser = one_of(PRESSURE_LAWS, |law| law))]
+    pub law: &'static str,
+    /// Write the soil here, for `parameters = "soil.toml"` in a scenario, and a drawing beside it (.svg).
+    #[arg(long, value_name = "TOML")]
+    pub out: Option<PathBuf>,
+    /// Tests that the fit does not see: how well are they predicted?
+    #[arg(long, value_name = "CSV")]
+    pub predict: Option<PathBuf>,
+    /// Leave out what lies above this sinkage, mm: the plate is not seated yet.
+    #[arg(long, value_name = "MM", default_value_t = 3.0)]
+    pub from_mm: f64,
+    /// Row of the soil table that gives cohesion, friction, shear modulus and density.
+    #[arg(long, value_name = "NAME")]
+    pub soil: Option<String>,
+    /// Cohesion, Pa; needed for reece and bearing.
+    #[arg(long, value_name = "PA")]
+    pub cohesion_pa: Option<f64>,
+    /// Angle of internal friction, degrees.
+    #[arg(long, value_name = "DEG")]
+    pub phi_deg: Option<f64>,
+    /// Shear deformation modulus K, m.
+    #[arg(long, value_name = "M")]
+    pub shear_m: Option<f64>,
+    /// Bulk density, kg/m³; needed for reece and bearing.
+    #[arg(long, value_name = "KG_M3")]
+    pub density: Option<f64>,
+    /// Print JSON and nothing else.
+    #[arg(long)]
+    pub json: bool,
+}
+
+const FIT_EXAMPLES: &str = "\
+Example:
+  terraglue fit-soil plates.csv --law bearing --density 1330 --cohesion-pa 1000 --out soil.toml --predict other.csv
+
+The error is the root of the mean square of ln(p/p_measured). b is the radius of a disc or the short side of a
+rectangle. Confidence intervals: whole presses are left out in turn.";
 
 /// What `compare` takes.
 #[derive(Args, Debug, Clone)]

@@ -1,4 +1,4 @@
-//! `terraglue modules`, `variables` and `soils`: what there is to choose from.
+//! `terraglue modules` and `variables`: what there is to choose from.
 
 use super::arguments::ScenarioArguments;
 use super::output::outln;
@@ -7,7 +7,7 @@ use super::{Exit, show};
 use std::path::{Path, PathBuf};
 use terraglue::Result;
 use terraglue::host::{AvailableModule, SearchPath, available_modules};
-use terraglue::scenario::{InputError, Scenario, allowed_values, find_soil_table, read_soil_table};
+use terraglue::scenario::{Scenario, allowed_values};
 use terraglue::subsystem::{Causality, Effect, Kind, Schema, ValueType, Variable};
 use terraglue::testbed::Options;
 
@@ -67,33 +67,6 @@ fn range(v: &Variable) -> String {
         (false, true) => format!("≤ {}", v.max),
         (false, false) => String::new(),
     }
-}
-
-/// The soil table.
-pub fn soils(file: Option<&Path>) -> Result<Exit> {
-    let path = file.map(Path::to_owned).or_else(|| find_soil_table(Path::new(".")));
-    let path = path.ok_or_else(|| {
-        let help = Some("name a table with --file".into());
-        InputError::plain("no soil table: models/soils.csv is not there", help)
-    })?;
-    let rows = read_soil_table(&path).map_err(|message| InputError::plain(message, None))?.rows;
-    let mut table =
-        show::table(&["soil", "n", "k_c", "k_phi", "c, Pa", "phi, rad", "K, m", "density, kg/m³", "source"]);
-    let mut refused = show::table(&["refused", "reason"]);
-    for row in &rows {
-        if let Some(reason) = &row.refused {
-            refused.add_row([&row.name, reason]);
-            continue;
-        }
-        let cells = row.values.iter().map(|v| v.map_or_else(|| "–".to_owned(), |x| x.to_string()));
-        table.add_row(std::iter::once(row.name.clone()).chain(cells).chain([row.source.clone()]));
-    }
-    outln!("{table}");
-    if refused.row_count() > 0 {
-        outln!("{refused}");
-    }
-    outln!("from {}", path.display());
-    Ok(Exit::Done)
 }
 
 /// The modules on the search path.

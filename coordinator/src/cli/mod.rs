@@ -5,6 +5,7 @@
 mod arguments;
 mod check;
 mod compare;
+mod fit_soil;
 mod fmu;
 mod folder;
 mod interrupt;
@@ -17,6 +18,7 @@ mod report;
 mod run;
 mod show;
 mod soil_module;
+mod soils;
 
 use arguments::{Arguments, Command};
 use clap::Parser;
@@ -59,7 +61,8 @@ pub fn main() -> ExitCode {
         Command::Variables(arguments) => list::variables(&arguments),
         Command::Fmu(command) => fmu::fmu(&command),
         Command::New(arguments) => new::new(&arguments),
-        Command::Soils { file } => list::soils(file.as_deref()),
+        Command::Soils { name, file } => soils::soils(name.as_deref(), file.as_deref()),
+        Command::FitSoil(arguments) => fit_soil::fit_soil(&arguments),
     };
     match done {
         Ok(exit) => exit.into(),

@@ -317,7 +317,7 @@ pub fn subsystem_keys() -> Vec<Key> {
     let multiple = "steps of the testbed per step of this subsystem";
     let module = "a module's name, or the path of a shared library relative to the scenario";
     let unit = "a functional mock-up unit instead of a module; other keys are its start values, `on_nan`, `event_mode`, `rollback`";
-    let row = "a row of the soil table, whose numbers are offered to the module";
+    let row = "a row of the soil table, or a soil file (.toml), whose numbers are offered to the module";
     vec![
         Parameter::of("module", ParameterType::Text, module).into(),
         Parameter::of("fmu", ParameterType::Path, unit).optional().into(),

@@ -1,4 +1,4 @@
-//! `parameters = "row"`: a row of the soil table, offered to the module.
+//! `parameters = "row"` or `"soil.toml"`: a row of the soil table or a soil file, offered to the module.
 
 use super::nearest::did_you_mean;
 use super::node::Node;
@@ -39,6 +39,10 @@ pub fn offered(
 ) -> Result<Map<String, Value>, Box<InputError>> {
     let Some(row) = text(node, "parameters") else { return Ok(Map::new()) };
     let at = |key, message: String, help| source.error_at_value(&[name, key], message, help);
+    if row.ends_with(".toml") {
+        return own_file(&source.folder().join(&row))
+            .map_err(|(message, help)| at("parameters", message, help));
+    }
     let file = text(node, "parameters_file").map(|file| source.folder().join(file));
     let key = if file.is_some() { "parameters_file" } else { "parameters" };
     let Some(path) = file.or_else(|| find_soil_table(&source.folder())) else {
@@ -59,6 +63,23 @@ pub fn offered(
             Err(at("parameters", other.to_string(), help))
         }
     }
+}
+
+/// The table `[soil]` of a soil file, as `terraglue fit-soil` writes it.
+fn own_file(path: &Path) -> Result<Map<String, Value>, (String, Option<String>)> {
+    let said = |what: String| (format!("{}: {what}", path.display()), None);
+    let text = std::fs::read_to_string(path).map_err(|e| said(format!("cannot read it: {e}")))?;
+    let document: toml_edit::DocumentMut = text.parse().map_err(|e| said(format!("{e}")))?;
+    let table = document.get("soil").and_then(|t| t.as_table_like()).ok_or_else(|| {
+        let help = Some("`terraglue fit-soil` writes such files".to_owned());
+        (format!("{}: there is no table [soil]", path.display()), help)
+    })?;
+    let value = |key: &str, item: &toml_edit::Item| {
+        let number = item.as_float().or_else(|| item.as_integer().map(|i| i as f64)).map(Value::from);
+        let value = number.or_else(|| item.as_str().map(Value::from));
+        value.map(|v| (key.to_owned(), v)).ok_or_else(|| said(format!("`{key}` takes a number or a text")))
+    };
+    table.iter().map(|(key, item)| value(key, item)).collect()
 }
 
 fn keys(node: &Node) -> impl Iterator<Item = &str> {

@@ -5,6 +5,7 @@
 
 mod batch;
 pub mod expression;
+pub mod fit;
 mod parameters;
 mod pressure;
 mod shear;

@@ -56,6 +56,8 @@ pub struct SoilRow {
     pub values: [Option<f64>; COLUMNS.len()],
     /// Where the numbers come from.
     pub source: String,
+    /// How far they can be trusted.
+    pub confidence: String,
     /// Why the row cannot be used as it stands.
     pub refused: Option<String>,
 }
@@ -117,6 +119,7 @@ struct Columns {
     name: usize,
     numbers: [usize; COLUMNS.len()],
     source: usize,
+    confidence: usize,
     refused: usize,
 }
 
@@ -132,7 +135,9 @@ impl Columns {
         for (place, name) in numbers.iter_mut().zip(COLUMNS) {
             *place = at(name)?;
         }
-        Ok(Self { name: at("name")?, numbers, source: at("source")?, refused: at("refused")? })
+        let [name, source, confidence, refused] =
+            [at("name")?, at("source")?, at("confidence")?, at("refused")?];
+        Ok(Self { name, numbers, source, confidence, refused })
     }
 
     fn row(&self, line: usize, text: &str, width: usize) -> Result<SoilRow, TableError> {
@@ -147,7 +152,9 @@ impl Columns {
             })?;
         }
         let refused = Some(cells[self.refused].to_string()).filter(|r| !r.is_empty());
-        Ok(SoilRow { name: cells[self.name].into(), values, source: cells[self.source].into(), refused })
+        let text = |place: usize| cells[place].to_owned();
+        let [name, source, confidence] = [text(self.name), text(self.source), text(self.confidence)];
+        Ok(SoilRow { name, values, source, confidence, refused })
     }
 }
 

@@ -318,6 +318,7 @@ impl Rig {
         // start from the estimate: rest where the foot is pressed
         let mut x = vec![0.0; n];
         let mut t = vec![0.0; n];
+        let (mut before, mut d) = (f64::INFINITY, [0.0; 3]);
         for round in 0..60 {
             t = self.under_motion(&x);
             let r: [f64; 3] = std::array::from_fn(|k| x[k] - x_free[k] - g * t[k]);
@@ -325,12 +326,19 @@ impl Rig {
             if size < 1e-9 * g * self.mass * 9.81 {
                 break;
             }
+            if size >= before {
+                // beyond a kink of the law: half the way
+                d = d.map(|d| 0.5 * d);
+                (0..3).for_each(|a| x[a] += d[a]);
+                continue;
+            }
+            before = size;
             assert!(round < 59, "Newton does not converge: {r:?} {x:?} {t:?}");
             let k = self.jacobian();
             // I + G·K with K = −dT/dX
             let mut m: [[f64; 3]; 3] = std::array::from_fn(|a| std::array::from_fn(|b| g * k[b * n + a]));
             (0..3).for_each(|a| m[a][a] += 1.0);
-            let d = solve3(m, r);
+            d = solve3(m, r);
             (0..3).for_each(|a| x[a] -= d[a]);
         }
         self.finish(&t, x_free, g);

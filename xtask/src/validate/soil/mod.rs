@@ -1,6 +1,7 @@
 //! Area `soil`: what both soils promise, part by part.
 
 mod automaton;
+mod fit;
 mod plates;
 #[path = "../../../../interfaces/soil-contact/tests/support/mod.rs"]
 mod rig;
@@ -21,7 +22,8 @@ use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
 type Part = fn(&Context) -> Outcome<Vec<Figure>>;
 
 /// The parts, in the order of the table.
-const PARTS: [Part; 4] = [automaton::figures, plates::figures, stick::figures, wong_reece::figures];
+const PARTS: [Part; 5] =
+    [automaton::figures, plates::figures, fit::figures, stick::figures, wong_reece::figures];
 
 /// All figures of the area.
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {

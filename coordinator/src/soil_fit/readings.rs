@@ -1,0 +1,125 @@
+//! Plate tests from comma-separated text; the unit stands in the name of a column.
+
+use crate::scenario::InputError;
+use std::path::Path;
+use terraglue_soil_law::fit::Reading;
+
+/// The readings of a file.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PlateTests {
+    /// Those that can be used.
+    pub readings: Vec<Reading>,
+    /// Rows of the file.
+    pub rows: usize,
+    /// Rows left out because the plate was not seated yet.
+    pub shallow: usize,
+}
+
+/// Name of a column and how many SI units its unit has.
+const SINKAGE: &[(&str, f64)] = &[("sinkage_m", 1.0), ("sinkage_cm", 1e-2), ("sinkage_mm", 1e-3)];
+const PRESSURE: &[(&str, f64)] = &[("pressure_Pa", 1.0), ("pressure_kPa", 1e3), ("pressure_MPa", 1e6)];
+/// Size b: radius of a disc or short side of a rectangle.
+const SIZE: &[(&str, f64)] = &[
+    ("b_m", 1.0),
+    ("b_cm", 1e-2),
+    ("b_mm", 1e-3),
+    ("plate_diam_m", 0.5),
+    ("plate_diam_cm", 0.5e-2),
+    ("plate_diam_mm", 0.5e-3),
+    ("plate_radius_m", 1.0),
+    ("plate_radius_mm", 1e-3),
+    ("plate_width_m", 1.0),
+    ("plate_width_mm", 1e-3),
+];
+/// What is measured along a curve: equal cells in all other columns make one curve.
+const MEASURED: [&str; 4] = ["sinkage_", "pressure_", "force_", "time_"];
+
+/// Reads a file; rows whose sinkage is below `from` (m) are left out.
+///
+/// # Errors
+/// What is wrong, with file and line.
+pub fn read(path: &Path, from: f64) -> Result<PlateTests, Box<InputError>> {
+    let text = std::fs::read_to_string(path)
+        .map_err(|e| InputError::plain(format!("cannot read {}: {e}", path.display()), None))?;
+    parse(&text, from)
+        .map_err(|(message, help)| InputError::plain(format!("{}: {message}", path.display()), help))
+}
+
+type Wrong = (String, Option<String>);
+
+fn parse(text: &str, from: f64) -> Result<PlateTests, Wrong> {
+    let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'));
+    let header: Vec<&str> = match lines.next() {
+        Some((_, line)) => line.split(',').map(str::trim).collect(),
+        None => return Err(("the file is empty".into(), None)),
+    };
+    let columns = [find(&header, SINKAGE)?, find(&header, PRESSURE)?, find(&header, SIZE)?];
+    let labels: Vec<usize> =
+        (0..header.len()).filter(|k| !MEASURED.iter().any(|m| header[*k].starts_with(m))).collect();
+    let mut tests = PlateTests { readings: Vec::new(), rows: 0, shallow: 0 };
+    let mut curves: Vec<Vec<&str>> = Vec::new();
+    for (k, line) in lines {
+        let cells: Vec<&str> = line.split(',').map(str::trim).collect();
+        if cells.len() != header.len() {
+            return Err((format!("line {}: {} cells instead of {}", k + 1, cells.len(), header.len()), None));
+        }
+        tests.rows += 1;
+        let number = |(place, scale): (usize, f64)| {
+            let value = cells[place].parse::<f64>().ok().filter(|v| v.is_finite());
+            let message =
+                || format!("line {}: `{}` in `{}` is not a number", k + 1, cells[place], header[place]);
+            value.map(|v| v * scale).ok_or_else(|| (message(), None))
+        };
+        let [depth, pressure, b] = [number(columns[0])?, number(columns[1])?, number(columns[2])?];
+        if b <= 0.0 {
+            return Err((format!("line {}: the size of the plate must be larger than zero", k + 1), None));
+        }
+        // a reading in the middle of a bin of a millimetre is printed with rounding
+        if depth < from * (1.0 - 1e-9) || depth <= 0.0 || pressure <= 0.0 {
+            tests.shallow += 1;
+            continue;
+        }
+        let label: Vec<&str> = labels.iter().map(|k| cells[*k]).collect();
+        let curve = curves.iter().position(|c| *c == label).unwrap_or_else(|| {
+            curves.push(label);
+            curves.len() - 1
+        });
+        tests.readings.push(Reading { curve, b, depth, pressure });
+    }
+    Ok(tests)
+}
+
+fn find(header: &[&str], names: &[(&str, f64)]) -> Result<(usize, f64), Wrong> {
+    let found = names.iter().find_map(|(name, scale)| Some((header.iter().position(|h| h == name)?, *scale)));
+    found.ok_or_else(|| {
+        let known: Vec<&str> = names.iter().map(|n| n.0).collect();
+        let message = format!("no column is called {}", known.join(" or "));
+        (message, Some(format!("the columns are {}", header.join(", "))))
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_curves_and_seating() {
+        let text = "trial,plate_diam_mm,sinkage_mm,pressure_kPa,force_N\n1,60,1,0.5,1\n1,60,3,2,5\n2,60,3,2.5,6\n2,60,4,3,7\n";
+        let tests = parse(text, 3e-3).unwrap();
+        assert_eq!((tests.rows, tests.shallow, tests.readings.len()), (4, 1, 3));
+        let r = tests.readings[1];
+        assert!((r.b - 0.03).abs() < 1e-12 && (r.depth - 3e-3).abs() < 1e-12 && r.pressure == 2500.0);
+        assert_eq!(tests.readings.iter().map(|r| r.curve).collect::<Vec<_>>(), [0, 1, 1]);
+    }
+
+    #[test]
+    fn wrong_files_name_line_and_column() {
+        let wrong = |text: &str| parse(text, 0.0).unwrap_err();
+        assert!(wrong("").0.contains("empty"));
+        let (message, help) = wrong("a,b_m,pressure_Pa\n");
+        assert!(message.contains("sinkage_mm") && help.unwrap().contains("a, b_m"));
+        assert!(wrong("sinkage_m,b_m,pressure_Pa\n1,2,x\n").0.contains("line 2: `x` in `pressure_Pa`"));
+        assert!(wrong("sinkage_m,b_m,pressure_Pa\n1,2\n").0.contains("2 cells instead of 3"));
+        assert!(wrong("sinkage_m,b_m,pressure_Pa\n1,0,4\n").0.contains("larger than zero"));
+    }
+}

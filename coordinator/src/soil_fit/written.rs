@@ -1,0 +1,87 @@
+//! A fit as a soil file for scenarios, and as JSON.
+
+use super::{Known, SoilFit};
+use serde_json::{Value, json as value};
+use terraglue_soil_law::fit::Basis;
+
+/// Significant digits of what is written: more than any plate test knows.
+fn digits(x: f64) -> String {
+    if x == 0.0 || !x.is_finite() {
+        return "0.0".into();
+    }
+    let rounded: f64 = format!("{x:.6e}").parse().unwrap_or(x);
+    let text = format!("{rounded}");
+    if text.contains('.') { text } else { format!("{text}.0") }
+}
+
+/// The table of a soil, for `parameters = "soil.toml"` or to be copied into a scenario. `source` says where the
+/// numbers come from.
+pub fn toml(fit: &SoilFit, source: &str) -> String {
+    let mut text = format!("# {source}\n# {}\n\n[soil]\npressure_law = \"{}\"\n", basis(fit), fit.law);
+    for p in &fit.parameters {
+        let known = format!("95 %: {} … {}", digits(p.interval.low), digits(p.interval.high));
+        text += &format!("{} = {}  # {}; {known}\n", p.name, digits(p.value), p.help);
+    }
+    if fit.law == "bearing" {
+        text += &format!("reference_depth_m = {}\n", digits(super::REFERENCE_DEPTH));
+    }
+    for (key, number, what) in others(&fit.known) {
+        match number {
+            Some(x) => text += &format!("{key} = {}\n", digits(x)),
+            None => text += &format!("# {key} = …  # plates do not tell the {what}\n"),
+        }
+    }
+    text
+}
+
+fn others(known: &Known) -> [(&'static str, Option<f64>, &'static str); 4] {
+    [
+        ("c_pa", known.c_pa, "cohesion"),
+        ("phi_rad", known.phi_rad, "angle of internal friction"),
+        ("K_m", known.shear_m, "shear deformation modulus"),
+        ("density_kg_m3", known.density, "density"),
+    ]
+}
+
+/// How good the fit is and what its intervals rest on, in words.
+pub fn basis(fit: &SoilFit) -> String {
+    let rests = match fit.fit.basis {
+        Basis::Curves(n) => format!("intervals: each of {n} presses left out in turn"),
+        Basis::Pieces(n) => {
+            format!(
+                "intervals: each of {n} pieces of the curves left out in turn; too narrow, presses differ more"
+            )
+        }
+    };
+    let size =
+        if fit.fit.one_size { "; one size of plate only: the cohesive factor is set to 0" } else { "" };
+    format!("rms of ln(p/p_measured) {:.2} %; {rests}{size}", 100.0 * fit.fit.rms)
+}
+
+/// Everything for programs. `predicted` is (file, rms, readings).
+pub fn json(fit: &SoilFit, all: &[SoilFit], from: f64, predicted: Option<(&str, f64, usize)>) -> Value {
+    let (basis, groups) = match fit.fit.basis {
+        Basis::Curves(n) => ("curves", n),
+        Basis::Pieces(n) => ("pieces", n),
+    };
+    let finite = |x: f64| if x.is_finite() { value!(x) } else { Value::Null };
+    let parameters: serde_json::Map<_, _> = fit
+        .parameters
+        .iter()
+        .map(|p| {
+            let ends =
+                value!({ "value": p.value, "low": finite(p.interval.low), "high": finite(p.interval.high) });
+            (p.name.to_owned(), ends)
+        })
+        .collect();
+    let laws: serde_json::Map<_, _> = all.iter().map(|f| (f.law.to_owned(), value!(f.fit.rms))).collect();
+    value!({
+        "law": fit.law,
+        "parameters": parameters,
+        "rms": fit.fit.rms,
+        "from_m": from,
+        "intervals_from": { "basis": basis, "groups": groups, "confidence": 0.95 },
+        "rms_of_laws": laws,
+        "predicted": predicted.map(|(file, rms, readings)| value!({ "file": file, "rms": rms, "readings": readings })),
+    })
+}

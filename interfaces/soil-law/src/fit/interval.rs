@@ -1,0 +1,95 @@
+//! Confidence intervals of a fit. The readings of one press are no independent numbers: they err together. So whole
+//! curves are left out in turn (jackknife over groups; Efron and Tibshirani 1993, An Introduction to the
+//! Bootstrap, ch. 11) and the spread of the answers tells how well the numbers are known.
+
+use super::{FitLaw, Numbers, Reading, solve::solve, student};
+
+/// Probability that the interval holds the number.
+const CONFIDENCE: f64 = 0.95;
+/// Pieces of each curve where there are fewer than three curves.
+const PIECES: usize = 5;
+
+/// An interval; NaN ends: unknown.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Interval {
+    /// Lower end.
+    pub low: f64,
+    /// Upper end.
+    pub high: f64,
+}
+
+/// What intervals rest on.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Basis {
+    /// Whole curves were left out in turn, as many as there are.
+    Curves(usize),
+    /// There are fewer than three curves: pieces of them were left out, so many. How presses differ remains unknown,
+    /// and the intervals are too narrow.
+    Pieces(usize),
+}
+
+/// Intervals of A, B and n.
+pub fn intervals(law: &FitLaw, readings: &[Reading], both: bool, at: &Numbers) -> ([Interval; 3], Basis) {
+    let curves = groups(readings.iter().map(|r| r.curve).collect());
+    let (group_of, basis) = if curves.count >= 3 {
+        let basis = Basis::Curves(curves.count);
+        (curves, basis)
+    } else {
+        let pieces = groups(pieces(readings));
+        let basis = Basis::Pieces(pieces.count);
+        (pieces, basis)
+    };
+    let answers: Vec<Numbers> = (0..group_of.count)
+        .filter_map(|left_out| {
+            let rest = readings.iter().zip(&group_of.of).filter(|(_, g)| **g != left_out);
+            solve(law, &rest.map(|(r, _)| *r).collect::<Vec<_>>(), both).ok()
+        })
+        .collect();
+    let of = |pick: fn(&Numbers) -> f64| interval(&answers.iter().map(pick).collect::<Vec<_>>(), pick(at));
+    ([of(|n| n.cohesive), of(|n| n.frictional), of(|n| n.n)], basis)
+}
+
+fn interval(answers: &[f64], at: f64) -> Interval {
+    let count = answers.len() as f64;
+    if answers.len() < 2 {
+        return Interval { low: f64::NAN, high: f64::NAN };
+    }
+    let mean = answers.iter().sum::<f64>() / count;
+    let squares: f64 = answers.iter().map(|a| (a - mean) * (a - mean)).sum();
+    let error = ((count - 1.0) / count * squares).sqrt();
+    let half = student::quantile(0.5 + 0.5 * CONFIDENCE, count - 1.0) * error;
+    Interval { low: (at - half).max(0.0), high: at + half }
+}
+
+struct Groups {
+    /// Number of the group of each reading.
+    of: Vec<usize>,
+    count: usize,
+}
+
+/// Groups numbered from 0 in the order of their labels.
+fn groups(labels: Vec<usize>) -> Groups {
+    let mut known = labels.clone();
+    known.sort_unstable();
+    known.dedup();
+    let of = labels.iter().map(|l| known.binary_search(l).unwrap_or(0)).collect();
+    Groups { of, count: known.len() }
+}
+
+/// Labels of pieces of curves, each in the order of its readings.
+fn pieces(readings: &[Reading]) -> Vec<usize> {
+    let length = |curve: usize| readings.iter().filter(|r| r.curve == curve).count();
+    let mut seen: Vec<(usize, usize)> = Vec::new();
+    readings
+        .iter()
+        .map(|r| {
+            let place = seen.iter().position(|(curve, _)| *curve == r.curve).unwrap_or_else(|| {
+                seen.push((r.curve, 0));
+                seen.len() - 1
+            });
+            let number = seen[place].1;
+            seen[place].1 += 1;
+            PIECES * place + number * PIECES / length(r.curve)
+        })
+        .collect()
+}

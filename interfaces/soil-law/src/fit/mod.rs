@@ -1,0 +1,194 @@
+//! Pressure laws fitted to plate tests: least squares of ln p, with confidence intervals.
+//!
+//! Pressure over sinkage spans decades and its scatter grows with it, so the error of a fit is the root of the mean
+//! square of ln(p/p_measured), as Wong (1980, J. Terramechanics 17) weights his fits. All laws here have the form
+//! p = (A·u(b) + B·w(b))·x(z, b)ⁿ with A, B ≥ 0; see [`FitLaw`].
+
+mod interval;
+mod solve;
+mod student;
+
+pub use interval::{Basis, Interval};
+
+/// One reading of a plate test.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reading {
+    /// Number of the curve, one press of one plate, that it belongs to.
+    pub curve: usize,
+    /// Size of the contact in the law, m: radius of a disc, short side of a rectangle.
+    pub b: f64,
+    /// Sinkage, m, > 0.
+    pub depth: f64,
+    /// Pressure, Pa, > 0.
+    pub pressure: f64,
+}
+
+/// The laws that can be fitted; the factors A and B are found, see [`crate::PressureLaw`] for what they mean.
+#[derive(Clone, Copy, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum FitLaw {
+    /// p = (A/b + B)·zⁿ: A = k_c, B = k_φ.
+    Bekker,
+    /// p = (A + B·b)·(z/b)ⁿ: A = c·k_c', B = γ·k_φ'.
+    Reece,
+    /// p = (A + B·b)·(z/z_r)ⁿ: A = c·N_c, B = γ·N_γ.
+    Bearing {
+        /// z_r, m.
+        reference: f64,
+    },
+}
+
+impl FitLaw {
+    /// u, w and ln x of a reading.
+    fn terms(&self, b: f64, depth: f64) -> [f64; 3] {
+        match *self {
+            Self::Bekker => [1.0 / b, 1.0, libm::log(depth)],
+            Self::Reece => [1.0, b, libm::log(depth / b)],
+            Self::Bearing { reference } => [1.0, b, libm::log(depth / reference)],
+        }
+    }
+}
+
+/// The numbers of a law.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Numbers {
+    /// A, the cohesive factor.
+    pub cohesive: f64,
+    /// B, the frictional factor.
+    pub frictional: f64,
+    /// n.
+    pub n: f64,
+}
+
+impl Numbers {
+    /// ln p of the law at a size and a depth.
+    pub fn ln_pressure(&self, law: &FitLaw, b: f64, depth: f64) -> f64 {
+        let [u, w, x] = law.terms(b, depth);
+        libm::log(self.cohesive * u + self.frictional * w) + self.n * x
+    }
+
+    /// Root of the mean square of ln(p/p_measured).
+    pub fn rms(&self, law: &FitLaw, readings: &[Reading]) -> f64 {
+        let square = |r: &Reading| {
+            let e = self.ln_pressure(law, r.b, r.depth) - libm::log(r.pressure);
+            e * e
+        };
+        (readings.iter().map(square).sum::<f64>() / readings.len() as f64).sqrt()
+    }
+}
+
+/// A fitted law.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Fit {
+    /// The law.
+    pub law: FitLaw,
+    /// Its numbers.
+    pub numbers: Numbers,
+    /// 95 % confidence intervals of A, B and n.
+    pub intervals: [Interval; 3],
+    /// What the intervals rest on.
+    pub basis: Basis,
+    /// Root of the mean square of ln(p/p_measured) over the readings.
+    pub rms: f64,
+    /// Whether the readings hold one size only, so that A is set to 0.
+    pub one_size: bool,
+}
+
+/// Why nothing can be fitted.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum FitError {
+    /// Fewer than four readings with positive size, depth and pressure.
+    TooFew,
+    /// All readings have one depth: the exponent is free.
+    OneDepth,
+}
+
+impl std::fmt::Display for FitError {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.write_str(match self {
+            Self::TooFew => "fewer than four readings can be used",
+            Self::OneDepth => "all readings have the same sinkage: the exponent n cannot be found",
+        })
+    }
+}
+
+impl std::error::Error for FitError {}
+
+/// Fits `law` to the readings. With `cohesion` false, or where all readings have one size, A = 0.
+pub fn fit(law: FitLaw, readings: &[Reading], cohesion: bool) -> Result<Fit, FitError> {
+    let first = readings.first().ok_or(FitError::TooFew)?;
+    let one_size = readings.iter().all(|r| (r.b / first.b - 1.0).abs() < 1e-6);
+    let both = cohesion && !one_size;
+    let numbers = solve::solve(&law, readings, both)?;
+    let (intervals, basis) = interval::intervals(&law, readings, both, &numbers);
+    Ok(Fit { law, numbers, intervals, basis, rms: numbers.rms(&law, readings), one_size })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Curves of a law, each scaled by its own factor, as trials scatter.
+    fn curves(law: FitLaw, numbers: Numbers, factors: &[f64]) -> Vec<Reading> {
+        let mut all = Vec::new();
+        for (curve, factor) in factors.iter().enumerate() {
+            let b = [0.03, 0.05][curve % 2];
+            for k in 3..30 {
+                let depth = 1e-3 * f64::from(k);
+                let pressure = factor * libm::exp(numbers.ln_pressure(&law, b, depth));
+                all.push(Reading { curve, b, depth, pressure });
+            }
+        }
+        all
+    }
+
+    const LAWS: [FitLaw; 3] = [FitLaw::Bekker, FitLaw::Reece, FitLaw::Bearing { reference: 0.1 }];
+
+    #[test]
+    fn what_a_law_has_drawn_is_found_again() {
+        for law in LAWS {
+            let numbers = Numbers { cohesive: 4.2e4, frictional: 1.3e6, n: 0.87 };
+            let found = fit(law, &curves(law, numbers, &[1.0; 4]), true).unwrap();
+            let relative = |a: f64, b: f64| (a / b - 1.0).abs();
+            assert!(relative(found.numbers.cohesive, numbers.cohesive) < 1e-6, "{law:?} {found:?}");
+            assert!(relative(found.numbers.frictional, numbers.frictional) < 1e-6, "{law:?} {found:?}");
+            assert!(relative(found.numbers.n, numbers.n) < 1e-8 && found.rms < 1e-8, "{law:?} {found:?}");
+        }
+    }
+
+    #[test]
+    fn trials_that_scatter_widen_the_intervals_and_they_hold_the_truth() {
+        let law = FitLaw::Bearing { reference: 0.1 };
+        let numbers = Numbers { cohesive: 3e4, frictional: 6e6, n: 1.3 };
+        let narrow = fit(law, &curves(law, numbers, &[1.01, 0.99, 0.99, 1.01, 1.0, 1.0]), true).unwrap();
+        let wide = fit(law, &curves(law, numbers, &[1.1, 0.92, 0.9, 1.08, 1.0, 0.97]), true).unwrap();
+        let width = |f: &Fit| f.intervals[1].high - f.intervals[1].low;
+        assert!(width(&wide) > 5.0 * width(&narrow) && width(&narrow) > 0.0);
+        for f in [narrow, wide] {
+            assert_eq!(f.basis, Basis::Curves(6));
+            assert!(f.intervals[1].low < 6e6 && 6e6 < f.intervals[1].high, "{f:?}");
+        }
+    }
+
+    #[test]
+    fn factors_are_never_negative_and_one_size_cannot_tell_them_apart() {
+        // pressure falls faster with 1/size than the cohesive term alone can follow
+        let law = FitLaw::Bekker;
+        let mut readings = curves(law, Numbers { cohesive: 0.0, frictional: 1e6, n: 1.0 }, &[1.0, 2.0]);
+        let found = fit(law, &readings, true).unwrap();
+        assert_eq!(found.numbers.cohesive, 0.0);
+        assert!(found.rms > 0.3);
+        readings.retain(|r| r.curve == 0);
+        let single = fit(law, &readings, true).unwrap();
+        assert!(single.one_size && single.numbers.cohesive == 0.0 && single.rms < 1e-12);
+    }
+
+    #[test]
+    fn too_little_is_refused() {
+        let reading = Reading { curve: 0, b: 0.03, depth: 0.01, pressure: 1e4 };
+        assert_eq!(fit(FitLaw::Bekker, &[], true), Err(FitError::TooFew));
+        assert_eq!(fit(FitLaw::Bekker, &[reading; 3], true), Err(FitError::TooFew));
+        assert_eq!(fit(FitLaw::Bekker, &[reading; 9], true), Err(FitError::OneDepth));
+    }
+}

@@ -1,0 +1,52 @@
+"""A soil from plate tests: fitted, written, drawn, predicted on unseen tests, and run."""
+
+import csv
+import json
+
+from conftest import ROOT, terraglue
+
+PLATES = ROOT / "tests" / "reference" / "terramechanics" / "cmu_plate_pressure_sinkage_d60_d100.csv"
+
+
+def test_fit_predict_and_use(tmp_path):
+    rows = list(csv.DictReader(PLATES.open()))
+    seen, unseen = tmp_path / "seen.csv", tmp_path / "unseen.csv"
+    for path, box in ((seen, "f-d-large-box"), (unseen, None)):
+        chosen = [r for r in rows if (r["box"] == "f-d-large-box") == (box is not None)]
+        with path.open("w", newline="") as file:
+            writer = csv.DictWriter(file, rows[0].keys())
+            writer.writeheader()
+            writer.writerows(chosen)
+    out = tmp_path / "soil.toml"
+    process = terraglue("fit-soil", seen, "--law", "bearing", "--soil", "CMU_Direct90_s0",
+                        "--out", out, "--predict", unseen, "--json")
+    assert process.returncode == 0, process.stderr
+    found = json.loads(process.stdout)
+    assert found["rms"] < 0.12 and found["predicted"]["rms"] < 0.2
+    n = found["parameters"]["n"]
+    assert n["low"] < n["value"] < n["high"] and 1.1 < n["value"] < 1.5
+    assert found["intervals_from"] == {"basis": "curves", "groups": 6, "confidence": 0.95}
+    drawing = (tmp_path / "soil.svg").read_text()
+    assert drawing.count("<circle") > 250 and drawing.count("<polyline") == 2
+    (tmp_path / "models").symlink_to(ROOT / "models")
+    (tmp_path / "scenarios").mkdir()
+    scenario = tmp_path / "scenarios" / "plate.toml"
+    text = (ROOT / "scenarios" / "plate_sinkage.toml").read_text()
+    old = next(line for line in text.splitlines() if line.startswith("parameters ="))
+    scenario.write_text(text.replace(old, 'parameters = "../soil.toml"', 1))
+    assert terraglue("check", scenario).returncode == 0, terraglue("check", scenario).stderr
+
+
+def test_what_is_missing_is_said(tmp_path):
+    process = terraglue("fit-soil", PLATES, "--law", "reece")
+    assert process.returncode == 2 and "--cohesion-pa" in process.stderr
+    bad = tmp_path / "bad.csv"
+    bad.write_text("depth,load\n1,2\n")
+    process = terraglue("fit-soil", bad, "--law", "bekker")
+    assert process.returncode == 2 and "sinkage_mm" in process.stderr and "depth, load" in process.stderr
+
+
+def test_one_soil():
+    shown = terraglue("soils", "Toyoura_sand_Ishigami")
+    assert shown.returncode == 0 and "ambiguous" in shown.stdout and "confidence" in shown.stdout
+    assert "no soil is called" in terraglue("soils", "cheese").stderr

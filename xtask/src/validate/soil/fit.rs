@@ -1,0 +1,43 @@
+//! Real plates: the laws fitted to the presses of two discs into Direct-90 sand, and what one box says of the other.
+
+use crate::process::{Outcome, root};
+use crate::validate::{Context, Figure, Limit};
+use terraglue::soil_fit::{Known, fit_law, read};
+use terraglue_soil_law::fit::{FitLaw, Reading, fit};
+
+const FILE: &str = "tests/reference/terramechanics/cmu_plate_pressure_sinkage_d60_d100.csv";
+/// Below this sinkage the plates are not seated, m.
+const FROM: f64 = 3e-3;
+/// Direct-90 sand: density measured, cohesion as in the source of the data.
+const SAND: Known = Known { c_pa: Some(1000.0), phi_rad: None, shear_m: None, density: Some(1330.0) };
+
+/// All figures.
+pub fn figures(_: &Context) -> Outcome<Vec<Figure>> {
+    let tests = read(&root().join(FILE), FROM).map_err(|e| e.to_string())?;
+    let mut all = Vec::new();
+    for (law, limit) in [("bearing", Limit::AtMost(10.0)), ("reece", Limit::None), ("bekker", Limit::None)] {
+        let fitted = fit_law(law, &tests, SAND).map_err(|e| e.to_string())?;
+        let what = format!(
+            "rms of ln(p/p_measured), %, law `{law}` with one set for discs of 60 and 100 mm, {} readings",
+            tests.readings.len()
+        );
+        all.push(Figure::new(format!("soil.fit.{law}"), 100.0 * fitted.fit.rms, limit, what));
+    }
+    all.push(unseen_presses(&tests.readings)?);
+    Ok(all)
+}
+
+/// Fit to all presses but one, error on that one; the worst.
+fn unseen_presses(readings: &[Reading]) -> Outcome<Figure> {
+    let law = FitLaw::Bearing { reference: terraglue::soil_fit::REFERENCE_DEPTH };
+    let presses = readings.iter().map(|r| r.curve + 1).max().unwrap_or(0);
+    let mut worst = 0.0_f64;
+    for press in 0..presses {
+        let (unseen, seen): (Vec<Reading>, Vec<Reading>) = readings.iter().partition(|r| r.curve == press);
+        let numbers = fit(law, &seen, true).map_err(|e| e.to_string())?.numbers;
+        worst = worst.max(numbers.rms(&law, &unseen));
+    }
+    let what =
+        format!("largest rms of ln(p/p_measured), %, on a press left out of the fit, {presses} presses");
+    Ok(Figure::new("soil.fit.unseen_press", 100.0 * worst, Limit::None, what))
+}

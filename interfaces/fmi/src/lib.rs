@@ -11,6 +11,7 @@
 mod archive;
 mod binary;
 pub mod description;
+pub mod export;
 mod error;
 mod fmu;
 pub mod slave;

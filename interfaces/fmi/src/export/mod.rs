@@ -1,0 +1,65 @@
+//! A subsystem as a functional mock-up unit: its variables as those of FMI 2.0 or 3.0, its description, its life.
+//!
+//! Everything here is safe Rust and knows no pointer. [`Component`] is an instance as the standards see it: phases,
+//! value references, saved states, the log. [`describe`] writes `modelDescription.xml` from the variables, and
+//! [`pack`] the archive. The functions of the C interfaces, which wrap a [`Component`], stand in the library that goes
+//! into the archive.
+
+mod component;
+mod describe;
+mod layout;
+mod pack;
+mod states;
+mod values;
+mod xml;
+
+pub use component::{Component, Mailbox, Open, Opened, Opening, Phase, Reached};
+pub use describe::{About, describe, identifier};
+pub use layout::{Entry, Layout};
+pub use pack::{Content, pack};
+pub use states::Handle;
+pub use values::Value;
+
+/// What a call of a unit did not do, with the status that the standards give it.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wrong {
+    /// Status.
+    pub status: Status,
+    /// Why, for the log.
+    pub text: String,
+}
+
+/// Status of a call; the numbers are those of both standards.
+#[repr(i32)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Status {
+    /// Done.
+    Ok = 0,
+    /// Done, but look at the log.
+    Warning = 1,
+    /// The step was not done to its end.
+    Discard = 2,
+    /// Not done.
+    Error = 3,
+    /// Not done; nothing of the instance may be called any more.
+    Fatal = 4,
+}
+
+/// Outcome of a call.
+pub type Answer<T = ()> = std::result::Result<T, Wrong>;
+
+/// A call that was not done, for this reason.
+pub fn wrong<T>(text: impl Into<String>) -> Answer<T> {
+    Err(Wrong { status: Status::Error, text: text.into() })
+}
+
+impl From<terraglue_subsystem::Error> for Wrong {
+    fn from(error: terraglue_subsystem::Error) -> Self {
+        let status = match &error {
+            terraglue_subsystem::Error::Fatal(_) => Status::Fatal,
+            terraglue_subsystem::Error::Discard { .. } => Status::Discard,
+            _ => Status::Error,
+        };
+        Self { status, text: error.to_string() }
+    }
+}

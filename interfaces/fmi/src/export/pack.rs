@@ -1,0 +1,56 @@
+//! Writes the archive of a unit.
+
+use std::fs::File;
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use zip::write::SimpleFileOptions;
+
+/// What an entry of the archive holds.
+#[derive(Clone, Debug)]
+pub enum Content {
+    /// Text.
+    Text(String),
+    /// Bytes.
+    Bytes(Vec<u8>),
+    /// A copy of a file.
+    File(PathBuf),
+}
+
+/// Writes an archive with these entries, in their order. The same content gives the same bytes: no time is written.
+///
+/// # Errors
+/// What cannot be read or written, with its path.
+pub fn pack(path: &Path, entries: &[(String, Content)]) -> Result<(), String> {
+    let failed = |what: &Path, e: &dyn std::fmt::Display| format!("{}: {e}", what.display());
+    let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    // a name of its own until it is whole
+    let part = tempfile::Builder::new().prefix(".unit").tempfile_in(folder);
+    let part = part.map_err(|e| failed(path, &e))?;
+    let file = part.as_file().try_clone().map_err(|e| failed(path, &e))?;
+    let mut archive = zip::ZipWriter::new(BufWriter::new(file));
+    for (name, content) in entries {
+        let library = name.starts_with("binaries/") || name.ends_with(".so");
+        let options = SimpleFileOptions::default()
+            .compression_method(zip::CompressionMethod::Deflated)
+            .unix_permissions(if library { 0o755 } else { 0o644 });
+        archive.start_file(name.as_str(), options).map_err(|e| failed(path, &e))?;
+        match content {
+            Content::Text(text) => archive.write_all(text.as_bytes()).map_err(|e| failed(path, &e))?,
+            Content::Bytes(bytes) => archive.write_all(bytes).map_err(|e| failed(path, &e))?,
+            Content::File(source) => {
+                let mut file = File::open(source).map_err(|e| failed(source, &e))?;
+                std::io::copy(&mut file, &mut archive).map_err(|e| failed(source, &e))?;
+            }
+        }
+    }
+    let mut file = archive.finish().map_err(|e| failed(path, &e))?;
+    file.flush().map_err(|e| failed(path, &e))?;
+    let kept = part.persist(path).map_err(|e| failed(path, &e))?;
+    readable(&kept).map_err(|e| failed(path, &e))
+}
+
+/// Temporary files are the owner's alone; a unit is for everybody.
+fn readable(file: &File) -> std::io::Result<()> {
+    use std::os::unix::fs::PermissionsExt;
+    file.set_permissions(std::fs::Permissions::from_mode(0o644))
+}

@@ -19,6 +19,7 @@ use std::time::Instant as Clock;
 use terraglue_subsystem::{BodyState, Energy, Input, Motion, Response, Step};
 
 mod build;
+mod hosted;
 
 /// How often a step may be halved before the run stops.
 const MAX_HALVINGS: u32 = 4;
@@ -67,6 +68,8 @@ pub struct Testbed {
     contact_margin_m: f64,
     cancel: Arc<AtomicBool>,
     step_s: f64,
+    /// Time of nominal step 0, s: 0 unless the length of the steps has been changed on the way.
+    origin_s: f64,
     /// Nominal steps done.
     nominal: u64,
     /// Communication steps done, halves counted.
@@ -82,11 +85,20 @@ pub struct Testbed {
 #[derive(Clone, Debug)]
 pub struct Snapshot {
     slot: u32,
+    clock: TimeKept,
+    fired: Vec<bool>,
+    closed: Vec<u64>,
+}
+
+/// What a testbed knows of its time.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct TimeKept {
+    step_s: f64,
+    origin_s: f64,
     nominal: u64,
     index: u64,
     t: f64,
-    fired: Vec<bool>,
-    closed: Vec<u64>,
+    started: bool,
 }
 
 impl Testbed {
@@ -121,7 +133,7 @@ impl Testbed {
             self.started = true;
             self.start_joints()?;
         }
-        let end = (self.nominal + 1) as f64 * self.step_s;
+        let end = self.origin_s + (self.nominal + 1) as f64 * self.step_s;
         let mut h = self.step_s;
         self.halvings = 0;
         while end - self.t > 1e-6 * self.step_s {
@@ -399,9 +411,7 @@ impl Testbed {
         self.instances.iter_mut().try_for_each(|i| i.save_state(slot))?;
         Ok(Snapshot {
             slot,
-            nominal: self.nominal,
-            index: self.index,
-            t: self.t,
+            clock: self.time_kept(),
             fired: self.time_line.fired(),
             closed: self.group.as_ref().map(|g| g.closed.clone()).unwrap_or_default(),
         })
@@ -410,7 +420,12 @@ impl Testbed {
     /// Back to a snapshot, exactly.
     pub fn restore(&mut self, snapshot: &Snapshot) -> Result {
         self.instances.iter_mut().try_for_each(|i| i.restore_state(snapshot.slot))?;
-        (self.nominal, self.index, self.t) = (snapshot.nominal, snapshot.index, snapshot.t);
+        self.restore_rest(snapshot)
+    }
+
+    /// What a snapshot holds beside the states of the instances.
+    fn restore_rest(&mut self, snapshot: &Snapshot) -> Result {
+        self.set_time(snapshot.clock);
         self.time_line.set_fired(&snapshot.fired);
         if let Some(group) = &mut self.group {
             group.closed.clone_from(&snapshot.closed);

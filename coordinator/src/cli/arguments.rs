@@ -53,6 +53,8 @@ pub enum Command {
     /// Run, show or check a functional mock-up unit (FMI 2.0 and 3.0, co-simulation).
     #[command(subcommand)]
     Fmu(FmuCommand),
+    /// Write a module or a scenario as a functional mock-up unit for other programs.
+    Export(ExportArguments),
     /// Make the folder of a new module that builds and runs at once.
     New(NewArguments),
     /// Find the parameters of a soil from plate tests.
@@ -106,6 +108,39 @@ pub struct RunArguments {
     #[arg(long)]
     pub json: bool,
 }
+
+/// What `export` takes.
+#[derive(Args, Debug, Clone)]
+#[command(after_help = EXPORT_EXAMPLES)]
+pub struct ExportArguments {
+    /// A scenario file (TOML) or the name of a module.
+    #[arg(value_name = "MODULE|SCENARIO")]
+    pub target: String,
+    /// The unit to write.
+    #[arg(short, long, value_name = "FILE.fmu")]
+    pub output: PathBuf,
+    /// Version of the standard.
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u8).range(2..=3))]
+    pub fmi: u8,
+    /// Show arrays element by element in FMI 3 too; FMI 2 has no arrays.
+    #[arg(long)]
+    pub scalars: bool,
+    /// Edit the scenario before it is exported; a bare word is text. May be repeated.
+    #[arg(long = "set", value_name = "KEY.PATH=VALUE", value_parser = parse_set)]
+    pub sets: Vec<(String, String)>,
+    /// Search this folder for modules first; may be repeated.
+    #[arg(long, value_name = "DIR")]
+    pub module_path: Vec<PathBuf>,
+}
+
+const EXPORT_EXAMPLES: &str = "\
+Examples:
+  terraglue export soil-bekker -o soil.fmu --set soil.parameters=LETE_sand --set foot.count=6
+  terraglue export rigid-body -o robot.fmu --fmi 2 --set robot.model=models/hexapod.urdf
+  terraglue export scenarios/moon_walk.toml -o walk.fmu
+
+A module is exported inside a small scenario: [time], [world], and [robot], [unit] or, for a soil, [soil] with
+[terrain], [gluing] and [foot] (count, shape, radius_m, half_extents_m, …). --set changes any key of it.";
 
 /// What `new` takes.
 #[derive(Args, Debug, Clone)]

@@ -6,6 +6,7 @@ mod arguments;
 mod check;
 mod compare;
 mod fit_soil;
+mod export;
 mod fmu;
 mod folder;
 mod interrupt;
@@ -60,6 +61,7 @@ pub fn main() -> ExitCode {
         Command::Modules { module_path, json } => list::modules(&module_path, json),
         Command::Variables(arguments) => list::variables(&arguments),
         Command::Fmu(command) => fmu::fmu(&command),
+        Command::Export(arguments) => export::export(&arguments),
         Command::New(arguments) => new::new(&arguments),
         Command::Soils { name, file } => soils::soils(name.as_deref(), file.as_deref()),
         Command::FitSoil(arguments) => fit_soil::fit_soil(&arguments),

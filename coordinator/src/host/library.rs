@@ -147,13 +147,19 @@ fn cause(error: &libloading::Error) -> String {
 }
 
 /// Modules by name: those linked into the program first, then those on the search path.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub struct Library {
     builtins: Vec<LoadedModule>,
 }
 
+impl Default for Library {
+    fn default() -> Self {
+        Self { builtins: vec![LoadedModule::builtin::<crate::fmu::Feet>()] }
+    }
+}
+
 impl Library {
-    /// Nothing linked in.
+    /// What the coordinator itself brings: `feet`.
     pub fn new() -> Self {
         Self::default()
     }

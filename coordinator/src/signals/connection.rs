@@ -21,6 +21,11 @@ pub struct Link {
 }
 
 impl Link {
+    /// Whether it feeds a variable of a subsystem.
+    pub fn feeds(&self, slot: usize, id: u32) -> bool {
+        self.to == slot && self.to_ids.contains(&id)
+    }
+
     /// Copies the committed values.
     pub fn transfer(&mut self, instances: &mut [Instance]) -> Result {
         instances[self.from].get(&self.from_ids, ValuesMut::F64(&mut self.values))?;

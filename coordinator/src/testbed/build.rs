@@ -23,6 +23,16 @@ impl Testbed {
 
     /// The same; modules linked into the program come first.
     pub fn build_with(scenario: &Scenario, options: &Options, library: &Library) -> Result<Self> {
+        Self::build_hosted(scenario, options, library, |services| services)
+    }
+
+    /// The same with services that the caller changes: the log, the number of states that can be kept.
+    pub(crate) fn build_hosted(
+        scenario: &Scenario,
+        options: &Options,
+        library: &Library,
+        change: impl FnOnce(HostServices) -> HostServices,
+    ) -> Result<Self> {
         let terrain: Option<Arc<dyn Terrain>> = match &scenario.terrain {
             Some(spec) => Some(Arc::from(terrain::build(spec, scenario.world.seed)?)),
             None => None,
@@ -34,6 +44,7 @@ impl Testbed {
             cancel: options.cancel.clone(),
             ..HostServices::new(scenario.world.seed, &scenario.folder)
         };
+        let services = change(services);
         let instances = instantiate(scenario, options, library, &services)?;
         let directory = Directory::new(&instances);
         let links = signals::connect(&scenario.connections, &directory, &instances, &scenario.source)?;
@@ -56,6 +67,7 @@ impl Testbed {
             timings: Timings::default(),
             cancel: options.cancel.clone(),
             step_s: scenario.time.step_s,
+            origin_s: 0.0,
             nominal: 0,
             index: 0,
             t: 0.0,

@@ -1,0 +1,113 @@
+//! A testbed inside another program: its time, its state as bytes, its instances by number.
+
+use super::{Snapshot, Testbed, TimeKept};
+use crate::host::Instance;
+use crate::{Error, Result};
+use serde_json::{Value, json};
+
+impl Testbed {
+    pub(super) fn time_kept(&self) -> TimeKept {
+        TimeKept {
+            step_s: self.step_s,
+            origin_s: self.origin_s,
+            nominal: self.nominal,
+            index: self.index,
+            t: self.t,
+            started: self.started,
+        }
+    }
+
+    pub(super) fn set_time(&mut self, kept: TimeKept) {
+        (self.step_s, self.origin_s) = (kept.step_s, kept.origin_s);
+        (self.nominal, self.index, self.t) = (kept.nominal, kept.index, kept.t);
+        self.started = kept.started;
+    }
+
+    /// Length of a nominal step, s.
+    pub(crate) fn step_s(&self) -> f64 {
+        self.step_s
+    }
+
+    /// Steps have this length from now on, s. Steps of the scenario's own length stay on its grid of times.
+    pub(crate) fn set_step_s(&mut self, step_s: f64) {
+        let on_grid = self.nominal as f64 * step_s;
+        let off = (self.t - on_grid).abs() > 1e-12 * self.t.abs().max(step_s);
+        self.origin_s = if off { self.t - on_grid } else { 0.0 };
+        self.step_s = step_s;
+    }
+
+    /// Whether all subsystems make every step, so that its length may change.
+    pub(crate) fn takes_any_step(&self) -> bool {
+        self.members.iter().all(|m| m.step_multiple == 1)
+    }
+
+    /// An instance by its number, to set its values.
+    pub(crate) fn instance_mut(&mut self, slot: usize) -> &mut Instance {
+        &mut self.instances[slot]
+    }
+
+    /// Whether a connection feeds a variable.
+    pub(crate) fn is_fed(&self, slot: usize, id: u32) -> bool {
+        self.links.iter().any(|l| l.feeds(slot, id))
+    }
+
+    /// Reads the motion of all bodies again after values were set from outside.
+    pub(crate) fn refresh(&mut self) -> Result {
+        self.happenings.clear();
+        self.read_states()
+    }
+
+    /// The committed state of everything as bytes: a line of JSON, then those of every instance.
+    pub(crate) fn serialize(&self) -> Result<Vec<u8>> {
+        let parts = self.instances.iter().map(Instance::serialize).collect::<Result<Vec<_>>>()?;
+        let kept = self.time_kept();
+        let bits = [kept.step_s, kept.origin_s, kept.t].map(f64::to_bits);
+        let head = json!({
+            "bits": bits,
+            "counts": [kept.nominal, kept.index],
+            "started": kept.started,
+            "fired": self.time_line.fired(),
+            "closed": self.group.as_ref().map(|g| g.closed.as_slice()).unwrap_or_default(),
+            "lengths": parts.iter().map(Vec::len).collect::<Vec<_>>(),
+        });
+        let mut out = head.to_string().into_bytes();
+        out.push(b'\n');
+        parts.iter().for_each(|part| out.extend(part));
+        Ok(out)
+    }
+
+    /// Back to a state made by [`Testbed::serialize`] of the same scenario.
+    pub(crate) fn deserialize(&mut self, bytes: &[u8]) -> Result {
+        let wrong = || Error::Simulation { time_s: self.t, message: "these bytes are no state of this run".into() };
+        let (head, lengths, mut rest) = split(bytes, self.instances.len()).ok_or_else(wrong)?;
+        let (kept, fired, closed) = read_head(&head).ok_or_else(wrong)?;
+        for (instance, length) in self.instances.iter_mut().zip(lengths) {
+            let (part, after) = rest.split_at(length);
+            instance.deserialize(part)?;
+            rest = after;
+        }
+        self.restore_rest(&Snapshot { slot: 0, clock: kept, fired, closed })
+    }
+}
+
+/// Head, lengths of the parts, and the parts, where they fit together.
+fn split(bytes: &[u8], count: usize) -> Option<(Value, Vec<usize>, &[u8])> {
+    let end = bytes.iter().position(|b| *b == b'\n')?;
+    let head: Value = serde_json::from_slice(&bytes[..end]).ok()?;
+    let lengths: Option<Vec<usize>> =
+        head["lengths"].as_array()?.iter().map(|x| x.as_u64().map(|x| x as usize)).collect();
+    let (lengths, rest) = (lengths?, &bytes[end + 1..]);
+    let sum = lengths.iter().try_fold(0_usize, |sum, x| sum.checked_add(*x))?;
+    (lengths.len() == count && sum == rest.len()).then_some((head, lengths, rest))
+}
+
+fn read_head(head: &Value) -> Option<(TimeKept, Vec<bool>, Vec<u64>)> {
+    let numbers = |key: &str| -> Option<Vec<u64>> { head[key].as_array()?.iter().map(Value::as_u64).collect() };
+    let (bits, counts) = (numbers("bits")?, numbers("counts")?);
+    let (&[step, origin, t], &[nominal, index]) = (bits.as_slice(), counts.as_slice()) else { return None };
+    let fired: Option<Vec<bool>> = head["fired"].as_array()?.iter().map(Value::as_bool).collect();
+    let [step_s, origin_s, t] = [step, origin, t].map(f64::from_bits);
+    let good = [step_s, origin_s, t].iter().all(|x| x.is_finite()) && step_s > 0.0;
+    let kept = TimeKept { step_s, origin_s, nominal, index, t, started: head["started"].as_bool()? };
+    good.then_some((kept, fired?, numbers("closed")?))
+}

@@ -4,9 +4,12 @@ use crate::process::{Outcome, cargo, must, root, target};
 use std::path::Path;
 use terraglue::scenario::SHIPPED_MODULES;
 
+/// The library inside exported units.
+const UNIT: &str = "libterraglue_unit.so";
+
 /// Builds in the release profile and copies what a user needs.
 pub fn install(prefix: &Path) -> Outcome {
-    must(&mut cargo(&["build", "--release", "--package", "terraglue"]))?;
+    must(&mut cargo(&["build", "--release", "--package", "terraglue", "--package", "terraglue-unit"]))?;
     let release = target().join("release");
     copy(&release.join("terraglue"), &prefix.join("bin/terraglue"))?;
     for module in SHIPPED_MODULES {
@@ -16,6 +19,7 @@ pub fn install(prefix: &Path) -> Outcome {
         let built = built.iter().find(|f| f.is_file()).ok_or_else(|| format!("{file} was not built"))?;
         copy(built, &prefix.join("lib/terraglue").join(&file))?;
     }
+    copy(&release.join(UNIT), &prefix.join("lib/terraglue").join(UNIT))?;
     copy_files(&root().join("interfaces/plugin/include"), &prefix.join("include"))?;
     copy_files(&root().join("models"), &prefix.join("share/terraglue/models"))?;
     copy_files(&root().join("scenarios"), &prefix.join("share/terraglue/scenarios"))?;

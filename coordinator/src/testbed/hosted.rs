@@ -78,7 +78,8 @@ impl Testbed {
 
     /// Back to a state made by [`Testbed::serialize`] of the same scenario.
     pub(crate) fn deserialize(&mut self, bytes: &[u8]) -> Result {
-        let wrong = || Error::Simulation { time_s: self.t, message: "these bytes are no state of this run".into() };
+        let wrong =
+            || Error::Simulation { time_s: self.t, message: "these bytes are no state of this run".into() };
         let (head, lengths, mut rest) = split(bytes, self.instances.len()).ok_or_else(wrong)?;
         let (kept, fired, closed) = read_head(&head).ok_or_else(wrong)?;
         for (instance, length) in self.instances.iter_mut().zip(lengths) {
@@ -102,7 +103,8 @@ fn split(bytes: &[u8], count: usize) -> Option<(Value, Vec<usize>, &[u8])> {
 }
 
 fn read_head(head: &Value) -> Option<(TimeKept, Vec<bool>, Vec<u64>)> {
-    let numbers = |key: &str| -> Option<Vec<u64>> { head[key].as_array()?.iter().map(Value::as_u64).collect() };
+    let numbers =
+        |key: &str| -> Option<Vec<u64>> { head[key].as_array()?.iter().map(Value::as_u64).collect() };
     let (bits, counts) = (numbers("bits")?, numbers("counts")?);
     let (&[step, origin, t], &[nominal, index]) = (bits.as_slice(), counts.as_slice()) else { return None };
     let fired: Option<Vec<bool>> = head["fired"].as_array()?.iter().map(Value::as_bool).collect();

@@ -40,7 +40,13 @@ impl Log {
         unsafe {
             match &self.logger {
                 Logger::Two(f) => {
-                    f(self.environment, self.name.as_ptr(), status as c_int, category.as_ptr(), text.as_ptr());
+                    f(
+                        self.environment,
+                        self.name.as_ptr(),
+                        status as c_int,
+                        category.as_ptr(),
+                        text.as_ptr(),
+                    );
                 }
                 Logger::Three(f) => f(self.environment, status as c_int, category.as_ptr(), text.as_ptr()),
                 Logger::None => {}
@@ -208,7 +214,11 @@ pub fn resources(given: Option<String>) -> Result<PathBuf, String> {
         Some(rest) => decoded(rest.strip_prefix("//localhost").or(rest.strip_prefix("//")).unwrap_or(rest))?,
     };
     let path = PathBuf::from(path);
-    if path.is_dir() { Ok(path) } else { Err(format!("the folder of resources `{}` is not there", path.display())) }
+    if path.is_dir() {
+        Ok(path)
+    } else {
+        Err(format!("the folder of resources `{}` is not there", path.display()))
+    }
 }
 
 /// Replaces `%20` and its like.

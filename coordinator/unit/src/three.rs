@@ -17,7 +17,12 @@ pub extern "C" fn fmi3GetVersion() -> Text {
 }
 
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetDebugLogging(c: Component, on: bool, _n: usize, _names: *const Text) -> c_int {
+pub unsafe extern "C" fn fmi3SetDebugLogging(
+    c: Component,
+    on: bool,
+    _n: usize,
+    _names: *const Text,
+) -> c_int {
     // SAFETY: by the contract of the standard, here and in all functions below.
     unsafe {
         call(c, |i| {
@@ -221,7 +226,13 @@ fn get_with_time(unit: &Unit, mut references: &[u32], mut out: &mut [f64]) -> An
 }
 
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetFloat64(c: Component, vr: Refs, n: usize, values: *const f64, m: usize) -> c_int {
+pub unsafe extern "C" fn fmi3SetFloat64(
+    c: Component,
+    vr: Refs,
+    n: usize,
+    values: *const f64,
+    m: usize,
+) -> c_int {
     // SAFETY: as above.
     unsafe { call(c, |i| i.component.set(slice(vr, n)?, &[ValueType::F64], slice(values, m)?)) }
 }
@@ -240,7 +251,13 @@ pub unsafe extern "C" fn fmi3GetBoolean(c: Component, vr: Refs, n: usize, out: *
 }
 
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetBoolean(c: Component, vr: Refs, n: usize, values: *const u8, m: usize) -> c_int {
+pub unsafe extern "C" fn fmi3SetBoolean(
+    c: Component,
+    vr: Refs,
+    n: usize,
+    values: *const u8,
+    m: usize,
+) -> c_int {
     // SAFETY: as above; a byte that is neither 0 nor 1 would be no bool.
     unsafe {
         call(c, |i| {
@@ -265,7 +282,13 @@ pub unsafe extern "C" fn fmi3GetString(c: Component, vr: Refs, n: usize, out: *m
 }
 
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SetString(c: Component, vr: Refs, n: usize, values: *const Text, m: usize) -> c_int {
+pub unsafe extern "C" fn fmi3SetString(
+    c: Component,
+    vr: Refs,
+    n: usize,
+    values: *const Text,
+    m: usize,
+) -> c_int {
     // SAFETY: as above.
     unsafe {
         call(c, |i| {
@@ -345,7 +368,12 @@ pub unsafe extern "C" fn fmi3SerializedFMUStateSize(c: Component, state: State, 
 }
 
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi3SerializeFMUState(c: Component, state: State, out: *mut u8, size: usize) -> c_int {
+pub unsafe extern "C" fn fmi3SerializeFMUState(
+    c: Component,
+    state: State,
+    out: *mut u8,
+    size: usize,
+) -> c_int {
     // SAFETY: as above.
     unsafe { crate::instance::serialise(c, state, out, size) }
 }

@@ -10,14 +10,8 @@ type State = *mut c_void;
 type Text = *const c_char;
 
 const REAL: &[ValueType] = &[ValueType::F64, ValueType::F32];
-const INTEGER: &[ValueType] = &[
-    ValueType::I32,
-    ValueType::I8,
-    ValueType::I16,
-    ValueType::U8,
-    ValueType::U16,
-    ValueType::Enumeration,
-];
+const INTEGER: &[ValueType] =
+    &[ValueType::I32, ValueType::I8, ValueType::I16, ValueType::U8, ValueType::U16, ValueType::Enumeration];
 const BOOLEAN: &[ValueType] = &[ValueType::Bool];
 const STRING: &[ValueType] = &[ValueType::String];
 /// `fmi2CoSimulation`.
@@ -44,7 +38,12 @@ pub extern "C" fn fmi2GetVersion() -> Text {
 }
 
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetDebugLogging(c: Component, on: c_int, _n: usize, _names: *const Text) -> c_int {
+pub unsafe extern "C" fn fmi2SetDebugLogging(
+    c: Component,
+    on: c_int,
+    _n: usize,
+    _names: *const Text,
+) -> c_int {
     // SAFETY: by the contract of the standard, here and in all functions below.
     unsafe {
         call(c, |i| {
@@ -194,7 +193,12 @@ pub unsafe extern "C" fn fmi2SetBoolean(
 }
 
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SetString(c: Component, vr: *const c_uint, n: usize, values: *const Text) -> c_int {
+pub unsafe extern "C" fn fmi2SetString(
+    c: Component,
+    vr: *const c_uint,
+    n: usize,
+    values: *const Text,
+) -> c_int {
     // SAFETY: as above.
     unsafe {
         call(c, |i| {
@@ -306,7 +310,12 @@ pub unsafe extern "C" fn fmi2SerializedFMUstateSize(c: Component, state: State, 
 }
 
 #[unsafe(no_mangle)]
-pub unsafe extern "C" fn fmi2SerializeFMUstate(c: Component, state: State, out: *mut u8, size: usize) -> c_int {
+pub unsafe extern "C" fn fmi2SerializeFMUstate(
+    c: Component,
+    state: State,
+    out: *mut u8,
+    size: usize,
+) -> c_int {
     // SAFETY: as above.
     unsafe { crate::instance::serialise(c, state, out, size) }
 }

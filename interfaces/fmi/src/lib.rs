@@ -11,8 +11,8 @@
 mod archive;
 mod binary;
 pub mod description;
-pub mod export;
 mod error;
+pub mod export;
 mod fmu;
 pub mod slave;
 

@@ -77,7 +77,7 @@ pub fn validate(arguments: &Arguments) -> Outcome {
     }
     let profile = if arguments.no_timing { "debug" } else { "release" };
     let build: &[&str] = if arguments.no_timing { &["build"] } else { &["build", "--release"] };
-    must(cargo(build).args(["--package", "terraglue"]))?;
+    must(cargo(build).args(["--package", "terraglue", "--package", "terraglue-unit"]))?;
     let scratch = crate::process::target().join("validate");
     let _ = std::fs::remove_dir_all(&scratch);
     let context =

@@ -35,7 +35,12 @@ pub fn write(request: &Request) -> Result<Exported> {
     let search = SearchPath::standard(&request.module_paths, &scenario.folder);
     let stage = tempfile::tempdir().map_err(|e| plain(format!("a temporary folder: {e}")))?;
     let resources = stage.path().join("resources");
-    let mut bundle = Bundle { scenario: &scenario, search: &search, resources: &resources, document: document(&scenario)? };
+    let mut bundle = Bundle {
+        scenario: &scenario,
+        search: &search,
+        resources: &resources,
+        document: document(&scenario)?,
+    };
     bundle.subsystems()?;
     bundle.terrain()?;
     let text = bundle.document.to_string();
@@ -109,7 +114,8 @@ impl Bundle<'_> {
     fn subsystems(&mut self) -> Result {
         for spec in &self.scenario.subsystems {
             if crate::fmu::is_fmu(&spec.module) {
-                let to = self.take(&self.scenario.folder.join(&spec.module), format!("units/{}.fmu", spec.name))?;
+                let to =
+                    self.take(&self.scenario.folder.join(&spec.module), format!("units/{}.fmu", spec.name))?;
                 self.set(&spec.name, "fmu", &to);
                 continue;
             }
@@ -164,8 +170,10 @@ impl Bundle<'_> {
         if spec.offered.is_empty() {
             return Ok(());
         }
-        let named = self.document.get(&spec.name).and_then(|t| t.get("parameters_file")).and_then(Item::as_str);
-        let path = named.map(|f| self.scenario.folder.join(f)).or_else(|| find_soil_table(&self.scenario.folder));
+        let named =
+            self.document.get(&spec.name).and_then(|t| t.get("parameters_file")).and_then(Item::as_str);
+        let path =
+            named.map(|f| self.scenario.folder.join(f)).or_else(|| find_soil_table(&self.scenario.folder));
         if let Some(path) = path {
             let to = self.take(&path, "models/soils.csv".into())?;
             self.set(&spec.name, "parameters_file", &to);
@@ -254,11 +262,16 @@ fn entries(
 ) -> Result<Vec<(String, Content)>> {
     let library = search.folders().iter().map(|f| f.join(LIBRARY)).find(|p| p.is_file());
     let library = library.ok_or_else(|| {
-        let help = "build it with `cargo build --package terraglue-unit`, or give its folder by --module-path";
-        InputError::plain(format!("the library of exported units, {LIBRARY}, was not found"), Some(help.into()))
+        let help =
+            "build it with `cargo build --package terraglue-unit`, or give its folder by --module-path";
+        InputError::plain(
+            format!("the library of exported units, {LIBRARY}, was not found"),
+            Some(help.into()),
+        )
     })?;
     let two = request.version == Version::V2;
-    let description = describe(opened.subsystem.as_ref(), &opened.layout, about).map_err(|e| plain(e.to_string()))?;
+    let description =
+        describe(opened.subsystem.as_ref(), &opened.layout, about).map_err(|e| plain(e.to_string()))?;
     let platform = if two { "linux64" } else { "x86_64-linux" };
     let mut all = vec![
         ("modelDescription.xml".to_owned(), Content::Text(description)),

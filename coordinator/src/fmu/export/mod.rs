@@ -83,13 +83,12 @@ fn instance(opening: &Opening, unit: &Unit) -> crate::Result<terraglue_subsystem
     // Nothing but the unit's own modules: not what the program that runs it happens to have beside it.
     let options = Options { threads: 1, ..Options::default() };
     let log = opening.log.clone();
-    let testbed = Testbed::build_hosted(&scenario, &options, &Library::new(), |services| {
-        crate::host::HostServices {
+    let testbed =
+        Testbed::build_hosted(&scenario, &options, &Library::new(), |services| crate::host::HostServices {
             slots: SLOTS,
             log: Some(Arc::new(move |name, level, text| log.put(level, &format!("{name}: {text}")))),
             ..services
-        }
-    })?;
+        })?;
     Ok(Whole::new(testbed, unit.bare.as_deref(), SLOTS))
 }
 

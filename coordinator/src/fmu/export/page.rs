@@ -12,14 +12,16 @@ pub fn page(opened: &Opened, about: &About) -> String {
     let mut rows = String::new();
     for entry in &opened.layout.entries {
         let v = &opened.subsystem.variables()[entry.variable];
-        let dims: String = v.dims.iter().filter(|_| entry.element.is_none()).map(|d| format!("[{d}]")).collect();
+        let dims: String =
+            v.dims.iter().filter(|_| entry.element.is_none()).map(|d| format!("[{d}]")).collect();
         let role = match v.causality {
             Causality::Parameter => "parameter",
             Causality::Input => "input",
             Causality::Output => "output",
             Causality::Local => "local",
         };
-        let cells = [escaped(&entry.name), format!("{:?}{dims}", v.value_type), escaped(&v.unit), role.into()];
+        let cells =
+            [escaped(&entry.name), format!("{:?}{dims}", v.value_type), escaped(&v.unit), role.into()];
         let cells: String = cells.iter().map(|c| format!("<td>{c}</td>")).collect();
         // writing to a String does not fail
         let _ = writeln!(rows, "<tr>{cells}<td>{}</td></tr>", escaped(&v.help));

@@ -56,7 +56,8 @@ impl Whole {
         let whole = ratio.round().max(1.0);
         let fits = (ratio - whole).abs() <= 1e-6 * whole;
         if !fits && !self.testbed.takes_any_step() {
-            let text = format!("a step of {h} s is no multiple of {} s, and a subsystem needs that", self.step_s);
+            let text =
+                format!("a step of {h} s is no multiple of {} s, and a subsystem needs that", self.step_s);
             return Err(Error::Refused(text));
         }
         let (count, step_s) = if fits { (whole, self.step_s) } else { (ratio.ceil(), h / ratio.ceil()) };
@@ -88,7 +89,8 @@ fn tell(testbed: &mut Testbed, slot: usize, id: u32, values: Values) -> Result {
 fn variables(testbed: &Testbed, bare: Option<&str>, feet: &[usize]) -> (Vec<Variable>, Vec<Place>) {
     let (mut all, mut places) = (Vec::new(), Vec::new());
     for (slot, instance) in testbed.instances().iter().enumerate() {
-        let own = |v: &&Variable| feet.contains(&slot) && [feet::id::DURATION, feet::id::JUMP].contains(&v.id);
+        let own =
+            |v: &&Variable| feet.contains(&slot) && [feet::id::DURATION, feet::id::JUMP].contains(&v.id);
         for v in instance.variables().iter().filter(|v| !own(v)) {
             let mut shown = Variable { id: all.len() as u32, ..v.clone() };
             if bare != Some(instance.name()) {

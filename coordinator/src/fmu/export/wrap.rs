@@ -5,7 +5,8 @@ use std::path::Path;
 use terraglue_subsystem::Kind;
 
 /// What every small scenario holds; `--set` changes it.
-const COMMON: &str = "[time]\nstep_s = 0.001\nduration_s = 10.0\n\n[world]\ngravity_m_s2 = [0.0, 0.0, -9.81]\n";
+const COMMON: &str =
+    "[time]\nstep_s = 0.001\nduration_s = 10.0\n\n[world]\ngravity_m_s2 = [0.0, 0.0, -9.81]\n";
 
 /// Ground, and feet that the master moves.
 const GROUND: &str = "\n[terrain]\nkind = \"flat\"\nsize_m = [4.0, 4.0]\nspacing_m = 0.01\n\n[gluing]\nstrategy = \

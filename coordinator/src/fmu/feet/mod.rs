@@ -147,7 +147,8 @@ impl Subsystem for DrivenFeet {
 
     fn restore_state(&mut self, slot: u32) -> Result {
         let saved = self.saved.get(slot as usize).and_then(Option::as_ref);
-        self.state = saved.ok_or_else(|| Error::Refused(format!("no state was saved in slot {slot}")))?.clone();
+        self.state =
+            saved.ok_or_else(|| Error::Refused(format!("no state was saved in slot {slot}")))?.clone();
         Ok(())
     }
 

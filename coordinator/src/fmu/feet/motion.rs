@@ -110,7 +110,8 @@ impl Foot {
 
     fn numbers(&self) -> [f64; 21] {
         let mut out = [0.0; 21];
-        let poses = [&self.now, &self.target].into_iter().flat_map(|p| p.position.into_iter().chain(p.orientation));
+        let poses =
+            [&self.now, &self.target].into_iter().flat_map(|p| p.position.into_iter().chain(p.orientation));
         let all = poses.chain([self.left_s]).chain(self.force).chain(self.moment);
         out.iter_mut().zip(all).for_each(|(out, x)| *out = x);
         out
@@ -134,8 +135,7 @@ impl State {
 
     /// Back from bytes of as many feet.
     pub fn from_bytes(bytes: &[u8], count: usize) -> Option<Self> {
-        let numbers: Vec<f64> =
-            bytes.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
+        let numbers: Vec<f64> = bytes.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
         let good = bytes.len() == 8 * (2 + 21 * count) && numbers.iter().all(|x| x.is_finite());
         let (head, feet) = numbers.split_at_checked(2).filter(|_| good)?;
         let feet = feet.as_chunks::<21>().0.iter().map(Foot::from_numbers).collect();

@@ -18,7 +18,8 @@ pub struct Settings {
 
 /// What the module is.
 pub fn schema() -> Schema {
-    let number = |name: &str, default: f64, help: &str| Parameter::number(name, "m", default, help).positive();
+    let number =
+        |name: &str, default: f64, help: &str| Parameter::number(name, "m", default, help).positive();
     Schema {
         name: NAME.into(),
         kind: Kind::Robot,
@@ -38,7 +39,10 @@ pub fn schema() -> Schema {
                 "x, y, z of every foot at the start; far above the ground if silent",
             )
             .optional(),
-            Parameter { unit: "s".into(), ..number("duration_s", 1e-3, "Time over which a new pose is reached") },
+            Parameter {
+                unit: "s".into(),
+                ..number("duration_s", 1e-3, "Time over which a new pose is reached")
+            },
         ],
     }
 }
@@ -60,7 +64,8 @@ impl Settings {
         };
         let given = config.numbers("position_m")?;
         if !given.is_empty() && given.len() != 3 * count {
-            let message = format!("`position_m` needs {} numbers for {count} feet, not {}", 3 * count, given.len());
+            let message =
+                format!("`position_m` needs {} numbers for {count} feet, not {}", 3 * count, given.len());
             return Err(Error::Refused(message));
         }
         let mut positions: Vec<[f64; 3]> = given.as_chunks::<3>().0.to_vec();

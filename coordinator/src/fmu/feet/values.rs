@@ -28,14 +28,42 @@ pub fn variables(n: u32) -> Vec<Variable> {
         ..Variable::real(id, name, unit, role, help)
     };
     vec![
-        rows(id::POSITION, "position", "m", Input, 3, "Where each foot is to be at the end of the step, world"),
-        rows(id::ORIENTATION, "orientation", "", Input, 4, "Unit quaternion w, x, y, z, world from foot, likewise"),
+        rows(
+            id::POSITION,
+            "position",
+            "m",
+            Input,
+            3,
+            "Where each foot is to be at the end of the step, world",
+        ),
+        rows(
+            id::ORIENTATION,
+            "orientation",
+            "",
+            Input,
+            4,
+            "Unit quaternion w, x, y, z, world from foot, likewise",
+        ),
         Variable::real(id::DURATION, "duration", "s", Parameter, "Time over which a new pose is reached")
             .within(0.0, f64::INFINITY),
         Variable::real(id::JUMP, "jump", "", Parameter, "A new pose holds at once, without a way to it")
             .typed(ValueType::Bool),
-        rows(id::FORCE, "force", "N", Output, 3, "Force of the ground on each foot in the last step, world axes"),
-        rows(id::MOMENT, "moment", "N m", Output, 3, "Moment about the foot's origin in the last step, world axes"),
+        rows(
+            id::FORCE,
+            "force",
+            "N",
+            Output,
+            3,
+            "Force of the ground on each foot in the last step, world axes",
+        ),
+        rows(
+            id::MOMENT,
+            "moment",
+            "N m",
+            Output,
+            3,
+            "Moment about the foot's origin in the last step, world axes",
+        ),
     ]
 }
 
@@ -136,7 +164,8 @@ fn set_one<'a>(state: &mut State, id: u32, new: &'a [f64]) -> Result<&'a [f64]> 
         id::ORIENTATION => {
             let new = front.as_chunks::<4>().0;
             let unit: Option<Vec<[f64; 4]>> = new.iter().map(|q| normalised(*q)).collect();
-            let unit = unit.ok_or_else(|| Error::Refused("a quaternion of length 0 is no orientation".into()))?;
+            let unit =
+                unit.ok_or_else(|| Error::Refused("a quaternion of length 0 is no orientation".into()))?;
             state.feet.iter_mut().zip(unit).for_each(|(foot, new)| foot.target.orientation = new);
         }
         _ if front[0] < 0.0 => return Err(Error::Refused("a duration is not negative".into())),

@@ -117,8 +117,7 @@ impl Component {
     /// # Errors
     /// Why the subsystem cannot be made, or that `token` belongs to another unit.
     pub fn new(open: Open, name: &str, resources: &Path, token: Option<&str>) -> Result<Self, String> {
-        let opening =
-            Opening { name: name.into(), resources: resources.into(), log: Mailbox::default() };
+        let opening = Opening { name: name.into(), resources: resources.into(), log: Mailbox::default() };
         let opened = open(&opening)?;
         if let Some(given) = token.filter(|t| *t != opened.token) {
             return Err(format!("the token `{given}` is not that of this unit, `{}`", opened.token));
@@ -257,7 +256,10 @@ impl Component {
         self.expect("a step", &[Phase::Running])?;
         let slack = 1e-9 * h.abs().max(self.time.abs());
         if !((t - self.time).abs() <= slack) {
-            return wrong(format!("the step begins at t = {t} s, but the unit stands at t = {} s", self.time));
+            return wrong(format!(
+                "the step begins at t = {t} s, but the unit stands at t = {} s",
+                self.time
+            ));
         }
         if !(h.is_finite() && h > 0.0) {
             return wrong(format!("a step of {h} s cannot be made"));
@@ -305,8 +307,7 @@ impl Component {
         let step = Step::free(self.time, h, self.index);
         let none = Input::Force { t: &[], hold: Hold::End, motion: None };
         let end = self.time + h;
-        let mut out =
-            Response { x: &mut [], v: &mut [], a: &mut [], t: &mut [], reached: end, flags: 0 };
+        let mut out = Response { x: &mut [], v: &mut [], a: &mut [], t: &mut [], reached: end, flags: 0 };
         self.unit.advance(&step, &none, &mut out)?;
         let (reached, flags) = (out.reached, out.flags);
         if !(reached >= self.time && reached <= end) {
@@ -333,13 +334,8 @@ impl Component {
     }
 
     fn saving(&self) -> Answer {
-        let any = [
-            Phase::Instantiated,
-            Phase::Initialization,
-            Phase::Running,
-            Phase::Failed,
-            Phase::Terminated,
-        ];
+        let any =
+            [Phase::Instantiated, Phase::Initialization, Phase::Running, Phase::Failed, Phase::Terminated];
         self.expect("saving or restoring a state", &any)?;
         self.can(Capabilities::STATE, "save its state")
     }

@@ -63,8 +63,7 @@ impl Writer<'_> {
     fn document(&self) -> Result<String> {
         let mut xml = Xml::new();
         let a = self.about;
-        let (version, token) =
-            if self.two() { ("2.0", "guid") } else { ("3.0", "instantiationToken") };
+        let (version, token) = if self.two() { ("2.0", "guid") } else { ("3.0", "instantiationToken") };
         let convention = if self.structured() { "structured" } else { "flat" };
         xml.open(
             "fmiModelDescription",
@@ -82,7 +81,8 @@ impl Writer<'_> {
         self.units(&mut xml);
         self.types(&mut xml);
         xml.open("LogCategories", &[]);
-        for (name, help) in [("logStatusError", "what was not done"), ("logStatusWarning", "what to look at")] {
+        for (name, help) in [("logStatusError", "what was not done"), ("logStatusWarning", "what to look at")]
+        {
             xml.leaf("Category", &[("name", &name), ("description", &help)]);
         }
         xml.leaf("Category", &[("name", &"logAll"), ("description", &"all of it")]);
@@ -317,10 +317,8 @@ impl Writer<'_> {
     fn structure(&self, xml: &mut Xml) {
         let feeds = self.subsystem.capabilities().has(Capabilities::FEEDTHROUGH);
         let output = |e: &&Entry| self.variables[e.variable].causality == Causality::Output;
-        let outputs: Vec<usize> = (self.layout.entries.iter().enumerate())
-            .filter(|(_, e)| output(e))
-            .map(|(k, _)| k + 1)
-            .collect();
+        let outputs: Vec<usize> =
+            (self.layout.entries.iter().enumerate()).filter(|(_, e)| output(e)).map(|(k, _)| k + 1).collect();
         xml.open("ModelStructure", &[]);
         let none: (&str, &dyn Display) = ("dependencies", &"");
         let kinds: (&str, &dyn Display) = ("dependenciesKind", &"");

@@ -1,0 +1,224 @@
+"""Exported units, driven by FMPy: valid, equal to `terraglue run`, and right about states, resets, threads, errors."""
+
+import csv
+import threading
+
+import numpy as np
+import pytest
+from fmpy.fmi1 import FMICallException
+from fmpy.validation import validate_fmu
+
+from conftest import ROOT, terraglue
+from fmus import Unit, export
+
+GROUND = ("terrain.size_m=[1.0,0.6]", "terrain.spacing_m=0.005")
+PLATE = ("foot.shape=cylinder", "foot.radius_m=0.025", "foot.half_length_m=0.01")
+SCENARIO = ROOT / "scenarios" / "plate_sinkage.toml"
+EXACT = ("--set", "gluing.strategy=iterative", "--set", "gluing.tolerance=1e-13")
+PRESSES = ["robot.small_press.velocity_target", "robot.large_press.velocity_target"]
+
+
+def sets(*edits):
+    return [word for edit in edits for word in ("--set", edit)]
+
+
+@pytest.fixture(scope="session")
+def units(tmp_path_factory):
+    """All that can be exported, in both versions."""
+    folder = tmp_path_factory.mktemp("units")
+    soil = sets("soil.parameters=LETE_sand", *GROUND, *PLATE)
+    press = sets(f"robot.model={ROOT}/models/bevameter.urdf", "robot.fixed_base=true", "robot.motor=velocity")
+    wanted = {
+        "soil3": ("soil-bekker", "--fmi", "3", *soil),
+        "soil2": ("soil-cellular-automaton", "--fmi", "2", *soil, "--set", "foot.count=2"),
+        "robot2": ("rigid-body", "--fmi", "2", *press),
+        "whole3": (SCENARIO, "--fmi", "3", "--scalars", *EXACT),
+    }
+    made = {name: Unit(export(target, folder / f"{name}.fmu", *rest)) for name, (target, *rest) in wanted.items()}
+    yield made
+    for unit in made.values():
+        unit.remove()
+
+
+@pytest.fixture(scope="session")
+def pressed(tmp_path_factory):
+    """Seven tenths of a second of plate_sinkage as `terraglue run` writes it."""
+    out = tmp_path_factory.mktemp("plate") / "out"
+    every = ("--set", "recording.every_steps=1", "--duration", "0.7", "--csv", "--quiet", "--out", out)
+    done = terraglue("run", SCENARIO, *EXACT, *every)
+    assert done.returncode == 0, done.stderr
+    return list(csv.DictReader((out / "variables.csv").open()))
+
+
+def place(row):
+    return [float(row[f"bevameter.small_plate.{axis}"]) for axis in "xyz"]
+
+
+def press(instance, depths, feet=1):
+    """Forces while the feet go down to each depth in turn, 1 ms apart."""
+    forces = []
+    for depth in depths:
+        instance["foot.position"] = [[0.2 * k, 0.0, 0.01 - depth] for k in range(feet)]
+        instance.step(1e-3)
+        forces.append(instance["foot.force"].copy())
+    return np.array(forces)
+
+
+DEPTHS = [0.0] + [1e-4 * k for k in range(1, 40)] + [2e-3, 3e-3]
+
+
+@pytest.mark.parametrize("name", ["soil3", "soil2", "robot2", "whole3"])
+def test_fmpy_finds_no_fault(units, name):
+    assert validate_fmu(units[name].path) == []
+
+
+def test_a_soil_gives_the_forces_of_the_run(units, pressed):
+    instance = units["soil3"].instance(foot__position=place(pressed[0]))
+    forces, wanted = [], np.array([float(row["bevameter.small_plate.contact_normal"]) for row in pressed[1:]])
+    for row in pressed[1:]:
+        instance["foot.position"] = place(row)
+        instance.step(1e-3)
+        forces.append(instance["foot.force"][0, 2])
+    assert np.abs(np.array(forces) - wanted).max() <= 1e-12 * wanted.max() and wanted.max() > 100.0
+    instance.end()
+
+
+def test_a_whole_scenario_gives_the_run(units, pressed):
+    instance = units["whole3"].instance()
+    for row in pressed[1:]:
+        instance.step(1e-3)
+    outputs = [n for n, v in units["whole3"].variables.items() if v.causality == "output" and n in row]
+    assert len(outputs) > 50
+    for name in outputs:
+        assert abs(instance[name][0] - float(row[name])) <= 1e-12 * max(1.0, abs(float(row[name]))), name
+    instance.end()
+
+
+def test_a_robot_gives_the_run(units, tmp_path):
+    path = tmp_path / "presses.toml"
+    path.write_text(f"""
+[time]
+step_s = 0.001
+duration_s = 0.2
+[world]
+gravity_m_s2 = [0.0, 0.0, -9.81]
+[recording]
+every_steps = 1
+[robot]
+module = "rigid-body"
+model = "{ROOT}/models/bevameter.urdf"
+fixed_base = true
+motor = "velocity"
+[[event]]
+at_s = 0.0
+set = {{ "{PRESSES[0]}" = 0.01, "{PRESSES[1]}" = 0.02 }}
+""")
+    done = terraglue("run", path, "--csv", "--quiet", "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    row = list(csv.DictReader((tmp_path / "out" / "variables.csv").open()))[-1]
+    instance = units["robot2"].instance(small_press__velocity_target=0.01, large_press__velocity_target=0.02)
+    for _ in range(200):
+        instance.step(1e-3)
+    outputs = [n for n, v in units["robot2"].variables.items() if v.causality == "output" and f"robot.{n}" in row]
+    assert len(outputs) > 30
+    for name in outputs:
+        wanted = float(row[f"robot.{name}"])
+        assert abs(instance[name][0] - wanted) <= 1e-12 * max(1.0, abs(wanted)), name
+    instance.end()
+
+
+@pytest.mark.parametrize(("name", "feet"), [("soil3", 1), ("soil2", 2)])
+def test_a_state_is_saved_restored_and_replayed(units, name, feet):
+    unit = units[name]
+    instance = unit.instance(foot__position=[[0.2 * k, 0, 0.05] for k in range(feet)])
+    press(instance, DEPTHS[:20], feet)
+    state = instance.save()
+    first, t = press(instance, DEPTHS[20:], feet), instance.t
+    instance.restore(state)
+    instance.t = t - 1e-3 * len(first)
+    assert (press(instance, DEPTHS[20:], feet) == first).all() and first.max() > 10.0
+    if unit.description.coSimulation.canSerializeFMUstate:
+        raw = instance.raw
+        data = (raw.serializeFMUstate if unit.two else raw.serializeFMUState)(state)
+        other = unit.instance("other", start=t - 1e-3 * len(first))
+        loaded = (other.raw.deSerializeFMUstate if unit.two else other.raw.deserializeFMUState)(data)
+        other.restore(loaded)
+        assert (press(other, DEPTHS[20:], feet) == first).all()
+        other.end()
+    instance.release(state)
+    instance.end()
+
+
+def test_reset_forgets_everything(units):
+    instance = units["soil3"].instance(foot__position=[0, 0, 0.05])
+    first = press(instance, DEPTHS)
+    instance.raw.reset()
+    instance.t = 0.0
+    instance.initialize({"foot.position": [0, 0, 0.05]})
+    assert (press(instance, DEPTHS) == first).all()
+    instance.end()
+
+
+def test_ten_instances_in_threads(units):
+    results = {}
+
+    def run(k):
+        instance = units["soil2"].instance(f"soil{k}", foot__position=[[0, 0, 0.05], [0.2, 0, 0.05]])
+        results[k] = press(instance, DEPTHS, 2)
+        instance.end()
+
+    threads = [threading.Thread(target=run, args=(k,)) for k in range(10)]
+    [t.start() for t in threads]
+    [t.join() for t in threads]
+    assert len(results) == 10 and all((results[k] == results[0]).all() for k in results)
+
+
+def test_steps_of_any_length(units):
+    """The same way in steps of 1 ms and of 2.5 ms: the law depends on the way, not on the steps."""
+    ends = []
+    for h in (1e-3, 2.5e-3):
+        instance = units["soil3"].instance(foot__position=[0, 0, 0.01])
+        for k in range(1, round(0.05 / h) + 1):
+            instance["foot.position"] = [0, 0, 0.01 - 0.1 * k * h]
+            instance.step(h)
+        ends.append(instance["foot.force"][0, 2])
+        instance.end()
+    assert ends[0] > 100.0 and ends[0] == pytest.approx(ends[1], rel=1e-9)
+
+
+@pytest.mark.parametrize("name", ["soil3", "soil2"])
+def test_what_must_not_be_done_is_an_error(units, name):
+    unit = units[name]
+    instance = unit.instance(running=False)
+    feet = 2 if unit.two else 1
+
+    def refused(call, *arguments, **named):
+        with pytest.raises(FMICallException) as error:
+            call(*arguments, **named)
+        assert error.value.status == 3, error.value
+
+    refused(lambda: instance["foot.force"])
+    refused(instance.step, 1e-3)
+    refused(instance.raw.terminate)
+    instance.initialize({"foot.position": [[0.2 * k, 0, 0.05] for k in range(feet)]})
+    refused((instance.raw.getReal if unit.two else instance.raw.getFloat64), [99999])
+    refused((instance.raw.getBoolean), [unit.variables["max_sinkage"].valueReference])
+    refused(instance.__setitem__, "max_sinkage", 1.0)
+    refused(instance.__setitem__, "foot.position", [np.nan] * 3 * feet)
+    refused(instance.raw.enterInitializationMode)
+    refused(instance.raw.doStep, currentCommunicationPoint=1.0, communicationStepSize=1e-3)
+    refused(instance.raw.doStep, currentCommunicationPoint=0.0, communicationStepSize=-1e-3)
+    press(instance, DEPTHS[:5], feet)  # and all of this has broken nothing
+    instance.end()
+
+
+def test_our_own_import_gives_the_same(units, pressed, tmp_path):
+    out = tmp_path / "out.csv"
+    names = ["bevameter.small_plate.z", "bevameter.small_plate.contact_normal"]
+    done = terraglue(
+        "fmu", "run", units["whole3"].path, "--stop", "0.7", "--step", "0.001", "--output", ",".join(names), "--csv", out
+    )
+    assert done.returncode == 0, done.stderr
+    row = list(csv.DictReader(out.open()))[-1]
+    for name in names:
+        assert abs(float(row[name]) - float(pressed[-1][name])) <= 1e-12 * abs(float(pressed[-1][name]))

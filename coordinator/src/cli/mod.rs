@@ -5,8 +5,8 @@
 mod arguments;
 mod check;
 mod compare;
-mod fit_soil;
 mod export;
+mod fit_soil;
 mod fmu;
 mod folder;
 mod interrupt;

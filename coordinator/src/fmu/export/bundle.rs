@@ -166,14 +166,19 @@ impl Bundle<'_> {
         Ok(())
     }
 
+    /// The soil file that `parameters` names, or the table with the row that it names.
     fn soil_table(&mut self, spec: &SubsystemSpec) -> Result {
         if spec.offered.is_empty() {
             return Ok(());
         }
-        let named =
-            self.document.get(&spec.name).and_then(|t| t.get("parameters_file")).and_then(Item::as_str);
-        let path =
-            named.map(|f| self.scenario.folder.join(f)).or_else(|| find_soil_table(&self.scenario.folder));
+        let folder = &self.scenario.folder;
+        let text = |key: &str| self.document.get(&spec.name).and_then(|t| t.get(key)).and_then(Item::as_str);
+        if let Some(file) = text("parameters").filter(|p| p.ends_with(".toml")) {
+            let to = self.take(&folder.join(file), format!("models/{}.toml", spec.name))?;
+            self.set(&spec.name, "parameters", &to);
+            return Ok(());
+        }
+        let path = text("parameters_file").map(|f| folder.join(f)).or_else(|| find_soil_table(folder));
         if let Some(path) = path {
             let to = self.take(&path, "models/soils.csv".into())?;
             self.set(&spec.name, "parameters_file", &to);

@@ -44,6 +44,26 @@ impl Motor {
 /// At and above this, N m, a block gives way to nothing.
 pub(crate) const FULL_BLOCK: f64 = 1e12;
 
+/// By how much a rigid motor gives way at its largest torque while bodies touch, rad/s or m/s. Between feet that
+/// motors hold apart rigidly, forces are not determined, and whether a motor is at its bound neither.
+pub(crate) const YIELDING: f64 = 1e-7;
+/// Where no consistent state is found it is raised up to this.
+pub(crate) const MOST_YIELDING: f64 = 1e-2;
+
+/// The step for which an axis is made.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Span {
+    /// Length, s.
+    pub h: f64,
+    /// Springs and position motors act with the coordinate at this share of the step, and the rate at its end is the
+    /// old one plus (mean − old)/`when`.
+    pub when: f64,
+    /// Voltage that the supply can give, V.
+    pub supply_v: f64,
+    /// Rate by which a rigid motor gives way at its largest torque, see [`YIELDING`].
+    pub yielding: f64,
+}
+
 /// The axis during one step.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Axis {
@@ -84,36 +104,38 @@ impl Axis {
         }
     }
 
-    /// The relation for a step of length h; `limits` of the coordinate; voltage that the supply can give, V.
-    pub fn new(j: &JointState, limits: Option<[f64; 2]>, supply_v: f64, h: f64) -> Self {
-        Self::at(j, limits, supply_v, h, 1.0)
-    }
-
-    /// The same where springs and position motors act with the coordinate at the share `when` of the step, and the
-    /// rate at its end is the old one plus (mean − old)/`when`.
-    pub fn at(j: &JointState, limits: Option<[f64; 2]>, supply_v: f64, h: f64, when: f64) -> Self {
+    /// Makes it the relation for a step; `limits` of the coordinate. In place, because a curve is a kilobyte of which
+    /// a plain motor uses a tenth.
+    pub fn renew(&mut self, j: &JointState, limits: Option<[f64; 2]>, step: &Span) {
+        let Span { h, when, .. } = *step;
         if j.broken {
-            return Self::idle();
+            return *self = Self::idle();
         }
         let a = &j.actuator;
         let bound = h * j.max_torque;
-        let motor = if bound > 0.0 { motor(j, supply_v, h, when) } else { Curve::line(Line::ZERO, Tag::Law) };
-        let friction = friction::curve(a, h);
+        match law(j, step).yielding(step.yielding, bound) {
+            _ if bound <= 0.0 => self.motor.assign_line(Line::ZERO, Tag::Law),
+            law if winding::is_ideal(j) => law.bound_into(bound, &mut self.motor),
+            law => self.motor = through_winding(law, j, step),
+        }
+        self.total.assign(&self.motor);
+        match friction::curve(a, h) {
+            Some(friction) => {
+                self.total.add(&friction);
+                self.friction = friction;
+            }
+            None => self.friction.assign_line(Line::ZERO, Tag::Friction),
+        }
         let (inertia, k) = (a.inertia(), a[Item::SpringStiffness]);
-        let passive = [
+        self.passive = [
             Line { at_zero: inertia / when * j.velocity, slope: inertia / when },
             Line { at_zero: h * k * (a[Item::SpringReference] - j.angle), slope: when * h * h * k },
             Line { at_zero: 0.0, slope: h * a[Item::ViscousFriction] },
         ];
-        let mut total = motor;
-        if let Some(friction) = &friction {
-            total.add(friction);
-        }
-        passive.iter().filter(|l| **l != Line::ZERO).for_each(|l| total.add_line(*l));
-        let friction = friction.unwrap_or_else(|| Curve::line(Line::ZERO, Tag::Friction));
-        add_stops(&mut total, j, limits, h);
-        let slips = j.blocked.is_some() && a[Item::BlockTorque] < FULL_BLOCK;
-        Self { total, motor, friction, passive, rate: j.velocity, slips }
+        self.passive.iter().filter(|l| **l != Line::ZERO).for_each(|l| self.total.add_line(*l));
+        add_stops(&mut self.total, j, limits, h);
+        self.slips = j.blocked.is_some() && a[Item::BlockTorque] < FULL_BLOCK;
+        self.rate = j.velocity;
     }
 
     /// The branch to begin with, as near as possible to the last one.
@@ -169,27 +191,68 @@ impl Axis {
     }
 }
 
-/// The motor alone: law, supply, gear, bound.
-fn motor(j: &JointState, supply_v: f64, h: f64, when: f64) -> Curve {
-    let law = match j.motor {
-        Motor::Off | Motor::Voltage => Curve::line(Line::ZERO, Tag::Law),
-        Motor::Torque => Curve::line(Line::level(h * j.torque_target), Tag::Law),
-        Motor::Velocity => Curve::rigid(j.velocity_target, Tag::Law),
+/// What a motor is asked for, without any bound.
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Law {
+    /// Impulse against rate.
+    Line(Line),
+    /// A rate, whatever it takes.
+    Rate(f64),
+}
+
+impl Law {
+    /// A rate becomes a steep line that gives the bound at ± `by`.
+    fn yielding(self, by: f64, bound: f64) -> Self {
+        match self {
+            Self::Rate(rate) if by > 0.0 && bound > 0.0 && bound.is_finite() => {
+                let slope = bound / by;
+                Self::Line(Line { at_zero: slope * rate, slope })
+            }
+            _ => self,
+        }
+    }
+
+    fn curve(self) -> Curve {
+        match self {
+            Self::Line(line) => Curve::line(line, Tag::Law),
+            Self::Rate(rate) => Curve::rigid(rate, Tag::Law),
+        }
+    }
+
+    /// The curve within ± an impulse.
+    fn bound_into(self, bound: f64, out: &mut Curve) {
+        match self {
+            Self::Line(line) => out.assign_bounded(line, bound),
+            Self::Rate(rate) => {
+                out.assign_line(Line::level(bound), Tag::High);
+                out.push((rate, Tag::Law), Line::level(-bound), Tag::Low);
+            }
+        }
+    }
+}
+
+fn law(j: &JointState, step: &Span) -> Law {
+    let Span { h, when, .. } = *step;
+    match j.motor {
+        Motor::Off | Motor::Voltage => Law::Line(Line::ZERO),
+        Motor::Torque => Law::Line(Line::level(h * j.torque_target)),
+        Motor::Velocity => Law::Rate(j.velocity_target),
         Motor::RigidPosition => {
             let most = j.actuator[Item::ApproachRate];
             let wanted = (j.angle_target - j.angle) / j.actuator[Item::ApproachTime].max(h);
-            Curve::rigid(wanted.clamp(-most, most), Tag::Law)
+            Law::Rate(wanted.clamp(-most, most))
         }
         Motor::Position => {
             let wanted = j.stiffness * (j.angle_target - j.angle) + j.damping * j.velocity_target;
-            Curve::line(
-                Line { at_zero: h * wanted, slope: h * j.damping + when * h * h * j.stiffness },
-                Tag::Law,
-            )
+            Law::Line(Line { at_zero: h * wanted, slope: h * j.damping + when * h * h * j.stiffness })
         }
-    };
-    let bound = h * j.max_torque;
-    winding::through_winding(law, j, supply_v, h)
+    }
+}
+
+/// Law, supply, gear, bound.
+fn through_winding(law: Law, j: &JointState, step: &Span) -> Curve {
+    let bound = step.h * j.max_torque;
+    winding::through_winding(law.curve(), j, step.supply_v, step.h)
         .at_most(Line::level(bound), Tag::High)
         .at_least(Line::level(-bound), Tag::Low)
 }
@@ -214,4 +277,25 @@ fn add_stops(total: &mut Curve, j: &JointState, limits: Option<[f64; 2]>, h: f64
 /// Whether two rates count as the same.
 pub(crate) fn at_rest(u: f64) -> bool {
     u.abs() <= RATE_TOLERANCE
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bounded_at_once_is_bounded_step_by_step() {
+        let laws = [0.0, 1.0, 30.0, -70.0].map(|at_zero| Law::Line(Line { at_zero, slope: 2.5 }));
+        let level = [0.0, 0.5, 7.0, -7.0].map(|at_zero| Law::Line(Line::level(at_zero)));
+        for law in laws.into_iter().chain(level).chain([Law::Rate(0.3)]) {
+            let slow = law.curve().at_most(Line::level(4.0), Tag::High).at_least(Line::level(-4.0), Tag::Low);
+            let mut fast = Curve::line(Line { at_zero: 9.0, slope: 9.0 }, Tag::Brake);
+            law.bound_into(4.0, &mut fast);
+            for k in -400..400 {
+                let u = 0.1 * f64::from(k) + 0.01;
+                assert_eq!(fast.tag_at(u), slow.tag_at(u), "{law:?} {u}");
+                assert!((fast.value(u) - slow.value(u)).abs() < 1e-12, "{law:?} {u}");
+            }
+        }
+    }
 }

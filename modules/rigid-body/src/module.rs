@@ -10,7 +10,7 @@ use crate::math::V3;
 use crate::model::Model;
 use crate::placement::{StartRates, at_rest, base_pose, clearance, coordinates, joint_rates, set_moving};
 use crate::robot::Robot;
-use crate::state::{JointState, Motion, State};
+use crate::state::{ContactBook, JointState, Motion, State};
 use nalgebra::Isometry3;
 use std::path::Path;
 use std::sync::Arc;
@@ -49,6 +49,7 @@ impl Module for RigidBody {
             bodies,
             joints,
             energy: Energy::default(),
+            contact: ContactBook::default(),
             supply: configure::supply(&config)?,
             start: None,
             stagger: 0.0,

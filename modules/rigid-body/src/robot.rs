@@ -123,7 +123,12 @@ impl Robot {
     /// Solves the step under the wrenches t.
     fn try_wrenches(&mut self, t: &[f64]) -> Result {
         self.ports.load(&mut self.dynamics, t);
-        self.dynamics.solve().map_err(failed)
+        loop {
+            match self.dynamics.solve() {
+                Err(Failure::Branches { .. }) if self.dynamics.soften(&self.state) => {}
+                done => return done.map_err(failed),
+            }
+        }
     }
 
     /// Fills `scratch.g` with d(x1 − x2)/dT and `scratch.gap` with x_free − x2 in the sign of side 1.
@@ -205,9 +210,25 @@ impl Robot {
         }
     }
 
+    fn book_contacts(&mut self) {
+        let Self { dynamics, state, .. } = self;
+        state.contact_normal.fill(0.0);
+        state.contact.points = 0;
+        state.contact.residual = 0.0;
+        state.contact.yielding = dynamics.yielding;
+        if dynamics.integrator.is_second_order() {
+            return;
+        }
+        let contacts = &dynamics.contacts;
+        contacts.add_normal_forces(dynamics.h, &mut state.contact_normal);
+        let lost = -dynamics.contact_work();
+        state.energy.dissipated += lost;
+        state.contact.lost += lost;
+        state.contact.points = contacts.pressing();
+        state.contact.residual = contacts.residual;
+    }
+
     fn book_ports(&mut self, step: &Step, t: &[f64]) {
-        self.state.contact_normal.fill(0.0);
-        self.dynamics.contacts.add_normal_forces(self.dynamics.h, &mut self.state.contact_normal);
         displacement(step.ports, &self.dynamics, &mut self.scratch.free);
         for port in step.ports {
             for (i, c) in port.components() {
@@ -328,6 +349,7 @@ impl Subsystem for Robot {
             return Err(Error::Failed("commit without a trial of this step".into()));
         }
         self.scratch.free.resize(step.n as usize, 0.0);
+        self.book_contacts();
         self.book_ports(step, t);
         self.book_joints();
         self.state.bodies.clone_from(&self.dynamics.ends);

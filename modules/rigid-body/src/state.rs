@@ -50,6 +50,19 @@ pub(crate) struct JointState {
     pub actuator: Actuator,
 }
 
+/// What the last step says about contacts among the bodies and with rigid ground.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub(crate) struct ContactBook {
+    /// Points that pressed.
+    pub points: usize,
+    /// Residual of the contact problem.
+    pub residual: f64,
+    /// Energy lost in impacts and friction since the start, J.
+    pub lost: f64,
+    /// How far rigid motors gave way at their largest torque, rad/s or m/s.
+    pub yielding: f64,
+}
+
 /// All that changes from step to step.
 #[derive(Debug, PartialEq, Default)]
 pub(crate) struct State {
@@ -60,6 +73,7 @@ pub(crate) struct State {
     /// Normal force of all ports of a body, N.
     pub contact_normal: Vec<f64>,
     pub energy: Energy,
+    pub contact: ContactBook,
     pub supply: Supply,
     /// Where body 0 was at the start; distances are counted from there.
     pub start: Option<V3>,
@@ -81,6 +95,7 @@ impl State {
         self.accelerations.clone_from(&other.accelerations);
         self.accelerated = other.accelerated;
         (self.energy, self.stagger) = (other.energy, other.stagger);
+        self.contact = other.contact;
         (self.supply, self.start) = (other.supply, other.start);
     }
 }

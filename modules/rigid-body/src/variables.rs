@@ -93,19 +93,27 @@ const ACTUATOR_ITEMS: [ActuatorItem; 14] = [
 ];
 
 /// What the robot as a whole tells.
-const ROBOT_ITEMS: [(&str, &str, &str); 9] = [
+const ROBOT_ITEMS: [(&str, &str, &str); 13] = [
     ("energy.motor_work", "J", "Mechanical work of all motors since the start"),
     ("energy.electrical", "J", "Electrical energy drawn by all motors since the start"),
     ("energy.distance", "m", "Horizontal distance of the first body from its start"),
     ("energy.per_metre", "J/m", "Electrical energy / distance; 0 until 1 cm has been made"),
     ("supply.voltage", "V", "Voltage that feeds the motors"),
     ("supply.current", "A", "Current drawn from the supply in the last step"),
+    ("contact.points", "", "Points that pressed in the last step, among the bodies and on rigid ground"),
+    ("contact.residual", "", "Residual of the contact problem of the last step, relative to its data"),
+    (
+        "contact.lost",
+        "J",
+        "Lost in impacts and friction among the bodies and on rigid ground since the start",
+    ),
+    ("contact.yielding", "", "By how much rigid motors gave way at their largest torque, rad/s or m/s"),
     ("battery.charge", "", "Share of the capacity that is left"),
     ("battery.lost", "J", "Lost in the internal resistance since the start"),
     ("battery.missing", "J", "Asked for beyond what the battery could give"),
 ];
 /// Those before are there without a battery.
-const WITHOUT_BATTERY: usize = 6;
+const WITHOUT_BATTERY: usize = 10;
 /// Nearer than this an energy per metre says nothing, m.
 const SHORTEST: f64 = 1e-2;
 
@@ -289,8 +297,12 @@ fn robot_number(state: &State, item: usize) -> f64 {
         3 => state.energy.electrical / distance(),
         4 => state.supply.limit,
         5 => state.supply.current,
-        6 => state.supply.charge,
-        7 => state.supply.lost,
+        6 => state.contact.points as f64,
+        7 => state.contact.residual,
+        8 => state.contact.lost,
+        9 => state.contact.yielding,
+        10 => state.supply.charge,
+        11 => state.supply.lost,
         _ => state.supply.missing,
     }
 }

@@ -137,7 +137,8 @@ fn own_bodies_do_not_pass_through_each_other() {
         hinge("r", "right", 0.3)
     );
     let file = temporary_urdf("arms", &text);
-    let mut rig = Rig::new(&format!(r#"{{"model": "{file}", "motor": "torque", "friction": 0.0}}"#), 0.0, 1e-3);
+    let mut rig =
+        Rig::new(&format!(r#"{{"model": "{file}", "motor": "torque", "friction": 0.0}}"#), 0.0, 1e-3);
     // Without friction: with 0.8 the two arms, 24 degrees off the vertical, lock (tan 24 degrees = 0.44). A wrench at a port on the left arm, later felt by the right arm too.
     let port = |rig: &Rig| {
         let p = rig.states()[0].world_from_body.position;

@@ -9,6 +9,12 @@ pub fn median(mut values: Vec<f64>) -> f64 {
     values.get(values.len() / 2).copied().unwrap_or(f64::NAN)
 }
 
+/// CPU time of this thread so far, s.
+pub fn cpu_s() -> f64 {
+    let t = rustix::time::clock_gettime(rustix::time::ClockId::ThreadCPUTime);
+    t.tv_sec as f64 + 1e-9 * t.tv_nsec as f64
+}
+
 /// Time of one million dependent multiply-adds, s: the median of five.
 pub fn calibration_s() -> f64 {
     median((0..5).map(|_| one_loop_s()).collect())

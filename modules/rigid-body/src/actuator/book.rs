@@ -56,7 +56,7 @@ impl Actuator {
         let torque = o.shares.motor / h;
         let work = o.shares.motor * o.mean_rate;
         let lost = -(o.shares.friction + o.shares.damper) * o.mean_rate;
-        let g_bristle = friction::bristle_after(self, h, o.rate);
+        let bristle = (self[Item::BristleStiffness] > 0.0).then(|| friction::bristle_after(self, h, o.rate));
         let asked = match self.kind {
             Drivetrain::Ideal => {
                 (self.current, self.voltage) = (0.0, 0.0);
@@ -78,8 +78,8 @@ impl Actuator {
         b.friction_heat += lost;
         let stored = 0.5 * self[Item::Inductance] * self.current * self.current;
         self.book.heat = self.book.electrical - self.book.work - stored;
-        if self[Item::BristleStiffness] > 0.0 {
-            self.bristle = g_bristle;
+        if let Some(bristle) = bristle {
+            self.bristle = bristle;
         }
         (self.rate, self.stuck) = (o.rate, at_rest(o.rate));
         draw.power += electrical / h;

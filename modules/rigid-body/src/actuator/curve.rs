@@ -113,10 +113,39 @@ impl Curve {
         Self { count: 0, kinks: [(0.0, tag); KINKS], pieces: [Piece { line, tag }; KINKS + 1] }
     }
 
+    /// Becomes one line.
+    pub fn assign_line(&mut self, line: Line, tag: Tag) {
+        self.count = 0;
+        self.pieces[0] = Piece { line, tag };
+    }
+
+    /// Becomes a line between the levels ± `bound`.
+    pub fn assign_bounded(&mut self, line: Line, bound: f64) {
+        let Line { at_zero, slope } = line;
+        if slope <= 0.0 {
+            let tag = match at_zero {
+                a if a > bound => Tag::High,
+                a if a < -bound => Tag::Low,
+                _ => Tag::Law,
+            };
+            return self.assign_line(Line::level(at_zero.min(bound).max(-bound)), tag);
+        }
+        self.assign_line(Line::level(bound), Tag::High);
+        self.push(((at_zero - bound) / slope, Tag::High), line, Tag::Law);
+        self.push(((at_zero + bound) / slope, Tag::Low), Line::level(-bound), Tag::Low);
+    }
+
+    /// Becomes another one, of which only what is in use is copied.
+    pub fn assign(&mut self, other: &Self) {
+        self.count = other.count;
+        self.kinks[..self.count].copy_from_slice(&other.kinks[..self.count]);
+        self.pieces[..=self.count].copy_from_slice(&other.pieces[..=self.count]);
+    }
+
     /// Any impulse at one rate.
     pub fn rigid(rate: f64, tag: Tag) -> Self {
         let mut curve = Self::line(Line::level(f64::INFINITY), tag);
-        curve.push((rate, tag), Piece { line: Line::level(f64::NEG_INFINITY), tag });
+        curve.push((rate, tag), Line::level(f64::NEG_INFINITY), tag);
         curve
     }
 
@@ -129,9 +158,9 @@ impl Curve {
         for pair in points.windows(2) {
             let ((u, a), (v, b)) = (pair[0], pair[1]);
             let slope = (a - b) / (v - u);
-            curve.push((u, tag), Piece { line: Line { at_zero: a + slope * u, slope }, tag });
+            curve.push((u, tag), Line { at_zero: a + slope * u, slope }, tag);
         }
-        curve.push((last.0, tag), Piece { line: Line::level(last.1), tag });
+        curve.push((last.0, tag), Line::level(last.1), tag);
         curve
     }
 
@@ -140,11 +169,12 @@ impl Curve {
         self.pieces[self.index_at(u)].tag
     }
 
-    fn push(&mut self, kink: (f64, Tag), piece: Piece) {
+    /// Adds a kink on the right and the line behind it.
+    pub fn push(&mut self, kink: (f64, Tag), line: Line, tag: Tag) {
         if self.count < KINKS {
             self.kinks[self.count] = kink;
             self.count += 1;
-            self.pieces[self.count] = piece;
+            self.pieces[self.count] = Piece { line, tag };
         }
     }
 
@@ -179,7 +209,7 @@ impl Curve {
             None => out = Some(Self { pieces: [piece; KINKS + 1], ..Self::line(piece.line, piece.tag) }),
             Some(curve) => {
                 if curve.pieces[curve.count] != piece {
-                    curve.push(kink, piece);
+                    curve.push(kink, piece.line, piece.tag);
                 }
             }
         };
@@ -392,7 +422,8 @@ impl Curve {
         }
     }
 
-    /// From line `from` towards `u`: to the line there, or to the first vertical piece on the way.
+    /// From line `from` towards `u`: to the line there, or to the first vertical or steeper piece on the way. A
+    /// solution found on a level line may lie far beyond a steep one and yet belong there.
     fn walk(&self, mode: Mode, from: usize, u: f64, direction: isize) -> Mode {
         let up = direction > 0;
         let mut i = from;
@@ -407,6 +438,9 @@ impl Curve {
                 return if near && i == from { mode } else { self.on_kink(k) };
             }
             i = i.wrapping_add_signed(direction);
+            if self.pieces[i].line.slope > self.pieces[from].line.slope {
+                break;
+            }
         }
         // By how much the impulse is wrong on the line where it is now.
         let wrong = (self.pieces[i].line.at(u) - self.pieces[from].line.at(u)).abs();

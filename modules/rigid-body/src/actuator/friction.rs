@@ -16,7 +16,8 @@ const FAR: f64 = 20.0;
 /// Friction torque while sliding at a rate, N m.
 pub(crate) fn sliding(a: &Actuator, rate: f64) -> f64 {
     let (coulomb, v) = (a[Item::CoulombFriction], rate / a[Item::StribeckRate]);
-    coulomb + (a[Item::StaticFriction] - coulomb).max(0.0) * libm::exp(-v * v)
+    let more = a[Item::StaticFriction] - coulomb;
+    if more > 0.0 { coulomb + more * libm::exp(-v * v) } else { coulomb }
 }
 
 /// Impulse against rate; none without friction.

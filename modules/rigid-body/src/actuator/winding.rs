@@ -34,10 +34,15 @@ pub(crate) fn largest_voltage(a: &Actuator, supply_v: f64) -> f64 {
     a[Item::MaxVoltage].min(supply_v)
 }
 
+/// Whether torque comes without a winding in between.
+pub(crate) fn is_ideal(j: &JointState) -> bool {
+    j.actuator.kind != Drivetrain::Dc || j.motor == Motor::Off
+}
+
 /// The law of a motor (impulse at the joint) as the drive train lets it through.
 pub(crate) fn through_winding(law: Curve, j: &JointState, supply_v: f64, h: f64) -> Curve {
     let a = &j.actuator;
-    if a.kind != Drivetrain::Dc || j.motor == Motor::Off {
+    if is_ideal(j) {
         return law;
     }
     let (gear, k, l) = (a[Item::GearRatio], a[Item::TorqueConstant], a[Item::Inductance] / h);

@@ -78,6 +78,11 @@ impl BodyContacts {
         }
     }
 
+    /// Whether anything can touch within the step.
+    pub fn any(&self) -> bool {
+        !self.points.is_empty()
+    }
+
     /// Whether any bodies can meet.
     pub fn watches(&self) -> bool {
         self.detector.watches()
@@ -222,9 +227,18 @@ impl BodyContacts {
         }
     }
 
-    /// Whether anything pressed in the last solve.
-    pub fn pressing(&self) -> bool {
-        self.impulses.chunks_exact(3).any(|r| r[0] > 0.0)
+    /// Number of points that pressed in the last solve.
+    pub fn pressing(&self) -> usize {
+        self.impulses.chunks_exact(3).filter(|r| r[0] > 0.0).count()
+    }
+
+    /// Σ r·(H·v) for rates v of all bodies: the work of the impulses at these rates.
+    pub fn work(&self, body_at: &[usize], v: &[f64]) -> f64 {
+        let of = |k: usize| {
+            let (p, wrenches) = (&self.points[k], &self.wrenches[k]);
+            (0..3).map(|c| self.impulses[3 * k + c] * rate(p, &wrenches[c], body_at, v)).sum::<f64>()
+        };
+        (0..self.points.len()).filter(|k| self.impulses[3 * k] > 0.0).map(of).sum()
     }
 
     /// Adds the mean normal force of the last solve over h to each body, N.

@@ -89,7 +89,7 @@ impl Ports {
     /// Only along the paths of the bodies to the root: see [`Path`].
     pub fn compliance(&mut self, dynamics: &Dynamics) -> &[f64] {
         let n = self.components.len();
-        if self.g_of == dynamics.factor_count && !dynamics.contacts.pressing() && self.g.len() == n * n {
+        if self.g_of == dynamics.factor_count && dynamics.contacts.pressing() == 0 && self.g.len() == n * n {
             return &self.g;
         }
         let tree = &dynamics.kkt.solver;
@@ -116,7 +116,7 @@ impl Ports {
             }
         }
         self.g_of = dynamics.factor_count;
-        if dynamics.contacts.pressing() {
+        if dynamics.contacts.pressing() > 0 {
             let components = &self.components;
             let rate = |p: usize, v: &[f64]| {
                 let at = dynamics.kkt.body_at[components[p].body];

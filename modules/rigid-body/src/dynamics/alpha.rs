@@ -3,7 +3,6 @@
 use super::scheme::{Acceleration, Integrator, Weights};
 use super::second_order::{add, inertial_moment, rates};
 use super::{Dynamics, Failure};
-use crate::drive::Axis;
 use crate::dynamics::joint_rows::{gap, rows};
 use crate::math::{V3, cayley};
 use crate::state::{Motion, State};
@@ -69,10 +68,12 @@ impl Dynamics {
                 self.rhs[at + 3 + k] += moment[k];
             }
         }
+        let span = self.span(state, dt, 1.0);
         for (j, joint) in self.model.joints.iter().enumerate() {
             let s = &state.joints[j];
             self.rows[j] = rows(joint, &state.bodies);
-            let axis = Axis::new(s, joint.limits, state.supply.limit, dt);
+            let axis = &mut self.axes[j];
+            axis.renew(s, joint.limits, &span);
             let mode = axis.start(s.mode);
             for r in 0..6 {
                 self.compliance[j][r] = if s.broken { None } else { Some(0.0) };

@@ -18,7 +18,7 @@ pub(crate) mod scheme;
 mod second_order;
 
 use crate::contact::bodies::BodyContacts;
-use crate::drive::{Axis, Mode};
+use crate::drive::{Axis, MOST_YIELDING, Mode, Span, YIELDING};
 use crate::math::{M3, V3, cayley};
 use crate::model::Model;
 use crate::state::{Motion, State};
@@ -33,6 +33,8 @@ const GAP_TOLERANCE: f64 = 1e-11;
 const MAX_CORRECTIONS: usize = 6;
 /// Rounds in which all axes change branch at once; after them one at a time.
 const FREE_ROUNDS: usize = 8;
+/// Rounds one at a time before rigid motors are softened.
+const SINGLE_ROUNDS: usize = 8;
 
 /// Why a trial has no result.
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
@@ -84,6 +86,8 @@ pub(crate) struct Dynamics {
     free_rate: Vec<V3>,
     rows: Vec<Rows>,
     pub axes: Vec<Axis>,
+    /// See [`YIELDING`].
+    pub yielding: f64,
     /// Per axis: change of the coordinate over h less J·v⁺, from the curvature of the motion.
     curvature: Vec<f64>,
     broken: Vec<bool>,
@@ -128,6 +132,7 @@ impl Dynamics {
             free_rate: vec![V3::zeros(); nb],
             rows: vec![Rows::default(); nj],
             axes: vec![Axis::idle(); nj],
+            yielding: 0.0,
             curvature: vec![0.0; nj],
             broken: vec![false; nj],
             base_rhs: vec![0.0; n],
@@ -156,9 +161,22 @@ impl Dynamics {
             return self.prepare_second_order(state);
         }
         self.prepare_bodies(state);
-        self.prepare_joints(state);
         self.contacts.detect(&self.starts, h);
+        self.yielding = if self.contacts.any() { YIELDING } else { 0.0 };
+        self.prepare_joints(state);
         Ok(())
+    }
+
+    /// After a step without a consistent state: rigid motors give way ten times as much. False: no more of that.
+    /// Coulomb's law is not monotone, so a motor that pushes a sliding foot may belong neither at its bound nor below.
+    pub fn soften(&mut self, state: &State) -> bool {
+        if self.yielding <= 0.0 || self.yielding >= MOST_YIELDING {
+            return false;
+        }
+        self.yielding *= 10.0;
+        self.factored = false;
+        self.prepare_joints(state);
+        true
     }
 
     /// Impulse of a unit force of the step in the system for the mean rates, s.
@@ -193,11 +211,12 @@ impl Dynamics {
         }
         self.solution.copy_from_slice(&self.free);
         self.find_ends();
+        let span = self.span(state, self.h, 1.0);
         for (j, joint) in self.model.joints.iter().enumerate() {
             let s = &state.joints[j];
             self.broken[j] = s.broken;
             self.rows[j] = joint_rows::rows(joint, &self.starts);
-            self.axes[j] = Axis::new(s, joint.limits, state.supply.limit, self.h);
+            self.axes[j].renew(s, joint.limits, &span);
             self.modes[j] = self.axes[j].start(s.mode);
             let open = gap(joint, &self.ends);
             let rates = self.rates(j, &self.free);
@@ -211,6 +230,11 @@ impl Dynamics {
                 self.base_rhs[at + r] = if s.broken || joint.free_row() == Some(r) { 0.0 } else { hold };
             }
         }
+    }
+
+    /// For which step axes are made; `when`: see [`Span`].
+    fn span(&self, state: &State, h: f64, when: f64) -> Span {
+        Span { h, when, supply_v: state.supply.limit, yielding: self.yielding }
     }
 
     /// J·v of all rows of joint j.
@@ -237,6 +261,13 @@ impl Dynamics {
         };
         let rate = rate + self.curvature[j];
         Some(AxisResult { rate, end_rate: rate, mean_rate, impulse })
+    }
+
+    /// Work of the contact impulses of the trial: at the mean of the rates before and after, so that it is exactly
+    /// what the kinetic energy misses.
+    pub fn contact_work(&self) -> f64 {
+        let at = |v| self.contacts.work(&self.kkt.body_at, v);
+        0.5 * (at(&self.free) + at(&self.solution))
     }
 
     /// Change of the rates of a body by all impulses of the trial.
@@ -272,7 +303,8 @@ impl Dynamics {
 
     /// Solves the step under `external`; the result is in `solution`, `ends`, `turns` and `modes`.
     pub fn solve(&mut self) -> Result<(), Failure> {
-        let rounds = FREE_ROUNDS + 8 * self.axes.len() + 8;
+        let soft = self.yielding <= 0.0 || self.yielding >= MOST_YIELDING;
+        let rounds = FREE_ROUNDS + if soft { 8 * self.axes.len() + 8 } else { SINGLE_ROUNDS };
         for round in 0..rounds {
             self.ensure_factor()?;
             if self.integrator.is_second_order() {

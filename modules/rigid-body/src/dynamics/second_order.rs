@@ -6,7 +6,6 @@
 
 use super::scheme::{Integrator, Six, Weights};
 use super::{AxisResult, Dynamics, Failure, GAP_TOLERANCE};
-use crate::drive::Axis;
 use crate::dynamics::joint_rows::{coordinate, gap, mean_rows, rows};
 use crate::math::V3;
 use crate::state::{Motion, State};
@@ -46,6 +45,7 @@ impl Dynamics {
             let r = self.ends[b].q.to_rotation_matrix();
             self.inertia[b] = r * self.model.bodies[b].inertia * r.transpose();
         }
+        let span = self.span(state, self.h, self.integrator.force_time());
         for (j, joint) in self.model.joints.iter().enumerate() {
             let s = &state.joints[j];
             self.broken[j] = s.broken;
@@ -53,8 +53,7 @@ impl Dynamics {
                 Integrator::EnergyMomentum => mean_rows(joint, &self.starts, &self.ends),
                 _ => rows(joint, &self.ends),
             };
-            let (h, when) = (self.h, self.integrator.force_time());
-            self.axes[j] = Axis::at(s, joint.limits, state.supply.limit, h, when);
+            self.axes[j].renew(s, joint.limits, &span);
             self.modes[j] = self.axes[j].start(s.mode);
         }
         Ok(())

@@ -3,51 +3,48 @@
 use crate::spatial::Wrench;
 use crate::tree::Tree;
 
-/// Answers of a factored [`Tree`] to unit wrenches as vectors y(w) with w_i·K⁻¹·w_k = y_i·y_k.
+/// Answers of a factored [`Tree`] to unit wrenches as vectors y(w) with w_i·K⁻¹·w_k = ⟨y_i, y_k⟩ ([`Path::dot`]).
 ///
-/// A vector has one entry for each freedom between the root and the body, from the root on, so two bodies share
-/// the first [`Path::shared`] entries and W = H·K⁻¹·Hᵀ of contacts is a matter of short dot products. For rates
-/// under rigid rows at rest (b = 0).
+/// A vector has one entry for each row that closes a loop, then one for each freedom between the root and the body,
+/// from the root on, so two bodies share the first [`Path::shared`] entries and W = H·K⁻¹·Hᵀ of contacts is a matter
+/// of short dot products. For rates under rigid rows at rest (b = 0).
 pub struct Path;
 
 impl Path {
     /// Number of entries for a body.
     pub fn len(tree: &Tree, body: usize) -> usize {
-        tree.path_len(body)
+        tree.loops().len() + tree.path_len(body)
     }
 
-    /// How many entries the vectors of two bodies have in common; 0: they are in different trees.
-    pub fn shared(tree: &Tree, mut a: usize, mut b: usize) -> usize {
-        // Parents come first, so the later body is never the ancestor.
-        while a != b {
-            let later = if a > b { &mut a } else { &mut b };
-            match tree.above(*later) {
-                Some(above) => *later = above,
-                None => return 0,
-            }
-        }
-        tree.path_len(a)
+    /// How many entries the vectors of two bodies have in common; 0: nothing connects them.
+    pub fn shared(tree: &Tree, a: usize, b: usize) -> usize {
+        tree.loops().len() + shared_entries(tree, a, b)
     }
 
     /// Writes y of a wrench on a body (about its centre of mass, world axes) into `y[..Path::len(body)]`.
     pub fn respond(tree: &Tree, body: usize, wrench: &Wrench, y: &mut [f64]) {
-        let mut end = tree.path_len(body);
-        let mut p = *wrench;
-        let mut next = Some(body);
-        while let Some(b) = next {
-            let first = tree.above(b).map_or(0, |above| tree.path_len(above));
-            let mut k = first;
-            next = tree.pass_up(b, &mut p, |share| {
-                y[k] = share;
-                k += 1;
-            });
-            debug_assert_eq!(k, end);
-            end = first;
-        }
+        let (loops, path) = y.split_at_mut(tree.loops().len());
+        tree.climb(body, wrench, path);
+        tree.loops().feel(tree, body, path, loops);
     }
 
-    /// y_a·y_b over the shared entries.
-    pub fn dot(shared: usize, a: &[f64], b: &[f64]) -> f64 {
-        a[..shared].iter().zip(&b[..shared]).map(|(a, b)| a * b).sum()
+    /// ⟨y_a, y_b⟩ over the shared entries: what loops hold back counts against.
+    pub fn dot(tree: &Tree, shared: usize, a: &[f64], b: &[f64]) -> f64 {
+        let loops = tree.loops().len();
+        let held: f64 = a[..loops].iter().zip(&b[..loops]).map(|(a, b)| a * b).sum();
+        a[loops..shared].iter().zip(&b[loops..shared]).map(|(a, b)| a * b).sum::<f64>() - held
     }
+}
+
+/// Freedoms that the paths of two bodies have in common.
+pub(crate) fn shared_entries(tree: &Tree, mut a: usize, mut b: usize) -> usize {
+    // Parents come first, so the later body is never the ancestor.
+    while a != b {
+        let later = if a > b { &mut a } else { &mut b };
+        match tree.above(*later) {
+            Some(above) => *later = above,
+            None => return 0,
+        }
+    }
+    tree.path_len(a)
 }

@@ -7,6 +7,7 @@
 //! is due to Baraff (1996). The directions are taken out one at a time, so each pivot SᵀAS + K is a positive
 //! number, and no block is ever inverted.
 
+use crate::loops::{Cut, Loops};
 use crate::rows::Rows;
 use crate::spatial::{
     Inertia, Wrench, add, add_shifted, at, deflate, dot, of_body, rates_further, times, wrench_back,
@@ -31,6 +32,9 @@ pub enum Error {
         /// What should have been positive.
         pivot: f64,
     },
+    /// The system of the rows that close loops cannot be factored.
+    #[error("the rows that close loops are not finite or have negative compliance")]
+    Loops,
     /// The right-hand side is not finite.
     #[error("the right-hand side or the solution is not finite")]
     NotFinite,
@@ -78,27 +82,47 @@ struct Node {
     path_len: usize,
 }
 
-/// Trees of bodies.
+/// Trees of bodies, with or without rows that close loops.
 #[derive(Clone, Debug)]
 pub struct Tree {
     nodes: Vec<Node>,
     joints: usize,
+    loops: Loops,
 }
 
 impl Tree {
-    /// From the links of all bodies, parents first, and the number of joints.
-    pub fn new(links: &[Link], joints: usize) -> Result<Self, Error> {
+    /// From the links of all bodies, parents first, the number of joints and that of rows that close loops.
+    pub fn new(links: &[Link], joints: usize, cuts: usize) -> Result<Self, Error> {
         let late = links.iter().enumerate().find(|(b, l)| l.parent.is_some_and(|p| p >= *b));
         if let Some((body, _)) = late {
             return Err(Error::Order { body });
         }
         let node = |l: &Link| Node { parent: l.parent, joint: l.joint, ..Node::default() };
-        Ok(Self { nodes: links.iter().map(node).collect(), joints })
+        Ok(Self { nodes: links.iter().map(node).collect(), joints, loops: Loops::new(cuts) })
     }
 
     /// Number of unknowns.
     pub fn len(&self) -> usize {
+        self.tree_len() + self.loops.len()
+    }
+
+    /// Those of bodies and joints.
+    pub(crate) fn tree_len(&self) -> usize {
         6 * (self.nodes.len() + self.joints)
+    }
+
+    /// Unknown of a row that closes a loop, with the sign of μ as for joints.
+    pub fn cut_at(&self, cut: usize) -> usize {
+        self.tree_len() + cut
+    }
+
+    /// How many rows of loops say nothing that the others do not say, at the last factorisation.
+    pub fn redundant(&self) -> usize {
+        self.loops.redundant()
+    }
+
+    pub(crate) fn loops(&self) -> &Loops {
+        &self.loops
     }
 
     /// Whether there are no unknowns.
@@ -117,13 +141,15 @@ impl Tree {
     }
 
     /// Factorises. Per body its mass (kg) and inertia about the centre of mass (kg m², world axes); per joint its
-    /// rows and their compliance: `Some(0)` rigid, `Some(c)` compliant, `None` no row at all.
+    /// rows and their compliance: `Some(0)` rigid, `Some(c)` compliant, `None` no row at all; the rows that close
+    /// loops.
     pub fn factor(
         &mut self,
         masses: &[f64],
         inertia: &[Matrix3<f64>],
         rows: &[Rows],
         compliance: &[[Option<f64>; 6]],
+        cuts: &[Cut],
     ) -> Result<(), Error> {
         for (b, node) in self.nodes.iter_mut().enumerate() {
             node.inertia = of_body(masses[b], &inertia[b]);
@@ -141,6 +167,12 @@ impl Tree {
             self.nodes[b].path_len =
                 self.above(b).map_or(0, |p| self.nodes[p].path_len) + self.nodes[b].count;
         }
+        if !self.loops.is_empty() {
+            let mut loops = std::mem::take(&mut self.loops);
+            let done = loops.factor(self, cuts);
+            self.loops = loops;
+            done?;
+        }
         Ok(())
     }
 
@@ -155,7 +187,7 @@ impl Tree {
 
     /// Takes the freedoms of body b out of a wrench on it and hands the rest to the body above. `each` receives
     /// every freedom's share, divided by the root of its pivot, last freedom of the row order last.
-    pub(crate) fn pass_up(&self, b: usize, p: &mut Wrench, mut each: impl FnMut(f64)) -> Option<usize> {
+    fn pass_up(&self, b: usize, p: &mut Wrench, mut each: impl FnMut(f64)) -> Option<usize> {
         let node = &self.nodes[b];
         for f in &node.freedoms[..node.count] {
             let share = dot(&f.motion, p) * f.inverse;
@@ -166,9 +198,35 @@ impl Tree {
         self.above(b)
     }
 
+    /// Answers of the path of a body to a wrench on it, from the root on, without loops.
+    pub(crate) fn climb(&self, body: usize, wrench: &Wrench, y: &mut [f64]) {
+        let mut end = self.path_len(body);
+        let mut p = *wrench;
+        let mut next = Some(body);
+        while let Some(b) = next {
+            let first = self.above(b).map_or(0, |above| self.path_len(above));
+            let mut k = first;
+            next = self.pass_up(b, &mut p, |share| {
+                y[k] = share;
+                k += 1;
+            });
+            debug_assert_eq!(k, end);
+            end = first;
+        }
+    }
+
     /// Overwrites the right-hand side (f, b) by the solution (v, μ). Rows that do not exist get μ = 0; the
     /// right-hand side there is of no effect.
     pub fn substitute(&self, x: &mut [f64]) {
+        let n = self.tree_len();
+        self.substitute_trees(&mut x[..n]);
+        if !self.loops.is_empty() {
+            self.loops.substitute(x, n);
+        }
+    }
+
+    /// The same without loops.
+    pub(crate) fn substitute_trees(&self, x: &mut [f64]) {
         for (b, node) in self.nodes.iter().enumerate().rev() {
             let rest = node.forward(b, x, 6 * self.nodes.len());
             if let Some(p) = node.parent.filter(|_| node.hangs) {

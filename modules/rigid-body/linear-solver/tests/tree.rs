@@ -55,8 +55,8 @@ fn forest(raw: &[Raw]) -> Forest {
 
 impl Forest {
     fn tree(&self) -> Tree {
-        let mut tree = Tree::new(&self.links, self.rows.len()).expect("parents first");
-        tree.factor(&self.masses, &self.inertia, &self.rows, &self.compliance).expect("positive pivots");
+        let mut tree = Tree::new(&self.links, self.rows.len(), 0).expect("parents first");
+        tree.factor(&self.masses, &self.inertia, &self.rows, &self.compliance, &[]).expect("positive pivots");
         tree
     }
 
@@ -135,7 +135,7 @@ proptest! {
         tree.substitute(&mut x);
         for b in 0..=last {
             let moved: f64 = wrench(b).iter().zip(&x[tree.body_at(b)..]).map(|(w, v)| w * v).sum();
-            let found = Path::dot(Path::shared(&tree, b, last), &answers[b], &answers[last]);
+            let found = Path::dot(&tree, Path::shared(&tree, b, last), &answers[b], &answers[last]);
             let size = wrench(b).iter().zip(&x[tree.body_at(b)..]).map(|(w, v)| (w * v).abs()).sum::<f64>();
             prop_assert!((moved - found).abs() <= 1e-11 * size.max(1e-6), "{b}: {moved} {found}");
         }
@@ -182,11 +182,11 @@ fn what_cannot_be_factored_is_an_error() {
     let mut f = chain(1.0);
     f.inertia[7] = Matrix3::zeros();
     f.masses[7] = 0.0;
-    let mut tree = Tree::new(&f.links, 8).expect("parents first");
-    let refused = tree.factor(&f.masses, &f.inertia, &f.rows, &f.compliance);
+    let mut tree = Tree::new(&f.links, 8, 0).expect("parents first");
+    let refused = tree.factor(&f.masses, &f.inertia, &f.rows, &f.compliance, &[]);
     assert!(matches!(refused, Err(Error::Pivot { body: 7, .. })), "{refused:?}");
     let backwards = [Link { parent: Some(1), joint: Some(0) }, Link { parent: None, joint: None }];
-    assert_eq!(Tree::new(&backwards, 1).err(), Some(Error::Order { body: 0 }));
+    assert_eq!(Tree::new(&backwards, 1, 0).err(), Some(Error::Order { body: 0 }));
     let mut x = vec![0.0; good.len()];
     let mut rhs = x.clone();
     rhs[3] = f64::NAN;

@@ -215,7 +215,7 @@ impl BodyContacts {
                     for d in 0..if i == k { c + 1 } else { 3 } {
                         let left = &self.answers[(6 * i + 2 * c + a) * self.stride..];
                         let right = &self.answers[(6 * k + 2 * d + b) * self.stride..];
-                        let value = Path::dot(shared, left, right);
+                        let value = Path::dot(tree, shared, left, right);
                         let (row, column) = (3 * i + c, 3 * k + d);
                         self.w[row * n + column] += value;
                         if row != column {

@@ -110,7 +110,7 @@ impl Ports {
                     (pair, shared) = (bodies, Path::shared(tree, bodies[0], bodies[1]));
                 }
                 let answer = |c: usize| &self.answers[c * self.stride..];
-                let sum = Path::dot(shared, answer(i), answer(k));
+                let sum = Path::dot(tree, shared, answer(i), answer(k));
                 self.g[k * n + i] = h2 * sum;
                 self.g[i * n + k] = h2 * sum;
             }

@@ -20,7 +20,7 @@ impl Kkt {
             joint: *above,
         };
         let links: Vec<Link> = model.joint_above.iter().map(link).collect();
-        let solver = Tree::new(&links, model.joints.len())?;
+        let solver = Tree::new(&links, model.joints.len(), 0)?;
         Ok(Self {
             body_at: (0..model.bodies.len()).map(|b| solver.body_at(b)).collect(),
             joint_at: (0..model.joints.len()).map(|j| solver.joint_at(j)).collect(),
@@ -41,6 +41,6 @@ impl Kkt {
         rows: &[Rows],
         compliance: &[[Option<f64>; 6]],
     ) -> Result<(), Error> {
-        self.solver.factor(&self.masses, inertia, rows, compliance)
+        self.solver.factor(&self.masses, inertia, rows, compliance, &[])
     }
 }

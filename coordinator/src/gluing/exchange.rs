@@ -65,6 +65,10 @@ pub struct Exchange {
     pub stabilisation: f64,
     /// T, X1 and V1 of the last trial of the bodies.
     base: [Vec<f64>; 3],
+    /// T, X1, V1, A1, X2, V2 and A2 while differences are taken.
+    kept: [Vec<f64>; 7],
+    /// The bodies' last trial is not that of T.
+    displaced: bool,
     zeros: Vec<f64>,
     /// Committed wrench of every port of the step before, by key.
     pub last: Vec<(u64, [f64; 6])>,
@@ -104,6 +108,8 @@ impl Exchange {
             level: Level::Position,
             stabilisation: 0.0,
             base: Default::default(),
+            kept: Default::default(),
+            displaced: false,
             zeros: Vec::new(),
             last: Vec::new(),
             work: Vec::new(),
@@ -277,6 +283,7 @@ impl Exchange {
     pub fn advance_bodies(&mut self, instances: &mut [Instance]) -> Result {
         let start = Clock::now();
         self.at.trial += 1;
+        self.displaced = false;
         for side in &mut self.bodies {
             let instance = &mut instances[side.slot];
             side.advance_under_force(instance, &self.nodes, &self.at, &self.t, None, Answer::default())?;
@@ -402,33 +409,61 @@ impl Exchange {
     }
 
     /// The same by differences of trials: δT = 1e-6·max(1, |T|), forward or central. The bodies' last trial is
-    /// then another one: a strategy advances them again before it ends.
+    /// then another one: see [`Exchange::settle_bodies`].
     fn difference_trials(&mut self, central: bool, instances: &mut [Instance]) -> Result {
         let n = self.n();
-        let answers = |e: &Self| -> Vec<f64> { (0..n).map(|i| e.mismatch(i, 0.0)).collect() };
-        let kept = (self.t.clone(), answers(self), self.report.evaluations_bodies);
-        let saved = [&self.x1, &self.v1, &self.a1, &self.x2, &self.v2, &self.a2].map(Clone::clone);
+        let before = self.report.evaluations_bodies;
+        let mut kept = std::mem::take(&mut self.kept);
+        for (kept, value) in
+            kept.iter_mut().zip([&self.t, &self.x1, &self.v1, &self.a1, &self.x2, &self.v2, &self.a2])
+        {
+            kept.clear();
+            kept.extend_from_slice(value);
+        }
+        let mut base = std::mem::take(&mut self.work);
+        base.clear();
+        base.extend((0..n).map(|i| self.mismatch(i, 0.0)));
         for column in 0..n {
-            let delta = 1e-6 * kept.0[column].abs().max(1.0);
-            self.t[column] = kept.0[column] + delta;
-            self.advance_bodies(instances)?;
-            let plus = answers(self);
-            let (minus, width) = if central {
-                self.t[column] = kept.0[column] - delta;
+            let delta = 1e-6 * kept[0][column].abs().max(1.0);
+            if central {
+                self.t[column] = kept[0][column] - delta;
                 self.advance_bodies(instances)?;
-                (answers(self), 2.0 * delta)
-            } else {
-                (kept.1.clone(), delta)
-            };
-            self.t[column] = kept.0[column];
-            for row in 0..n {
-                self.estimate.g[column * n + row] = (plus[row] - minus[row]) / width;
+                base.clear();
+                base.extend((0..n).map(|i| self.mismatch(i, 0.0)));
+            }
+            self.t[column] = kept[0][column] + delta;
+            self.advance_bodies(instances)?;
+            self.t[column] = kept[0][column];
+            let width = if central { 2.0 * delta } else { delta };
+            for (row, base) in base.iter().enumerate() {
+                self.estimate.g[column * n + row] = (self.mismatch(row, 0.0) - base) / width;
             }
         }
-        self.report.evaluations_jacobian += self.report.evaluations_bodies - kept.2;
-        self.report.evaluations_bodies = kept.2;
-        let [x1, v1, a1, x2, v2, a2] = saved;
-        (self.x1, self.v1, self.a1, self.x2, self.v2, self.a2) = (x1, v1, a1, x2, v2, a2);
+        self.work = base;
+        self.report.evaluations_jacobian += self.report.evaluations_bodies - before;
+        self.report.evaluations_bodies = before;
+        for (value, kept) in
+            [&mut self.t, &mut self.x1, &mut self.v1, &mut self.a1, &mut self.x2, &mut self.v2, &mut self.a2]
+                .into_iter()
+                .zip(&kept)
+        {
+            value.copy_from_slice(kept);
+        }
+        for (base, kept) in self.base.iter_mut().zip(&kept) {
+            base.copy_from_slice(kept);
+        }
+        self.kept = kept;
+        self.displaced = true;
+        Ok(())
+    }
+
+    /// Repeats the bodies' trial under T where differences have left them in another one: before a commit.
+    pub fn settle_bodies(&mut self, instances: &mut [Instance]) -> Result {
+        if self.displaced {
+            self.advance_bodies(instances)?;
+            self.report.evaluations_bodies -= 1;
+            self.report.evaluations_jacobian += 1;
+        }
         Ok(())
     }
 

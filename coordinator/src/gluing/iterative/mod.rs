@@ -10,6 +10,7 @@
 //! one on failure. The start is the co-operational answer min(T*, F), never the T of the step before, which
 //! lands on the wrong side of the unloading kink by rounding.
 
+mod friction;
 mod tt;
 mod xt;
 

@@ -11,7 +11,7 @@ use super::super::exchange::Exchange;
 use super::super::glue::Row;
 use super::super::linear::max_norm;
 use super::super::refresh::Refresh;
-use super::{Limits, largest_eigenvalue};
+use super::{Limits, friction, largest_eigenvalue};
 use crate::Result;
 use crate::host::Instance;
 
@@ -65,6 +65,7 @@ impl TtForm {
             let solved = self.newton_step(exchange, instances)?;
             size = max_norm(&self.d);
             if size <= limits.threshold(exchange) {
+                exchange.settle_bodies(instances)?;
                 return Ok(self.converged(exchange, size));
             }
             if !solved {
@@ -96,7 +97,7 @@ impl TtForm {
         Ok(())
     }
 
-    /// Bounds of every component; Coulomb's follow the normal force of the last trial.
+    /// Bounds of every component; Coulomb's cone is inside its rows instead.
     fn bounds(&mut self, exchange: &Exchange) {
         self.lower.clear();
         self.upper.clear();
@@ -104,11 +105,7 @@ impl TtForm {
             for (i, _) in port.components() {
                 let (lower, upper) = match exchange.rows[i] {
                     Row::Normal => (port.law.t_min, port.law.t_max),
-                    Row::Coulomb => {
-                        let bound = port.law.mu * exchange.t[port.first as usize].max(0.0);
-                        (-bound, bound)
-                    }
-                    Row::Law | Row::Joint => (f64::NEG_INFINITY, f64::INFINITY),
+                    Row::Law | Row::Joint | Row::Coulomb => (f64::NEG_INFINITY, f64::INFINITY),
                 };
                 self.lower.push(lower);
                 self.upper.push(upper);
@@ -139,6 +136,11 @@ impl TtForm {
         let n = exchange.n();
         exchange.ground_jacobian(instances, false, &mut self.mixed)?;
         self.assemble(exchange);
+        for port in exchange.ports.iter().filter(|p| p.len() > 1) {
+            if exchange.rows[port.first as usize + 1] == Row::Coulomb {
+                friction::project(port, &exchange.t, &mut self.e, &mut self.matrix);
+            }
+        }
         let matrix = &self.matrix;
         let problem = BoundedProblem {
             a: |r: usize, c: usize| matrix[r * n + c],
@@ -237,11 +239,16 @@ impl TtForm {
         report.residual = size / exchange.t_ref;
         for port in &exchange.ports {
             let i = port.first as usize;
-            if exchange.t[i] > 0.0 || exchange.rows[i] == Row::Joint {
-                report.max_gap_m = report.max_gap_m.max(self.e[i].abs());
-            }
             if exchange.rows[i] == Row::Joint {
+                for k in port.range() {
+                    let gap = exchange.x1[k] - exchange.x2[k] + exchange.gap[k];
+                    let gap = (gap + port.law.compliance * exchange.t[k]).abs();
+                    report.max_gap_m = report.max_gap_m.max(gap);
+                }
                 continue;
+            }
+            if exchange.t[i] > 0.0 {
+                report.max_gap_m = report.max_gap_m.max(self.e[i].abs());
             }
             let complementarity = exchange.t[i].min(self.e[i] / self.matrix[i * exchange.t.len() + i]).abs();
             report.complementarity_n = report.complementarity_n.max(complementarity);

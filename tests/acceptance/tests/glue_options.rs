@@ -1,0 +1,313 @@
+//! Every option of `[gluing]` changes what it says and nothing else: Jacobians, levels, holds, friction, soil columns.
+//!
+//! Models, integrators and figures: `tests/reference/gluing/README.md`.
+
+use glue_cases::{MassChain, PlanarBodies, PowerColumns, TableOnFeet};
+use terraglue::host::Library;
+use terraglue::testbed::Options;
+use terraglue::{Result, Testbed, scenario::Scenario};
+
+fn try_build(text: &str) -> Result<Testbed> {
+    let scenario = Scenario::parse(text, "test.toml", &[])?;
+    let library = Library::new()
+        .with::<MassChain>()
+        .with::<PlanarBodies>()
+        .with::<TableOnFeet>()
+        .with::<PowerColumns>();
+    Testbed::build_with(&scenario, &Options { threads: 1, ..Options::default() }, &library)
+}
+
+fn build(text: &str) -> Testbed {
+    try_build(text).unwrap_or_else(|e| panic!("{e}"))
+}
+
+fn read(testbed: &Testbed, name: &str) -> f64 {
+    testbed.read(name).unwrap_or_else(|| panic!("no variable {name}"))
+}
+
+/// What a run did: mean evaluations of the bodies, Jacobian refreshes, evaluations for them, largest gap.
+#[derive(Debug, Default)]
+struct Did {
+    steps: f64,
+    evaluations: f64,
+    refreshes: u32,
+    gap: f64,
+}
+
+fn run(testbed: &mut Testbed, until: f64) -> Result<Did> {
+    let mut did = Did::default();
+    while testbed.t_s() < until - 1e-9 {
+        testbed.step()?;
+        let report = testbed.report();
+        did.steps += 1.0;
+        did.evaluations += f64::from(report.evaluations_bodies);
+        did.refreshes += report.jacobian_refreshes;
+        did.gap = did.gap.max(report.max_gap_m);
+    }
+    did.evaluations /= did.steps;
+    Ok(did)
+}
+
+/// Two rods, cut at their pin.
+fn pendulum(gluing: &str) -> String {
+    format!(
+        r#"
+[time]
+step_s = 0.005
+duration_s = 1.0
+[world]
+gravity_m_s2 = [0.0, -9.81, 0.0]
+[gluing]
+strategy = "iterative"
+{gluing}
+[upper]
+module = "planar-bodies"
+mass_kg = [1.0]
+inertia_kg_m2 = [0.08333333333333333]
+pose = [0.5, 0.0, 0.0]
+pins = [0, -1, 0.0, 0.0]
+integrator = "generalized-alpha"
+[lower]
+module = "planar-bodies"
+mass_kg = [1.0]
+inertia_kg_m2 = [0.08333333333333333]
+pose = [1.5, 0.0, 0.0]
+integrator = "generalized-alpha"
+[[glue]]
+side_1 = "upper.b0"
+side_2 = "lower.b0"
+at_m = [1.0, 0.0, 0.0]
+components = ["x", "y"]
+"#
+    )
+}
+
+#[test]
+fn jacobians_by_differences_give_the_same_motion() {
+    let mut analytic = build(&pendulum(""));
+    let own = run(&mut analytic, 1.0).unwrap_or_else(|e| panic!("{e}"));
+    for jacobian in ["directional", "finite-differences"] {
+        let mut other = build(&pendulum(&format!("jacobian = \"{jacobian}\"")));
+        let did = run(&mut other, 1.0).unwrap_or_else(|e| panic!("{e}"));
+        let apart = (read(&other, "lower.b0.angle") - read(&analytic, "lower.b0.angle")).abs();
+        println!("{jacobian}: {apart:.1e} rad, {did:?}, analytic {own:?}");
+        assert!(apart <= 1e-8 && did.evaluations <= own.evaluations + 0.5);
+        assert!(did.refreshes >= 10, "one in 20 steps");
+    }
+}
+
+#[test]
+fn a_frozen_jacobian_fails_when_the_rods_have_turned() {
+    let mut frozen = build(&pendulum("jacobian = \"frozen\""));
+    let failed = run(&mut frozen, 1.0).expect_err("a frozen Jacobian glues nothing that turns");
+    println!("{failed}");
+    assert!(failed.to_string().contains("halved"), "{failed}");
+}
+
+#[test]
+fn velocity_level_keeps_the_order_and_stabilisation_the_gap() {
+    let error = |gluing: &str, until: f64| {
+        let mut testbed = build(&pendulum(gluing));
+        let did = run(&mut testbed, until).unwrap_or_else(|e| panic!("{e}"));
+        // DOP853 at 1 s
+        ((read(&testbed, "upper.b0.angle") + 2.778512564986).abs(), did.gap)
+    };
+    let (free, drift) = error("level = \"velocity\"", 1.0);
+    let (held, kept) = error("level = \"velocity\"\nstabilisation = 0.2", 1.0);
+    println!("velocity level: {free:.1e} rad, {drift:.1e} m; stabilised {held:.1e} rad, {kept:.1e} m");
+    assert!(free < 2e-3 && held < 2e-3, "{free} {held}");
+    assert!(drift < 1e-3 && kept < 0.1 * drift, "{drift} {kept}");
+}
+
+/// Two free masses with exact inner integration, pulled apart at the start.
+fn masses(gluing: &str) -> String {
+    format!(
+        r#"
+[time]
+step_s = 0.01
+duration_s = 1.0
+[world]
+gravity_m_s2 = [0.0, 0.0, 0.0]
+[gluing]
+strategy = "iterative"
+{gluing}
+[a]
+module = "mass-chain"
+mass_kg = [1.0]
+velocity_m_s = [1.0]
+integrator = "exact"
+[b]
+module = "mass-chain"
+mass_kg = [3.0]
+integrator = "exact"
+[[glue]]
+side_1 = "a.m0"
+side_2 = "b.m0"
+components = ["x"]
+"#
+    )
+}
+
+#[test]
+fn holds_and_levels_for_subsystems_that_sub_cycle() {
+    // spectral radius 1: the force rings for ever, its sign changes every step
+    let mut ringing = build(&masses("hold = \"constant\""));
+    let mut forces = Vec::new();
+    for _ in 0..20 {
+        ringing.step().unwrap_or_else(|e| panic!("{e}"));
+        forces.push(ringing.report().ports[0].wrench[0]);
+    }
+    assert!(
+        (forces[18] + forces[19]).abs() < 1e-6 * forces[19].abs() && forces[19].abs() > 1.0,
+        "{forces:?}"
+    );
+    // velocity level: common velocity after one step, then no force; the gap of that step stays
+    for hold in ["constant", "linear"] {
+        let mut level = build(&masses(&format!("hold = \"{hold}\"\nlevel = \"velocity\"")));
+        run(&mut level, 0.1).unwrap_or_else(|e| panic!("{e}"));
+        let (a, b) = (read(&level, "a.m0.v"), read(&level, "b.m0.v"));
+        assert!((a - 0.25).abs() < 1e-12 && (b - 0.25).abs() < 1e-12, "{hold}: {a} {b}");
+    }
+    let refused = try_build(&masses("hold = \"linear\"")).err().expect("linear hold at position level");
+    assert!(refused.to_string().contains("2 + √3"), "{refused}");
+}
+
+/// A block on the world with friction.
+fn block(velocity: f64, push: f64) -> String {
+    format!(
+        r#"
+[time]
+step_s = 0.001
+duration_s = 1.0
+[world]
+gravity_m_s2 = [{}, -9.81, 0.0]
+[gluing]
+strategy = "iterative"
+tolerance = 1e-12
+[block]
+module = "planar-bodies"
+mass_kg = [2.0]
+inertia_kg_m2 = [0.1]
+pose = [0.0, 0.0, 0.0]
+rate = [{velocity}, 0.0, 0.0]
+integrator = "implicit-euler"
+[[glue]]
+kind = "contact"
+side_1 = "block.b0"
+side_2 = "world"
+normal = [0.0, 1.0, 0.0]
+mu = 0.4
+"#,
+        push / 2.0
+    )
+}
+
+#[test]
+fn a_block_slides_stops_and_sticks_by_coulombs_law() {
+    let mut sliding = build(&block(1.5, 0.0));
+    run(&mut sliding, 1.0).unwrap_or_else(|e| panic!("{e}"));
+    let (x, v) = (read(&sliding, "block.b0.x"), read(&sliding, "block.b0.vx"));
+    let expected = 1.5 * 1.5 / (2.0 * 0.4 * 9.81) - 0.5e-3 * 1.5;
+    println!("stops at {x}, expected {expected}, v = {v:e}");
+    assert!((x - expected).abs() <= 1e-6 && v.abs() <= 1e-14);
+    // 5 N do not move it, 10 N do
+    let mut stuck = build(&block(0.0, 5.0));
+    run(&mut stuck, 1.0).unwrap_or_else(|e| panic!("{e}"));
+    assert!(read(&stuck, "block.b0.vx").abs() <= 1e-14);
+    let tangential = stuck.report().ports[0].wrench[1];
+    assert!((tangential + 5.0).abs() < 1e-9, "{tangential}");
+    let mut pushed = build(&block(0.0, 10.0));
+    run(&mut pushed, 1.0).unwrap_or_else(|e| panic!("{e}"));
+    assert!((read(&pushed, "block.b0.vx") - 1.0760).abs() < 1e-4);
+}
+
+/// A foot above one column of soil, trapezoidal rule or implicit Euler.
+fn foot(integrator: &str, soil: &str, duration: f64) -> String {
+    format!(
+        r#"
+[time]
+step_s = 0.001
+duration_s = {duration}
+[world]
+gravity_m_s2 = [0.0, 0.0, -9.81]
+[gluing]
+strategy = "iterative"
+tolerance = 1e-12
+[foot]
+module = "table-on-feet"
+mass_kg = 5.0
+start = [0.0, 0.0, 0.0, 0.5]
+integrator = "{integrator}"
+[soil]
+module = "power-columns"
+{soil}
+[[glue]]
+kind = "contact"
+side_1 = "foot.foot0"
+side_2 = "soil.c0"
+"#
+    )
+}
+
+/// `tests/reference/gluing/foot_exact.csv` and the errors that the README states for the integrators at 1 ms.
+#[test]
+fn a_foot_sinks_into_power_law_soil_as_deep_as_its_energy_carries_it() {
+    let soils = [
+        ("K = [8340.0]\nn = [1.0]\nk_u = [2e5]", 0.06, 0.01946325823806, 3e-4, -0.0280),
+        ("K = [15383.3]\nn = [1.1]\nk_u = [4e5]", 0.06, 0.01739549831024, 3e-4, -0.0303),
+        ("K = [8240.5]\nn = [0.5]\nk_u = [2e5]", 0.02, 0.002664777058788, 2e-2, -0.143),
+        ("K = [2404.2]\nn = [1.6]\nk_u = [5e4]", 0.23, 0.1670526528772, 3e-4, -0.0078),
+    ];
+    for (soil, until, z_max, bar, euler) in soils {
+        let deepest = |integrator| {
+            let mut testbed = build(&foot(integrator, soil, until));
+            run(&mut testbed, until).unwrap_or_else(|e| panic!("{soil}: {e}"));
+            read(&testbed, "soil.max_sinkage") / z_max - 1.0
+        };
+        let (second, first) = (deepest("newmark"), deepest("implicit-euler"));
+        println!("{soil:?}: {second:.1e} and {first:.4}");
+        assert!(second.abs() <= bar, "{soil}: {second}");
+        assert!((first - euler).abs() <= 0.05 * euler.abs(), "{soil}: {first}");
+    }
+}
+
+#[test]
+fn six_feet_on_springs_rest_where_statics_puts_them() {
+    let table = format!(
+        r#"
+[time]
+step_s = 1.0
+duration_s = 40.0
+[world]
+gravity_m_s2 = [0.0, 0.0, -9.81]
+[gluing]
+strategy = "iterative"
+tolerance = 1e-12
+[table]
+module = "table-on-feet"
+mass_kg = 60.0
+roll_inertia_kg_m2 = 2.0
+pitch_inertia_kg_m2 = 4.0
+feet_m = [0.4, 0.3, 0.0, 0.3, -0.4, 0.3, 0.4, -0.3, 0.0, -0.3, -0.4, -0.3]
+offset_m = [0.05, 0.02]
+integrator = "implicit-euler"
+[soil]
+module = "power-columns"
+K = [15e3, 15e3, 15e3, 15e3, 15e3, 15e3]
+k_u = [15e3, 15e3, 15e3, 15e3, 15e3, 15e3]
+{}"#,
+        (0..6)
+            .map(|i| format!(
+                "[[glue]]\nkind = \"contact\"\nside_1 = \"table.foot{i}\"\nside_2 = \"soil.c{i}\"\n"
+            ))
+            .collect::<String>()
+    );
+    let mut testbed = build(&table);
+    run(&mut testbed, 40.0).unwrap_or_else(|e| panic!("{e}"));
+    let forces: Vec<f64> = testbed.report().ports.iter().map(|p| p.wrench[0]).collect();
+    println!("{forces:?}");
+    for (got, want) in forces.iter().zip([123.03375, 104.64, 86.24625, 109.95375, 91.56, 73.16625]) {
+        assert!((got - want).abs() < 1e-9 * want, "{got} {want}");
+    }
+    assert!((read(&testbed, "table.heave") - 0.006722347916667).abs() < 1e-11);
+}

@@ -48,6 +48,8 @@ struct Member {
 struct Group {
     exchange: Exchange,
     strategy: Box<dyn Strategy>,
+    /// What finds the forces of joints at the start, where there are any.
+    start: Option<Box<dyn Strategy>>,
     /// Keys of the ports that carried a normal force in the last step.
     closed: Vec<u64>,
 }
@@ -162,12 +164,14 @@ impl Testbed {
 
     /// The forces of joints and the accelerations at the start: a step of h = 0.
     fn start_joints(&mut self) -> Result {
-        let joints =
-            self.group.as_ref().is_some_and(|g| g.strategy.starts_joints() && g.exchange.glue.has_joints());
-        if !joints {
-            return Ok(());
+        let Some(group) = &mut self.group else { return Ok(()) };
+        let Some(mut other) = group.start.take() else { return Ok(()) };
+        std::mem::swap(&mut group.strategy, &mut other);
+        let started = self.glue(0.0);
+        if let Some(group) = &mut self.group {
+            group.strategy = other;
         }
-        match self.glue(0.0)? {
+        match started? {
             Outcome::Converged => Ok(()),
             Outcome::NotConverged(why) => {
                 let message = format!("at the start, for the forces of the joints: {why}");

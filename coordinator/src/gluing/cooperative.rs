@@ -5,7 +5,7 @@
 //! without the contact constraints, under T1. The coordinator never sends T2 back.
 
 use super::exchange::Exchange;
-use super::{Outcome, Strategy};
+use super::{Needs, Outcome, Strategy};
 use crate::Result;
 use crate::host::Instance;
 use terraglue_subsystem::Capabilities;
@@ -22,8 +22,12 @@ impl Strategy for Cooperative {
         NAME
     }
 
-    fn needs(&self) -> (Capabilities, Capabilities) {
-        (Capabilities::FORCE, Capabilities::default())
+    fn needs(&self) -> Needs {
+        Needs { first: Capabilities::FORCE, second: Capabilities::FORCE, grounds: Capabilities::default() }
+    }
+
+    fn refuses(&self, exchange: &Exchange) -> Option<String> {
+        super::joints_refused(NAME, exchange)
     }
 
     fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {

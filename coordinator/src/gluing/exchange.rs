@@ -30,9 +30,9 @@ pub struct Exchange {
     pub at: Instant,
     /// All ports of the group in ascending order of key.
     pub ports: Vec<Port>,
-    nodes: Vec<Node>,
-    bodies: Vec<Side>,
-    grounds: Vec<Side>,
+    pub(super) nodes: Vec<Node>,
+    pub(super) bodies: Vec<Side>,
+    pub(super) grounds: Vec<Side>,
     /// The estimate of step 2.
     pub estimate: GroupEstimate,
     /// Surface of the grounds (answer to step 1 and to every trial), packed.
@@ -64,7 +64,7 @@ pub struct Exchange {
     /// Share of the position error taken out per step at velocity level.
     pub stabilisation: f64,
     /// T, X1 and V1 of the last trial of the bodies.
-    base: [Vec<f64>; 3],
+    pub(super) base: [Vec<f64>; 3],
     /// T, X1, V1, A1, X2, V2 and A2 while differences are taken.
     kept: [Vec<f64>; 7],
     /// The bodies' last trial is not that of T.
@@ -72,7 +72,7 @@ pub struct Exchange {
     zeros: Vec<f64>,
     /// Committed wrench of every port of the step before, by key.
     pub last: Vec<(u64, [f64; 6])>,
-    work: Vec<f64>,
+    pub(super) work: Vec<f64>,
     rigid: RigidContact,
     /// Where the time went.
     pub timings: Timings,
@@ -333,6 +333,11 @@ impl Exchange {
         }
     }
 
+    /// What the bodies' motion contributes to a row, without the glue's compliance and the soil's surface.
+    pub fn bodies_part(&self, i: usize) -> f64 {
+        if self.has_grounds() && self.rows[i] != Row::Joint { self.x1[i] } else { self.mismatch(i, 0.0) }
+    }
+
     /// Level of the interface Jacobian that fits [`Exchange::mismatch`].
     fn level_now(&self) -> Level {
         if self.at.h == 0.0 { Level::Acceleration } else { self.level }
@@ -465,43 +470,6 @@ impl Exchange {
             self.report.evaluations_jacobian += 1;
         }
         Ok(())
-    }
-
-    /// A trial of the bodies that stand on side 1 only, under T.
-    pub fn advance_first_under_force(&mut self, instances: &mut [Instance]) -> Result {
-        self.at.trial += 1;
-        for side in self.bodies.iter_mut().filter(|s| !s.is_second()) {
-            let instance = &mut instances[side.slot];
-            side.advance_under_force(instance, &self.nodes, &self.at, &self.t, None, Answer::default())?;
-            side.motion_by_side(
-                [&mut self.x1, &mut self.v1, &mut self.a1],
-                [&mut self.x2, &mut self.v2, &mut self.a2],
-            );
-        }
-        self.report.evaluations_bodies += 1;
-        Ok(())
-    }
-
-    /// A trial of all side 2, bodies and soils, under the motion X1: the wrench that it takes goes to `f`.
-    pub fn advance_second_under_motion(&mut self, instances: &mut [Instance]) -> Result {
-        if !self.grounds.is_empty() {
-            self.advance_grounds_under_motion(instances)?;
-        }
-        // the partner's motion from its own origin
-        self.work.clear();
-        self.work.extend(self.x1.iter().zip(&self.gap).map(|(x, gap)| x + gap));
-        for side in self.bodies.iter_mut().filter(|s| s.is_second()) {
-            let partner = (self.work.as_slice(), self.v1.as_slice());
-            let out = Answer { t: Some(&mut self.f), ..Answer::default() };
-            side.advance_under_motion(&mut instances[side.slot], &self.nodes, &self.at, partner, out)?;
-        }
-        self.x2.copy_from_slice(&self.work);
-        Ok(())
-    }
-
-    /// Bodies on side 2, which `advance_second_under_motion` drives.
-    pub fn second_slots(&self) -> impl Iterator<Item = usize> + '_ {
-        self.bodies.iter().filter(|s| s.is_second()).map(|s| s.slot).chain(self.ground_slots())
     }
 
     /// A trial of the grounds under the motion X1: the wrench of their law goes to `f`.

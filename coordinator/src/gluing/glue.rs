@@ -121,7 +121,33 @@ impl Glue {
 
     /// A joint without compliance, by number.
     pub fn rigid_joint(&self) -> Option<usize> {
-        self.joints.iter().position(|j| j.port.law.compliance == 0.0)
+        self.joints.iter().position(|j| !j.is_contact() && j.port.law.compliance == 0.0)
+    }
+
+    /// Whether a subsystem is side 2 of all its glue.
+    pub fn is_second(&self, slot: usize) -> bool {
+        let side = |e: usize| self.joints.iter().any(|j| j.ends[e].slot == Some(slot));
+        side(1) && !side(0)
+    }
+
+    /// A joint whose side 2 is the world or is side 1 elsewhere, by number: nobody could take its motion.
+    pub fn joint_without_second(&self) -> Option<usize> {
+        self.joints.iter().position(|j| !j.soil && !j.ends[1].slot.is_some_and(|s| self.is_second(s)))
+    }
+
+    /// A contact between bodies, by number.
+    pub fn contact(&self) -> Option<usize> {
+        self.joints.iter().position(Joint::is_contact)
+    }
+
+    /// A contact with friction between bodies, or with the world, by number.
+    pub fn body_contact(&self) -> Option<usize> {
+        self.joints.iter().position(|j| j.is_contact() && !j.soil)
+    }
+
+    /// A joint with compliance, by number.
+    pub fn spring(&self) -> Option<usize> {
+        self.joints.iter().position(|j| !j.is_contact() && j.port.law.compliance > 0.0)
     }
 
     /// Who meets at glue k.

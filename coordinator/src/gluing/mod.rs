@@ -1,27 +1,47 @@
 //! Gluing: how subsystems that share ports find one wrench per port and step. One file per strategy.
 //!
 //! - [`cooperative`]: the paper's single pass. The bodies estimate, the soil answers, the bodies re-solve.
+//! - [`cooperative_compliant`]: the same, exact for soils that yield: the soil iterates against the estimate.
 //! - [`iterative`]: the generic T-T strategy with its X-T form; repeats trials until both sides agree.
+//! - [`semi_implicit`]: one Newton step of it, no check.
+//! - [`xt_newton`], [`relaxed`]: motion in, force out on side 2; with and without derivatives.
+//! - [`xx_newton`]: motion in on both sides.
+//! - [`jacobi`], [`gauss_seidel`]: explicit, the baseline.
+//! - [`tlm`]: springs as transmission lines.
+//! - [`monolithic`]: the reference.
 //!
-//! Both work on an [`Exchange`], where the paper's calls stand by name, and fill one [`StepReport`].
+//! All work on an [`Exchange`], where the paper's calls stand by name, and fill one [`StepReport`].
 
 mod complementarity;
 pub mod cooperative;
+pub mod cooperative_compliant;
 mod estimate;
 mod exchange;
+pub mod gauss_seidel;
 pub mod glue;
 mod group_estimate;
+mod halves;
 pub mod iterative;
+pub mod jacobi;
 mod linear;
+pub mod monolithic;
 mod refresh;
+mod refusal;
+pub mod relaxed;
 mod report;
+pub mod semi_implicit;
 mod side;
 #[cfg(test)]
 mod tests;
+pub mod tlm;
+pub mod xt_newton;
+pub mod xx_newton;
 
 pub use exchange::{Derivatives, Exchange};
 pub use glue::{Glue, Row};
 pub use group_estimate::GroupEstimate;
+pub use refusal::{Refusal, refusal};
+use refusal::{body_contacts_refused, contacts_refused, joints_refused, rigid_refused, second_refused};
 pub use report::{PortReport, StepReport};
 pub use side::Instant;
 /// How wrenches run inside a step: only their end value counts for the integrators in use.
@@ -41,18 +61,24 @@ pub enum Outcome {
     NotConverged(String),
 }
 
+/// What the members of a group must be able to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Needs {
+    /// Bodies on side 1.
+    pub first: Capabilities,
+    /// Bodies that are side 2 of all their glue.
+    pub second: Capabilities,
+    /// Soils.
+    pub grounds: Capabilities,
+}
+
 /// A way to find the wrenches of one step (paper, steps 2 to 4; 1 and 5 are the same for all).
 pub trait Strategy: Send {
     /// Name in the scenario.
     fn name(&self) -> &'static str;
 
-    /// What a member on the side of the bodies and one on the side of the grounds must be able to do.
-    fn needs(&self) -> (Capabilities, Capabilities);
-
-    /// Whether it solves a step of h = 0 for the forces of joints at the start.
-    fn starts_joints(&self) -> bool {
-        false
-    }
+    /// What the members must be able to do.
+    fn needs(&self) -> Needs;
 
     /// Why it cannot glue this group, whatever its members can do.
     fn refuses(&self, _exchange: &Exchange) -> Option<String> {
@@ -64,36 +90,51 @@ pub trait Strategy: Send {
 }
 
 /// Names of all strategies, in the order of the documentation.
-pub const STRATEGIES: [&str; 2] = [cooperative::NAME, iterative::NAME];
+pub const STRATEGIES: [&str; 11] = [
+    cooperative::NAME,
+    cooperative_compliant::NAME,
+    iterative::NAME,
+    semi_implicit::NAME,
+    xt_newton::NAME,
+    relaxed::NAME,
+    xx_newton::NAME,
+    jacobi::NAME,
+    gauss_seidel::NAME,
+    tlm::NAME,
+    monolithic::NAME,
+];
 
 /// The strategy of a scenario; its name has been checked.
 pub fn strategy(spec: &GluingSpec) -> Box<dyn Strategy> {
-    if spec.strategy == iterative::NAME {
-        Box::new(iterative::Iterative::new(spec))
-    } else {
-        Box::new(cooperative::Cooperative::default())
+    match spec.strategy.as_str() {
+        cooperative_compliant::NAME => Box::new(cooperative_compliant::CooperativeCompliant::new(spec)),
+        iterative::NAME => Box::new(iterative::Iterative::new(spec)),
+        semi_implicit::NAME => Box::new(semi_implicit::SemiImplicit::new(spec)),
+        xt_newton::NAME => Box::new(xt_newton::XtNewton::new(spec)),
+        relaxed::NAME => Box::new(relaxed::Relaxed::new(spec)),
+        xx_newton::NAME => Box::new(xx_newton::XxNewton::new(spec)),
+        jacobi::NAME => Box::new(jacobi::Jacobi::default()),
+        gauss_seidel::NAME => Box::new(gauss_seidel::GaussSeidel::default()),
+        tlm::NAME => Box::new(tlm::Tlm::default()),
+        monolithic::NAME => Box::new(monolithic::Monolithic::new(spec)),
+        _ => Box::new(cooperative::Cooperative::default()),
     }
 }
 
-/// Why `strategy` cannot glue these members, and which strategy could; `None`: it can.
-pub fn refusal(strategy: &dyn Strategy, exchange: &Exchange, instances: &[Instance]) -> Option<String> {
-    let (bodies, grounds) = strategy.needs();
-    let lacks = |slot: usize, needs: Capabilities| {
-        let have = instances[slot].capabilities();
-        let missing = Capabilities(needs.0 & !have.0);
-        (missing.0 != 0).then(|| {
-            let names: Vec<_> = missing.names().collect();
-            format!(
-                "strategy `{}` needs {} of `{}` (module {}), which does not offer it",
-                strategy.name(),
-                names.join(", "),
-                instances[slot].name(),
-                instances[slot].module()
-            )
-        })
-    };
-    exchange
-        .body_slots()
-        .find_map(|s| lacks(s, bodies))
-        .or_else(|| exchange.ground_slots().find_map(|s| lacks(s, grounds)))
+/// What finds the forces of joints in a step of h = 0 before the first: the same for all strategies.
+pub fn start(spec: &GluingSpec) -> Box<dyn Strategy> {
+    Box::new(iterative::Iterative::new(spec))
+}
+
+/// The end of a pass that does not ask whether it converged.
+fn single_pass(exchange: &mut Exchange) -> Outcome {
+    exchange.report.converged = true;
+    for port in &exchange.ports {
+        for i in port.range().filter(|i| exchange.rows[*i] == Row::Joint) {
+            let apart =
+                exchange.x1[i] - exchange.x2[i] + exchange.gap[i] + port.law.compliance * exchange.t[i];
+            exchange.report.max_gap_m = exchange.report.max_gap_m.max(apart.abs());
+        }
+    }
+    Outcome::Converged
 }

@@ -1,59 +1,119 @@
 //! When the bodies' interface Jacobian is computed again, and from where.
 
 use super::exchange::{Derivatives, Exchange};
+use crate::Result;
+use crate::host::Instance;
 
 /// The residual may shrink by this factor at least before the Jacobian counts as stale.
 const RATIO: f64 = 0.3;
 
-/// Keeps G from step to step. Derivatives of the modules cost no evaluation and are taken anew at every iteration;
-/// one from differences is refreshed when the last iteration left more than 0.3 of the residual, when
-/// the set of ports or h has changed, and never in the control that shows why one must.
+/// `gluing.jacobian`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Way {
+    /// The modules' own derivatives, anew at every iteration: they cost no evaluation.
+    #[default]
+    Analytic,
+    /// Central differences at the first iteration of a step.
+    Central,
+    /// Forward differences at the first iteration of a step.
+    Forward,
+    /// Forward differences once.
+    Broyden,
+    /// The control that shows why one must refresh.
+    Frozen,
+}
+
+/// Keeps G from trial to trial.
+///
+/// One that comes from differences is taken at the first iteration of a step, and again when an iteration left more
+/// than 0.3 of the residual. Between, and with `broyden` from step to step, Broyden's rank-one update (1965) brings
+/// it up to what the trials say.
 #[derive(Debug, Default)]
 pub struct Refresh {
-    differences: bool,
-    central: bool,
-    frozen: bool,
+    way: Way,
     /// n, epoch and h of the kept one.
     of: Option<(usize, u32, f64)>,
     g: Vec<f64>,
+    /// T and the bodies' part of the mismatch at the trial before.
+    t: Vec<f64>,
+    motion: Vec<f64>,
+    change: Vec<f64>,
 }
 
 impl Refresh {
     /// From `gluing.jacobian`.
     pub fn new(jacobian: &str) -> Self {
-        Self {
-            differences: jacobian == "finite-differences",
-            central: jacobian == "directional",
-            frozen: jacobian == "frozen",
-            ..Self::default()
-        }
+        let way = match jacobian {
+            "directional" => Way::Central,
+            "finite-differences" => Way::Forward,
+            "broyden" => Way::Broyden,
+            "frozen" => Way::Frozen,
+            _ => Way::Analytic,
+        };
+        Self { way, ..Self::default() }
     }
 
-    /// Where a fresh one comes from.
-    pub fn source(&self) -> Derivatives {
-        match (self.central, self.differences) {
-            (true, _) => Derivatives::Central,
-            (_, true) => Derivatives::Forward,
-            _ => Derivatives::Analytic,
+    /// Puts G for the last trial into `exchange.estimate`. `left` is the present residual, `before` that of the
+    /// iteration before (NaN: this is the first).
+    pub fn provide(
+        &mut self,
+        left: f64,
+        before: f64,
+        exchange: &mut Exchange,
+        instances: &mut [Instance],
+    ) -> Result {
+        if self.is_stale(left, before, exchange) {
+            exchange.linearise_bodies(self.source(), instances)?;
+        } else {
+            self.put_back(before, exchange);
         }
-    }
-
-    /// Whether a fresh one is needed; else puts the kept one back. `left` is the present residual, `before` that
-    /// of the iteration before (NaN: this is the first).
-    pub fn is_stale(&self, left: f64, before: f64, exchange: &mut Exchange) -> bool {
-        let now = (exchange.n(), exchange.at.epoch, exchange.at.h);
-        let same = self.of.is_some_and(|of| of == now || self.frozen && of.0 == now.0 && of.2 == now.2);
-        let free = self.source() == Derivatives::Analytic;
-        if !same || !self.frozen && (free || left > RATIO * before) {
-            return true;
-        }
-        exchange.estimate.g.copy_from_slice(&self.g);
-        false
-    }
-
-    /// Keeps what is in the exchange.
-    pub fn keep(&mut self, exchange: &Exchange) {
         self.of = Some((exchange.n(), exchange.at.epoch, exchange.at.h));
         self.g.clone_from(&exchange.estimate.g);
+        self.t.clone_from(&exchange.t);
+        self.motion.clear();
+        self.motion.extend((0..exchange.n()).map(|i| exchange.bodies_part(i)));
+        Ok(())
+    }
+
+    fn source(&self) -> Derivatives {
+        match self.way {
+            Way::Central => Derivatives::Central,
+            Way::Forward | Way::Broyden => Derivatives::Forward,
+            Way::Analytic | Way::Frozen => Derivatives::Analytic,
+        }
+    }
+
+    fn is_stale(&self, left: f64, before: f64, exchange: &Exchange) -> bool {
+        let Some((n, epoch, h)) = self.of else { return true };
+        let same = n == exchange.n() && (h == 0.0) == (exchange.at.h == 0.0);
+        match self.way {
+            Way::Analytic => true,
+            Way::Frozen => !same,
+            Way::Central | Way::Forward if before.is_nan() => true,
+            _ => !same || epoch != exchange.at.epoch || h != exchange.at.h || left > RATIO * before,
+        }
+    }
+
+    /// The kept one; brought up to date by the last two trials where they belong to one step.
+    fn put_back(&mut self, before: f64, exchange: &mut Exchange) {
+        let n = exchange.n();
+        if self.way == Way::Frozen {
+            // G grows with h² at position level: what is frozen is the mechanism's position
+            let of = self.of.map_or(exchange.at.h, |of| of.2);
+            let scale = if of > 0.0 { exchange.at.h / of } else { 1.0 };
+            self.g.iter_mut().for_each(|g| *g *= scale * scale);
+        } else if !before.is_nan() {
+            self.change.clear();
+            self.change.extend(exchange.t.iter().zip(&self.t).map(|(new, old)| new - old));
+            let size: f64 = self.change.iter().map(|d| d * d).sum();
+            for row in 0..n {
+                let predicted: f64 = (0..n).map(|c| self.g[c * n + row] * self.change[c]).sum();
+                let missing = exchange.bodies_part(row) - self.motion[row] - predicted;
+                for c in (0..n).filter(|_| size > 0.0) {
+                    self.g[c * n + row] += missing * self.change[c] / size;
+                }
+            }
+        }
+        exchange.estimate.g.copy_from_slice(&self.g);
     }
 }

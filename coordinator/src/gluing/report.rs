@@ -26,6 +26,8 @@ pub struct StepReport {
     pub max_action_reaction_gap_n: f64,
     /// |Λe|∞ / T_ref at the end.
     pub residual: f64,
+    /// Ratio of the last two residuals of a fixed point or Newton on forces; 0 where there were none.
+    pub contraction: f64,
     /// max(|min(T, L·w)|) over unilateral ports at the end, N.
     pub complementarity_n: f64,
     /// Largest eigenvalue estimate of K·G1.

@@ -270,6 +270,32 @@ impl Side {
         self.advance(instance, nodes, at, Given::Force { with_motion: partner.is_some() }, partner, out)
     }
 
+    /// A trial under the wrench f0 − z·X on side 1, −(f0 − z·X) on side 2; one z per component (N/m).
+    pub fn advance_under_impedance(
+        &mut self,
+        instance: &mut Instance,
+        nodes: &[Node],
+        at: &Instant,
+        f0: &[f64],
+        z: &[f64],
+    ) -> Result {
+        let n = self.n();
+        self.given_t.clear();
+        self.given_t.resize(n, 0.0);
+        Self::gather(&mut self.given_t, &self.index, f0);
+        self.matrix.clear();
+        self.matrix.resize(n * n, 0.0);
+        for (k, i) in self.index.iter().enumerate() {
+            self.matrix[k * n + k] = z[*i];
+        }
+        self.advance(instance, nodes, at, Given::Impedance, None, Answer::default())
+    }
+
+    /// The wrench of the last trial.
+    pub fn force(&self, out: &mut [f64]) {
+        Self::scatter(&self.t, &self.index, out);
+    }
+
     /// A trial of a soil under the bodies' motion.
     pub fn advance_under_motion(
         &mut self,
@@ -298,6 +324,7 @@ impl Side {
         let motion = Motion { x: &self.partner_x, v: &self.partner_v };
         let input = match given {
             Given::Motion => Input::Motion(motion),
+            Given::Impedance => Input::Impedance { f0: &self.given_t, z: &self.matrix },
             Given::Force { with_motion } => {
                 Input::Force { t: &self.given_t, hold: at.hold, motion: with_motion.then_some(motion) }
             }
@@ -434,6 +461,8 @@ enum Given {
     Force { with_motion: bool },
     /// The partner's motion.
     Motion,
+    /// The wrench in `given_t` less the impedance in `matrix` times X.
+    Impedance,
 }
 
 /// Where a trial's answer goes; packed over the group.

@@ -196,7 +196,7 @@ fn gluing() -> Table {
             .into(),
         Parameter::of("jacobian", ParameterType::Text, "where the bodies' interface Jacobian comes from")
             .or("analytic")
-            .choices(&["analytic", "directional", "finite-differences", "frozen"])
+            .choices(&["analytic", "directional", "finite-differences", "broyden", "frozen"])
             .into(),
         Parameter::of("level", ParameterType::Text, "level of the condition at joints")
             .or("position")

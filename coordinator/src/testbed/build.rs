@@ -179,12 +179,19 @@ fn group(scenario: &Scenario, instances: &[Instance]) -> Result<Option<Group>> {
         let help = Some("use hold = \"end\" or \"constant\", or level = \"velocity\"".into());
         return Err(scenario.source.error_at_value(&["gluing", "hold"], message, help).into());
     }
-    let strategy = gluing::strategy(&scenario.gluing);
-    if let Some(reason) = gluing::refusal(strategy.as_ref(), &exchange, instances) {
-        let help = format!("strategies are {}", gluing::STRATEGIES.join(", "));
-        return Err(scenario.source.error_at_value(&["gluing", "strategy"], reason, Some(help)).into());
+    let spec = &scenario.gluing;
+    if let Some(refusal) = gluing::refusal(spec, &exchange, instances) {
+        let help = match refusal.would_work.as_slice() {
+            [] => "no strategy of this version can glue these subsystems".into(),
+            names => format!("these would work: {}", names.join(", ")),
+        };
+        let at = &["gluing", "strategy"];
+        return Err(scenario.source.error_at_value(at, refusal.reason, Some(help)).into());
     }
-    Ok(Some(Group { exchange, strategy, closed: Vec::new() }))
+    let can_start = |s: usize| instances[s].capabilities().has(Capabilities::FORCE | Capabilities::RETRY);
+    let start =
+        (exchange.glue.has_joints() && exchange.members().all(can_start)).then(|| gluing::start(spec));
+    Ok(Some(Group { exchange, strategy: gluing::strategy(spec), start, closed: Vec::new() }))
 }
 
 fn hold(text: &str) -> Hold {

@@ -108,15 +108,20 @@ fn a_frozen_jacobian_fails_when_the_rods_have_turned() {
 fn velocity_level_keeps_the_order_and_stabilisation_the_gap() {
     let error = |gluing: &str, until: f64| {
         let mut testbed = build(&pendulum(gluing));
-        let did = run(&mut testbed, until).unwrap_or_else(|e| panic!("{e}"));
+        let did = run(&mut testbed, 1.0).unwrap_or_else(|e| panic!("{e}"));
         // DOP853 at 1 s
-        ((read(&testbed, "upper.b0.angle") + 2.778512564986).abs(), did.gap)
+        let error = (read(&testbed, "upper.b0.angle") + 2.778512564986).abs();
+        let later = run(&mut testbed, until).unwrap_or_else(|e| panic!("{e}"));
+        (error, did.gap, later.gap)
     };
-    let (free, drift) = error("level = \"velocity\"", 1.0);
-    let (held, kept) = error("level = \"velocity\"\nstabilisation = 0.2", 1.0);
-    println!("velocity level: {free:.1e} rad, {drift:.1e} m; stabilised {held:.1e} rad, {kept:.1e} m");
+    let (free, drift, later) = error("level = \"velocity\"", 3.0);
+    let (held, kept, still) = error("level = \"velocity\"\nstabilisation = 0.2", 3.0);
+    println!(
+        "velocity level: {free:.1e} rad, gap {drift:.1e}, {later:.1e} m; stabilised {held:.1e} rad, gap {kept:.1e}, {still:.1e} m"
+    );
     assert!(free < 2e-3 && held < 2e-3, "{free} {held}");
-    assert!(drift < 1e-3 && kept < 0.1 * drift, "{drift} {kept}");
+    // what every step leaves adds up without stabilisation; with a share of 0.2 that of the last five steps remains
+    assert!(later > 1.5 * drift && kept < 0.35 * drift && still < 0.35 * later, "{later} {kept} {still}");
 }
 
 /// Two free masses with exact inner integration, pulled apart at the start.

@@ -10,13 +10,16 @@
 //! one on failure. The start is the co-operational answer min(T*, F), never the T of the step before, which
 //! lands on the wrong side of the unloading kink by rounding.
 
-mod friction;
+pub(super) mod friction;
 mod tt;
 mod xt;
 
+pub(super) use tt::TtForm;
+pub(super) use xt::XtForm;
+
 use super::exchange::Exchange;
 use super::refresh::Refresh;
-use super::{Outcome, Strategy, linear};
+use super::{Needs, Outcome, Strategy, linear};
 use crate::Result;
 use crate::host::Instance;
 use crate::scenario::GluingSpec;
@@ -26,31 +29,68 @@ use terraglue_subsystem::Capabilities;
 pub const NAME: &str = "iterative";
 
 /// Largest κ at which `auto` prefers the X-T form.
-const KAPPA_XT: f64 = 10.0;
+pub(super) const KAPPA_XT: f64 = 10.0;
 
 /// Which of the two forms runs.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-enum Form {
+pub(super) enum Form {
     Tt,
     Xt,
 }
 
 /// What both forms iterate with.
 #[derive(Clone, Copy, Debug)]
-struct Limits {
+pub(super) struct Limits {
     /// τ of the stopping rule.
-    tolerance: f64,
-    max_iterations: u32,
+    pub tolerance: f64,
+    pub max_iterations: u32,
+}
+
+impl Form {
+    /// From `gluing.form`; none: `auto`.
+    pub fn read(spec: &GluingSpec) -> Option<Self> {
+        match spec.form.as_str() {
+            "tt" => Some(Self::Tt),
+            "xt" => Some(Self::Xt),
+            _ => None,
+        }
+    }
+
+    /// What a soil must offer.
+    pub fn need(form: Option<Self>) -> Capabilities {
+        match form {
+            Some(Self::Tt) => Capabilities::FORCE,
+            Some(Self::Xt) => Capabilities::MOTION,
+            None => Capabilities::default(),
+        }
+    }
+
+    /// The form for the soils of a group: as asked, else by what they offer and by κ of the step before.
+    pub fn choose(form: Option<Self>, kappa: f64, exchange: &Exchange, instances: &[Instance]) -> Self {
+        let takes = |c| exchange.ground_slots().all(|s| instances[s].capabilities().has(c));
+        match form {
+            _ if exchange.needs_linearisation() => Self::Tt,
+            Some(form) => form,
+            None if !takes(Capabilities::FORCE) => Self::Xt,
+            None if !takes(Capabilities::MOTION) || kappa > KAPPA_XT => Self::Tt,
+            None => Self::Xt,
+        }
+    }
 }
 
 impl Limits {
+    /// From the scenario's `[gluing]`.
+    pub fn read(spec: &GluingSpec) -> Self {
+        Self { tolerance: spec.tolerance, max_iterations: spec.max_iterations }
+    }
+
     /// τ·max(T_ref, |T|∞), N.
-    fn threshold(&self, exchange: &Exchange) -> f64 {
+    pub fn threshold(&self, exchange: &Exchange) -> f64 {
         self.tolerance * exchange.t_ref.max(linear::max_norm(&exchange.t))
     }
 
     /// The end of an iteration that did not reach its threshold; `measure` (N) is what was left.
-    fn give_up(&self, exchange: &mut Exchange, what: &str, measure: f64) -> Outcome {
+    pub fn give_up(&self, exchange: &mut Exchange, what: &str, measure: f64) -> Outcome {
         exchange.report.residual = measure / exchange.t_ref;
         Outcome::NotConverged(format!(
             "{what} = {measure:.3e} N after {} iterations, tolerance {:.3e} N",
@@ -75,30 +115,14 @@ pub struct Iterative {
 impl Iterative {
     /// From the scenario's `[gluing]`.
     pub fn new(spec: &GluingSpec) -> Self {
-        let form = match spec.form.as_str() {
-            "tt" => Some(Form::Tt),
-            "xt" => Some(Form::Xt),
-            _ => None,
-        };
         Self {
-            form,
+            form: Form::read(spec),
             from_estimate: spec.start != "zero",
-            limits: Limits { tolerance: spec.tolerance, max_iterations: spec.max_iterations },
+            limits: Limits::read(spec),
             tt: tt::TtForm::new(Refresh::new(&spec.jacobian)),
             xt: xt::XtForm::default(),
             start: Vec::new(),
             kappa: 0.0,
-        }
-    }
-
-    fn preferred(&self, exchange: &Exchange, instances: &[Instance]) -> Form {
-        let takes = |c| exchange.ground_slots().all(|s| instances[s].capabilities().has(c));
-        match self.form {
-            _ if exchange.needs_linearisation() => Form::Tt,
-            Some(form) => form,
-            None if !takes(Capabilities::FORCE) => Form::Xt,
-            None if !takes(Capabilities::MOTION) || self.kappa > KAPPA_XT => Form::Tt,
-            None => Form::Xt,
         }
     }
 
@@ -119,17 +143,9 @@ impl Strategy for Iterative {
         NAME
     }
 
-    fn needs(&self) -> (Capabilities, Capabilities) {
-        let ground = match self.form {
-            Some(Form::Tt) => Capabilities::FORCE,
-            Some(Form::Xt) => Capabilities::MOTION,
-            None => Capabilities::default(),
-        };
-        (Capabilities::FORCE | Capabilities::RETRY, ground | Capabilities::RETRY)
-    }
-
-    fn starts_joints(&self) -> bool {
-        true
+    fn needs(&self) -> Needs {
+        let bodies = Capabilities::FORCE | Capabilities::RETRY;
+        Needs { first: bodies, second: bodies, grounds: Form::need(self.form) | Capabilities::RETRY }
     }
 
     fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
@@ -149,7 +165,7 @@ impl Strategy for Iterative {
         }
         self.start.clear();
         self.start.extend_from_slice(&exchange.t);
-        let first = self.preferred(exchange, instances);
+        let first = Form::choose(self.form, self.kappa, exchange, instances);
         let outcome = self.run(first, exchange, instances)?;
         if outcome == Outcome::Converged || self.form.is_some() {
             return Ok(outcome);

@@ -56,9 +56,8 @@ impl TtForm {
             exchange.advance_bodies(instances)?;
             self.evaluate_grounds(exchange, instances)?;
             let left = max_norm(&self.e);
-            if own_start && self.jacobian.is_stale(left, before, exchange) {
-                exchange.linearise_bodies(self.jacobian.source(), instances)?;
-                self.jacobian.keep(exchange);
+            if own_start {
+                self.jacobian.provide(left, before, exchange, instances)?;
             }
             before = left;
             self.bounds(exchange);
@@ -78,6 +77,48 @@ impl TtForm {
             }
         }
         Ok(limits.give_up(exchange, "T-T form: |Λ·e|", size))
+    }
+
+    /// One Newton step from `exchange.t` and no check: two evaluations of the bodies.
+    pub fn one_step(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
+        exchange.advance_bodies(instances)?;
+        self.evaluate_grounds(exchange, instances)?;
+        if exchange.needs_linearisation() {
+            self.jacobian.provide(max_norm(&self.e), f64::NAN, exchange, instances)?;
+        }
+        self.bounds(exchange);
+        self.newton_step(exchange, instances)?;
+        exchange.t.iter_mut().zip(&self.d).for_each(|(t, d)| *t += d);
+        exchange.advance_bodies(instances)?;
+        self.evaluate_grounds(exchange, instances)?;
+        let size = max_norm(&self.d);
+        Ok(self.converged(exchange, size))
+    }
+
+    /// Iterates the soil alone against the bodies as `exchange.predict_bodies` knows them; what is left of |Λ·e|, N.
+    pub fn solve_predicted(
+        &mut self,
+        limits: &Limits,
+        exchange: &mut Exchange,
+        instances: &mut [Instance],
+    ) -> Result<f64> {
+        exchange.predict_bodies();
+        self.evaluate_grounds(exchange, instances)?;
+        self.bounds(exchange);
+        for _ in 0..limits.max_iterations {
+            let solved = self.newton_step(exchange, instances)?;
+            if !solved || max_norm(&self.d) <= limits.threshold(exchange) {
+                break;
+            }
+            self.step(exchange, instances)?;
+        }
+        Ok(max_norm(&self.d))
+    }
+
+    /// Figures of the last trials of both sides; `size` is what is left, N.
+    pub fn conclude(&mut self, size: f64, exchange: &mut Exchange) -> Outcome {
+        self.residuals(exchange);
+        self.converged(exchange, size)
     }
 
     /// Newton with X1 linear in T, from the step d: evaluations of the soil only.
@@ -118,6 +159,11 @@ impl TtForm {
         if exchange.has_grounds() {
             exchange.advance_grounds_under_force(instances)?;
         }
+        self.residuals(exchange);
+        Ok(())
+    }
+
+    fn residuals(&mut self, exchange: &Exchange) {
         self.e.clear();
         for port in &exchange.ports {
             let compliance = port.law.compliance;
@@ -128,7 +174,6 @@ impl TtForm {
                 });
             }
         }
-        Ok(())
     }
 
     /// The solution of the linearised problem at the last trial; `false` if none was found.

@@ -51,6 +51,30 @@ impl XtForm {
         Ok(limits.give_up(exchange, "X-T form: |T - F|", norm))
     }
 
+    /// Iterates the soil alone against the bodies as `exchange.predict_bodies` knows them; what is left of |T − F|, N.
+    pub fn solve_predicted(
+        &mut self,
+        limits: &Limits,
+        exchange: &mut Exchange,
+        instances: &mut [Instance],
+    ) -> Result<f64> {
+        exchange.predict_bodies();
+        let mut norm = self.evaluate_grounds(exchange, instances)?;
+        for _ in 0..limits.max_iterations {
+            if norm <= limits.threshold(exchange) {
+                break;
+            }
+            self.newton_step(exchange, instances)?;
+            norm = self.step(norm, exchange, instances)?;
+        }
+        Ok(norm)
+    }
+
+    /// Figures of the last trials of both sides; `norm` is what is left, N.
+    pub fn conclude(&self, norm: f64, exchange: &mut Exchange) -> Outcome {
+        self.converged(exchange, norm)
+    }
+
     /// Newton on T − F(X1(T)) = 0 with X1 linear in T: evaluations of the soil only.
     fn solve_linearised(
         &mut self,

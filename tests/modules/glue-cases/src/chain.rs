@@ -31,6 +31,8 @@ pub struct MassChain {
     g: Vec<f64>,
     square: Dense,
     under_motion: bool,
+    /// How the force ran inside the step of the last trial.
+    hold: Hold,
     port_work: f64,
     variables: Vec<Variable>,
 }
@@ -78,6 +80,7 @@ impl Module for MassChain {
             g: Vec::new(),
             square: Dense::default(),
             under_motion: false,
+            hold: Hold::End,
             port_work: 0.0,
             variables: variables(n),
             mass,
@@ -165,6 +168,7 @@ impl MassChain {
 
     /// Applies `force` (on itself, packed) and moves.
     fn advance_under(&mut self, step: &Step, hold: Hold) {
+        self.hold = hold;
         self.load.fill(0.0);
         for (i, k, d) in Self::components(step) {
             self.load[k] += d * self.force[i];
@@ -186,8 +190,12 @@ impl MassChain {
         self.g.clear();
         self.g.resize(n * n, 0.0);
         let factor = match level {
-            Level::Position if self.scheme.exact => step.h * step.h / 2.0,
-            Level::Velocity if self.scheme.exact => step.h,
+            Level::Position if self.scheme.exact => {
+                step.h * step.h * if self.hold == Hold::Linear { 1.0 / 6.0 } else { 0.5 }
+            }
+            Level::Velocity if self.scheme.exact => {
+                step.h * if self.hold == Hold::Linear { 0.5 } else { 1.0 }
+            }
             Level::Position => self.scheme.q1(step.h),
             Level::Velocity => self.scheme.v1(step.h),
             Level::Acceleration => 1.0,

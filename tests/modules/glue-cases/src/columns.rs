@@ -5,18 +5,23 @@
 
 use std::sync::Arc;
 use terraglue_subsystem::{
-    BodyState, Capabilities, Causality, Config, Energy, Error, Host, Input, Kind, Law, Level, Module, Motion,
-    Parameter, ParameterType, Pose, Response, Result, Scene, SceneBody, Schema, Step, Subsystem, ValuesMut,
-    Variable,
+    BodyState, Capabilities, Causality, Config, Energy, Error, Estimate, Host, Input, Kind, Law, Level,
+    Module, Motion, Parameter, ParameterType, Pose, Response, Result, Scene, SceneBody, Schema, Step,
+    Subsystem, ValuesMut, Variable,
 };
 
 /// At this force a power law with n < 1 is given a finite tangent at z = 0, N.
 const REGULAR_N: f64 = 1e-3;
 
+/// Outputs.
+const OUTPUTS: [(&str, &str); 2] =
+    [("max_sinkage", "Deepest that any column was"), ("print", "Deepest column when it is free of force")];
+
 /// The module.
 pub struct PowerColumns {
     columns: Vec<Column>,
     rigid: bool,
+    echo: bool,
     saved: Vec<Vec<Column>>,
     /// Per port: depth and slope at the last trial.
     trials: Vec<Trial>,
@@ -122,6 +127,12 @@ impl Module for PowerColumns {
                 list("soil_mass_kg", "Mass that moves with the foot").optional(),
                 list("z_start", "Depth that every column has been pressed to, m").optional(),
                 list("v_start", "Rate of the columns' mass at the start, m/s").optional(),
+                Parameter::of(
+                    "echo_estimate",
+                    ParameterType::Bool,
+                    "Answer T* itself: a control, which never sinks",
+                )
+                .or(false),
                 Parameter::of("rigid", ParameterType::Bool, "No compliance below the cap").or(false),
             ],
         }
@@ -149,7 +160,6 @@ impl Module for PowerColumns {
             v: v[i],
         };
         let columns: Vec<Column> = (0..k.len()).map(column).collect();
-        let depth = Variable::real(0, "max_sinkage", "m", Causality::Output, "Deepest column");
         Ok(Box::new(Self {
             rigid: config.flag("rigid")?,
             saved: vec![columns.clone(); host.slots() as usize],
@@ -157,7 +167,12 @@ impl Module for PowerColumns {
             trials: Vec::new(),
             under_motion: false,
             dissipated: 0.0,
-            variables: vec![depth],
+            variables: OUTPUTS
+                .iter()
+                .enumerate()
+                .map(|(id, (name, help))| Variable::real(id as u32, *name, "m", Causality::Output, *help))
+                .collect(),
+            echo: config.flag("echo_estimate")?,
         }))
     }
 }
@@ -190,7 +205,17 @@ impl PowerColumns {
 impl Subsystem for PowerColumns {
     fn capabilities(&self) -> Capabilities {
         let all = Capabilities::FORCE | Capabilities::DERIVATIVES | Capabilities::RETRY | Capabilities::STATE;
+        let all = if self.echo { all | Capabilities::SOLVE } else { all };
         if self.rigid { all } else { all | Capabilities::MOTION }
+    }
+
+    fn solve_compatibility(&mut self, step: &Step, estimate: &Estimate, out: &mut Response) -> Result {
+        for v in [&mut *out.x, &mut *out.v, &mut *out.a] {
+            v.fill(0.0);
+        }
+        out.t.copy_from_slice(estimate.t_star);
+        out.reached = step.t + step.h;
+        Ok(())
     }
 
     fn set_ports(&mut self, step: &Step, laws: &mut [Law], now: &mut Response) -> Result {
@@ -285,9 +310,12 @@ impl Subsystem for PowerColumns {
         &self.variables
     }
 
-    fn get(&self, _: &[u32], out: ValuesMut) -> Result {
+    fn get(&self, ids: &[u32], out: ValuesMut) -> Result {
         let ValuesMut::F64(out) = out else { return Err(Error::Unsupported) };
-        out.fill(self.columns.iter().fold(0.0, |m, c| m.max(c.z_max)));
+        for (id, value) in ids.iter().zip(out) {
+            let of = |c: &Column| if *id == 0 { c.z_max } else { c.free() };
+            *value = self.columns.iter().fold(0.0, |m, c| m.max(of(c)));
+        }
         Ok(())
     }
 

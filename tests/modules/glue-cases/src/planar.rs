@@ -39,7 +39,6 @@ struct Component {
     body: usize,
     /// The material point in the body's frame.
     local: [f64; 2],
-    origin: [f64; 2],
     /// Force direction in the plane; zero for a moment.
     direction: [f64; 2],
     /// Share of a moment about z.
@@ -108,7 +107,7 @@ impl PlanarBodies {
     /// Newton for the state at t + h (or, for h = 0, the accelerations at t) under T on side 1.
     fn solve(&mut self, h: f64, t: &[f64]) -> Result {
         let n = self.now.len();
-        let (q1, v1) = (self.scheme.q1(h), self.scheme.v1(h));
+        let q1 = self.scheme.q1(h);
         let mut x: Vec<f64> = self.now.iter().map(|c| c.qdd).collect();
         self.lambda.clone_from(&self.lambda_now);
         for _ in 0..MAX_ITERATIONS {
@@ -133,7 +132,6 @@ impl PlanarBodies {
                 for (next, (now, x)) in self.next.iter_mut().zip(self.now.iter().zip(&x)) {
                     *next = self.scheme.finish(now, h, *x);
                 }
-                let _ = v1;
                 return Ok(());
             }
         }
@@ -178,15 +176,24 @@ impl PlanarBodies {
         [dx, dy, dy * arm[0] - dx * arm[1] + c.moment]
     }
 
-    fn answer(&self, step: &Step, t: &[f64], out: &mut Response) {
+    /// The motion at the ports over h: displacements, not differences of places, so that they are exact to
+    /// rounding of themselves.
+    fn answer(&self, step: &Step, h: f64, t: &[f64], out: &mut Response) {
         for (i, c) in self.ports.iter().enumerate() {
             let at = |k: usize| self.next[k].q;
             let point = Point { body: c.body, local: c.local };
-            let [x, y] = point.place(at);
             let row = self.row(c, at);
-            let turn = self.next[3 * c.body + 2].q - self.now[3 * c.body + 2].q;
-            out.x[i] =
-                c.direction[0] * (x - c.origin[0]) + c.direction[1] * (y - c.origin[1]) + c.moment * turn;
+            let moved = [0, 1, 2].map(|k| {
+                let j = 3 * c.body + k;
+                self.scheme.displacement(&self.now[j], h, self.next[j].qdd)
+            });
+            let before = point.arm(|k| self.now[k].q);
+            // (R(Δθ) − 1)·arm
+            let (half, sine) = (libm::sin(0.5 * moved[2]), libm::sin(moved[2]));
+            let shrink = -2.0 * half * half;
+            let x = moved[0] + shrink * before[0] - sine * before[1];
+            let y = moved[1] + shrink * before[1] + sine * before[0];
+            out.x[i] = c.direction[0] * x + c.direction[1] * y + c.moment * moved[2];
             out.v[i] = (0..3).map(|k| row[k] * self.next[3 * c.body + k].v).sum();
             let arm = point.arm(at);
             let w = self.next[3 * c.body + 2].v;
@@ -215,25 +222,18 @@ impl Subsystem for PlanarBodies {
             for (_, c) in port.components() {
                 let d = port.direction(c);
                 let (direction, moment) = if c < 3 { ([d[0], d[1]], 0.0) } else { ([0.0; 2], d[2]) };
-                self.ports.push(Component {
-                    body,
-                    local,
-                    origin,
-                    direction,
-                    moment,
-                    side: f64::from(port.side),
-                });
+                self.ports.push(Component { body, local, direction, moment, side: f64::from(port.side) });
             }
         }
         self.next.clone_from(&self.now);
-        self.answer(step, &[], now);
+        self.answer(step, 0.0, &[], now);
         Ok(())
     }
 
     fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result {
         let Input::Force { t, .. } = input else { return Err(Error::Unsupported) };
         self.solve(step.h, t)?;
-        self.answer(step, t, out);
+        self.answer(step, step.h, t, out);
         Ok(())
     }
 

@@ -102,6 +102,11 @@ impl Scheme {
         }
     }
 
+    /// q⁺ − q with q̈⁺, without the rounding of a difference of large numbers.
+    pub fn displacement(&self, c: &Coordinate, h: f64, qdd: f64) -> f64 {
+        h * c.v + h * h * (self.b[0] * c.a + self.b[1] * self.known(c)) + self.q1(h) * qdd
+    }
+
     /// The coordinate at t⁺ with q̈⁺. A step of h = 0 sets the accelerations and nothing else.
     pub fn finish(&self, c: &Coordinate, h: f64, qdd: f64) -> Coordinate {
         if h == 0.0 {

@@ -1,0 +1,77 @@
+//! The paper's single pass made exact for soils that yield: the soil iterates against the bodies' estimate.
+//!
+//! x1 = x_free + G1·T stands in for the bodies, so they are evaluated once, in step 4; the soil as often as it takes
+//! (one to five times). Exact for bodies that are linear within the step, whatever the law or branch of the soil.
+//! For one contact on a linear branch T = (f_n + κ·T*)/(1 + κ), κ = K·G1. The iteration is that of [`super::iterative`].
+
+use super::exchange::Exchange;
+use super::iterative::{Form, Limits, TtForm, XtForm};
+use super::{Needs, Outcome, Strategy};
+use crate::Result;
+use crate::host::Instance;
+use crate::scenario::GluingSpec;
+use terraglue_subsystem::Capabilities;
+
+/// Name in the scenario.
+pub const NAME: &str = "cooperative-compliant";
+
+/// The strategy with its buffers.
+#[derive(Debug)]
+pub struct CooperativeCompliant {
+    form: Option<Form>,
+    limits: Limits,
+    tt: TtForm,
+    xt: XtForm,
+    kappa: f64,
+}
+
+impl CooperativeCompliant {
+    /// From the scenario's `[gluing]`.
+    pub fn new(spec: &GluingSpec) -> Self {
+        Self {
+            form: Form::read(spec),
+            limits: Limits::read(spec),
+            tt: TtForm::default(),
+            xt: XtForm::default(),
+            kappa: 0.0,
+        }
+    }
+}
+
+impl Strategy for CooperativeCompliant {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn needs(&self) -> Needs {
+        let soil = Form::need(self.form) | Capabilities::RETRY;
+        Needs { first: Capabilities::FORCE, second: Capabilities::FORCE, grounds: soil }
+    }
+
+    fn refuses(&self, exchange: &Exchange) -> Option<String> {
+        super::joints_refused(NAME, exchange).or_else(|| super::body_contacts_refused(NAME, exchange))
+    }
+
+    fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
+        exchange.estimate_forces(instances)?;
+        exchange.solve_compatibility(instances)?;
+        exchange.report.evaluations_soil = 0; // the start is not an evaluation of the iteration
+        exchange.predict_from_estimate();
+        let form = Form::choose(self.form, self.kappa, exchange, instances);
+        exchange.report.xt_form = form == Form::Xt;
+        let left = match form {
+            Form::Tt => self.tt.solve_predicted(&self.limits, exchange, instances)?,
+            Form::Xt => self.xt.solve_predicted(&self.limits, exchange, instances)?,
+        };
+        self.kappa = exchange.report.kappa_max;
+        // a residual that is no number does not pass
+        if !(left <= self.limits.threshold(exchange)) {
+            return Ok(self.limits.give_up(exchange, "the soil against the estimate: |Λ·e|", left));
+        }
+        exchange.advance_bodies(instances)?;
+        Ok(match form {
+            Form::Tt => self.tt.conclude(left, exchange),
+            Form::Xt => self.xt.conclude(left, exchange),
+        })
+    }
+}

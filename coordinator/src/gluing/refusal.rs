@@ -1,0 +1,97 @@
+//! Why a strategy cannot glue a group, said when the scenario is loaded, with the strategies that could.
+
+use super::{Exchange, Strategy, strategy};
+use crate::host::Instance;
+use crate::scenario::GluingSpec;
+use terraglue_subsystem::Capabilities;
+
+/// A refused strategy.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Refusal {
+    /// Why.
+    pub reason: String,
+    /// Strategies that this group could be glued with.
+    pub would_work: Vec<&'static str>,
+}
+
+/// Why the scenario's strategy cannot glue these members; `None`: it can.
+pub fn refusal(spec: &GluingSpec, exchange: &Exchange, instances: &[Instance]) -> Option<Refusal> {
+    let of = |name: &str| {
+        let spec = GluingSpec { strategy: name.into(), ..spec.clone() };
+        why(strategy(&spec).as_ref(), exchange, instances)
+    };
+    let reason = of(&spec.strategy)?;
+    let would_work = super::STRATEGIES.into_iter().filter(|name| of(name).is_none()).collect();
+    Some(Refusal { reason, would_work })
+}
+
+fn why(strategy: &dyn Strategy, exchange: &Exchange, instances: &[Instance]) -> Option<String> {
+    let needs = strategy.needs();
+    let lacks = |slot: usize, needs: Capabilities| {
+        let have = instances[slot].capabilities();
+        let missing = Capabilities(needs.0 & !have.0);
+        (missing.0 != 0).then(|| {
+            let names: Vec<_> = missing.names().collect();
+            format!(
+                "strategy `{}` needs {} of `{}` (module {}), which does not offer it",
+                strategy.name(),
+                names.join(", "),
+                instances[slot].name(),
+                instances[slot].module()
+            )
+        })
+    };
+    let body =
+        |slot: usize| lacks(slot, if exchange.glue.is_second(slot) { needs.second } else { needs.first });
+    strategy
+        .refuses(exchange)
+        .or_else(|| exchange.body_slots().find_map(body))
+        .or_else(|| exchange.ground_slots().find_map(|s| lacks(s, needs.grounds)))
+}
+
+/// A pass of contacts meets a joint.
+pub fn joints_refused(name: &str, exchange: &Exchange) -> Option<String> {
+    exchange.glue.has_joints().then(|| {
+        format!("`{name}` co-operates at contacts: the soil cannot say how a joint between bodies pulls")
+    })
+}
+
+/// A strategy of joints meets a contact.
+pub fn contacts_refused(name: &str, exchange: &Exchange) -> Option<String> {
+    (exchange.has_grounds() || exchange.glue.contact().is_some())
+        .then(|| format!("`{name}` glues joints: a contact opens and closes, and it cannot see when"))
+}
+
+/// A strategy that asks soils meets a contact between bodies.
+pub fn body_contacts_refused(name: &str, exchange: &Exchange) -> Option<String> {
+    let k = exchange.glue.body_contact()?;
+    Some(format!("`{name}` asks a soil for the force of a contact, but side 2 of glue {} is a body", k + 1))
+}
+
+/// An explicit strategy meets a constraint.
+pub fn rigid_refused(name: &str, exchange: &Exchange) -> Option<String> {
+    let joint = exchange.glue.rigid_joint().map(|k| {
+        format!(
+            "`{name}` is explicit and knows the force of a spring only: glue {} has no compliance_m_n",
+            k + 1
+        )
+    });
+    joint.or_else(|| body_contacts_refused(name, exchange))
+}
+
+/// A strategy that drives side 2 by motion meets a glue where that cannot be.
+pub fn second_refused(name: &str, exchange: &Exchange) -> Option<String> {
+    let spring = exchange.glue.spring().map(|k| {
+        format!(
+            "`{name}` makes side 2 follow side 1: the compliance of glue {} would have to be inside side 2",
+            k + 1
+        )
+    });
+    let nobody = exchange.glue.joint_without_second().map(|k| {
+        format!(
+            "`{name}` makes side 2 follow side 1: side 2 of glue {} is the world, or side 1 of another glue",
+            k + 1
+        )
+    });
+    spring.or_else(|| body_contacts_refused(name, exchange)).or(nobody)
+}

@@ -1,0 +1,51 @@
+//! One Newton step of the T-T form and no check: T1 = T0 − Λ·e(T0), Λ = (G1 + G2 + 1/k_c)⁻¹.
+//!
+//! Two evaluations per step; the gap it leaves at smooth joints is of order h⁶. T0 is the force of the step
+//! before at joints and the soil's own at contacts, where the linearised problem keeps the bounds of the law.
+
+use super::exchange::Exchange;
+use super::iterative::TtForm;
+use super::refresh::Refresh;
+use super::{Needs, Outcome, Strategy};
+use crate::Result;
+use crate::host::Instance;
+use crate::scenario::GluingSpec;
+use terraglue_subsystem::Capabilities;
+
+/// Name in the scenario.
+pub const NAME: &str = "semi-implicit";
+
+/// The strategy with its buffers.
+#[derive(Debug)]
+pub struct SemiImplicit {
+    tt: TtForm,
+}
+
+impl SemiImplicit {
+    /// From the scenario's `[gluing]`.
+    pub fn new(spec: &GluingSpec) -> Self {
+        Self { tt: TtForm::new(Refresh::new(&spec.jacobian)) }
+    }
+}
+
+impl Strategy for SemiImplicit {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn needs(&self) -> Needs {
+        let both = Capabilities::FORCE | Capabilities::RETRY;
+        Needs { first: both, second: both, grounds: both }
+    }
+
+    fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
+        if exchange.needs_linearisation() {
+            exchange.start_from_last();
+        } else {
+            exchange.estimate_forces(instances)?;
+            exchange.solve_compatibility(instances)?;
+            exchange.report.evaluations_soil = 0; // the start is not an evaluation of the iteration
+        }
+        self.tt.one_step(exchange, instances)
+    }
+}

@@ -1,0 +1,80 @@
+//! Motion in on both sides: r(X) = F1(X) − F2(X) = 0, Newton with J = K1 + K2, for rigid joints.
+//!
+//! F1(X) is the wrench on side 1 that makes it move by X, −F2 that on side 2. The unknown is the common motion, so
+//! there is no gap at all; what is left when the iteration stops is a difference of the forces. Dual to T-T: best
+//! where both sides are soft, and refused where a side can only take forces.
+
+use super::exchange::Exchange;
+use super::iterative::Limits;
+use super::linear::{Lu, max_norm};
+use super::{Needs, Outcome, Strategy};
+use crate::Result;
+use crate::host::Instance;
+use crate::scenario::GluingSpec;
+use terraglue_subsystem::Capabilities;
+
+/// Name in the scenario.
+pub const NAME: &str = "xx-newton";
+
+/// The strategy with its buffers.
+#[derive(Debug)]
+pub struct XxNewton {
+    limits: Limits,
+    k1: Vec<f64>,
+    k2: Vec<f64>,
+    d: Vec<f64>,
+    lu: Lu,
+}
+
+impl XxNewton {
+    /// From the scenario's `[gluing]`.
+    pub fn new(spec: &GluingSpec) -> Self {
+        let limits = Limits::read(spec);
+        Self { limits, k1: Vec::new(), k2: Vec::new(), d: Vec::new(), lu: Lu::default() }
+    }
+}
+
+impl Strategy for XxNewton {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn needs(&self) -> Needs {
+        let both = Capabilities::MOTION | Capabilities::DERIVATIVES | Capabilities::RETRY;
+        Needs { first: both, second: both, grounds: both }
+    }
+
+    fn refuses(&self, exchange: &Exchange) -> Option<String> {
+        super::second_refused(NAME, exchange).or_else(|| super::contacts_refused(NAME, exchange))
+    }
+
+    fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
+        let n = exchange.n();
+        exchange.start_at_constant_velocity();
+        let mut size = f64::INFINITY;
+        for _ in 0..=self.limits.max_iterations {
+            exchange.advance_first_under_motion(instances)?;
+            exchange.advance_second_under_motion(instances)?;
+            self.d.clear();
+            self.d.extend(exchange.f.iter().zip(&exchange.t).map(|(f2, f1)| f2 - f1));
+            let before = std::mem::replace(&mut size, max_norm(&self.d));
+            exchange.report.contraction = size / before;
+            exchange.report.residual = size / exchange.t_ref;
+            if size <= self.limits.threshold(exchange) {
+                exchange.report.converged = true;
+                return Ok(Outcome::Converged);
+            }
+            if !size.is_finite() || !exchange.first_stiffness(instances, &mut self.k1)? {
+                break;
+            }
+            exchange.second_stiffness(instances, &mut self.k2)?;
+            let (k1, k2) = (&self.k1, &self.k2);
+            let rank = self.lu.factor(n, |r, c| k1[c * n + r] + k2[c * n + r]);
+            exchange.report.rank = (rank as u32, n as u32);
+            exchange.report.jacobian_refreshes += 1;
+            self.lu.solve(&mut self.d);
+            exchange.x1.iter_mut().zip(&self.d).for_each(|(x, d)| *x += d);
+        }
+        Ok(self.limits.give_up(exchange, "X-X Newton: |F1 - F2|", size))
+    }
+}

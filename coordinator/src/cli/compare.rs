@@ -23,16 +23,15 @@ struct Plan {
     soil: String,
     scenario: Scenario,
     folder: PathBuf,
+    /// Why it cannot run: a row of the comparison.
+    refused: Option<String>,
 }
 
 /// Runs all combinations and writes the comparison.
 pub fn compare(arguments: &CompareArguments) -> Result<Exit> {
     let cancel = interrupt::cancel_flag();
     let mut plans = plan(arguments)?;
-    for plan in &plans {
-        // Wrong input shows before the first run starts.
-        run::build(&plan.scenario, &run::options(&arguments.run, &cancel))?;
-    }
+    refuse(&mut plans, &arguments.run, &cancel)?;
     let name = plans.first().map_or_else(String::new, |p| p.scenario.name.clone());
     let folder = results_folder(arguments.run.out.as_deref(), &name)?;
     for plan in &mut plans {
@@ -46,6 +45,22 @@ pub fn compare(arguments: &CompareArguments) -> Result<Exit> {
     Ok(if cancel.load(Ordering::Relaxed) { Exit::Interrupted } else { Exit::Done })
 }
 
+/// Wrong input shows before the first run starts; a strategy that cannot glue the scenario is a row that says so,
+/// as long as another one can.
+fn refuse(plans: &mut [Plan], arguments: &RunArguments, cancel: &Arc<AtomicBool>) -> Result {
+    let mut first = None;
+    for plan in plans.iter_mut() {
+        if let Err(error) = run::build(&plan.scenario, &run::options(arguments, cancel)) {
+            plan.refused = Some(format!("refused: {error}"));
+            first = first.or(Some(error));
+        }
+    }
+    match first {
+        Some(error) if plans.iter().all(|p| p.refused.is_some()) => Err(error),
+        _ => Ok(()),
+    }
+}
+
 impl Plan {
     /// Whether the iteration also runs from zero, to show what the estimate saves.
     fn has_cold_start(&self) -> bool {
@@ -56,6 +71,9 @@ impl Plan {
     fn steps(&self) -> u64 {
         let time = self.scenario.time;
         let once = (time.duration_s / time.step_s).round() as u64;
+        if self.refused.is_some() {
+            return 0;
+        }
         if self.has_cold_start() { 2 * once } else { once }
     }
 }
@@ -95,6 +113,7 @@ fn plan(arguments: &CompareArguments) -> Result<Vec<Plan>> {
                 soil: module.clone(),
                 scenario,
                 folder: PathBuf::new(),
+                refused: None,
             });
         }
     }
@@ -173,6 +192,10 @@ fn run_one(plan: &Plan, arguments: &RunArguments, cancel: &Arc<AtomicBool>, bar:
         error: None,
         cold_start_mean: None,
     };
+    if plan.refused.is_some() {
+        row.error.clone_from(&plan.refused);
+        return row;
+    }
     if cancel.load(Ordering::Relaxed) {
         row.error = Some("not started: interrupted".into());
         return row;

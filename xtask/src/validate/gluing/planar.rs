@@ -162,7 +162,9 @@ pub fn answer(case: &str, p: Parameters, rows: &[(Option<f64>, String)]) -> Outc
     let last = times.iter().fold(0.0_f64, |m, t| m.max(*t));
     let h = common_step(&times, 0.0025);
     let limits = extrapolate(h, &[2, 3, 4, 5], |h| {
-        let mut testbed = build(&mechanism.cut(&Setting::iterative(h, GRAVITY), ALPHA))?;
+        // rounding of a place of 1 m is 1e-8 N at the shortest of these steps
+        let setting = Setting { gluing: "tolerance = 1e-8".into(), ..Setting::iterative(h, GRAVITY) };
+        let mut testbed = build(&mechanism.cut(&setting, ALPHA))?;
         let mut out = vec![f64::NAN; rows.len()];
         let mut count = 0;
         step(&mut testbed, steps_to(last, h), |testbed| {

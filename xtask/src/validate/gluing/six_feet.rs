@@ -94,7 +94,7 @@ pub fn answer(case: &str, p: Parameters, rows: &[(Option<f64>, String)]) -> Outc
 }
 
 fn statics(table: &Table, k: &[f64], rows: &[(Option<f64>, String)]) -> Outcome<Answers> {
-    let h = 1e4;
+    let h = 1.0;
     // as stiff when the force falls: the equilibrium does not depend on the way to it
     let mut testbed =
         build(&table.text(&Setting::iterative(h, GRAVITY), &[("K", list(k)), ("k_u", list(k))]))?;
@@ -123,7 +123,7 @@ fn falling(table: &Table, p: Parameters, rows: &[(Option<f64>, String)]) -> Outc
     let times: Vec<f64> = rows.iter().filter_map(|r| r.0).collect();
     let last = times.iter().fold(0.0_f64, |m, t| m.max(*t));
     let stiffest = k_u.iter().sum::<f64>() / table.mass;
-    let h = common_step(&times, 0.004 / stiffest.sqrt());
+    let h = common_step(&times, 0.001 / stiffest.sqrt());
     let mut testbed = build(&table.text(&Setting::iterative(h, GRAVITY), &soil))?;
     let (mut values, mut peak, mut count) = (vec![f64::NAN; rows.len()], 0.0_f64, 0);
     step(&mut testbed, steps_to(last, h), |testbed| {

@@ -9,6 +9,9 @@ use terraglue_subsystem::{Geometry, Node};
 /// Sub-samples along each side of a cell at the edge of an outline without closed form.
 const SAMPLES: i32 = 8;
 
+/// Heights that are read at once.
+const CHUNK: usize = 64;
+
 /// Outline of a shape seen from above.
 enum Outline {
     /// Centre and radius.
@@ -31,16 +34,21 @@ pub fn nodes_below<S: Surface + ?Sized>(shape: &Placed, surface: &S, margin: f64
     let outline = Outline::of(shape);
     let (i0, i1) = lattice.cell_range(0, bounds.min[0], bounds.max[0]);
     let (j0, j1) = lattice.cell_range(1, bounds.min[1], bounds.max[1]);
+    let mut heights = [0.0; CHUNK];
     for j in j0..=j1 {
-        for i in i0..=i1 {
-            let reach = surface.height(i, j) + margin;
-            if bounds.min[2] >= reach {
-                continue;
-            }
-            let cell = Cell { at: lattice.position(i, j), half: 0.5 * lattice.spacing };
-            if let Some((area, [x, y, lower])) = outline.node(shape, &cell, reach) {
-                let slope = shape.underside_slope([x, y, lower]);
-                out.push(Node { i, j, area, lower, slope });
+        for first in (i0..=i1).step_by(CHUNK) {
+            let row = &mut heights[..CHUNK.min((i1 - first + 1) as usize)];
+            surface.heights(first, j, row);
+            for (i, height) in (first..).zip(row) {
+                let reach = *height + margin;
+                if bounds.min[2] >= reach {
+                    continue;
+                }
+                let cell = Cell { at: lattice.position(i, j), half: 0.5 * lattice.spacing };
+                if let Some((area, [x, y, lower])) = outline.node(shape, &cell, reach) {
+                    let slope = shape.underside_slope([x, y, lower]);
+                    out.push(Node { i, j, area, lower, slope });
+                }
             }
         }
     }

@@ -325,6 +325,28 @@ impl Surface for HeightField {
     fn height(&self, i: i32, j: i32) -> f64 {
         Self::height(self, i, j)
     }
+    fn heights(&self, i: i32, j: i32, out: &mut [f64]) {
+        let edge = TILE_EDGE as usize;
+        let (mut i, mut rest) = (i, out);
+        while !rest.is_empty() {
+            if !self.lattice.has(i, j) {
+                let (now, later) = rest.split_at_mut(1);
+                now[0] = Self::height(self, i, j);
+                (i, rest) = (i + 1, later);
+                continue;
+            }
+            let (tile, first) = self.lattice.locate(i as u32, j as u32);
+            let inside = (self.lattice.size[0] as usize - i as usize).min(edge - first % edge);
+            let (now, later) = rest.split_at_mut(inside.min(rest.len()));
+            match self.tile(tile) {
+                Err(units) => now.fill(f64::from(units) * UNIT_M),
+                Ok(units) => {
+                    now.iter_mut().zip(&units[first..]).for_each(|(h, u)| *h = f64::from(*u) * UNIT_M);
+                }
+            }
+            (i, rest) = (i + now.len() as i32, later);
+        }
+    }
 }
 
 /// The nodes of a tile that lie inside the lattice.

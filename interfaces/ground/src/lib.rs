@@ -37,4 +37,10 @@ pub trait Surface {
     fn lattice(&self) -> &Lattice;
     /// Height of node (i, j), m. Indices outside the lattice read the nearest node of the edge.
     fn height(&self, i: i32, j: i32) -> f64;
+    /// Heights of the nodes (i, j), (i + 1, j) …, as many as `out` has places.
+    fn heights(&self, i: i32, j: i32, out: &mut [f64]) {
+        for (i, out) in (i..).zip(out) {
+            *out = self.height(i, j);
+        }
+    }
 }

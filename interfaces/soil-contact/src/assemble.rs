@@ -11,17 +11,35 @@ impl Patches {
     pub fn wrench(&self, p: usize, x: &[f64; 6], shear: &ShearLaw) -> [f64; 6] {
         let mut sum = [0.0; 6];
         self.each_loaded(p, x, |k, pressure, _, moved| {
-            let facing = &self.nodes.facing[k];
-            let tau = shear.respond(&self.nodes.shear[k], pressure, moved).stress;
-            let area = self.nodes.area[k];
-            let inclined = area * facing.stretch;
-            let force = std::array::from_fn(|c| {
-                area * pressure * facing.press[c]
-                    - inclined * (tau[0] * facing.along[0][c] + tau[1] * facing.along[1][c])
-            });
-            add_force(&mut sum, self.nodes.arm[k], force);
+            add_force(&mut sum, self.nodes.arm[k], self.node_force(k, pressure, moved, shear));
         });
         sum
+    }
+
+    /// Wrench on the body at rest, and the largest tangential force there, N.
+    pub fn at_rest(&self, p: usize, shear: &ShearLaw) -> ([f64; 6], f64) {
+        let (mut sum, mut strength) = ([0.0; 6], 0.0);
+        let n = &self.nodes;
+        self.each_loaded(p, &[0.0; 6], |k, pressure, _, moved| {
+            add_force(&mut sum, n.arm[k], self.node_force(k, pressure, moved, shear));
+            let inclined = n.area[k] * n.facing[k].stretch;
+            strength += inclined * shear.yield_stress_at(pressure, n.shear[k].slip, n.mobilised[k]);
+        });
+        (sum, strength)
+    }
+
+    /// Force of a node on the body along n, t1, t2 after a displacement along its underside.
+    #[inline]
+    fn node_force(&self, k: usize, pressure: f64, moved: [f64; 2], shear: &ShearLaw) -> [f64; 3] {
+        let n = &self.nodes;
+        let facing = &n.facing[k];
+        let tau = shear.respond_at(&n.shear[k], n.mobilised[k], pressure, moved).stress;
+        let area = n.area[k];
+        let inclined = area * facing.stretch;
+        std::array::from_fn(|c| {
+            area * pressure * facing.press[c]
+                - inclined * (tau[0] * facing.along[0][c] + tau[1] * facing.along[1][c])
+        })
     }
 
     /// d(wrench on the soil)/dX at `x`: consistent tangents of both laws, moved to the port's origin.
@@ -29,7 +47,7 @@ impl Patches {
         let mut sum = [[0.0; 6]; 6];
         let moments = self.ports[p].carries_moments();
         self.each_loaded(p, x, |k, pressure, slope, moved| {
-            let r = shear.respond(&self.nodes.shear[k], pressure, moved);
+            let r = shear.respond_at(&self.nodes.shear[k], self.nodes.mobilised[k], pressure, moved);
             let node = node_stiffness(&self.nodes.facing[k], self.nodes.area[k], slope, &r);
             add_stiffness(&mut sum, self.nodes.arm[k], &node, moments);
         });

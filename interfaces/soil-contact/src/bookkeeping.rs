@@ -115,21 +115,22 @@ impl Scene<'_> {
             let depth = n.depth[k] - rise;
             let (pressure, _) = patch.curve.at(depth, n.z_max[k], n.p_max[k]);
             let [i, j] = n.index[k];
+            let lower = n.reference[k] - depth / patch.slope;
+            let mut covered =
+                Covered { i, j, lower, depth: depth / patch.slope, pressure, virgin: 0.0, surface: f64::NAN };
             if pressure > 0.0 {
                 loaded += 1;
-                let before = ground.nodes.get(i, j);
-                let fresh = !before.loaded() || before.stamp + 1 != book.stamp;
+                let fresh = n.stamp[k] == 0 || n.stamp[k] + 1 != book.stamp;
                 // a point that has just come down from above is no deeper than its own descent
                 lists.slid_in.push(fresh && depth > -2.0 * rise);
                 let node = Pressed { k, depth, pressure, slip: facing.slide(moved) };
-                let plastic = self.press(patch, &node, ground, book);
+                let (plastic, surface) = self.press(patch, &node, ground, book);
                 slid = [slid[0] + plastic[0], slid[1] + plastic[1]];
                 lists.loaded.push([i, j]);
+                covered.surface = surface;
+                covered.virgin = if depth > n.z_max[k] { pressure } else { patch.curve.virgin(depth) };
             }
-            let virgin = patch.curve.virgin(depth);
-            let depth = depth / patch.slope;
-            let lower = ground.reference(i, j, &ground.nodes.get(i, j)) - depth;
-            lists.covered.push(Covered { i, j, lower, depth, pressure, virgin });
+            lists.covered.push(covered);
         }
         let mean = slid.map(|s| s / f64::from(loaded.max(1)));
         carry_slip(ground, lists, first, in_world(port, mean), book.stamp);
@@ -137,13 +138,13 @@ impl Scene<'_> {
     }
 
     /// One loaded node: plastic depth, slip, heat and elastic energy. Returns how far the foot slipped over the soil
-    /// along t1 and t2, m.
-    fn press(&self, patch: &Patch, node: &Pressed, ground: &mut Ground, book: &mut Book) -> [f64; 2] {
+    /// along t1 and t2, and the height of the unloaded surface, m.
+    fn press(&self, patch: &Patch, node: &Pressed, ground: &mut Ground, book: &mut Book) -> ([f64; 2], f64) {
         let Pressed { k, depth, pressure, slip } = *node;
         let (n, curve) = (&self.patches.nodes, &patch.curve);
         let area = n.area[k];
         let inclined = area * n.facing[k].stretch;
-        let shear = self.laws.shear.respond(&n.shear[k], pressure, slip);
+        let shear = self.laws.shear.respond_at(&n.shear[k], n.mobilised[k], pressure, slip);
         let squeezed = 0.5 * pressure * pressure / curve.unloading();
         book.dissipated += inclined * shear.dissipated;
         book.elastic += inclined * self.laws.shear.elastic_energy(&shear.state) + area * squeezed;
@@ -160,13 +161,14 @@ impl Scene<'_> {
         state.curve = key(curve, patch.slope);
         (state.pressure, state.shear, state.stamp) = (pressure, shear.state, book.stamp);
         book.max_sinkage = book.max_sinkage.max(depth / patch.slope - (state.reference - initial));
+        let surface = state.reference - state.permanent.max(0.0);
         let elastic = |c: usize| shear.state.elastic[c] - n.shear[k].elastic[c];
         if shear.state.slip > n.shear[k].slip {
             let [a, b] = [slip[0] - elastic(0), slip[1] - elastic(1)];
             let along = &n.facing[k].along;
-            [1, 2].map(|c| a * along[0][c] + b * along[1][c])
+            ([1, 2].map(|c| a * along[0][c] + b * along[1][c]), surface)
         } else {
-            [0.0; 2]
+            ([0.0; 2], surface)
         }
     }
 }

@@ -17,8 +17,10 @@ pub struct Covered {
     pub depth: f64,
     /// Pressure, Pa; 0: the foot does not touch here.
     pub pressure: f64,
-    /// Pressure of first loading at this depth, Pa.
+    /// Pressure of first loading at this depth, Pa; 0 where the foot does not touch.
     pub virgin: f64,
+    /// Height of the unloaded surface, from the unrounded state, m; NaN where the foot does not touch.
+    pub surface: f64,
 }
 
 /// Heights and node states on one lattice.

@@ -91,7 +91,7 @@ impl Patches {
         let mut sum = 0.0;
         self.each_loaded(p, x, |k, pressure, slope, moved| {
             let (n, facing) = (&self.nodes, &self.nodes.facing[k]);
-            let r = shear.respond(&n.shear[k], pressure, moved);
+            let r = shear.respond_at(&n.shear[k], n.mobilised[k], pressure, moved);
             sum += node_stiffness(facing, n.area[k], slope, &r)[0][0];
         });
         sum

@@ -5,7 +5,6 @@
 
 use crate::assemble::dot;
 use crate::ground::Ground;
-use crate::nodes::NodeState;
 use terraglue_soil_law::{PressureCurve, PressureLaw, ShearLaw, ShearState};
 use terraglue_subsystem::{Node, Port, Step};
 
@@ -111,6 +110,14 @@ pub struct PatchNodes {
     pub facing: Vec<Facing>,
     /// Shear history.
     pub shear: Vec<ShearState>,
+    /// Share of the shear strength that the slip so far has mobilised.
+    pub mobilised: Vec<f64>,
+    /// Largest depth as the node remembers it, and the curve and normal for which it holds.
+    remembered: Vec<(f64, [f64; 3])>,
+    /// Reference level, world, m.
+    pub reference: Vec<f64>,
+    /// Number of the commit at which the node was last loaded; 0: no foot stood here.
+    pub stamp: Vec<u64>,
     /// Depth with the rotation of a trial; scratch.
     pub turned: Vec<f64>,
 }
@@ -125,6 +132,10 @@ impl PatchNodes {
         self.area.clear();
         self.arm.clear();
         self.shear.clear();
+        self.mobilised.clear();
+        self.remembered.clear();
+        self.reference.clear();
+        self.stamp.clear();
         self.facing.clear();
     }
 
@@ -133,8 +144,12 @@ impl PatchNodes {
         self.index.reserve(count);
         self.arm.reserve(count);
         self.shear.reserve(count);
+        self.remembered.reserve(count);
+        self.stamp.reserve(count);
         self.facing.reserve(count);
         for v in [
+            &mut self.mobilised,
+            &mut self.reference,
             &mut self.depth,
             &mut self.z_max,
             &mut self.p_max,
@@ -197,15 +212,21 @@ impl Patches {
         let first = self.nodes.index.len();
         let n_z = port.frame[2];
         for node in nodes {
-            self.read_node(port, node, ground);
+            self.read_node(port, node, ground, &laws.shear);
         }
         let range = first..self.nodes.index.len();
         let b = contact_size(port, nodes, &self.nodes, range.clone(), ground.heights.lattice().spacing);
         let curve = laws.pressure.curve(b, laws.elastic);
-        for (k, node) in range.clone().zip(nodes) {
-            let state = ground.nodes.get(node.i, node.j);
-            self.nodes.z_max[k] = largest_depth(&state, &curve, n_z);
-            self.nodes.p_max[k] = curve.unloading() * (self.nodes.z_max[k] - self.nodes.permanent[k]);
+        let here = key(&curve, n_z);
+        for k in range.clone() {
+            let permanent = self.nodes.permanent[k];
+            if permanent > 0.0 {
+                let (largest, curve_then) = self.nodes.remembered[k];
+                let z_max =
+                    if curve_then == here { largest } else { curve.largest_depth(permanent, largest) };
+                self.nodes.z_max[k] = z_max;
+                self.nodes.p_max[k] = curve.unloading() * (z_max - permanent);
+            }
         }
         let mut place = [None; 6];
         port.components().for_each(|(i, c)| place[c] = Some(i));
@@ -221,7 +242,7 @@ impl Patches {
         }
     }
 
-    fn read_node(&mut self, port: &Port, node: &Node, ground: &Ground) {
+    fn read_node(&mut self, port: &Port, node: &Node, ground: &Ground, shear: &ShearLaw) {
         let state = ground.nodes.get(node.i, node.j);
         let n_z = port.frame[2];
         let [x, y] = ground.heights.lattice().position(node.i, node.j);
@@ -230,6 +251,8 @@ impl Patches {
         let along = |c: usize| port.direction(c).iter().zip(&offset).map(|(a, b)| a * b).sum::<f64>();
         let nodes = &mut self.nodes;
         nodes.index.push([node.i, node.j]);
+        nodes.reference.push(reference);
+        nodes.stamp.push(state.stamp);
         nodes.depth.push((reference - node.lower) * n_z);
         nodes.z_max.push(0.0);
         nodes.p_max.push(0.0);
@@ -237,6 +260,8 @@ impl Patches {
         nodes.area.push(node.area / n_z);
         nodes.arm.push([along(0), along(1), along(2)]);
         nodes.shear.push(state.shear);
+        nodes.mobilised.push(shear.mobilised(state.shear.slip));
+        nodes.remembered.push((state.largest, state.curve));
         nodes.facing.push(Facing::new(port, node.slope));
     }
 
@@ -261,22 +286,17 @@ impl Patches {
     }
 
     fn evaluate_at_rest(&mut self, p: usize, shear: &ShearLaw) {
-        let force = self.wrench(p, &[0.0; 6], shear);
-        let patch = &self.ports[p];
-        let (mut highest, mut strength) = (f64::NEG_INFINITY, 0.0);
-        for k in patch.nodes.clone().filter(|k| self.nodes.area[*k] > 0.0) {
-            highest =
-                highest.max((self.nodes.depth[k] - self.nodes.permanent[k]) / self.nodes.facing[k].press[0]);
-            let (pressure, _) = patch.curve.at(self.nodes.depth[k], self.nodes.z_max[k], self.nodes.p_max[k]);
-            if pressure > 0.0 {
-                let inclined = self.nodes.area[k] * self.nodes.facing[k].stretch;
-                strength += inclined * shear.yield_stress(pressure, self.nodes.shear[k].slip);
-            }
-        }
+        let (force, strength) = self.at_rest(p, shear);
+        let surface = if force[0] > 0.0 { 0.0 } else { self.highest(p).clamp(-FAR, 0.0) };
         let patch = &mut self.ports[p];
-        patch.force = force;
-        patch.strength = strength;
-        patch.surface = if force[0] > 0.0 { 0.0 } else { highest.clamp(-FAR, 0.0) };
+        (patch.force, patch.strength, patch.surface) = (force, strength, surface);
+    }
+
+    /// How far the foot of patch `p` is below where it just touches, along n, m.
+    fn highest(&self, p: usize) -> f64 {
+        let n = &self.nodes;
+        let loaded = self.ports[p].nodes.clone().filter(|k| n.area[*k] > 0.0);
+        loaded.fold(f64::NEG_INFINITY, |h, k| h.max((n.depth[k] - n.permanent[k]) / n.facing[k].press[0]))
     }
 }
 
@@ -287,16 +307,6 @@ const FAR: f64 = 1.0;
 pub fn key(curve: &PressureCurve, n_z: f64) -> [f64; 3] {
     let [a, b] = curve.key();
     [a, b, n_z]
-}
-
-fn largest_depth(state: &NodeState, curve: &PressureCurve, n_z: f64) -> f64 {
-    if state.permanent <= 0.0 {
-        0.0
-    } else if state.curve == key(curve, n_z) {
-        state.largest
-    } else {
-        curve.largest_depth(state.permanent * n_z, state.largest)
-    }
 }
 
 /// Whether the index ranges of two node lists meet.

@@ -13,6 +13,9 @@
 /// Ratio of tangential to normal elastic stiffness, 2(1 − ν)/(2 − ν) at ν = 0.3 (Mindlin 1949).
 const MINDLIN_RATIO: f64 = 1.4 / 1.7;
 
+/// A stress so little above the yield stress is on it: a foot that slid and now stands does not slip by rounding.
+const ON_YIELD: f64 = 1.0 + 1e-13;
+
 use crate::expression::ShearExpression;
 
 /// Parameters of the shear law.
@@ -68,9 +71,15 @@ impl ShearLaw {
 
     /// Stress up to which soil under the pressure p that has slipped by `slip` is elastic, Pa.
     pub fn yield_stress(&self, p: f64, slip: f64) -> f64 {
+        self.yield_stress_at(p, slip, self.mobilised(slip))
+    }
+
+    /// [`ShearLaw::yield_stress`] where `mobilised` = [`ShearLaw::mobilised`] of the slip is known already.
+    #[inline]
+    pub fn yield_stress_at(&self, p: f64, slip: f64, mobilised: f64) -> f64 {
         match &self.expression {
             Some(law) => law.strength(p, slip).0,
-            None => self.strength(p).0 * self.mobilised(slip),
+            None => self.strength(p).0 * mobilised,
         }
     }
 
@@ -95,6 +104,12 @@ impl ShearLaw {
 
     /// Stress, tangents and new history after the foot has moved by `s` (m, along t1, t2) under the pressure p.
     pub fn respond(&self, state: &ShearState, p: f64, s: [f64; 2]) -> ShearResponse {
+        self.respond_at(state, self.mobilised(state.slip), p, s)
+    }
+
+    /// [`ShearLaw::respond`] where `mobilised` = [`ShearLaw::mobilised`] of the state's slip is known already.
+    #[inline]
+    pub fn respond_at(&self, state: &ShearState, mobilised: f64, p: f64, s: [f64; 2]) -> ShearResponse {
         if p <= 0.0 {
             return ShearResponse::default();
         }
@@ -105,10 +120,10 @@ impl ShearLaw {
             return self.respond_by(law, state, p, u);
         }
         let (strength, by_p) = self.strength(p);
-        if trial <= strength * self.mobilised(state.slip) {
+        if trial <= strength * mobilised * ON_YIELD {
             return self.elastic(u, state.slip);
         }
-        let (slip, left) = self.return_map(trial, strength, state.slip);
+        let (slip, left) = self.return_map(trial, strength, state.slip, 1.0 - mobilised);
         self.plastic(u, length, state.slip, slip, left * strength / self.modulus, (1.0 - left) * by_p)
     }
 
@@ -153,17 +168,16 @@ impl ShearLaw {
     }
 
     /// Solves trial − k_t·Δj = S·(1 − e^(−(j + Δj)/K)) for the slip increment Δj. The left side minus the right is
-    /// convex and falling, so Newton from Δj = 0 climbs to the root without passing it. Returns Δj and
-    /// e^(−(j + Δj)/K).
-    fn return_map(&self, trial: f64, strength: f64, slip: f64) -> (f64, f64) {
+    /// convex and falling, so Newton from Δj = 0 (where the exponential is `left`) climbs to the root without passing
+    /// it, and the error of a step is below the square of the one before. Returns Δj and e^(−(j + Δj)/K).
+    fn return_map(&self, trial: f64, strength: f64, slip: f64, mut left: f64) -> (f64, f64) {
         let mut step = 0.0;
-        let mut left = libm::exp(-slip / self.modulus);
         for _ in 0..30 {
             let residual = trial - self.stiffness * step - strength * (1.0 - left);
             let change = residual / (self.stiffness + strength / self.modulus * left);
             step += change;
             left = libm::exp(-(slip + step) / self.modulus);
-            if change <= 1e-15 * step {
+            if change <= 1e-8 * step {
                 break;
             }
         }

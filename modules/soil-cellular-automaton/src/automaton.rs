@@ -6,7 +6,7 @@ use crate::feet::Foot;
 use crate::sweep::{Counts, SavedAwake, Sweeper};
 use crate::values;
 use std::sync::Arc;
-use terraglue_ground::Lattice;
+use terraglue_ground::{Lattice, UNIT_M};
 use terraglue_soil_contact::{Covered, Ground, Material};
 use terraglue_soil_law::SoilParameters;
 use terraglue_subsystem::{Config, Error, Host, Result, Variable};
@@ -118,7 +118,7 @@ impl Automaton {
     fn displace(&mut self, ground: &mut Ground, covered: &[Covered]) {
         for node in covered.iter().filter(|n| n.pressure > 0.0) {
             let before = ground.heights.units(node.i, node.j);
-            let excess = before - ground.surface_units(node.i, node.j);
+            let excess = before - nearest_unit(node.surface);
             if excess <= 0 {
                 continue;
             }
@@ -147,6 +147,13 @@ impl Automaton {
         self.credit = (self.credit - whole).max(0.0);
         whole as u32
     }
+}
+
+/// A height (m, within the range of units) in units, halves upwards.
+fn nearest_unit(height: f64) -> i32 {
+    let raised = height / UNIT_M + 0.5;
+    let towards_zero = raised as i32;
+    towards_zero - i32::from(f64::from(towards_zero) > raised)
 }
 
 /// Exact copy of the automaton's state.

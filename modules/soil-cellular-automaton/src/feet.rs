@@ -50,7 +50,8 @@ fn load_units(node: &Covered) -> i32 {
         return 0;
     }
     let height = node.depth * (node.pressure / node.virgin).min(1.0);
-    (height / (UNIT_M * f64::from(QUANTUM))).round() as i32 * QUANTUM
+    // a depth below a foot under pressure is not negative: the nearest step
+    (height / (UNIT_M * f64::from(QUANTUM)) + 0.5) as i32 * QUANTUM
 }
 
 /// What fits between the ground and a foot that does not touch it, units.

@@ -93,6 +93,16 @@ pub fn admit(flux: &mut [i32], from: &[i32], to: &[i32]) {
     }
 }
 
+/// Cuts what the middles of triples receive to what every node of a triple admits: its middle and both its `ends`
+/// (inlets; slices of the same length).
+#[inline(always)]
+pub fn admit_triples(flux: &mut [i32], middle: &[i32], ends: [&[i32]; 2]) {
+    for (((q, m), a), b) in flux.iter_mut().zip(middle).zip(ends[0]).zip(ends[1]) {
+        let least = (*a).min(*b).min(*m);
+        *q = (*q).clamp(-least, least);
+    }
+}
+
 /// What the middles of the triples (a, middle, b) receive from each end, units, at `first` …; < 0: they give.
 /// Returns whether any is not 0. `shift` moves a to the left and b to the right.
 #[inline(always)]

@@ -4,7 +4,7 @@
 //! neither see nor disturb each other and their number and shape cannot be seen in the result.
 
 use crate::feet::{Foot, OPEN_INLET, inlet};
-use crate::kernel::{LANES, admit, faces_across, faces_along, triples};
+use crate::kernel::{LANES, admit, admit_triples, faces_across, faces_along, triples};
 use crate::span::Span;
 use terraglue_ground::{Lattice, TILE_EDGE};
 use terraglue_soil_contact::Ground;
@@ -475,14 +475,13 @@ impl Window {
             let moves = triples(rows, shift, range, limit, out);
             any |= moves;
             if moves && limited {
-                let inlet = |dy: isize, dx: isize, x: usize| {
-                    self.inlets[y.wrapping_add_signed(dy) * self.stride + x.wrapping_add_signed(dx)]
+                let place = |dy: isize, dx: isize| {
+                    (y.wrapping_add_signed(dy) * self.stride + range[0]).wrapping_add_signed(dx)
                 };
-                for x in range[0]..range[1] {
-                    let ends = inlet(step[0], shift[0], x).min(inlet(step[1], shift[1], x));
-                    let least = ends.min(inlet(0, 0, x));
-                    out[x] = out[x].clamp(-least, least);
-                }
+                let n = range[1] - range[0];
+                let inlets = |at: usize| &self.inlets[at..at + n];
+                let ends = [inlets(place(step[0], shift[0])), inlets(place(step[1], shift[1]))];
+                admit_triples(&mut out[range[0]..range[1]], inlets(place(0, 0)), ends);
             }
         }
         any
@@ -537,25 +536,36 @@ fn sum_triples(span: Span, y: usize, any: [bool; 3], fluxes: &[Vec<i32>], change
     change[span.lo..span.lo + span.len().next_multiple_of(LANES)].fill(0);
     let rows = [y - 1, y, y + 1].map(|r| r % 3);
     let [lower, here, upper] = rows.map(|r| &fluxes[4 * r..4 * r + 4]);
-    let range = span.lo..span.hi;
+    let n = span.len();
+    let change = &mut change[span.lo..span.hi];
     if any[rows[1]] {
         let [h, v, d, e] = here else { return };
-        for x in range.clone() {
-            let own = h[x] + v[x] + d[x] + e[x];
-            change[x] += 2 * own - h[x - 1] - h[x + 1];
+        let [v, d, e] = [v, d, e].map(|row| &row[span.lo..span.hi]);
+        let (left, own, right) =
+            (&h[span.lo - 1..span.hi - 1], &h[span.lo..span.hi], &h[span.lo + 1..=span.hi]);
+        for x in 0..n {
+            let all = own[x] + v[x] + d[x] + e[x];
+            change[x] += 2 * all - left[x] - right[x];
         }
     }
     if any[rows[0]] {
-        let [_, v, d, e] = lower else { return };
-        for x in range.clone() {
-            change[x] -= v[x] + d[x - 1] + e[x + 1];
-        }
+        take_ends(change, span, lower, [-1, 1]);
     }
     if any[rows[2]] {
-        let [_, v, d, e] = upper else { return };
-        for x in range {
-            change[x] -= v[x] + d[x + 1] + e[x - 1];
-        }
+        take_ends(change, span, upper, [1, -1]);
+    }
+}
+
+/// Subtracts what the ends in a row give to middles in a row beside it; `shift` leads from an end to the middles of
+/// the two diagonals.
+#[inline(always)]
+fn take_ends(change: &mut [i32], span: Span, fluxes: &[Vec<i32>], shift: [isize; 2]) {
+    let [_, v, d, e] = fluxes else { return };
+    let n = change.len();
+    let from = |left: isize| span.lo.wrapping_add_signed(left);
+    let (v, d, e) = (&v[span.lo..][..n], &d[from(shift[0])..][..n], &e[from(shift[1])..][..n]);
+    for x in 0..n {
+        change[x] -= v[x] + d[x] + e[x];
     }
 }
 

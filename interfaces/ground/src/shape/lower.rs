@@ -15,6 +15,10 @@ impl Placed {
     pub fn lower(&self, x: f64, y: f64) -> Option<f64> {
         let centre = self.world_from_shape.position;
         let (dx, dy) = (x - centre[0], y - centre[1]);
+        if let Geometry::Sphere { radius } = &self.geometry {
+            let rest = radius * radius - (dx * dx + dy * dy);
+            return (rest >= 0.0).then(|| centre[2] - rest.sqrt());
+        }
         // Points of the line in the shape's frame: start + s·up, s = height above the shape's origin.
         let start = self.rotation.to_shape([dx, dy, 0.0]);
         let axes = &self.rotation.0;

@@ -15,10 +15,13 @@ impl Placed {
     /// that of the flatter face.
     pub fn underside_slope(&self, p: [f64; 3]) -> [f64; 2] {
         let centre = self.world_from_shape.position;
+        if let Geometry::Sphere { .. } = &self.geometry {
+            return slope_of(std::array::from_fn(|k| p[k] - centre[k]));
+        }
         let local = self.rotation.to_shape(std::array::from_fn(|k| p[k] - centre[k]));
         let mut face = Downwards { placed: self, distance: f64::NEG_INFINITY, normal: [0.0, 0.0, -1.0] };
         match &self.geometry {
-            Geometry::Sphere { .. } => face.offer(local, 0.0),
+            Geometry::Sphere { .. } => {}
             Geometry::Capsule { half_length, .. } => {
                 face.offer([local[0], local[1], local[2] - local[2].clamp(-half_length, *half_length)], 0.0);
             }
@@ -42,7 +45,7 @@ impl Placed {
                 }
             }
         }
-        face.slope()
+        slope_of(face.normal)
     }
 }
 
@@ -63,13 +66,13 @@ impl Downwards<'_> {
             (self.distance, self.normal) = (distance, normal);
         }
     }
+}
 
-    fn slope(&self) -> [f64; 2] {
-        let n = self.normal;
-        let size = (n[0] * n[0] + n[1] * n[1]).sqrt();
-        let down = n[2].abs().max(size / STEEPEST_SLOPE);
-        if down > 0.0 { [n[0] / down, n[1] / down] } else { [0.0; 2] }
-    }
+/// Slope of a face with the outward normal `n` (any length), at most [`STEEPEST_SLOPE`].
+fn slope_of(n: [f64; 3]) -> [f64; 2] {
+    let size = (n[0] * n[0] + n[1] * n[1]).sqrt();
+    let down = n[2].abs().max(size / STEEPEST_SLOPE);
+    if down > 0.0 { [n[0] / down, n[1] / down] } else { [0.0; 2] }
 }
 
 /// Squared slope.

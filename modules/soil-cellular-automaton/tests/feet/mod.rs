@@ -2,6 +2,8 @@
 //! material as in a run, without a coordinator.
 #![allow(dead_code, clippy::unwrap_used)]
 
+pub mod walk;
+
 use std::sync::Arc;
 use terraglue_ground::{Placed, Rotation, UNIT_M, nodes_below};
 use terraglue_soil_cellular_automaton::{Automaton, Settings};
@@ -15,7 +17,7 @@ pub type Soil = FieldSoil<Automaton>;
 
 pub const H: f64 = 1e-3;
 /// Nodes whose surface lies so far below a body (m) belong to its patch all the same: material flows there.
-const MARGIN: f64 = 0.01;
+const MARGIN: f64 = 0.002;
 const FRAME: [f64; 9] = [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0];
 
 /// Bodies on a soil.

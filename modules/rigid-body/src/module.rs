@@ -50,6 +50,7 @@ impl Module for RigidBody {
             joints,
             energy: Energy::default(),
             contact: ContactBook::default(),
+            pressed: Vec::new(),
             supply: configure::supply(&config)?,
             start: None,
             stagger: 0.0,

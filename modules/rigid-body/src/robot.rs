@@ -224,6 +224,7 @@ impl Robot {
         let lost = -dynamics.contact_work();
         state.energy.dissipated += lost;
         state.contact.lost += lost;
+        contacts.remember(&state.bodies, dynamics.h, &mut state.pressed);
         state.contact.points = contacts.pressing();
         state.contact.residual = contacts.residual;
     }

@@ -2,6 +2,7 @@
 
 use crate::actuator::Actuator;
 use crate::actuator::battery::Supply;
+use crate::contact::memory::Pressed;
 use crate::drive::{Mode, Motor};
 use crate::dynamics::scheme::Acceleration;
 use crate::math::{Q, V3};
@@ -74,6 +75,8 @@ pub(crate) struct State {
     pub contact_normal: Vec<f64>,
     pub energy: Energy,
     pub contact: ContactBook,
+    /// Contact forces of the last step.
+    pub pressed: Vec<Pressed>,
     pub supply: Supply,
     /// Where body 0 was at the start; distances are counted from there.
     pub start: Option<V3>,
@@ -96,6 +99,7 @@ impl State {
         self.accelerated = other.accelerated;
         (self.energy, self.stagger) = (other.energy, other.stagger);
         self.contact = other.contact;
+        self.pressed.clone_from(&other.pressed);
         (self.supply, self.start) = (other.supply, other.start);
     }
 }

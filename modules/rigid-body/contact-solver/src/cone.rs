@@ -8,7 +8,7 @@ pub(crate) fn norm2(v: [f64; 2]) -> f64 {
 /// The point nearest to (r_n, r_t1, r_t2) with |r_t| ≤ μ·r_n.
 pub fn project(mu: f64, r: [f64; 3]) -> [f64; 3] {
     let tangential = norm2([r[1], r[2]]);
-    if tangential <= mu * r[0] {
+    if r[0] >= 0.0 && tangential <= mu * r[0] {
         return r;
     }
     let along = r[0] + mu * tangential;
@@ -33,5 +33,6 @@ mod tests {
         // What is left over is orthogonal to the generator (1, μ).
         assert!(((1.0 - p[0]) + 0.5 * (2.0 - p[2])).abs() < 1e-15);
         assert_eq!(project(0.0, [1.0, 3.0, 0.0]), [1.0, 0.0, 0.0]);
+        assert_eq!(project(0.0, [-1.0, 0.0, 0.0]), [0.0; 3]);
     }
 }

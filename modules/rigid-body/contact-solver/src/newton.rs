@@ -41,7 +41,7 @@ impl Shifted<'_> {
 enum Branch {
     Open,
     Stick,
-    /// Direction d of b and the ratio of the disc's radius to |b|.
+    /// Direction d of b and the ratio of the disc's radius to |b|; both 0 without friction.
     Slide {
         d: [f64; 2],
         ratio: f64,
@@ -149,6 +149,9 @@ impl Newton {
         let a = r[at] - rho_n * u[at];
         if a <= 0.0 {
             return Branch::Open;
+        }
+        if mu <= 0.0 {
+            return Branch::Slide { d: [0.0; 2], ratio: 0.0 };
         }
         let b = [r[at + 1] - rho_t * u[at + 1], r[at + 2] - rho_t * u[at + 2]];
         let (size, radius) = (norm2(b), mu * a);

@@ -6,6 +6,7 @@
 //! approach exceeds a threshold rebounds by Newton's law u_n⁺ = −e·u_n⁻.
 
 use crate::contact::detection::{ContactPoint, Detector};
+use crate::contact::memory::{Pressed, recall, remember};
 use crate::dense::{cholesky, cholesky_solve};
 use crate::model::Model;
 use crate::state::Motion;
@@ -94,8 +95,8 @@ impl BodyContacts {
         self.detector.ground = ground;
     }
 
-    /// Finds the contact points of a step of length h from the committed motion.
-    pub fn detect(&mut self, bodies: &[Motion], h: f64) {
+    /// Finds the contact points of a step of length h from the committed motion; `memory`: forces of the last step.
+    pub fn detect(&mut self, bodies: &[Motion], h: f64, memory: &[Pressed]) {
         self.points.clear();
         self.detector.detect(bodies, h, &mut self.points);
         self.wrenches.clear();
@@ -122,6 +123,12 @@ impl BodyContacts {
         self.mu.resize(n, self.surface.friction);
         self.impulses.clear();
         self.impulses.resize(3 * n, 0.0);
+        recall(memory, &self.points, bodies, h, &mut self.impulses);
+    }
+
+    /// Keeps the forces of the last solve; `bodies` as in [`Self::detect`].
+    pub fn remember(&self, bodies: &[Motion], h: f64, memory: &mut Vec<Pressed>) {
+        remember(memory, &self.points, &self.impulses, bodies, h);
     }
 
     fn offset(&self, gap: f64, approach: f64, h: f64) -> f64 {

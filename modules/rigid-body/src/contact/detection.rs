@@ -46,6 +46,8 @@ struct Pair {
 /// A point where two bodies, or the ground and a body, can touch within the step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ContactPoint {
+    /// Number of the pair of shapes; shapes on the ground come first.
+    pub pair: usize,
     /// Body a (none: the ground) and body b.
     pub bodies: [Option<usize>; 2],
     /// Out of a into b: normal, tangent 1, tangent 2.
@@ -129,12 +131,12 @@ impl Detector {
     /// Adds the contact points of a step of length h from the committed motion.
     pub fn detect(&mut self, bodies: &[Motion], h: f64, out: &mut Vec<ContactPoint>) {
         if let Some(plane) = self.ground {
-            self.colliders.iter().for_each(|c| on_ground(&plane, c, bodies, h, out));
+            self.colliders.iter().enumerate().for_each(|(i, c)| on_ground(&plane, (i, c), bodies, h, out));
         }
         let Self { colliders, pairs, .. } = self;
-        for pair in pairs {
+        for (i, pair) in pairs.iter_mut().enumerate() {
             let [a, b] = pair.colliders.map(|i| &colliders[i]);
-            between(a, b, &mut pair.manifolds, bodies, h, out);
+            between((colliders.len() + i, a, b), &mut pair.manifolds, bodies, h, out);
         }
     }
 }
@@ -151,7 +153,13 @@ impl Collider {
     }
 }
 
-fn on_ground(plane: &Plane, c: &Collider, bodies: &[Motion], h: f64, out: &mut Vec<ContactPoint>) {
+fn on_ground(
+    plane: &Plane,
+    (pair, c): (usize, &Collider),
+    bodies: &[Motion],
+    h: f64,
+    out: &mut Vec<ContactPoint>,
+) {
     let m = &bodies[c.body];
     let reach = MARGIN + 2.0 * h * (m.v.norm() + m.w.norm() * c.reach);
     let height = plane.normal.dot(&m.point(&c.centre)) - plane.offset;
@@ -162,14 +170,19 @@ fn on_ground(plane: &Plane, c: &Collider, bodies: &[Motion], h: f64, out: &mut V
         let gap = plane.normal.dot(&p) - plane.offset;
         if gap < reach {
             let points = [p - gap * plane.normal, p];
-            out.push(ContactPoint { bodies: [None, Some(c.body)], frame: frame(plane.normal), points, gap });
+            out.push(ContactPoint {
+                pair,
+                bodies: [None, Some(c.body)],
+                frame: frame(plane.normal),
+                points,
+                gap,
+            });
         }
     });
 }
 
 fn between(
-    a: &Collider,
-    b: &Collider,
+    (pair, a, b): (usize, &Collider, &Collider),
     manifolds: &mut Vec<ContactManifold<(), ()>>,
     bodies: &[Motion],
     h: f64,
@@ -200,7 +213,7 @@ fn between(
                 continue;
             }
             let bodies = [Some(a.body), Some(b.body)];
-            out.push(ContactPoint { bodies, frame: frame(n), points: [on_a, on_b], gap: point.dist });
+            out.push(ContactPoint { pair, bodies, frame: frame(n), points: [on_a, on_b], gap: point.dist });
         }
     }
 }

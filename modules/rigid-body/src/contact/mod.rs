@@ -4,6 +4,7 @@
 pub(crate) mod bodies;
 pub(crate) mod detection;
 pub(crate) mod estimate;
+pub(crate) mod memory;
 pub(crate) mod plane;
 pub(crate) mod ports;
 pub(crate) mod shapes;

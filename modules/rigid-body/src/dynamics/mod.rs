@@ -161,7 +161,7 @@ impl Dynamics {
             return self.prepare_second_order(state);
         }
         self.prepare_bodies(state);
-        self.contacts.detect(&self.starts, h);
+        self.contacts.detect(&self.starts, h, &state.pressed);
         self.yielding = if self.contacts.any() { YIELDING } else { 0.0 };
         self.prepare_joints(state);
         Ok(())

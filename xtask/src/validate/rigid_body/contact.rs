@@ -1,7 +1,10 @@
 //! Contact figures of the rigid bodies.
 
+mod analytic;
 mod gait;
 mod problems;
+mod scenes;
+mod small;
 mod walking;
 
 use crate::process::Outcome;
@@ -10,6 +13,8 @@ use crate::validate::{Context, Figure};
 /// All contact figures.
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     let mut all = walking::figures(context)?;
+    all.extend(small::figures(context)?);
+    all.extend(analytic::figures(context)?);
     all.extend(problems::figures(context)?);
     Ok(all)
 }

@@ -10,8 +10,9 @@ impl Patches {
     /// Wrench on the body (n, t1, t2, mn, mt1, mt2) when the foot of patch `p` has moved by `x`.
     pub fn wrench(&self, p: usize, x: &[f64; 6], shear: &ShearLaw) -> [f64; 6] {
         let mut sum = [0.0; 6];
+        let shear = self.ports[p].shear(shear);
         self.each_loaded(p, x, |k, pressure, _, moved| {
-            add_force(&mut sum, self.nodes.arm[k], self.node_force(k, pressure, moved, shear));
+            add_force(&mut sum, self.nodes.arm[k], self.node_force(k, pressure, moved, &shear));
         });
         sum
     }
@@ -19,9 +20,10 @@ impl Patches {
     /// Wrench on the body at rest, and the largest tangential force there, N.
     pub fn at_rest(&self, p: usize, shear: &ShearLaw) -> ([f64; 6], f64) {
         let (mut sum, mut strength) = ([0.0; 6], 0.0);
+        let shear = self.ports[p].shear(shear);
         let n = &self.nodes;
         self.each_loaded(p, &[0.0; 6], |k, pressure, _, moved| {
-            add_force(&mut sum, n.arm[k], self.node_force(k, pressure, moved, shear));
+            add_force(&mut sum, n.arm[k], self.node_force(k, pressure, moved, &shear));
             let inclined = n.area[k] * n.facing[k].stretch;
             strength += inclined * shear.yield_stress_at(pressure, n.shear[k].slip, n.mobilised[k]);
         });
@@ -46,6 +48,7 @@ impl Patches {
     pub fn stiffness(&self, p: usize, x: &[f64; 6], shear: &ShearLaw) -> Stiffness {
         let mut sum = [[0.0; 6]; 6];
         let moments = self.ports[p].carries_moments();
+        let shear = self.ports[p].shear(shear);
         self.each_loaded(p, x, |k, pressure, slope, moved| {
             let r = shear.respond_at(&self.nodes.shear[k], self.nodes.mobilised[k], pressure, moved);
             let node = node_stiffness(&self.nodes.facing[k], self.nodes.area[k], slope, &r);

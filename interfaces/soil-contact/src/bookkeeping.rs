@@ -2,7 +2,9 @@
 
 use crate::assemble::{displacement, dot};
 use crate::ground::{Covered, Ground};
-use crate::patch::{Laws, Patch, Patches, key};
+use crate::patch::{Laws, Patch, PatchNodes, Patches, key};
+use crate::wheel;
+use terraglue_soil_law::ShearLaw;
 use terraglue_subsystem::Port;
 
 /// Sums over the run and what the last commit found. Part of the committed state.
@@ -34,6 +36,8 @@ pub struct Lists {
     previous: Vec<[i32; 2]>,
     /// Per loaded node whether the part of the foot there slid in from inside the contact.
     slid_in: Vec<bool>,
+    /// Per loaded node how far the foot slipped over the soil there, world x and y, m.
+    slid: Vec<[f64; 2]>,
     /// Slip of loaded nodes after it was carried along; scratch.
     carried: Vec<f64>,
     /// Nodes that were loaded before and are not any more.
@@ -48,6 +52,7 @@ impl Lists {
         self.previous.reserve(count);
         self.carried.reserve(count);
         self.slid_in.reserve(count);
+        self.slid.reserve(count);
         self.released.reserve(count);
     }
 }
@@ -61,11 +66,12 @@ pub struct Scene<'a> {
 }
 
 /// A node that the foot presses: its number in the arrays, depth and displacement.
-struct Pressed {
+struct Pressed<'a> {
     k: usize,
     depth: f64,
     pressure: f64,
     slip: [f64; 2],
+    shear: &'a ShearLaw,
 }
 
 impl Scene<'_> {
@@ -84,6 +90,7 @@ impl Scene<'_> {
         std::mem::swap(&mut lists.loaded, &mut lists.previous);
         lists.loaded.clear();
         lists.slid_in.clear();
+        lists.slid.clear();
         lists.covered.clear();
         for (patch, port) in self.patches.ports.iter().zip(ports) {
             book.port_work -= port.range().map(|k| t[k] * x[k]).sum::<f64>();
@@ -106,8 +113,8 @@ impl Scene<'_> {
         book: &mut Book,
     ) -> u32 {
         let n = &self.patches.nodes;
+        let shear = patch.shear(&self.laws.shear);
         let first = lists.loaded.len();
-        let mut slid = [0.0; 2];
         let mut loaded = 0;
         for k in patch.nodes.clone().filter(|k| n.area[*k] > 0.0) {
             let (moved, facing) = (displacement(n.arm[k], x), &n.facing[k]);
@@ -115,36 +122,39 @@ impl Scene<'_> {
             let depth = n.depth[k] - rise;
             let (pressure, _) = patch.curve.at(depth, n.z_max[k], n.p_max[k]);
             let [i, j] = n.index[k];
-            let lower = n.reference[k] - depth / patch.slope;
-            let mut covered =
-                Covered { i, j, lower, depth: depth / patch.slope, pressure, virgin: 0.0, surface: f64::NAN };
+            let deep = (depth + relief(n, k)) / patch.slope;
+            let lower = n.reference[k] - deep;
+            let mut covered = Covered { i, j, lower, depth: deep, pressure, virgin: 0.0, surface: f64::NAN };
             if pressure > 0.0 {
                 loaded += 1;
                 let fresh = n.stamp[k] == 0 || n.stamp[k] + 1 != book.stamp;
                 // a point that has just come down from above is no deeper than its own descent
                 lists.slid_in.push(fresh && depth > -2.0 * rise);
-                let node = Pressed { k, depth, pressure, slip: facing.slide(moved) };
-                let (plastic, surface) = self.press(patch, &node, ground, book);
-                slid = [slid[0] + plastic[0], slid[1] + plastic[1]];
+                let node = Pressed { k, depth, pressure, slip: facing.slide(moved), shear: &shear };
+                let (slid, surface) = self.press(patch, &node, ground, book);
+                let carried = if patch.wheel.is_some() { moved } else { slid };
+                lists.slid.push(in_world(port, carried));
                 lists.loaded.push([i, j]);
                 covered.surface = surface;
                 covered.virgin = if depth > n.z_max[k] { pressure } else { patch.curve.virgin(depth) };
             }
             lists.covered.push(covered);
         }
-        let mean = slid.map(|s| s / f64::from(loaded.max(1)));
-        carry_slip(ground, lists, first, in_world(port, mean), book.stamp);
+        if let Some(wheel) = patch.wheel.as_ref().filter(|_| loaded > 0) {
+            wheel::remember(&mut ground.wheels, wheel, x);
+        }
+        carry_slip(ground, lists, first, book.stamp);
         loaded
     }
 
     /// One loaded node: plastic depth, slip, heat and elastic energy. Returns how far the foot slipped over the soil
-    /// along t1 and t2, and the height of the unloaded surface, m.
-    fn press(&self, patch: &Patch, node: &Pressed, ground: &mut Ground, book: &mut Book) -> ([f64; 2], f64) {
-        let Pressed { k, depth, pressure, slip } = *node;
+    /// along n, t1 and t2, and the height of the unloaded surface, m.
+    fn press(&self, patch: &Patch, node: &Pressed, ground: &mut Ground, book: &mut Book) -> ([f64; 3], f64) {
+        let Pressed { k, depth, pressure, slip, .. } = *node;
         let (n, curve) = (&self.patches.nodes, &patch.curve);
         let area = n.area[k];
         let inclined = area * n.facing[k].stretch;
-        let shear = self.laws.shear.respond_at(&n.shear[k], n.mobilised[k], pressure, slip);
+        let shear = node.shear.respond_at(&n.shear[k], n.mobilised[k], pressure, slip);
         let squeezed = 0.5 * pressure * pressure / curve.unloading();
         book.dissipated += inclined * shear.dissipated;
         book.elastic += inclined * self.laws.shear.elastic_energy(&shear.state) + area * squeezed;
@@ -159,53 +169,69 @@ impl Scene<'_> {
             state.largest = depth;
         }
         state.curve = key(curve, patch.slope);
+        if !n.relief[k].is_nan() {
+            // what stays behind the peak is the depth of the underside, whatever its pressure
+            let stays = depth - pressure / curve.unloading() + n.relief[k];
+            state.permanent = state.permanent.max(stays / patch.slope);
+            state.curve = [0.0; 3];
+        }
         (state.pressure, state.shear, state.stamp) = (pressure, shear.state, book.stamp);
-        book.max_sinkage = book.max_sinkage.max(depth / patch.slope - (state.reference - initial));
+        book.max_sinkage =
+            book.max_sinkage.max((depth + relief(n, k)) / patch.slope - (state.reference - initial));
         let surface = state.reference - state.permanent.max(0.0);
         let elastic = |c: usize| shear.state.elastic[c] - n.shear[k].elastic[c];
         if shear.state.slip > n.shear[k].slip {
             let [a, b] = [slip[0] - elastic(0), slip[1] - elastic(1)];
             let along = &n.facing[k].along;
-            ([1, 2].map(|c| a * along[0][c] + b * along[1][c]), surface)
+            ([0, 1, 2].map(|c| a * along[0][c] + b * along[1][c]), surface)
         } else {
-            ([0.0; 2], surface)
+            ([0.0; 3], surface)
         }
     }
 }
 
-/// Horizontal world components of a vector along t1, t2.
-fn in_world(port: &Port, [a, b]: [f64; 2]) -> [f64; 2] {
-    let (t1, t2) = (port.direction(1), port.direction(2));
-    [a * t1[0] + b * t2[0], a * t1[1] + b * t2[1]]
+/// How much deeper than it counts node k lies, m.
+fn relief(nodes: &PatchNodes, k: usize) -> f64 {
+    let relief = nodes.relief[k];
+    if relief.is_nan() { 0.0 } else { relief }
+}
+
+/// Horizontal world components of a vector along n, t1, t2.
+fn in_world(port: &Port, v: [f64; 3]) -> [f64; 2] {
+    [0, 1].map(|k| (0..3).map(|c| v[c] * port.direction(c)[k]).sum())
 }
 
 /// Accumulated slip belongs to the points of the foot (Janosi and Hanamoto 1961 count it from where a point
-/// enters the contact): where the foot slides over the lattice by `slid` (m, world x, y), the slip of the loaded
-/// nodes from `first` on moves with it, ∂j/∂t + v·∇j = 0, first order upwind. A node onto which the foot slid from
+/// enters the contact): where the foot slides over the lattice, at each node by its own way, the slip of the loaded
+/// nodes from `first` on moves with it, ∂j/∂t + v·∇j = 0, first order upwind. A point of a wheel's rim also moves over
+/// the lattice as it comes down. A node onto which the foot slid from
 /// inside the contact takes the mean slip of the contact, weighted with the pressure; what enters from above or
 /// from outside brings nothing. A rolling foot, whose points do not slide, carries nothing along.
-fn carry_slip(ground: &mut Ground, lists: &mut Lists, first: usize, slid: [f64; 2], stamp: u64) {
-    if slid == [0.0; 2] {
+fn carry_slip(ground: &mut Ground, lists: &mut Lists, first: usize, stamp: u64) {
+    if lists.slid[first..].iter().all(|s| *s == [0.0; 2]) {
         return;
     }
     let nodes = &lists.loaded[first..];
     let slid_in = &lists.slid_in[first..];
     let mean = mean_slip(ground, nodes, slid_in);
-    let share = slid.map(|s| s.abs() / ground.heights.lattice().spacing);
-    let scale = 1.0 / (share[0] + share[1]).max(1.0);
-    let behind = slid.map(|s| if s > 0.0 { -1 } else { 1 });
+    let spacing = ground.heights.lattice().spacing;
     lists.carried.clear();
-    lists.carried.extend(nodes.iter().zip(slid_in).map(|([i, j], slid_in)| {
-        let own = ground.nodes.get(*i, *j).shear.slip;
-        if *slid_in {
-            return own.max(mean);
-        }
-        let gain = |i: i32, j: i32, share: f64| {
-            let there = ground.nodes.get(i, j);
-            if there.stamp == stamp { share * scale * (there.shear.slip - own) } else { 0.0 }
-        };
-        own + gain(i + behind[0], *j, share[0]) + gain(*i, j + behind[1], share[1])
-    }));
+    lists.carried.extend(nodes.iter().zip(slid_in).zip(&lists.slid[first..]).map(
+        |(([i, j], slid_in), slid)| {
+            let share = slid.map(|s| s.abs() / spacing);
+            let scale = 1.0 / (share[0] + share[1]).max(1.0);
+            let behind = slid.map(|s| if s > 0.0 { -1 } else { 1 });
+            let own = ground.nodes.get(*i, *j).shear.slip;
+            if *slid_in {
+                return own.max(mean);
+            }
+            let gain = |i: i32, j: i32, share: f64| {
+                let there = ground.nodes.get(i, j);
+                if there.stamp == stamp { share * scale * (there.shear.slip - own) } else { 0.0 }
+            };
+            own + gain(i + behind[0], *j, share[0]) + gain(*i, j + behind[1], share[1])
+        },
+    ));
     for ([i, j], slip) in nodes.iter().zip(&lists.carried) {
         if let Some(state) = ground.nodes.get_mut(*i, *j) {
             state.shear.slip = *slip;

@@ -1,8 +1,12 @@
 //! The ground of a soil: heights of its material and what it remembers at each node.
 
 use crate::nodes::{NodeState, NodeStates};
+use crate::wheel::Memory;
 use terraglue_ground::{HeightField, TILE_EDGE, UNIT_M};
 use terraglue_subsystem::{Result, Terrain};
+
+/// Wheels for which memory is asked at the start.
+const WHEELS: usize = 64;
 
 /// A node below a foot, as committed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,6 +34,8 @@ pub struct Ground {
     pub heights: HeightField,
     /// What the soil remembers.
     pub nodes: NodeStates,
+    /// Wheels that have touched it.
+    pub wheels: Vec<Memory>,
 }
 
 impl Ground {
@@ -37,7 +43,7 @@ impl Ground {
     pub fn new(terrain: &dyn Terrain) -> Result<Self> {
         let heights = HeightField::from_terrain(terrain)?;
         let nodes = NodeStates::new(*heights.lattice());
-        Ok(Self { heights, nodes })
+        Ok(Self { heights, nodes, wheels: Vec::with_capacity(WHEELS) })
     }
 
     /// Height of a node at the start, m.

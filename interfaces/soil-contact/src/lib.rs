@@ -20,6 +20,7 @@ mod soil;
 mod state;
 mod trial;
 mod values;
+mod wheel;
 
 pub use ground::{Covered, Ground};
 pub use nodes::{NodeState, NodeStates, NodesSnapshot};

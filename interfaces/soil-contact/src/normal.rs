@@ -89,6 +89,7 @@ impl Patches {
     /// dW_n/dX_n at `x`, N/m.
     pub fn normal_stiffness(&self, p: usize, x: &[f64; 6], shear: &ShearLaw) -> f64 {
         let mut sum = 0.0;
+        let shear = self.ports[p].shear(shear);
         self.each_loaded(p, x, |k, pressure, slope, moved| {
             let (n, facing) = (&self.nodes, &self.nodes.facing[k]);
             let r = shear.respond_at(&n.shear[k], n.mobilised[k], pressure, moved);

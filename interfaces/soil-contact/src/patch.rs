@@ -5,7 +5,8 @@
 
 use crate::assemble::dot;
 use crate::ground::Ground;
-use terraglue_soil_law::{PressureCurve, PressureLaw, ShearLaw, ShearState};
+use crate::wheel::{self, Shift, Wheel};
+use terraglue_soil_law::{PressureCurve, PressureLaw, Rolling, ShearLaw, ShearState};
 use terraglue_subsystem::{Node, Port, Step};
 
 /// One port's share of the arrays and what is constant during the step.
@@ -27,9 +28,22 @@ pub struct Patch {
     pub strength: f64,
     /// Start for the inverse of the normal law: the last solution in this step.
     pub warm: f64,
+    /// What rolls here.
+    pub wheel: Option<Wheel>,
+    /// Shear deformation modulus across the travel of a wheel, m.
+    pub across: Option<f64>,
 }
 
 impl Patch {
+    /// The shear law in the directions of this contact.
+    #[inline]
+    pub fn shear(&self, law: &ShearLaw) -> ShearLaw {
+        match &self.wheel {
+            Some(wheel) => law.travelling(wheel.heading, self.across),
+            None => *law,
+        }
+    }
+
     /// Whether the port carries moments.
     pub fn carries_moments(&self) -> bool {
         self.place[3..].iter().any(Option::is_some)
@@ -102,6 +116,8 @@ pub struct PatchNodes {
     pub p_max: Vec<f64>,
     /// Depth of the unloaded surface along n, m.
     pub permanent: Vec<f64>,
+    /// How much deeper than `depth` the underside lies, m: behind the peak of a wheel's stress; NaN elsewhere.
+    pub relief: Vec<f64>,
     /// Area in the tangent plane, m²; 0 where another port presses deeper.
     pub area: Vec<f64>,
     /// From the port's origin to the underside at the node along n, t1, t2, m.
@@ -129,6 +145,7 @@ impl PatchNodes {
         self.z_max.clear();
         self.p_max.clear();
         self.permanent.clear();
+        self.relief.clear();
         self.area.clear();
         self.arm.clear();
         self.shear.clear();
@@ -154,6 +171,7 @@ impl PatchNodes {
             &mut self.z_max,
             &mut self.p_max,
             &mut self.permanent,
+            &mut self.relief,
             &mut self.area,
             &mut self.turned,
         ] {
@@ -171,6 +189,8 @@ pub struct Laws {
     pub shear: ShearLaw,
     /// Elastic stiffness, Pa/m.
     pub elastic: f64,
+    /// What concerns wheels alone.
+    pub rolling: Rolling,
 }
 
 /// All patches of a step.
@@ -215,8 +235,22 @@ impl Patches {
             self.read_node(port, node, ground, &laws.shear);
         }
         let range = first..self.nodes.index.len();
-        let b = contact_size(port, nodes, &self.nodes, range.clone(), ground.heights.lattice().spacing);
-        let curve = laws.pressure.curve(b, laws.elastic);
+        let spacing = ground.heights.lattice().spacing;
+        // a sphere has no extent and does not roll
+        let found = || Wheel::find(&self.nodes, range.clone(), spacing, port.key);
+        let wheel = (port.extent[0] > 0.0 && port.extent[1] > 0.0)
+            .then(found)
+            .flatten()
+            .map(|w| Wheel { memory: wheel::recall(&ground.wheels, port.key), ..w });
+        let curve = match &wheel {
+            Some(w) => {
+                laws.pressure.curve_in_slip(w.width, laws.elastic, &laws.rolling.sinkage, w.memory.slip)
+            }
+            None => {
+                let b = contact_size(port, nodes, &self.nodes, range.clone(), spacing);
+                laws.pressure.curve(b, laws.elastic)
+            }
+        };
         let here = key(&curve, n_z);
         for k in range.clone() {
             let permanent = self.nodes.permanent[k];
@@ -226,6 +260,11 @@ impl Patches {
                     if curve_then == here { largest } else { curve.largest_depth(permanent, largest) };
                 self.nodes.z_max[k] = z_max;
                 self.nodes.p_max[k] = curve.unloading() * (z_max - permanent);
+            }
+        }
+        if let Some(wheel) = &wheel {
+            if let Some(shift) = wheel.shift(&laws.rolling, &self.nodes, range.clone()) {
+                self.shift_peak(wheel, &shift, &curve, range.clone());
             }
         }
         let mut place = [None; 6];
@@ -239,6 +278,28 @@ impl Patches {
             force: [0.0; 6],
             strength: 0.0,
             warm: 0.0,
+            wheel,
+            across: laws.rolling.across,
+        }
+    }
+
+    /// Takes the soil behind the peak of a wheel's stress as if it were less deep, and first loaded there.
+    fn shift_peak(
+        &mut self,
+        wheel: &Wheel,
+        shift: &Shift,
+        curve: &PressureCurve,
+        range: std::ops::Range<usize>,
+    ) {
+        let largest = curve.largest_depth(shift.before, shift.before);
+        let n = &mut self.nodes;
+        for k in range {
+            let Some(relief) = wheel.relief(shift, n.arm[k]) else { continue };
+            n.relief[k] = relief;
+            n.depth[k] -= relief;
+            n.z_max[k] = n.depth[k].max(largest);
+            n.p_max[k] = curve.virgin(n.z_max[k]);
+            n.permanent[k] = curve.permanent(n.z_max[k], n.p_max[k]);
         }
     }
 
@@ -257,6 +318,7 @@ impl Patches {
         nodes.z_max.push(0.0);
         nodes.p_max.push(0.0);
         nodes.permanent.push(state.permanent * n_z);
+        nodes.relief.push(f64::NAN);
         nodes.area.push(node.area / n_z);
         nodes.arm.push([along(0), along(1), along(2)]);
         nodes.shear.push(state.shear);

@@ -150,7 +150,12 @@ fn length(v: [f64; 3]) -> f64 {
 
 /// The laws with these numbers; what the scenario writes as text takes the place of the built-in law.
 fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>) -> Result<Laws> {
-    let mut laws = Laws { pressure: p.pressure(), shear: p.shear(), elastic: p.elastic_stiffness_pa_m };
+    let mut laws = Laws {
+        pressure: p.pressure(),
+        shear: p.shear(),
+        elastic: p.elastic_stiffness_pa_m,
+        rolling: p.rolling,
+    };
     if let Some(texts) = texts {
         if let Some(law) = texts.pressure(p)? {
             laws.pressure = PressureLaw::Expression(law);

@@ -3,6 +3,7 @@
 use crate::bookkeeping::Book;
 use crate::ground::Ground;
 use crate::nodes::NodesSnapshot;
+use crate::wheel::Memory;
 use terraglue_ground::HeightSnapshot;
 use terraglue_soil_law::SoilParameters;
 use terraglue_subsystem::{Error, Result};
@@ -12,6 +13,7 @@ use terraglue_subsystem::{Error, Result};
 struct Slot<S> {
     heights: HeightSnapshot,
     nodes: NodesSnapshot,
+    wheels: Vec<Memory>,
     loaded: Vec<[i32; 2]>,
     book: Book,
     parameters: Option<SoilParameters>,
@@ -47,6 +49,7 @@ impl<S: Default> Slots<S> {
         let s = self.slots.get_mut(slot as usize).ok_or_else(|| unknown(slot))?;
         state.ground.heights.save(&mut s.heights);
         state.ground.nodes.save(&mut s.nodes);
+        s.wheels.clone_from(&state.ground.wheels);
         s.loaded.clone_from(state.loaded);
         s.book = *state.book;
         s.parameters = Some(*state.parameters);
@@ -59,6 +62,7 @@ impl<S: Default> Slots<S> {
         *state.parameters = s.parameters.ok_or_else(|| unknown(slot))?;
         state.ground.heights.restore(&s.heights);
         state.ground.nodes.restore(&s.nodes);
+        state.ground.wheels.clone_from(&s.wheels);
         state.loaded.clone_from(&s.loaded);
         *state.book = s.book;
         Ok(&s.material)

@@ -2,6 +2,7 @@
 
 use crate::expression::SoilExpressions;
 use crate::pressure::{PRESSURE_LAWS, PressureLaw};
+use crate::rolling::Rolling;
 use crate::shear::ShearLaw;
 use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};
 
@@ -32,6 +33,10 @@ pub struct SoilParameters {
     pub elastic_stiffness_pa_m: f64,
     /// Acceleration of gravity, m/s²: makes a weight of the density.
     pub gravity: f64,
+    /// Angle of friction and adhesive strength between feet and soil, rad and Pa, where they are not those of the soil.
+    pub interface: [Option<f64>; 2],
+    /// What concerns wheels alone.
+    pub rolling: Rolling,
 }
 
 /// A pressure–sinkage law and the numbers that it alone has.
@@ -72,6 +77,8 @@ impl Default for SoilParameters {
             density_kg_m3: None,
             elastic_stiffness_pa_m: DEFAULT_ELASTIC_STIFFNESS,
             gravity: 1.62,
+            interface: [None; 2],
+            rolling: Rolling::default(),
         }
     }
 }
@@ -109,7 +116,22 @@ impl SoilParameters {
                 "stiffness of unloading and reloading",
             )
             .positive(),
+            number(
+                "interface_phi_rad",
+                "rad",
+                "angle of friction between feet and soil; phi_rad where absent",
+            )
+            .within(0.0, 1.2)
+            .optional(),
+            number(
+                "interface_c_pa",
+                "Pa",
+                "shear strength between feet and soil without pressure; c_pa where absent",
+            )
+            .within(0.0, 1e7)
+            .optional(),
         ];
+        parameters.extend(Rolling::schema());
         parameters.extend(SoilExpressions::schema());
         parameters
     }
@@ -129,6 +151,8 @@ impl SoilParameters {
             density_kg_m3: number("density_kg_m3")?,
             elastic_stiffness_pa_m: number("elastic_stiffness_pa_m")?.unwrap_or(DEFAULT_ELASTIC_STIFFNESS),
             gravity,
+            interface: [number("interface_phi_rad")?, number("interface_c_pa")?],
+            rolling: Rolling::from_config(config)?,
         };
         parameters.check().map(|()| parameters)
     }
@@ -179,9 +203,12 @@ impl SoilParameters {
         }
     }
 
-    /// The shear law.
+    /// The shear law between feet and soil: the weaker of the soil's own strength and that of the interface acts.
     pub fn shear(&self) -> ShearLaw {
-        ShearLaw::new(self.c_pa, self.phi_rad, self.K_m, self.elastic_stiffness_pa_m)
+        let [phi, c] = self.interface;
+        let cohesion = c.map_or(self.c_pa, |c| c.min(self.c_pa));
+        let phi = phi.map_or(self.phi_rad, |phi| phi.min(self.phi_rad));
+        ShearLaw::new(cohesion, phi, self.K_m, self.elastic_stiffness_pa_m)
     }
 }
 

@@ -29,8 +29,19 @@ pub struct ShearLaw {
     pub modulus: f64,
     /// Elastic tangential stiffness k_t, Pa/m.
     pub stiffness: f64,
+    /// Direction of travel along t1 and t2 with a modulus of its own; see [`ShearLaw::travelling`].
+    pub travel: Option<Travel>,
     /// Written in the scenario: takes the place of cohesion, friction and modulus in the yield stress.
     pub expression: Option<ShearExpression>,
+}
+
+/// Shear moduli along and across a direction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Travel {
+    /// Unit vector along t1 and t2.
+    pub heading: [f64; 2],
+    /// Modulus along it over the one across.
+    pub ratio: f64,
 }
 
 /// Shear history of a node. The default is untouched soil, and soil after lift-off.
@@ -61,12 +72,30 @@ impl ShearLaw {
     /// From cohesion (Pa), angle of friction (rad), deformation modulus (m) and normal elastic stiffness k_u (Pa/m).
     pub fn new(cohesion: f64, phi: f64, modulus: f64, k_u: f64) -> Self {
         let (friction, stiffness) = (libm::tan(phi), MINDLIN_RATIO * k_u);
-        Self { cohesion, friction, modulus, stiffness, expression: None }
+        Self { cohesion, friction, modulus, stiffness, travel: None, expression: None }
     }
 
     /// The same with a yield stress of its own, see [`crate::expression`].
     pub fn with_expression(self, law: ShearExpression) -> Self {
         Self { cohesion: law.cohesion, friction: law.friction, expression: Some(law), ..self }
+    }
+
+    /// The same with the deformation modulus `across` (m) across the unit vector `heading` (along t1, t2). Slip in a
+    /// direction e counts √((e_along/K)² + (e_across/K_across)²) per length, in units of 1/K, so that each direction
+    /// alone follows Janosi and Hanamoto with its own modulus (Ishigami et al. 2007, J. Field Robotics 24, eq. 14–15,
+    /// have the two moduli).
+    pub fn travelling(&self, heading: [f64; 2], across: Option<f64>) -> Self {
+        let travel = across.map(|across| Travel { heading, ratio: self.modulus / across });
+        Self { travel, ..*self }
+    }
+
+    /// How much a slip along `u` counts.
+    #[inline]
+    fn weight(&self, u: [f64; 2], length: f64) -> f64 {
+        let Some(Travel { heading, ratio }) = self.travel else { return 1.0 };
+        let along = (u[0] * heading[0] + u[1] * heading[1]) / length;
+        let across = (1.0 - along * along).max(0.0);
+        (along * along + ratio * ratio * across).sqrt()
     }
 
     /// Stress up to which soil under the pressure p that has slipped by `slip` is elastic, Pa.
@@ -123,8 +152,15 @@ impl ShearLaw {
         if trial <= strength * mobilised * ON_YIELD {
             return self.elastic(u, state.slip);
         }
-        let (slip, left) = self.return_map(trial, strength, state.slip, 1.0 - mobilised);
-        self.plastic(u, length, state.slip, slip, left * strength / self.modulus, (1.0 - left) * by_p)
+        let weight = self.weight(u, length);
+        let (step, left) = self.return_map(trial, strength, state.slip, weight, 1.0 - mobilised);
+        let answer = Plastic {
+            step,
+            slip: state.slip + weight * step,
+            hardening: weight * left * strength / self.modulus,
+            by_p: (1.0 - left) * by_p,
+        };
+        self.plastic(u, length, &answer)
     }
 
     /// The same with the yield stress of an expression: trial − k_t·Δj = Y(p, j + Δj), Newton inside a bracket.
@@ -135,6 +171,7 @@ impl ShearLaw {
         if trial <= y {
             return self.elastic(u, state.slip);
         }
+        let weight = self.weight(u, length);
         let (mut low, mut high, mut step) = (0.0, length, 0.0);
         for _ in 0..60 {
             let residual = trial - self.stiffness * step - y;
@@ -143,18 +180,19 @@ impl ShearLaw {
             } else {
                 high = step
             }
-            let mut next = step + residual / (self.stiffness + by[1].max(0.0));
+            let mut next = step + residual / (self.stiffness + weight * by[1].max(0.0));
             if !(next >= low && next <= high) {
                 next = 0.5 * (low + high);
             }
             let change = (next - step).abs();
             step = next;
-            (y, by) = law.strength(p, state.slip + step);
+            (y, by) = law.strength(p, state.slip + weight * step);
             if change <= 1e-15 * step {
                 break;
             }
         }
-        self.plastic(u, length, state.slip, step, by[1].max(0.0), by[0])
+        let slip = state.slip + weight * step;
+        self.plastic(u, length, &Plastic { step, slip, hardening: weight * by[1].max(0.0), by_p: by[0] })
     }
 
     fn elastic(&self, u: [f64; 2], slip: f64) -> ShearResponse {
@@ -167,16 +205,17 @@ impl ShearLaw {
         }
     }
 
-    /// Solves trial − k_t·Δj = S·(1 − e^(−(j + Δj)/K)) for the slip increment Δj. The left side minus the right is
-    /// convex and falling, so Newton from Δj = 0 (where the exponential is `left`) climbs to the root without passing
-    /// it, and the error of a step is below the square of the one before. Returns Δj and e^(−(j + Δj)/K).
-    fn return_map(&self, trial: f64, strength: f64, slip: f64, mut left: f64) -> (f64, f64) {
+    /// Solves trial − k_t·Δj = S·(1 − e^(−(j + w·Δj)/K)) for the slip increment Δj, which counts `weight` = w. The left
+    /// side minus the right is convex and falling, so Newton from Δj = 0 (where the exponential is `left`) climbs to
+    /// the root without passing it, and the error of a step is below the square of the one before. Returns Δj and
+    /// e^(−(j + w·Δj)/K).
+    fn return_map(&self, trial: f64, strength: f64, slip: f64, weight: f64, mut left: f64) -> (f64, f64) {
         let mut step = 0.0;
         for _ in 0..30 {
             let residual = trial - self.stiffness * step - strength * (1.0 - left);
-            let change = residual / (self.stiffness + strength / self.modulus * left);
+            let change = residual / (self.stiffness + weight * strength / self.modulus * left);
             step += change;
-            left = libm::exp(-(slip + step) / self.modulus);
+            left = libm::exp(-(slip + weight * step) / self.modulus);
             if change <= 1e-8 * step {
                 break;
             }
@@ -184,16 +223,8 @@ impl ShearLaw {
         (step, left)
     }
 
-    /// `hardening` is d(yield)/dj, `by_p` d(yield)/dp at fixed slip.
-    fn plastic(
-        &self,
-        u: [f64; 2],
-        length: f64,
-        before: f64,
-        step: f64,
-        hardening: f64,
-        by_p: f64,
-    ) -> ShearResponse {
+    fn plastic(&self, u: [f64; 2], length: f64, answer: &Plastic) -> ShearResponse {
+        let Plastic { step, slip, hardening, by_p } = *answer;
         let k = self.stiffness;
         let stress = (k * (length - step)).max(0.0);
         let along = k * hardening / (k + hardening);
@@ -205,7 +236,7 @@ impl ShearLaw {
             stress: [stress * e[0], stress * e[1]],
             tangent: [across + d * e[0] * e[0], d * e[0] * e[1], across + d * e[1] * e[1]],
             by_pressure: [scale * e[0], scale * e[1]],
-            state: ShearState { elastic: [stress / k * e[0], stress / k * e[1]], slip: before + step },
+            state: ShearState { elastic: [stress / k * e[0], stress / k * e[1]], slip },
             dissipated: stress * step,
         }
     }
@@ -214,6 +245,15 @@ impl ShearLaw {
     pub fn elastic_energy(&self, state: &ShearState) -> f64 {
         0.5 * self.stiffness * (state.elastic[0] * state.elastic[0] + state.elastic[1] * state.elastic[1])
     }
+}
+
+/// What a slip increment has done: its length, the slip counted since the contact began, d(yield)/d(length) and
+/// d(yield)/dp at fixed slip.
+struct Plastic {
+    step: f64,
+    slip: f64,
+    hardening: f64,
+    by_p: f64,
 }
 
 #[cfg(test)]
@@ -238,6 +278,22 @@ mod tests {
             let stress = r.stress[0].hypot(r.stress[1]);
             assert!((stress - expected).abs() < 1.5e-3 * expected, "{j}: {stress} {expected}");
             assert!((r.stress[0] * 0.6 - r.stress[1] * 0.8).abs() < 1e-6);
+        }
+    }
+
+    #[test]
+    fn each_direction_follows_its_own_modulus() {
+        let (law, p) = (lunar().travelling([0.6, 0.8], Some(0.006)), 5000.0);
+        let s = law.strength(p).0;
+        for (direction, modulus) in [([0.6, 0.8], 0.018f64), ([-0.8, 0.6], 0.006)] {
+            let mut state = ShearState::default();
+            for k in 1..=300 {
+                let r = law.respond(&state, p, direction.map(|d| 1e-4 * d));
+                state = r.state;
+                let expected = s * (1.0 - (-f64::from(k) * 1e-4 / modulus).exp());
+                let stress = r.stress[0].hypot(r.stress[1]);
+                assert!((stress - expected).abs() < 5e-3 * expected, "{k}: {stress} {expected}");
+            }
         }
     }
 

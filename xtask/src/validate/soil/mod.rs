@@ -3,10 +3,13 @@
 mod automaton;
 mod fit;
 mod plates;
+mod real_wheel;
 #[path = "../../../../interfaces/soil-contact/tests/support/mod.rs"]
 mod rig;
 mod rows;
 mod stick;
+mod wheel_rig;
+mod wheels;
 mod wong_reece;
 
 pub use automaton::print_hash;
@@ -22,8 +25,8 @@ use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
 type Part = fn(&Context) -> Outcome<Vec<Figure>>;
 
 /// The parts, in the order of the table.
-const PARTS: [Part; 5] =
-    [automaton::figures, plates::figures, fit::figures, stick::figures, wong_reece::figures];
+const PARTS: [Part; 6] =
+    [automaton::figures, plates::figures, fit::figures, wheels::figures, stick::figures, wong_reece::figures];
 
 /// All figures of the area.
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {

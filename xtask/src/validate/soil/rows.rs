@@ -31,6 +31,11 @@ impl Row {
         COLUMNS.iter().position(|c| *c == column).map_or(f64::NAN, |k| self.values[k])
     }
 
+    /// The configuration with more keys, written as JSON.
+    pub fn with(&self, keys: &str) -> String {
+        self.config.replacen('{', &format!("{{{keys},"), 1)
+    }
+
     /// k_c/b + k_φ of Bekker's law, Pa/mⁿ.
     pub fn modulus(&self, b: f64) -> f64 {
         self.value("k_c") / b + self.value("k_phi")

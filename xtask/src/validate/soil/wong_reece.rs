@@ -2,13 +2,14 @@
 //! with Bekker's pressure and the shear of Janosi and Hanamoto: what wheels on the soils are held against.
 //!
 //! Angles are counted from the lowest point of the rim, positive where soil enters. The wheel enters the soil at θ_f
-//! = arccos(1 − h/r) and leaves it at θ_r ≤ 0; the largest stress lies at θ_m = (a0 + a1·s)·θ_f.
+//! = arccos(1 − h/r) and leaves it at 0, or a little behind where the soil springs back; the largest stress lies at θ_m =
+//! (a0 + a1·s)·θ_f.
 
 use super::rows::{Row, eight};
 use crate::process::{Outcome, read, root};
 use crate::validate::{Context, Figure, Limit};
 
-/// Points of Simpson's rule on each side of the largest stress.
+/// Points that the table's digits need.
 const POINTS: usize = 2000;
 
 /// A wheel on a soil.
@@ -30,8 +31,10 @@ pub struct Wheel {
     pub shear: f64,
     /// a0 and a1.
     pub peak: [f64; 2],
-    /// Height at which the wheel leaves the soil behind it, over the sinkage.
-    pub exit: f64,
+    /// Stiffness with which the soil springs back behind the lowest point, Pa/m; infinite: the wheel leaves it there.
+    pub unloading: f64,
+    /// Points of Simpson's rule on each side of the largest stress, even.
+    pub points: usize,
 }
 
 /// What a wheel does at a sinkage, per integral.
@@ -61,38 +64,44 @@ impl Wheel {
     /// The integrals at the sinkage h (m) and the slip `s`.
     pub fn at(&self, h: f64, slip: f64) -> State {
         let front = (1.0 - h / self.radius).acos();
-        let rear = -(1.0 - self.exit * h / self.radius).acos();
-        let middle = ((self.peak[0] + self.peak[1] * slip) * front).clamp(rear, front);
+        let middle = ((self.peak[0] + self.peak[1] * slip) * front).clamp(0.0, front);
         let mut sum = State { sinkage: h, ..State::default() };
         // squares of the variable take the kinks at both ends out
-        self.add(&mut sum, front, middle, |theta| theta, [front, slip]);
-        let share = (front - middle) / (middle - rear).max(f64::MIN_POSITIVE);
-        self.add(&mut sum, rear, middle, |theta| front - (theta - rear) * share, [front, slip]);
+        let law =
+            |theta: f64| self.modulus * (self.radius * (theta.cos() - front.cos()).max(0.0)).powf(self.n);
+        self.add(&mut sum, [front, middle], &law, [front, slip]);
+        let share = (front - middle) / middle.max(f64::MIN_POSITIVE);
+        self.add(&mut sum, [0.0, middle], |theta| law(front - theta * share), [front, slip]);
+        // the soil springs back behind the lowest point, where the stress is largest without a shifted peak
+        let largest = if middle > 0.0 { 0.0 } else { law(0.0) };
+        let rear = -(1.0 - largest / self.unloading / self.radius).acos();
+        let back = |theta: f64| (largest - self.unloading * self.radius * (1.0 - theta.cos())).max(0.0);
+        if rear < 0.0 {
+            self.add(&mut sum, [rear, 0.0], back, [front, slip]);
+        }
         let area = self.radius * self.width;
         State { load: area * sum.load, pull: area * sum.pull, torque: area * self.radius * sum.torque, ..sum }
     }
 
-    /// Adds the integrals between `end`, where the stress vanishes, and `middle`; `equal` is the angle in front with
-    /// the same pressure.
+    /// Adds the integrals between `end`, where the stress vanishes, and `middle`; `stress` is the normal one.
     fn add(
         &self,
         sum: &mut State,
-        end: f64,
-        middle: f64,
-        equal: impl Fn(f64) -> f64,
+        [end, middle]: [f64; 2],
+        stress: impl Fn(f64) -> f64,
         [front, slip]: [f64; 2],
     ) {
         let width = middle - end;
         if width == 0.0 {
             return;
         }
-        for k in 0..=POINTS {
-            let t = k as f64 / POINTS as f64;
-            let weight = if k == 0 || k == POINTS { 1.0 } else { 2.0 + 2.0 * (k % 2) as f64 };
-            let weight = weight / (3.0 * POINTS as f64) * 2.0 * t * width.abs();
+        let points = self.points;
+        for k in 0..=points {
+            let t = k as f64 / points as f64;
+            let weight = if k == 0 || k == points { 1.0 } else { 2.0 + 2.0 * (k % 2) as f64 };
+            let weight = weight / (3.0 * points as f64) * 2.0 * t * width.abs();
             let theta = end + width * t * t;
-            let depth = self.radius * (equal(theta).cos() - front.cos()).max(0.0);
-            let sigma = self.modulus * depth.powf(self.n);
+            let sigma = stress(theta);
             let j = self.radius * (front - theta - (1.0 - slip) * (front.sin() - theta.sin()));
             let tau = (self.cohesion + sigma * self.friction) * (1.0 - (-j / self.shear).exp());
             sum.load += weight * (sigma * theta.cos() + tau * theta.sin());
@@ -123,7 +132,8 @@ pub fn wheel_on(soil: &Row, [radius, width]: [f64; 2], peak: [f64; 2]) -> Wheel 
         friction: soil.value("phi_rad").tan(),
         shear: soil.value("K_m"),
         peak,
-        exit: 0.0,
+        unloading: f64::INFINITY,
+        points: POINTS,
     }
 }
 

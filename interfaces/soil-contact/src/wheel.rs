@@ -1,0 +1,281 @@
+//! Wheels: which contacts roll, how fast they slip, and the shifted peak of their stress.
+//!
+//! A wheel is told by its underside, not by its name: where the nodes lie on a circular cylinder, each of them is
+//! r·(n − ν) away from the lowest line, with ν the inward normal there. A flat foot, whose normals are all alike, and
+//! a sphere, which is round in both directions, do not roll.
+
+use crate::patch::{Facing, PatchNodes};
+use terraglue_soil_law::Rolling;
+
+/// Largest squared distance of nodes from the circle over their squared distance from the lowest line.
+const ROUND: f64 = 1e-2;
+/// Smallest scatter of the normals of a round underside.
+const CURVED: f64 = 1e-8;
+/// Largest scatter across the travel over that along it: a wheel may lean a little.
+const LEVEL: f64 = 0.02;
+/// Nodes whose normal leans further, cos = 0.2, are not looked at.
+const LEANING: f64 = 0.2;
+
+/// What the soil remembers of a contact that rolls. Part of the committed state.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Memory {
+    /// Key of the port.
+    pub key: u64,
+    /// Slip (w − v)/max(|w|, |v|) with w the way of the rim and v that of the axle: 0 rolls, 1 spins, −1 is locked;
+    /// smoothed over the length of the contact.
+    pub slip: f64,
+    /// Whether the way of the axle points along [`Wheel::heading`].
+    pub forward: bool,
+}
+
+/// A contact that can roll, at the start of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Wheel {
+    /// Radius of the underside, m.
+    pub radius: f64,
+    /// Direction of travel along t1 and t2, unit length; its sign is arbitrary.
+    pub heading: [f64; 2],
+    /// Length of the loaded nodes across the travel, m.
+    pub width: f64,
+    /// Half the length of the contact along the travel, as the depth makes it, m.
+    pub length: f64,
+    /// As of the last commit.
+    pub memory: Memory,
+}
+
+impl Wheel {
+    /// The wheel whose underside the nodes in `range` are; `None` where the contact does not roll.
+    pub fn find(nodes: &PatchNodes, range: std::ops::Range<usize>, spacing: f64, key: u64) -> Option<Self> {
+        let used =
+            || range.clone().filter(|k| nodes.area[*k] > 0.0 && normal(&nodes.facing[*k])[0] > LEANING);
+        let heading = heading(used().map(|k| normal(&nodes.facing[k])))?;
+        let radius = radius(used().map(|k| (nodes.arm[k], normal(&nodes.facing[k]))), heading)?;
+        let pressed = || used().filter(|k| nodes.depth[*k] > nodes.permanent[*k]);
+        let across = |k: usize| nodes.arm[k][2] * heading[0] - nodes.arm[k][1] * heading[1];
+        let (sum, mean) =
+            pressed().fold((0.0, 0.0), |(s, m), k| (s + nodes.area[k], m + nodes.area[k] * across(k)));
+        if sum <= 0.0 {
+            return None;
+        }
+        let mean = mean / sum;
+        let variance = pressed().map(|k| nodes.area[k] * (across(k) - mean).powi(2)).sum::<f64>() / sum;
+        let deepest = pressed().fold(0.0_f64, |m, k| m.max(nodes.depth[k]));
+        Some(Self {
+            radius,
+            heading,
+            // rows of cells of equal load scatter by (W² − Δ²)/12
+            width: (12.0 * variance + spacing * spacing).sqrt(),
+            length: (deepest * (2.0 * radius - deepest).max(0.0)).sqrt(),
+            memory: Memory { key, ..Memory::default() },
+        })
+    }
+
+    /// The memory after the foot has moved by `x` (n, t1, t2 and rotations).
+    pub fn rolled(&self, x: &[f64; 6]) -> Memory {
+        let along = |v: [f64; 2]| v[0] * self.heading[0] + v[1] * self.heading[1];
+        // the axle lies r·n above the lowest point: θ × r·n along t1 and t2
+        let rim = along([self.radius * x[5], -self.radius * x[4]]);
+        let axle = along([x[1], x[2]]) + rim;
+        let way = rim.abs().max(axle.abs());
+        if way <= f64::MIN_POSITIVE {
+            return self.memory;
+        }
+        let now = ((rim - axle) * (rim + axle).signum() / way).clamp(-1.0, 1.0);
+        let share = (way / self.length.max(f64::MIN_POSITIVE)).min(1.0);
+        let slip = self.memory.slip + share * (now - self.memory.slip);
+        let forward = if axle.abs() > 1e-9 * way { axle > 0.0 } else { self.memory.forward };
+        Memory { slip, forward, ..self.memory }
+    }
+
+    /// Angle of a node from the lowest line, rad, positive where soil enters.
+    fn angle(&self, arm: [f64; 3]) -> f64 {
+        let sign = if self.memory.forward { 1.0 } else { -1.0 };
+        let ahead = sign * (arm[1] * self.heading[0] + arm[2] * self.heading[1]);
+        libm::asin((ahead / self.radius).clamp(-1.0, 1.0))
+    }
+
+    /// The shifted stress of this step; `None` where it follows the depth.
+    pub fn shift(
+        &self,
+        rolling: &Rolling,
+        nodes: &PatchNodes,
+        range: std::ops::Range<usize>,
+    ) -> Option<Shift> {
+        let share = rolling.peak_share(self.memory.slip);
+        let (mut bottom, mut sum, mut count) = (0.0_f64, 0.0, 0.0);
+        for k in range.filter(|k| nodes.area[*k] > 0.0) {
+            let angle = self.angle(nodes.arm[k]);
+            if nodes.depth[k] > nodes.permanent[k] {
+                bottom = bottom.max(nodes.depth[k] + self.radius * (1.0 - libm::cos(angle)));
+            }
+            if nodes.stamp[k] == 0 && angle > 0.0 {
+                sum += nodes.permanent[k];
+                count += 1.0;
+            }
+        }
+        let before = if count > 0.0 { sum / count } else { 0.0 };
+        let entry = libm::acos(1.0 - ((bottom - before) / self.radius).clamp(0.0, 1.0));
+        (share > 0.0 && entry > 0.0).then_some(Shift { entry, peak: share * entry, before })
+    }
+
+    /// How much less deep than it lies a node behind the peak counts, m: there the stress is that of the angle in front
+    /// which lies as far from the entry, in its share, as the node does from the exit at the bottom. `None` in
+    /// front of the peak and behind the bottom.
+    pub fn relief(&self, shift: &Shift, arm: [f64; 3]) -> Option<f64> {
+        let angle = self.angle(arm);
+        if angle >= shift.peak || angle < 0.0 {
+            return None;
+        }
+        let equal = shift.entry - angle * (shift.entry - shift.peak) / shift.peak;
+        Some((self.radius * (libm::cos(angle) - libm::cos(equal))).max(0.0))
+    }
+}
+
+/// Where the stress below a wheel is largest.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shift {
+    /// Angle at which the soil enters, rad.
+    pub entry: f64,
+    /// Angle of the largest stress, rad.
+    pub peak: f64,
+    /// Permanent depth of the soil ahead, m.
+    pub before: f64,
+}
+
+/// Inward unit normal of the underside along n, t1, t2.
+fn normal(facing: &Facing) -> [f64; 3] {
+    facing.press.map(|c| c / facing.stretch)
+}
+
+/// Direction in which the normals turn; `None` where they are all alike or turn in both.
+fn heading(normals: impl Iterator<Item = [f64; 3]> + Clone) -> Option<[f64; 2]> {
+    let (mut count, mut mean, mut square) = (0.0, [0.0; 2], [0.0; 3]);
+    for [_, a, b] in normals {
+        count += 1.0;
+        mean = [mean[0] + a, mean[1] + b];
+        square = [square[0] + a * a, square[1] + a * b, square[2] + b * b];
+    }
+    if count < 2.0 {
+        return None;
+    }
+    let m = mean.map(|m| m / count);
+    let (xx, xy, yy) =
+        (square[0] / count - m[0] * m[0], square[1] / count - m[0] * m[1], square[2] / count - m[1] * m[1]);
+    let (half, middle) = ((0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt(), 0.5 * (xx + yy));
+    let (large, small) = (middle + half, middle - half);
+    if large < CURVED || small > LEVEL * large {
+        return None;
+    }
+    let v = if xx >= yy { [xx - small, xy] } else { [xy, yy - small] };
+    let length = (v[0] * v[0] + v[1] * v[1]).sqrt();
+    // x is the usual direction of travel: its sign is kept
+    let sign = if v[0] + 1e-6 * v[1] < 0.0 { -1.0 } else { 1.0 };
+    (length > 0.0).then(|| v.map(|c| sign * c / length))
+}
+
+/// Radius of the circle on which the nodes lie; `None` where they lie on none.
+fn radius(nodes: impl Iterator<Item = ([f64; 3], [f64; 3])> + Clone, heading: [f64; 2]) -> Option<f64> {
+    let pairs = nodes.map(|(arm, nu)| {
+        let plane = |v: [f64; 3]| [v[0], v[1] * heading[0] + v[2] * heading[1]];
+        (plane(arm), plane([1.0 - nu[0], -nu[1], -nu[2]]))
+    });
+    let of = |a: [f64; 2], b: [f64; 2]| a[0] * b[0] + a[1] * b[1];
+    let (product, square) = pairs.clone().fold((0.0, 0.0), |(p, s), (a, b)| (p + of(a, b), s + of(b, b)));
+    if square <= 0.0 || product <= 0.0 {
+        return None;
+    }
+    let radius = product / square;
+    let off = pairs.clone().fold((0.0, 0.0), |(e, all), (a, b)| {
+        let d = [a[0] - radius * b[0], a[1] - radius * b[1]];
+        (e + of(d, d), all + of(a, a))
+    });
+    (off.0 <= ROUND * off.1).then_some(radius)
+}
+
+/// Keeps the memories of the wheels that touch, in ascending order of their keys.
+pub fn remember(memories: &mut Vec<Memory>, wheel: &Wheel, x: &[f64; 6]) {
+    let new = wheel.rolled(x);
+    match memories.binary_search_by_key(&new.key, |m| m.key) {
+        Ok(k) => memories[k] = new,
+        Err(k) => memories.insert(k, new),
+    }
+}
+
+/// The memory of a port; a wheel that was never seen rolls forward without slip.
+pub fn recall(memories: &[Memory], key: u64) -> Memory {
+    let found = memories.binary_search_by_key(&key, |m| m.key);
+    found.map_or(Memory { key, slip: 0.0, forward: true }, |k| memories[k])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RADIUS: f64 = 0.15;
+
+    /// Nodes below a wheel that travels along `angle` and leans by `lean`, sunk by 1 cm.
+    fn wheel(angle: f64, lean: f64) -> PatchNodes {
+        let mut nodes = PatchNodes::default();
+        let (s, c) = (libm::sin(angle), libm::cos(angle));
+        for i in -6..=6 {
+            for j in -5..=5 {
+                let (along, across) = (0.01 * f64::from(i), 0.01 * f64::from(j));
+                let root = (RADIUS * RADIUS - along * along).sqrt();
+                let slope = [along / root * c - lean * s, along / root * s + lean * c];
+                let rise = RADIUS - root + lean * across;
+                push(&mut nodes, [rise, along * c - across * s, along * s + across * c], slope);
+            }
+        }
+        nodes
+    }
+
+    fn push(nodes: &mut PatchNodes, arm: [f64; 3], slope: [f64; 2]) {
+        nodes.index.push([0, 0]);
+        nodes.arm.push(arm);
+        nodes.depth.push(0.01 - arm[0]);
+        nodes.permanent.push(0.0);
+        nodes.area.push(1e-4);
+        let press = [1.0, -slope[0], -slope[1]];
+        let stretch = (1.0 + slope[0] * slope[0] + slope[1] * slope[1]).sqrt();
+        nodes.facing.push(Facing { press, along: [[0.0; 3]; 2], stretch });
+    }
+
+    fn find(nodes: &PatchNodes) -> Option<Wheel> {
+        Wheel::find(nodes, 0..nodes.index.len(), 0.01, 1)
+    }
+
+    #[test]
+    fn a_wheel_is_told_by_its_underside_in_any_direction() {
+        for (angle, lean) in [(0.0, 0.0), (0.7, 0.0), (1.2, 0.02)] {
+            let w = find(&wheel(angle, lean)).expect("a wheel");
+            assert!((w.radius - RADIUS).abs() < 2e-2 * RADIUS, "{w:?}");
+            let along = (w.heading[0] * libm::cos(angle) + w.heading[1] * libm::sin(angle)).abs();
+            assert!(along > 1.0 - 1e-4 && (w.width - 0.11).abs() < 0.005, "{w:?}");
+        }
+    }
+
+    #[test]
+    fn feet_do_not_roll() {
+        let (mut flat, mut round) = (PatchNodes::default(), PatchNodes::default());
+        for i in -4..=4 {
+            for j in -4..=4 {
+                let (x, y) = (0.01 * f64::from(i), 0.01 * f64::from(j));
+                push(&mut flat, [0.05 * x, x, y], [0.05, 0.0]);
+                let root = (RADIUS * RADIUS - x * x - y * y).sqrt();
+                push(&mut round, [RADIUS - root, x, y], [x / root, y / root]);
+            }
+        }
+        assert_eq!(find(&flat), None);
+        assert_eq!(find(&round), None);
+    }
+
+    #[test]
+    fn slip_is_that_of_rim_and_axle() {
+        let w = Wheel { length: 1e-9, ..find(&wheel(0.0, 0.0)).expect("a wheel") };
+        let slip = |rim: f64, axle: f64| w.rolled(&[0.0, axle - rim, 0.0, 0.0, 0.0, rim / w.radius]).slip;
+        assert!((slip(1e-3, 1e-3)).abs() < 1e-9);
+        assert!((slip(1e-3, 0.8e-3) - 0.2).abs() < 1e-9 && (slip(-1e-3, -0.8e-3) - 0.2).abs() < 1e-9);
+        assert!((slip(1e-3, 0.0) - 1.0).abs() < 1e-9 && (slip(0.5e-3, 1e-3) + 0.5).abs() < 1e-9);
+        assert!((slip(0.0, 1e-3) + 1.0).abs() < 1e-9);
+    }
+}

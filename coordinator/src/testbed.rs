@@ -6,7 +6,7 @@
 
 use crate::contact::{ContactDetector, Now};
 use crate::gluing::{self, Exchange, Instant, Outcome, PortReport, StepReport, Strategy};
-use crate::host::{Instance, Progress, Reply};
+use crate::host::{Instance, Partings, Progress, Reply};
 use crate::observer::{Happening, Observer, SubsystemView, View};
 use crate::signals::{Directory, Link, TimeLine};
 use crate::timing::{Part, Timings};
@@ -69,6 +69,7 @@ pub struct Testbed {
     gravity: [f64; 3],
     contact_margin_m: f64,
     cancel: Arc<AtomicBool>,
+    partings: Partings,
     step_s: f64,
     /// Time of nominal step 0, s: 0 unless the length of the steps has been changed on the way.
     origin_s: f64,
@@ -195,6 +196,9 @@ impl Testbed {
 
     /// (2) Outputs of t become inputs of the step.
     fn transfer_signals(&mut self) -> Result {
+        if self.index == 0 && self.t == 0.0 {
+            self.settle()?;
+        }
         self.links.iter_mut().try_for_each(|l| l.transfer(&mut self.instances))
     }
 
@@ -408,6 +412,19 @@ impl Testbed {
         }
         self.happenings.push(Happening { t_s: self.t, what: format!("act {action}") });
         Ok(())
+    }
+
+    /// Ends all subsystems. Units are told to terminate and are freed; what goes wrong there is an error too.
+    ///
+    /// # Errors
+    /// What a subsystem did instead of ending.
+    pub fn close(self) -> Result {
+        let (time_s, partings) = (self.t, self.partings.clone());
+        drop(self);
+        match partings.take() {
+            all if all.is_empty() => Ok(()),
+            all => Err(Error::Simulation { time_s, message: all.join("; ") }),
+        }
     }
 
     /// Keeps the committed state of everything under a number.

@@ -55,6 +55,12 @@ pub enum Command {
     Fmu(FmuCommand),
     /// Write a module or a scenario as a functional mock-up unit for other programs.
     Export(ExportArguments),
+    /// Serve an isolated subsystem; started by `run` itself.
+    #[command(hide = true)]
+    Worker {
+        /// Shared memory of the host.
+        segment: PathBuf,
+    },
     /// Make the folder of a new module that builds and runs at once.
     New(NewArguments),
     /// Find the parameters of a soil from plate tests.
@@ -293,6 +299,12 @@ pub struct FmuRunArguments {
     /// Names to write, separated by commas [default: all outputs].
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     pub output: Vec<String>,
+    /// Run it in a process of its own: a crash, a hang or an `exit` is an error.
+    #[arg(long)]
+    pub isolate: bool,
+    /// Longest time of the whole run where it is isolated, s.
+    #[arg(long, value_name = "S", default_value_t = 3600.0)]
+    pub timeout: f64,
     /// Handle events in event mode (FMI 3).
     #[arg(long, value_parser = clap::builder::BoolishValueParser::new(), default_value = "off")]
     pub event_mode: bool,

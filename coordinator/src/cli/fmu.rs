@@ -2,11 +2,12 @@
 
 use super::arguments::{FmuCommand, FmuRunArguments};
 use super::output::outln;
-use super::{Exit, show};
+use super::{Exit, apart, show};
 use std::fmt::Debug;
 use std::io::Write;
 use std::path::Path;
 use terraglue::fmu::simulate::{self, Settings, Table};
+use terraglue::host::exit_guard;
 use terraglue::scenario::InputError;
 use terraglue::{Error, Result};
 use terraglue_fmi::description::ModelDescription;
@@ -15,6 +16,7 @@ use terraglue_fmi::{Error as FmiError, Fmu};
 /// Does the command.
 pub fn fmu(command: &FmuCommand) -> Result<Exit> {
     match command {
+        FmuCommand::Run(arguments) if arguments.isolate => apart::run(arguments),
         FmuCommand::Run(arguments) => run(arguments),
         FmuCommand::Info { unit } => info(unit),
         FmuCommand::Check { unit } => check(unit),
@@ -53,12 +55,18 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
         }
         Some(file) => writeln!(file, "{text}").map_err(|e| FmiError::Refused(format!("the table: {e}"))),
     };
+    exit_guard::arm();
     let ran = simulate::run(&fmu, &settings, sink, &mut row);
+    exit_guard::disarm();
     if let Some(file) = &mut file {
         file.flush().map_err(|source| Error::File { path: "the table".into(), source })?;
     }
     match ran {
-        Ok(()) => Ok(Exit::Done),
+        Ok(()) => {
+            drop(fmu);
+            apart::done();
+            Ok(Exit::Done)
+        }
         Err(error) => {
             eprintln!("error: {}: {error}", arguments.unit.display());
             Ok(Exit::Failed)

@@ -2,6 +2,7 @@
 //!
 //! Exit codes: 0 done, 1 the simulation or a check failed, 2 the input is wrong, 130 interrupted.
 
+mod apart;
 mod arguments;
 mod check;
 mod compare;
@@ -52,8 +53,12 @@ impl From<Exit> for ExitCode {
 
 /// Reads the arguments and does the command.
 pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    if let Command::Worker { segment } = &arguments.command {
+        return terraglue::host::isolation::serve(segment);
+    }
     logger::install();
-    let done = match Arguments::parse().command {
+    let done = match arguments.command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Compare(arguments) => compare::compare(&arguments),
         Command::Report { folder } => report::report(&folder),
@@ -62,6 +67,7 @@ pub fn main() -> ExitCode {
         Command::Variables(arguments) => list::variables(&arguments),
         Command::Fmu(command) => fmu::fmu(&command),
         Command::Export(arguments) => export::export(&arguments),
+        Command::Worker { .. } => Ok(Exit::Failed),
         Command::New(arguments) => new::new(&arguments),
         Command::Soils { name, file } => soils::soils(name.as_deref(), file.as_deref()),
         Command::FitSoil(arguments) => fit_soil::fit_soil(&arguments),

@@ -9,6 +9,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
+use terraglue::host::exit_guard;
 use terraglue::observer::Observer;
 use terraglue::recording::{self, Recorder, RecorderOptions, Status, Summary, TimingRow, write_timing};
 use terraglue::scenario::{InputError, Scenario};
@@ -63,7 +64,7 @@ pub fn options(arguments: &RunArguments, cancel: &Arc<AtomicBool>) -> Options {
 /// Builds a testbed. Whatever stops it, a module that refuses its files among them, is wrong input.
 pub fn build(scenario: &Scenario, options: &Options) -> Result<Testbed> {
     Testbed::build(scenario, options).map_err(|error| match error {
-        Error::Input(_) => error,
+        Error::Input(_) | Error::Module { function: "instantiate", .. } => error,
         other => Error::Input(InputError::plain(other.to_string(), None)),
     })
 }
@@ -76,6 +77,7 @@ pub fn run_testbed(
     csv: bool,
     progress: &mut dyn Observer,
 ) -> Result<Outcome> {
+    exit_guard::arm();
     let mut recorder = Recorder::create(folder, scenario, RecorderOptions { csv })?;
     testbed.view(|view| recorder.started(view))?;
     let (wall, cpu) = (Instant::now(), cpu_s());
@@ -83,12 +85,16 @@ pub fn run_testbed(
     let (wall_s, cpu_s) = (wall.elapsed().as_secs_f64(), cpu_s() - cpu);
     let error = ran.err();
     testbed.view(|view| recorder.finished(view, error.as_ref()))?;
+    write_timing(folder, &timing_rows(&testbed, wall_s, cpu_s))?;
+    let cancelled = testbed.cancelled();
+    let closed = testbed.close();
+    let error = error.or(closed.err());
     let status = match &error {
         Some(_) => Status::Failed,
-        None if testbed.cancelled() => Status::Stopped,
+        None if cancelled => Status::Stopped,
         None => Status::Done,
     };
-    write_timing(folder, &timing_rows(&testbed, wall_s, cpu_s))?;
+    exit_guard::disarm();
     let summary = recorder.finish(wall_s, cpu_s, error.as_ref(), status)?;
     Ok(Outcome { summary, error })
 }

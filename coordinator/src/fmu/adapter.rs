@@ -1,6 +1,8 @@
 //! A unit as a subsystem: trials by its saved states, values by name, every error with what the unit said.
 
+use super::bodies::Bodies;
 use super::map::{self, Place};
+use crate::host::Partings;
 use crate::scenario::did_you_mean;
 use serde_json::{Map, Value};
 use std::cell::{Cell, RefCell};
@@ -8,8 +10,8 @@ use std::path::Path;
 use std::sync::Arc;
 use terraglue_fmi::{Advance, Error as FmiError, Fmu, Slave, SlaveOptions, SlaveState};
 use terraglue_subsystem::{
-    Capabilities, Error, Host, Input, LogLevel, Motion, Response, Result, Step, Subsystem, ValueType, Values,
-    ValuesMut, Variable,
+    BodyState, Capabilities, Error, Host, Input, Law, LogLevel, Motion, Response, Result, Scene, Step,
+    Subsystem, ValueType, Values, ValuesMut, Variable,
 };
 
 /// What a value that is no number does.
@@ -43,6 +45,9 @@ pub struct FmuSubsystem {
     on_nan: OnNan,
     warned: Cell<bool>,
     references: RefCell<Vec<u32>>,
+    bodies: Bodies,
+    feeds_through: bool,
+    partings: Partings,
 }
 
 impl FmuSubsystem {
@@ -81,13 +86,29 @@ impl FmuSubsystem {
             on_nan: options.on_nan,
             warned: Cell::new(false),
             references: RefCell::default(),
+            bodies: Bodies::default(),
+            feeds_through: feeds_through(fmu.description()),
+            partings: Partings::default(),
             host,
         };
         for (name, value) in start {
             subsystem.set_start(&name, &value)?;
         }
+        let places = &subsystem.places;
+        let scalar = |id: u32| places.get(id as usize).filter(|p| p.count == 1).map(|p| p.reference);
+        subsystem.bodies = Bodies::read(&options.bodies, &subsystem.variables, scalar)?;
+        if !subsystem.bodies.is_empty() && !subsystem.can_go_back {
+            let text = "glued bodies need a unit that can save its state, to repeat a step";
+            return Err(Error::Refused(text.into()));
+        }
         subsystem.slave.enter_initialization(0.0, None, None).map_err(error)?;
         Ok(subsystem)
+    }
+
+    /// Where an error at the end of its life goes.
+    pub fn with_partings(mut self, partings: Partings) -> Self {
+        self.partings = partings;
+        self
     }
 
     fn set_start(&mut self, name: &str, value: &Value) -> Result {
@@ -169,16 +190,27 @@ impl FmuSubsystem {
     }
 }
 
+/// Whether an output at the start may depend on an input of the same time.
+fn feeds_through(description: &terraglue_fmi::ModelDescription) -> bool {
+    let is_input =
+        |k: &usize| description.variables[*k].causality == terraglue_fmi::description::Causality::Input;
+    let unknowns = description.initial_unknowns.iter().chain(&description.outputs);
+    let mut all = unknowns.map(|u| u.dependencies.as_ref().is_none_or(|d| d.iter().any(is_input)));
+    let inputs = (0..description.variables.len()).any(|k| is_input(&k));
+    inputs && all.any(|depends| depends)
+}
+
 /// Keys of the host in the table of a unit.
 struct Options {
     on_nan: OnNan,
     event_mode: bool,
     rollback: bool,
+    bodies: Map<String, Value>,
 }
 
 /// The host's keys and the start values, whose nested tables become dotted names.
 fn options(parameters: &Map<String, Value>) -> Result<(Options, Vec<(String, Value)>)> {
-    let mut options = Options { on_nan: OnNan::Stop, event_mode: false, rollback: true };
+    let mut options = Options { on_nan: OnNan::Stop, event_mode: false, rollback: true, bodies: Map::new() };
     let mut start = Vec::new();
     for (key, value) in parameters {
         let wrong = |takes: &str| Error::Refused(format!("`{key}` takes {takes}, not {value}"));
@@ -190,6 +222,7 @@ fn options(parameters: &Map<String, Value>) -> Result<(Options, Vec<(String, Val
             ("event_mode", _) => return Err(wrong("true or false")),
             ("rollback", Value::Bool(on)) => options.rollback = *on,
             ("rollback", _) => return Err(wrong("true or false")),
+            ("bodies", Value::Object(table)) => options.bodies = table.clone(),
             ("start", Value::Object(below)) => {
                 below.iter().for_each(|(k, v)| flatten(k.clone(), v, &mut start));
             }
@@ -227,13 +260,38 @@ impl Subsystem for FmuSubsystem {
             Capabilities::default()
         };
         let bytes = if c.serialize { Capabilities::SERIALIZE } else { Capabilities::default() };
-        retry | bytes
+        let force = if self.bodies.is_empty() { Capabilities::default() } else { Capabilities::FORCE };
+        let through = if self.feeds_through { Capabilities::FEEDTHROUGH } else { Capabilities::default() };
+        retry | bytes | force | through
     }
 
-    fn advance(&mut self, step: &Step, _: &Input, out: &mut Response) -> Result {
+    fn set_ports(&mut self, step: &Step, _: &mut [Law], now: &mut Response) -> Result {
+        self.bodies.check(step)?;
+        for values in [&mut *now.x, &mut *now.v, &mut *now.a, &mut *now.t] {
+            values.fill(0.0);
+        }
+        Ok(())
+    }
+
+    fn scene(&self) -> Scene {
+        self.bodies.scene()
+    }
+
+    fn body_states(&self, out: &mut [BodyState]) -> Result {
+        self.bodies.states(&self.slave, out, error)
+    }
+
+    fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result {
         if self.slave.is_initializing() {
             self.slave.exit_initialization().map_err(error)?;
             self.running = true;
+        }
+        let wrench = match input {
+            Input::Force { t, .. } => *t,
+            _ => return Err(Error::Unsupported),
+        };
+        if step.h == 0.0 && !self.bodies.is_empty() {
+            return self.bodies.still(&mut self.slave, step, wrench, out, error);
         }
         if self.open && !self.can_go_back {
             let text =
@@ -246,6 +304,9 @@ impl Subsystem for FmuSubsystem {
             self.slave.save(&mut self.before).map_err(error)?;
         }
         self.open = true;
+        if !self.bodies.is_empty() {
+            self.bodies.push(&mut self.slave, step, wrench, error)?;
+        }
         let step_now = Advance { t: step.t, h: step.h, for_good: !self.can_go_back };
         match self.slave.do_step(step_now) {
             Ok(done) if done.terminate => {
@@ -254,7 +315,10 @@ impl Subsystem for FmuSubsystem {
             }
             Ok(_) => {
                 out.reached = step.t + step.h;
-                Ok(())
+                match self.bodies.is_empty() {
+                    true => Ok(()),
+                    false => self.bodies.pull(&self.slave, step, wrench, out, error),
+                }
             }
             Err(discard @ FmiError::Discard { .. }) => {
                 let variable = self.slave.fmu().description().capabilities.variable_step;
@@ -415,6 +479,11 @@ impl Drop for FmuSubsystem {
         for state in self.slots.iter_mut().chain([&mut self.before]) {
             // The instance goes next; what it says to this is in its log.
             drop(self.slave.release(state));
+        }
+        if self.slave.is_good()
+            && let Err(error) = self.slave.terminate()
+        {
+            self.partings.put(format!("`{}` at its end: {error}", self.host.name()));
         }
     }
 }

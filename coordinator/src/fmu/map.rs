@@ -76,13 +76,15 @@ fn effect(v: &fmi::Variable) -> Effect {
     }
 }
 
-/// The unit where our own reading of its name agrees with the unit's definition; nothing otherwise, so that no
-/// connection converts by a guess.
+/// Its name where our own reading of it agrees with the unit's definition, or else the definition in SI symbols with
+/// factor and offset. Nothing where the unit is not defined, so that no connection converts by a guess.
 fn unit(description: &ModelDescription, v: &fmi::Variable) -> String {
     let Some(name) = &v.unit else { return String::new() };
-    let Ok(ours) = Unit::parse(name) else { return String::new() };
-    match description.units.iter().find(|(n, _)| n == name) {
-        Some((_, theirs)) if *theirs != ours => String::new(),
-        _ => name.clone(),
+    let theirs = description.units.iter().find(|(n, _)| n == name).map(|(_, unit)| *unit);
+    match (Unit::parse(name), theirs) {
+        (Ok(ours), Some(theirs)) if ours == theirs => name.clone(),
+        (_, Some(theirs)) => theirs.to_string(),
+        (Ok(_), None) => name.clone(),
+        (Err(_), None) => String::new(),
     }
 }

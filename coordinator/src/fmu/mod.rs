@@ -3,6 +3,7 @@
 //! A table `[x] fmu = "path.fmu"` makes a [`FmuSubsystem`]; [`simulate`] runs one unit alone; [`export`] writes one.
 
 mod adapter;
+mod bodies;
 pub mod export;
 mod feet;
 mod map;

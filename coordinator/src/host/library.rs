@@ -3,6 +3,7 @@
 
 use super::elf::{Description, foreign_machine, is_elf, needed_length};
 use super::error::LoadError;
+use super::isolation::{self, Isolation, What};
 use super::search::{SearchPath, file_name, is_path};
 use super::{HostServices, Instance};
 use libloading::os::unix::{Library as Handle, RTLD_LOCAL, RTLD_NOW, Symbol};
@@ -71,13 +72,46 @@ impl LoadedModule {
         services: &HostServices,
     ) -> std::result::Result<Instance, LoadError> {
         let config = config.with_defaults(&self.schema);
-        let host = services.for_instance(instance_name);
-        let made = match &self.origin {
-            Origin::Builtin(instantiate) => instantiate(&config, host),
+        let made = self.make(&config, services.for_instance(instance_name));
+        self.supervised(instance_name, made)
+    }
+
+    /// The subsystem alone, without supervision.
+    pub(crate) fn make(&self, config: &Config, host: Arc<dyn Host>) -> Result<Box<dyn Subsystem>> {
+        match &self.origin {
+            Origin::Builtin(instantiate) => instantiate(config, host),
             Origin::Foreign(module, _) => {
-                module.instantiate(&config, host).map(|s| Box::new(s) as Box<dyn Subsystem>)
+                module.instantiate(config, host).map(|s| Box::new(s) as Box<dyn Subsystem>)
+            }
+        }
+    }
+
+    /// The same in a process of its own; a module linked into the program has no library and stays here.
+    pub(crate) fn instantiate_isolated(
+        &self,
+        instance_name: &str,
+        config: Config,
+        services: &HostServices,
+        isolation: Isolation,
+    ) -> std::result::Result<Instance, LoadError> {
+        let config = config.with_defaults(&self.schema);
+        let host = services.for_instance(instance_name);
+        let made = match self.path() {
+            None => self.make(&config, host),
+            Some(path) => {
+                let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+                let config = serde_json::from_str(&config.to_json()).unwrap_or_default();
+                isolation::start(What::Module { path, config }, &host, services, isolation)
             }
         };
+        self.supervised(instance_name, made)
+    }
+
+    fn supervised(
+        &self,
+        instance_name: &str,
+        made: Result<Box<dyn Subsystem>>,
+    ) -> std::result::Result<Instance, LoadError> {
         let (subsystem, module) = (instance_name.to_owned(), self.schema.name.clone());
         match made {
             Ok(made) => Ok(Instance::new(instance_name, &module, self.schema.kind, made)),

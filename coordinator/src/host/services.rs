@@ -2,12 +2,28 @@
 
 use super::Workers;
 use std::path::{Path, PathBuf};
-use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex, PoisonError};
 use terraglue_subsystem::{Host, LogLevel, Terrain};
 
 /// Takes the log lines of instances: name of the instance, severity, text.
 pub type LogSink = Arc<dyn Fn(&str, LogLevel, &str) + Send + Sync>;
+
+/// Errors of instances at their end, when nobody waits for an answer any more.
+#[derive(Clone, Debug, Default)]
+pub struct Partings(Arc<Mutex<Vec<String>>>);
+
+impl Partings {
+    /// Remembers one.
+    pub fn put(&self, text: String) {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner).push(text);
+    }
+
+    /// Takes all of them.
+    pub fn take(&self) -> Vec<String> {
+        std::mem::take(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner))
+    }
+}
 
 /// Services shared by all instances of a testbed; cloned for each.
 #[derive(Clone)]
@@ -26,6 +42,8 @@ pub struct HostServices {
     pub cancel: Arc<AtomicBool>,
     /// Where log lines go; None: to the crate `log` with target `terraglue::module`.
     pub log: Option<LogSink>,
+    /// What went wrong while instances were ended, after the last step.
+    pub partings: Partings,
     /// Numbered states that `save_state` must keep.
     pub slots: u32,
     /// Largest number of ground nodes that a step may show; a hint.
@@ -43,6 +61,7 @@ impl HostServices {
             workers: Arc::new(Workers::new(1)),
             cancel: Arc::new(AtomicBool::new(false)),
             log: None,
+            partings: Partings::default(),
             slots: 8,
             max_nodes: 1 << 14,
         }

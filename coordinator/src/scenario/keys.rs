@@ -322,6 +322,18 @@ pub fn subsystem_keys() -> Vec<Key> {
         Parameter::of("module", ParameterType::Text, module).into(),
         Parameter::of("fmu", ParameterType::Path, unit).optional().into(),
         Parameter::of("step_multiple", ParameterType::Integer, multiple).or(1).within(1.0, 1e6).into(),
+        Parameter::of(
+            "isolate",
+            ParameterType::Bool,
+            "in a process of its own: a crash or a hang is an error",
+        )
+        .or(false)
+        .into(),
+        number("load_timeout_s", "s", 60.0, "longest time to load it, where isolated").positive().into(),
+        number("step_timeout_s", "s", 30.0, "longest time of one call, where isolated").positive().into(),
+        number("memory_mb", "", 8192.0, "most memory of its process in MiB, where isolated")
+            .positive()
+            .into(),
         Parameter::of("parameters", ParameterType::Text, row).optional().into(),
         Parameter::of("parameters_file", ParameterType::Path, "soil table other than `models/soils.csv`")
             .optional()

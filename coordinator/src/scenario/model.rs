@@ -1,5 +1,6 @@
 //! A checked scenario: plain data that the testbed is built from.
 
+use crate::host::Isolation;
 use serde_json::{Map, Value};
 use std::path::PathBuf;
 
@@ -175,6 +176,8 @@ pub struct SubsystemSpec {
     pub module: String,
     /// Steps of the testbed per step of the subsystem.
     pub step_multiple: u32,
+    /// In a process of its own, with these limits.
+    pub isolation: Option<Isolation>,
     /// All parameters, nested tables as objects: the host's keys are taken out.
     pub parameters: Map<String, Value>,
     /// Numbers of a named soil row that are offered to the module, not demanded of it.

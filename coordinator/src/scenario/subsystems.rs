@@ -8,6 +8,7 @@ use super::node::{Node, Raw};
 use super::section::check_entry;
 use super::soil_row;
 use super::source::{InputError, Source};
+use crate::host::Isolation;
 use serde_json::{Map, Value};
 
 /// All subsystems in the order of their names.
@@ -53,9 +54,23 @@ fn one(source: &Source, name: &str, node: &Node) -> Result<SubsystemSpec, Box<In
     Ok(SubsystemSpec {
         name: name.into(),
         step_multiple: node.get("step_multiple").and_then(|n| n.to_json().as_u64()).unwrap_or(1) as u32,
+        isolation: isolation(node),
         parameters: parameters(node, &module, is_host_key),
         offered: soil_row::offered(source, name, node, &module)?,
         module,
+    })
+}
+
+/// Whether and how it is kept in a process of its own.
+fn isolation(node: &Node) -> Option<Isolation> {
+    let number =
+        |key: &str, otherwise: f64| node.get(key).and_then(|n| n.to_json().as_f64()).unwrap_or(otherwise);
+    let usual = Isolation::default();
+    let wanted = node.get("isolate").is_some_and(|n| n.to_json().as_bool() == Some(true));
+    wanted.then(|| Isolation {
+        load_timeout_s: number("load_timeout_s", usual.load_timeout_s),
+        step_timeout_s: number("step_timeout_s", usual.step_timeout_s),
+        memory_bytes: (number("memory_mb", (usual.memory_bytes >> 20) as f64) as u64) << 20,
     })
 }
 

@@ -28,15 +28,49 @@ impl Link {
 
     /// Copies the committed values.
     pub fn transfer(&mut self, instances: &mut [Instance]) -> Result {
+        self.read(instances)?;
+        let values = std::mem::take(&mut self.values);
+        let done = self.write(instances, &values);
+        self.values = values;
+        done
+    }
+
+    /// Values of the outputs, in the units of the inputs.
+    pub fn read(&mut self, instances: &[Instance]) -> Result<&[f64]> {
         instances[self.from].get(&self.from_ids, ValuesMut::F64(&mut self.values))?;
         for (value, (a, b)) in self.values.iter_mut().zip(&self.conversion) {
             *value = a * *value + b;
         }
+        Ok(&self.values)
+    }
+
+    /// Sets the inputs.
+    pub fn write(&self, instances: &mut [Instance], values: &[f64]) -> Result {
         let target = &mut instances[self.to];
-        match target.set(&self.to_ids, Values::F64(&self.values))? {
+        match target.set(&self.to_ids, Values::F64(values))? {
             Reply::Accepted => Ok(()),
             Reply::Refused(reason) => Err(target.error("set", reason)),
         }
+    }
+
+    /// Whether it leaves a subsystem of some kind.
+    pub fn leaves(&self, kind: impl Fn(usize) -> bool) -> bool {
+        kind(self.from)
+    }
+
+    /// Number of values.
+    pub fn len(&self) -> usize {
+        self.to_ids.len()
+    }
+
+    /// `a.y → b.u` of every value.
+    pub fn names(&self, instances: &[Instance]) -> Vec<String> {
+        let name = |slot: usize, id: &u32| {
+            let variable = instances[slot].variables().iter().find(|v| v.id == *id);
+            format!("{}.{}", instances[slot].name(), variable.map_or("?", |v| &v.name))
+        };
+        let pairs = self.from_ids.iter().zip(&self.to_ids);
+        pairs.map(|(from, to)| format!("{} → {}", name(self.from, from), name(self.to, to))).collect()
     }
 }
 

@@ -4,8 +4,10 @@
 mod access;
 mod connection;
 mod event;
+mod initial;
 pub mod pattern;
 
 pub use access::{Directory, VariableRef};
 pub use connection::{Link, connect};
 pub use event::{Due, TimeLine};
+pub use initial::settle;

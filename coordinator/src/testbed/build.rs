@@ -4,13 +4,14 @@ use super::{Group, Member, Options, Testbed};
 use crate::contact::{BodySide, ContactDetector, GroundSide};
 use crate::gluing::glue::Recipe;
 use crate::gluing::{self, Exchange, Glue, StepReport};
+use crate::host::isolation::{self, What};
 use crate::host::{HostServices, Instance, Library, LoadError, LoadedModule, SearchPath, Workers};
 use crate::scenario::{self, GlueSpec, InputError, Scenario, SubsystemSpec};
 use crate::signals::{self, Directory, TimeLine};
 use crate::timing::Timings;
 use crate::{Error, Result, terrain};
 use std::sync::Arc;
-use terraglue_subsystem::{BodyState, Capabilities, Hold, Kind, Law, Level, Terrain};
+use terraglue_subsystem::{BodyState, Capabilities, Hold, Kind, Law, Level, Subsystem, Terrain};
 
 impl Testbed {
     /// Builds a scenario with modules found as libraries.
@@ -66,6 +67,7 @@ impl Testbed {
             no_glue: StepReport { converged: true, ..StepReport::default() },
             timings: Timings::default(),
             cancel: options.cancel.clone(),
+            partings: services.partings.clone(),
             step_s: scenario.time.step_s,
             origin_s: 0.0,
             nominal: 0,
@@ -76,6 +78,7 @@ impl Testbed {
             hold: hold(&scenario.gluing.hold),
             started: false,
         };
+        testbed.settle()?;
         testbed.read_states()?;
         if let Err(Error::Simulation { message, .. }) = testbed.detect_contacts(scenario.time.step_s) {
             return Err(InputError::plain(format!("at the start: {message}"), None).into());
@@ -100,7 +103,11 @@ fn instantiate(
         }
         let module: LoadedModule = library.find(&spec.module, &search, &scenario.folder).map_err(wrong)?;
         let config = scenario::check_parameters(module.schema(), spec, &scenario.source)?;
-        instances.push(module.instantiate(&spec.name, config, services).map_err(wrong)?);
+        let made = match spec.isolation {
+            Some(isolation) => module.instantiate_isolated(&spec.name, config, services, isolation),
+            None => module.instantiate(&spec.name, config, services),
+        };
+        instances.push(made.map_err(wrong)?);
     }
     Ok(instances)
 }
@@ -108,12 +115,37 @@ fn instantiate(
 /// A functional mock-up unit as an instance.
 fn unit(scenario: &Scenario, spec: &SubsystemSpec, services: &HostServices) -> Result<Instance> {
     let path = scenario.folder.join(&spec.module);
-    let made = crate::fmu::FmuSubsystem::new(&path, &spec.parameters, services.for_instance(&spec.name));
-    let made = made.map_err(|e| {
-        let message = format!("{} ({}): {e}", spec.name, spec.module);
-        scenario.source.error_at_value(&[&spec.name, "fmu"], message, None)
+    let host = services.for_instance(&spec.name);
+    let once = || terraglue_fmi::Fmu::inspect(&path).is_ok_and(|(d, _)| d.capabilities.once_per_process);
+    let made: terraglue_subsystem::Result<Box<dyn Subsystem>> = match spec.isolation {
+        // One instance per process is all that such a unit stands.
+        None if !once() => crate::fmu::FmuSubsystem::new(&path, &spec.parameters, host)
+            .map(|u| Box::new(u.with_partings(services.partings.clone())) as _),
+        isolation => {
+            let what = What::Unit {
+                path: std::path::absolute(&path).unwrap_or_else(|_| path.clone()),
+                parameters: spec.parameters.clone(),
+            };
+            isolation::start(what, &host, services, isolation.unwrap_or_default())
+        }
+    };
+    let made = made.map_err(|e| -> Error {
+        match e {
+            // What it did, not what was written about it.
+            terraglue_subsystem::Error::Fatal(message) => Error::Module {
+                subsystem: spec.name.clone(),
+                module: spec.module.clone(),
+                function: "instantiate",
+                time_s: 0.0,
+                message,
+            },
+            other => {
+                let message = format!("{} ({}): {other}", spec.name, spec.module);
+                scenario.source.error_at_value(&[&spec.name, "fmu"], message, None).into()
+            }
+        }
     })?;
-    Ok(Instance::new(&spec.name, &spec.module, Kind::Controller, Box::new(made)))
+    Ok(Instance::new(&spec.name, &spec.module, Kind::Controller, made))
 }
 
 fn module_error(scenario: &Scenario, spec: &SubsystemSpec, error: &LoadError) -> Box<InputError> {

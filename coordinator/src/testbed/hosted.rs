@@ -4,6 +4,7 @@ use super::{Snapshot, Testbed, TimeKept};
 use crate::host::Instance;
 use crate::{Error, Result};
 use serde_json::{Value, json};
+use terraglue_subsystem::Capabilities;
 
 impl Testbed {
     pub(super) fn time_kept(&self) -> TimeKept {
@@ -49,6 +50,15 @@ impl Testbed {
     /// Whether a connection feeds a variable.
     pub(crate) fn is_fed(&self, slot: usize, id: u32) -> bool {
         self.links.iter().any(|l| l.feeds(slot, id))
+    }
+
+    /// Connected values at the start where outputs depend on inputs of the same time: in their order, loops solved.
+    pub(super) fn settle(&mut self) -> Result {
+        let through = |k: usize| self.instances[k].capabilities().has(Capabilities::FEEDTHROUGH);
+        if self.links.iter().any(|l| l.leaves(through)) {
+            crate::signals::settle(&mut self.links, &mut self.instances)?;
+        }
+        Ok(())
     }
 
     /// Reads the motion of all bodies again after values were set from outside.

@@ -6,12 +6,29 @@ use crate::error::{Error, Result};
 use crate::fmu::Fmu;
 use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_LOCAL, RTLD_NOW};
 use std::error::Error as _;
+use std::mem::ManuallyDrop;
 use std::path::Path;
 
-/// Library of a unit in this process; unloaded when dropped.
+/// Library of a unit in this process; unloaded when dropped, unless threads may still run in it.
 #[derive(Debug)]
 pub struct Loaded {
-    pub library: Library,
+    pub library: ManuallyDrop<Library>,
+    /// Threads of this process before it was loaded.
+    threads: usize,
+}
+
+impl Drop for Loaded {
+    fn drop(&mut self) {
+        if threads() <= self.threads {
+            // SAFETY: dropped once, here; no instance of the unit is left.
+            unsafe { ManuallyDrop::drop(&mut self.library) };
+        }
+    }
+}
+
+/// Number of threads of this process.
+fn threads() -> usize {
+    std::fs::read_dir("/proc/self/task").map_or(0, Iterator::count)
 }
 
 /// Name of this platform in an archive.
@@ -51,8 +68,9 @@ pub fn load(fmu: &Fmu) -> Result<Loaded> {
         return Err(fail(missing(fmu, &name)));
     }
     inspect(&path).map_err(|why| fail(format!("`{name}` cannot be loaded: {why}")))?;
+    let threads = threads();
     open(&path)
-        .map(|library| Loaded { library })
+        .map(|library| Loaded { library: ManuallyDrop::new(library), threads })
         .map_err(|why| fail(format!("`{name}` cannot be loaded: {why}")))
 }
 

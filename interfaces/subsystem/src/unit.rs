@@ -50,8 +50,17 @@ impl Unit {
     /// A pure number.
     pub const ONE: Self = Self { exponents: [0; 8], factor: 1.0, offset: 0.0 };
 
-    /// Reads `N m`, `kg m^2`, `rad/s`, `m/s^2`, `N m s/rad`. What follows a `/` is divided, up to the end.
+    /// Reads `N m`, `kg m^2`, `rad/s`, `m/s^2`, `N m s/rad`. What follows a `/` is divided, up to the end. `× 0.3048`
+    /// and `+ 273.15` at the end are a factor and an offset to SI.
     pub fn parse(text: &str) -> Result<Self, UnknownUnit> {
+        if let Some((symbols, rest)) = text.split_once('×') {
+            let (factor, offset) = rest.split_once(" + ").unwrap_or((rest, "0"));
+            let number = |text: &str| text.trim().parse::<f64>().ok().filter(|x| x.is_finite());
+            let unit = Self::parse(symbols)?;
+            let both = number(factor).filter(|f| *f != 0.0).zip(number(offset));
+            let (factor, offset) = both.ok_or_else(|| unknown(rest))?;
+            return Ok(Self { factor: unit.factor * factor, offset, ..unit });
+        }
         if text.trim() == "degC" {
             return Ok(Self { offset: 273.15, ..Self::parse("K")? });
         }
@@ -90,6 +99,21 @@ impl Unit {
     }
 }
 
+impl std::fmt::Display for Unit {
+    /// In SI symbols, so that [`Unit::parse`] reads the same unit again.
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        const BASE: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
+        let powers = self.exponents.iter().zip(BASE).filter(|(e, _)| **e != 0);
+        let powers: Vec<String> =
+            powers.map(|(e, name)| if *e == 1 { name.to_owned() } else { format!("{name}^{e}") }).collect();
+        f.write_str(&if powers.is_empty() { "1".to_owned() } else { powers.join(" ") })?;
+        if self.factor != 1.0 || self.offset != 0.0 {
+            write!(f, " × {:?} + {:?}", self.factor, self.offset)?;
+        }
+        Ok(())
+    }
+}
+
 fn unknown(symbol: &str) -> UnknownUnit {
     let near = SYMBOLS.iter().map(|(s, ..)| *s).min_by_key(|s| strsim::damerau_levenshtein(s, symbol));
     let hint = near.map(|s| format!("; did you mean `{s}`?")).unwrap_or_default();
@@ -106,6 +130,22 @@ mod tests {
         let joule = Unit::parse("J").expect("known");
         assert!(n_m.same_dimension(&joule));
         assert_eq!(Unit::parse("kg m^2/s^2").expect("known").exponents, joule.exponents);
+    }
+
+    #[test]
+    fn what_is_written_is_read_again() {
+        for text in
+            ["1", "N m", "deg", "degC", "kg m^2/s^3", "m × 0.3048", "K × 0.5555555555555556 + 255.372"]
+        {
+            let unit = Unit::parse(text).expect("known");
+            assert_eq!(Unit::parse(&unit.to_string()), Ok(unit), "{text}");
+        }
+        let (a, b) = Unit::parse("K × 0.5 + 250.0")
+            .expect("good")
+            .conversion_to(&Unit::parse("K").expect("K"))
+            .expect("same");
+        assert_eq!((a, b), (0.5, 250.0));
+        assert!(Unit::parse("m × zero").is_err() && Unit::parse("m × 0").is_err());
     }
 
     #[test]

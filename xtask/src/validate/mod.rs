@@ -5,6 +5,7 @@
 
 mod documents;
 mod figure;
+mod fmi;
 mod gluing;
 mod known;
 mod rigid_body;
@@ -68,7 +69,7 @@ const AREAS: [(&str, Option<Measure>); 6] = [
     ("rigid-body", Some(rigid_body::figures)),
     ("soil", Some(soil::figures)),
     ("gluing", Some(gluing::figures)),
-    ("fmi", None),
+    ("fmi", Some(fmi::figures)),
     ("plugins", None),
 ];
 

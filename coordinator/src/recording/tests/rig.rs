@@ -195,6 +195,7 @@ pub fn scenario(strategy: &str) -> Scenario {
          \"{strategy}\"\n\n[robot]\nmodule = \"rigid-body\"\n\n[soil]\nmodule = \"soil-bekker\"\n"
     );
     let part = |name: &str, module: &str| SubsystemSpec {
+        isolation: None,
         name: name.into(),
         module: module.into(),
         step_multiple: 1,

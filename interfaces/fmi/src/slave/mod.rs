@@ -211,6 +211,11 @@ impl Slave {
         Ok(())
     }
 
+    /// Whether every function may be called that its phase allows.
+    pub fn is_good(&self) -> bool {
+        self.health.get() == Health::Good
+    }
+
     /// Whether it is in initialisation mode.
     pub fn is_initializing(&self) -> bool {
         self.phase == Phase::Initializing

@@ -1,0 +1,271 @@
+//! The host's side of an isolated instance: a subsystem whose every call is made in its worker.
+
+use super::calls::{self, Call};
+use super::tiles::Tiles;
+use super::wire::{Reader, Writer};
+use super::{Link, Start};
+use std::cell::RefCell;
+use terraglue_subsystem::{
+    Action, BodyState, Capabilities, Energy, Error, Estimate, FieldInfo, FieldTile, Input, Law, Level,
+    Motion, Response, Result, Scene, Step, Subsystem, Terrain, Values, ValuesMut, Variable,
+};
+
+/// An instance in a worker.
+pub struct Isolated {
+    link: RefCell<Link>,
+    about: About,
+    tiles: Tiles,
+}
+
+/// What never changes over its life.
+pub struct About {
+    pub capabilities: Capabilities,
+    pub variables: Vec<Variable>,
+    pub actions: Vec<Action>,
+    pub scene: Scene,
+    pub fields: Vec<FieldInfo>,
+    /// Whether it books energies and knows events; a functional mock-up unit does not.
+    pub is_module: bool,
+}
+
+impl About {
+    pub fn put(&self, w: &mut Writer) {
+        w.put(&self.capabilities.0);
+        w.put(&self.variables);
+        w.put(&self.actions);
+        w.put(&self.scene);
+        w.put(&self.fields);
+        w.put(&self.is_module);
+    }
+
+    fn take(r: &mut Reader) -> Option<Self> {
+        Some(Self {
+            capabilities: Capabilities(r.take()?),
+            variables: r.take()?,
+            actions: r.take()?,
+            scene: r.take()?,
+            fields: r.take()?,
+            is_module: r.take()?,
+        })
+    }
+}
+
+impl Isolated {
+    pub fn start(mut link: Link, start: &Start, terrain: Option<&dyn Terrain>) -> Result<Self> {
+        let text = serde_json::to_string(start).map_err(|e| Error::Failed(e.to_string()))?;
+        let (about, tiles) = link.call(
+            Call::Start,
+            |w| {
+                w.put(&text);
+                w.put(&u8::from(terrain.is_some()));
+                if let Some(terrain) = terrain {
+                    put_terrain(w, terrain);
+                }
+            },
+            |r| {
+                let about = About::take(r)?;
+                let mut tiles = Tiles::new(&about.fields);
+                tiles.receive(r)?;
+                Some((about, tiles))
+            },
+        )?;
+        Ok(Self { link: RefCell::new(link), about, tiles })
+    }
+
+    /// A call after which fields may have changed.
+    fn change(&mut self, call: Call, write: impl FnOnce(&mut Writer)) -> Result {
+        let tiles = &mut self.tiles;
+        self.link.get_mut().call(call, write, |r| tiles.receive(r))
+    }
+}
+
+/// Row by row, so that nothing large is made in between.
+fn put_terrain(w: &mut Writer, terrain: &dyn Terrain) {
+    let [nx, ny] = terrain.size();
+    w.put(&terrain.origin());
+    w.put(&terrain.spacing());
+    w.put(&[nx, ny]);
+    w.put(&nx.saturating_mul(ny));
+    let mut row = vec![0.0; nx as usize];
+    for j in 0..ny {
+        terrain.heights(0, j.into(), row.len(), 1, &mut row);
+        row.iter().for_each(|z| w.put(z));
+    }
+}
+
+impl Subsystem for Isolated {
+    fn capabilities(&self) -> Capabilities {
+        self.about.capabilities
+    }
+
+    fn set_ports(&mut self, step: &Step, laws: &mut [Law], now: &mut Response) -> Result {
+        let given = laws.to_vec();
+        self.link.get_mut().call(
+            Call::SetPorts,
+            |w| {
+                calls::put_step(w, step);
+                w.put(&given);
+            },
+            |r| {
+                calls::take_laws(r, laws)?;
+                calls::take_response(r, now)
+            },
+        )
+    }
+
+    fn estimate_forces(&mut self, step: &Step, partner: &Motion, out: &mut Estimate) -> Result {
+        self.link.get_mut().call(
+            Call::Estimate,
+            |w| {
+                calls::put_step(w, step);
+                calls::put_motion(w, partner);
+            },
+            |r| {
+                r.fill(out.t_star)?;
+                r.fill(out.x_free)?;
+                r.fill(out.g)?;
+                let active: Vec<u8> = r.take()?;
+                out.active.get_mut(..active.len())?.copy_from_slice(&active);
+                out.unique = r.take()?;
+                Some(())
+            },
+        )
+    }
+
+    fn solve_compatibility(&mut self, step: &Step, estimate: &Estimate, out: &mut Response) -> Result {
+        self.link.get_mut().call(
+            Call::Solve,
+            |w| {
+                calls::put_step(w, step);
+                w.put(&*estimate.t_star);
+                w.put(&*estimate.x_free);
+                w.put(&*estimate.g);
+                w.put(&*estimate.active);
+                w.put(&estimate.unique);
+            },
+            |r| calls::take_response(r, out),
+        )
+    }
+
+    fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result {
+        self.link.get_mut().call(
+            Call::Advance,
+            |w| {
+                calls::put_step(w, step);
+                calls::put_input(w, input);
+            },
+            |r| calls::take_response(r, out),
+        )
+    }
+
+    fn interface_jacobian(&mut self, step: &Step, level: Level, out: &mut [f64]) -> Result {
+        self.link.get_mut().call(
+            Call::Jacobian,
+            |w| {
+                calls::put_step(w, step);
+                w.put(&(level as u32));
+            },
+            |r| r.fill(out),
+        )
+    }
+
+    fn commit(&mut self, step: &Step, t: &[f64], partner: &Motion) -> Result {
+        self.change(Call::Commit, |w| {
+            calls::put_step(w, step);
+            w.put(t);
+            calls::put_motion(w, partner);
+        })
+    }
+
+    fn save_state(&mut self, slot: u32) -> Result {
+        self.link.get_mut().call(Call::Save, |w| w.put(&slot), |_| Some(()))
+    }
+
+    fn restore_state(&mut self, slot: u32) -> Result {
+        self.change(Call::Restore, |w| w.put(&slot))
+    }
+
+    fn serialize(&self) -> Result<Vec<u8>> {
+        self.link.borrow_mut().call(Call::Serialize, |_| {}, |r| r.take())
+    }
+
+    fn deserialize(&mut self, bytes: &[u8]) -> Result {
+        self.change(Call::Deserialize, |w| w.put(bytes))
+    }
+
+    fn variables(&self) -> &[Variable] {
+        &self.about.variables
+    }
+
+    fn get(&self, ids: &[u32], mut out: ValuesMut) -> Result {
+        let mut link = self.link.borrow_mut();
+        let out = RefCell::new(&mut out);
+        link.call(
+            Call::Get,
+            |w| {
+                w.put(ids);
+                calls::put_room(w, &out.borrow());
+            },
+            |r| calls::take_room(r, &mut out.borrow_mut()),
+        )
+    }
+
+    fn set(&mut self, ids: &[u32], values: Values) -> Result {
+        self.link.get_mut().call(
+            Call::Set,
+            |w| {
+                w.put(ids);
+                calls::put_values(w, &values);
+            },
+            |_| Some(()),
+        )
+    }
+
+    fn actions(&self) -> &[Action] {
+        &self.about.actions
+    }
+
+    fn act(&mut self, action: &str, arguments: &str) -> Result {
+        self.change(Call::Act, |w| {
+            w.put(action);
+            w.put(arguments);
+        })
+    }
+
+    fn next_event_time(&self) -> f64 {
+        if !self.about.is_module {
+            return f64::INFINITY;
+        }
+        self.link.borrow_mut().call(Call::NextEvent, |_| {}, |r| r.take()).unwrap_or(f64::INFINITY)
+    }
+
+    fn scene(&self) -> Scene {
+        self.about.scene.clone()
+    }
+
+    fn body_states(&self, out: &mut [BodyState]) -> Result {
+        if out.is_empty() {
+            return Ok(());
+        }
+        let found: Vec<BodyState> = self.link.borrow_mut().call(Call::BodyStates, |_| {}, |r| r.take())?;
+        out.iter_mut().zip(found).for_each(|(out, s)| *out = s);
+        Ok(())
+    }
+
+    fn fields(&self) -> &[FieldInfo] {
+        &self.about.fields
+    }
+
+    fn field_tile(&self, field: usize, a: u32, b: u32) -> Result<FieldTile<'_>> {
+        self.tiles
+            .tile(field, a, b)
+            .ok_or_else(|| Error::Refused(format!("no tile ({a}, {b}) of field {field}")))
+    }
+
+    fn energy(&self) -> Energy {
+        if !self.about.is_module {
+            return Energy::default();
+        }
+        self.link.borrow_mut().call(Call::Energy, |_| {}, |r| r.take()).unwrap_or_default()
+    }
+}

@@ -6,8 +6,10 @@ use crate::host::Partings;
 use crate::scenario::did_you_mean;
 use serde_json::{Map, Value};
 use std::cell::{Cell, RefCell};
+use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
+use terraglue_fmi::description::Start;
 use terraglue_fmi::{Advance, Error as FmiError, Fmu, Slave, SlaveOptions, SlaveState};
 use terraglue_subsystem::{
     BodyState, Capabilities, Error, Host, Input, Law, LogLevel, Motion, Response, Result, Scene, Step,
@@ -46,6 +48,8 @@ pub struct FmuSubsystem {
     warned: Cell<bool>,
     references: RefCell<Vec<u32>>,
     bodies: Bodies,
+    /// Arrays by reference that are being set element by element before the initialisation.
+    starts: BTreeMap<u32, Vec<f64>>,
     feeds_through: bool,
     partings: Partings,
 }
@@ -87,6 +91,7 @@ impl FmuSubsystem {
             warned: Cell::new(false),
             references: RefCell::default(),
             bodies: Bodies::default(),
+            starts: BTreeMap::new(),
             feeds_through: feeds_through(fmu.description()),
             partings: Partings::default(),
             host,
@@ -150,6 +155,20 @@ impl FmuSubsystem {
             ValueType::U64 => self.set(&id, Values::U64(&[value.as_u64().ok_or_else(wrong)?])),
             ValueType::Binary | ValueType::Clock => Err(wrong()),
         }
+    }
+
+    /// Sets an element of an array whose other elements have their start values: nothing can be read yet.
+    fn start_element(&mut self, id: u32, value: f64) -> Result {
+        let place = *self.place(id)?;
+        let whole = self.starts.entry(place.reference).or_insert_with(|| {
+            let given = match &self.slave.fmu().description().variables[place.variable].start {
+                Start::Numbers(given) => given.clone(),
+                _ => Vec::new(),
+            };
+            (0..place.count).map(|k| given.get(k).or(given.first()).copied().unwrap_or(0.0)).collect()
+        });
+        whole[place.element] = value;
+        self.slave.set_f64(&[place.reference], whole).map_err(error)
     }
 
     fn place(&self, id: u32) -> Result<&Place> {
@@ -456,6 +475,9 @@ impl Subsystem for FmuSubsystem {
             }};
         }
         match values {
+            Values::F64(v) if self.slave.is_instantiated() => {
+                ids.iter().zip(v).try_for_each(|(id, value)| self.start_element(*id, *value))
+            }
             Values::F64(v) => elements!(F64, v, 0.0),
             Values::F32(v) => elements!(F32, v, 0.0),
             Values::I8(v) => elements!(I8, v, 0),

@@ -216,6 +216,11 @@ impl Slave {
         self.health.get() == Health::Good
     }
 
+    /// Whether the initialisation has not begun: values can be set, not read.
+    pub fn is_instantiated(&self) -> bool {
+        self.phase == Phase::Instantiated
+    }
+
     /// Whether it is in initialisation mode.
     pub fn is_initializing(&self) -> bool {
         self.phase == Phase::Initializing

@@ -22,7 +22,7 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
         units::build(folder, name, &variables, "", STEP)?;
     }
     let glued = |form: &str| {
-        worst(folder, &format!("[gluing]\nstrategy = \"iterative\"\nform = \"{form}\"\ntolerance = 1e-13\n"))
+        worst(folder, &format!("[gluing]\nstrategy = \"iterative\"\nform = \"{form}\"\ntolerance = 1e-8\n"))
     };
     let what = "two oscillators as units, glued T-T, against one oscillator: largest difference of x over its largest value";
     Ok(vec![Figure::new("fmi.pair.tt", glued("tt")?, Limit::AtMost(1e-10), what)])

@@ -127,7 +127,11 @@ impl Outline {
     fn node(&self, shape: &Placed, cell: &Cell, reach: f64) -> Option<(f64, [f64; 3])> {
         let hit = shape.lower(cell.at[0], cell.at[1]);
         let (point, sampled) = match (hit, self) {
+            (_, Self::Disc(centre, radius)) if at_rim(shape, cell, *centre, *radius) => {
+                (below_rim(shape, cell, *centre, *radius), None)
+            }
             (Some(lower), _) => ([cell.at[0], cell.at[1], lower], None),
+            // A node on the edge itself, by rounding.
             (None, Self::Disc(centre, radius)) => (below_rim(shape, cell, *centre, *radius), None),
             (None, Self::Polygon(corners, count)) => {
                 let [x, y] = nearest_on(&corners[..*count], cell.at);
@@ -165,20 +169,30 @@ impl Outline {
     }
 }
 
-/// Part of a radius by which a rim lies below the widest circle: the underside still looks down there.
-const BELOW_WIDEST: f64 = 1e-9;
+/// Part of the radius that a round underside's rim is drawn in: closer to its widest circle the underside is a wall, and
+/// its height at a node no statement about the soil there. What a stiff soil would feel of a rounding error of the
+/// position is bounded by it (the slope at this rim is 32).
+const RIM: f64 = 5e-4;
 
-/// Underside at the point of a disc's rim nearest to a node outside it, read off the shape: the square root in
-/// [`Placed::lower`] turns a rounding error of the position into picometres there, which a stiff soil feels.
+/// Underside at the rim of a disc on the ray to a node, as far below the shape's origin at every node.
 fn below_rim(shape: &Placed, cell: &Cell, centre: [f64; 2], radius: f64) -> [f64; 3] {
     let (dx, dy) = (cell.at[0] - centre[0], cell.at[1] - centre[1]);
-    let s = radius / (dx * dx + dy * dy).sqrt();
-    let below = match shape.geometry() {
-        Geometry::Cylinder { half_length, .. } => *half_length,
-        Geometry::Capsule { half_length, .. } => half_length + BELOW_WIDEST * radius,
-        _ => BELOW_WIDEST * radius,
+    let round = radius * (RIM * (2.0 - RIM)).sqrt();
+    let (inwards, below) = match shape.geometry() {
+        Geometry::Cylinder { half_length, .. } => (1.0, *half_length),
+        Geometry::Capsule { half_length, .. } => (1.0 - RIM, half_length + round),
+        _ => (1.0 - RIM, round),
     };
+    let s = inwards * radius / (dx * dx + dy * dy).sqrt();
     [centre[0] + s * dx, centre[1] + s * dy, shape.pose().position[2] - below]
+}
+
+/// Whether a node lies so near the widest circle of a round underside, or outside it, that the rim stands for it.
+fn at_rim(shape: &Placed, cell: &Cell, centre: [f64; 2], radius: f64) -> bool {
+    let (dx, dy) = (cell.at[0] - centre[0], cell.at[1] - centre[1]);
+    let flat = matches!(shape.geometry(), Geometry::Cylinder { .. });
+    let rim = if flat { radius } else { (1.0 - RIM) * radius };
+    dx * dx + dy * dy > rim * rim
 }
 
 /// The point of a polygon's edge nearest to p, drawn a little towards the middle.

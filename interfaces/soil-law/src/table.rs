@@ -56,7 +56,7 @@ pub struct SoilRow {
     pub values: [Option<f64>; COLUMNS.len()],
     /// Where the numbers come from.
     pub source: String,
-    /// How far they can be trusted.
+    /// How far they can be trusted; empty where the table does not say.
     pub confidence: String,
     /// Why the row cannot be used as it stands.
     pub refused: Option<String>,
@@ -119,7 +119,8 @@ struct Columns {
     name: usize,
     numbers: [usize; COLUMNS.len()],
     source: usize,
-    confidence: usize,
+    /// A table without grades is a table all the same.
+    confidence: Option<usize>,
     refused: usize,
 }
 
@@ -135,8 +136,8 @@ impl Columns {
         for (place, name) in numbers.iter_mut().zip(COLUMNS) {
             *place = at(name)?;
         }
-        let [name, source, confidence, refused] =
-            [at("name")?, at("source")?, at("confidence")?, at("refused")?];
+        let [name, source, refused] = [at("name")?, at("source")?, at("refused")?];
+        let confidence = header.iter().position(|h| *h == "confidence");
         Ok(Self { name, numbers, source, confidence, refused })
     }
 
@@ -153,7 +154,8 @@ impl Columns {
         }
         let refused = Some(cells[self.refused].to_string()).filter(|r| !r.is_empty());
         let text = |place: usize| cells[place].to_owned();
-        let [name, source, confidence] = [text(self.name), text(self.source), text(self.confidence)];
+        let [name, source] = [text(self.name), text(self.source)];
+        let confidence = self.confidence.map(text).unwrap_or_default();
         Ok(SoilRow { name, values, source, confidence, refused })
     }
 }

@@ -1,0 +1,58 @@
+//! The process of the host is the same before and after: loading and every call leave it alone.
+
+use crate::check_module::catalogue::{Area, Level, Test};
+use crate::check_module::finding::{Stop, Verdict};
+use crate::check_module::lab::Lab;
+use crate::check_module::rig::script;
+use crate::host::Process;
+
+const fn test(name: &'static str, promise: &'static str, run: fn(&Lab) -> Verdict) -> Test {
+    let after = &["steps"];
+    Test { name, area: Area::Library, level: Level::Quick, kinds: &[], after, promise, run }
+}
+
+/// The tests of this area.
+pub fn tests() -> Vec<Test> {
+    vec![
+        test("host-floating-point", "rounding, denormal numbers and traps stay as they were", floating_point),
+        test("host-signals", "no signal handler is set", |lab| untouched(lab, "signal handlers", |p| p.signals.clone())),
+        test("host-locale", "the locale stays", |lab| untouched(lab, "the locale", |p| p.locale.clone())),
+        test("host-directory", "the working directory stays", |lab| untouched(lab, "the working directory", |p| p.directory.clone())),
+        test("host-environment", "environment variables and umask stay", |lab| untouched(lab, "the environment", |p| p.environment.clone())),
+        test("host-threads", "no thread is left behind", |lab| untouched(lab, "threads", |p| p.threads.clone())),
+        test("host-files", "no file is left open", |lab| untouched(lab, "open files", |p| p.files.clone())),
+        test("host-output", "nothing is printed: lines go through the host's log", output),
+    ]
+}
+
+fn untouched(lab: &Lab, what: &str, look: fn(&Process) -> String) -> Verdict {
+    let before = look(&Process::now());
+    let module = lab.module()?;
+    let mut then = |call: &str| {
+        let now = look(&Process::now());
+        if now == before {
+            return Ok(());
+        }
+        let got = format!("{what} changed from {before} to {now}");
+        Err(Stop::fail(call, "the process of the host", got, "no change"))
+    };
+    then("loading")?;
+    let instance = lab.instance_on(&module, crate::check_module::rig::Flat::LEVEL)?;
+    then("instantiate")?;
+    let (_, instance) = script(instance, 60, 0)?;
+    then("a run of 60 steps")?;
+    drop(instance);
+    then("free")
+}
+
+/// On this thread, in which the library is loaded and called.
+fn floating_point(lab: &Lab) -> Verdict {
+    untouched(lab, "the floating-point mode", |p| p.floating_point.clone())
+}
+
+/// What was printed is seen by the process that watches this one.
+fn output(lab: &Lab) -> Verdict {
+    let (_, instance) = script(lab.instance()?, 60, 0)?;
+    drop(instance);
+    Ok(())
+}

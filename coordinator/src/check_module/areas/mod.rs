@@ -1,0 +1,26 @@
+//! The tests, one file per area.
+
+mod host_untouched;
+mod library;
+mod life_cycle;
+mod numbers;
+mod physics_controller;
+mod physics_robot;
+mod physics_soil;
+mod state;
+mod values;
+
+use super::catalogue::Test;
+
+/// The lists of all areas, in the order in which they build on each other.
+pub const ALL: [fn() -> Vec<Test>; 9] = [
+    library::tests,
+    life_cycle::tests,
+    host_untouched::tests,
+    values::tests,
+    state::tests,
+    numbers::tests,
+    physics_soil::tests,
+    physics_robot::tests,
+    physics_controller::tests,
+];

@@ -1,0 +1,181 @@
+//! What a test works with.
+
+use super::check_file::CheckFile;
+use super::finding::{Stop, Verdict};
+use super::rig::Flat;
+use super::{Level, catalogue::Area};
+use crate::host::{HostServices, Instance, LoadError, LoadedModule};
+use crate::terrain::SplitMix64;
+use serde_json::{Map, Value};
+use std::path::PathBuf;
+use std::sync::Arc;
+use terraglue_subsystem::{Config, Kind, Parameter, ParameterType, Schema};
+
+/// Numbers of a loose lunar soil (Apollo, nominal), for parameters without a default that carry these names.
+const SOIL: [(&str, f64); 8] = [
+    ("n", 1.0),
+    ("k_c", 1400.0),
+    ("k_phi", 820e3),
+    ("c_pa", 170.0),
+    ("phi_rad", 0.6109),
+    ("K_m", 0.018),
+    ("density_kg_m3", 1500.0),
+    ("cohesion_pa", 170.0),
+];
+
+/// The module under test, its parameters, and how hard to try.
+pub struct Lab {
+    /// The file.
+    pub path: PathBuf,
+    /// How hard to try.
+    pub level: Level,
+    /// Seed of everything random.
+    pub seed: u64,
+    /// Parameters given by the user, by dotted name.
+    pub sets: Vec<(String, Value)>,
+    /// Folder of relative paths in parameters.
+    pub folder: PathBuf,
+}
+
+impl Lab {
+    /// For a module file; the file beside it gives parameters, `sets` (as `--set`) come after them.
+    ///
+    /// # Errors
+    /// The file beside the module is wrong.
+    pub fn new(path: PathBuf, level: Level, seed: u64, sets: &[(String, String)]) -> Result<Self, String> {
+        let beside = CheckFile::beside(&path)?;
+        let typed = |text: &String| serde_json::from_str(text).unwrap_or_else(|_| Value::from(text.as_str()));
+        let mut all = beside.parameters;
+        all.extend(sets.iter().map(|(key, text)| (key.clone(), typed(text))));
+        let folder = beside.folder.unwrap_or_else(|| ".".into());
+        Ok(Self { path, level, seed, sets: all, folder })
+    }
+
+    /// Randomness of one test: of its name and of the seed.
+    pub fn random(&self, test: &str) -> SplitMix64 {
+        SplitMix64::new(crate::host::instance_seed(self.seed, test))
+    }
+
+    /// Few, some or many.
+    pub fn count(&self, quick: usize) -> usize {
+        quick * [1, 2, 20][self.level as usize]
+    }
+
+    /// The module.
+    ///
+    /// # Errors
+    /// A finding: it cannot be loaded.
+    pub fn module(&self) -> Verdict<LoadedModule> {
+        LoadedModule::load(&self.path).map_err(|e| not_usable("loading", &e))
+    }
+
+    /// Services as the coordinator gives them: earth's gravity, level ground of a metre, eight slots.
+    pub fn services(&self) -> HostServices {
+        self.services_on(Flat::LEVEL)
+    }
+
+    /// The same on other ground.
+    pub fn services_on(&self, ground: Flat) -> HostServices {
+        let mut services = HostServices::new(self.seed, &self.folder);
+        services.gravity = [0.0, 0.0, -9.81];
+        services.terrain = Some(Arc::new(ground));
+        services.log = Some(Arc::new(|_, _, _| {}));
+        services
+    }
+
+    /// Parameters: those given, those of a usual soil, else the middle of the range.
+    pub fn config(&self, schema: &Schema) -> Config {
+        let mut map = Map::new();
+        for p in schema.parameters.iter().filter(|p| p.default.is_null() && !p.name.ends_with('*')) {
+            let soil = SOIL.iter().find(|(name, _)| *name == p.name).map(|(_, x)| Value::from(*x));
+            let value = soil.or_else(|| (!p.optional).then(|| middle(p)).flatten());
+            if let Some(value) = value {
+                insert(&mut map, &p.name, value);
+            }
+        }
+        for (name, value) in &self.sets {
+            insert(&mut map, name, value.clone());
+        }
+        Config::parse(&Value::Object(map).to_string()).unwrap_or_default()
+    }
+
+    /// An instance as the coordinator would make it.
+    ///
+    /// # Errors
+    /// A finding: it cannot be made.
+    pub fn instance(&self) -> Verdict<Instance> {
+        self.instance_on(&self.module()?, Flat::LEVEL)
+    }
+
+    /// The same of a module that is loaded already, on other ground.
+    ///
+    /// # Errors
+    /// As [`Lab::instance`].
+    pub fn instance_on(&self, module: &LoadedModule, ground: Flat) -> Verdict<Instance> {
+        let config = self.config(module.schema());
+        let made = module.instantiate("checked", config, &self.services_on(ground));
+        made.map_err(|e| not_usable("instantiate", &e))
+    }
+
+    /// Whether the module needs a path that nobody gave; then hardly anything can be tried.
+    pub fn missing_path(&self, schema: &Schema) -> Option<String> {
+        let given = |name: &str| self.sets.iter().any(|(key, _)| key == name);
+        let needed = |p: &&Parameter| {
+            p.parameter_type == ParameterType::Path && p.default.is_null() && !p.optional && !given(&p.name)
+        };
+        schema.parameters.iter().find(needed).map(|p| p.name.clone())
+    }
+
+    /// Kind of the module, from its description of itself; None: it cannot be loaded.
+    pub fn kind(&self) -> Option<Kind> {
+        LoadedModule::load(&self.path).ok().map(|m| m.schema().kind)
+    }
+}
+
+impl Area {
+    /// All, in the order in which they are shown.
+    pub const ALL: [Self; 7] = [
+        Self::Library,
+        Self::LifeCycle,
+        Self::Values,
+        Self::State,
+        Self::Numbers,
+        Self::Physics,
+        Self::Resources,
+    ];
+}
+
+fn not_usable(call: &str, error: &LoadError) -> Stop {
+    Stop::fail(call, "parameters of the check", error.to_string(), "success")
+}
+
+/// A value inside the range of a parameter.
+fn middle(p: &Parameter) -> Option<Value> {
+    let number = match (p.min, p.max) {
+        (Some(a), Some(b)) => 0.5 * (a + b),
+        (Some(a), None) => a + 1.0,
+        (None, Some(b)) => b - 1.0,
+        (None, None) => 1.0,
+    };
+    match p.parameter_type {
+        ParameterType::Number => Some(number.into()),
+        ParameterType::Integer => Some((number.round() as i64).into()),
+        ParameterType::Bool => Some(false.into()),
+        ParameterType::Text => Some(p.choices.first().map_or("", String::as_str).into()),
+        ParameterType::Numbers => Some(Value::Array(Vec::new())),
+        ParameterType::NumberTable => Some(Value::Object(Map::new())),
+        ParameterType::Path => None,
+    }
+}
+
+fn insert(map: &mut Map<String, Value>, name: &str, value: Value) {
+    match name.split_once('.') {
+        None => drop(map.insert(name.into(), value)),
+        Some((head, rest)) => {
+            let below = map.entry(head).or_insert_with(|| Value::Object(Map::new()));
+            if let Value::Object(below) = below {
+                insert(below, rest, value);
+            }
+        }
+    }
+}

@@ -1,0 +1,70 @@
+//! `terraglue check-module`: says what is wrong with a module before a robot falls over.
+//!
+//! Named tests over what a module promises in `terraglue.h`, from symbols to physics. [`check`] runs each in a process of
+//! its own with a time limit, so that a crash or an endless loop is a finding like any other; [`run_here`] runs one in
+//! this process, which is what those processes do and what a debugger needs. A test names the tests that it builds
+//! on: when one of those fails it is blocked, so that one mistake is one finding.
+//!
+//! * [`catalogue`]: all tests, by area.
+//! * [`Lab`]: what a test works with: the module, its parameters, a source of randomness.
+//! * `rig`: steps a soil below moving feet, a robot, a controller, without the rest of the coordinator.
+
+mod areas;
+mod catalogue;
+mod check_file;
+mod finding;
+mod lab;
+mod report;
+mod rig;
+mod supervisor;
+
+pub use catalogue::{Area, Level, Test, catalogue};
+pub use finding::{Finding, Outcome, Stop, Verdict};
+pub use lab::Lab;
+pub use report::{Report, Row};
+pub use supervisor::{Options, check};
+
+use std::path::Path;
+
+/// Runs one test in this process.
+///
+/// # Errors
+/// There is no test of this name; the nearest one is named.
+pub fn run_here(name: &str, lab: &Lab) -> Result<Outcome, String> {
+    let tests = catalogue();
+    match tests.iter().find(|t| t.name == name) {
+        Some(test) => Ok(Outcome::of((test.run)(lab))),
+        None => Err(unknown(name, tests)),
+    }
+}
+
+fn unknown(name: &str, tests: &[Test]) -> String {
+    let likeness = |t: &&Test| (strsim::jaro_winkler(t.name, name) * 1e6) as u64;
+    let near = tests.iter().max_by_key(likeness).map_or("", |t| t.name);
+    format!("there is no test `{name}`; the nearest is `{near}`")
+}
+
+/// The module file that a path means: the file itself, or the only module in a folder.
+///
+/// # Errors
+/// No file there, or not exactly one module.
+pub fn module_file(path: &Path) -> Result<std::path::PathBuf, String> {
+    if !path.is_dir() {
+        return match path.is_file() {
+            true => Ok(path.to_owned()),
+            false => Err(format!("there is no module file {}", path.display())),
+        };
+    }
+    let is_module = |p: &Path| {
+        let name = p.file_name().and_then(|n| n.to_str()).unwrap_or_default();
+        name.starts_with(std::env::consts::DLL_PREFIX)
+            && name.ends_with(&format!("_plugin{}", std::env::consts::DLL_SUFFIX))
+    };
+    let entries = std::fs::read_dir(path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let mut found: Vec<_> = entries.flatten().map(|e| e.path()).filter(|p| is_module(p)).collect();
+    match (found.pop(), found.is_empty()) {
+        (Some(one), true) => Ok(one),
+        (Some(_), false) => Err(format!("{} holds several modules; name one", path.display())),
+        (None, _) => Err(format!("{} holds no module (lib…_plugin{})", path.display(), std::env::consts::DLL_SUFFIX)),
+    }
+}

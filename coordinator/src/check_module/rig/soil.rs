@@ -1,0 +1,311 @@
+//! A soil below feet that move as they are told.
+
+use super::{Flat, Vectors};
+use crate::check_module::finding::Verdict;
+use crate::check_module::lab::Lab;
+use crate::contact::{BodySide, ContactDetector, GroundSide, Now};
+use crate::host::{Instance, LoadedModule, Progress};
+use terraglue_subsystem::{
+    BodyState, Geometry, Hold, Input, Law, Level, Motion, Node, Port, Pose, Scene, SceneBody, SceneShape, Step,
+    Subsystem, Terrain,
+};
+
+/// A foot: its shape and where its centre is at the start, m.
+#[derive(Clone, Debug)]
+pub struct Foot {
+    /// Shape around the centre.
+    pub geometry: Geometry,
+    /// Centre in the world, m.
+    pub centre: [f64; 3],
+}
+
+impl Foot {
+    /// A sphere of 4 cm radius that touches level ground at (x, y).
+    pub fn sphere(x: f64, y: f64) -> Self {
+        Self { geometry: Geometry::Sphere { radius: 0.04 }, centre: [x, y, 0.04] }
+    }
+
+    /// A plate of 10 cm by 6 cm that lies on level ground at (x, y).
+    pub fn plate(x: f64, y: f64) -> Self {
+        Self { geometry: Geometry::Box { half_extents: [0.05, 0.03, 0.01] }, centre: [x, y, 0.01] }
+    }
+
+    /// The same, higher by h (m).
+    pub fn lifted(mut self, h: f64) -> Self {
+        self.centre[2] += h;
+        self
+    }
+}
+
+/// What a foot met in a step.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Moved {
+    /// Force of the soil on the foot, world, N.
+    pub force: [f64; 3],
+    /// Moment of the soil on the foot about its centre, world, N m.
+    pub moment: [f64; 3],
+    /// Force along the normal of the port, N.
+    pub normal: f64,
+    /// Force across it, N.
+    pub tangential: f64,
+    /// Coulomb coefficient that the soil declared.
+    pub mu: f64,
+    /// Whether there was a port at all.
+    pub touched: bool,
+}
+
+/// The bench.
+pub struct SoilBench {
+    /// The soil.
+    pub soil: Instance,
+    detector: ContactDetector,
+    /// Centres of the feet now.
+    pub states: Vec<BodyState>,
+    /// Ports of the last step, as the soil sees them.
+    pub ports: Vec<Port>,
+    /// Nodes of the last step.
+    pub nodes: Vec<Node>,
+    laws: Vec<Law>,
+    n: usize,
+    epoch: u32,
+    /// Time, s.
+    pub t: f64,
+    /// Accepted steps.
+    pub index: u64,
+    /// Answer of the soil to `set_ports`.
+    pub now: Vectors,
+    /// Answer of the last trial.
+    pub out: Vectors,
+    x: Vec<f64>,
+    v: Vec<f64>,
+    /// Answers per foot in the last step.
+    pub moved: Vec<Moved>,
+}
+
+impl SoilBench {
+    /// A new instance on level ground.
+    ///
+    /// # Errors
+    /// A finding: the soil cannot be made.
+    pub fn new(lab: &Lab, feet: &[Foot]) -> Verdict<Self> {
+        Self::on(lab, &lab.module()?, Flat::LEVEL, feet)
+    }
+
+    /// The same of a module that is loaded already, on other ground.
+    ///
+    /// # Errors
+    /// As [`SoilBench::new`].
+    pub fn on(lab: &Lab, module: &LoadedModule, ground: Flat, feet: &[Foot]) -> Verdict<Self> {
+        Self::around(lab.instance_on(module, ground)?, &ground, feet)
+    }
+
+    /// Around a soil that exists.
+    ///
+    /// # Errors
+    /// It shows a ground that cannot be read.
+    pub fn around(soil: Instance, ground: &dyn Terrain, feet: &[Foot]) -> Verdict<Self> {
+        let scene = scene(feet);
+        let bodies = [BodySide { subsystem: 0, name: "feet", scene: &scene }];
+        let grounds = [GroundSide { subsystem: 1, instance: soil.subsystem() }];
+        let detector = ContactDetector::new(&bodies, &grounds, Some(ground))?;
+        let state = |f: &Foot| BodyState {
+            world_from_body: Pose { position: f.centre, ..Pose::IDENTITY },
+            ..BodyState::REST
+        };
+        Ok(Self {
+            soil,
+            detector,
+            states: feet.iter().map(state).collect(),
+            ports: Vec::new(),
+            nodes: Vec::new(),
+            laws: Vec::new(),
+            n: 0,
+            epoch: 0,
+            t: 0.0,
+            index: 0,
+            now: Vectors::default(),
+            out: Vectors::default(),
+            x: Vec::new(),
+            v: Vec::new(),
+            moved: vec![Moved::default(); feet.len()],
+        })
+    }
+
+    /// The step from here, for calls of one's own.
+    pub fn step_of(&self, h: f64) -> Step<'_> {
+        let (n, epoch) = (self.n as u32, self.epoch);
+        Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) }
+    }
+
+    /// Contacts of the feet that move with these velocities (m/s), and the soil's answer to `set_ports`.
+    ///
+    /// # Errors
+    /// The soil failed.
+    pub fn meet(&mut self, velocities: &[[f64; 3]], h: f64) -> Verdict {
+        for (state, v) in self.states.iter_mut().zip(velocities) {
+            state.linear_velocity = *v;
+        }
+        let now = Now { t: self.t, h, gravity: [0.0, 0.0, -9.81], margin: 1e-3 };
+        let (states, soil) = (&self.states, &self.soil);
+        let set = self.detector.detect(&now, |_| states, |_| soil.subsystem())?;
+        self.ports.clear();
+        self.ports.extend(set.ports.iter().map(|p| Port { side: -1, ..*p }));
+        self.nodes.clone_from(&set.nodes);
+        (self.n, self.epoch) = (set.n as usize, set.epoch);
+        self.ask_ports(h)
+    }
+
+    /// The soil's answer to `set_ports` with the ports as they are.
+    ///
+    /// # Errors
+    /// The soil failed.
+    pub fn ask_ports(&mut self, h: f64) -> Verdict {
+        self.laws.clear();
+        self.laws.resize(self.ports.len(), Law::UNILATERAL);
+        (self.now, self.out) = (Vectors::new(self.n), Vectors::new(self.n));
+        let (n, epoch) = (self.n as u32, self.epoch);
+        let step = Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
+        Ok(self.soil.set_ports(&step, &mut self.laws, &mut self.now.response())?)
+    }
+
+    /// Packed motion of the feet over h.
+    pub fn motion_of(&self, velocities: &[[f64; 3]], h: f64) -> (Vec<f64>, Vec<f64>) {
+        let (mut x, mut v) = (vec![0.0; self.n], vec![0.0; self.n]);
+        for port in &self.ports {
+            for (i, c) in port.components().filter(|(_, c)| *c < 3) {
+                v[i] = dot(port.direction(c), velocities[port.body as usize]);
+                x[i] = h * v[i];
+            }
+        }
+        (x, v)
+    }
+
+    /// A trial: the answer to a motion of the feet.
+    ///
+    /// # Errors
+    /// The soil failed.
+    pub fn try_motion(&mut self, x: &[f64], v: &[f64], h: f64) -> Verdict {
+        let (n, epoch) = (self.n as u32, self.epoch);
+        let step = Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
+        let progress = self.soil.advance(&step, &Input::Motion(Motion { x, v }), &mut self.out.response())?;
+        match progress {
+            Progress::Complete => Ok(()),
+            Progress::Early { reached_s } => Err(crate::check_module::Stop::fail(
+                "advance",
+                format!("motion over h = {h} s at t = {} s", self.t),
+                format!("it ended early at {reached_s} s"),
+                "a whole step of a foot that moves a fraction of a millimetre",
+            )),
+        }
+    }
+
+    /// A trial: the answer to a force with the motion of the feet.
+    ///
+    /// # Errors
+    /// The soil failed.
+    pub fn try_force(&mut self, t: &[f64], motion: Option<(&[f64], &[f64])>, h: f64) -> Verdict {
+        let (n, epoch) = (self.n as u32, self.epoch);
+        let step = Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
+        let motion = motion.map(|(x, v)| Motion { x, v });
+        let input = Input::Force { t, hold: Hold::End, motion };
+        self.soil.advance(&step, &input, &mut self.out.response())?;
+        Ok(())
+    }
+
+    /// The derivative after a trial, column-major.
+    ///
+    /// # Errors
+    /// The soil failed.
+    pub fn jacobian(&mut self, level: Level, h: f64) -> Verdict<Vec<f64>> {
+        let mut k = vec![0.0; self.n * self.n];
+        let (n, epoch) = (self.n as u32, self.epoch);
+        let step = Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
+        self.soil.interface_jacobian(&step, level, &mut k)?;
+        Ok(k)
+    }
+
+    /// Accepts the last trial with the feet at this motion, and moves them.
+    ///
+    /// # Errors
+    /// The soil failed.
+    pub fn commit(&mut self, velocities: &[[f64; 3]], h: f64) -> Verdict {
+        let (x, v) = self.motion_of(velocities, h);
+        let (n, epoch) = (self.n as u32, self.epoch);
+        let step = Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
+        self.soil.commit(&step, &self.out.t, &Motion { x: &x, v: &v })?;
+        self.note_moved();
+        for (state, v) in self.states.iter_mut().zip(velocities) {
+            (0..3).for_each(|k| state.world_from_body.position[k] += h * v[k]);
+        }
+        self.t += h;
+        self.index += 1;
+        (self.x, self.v) = (x, v);
+        Ok(())
+    }
+
+    fn note_moved(&mut self) {
+        self.moved.fill(Moved::default());
+        for (port, law) in self.ports.iter().zip(&self.laws) {
+            let (force, about_origin) = port.wrench_in_world(&self.out.t);
+            let centre = self.states[port.body as usize].world_from_body.position;
+            let arm: [f64; 3] = std::array::from_fn(|k| port.origin[k] - centre[k]);
+            let turned = cross(arm, force);
+            let normal = dot(port.direction(0), force);
+            let across: [f64; 3] = std::array::from_fn(|k| force[k] - normal * port.frame[k]);
+            self.moved[port.body as usize] = Moved {
+                force,
+                moment: std::array::from_fn(|k| about_origin[k] + turned[k]),
+                normal,
+                tangential: dot(across, across).sqrt(),
+                mu: law.mu,
+                touched: true,
+            };
+        }
+    }
+
+    /// A whole step with feet that move with these velocities (m/s).
+    ///
+    /// # Errors
+    /// The soil failed.
+    pub fn go(&mut self, velocities: &[[f64; 3]], h: f64) -> Verdict<&[Moved]> {
+        self.meet(velocities, h)?;
+        let (x, v) = self.motion_of(velocities, h);
+        self.try_motion(&x, &v, h)?;
+        self.commit(velocities, h)?;
+        Ok(&self.moved)
+    }
+
+    /// Steps of one millisecond that move the only foot by a displacement (m) in `steps` steps.
+    ///
+    /// # Errors
+    /// The soil failed.
+    pub fn drag(&mut self, displacement: [f64; 3], steps: usize) -> Verdict<Moved> {
+        let velocity = displacement.map(|d| d / (steps as f64 * 1e-3));
+        for _ in 0..steps {
+            self.go(&[velocity], 1e-3)?;
+        }
+        Ok(self.moved[0])
+    }
+}
+
+fn scene(feet: &[Foot]) -> Scene {
+    let body = |k: usize| SceneBody { name: format!("foot {k}"), mass: 1.0 };
+    let shape = |(k, foot): (usize, &Foot)| SceneShape {
+        id: k as u32,
+        body: k as u32,
+        name: format!("foot {k}"),
+        geometry: foot.geometry.clone(),
+        body_from_shape: Pose::IDENTITY,
+        collides: true,
+    };
+    Scene { bodies: (0..feet.len()).map(body).collect(), shapes: feet.iter().enumerate().map(shape).collect() }
+}
+
+/// Scalar product.
+pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
+    a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+}
+
+fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
+    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}

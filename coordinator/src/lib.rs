@@ -3,6 +3,7 @@
 //! [`Testbed`] is the entry: `build` a [`scenario::Scenario`], `step` it, look at it through an
 //! [`observer::Observer`]. Several live side by side in one process; there are no globals.
 
+pub mod check_module;
 pub mod contact;
 pub mod error;
 pub mod fmu;

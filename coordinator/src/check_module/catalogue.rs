@@ -92,7 +92,11 @@ mod tests {
         for test in catalogue() {
             assert!(!seen.contains(&test.name), "{} twice", test.name);
             for before in test.after {
-                assert!(seen.contains(before), "{} builds on {before}, which does not come before it", test.name);
+                assert!(
+                    seen.contains(before),
+                    "{} builds on {before}, which does not come before it",
+                    test.name
+                );
             }
             seen.push(test.name);
         }

@@ -41,18 +41,22 @@ impl CheckFile {
                 "parameters" => {
                     for (name, value) in table.iter() {
                         let value = value.as_value().and_then(json);
-                        let value = value.ok_or_else(|| wrong(format!("`{name}` has no value of a parameter")))?;
+                        let value =
+                            value.ok_or_else(|| wrong(format!("`{name}` has no value of a parameter")))?;
                         out.parameters.push((name.to_owned(), value));
                     }
                 }
                 "off" => {
                     for (name, value) in table.iter() {
                         let reason = value.as_str().filter(|r| !r.trim().is_empty());
-                        let reason = reason.ok_or_else(|| wrong(format!("`{name}` is off without a reason")))?;
+                        let reason =
+                            reason.ok_or_else(|| wrong(format!("`{name}` is off without a reason")))?;
                         out.off.push((name.to_owned(), reason.to_owned()));
                     }
                 }
-                other => return Err(wrong(format!("unknown table `{other}`; there are [parameters] and [off]"))),
+                other => {
+                    return Err(wrong(format!("unknown table `{other}`; there are [parameters] and [off]")));
+                }
             }
         }
         Ok(out)
@@ -66,9 +70,9 @@ fn json(value: &toml_edit::Value) -> Option<Value> {
         toml_edit::Value::Float(x) => Value::from(*x.value()),
         toml_edit::Value::Boolean(b) => Value::from(*b.value()),
         toml_edit::Value::Array(a) => Value::Array(a.iter().map(json).collect::<Option<_>>()?),
-        toml_edit::Value::InlineTable(t) => {
-            Value::Object(t.iter().map(|(k, v)| Some((k.to_owned(), json(v)?))).collect::<Option<Map<_, _>>>()?)
-        }
+        toml_edit::Value::InlineTable(t) => Value::Object(
+            t.iter().map(|(k, v)| Some((k.to_owned(), json(v)?))).collect::<Option<Map<_, _>>>()?,
+        ),
         toml_edit::Value::Datetime(_) => return None,
     })
 }
@@ -81,13 +85,15 @@ mod tests {
     fn parameters_and_reasons_are_read_and_mistakes_named() {
         let folder = tempfile::tempdir().expect("folder");
         let module = folder.path().join("libx_plugin.so");
-        let write = |text: &str| std::fs::write(folder.path().join("libx_plugin.check.toml"), text).expect("written");
+        let write =
+            |text: &str| std::fs::write(folder.path().join("libx_plugin.check.toml"), text).expect("written");
         assert!(CheckFile::beside(&module).expect("none").off.is_empty());
         write("[parameters]\nn = 1.5\ncells = [1, 2]\n[off]\nrotation = \"hexagonal cells\"\n");
         let read = CheckFile::beside(&module).expect("good");
         assert_eq!(read.off, [("rotation".to_owned(), "hexagonal cells".to_owned())]);
         assert_eq!(read.parameters[1].1, serde_json::json!([1, 2]));
-        for (text, why) in [("[off]\nx = \"\"", "without a reason"), ("[of]\n", "unknown table"), ("x", "x")] {
+        for (text, why) in [("[off]\nx = \"\"", "without a reason"), ("[of]\n", "unknown table"), ("x", "x")]
+        {
             write(text);
             let told = CheckFile::beside(&module).expect_err(text);
             assert!(told.contains(why) && told.contains("libx_plugin.check.toml"), "{told}");

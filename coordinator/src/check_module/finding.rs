@@ -43,7 +43,12 @@ impl Stop {
         got: impl Into<String>,
         expected: impl Into<String>,
     ) -> Self {
-        Self::Fail(Finding { call: call.into(), given: given.into(), got: got.into(), expected: expected.into() })
+        Self::Fail(Finding {
+            call: call.into(),
+            given: given.into(),
+            got: got.into(),
+            expected: expected.into(),
+        })
     }
 }
 
@@ -59,7 +64,7 @@ impl From<crate::Error> for Stop {
 }
 
 /// How a test ended.
-#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "outcome", rename_all = "lowercase")]
 pub enum Outcome {
     /// Every promise was kept.

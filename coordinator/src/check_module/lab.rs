@@ -35,6 +35,8 @@ pub struct Lab {
     pub sets: Vec<(String, Value)>,
     /// Folder of relative paths in parameters.
     pub folder: PathBuf,
+    /// The program that can repeat a run in another process.
+    pub program: Option<PathBuf>,
 }
 
 impl Lab {
@@ -48,7 +50,7 @@ impl Lab {
         let mut all = beside.parameters;
         all.extend(sets.iter().map(|(key, text)| (key.clone(), typed(text))));
         let folder = beside.folder.unwrap_or_else(|| ".".into());
-        Ok(Self { path, level, seed, sets: all, folder })
+        Ok(Self { path, level, seed, sets: all, folder, program: None })
     }
 
     /// Randomness of one test: of its name and of the seed.
@@ -117,6 +119,30 @@ impl Lab {
         made.map_err(|e| not_usable("instantiate", &e))
     }
 
+    /// The same with other values for those of the named parameters that the module has.
+    ///
+    /// # Errors
+    /// As [`Lab::instance`].
+    pub fn instance_with(
+        &self,
+        module: &LoadedModule,
+        ground: Flat,
+        values: &[(&str, f64)],
+    ) -> Verdict<Instance> {
+        let has = |name: &str| module.schema().parameters.iter().any(|p| p.name == name);
+        let mut lab = Self {
+            sets: self.sets.clone(),
+            path: self.path.clone(),
+            folder: self.folder.clone(),
+            program: None,
+            ..*self
+        };
+        lab.sets.extend(
+            values.iter().filter(|(name, _)| has(name)).map(|(name, x)| ((*name).to_owned(), (*x).into())),
+        );
+        lab.instance_on(module, ground)
+    }
+
     /// Whether the module needs a path that nobody gave; then hardly anything can be tried.
     pub fn missing_path(&self, schema: &Schema) -> Option<String> {
         let given = |name: &str| self.sets.iter().any(|(key, _)| key == name);
@@ -164,7 +190,7 @@ fn middle(p: &Parameter) -> Option<Value> {
         ParameterType::Text => Some(p.choices.first().map_or("", String::as_str).into()),
         ParameterType::Numbers => Some(Value::Array(Vec::new())),
         ParameterType::NumberTable => Some(Value::Object(Map::new())),
-        ParameterType::Path => None,
+        ParameterType::Path | ParameterType::NumberByName | ParameterType::TextByName => None,
     }
 }
 

@@ -12,6 +12,8 @@
 mod areas;
 mod catalogue;
 mod check_file;
+mod derivative;
+mod elsewhere;
 mod finding;
 mod lab;
 mod report;
@@ -19,10 +21,11 @@ mod rig;
 mod supervisor;
 
 pub use catalogue::{Area, Level, Test, catalogue};
+pub use elsewhere::{Errand, run_errand};
 pub use finding::{Finding, Outcome, Stop, Verdict};
 pub use lab::Lab;
 pub use report::{Report, Row};
-pub use supervisor::{Options, check};
+pub use supervisor::{Options, Told, check};
 
 use std::path::Path;
 
@@ -65,6 +68,8 @@ pub fn module_file(path: &Path) -> Result<std::path::PathBuf, String> {
     match (found.pop(), found.is_empty()) {
         (Some(one), true) => Ok(one),
         (Some(_), false) => Err(format!("{} holds several modules; name one", path.display())),
-        (None, _) => Err(format!("{} holds no module (lib…_plugin{})", path.display(), std::env::consts::DLL_SUFFIX)),
+        (None, _) => {
+            Err(format!("{} holds no module (lib…_plugin{})", path.display(), std::env::consts::DLL_SUFFIX))
+        }
     }
 }

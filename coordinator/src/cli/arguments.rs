@@ -39,6 +39,8 @@ pub enum Command {
     },
     /// Check a scenario and everything that it refers to, without running it.
     Check(ScenarioArguments),
+    /// Put a module to the test: named tests of what it promises, each in a process of its own.
+    CheckModule(CheckModuleArguments),
     /// List the modules that are found, with their parameters.
     Modules {
         /// Search this folder first; may be repeated.
@@ -147,6 +149,53 @@ Examples:
 
 A module is exported inside a small scenario: [time], [world], and [robot], [unit] or, for a soil, [soil] with
 [terrain], [gluing] and [foot] (count, shape, radius_m, half_extents_m, …). --set changes any key of it.";
+
+/// What `check-module` takes.
+#[derive(Args, Debug, Clone)]
+pub struct CheckModuleArguments {
+    /// File of the module (lib…_plugin.so), or a folder that holds one.
+    #[arg(required_unless_present = "list")]
+    pub path: Option<PathBuf>,
+    /// How much is tried: quick, standard or thorough.
+    #[arg(long, default_value = "standard", value_parser = super::check_module::level)]
+    pub level: terraglue::check_module::Level,
+    /// Run this test only. May be repeated.
+    #[arg(long, value_name = "NAME")]
+    pub only: Vec<String>,
+    /// Seed of everything random.
+    #[arg(long, default_value_t = 1)]
+    pub seed: u64,
+    /// A parameter of the module. May be repeated.
+    #[arg(long = "set", value_name = "NAME=VALUE", value_parser = parse_set)]
+    pub sets: Vec<(String, String)>,
+    /// Also write the results as JSON.
+    #[arg(long, value_name = "FILE")]
+    pub json: Option<PathBuf>,
+    /// Also write the results as JUnit's XML.
+    #[arg(long, value_name = "FILE")]
+    pub junit: Option<PathBuf>,
+    /// Processes at a time [default: one per core].
+    #[arg(long, value_name = "N")]
+    pub jobs: Option<usize>,
+    /// Time that a test may take, s.
+    #[arg(long, value_name = "S", default_value_t = 30.0)]
+    pub time_limit: f64,
+    /// Run in this process, for a debugger.
+    #[arg(long)]
+    pub in_process: bool,
+    /// List the tests.
+    #[arg(long)]
+    pub list: bool,
+    /// Where a test in this process writes its result.
+    #[arg(long, value_name = "FILE", hide = true)]
+    pub result: Option<PathBuf>,
+    /// A run whose bits are wanted: FROM,TO,VARIANT.
+    #[arg(long, hide = true)]
+    pub errand: Option<String>,
+    /// File with the state that an errand starts from.
+    #[arg(long, hide = true)]
+    pub state: Option<PathBuf>,
+}
 
 /// What `new` takes.
 #[derive(Args, Debug, Clone)]

@@ -5,6 +5,7 @@
 mod apart;
 mod arguments;
 mod check;
+mod check_module;
 mod compare;
 mod export;
 mod fit_soil;
@@ -63,6 +64,7 @@ pub fn main() -> ExitCode {
         Command::Compare(arguments) => compare::compare(&arguments),
         Command::Report { folder } => report::report(&folder),
         Command::Check(arguments) => check::check(&arguments),
+        Command::CheckModule(arguments) => check_module::check_module(&arguments),
         Command::Modules { module_path, json } => list::modules(&module_path, json),
         Command::Variables(arguments) => list::variables(&arguments),
         Command::Fmu(command) => fmu::fmu(&command),

@@ -49,7 +49,11 @@ impl Description {
     /// From the bytes of a library.
     pub(super) fn of(bytes: &[u8]) -> Option<Self> {
         let section = section(bytes, terraglue_plugin::SECTION)?;
-        let text = str::from_utf8(section.split(|b| *b == 0).next()?).ok()?;
+        Self::parse(str::from_utf8(section.split(|b| *b == 0).next()?).ok()?)
+    }
+
+    /// From its text.
+    pub fn parse(text: &str) -> Option<Self> {
         let mut lines = text.lines();
         if lines.next() != Some("terraglue module") {
             return None;
@@ -124,6 +128,49 @@ fn section<'a>(bytes: &'a [u8], name: &str) -> Option<&'a [u8]> {
         }
     }
     None
+}
+
+/// Names of the functions and data that a library offers to others; None: it has no table of them. Weak symbols are
+/// left out: compilers of C++ emit them for templates, and any definition will do.
+pub fn exported_symbols(bytes: &[u8]) -> Option<Vec<String>> {
+    const ENTRY: usize = 24;
+    const MADE_BY_THE_LINKER: [&str; 5] = ["_init", "_fini", "__bss_start", "_edata", "_end"];
+    let (table, names) = (section(bytes, ".dynsym")?, section(bytes, ".dynstr")?);
+    let mut out = Vec::new();
+    for symbol in table.chunks_exact(ENTRY) {
+        let (binding, visibility) = (symbol[4] >> 4, symbol[5] & 3);
+        let is_defined = number::<2>(symbol, 6)? != 0;
+        let is_global = binding == 1 && (visibility == 0 || visibility == 3);
+        if is_defined && is_global {
+            let name = names.get(number::<4>(symbol, 0)?..)?.split(|b| *b == 0).next()?;
+            out.push(String::from_utf8_lossy(name).into_owned());
+        }
+    }
+    out.retain(|name| !MADE_BY_THE_LINKER.contains(&name.as_str()));
+    Some(out)
+}
+
+/// Names of what a library takes from others, each with the place of the pointer to it, relative to where the library
+/// is loaded.
+pub(super) fn imported_slots(bytes: &[u8]) -> Option<Vec<(String, usize)>> {
+    const RELOCATION: usize = 24;
+    const SYMBOL: usize = 24;
+    // A pointer to a function by name: R_X86_64_64, GLOB_DAT, JUMP_SLOT; R_AARCH64_ABS64, GLOB_DAT, JUMP_SLOT.
+    const POINTERS: [usize; 6] = [1, 6, 7, 257, 1025, 1026];
+    let (table, names) = (section(bytes, ".dynsym")?, section(bytes, ".dynstr")?);
+    let mut out = Vec::new();
+    for relocations in [".rela.dyn", ".rela.plt"].into_iter().filter_map(|name| section(bytes, name)) {
+        for one in relocations.chunks_exact(RELOCATION) {
+            let (offset, kind, symbol) = (number::<8>(one, 0)?, number::<4>(one, 8)?, number::<4>(one, 12)?);
+            if symbol == 0 || !POINTERS.contains(&kind) {
+                continue;
+            }
+            let entry = table.get(symbol.checked_mul(SYMBOL)?..)?;
+            let name = names.get(number::<4>(entry, 0)?..)?.split(|b| *b == 0).next()?;
+            out.push((String::from_utf8_lossy(name).into_owned(), offset));
+        }
+    }
+    Some(out)
 }
 
 /// A little-endian number of N ≤ 8 bytes.

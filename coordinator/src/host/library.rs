@@ -51,6 +51,14 @@ impl LoadedModule {
         Ok(Self { schema: Arc::new(schema), origin: Origin::Foreign(Arc::new(module), path) })
     }
 
+    /// The foreign module; None: linked into the program.
+    pub(super) fn foreign(&self) -> Option<&ForeignModule> {
+        match &self.origin {
+            Origin::Builtin(_) => None,
+            Origin::Foreign(module, _) => Some(module),
+        }
+    }
+
     /// Name, kind and parameters.
     pub fn schema(&self) -> &Schema {
         &self.schema
@@ -158,7 +166,7 @@ fn inspect(path: &Path) -> std::result::Result<(), LoadError> {
 }
 
 /// Loads a library for good and finds its entry.
-fn entry(path: &Path) -> std::result::Result<TgEntry, LoadError> {
+pub(super) fn entry(path: &Path) -> std::result::Result<TgEntry, LoadError> {
     // A bare file name would be searched by the system, so the path is made absolute.
     let full = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
     // SAFETY: the user asked for this library in the scenario; its constructors run.

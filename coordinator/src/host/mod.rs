@@ -4,6 +4,7 @@
 //! [`SearchPath`]; [`LoadedModule::instantiate`] makes an [`Instance`], which checks every answer of the
 //! subsystem and gives every failure its name, function and time. Loaded libraries are never unloaded.
 
+mod allocations;
 mod check;
 mod elf;
 mod error;
@@ -11,17 +12,22 @@ pub mod exit_guard;
 mod instance;
 pub mod isolation;
 mod library;
+mod probe;
+mod process;
 mod search;
 mod services;
 #[cfg(test)]
 mod tests;
 mod workers;
 
-pub use elf::Description;
+pub use allocations::AllocationCounter;
+pub use elf::{Description, exported_symbols};
 pub use error::LoadError;
 pub use instance::{Instance, Progress, Reply};
 pub use isolation::Isolation;
 pub use library::{AvailableModule, Library, LoadedModule, available_modules};
+pub use probe::{TableFacts, probe_odd_calls, table_of};
+pub use process::{Process, adopt_locale, has_locale, heap_in_use};
 pub use search::SearchPath;
 pub use services::{HostServices, LogSink, Partings, instance_seed};
 pub use workers::Workers;

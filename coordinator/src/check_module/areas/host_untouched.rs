@@ -6,6 +6,9 @@ use crate::check_module::lab::Lab;
 use crate::check_module::rig::script;
 use crate::host::Process;
 
+/// The test whose output the watching process looks at.
+pub const OUTPUT: &str = "host-output";
+
 const fn test(name: &'static str, promise: &'static str, run: fn(&Lab) -> Verdict) -> Test {
     let after = &["steps"];
     Test { name, area: Area::Library, level: Level::Quick, kinds: &[], after, promise, run }
@@ -15,20 +18,28 @@ const fn test(name: &'static str, promise: &'static str, run: fn(&Lab) -> Verdic
 pub fn tests() -> Vec<Test> {
     vec![
         test("host-floating-point", "rounding, denormal numbers and traps stay as they were", floating_point),
-        test("host-signals", "no signal handler is set", |lab| untouched(lab, "signal handlers", |p| p.signals.clone())),
+        test("host-signals", "no signal handler is set", |lab| {
+            untouched(lab, "signal handlers", |p| p.signals.clone())
+        }),
         test("host-locale", "the locale stays", |lab| untouched(lab, "the locale", |p| p.locale.clone())),
-        test("host-directory", "the working directory stays", |lab| untouched(lab, "the working directory", |p| p.directory.clone())),
-        test("host-environment", "environment variables and umask stay", |lab| untouched(lab, "the environment", |p| p.environment.clone())),
-        test("host-threads", "no thread is left behind", |lab| untouched(lab, "threads", |p| p.threads.clone())),
+        test("host-directory", "the working directory stays", |lab| {
+            untouched(lab, "the working directory", |p| p.directory.clone())
+        }),
+        test("host-environment", "environment variables and umask stay", |lab| {
+            untouched(lab, "the environment", |p| p.environment.clone())
+        }),
+        test("host-threads", "no thread is left behind", |lab| {
+            untouched(lab, "threads", |p| p.threads.clone())
+        }),
         test("host-files", "no file is left open", |lab| untouched(lab, "open files", |p| p.files.clone())),
-        test("host-output", "nothing is printed: lines go through the host's log", output),
+        test(OUTPUT, "nothing is printed: lines go through the host's log", output),
     ]
 }
 
 fn untouched(lab: &Lab, what: &str, look: fn(&Process) -> String) -> Verdict {
     let before = look(&Process::now());
     let module = lab.module()?;
-    let mut then = |call: &str| {
+    let then = |call: &str| {
         let now = look(&Process::now());
         if now == before {
             return Ok(());

@@ -22,7 +22,12 @@ pub fn tests() -> Vec<Test> {
         test("loads", &[], "the library loads with every symbol resolved, and its table can be used", loads),
         test("exports", &["loads"], "it exports the entry symbol only", exports),
         test("handshake", &["loads"], "the table states its size and versions truly", handshake),
-        test("description", &["loads"], "its section describes it, and the table shows the same text", description),
+        test(
+            "description",
+            &["loads"],
+            "its section describes it, and the table shows the same text",
+            description,
+        ),
         test("schema", &["loads"], "names, units, ranges and defaults of its parameters agree", schema),
         test("schema-again", &["schema"], "it describes itself the same way every time", schema_again),
     ]
@@ -59,7 +64,8 @@ fn exports(lab: &Lab) -> Verdict {
 }
 
 fn handshake(lab: &Lab) -> Verdict {
-    let table = table_of(&lab.path).map_err(|e| Stop::fail("terraglue_subsystem", "no arguments", e.to_string(), "a table"))?;
+    let table = table_of(&lab.path)
+        .map_err(|e| Stop::fail("terraglue_subsystem", "no arguments", e.to_string(), "a table"))?;
     let whole = size_of::<TgSubsystem>() as u32;
     let given = "the table";
     if table.abi_minor > TG_ABI_MINOR {
@@ -70,7 +76,12 @@ fn handshake(lab: &Lab) -> Verdict {
     }
     if table.abi_minor == TG_ABI_MINOR && table.size != whole {
         let expected = format!("{whole} bytes: `.size = sizeof table`");
-        return Err(Stop::fail("terraglue_subsystem", given, format!("a size of {} bytes", table.size), expected));
+        return Err(Stop::fail(
+            "terraglue_subsystem",
+            given,
+            format!("a size of {} bytes", table.size),
+            expected,
+        ));
     }
     if !table.id_is_set {
         return Err(Stop::fail("terraglue_subsystem", given, "`id` is null", "the name of the module"));
@@ -93,12 +104,18 @@ fn description(lab: &Lab) -> Verdict {
         let got = format!("the section names `{}`, the schema `{own}`", section.name);
         return Err(Stop::fail("schema", "the section .terraglue", got, "the same name in both"));
     }
-    let table = table_of(&lab.path).map_err(|e| Stop::fail("terraglue_subsystem", "", e.to_string(), "a table"))?;
+    let table =
+        table_of(&lab.path).map_err(|e| Stop::fail("terraglue_subsystem", "", e.to_string(), "a table"))?;
     match table.description {
         Some(text) if Description::parse(&text).as_ref() == Some(&section) => Ok(()),
         Some(_) => {
             let got = "the text of the table is not that of the section";
-            Err(Stop::fail("terraglue_subsystem", "`description`", got, "the same text before and after loading"))
+            Err(Stop::fail(
+                "terraglue_subsystem",
+                "`description`",
+                got,
+                "the same text before and after loading",
+            ))
         }
         None => {
             let got = "`description` is null";
@@ -126,7 +143,11 @@ fn schema(lab: &Lab) -> Verdict {
             return wrong(p, "its help is empty".into(), "one line for people");
         }
         if let Err(e) = Unit::parse(&p.unit) {
-            return wrong(p, format!("its unit `{}`: {e}", p.unit), "SI symbols separated by spaces, e.g. \"N m\"");
+            return wrong(
+                p,
+                format!("its unit `{}`: {e}", p.unit),
+                "SI symbols separated by spaces, e.g. \"N m\"",
+            );
         }
         if let (Some(min), Some(max)) = (p.min, p.max)
             && min > max
@@ -149,6 +170,8 @@ fn default_fits(p: &Parameter) -> Verdict {
             ParameterType::Text | ParameterType::Path => d.is_string(),
             ParameterType::Numbers => d.is_array(),
             ParameterType::NumberTable => d.is_object(),
+            ParameterType::NumberByName => d.is_number() || d.is_object(),
+            ParameterType::TextByName => d.is_string() || d.is_object(),
         };
     let fail = |expected: String| {
         Err(Stop::fail("schema", format!("parameter `{}`", p.name), format!("its default is {d}"), expected))

@@ -23,16 +23,58 @@ pub fn tests() -> Vec<Test> {
     use Level::{Quick, Standard};
     const SOIL: &[Kind] = &[Kind::Soil];
     vec![
-        test("instantiates", Quick, &[], &["loads"], "an instance can be made from usual parameters", instantiates),
-        test("steps", Quick, &[], &["instantiates"], "a run of a tenth of a second answers every call", steps),
+        test(
+            "instantiates",
+            Quick,
+            &[],
+            &["loads"],
+            "an instance can be made from usual parameters",
+            instantiates,
+        ),
+        test(
+            "steps",
+            Quick,
+            &[],
+            &["instantiates"],
+            "a run of a tenth of a second answers every call",
+            steps,
+        ),
         test("many-instances", Standard, &[], &["steps"], "a thousand instances can be made and ended", many),
         test("two-instances", Quick, &[], &["steps"], "two instances do not feel each other", two),
-        test("new-is-fresh", Quick, &[], &["steps"], "an instance made after others have run starts afresh", fresh),
-        test("odd-calls", Quick, &[], &["steps"], "null and wrong arguments are answered by a status", odd_calls),
-        test("wrong-config", Quick, &[], &["instantiates"], "parameters that make no sense are refused with a text", wrong_config),
+        test(
+            "new-is-fresh",
+            Quick,
+            &[],
+            &["steps"],
+            "an instance made after others have run starts afresh",
+            fresh,
+        ),
+        test(
+            "odd-calls",
+            Quick,
+            &[],
+            &["steps"],
+            "null and wrong arguments are answered by a status",
+            odd_calls,
+        ),
+        test(
+            "wrong-config",
+            Quick,
+            &[],
+            &["instantiates"],
+            "parameters that make no sense are refused with a text",
+            wrong_config,
+        ),
         test("no-contact", Quick, SOIL, &["steps"], "a step without any port works", no_contact),
         test("come-and-go", Quick, SOIL, &["steps"], "feet may come, go and return", come_and_go),
-        test("thousand-feet", Standard, SOIL, &["steps"], "a thousand feet are carried, or refused by a status", thousand),
+        test(
+            "thousand-feet",
+            Standard,
+            SOIL,
+            &["steps"],
+            "a thousand feet are carried, or refused by a status",
+            thousand,
+        ),
     ]
 }
 
@@ -75,7 +117,8 @@ fn fresh(lab: &Lab) -> Verdict {
 /// Whether two runs gave the same bits.
 pub fn same(given: &str, a: &[u64], b: &[u64]) -> Verdict {
     let Some(k) = (0..a.len().max(b.len())).find(|k| a.get(*k) != b.get(*k)) else { return Ok(()) };
-    let value = |bits: Option<&u64>| bits.map_or("nothing".to_owned(), |b| format!("{:e}", f64::from_bits(*b)));
+    let value =
+        |bits: Option<&u64>| bits.map_or("nothing".to_owned(), |b| format!("{:e}", f64::from_bits(*b)));
     let got = format!("{} instead of {} (number {k} of {})", value(b.get(k)), value(a.get(k)), a.len());
     Err(Stop::fail("a run", given, got, "the same bytes"))
 }
@@ -83,8 +126,9 @@ pub fn same(given: &str, a: &[u64], b: &[u64]) -> Verdict {
 fn odd_calls(lab: &Lab) -> Verdict {
     let module = lab.module()?;
     let config = lab.config(module.schema()).with_defaults(module.schema());
-    probe_odd_calls(&lab.path, &config, &lab.services())
-        .map_err(|(call, got)| Stop::fail(call, "null or wrong arguments", got, "TG_REFUSED, TG_ERROR or TG_UNSUPPORTED"))
+    probe_odd_calls(&lab.path, &config, &lab.services()).map_err(|(call, got)| {
+        Stop::fail(call, "null or wrong arguments", got, "TG_REFUSED, TG_ERROR or TG_UNSUPPORTED")
+    })
 }
 
 fn wrong_config(lab: &Lab) -> Verdict {
@@ -103,7 +147,12 @@ fn wrong_config(lab: &Lab) -> Verdict {
         if let Err(error) = module.instantiate("checked", config, &lab.services())
             && error.to_string().ends_with("no reason given")
         {
-            return Err(Stop::fail("instantiate", text, "a failure without a text", "last_error(NULL) says why"));
+            return Err(Stop::fail(
+                "instantiate",
+                text,
+                "a failure without a text",
+                "last_error(NULL) says why",
+            ));
         }
     }
     // The module is usable afterwards.

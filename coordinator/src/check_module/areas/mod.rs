@@ -7,13 +7,17 @@ mod numbers;
 mod physics_controller;
 mod physics_robot;
 mod physics_soil;
+mod resources;
+mod soil_cooperation;
+mod soil_symmetry;
 mod state;
 mod values;
 
 use super::catalogue::Test;
+pub use host_untouched::OUTPUT;
 
 /// The lists of all areas, in the order in which they build on each other.
-pub const ALL: [fn() -> Vec<Test>; 9] = [
+pub const ALL: [fn() -> Vec<Test>; 12] = [
     library::tests,
     life_cycle::tests,
     host_untouched::tests,
@@ -21,6 +25,9 @@ pub const ALL: [fn() -> Vec<Test>; 9] = [
     state::tests,
     numbers::tests,
     physics_soil::tests,
+    soil_symmetry::tests,
+    soil_cooperation::tests,
     physics_robot::tests,
     physics_controller::tests,
+    resources::tests,
 ];

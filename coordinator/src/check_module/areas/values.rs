@@ -20,13 +20,28 @@ const fn test(
 /// The tests of this area.
 pub fn tests() -> Vec<Test> {
     vec![
-        test("variables", &["instantiates"], "ids, names, units and ranges of the variables agree", variables),
-        test("readable", &["steps", "variables"], "every variable can be read and lies in its range", readable),
+        test(
+            "variables",
+            &["instantiates"],
+            "ids, names, units and ranges of the variables agree",
+            variables,
+        ),
+        test(
+            "readable",
+            &["steps", "variables"],
+            "every variable can be read and lies in its range",
+            readable,
+        ),
         test("wrong-reference", &["variables"], "an unknown id or a wrong type is refused", wrong_reference),
         test("read-only", &["variables"], "what is read-only cannot be set", read_only),
         test("range", &["variables"], "values outside the range, NaN among them, are refused", range),
         test("set-and-get", &["variables"], "what is set can be read back", set_and_get),
-        test("unknown-action", &["instantiates"], "an unknown action is refused and changes nothing", unknown_action),
+        test(
+            "unknown-action",
+            &["instantiates"],
+            "an unknown action is refused and changes nothing",
+            unknown_action,
+        ),
     ]
 }
 
@@ -47,7 +62,10 @@ fn variables(lab: &Lab) -> Verdict {
         }
         names.push(&v.name);
         if let Err(e) = Unit::parse(&v.unit) {
-            return wrong(format!("its unit `{}`: {e}", v.unit), "SI symbols separated by spaces, e.g. \"N m\"");
+            return wrong(
+                format!("its unit `{}`: {e}", v.unit),
+                "SI symbols separated by spaces, e.g. \"N m\"",
+            );
         }
         if v.min > v.max || v.min.is_nan() || v.max.is_nan() {
             return wrong(format!("its range runs from {} to {}", v.min, v.max), "min ≤ max");
@@ -153,7 +171,12 @@ fn unknown_action(lab: &Lab) -> Verdict {
     let mut instance = lab.instance()?;
     let before = committed(&instance)?;
     if let Ok(Reply::Accepted) = instance.act("no.such.action", "{}") {
-        return Err(Stop::fail("act", "the action `no.such.action`", "success", "TG_REFUSED or TG_UNSUPPORTED"));
+        return Err(Stop::fail(
+            "act",
+            "the action `no.such.action`",
+            "success",
+            "TG_REFUSED or TG_UNSUPPORTED",
+        ));
     }
     same("committed values after an action that was refused", &before, &committed(&instance)?)
 }

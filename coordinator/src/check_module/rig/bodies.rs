@@ -5,7 +5,7 @@ use crate::check_module::finding::{Stop, Verdict};
 use crate::host::Instance;
 use terraglue_ground::{Placed, compose};
 use terraglue_subsystem::{
-    BodyState, Hold, Input, Law, Level, Motion, Port, PortKind, SceneShape, Step, Subsystem, component,
+    BodyState, Estimate, Hold, Input, Law, Level, Motion, Port, PortKind, SceneShape, Step, component,
 };
 
 /// The bench.
@@ -18,14 +18,27 @@ pub struct BodyBench {
     pub index: u64,
     /// Answer of the last trial.
     pub out: Vectors,
-    /// Ports of the last step.
+    /// Ports of the next step.
     pub ports: Vec<Port>,
+    /// Ports of the last step.
+    pub ports_before: Vec<Port>,
+}
+
+/// A rigid estimate at one port.
+#[derive(Clone, Debug, Default)]
+pub struct Held {
+    /// T*.
+    pub t_star: Vec<f64>,
+    /// Motion without a wrench.
+    pub x_free: Vec<f64>,
+    /// Whether each port is active.
+    pub active: Vec<u8>,
 }
 
 impl BodyBench {
     /// Around a robot.
     pub fn new(robot: Instance) -> Self {
-        Self { robot, t: 0.0, index: 0, out: Vectors::default(), ports: Vec::new() }
+        Self { robot, t: 0.0, index: 0, out: Vectors::default(), ports: Vec::new(), ports_before: Vec::new() }
     }
 
     /// Committed states of its bodies.
@@ -65,11 +78,6 @@ impl BodyBench {
         Ok(())
     }
 
-    fn step(&self, h: f64) -> Step<'_> {
-        let n = self.ports.iter().map(|p| p.len() as u32).sum();
-        Step { n, epoch: self.ports.len() as u32, ports: &self.ports, ..Step::free(self.t, h, self.index) }
-    }
-
     /// A trial under the packed wrench.
     ///
     /// # Errors
@@ -79,13 +87,40 @@ impl BodyBench {
         let mut laws = vec![Law::UNILATERAL; self.ports.len()];
         let (mut now, mut out) = (Vectors::new(n), Vectors::new(n));
         let ports = std::mem::take(&mut self.ports);
-        let step = Step { ports: &ports, n: n as u32, epoch: ports.len() as u32, ..self.step(h) };
+        let step = step_of(&ports, self.t, h, self.index);
         let asked = self.robot.set_ports(&step, &mut laws, &mut now.response());
         let input = Input::Force { t, hold: Hold::End, motion: None };
         let done = asked.and_then(|()| self.robot.advance(&step, &input, &mut out.response()));
         (self.ports, self.out) = (ports, out);
         done?;
         Ok(())
+    }
+
+    /// The rigid estimate against ground that stands at `partner` (packed X) at the end of the step.
+    ///
+    /// # Errors
+    /// It failed.
+    pub fn estimate(&mut self, partner: &[f64], h: f64) -> Verdict<Held> {
+        let n = partner.len();
+        let mut held = Held { t_star: vec![0.0; n], x_free: vec![0.0; n], active: vec![0; self.ports.len()] };
+        let (mut g, still) = (vec![0.0; n * n], vec![0.0; n]);
+        let mut laws = vec![Law { mu: 0.5, ..Law::UNILATERAL }; self.ports.len()];
+        let ports = std::mem::take(&mut self.ports);
+        let step = step_of(&ports, self.t, h, self.index);
+        let mut now = Vectors::new(n);
+        let asked = self.robot.set_ports(&step, &mut laws, &mut now.response());
+        let mut out = Estimate {
+            t_star: &mut held.t_star,
+            x_free: &mut held.x_free,
+            g: &mut g,
+            active: &mut held.active,
+            unique: false,
+        };
+        let motion = Motion { x: partner, v: &still };
+        let done = asked.and_then(|()| self.robot.estimate_forces(&step, &motion, &mut out));
+        self.ports = ports;
+        done?;
+        Ok(held)
     }
 
     /// The derivative after a trial, column-major.
@@ -96,7 +131,7 @@ impl BodyBench {
         let n: usize = self.ports.iter().map(Port::len).sum();
         let mut g = vec![0.0; n * n];
         let ports = std::mem::take(&mut self.ports);
-        let step = Step { ports: &ports, n: n as u32, epoch: ports.len() as u32, ..self.step(h) };
+        let step = step_of(&ports, self.t, h, self.index);
         let done = self.robot.interface_jacobian(&step, Level::Position, &mut g);
         self.ports = ports;
         done?;
@@ -110,10 +145,10 @@ impl BodyBench {
     pub fn commit(&mut self, t: &[f64], h: f64) -> Verdict {
         let ports = std::mem::take(&mut self.ports);
         let n: usize = ports.iter().map(Port::len).sum();
-        let step = Step { ports: &ports, n: n as u32, epoch: ports.len() as u32, ..self.step(h) };
+        let step = step_of(&ports, self.t, h, self.index);
         let still = vec![0.0; n];
         let done = self.robot.commit(&step, t, &Motion { x: &still, v: &still });
-        self.ports = ports;
+        self.ports_before = ports;
         done?;
         self.t += h;
         self.index += 1;
@@ -129,11 +164,11 @@ impl BodyBench {
         self.try_force(&[], h)?;
         self.commit(&[], h)
     }
+}
 
-    /// Its committed values.
-    pub fn subsystem(&self) -> &dyn Subsystem {
-        self.robot.subsystem()
-    }
+fn step_of(ports: &[Port], t: f64, h: f64, index: u64) -> Step<'_> {
+    let n = ports.iter().map(|p| p.len() as u32).sum();
+    Step { n, epoch: ports.len() as u32, ports, ..Step::free(t, h, index) }
 }
 
 fn port_below(shape: &SceneShape, state: &BodyState) -> Port {

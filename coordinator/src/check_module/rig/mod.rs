@@ -9,9 +9,9 @@ mod soil;
 
 pub use bodies::BodyBench;
 pub use flat::Flat;
-pub use script::{committed, script};
+pub use script::{Runner, committed, script};
 pub use signals::{numbers, outputs, set_numbers};
-pub use soil::{Foot, Moved, SoilBench};
+pub use soil::{Foot, Moved, SoilBench, dot};
 
 use terraglue_subsystem::Response;
 

@@ -6,8 +6,8 @@ use crate::check_module::lab::Lab;
 use crate::contact::{BodySide, ContactDetector, GroundSide, Now};
 use crate::host::{Instance, LoadedModule, Progress};
 use terraglue_subsystem::{
-    BodyState, Geometry, Hold, Input, Law, Level, Motion, Node, Port, Pose, Scene, SceneBody, SceneShape, Step,
-    Subsystem, Terrain,
+    BodyState, Estimate, Geometry, Hold, Input, Law, Level, Motion, Node, Port, Pose, Scene, SceneBody,
+    SceneShape, Step, Terrain,
 };
 
 /// A foot: its shape and where its centre is at the start, m.
@@ -80,6 +80,8 @@ pub struct SoilBench {
     v: Vec<f64>,
     /// Answers per foot in the last step.
     pub moved: Vec<Moved>,
+    /// Angle by which the tangents of every port are turned about its normal, rad.
+    pub turn: f64,
 }
 
 impl SoilBench {
@@ -128,13 +130,8 @@ impl SoilBench {
             x: Vec::new(),
             v: Vec::new(),
             moved: vec![Moved::default(); feet.len()],
+            turn: 0.0,
         })
-    }
-
-    /// The step from here, for calls of one's own.
-    pub fn step_of(&self, h: f64) -> Step<'_> {
-        let (n, epoch) = (self.n as u32, self.epoch);
-        Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) }
     }
 
     /// Contacts of the feet that move with these velocities (m/s), and the soil's answer to `set_ports`.
@@ -149,7 +146,8 @@ impl SoilBench {
         let (states, soil) = (&self.states, &self.soil);
         let set = self.detector.detect(&now, |_| states, |_| soil.subsystem())?;
         self.ports.clear();
-        self.ports.extend(set.ports.iter().map(|p| Port { side: -1, ..*p }));
+        let turn = self.turn;
+        self.ports.extend(set.ports.iter().map(|p| turned(&Port { side: -1, ..*p }, turn)));
         self.nodes.clone_from(&set.nodes);
         (self.n, self.epoch) = (set.n as usize, set.epoch);
         self.ask_ports(h)
@@ -164,7 +162,8 @@ impl SoilBench {
         self.laws.resize(self.ports.len(), Law::UNILATERAL);
         (self.now, self.out) = (Vectors::new(self.n), Vectors::new(self.n));
         let (n, epoch) = (self.n as u32, self.epoch);
-        let step = Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
+        let step =
+            Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
         Ok(self.soil.set_ports(&step, &mut self.laws, &mut self.now.response())?)
     }
 
@@ -186,7 +185,8 @@ impl SoilBench {
     /// The soil failed.
     pub fn try_motion(&mut self, x: &[f64], v: &[f64], h: f64) -> Verdict {
         let (n, epoch) = (self.n as u32, self.epoch);
-        let step = Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
+        let step =
+            Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
         let progress = self.soil.advance(&step, &Input::Motion(Motion { x, v }), &mut self.out.response())?;
         match progress {
             Progress::Complete => Ok(()),
@@ -205,11 +205,85 @@ impl SoilBench {
     /// The soil failed.
     pub fn try_force(&mut self, t: &[f64], motion: Option<(&[f64], &[f64])>, h: f64) -> Verdict {
         let (n, epoch) = (self.n as u32, self.epoch);
-        let step = Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
+        let step =
+            Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
         let motion = motion.map(|(x, v)| Motion { x, v });
         let input = Input::Force { t, hold: Hold::End, motion };
         self.soil.advance(&step, &input, &mut self.out.response())?;
         Ok(())
+    }
+
+    /// A packed wrench with this normal force (N) on every port.
+    pub fn packed_normal(&self, size: f64) -> Vec<f64> {
+        let mut t = vec![0.0; self.n];
+        self.normal_components().into_iter().for_each(|i| t[i] = size);
+        t
+    }
+
+    /// A trial of the co-operational pass under a rigid estimate.
+    ///
+    /// # Errors
+    /// The soil failed.
+    pub fn try_estimate(&mut self, t_star: &[f64], h: f64) -> Verdict {
+        let (mut t_star, mut x_free) = (t_star.to_vec(), vec![0.0; self.n]);
+        let (mut g, mut active) = (vec![0.0; self.n * self.n], vec![1u8; self.ports.len()]);
+        (0..self.n).for_each(|i| g[i * self.n + i] = h * h);
+        let estimate = Estimate {
+            t_star: &mut t_star,
+            x_free: &mut x_free,
+            g: &mut g,
+            active: &mut active,
+            unique: true,
+        };
+        let (n, epoch) = (self.n as u32, self.epoch);
+        let step =
+            Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
+        self.soil.solve_compatibility(&step, &estimate, &mut self.out.response())?;
+        Ok(())
+    }
+
+    /// Height (m) of the node of the field `height` nearest to a point; None: there is no such field.
+    ///
+    /// # Errors
+    /// The soil failed.
+    pub fn ground_height(&self, x: f64, y: f64) -> Verdict<Option<f64>> {
+        let Some(number) = self.soil.fields().iter().position(|f| f.name == "height") else {
+            return Ok(None);
+        };
+        let field = &self.soil.fields()[number];
+        let node = |at: f64, axis: usize| {
+            let k = ((at - field.origin[axis]) / field.spacing).round().max(0.0) as u32;
+            k.min(field.size[axis].saturating_sub(1))
+        };
+        let (i, j, edge) = (node(x, 0), node(y, 1), field.tile_edge.max(1));
+        let tile = self.soil.field_tile(number, i / edge, j / edge)?;
+        Ok(Some(tile.values.at(((j % edge) * edge + i % edge) as usize)))
+    }
+
+    /// Sum of the heights of all nodes times the area of a cell, m³; None: there is no field `height`.
+    ///
+    /// # Errors
+    /// The soil failed.
+    pub fn ground_volume(&self) -> Verdict<Option<f64>> {
+        let Some(number) = self.soil.fields().iter().position(|f| f.name == "height") else {
+            return Ok(None);
+        };
+        let field = &self.soil.fields()[number];
+        let edge = field.tile_edge.max(1);
+        let mut sum = 0.0;
+        for (a, b) in (0..field.size[0].div_ceil(edge))
+            .flat_map(|a| (0..field.size[1].div_ceil(edge)).map(move |b| (a, b)))
+        {
+            let tile = self.soil.field_tile(number, a, b)?;
+            let inside = |k: u32| a * edge + k % edge < field.size[0] && b * edge + k / edge < field.size[1];
+            sum += (0..edge * edge).filter(|k| inside(*k)).map(|k| tile.values.at(k as usize)).sum::<f64>();
+        }
+        Ok(Some(sum * field.spacing * field.spacing))
+    }
+
+    /// Places of the normal components in packed vectors.
+    pub fn normal_components(&self) -> Vec<usize> {
+        self.ports.iter().flat_map(|p| p.components().filter(|(_, c)| *c == 0)).map(|(i, _)| i).collect()
     }
 
     /// The derivative after a trial, column-major.
@@ -219,7 +293,8 @@ impl SoilBench {
     pub fn jacobian(&mut self, level: Level, h: f64) -> Verdict<Vec<f64>> {
         let mut k = vec![0.0; self.n * self.n];
         let (n, epoch) = (self.n as u32, self.epoch);
-        let step = Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
+        let step =
+            Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
         self.soil.interface_jacobian(&step, level, &mut k)?;
         Ok(k)
     }
@@ -231,7 +306,8 @@ impl SoilBench {
     pub fn commit(&mut self, velocities: &[[f64; 3]], h: f64) -> Verdict {
         let (x, v) = self.motion_of(velocities, h);
         let (n, epoch) = (self.n as u32, self.epoch);
-        let step = Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
+        let step =
+            Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
         self.soil.commit(&step, &self.out.t, &Motion { x: &x, v: &v })?;
         self.note_moved();
         for (state, v) in self.states.iter_mut().zip(velocities) {
@@ -288,6 +364,24 @@ impl SoilBench {
     }
 }
 
+/// The port with its tangents turned about its normal.
+fn turned(port: &Port, angle: f64) -> Port {
+    if angle == 0.0 {
+        return *port;
+    }
+    let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+    let (t1, t2) = (port.direction(1), port.direction(2));
+    let mut out = *port;
+    for k in 0..3 {
+        out.frame[3 + k] = cos * t1[k] + sin * t2[k];
+        out.frame[6 + k] = cos * t2[k] - sin * t1[k];
+    }
+    // Half lengths along the turned tangents hold the whole plate.
+    let [a, b] = port.extent;
+    out.extent = [a * cos.abs() + b * sin.abs(), a * sin.abs() + b * cos.abs()];
+    out
+}
+
 fn scene(feet: &[Foot]) -> Scene {
     let body = |k: usize| SceneBody { name: format!("foot {k}"), mass: 1.0 };
     let shape = |(k, foot): (usize, &Foot)| SceneShape {
@@ -298,7 +392,10 @@ fn scene(feet: &[Foot]) -> Scene {
         body_from_shape: Pose::IDENTITY,
         collides: true,
     };
-    Scene { bodies: (0..feet.len()).map(body).collect(), shapes: feet.iter().enumerate().map(shape).collect() }
+    Scene {
+        bodies: (0..feet.len()).map(body).collect(),
+        shapes: feet.iter().enumerate().map(shape).collect(),
+    }
 }
 
 /// Scalar product.

@@ -123,6 +123,12 @@ fn input_out(input: &Input, n: usize) -> Result<TgInput> {
 }
 
 impl ForeignSubsystem {
+    /// The table and the opaque instance, for programs that put a module to the test. The pointer is valid as long
+    /// as `self`.
+    pub fn raw(&self) -> (&TgSubsystem, *mut c_void) {
+        (&self.raw.table, self.raw.instance)
+    }
+
     pub(super) fn new(table: TgSubsystem, instance: *mut c_void, services: Box<Services>) -> Result<Self> {
         let raw = Raw { table, instance };
         let descriptions = Descriptions::of(&raw)?;

@@ -1,0 +1,91 @@
+//! A derivative that a module gives against one-sided differences of its answers.
+
+use super::finding::{Stop, Verdict};
+use terraglue_subsystem::Port;
+
+/// Names of the components of a port.
+const NAMES: [&str; 6] = ["n", "t1", "t2", "mn", "mt1", "mt2"];
+
+/// What was given and what the differences say, entry by entry.
+pub struct Columns {
+    n: usize,
+    given: Vec<f64>,
+    forward: Vec<f64>,
+    backward: Vec<f64>,
+    rows: Vec<bool>,
+}
+
+impl Columns {
+    /// Differences of `answer` around `at`, each component moved by `delta` both ways.
+    ///
+    /// # Errors
+    /// The module failed.
+    pub fn of(
+        given: &[f64],
+        mut answer: impl FnMut(&[f64]) -> Verdict<Vec<f64>>,
+        at: &[f64],
+        delta: f64,
+    ) -> Verdict<Self> {
+        let n = at.len();
+        let middle = answer(at)?;
+        let (mut forward, mut backward) = (vec![0.0; n * n], vec![0.0; n * n]);
+        for j in 0..n {
+            for (way, out) in [(1.0, &mut forward), (-1.0, &mut backward)] {
+                let mut moved = at.to_vec();
+                moved[j] += way * delta;
+                let there = answer(&moved)?;
+                (0..n).for_each(|i| out[j * n + i] = way * (there[i] - middle[i]) / delta);
+            }
+        }
+        Ok(Self { n, given: given.to_vec(), forward, backward, rows: vec![true; n] })
+    }
+
+    /// Only these components, as rows and as columns.
+    pub fn only(mut self, components: &[usize]) -> Self {
+        self.rows = (0..self.n).map(|i| components.contains(&i)).collect();
+        self
+    }
+}
+
+/// Compares: at a kink the two differences disagree, and anything between them is right.
+///
+/// # Errors
+/// The worst entry, by the names of its components.
+pub fn compare(ports: &[Port], columns: &Columns, after: &str, t: f64) -> Verdict {
+    const TOLERANCE: f64 = 2e-3;
+    let Columns { n, given, forward, backward, rows } = columns;
+    let size = |i: usize| {
+        let row =
+            (0..*n).filter(|j| rows[*j]).map(|j| forward[j * n + i].abs().max(backward[j * n + i].abs()));
+        row.fold(0.0, f64::max)
+    };
+    // Smaller than a millionth of the largest row, differences say nothing.
+    let largest = (0..*n).map(size).fold(0.0, f64::max);
+    let mut worst: Option<(f64, usize, usize)> = None;
+    for (i, j) in (0..*n).flat_map(|i| (0..*n).map(move |j| (i, j))).filter(|(i, j)| rows[*i] && rows[*j]) {
+        let k = j * n + i;
+        let (low, high) = (forward[k].min(backward[k]), forward[k].max(backward[k]));
+        let room = TOLERANCE * size(i).max(1e-4 * largest) + 0.1 * (high - low);
+        let beyond = (low - given[k]).max(given[k] - high).max(0.0) / room.max(f64::MIN_POSITIVE);
+        if beyond > worst.map_or(1.0, |(b, ..)| b) {
+            worst = Some((beyond, i, j));
+        }
+    }
+    let Some((_, i, j)) = worst else { return Ok(()) };
+    let k = j * n + i;
+    let name = |at: usize| {
+        let found = ports.iter().enumerate().find(|(_, p)| p.range().contains(&at));
+        found.map_or(format!("component {at}"), |(number, port)| {
+            let c = port.components().find(|(place, _)| *place == at).map_or("?", |(_, c)| NAMES[c]);
+            format!("{c} of port {number}")
+        })
+    };
+    let entry = format!("the entry of {} to {} after a {after} at t = {t:.3} s", name(i), name(j));
+    let expected = match (forward[k], backward[k]) {
+        (f, b) if (f - b).abs() <= 1e-3 * (f.abs() + b.abs()) => {
+            format!("{:.6e}, by differences", 0.5 * (f + b))
+        }
+        (f, b) => format!("between {b:.6e} and {f:.6e}, by one-sided differences"),
+    };
+    Err(Stop::fail("interface_jacobian", entry, format!("{:.6e}", given[k]), expected))
+}

@@ -1,0 +1,90 @@
+//! `terraglue check-module`: puts a module to the test.
+
+use super::Exit;
+use super::arguments::CheckModuleArguments;
+use super::output::outln;
+use std::path::Path;
+use terraglue::Result;
+use terraglue::check_module::{
+    Errand, Lab, Level, Options, Outcome, Told, catalogue, check, module_file, run_errand, run_here,
+};
+use terraglue::scenario::InputError;
+
+/// Runs the tests and prints what came out.
+pub fn check_module(arguments: &CheckModuleArguments) -> Result<Exit> {
+    let wrong = |text: String| InputError::plain(text, None);
+    if arguments.list {
+        for t in catalogue() {
+            outln!("{:<24} {:<10} {:<9} {}", t.name, t.area.title(), t.level.word(), t.promise);
+        }
+        return Ok(Exit::Done);
+    }
+    let Some(path) = &arguments.path else { return Err(wrong("name the file of a module".into()).into()) };
+    let module = module_file(path).map_err(wrong)?;
+    if arguments.in_process {
+        return in_process(arguments, &module);
+    }
+    let program =
+        std::env::current_exe().map_err(|e| wrong(format!("the program does not find itself: {e}")))?;
+    let mut options = Options {
+        level: arguments.level,
+        seed: arguments.seed,
+        only: arguments.only.clone(),
+        sets: arguments.sets.clone(),
+        limit_s: arguments.time_limit,
+        ..Options::new(program)
+    };
+    options.jobs = arguments.jobs.unwrap_or(options.jobs);
+    let report = check(&module, &options).map_err(wrong)?;
+    for (file, text) in [(&arguments.json, report.json()), (&arguments.junit, report.junit())] {
+        if let Some(file) = file {
+            write(file, &text)?;
+        }
+    }
+    outln!("{}", report.text().trim_end());
+    Ok(if report.is_good() { Exit::Done } else { Exit::Failed })
+}
+
+/// One test, or an errand of one, in this process.
+fn in_process(arguments: &CheckModuleArguments, module: &Path) -> Result<Exit> {
+    let wrong = |text: String| InputError::plain(text, None);
+    let mut lab =
+        Lab::new(module.to_owned(), arguments.level, arguments.seed, &arguments.sets).map_err(wrong)?;
+    lab.program = std::env::current_exe().ok();
+    if let Some(word) = &arguments.errand {
+        let errand = Errand::parse(word, arguments.state.as_deref());
+        let errand = errand.ok_or_else(|| wrong(format!("`{word}` is no errand: write FROM,TO,VARIANT")))?;
+        let bits = run_errand(&lab, &errand).map_err(|stop| wrong(Outcome::of(Err(stop)).detail()))?;
+        if let Some(file) = &arguments.result {
+            write(file, &serde_json::to_string(&bits).unwrap_or_default())?;
+        }
+        return Ok(Exit::Done);
+    }
+    let mut good = true;
+    let names = match arguments.only.as_slice() {
+        [] => catalogue().iter().filter(|t| t.level <= arguments.level).map(|t| t.name.to_owned()).collect(),
+        some => some.to_vec(),
+    };
+    for name in names {
+        let outcome = run_here(&name, &lab).map_err(wrong)?;
+        good &= !outcome.is_broken();
+        match &arguments.result {
+            None => outln!("{name}: {} {}", outcome.word(), outcome.detail()),
+            Some(file) => {
+                let kind = (name == catalogue()[0].name).then(|| lab.kind()).flatten();
+                write(file, &serde_json::to_string(&Told { outcome, kind }).unwrap_or_default())?;
+            }
+        }
+    }
+    Ok(if good { Exit::Done } else { Exit::Failed })
+}
+
+fn write(file: &Path, text: &str) -> Result {
+    std::fs::write(file, text)
+        .map_err(|source| terraglue::Error::File { path: file.display().to_string(), source })
+}
+
+/// The levels as words of the command line.
+pub fn level(word: &str) -> std::result::Result<Level, String> {
+    Level::ALL.into_iter().find(|l| l.word() == word).ok_or_else(|| "quick, standard or thorough".into())
+}

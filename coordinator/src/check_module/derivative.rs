@@ -16,7 +16,8 @@ pub struct Columns {
 }
 
 impl Columns {
-    /// Differences of `answer` around `at`, each component moved by `delta` both ways.
+    /// Differences of `answer` around `at`, each component moved by `delta` both ways, and by a thousandth of it: a
+    /// corner may lie between the two.
     ///
     /// # Errors
     /// The module failed.
@@ -30,11 +31,20 @@ impl Columns {
         let middle = answer(at)?;
         let (mut forward, mut backward) = (vec![0.0; n * n], vec![0.0; n * n]);
         for j in 0..n {
-            for (way, out) in [(1.0, &mut forward), (-1.0, &mut backward)] {
+            let column = j * n..(j + 1) * n;
+            let (high, low) = (&mut forward[column.clone()], &mut backward[column]);
+            high.fill(f64::NEG_INFINITY);
+            low.fill(f64::INFINITY);
+            for step in [delta, -delta, 1e-3 * delta, -1e-3 * delta] {
                 let mut moved = at.to_vec();
-                moved[j] += way * delta;
+                moved[j] += step;
+                // What has been added, after rounding.
+                let step = moved[j] - at[j];
                 let there = answer(&moved)?;
-                (0..n).for_each(|i| out[j * n + i] = way * (there[i] - middle[i]) / delta);
+                for i in 0..n {
+                    let slope = (there[i] - middle[i]) / step;
+                    (high[i], low[i]) = (high[i].max(slope), low[i].min(slope));
+                }
             }
         }
         Ok(Self { n, given: given.to_vec(), forward, backward, rows: vec![true; n] })

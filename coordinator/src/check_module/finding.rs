@@ -131,6 +131,14 @@ impl Outcome {
         }
     }
 
+    /// The test that stands in the way.
+    pub fn blocked_by(&self) -> Option<&str> {
+        match self {
+            Self::Blocked { by } => Some(by),
+            _ => None,
+        }
+    }
+
     /// Whether the module broke a promise.
     pub fn is_broken(&self) -> bool {
         matches!(self, Self::Fail { .. } | Self::Crash { .. } | Self::Hang { .. })

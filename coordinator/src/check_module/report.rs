@@ -121,7 +121,7 @@ impl Report {
     pub fn text(&self) -> String {
         let mut out = String::new();
         let mut area = "";
-        for row in &self.rows {
+        for row in self.rows.iter().filter(|r| r.outcome.word() != "blocked") {
             if row.area != area {
                 area = row.area;
                 let _ = writeln!(out, "{}{area}", if out.is_empty() { "" } else { "\n" });
@@ -135,6 +135,14 @@ impl Report {
                 row.promise
             );
             details(row, &mut out);
+        }
+        let mut roots: Vec<&str> = self.rows.iter().filter_map(|r| r.outcome.blocked_by()).collect();
+        roots.dedup();
+        for (k, root) in roots.iter().enumerate().filter(|(k, root)| !roots[..*k].contains(root)) {
+            let names: Vec<&str> =
+                self.rows.iter().filter(|r| r.outcome.blocked_by() == Some(*root)).map(|r| r.test).collect();
+            let gap = if k == 0 { "\n" } else { "" };
+            let _ = writeln!(out, "{gap}blocked by {root}: {}", names.join(", "));
         }
         let _ = writeln!(out, "\n{}: {}", self.module.display(), self.summary());
         out

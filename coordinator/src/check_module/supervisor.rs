@@ -174,6 +174,8 @@ impl Bench<'_> {
             command.arg("--set").arg(format!("{key}={value}"));
         }
         command.arg("--result").arg(self.file(test, "json")).env_remove("TERRAGLUE_LOG");
+        // Without the allocator's caches per thread, what is freed counts as free.
+        command.env("GLIBC_TUNABLES", "glibc.malloc.tcache_count=0");
         command.stdin(std::process::Stdio::null()).stdout(file("out")?).stderr(file("err")?);
         let process =
             command.spawn().map_err(|e| format!("{} cannot be started: {e}", options.program.display()))?;

@@ -20,11 +20,13 @@ pub enum Language {
     Rust,
     /// C11.
     C,
+    /// C++17.
+    Cpp,
 }
 
 impl Kind {
     /// All, in the order in which they are listed.
-    pub const ALL: [Self; 1] = [Self::Soil];
+    pub const ALL: [Self; 3] = [Self::Soil, Self::Robot, Self::Controller];
 
     /// As a word of the command line.
     pub fn word(self) -> &'static str {
@@ -48,9 +50,11 @@ impl Kind {
             Self::Soil => format!(
                 "Your physics goes into `law` of `{source}`, what it has to remember into the state of a foot."
             ),
-            Self::Robot => format!("Your bodies go into `advance` of `{source}`: forces in, motion out."),
+            Self::Robot => {
+                format!("Your bodies go into `move` or `moved` of `{source}`: forces in, motion out.")
+            }
             Self::Controller => {
-                format!("Your control law goes into `advance` of `{source}`: inputs in, outputs out.")
+                format!("Your control law goes into `control` of `{source}`: inputs in, outputs out.")
             }
         }
     }
@@ -58,13 +62,14 @@ impl Kind {
 
 impl Language {
     /// All.
-    pub const ALL: [Self; 2] = [Self::Rust, Self::C];
+    pub const ALL: [Self; 3] = [Self::Rust, Self::C, Self::Cpp];
 
     /// As people write it.
     pub fn title(self) -> &'static str {
         match self {
             Self::Rust => "Rust",
             Self::C => "C",
+            Self::Cpp => "C++",
         }
     }
 
@@ -73,6 +78,7 @@ impl Language {
         match self {
             Self::Rust => "rust",
             Self::C => "c",
+            Self::Cpp => "cpp",
         }
     }
 }
@@ -88,6 +94,8 @@ const HEADER: File = (
 const MAKEFILE: File =
     ("Makefile", "builds (`make`) and checks (`make check`)", include_str!("templates/Makefile.in"));
 const BALL: File = ("ball.urdf", "the body that falls on it", include_str!("templates/ball.urdf.in"));
+const CLASS: File = ("terraglue.hpp", "a thin class over it", include_str!("templates/terraglue.hpp.in"));
+const ARM: File = ("arm.urdf", "the arm that it moves", include_str!("templates/arm.urdf.in"));
 const RUST: [File; 2] = [
     ("Cargo.toml", "build file", include_str!("templates/Cargo.toml.in")),
     (
@@ -102,7 +110,21 @@ fn source(kind: Kind, language: Language) -> Option<File> {
     Some(match (kind, language) {
         (Kind::Soil, Language::Rust) => ("src/lib.rs", "the soil", include_str!("templates/soil.rs.in")),
         (Kind::Soil, Language::C) => ("my_module.c", "the soil", include_str!("templates/soil.c.in")),
-        _ => return None,
+        (Kind::Soil, Language::Cpp) => ("my_module.cpp", "the soil", include_str!("templates/soil.cpp.in")),
+        (Kind::Robot, Language::Rust) => ("src/lib.rs", "the robot", include_str!("templates/robot.rs.in")),
+        (Kind::Robot, Language::C) => ("my_module.c", "the robot", include_str!("templates/robot.c.in")),
+        (Kind::Robot, Language::Cpp) => {
+            ("my_module.cpp", "the robot", include_str!("templates/robot.cpp.in"))
+        }
+        (Kind::Controller, Language::Rust) => {
+            ("src/lib.rs", "the controller", include_str!("templates/controller.rs.in"))
+        }
+        (Kind::Controller, Language::C) => {
+            ("my_module.c", "the controller", include_str!("templates/controller.c.in"))
+        }
+        (Kind::Controller, Language::Cpp) => {
+            ("my_module.cpp", "the controller", include_str!("templates/controller.cpp.in"))
+        }
     })
 }
 
@@ -111,7 +133,13 @@ fn scenario(kind: Kind) -> &'static [File] {
         Kind::Soil => {
             &[("scenario.toml", "a ball falls on it", include_str!("templates/scenario-soil.toml.in")), BALL]
         }
-        Kind::Robot | Kind::Controller => &[],
+        Kind::Robot => {
+            &[("scenario.toml", "it falls on a soil", include_str!("templates/scenario-robot.toml.in"))]
+        }
+        Kind::Controller => &[
+            ("scenario.toml", "it moves an arm", include_str!("templates/scenario-controller.toml.in")),
+            ARM,
+        ],
     }
 }
 
@@ -135,6 +163,7 @@ pub(super) fn fill(
     match language {
         Language::Rust => files.extend(RUST),
         Language::C => files.extend([HEADER, MAKEFILE]),
+        Language::Cpp => files.extend([HEADER, CLASS, MAKEFILE]),
     }
     files.extend(scenario(kind));
     let interfaces = match (&place.interfaces, language) {
@@ -146,13 +175,20 @@ pub(super) fn fill(
     let library = format!("lib{snake}_plugin.so");
     let (build, module) = match language {
         Language::Rust => ("cargo build", format!("./target/debug/{library}")),
-        Language::C => ("make", format!("./{library}")),
+        Language::C | Language::Cpp => ("make", format!("./{library}")),
     };
     let listing: Vec<_> = files.iter().map(|(path, what, _)| format!("| `{path}` | {what} |")).collect();
+    let (flags, compile) = match language {
+        Language::Cpp => (
+            "CXXFLAGS ?= -std=c++17 -O2 -Wall -Wextra",
+            "$(CXX) $(CXXFLAGS) -fvisibility=hidden -fPIC -shared $< -o $@",
+        ),
+        _ => ("CFLAGS ?= -std=c11 -O2 -Wall -Wextra", "$(CC) $(CFLAGS) -fPIC -shared $< -o $@ -lm"),
+    };
     let words = [
         ("@files@", listing.join("\n")),
-        ("@variables@", "CFLAGS ?= -std=c11 -O2 -Wall -Wextra".into()),
-        ("@compile@", "$(CC) $(CFLAGS) -fPIC -shared $< -o $@ -lm".into()),
+        ("@variables@", flags.into()),
+        ("@compile@", compile.into()),
         ("@source@", source.0.into()),
         ("@where@", kind.place_of_physics(source.0)),
         ("@starts@", kind.starts().into()),

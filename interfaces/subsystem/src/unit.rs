@@ -44,14 +44,18 @@ const SYMBOLS: &[(&str, [i8; 8], f64)] = &[
     ("kPa", [1, -1, -2, 0, 0, 0, 0, 0], 1e3),
     ("Hz", [0, 0, -1, 0, 0, 0, 0, 0], 1.0),
     ("V", [1, 2, -3, -1, 0, 0, 0, 0], 1.0),
+    ("ohm", [1, 2, -3, -2, 0, 0, 0, 0], 1.0),
+    ("C", [0, 0, 1, 1, 0, 0, 0, 0], 1.0),
+    ("F", [-1, -2, 4, 2, 0, 0, 0, 0], 1.0),
+    ("H", [1, 2, -2, -2, 0, 0, 0, 0], 1.0),
 ];
 
 impl Unit {
     /// A pure number.
     pub const ONE: Self = Self { exponents: [0; 8], factor: 1.0, offset: 0.0 };
 
-    /// Reads `N m`, `kg m^2`, `rad/s`, `m/s^2`, `N m s/rad`. What follows a `/` is divided, up to the end. `× 0.3048`
-    /// and `+ 273.15` at the end are a factor and an offset to SI.
+    /// Reads `N m`, `kg m^2`, `rad/s`, `m/s^2`, `N m s/rad`, `A/(N m)`. What follows a `/` is divided, up to the end,
+    /// with or without parentheses. `× 0.3048` and `+ 273.15` at the end are a factor and an offset to SI.
     pub fn parse(text: &str) -> Result<Self, UnknownUnit> {
         if let Some((symbols, rest)) = text.split_once('×') {
             let (factor, offset) = rest.split_once(" + ").unwrap_or((rest, "0"));
@@ -66,7 +70,7 @@ impl Unit {
         }
         let mut unit = Self::ONE;
         for (part, side) in text.split('/').enumerate() {
-            for symbol in side.split([' ', '*', '.']).filter(|s| !s.is_empty()) {
+            for symbol in side.split([' ', '*', '.', '(', ')']).filter(|s| !s.is_empty()) {
                 unit.multiply(symbol, if part == 0 { 1 } else { -1 })?;
             }
         }

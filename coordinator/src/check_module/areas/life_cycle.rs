@@ -168,9 +168,10 @@ fn no_contact(lab: &Lab) -> Verdict {
 }
 
 fn come_and_go(lab: &Lab) -> Verdict {
-    let mut bench = SoilBench::new(lab, &[Foot::sphere(-0.1, 0.0), Foot::sphere(0.1, 0.0).lifted(2e-3)])?;
+    let mut bench =
+        SoilBench::new(lab, &[Foot::sphere(-0.1, 0.0).lifted(-1e-3), Foot::sphere(0.1, 0.0).lifted(7e-3)])?;
     for k in 0..120 {
-        let up = if (k / 20) % 2 == 0 { -0.2 } else { 0.2 };
+        let up = if (k / 20) % 2 == 0 { 0.4 } else { -0.4 };
         bench.go(&[[0.0, 0.0, up], [0.0, 0.0, -up]], 1e-3)?;
     }
     Ok(())

@@ -68,6 +68,9 @@ impl ColumnLaw {
     pub fn friction(&self, t0: [f64; 2], x: [f64; 2], t_n: f64) -> ([f64; 2], f64) {
         let trial = [t0[0] - self.k_t * x[0], t0[1] - self.k_t * x[1]];
         let (size, bound) = (libm::hypot(trial[0], trial[1]), self.mu * t_n.max(0.0));
+        if bound <= 0.0 {
+            return ([0.0; 2], f64::MIN_POSITIVE);
+        }
         if size <= bound {
             return (trial, 0.0);
         }

@@ -28,7 +28,7 @@ impl Module for SoilColumnModule {
             kind: Kind::Soil,
             help: "Independent columns T = K z^n with straight unloading and Coulomb friction".into(),
             parameters: vec![
-                Parameter::number("K", "N/m^n", 8340.0, "Stiffness of first loading").positive(),
+                Parameter::number("K", "", 8340.0, "Stiffness of first loading, N/m^n").positive(),
                 Parameter::number("n", "", 1.0, "Exponent of first loading").positive(),
                 Parameter::number("k_u", "N/m", 2e5, "Stiffness of unloading").positive(),
                 Parameter::number("k_t", "N/m", 1e5, "Tangential stiffness while a foot sticks").positive(),

@@ -1,0 +1,116 @@
+"""The newcomer: `terraglue new`, build, run, check, for every kind in every language, from outside the repository."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+
+import pytest
+from conftest import PROGRAM, ROOT, terraglue
+
+KINDS = ["soil", "robot", "controller"]
+
+
+def made(folder, kind, language):
+    """The folder of a new module, and the commands that its page names."""
+    name = f"my-{kind}"
+    process = terraglue("new", kind, name, "--lang", language, cwd=folder)
+    assert process.returncode == 0, process.stderr
+    place = folder / name
+    assert len([p for p in place.rglob("*") if p.is_file()]) <= 8
+    commands = re.search(r"```sh\n(.*?)```", (place / "README.md").read_text(), re.S).group(1)
+    return place, commands.strip().splitlines()
+
+
+def played(place, commands, **environment):
+    """Types the three commands of the page."""
+    for command in commands:
+        done = subprocess.run(command, shell=True, cwd=place, env={**os.environ, **environment},
+                              capture_output=True, text=True, timeout=300)
+        assert done.returncode == 0, f"{command}\n{done.stdout[-3000:]}{done.stderr[-3000:]}"
+    return done.stdout
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("language", ["c", "cpp"])
+def test_a_new_module_builds_runs_and_passes(tmp_path, kind, language):
+    place, commands = made(tmp_path, kind, language)
+    assert len(commands) == 3
+    told = played(place, commands)
+    assert " fail" not in told.splitlines()[-1] and " pass" in told.splitlines()[-1]
+
+
+@pytest.fixture(scope="module")
+def rust_target(tmp_path_factory):
+    """One folder of compiled crates for the three modules in Rust."""
+    return tmp_path_factory.mktemp("target")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_a_new_module_in_rust_builds_runs_and_passes(tmp_path, rust_target, kind):
+    place, commands = made(tmp_path, kind, "rust")
+    (place / "target").symlink_to(rust_target)
+    played(place, commands)
+
+
+def test_the_check_is_a_target_of_the_makefile_and_writes_what_ci_reads(tmp_path):
+    place, commands = made(tmp_path, "soil", "c")
+    subprocess.run(["make", "check"], cwd=place, check=True, capture_output=True)
+    process = terraglue("check-module", place, "--level", "quick", "--json", tmp_path / "o.json",
+                        "--junit", tmp_path / "o.xml")
+    assert process.returncode == 0, process.stdout
+    rows = json.loads((tmp_path / "o.json").read_text())["rows"]
+    assert len(rows) >= 50 and {"library", "physics", "numbers"} <= {r["area"] for r in rows}
+    assert len([r for r in rows if r["area"] == "physics"]) >= 12
+    assert (tmp_path / "o.xml").read_text().count("<testcase ") == len(rows)
+
+
+def test_a_mistake_is_named_with_call_values_and_the_command_that_repeats_it(tmp_path):
+    place, commands = made(tmp_path, "soil", "c")
+    source = place / "my_soil.c"
+    text = source.read_text()
+    assert text.count("return z > 0.0 ? s->k * z : 0.0;") == 1
+    source.write_text(text.replace("return z > 0.0 ? s->k * z : 0.0;", "return s->k * z;"))
+    subprocess.run(["make"], cwd=place, check=True, capture_output=True)
+    process = terraglue("check-module", place)
+    assert process.returncode == 1
+    found = process.stdout[process.stdout.index("fail     no-tension"):]
+    for part in ["call      advance", "given", "got       a normal force of -", "expected  >= 0", "--only no-tension"]:
+        assert part in found, found[:800]
+    repeat = re.search(r"repeat +(.*)", found).group(1)
+    again = subprocess.run(repeat, shell=True, cwd=tmp_path, capture_output=True, text=True)
+    assert again.returncode == 1 and "no-tension: fail" in again.stdout
+
+
+def test_a_file_beside_the_module_switches_a_test_off_with_its_reason(tmp_path):
+    place, commands = made(tmp_path, "soil", "c")
+    subprocess.run(["make"], cwd=place, check=True, capture_output=True)
+    (place / "libmy_soil_plugin.check.toml").write_text('[off]\nany-turn = "the lattice is hexagonal"\n')
+    process = terraglue("check-module", place, "--level", "quick")
+    assert process.returncode == 0 and "switched off: the lattice is hexagonal" in process.stdout
+    (place / "libmy_soil_plugin.check.toml").write_text('[off]\nany-trun = "x"\n')
+    process = terraglue("check-module", place, "--level", "quick")
+    assert process.returncode == 2 and "any-turn" in process.stderr
+
+
+MODULES = [("soil-bekker", []), ("soil-cellular-automaton", []), ("gait", []), ("soil-column", []),
+           ("rigid-body", ["--set", f"model={ROOT / 'tests/models/ball.urdf'}"])]
+
+
+@pytest.mark.parametrize("module, sets", MODULES)
+def test_the_modules_of_the_project_pass(module, sets):
+    folders = [os.path.join(os.path.dirname(PROGRAM), sub) for sub in ("deps", "../lib/terraglue", ".")]
+    paths = [os.path.join(f, f"lib{module.replace('-', '_')}_plugin.so") for f in folders]
+    path = next((p for p in paths if os.path.isfile(p)), None)
+    if path is None:
+        pytest.skip(f"{module} was not built")
+    process = terraglue("check-module", path, *sets)
+    assert process.returncode == 0, process.stdout
+
+
+def test_the_page_of_a_folder_that_exists_is_left_alone(tmp_path):
+    made(tmp_path, "controller", "c")
+    process = terraglue("new", "controller", "my-controller", cwd=tmp_path)
+    assert process.returncode == 2 and "exists already" in process.stderr
+    shutil.rmtree(tmp_path / "my-controller")

@@ -75,7 +75,8 @@ pub fn compare(ports: &[Port], columns: &Columns, after: &str, t: f64) -> Verdic
     for (i, j) in (0..*n).flat_map(|i| (0..*n).map(move |j| (i, j))).filter(|(i, j)| rows[*i] && rows[*j]) {
         let k = j * n + i;
         let (low, high) = (forward[k].min(backward[k]), forward[k].max(backward[k]));
-        let room = TOLERANCE * size(i).max(1e-4 * largest) + 0.1 * (high - low);
+        let share = if i == j { TOLERANCE } else { 5.0 * TOLERANCE };
+        let room = share * (size(i) * size(j)).sqrt() + 0.1 * (high - low);
         let beyond = (low - given[k]).max(given[k] - high).max(0.0) / room.max(f64::MIN_POSITIVE);
         if beyond > worst.map_or(1.0, |(b, ..)| b) {
             worst = Some((beyond, i, j));

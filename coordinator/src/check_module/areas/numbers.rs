@@ -239,6 +239,8 @@ fn jacobian_soil(lab: &Lab) -> Verdict {
             bench.meet(&velocities, 1e-3)?;
             let (x, v) = bench.motion_of(&velocities, 1e-3);
             bench.try_motion(&x, &v, 1e-3)?;
+            // Where a foot hardly touches, node after node comes into contact: corners everywhere.
+            let pressed = bench.components_above(1.0);
             let k = bench.jacobian(Derivative::Position, 1e-3)?;
             let columns = Columns::of(
                 &k,
@@ -250,7 +252,7 @@ fn jacobian_soil(lab: &Lab) -> Verdict {
                 &x,
                 1e-7,
             )?;
-            compare(&bench.ports, &columns, "motion", bench.t)?;
+            compare(&bench.ports, &columns.only(&pressed), "motion", bench.t)?;
         }
         bench.go(&velocities, 1e-3)?;
     }

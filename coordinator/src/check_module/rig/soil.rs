@@ -281,6 +281,12 @@ impl SoilBench {
         Ok(Some(sum * field.spacing * field.spacing))
     }
 
+    /// Places of all components of ports that carry more than a normal force (N) in the last trial.
+    pub fn components_above(&self, force: f64) -> Vec<usize> {
+        let carries = |p: &&Port| p.components().any(|(i, c)| c == 0 && self.out.t[i] > force);
+        self.ports.iter().filter(carries).flat_map(Port::components).map(|(i, _)| i).collect()
+    }
+
     /// Places of the normal components in packed vectors.
     pub fn normal_components(&self) -> Vec<usize> {
         self.ports.iter().flat_map(|p| p.components().filter(|(_, c)| *c == 0)).map(|(i, _)| i).collect()

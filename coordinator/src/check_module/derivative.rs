@@ -64,13 +64,10 @@ impl Columns {
 pub fn compare(ports: &[Port], columns: &Columns, after: &str, t: f64) -> Verdict {
     const TOLERANCE: f64 = 2e-3;
     let Columns { n, given, forward, backward, rows } = columns;
-    let size = |i: usize| {
-        let row =
-            (0..*n).filter(|j| rows[*j]).map(|j| forward[j * n + i].abs().max(backward[j * n + i].abs()));
-        row.fold(0.0, f64::max)
-    };
-    // Smaller than a millionth of the largest row, differences say nothing.
-    let largest = (0..*n).map(size).fold(0.0, f64::max);
+    // Forces and moments have different units: an entry is small against the diagonal entries of its row and column.
+    let diagonal = |i: usize| forward[i * n + i].abs().max(backward[i * n + i].abs());
+    let largest = (0..*n).map(diagonal).fold(0.0, f64::max);
+    let size = |i: usize| diagonal(i).max(1e-4 * largest);
     let mut worst: Option<(f64, usize, usize)> = None;
     for (i, j) in (0..*n).flat_map(|i| (0..*n).map(move |j| (i, j))).filter(|(i, j)| rows[*i] && rows[*j]) {
         let k = j * n + i;

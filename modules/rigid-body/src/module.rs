@@ -1,7 +1,7 @@
 //! The module: from parameters to an instance.
 
 use crate::actuator::{Actuator, configure};
-use crate::contact::bodies::Surface;
+use crate::contact::bodies::{Law, Surface};
 use crate::contact::plane::Plane;
 use crate::drive::{Mode, Motor};
 use crate::dynamics::Dynamics;
@@ -70,7 +70,11 @@ impl Module for RigidBody {
         if integrator.is_second_order() {
             without_impacts(&*host, ground.is_some(), dynamics.contacts.watches())?;
         }
-        dynamics.contacts.set_surroundings(surface(&config)?, ground);
+        let name = config.text("contact_solver")?;
+        let law = Law::from_name(name).ok_or_else(|| {
+            Error::Refused(format!("parameter `contact_solver` = `{name}` is none of {:?}", Law::NAMES))
+        })?;
+        dynamics.contacts.set_surroundings(law, surface(&config)?, ground);
         Ok(Box::new(Robot::new(host, dynamics, state)))
     }
 }

@@ -83,6 +83,13 @@ pub(crate) fn schema() -> Schema {
             Parameter::number("ground_height_m", "m", 0.0, "Distance of the rigid ground from the origin along its normal"),
             Parameter::of("ground_normal", ParameterType::Numbers, "Direction out of the rigid ground: x, y, z")
                 .or(vec![0.0, 0.0, 1.0]),
+            Parameter::of(
+                "contact_solver",
+                ParameterType::Text,
+                "How contacts are solved: `ncp` (Coulomb's cone) or a friction pyramid of 4 or 8 facets by Lemke",
+            )
+            .or("ncp")
+            .choices(&crate::contact::bodies::Law::NAMES),
             Parameter::number("friction", "1", 0.8, "Coulomb friction among bodies and with rigid ground")
                 .within(0.0, f64::INFINITY),
             Parameter::number("restitution", "1", 0.0, "Newton's coefficient of restitution among bodies and with rigid ground")

@@ -7,9 +7,11 @@
 
 use crate::contact::detection::{ContactPoint, Detector};
 use crate::contact::memory::{Pressed, recall, remember};
+use crate::contact::plane::Plane;
 use crate::dense::{cholesky, cholesky_solve};
 use crate::model::Model;
 use crate::state::Motion;
+use terraglue_contact_solver::lcp::{Facets, Method, Outcome, Pyramid};
 use terraglue_contact_solver::{Options, Problem, Solver};
 use terraglue_linear_solver::{Path, Tree};
 
@@ -26,6 +28,37 @@ const IMMOBILE: f64 = 1e-14;
 const REFUSE: f64 = 1e-3;
 const OPTIONS: Options =
     Options { tolerance: 1e-11, newton_steps: 30, turns: 6, sweeps: 3, proximal_steps: 20, softening: 1e-9 };
+
+/// How the contact problem of a step is put and solved.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(crate) enum Law {
+    /// Coulomb's cone, to rounding.
+    Cone,
+    /// A friction pyramid, by Lemke's algorithm.
+    Pyramid(Facets),
+}
+
+impl Law {
+    pub const NAMES: [&'static str; 3] = ["ncp", "lcp-4", "lcp-8"];
+
+    pub fn from_name(name: &str) -> Option<Self> {
+        let i = Self::NAMES.iter().position(|n| *n == name)?;
+        Some([Self::Cone, Self::Pyramid(Facets::Four), Self::Pyramid(Facets::Eight)][i])
+    }
+}
+
+/// Why a contact problem was not solved.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+pub(crate) enum Unsolved {
+    #[error("the data are not finite")]
+    NotFinite,
+    #[error("the residual of the cone stays at {0:.1e}")]
+    Residual(f64),
+    #[error("Lemke's algorithm ended on a ray after {0} pivots")]
+    Ray(u32),
+    #[error("Lemke's algorithm had no result after {0} pivots")]
+    Pivots(u32),
+}
 
 /// Friction and restitution of all pairs.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -52,7 +85,11 @@ pub(crate) struct BodyContacts {
     answers: Vec<f64>,
     stride: usize,
     push: Vec<f64>,
+    law: Law,
     solver: Solver,
+    pyramid: Pyramid,
+    /// Velocities at the solution of the pyramid.
+    u: Vec<f64>,
     /// Residual of the last solution.
     pub residual: f64,
 }
@@ -74,7 +111,10 @@ impl BodyContacts {
             answers: Vec::new(),
             stride: 0,
             push: Vec::new(),
+            law: Law::Cone,
             solver: Solver::default(),
+            pyramid: Pyramid::default(),
+            u: Vec::new(),
             residual: 0.0,
         }
     }
@@ -89,9 +129,9 @@ impl BodyContacts {
         self.detector.watches()
     }
 
-    /// Friction, restitution and the rigid ground.
-    pub fn set_surroundings(&mut self, surface: Surface, ground: Option<crate::contact::plane::Plane>) {
-        self.surface = surface;
+    /// Law, friction, restitution and the rigid ground.
+    pub fn set_surroundings(&mut self, law: Law, surface: Surface, ground: Option<Plane>) {
+        (self.law, self.surface) = (law, surface);
         self.detector.ground = ground;
     }
 
@@ -143,12 +183,12 @@ impl BodyContacts {
         }
     }
 
-    /// Adds the contact impulses to a solution of the system. False: no solution was found.
-    pub fn resolve(&mut self, tree: &Tree, body_at: &[usize], solution: &mut [f64]) -> bool {
+    /// Adds the contact impulses to a solution of the system.
+    pub fn resolve(&mut self, tree: &Tree, body_at: &[usize], solution: &mut [f64]) -> Result<(), Unsolved> {
         let n = self.points.len();
         self.residual = 0.0;
         if n == 0 {
-            return true;
+            return Ok(());
         }
         self.q.clear();
         for (p, wrenches) in self.points.iter().zip(&self.wrenches) {
@@ -157,15 +197,10 @@ impl BodyContacts {
         (0..n).for_each(|k| self.q[3 * k] += self.offsets[k]);
         if (0..n).all(|k| self.q[3 * k] >= 0.0) {
             self.impulses.fill(0.0);
-            return true;
+            return Ok(());
         }
         self.fill_w(tree);
-        let Ok(problem) = Problem::new(&self.w, &self.q, &self.mu) else { return false };
-        let report = self.solver.solve(&problem, &OPTIONS, &mut self.impulses);
-        self.residual = report.residual;
-        if report.residual.is_nan() || report.residual > REFUSE {
-            return false;
-        }
+        self.find_impulses()?;
         self.push.clear();
         self.push.resize(solution.len(), 0.0);
         for (k, (p, wrenches)) in self.points.iter().zip(&self.wrenches).enumerate() {
@@ -175,7 +210,29 @@ impl BodyContacts {
         }
         tree.substitute(&mut self.push);
         solution.iter_mut().zip(&self.push).for_each(|(s, p)| *s += p);
-        true
+        Ok(())
+    }
+
+    /// Solves the contact problem by the law that was chosen.
+    fn find_impulses(&mut self) -> Result<(), Unsolved> {
+        let problem = Problem::new(&self.w, &self.q, &self.mu).map_err(|_| Unsolved::NotFinite)?;
+        let facets = match self.law {
+            Law::Cone => {
+                self.residual = self.solver.solve(&problem, &OPTIONS, &mut self.impulses).residual;
+                let good = self.residual <= REFUSE;
+                return if good { Ok(()) } else { Err(Unsolved::Residual(self.residual)) };
+            }
+            Law::Pyramid(facets) => facets,
+        };
+        match self.pyramid.solve(&problem, facets, Method::Lemke, &mut self.impulses) {
+            Outcome::Solved(_) => {}
+            Outcome::Ray(pivots) => return Err(Unsolved::Ray(pivots)),
+            Outcome::PivotLimit(pivots) => return Err(Unsolved::Pivots(pivots)),
+        }
+        self.u.resize(self.q.len(), 0.0);
+        problem.velocity(&self.impulses, &mut self.u);
+        self.residual = problem.residual(&self.impulses, &self.u);
+        Ok(())
     }
 
     /// W = H·K⁻¹·Hᵀ by the paths of the bodies to their roots.

@@ -17,7 +17,7 @@ mod midpoint;
 pub(crate) mod scheme;
 mod second_order;
 
-use crate::contact::bodies::BodyContacts;
+use crate::contact::bodies::{BodyContacts, Unsolved};
 use crate::drive::{Axis, MOST_YIELDING, Mode, Span, YIELDING};
 use crate::math::{M3, V3, cayley};
 use crate::model::Model;
@@ -50,8 +50,8 @@ pub(crate) enum Failure {
          integrator = \"symplectic-euler\" where something hits or sticks"
     )]
     NotConverged { corrections: usize },
-    #[error("contact among the bodies or with rigid ground found no solution; a shorter step may help")]
-    Contact,
+    #[error("contact among the bodies or with rigid ground found no solution: {0}; a shorter step may help")]
+    Contact(#[from] Unsolved),
 }
 
 /// A free axis at the end of a trial.
@@ -323,9 +323,7 @@ impl Dynamics {
     fn solve_branch(&mut self) -> Result<(), Failure> {
         self.assemble();
         self.kkt.solver.solve(&self.rhs, &mut self.solution)?;
-        if !self.contacts.resolve(&self.kkt.solver, &self.kkt.body_at, &mut self.solution) {
-            return Err(Failure::Contact);
-        }
+        self.contacts.resolve(&self.kkt.solver, &self.kkt.body_at, &mut self.solution)?;
         self.close_joints()
     }
 

@@ -157,10 +157,8 @@ fn rod_rig(context: &Context, degrees: f64, mu: f64, v: f64) -> Outcome<Rig> {
         iyz="0"/></inertial>{}{}</link>"#,
         ends[0], ends[1]
     );
-    let more = format!(r#", "friction": {mu}"#);
-    let mut rig = alone(context, "rod", &body, [0.0, 0.0, l * s + r], &more, (DOWN, 1e-3))?;
-    throw(&mut rig, "rod", [v, 0.0, 0.0], 1e-3)?;
-    Ok(rig)
+    let more = format!(r#", "friction": {mu}, "velocity_m_s": [{v}, 0, 0]"#);
+    alone(context, "rod", &body, [0.0, 0.0, l * s + r], &more, (DOWN, 1e-3))
 }
 
 fn rod(context: &Context) -> Outcome<Vec<Figure>> {

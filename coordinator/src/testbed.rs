@@ -427,6 +427,19 @@ impl Testbed {
         }
     }
 
+    /// Glues from the next step on as `spec` says; what strategies remember of earlier steps is lost.
+    ///
+    /// # Errors
+    /// [`Error::Simulation`]: the strategy cannot glue these subsystems.
+    pub fn set_gluing(&mut self, spec: &crate::scenario::GluingSpec) -> Result {
+        let Some(group) = &mut self.group else { return Ok(()) };
+        if let Some(refusal) = gluing::refusal(spec, &group.exchange, &self.instances) {
+            return Err(Error::Simulation { time_s: self.t, message: refusal.reason });
+        }
+        group.strategy = gluing::strategy(spec);
+        Ok(())
+    }
+
     /// Keeps the committed state of everything under a number.
     pub fn snapshot(&mut self, slot: u32) -> Result<Snapshot> {
         self.instances.iter_mut().try_for_each(|i| i.save_state(slot))?;

@@ -5,7 +5,11 @@
 //! (Hintermüller, Ito, Kunisch 2002); if it cycles, by principal pivoting with the least index (Murty 1974),
 //! which ends for every P-matrix.
 
+use super::eigen::TruncatedSolver;
 use super::linear::Lu;
+
+/// Pivots weaker than this make the system one for the truncated solver.
+const WEAK: f64 = 1e-10;
 
 /// Where a component stands.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,8 +23,10 @@ enum State {
 #[derive(Debug, Default)]
 pub struct BoundedSolver {
     lu: Lu,
+    truncated: TruncatedSolver,
     states: Vec<State>,
     rank: usize,
+    condition: f64,
 }
 
 /// The problem; `a` is row-major through a function, so that callers assemble nothing twice.
@@ -41,6 +47,11 @@ impl BoundedSolver {
     /// Rank of the last system.
     pub fn rank(&self) -> usize {
         self.rank
+    }
+
+    /// Condition of the last system, by its pivots.
+    pub fn condition(&self) -> f64 {
+        self.condition
     }
 
     /// Writes d; `false` when no consistent set was found (A is not a P-matrix), d is then the last trial.
@@ -110,7 +121,13 @@ impl BoundedSolver {
             };
         }
         self.rank = self.lu.factor(n, entry);
-        self.lu.solve(d);
+        let weakest = self.lu.weakest();
+        self.condition = 1.0 / weakest.max(f64::MIN_POSITIVE);
+        if weakest < WEAK && states.iter().all(|s| *s == State::Free) && symmetric(&p.a, n) {
+            self.rank = self.truncated.solve(n, &p.a, d);
+        } else {
+            self.lu.solve(d);
+        }
         for i in 0..n {
             match states[i] {
                 State::Free => {}
@@ -119,6 +136,13 @@ impl BoundedSolver {
             }
         }
     }
+}
+
+fn symmetric(a: impl Fn(usize, usize) -> f64, n: usize) -> bool {
+    (0..n * n).all(|k| {
+        let (r, c) = (k / n, k % n);
+        (a(r, c) - a(c, r)).abs() <= 1e-8 * (a(r, r).abs() + a(c, c).abs())
+    })
 }
 
 #[cfg(test)]

@@ -57,6 +57,10 @@ pub struct Exchange {
     pub rows: Vec<Row>,
     /// Where the points of both sides of a joint lay apart at t, packed.
     pub gap: Vec<f64>,
+    /// Compliance of the glue by component, m/N.
+    pub compliance: Vec<f64>,
+    /// Damper beside it, N s/m.
+    pub damping: Vec<f64>,
     /// Glue of the scenario.
     pub glue: Glue,
     /// Level of the condition at joints.
@@ -67,6 +71,8 @@ pub struct Exchange {
     pub(super) base: [Vec<f64>; 3],
     /// T, X1, V1, A1, X2, V2 and A2 while differences are taken.
     kept: [Vec<f64>; 7],
+    /// d(v1 − v2)/dT.
+    rates: Vec<f64>,
     /// The bodies' last trial is not that of T.
     displaced: bool,
     zeros: Vec<f64>,
@@ -104,11 +110,14 @@ impl Exchange {
             a2: Vec::new(),
             rows: Vec::new(),
             gap: Vec::new(),
+            compliance: Vec::new(),
+            damping: Vec::new(),
             glue: Glue::default(),
             level: Level::Position,
             stabilisation: 0.0,
             base: Default::default(),
             kept: Default::default(),
+            rates: Vec::new(),
             displaced: false,
             zeros: Vec::new(),
             last: Vec::new(),
@@ -165,11 +174,15 @@ impl Exchange {
         }
         self.rows.clear();
         self.gap.clear();
+        self.compliance.clear();
+        self.damping.clear();
         for (p, port) in self.ports.iter().enumerate() {
             let glued = p.checked_sub(found_ports).and_then(|k| glue.joint(k));
             for (_, c) in port.components() {
                 self.rows.push(glued.map_or(if c == 0 { Row::Normal } else { Row::Law }, |j| j.row(c)));
                 self.gap.push(glued.map_or(0.0, |j| j.gap(port, c)));
+                self.compliance.push(port.law.compliance);
+                self.damping.push(glued.map_or(0.0, |j| j.damping()));
             }
         }
         let e = &mut self.estimate;
@@ -318,37 +331,44 @@ impl Exchange {
     }
 
     /// x1 − x2 with the distance of the points at t, of the rows that are not a soil's law; at h = 0 and at the
-    /// velocity level the derivative that the condition speaks of. T/k_c of a compliant glue is added.
-    pub fn mismatch(&self, i: usize, compliance: f64) -> f64 {
-        let position = self.x1[i] - self.x2[i] + self.gap[i];
-        let compliant = compliance * self.t[i];
-        if self.at.h == 0.0 {
-            return if compliance > 0.0 { position + compliant } else { self.a1[i] - self.a2[i] };
-        }
-        match self.level {
-            Level::Velocity if self.rows[i] == Row::Joint => {
-                self.v1[i] - self.v2[i] + (self.stabilisation * self.gap[i] + compliant) / self.at.h
-            }
-            _ => position + compliant,
-        }
+    /// velocity level the derivative that the condition speaks of. The stretch of a compliant glue is added.
+    pub fn mismatch(&self, i: usize) -> f64 {
+        self.bodies_part(i) + self.surface_part(i) + self.compliance_now(i) * self.t[i]
     }
 
-    /// What the bodies' motion contributes to a row, without the glue's compliance and the soil's surface.
+    /// What the bodies' motion contributes to a row: without the force of the glue's spring and the soil's surface.
     pub fn bodies_part(&self, i: usize) -> f64 {
-        if self.has_grounds() && self.rows[i] != Row::Joint { self.x1[i] } else { self.mismatch(i, 0.0) }
+        let rate = self.v1[i] - self.v2[i];
+        let damper = self.compliance_now(i) * self.damping[i] * rate;
+        if self.at.h == 0.0 && self.compliance[i] == 0.0 {
+            return self.a1[i] - self.a2[i];
+        }
+        if self.level == Level::Velocity && self.rows[i] == Row::Joint && self.at.h > 0.0 {
+            return rate + self.stabilisation * self.gap[i] / self.at.h + damper;
+        }
+        let soil = self.has_grounds() && self.rows[i] != Row::Joint;
+        self.x1[i] + self.gap[i] + damper - if soil { 0.0 } else { self.x2[i] }
+    }
+
+    fn surface_part(&self, i: usize) -> f64 {
+        if self.has_grounds() && self.rows[i] != Row::Joint && self.at.h > 0.0 { -self.x2[i] } else { 0.0 }
+    }
+
+    /// Compliance of the glue as it enters [`Exchange::mismatch`].
+    pub fn compliance_now(&self, i: usize) -> f64 {
+        let velocity = self.level == Level::Velocity && self.rows[i] == Row::Joint && self.at.h > 0.0;
+        if velocity { self.compliance[i] / self.at.h } else { self.compliance[i] }
+    }
+
+    /// How far a closed joint lies apart at t + h beyond what its spring and damper allow, m or rad.
+    pub fn joint_gap(&self, i: usize) -> f64 {
+        let force = self.t[i] + self.damping[i] * (self.v1[i] - self.v2[i]);
+        (self.x1[i] - self.x2[i] + self.gap[i] + self.compliance[i] * force).abs()
     }
 
     /// Level of the interface Jacobian that fits [`Exchange::mismatch`].
     fn level_now(&self) -> Level {
         if self.at.h == 0.0 { Level::Acceleration } else { self.level }
-    }
-
-    /// Compliance of the glue by component, as it enters the derivative of [`Exchange::mismatch`].
-    pub fn glue_compliance(&self, port: &Port) -> f64 {
-        match self.level_now() {
-            Level::Velocity => port.law.compliance / self.at.h,
-            _ => port.law.compliance,
-        }
     }
 
     /// Whether the bodies' Jacobian comes from their trials: no member estimates contact forces where joints or
@@ -399,17 +419,34 @@ impl Exchange {
         }
         if !complete {
             self.difference_trials(source == Derivatives::Central, instances)?;
+        } else if self.at.h > 0.0 && self.damping.iter().any(|d| *d > 0.0) {
+            self.add_dampers(instances)?;
         }
-        for i in (0..self.n()).filter(|_| self.at.h == 0.0) {
-            let port = self.ports.iter().find(|p| p.range().contains(&i));
-            if port.is_some_and(|p| p.law.compliance > 0.0) {
-                // a spring's force at t is given by positions alone
-                let n = self.n();
-                (0..n).for_each(|c| self.estimate.g[c * n + i] = 0.0);
-            }
+        for i in (0..self.n()).filter(|i| self.at.h == 0.0 && self.compliance[*i] > 0.0) {
+            // a spring's force at t is given by positions and velocities alone
+            let n = self.n();
+            (0..n).for_each(|c| self.estimate.g[c * n + i] = 0.0);
         }
         self.report.jacobian_refreshes += 1;
         self.timings.charge(Part::Jacobian, start);
+        Ok(())
+    }
+
+    /// What dampers of the glue add to the Jacobian: compliance·damping·d(v1 − v2)/dT.
+    fn add_dampers(&mut self, instances: &mut [Instance]) -> Result {
+        let n = self.n();
+        let mut rates = std::mem::take(&mut self.rates);
+        rates.clear();
+        rates.resize(n * n, 0.0);
+        for side in &mut self.bodies {
+            let instance = &mut instances[side.slot];
+            side.add_compliance(instance, &self.nodes, &self.at, Level::Velocity, &mut rates)?;
+        }
+        for row in (0..n).filter(|i| self.damping[*i] > 0.0) {
+            let factor = self.compliance_now(row) * self.damping[row];
+            (0..n).for_each(|c| self.estimate.g[c * n + row] += factor * rates[c * n + row]);
+        }
+        self.rates = rates;
         Ok(())
     }
 
@@ -427,21 +464,21 @@ impl Exchange {
         }
         let mut base = std::mem::take(&mut self.work);
         base.clear();
-        base.extend((0..n).map(|i| self.mismatch(i, 0.0)));
+        base.extend((0..n).map(|i| self.bodies_part(i)));
         for column in 0..n {
             let delta = 1e-6 * kept[0][column].abs().max(1.0);
             if central {
                 self.t[column] = kept[0][column] - delta;
                 self.advance_bodies(instances)?;
                 base.clear();
-                base.extend((0..n).map(|i| self.mismatch(i, 0.0)));
+                base.extend((0..n).map(|i| self.bodies_part(i)));
             }
             self.t[column] = kept[0][column] + delta;
             self.advance_bodies(instances)?;
             self.t[column] = kept[0][column];
             let width = if central { 2.0 * delta } else { delta };
             for (row, base) in base.iter().enumerate() {
-                self.estimate.g[column * n + row] = (self.mismatch(row, 0.0) - base) / width;
+                self.estimate.g[column * n + row] = (self.bodies_part(row) - base) / width;
             }
         }
         self.work = base;

@@ -40,6 +40,7 @@ pub struct Joint {
     ends: [Terminal; 2],
     soil: bool,
     turning: bool,
+    damping: f64,
     axes: [f64; 9],
 }
 
@@ -66,6 +67,8 @@ pub struct Recipe {
     pub turning: bool,
     /// Bounds and compliance.
     pub law: Law,
+    /// Damper beside the compliance, N s/m.
+    pub damping: f64,
     /// Unilateral.
     pub contact: bool,
     /// Side 2 is a soil, whose law answers all but the normal force.
@@ -101,7 +104,14 @@ impl Glue {
             law: recipe.law,
         };
         let ends = recipe.ends.map(end);
-        self.joints.push(Joint { port, ends, soil: recipe.soil, turning: recipe.turning, axes: recipe.axes });
+        self.joints.push(Joint {
+            port,
+            ends,
+            soil: recipe.soil,
+            turning: recipe.turning,
+            damping: recipe.damping,
+            axes: recipe.axes,
+        });
     }
 
     /// Number of glues.
@@ -133,6 +143,11 @@ impl Glue {
     /// A joint whose side 2 is the world or is side 1 elsewhere, by number: nobody could take its motion.
     pub fn joint_without_second(&self) -> Option<usize> {
         self.joints.iter().position(|j| !j.soil && !j.ends[1].slot.is_some_and(|s| self.is_second(s)))
+    }
+
+    /// A glue with a damper, by number.
+    pub fn damped(&self) -> Option<usize> {
+        self.joints.iter().position(|j| j.damping > 0.0)
     }
 
     /// A contact between bodies, by number.
@@ -217,6 +232,11 @@ impl Joint {
             (true, _, true) => Row::Law,
             (true, _, false) => Row::Coulomb,
         }
+    }
+
+    /// Damper beside the compliance, N s/m.
+    pub fn damping(&self) -> f64 {
+        self.damping
     }
 
     /// How far the points lay apart at t along a component, m or rad.

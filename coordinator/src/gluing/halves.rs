@@ -14,22 +14,30 @@ use terraglue_subsystem::Level;
 impl Exchange {
     /// What is known at t without any trial: T = −(x1 − x2)/compliance of springs, the soil's own force at contacts.
     pub fn explicit_forces(&mut self) {
-        for port in &self.ports {
-            for (i, _) in port.components() {
-                self.t[i] = match self.rows[i] {
-                    Row::Joint => -self.gap[i] / port.law.compliance,
-                    _ => self.f_law[i],
-                };
-            }
+        self.read_velocities();
+        for i in 0..self.n() {
+            self.t[i] = match self.rows[i] {
+                Row::Joint => -self.gap[i] / self.compliance[i] - self.damping[i] * (self.v1[i] - self.v2[i]),
+                _ => self.f_law[i],
+            };
+        }
+    }
+
+    /// V1 and V2 of t, as `set_ports` answered them.
+    fn read_velocities(&mut self) {
+        for side in &self.bodies {
+            side.motion_by_side(
+                [&mut self.x1, &mut self.v1, &mut self.a1],
+                [&mut self.x2, &mut self.v2, &mut self.a2],
+            );
         }
     }
 
     /// The springs' force where side 2 has moved and side 1 has not.
     pub fn spring_forces(&mut self) {
-        for port in &self.ports {
-            for (i, _) in port.components().filter(|(i, _)| self.rows[*i] == Row::Joint) {
-                self.t[i] = (self.x2[i] - self.gap[i]) / port.law.compliance;
-            }
+        for i in (0..self.n()).filter(|i| self.rows[*i] == Row::Joint) {
+            let damper = self.damping[i] * (self.v1[i] - self.v2[i]);
+            self.t[i] = (self.x2[i] - self.gap[i]) / self.compliance[i] - damper;
         }
     }
 
@@ -42,12 +50,7 @@ impl Exchange {
 
     /// X1 = h·V1 and X2 = h·V2 with the velocities of t, which `set_ports` answered.
     pub fn start_at_constant_velocity(&mut self) {
-        for side in &self.bodies {
-            side.motion_by_side(
-                [&mut self.x1, &mut self.v1, &mut self.a1],
-                [&mut self.x2, &mut self.v2, &mut self.a2],
-            );
-        }
+        self.read_velocities();
         let h = self.at.h;
         self.x1.iter_mut().zip(&self.v1).for_each(|(x, v)| *x = h * v);
         self.x2.iter_mut().zip(&self.v2).for_each(|(x, v)| *x = h * v);

@@ -51,6 +51,13 @@ impl Lu {
         regular
     }
 
+    /// Smallest pivot over the largest: 1/condition, roughly.
+    pub fn weakest(&self) -> f64 {
+        let pivots = || (0..self.n).map(|k| self.factors[k * self.n + k].abs());
+        let largest = pivots().fold(0.0, f64::max);
+        if largest > 0.0 { pivots().fold(f64::INFINITY, f64::min) / largest } else { 1.0 }
+    }
+
     /// Solves A·x = b in place.
     pub fn solve(&self, b: &mut [f64]) {
         let n = self.n;

@@ -15,6 +15,7 @@
 mod complementarity;
 pub mod cooperative;
 pub mod cooperative_compliant;
+mod eigen;
 mod estimate;
 mod exchange;
 pub mod gauss_seidel;
@@ -31,6 +32,7 @@ pub mod relaxed;
 mod report;
 pub mod semi_implicit;
 mod side;
+mod start;
 #[cfg(test)]
 mod tests;
 pub mod tlm;
@@ -123,18 +125,14 @@ pub fn strategy(spec: &GluingSpec) -> Box<dyn Strategy> {
 
 /// What finds the forces of joints in a step of h = 0 before the first: the same for all strategies.
 pub fn start(spec: &GluingSpec) -> Box<dyn Strategy> {
-    Box::new(iterative::Iterative::new(spec))
+    Box::new(start::Start::new(spec))
 }
 
 /// The end of a pass that does not ask whether it converged.
 fn single_pass(exchange: &mut Exchange) -> Outcome {
     exchange.report.converged = true;
-    for port in &exchange.ports {
-        for i in port.range().filter(|i| exchange.rows[*i] == Row::Joint) {
-            let apart =
-                exchange.x1[i] - exchange.x2[i] + exchange.gap[i] + port.law.compliance * exchange.t[i];
-            exchange.report.max_gap_m = exchange.report.max_gap_m.max(apart.abs());
-        }
+    for i in (0..exchange.n()).filter(|i| exchange.rows[*i] == Row::Joint) {
+        exchange.report.max_gap_m = exchange.report.max_gap_m.max(exchange.joint_gap(i));
     }
     Outcome::Converged
 }

@@ -129,10 +129,15 @@ fn rows(port: &Port, exchange: &Exchange, motion: bool, scale: &[f64], out: &mut
     for (i, c) in port.components() {
         let t = exchange.t[i];
         out[i] = match exchange.rows[i] {
-            Row::Joint if exchange.at.h == 0.0 && port.law.compliance > 0.0 => {
-                t + exchange.gap[i] / port.law.compliance
+            Row::Joint => {
+                let (k, rate) = (port.law.compliance, exchange.v1[i] - exchange.v2[i]);
+                let apart = if k > 0.0 {
+                    exchange.x1[i] - exchange.x2[i] + exchange.gap[i]
+                } else {
+                    gap(exchange, i)
+                };
+                (apart + k * (t + exchange.damping[i] * rate)) / (scale[i] + k)
             }
-            Row::Joint => (gap(exchange, i) + port.law.compliance * t) / (scale[i] + port.law.compliance),
             Row::Normal if !motion => {
                 let w = gap(exchange, i) / scale[i];
                 t - (t - w).max(port.law.t_min).min(port.law.t_max)
@@ -205,9 +210,7 @@ impl Strategy for Monolithic {
         for port in &exchange.ports {
             let closed =
                 exchange.rows[port.first as usize] == Row::Joint || exchange.t[port.first as usize] > 0.0;
-            let apart = (gap(exchange, port.first as usize)
-                + port.law.compliance * exchange.t[port.first as usize])
-                .abs();
+            let apart = exchange.joint_gap(port.first as usize);
             if closed {
                 exchange.report.max_gap_m = exchange.report.max_gap_m.max(apart);
             }

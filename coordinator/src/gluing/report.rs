@@ -38,6 +38,8 @@ pub struct StepReport {
     pub interface_work_error_j: f64,
     /// Rank of Λ and its size, for the last Jacobian; 0 when none was formed.
     pub rank: (u32, u32),
+    /// Condition of Λ by its pivots; 0 when none was formed.
+    pub condition: f64,
     /// All ports of the step.
     pub ports: Vec<PortReport>,
 }

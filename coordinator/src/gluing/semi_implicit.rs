@@ -5,7 +5,6 @@
 
 use super::exchange::Exchange;
 use super::iterative::TtForm;
-use super::refresh::Refresh;
 use super::{Needs, Outcome, Strategy};
 use crate::Result;
 use crate::host::Instance;
@@ -24,7 +23,7 @@ pub struct SemiImplicit {
 impl SemiImplicit {
     /// From the scenario's `[gluing]`.
     pub fn new(spec: &GluingSpec) -> Self {
-        Self { tt: TtForm::new(Refresh::new(&spec.jacobian)) }
+        Self { tt: TtForm::new(&spec.jacobian) }
     }
 }
 

@@ -83,7 +83,10 @@ impl Strategy for Tlm {
                 k + 1
             )
         });
-        super::contacts_refused(NAME, exchange).or(rigid)
+        let damped = exchange.glue.damped().map(|k| {
+            format!("`{NAME}` carries forces through springs: glue {} has a damper, which no line has", k + 1)
+        });
+        super::contacts_refused(NAME, exchange).or(rigid).or(damped)
     }
 
     fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {

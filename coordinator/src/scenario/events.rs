@@ -38,6 +38,10 @@ pub fn glue(source: &Source, names: &[&str]) -> Checked<Vec<GlueSpec>> {
         }
         let contact = s.text("kind") == "contact";
         let mu = s.number("mu");
+        if s.number("damping_n_s_m") > 0.0 && (contact || s.number("compliance_m_n") == 0.0) {
+            let message = "a damper stands beside the spring of a joint: give compliance_m_n too".into();
+            return Err(s.error("damping_n_s_m", message, None));
+        }
         Ok(GlueSpec {
             sides: [s.text("side_1"), s.text("side_2")],
             contact,
@@ -46,6 +50,7 @@ pub fn glue(source: &Source, names: &[&str]) -> Checked<Vec<GlueSpec>> {
             turning: s.text("axes") == "body",
             normal: s.numbers("normal"),
             compliance: s.number("compliance_m_n"),
+            damping: s.number("damping_n_s_m"),
             t_max: s.optional_number("t_max_n").unwrap_or(f64::INFINITY),
             mu,
             span: node.extent(),

@@ -196,7 +196,7 @@ fn gluing() -> Table {
             .into(),
         Parameter::of("jacobian", ParameterType::Text, "where the bodies' interface Jacobian comes from")
             .or("analytic")
-            .choices(&["analytic", "directional", "finite-differences", "broyden", "frozen"])
+            .choices(&["analytic", "directional", "finite-differences", "broyden", "diagonal", "frozen"])
             .into(),
         Parameter::of("level", ParameterType::Text, "level of the condition at joints")
             .or("position")
@@ -213,6 +213,14 @@ fn gluing() -> Table {
         number("stabilisation", "", 0.0, "share of the position error taken out per step at velocity level")
             .within(0.0, 1.0)
             .into(),
+        number(
+            "start_scale",
+            "",
+            1.0,
+            "factor on the forces of joints at the start; other than 1 it is a control",
+        )
+        .within(0.0, 10.0)
+        .into(),
         number(
             "contact_margin_m",
             "m",
@@ -279,6 +287,9 @@ fn glue() -> Table {
         Key::from(vector("normal", "", "of a contact, from side 2 to side 1").or(vec![0.0, 0.0, 1.0]))
             .form(Form::Count(3)),
         number("compliance_m_n", "m/N", 0.0, "of the glue itself: 1/stiffness of a spring")
+            .within(0.0, f64::INFINITY)
+            .into(),
+        number("damping_n_s_m", "N s/m", 0.0, "of a damper beside that spring")
             .within(0.0, f64::INFINITY)
             .into(),
         bound("t_max_n", "largest normal force; side 2 yields there")

@@ -167,6 +167,7 @@ fn read_gluing(s: &Section) -> Checked<GluingSpec> {
         level: s.text("level"),
         hold: s.text("hold"),
         stabilisation: s.number("stabilisation"),
+        start_scale: s.number("start_scale"),
         contact_margin_m: s.number("contact_margin_m"),
     })
 }

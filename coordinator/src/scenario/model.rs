@@ -143,6 +143,8 @@ pub struct GluingSpec {
     pub hold: String,
     /// Share of the position error that is taken out per step at velocity level.
     pub stabilisation: f64,
+    /// Factor on the forces of joints at the start: a control that shows how an integrator forgets a wrong start.
+    pub start_scale: f64,
     /// Contacts are made when a shape can come this near within the step, m.
     pub contact_margin_m: f64,
 }
@@ -208,6 +210,7 @@ impl Default for GluingSpec {
             level: "position".into(),
             hold: "end".into(),
             stabilisation: 0.0,
+            start_scale: 1.0,
             contact_margin_m: 1e-3,
         }
     }
@@ -230,6 +233,8 @@ pub struct GlueSpec {
     pub normal: [f64; 3],
     /// Compliance of the glue, m/N.
     pub compliance: f64,
+    /// Damping of the glue beside its spring, N s/m.
+    pub damping: f64,
     /// Largest normal force, N.
     pub t_max: f64,
     /// Coulomb coefficient.

@@ -286,7 +286,8 @@ fn glue(scenario: &Scenario, instances: &[Instance]) -> Result<Glue> {
             None
         });
         let (mask, turning, soil) = (spec.mask, spec.turning, soil_at(1));
-        let recipe = Recipe { ends, at, mask, axes, turning, law, contact: spec.contact, soil };
+        let (damping, contact) = (spec.damping, spec.contact);
+        let recipe = Recipe { ends, at, mask, axes, turning, law, damping, contact, soil };
         glue.add(&recipe, |slot, body| states[slot][body as usize]);
     }
     Ok(glue)

@@ -118,8 +118,13 @@ fn has_word(line: &str, word: &str) -> bool {
 
 #[test]
 fn unsafe_code_stands_only_at_the_borders() {
-    let borders =
-        ["interfaces/plugin", "interfaces/fmi", "coordinator/src/host", "coordinator/unit", "tests/acceptance"];
+    let borders = [
+        "interfaces/plugin",
+        "interfaces/fmi",
+        "coordinator/src/host",
+        "coordinator/unit",
+        "tests/acceptance",
+    ];
     for path in rust_files().iter().filter(|p| !borders.iter().any(|b| p.starts_with(b))) {
         let text = read(path);
         let found = code_lines(&text).find(|(_, line)| has_word(line, "unsafe"));

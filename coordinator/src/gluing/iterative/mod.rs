@@ -18,7 +18,6 @@ pub(super) use tt::TtForm;
 pub(super) use xt::XtForm;
 
 use super::exchange::Exchange;
-use super::refresh::Refresh;
 use super::{Needs, Outcome, Strategy, linear};
 use crate::Result;
 use crate::host::Instance;
@@ -119,7 +118,7 @@ impl Iterative {
             form: Form::read(spec),
             from_estimate: spec.start != "zero",
             limits: Limits::read(spec),
-            tt: tt::TtForm::new(Refresh::new(&spec.jacobian)),
+            tt: tt::TtForm::new(&spec.jacobian),
             xt: xt::XtForm::default(),
             start: Vec::new(),
             kappa: 0.0,

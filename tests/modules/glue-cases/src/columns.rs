@@ -84,31 +84,31 @@ impl Column {
         if self.z_max > 0.0 { self.z_max - self.peak() / self.k_u } else { 0.0 }
     }
 
-    /// The same with the lumped mass: m_s·(z − z_n − h·v_n)/h² + F(z) = T, by a safeguarded Newton.
+    /// The same with the lumped mass: m_s·(z − z_n − h·v_n)/h² + F(z) = T, by a safeguarded Newton on the way u from
+    /// where the mass would go by itself, so that a heavy mass does not lose digits.
     fn depth_with_mass(&self, t: f64, h: f64) -> (f64, f64) {
         let m = self.mass / (h * h);
-        let (base, residual) =
-            (self.z + h * self.v, |z: f64| m * (z - self.z - h * self.v) + self.force(z).0 - t);
-        let (mut low, mut high) = (
-            base.min(self.depth(t.max(0.0)).0) - 1.0,
-            base.max(self.depth(t.max(0.0)).0) + t.abs() / m + 1e-9,
-        );
-        let mut z = base;
+        let base = self.z + h * self.v;
+        let residual = |u: f64| m * u + self.force(base + u).0 - t;
+        let reach = (self.depth(t.max(0.0)).0 - base).abs() + t.abs() / m + self.force(base).0 / m;
+        let (mut low, mut high) = (-reach - 1e-9, reach + 1e-9);
+        let mut u = 0.0;
         for _ in 0..200 {
-            let r = residual(z);
+            let r = residual(u);
             if r > 0.0 {
-                high = z
+                high = u
             } else {
-                low = z
+                low = u
             }
-            let newton = z - r / (m + self.force(z).1);
+            let newton = u - r / (m + self.force(base + u).1);
             let next = if newton > low && newton < high { newton } else { 0.5 * (low + high) };
-            if (next - z).abs() <= 1e-17 + 1e-16 * z.abs() {
+            let change = (next - u).abs();
+            u = next;
+            if change <= 1e-24 + 2e-16 * u.abs() {
                 break;
             }
-            z = next;
         }
-        (z, 1.0 / (m + self.force(z).1))
+        (base + u, 1.0 / (m + self.force(base + u).1))
     }
 }
 

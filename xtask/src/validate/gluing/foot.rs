@@ -21,6 +21,8 @@ pub struct Foot {
     pub exponent: f64,
     /// N/m.
     pub unloading: f64,
+    /// Depth at the start, to which the soil has been pressed, m.
+    pub depth: f64,
 }
 
 impl Foot {
@@ -33,6 +35,7 @@ impl Foot {
             stiffness: p.number("K")?,
             exponent: p.number("n")?,
             unloading: p.number("ku")?,
+            depth: 0.0,
         })
     }
 
@@ -43,7 +46,7 @@ impl Foot {
             "table-on-feet",
             &[
                 ("mass_kg", format!("{:?}", self.mass)),
-                ("start", list(&[0.0, 0.0, 0.0, self.speed])),
+                ("start", list(&[self.depth, 0.0, 0.0, self.speed])),
                 ("integrator", format!("{integrator:?}")),
             ],
         );
@@ -54,6 +57,7 @@ impl Foot {
                 ("K", list(&[self.stiffness])),
                 ("n", list(&[self.exponent])),
                 ("k_u", list(&[self.unloading])),
+                ("z_start", list(&[self.depth])),
             ],
         );
         let glue = "[[glue]]\nkind = \"contact\"\nside_1 = \"foot.foot0\"\nside_2 = \"soil.c0\"\n";

@@ -5,7 +5,10 @@
 //! `tests/reference/gluing/README.md`.
 
 mod extrapolate;
+mod feet;
 mod foot;
+mod linear;
+mod mechanisms;
 mod oscillator;
 mod parameters;
 mod planar;
@@ -19,7 +22,7 @@ use crate::process::{Outcome, root};
 type Part = fn(&Context) -> Outcome<Vec<Figure>>;
 
 /// The parts, in the order of the table.
-const PARTS: [Part; 0] = [];
+const PARTS: [Part; 3] = [linear::figures, mechanisms::figures, feet::figures];
 
 /// All figures of the area, or those of the file that `--table` names.
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {

@@ -130,3 +130,15 @@ pub fn answer(p: Parameters, rows: &[(Option<f64>, String)]) -> Outcome<Answers>
     })?;
     Ok(Answers::extrapolated(limits, h, 3, "Newmark 1/4, 1/2"))
 }
+
+impl Oscillator {
+    /// The first mass on a spring with a damper to the world, which are glue.
+    pub fn on_a_spring(&self, setting: &Setting, k: f64, c: f64) -> String {
+        let glue = format!(
+            "[[glue]]\nside_1 = \"a.m0\"\nside_2 = \"world\"\nat_m = [0.0, 0.0, 0.0]\ncomponents = [\"x\"]\n\
+             compliance_m_n = {:?}\ndamping_n_s_m = {c:?}\n",
+            1.0 / k
+        );
+        setting.text() + &self.half("a", 0) + &glue
+    }
+}

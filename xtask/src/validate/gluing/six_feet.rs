@@ -19,8 +19,8 @@ pub struct Table {
     pub offset: Vec<f64>,
     /// kg.
     pub mass: f64,
-    /// Downward speed at the start, m/s.
-    pub speed: f64,
+    /// Heave (down), roll, pitch and their rates at the start.
+    pub start: [f64; 6],
     /// Integrator.
     pub integrator: &'static str,
 }
@@ -28,7 +28,13 @@ pub struct Table {
 impl Table {
     /// The body of all cases.
     pub fn standard(integrator: &'static str, speed: f64) -> Self {
-        Self { feet: FEET.concat(), offset: vec![0.05, 0.02], mass: 60.0, speed, integrator }
+        Self {
+            feet: FEET.concat(),
+            offset: vec![0.05, 0.02],
+            mass: 60.0,
+            start: [0.0, 0.0, 0.0, speed, 0.0, 0.0],
+            integrator,
+        }
     }
 
     /// The scenario with the lines of the soil's table.
@@ -43,7 +49,7 @@ impl Table {
                 ("pitch_inertia_kg_m2", "4.0".into()),
                 ("feet_m", list(&self.feet)),
                 ("offset_m", list(&self.offset)),
-                ("start", list(&[0.0, 0.0, 0.0, self.speed])),
+                ("start", list(&self.start)),
                 ("integrator", format!("{:?}", self.integrator)),
             ],
         );
@@ -84,8 +90,8 @@ pub fn answer(case: &str, p: Parameters, rows: &[(Option<f64>, String)]) -> Outc
     let offset = p.numbers("offset").or_else(|_| p.numbers("off"))?;
     let feet = p.numbers("xy").unwrap_or_else(|_| FEET.concat());
     let mass = p.optional("M").unwrap_or(60.0);
-    let table =
-        Table { feet, offset, mass, speed: p.optional("v0").unwrap_or(0.0), integrator: "implicit-euler" };
+    let start = [0.0, 0.0, 0.0, p.optional("v0").unwrap_or(0.0), 0.0, 0.0];
+    let table = Table { feet, offset, mass, start, integrator: "implicit-euler" };
     match case.get(6..7) {
         Some("S") => statics(&table, &p.numbers("K")?, rows),
         Some("D") => falling(&table, p, rows),

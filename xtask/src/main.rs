@@ -32,6 +32,8 @@ enum Command {
         #[arg(long)]
         check: bool,
     },
+    /// Draw the pictures of docs/ that are computed: docs/images/automaton_crater.svg.
+    Pictures,
     /// Print a hash of the automaton's state after a fixed run: `validate soil` runs this in another environment.
     #[command(hide = true)]
     SoilHash {
@@ -57,6 +59,7 @@ fn main() -> ExitCode {
         Command::Test => test::test(),
         Command::Validate(arguments) => validate::validate(&arguments),
         Command::Header { check } => header::run(check),
+        Command::Pictures => validate::write_soil_picture(),
         Command::SoilHash { quick } => {
             validate::print_soil_hash(quick);
             Ok(())

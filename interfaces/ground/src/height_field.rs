@@ -3,6 +3,7 @@
 use crate::Surface;
 use crate::lattice::{Lattice, TILE_EDGE, TILE_NODES};
 use crate::pool::Pool;
+use crate::snapshot::Identity;
 use terraglue_subsystem::{FieldInfo, FieldTile, Terrain, TerrainTile, TileValues};
 
 /// Height of one unit, m: 2⁻²² m (0.24 µm), so an i32 spans ±512 m.
@@ -72,6 +73,9 @@ pub struct HeightField {
     pub(crate) tiles: Vec<Tile>,
     pub(crate) touched: Vec<u32>,
     pub(crate) pool: Pool<i32>,
+    /// Grows with every write and never goes back: the source of the tiles' generations.
+    writes: u64,
+    pub(crate) identity: Identity,
 }
 
 impl HeightField {
@@ -83,7 +87,8 @@ impl HeightField {
         let mut pool = Pool::new(0);
         pool.reserve(2 * RESERVE_TILES.min(count));
         let tiles = vec![Tile { heights, sinkage: UNTOUCHED, generation: 0 }; count];
-        Ok(Self { lattice, tiles, touched: Vec::with_capacity(count), pool })
+        let touched = Vec::with_capacity(count);
+        Ok(Self { lattice, tiles, touched, pool, writes: 0, identity: Identity::default() })
     }
 
     /// The ground of a scenario, each node rounded to the nearest unit.
@@ -211,8 +216,9 @@ impl HeightField {
     /// Makes a tile ready for writing: (pool tile of heights, pool tile of sinkage).
     #[inline]
     pub(crate) fn touch(&mut self, tile: usize) -> (u32, u32) {
+        self.writes += 1;
         let t = &mut self.tiles[tile];
-        t.generation += 1;
+        t.generation = self.writes;
         if t.sinkage == UNTOUCHED {
             t.sinkage = self.pool.take();
             self.pool.tile_mut(t.sinkage).fill(0);
@@ -239,7 +245,7 @@ impl HeightField {
         }
     }
 
-    /// Grows with every write to the tile.
+    /// New with every write to the tile; equal numbers mean equal contents.
     #[inline]
     pub fn generation(&self, tile: usize) -> u64 {
         self.tiles[tile].generation
@@ -304,7 +310,7 @@ impl HeightField {
         FieldTile { generation: tile.generation, values }
     }
 
-    /// Undoes all writes to a tile.
+    /// Undoes all writes to a tile; the caller takes it out of the list of touched ones.
     pub(crate) fn revert(&mut self, tile: usize) {
         let (heights, sinkage) = self.touch(tile);
         for k in 0..TILE_NODES {
@@ -313,6 +319,15 @@ impl HeightField {
         }
         self.pool.release(sinkage);
         self.tiles[tile].sinkage = UNTOUCHED;
+    }
+
+    /// Moves a tile to where its nodes have sunk by `sunk` units since the start.
+    pub(crate) fn put_sinkage(&mut self, tile: usize, sunk: &[i32]) {
+        let (heights, sinkage) = self.touch(tile);
+        for (k, sunk) in sunk.iter().enumerate() {
+            let before = std::mem::replace(&mut self.pool.tile_mut(sinkage)[k], *sunk);
+            self.pool.tile_mut(heights)[k] += before - sunk;
+        }
     }
 }
 

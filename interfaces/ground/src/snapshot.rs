@@ -1,7 +1,70 @@
-//! Exact copies of a height field's changes, for saving and rewinding; cost follows the touched tiles only.
+//! Exact copies of a height field's changes, for saving and rewinding. Saving again and going back touch only the tiles
+//! that were written in between.
 
 use crate::height_field::HeightField;
 use crate::lattice::TILE_NODES;
+use std::sync::Arc;
+
+/// Tells fields apart, so that a generation means the same contents only in the field that counted it. A copy of a
+/// field is another field.
+#[derive(Debug, Default)]
+pub(crate) struct Identity(Arc<()>);
+
+impl Clone for Identity {
+    fn clone(&self) -> Self {
+        Self::default()
+    }
+}
+
+/// The field from which a snapshot was last filled, and the generation of each of its tiles then.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Origin {
+    field: Option<Arc<()>>,
+    generations: Vec<u64>,
+}
+
+impl Origin {
+    /// From now on that of this field; what was known of another one's tiles is forgotten.
+    pub fn set(&mut self, field: &Identity) {
+        if !self.is(field) {
+            self.generations.clear();
+            self.field = Some(field.0.clone());
+        }
+    }
+
+    /// Whether it was filled from this field.
+    pub fn is(&self, field: &Identity) -> bool {
+        self.field.as_ref().is_some_and(|own| Arc::ptr_eq(own, &field.0))
+    }
+
+    /// Whether entry k is known to hold the contents of `generation`.
+    pub fn holds(&self, k: usize, generation: u64) -> bool {
+        self.generations.get(k) == Some(&generation)
+    }
+
+    /// Entry k holds the contents of `generation`; entries become known in their order.
+    pub fn note(&mut self, k: usize, generation: u64) {
+        match self.generations.get_mut(k) {
+            Some(place) => *place = generation,
+            None => self.generations.push(generation),
+        }
+    }
+
+    /// Only the first `count` entries are left.
+    pub fn truncate(&mut self, count: usize) {
+        self.generations.truncate(count);
+    }
+
+    /// Generation of entry k.
+    pub fn generation(&self, k: usize) -> Option<u64> {
+        self.generations.get(k).copied()
+    }
+}
+
+/// Number of entries at the start that two lists of tiles have in common.
+pub(crate) fn common(a: &[u32], b: &[u32]) -> usize {
+    a.iter().zip(b).take_while(|(a, b)| a == b).count()
+}
 
 /// What was changed since the start: the sinkage of every touched tile. Refilled without allocation once it
 /// was large enough.
@@ -9,6 +72,7 @@ use crate::lattice::TILE_NODES;
 pub struct HeightSnapshot {
     touched: Vec<u32>,
     sinkage: Vec<i32>,
+    origin: Origin,
 }
 
 impl HeightSnapshot {
@@ -21,6 +85,7 @@ impl HeightSnapshot {
     pub fn push(&mut self, tile: u32, sinkage: &[i32]) -> bool {
         let right = sinkage.len() == TILE_NODES;
         if right {
+            self.origin = Origin::default();
             self.touched.push(tile);
             self.sinkage.extend_from_slice(sinkage);
         }
@@ -29,27 +94,44 @@ impl HeightSnapshot {
 }
 
 impl HeightField {
-    /// Copies the changes since the start into `out`.
+    /// Copies the changes since the start into `out`; what `out` holds already of them is left as it is.
     pub fn save(&self, out: &mut HeightSnapshot) {
-        out.touched.clear();
-        out.sinkage.clear();
-        out.touched.extend_from_slice(&self.touched);
-        for tile in &self.touched {
-            out.sinkage.extend_from_slice(self.pool.tile(self.tiles[*tile as usize].sinkage));
+        out.origin.set(&self.identity);
+        let same = common(&self.touched, &out.touched);
+        out.origin.truncate(same);
+        out.touched.truncate(same);
+        out.touched.extend_from_slice(&self.touched[same..]);
+        out.sinkage.resize(self.touched.len() * TILE_NODES, 0);
+        let places = out.sinkage.chunks_exact_mut(TILE_NODES);
+        for (k, (tile, place)) in self.touched.iter().zip(places).enumerate() {
+            let tile = &self.tiles[*tile as usize];
+            if !out.origin.holds(k, tile.generation) {
+                place.copy_from_slice(self.pool.tile(tile.sinkage));
+                out.origin.note(k, tile.generation);
+            }
         }
     }
 
-    /// Back to a state saved from this field or from one made of the same terrain.
+    /// Back to a state saved from this field or from one made of the same terrain. A tile that comes back has the
+    /// generation that it had when it was saved from this field.
     pub fn restore(&mut self, snapshot: &HeightSnapshot) {
-        while let Some(tile) = self.touched.last().copied() {
-            self.revert(tile as usize);
-            self.touched.pop();
+        let own = snapshot.origin.is(&self.identity);
+        let same = common(&self.touched, &snapshot.touched);
+        while self.touched.len() > same {
+            if let Some(tile) = self.touched.pop() {
+                self.revert(tile as usize);
+            }
         }
         let count = self.tiles.len();
-        for (tile, saved) in snapshot.tiles().filter(|(tile, _)| (*tile as usize) < count) {
-            let (heights, sinkage) = self.touch(tile as usize);
-            self.pool.tile_mut(heights).iter_mut().zip(saved).for_each(|(h, s)| *h -= s);
-            self.pool.tile_mut(sinkage).copy_from_slice(saved);
+        for (k, (tile, saved)) in snapshot.tiles().enumerate().filter(|(_, (t, _))| (*t as usize) < count) {
+            let tile = tile as usize;
+            if own && k < same && snapshot.origin.holds(k, self.tiles[tile].generation) {
+                continue;
+            }
+            self.put_sinkage(tile, saved);
+            if let Some(generation) = snapshot.origin.generation(k).filter(|_| own) {
+                self.tiles[tile].generation = generation;
+            }
         }
     }
 }

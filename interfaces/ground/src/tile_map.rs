@@ -2,6 +2,7 @@
 
 use crate::lattice::{Lattice, TILE_NODES};
 use crate::pool::Pool;
+use crate::snapshot::{Identity, Origin, common};
 use terraglue_subsystem::{FieldTile, TileValues};
 
 const ABSENT: u32 = u32::MAX;
@@ -16,18 +17,23 @@ pub struct TileMap<T> {
     touched: Vec<u32>,
     pool: Pool<T>,
     default: T,
+    /// Grows with every write and never goes back: the source of the tiles' generations.
+    writes: u64,
+    identity: Identity,
 }
 
-/// Exact copy of the tiles of a [`TileMap`] that exist; refilled without allocation once it was large enough.
+/// Exact copy of the tiles of a [`TileMap`] that exist; refilled without allocation once it was large enough, and without
+/// looking at tiles that nobody has written since.
 #[derive(Clone, Debug)]
 pub struct TileMapSnapshot<T> {
     touched: Vec<u32>,
     values: Vec<T>,
+    origin: Origin,
 }
 
 impl<T> Default for TileMapSnapshot<T> {
     fn default() -> Self {
-        Self { touched: Vec::new(), values: Vec::new() }
+        Self { touched: Vec::new(), values: Vec::new(), origin: Origin::default() }
     }
 }
 
@@ -38,7 +44,8 @@ impl<T: Copy> TileMap<T> {
         let mut pool = Pool::new(default);
         pool.reserve(reserve.min(count));
         let touched = Vec::with_capacity(count);
-        Self { lattice, tiles: vec![ABSENT; count], generations: vec![0; count], touched, pool, default }
+        let (tiles, generations) = (vec![ABSENT; count], vec![0; count]);
+        Self { lattice, tiles, generations, touched, pool, default, writes: 0, identity: Identity::default() }
     }
 
     /// Where the nodes lie.
@@ -84,7 +91,8 @@ impl<T: Copy> TileMap<T> {
     /// The nodes of a tile for writing; it exists from now on.
     #[inline]
     pub fn tile_mut(&mut self, tile: usize) -> &mut [T] {
-        self.generations[tile] += 1;
+        self.writes += 1;
+        self.generations[tile] = self.writes;
         if self.tiles[tile] == ABSENT {
             let slot = self.pool.take();
             self.pool.tile_mut(slot).fill(self.default);
@@ -99,40 +107,61 @@ impl<T: Copy> TileMap<T> {
         &self.touched
     }
 
-    /// Grows with every write to the tile.
+    /// New with every write to the tile; equal numbers mean equal contents.
     pub fn generation(&self, tile: usize) -> u64 {
         self.generations[tile]
     }
 
     /// All nodes back to the default.
     pub fn clear(&mut self) {
-        self.drop_tiles();
+        self.drop_tiles(0);
     }
 
-    /// Copies all tiles that exist into `out`.
+    /// Copies all tiles that exist into `out`; what `out` holds already of them is left as it is.
     pub fn save(&self, out: &mut TileMapSnapshot<T>) {
-        out.touched.clear();
-        out.values.clear();
-        out.touched.extend_from_slice(&self.touched);
-        for tile in &self.touched {
-            out.values.extend_from_slice(self.pool.tile(self.tiles[*tile as usize]));
+        out.origin.set(&self.identity);
+        let same = common(&self.touched, &out.touched);
+        out.origin.truncate(same);
+        out.touched.truncate(same);
+        out.touched.extend_from_slice(&self.touched[same..]);
+        out.values.resize(self.touched.len() * TILE_NODES, self.default);
+        let places = out.values.chunks_exact_mut(TILE_NODES);
+        for (k, (tile, place)) in self.touched.iter().zip(places).enumerate() {
+            let tile = *tile as usize;
+            if !out.origin.holds(k, self.generations[tile]) {
+                place.copy_from_slice(self.pool.tile(self.tiles[tile]));
+                out.origin.note(k, self.generations[tile]);
+            }
         }
     }
 
-    /// Back to a state made by [`TileMap::save`] of this map or of one on the same lattice.
+    /// Back to a state made by [`TileMap::save`] of this map or of one on the same lattice. A tile that comes back has
+    /// the generation that it had when it was saved from this map.
     pub fn restore(&mut self, snapshot: &TileMapSnapshot<T>) {
-        self.drop_tiles();
+        let own = snapshot.origin.is(&self.identity);
+        let same = common(&self.touched, &snapshot.touched);
+        self.drop_tiles(same);
         let count = self.tiles.len();
-        for (tile, values) in snapshot.tiles().filter(|(tile, _)| (*tile as usize) < count) {
-            self.tile_mut(tile as usize).copy_from_slice(values);
+        for (k, (tile, saved)) in snapshot.tiles().enumerate().filter(|(_, (t, _))| (*t as usize) < count) {
+            let tile = tile as usize;
+            if own && k < same && snapshot.origin.holds(k, self.generations[tile]) {
+                continue;
+            }
+            self.tile_mut(tile).copy_from_slice(saved);
+            if let Some(generation) = snapshot.origin.generation(k).filter(|_| own) {
+                self.generations[tile] = generation;
+            }
         }
     }
 
-    fn drop_tiles(&mut self) {
-        for tile in self.touched.drain(..) {
+    /// Leaves only the first `count` tiles that exist.
+    fn drop_tiles(&mut self, count: usize) {
+        while self.touched.len() > count {
+            let Some(tile) = self.touched.pop() else { return };
             self.pool.release(self.tiles[tile as usize]);
             self.tiles[tile as usize] = ABSENT;
-            self.generations[tile as usize] += 1;
+            self.writes += 1;
+            self.generations[tile as usize] = self.writes;
         }
     }
 }
@@ -148,6 +177,7 @@ impl<T> TileMapSnapshot<T> {
         let before = self.values.len();
         self.values.extend(values);
         let right = self.values.len() == before + TILE_NODES;
+        self.origin = Origin::default();
         if right {
             self.touched.push(tile);
         } else {

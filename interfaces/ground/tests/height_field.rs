@@ -58,6 +58,7 @@ fn untouched_flat_ground_stays_one_number_per_tile() {
 }
 
 proptest! {
+    #![proptest_config(ProptestConfig::with_cases(48))]
     #[test]
     fn moved_material_is_neither_made_nor_lost(
         moves in prop::collection::vec((0..201i32, 0..101i32, 0..201i32, 0..101i32, 1..100_000i32), 1..200),
@@ -106,5 +107,46 @@ proptest! {
         }
         prop_assert_eq!(map.touched(), kept_map.touched());
         prop_assert_eq!(field.touched(), kept.touched());
+    }
+
+    #[test]
+    fn any_order_of_saving_and_going_back_gives_the_saved_contents(
+        actions in prop::collection::vec((0..7u32, 0..2usize, 0..201i32, 0..101i32, -1000..1000i32), 2..150),
+    ) {
+        let mut field = HeightField::from_terrain(&Wavy).expect("in range");
+        let mut map = TileMap::new(LATTICE, 7.0, 4);
+        let mut slots: [(HeightSnapshot, TileMapSnapshot<f64>); 2] = Default::default();
+        let mut models = [None, None];
+        for (action, slot, i, j, u) in actions {
+            match (action, &models[slot]) {
+                (0, _) => {
+                    field.save(&mut slots[slot].0);
+                    map.save(&mut slots[slot].1);
+                    models[slot] = Some((field.clone(), map.clone()));
+                }
+                (1, Some((heights, values))) => {
+                    let before: Vec<u64> = (0..28).map(|t| field.generation(t)).collect();
+                    let old = field.clone();
+                    field.restore(&slots[slot].0);
+                    map.restore(&slots[slot].1);
+                    for tile in 0..28 {
+                        prop_assert_eq!(field.tile(tile), heights.tile(tile));
+                        prop_assert_eq!(map.tile(tile), values.tile(tile));
+                        // a number that stays tells readers that nothing changed
+                        prop_assert!(field.generation(tile) != before[tile] || field.tile(tile) == old.tile(tile));
+                    }
+                    prop_assert_eq!(field.gained_units(), heights.gained_units());
+                    prop_assert_eq!(field.touched(), heights.touched());
+                    // a field that was made anew from the same terrain
+                    let mut other = HeightField::from_terrain(&Wavy).expect("in range");
+                    other.restore(&slots[slot].0);
+                    (0..28).for_each(|tile| assert_eq!(other.tile(tile), heights.tile(tile)));
+                }
+                _ => {
+                    field.add_units(i, j, u);
+                    *map.get_mut(i, j) += f64::from(u);
+                }
+            }
+        }
     }
 }

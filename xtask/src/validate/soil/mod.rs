@@ -12,7 +12,7 @@ mod wheel_rig;
 mod wheels;
 mod wong_reece;
 
-pub use automaton::print_hash;
+pub use automaton::{print_hash, write_picture};
 
 use super::{Context, Figure};
 use crate::process::Outcome;

@@ -1,6 +1,7 @@
 //! The cellular automaton: slopes, curvature, mass, reproducibility, contact geometry, cost.
 
 mod cone;
+mod cost;
 #[path = "../../../../../modules/soil-cellular-automaton/tests/feet/mod.rs"]
 mod feet;
 mod field;
@@ -9,8 +10,10 @@ mod geometry;
 mod hash;
 mod machine;
 mod mass;
+mod picture;
 
 pub use hash::print as print_hash;
+pub use picture::write_picture;
 
 use crate::process::Outcome;
 use crate::validate::{Context, Figure};
@@ -26,5 +29,8 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     all.push(mass::figure(context)?);
     all.extend(hash::figures(context)?);
     all.extend(geometry::figures(context));
+    if context.timing {
+        all.extend(cost::figures(context)?);
+    }
     Ok(all)
 }

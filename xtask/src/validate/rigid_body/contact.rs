@@ -2,6 +2,7 @@
 
 mod analytic;
 mod gait;
+mod peers;
 mod problems;
 mod scenes;
 mod small;
@@ -16,5 +17,6 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     all.extend(small::figures(context)?);
     all.extend(analytic::figures(context)?);
     all.extend(problems::figures(context)?);
+    all.extend(peers::figures(context)?);
     Ok(all)
 }

@@ -1,0 +1,115 @@
+"""MuJoCo on the cases of `cargo xtask validate rigid-body`: one line per figure, `name<TAB>value<TAB>what`.
+
+Usage: peer_mujoco.py HEXAPOD.xml GAIT.csv. Step 1 ms, default (soft) contacts, and contacts as stiff as the step admits.
+"""
+
+import csv
+import math
+import sys
+import time
+
+import mujoco
+
+STAND = [0.0, 0.9581921787462744, -1.3796341802638374, -1.1493543252773333]
+CYCLE = 1.2
+STIFF = '<default><geom solref="0.002 1" solimp="0.99 0.9999 0.0001"/></default>'
+
+
+def figure(name, value, what):
+    print(f"{name}\t{float(value)!r}\t{what}")
+
+
+def targets(t, rows):
+    blend = min(max(t - 0.5, 0.0), 1.0)
+    place = (max(t - 0.5, 0.0) % CYCLE) / CYCLE * (len(rows) - 1)
+    k = min(int(place), len(rows) - 2)
+    part = place - k
+    out = []
+    for j in range(24):
+        gait = (1 - part) * rows[k][j] + part * rows[k + 1][j]
+        out.append(STAND[j % 4] + blend * (gait - STAND[j % 4]))
+    return out
+
+
+def walk(xml, rows, name):
+    model = mujoco.MjModel.from_xml_string(xml)
+    data = mujoco.MjData(model)
+    data.qpos[7:31] = STAND * 6
+    feet = [model.geom(f"{leg}4_foot").id for leg in ("LF", "LM", "LR", "RF", "RM", "RR")]
+    times, slips, deepest = [], [], 0.0
+    last = [None] * 6
+    wanted = [targets(i * 1e-3, rows) for i in range(10_000)]
+    for i in range(10_000):
+        start = time.thread_time()
+        data.ctrl[:] = wanted[i]
+        mujoco.mj_step(model, data)
+        times.append(time.thread_time() - start)
+        for k, foot in enumerate(feet):
+            x, y, z = data.geom_xpos[foot]
+            stands = z < 0.03
+            if i >= 2000:
+                deepest = max(deepest, 0.03 - z)
+                if stands and last[k]:
+                    slips.append(math.hypot(x - last[k][0], y - last[k][1]) / 1e-3)
+            last[k] = (x, y) if stands else None
+    times.sort()
+    figure(f"gait.{name}.step", 1e6 * times[5000], "CPU time of a step, median, µs")
+    figure(f"gait.{name}.tail", times[9900] / times[5000], "99th percentile / median")
+    figure(f"gait.{name}.penetration", 1e3 * deepest, "deepest foot after 2 s, mm")
+    figure(f"gait.{name}.slip", 1e3 * sum(slips) / max(len(slips), 1), "mean speed of feet that stand, mm/s")
+    figure(f"gait.{name}.x", float(data.qpos[0]), "distance in 10 s, m")
+
+
+def scene(gravity, bodies, friction):
+    text = "".join(
+        f'<body pos="0 0 {z}"><freejoint/><geom type="box" size="{x} {y} {h}" mass="{mass}" '
+        f'friction="{friction} 0 0" condim="3"/></body>'
+        for mass, (x, y, h), z in bodies
+    )
+    gx, gz = gravity
+    xml = (
+        f'<mujoco><option timestep="0.001" gravity="{gx} 0 {gz}" integrator="implicitfast"/><worldbody>'
+        f'<geom type="plane" size="0 0 1" friction="{friction} 0 0" condim="3"/>{text}</worldbody></mujoco>'
+    )
+    model = mujoco.MjModel.from_xml_string(xml)
+    return model, mujoco.MjData(model)
+
+
+def run(model, data, until):
+    while data.time < until - 1e-9:
+        mujoco.mj_step(model, data)
+
+
+def incline(degrees):
+    a = math.radians(degrees)
+    return scene((9.81 * math.sin(a), -9.81 * math.cos(a)), [(1.0, (0.1, 0.1, 0.05), 0.05)], 0.5)
+
+
+def main():
+    with open(sys.argv[1], encoding="utf-8") as file:
+        xml = file.read()
+    with open(sys.argv[2], encoding="utf-8") as file:
+        rows = [[float(x) for x in row[1:]] for row in list(csv.reader(file))[1:]]
+    figure("version", int("".join(f"{int(part):03d}" for part in mujoco.__version__.split(".")[:3])), mujoco.__version__)
+    walk(xml, rows, "soft")
+    walk(xml.replace("<worldbody>", STIFF + "<worldbody>", 1), rows, "stiff_contacts")
+    model, data = incline(20)
+    run(model, data, 5.0)
+    before = data.qpos[0]
+    run(model, data, 10.0)
+    figure("incline.creep", 1e3 * abs(data.qpos[0] - before) / 5.0, "box on 20° with μ = 0.5: creep, mm/s")
+    model, data = incline(35)
+    run(model, data, 2.0)
+    error = 2 * data.qpos[0] / 4.0 / 1.608844063366257 - 1
+    figure("incline.acceleration", abs(error), "box on 35° with μ = 0.5: error of 2x/t²")
+    for name, bodies in (
+        ("stack.sink", [(1.0, (0.1, 0.1, 0.1), 0.1 + 0.2 * k) for k in range(10)]),
+        ("heavy.sink", [(1.0, (0.1, 0.1, 0.1), 0.1), (1000.0, (0.1, 0.1, 0.1), 0.3)]),
+    ):
+        model, data = scene((0.0, -9.81), bodies, 0.6)
+        start = data.qpos[-5]
+        run(model, data, 5.0)
+        figure(name, 1e3 * abs(start - data.qpos[-5]), "5 s: sink of the top, mm")
+
+
+main()

@@ -39,24 +39,12 @@ pub fn nodes_below<S: Surface + ?Sized>(shape: &Placed, surface: &S, margin: f64
             }
             let cell = Cell { at: lattice.position(i, j), half: 0.5 * lattice.spacing };
             if let Some((area, [x, y, lower])) = outline.node(shape, &cell, reach) {
-                let slope = slope_at(shape, &cell, [x, y, lower]);
+                let slope = shape.underside_slope([x, y, lower]);
                 out.push(Node { i, j, area, lower, slope });
             }
         }
     }
 }
-
-/// Slope of the underside at the point that stands for a cell. Where that is a point of the rim because the node
-/// itself lies beside the shape, and the side is a wall there, the underside ends: its height does not change when the
-/// shape moves towards the node.
-fn slope_at(shape: &Placed, cell: &Cell, point: [f64; 3]) -> [f64; 2] {
-    let slope = shape.underside_slope(point);
-    let beside = [point[0], point[1]] != cell.at;
-    if beside && slope[0] * slope[0] + slope[1] * slope[1] > WALL * WALL { [0.0; 2] } else { slope }
-}
-
-/// Slope from which the side of a shape counts as a wall.
-const WALL: f64 = 2.5;
 
 /// A square of side 2·half around a node.
 struct Cell {

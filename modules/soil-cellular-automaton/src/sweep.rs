@@ -103,6 +103,10 @@ fn reach(sweeps: u32, parity: u32) -> usize {
     (0..sweeps).map(|k| if (parity + k).is_multiple_of(2) { 3 } else { 1 }).sum()
 }
 
+/// Windows that stand ready, and the side (nodes) up to which using one allocates nothing.
+const WINDOWS: usize = 16;
+const WINDOW_SIDE: usize = 128;
+
 impl Sweeper {
     /// A sweeper for ground where nothing has happened.
     pub fn new(lattice: Lattice, host: Arc<dyn Host>, nodes: usize) -> Self {
@@ -115,7 +119,7 @@ impl Sweeper {
             limits: Limits::default(),
             host,
             areas: Vec::with_capacity(64),
-            windows: Vec::new(),
+            windows: (0..WINDOWS).map(|_| Mutex::new(Window::with_room(WINDOW_SIDE))).collect(),
         }
     }
 

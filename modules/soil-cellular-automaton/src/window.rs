@@ -79,6 +79,24 @@ pub struct Window {
 }
 
 impl Window {
+    /// An empty window with room for `side` × `side` nodes, so that filling one up to that size does not allocate.
+    pub fn with_room(side: usize) -> Self {
+        let stride = LEFT + side.next_multiple_of(LANES) + RIGHT;
+        let spans = || Vec::with_capacity(side);
+        Self {
+            levels: Vec::with_capacity(side * stride),
+            inlets: Vec::with_capacity(side * stride),
+            limited: Vec::with_capacity(side),
+            below: Vec::with_capacity(side * side),
+            repose: spans(),
+            curvature: spans(),
+            next: spans(),
+            dirty: spans(),
+            work: (0..WORK_ROWS).map(|_| Vec::with_capacity(stride)).collect(),
+            ..Self::default()
+        }
+    }
+
     /// Copies the ground around `area`, `reach` nodes farther on every side, with the load of the feet.
     pub fn fill(&mut self, ground: &Ground, feet: &[Foot], area: Rectangle, reach: usize) {
         let lattice = *ground.heights.lattice();

@@ -1,5 +1,6 @@
-//! The developer commands, the same as in CI: `cargo xtask test | validate | header | schema | install`.
+//! The developer commands, the same as in CI: `cargo xtask test | validate | faults | header | schema | install`.
 
+mod faults;
 mod header;
 mod install;
 mod process;
@@ -26,6 +27,8 @@ enum Command {
     Test,
     /// Measure the figures that the areas promise and hold them against their limits.
     Validate(validate::Arguments),
+    /// Run the fault scenarios and write the tables and the picture of docs/faults.md (some minutes).
+    Faults,
     /// Write interfaces/plugin/include/terraglue.h from the Rust definitions of the C ABI.
     Header {
         /// Change nothing; fail when the file is out of date.
@@ -58,6 +61,7 @@ fn main() -> ExitCode {
     let done: Outcome = match Arguments::parse().command {
         Command::Test => test::test(),
         Command::Validate(arguments) => validate::validate(&arguments),
+        Command::Faults => faults::write_page(),
         Command::Header { check } => header::run(check),
         Command::Pictures => validate::write_soil_picture(),
         Command::SoilHash { quick } => {

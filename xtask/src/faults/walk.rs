@@ -41,9 +41,12 @@ impl Walk {
             child.args(["--set", option]);
         });
         let output = child.output().map_err(|e| format!("{name}: {e}"))?;
-        let summary = serde_json::from_slice(&output.stdout).map_err(|_| {
+        let summary: Value = serde_json::from_slice(&output.stdout).map_err(|_| {
             format!("{name} gave no summary: {}", String::from_utf8_lossy(&output.stderr).trim())
         })?;
+        if summary["status"] != "done" {
+            return Err(format!("{name} ended early: {}", summary["error"]["message"]));
+        }
         Self::read(&folder.join("variables.csv"), summary)
     }
 

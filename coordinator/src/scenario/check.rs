@@ -34,6 +34,10 @@ pub fn check_value(parameter: &Parameter, count: Option<usize>, value: &Value) -
             by_name(value).try_for_each(|v| check_number(parameter, count, v.as_f64(), v))
         }
         ParameterType::TextByName => by_name(value).try_for_each(|v| check_text(parameter, count, v)),
+        ParameterType::Tables => {
+            let ok = value.as_array().is_some_and(|list| list.iter().all(Value::is_object));
+            typed(parameter, count, ok, value)
+        }
     }
 }
 
@@ -130,6 +134,7 @@ pub fn allowed(p: &Parameter, count: Option<usize>) -> String {
         }
         (ParameterType::Numbers, Some(n)) => format!("a list of {n} numbers{range}"),
         (ParameterType::Numbers, None) => format!("a list of numbers{range}"),
+        (ParameterType::Tables, _) => "a list of tables, [[...]]".into(),
         (ParameterType::NumberTable, _) => format!("a table of numbers{range}"),
         (ParameterType::NumberByName, _) => format!("a number{range}, or a table of them by name"),
         (ParameterType::TextByName, _) => {

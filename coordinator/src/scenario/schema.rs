@@ -87,6 +87,7 @@ fn plain(p: &Parameter) -> Value {
         ParameterType::NumberByName => either(number(p, "number")),
         ParameterType::TextByName if !p.choices.is_empty() => either(json!({ "enum": p.choices })),
         ParameterType::TextByName => either(json!({ "type": "string" })),
+        ParameterType::Tables => json!({ "type": "array", "items": { "type": "object" } }),
     }
 }
 

@@ -85,6 +85,8 @@ pub enum ParameterType {
     NumberByName,
     /// A text for all, or a table of texts by name pattern.
     TextByName,
+    /// A list of tables, whose keys the module checks.
+    Tables,
 }
 
 impl Parameter {

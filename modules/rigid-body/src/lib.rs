@@ -9,6 +9,7 @@
 //! | `model`, `state` | what stays and what changes |
 //! | `dynamics` | one step: joint rows, gyroscopic term, the whole KKT matrix, corrections |
 //! | `drive` | what acts along the free axis of a joint: motor, friction, limits, brake |
+//! | `closure` | what connects bodies beyond the tree: loops, rods, springs, couplings |
 //! | `actuator` | windings, gears, friction, heat, battery, energy |
 //! | `contact` | ports, the rigid estimate T*, contacts among own bodies |
 //! | `lcp` | pivoting methods, from the crate `contact-solver` |
@@ -17,6 +18,7 @@
 //! Deliberately absent: ground and soil. The robot knows its ports, never what lies behind them.
 
 mod actuator;
+mod closure;
 mod contact;
 mod dense;
 mod drive;

@@ -23,6 +23,14 @@ pub(crate) enum Kind {
     Revolute,
     Prismatic,
     Fixed,
+    /// Slides along its axis and turns about it.
+    Cylindrical,
+    /// Turns about the parent's axis x and the child's axis y of the joint frame, which stay perpendicular.
+    Universal,
+    /// Turns freely.
+    Spherical,
+    /// Slides across its axis and turns about it.
+    Planar,
 }
 
 /// A joint between a body and its parent (or the world).
@@ -43,18 +51,37 @@ pub(crate) struct Joint {
 }
 
 impl Joint {
-    /// Which of the six rows (three translations, three rotations, each along axis, t1, t2) is the free one.
+    /// Which of the six rows (three translations, three rotations, each along axis, t1, t2) is the free one, for joints
+    /// with one coordinate, which motors can drive.
     pub fn free_row(&self) -> Option<usize> {
         match self.kind {
             Kind::Prismatic => Some(0),
             Kind::Revolute => Some(3),
-            Kind::Fixed => None,
+            _ => None,
         }
     }
 
-    /// Whether it has a coordinate.
+    /// Which rows hold.
+    pub fn rigid(&self) -> [bool; 6] {
+        match self.kind {
+            Kind::Revolute => [true, true, true, false, true, true],
+            Kind::Prismatic => [false, true, true, true, true, true],
+            Kind::Fixed => [true; 6],
+            Kind::Cylindrical => [false, true, true, false, true, true],
+            Kind::Universal => [true, true, true, false, false, true],
+            Kind::Spherical => [true, true, true, false, false, false],
+            Kind::Planar => [true, false, false, false, true, true],
+        }
+    }
+
+    /// Whether it keeps two axes parallel that may turn about each other.
+    pub fn aligns_axes(&self) -> bool {
+        matches!(self.kind, Kind::Revolute | Kind::Cylindrical | Kind::Planar)
+    }
+
+    /// Whether it has one coordinate.
     pub fn moves(&self) -> bool {
-        self.kind != Kind::Fixed
+        self.free_row().is_some()
     }
 
     /// Unit of its coordinate.
@@ -70,6 +97,8 @@ pub(crate) struct Model {
     pub joints: Vec<Joint>,
     /// Joint above each body.
     pub joint_above: Vec<Option<usize>>,
+    /// Connections beyond the tree.
+    pub closures: Vec<crate::closure::Closure>,
     pub gravity: V3,
     /// Pose of body 0 at the file's root frame = origin; `None`: the root frame is the world.
     pub free_base: Option<Isometry3<f64>>,
@@ -91,7 +120,7 @@ impl Model {
         };
         let mut joint_above = vec![None; bodies.len()];
         joints.iter().enumerate().for_each(|(i, j)| joint_above[j.child] = Some(i));
-        Self { bodies, joints, joint_above, gravity, free_base }
+        Self { bodies, joints, joint_above, closures: Vec::new(), gravity, free_base }
     }
 
     /// Total mass, kg.

@@ -1,16 +1,17 @@
 //! The module: from parameters to an instance.
 
 use crate::actuator::{Actuator, configure};
+use crate::closure::configure::closures;
 use crate::contact::bodies::{Law, Surface};
 use crate::contact::plane::Plane;
 use crate::drive::{Mode, Motor};
 use crate::dynamics::Dynamics;
 use crate::dynamics::scheme::{Acceleration, Integrator, Weights};
 use crate::math::V3;
-use crate::model::Model;
+use crate::model::{Kind, Model};
 use crate::placement::{StartRates, at_rest, base_pose, clearance, coordinates, joint_rates, set_moving};
 use crate::robot::Robot;
-use crate::state::{ContactBook, JointState, Motion, State};
+use crate::state::{ClosureState, ContactBook, JointState, Motion, State};
 use nalgebra::Isometry3;
 use std::path::Path;
 use std::sync::Arc;
@@ -32,7 +33,8 @@ impl Module for RigidBody {
         let path = Path::new(host.folder()).join(config.text("model")?);
         let file = read_urdf(&path, fixed).map_err(|e| Error::Refused(e.to_string()))?;
         let base = base_pose(&vector(&config, "position_m")?, config.number("heading_rad")?);
-        let model = Model::new(&file, &base, fixed, V3::from(host.gravity()));
+        let mut model = Model::new(&file, &base, fixed, V3::from(host.gravity()));
+        set_kinds(&config, &mut model)?;
         let angles = coordinates(&model, &config.number_table("joints")?)?;
         let rates = StartRates {
             velocity: vector(&config, "velocity_m_s")?,
@@ -41,13 +43,16 @@ impl Module for RigidBody {
         };
         let bodies = start(&config, &*host, &model, base, (&angles, &rates))?;
         let joints = joint_states(&config, &model, &angles, &rates.joints)?;
-        let state = State {
+        model.closures = closures(&config, &model, &bodies, &angles)?;
+        let mut state = State {
             forces: vec![V3::zeros(); bodies.len()],
             contact_normal: vec![0.0; bodies.len()],
             accelerations: vec![Acceleration::default(); bodies.len()],
             accelerated: false,
             bodies,
             joints,
+            closures: vec![ClosureState::default(); model.closures.len()],
+            redundant_rows: 0,
             energy: Energy::default(),
             contact: ContactBook::default(),
             pressed: Vec::new(),
@@ -75,8 +80,47 @@ impl Module for RigidBody {
             Error::Refused(format!("parameter `contact_solver` = `{name}` is none of {:?}", Law::NAMES))
         })?;
         dynamics.contacts.set_surroundings(law, surface(&config)?, ground);
+        settle_loops(&*host, &mut dynamics, &mut state)?;
         Ok(Box::new(Robot::new(host, dynamics, state)))
     }
+}
+
+/// Counts the rows that loops promise in vain, and takes from the initial rates what loops do not allow.
+fn settle_loops(host: &dyn Host, dynamics: &mut Dynamics, state: &mut State) -> Result<()> {
+    if dynamics.model.closures.is_empty() {
+        return Ok(());
+    }
+    let changed = dynamics.settle_closures(state).map_err(|e| Error::Failed(e.to_string()))?;
+    if state.redundant_rows > 0 {
+        let text = format!(
+            "loops: {} of their rows follow from the others; forces there are one of many choices",
+            state.redundant_rows
+        );
+        host.log(LogLevel::Warning, &text);
+    }
+    if changed > 1e-9 {
+        let text = format!("loops: initial rates changed by up to {changed:.3e} (m/s or rad/s) to fit them");
+        host.log(LogLevel::Warning, &text);
+    }
+    Ok(())
+}
+
+/// Kinds of joints that the robot file has no word for.
+fn set_kinds(config: &Config, model: &mut Model) -> Result<()> {
+    let names: Vec<String> = model.joints.iter().map(|j| j.name.clone()).collect();
+    let kind = |name: &String| configure::text(config, model, "joint_kind", name).map(|k| k.map(str::to_owned));
+    let kinds = names.iter().map(kind).collect::<Result<Vec<_>>>()?;
+    for (joint, kind) in model.joints.iter_mut().zip(kinds).filter(|(j, _)| j.moves()) {
+        joint.kind = match kind.as_deref() {
+            Some("cylindrical") => Kind::Cylindrical,
+            Some("universal") => Kind::Universal,
+            Some("spherical") => Kind::Spherical,
+            Some("planar") => Kind::Planar,
+            _ => continue,
+        };
+        joint.limits = None;
+    }
+    Ok(())
 }
 
 /// Friction and restitution among bodies and with rigid ground.

@@ -353,6 +353,7 @@ impl Subsystem for Robot {
         self.book_contacts();
         self.book_ports(step, t);
         self.book_joints();
+        self.dynamics.book_closures(&mut self.state);
         self.state.bodies.clone_from(&self.dynamics.ends);
         self.changed();
         Ok(())
@@ -419,6 +420,14 @@ impl Subsystem for Robot {
     fn act(&mut self, action: &str, _arguments: &str) -> Result {
         let unknown = || Error::Refused(format!("there is no action `{action}`"));
         let (name, what) = action.rsplit_once('.').ok_or_else(unknown)?;
+        if let Some(closure) = self.model().closures.iter().position(|c| c.name == name) {
+            if what != "break" {
+                return Err(unknown());
+            }
+            variables::break_closure(&mut self.state, closure);
+            self.changed();
+            return Ok(());
+        }
         let joint = self.model().joints.iter().position(|j| j.name == name).ok_or_else(unknown)?;
         let moves = self.model().joints[joint].moves();
         match what {
@@ -456,6 +465,7 @@ impl Subsystem for Robot {
                 (potential, kinetic) = (potential + spring, kinetic + armature);
             }
         }
+        potential += self.state.closures.iter().filter(|s| !s.broken).map(|s| s.stored).sum::<f64>();
         Energy { kinetic, potential, ..self.state.energy }
     }
 }

@@ -53,6 +53,14 @@ pub(crate) fn schema() -> Schema {
                 )
                 .optional()
             },
+            Parameter::of(
+                "joint_kind",
+                ParameterType::TextByName,
+                "Kind of joints by name that the robot file has no word for; they have no motor. A universal joint turns about \
+                 its axis and a second one across it on the child (y for z, x for y, z for x)",
+            )
+            .optional()
+            .choices(&["as-in-file", "cylindrical", "universal", "spherical", "planar"]),
             Parameter::of("fixed_base", ParameterType::Bool, "Fix the root link to the world").or(false),
             Parameter::of(
                 "place_on_ground",
@@ -96,6 +104,7 @@ pub(crate) fn schema() -> Schema {
                 .within(0.0, 1.0),
         ]
         .into_iter()
+        .chain(crate::closure::configure::parameters())
         .chain(crate::actuator::configure::parameters())
         .collect(),
     }

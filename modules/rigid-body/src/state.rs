@@ -51,6 +51,17 @@ pub(crate) struct JointState {
     pub actuator: Actuator,
 }
 
+/// A connection beyond the tree.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub(crate) struct ClosureState {
+    pub broken: bool,
+    /// Magnitudes of force (N) and moment (N m) in the last step.
+    pub force: f64,
+    pub moment: f64,
+    /// Energy in a spring, J.
+    pub stored: f64,
+}
+
 /// What the last step says about contacts among the bodies and with rigid ground.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub(crate) struct ContactBook {
@@ -69,6 +80,9 @@ pub(crate) struct ContactBook {
 pub(crate) struct State {
     pub bodies: Vec<Motion>,
     pub joints: Vec<JointState>,
+    pub closures: Vec<ClosureState>,
+    /// Rows that close loops and say nothing that the others do not say, at the last step.
+    pub redundant_rows: usize,
     /// External force at the centre of mass, N.
     pub forces: Vec<V3>,
     /// Normal force of all ports of a body, N.
@@ -93,6 +107,8 @@ impl State {
     pub fn copy_from(&mut self, other: &Self) {
         self.bodies.clone_from(&other.bodies);
         self.joints.clone_from(&other.joints);
+        self.closures.clone_from(&other.closures);
+        self.redundant_rows = other.redundant_rows;
         self.forces.clone_from(&other.forces);
         self.contact_normal.clone_from(&other.contact_normal);
         self.accelerations.clone_from(&other.accelerations);

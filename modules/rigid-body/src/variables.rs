@@ -25,6 +25,13 @@ pub(crate) enum Meaning {
     },
     /// Of the whole robot: place in [`ROBOT_ITEMS`].
     Robot(usize),
+    /// Number of dependent rows of loops.
+    RedundantRows,
+    /// Of a connection beyond the tree: place in [`CLOSURE_ITEMS`].
+    Closure {
+        closure: usize,
+        item: u32,
+    },
 }
 
 /// Items of a body: 0–11 motion, 12 contact force, 13–15 external force.
@@ -114,6 +121,14 @@ const ROBOT_ITEMS: [(&str, &str, &str); 13] = [
 ];
 /// Those before are there without a battery.
 const WITHOUT_BATTERY: usize = 10;
+/// Ids of connections beyond the tree; the one before is the number of dependent rows.
+const CLOSURES: u32 = 1 << 24;
+const CLOSURE_STRIDE: u32 = 8;
+const CLOSURE_ITEMS: [(&str, &str, &str); 2] = [
+    ("force", "N", "Magnitude of the force in the last step"),
+    ("moment", "N m", "Magnitude of the moment in the last step"),
+];
+const CLOSURE_BROKEN: u32 = 2;
 /// Nearer than this an energy per metre says nothing, m.
 const SHORTEST: f64 = 1e-2;
 
@@ -144,7 +159,25 @@ pub(crate) fn describe(model: &Model, state: &State) -> Vec<Variable> {
     for (item, (name, unit, help)) in ROBOT_ITEMS[..count].iter().enumerate() {
         all.push(Variable::real(first + item as u32, *name, unit, Causality::Output, help));
     }
+    describe_closures(model, &mut all);
     all
+}
+
+fn describe_closures(model: &Model, all: &mut Vec<Variable>) {
+    if model.closures.is_empty() {
+        return;
+    }
+    let help = "Rows of loops that follow from the others, in the last step";
+    all.push(Variable::real(CLOSURES - 1, "loops.redundant_rows", "", Causality::Output, help));
+    for (c, closure) in model.closures.iter().enumerate() {
+        let id = CLOSURES + c as u32 * CLOSURE_STRIDE;
+        for (item, (what, unit, help)) in CLOSURE_ITEMS.iter().enumerate() {
+            let name = format!("{}.{what}", closure.name);
+            all.push(Variable::real(id + item as u32, name, unit, Causality::Output, help));
+        }
+        let help = "Whether it is gone for ever; true breaks it";
+        all.push(flag(id + CLOSURE_BROKEN, &closure.name, "broken", Causality::Parameter, help));
+    }
 }
 
 /// What an actuator tells, and its data.
@@ -232,6 +265,7 @@ pub(crate) fn actions(model: &Model) -> Vec<Action> {
             all.push(action(&joint.name, "release", "Let a blocked joint move again"));
         }
     }
+    all.extend(model.closures.iter().map(|c| action(&c.name, "break", "Remove it for ever")));
     all
 }
 
@@ -239,6 +273,15 @@ pub(crate) fn actions(model: &Model) -> Vec<Action> {
 pub(crate) fn meaning(model: &Model, id: u32) -> Result<Meaning> {
     let first = model.bodies.len() as u32 * BODY_STRIDE;
     let unknown = || Error::Refused(format!("there is no variable number {id}"));
+    if id >= CLOSURES {
+        let (closure, item) = ((id - CLOSURES) / CLOSURE_STRIDE, (id - CLOSURES) % CLOSURE_STRIDE);
+        let known = (closure as usize) < model.closures.len() && item <= CLOSURE_BROKEN;
+        let meaning = Meaning::Closure { closure: closure as usize, item };
+        return if known { Ok(meaning) } else { Err(unknown()) };
+    }
+    if id == CLOSURES - 1 && !model.closures.is_empty() {
+        return Ok(Meaning::RedundantRows);
+    }
     if id < first {
         return Ok(Meaning::Body { body: (id / BODY_STRIDE) as usize, item: id % BODY_STRIDE });
     }
@@ -281,6 +324,12 @@ pub(crate) fn number(model: &Model, state: &State, id: u32) -> Result<f64> {
             }
         }
         Meaning::Robot(item) => Ok(robot_number(state, item)),
+        Meaning::RedundantRows => Ok(state.redundant_rows as f64),
+        Meaning::Closure { item: CLOSURE_BROKEN, .. } => Err(wrong_type(id)),
+        Meaning::Closure { closure, item } => {
+            let s = &state.closures[closure];
+            Ok(if item == 0 { s.force } else { s.moment })
+        }
     }
 }
 
@@ -331,7 +380,11 @@ pub(crate) fn set_number(model: &Model, state: &mut State, id: u32, value: f64) 
             Ok(())
         }
         Meaning::Body { .. } => Err(Error::Refused("the motion of a body can be read only".into())),
-        Meaning::Robot(_) => Err(Error::Refused("what the robot as a whole tells can be read only".into())),
+        Meaning::Robot(_) | Meaning::RedundantRows => {
+            Err(Error::Refused("what the robot as a whole tells can be read only".into()))
+        }
+        Meaning::Closure { item: CLOSURE_BROKEN, .. } => Err(wrong_type(id)),
+        Meaning::Closure { .. } => Err(Error::Refused("what a connection carries can be read only".into())),
         Meaning::Joint { joint, item: SETTING.. } => {
             let place = ((id - model.bodies.len() as u32 * BODY_STRIDE) % JOINT_STRIDE - SETTING) as usize;
             let s = &SETTINGS[place];
@@ -373,6 +426,7 @@ pub(crate) fn flag_value(model: &Model, state: &State, id: u32) -> Result<bool> 
     match meaning(model, id)? {
         Meaning::Joint { joint, item: BLOCKED } => Ok(state.joints[joint].blocked.is_some()),
         Meaning::Joint { joint, item: BROKEN } => Ok(state.joints[joint].broken),
+        Meaning::Closure { closure, item: CLOSURE_BROKEN } => Ok(state.closures[closure].broken),
         _ => Err(wrong_type(id)),
     }
 }
@@ -389,6 +443,14 @@ pub(crate) fn set_flag(model: &Model, state: &mut State, id: u32, value: bool) -
             Err(Error::Refused("the joint is broken: nothing mends it".into()))
         }
         Meaning::Joint { item: BROKEN, .. } => Ok(()),
+        Meaning::Closure { closure, item: CLOSURE_BROKEN } if value => {
+            break_closure(state, closure);
+            Ok(())
+        }
+        Meaning::Closure { closure, item: CLOSURE_BROKEN } if state.closures[closure].broken => {
+            Err(Error::Refused("it is broken: nothing mends it".into()))
+        }
+        Meaning::Closure { item: CLOSURE_BROKEN, .. } => Ok(()),
         _ => Err(wrong_type(id)),
     }
 }
@@ -417,6 +479,13 @@ pub(crate) fn break_joint(state: &mut State, joint: usize) {
     }
     (j.broken, j.velocity, j.torque, j.blocked) = (true, 0.0, 0.0, None);
     j.actuator.stop();
+}
+
+/// Removes a connection beyond the tree for ever; what a spring holds is lost.
+pub(crate) fn break_closure(state: &mut State, closure: usize) {
+    let s = &mut state.closures[closure];
+    state.energy.dissipated += s.stored;
+    *s = crate::state::ClosureState { broken: true, ..Default::default() };
 }
 
 /// Reads the drive of a motor.

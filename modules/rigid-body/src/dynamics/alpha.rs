@@ -75,8 +75,10 @@ impl Dynamics {
             let axis = &mut self.axes[j];
             axis.renew(s, joint.limits, &span);
             let mode = axis.start(s.mode);
+            let (rigid, free) = (joint.rigid(), joint.free_row());
             for r in 0..6 {
-                self.compliance[j][r] = if s.broken { None } else { Some(0.0) };
+                let holds = !s.broken && (rigid[r] || free == Some(r));
+                self.compliance[j][r] = holds.then_some(0.0);
             }
             let Some(free) = joint.free_row().filter(|_| !s.broken) else { continue };
             let torque = match axis.row(mode) {
@@ -91,6 +93,7 @@ impl Dynamics {
                 add(&mut self.rhs, self.kkt.body_at[parent], torque, &self.rows[j].on_parent(free));
             }
         }
+        self.closures_at_rest();
         for direction in [1.0, -1.0] {
             self.drift(&state.bodies, direction * dt);
             for (j, joint) in self.model.joints.iter().enumerate() {
@@ -98,8 +101,9 @@ impl Dynamics {
                 let open = gap(joint, &self.ends);
                 (0..6).for_each(|r| self.rhs[at + r] -= open[r] / (dt * dt));
             }
+            self.closures_drift(dt);
         }
-        self.kkt.factor(&self.inertia, &self.rows, &self.compliance)?;
+        self.kkt.factor(&self.inertia, &self.rows, &self.compliance, &self.closing.cuts)?;
         self.factored = false;
         self.factor_count += 1;
         self.kkt.solver.solve(&self.rhs, &mut self.solution)?;

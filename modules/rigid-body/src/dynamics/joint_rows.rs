@@ -1,7 +1,7 @@
 //! Rows of a joint: six directions, their Jacobians on both bodies, and how far the joint is out of place.
 //!
 //! Rows 0–2: translation of the child's anchor against the parent's along axis, t1, t2; rows 3–5: rotation about
-//! them. The frame is the parent's. One of them is free in a revolute (3) or prismatic (0) joint.
+//! them. The frame is the parent's. A revolute joint leaves row 3 free, a prismatic one row 0.
 
 use crate::math::{Q, V3, unwrap_angle};
 use crate::model::{Joint, Kind};
@@ -23,7 +23,18 @@ pub(crate) fn rows(joint: &Joint, bodies: &[Motion]) -> Rows {
     let frame = (parent.q * joint.parent_frame).to_rotation_matrix();
     let direction = |k: usize| frame.matrix().column(k).into();
     let anchor = child.q * joint.child_anchor;
-    Rows { directions: std::array::from_fn(|r| direction(r % 3)), anchor, lever: child.c + anchor - parent.c }
+    let mut directions: [V3; 6] = std::array::from_fn(|r| direction(r % 3));
+    if joint.kind == Kind::Universal {
+        let (x, y) = (directions[3], second_axis(joint, bodies));
+        directions[4] = (y - x * x.dot(&y)).normalize();
+        directions[5] = x.cross(&directions[4]);
+    }
+    Rows { directions, anchor, lever: child.c + anchor - parent.c }
+}
+
+/// The child's axis of a universal joint.
+fn second_axis(joint: &Joint, bodies: &[Motion]) -> V3 {
+    bodies[joint.child].q * (joint.child_frame * V3::y())
 }
 
 /// Rows whose product with the mean rates times h is the change of the joint's equations over a step, for poses at its
@@ -32,7 +43,11 @@ pub(crate) fn mean_rows(joint: &Joint, starts: &[Motion], ends: &[Motion]) -> Ro
     let (before, after) = (rows(joint, starts), rows(joint, ends));
     let mean = |a: &V3, b: &V3| 0.5 * (a + b);
     let mut directions: [V3; 6] = std::array::from_fn(|r| mean(&before.directions[r], &after.directions[r]));
-    if joint.kind == Kind::Revolute {
+    if joint.kind == Kind::Universal {
+        let second = mean(&second_axis(joint, starts), &second_axis(joint, ends));
+        directions[5] = directions[3].cross(&second);
+    }
+    if joint.aligns_axes() {
         let axis = |bodies: &[Motion]| bodies[joint.child].q * (joint.child_frame * V3::x());
         let axis = mean(&axis(starts), &axis(ends));
         (directions[4], directions[5]) = (directions[2].cross(&axis), axis.cross(&directions[1]));
@@ -40,14 +55,16 @@ pub(crate) fn mean_rows(joint: &Joint, starts: &[Motion], ends: &[Motion]) -> Ro
     Rows { directions, anchor: mean(&before.anchor, &after.anchor), lever: mean(&before.lever, &after.lever) }
 }
 
-/// How far the joint is out of place, in the rows' order, m and rad; the free row is 0.
+/// How far the joint is out of place, in the rows' order, m and rad; rows that do not hold are 0.
 pub(crate) fn gap(joint: &Joint, bodies: &[Motion]) -> [f64; 6] {
     let (parent, child) = (parent_of(joint, bodies), &bodies[joint.child]);
     let frame = parent.q * joint.parent_frame;
     let apart = frame
         .inverse_transform_vector(&(child.point(&joint.child_anchor) - parent.point(&joint.parent_anchor)));
     let relative = frame.inverse() * (child.q * joint.child_frame);
-    let turned = if joint.kind == Kind::Revolute {
+    let turned = if joint.kind == Kind::Universal {
+        V3::new(0.0, 0.0, -(relative * V3::y()).x)
+    } else if joint.aligns_axes() {
         // u_parent × u_child, in the frame of the parent: the axis alone has to agree.
         let axis = relative * V3::x();
         V3::new(0.0, -axis.z, axis.y)
@@ -55,9 +72,8 @@ pub(crate) fn gap(joint: &Joint, bodies: &[Motion]) -> [f64; 6] {
         relative.imag() * (2.0_f64.copysign(relative.w))
     };
     let mut gap = [apart.x, apart.y, apart.z, turned.x, turned.y, turned.z];
-    if let Some(free) = joint.free_row() {
-        gap[free] = 0.0;
-    }
+    let rigid = joint.rigid();
+    (0..6).filter(|r| !rigid[*r]).for_each(|r| gap[r] = 0.0);
     gap
 }
 
@@ -66,7 +82,6 @@ pub(crate) fn coordinate(joint: &Joint, bodies: &[Motion], near: f64) -> f64 {
     let (parent, child) = (parent_of(joint, bodies), &bodies[joint.child]);
     let frame = parent.q * joint.parent_frame;
     match joint.kind {
-        Kind::Fixed => 0.0,
         Kind::Prismatic => {
             frame
                 .inverse_transform_vector(
@@ -78,6 +93,7 @@ pub(crate) fn coordinate(joint: &Joint, bodies: &[Motion], near: f64) -> f64 {
             let relative = frame.inverse() * (child.q * joint.child_frame);
             unwrap_angle(2.0 * libm::atan2(relative.i, relative.w), near)
         }
+        _ => 0.0,
     }
 }
 
@@ -86,9 +102,9 @@ pub(crate) fn place_child(joint: &Joint, parent: Option<&Motion>, coordinate: f6
     let parent = parent.copied().unwrap_or_else(world);
     let frame = parent.q * joint.parent_frame;
     let (slide, turn) = match joint.kind {
-        Kind::Fixed => (0.0, 0.0),
         Kind::Prismatic => (coordinate, 0.0),
         Kind::Revolute => (0.0, coordinate),
+        _ => (0.0, 0.0),
     };
     let q = frame * Q::from_axis_angle(&V3::x_axis(), turn) * joint.child_frame.inverse();
     let anchor = parent.point(&joint.parent_anchor) + frame * V3::new(slide, 0.0, 0.0);
@@ -100,9 +116,9 @@ pub(crate) fn rates_of_child(joint: &Joint, bodies: &[Motion], rate: f64) -> (V3
     let parent = parent_of(joint, bodies);
     let axis = parent.q * (joint.parent_frame * V3::x());
     let (slide, turn) = match joint.kind {
-        Kind::Fixed => (0.0, 0.0),
         Kind::Prismatic => (rate, 0.0),
         Kind::Revolute => (0.0, rate),
+        _ => (0.0, 0.0),
     };
     let child = &bodies[joint.child];
     let anchor = child.point(&joint.child_anchor);

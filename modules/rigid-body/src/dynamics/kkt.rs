@@ -2,7 +2,7 @@
 
 use crate::math::M3;
 use crate::model::Model;
-use terraglue_linear_solver::{Error, Link, Rows, Tree};
+use terraglue_linear_solver::{Cut, Error, Link, Rows, Tree};
 
 /// Where the unknowns of bodies (six rates) and joints (six impulses) stand, and the solver.
 pub(crate) struct Kkt {
@@ -20,7 +20,7 @@ impl Kkt {
             joint: *above,
         };
         let links: Vec<Link> = model.joint_above.iter().map(link).collect();
-        let solver = Tree::new(&links, model.joints.len(), 0)?;
+        let solver = Tree::new(&links, model.joints.len(), model.closures.iter().map(|c| c.len()).sum())?;
         Ok(Self {
             body_at: (0..model.bodies.len()).map(|b| solver.body_at(b)).collect(),
             joint_at: (0..model.joints.len()).map(|j| solver.joint_at(j)).collect(),
@@ -34,13 +34,15 @@ impl Kkt {
         self.solver.len()
     }
 
-    /// Factorises. `compliance[j][r]`: `None` removes row r of joint j.
+    /// Factorises. `compliance[j][r]`: `None` removes row r of joint j; `cuts`: rows that
+    /// close loops.
     pub fn factor(
         &mut self,
         inertia: &[M3],
         rows: &[Rows],
         compliance: &[[Option<f64>; 6]],
+        cuts: &[Cut],
     ) -> Result<(), Error> {
-        self.solver.factor(&self.masses, inertia, rows, compliance, &[])
+        self.solver.factor(&self.masses, inertia, rows, compliance, cuts)
     }
 }

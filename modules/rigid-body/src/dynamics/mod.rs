@@ -10,6 +10,7 @@
 //! [`alpha`] and [`midpoint`] over [`second_order`]; what all share is in [`scheme`].
 
 mod alpha;
+mod closing;
 mod gyro;
 pub(crate) mod joint_rows;
 pub(crate) mod kkt;
@@ -22,6 +23,7 @@ use crate::drive::{Axis, MOST_YIELDING, Mode, Span, YIELDING};
 use crate::math::{M3, V3, cayley};
 use crate::model::Model;
 use crate::state::{Motion, State};
+use closing::Closing;
 use joint_rows::{coordinate, gap};
 use kkt::Kkt;
 use scheme::{Acceleration, Integrator};
@@ -72,6 +74,7 @@ pub(crate) struct Dynamics {
     pub model: Model,
     pub kkt: Kkt,
     pub contacts: BodyContacts,
+    closing: Closing,
     pub h: f64,
     pub integrator: Integrator,
     starts: Vec<Motion>,
@@ -119,6 +122,7 @@ impl Dynamics {
         let rest = Motion::at(V3::zeros(), crate::math::Q::identity());
         Ok(Self {
             contacts: BodyContacts::new(&model, bodies),
+            closing: Closing::new(&model),
             kkt,
             h: 0.0,
             integrator,
@@ -225,11 +229,14 @@ impl Dynamics {
                 let travel = coordinate(joint, &self.ends, s.angle) - s.angle;
                 self.curvature[j] = travel / self.h - rates[free];
             }
+            let rigid = joint.rigid();
             for (r, open) in open.iter().enumerate() {
                 let hold = rates[r] - open / self.h;
-                self.base_rhs[at + r] = if s.broken || joint.free_row() == Some(r) { 0.0 } else { hold };
+                self.base_rhs[at + r] = if s.broken || !rigid[r] { 0.0 } else { hold };
             }
         }
+        self.prepare_closures(state);
+        self.close_base();
     }
 
     /// For which step axes are made; `when`: see [`Span`].
@@ -279,15 +286,16 @@ impl Dynamics {
     fn factor(&mut self) -> Result<(), SolverError> {
         let weight = self.integrator.force_weight();
         for (j, joint) in self.model.joints.iter().enumerate() {
+            let rigid = joint.rigid();
             for r in 0..6 {
                 self.compliance[j][r] = match joint.free_row() {
                     _ if self.broken[j] => None,
                     Some(free) if free == r => self.axes[j].row(self.modes[j]).map(|(c, _)| c / weight),
-                    _ => Some(0.0),
+                    _ => rigid[r].then_some(0.0),
                 };
             }
         }
-        self.kkt.factor(&self.inertia, &self.rows, &self.compliance)?;
+        self.kkt.factor(&self.inertia, &self.rows, &self.compliance, &self.closing.cuts)?;
         self.factored = true;
         self.factor_count += 1;
         Ok(())
@@ -363,13 +371,23 @@ impl Dynamics {
             self.solution.iter_mut().zip(&self.correction).for_each(|(s, c)| *s += c);
         }
         self.find_ends();
+        self.check_gaps()
+    }
+
+    /// Refuses a step that leaves a joint or a loop open.
+    fn check_gaps(&mut self) -> Result<(), Failure> {
         match self.gaps_into_correction() {
             (_, gap) if gap <= 1e3 * GAP_TOLERANCE => Ok(()),
-            (j, gap) => Err(Failure::Gap { joint: self.model.joints[j].name.clone(), gap }),
+            (part, gap) => {
+                let joint = self.model.joints.get(part).map(|j| &j.name);
+                let closure = || self.model.closures.get(part - self.model.joints.len()).map(|c| &c.name);
+                let name = joint.or_else(closure).cloned().unwrap_or_default();
+                Err(Failure::Gap { joint: name, gap })
+            }
         }
     }
 
-    /// Right-hand side of a correction; the worst joint and its gap.
+    /// Right-hand side of a correction; the worst joint (connections beyond the tree after the joints) and its gap.
     fn gaps_into_correction(&mut self) -> (usize, f64) {
         let mut worst = (0, 0.0);
         self.correction.fill(0.0);
@@ -382,6 +400,10 @@ impl Dynamics {
                     worst = (j, open.abs());
                 }
             }
+        }
+        let (closure, open) = self.closures_into_correction();
+        if open > worst.1 || open.is_nan() {
+            worst = (self.model.joints.len() + closure, open);
         }
         worst
     }

@@ -5,7 +5,7 @@
 //! are closed on the level of positions. The two rules are [`super::alpha`] and [`super::midpoint`].
 
 use super::scheme::{Integrator, Six, Weights};
-use super::{AxisResult, Dynamics, Failure, GAP_TOLERANCE};
+use super::{AxisResult, Dynamics, Failure};
 use crate::dynamics::joint_rows::{coordinate, gap, mean_rows, rows};
 use crate::math::V3;
 use crate::state::{Motion, State};
@@ -56,6 +56,7 @@ impl Dynamics {
             self.axes[j].renew(s, joint.limits, &span);
             self.modes[j] = self.axes[j].start(s.mode);
         }
+        self.prepare_closures(state);
         Ok(())
     }
 
@@ -80,7 +81,8 @@ impl Dynamics {
     /// To what rates of jointed bodies can be told, m/s and rad/s.
     fn noise(&self) -> f64 {
         let jointed = self.model.joints.iter().flat_map(|j| [Some(j.child), j.parent]).flatten();
-        let far = jointed.fold(0.0_f64, |m, b| m.max(1.0).max(self.starts[b].c.amax()));
+        let looped = (0..self.starts.len()).filter(|_| self.closes());
+        let far = jointed.chain(looped).fold(0.0_f64, |m, b| m.max(1.0).max(self.starts[b].c.amax()));
         ROUNDING * far / self.h + REST
     }
 
@@ -105,13 +107,6 @@ impl Dynamics {
             None => self.axes[j].impulse(self.modes[j]),
         };
         AxisResult { rate, end_rate, mean_rate: rate, impulse }
-    }
-
-    fn check_gaps(&mut self) -> Result<(), Failure> {
-        match self.gaps_into_correction() {
-            (_, gap) if gap <= 1e3 * GAP_TOLERANCE => Ok(()),
-            (j, gap) => Err(Failure::Gap { joint: self.model.joints[j].name.clone(), gap }),
-        }
     }
 
     fn find_ends_second_order(&mut self) {
@@ -141,8 +136,8 @@ impl Dynamics {
             let open = gap(joint, &self.ends);
             let here =
                 if midpoint { mean_rows(joint, &self.starts, &self.ends) } else { rows(joint, &self.ends) };
-            let free = joint.free_row();
-            for r in 0..6 {
+            let (free, rigid) = (joint.free_row(), joint.rigid());
+            for r in (0..6).filter(|r| rigid[*r] || free == Some(*r)) {
                 let mut impulse = -self.solution[at + r];
                 if free == Some(r) {
                     match self.axes[j].row(self.modes[j]) {
@@ -164,6 +159,7 @@ impl Dynamics {
                 }
             }
         }
+        self.closures_second_order();
     }
 }
 

@@ -113,3 +113,41 @@ pub fn model(folder: &std::path::Path, name: &str, text: &str) -> Outcome<String
     crate::process::write(&path, text)?;
     Ok(path.display().to_string())
 }
+
+/// A robot file in the making.
+pub struct Urdf {
+    text: String,
+}
+
+impl Urdf {
+    /// Everything hangs on the world.
+    pub fn in_world() -> Self {
+        Self { text: r#"<robot name="mechanism"><link name="world"/>"#.into() }
+    }
+
+    /// A body: mass, centre of mass, principal moments about it in the axes of its frame.
+    pub fn body(mut self, name: &str, mass: f64, com: [f64; 3], moments: [f64; 3]) -> Self {
+        let ([x, y, z], [ix, iy, iz]) = (com, moments);
+        self.text += &format!(
+            r#"<link name="{name}"><inertial><origin xyz="{x} {y} {z}"/><mass value="{mass}"/>
+            <inertia ixx="{ix}" iyy="{iy}" izz="{iz}" ixy="0" ixz="0" iyz="0"/></inertial></link>"#
+        );
+        self
+    }
+
+    /// A joint called `j_CHILD`: kind, its place in the parent's frame, its axis.
+    pub fn joint(mut self, kind: &str, [parent, child]: [&str; 2], at: [f64; 3], axis: [f64; 3]) -> Self {
+        let ([x, y, z], [ax, ay, az]) = (at, axis);
+        let limit = if kind == "prismatic" { r#"<limit lower="-1e9" upper="1e9" effort="0" velocity="0"/>"# } else { "" };
+        self.text += &format!(
+            r#"<joint name="j_{child}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>
+            <origin xyz="{x} {y} {z}"/><axis xyz="{ax} {ay} {az}"/>{limit}</joint>"#
+        );
+        self
+    }
+
+    /// Writes it; its path.
+    pub fn write(self, folder: &std::path::Path, name: &str) -> Outcome<String> {
+        model(folder, name, &(self.text + "</robot>"))
+    }
+}

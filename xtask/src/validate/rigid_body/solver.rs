@@ -3,6 +3,7 @@
 mod chains;
 mod free;
 mod gait;
+mod mechanisms;
 
 use crate::process::Outcome;
 use crate::validate::{Context, Figure};
@@ -12,5 +13,6 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     let mut all = chains::figures()?;
     all.extend(free::figures(context)?);
     all.extend(gait::figures()?);
+    all.extend(mechanisms::figures(context)?);
     Ok(all)
 }

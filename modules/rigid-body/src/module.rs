@@ -108,7 +108,8 @@ fn settle_loops(host: &dyn Host, dynamics: &mut Dynamics, state: &mut State) -> 
 /// Kinds of joints that the robot file has no word for.
 fn set_kinds(config: &Config, model: &mut Model) -> Result<()> {
     let names: Vec<String> = model.joints.iter().map(|j| j.name.clone()).collect();
-    let kind = |name: &String| configure::text(config, model, "joint_kind", name).map(|k| k.map(str::to_owned));
+    let kind =
+        |name: &String| configure::text(config, model, "joint_kind", name).map(|k| k.map(str::to_owned));
     let kinds = names.iter().map(kind).collect::<Result<Vec<_>>>()?;
     for (joint, kind) in model.joints.iter_mut().zip(kinds).filter(|(j, _)| j.moves()) {
         joint.kind = match kind.as_deref() {

@@ -42,6 +42,12 @@ impl Dense {
     /// False: the matrix is not positive semi-definite.
     pub fn factor(&mut self) -> bool {
         let Some(memory) = &mut self.memory else { return true };
+        let n = self.order.len();
+        if (0..n).all(|i| self.w[(i, i)] == 0.0) {
+            self.rank = 0;
+            self.order.iter_mut().enumerate().for_each(|(i, o)| *o = i);
+            return true;
+        }
         let done = cholesky_in_place(
             self.w.as_mut(),
             &mut self.order,

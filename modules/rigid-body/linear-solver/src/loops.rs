@@ -10,6 +10,8 @@ use crate::dense::Dense;
 use crate::path::shared_entries;
 use crate::spatial::{Wrench, dot};
 use crate::tree::{Error, Tree};
+/// A row that moves less than this share of what it would move with its bodies free moves nothing but rounding.
+const IMMOBILE: f64 = 1e-20;
 /// Bodies that one row can act on.
 pub const MOST_PARTS: usize = 4;
 
@@ -113,13 +115,25 @@ impl Loops {
         let n = self.cuts.len();
         for i in 0..n {
             let own = self.entry(tree, i, i) + self.cuts[i].compliance.unwrap_or(0.0);
-            self.scale[i] = if own > 0.0 { 1.0 / own.sqrt() } else { 0.0 };
-            self.w.set(i, i, if own > 0.0 { 1.0 } else { own });
+            let moves = own > IMMOBILE * self.free_mobility(i, tree) || own.is_nan();
+            self.scale[i] = if moves { 1.0 / own.sqrt() } else { 0.0 };
+            self.w.set(i, i, if moves { self.scale[i] * self.scale[i] * own } else { 0.0 });
             for k in 0..i {
                 let value = self.scale[i] * self.scale[k] * self.entry(tree, i, k);
                 self.w.set(i, k, value);
             }
         }
+    }
+
+    /// About what a unit impulse along row i would move if its bodies were free.
+    fn free_mobility(&self, i: usize, tree: &Tree) -> f64 {
+        let part = |(body, w): &(usize, Wrench)| {
+            let (force, moment) = w.split_at(3);
+            let size = |v: &[f64]| v.iter().map(|x| x * x).sum::<f64>();
+            let (mass, inertia) = tree.own_inertia(*body);
+            size(force) / mass + size(moment) / inertia
+        };
+        self.cuts[i].parts.iter().flatten().map(part).sum()
     }
 
     /// Entry of H·K⁻¹·Hᵀ.

@@ -72,6 +72,8 @@ struct Node {
     /// Whether the joint holds at all; without, the body is a root.
     hangs: bool,
     inertia: Inertia,
+    /// Its own mass and mean moment of inertia, without what hangs below.
+    own: (f64, f64),
     /// From the parent's centre of mass to its own.
     shift: Vector3<f64>,
     rows: Rows,
@@ -153,6 +155,7 @@ impl Tree {
     ) -> Result<(), Error> {
         for (b, node) in self.nodes.iter_mut().enumerate() {
             node.inertia = of_body(masses[b], &inertia[b]);
+            node.own = (masses[b], inertia[b].trace() / 3.0);
             node.set_rows(rows, compliance);
         }
         for b in (0..self.nodes.len()).rev() {
@@ -179,6 +182,11 @@ impl Tree {
     /// The body that b hangs on at present.
     pub(crate) fn above(&self, b: usize) -> Option<usize> {
         self.nodes[b].parent.filter(|_| self.nodes[b].hangs)
+    }
+
+    /// Mass and mean moment of inertia of a body alone.
+    pub(crate) fn own_inertia(&self, b: usize) -> (f64, f64) {
+        self.nodes[b].own
     }
 
     pub(crate) fn path_len(&self, b: usize) -> usize {

@@ -104,6 +104,32 @@ fn dependent_rows_are_counted_and_harmless() {
 }
 
 #[test]
+fn rows_that_move_nothing_are_harmless() {
+    // Both bodies are held against the world in these directions, but for rounding.
+    let held = |b: usize, tiny: f64| Cut {
+        parts: [Some((b, [tiny, 0.0, 0.0, 0.0, tiny, 0.0])), None, None, None],
+        compliance: Some(0.0),
+    };
+    let links: Vec<Link> = (0..2).map(|b| Link { parent: None, joint: Some(b) }).collect();
+    let axes = [Vector3::x(), Vector3::y(), Vector3::z()];
+    let directions = std::array::from_fn(|r| axes[r % 3]);
+    let rows = vec![Rows { directions, anchor: Vector3::zeros(), lever: Vector3::zeros() }; 2];
+    // Only a turn about z is free.
+    let compliance = vec![[Some(0.0), Some(0.0), Some(0.0), Some(0.0), Some(0.0), None]; 2];
+    let nearly =
+        Cut { parts: [Some((1, [1.0, 0.0, 0.0, 0.0, 0.0, 1e-16])), None, None, None], compliance: Some(0.0) };
+    let cuts = [held(0, 1.0), nearly, held(1, 1e-3)];
+    let mut tree = Tree::new(&links, 2, cuts.len()).expect("parents first");
+    let inertia = vec![Matrix3::identity(); 2];
+    tree.factor(&[1.0, 2.0], &inertia, &rows, &compliance, &cuts).expect("factors");
+    assert_eq!(tree.redundant(), 3);
+    let mut x = vec![1.0; tree.len()];
+    (0..3).for_each(|c| x[tree.cut_at(c)] = 0.0);
+    tree.substitute(&mut x);
+    assert_eq!((x[5], x[11], x[tree.cut_at(1)]), (1.0, 1.0, 0.0));
+}
+
+#[test]
 fn paths_know_the_loops() {
     let cuts = [cut(1, 6, Some(5), Some(0.0)), cut(2, 4, None, Some(0.7)), cut(1, 6, Some(5), Some(0.0))];
     for free in [true, false] {

@@ -138,7 +138,11 @@ impl Urdf {
     /// A joint called `j_CHILD`: kind, its place in the parent's frame, its axis.
     pub fn joint(mut self, kind: &str, [parent, child]: [&str; 2], at: [f64; 3], axis: [f64; 3]) -> Self {
         let ([x, y, z], [ax, ay, az]) = (at, axis);
-        let limit = if kind == "prismatic" { r#"<limit lower="-1e9" upper="1e9" effort="0" velocity="0"/>"# } else { "" };
+        let limit = if kind == "prismatic" {
+            r#"<limit lower="-1e9" upper="1e9" effort="0" velocity="0"/>"#
+        } else {
+            ""
+        };
         self.text += &format!(
             r#"<joint name="j_{child}" type="{kind}"><parent link="{parent}"/><child link="{child}"/>
             <origin xyz="{x} {y} {z}"/><axis xyz="{ax} {ay} {az}"/>{limit}</joint>"#

@@ -190,7 +190,10 @@ fn middle(p: &Parameter) -> Option<Value> {
         ParameterType::Text => Some(p.choices.first().map_or("", String::as_str).into()),
         ParameterType::Numbers => Some(Value::Array(Vec::new())),
         ParameterType::NumberTable => Some(Value::Object(Map::new())),
-        ParameterType::Path | ParameterType::NumberByName | ParameterType::TextByName => None,
+        ParameterType::Path
+        | ParameterType::NumberByName
+        | ParameterType::TextByName
+        | ParameterType::Tables => None,
     }
 }
 

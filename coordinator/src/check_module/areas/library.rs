@@ -168,7 +168,7 @@ fn default_fits(p: &Parameter) -> Verdict {
             ParameterType::Integer => d.is_i64() || d.is_u64(),
             ParameterType::Bool => d.is_boolean(),
             ParameterType::Text | ParameterType::Path => d.is_string(),
-            ParameterType::Numbers => d.is_array(),
+            ParameterType::Numbers | ParameterType::Tables => d.is_array(),
             ParameterType::NumberTable => d.is_object(),
             ParameterType::NumberByName => d.is_number() || d.is_object(),
             ParameterType::TextByName => d.is_string() || d.is_object(),

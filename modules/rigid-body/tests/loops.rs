@@ -56,7 +56,7 @@ fn point(rig: &Rig, body: usize, at: Vector3<f64>) -> Vector3<f64> {
 fn a_four_bar_swings_as_its_reduced_equation_says() {
     // Posts at angle a from the vertical: (2·(0.1 + 0.25) + 1)·a'' = 2·g·sin a.
     let (mut a, mut w, h) = (0.3_f64, 0.0_f64, 1e-5);
-    for _ in 0..80_000 {
+    for _ in 0..50_000 {
         let f = |a: f64| 2.0 * G * libm::sin(a) / 1.7;
         let (k1, v1) = (w, f(a));
         let (k2, v2) = (w + 0.5 * h * v1, f(a + 0.5 * h * k1));
@@ -68,7 +68,7 @@ fn a_four_bar_swings_as_its_reduced_equation_says() {
         let mut rig = new(&four_bar("four_bar"), rule, &more);
         assert_eq!(rig.get("loops.redundant_rows"), 3.0);
         let start = rig.robot.energy().mechanical();
-        for _ in 0..800 {
+        for _ in 0..500 {
             rig.free_step();
             let open = point(&rig, 2, Vector3::z()) - point(&rig, 1, Vector3::x());
             assert!(open.norm() < 1e-9, "{rule}: {open}");
@@ -77,7 +77,7 @@ fn a_four_bar_swings_as_its_reduced_equation_says() {
         assert!(error < tolerance, "{rule}: {error}");
         let change = (rig.robot.energy().mechanical() - start).abs();
         assert!(
-            change < [0.2, 1e-4, 1e-9][RULES.iter().position(|r| *r == rule).unwrap()],
+            change < [0.2, 1e-3, 1e-9][RULES.iter().position(|r| *r == rule).unwrap()],
             "{rule}: {change}"
         );
     }

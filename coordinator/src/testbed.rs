@@ -21,9 +21,6 @@ use terraglue_subsystem::{BodyState, Energy, Input, Motion, Response, Step};
 mod build;
 mod hosted;
 
-/// How often a step may be halved before the run stops.
-const MAX_HALVINGS: u32 = 4;
-
 /// What a run needs beside its scenario.
 #[derive(Clone, Debug, Default)]
 pub struct Options {
@@ -80,6 +77,7 @@ pub struct Testbed {
     t: f64,
     last_h: f64,
     halvings: u32,
+    max_halvings: u32,
     hold: terraglue_subsystem::Hold,
     started: bool,
 }
@@ -151,7 +149,9 @@ impl Testbed {
                     self.last_h = h_now;
                     self.t += h_now;
                 }
-                Outcome::NotConverged(why) if self.halvings == MAX_HALVINGS => return Err(self.gave_up(why)),
+                Outcome::NotConverged(why) if self.halvings == self.max_halvings => {
+                    return Err(self.gave_up(why));
+                }
                 Outcome::NotConverged(_) => {
                     self.halvings += 1;
                     h = 0.5 * h_now;
@@ -300,8 +300,9 @@ impl Testbed {
             strategy: self.group.as_ref().map_or("none", |g| g.strategy.name()),
             time_s: self.t,
             message: format!(
-                "{message}; the step was halved {MAX_HALVINGS} times. Try a smaller time.step_s, another \
-                 gluing.form, or the strategy `cooperative`"
+                "{message}; the step was halved {} times. Try a smaller time.step_s, another \
+                 gluing.form, or the strategy `cooperative`",
+                self.max_halvings
             ),
         }
     }

@@ -23,6 +23,23 @@ def test_compare_writes_a_row_per_combination(tmp_path):
     assert (tmp_path / "compare.html").is_file()
 
 
+def test_compare_runs_steps_against_a_reference(tmp_path):
+    process = terraglue("compare", MOON_WALK, "--duration", "0.04", "--out", tmp_path, "--quiet",
+                        "--strategies", "cooperative,iterative,xx-newton", "--soils", "soil-bekker",
+                        "--steps", "1e-3,2e-3", "--reference", "iterative")
+    assert process.returncode == 0, process.stderr
+    rows = json.loads((tmp_path / "compare.json").read_text())["rows"]
+    assert [(row["strategy"], row["step_s"]) for row in rows] == [
+        ("cooperative", 1e-3), ("cooperative", 2e-3), ("iterative", 1e-3), ("iterative", 2e-3),
+        ("xx-newton", 1e-3), ("xx-newton", 2e-3), ("iterative", 1e-3)]
+    refused = [row for row in rows if row["strategy"] == "xx-newton"]
+    assert all("refused" in row["error"] for row in refused)
+    assert rows[2]["reference_error_m"] == 0.0
+    assert rows[3]["reference_error_m"] > 0.0
+    page = (tmp_path / "compare.html").read_text()
+    assert "error-step" in page and "work-precision" in page
+
+
 def test_compare_refuses_unknown_names():
     for option, name in (("--strategies", "iterativ"), ("--soils", "soil-beker")):
         process = terraglue("compare", MOON_WALK, option, name)

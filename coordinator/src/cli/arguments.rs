@@ -281,12 +281,20 @@ pub struct CompareArguments {
     /// Soil modules, separated by commas [default: that of the scenario].
     #[arg(long, value_delimiter = ',', value_name = "MODULES")]
     pub soils: Vec<String>,
+    /// Communication steps in seconds, separated by commas [default: that of the scenario].
+    #[arg(long, value_delimiter = ',', value_name = "SECONDS")]
+    pub steps: Vec<f64>,
+    /// Compare the path of the reported body with this: `monolithic`, another strategy, run with the smallest step on
+    /// each soil, or the folder or recording of an earlier run.
+    #[arg(long, value_name = "STRATEGY|DIR")]
+    pub reference: Option<String>,
 }
 
 const COMPARE_EXAMPLES: &str = "\
 Example:
   terraglue compare scenarios/moon_walk.toml --strategies cooperative,iterative \\
       --soils soil-cellular-automaton,soil-bekker
+  terraglue compare scenarios/moon_walk.toml --duration 1 --steps 5e-4,1e-3,2e-3 --reference monolithic
 
 Writes compare.html, compare.csv and compare.json, and each run into a folder of its own beside them.";
 

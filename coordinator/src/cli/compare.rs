@@ -21,6 +21,10 @@ use terraglue::{Error, Result};
 struct Plan {
     strategy: String,
     soil: String,
+    /// Whether the others are compared with it.
+    is_reference: bool,
+    /// Whether the comparison has several steps.
+    name_step: bool,
     scenario: Scenario,
     folder: PathBuf,
     /// Why it cannot run: a row of the comparison.
@@ -35,14 +39,31 @@ pub fn compare(arguments: &CompareArguments) -> Result<Exit> {
     let name = plans.first().map_or_else(String::new, |p| p.scenario.name.clone());
     let folder = results_folder(arguments.run.out.as_deref(), &name)?;
     for plan in &mut plans {
-        plan.folder = folder.join(format!("{}_{}", plan.strategy, file_name(&plan.soil)));
+        let step = if plan.name_step { format!("_{}s", plan.scenario.time.step_s) } else { String::new() };
+        let reference = if plan.is_reference { "reference_" } else { "" };
+        plan.folder = folder.join(format!("{reference}{}_{}{step}", plan.strategy, file_name(&plan.soil)));
     }
     let bar = progress::bar(plans.iter().map(Plan::steps).sum(), arguments.run.quiet);
-    let rows = run_all(&plans, &arguments.run, &cancel, &bar);
+    let mut rows = run_all(&plans, &arguments.run, &cancel, &bar);
     bar.finish_and_clear();
+    judge(&mut rows, arguments)?;
     compare::write(&folder, &rows)?;
     print(&arguments.run, &folder, &rows)?;
     Ok(if cancel.load(Ordering::Relaxed) { Exit::Interrupted } else { Exit::Done })
+}
+
+/// The errors of all rows against the reference, where there is one.
+fn judge(rows: &mut [CompareRow], arguments: &CompareArguments) -> Result {
+    let Some(reference) = &arguments.reference else { return Ok(()) };
+    if !STRATEGIES.contains(&reference.as_str()) {
+        return compare::judge(rows, None, Path::new(reference));
+    }
+    let runs: Vec<(String, PathBuf)> = rows
+        .iter()
+        .filter(|r| r.is_reference && r.failure().is_none())
+        .filter_map(|r| Some((r.soil.clone(), r.folder.clone()?)))
+        .collect();
+    runs.iter().try_for_each(|(soil, folder)| compare::judge(rows, Some(soil), folder))
 }
 
 /// Wrong input shows before the first run starts; a strategy that cannot glue the scenario is a row that says so,
@@ -99,23 +120,49 @@ fn plan(arguments: &CompareArguments) -> Result<Vec<Plan>> {
         (None, true) => vec![String::new()],
         (None, false) => return Err(InputError::plain("--soils: the scenario has no soil", None).into()),
     };
-    let mut plans = Vec::new();
+    let steps: Vec<Option<f64>> = if arguments.steps.is_empty() {
+        vec![None]
+    } else {
+        arguments.steps.iter().copied().map(Some).collect()
+    };
+    let mut wanted: Vec<(String, String, Option<f64>, bool)> = Vec::new();
     for strategy in &strategies {
         for module in &soils {
-            let mut sets = arguments.run.sets();
-            sets.push(("gluing.strategy".into(), strategy.clone()));
-            if let Some(soil) = soil.as_ref().filter(|_| !arguments.soils.is_empty()) {
-                sets.push((format!("{}.module", soil.name), module.clone()));
-            }
-            let scenario = Scenario::load(file, &sets)?;
-            plans.push(Plan {
-                strategy: strategy.clone(),
-                soil: module.clone(),
-                scenario,
-                folder: PathBuf::new(),
-                refused: None,
-            });
+            wanted.extend(steps.iter().map(|step| (strategy.clone(), module.clone(), *step, false)));
         }
+    }
+    match &arguments.reference {
+        Some(name) if STRATEGIES.contains(&name.as_str()) => {
+            let finest = arguments.steps.iter().copied().reduce(f64::min);
+            wanted.extend(soils.iter().map(|module| (name.clone(), module.clone(), finest, true)));
+        }
+        Some(path) if !Path::new(path).exists() => {
+            let help = did_you_mean(path, STRATEGIES.iter().copied());
+            let message = format!("--reference: `{path}` is no strategy and no folder of a run");
+            return Err(InputError::plain(message, help).into());
+        }
+        _ => {}
+    }
+    let mut plans = Vec::new();
+    for (strategy, module, step, is_reference) in wanted {
+        let mut sets = arguments.run.sets();
+        sets.push(("gluing.strategy".into(), strategy.clone()));
+        if let Some(step) = step {
+            sets.push(("time.step_s".into(), format!("{step:?}")));
+        }
+        if let Some(soil) = soil.as_ref().filter(|_| !arguments.soils.is_empty()) {
+            sets.push((format!("{}.module", soil.name), module.clone()));
+        }
+        let scenario = Scenario::load(file, &sets)?;
+        plans.push(Plan {
+            strategy,
+            soil: module,
+            is_reference,
+            name_step: arguments.steps.len() > 1,
+            scenario,
+            folder: PathBuf::new(),
+            refused: None,
+        });
     }
     Ok(plans)
 }
@@ -187,10 +234,10 @@ fn run_one(plan: &Plan, arguments: &RunArguments, cancel: &Arc<AtomicBool>, bar:
     let mut row = CompareRow {
         strategy: plan.strategy.clone(),
         soil: plan.soil.clone(),
-        summary: None,
-        folder: None,
-        error: None,
-        cold_start_mean: None,
+        step_s: plan.scenario.time.step_s,
+        is_reference: plan.is_reference,
+        name_step: plan.name_step,
+        ..CompareRow::default()
     };
     if plan.refused.is_some() {
         row.error.clone_from(&plan.refused);

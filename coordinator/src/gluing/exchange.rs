@@ -556,7 +556,7 @@ impl Exchange {
                 break;
             }
         }
-        self.report.jacobian_refreshes += 1;
+        self.report.jacobian_refreshes += u32::from(!self.grounds.is_empty());
         self.timings.charge(Part::Jacobian, start);
         Ok(())
     }

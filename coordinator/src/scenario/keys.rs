@@ -189,6 +189,10 @@ fn gluing() -> Table {
             .within_max(1.0)
             .into(),
         most.or(20).within(1.0, 10_000.0).into(),
+        Parameter::of("max_halvings", ParameterType::Integer, "halvings of a step before the run stops")
+            .or(4)
+            .within(0.0, 16.0)
+            .into(),
         start.or("estimate").choices(&["estimate", "zero"]).into(),
         Parameter::of("relaxation", ParameterType::Text, "how the fixed point is accelerated (relaxed only)")
             .or("anderson")

@@ -161,6 +161,7 @@ fn read_gluing(s: &Section) -> Checked<GluingSpec> {
         form: s.text("form"),
         tolerance: s.number("tolerance"),
         max_iterations: u32::try_from(s.count("max_iterations")).unwrap_or(u32::MAX),
+        max_halvings: u32::try_from(s.count("max_halvings")).unwrap_or(0),
         start: s.text("start"),
         relaxation: s.text("relaxation"),
         jacobian: s.text("jacobian"),

@@ -130,6 +130,8 @@ pub struct GluingSpec {
     pub tolerance: f64,
     /// Most iterations of one step before it is halved.
     pub max_iterations: u32,
+    /// How often a step that does not converge may be halved before the run stops.
+    pub max_halvings: u32,
     /// What the iteration starts from: `estimate` (min(T*, F)) or `zero` (to show what the estimate saves).
     pub start: String,
     /// How `relaxed` accelerates its fixed point: `none`, `aitken`, `anderson` or `broyden`.
@@ -204,6 +206,7 @@ impl Default for GluingSpec {
             form: "auto".into(),
             tolerance: 1e-8,
             max_iterations: 20,
+            max_halvings: 4,
             start: "estimate".into(),
             relaxation: "anderson".into(),
             jacobian: "analytic".into(),

@@ -75,6 +75,7 @@ impl Testbed {
             t: 0.0,
             last_h: 0.0,
             halvings: 0,
+            max_halvings: scenario.gluing.max_halvings,
             hold: hold(&scenario.gluing.hold),
             started: false,
         };

@@ -47,6 +47,9 @@ macro_rules! column {
 
 /// All figures in the order of the table.
 pub(crate) const ALL: &[Column] = &[
+    column!("step_s", "", "step", "s", Neither, |r| Some(r.step_s)),
+    column!("reference_error_m", "", "error against the reference", "m", Smallest, |r| r.reference_error_m),
+    column!("order", "", "observed order", "", Neither, |r| r.order),
     column!("evaluations_mean", "evaluations of bodies", "mean", "", Smallest, |r| of(r, |s| s
         .evaluations_mean)),
     column!("evaluations_p95", "evaluations of bodies", "95 %", "", Smallest, |r| {

@@ -4,7 +4,11 @@
 
 mod columns;
 mod page;
+mod reference;
+mod scatter;
 mod table;
+
+pub use reference::judge;
 
 use crate::error::Result;
 use crate::recording::layout::{at, other_at};
@@ -20,7 +24,7 @@ pub const COMPARE_TABLE: &str = "compare.csv";
 pub const COMPARE_JSON: &str = "compare.json";
 
 /// One run of a comparison.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct CompareRow {
     /// Gluing strategy.
     pub strategy: String,
@@ -32,6 +36,16 @@ pub struct CompareRow {
     pub folder: Option<PathBuf>,
     /// What went wrong.
     pub error: Option<String>,
+    /// Communication step, s.
+    pub step_s: f64,
+    /// Whether the other rows are compared with it.
+    pub is_reference: bool,
+    /// Largest distance of the reported body from the reference, m.
+    pub reference_error_m: Option<f64>,
+    /// Observed order of that error against the same run with the next smaller step.
+    pub order: Option<f64>,
+    /// Whether the comparison has several steps, so that names say which.
+    pub name_step: bool,
     /// Mean evaluations of the soils per step when the iteration does not start from the estimate.
     pub cold_start_mean: Option<f64>,
 }
@@ -39,11 +53,14 @@ pub struct CompareRow {
 impl CompareRow {
     /// Name of the run.
     pub fn name(&self) -> String {
-        if self.soil.is_empty() {
-            self.strategy.clone()
-        } else {
-            format!("{} · {}", self.strategy, self.soil)
+        let mut name = self.strategy.clone();
+        if !self.soil.is_empty() {
+            name += &format!(" · {}", self.soil);
         }
+        if self.name_step {
+            name += &format!(" · {} ms", 1e3 * self.step_s);
+        }
+        if self.is_reference { name + " (reference)" } else { name }
     }
 
     /// `diverged at t = … s: …`; `None` where the run reached its end.

@@ -1,5 +1,6 @@
 //! `compare.html`: the table with the best figure of each column marked, and curves of all runs in one picture.
 
+use crate::recording::compare::scatter::{self, Series};
 use crate::recording::compare::{CompareRow, columns, relative, table};
 use crate::recording::reader::Recording;
 use crate::recording::report::figure::{Curve, Figure, Panel};
@@ -29,11 +30,43 @@ pub(crate) fn render(folder: &Path, rows: &[CompareRow]) -> String {
         escape(scenario)
     ));
     page.section("At a glance", "figures", &html_table(folder, rows));
+    for (title, id, html) in diagrams(rows) {
+        page.section(title, id, &html);
+    }
     let runs: Vec<Run> = rows.iter().enumerate().filter_map(|(k, row)| open(k, row)).collect();
     for figure in [gluing(&runs), forces(&runs), body(&runs)].into_iter().flatten() {
         page.figure(figure);
     }
     page.finish()
+}
+
+/// Error against the reference over the step and over the work, one line per strategy and soil.
+fn diagrams(rows: &[CompareRow]) -> Vec<(&'static str, &'static str, String)> {
+    let mut names: Vec<(&str, &str)> = rows.iter().map(|r| (r.strategy.as_str(), r.soil.as_str())).collect();
+    names.dedup();
+    let series = |x: fn(&CompareRow) -> Option<f64>| -> Vec<Series> {
+        let one = |(colour, (strategy, soil)): (usize, &(&str, &str))| {
+            let own =
+                rows.iter().filter(|r| r.strategy == *strategy && r.soil == *soil && r.failure().is_none());
+            let mut points: Vec<(f64, f64)> =
+                own.filter_map(|r| Some((x(r)?, r.reference_error_m?))).collect();
+            points.sort_by(|a, b| a.0.total_cmp(&b.0));
+            let name = if soil.is_empty() { (*strategy).to_owned() } else { format!("{strategy} · {soil}") };
+            Series { name, colour, points }
+        };
+        names.iter().enumerate().map(one).collect()
+    };
+    let work = |r: &CompareRow| {
+        let s = r.summary.as_ref()?;
+        Some((s.evaluations_mean + s.evaluations_soil_mean) * s.steps as f64)
+    };
+    [
+        ("Error against the step", "error-step", "step, s", series(|r| Some(r.step_s))),
+        ("Work and precision", "work-precision", "evaluations of both sides, all steps", series(work)),
+    ]
+    .into_iter()
+    .filter_map(|(title, id, x, s)| Some((title, id, scatter::diagram(x, "error, m", &s)?)))
+    .collect()
 }
 
 /// A recording that cannot be read leaves its row without curves; the table says what went wrong with the run.

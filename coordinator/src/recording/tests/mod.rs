@@ -339,6 +339,7 @@ fn compared(f: &Path) -> Vec<compare::CompareRow> {
             folder: Some(folder),
             error: None,
             cold_start_mean: (strategy == "iterative").then_some(7.5),
+            ..Default::default()
         });
     }
     let mut failed = rows[1].clone();

@@ -1,0 +1,104 @@
+//! Runs against a reference: the error of the reported body, and the order at which it falls with the step.
+
+use super::CompareRow;
+use crate::error::{Error, Result};
+use crate::recording::layout::at;
+use crate::recording::reader::{PoseSeries, Recording};
+use std::path::Path;
+
+/// Fills in the error of every row of a soil (of all rows where `soil` is none) against a recording.
+///
+/// # Errors
+/// The recording cannot be read.
+pub fn judge(rows: &mut [CompareRow], soil: Option<&str>, folder: &Path) -> Result {
+    let reference = if folder.is_dir() { Recording::open(folder)? } else { from_file(folder)? };
+    let Some((_, truth)) = reference.reported_body() else { return Ok(()) };
+    for row in rows.iter_mut().filter(|r| soil.is_none_or(|s| s == r.soil) && !r.is_reference) {
+        let Some(own) = row.folder.as_deref().and_then(|f| Recording::open(f).ok()) else { continue };
+        let Some((_, poses)) = own.reported_body() else { continue };
+        row.reference_error_m = largest_distance(poses, truth);
+    }
+    orders(rows);
+    Ok(())
+}
+
+fn from_file(path: &Path) -> Result<Recording> {
+    let bytes = std::fs::read(path).map_err(at(path))?;
+    Recording::read(&bytes).ok_or_else(|| Error::File {
+        path: path.display().to_string(),
+        source: std::io::Error::new(std::io::ErrorKind::InvalidData, "is not an MCAP recording"),
+    })
+}
+
+/// Largest distance of two bodies over the times that both know, m; the reference is read between its records.
+fn largest_distance(own: &PoseSeries, truth: &PoseSeries) -> Option<f64> {
+    let (first, last) = (truth.t_s.first()?, truth.t_s.last()?);
+    let inside = |t: &f64| *t >= first - 1e-9 && *t <= last + 1e-9;
+    let distance = |(t, p): (&f64, &[f64; 3])| {
+        let after = truth.t_s.partition_point(|x| x < t).clamp(1, truth.t_s.len() - 1);
+        let (a, b) = (truth.t_s[after - 1], truth.t_s[after]);
+        let share = if b > a { ((t - a) / (b - a)).clamp(0.0, 1.0) } else { 0.0 };
+        let (from, to) = (truth.position[after - 1], truth.position[after]);
+        let square: f64 = (0..3).map(|k| p[k] - from[k] - share * (to[k] - from[k])).map(|d| d * d).sum();
+        square.sqrt()
+    };
+    if truth.t_s.len() < 2 {
+        return None;
+    }
+    own.t_s.iter().zip(&own.position).filter(|(t, _)| inside(t)).map(distance).reduce(f64::max)
+}
+
+/// Observed order of each row against the row of the same strategy and soil with the next smaller step.
+fn orders(rows: &mut [CompareRow]) {
+    let known: Vec<(String, String, f64, f64)> = rows
+        .iter()
+        .filter(|r| r.error.is_none())
+        .filter_map(|r| Some((r.strategy.clone(), r.soil.clone(), r.step_s, r.reference_error_m?)))
+        .collect();
+    for row in rows.iter_mut() {
+        let Some(error) = row.reference_error_m.filter(|_| row.error.is_none()) else { continue };
+        let finer = known
+            .iter()
+            .filter(|(strategy, soil, h, _)| {
+                *strategy == row.strategy && *soil == row.soil && *h < row.step_s * (1.0 - 1e-9)
+            })
+            .max_by(|a, b| a.2.total_cmp(&b.2));
+        row.order = finer
+            .map(|(_, _, h, e)| (error / e).ln() / (row.step_s / h).ln())
+            .filter(|order| order.is_finite());
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn line(t_s: &[f64], slope: f64) -> PoseSeries {
+        PoseSeries {
+            t_s: t_s.to_vec(),
+            position: t_s.iter().map(|t| [slope * t, 0.0, 0.0]).collect(),
+            orientation: Vec::new(),
+        }
+    }
+
+    #[test]
+    fn distances_are_read_between_the_records_of_the_reference() {
+        let distance = largest_distance(&line(&[0.5, 1.0, 1.5, 9.0], 1.1), &line(&[0.0, 1.0, 2.0], 1.0));
+        assert!((distance.expect("common times") - 0.15).abs() < 1e-12);
+        assert_eq!(largest_distance(&line(&[5.0], 1.0), &line(&[0.0, 1.0], 1.0)), None);
+    }
+
+    #[test]
+    fn the_order_is_that_of_the_next_smaller_step() {
+        let row = |step_s: f64, error: f64| CompareRow {
+            strategy: "a".into(),
+            step_s,
+            reference_error_m: Some(error),
+            ..CompareRow::default()
+        };
+        let mut rows = [row(0.004, 16.0), row(0.001, 1.0), row(0.002, 4.0)];
+        orders(&mut rows);
+        assert!((rows[0].order.expect("finer") - 2.0).abs() < 1e-12);
+        assert_eq!(rows[1].order, None);
+    }
+}

@@ -103,3 +103,17 @@ fn their_twins_without_the_mistake_pass() {
         }
     }
 }
+
+#[test]
+fn every_test_stands_in_the_documents_and_every_defect_names_one() {
+    let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/plugins/check-module.md");
+    let page = std::fs::read_to_string(page).expect("the page of the checker");
+    let all = terraglue::check_module::catalogue();
+    for test in all {
+        let row = format!("| `{}` | {} | {} |", test.name, test.level.word(), test.promise);
+        assert!(page.contains(&row), "docs/plugins/check-module.md misses the line\n{row}");
+    }
+    for defect in defects() {
+        assert!(all.iter().any(|t| t.name == defect.test), "there is no test {}", defect.test);
+    }
+}

@@ -114,3 +114,106 @@ def test_the_page_of_a_folder_that_exists_is_left_alone(tmp_path):
     process = terraglue("new", "controller", "my-controller", cwd=tmp_path)
     assert process.returncode == 2 and "exists already" in process.stderr
     shutil.rmtree(tmp_path / "my-controller")
+
+
+def test_the_power_law_of_the_page_passes_and_its_mistake_is_found(tmp_path):
+    place, commands = made(tmp_path, "soil", "c")
+    page = (ROOT / "docs" / "plugins" / "new-module.md").read_text()
+    blocks = re.findall(r"```c\n(.*?)```", page, re.S)
+    source = place / "my_soil.c"
+    text = source.read_text()
+    for old, new in zip(*[re.findall(r"static double \w+\(.*?\n}\n", block, re.S) for block in blocks[:2]]):
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    source.write_text(text)
+    subprocess.run(["make"], cwd=place, check=True, capture_output=True)
+    process = terraglue("check-module", place)
+    assert process.returncode == 0, process.stdout
+    source.write_text(text.replace("1.2 * s->k * pow(z, 0.2)", "s->k * pow(z, 0.2)"))
+    subprocess.run(["make"], cwd=place, check=True, capture_output=True)
+    process = terraglue("check-module", place)
+    assert process.returncode == 1 and "fail     jacobian-soil" in process.stdout
+
+
+def test_modules_are_listed_without_running_them(tmp_path):
+    place, commands = made(tmp_path, "soil", "c")
+    source = place / "my_soil.c"
+    source.write_text(source.read_text() + "\n__attribute__((constructor)) static void run(void) { abort(); }\n")
+    subprocess.run(["make"], cwd=place, check=True, capture_output=True)
+    other = tmp_path / "other"
+    other.mkdir()
+    shutil.copy(place / "libmy_soil_plugin.so", other)
+    (other / "libcut_plugin.so").write_bytes((place / "libmy_soil_plugin.so").read_bytes()[:900])
+    process = terraglue("modules", "--module-path", place, "--module-path", other, cwd=tmp_path)
+    assert process.returncode == 0, process.stderr
+    told = " ".join(process.stdout.replace("│", " ").replace("┆", " ").split())
+    assert "my-soil" in told and "hidden by" in told and "cut off after 900 bytes" in told.replace("- ", "-")
+    process = terraglue("modules", "soil-bekkr")
+    assert process.returncode == 2 and "did you mean" in process.stderr and "soil-bekker" in process.stderr
+    process = terraglue("modules", "soil-bekker")
+    assert process.returncode == 0 and "elastic_stiffness_pa_m" in process.stdout
+
+
+HEADERS = sorted((ROOT / "tests" / "abi").glob("terraglue-*.h"))
+
+
+def built_with(folder, header):
+    """The soil of the scaffold, built with another header."""
+    place, commands = made(folder, "soil", "c")
+    (place / "terraglue.h").write_text(header)
+    subprocess.run(["make"], cwd=place, check=True, capture_output=True)
+    return place
+
+
+@pytest.mark.parametrize("header", HEADERS, ids=lambda h: h.stem)
+def test_modules_of_every_released_minor_run(tmp_path, header):
+    place = built_with(tmp_path, header.read_text())
+    process = terraglue("run", "scenario.toml", "--quiet", cwd=place)
+    assert process.returncode == 0, process.stderr
+    assert terraglue("check-module", place, "--level", "quick").returncode == 0
+
+
+def test_a_later_minor_runs_and_a_later_major_is_refused(tmp_path):
+    text = HEADERS[-1].read_text()
+    minor = int(re.search(r"#define TG_ABI_MINOR (\d+)", text).group(1))
+    assert text.count("} tg_subsystem;") == 1
+    later = text.replace(f"#define TG_ABI_MINOR {minor}", f"#define TG_ABI_MINOR {minor + 1}")
+    later = later.replace("} tg_subsystem;", "    void (*made_up)(void *instance);\n} tg_subsystem;")
+    (tmp_path / "minor").mkdir()
+    place = built_with(tmp_path / "minor", later)
+    process = terraglue("run", "scenario.toml", "--quiet", cwd=place)
+    assert process.returncode == 0, process.stderr
+    process = terraglue("check-module", place, "--level", "quick")
+    assert process.returncode == 0 and f"ABI 2.{minor + 1}" in process.stdout
+    (tmp_path / "major").mkdir()
+    place = built_with(tmp_path / "major", text.replace("#define TG_ABI_MAJOR 2", "#define TG_ABI_MAJOR 3"))
+    process = terraglue("run", "scenario.toml", "--quiet", cwd=place)
+    told = " ".join(process.stderr.replace("│", " ").split())
+    assert process.returncode == 2 and "built for ABI 3.0" in told and "build the module again" in told, told
+
+
+def test_a_module_for_another_machine_is_refused(tmp_path):
+    place, commands = made(tmp_path, "soil", "c")
+    subprocess.run(["make"], cwd=place, check=True, capture_output=True)
+    library = place / "libmy_soil_plugin.so"
+    bytes_ = bytearray(library.read_bytes())
+    bytes_[0x12] = 0x28
+    library.write_bytes(bytes_)
+    process = terraglue("run", "scenario.toml", "--quiet", cwd=place)
+    assert process.returncode == 2 and "another kind of machine" in " ".join(process.stderr.replace("│", " ").split())
+
+
+def test_a_new_law_is_five_lines_of_a_scenario(tmp_path):
+    process = terraglue("new", "law", "my-law", cwd=tmp_path)
+    assert process.returncode == 0, process.stderr
+    place = tmp_path / "my-law"
+    commands = re.search(r"```sh\n(.*?)```", (place / "README.md").read_text(), re.S).group(1)
+    played(place, commands.strip().splitlines())
+    law = (place / "scenario.toml").read_text().split("[soil.law]")[1].split("\n\n")[0]
+    assert 2 <= len(law.strip().splitlines()) <= 5
+    text = (place / "scenario.toml").read_text()
+    (place / "scenario.toml").write_text(text.replace("z/z_1", "z/z_2"))
+    process = terraglue("check", "scenario.toml", cwd=place)
+    assert process.returncode == 2 and "z_2" in process.stderr
+    process = terraglue("new", "law", "another", "--lang", "c", cwd=tmp_path)
+    assert process.returncode == 2 and "languages: scenario" in " ".join(process.stderr.split())

@@ -41,8 +41,10 @@ pub enum Command {
     Check(ScenarioArguments),
     /// Put a module to the test: named tests of what it promises, each in a process of its own.
     CheckModule(CheckModuleArguments),
-    /// List the modules that are found, with their parameters.
+    /// List the modules that are found, without running them; with a name, show its parameters.
     Modules {
+        /// Show this module with its parameters.
+        name: Option<String>,
         /// Search this folder first; may be repeated.
         #[arg(long, value_name = "DIR")]
         module_path: Vec<PathBuf>,
@@ -205,9 +207,9 @@ pub struct NewArguments {
     pub kind: Kind,
     /// Name of the module and of its folder, e.g. my-soil.
     pub name: String,
-    /// Language.
-    #[arg(long, default_value = "rust", value_parser = one_of(Language::ALL, Language::word))]
-    pub lang: Language,
+    /// Language [default: rust; a law: scenario].
+    #[arg(long, value_parser = one_of(Language::ALL, Language::word))]
+    pub lang: Option<Language>,
 }
 
 /// Takes the word of one of a few values.

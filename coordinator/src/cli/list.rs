@@ -6,8 +6,8 @@ use super::run::build;
 use super::{Exit, show};
 use std::path::{Path, PathBuf};
 use terraglue::Result;
-use terraglue::host::{AvailableModule, SearchPath, available_modules};
-use terraglue::scenario::{Scenario, allowed_values};
+use terraglue::host::{AvailableModule, Library, SearchPath, available_modules, listed_modules};
+use terraglue::scenario::{InputError, Scenario, allowed_values};
 use terraglue::subsystem::{Causality, Effect, Kind, Schema, ValueType, Variable};
 use terraglue::testbed::Options;
 
@@ -70,8 +70,19 @@ fn range(v: &Variable) -> String {
 }
 
 /// The modules on the search path.
-pub fn modules(module_path: &[PathBuf], json: bool) -> Result<Exit> {
-    let found = available_modules(&SearchPath::standard(module_path, Path::new(".")));
+pub fn modules(name: Option<&str>, module_path: &[PathBuf], json: bool) -> Result<Exit> {
+    let search = SearchPath::standard(module_path, Path::new("."));
+    if name.is_none() && !json {
+        return Ok(listing(&search));
+    }
+    let mut found = available_modules(&search);
+    found.retain(|m| name.is_none_or(|n| n == m.name));
+    if let (Some(name), true) = (name, found.is_empty()) {
+        // Says every folder that was searched, and the nearest name.
+        let unknown = Library::new().find(name, &search, Path::new("."));
+        let told = unknown.err().map_or_else(|| format!("no module `{name}`"), |e| e.to_string());
+        return Err(InputError::plain(told, None).into());
+    }
     if json {
         let describe = |m: &AvailableModule| match &m.schema {
             Ok(schema) => serde_json::json!({ "name": m.name, "path": m.path, "schema": schema }),
@@ -86,10 +97,30 @@ pub fn modules(module_path: &[PathBuf], json: bool) -> Result<Exit> {
             Ok(schema) => describe(module, schema),
         }
     }
+    Ok(Exit::Done)
+}
+
+/// One line per file, from the section of the library: no code of it runs.
+fn listing(search: &SearchPath) -> Exit {
+    let mut table = show::table(&["module", "version", "ABI", "licence", "file", ""]);
+    let found = listed_modules(search);
+    for m in &found {
+        let described = m.description.clone().unwrap_or_default();
+        let note = match (&m.refused, &m.hidden_by) {
+            (Some(why), _) => format!("refused: {why}"),
+            (None, Some(by)) => format!("hidden by {}", by.display()),
+            (None, None) if m.description.is_none() => "does not describe itself".into(),
+            (None, None) => String::new(),
+        };
+        let file = m.path.display().to_string();
+        table.add_row([m.name.clone(), described.version, described.abi, described.license, file, note]);
+    }
     if found.is_empty() {
         outln!("no module found; see --module-path");
+    } else {
+        outln!("{table}\n`terraglue modules NAME` shows what a module takes.");
     }
-    Ok(Exit::Done)
+    Exit::Done
 }
 
 fn describe(module: &AvailableModule, schema: &Schema) {

@@ -65,7 +65,7 @@ pub fn main() -> ExitCode {
         Command::Report { folder } => report::report(&folder),
         Command::Check(arguments) => check::check(&arguments),
         Command::CheckModule(arguments) => check_module::check_module(&arguments),
-        Command::Modules { module_path, json } => list::modules(&module_path, json),
+        Command::Modules { name, module_path, json } => list::modules(name.as_deref(), &module_path, json),
         Command::Variables(arguments) => list::variables(&arguments),
         Command::Fmu(command) => fmu::fmu(&command),
         Command::Export(arguments) => export::export(&arguments),

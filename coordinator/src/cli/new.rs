@@ -5,13 +5,15 @@ use super::arguments::NewArguments;
 use super::output::outln;
 use std::path::Path;
 use terraglue::Result;
-use terraglue::scaffold::{Place, scaffold};
+use terraglue::scaffold::{Kind, Language, Place, scaffold};
 use terraglue::scenario::InputError;
 
 /// Writes the folder and says what to type next.
 pub fn new(arguments: &NewArguments) -> Result<Exit> {
     let wrong = |e: terraglue::scaffold::ScaffoldError| InputError::plain(e.to_string(), None);
-    let made = scaffold(arguments.kind, arguments.lang, &arguments.name, &Place::here()).map_err(wrong)?;
+    let usual = if arguments.kind == Kind::Law { Language::Scenario } else { Language::Rust };
+    let made = scaffold(arguments.kind, arguments.lang.unwrap_or(usual), &arguments.name, &Place::here())
+        .map_err(wrong)?;
     let folder = Path::new(&arguments.name);
     made.write(folder).map_err(wrong)?;
     outln!("{} files in {}. Next:\n", made.files.len(), folder.display());

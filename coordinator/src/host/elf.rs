@@ -12,6 +12,10 @@ pub struct Description {
     pub version: String,
     /// MAJOR.MINOR of the ABI that it was built for.
     pub abi: String,
+    /// Licence; empty: not told.
+    pub license: String,
+    /// Authors, separated by `:`; empty: not told.
+    pub authors: String,
 }
 
 /// Whether the bytes are an ELF file at all.
@@ -64,6 +68,8 @@ impl Description {
                 "name" => out.name = value.into(),
                 "version" => out.version = value.into(),
                 "abi" => out.abi = value.into(),
+                "license" => out.license = value.into(),
+                "authors" => out.authors = value.into(),
                 _ => {}
             }
         }

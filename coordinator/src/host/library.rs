@@ -260,6 +260,35 @@ pub struct AvailableModule {
     pub schema: std::result::Result<Schema, LoadError>,
 }
 
+/// A file of a module, as far as it can be told without running it.
+#[derive(Debug)]
+pub struct ListedModule {
+    /// Name by its file.
+    pub name: String,
+    /// File.
+    pub path: PathBuf,
+    /// What its section says; None: it has none.
+    pub description: Option<Description>,
+    /// Why it would be refused; None: it can be loaded, as far as its bytes say.
+    pub refused: Option<LoadError>,
+    /// The file of the same name that is found before it.
+    pub hidden_by: Option<PathBuf>,
+}
+
+/// All files of modules on the search path, by name. No code of them runs.
+pub fn listed_modules(search: &SearchPath) -> Vec<ListedModule> {
+    let every = search.every();
+    let first = |name: &str| every.iter().find(|(n, _)| n == name).map(|(_, path)| path.clone());
+    let listed = |(name, path): &(String, PathBuf)| ListedModule {
+        name: name.clone(),
+        path: path.clone(),
+        description: Description::read(path),
+        refused: inspect(path).err(),
+        hidden_by: first(name).filter(|f| f != path),
+    };
+    every.iter().map(listed).collect()
+}
+
 /// All modules on the search path, by name. Each is loaded to ask for its schema.
 pub fn available_modules(search: &SearchPath) -> Vec<AvailableModule> {
     let module = |(name, path): (String, PathBuf)| {

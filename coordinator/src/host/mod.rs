@@ -25,7 +25,7 @@ pub use elf::{Description, exported_symbols};
 pub use error::LoadError;
 pub use instance::{Instance, Progress, Reply};
 pub use isolation::Isolation;
-pub use library::{AvailableModule, Library, LoadedModule, available_modules};
+pub use library::{AvailableModule, Library, ListedModule, LoadedModule, available_modules, listed_modules};
 pub use probe::{TableFacts, probe_odd_calls, table_of};
 pub use process::{Process, adopt_locale, has_locale, heap_in_use};
 pub use search::SearchPath;

@@ -53,15 +53,21 @@ impl SearchPath {
 
     /// All modules that can be found, by name; the first of each name as `locate` would find it.
     pub(super) fn all(&self) -> Vec<(String, PathBuf)> {
+        let mut first = self.every();
+        first.dedup_by(|later, earlier| later.0 == earlier.0);
+        first
+    }
+
+    /// All files of modules, by name, those of one name in the order of the search.
+    pub(super) fn every(&self) -> Vec<(String, PathBuf)> {
         let mut found: Vec<(String, PathBuf)> = Vec::new();
         for entry in self.folders.iter().filter_map(|f| std::fs::read_dir(f).ok()).flatten().flatten() {
-            if let Some(name) = entry.file_name().to_str().and_then(module_name)
-                && !found.iter().any(|(n, _)| *n == name)
-            {
+            if let Some(name) = entry.file_name().to_str().and_then(module_name) {
                 found.push((name, entry.path()));
             }
         }
-        found.sort();
+        // Stable: the order of the search stays among files of one name.
+        found.sort_by(|a, b| a.0.cmp(&b.0));
         found
     }
 }

@@ -11,6 +11,8 @@ pub enum Kind {
     Robot,
     /// Signals.
     Controller,
+    /// Pressure and shear of a soil.
+    Law,
 }
 
 /// In which language.
@@ -22,11 +24,13 @@ pub enum Language {
     C,
     /// C++17.
     Cpp,
+    /// Text in a scenario.
+    Scenario,
 }
 
 impl Kind {
     /// All, in the order in which they are listed.
-    pub const ALL: [Self; 3] = [Self::Soil, Self::Robot, Self::Controller];
+    pub const ALL: [Self; 4] = [Self::Soil, Self::Robot, Self::Controller, Self::Law];
 
     /// As a word of the command line.
     pub fn word(self) -> &'static str {
@@ -34,6 +38,7 @@ impl Kind {
             Self::Soil => "soil",
             Self::Robot => "robot",
             Self::Controller => "controller",
+            Self::Law => "law",
         }
     }
 
@@ -42,6 +47,7 @@ impl Kind {
             Self::Soil => "It starts as flat ground that yields like a spring and holds a foot by friction.",
             Self::Robot => "It starts as a ball that falls and rests with T* = m g.",
             Self::Controller => "It starts as a motor target that goes smoothly to a set-point.",
+            Self::Law => "It starts as Bekker's law that stiffens with the depth.",
         }
     }
 
@@ -56,13 +62,14 @@ impl Kind {
             Self::Controller => {
                 format!("Your control law goes into `control` of `{source}`: inputs in, outputs out.")
             }
+            Self::Law => format!("Your physics goes into `[soil.law]` of `{source}`."),
         }
     }
 }
 
 impl Language {
     /// All.
-    pub const ALL: [Self; 3] = [Self::Rust, Self::C, Self::Cpp];
+    pub const ALL: [Self; 4] = [Self::Rust, Self::C, Self::Cpp, Self::Scenario];
 
     /// As people write it.
     pub fn title(self) -> &'static str {
@@ -70,6 +77,7 @@ impl Language {
             Self::Rust => "Rust",
             Self::C => "C",
             Self::Cpp => "C++",
+            Self::Scenario => "a scenario",
         }
     }
 
@@ -79,6 +87,7 @@ impl Language {
             Self::Rust => "rust",
             Self::C => "c",
             Self::Cpp => "cpp",
+            Self::Scenario => "scenario",
         }
     }
 }
@@ -105,9 +114,14 @@ const RUST: [File; 2] = [
     ),
 ];
 
+const LAW: File =
+    ("scenario.toml", "the law, and a ball that falls on it", include_str!("templates/scenario-law.toml.in"));
+
 /// The source file of a kind in a language; None: not offered.
 fn source(kind: Kind, language: Language) -> Option<File> {
     Some(match (kind, language) {
+        (Kind::Law, Language::Scenario) => LAW,
+        (Kind::Law, _) | (_, Language::Scenario) => return None,
         (Kind::Soil, Language::Rust) => ("src/lib.rs", "the soil", include_str!("templates/soil.rs.in")),
         (Kind::Soil, Language::C) => ("my_module.c", "the soil", include_str!("templates/soil.c.in")),
         (Kind::Soil, Language::Cpp) => ("my_module.cpp", "the soil", include_str!("templates/soil.cpp.in")),
@@ -136,6 +150,7 @@ fn scenario(kind: Kind) -> &'static [File] {
         Kind::Robot => {
             &[("scenario.toml", "it falls on a soil", include_str!("templates/scenario-robot.toml.in"))]
         }
+        Kind::Law => &[BALL],
         Kind::Controller => &[
             ("scenario.toml", "it moves an arm", include_str!("templates/scenario-controller.toml.in")),
             ARM,
@@ -164,6 +179,7 @@ pub(super) fn fill(
         Language::Rust => files.extend(RUST),
         Language::C => files.extend([HEADER, MAKEFILE]),
         Language::Cpp => files.extend([HEADER, CLASS, MAKEFILE]),
+        Language::Scenario => {}
     }
     files.extend(scenario(kind));
     let interfaces = match (&place.interfaces, language) {
@@ -176,6 +192,7 @@ pub(super) fn fill(
     let (build, module) = match language {
         Language::Rust => ("cargo build", format!("./target/debug/{library}")),
         Language::C | Language::Cpp => ("make", format!("./{library}")),
+        Language::Scenario => ("terraglue check scenario.toml", String::new()),
     };
     let listing: Vec<_> = files.iter().map(|(path, what, _)| format!("| `{path}` | {what} |")).collect();
     let (flags, compile) = match language {
@@ -202,12 +219,16 @@ pub(super) fn fill(
         ("my-module", name.into()),
         ("my_module", snake),
     ];
-    files.push(("README.md", "this page", include_str!("templates/README.md.in")));
+    files.push(match kind {
+        Kind::Law => ("README.md", "this page", include_str!("templates/README-law.md.in")),
+        _ => ("README.md", "this page", include_str!("templates/README.md.in")),
+    });
     let replaced = |text: &str| words.iter().fold(text.to_owned(), |text, (word, by)| text.replace(word, by));
     let mut out: Vec<(String, String)> =
         files.iter().map(|(path, _, text)| (replaced(path), replaced(text))).collect();
     out.extend(lock_file(language, place));
-    Ok(Scaffold { files: out, commands: [build.into(), format!("{} run scenario.toml", place.program)] })
+    let build = build.replace("terraglue", &place.program);
+    Ok(Scaffold { files: out, commands: [build, format!("{} run scenario.toml", place.program)] })
 }
 
 /// The versions of the crates that the program was built with, so that what is cached is used.

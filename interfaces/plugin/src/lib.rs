@@ -71,6 +71,10 @@ macro_rules! export_subsystem {
             env!("CARGO_PKG_VERSION"),
             "\nabi=",
             $crate::abi_version!(),
+            "\nlicense=",
+            env!("CARGO_PKG_LICENSE"),
+            "\nauthors=",
+            env!("CARGO_PKG_AUTHORS"),
             "\n\0"
         );
 

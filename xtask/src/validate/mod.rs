@@ -8,6 +8,7 @@ mod figure;
 mod fmi;
 mod gluing;
 mod known;
+mod plugins;
 mod rigid_body;
 mod soil;
 mod timing;
@@ -70,7 +71,7 @@ const AREAS: [(&str, Option<Measure>); 6] = [
     ("soil", Some(soil::figures)),
     ("gluing", Some(gluing::figures)),
     ("fmi", Some(fmi::figures)),
-    ("plugins", None),
+    ("plugins", Some(plugins::figures)),
 ];
 
 fn area_names() -> Vec<&'static str> {

@@ -1,0 +1,162 @@
+//! Figures of the plugin interface: the checker, its broken modules, its time, and what it says of our own modules.
+
+mod speed;
+
+use super::{Context, Figure, Limit};
+use crate::process::{Outcome, root};
+use std::path::{Path, PathBuf};
+use std::process::Command;
+use std::time::Instant;
+use terraglue::check_module::{Area, Level, Options, Report, catalogue, check};
+
+/// All figures.
+pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
+    let physical = catalogue().iter().filter(|t| t.area == Area::Physics).count();
+    let mut out = vec![
+        Figure::new(
+            "plugins.tests",
+            catalogue().len() as f64,
+            Limit::AtLeast(50.0),
+            "named tests of check-module",
+        ),
+        Figure::new("plugins.tests.physical", physical as f64, Limit::AtLeast(12.0), "of them about physics"),
+    ];
+    broken(context, &mut out)?;
+    own(context, &mut out)?;
+    seeds(context, &mut out)?;
+    if context.timing {
+        speed::figures(&mut out)?;
+    }
+    Ok(out)
+}
+
+fn options(context: &Context) -> Options {
+    Options { jobs: 2, ..Options::new(context.program.clone()) }
+}
+
+/// A line of tests/modules/broken/defects.tsv: source, test, switches.
+type Defect = [String; 3];
+
+fn defects() -> Outcome<Vec<Defect>> {
+    let path = root().join("tests/modules/broken/defects.tsv");
+    let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let row = |line: &str| {
+        let mut cells = line.split('\t').map(str::to_owned);
+        Some([cells.next()?, cells.next()?, cells.next()?])
+    };
+    text.lines().skip(1).map(row).collect::<Option<_>>().ok_or_else(|| "defects.tsv: a short line".into())
+}
+
+fn compiled(context: &Context, source: &str, switches: &str) -> Outcome<PathBuf> {
+    let folder = context.scratch.join(format!("broken-{source}-{switches}"));
+    std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let library = folder.join(format!("libbroken_{source}_plugin.so"));
+    let mut cc = Command::new("cc");
+    cc.args(["-std=gnu11", "-O1", "-w", "-fPIC", "-shared", "-I"])
+        .arg(root().join("interfaces/plugin/include"));
+    for switch in switches.split(',').filter(|s| !s.is_empty()) {
+        cc.arg(if switch == "WITH_FIELD" { "-DWITH_FIELD=1".into() } else { format!("-DBROKEN_{switch}=1") });
+    }
+    cc.arg(root().join(format!("tests/modules/broken/{source}.c"))).arg("-o").arg(&library);
+    let done = cc.args(["-lm", "-lpthread"]).status().map_err(|e| format!("cannot start `cc`: {e}"))?;
+    if done.success() { Ok(library) } else { Err(format!("{source} does not compile with {switches}")) }
+}
+
+fn report(context: &Context, library: &Path, change: impl Fn(&mut Options)) -> Outcome<Report> {
+    let mut options = options(context);
+    change(&mut options);
+    Ok(check(library, &options)?)
+}
+
+/// How many broken modules there are, and how many are caught by the test meant for them; a fifth of them when short.
+fn broken(context: &Context, out: &mut Vec<Figure>) -> Outcome {
+    let all = defects()?;
+    let (mut tried, mut caught) = (0u32, 0u32);
+    for [source, test, switches] in all.iter().step_by(if context.quick { 5 } else { 1 }) {
+        let library = compiled(context, source, switches)?;
+        let found = report(context, &library, |o| {
+            o.only = vec![test.clone()];
+            o.limit_s = if test == "steps" { 3.0 } else { 30.0 };
+        })?;
+        tried += 1;
+        caught += u32::from(found.broken().contains(&test.as_str()));
+    }
+    let what = "broken modules, each with its one mistake";
+    out.push(Figure::new("plugins.broken", all.len() as f64, Limit::AtLeast(40.0), what));
+    let share = f64::from(caught) / f64::from(tried.max(1));
+    out.push(Figure::new(
+        "plugins.broken.caught",
+        share,
+        Limit::Equal(1.0),
+        "share caught by the test meant for them",
+    ));
+    let mut alarms = 0;
+    for source in ["soil", "robot", "controller"] {
+        alarms += report(context, &compiled(context, source, "")?, |_| {})?.broken().len();
+    }
+    out.push(Figure::new(
+        "plugins.twins",
+        alarms as f64,
+        Limit::Equal(0.0),
+        "tests that complain of their clean twins",
+    ));
+    Ok(())
+}
+
+/// Our own modules: what is found, and how long it takes.
+fn own(context: &Context, out: &mut Vec<Figure>) -> Outcome {
+    let ball = root().join("tests/models/ball.urdf").display().to_string();
+    let deps = context.program.with_file_name("deps");
+    for name in ["soil-bekker", "soil-cellular-automaton", "gait", "rigid-body"] {
+        let file = format!("lib{}_plugin.so", name.replace('-', "_"));
+        let sets = if name == "rigid-body" { vec![("model".to_owned(), ball.clone())] } else { Vec::new() };
+        let start = Instant::now();
+        let found = report(context, &deps.join(&file), |o| o.sets.clone_from(&sets))?;
+        let took = start.elapsed().as_secs_f64();
+        let what = format!("tests that {name} fails");
+        out.push(Figure::new(
+            format!("plugins.own.{name}"),
+            found.broken().len() as f64,
+            Limit::Equal(0.0),
+            what,
+        ));
+        if context.timing {
+            let what = format!("check of {name}, s");
+            out.push(Figure::new(format!("plugins.time.{name}"), took, Limit::AtMost(60.0), what));
+        }
+    }
+    if context.timing {
+        let start = Instant::now();
+        report(context, &compiled(context, "soil", "")?, |o| o.level = Level::Quick)?;
+        let took = start.elapsed().as_secs_f64();
+        out.push(Figure::new(
+            "plugins.time.quick",
+            took,
+            Limit::AtMost(2.0),
+            "quick check of a soil in C, s",
+        ));
+    }
+    Ok(())
+}
+
+/// False alarms over many seeds: the tests that draw numbers, on a soil that is right.
+fn seeds(context: &Context, out: &mut Vec<Figure>) -> Outcome {
+    let library = compiled(context, "soil", "")?;
+    let bekker = context.program.with_file_name("deps").join("libsoil_bekker_plugin.so");
+    let seeds = if context.quick { 3 } else { 100 };
+    let mut alarms = 0;
+    for seed in 1..=seeds {
+        for module in [&library, &bekker] {
+            let drawn = ["passive", "slots", "serialize-garbage"].map(str::to_owned).to_vec();
+            alarms += report(context, module, |o| (o.seed, o.only) = (seed, drawn.clone()))?.broken().len();
+        }
+    }
+    let what = format!("false alarms of the tests that draw numbers, two soils, {seeds} seeds");
+    out.push(Figure::new(
+        "plugins.false-alarms",
+        f64::from(u32::try_from(alarms).unwrap_or(u32::MAX)),
+        Limit::Equal(0.0),
+        what,
+    ));
+    Ok(())
+}

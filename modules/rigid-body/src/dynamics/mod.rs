@@ -48,7 +48,7 @@ pub(crate) enum Failure {
     #[error("joint `{joint}` stays open by {gap:e} (m or rad); a shorter step may help")]
     Gap { joint: String, gap: f64 },
     #[error(
-        "the step of generalized-alpha did not converge in {corrections} corrections; shorten the step, or take \
+        "the step of second order did not converge in {corrections} corrections; shorten the step, or take \
          integrator = \"symplectic-euler\" where something hits or sticks"
     )]
     NotConverged { corrections: usize },

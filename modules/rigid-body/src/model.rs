@@ -1,5 +1,6 @@
 //! What stays constant over the life of an instance: bodies, joints, shapes.
 
+use crate::contact::plane::Plane;
 use crate::math::{M3, Q, V3, frame_along};
 use nalgebra::Isometry3;
 use terraglue_robot_import as import;
@@ -48,6 +49,8 @@ pub(crate) struct Joint {
     pub parent_frame: Q,
     pub child_frame: Q,
     pub limits: Option<[f64; 2]>,
+    /// What the file says about its axis.
+    pub data: import::AxisData,
 }
 
 impl Joint {
@@ -100,8 +103,13 @@ pub(crate) struct Model {
     /// Connections beyond the tree.
     pub closures: Vec<crate::closure::Closure>,
     pub gravity: V3,
-    /// Pose of body 0 at the file's root frame = origin; `None`: the root frame is the world.
-    pub free_base: Option<Isometry3<f64>>,
+    /// Per body without a joint its pose in the file's frame.
+    pub free: Vec<Option<Isometry3<f64>>>,
+    /// Shapes and planes that stand still, in the world.
+    pub world_shapes: Vec<import::Shape>,
+    pub planes: Vec<Plane>,
+    /// Pairs of bodies that never touch.
+    pub excluded: Vec<[usize; 2]>,
 }
 
 impl Model {
@@ -110,23 +118,33 @@ impl Model {
     pub fn new(robot: &import::Robot, base: &Isometry3<f64>, fixed_base: bool, gravity: V3) -> Self {
         let bodies: Vec<Body> = robot.bodies.iter().map(body).collect();
         let mut joints: Vec<Joint> = robot.joints.iter().map(|j| joint(j, &bodies, base)).collect();
-        let free_base = match robot.base {
-            import::Base::World => None,
-            import::Base::Free(root) if fixed_base => {
-                joints.insert(0, weld(&bodies[0], &(base * root)));
-                None
-            }
-            import::Base::Free(root) => Some(root),
-        };
+        let mut free = vec![None; bodies.len()];
+        robot.others.iter().for_each(|(b, pose)| free[*b] = Some(*pose));
+        match robot.base {
+            import::Base::World => {}
+            import::Base::Free(root) if fixed_base => joints.insert(0, weld(&bodies[0], &(base * root))),
+            import::Base::Free(root) => free[0] = Some(root),
+        }
+        let moved =
+            |s: &import::Shape| import::Shape { body_from_shape: base * s.body_from_shape, ..s.clone() };
+        let world_shapes = robot.world_shapes.iter().map(moved).collect();
+        let planes = robot.planes.iter().map(|p| plane(p, base)).collect();
+        let excluded = robot.excluded.clone();
         let mut joint_above = vec![None; bodies.len()];
         joints.iter().enumerate().for_each(|(i, j)| joint_above[j.child] = Some(i));
-        Self { bodies, joints, joint_above, closures: Vec::new(), gravity, free_base }
+        let closures = Vec::new();
+        Self { bodies, joints, joint_above, closures, gravity, free, world_shapes, planes, excluded }
     }
 
     /// Total mass, kg.
     pub fn mass(&self) -> f64 {
         self.bodies.iter().map(|b| b.mass).sum()
     }
+}
+
+fn plane(p: &import::Plane, base: &Isometry3<f64>) -> Plane {
+    let normal = (base.rotation * p.normal).into_inner();
+    Plane { normal, offset: p.offset + normal.dot(&base.translation.vector), friction: p.friction }
 }
 
 fn body(b: &import::Body) -> Body {
@@ -161,6 +179,7 @@ fn joint(j: &import::Joint, bodies: &[Body], base: &Isometry3<f64>) -> Joint {
         parent_frame: parent.rotation * along,
         child_frame: j.child_from_joint.rotation * along,
         limits: j.limits,
+        data: j.data,
     }
 }
 
@@ -175,5 +194,6 @@ fn weld(body: &Body, pose: &Isometry3<f64>) -> Joint {
         parent_frame: pose.rotation,
         child_frame: Q::identity(),
         limits: None,
+        data: import::AxisData::default(),
     }
 }

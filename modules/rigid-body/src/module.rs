@@ -1,6 +1,6 @@
 //! The module: from parameters to an instance.
 
-use crate::actuator::{Actuator, configure};
+use crate::actuator::{Actuator, Item, configure};
 use crate::closure::configure::closures;
 use crate::contact::bodies::{Law, Surface};
 use crate::contact::plane::Plane;
@@ -15,7 +15,7 @@ use crate::state::{ClosureState, ContactBook, JointState, Motion, State};
 use nalgebra::Isometry3;
 use std::path::Path;
 use std::sync::Arc;
-use terraglue_robot_import::read_urdf;
+use terraglue_robot_import::{Drive, DriveKind, read_robot};
 use terraglue_subsystem::{Config, Energy, Error, Host, LogLevel, Module, Result, Schema, Subsystem};
 
 /// Rigid bodies with joints and motors, read from a robot file.
@@ -28,10 +28,11 @@ impl Module for RigidBody {
     }
 
     fn instantiate(config: &Config, host: Arc<dyn Host>) -> Result<Box<dyn Subsystem>> {
+        let said = config;
         let config = config.clone().with_defaults(&Self::schema());
         let fixed = config.flag("fixed_base")?;
         let path = Path::new(host.folder()).join(config.text("model")?);
-        let file = read_urdf(&path, fixed).map_err(|e| Error::Refused(e.to_string()))?;
+        let file = read_robot(&path, fixed).map_err(|e| Error::Refused(e.to_string()))?;
         let base = base_pose(&vector(&config, "position_m")?, config.number("heading_rad")?);
         let mut model = Model::new(&file, &base, fixed, V3::from(host.gravity()));
         set_kinds(&config, &mut model)?;
@@ -42,8 +43,9 @@ impl Module for RigidBody {
             joints: joint_rates(&model, &config.number_table("joint_rates")?)?,
         };
         let bodies = start(&config, &*host, &model, base, (&angles, &rates))?;
-        let joints = joint_states(&config, &model, &angles, &rates.joints)?;
+        let joints = joint_states((&config, said), &model, &angles, &rates.joints)?;
         model.closures = closures(&config, &model, &bodies, &angles)?;
+        file.warnings.iter().for_each(|w| host.log(LogLevel::Warning, w));
         let mut state = State {
             forces: vec![V3::zeros(); bodies.len()],
             contact_normal: vec![0.0; bodies.len()],
@@ -73,7 +75,8 @@ impl Module for RigidBody {
             Dynamics::new(model, integrator, &state.bodies).map_err(|e| Error::Failed(e.to_string()))?;
         let ground = ground(&config)?;
         if integrator.is_second_order() {
-            without_impacts(&*host, ground.is_some(), dynamics.contacts.watches())?;
+            let planes = ground.is_some() || !dynamics.model.planes.is_empty();
+            without_impacts(&*host, planes, dynamics.contacts.watches())?;
         }
         let name = config.text("contact_solver")?;
         let law = Law::from_name(name).ok_or_else(|| {
@@ -142,7 +145,8 @@ fn ground(config: &Config) -> Result<Option<Plane>> {
     if !length.is_finite() || length < 1e-9 {
         return Err(refused());
     }
-    Ok(Some(Plane { normal: normal / length, offset: config.number("ground_height_m")? }))
+    let offset = config.number("ground_height_m")?;
+    Ok(Some(Plane { normal: normal / length, offset, friction: None }))
 }
 
 /// A parameter with x, y, z.
@@ -187,7 +191,7 @@ fn start(
     (angles, rates): (&[f64], &StartRates),
 ) -> Result<Vec<Motion>> {
     let mut bodies = at_rest(model, &base, angles);
-    let terrain = host.terrain().filter(|_| model.free_base.is_some());
+    let terrain = host.terrain().filter(|_| model.free.iter().any(Option::is_some));
     if let Some(terrain) = terrain.filter(|_| config.flag("place_on_ground").unwrap_or(true)) {
         base.translation.vector.z -= clearance(model, &bodies, terrain).unwrap_or(0.0);
         bodies = at_rest(model, &base, angles);
@@ -196,20 +200,56 @@ fn start(
     Ok(bodies)
 }
 
-fn joint_states(config: &Config, model: &Model, angles: &[f64], rates: &[f64]) -> Result<Vec<JointState>> {
+fn joint_states(
+    config: (&Config, &Config),
+    model: &Model,
+    angles: &[f64],
+    rates: &[f64],
+) -> Result<Vec<JointState>> {
     let states = model.joints.iter().zip(angles.iter().zip(rates));
     let start = |(joint, (angle, rate)): (&crate::model::Joint, (&f64, &f64))| {
-        Ok(JointState { velocity: *rate, ..joint_state(config, model, &joint.name, *angle)? })
+        Ok(JointState { velocity: *rate, ..joint_state(config, model, joint, *angle)? })
     };
     states.map(start).collect()
 }
 
-fn joint_state(config: &Config, model: &Model, joint: &str, angle: f64) -> Result<JointState> {
-    let name = configure::text(config, model, "motor", joint)?.unwrap_or("off");
+/// `said`: the scenario without defaults; where it is silent the robot file speaks.
+fn joint_state(
+    (config, said): (&Config, &Config),
+    model: &Model,
+    joint: &crate::model::Joint,
+    angle: f64,
+) -> Result<JointState> {
+    let (data, joint) = (joint.data, joint.name.as_str());
+    let drive = data.drive;
+    let silent = |key: &str| said.get(key).is_none();
+    let given = drive.filter(|_| silent("motor")).map(|d| match d.kind {
+        DriveKind::Position => "position",
+        DriveKind::Velocity => "velocity",
+        DriveKind::Torque => "torque",
+    });
+    let name = match given {
+        Some(name) => name,
+        None => configure::text(config, model, "motor", joint)?.unwrap_or("off"),
+    };
     let motor = Motor::from_name(name).ok_or_else(|| {
         Error::Refused(format!("parameter `motor` = `{name}` is none of {:?}", Motor::NAMES))
     })?;
-    let number = |name: &str| Ok::<f64, Error>(configure::number(config, model, name, joint)?.unwrap_or(0.0));
+    let number = |name: &str, given: Option<f64>| match given.filter(|_| silent(name)) {
+        Some(given) => Ok::<f64, Error>(given),
+        None => Ok(configure::number(config, model, name, joint)?.unwrap_or(0.0)),
+    };
+    let gain = |of: fn(&Drive) -> f64| drive.as_ref().filter(|d| d.kind == DriveKind::Position).map(of);
+    let mut from_file = Actuator::default();
+    for (item, value) in [
+        (Item::ViscousFriction, data.damping),
+        (Item::CoulombFriction, data.friction),
+        (Item::Armature, data.armature),
+        (Item::SpringStiffness, data.stiffness),
+        (Item::SpringReference, data.reference),
+    ] {
+        from_file.settings[item as usize] = value;
+    }
     Ok(JointState {
         angle,
         velocity: 0.0,
@@ -217,13 +257,13 @@ fn joint_state(config: &Config, model: &Model, joint: &str, angle: f64) -> Resul
         angle_target: angle,
         velocity_target: 0.0,
         torque_target: 0.0,
-        max_torque: number("max_torque")?,
-        stiffness: number("stiffness")?,
-        damping: number("damping")?,
+        max_torque: number("max_torque", drive.and_then(|d| d.max_torque))?,
+        stiffness: number("stiffness", gain(|d| d.stiffness))?,
+        damping: number("damping", gain(|d| d.damping))?,
         motor,
         blocked: None,
         broken: false,
         mode: Mode::Free,
-        actuator: configure::actuator(config, model, joint, Actuator::default())?,
+        actuator: configure::actuator(config, model, joint, from_file)?,
     })
 }

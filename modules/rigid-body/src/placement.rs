@@ -81,7 +81,7 @@ pub(crate) fn at_rest(model: &Model, base: &Isometry3<f64>, coordinates: &[f64])
                 place_child(joint, joint.parent.map(|p| &bodies[p]), coordinates[j])
             }
             None => {
-                let pose = base * model.free_base.unwrap_or_else(Isometry3::identity);
+                let pose = base * model.free[b].unwrap_or_else(Isometry3::identity);
                 Motion::at(
                     pose * nalgebra::Point3::from(body.com) - nalgebra::Point3::origin(),
                     pose.rotation,

@@ -8,9 +8,9 @@ pub(crate) fn schema() -> Schema {
     Schema {
         name: "rigid-body".into(),
         kind: Kind::Robot,
-        help: "Rigid bodies with joints and motors, read from a robot file (URDF)".into(),
+        help: "Rigid bodies with joints and motors, read from a robot file (URDF, MJCF)".into(),
         parameters: vec![
-            Parameter::of("model", ParameterType::Path, "Robot file (URDF)"),
+            Parameter::of("model", ParameterType::Path, "Robot file (URDF or MJCF)"),
             Parameter {
                 unit: "m".into(),
                 ..Parameter::of("position_m", ParameterType::Numbers, "Initial x, y, z of the root link's frame")

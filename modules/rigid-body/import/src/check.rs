@@ -34,7 +34,7 @@ pub(crate) fn inertial(source: &Source, link: &Link) -> Result<Inertial, Error> 
 }
 
 /// Principal moments must be positive and each at most the sum of the others (with 1e-6 for rounding in files).
-fn physical(tensor: &Matrix3<f64>) -> Result<(), String> {
+pub(crate) fn physical(tensor: &Matrix3<f64>) -> Result<(), String> {
     if !tensor.iter().all(|v| v.is_finite()) {
         return Err("the inertia is not finite; write numbers in kg m²".into());
     }
@@ -105,5 +105,6 @@ fn shape(
         return Err(source.link(&link.name, format!("a shape has the size {bad} m; sizes are positive")));
     }
     let name = name.filter(|n| !n.is_empty()).unwrap_or(&link.name).into();
-    Ok(Shape { name, geometry, body_from_shape: isometry(origin), collides })
+    let body_from_shape = isometry(origin);
+    Ok(Shape { name, geometry, body_from_shape, collides, friction: None, group: 1, mask: 1 })
 }

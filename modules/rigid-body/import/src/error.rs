@@ -44,6 +44,18 @@ pub enum Error {
         /// Value and way out.
         problem: String,
     },
+    /// An element is wrong.
+    #[error("{file}:{line}: {element}: {problem}")]
+    Element {
+        /// Path.
+        file: String,
+        /// Line of the element, from 1.
+        line: usize,
+        /// Tag and name.
+        element: String,
+        /// Value and way out.
+        problem: String,
+    },
     /// Links and joints do not form one tree.
     #[error("{file}: {problem}")]
     Tree {

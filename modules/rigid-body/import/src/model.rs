@@ -13,6 +13,27 @@ pub struct Robot {
     pub bodies: Vec<Body>,
     /// Joints in the order of their child bodies.
     pub joints: Vec<Joint>,
+    /// Further bodies that move freely, with the pose of their frame in the frame of the file.
+    pub others: Vec<(usize, Isometry3<f64>)>,
+    /// Shapes that stand still, in the frame of the file.
+    pub world_shapes: Vec<Shape>,
+    /// Planes that stand still.
+    pub planes: Vec<Plane>,
+    /// Pairs of bodies that never touch.
+    pub excluded: Vec<[usize; 2]>,
+    /// What the file says that has no effect, with its place.
+    pub warnings: Vec<String>,
+}
+
+/// A half-space that stands still, in the frame of the file.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Plane {
+    /// Out of the ground.
+    pub normal: Unit<Vector3<f64>>,
+    /// normal·p of the points p of the surface, m.
+    pub offset: f64,
+    /// Coulomb friction; none: the scenario's.
+    pub friction: Option<f64>,
 }
 
 /// Root of the tree.
@@ -50,6 +71,19 @@ pub struct Shape {
     pub body_from_shape: Isometry3<f64>,
     /// Whether it can be hit; otherwise it is only seen.
     pub collides: bool,
+    /// Coulomb friction; none: the scenario's. Of two shapes the larger one counts.
+    pub friction: Option<f64>,
+    /// Bits of what it is and of what it can meet: two shapes meet if one's group is in the other's mask.
+    pub group: u32,
+    /// See `group`.
+    pub mask: u32,
+}
+
+impl Shape {
+    /// Whether the bits let two shapes meet.
+    pub fn meets(&self, other: &Self) -> bool {
+        self.group & other.mask != 0 || other.group & self.mask != 0
+    }
 }
 
 /// Geometry in the shape's frame, centre at the origin, m.
@@ -100,6 +134,49 @@ pub struct Joint {
     pub axis: Unit<Vector3<f64>>,
     /// Smallest and largest coordinate, rad or m; none: unlimited.
     pub limits: Option<[f64; 2]>,
+    /// What acts along it unless the scenario says otherwise.
+    pub data: AxisData,
+}
+
+/// What acts along the axis of a joint; units of a joint that turns.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct AxisData {
+    /// Viscous friction, N m s/rad.
+    pub damping: f64,
+    /// Coulomb friction, N m.
+    pub friction: f64,
+    /// Inertia of the drive at the joint, kg m².
+    pub armature: f64,
+    /// Spring, N m/rad, and the coordinate where it rests, rad.
+    pub stiffness: f64,
+    /// See `stiffness`.
+    pub reference: f64,
+    /// The motor; none: the file has none.
+    pub drive: Option<Drive>,
+}
+
+/// A motor as the file describes it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Drive {
+    /// How it is driven.
+    pub kind: DriveKind,
+    /// Of a position motor, N m/rad.
+    pub stiffness: f64,
+    /// Of a position motor, N m s/rad.
+    pub damping: f64,
+    /// Largest torque, N m; none: the scenario's.
+    pub max_torque: Option<f64>,
+}
+
+/// How a motor is driven.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum DriveKind {
+    /// To a coordinate, by stiffness and damping.
+    Position,
+    /// At a rate.
+    Velocity,
+    /// By a torque.
+    Torque,
 }
 
 /// What a joint leaves free.

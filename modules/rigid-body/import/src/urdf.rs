@@ -2,7 +2,7 @@
 
 use crate::check::{Inertial, inertial, isometry, shapes};
 use crate::error::{Error, Source};
-use crate::model::{Base, Body, Joint, JointKind, Robot, Shape};
+use crate::model::{AxisData, Base, Body, Joint, JointKind, Robot, Shape};
 use crate::tree::{Place, order};
 use nalgebra::{Isometry3, Unit, Vector3};
 use std::path::Path;
@@ -119,7 +119,35 @@ fn build(
         Some(link) => Base::Free(merged.group_from_link[link]),
         None => Base::World,
     };
-    Ok(Robot { name: robot.name.clone(), base, bodies, joints })
+    Ok(Robot {
+        name: robot.name.clone(),
+        base,
+        bodies,
+        joints,
+        others: Vec::new(),
+        world_shapes: Vec::new(),
+        planes: Vec::new(),
+        excluded: Vec::new(),
+        warnings: warnings(source, robot),
+    })
+}
+
+/// Friction in the joint, from `<dynamics>`.
+fn data(source: &Source, joint: &urdf_rs::Joint) -> Result<AxisData, Error> {
+    let (damping, friction) = joint.dynamics.as_ref().map_or((0.0, 0.0), |d| (d.damping, d.friction));
+    if let Some(bad) = [damping, friction].iter().find(|x| !(**x >= 0.0 && x.is_finite())) {
+        let problem = format!("<dynamics> has {bad}; damping and friction are finite and not below 0");
+        return Err(source.joint(&joint.name, problem));
+    }
+    Ok(AxisData { damping, friction, ..AxisData::default() })
+}
+
+/// What the file says that has no effect.
+fn warnings(source: &Source, robot: &urdf_rs::Robot) -> Vec<String> {
+    let mimics = robot.joints.iter().filter(|j| j.mimic.is_some());
+    mimics
+        .map(|j| source.joint(&j.name, "<mimic> has no effect; give the joint its own target").to_string())
+        .collect()
 }
 
 fn check_world(
@@ -169,6 +197,7 @@ fn joint(
         child_from_joint: merged.body_from_link(child_link),
         axis: Unit::new_normalize(axis),
         limits: if limited { Some(limits(source, joint)?) } else { None },
+        data: data(source, joint)?,
     })
 }
 

@@ -229,6 +229,7 @@ fn closing(entry: &Entry, model: &Model, bodies: &[Motion], _: &[f64]) -> Result
         parent_frame: inverse(points.parent) * along(&parent_axis),
         child_frame: inverse(Some(points.child)) * along(&child_axis),
         limits: None,
+        data: terraglue_robot_import::AxisData::default(),
     }))
 }
 

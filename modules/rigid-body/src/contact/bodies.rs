@@ -132,7 +132,7 @@ impl BodyContacts {
     /// Law, friction, restitution and the rigid ground.
     pub fn set_surroundings(&mut self, law: Law, surface: Surface, ground: Option<Plane>) {
         (self.law, self.surface) = (law, surface);
-        self.detector.ground = ground;
+        self.detector.planes.extend(ground);
     }
 
     /// Finds the contact points of a step of length h from the committed motion; `memory`: forces of the last step.
@@ -160,7 +160,8 @@ impl BodyContacts {
         }
         let n = self.points.len();
         self.mu.clear();
-        self.mu.resize(n, self.surface.friction);
+        let scenario = self.surface.friction;
+        self.mu.extend(self.points.iter().map(|p| p.friction.unwrap_or(scenario)));
         self.impulses.clear();
         self.impulses.resize(3 * n, 0.0);
         recall(memory, &self.points, bodies, h, &mut self.impulses);

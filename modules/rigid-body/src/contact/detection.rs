@@ -5,14 +5,14 @@
 
 use crate::contact::plane::{Plane, support_points};
 use crate::contact::shapes::{parry_local, parry_shape};
-use crate::math::V3;
+use crate::math::{Q, V3};
 use crate::model::Model;
 use crate::state::Motion;
 use nalgebra::{Isometry3, Point3, Translation3};
 use parry3d_f64::math::{Pose, Vector};
 use parry3d_f64::query::{self, ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
 use parry3d_f64::shape::SharedShape;
-use terraglue_robot_import::ShapeGeometry;
+use terraglue_robot_import::Shape;
 
 /// Shapes that come nearer than this within the step are watched, m.
 const MARGIN: f64 = 2e-3;
@@ -24,11 +24,13 @@ const TOUCHING: f64 = 1e-4;
 const SAME_POINT: f64 = 1e-5;
 
 struct Collider {
-    body: usize,
+    /// None: it stands still in the world.
+    body: Option<usize>,
     /// Pose against the centre of mass in body axes, of the shape and of parry's.
     local: Isometry3<f64>,
     parry_local: Isometry3<f64>,
-    geometry: ShapeGeometry,
+    /// What the file says.
+    given: Shape,
     shape: SharedShape,
     /// Largest distance of the shape from the centre of mass, m.
     reach: f64,
@@ -56,13 +58,15 @@ pub(crate) struct ContactPoint {
     pub points: [V3; 2],
     /// Distance, negative where they overlap, m.
     pub gap: f64,
+    /// Coulomb friction that the file gives; none: the scenario's.
+    pub friction: Option<f64>,
 }
 
 /// All shapes that collide and the pairs that may meet.
 pub(crate) struct Detector {
     colliders: Vec<Collider>,
     pairs: Vec<Pair>,
-    pub ground: Option<Plane>,
+    pub planes: Vec<Plane>,
 }
 
 fn vector(v: Vector) -> V3 {
@@ -84,20 +88,21 @@ impl Detector {
 
     /// Chooses the pairs at the initial pose.
     pub fn new(model: &Model, bodies: &[Motion]) -> Self {
-        let mut me = Self { colliders: Vec::new(), pairs: Vec::new(), ground: None };
-        for (b, body) in model.bodies.iter().enumerate() {
-            for shape in body.shapes.iter().filter(|s| s.collides) {
-                let to_centre = Translation3::from(-body.com);
+        let mut me = Self { colliders: Vec::new(), pairs: Vec::new(), planes: model.planes.clone() };
+        let of_bodies = model.bodies.iter().enumerate().map(|(b, body)| (Some(b), body.com, &body.shapes));
+        for (body, com, shapes) in of_bodies.chain([(None, V3::zeros(), &model.world_shapes)]) {
+            for shape in shapes.iter().filter(|s| s.collides) {
+                let to_centre = Translation3::from(-com);
                 let (local, parry_local) =
                     (to_centre * shape.body_from_shape, to_centre * parry_local(shape));
                 let parry = parry_shape(shape);
                 let sphere = parry.compute_local_bounding_sphere();
                 let centre = (parry_local * Point3::from(vector(sphere.center))).coords;
                 me.colliders.push(Collider {
-                    body: b,
+                    body,
                     local,
                     parry_local,
-                    geometry: shape.geometry,
+                    given: shape.clone(),
                     reach: centre.norm() + sphere.radius,
                     radius: sphere.radius,
                     centre,
@@ -117,9 +122,15 @@ impl Detector {
 
     fn may_meet(&self, model: &Model, bodies: &[Motion], i: usize, k: usize) -> bool {
         let (a, b) = (self.colliders[i].body, self.colliders[k].body);
-        let neighbours =
-            |a: usize, b: usize| model.joint_above[a].is_some_and(|j| model.joints[j].parent == Some(b));
-        if a == b || neighbours(a, b) || neighbours(b, a) {
+        // A body that hangs from the world is no neighbour of what stands in it.
+        let neighbours = |a: Option<usize>, b: Option<usize>| {
+            let above = a.and_then(|a| model.joint_above[a]).map(|j| model.joints[j].parent);
+            b.is_some() && above == Some(b)
+        };
+        let excluded = |a: usize, b: usize| model.excluded.iter().any(|p| *p == [a, b] || *p == [b, a]);
+        let filtered = !self.colliders[i].given.meets(&self.colliders[k].given)
+            || a.zip(b).is_some_and(|(a, b)| excluded(a, b));
+        if a == b || neighbours(a, b) || neighbours(b, a) || filtered {
             return false;
         }
         let pose = |i: usize| -> Pose { self.colliders[i].parry_pose(bodies).into() };
@@ -130,26 +141,42 @@ impl Detector {
 
     /// Adds the contact points of a step of length h from the committed motion.
     pub fn detect(&mut self, bodies: &[Motion], h: f64, out: &mut Vec<ContactPoint>) {
-        if let Some(plane) = self.ground {
-            self.colliders.iter().enumerate().for_each(|(i, c)| on_ground(&plane, (i, c), bodies, h, out));
+        let Self { colliders, pairs, planes } = self;
+        for (p, plane) in planes.iter().enumerate() {
+            for (i, c) in colliders.iter().enumerate() {
+                on_ground(plane, (p * colliders.len() + i, c), bodies, h, out);
+            }
         }
-        let Self { colliders, pairs, .. } = self;
+        let first = planes.len() * colliders.len();
         for (i, pair) in pairs.iter_mut().enumerate() {
             let [a, b] = pair.colliders.map(|i| &colliders[i]);
-            between((colliders.len() + i, a, b), &mut pair.manifolds, bodies, h, out);
+            between((first + i, a, b), &mut pair.manifolds, bodies, h, out);
         }
     }
 }
 
 impl Collider {
+    /// Motion of its body.
+    fn motion(&self, bodies: &[Motion]) -> Motion {
+        self.body.map_or(Motion::at(V3::zeros(), Q::identity()), |b| bodies[b])
+    }
+
     fn pose(&self, bodies: &[Motion]) -> Isometry3<f64> {
-        let m = &bodies[self.body];
+        let m = self.motion(bodies);
         Isometry3::from_parts(Translation3::from(m.c), m.q) * self.local
     }
 
     fn parry_pose(&self, bodies: &[Motion]) -> Isometry3<f64> {
-        let m = &bodies[self.body];
+        let m = self.motion(bodies);
         Isometry3::from_parts(Translation3::from(m.c), m.q) * self.parry_local
+    }
+}
+
+/// Of two frictions the larger one, where any is given.
+fn larger(a: Option<f64>, b: Option<f64>) -> Option<f64> {
+    match (a, b) {
+        (Some(a), Some(b)) => Some(a.max(b)),
+        _ => a.or(b),
     }
 }
 
@@ -160,23 +187,22 @@ fn on_ground(
     h: f64,
     out: &mut Vec<ContactPoint>,
 ) {
-    let m = &bodies[c.body];
+    if c.body.is_none() {
+        return;
+    }
+    let m = c.motion(bodies);
     let reach = MARGIN + 2.0 * h * (m.v.norm() + m.w.norm() * c.reach);
     let height = plane.normal.dot(&m.point(&c.centre)) - plane.offset;
     if height > c.radius + reach {
         return;
     }
-    support_points(&c.geometry, &c.pose(bodies), &plane.normal, |p| {
+    let friction = larger(plane.friction, c.given.friction);
+    support_points(&c.given.geometry, &c.pose(bodies), &plane.normal, |p| {
         let gap = plane.normal.dot(&p) - plane.offset;
         if gap < reach {
             let points = [p - gap * plane.normal, p];
-            out.push(ContactPoint {
-                pair,
-                bodies: [None, Some(c.body)],
-                frame: frame(plane.normal),
-                points,
-                gap,
-            });
+            let (bodies, frame) = ([None, c.body], frame(plane.normal));
+            out.push(ContactPoint { pair, bodies, frame, points, gap, friction });
         }
     });
 }
@@ -188,7 +214,7 @@ fn between(
     h: f64,
     out: &mut Vec<ContactPoint>,
 ) {
-    let (ma, mb) = (&bodies[a.body], &bodies[b.body]);
+    let (ma, mb) = (a.motion(bodies), b.motion(bodies));
     let reach = MARGIN + 2.0 * h * ((ma.v - mb.v).norm() + ma.w.norm() * a.reach + mb.w.norm() * b.reach);
     if (ma.point(&a.centre) - mb.point(&b.centre)).norm() > a.radius + b.radius + reach {
         return;
@@ -212,8 +238,9 @@ fn between(
             if out[first..].iter().any(|o| (o.points[0] - on_a).norm_squared() < SAME_POINT * SAME_POINT) {
                 continue;
             }
-            let bodies = [Some(a.body), Some(b.body)];
-            out.push(ContactPoint { pair, bodies, frame: frame(n), points: [on_a, on_b], gap: point.dist });
+            let friction = larger(a.given.friction, b.given.friction);
+            let (bodies, points) = ([a.body, b.body], [on_a, on_b]);
+            out.push(ContactPoint { pair, bodies, frame: frame(n), points, gap: point.dist, friction });
         }
     }
 }

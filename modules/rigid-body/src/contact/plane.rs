@@ -11,6 +11,8 @@ pub(crate) struct Plane {
     pub normal: V3,
     /// Points p of the surface have normal·p = offset, m.
     pub offset: f64,
+    /// Coulomb friction; none: the scenario's.
+    pub friction: Option<f64>,
 }
 
 /// Calls `each` with the points of a shape, m in the world, of which at least one is the deepest in the half-space

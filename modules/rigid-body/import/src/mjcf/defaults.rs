@@ -1,0 +1,169 @@
+//! Attributes of an element: its own, else those of its default class.
+
+use crate::error::{Error, Source};
+use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
+use roxmltree::Node;
+use std::collections::BTreeMap;
+
+/// Attributes by element and name.
+type Class = BTreeMap<(String, String), String>;
+
+/// The default classes of a file and how it writes angles.
+pub(crate) struct Defaults<'a> {
+    pub source: Source<'a>,
+    classes: BTreeMap<String, Class>,
+    /// rad per unit of angle.
+    pub angle: f64,
+    eulerseq: String,
+}
+
+/// An element with the class that it takes defaults from.
+#[derive(Clone, Copy)]
+pub(crate) struct Element<'a, 'i> {
+    pub node: Node<'a, 'i>,
+    class: Option<&'a str>,
+}
+
+impl<'a> Defaults<'a> {
+    pub fn new(source: Source<'a>, root: Node) -> Self {
+        let compiler = root.children().find(|n| n.has_tag_name("compiler"));
+        let text = |name: &str| compiler.and_then(|c| c.attribute(name));
+        let angle = if text("angle") == Some("radian") { 1.0 } else { std::f64::consts::PI / 180.0 };
+        let eulerseq = text("eulerseq").unwrap_or("xyz").to_owned();
+        let mut me = Self { source, classes: BTreeMap::new(), angle, eulerseq };
+        for node in root.children().filter(|n| n.has_tag_name("default")) {
+            me.read(node, &Class::new(), "main");
+        }
+        me
+    }
+
+    fn read(&mut self, node: Node, above: &Class, otherwise: &str) {
+        let mut class = above.clone();
+        for element in node.children().filter(|n| n.is_element() && !n.has_tag_name("default")) {
+            for a in element.attributes() {
+                class.insert((element.tag_name().name().into(), a.name().into()), a.value().into());
+            }
+        }
+        for below in node.children().filter(|n| n.has_tag_name("default")) {
+            self.read(below, &class, "");
+        }
+        self.classes.insert(node.attribute("class").unwrap_or(otherwise).into(), class);
+    }
+
+    /// An element with its class; `inherited`: the `childclass` of the bodies around it.
+    pub fn element<'n, 'i>(&self, node: Node<'n, 'i>, inherited: Option<&'n str>) -> Element<'n, 'i> {
+        Element { node, class: node.attribute("class").or(inherited) }
+    }
+
+    /// Text of an attribute.
+    pub fn text<'e>(&'e self, e: &'e Element, name: &str) -> Option<&'e str> {
+        e.node.attribute(name).or_else(|| {
+            let class = self.classes.get(e.class.unwrap_or("main"))?;
+            class.get(&(e.node.tag_name().name().into(), name.into())).map(String::as_str)
+        })
+    }
+
+    /// Numbers of an attribute; none where it is not there.
+    pub fn numbers(&self, e: &Element, name: &str) -> Result<Option<Vec<f64>>, Error> {
+        let Some(text) = self.text(e, name) else { return Ok(None) };
+        let numbers: Result<Vec<f64>, _> = text.split_whitespace().map(str::parse::<f64>).collect();
+        match numbers {
+            Ok(n) if !n.is_empty() && n.iter().all(|x| x.is_finite()) => Ok(Some(n)),
+            _ => Err(self.wrong(e, format!("{name} = \"{text}\" is not a list of finite numbers"))),
+        }
+    }
+
+    /// A number.
+    pub fn number(&self, e: &Element, name: &str) -> Result<Option<f64>, Error> {
+        Ok(self.numbers(e, name)?.map(|n| n[0]))
+    }
+
+    /// Three numbers.
+    pub fn vector(&self, e: &Element, name: &str) -> Result<Option<Vector3<f64>>, Error> {
+        match self.numbers(e, name)?.as_deref() {
+            None => Ok(None),
+            Some([x, y, z]) => Ok(Some(Vector3::new(*x, *y, *z))),
+            Some(other) => {
+                Err(self.wrong(e, format!("{name} has {} numbers; three are needed", other.len())))
+            }
+        }
+    }
+
+    /// `pos` with one of `quat`, `axisangle`, `euler`, `xyaxes`, `zaxis`.
+    pub fn pose(&self, e: &Element) -> Result<Isometry3<f64>, Error> {
+        let place = self.vector(e, "pos")?.unwrap_or_else(Vector3::zeros);
+        Ok(Isometry3::from_parts(Translation3::from(place), self.rotation(e)?))
+    }
+
+    fn rotation(&self, e: &Element) -> Result<UnitQuaternion<f64>, Error> {
+        let count = |name: &str, n: usize, v: Vec<f64>| match v.len() == n {
+            true => Ok(v),
+            false => Err(self.wrong(e, format!("{name} has {} numbers; {n} are needed", v.len()))),
+        };
+        let along = |v: &[f64], name: &str| {
+            Unit::try_new(Vector3::new(v[0], v[1], v[2]), 1e-9)
+                .ok_or_else(|| self.wrong(e, format!("{name} has no direction")))
+        };
+        if let Some(q) = self.numbers(e, "quat")? {
+            let q = count("quat", 4, q)?;
+            let q = nalgebra::Quaternion::new(q[0], q[1], q[2], q[3]);
+            return UnitQuaternion::try_new(q, 1e-9).ok_or_else(|| self.wrong(e, "quat is 0".into()));
+        }
+        if let Some(v) = self.numbers(e, "axisangle")? {
+            let v = count("axisangle", 4, v)?;
+            return Ok(UnitQuaternion::from_axis_angle(&along(&v, "axisangle")?, self.angle * v[3]));
+        }
+        if let Some(v) = self.numbers(e, "euler")? {
+            return Ok(self.euler(&count("euler", 3, v)?));
+        }
+        if let Some(v) = self.numbers(e, "xyaxes")? {
+            let v = count("xyaxes", 6, v)?;
+            let x = along(&v, "xyaxes")?;
+            let y = Vector3::new(v[3], v[4], v[5]);
+            let y = along((y - *x * x.dot(&y)).as_slice(), "xyaxes")?;
+            let m = Matrix3::from_columns(&[*x, *y, x.cross(&y)]);
+            return Ok(UnitQuaternion::from_rotation_matrix(&Rotation3::from_matrix_unchecked(m)));
+        }
+        if let Some(v) = self.numbers(e, "zaxis")? {
+            return Ok(from_z(&along(&count("zaxis", 3, v)?, "zaxis")?));
+        }
+        Ok(UnitQuaternion::identity())
+    }
+
+    /// Lower-case letters turn about the axes that turn along, capitals about those that stay.
+    fn euler(&self, angles: &[f64]) -> UnitQuaternion<f64> {
+        let mut q = UnitQuaternion::identity();
+        for (axis, angle) in self.eulerseq.chars().zip(angles) {
+            let about = match axis.to_ascii_lowercase() {
+                'x' => Vector3::x_axis(),
+                'y' => Vector3::y_axis(),
+                _ => Vector3::z_axis(),
+            };
+            let turn = UnitQuaternion::from_axis_angle(&about, self.angle * angle);
+            q = if axis.is_ascii_lowercase() { q * turn } else { turn * q };
+        }
+        q
+    }
+
+    /// Line of an element.
+    pub fn line(&self, node: Node) -> usize {
+        self.source.text[..node.range().start].matches('\n').count() + 1
+    }
+
+    /// What is wrong with an element.
+    pub fn wrong(&self, e: &Element, problem: String) -> Error {
+        let name = e.node.attribute("name").map(|n| format!(" `{n}`")).unwrap_or_default();
+        Error::Element {
+            file: self.source.file.into(),
+            line: self.line(e.node),
+            element: format!("{}{name}", e.node.tag_name().name()),
+            problem,
+        }
+    }
+}
+
+/// A rotation that takes z to a direction.
+pub(crate) fn from_z(z: &Unit<Vector3<f64>>) -> UnitQuaternion<f64> {
+    UnitQuaternion::rotation_between(&Vector3::z(), z)
+        .unwrap_or_else(|| UnitQuaternion::from_axis_angle(&Vector3::x_axis(), std::f64::consts::PI))
+}

@@ -1,0 +1,90 @@
+//! A robot from MJCF moves as its URDF twin; scenes of several bodies and standing shapes.
+#![allow(clippy::unwrap_used, missing_docs)]
+
+mod common;
+use common::{Rig, STAND};
+
+/// Writes a model next to the temporary ones of this test.
+fn scene(name: &str, worldbody: &str, more: &str) -> String {
+    let text = format!("<mujoco>{more}<worldbody>{worldbody}</worldbody></mujoco>");
+    common::temporary_urdf(&format!("mjcf-{name}"), &text)
+}
+
+#[test]
+fn the_hexapod_stands_and_moves_as_its_urdf_twin() {
+    let mut twins = [
+        r#""model": "tests/reference/multibody/hexapod.xml""#,
+        r#""model": "models/hexapod.urdf", "position_m": [0, 0, 0.33], "ground": "half-space""#,
+    ]
+    .map(|model| Rig::new(&format!(r#"{{{model}, {STAND}}}"#), 9.81, 1e-3));
+    for rig in &mut twins {
+        for step in 0..400 {
+            let target = rig.get("LF_j2.angle_target") - 5e-4 * f64::from(u8::from(step > 100));
+            rig.set("LF_j2.angle_target", target);
+            rig.free_step();
+        }
+    }
+    let [ours, twin] = twins.map(|rig| rig.states());
+    for (a, b) in ours.iter().zip(&twin) {
+        let (a, b) = (a.world_from_body, b.world_from_body);
+        for k in 0..3 {
+            assert!((a.position[k] - b.position[k]).abs() < 1e-7, "{:?} {:?}", a.position, b.position);
+        }
+    }
+}
+
+#[test]
+fn bodies_of_one_file_fall_on_what_stands_in_it() {
+    let model = scene(
+        "table",
+        r#"<geom type="plane" size="1 1 1"/><geom type="box" pos="0 0 0.5" size="0.5 0.5 0.5"/>
+           <body name="a" pos="0 0 1.2"><freejoint/><geom type="box" size="0.1 0.1 0.1" mass="1"/></body>
+           <body name="b" pos="2 0 0.3"><freejoint/><geom size="0.1" mass="2"/></body>"#,
+        "",
+    );
+    let mut rig = Rig::new(&format!(r#"{{"model": "{model}"}}"#), 9.81, 1e-3);
+    (0..1000).for_each(|_| rig.free_step());
+    assert!((rig.get("a.z") - 1.1).abs() < 1e-5, "{}", rig.get("a.z"));
+    assert!((rig.get("b.z") - 0.1).abs() < 1e-5, "{}", rig.get("b.z"));
+    assert!((rig.get("a.contact_normal") - 9.81).abs() < 1e-3);
+}
+
+#[test]
+fn friction_is_that_of_the_pair_and_bits_filter() {
+    let model = scene(
+        "pair",
+        r#"<geom type="plane" size="1 1 1" friction="0.1"/>
+           <body name="rough" pos="0 0 0.1"><freejoint/><geom type="box" size="0.1 0.1 0.1" friction="0.6"/></body>
+           <body name="smooth" pos="0 1 0.1"><freejoint/><geom type="box" size="0.1 0.1 0.1" friction="0.05"/></body>
+           <body name="ghost" pos="0 1 0.2"><freejoint/>
+             <geom type="box" size="0.1 0.1 0.1" contype="0" conaffinity="0"/></body>"#,
+        "",
+    );
+    let mut rig = Rig::new(&format!(r#"{{"model": "{model}"}}"#), 9.81, 1e-3);
+    let mass = 8.0;
+    for body in ["rough", "smooth"] {
+        rig.push(body, [0.3 * mass * 9.81, 0.0, 0.0]);
+    }
+    (0..500).for_each(|_| rig.free_step());
+    assert!(rig.get("rough.x").abs() < 1e-9);
+    // 0.3·g of push less 0.1·g of friction: the larger one of the pair.
+    let exact = 0.2 * 9.81 * 0.5;
+    assert!((rig.get("smooth.vx") / exact - 1.0).abs() < 1e-6, "{}", rig.get("smooth.vx"));
+    assert!(rig.get("ghost.z") < -0.5);
+}
+
+#[test]
+fn the_file_speaks_where_the_scenario_is_silent() {
+    let model = scene(
+        "silent",
+        r#"<body name="arm"><joint name="j" axis="0 1 0" damping="0.5" armature="0.1"/><geom size="0.1" mass="1"/></body>"#,
+        "<actuator><position joint=\"j\" kp=\"50\" kv=\"2\" forcerange=\"-3 3\"/></actuator>",
+    );
+    // Actuators may come before the world.
+    let rig = Rig::new(&format!(r#"{{"model": "{model}"}}"#), 9.81, 1e-3);
+    let shown =
+        ["j.stiffness", "j.damping", "j.max_torque", "j.viscous_friction", "j.armature"].map(|n| rig.get(n));
+    assert_eq!(shown, [50.0, 2.0, 3.0, 0.5, 0.1]);
+    let rig = Rig::new(&format!(r#"{{"model": "{model}", "max_torque": 9, "stiffness": 70}}"#), 9.81, 1e-3);
+    assert_eq!([rig.get("j.stiffness"), rig.get("j.max_torque"), rig.get("j.damping")], [70.0, 9.0, 2.0]);
+}

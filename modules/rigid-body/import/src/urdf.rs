@@ -146,7 +146,11 @@ fn data(source: &Source, joint: &urdf_rs::Joint) -> Result<AxisData, Error> {
 fn warnings(source: &Source, robot: &urdf_rs::Robot) -> Vec<String> {
     let mimics = robot.joints.iter().filter(|j| j.mimic.is_some());
     mimics
-        .map(|j| source.joint(&j.name, "<mimic> has no effect; give the joint its own target").to_string())
+        .map(|j| {
+            source
+                .joint(&j.name, "<mimic> has no effect; couple the joints by [[robot.coupling]]")
+                .to_string()
+        })
         .collect()
 }
 

@@ -8,7 +8,7 @@ use crate::contact::{ContactDetector, Now};
 use crate::gluing::{self, Exchange, Instant, Outcome, PortReport, StepReport, Strategy};
 use crate::host::{Instance, Partings, Progress, Reply};
 use crate::observer::{Happening, Observer, SubsystemView, View};
-use crate::signals::{Directory, Link, TimeLine};
+use crate::signals::{Directory, Links, TimeLine};
 use crate::timing::{Part, Timings};
 use crate::{Error, Result};
 use serde_json::Value;
@@ -57,7 +57,7 @@ pub struct Testbed {
     members: Vec<Member>,
     group: Option<Group>,
     detector: ContactDetector,
-    links: Vec<Link>,
+    links: Links,
     time_line: TimeLine,
     directory: Directory,
     happenings: Vec<Happening>,
@@ -199,7 +199,8 @@ impl Testbed {
         if self.index == 0 && self.t == 0.0 {
             self.settle()?;
         }
-        self.links.iter_mut().try_for_each(|l| l.transfer(&mut self.instances))
+        self.links.numbers.iter_mut().try_for_each(|l| l.transfer(&mut self.instances))?;
+        self.links.discrete.iter().try_for_each(|l| l.transfer(&mut self.instances))
     }
 
     /// (3) to (5) for one step of length h; nothing is committed unless it converged.

@@ -62,7 +62,13 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
         file.flush().map_err(|source| Error::File { path: "the table".into(), source })?;
     }
     match ran {
-        Ok(()) => {
+        Ok(ended) => {
+            if let Some(t) = ended {
+                eprintln!(
+                    "note: {}: the unit asked for the end of the run at t = {t} s",
+                    arguments.unit.display()
+                );
+            }
             drop(fmu);
             apart::done();
             Ok(Exit::Done)

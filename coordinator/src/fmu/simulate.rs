@@ -55,11 +55,17 @@ impl Table {
 /// Longest run, in steps.
 const STEPS: f64 = 1e9;
 
-/// Runs a unit and hands `row` each line of the table, the header first.
+/// Runs a unit and hands `row` each line of the table, the header first. Answers when the unit itself asked for the end
+/// of the run before its time, s.
 ///
 /// # Errors
 /// What the unit or its input does wrong, with the time.
-pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, row: &mut dyn FnMut(&str) -> Result) -> Result {
+pub fn run(
+    fmu: &Arc<Fmu>,
+    settings: &Settings,
+    sink: Sink,
+    row: &mut dyn FnMut(&str) -> Result,
+) -> Result<Option<f64>> {
     let experiment = fmu.description().experiment;
     let start = settings.start_time.or(experiment.start).unwrap_or(0.0);
     let stop = settings.stop.or(experiment.stop).unwrap_or(start + 1.0);
@@ -81,20 +87,26 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, row: &mut dyn FnMut(
     row(&header(&columns))?;
     row(&line(&slave, start, &columns)?)?;
     let mut state = SlaveState::default();
+    let mut ended = None;
     let outcome = (0..steps as u64).try_for_each(|k| {
+        if ended.is_some() {
+            return Ok(());
+        }
         let (t, end) = (start + k as f64 * step, start + (k + 1) as f64 * step);
         let at = |e: Error| named(e, t);
         set_inputs(&slave, settings, t).map_err(at)?;
-        halving(&mut slave, &mut state, t, end).map_err(at)?;
-        row(&line(&slave, end, &columns).map_err(|e| named(e, end))?)
+        ended = halving(&mut slave, &mut state, t, end).map_err(at)?;
+        let now = ended.unwrap_or(end);
+        row(&line(&slave, now, &columns).map_err(|e| named(e, now))?)
     });
     drop(slave.release(&mut state));
     outcome?;
-    slave.terminate()
+    slave.terminate()?;
+    Ok(ended)
 }
 
 /// A step, in halves where the unit discards it and can go back.
-fn halving(slave: &mut Slave, state: &mut SlaveState, start: f64, end: f64) -> Result {
+fn halving(slave: &mut Slave, state: &mut SlaveState, start: f64, end: f64) -> Result<Option<f64>> {
     let c = slave.fmu().description().capabilities;
     let (mut t, mut h, mut halvings) = (start, end - start, 0);
     while end - t > 1e-9 * (end - start) {
@@ -102,9 +114,7 @@ fn halving(slave: &mut Slave, state: &mut SlaveState, start: f64, end: f64) -> R
             slave.save(state)?;
         }
         match slave.do_step(Advance { t, h: h.min(end - t), for_good: !c.state }) {
-            Ok(done) if done.terminate => {
-                return Err(Error::Refused(format!("the unit asks for the end at t = {} s", done.reached)));
-            }
+            Ok(done) if done.terminate => return Ok(Some(done.reached)),
             Ok(_) => t = if h >= end - t { end } else { t + h },
             Err(Error::Discard { .. }) if c.state && c.variable_step && halvings < 10 => {
                 slave.restore(state)?;
@@ -113,7 +123,7 @@ fn halving(slave: &mut Slave, state: &mut SlaveState, start: f64, end: f64) -> R
             Err(error) => return Err(error),
         }
     }
-    Ok(())
+    Ok(None)
 }
 
 fn named(error: Error, t: f64) -> Error {

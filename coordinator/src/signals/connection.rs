@@ -1,6 +1,7 @@
 //! Connections: outputs of t become inputs of the step, with units checked once and converted every step.
 
 use super::access::{Directory, VariableRef};
+use super::discrete::{self, Discrete};
 use super::pattern;
 use crate::Result;
 use crate::host::{Instance, Reply};
@@ -74,20 +75,63 @@ impl Link {
     }
 }
 
+/// All connections of a scenario, resolved.
+#[derive(Debug, Default)]
+pub struct Links {
+    /// Of f64.
+    pub numbers: Vec<Link>,
+    /// Of all other types.
+    pub discrete: Vec<Discrete>,
+}
+
+/// Name without the index of an element at its end, and that index: `a.b[2,1]` → `a.b`, `[2,1]`.
+fn element(name: &str) -> Option<(&str, &str)> {
+    name.ends_with(']').then(|| name.rfind('[').map(|at| name.split_at(at))).flatten()
+}
+
+/// What a variable is connected to: by its own name, or as an element of a whole array that is named.
+fn target(connection: &Connection, name: &str) -> Option<(String, bool)> {
+    if let Some(target) = pattern::rewrite(&connection.from, &connection.to, name) {
+        return Some((target, false));
+    }
+    let (base, index) = element(name)?;
+    pattern::rewrite(&connection.from, &connection.to, base).map(|target| (target + index, true))
+}
+
+/// Why two whole arrays cannot be connected, where their shapes differ.
+fn shapes_differ(directory: &Directory, name: &str, target: &str) -> Option<String> {
+    let last = |name: &str| {
+        let base = element(name)?.0;
+        let own = |n: &&String| element(n).is_some_and(|(b, _)| b == base);
+        Some(element(directory.names().iter().rev().find(own)?)?.1.to_owned())
+    };
+    let (from, to) = (last(name)?, last(target));
+    let bases = [name, target].map(|n| element(n).map_or(n, |(base, _)| base));
+    (to.as_ref() != Some(&from)).then(|| match to {
+        Some(to) => {
+            format!("`{}` has the shape {from}, `{}` has {to}: these cannot be connected", bases[0], bases[1])
+        }
+        None => format!("`{}` has the shape {from}, `{}` is no array", bases[0], bases[1]),
+    })
+}
+
 /// Resolves all connections of a scenario into links, in the order of the file.
 pub fn connect(
     connections: &[Connection],
     directory: &Directory,
     instances: &[Instance],
     source: &Source,
-) -> std::result::Result<Vec<Link>, Box<InputError>> {
-    let mut links: Vec<Link> = Vec::new();
+) -> std::result::Result<Links, Box<InputError>> {
+    let mut links = Links::default();
     let mut fed: Vec<(String, VariableRef)> = Vec::new();
     for connection in connections {
         let mut matched = false;
         for (name, from) in directory.iter() {
-            let Some(target) = pattern::rewrite(&connection.from, &connection.to, name) else { continue };
+            let Some((target, of_array)) = target(connection, name) else { continue };
             matched = true;
+            if let Some(message) = of_array.then(|| shapes_differ(directory, name, &target)).flatten() {
+                return Err(source.error_at(connection.span.clone(), message, None));
+            }
             let to = directory.find(&target).ok_or_else(|| {
                 let message = format!("`{name}` is connected to `{target}`, which does not exist");
                 source.error_at(connection.span.clone(), message, directory.hint(&target))
@@ -99,7 +143,10 @@ pub fn connect(
                 return Err(source.error_at(connection.span.clone(), message, None));
             }
             fed.push((name.to_owned(), to));
-            add(&mut links, instances, from, to, conversion);
+            match from.describe(instances).value_type {
+                ValueType::F64 => add(&mut links.numbers, instances, from, to, conversion),
+                _ => links.discrete.push(Discrete::new(from, to)),
+            }
         }
         if !matched {
             let message = format!("no variable matches `{}`", connection.from);
@@ -116,8 +163,14 @@ fn check(
     (to_name, to): (&str, VariableRef),
 ) -> std::result::Result<(f64, f64), String> {
     let (a, b) = (from.describe(instances), to.describe(instances));
-    if a.value_type != ValueType::F64 || b.value_type != ValueType::F64 || a.len() != 1 || b.len() != 1 {
-        return Err(format!("`{from_name}` → `{to_name}`: only scalar f64 variables can be connected"));
+    if a.len() != 1 || b.len() != 1 {
+        return Err(format!("`{from_name}` → `{to_name}`: arrays of a module cannot be connected"));
+    }
+    if !discrete::fits(a.value_type, b.value_type) {
+        let [own, other] = [a.value_type, b.value_type].map(|t| format!("{t:?}").to_lowercase());
+        return Err(format!(
+            "`{from_name}` is of type {own} and `{to_name}` of {other}: these cannot be connected"
+        ));
     }
     if a.causality == Causality::Input {
         return Err(format!("`{from_name}` is an input and cannot feed another variable"));

@@ -3,11 +3,13 @@
 
 mod access;
 mod connection;
+mod discrete;
 mod event;
 mod initial;
 pub mod pattern;
 
 pub use access::{Directory, VariableRef};
-pub use connection::{Link, connect};
+pub use connection::{Link, Links, connect};
+pub use discrete::Discrete;
 pub use event::{Due, TimeLine};
 pub use initial::settle;

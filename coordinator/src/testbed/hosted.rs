@@ -49,14 +49,15 @@ impl Testbed {
 
     /// Whether a connection feeds a variable.
     pub(crate) fn is_fed(&self, slot: usize, id: u32) -> bool {
-        self.links.iter().any(|l| l.feeds(slot, id))
+        self.links.numbers.iter().any(|l| l.feeds(slot, id))
+            || self.links.discrete.iter().any(|l| l.feeds(&self.instances, slot, id))
     }
 
     /// Connected values at the start where outputs depend on inputs of the same time: in their order, loops solved.
     pub(super) fn settle(&mut self) -> Result {
         let through = |k: usize| self.instances[k].capabilities().has(Capabilities::FEEDTHROUGH);
-        if self.links.iter().any(|l| l.leaves(through)) {
-            crate::signals::settle(&mut self.links, &mut self.instances)?;
+        if self.links.numbers.iter().any(|l| l.leaves(through)) {
+            crate::signals::settle(&mut self.links.numbers, &mut self.instances)?;
         }
         Ok(())
     }

@@ -61,8 +61,13 @@ struct Holdings {
 impl Holdings {
     fn now() -> Self {
         let count = |path: &str| std::fs::read_dir(path).map_or(0, Iterator::count) as f64;
-        let own = |e: &std::fs::DirEntry| e.file_name().to_string_lossy().starts_with("terraglue-fmu-");
-        let held = std::fs::read_dir(std::env::temp_dir()).into_iter().flatten().flatten().filter(own);
+        // Folders of units that nobody holds: those in use are locked, by this or by another process.
+        let left = |e: &std::fs::DirEntry| {
+            let named = e.file_name().to_string_lossy().starts_with("terraglue-fmu-");
+            let lock = std::fs::File::open(e.path().join(".terraglue-lock"));
+            named && e.path().is_dir() && lock.is_ok_and(|file| file.try_lock().is_ok())
+        };
+        let held = std::fs::read_dir(std::env::temp_dir()).into_iter().flatten().flatten().filter(left);
         let pages = std::fs::read_to_string("/proc/self/statm").unwrap_or_default();
         let pages: f64 = pages.split_whitespace().nth(1).and_then(|p| p.parse().ok()).unwrap_or(f64::NAN);
         Self {

@@ -68,29 +68,50 @@ fn worst(context: &Context, unit: &Path, table: &Path) -> Outcome<f64> {
     let step = (time(last) - time(first)) / (rows.len() - 1) as f64;
     let mut run = command(&context.program, &["fmu", "run"]);
     run.arg(unit).args(["--stop", &time(last).to_string(), "--step", &step.to_string()]);
-    run.args(["--output", &names[1..].join(",")]);
+    // Tables are written for both versions; a unit of FMI 2 has some of their columns only.
+    let (description, _) = terraglue_fmi::Fmu::inspect(unit).map_err(|e| e.to_string())?;
+    let has = |name: &&String| description.position(name).is_some();
+    let wanted: Vec<&String> = names[1..].iter().filter(has).collect();
+    run.args(["--output", &wanted.iter().map(|n| n.as_str()).collect::<Vec<_>>().join(",")]);
     let input =
         table.with_file_name(table.file_name().unwrap_or_default().to_string_lossy().replace("_out", "_in"));
-    if input.is_file() {
-        run.arg("--input").arg(input);
+    if let Ok(text) = std::fs::read_to_string(&input) {
+        run.arg("--input").arg(kept(context, &text, |name| description.position(name).is_some())?);
     }
     let done = run.output().map_err(|e| e.to_string())?;
     if !done.status.success() {
         return Err(String::from_utf8_lossy(&done.stderr).into_owned());
     }
-    let (_, ours) = read(&String::from_utf8_lossy(&done.stdout));
+    let (own, ours) = read(&String::from_utf8_lossy(&done.stdout));
     if ours.len() != rows.len() {
         return Err(format!("{} rows, the table has {}", ours.len(), rows.len()));
     }
     let mut worst = 0.0_f64;
-    for column in 1..names.len() {
-        worst = worst.max(difference(&names[column], &rows, &ours, column)?);
+    for (column, name) in own.iter().enumerate().skip(1) {
+        let theirs =
+            names.iter().position(|n| n == name).ok_or_else(|| format!("`{name}` is not in the table"))?;
+        let [a, b] = [(&rows, theirs), (&ours, column)].map(|(table, c)| {
+            table.iter().map(|r| r.get(c).cloned().unwrap_or_default()).collect::<Vec<_>>()
+        });
+        worst = worst.max(difference(name, &a, &b)?);
     }
     Ok(worst)
 }
 
-fn difference(name: &str, rows: &[Vec<String>], ours: &[Vec<String>], column: usize) -> Outcome<f64> {
-    let cell = |table: &[Vec<String>], k: usize| table[k].get(column).cloned().unwrap_or_default();
+/// A copy of a table of inputs with the columns that a unit has.
+fn kept(context: &Context, text: &str, has: impl Fn(&str) -> bool) -> Outcome<PathBuf> {
+    let (names, rows) = read(text);
+    let columns: Vec<usize> = (0..names.len()).filter(|k| *k == 0 || has(&names[*k])).collect();
+    let line =
+        |row: &[String]| columns.iter().map(|k| row.get(*k).map_or("", |c| c)).collect::<Vec<_>>().join(",");
+    let all: Vec<String> = std::iter::once(line(&names)).chain(rows.iter().map(|r| line(r))).collect();
+    let path = context.scratch.join("input.csv");
+    crate::process::write(&path, &(all.join("\n") + "\n"))?;
+    Ok(path)
+}
+
+fn difference(name: &str, rows: &[String], ours: &[String]) -> Outcome<f64> {
+    let cell = |table: &[String], k: usize| table[k].clone();
     let numbers: Option<Vec<f64>> = (0..rows.len()).map(|k| truth(&cell(rows, k))).collect();
     let Some(numbers) = numbers else {
         return match (0..rows.len()).find(|k| cell(rows, *k) != cell(ours, *k)) {

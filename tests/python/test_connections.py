@@ -1,0 +1,133 @@
+"""Connections of units: whole arrays, other types than f64, units with factor and offset."""
+
+import csv
+import subprocess
+import zipfile
+
+import pytest
+
+from conftest import terraglue
+
+# All values of a type lie in one array, by reference; `twice` hands on what it gets, doubled or as it is.
+CODE = r"""
+#include <stdlib.h>
+typedef struct { double r[16]; int i[4], b[4]; const char *s[4]; char text[64]; } Unit;
+#include <string.h>
+void *fmi2Instantiate(const char *n, int t, const char *g, const char *r, const void *b, int v, int l) {
+    Unit *u = calloc(1, sizeof *u); u->s[0] = u->s[1] = "start"; return u; }
+void fmi2FreeInstance(Unit *u) { free(u); }
+int fmi2SetupExperiment(Unit *u, int a, double b, double c, int d, double e) { return 0; }
+int fmi2EnterInitializationMode(Unit *u) { return 0; }
+int fmi2ExitInitializationMode(Unit *u) { return 0; }
+int fmi2Terminate(Unit *u) { return 0; }
+int fmi2GetReal(Unit *u, const unsigned *r, size_t n, double *x) { while (n--) x[n] = u->r[r[n]]; return 0; }
+int fmi2SetReal(Unit *u, const unsigned *r, size_t n, const double *x) { while (n--) u->r[r[n]] = x[n]; return 0; }
+int fmi2GetInteger(Unit *u, const unsigned *r, size_t n, int *x) { while (n--) x[n] = u->i[r[n]]; return 0; }
+int fmi2SetInteger(Unit *u, const unsigned *r, size_t n, const int *x) { while (n--) u->i[r[n]] = x[n]; return 0; }
+int fmi2GetBoolean(Unit *u, const unsigned *r, size_t n, int *x) { while (n--) x[n] = u->b[r[n]]; return 0; }
+int fmi2SetBoolean(Unit *u, const unsigned *r, size_t n, const int *x) { while (n--) u->b[r[n]] = x[n]; return 0; }
+int fmi2GetString(Unit *u, const unsigned *r, size_t n, const char **x) { while (n--) x[n] = u->s[r[n]]; return 0; }
+int fmi2SetString(Unit *u, const unsigned *r, size_t n, const char *const *x) {
+    strncpy(u->text, x[0], 63); u->s[0] = u->s[1] = u->text; return 0; }
+int fmi2DoStep(Unit *u, double t, double h, int p) {
+    for (int k = 0; k < 4; k++) u->r[8 + k] = u->r[k];
+    u->i[1] = 2 * u->i[0]; u->b[1] = u->b[0]; return 0; }
+"""
+
+
+def variable(name, reference, causality, kind="Real", more=""):
+    start = {"Real": "0", "Integer": "0", "Boolean": "false", "String": "start"}[kind]
+    start = f' start="{start}"' if causality != "output" else ""
+    return (
+        f'<ScalarVariable name="{name}" valueReference="{reference}" causality="{causality}" '
+        f'variability="discrete"><{kind}{start}{more}/></ScalarVariable>'
+    )
+
+
+def description(shape, unit_in, unit_out):
+    rows, columns = shape
+    names = [f"[{i + 1},{j + 1}]" for i in range(rows) for j in range(columns)]
+    all_ = [variable(f"u{n}", k, "input", more=f' unit="{unit_in}"') for k, n in enumerate(names)]
+    all_ += [variable(f"y{n}", 8 + k, "output", more=f' unit="{unit_out}"') for k, n in enumerate(names)]
+    for name, kind in (("i", "Integer"), ("b", "Boolean"), ("s", "String")):
+        all_ += [variable(f"{name}_in", 0, "input", kind), variable(f"{name}_out", 1, "output", kind)]
+    outputs = "".join(f'<Unknown index="{k + 1}"/>' for k, v in enumerate(all_) if 'causality="output"' in v)
+    return f"""<?xml version="1.0" encoding="UTF-8"?><fmiModelDescription fmiVersion="2.0" modelName="m" guid="g">
+<CoSimulation modelIdentifier="m"/><UnitDefinitions><Unit name="m"><BaseUnit m="1"/></Unit>
+<Unit name="foot"><BaseUnit m="1" factor="0.3048"/></Unit><Unit name="warmth"><BaseUnit K="1" offset="273.15"/></Unit>
+</UnitDefinitions><ModelVariables>{"".join(all_)}</ModelVariables>
+<ModelStructure><Outputs>{outputs}</Outputs></ModelStructure></fmiModelDescription>"""
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("units")
+    (folder / "m.c").write_text(CODE)
+    subprocess.run(["cc", "-shared", "-fPIC", "-w", "m.c", "-o", "m.so"], cwd=folder, check=True)
+    for name, shape, units in [
+        ("metres", (2, 2), ("m", "m")),
+        ("feet", (2, 2), ("foot", "foot")),
+        ("long", (4, 1), ("m", "m")),
+        ("warm", (2, 2), ("warmth", "warmth")),
+    ]:
+        with zipfile.ZipFile(folder / f"{name}.fmu", "w") as archive:
+            archive.writestr("modelDescription.xml", description(shape, *units))
+            archive.write(folder / "m.so", "binaries/linux64/m.so")
+    return folder
+
+
+def run(made, tmp_path, second, connections):
+    path = made / "scenario.toml"
+    connect = "".join(f'[[connect]]\nfrom = "a.{a}"\nto = "b.{b}"\n' for a, b in connections)
+    path.write_text(f"""
+[time]
+step_s = 0.1
+duration_s = 0.4
+[recording]
+every_steps = 1
+[a]
+fmu = "metres.fmu"
+u = [1.0, 2.0]
+i_in = 7
+b_in = true
+s_in = "hello"
+[a.start]
+"u[1,1]" = 1.0
+"u[1,2]" = 2.0
+"u[2,1]" = 3.0
+"u[2,2]" = 4.0
+[b]
+fmu = "{second}.fmu"
+{connect}
+""".replace("u = [1.0, 2.0]\n", ""))
+    done = terraglue("run", path, "--csv", "--quiet", "--out", tmp_path / "out")
+    rows = list(csv.DictReader((tmp_path / "out" / "variables.csv").open())) if done.returncode == 0 else []
+    return done, rows[-1] if rows else None
+
+
+def test_whole_arrays_and_other_types_are_connected(made, tmp_path):
+    names = [("y", "u"), ("i_out", "i_in"), ("b_out", "b_in"), ("s_out", "s_in")]
+    done, row = run(made, tmp_path, "metres", names)
+    assert done.returncode == 0, done.stderr
+    assert [float(row[f"b.y[{i},{j}]"]) for i in (1, 2) for j in (1, 2)] == [1.0, 2.0, 3.0, 4.0]
+    assert float(row["b.i_out"]) == 28.0 and row["b.b_out"] in ("true", "1", "1.0")
+
+
+def test_units_are_converted_at_connections(made, tmp_path):
+    done, row = run(made, tmp_path, "feet", [("y", "u")])
+    assert done.returncode == 0, done.stderr
+    assert float(row["b.y[2,2]"]) == pytest.approx(4.0 / 0.3048, rel=1e-15)
+
+
+@pytest.mark.parametrize(
+    ("second", "pair", "says"),
+    [
+        ("long", ("y", "u"), ["[2,2]", "[4,1]"]),
+        ("warm", ("y", "u"), ["cannot be connected", "K × 1.0 + 273.15"]),
+        ("metres", ("i_out", "b_in"), ["i32", "bool"]),
+    ],
+)
+def test_what_does_not_fit_is_refused(made, tmp_path, second, pair, says):
+    done, _ = run(made, tmp_path, second, [pair])
+    assert done.returncode == 2
+    assert all(word in done.stderr for word in says), done.stderr

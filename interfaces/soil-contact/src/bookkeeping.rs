@@ -1,6 +1,7 @@
 //! Commit: the foot's motion becomes depths, slip and heat; the nodes that it left forget their contact.
 
 use crate::assemble::{displacement, dot};
+use crate::contacts::Touch;
 use crate::ground::{Covered, Ground};
 use crate::patch::{Laws, Patch, PatchNodes, Patches, key};
 use crate::wheel;
@@ -63,6 +64,8 @@ pub struct Scene<'a> {
     pub patches: &'a Patches,
     /// Laws.
     pub laws: &'a Laws,
+    /// Length of the step, s.
+    pub h: f64,
 }
 
 /// A node that the foot presses: its number in the arrays, depth and displacement.
@@ -92,9 +95,16 @@ impl Scene<'_> {
         lists.slid_in.clear();
         lists.slid.clear();
         lists.covered.clear();
+        ground.contacts.begin();
         for (patch, port) in self.patches.ports.iter().zip(ports) {
             book.port_work -= port.range().map(|k| t[k] * x[k]).sum::<f64>();
-            let loaded = self.commit_patch(patch, port, &patch.unpack(x), ground, lists, book);
+            let (x, wrench) = (patch.unpack(x), patch.unpack(t));
+            let mut touch = Touch::default();
+            let loaded = self.commit_patch(patch, port, &x, ground, lists, book, &mut touch);
+            if loaded > 0 && ground.contacts.any() {
+                touch.under(patch, &wrench, &x, self.h);
+                ground.contacts.tell(port.key, &touch);
+            }
             if loaded > 0 {
                 book.fewest = if book.fewest == 0 { loaded } else { book.fewest.min(loaded) };
             }
@@ -103,6 +113,7 @@ impl Scene<'_> {
         release(ground, lists, book.stamp);
     }
 
+    #[allow(clippy::too_many_arguments)]
     fn commit_patch(
         &self,
         patch: &Patch,
@@ -111,6 +122,7 @@ impl Scene<'_> {
         ground: &mut Ground,
         lists: &mut Lists,
         book: &mut Book,
+        touch: &mut Touch,
     ) -> u32 {
         let n = &self.patches.nodes;
         let shear = patch.shear(&self.laws.shear);
@@ -128,8 +140,11 @@ impl Scene<'_> {
             if pressure > 0.0 {
                 loaded += 1;
                 let fresh = n.stamp[k] == 0 || n.stamp[k] + 1 != book.stamp;
-                // a point that has just come down from above is no deeper than its own descent
-                lists.slid_in.push(fresh && depth > -2.0 * rise);
+                // a point that has just come down from above is no deeper in the soil than its own descent; those of
+                // a rim all come from above
+                let slid_in = fresh && patch.wheel.is_none() && depth - n.permanent[k] > -2.0 * rise;
+                lists.slid_in.push(slid_in);
+                touch.add(n, k, pressure, deep);
                 let node = Pressed { k, depth, pressure, slip: facing.slide(moved), shear: &shear };
                 let (slid, surface) = self.press(patch, &node, ground, book);
                 let carried = if patch.wheel.is_some() { moved } else { slid };
@@ -143,7 +158,11 @@ impl Scene<'_> {
         if let Some(wheel) = patch.wheel.as_ref().filter(|_| loaded > 0) {
             wheel::remember(&mut ground.wheels, wheel, x);
         }
-        carry_slip(ground, lists, first, book.stamp);
+        let entry = patch.wheel.as_ref().map(|wheel| {
+            let [a, b] = wheel.heading.map(|c| if wheel.rolled(x).forward { c } else { -c });
+            in_world(port, [0.0, a, b])
+        });
+        carry_slip(ground, lists, first, entry, book.stamp);
         loaded
     }
 
@@ -207,7 +226,7 @@ fn in_world(port: &Port, v: [f64; 3]) -> [f64; 2] {
 /// the lattice as it comes down. A node onto which the foot slid from
 /// inside the contact takes the mean slip of the contact, weighted with the pressure; what enters from above or
 /// from outside brings nothing. A rolling foot, whose points do not slide, carries nothing along.
-fn carry_slip(ground: &mut Ground, lists: &mut Lists, first: usize, stamp: u64) {
+fn carry_slip(ground: &mut Ground, lists: &mut Lists, first: usize, entry: Option<[f64; 2]>, stamp: u64) {
     if lists.slid[first..].iter().all(|s| *s == [0.0; 2]) {
         return;
     }
@@ -225,11 +244,19 @@ fn carry_slip(ground: &mut Ground, lists: &mut Lists, first: usize, stamp: u64) 
             if *slid_in {
                 return own.max(mean);
             }
-            let gain = |i: i32, j: i32, share: f64| {
-                let there = ground.nodes.get(i, j);
-                if there.stamp == stamp { share * scale * (there.shear.slip - own) } else { 0.0 }
+            let gain = |axis: usize| {
+                let at = [[i + behind[0], *j], [*i, j + behind[1]]][axis];
+                let there = ground.nodes.get(at[0], at[1]);
+                let enters = entry.is_some_and(|e| e[axis] * f64::from(behind[axis]) > 0.5);
+                let brought = match there.stamp == stamp {
+                    true => there.shear.slip,
+                    // points of a rim come down in front of the contact and have not slipped yet
+                    false if enters => 0.0,
+                    false => own,
+                };
+                share[axis] * scale * (brought - own)
             };
-            own + gain(i + behind[0], *j, share[0]) + gain(*i, j + behind[1], share[1])
+            own + gain(0) + gain(1)
         },
     ));
     for ([i, j], slip) in nodes.iter().zip(&lists.carried) {

@@ -1,5 +1,6 @@
 //! The ground of a soil: heights of its material and what it remembers at each node.
 
+use crate::contacts::Contacts;
 use crate::nodes::{NodeState, NodeStates};
 use crate::wheel::Memory;
 use terraglue_ground::{HeightField, TILE_EDGE, UNIT_M};
@@ -36,6 +37,8 @@ pub struct Ground {
     pub nodes: NodeStates,
     /// Wheels that have touched it.
     pub wheels: Vec<Memory>,
+    /// What is told of the contacts.
+    pub contacts: Contacts,
 }
 
 impl Ground {
@@ -43,7 +46,7 @@ impl Ground {
     pub fn new(terrain: &dyn Terrain) -> Result<Self> {
         let heights = HeightField::from_terrain(terrain)?;
         let nodes = NodeStates::new(*heights.lattice());
-        Ok(Self { heights, nodes, wheels: Vec::with_capacity(WHEELS) })
+        Ok(Self { heights, nodes, wheels: Vec::with_capacity(WHEELS), contacts: Contacts::default() })
     }
 
     /// Height of a node at the start, m.

@@ -12,6 +12,7 @@
 
 mod assemble;
 mod bookkeeping;
+mod contacts;
 mod ground;
 mod nodes;
 mod normal;

@@ -1,6 +1,7 @@
 //! A subsystem from the shared contact machinery and a soil's own rule for its material.
 
 use crate::bookkeeping::{self, Book, Lists};
+use crate::contacts::Contacts;
 use crate::ground::{Covered, Ground};
 use crate::patch::{Laws, Patches};
 use crate::state::{Committed, Slots};
@@ -64,6 +65,8 @@ pub struct FieldSoil<M: Material> {
     law_force: Vec<f64>,
     fields: [FieldInfo; 2],
     variables: Vec<Variable>,
+    /// Number of the first variable of the contacts.
+    first_contact: u32,
     slots: Slots<M::Saved>,
     few_nodes: u32,
     warned: [bool; 2],
@@ -74,10 +77,13 @@ impl<M: Material> FieldSoil<M> {
     pub fn new(config: &Config, host: Arc<dyn Host>, mut material: M) -> Result<Self> {
         let parameters = SoilParameters::from_config(config, length(host.gravity()))?;
         let expressions = SoilExpressions::from_config(config)?;
-        let ground = Ground::new(host.required_terrain()?)?;
+        let mut ground = Ground::new(host.required_terrain()?)?;
+        ground.contacts = Contacts::new(config.optional_number("contacts_shown")?.unwrap_or(0.0) as usize);
         material.begin(&ground, &parameters);
         let mut variables = values::shared();
         variables.extend(material.variables(values::SHARED));
+        let first_contact = variables.len() as u32;
+        variables.extend(ground.contacts.variables(first_contact));
         let nodes = host.max_nodes() as usize;
         let (mut patches, mut lists) = (Patches::default(), Lists::default());
         patches.nodes.reserve(nodes);
@@ -99,6 +105,7 @@ impl<M: Material> FieldSoil<M> {
             patches,
             lists,
             variables,
+            first_contact,
         })
     }
 
@@ -230,7 +237,7 @@ impl<M: Material> Subsystem for FieldSoil<M> {
             return Err(Error::Failed(format!("the foot's motion, component {k}, is not a number")));
         }
         self.build(step);
-        let scene = bookkeeping::Scene { patches: &self.patches, laws: &self.laws };
+        let scene = bookkeeping::Scene { patches: &self.patches, laws: &self.laws, h: step.h };
         scene.commit(step.ports, t, partner.x, &mut self.ground, &mut self.lists, &mut self.book);
         self.material.settle(&mut self.ground, &self.lists.covered, &self.lists.released, step.h);
         self.patches.forget();
@@ -276,6 +283,10 @@ impl<M: Material> Subsystem for FieldSoil<M> {
             if *id as usize >= self.variables.len() {
                 return Err(Error::Refused(format!("no variable has the number {id}")));
             }
+            if let Some(k) = id.checked_sub(self.first_contact) {
+                *out = self.ground.contacts.value(k as usize);
+                continue;
+            }
             *out = values::get(*id, &self.book, &self.parameters)
                 .unwrap_or_else(|| self.material.value(*id - values::SHARED, &self.ground));
         }
@@ -292,7 +303,7 @@ impl<M: Material> Subsystem for FieldSoil<M> {
                 .variables
                 .get(*id as usize)
                 .ok_or_else(|| Error::Refused(format!("no variable has the number {id}")))?;
-            if *id < values::SHARED {
+            if *id < values::SHARED || *id >= self.first_contact {
                 values::set(variable, *value, &mut self.parameters)?;
             } else {
                 values::check(variable, *value)?;

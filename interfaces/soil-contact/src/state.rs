@@ -1,6 +1,7 @@
 //! Numbered slots with exact copies of the committed state.
 
 use crate::bookkeeping::Book;
+use crate::contacts::Contacts;
 use crate::ground::Ground;
 use crate::nodes::NodesSnapshot;
 use crate::wheel::Memory;
@@ -14,6 +15,7 @@ struct Slot<S> {
     heights: HeightSnapshot,
     nodes: NodesSnapshot,
     wheels: Vec<Memory>,
+    contacts: Contacts,
     loaded: Vec<[i32; 2]>,
     book: Book,
     parameters: Option<SoilParameters>,
@@ -50,6 +52,7 @@ impl<S: Default> Slots<S> {
         state.ground.heights.save(&mut s.heights);
         state.ground.nodes.save(&mut s.nodes);
         s.wheels.clone_from(&state.ground.wheels);
+        s.contacts.clone_from(&state.ground.contacts);
         s.loaded.clone_from(state.loaded);
         s.book = *state.book;
         s.parameters = Some(*state.parameters);
@@ -63,6 +66,7 @@ impl<S: Default> Slots<S> {
         state.ground.heights.restore(&s.heights);
         state.ground.nodes.restore(&s.nodes);
         state.ground.wheels.clone_from(&s.wheels);
+        state.ground.contacts.clone_from(&s.contacts);
         state.loaded.clone_from(&s.loaded);
         *state.book = s.book;
         Ok(&s.material)

@@ -131,6 +131,15 @@ impl SoilParameters {
             .within(0.0, 1e7)
             .optional(),
         ];
+        parameters.push(
+            Parameter::of(
+                "contacts_shown",
+                ParameterType::Integer,
+                "of how many wheels and feet variables are told (contact1.slip, …), in the order of their first touch",
+            )
+            .or(0)
+            .within(0.0, 64.0),
+        );
         parameters.extend(Rolling::schema());
         parameters.extend(SoilExpressions::schema());
         parameters

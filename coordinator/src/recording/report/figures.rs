@@ -13,6 +13,7 @@ pub(crate) fn all(recording: &Recording, legs: &[Leg]) -> Vec<Figure> {
         joints(recording),
         gluing(recording),
         energy(recording),
+        contacts(recording),
         soil(recording),
     ];
     figures.into_iter().flatten().collect()
@@ -163,6 +164,29 @@ fn energy(recording: &Recording) -> Option<Figure> {
         "All subsystems together. Net work at ports would be zero if the glue neither made nor took any.";
     let figure =
         Figure { id: "energy", title: "Energy".into(), note: note.into(), panels, ..Figure::default() };
+    (!figure.panels.is_empty()).then_some(figure)
+}
+
+/// What a soil tells of wheels and feet: one panel a quantity, one curve a contact.
+fn contacts(recording: &Recording) -> Option<Figure> {
+    let shown = [("slip", ""), ("sinkage", "m"), ("mean_pressure", "Pa"), ("largest_pressure", "Pa")];
+    let shown = shown.into_iter().chain([("area", "m²"), ("pull", "N"), ("torque", "N m"), ("power", "W")]);
+    let panel = |(quantity, unit): (&'static str, &'static str)| {
+        let mut curves = Vec::new();
+        for (_, table) in &recording.variables {
+            for (name, y) in table.names.iter().zip(&table.columns) {
+                let contact = name.strip_suffix(quantity).and_then(|n| n.strip_suffix('.'));
+                if let Some(contact) = contact.filter(|c| c.starts_with("contact")) {
+                    curves.push(Curve::new(contact, curves.len(), &table.t_s, y.clone()));
+                }
+            }
+        }
+        Panel::new(&quantity.replace('_', " "), unit, curves)
+    };
+    let panels: Vec<Panel> = shown.map(panel).filter(|p| !p.curves.is_empty()).collect();
+    let note = "As the soil tells after each commit; contacts in the order of their first touch.".into();
+    let figure =
+        Figure { id: "contacts", title: "Wheels and feet".into(), note, panels, ..Figure::default() };
     (!figure.panels.is_empty()).then_some(figure)
 }
 

@@ -1,0 +1,132 @@
+//! What is told of each wheel and foot: numbers of the last commit, one set per contact.
+
+use crate::patch::{Patch, PatchNodes};
+use crate::wheel::Wheel;
+use terraglue_subsystem::{Causality, Variable};
+
+/// Name, unit and meaning of what is told.
+const QUANTITIES: [(&str, &str, &str); 9] = [
+    ("slip", "", "slip of a wheel: 0 rolls, 1 spins on the spot, below 0 is braked; 0 for a foot"),
+    ("sinkage", "m", "depth of the deepest point below the reference level of the soil there"),
+    ("area", "m^2", "area that carries pressure, in the tangent plane"),
+    ("mean_pressure", "Pa", "mean of the pressure over that area"),
+    ("largest_pressure", "Pa", "largest pressure of a node"),
+    ("normal_force", "N", "force of the soil along the normal of the ground"),
+    ("pull", "N", "force of the soil along the travel of a wheel, or along t1 for a foot: the drawbar pull"),
+    ("torque", "N m", "torque that drives a wheel against the soil; 0 for a foot"),
+    ("power", "W", "torque times rate of turning"),
+];
+
+/// One contact's numbers, in the order of the variables.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Contact {
+    key: u64,
+    values: [f64; QUANTITIES.len()],
+}
+
+/// Contacts numbered in the order of their first touch; those of one step by their keys.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Contacts {
+    shown: usize,
+    all: Vec<Contact>,
+}
+
+impl Contacts {
+    /// Tells of at most `shown` contacts.
+    pub fn new(shown: usize) -> Self {
+        Self { shown, all: Vec::with_capacity(shown) }
+    }
+
+    /// The variables, numbered from `first`.
+    pub fn variables(&self, first: u32) -> Vec<Variable> {
+        let numbers = (first..).zip((0..self.shown).flat_map(|c| QUANTITIES.iter().map(move |q| (c, q))));
+        numbers
+            .map(|(id, (c, (name, unit, help)))| {
+                Variable::real(id, format!("contact{}.{name}", c + 1), *unit, Causality::Output, *help)
+            })
+            .collect()
+    }
+
+    /// Value of variable number k.
+    pub fn value(&self, k: usize) -> f64 {
+        let count = QUANTITIES.len();
+        self.all.get(k / count).map_or(0.0, |c| c.values[k % count])
+    }
+
+    /// A commit begins: nothing touches yet.
+    pub fn begin(&mut self) {
+        self.all.iter_mut().for_each(|c| c.values.fill(0.0));
+    }
+
+    /// Puts the numbers of a contact where they belong.
+    pub fn tell(&mut self, key: u64, touch: &Touch) {
+        let known = self.all.iter().position(|c| c.key == key);
+        if known.is_none() && self.all.len() < self.shown {
+            self.all.push(Contact { key, values: [0.0; QUANTITIES.len()] });
+        }
+        if let Some(c) = known.or(self.all.len().checked_sub(1)).and_then(|k| self.all.get_mut(k))
+            && c.key == key
+        {
+            c.values = touch.values();
+        }
+    }
+
+    /// Whether anything is told.
+    pub fn any(&self) -> bool {
+        self.shown > 0
+    }
+}
+
+/// What a commit has found below a contact.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Touch {
+    /// Sum of the areas with pressure, m².
+    pub area: f64,
+    /// Σ pressure·area, N.
+    pub carried: f64,
+    /// Largest pressure, Pa.
+    pub largest: f64,
+    /// Largest depth, m.
+    pub sinkage: f64,
+    slip: f64,
+    normal: f64,
+    pull: f64,
+    torque: f64,
+    power: f64,
+}
+
+impl Touch {
+    /// Takes a node with pressure.
+    pub fn add(&mut self, nodes: &PatchNodes, k: usize, pressure: f64, depth: f64) {
+        self.area += nodes.area[k];
+        self.carried += nodes.area[k] * pressure;
+        self.largest = self.largest.max(pressure);
+        self.sinkage = self.sinkage.max(depth);
+    }
+
+    /// Takes the wrench on the body and its motion `x` over `h` seconds.
+    pub fn under(&mut self, patch: &Patch, wrench: &[f64; 6], x: &[f64; 6], h: f64) {
+        self.normal = wrench[0];
+        self.pull = wrench[1];
+        if let Some(wheel) = &patch.wheel {
+            self.roll(wheel, wrench, x, h);
+        }
+    }
+
+    fn roll(&mut self, wheel: &Wheel, wrench: &[f64; 6], x: &[f64; 6], h: f64) {
+        let memory = wheel.rolled(x);
+        let sign = if memory.forward { 1.0 } else { -1.0 };
+        let [a, b] = wheel.heading.map(|c| sign * c);
+        self.slip = memory.slip;
+        self.pull = a * wrench[1] + b * wrench[2];
+        // about the axle, which lies r·n above the port
+        self.torque = wheel.radius * self.pull - (a * wrench[5] - b * wrench[4]);
+        self.power = self.torque * (a * x[5] - b * x[4]) / h;
+    }
+
+    fn values(&self) -> [f64; QUANTITIES.len()] {
+        let mean = if self.area > 0.0 { self.carried / self.area } else { 0.0 };
+        let Self { slip, sinkage, area, largest, normal, pull, torque, power, .. } = *self;
+        [slip, sinkage, area, mean, largest, normal, pull, torque, power]
+    }
+}

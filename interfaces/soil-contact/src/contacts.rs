@@ -12,7 +12,11 @@ const QUANTITIES: [(&str, &str, &str); 9] = [
     ("mean_pressure", "Pa", "mean of the pressure over that area"),
     ("largest_pressure", "Pa", "largest pressure of a node"),
     ("normal_force", "N", "force of the soil along the normal of the ground"),
-    ("pull", "N", "force of the soil along the travel of a wheel, or along t1 for a foot: the drawbar pull"),
+    (
+        "pull",
+        "N",
+        "drawbar pull: force of the soil along the way that a wheel is driven, or along t1 for a foot",
+    ),
     ("torque", "N m", "torque that drives a wheel against the soil; 0 for a foot"),
     ("power", "W", "torque times rate of turning"),
 ];
@@ -114,10 +118,8 @@ impl Touch {
     }
 
     fn roll(&mut self, wheel: &Wheel, wrench: &[f64; 6], x: &[f64; 6], h: f64) {
-        let memory = wheel.rolled(x);
-        let sign = if memory.forward { 1.0 } else { -1.0 };
-        let [a, b] = wheel.heading.map(|c| sign * c);
-        self.slip = memory.slip;
+        let [a, b] = wheel.driven(x);
+        self.slip = wheel.rolled(x).slip;
         self.pull = a * wrench[1] + b * wrench[2];
         // about the axle, which lies r·n above the port
         self.torque = wheel.radius * self.pull - (a * wrench[5] - b * wrench[4]);

@@ -70,12 +70,25 @@ impl Wheel {
         })
     }
 
-    /// The memory after the foot has moved by `x` (n, t1, t2 and rotations).
-    pub fn rolled(&self, x: &[f64; 6]) -> Memory {
+    /// Ways of the rim and of the axle along the heading for a motion `x` (n, t1, t2 and rotations), m.
+    fn ways(&self, x: &[f64; 6]) -> [f64; 2] {
         let along = |v: [f64; 2]| v[0] * self.heading[0] + v[1] * self.heading[1];
         // the axle lies r·n above the lowest point: θ × r·n along t1 and t2
         let rim = along([self.radius * x[5], -self.radius * x[4]]);
-        let axle = along([x[1], x[2]]) + rim;
+        [rim, along([x[1], x[2]]) + rim]
+    }
+
+    /// Direction along t1 and t2 in which the wheel is driven: that of the larger way of rim and axle.
+    pub fn driven(&self, x: &[f64; 6]) -> [f64; 2] {
+        let [rim, axle] = self.ways(x);
+        let way = if rim.abs() >= axle.abs() { rim } else { axle };
+        let back = way < 0.0 || way == 0.0 && !self.memory.forward;
+        self.heading.map(|c| if back { -c } else { c })
+    }
+
+    /// The memory after the foot has moved by `x` (n, t1, t2 and rotations).
+    pub fn rolled(&self, x: &[f64; 6]) -> Memory {
+        let [rim, axle] = self.ways(x);
         let way = rim.abs().max(axle.abs());
         if way <= f64::MIN_POSITIVE {
             return self.memory;

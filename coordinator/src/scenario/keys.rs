@@ -78,11 +78,11 @@ impl From<Parameter> for Key {
 /// The strategies of this version.
 pub const STRATEGIES: &[&str] = &crate::gluing::STRATEGIES;
 /// The kinds of terrain of this version.
-pub const TERRAIN_KINDS: &[&str] = &["flat", "slope", "undulating", "crater", "esri-ascii", "geotiff"];
+pub const TERRAIN_KINDS: &[&str] = &["flat", "slope", "undulating", "crater", "esri-ascii", "geotiff", "png"];
 /// Kinds of terrain that are made, not read.
 const MADE: &[&str] = &["flat", "slope", "undulating", "crater"];
 /// Kinds of terrain that come from a file.
-pub const READ: &[&str] = &["esri-ascii", "geotiff"];
+pub const READ: &[&str] = &["esri-ascii", "geotiff", "png"];
 
 /// All reserved tables in the order of the documentation.
 pub fn tables() -> Vec<Table> {
@@ -170,6 +170,9 @@ fn terrain() -> Table {
             .optional(),
         )
         .only(READ),
+        Key::from(required("pixel_m", "m", "distance of pixels").positive()).only(&["png"]),
+        Key::from(number("low_m", "m", 0.0, "height of black pixels")).only(&["png"]),
+        Key::from(required("high_m", "m", "height of white pixels")).only(&["png"]),
     ];
     of("terrain", "The ground at the start; built by the coordinator, owned by the soil from then on.", keys)
 }

@@ -110,6 +110,15 @@ pub enum TerrainKind {
         /// Height that replaces NODATA; refused when absent.
         fill_m: Option<f64>,
     },
+    /// Greyscale PNG image.
+    Png {
+        /// File.
+        file: PathBuf,
+        /// What its greys mean.
+        greys: crate::terrain::Greys,
+        /// Height that replaces transparent pixels; refused when absent.
+        fill_m: Option<f64>,
+    },
     /// GeoTIFF with one band.
     Geotiff {
         /// File.

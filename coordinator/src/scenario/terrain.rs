@@ -4,6 +4,7 @@ use super::keys::READ;
 use super::model::{TerrainKind, TerrainSpec};
 use super::section::Section;
 use super::source::InputError;
+use crate::terrain::Greys;
 
 /// Reads the checked table.
 pub fn read(s: &Section) -> Result<TerrainSpec, Box<InputError>> {
@@ -21,6 +22,15 @@ pub fn read(s: &Section) -> Result<TerrainSpec, Box<InputError>> {
         },
         "esri-ascii" => TerrainKind::EsriAscii { file: s.file("file"), fill_m: s.optional_number("fill_m") },
         "geotiff" => TerrainKind::Geotiff { file: s.file("file"), fill_m: s.optional_number("fill_m") },
+        "png" => TerrainKind::Png {
+            file: s.file("file"),
+            greys: Greys {
+                pixel_m: s.number("pixel_m"),
+                low_m: s.number("low_m"),
+                high_m: s.number("high_m"),
+            },
+            fill_m: s.optional_number("fill_m"),
+        },
         _ => TerrainKind::Flat { height_m: s.number("height_m") },
     };
     if s.optional_number("spacing_m").is_none() && !READ.contains(&s.text("kind").as_str()) {

@@ -10,6 +10,7 @@ mod esri_ascii;
 mod esri_writer;
 mod geotiff;
 mod grid;
+mod png;
 mod random;
 mod resample;
 mod undulating;
@@ -19,6 +20,7 @@ pub use esri_ascii::read_esri_ascii;
 pub use esri_writer::write_esri_ascii;
 pub use geotiff::read_geotiff;
 pub use grid::Grid;
+pub use png::{Greys, read_png};
 pub use random::SplitMix64;
 
 use crate::error::Result;
@@ -64,6 +66,9 @@ pub fn build(spec: &TerrainSpec, seed: u64) -> Result<Box<dyn Terrain>> {
         }
         TerrainKind::Geotiff { file, fill_m } => {
             from_file(&file.display().to_string(), read_geotiff(file, *fill_m)?, spec.spacing_m)?
+        }
+        TerrainKind::Png { file, greys, fill_m } => {
+            from_file(&file.display().to_string(), read_png(file, *greys, *fill_m)?, spec.spacing_m)?
         }
     })
 }

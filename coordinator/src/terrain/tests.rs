@@ -204,6 +204,45 @@ fn a_geotiff_is_read_and_its_faults_are_named() {
     assert!(failure(read_geotiff(&path, None)).contains("not a TIFF file"));
 }
 
+fn write_png(path: &Path, color: ::png::ColorType, depth: ::png::BitDepth, data: &[u8]) {
+    let mut encoder = ::png::Encoder::new(std::fs::File::create(path).expect("created"), 3, 2);
+    encoder.set_color(color);
+    encoder.set_depth(depth);
+    encoder.write_header().expect("header").write_image_data(data).expect("data");
+}
+
+#[test]
+fn a_greyscale_image_is_read_and_its_faults_are_named() {
+    use ::png::{BitDepth, ColorType};
+    let folder = tempfile::tempdir().expect("folder");
+    let path = folder.path().join("hills.png");
+    let greys = Greys { pixel_m: 0.5, low_m: -1.0, high_m: 4.1 };
+    write_png(&path, ColorType::Grayscale, BitDepth::Eight, &[0, 51, 102, 153, 204, 255]);
+    let raster = read_png(&path, greys, None).expect("eight bits");
+    // the upper row is the one of the largest y
+    for (found, expected) in raster.heights.iter().zip([2.06, 3.08, 4.1, -1.0, 0.02, 1.04]) {
+        assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+    }
+    assert_eq!((raster.size, raster.step), ([3, 2], [0.5; 2]));
+    let sixteen = [0, 0, 0, 1, 1, 0, 128, 0, 255, 254, 255, 255];
+    write_png(&path, ColorType::Grayscale, BitDepth::Sixteen, &sixteen);
+    let raster = read_png(&path, Greys { low_m: 0.0, high_m: 65.535, ..greys }, None).expect("sixteen bits");
+    for (found, expected) in raster.heights.iter().zip([32.768, 65.534, 65.535, 0.0, 0.001, 0.256]) {
+        assert!((found - expected).abs() < 1e-12, "{found} {expected}");
+    }
+    let clear = [9, 255, 9, 255, 9, 0, 9, 255, 9, 255, 9, 255];
+    write_png(&path, ColorType::GrayscaleAlpha, BitDepth::Eight, &clear);
+    assert!(failure(read_png(&path, greys, None)).contains("transparent"));
+    assert_eq!(read_png(&path, greys, Some(7.0)).expect("filled").heights[5], 7.0);
+    write_png(&path, ColorType::Rgb, BitDepth::Eight, &[0; 18]);
+    assert!(failure(read_png(&path, greys, None)).contains("coloured"));
+    let whole = std::fs::read(&path).expect("read");
+    std::fs::write(&path, &whole[..40]).expect("written");
+    assert!(failure(read_png(&path, greys, None)).contains("hills.png"));
+    std::fs::write(&path, "no image").expect("written");
+    assert!(failure(read_png(&path, greys, None)).contains("not a PNG image"));
+}
+
 #[test]
 fn heights_far_above_zero_are_taken_relative_to_the_middle() {
     let raster = Raster {

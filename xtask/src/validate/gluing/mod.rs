@@ -15,6 +15,7 @@ mod planar;
 mod rig;
 mod six_feet;
 mod table;
+mod walk_forms;
 
 use super::{Context, Figure, Limit};
 use crate::process::{Outcome, root};
@@ -22,7 +23,7 @@ use crate::process::{Outcome, root};
 type Part = fn(&Context) -> Outcome<Vec<Figure>>;
 
 /// The parts, in the order of the table.
-const PARTS: [Part; 3] = [linear::figures, mechanisms::figures, feet::figures];
+const PARTS: [Part; 4] = [linear::figures, mechanisms::figures, feet::figures, walk_forms::figures];
 
 /// All figures of the area, or those of the file that `--table` names.
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {

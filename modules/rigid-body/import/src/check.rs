@@ -1,7 +1,7 @@
-//! Checks of single links: mass, inertia, shapes.
+//! Checks of single links (mass, inertia, shapes, places) and of masses against each other.
 
 use crate::error::{Error, Source};
-use crate::model::{Shape, ShapeGeometry};
+use crate::model::{Body, Shape, ShapeGeometry};
 use nalgebra::{Isometry3, Matrix3, SymmetricEigen, Translation3, UnitQuaternion, Vector3};
 use urdf_rs::{Geometry, Link, Pose};
 
@@ -13,6 +13,49 @@ pub(crate) fn isometry(pose: &Pose) -> Isometry3<f64> {
     let [x, y, z] = pose.xyz.0;
     let [roll, pitch, yaw] = pose.rpy.0;
     Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_euler_angles(roll, pitch, yaw))
+}
+
+/// Masses further apart than this leave few of sixteen digits to the lighter body.
+const WIDEST_MASS_RATIO: f64 = 1e12;
+
+/// What is wrong with a place: URDF reads `nan` and `inf` as numbers.
+fn not_finite(what: &str, pose: &Pose) -> Option<String> {
+    let (xyz, rpy) = (pose.xyz.0, pose.rpy.0);
+    let bad = xyz.iter().chain(&rpy).any(|x| !x.is_finite());
+    bad.then(|| {
+        format!("the <origin> of {what} is xyz {xyz:?} rpy {rpy:?}; write finite numbers in m and rad")
+    })
+}
+
+/// Refuses places of joints, masses and shapes that are not finite.
+pub(crate) fn places(source: &Source, robot: &urdf_rs::Robot) -> Result<(), Error> {
+    for joint in &robot.joints {
+        if let Some(problem) = not_finite("the joint", &joint.origin) {
+            return Err(source.joint(&joint.name, problem));
+        }
+    }
+    for link in &robot.links {
+        let mass = not_finite("<inertial>", &link.inertial.origin);
+        let hit = link.collision.iter().find_map(|c| not_finite("a <collision>", &c.origin));
+        let seen = link.visual.iter().find_map(|v| not_finite("a <visual>", &v.origin));
+        if let Some(problem) = mass.or(hit).or(seen) {
+            return Err(source.link(&link.name, problem));
+        }
+    }
+    Ok(())
+}
+
+/// A warning where masses of one file are too far apart for double precision.
+pub(crate) fn mass_spread(file: &str, bodies: &[Body]) -> Option<String> {
+    let lightest = bodies.iter().min_by(|a, b| a.mass.total_cmp(&b.mass))?;
+    let heaviest = bodies.iter().max_by(|a, b| a.mass.total_cmp(&b.mass))?;
+    (heaviest.mass > WIDEST_MASS_RATIO * lightest.mass).then(|| {
+        format!(
+            "{file}: link `{}` weighs {:e} kg and link `{}` {:e} kg: more than 1e12 apart, rounding at the heavy one \
+             moves the light one; check the units, or fix the heavy one to the world",
+            lightest.name, lightest.mass, heaviest.name, heaviest.mass
+        )
+    })
 }
 
 /// Reads and checks the inertial of a link.

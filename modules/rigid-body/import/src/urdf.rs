@@ -1,6 +1,6 @@
 //! From the text of a URDF file to the checked robot; links without mass are merged into their neighbours.
 
-use crate::check::{Inertial, inertial, isometry, shapes};
+use crate::check::{Inertial, inertial, isometry, mass_spread, places, shapes};
 use crate::error::{Error, Source};
 use crate::model::{AxisData, Base, Body, Joint, JointKind, Robot, Shape};
 use crate::tree::{Place, order};
@@ -20,6 +20,7 @@ pub fn read_urdf(path: &Path, fixed_base: bool) -> Result<Robot, Error> {
 pub fn read_urdf_text(file: &str, text: &str, fixed_base: bool) -> Result<Robot, Error> {
     let source = Source { file, text };
     let robot = urdf_rs::read_from_string(text).map_err(|e| not_urdf(&source, &e.to_string()))?;
+    places(&source, &robot)?;
     let order = order(&source, &robot)?;
     let inertials = robot.links.iter().map(|l| inertial(&source, l)).collect::<Result<Vec<_>, _>>()?;
     let merged = merge(&robot, &order, &inertials);
@@ -119,6 +120,8 @@ fn build(
         Some(link) => Base::Free(merged.group_from_link[link]),
         None => Base::World,
     };
+    let mut warnings = warnings(source, robot);
+    warnings.extend(mass_spread(source.file, &bodies));
     Ok(Robot {
         name: robot.name.clone(),
         base,
@@ -128,7 +131,7 @@ fn build(
         world_shapes: Vec::new(),
         planes: Vec::new(),
         excluded: Vec::new(),
-        warnings: warnings(source, robot),
+        warnings,
     })
 }
 
@@ -220,12 +223,12 @@ fn kind(source: &Source, joint: &urdf_rs::Joint) -> Result<(JointKind, bool), Er
 
 fn limits(source: &Source, joint: &urdf_rs::Joint) -> Result<[f64; 2], Error> {
     let (lower, upper) = (joint.limit.lower, joint.limit.upper);
-    if lower < upper {
+    if lower < upper && lower.is_finite() && upper.is_finite() {
         return Ok([lower, upper]);
     }
     let problem = format!(
-        "the limits {lower} … {upper} leave no room; write <limit lower= upper= …> with lower < upper, \
-         or make it continuous or fixed"
+        "the limits {lower} … {upper} leave no room or are not finite; write <limit lower= upper= …> with \
+         lower < upper, or make it continuous or fixed"
     );
     Err(source.joint(&joint.name, problem))
 }

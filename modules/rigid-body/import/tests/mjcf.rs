@@ -119,5 +119,30 @@ fn what_would_be_another_mechanism_is_refused() {
     refused(r#"<body name="a"><freejoint/></body>"#, &["body `a`", "no mass"]);
     refused(r#"<body name="a"><freejoint/><geom size="0"/></body>"#, &["positive"]);
     refused(r#"<body name="a" pos="0 0"><freejoint/><geom size="1"/></body>"#, &["pos has 2 numbers"]);
+    refused(r#"<body name="a" pos="0 0 nan"><freejoint/><geom size="1"/></body>"#, &["body `a`", "finite"]);
+    let inertial = |mass: &str, inertia: &str| {
+        format!(
+            r#"<body name="a"><freejoint/><inertial pos="0 0 0" mass="{mass}" diaginertia="{inertia}"/></body>"#
+        )
+    };
+    refused(&inertial("1", "1 1 3"), &["m.xml:4", "body `a`", "sum of the other two"]);
+    refused(&inertial("1", "0 0 0"), &["body `a`", "not positive"]);
+    refused(&inertial("nan", "1 1 1"), &["m.xml:4", "mass", "finite"]);
+    refused(&inertial("-1", "1 1 1"), &["positive mass"]);
+    let hinge = |more: &str| format!(r#"<body name="b"><joint name="j" {more}/><geom size="0.1"/></body>"#);
+    refused(&hinge("damping=\"-1\""), &["joint `j`", "damping = -1", "negative"]);
+    refused(&(hinge("") + &hinge("")), &["body `b`", "used twice"]);
+    refused(&(hinge("") + &hinge("").replace("\"b\"", "\"c\"")), &["joint `j`", "used twice"]);
     refused("<geom size=\"1\"/>", &["no body"]);
+}
+
+#[test]
+fn masses_far_apart_are_warned_of() {
+    let robot = read(
+        r#"<body name="a"><freejoint/><geom size="0.1" mass="1e7"/></body>
+           <body name="b"><freejoint/><geom size="0.1" mass="1e-6"/></body>"#,
+        "",
+    );
+    let warnings = robot.unwrap().warnings;
+    assert!(warnings.len() == 1 && warnings[0].contains("m.xml: link `b` weighs 1e-6 kg"), "{warnings:?}");
 }

@@ -97,6 +97,50 @@ fn inertia_that_no_body_has_is_refused() {
 }
 
 #[test]
+fn numbers_that_are_not_finite_are_refused() {
+    let nan = |text: String, from: &str, to: &str| {
+        let changed = text.replacen(from, to, 1);
+        assert_ne!(changed, text);
+        changed
+    };
+    refused(&[nan(good("a"), "0.1", "nan")], &["robot.urdf:2", "link `a`", "not finite"]);
+    refused(&[nan(good("a"), "value=\"1\"", "value=\"NaN\"")], &["link `a`", "mass NaN kg"]);
+    refused(&[nan(good("a"), "value=\"1\"", "value=\"inf\"")], &["link `a`", "mass inf kg"]);
+    let place = "<inertial><origin xyz=\"0 nan 0\"/>";
+    refused(&[nan(good("a"), "<inertial>", place)], &["link `a`", "<inertial>", "NaN", "finite"]);
+    let ball =
+        "<collision><origin rpy=\"0 0 inf\"/><geometry><sphere radius=\"1\"/></geometry></collision></link>";
+    refused(&[nan(good("a"), "</link>", ball)], &["link `a`", "<collision>", "inf"]);
+    let two = [good("a"), good("b")].concat();
+    let j = joint("j", "continuous", "a", "b");
+    refused(
+        &[two.clone(), nan(j.clone(), "1 0 0", "nan 0 0")],
+        &["robot.urdf:6", "joint `j`", "<origin>", "NaN"],
+    );
+    refused(&[two.clone(), nan(j, "0 0 1", "0 nan 1")], &["joint `j`", "axis"]);
+    for limit in ["lower=\"-inf\" upper=\"1\"", "lower=\"0\" upper=\"nan\""] {
+        let with = format!("<limit {limit} effort=\"1\" velocity=\"1\"/></joint>");
+        let j = nan(joint("j", "revolute", "a", "b"), "</joint>", &with);
+        refused(&[two.clone(), j], &["joint `j`", "not finite", "continuous"]);
+    }
+}
+
+#[test]
+fn masses_far_apart_are_warned_of() {
+    let pair = |light: f64| {
+        let parts =
+            [body("a", 1e3, [10.0; 3]), body("b", light, [light; 3]), joint("j", "continuous", "a", "b")];
+        read(&robot(&parts)).unwrap().warnings
+    };
+    assert!(pair(1.1e-9).is_empty());
+    let warnings = pair(0.9e-9);
+    assert_eq!(warnings.len(), 1);
+    for expected in ["robot.urdf", "`b` weighs 9e-10 kg", "`a` 1e3 kg", "1e12 apart"] {
+        assert!(warnings[0].contains(expected), "{}", warnings[0]);
+    }
+}
+
+#[test]
 fn what_is_not_a_tree_is_refused() {
     let (ab, bc, ca) = (
         joint("ab", "continuous", "a", "b"),

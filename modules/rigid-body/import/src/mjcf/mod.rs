@@ -9,7 +9,7 @@ mod actuators;
 mod defaults;
 mod geom;
 
-use crate::check::physical;
+use crate::check::{mass_spread, physical};
 use crate::error::{Error, Source};
 use crate::model::{AxisData, Base, Body, Joint, JointKind, Robot, Shape};
 use defaults::{Defaults, Element};
@@ -48,6 +48,7 @@ pub fn read_mjcf_text(file: &str, text: &str) -> Result<Robot, Error> {
         _ => Base::World,
     };
     robot.others.retain(|(body, _)| *body != 0);
+    robot.warnings.extend(mass_spread(file, &robot.bodies));
     Ok(robot)
 }
 
@@ -187,6 +188,11 @@ impl<'d, 's> Reader<'d, 's> {
             }
             (joint, Some((mass, com, inertia))) => {
                 physical(&inertia).map_err(|problem| self.d.wrong(&e, problem))?;
+                if self.robot.bodies.iter().any(|b| b.name == name) {
+                    return Err(self
+                        .d
+                        .wrong(&e, "the name is used twice; names of bodies are unique".into()));
+                }
                 let child = self.robot.bodies.len();
                 self.robot.bodies.push(Body { name: name.clone(), mass, com, inertia, shapes: Vec::new() });
                 let joint = joint.map(|j| self.d.element(*j, class));
@@ -279,12 +285,19 @@ impl<'d, 's> Reader<'d, 's> {
                 "has a `ref`, which is not supported: its coordinate is 0 in the pose of the file",
             );
         }
+        if self.robot.joints.iter().any(|j| j.name == name) {
+            return Err(d.wrong(&e, format!("the name `{name}` is used twice; names of joints are unique")));
+        }
         let unit = if kind == JointKind::Revolute { d.angle } else { 1.0 };
+        let not_negative = |what: &str| match d.number(&e, what)?.unwrap_or(0.0) {
+            x if x >= 0.0 => Ok(x),
+            x => Err(d.wrong(&e, format!("{what} = {x} is negative: it would drive the joint"))),
+        };
         let data = AxisData {
-            damping: d.number(&e, "damping")?.unwrap_or(0.0),
-            friction: d.number(&e, "frictionloss")?.unwrap_or(0.0),
-            armature: d.number(&e, "armature")?.unwrap_or(0.0),
-            stiffness: d.number(&e, "stiffness")?.unwrap_or(0.0),
+            damping: not_negative("damping")?,
+            friction: not_negative("frictionloss")?,
+            armature: not_negative("armature")?,
+            stiffness: not_negative("stiffness")?,
             reference: unit * d.number(&e, "springref")?.unwrap_or(0.0),
             drive: None,
         };

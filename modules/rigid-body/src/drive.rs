@@ -62,6 +62,8 @@ pub(crate) struct Span {
     pub supply_v: f64,
     /// Rate by which a rigid motor gives way at its largest torque, see [`YIELDING`].
     pub yielding: f64,
+    /// Whether rates may jump: end stops then throw back what hits them.
+    pub impacts: bool,
 }
 
 /// The axis during one step.
@@ -133,7 +135,7 @@ impl Axis {
             Line { at_zero: 0.0, slope: h * a[Item::ViscousFriction] },
         ];
         self.passive.iter().filter(|l| **l != Line::ZERO).for_each(|l| self.total.add_line(*l));
-        add_stops(&mut self.total, j, limits, h);
+        add_stops(&mut self.total, j, limits, step);
         self.slips = j.blocked.is_some() && a[Item::BlockTorque] < FULL_BLOCK;
         self.rate = j.velocity;
     }
@@ -258,7 +260,8 @@ fn through_winding(law: Law, j: &JointState, step: &Span) -> Curve {
 }
 
 /// End stops and brake: a block holds the coordinate, a partial one up to its torque.
-fn add_stops(total: &mut Curve, j: &JointState, limits: Option<[f64; 2]>, h: f64) {
+fn add_stops(total: &mut Curve, j: &JointState, limits: Option<[f64; 2]>, step: &Span) {
+    let h = step.h;
     let most = j.actuator[Item::BlockTorque];
     match j.blocked {
         Some(held) if most >= FULL_BLOCK => {
@@ -269,8 +272,26 @@ fn add_stops(total: &mut Curve, j: &JointState, limits: Option<[f64; 2]>, h: f64
         None => {}
     }
     if let Some([lower, upper]) = limits {
-        total.add_step((lower - j.angle) / h, f64::INFINITY, 0.0, Tag::LowerLimit);
-        total.add_step((upper - j.angle) / h, 0.0, f64::NEG_INFINITY, Tag::UpperLimit);
+        let (slowest, fastest) = stop_rates(j, (lower - j.angle) / h, (upper - j.angle) / h, step.impacts);
+        total.add_step(slowest, f64::INFINITY, 0.0, Tag::LowerLimit);
+        total.add_step(fastest, 0.0, f64::NEG_INFINITY, Tag::UpperLimit);
+    }
+}
+
+/// Rates between which the end stops leave the axis, from those that lead just to the limits. A joint that would pass
+/// a limit at its present rate u⁻ leaves at −e·u⁻ at least (Newton's law of impact), but not beyond the other limit.
+fn stop_rates(j: &JointState, to_lower: f64, to_upper: f64, impacts: bool) -> (f64, f64) {
+    let e = j.actuator[Item::LimitRestitution];
+    if !impacts || e <= 0.0 {
+        return (to_lower, to_upper);
+    }
+    let back = -e * j.velocity;
+    if j.velocity < to_lower.min(0.0) {
+        (to_lower.max(back.min(to_upper)), to_upper)
+    } else if j.velocity > to_upper.max(0.0) {
+        (to_lower, to_upper.min(back.max(to_lower)))
+    } else {
+        (to_lower, to_upper)
     }
 }
 

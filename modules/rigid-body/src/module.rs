@@ -77,6 +77,7 @@ impl Module for RigidBody {
         if integrator.is_second_order() {
             let planes = ground.is_some() || !dynamics.model.planes.is_empty();
             without_impacts(&*host, planes, dynamics.contacts.watches())?;
+            without_rebound(&dynamics.model, &state)?;
         }
         let name = config.text("contact_solver")?;
         let law = Law::from_name(name).ok_or_else(|| {
@@ -164,6 +165,19 @@ fn integrator(config: &Config) -> Result<Integrator> {
         "energy-momentum" => Integrator::EnergyMomentum,
         _ => Integrator::SymplecticEuler,
     })
+}
+
+/// End stops that throw back need impulses, too.
+fn without_rebound(model: &Model, state: &State) -> Result<()> {
+    let rebounds = |j: &crate::state::JointState| j.actuator[crate::actuator::Item::LimitRestitution] > 0.0;
+    match state.joints.iter().position(rebounds) {
+        None => Ok(()),
+        Some(j) => Err(Error::Refused(format!(
+            "parameter `actuator.limit_restitution` of joint `{}` does not go with an `integrator` of second order: \
+             what hits needs \"symplectic-euler\"",
+            model.joints[j].name
+        ))),
+    }
 }
 
 /// Impacts need impulses, which the second-order option does not have.

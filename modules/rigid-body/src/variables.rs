@@ -203,7 +203,7 @@ fn describe_actuator(id: u32, name: &str, kind: Kind, j: &JointState, all: &mut 
         let variable = Variable::real(id, name, unit(s.unit), Causality::Parameter, s.help);
         all.push(match s.range {
             Range::NotNegative | Range::Positive => variable.within(0.0, f64::INFINITY),
-            Range::Share => variable.within(0.0, 1.0),
+            Range::Share | Range::UpToOne => variable.within(0.0, 1.0),
             Range::Any => variable,
         });
     }

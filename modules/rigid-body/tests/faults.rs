@@ -194,3 +194,69 @@ fn what_cannot_be_set_is_refused() {
     rig.robot.act("LF_j1.break", "{}").unwrap();
     assert!(rig.robot.act("LF_j1.block", "{}").is_err());
 }
+
+/// A body of 1 kg on a vertical rail above its lower limit.
+fn drop_on_a_stop(name: &str, upper: f64, parameters: &str) -> Rig {
+    let file = temporary_urdf(
+        name,
+        &format!(
+            r#"<robot name="drop"><link name="world"/><link name="body"><inertial><mass value="1"/>
+            <inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+            <joint name="rail" type="prismatic"><parent link="world"/><child link="body"/><axis xyz="0 0 1"/>
+            <limit lower="0" upper="{upper}" effort="1" velocity="1"/></joint></robot>"#
+        ),
+    );
+    Rig::new(&format!(r#"{{"model": "{file}", "motor": "off"{parameters}}}"#), 9.81, 1e-3)
+}
+
+#[test]
+fn a_joint_bounces_off_its_limit_and_comes_to_rest() {
+    let bouncy = r#", "joints": {"rail": 1.0}, "actuator": {"limit_restitution": 0.8}"#;
+    let mut rig = drop_on_a_stop("bounce", 5.0, bouncy);
+    let (mut apexes, mut last, mut rising) = (Vec::new(), 1.0, false);
+    for _ in 0..2500 {
+        rig.free_step();
+        let height = rig.get("rail.angle");
+        assert!(height > -1e-12, "{height}");
+        if rising && height < last {
+            apexes.push(last);
+        }
+        (rising, last) = (height > last, height);
+    }
+    // The stop is met up to a step before or after the limit, at 4.43 m/s first: 4.4 mm.
+    for (n, apex) in apexes[..3].iter().enumerate() {
+        let exact = 0.64_f64.powi(n as i32 + 1);
+        assert!((apex - exact).abs() < 0.009, "{n}: {apex} {exact}");
+    }
+    // All bounces take 4.06 s.
+    (0..3000).for_each(|_| rig.free_step());
+    assert!(rig.get("rail.angle").abs() < 1e-9 && rig.get("rail.velocity").abs() < 1e-9);
+    let lost = rig.robot.energy().dissipated;
+    assert!((lost - 9.81).abs() < 0.03 * 9.81, "{lost}");
+}
+
+#[test]
+fn play_narrower_than_a_step_stays_within_its_limits() {
+    let elastic = r#", "joint_rates": {"rail": 1.0}, "actuator": {"limit_restitution": 1.0}"#;
+    let mut rig = drop_on_a_stop("play", 1e-4, elastic);
+    for _ in 0..2000 {
+        rig.free_step();
+        let (x, v) = (rig.get("rail.angle"), rig.get("rail.velocity"));
+        assert!((-1e-12..1e-4 + 1e-12).contains(&x) && v.abs() < 1.0 + 1e-9, "{x} {v}");
+    }
+}
+
+#[test]
+fn rebound_is_refused_where_there_are_no_impulses() {
+    let text = |e: f64| {
+        let file = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/hexapod.urdf");
+        format!(
+            r#"{{"model": "{}", "integrator": "generalized-alpha", "actuator": {{"limit_restitution": {e}}}}}"#,
+            file.display()
+        )
+    };
+    let refusal = |e: f64| common::instantiate(&text(e), 9.81).err().unwrap().to_string();
+    let message = refusal(0.5);
+    assert!(message.contains("limit_restitution") && message.contains("LF_j1"), "{message}");
+    assert!(refusal(1.5).contains("out of range"));
+}

@@ -21,6 +21,8 @@ pub(crate) enum Range {
     Positive,
     /// Greater than 0 and at most 1.
     Share,
+    /// From 0 to 1.
+    UpToOne,
     Any,
 }
 
@@ -30,6 +32,7 @@ impl Range {
             Self::NotNegative => x >= 0.0,
             Self::Positive => x > 0.0,
             Self::Share => x > 0.0 && x <= 1.0,
+            Self::UpToOne => (0.0..=1.0).contains(&x),
             Self::Any => true,
         }
     }
@@ -102,4 +105,5 @@ settings! {
     FormulaTorque = "current_per_torque", "A/(N m)", 0.0, NotNegative, Formula, "Coefficient of |torque|";
     FormulaRate = "current_per_rate", "A s/rad", 0.0, NotNegative, Formula, "Coefficient of |rate|";
     FormulaIdle = "idle_current", "A", 0.0, NotNegative, Formula, "Current at rest";
+    LimitRestitution = "limit_restitution", "", 0.0, UpToOne, All, "Rate with which the joint leaves an end stop / rate with which it hits it";
 }

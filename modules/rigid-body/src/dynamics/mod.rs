@@ -241,7 +241,8 @@ impl Dynamics {
 
     /// For which step axes are made; `when`: see [`Span`].
     fn span(&self, state: &State, h: f64, when: f64) -> Span {
-        Span { h, when, supply_v: state.supply.limit, yielding: self.yielding }
+        let impacts = !self.integrator.is_second_order();
+        Span { h, when, supply_v: state.supply.limit, yielding: self.yielding, impacts }
     }
 
     /// J·v of all rows of joint j.

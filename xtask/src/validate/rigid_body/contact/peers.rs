@@ -22,7 +22,7 @@ fn measured() -> Outcome<Vec<Figure>> {
     let file = |name: &str| root().join(REFERENCE).join(name).display().to_string();
     let (model, gait) = (file("hexapod.xml"), file("gait_tripod.csv"));
     let script = root().join(SCRIPT).display().to_string();
-    let output = command(python, &[&script, &model, &gait]).output().map_err(|e| e.to_string())?;
+    let output = command(python, &[&script, &model, &gait]).output().map_err(|e| format!("{script}: {e}"))?;
     if !output.status.success() {
         let text = String::from_utf8_lossy(&output.stderr);
         return Err(format!("MuJoCo did not run: {}", text.trim().lines().last().unwrap_or("")));

@@ -64,15 +64,17 @@ pub fn print(quick: bool) {
     println!("{:016x}", plain(1, STEPS[usize::from(!quick)]));
 }
 
+/// This very program, also when cargo has put another one in its place since it started.
+const OWN_PROGRAM: &str = "/proc/self/exe";
+
 fn in_other_process(quick: bool) -> Outcome<u64> {
-    let program = std::env::current_exe().map_err(|e| e.to_string())?;
-    let mut command = std::process::Command::new(program);
+    let mut command = std::process::Command::new(OWN_PROGRAM);
     let output = command
         .arg("soil-hash")
         .args(quick.then_some("--quick"))
         .env("GLIBC_TUNABLES", WITHOUT)
         .output()
-        .map_err(|e| e.to_string())?;
+        .map_err(|e| format!("{OWN_PROGRAM}: {e}"))?;
     let text = String::from_utf8_lossy(&output.stdout);
     u64::from_str_radix(text.trim(), 16).map_err(|e| format!("`soil-hash` printed `{text}`: {e}"))
 }

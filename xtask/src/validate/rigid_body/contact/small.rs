@@ -69,7 +69,7 @@ fn slides(context: &Context) -> Outcome<Vec<Figure>> {
         Figure::new(
             format!("{id}_at_end"),
             error(x),
-            Limit::None,
+            Limit::AtMost(1e-4),
             "the same with x at the end of the step, half a step ahead (h/t = 5e-4)",
         ),
     ])

@@ -4,6 +4,7 @@
 
 use super::exchange::Exchange;
 use super::glue::Row;
+use super::linear::max_norm;
 use super::side::Answer;
 use crate::Result;
 use crate::host::Instance;
@@ -118,6 +119,17 @@ impl Exchange {
         self.report.evaluations_bodies += 1;
         self.timings.charge(Part::Bodies, start);
         Ok(())
+    }
+
+    /// What the wrenches of the last trials miss, F − T, into `miss`; returns its largest component, N and N m. The
+    /// report takes its ratio to the one `before` and its part of T_ref.
+    pub fn force_residual(&mut self, miss: &mut Vec<f64>, before: f64) -> f64 {
+        miss.clear();
+        miss.extend(self.f.iter().zip(&self.t).map(|(f, t)| f - t));
+        let size = max_norm(miss);
+        self.report.contraction = size / before;
+        self.report.residual = size / self.t_ref;
+        size
     }
 
     /// A trial of one side under f0 − z·X with one impedance per component.

@@ -9,7 +9,6 @@
 
 use super::exchange::Exchange;
 use super::iterative::Limits;
-use super::linear::max_norm;
 use super::{Needs, Outcome, Strategy};
 use crate::Result;
 use crate::host::Instance;
@@ -244,11 +243,7 @@ impl Strategy for Relaxed {
         for iteration in 0..self.limits.max_iterations {
             exchange.advance_half(false, instances)?;
             exchange.advance_second_under_motion(instances)?;
-            self.r.clear();
-            self.r.extend(exchange.f.iter().zip(&exchange.t).map(|(f, t)| f - t));
-            let before = std::mem::replace(&mut size, max_norm(&self.r));
-            exchange.report.contraction = size / before;
-            exchange.report.residual = size / exchange.t_ref;
+            size = exchange.force_residual(&mut self.r, size);
             if iteration == 0 {
                 at_start = size;
             }

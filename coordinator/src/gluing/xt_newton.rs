@@ -5,7 +5,7 @@
 
 use super::exchange::Exchange;
 use super::iterative::Limits;
-use super::linear::{Lu, max_norm, multiply_add};
+use super::linear::{Lu, multiply_add};
 use super::{Needs, Outcome, Strategy};
 use crate::Result;
 use crate::host::Instance;
@@ -72,11 +72,7 @@ impl Strategy for XtNewton {
         for _ in 0..=self.limits.max_iterations {
             exchange.advance_half(false, instances)?;
             exchange.advance_second_under_motion(instances)?;
-            self.d.clear();
-            self.d.extend(exchange.f.iter().zip(&exchange.t).map(|(f, t)| f - t));
-            let before = std::mem::replace(&mut size, max_norm(&self.d));
-            exchange.report.contraction = size / before;
-            exchange.report.residual = size / exchange.t_ref;
+            size = exchange.force_residual(&mut self.d, size);
             if size <= self.limits.threshold(exchange) {
                 exchange.report.converged = true;
                 return Ok(Outcome::Converged);

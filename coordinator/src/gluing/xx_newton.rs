@@ -6,7 +6,7 @@
 
 use super::exchange::Exchange;
 use super::iterative::Limits;
-use super::linear::{Lu, max_norm};
+use super::linear::Lu;
 use super::{Needs, Outcome, Strategy};
 use crate::Result;
 use crate::host::Instance;
@@ -55,11 +55,7 @@ impl Strategy for XxNewton {
         for _ in 0..=self.limits.max_iterations {
             exchange.advance_first_under_motion(instances)?;
             exchange.advance_second_under_motion(instances)?;
-            self.d.clear();
-            self.d.extend(exchange.f.iter().zip(&exchange.t).map(|(f2, f1)| f2 - f1));
-            let before = std::mem::replace(&mut size, max_norm(&self.d));
-            exchange.report.contraction = size / before;
-            exchange.report.residual = size / exchange.t_ref;
+            size = exchange.force_residual(&mut self.d, size);
             if size <= self.limits.threshold(exchange) {
                 exchange.report.converged = true;
                 return Ok(Outcome::Converged);

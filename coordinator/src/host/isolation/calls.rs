@@ -7,55 +7,32 @@ use terraglue_subsystem::{
     ValuesMut,
 };
 
-/// What can be asked of a worker.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-#[repr(u8)]
-pub enum Call {
-    Start = 1,
-    SetPorts,
-    Estimate,
-    Solve,
-    Advance,
-    Jacobian,
-    Commit,
-    Save,
-    Restore,
-    Serialize,
-    Deserialize,
-    Get,
-    Set,
-    Act,
-    NextEvent,
-    BodyStates,
-    Energy,
-    Quit,
+/// The calls, numbered from 1 in this order.
+macro_rules! calls {
+    ($first:ident, $($other:ident),+ $(,)?) => {
+        /// What can be asked of a worker.
+        #[derive(Clone, Copy, Debug, PartialEq, Eq)]
+        #[repr(u8)]
+        pub enum Call {
+            $first = 1,
+            $($other),+
+        }
+
+        impl Call {
+            const ALL: &[Self] = &[Self::$first, $(Self::$other),+];
+        }
+    };
+}
+
+calls! {
+    Start, SetPorts, Estimate, Solve, Advance, Jacobian, Commit, Save, Restore, Serialize, Deserialize, Get, Set, Act,
+    NextEvent, BodyStates, Energy, Quit,
 }
 
 impl Call {
     /// The call of this number.
     pub fn of(number: u8) -> Option<Self> {
-        use Call::*;
-        let all = [
-            Start,
-            SetPorts,
-            Estimate,
-            Solve,
-            Advance,
-            Jacobian,
-            Commit,
-            Save,
-            Restore,
-            Serialize,
-            Deserialize,
-            Get,
-            Set,
-            Act,
-            NextEvent,
-            BodyStates,
-            Energy,
-            Quit,
-        ];
-        all.into_iter().find(|c| *c as u8 == number)
+        Self::ALL.iter().copied().find(|c| *c as u8 == number)
     }
 }
 

@@ -1,5 +1,6 @@
 //! Folders of the workspace and child processes that must succeed.
 
+use serde_json::Value;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -53,4 +54,19 @@ pub fn read(path: &Path) -> Outcome<String> {
 pub fn write(path: &Path, text: &str) -> Outcome {
     let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
     made.and_then(|()| std::fs::write(path, text)).map_err(|e| format!("{}: {e}", path.display()))
+}
+
+/// Runs a scenario as a user does and reads `summary.json` from standard output; `name` stands in errors.
+pub fn run_scenario(
+    program: &Path,
+    name: &str,
+    scenario: &str,
+    out: &Path,
+    options: &[&str],
+) -> Outcome<Value> {
+    let out = out.display().to_string();
+    let mut child = command(program, &["run", scenario, "--json", "--out", &out]);
+    let output = child.args(options).output().map_err(|e| format!("{name}: {e}"))?;
+    serde_json::from_slice(&output.stdout)
+        .map_err(|_| format!("{name} gave no summary: {}", String::from_utf8_lossy(&output.stderr).trim()))
 }

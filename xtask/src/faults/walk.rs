@@ -1,6 +1,6 @@
 //! One run of the program, and the path of the body in it.
 
-use crate::process::{Outcome, command};
+use crate::process::{Outcome, run_scenario};
 use serde_json::Value;
 use std::path::PathBuf;
 
@@ -35,15 +35,8 @@ impl Walk {
     pub fn run(place: &Place, name: &str, scenario: &str, set: &[String]) -> Outcome<Self> {
         eprintln!("walk `{name}`: {scenario} {}", set.join(" "));
         let folder = place.folder.join(name);
-        let out = folder.display().to_string();
-        let mut child = command(&place.program, &["run", scenario, "--json", "--csv", "--out", &out]);
-        set.iter().for_each(|option| {
-            child.args(["--set", option]);
-        });
-        let output = child.output().map_err(|e| format!("{name}: {e}"))?;
-        let summary: Value = serde_json::from_slice(&output.stdout).map_err(|_| {
-            format!("{name} gave no summary: {}", String::from_utf8_lossy(&output.stderr).trim())
-        })?;
+        let options = set.iter().flat_map(|option| ["--set", option]).chain(["--csv"]);
+        let summary = run_scenario(&place.program, name, scenario, &folder, &options.collect::<Vec<_>>())?;
         if summary["status"] != "done" {
             return Err(format!("{name} ended early: {}", summary["error"]["message"]));
         }

@@ -2,7 +2,7 @@
 
 use super::timing::{calibration_s, median};
 use super::{Context, Figure, Limit};
-use crate::process::{Outcome, command};
+use crate::process::{Outcome, run_scenario};
 use serde_json::Value;
 use std::path::PathBuf;
 
@@ -130,12 +130,8 @@ impl Run<'_> {
 
     /// Runs and reads `summary.json` from standard output.
     fn summary(&self) -> Outcome<Value> {
-        let folder = self.folder().display().to_string();
-        let mut child = command(&self.context.program, &["run", SCENARIO, "--json", "--out", &folder]);
-        let output = child.args(&self.options).output().map_err(|e| format!("{}: {e}", self.name))?;
-        serde_json::from_slice(&output.stdout).map_err(|_| {
-            format!("{} gave no summary: {}", self.name, String::from_utf8_lossy(&output.stderr).trim())
-        })
+        let options: Vec<&str> = self.options.iter().map(String::as_str).collect();
+        run_scenario(&self.context.program, &self.name, SCENARIO, &self.folder(), &options)
     }
 
     fn recording(&self) -> Outcome<Vec<u8>> {

@@ -10,10 +10,12 @@ const LARGEST: f32 = 4e6;
 /// 2²³: adding it leaves the nearest whole number in the low bits.
 const WHOLE: f32 = 8_388_608.0;
 
-type Lanes<T> = [T; LANES];
+/// Numbers that are computed together.
+pub type Lanes<T> = [T; LANES];
 
+/// The numbers of a row from `at` on.
 #[inline(always)]
-fn lanes(row: &[i32], at: usize) -> Lanes<i32> {
+pub fn lanes(row: &[i32], at: usize) -> Lanes<i32> {
     let mut out = [0; LANES];
     out.copy_from_slice(&row[at..at + LANES]);
     out
@@ -42,45 +44,50 @@ fn face(along: Lanes<i32>, across: Lanes<i32>, thr: f32) -> Lanes<i32> {
     }
     let mut flux = [0; LANES];
     for k in 0..LANES {
-        let share = 1.0 - thr / squared[k].max(thr * thr).sqrt();
+        let steep = if squared[k] > thr * thr { squared[k] } else { thr * thr };
+        let share = 1.0 - thr / steep.sqrt();
         flux[k] = whole(0.25 * (along[k] as f32).abs() * share, along[k]);
     }
     flux
 }
 
-/// Fluxes from x to x + 1 for x = first … (whole groups of [`LANES`]), in the row `here`.
+/// Fluxes from x to x + 1 for x = first … end − 1 (whole groups), in the middle one of three rows.
 #[inline(always)]
-pub fn faces_along(rows: [&[i32]; 3], [first, end]: [usize; 2], thr: f32, out: &mut [i32]) {
-    let [below, here, above] = rows;
-    let mut x = first;
-    while x < end {
+pub fn faces_along([below, here, above]: [&[i32]; 3], [first, end]: [usize; 2], thr: f32, out: &mut [i32]) {
+    // slices of one length, so that it is checked once
+    let n = end - first;
+    let (h0, h1) = (&here[first..][..n], &here[first + 1..][..n]);
+    let (a0, a1) = (&above[first..][..n], &above[first + 1..][..n]);
+    let (b0, b1) = (&below[first..][..n], &below[first + 1..][..n]);
+    let out = &mut out[first..][..n];
+    for x in (0..n).step_by(LANES) {
+        let (h0, h1, a0, a1, b0, b1) =
+            (lanes(h0, x), lanes(h1, x), lanes(a0, x), lanes(a1, x), lanes(b0, x), lanes(b1, x));
         let (mut along, mut across) = ([0; LANES], [0; LANES]);
-        let (h0, h1) = (lanes(here, x), lanes(here, x + 1));
-        let (a0, a1, b0, b1) = (lanes(above, x), lanes(above, x + 1), lanes(below, x), lanes(below, x + 1));
         for k in 0..LANES {
             along[k] = h0[k].wrapping_sub(h1[k]);
             across[k] = a0[k].wrapping_sub(b0[k]).wrapping_add(a1[k].wrapping_sub(b1[k]));
         }
         out[x..x + LANES].copy_from_slice(&face(along, across, thr));
-        x += LANES;
     }
 }
 
-/// Fluxes from the row `here` to the row `above`.
+/// Fluxes at x = first … end − 1 (whole groups) from the row `here` to the row `above`.
 #[inline(always)]
-pub fn faces_across(here: &[i32], above: &[i32], [first, end]: [usize; 2], thr: f32, out: &mut [i32]) {
-    let mut x = first;
-    while x < end {
+pub fn faces_across([here, above]: [&[i32]; 2], [first, end]: [usize; 2], thr: f32, out: &mut [i32]) {
+    let n = end - first;
+    let (h, hl, hr) = (&here[first..][..n], &here[first - 1..][..n], &here[first + 1..][..n]);
+    let (a, al, ar) = (&above[first..][..n], &above[first - 1..][..n], &above[first + 1..][..n]);
+    let out = &mut out[first..][..n];
+    for x in (0..n).step_by(LANES) {
+        let (h, hl, hr) = (lanes(h, x), lanes(hl, x), lanes(hr, x));
+        let (a, al, ar) = (lanes(a, x), lanes(al, x), lanes(ar, x));
         let (mut along, mut across) = ([0; LANES], [0; LANES]);
-        let (h, a) = (lanes(here, x), lanes(above, x));
-        let (hl, hr, al, ar) =
-            (lanes(here, x - 1), lanes(here, x + 1), lanes(above, x - 1), lanes(above, x + 1));
         for k in 0..LANES {
             along[k] = h[k].wrapping_sub(a[k]);
             across[k] = hr[k].wrapping_sub(hl[k]).wrapping_add(ar[k].wrapping_sub(al[k]));
         }
         out[x..x + LANES].copy_from_slice(&face(along, across, thr));
-        x += LANES;
     }
 }
 
@@ -89,7 +96,8 @@ pub fn faces_across(here: &[i32], above: &[i32], [first, end]: [usize; 2], thr: 
 #[inline(always)]
 pub fn admit(flux: &mut [i32], from: &[i32], to: &[i32]) {
     for ((q, from), to) in flux.iter_mut().zip(from).zip(to) {
-        *q = (*q).clamp(-*from, *to);
+        // not `clamp`, whose check of its limits keeps compilers from vectors
+        *q = (*q).max(-*from).min(*to);
     }
 }
 
@@ -99,7 +107,7 @@ pub fn admit(flux: &mut [i32], from: &[i32], to: &[i32]) {
 pub fn admit_triples(flux: &mut [i32], middle: &[i32], ends: [&[i32]; 2]) {
     for (((q, m), a), b) in flux.iter_mut().zip(middle).zip(ends[0]).zip(ends[1]) {
         let least = (*a).min(*b).min(*m);
-        *q = (*q).clamp(-least, least);
+        *q = (*q).max(-least).min(least);
     }
 }
 
@@ -118,13 +126,13 @@ pub fn triples(
     while x < end {
         let m = lanes(middle, x);
         let (l, r) = (lanes(a, x.wrapping_add_signed(shift[0])), lanes(b, x.wrapping_add_signed(shift[1])));
-        let (mut curvature, mut most) = ([0; LANES], 0);
+        let (mut curvature, mut bent) = ([0; LANES], false);
         for k in 0..LANES {
             curvature[k] = l[k].wrapping_sub(m[k]).wrapping_add(r[k].wrapping_sub(m[k]));
-            most = most.max(curvature[k].wrapping_abs());
+            bent |= curvature[k].wrapping_abs() > limit;
         }
         let mut flux = [0; LANES];
-        if most > limit {
+        if bent {
             any = true;
             for k in 0..LANES {
                 let excess = curvature[k].wrapping_abs().wrapping_sub(limit).max(0);

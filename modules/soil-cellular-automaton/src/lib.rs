@@ -30,6 +30,7 @@ mod feet;
 mod kernel;
 mod regions;
 mod span;
+mod still;
 mod sweep;
 mod values;
 mod window;

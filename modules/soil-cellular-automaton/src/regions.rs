@@ -28,11 +28,7 @@ fn around_tile(lattice: &Lattice, set: &Marks, tile: u32) -> Rectangle {
 /// Adds a rectangle, swallowing those that come too near.
 fn add(mut new: Rectangle, gap: i32, out: &mut Vec<Rectangle>) {
     while let Some(k) = out.iter().position(|other| near(&new, other, gap)) {
-        let other = out.swap_remove(k);
-        for c in 0..2 {
-            new.first[c] = new.first[c].min(other.first[c]);
-            new.last[c] = new.last[c].max(other.last[c]);
-        }
+        new = new.hull(&out.swap_remove(k));
     }
     out.push(new);
 }

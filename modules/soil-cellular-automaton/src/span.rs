@@ -1,5 +1,7 @@
 //! Half-open ranges of columns, one per row of a window: where a rule has something to do.
 
+use crate::kernel::LANES;
+
 /// Columns lo … hi − 1; empty when lo ≥ hi.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Span {
@@ -23,6 +25,13 @@ impl Span {
     #[inline]
     pub fn len(self) -> usize {
         self.hi.saturating_sub(self.lo)
+    }
+
+    /// The groups of [`LANES`] columns that hold it. They begin at multiples of [`LANES`], so that what one group has
+    /// stored another loads whole.
+    #[inline]
+    pub fn whole_groups(self) -> Self {
+        Self { lo: self.lo - self.lo % LANES, hi: self.hi.next_multiple_of(LANES) }
     }
 
     /// Smallest span around both.

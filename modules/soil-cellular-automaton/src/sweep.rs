@@ -3,6 +3,7 @@
 use crate::active::{Marks, TileBits};
 use crate::feet::Feet;
 use crate::regions::rectangles;
+use crate::still::Still;
 use crate::window::{Limits, Rectangle, Window};
 use std::sync::{Arc, Mutex, PoisonError};
 use terraglue_ground::{Lattice, TILE_EDGE, UNIT_M};
@@ -98,11 +99,21 @@ impl pulp::NullaryFnOnce for Look<'_> {
     }
 }
 
-/// How far sweeps reach beyond the awake nodes: one node for repose, two more for curvature in every second one.
+/// How far beyond the awake nodes sweeps wake others: a change wakes nodes one away for repose and two away for
+/// curvature, which acts in every second sweep.
 fn reach(sweeps: u32, parity: u32) -> usize {
-    (0..sweeps).map(|k| if (parity + k).is_multiple_of(2) { 3 } else { 1 }).sum()
+    let (mut repose, mut curvature) = (0, 0);
+    for k in 0..sweeps {
+        (repose, curvature) = (repose + 1, curvature.max(repose + 2));
+        if (parity + k).is_multiple_of(2) {
+            (repose, curvature) = (curvature + 1, curvature + 2);
+        }
+    }
+    repose.max(curvature)
 }
 
+/// A limit of curvature beyond which the rule rests, units per triple: higher than any ground.
+const SHARPEST: f64 = 5e8;
 /// Windows that stand ready, and the side (nodes) up to which using one allocates nothing.
 const WINDOWS: usize = 16;
 const WINDOW_SIDE: usize = 128;
@@ -125,9 +136,10 @@ impl Sweeper {
 
     /// Sets the angle of repose (rad) and the largest curvature (1/m) on nodes `spacing` (m) apart.
     pub fn set_limits(&mut self, repose: f64, curvature_max: f64, spacing: f64) {
-        let curvature = (curvature_max * spacing * spacing / UNIT_M).min(5e8) as i32;
+        let straight = curvature_max * spacing * spacing / UNIT_M;
+        let curvature = (straight < SHARPEST).then_some([straight as i32, 2 * straight as i32]);
         let repose = (spacing * libm::tan(repose) / UNIT_M) as f32;
-        self.limits = Limits { repose, curvature: [curvature, 2 * curvature] };
+        self.limits = Limits { repose, curvature };
     }
 
     /// Whether all sleep.
@@ -150,21 +162,15 @@ impl Sweeper {
         self.changed.clear();
     }
 
-    /// Wakes every node that one of the rules would move. Level ground is skipped.
+    /// Wakes every node that one of the rules would move: looks where bounds leave it open.
     pub fn scan(&mut self, ground: &Ground) {
-        let lattice = *ground.heights.lattice();
-        let [nx, ny] = lattice.tiles();
+        let [nx, ny] = ground.heights.lattice().tiles();
+        let still = Still::new(ground, &self.feet.list);
         let mut window = Window::default();
         for b in (0..ny).step_by(BLOCK_TILES as usize) {
             for a in (0..nx).step_by(BLOCK_TILES as usize) {
-                if level(ground, a, b) {
-                    continue;
-                }
-                let last = |k: u32, n: u32| ((k + BLOCK_TILES) * TILE_EDGE).min(n) as i32 - 1;
-                let area = Rectangle {
-                    first: [(a * TILE_EDGE) as i32, (b * TILE_EDGE) as i32],
-                    last: [last(a, lattice.size[0]), last(b, lattice.size[1])],
-                };
+                let end = [(a + BLOCK_TILES).min(nx), (b + BLOCK_TILES).min(ny)];
+                let Some(area) = still.restless([a, b], end, &self.limits) else { continue };
                 window.fill(ground, &self.feet.list, area, 2);
                 window.wake_all();
                 pulp::Arch::new().dispatch(Look { window: &mut window, limits: &self.limits });
@@ -284,14 +290,4 @@ fn inside(bits: u32, first: i32, area: &Rectangle) -> u32 {
     let low = (area.first[0] - first).clamp(0, 31) as u32;
     let high = (area.last[0] - first).clamp(0, 31) as u32;
     bits & (u32::MAX << low) & (u32::MAX >> (31 - high))
-}
-
-/// Whether a block of tiles and those around it have one height.
-fn level(ground: &Ground, a: u32, b: u32) -> bool {
-    let lattice = ground.heights.lattice();
-    let [nx, ny] = lattice.tiles();
-    let near = |k: u32, n: u32| k.saturating_sub(1)..=(k + BLOCK_TILES).min(n - 1);
-    let height = |a: u32, b: u32| ground.heights.tile((b * nx + a) as usize).err();
-    let first = height(a, b);
-    first.is_some() && near(b, ny).all(|b| near(a, nx).all(|a| height(a, b) == first))
 }

@@ -22,8 +22,8 @@ const WORK_ROWS: usize = 13;
 pub struct Limits {
     /// Δ·tan φ_r.
     pub repose: f32,
-    /// κ_max·d² for straight and diagonal triples.
-    pub curvature: [i32; 2],
+    /// κ_max·d² for straight and diagonal triples; `None`: nothing is too sharp.
+    pub curvature: Option<[i32; 2]>,
 }
 
 /// Nodes first … last of the lattice along x and y.
@@ -33,6 +33,16 @@ pub struct Rectangle {
     pub first: [i32; 2],
     /// Largest indices.
     pub last: [i32; 2],
+}
+
+impl Rectangle {
+    /// Smallest rectangle around both.
+    pub fn hull(&self, other: &Self) -> Self {
+        Self {
+            first: [0, 1].map(|k| self.first[k].min(other.first[k])),
+            last: [0, 1].map(|k| self.last[k].max(other.last[k])),
+        }
+    }
 }
 
 /// A foot's node inside the window.
@@ -70,6 +80,8 @@ pub struct Window {
     pub curvature: Vec<Span>,
     next: Vec<Span>,
     dirty: Vec<Span>,
+    /// What the last pass has changed, per row.
+    changed: Vec<Span>,
     /// Rows of fluxes and changes.
     work: Vec<Vec<i32>>,
     /// Nodes visited since the window was filled.
@@ -92,6 +104,7 @@ impl Window {
             curvature: spans(),
             next: spans(),
             dirty: spans(),
+            changed: spans(),
             work: (0..WORK_ROWS).map(|_| Vec::with_capacity(stride)).collect(),
             ..Self::default()
         }
@@ -116,7 +129,8 @@ impl Window {
     fn reset(&mut self) {
         let (rows, nodes) = (self.height, self.stride * self.height);
         self.levels.resize(nodes.max(self.levels.len()), 0);
-        for spans in [&mut self.repose, &mut self.curvature, &mut self.next, &mut self.dirty] {
+        let passes = [&mut self.repose, &mut self.curvature, &mut self.next, &mut self.changed];
+        for spans in passes.into_iter().chain([&mut self.dirty]) {
             spans.clear();
             spans.resize(rows, Span::NONE);
         }
@@ -286,7 +300,10 @@ impl Window {
         let rows = self.rows.unwrap_or(Span::NONE);
         let mut work = std::mem::take(&mut self.work);
         let [along, lower, upper, change, waiting] = &mut work[..5] else { return 0 };
+        let (mut lower, mut upper) = (lower.as_mut_slice(), upper.as_mut_slice());
+        let (mut change, mut waiting) = (change.as_mut_slice(), waiting.as_mut_slice());
         self.next.fill(Span::NONE);
+        self.changed.fill(Span::NONE);
         let (mut before, mut pending, mut largest) = (Span::NONE, Span::NONE, 0);
         for y in rows.lo..rows.hi {
             let span = self.repose[y];
@@ -295,28 +312,28 @@ impl Window {
                     // the row below did not need all of these faces
                     self.across(y - 1, span, limits.repose, lower);
                 }
-                self.along(y, span, limits.repose, along);
                 self.visited += span.len() as u64;
             }
-            // the row below is not read any more
-            largest = largest.max(self.finish(y.wrapping_sub(1), pending, waiting, apply));
             let next = if y + 1 < rows.hi { self.repose[y + 1] } else { Span::NONE };
             let faces = span.hull(next);
             if !faces.is_empty() {
                 self.across(y, faces, limits.repose, upper);
             }
             if !span.is_empty() {
-                sum_faces(span, along, lower, upper, change);
+                self.along(y, span, limits.repose, along);
+                sum_faces(span, along, [lower, upper], change);
             }
+            // the row below is not read any more
+            largest = largest.max(self.finish(y.wrapping_sub(1), pending, waiting, apply));
             pending = span;
             before = faces;
-            std::mem::swap(change, waiting);
-            std::mem::swap(lower, upper);
+            std::mem::swap(&mut change, &mut waiting);
+            std::mem::swap(&mut lower, &mut upper);
         }
         largest = largest.max(self.finish(rows.hi.wrapping_sub(1), pending, waiting, apply));
         self.work = work;
-        std::mem::swap(&mut self.repose, &mut self.next);
         self.after_pass(apply);
+        std::mem::swap(&mut self.repose, &mut self.next);
         largest
     }
 
@@ -325,80 +342,74 @@ impl Window {
         &self.levels[y * self.stride..(y + 1) * self.stride]
     }
 
-    /// Fluxes over the faces along row y on either side of the nodes of `span`.
     #[inline(always)]
-    fn along(&self, y: usize, span: Span, thr: f32, out: &mut [i32]) {
-        let range = [span.lo - 1, span.hi];
-        faces_along([self.row(y - 1), self.row(y), self.row(y + 1)], range, thr, out);
-        if self.limited[y] {
-            let inlets = &self.inlets[y * self.stride..(y + 1) * self.stride];
-            admit(
-                &mut out[range[0]..range[1]],
-                &inlets[range[0]..range[1]],
-                &inlets[range[0] + 1..=range[1]],
-            );
-        }
+    fn row_inlets(&self, y: usize) -> &[i32] {
+        &self.inlets[y * self.stride..(y + 1) * self.stride]
     }
 
     /// Fluxes from row y to row y + 1.
     #[inline(always)]
     fn across(&self, y: usize, span: Span, thr: f32, out: &mut [i32]) {
-        faces_across(self.row(y), self.row(y + 1), [span.lo, span.hi], thr, out);
+        let Span { lo, hi } = span.whole_groups();
+        faces_across([self.row(y), self.row(y + 1)], [lo, hi], thr, out);
         if self.limited[y] || self.limited[y + 1] {
-            let at = |y: usize| &self.inlets[y * self.stride + span.lo..y * self.stride + span.hi];
-            admit(&mut out[span.lo..span.hi], at(y), at(y + 1));
+            admit(&mut out[lo..hi], &self.row_inlets(y)[lo..hi], &self.row_inlets(y + 1)[lo..hi]);
         }
     }
 
-    /// Adds the changes of row y, notes them and wakes what they reach. Returns the largest.
+    /// Fluxes along row y over the faces on either side of the nodes of `span`.
     #[inline(always)]
-    fn finish(&mut self, y: usize, span: Span, change: &mut [i32], apply: bool) -> i32 {
+    fn along(&self, y: usize, span: Span, thr: f32, out: &mut [i32]) {
+        let Span { lo, hi } = Span { lo: span.lo - 1, hi: span.hi }.whole_groups();
+        faces_along([self.row(y - 1), self.row(y), self.row(y + 1)], [lo, hi], thr, out);
+        if self.limited[y] {
+            let inlets = self.row_inlets(y);
+            admit(&mut out[lo..hi], &inlets[lo..hi], &inlets[lo + 1..=hi]);
+        }
+    }
+
+    /// Adds the changes of row y and notes where they are. Returns the largest.
+    #[inline(always)]
+    fn finish(&mut self, y: usize, span: Span, change: &[i32], apply: bool) -> i32 {
         if span.is_empty() {
             return 0;
         }
-        let mut largest = 0;
-        let end = span.lo + span.len().next_multiple_of(LANES);
-        change[span.hi..end].fill(0);
-        let row = &mut self.levels[y * self.stride..(y + 1) * self.stride];
-        let mut changed = Span::NONE;
-        for x in (span.lo..end).step_by(LANES) {
-            let group = &change[x..x + LANES];
-            let mut most = 0;
-            for change in group {
-                most = most.max(change.wrapping_abs());
-            }
-            if most != 0 {
-                changed = changed.hull(Span { lo: x, hi: x + LANES });
-                largest = largest.max(most);
-                if apply {
-                    for (level, change) in row[x..x + LANES].iter_mut().zip(group) {
-                        *level = level.wrapping_add(*change);
-                    }
-                }
+        let change = &change[span.lo..span.hi];
+        let largest = change.iter().fold(0, |most, change| most.max(change.wrapping_abs()));
+        if largest == 0 {
+            return 0;
+        }
+        if apply {
+            let row = &mut self.levels[y * self.stride..(y + 1) * self.stride];
+            for (level, change) in row[span.lo..span.hi].iter_mut().zip(change) {
+                *level = level.wrapping_add(*change);
             }
         }
-        if !changed.is_empty() {
-            self.note(y, trimmed(changed, span, change));
-        }
+        let first = change.iter().position(|c| *c != 0).unwrap_or(0);
+        let last = change.iter().rposition(|c| *c != 0).unwrap_or(0);
+        self.changed[y] = Span { lo: span.lo + first, hi: span.lo + last + 1 };
         largest
     }
 
-    /// Row y has changed in `span`.
+    /// Wakes what the changes of the pass reach.
     #[inline(always)]
-    fn note(&mut self, y: usize, span: Span) {
+    fn wake_around(&mut self) {
         let (columns, rows) = (self.columns.unwrap_or(Span::NONE), self.rows.unwrap_or(Span::NONE));
-        self.dirty[y] = self.dirty[y].hull(span);
-        let near = span.grown(1, columns);
-        for row in (y - 1).max(rows.lo)..(y + 2).min(rows.hi) {
-            self.next[row] = self.next[row].hull(near);
-        }
-        let far = span.grown(2, columns);
-        for row in (y - 2).max(rows.lo)..(y + 3).min(rows.hi) {
-            self.curvature[row] = self.curvature[row].hull(far);
+        for y in rows.lo..rows.hi {
+            let near = self.changed[y - 1].hull(self.changed[y]).hull(self.changed[y + 1]);
+            let far = near.hull(self.changed[y - 2]).hull(self.changed[y + 2]);
+            if far.is_empty() {
+                continue;
+            }
+            self.dirty[y] = self.dirty[y].hull(self.changed[y]);
+            self.next[y] = self.next[y].hull(near.grown(1, columns));
+            self.curvature[y] = self.curvature[y].hull(far.grown(2, columns));
         }
     }
 
+    #[inline(always)]
     fn after_pass(&mut self, apply: bool) {
+        self.wake_around();
         if apply {
             self.repeat_borders();
             for node in &mut self.below {
@@ -416,12 +427,17 @@ impl Window {
     /// Applies the rule of curvature once; otherwise as [`Window::repose_pass`].
     #[inline(always)]
     pub fn curvature_pass(&mut self, limits: &Limits, apply: bool) -> i32 {
+        let Some(limits) = limits.curvature else {
+            self.curvature.fill(Span::NONE);
+            return 0;
+        };
         let rows = self.rows.unwrap_or(Span::NONE);
         let mut work = std::mem::take(&mut self.work);
         let mut visit = std::mem::take(&mut self.next);
         std::mem::swap(&mut visit, &mut self.curvature);
         self.curvature.resize(visit.len(), Span::NONE);
         self.curvature.fill(Span::NONE);
+        self.changed.fill(Span::NONE);
         // what was awake for the rule of repose stays so
         self.next = std::mem::take(&mut self.repose);
         let mut largest = 0;
@@ -451,18 +467,17 @@ impl Window {
             }
         }
         self.work = work;
+        self.after_pass(apply);
         std::mem::swap(&mut self.repose, &mut self.next);
         self.next = visit;
-        self.after_pass(apply);
         largest
     }
 
     /// The four directions of triples with their middle in row y. Returns whether any gives or takes.
     #[inline(always)]
-    fn middles(&self, y: usize, span: Span, limits: &Limits, out: &mut [Vec<i32>]) -> bool {
+    fn middles(&self, y: usize, span: Span, [straight, diagonal]: [i32; 2], out: &mut [Vec<i32>]) -> bool {
         let [below, here, above] = [self.row(y - 1), self.row(y), self.row(y + 1)];
         let range = [span.lo - 1, span.hi + 1];
-        let [straight, diagonal] = limits.curvature;
         let cases = [
             ([here, here, here], [-1, 1], straight, [0, 0]),
             ([below, here, above], [0, 0], straight, [-1, 1]),
@@ -517,23 +532,10 @@ impl Window {
     }
 }
 
-/// Change of each node of `span` from the fluxes over its four faces.
-#[inline(always)]
-fn sum_faces(span: Span, along: &[i32], lower: &[i32], upper: &[i32], change: &mut [i32]) {
-    for x in (span.lo..span.hi).step_by(LANES) {
-        let (left, right) = (&along[x - 1..x - 1 + LANES], &along[x..x + LANES]);
-        let (lower, upper) = (&lower[x..x + LANES], &upper[x..x + LANES]);
-        let out = &mut change[x..x + LANES];
-        for k in 0..LANES {
-            out[k] = left[k].wrapping_sub(right[k]).wrapping_add(lower[k].wrapping_sub(upper[k]));
-        }
-    }
-}
-
 /// Change of each node of row y from the triples that hold it; fluxes of middles in row r lie in `fluxes[4·(r % 3)]` ….
 #[inline(always)]
 fn sum_triples(span: Span, y: usize, any: [bool; 3], fluxes: &[Vec<i32>], change: &mut [i32]) {
-    change[span.lo..span.lo + span.len().next_multiple_of(LANES)].fill(0);
+    change[span.lo..span.hi].fill(0);
     let rows = [y - 1, y, y + 1].map(|r| r % 3);
     let [lower, here, upper] = rows.map(|r| &fluxes[4 * r..4 * r + 4]);
     let n = span.len();
@@ -569,15 +571,12 @@ fn take_ends(change: &mut [i32], span: Span, fluxes: &[Vec<i32>], shift: [isize;
     }
 }
 
-/// The part of `changed` inside `span` without zeros at its ends.
+/// Change of each node of `span` from the fluxes over its four faces.
 #[inline(always)]
-fn trimmed(changed: Span, span: Span, change: &[i32]) -> Span {
-    let (mut lo, mut hi) = (changed.lo, changed.hi.min(span.hi));
-    while lo < hi && change[lo] == 0 {
-        lo += 1;
+fn sum_faces(Span { lo, hi }: Span, along: &[i32], [lower, upper]: [&[i32]; 2], change: &mut [i32]) {
+    let (left, right) = (&along[lo - 1..hi - 1], &along[lo..hi]);
+    let (lower, upper, change) = (&lower[lo..hi], &upper[lo..hi], &mut change[lo..hi]);
+    for k in 0..change.len() {
+        change[k] = left[k].wrapping_sub(right[k]).wrapping_add(lower[k].wrapping_sub(upper[k]));
     }
-    while hi > lo && change[hi - 1] == 0 {
-        hi -= 1;
-    }
-    Span { lo, hi }
 }

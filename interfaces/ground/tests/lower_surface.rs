@@ -176,3 +176,31 @@ proptest! {
         }
     }
 }
+
+/// A vertical line that just grazes the widest circle of a rolling wheel: what rounding makes of both ends of an interval
+/// without length must not lie below the wheel.
+#[test]
+fn lines_that_graze_a_wheel_do_not_enter_it_below_its_lowest_point() {
+    let (radius, half_length) = (0.092, 0.0535);
+    let wheel = Geometry::Cylinder { half_length, radius };
+    let mut grazed = 0;
+    for k in 0..20_000 {
+        let turn = 0.5 * (1e-3 * f64::from(k) + std::f64::consts::FRAC_PI_2);
+        let (s, c) =
+            (libm::sin(0.5 * std::f64::consts::FRAC_PI_2), libm::cos(0.5 * std::f64::consts::FRAC_PI_2));
+        // lying along y, then turned about y
+        let orientation =
+            [c * libm::cos(turn), s * libm::cos(turn), c * libm::sin(turn), -s * libm::sin(turn)];
+        let position = [-0.5 + 1e-5 * f64::from(k), 0.0013, 0.0717];
+        let placed = Placed::new(&wheel, &Pose { position, orientation });
+        for x in [position[0] + radius, position[0] - radius] {
+            for y in [-0.05, 0.0, 0.02, 0.05] {
+                if let Some(z) = placed.lower(x, y) {
+                    grazed += 1;
+                    assert!(z >= placed.aabb().min[2] - 1e-9, "{k} {x} {y}: {z}");
+                }
+            }
+        }
+    }
+    assert!(grazed > 1000, "{grazed}");
+}

@@ -105,7 +105,9 @@ fn endless_cylinder(start: [f64; 3], up: [f64; 3], radius: f64) -> Interval {
     if q == 0.0 {
         return Interval { low: 0.0, high: 0.0 };
     }
-    let (one, other) = (q / a, c / q);
+    // a line that grazes the cylinder has nothing but rounding in c and q
+    let one = q / a;
+    let other = (c / q).clamp(-one.abs(), one.abs());
     Interval { low: one.min(other), high: one.max(other) }
 }
 

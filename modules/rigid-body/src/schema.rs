@@ -85,6 +85,8 @@ pub(crate) fn schema() -> Schema {
             by_name("stiffness", "N m/rad", 600.0, "Stiffness of position motors, for all joints or by name"),
             by_name("damping", "N m s/rad", 10.0, "Damping of position motors, for all joints or by name"),
             by_name("max_torque", "N m", 60.0, "Largest torque of the motors, for all joints or by name"),
+            target_by_name("velocity_target", "rad/s", "Rate that the motors want at the start, for all joints or by name"),
+            target_by_name("torque_target", "N m", "Torque that torque motors give at the start, for all joints or by name"),
             Parameter::of("ground", ParameterType::Text, "Rigid ground under the robot: no soil is needed")
                 .or("none")
                 .choices(&["none", "half-space"]),
@@ -108,6 +110,10 @@ pub(crate) fn schema() -> Schema {
         .chain(crate::actuator::configure::parameters())
         .collect(),
     }
+}
+
+fn target_by_name(name: &str, unit: &str, help: &str) -> Parameter {
+    Parameter { unit: unit.into(), ..Parameter::of(name, ParameterType::NumberByName, help).or(0.0) }
 }
 
 fn by_name(name: &str, unit: &str, default: f64, help: &str) -> Parameter {

@@ -35,7 +35,7 @@ enum Command {
         #[arg(long)]
         check: bool,
     },
-    /// Draw the pictures of docs/ that are computed: docs/images/automaton_crater.svg.
+    /// Draw the pictures of docs/ that are computed: docs/images/automaton_crater.svg and wheel_pressure.svg.
     Pictures,
     /// Print a hash of the automaton's state after a fixed run: `validate soil` runs this in another environment.
     #[command(hide = true)]
@@ -63,7 +63,7 @@ fn main() -> ExitCode {
         Command::Validate(arguments) => validate::validate(&arguments),
         Command::Faults => faults::write_page(),
         Command::Header { check } => header::run(check),
-        Command::Pictures => validate::write_soil_picture(),
+        Command::Pictures => validate::write_soil_pictures(),
         Command::SoilHash { quick } => {
             validate::print_soil_hash(quick);
             Ok(())

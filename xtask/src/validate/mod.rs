@@ -15,7 +15,7 @@ mod timing;
 mod walk;
 
 pub use figure::{Figure, Limit};
-pub use soil::{print_hash as print_soil_hash, write_picture as write_soil_picture};
+pub use soil::{print_hash as print_soil_hash, write_pictures as write_soil_pictures};
 
 use crate::process::{Outcome, cargo, must, program, root};
 use known::KnownFailures;

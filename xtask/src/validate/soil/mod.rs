@@ -2,17 +2,20 @@
 
 mod automaton;
 mod fit;
+mod panel;
 mod plates;
 mod real_wheel;
 #[path = "../../../../interfaces/soil-contact/tests/support/mod.rs"]
 mod rig;
+mod rig_scenario;
 mod rows;
 mod stick;
+mod wheel_picture;
 mod wheel_rig;
 mod wheels;
 mod wong_reece;
 
-pub use automaton::{print_hash, write_picture};
+pub use automaton::print_hash;
 
 use super::{Context, Figure};
 use crate::process::Outcome;
@@ -25,8 +28,15 @@ use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
 type Part = fn(&Context) -> Outcome<Vec<Figure>>;
 
 /// The parts, in the order of the table.
-const PARTS: [Part; 6] =
-    [automaton::figures, plates::figures, fit::figures, wheels::figures, stick::figures, wong_reece::figures];
+const PARTS: [Part; 7] = [
+    automaton::figures,
+    plates::figures,
+    fit::figures,
+    wheels::figures,
+    rig_scenario::figures,
+    stick::figures,
+    wong_reece::figures,
+];
 
 /// All figures of the area.
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
@@ -35,6 +45,11 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
         all.extend(part(context)?);
     }
     Ok(all)
+}
+
+/// Draws the pictures of docs/images.
+pub fn write_pictures() -> Outcome {
+    automaton::write_picture().and_then(|()| wheel_picture::write_picture())
 }
 
 /// Both soils: name in the figures and how an instance is made.

@@ -133,11 +133,12 @@ fn solve(mut m: [[f64; 7]; 6]) -> Numbers {
     x
 }
 
-/// The numbers as a module's configuration: the sand of the plates, its rim smoother than the sand is rough.
+/// The numbers as a module's configuration: the sand of the plates, its rim smoother than the sand is rough. The integral
+/// that was calibrated knows no material that moves.
 fn config(x: &Numbers) -> String {
     format!(
         r#"{{"n":{},"k_c":0.0,"k_phi":{},"c_pa":1000.0,"phi_rad":0.506145483078,"K_m":{},"density_kg_m3":1330.0,
-            "interface_c_pa":{},"interface_phi_rad":{},"slip_sinkage":"ding","slip_sinkage_n1":{}}}"#,
+            "interface_c_pa":{},"interface_phi_rad":{},"slip_sinkage":"ding","slip_sinkage_n1":{},"compacted_fraction":1.0}}"#,
         x[1],
         x[0].exp(),
         x[5].exp(),

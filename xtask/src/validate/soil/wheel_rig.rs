@@ -1,6 +1,7 @@
 //! A single-wheel test bench: a rigid wheel with prescribed slip, free to sink under its load, on level soil.
 
 use super::rig::Shown;
+use std::borrow::BorrowMut;
 use terraglue_ground::{Placed, nodes_below};
 use terraglue_subsystem::{
     Geometry, Hold, Input, Law, Motion, Node, Port, PortKind, Pose, Response, Step, Subsystem, component,
@@ -12,13 +13,14 @@ const STRIDE: f64 = 5e-4;
 const MARGIN: f64 = 5e-3;
 
 /// The bench.
-pub struct Bench {
-    soil: Box<dyn Subsystem>,
+pub struct Bench<S = Box<dyn Subsystem>> {
+    /// The soil.
+    pub soil: S,
     radius: f64,
     width: f64,
     load: f64,
     /// Position of the axle, x and z, m.
-    axle: [f64; 2],
+    pub axle: [f64; 2],
     index: u64,
     nodes: Vec<Node>,
 }
@@ -34,9 +36,9 @@ pub struct Reading {
     pub torque: f64,
 }
 
-impl Bench {
+impl<S: BorrowMut<dyn Subsystem>> Bench<S> {
     /// A wheel of `[radius, width]` (m) under `load` (N), touching the soil at x = `start` (m).
-    pub fn new(soil: Box<dyn Subsystem>, [radius, width]: [f64; 2], load: f64, start: f64) -> Self {
+    pub fn new(soil: S, [radius, width]: [f64; 2], load: f64, start: f64) -> Self {
         Self { soil, radius, width, load, axle: [start, radius], index: 0, nodes: Vec::new() }
     }
 
@@ -75,17 +77,18 @@ impl Bench {
         };
         let mut answer = Answer::default();
         let mut laws = [port.law];
-        self.soil.set_ports(&step, &mut laws, &mut answer.response()).expect("ports are taken");
+        self.soil.borrow_mut().set_ports(&step, &mut laws, &mut answer.response()).expect("ports are taken");
         let mut x = [0.0, ahead - rim, 0.0, 0.0, 0.0, rim / self.radius];
         let t = [self.load, 0.0, 0.0, 0.0, 0.0, 0.0];
         let motion = Some(Motion { x: &x, v: &[0.0; 6] });
         self.soil
+            .borrow_mut()
             .advance(&step, &Input::Force { t: &t, hold: Hold::End, motion }, &mut answer.response())
             .expect("the soil carries the load");
         x[0] = answer.x[0];
         let wrench = answer.t;
         let v = x.map(|x| x / h);
-        self.soil.commit(&step, &wrench, &Motion { x: &x, v: &v }).expect("the motion is taken");
+        self.soil.borrow_mut().commit(&step, &wrench, &Motion { x: &x, v: &v }).expect("the motion is taken");
         self.nodes = nodes;
         self.axle = [self.axle[0] + ahead, self.axle[1] + x[0]];
         self.index += 1;
@@ -100,7 +103,7 @@ impl Bench {
         let geometry = Geometry::Cylinder { half_length: 0.5 * self.width, radius: self.radius };
         let placed = Placed::new(&geometry, &Pose { position, orientation: lying });
         self.nodes.clear();
-        nodes_below(&placed, &Shown::new(&*self.soil), MARGIN, &mut self.nodes);
+        nodes_below(&placed, &Shown::new(self.soil.borrow()), MARGIN, &mut self.nodes);
         Port {
             key: 7,
             kind: PortKind::Contact as u32,

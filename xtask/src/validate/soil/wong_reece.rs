@@ -83,6 +83,21 @@ impl Wheel {
         State { load: area * sum.load, pull: area * sum.pull, torque: area * self.radius * sum.torque, ..sum }
     }
 
+    /// Normal and shear stress at the angle `theta` of a wheel sunk by h (m) at the slip `s`, without a shifted peak, Pa.
+    pub fn stresses(&self, h: f64, slip: f64, theta: f64) -> [f64; 2] {
+        let front = (1.0 - h / self.radius).acos();
+        let height = |angle: f64| self.radius * (theta.cos() - angle.cos()).max(0.0);
+        let largest = self.modulus * h.powf(self.n);
+        let sigma = if theta >= 0.0 {
+            self.modulus * height(front).powf(self.n)
+        } else {
+            (largest - self.unloading * self.radius * (1.0 - theta.cos())).max(0.0)
+        };
+        let j = self.radius * (front - theta - (1.0 - slip) * (front.sin() - theta.sin()));
+        let mobilised = if sigma > 0.0 { 1.0 - (-j / self.shear).exp() } else { 0.0 };
+        [sigma, (self.cohesion + sigma * self.friction) * mobilised]
+    }
+
     /// Adds the integrals between `end`, where the stress vanishes, and `middle`; `stress` is the normal one.
     fn add(
         &self,

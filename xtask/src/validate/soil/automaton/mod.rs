@@ -12,6 +12,7 @@ mod machine;
 mod mass;
 mod picture;
 
+pub use feet::Soil;
 pub use hash::print as print_hash;
 pub use picture::write_picture;
 
@@ -33,4 +34,11 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
         all.extend(cost::figures(context)?);
     }
     Ok(all)
+}
+
+/// The automaton itself on level ground.
+pub fn automaton_on(config: &str, size: u32, spacing: f64) -> Soil {
+    let terrain = field::Function { size: [size; 2], spacing, height: |_, _| 0.0 };
+    let machine = std::sync::Arc::new(machine::Machine::new(Box::new(terrain), 1));
+    feet::instance::<terraglue_soil_cellular_automaton::SoilCellularAutomaton>(config, machine)
 }

@@ -63,7 +63,8 @@ impl CheckFile {
     }
 }
 
-fn json(value: &toml_edit::Value) -> Option<Value> {
+/// A value of TOML as JSON; None: a date.
+pub fn json(value: &toml_edit::Value) -> Option<Value> {
     Some(match value {
         toml_edit::Value::String(s) => Value::from(s.value().as_str()),
         toml_edit::Value::Integer(i) => Value::from(*i.value()),

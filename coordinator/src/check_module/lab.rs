@@ -152,6 +152,17 @@ impl Lab {
         schema.parameters.iter().find(needed).map(|p| p.name.clone())
     }
 
+    /// Skips a test that a module in Python cannot be put to, with what that costs.
+    ///
+    /// # Errors
+    /// The skip.
+    pub fn needs_a_library(&self, cost: &str) -> Verdict {
+        if crate::host::is_python(&self.path) {
+            return Err(Stop::Skip(format!("a module in Python runs in a process of its own: {cost}")));
+        }
+        Ok(())
+    }
+
     /// Kind of the module, from its description of itself; None: it cannot be loaded.
     pub fn kind(&self) -> Option<Kind> {
         LoadedModule::load(&self.path).ok().map(|m| m.schema().kind)

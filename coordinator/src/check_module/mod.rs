@@ -20,6 +20,8 @@ mod report;
 mod rig;
 mod supervisor;
 
+pub(crate) use check_file::json;
+
 pub use catalogue::{Area, Level, Test, catalogue};
 pub use elsewhere::{Errand, run_errand};
 pub use finding::{Finding, Outcome, Stop, Verdict};
@@ -59,6 +61,9 @@ pub fn module_file(path: &Path) -> Result<std::path::PathBuf, String> {
         };
     }
     let is_module = |p: &Path| {
+        if crate::host::describes_module(p) {
+            return true;
+        }
         let name = p.file_name().and_then(|n| n.to_str()).unwrap_or_default();
         name.starts_with(std::env::consts::DLL_PREFIX)
             && name.ends_with(&format!("_plugin{}", std::env::consts::DLL_SUFFIX))
@@ -68,8 +73,10 @@ pub fn module_file(path: &Path) -> Result<std::path::PathBuf, String> {
     match (found.pop(), found.is_empty()) {
         (Some(one), true) => Ok(one),
         (Some(_), false) => Err(format!("{} holds several modules; name one", path.display())),
-        (None, _) => {
-            Err(format!("{} holds no module (lib…_plugin{})", path.display(), std::env::consts::DLL_SUFFIX))
-        }
+        (None, _) => Err(format!(
+            "{} holds no module (lib…_plugin{}, or a file in Python)",
+            path.display(),
+            std::env::consts::DLL_SUFFIX
+        )),
     }
 }

@@ -4,7 +4,8 @@
 use super::elf::{Description, foreign_machine, is_elf, needed_length};
 use super::error::LoadError;
 use super::isolation::{self, Isolation, What};
-use super::search::{SearchPath, file_name, is_path};
+use super::python::{self, PythonFile};
+use super::search::{SearchPath, file_name, is_path, python_name};
 use super::{HostServices, Instance};
 use libloading::os::unix::{Library as Handle, RTLD_LOCAL, RTLD_NOW, Symbol};
 use std::error::Error as _;
@@ -20,6 +21,14 @@ type Instantiate = fn(&Config, Arc<dyn Host>) -> Result<Box<dyn Subsystem>>;
 enum Origin {
     Builtin(Instantiate),
     Foreign(Arc<ForeignModule>, PathBuf),
+    Python(PythonSource),
+}
+
+/// A module in Python and who runs it.
+#[derive(Clone)]
+struct PythonSource {
+    path: PathBuf,
+    interpreter: PathBuf,
 }
 
 /// A module that is ready to make instances.
@@ -36,10 +45,18 @@ impl LoadedModule {
     }
 
     /// Loads a library. Checked in this order: it is a library; its section, where it has one, names our ABI; the
-    /// system loads it; it has the entry; its table can be used; it describes itself.
+    /// system loads it; it has the entry; its table can be used; it describes itself. Of a file in Python only the
+    /// description is read.
     pub fn load(path: &Path) -> std::result::Result<Self, LoadError> {
         let path = path.to_path_buf();
         inspect(&path)?;
+        if python::is_python(&path) {
+            let file = PythonFile::read(&path)?;
+            log::info!("module {} from {}", file.schema.name, path.display());
+            let interpreter = python::interpreter(None, Path::new("."));
+            let source = PythonSource { path, interpreter };
+            return Ok(Self { schema: Arc::new(file.schema), origin: Origin::Python(source) });
+        }
         let table = entry(&path)?;
         // SAFETY: the symbol is the entry of a Terraglue module, whose contract is terraglue.h; the library is
         // never unloaded.
@@ -54,8 +71,8 @@ impl LoadedModule {
     /// The foreign module; None: linked into the program.
     pub(super) fn foreign(&self) -> Option<&ForeignModule> {
         match &self.origin {
-            Origin::Builtin(_) => None,
             Origin::Foreign(module, _) => Some(module),
+            Origin::Builtin(_) | Origin::Python(_) => None,
         }
     }
 
@@ -69,7 +86,21 @@ impl LoadedModule {
         match &self.origin {
             Origin::Builtin(_) => None,
             Origin::Foreign(_, path) => Some(path),
+            Origin::Python(source) => Some(&source.path),
         }
+    }
+
+    /// Whether it is a file in Python, which lives in a process of its own.
+    pub fn is_python(&self) -> bool {
+        matches!(self.origin, Origin::Python(_))
+    }
+
+    /// The same run by this interpreter, where it is in Python.
+    pub(crate) fn run_by(mut self, interpreter: PathBuf) -> Self {
+        if let Origin::Python(source) = &mut self.origin {
+            source.interpreter = interpreter;
+        }
+        self
     }
 
     /// Makes an instance; what the configuration leaves out gets the default of the schema.
@@ -79,6 +110,9 @@ impl LoadedModule {
         config: Config,
         services: &HostServices,
     ) -> std::result::Result<Instance, LoadError> {
+        if self.is_python() {
+            return self.instantiate_isolated(instance_name, config, services, Isolation::default());
+        }
         let config = config.with_defaults(&self.schema);
         let made = self.make(&config, services.for_instance(instance_name));
         self.supervised(instance_name, made)
@@ -90,6 +124,10 @@ impl LoadedModule {
             Origin::Builtin(instantiate) => instantiate(config, host),
             Origin::Foreign(module, _) => {
                 module.instantiate(config, host).map(|s| Box::new(s) as Box<dyn Subsystem>)
+            }
+            Origin::Python(source) => {
+                let text = format!("{} is run in a process of its own", source.path.display());
+                Err(Failure::Refused(text))
             }
         }
     }
@@ -109,7 +147,13 @@ impl LoadedModule {
             Some(path) => {
                 let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
                 let config = serde_json::from_str(&config.to_json()).unwrap_or_default();
-                isolation::start(What::Module { path, config }, &host, services, isolation)
+                let what = match &self.origin {
+                    Origin::Python(source) => {
+                        What::Python { path, config, python: source.interpreter.clone() }
+                    }
+                    _ => What::Module { path, config },
+                };
+                isolation::start(what, &host, services, isolation)
             }
         };
         self.supervised(instance_name, made)
@@ -141,6 +185,9 @@ fn inspect(path: &Path) -> std::result::Result<(), LoadError> {
     let path_buf = || path.to_path_buf();
     if !path.is_file() {
         return Err(LoadError::MissingFile { path: path_buf() });
+    }
+    if python::is_python(path) {
+        return PythonFile::read(path).map(drop);
     }
     let bytes = std::fs::read(path)
         .map_err(|e| LoadError::NotALibrary { path: path_buf(), reason: e.to_string() })?;
@@ -212,7 +259,7 @@ impl Library {
         self
     }
 
-    /// The module that a scenario names. A value with `/` or ending in `.so` is a path relative to `folder`, the
+    /// The module that a scenario names. A value with `/` or ending in `.so` or `.py` is a path relative to `folder`, the
     /// scenario's; any other is a name: soil-bekker is the file libsoil_bekker_plugin.so on the search path.
     pub fn find(
         &self,
@@ -242,7 +289,7 @@ impl Library {
             .max_by(|a, b| a.0.total_cmp(&b.0));
         LoadError::Unknown {
             name: name.into(),
-            file: file_name(name),
+            file: format!("{} or {}", file_name(name), python_name(name)),
             looked: search.folders().to_vec(),
             nearest: near.map(|(_, n)| n),
         }
@@ -282,11 +329,19 @@ pub fn listed_modules(search: &SearchPath) -> Vec<ListedModule> {
     let listed = |(name, path): &(String, PathBuf)| ListedModule {
         name: name.clone(),
         path: path.clone(),
-        description: Description::read(path),
+        description: described(path),
         refused: inspect(path).err(),
         hidden_by: first(name).filter(|f| f != path),
     };
     every.iter().map(listed).collect()
+}
+
+/// What a file says about itself, without running it.
+pub fn described(path: &Path) -> Option<Description> {
+    if python::is_python(path) {
+        return PythonFile::read(path).ok().map(|f| f.description);
+    }
+    Description::read(path)
 }
 
 /// All modules on the search path, by name. Each is loaded to ask for its schema.

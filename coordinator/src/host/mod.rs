@@ -14,6 +14,7 @@ pub mod isolation;
 mod library;
 mod probe;
 mod process;
+mod python;
 mod search;
 mod services;
 #[cfg(test)]
@@ -25,9 +26,12 @@ pub use elf::{Description, exported_symbols};
 pub use error::LoadError;
 pub use instance::{Instance, Progress, Reply};
 pub use isolation::Isolation;
-pub use library::{AvailableModule, Library, ListedModule, LoadedModule, available_modules, listed_modules};
+pub use library::{
+    AvailableModule, Library, ListedModule, LoadedModule, available_modules, described, listed_modules,
+};
 pub use probe::{TableFacts, probe_odd_calls, table_of};
 pub use process::{Process, adopt_locale, has_locale, heap_in_use};
+pub(crate) use python::{describes_module, interpreter, is_python};
 pub use search::SearchPath;
 pub use services::{HostServices, LogSink, Partings, instance_seed};
 pub use workers::Workers;

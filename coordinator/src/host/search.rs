@@ -1,5 +1,6 @@
 //! Where modules are looked for.
 
+use super::python;
 use std::path::{Path, PathBuf};
 
 /// Folders in the order in which they are searched.
@@ -47,8 +48,11 @@ impl SearchPath {
 
     /// The first file of a module of this name.
     pub(super) fn locate(&self, name: &str) -> Option<PathBuf> {
-        let file = file_name(name);
-        self.folders.iter().map(|f| f.join(&file)).find(|p| p.is_file())
+        let [library, source] = [file_name(name), python_name(name)];
+        self.folders.iter().find_map(|f| {
+            let found = Some(f.join(&library)).filter(|p| p.is_file());
+            found.or_else(|| Some(f.join(&source)).filter(|p| python::describes_module(p)))
+        })
     }
 
     /// All modules that can be found, by name; the first of each name as `locate` would find it.
@@ -64,6 +68,12 @@ impl SearchPath {
         for entry in self.folders.iter().filter_map(|f| std::fs::read_dir(f).ok()).flatten().flatten() {
             if let Some(name) = entry.file_name().to_str().and_then(module_name) {
                 found.push((name, entry.path()));
+            }
+            let path = entry.path();
+            if let Some(stem) = path.file_stem().and_then(|s| s.to_str())
+                && python::describes_module(&path)
+            {
+                found.push((stem.replace('_', "-"), path));
             }
         }
         // Stable: the order of the search stays among files of one name.
@@ -82,6 +92,11 @@ pub(super) fn file_name(module: &str) -> String {
     )
 }
 
+/// `my-soil` → `my_soil.py`.
+pub(super) fn python_name(module: &str) -> String {
+    format!("{}.py", module.replace('-', "_"))
+}
+
 /// `libsoil_bekker_plugin.so` → `soil-bekker`; None: not the file of a module.
 fn module_name(file: &str) -> Option<String> {
     let stem = file.strip_prefix(std::env::consts::DLL_PREFIX)?.strip_suffix(std::env::consts::DLL_SUFFIX)?;
@@ -90,7 +105,7 @@ fn module_name(file: &str) -> Option<String> {
 
 /// Whether the value of `module` is a path.
 pub(super) fn is_path(module: &str) -> bool {
-    module.contains('/') || module.ends_with(std::env::consts::DLL_SUFFIX)
+    module.contains('/') || module.ends_with(std::env::consts::DLL_SUFFIX) || module.ends_with(".py")
 }
 
 fn user_folder() -> Option<PathBuf> {

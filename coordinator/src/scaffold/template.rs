@@ -24,6 +24,8 @@ pub enum Language {
     C,
     /// C++17.
     Cpp,
+    /// Python 3.8 or later.
+    Python,
     /// Text in a scenario.
     Scenario,
 }
@@ -69,7 +71,7 @@ impl Kind {
 
 impl Language {
     /// All.
-    pub const ALL: [Self; 4] = [Self::Rust, Self::C, Self::Cpp, Self::Scenario];
+    pub const ALL: [Self; 5] = [Self::Rust, Self::C, Self::Cpp, Self::Python, Self::Scenario];
 
     /// As people write it.
     pub fn title(self) -> &'static str {
@@ -77,6 +79,7 @@ impl Language {
             Self::Rust => "Rust",
             Self::C => "C",
             Self::Cpp => "C++",
+            Self::Python => "Python",
             Self::Scenario => "a scenario",
         }
     }
@@ -87,6 +90,7 @@ impl Language {
             Self::Rust => "rust",
             Self::C => "c",
             Self::Cpp => "cpp",
+            Self::Python => "python",
             Self::Scenario => "scenario",
         }
     }
@@ -105,6 +109,18 @@ const MAKEFILE: File =
 const BALL: File = ("ball.urdf", "the body that falls on it", include_str!("templates/ball.urdf.in"));
 const CLASS: File = ("terraglue.hpp", "a thin class over it", include_str!("templates/terraglue.hpp.in"));
 const ARM: File = ("arm.urdf", "the arm that it moves", include_str!("templates/arm.urdf.in"));
+const PYTHON: [File; 2] = [
+    (
+        "terraglue.py",
+        "what a module in Python is made of; the program brings its own copy",
+        crate::host::isolation::SDK,
+    ),
+    (
+        "test_my_module.py",
+        "puts the module through the checker (`python3 -m pytest`)",
+        include_str!("templates/check.py.in"),
+    ),
+];
 const RUST: [File; 2] = [
     ("Cargo.toml", "build file", include_str!("templates/Cargo.toml.in")),
     (
@@ -125,6 +141,13 @@ fn source(kind: Kind, language: Language) -> Option<File> {
         (Kind::Soil, Language::Rust) => ("src/lib.rs", "the soil", include_str!("templates/soil.rs.in")),
         (Kind::Soil, Language::C) => ("my_module.c", "the soil", include_str!("templates/soil.c.in")),
         (Kind::Soil, Language::Cpp) => ("my_module.cpp", "the soil", include_str!("templates/soil.cpp.in")),
+        (Kind::Soil, Language::Python) => ("my_module.py", "the soil", include_str!("templates/soil.py.in")),
+        (Kind::Robot, Language::Python) => {
+            ("my_module.py", "the robot", include_str!("templates/robot.py.in"))
+        }
+        (Kind::Controller, Language::Python) => {
+            ("my_module.py", "the controller", include_str!("templates/controller.py.in"))
+        }
         (Kind::Robot, Language::Rust) => ("src/lib.rs", "the robot", include_str!("templates/robot.rs.in")),
         (Kind::Robot, Language::C) => ("my_module.c", "the robot", include_str!("templates/robot.c.in")),
         (Kind::Robot, Language::Cpp) => {
@@ -179,6 +202,7 @@ pub(super) fn fill(
         Language::Rust => files.extend(RUST),
         Language::C => files.extend([HEADER, MAKEFILE]),
         Language::Cpp => files.extend([HEADER, CLASS, MAKEFILE]),
+        Language::Python => files.extend(PYTHON),
         Language::Scenario => {}
     }
     files.extend(scenario(kind));
@@ -192,7 +216,8 @@ pub(super) fn fill(
     let (build, module) = match language {
         Language::Rust => ("cargo build", format!("./target/debug/{library}")),
         Language::C | Language::Cpp => ("make", format!("./{library}")),
-        Language::Scenario => ("terraglue check scenario.toml", String::new()),
+        Language::Python => ("@terraglue@ check scenario.toml", format!("./{snake}.py")),
+        Language::Scenario => ("@terraglue@ check scenario.toml", String::new()),
     };
     let listing: Vec<_> = files.iter().map(|(path, what, _)| format!("| `{path}` | {what} |")).collect();
     let (flags, compile) = match language {
@@ -213,6 +238,10 @@ pub(super) fn fill(
         ("@table@", kind.word().into()),
         ("@language@", language.title().into()),
         ("@interfaces@", interfaces),
+        (
+            "@first@",
+            if language == Language::Python { "See whether all names fit" } else { "Build it" }.into(),
+        ),
         ("@build@", build.into()),
         ("@module@", module),
         ("@terraglue@", place.program.clone()),
@@ -227,7 +256,7 @@ pub(super) fn fill(
     let mut out: Vec<(String, String)> =
         files.iter().map(|(path, _, text)| (replaced(path), replaced(text))).collect();
     out.extend(lock_file(language, place));
-    let build = build.replace("terraglue", &place.program);
+    let build = build.replace("@terraglue@", &place.program);
     Ok(Scaffold { files: out, commands: [build, format!("{} run scenario.toml", place.program)] })
 }
 

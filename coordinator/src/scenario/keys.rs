@@ -333,7 +333,8 @@ fn event() -> Table {
 /// Keys of the host in the table of a subsystem; everything else there is a parameter of the module.
 pub fn subsystem_keys() -> Vec<Key> {
     let multiple = "steps of the testbed per step of this subsystem";
-    let module = "a module's name, or the path of a shared library relative to the scenario";
+    let module = "a module's name, or the path of a library or of a file in Python relative to the scenario";
+    let python = "interpreter of a module in Python; by default $VIRTUAL_ENV/bin/python, else python3";
     let unit = "a functional mock-up unit instead of a module; other keys are its start values, `on_nan`, `event_mode`, `rollback`";
     let row = "a row of the soil table, or a soil file (.toml), whose numbers are offered to the module";
     vec![
@@ -347,11 +348,16 @@ pub fn subsystem_keys() -> Vec<Key> {
         )
         .or(false)
         .into(),
-        number("load_timeout_s", "s", 60.0, "longest time to load it, where isolated").positive().into(),
-        number("step_timeout_s", "s", 30.0, "longest time of one call, where isolated").positive().into(),
-        number("memory_mb", "", 8192.0, "most memory of its process in MiB, where isolated")
+        number("load_timeout_s", "s", 60.0, "longest time to load it, where isolated or in Python")
             .positive()
             .into(),
+        number("step_timeout_s", "s", 30.0, "longest time of one call, where isolated or in Python")
+            .positive()
+            .into(),
+        number("memory_mb", "", 8192.0, "most memory of its process in MiB, where isolated or in Python")
+            .positive()
+            .into(),
+        Parameter::of("python", ParameterType::Text, python).optional().into(),
         Parameter::of("parameters", ParameterType::Text, row).optional().into(),
         Parameter::of("parameters_file", ParameterType::Path, "soil table other than `models/soils.csv`")
             .optional()

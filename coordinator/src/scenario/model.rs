@@ -189,8 +189,12 @@ pub struct SubsystemSpec {
     pub module: String,
     /// Steps of the testbed per step of the subsystem.
     pub step_multiple: u32,
-    /// In a process of its own, with these limits.
-    pub isolation: Option<Isolation>,
+    /// Whether it lives in a process of its own by `isolate = true`; what is in Python always does.
+    pub isolate: bool,
+    /// Limits of that process.
+    pub isolation: Isolation,
+    /// `python`: the interpreter of a module in Python, as written.
+    pub python: Option<String>,
     /// All parameters, nested tables as objects: the host's keys are taken out.
     pub parameters: Map<String, Value>,
     /// Numbers of a named soil row that are offered to the module, not demanded of it.

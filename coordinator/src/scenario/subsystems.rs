@@ -54,24 +54,25 @@ fn one(source: &Source, name: &str, node: &Node) -> Result<SubsystemSpec, Box<In
     Ok(SubsystemSpec {
         name: name.into(),
         step_multiple: node.get("step_multiple").and_then(|n| n.to_json().as_u64()).unwrap_or(1) as u32,
+        isolate: node.get("isolate").is_some_and(|n| n.to_json().as_bool() == Some(true)),
         isolation: isolation(node),
+        python: text(node, "python"),
         parameters: parameters(node, &module, is_host_key),
         offered: soil_row::offered(source, name, node, &module)?,
         module,
     })
 }
 
-/// Whether and how it is kept in a process of its own.
-fn isolation(node: &Node) -> Option<Isolation> {
+/// How it is kept in a process of its own.
+fn isolation(node: &Node) -> Isolation {
     let number =
         |key: &str, otherwise: f64| node.get(key).and_then(|n| n.to_json().as_f64()).unwrap_or(otherwise);
     let usual = Isolation::default();
-    let wanted = node.get("isolate").is_some_and(|n| n.to_json().as_bool() == Some(true));
-    wanted.then(|| Isolation {
+    Isolation {
         load_timeout_s: number("load_timeout_s", usual.load_timeout_s),
         step_timeout_s: number("step_timeout_s", usual.step_timeout_s),
         memory_bytes: (number("memory_mb", (usual.memory_bytes >> 20) as f64) as u64) << 20,
-    })
+    }
 }
 
 /// The path of a unit as it was written; the file must exist and be named `….fmu`.

@@ -5,7 +5,9 @@ use crate::contact::{BodySide, ContactDetector, GroundSide};
 use crate::gluing::glue::Recipe;
 use crate::gluing::{self, Exchange, Glue, StepReport};
 use crate::host::isolation::{self, What};
-use crate::host::{HostServices, Instance, Library, LoadError, LoadedModule, SearchPath, Workers};
+use crate::host::{
+    HostServices, Instance, Library, LoadError, LoadedModule, SearchPath, Workers, interpreter,
+};
 use crate::scenario::{self, GlueSpec, InputError, Scenario, SubsystemSpec};
 use crate::signals::{self, Directory, TimeLine};
 use crate::timing::Timings;
@@ -104,9 +106,10 @@ fn instantiate(
         }
         let module: LoadedModule = library.find(&spec.module, &search, &scenario.folder).map_err(wrong)?;
         let config = scenario::check_parameters(module.schema(), spec, &scenario.source)?;
-        let made = match spec.isolation {
-            Some(isolation) => module.instantiate_isolated(&spec.name, config, services, isolation),
-            None => module.instantiate(&spec.name, config, services),
+        let module = module.run_by(interpreter(spec.python.as_deref(), &scenario.folder));
+        let made = match spec.isolate || module.is_python() {
+            true => module.instantiate_isolated(&spec.name, config, services, spec.isolation),
+            false => module.instantiate(&spec.name, config, services),
         };
         instances.push(made.map_err(wrong)?);
     }
@@ -118,16 +121,16 @@ fn unit(scenario: &Scenario, spec: &SubsystemSpec, services: &HostServices) -> R
     let path = scenario.folder.join(&spec.module);
     let host = services.for_instance(&spec.name);
     let once = || terraglue_fmi::Fmu::inspect(&path).is_ok_and(|(d, _)| d.capabilities.once_per_process);
-    let made: terraglue_subsystem::Result<Box<dyn Subsystem>> = match spec.isolation {
+    let made: terraglue_subsystem::Result<Box<dyn Subsystem>> = match spec.isolate {
         // One instance per process is all that such a unit stands.
-        None if !once() => crate::fmu::FmuSubsystem::new(&path, &spec.parameters, host)
+        false if !once() => crate::fmu::FmuSubsystem::new(&path, &spec.parameters, host)
             .map(|u| Box::new(u.with_partings(services.partings.clone())) as _),
-        isolation => {
+        _ => {
             let what = What::Unit {
                 path: std::path::absolute(&path).unwrap_or_else(|_| path.clone()),
                 parameters: spec.parameters.clone(),
             };
-            isolation::start(what, &host, services, isolation.unwrap_or_default())
+            isolation::start(what, &host, services, spec.isolation)
         }
     };
     let made = made.map_err(|e| -> Error {

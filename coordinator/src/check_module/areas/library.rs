@@ -3,7 +3,7 @@
 use crate::check_module::catalogue::{Area, Level, Test};
 use crate::check_module::finding::{Stop, Verdict};
 use crate::check_module::lab::Lab;
-use crate::host::{Description, LoadedModule, exported_symbols, table_of};
+use crate::host::{LoadedModule, described, exported_symbols, table_of};
 use terraglue_plugin::abi::{TG_ABI_MAJOR, TG_ABI_MINOR, TgSubsystem};
 use terraglue_subsystem::{Parameter, ParameterType, unit::Unit};
 
@@ -46,6 +46,7 @@ fn loads(lab: &Lab) -> Verdict {
 }
 
 fn exports(lab: &Lab) -> Verdict {
+    lab.needs_a_library("it has no symbols that could clash, nothing is lost")?;
     let bytes = std::fs::read(&lab.path).unwrap_or_default();
     let Some(names) = exported_symbols(&bytes) else {
         return Err(Stop::Skip("its symbol table cannot be read: names that clash are not found".into()));
@@ -64,6 +65,7 @@ fn exports(lab: &Lab) -> Verdict {
 }
 
 fn handshake(lab: &Lab) -> Verdict {
+    lab.needs_a_library("the program brings its side of the table, nothing is lost")?;
     let table = table_of(&lab.path)
         .map_err(|e| Stop::fail("terraglue_subsystem", "no arguments", e.to_string(), "a table"))?;
     let whole = size_of::<TgSubsystem>() as u32;
@@ -90,7 +92,7 @@ fn handshake(lab: &Lab) -> Verdict {
 }
 
 fn description(lab: &Lab) -> Verdict {
-    let Some(section) = Description::read(&lab.path) else {
+    let Some(section) = described(&lab.path) else {
         return Err(Stop::fail(
             "loading",
             "the section .terraglue",
@@ -99,6 +101,9 @@ fn description(lab: &Lab) -> Verdict {
         ));
     };
     let module = lab.module()?;
+    if module.is_python() {
+        return named_as_its_file(lab, &section.name);
+    }
     let (named, own) = (section.name.trim_end_matches("-plugin"), &module.schema().name);
     if named != own {
         let got = format!("the section names `{}`, the schema `{own}`", section.name);
@@ -107,7 +112,7 @@ fn description(lab: &Lab) -> Verdict {
     let table =
         table_of(&lab.path).map_err(|e| Stop::fail("terraglue_subsystem", "", e.to_string(), "a table"))?;
     match table.description {
-        Some(text) if Description::parse(&text).as_ref() == Some(&section) => Ok(()),
+        Some(text) if crate::host::Description::parse(&text).as_ref() == Some(&section) => Ok(()),
         Some(_) => {
             let got = "the text of the table is not that of the section";
             Err(Stop::fail(
@@ -122,6 +127,16 @@ fn description(lab: &Lab) -> Verdict {
             Err(Stop::fail("terraglue_subsystem", "the table", got, ".description = tg_description"))
         }
     }
+}
+
+/// A scenario that names a module in Python finds it by its file.
+fn named_as_its_file(lab: &Lab, name: &str) -> Verdict {
+    let stem = lab.path.file_stem().and_then(|s| s.to_str()).unwrap_or_default();
+    if name.replace('-', "_") == stem {
+        return Ok(());
+    }
+    let got = format!("the docstring names `{name}`, the file is {stem}.py");
+    Err(Stop::fail("loading", "the docstring", got, "the same name, with `_` for `-` in that of the file"))
 }
 
 fn schema(lab: &Lab) -> Verdict {

@@ -48,8 +48,12 @@ pub fn tests() -> Vec<Test> {
     ]
 }
 
+/// What is not known of a module in Python.
+const MEMORY: &str = "its memory is not watched";
+
 /// The same way again and again: nothing new appears after the first two rounds.
 fn no_allocation(lab: &Lab) -> Verdict {
+    lab.needs_a_library(MEMORY)?;
     let module = lab.module()?;
     let Some(counter) = AllocationCounter::new(&lab.path) else {
         return Err(Stop::Skip("its calls of malloc cannot be counted on this platform".into()));
@@ -74,6 +78,7 @@ fn no_allocation(lab: &Lab) -> Verdict {
 }
 
 fn leak_steps(lab: &Lab) -> Verdict {
+    lab.needs_a_library(MEMORY)?;
     let mut runner = Runner::new(lab.instance()?)?;
     let start = runner.place();
     let round = || {
@@ -95,6 +100,7 @@ fn leak_steps(lab: &Lab) -> Verdict {
 }
 
 fn leak_instances(lab: &Lab) -> Verdict {
+    lab.needs_a_library(MEMORY)?;
     let module = lab.module()?;
     let round = || {
         for _ in 0..40 {

@@ -167,6 +167,14 @@ pub fn parent() -> i32 {
     unsafe { libc::getppid() }
 }
 
+/// Asks a worker in Python to write down where it stands.
+pub fn ask(worker: u32) {
+    if worker > 1 {
+        // SAFETY: a plain system call; the process is a child that was not waited for yet.
+        unsafe { libc::kill(worker as i32, libc::SIGUSR1) };
+    }
+}
+
 /// Ends a whole group of processes at once.
 pub fn end_group(leader: u32) {
     if leader > 1 {

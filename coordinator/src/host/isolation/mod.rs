@@ -1,18 +1,20 @@
 //! `isolate = true`: an instance in a process of its own, so that a crash, a hang or `exit()` is an error of that
 //! subsystem and never the end of the run.
 //!
-//! The worker is this program again, in a process group of its own with a limit of memory and a temporary folder of
-//! its own. Calls and answers cross through a shared segment; both sides sleep in between. What a worker leaves behind,
+//! The worker is this program again, or for a module in Python the user's interpreter, in a process group of its own with
+//! a limit of memory and a temporary folder of its own. Calls and answers cross through a shared segment; both sides sleep in between. What a worker leaves behind,
 //! processes and files, goes with it.
 
 mod calls;
 mod channel;
 mod proxy;
+mod python;
 mod tiles;
 mod wire;
 mod worker;
 
 pub use channel::end_group;
+pub use python::SDK;
 pub use worker::serve;
 
 use super::{HostServices, Partings};
@@ -61,6 +63,15 @@ pub(crate) enum What {
         /// Checked parameters.
         config: Value,
     },
+    /// A module in Python with its configuration.
+    Python {
+        /// File.
+        path: PathBuf,
+        /// Checked parameters.
+        config: Value,
+        /// Interpreter.
+        python: PathBuf,
+    },
 }
 
 /// All that a worker is told at the start, beside the terrain.
@@ -86,7 +97,7 @@ pub(crate) fn start(
     services: &HostServices,
     isolation: Isolation,
 ) -> Result<Box<dyn Subsystem>> {
-    let link = Link::new(host.clone(), services, isolation)?;
+    let link = Link::new(&what, host.clone(), services, isolation)?;
     let start = Start {
         what,
         name: host.name().to_owned(),
@@ -115,29 +126,36 @@ struct Link {
     partings: Partings,
     /// Why nothing can be asked any more.
     gone: Option<String>,
+    is_python: bool,
     // After the child, whose files it holds.
-    _folder: tempfile::TempDir,
+    folder: tempfile::TempDir,
 }
 
 impl Link {
-    fn new(host: Arc<dyn Host>, services: &HostServices, isolation: Isolation) -> Result<Self> {
+    fn new(what: &What, host: Arc<dyn Host>, services: &HostServices, isolation: Isolation) -> Result<Self> {
         use std::os::unix::process::CommandExt;
         let failed = |what: &str, e: &dyn std::fmt::Display| Error::Failed(format!("isolation: {what}: {e}"));
         let segment = Segment::new().map_err(|e| failed("no shared memory", &e))?;
         let folder = tempfile::Builder::new().prefix("terraglue-worker-").tempdir();
         let folder = folder.map_err(|e| failed("no temporary folder", &e))?;
-        let program = program()?;
-        let child = Command::new(&program)
-            .args(["worker", &segment.path()])
-            .env("TMPDIR", folder.path())
-            .stdin(Stdio::null())
-            .stdout(Stdio::null())
-            .stderr(Stdio::null())
-            .process_group(0)
-            .spawn()
-            .map_err(|e| failed(&program.display().to_string(), &e))?;
+        let python = python::command(what, folder.path(), &segment.path());
+        let python = python.map_err(|e| failed("no files for a worker", &e))?;
+        let is_python = python.is_some();
+        let mut command = match python {
+            Some(command) => command,
+            None => {
+                let mut command = Command::new(program()?);
+                command.args(["worker", &segment.path()]).stdin(Stdio::null()).stderr(Stdio::null());
+                command
+            }
+        };
+        command.env("TMPDIR", folder.path()).stdout(Stdio::null()).process_group(0);
+        let child = command.spawn().map_err(|e| match what {
+            What::Python { python, .. } => Error::Refused(python::not_started(python, &e)),
+            _ => failed(&command.get_program().to_string_lossy(), &e),
+        })?;
         let (cancel, partings) = (services.cancel.clone(), services.partings.clone());
-        Ok(Self { segment, child, isolation, host, cancel, partings, gone: None, _folder: folder })
+        Ok(Self { segment, child, isolation, host, cancel, partings, gone: None, is_python, folder })
     }
 
     /// One call: `write` fills the request after its number, `read` takes the answer after its status.
@@ -190,7 +208,11 @@ impl Link {
             }
             if Instant::now() >= end {
                 let key = if call == calls::Call::Start { "load_timeout_s" } else { "step_timeout_s" };
-                return Err(self.lose(format!("it did not answer within {limit_s} s ({key}) and was ended")));
+                let why = format!("it did not answer within {limit_s} s ({key}) and was ended");
+                if self.is_python {
+                    python::ask_where(self.child.id(), self.folder.path());
+                }
+                return Err(self.lose(why));
             }
         }
     }
@@ -200,7 +222,8 @@ impl Link {
     fn lose(&mut self, why: String) -> Error {
         channel::end_group(self.child.id());
         drop(self.child.wait());
-        let why = format!("its process was lost: {why}");
+        let said = if self.is_python { python::last_words(self.folder.path()) } else { String::new() };
+        let why = format!("its process was lost: {why}{said}");
         self.gone = Some(why.clone());
         Error::Fatal(why)
     }

@@ -169,6 +169,9 @@ impl Worker {
                 let config = Config::parse(&config.to_string())?;
                 module.make(&config, host)?
             }
+            What::Python { path, .. } => {
+                return Err(Error::Refused(format!("{} is served by an interpreter", path.display())));
+            }
         });
         Ok(())
     }

@@ -195,7 +195,9 @@ pub fn scenario(strategy: &str) -> Scenario {
          \"{strategy}\"\n\n[robot]\nmodule = \"rigid-body\"\n\n[soil]\nmodule = \"soil-bekker\"\n"
     );
     let part = |name: &str, module: &str| SubsystemSpec {
-        isolation: None,
+        isolate: false,
+        isolation: Default::default(),
+        python: None,
         name: name.into(),
         module: module.into(),
         step_multiple: 1,

@@ -1,5 +1,6 @@
 //! Figures of the plugin interface: the checker, its broken modules, its time, and what it says of our own modules.
 
+mod python;
 mod speed;
 
 use super::{Context, Figure, Limit};
@@ -26,6 +27,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     seeds(context, &mut out)?;
     if context.timing {
         speed::figures(&mut out)?;
+        python::figures(context, &mut out)?;
     }
     Ok(out)
 }

@@ -1,0 +1,65 @@
+//! The worker of a module in Python: the user's interpreter, which runs the files that this program brings.
+
+use super::What;
+use std::fs::File;
+use std::io;
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// What stands beside a worker, by file name: what modules derive from, what is read and written, the loop.
+const FILES: [(&str, &str); 3] = [
+    ("terraglue.py", SDK),
+    ("terraglue_wire.py", include_str!("../../../../interfaces/plugin/python/terraglue_wire.py")),
+    ("terraglue_worker.py", include_str!("../../../../interfaces/plugin/python/terraglue_worker.py")),
+];
+
+/// What a module in Python derives from.
+pub const SDK: &str = include_str!("../../../../interfaces/plugin/python/terraglue.py");
+
+/// Ahead of everything else on the path stand the files of this program; the working folder does not stand there.
+const RUN: &str = "import sys; sys.path[:] = [sys.argv[1]] + [p for p in sys.path if p]; \
+                   import terraglue_worker; terraglue_worker.serve(sys.argv[2])";
+
+/// File with what the interpreter itself says: faults, and where a module hangs.
+const DIARY: &str = "stderr.txt";
+
+/// The command that serves the segment; None: this is no module in Python.
+pub fn command(what: &What, folder: &Path, segment: &str) -> io::Result<Option<Command>> {
+    let What::Python { python, .. } = what else { return Ok(None) };
+    for (name, text) in FILES {
+        std::fs::write(folder.join(name), text)?;
+    }
+    let mut command = Command::new(python);
+    // Compiled copies would be left beside the user's files.
+    command.arg("-B").args(["-c", RUN]).arg(folder).arg(segment);
+    command.stdin(Stdio::piped()).stderr(File::create(folder.join(DIARY))?);
+    Ok(Some(command))
+}
+
+/// Asks a worker that does not answer where it stands, and gives it a moment to write that down.
+pub fn ask_where(child: u32, folder: &Path) {
+    super::channel::ask(child);
+    let end = Instant::now() + Duration::from_millis(500);
+    while Instant::now() < end && !last_words(folder).contains("File ") {
+        std::thread::sleep(Duration::from_millis(10));
+    }
+}
+
+/// The end of what the interpreter said on its own.
+pub fn last_words(folder: &Path) -> String {
+    let text = std::fs::read(folder.join(DIARY)).unwrap_or_default();
+    let text = String::from_utf8_lossy(&text);
+    let own = |line: &&str| {
+        FILES.iter().all(|(name, _)| !line.contains(name)) && !line.contains("File \"<string>\"")
+    };
+    let lines: Vec<&str> = text.lines().filter(|l| !l.trim().is_empty()).filter(own).collect();
+    let from = lines.len().saturating_sub(12);
+    lines[from..].iter().map(|l| format!("\n{l}")).collect()
+}
+
+/// Why an interpreter does not start, and the way out.
+pub fn not_started(python: &Path, error: &io::Error) -> String {
+    let way = "set `python` in the table of the subsystem to the interpreter that has your packages";
+    format!("the interpreter {} does not start: {error}; {way}", python.display())
+}

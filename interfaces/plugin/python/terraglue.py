@@ -1,0 +1,298 @@
+"""What a Terraglue module in Python is made of; needs Python 3.8 and the standard library alone.
+
+A module is one file. Its docstring holds, from the line `[module]` on, a TOML block that says what it is and which
+parameters it takes; the host reads it without running the file. Below it stands one class derived from `Subsystem`.
+The host runs the file in a process of its own with your interpreter and packages, and exchanges arrays with it through
+shared memory: `memoryview`s of doubles, which `numpy.frombuffer` takes as they are. Everything handed to a call is borrowed:
+copy what is to outlive it.
+
+SI units. Packed vectors hold one entry per carried component (n, t1, t2, mn, mt1, mt2) of every port; port p owns
+`port.first` onwards. T is the wrench on side 1 (the body); side 2 (the soil) feels -T.
+"""
+import array
+import math
+
+# What an instance can do beyond `advance`: the sum stands in `Subsystem.can`.
+FORCE, MOTION, IMPEDANCE, ESTIMATE, SOLVE, DERIVATIVES, RETRY = 1, 2, 4, 8, 16, 32, 64
+SUBCYCLES, FEEDTHROUGH = 512, 1024
+# Roles of a variable, what a change of it does, and the types of its elements.
+PARAMETER, INPUT, OUTPUT, LOCAL = range(4)
+LIVE, NEEDS_RESET, READ_ONLY = range(3)
+F64, F32, I8, I16, I32, I64, U8, U16, U32, U64, BOOL, STRING, BINARY, ENUMERATION = range(14)
+# Levels of a derivative, and bits of `Response.flags`.
+POSITION, VELOCITY, ACCELERATION = range(3)
+EVENT, TERMINATE, YIELDED = 1, 2, 4
+# Severities of a line of the log.
+ERROR, WARNING, INFO, DEBUG = 1, 2, 3, 4
+INFINITY, NAN = math.inf, math.nan
+
+
+class Unsupported(Exception):
+    """This call, this kind of input or this level is not offered."""
+
+
+class Refused(Exception):
+    """A value, name or argument is not acceptable; the instance is unchanged and usable."""
+
+
+class Discard(Exception):
+    """The step is too long: `Discard(reached_s)`; the host repeats it up to that time."""
+
+    def __init__(self, reached):
+        super().__init__(reached)
+        self.reached = float(reached)
+
+
+class Law:
+    """t_min <= T_n <= t_max (N), |T_t| <= mu T_n, compliance of the glue (m/N)."""
+
+    __slots__ = ("t_min", "t_max", "mu", "compliance")
+
+    def __init__(self, t_min, t_max, mu, compliance):
+        self.t_min, self.t_max, self.mu, self.compliance = t_min, t_max, mu, compliance
+
+
+class Port:
+    """Where two subsystems are glued: key, kind (0 contact, 1 joint, 2 named), side (+1: T acts here, -1: -T does),
+    mask of carried components, first place in packed vectors, body, shape, nodes below the shape, origin (m, world), axes
+    n, t1, t2 (world), extent (m), law."""
+
+    __slots__ = ("key", "kind", "side", "mask", "first", "body", "shape", "first_node", "node_count", "origin", "axes",
+                 "extent", "law", "components")
+
+    def __init__(self, v):
+        (self.key, self.kind, self.side, self.mask, self.first, self.body, self.shape, self.first_node,
+         self.node_count) = v[:9]
+        self.origin, self.axes, self.extent = v[9:12], (v[12:15], v[15:18], v[18:21]), v[21:23]
+        self.law = Law(*v[23:27])
+        carried = [c for c in range(6) if self.mask >> c & 1]
+        #: (place in packed vectors, component 0 ... 5, its direction in the world) of all that is carried.
+        self.components = [(self.first + i, c, self.axes[c % 3]) for i, c in enumerate(carried)]
+
+
+class Node:
+    """A lattice node of the ground below a shape: i, j, covered area (m^2), height of the underside (m), its slopes."""
+
+    __slots__ = ("i", "j", "area", "lower", "slope")
+
+    def __init__(self, i, j, area, lower, slope_x, slope_y):
+        self.i, self.j, self.area, self.lower, self.slope = i, j, area, lower, (slope_x, slope_y)
+
+
+class Step:
+    """From t to t + h (s): index of the step, number of the trial, epoch of the ports, length n of packed vectors."""
+
+    __slots__ = ("t", "h", "index", "trial", "epoch", "n", "ports", "nodes")
+
+
+class Motion:
+    """Of the other side at t + h: x (m, rad) from the origin of each port, v (m/s, rad/s)."""
+
+    __slots__ = ("x", "v")
+
+    def __init__(self, x, v):
+        self.x, self.v = x, v
+
+
+class Force:
+    """Input: the wrench t; hold 0 end, 1 constant, 2 linear; `motion` of the other side where it is known, else None."""
+
+    __slots__ = ("t", "hold", "motion")
+
+
+class Impedance:
+    """Input: T = f0 - z X with z of n x n, column by column."""
+
+    __slots__ = ("f0", "z")
+
+
+class Response:
+    """To be filled: x, v, a, t; comes as NaN with `reached` = t + h and no `flags`."""
+
+    __slots__ = ("x", "v", "a", "t", "reached", "flags")
+
+
+class Estimate:
+    """Of rigid contact: t_star, x_free, g = dX/d(wrench on itself), n x n column by column; active per port; unique."""
+
+    __slots__ = ("t_star", "x_free", "g", "active", "unique")
+
+
+class Variable:
+    """A named, typed value with a unit. `get` and `set` reach it as `state[name]`, else as an attribute of that name with
+    its dots as underscores."""
+
+    def __init__(self, name, unit="", causality=LOCAL, help="", low=-INFINITY, high=INFINITY, type=F64, dims=(),
+                 enumeration=(), effect=None):
+        self.name, self.unit, self.causality, self.help = name, unit, causality, help
+        self.low, self.high, self.type = low, high, ENUMERATION if enumeration else type
+        self.dims, self.enumeration = tuple(dims), tuple(enumeration)
+        self.effect = (LIVE if causality in (PARAMETER, INPUT) else READ_ONLY) if effect is None else effect
+        self.count = math.prod(self.dims)
+
+
+class Shape:
+    """A shape on a body. kind and size: "sphere" (radius,), "box" half lengths, "capsule" and "cylinder" (half length,
+    radius) along z, "mesh" (points, triangles). position and orientation (w, x, y, z) in the frame of the body."""
+
+    KINDS = ("sphere", "box", "capsule", "cylinder", "mesh")
+
+    def __init__(self, body, kind, size, name="", position=(0.0, 0.0, 0.0), orientation=(1.0, 0.0, 0.0, 0.0), collides=True):
+        self.body, self.kind, self.size, self.name = body, self.KINDS.index(kind), tuple(size), name
+        self.position, self.orientation, self.collides = position, orientation, collides
+
+
+class Field:
+    """Values over the ground, x fastest; the one named `height` is what feet touch. Change them by `put`, or change
+    `values` and say `changed`."""
+
+    def __init__(self, name, unit, origin, spacing, size, values=None):
+        self.name, self.unit, self.origin, self.spacing, self.size = name, unit, tuple(origin), spacing, tuple(size)
+        self.edge, nodes = 32, size[0] * size[1]
+        self.values = array.array("d", bytes(8 * nodes) if values is None else values)
+        self._across = -(-size[0] // self.edge)
+        self.changed()
+
+    def changed(self):
+        """All of it."""
+        self._new = set(range(self._across * -(-self.size[1] // self.edge)))
+
+    def put(self, i, j, value):
+        """A new value of node (i, j)."""
+        self.values[j * self.size[0] + i] = value
+        self._new.add((j // self.edge) * self._across + i // self.edge)
+
+    def _tile(self, k):
+        nx, ny = self.size
+        i0, j0 = self.edge * (k % self._across), self.edge * (k // self._across)
+        wide, out = min(self.edge, nx - i0), array.array("d", bytes(8 * self.edge * self.edge))
+        for row in range(min(self.edge, ny - j0)):
+            at = (j0 + row) * nx + i0
+            out[row * self.edge:row * self.edge + wide] = self.values[at:at + wide]
+        return out
+
+
+class Terrain:
+    """Ground at the start: node (i, j) at origin + (i, j) spacing, `heights` (m) with x fastest."""
+
+    def __init__(self, origin, spacing, size, heights):
+        self.origin, self.spacing, self.size, self.heights = origin, spacing, size, heights
+
+    def height(self, x, y):
+        """Height (m) at a place, bilinear between nodes, outside as at the edge."""
+        at, low = [], []
+        for a, place in enumerate((x, y)):
+            u = min(max((place - self.origin[a]) / self.spacing, 0.0), self.size[a] - 1.0)
+            low.append(max(min(int(u), self.size[a] - 2), 0))
+            at.append(u - low[a])
+        nx = self.size[0]
+        right, up = min(1, nx - 1), nx * min(1, self.size[1] - 1)
+        k, h = low[1] * nx + low[0], self.heights
+        near = h[k] + at[0] * (h[k + right] - h[k])
+        far = h[k + up] + at[0] * (h[k + up + right] - h[k + up])
+        return near + at[1] * (far - near)
+
+
+class Host:
+    """Name of the instance, seed, folder of relative paths, slots, max_nodes, gravity (m/s^2), terrain (or None)."""
+
+    def __init__(self, start, terrain, lines):
+        self.name, self.seed, self.folder, self.slots = start["name"], start["seed"], start["folder"], start["slots"]
+        self.max_nodes, self.gravity, self.terrain = start["max_nodes"], tuple(start["gravity"]), terrain
+        self._lines = lines
+
+    def log(self, text, level=INFO):
+        """A line for the log of the run."""
+        if len(self._lines) < 1000:
+            self._lines.append((level, str(text)[:10000]))
+
+
+class Subsystem:
+    """An instance: derive from it, set `can`, override what the module offers. Everything to be remembered from step to step
+    lies in `self.state` (numbers, texts, lists, tuples, dictionaries, arrays): it is saved, restored and written as bytes
+    for you. A trial (`advance`, `solve_compatibility`, `estimate_forces`) leaves it alone; `commit` changes it."""
+
+    can = FORCE | RETRY
+    state = None
+    variables = ()
+    actions = ()
+    bodies = ()
+    shapes = ()
+    fields = ()
+
+    def __init__(self, host, config):
+        """`config`: the parameters, each with a value or its default; tables are dictionaries."""
+
+    def set_ports(self, step, laws, now):
+        """Paper, step 1: the ports of this step; answers with the committed x, v and, a soil, with t; may narrow laws."""
+        for vector in (now.x, now.v, now.a, now.t):
+            fill(vector, 0.0)
+
+    def advance(self, step, input, out):
+        """Paper, steps 3 and 4: a trial from the committed state under Force, Motion or Impedance."""
+        raise Unsupported
+
+    def estimate_forces(self, step, partner, out):
+        """Paper, step 2: the wrenches if the other side were rigid."""
+        raise Unsupported
+
+    def solve_compatibility(self, step, estimate, out):
+        """Paper, step 3: the wrenches given that estimate."""
+        raise Unsupported
+
+    def interface_jacobian(self, step, level, out):
+        """Derivative at the last trial, n x n, column by column."""
+        raise Unsupported
+
+    def commit(self, step, t, partner):
+        """Paper, step 5: the last trial is accepted under t; the other side moved to `partner`."""
+
+    def restored(self):
+        """Called after `state` was put back, to rebuild what follows from it."""
+
+    def migrate(self, state):
+        """The state of an earlier version of this code, whose keys differ, as one of this code."""
+        raise Refused("there is no method `migrate`")
+
+    def act(self, action, arguments):
+        """Does one of `actions`, which are pairs (name, help)."""
+        raise Refused(f"there is no action `{action}`")
+
+    def body_states(self):
+        """Per body of `bodies` (pairs of name and mass): (position, orientation w x y z, velocity, angular velocity)."""
+        return []
+
+    def energy(self):
+        """(kinetic, potential, dissipated, port work, actuator work, electrical), J."""
+        return (0.0,) * 6
+
+    def next_event_time(self):
+        """Time of the next event known beforehand, s."""
+        return INFINITY
+
+    def close(self):
+        """The end of the instance."""
+
+    def get_value(self, variable):
+        """Value of a variable."""
+        if isinstance(self.state, dict) and variable.name in self.state:
+            return self.state[variable.name]
+        return getattr(self, variable.name.replace(".", "_"))
+
+    def set_value(self, variable, value):
+        """A new value, of the right type and range."""
+        if isinstance(self.state, dict) and variable.name in self.state:
+            self.state[variable.name] = value
+        else:
+            setattr(self, variable.name.replace(".", "_"), value)
+
+
+def dot(a, b):
+    """Of two vectors of three."""
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
+
+
+def fill(view, value):
+    """The same number everywhere."""
+    for k in range(len(view)):
+        view[k] = value

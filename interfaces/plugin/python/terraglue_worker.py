@@ -1,0 +1,485 @@
+"""The process of a module in Python: makes one instance and answers the host until it is told to quit or its host is gone.
+What the module keeps in `state` is saved, restored and written as bytes here."""
+import array
+import copy
+import json
+import os
+import signal
+import struct
+import sys
+import threading
+import traceback
+import zlib
+
+from terraglue import (BOOL, ENUMERATION, INFO, NEEDS_RESET, READ_ONLY, STRING, U32, WARNING, Discard, Estimate, Force, Host,
+                       Impedance, Law, Motion, Node, Port, Refused, Response, Step, Subsystem, Terrain, Unsupported)
+from terraglue_wire import AREA, BODY, END, LAW, NODE, OUTCOME, PORT, START, STEP, Call, Reply, Segment
+
+_STATE, _SERIALIZE = 128, 256
+_HEAD = b"terraglue python state 1\n"
+
+
+def _plain(x):
+    """As JSON that says which kind of collection stood there."""
+    if x is None or isinstance(x, (bool, int, float, str)):
+        return x
+    if isinstance(x, list):
+        return [_plain(y) for y in x]
+    if isinstance(x, tuple):
+        return {"tuple": [_plain(y) for y in x]}
+    if isinstance(x, dict):
+        return {"dict": [[_plain(k), _plain(v)] for k, v in x.items()]}
+    if isinstance(x, array.array):
+        return {"array": x.typecode, "values": x.tolist()}
+    if hasattr(x, "dtype") and hasattr(x, "tobytes"):
+        return {"numpy": str(x.dtype), "shape": list(x.shape), "bytes": x.tobytes().hex()}
+    raise TypeError(f"the state holds a {type(x).__name__}; numbers, texts, lists, tuples, dictionaries and arrays can be kept")
+
+
+def _rich(x):
+    if isinstance(x, list):
+        return [_rich(y) for y in x]
+    if not isinstance(x, dict):
+        return x
+    if "tuple" in x:
+        return tuple(_rich(y) for y in x["tuple"])
+    if "dict" in x:
+        return {_rich(k): _rich(v) for k, v in x["dict"]}
+    if "array" in x:
+        return array.array(x["array"], x["values"])
+    import numpy
+    return numpy.frombuffer(bytes.fromhex(x["bytes"]), x["numpy"]).reshape(x["shape"]).copy()
+
+
+def _packed_state(unit):
+    text = json.dumps([_plain(unit.state), [[f.name, f.values.tobytes().hex()] for f in unit.fields]]).encode()
+    return _HEAD + struct.pack("<I", zlib.crc32(text)) + text
+
+
+def _unpacked_state(unit, data):
+    text = data[len(_HEAD) + 4:]
+    if data[:len(_HEAD)] != _HEAD or data[len(_HEAD):len(_HEAD) + 4] != struct.pack("<I", zlib.crc32(text)):
+        raise Refused("these bytes are no state of a module in Python, or they were changed")
+    state, fields = json.loads(text)
+    fields = [array.array("d", bytes.fromhex(values)) for _, values in fields]
+    if [len(f) for f in fields] != [len(f.values) for f in unit.fields]:
+        raise Refused("the state has other fields")
+    state = _rich(state)
+    keys = [_names(state), unit._names]
+    if keys[0] != keys[1]:
+        try:
+            state = unit.migrate(state)
+        except Refused as e:
+            raise Refused(f"the state holds {keys[0]}; that of this code holds {keys[1]}, and {e}") from None
+    _put_back(unit, (state, fields))
+
+
+def _names(state):
+    """What tells states of different code apart: the texts among the keys of a dictionary, else the type."""
+    if not isinstance(state, dict):
+        return type(state).__name__
+    return ", ".join(sorted(k for k in state if isinstance(k, str))) or "no names"
+
+
+def _kept(unit):
+    return copy.deepcopy(unit.state), [f.values[:] for f in unit.fields]
+
+
+def _put_back(unit, kept):
+    unit.state = copy.deepcopy(kept[0])
+    for field, values in zip(unit.fields, kept[1]):
+        field.values[:] = values
+        field.changed()
+    unit.restored()
+
+
+class Worker:
+    """Makes one instance and answers its calls."""
+
+    NAMES = ("", "start", "set_ports", "estimate", "solve", "advance", "jacobian", "commit", "save", "restore", "serialize",
+             "deserialize", "get", "set", "act", "next_event", "body_states", "energy", "quit")
+
+    def __init__(self):
+        self.unit, self.lines, self.slots, self.begun = None, [], {}, False
+        self.ports_seen, self.ports, self.nodes = None, [], []
+        self.generation = 0
+        self.file = ""
+        self.calls = [getattr(self, "_" + name, None) for name in self.NAMES]
+
+    def answer(self, request, length, memory):
+        """Does one call and writes its answer; the length."""
+        reply, failure = Reply(memory), None
+        try:
+            self.calls[request[0]](Call(request, length), reply)
+        except Unsupported:
+            failure = (1, None)
+        except Discard as e:
+            failure = (2, e.reached)
+        except Refused as e:
+            failure = (3, str(e))
+        except (struct.error, ValueError) as e:
+            too_long = reply.at > AREA - 64 or "slice" in str(e) and reply.at + 64 > len(memory)
+            failure = (4, "the answer does not fit into the shared memory" if too_long else self.told())
+        except BaseException:
+            failure = (4, self.told())
+        sys.stdout.flush()
+        sys.stderr.flush()
+        if failure is None and not self.lines:
+            OUTCOME.pack_into(memory, 0, 0, 0)
+            return reply.at
+        return self.outcome(failure, memory, reply.at)
+
+    def outcome(self, failure, memory, end):
+        body = b"" if failure else bytes(memory[OUTCOME.size:end])
+        reply = Reply(memory)
+        reply.at = 0
+        reply.u32(len(self.lines))
+        for level, text in self.lines:
+            reply.u32(level)
+            reply.text(text)
+        self.lines.clear()
+        status, what = failure or (0, None)
+        reply.u8(status)
+        if status == 2:
+            reply.numbers(what)
+        elif what is not None:
+            reply.text(what)
+        reply.bytes(body)
+        return reply.at
+
+    def told(self):
+        """The exception with its traceback, without what happened in this file."""
+        kind, error, trace = sys.exc_info()
+        while trace is not None and trace.tb_frame.f_code.co_filename == __file__:
+            trace = trace.tb_next
+        lines = [line.rstrip("\n") for line in traceback.format_exception(kind, error, trace)]
+        last = lines.pop() if lines else repr(error)
+        if isinstance(error, SystemExit):
+            last = f"it called sys.exit({error.code!r})"
+        return "\n".join([last, *lines])
+
+    # --- calls, in the order of their numbers
+
+    def _start(self, call, reply):
+        start = json.loads(call.text())
+        terrain = None
+        if call.u8():
+            origin, (spacing,) = call.take(struct.Struct("<2d")), call.take(struct.Struct("<d"))
+            size = call.take(struct.Struct("<2I"))
+            terrain = Terrain(origin, spacing, size, array.array("d", call.doubles()))
+        _confine(start["memory_bytes"])
+        what = start["what"]["Python"]
+        cls = _load(what["path"])
+        self.host = Host(start, terrain, self.lines)
+        unit = cls(self.host, what["config"])
+        self.unit, self.fields = unit, list(unit.fields)
+        unit._names = _names(unit.state)
+        self.variables = list(unit.variables)
+        can = unit.can | (_STATE | _SERIALIZE if unit.state is not None else 0)
+        reply.u32(can)
+        self._describe(reply)
+
+    def _describe(self, reply):
+        unit = self.unit
+        reply.u32(len(self.variables))
+        for k, v in enumerate(self.variables):
+            reply.u32(k)
+            reply.text(v.name)
+            for number in (v.type, v.causality, v.effect):
+                reply.u32(number)
+            reply.text(v.unit)
+            reply.text(v.help)
+            reply.numbers(v.low, v.high)
+            reply.values(U32, v.dims)
+            reply.values(STRING, v.enumeration)
+        reply.u32(len(unit.actions))
+        for name, help in unit.actions:
+            reply.text(name)
+            reply.text(help)
+        reply.u32(len(unit.bodies))
+        for name, mass in unit.bodies:
+            reply.text(name)
+            reply.numbers(mass)
+        reply.u32(len(unit.shapes))
+        for k, s in enumerate(unit.shapes):
+            reply.u32(k)
+            reply.u32(s.body)
+            reply.text(s.name or unit.bodies[s.body][0])
+            reply.u8(s.kind)
+            if s.kind == 4:
+                points, triangles = s.size
+                reply.u32(len(points))
+                for p in points:
+                    reply.numbers(*p)
+                reply.u32(len(triangles))
+                for t in triangles:
+                    reply.put(struct.Struct("<3I"), *t)
+            else:
+                reply.numbers(*s.size)
+            reply.numbers(*s.position, *s.orientation)
+            reply.u8(bool(s.collides))
+        reply.u32(len(self.fields))
+        for f in self.fields:
+            reply.text(f.name)
+            reply.text(f.unit)
+            reply.numbers(*f.origin, f.spacing)
+            reply.put(struct.Struct("<3I"), *f.size, f.edge)
+        reply.u8(1)
+        self._tiles(reply)
+
+    def _tiles(self, reply):
+        """What of the fields is new."""
+        self.generation += 1
+        for number, field in enumerate(self.fields):
+            for k in sorted(field._new):
+                reply.u8(1)
+                reply.put(struct.Struct("<IIQB"), number, k, self.generation, 1)
+                tile = field._tile(k)
+                reply.doubles(len(tile))[:] = tile
+            field._new.clear()
+        reply.u8(0)
+
+    def _step(self, call):
+        step = Step()
+        step.t, step.h, step.index, step.trial, step.epoch, step.n = call.take(STEP)
+        at = call.at
+        ports = call.u32()
+        call.at += ports * PORT.size
+        nodes = call.u32()
+        call.at += nodes * NODE.size
+        raw = call.memory[at:call.at]
+        # Between trials of a step the ports stay: they are read once.
+        if raw != self.ports_seen:
+            self.ports_seen = bytes(raw)
+            raw = raw[4:]
+            self.ports = [Port(v) for v in PORT.iter_unpack(raw[:ports * PORT.size])]
+            self.nodes = [Node(*v) for v in NODE.iter_unpack(raw[ports * PORT.size + 4:])]
+        step.ports, step.nodes = self.ports, self.nodes
+        return step
+
+    def _responded(self, step, reply, run):
+        out, n = Response(), step.n
+        out.x, out.v, out.a, out.t = [reply.doubles(n) for _ in range(4)]
+        out.reached, out.flags = step.t + step.h, 0
+        run(out)
+        reply.put(END, out.reached, out.flags)
+
+    def _set_ports(self, call, reply):
+        step = self._step(call)
+        laws = [Law(*call.take(LAW)) for _ in range(call.u32())]
+        at = reply.at
+        reply.at += 4 + LAW.size * len(laws)
+        self._responded(step, reply, lambda out: self.unit.set_ports(step, laws, out))
+        end, reply.at = reply.at, at
+        reply.u32(len(laws))
+        for law in laws:
+            reply.put(LAW, law.t_min, law.t_max, law.mu, law.compliance)
+        reply.at = end
+
+    def _estimate(self, call, reply):
+        step = self._step(call)
+        partner, out = Motion(call.doubles(), call.doubles()), Estimate()
+        out.t_star, out.x_free, out.g = reply.doubles(step.n), reply.doubles(step.n), reply.doubles(step.n * step.n)
+        out.active, out.unique = [0] * len(step.ports), False
+        self.unit.estimate_forces(step, partner, out)
+        reply.text(bytes(map(bool, out.active)))
+        reply.u8(bool(out.unique))
+
+    def _solve(self, call, reply):
+        step, estimate = self._step(call), Estimate()
+        estimate.t_star, estimate.x_free, estimate.g = call.doubles(), call.doubles(), call.doubles()
+        estimate.active, estimate.unique = list(call.bytes()), bool(call.u8())
+        self._responded(step, reply, lambda out: self.unit.solve_compatibility(step, estimate, out))
+
+    def _advance(self, call, reply):
+        step, kind = self._step(call), call.u8()
+        if kind < 2:
+            given = Force()
+            given.t, given.hold = call.doubles(), call.u32()
+            given.motion = Motion(call.doubles(), call.doubles()) if kind else None
+        elif kind == 2:
+            given = Motion(call.doubles(), call.doubles())
+        else:
+            given = Impedance()
+            given.f0, given.z = call.doubles(), call.doubles()
+        self._responded(step, reply, lambda out: self.unit.advance(step, given, out))
+
+    def _jacobian(self, call, reply):
+        step, level = self._step(call), call.u32()
+        self.unit.interface_jacobian(step, level, reply.doubles(step.n * step.n))
+
+    def _commit(self, call, reply):
+        step = self._step(call)
+        self.unit.commit(step, call.doubles(), Motion(call.doubles(), call.doubles()))
+        self.begun = True
+        self._tiles(reply)
+
+    def _slot(self, call):
+        slot = call.u32()
+        if self.unit.state is None:
+            raise Unsupported
+        if slot >= self.host.slots:
+            raise Refused(f"there is no slot {slot}")
+        return slot
+
+    def _save(self, call, reply):
+        self.slots[self._slot(call)] = _kept(self.unit)
+
+    def _restore(self, call, reply):
+        slot = self._slot(call)
+        if slot not in self.slots:
+            raise Refused(f"nothing was saved in slot {slot}")
+        _put_back(self.unit, self.slots[slot])
+        self._tiles(reply)
+
+    def _serialize(self, call, reply):
+        if self.unit.state is None:
+            raise Unsupported
+        reply.text(_packed_state(self.unit))
+
+    def _deserialize(self, call, reply):
+        if self.unit.state is None:
+            raise Unsupported
+        _unpacked_state(self.unit, call.bytes())
+        self._tiles(reply)
+
+    def _variable(self, number, kind):
+        if number >= len(self.variables):
+            raise Refused(f"there is no variable {number}")
+        variable = self.variables[number]
+        if variable.type != kind:
+            raise Refused(f"`{variable.name}` has another type")
+        return variable
+
+    def _get(self, call, reply):
+        ids = call.values(U32)
+        kind, count = call.u32(), call.u32()
+        values = []
+        for number in ids:
+            variable = self._variable(number, kind)
+            value = self.unit.get_value(variable)
+            values.extend(value) if variable.dims else values.append(value)
+        if len(values) != count:
+            raise Refused(f"{len(values)} values, but room for {count}")
+        reply.values(kind, values)
+
+    def _set(self, call, reply):
+        ids = call.values(U32)
+        kind = call.u32()
+        values, at, todo = call.values(kind), 0, []
+        for number in ids:
+            variable = self._variable(number, kind)
+            part = values[at:at + variable.count]
+            at += variable.count
+            self._acceptable(variable, part)
+            todo.append((variable, list(part) if variable.dims else part[0]))
+        for variable, value in todo:
+            self.unit.set_value(variable, value)
+
+    def _acceptable(self, variable, values):
+        if variable.effect == READ_ONLY:
+            raise Refused(f"`{variable.name}` cannot be set")
+        if variable.effect == NEEDS_RESET and self.begun:
+            raise Refused(f"`{variable.name}` can be set before the first step only")
+        if len(values) != variable.count:
+            raise Refused(f"`{variable.name}` takes {variable.count} values")
+        if variable.type < BOOL and not all(variable.low <= x <= variable.high for x in values):
+            raise Refused(f"`{variable.name}` takes {variable.low} to {variable.high}")
+        if variable.type == ENUMERATION and not all(0 <= x < len(variable.enumeration) for x in values):
+            raise Refused(f"`{variable.name}` takes one of {', '.join(variable.enumeration)}")
+
+    def _act(self, call, reply):
+        action, arguments = call.text(), call.text()
+        if action not in [name for name, _ in self.unit.actions]:
+            raise Refused(f"there is no action `{action}`")
+        self.unit.act(action, json.loads(arguments or "{}"))
+        self._tiles(reply)
+
+    def _next_event(self, call, reply):
+        reply.numbers(self.unit.next_event_time())
+
+    def _body_states(self, call, reply):
+        states = self.unit.body_states()
+        reply.u32(len(states))
+        for position, orientation, velocity, turning in states:
+            reply.put(BODY, *position, *orientation, *velocity, *turning)
+
+    def _energy(self, call, reply):
+        reply.numbers(*self.unit.energy())
+
+    def _quit(self, call, reply):
+        unit, self.unit = self.unit, None
+        if unit is not None:
+            unit.close()
+
+
+class _Print:
+    """What the module prints goes to the log of the run, line by line."""
+
+    encoding = "utf-8"
+
+    def __init__(self, lines, level):
+        self.lines, self.level, self.rest = lines, level, ""
+
+    def write(self, text):
+        *whole, self.rest = (self.rest + text).split("\n")
+        for line in whole:
+            if len(self.lines) < 1000:
+                self.lines.append((self.level, line[:10000]))
+        return len(text)
+
+    def flush(self):
+        pass
+
+    def isatty(self):
+        return False
+
+
+def _load(path):
+    """The class of a module. The file is read afresh, and no compiled copy is left beside it."""
+    import types
+    sys.path.insert(1, os.path.dirname(path))
+    with open(path, encoding="utf-8") as file:
+        text = file.read()
+    module = types.ModuleType(os.path.splitext(os.path.basename(path))[0])
+    module.__file__ = path
+    sys.modules[module.__name__] = module
+    exec(compile(text, path, "exec"), module.__dict__)
+    found = [c for c in vars(module).values()
+             if isinstance(c, type) and issubclass(c, Subsystem) and c.__module__ == module.__name__]
+    if len(found) != 1:
+        names = ", ".join(c.__name__ for c in found) or "none"
+        raise Refused(f"{path} must hold one class derived from terraglue.Subsystem; it holds {names}")
+    return found[0]
+
+
+def _confine(memory_bytes):
+    import resource
+    resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    most = memory_bytes + START + 2 * AREA
+    resource.setrlimit(resource.RLIMIT_AS, (most, most))
+
+
+def _follow_the_host():
+    """An orphan ends with all that it has started: the host holds the other end of standard input."""
+    while os.read(0, 64):
+        pass
+    os.killpg(0, signal.SIGKILL)
+
+
+def serve(path):
+    """Serves the host that made the segment at `path`."""
+    import faulthandler
+    faulthandler.enable(sys.__stderr__)
+    # The host asks where a module hangs.
+    faulthandler.register(signal.SIGUSR1, sys.__stderr__, all_threads=False)
+    segment, worker = Segment(path), Worker()
+    threading.Thread(target=_follow_the_host, daemon=True).start()
+    sys.stdout, sys.stderr = _Print(worker.lines, INFO), _Print(worker.lines, WARNING)
+    while True:
+        length = segment.next()
+        number = segment.call[0]
+        segment.post(worker.answer(segment.call, length, segment.answer))
+        if number == len(Worker.NAMES) - 1:
+            # The host ends the whole group; nothing of the module runs any more.
+            signal.pause()

@@ -1,0 +1,61 @@
+//! Time of a call to a module in Python: 64 numbers there and (four times) 64 back, through its process.
+
+use super::super::timing::median;
+use super::super::{Context, Figure, Limit};
+use crate::process::Outcome;
+use std::time::Instant;
+use terraglue::host::{HostServices, LoadedModule};
+use terraglue::subsystem::{Config, Hold, Input, Response, Step};
+
+const NUMBERS: usize = 64;
+const CALLS: usize = 4000;
+const MODULE: &str = r#""""Gives back what it gets.
+
+[module]
+name = "echo"
+kind = "robot"
+"""
+import terraglue as tg
+
+
+class Echo(tg.Subsystem):
+    def advance(self, step, input, out):
+        out.x[:] = out.v[:] = out.a[:] = out.t[:] = input.t
+"#;
+
+/// Median and 99th percentile of the time of a call.
+pub fn figures(context: &Context, out: &mut Vec<Figure>) -> Outcome {
+    let file = context.scratch.join("echo.py");
+    std::fs::write(&file, MODULE).map_err(|e| format!("{}: {e}", file.display()))?;
+    let module = LoadedModule::load(&file).map_err(|e| e.to_string())?;
+    let services = HostServices::new(1, &context.scratch);
+    let made = module.instantiate("echo", Config::default(), &services);
+    let mut instance = made.map_err(|e| e.to_string())?;
+    let sent: [f64; NUMBERS] = std::array::from_fn(|k| k as f64);
+    let mut got = [[0.0; NUMBERS]; 4];
+    let mut times = Vec::with_capacity(CALLS);
+    for index in 0..CALLS as u64 {
+        let step = Step { n: NUMBERS as u32, ..Step::free(0.0, 1e-3, index) };
+        let input = Input::Force { t: &sent, hold: Hold::End, motion: None };
+        let [x, v, a, t] = &mut got;
+        let mut answer = Response { x, v, a, t, reached: 0.0, flags: 0 };
+        let start = Instant::now();
+        instance.advance(&step, &input, &mut answer).map_err(|e| e.to_string())?;
+        times.push(1e6 * start.elapsed().as_secs_f64());
+        if got.iter().any(|g| g != &sent) {
+            return Err("a module in Python gives back other numbers than it got".into());
+        }
+    }
+    let mut times = times.split_off(CALLS / 10);
+    times.sort_by(f64::total_cmp);
+    let p99 = times[times.len() * 99 / 100];
+    let what = "call of a module in Python, 64 numbers there and back, µs";
+    out.push(Figure::new(
+        "plugins.python.median",
+        median(times),
+        Limit::AtMost(25.0),
+        format!("{what}, median"),
+    ));
+    out.push(Figure::new("plugins.python.p99", p99, Limit::AtMost(80.0), format!("{what}, 99th percentile")));
+    Ok(())
+}

@@ -4,7 +4,7 @@ use super::{Snapshot, Testbed, TimeKept};
 use crate::host::Instance;
 use crate::{Error, Result};
 use serde_json::{Value, json};
-use terraglue_subsystem::Capabilities;
+use terraglue_subsystem::{Capabilities, bytes};
 
 impl Testbed {
     pub(super) fn time_kept(&self) -> TimeKept {
@@ -68,7 +68,7 @@ impl Testbed {
         self.read_states()
     }
 
-    /// The committed state of everything as bytes: a line of JSON, then those of every instance.
+    /// The committed state of everything as bytes: a line of JSON, those of every instance, a hash.
     pub(crate) fn serialize(&self) -> Result<Vec<u8>> {
         let parts = self.instances.iter().map(Instance::serialize).collect::<Result<Vec<_>>>()?;
         let kept = self.time_kept();
@@ -84,22 +84,35 @@ impl Testbed {
         let mut out = head.to_string().into_bytes();
         out.push(b'\n');
         parts.iter().for_each(|part| out.extend(part));
+        let sum = bytes::hash(&out);
+        out.extend(sum.to_le_bytes());
         Ok(out)
     }
 
-    /// Back to a state made by [`Testbed::serialize`] of the same scenario.
+    /// Back to a state made by [`Testbed::serialize`] of the same scenario. After an error everything is as before.
     pub(crate) fn deserialize(&mut self, bytes: &[u8]) -> Result {
         let wrong =
             || Error::Simulation { time_s: self.t, message: "these bytes are no state of this run".into() };
-        let (head, lengths, mut rest) = split(bytes, self.instances.len()).ok_or_else(wrong)?;
+        let content = unsealed(bytes).ok_or_else(wrong)?;
+        let (head, lengths, mut rest) = split(content, self.instances.len()).ok_or_else(wrong)?;
         let (kept, fired, closed) = read_head(&head).ok_or_else(wrong)?;
-        for (instance, length) in self.instances.iter_mut().zip(lengths) {
+        let before = self.instances.iter().map(Instance::serialize).collect::<Result<Vec<_>>>()?;
+        for (k, length) in lengths.into_iter().enumerate() {
             let (part, after) = rest.split_at(length);
-            instance.deserialize(part)?;
+            if let Err(refused) = self.instances[k].deserialize(part) {
+                self.instances.iter_mut().zip(&before).take(k).try_for_each(|(i, b)| i.deserialize(b))?;
+                return Err(refused);
+            }
             rest = after;
         }
         self.restore_rest(&Snapshot { slot: 0, clock: kept, fired, closed })
     }
+}
+
+/// The bytes before their hash, where it is theirs.
+fn unsealed(all: &[u8]) -> Option<&[u8]> {
+    let (content, sum) = all.split_last_chunk::<8>()?;
+    (bytes::hash(content) == u64::from_le_bytes(*sum)).then_some(content)
 }
 
 /// Head, lengths of the parts, and the parts, where they fit together.

@@ -135,3 +135,28 @@ impl HeightField {
         }
     }
 }
+
+impl terraglue_subsystem::bytes::Persist for HeightSnapshot {
+    fn write(&self, out: &mut Vec<u8>) {
+        self.touched.write(out);
+        self.sinkage.iter().for_each(|s| s.write(out));
+    }
+    fn read(from: &mut &[u8]) -> terraglue_subsystem::Result<Self> {
+        let (touched, sinkage) = read_tiles(from)?;
+        Ok(Self { touched, sinkage, origin: Origin::default() })
+    }
+}
+
+/// Numbers of tiles and the values of their nodes, as a snapshot writes them.
+pub(crate) fn read_tiles<T: terraglue_subsystem::bytes::Persist>(
+    from: &mut &[u8],
+) -> terraglue_subsystem::Result<(Vec<u32>, Vec<T>)> {
+    use terraglue_subsystem::bytes::{Persist, wrong};
+    let touched = Vec::<u32>::read(from)?;
+    let count = touched.len() * TILE_NODES;
+    if count > from.len() {
+        return Err(wrong("they end too early"));
+    }
+    let values = (0..count).map(|_| T::read(from)).collect::<terraglue_subsystem::Result<_>>()?;
+    Ok((touched, values))
+}

@@ -204,3 +204,14 @@ impl TileMap<f32> {
         FieldTile { generation: self.generations[tile], values }
     }
 }
+
+impl<T: terraglue_subsystem::bytes::Persist> terraglue_subsystem::bytes::Persist for TileMapSnapshot<T> {
+    fn write(&self, out: &mut Vec<u8>) {
+        self.touched.write(out);
+        self.values.iter().for_each(|v| v.write(out));
+    }
+    fn read(from: &mut &[u8]) -> terraglue_subsystem::Result<Self> {
+        let (touched, values) = crate::snapshot::read_tiles(from)?;
+        Ok(Self { touched, values, origin: Origin::default() })
+    }
+}

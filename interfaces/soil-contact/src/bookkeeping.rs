@@ -286,3 +286,5 @@ fn release(ground: &mut Ground, lists: &mut Lists, stamp: u64) {
         }
     }
 }
+
+terraglue_subsystem::persist!(Book { stamp, elastic, dissipated, port_work, max_sinkage, loaded, fewest });

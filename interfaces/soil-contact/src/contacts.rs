@@ -132,3 +132,6 @@ impl Touch {
         [slip, sinkage, area, mean, largest, normal, pull, torque, power]
     }
 }
+
+terraglue_subsystem::persist!(Contact { key, values });
+terraglue_subsystem::persist!(Contacts { shown, all });

@@ -5,6 +5,8 @@
 
 use terraglue_ground::{Lattice, TILE_NODES, TileMap, TileMapSnapshot, UNIT_M};
 use terraglue_soil_law::ShearState;
+use terraglue_subsystem::Result;
+use terraglue_subsystem::bytes::{self, Persist};
 
 /// Tiles of pressed ground, and nodes below feet, for which memory is asked at the start.
 const RESERVE_TILES: usize = 256;
@@ -128,6 +130,13 @@ pub struct NodesSnapshot {
     kept: TileMapSnapshot<Kept>,
     nodes: Vec<[i32; 2]>,
     contacts: Vec<NodeState>,
+}
+
+impl NodesSnapshot {
+    /// Nodes on which a foot stands.
+    pub(crate) fn contacts(&self) -> impl Iterator<Item = &[i32; 2]> {
+        self.nodes.iter()
+    }
 }
 
 impl NodeStates {
@@ -296,6 +305,41 @@ impl NodeStates {
             let (tile, k, _) = self.place(i, j);
             self.list(tile, k, place as u32);
         }
+    }
+}
+
+terraglue_subsystem::persist!(NodeState {
+    reference,
+    remainder,
+    permanent,
+    largest,
+    curve,
+    pressure,
+    shear,
+    stamp,
+});
+
+impl Persist for Kept {
+    fn write(&self, out: &mut Vec<u8>) {
+        let [a, b, c, d, e] = self.0;
+        u64::from_le_bytes([a, b, c, d, e, 0, 0, 0]).write(out);
+    }
+    fn read(from: &mut &[u8]) -> Result<Self> {
+        let [a, b, c, d, e, rest @ ..] = u64::read(from)?.to_le_bytes();
+        if rest == [0; 3] { Ok(Self([a, b, c, d, e])) } else { Err(bytes::wrong("a depth is too large")) }
+    }
+}
+
+impl Persist for NodesSnapshot {
+    fn write(&self, out: &mut Vec<u8>) {
+        self.kept.write(out);
+        self.nodes.write(out);
+        self.contacts.iter().for_each(|c| c.write(out));
+    }
+    fn read(from: &mut &[u8]) -> Result<Self> {
+        let (kept, nodes) = (Persist::read(from)?, Vec::<[i32; 2]>::read(from)?);
+        let contacts = nodes.iter().map(|_| NodeState::read(from)).collect::<Result<_>>()?;
+        Ok(Self { kept, nodes, contacts })
     }
 }
 

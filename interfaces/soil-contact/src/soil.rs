@@ -4,11 +4,12 @@ use crate::bookkeeping::{self, Book, Lists};
 use crate::contacts::Contacts;
 use crate::ground::{Covered, Ground};
 use crate::patch::{Laws, Patches};
-use crate::state::{Committed, Slots};
+use crate::state::{Committed, Slot, Slots, Target};
 use crate::trial::Last;
 use crate::values;
 use std::sync::Arc;
 use terraglue_soil_law::{PressureLaw, SoilExpressions, SoilParameters};
+use terraglue_subsystem::bytes::{self, Persist};
 use terraglue_subsystem::{
     Capabilities, Config, Energy, Error, Estimate, FieldInfo, FieldTile, Host, Input, Law, Level, LogLevel,
     Motion, Response, Result, Step, Subsystem, Values, ValuesMut, Variable, cooperation,
@@ -23,7 +24,7 @@ const FEW_NODES_COMMITS: u32 = 100;
 /// Where the material under and around a foot goes.
 pub trait Material: Send {
     /// Exact copy of its own committed state.
-    type Saved: Default + Send;
+    type Saved: Default + Send + Persist;
 
     /// Looks at the ground before the first step.
     fn begin(&mut self, _ground: &Ground, _parameters: &SoilParameters) {}
@@ -46,6 +47,10 @@ pub trait Material: Send {
     fn settle(&mut self, ground: &mut Ground, covered: &[Covered], released: &[[i32; 2]], h: f64);
     /// Copies the state into `out`.
     fn save(&self, _out: &mut Self::Saved) {}
+    /// Whether a saved state speaks of nodes of this ground only.
+    fn fits(&self, _saved: &Self::Saved, _ground: &Ground) -> bool {
+        true
+    }
     /// Back to a saved state.
     fn restore(&mut self, _saved: &Self::Saved) {}
 }
@@ -133,6 +138,17 @@ impl<M: Material> FieldSoil<M> {
         }
     }
 
+    /// Makes a saved state the committed one.
+    fn go_back(&mut self, slot: &Slot<M::Saved>) -> Result {
+        let Self { ground, lists, book, parameters, .. } = self;
+        slot.put_back(&mut Target { ground, loaded: &mut lists.loaded, book, parameters })?;
+        self.material.restore(&slot.material);
+        self.laws = laws_of(&self.parameters, self.expressions.as_ref())?;
+        self.patches.forget();
+        self.last.clear();
+        Ok(())
+    }
+
     fn warn(&mut self, which: usize, text: &str) {
         if !std::mem::replace(&mut self.warned[which], true) {
             self.host.log(LogLevel::Warning, text);
@@ -182,6 +198,7 @@ impl<M: Material> Subsystem for FieldSoil<M> {
             | Capabilities::DERIVATIVES
             | Capabilities::RETRY
             | Capabilities::STATE
+            | Capabilities::SERIALIZE
     }
 
     fn set_ports(&mut self, step: &Step, laws: &mut [Law], now: &mut Response) -> Result {
@@ -247,28 +264,34 @@ impl<M: Material> Subsystem for FieldSoil<M> {
     }
 
     fn save_state(&mut self, slot: u32) -> Result {
-        let state = Committed {
-            ground: &mut self.ground,
-            loaded: &mut self.lists.loaded,
-            book: &mut self.book,
-            parameters: &mut self.parameters,
-        };
-        self.material.save(self.slots.save(slot, &state)?);
+        let Self { ground, lists, book, parameters, .. } = self;
+        let slot = self.slots.get_mut(slot)?;
+        slot.fill(&Committed { ground, loaded: &lists.loaded, book, parameters });
+        self.material.save(&mut slot.material);
         Ok(())
     }
 
+    fn serialize(&self) -> Result<Vec<u8>> {
+        let Self { ground, lists, book, parameters, .. } = self;
+        let mut slot = Slot::<M::Saved>::default();
+        slot.fill(&Committed { ground, loaded: &lists.loaded, book, parameters });
+        self.material.save(&mut slot.material);
+        Ok(slot.to_bytes(ground))
+    }
+
+    fn deserialize(&mut self, from: &[u8]) -> Result {
+        let slot = Slot::<M::Saved>::from_bytes(from, &self.ground)?;
+        if !self.material.fits(&slot.material, &self.ground) {
+            return Err(bytes::wrong("they speak of nodes that this ground does not have"));
+        }
+        self.go_back(&slot)
+    }
+
     fn restore_state(&mut self, slot: u32) -> Result {
-        let mut state = Committed {
-            ground: &mut self.ground,
-            loaded: &mut self.lists.loaded,
-            book: &mut self.book,
-            parameters: &mut self.parameters,
-        };
-        self.material.restore(self.slots.restore(slot, &mut state)?);
-        self.laws = laws_of(&self.parameters, self.expressions.as_ref())?;
-        self.patches.forget();
-        self.last.clear();
-        Ok(())
+        let slots = std::mem::replace(&mut self.slots, Slots::new(0));
+        let done = slots.get(slot).and_then(|slot| self.go_back(slot));
+        self.slots = slots;
+        done
     }
 
     fn variables(&self) -> &[Variable] {

@@ -1,4 +1,4 @@
-//! Numbered slots with exact copies of the committed state.
+//! Exact copies of the committed state: in numbered slots, and as bytes.
 
 use crate::bookkeeping::Book;
 use crate::contacts::Contacts;
@@ -7,11 +7,15 @@ use crate::nodes::NodesSnapshot;
 use crate::wheel::Memory;
 use terraglue_ground::HeightSnapshot;
 use terraglue_soil_law::SoilParameters;
+use terraglue_subsystem::bytes::{self, Persist};
 use terraglue_subsystem::{Error, Result};
 
-/// One saved state.
+/// Version of the bytes.
+const VERSION: u32 = 1;
+
+/// One saved state; `S` is the material's own.
 #[derive(Debug, Default)]
-struct Slot<S> {
+pub struct Slot<S> {
     heights: HeightSnapshot,
     nodes: NodesSnapshot,
     wheels: Vec<Memory>,
@@ -19,19 +23,122 @@ struct Slot<S> {
     loaded: Vec<[i32; 2]>,
     book: Book,
     parameters: Option<SoilParameters>,
-    material: S,
+    /// The material's own state.
+    pub material: S,
+}
+
+impl<S: Persist> Persist for Slot<S> {
+    fn write(&self, out: &mut Vec<u8>) {
+        let Self { heights, nodes, wheels, contacts, loaded, book, parameters, material } = self;
+        (heights.write(out), nodes.write(out), wheels.write(out), contacts.write(out));
+        (loaded.write(out), book.write(out), parameters.write(out), material.write(out));
+    }
+    fn read(from: &mut &[u8]) -> Result<Self> {
+        Ok(Self {
+            heights: Persist::read(from)?,
+            nodes: Persist::read(from)?,
+            wheels: Persist::read(from)?,
+            contacts: Persist::read(from)?,
+            loaded: Persist::read(from)?,
+            book: Persist::read(from)?,
+            parameters: Persist::read(from)?,
+            material: Persist::read(from)?,
+        })
+    }
 }
 
 /// What a slot holds beside the material's own state.
 pub struct Committed<'a> {
+    /// Heights and node states.
+    pub ground: &'a Ground,
+    /// Loaded nodes.
+    pub loaded: &'a Vec<[i32; 2]>,
+    /// Sums over the run.
+    pub book: &'a Book,
+    /// The laws' numbers, which may be changed during a run.
+    pub parameters: &'a SoilParameters,
+}
+
+/// The same to be overwritten.
+pub struct Target<'a> {
     /// Heights and node states.
     pub ground: &'a mut Ground,
     /// Loaded nodes.
     pub loaded: &'a mut Vec<[i32; 2]>,
     /// Sums over the run.
     pub book: &'a mut Book,
-    /// The laws' numbers, which may be changed during a run.
+    /// The laws' numbers.
     pub parameters: &'a mut SoilParameters,
+}
+
+impl<S> Slot<S> {
+    /// Copies the state; the material's own is left to the caller.
+    pub fn fill(&mut self, state: &Committed) {
+        state.ground.heights.save(&mut self.heights);
+        state.ground.nodes.save(&mut self.nodes);
+        self.wheels.clone_from(&state.ground.wheels);
+        self.contacts.clone_from(&state.ground.contacts);
+        self.loaded.clone_from(state.loaded);
+        self.book = *state.book;
+        self.parameters = Some(*state.parameters);
+    }
+
+    /// Copies it back; the material's own is left to the caller.
+    ///
+    /// # Errors
+    /// It was never filled.
+    pub fn put_back(&self, state: &mut Target) -> Result {
+        let empty = || Error::Refused("nothing is saved in this slot".into());
+        *state.parameters = self.parameters.ok_or_else(empty)?;
+        state.ground.heights.restore(&self.heights);
+        state.ground.nodes.restore(&self.nodes);
+        state.ground.wheels.clone_from(&self.wheels);
+        state.ground.contacts.clone_from(&self.contacts);
+        state.loaded.clone_from(&self.loaded);
+        *state.book = self.book;
+        Ok(())
+    }
+}
+
+impl<S: Persist> Slot<S> {
+    /// As bytes that only a soil on the same ground takes.
+    pub fn to_bytes(&self, ground: &Ground) -> Vec<u8> {
+        bytes::seal(VERSION, mark(ground), self)
+    }
+
+    /// Back from such bytes.
+    ///
+    /// # Errors
+    /// `Refused`: cut, changed, of another ground, or about nodes that the ground does not have.
+    pub fn from_bytes(from: &[u8], ground: &Ground) -> Result<Self> {
+        let slot: Self = bytes::open(VERSION, mark(ground), from)?;
+        let lattice = ground.heights.lattice();
+        let inside = |[i, j]: &[i32; 2]| lattice.has(*i, *j);
+        let tiles = slot.heights.tiles().all(|(t, _)| (t as usize) < lattice.tile_count());
+        let nodes = slot.nodes.contacts().all(inside) && slot.loaded.iter().all(inside);
+        if tiles && nodes && slot.parameters.is_some() {
+            Ok(slot)
+        } else {
+            Err(bytes::wrong("they speak of nodes that this ground does not have"))
+        }
+    }
+}
+
+/// Of the ground at its start: where its nodes lie, and how high.
+fn mark(ground: &Ground) -> u64 {
+    let lattice = ground.heights.lattice();
+    let mut all = Vec::new();
+    (lattice.origin, [lattice.spacing]).write(&mut all);
+    lattice.size.write(&mut all);
+    for j in 0..lattice.size[1] as i32 {
+        for i in 0..lattice.size[0] as i32 {
+            ground.heights.initial_units(i, j).write(&mut all);
+        }
+        let row = bytes::hash(&all);
+        all.clear();
+        row.write(&mut all);
+    }
+    bytes::hash(&all)
 }
 
 /// All slots of an instance.
@@ -46,30 +153,15 @@ impl<S: Default> Slots<S> {
         Self { slots: (0..count).map(|_| Slot::default()).collect() }
     }
 
-    /// Copies the state into a slot; the place for the material's own state is returned.
-    pub fn save(&mut self, slot: u32, state: &Committed) -> Result<&mut S> {
-        let s = self.slots.get_mut(slot as usize).ok_or_else(|| unknown(slot))?;
-        state.ground.heights.save(&mut s.heights);
-        state.ground.nodes.save(&mut s.nodes);
-        s.wheels.clone_from(&state.ground.wheels);
-        s.contacts.clone_from(&state.ground.contacts);
-        s.loaded.clone_from(state.loaded);
-        s.book = *state.book;
-        s.parameters = Some(*state.parameters);
-        Ok(&mut s.material)
+    /// A slot to be filled.
+    pub fn get_mut(&mut self, slot: u32) -> Result<&mut Slot<S>> {
+        self.slots.get_mut(slot as usize).ok_or_else(|| unknown(slot))
     }
 
-    /// Copies a slot back; the material's own state is returned.
-    pub fn restore(&self, slot: u32, state: &mut Committed) -> Result<&S> {
-        let s = self.slots.get(slot as usize).ok_or_else(|| unknown(slot))?;
-        *state.parameters = s.parameters.ok_or_else(|| unknown(slot))?;
-        state.ground.heights.restore(&s.heights);
-        state.ground.nodes.restore(&s.nodes);
-        state.ground.wheels.clone_from(&s.wheels);
-        state.ground.contacts.clone_from(&s.contacts);
-        state.loaded.clone_from(&s.loaded);
-        *state.book = s.book;
-        Ok(&s.material)
+    /// A slot to be put back.
+    pub fn get(&self, slot: u32) -> Result<&Slot<S>> {
+        let filled = self.slots.get(slot as usize).filter(|s| s.parameters.is_some());
+        filled.ok_or_else(|| unknown(slot))
     }
 }
 

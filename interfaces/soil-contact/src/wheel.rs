@@ -220,6 +220,8 @@ pub fn recall(memories: &[Memory], key: u64) -> Memory {
     found.map_or(Memory { key, slip: 0.0, forward: true }, |k| memories[k])
 }
 
+terraglue_subsystem::persist!(Memory { key, slip, forward });
+
 #[cfg(test)]
 mod tests {
     use super::*;

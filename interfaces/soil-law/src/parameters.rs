@@ -256,3 +256,37 @@ fn weighed(config: &Config, name: &str) -> Result<f64> {
 fn unknown(key: &str, value: &str, known: &[&str]) -> Error {
     Error::Refused(format!("`{key}` = \"{value}\" is not known; take one of {}", known.join(", ")))
 }
+
+impl terraglue_subsystem::bytes::Persist for Family {
+    fn write(&self, out: &mut Vec<u8>) {
+        let (name, numbers) = match *self {
+            Self::Bekker => (0_u8, [0.0; 3]),
+            Self::Reece { k_c, k_phi } => (1, [k_c, k_phi, 0.0]),
+            Self::Bearing { n_c, n_gamma, reference } => (2, [n_c, n_gamma, reference]),
+        };
+        (name, numbers).write(out);
+    }
+    fn read(from: &mut &[u8]) -> Result<Self> {
+        match <(u8, [f64; 3])>::read(from)? {
+            (0, _) => Ok(Self::Bekker),
+            (1, [k_c, k_phi, _]) => Ok(Self::Reece { k_c, k_phi }),
+            (2, [n_c, n_gamma, reference]) => Ok(Self::Bearing { n_c, n_gamma, reference }),
+            _ => Err(terraglue_subsystem::bytes::wrong("there is no such pressure law")),
+        }
+    }
+}
+
+terraglue_subsystem::persist!(SoilParameters {
+    family,
+    n,
+    k_c,
+    k_phi,
+    c_pa,
+    phi_rad,
+    K_m,
+    density_kg_m3,
+    elastic_stiffness_pa_m,
+    gravity,
+    interface,
+    rolling,
+});

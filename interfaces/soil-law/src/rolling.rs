@@ -71,3 +71,5 @@ impl Rolling {
         self.peak.map_or(0.0, |[a0, a1]| (a0 + a1 * slip.clamp(0.0, 1.0)).clamp(0.0, 0.95))
     }
 }
+
+terraglue_subsystem::persist!(Rolling { sinkage, peak, across });

@@ -256,6 +256,8 @@ struct Plastic {
     by_p: f64,
 }
 
+terraglue_subsystem::persist!(ShearState { elastic, slip });
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -30,6 +30,25 @@ impl SlipSinkage {
     }
 }
 
+impl terraglue_subsystem::bytes::Persist for SlipSinkage {
+    fn write(&self, out: &mut Vec<u8>) {
+        let (name, n1) = match self {
+            Self::None => (0_u8, 0.0),
+            Self::Ding { n1 } => (1, *n1),
+            Self::Lyasko => (2, 0.0),
+        };
+        (name, n1).write(out);
+    }
+    fn read(from: &mut &[u8]) -> terraglue_subsystem::Result<Self> {
+        match <(u8, f64)>::read(from)? {
+            (0, _) => Ok(Self::None),
+            (1, n1) => Ok(Self::Ding { n1 }),
+            (2, _) => Ok(Self::Lyasko),
+            _ => Err(terraglue_subsystem::bytes::wrong("there is no such law of slip sinkage")),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -22,6 +22,7 @@
 //!
 //! SI units everywhere; the world frame is right-handed with z up.
 
+pub mod bytes;
 mod capability;
 mod config;
 pub mod cooperation;

@@ -155,3 +155,6 @@ impl Foot {
         0.0
     }
 }
+
+terraglue_subsystem::persist!(Twist { speed, turn_rate });
+terraglue_subsystem::persist!(Foot { phase, airborne, position, height, lift_off, lift });

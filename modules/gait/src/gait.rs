@@ -4,10 +4,14 @@ use crate::parameters::{Settings, schema, settings};
 use crate::variables;
 use crate::walker::{Command, Walker};
 use std::sync::Arc;
+use terraglue_subsystem::bytes;
 use terraglue_subsystem::{
     Capabilities, Config, Error, Host, Input, Module, Motion, Response, Result, Schema, Step, Subsystem,
     Values, ValuesMut, Variable,
 };
+
+/// Version of its states as bytes.
+const VERSION: u32 = 1;
 
 /// Walks a robot with six legs of four joints. Outputs are the targets at the committed time: those that the joints
 /// shall follow during the next step. Inputs are taken at the start of a step.
@@ -63,7 +67,7 @@ impl Module for Gait {
 
 impl Subsystem for Gait {
     fn capabilities(&self) -> Capabilities {
-        Capabilities::RETRY | Capabilities::STATE
+        Capabilities::RETRY | Capabilities::STATE | Capabilities::SERIALIZE
     }
 
     fn advance(&mut self, step: &Step, _input: &Input, out: &mut Response) -> Result {
@@ -95,6 +99,16 @@ impl Subsystem for Gait {
     fn restore_state(&mut self, slot: u32) -> Result {
         let (walker, command) =
             (*self.slot(slot)?).ok_or_else(|| Error::Refused(format!("nothing was saved in slot {slot}")))?;
+        (self.committed, self.trial, self.command) = (walker, walker, command);
+        Ok(())
+    }
+
+    fn serialize(&self) -> Result<Vec<u8>> {
+        Ok(bytes::seal(VERSION, 0, &(self.committed, self.command)))
+    }
+
+    fn deserialize(&mut self, from: &[u8]) -> Result {
+        let (walker, command) = bytes::open(VERSION, 0, from)?;
         (self.committed, self.trial, self.command) = (walker, walker, command);
         Ok(())
     }

@@ -62,3 +62,11 @@ impl Pattern {
         }
     }
 }
+
+terraglue_subsystem::persist!(
+    enum Pattern {
+        Tripod,
+        Ripple,
+        Wave,
+    }
+);

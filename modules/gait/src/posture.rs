@@ -73,3 +73,5 @@ pub fn turn_towards(gains: &Gains, heading: f64, yaw: f64) -> f64 {
 pub fn wrap(angle: f64) -> f64 {
     libm::atan2(libm::sin(angle), libm::cos(angle))
 }
+
+terraglue_subsystem::persist!(Posture { smooth, integral, correction });

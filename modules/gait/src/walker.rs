@@ -5,6 +5,8 @@ use crate::geometry::{JOINTS, LEGS};
 use crate::parameters::Settings;
 use crate::pattern::Pattern;
 use crate::posture::{Posture, turn_towards, wrap};
+use terraglue_subsystem::Result;
+use terraglue_subsystem::bytes::{self, Persist};
 
 /// What is asked of the walker and what it measures; may change before every step.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -186,4 +188,47 @@ impl Walker {
 
 fn moves(command: &Command) -> bool {
     command.speed != 0.0 || command.turn_rate != 0.0
+}
+
+terraglue_subsystem::persist!(Command {
+    speed,
+    turn_rate,
+    heading,
+    lift,
+    pattern,
+    posture_feedback,
+    heading_feedback,
+    attitude,
+});
+terraglue_subsystem::persist!(Walker {
+    mode,
+    pattern,
+    feet,
+    posture,
+    twist,
+    targets,
+    out_of_reach,
+    phase,
+    ramp,
+    slewed,
+    turned,
+});
+
+impl Persist for Mode {
+    fn write(&self, out: &mut Vec<u8>) {
+        match self {
+            Self::Standing(left) => (0_u8, *left),
+            Self::Walking => (1, 0.0),
+            Self::Stopping => (2, 0.0),
+        }
+        .write(out);
+    }
+    fn read(from: &mut &[u8]) -> Result<Self> {
+        match <(u8, f64)>::read(from)? {
+            (0, left) => Ok(Self::Standing(left)),
+            (1, _) => Ok(Self::Walking),
+            (2, _) => Ok(Self::Stopping),
+            _ => Err(bytes::wrong("a walking machine has no such mode")),
+        }
+    }
 }

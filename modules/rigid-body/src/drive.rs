@@ -300,6 +300,17 @@ pub(crate) fn at_rest(u: f64) -> bool {
     u.abs() <= RATE_TOLERANCE
 }
 
+terraglue_subsystem::persist!(
+    enum Motor {
+        Off,
+        Position,
+        Velocity,
+        Torque,
+        RigidPosition,
+        Voltage,
+    }
+);
+
 #[cfg(test)]
 mod tests {
     use super::*;

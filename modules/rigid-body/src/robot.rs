@@ -275,6 +275,7 @@ impl Subsystem for Robot {
             | Capabilities::DERIVATIVES
             | Capabilities::RETRY
             | Capabilities::STATE
+            | Capabilities::SERIALIZE
     }
 
     fn set_ports(&mut self, step: &Step, _laws: &mut [Law], now: &mut Response) -> Result {
@@ -370,6 +371,17 @@ impl Subsystem for Robot {
         let Self { slots, state, .. } = self;
         let saved = slots.get(slot as usize).filter(|s| !s.bodies.is_empty()).ok_or_else(|| no_slot(slot))?;
         state.copy_from(saved);
+        self.changed();
+        Ok(())
+    }
+
+    fn serialize(&self) -> Result<Vec<u8>> {
+        Ok(self.state.to_bytes(self.model()))
+    }
+
+    fn deserialize(&mut self, from: &[u8]) -> Result {
+        let state = self.state.from_bytes(self.model(), from)?;
+        self.state.copy_from(&state);
         self.changed();
         Ok(())
     }

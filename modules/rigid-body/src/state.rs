@@ -8,6 +8,8 @@ use crate::dynamics::scheme::Acceleration;
 use crate::math::{Q, V3};
 use terraglue_subsystem::Energy;
 
+mod bytes;
+
 /// Motion of a body: centre of mass, orientation, and their rates in world axes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Motion {

@@ -127,6 +127,11 @@ impl Marks {
         out.extend(self.tiles.iter().map(|t| (*t, self.bits[*t as usize])));
     }
 
+    /// Whether a saved set lies in this lattice.
+    pub fn fits(&self, saved: &[(u32, TileBits)]) -> bool {
+        saved.iter().all(|(tile, _)| (*tile as usize) < self.bits.len())
+    }
+
     /// Back to a saved set.
     pub fn restore(&mut self, saved: &[(u32, TileBits)]) {
         self.clear();
@@ -136,6 +141,8 @@ impl Marks {
         }
     }
 }
+
+terraglue_subsystem::persist!(TileBits { rows, any });
 
 #[cfg(test)]
 mod tests {

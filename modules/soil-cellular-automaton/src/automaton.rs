@@ -230,6 +230,11 @@ impl Material for Automaton {
         (out.credit, out.commits, out.rescan) = (self.credit, self.commits, self.rescan);
     }
 
+    fn fits(&self, saved: &Saved, ground: &Ground) -> bool {
+        let lattice = ground.heights.lattice();
+        self.sweeper.fits(&saved.awake) && saved.feet.iter().all(|f| lattice.has(f.node[0], f.node[1]))
+    }
+
     fn restore(&mut self, saved: &Saved) {
         self.settings = saved.settings.unwrap_or(self.settings);
         self.friction_angle = saved.friction_angle;
@@ -240,3 +245,20 @@ impl Material for Automaton {
         self.limit();
     }
 }
+
+terraglue_subsystem::persist!(Settings {
+    curvature_max,
+    angle_of_repose,
+    sweeps_per_step,
+    compacted_fraction
+});
+terraglue_subsystem::persist!(Saved {
+    settings,
+    friction_angle,
+    awake,
+    feet,
+    compaction,
+    credit,
+    commits,
+    rescan,
+});

@@ -83,6 +83,8 @@ impl Compaction {
     }
 }
 
+terraglue_subsystem::persist!(SavedCompaction { fraction, grains, carried, total });
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -147,3 +147,5 @@ impl Feet {
         self.cover(true);
     }
 }
+
+terraglue_subsystem::persist!(Foot { node, load, room });

@@ -276,6 +276,11 @@ impl Sweeper {
         out.counts = self.counts;
     }
 
+    /// Whether a saved state lies in this ground.
+    pub fn fits(&self, saved: &SavedAwake) -> bool {
+        self.repose.fits(&saved.repose) && self.curvature.fits(&saved.curvature)
+    }
+
     /// Back to a saved state.
     pub fn restore(&mut self, saved: &SavedAwake) {
         self.changed.clear();
@@ -291,3 +296,6 @@ fn inside(bits: u32, first: i32, area: &Rectangle) -> u32 {
     let high = (area.last[0] - first).clamp(0, 31) as u32;
     bits & (u32::MAX << low) & (u32::MAX >> (31 - high))
 }
+
+terraglue_subsystem::persist!(Counts { visited, sweeps, moved, gained, parity });
+terraglue_subsystem::persist!(SavedAwake { repose, curvature, counts });

@@ -93,6 +93,20 @@ impl Supply {
     }
 }
 
+terraglue_subsystem::persist!(Supply {
+    open_circuit,
+    points,
+    resistance,
+    capacity,
+    charge,
+    limit,
+    voltage,
+    current,
+    delivered,
+    lost,
+    missing,
+});
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -115,3 +115,16 @@ impl Actuator {
         self.voltage * current * h
     }
 }
+
+terraglue_subsystem::persist!(Book {
+    power,
+    electrical_power,
+    friction,
+    stop,
+    work,
+    electrical,
+    winding_heat,
+    gear_heat,
+    heat,
+    friction_heat,
+});

@@ -7,6 +7,9 @@
 //! for any pair of them. On a line the axis is a row u + λ/s = a/s of the step's linear system (no row where s = 0),
 //! on a vertical piece a rigid row; the right piece is found by an active set over all axes.
 
+use terraglue_subsystem::Result;
+use terraglue_subsystem::bytes::{self, Persist};
+
 /// Most kinks of a curve; parts add up to 19.
 const KINKS: usize = 24;
 
@@ -455,6 +458,42 @@ fn middle(low: f64, high: f64) -> f64 {
         (true, false) => low + low.abs().max(1.0),
         (false, true) => high - high.abs().max(1.0),
         (false, false) => 0.0,
+    }
+}
+
+terraglue_subsystem::persist!(
+    enum Tag {
+        Law,
+        High,
+        Low,
+        SupplyHigh,
+        SupplyLow,
+        CurrentHigh,
+        CurrentLow,
+        Gear,
+        Friction,
+        LowerLimit,
+        UpperLimit,
+        Brake,
+    }
+);
+
+impl Persist for Mode {
+    fn write(&self, out: &mut Vec<u8>) {
+        let (name, place) = match self {
+            Self::Free => (0_u8, None),
+            Self::Line { index, tag } => (1, Some((*index, *tag))),
+            Self::Kink { index, tag } => (2, Some((*index, *tag))),
+        };
+        (name, place).write(out);
+    }
+    fn read(from: &mut &[u8]) -> Result<Self> {
+        match <(u8, Option<(usize, Tag)>)>::read(from)? {
+            (0, None) => Ok(Self::Free),
+            (1, Some((index, tag))) if index <= KINKS => Ok(Self::Line { index, tag }),
+            (2, Some((index, tag))) if index < KINKS => Ok(Self::Kink { index, tag }),
+            _ => Err(bytes::wrong("a motor has no such branch")),
+        }
     }
 }
 

@@ -113,3 +113,24 @@ impl Actuator {
         self.book.rest();
     }
 }
+
+terraglue_subsystem::persist!(
+    enum Drivetrain {
+        Ideal,
+        CurrentFormula,
+        Dc,
+    }
+);
+terraglue_subsystem::persist!(Actuator {
+    kind,
+    settings,
+    voltage_target,
+    current,
+    voltage,
+    winding_k,
+    housing_k,
+    bristle,
+    rate,
+    stuck,
+    book,
+});

@@ -6,6 +6,8 @@
 use crate::contact::detection::ContactPoint;
 use crate::math::V3;
 use crate::state::Motion;
+use terraglue_subsystem::Result;
+use terraglue_subsystem::bytes::Persist;
 
 /// Points of a pair nearer than this to an old one go on with its force, m.
 const NEAR: f64 = 1e-2;
@@ -54,5 +56,16 @@ pub(crate) fn recall(
         if let Some(old) = old.min_by(|a, b| away(a).total_cmp(&away(b))) {
             r.iter_mut().zip(old.force).for_each(|(r, f)| *r = h * f);
         }
+    }
+}
+
+impl Persist for Pressed {
+    fn write(&self, out: &mut Vec<u8>) {
+        let Self { pair, place, force } = self;
+        (*pair, [<[f64; 3]>::from(*place), *force]).write(out);
+    }
+    fn read(from: &mut &[u8]) -> Result<Self> {
+        let (pair, [place, force]) = <(usize, [[f64; 3]; 2])>::read(from)?;
+        Ok(Self { pair, place: place.into(), force })
     }
 }

@@ -106,6 +106,8 @@ impl Weights {
     }
 }
 
+terraglue_subsystem::persist!(Acceleration { algorithmic, real });
+
 #[cfg(test)]
 mod tests {
     use super::*;

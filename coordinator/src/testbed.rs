@@ -15,11 +15,13 @@ use serde_json::Value;
 use std::path::PathBuf;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Instant as Clock;
-use terraglue_subsystem::{BodyState, Energy, Input, Motion, Response, Step};
+use std::time::{Duration, Instant as Clock};
+use terraglue_subsystem::{BodyState, Energy};
+use unglued::Unglued;
 
 mod build;
 mod hosted;
+mod unglued;
 
 /// What a run needs beside its scenario.
 #[derive(Clone, Debug, Default)]
@@ -39,6 +41,10 @@ struct Member {
     /// Steps of the testbed per step of this subsystem.
     step_multiple: u64,
     glued: bool,
+    /// How its last trial without glue ended.
+    trial: Result<Progress>,
+    /// CPU cost of its trials without glue, sampled, s.
+    cost: Duration,
 }
 
 /// Subsystems that share ports, with their strategy.
@@ -63,6 +69,7 @@ pub struct Testbed {
     happenings: Vec<Happening>,
     no_glue: StepReport,
     timings: Timings,
+    unglued: Unglued,
     gravity: [f64; 3],
     contact_margin_m: f64,
     cancel: Arc<AtomicBool>,
@@ -138,10 +145,10 @@ impl Testbed {
         let mut h = self.step_s;
         self.halvings = 0;
         while end - self.t > 1e-6 * self.step_s {
-            let start = Clock::now();
+            let (start, times) = self.watch();
             self.apply_events()?;
             self.transfer_signals()?;
-            self.timings.charge(Part::Signals, start);
+            self.timings.charge_sample(Part::Signals, start, times);
             let h_now = h.min(end - self.t);
             match self.communication_step(h_now, end)? {
                 Outcome::Converged => {
@@ -205,12 +212,12 @@ impl Testbed {
 
     /// (3) to (5) for one step of length h; nothing is committed unless it converged.
     fn communication_step(&mut self, h: f64, end: f64) -> Result<Outcome> {
-        let start = Clock::now();
+        let (start, times) = self.watch();
         let early = self.advance_unglued(h, end)?;
         if let Some(why) = early {
             return Ok(Outcome::NotConverged(why));
         }
-        self.timings.charge(Part::Unglued, start);
+        self.timings.charge_sample(Part::Unglued, start, times);
         let outcome = self.glue(h)?;
         if outcome == Outcome::Converged {
             self.commit_unglued(h, end)?;
@@ -221,6 +228,9 @@ impl Testbed {
 
     /// (4) The group of glued subsystems: the five steps of the paper.
     fn glue(&mut self, h: f64) -> Result<Outcome> {
+        if self.group.is_none() {
+            return Ok(Outcome::Converged);
+        }
         let at = Instant { t: self.t, h, index: self.index, hold: self.hold, ..Instant::default() };
         let start = Clock::now();
         // step 1: collision detection and the constraints of rigid contact
@@ -248,42 +258,6 @@ impl Testbed {
         let (members, instances) = (&self.members, &self.instances);
         let states = |slot: u32| members[slot as usize].states.as_slice();
         self.detector.detect(&now, states, |slot| instances[slot as usize].subsystem())?;
-        Ok(())
-    }
-
-    /// (3) A trial of every subsystem without glue.
-    fn advance_unglued(&mut self, h: f64, end: f64) -> Result<Option<String>> {
-        for (instance, member) in self.instances.iter_mut().zip(&self.members) {
-            if let Some(step) = member.own_step(self.t, h, end, self.nominal, self.step_s, self.index) {
-                let none = Input::Force { t: &[], hold: gluing::HOLD, motion: None };
-                let mut out = Response {
-                    x: &mut [],
-                    v: &mut [],
-                    a: &mut [],
-                    t: &mut [],
-                    reached: step.t + step.h,
-                    flags: 0,
-                };
-                if let Progress::Early { reached_s } = instance.advance(&step, &none, &mut out)? {
-                    if member.step_multiple > 1 {
-                        let message = format!("ended its long step early, at t = {reached_s} s");
-                        return Err(instance.error("advance", message));
-                    }
-                    return Ok(Some(format!("`{}` discarded the step", instance.name())));
-                }
-            }
-        }
-        Ok(None)
-    }
-
-    /// (5) for subsystems without glue.
-    fn commit_unglued(&mut self, h: f64, end: f64) -> Result {
-        let still = Motion { x: &[], v: &[] };
-        for (instance, member) in self.instances.iter_mut().zip(&self.members) {
-            if let Some(step) = member.own_step(self.t, h, end, self.nominal, self.step_s, self.index) {
-                instance.commit(&step, &[], &still)?;
-            }
-        }
         Ok(())
     }
 
@@ -467,31 +441,6 @@ impl Testbed {
             group.closed.clone_from(&snapshot.closed);
         }
         self.read_states()
-    }
-}
-
-impl Member {
-    /// The step that this subsystem makes by itself now, if any: one of `step_multiple` nominal steps is made
-    /// when its last part is reached, so its outputs never run ahead.
-    fn own_step(
-        &self,
-        t: f64,
-        h: f64,
-        end: f64,
-        nominal: u64,
-        step_s: f64,
-        index: u64,
-    ) -> Option<Step<'static>> {
-        if self.glued {
-            return None;
-        }
-        if self.step_multiple == 1 {
-            return Some(Step::free(t, h, index));
-        }
-        let at_end = end - (t + h) <= 1e-6 * step_s;
-        let whole = (nominal + 1).is_multiple_of(self.step_multiple);
-        let length = self.step_multiple as f64 * step_s;
-        (at_end && whole).then(|| Step::free(end - length, length, (nominal + 1) / self.step_multiple - 1))
     }
 }
 

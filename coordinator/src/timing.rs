@@ -51,6 +51,13 @@ pub struct Timings {
 }
 
 impl Timings {
+    /// The time since `start` counts `times` for `part`; nothing where no watch was started.
+    pub fn charge_sample(&mut self, part: Part, start: Option<Instant>, times: u32) {
+        if let Some(start) = start {
+            self.sums[part as usize] += start.elapsed() * times;
+        }
+    }
+
     /// The time since `start` goes to the account of `part`.
     pub fn charge(&mut self, part: Part, start: Instant) {
         self.sums[part as usize] += start.elapsed();

@@ -27,6 +27,23 @@ struct Shared {
     next: AtomicUsize,
 }
 
+/// Start of a list whose items go to one thread each.
+struct Items<T>(*mut T);
+
+// SAFETY: items that can be sent are handed to one thread each.
+unsafe impl<T: Send> Sync for Items<T> {}
+
+impl<T> Items<T> {
+    /// Address of item k.
+    ///
+    /// # Safety
+    /// The list has an item k.
+    unsafe fn at(&self, k: usize) -> *mut T {
+        // SAFETY: by the caller.
+        unsafe { self.0.add(k) }
+    }
+}
+
 #[derive(Default)]
 struct State {
     /// The loop in flight.
@@ -94,6 +111,22 @@ impl Workers {
 }
 
 impl Workers {
+    /// Runs job(a, b) for each pair of items of two lists of one length, on any thread.
+    pub fn for_each_pair<A: Send, B: Send>(
+        &self,
+        a: &mut [A],
+        b: &mut [B],
+        job: &(dyn Fn(&mut A, &mut B) + Sync),
+    ) {
+        let n = a.len().min(b.len());
+        let (a, b) = (Items(a.as_mut_ptr()), Items(b.as_mut_ptr()));
+        self.parallel_for(n, &|k| {
+            // SAFETY: k is below both lengths, and `parallel_for` runs each k once, so no item is lent twice.
+            let (a, b) = unsafe { (&mut *a.at(k), &mut *b.at(k)) };
+            job(a, b);
+        });
+    }
+
     /// The right to run a loop on all threads; None: one is running.
     fn enter(&self) -> Option<MutexGuard<'_, ()>> {
         match self.busy.try_lock() {
@@ -194,6 +227,14 @@ mod tests {
                 assert!(runs.iter().all(|r| r.load(Ordering::Relaxed) == round));
             }
         }
+    }
+
+    #[test]
+    fn pairs_are_lent_to_one_thread_each() {
+        let workers = Workers::new(3);
+        let (mut a, mut b): (Vec<usize>, Vec<usize>) = ((0..500).collect(), vec![0; 500]);
+        workers.for_each_pair(&mut a, &mut b, &|a, b| *b = std::mem::take(a) + 1);
+        assert!(a.iter().all(|a| *a == 0) && b.iter().enumerate().all(|(k, b)| *b == k + 1));
     }
 
     #[test]

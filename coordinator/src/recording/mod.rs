@@ -44,6 +44,7 @@ mod snapshot;
 mod summary;
 mod summary_observer;
 mod table;
+mod trace;
 
 pub mod compare;
 pub mod report;
@@ -60,3 +61,4 @@ pub use recorder::{Recorder, RecorderOptions};
 pub use summary::{FailureRecord, Stall, Status, Summary};
 pub use summary_observer::SummaryObserver;
 pub use table::Table;
+pub use trace::Trace;

@@ -56,6 +56,11 @@ impl Directory {
 }
 
 impl VariableRef {
+    /// Its subsystem, by number.
+    pub fn slot(self) -> usize {
+        self.slot
+    }
+
     /// Description.
     pub fn describe(self, instances: &[Instance]) -> &Variable {
         &instances[self.slot].subsystem().variables()[self.variable]

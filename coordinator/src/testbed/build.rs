@@ -1,18 +1,20 @@
 //! From a checked scenario to a testbed: terrain, modules, instances, the group of glued subsystems, signals.
 
+use super::unglued::Unglued;
 use super::{Group, Member, Options, Testbed};
 use crate::contact::{BodySide, ContactDetector, GroundSide};
 use crate::gluing::glue::Recipe;
 use crate::gluing::{self, Exchange, Glue, StepReport};
 use crate::host::isolation::{self, What};
 use crate::host::{
-    HostServices, Instance, Library, LoadError, LoadedModule, SearchPath, Workers, interpreter,
+    HostServices, Instance, Library, LoadError, LoadedModule, Progress, SearchPath, Workers, interpreter,
 };
 use crate::scenario::{self, GlueSpec, InputError, Scenario, SubsystemSpec};
 use crate::signals::{self, Directory, TimeLine};
 use crate::timing::Timings;
 use crate::{Error, Result, terrain};
 use std::sync::Arc;
+use std::time::Duration;
 use terraglue_subsystem::{BodyState, Capabilities, Hold, Kind, Law, Level, Subsystem, Terrain};
 
 impl Testbed {
@@ -68,6 +70,7 @@ impl Testbed {
             happenings: Vec::new(),
             no_glue: StepReport { converged: true, ..StepReport::default() },
             timings: Timings::default(),
+            unglued: Unglued::new(services.workers.clone()),
             cancel: options.cancel.clone(),
             partings: services.partings.clone(),
             step_s: scenario.time.step_s,
@@ -167,6 +170,8 @@ fn members(scenario: &Scenario, instances: &[Instance], group: Option<&Group>) -
         states: vec![BodyState::REST; instance.scene().bodies.len()],
         step_multiple: u64::from(spec.step_multiple.max(1)),
         glued: glued(slot),
+        trial: Ok(Progress::Complete),
+        cost: Duration::ZERO,
     };
     scenario.subsystems.iter().zip(instances).enumerate().map(member).collect()
 }

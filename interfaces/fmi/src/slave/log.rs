@@ -2,6 +2,7 @@
 
 use std::collections::VecDeque;
 use std::ffi::{c_char, c_int, c_void};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Mutex, PoisonError};
 use terraglue_subsystem::LogLevel;
 
@@ -30,6 +31,8 @@ const LENGTH: usize = 1000;
 pub struct LogBook {
     sink: Sink,
     lines: Mutex<Lines>,
+    /// Whether anything was said since the last call began; most calls say nothing and need no lock.
+    said: AtomicBool,
 }
 
 #[derive(Default)]
@@ -42,11 +45,15 @@ struct Lines {
 
 impl LogBook {
     pub fn new(sink: Sink) -> Self {
-        Self { sink, lines: Mutex::default() }
+        Self { sink, lines: Mutex::default(), said: AtomicBool::new(false) }
     }
 
     /// A call begins: its lines count anew.
     pub fn begin(&self) {
+        if !self.said.load(Ordering::Relaxed) {
+            return;
+        }
+        self.said.store(false, Ordering::Relaxed);
         let mut lines = self.lines.lock().unwrap_or_else(PoisonError::into_inner);
         lines.this_call = 0;
         lines.kept.clear();
@@ -65,6 +72,7 @@ impl LogBook {
     }
 
     fn take(&self, status: c_int, category: &str, text: &str) {
+        self.said.store(true, Ordering::Relaxed);
         let mut lines = self.lines.lock().unwrap_or_else(PoisonError::into_inner);
         let trimmed: String = text.trim().chars().take(LENGTH).collect();
         let text: String = trimmed.chars().map(|c| if c.is_control() { ' ' } else { c }).collect();

@@ -23,16 +23,21 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     all.extend(cycles::figures(&folder, context.quick)?);
     all.extend(reference::figures(context)?);
     if context.timing {
-        all.extend(cost::figures(&folder)?);
+        all.extend(cost::figures(&folder, context)?);
     }
     Ok(all)
 }
 
 /// A testbed from the text of a scenario that lies in `folder`.
 fn testbed(folder: &Path, text: &str) -> Result<Testbed, terraglue::Error> {
+    testbed_on(folder, text, 1)
+}
+
+/// The same on so many threads.
+fn testbed_on(folder: &Path, text: &str, threads: usize) -> Result<Testbed, terraglue::Error> {
     let path = folder.join("scenario.toml").display().to_string();
     let scenario = Scenario::parse(text, &path, &[])?;
-    Testbed::build(&scenario, &Options { threads: 1, ..Options::default() })
+    Testbed::build(&scenario, &Options { threads, ..Options::default() })
 }
 
 /// The same where an error ends the measurement.

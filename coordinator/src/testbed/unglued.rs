@@ -1,0 +1,155 @@
+//! Subsystems without glue: one trial each per step, beside each other where that pays.
+//!
+//! Their trials see committed values only, so the order, and the thread that runs one, cannot be seen in any result.
+//! Every 64th step runs one after the other under a watch: it tells what each costs, and whether threads gain.
+
+use super::{Member, Testbed};
+use crate::Result;
+use crate::gluing;
+use crate::host::{Instance, Progress, Workers};
+use std::sync::Arc;
+use std::time::{Duration, Instant};
+use terraglue_subsystem::{Input, Motion, Response, Step};
+
+/// Steps from one that is watched to the next.
+const SAMPLED: u64 = 64;
+/// The first one to be watched; what is made at the first step of all is no example.
+const FIRST: u64 = 1;
+/// What threads must save in a step before they are woken: several times what waking costs.
+const WORTH: Duration = Duration::from_micros(20);
+
+/// Whether trials run beside each other.
+pub(super) struct Unglued {
+    workers: Arc<Workers>,
+    /// What threads would have saved in the last two steps that were watched.
+    saved: [Duration; 2],
+}
+
+/// A step of the testbed as subsystems see it.
+#[derive(Clone, Copy)]
+struct Span {
+    t: f64,
+    h: f64,
+    end: f64,
+    nominal: u64,
+    step_s: f64,
+    index: u64,
+}
+
+impl Unglued {
+    pub fn new(workers: Arc<Workers>) -> Self {
+        Self { workers, saved: [Duration::ZERO; 2] }
+    }
+
+    fn pays(&self) -> bool {
+        self.workers.threads() > 1 && self.saved.iter().all(|s| *s >= WORTH)
+    }
+}
+
+impl Testbed {
+    /// A watch for a part of this step, and how many steps it stands for. Where bodies are glued every step is
+    /// watched; elsewhere reading the clock would cost more than the step of a cheap unit.
+    pub(super) fn watch(&self) -> (Option<Instant>, u32) {
+        if self.group.is_some() {
+            return (Some(Instant::now()), 1);
+        }
+        (self.is_sampled().then(Instant::now), SAMPLED as u32)
+    }
+
+    fn is_sampled(&self) -> bool {
+        self.index % SAMPLED == FIRST
+    }
+
+    fn span(&self, h: f64, end: f64) -> Span {
+        Span { t: self.t, h, end, nominal: self.nominal, step_s: self.step_s, index: self.index }
+    }
+
+    /// (3) A trial of every subsystem without glue. What discarded the step, if any.
+    pub(super) fn advance_unglued(&mut self, h: f64, end: f64) -> Result<Option<String>> {
+        let span = self.span(h, end);
+        if self.is_sampled() {
+            self.sample(span);
+        } else if self.unglued.pays() {
+            let job = |instance: &mut Instance, member: &mut Member| member.try_alone(instance, span);
+            self.unglued.workers.for_each_pair(&mut self.instances, &mut self.members, &job);
+        } else {
+            let all = self.instances.iter_mut().zip(&mut self.members);
+            all.for_each(|(instance, member)| member.try_alone(instance, span));
+        }
+        for (instance, member) in self.instances.iter().zip(&mut self.members) {
+            match std::mem::replace(&mut member.trial, Ok(Progress::Complete))? {
+                Progress::Complete => {}
+                Progress::Early { reached_s } if member.step_multiple > 1 => {
+                    let message = format!("ended its long step early, at t = {reached_s} s");
+                    return Err(instance.error("advance", message));
+                }
+                Progress::Early { .. } => {
+                    return Ok(Some(format!("`{}` discarded the step", instance.name())));
+                }
+            }
+        }
+        Ok(None)
+    }
+
+    /// One after the other, each under a watch.
+    fn sample(&mut self, span: Span) {
+        let (mut sum, mut longest) = (Duration::ZERO, Duration::ZERO);
+        for (instance, member) in self.instances.iter_mut().zip(&mut self.members).filter(|(_, m)| !m.glued) {
+            let start = Instant::now();
+            member.try_alone(instance, span);
+            let took = start.elapsed();
+            member.cost += took * SAMPLED as u32;
+            sum += took;
+            longest = longest.max(took);
+        }
+        let threads = self.unglued.workers.threads() as u32;
+        let beside = longest.max(sum / threads);
+        self.unglued.saved = [self.unglued.saved[1], sum - beside];
+    }
+
+    /// (5) for subsystems without glue.
+    pub(super) fn commit_unglued(&mut self, h: f64, end: f64) -> Result {
+        let still = Motion { x: &[], v: &[] };
+        let span = self.span(h, end);
+        for (instance, member) in self.instances.iter_mut().zip(&self.members) {
+            if let Some(step) = member.own_step(span) {
+                instance.commit(&step, &[], &still)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// What the trials of each subsystem without glue have cost so far, s: wall time of the steps that were watched,
+    /// times the steps that each stands for.
+    pub fn costs(&self) -> impl Iterator<Item = (&str, f64)> {
+        let all = self.instances.iter().zip(&self.members).filter(|(_, m)| !m.glued);
+        all.map(|(instance, member)| (instance.name(), member.cost.as_secs_f64()))
+    }
+}
+
+impl Member {
+    /// Its trial of this step, if it makes one.
+    fn try_alone(&mut self, instance: &mut Instance, span: Span) {
+        let Some(step) = self.own_step(span) else { return };
+        let none = Input::Force { t: &[], hold: gluing::HOLD, motion: None };
+        let reached = step.t + step.h;
+        let mut out = Response { x: &mut [], v: &mut [], a: &mut [], t: &mut [], reached, flags: 0 };
+        self.trial = instance.advance(&step, &none, &mut out);
+    }
+
+    /// The step that this subsystem makes by itself now, if any: one of `step_multiple` nominal steps is made
+    /// when its last part is reached, so its outputs never run ahead.
+    fn own_step(&self, span: Span) -> Option<Step<'static>> {
+        if self.glued {
+            return None;
+        }
+        let Span { t, h, end, nominal, step_s, index } = span;
+        if self.step_multiple == 1 {
+            return Some(Step::free(t, h, index));
+        }
+        let at_end = end - (t + h) <= 1e-6 * step_s;
+        let whole = (nominal + 1).is_multiple_of(self.step_multiple);
+        let length = self.step_multiple as f64 * step_s;
+        (at_end && whole).then(|| Step::free(end - length, length, (nominal + 1) / self.step_multiple - 1))
+    }
+}

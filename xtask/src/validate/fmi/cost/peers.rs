@@ -1,0 +1,77 @@
+//! The same units in other masters, measured in the same run: installed by name into a virtual environment of its own.
+
+use super::steps::{CASES, unit};
+use crate::process::{Outcome, command, target};
+use crate::validate::{Figure, Limit};
+use std::path::{Path, PathBuf};
+use std::process::Stdio;
+
+const SCRIPT: &str = "xtask/src/validate/fmi/cost/peers.py";
+const PACKAGES: [&str; 5] =
+    ["fmpy==0.3.32", "ecospy==0.7.2", "tbb", "libcosimpy==0.0.6", "fmu-manipulation-toolbox"];
+
+/// Figures of all peers; none of them is judged.
+pub fn figures(folder: &Path) -> Vec<Figure> {
+    measured(folder).unwrap_or_else(|why| vec![Figure::skipped("fmi.cost.peer", why)])
+}
+
+fn measured(folder: &Path) -> Outcome<Vec<Figure>> {
+    let python = python()?;
+    let mut all = Vec::new();
+    for peer in ["ecos", "libcosim", "fmpy", "fmucontainer"] {
+        for case in &CASES {
+            let file = folder.join(format!("{}.fmu", unit(case)));
+            let mut child = command(&python, &[SCRIPT, peer]);
+            child.arg(&file).arg(case.units.to_string()).arg(if case.pair { "pair" } else { "chain" });
+            child.arg(folder.join("bare_loop"));
+            child.env("LD_LIBRARY_PATH", target().join("peers-fmi/lib"));
+            let output = child.output().map_err(|e| format!("{SCRIPT}: {e}"))?;
+            let text = String::from_utf8_lossy(&output.stdout).into_owned();
+            let value = text.lines().find_map(|l| l.strip_prefix("RESULT ")?.trim().parse().ok());
+            let id = format!("fmi.cost.peer.{peer}.{}", case.name);
+            all.push(match value {
+                Some(value) => Figure::new(
+                    id,
+                    value,
+                    Limit::None,
+                    format!("µs of CPU per unit and step, nothing recorded: {peer}"),
+                ),
+                None => {
+                    let said = String::from_utf8_lossy(&output.stderr).into_owned();
+                    Figure::skipped(id, said.trim().lines().last().unwrap_or("it said nothing").to_owned())
+                }
+            });
+        }
+    }
+    Ok(all)
+}
+
+/// The Python of `target/peers-fmi`, with what could be installed of the peers.
+fn python() -> Outcome<PathBuf> {
+    let folder = target().join("peers-fmi");
+    let python = folder.join("bin/python");
+    if python.exists() {
+        return Ok(python);
+    }
+    let run = |program: &Path, arguments: &[&str]| {
+        let done = command(program, arguments).stdout(Stdio::null()).stderr(Stdio::null()).status();
+        done.is_ok_and(|s| s.success())
+    };
+    if !run("python3".as_ref(), &["-m", "venv", "--clear", &folder.display().to_string()]) {
+        return Err("there is no python3 with venv for the peers".into());
+    }
+    for package in PACKAGES {
+        if !run(&python, &["-m", "pip", "install", "--quiet", package]) {
+            eprintln!("note: `pip install {package}` did not work");
+        }
+    }
+    Ok(python)
+}
+
+#[cfg(test)]
+mod tests {
+    #[test]
+    fn the_script_is_there() {
+        assert!(crate::process::root().join(super::SCRIPT).exists());
+    }
+}

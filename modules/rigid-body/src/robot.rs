@@ -147,6 +147,13 @@ impl Robot {
         self.scratch.gap.extend(gaps);
     }
 
+    /// T* on the present branches of the motors; whether it is unique.
+    fn solve_contact(&mut self, step: &Step, partner: &Motion, out: &mut Estimate) -> Result<bool> {
+        self.linear_contact(out.x_free, partner);
+        let problem = Problem { ports: step.ports, g: &self.scratch.g, gap: &self.scratch.gap };
+        self.estimator.solve(&problem, out.t_star).map_err(|e| Error::Failed(e.into()))
+    }
+
     /// x_free as it would be on the branches of the motors under T*: x(T*) − G·T*.
     fn extrapolate_free(&mut self, step: &Step, t: &[f64], x_free: &mut [f64]) {
         let n = self.ports.len();
@@ -301,11 +308,16 @@ impl Subsystem for Robot {
         out.unique = true;
         // Motors may change branch under T*; then the free motion is taken on the new branches.
         for _ in 0..4 {
-            self.linear_contact(out.x_free, partner);
-            let problem = Problem { ports: step.ports, g: &self.scratch.g, gap: &self.scratch.gap };
-            out.unique = self.estimator.solve(&problem, out.t_star).map_err(|e| Error::Failed(e.into()))?;
+            out.unique = self.solve_contact(step, partner, out)?;
             let factor = self.dynamics.factor_count;
-            self.try_wrenches(out.t_star)?;
+            if self.try_wrenches(out.t_star).is_err() {
+                // An impact that no step can follow: motors stay on the branches without it.
+                out.t_star.fill(0.0);
+                self.try_wrenches(out.t_star)?;
+                displacement(step.ports, &self.dynamics, out.x_free);
+                out.unique = self.solve_contact(step, partner, out)?;
+                break;
+            }
             if self.dynamics.factor_count == factor {
                 break;
             }

@@ -5,6 +5,10 @@
 //! smallest norm whatever the order of the feet (Rockafellar 1976). Then normals and sticking components
 //! together, starting from there, each port within its friction |T_t| ≤ μ·T_n and, for patches, its moments
 //! within the footprint; what would exceed a bound is put on it.
+//!
+//! Wheels that rigid motors hold against each other cannot all keep their place: then the joint solution has no bound
+//! or its rounds no end. Sweeps over the ports (projected Gauss–Seidel) that stay within friction and footprint then
+//! give another answer, and the one with the smaller defect counts.
 
 use crate::dense::{cholesky, cholesky_solve, rank};
 use crate::lcp::{Lemke, Outcome};
@@ -21,8 +25,13 @@ const IMMOBILE_REGULARISATION: f64 = 1e-9;
 const PROXIMAL_MIN: usize = 4;
 const PROXIMAL_MAX: usize = 40;
 const PROXIMAL_CHANGE: f64 = 1e-12;
+/// Still so large a share of T in the last proximal step: what is held cannot be held, and T grows with every step.
+const GROWS: f64 = 1e-2;
 /// Rounds in which ports change between open, sticking and slipping.
 const MAX_ROUNDS: usize = 24;
+/// Sweeps where rounds have no end, and the relative change that ends them.
+const SWEEPS: usize = 200;
+const SWEEP_CHANGE: f64 = 1e-9;
 
 /// What a component does at present.
 #[derive(Clone, Copy, PartialEq, Eq, Debug)]
@@ -58,6 +67,8 @@ pub(crate) struct Estimator {
     normal_gap: Vec<f64>,
     normal_rhs: Vec<f64>,
     solution: Vec<f64>,
+    /// Where the rounds ended without a result.
+    rounds: Vec<f64>,
 }
 
 fn unilateral(port: &Port) -> bool {
@@ -76,12 +87,23 @@ impl Estimator {
             self.status[port.range()].fill(if open { Status::Open } else { Status::Held });
         }
         for _ in 0..MAX_ROUNDS {
-            self.solve_held(p, t)?;
+            let settled = self.solve_held(p, t)?;
             if !self.change_status(p, t) {
+                if settled {
+                    return Ok(unique);
+                }
                 break;
             }
         }
-        Ok(unique)
+        self.rounds.clear();
+        self.rounds.extend_from_slice(t);
+        t.fill(0.0);
+        self.normals.iter().zip(&self.solution).for_each(|(i, s)| t[*i] = *s);
+        sweep(p, t);
+        if defect(p, &mut self.rounds) < defect(p, t) {
+            t.copy_from_slice(&self.rounds);
+        }
+        Ok(false)
     }
 
     fn classify(&mut self, p: &Problem) {
@@ -146,14 +168,15 @@ impl Estimator {
         rank(m, &mut self.matrix, 1e-9) == m
     }
 
-    /// Motion of all held components equals the partner's; the proximal point nearest to the present T.
-    fn solve_held(&mut self, p: &Problem, t: &mut [f64]) -> Result<(), &'static str> {
+    /// Motion of all held components equals the partner's; the proximal point nearest to the present T. False: there is
+    /// none.
+    fn solve_held(&mut self, p: &Problem, t: &mut [f64]) -> Result<bool, &'static str> {
         let n = p.gap.len();
         self.unknowns.clear();
         self.unknowns.extend((0..n).filter(|i| self.status[*i] == Status::Held));
         let m = self.unknowns.len();
         if m == 0 {
-            return Ok(());
+            return Ok(true);
         }
         self.matrix.clear();
         for c in &self.unknowns {
@@ -164,6 +187,7 @@ impl Estimator {
         if !cholesky(m, &mut self.matrix) {
             return Err("the compliance of the contacts is not positive definite");
         }
+        let mut settled = true;
         for step in 0..PROXIMAL_MAX {
             // In increments: (G + ε)·dT = −(x_free + G·T − x2), exact to rounding at any size of T.
             self.rhs.clear();
@@ -173,11 +197,12 @@ impl Estimator {
             let largest = |v: &mut dyn Iterator<Item = f64>| v.fold(0.0_f64, |a, x| a.max(x.abs()));
             let change = largest(&mut self.rhs.iter().copied());
             let size = largest(&mut t.iter().copied());
+            settled = change <= GROWS * size;
             if step >= PROXIMAL_MIN && change <= PROXIMAL_CHANGE * size {
                 break;
             }
         }
-        Ok(())
+        Ok(settled)
     }
 
     /// Opens, closes, clips; true when something changed noticeably.
@@ -210,16 +235,8 @@ impl Estimator {
 
     /// Puts the tangential force and the moments of a closed port within their bounds.
     fn clip(&mut self, port: &Port, t: &mut [f64], noticeable: f64) -> bool {
-        let normal = t[port.first as usize].max(0.0);
-        let extent = port.extent[0].max(port.extent[1]);
-        let bounds = [
-            (0b000110, port.law.mu * normal),
-            (0b001000, port.law.mu * normal * extent),
-            (0b010000, normal * port.extent[1]),
-            (0b100000, normal * port.extent[0]),
-        ];
         let mut changed = false;
-        for (mask, bound) in bounds {
+        for (mask, bound) in bounds(port, t) {
             let of = move |c: &(usize, usize)| mask & (1 << c.1) != 0;
             let squares: f64 = port.components().filter(of).map(|(i, _)| t[i] * t[i]).sum();
             let size = squares.sqrt();
@@ -234,6 +251,83 @@ impl Estimator {
             changed |= !slipping || (size - bound).abs() > noticeable;
         }
         changed
+    }
+}
+
+/// Bounds that the normal force of a port sets to the size of its tangential force and moments: which components.
+fn bounds(port: &Port, t: &[f64]) -> [(u32, f64); 4] {
+    let normal = t[port.first as usize].max(0.0);
+    let extent = port.extent[0].max(port.extent[1]);
+    [
+        (0b000110, port.law.mu * normal),
+        (0b001000, port.law.mu * normal * extent),
+        (0b010000, normal * port.extent[1]),
+        (0b100000, normal * port.extent[0]),
+    ]
+}
+
+/// Sweeps over the ports from the present T: each component on its own, then what has a bound within it.
+fn sweep(p: &Problem, t: &mut [f64]) {
+    for _ in 0..SWEEPS {
+        let (mut change, mut size) = (0.0_f64, 0.0_f64);
+        for port in p.ports {
+            let before = settle(p, port, t);
+            for (i, c) in port.components() {
+                change = change.max((t[i] - before[c]).abs());
+                size = size.max(t[i].abs());
+            }
+        }
+        if change <= SWEEP_CHANGE * size {
+            break;
+        }
+    }
+}
+
+/// By how much the ports would move, m and rad, if each settled on its own.
+fn defect(p: &Problem, t: &mut [f64]) -> f64 {
+    let mut sum = 0.0;
+    for port in p.ports {
+        let before = settle(p, port, t);
+        for (i, c) in port.components() {
+            sum += compliance(p, i) * (t[i] - before[c]).abs();
+            t[i] = before[c];
+        }
+    }
+    sum
+}
+
+/// One port settles while all others keep their wrenches: the normal, both tangential forces at once, each moment. Its
+/// wrench before.
+fn settle(p: &Problem, port: &Port, t: &mut [f64]) -> [f64; 6] {
+    let mut before = [0.0; 6];
+    port.components().for_each(|(i, c)| before[c] = t[i]);
+    for mask in [0b000001, 0b000110, 0b001000, 0b010000, 0b100000] {
+        let of = || port.components().filter(|(_, c)| mask & (1 << c) != 0);
+        let mut open = [0.0; 6];
+        of().for_each(|(i, c)| open[c] = residual(p, t, i));
+        let soft = of().fold(IMMOBILE, |m, (i, _)| m.max(compliance(p, i)));
+        of().for_each(|(i, c)| t[i] -= open[c] / soft);
+        if unilateral(port) {
+            within_bound(port, t, mask);
+        }
+    }
+    before
+}
+
+fn compliance(p: &Problem, i: usize) -> f64 {
+    p.g[i * p.gap.len() + i].max(IMMOBILE)
+}
+
+/// Puts the components of a port that share a bound within it.
+fn within_bound(port: &Port, t: &mut [f64], mask: u32) {
+    let of = || port.components().filter(|(_, c)| mask & (1 << c) != 0);
+    if mask == 1 {
+        return of().for_each(|(i, _)| t[i] = t[i].max(0.0));
+    }
+    let size = of().map(|(i, _)| t[i] * t[i]).sum::<f64>().sqrt();
+    let bound = bounds(port, t).into_iter().find(|b| b.0 == mask).map_or(f64::INFINITY, |b| b.1);
+    if size > bound {
+        of().for_each(|(i, _)| t[i] *= bound / size);
     }
 }
 

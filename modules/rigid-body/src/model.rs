@@ -110,6 +110,8 @@ pub(crate) struct Model {
     pub planes: Vec<Plane>,
     /// Pairs of bodies that never touch.
     pub excluded: Vec<[usize; 2]>,
+    /// Whether the first joint fixes a root with mass to the world, which the robot file does not know.
+    pub welded: bool,
 }
 
 impl Model {
@@ -133,7 +135,13 @@ impl Model {
         let mut joint_above = vec![None; bodies.len()];
         joints.iter().enumerate().for_each(|(i, j)| joint_above[j.child] = Some(i));
         let closures = Vec::new();
-        Self { bodies, joints, joint_above, closures, gravity, free, world_shapes, planes, excluded }
+        let welded = fixed_base && matches!(robot.base, import::Base::Free(_));
+        Self { bodies, joints, joint_above, closures, gravity, free, world_shapes, planes, excluded, welded }
+    }
+
+    /// Index of the joint with that index in the robot file: a weld of the root comes before them.
+    pub fn from_file(&self, joint: usize) -> usize {
+        joint + usize::from(self.welded)
     }
 
     /// Total mass, kg.
@@ -171,6 +179,8 @@ fn joint(j: &import::Joint, bodies: &[Body], base: &Isometry3<f64>) -> Joint {
             import::JointKind::Revolute => Kind::Revolute,
             import::JointKind::Prismatic => Kind::Prismatic,
             import::JointKind::Fixed => Kind::Fixed,
+            import::JointKind::Spherical => Kind::Spherical,
+            import::JointKind::Planar => Kind::Planar,
         },
         parent: j.parent,
         child: j.child,

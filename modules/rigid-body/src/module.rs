@@ -13,9 +13,11 @@ use crate::placement::{StartRates, at_rest, base_pose, clearance, coordinates, j
 use crate::robot::Robot;
 use crate::state::{ClosureState, ContactBook, JointState, Motion, State};
 use nalgebra::Isometry3;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
-use terraglue_robot_import::{Drive, DriveKind, read_robot};
+use terraglue_robot_import::{
+    Coupling, Drive, DriveKind, Heights, Options, Shape, ShapeGeometry, read_robot,
+};
 use terraglue_subsystem::{Config, Energy, Error, Host, LogLevel, Module, Result, Schema, Subsystem};
 
 /// Rigid bodies with joints and motors, read from a robot file.
@@ -31,21 +33,28 @@ impl Module for RigidBody {
         let said = config;
         let config = config.clone().with_defaults(&Self::schema());
         let fixed = config.flag("fixed_base")?;
-        let path = Path::new(host.folder()).join(config.text("model")?);
-        let file = read_robot(&path, fixed).map_err(|e| Error::Refused(e.to_string()))?;
+        let folder = Path::new(host.folder());
+        let options =
+            Options { fixed_base: fixed, packages: packages(&config, folder), ..Options::default() };
+        let file = read_robot(&folder.join(config.text("model")?), &options.with_ros_package_path())
+            .map_err(|e| Error::Refused(e.to_string()))?;
         let base = base_pose(&vector(&config, "position_m")?, config.number("heading_rad")?);
         let mut model = Model::new(&file, &base, fixed, V3::from(host.gravity()));
         set_kinds(&config, &mut model)?;
-        let angles = coordinates(&model, &config.number_table("joints")?)?;
+        model.world_shapes.extend(stone(&config, &*host)?);
+        let mut angles = coordinates(&model, &config.number_table("joints")?)?;
+        follow(&model, &file.couplings, &mut angles)?;
         let rates = StartRates {
             velocity: vector(&config, "velocity_m_s")?,
             rotation: vector(&config, "rotation_rate_rad_s")?,
             joints: joint_rates(&model, &config.number_table("joint_rates")?)?,
         };
         let bodies = start(&config, &*host, &model, base, (&angles, &rates))?;
-        let joints = joint_states((&config, said), &model, &angles, &rates.joints)?;
-        model.closures = closures(&config, &model, &bodies, &angles)?;
+        let mut joints = joint_states((&config, said), &model, &angles, &rates.joints)?;
+        without_own_motor(said, &model, &file.couplings, &mut joints);
+        model.closures = closures(&config, &model, (&bodies, &angles), (&file.couplings, &file.loops))?;
         file.warnings.iter().for_each(|w| host.log(LogLevel::Warning, w));
+        file.notices.iter().for_each(|n| host.log(LogLevel::Info, n));
         let mut state = State {
             forces: vec![V3::zeros(); bodies.len()],
             contact_normal: vec![0.0; bodies.len()],
@@ -75,7 +84,7 @@ impl Module for RigidBody {
             Dynamics::new(model, integrator, &state.bodies).map_err(|e| Error::Failed(e.to_string()))?;
         let ground = ground(&config)?;
         if integrator.is_second_order() {
-            let planes = ground.is_some() || !dynamics.model.planes.is_empty();
+            let planes = config.text("ground")? != "none" || !dynamics.model.planes.is_empty();
             without_impacts(&*host, planes, dynamics.contacts.watches())?;
             without_rebound(&dynamics.model, &state)?;
         }
@@ -135,7 +144,7 @@ fn surface(config: &Config) -> Result<Surface> {
 
 /// The rigid ground, if there is one.
 fn ground(config: &Config) -> Result<Option<Plane>> {
-    if config.text("ground")? == "none" {
+    if config.text("ground")? != "half-space" {
         return Ok(None);
     }
     let n = config.numbers("ground_normal")?;
@@ -148,6 +157,75 @@ fn ground(config: &Config) -> Result<Option<Plane>> {
     }
     let offset = config.number("ground_height_m")?;
     Ok(Some(Plane { normal: normal / length, offset, friction: None }))
+}
+
+/// The scenario's terrain as rigid ground, where that is wanted.
+fn stone(config: &Config, host: &dyn Host) -> Result<Option<Shape>> {
+    if config.text("ground")? != "terrain" {
+        return Ok(None);
+    }
+    let missing = "parameter `ground` = \"terrain\" needs a [terrain] in the scenario";
+    let terrain = host.terrain().ok_or_else(|| Error::Refused(missing.into()))?;
+    let (origin, spacing, nodes) = (terrain.origin(), terrain.spacing(), terrain.size().map(|n| n as usize));
+    if nodes.iter().any(|n| *n < 2) {
+        return Err(Error::Refused(
+            "parameter `ground` = \"terrain\": the terrain has fewer than 2 nodes".into(),
+        ));
+    }
+    let mut heights = vec![0.0; nodes[0] * nodes[1]];
+    terrain.heights(0, 0, nodes[0], nodes[1], &mut heights);
+    let lengths = nodes.map(|n| (n - 1) as f64 * spacing);
+    let middle = Isometry3::translation(origin[0] + lengths[0] / 2.0, origin[1] + lengths[1] / 2.0, 0.0);
+    Ok(Some(Shape {
+        name: "terrain".into(),
+        geometry: ShapeGeometry::Heights(Arc::new(Heights { nodes, lengths, heights })),
+        body_from_shape: middle,
+        collides: true,
+        friction: None,
+        group: 1,
+        mask: 1,
+    }))
+}
+
+/// Folders of packages by name.
+fn packages(config: &Config, folder: &Path) -> Vec<(String, PathBuf)> {
+    let table = config.get("packages").and_then(|v| v.as_object());
+    let entries = table.into_iter().flatten();
+    entries.filter_map(|(name, path)| Some((name.clone(), folder.join(path.as_str()?)))).collect()
+}
+
+/// Gives joints that follow others in the robot file their coordinates, leaders first.
+fn follow(model: &Model, couplings: &[Coupling], angles: &mut [f64]) -> Result<()> {
+    // A chain of followers is as long as there are couplings at most.
+    for _ in couplings {
+        couplings.iter().for_each(|c| {
+            angles[model.from_file(c.follower)] = c.ratio * angles[model.from_file(c.leader)] + c.offset
+        });
+    }
+    let outside = |c: &&Coupling| {
+        let (joint, angle) =
+            (&model.joints[model.from_file(c.follower)], angles[model.from_file(c.follower)]);
+        joint.limits.is_some_and(|[low, high]| angle < low || angle > high)
+    };
+    match couplings.iter().find(outside) {
+        None => Ok(()),
+        Some(c) => Err(Error::Refused(format!(
+            "parameter `joints`: joint `{}` follows `{}` to {} at the start, outside its limits",
+            model.joints[model.from_file(c.follower)].name,
+            model.joints[model.from_file(c.leader)].name,
+            angles[model.from_file(c.follower)]
+        ))),
+    }
+}
+
+/// A joint that follows another has no motor unless the scenario names it.
+fn without_own_motor(said: &Config, model: &Model, couplings: &[Coupling], joints: &mut [JointState]) {
+    let named =
+        |name: &str| said.get("motor").and_then(|v| v.as_object()).is_some_and(|t| t.contains_key(name));
+    for c in couplings.iter().map(|c| model.from_file(c.follower)).filter(|j| !named(&model.joints[*j].name))
+    {
+        joints[c].motor = Motor::Off;
+    }
 }
 
 /// A parameter with x, y, z.

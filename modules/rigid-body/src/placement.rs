@@ -121,7 +121,8 @@ pub(crate) fn clearance(model: &Model, bodies: &[Motion], terrain: &dyn Terrain)
         for shape in body.shapes.iter().filter(|s| s.collides) {
             let local = Translation3::from(-body.com) * parry_local(shape);
             let pose: Pose = (Isometry3::from_parts(Translation3::from(motion.c), motion.q) * local).into();
-            let found = shape_clearance(&*parry_shape(shape), &pose, terrain);
+            let Some(shape) = parry_shape(shape) else { continue };
+            let found = shape_clearance(&*shape, &pose, terrain);
             smallest = Some(smallest.map_or(found, |s| s.min(found)));
         }
     }

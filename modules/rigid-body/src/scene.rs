@@ -13,25 +13,36 @@ pub(crate) fn scene(model: &Model) -> Scene {
     let all = model.bodies.iter().enumerate().flat_map(|(b, body)| body.shapes.iter().map(move |s| (b, s)));
     let shapes = all
         .enumerate()
-        .map(|(id, (body, shape))| SceneShape {
-            id: id as u32,
-            body: body as u32,
-            name: shape.name.clone(),
-            geometry: geometry(&shape.geometry),
-            body_from_shape: pose(&shape.body_from_shape),
-            collides: shape.collides,
+        .filter_map(|(id, (body, shape))| {
+            Some(SceneShape {
+                id: id as u32,
+                body: body as u32,
+                name: shape.name.clone(),
+                geometry: geometry(&shape.geometry)?,
+                body_from_shape: pose(&shape.body_from_shape),
+                collides: shape.collides,
+            })
         })
         .collect();
     Scene { bodies, shapes }
 }
 
-fn geometry(g: &ShapeGeometry) -> Geometry {
-    match *g {
-        ShapeGeometry::Sphere { radius } => Geometry::Sphere { radius },
-        ShapeGeometry::Box { half_extents } => Geometry::Box { half_extents },
-        ShapeGeometry::Cylinder { half_length, radius } => Geometry::Cylinder { half_length, radius },
-        ShapeGeometry::Capsule { half_length, radius } => Geometry::Capsule { half_length, radius },
-    }
+/// Shapes of bodies are convex; ground of triangles is no body's.
+fn geometry(g: &ShapeGeometry) -> Option<Geometry> {
+    Some(match g {
+        ShapeGeometry::Sphere { radius } => Geometry::Sphere { radius: *radius },
+        ShapeGeometry::Box { half_extents } => Geometry::Box { half_extents: *half_extents },
+        ShapeGeometry::Cylinder { half_length, radius } => {
+            Geometry::Cylinder { half_length: *half_length, radius: *radius }
+        }
+        ShapeGeometry::Capsule { half_length, radius } => {
+            Geometry::Capsule { half_length: *half_length, radius: *radius }
+        }
+        ShapeGeometry::Hull(mesh) => {
+            Geometry::ConvexMesh { points: mesh.points.clone(), triangles: mesh.triangles.clone() }
+        }
+        ShapeGeometry::Triangles(_) | ShapeGeometry::Heights(_) => return None,
+    })
 }
 
 fn pose(iso: &Isometry3<f64>) -> Pose {

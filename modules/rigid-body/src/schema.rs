@@ -11,6 +11,12 @@ pub(crate) fn schema() -> Schema {
         help: "Rigid bodies with joints and motors, read from a robot file (URDF, MJCF)".into(),
         parameters: vec![
             Parameter::of("model", ParameterType::Path, "Robot file (URDF or MJCF)"),
+            Parameter::of(
+                "packages.*",
+                ParameterType::Path,
+                "Folder of a package that the robot file names by `package://` (else: folders above the file, ROS_PACKAGE_PATH)",
+            )
+            .optional(),
             Parameter {
                 unit: "m".into(),
                 ..Parameter::of("position_m", ParameterType::Numbers, "Initial x, y, z of the root link's frame")
@@ -87,9 +93,13 @@ pub(crate) fn schema() -> Schema {
             by_name("max_torque", "N m", 60.0, "Largest torque of the motors, for all joints or by name"),
             target_by_name("velocity_target", "rad/s", "Rate that the motors want at the start, for all joints or by name"),
             target_by_name("torque_target", "N m", "Torque that torque motors give at the start, for all joints or by name"),
-            Parameter::of("ground", ParameterType::Text, "Rigid ground under the robot: no soil is needed")
-                .or("none")
-                .choices(&["none", "half-space"]),
+            Parameter::of(
+                "ground",
+                ParameterType::Text,
+                "Rigid ground under the robot, where no soil is needed: a half-space, or the scenario's terrain turned to stone",
+            )
+            .or("none")
+            .choices(&["none", "half-space", "terrain"]),
             Parameter::number("ground_height_m", "m", 0.0, "Distance of the rigid ground from the origin along its normal"),
             Parameter::of("ground_normal", ParameterType::Numbers, "Direction out of the rigid ground: x, y, z")
                 .or(vec![0.0, 0.0, 1.0]),

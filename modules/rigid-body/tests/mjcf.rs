@@ -88,3 +88,74 @@ fn the_file_speaks_where_the_scenario_is_silent() {
     let rig = Rig::new(&format!(r#"{{"model": "{model}", "max_torque": 9, "stiffness": 70}}"#), 9.81, 1e-3);
     assert_eq!([rig.get("j.stiffness"), rig.get("j.max_torque"), rig.get("j.damping")], [70.0, 9.0, 2.0]);
 }
+
+#[test]
+fn a_joint_that_mimics_follows_with_its_own_ratio() {
+    let link = |name: &str| {
+        format!(
+            r#"<link name="{name}"><inertial><mass value="1"/>
+            <inertia ixx="0.1" iyy="0.1" izz="0.1" ixy="0" ixz="0" iyz="0"/></inertial></link>"#
+        )
+    };
+    let joint = |name: &str, child: &str, more: &str| {
+        format!(
+            r#"<joint name="{name}" type="revolute"><parent link="a"/><child link="{child}"/>
+            <origin xyz="0 0 1"/><axis xyz="0 0 1"/><limit lower="-2" upper="2" effort="1" velocity="1"/>{more}</joint>"#
+        )
+    };
+    let mimic = r#"<mimic joint="leader" multiplier="-0.5" offset="0.3"/>"#;
+    let text = [
+        "<robot name=\"r\">".into(),
+        [link("a"), link("b"), link("c")].concat(),
+        // The follower stands first in the file.
+        joint("follower", "c", mimic),
+        joint("leader", "b", ""),
+        "</robot>".into(),
+    ];
+    let model = common::temporary_urdf("mimic", &text.concat());
+    let mut rig = Rig::new(
+        &format!(r#"{{"model": "{model}", "fixed_base": true, "joints": {{"leader": 0.4}}}}"#),
+        9.81,
+        1e-3,
+    );
+    assert!((rig.get("follower.angle") - 0.1).abs() < 1e-15);
+    rig.set("leader.angle_target", 1.2);
+    (0..2000).for_each(|_| rig.free_step());
+    let (leader, follower) = (rig.get("leader.angle"), rig.get("follower.angle"));
+    assert!((leader - 1.2).abs() < 1e-3, "{leader}");
+    assert!((follower - (0.3 - 0.5 * leader)).abs() < 1e-9, "{follower}");
+    // A load on the follower is felt by the leader: it gives way by half the torque over its stiffness.
+    let outside = common::instantiate(
+        &format!(r#"{{"model": "{model}", "fixed_base": true, "joints": {{"leader": -2, "follower": 0}}}}"#),
+        9.81,
+    );
+    assert!(outside.is_ok(), "1.3 rad is inside the limits");
+    let text = text.concat().replace("multiplier=\"-0.5\"", "multiplier=\"5\"");
+    let model = common::temporary_urdf("mimic-out", &text);
+    let outside = common::instantiate(&format!(r#"{{"model": "{model}", "joints": {{"leader": 1}}}}"#), 9.81);
+    let message = outside.err().unwrap().to_string();
+    assert!(message.contains("`follower` follows `leader` to 5.3"), "{message}");
+}
+
+#[test]
+fn connected_and_welded_bodies_stay_together() {
+    // A pendulum whose end is connected to a slider: a crank; and a load welded to the slider.
+    let model = scene(
+        "crank",
+        r#"<body name="crank"><joint name="jc" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 .3 0 0" size=".02"/></body>
+           <body name="rod" pos=".3 0 0"><joint name="jr" axis="0 1 0"/>
+             <geom type="capsule" fromto="0 0 0 .5 0 0" size=".02" contype="0" conaffinity="0"/></body>
+           <body name="load" pos="2 0 0"><freejoint/><geom size=".1" mass="2"/></body>
+           <body name="slider" pos="1 0 0"><joint name="js" type="slide" axis="1 0 0"/><geom size=".1" mass="1"/></body>"#,
+        r#"<equality><weld name="hold" body1="slider" body2="load"/>
+           <connect name="pin" body1="crank" body2="slider" anchor=".3 0 0"/></equality>"#,
+    );
+    // The slider is held where the crank ends: the crank cannot turn without pulling it.
+    let mut rig = Rig::new(&format!(r#"{{"model": "{model}", "motor": "off"}}"#), 9.81, 1e-3);
+    (0..500).for_each(|_| rig.free_step());
+    let (slider, load) = (rig.get("slider.x"), rig.get("load.x"));
+    assert!((load - slider - 1.0).abs() < 1e-9, "{slider} {load}");
+    // The pin binds the end of the crank to the slider's height 0: the crank stays level.
+    assert!(rig.get("jc.angle").abs() < 1e-9 && rig.get("jr.angle") > 1.0, "{}", rig.get("jr.angle"));
+    assert!(rig.get("hold.force") > 19.0);
+}

@@ -1,9 +1,9 @@
-//! Checks of single links (mass, inertia, shapes, places) and of masses against each other.
+//! Checks of single links (mass, inertia, places) and of masses against each other.
 
 use crate::error::{Error, Source};
-use crate::model::{Body, Shape, ShapeGeometry};
+use crate::model::Body;
 use nalgebra::{Isometry3, Matrix3, SymmetricEigen, Translation3, UnitQuaternion, Vector3};
-use urdf_rs::{Geometry, Link, Pose};
+use urdf_rs::{Link, Pose};
 
 /// Mass, centre of mass and inertia about it in link axes; none where the link has no mass at all.
 pub(crate) type Inertial = Option<(f64, Vector3<f64>, Matrix3<f64>)>;
@@ -96,58 +96,4 @@ pub(crate) fn physical(tensor: &Matrix3<f64>) -> Result<(), String> {
         ));
     }
     Ok(())
-}
-
-/// All shapes of a link in its own frame; what is seen and hit appears once.
-pub(crate) fn shapes(source: &Source, link: &Link) -> Result<Vec<Shape>, Error> {
-    let mut shapes: Vec<Shape> = Vec::new();
-    for c in &link.collision {
-        shapes.push(shape(source, link, c.name.as_deref(), &c.origin, &c.geometry, true)?);
-    }
-    for v in &link.visual {
-        let seen = match shape(source, link, v.name.as_deref(), &v.origin, &v.geometry, false) {
-            Ok(seen) => seen,
-            // A picture that cannot be drawn does no harm to the simulation.
-            Err(_) if matches!(v.geometry, Geometry::Mesh { .. }) => continue,
-            Err(e) => return Err(e),
-        };
-        if !shapes.iter().any(|s| s.geometry == seen.geometry && s.body_from_shape == seen.body_from_shape) {
-            shapes.push(seen);
-        }
-    }
-    Ok(shapes)
-}
-
-fn shape(
-    source: &Source,
-    link: &Link,
-    name: Option<&str>,
-    origin: &Pose,
-    geometry: &Geometry,
-    collides: bool,
-) -> Result<Shape, Error> {
-    let (geometry, sizes) = match geometry {
-        Geometry::Sphere { radius } => (ShapeGeometry::Sphere { radius: *radius }, vec![*radius]),
-        Geometry::Box { size } => {
-            (ShapeGeometry::Box { half_extents: size.0.map(|s| s / 2.0) }, size.0.to_vec())
-        }
-        Geometry::Cylinder { radius, length } => {
-            (ShapeGeometry::Cylinder { half_length: length / 2.0, radius: *radius }, vec![*radius, *length])
-        }
-        Geometry::Capsule { radius, length } => {
-            (ShapeGeometry::Capsule { half_length: length / 2.0, radius: *radius }, vec![*radius, *length])
-        }
-        Geometry::Mesh { filename, .. } => {
-            let problem = format!(
-                "the mesh `{filename}` cannot be used for collision; replace it by spheres, boxes or cylinders"
-            );
-            return Err(source.link(&link.name, problem));
-        }
-    };
-    if let Some(bad) = sizes.iter().find(|s| !(**s > 0.0 && s.is_finite())) {
-        return Err(source.link(&link.name, format!("a shape has the size {bad} m; sizes are positive")));
-    }
-    let name = name.filter(|n| !n.is_empty()).unwrap_or(&link.name).into();
-    let body_from_shape = isometry(origin);
-    Ok(Shape { name, geometry, body_from_shape, collides, friction: None, group: 1, mask: 1 })
 }

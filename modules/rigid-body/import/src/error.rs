@@ -12,16 +12,18 @@ pub enum Error {
         /// What the operating system said.
         reason: String,
     },
-    /// The text is not URDF.
-    #[error("{file}: this is not URDF: {reason}")]
+    /// The text is not URDF or MJCF.
+    #[error("{file}{}: the robot file cannot be read: {reason}", at(*.line))]
     Syntax {
         /// Path.
         file: String,
+        /// Line, from 1; 0: unknown.
+        line: usize,
         /// What the reader said.
         reason: String,
     },
     /// A link is wrong.
-    #[error("{file}:{line}: link `{link}`: {problem}")]
+    #[error("{file}{}: link `{link}`: {problem}", at(*.line))]
     Link {
         /// Path.
         file: String,
@@ -33,7 +35,7 @@ pub enum Error {
         problem: String,
     },
     /// A joint is wrong.
-    #[error("{file}:{line}: joint `{joint}`: {problem}")]
+    #[error("{file}{}: joint `{joint}`: {problem}", at(*.line))]
     Joint {
         /// Path.
         file: String,
@@ -66,6 +68,10 @@ pub enum Error {
     },
 }
 
+fn at(line: usize) -> String {
+    if line > 0 { format!(":{line}") } else { String::new() }
+}
+
 /// File name and text, for errors that point to a line.
 pub(crate) struct Source<'a> {
     pub(crate) file: &'a str,
@@ -81,6 +87,10 @@ impl Source<'_> {
     pub(crate) fn joint(&self, joint: &str, problem: impl Into<String>) -> Error {
         let (file, line) = (self.file.into(), self.line("<joint", joint));
         Error::Joint { file, line, joint: joint.into(), problem: problem.into() }
+    }
+
+    pub(crate) fn syntax(&self, line: usize, reason: String) -> Error {
+        Error::Syntax { file: self.file.into(), line, reason }
     }
 
     pub(crate) fn tree(&self, problem: impl Into<String>) -> Error {

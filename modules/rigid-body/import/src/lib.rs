@@ -6,28 +6,59 @@
 
 mod check;
 mod error;
+mod mesh;
 mod mjcf;
 mod model;
+mod shapes;
+mod syntax;
 mod tree;
 mod urdf;
 
 pub use error::Error;
-pub use mjcf::{read_mjcf, read_mjcf_text};
+pub use mesh::Mesh;
+pub use mjcf::read_mjcf_text;
 pub use model::{
-    AxisData, Base, Body, Drive, DriveKind, Joint, JointKind, Plane, Robot, Shape, ShapeGeometry,
+    AxisData, Base, Body, Coupling, Drive, DriveKind, Heights, Joint, JointKind, Loop, Plane, Robot, Shape,
+    ShapeGeometry,
 };
-pub use urdf::{read_urdf, read_urdf_text};
+pub use urdf::read_urdf_text;
 
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Reads a file of either format, which the root of its text tells. `fixed_base`: see [`read_urdf`].
-pub fn read_robot(path: &Path, fixed_base: bool) -> Result<Robot, Error> {
+/// How a file is read.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Options {
+    /// A root link of URDF without mass is the world; one with mass the caller fixes.
+    pub fixed_base: bool,
+    /// Folders of packages by name, for `package://`.
+    pub packages: Vec<(String, PathBuf)>,
+    /// Folders that hold packages, or are one.
+    pub package_path: Vec<PathBuf>,
+}
+
+impl Options {
+    /// The folders of the environment's `ROS_PACKAGE_PATH`.
+    pub fn with_ros_package_path(mut self) -> Self {
+        let value = std::env::var_os("ROS_PACKAGE_PATH").unwrap_or_default();
+        self.package_path.extend(std::env::split_paths(&value).filter(|p| !p.as_os_str().is_empty()));
+        self
+    }
+
+    fn folders(&self, file: &str) -> mesh::Folders {
+        let beside = Path::new(file).parent().map(Path::to_path_buf).unwrap_or_default();
+        let (packages, package_path) = (self.packages.clone(), self.package_path.clone());
+        mesh::Folders { beside, packages, package_path }
+    }
+}
+
+/// Reads a file of either format, which the root of its text tells.
+pub fn read_robot(path: &Path, options: &Options) -> Result<Robot, Error> {
     let file = path.display().to_string();
     let text = std::fs::read_to_string(path)
         .map_err(|e| Error::Read { file: file.clone(), reason: e.to_string() })?;
     if text.contains("<mujoco") {
-        read_mjcf_text(&file, &text)
+        read_mjcf_text(&file, &text, options)
     } else {
-        read_urdf_text(&file, &text, fixed_base)
+        read_urdf_text(&file, &text, options)
     }
 }

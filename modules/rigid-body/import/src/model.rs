@@ -1,6 +1,8 @@
 //! The checked robot: plain data, SI units, parents before children.
 
+use crate::mesh::Mesh;
 use nalgebra::{Isometry3, Matrix3, Unit, Vector3};
+use std::sync::Arc;
 
 /// A tree of bodies.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,8 +23,42 @@ pub struct Robot {
     pub planes: Vec<Plane>,
     /// Pairs of bodies that never touch.
     pub excluded: Vec<[usize; 2]>,
+    /// Joints that follow others.
+    pub couplings: Vec<Coupling>,
+    /// Connections beyond the tree, closed in the pose of the file.
+    pub loops: Vec<Loop>,
     /// What the file says that has no effect, with its place.
     pub warnings: Vec<String>,
+    /// What was made of the file where there was a choice, with its place.
+    pub notices: Vec<String>,
+}
+
+/// Coordinate of the follower = ratio · coordinate of the leader + offset.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Coupling {
+    /// Name, unique among what couples.
+    pub name: String,
+    /// Index of the joint that follows.
+    pub follower: usize,
+    /// Index of the joint that leads.
+    pub leader: usize,
+    /// See above.
+    pub ratio: f64,
+    /// rad or m.
+    pub offset: f64,
+}
+
+/// Two bodies held together beyond the tree.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Loop {
+    /// Name, unique among what couples.
+    pub name: String,
+    /// The bodies; none: the world. Different.
+    pub bodies: [Option<usize>; 2],
+    /// Where, in the frame of the first body (of the file, where it is the world), m.
+    pub origin: Vector3<f64>,
+    /// Whether they also keep their orientation.
+    pub rigid: bool,
 }
 
 /// A half-space that stands still, in the frame of the file.
@@ -87,7 +123,7 @@ impl Shape {
 }
 
 /// Geometry in the shape's frame, centre at the origin, m.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub enum ShapeGeometry {
     /// Sphere.
     Sphere {
@@ -113,6 +149,23 @@ pub enum ShapeGeometry {
         /// Radius.
         radius: f64,
     },
+    /// What is inside all faces of a convex mesh.
+    Hull(Arc<Mesh>),
+    /// Triangles as they are; of shapes that stand still only.
+    Triangles(Arc<Mesh>),
+    /// Ground over a grid; of shapes that stand still only.
+    Heights(Arc<Heights>),
+}
+
+/// Heights over a rectangular grid around the origin, z up; every cell is two triangles.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Heights {
+    /// Number of nodes along x and y, at least 2.
+    pub nodes: [usize; 2],
+    /// Lengths of the whole grid along x and y, m.
+    pub lengths: [f64; 2],
+    /// Of all nodes, x fastest, m.
+    pub heights: Vec<f64>,
 }
 
 /// A joint between a body and its parent.
@@ -188,4 +241,8 @@ pub enum JointKind {
     Prismatic,
     /// Nothing.
     Fixed,
+    /// Turns freely.
+    Spherical,
+    /// Slides across its axis and turns about it.
+    Planar,
 }

@@ -1,37 +1,24 @@
 //! From the text of a URDF file to the checked robot; links without mass are merged into their neighbours.
 
-use crate::check::{Inertial, inertial, isometry, mass_spread, places, shapes};
+use crate::Options;
+use crate::check::{Inertial, inertial, isometry, mass_spread, places};
 use crate::error::{Error, Source};
-use crate::model::{AxisData, Base, Body, Joint, JointKind, Robot, Shape};
+use crate::model::{AxisData, Base, Body, Coupling, Joint, JointKind, Robot, Shape};
+use crate::shapes::Shapes;
 use crate::tree::{Place, order};
 use nalgebra::{Isometry3, Unit, Vector3};
-use std::path::Path;
 use urdf_rs::JointType;
 
-/// Reads a file. `fixed_base`: a root link without mass is the world; with mass, the caller fixes it.
-pub fn read_urdf(path: &Path, fixed_base: bool) -> Result<Robot, Error> {
-    let file = path.display().to_string();
-    let text = std::fs::read_to_string(path)
-        .map_err(|e| Error::Read { file: file.clone(), reason: e.to_string() })?;
-    read_urdf_text(&file, &text, fixed_base)
-}
-
-/// Reads the text of a file; `file` appears in messages.
-pub fn read_urdf_text(file: &str, text: &str, fixed_base: bool) -> Result<Robot, Error> {
+/// Reads the text of a file; `file` appears in messages and tells the folder of meshes.
+pub fn read_urdf_text(file: &str, text: &str, options: &Options) -> Result<Robot, Error> {
     let source = Source { file, text };
-    let robot = urdf_rs::read_from_string(text).map_err(|e| not_urdf(&source, &e.to_string()))?;
+    crate::syntax::check(&source)?;
+    let robot = urdf_rs::read_from_string(text).map_err(|e| source.syntax(0, e.to_string()))?;
     places(&source, &robot)?;
     let order = order(&source, &robot)?;
     let inertials = robot.links.iter().map(|l| inertial(&source, l)).collect::<Result<Vec<_>, _>>()?;
     let merged = merge(&robot, &order, &inertials);
-    build(&source, &robot, &order, &inertials, &merged, fixed_base)
-}
-
-fn not_urdf(source: &Source, reason: &str) -> Error {
-    let kinds = "floating, planar and spherical are kinds that this reader knows but cannot simulate; \
-                 revolute, continuous, prismatic and fixed work";
-    let reason = if reason.contains("variant") { format!("{reason} ({kinds})") } else { reason.to_owned() };
-    Error::Syntax { file: source.file.into(), reason }
+    build(&source, &robot, &order, &inertials, &merged, options)
 }
 
 /// Links that move as one: at most one of them has mass and gives name and frame.
@@ -88,11 +75,11 @@ fn build(
     order: &[Place],
     inertials: &[Inertial],
     merged: &Merged,
-    fixed_base: bool,
+    options: &Options,
 ) -> Result<Robot, Error> {
     let world = merged.massive[0].is_none();
     if world {
-        check_world(source, robot, merged, fixed_base)?;
+        check_world(source, robot, merged, options.fixed_base)?;
     }
     let shift = usize::from(world);
     let (mut bodies, mut joints) = (Vec::new(), Vec::new());
@@ -110,28 +97,37 @@ fn build(
         }
         bodies.push(Body { name: robot.links[link].name.clone(), mass, com, inertia, shapes: Vec::new() });
     }
-    for place in order.iter().filter(|p| merged.group[p.link] >= shift) {
-        let frame = merged.body_from_link(place.link);
-        let found = shapes(source, &robot.links[place.link])?;
+    let folders = options.folders(source.file);
+    let (mut shapes, mut world_shapes) = (Shapes::new(source, &folders), Vec::new());
+    for place in order {
+        let (frame, body) = (merged.body_from_link(place.link), merged.group[place.link].checked_sub(shift));
+        let found = shapes.of(&robot.links[place.link], body.is_none())?;
         let moved = found.into_iter().map(|s| Shape { body_from_shape: frame * s.body_from_shape, ..s });
-        bodies[merged.group[place.link] - shift].shapes.extend(moved);
+        match body {
+            Some(body) => bodies[body].shapes.extend(moved),
+            None => world_shapes.extend(moved),
+        }
     }
     let base = match merged.massive[0] {
         Some(link) => Base::Free(merged.group_from_link[link]),
         None => Base::World,
     };
-    let mut warnings = warnings(source, robot);
+    let (mut warnings, notices) = shapes.said();
     warnings.extend(mass_spread(source.file, &bodies));
+    let couplings = couplings(source, robot, &joints)?;
     Ok(Robot {
         name: robot.name.clone(),
         base,
         bodies,
         joints,
         others: Vec::new(),
-        world_shapes: Vec::new(),
+        world_shapes,
         planes: Vec::new(),
         excluded: Vec::new(),
+        couplings,
+        loops: Vec::new(),
         warnings,
+        notices,
     })
 }
 
@@ -145,16 +141,23 @@ fn data(source: &Source, joint: &urdf_rs::Joint) -> Result<AxisData, Error> {
     Ok(AxisData { damping, friction, ..AxisData::default() })
 }
 
-/// What the file says that has no effect.
-fn warnings(source: &Source, robot: &urdf_rs::Robot) -> Vec<String> {
-    let mimics = robot.joints.iter().filter(|j| j.mimic.is_some());
-    mimics
-        .map(|j| {
-            source
-                .joint(&j.name, "<mimic> has no effect; couple the joints by [[robot.coupling]]")
-                .to_string()
-        })
-        .collect()
+/// Joints that follow others, from `<mimic>`.
+fn couplings(source: &Source, robot: &urdf_rs::Robot, joints: &[Joint]) -> Result<Vec<Coupling>, Error> {
+    let moving = |name: &str| joints.iter().position(|j| j.name == name && j.kind != JointKind::Fixed);
+    let mut all = Vec::new();
+    for joint in &robot.joints {
+        let Some(mimic) = &joint.mimic else { continue };
+        let wrong = |problem: String| source.joint(&joint.name, format!("<mimic>: {problem}"));
+        let follower = moving(&joint.name).ok_or_else(|| wrong("a fixed joint follows none".into()))?;
+        let leader = moving(&mimic.joint);
+        let leader = leader.ok_or_else(|| wrong(format!("no moving joint is called `{}`", mimic.joint)))?;
+        let (ratio, offset) = (mimic.multiplier.unwrap_or(1.0), mimic.offset.unwrap_or(0.0));
+        if leader == follower || !ratio.is_finite() || !offset.is_finite() {
+            return Err(wrong("it follows another joint, by a finite multiplier and offset".into()));
+        }
+        all.push(Coupling { name: format!("{}_mimic", joint.name), follower, leader, ratio, offset });
+    }
+    Ok(all)
 }
 
 fn check_world(
@@ -214,9 +217,11 @@ fn kind(source: &Source, joint: &urdf_rs::Joint) -> Result<(JointKind, bool), Er
         JointType::Continuous => Ok((JointKind::Revolute, false)),
         JointType::Prismatic => Ok((JointKind::Prismatic, true)),
         JointType::Fixed => Ok((JointKind::Fixed, false)),
+        JointType::Planar => Ok((JointKind::Planar, false)),
+        JointType::Spherical => Ok((JointKind::Spherical, false)),
         ref other => Err(source.joint(
             &joint.name,
-            format!("type `{other:?}` cannot be simulated; use revolute, continuous, prismatic or fixed"),
+            format!("type `{other:?}` cannot be simulated; use revolute, continuous, prismatic, planar, spherical or fixed"),
         )),
     }
 }

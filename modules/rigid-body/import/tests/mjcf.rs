@@ -3,7 +3,7 @@
 
 use std::path::Path;
 use terraglue_robot_import::{
-    Base, DriveKind, JointKind, Robot, ShapeGeometry, read_mjcf, read_mjcf_text, read_urdf,
+    Base, DriveKind, JointKind, Options, Robot, ShapeGeometry, read_mjcf_text, read_robot,
 };
 
 fn file(name: &str) -> std::path::PathBuf {
@@ -12,13 +12,13 @@ fn file(name: &str) -> std::path::PathBuf {
 
 fn read(worldbody: &str, more: &str) -> Result<Robot, String> {
     let text = format!("<mujoco model=\"m\">\n{more}\n<worldbody>\n{worldbody}\n</worldbody></mujoco>");
-    read_mjcf_text("m.xml", &text).map_err(|e| e.to_string())
+    read_mjcf_text("m.xml", &text, &Options::default()).map_err(|e| e.to_string())
 }
 
 #[test]
 fn the_hexapod_is_its_urdf_twin() {
-    let ours = read_mjcf(&file("tests/reference/multibody/hexapod.xml")).unwrap();
-    let twin = read_urdf(&file("models/hexapod.urdf"), false).unwrap();
+    let ours = read_robot(&file("tests/reference/multibody/hexapod.xml"), &Options::default()).unwrap();
+    let twin = read_robot(&file("models/hexapod.urdf"), &Options::default()).unwrap();
     assert_eq!((ours.bodies.len(), ours.joints.len()), (25, 24));
     assert!(matches!(ours.base, Base::Free(_)) && ours.warnings.is_empty(), "{:?}", ours.warnings);
     assert_eq!(ours.planes.len(), 1);
@@ -95,13 +95,145 @@ fn a_world_has_shapes_and_bodies_hang_from_it() {
 fn what_is_not_supported_is_named_with_its_line() {
     let robot = read(
         "<body name=\"a\"><freejoint/><geom size=\"0.1\"/>\n<geom name=\"egg\" type=\"ellipsoid\" size=\"1 1 2\"/></body>",
-        "<equality><weld body1=\"a\"/></equality>\n<sensor><gyro name=\"g\" site=\"s\"/></sensor>",
+        "<equality><tendon tendon1=\"t\"/></equality>\n<sensor><gyro name=\"g\" site=\"s\"/></sensor>",
     )
     .unwrap();
     let text = robot.warnings.join("\n");
-    for expected in ["m.xml:2: <weld>", "m.xml:3: <gyro> `g`", "m.xml:6: <geom> `egg`", "ellipsoid"] {
+    for expected in ["m.xml:2: <tendon>", "m.xml:3: <gyro> `g`", "m.xml:6: <geom> `egg`", "ellipsoid"] {
         assert!(text.contains(expected), "`{expected}` is not in: {text}");
     }
+}
+
+#[test]
+fn attributes_that_act_and_are_not_supported_are_named() {
+    let cases = [
+        (
+            "<body name=\"a\" gravcomp=\"1\"><freejoint/><geom size=\"1\"/></body>",
+            "<body> `a` has `gravcomp`",
+        ),
+        (
+            "<body name=\"a\"><joint springdamper=\"1 1\"/><geom size=\"1\"/></body>",
+            "<joint> has `springdamper`",
+        ),
+        ("<body name=\"a\"><joint ref=\"30\"/><geom size=\"1\"/></body>", "has `ref` = \"30\""),
+        ("<body name=\"a\"><freejoint/><geom size=\"1\" margin=\"0.1\"/></body>", "<geom> has `margin`"),
+        (
+            "<body name=\"a\"><joint type=\"ball\" damping=\"1\"/><geom size=\"1\"/></body>",
+            "turns freely: `damping`",
+        ),
+        (
+            "<body name=\"a\"><freejoint/><geom size=\"1\"/><composite/></body>",
+            "<composite> is not supported",
+        ),
+        (
+            "<body name=\"a\"><freejoint/><geom size=\"1\"/><geom type=\"plane\" size=\"1 1 1\"/></body>",
+            "plane on a body",
+        ),
+        (
+            "<frame><body name=\"b\"/></frame><body name=\"a\"><freejoint/><geom size=\"1\"/></body>",
+            "<frame> is not",
+        ),
+    ];
+    for (world, expected) in cases {
+        let robot = read(world, "").unwrap();
+        let text = robot.warnings.join("\n");
+        assert!(text.contains("m.xml:4: ") && text.contains(expected), "`{expected}` is not in: {text}");
+    }
+    let ball = "<body name=\"a\"><joint name=\"j\"/><geom size=\"1\"/></body>";
+    for (more, expected) in [
+        ("<option density=\"1.2\"/>", "<option> has `density`"),
+        ("<compiler settotalmass=\"3\"/>", "<compiler> has `settotalmass`"),
+        ("<tendon><fixed name=\"t\"/></tendon>", "<fixed> `t` is not supported"),
+        ("<actuator><muscle joint=\"j\"/></actuator>", "<muscle> is not supported"),
+        ("<actuator><position joint=\"j\" dampratio=\"1\"/></actuator>", "<position> has `dampratio`"),
+        ("<contact><pair geom1=\"x\" geom2=\"y\"/></contact>", "<pair> is not supported"),
+        ("<keyframe><key qpos=\"1\"/></keyframe>", "<key> is not supported"),
+        ("<default><joint springdamper=\"1 1\"/></default>", "<joint> `j` has `springdamper`"),
+    ] {
+        let text = read(ball, more).unwrap().warnings.join("\n");
+        assert!(text.contains(expected), "`{expected}` is not in: {text}");
+    }
+    assert!(read(ball, "<option gravity=\"0 0 -1\" density=\"0\"/>").unwrap().warnings.is_empty());
+}
+
+const PAIR: &str = r#"<body name="a" pos="0 0 1"><joint name="ja" axis="0 1 0"/><geom size="0.1" mass="1"/></body>
+    <body name="b" pos="1 0 1"><joint name="jb" axis="0 1 0"/><geom size="0.1" mass="1"/>
+      <body name="c" pos="0 0 -0.5"><geom size="0.1" mass="0"/></body></body>"#;
+
+#[test]
+fn equality_becomes_loops_and_couplings() {
+    let robot = read(
+        PAIR,
+        r#"<equality><connect name="c" body1="c" body2="a" anchor="0.1 0 0"/><weld body1="b"/>
+           <joint joint1="jb" joint2="ja" polycoef="0.2 -3 0 0 0"/>
+           <connect body1="a" body2="b" anchor="0 0 0" active="false"/></equality>"#,
+    )
+    .unwrap();
+    let [connect, weld] = &robot.loops[..] else { panic!("{:?}", robot.loops) };
+    // `c` hangs fixed below `b`, 0.5 m lower.
+    assert_eq!((connect.name.as_str(), connect.bodies, connect.rigid), ("c", [Some(1), Some(0)], false));
+    assert!((connect.origin - nalgebra::Vector3::new(0.1, 0.0, -0.5)).norm() < 1e-15);
+    assert_eq!((weld.bodies, weld.rigid), ([Some(1), None], true));
+    let c = &robot.couplings[0];
+    assert_eq!((c.follower, c.leader, c.ratio, c.offset), (1, 0, -3.0, 0.2));
+    assert!(robot.warnings.len() == 1 && robot.warnings[0].contains("not active"), "{:?}", robot.warnings);
+    let refused = |equality: &str, expected: &str| {
+        let message = read(PAIR, &format!("<equality>{equality}</equality>")).unwrap_err();
+        assert!(message.starts_with("m.xml:2: ") && message.contains(expected), "{message}");
+    };
+    refused("<connect body1=\"x\" anchor=\"0 0 0\"/>", "no body `x`");
+    refused("<connect body1=\"b\" body2=\"c\" anchor=\"0 0 0\"/>", "do not move against each other");
+    refused("<connect body1=\"b\"/>", "anchor");
+    refused("<weld body1=\"a\" body2=\"b\" relpose=\"1 0 0.1 1 0 0 0\"/>", "open by 1.000e-1");
+    refused("<joint joint1=\"ja\" joint2=\"jx\"/>", "no joint `jx`");
+    refused("<joint joint1=\"ja\" joint2=\"jb\" polycoef=\"0 1 2\"/>", "polycoef");
+    assert!(
+        read(PAIR, r#"<equality><weld body1="a" body2="b" relpose="1 0 0 1 0 0 0"/></equality>"#).is_ok()
+    );
+}
+
+#[test]
+fn meshes_and_height_fields_come_from_assets() {
+    let robot = read(
+        r#"<geom type="hfield" hfield="f" pos="0 0 0.2"/><geom type="mesh" mesh="wedge"/>
+           <body name="a" pos="0 0 1"><freejoint/><geom type="mesh" mesh="wedge" density="600"/></body>"#,
+        r#"<asset><mesh name="wedge" vertex="0 0 0 1 0 0 0 1 0 0 0 1" scale="2 1 1" refpos="1 0 0"/>
+           <hfield name="f" nrow="2" ncol="3" size="1 2 0.5 1" elevation="5 5 7 3 3 3"/></asset>"#,
+    )
+    .unwrap();
+    let ShapeGeometry::Heights(field) = &robot.world_shapes[0].geometry else { panic!("heights") };
+    assert_eq!((field.nodes, field.lengths), ([3, 2], [2.0, 4.0]));
+    assert_eq!(field.heights, [0.0, 0.0, 0.0, 0.25, 0.25, 0.5]);
+    assert!(matches!(&robot.world_shapes[1].geometry, ShapeGeometry::Triangles(m) if m.triangles.len() == 4));
+    assert!(matches!(&robot.bodies[0].shapes[0].geometry, ShapeGeometry::Hull(m) if m.points.len() == 4));
+    // A tetrahedron with edges 2, 1, 1 m around a corner at (−1, 0, 0): 1/3 m³.
+    let a = &robot.bodies[0];
+    assert!((a.mass - 200.0).abs() < 1e-9);
+    assert!((a.com - nalgebra::Vector3::new(-0.5, 0.25, 0.25)).norm() < 1e-12);
+    assert!((a.inertia[(0, 0)] - 200.0 * 3.0 / 80.0 * 2.0).abs() < 1e-9, "{}", a.inertia);
+    assert!(robot.notices[0].contains("m.xml:6: <geom> with the mesh `wedge`"), "{:?}", robot.notices);
+    let refused = |world: &str, more: &str, expected: &[&str]| {
+        let message = read(world, more).unwrap_err();
+        expected.iter().for_each(|e| assert!(message.contains(e), "`{e}` is not in: {message}"));
+    };
+    let body = r#"<body name="a"><freejoint/><geom type="mesh" mesh="m"/></body>"#;
+    refused(body, "", &["m.xml:4", "no <mesh> `m`"]);
+    let missing = r#"<compiler meshdir="parts"/><asset><mesh name="m" file="no.stl"/></asset>"#;
+    refused(body, missing, &["m.xml:4", "no.stl", "tried: parts/no.stl"]);
+    let seen = r#"<body name="a"><freejoint/><geom size="1"/>
+        <geom type="mesh" mesh="m" contype="0" conaffinity="0"/></body>"#;
+    let robot = read(seen, missing).unwrap();
+    assert!(
+        robot.warnings[0].contains("only seen") && robot.warnings[0].contains("no.stl"),
+        "{:?}",
+        robot.warnings
+    );
+    let field =
+        |size: &str, grid: &str| format!("<asset><hfield name=\"f\" size=\"{size}\" {grid}/></asset>");
+    let ground = r#"<geom type="hfield" hfield="f"/><body name="a"><freejoint/><geom size="1"/></body>"#;
+    refused(ground, &field("1 1 1", ""), &["m.xml:2", "four numbers"]);
+    refused(ground, &field("1 1 1 1", r#"nrow="2" ncol="2" elevation="1 2 3""#), &["nrow = 2", "are not 3"]);
+    refused(ground, &field("1 1 1 1", r#"file="x.png""#), &["x.png"]);
 }
 
 #[test]
@@ -112,8 +244,8 @@ fn what_would_be_another_mechanism_is_refused() {
         expected.iter().for_each(|e| assert!(message.contains(e), "`{e}` is not in: {message}"));
     };
     refused(
-        r#"<body name="a"><joint type="ball"/><geom size="0.1"/></body>"#,
-        &["m.xml:4", "`ball` cannot be simulated", "hinge"],
+        r#"<body name="a"><joint type="screw"/><geom size="0.1"/></body>"#,
+        &["m.xml:4", "`screw` cannot be simulated", "hinge"],
     );
     refused(r#"<body name="a"><joint/><joint/><geom size="0.1"/></body>"#, &["body `a`", "2 joints"]);
     refused(r#"<body name="a"><freejoint/></body>"#, &["body `a`", "no mass"]);

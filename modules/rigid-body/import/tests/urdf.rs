@@ -2,10 +2,10 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use std::path::Path;
-use terraglue_robot_import::{Base, JointKind, Robot, ShapeGeometry, read_urdf, read_urdf_text};
+use terraglue_robot_import::{Base, JointKind, Options, Robot, ShapeGeometry, read_robot, read_urdf_text};
 
 fn read(text: &str) -> Result<Robot, String> {
-    read_urdf_text("robot.urdf", text, false).map_err(|e| e.to_string())
+    read_urdf_text("robot.urdf", text, &Options::default()).map_err(|e| e.to_string())
 }
 
 fn body(name: &str, mass: f64, moments: [f64; 3]) -> String {
@@ -40,7 +40,7 @@ fn refused(parts: &[String], expected: &[&str]) {
 #[test]
 fn the_hexapod_is_read() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../models/hexapod.urdf");
-    let robot = read_urdf(&path, false).unwrap();
+    let robot = read_robot(&path, &Options::default()).unwrap();
     assert_eq!((robot.bodies.len(), robot.joints.len()), (25, 24));
     let mass: f64 = robot.bodies.iter().map(|b| b.mass).sum();
     assert!((mass - 25.02).abs() < 1e-9);
@@ -58,7 +58,7 @@ fn the_hexapod_is_read() {
 #[test]
 fn a_chain_hangs_from_the_world() {
     let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../tests/reference/multibody/chain8.urdf");
-    let robot = read_urdf(&path, false).unwrap();
+    let robot = read_robot(&path, &Options::default()).unwrap();
     assert_eq!((robot.bodies.len(), robot.joints.len(), robot.base), (8, 8, Base::World));
     assert_eq!(robot.joints[0].parent, None);
     assert_eq!(robot.joints[1].limits, None);
@@ -174,15 +174,15 @@ fn what_is_not_a_tree_is_refused() {
 fn joints_and_shapes_that_make_no_sense_are_refused() {
     let two = [good("a"), good("b")].concat();
     refused(&[two.clone(), joint("j", "floating", "a", "b")], &["joint `j`", "Floating", "revolute"]);
-    refused(&[two.clone(), joint("j", "bent", "a", "b")], &["bent"]);
+    refused(
+        &[two.clone(), joint("j", "bent", "a", "b")],
+        &["robot.urdf:6", "<joint> `j`", "`bent` is unknown", "planar"],
+    );
     refused(&[two.clone(), joint("j", "revolute", "a", "b")], &["joint `j`", "0 … 0", "continuous"]);
     refused(&[two, joint("j", "continuous", "a", "b").replace("0 0 1", "0 0 0")], &["joint `j`", "axis"]);
     let ball = good("a")
         .replace("</link>", "<collision><geometry><sphere radius=\"-1\"/></geometry></collision></link>");
     refused(&[ball], &["link `a`", "-1 m"]);
-    let mesh = good("a")
-        .replace("</link>", "<collision><geometry><mesh filename=\"x.stl\"/></geometry></collision></link>");
-    refused(&[mesh], &["link `a`", "x.stl", "spheres"]);
     refused(&["<link name=\"a\"/>".into()], &["link `a`", "no mass"]);
     refused(
         &[good("a"), "<link name=\"b\"/>".into(), joint("j", "continuous", "a", "b")],
@@ -191,8 +191,57 @@ fn joints_and_shapes_that_make_no_sense_are_refused() {
 }
 
 #[test]
+fn errors_of_the_text_name_their_line() {
+    let two = [good("a"), good("b")].concat();
+    let changed =
+        |from: &str, to: &str| [two.clone(), joint("j", "continuous", "a", "b").replacen(from, to, 1)];
+    refused(&changed("1 0 0", "1 0"), &["robot.urdf:6", "<origin>", "xyz", "3 numbers"]);
+    refused(&changed("0 0 1", "0 0 one"), &["robot.urdf:6", "<axis>", "one"]);
+    refused(&changed("<parent link=\"a\"/>", ""), &["robot.urdf:6", "<joint> `j`", "<parent"]);
+    refused(&changed("name=\"j\" ", ""), &["robot.urdf:6", "<joint>", "no `name`"]);
+    refused(&changed("type=\"continuous\"", ""), &["robot.urdf:6", "no `type`"]);
+    refused(&changed("</joint>", "</joined>"), &["robot.urdf:6", "joint"]);
+    refused(
+        &[good("a").replace("value=\"1\"", "value=\"1 kg\"")],
+        &["robot.urdf:2", "<mass>", "1 kg", "a number"],
+    );
+    let message =
+        read("<robot name=\"r\" xmlns:xacro=\"http://www.ros.org/wiki/xacro\">\n<xacro:arm/></robot>");
+    let message = message.unwrap_err();
+    assert!(message.contains("robot.urdf:2") && message.contains("xacro ROBOT.xacro"), "{message}");
+    let message = read("<mars/>").unwrap_err();
+    assert!(message.contains("robot.urdf:1") && message.contains("<robot>"), "{message}");
+}
+
+#[test]
+fn mimic_joints_become_couplings() {
+    let links = [good("a"), good("b"), good("c")].concat();
+    let mimic = |of: &str| {
+        let joint = joint("jc", "continuous", "a", "c");
+        joint
+            .replace("</joint>", &format!("<mimic joint=\"{of}\" multiplier=\"-2\" offset=\"0.5\"/></joint>"))
+    };
+    let with = |of: &str| [links.clone(), joint("jb", "continuous", "a", "b"), mimic(of)];
+    let robot = read(&robot(&with("jb"))).unwrap();
+    let c = &robot.couplings[0];
+    assert_eq!((c.name.as_str(), c.follower, c.leader, c.ratio, c.offset), ("jc_mimic", 1, 0, -2.0, 0.5));
+    refused(&with("no"), &["joint `jc`", "<mimic>", "`no`"]);
+    refused(&with("jc"), &["joint `jc`", "another"]);
+}
+
+#[test]
+fn planar_and_spherical_joints_are_read() {
+    let two = [good("a"), good("b")].concat();
+    for (name, kind) in [("planar", JointKind::Planar), ("spherical", JointKind::Spherical)] {
+        let robot = read(&robot(&[two.clone(), joint("j", name, "a", "b")])).unwrap();
+        assert_eq!(robot.joints[0].kind, kind);
+    }
+}
+
+#[test]
 fn what_cannot_be_read_is_refused() {
-    let missing = read_urdf(Path::new("no/such.urdf"), false).expect_err("missing").to_string();
+    let missing =
+        read_robot(Path::new("no/such.urdf"), &Options::default()).expect_err("missing").to_string();
     assert!(missing.starts_with("no/such.urdf: the robot file cannot be read"), "{missing}");
     for text in ["", "not xml", "<robot>", "<sdf></sdf>"] {
         assert!(read(text).is_err(), "{text}");

@@ -5,6 +5,7 @@ use crate::math::{Q, V3, frame_along};
 use crate::model::{Joint, Kind, Model};
 use crate::state::Motion;
 use serde_json::{Map, Value};
+use terraglue_robot_import as import;
 use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};
 
 /// A closure may be open by this at the start, m or rad; the first step takes it back.
@@ -49,10 +50,16 @@ pub(crate) fn parameters() -> Vec<Parameter> {
 pub(crate) fn closures(
     config: &Config,
     model: &Model,
-    bodies: &[Motion],
-    angles: &[f64],
+    (bodies, angles): (&[Motion], &[f64]),
+    (couplings, loops): (&[import::Coupling], &[import::Loop]),
 ) -> Result<Vec<Closure>> {
-    let mut all: Vec<Closure> = Vec::new();
+    let mut all: Vec<Closure> = couplings.iter().map(|c| from_coupling(c, model)).collect();
+    all.extend(loops.iter().map(|l| from_loop(l, model, bodies)));
+    let mut names: Vec<&str> = all.iter().map(|c| c.name.as_str()).collect();
+    names.sort_unstable();
+    if let Some(twice) = names.windows(2).find(|n| n[0] == n[1]) {
+        return Err(Error::Refused(format!("the robot file gives two connections the name `{}`", twice[0])));
+    }
     type Read = fn(&Entry, &Model, &[Motion], &[f64]) -> Result<Law>;
     let tables: [(&str, &[&str], Read); 3] =
         [("loop", &LOOP, closing), ("spring", &SPRING, spring), ("coupling", &COUPLING, coupling)];
@@ -73,6 +80,40 @@ pub(crate) fn closures(
         }
     }
     Ok(all)
+}
+
+/// A joint that follows another, as the robot file says.
+fn from_coupling(c: &import::Coupling, model: &Model) -> Closure {
+    let (follower, leader) = (model.from_file(c.follower), model.from_file(c.leader));
+    Closure {
+        name: c.name.clone(),
+        law: Law::Coupling { follower, leader, ratio: c.ratio, offset: c.offset },
+    }
+}
+
+/// Two bodies held together as they stand, as the robot file says.
+fn from_loop(l: &import::Loop, model: &Model, bodies: &[Motion]) -> Closure {
+    let (origin, q) = frame(model, bodies, l.bodies[0]);
+    let point = origin + q * l.origin;
+    let (parent, child) = match l.bodies {
+        [parent, Some(child)] => (parent, child),
+        // One of two different bodies moves.
+        [child, None] => (None, child.unwrap_or(0)),
+    };
+    let inverse = |body: Option<usize>| body.map_or_else(Q::identity, |b| bodies[b].q.inverse());
+    let law = Law::Joint(Joint {
+        name: l.name.clone(),
+        kind: if l.rigid { Kind::Fixed } else { Kind::Spherical },
+        parent,
+        child,
+        parent_anchor: local(bodies, parent, &point),
+        child_anchor: local(bodies, Some(child), &point),
+        parent_frame: inverse(parent),
+        child_frame: inverse(Some(child)),
+        limits: None,
+        data: import::AxisData::default(),
+    });
+    Closure { name: l.name.clone(), law }
 }
 
 fn entries<'a>(config: &'a Config, table: &str) -> Result<Vec<&'a Map<String, Value>>> {
@@ -229,7 +270,7 @@ fn closing(entry: &Entry, model: &Model, bodies: &[Motion], _: &[f64]) -> Result
         parent_frame: inverse(points.parent) * along(&parent_axis),
         child_frame: inverse(Some(points.child)) * along(&child_axis),
         limits: None,
-        data: terraglue_robot_import::AxisData::default(),
+        data: import::AxisData::default(),
     }))
 }
 

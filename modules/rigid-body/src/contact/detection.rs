@@ -3,16 +3,19 @@
 //! Points are speculative: all that can touch within the step are found, touching or not. Neighbours in the tree and
 //! shapes that overlap in the initial pose are left alone: a leg may stand in the box that stands for the body.
 
+use crate::contact::convex::{Manifold, between_convex, vector};
 use crate::contact::plane::{Plane, support_points};
+use crate::contact::reduce::{Found, reduce};
 use crate::contact::shapes::{parry_local, parry_shape};
+use crate::contact::triangles::{is_ground, on_triangles};
 use crate::math::{Q, V3};
 use crate::model::Model;
 use crate::state::Motion;
 use nalgebra::{Isometry3, Point3, Translation3};
-use parry3d_f64::math::{Pose, Vector};
-use parry3d_f64::query::{self, ContactManifold, DefaultQueryDispatcher, PersistentQueryDispatcher};
+use parry3d_f64::math::Pose;
+use parry3d_f64::query;
 use parry3d_f64::shape::SharedShape;
-use terraglue_robot_import::Shape;
+use terraglue_robot_import::{Shape, ShapeGeometry};
 
 /// Shapes that come nearer than this within the step are watched, m.
 const MARGIN: f64 = 2e-3;
@@ -39,12 +42,6 @@ struct Collider {
     centre: V3,
 }
 
-/// Two shapes that may meet, with parry's memory of them.
-struct Pair {
-    colliders: [usize; 2],
-    manifolds: Vec<ContactManifold<(), ()>>,
-}
-
 /// A point where two bodies, or the ground and a body, can touch within the step.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct ContactPoint {
@@ -65,12 +62,17 @@ pub(crate) struct ContactPoint {
 /// All shapes that collide and the pairs that may meet.
 pub(crate) struct Detector {
     colliders: Vec<Collider>,
-    pairs: Vec<Pair>,
+    /// Shapes that may meet.
+    pairs: Vec<[usize; 2]>,
     pub planes: Vec<Plane>,
+    scratch: Scratch,
 }
 
-fn vector(v: Vector) -> V3 {
-    V3::new(v.x, v.y, v.z)
+/// What is filled anew for every pair.
+#[derive(Default)]
+struct Scratch {
+    manifold: Manifold,
+    found: Vec<Found>,
 }
 
 /// A right-handed frame whose tangents do not jump while the normal turns a little.
@@ -88,14 +90,15 @@ impl Detector {
 
     /// Chooses the pairs at the initial pose.
     pub fn new(model: &Model, bodies: &[Motion]) -> Self {
-        let mut me = Self { colliders: Vec::new(), pairs: Vec::new(), planes: model.planes.clone() };
+        let (planes, scratch) = (model.planes.clone(), Scratch::default());
+        let mut me = Self { colliders: Vec::new(), pairs: Vec::new(), planes, scratch };
         let of_bodies = model.bodies.iter().enumerate().map(|(b, body)| (Some(b), body.com, &body.shapes));
         for (body, com, shapes) in of_bodies.chain([(None, V3::zeros(), &model.world_shapes)]) {
             for shape in shapes.iter().filter(|s| s.collides) {
                 let to_centre = Translation3::from(-com);
                 let (local, parry_local) =
                     (to_centre * shape.body_from_shape, to_centre * parry_local(shape));
-                let parry = parry_shape(shape);
+                let Some(parry) = parry_shape(shape) else { continue };
                 let sphere = parry.compute_local_bounding_sphere();
                 let centre = (parry_local * Point3::from(vector(sphere.center))).coords;
                 me.colliders.push(Collider {
@@ -113,7 +116,7 @@ impl Detector {
         for i in 0..me.colliders.len() {
             for k in i + 1..me.colliders.len() {
                 if me.may_meet(model, bodies, i, k) {
-                    me.pairs.push(Pair { colliders: [i, k], manifolds: Vec::new() });
+                    me.pairs.push([i, k]);
                 }
             }
         }
@@ -133,6 +136,10 @@ impl Detector {
         if a == b || neighbours(a, b) || neighbours(b, a) || filtered {
             return false;
         }
+        // What starts inside ground comes out of it.
+        if is_ground(&*self.colliders[i].shape) || is_ground(&*self.colliders[k].shape) {
+            return true;
+        }
         let pose = |i: usize| -> Pose { self.colliders[i].parry_pose(bodies).into() };
         let (p, q) = (pose(i), pose(k));
         let near = query::contact(&p, &*self.colliders[i].shape, &q, &*self.colliders[k].shape, MARGIN);
@@ -141,16 +148,16 @@ impl Detector {
 
     /// Adds the contact points of a step of length h from the committed motion.
     pub fn detect(&mut self, bodies: &[Motion], h: f64, out: &mut Vec<ContactPoint>) {
-        let Self { colliders, pairs, planes } = self;
+        let Self { colliders, pairs, planes, scratch } = self;
         for (p, plane) in planes.iter().enumerate() {
             for (i, c) in colliders.iter().enumerate() {
-                on_ground(plane, (p * colliders.len() + i, c), bodies, h, out);
+                on_ground(plane, (p * colliders.len() + i, c), bodies, h, scratch, out);
             }
         }
         let first = planes.len() * colliders.len();
-        for (i, pair) in pairs.iter_mut().enumerate() {
-            let [a, b] = pair.colliders.map(|i| &colliders[i]);
-            between((first + i, a, b), &mut pair.manifolds, bodies, h, out);
+        for (i, pair) in pairs.iter().enumerate() {
+            let [a, b] = pair.map(|i| &colliders[i]);
+            between((first + i, a, b), bodies, h, scratch, out);
         }
     }
 }
@@ -185,6 +192,7 @@ fn on_ground(
     (pair, c): (usize, &Collider),
     bodies: &[Motion],
     h: f64,
+    scratch: &mut Scratch,
     out: &mut Vec<ContactPoint>,
 ) {
     if c.body.is_none() {
@@ -197,21 +205,28 @@ fn on_ground(
         return;
     }
     let friction = larger(plane.friction, c.given.friction);
-    support_points(&c.given.geometry, &c.pose(bodies), &plane.normal, |p| {
-        let gap = plane.normal.dot(&p) - plane.offset;
+    let found = &mut scratch.found;
+    found.clear();
+    support_points(&c.given.geometry, &c.pose(bodies), &plane.normal, |on_shape| {
+        let (normal, gap) = (plane.normal, plane.normal.dot(&on_shape) - plane.offset);
         if gap < reach {
-            let points = [p - gap * plane.normal, p];
-            let (bodies, frame) = ([None, c.body], frame(plane.normal));
-            out.push(ContactPoint { pair, bodies, frame, points, gap, friction });
+            found.push(Found { on_ground: on_shape - gap * normal, on_shape, normal, gap });
         }
     });
+    if matches!(c.given.geometry, ShapeGeometry::Hull(_)) {
+        reduce(found);
+    }
+    out.extend(found.iter().map(|f| {
+        let (bodies, frame) = ([None, c.body], frame(f.normal));
+        ContactPoint { pair, bodies, frame, points: [f.on_ground, f.on_shape], gap: f.gap, friction }
+    }));
 }
 
 fn between(
     (pair, a, b): (usize, &Collider, &Collider),
-    manifolds: &mut Vec<ContactManifold<(), ()>>,
     bodies: &[Motion],
     h: f64,
+    scratch: &mut Scratch,
     out: &mut Vec<ContactPoint>,
 ) {
     let (ma, mb) = (a.motion(bodies), b.motion(bodies));
@@ -219,28 +234,31 @@ fn between(
     if (ma.point(&a.centre) - mb.point(&b.centre)).norm() > a.radius + b.radius + reach {
         return;
     }
+    let friction = larger(a.given.friction, b.given.friction);
     let (pose_a, pose_b) = (a.parry_pose(bodies), b.parry_pose(bodies));
-    // Without its memory parry would keep old points while a pair moves little, and contacts would creep.
-    manifolds.iter_mut().for_each(|m| m.points.clear());
-    let relative: Pose = (pose_a.inverse() * pose_b).into();
-    let found = DefaultQueryDispatcher
-        .contact_manifolds(&relative, &*a.shape, &*b.shape, reach, manifolds, &mut None);
-    if found.is_err() {
+    let Scratch { manifold, found } = scratch;
+    found.clear();
+    // Bodies come before what stands still, so ground is b.
+    if is_ground(&*b.shape) {
+        on_triangles((&*b.shape, &pose_b), (&*a.shape, &pose_a), reach, manifold, &mut |f| found.push(f));
+        reduce(found);
+        out.extend(found.iter().map(|f| {
+            let (bodies, frame) = ([a.body, b.body], frame(-f.normal));
+            ContactPoint { pair, bodies, frame, points: [f.on_shape, f.on_ground], gap: f.gap, friction }
+        }));
         return;
     }
-    for manifold in manifolds.iter() {
-        let n = pose_a.rotation * vector(manifold.local_n1);
-        let first = out.len();
-        for point in manifold.points.iter().filter(|p| p.dist < reach) {
-            let on_a = (pose_a * Point3::from(vector(point.local_p1))).coords;
-            let on_b = (pose_b * Point3::from(vector(point.local_p2))).coords;
-            // Where edges and corners coincide parry gives the same point more than once.
-            if out[first..].iter().any(|o| (o.points[0] - on_a).norm_squared() < SAME_POINT * SAME_POINT) {
-                continue;
-            }
-            let friction = larger(a.given.friction, b.given.friction);
-            let (bodies, points) = ([a.body, b.body], [on_a, on_b]);
-            out.push(ContactPoint { pair, bodies, frame: frame(n), points, gap: point.dist, friction });
+    between_convex((&*a.shape, None), &*b.shape, &(pose_a.inverse() * pose_b), reach, manifold);
+    let n = pose_a.rotation * vector(manifold.local_n1);
+    let first = out.len();
+    for point in manifold.points.iter().filter(|p| p.dist < reach) {
+        let on_a = (pose_a * Point3::from(vector(point.local_p1))).coords;
+        let on_b = (pose_b * Point3::from(vector(point.local_p2))).coords;
+        // Where edges and corners coincide parry gives the same point more than once.
+        if out[first..].iter().any(|o| (o.points[0] - on_a).norm_squared() < SAME_POINT * SAME_POINT) {
+            continue;
         }
+        let (bodies, points) = ([a.body, b.body], [on_a, on_b]);
+        out.push(ContactPoint { pair, bodies, frame: frame(n), points, gap: point.dist, friction });
     }
 }

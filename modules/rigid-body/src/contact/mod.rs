@@ -2,9 +2,12 @@
 //! the bodies and with rigid ground.
 
 pub(crate) mod bodies;
+pub(crate) mod convex;
 pub(crate) mod detection;
 pub(crate) mod estimate;
 pub(crate) mod memory;
 pub(crate) mod plane;
 pub(crate) mod ports;
+pub(crate) mod reduce;
 pub(crate) mod shapes;
+pub(crate) mod triangles;

@@ -33,6 +33,9 @@ pub(crate) fn support_points(g: &ShapeGeometry, pose: &Isometry3<f64>, n: &V3, m
                 at(sign(1) * x, sign(2) * y, sign(4) * z);
             }
         }
+        ShapeGeometry::Hull(ref mesh) => mesh.points.iter().for_each(|p| at(p[0], p[1], p[2])),
+        // Ground has no ground below it.
+        ShapeGeometry::Triangles(_) | ShapeGeometry::Heights(_) => {}
         ShapeGeometry::Cylinder { half_length, radius } => {
             // On each rim the lowest point, the opposite one and those between; any four where the disc lies flat.
             let down = -pose.rotation.inverse_transform_vector(n);

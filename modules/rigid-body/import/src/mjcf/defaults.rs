@@ -24,6 +24,18 @@ pub(crate) struct Element<'a, 'i> {
     class: Option<&'a str>,
 }
 
+impl<'a, 'i> Element<'a, 'i> {
+    /// The class that it takes defaults from.
+    pub fn class(&self) -> Option<&'a str> {
+        self.class
+    }
+
+    /// The same with another class.
+    pub fn inheriting(self, class: Option<&'a str>) -> Self {
+        Self { class, ..self }
+    }
+}
+
 impl<'a> Defaults<'a> {
     pub fn new(source: Source<'a>, root: Node) -> Self {
         let compiler = root.children().find(|n| n.has_tag_name("compiler"));

@@ -1,7 +1,9 @@
 //! Geoms: shapes, what they weigh, planes.
 
+use super::assets::Assets;
 use super::defaults::{Defaults, Element, from_z};
 use crate::error::Error;
+use crate::mesh::Solid;
 use crate::model::{Plane, Shape, ShapeGeometry};
 use nalgebra::{Isometry3, Matrix3, Translation3, Unit, Vector3};
 use std::f64::consts::PI;
@@ -11,17 +13,34 @@ const DENSITY: f64 = 1000.0;
 
 /// What a geom is.
 pub(crate) enum Geom {
-    Shape {
-        shape: Shape,
-        mass: f64,
-    },
+    Shape(Weighed),
     Plane(Plane),
-    /// Of a kind that cannot be used.
-    Unknown(String),
+    /// Cannot be used, and why.
+    Unused(String),
 }
 
-/// Reads a geom; `owner` names it where it has no name.
-pub(crate) fn geom(d: &Defaults, e: &Element, owner: &str) -> Result<Geom, Error> {
+/// A shape that weighs something.
+pub(super) struct Weighed {
+    pub shape: Shape,
+    /// kg.
+    pub mass: f64,
+    pub solid: Solid,
+    /// What was made of it.
+    pub notice: Option<String>,
+}
+
+/// What a geom is read with.
+#[derive(Clone, Copy)]
+pub(super) struct Around<'a> {
+    pub assets: &'a Assets,
+    /// Names it where it has no name.
+    pub owner: &'a str,
+    /// Whether it stands still in the world.
+    pub still: bool,
+}
+
+/// Reads a geom.
+pub(super) fn geom(d: &Defaults, e: &Element, around: Around) -> Result<Geom, Error> {
     let kind = d.text(e, "type").unwrap_or("sphere").to_owned();
     let size = d.numbers(e, "size")?.unwrap_or_default();
     let mut pose = d.pose(e)?;
@@ -51,71 +70,111 @@ pub(crate) fn geom(d: &Defaults, e: &Element, owner: &str) -> Result<Geom, Error
         }
     };
     let half = |k: usize| length.map_or_else(|| at(k), Ok);
+    let bits = |name: &str| d.number(e, name).map(|b| b.unwrap_or(1.0) as u32);
+    let (group, mask) = (bits("contype")?, bits("conaffinity")?);
+    let collides = group != 0 || mask != 0;
+    let name = e.node.attribute("name").unwrap_or(around.owner).to_owned();
+    let mut notice = None;
     let geometry = match kind.as_str() {
+        "mesh" => match mesh(d, e, around)? {
+            Ok((geometry, said)) => {
+                notice = said.filter(|_| collides);
+                geometry
+            }
+            Err(why) if collides => return Err(d.wrong(e, why)),
+            Err(why) => return Ok(Geom::Unused(format!("is only seen and is not shown: {why}"))),
+        },
+        "hfield" if !around.still => {
+            return Ok(Geom::Unused(
+                "is a height field on a body; they belong to the world, it is left out".into(),
+            ));
+        }
+        "hfield" => {
+            let wanted = d.text(e, "hfield").unwrap_or_default();
+            let unknown = || d.wrong(e, format!("there is no <hfield> `{wanted}` in <asset>"));
+            let field = around.assets.fields.get(wanted).ok_or_else(unknown)?;
+            ShapeGeometry::Heights(field.clone().map_err(|why| d.wrong(e, format!("hfield {why}")))?)
+        }
         "sphere" => ShapeGeometry::Sphere { radius: at(0)? },
         "capsule" => ShapeGeometry::Capsule { radius: at(0)?, half_length: half(1)? },
         "cylinder" => ShapeGeometry::Cylinder { radius: at(0)?, half_length: half(1)? },
         "box" if length.is_none() => ShapeGeometry::Box { half_extents: [at(0)?, at(1)?, at(2)?] },
-        _ => return Ok(Geom::Unknown(kind)),
+        _ => return Ok(Geom::Unused(format!("of type `{kind}` is not supported and is left out"))),
     };
-    let bits = |name: &str| d.number(e, name).map(|b| b.unwrap_or(1.0) as u32);
-    let (group, mask) = (bits("contype")?, bits("conaffinity")?);
+    let solid = match &geometry {
+        ShapeGeometry::Hull(_) | ShapeGeometry::Triangles(_) => {
+            let asset = around.assets.meshes.get(d.text(e, "mesh").unwrap_or_default());
+            asset.and_then(|a| a.as_ref().ok()).map_or_else(nothing, |a| a.solid)
+        }
+        other => solid(other),
+    };
     let density = d.number(e, "density")?.unwrap_or(DENSITY);
-    let mass = d.number(e, "mass")?.unwrap_or_else(|| density * volume(&geometry));
-    let name = e.node.attribute("name").unwrap_or(owner).to_owned();
-    let collides = group != 0 || mask != 0;
-    Ok(Geom::Shape {
-        shape: Shape { name, geometry, body_from_shape: pose, collides, friction, group, mask },
-        mass,
+    let mass = d.number(e, "mass")?.unwrap_or(density * solid.volume);
+    let shape = Shape { name, geometry, body_from_shape: pose, collides, friction, group, mask };
+    Ok(Geom::Shape(Weighed { shape, mass, solid, notice }))
+}
+
+/// A mesh by its name: triangles where it stands still, else its hull.
+fn mesh(
+    d: &Defaults,
+    e: &Element,
+    around: Around,
+) -> Result<Result<(ShapeGeometry, Option<String>), String>, Error> {
+    let wanted = d.text(e, "mesh").unwrap_or_default();
+    let unknown = || d.wrong(e, format!("there is no <mesh> `{wanted}` in <asset>"));
+    Ok(match around.assets.meshes.get(wanted).ok_or_else(unknown)? {
+        Ok(asset) if around.still => Ok((ShapeGeometry::Triangles(asset.triangles.clone()), None)),
+        Ok(asset) => {
+            let said = format!("with the mesh `{wanted}` {}", asset.notice);
+            Ok((ShapeGeometry::Hull(asset.hull.clone()), Some(said)))
+        }
+        Err(why) => Err(format!("mesh {why}")),
     })
 }
 
-fn volume(g: &ShapeGeometry) -> f64 {
-    match *g {
-        ShapeGeometry::Sphere { radius: r } => 4.0 / 3.0 * PI * r * r * r,
-        ShapeGeometry::Box { half_extents: [x, y, z] } => 8.0 * x * y * z,
-        ShapeGeometry::Cylinder { half_length: l, radius: r } => PI * r * r * 2.0 * l,
-        ShapeGeometry::Capsule { half_length: l, radius: r } => PI * r * r * (2.0 * l + 4.0 / 3.0 * r),
-    }
+fn nothing() -> Solid {
+    Solid { volume: 0.0, centre: Vector3::zeros(), inertia: Matrix3::zeros() }
 }
 
-/// Inertia of a homogeneous shape about its centre in its axes, kg m².
-fn inertia(g: &ShapeGeometry, mass: f64) -> Matrix3<f64> {
-    let (about, along) = match *g {
-        ShapeGeometry::Sphere { radius: r } => return Matrix3::from_diagonal_element(0.4 * mass * r * r),
+/// A homogeneous shape around its centre.
+fn solid(g: &ShapeGeometry) -> Solid {
+    let (volume, moments) = match *g {
+        ShapeGeometry::Sphere { radius: r } => (4.0 / 3.0 * PI * r * r * r, [0.4 * r * r; 3]),
         ShapeGeometry::Box { half_extents: [x, y, z] } => {
-            let i = |a: f64, b: f64| mass * (a * a + b * b) / 3.0;
-            return Matrix3::from_diagonal(&Vector3::new(i(y, z), i(x, z), i(x, y)));
+            let i = |a: f64, b: f64| (a * a + b * b) / 3.0;
+            (8.0 * x * y * z, [i(y, z), i(x, z), i(x, y)])
         }
         ShapeGeometry::Cylinder { half_length: l, radius: r } => {
-            (mass * (r * r / 4.0 + l * l / 3.0), mass * r * r / 2.0)
+            let about = r * r / 4.0 + l * l / 3.0;
+            (PI * r * r * 2.0 * l, [about, about, r * r / 2.0])
         }
         ShapeGeometry::Capsule { half_length: l, radius: r } => {
             // A cylinder and two half spheres whose centres lie 3/8·r beyond its ends.
-            let total = volume(g);
-            let (rod, ball) =
-                (mass * PI * r * r * 2.0 * l / total, mass * 4.0 / 3.0 * PI * r * r * r / total);
+            let total = PI * r * r * (2.0 * l + 4.0 / 3.0 * r);
+            let (rod, ball) = (PI * r * r * 2.0 * l / total, PI * 4.0 / 3.0 * r * r * r / total);
             let about = rod * (r * r / 4.0 + l * l / 3.0) + ball * (0.4 * r * r + l * l + 0.75 * l * r);
-            (about, rod * r * r / 2.0 + 0.4 * ball * r * r)
+            (total, [about, about, rod * r * r / 2.0 + 0.4 * ball * r * r])
         }
+        ShapeGeometry::Hull(_) | ShapeGeometry::Triangles(_) | ShapeGeometry::Heights(_) => return nothing(),
     };
-    Matrix3::from_diagonal(&Vector3::new(about, about, along))
+    let inertia = Matrix3::from_diagonal(&Vector3::from(moments));
+    Solid { volume, centre: Vector3::zeros(), inertia }
 }
 
-/// Mass, centre of mass and inertia about it of shapes with their masses, in their common frame.
-pub(crate) fn compound(shapes: &[(Shape, f64)]) -> Option<(f64, Vector3<f64>, Matrix3<f64>)> {
-    let mass: f64 = shapes.iter().map(|(_, m)| m).sum();
+/// Mass, centre of mass and inertia about it of shapes in their common frame.
+pub(super) fn compound(shapes: &[Weighed]) -> Option<(f64, Vector3<f64>, Matrix3<f64>)> {
+    let mass: f64 = shapes.iter().map(|s| s.mass).sum();
     if mass <= 0.0 {
         return None;
     }
-    let centre =
-        shapes.iter().map(|(s, m)| *m * s.body_from_shape.translation.vector).sum::<Vector3<f64>>() / mass;
+    let centre_of = |s: &Weighed| (s.shape.body_from_shape * nalgebra::Point3::from(s.solid.centre)).coords;
+    let centre = shapes.iter().map(|s| s.mass * centre_of(s)).sum::<Vector3<f64>>() / mass;
     let mut total = Matrix3::zeros();
-    for (s, m) in shapes {
-        let r = s.body_from_shape.rotation.to_rotation_matrix();
-        let arm = s.body_from_shape.translation.vector - centre;
+    for s in shapes {
+        let r = s.shape.body_from_shape.rotation.to_rotation_matrix();
+        let arm = centre_of(s) - centre;
         let moved = Matrix3::from_diagonal_element(arm.norm_squared()) - arm * arm.transpose();
-        total += r * inertia(&s.geometry, *m) * r.transpose() + *m * moved;
+        total += s.mass * (r * s.solid.inertia * r.transpose() + moved);
     }
     Some((mass, centre, total))
 }

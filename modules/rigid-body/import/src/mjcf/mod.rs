@@ -6,37 +6,37 @@
 //! the scenario's.
 
 mod actuators;
+mod assets;
 mod defaults;
+mod equality;
 mod geom;
+mod hang;
+mod ignored;
 
+use crate::Options;
 use crate::check::{mass_spread, physical};
 use crate::error::{Error, Source};
-use crate::model::{AxisData, Base, Body, Joint, JointKind, Robot, Shape};
-use defaults::{Defaults, Element};
-use geom::{Geom, compound, geom};
-use nalgebra::{Isometry3, Matrix3, Translation3, Unit, Vector3};
+use crate::model::{Base, Body, Robot, Shape};
+use assets::Assets;
+use defaults::Defaults;
+use geom::{Around, Geom, compound, geom};
+use nalgebra::{Isometry3, Matrix3, Vector3};
 use roxmltree::{Document, Node};
-use std::path::Path;
+use std::collections::BTreeMap;
 
 /// Elements that say nothing about the mechanics.
 const SEEN_ONLY: [&str; 9] =
     ["site", "camera", "light", "visual", "statistic", "asset", "size", "compiler", "default"];
 
-/// Reads a file.
-pub fn read_mjcf(path: &Path) -> Result<Robot, Error> {
-    let file = path.display().to_string();
-    let text = std::fs::read_to_string(path)
-        .map_err(|e| Error::Read { file: file.clone(), reason: e.to_string() })?;
-    read_mjcf_text(&file, &text)
-}
-
-/// Reads the text of a file; `file` appears in messages.
-pub fn read_mjcf_text(file: &str, text: &str) -> Result<Robot, Error> {
-    let document =
-        Document::parse(text).map_err(|e| Error::Syntax { file: file.into(), reason: e.to_string() })?;
+/// Reads the text of a file; `file` appears in messages and tells the folder of meshes.
+pub fn read_mjcf_text(file: &str, text: &str, options: &Options) -> Result<Robot, Error> {
+    let source = Source { file, text };
+    let document = Document::parse(text).map_err(|e| source.syntax(e.pos().row as usize, e.to_string()))?;
     let root = document.root_element();
-    let defaults = Defaults::new(Source { file, text }, root);
-    let mut reader = Reader { d: &defaults, robot: empty(root.attribute("model").unwrap_or("robot")) };
+    let defaults = Defaults::new(source, root);
+    let assets = Assets::read(&defaults, root, &options.folders(file))?;
+    let robot = empty(root.attribute("model").unwrap_or("robot"));
+    let mut reader = Reader { d: &defaults, robot, assets: &assets, frames: BTreeMap::new() };
     reader.sections(root)?;
     let mut robot = reader.robot;
     if robot.bodies.is_empty() {
@@ -62,7 +62,10 @@ fn empty(name: &str) -> Robot {
         world_shapes: Vec::new(),
         planes: Vec::new(),
         excluded: Vec::new(),
+        couplings: Vec::new(),
+        loops: Vec::new(),
         warnings: Vec::new(),
+        notices: Vec::new(),
     }
 }
 
@@ -80,6 +83,9 @@ struct Place<'a> {
 struct Reader<'d, 's> {
     d: &'d Defaults<'s>,
     robot: Robot,
+    assets: &'d Assets,
+    /// By name of a body of the file: the body that it belongs to (none: the world) and its frame there.
+    frames: BTreeMap<String, (Option<usize>, Isometry3<f64>)>,
 }
 
 impl<'d, 's> Reader<'d, 's> {
@@ -106,9 +112,17 @@ impl<'d, 's> Reader<'d, 's> {
             self.exclude(node)?;
         }
         for node in section("actuator") {
+            self.warn_ignored(node, None);
             self.actuator(node)?;
         }
-        let known = ["worldbody", "contact", "actuator", "option"];
+        for node in section("equality") {
+            self.equality(node)?;
+        }
+        let heads = root.children().filter(|n| n.has_tag_name("compiler") || n.has_tag_name("option"));
+        for node in heads.chain(section("asset")) {
+            self.warn_ignored(node, None);
+        }
+        let known = ["worldbody", "contact", "actuator", "equality", "option"];
         for node in root.children().filter(Node::is_element) {
             let name = node.tag_name().name();
             if !known.contains(&name) && !SEEN_ONLY.contains(&name) {
@@ -121,9 +135,15 @@ impl<'d, 's> Reader<'d, 's> {
     }
 
     fn warn(&mut self, node: Node, what: &str) {
+        let text = self.place(node, what);
+        self.robot.warnings.push(text);
+    }
+
+    /// What is to be said about an element, with its place.
+    fn place(&self, node: Node, what: &str) -> String {
         let (file, line) = (self.d.source.file, self.d.line(node));
         let name = node.attribute("name").map(|n| format!(" `{n}`")).unwrap_or_default();
-        self.robot.warnings.push(format!("{file}:{line}: <{}>{name} {what}", node.tag_name().name()));
+        format!("{file}:{line}: <{}>{name} {what}", node.tag_name().name())
     }
 
     /// Geoms and bodies of a body or the world, which are at `place`.
@@ -141,22 +161,31 @@ impl<'d, 's> Reader<'d, 's> {
     }
 
     fn shape<'a>(&mut self, node: Node<'a, '_>, place: Place<'a>, owner: &str) -> Result<(), Error> {
+        self.warn_ignored(node, place.class);
         let e = self.d.element(node, place.class);
-        match geom(self.d, &e, owner)? {
-            Geom::Shape { shape, .. } => {
+        let around = Around { assets: self.assets, owner, still: place.body.is_none() };
+        match geom(self.d, &e, around)? {
+            Geom::Shape(weighed) => {
+                if let Some(said) = weighed.notice {
+                    let said = self.place(node, &said);
+                    self.robot.notices.push(said);
+                }
+                let shape = weighed.shape;
                 let shape = Shape { body_from_shape: place.frame * shape.body_from_shape, ..shape };
                 match place.body {
                     Some(body) => self.robot.bodies[body].shapes.push(shape),
                     None => self.robot.world_shapes.push(shape),
                 }
             }
-            Geom::Plane(plane) if place.body.is_none() => self.robot.planes.push(plane),
+            Geom::Plane(plane) if place.body.is_none() => {
+                let normal = place.frame.rotation * plane.normal;
+                let offset = plane.offset + normal.dot(&place.frame.translation.vector);
+                self.robot.planes.push(crate::model::Plane { normal, offset, ..plane });
+            }
             Geom::Plane(_) => {
                 self.warn(node, "is a plane on a body; planes belong to the world, it is left out")
             }
-            Geom::Unknown(kind) => {
-                self.warn(node, &format!("of type `{kind}` is not supported and is left out"))
-            }
+            Geom::Unused(why) => self.warn(node, &why),
         }
         Ok(())
     }
@@ -164,6 +193,7 @@ impl<'d, 's> Reader<'d, 's> {
     fn body<'a>(&mut self, node: Node<'a, '_>, above: Place<'a>) -> Result<(), Error> {
         let class = node.attribute("childclass").or(above.class);
         let e = self.d.element(node, None);
+        self.warn_ignored(node, class);
         let frame = above.frame * self.d.pose(&e)?;
         let name =
             node.attribute("name").map_or_else(|| format!("body{}", self.robot.bodies.len()), str::to_owned);
@@ -200,6 +230,7 @@ impl<'d, 's> Reader<'d, 's> {
                 Place { body: Some(child), frame: Isometry3::identity(), class }
             }
         };
+        self.frames.insert(name.clone(), (place.body, place.frame));
         self.contents(node, place, &name)
     }
 
@@ -227,102 +258,13 @@ impl<'d, 's> Reader<'d, 's> {
             return Ok(Some((mass, pose.translation.vector, r * tensor * r.transpose())));
         }
         let mut weighed = Vec::new();
+        let around = Around { assets: self.assets, owner: name, still: false };
         for node in node.children().filter(|n| n.has_tag_name("geom")) {
-            if let Geom::Shape { shape, mass } = geom(d, &d.element(node, class), name)? {
-                weighed.push((shape, mass));
+            if let Geom::Shape(shape) = geom(d, &d.element(node, class), around)? {
+                weighed.push(shape);
             }
         }
         Ok(compound(&weighed))
-    }
-
-    /// Hangs a body on its parent; `frame`: its pose there or in the world.
-    fn hang(
-        &mut self,
-        joint: Option<Element>,
-        parent: Option<usize>,
-        child: usize,
-        frame: Isometry3<f64>,
-        body: &str,
-    ) -> Result<(), Error> {
-        let d = self.d;
-        let Some(e) = joint else {
-            self.robot.joints.push(Joint {
-                name: format!("{body}_fixed"),
-                kind: JointKind::Fixed,
-                parent,
-                child,
-                parent_from_joint: frame,
-                child_from_joint: Isometry3::identity(),
-                axis: Vector3::x_axis(),
-                limits: None,
-                data: AxisData::default(),
-            });
-            return Ok(());
-        };
-        let kind =
-            if e.node.has_tag_name("freejoint") { "free" } else { d.text(&e, "type").unwrap_or("hinge") };
-        let kind = match kind {
-            "hinge" => JointKind::Revolute,
-            "slide" => JointKind::Prismatic,
-            "free" if parent.is_none() => {
-                self.robot.others.push((child, frame));
-                return Ok(());
-            }
-            other => {
-                let problem = format!(
-                    "type `{other}` cannot be simulated here; hinge, slide and free (in the world) can"
-                );
-                return Err(d.wrong(&e, problem));
-            }
-        };
-        let name = e.node.attribute("name").map_or_else(|| format!("{body}_joint"), str::to_owned);
-        let axis = d.vector(&e, "axis")?.unwrap_or_else(Vector3::z);
-        let axis = Unit::try_new(axis, 1e-9).ok_or_else(|| d.wrong(&e, "axis has no direction".into()))?;
-        let anchor = Isometry3::from(Translation3::from(d.vector(&e, "pos")?.unwrap_or_else(Vector3::zeros)));
-        if d.number(&e, "ref")?.unwrap_or(0.0) != 0.0 {
-            self.warn(
-                e.node,
-                "has a `ref`, which is not supported: its coordinate is 0 in the pose of the file",
-            );
-        }
-        if self.robot.joints.iter().any(|j| j.name == name) {
-            return Err(d.wrong(&e, format!("the name `{name}` is used twice; names of joints are unique")));
-        }
-        let unit = if kind == JointKind::Revolute { d.angle } else { 1.0 };
-        let not_negative = |what: &str| match d.number(&e, what)?.unwrap_or(0.0) {
-            x if x >= 0.0 => Ok(x),
-            x => Err(d.wrong(&e, format!("{what} = {x} is negative: it would drive the joint"))),
-        };
-        let data = AxisData {
-            damping: not_negative("damping")?,
-            friction: not_negative("frictionloss")?,
-            armature: not_negative("armature")?,
-            stiffness: not_negative("stiffness")?,
-            reference: unit * d.number(&e, "springref")?.unwrap_or(0.0),
-            drive: None,
-        };
-        let limits = self.limits(&e, unit)?;
-        self.robot.joints.push(Joint {
-            name,
-            kind,
-            parent,
-            child,
-            parent_from_joint: frame * anchor,
-            child_from_joint: anchor,
-            axis,
-            limits,
-            data,
-        });
-        Ok(())
-    }
-
-    fn limits(&self, e: &Element, unit: f64) -> Result<Option<[f64; 2]>, Error> {
-        let range = self.d.numbers(e, "range")?;
-        match (self.d.text(e, "limited"), range.as_deref()) {
-            (Some("false"), _) | (_, None) => Ok(None),
-            (_, Some([lower, upper])) if lower < upper => Ok(Some([unit * lower, unit * upper])),
-            (_, Some(other)) => Err(self.d.wrong(e, format!("range = {other:?} leaves no room"))),
-        }
     }
 
     fn exclude(&mut self, node: Node) -> Result<(), Error> {

@@ -4,7 +4,7 @@ use crate::process::{Outcome, root};
 use crate::validate::rigid_body::rig::{G, Rig, pose, table};
 use crate::validate::{Figure, Limit};
 use nalgebra::Vector3;
-use terraglue_robot_import::{JointKind, Robot, read_urdf};
+use terraglue_robot_import::{JointKind, Options, Robot, read_robot};
 
 const STAND: [f64; 4] = [0.0, 0.958_192_178_746_274_4, -1.379_634_180_263_838_4, -1.149_354_325_277_333_1];
 const CYCLE: f64 = 1.2;
@@ -25,7 +25,7 @@ impl Walker {
             STAND[1], STAND[2], STAND[3]
         );
         let rig = Rig::new(&parameters, [0.0, 0.0, -gravity], 1e-3)?;
-        let robot = read_urdf(&root().join("models/hexapod.urdf"), false).map_err(|e| e.to_string())?;
+        let robot = read_robot(&root().join("models/hexapod.urdf"), &Options::default()).map_err(|e| e.to_string())?;
         let moving = robot.joints.iter().filter(|j| j.kind == JointKind::Revolute);
         let targets = moving.map(|j| rig.id(&format!("{}.angle_target", j.name))).collect::<Outcome<_>>()?;
         Ok(Self { rig, robot, targets, rows: table("gait_tripod.csv")? })

@@ -1,0 +1,70 @@
+//! Mesh files: STL, ascii and binary, and OBJ, by the crate `mesh-loader`.
+
+use super::Mesh;
+use mesh_loader::Loader;
+use std::collections::BTreeMap;
+use std::path::Path;
+
+/// Reads all triangles of a file.
+pub(crate) fn load(path: &Path) -> Result<Mesh, String> {
+    let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
+    if !["stl", "obj"].contains(&ending.as_str()) {
+        let problem = format!(
+            "meshes of kind `.{ending}` cannot be read; convert it to STL or OBJ, which mesh editors write"
+        );
+        return Err(problem);
+    }
+    let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
+    // The loader chooses by the ending as it is written most often.
+    let named = path.with_extension(&ending);
+    let scene = Loader::default().load_from_slice(&bytes, &named).map_err(|e| e.to_string())?;
+    let mut mesh = Builder::default();
+    for part in &scene.meshes {
+        for face in &part.faces {
+            let corner = |k: u32| part.vertices.get(k as usize).map(|p| p.map(f64::from));
+            let [Some(a), Some(b), Some(c)] = face.map(corner) else {
+                return Err("a triangle names a corner that is not there".into());
+            };
+            mesh.add([a, b, c]);
+        }
+    }
+    mesh.finish()
+}
+
+/// Corners as they stand in a text, without triangles.
+pub(crate) fn corners_of(numbers: &[f64]) -> Mesh {
+    let points = numbers.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
+    Mesh { points, triangles: Vec::new() }
+}
+
+/// Joins corners at the same place, which STL repeats for every triangle.
+#[derive(Default)]
+struct Builder {
+    mesh: Mesh,
+    known: BTreeMap<[u64; 3], u32>,
+}
+
+impl Builder {
+    fn add(&mut self, triangle: [[f64; 3]; 3]) {
+        let corners = triangle.map(|p| {
+            // 0 and −0 are the same place.
+            let p = p.map(|x| x + 0.0);
+            *self.known.entry(p.map(f64::to_bits)).or_insert_with(|| {
+                self.mesh.points.push(p);
+                self.mesh.points.len() as u32 - 1
+            })
+        });
+        let [a, b, c] = corners;
+        if a != b && b != c && c != a {
+            self.mesh.triangles.push(corners);
+        }
+    }
+
+    fn finish(self) -> Result<Mesh, String> {
+        let mesh = self.mesh;
+        if mesh.points.iter().flatten().any(|x| !x.is_finite()) {
+            return Err("a corner is not finite".into());
+        }
+        if mesh.triangles.is_empty() { Err("it has no triangles".into()) } else { Ok(mesh) }
+    }
+}

@@ -1,0 +1,113 @@
+//! Joints: how a body hangs from the one above it.
+
+use super::Reader;
+use super::defaults::Element;
+use crate::error::Error;
+use crate::model::{AxisData, Joint, JointKind};
+use nalgebra::{Isometry3, Translation3, Unit, Vector3};
+
+impl Reader<'_, '_> {
+    /// Hangs a body on its parent; `frame`: its pose there or in the world.
+    pub(super) fn hang(
+        &mut self,
+        joint: Option<Element>,
+        parent: Option<usize>,
+        child: usize,
+        frame: Isometry3<f64>,
+        body: &str,
+    ) -> Result<(), Error> {
+        let d = self.d;
+        let Some(e) = joint else {
+            self.robot.joints.push(Joint {
+                name: format!("{body}_fixed"),
+                kind: JointKind::Fixed,
+                parent,
+                child,
+                parent_from_joint: frame,
+                child_from_joint: Isometry3::identity(),
+                axis: Vector3::x_axis(),
+                limits: None,
+                data: AxisData::default(),
+            });
+            return Ok(());
+        };
+        let kind =
+            if e.node.has_tag_name("freejoint") { "free" } else { d.text(&e, "type").unwrap_or("hinge") };
+        let kind = match kind {
+            "hinge" => JointKind::Revolute,
+            "slide" => JointKind::Prismatic,
+            "ball" => JointKind::Spherical,
+            "free" if parent.is_none() => {
+                self.robot.others.push((child, frame));
+                return Ok(());
+            }
+            other => {
+                let problem = format!(
+                    "type `{other}` cannot be simulated here; hinge, slide, ball and free (in the world) can"
+                );
+                return Err(d.wrong(&e, problem));
+            }
+        };
+        self.warn_ignored(e.node, e.class());
+        let name = e.node.attribute("name").map_or_else(|| format!("{body}_joint"), str::to_owned);
+        let axis = d.vector(&e, "axis")?.unwrap_or_else(Vector3::z);
+        let axis = Unit::try_new(axis, 1e-9).ok_or_else(|| d.wrong(&e, "axis has no direction".into()))?;
+        let anchor = Isometry3::from(Translation3::from(d.vector(&e, "pos")?.unwrap_or_else(Vector3::zeros)));
+        if self.robot.joints.iter().any(|j| j.name == name) {
+            return Err(d.wrong(&e, format!("the name `{name}` is used twice; names of joints are unique")));
+        }
+        let unit = if kind == JointKind::Revolute { d.angle } else { 1.0 };
+        let not_negative = |what: &str| match d.number(&e, what)?.unwrap_or(0.0) {
+            x if x >= 0.0 => Ok(x),
+            x => Err(d.wrong(&e, format!("{what} = {x} is negative: it would drive the joint"))),
+        };
+        let data = AxisData {
+            damping: not_negative("damping")?,
+            friction: not_negative("frictionloss")?,
+            armature: not_negative("armature")?,
+            stiffness: not_negative("stiffness")?,
+            reference: unit * d.number(&e, "springref")?.unwrap_or(0.0),
+            drive: None,
+        };
+        let limits = if kind == JointKind::Spherical {
+            self.ball(&e)?;
+            None
+        } else {
+            self.limits(&e, unit)?
+        };
+        self.robot.joints.push(Joint {
+            name,
+            kind,
+            parent,
+            child,
+            parent_from_joint: frame * anchor,
+            child_from_joint: anchor,
+            axis,
+            limits,
+            data,
+        });
+        Ok(())
+    }
+
+    /// A ball turns freely: what else it says is named.
+    fn ball(&mut self, e: &Element) -> Result<(), Error> {
+        for name in ["range", "damping", "frictionloss", "armature", "stiffness"] {
+            if self.d.numbers(e, name)?.is_some_and(|n| n.iter().any(|x| *x != 0.0)) {
+                self.warn(
+                    e.node,
+                    &format!("is a ball and turns freely: `{name}` is not supported and does nothing"),
+                );
+            }
+        }
+        Ok(())
+    }
+
+    fn limits(&self, e: &Element, unit: f64) -> Result<Option<[f64; 2]>, Error> {
+        let range = self.d.numbers(e, "range")?;
+        match (self.d.text(e, "limited"), range.as_deref()) {
+            (Some("false"), _) | (_, None) => Ok(None),
+            (_, Some([lower, upper])) if lower < upper => Ok(Some([unit * lower, unit * upper])),
+            (_, Some(other)) => Err(self.d.wrong(e, format!("range = {other:?} leaves no room"))),
+        }
+    }
+}

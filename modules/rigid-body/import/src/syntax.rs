@@ -1,0 +1,105 @@
+//! What can be said about the text of a URDF file with a line, before `urdf-rs` reads it: its messages have no place.
+
+use crate::error::{Error, Source};
+use roxmltree::{Document, Node};
+
+/// Attributes that hold numbers: element, attribute, how many.
+const NUMBERS: [(&str, &str, usize); 27] = [
+    ("origin", "xyz", 3),
+    ("origin", "rpy", 3),
+    ("axis", "xyz", 3),
+    ("mass", "value", 1),
+    ("inertia", "ixx", 1),
+    ("inertia", "ixy", 1),
+    ("inertia", "ixz", 1),
+    ("inertia", "iyy", 1),
+    ("inertia", "iyz", 1),
+    ("inertia", "izz", 1),
+    ("sphere", "radius", 1),
+    ("cylinder", "radius", 1),
+    ("cylinder", "length", 1),
+    ("capsule", "radius", 1),
+    ("capsule", "length", 1),
+    ("box", "size", 3),
+    ("mesh", "scale", 3),
+    ("limit", "lower", 1),
+    ("limit", "upper", 1),
+    ("limit", "effort", 1),
+    ("limit", "velocity", 1),
+    ("dynamics", "damping", 1),
+    ("dynamics", "friction", 1),
+    ("mimic", "multiplier", 1),
+    ("mimic", "offset", 1),
+    ("color", "rgba", 4),
+    ("calibration", "rising", 1),
+];
+
+/// Kinds of joints of the format.
+const KINDS: [&str; 7] = ["revolute", "continuous", "prismatic", "fixed", "floating", "planar", "spherical"];
+
+/// Refuses text that is no XML or not URDF, attributes that are not there and numbers that are none.
+pub(crate) fn check(source: &Source) -> Result<(), Error> {
+    let document =
+        Document::parse(source.text).map_err(|e| source.syntax(e.pos().row as usize, e.to_string()))?;
+    let wrong = |node: Node, problem: String| {
+        let line = document.text_pos_at(node.range().start).row as usize;
+        let name = node.attribute("name").map(|n| format!(" `{n}`")).unwrap_or_default();
+        let element = format!("<{}>{name}", node.tag_name().name());
+        Err(Error::Element { file: source.file.into(), line, element, problem })
+    };
+    let root = document.root_element();
+    let xacro = |n: &Node| n.tag_name().namespace().is_some_and(|s| s.contains("xacro"));
+    if let Some(node) = document.descendants().find(xacro) {
+        let problem =
+            "is xacro, which is a language of its own: `xacro ROBOT.xacro > ROBOT.urdf` makes URDF of it";
+        return wrong(node, problem.into());
+    }
+    if !root.has_tag_name("robot") {
+        return wrong(root, "the root of URDF is <robot>".into());
+    }
+    for node in root.children().filter(Node::is_element) {
+        let needed: &[&str] = match node.tag_name().name() {
+            "link" => &["name"],
+            "joint" => &["name", "type"],
+            _ => continue,
+        };
+        if let Some(lacks) = needed.iter().find(|a| node.attribute(**a).is_none()) {
+            return wrong(node, format!("has no `{lacks}`"));
+        }
+        if node.has_tag_name("joint") {
+            joint(node).or_else(|problem| wrong(node, problem))?;
+        }
+        for below in node.descendants().filter(Node::is_element) {
+            numbers(below).or_else(|problem| wrong(below, problem))?;
+        }
+    }
+    Ok(())
+}
+
+fn joint(node: Node) -> Result<(), String> {
+    let kind = node.attribute("type").unwrap_or_default();
+    if !KINDS.contains(&kind) {
+        return Err(format!(
+            "type `{kind}` is unknown; use revolute, continuous, prismatic, planar, spherical or fixed"
+        ));
+    }
+    for end in ["parent", "child"] {
+        if !node.children().any(|n| n.has_tag_name(end) && n.attribute("link").is_some()) {
+            return Err(format!("has no <{end} link=\"…\"/>"));
+        }
+    }
+    Ok(())
+}
+
+fn numbers(node: Node) -> Result<(), String> {
+    let of_this = NUMBERS.iter().filter(|(element, ..)| node.has_tag_name(*element));
+    for (_, name, count) in of_this {
+        let Some(text) = node.attribute(*name) else { continue };
+        let read: Result<Vec<f64>, _> = text.split_whitespace().map(str::parse::<f64>).collect();
+        if !read.is_ok_and(|n| n.len() == *count) {
+            let needed = if *count == 1 { "a number".into() } else { format!("{count} numbers") };
+            return Err(format!("{name} = \"{text}\" is not {needed}"));
+        }
+    }
+    Ok(())
+}

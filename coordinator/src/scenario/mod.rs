@@ -3,6 +3,7 @@
 //! The keys of the reserved tables stand once, in [`keys`]; the parser, the JSON Schema and the documentation
 //! are made from there. Parameters of modules are checked by [`check_parameters`] once their schemas are known.
 
+pub mod advice;
 mod check;
 pub mod docs;
 mod events;

@@ -42,6 +42,21 @@ pub fn check_parameters_among(
     Ok(config.with_defaults(schema))
 }
 
+/// Checks the table `[NAME.MODULE]` of a module that the scenario does not choose.
+///
+/// # Errors
+/// The first wrong parameter, at its place in the scenario.
+pub(super) fn check_own_table(
+    schema: &Schema,
+    spec: &SubsystemSpec,
+    source: &Source,
+) -> Result<(), Box<InputError>> {
+    match spec.parameters.get(&schema.name) {
+        Some(Value::Object(values)) => Check { schema, spec, source, modules: &[] }.table("", values),
+        _ => Ok(()),
+    }
+}
+
 struct Check<'a> {
     schema: &'a Schema,
     spec: &'a SubsystemSpec,

@@ -243,6 +243,32 @@ fn a_module_named_by_its_path_has_a_sub_table_too() {
 }
 
 #[test]
+fn what_has_no_effect_is_said() {
+    let good = parse(GOOD).expect("parses");
+    assert!(advice::late_events(&good).is_empty());
+    let late = parse(&GOOD.replacen("at_s = 1.0", "at_s = 2.5", 1)).expect("parses");
+    let said = advice::late_events(&late);
+    assert_eq!(said.len(), 1);
+    assert_holds(&said[0], &["scenarios/walk.toml:24: ", "2.5 s never happens", "ends at 2 s"]);
+    let other = Schema {
+        name: "soil-cellular-automaton".into(),
+        parameters: vec![Parameter::number("curvature_max_per_m", "1/m", 40.0, "curvature").positive()],
+        ..schema()
+    };
+    let said = |own: &str| {
+        let s = parse(&GOOD.replacen("curvature_max_per_m = 40.0", own, 1)).expect("parses");
+        advice::unchosen(&other, &s.subsystems[1], &s.source)
+    };
+    assert_eq!(said("curvature_max_per_m = 30"), None);
+    let typo = said("curvature_max = 30").expect("a typo");
+    assert_holds(
+        &typo,
+        &["scenarios/walk.toml:18: ", "unknown key `curvature_max`", "`module = \"soil-bekker\"`"],
+    );
+    assert_holds(&said("curvature_max_per_m = -1").expect("out of range"), &[":18: ", "curvature_max_per_m"]);
+}
+
+#[test]
 fn no_damaged_text_makes_the_reader_panic() {
     let text = format!("# é – ü\n{GOOD}");
     let outcome = |damaged: &str| parse(damaged).map_err(|e| rendered(&e)).is_ok();

@@ -50,6 +50,7 @@ impl Testbed {
             ..HostServices::new(scenario.world.seed, &scenario.folder)
         };
         let services = change(services);
+        scenario::advice::late_events(scenario).iter().for_each(|advice| log::warn!("{advice}"));
         let instances = instantiate(scenario, options, library, &services)?;
         let directory = Directory::new(&instances);
         let links = signals::connect(&scenario.connections, &directory, &instances, &scenario.source)?;
@@ -109,6 +110,14 @@ fn instantiate(
         }
         let module: LoadedModule = library.find(&spec.module, &search, &scenario.folder).map_err(wrong)?;
         let config = scenario::check_parameters(module.schema(), spec, &scenario.source)?;
+        for name in scenario::SHIPPED_MODULES.iter().filter(|name| spec.parameters.contains_key(**name)) {
+            let Ok(other) = library.find(name, &search, &scenario.folder) else { continue };
+            if other.schema().name != module.schema().name
+                && let Some(advice) = scenario::advice::unchosen(other.schema(), spec, &scenario.source)
+            {
+                log::warn!("{advice}");
+            }
+        }
         let module = module.run_by(interpreter(spec.python.as_deref(), &scenario.folder));
         let made = match spec.isolate || module.is_python() {
             true => module.instantiate_isolated(&spec.name, config, services, spec.isolation),

@@ -14,6 +14,7 @@ mod parameters;
 mod planar;
 mod rig;
 mod six_feet;
+mod squeezer;
 mod table;
 mod walk_forms;
 
@@ -23,7 +24,8 @@ use crate::process::{Outcome, root};
 type Part = fn(&Context) -> Outcome<Vec<Figure>>;
 
 /// The parts, in the order of the table.
-const PARTS: [Part; 4] = [linear::figures, mechanisms::figures, feet::figures, walk_forms::figures];
+const PARTS: [Part; 5] =
+    [linear::figures, mechanisms::figures, squeezer::figures, feet::figures, walk_forms::figures];
 
 /// All figures of the area, or those of the file that `--table` names.
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {

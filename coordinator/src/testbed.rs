@@ -4,8 +4,10 @@
 //! (3) a trial of every subsystem without glue; (4) the group of glued subsystems by its strategy;
 //! (5) commit of all, in the order of their names. Reads see committed values only.
 
-use crate::contact::{ContactDetector, Now};
-use crate::gluing::{self, Exchange, Instant, Outcome, PortReport, StepReport, Strategy};
+use crate::contact::{ContactDetector, Now, PortSet};
+use crate::gluing::memory::Recall;
+use crate::gluing::step_control::StepControl;
+use crate::gluing::{self, Instant, Outcome, StepReport};
 use crate::host::{Instance, Partings, Progress, Reply};
 use crate::observer::{Happening, Observer, SubsystemView, View};
 use crate::signals::{Directory, Links, TimeLine};
@@ -20,8 +22,11 @@ use terraglue_subsystem::{BodyState, Energy};
 use unglued::Unglued;
 
 mod build;
+mod group;
 mod hosted;
 mod unglued;
+
+use group::Group;
 
 /// What a run needs beside its scenario.
 #[derive(Clone, Debug, Default)]
@@ -47,27 +52,25 @@ struct Member {
     cost: Duration,
 }
 
-/// Subsystems that share ports, with their strategy.
-struct Group {
-    exchange: Exchange,
-    strategy: Box<dyn Strategy>,
-    /// What finds the forces of joints at the start, where there are any.
-    start: Option<Box<dyn Strategy>>,
-    /// Keys of the ports that carried a normal force in the last step.
-    closed: Vec<u64>,
-}
-
 /// A simulation of a whole mission. Several live side by side; there are no globals.
 pub struct Testbed {
     instances: Vec<Instance>,
     members: Vec<Member>,
-    group: Option<Group>,
+    /// Subsystems that are glued to each other, in the order of their first member.
+    groups: Vec<Group>,
     detector: ContactDetector,
     links: Links,
     time_line: TimeLine,
     directory: Directory,
     happenings: Vec<Happening>,
-    no_glue: StepReport,
+    /// How the last nominal step was glued, all groups and parts.
+    report: StepReport,
+    /// Ports of groups without ground.
+    no_ports: PortSet,
+    /// Sets the length of steps, where the scenario asks for it.
+    control: Option<StepControl>,
+    /// The strategy that did not converge last.
+    failed: &'static str,
     timings: Timings,
     unglued: Unglued,
     gravity: [f64; 3],
@@ -95,7 +98,8 @@ pub struct Snapshot {
     slot: u32,
     clock: TimeKept,
     fired: Vec<bool>,
-    closed: Vec<u64>,
+    /// What each group, and at the end the control of the steps, keeps from step to step.
+    memory: Vec<Vec<u64>>,
 }
 
 /// What a testbed knows of its time.
@@ -132,7 +136,7 @@ impl Testbed {
 
     /// How the last step was glued.
     pub fn report(&self) -> &StepReport {
-        self.group.as_ref().map_or(&self.no_glue, |g| &g.exchange.report)
+        &self.report
     }
 
     /// Goes to the next nominal communication point t + h.
@@ -142,43 +146,84 @@ impl Testbed {
             self.start_joints()?;
         }
         let end = self.origin_s + (self.nominal + 1) as f64 * self.step_s;
-        let mut h = self.step_s;
+        let mut longest = self.step_s;
         self.halvings = 0;
+        self.report.clear();
+        self.report.converged = true;
         while end - self.t > 1e-6 * self.step_s {
             let (start, times) = self.watch();
             self.apply_events()?;
             self.transfer_signals()?;
             self.timings.charge_sample(Part::Signals, start, times);
-            let h_now = h.min(end - self.t);
+            let h_now = self.next_length(longest, end)?;
             match self.communication_step(h_now, end)? {
                 Outcome::Converged => {
                     self.index += 1;
-                    self.last_h = h_now;
                     self.t += h_now;
+                    self.account();
                 }
                 Outcome::NotConverged(why) if self.halvings == self.max_halvings => {
+                    self.account();
                     return Err(self.gave_up(why));
                 }
                 Outcome::NotConverged(_) => {
+                    self.groups.iter().for_each(|g| self.report.add_cost(&g.exchange.report));
                     self.halvings += 1;
-                    h = 0.5 * h_now;
+                    longest = 0.5 * h_now;
                 }
             }
         }
         self.nominal += 1;
         self.t = end;
+        self.last_h = self.step_s;
         Ok(())
+    }
+
+    /// Length of the next communication step: as long as is left, unless halving or the control asks for less.
+    fn next_length(&mut self, longest: f64, end: f64) -> Result<f64> {
+        let left = end - self.t;
+        let Some(mut control) = self.control else { return Ok(longest.min(left)) };
+        if let Some(residual) = self.energy_residual(control.h)? {
+            control.learn(residual, control.last_h);
+        }
+        let wanted = control.h.min(longest);
+        // two equal parts rather than a long one and a splinter
+        let h = if wanted >= left { left } else { wanted.min(0.5 * left) };
+        control.last_h = h;
+        self.control = Some(control);
+        Ok(h)
+    }
+
+    /// The energy residual of the step before, J, by the forces of all laws at t; none before the first.
+    fn energy_residual(&mut self, h: f64) -> Result<Option<f64>> {
+        if self.index == 0 {
+            return Ok(None);
+        }
+        self.detect_contacts(h)?;
+        let at = Instant { t: self.t, h, index: self.index, hold: self.hold, ..Instant::default() };
+        let mut sum = 0.0;
+        for group in &mut self.groups {
+            let found = if group.exchange.has_grounds() { self.detector.ports() } else { &self.no_ports };
+            sum += group.residual(at, found, &self.members, &mut self.instances)?;
+        }
+        Ok(Some(sum))
+    }
+
+    /// Adds what all groups did in the last communication step to the report of the nominal step.
+    fn account(&mut self) {
+        self.report.ports.clear();
+        self.report.parts += 1;
+        self.groups.iter().for_each(|g| self.report.add(&g.exchange.report));
     }
 
     /// The forces of joints and the accelerations at the start: a step of h = 0.
     fn start_joints(&mut self) -> Result {
-        let Some(group) = &mut self.group else { return Ok(()) };
-        let Some(mut other) = group.start.take() else { return Ok(()) };
-        std::mem::swap(&mut group.strategy, &mut other);
-        let started = self.glue(0.0);
-        if let Some(group) = &mut self.group {
-            group.strategy = other;
+        if self.groups.iter().all(|g| g.start.is_none()) {
+            return Ok(());
         }
+        self.groups.iter_mut().for_each(Group::swap_start);
+        let started = self.glue(0.0);
+        self.groups.iter_mut().for_each(Group::swap_start);
         match started? {
             Outcome::Converged => Ok(()),
             Outcome::NotConverged(why) => {
@@ -228,28 +273,40 @@ impl Testbed {
 
     /// (4) The group of glued subsystems: the five steps of the paper.
     fn glue(&mut self, h: f64) -> Result<Outcome> {
-        if self.group.is_none() {
+        if self.groups.is_empty() {
             return Ok(Outcome::Converged);
         }
-        let at = Instant { t: self.t, h, index: self.index, hold: self.hold, ..Instant::default() };
+        let hold = if h > 0.0 { self.hold } else { gluing::HOLD };
+        let at = Instant { t: self.t, h, index: self.index, hold, ..Instant::default() };
         let start = Clock::now();
         // step 1: collision detection and the constraints of rigid contact
         self.detect_contacts(h)?;
-        let Some(group) = &mut self.group else { return Ok(Outcome::Converged) };
-        let (ports, instances, members) = (self.detector.ports(), &mut self.instances, &self.members);
-        group.exchange.glue.place(|slot, body| members[slot].states[body as usize]);
-        group.exchange.begin(at, ports);
         self.timings.charge(Part::Contact, start);
-        group.exchange.set_ports(instances)?;
-        group.measure_gap();
-        // steps 2 to 4: estimate, compatibility, the bodies under the soil's force
-        let outcome = group.strategy.solve(&mut group.exchange, instances)?;
-        if outcome == Outcome::Converged {
-            // step 5: integrate
-            group.exchange.commit(instances)?;
-            group.describe(ports, self.halvings);
+        let watched = self.control.is_some();
+        for group in self.groups.iter_mut().filter(|g| h > 0.0 || g.start.is_some()) {
+            let found = if group.exchange.has_grounds() { self.detector.ports() } else { &self.no_ports };
+            group.begin(at, found, &self.members, &mut self.instances, &mut self.timings)?;
+            group.measure_gap();
+            if watched {
+                group.passage.look(&mut group.exchange);
+            }
+            // steps 2 to 4: estimate, compatibility, the bodies under the soil's force
+            let outcome = group.strategy.solve(&mut group.exchange, &mut self.instances)?;
+            if outcome != Outcome::Converged {
+                self.failed = group.strategy.name();
+                return Ok(outcome);
+            }
         }
-        Ok(outcome)
+        // step 5: integrate, once all groups agree
+        for group in self.groups.iter_mut().filter(|g| h > 0.0 || g.start.is_some()) {
+            let found = if group.exchange.has_grounds() { self.detector.ports() } else { &self.no_ports };
+            group.describe(found, self.halvings);
+            if watched {
+                group.passage.take(&group.exchange);
+            }
+            group.exchange.commit(&mut self.instances)?;
+        }
+        Ok(Outcome::Converged)
     }
 
     /// Where bodies may touch ground in a step of length h; the ports are then in the detector.
@@ -272,7 +329,7 @@ impl Testbed {
 
     fn gave_up(&self, message: String) -> Error {
         Error::NotConverged {
-            strategy: self.group.as_ref().map_or("none", |g| g.strategy.name()),
+            strategy: self.failed,
             time_s: self.t,
             message: format!(
                 "{message}; the step was halved {} times. Try a smaller time.step_s, another \
@@ -301,9 +358,7 @@ impl Testbed {
     /// Where the time of all steps went.
     pub fn timings(&self) -> Timings {
         let mut sum = self.timings.clone();
-        if let Some(group) = &self.group {
-            sum.add(&group.exchange.timings);
-        }
+        self.groups.iter().for_each(|g| sum.add(&g.exchange.timings));
         sum
     }
 
@@ -408,23 +463,22 @@ impl Testbed {
     /// # Errors
     /// [`Error::Simulation`]: the strategy cannot glue these subsystems.
     pub fn set_gluing(&mut self, spec: &crate::scenario::GluingSpec) -> Result {
-        let Some(group) = &mut self.group else { return Ok(()) };
-        if let Some(refusal) = gluing::refusal(spec, &group.exchange, &self.instances) {
-            return Err(Error::Simulation { time_s: self.t, message: refusal.reason });
+        let specs: Vec<_> = self.groups.iter().map(|g| g.spec(spec)).collect();
+        for (group, spec) in self.groups.iter().zip(&specs) {
+            if let Some(refusal) = gluing::refusal(spec, &group.exchange, &self.instances) {
+                return Err(Error::Simulation { time_s: self.t, message: refusal.reason });
+            }
         }
-        group.strategy = gluing::strategy(spec);
+        for (group, spec) in self.groups.iter_mut().zip(&specs) {
+            group.strategy = gluing::strategy(spec);
+        }
         Ok(())
     }
 
     /// Keeps the committed state of everything under a number.
     pub fn snapshot(&mut self, slot: u32) -> Result<Snapshot> {
         self.instances.iter_mut().try_for_each(|i| i.save_state(slot))?;
-        Ok(Snapshot {
-            slot,
-            clock: self.time_kept(),
-            fired: self.time_line.fired(),
-            closed: self.group.as_ref().map(|g| g.closed.clone()).unwrap_or_default(),
-        })
+        Ok(Snapshot { slot, clock: self.time_kept(), fired: self.time_line.fired(), memory: self.memory() })
     }
 
     /// Back to a snapshot, exactly.
@@ -437,61 +491,21 @@ impl Testbed {
     fn restore_rest(&mut self, snapshot: &Snapshot) -> Result {
         self.set_time(snapshot.clock);
         self.time_line.set_fired(&snapshot.fired);
-        if let Some(group) = &mut self.group {
-            group.closed.clone_from(&snapshot.closed);
+        for (group, kept) in self.groups.iter_mut().zip(&snapshot.memory) {
+            group.recall(kept);
+        }
+        if let (Some(control), Some(kept)) = (&mut self.control, snapshot.memory.last()) {
+            control.recall(&mut Recall(kept));
         }
         self.read_states()
     }
-}
 
-impl Group {
-    /// The gap that the last commit left, told by the soil itself in its answer to `set_ports`.
-    fn measure_gap(&mut self) {
-        let exchange = &mut self.exchange;
-        for port in &exchange.ports {
-            if exchange.rows[port.first as usize] == gluing::Row::Joint {
-                continue; // the strategy itself measures the gap of joints
-            }
-            if self.closed.binary_search(&port.key).is_ok() {
-                let gap = exchange.x2[port.first as usize].abs();
-                exchange.report.max_gap_m = exchange.report.max_gap_m.max(gap);
-            }
-        }
-    }
-
-    /// Fills the report's ports after commit.
-    fn describe(&mut self, found: &crate::contact::PortSet, halvings: u32) {
-        let exchange = &mut self.exchange;
-        exchange.report.halvings = halvings;
-        self.closed.clear();
-        let mut work = 0.0;
-        for (p, port) in exchange.ports.iter().enumerate() {
-            let owner =
-                found.owners.get(p).copied().unwrap_or_else(|| exchange.glue.owner(p - found.owners.len()));
-            let n = port.first as usize;
-            let mut wrench = [0.0; 6];
-            for (i, c) in port.components() {
-                wrench[c] = exchange.t[i];
-                work += exchange.t[i] * (exchange.x1[i] - exchange.x2[i] + exchange.gap[i]);
-            }
-            if wrench[0] > 0.0 {
-                self.closed.push(port.key);
-            }
-            let t_star_n = exchange.estimate.t_star[n];
-            let report = &mut exchange.report;
-            report.estimate_gap_n = report.estimate_gap_n.max((t_star_n - wrench[0]).abs());
-            report.ports.push(PortReport {
-                key: port.key,
-                subsystem: owner.subsystem,
-                body: owner.body,
-                shape: owner.shape,
-                origin: port.origin,
-                frame: port.frame,
-                wrench,
-                t_star_n,
-                gap_m: exchange.x1[n] - exchange.x2[n] + exchange.gap[n],
-            });
-        }
-        exchange.report.interface_work_error_j = work.abs();
+    /// What each group and the control of the steps keep from step to step.
+    fn memory(&self) -> Vec<Vec<u64>> {
+        let mut all: Vec<Vec<u64>> = self.groups.iter().map(Group::memory).collect();
+        let mut last = Vec::new();
+        self.control.iter().for_each(|c| c.remember(&mut last));
+        all.push(last);
+        all
     }
 }

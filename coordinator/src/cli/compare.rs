@@ -252,6 +252,7 @@ fn run_one(plan: &Plan, arguments: &RunArguments, cancel: &Arc<AtomicBool>, bar:
             row.error = outcome.error.map(|e| e.to_string());
             row.summary = Some(outcome.summary);
             row.folder = Some(plan.folder.clone());
+            row.parts_s = Some(outcome.parts_s);
         }
         Err(e) => row.error = Some(e.to_string()),
     }

@@ -22,6 +22,8 @@ pub struct Outcome {
     pub summary: Summary,
     /// What stopped it early.
     pub error: Option<Error>,
+    /// Wall time per step of the exchange, of Jacobians, and of all else, s.
+    pub parts_s: [f64; 3],
 }
 
 impl Outcome {
@@ -86,6 +88,7 @@ pub fn run_testbed(
     let error = ran.err();
     testbed.view(|view| recorder.finished(view, error.as_ref()))?;
     write_timing(folder, &timing_rows(&testbed, wall_s, cpu_s))?;
+    let parts_s = parts_s(&testbed, wall_s);
     let cancelled = testbed.cancelled();
     let closed = testbed.close();
     let error = error.or(closed.err());
@@ -96,7 +99,18 @@ pub fn run_testbed(
     };
     exit_guard::disarm();
     let summary = recorder.finish(wall_s, cpu_s, error.as_ref(), status)?;
-    Ok(Outcome { summary, error })
+    Ok(Outcome { summary, error, parts_s })
+}
+
+/// Wall time per step of the exchange with the subsystems, of Jacobians, and of all else, recording included, s.
+fn parts_s(testbed: &Testbed, wall_s: f64) -> [f64; 3] {
+    let steps = testbed.step_index().max(1) as f64;
+    let timings = testbed.timings();
+    let sum = |names: &[&str]| timings.rows().filter(|r| names.contains(&r.0)).map(|r| r.1).sum::<f64>();
+    let exchange =
+        sum(&["set_ports", "estimate_forces", "grounds", "bodies", "commit_bodies", "commit_grounds"]);
+    let jacobian = sum(&["jacobian"]);
+    [exchange, jacobian, (wall_s - exchange - jacobian).max(0.0)].map(|s| s / steps)
 }
 
 /// The parts of a step, and all of them together.

@@ -281,7 +281,8 @@ impl Subsystem for FmuSubsystem {
         let bytes = if c.serialize { Capabilities::SERIALIZE } else { Capabilities::default() };
         let force = if self.bodies.is_empty() { Capabilities::default() } else { Capabilities::FORCE };
         let through = if self.feeds_through { Capabilities::FEEDTHROUGH } else { Capabilities::default() };
-        retry | bytes | force | through
+        let fixed = if c.variable_step { Capabilities::default() } else { Capabilities::FIXED_STEP };
+        retry | bytes | force | through | fixed
     }
 
     fn set_ports(&mut self, step: &Step, _: &mut [Law], now: &mut Response) -> Result {

@@ -6,6 +6,7 @@
 
 use super::exchange::Exchange;
 use super::iterative::{Form, Limits, TtForm, XtForm};
+use super::memory::{Recall, Remember};
 use super::{Needs, Outcome, Strategy};
 use crate::Result;
 use crate::host::Instance;
@@ -50,6 +51,14 @@ impl Strategy for CooperativeCompliant {
 
     fn refuses(&self, exchange: &Exchange) -> Option<String> {
         super::joints_refused(NAME, exchange).or_else(|| super::body_contacts_refused(NAME, exchange))
+    }
+
+    fn remember(&self, out: &mut Vec<u64>) {
+        out.put(self.kappa);
+    }
+
+    fn recall(&mut self, kept: &mut Recall) {
+        self.kappa = kept.number();
     }
 
     fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {

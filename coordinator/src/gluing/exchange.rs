@@ -41,6 +41,10 @@ pub struct Exchange {
     pub f_law: Vec<f64>,
     /// The wrench on the bodies; after a strategy the one to commit.
     pub t: Vec<f64>,
+    /// T at the start of the step under a two-parameter hold.
+    pub t_start: Vec<f64>,
+    /// What side 2 got where that was another wrench; else empty.
+    pub t_second: Vec<f64>,
     /// Wrench of the soil's law at the last trial.
     pub f: Vec<f64>,
     /// End-of-step displacement of the bodies at the last trial.
@@ -70,7 +74,7 @@ pub struct Exchange {
     /// T, X1 and V1 of the last trial of the bodies.
     pub(super) base: [Vec<f64>; 3],
     /// T, X1, V1, A1, X2, V2 and A2 while differences are taken.
-    kept: [Vec<f64>; 7],
+    pub(super) kept: [Vec<f64>; 7],
     /// d(v1 − v2)/dT.
     rates: Vec<f64>,
     /// The bodies' last trial is not that of T.
@@ -102,6 +106,8 @@ impl Exchange {
             x2: Vec::new(),
             f_law: Vec::new(),
             t: Vec::new(),
+            t_start: Vec::new(),
+            t_second: Vec::new(),
             f: Vec::new(),
             x1: Vec::new(),
             v1: Vec::new(),
@@ -192,6 +198,7 @@ impl Exchange {
             &mut self.x2,
             &mut self.f_law,
             &mut self.t,
+            &mut self.t_start,
             &mut self.f,
             &mut self.x1,
             &mut self.v1,
@@ -203,6 +210,7 @@ impl Exchange {
             buffer.clear();
             buffer.resize(n, 0.0);
         }
+        self.t_second.clear();
         e.g.clear();
         e.g.resize(n * n, 0.0);
         e.active.clear();
@@ -299,6 +307,7 @@ impl Exchange {
         self.displaced = false;
         for side in &mut self.bodies {
             let instance = &mut instances[side.slot];
+            side.start_from(&self.t_start);
             side.advance_under_force(instance, &self.nodes, &self.at, &self.t, None, Answer::default())?;
             side.motion_by_side(
                 [&mut self.x1, &mut self.v1, &mut self.a1],
@@ -343,8 +352,14 @@ impl Exchange {
         if self.at.h == 0.0 && self.compliance[i] == 0.0 {
             return self.a1[i] - self.a2[i];
         }
-        if self.level == Level::Velocity && self.rows[i] == Row::Joint && self.at.h > 0.0 {
-            return rate + self.stabilisation * self.gap[i] / self.at.h + damper;
+        if self.is_above_position(i) {
+            let share = self.stabilisation / self.at.h;
+            if self.level == Level::Velocity {
+                return rate + share * self.gap[i];
+            }
+            // Baumgarte (1972)
+            let apart = self.x1[i] - self.x2[i] + self.gap[i];
+            return self.a1[i] - self.a2[i] + 2.0 * share * rate + share * share * apart;
         }
         let soil = self.has_grounds() && self.rows[i] != Row::Joint;
         self.x1[i] + self.gap[i] + damper - if soil { 0.0 } else { self.x2[i] }
@@ -354,10 +369,18 @@ impl Exchange {
         if self.has_grounds() && self.rows[i] != Row::Joint && self.at.h > 0.0 { -self.x2[i] } else { 0.0 }
     }
 
+    /// Whether the condition of a row speaks of rates or accelerations: a constraint at such a level. Springs and
+    /// contacts are laws of the place.
+    fn is_above_position(&self, i: usize) -> bool {
+        self.level != Level::Position
+            && self.rows[i] == Row::Joint
+            && self.compliance[i] == 0.0
+            && self.at.h > 0.0
+    }
+
     /// Compliance of the glue as it enters [`Exchange::mismatch`].
     pub fn compliance_now(&self, i: usize) -> f64 {
-        let velocity = self.level == Level::Velocity && self.rows[i] == Row::Joint && self.at.h > 0.0;
-        if velocity { self.compliance[i] / self.at.h } else { self.compliance[i] }
+        self.compliance[i]
     }
 
     /// How far a closed joint lies apart at t + h beyond what its spring and damper allow, m or rad.
@@ -366,9 +389,29 @@ impl Exchange {
         (self.x1[i] - self.x2[i] + self.gap[i] + self.compliance[i] * force).abs()
     }
 
-    /// Level of the interface Jacobian that fits [`Exchange::mismatch`].
-    fn level_now(&self) -> Level {
-        if self.at.h == 0.0 { Level::Acceleration } else { self.level }
+    /// Work that the interface of a row gains in the step, J: that of the wrench on the gap, or at a spring that of the
+    /// mean wrench beyond the energy that the spring takes and the damper turns into heat.
+    pub fn work_error(&self, i: usize, t_before: Option<f64>) -> f64 {
+        let moved = self.x1[i] - self.x2[i];
+        if self.rows[i] != Row::Joint || self.compliance[i] == 0.0 {
+            return self.t[i] * (moved + self.gap[i]);
+        }
+        let mean = 0.5 * (t_before.unwrap_or(self.t[i]) + self.t[i]);
+        let stretched = moved + self.gap[i];
+        let spring = 0.5 * (stretched * stretched - self.gap[i] * self.gap[i]) / self.compliance[i];
+        let rate = if self.at.h > 0.0 { moved / self.at.h } else { 0.0 };
+        mean * moved + spring + self.damping[i] * rate * moved
+    }
+
+    /// Levels of the interface Jacobian with their weights in the condition of a constraint.
+    fn weights(&self) -> [(Level, f64); 3] {
+        let share = self.stabilisation / self.at.h;
+        match self.level {
+            Level::Acceleration => {
+                [(Level::Acceleration, 1.0), (Level::Velocity, 2.0 * share), (Level::Position, share * share)]
+            }
+            level => [(level, 1.0), (level, 0.0), (level, 0.0)],
+        }
     }
 
     /// Whether the bodies' Jacobian comes from their trials: no member estimates contact forces where joints or
@@ -408,7 +451,7 @@ impl Exchange {
     /// d(x1 − x2)/dT of all bodies at their last trial into `estimate.g`, from the modules' derivatives.
     pub fn linearise_bodies(&mut self, source: Derivatives, instances: &mut [Instance]) -> Result {
         let start = Clock::now();
-        let level = self.level_now();
+        let level = if self.at.h == 0.0 { Level::Acceleration } else { Level::Position };
         self.estimate.g.fill(0.0);
         let mut complete = source == Derivatives::Analytic;
         for side in &mut self.bodies {
@@ -419,8 +462,13 @@ impl Exchange {
         }
         if !complete {
             self.difference_trials(source == Derivatives::Central, instances)?;
-        } else if self.at.h > 0.0 && self.damping.iter().any(|d| *d > 0.0) {
-            self.add_dampers(instances)?;
+        } else {
+            if self.at.h > 0.0 && self.damping.iter().any(|d| *d > 0.0) {
+                self.add_dampers(instances)?;
+            }
+            if (0..self.n()).any(|i| self.is_above_position(i)) {
+                self.raise_levels(instances)?;
+            }
         }
         for i in (0..self.n()).filter(|i| self.at.h == 0.0 && self.compliance[*i] > 0.0) {
             // a spring's force at t is given by positions and velocities alone
@@ -429,6 +477,32 @@ impl Exchange {
         }
         self.report.jacobian_refreshes += 1;
         self.timings.charge(Part::Jacobian, start);
+        Ok(())
+    }
+
+    /// Rows of constraints at velocity or acceleration level: the Jacobian of their own condition.
+    fn raise_levels(&mut self, instances: &mut [Instance]) -> Result {
+        let n = self.n();
+        let mut rates = std::mem::take(&mut self.rates);
+        for k in 0..n * n {
+            if self.is_above_position(k % n) {
+                self.estimate.g[k] = 0.0;
+            }
+        }
+        for (level, weight) in self.weights().into_iter().filter(|w| w.1 != 0.0) {
+            rates.clear();
+            rates.resize(n * n, 0.0);
+            for side in &mut self.bodies {
+                let instance = &mut instances[side.slot];
+                side.add_compliance(instance, &self.nodes, &self.at, level, &mut rates)?;
+            }
+            for (k, rate) in rates.iter().enumerate() {
+                if self.is_above_position(k % n) {
+                    self.estimate.g[k] += weight * rate;
+                }
+            }
+        }
+        self.rates = rates;
         Ok(())
     }
 
@@ -583,7 +657,10 @@ impl Exchange {
     /// The mixed Jacobian after force: normal columns by ΔT, the others by ΔX.
     fn difference_force(&mut self, instances: &mut [Instance], out: &mut [f64]) -> Result {
         let n = self.n();
-        let (f, x2) = (self.f.clone(), self.x2.clone());
+        let mut kept_before = std::mem::take(&mut self.kept);
+        let [f, x2, ..] = &mut kept_before;
+        f.clone_from(&self.f);
+        x2.clone_from(&self.x2);
         for p in 0..self.ports.len() {
             for (column, c) in self.ports[p].components() {
                 let delta = if c == 0 { 1e-6 * self.t[column].abs().max(1.0) } else { -1e-9 };
@@ -607,8 +684,9 @@ impl Exchange {
                 }
             }
         }
-        self.f.copy_from_slice(&f);
-        self.x2.copy_from_slice(&x2);
+        self.f.copy_from_slice(f);
+        self.x2.copy_from_slice(x2);
+        self.kept = kept_before;
         Ok(())
     }
 

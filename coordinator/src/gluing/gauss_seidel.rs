@@ -34,6 +34,7 @@ impl Strategy for GaussSeidel {
         exchange.explicit_forces();
         if exchange.has_joints() {
             exchange.advance_half(true, instances)?;
+            exchange.t_second.clone_from(&exchange.t);
             exchange.spring_forces();
             exchange.advance_half(false, instances)?;
         } else {

@@ -36,6 +36,8 @@ struct Terminal {
 /// One declared glue.
 #[derive(Clone, Debug)]
 pub struct Joint {
+    /// Number in the scenario.
+    number: usize,
     port: Port,
     ends: [Terminal; 2],
     soil: bool,
@@ -55,6 +57,8 @@ const FIRST_KEY: u64 = 1 << 63;
 
 /// How one glue is made.
 pub struct Recipe {
+    /// Number in the scenario, from 0.
+    pub number: usize,
     /// Index of the subsystem and body of both sides; none: the world.
     pub ends: [Option<(usize, u32)>; 2],
     /// World point at the start; absent: the origins of both bodies.
@@ -89,7 +93,7 @@ impl Glue {
         };
         let kind = if recipe.contact { PortKind::Contact } else { PortKind::Joint };
         let port = Port {
-            key: FIRST_KEY | self.joints.len() as u64,
+            key: FIRST_KEY | recipe.number as u64,
             kind: kind as u32,
             side: 1,
             mask: recipe.mask,
@@ -105,6 +109,7 @@ impl Glue {
         };
         let ends = recipe.ends.map(end);
         self.joints.push(Joint {
+            number: recipe.number,
             port,
             ends,
             soil: recipe.soil,
@@ -129,9 +134,14 @@ impl Glue {
         self.joints.iter().any(|j| !j.is_contact())
     }
 
+    /// Number in the scenario of the first that is so.
+    fn number(&self, so: impl Fn(&Joint) -> bool) -> Option<usize> {
+        self.joints.iter().find(|j| so(j)).map(|j| j.number)
+    }
+
     /// A joint without compliance, by number.
     pub fn rigid_joint(&self) -> Option<usize> {
-        self.joints.iter().position(|j| !j.is_contact() && j.port.law.compliance == 0.0)
+        self.number(|j| !j.is_contact() && j.port.law.compliance == 0.0)
     }
 
     /// Whether a subsystem is side 2 of all its glue.
@@ -142,27 +152,27 @@ impl Glue {
 
     /// A joint whose side 2 is the world or is side 1 elsewhere, by number: nobody could take its motion.
     pub fn joint_without_second(&self) -> Option<usize> {
-        self.joints.iter().position(|j| !j.soil && !j.ends[1].slot.is_some_and(|s| self.is_second(s)))
+        self.number(|j| !j.soil && !j.ends[1].slot.is_some_and(|s| self.is_second(s)))
     }
 
     /// A glue with a damper, by number.
     pub fn damped(&self) -> Option<usize> {
-        self.joints.iter().position(|j| j.damping > 0.0)
+        self.number(|j| j.damping > 0.0)
     }
 
     /// A contact between bodies, by number.
     pub fn contact(&self) -> Option<usize> {
-        self.joints.iter().position(Joint::is_contact)
+        self.number(Joint::is_contact)
     }
 
     /// A contact with friction between bodies, or with the world, by number.
     pub fn body_contact(&self) -> Option<usize> {
-        self.joints.iter().position(|j| j.is_contact() && !j.soil)
+        self.number(|j| j.is_contact() && !j.soil)
     }
 
     /// A joint with compliance, by number.
     pub fn spring(&self) -> Option<usize> {
-        self.joints.iter().position(|j| !j.is_contact() && j.port.law.compliance > 0.0)
+        self.number(|j| !j.is_contact() && j.port.law.compliance > 0.0)
     }
 
     /// Who meets at glue k.

@@ -15,13 +15,21 @@ use terraglue_subsystem::Level;
 impl Exchange {
     /// What is known at t without any trial: T = −(x1 − x2)/compliance of springs, the soil's own force at contacts.
     pub fn explicit_forces(&mut self) {
+        let mut t = std::mem::take(&mut self.t);
+        self.law_forces(&mut t);
+        self.t = t;
+    }
+
+    /// The forces of all laws at t into `out`: of soils at contacts, of springs at joints; zero at constraints.
+    pub fn law_forces(&mut self, out: &mut Vec<f64>) {
         self.read_velocities();
-        for i in 0..self.n() {
-            self.t[i] = match self.rows[i] {
-                Row::Joint => -self.gap[i] / self.compliance[i] - self.damping[i] * (self.v1[i] - self.v2[i]),
-                _ => self.f_law[i],
-            };
-        }
+        let n = self.rows.len();
+        out.clear();
+        out.extend((0..n).map(|i| match self.rows[i] {
+            Row::Joint if self.compliance[i] == 0.0 => 0.0,
+            Row::Joint => -self.gap[i] / self.compliance[i] - self.damping[i] * (self.v1[i] - self.v2[i]),
+            _ => self.f_law[i],
+        }));
     }
 
     /// V1 and V2 of t, as `set_ports` answered them.
@@ -217,20 +225,23 @@ impl Exchange {
     fn difference_half(&mut self, second: bool, instances: &mut [Instance]) -> Result {
         let n = self.n();
         let before = (self.report.evaluations_bodies, self.report.evaluations_soil);
-        let (x1, f, x2) = (self.x1.clone(), self.f.clone(), self.x2.clone());
+        let mut kept = std::mem::take(&mut self.kept);
+        for (kept, value) in kept.iter_mut().zip([&self.x1, &self.f, &self.x2]) {
+            kept.clone_from(value);
+        }
         for column in 0..n {
             let delta = if second { -1e-9 } else { 1e-6 * self.t[column].abs().max(1.0) };
-            let kept = if second { self.x1[column] } else { self.t[column] };
+            let before = if second { self.x1[column] } else { self.t[column] };
             if second {
                 self.x1[column] += delta;
                 self.advance_second_under_motion(instances)?;
-                self.x1[column] = kept;
+                self.x1[column] = before;
             } else {
                 self.t[column] += delta;
                 self.advance_half(false, instances)?;
-                self.t[column] = kept;
+                self.t[column] = before;
             }
-            let (new, old) = if second { (&self.f, &f) } else { (&self.x1, &x1) };
+            let (new, old) = if second { (&self.f, &kept[1]) } else { (&self.x1, &kept[0]) };
             for row in 0..n {
                 self.estimate.g[column * n + row] = (new[row] - old[row]) / delta;
             }
@@ -238,7 +249,10 @@ impl Exchange {
         let done = self.report.evaluations_bodies - before.0 + self.report.evaluations_soil - before.1;
         self.report.evaluations_jacobian += done;
         (self.report.evaluations_bodies, self.report.evaluations_soil) = before;
-        (self.x1, self.f, self.x2) = (x1, f, x2);
+        for (value, kept) in [&mut self.x1, &mut self.f, &mut self.x2].into_iter().zip(&kept) {
+            value.copy_from_slice(kept);
+        }
+        self.kept = kept;
         Ok(())
     }
 }

@@ -4,6 +4,7 @@
 //! gave at the motion known one step earlier, F(x1 of t − h), because the soil steps at the same time.
 
 use super::exchange::Exchange;
+use super::memory::{Recall, Remember};
 use super::{Needs, Outcome, Row, Strategy};
 use crate::Result;
 use crate::host::Instance;
@@ -30,6 +31,14 @@ impl Strategy for Jacobi {
 
     fn refuses(&self, exchange: &Exchange) -> Option<String> {
         super::rigid_refused(NAME, exchange)
+    }
+
+    fn remember(&self, out: &mut Vec<u64>) {
+        out.put_wrenches(&self.delayed);
+    }
+
+    fn recall(&mut self, kept: &mut Recall) {
+        kept.wrenches(&mut self.delayed);
     }
 
     fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {

@@ -25,6 +25,7 @@ mod halves;
 pub mod iterative;
 pub mod jacobi;
 mod linear;
+pub mod memory;
 pub mod monolithic;
 mod refresh;
 mod refusal;
@@ -33,6 +34,7 @@ mod report;
 pub mod semi_implicit;
 mod side;
 mod start;
+pub mod step_control;
 #[cfg(test)]
 mod tests;
 pub mod tlm;
@@ -86,6 +88,12 @@ pub trait Strategy: Send {
     fn refuses(&self, _exchange: &Exchange) -> Option<String> {
         None
     }
+
+    /// What later steps depend on goes into a snapshot.
+    fn remember(&self, _out: &mut Vec<u64>) {}
+
+    /// Back to what [`Strategy::remember`] wrote.
+    fn recall(&mut self, _kept: &mut memory::Recall) {}
 
     /// Finds the wrenches of the step.
     fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome>;

@@ -30,6 +30,7 @@ pub struct Monolithic {
     /// Metres per newton that make gaps forces, by component.
     scale: Vec<f64>,
     residual: Vec<f64>,
+    kept: Vec<f64>,
     plus: Vec<f64>,
     jacobian: Vec<f64>,
     base: Vec<f64>,
@@ -44,6 +45,7 @@ impl Monolithic {
             max_iterations: spec.max_iterations.max(50),
             scale: Vec::new(),
             residual: Vec::new(),
+            kept: Vec::new(),
             plus: Vec::new(),
             jacobian: Vec::new(),
             base: Vec::new(),
@@ -176,13 +178,13 @@ impl Strategy for Monolithic {
             if size <= ROUNDING * exchange.t_ref.max(max_norm(&exchange.t)) {
                 break;
             }
-            let kept = self.residual.clone();
+            self.kept.clone_from(&self.residual);
             self.differentiate(exchange, instances)?;
             let jacobian = &self.jacobian;
             let rank = self.lu.factor(n, |r, c| jacobian[c * n + r]);
             exchange.report.rank = (rank as u32, n as u32);
             self.d.clear();
-            self.d.extend(kept.iter().map(|r| -r));
+            self.d.extend(self.kept.iter().map(|r| -r));
             self.lu.solve(&mut self.d);
             let before = size;
             let mut share = 1.0;

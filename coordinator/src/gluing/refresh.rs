@@ -1,6 +1,7 @@
 //! When the bodies' interface Jacobian is computed again, and from where.
 
 use super::exchange::{Derivatives, Exchange};
+use super::memory::{Recall, Remember};
 use crate::Result;
 use crate::host::Instance;
 
@@ -75,6 +76,21 @@ impl Refresh {
         Ok(())
     }
 
+    /// Part of a snapshot.
+    pub fn remember(&self, out: &mut Vec<u64>) {
+        let (n, epoch, h) = self.of.unwrap_or((0, 0, f64::NAN));
+        out.extend([n as u64, u64::from(epoch)]);
+        out.put(h);
+        [&self.g, &self.t, &self.motion].into_iter().for_each(|list| out.put_all(list));
+    }
+
+    /// Back from a snapshot.
+    pub fn recall(&mut self, kept: &mut Recall) {
+        let (n, epoch, h) = (kept.word() as usize, kept.word() as u32, kept.number());
+        self.of = (!h.is_nan()).then_some((n, epoch, h));
+        [&mut self.g, &mut self.t, &mut self.motion].into_iter().for_each(|list| kept.all(list));
+    }
+
     fn source(&self) -> Derivatives {
         match self.way {
             Way::Central => Derivatives::Central,
@@ -115,5 +131,46 @@ impl Refresh {
             }
         }
         exchange.estimate.g.copy_from_slice(&self.g);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A kept Jacobian of no component, so that only the ratio of the residuals decides.
+    fn kept(jacobian: &str, exchange: &Exchange) -> Refresh {
+        let of = Some((0, exchange.at.epoch, exchange.at.h));
+        Refresh { of, ..Refresh::new(jacobian) }
+    }
+
+    #[test]
+    fn it_is_taken_again_when_more_than_three_tenths_are_left() {
+        let exchange = Exchange::new(&[], &[], 1.0);
+        for way in ["directional", "finite-differences", "broyden"] {
+            let refresh = kept(way, &exchange);
+            assert!(refresh.is_stale(0.31, 1.0, &exchange), "{way}");
+            assert!(!refresh.is_stale(0.29, 1.0, &exchange), "{way}");
+        }
+        assert!(kept("analytic", &exchange).is_stale(1e-9, 1.0, &exchange));
+        assert!(!kept("frozen", &exchange).is_stale(2.0, 1.0, &exchange));
+        // differences start each step afresh, Broyden's update goes on
+        assert!(kept("finite-differences", &exchange).is_stale(1.0, f64::NAN, &exchange));
+        assert!(!kept("broyden", &exchange).is_stale(1.0, f64::NAN, &exchange));
+    }
+
+    #[test]
+    fn a_snapshot_holds_the_kept_jacobian() {
+        let exchange = Exchange::new(&[], &[], 1.0);
+        let mut refresh = kept("broyden", &exchange);
+        (refresh.g, refresh.t, refresh.motion) = (vec![1.0], vec![2.0], vec![3.0]);
+        let mut words = Vec::new();
+        refresh.remember(&mut words);
+        let mut other = Refresh::new("broyden");
+        other.recall(&mut Recall(&words));
+        assert_eq!(
+            (other.of, other.g, other.t, other.motion),
+            (refresh.of, refresh.g, refresh.t, refresh.motion)
+        );
     }
 }

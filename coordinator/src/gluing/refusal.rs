@@ -8,6 +8,10 @@ use terraglue_subsystem::Capabilities;
 /// A refused strategy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Refusal {
+    /// The key of `[gluing]` that it is about.
+    pub key: &'static str,
+    /// The way out, where another strategy is none.
+    pub help: Option<String>,
     /// Why.
     pub reason: String,
     /// Strategies that this group could be glued with.
@@ -20,9 +24,47 @@ pub fn refusal(spec: &GluingSpec, exchange: &Exchange, instances: &[Instance]) -
         let spec = GluingSpec { strategy: name.into(), ..spec.clone() };
         why(strategy(&spec).as_ref(), exchange, instances)
     };
+    if let Some(refusal) = hold_refused(spec, exchange, instances) {
+        return Some(refusal);
+    }
     let reason = of(&spec.strategy)?;
     let would_work = super::STRATEGIES.into_iter().filter(|name| of(name).is_none()).collect();
-    Some(Refusal { reason, would_work })
+    Some(Refusal { key: "strategy", help: None, reason, would_work })
+}
+
+/// Holds that do not go with the level, the strategy, the glue or the members.
+fn hold_refused(spec: &GluingSpec, exchange: &Exchange, instances: &[Instance]) -> Option<Refusal> {
+    let refused = |reason: String, help: &str| {
+        Some(Refusal { key: "hold", help: Some(help.into()), reason, would_work: Vec::new() })
+    };
+    if spec.hold == "linear" && spec.level == "position" {
+        let reason = "a linear hold with the condition at position level grows by 2 + √3 = 3.73 per step";
+        let help = "use hold = \"end\", \"constant\" or \"two-parameter\", or level = \"velocity\"";
+        return refused(reason.into(), help);
+    }
+    if spec.hold != "two-parameter" {
+        return None;
+    }
+    if spec.level != "position" {
+        let reason = "a two-parameter hold closes place and rate at once: it has no other level";
+        return refused(reason.into(), "leave `level` out");
+    }
+    if spec.strategy != super::iterative::NAME {
+        let reason = format!("`{}` has no second force per step for a two-parameter hold", spec.strategy);
+        return refused(reason, "use strategy = \"iterative\", or another hold");
+    }
+    if exchange.has_grounds() || exchange.glue.contact().is_some() || exchange.glue.spring().is_some() {
+        let reason = "a two-parameter hold is for rigid joints: a law gives one force per place and rate";
+        return refused(reason.into(), "use another hold");
+    }
+    let lacks = |slot: &usize| !instances[*slot].capabilities().has(Capabilities::RAMP);
+    let slot = exchange.members().find(lacks)?;
+    let (name, module) = (instances[slot].name(), instances[slot].module());
+    let reason = format!("`{name}` (module {module}) takes one force per step, not two");
+    refused(
+        reason,
+        "use another hold; sub-cycling modules may declare `force input with two parameters per step`",
+    )
 }
 
 fn why(strategy: &dyn Strategy, exchange: &Exchange, instances: &[Instance]) -> Option<String> {

@@ -13,6 +13,8 @@ pub struct StepReport {
     pub evaluations_jacobian: u32,
     /// Fresh interface Jacobians.
     pub jacobian_refreshes: u32,
+    /// Communication steps that the nominal step was made of.
+    pub parts: u32,
     /// How often the step was halved.
     pub halvings: u32,
     /// Whether the strategy reached its tolerance (a single pass always does).
@@ -68,6 +70,39 @@ pub struct PortReport {
 }
 
 impl StepReport {
+    /// Adds what another group, or a later part of the same step, did: counts and work add up, the worst of the other
+    /// figures stays. Ports are appended.
+    pub fn add(&mut self, other: &Self) {
+        self.add_cost(other);
+        self.halvings = self.halvings.max(other.halvings);
+        self.converged &= other.converged;
+        self.xt_form |= other.xt_form;
+        self.max_gap_m = self.max_gap_m.max(other.max_gap_m);
+        self.max_action_reaction_gap_n = self.max_action_reaction_gap_n.max(other.max_action_reaction_gap_n);
+        self.residual = self.residual.max(other.residual);
+        self.contraction = self.contraction.max(other.contraction);
+        self.complementarity_n = self.complementarity_n.max(other.complementarity_n);
+        self.kappa_max = self.kappa_max.max(other.kappa_max);
+        self.estimate_gap_n = self.estimate_gap_n.max(other.estimate_gap_n);
+        self.interface_work_error_j += other.interface_work_error_j;
+        let missing = |rank: (u32, u32)| rank.1 - rank.0.min(rank.1);
+        let weaker = self.rank.1 == 0 || missing(other.rank) > missing(self.rank);
+        if other.rank.1 > 0 && weaker {
+            self.rank = other.rank;
+        }
+        self.condition = self.condition.max(other.condition);
+        self.ports.extend_from_slice(&other.ports);
+    }
+
+    /// Adds what another part cost and nothing else: of a part that did not converge and is repeated in halves.
+    pub fn add_cost(&mut self, other: &Self) {
+        self.evaluations_bodies += other.evaluations_bodies;
+        self.evaluations_soil += other.evaluations_soil;
+        self.evaluations_line_search += other.evaluations_line_search;
+        self.evaluations_jacobian += other.evaluations_jacobian;
+        self.jacobian_refreshes += other.jacobian_refreshes;
+    }
+
     /// Back to zero; the storage for ports stays.
     pub fn clear(&mut self) {
         let mut ports = std::mem::take(&mut self.ports);

@@ -5,6 +5,7 @@
 
 use super::exchange::Exchange;
 use super::iterative::TtForm;
+use super::memory::Recall;
 use super::{Needs, Outcome, Strategy};
 use crate::Result;
 use crate::host::Instance;
@@ -35,6 +36,14 @@ impl Strategy for SemiImplicit {
     fn needs(&self) -> Needs {
         let both = Capabilities::FORCE | Capabilities::RETRY;
         Needs { first: both, second: both, grounds: both }
+    }
+
+    fn remember(&self, out: &mut Vec<u64>) {
+        self.tt.remember(out);
+    }
+
+    fn recall(&mut self, kept: &mut Recall) {
+        self.tt.recall(kept);
     }
 
     fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {

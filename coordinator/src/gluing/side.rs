@@ -61,6 +61,8 @@ pub struct Side {
     a: Vec<f64>,
     t: Vec<f64>,
     given_t: Vec<f64>,
+    /// T at the start of the step under a two-parameter hold.
+    start_t: Vec<f64>,
     partner_x: Vec<f64>,
     partner_v: Vec<f64>,
     matrix: Vec<f64>,
@@ -254,6 +256,12 @@ impl Side {
         Ok(true)
     }
 
+    /// T at the start of the step, for trials under a two-parameter hold.
+    pub fn start_from(&mut self, t: &[f64]) {
+        self.start_t.clear();
+        self.start_t.extend(self.index.iter().map(|i| t[*i]));
+    }
+
     /// A trial under T (and the partner's motion, where given): own X, V and the wrench at the end.
     pub fn advance_under_force(
         &mut self,
@@ -267,6 +275,9 @@ impl Side {
         self.given_t.clear();
         self.given_t.resize(self.n(), 0.0);
         Self::gather(&mut self.given_t, &self.index, t);
+        if at.hold == Hold::Ramp {
+            self.given_t.extend_from_slice(&self.start_t);
+        }
         self.advance(instance, nodes, at, Given::Force { with_motion: partner.is_some() }, partner, out)
     }
 

@@ -6,6 +6,7 @@
 //! k_c on the motion X in the step.
 
 use super::exchange::Exchange;
+use super::memory::{Recall, Remember};
 use super::{Needs, Outcome, Strategy};
 use crate::Result;
 use crate::host::Instance;
@@ -14,11 +15,14 @@ use terraglue_subsystem::Capabilities;
 /// Name in the scenario.
 pub const NAME: &str = "tlm";
 
+/// Key of a port and what arrives at its two ends.
+type Wave = (u64, [f64; 6], [f64; 6]);
+
 /// The waves that arrive in the next step, by port.
 #[derive(Debug, Default)]
 pub struct Tlm {
-    waves: Vec<(u64, [f64; 6], [f64; 6])>,
-    next: Vec<(u64, [f64; 6], [f64; 6])>,
+    waves: Vec<Wave>,
+    next: Vec<Wave>,
     c1: Vec<f64>,
     c2: Vec<f64>,
     z1: Vec<f64>,
@@ -87,6 +91,19 @@ impl Strategy for Tlm {
             format!("`{NAME}` carries forces through springs: glue {} has a damper, which no line has", k + 1)
         });
         super::contacts_refused(NAME, exchange).or(rigid).or(damped)
+    }
+
+    fn remember(&self, out: &mut Vec<u64>) {
+        for end in [|w: &Wave| (w.0, w.1), |w: &Wave| (w.0, w.2)] {
+            out.put_wrenches(&self.waves.iter().map(end).collect::<Vec<_>>());
+        }
+    }
+
+    fn recall(&mut self, kept: &mut Recall) {
+        let (mut first, mut second) = (Vec::new(), Vec::new());
+        kept.wrenches(&mut first);
+        kept.wrenches(&mut second);
+        self.waves = first.iter().zip(&second).map(|(a, b)| (a.0, a.1, b.1)).collect();
     }
 
     fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {

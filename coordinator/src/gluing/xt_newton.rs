@@ -46,6 +46,7 @@ impl XtNewton {
         let kg = &self.kg;
         let rank = self.lu.factor(n, |r, c| kg[c * n + r] + if r == c { 1.0 } else { 0.0 });
         exchange.report.rank = (rank as u32, n as u32);
+        exchange.report.condition = exchange.report.condition.max(1.0 / self.lu.weakest());
         self.lu.solve(&mut self.d);
         Ok(())
     }

@@ -67,6 +67,7 @@ impl Strategy for XxNewton {
             let (k1, k2) = (&self.k1, &self.k2);
             let rank = self.lu.factor(n, |r, c| k1[c * n + r] + k2[c * n + r]);
             exchange.report.rank = (rank as u32, n as u32);
+            exchange.report.condition = exchange.report.condition.max(1.0 / self.lu.weakest());
             exchange.report.jacobian_refreshes += 1;
             self.lu.solve(&mut self.d);
             exchange.x1.iter_mut().zip(&self.d).for_each(|(x, d)| *x += d);

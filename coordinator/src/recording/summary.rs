@@ -131,6 +131,30 @@ pub struct Summary {
     /// electrical_energy_j / |distance|, J/m; null below 1 mm.
     #[serde(default)]
     pub electrical_energy_j_per_m: Option<f64>,
+    /// Largest κ = λmax(K·G1) of any step; 0 where no strategy formed it.
+    #[serde(default)]
+    pub kappa_max: f64,
+    /// Fresh interface Jacobians per step, mean.
+    #[serde(default)]
+    pub jacobian_refreshes_mean: f64,
+    /// Evaluations per step that finite differences took, mean; not among the others.
+    #[serde(default)]
+    pub evaluations_jacobian_mean: f64,
+    /// Largest |Λ·e|/T_ref that was accepted.
+    #[serde(default)]
+    pub max_residual: f64,
+    /// Largest residual of complementarity at unilateral ports, N.
+    #[serde(default)]
+    pub max_complementarity_n: f64,
+    /// Largest number of components by which Λ was short of its full rank.
+    #[serde(default)]
+    pub rank_missing_max: u32,
+    /// Largest condition of Λ; 0 where no strategy formed it.
+    #[serde(default)]
+    pub condition_max: f64,
+    /// Steps that were halved.
+    #[serde(default)]
+    pub steps_halved: u64,
 }
 
 /// Since when and where less than a tenth of the commanded distance was made.

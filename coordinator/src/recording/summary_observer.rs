@@ -72,6 +72,14 @@ struct GluingFigures {
     max_action_reaction_gap_n: f64,
     max_estimate_gap_n: f64,
     interface_work_error_j: f64,
+    kappa_max: f64,
+    refreshes: u64,
+    differences: u64,
+    residual: f64,
+    complementarity_n: f64,
+    rank_missing: u32,
+    condition: f64,
+    halved: u64,
 }
 
 impl Deepest {
@@ -151,6 +159,14 @@ impl GluingFigures {
         self.max_action_reaction_gap_n = self.max_action_reaction_gap_n.max(g.max_action_reaction_gap_n);
         self.max_estimate_gap_n = self.max_estimate_gap_n.max(g.estimate_gap_n);
         self.interface_work_error_j += g.interface_work_error_j.abs();
+        self.kappa_max = self.kappa_max.max(g.kappa_max);
+        self.refreshes += u64::from(g.jacobian_refreshes);
+        self.differences += u64::from(g.evaluations_jacobian);
+        self.residual = self.residual.max(g.residual);
+        self.complementarity_n = self.complementarity_n.max(g.complementarity_n);
+        self.rank_missing = self.rank_missing.max(g.rank.1 - g.rank.0.min(g.rank.1));
+        self.condition = self.condition.max(g.condition);
+        self.halved += u64::from(g.halvings > 0);
     }
 
     /// Smallest number of evaluations that `share` of the steps do not exceed.
@@ -278,6 +294,14 @@ impl SummaryObserver {
             stalled: body.and_then(BodyTrack::stall),
             electrical_energy_j: self.electrical_j,
             electrical_energy_j_per_m: body.filter(|_| moved).map(|b| self.electrical_j / b.distance_m.abs()),
+            kappa_max: g.kappa_max,
+            jacobian_refreshes_mean: g.mean(g.refreshes),
+            evaluations_jacobian_mean: g.mean(g.differences),
+            max_residual: g.residual,
+            max_complementarity_n: g.complementarity_n,
+            rank_missing_max: g.rank_missing,
+            condition_max: g.condition,
+            steps_halved: g.halved,
         }
     }
 }

@@ -53,6 +53,7 @@ pub fn glue(source: &Source, names: &[&str]) -> Checked<Vec<GlueSpec>> {
             damping: s.number("damping_n_s_m"),
             t_max: s.optional_number("t_max_n").unwrap_or(f64::INFINITY),
             mu,
+            strategy: s.optional_text("strategy"),
             span: node.extent(),
         })
     })

@@ -207,7 +207,7 @@ fn gluing() -> Table {
             .into(),
         Parameter::of("level", ParameterType::Text, "level of the condition at joints")
             .or("position")
-            .choices(&["position", "velocity"])
+            .choices(&["position", "velocity", "acceleration"])
             .into(),
         Parameter::of(
             "hold",
@@ -215,10 +215,27 @@ fn gluing() -> Table {
             "how T runs inside the step of a subsystem that sub-cycles",
         )
         .or("end")
-        .choices(&["end", "constant", "linear"])
+        .choices(&["end", "constant", "linear", "two-parameter"])
         .into(),
-        number("stabilisation", "", 0.0, "share of the position error taken out per step at velocity level")
-            .within(0.0, 1.0)
+        number(
+            "stabilisation",
+            "",
+            0.0,
+            "share of the error taken out per step at velocity or acceleration level",
+        )
+        .within(0.0, 1.0)
+        .into(),
+        required(
+            "energy_residual_j",
+            "J",
+            "tolerated energy residual of the interface per step: `time.step_s` is then the longest step",
+        )
+        .optional()
+        .positive()
+        .into(),
+        required("step_min_s", "s", "shortest step under `energy_residual_j`; a hundredth of `time.step_s`")
+            .optional()
+            .positive()
             .into(),
         number(
             "start_scale",
@@ -305,6 +322,10 @@ fn glue() -> Table {
             .into(),
         number("mu", "", 0.0, "Coulomb coefficient of a contact; 0: the normal force only")
             .within(0.0, f64::INFINITY)
+            .into(),
+        text("strategy", "how all that is connected with this glue is glued; `gluing.strategy` where absent")
+            .optional()
+            .choices(STRATEGIES)
             .into(),
     ];
     Table {

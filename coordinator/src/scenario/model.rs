@@ -148,12 +148,16 @@ pub struct GluingSpec {
     /// Where the bodies' interface Jacobian comes from: `analytic`, `directional` (central differences),
     /// `finite-differences`, or `frozen` (a control: never refreshed).
     pub jacobian: String,
-    /// Level of the condition at joints: `position` or `velocity`.
+    /// Level of the condition at joints: `position`, `velocity` or `acceleration`.
     pub level: String,
-    /// How T runs inside the step: `end`, `constant` or `linear`.
+    /// How T runs inside the step: `end`, `constant`, `linear` or `two-parameter`.
     pub hold: String,
-    /// Share of the position error that is taken out per step at velocity level.
+    /// Share of the error that is taken out per step at velocity or acceleration level.
     pub stabilisation: f64,
+    /// Tolerated energy residual of a step, J; absent: all steps have the same length.
+    pub energy_residual_j: Option<f64>,
+    /// Shortest step where the energy residual sets the length, s.
+    pub step_min_s: Option<f64>,
     /// Factor on the forces of joints at the start: a control that shows how an integrator forgets a wrong start.
     pub start_scale: f64,
     /// Contacts are made when a shape can come this near within the step, m.
@@ -226,6 +230,8 @@ impl Default for GluingSpec {
             level: "position".into(),
             hold: "end".into(),
             stabilisation: 0.0,
+            energy_residual_j: None,
+            step_min_s: None,
             start_scale: 1.0,
             contact_margin_m: 1e-3,
         }
@@ -255,6 +261,8 @@ pub struct GlueSpec {
     pub t_max: f64,
     /// Coulomb coefficient.
     pub mu: f64,
+    /// Strategy of its group; absent: that of `[gluing]`.
+    pub strategy: Option<String>,
     /// Byte range of the table in the source.
     pub span: std::ops::Range<usize>,
 }

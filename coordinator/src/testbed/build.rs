@@ -2,14 +2,15 @@
 
 use super::unglued::Unglued;
 use super::{Group, Member, Options, Testbed};
-use crate::contact::{BodySide, ContactDetector, GroundSide};
+use crate::contact::{BodySide, ContactDetector, GroundSide, PortSet};
 use crate::gluing::glue::Recipe;
-use crate::gluing::{self, Exchange, Glue, StepReport};
+use crate::gluing::step_control::{Passage, StepControl};
+use crate::gluing::{self, Exchange, StepReport};
 use crate::host::isolation::{self, What};
 use crate::host::{
     HostServices, Instance, Library, LoadError, LoadedModule, Progress, SearchPath, Workers, interpreter,
 };
-use crate::scenario::{self, GlueSpec, InputError, Scenario, SubsystemSpec};
+use crate::scenario::{self, GlueSpec, GluingSpec, InputError, Scenario, SubsystemSpec};
 use crate::signals::{self, Directory, TimeLine};
 use crate::timing::Timings;
 use crate::{Error, Result, terrain};
@@ -56,20 +57,24 @@ impl Testbed {
         let links = signals::connect(&scenario.connections, &directory, &instances, &scenario.source)?;
         let time_line = TimeLine::new(&scenario.events, &directory, &instances, &scenario.source)?;
         check_report(scenario, &directory, &instances)?;
-        let group = group(scenario, &instances)?;
-        let detector = detector(group.as_ref(), &instances, terrain.as_deref())?;
+        let groups = groups(scenario, &instances)?;
+        let ground = groups.iter().find(|g| g.exchange.has_grounds());
+        let detector = detector(ground, &instances, terrain.as_deref())?;
         let mut testbed = Self {
-            members: members(scenario, &instances, group.as_ref()),
+            members: members(scenario, &instances, &groups),
             detector,
             gravity: services.gravity,
             contact_margin_m: scenario.gluing.contact_margin_m,
-            group,
+            control: control(scenario, &groups, &instances)?,
+            groups,
+            no_ports: PortSet::default(),
+            failed: "none",
             links,
             time_line,
             directory,
             instances,
             happenings: Vec::new(),
-            no_glue: StepReport { converged: true, ..StepReport::default() },
+            report: StepReport { converged: true, ..StepReport::default() },
             timings: Timings::default(),
             unglued: Unglued::new(services.workers.clone()),
             cancel: options.cancel.clone(),
@@ -173,8 +178,8 @@ fn module_error(scenario: &Scenario, spec: &SubsystemSpec, error: &LoadError) ->
     scenario.source.error_at_value(&key, error.to_string(), help)
 }
 
-fn members(scenario: &Scenario, instances: &[Instance], group: Option<&Group>) -> Vec<Member> {
-    let glued = |slot| group.is_some_and(|g| g.exchange.members().any(|m| m == slot));
+fn members(scenario: &Scenario, instances: &[Instance], groups: &[Group]) -> Vec<Member> {
+    let glued = |slot| groups.iter().any(|g| g.exchange.members().any(|m| m == slot));
     let member = |(slot, (spec, instance)): (usize, (&SubsystemSpec, &Instance))| Member {
         states: vec![BodyState::REST; instance.scene().bodies.len()],
         step_multiple: u64::from(spec.step_multiple.max(1)),
@@ -185,25 +190,10 @@ fn members(scenario: &Scenario, instances: &[Instance], group: Option<&Group>) -
     scenario.subsystems.iter().zip(instances).enumerate().map(member).collect()
 }
 
-/// All bodies that can touch the ground and the ground: one group with the scenario's strategy.
-fn group(scenario: &Scenario, instances: &[Instance]) -> Result<Option<Group>> {
-    let of = |f: &dyn Fn(&Instance) -> bool| -> Vec<usize> {
-        instances.iter().enumerate().filter(|(_, i)| f(i)).map(|(slot, _)| slot).collect()
-    };
-    let named = |i: &Instance| {
-        scenario
-            .glue
-            .iter()
-            .any(|g| g.sides.iter().any(|s| s.split_once('.').is_some_and(|(n, _)| n == i.name())))
-    };
-    let grounds = of(&|i| i.kind() == Kind::Soil);
-    let bodies = of(&|i| {
-        i.kind() != Kind::Soil && named(i)
-            || i.kind() == Kind::Robot
-                && !grounds.is_empty()
-                && i.capabilities().has(Capabilities::FORCE)
-                && i.scene().shapes.iter().any(|s| s.collides)
-    });
+/// Bodies that can touch the ground, with the ground, and all that glue connects: one group each.
+fn groups(scenario: &Scenario, instances: &[Instance]) -> Result<Vec<Group>> {
+    let glue = glue(scenario, instances)?;
+    let grounds: Vec<usize> = (0..instances.len()).filter(|k| instances[*k].kind() == Kind::Soil).collect();
     if let [first, second, ..] = grounds[..] {
         let message = format!(
             "`{}` and `{}` are both soils, but the terrain can belong to one only",
@@ -213,59 +203,168 @@ fn group(scenario: &Scenario, instances: &[Instance]) -> Result<Option<Group>> {
         let source = &scenario.source;
         return Err(source.error_at_value(&[instances[second].name()], message, None).into());
     }
-    if bodies.is_empty() || grounds.is_empty() && scenario.glue.is_empty() {
-        return Ok(None);
+    // the smallest member that a subsystem is connected with; none: it is not glued
+    let mut root: Vec<Option<usize>> = vec![None; instances.len()];
+    for (slot, instance) in instances.iter().enumerate() {
+        let stands = instance.kind() == Kind::Robot
+            && instance.capabilities().has(Capabilities::FORCE)
+            && instance.scene().shapes.iter().any(|s| s.collides);
+        if let Some(ground) = grounds.first().filter(|_| stands) {
+            join(&mut root, slot, *ground);
+        }
     }
+    for ends in &glue {
+        let [a, b] = ends.ends.map(|e| e.map(|(slot, _)| slot));
+        if let Some(a) = a.or(b) {
+            join(&mut root, a, b.unwrap_or(a));
+        }
+    }
+    let mut all = Vec::new();
+    for first in (0..instances.len()).filter(|k| root[*k] == Some(*k)) {
+        let of = |soil: bool| -> Vec<usize> {
+            let is = |k: &usize| root[*k] == Some(first) && (instances[*k].kind() == Kind::Soil) == soil;
+            (0..instances.len()).filter(is).collect()
+        };
+        let (bodies, grounds) = (of(false), of(true));
+        if !bodies.is_empty() {
+            all.push(group(scenario, instances, &bodies, &grounds, &glue)?);
+        }
+    }
+    Ok(all)
+}
+
+/// Makes two subsystems members of one group.
+fn join(root: &mut [Option<usize>], a: usize, b: usize) {
+    let (of_a, of_b) = (root[a].unwrap_or(a), root[b].unwrap_or(b));
+    let smallest = of_a.min(of_b);
+    for entry in root.iter_mut().flatten().filter(|r| **r == of_a || **r == of_b) {
+        *entry = smallest;
+    }
+    (root[a], root[b]) = (Some(smallest), Some(smallest));
+}
+
+/// One group with its strategy.
+fn group(
+    scenario: &Scenario,
+    instances: &[Instance],
+    bodies: &[usize],
+    grounds: &[usize],
+    glue: &[Recipe],
+) -> Result<Group> {
     let gravity = scenario.world.gravity_m_s2.iter().map(|g| g * g).sum::<f64>().sqrt();
     let mass: f64 = bodies.iter().flat_map(|b| &instances[*b].scene().bodies).map(|b| b.mass).sum();
     let weight = mass * gravity;
-    let mut exchange = Exchange::new(&bodies, &grounds, if weight > 0.0 { weight } else { 1.0 });
-    exchange.glue = glue(scenario, instances)?;
-    exchange.stabilisation = scenario.gluing.stabilisation;
-    if scenario.gluing.level == "velocity" {
-        exchange.level = Level::Velocity;
-    } else if scenario.gluing.hold == "linear" {
-        let message = "a linear hold with the condition at position level grows by 2 + √3 = 3.73 per step";
-        let help = Some("use hold = \"end\" or \"constant\", or level = \"velocity\"".into());
-        return Err(scenario.source.error_at_value(&["gluing", "hold"], message, help).into());
+    let mut exchange = Exchange::new(bodies, grounds, if weight > 0.0 { weight } else { 1.0 });
+    let states = body_states(instances)?;
+    let own = |r: &&Recipe| r.ends.iter().flatten().any(|(slot, _)| bodies.contains(slot));
+    for recipe in glue.iter().filter(own) {
+        exchange.glue.add(recipe, |slot, body| states[slot][body as usize]);
     }
-    let spec = &scenario.gluing;
+    exchange.stabilisation = scenario.gluing.stabilisation;
+    exchange.level = match scenario.gluing.level.as_str() {
+        "velocity" => Level::Velocity,
+        "acceleration" => Level::Acceleration,
+        _ => Level::Position,
+    };
+    let (own, at) = own_strategy(scenario, glue.iter().filter(own).map(|r| r.number))?;
+    let spec = &GluingSpec {
+        strategy: own.clone().unwrap_or_else(|| scenario.gluing.strategy.clone()),
+        ..scenario.gluing.clone()
+    };
     if let Some(refusal) = gluing::refusal(spec, &exchange, instances) {
         let help = match refusal.would_work.as_slice() {
             [] => "no strategy of this version can glue these subsystems".into(),
             names => format!("these would work: {}", names.join(", ")),
         };
-        let at = &["gluing", "strategy"];
-        return Err(scenario.source.error_at_value(at, refusal.reason, Some(help)).into());
+        let source = &scenario.source;
+        return Err(match (at, refusal.key) {
+            (Some(span), "strategy") => source.error_at(span, refusal.reason, Some(help)),
+            (_, key) => source.error_at_value(&["gluing", key], refusal.reason, refusal.help.or(Some(help))),
+        }
+        .into());
     }
     let can_start = |s: usize| instances[s].capabilities().has(Capabilities::FORCE | Capabilities::RETRY);
     let start =
         (exchange.glue.has_joints() && exchange.members().all(can_start)).then(|| gluing::start(spec));
-    Ok(Some(Group { exchange, strategy: gluing::strategy(spec), start, closed: Vec::new() }))
+    let strategy = gluing::strategy(spec);
+    Ok(Group { exchange, strategy, own, start, closed: Vec::new(), passage: Passage::default() })
+}
+
+/// The strategy that the glue of a group names, and where; all that name one must agree.
+fn own_strategy(
+    scenario: &Scenario,
+    numbers: impl Iterator<Item = usize>,
+) -> Result<(Option<String>, Option<std::ops::Range<usize>>)> {
+    let mut found: Option<&GlueSpec> = None;
+    for spec in numbers.map(|k| &scenario.glue[k]).filter(|s| s.strategy.is_some()) {
+        match found {
+            Some(other) if other.strategy != spec.strategy => {
+                let message: String = "glue of one group, but another strategy is named before".into();
+                let help =
+                    Some("subsystems that are connected by glue are solved together, by one strategy".into());
+                return Err(scenario.source.error_at(spec.span.clone(), message, help).into());
+            }
+            _ => found = Some(spec),
+        }
+    }
+    Ok((found.and_then(|s| s.strategy.clone()), found.map(|s| s.span.clone())))
+}
+
+/// The control of the steps, where the scenario asks for it and all can follow.
+fn control(scenario: &Scenario, groups: &[Group], instances: &[Instance]) -> Result<Option<StepControl>> {
+    let Some(tolerance) = scenario.gluing.energy_residual_j else { return Ok(None) };
+    let refused = |message: String, help: &str| {
+        let at = &["gluing", "energy_residual_j"];
+        Err(Error::from(scenario.source.error_at_value(at, message, Some(help.into()))))
+    };
+    if let Some(fixed) = instances.iter().find(|i| i.capabilities().has(Capabilities::FIXED_STEP)) {
+        let message = format!("`{}` ({}) makes steps of one length only", fixed.name(), fixed.module());
+        return refused(message, "leave the key out: all steps are then time.step_s long");
+    }
+    if !groups.iter().any(|g| g.exchange.has_grounds() || g.exchange.glue.spring().is_some()) {
+        let message = "no soil and no spring is glued: a constraint passes as much energy as it takes, so there is \
+                       no residual to set the steps by";
+        return refused(message.into(), "give the glue a compliance_m_n, or leave the key out");
+    }
+    let longest = scenario.time.step_s;
+    let shortest = scenario.gluing.step_min_s.unwrap_or(0.01 * longest);
+    if shortest > longest {
+        let at = &["gluing", "step_min_s"];
+        let message = format!("{shortest} s is longer than time.step_s, the longest step");
+        return Err(scenario.source.error_at_value(at, message, None).into());
+    }
+    Ok(Some(StepControl::new(tolerance, [shortest, longest])))
 }
 
 fn hold(text: &str) -> Hold {
     match text {
         "constant" => Hold::Constant,
         "linear" => Hold::Linear,
+        "two-parameter" => Hold::Ramp,
         _ => Hold::End,
     }
 }
 
-/// The glue that the scenario declares, between bodies that exist.
-fn glue(scenario: &Scenario, instances: &[Instance]) -> Result<Glue> {
-    let mut glue = Glue::default();
-    let source = &scenario.source;
-    let wrong = |spec: &GlueSpec, message: String, help: Option<String>| {
-        Error::from(source.error_at(spec.span.clone(), message, help))
-    };
+/// Committed states of all bodies.
+fn body_states(instances: &[Instance]) -> Result<Vec<Vec<BodyState>>> {
     let mut states: Vec<Vec<BodyState>> = Vec::new();
     for instance in instances {
         let mut own = vec![BodyState::REST; instance.scene().bodies.len()];
         instance.body_states(&mut own)?;
         states.push(own);
     }
-    for spec in &scenario.glue {
+    Ok(states)
+}
+
+/// The glue that the scenario declares, between bodies that exist.
+fn glue(scenario: &Scenario, instances: &[Instance]) -> Result<Vec<Recipe>> {
+    let mut glue = Vec::new();
+    let source = &scenario.source;
+    let wrong = |spec: &GlueSpec, message: String, help: Option<String>| {
+        Error::from(source.error_at(spec.span.clone(), message, help))
+    };
+    let states = body_states(instances)?;
+    for (number, spec) in scenario.glue.iter().enumerate() {
         let mut ends = [None; 2];
         for (end, side) in ends.iter_mut().zip(&spec.sides).filter(|(_, side)| *side != "world") {
             let (name, body) = side.split_once('.').unwrap_or((side, ""));
@@ -305,8 +404,7 @@ fn glue(scenario: &Scenario, instances: &[Instance]) -> Result<Glue> {
         });
         let (mask, turning, soil) = (spec.mask, spec.turning, soil_at(1));
         let (damping, contact) = (spec.damping, spec.contact);
-        let recipe = Recipe { ends, at, mask, axes, turning, law, damping, contact, soil };
-        glue.add(&recipe, |slot, body| states[slot][body as usize]);
+        glue.push(Recipe { number, ends, at, mask, axes, turning, law, damping, contact, soil });
     }
     Ok(glue)
 }

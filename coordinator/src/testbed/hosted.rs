@@ -78,7 +78,7 @@ impl Testbed {
             "counts": [kept.nominal, kept.index],
             "started": kept.started,
             "fired": self.time_line.fired(),
-            "closed": self.group.as_ref().map(|g| g.closed.as_slice()).unwrap_or_default(),
+            "memory": self.memory(),
             "lengths": parts.iter().map(Vec::len).collect::<Vec<_>>(),
         });
         let mut out = head.to_string().into_bytes();
@@ -95,7 +95,7 @@ impl Testbed {
             || Error::Simulation { time_s: self.t, message: "these bytes are no state of this run".into() };
         let content = unsealed(bytes).ok_or_else(wrong)?;
         let (head, lengths, mut rest) = split(content, self.instances.len()).ok_or_else(wrong)?;
-        let (kept, fired, closed) = read_head(&head).ok_or_else(wrong)?;
+        let (kept, fired, memory) = read_head(&head).ok_or_else(wrong)?;
         let before = self.instances.iter().map(Instance::serialize).collect::<Result<Vec<_>>>()?;
         for (k, length) in lengths.into_iter().enumerate() {
             let (part, after) = rest.split_at(length);
@@ -105,7 +105,7 @@ impl Testbed {
             }
             rest = after;
         }
-        self.restore_rest(&Snapshot { slot: 0, clock: kept, fired, closed })
+        self.restore_rest(&Snapshot { slot: 0, clock: kept, fired, memory })
     }
 }
 
@@ -126,14 +126,21 @@ fn split(bytes: &[u8], count: usize) -> Option<(Value, Vec<usize>, &[u8])> {
     (lengths.len() == count && sum == rest.len()).then_some((head, lengths, rest))
 }
 
-fn read_head(head: &Value) -> Option<(TimeKept, Vec<bool>, Vec<u64>)> {
+type Head = (TimeKept, Vec<bool>, Vec<Vec<u64>>);
+
+fn read_head(head: &Value) -> Option<Head> {
     let numbers =
         |key: &str| -> Option<Vec<u64>> { head[key].as_array()?.iter().map(Value::as_u64).collect() };
     let (bits, counts) = (numbers("bits")?, numbers("counts")?);
     let (&[step, origin, t], &[nominal, index]) = (bits.as_slice(), counts.as_slice()) else { return None };
     let fired: Option<Vec<bool>> = head["fired"].as_array()?.iter().map(Value::as_bool).collect();
+    let memory: Option<Vec<Vec<u64>>> = head["memory"]
+        .as_array()?
+        .iter()
+        .map(|list| list.as_array()?.iter().map(Value::as_u64).collect())
+        .collect();
     let [step_s, origin_s, t] = [step, origin, t].map(f64::from_bits);
     let good = [step_s, origin_s, t].iter().all(|x| x.is_finite()) && step_s > 0.0;
     let kept = TimeKept { step_s, origin_s, nominal, index, t, started: head["started"].as_bool()? };
-    good.then_some((kept, fired?, numbers("closed")?))
+    good.then_some((kept, fired?, memory?))
 }

@@ -50,7 +50,7 @@ impl Testbed {
     /// A watch for a part of this step, and how many steps it stands for. Where bodies are glued every step is
     /// watched; elsewhere reading the clock would cost more than the step of a cheap unit.
     pub(super) fn watch(&self) -> (Option<Instant>, u32) {
-        if self.group.is_some() {
+        if !self.groups.is_empty() {
             return (Some(Instant::now()), 1);
         }
         (self.is_sampled().then(Instant::now), SAMPLED as u32)

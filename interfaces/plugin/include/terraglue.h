@@ -83,6 +83,10 @@
 #define TG_CAN_SUBCYCLE 512
 /* Bit of `capabilities`: outputs depend directly on inputs of the same time. */
 #define TG_CAN_FEEDTHROUGH 1024
+/* Bit of `capabilities`: `advance` takes `TG_HOLD_RAMP`. */
+#define TG_CAN_RAMP 2048
+/* Bit of `capabilities`: makes communication steps of one length only. */
+#define TG_CAN_FIXED_STEP 4096
 /* `tg_port.kind`: one body shape on one ground, unilateral. */
 #define TG_CONTACT 0
 /* `tg_port.kind`: a cut joint, bilateral. */
@@ -113,6 +117,8 @@
 #define TG_HOLD_CONSTANT 1
 /* `tg_input.hold`: T runs linearly from its committed value. */
 #define TG_HOLD_LINEAR 2
+/* `tg_input.hold`: T runs linearly in the step; `t` holds 2 n values, first T at t + h, then T at t. */
+#define TG_HOLD_RAMP 3
 /* Level of a derivative: X. */
 #define TG_POSITION 0
 /* Level of a derivative: V. */
@@ -286,7 +292,7 @@ typedef struct {
 typedef struct {
     /* TG_FORCE, TG_MOTION or TG_IMPEDANCE. */
     uint32_t kind;
-    /* TG_HOLD_END, TG_HOLD_CONSTANT or TG_HOLD_LINEAR (force only). */
+    /* TG_HOLD_END, TG_HOLD_CONSTANT, TG_HOLD_LINEAR or TG_HOLD_RAMP (force only). */
     uint32_t hold;
     /* Wrench on side 1 (force), or wrench at X = 0 (impedance). */
     const double *t;

@@ -20,6 +20,7 @@ pub(crate) fn hold(number: u32) -> Option<Hold> {
         TG_HOLD_END => Some(Hold::End),
         TG_HOLD_CONSTANT => Some(Hold::Constant),
         TG_HOLD_LINEAR => Some(Hold::Linear),
+        TG_HOLD_RAMP => Some(Hold::Ramp),
         _ => None,
     }
 }

@@ -11,8 +11,10 @@ impl Patches {
     /// X_n of the soil's surface under the normal force `force` (N) when the other components of the motion of the
     /// foot of patch `p` are those of `x`; for `force` ≤ 0 the height at which the foot just leaves the soil.
     ///
-    /// The force grows with the depth: Newton from the last solution of the step, kept inside a bracket whose lower
-    /// end carries nothing. Its upper end carries `force` by pressure alone; where shear on inclined undersides
+    /// The force mostly grows with the depth: Newton from where the foot is said to be (X_n = 0: from the last solution
+    /// of the step), kept inside a bracket whose lower end carries nothing. Where cohesion pulls at an inclined node as
+    /// soon as it is touched, a force belongs to two depths close together; the one next to the foot is meant.
+    /// Its upper end carries `force` by pressure alone; where shear on inclined undersides
     /// lifts the foot, it moves further down.
     pub fn surface_under(&mut self, p: usize, force: f64, x: &[f64; 6], shear: &ShearLaw) -> f64 {
         self.turn(p, x);
@@ -32,7 +34,7 @@ impl Patches {
             }
             (low, high) = (high, high + (high - free) + 1e-9);
         }
-        let mut shift = -self.ports[p].warm;
+        let mut shift = if x[0] == 0.0 { -self.ports[p].warm } else { -x[0] };
         for _ in 0..200 {
             if !(shift > low && shift < high) {
                 shift = 0.5 * (low + high);

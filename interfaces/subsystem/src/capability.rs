@@ -28,8 +28,13 @@ impl Capabilities {
     /// Outputs depend directly on inputs of the same time.
     pub const FEEDTHROUGH: Self = Self(1024);
 
+    /// `advance` takes a force that runs linearly between two values of the step's own, [`crate::Hold::Ramp`].
+    pub const RAMP: Self = Self(2048);
+    /// Makes communication steps of one length only.
+    pub const FIXED_STEP: Self = Self(4096);
+
     /// All names, for messages and listings.
-    pub const NAMES: [(Self, &'static str); 11] = [
+    pub const NAMES: [(Self, &'static str); 13] = [
         (Self::FORCE, "force input"),
         (Self::MOTION, "motion input"),
         (Self::IMPEDANCE, "impedance input"),
@@ -41,6 +46,8 @@ impl Capabilities {
         (Self::SERIALIZE, "serialize"),
         (Self::SUBCYCLES, "sub-cycles"),
         (Self::FEEDTHROUGH, "direct feed-through"),
+        (Self::RAMP, "force input with two parameters per step"),
+        (Self::FIXED_STEP, "steps of one length only"),
     ];
 
     /// Whether all of `other` is in this set.

@@ -37,7 +37,7 @@ pub enum Input<'a> {
     /// carries the partner's motion at t + h: a soil then answers `x` = its surface under the normal force
     /// and `t` = the whole wrench that its law gives at that motion. Bodies ignore `motion`.
     Force {
-        /// Wrench on side 1.
+        /// Wrench on side 1; under [`Hold::Ramp`] 2·n values, first those at t + h, then those at t.
         t: &'a [f64],
         /// How T runs inside the step.
         hold: Hold,
@@ -65,6 +65,8 @@ pub enum Hold {
     Constant = 1,
     /// Linear from the committed T.
     Linear = 2,
+    /// Linear between two values of the step's own; only for subsystems with `Capabilities::RAMP`.
+    Ramp = 3,
 }
 
 /// Level at which a derivative is asked for.

@@ -101,7 +101,13 @@ fn a_frozen_jacobian_fails_when_the_rods_have_turned() {
     let mut frozen = build(&pendulum("jacobian = \"frozen\""));
     let failed = run(&mut frozen, 1.0).expect_err("a frozen Jacobian glues nothing that turns");
     println!("{failed}");
-    assert!(failed.to_string().contains("halved"), "{failed}");
+    assert!(failed.to_string().contains("the step was halved 4 times"), "{failed}");
+    // a clean stop: the last committed state stands, and the report says what was tried in vain
+    let (t, angle) = (frozen.t_s(), read(&frozen, "lower.b0.angle"));
+    assert!(t > 0.0 && t < 1.0 && angle.is_finite());
+    assert!(!frozen.report().converged && frozen.report().evaluations_bodies > 5 * 20);
+    assert!(frozen.step().is_err(), "the same step fails again");
+    assert_eq!((frozen.t_s(), read(&frozen, "lower.b0.angle")), (t, angle));
 }
 
 #[test]

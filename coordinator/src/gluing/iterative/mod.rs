@@ -11,6 +11,7 @@
 //! lands on the wrong side of the unloading kink by rounding.
 
 pub(super) mod friction;
+mod ramp;
 mod tt;
 mod xt;
 
@@ -18,11 +19,12 @@ pub(super) use tt::TtForm;
 pub(super) use xt::XtForm;
 
 use super::exchange::Exchange;
+use super::memory::{Recall, Remember};
 use super::{Needs, Outcome, Strategy, linear};
 use crate::Result;
 use crate::host::Instance;
 use crate::scenario::GluingSpec;
-use terraglue_subsystem::Capabilities;
+use terraglue_subsystem::{Capabilities, Hold};
 
 /// Name in the scenario.
 pub const NAME: &str = "iterative";
@@ -107,6 +109,7 @@ pub struct Iterative {
     limits: Limits,
     tt: tt::TtForm,
     xt: xt::XtForm,
+    ramp: ramp::RampForm,
     start: Vec<f64>,
     kappa: f64,
 }
@@ -120,6 +123,7 @@ impl Iterative {
             limits: Limits::read(spec),
             tt: tt::TtForm::new(&spec.jacobian),
             xt: xt::XtForm::default(),
+            ramp: ramp::RampForm::default(),
             start: Vec::new(),
             kappa: 0.0,
         }
@@ -147,12 +151,25 @@ impl Strategy for Iterative {
         Needs { first: bodies, second: bodies, grounds: Form::need(self.form) | Capabilities::RETRY }
     }
 
+    fn remember(&self, out: &mut Vec<u64>) {
+        out.put(self.kappa);
+        self.tt.remember(out);
+    }
+
+    fn recall(&mut self, kept: &mut Recall) {
+        self.kappa = kept.number();
+        self.tt.recall(kept);
+    }
+
     fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
         if exchange.needs_linearisation() {
             // joints start from the force of the step before, contacts from the soil's own
             exchange.start_from_last();
             self.start.clear();
             self.start.extend_from_slice(&exchange.t);
+            if exchange.at.hold == Hold::Ramp {
+                return self.ramp.solve(&self.limits, exchange, instances);
+            }
             return self.run(Form::Tt, exchange, instances);
         }
         exchange.estimate_forces(instances)?;

@@ -10,6 +10,7 @@ use super::super::complementarity::{BoundedProblem, BoundedSolver};
 use super::super::exchange::Exchange;
 use super::super::glue::Row;
 use super::super::linear::max_norm;
+use super::super::memory::Recall;
 use super::super::refresh::Refresh;
 use super::{Limits, friction, largest_eigenvalue};
 use crate::Result;
@@ -20,6 +21,11 @@ const MAX_TRIALS: u32 = 12;
 
 /// What rounding leaves of a gap between places of some metres, m.
 const ROUNDING_M: f64 = 1e-13;
+
+/// Iterations against the linearised bodies after which steps must pass the filter.
+const FREE_ITERATIONS: u32 = 4;
+/// Share of a figure of the filter that counts as smaller.
+const SMALLER: f64 = 0.999;
 
 /// Buffers.
 #[derive(Debug, Default)]
@@ -38,6 +44,8 @@ pub struct TtForm {
     predicted: Vec<f64>,
     lower: Vec<f64>,
     upper: Vec<f64>,
+    /// What earlier iterates left open in the laws and at the normals, N.
+    filter: Vec<[f64; 2]>,
     solver: BoundedSolver,
     jacobian: Refresh,
     /// A control that neglects the coupling of the ports.
@@ -48,6 +56,16 @@ impl TtForm {
     /// With the interface Jacobian from there.
     pub fn new(jacobian: &str) -> Self {
         Self { jacobian: Refresh::new(jacobian), diagonal: jacobian == "diagonal", ..Self::default() }
+    }
+
+    /// The Jacobian that is kept from step to step.
+    pub fn remember(&self, out: &mut Vec<u64>) {
+        self.jacobian.remember(out);
+    }
+
+    /// Back from a snapshot.
+    pub fn recall(&mut self, kept: &mut Recall) {
+        self.jacobian.recall(kept);
     }
 
     /// Iterates from `exchange.t`.
@@ -135,12 +153,13 @@ impl TtForm {
         exchange.predict_bodies();
         self.evaluate_grounds(exchange, instances)?;
         self.bounds(exchange);
-        for _ in 0..limits.max_iterations {
+        self.filter.clear();
+        for iteration in 0..limits.max_iterations {
             let solved = self.newton_step(exchange, instances)?;
             if !solved || max_norm(&self.d) <= limits.threshold(exchange) {
                 break;
             }
-            self.step(exchange, instances)?;
+            self.step(iteration, exchange, instances)?;
         }
         Ok(max_norm(&self.d))
     }
@@ -158,8 +177,9 @@ impl TtForm {
         exchange: &mut Exchange,
         instances: &mut [Instance],
     ) -> Result {
-        for _ in 0..limits.max_iterations {
-            self.step(exchange, instances)?;
+        self.filter.clear();
+        for iteration in 0..limits.max_iterations {
+            self.step(iteration, exchange, instances)?;
             let solved = self.newton_step(exchange, instances)?;
             if !solved || max_norm(&self.d) <= 0.1 * limits.threshold(exchange) {
                 break;
@@ -276,7 +296,15 @@ impl TtForm {
 
     /// Takes the step d: whole when the energy still falls at its end, else the first share s with
     /// |g(s)| ≤ ½|g(0)|, g(s) = dᵀ·e(T + s·d) over the normal rows.
-    fn step(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result {
+    ///
+    /// Shear laws bend where slip turns back, and Newton can jump to and fro across the bend for ever. Where an
+    /// iteration lasts, a step must also pass a filter (Fletcher and Leyffer 2002): no earlier iterate had less left
+    /// open in the laws and at the normals.
+    fn step(&mut self, iteration: u32, exchange: &mut Exchange, instances: &mut [Instance]) -> Result {
+        let filtered = iteration >= FREE_ITERATIONS && exchange.rows.contains(&Row::Law);
+        if filtered {
+            self.filter.push(self.left_open(exchange));
+        }
         self.base.clear();
         self.base.extend_from_slice(&exchange.t);
         let start = self.slope(exchange);
@@ -291,7 +319,12 @@ impl TtForm {
             exchange.report.evaluations_line_search += u32::from(trial > 0);
             let g = self.slope(exchange);
             if start >= 0.0 || (trial == 0 && g <= 0.0) || g.abs() <= 0.5 * start.abs() {
-                return Ok(());
+                if !filtered || self.passes(exchange) {
+                    return Ok(());
+                }
+                (high, g_high) = (share, g);
+                share = 0.5 * (low + share);
+                continue;
             }
             if g > 0.0 {
                 (high, g_high) = (share, g);
@@ -306,6 +339,27 @@ impl TtForm {
             }
         }
         Ok(())
+    }
+
+    /// Largest residual of a law and largest distance of a normal force from its complementary solution, N.
+    fn left_open(&self, exchange: &Exchange) -> [f64; 2] {
+        let n = exchange.n();
+        let mut open = [0.0_f64; 2];
+        for (i, t) in exchange.t.iter().enumerate() {
+            match exchange.rows[i] {
+                Row::Law => open[0] = open[0].max(self.e[i].abs()),
+                _ => {
+                    let wanted = t - self.e[i] / self.matrix[i * n + i];
+                    open[1] = open[1].max((t - wanted.max(self.lower[i]).min(self.upper[i])).abs());
+                }
+            }
+        }
+        open
+    }
+
+    fn passes(&self, exchange: &Exchange) -> bool {
+        let now = self.left_open(exchange);
+        self.filter.iter().all(|f| now[0] < SMALLER * f[0] || now[1] < SMALLER * f[1])
     }
 
     fn slope(&self, exchange: &Exchange) -> f64 {

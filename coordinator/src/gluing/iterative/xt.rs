@@ -145,6 +145,7 @@ impl XtForm {
         let kappa = largest_eigenvalue(k, g, &mut self.base, &mut self.work, n);
         exchange.report.kappa_max = exchange.report.kappa_max.max(kappa);
         exchange.report.rank = (rank as u32, n as u32);
+        exchange.report.condition = exchange.report.condition.max(1.0 / self.lu.weakest());
         Ok(())
     }
 

@@ -175,7 +175,7 @@ pub fn with_input<T>(r: &mut Reader, run: impl FnOnce(&Input) -> T) -> Option<T>
 }
 
 fn hold_of(number: u32) -> Option<Hold> {
-    [Hold::End, Hold::Constant, Hold::Linear].into_iter().find(|h| *h as u32 == number)
+    [Hold::End, Hold::Constant, Hold::Linear, Hold::Ramp].into_iter().find(|h| *h as u32 == number)
 }
 
 /// The level of this number.

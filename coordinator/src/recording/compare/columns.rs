@@ -39,6 +39,16 @@ fn of(row: &CompareRow, f: impl Fn(&Summary) -> f64) -> Option<f64> {
     row.summary.as_ref().map(f).filter(|v| v.is_finite())
 }
 
+/// Whether the strategy formed Λ.
+fn formed(row: &CompareRow) -> bool {
+    row.summary.as_ref().is_some_and(|s| s.condition_max > 0.0)
+}
+
+/// Whether it asks when to stop.
+fn iterated(row: &CompareRow) -> bool {
+    row.summary.as_ref().is_some_and(|s| s.form != "single pass")
+}
+
 macro_rules! column {
     ($key:literal, $group:literal, $title:literal, $unit:literal, $best:ident, $value:expr) => {
         Column { key: $key, group: $group, title: $title, unit: $unit, best: Best::$best, value: $value }
@@ -66,6 +76,26 @@ pub(crate) const ALL: &[Column] = &[
     column!("evaluations_soil_max", "evaluations of soil", "max", "", Smallest, |r| {
         of(r, |s| f64::from(s.evaluations_soil_max))
     }),
+    column!("evaluations_jacobian_mean", "", "evaluations for differences", "", Smallest, |r| {
+        of(r, |s| s.evaluations_jacobian_mean)
+    }),
+    column!("jacobian_refreshes_mean", "", "Jacobians per step", "", Smallest, |r| {
+        of(r, |s| s.jacobian_refreshes_mean)
+    }),
+    column!("kappa_max", "", "largest κ", "", Neither, |r| of(r, |s| s.kappa_max).filter(|k| *k > 0.0)),
+    column!("rank_missing_max", "Λ", "short of full rank by", "", Neither, |r| {
+        of(r, |s| f64::from(s.rank_missing_max)).filter(|_| formed(r))
+    }),
+    column!("condition_max", "Λ", "largest condition", "", Neither, |r| {
+        of(r, |s| s.condition_max).filter(|_| formed(r))
+    }),
+    column!("max_residual", "", "largest |Λ·e|/T_ref", "", Smallest, |r| {
+        of(r, |s| s.max_residual).filter(|_| iterated(r))
+    }),
+    column!("max_complementarity_n", "", "complementarity residual", "N", Smallest, |r| {
+        of(r, |s| s.max_complementarity_n).filter(|_| formed(r))
+    }),
+    column!("steps_halved", "", "steps halved", "", Smallest, |r| of(r, |s| s.steps_halved as f64)),
     column!("steps_not_converged", "", "steps not converged", "", Smallest, |r| {
         of(r, |s| s.steps_not_converged as f64)
     }),
@@ -82,6 +112,13 @@ pub(crate) const ALL: &[Column] = &[
     column!("interface_work_error_j", "", "interface work error", "J", Smallest, |r| {
         of(r, |s| s.interface_work_error_j)
     }),
+    column!("exchange_per_step_s", "wall time per step", "exchange", "s", Smallest, |r| r
+        .parts_s
+        .map(|p| p[0])),
+    column!("jacobian_per_step_s", "wall time per step", "Jacobians", "s", Smallest, |r| r
+        .parts_s
+        .map(|p| p[1])),
+    column!("rest_per_step_s", "wall time per step", "all else", "s", Smallest, |r| r.parts_s.map(|p| p[2])),
     column!("cpu_per_step_s", "", "CPU time per step", "s", Smallest, |r| of(r, |s| s.cpu_per_step_s)),
 ];
 

@@ -46,6 +46,8 @@ pub struct CompareRow {
     pub order: Option<f64>,
     /// Whether the comparison has several steps, so that names say which.
     pub name_step: bool,
+    /// Wall time per step of the exchange with the subsystems, of Jacobians, and of all else, s.
+    pub parts_s: Option<[f64; 3]>,
     /// Mean evaluations of the soils per step when the iteration does not start from the estimate.
     pub cold_start_mean: Option<f64>,
 }

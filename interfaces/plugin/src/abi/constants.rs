@@ -51,6 +51,10 @@ pub const TG_CAN_SERIALIZE: u32 = 256;
 pub const TG_CAN_SUBCYCLE: u32 = 512;
 /// Bit of `capabilities`: outputs depend directly on inputs of the same time.
 pub const TG_CAN_FEEDTHROUGH: u32 = 1024;
+/// Bit of `capabilities`: `advance` takes `TG_HOLD_RAMP`.
+pub const TG_CAN_RAMP: u32 = 2048;
+/// Bit of `capabilities`: makes communication steps of one length only.
+pub const TG_CAN_FIXED_STEP: u32 = 4096;
 
 /// `tg_port.kind`: one body shape on one ground, unilateral.
 pub const TG_CONTACT: u32 = 0;
@@ -85,6 +89,8 @@ pub const TG_HOLD_END: u32 = 0;
 pub const TG_HOLD_CONSTANT: u32 = 1;
 /// `tg_input.hold`: T runs linearly from its committed value.
 pub const TG_HOLD_LINEAR: u32 = 2;
+/// `tg_input.hold`: T runs linearly in the step; `t` holds 2 n values, first T at t + h, then T at t.
+pub const TG_HOLD_RAMP: u32 = 3;
 
 /// Level of a derivative: X.
 pub const TG_POSITION: u32 = 0;

@@ -99,7 +99,7 @@ pub struct TgStep {
 pub struct TgInput {
     /// TG_FORCE, TG_MOTION or TG_IMPEDANCE.
     pub kind: u32,
-    /// TG_HOLD_END, TG_HOLD_CONSTANT or TG_HOLD_LINEAR (force only).
+    /// TG_HOLD_END, TG_HOLD_CONSTANT, TG_HOLD_LINEAR or TG_HOLD_RAMP (force only).
     pub hold: u32,
     /// Wrench on side 1 (force), or wrench at X = 0 (impedance).
     pub t: *const f64,

@@ -42,7 +42,7 @@ unsafe fn input_of<'a>(input: *const TgInput, n: usize) -> Result<Input<'a>> {
         let motion = || Motion { x: slice(i.x, n), v: slice(i.v, n) };
         match i.kind {
             TG_FORCE => Ok(Input::Force {
-                t: slice(i.t, n),
+                t: slice(i.t, if i.hold == TG_HOLD_RAMP { 2 * n } else { n }),
                 hold: convert::hold(i.hold)
                     .ok_or_else(|| Error::Failed(format!("unknown hold {}", i.hold)))?,
                 motion: (!i.x.is_null() && !i.v.is_null()).then(motion),

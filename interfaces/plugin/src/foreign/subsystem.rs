@@ -8,7 +8,7 @@ use crate::text::{borrowed, c_string, slice};
 use std::cell::RefCell;
 use std::ffi::c_void;
 use terraglue_subsystem::{
-    Action, BodyState, Capabilities, Energy, Error, Estimate, FieldInfo, FieldTile, Input, Law, Level,
+    Action, BodyState, Capabilities, Energy, Error, Estimate, FieldInfo, FieldTile, Hold, Input, Law, Level,
     Motion, Response, Result, Scene, Step, Subsystem, TileValues, Values, ValuesMut, Variable,
 };
 
@@ -103,7 +103,7 @@ fn input_out(input: &Input, n: usize) -> Result<TgInput> {
     let mut out = TgInput { kind: TG_FORCE, hold: TG_HOLD_END, t: null, x: null, v: null, z: null };
     match input {
         Input::Force { t, hold, motion } => {
-            enough(&[(t.len(), n)])?;
+            enough(&[(t.len(), if *hold == Hold::Ramp { 2 * n } else { n })])?;
             (out.t, out.hold) = (t.as_ptr(), *hold as u32);
             if let Some(m) = motion {
                 enough(&[(m.x.len(), n), (m.v.len(), n)])?;

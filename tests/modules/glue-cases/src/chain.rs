@@ -21,11 +21,15 @@ pub struct MassChain {
     coupling: (f64, f64),
     now: Vec<Coordinate>,
     next: Vec<Coordinate>,
-    saved: Vec<Vec<Coordinate>>,
+    saved: Vec<(Vec<Coordinate>, Vec<f64>)>,
     /// Force on itself by port at the last trial and at the last commit.
     force: Vec<f64>,
     before: Vec<f64>,
+    /// Force on itself at t under a two-parameter hold.
+    ramp: Vec<f64>,
     load: Vec<f64>,
+    work: Vec<f64>,
+    free: Vec<f64>,
     system: Dense,
     /// G of the step, row-major over components, and its factors.
     g: Vec<f64>,
@@ -71,11 +75,14 @@ impl Module for MassChain {
             damper: list("damper_n_s_m")?,
             coupling: (config.number("coupling_n_m")?, config.number("coupling_n_s_m")?),
             next: now.clone(),
-            saved: vec![now.clone(); host.slots() as usize],
+            saved: vec![(now.clone(), Vec::new()); host.slots() as usize],
             now,
             force: Vec::new(),
             before: Vec::new(),
+            ramp: Vec::new(),
             load: vec![0.0; n],
+            work: Vec::new(),
+            free: Vec::new(),
             system: Dense::default(),
             g: Vec::new(),
             square: Dense::default(),
@@ -134,20 +141,22 @@ impl MassChain {
 
     /// The state at t + h under `load`, the port forces by mass.
     fn solve(&mut self, h: f64) {
+        let mut x = std::mem::take(&mut self.work);
         let at = |k: usize| self.scheme.predict(&self.now[k], h);
-        let mut x: Vec<f64> =
-            (0..self.mass.len()).map(|k| self.load[k] + self.inner(k, |j| at(j).q0, |j| at(j).v0)).collect();
+        x.clear();
+        x.extend((0..self.mass.len()).map(|k| self.load[k] + self.inner(k, |j| at(j).q0, |j| at(j).v0)));
         self.system.solve(&mut x);
-        for (k, qdd) in x.into_iter().enumerate() {
-            self.next[k] = self.scheme.finish(&self.now[k], h, qdd);
+        for (k, qdd) in x.iter().enumerate() {
+            self.next[k] = self.scheme.finish(&self.now[k], h, *qdd);
         }
+        self.work = x;
     }
 
     /// A free mass under a force that is constant, or linear from the last one.
     fn solve_exactly(&mut self, h: f64, hold: Hold, before: &[f64]) {
         for k in 0..self.mass.len() {
             let (now, f1) = (self.now[k], self.load[k]);
-            let f0 = if hold == Hold::Linear { before[k] } else { f1 };
+            let f0 = if matches!(hold, Hold::Linear | Hold::Ramp) { before[k] } else { f1 };
             let m = self.mass[k];
             self.next[k] = Coordinate {
                 q: now.q + h * now.v + h * h * (f0 / 3.0 + f1 / 6.0) / m,
@@ -174,11 +183,15 @@ impl MassChain {
             self.load[k] += d * self.force[i];
         }
         if self.scheme.exact {
-            let mut before = vec![0.0; self.mass.len()];
+            let mut before = std::mem::take(&mut self.work);
+            before.clear();
+            before.resize(self.mass.len(), 0.0);
             for (i, k, d) in Self::components(step) {
-                before[k] += d * self.before.get(i).copied().unwrap_or(0.0);
+                let from = if hold == Hold::Ramp { &self.ramp } else { &self.before };
+                before[k] += d * from.get(i).copied().unwrap_or(0.0);
             }
             self.solve_exactly(step.h, hold, &before);
+            self.work = before;
         } else {
             self.solve(step.h);
         }
@@ -200,8 +213,10 @@ impl MassChain {
             Level::Velocity => self.scheme.v1(step.h),
             Level::Acceleration => 1.0,
         };
+        let mut x = std::mem::take(&mut self.work);
         for (i, k, d) in Self::components(step) {
-            let mut x = vec![0.0; self.mass.len()];
+            x.clear();
+            x.resize(self.mass.len(), 0.0);
             x[k] = d;
             if self.scheme.exact {
                 x[k] /= self.mass[k]
@@ -212,6 +227,7 @@ impl MassChain {
                 self.g[j * n + i] = factor * e * x[l];
             }
         }
+        self.work = x;
     }
 
     fn answer(&self, step: &Step, out: &mut Response) {
@@ -239,7 +255,9 @@ impl MassChain {
         self.force.clear();
         self.force.resize(n, 0.0);
         self.advance_under(step, Hold::End);
-        let mut free = vec![0.0; n];
+        let mut free = std::mem::take(&mut self.free);
+        free.clear();
+        free.resize(n, 0.0);
         for port in step.ports {
             for (i, c) in port.components() {
                 free[i] = port.direction(c)[0] * (self.next[port.body as usize].q - port.origin[0]);
@@ -263,9 +281,9 @@ impl MassChain {
         if !self.square.factor() {
             return Err(Error::Failed("a component is not free to move along x".into()));
         }
-        let mut x: Vec<f64> = (0..n).map(|i| rhs(i, &free)).collect();
-        self.square.solve(&mut x);
-        self.force.copy_from_slice(&x);
+        (0..n).for_each(|i| self.force[i] = rhs(i, &free));
+        self.square.solve(&mut self.force);
+        self.free = free;
         self.advance_under(step, Hold::End);
         Ok(())
     }
@@ -279,7 +297,7 @@ impl Subsystem for MassChain {
     fn capabilities(&self) -> Capabilities {
         let all = Capabilities::FORCE | Capabilities::RETRY | Capabilities::DERIVATIVES | Capabilities::STATE;
         if self.scheme.exact {
-            return all | Capabilities::SUBCYCLES;
+            return all | Capabilities::SUBCYCLES | Capabilities::RAMP;
         }
         all | Capabilities::MOTION | Capabilities::IMPEDANCE
     }
@@ -299,6 +317,9 @@ impl Subsystem for MassChain {
             Input::Force { t, hold, .. } => {
                 self.force.clear();
                 self.force.extend((0..step.n as usize).map(|i| f64::from(side_of(step, i)) * t[i]));
+                self.ramp.clear();
+                let start = t.get(step.n as usize..).unwrap_or_default();
+                self.ramp.extend(start.iter().enumerate().map(|(i, t)| f64::from(side_of(step, i)) * t));
                 self.advance_under(step, *hold);
             }
             Input::Motion(m) if !self.scheme.exact => {
@@ -346,12 +367,16 @@ impl Subsystem for MassChain {
     }
 
     fn save_state(&mut self, slot: u32) -> Result {
-        self.saved.get_mut(slot as usize).ok_or(Error::Unsupported)?.clone_from(&self.now);
+        let room = self.saved.get_mut(slot as usize).ok_or(Error::Unsupported)?;
+        room.0.clone_from(&self.now);
+        room.1.clone_from(&self.before);
         Ok(())
     }
 
     fn restore_state(&mut self, slot: u32) -> Result {
-        self.now.clone_from(self.saved.get(slot as usize).ok_or(Error::Unsupported)?);
+        let kept = self.saved.get(slot as usize).ok_or(Error::Unsupported)?;
+        self.now.clone_from(&kept.0);
+        self.before.clone_from(&kept.1);
         Ok(())
     }
 

@@ -8,10 +8,12 @@ use crate::process::{Outcome, read as read_file, root};
 use std::f64::consts::FRAC_PI_2;
 
 /// A mechanism with its reference: a column of a table per angle.
-struct Case {
+pub(super) struct Case {
     name: &'static str,
-    mechanism: Mechanism,
-    angles: &'static [&'static str],
+    /// The two parts.
+    pub mechanism: Mechanism,
+    /// Variables that are compared.
+    pub angles: &'static [&'static str],
     table: &'static str,
     columns: &'static [usize],
     until: f64,
@@ -19,7 +21,8 @@ struct Case {
     evaluations: f64,
 }
 
-fn cases() -> [Case; 4] {
+/// The mechanisms of the figures.
+pub(super) fn cases() -> [Case; 4] {
     let corners = [[0.0, 0.0], [0.0, 1.0], [2.0, 2.0], [3.0, 0.0]];
     [
         Case {
@@ -115,7 +118,7 @@ fn run(case: &Case, h: f64, every: f64) -> Outcome<(Vec<Vec<f64>>, Tally)> {
 }
 
 /// At every step of 5 ms: the limit of runs with short steps, or the equation of motion in one angle.
-fn reference(case: &Case) -> Outcome<Vec<Vec<f64>>> {
+pub(super) fn reference(case: &Case) -> Outcome<Vec<Vec<f64>>> {
     if case.table.is_empty() {
         return Ok(parallelogram(case.until));
     }
@@ -147,7 +150,8 @@ fn parallelogram(until: f64) -> Vec<Vec<f64>> {
     out
 }
 
-fn largest(a: &[Vec<f64>], b: &[Vec<f64>], stride: usize) -> f64 {
+/// Largest difference, `b` taken at every `stride`th row.
+pub(super) fn largest(a: &[Vec<f64>], b: &[Vec<f64>], stride: usize) -> f64 {
     let reference = b.iter().skip(stride - 1).step_by(stride);
     a.iter().zip(reference).flat_map(|(a, b)| a.iter().zip(b)).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
 }

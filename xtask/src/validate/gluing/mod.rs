@@ -7,6 +7,7 @@
 mod extrapolate;
 mod feet;
 mod foot;
+mod holds;
 mod linear;
 mod mechanisms;
 mod oscillator;
@@ -15,6 +16,7 @@ mod planar;
 mod rig;
 mod six_feet;
 mod squeezer;
+mod step_control;
 mod table;
 mod walk_forms;
 
@@ -24,8 +26,15 @@ use crate::process::{Outcome, root};
 type Part = fn(&Context) -> Outcome<Vec<Figure>>;
 
 /// The parts, in the order of the table.
-const PARTS: [Part; 5] =
-    [linear::figures, mechanisms::figures, squeezer::figures, feet::figures, walk_forms::figures];
+const PARTS: [Part; 7] = [
+    linear::figures,
+    mechanisms::figures,
+    holds::figures,
+    squeezer::figures,
+    step_control::figures,
+    feet::figures,
+    walk_forms::figures,
+];
 
 /// All figures of the area, or those of the file that `--table` names.
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {

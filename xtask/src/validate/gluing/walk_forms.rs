@@ -19,6 +19,8 @@ fn forms(soil: &str, context: &Context) -> Outcome<Figure> {
         ("gluing.strategy", "iterative"),
         ("gluing.tolerance", "1e-10"),
         ("gluing.max_iterations", "60"),
+        // a form that fails is not to be helped by halves of the step
+        ("gluing.max_halvings", "0"),
         ("soil.module", soil),
     ];
     let sets = sets.map(|(k, v)| (k.to_owned(), v.to_owned()));
@@ -27,7 +29,7 @@ fn forms(soil: &str, context: &Context) -> Outcome<Figure> {
     let options = Options { threads: 1, ..Options::default() };
     let mut testbed = Testbed::build(&scenario, &options).map_err(|e| e.to_string())?;
     let form = |form: &str| GluingSpec { form: form.into(), ..scenario.gluing.clone() };
-    let (mut worst, mut failed): (f64, u32) = (0.0, 0);
+    let (mut worst, mut failed, mut why): (f64, u32, String) = (0.0, 0, String::new());
     for _ in 0..samples {
         let mut forces = Vec::new();
         for _ in 1..stride {
@@ -39,7 +41,10 @@ fn forms(soil: &str, context: &Context) -> Outcome<Figure> {
             testbed.set_gluing(&form(name)).map_err(|e| e.to_string())?;
             match testbed.step() {
                 Ok(()) => forces.push(wrenches(&testbed)),
-                Err(_) => failed += 1,
+                Err(e) => {
+                    failed += 1;
+                    why = format!(": {name}, {e}");
+                }
             }
         }
         if let [tt, xt] = forces.as_slice() {
@@ -50,7 +55,7 @@ fn forms(soil: &str, context: &Context) -> Outcome<Figure> {
         testbed.step().map_err(|e| e.to_string())?;
     }
     let what = format!(
-        "largest difference of a force between the T-T and the X-T form, {samples} steps of moon_walk, N; {failed} did not converge"
+        "largest difference of a force between the T-T and the X-T form, {samples} steps of moon_walk, N; {failed} did not converge{why}"
     );
     let worst = if failed > 0 { f64::NAN } else { worst };
     Ok(Figure::new(format!("gluing.forms.{soil}"), worst, Limit::AtMost(1e-6), what))

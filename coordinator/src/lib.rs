@@ -11,6 +11,7 @@ pub mod gluing;
 pub mod host;
 pub mod observer;
 pub mod recording;
+pub mod reload;
 pub mod scaffold;
 pub mod scenario;
 pub mod signals;

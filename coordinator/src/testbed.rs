@@ -24,8 +24,10 @@ use unglued::Unglued;
 mod build;
 mod group;
 mod hosted;
+mod reload;
 mod unglued;
 
+pub(crate) use build::{find, make, services};
 use group::Group;
 
 /// What a run needs beside its scenario.

@@ -18,6 +18,7 @@ mod finding;
 mod lab;
 mod report;
 mod rig;
+mod sanitize;
 mod supervisor;
 
 pub(crate) use check_file::json;
@@ -27,6 +28,7 @@ pub use elsewhere::{Errand, run_errand};
 pub use finding::{Finding, Outcome, Stop, Verdict};
 pub use lab::Lab;
 pub use report::{Report, Row};
+pub use sanitize::{Fault, Sanitized, sanitize, sources_of};
 pub use supervisor::{Options, Told, check};
 
 use std::path::Path;

@@ -29,6 +29,8 @@ pub struct Options {
     pub jobs: usize,
     /// Time that a test may take, s.
     pub limit_s: f64,
+    /// Variables of the environment of every test; `{test}` stands for its name.
+    pub environment: Vec<(String, String)>,
 }
 
 impl Options {
@@ -42,6 +44,7 @@ impl Options {
             sets: Vec::new(),
             jobs: std::thread::available_parallelism().map_or(2, usize::from),
             limit_s: 30.0,
+            environment: Vec::new(),
         }
     }
 }
@@ -176,6 +179,9 @@ impl Bench<'_> {
         command.arg("--result").arg(self.file(test, "json")).env_remove("TERRAGLUE_LOG");
         // Without the allocator's caches per thread, what is freed counts as free.
         command.env("GLIBC_TUNABLES", "glibc.malloc.tcache_count=0");
+        for (key, value) in &options.environment {
+            command.env(key, value.replace("{test}", test.name));
+        }
         command.stdin(std::process::Stdio::null()).stdout(file("out")?).stderr(file("err")?);
         let process =
             command.spawn().map_err(|e| format!("{} cannot be started: {e}", options.program.display()))?;

@@ -28,7 +28,7 @@ TERRAGLUE_LOG=info shows which modules are loaded and what they say; TERRAGLUE_M
 #[derive(Subcommand, Debug)]
 pub enum Command {
     /// Run a scenario and write recording, summary and report.
-    Run(RunArguments),
+    Run(RunCommand),
     /// Run a scenario with several strategies and soils and put them side by side.
     Compare(CompareArguments),
     /// Make the report of a recording again, also of one that was cut off.
@@ -119,6 +119,23 @@ pub struct RunArguments {
     pub json: bool,
 }
 
+/// What `run` takes.
+#[derive(Args, Debug, Clone)]
+pub struct RunCommand {
+    /// As for `compare`.
+    #[command(flatten)]
+    pub run: RunArguments,
+    /// Watch the files of modules, and exchange their code while the run goes on.
+    #[arg(long)]
+    pub watch: bool,
+    /// Start a subsystem afresh with its new code instead of carrying its state over.
+    #[arg(long, requires = "watch")]
+    pub reload_reset: bool,
+    /// Exchange this subsystem before this step, changed or not. May be repeated.
+    #[arg(long, value_name = "NAME=STEP", requires = "watch", hide = true, value_parser = parse_set)]
+    pub reload_at: Vec<(String, String)>,
+}
+
 /// What `export` takes.
 #[derive(Args, Debug, Clone)]
 #[command(after_help = EXPORT_EXAMPLES)]
@@ -188,6 +205,12 @@ pub struct CheckModuleArguments {
     /// List the tests.
     #[arg(long)]
     pub list: bool,
+    /// Build the sources of a module in C or C++ with the compiler's sanitizers instead, and tell what they find in the tests.
+    #[arg(long)]
+    pub sanitize: bool,
+    /// A source for --sanitize [default: those beside the module]. May be repeated.
+    #[arg(long = "source", value_name = "FILE", requires = "sanitize")]
+    pub sources: Vec<PathBuf>,
     /// Where a test in this process writes its result.
     #[arg(long, value_name = "FILE", hide = true)]
     pub result: Option<PathBuf>,

@@ -7,6 +7,7 @@ use std::path::Path;
 use terraglue::Result;
 use terraglue::check_module::{
     Errand, Lab, Level, Options, Outcome, Told, catalogue, check, module_file, run_errand, run_here,
+    sanitize, sources_of,
 };
 use terraglue::scenario::InputError;
 
@@ -20,22 +21,14 @@ pub fn check_module(arguments: &CheckModuleArguments) -> Result<Exit> {
         return Ok(Exit::Done);
     }
     let Some(path) = &arguments.path else { return Err(wrong("name the file of a module".into()).into()) };
+    if arguments.sanitize {
+        return sanitized(arguments, path);
+    }
     let module = module_file(path).map_err(wrong)?;
     if arguments.in_process {
         return in_process(arguments, &module);
     }
-    let program =
-        std::env::current_exe().map_err(|e| wrong(format!("the program does not find itself: {e}")))?;
-    let mut options = Options {
-        level: arguments.level,
-        seed: arguments.seed,
-        only: arguments.only.clone(),
-        sets: arguments.sets.clone(),
-        limit_s: arguments.time_limit,
-        ..Options::new(program)
-    };
-    options.jobs = arguments.jobs.unwrap_or(options.jobs);
-    let report = check(&module, &options).map_err(wrong)?;
+    let report = check(&module, &options(arguments)?).map_err(wrong)?;
     for (file, text) in [(&arguments.json, report.json()), (&arguments.junit, report.junit())] {
         if let Some(file) = file {
             write(file, &text)?;
@@ -43,6 +36,39 @@ pub fn check_module(arguments: &CheckModuleArguments) -> Result<Exit> {
     }
     outln!("{}", report.text().trim_end());
     Ok(if report.is_good() { Exit::Done } else { Exit::Failed })
+}
+
+fn options(arguments: &CheckModuleArguments) -> Result<Options> {
+    let wrong = |e| InputError::plain(format!("the program does not find itself: {e}"), None);
+    let options = Options::new(std::env::current_exe().map_err(wrong)?);
+    Ok(Options {
+        level: arguments.level,
+        seed: arguments.seed,
+        only: arguments.only.clone(),
+        sets: arguments.sets.clone(),
+        limit_s: arguments.time_limit,
+        jobs: arguments.jobs.unwrap_or(options.jobs),
+        ..options
+    })
+}
+
+/// What the sanitizers find in the sources.
+fn sanitized(arguments: &CheckModuleArguments, path: &Path) -> Result<Exit> {
+    let wrong = |text: String| InputError::plain(text, None);
+    let sources = match arguments.sources.as_slice() {
+        [] => sources_of(path).map_err(wrong)?,
+        named => named.to_vec(),
+    };
+    let told = sanitize(&sources, &options(arguments)?).map_err(wrong)?;
+    for fault in &told.faults {
+        let function =
+            if fault.function.is_empty() { String::new() } else { format!(" in {}", fault.function) };
+        outln!("{}: {}{function} (test {})", fault.place, fault.what, fault.test);
+    }
+    told.skipped.iter().for_each(|why| outln!("skip: {why}"));
+    let looked = if told.ran.is_empty() { "nothing".into() } else { told.ran.join(", ") };
+    outln!("{} found; looked for: {looked}", told.faults.len());
+    Ok(if told.faults.is_empty() { Exit::Done } else { Exit::Failed })
 }
 
 /// One test, or an errand of one, in this process.

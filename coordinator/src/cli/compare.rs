@@ -271,7 +271,8 @@ fn recorded(
     let testbed = run::build(&plan.scenario, &run::options(arguments, cancel))?;
     let label = format!("{} on {}: ", plan.strategy, file_name(&plan.soil));
     let mut progress = Progress::new(bar.clone(), plan.scenario.time.duration_s, &label);
-    let outcome = run::run_testbed(testbed, &plan.scenario, &plan.folder, arguments.csv, &mut progress)?;
+    let outcome =
+        run::run_testbed(testbed, None, &plan.scenario, &plan.folder, arguments.csv, &mut progress)?;
     recording::report::write(&plan.folder)?;
     Ok(outcome)
 }

@@ -1,6 +1,6 @@
 //! `terraglue run`: one scenario from file to report.
 
-use super::arguments::RunArguments;
+use super::arguments::{RunArguments, RunCommand};
 use super::folder::results_folder;
 use super::output::outln;
 use super::progress::{self, Progress};
@@ -12,6 +12,7 @@ use std::time::Instant;
 use terraglue::host::exit_guard;
 use terraglue::observer::Observer;
 use terraglue::recording::{self, Recorder, RecorderOptions, Status, Summary, TimingRow, write_timing};
+use terraglue::reload::{ReloadOptions, Reloader};
 use terraglue::scenario::{InputError, Scenario};
 use terraglue::testbed::{Options, Testbed};
 use terraglue::{Error, Result};
@@ -38,20 +39,40 @@ impl Outcome {
 }
 
 /// Runs a scenario as the arguments say.
-pub fn run(arguments: &RunArguments) -> Result<Exit> {
+pub fn run(command: &RunCommand) -> Result<Exit> {
+    let arguments = &command.run;
     let scenario = Scenario::load(&arguments.scenario.scenario, &arguments.sets())?;
     soil_module::check(&scenario, &arguments.scenario)?;
     let options = options(arguments, &interrupt::cancel_flag());
     let testbed = build(&scenario, &options)?;
+    let mut reloader = reloader(command, &scenario, &options)?;
     let folder = results_folder(arguments.out.as_deref(), &scenario.name)?;
     let steps = (scenario.time.duration_s / scenario.time.step_s).round() as u64;
     let bar = progress::bar(steps, arguments.quiet);
     let mut progress = Progress::new(bar.clone(), scenario.time.duration_s, "");
-    let outcome = run_testbed(testbed, &scenario, &folder, arguments.csv, &mut progress)?;
+    let outcome = run_testbed(testbed, reloader.as_mut(), &scenario, &folder, arguments.csv, &mut progress)?;
     bar.finish_and_clear();
     let report = recording::report::write(&folder)?;
     print(arguments, &outcome, &report)?;
     Ok(outcome.exit())
+}
+
+/// What watches the modules, where that is wanted.
+fn reloader(command: &RunCommand, scenario: &Scenario, options: &Options) -> Result<Option<Reloader>> {
+    if !command.watch {
+        return Ok(None);
+    }
+    let own = std::env::current_exe().ok().filter(|program| program.is_file());
+    let at = |(name, step): &(String, String)| match step.parse() {
+        Ok(step) => Ok((name.clone(), step)),
+        Err(_) => Err(InputError::plain(format!("--reload-at {name}={step}: that is no step"), None)),
+    };
+    let wanted = ReloadOptions {
+        program: own.unwrap_or_else(|| "/proc/self/exe".into()),
+        reset: command.reload_reset,
+        at_steps: command.reload_at.iter().map(at).collect::<std::result::Result<_, _>>()?,
+    };
+    Reloader::new(scenario, options, wanted).map(Some)
 }
 
 /// Options of the testbed.
@@ -74,6 +95,7 @@ pub fn build(scenario: &Scenario, options: &Options) -> Result<Testbed> {
 /// Steps a testbed to the end of its scenario and records it into `folder`.
 pub fn run_testbed(
     mut testbed: Testbed,
+    reloader: Option<&mut Reloader>,
     scenario: &Scenario,
     folder: &Path,
     csv: bool,
@@ -83,7 +105,11 @@ pub fn run_testbed(
     let mut recorder = Recorder::create(folder, scenario, RecorderOptions { csv })?;
     testbed.view(|view| recorder.started(view))?;
     let (wall, cpu) = (Instant::now(), cpu_s());
-    let ran = testbed.run_until(scenario.time.duration_s, &mut [&mut recorder, progress]);
+    let until_s = scenario.time.duration_s;
+    let ran = match reloader {
+        None => testbed.run_until(until_s, &mut [&mut recorder, progress]),
+        Some(reloader) => reloader.run_until(&mut testbed, until_s, &mut [&mut recorder, progress]),
+    };
     let (wall_s, cpu_s) = (wall.elapsed().as_secs_f64(), cpu_s() - cpu);
     let error = ran.err();
     testbed.view(|view| recorder.finished(view, error.as_ref()))?;

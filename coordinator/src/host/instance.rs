@@ -56,6 +56,12 @@ impl Instance {
         }
     }
 
+    /// The same around the subsystem that `wrap` makes of it.
+    pub(crate) fn wrapped(mut self, wrap: impl FnOnce(Box<dyn Subsystem>) -> Box<dyn Subsystem>) -> Self {
+        self.subsystem = wrap(self.subsystem);
+        self
+    }
+
     /// Name in the scenario.
     pub fn name(&self) -> &str {
         &self.name

@@ -219,6 +219,12 @@ pub(super) fn fill(
         Language::Python => ("@terraglue@ check scenario.toml", format!("./{snake}.py")),
         Language::Scenario => ("@terraglue@ check scenario.toml", String::new()),
     };
+    let rebuild = match language {
+        Language::Python | Language::Scenario => String::new(),
+        _ => format!(
+            "build = \"{build}\"                  # what `run --watch` does on a change of the source\n"
+        ),
+    };
     let listing: Vec<_> = files.iter().map(|(path, what, _)| format!("| `{path}` | {what} |")).collect();
     let (flags, compile) = match language {
         Language::Cpp => (
@@ -243,6 +249,7 @@ pub(super) fn fill(
             if language == Language::Python { "See whether all names fit" } else { "Build it" }.into(),
         ),
         ("@build@", build.into()),
+        ("@rebuild@", rebuild),
         ("@module@", module),
         ("@terraglue@", place.program.clone()),
         ("my-module", name.into()),

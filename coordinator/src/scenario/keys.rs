@@ -356,6 +356,9 @@ pub fn subsystem_keys() -> Vec<Key> {
     let multiple = "steps of the testbed per step of this subsystem";
     let module = "a module's name, or the path of a library or of a file in Python relative to the scenario";
     let python = "interpreter of a module in Python; by default $VIRTUAL_ENV/bin/python, else python3";
+    let build = "command that builds the module, run by `run --watch` in the scenario's folder on a change of its sources";
+    let sources =
+        "files and folders that `build` depends on; where absent, the sources below the scenario's folder";
     let unit = "a functional mock-up unit instead of a module; other keys are its start values, `on_nan`, `event_mode`, `rollback`";
     let row = "a row of the soil table, or a soil file (.toml), whose numbers are offered to the module";
     vec![
@@ -379,6 +382,8 @@ pub fn subsystem_keys() -> Vec<Key> {
             .positive()
             .into(),
         Parameter::of("python", ParameterType::Text, python).optional().into(),
+        Parameter::of("build", ParameterType::Text, build).optional().into(),
+        Key::from(Parameter::of("sources", ParameterType::Text, sources).optional()).form(Form::Texts),
         Parameter::of("parameters", ParameterType::Text, row).optional().into(),
         Parameter::of("parameters_file", ParameterType::Path, "soil table other than `models/soils.csv`")
             .optional()

@@ -199,6 +199,10 @@ pub struct SubsystemSpec {
     pub isolation: Isolation,
     /// `python`: the interpreter of a module in Python, as written.
     pub python: Option<String>,
+    /// `build`: what makes the module anew, for `run --watch`.
+    pub build: Option<String>,
+    /// `sources`: files and folders that this depends on; empty: the scenario's folder.
+    pub sources: Vec<String>,
     /// All parameters, nested tables as objects: the host's keys are taken out.
     pub parameters: Map<String, Value>,
     /// Numbers of a named soil row that are offered to the module, not demanded of it.

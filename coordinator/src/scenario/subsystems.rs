@@ -57,6 +57,8 @@ fn one(source: &Source, name: &str, node: &Node) -> Result<SubsystemSpec, Box<In
         isolate: node.get("isolate").is_some_and(|n| n.to_json().as_bool() == Some(true)),
         isolation: isolation(node),
         python: text(node, "python"),
+        build: text(node, "build"),
+        sources: node.get("sources").map(texts).unwrap_or_default(),
         parameters: parameters(node, &module, is_host_key),
         offered: soil_row::offered(source, name, node, &module)?,
         module,
@@ -72,6 +74,15 @@ fn isolation(node: &Node) -> Isolation {
         load_timeout_s: number("load_timeout_s", usual.load_timeout_s),
         step_timeout_s: number("step_timeout_s", usual.step_timeout_s),
         memory_bytes: (number("memory_mb", (usual.memory_bytes >> 20) as f64) as u64) << 20,
+    }
+}
+
+/// A text or a list of texts.
+fn texts(node: &Node) -> Vec<String> {
+    match node.to_json() {
+        Value::String(one) => vec![one],
+        Value::Array(all) => all.iter().filter_map(|t| t.as_str().map(str::to_owned)).collect(),
+        _ => Vec::new(),
     }
 }
 

@@ -16,7 +16,7 @@ use crate::timing::Timings;
 use crate::{Error, Result, terrain};
 use std::sync::Arc;
 use std::time::Duration;
-use terraglue_subsystem::{BodyState, Capabilities, Hold, Kind, Law, Level, Subsystem, Terrain};
+use terraglue_subsystem::{BodyState, Capabilities, Config, Hold, Kind, Law, Level, Subsystem, Terrain};
 
 impl Testbed {
     /// Builds a scenario with modules found as libraries.
@@ -39,17 +39,8 @@ impl Testbed {
         library: &Library,
         change: impl FnOnce(HostServices) -> HostServices,
     ) -> Result<Self> {
-        let terrain: Option<Arc<dyn Terrain>> = match &scenario.terrain {
-            Some(spec) => Some(Arc::from(terrain::build(spec, scenario.world.seed)?)),
-            None => None,
-        };
-        let services = HostServices {
-            gravity: scenario.world.gravity_m_s2,
-            terrain: terrain.clone(),
-            workers: Arc::new(Workers::new(options.threads)),
-            cancel: options.cancel.clone(),
-            ..HostServices::new(scenario.world.seed, &scenario.folder)
-        };
+        let services = services(scenario, options, true)?;
+        let terrain = services.terrain.clone();
         let services = change(services);
         scenario::advice::late_events(scenario).iter().for_each(|advice| log::warn!("{advice}"));
         let instances = instantiate(scenario, options, library, &services)?;
@@ -99,6 +90,49 @@ impl Testbed {
     }
 }
 
+/// What instances of a scenario are offered; `ground`: with the terrain, where it has one.
+pub(crate) fn services(scenario: &Scenario, options: &Options, ground: bool) -> Result<HostServices> {
+    let terrain: Option<Arc<dyn Terrain>> = match scenario.terrain.as_ref().filter(|_| ground) {
+        Some(spec) => Some(Arc::from(terrain::build(spec, scenario.world.seed)?)),
+        None => None,
+    };
+    Ok(HostServices {
+        gravity: scenario.world.gravity_m_s2,
+        terrain,
+        workers: Arc::new(Workers::new(options.threads)),
+        cancel: options.cancel.clone(),
+        ..HostServices::new(scenario.world.seed, &scenario.folder)
+    })
+}
+
+/// The module of a subsystem.
+pub(crate) fn find(
+    scenario: &Scenario,
+    spec: &SubsystemSpec,
+    options: &Options,
+    library: &Library,
+) -> Result<LoadedModule> {
+    let search = SearchPath::standard(&options.module_paths, &scenario.folder);
+    let found = library.find(&spec.module, &search, &scenario.folder);
+    found.map_err(|e| module_error(scenario, spec, &e).into())
+}
+
+/// An instance of a module, in this process or in one of its own.
+pub(crate) fn make(
+    scenario: &Scenario,
+    spec: &SubsystemSpec,
+    module: LoadedModule,
+    config: Config,
+    services: &HostServices,
+) -> Result<Instance> {
+    let module = module.run_by(interpreter(spec.python.as_deref(), &scenario.folder));
+    let made = match spec.isolate || module.is_python() {
+        true => module.instantiate_isolated(&spec.name, config, services, spec.isolation),
+        false => module.instantiate(&spec.name, config, services),
+    };
+    made.map_err(|e| module_error(scenario, spec, &e).into())
+}
+
 fn instantiate(
     scenario: &Scenario,
     options: &Options,
@@ -108,12 +142,11 @@ fn instantiate(
     let search = SearchPath::standard(&options.module_paths, &scenario.folder);
     let mut instances = Vec::new();
     for spec in &scenario.subsystems {
-        let wrong = |e: LoadError| Error::Input(module_error(scenario, spec, &e));
         if crate::fmu::is_fmu(&spec.module) {
             instances.push(unit(scenario, spec, services)?);
             continue;
         }
-        let module: LoadedModule = library.find(&spec.module, &search, &scenario.folder).map_err(wrong)?;
+        let module = find(scenario, spec, options, library)?;
         let config = scenario::check_parameters(module.schema(), spec, &scenario.source)?;
         for name in scenario::SHIPPED_MODULES.iter().filter(|name| spec.parameters.contains_key(**name)) {
             let Ok(other) = library.find(name, &search, &scenario.folder) else { continue };
@@ -123,12 +156,7 @@ fn instantiate(
                 log::warn!("{advice}");
             }
         }
-        let module = module.run_by(interpreter(spec.python.as_deref(), &scenario.folder));
-        let made = match spec.isolate || module.is_python() {
-            true => module.instantiate_isolated(&spec.name, config, services, spec.isolation),
-            false => module.instantiate(&spec.name, config, services),
-        };
-        instances.push(made.map_err(wrong)?);
+        instances.push(make(scenario, spec, module, config, services)?);
     }
     Ok(instances)
 }

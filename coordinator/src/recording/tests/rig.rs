@@ -198,6 +198,8 @@ pub fn scenario(strategy: &str) -> Scenario {
         isolate: false,
         isolation: Default::default(),
         python: None,
+        build: None,
+        sources: Vec::new(),
         name: name.into(),
         module: module.into(),
         step_multiple: 1,

@@ -1,6 +1,7 @@
 //! Figures of the plugin interface: the checker, its broken modules, its time, and what it says of our own modules.
 
 mod python;
+mod reload;
 mod speed;
 
 use super::{Context, Figure, Limit};
@@ -28,6 +29,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     if context.timing {
         speed::figures(&mut out)?;
         python::figures(context, &mut out)?;
+        reload::figures(context, &mut out)?;
     }
     Ok(out)
 }

@@ -57,6 +57,7 @@ impl Module for RigidBody {
         file.notices.iter().for_each(|n| host.log(LogLevel::Info, n));
         let mut state = State {
             forces: vec![V3::zeros(); bodies.len()],
+            reactions: vec![[0.0; 6]; model.joints.len()],
             contact_normal: vec![0.0; bodies.len()],
             accelerations: vec![Acceleration::default(); bodies.len()],
             accelerated: false,

@@ -170,7 +170,9 @@ impl Robot {
         let h = dynamics.h;
         let (supply_v, mut draw) = (state.supply.limit, Draw::default());
         for (j, joint) in dynamics.model.joints.iter().enumerate() {
-            let Some(axis) = dynamics.axis_result(j) else { continue };
+            let axis = dynamics.axis_result(j);
+            state.reactions[j] = dynamics.reaction(j, axis.map_or(0.0, |a| a.impulse));
+            let Some(axis) = axis else { continue };
             let mode = dynamics.modes[j];
             let shares = dynamics.axes[j].shares(mode, axis.rate, axis.impulse);
             let s = &mut state.joints[j];

@@ -87,6 +87,8 @@ pub(crate) struct State {
     pub redundant_rows: usize,
     /// External force at the centre of mass, N.
     pub forces: Vec<V3>,
+    /// What each joint exerts on its child in the last step: force at the anchor, moment about it, world axes, N and N m.
+    pub reactions: Vec<[f64; 6]>,
     /// Normal force of all ports of a body, N.
     pub contact_normal: Vec<f64>,
     pub energy: Energy,
@@ -113,6 +115,7 @@ impl State {
         self.redundant_rows = other.redundant_rows;
         self.forces.clone_from(&other.forces);
         self.contact_normal.clone_from(&other.contact_normal);
+        self.reactions.clone_from(&other.reactions);
         self.accelerations.clone_from(&other.accelerations);
         self.accelerated = other.accelerated;
         (self.energy, self.stagger) = (other.energy, other.stagger);

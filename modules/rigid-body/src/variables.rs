@@ -70,6 +70,18 @@ const VOLTAGE_TARGET: u32 = 12;
 /// First of [`ACTUATOR_ITEMS`] and of the settings of the actuator.
 const ACTUATOR: u32 = 16;
 const SETTING: u32 = 48;
+/// First of [`REACTION_ITEMS`].
+const REACTION: u32 = 120;
+
+/// What every joint of the tree carries.
+const REACTION_ITEMS: [(&str, &str, &str); 6] = [
+    ("reaction_x", "N", "Force that the joint exerts on its child in the last step, world axes"),
+    ("reaction_y", "N", "Force that the joint exerts on its child in the last step, world axes"),
+    ("reaction_z", "N", "Force that the joint exerts on its child in the last step, world axes"),
+    ("reaction_mx", "N m", "Moment on the child about the joint's origin, motor included, world axes"),
+    ("reaction_my", "N m", "Moment on the child about the joint's origin, motor included, world axes"),
+    ("reaction_mz", "N m", "Moment on the child about the joint's origin, motor included, world axes"),
+];
 
 /// What an actuator tells: name, unit (of a joint that turns), who has it, help, where it stands.
 type ActuatorItem = (&'static str, &'static str, Group, &'static str, fn(&JointState) -> f64);
@@ -152,6 +164,10 @@ pub(crate) fn describe(model: &Model, state: &State) -> Vec<Variable> {
         all.push(flag(id + BROKEN, &joint.name, "broken", Causality::Parameter, help));
         if joint.moves() {
             describe_actuator(id, &joint.name, joint.kind, &state.joints[j], &mut all);
+        }
+        for (item, (what, unit, help)) in REACTION_ITEMS.iter().enumerate() {
+            let (id, name) = (id + REACTION + item as u32, format!("{}.{what}", joint.name));
+            all.push(Variable::real(id, name, unit, Causality::Output, help));
         }
     }
     let first = first + model.joints.len() as u32 * JOINT_STRIDE;
@@ -292,8 +308,10 @@ pub(crate) fn meaning(model: &Model, id: u32) -> Result<Meaning> {
     }
     let told = ACTUATOR..ACTUATOR + ACTUATOR_ITEMS.len() as u32;
     let settings = SETTING..SETTING + SETTINGS.len() as u32;
+    let reactions = REACTION..REACTION + REACTION_ITEMS.len() as u32;
     let of_moving = item <= VOLTAGE_TARGET || told.contains(&item) || settings.contains(&item);
-    let known = model.joints.get(joint).is_some_and(|j| item == BROKEN || (j.moves() && of_moving));
+    let of_all = item == BROKEN || reactions.contains(&item);
+    let known = model.joints.get(joint).is_some_and(|j| of_all || (j.moves() && of_moving));
     if known { Ok(Meaning::Joint { joint, item }) } else { Err(unknown()) }
 }
 
@@ -305,6 +323,9 @@ fn wrong_type(id: u32) -> Error {
 pub(crate) fn number(model: &Model, state: &State, id: u32) -> Result<f64> {
     match meaning(model, id)? {
         Meaning::Body { body, item } => Ok(body_number(model, state, body, item)),
+        Meaning::Joint { joint, item: item @ REACTION.. } => {
+            Ok(state.reactions[joint][(item - REACTION) as usize])
+        }
         Meaning::Joint { joint, item } => {
             let j = &state.joints[joint];
             match item {
@@ -385,6 +406,9 @@ pub(crate) fn set_number(model: &Model, state: &mut State, id: u32, value: f64) 
         }
         Meaning::Closure { item: CLOSURE_BROKEN, .. } => Err(wrong_type(id)),
         Meaning::Closure { .. } => Err(Error::Refused("what a connection carries can be read only".into())),
+        Meaning::Joint { item: REACTION.., .. } => {
+            Err(Error::Refused("what a joint carries can be read only".into()))
+        }
         Meaning::Joint { joint, item: SETTING.. } => {
             let place = ((id - model.bodies.len() as u32 * BODY_STRIDE) % JOINT_STRIDE - SETTING) as usize;
             let s = &SETTINGS[place];
@@ -479,6 +503,7 @@ pub(crate) fn break_joint(state: &mut State, joint: usize) {
     }
     (j.broken, j.velocity, j.torque, j.blocked) = (true, 0.0, 0.0, None);
     j.actuator.stop();
+    state.reactions[joint] = [0.0; 6];
 }
 
 /// Removes a connection beyond the tree for ever; what a spring holds is lost.

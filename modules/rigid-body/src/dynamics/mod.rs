@@ -15,6 +15,7 @@ mod gyro;
 pub(crate) mod joint_rows;
 pub(crate) mod kkt;
 mod midpoint;
+mod reaction;
 pub(crate) mod scheme;
 mod second_order;
 

@@ -193,7 +193,7 @@ fn partly_blocked() -> Outcome<Vec<Figure>> {
     Ok(vec![above, below, bound])
 }
 
-/// Numbers that differ between two runs.
+/// Numbers that differ between a run alone and two at the same time in two threads.
 fn repeated() -> Outcome<Figure> {
     let run = || -> Outcome<Vec<u64>> {
         let mut walker = Walker::new(0.33, G, "half-space")?;
@@ -208,9 +208,18 @@ fn repeated() -> Outcome<Figure> {
         }
         Ok(bits)
     };
-    let (first, second) = (run()?, run()?);
-    let different = first.iter().zip(&second).filter(|(a, b)| a != b).count();
-    let what =
-        format!("gait, 2 s: numbers out of {} that differ in their bits between two runs", first.len());
+    let alone = run()?;
+    let both = std::thread::scope(|scope| {
+        let threads = [(); 2].map(|()| scope.spawn(run));
+        threads.map(|t| t.join().unwrap_or_else(|_| Err("a thread of the gait ended early".into())))
+    });
+    let mut different = 0;
+    for bits in both {
+        different += alone.iter().zip(&bits?).filter(|(a, b)| a != b).count();
+    }
+    let what = format!(
+        "gait, 2 s, alone and twice at once in two threads: numbers out of {} that differ in their bits",
+        alone.len()
+    );
     Ok(Figure::new("rigid-body.repeated_run", different as f64, Limit::Equal(0.0), what))
 }

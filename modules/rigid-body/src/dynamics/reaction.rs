@@ -1,0 +1,36 @@
+//! What a joint of the tree carries: the multipliers of its rows, the motor's share included, as force and moment.
+
+use super::scheme::Integrator;
+use super::{Dynamics, joint_rows};
+use crate::math::V3;
+
+impl Dynamics {
+    /// Force (N) at the joint's anchor and moment (N m) about it that the joint exerts on the child, world axes; the
+    /// parent feels the opposite. `axis`: impulse along the free axis, N m s or N s. Mean of the step in first order,
+    /// at its end (generalized-α) or in its middle in second.
+    pub fn reaction(&self, j: usize, axis: f64) -> [f64; 6] {
+        if self.broken[j] {
+            return [0.0; 6];
+        }
+        let joint = &self.model.joints[j];
+        let rows = match self.integrator {
+            Integrator::SymplecticEuler => self.rows[j],
+            Integrator::GeneralizedAlpha(_) => joint_rows::rows(joint, &self.ends),
+            Integrator::EnergyMomentum => joint_rows::mean_rows(joint, &self.starts, &self.ends),
+        };
+        let (at, rigid, free) = (self.kkt.joint_at[j], joint.rigid(), joint.free_row());
+        let mut sum = [V3::zeros(); 2];
+        for r in 0..6 {
+            let force = if free == Some(r) {
+                axis / self.h
+            } else if rigid[r] {
+                -self.solution[at + r] / self.impulse_per_force()
+            } else {
+                continue;
+            };
+            sum[r / 3] += force * rows.directions[r];
+        }
+        let [f, m] = sum;
+        [f.x, f.y, f.z, m.x, m.y, m.z]
+    }
+}

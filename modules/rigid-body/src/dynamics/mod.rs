@@ -10,6 +10,7 @@
 //! [`alpha`] and [`midpoint`] over [`second_order`]; what all share is in [`scheme`].
 
 mod alpha;
+mod anderson;
 mod closing;
 mod gyro;
 pub(crate) mod joint_rows;
@@ -24,6 +25,7 @@ use crate::drive::{Axis, MOST_YIELDING, Mode, Span, YIELDING};
 use crate::math::{M3, V3, cayley};
 use crate::model::Model;
 use crate::state::{Motion, State};
+use anderson::Anderson;
 use closing::Closing;
 use joint_rows::{coordinate, gap};
 use kkt::Kkt;
@@ -112,6 +114,7 @@ pub(crate) struct Dynamics {
     pub external: Vec<f64>,
     rhs: Vec<f64>,
     correction: Vec<f64>,
+    anderson: Anderson,
     /// Rates and (negative) impulses of the trial.
     pub solution: Vec<f64>,
     /// Motion at the end of the trial and rotation vector (before the Cayley transform) of each body.
@@ -153,6 +156,7 @@ impl Dynamics {
             external: vec![0.0; n],
             rhs: vec![0.0; n],
             correction: vec![0.0; n],
+            anderson: Anderson::new(n, 6 * nb),
             solution: vec![0.0; n],
             ends: vec![rest; nb],
             turns: vec![V3::zeros(); nb],

@@ -11,7 +11,12 @@ use crate::math::V3;
 use crate::state::{Motion, State};
 
 /// Most corrections of a step.
-const MAX_CORRECTIONS: usize = 40;
+const MAX_CORRECTIONS: usize = 60;
+/// After so many corrections, or when they grow, earlier ones help (see [`super::anderson`]).
+const PLAIN: usize = 8;
+/// Where corrections shrink no more, so much of the largest rate is rounding: next to a singular pose gaps tell rates
+/// badly.
+const STALLED: f64 = 1e-7;
 /// Corrections end when the rates change by less than this, relative to the largest.
 const RATE_CHANGE: f64 = 1e-11;
 /// Nor can they be known better than the gaps of joints can be told: this many units in the last place, over h.
@@ -64,16 +69,33 @@ impl Dynamics {
     pub(super) fn solve_branch_second_order(&mut self) -> Result<(), Failure> {
         self.solution.copy_from_slice(&self.free);
         let noise = self.noise();
-        for _ in 0..MAX_CORRECTIONS {
+        let (mut least, mut last, mut mixed) = (f64::INFINITY, f64::INFINITY, None);
+        for round in 0..MAX_CORRECTIONS {
             self.find_ends_second_order();
             self.residual_second_order();
             self.kkt.solver.substitute(&mut self.correction);
+            if let Some(rounds) = &mut mixed {
+                self.anderson.mix(*rounds, &self.solution, &mut self.correction);
+                *rounds += 1;
+            }
             self.solution.iter_mut().zip(&self.correction).for_each(|(s, c)| *s += c);
             let (change, rates) = (self.largest(&self.correction), self.largest(&self.solution));
             if (0..2).all(|k| change[k] <= RATE_CHANGE * rates[k] + noise) {
                 self.find_ends_second_order();
                 return self.check_gaps();
             }
+            let share = (0..2).fold(0.0_f64, |m, k| m.max(change[k] / (rates[k] + REST)));
+            if mixed.is_some() && share <= STALLED && share > 0.5 * least {
+                self.find_ends_second_order();
+                return self.check_gaps();
+            }
+            if mixed.is_none() && (share > last || round >= PLAIN) {
+                mixed = Some(0);
+                if share > STALLED {
+                    self.solution.copy_from_slice(&self.free);
+                }
+            }
+            (least, last) = (least.min(share), share);
         }
         Err(Failure::NotConverged { corrections: MAX_CORRECTIONS })
     }

@@ -8,7 +8,7 @@ use terraglue_subsystem::bytes::{self, Persist, hash};
 use terraglue_subsystem::{Result, persist};
 
 /// Version of the bytes.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 impl Persist for Motion {
     fn write(&self, out: &mut Vec<u8>) {
@@ -47,12 +47,12 @@ impl Persist for State {
         let Self {
             bodies, joints, closures, redundant_rows, forces, contact_normal, energy, contact, ..
         } = self;
-        let Self { pressed, supply, start, stagger, accelerations, accelerated, .. } = self;
+        let Self { pressed, supply, start, stagger, reactions, accelerations, accelerated, .. } = self;
         (bodies.write(out), joints.write(out), closures.write(out), redundant_rows.write(out));
         forces.iter().map(|f| (*f).into()).collect::<Vec<[f64; 3]>>().write(out);
         (contact_normal.write(out), energy.write(out), contact.write(out), pressed.write(out));
         (supply.write(out), start.map(<[f64; 3]>::from).write(out), stagger.write(out));
-        (accelerations.write(out), accelerated.write(out));
+        (reactions.write(out), accelerations.write(out), accelerated.write(out));
     }
     fn read(from: &mut &[u8]) -> Result<Self> {
         Ok(Self {
@@ -68,6 +68,7 @@ impl Persist for State {
             supply: Persist::read(from)?,
             start: Option::<[f64; 3]>::read(from)?.map(V3::from),
             stagger: Persist::read(from)?,
+            reactions: Persist::read(from)?,
             accelerations: Persist::read(from)?,
             accelerated: Persist::read(from)?,
         })
@@ -91,6 +92,7 @@ impl State {
             (state.joints.len(), self.joints.len()),
             (state.closures.len(), self.closures.len()),
             (state.forces.len(), self.forces.len()),
+            (state.reactions.len(), self.reactions.len()),
             (state.contact_normal.len(), self.contact_normal.len()),
         ];
         let finite = |m: &Motion| {

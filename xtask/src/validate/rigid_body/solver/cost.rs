@@ -48,8 +48,7 @@ fn feet(robot: &dyn Subsystem) -> Outcome<Vec<Port>> {
 pub fn resolve() -> Outcome<Figure> {
     let parameters = r#"{"model": "models/hexapod.urdf", "position_m": [0, 0, 0.33],
         "joints": {"*_j2": 0.958192, "*_j3": -1.379634, "*_j4": -1.149354}}"#;
-    let host =
-        Standalone { gravity: [0.0, 0.0, -1.62], terrain: None, folder: root().display().to_string() };
+    let host = Standalone { gravity: [0.0, 0.0, -1.62], terrain: None, folder: root().display().to_string() };
     let config = Config::parse(parameters).map_err(|e| e.to_string())?;
     let mut robot = RigidBody::instantiate(&config, Arc::new(host)).map_err(|e| e.to_string())?;
     let ports = feet(&*robot)?;

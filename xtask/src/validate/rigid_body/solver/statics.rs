@@ -15,12 +15,17 @@ pub fn figures() -> Outcome<Vec<Figure>> {
 fn error(more: &str, expected: impl Fn(f64) -> [f64; 2]) -> Outcome<f64> {
     let mut worst = 0.0_f64;
     for scheme in ["symplectic-euler", "generalized-alpha", "energy-momentum"] {
-        let mut rig =
-            Rig::new(&format!(r#"{{"model": "{CHAIN}", "integrator": "{scheme}", {more}}}"#), [0.0, 0.0, -G], 1e-3)?;
+        let mut rig = Rig::new(
+            &format!(r#"{{"model": "{CHAIN}", "integrator": "{scheme}", {more}}}"#),
+            [0.0, 0.0, -G],
+            1e-3,
+        )?;
         rig.run(0.02, |_| Ok(()))?;
         for k in 1..=8 {
             let [force, moment] = expected(f64::from(9 - k));
-            for (what, value) in [("x", 0.0), ("y", 0.0), ("z", force), ("mx", 0.0), ("my", moment), ("mz", 0.0)] {
+            for (what, value) in
+                [("x", 0.0), ("y", 0.0), ("z", force), ("mx", 0.0), ("my", moment), ("mz", 0.0)]
+            {
                 let id = rig.id(&format!("j{k}.reaction_{what}"))?;
                 worst = worst.max((rig.get(id)? - value).abs());
             }
@@ -31,8 +36,14 @@ fn error(more: &str, expected: impl Fn(f64) -> [f64; 2]) -> Outcome<f64> {
 
 fn hanging() -> Outcome<Figure> {
     let more = format!(r#""motor": "off", "joints": {{"j1": {}}}"#, -std::f64::consts::FRAC_PI_2);
-    let what = "hanging chain of eight, all integrators: reactions less the weight below each joint, N and N m";
-    Ok(Figure::new("rigid-body.reactions.hanging", error(&more, |n| [n * G, 0.0])?, Limit::AtMost(1e-6), what))
+    let what =
+        "hanging chain of eight, all integrators: reactions less the weight below each joint, N and N m";
+    Ok(Figure::new(
+        "rigid-body.reactions.hanging",
+        error(&more, |n| [n * G, 0.0])?,
+        Limit::AtMost(1e-6),
+        what,
+    ))
 }
 
 fn held() -> Outcome<Figure> {

@@ -3,13 +3,25 @@
 import json
 import os
 import pathlib
+import shutil
 import subprocess
+import tempfile
 
 import pytest
+
+# A temporary folder of their own: tests look at what is left behind, and not at what other programs leave.
+TEMPORARY = tempfile.mkdtemp(prefix="terraglue-tests-")
+os.environ["TMPDIR"] = TEMPORARY
+tempfile.tempdir = TEMPORARY
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROGRAM = os.environ.get("TERRAGLUE_BIN", str(ROOT / "target" / "debug" / "terraglue"))
 MOON_WALK = ROOT / "scenarios" / "moon_walk.toml"
+
+
+def pytest_sessionfinish(exitstatus):
+    if exitstatus == 0:
+        shutil.rmtree(TEMPORARY, ignore_errors=True)
 
 
 def terraglue(*arguments, cwd=ROOT, timeout=300):

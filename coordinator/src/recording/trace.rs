@@ -8,11 +8,12 @@ use terraglue_subsystem::{ValueType, ValuesMut};
 
 /// Values of chosen f64 variables over time.
 ///
-/// ```
+/// ```no_run
+/// # use std::path::Path;
 /// use terraglue::{Testbed, recording::Trace, scenario::Scenario, testbed::Options};
-/// let scenario = Scenario::parse("[time]\nstep_s = 0.1\nduration_s = 1.0\n", "none.toml", &[])?;
+/// let scenario = Scenario::load(Path::new("scenarios/moon_walk.toml"), &[])?;
 /// let mut testbed = Testbed::build(&scenario, &Options::default())?;
-/// let mut trace = Trace::new(&testbed, &[])?;
+/// let mut trace = Trace::new(&testbed, &["robot.body.z"])?;
 /// for _ in 0..10 {
 ///     testbed.step()?;
 ///     trace.take(&testbed)?;

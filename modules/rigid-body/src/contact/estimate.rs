@@ -197,7 +197,10 @@ impl Estimator {
             let largest = |v: &mut dyn Iterator<Item = f64>| v.fold(0.0_f64, |a, x| a.max(x.abs()));
             let change = largest(&mut self.rhs.iter().copied());
             let size = largest(&mut t.iter().copied());
-            settled = change <= GROWS * size;
+            // what rigid motors hold alone grows until their bounds decide in the next round
+            let mobile = |(k, _): &(usize, &f64)| self.epsilon[self.unknowns[*k]] != IMMOBILE_REGULARISATION;
+            let growth = largest(&mut self.rhs.iter().enumerate().filter(mobile).map(|(_, x)| *x));
+            settled = growth <= GROWS * size;
             if step >= PROXIMAL_MIN && change <= PROXIMAL_CHANGE * size {
                 break;
             }

@@ -25,7 +25,8 @@ impl Walker {
             STAND[1], STAND[2], STAND[3]
         );
         let rig = Rig::new(&parameters, [0.0, 0.0, -gravity], 1e-3)?;
-        let robot = read_robot(&root().join("models/hexapod.urdf"), &Options::default()).map_err(|e| e.to_string())?;
+        let robot = read_robot(&root().join("models/hexapod.urdf"), &Options::default())
+            .map_err(|e| e.to_string())?;
         let moving = robot.joints.iter().filter(|j| j.kind == JointKind::Revolute);
         let targets = moving.map(|j| rig.id(&format!("{}.angle_target", j.name))).collect::<Outcome<_>>()?;
         Ok(Self { rig, robot, targets, rows: table("gait_tripod.csv")? })

@@ -111,6 +111,9 @@ fn glue_of_one_group_names_one_strategy_and_a_refusal_says_where() {
     let refused = try_build(&mixed("")).err().expect("a joint needs another strategy");
     assert!(refused.to_string().contains("co-operates at contacts"), "{refused}");
     build(&mixed("strategy = \"iterative\"\n"));
+    let unchecked = try_build(&(head("strategy = \"semi-implicit\"") + FOOT + FOOT_GLUE)).err();
+    let unchecked = unchecked.expect("one unchecked step is not enough for a contact").to_string();
+    assert!(unchecked.contains("does not check it"), "{unchecked}");
 }
 
 /// Two rods, cut at their pin.

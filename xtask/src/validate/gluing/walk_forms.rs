@@ -58,7 +58,7 @@ fn forms(soil: &str, context: &Context) -> Outcome<Figure> {
         "largest difference of a force between the T-T and the X-T form, {samples} steps of moon_walk, N; {failed} did not converge{why}"
     );
     let worst = if failed > 0 { f64::NAN } else { worst };
-    Ok(Figure::new(format!("gluing.forms.{soil}"), worst, Limit::AtMost(1e-6), what))
+    Ok(Figure::new(format!("gluing.forms.{soil}.{samples}_steps"), worst, Limit::AtMost(1e-6), what))
 }
 
 fn wrenches(testbed: &Testbed) -> Vec<f64> {

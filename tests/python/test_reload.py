@@ -63,7 +63,7 @@ def test_new_code_takes_over_the_state_at_its_step(tmp_path):
     source, scenario = place / "my_controller.c", place / "scenario.toml"
     text = source.read_text()
     assert text.count("s.target = s.set_point + (away + slope * h) * left;") == 1
-    changed = text.replace("+ (away + slope * h) * left;", "+ (away + slope * h) * left + 1e-3;")
+    changed = text.replace("+ (away + slope * h) * left;", "+ (away + slope * h) * left + 0.1 * h;")
     (place / "new.c").write_text(changed)
     build = 'build = "cp new.c my_controller.c && make"'
     scenario.write_text(re.sub(r"^build = .*$", build, scenario.read_text(), flags=re.M))

@@ -110,12 +110,12 @@ impl Preparation {
         let options =
             Options { level: Level::Quick, sets: self.sets.clone(), ..Options::new(self.program.clone()) };
         let report = check(path, &options)?;
-        match report.broken().as_slice() {
-            [] => Ok(()),
-            names => {
-                Err(format!("the quick tests found: {}\n{}", names.join(", "), report.text().trim_end()))
-            }
+        if report.is_good() {
+            return Ok(());
         }
+        let broken = report.rows.iter().filter(|r| r.outcome.is_broken());
+        let told: String = broken.map(|r| format!("\n{}: {}", r.test, r.outcome.detail())).collect();
+        Err(format!("the quick tests found: {}{told}", report.broken().join(", ")))
     }
 }
 

@@ -1,13 +1,14 @@
 //! A shared segment with room for one call and one answer, and two counters that either side sleeps on.
 #![allow(unsafe_code)] // Memory that two processes map.
 
+use std::cell::Cell;
 use std::fs::File;
 use std::io;
 use std::os::fd::{AsRawFd, FromRawFd};
 use std::path::Path;
 use std::ptr::NonNull;
 use std::sync::atomic::{AtomicU32, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 /// Room for a call, and the same for an answer, bytes. Pages that are never touched cost nothing.
 pub const AREA: usize = 64 << 20;
@@ -28,7 +29,13 @@ struct Head {
 pub struct Segment {
     memory: NonNull<u8>,
     file: File,
+    luck: Cell<i32>,
 }
+
+/// How long the host looks for an answer before it sleeps: waking a processor that sleeps takes longer.
+const LOOK: Duration = Duration::from_micros(20);
+/// How many waits go without a look after looks in vain: a slow worker or a busy machine is not worth them.
+const PAUSE: i32 = 256;
 
 // SAFETY: the memory is reached through `&self` by atomics only, and else through `&mut self`.
 unsafe impl Send for Segment {}
@@ -64,7 +71,10 @@ impl Segment {
             libc::mmap(std::ptr::null_mut(), LENGTH, protection, libc::MAP_SHARED, file.as_raw_fd(), 0)
         };
         match NonNull::new(memory.cast()) {
-            Some(found) if memory != libc::MAP_FAILED => Ok(Self { memory: found, file }),
+            Some(found) if memory != libc::MAP_FAILED => {
+                let several = std::thread::available_parallelism().is_ok_and(|n| n.get() > 1);
+                Ok(Self { memory: found, file, luck: Cell::new(if several { 1 } else { i32::MIN }) })
+            }
             _ => Err(io::Error::last_os_error()),
         }
     }
@@ -102,12 +112,31 @@ impl Segment {
     /// Waits for the answer to the last call; its length, or nothing when that took longer than `patience`.
     pub fn answer(&self, patience: Duration) -> Option<usize> {
         let wanted = self.head().call.load(Ordering::Relaxed);
+        self.look_for(wanted);
         let found = self.head().answer.load(Ordering::Acquire);
         if found != wanted {
             wait(&self.head().answer, found, Some(patience));
         }
         let done = self.head().answer.load(Ordering::Acquire) == wanted;
         done.then(|| (self.head().answer_length.load(Ordering::Relaxed) as usize).min(AREA))
+    }
+
+    /// Looks for an answer for a moment, unless that was in vain lately.
+    fn look_for(&self, wanted: u32) {
+        let luck = self.luck.get();
+        if luck <= 0 {
+            return self.luck.set(luck.saturating_add(i32::from(luck != i32::MIN)));
+        }
+        let start = Instant::now();
+        while start.elapsed() < LOOK {
+            for _ in 0..50 {
+                if self.head().answer.load(Ordering::Acquire) == wanted {
+                    return self.luck.set((luck + 1).min(8));
+                }
+                std::hint::spin_loop();
+            }
+        }
+        self.luck.set(if luck > 4 { luck - 4 } else { -PAUSE });
     }
 
     /// Waits for the next call after number `last`; its number and length.

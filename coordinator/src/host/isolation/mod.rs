@@ -2,8 +2,8 @@
 //! subsystem and never the end of the run.
 //!
 //! The worker is this program again, or for a module in Python the user's interpreter, in a process group of its own with
-//! a limit of memory and a temporary folder of its own. Calls and answers cross through a shared segment; both sides sleep in between. What a worker leaves behind,
-//! processes and files, goes with it.
+//! a limit of memory and a temporary folder of its own. Calls and answers cross through a shared segment; both sides sleep
+//! in between, after a short look. What a worker leaves behind, processes and files, goes with it.
 
 mod calls;
 mod channel;
@@ -264,8 +264,13 @@ pub fn last_words(status: ExitStatus) -> String {
 /// The program that serves as a worker: this one, or the `terraglue` beside it.
 fn program() -> Result<PathBuf> {
     let own = std::env::current_exe().map_err(|e| Error::Failed(format!("isolation: own program: {e}")))?;
-    if own.file_stem().is_some_and(|s| s == "terraglue") {
-        return Ok(own);
+    // Its file may have been replaced since it was started; the link leads to what runs.
+    if own
+        .file_name()
+        .and_then(|n| n.to_str())
+        .is_some_and(|n| n == "terraglue" || n == "terraglue (deleted)")
+    {
+        return Ok("/proc/self/exe".into());
     }
     let beside = |up: &str| own.parent().unwrap_or(Path::new(".")).join(up).join("terraglue");
     let found = ["", "..", "../bin"].iter().map(|up| beside(up)).find(|p| p.is_file());

@@ -1,9 +1,9 @@
 //! What a unit logs: kept for errors, handed on with a limit, because some units log without end.
 
-use std::collections::VecDeque;
+use std::collections::{BTreeMap, VecDeque};
 use std::ffi::{c_char, c_int, c_void};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::sync::{Mutex, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use terraglue_subsystem::LogLevel;
 
 /// A line of a unit.
@@ -43,9 +43,37 @@ struct Lines {
     held_back: u64,
 }
 
+/// All books of living instances by address, with the name of the instance. A unit may hand anything to its logger, or
+/// call it after its end; only what stands here is taken for a book.
+static BOOKS: Mutex<BTreeMap<usize, (String, Weak<LogBook>)>> = Mutex::new(BTreeMap::new());
+
+fn books() -> MutexGuard<'static, BTreeMap<usize, (String, Weak<LogBook>)>> {
+    BOOKS.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// The book that a call of the logger means: that of the environment, or else of the instance's name, or the only one.
+fn meant(environment: usize, name: &str) -> Option<Arc<LogBook>> {
+    let books = books();
+    let named = || {
+        let mut found = books.values().filter(|(n, _)| n == name);
+        found.next().filter(|_| found.next().is_none())
+    };
+    let only = || books.values().next().filter(|_| books.len() == 1);
+    books.get(&environment).or_else(named).or_else(only)?.1.upgrade()
+}
+
+impl Drop for LogBook {
+    fn drop(&mut self) {
+        books().remove(&(&raw const *self as usize));
+    }
+}
+
 impl LogBook {
-    pub fn new(sink: Sink) -> Self {
-        Self { sink, lines: Mutex::default(), said: AtomicBool::new(false) }
+    /// A book of the instance `name`.
+    pub fn new(sink: Sink, name: &str) -> Arc<Self> {
+        let book = Arc::new(Self { sink, lines: Mutex::default(), said: AtomicBool::new(false) });
+        books().insert(Arc::as_ptr(&book) as usize, (name.to_owned(), Arc::downgrade(&book)));
+        book
     }
 
     /// A call begins: its lines count anew.
@@ -119,25 +147,40 @@ unsafe fn foreign(text: *const c_char) -> String {
     String::from_utf8_lossy(&bytes).into_owned()
 }
 
-/// Called by the C part of the logger of FMI 2.0, and by that of FMI 3.0.
+/// The logger of FMI 3.0.
 ///
 /// # Safety
-/// `environment` is the [`LogBook`] handed to the unit, alive as long as its instance.
-// SAFETY: a name of our own; logger.c calls it.
-#[unsafe(no_mangle)]
-pub unsafe extern "C" fn terraglue_fmi_log(
+/// Texts are null or end in a zero.
+pub unsafe extern "C" fn log_3(
     environment: *mut c_void,
     status: c_int,
     category: *const c_char,
     text: *const c_char,
 ) {
-    // SAFETY: see above; a unit that hands on something else than it was given cannot be helped.
-    let Some(book) = (unsafe { environment.cast::<LogBook>().as_ref() }) else { return };
+    // SAFETY: by the caller.
+    unsafe { terraglue_fmi_log(environment, std::ptr::null(), status, category, text) };
+}
+
+/// Called by the C part of the logger of FMI 2.0.
+///
+/// # Safety
+/// Texts are null or end in a zero.
+// SAFETY: a name of our own; logger.c calls it.
+#[unsafe(no_mangle)]
+pub unsafe extern "C" fn terraglue_fmi_log(
+    environment: *mut c_void,
+    instance: *const c_char,
+    status: c_int,
+    category: *const c_char,
+    text: *const c_char,
+) {
     // A panic must not cross; nothing here is left half done.
     let done = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-        // SAFETY: texts of the unit end in a zero.
-        let (category, text) = unsafe { (foreign(category), foreign(text)) };
-        book.take(status, &category, &text);
+        // SAFETY: by the caller.
+        let (instance, category, text) = unsafe { (foreign(instance), foreign(category), foreign(text)) };
+        if let Some(book) = meant(environment as usize, &instance) {
+            book.take(status, &category, &text);
+        }
     }));
     drop(done);
 }
@@ -145,16 +188,17 @@ pub unsafe extern "C" fn terraglue_fmi_log(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::sync::Arc;
-    use std::sync::atomic::{AtomicU32, Ordering};
+    use std::ffi::CStr;
+    use std::sync::atomic::AtomicU32;
 
     #[test]
     fn a_flood_is_held_back_and_the_end_is_kept() {
         let count = Arc::new(AtomicU32::new(0));
         let seen = count.clone();
-        let book = LogBook::new(Box::new(move |_| {
+        let sink = Box::new(move |_: &LogLine| {
             seen.fetch_add(1, Ordering::Relaxed);
-        }));
+        });
+        let book = LogBook::new(sink, "flood");
         for call in 0..100 {
             book.begin();
             for k in 0..1000 {
@@ -164,5 +208,26 @@ mod tests {
         assert_eq!(u64::from(count.load(Ordering::Relaxed)), PER_RUN);
         assert_eq!(book.last().last().map(String::as_str), Some("[x] line 999 of 99"));
         assert_eq!(book.held_back(), 100_000 - PER_RUN);
+    }
+
+    #[test]
+    fn what_is_no_book_is_found_by_name_or_not_at_all() {
+        let book = LogBook::new(Box::new(|_| {}), "an instance of this test");
+        let log = |environment: usize, name: &CStr| {
+            // SAFETY: texts with a zero.
+            unsafe {
+                terraglue_fmi_log(environment as *mut c_void, name.as_ptr(), 0, c"c".as_ptr(), c"t".as_ptr())
+            };
+            book.last().len()
+        };
+        assert_eq!(log(1, c"an instance of this test"), 1);
+        assert_eq!(log(Arc::as_ptr(&book) as usize, c"another"), 2);
+        let other = LogBook::new(Box::new(|_| {}), "another instance of this test");
+        let gone = Arc::as_ptr(&other) as usize;
+        drop(other);
+        let third = LogBook::new(Box::new(|_| {}), "a third instance of this test");
+        if Arc::as_ptr(&third) as usize != gone {
+            assert_eq!(log(gone, c"nobody"), 2);
+        }
     }
 }

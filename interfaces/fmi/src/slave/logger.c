@@ -2,15 +2,14 @@
 #include <stdarg.h>
 #include <stdio.h>
 
-void terraglue_fmi_log(void *environment, int status, const char *category, const char *text);
+void terraglue_fmi_log(void *environment, const char *instance, int status, const char *category, const char *text);
 
 void terraglue_fmi2_logger(void *environment, const char *instance, int status, const char *category,
                            const char *message, ...) {
     char text[4096];
     va_list arguments;
-    (void)instance;
     if (!message) {
-        terraglue_fmi_log(environment, status, category, 0);
+        terraglue_fmi_log(environment, instance, status, category, 0);
         return;
     }
     va_start(arguments, message);
@@ -18,5 +17,5 @@ void terraglue_fmi2_logger(void *environment, const char *instance, int status, 
         text[0] = '\0';
     }
     va_end(arguments);
-    terraglue_fmi_log(environment, status, category, text);
+    terraglue_fmi_log(environment, instance, status, category, text);
 }

@@ -67,7 +67,7 @@ pub struct Slave {
     event_mode: bool,
     warnings: Cell<u64>,
     // The order matters: call-backs and log outlive the instance, the library both, the folder all.
-    log: Box<LogBook>,
+    log: Arc<LogBook>,
     _callbacks: Option<Box<Callbacks2>>,
     loaded: Arc<Loaded>,
     fmu: Arc<Fmu>,
@@ -85,9 +85,9 @@ impl Slave {
         }
         let loaded = fmu.library()?;
         let api = functions::find(fmu, &loaded.library)?;
-        let log = Box::new(LogBook::new(options.sink));
+        let log = LogBook::new(options.sink, &options.name);
         let event_mode = options.event_mode && description.capabilities.event_mode;
-        let environment = (&raw const *log).cast_mut().cast::<c_void>();
+        let environment = Arc::as_ptr(&log).cast_mut().cast::<c_void>();
         let text =
             |text: &str| CString::new(text).map_err(|_| Error::Refused(format!("`{text}` has a zero in it")));
         let (name, token) = (text(&options.name)?, text(&description.token)?);
@@ -129,7 +129,7 @@ impl Slave {
                         none,
                         0,
                         environment,
-                        log::terraglue_fmi_log,
+                        log::log_3,
                         std::ptr::null(),
                     )
                 })

@@ -4,6 +4,9 @@ use super::Slave;
 use super::functions::{Api, State};
 use crate::error::{Error, Result};
 
+/// Largest state that is taken as bytes.
+const LARGEST_STATE: usize = 4 << 30;
+
 /// A saved state; belongs to the instance that made it and is given back to it.
 #[derive(Debug)]
 pub struct SlaveState(State);
@@ -95,6 +98,10 @@ impl Slave {
                     f(c, state, place)
                 })?
             }
+        }
+        if size > LARGEST_STATE {
+            let text = format!("says that its state has {size} bytes");
+            return Err(self.lied("SerializedFMUStateSize", text));
         }
         let mut bytes = vec![0_u8; size];
         let out = bytes.as_mut_ptr();

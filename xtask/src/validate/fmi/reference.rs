@@ -28,6 +28,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
         let name = stem(unit);
         let id = format!("fmi.reference.{number}.{name}");
         match tables.get(&name) {
+            None if name == "Clocks" => refused(id, unit),
             None => Figure::skipped(id, format!("{}: there is no {name}_out.csv", unit.display())),
             Some(table) => match worst(context, unit, table) {
                 Ok(share) => Figure::new(
@@ -41,6 +42,14 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
         }
     };
     Ok(units.enumerate().map(figure).collect())
+}
+
+/// Whether a unit made for scheduled execution is refused by its name.
+fn refused(id: String, unit: &Path) -> Figure {
+    let said = terraglue_fmi::Fmu::inspect(unit).err().map(|e| e.to_string()).unwrap_or_default();
+    let named = said.contains("`Clocks` is made for scheduled execution");
+    let what = "refused by name as made for scheduled execution (1: yes)";
+    Figure::new(id, f64::from(u8::from(named)), Limit::Equal(1.0), what)
 }
 
 fn collect(folder: &Path, files: &mut Vec<PathBuf>) {

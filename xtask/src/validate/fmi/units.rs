@@ -27,6 +27,33 @@ int fmi2SetFMUstate(Unit *u, void *s) { memcpy(u, s, sizeof *u); return 0; }
 int fmi2FreeFMUstate(Unit *u, void **s) { free(*s); *s = 0; return 0; }
 ";
 
+/// Functions that no unit here has a use for; masters that look all of them up need them.
+const UNUSED: &str = r#"
+const char *fmi2GetTypesPlatform(void) { return "default"; }
+const char *fmi2GetVersion(void) { return "2.0"; }
+int fmi2SetDebugLogging(Unit *u, int on, size_t n, const char *const *c) { return 0; }
+int fmi2Reset(Unit *u) { start(u->v); return 0; }
+int fmi2GetInteger(Unit *u, const unsigned *r, size_t n, int *x) { return n ? 3 : 0; }
+int fmi2GetBoolean(Unit *u, const unsigned *r, size_t n, int *x) { return n ? 3 : 0; }
+int fmi2GetString(Unit *u, const unsigned *r, size_t n, const char **x) { return n ? 3 : 0; }
+int fmi2SetInteger(Unit *u, const unsigned *r, size_t n, const int *x) { return n ? 3 : 0; }
+int fmi2SetBoolean(Unit *u, const unsigned *r, size_t n, const int *x) { return n ? 3 : 0; }
+int fmi2SetString(Unit *u, const unsigned *r, size_t n, const char *const *x) { return n ? 3 : 0; }
+int fmi2SerializedFMUstateSize(Unit *u, void *s, size_t *n) { return 3; }
+int fmi2SerializeFMUstate(Unit *u, void *s, char *b, size_t n) { return 3; }
+int fmi2DeSerializeFMUstate(Unit *u, const char *b, size_t n, void **s) { return 3; }
+int fmi2SetRealInputDerivatives(Unit *u, const unsigned *r, size_t n, const int *o, const double *x) { return 3; }
+int fmi2GetRealOutputDerivatives(Unit *u, const unsigned *r, size_t n, const int *o, double *x) { return 3; }
+int fmi2CancelStep(Unit *u) { return 3; }
+int fmi2GetStatus(Unit *u, int k, int *x) { return 3; }
+int fmi2GetRealStatus(Unit *u, int k, double *x) { return 3; }
+int fmi2GetIntegerStatus(Unit *u, int k, int *x) { return 3; }
+int fmi2GetBooleanStatus(Unit *u, int k, int *x) { return 3; }
+int fmi2GetStringStatus(Unit *u, int k, const char **x) { return 3; }
+int fmi2GetDirectionalDerivative(Unit *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s,
+    double *x) { return 3; }
+"#;
+
 /// A variable: name, role (`p`arameter, `i`nput, `o`utput) and start value.
 pub type Variable<'a> = (&'a str, char, f64);
 
@@ -35,7 +62,7 @@ pub fn build(folder: &Path, name: &str, variables: &[Variable], calc: &str, step
     let starts: String = variables.iter().enumerate().map(|(k, v)| format!("v[{k}] = {:?}; ", v.2)).collect();
     let code = format!(
         "static void start(double *v) {{ {starts} }}\n{FRAME}\nstatic void calc(double *v) {{ {calc} }}\n\
-         static void step(double *v, double h) {{ {step} }}\n"
+         static void step(double *v, double h) {{ {step} }}\n{UNUSED}"
     )
     .replacen("static void start", "#include <stddef.h>\nstatic void start", 1);
     let (source, library) = (folder.join(format!("{name}.c")), folder.join(format!("{name}.so")));

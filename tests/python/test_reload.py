@@ -139,7 +139,7 @@ def test_a_change_is_noticed_while_the_run_goes_on(tmp_path):
     source, out = place / "my_controller.c", tmp_path / "out"
     # The new code ends the run where no test comes: it would go on for hours.
     changed = source.read_text().replace("    c->next = control(c->now, st->h);",
-                                         "    if (st->index > 2000) return fail(c->error, \"new code runs\");\n"
+                                         "    if (st->t > 5.0 && st->t < 3000.0) return fail(c->error, \"new code runs\");\n"
                                          "    c->next = control(c->now, st->h);")
     assert changed != source.read_text()
     command = [PROGRAM, "run", "scenario.toml", "--quiet", "--out", str(out), "--duration", "10000", "--watch"]

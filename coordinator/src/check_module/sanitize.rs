@@ -4,8 +4,8 @@
 //! The program itself is not built with them: the runtime is loaded ahead of it (`LD_PRELOAD`), so only the module is
 //! watched. What the tests themselves say does not matter here.
 
-use super::Level;
 use super::supervisor::{Options, check};
+use super::{Level, Outcome};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
@@ -94,7 +94,10 @@ pub fn sanitize(sources: &[PathBuf], options: &Options) -> Result<Sanitized, Str
         let library = build(sources, sanitizer, &place)?;
         let logs = place.join("logs");
         std::fs::create_dir_all(&logs).map_err(|e| format!("{}: {e}", logs.display()))?;
-        watch(&library, sanitizer, &runtime, &logs, options)?;
+        for test in watch(&library, sanitizer, &runtime, &logs, options)? {
+            out.skipped
+                .push(format!("`{test}` did not come to its end with -fsanitize={}", sanitizer.switch));
+        }
         out.ran.push(sanitizer.finds);
         out.faults.extend(found(&logs, sources));
     }
@@ -170,14 +173,15 @@ fn build(sources: &[PathBuf], sanitizer: &Sanitizer, place: &Path) -> Result<Pat
     Ok(library)
 }
 
-/// Runs the tests on a library with the runtime of its sanitizer ahead of the program.
+/// Runs the tests on a library with the runtime of its sanitizer ahead of the program; those that were cut short without a
+/// word of the sanitizer.
 fn watch(
     library: &Path,
     sanitizer: &Sanitizer,
     runtime: &Path,
     logs: &Path,
     options: &Options,
-) -> Result<(), String> {
+) -> Result<Vec<&'static str>, String> {
     let log = format!("log_path={}/{{test}}", logs.display());
     let shared = format!("{log}:print_stacktrace=1:detect_leaks=0:handle_segv=1");
     let environment = [
@@ -197,7 +201,15 @@ fn watch(
         environment: environment.map(|(k, v)| (k.to_owned(), v)).to_vec(),
         ..options.clone()
     };
-    check(library, &options).map(drop)
+    let report = check(library, &options)?;
+    let cut = |o: &Outcome| matches!(o, Outcome::Crash { .. } | Outcome::Hang { .. });
+    Ok(report.rows.iter().filter(|r| cut(&r.outcome) && !told(logs, r.test)).map(|r| r.test).collect())
+}
+
+/// Whether a test has left a log.
+fn told(logs: &Path, test: &str) -> bool {
+    let mut entries = std::fs::read_dir(logs).into_iter().flatten().flatten();
+    entries.any(|e| e.file_name().to_string_lossy().rsplit_once('.').is_some_and(|(name, _)| name == test))
 }
 
 /// What stands in the logs, named by the tests, about these sources.

@@ -4,7 +4,7 @@
 //!
 //! | file | what |
 //! |---|---|
-//! | `module`, `schema`, `placement` | from parameters and a robot file to an instance on the ground |
+//! | `module`, `schema`, `objects`, `placement` | from parameters and robot files to an instance on the ground |
 //! | `robot` | an instance and the calls of the interface |
 //! | `model`, `state` | what stays and what changes |
 //! | `dynamics` | one step: joint rows, gyroscopic term, the whole KKT matrix, corrections |
@@ -27,6 +27,7 @@ pub use terraglue_contact_solver::lcp;
 mod math;
 mod model;
 mod module;
+mod objects;
 mod placement;
 mod robot;
 mod scene;

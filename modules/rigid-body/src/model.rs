@@ -110,6 +110,8 @@ pub(crate) struct Model {
     pub planes: Vec<Plane>,
     /// Pairs of bodies that never touch.
     pub excluded: Vec<[usize; 2]>,
+    /// Number of bodies of the robot itself; those of objects come after them.
+    pub own: usize,
     /// Whether the first joint fixes a root with mass to the world, which the robot file does not know.
     pub welded: bool,
 }
@@ -135,8 +137,21 @@ impl Model {
         let mut joint_above = vec![None; bodies.len()];
         joints.iter().enumerate().for_each(|(i, j)| joint_above[j.child] = Some(i));
         let closures = Vec::new();
+        let own = bodies.len();
         let welded = fixed_base && matches!(robot.base, import::Base::Free(_));
-        Self { bodies, joints, joint_above, closures, gravity, free, world_shapes, planes, excluded, welded }
+        Self {
+            bodies,
+            joints,
+            joint_above,
+            closures,
+            gravity,
+            free,
+            world_shapes,
+            planes,
+            excluded,
+            own,
+            welded,
+        }
     }
 
     /// Index of the joint with that index in the robot file: a weld of the root comes before them.

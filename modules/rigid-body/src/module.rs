@@ -9,6 +9,7 @@ use crate::dynamics::Dynamics;
 use crate::dynamics::scheme::{Acceleration, Integrator, Weights};
 use crate::math::V3;
 use crate::model::{Kind, Model};
+use crate::objects;
 use crate::placement::{StartRates, at_rest, base_pose, clearance, coordinates, joint_rates, set_moving};
 use crate::robot::Robot;
 use crate::state::{ClosureState, ContactBook, JointState, Motion, State};
@@ -36,10 +37,13 @@ impl Module for RigidBody {
         let folder = Path::new(host.folder());
         let options =
             Options { fixed_base: fixed, packages: packages(&config, folder), ..Options::default() };
-        let file = read_robot(&folder.join(config.text("model")?), &options.with_ros_package_path())
-            .map_err(|e| Error::Refused(e.to_string()))?;
+        let options = options.with_ros_package_path();
+        let file = read_robot(&folder.join(config.text("model")?), &options);
+        let mut file = file.map_err(|e| Error::Refused(e.to_string()))?;
         let base = base_pose(&vector(&config, "position_m")?, config.number("heading_rad")?);
-        let mut model = Model::new(&file, &base, fixed, V3::from(host.gravity()));
+        let own = file.bodies.len();
+        objects::attach(&config, (folder, &options), &base, &mut file)?;
+        let mut model = Model { own, ..Model::new(&file, &base, fixed, V3::from(host.gravity())) };
         set_kinds(&config, &mut model)?;
         model.world_shapes.extend(stone(&config, &*host)?);
         let mut angles = coordinates(&model, &config.number_table("joints")?)?;
@@ -49,7 +53,7 @@ impl Module for RigidBody {
             rotation: vector(&config, "rotation_rate_rad_s")?,
             joints: joint_rates(&model, &config.number_table("joint_rates")?)?,
         };
-        let bodies = start(&config, &*host, &model, base, (&angles, &rates))?;
+        let bodies = start(&config, &*host, &mut model, base, (&angles, &rates))?;
         let mut joints = joint_states((&config, said), &model, &angles, &rates.joints)?;
         without_own_motor(said, &model, &file.couplings, &mut joints);
         model.closures = closures(&config, &model, (&bodies, &angles), (&file.couplings, &file.loops))?;
@@ -279,14 +283,18 @@ fn without_impacts(host: &dyn Host, ground: bool, pairs: bool) -> Result<()> {
 fn start(
     config: &Config,
     host: &dyn Host,
-    model: &Model,
+    model: &mut Model,
     mut base: Isometry3<f64>,
     (angles, rates): (&[f64], &StartRates),
 ) -> Result<Vec<Motion>> {
     let mut bodies = at_rest(model, &base, angles);
     let terrain = host.terrain().filter(|_| model.free.iter().any(Option::is_some));
     if let Some(terrain) = terrain.filter(|_| config.flag("place_on_ground").unwrap_or(true)) {
-        base.translation.vector.z -= clearance(model, &bodies, terrain).unwrap_or(0.0);
+        let before = base;
+        base.translation.vector.z -= clearance(model, &bodies[..model.own], terrain).unwrap_or(0.0);
+        // Objects stay where the scenario puts them.
+        let own = model.own;
+        model.free[own..].iter_mut().flatten().for_each(|pose| *pose = base.inverse() * before * *pose);
         bodies = at_rest(model, &base, angles);
     }
     set_moving(model, &base, rates, &mut bodies);

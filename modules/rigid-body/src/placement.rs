@@ -109,6 +109,7 @@ pub(crate) fn set_moving(model: &Model, base: &Isometry3<f64>, rates: &StartRate
     for b in 0..bodies.len() {
         (bodies[b].v, bodies[b].w) = match model.joint_above[b] {
             Some(j) => rates_of_child(&model.joints[j], bodies, rates.joints[j]),
+            None if b >= model.own => (V3::zeros(), V3::zeros()),
             None => (rates.velocity + w.cross(&(bodies[b].c - base.translation.vector)), w),
         };
     }

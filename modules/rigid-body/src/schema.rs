@@ -116,6 +116,7 @@ pub(crate) fn schema() -> Schema {
                 .within(0.0, 1.0),
         ]
         .into_iter()
+        .chain([crate::objects::parameter()])
         .chain(crate::closure::configure::parameters())
         .chain(crate::actuator::configure::parameters())
         .collect(),

@@ -4,6 +4,7 @@
 //! without mass are merged into the link to which they are fixed. What cannot be is refused with file, line,
 //! link or joint, the offending value and a way out.
 
+mod attach;
 mod check;
 mod error;
 mod mesh;

@@ -116,7 +116,7 @@ fn from_loop(l: &import::Loop, model: &Model, bodies: &[Motion]) -> Closure {
     Closure { name: l.name.clone(), law }
 }
 
-fn entries<'a>(config: &'a Config, table: &str) -> Result<Vec<&'a Map<String, Value>>> {
+pub(crate) fn entries<'a>(config: &'a Config, table: &str) -> Result<Vec<&'a Map<String, Value>>> {
     let wrong = || Error::Refused(format!("parameter `{table}` is a list of tables: write [[NAME.{table}]]"));
     match config.get(table) {
         None | Some(Value::Null) => Ok(Vec::new()),
@@ -126,36 +126,36 @@ fn entries<'a>(config: &'a Config, table: &str) -> Result<Vec<&'a Map<String, Va
 }
 
 /// One table of a list.
-struct Entry<'a> {
-    table: &'a str,
-    index: usize,
-    map: &'a Map<String, Value>,
+pub(crate) struct Entry<'a> {
+    pub table: &'a str,
+    pub index: usize,
+    pub map: &'a Map<String, Value>,
 }
 
 impl Entry<'_> {
-    fn refuse(&self, key: &str, problem: &str) -> Error {
+    pub fn refuse(&self, key: &str, problem: &str) -> Error {
         let name = self.map.get("name").and_then(Value::as_str).unwrap_or("");
         Error::Refused(format!("`{}` number {} (`{name}`), `{key}`: {problem}", self.table, self.index + 1))
     }
 
-    fn check_keys(&self, keys: &[&str]) -> Result {
+    pub fn check_keys(&self, keys: &[&str]) -> Result {
         match self.map.keys().find(|k| !keys.contains(&k.as_str())) {
             Some(key) => Err(self.refuse(key, &format!("unknown key; it takes {}", keys.join(", ")))),
             None => Ok(()),
         }
     }
 
-    fn text(&self, key: &str) -> Result<&str> {
+    pub fn text(&self, key: &str) -> Result<&str> {
         self.map.get(key).and_then(Value::as_str).ok_or_else(|| self.refuse(key, "a text is needed"))
     }
 
-    fn number(&self, key: &str) -> Result<Option<f64>> {
+    pub fn number(&self, key: &str) -> Result<Option<f64>> {
         let value = self.map.get(key);
         let number = value.map(|v| v.as_f64().filter(|x| x.is_finite()));
         number.map(|x| x.ok_or_else(|| self.refuse(key, "a finite number is needed"))).transpose()
     }
 
-    fn vector(&self, key: &str) -> Result<Option<V3>> {
+    pub fn vector(&self, key: &str) -> Result<Option<V3>> {
         let Some(value) = self.map.get(key) else { return Ok(None) };
         let list: Option<Vec<f64>> = value.as_array().and_then(|a| a.iter().map(Value::as_f64).collect());
         match list.as_deref() {

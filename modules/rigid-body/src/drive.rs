@@ -20,13 +20,22 @@ pub(crate) enum Motor {
     Torque,
     RigidPosition,
     Voltage,
+    /// PD from the state at the start of the step, as a controller outside would compute it.
+    ExplicitPosition,
 }
 
 impl Motor {
-    pub const NAMES: [&'static str; 6] =
-        ["off", "position", "velocity", "torque", "rigid-position", "voltage"];
-    const ALL: [Self; 6] =
-        [Self::Off, Self::Position, Self::Velocity, Self::Torque, Self::RigidPosition, Self::Voltage];
+    pub const NAMES: [&'static str; 7] =
+        ["off", "position", "velocity", "torque", "rigid-position", "voltage", "explicit-position"];
+    const ALL: [Self; 7] = [
+        Self::Off,
+        Self::Position,
+        Self::Velocity,
+        Self::Torque,
+        Self::RigidPosition,
+        Self::Voltage,
+        Self::ExplicitPosition,
+    ];
 
     pub fn from_index(i: i64) -> Option<Self> {
         usize::try_from(i).ok().and_then(|i| Self::ALL.get(i).copied())
@@ -238,6 +247,10 @@ fn law(j: &JointState, step: &Span) -> Law {
     match j.motor {
         Motor::Off | Motor::Voltage => Law::Line(Line::ZERO),
         Motor::Torque => Law::Line(Line::level(h * j.torque_target)),
+        Motor::ExplicitPosition => {
+            let (p, d) = (j.angle_target - j.angle, j.velocity_target - j.velocity);
+            Law::Line(Line::level(h * (j.stiffness * p + j.damping * d)))
+        }
         Motor::Velocity => Law::Rate(j.velocity_target),
         Motor::RigidPosition => {
             let most = j.actuator[Item::ApproachRate];
@@ -308,6 +321,7 @@ terraglue_subsystem::persist!(
         Torque,
         RigidPosition,
         Voltage,
+        ExplicitPosition,
     }
 );
 

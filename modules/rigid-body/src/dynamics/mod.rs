@@ -12,6 +12,7 @@
 mod alpha;
 mod anderson;
 mod closing;
+mod explicit;
 mod gyro;
 pub(crate) mod joint_rows;
 pub(crate) mod kkt;
@@ -58,6 +59,11 @@ pub(crate) enum Failure {
          integrator = \"symplectic-euler\" where something hits or sticks"
     )]
     NotConverged { corrections: usize },
+    #[error(
+        "joint `{joint}`: explicit PD is unstable at steps of {h} s; take less than {share:.3} of these gains, a shorter \
+         step, or motor = \"position\", which is implicit and stable at any gain"
+    )]
+    Explicit { joint: String, h: f64, share: f64 },
     #[error("contact among the bodies or with rigid ground found no solution: {0}; a shorter step may help")]
     Contact(#[from] Unsolved),
 }
@@ -115,6 +121,8 @@ pub(crate) struct Dynamics {
     rhs: Vec<f64>,
     correction: Vec<f64>,
     anderson: Anderson,
+    /// Per joint what its explicit PD motor weighs, as checked last.
+    explicit: Vec<f64>,
     /// Rates and (negative) impulses of the trial.
     pub solution: Vec<f64>,
     /// Motion at the end of the trial and rotation vector (before the Cayley transform) of each body.
@@ -157,6 +165,7 @@ impl Dynamics {
             rhs: vec![0.0; n],
             correction: vec![0.0; n],
             anderson: Anderson::new(n, 6 * nb),
+            explicit: vec![0.0; nj],
             solution: vec![0.0; n],
             ends: vec![rest; nb],
             turns: vec![V3::zeros(); nb],
@@ -176,7 +185,7 @@ impl Dynamics {
         self.contacts.detect(&self.starts, h, &state.pressed);
         self.yielding = if self.contacts.any() { YIELDING } else { 0.0 };
         self.prepare_joints(state);
-        Ok(())
+        self.check_explicit(state)
     }
 
     /// After a step without a consistent state: rigid motors give way ten times as much. False: no more of that.

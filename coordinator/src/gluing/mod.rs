@@ -15,6 +15,7 @@
 mod complementarity;
 pub mod cooperative;
 pub mod cooperative_compliant;
+mod derivatives;
 mod eigen;
 mod estimate;
 mod exchange;
@@ -41,7 +42,8 @@ pub mod tlm;
 pub mod xt_newton;
 pub mod xx_newton;
 
-pub use exchange::{Derivatives, Exchange};
+pub use derivatives::Derivatives;
+pub use exchange::Exchange;
 pub use glue::{Glue, Row};
 pub use group_estimate::GroupEstimate;
 pub use refusal::{Refusal, refusal};

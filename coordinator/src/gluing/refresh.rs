@@ -1,6 +1,7 @@
 //! When the bodies' interface Jacobian is computed again, and from where.
 
-use super::exchange::{Derivatives, Exchange};
+use super::derivatives::Derivatives;
+use super::exchange::Exchange;
 use super::memory::{Recall, Remember};
 use crate::Result;
 use crate::host::Instance;

@@ -9,6 +9,7 @@ pub mod docs;
 mod events;
 pub mod keys;
 mod load;
+mod mask;
 mod model;
 mod nearest;
 mod node;
@@ -24,6 +25,7 @@ mod terrain;
 mod tests;
 
 pub use check::allowed_values;
+pub use mask::resolve as resolve_mask;
 pub use model::*;
 pub use nearest::{did_you_mean, nearest};
 pub use parameters::{SHIPPED_MODULES, check_parameters, check_parameters_among};

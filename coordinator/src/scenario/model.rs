@@ -207,6 +207,19 @@ pub struct SubsystemSpec {
     pub parameters: Map<String, Value>,
     /// Numbers of a named soil row that are offered to the module, not demanded of it.
     pub offered: Map<String, Value>,
+    /// Soils by the labels of the mask, in ascending order.
+    pub regions: Vec<Region>,
+}
+
+/// A label of a soil's mask.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Region {
+    /// 1 … 255.
+    pub label: u8,
+    /// Row of the soil table, or soil file, as written.
+    pub soil: String,
+    /// Its numbers.
+    pub numbers: Map<String, Value>,
 }
 
 /// `[[connect]]`.

@@ -1,7 +1,7 @@
 //! `parameters = "row"` or `"soil.toml"`: a row of the soil table or a soil file, offered to the module.
 
 use super::nearest::did_you_mean;
-use super::node::Node;
+use super::node::{Node, Place};
 use super::source::{InputError, Source};
 use super::subsystems::text;
 use serde_json::{Map, Value};
@@ -38,9 +38,26 @@ pub fn offered(
     module: &str,
 ) -> Result<Map<String, Value>, Box<InputError>> {
     let Some(row) = text(node, "parameters") else { return Ok(Map::new()) };
-    let at = |key, message: String, help| source.error_at_value(&[name, key], message, help);
+    let overridden: Vec<&str> = keys(node).chain(node.get(module).into_iter().flat_map(keys)).collect();
+    let place = source.value_place(&[name, "parameters"]);
+    numbers(source, name, node, &row, &overridden, &place)
+}
+
+/// The numbers of a row, or of a soil file, that stands at `place` in the subsystem's table.
+pub fn numbers(
+    source: &Source,
+    name: &str,
+    node: &Node,
+    row: &str,
+    overridden: &[&str],
+    place: &Place,
+) -> Result<Map<String, Value>, Box<InputError>> {
+    let at = |key, message: String, help| match key {
+        "parameters" => source.error(place, message, help),
+        _ => source.error_at_value(&[name, key], message, help),
+    };
     if row.ends_with(".toml") {
-        return own_file(&source.folder().join(&row))
+        return own_file(&source.folder().join(row))
             .map_err(|(message, help)| at("parameters", message, help));
     }
     let file = text(node, "parameters_file").map(|file| source.folder().join(file));
@@ -50,8 +67,7 @@ pub fn offered(
         return Err(at("parameters", "no soil table: ../models/soils.csv is not there".to_owned(), help));
     };
     let table = read_soil_table(&path).map_err(|message| at(key, message, None))?;
-    let overridden: Vec<&str> = keys(node).chain(node.get(module).into_iter().flat_map(keys)).collect();
-    let numbers = table.row(&row).and_then(|found| found.offered(&overridden));
+    let numbers = table.row(row).and_then(|found| found.offered(overridden));
     match numbers {
         Ok(numbers) => Ok(numbers.into_iter().map(|(key, x)| (key.to_owned(), Value::from(x))).collect()),
         Err(TableError::Unknown { name, known }) => {

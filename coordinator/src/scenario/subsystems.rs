@@ -2,6 +2,7 @@
 
 use super::check::Complaint;
 use super::keys::subsystem_keys;
+use super::mask;
 use super::model::SubsystemSpec;
 use super::nearest::did_you_mean;
 use super::node::{Node, Raw};
@@ -61,6 +62,7 @@ fn one(source: &Source, name: &str, node: &Node) -> Result<SubsystemSpec, Box<In
         sources: node.get("sources").map(texts).unwrap_or_default(),
         parameters: parameters(node, &module, is_host_key),
         offered: soil_row::offered(source, name, node, &module)?,
+        regions: mask::regions(source, name, node, &module)?,
         module,
     })
 }

@@ -10,6 +10,7 @@ mod esri_ascii;
 mod esri_writer;
 mod geotiff;
 mod grid;
+mod labels;
 mod png;
 mod random;
 mod resample;
@@ -20,6 +21,7 @@ pub use esri_ascii::read_esri_ascii;
 pub use esri_writer::write_esri_ascii;
 pub use geotiff::read_geotiff;
 pub use grid::Grid;
+pub use labels::Labels;
 pub use png::{Greys, read_png};
 pub use random::SplitMix64;
 

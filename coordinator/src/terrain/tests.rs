@@ -265,3 +265,42 @@ fn the_generator_keeps_its_sequence() {
     let found: Vec<u64> = (0..3).map(|_| random.next_u64()).collect();
     assert_eq!(found, [6_457_827_717_110_365_317, 3_203_168_211_198_807_973, 9_817_491_932_198_370_423]);
 }
+
+#[test]
+fn labels_of_a_mask_lie_where_their_cells_lie() {
+    use super::Labels;
+    use ::png::{BitDepth, ColorType};
+    let folder = tempfile::tempdir().expect("folder");
+    let lattice = super::lattice_of([5, 5], 1.0);
+    let ground = super::Analytic::new(lattice, |_, _| 0.0);
+    let grid = folder.path().join("mask.asc");
+    std::fs::write(&grid, "ncols 2\nnrows 1\nxllcorner 7\nyllcorner 7\ncellsize 2\nNODATA_value -1\n3 -1\n")
+        .expect("written");
+    let labels = Labels::read(&grid, None, &ground).expect("a mask");
+    // cells −2 … 0 and 0 … 2 along x, −1 … 1 along y; a border belongs to the cell on the side of larger coordinates
+    for (point, label) in [
+        ([-2.0, 0.0], 3),
+        ([-0.1, -1.0], 3),
+        ([0.0, 0.0], 0),
+        ([-1.0, 1.0], 0),
+        ([-2.1, 0.0], 0),
+        ([9.0, 0.0], 0),
+    ] {
+        assert_eq!(labels.at(point), label, "{point:?}");
+    }
+    assert_eq!(labels.unknown(|l| l == 3), None);
+    assert_eq!(labels.unknown(|_| false), Some((3, "in column 1, row 1 from the top".into())));
+    std::fs::write(&grid, "ncols 2\nnrows 1\nxllcorner 0\nyllcorner 0\ncellsize 2\n1 2.5\n")
+        .expect("written");
+    let error = format!("{:?}", Labels::read(&grid, None, &ground).err().expect("refused"));
+    assert!(error.contains("2.5 in column 2, row 1 from the top is no label"), "{error}");
+    // an image without a size covers the ground: three pixels on five metres, the upper row at larger y
+    let image = folder.path().join("mask.png");
+    write_png(&image, ColorType::Grayscale, BitDepth::Eight, &[1, 2, 3, 4, 5, 6]);
+    let labels = Labels::read(&image, None, &ground).expect("a mask");
+    let at = |x: f64, y: f64| labels.at([x, y]);
+    assert_eq!([at(-2.0, 2.0), at(0.0, 0.0), at(2.0, 1.0)], [1, 2, 3]);
+    assert_eq!([at(-2.0, -2.0), at(0.0, -0.1), at(2.4, -2.4)], [4, 5, 6]);
+    let narrow = Labels::read(&image, Some(0.5), &ground).expect("a mask");
+    assert_eq!([narrow.at([-0.7, 0.4]), narrow.at([0.8, 0.0]), narrow.at([0.0, 0.6])], [1, 0, 0]);
+}

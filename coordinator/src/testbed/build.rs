@@ -125,6 +125,7 @@ pub(crate) fn make(
     config: Config,
     services: &HostServices,
 ) -> Result<Instance> {
+    let config = scenario::resolve_mask(scenario, spec, config, services.terrain.as_deref())?;
     let module = module.run_by(interpreter(spec.python.as_deref(), &scenario.folder));
     let made = match spec.isolate || module.is_python() {
         true => module.instantiate_isolated(&spec.name, config, services, spec.isolation),

@@ -1,30 +1,29 @@
 //! Wrench and stiffness of a patch at a motion of its foot.
 
 use crate::patch::{Facing, Patches};
-use terraglue_soil_law::{ShearLaw, ShearResponse};
+use terraglue_soil_law::ShearResponse;
 
 /// A 6 × 6 stiffness, rows: components of the wrench on the soil, columns: components of X.
 pub type Stiffness = [[f64; 6]; 6];
 
 impl Patches {
     /// Wrench on the body (n, t1, t2, mn, mt1, mt2) when the foot of patch `p` has moved by `x`.
-    pub fn wrench(&self, p: usize, x: &[f64; 6], shear: &ShearLaw) -> [f64; 6] {
+    pub fn wrench(&self, p: usize, x: &[f64; 6]) -> [f64; 6] {
         let mut sum = [0.0; 6];
-        let shear = self.ports[p].shear(shear);
         self.each_loaded(p, x, |k, pressure, _, moved| {
-            add_force(&mut sum, self.nodes.arm[k], self.node_force(k, pressure, moved, &shear));
+            add_force(&mut sum, self.nodes.arm[k], self.node_force(k, pressure, moved));
         });
         sum
     }
 
     /// Wrench on the body at rest, and the largest tangential force there, N.
-    pub fn at_rest(&self, p: usize, shear: &ShearLaw) -> ([f64; 6], f64) {
+    pub fn at_rest(&self, p: usize) -> ([f64; 6], f64) {
         let (mut sum, mut strength) = ([0.0; 6], 0.0);
-        let shear = self.ports[p].shear(shear);
         let n = &self.nodes;
         self.each_loaded(p, &[0.0; 6], |k, pressure, _, moved| {
-            add_force(&mut sum, n.arm[k], self.node_force(k, pressure, moved, &shear));
+            add_force(&mut sum, n.arm[k], self.node_force(k, pressure, moved));
             let inclined = n.area[k] * n.facing[k].stretch;
+            let shear = &self.law(k).shear;
             strength += inclined * shear.yield_stress_at(pressure, n.shear[k].slip, n.mobilised[k]);
         });
         (sum, strength)
@@ -32,8 +31,8 @@ impl Patches {
 
     /// Force of a node on the body along n, t1, t2 after a displacement along its underside.
     #[inline]
-    fn node_force(&self, k: usize, pressure: f64, moved: [f64; 2], shear: &ShearLaw) -> [f64; 3] {
-        let n = &self.nodes;
+    fn node_force(&self, k: usize, pressure: f64, moved: [f64; 2]) -> [f64; 3] {
+        let (n, shear) = (&self.nodes, &self.law(k).shear);
         let facing = &n.facing[k];
         let tau = shear.respond_at(&n.shear[k], n.mobilised[k], pressure, moved).stress;
         let area = n.area[k];
@@ -45,12 +44,12 @@ impl Patches {
     }
 
     /// d(wrench on the soil)/dX at `x`: consistent tangents of both laws, moved to the port's origin.
-    pub fn stiffness(&self, p: usize, x: &[f64; 6], shear: &ShearLaw) -> Stiffness {
+    pub fn stiffness(&self, p: usize, x: &[f64; 6]) -> Stiffness {
         let mut sum = [[0.0; 6]; 6];
         let moments = self.ports[p].carries_moments();
-        let shear = self.ports[p].shear(shear);
         self.each_loaded(p, x, |k, pressure, slope, moved| {
-            let r = shear.respond_at(&self.nodes.shear[k], self.nodes.mobilised[k], pressure, moved);
+            let r =
+                self.law(k).shear.respond_at(&self.nodes.shear[k], self.nodes.mobilised[k], pressure, moved);
             let node = node_stiffness(&self.nodes.facing[k], self.nodes.area[k], slope, &r);
             add_stiffness(&mut sum, self.nodes.arm[k], &node, moments);
         });
@@ -65,7 +64,7 @@ impl Patches {
         for k in patch.nodes.clone().filter(|k| n.area[*k] > 0.0) {
             let moved = displacement(n.arm[k], x);
             let deeper = -dot(n.facing[k].press, moved);
-            let (pressure, slope) = patch.curve.at(n.depth[k] + deeper, n.z_max[k], n.p_max[k]);
+            let (pressure, slope) = self.law(k).curve.at(n.depth[k] + deeper, n.z_max[k], n.p_max[k]);
             if pressure > 0.0 {
                 visit(k, pressure, slope, n.facing[k].slide(moved));
             }

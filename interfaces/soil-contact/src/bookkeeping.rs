@@ -3,9 +3,8 @@
 use crate::assemble::{displacement, dot};
 use crate::contacts::Touch;
 use crate::ground::{Covered, Ground};
-use crate::patch::{Laws, Patch, PatchNodes, Patches, key};
+use crate::patch::{Patch, PatchNodes, Patches, key};
 use crate::wheel;
-use terraglue_soil_law::ShearLaw;
 use terraglue_subsystem::Port;
 
 /// Sums over the run and what the last commit found. Part of the committed state.
@@ -58,23 +57,20 @@ impl Lists {
     }
 }
 
-/// The patches of a step and the laws that act on them.
+/// The patches of a step with the laws that act on them.
 pub struct Scene<'a> {
     /// Patches built for the step.
     pub patches: &'a Patches,
-    /// Laws.
-    pub laws: &'a Laws,
     /// Length of the step, s.
     pub h: f64,
 }
 
 /// A node that the foot presses: its number in the arrays, depth and displacement.
-struct Pressed<'a> {
+struct Pressed {
     k: usize,
     depth: f64,
     pressure: f64,
     slip: [f64; 2],
-    shear: &'a ShearLaw,
 }
 
 impl Scene<'_> {
@@ -125,14 +121,14 @@ impl Scene<'_> {
         touch: &mut Touch,
     ) -> u32 {
         let n = &self.patches.nodes;
-        let shear = patch.shear(&self.laws.shear);
         let first = lists.loaded.len();
         let mut loaded = 0;
         for k in patch.nodes.clone().filter(|k| n.area[*k] > 0.0) {
             let (moved, facing) = (displacement(n.arm[k], x), &n.facing[k]);
             let rise = dot(facing.press, moved);
             let depth = n.depth[k] - rise;
-            let (pressure, _) = patch.curve.at(depth, n.z_max[k], n.p_max[k]);
+            let curve = &self.patches.law(k).curve;
+            let (pressure, _) = curve.at(depth, n.z_max[k], n.p_max[k]);
             let [i, j] = n.index[k];
             let deep = (depth + relief(n, k)) / patch.slope;
             let lower = n.reference[k] - deep;
@@ -145,13 +141,13 @@ impl Scene<'_> {
                 let slid_in = fresh && patch.wheel.is_none() && depth - n.permanent[k] > -2.0 * rise;
                 lists.slid_in.push(slid_in);
                 touch.add(n, k, pressure, deep);
-                let node = Pressed { k, depth, pressure, slip: facing.slide(moved), shear: &shear };
+                let node = Pressed { k, depth, pressure, slip: facing.slide(moved) };
                 let (slid, surface) = self.press(patch, &node, ground, book);
                 let carried = if patch.wheel.is_some() { moved } else { slid };
                 lists.slid.push(in_world(port, carried));
                 lists.loaded.push([i, j]);
                 covered.surface = surface;
-                covered.virgin = if depth > n.z_max[k] { pressure } else { patch.curve.virgin(depth) };
+                covered.virgin = if depth > n.z_max[k] { pressure } else { curve.virgin(depth) };
             }
             lists.covered.push(covered);
         }
@@ -170,13 +166,14 @@ impl Scene<'_> {
     /// along n, t1 and t2, and the height of the unloaded surface, m.
     fn press(&self, patch: &Patch, node: &Pressed, ground: &mut Ground, book: &mut Book) -> ([f64; 3], f64) {
         let Pressed { k, depth, pressure, slip, .. } = *node;
-        let (n, curve) = (&self.patches.nodes, &patch.curve);
+        let (n, law) = (&self.patches.nodes, self.patches.law(k));
+        let curve = &law.curve;
         let area = n.area[k];
         let inclined = area * n.facing[k].stretch;
-        let shear = node.shear.respond_at(&n.shear[k], n.mobilised[k], pressure, slip);
+        let shear = law.shear.respond_at(&n.shear[k], n.mobilised[k], pressure, slip);
         let squeezed = 0.5 * pressure * pressure / curve.unloading();
         book.dissipated += inclined * shear.dissipated;
-        book.elastic += inclined * self.laws.shear.elastic_energy(&shear.state) + area * squeezed;
+        book.elastic += inclined * law.shear.elastic_energy(&shear.state) + area * squeezed;
         let [i, j] = n.index[k];
         let initial = ground.initial(i, j);
         let state = ground.enter(i, j);

@@ -1,6 +1,7 @@
 //! The ground of a soil: heights of its material and what it remembers at each node.
 
 use crate::contacts::Contacts;
+use crate::mask::Mask;
 use crate::nodes::{NodeState, NodeStates};
 use crate::wheel::Memory;
 use terraglue_ground::{HeightField, TILE_EDGE, UNIT_M};
@@ -39,6 +40,8 @@ pub struct Ground {
     pub wheels: Vec<Memory>,
     /// What is told of the contacts.
     pub contacts: Contacts,
+    /// Which soil lies where.
+    pub mask: Mask,
 }
 
 impl Ground {
@@ -46,7 +49,13 @@ impl Ground {
     pub fn new(terrain: &dyn Terrain) -> Result<Self> {
         let heights = HeightField::from_terrain(terrain)?;
         let nodes = NodeStates::new(*heights.lattice());
-        Ok(Self { heights, nodes, wheels: Vec::with_capacity(WHEELS), contacts: Contacts::default() })
+        Ok(Self {
+            heights,
+            nodes,
+            wheels: Vec::with_capacity(WHEELS),
+            contacts: Contacts::default(),
+            mask: Mask::default(),
+        })
     }
 
     /// Height of a node at the start, m.

@@ -14,6 +14,7 @@ mod assemble;
 mod bookkeeping;
 mod contacts;
 mod ground;
+mod mask;
 mod nodes;
 mod normal;
 mod patch;
@@ -24,5 +25,6 @@ mod values;
 mod wheel;
 
 pub use ground::{Covered, Ground};
+pub use mask::{MOST_SOILS, Mask, schema};
 pub use nodes::{NodeState, NodeStates, NodesSnapshot};
 pub use soil::{FieldSoil, Material};

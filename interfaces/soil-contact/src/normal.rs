@@ -2,7 +2,6 @@
 
 use crate::assemble::{displacement, dot, node_stiffness};
 use crate::patch::Patches;
-use terraglue_soil_law::ShearLaw;
 
 /// Relative accuracy of the force.
 const TOLERANCE: f64 = 1e-14;
@@ -16,7 +15,7 @@ impl Patches {
     /// soon as it is touched, a force belongs to two depths close together; the one next to the foot is meant.
     /// Its upper end carries `force` by pressure alone; where shear on inclined undersides
     /// lifts the foot, it moves further down.
-    pub fn surface_under(&mut self, p: usize, force: f64, x: &[f64; 6], shear: &ShearLaw) -> f64 {
+    pub fn surface_under(&mut self, p: usize, force: f64, x: &[f64; 6]) -> f64 {
         self.turn(p, x);
         let (free, full) = match self.bracket(p, force) {
             Some(bracket) => bracket,
@@ -29,7 +28,7 @@ impl Patches {
         let (mut low, mut high) = (free, full);
         for _ in 0..60 {
             at[0] = -high;
-            if self.wrench(p, &at, shear)[0] >= force {
+            if self.wrench(p, &at)[0] >= force {
                 break;
             }
             (low, high) = (high, high + (high - free) + 1e-9);
@@ -40,7 +39,7 @@ impl Patches {
                 shift = 0.5 * (low + high);
             }
             at[0] = -shift;
-            let residual = self.wrench(p, &at, shear)[0] - force;
+            let residual = self.wrench(p, &at)[0] - force;
             if residual.abs() <= TOLERANCE * force || high - low <= f64::EPSILON * shift.abs() {
                 break;
             }
@@ -49,7 +48,7 @@ impl Patches {
             } else {
                 low = shift
             }
-            let stiffness = self.normal_stiffness(p, &at, shear);
+            let stiffness = self.normal_stiffness(p, &at);
             let next = if stiffness > 0.0 { shift - residual / stiffness } else { f64::NAN };
             if next == shift {
                 break;
@@ -76,8 +75,9 @@ impl Patches {
         let loaded = || patch.nodes.clone().filter(|k| n.area[*k] > 0.0);
         let area: f64 = loaded().map(|k| n.area[k] * n.facing[k].press[0]).sum();
         let pressure = force.max(0.0) / area;
-        let virgin = patch.curve.virgin_depth(pressure);
-        let elastic = pressure / patch.curve.unloading();
+        let curves = || self.laws[patch.laws.clone()].iter().map(|law| &law.curve);
+        let virgin = curves().fold(0.0_f64, |m, c| m.max(c.virgin_depth(pressure)));
+        let elastic = curves().fold(0.0_f64, |m, c| m.max(pressure / c.unloading()));
         let (mut free, mut full) = (f64::INFINITY, f64::NEG_INFINITY);
         for k in loaded() {
             let down = n.facing[k].press[0];
@@ -89,12 +89,11 @@ impl Patches {
     }
 
     /// dW_n/dX_n at `x`, N/m.
-    pub fn normal_stiffness(&self, p: usize, x: &[f64; 6], shear: &ShearLaw) -> f64 {
+    pub fn normal_stiffness(&self, p: usize, x: &[f64; 6]) -> f64 {
         let mut sum = 0.0;
-        let shear = self.ports[p].shear(shear);
         self.each_loaded(p, x, |k, pressure, slope, moved| {
             let (n, facing) = (&self.nodes, &self.nodes.facing[k]);
-            let r = shear.respond_at(&n.shear[k], n.mobilised[k], pressure, moved);
+            let r = self.law(k).shear.respond_at(&n.shear[k], n.mobilised[k], pressure, moved);
             sum += node_stiffness(facing, n.area[k], slope, &r)[0][0];
         });
         sum

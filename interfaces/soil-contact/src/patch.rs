@@ -18,8 +18,8 @@ pub struct Patch {
     pub place: [Option<usize>; 6],
     /// n_z.
     pub slope: f64,
-    /// Pressure law under this contact.
-    pub curve: PressureCurve,
+    /// The laws of the soils under this contact, in [`Patches::laws`].
+    pub laws: std::ops::Range<usize>,
     /// Surface along n under the body: 0 in contact, −gap otherwise, m.
     pub surface: f64,
     /// Wrench of the law on the body at X = 0: n, t1, t2, mn, mt1, mt2.
@@ -30,20 +30,20 @@ pub struct Patch {
     pub warm: f64,
     /// What rolls here.
     pub wheel: Option<Wheel>,
-    /// Shear deformation modulus across the travel of a wheel, m.
-    pub across: Option<f64>,
+    /// Largest friction of the soils here.
+    pub friction: f64,
+}
+
+/// The laws of one soil under one contact.
+#[derive(Clone, Copy, Debug)]
+pub struct Local {
+    /// Pressure law for the size of the contact.
+    pub curve: PressureCurve,
+    /// Shear law in the directions of the contact.
+    pub shear: ShearLaw,
 }
 
 impl Patch {
-    /// The shear law in the directions of this contact.
-    #[inline]
-    pub fn shear(&self, law: &ShearLaw) -> ShearLaw {
-        match &self.wheel {
-            Some(wheel) => law.travelling(wheel.heading, self.across),
-            None => *law,
-        }
-    }
-
     /// Whether the port carries moments.
     pub fn carries_moments(&self) -> bool {
         self.place[3..].iter().any(Option::is_some)
@@ -124,6 +124,8 @@ pub struct PatchNodes {
     pub arm: Vec<[f64; 3]>,
     /// How the underside faces the soil.
     pub facing: Vec<Facing>,
+    /// Which of [`Patches::laws`] holds at the node.
+    pub law: Vec<usize>,
     /// Shear history.
     pub shear: Vec<ShearState>,
     /// Share of the shear strength that the slip so far has mobilised.
@@ -148,6 +150,7 @@ impl PatchNodes {
         self.relief.clear();
         self.area.clear();
         self.arm.clear();
+        self.law.clear();
         self.shear.clear();
         self.mobilised.clear();
         self.remembered.clear();
@@ -160,6 +163,7 @@ impl PatchNodes {
     pub fn reserve(&mut self, count: usize) {
         self.index.reserve(count);
         self.arm.reserve(count);
+        self.law.reserve(count);
         self.shear.reserve(count);
         self.remembered.reserve(count);
         self.stamp.reserve(count);
@@ -200,6 +204,8 @@ pub struct Patches {
     pub ports: Vec<Patch>,
     /// Their nodes, port after port.
     pub nodes: PatchNodes,
+    /// The laws of the soils under each of them, port after port.
+    pub laws: Vec<Local>,
     built_for: Option<(u64, u64, usize, usize)>,
 }
 
@@ -209,30 +215,38 @@ impl Patches {
         self.built_for = None;
     }
 
-    /// Reads the committed state below all ports, unless that was done for this step already.
-    pub fn build(&mut self, step: &Step, ground: &Ground, laws: &Laws) {
+    /// The laws at node k.
+    #[inline]
+    pub fn law(&self, k: usize) -> &Local {
+        &self.laws[self.nodes.law[k]]
+    }
+
+    /// Reads the committed state below all ports, unless that was done for this step already. `laws`: those of the
+    /// scenario's own soil and of the soils of the mask.
+    pub fn build(&mut self, step: &Step, ground: &Ground, laws: &[Laws]) {
         let key = (step.t.to_bits(), step.index, step.ports.len(), step.nodes.len());
         if self.built_for == Some(key) {
             return;
         }
         self.ports.clear();
         self.nodes.clear();
+        self.laws.clear();
         for port in step.ports {
             let patch = self.read_port(port, port.nodes(step.nodes), ground, laws);
             self.ports.push(patch);
         }
         self.share_nodes(step);
         for p in 0..self.ports.len() {
-            self.evaluate_at_rest(p, &laws.shear);
+            self.evaluate_at_rest(p);
         }
         self.built_for = Some(key);
     }
 
-    fn read_port(&mut self, port: &Port, nodes: &[Node], ground: &Ground, laws: &Laws) -> Patch {
+    fn read_port(&mut self, port: &Port, nodes: &[Node], ground: &Ground, laws: &[Laws]) -> Patch {
         let first = self.nodes.index.len();
         let n_z = port.frame[2];
         for node in nodes {
-            self.read_node(port, node, ground, &laws.shear);
+            self.read_node(port, node, ground, laws);
         }
         let range = first..self.nodes.index.len();
         let spacing = ground.heights.lattice().spacing;
@@ -242,20 +256,17 @@ impl Patches {
             .then(found)
             .flatten()
             .map(|w| Wheel { memory: wheel::recall(&ground.wheels, port.key), ..w });
-        let curve = match &wheel {
-            Some(w) => {
-                laws.pressure.curve_in_slip(w.width, laws.elastic, &laws.rolling.sinkage, w.memory.slip)
-            }
-            None => {
-                let b = contact_size(port, nodes, &self.nodes, range.clone(), spacing);
-                laws.pressure.curve(b, laws.elastic)
-            }
+        let b = match &wheel {
+            Some(w) => w.width,
+            None => contact_size(port, nodes, &self.nodes, range.clone(), spacing),
         };
-        let here = key(&curve, n_z);
+        let (local, friction) = self.local_laws(laws, wheel.as_ref(), b, range.clone());
         for k in range.clone() {
             let permanent = self.nodes.permanent[k];
             if permanent > 0.0 {
                 let (largest, curve_then) = self.nodes.remembered[k];
+                let curve = &self.laws[self.nodes.law[k]].curve;
+                let here = key(curve, n_z);
                 let z_max =
                     if curve_then == here { largest } else { curve.largest_depth(permanent, largest) };
                 self.nodes.z_max[k] = z_max;
@@ -263,8 +274,8 @@ impl Patches {
             }
         }
         if let Some(wheel) = &wheel {
-            if let Some(shift) = wheel.shift(&laws.rolling, &self.nodes, range.clone()) {
-                self.shift_peak(wheel, &shift, &curve, range.clone());
+            if let Some(shift) = wheel.shift(&laws[0].rolling, &self.nodes, range.clone()) {
+                self.shift_peak(wheel, &shift, range.clone());
             }
         }
         let mut place = [None; 6];
@@ -273,28 +284,54 @@ impl Patches {
             nodes: range,
             place,
             slope: n_z,
-            curve,
+            laws: local,
             surface: 0.0,
             force: [0.0; 6],
             strength: 0.0,
             warm: 0.0,
             wheel,
-            across: laws.rolling.across,
+            friction,
         }
     }
 
-    /// Takes the soil behind the peak of a wheel's stress as if it were less deep, and first loaded there.
-    fn shift_peak(
+    /// Makes the laws of the soils under a contact of size `b` (m), and lets its nodes, which know the number of their soil,
+    /// refer to them. Returns their range and the largest friction among them.
+    fn local_laws(
         &mut self,
-        wheel: &Wheel,
-        shift: &Shift,
-        curve: &PressureCurve,
-        range: std::ops::Range<usize>,
-    ) {
-        let largest = curve.largest_depth(shift.before, shift.before);
-        let n = &mut self.nodes;
+        laws: &[Laws],
+        wheel: Option<&Wheel>,
+        b: f64,
+        nodes: std::ops::Range<usize>,
+    ) -> (std::ops::Range<usize>, f64) {
+        let present = match laws {
+            [_] => 1,
+            _ => nodes.clone().fold(0_u64, |set, k| set | 1 << self.nodes.law[k]),
+        };
+        let (first, mut friction) = (self.laws.len(), 0.0_f64);
+        for (_, of) in laws.iter().enumerate().filter(|(r, _)| present >> r & 1 == 1) {
+            let (curve, shear) = match wheel {
+                Some(w) => (
+                    of.pressure.curve_in_slip(b, of.elastic, &of.rolling.sinkage, w.memory.slip),
+                    of.shear.travelling(w.heading, of.rolling.across),
+                ),
+                None => (of.pressure.curve(b, of.elastic), of.shear),
+            };
+            friction = friction.max(of.shear.friction);
+            self.laws.push(Local { curve, shear });
+        }
+        for number in &mut self.nodes.law[nodes] {
+            *number = first + (present & ((1 << *number) - 1)).count_ones() as usize;
+        }
+        (first..self.laws.len(), friction)
+    }
+
+    /// Takes the soil behind the peak of a wheel's stress as if it were less deep, and first loaded there.
+    fn shift_peak(&mut self, wheel: &Wheel, shift: &Shift, range: std::ops::Range<usize>) {
+        let (n, laws) = (&mut self.nodes, &self.laws);
         for k in range {
             let Some(relief) = wheel.relief(shift, n.arm[k]) else { continue };
+            let curve = &laws[n.law[k]].curve;
+            let largest = curve.largest_depth(shift.before, shift.before);
             n.relief[k] = relief;
             n.depth[k] -= relief;
             n.z_max[k] = n.depth[k].max(largest);
@@ -303,8 +340,9 @@ impl Patches {
         }
     }
 
-    fn read_node(&mut self, port: &Port, node: &Node, ground: &Ground, shear: &ShearLaw) {
+    fn read_node(&mut self, port: &Port, node: &Node, ground: &Ground, laws: &[Laws]) {
         let state = ground.nodes.get(node.i, node.j);
+        let number = ground.mask.at(node.i, node.j);
         let n_z = port.frame[2];
         let [x, y] = ground.heights.lattice().position(node.i, node.j);
         let reference = ground.reference(node.i, node.j, &state);
@@ -321,8 +359,9 @@ impl Patches {
         nodes.relief.push(f64::NAN);
         nodes.area.push(node.area / n_z);
         nodes.arm.push([along(0), along(1), along(2)]);
+        nodes.law.push(number);
         nodes.shear.push(state.shear);
-        nodes.mobilised.push(shear.mobilised(state.shear.slip));
+        nodes.mobilised.push(laws[number].shear.mobilised(state.shear.slip));
         nodes.remembered.push((state.largest, state.curve));
         nodes.facing.push(Facing::new(port, node.slope));
     }
@@ -347,8 +386,8 @@ impl Patches {
         }
     }
 
-    fn evaluate_at_rest(&mut self, p: usize, shear: &ShearLaw) {
-        let (force, strength) = self.at_rest(p, shear);
+    fn evaluate_at_rest(&mut self, p: usize) {
+        let (force, strength) = self.at_rest(p);
         let surface = if force[0] > 0.0 { 0.0 } else { self.highest(p).clamp(-FAR, 0.0) };
         let patch = &mut self.ports[p];
         (patch.force, patch.strength, patch.surface) = (force, strength, surface);

@@ -3,6 +3,7 @@
 use crate::bookkeeping::{self, Book, Lists};
 use crate::contacts::Contacts;
 use crate::ground::{Covered, Ground};
+use crate::mask::Mask;
 use crate::patch::{Laws, Patches};
 use crate::state::{Committed, Slot, Slots, Target};
 use crate::trial::Last;
@@ -60,7 +61,8 @@ pub struct FieldSoil<M: Material> {
     host: Arc<dyn Host>,
     parameters: SoilParameters,
     expressions: Option<SoilExpressions>,
-    laws: Laws,
+    /// Of the scenario's own soil, then of those of the mask.
+    laws: Vec<Laws>,
     ground: Ground,
     material: M,
     patches: Patches,
@@ -83,6 +85,7 @@ impl<M: Material> FieldSoil<M> {
         let parameters = SoilParameters::from_config(config, length(host.gravity()))?;
         let expressions = SoilExpressions::from_config(config)?;
         let mut ground = Ground::new(host.required_terrain()?)?;
+        ground.mask = Mask::from_config(config, length(host.gravity()), ground.heights.lattice())?;
         ground.contacts = Contacts::new(config.optional_number("contacts_shown")?.unwrap_or(0.0) as usize);
         material.begin(&ground, &parameters);
         let mut variables = values::shared();
@@ -94,7 +97,7 @@ impl<M: Material> FieldSoil<M> {
         patches.nodes.reserve(nodes);
         lists.reserve(nodes);
         Ok(Self {
-            laws: laws_of(&parameters, expressions.as_ref())?,
+            laws: all_laws(&parameters, &ground.mask, expressions.as_ref())?,
             expressions,
             fields: [ground.heights.height_info(), ground.heights.sinkage_info()],
             slots: Slots::new(host.slots()),
@@ -143,7 +146,7 @@ impl<M: Material> FieldSoil<M> {
         let Self { ground, lists, book, parameters, .. } = self;
         slot.put_back(&mut Target { ground, loaded: &mut lists.loaded, book, parameters })?;
         self.material.restore(&slot.material);
-        self.laws = laws_of(&self.parameters, self.expressions.as_ref())?;
+        self.laws[0] = laws_of(&self.parameters, self.expressions.as_ref())?;
         self.patches.forget();
         self.last.clear();
         Ok(())
@@ -169,6 +172,11 @@ impl<M: Material> FieldSoil<M> {
 
 fn length(v: [f64; 3]) -> f64 {
     v.iter().map(|c| c * c).sum::<f64>().sqrt()
+}
+
+/// The laws of the scenario's own soil and of those of the mask.
+fn all_laws(own: &SoilParameters, mask: &Mask, texts: Option<&SoilExpressions>) -> Result<Vec<Laws>> {
+    std::iter::once(own).chain(&mask.soils).map(|p| laws_of(p, texts)).collect()
 }
 
 /// The laws with these numbers; what the scenario writes as text takes the place of the built-in law.
@@ -204,8 +212,8 @@ impl<M: Material> Subsystem for FieldSoil<M> {
     fn set_ports(&mut self, step: &Step, laws: &mut [Law], now: &mut Response) -> Result {
         self.build(step);
         self.last.clear();
-        for law in laws {
-            law.mu = law.mu.min(self.laws.shear.friction);
+        for (law, patch) in laws.iter_mut().zip(&self.patches.ports) {
+            law.mu = law.mu.min(patch.friction);
         }
         self.show_surface(now);
         for patch in &self.patches.ports {
@@ -222,7 +230,7 @@ impl<M: Material> Subsystem for FieldSoil<M> {
         self.show_surface(out);
         for (port, patch) in step.ports.iter().zip(&self.patches.ports) {
             patch.pack(&patch.force, &mut self.law_force);
-            let mu = port.law.mu.min(self.laws.shear.friction);
+            let mu = port.law.mu.min(patch.friction);
             cooperation::plain_pass(port, estimate.t_star, &self.law_force, patch.strength, mu, out.t);
         }
         out.reached = step.t + step.h;
@@ -231,11 +239,10 @@ impl<M: Material> Subsystem for FieldSoil<M> {
 
     fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result {
         self.build(step);
-        let shear = &self.laws.shear;
         match input {
-            Input::Motion(motion) => self.last.motion(&mut self.patches, shear, motion, out),
+            Input::Motion(motion) => self.last.motion(&mut self.patches, motion, out),
             Input::Force { t, motion, .. } => {
-                self.last.force(&mut self.patches, shear, t, motion.as_ref(), out);
+                self.last.force(&mut self.patches, t, motion.as_ref(), out);
             }
             Input::Impedance { .. } => return Err(Error::Unsupported),
         }
@@ -246,7 +253,7 @@ impl<M: Material> Subsystem for FieldSoil<M> {
 
     fn interface_jacobian(&mut self, step: &Step, level: Level, out: &mut [f64]) -> Result {
         self.build(step);
-        self.last.jacobian(&mut self.patches, &self.laws.shear, step.n as usize, level, out)
+        self.last.jacobian(&mut self.patches, step.n as usize, level, out)
     }
 
     fn commit(&mut self, step: &Step, t: &[f64], partner: &Motion) -> Result {
@@ -254,7 +261,7 @@ impl<M: Material> Subsystem for FieldSoil<M> {
             return Err(Error::Failed(format!("the foot's motion, component {k}, is not a number")));
         }
         self.build(step);
-        let scene = bookkeeping::Scene { patches: &self.patches, laws: &self.laws, h: step.h };
+        let scene = bookkeeping::Scene { patches: &self.patches, h: step.h };
         scene.commit(step.ports, t, partner.x, &mut self.ground, &mut self.lists, &mut self.book);
         self.material.settle(&mut self.ground, &self.lists.covered, &self.lists.released, step.h);
         self.patches.forget();
@@ -334,7 +341,7 @@ impl<M: Material> Subsystem for FieldSoil<M> {
             }
         }
         match laws_of(&self.parameters, self.expressions.as_ref()) {
-            Ok(laws) => self.laws = laws,
+            Ok(laws) => self.laws[0] = laws,
             Err(refused) => {
                 self.parameters = before;
                 return Err(refused);

@@ -2,7 +2,6 @@
 
 use crate::assemble::Stiffness;
 use crate::patch::{Patch, Patches};
-use terraglue_soil_law::ShearLaw;
 use terraglue_subsystem::{Error, Level, Motion, Response, Result};
 
 /// Normal force at which the slope of the law is taken where the foot carries less, N: the compliance of a
@@ -36,18 +35,18 @@ impl Last {
     }
 
     /// The law's whole wrench at the foot's motion; the surface follows the foot where it is pressed.
-    pub fn motion(&mut self, patches: &mut Patches, shear: &ShearLaw, motion: &Motion, out: &mut Response) {
+    pub fn motion(&mut self, patches: &mut Patches, motion: &Motion, out: &mut Response) {
         self.clear();
         self.kind = Kind::Motion;
         out.v.fill(0.0);
         for p in 0..patches.ports.len() {
             let x = patches.ports[p].unpack(motion.x);
-            let wrench = patches.wrench(p, &x, shear);
+            let wrench = patches.wrench(p, &x);
             let mut surface = x;
             if wrench[0] > 0.0 {
                 patches.ports[p].pack(&patches.ports[p].unpack(motion.v), out.v);
             } else {
-                surface[0] = patches.surface_under(p, 0.0, &x, shear);
+                surface[0] = patches.surface_under(p, 0.0, &x);
             }
             patches.ports[p].pack(&surface, out.x);
             patches.ports[p].pack(&wrench, out.t);
@@ -58,22 +57,15 @@ impl Last {
 
     /// The surface under the normal forces of `t`; the other components of the wrench follow from the motion of the
     /// foot where it is known, from a foot at rest otherwise.
-    pub fn force(
-        &mut self,
-        patches: &mut Patches,
-        shear: &ShearLaw,
-        t: &[f64],
-        motion: Option<&Motion>,
-        out: &mut Response,
-    ) {
+    pub fn force(&mut self, patches: &mut Patches, t: &[f64], motion: Option<&Motion>, out: &mut Response) {
         self.clear();
         self.kind = if motion.is_some() { Kind::Hybrid } else { Kind::Force };
         out.v.fill(0.0);
         for p in 0..patches.ports.len() {
             let force = patches.ports[p].unpack(t)[0].max(0.0);
             let mut x = motion.map_or([0.0; 6], |m| patches.ports[p].unpack(m.x));
-            x[0] = patches.surface_under(p, force, &x, shear);
-            let mut wrench = patches.wrench(p, &x, shear);
+            x[0] = patches.surface_under(p, force, &x);
+            let mut wrench = patches.wrench(p, &x);
             wrench[0] = force;
             patches.ports[p].pack(&x, out.x);
             patches.ports[p].pack(&wrench, out.t);
@@ -85,14 +77,7 @@ impl Last {
     /// Derivatives at the last trial as [`terraglue_subsystem::Subsystem::interface_jacobian`] defines them. With
     /// W = −T, the wrench on the soil: after motion dW/dX; after force dX/dW, whose tangential part is 0 because
     /// the soil answers a rest there; after force with motion d(X_n, W_t, W_m)/d(W_n, X_t, X_m).
-    pub fn jacobian(
-        &mut self,
-        patches: &mut Patches,
-        shear: &ShearLaw,
-        n: usize,
-        level: Level,
-        out: &mut [f64],
-    ) -> Result {
+    pub fn jacobian(&mut self, patches: &mut Patches, n: usize, level: Level, out: &mut [f64]) -> Result {
         out.fill(0.0);
         match (self.kind, level) {
             (Kind::None, _) => return Err(Error::Failed("derivatives were asked for before a trial".into())),
@@ -101,10 +86,10 @@ impl Last {
             _ => return Err(Error::Unsupported),
         }
         for p in 0..self.x.len() {
-            let k = patches.stiffness(p, &self.x[p], shear);
+            let k = patches.stiffness(p, &self.x[p]);
             let block = match self.kind {
                 Kind::Motion => k,
-                kind => hybrid(&k, self.normal_stiffness(patches, p, &k, shear), kind == Kind::Hybrid),
+                kind => hybrid(&k, self.normal_stiffness(patches, p, &k), kind == Kind::Hybrid),
             };
             scatter(&patches.ports[p], &block, n, out);
         }
@@ -112,13 +97,13 @@ impl Last {
     }
 
     /// dW_n/dX_n, that of a small force where the foot carries none.
-    fn normal_stiffness(&self, patches: &mut Patches, p: usize, k: &Stiffness, shear: &ShearLaw) -> f64 {
+    fn normal_stiffness(&self, patches: &mut Patches, p: usize, k: &Stiffness) -> f64 {
         if self.normal[p] >= SMALLEST_FORCE_N && k[0][0] > 0.0 {
             return k[0][0];
         }
         let mut x = self.x[p];
-        x[0] = patches.surface_under(p, SMALLEST_FORCE_N, &x, shear);
-        patches.normal_stiffness(p, &x, shear)
+        x[0] = patches.surface_under(p, SMALLEST_FORCE_N, &x);
+        patches.normal_stiffness(p, &x)
     }
 }
 

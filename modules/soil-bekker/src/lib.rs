@@ -6,7 +6,6 @@
 
 use std::sync::Arc;
 use terraglue_soil_contact::{Covered, FieldSoil, Ground, Material};
-use terraglue_soil_law::SoilParameters;
 use terraglue_subsystem::{Config, Host, Kind, Module, Result, Schema, Subsystem};
 
 /// The module.
@@ -18,7 +17,7 @@ impl Module for SoilBekker {
             name: "soil-bekker".into(),
             kind: Kind::Soil,
             help: "Bekker pressure-sinkage with unloading, Mohr-Coulomb and Janosi-Hanamoto shear".into(),
-            parameters: SoilParameters::schema(),
+            parameters: terraglue_soil_contact::schema(),
         }
     }
 

@@ -71,3 +71,10 @@ fn energy_goes_into_storage_or_heat() {
         bars::energy_balances::<Soil>(soil);
     }
 }
+
+#[test]
+fn regions_of_a_mask_have_their_laws() {
+    bars::regions_have_their_laws::<Soil>();
+    bars::derivatives_are_exact::<Soil>(&bars::two_soils());
+    bars::normal_inverse_is_exact::<Soil>(&bars::two_soils());
+}

@@ -41,7 +41,6 @@ pub use sweep::{Counts, Sweeper};
 
 use std::sync::Arc;
 use terraglue_soil_contact::FieldSoil;
-use terraglue_soil_law::SoilParameters;
 use terraglue_subsystem::{Config, Host, Kind, Module, Parameter, ParameterType, Result, Schema, Subsystem};
 
 /// The module.
@@ -49,7 +48,7 @@ pub struct SoilCellularAutomaton;
 
 impl Module for SoilCellularAutomaton {
     fn schema() -> Schema {
-        let mut parameters = SoilParameters::schema();
+        let mut parameters = terraglue_soil_contact::schema();
         parameters.extend([
             Parameter::number(
                 "curvature_max_per_m",

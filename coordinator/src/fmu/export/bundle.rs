@@ -142,7 +142,10 @@ impl Bundle<'_> {
 
     /// A parameter that is the path of a file, with the files that this one names.
     fn parameter(&mut self, spec: &SubsystemSpec, key: &str) -> Result {
-        let Some(path) = spec.parameters.get(key).and_then(|v| v.as_str()) else { return Ok(()) };
+        let below = |value: &serde_json::Value, part: &str| value.get(part).cloned();
+        let all = serde_json::Value::Object(spec.parameters.clone());
+        let given = key.split('.').try_fold(all, |value, part| below(&value, part));
+        let Some(path) = given.as_ref().and_then(|v| v.as_str()) else { return Ok(()) };
         let from = self.scenario.folder.join(path);
         let file = from.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
         let folder = format!("files/{}", spec.name);
@@ -158,20 +161,29 @@ impl Bundle<'_> {
             }
         }
         // The sub-table of the module comes on top of the subsystem's own, so it is changed where it is written.
-        let own = self.document.get(&spec.name).and_then(|t| t.get(&spec.module)).and_then(|t| t.get(key));
-        match own.is_some() {
-            true => self.document[&spec.name][&spec.module][key] = value(to),
-            false => self.set(&spec.name, key, &to),
+        let parts = || key.split('.');
+        let table = self.document.get(&spec.name);
+        let own = table.and_then(|t| parts().try_fold(t.get(&spec.module)?, |item, part| item.get(part)));
+        let mut item = match own.is_some() {
+            true => &mut self.document[&spec.name][&spec.module],
+            false => &mut self.document[&spec.name],
+        };
+        for part in parts() {
+            item = &mut item[part];
         }
+        *item = value(to);
         Ok(())
     }
 
     /// The soil file that `parameters` names, or the table with the row that it names.
     fn soil_table(&mut self, spec: &SubsystemSpec) -> Result {
-        if spec.offered.is_empty() {
+        if spec.offered.is_empty() && spec.regions.is_empty() {
             return Ok(());
         }
         let folder = &self.scenario.folder;
+        for region in spec.regions.iter().filter(|region| region.soil.ends_with(".toml")) {
+            self.take(&folder.join(&region.soil), region.soil.clone())?;
+        }
         let text = |key: &str| self.document.get(&spec.name).and_then(|t| t.get(key)).and_then(Item::as_str);
         if let Some(file) = text("parameters").filter(|p| p.ends_with(".toml")) {
             let to = self.take(&folder.join(file), format!("models/{}.toml", spec.name))?;

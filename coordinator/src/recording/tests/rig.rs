@@ -205,6 +205,7 @@ pub fn scenario(strategy: &str) -> Scenario {
         step_multiple: 1,
         parameters: Default::default(),
         offered: Default::default(),
+        regions: Vec::new(),
     };
     let mut source = Source::default();
     (source.path, source.text) = ("/nowhere/synthetic_walk.toml".into(), text);

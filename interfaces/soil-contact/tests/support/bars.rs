@@ -31,6 +31,46 @@ pub fn ball_rests<M: Module>(config: &str, iterative: bool) {
     println!("sunk {:.3} mm, F {here:.2} N, evaluations {}", 1e3 * rig.sunk(), rig.evaluations);
 }
 
+/// Lunar soil where x < −5 mm, the soil of LETE beyond.
+pub fn two_soils() -> String {
+    let runs: Vec<String> = (0..65).map(|_| "32,0,33,1".into()).collect();
+    let mask = format!(r#","mask":{{"soils":[{LETE}],"runs":[{}]}}}}"#, runs.join(","));
+    LUNAR.trim_end().strip_suffix('}').unwrap().to_owned() + &mask
+}
+
+/// A plate presses each soil of a mask with its own law; on the border each node answers for its soil.
+pub fn regions_have_their_laws<M: Module>() {
+    let (b, area) = (0.06, 0.06 * 0.1);
+    let law = |[n, k_c, k_phi]: [f64; 3], z: f64| (k_c / b + k_phi) * libm::pow(z, n);
+    let (moon, lete) = ([1.0, 1400.0, 820e3], [0.793, 102e3, 5301e3]);
+    for (x, share) in [(-0.15, 1.0), (0.15, 0.0), (-0.005, 0.5), (-0.015, 2.0 / 3.0)] {
+        let geometry = Geometry::Box { half_extents: [0.03, 0.05, 0.1] };
+        let mut rig = Rig::new(soil::<M>(&two_soils(), 65, 0.01, flat), geometry, 1.0, 0.1);
+        rig.position[0] = x;
+        for k in 1..=200 {
+            let force = rig.prescribed_step(&[-1e-4, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
+            let z = 1e-4 * f64::from(k);
+            let expected = area * (share * law(moon, z) + (1.0 - share) * law(lete, z));
+            assert!(
+                k < 50 || (force / expected - 1.0).abs() < 1e-6,
+                "x = {x}, z = {z}: {force} N, {expected} N"
+            );
+        }
+        // dragged far, the weaker of both strengths does not decide: each node has its own
+        let pressure = |own: [f64; 3]| law(own, 0.02);
+        let strength = |c: f64, phi: f64, own| c + pressure(own) * phi.tan();
+        let limit = area
+            * (share * strength(170.0, 0.610865238198, moon)
+                + (1.0 - share) * strength(1300.0, 0.542797397, lete));
+        let mut x = [0.0, 0.3, 0.0, 0.0, 0.0, 0.0];
+        rig.set_ports();
+        let dragged = -rig.under_motion(&x)[1];
+        assert!((dragged / limit - 1.0).abs() < 1e-3, "{dragged} N, {limit} N");
+        x[1] = -0.3;
+        assert!((rig.under_motion(&x)[1] / limit - 1.0).abs() < 1e-3);
+    }
+}
+
 /// Plates under prescribed motion follow the closed form p = (k_c/b + k_φ)·zⁿ.
 /// Where material `stays`, the plate meets the same soil again after it was lifted.
 pub fn plates_follow_bekker<M: Module>(config: &str, [n, k_c, k_phi]: [f64; 3], stays: bool) {

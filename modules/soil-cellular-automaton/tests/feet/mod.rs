@@ -37,6 +37,16 @@ pub struct Feet {
     laws: Vec<Law>,
 }
 
+/// What the bodies know of a moment: all but the soil's state.
+#[derive(Clone)]
+pub struct Moment {
+    bodies: Vec<Placed>,
+    index: u64,
+    ports: Vec<Port>,
+    owners: Vec<usize>,
+    t: Vec<f64>,
+}
+
 pub fn instance<M: Module>(config: &str, host: Arc<dyn Host>) -> Soil {
     let config = Config::parse(config).unwrap().with_defaults(&M::schema());
     let automaton = Automaton::new(Settings::from_config(&config).unwrap(), host.clone());
@@ -58,6 +68,24 @@ impl Feet {
             answer: Default::default(),
             laws: Vec::with_capacity(32),
         }
+    }
+
+    /// Copies what the bodies know.
+    pub fn moment(&self) -> Moment {
+        let Self { bodies, index, ports, owners, t, .. } = self;
+        Moment {
+            bodies: bodies.clone(),
+            index: *index,
+            ports: ports.clone(),
+            owners: owners.clone(),
+            t: t.clone(),
+        }
+    }
+
+    /// Back to a moment; the soil's state is restored beside.
+    pub fn return_to(&mut self, moment: &Moment) {
+        let Moment { bodies, index, ports, owners, t } = moment.clone();
+        (self.bodies, self.index, self.ports, self.owners, self.t) = (bodies, index, ports, owners, t);
     }
 
     /// One more body, at rest.

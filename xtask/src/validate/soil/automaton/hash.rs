@@ -47,13 +47,13 @@ fn rolled_back(steps: u32) -> Outcome<[u64; 2]> {
     let (mut rig, mut wanderers) = begin(1);
     go(&mut rig, &mut wanderers, steps / 2);
     rig.soil.save_state(0).map_err(|e| e.to_string())?;
-    let (middle, bodies, index, forces) = (wanderers.clone(), rig.bodies.clone(), rig.index, rig.t.clone());
+    let (middle, moment) = (wanderers.clone(), rig.moment());
     let mut ends = [0; 2];
     for (end, more) in ends.iter_mut().zip([7, steps]) {
         go(&mut rig, &mut wanderers, more);
         rig.soil.restore_state(0).map_err(|e| e.to_string())?;
-        (wanderers, rig.bodies, rig.index) = (middle.clone(), bodies.clone(), index);
-        rig.t.clone_from(&forces);
+        wanderers.clone_from(&middle);
+        rig.return_to(&moment);
         *end = go(&mut rig, &mut wanderers, steps - steps / 2);
     }
     Ok(ends)

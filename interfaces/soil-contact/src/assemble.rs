@@ -56,7 +56,21 @@ impl Patches {
         sum
     }
 
-    /// Calls `visit(node, pressure, slope, displacement along the underside)` for the nodes with pressure.
+    /// Pressure at node k when the foot is at depth z there, and its slope. Soil that was in contact and clings follows the
+    /// elastic line below zero down to the tension that it bears, then lets go.
+    #[inline]
+    pub fn pressure(&self, k: usize, z: f64) -> (f64, f64) {
+        let (n, law) = (&self.nodes, self.law(k));
+        let (pressure, slope) = law.curve.at(z, n.z_max[k], n.p_max[k]);
+        if pressure > 0.0 || law.adhesion == 0.0 || n.stamp[k] == 0 {
+            return (pressure, slope);
+        }
+        let stiffness = law.curve.unloading();
+        let tension = stiffness * (n.permanent[k] - z);
+        if tension <= law.adhesion { (-tension, stiffness) } else { (0.0, 0.0) }
+    }
+
+    /// Calls `visit(node, pressure, slope, displacement along the underside)` for the nodes with pressure or tension.
     #[inline]
     pub fn each_loaded(&self, p: usize, x: &[f64; 6], mut visit: impl FnMut(usize, f64, f64, [f64; 2])) {
         let patch = &self.ports[p];
@@ -64,8 +78,8 @@ impl Patches {
         for k in patch.nodes.clone().filter(|k| n.area[*k] > 0.0) {
             let moved = displacement(n.arm[k], x);
             let deeper = -dot(n.facing[k].press, moved);
-            let (pressure, slope) = self.law(k).curve.at(n.depth[k] + deeper, n.z_max[k], n.p_max[k]);
-            if pressure > 0.0 {
+            let (pressure, slope) = self.pressure(k, n.depth[k] + deeper);
+            if pressure != 0.0 {
                 visit(k, pressure, slope, n.facing[k].slide(moved));
             }
         }

@@ -5,6 +5,7 @@ use crate::contacts::Touch;
 use crate::ground::{Covered, Ground};
 use crate::patch::{Patch, PatchNodes, Patches, key};
 use crate::wheel;
+use terraglue_soil_law::ShearState;
 use terraglue_subsystem::Port;
 
 /// Sums over the run and what the last commit found. Part of the committed state.
@@ -128,7 +129,7 @@ impl Scene<'_> {
             let rise = dot(facing.press, moved);
             let depth = n.depth[k] - rise;
             let curve = &self.patches.law(k).curve;
-            let (pressure, _) = curve.at(depth, n.z_max[k], n.p_max[k]);
+            let (pressure, _) = self.patches.pressure(k, depth);
             let [i, j] = n.index[k];
             let deep = (depth + relief(n, k)) / patch.slope;
             let lower = n.reference[k] - deep;
@@ -149,6 +150,9 @@ impl Scene<'_> {
                 covered.surface = surface;
                 covered.virgin = if depth > n.z_max[k] { pressure } else { curve.virgin(depth) };
             }
+            if n.stamp[k] != 0 && pressure <= 0.0 && self.patches.law(k).adhesion > 0.0 {
+                self.cling(k, pressure, ground, lists, book);
+            }
             lists.covered.push(covered);
         }
         if let Some(wheel) = patch.wheel.as_ref().filter(|_| loaded > 0) {
@@ -160,6 +164,24 @@ impl Scene<'_> {
         });
         carry_slip(ground, lists, first, entry, book.stamp);
         loaded
+    }
+
+    /// A node that was in contact and is not pressed any more: it clings under tension, or lets go, and what its stretched
+    /// soil held becomes heat.
+    fn cling(&self, k: usize, pressure: f64, ground: &mut Ground, lists: &mut Lists, book: &mut Book) {
+        let [i, j] = self.patches.nodes.index[k];
+        let held = |p: f64| 0.5 * self.patches.nodes.area[k] * p * p / self.patches.law(k).curve.unloading();
+        let before = ground.nodes.get(i, j).pressure;
+        if pressure < 0.0 {
+            let state = ground.enter(i, j);
+            (state.pressure, state.shear, state.stamp) = (pressure, ShearState::default(), book.stamp);
+            lists.loaded.push([i, j]);
+            lists.slid_in.push(false);
+            lists.slid.push([0.0; 2]);
+            book.elastic += held(pressure);
+        } else if before < 0.0 {
+            book.dissipated += held(before);
+        }
     }
 
     /// One loaded node: plastic depth, slip, heat and elastic energy. Returns how far the foot slipped over the soil

@@ -3,6 +3,15 @@
 use crate::assemble::{displacement, dot, node_stiffness};
 use crate::patch::Patches;
 
+/// A node that clings to a foot: it lets go at the shift `end` (m); up to there its normal force is `stiffness`·shift −
+/// `at_zero`.
+#[derive(Clone, Copy, Debug)]
+pub struct Clinging {
+    end: f64,
+    stiffness: f64,
+    at_zero: f64,
+}
+
 /// Relative accuracy of the force.
 const TOLERANCE: f64 = 1e-14;
 
@@ -22,7 +31,8 @@ impl Patches {
             None => return self.ports[p].surface,
         };
         if force <= 0.0 {
-            return -free;
+            self.list_clinging(p);
+            return -self.held(force).unwrap_or(free);
         }
         let mut at = *x;
         let (mut low, mut high) = (free, full);
@@ -66,6 +76,60 @@ impl Patches {
         for k in self.ports[p].nodes.clone() {
             n.turned[k] = n.depth[k] - dot(n.facing[k].press, displacement(n.arm[k], &aside));
         }
+    }
+
+    /// Largest force with which the soil holds back the foot of patch `p` as it is lifted, N: its nodes let go one after
+    /// the other.
+    pub fn pull(&mut self, p: usize) -> f64 {
+        if self.laws[self.ports[p].laws.clone()].iter().all(|law| law.adhesion == 0.0) {
+            return 0.0;
+        }
+        self.turn(p, &[0.0; 6]);
+        self.list_clinging(p);
+        let mut most = 0.0_f64;
+        self.peel(|end, stiffness, at_zero| {
+            most = most.max(at_zero - stiffness * end);
+            None
+        });
+        most
+    }
+
+    /// Shift at which clinging soil pulls with −`force` ≥ 0 N; `None` where it cannot.
+    fn held(&self, force: f64) -> Option<f64> {
+        self.peel(|end, stiffness, at_zero| {
+            (stiffness * end - at_zero <= force).then(|| (force + at_zero) / stiffness)
+        })
+    }
+
+    /// Walks up from letting go to letting go: `visit` gets the shift and the line on which the force falls to there.
+    fn peel(&self, mut visit: impl FnMut(f64, f64, f64) -> Option<f64>) -> Option<f64> {
+        let sum = |of: fn(&Clinging) -> f64| self.clinging.iter().map(of).sum::<f64>();
+        let (mut stiffness, mut at_zero) = (sum(|c| c.stiffness), sum(|c| c.at_zero));
+        for c in &self.clinging {
+            if let Some(found) = visit(c.end, stiffness, at_zero) {
+                return Some(found);
+            }
+            (stiffness, at_zero) = (stiffness - c.stiffness, at_zero - c.at_zero);
+        }
+        None
+    }
+
+    /// The nodes that cling to the foot of patch `p`, those that let go first at the front.
+    fn list_clinging(&mut self, p: usize) {
+        let mut list = std::mem::take(&mut self.clinging);
+        list.clear();
+        let n = &self.nodes;
+        for k in self.ports[p].nodes.clone().filter(|k| n.area[*k] > 0.0 && n.stamp[*k] != 0) {
+            let (law, down) = (self.law(k), n.facing[k].press[0]);
+            if law.adhesion > 0.0 {
+                let stiffness = n.area[k] * down * law.curve.unloading();
+                let touch = n.permanent[k] - n.turned[k];
+                let end = (touch - law.adhesion / law.curve.unloading()) / down;
+                list.push(Clinging { end, stiffness: stiffness * down, at_zero: stiffness * touch });
+            }
+        }
+        list.sort_unstable_by(|a, b| b.end.total_cmp(&a.end));
+        self.clinging = list;
     }
 
     /// Shift at which the foot just touches, and one at which the pressure carries `force` for certain; `None`

@@ -5,6 +5,7 @@
 
 use crate::assemble::dot;
 use crate::ground::Ground;
+use crate::normal::Clinging;
 use crate::wheel::{self, Shift, Wheel};
 use terraglue_soil_law::{PressureCurve, PressureLaw, Rolling, ShearLaw, ShearState};
 use terraglue_subsystem::{Node, Port, Step};
@@ -32,6 +33,8 @@ pub struct Patch {
     pub wheel: Option<Wheel>,
     /// Largest friction of the soils here.
     pub friction: f64,
+    /// Largest force with which the soil holds the foot back, N.
+    pub pull: f64,
 }
 
 /// The laws of one soil under one contact.
@@ -41,6 +44,8 @@ pub struct Local {
     pub curve: PressureCurve,
     /// Shear law in the directions of the contact.
     pub shear: ShearLaw,
+    /// Tension up to which soil clings, Pa.
+    pub adhesion: f64,
 }
 
 impl Patch {
@@ -193,6 +198,8 @@ pub struct Laws {
     pub shear: ShearLaw,
     /// Elastic stiffness, Pa/m.
     pub elastic: f64,
+    /// Tension up to which soil clings, Pa.
+    pub adhesion: f64,
     /// What concerns wheels alone.
     pub rolling: Rolling,
 }
@@ -206,6 +213,8 @@ pub struct Patches {
     pub nodes: PatchNodes,
     /// The laws of the soils under each of them, port after port.
     pub laws: Vec<Local>,
+    /// Clinging nodes; scratch of [`Patches::pull`].
+    pub(crate) clinging: Vec<Clinging>,
     built_for: Option<(u64, u64, usize, usize)>,
 }
 
@@ -291,6 +300,7 @@ impl Patches {
             warm: 0.0,
             wheel,
             friction,
+            pull: 0.0,
         }
     }
 
@@ -317,7 +327,7 @@ impl Patches {
                 None => (of.pressure.curve(b, of.elastic), of.shear),
             };
             friction = friction.max(of.shear.friction);
-            self.laws.push(Local { curve, shear });
+            self.laws.push(Local { curve, shear, adhesion: of.adhesion });
         }
         for number in &mut self.nodes.law[nodes] {
             *number = first + (present & ((1 << *number) - 1)).count_ones() as usize;
@@ -388,9 +398,10 @@ impl Patches {
 
     fn evaluate_at_rest(&mut self, p: usize) {
         let (force, strength) = self.at_rest(p);
-        let surface = if force[0] > 0.0 { 0.0 } else { self.highest(p).clamp(-FAR, 0.0) };
+        let pull = self.pull(p);
+        let surface = if force[0] != 0.0 { 0.0 } else { self.highest(p).clamp(-FAR, 0.0) };
         let patch = &mut self.ports[p];
-        (patch.force, patch.strength, patch.surface) = (force, strength, surface);
+        (patch.force, patch.strength, patch.surface, patch.pull) = (force, strength, surface, pull);
     }
 
     /// How far the foot of patch `p` is below where it just touches, along n, m.

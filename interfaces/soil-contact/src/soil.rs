@@ -185,6 +185,7 @@ fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>) -> Result<Laws> 
         pressure: p.pressure(),
         shear: p.shear(),
         elastic: p.elastic_stiffness_pa_m,
+        adhesion: p.adhesion_pa,
         rolling: p.rolling,
     };
     if let Some(texts) = texts {
@@ -214,6 +215,7 @@ impl<M: Material> Subsystem for FieldSoil<M> {
         self.last.clear();
         for (law, patch) in laws.iter_mut().zip(&self.patches.ports) {
             law.mu = law.mu.min(patch.friction);
+            law.t_min = law.t_min.min(-patch.pull);
         }
         self.show_surface(now);
         for patch in &self.patches.ports {

@@ -43,7 +43,7 @@ impl Last {
             let x = patches.ports[p].unpack(motion.x);
             let wrench = patches.wrench(p, &x);
             let mut surface = x;
-            if wrench[0] > 0.0 {
+            if wrench[0] != 0.0 {
                 patches.ports[p].pack(&patches.ports[p].unpack(motion.v), out.v);
             } else {
                 surface[0] = patches.surface_under(p, 0.0, &x);
@@ -62,7 +62,7 @@ impl Last {
         self.kind = if motion.is_some() { Kind::Hybrid } else { Kind::Force };
         out.v.fill(0.0);
         for p in 0..patches.ports.len() {
-            let force = patches.ports[p].unpack(t)[0].max(0.0);
+            let force = patches.ports[p].unpack(t)[0].max(-patches.ports[p].pull);
             let mut x = motion.map_or([0.0; 6], |m| patches.ports[p].unpack(m.x));
             x[0] = patches.surface_under(p, force, &x);
             let mut wrench = patches.wrench(p, &x);
@@ -98,7 +98,7 @@ impl Last {
 
     /// dW_n/dX_n, that of a small force where the foot carries none.
     fn normal_stiffness(&self, patches: &mut Patches, p: usize, k: &Stiffness) -> f64 {
-        if self.normal[p] >= SMALLEST_FORCE_N && k[0][0] > 0.0 {
+        if self.normal[p].abs() >= SMALLEST_FORCE_N && k[0][0] > 0.0 {
             return k[0][0];
         }
         let mut x = self.x[p];

@@ -35,6 +35,8 @@ pub struct SoilParameters {
     pub gravity: f64,
     /// Angle of friction and adhesive strength between feet and soil, rad and Pa, where they are not those of the soil.
     pub interface: [Option<f64>; 2],
+    /// Tension with which soil clings to a foot that lifts off, Pa; 0: it never pulls.
+    pub adhesion_pa: f64,
     /// What concerns wheels alone.
     pub rolling: Rolling,
 }
@@ -78,6 +80,7 @@ impl Default for SoilParameters {
             elastic_stiffness_pa_m: DEFAULT_ELASTIC_STIFFNESS,
             gravity: 1.62,
             interface: [None; 2],
+            adhesion_pa: 0.0,
             rolling: Rolling::default(),
         }
     }
@@ -130,6 +133,13 @@ impl SoilParameters {
             )
             .within(0.0, 1e7)
             .optional(),
+            number(
+                "adhesion_pa",
+                "Pa",
+                "tension with which soil clings to a foot that lifts off, until it lets go; none where absent",
+            )
+            .within(0.0, 1e7)
+            .optional(),
         ];
         parameters.push(
             Parameter::of(
@@ -161,6 +171,7 @@ impl SoilParameters {
             elastic_stiffness_pa_m: number("elastic_stiffness_pa_m")?.unwrap_or(DEFAULT_ELASTIC_STIFFNESS),
             gravity,
             interface: [number("interface_phi_rad")?, number("interface_c_pa")?],
+            adhesion_pa: number("adhesion_pa")?.unwrap_or(0.0),
             rolling: Rolling::from_config(config)?,
         };
         parameters.check().map(|()| parameters)
@@ -178,7 +189,9 @@ impl SoilParameters {
                 return Err(Error::Refused(format!("`{name}` = {value} must be larger than zero")));
             }
         }
-        for (name, value) in [("k_c", self.k_c), ("k_phi", self.k_phi), ("c_pa", self.c_pa)] {
+        for (name, value) in
+            [("k_c", self.k_c), ("k_phi", self.k_phi), ("c_pa", self.c_pa), ("adhesion_pa", self.adhesion_pa)]
+        {
             if !(value.is_finite() && value >= 0.0) {
                 return Err(Error::Refused(format!("`{name}` = {value} must not be negative")));
             }
@@ -288,5 +301,6 @@ terraglue_subsystem::persist!(SoilParameters {
     elastic_stiffness_pa_m,
     gravity,
     interface,
+    adhesion_pa,
     rolling,
 });

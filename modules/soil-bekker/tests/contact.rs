@@ -78,3 +78,8 @@ fn regions_of_a_mask_have_their_laws() {
     bars::derivatives_are_exact::<Soil>(&bars::two_soils());
     bars::normal_inverse_is_exact::<Soil>(&bars::two_soils());
 }
+
+#[test]
+fn adhesion_pulls_only_where_it_is_set_and_lets_go() {
+    bars::adhesion_holds_until_it_lets_go::<Soil>();
+}

@@ -31,6 +31,52 @@ pub fn ball_rests<M: Module>(config: &str, iterative: bool) {
     println!("sunk {:.3} mm, F {here:.2} N, evaluations {}", 1e3 * rig.sunk(), rig.evaluations);
 }
 
+/// Soil that clings holds a disc back with adhesion times area, once; without a contact before it never pulls.
+pub fn adhesion_holds_until_it_lets_go<M: Module>() {
+    let (adhesion, radius) = (800.0, 0.0537);
+    let area = std::f64::consts::PI * radius * radius;
+    let config = LUNAR.replacen('{', &format!("{{\"adhesion_pa\":{adhesion},"), 1);
+    let geometry = Geometry::Cylinder { half_length: 0.1, radius };
+    let mut rig = Rig::new(soil::<M>(&config, 65, 0.01, flat), geometry, 1.0, 0.1);
+    rig.position[0] = 0.0031;
+    let still = [0.0; 6];
+    let up = |by: f64| [by, 0.0, 0.0, 0.0, 0.0, 0.0];
+    let (mut work, mut turned) = (0.0, 0.0);
+    for cycle in 0..3 {
+        let mut least = 0.0_f64;
+        let mut lift = |rig: &mut Rig, by: f64, steps: u32, least: &mut f64| {
+            for _ in 0..steps {
+                rig.set_ports();
+                let before = rig.under_motion(&still)[0];
+                let after = rig.prescribed_step(&up(by))[0];
+                *least = least.min(after);
+                work -= 0.5 * by * (before + after);
+                turned += (by * after).abs();
+            }
+        };
+        rig.set_ports();
+        assert_eq!(rig.ports[0].law.t_min, 0.0, "nothing clings before the touch");
+        // down by a centimetre from a little above, then up by less than 4e8 Pa/m give per 800 Pa
+        lift(&mut rig, -1e-4, if cycle == 0 { 100 } else { 110 }, &mut least);
+        assert!(least >= 0.0, "it pulled on the way down: {least} N");
+        rig.set_ports();
+        assert!((rig.ports[0].law.t_min / (-adhesion * area) - 1.0).abs() < 1e-3, "{:?}", rig.ports[0].law);
+        // the inverse of the law where it pulls
+        let (x, t) = rig.under_force(&[-0.5 * adhesion * area, 0.0, 0.0, 0.0, 0.0, 0.0], &still);
+        assert!((rig.under_motion(&x)[0] / t[0] - 1.0).abs() < 1e-6 && t[0] < 0.0, "{x:?} {t:?}");
+        lift(&mut rig, 1e-7, 700, &mut least);
+        assert!(
+            (least / (-adhesion * area) - 1.0).abs() < 0.06,
+            "cycle {cycle}: {least} N of {}",
+            adhesion * area
+        );
+        let mut gone = 0.0;
+        lift(&mut rig, 1e-4, 10, &mut gone);
+        assert_eq!(gone, 0.0, "cycle {cycle}");
+    }
+    assert!(work > -1e-6 * turned, "the soil gave out {:e} J of {turned:e} J", -work);
+}
+
 /// Lunar soil where x < −5 mm, the soil of LETE beyond.
 pub fn two_soils() -> String {
     let runs: Vec<String> = (0..65).map(|_| "32,0,33,1".into()).collect();

@@ -1,12 +1,14 @@
 //! Soil after Bekker with unloading, Mohr-Coulomb strength and Janosi-Hanamoto shear.
 //!
 //! Pressure and shear act node by node as `terraglue-soil-law` says. The permanent sinkage lowers the ground under
-//! the foot: the soil is compacted, nothing is heaped up beside it. Where the displaced material goes is the
-//! business of `soil-cellular-automaton`.
+//! the foot: the soil is compacted, nothing is heaped up beside it. With `material_transport` the ruts slide by the
+//! rules of the automaton (`terraglue-soil-material`); what is pressed still becomes denser in place, unless
+//! `compacted_fraction` says that a part of it goes to the rim.
 
 use std::sync::Arc;
 use terraglue_soil_contact::{Covered, FieldSoil, Ground, Material};
-use terraglue_subsystem::{Config, Host, Kind, Module, Result, Schema, Subsystem};
+use terraglue_soil_material::{Automaton, Settings};
+use terraglue_subsystem::{Config, Host, Kind, Module, Parameter, ParameterType, Result, Schema, Subsystem};
 
 /// The module.
 pub struct SoilBekker;
@@ -17,13 +19,30 @@ impl Module for SoilBekker {
             name: "soil-bekker".into(),
             kind: Kind::Soil,
             help: "Bekker pressure-sinkage with unloading, Mohr-Coulomb and Janosi-Hanamoto shear".into(),
-            parameters: terraglue_soil_contact::schema(),
+            parameters: parameters(),
         }
     }
 
     fn instantiate(config: &Config, host: Arc<dyn Host>) -> Result<Box<dyn Subsystem>> {
+        if config.flag(TRANSPORT)? {
+            let settings = Settings::from_config(&config.clone().with_defaults(&Self::schema()))?;
+            return Ok(Box::new(FieldSoil::new(config, host.clone(), Automaton::new(settings, host))?));
+        }
         Ok(Box::new(FieldSoil::new(config, host, Compaction)?))
     }
+}
+
+/// Key of the option.
+const TRANSPORT: &str = "material_transport";
+/// Share of the pressed volume that becomes denser where a scenario is silent: all, as without transport.
+const ALL: f64 = 1.0;
+
+fn parameters() -> Vec<Parameter> {
+    let mut parameters = terraglue_soil_contact::schema();
+    let help = "material slides by the rules of the automaton: the walls of ruts fall in, mass is conserved";
+    parameters.push(Parameter::of(TRANSPORT, ParameterType::Bool, help).or(false));
+    parameters.extend(terraglue_soil_material::schema(ALL));
+    parameters
 }
 
 /// Lowers the ground to the depth that stays when the foot leaves.

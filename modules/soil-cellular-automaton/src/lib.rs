@@ -1,47 +1,13 @@
-//! Soil as a cellular automaton: angle of repose, curvature, active nodes, force-equivalent height.
+//! The module `soil-cellular-automaton`: the paper's automaton under the laws of pressure and shear that all soils share.
 //!
-//! The automaton moves material between the nodes of the height field in whole units of fixed point, so that
-//! nothing is lost; the forces on a foot come from the pressure and shear laws that all soils share
-//! (`terraglue-soil-contact`). Two rules act on the free surface (Rossmann, Jung and Rast 2010, section IV):
-//!
-//! * **Repose**, per face between the cells i and j: with g_n = h_i − h_j, the transverse slope g_t (mean of the
-//!   central differences of both cells) and g = √(g_n² + g_t²), the flux from i to j is
-//!   q = trunc(¼·(g − Δ·tan φ_r)₊·g_n/g). A plane of slope tan φ_r is at rest at any azimuth.
-//! * **Curvature**, per triple a–0–b of opposing neighbours in four directions at distance d: with
-//!   c = h_a − 2h_0 + h_b and e = (|c| − κ_max·d²)₊, q = trunc(e/24) goes from 0 to each end (c < 0), or from each
-//!   end to 0 (c > 0). e/6 would repair a single triple exactly; 1/24 is what twelve overlapping ones admit.
-//!
-//! Both are odd functions of one snapshot: the order in which nodes are visited cannot be seen. A flux is rounded down
-//! to whole units (0.24 µm). A sweep applies repose, every second one curvature as well; sweeps per step are bounded, what is
-//! not at rest then goes on in the next step.
-//!
-//! # Load
-//! A pressure p weighs as much as p/(N·ρ·g) of soil, N(z, b) = p_law(z, b)/(ρ·g·z): the force-equivalent height
-//! is z·p/p_law(z), so a node at the depth that the law asks for stands at its reference level and is in
-//! balance with the ground around it. Pressed deeper, it is too high by what it was pressed: this material
-//! leaves it within the commit and goes to the nearest free nodes in eight directions, weighted with 1/distance².
-//! Nothing flows into a node that carries a foot, and into a node below a foot only what fits under it.
+//! Where the material goes is told in `terraglue-soil-material`, what a foot feels in `terraglue-soil-contact`.
 
-mod active;
-mod automaton;
-mod compaction;
-mod displace;
-mod feet;
-mod kernel;
-mod regions;
-mod span;
-mod still;
-mod sweep;
-mod values;
-mod window;
-
-pub use automaton::{Automaton, Settings};
-pub use compaction::Compaction;
-pub use sweep::{Counts, Sweeper};
+pub use terraglue_soil_material::{Automaton, Compaction, Counts, Settings, Sweeper};
 
 use std::sync::Arc;
 use terraglue_soil_contact::FieldSoil;
-use terraglue_subsystem::{Config, Host, Kind, Module, Parameter, ParameterType, Result, Schema, Subsystem};
+use terraglue_soil_material::DEFAULT_COMPACTION;
+use terraglue_subsystem::{Config, Host, Kind, Module, Result, Schema, Subsystem};
 
 /// The module.
 pub struct SoilCellularAutomaton;
@@ -49,39 +15,7 @@ pub struct SoilCellularAutomaton;
 impl Module for SoilCellularAutomaton {
     fn schema() -> Schema {
         let mut parameters = terraglue_soil_contact::schema();
-        parameters.extend([
-            Parameter::number(
-                "curvature_max_per_m",
-                "",
-                automaton::DEFAULT_CURVATURE,
-                "largest curvature of the surface, 1/m",
-            )
-            .positive(),
-            Parameter {
-                unit: "rad".into(),
-                ..Parameter::of(
-                    "angle_of_repose_rad",
-                    ParameterType::Number,
-                    "angle of repose; phi_rad where it is left out",
-                )
-                .within(0.01, 1.4)
-                .optional()
-            },
-            Parameter::of(
-                "sweeps_per_step",
-                ParameterType::Integer,
-                "sweeps of the automaton per communication step; where it is left out a slide's front runs 20 m/s",
-            )
-            .within(0.0, 1e6)
-            .optional(),
-            Parameter::number(
-                "compacted_fraction",
-                "",
-                automaton::DEFAULT_COMPACTION,
-                "share of the pressed volume that becomes denser instead of moving to the rim",
-            )
-            .within(0.0, 1.0),
-        ]);
+        parameters.extend(terraglue_soil_material::schema(DEFAULT_COMPACTION));
         Schema {
             name: "soil-cellular-automaton".into(),
             kind: Kind::Soil,

@@ -1,0 +1,62 @@
+//! `material_transport`: the walls of a print fall in by the automaton's rules and no unit of material is lost.
+
+#[path = "../../../interfaces/soil-contact/tests/support/mod.rs"]
+mod support;
+
+use support::{LUNAR, Rig, Shown, flat, read, soil};
+use terraglue_ground::Surface;
+use terraglue_soil_bekker::SoilBekker as Soil;
+use terraglue_subsystem::Geometry;
+
+const DEPTH: f64 = 0.03;
+const SPACING: f64 = 0.01;
+const SIZE: i32 = 65;
+
+/// A disc of 5 cm pressed 3 cm deep and taken away, then three seconds of rest.
+fn print(more: &str) -> Rig {
+    let config = LUNAR.replacen('{', &format!("{{{more}"), 1);
+    let disc = Geometry::Cylinder { half_length: 0.1, radius: 0.05 };
+    let mut rig = Rig::new(soil::<Soil>(&config, SIZE as u32, SPACING, flat), disc, 1.0, 0.1);
+    let mut go = |by: f64, steps: u32| {
+        (0..steps).for_each(|_| drop(rig.prescribed_step(&[by, 0.0, 0.0, 0.0, 0.0, 0.0])));
+    };
+    go(-1e-4, (DEPTH / 1e-4) as u32);
+    go(0.01, 5);
+    go(0.0, 3000);
+    rig
+}
+
+/// Largest step between neighbours along x and y, m, and what lies below the initial surface in all, m.
+fn shape(rig: &Rig) -> (f64, f64) {
+    let (heights, sunk) = (Shown::new(&*rig.soil), Shown::field(&*rig.soil, "sinkage"));
+    let (mut step, mut sum) = (0.0_f64, 0.0);
+    for (i, j) in (0..SIZE - 1).flat_map(|j| (0..SIZE - 1).map(move |i| (i, j))) {
+        let here = heights.height(i, j);
+        step = step.max((heights.height(i + 1, j) - here).abs()).max((heights.height(i, j + 1) - here).abs());
+        sum += sunk.height(i, j);
+    }
+    (step, sum)
+}
+
+#[test]
+fn without_the_key_walls_stand() {
+    let (step, sum) = shape(&print(""));
+    assert!((step - DEPTH).abs() < 1e-3, "{step}");
+    assert!(sum * SPACING * SPACING > 0.9 * DEPTH * std::f64::consts::PI * 0.05 * 0.05);
+}
+
+#[test]
+fn with_it_they_fall_in_and_crater_is_rim_and_compaction() {
+    let slope = SPACING * libm::tan(0.610865238198);
+    for (compacted, dense) in [("", 1.0), (r#""compacted_fraction":0.4,"#, 0.4)] {
+        let rig = print(&format!(r#""material_transport":true,{compacted}"#));
+        let (step, sum) = shape(&rig);
+        assert!(step < 1.01 * slope, "{step} of {slope}");
+        assert_eq!(read(&*rig.soil, "mass_error_units"), 0.0);
+        assert_eq!(read(&*rig.soil, "active_nodes"), 0.0);
+        let booked = read(&*rig.soil, "compacted_volume") / (SPACING * SPACING);
+        assert!((sum - booked).abs() < 1e-9, "sunk {sum} m, booked {booked} m");
+        let pressed = DEPTH * std::f64::consts::PI * 0.05 * 0.05;
+        assert!((read(&*rig.soil, "compacted_volume") / (dense * pressed) - 1.0).abs() < 0.15, "{booked}");
+    }
+}

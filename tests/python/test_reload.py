@@ -36,6 +36,11 @@ def run(place, out, *arguments):
     return terraglue("run", "scenario.toml", "--csv", "--quiet", "--out", out, *arguments, cwd=place)
 
 
+def complaints(process):
+    """What was said on standard error, but for events that a short run does not reach."""
+    return [line for line in process.stderr.splitlines() if "never happens: the run ends" not in line]
+
+
 def built(folder, kind, language):
     place, _ = made(folder, kind, language)
     if language in ("c", "cpp"):
@@ -49,7 +54,7 @@ def test_the_same_code_in_mid_run_changes_no_number(tmp_path, kind, language):
     assert run(place, tmp_path / "a", "--duration", "0.2").returncode == 0
     process = run(place, tmp_path / "b", "--duration", "0.2", "--watch", "--reload-at", f"{kind}=90", "--reload-at",
                   f"{kind}=133")
-    assert process.returncode == 0 and process.stderr == "", process.stderr
+    assert process.returncode == 0 and not complaints(process), process.stderr
     assert rows(tmp_path / "a") == rows(tmp_path / "b")
     told = [e for e in events(tmp_path / "b") if e.startswith(f"reload {kind}: ")]
     assert len(told) == 2
@@ -130,7 +135,7 @@ def test_python_hands_its_state_to_other_code_by_migrate(tmp_path):
     source.write_text(text)
     (place / "new.py").write_text(other + '\n    def migrate(self, state):\n        return {**state, "age": 1}\n')
     process = run(place, tmp_path / "b", "--duration", "0.1", "--watch", "--reload-at", "controller=40")
-    assert process.returncode == 0 and process.stderr == "", process.stderr
+    assert process.returncode == 0 and not complaints(process), process.stderr
     assert rows(tmp_path / "a") == rows(tmp_path / "b")
 
 

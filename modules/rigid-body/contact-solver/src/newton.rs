@@ -74,6 +74,23 @@ pub(crate) struct Newton {
 }
 
 impl Newton {
+    /// With room for so many contacts.
+    pub fn with_room(contacts: usize) -> Self {
+        let n = 3 * contacts;
+        let numbers = || Vec::with_capacity(n);
+        Self {
+            branches: Vec::with_capacity(contacts),
+            active: Vec::with_capacity(n),
+            matrix: Vec::with_capacity(n * n),
+            rhs: numbers(),
+            step: numbers(),
+            motion: numbers(),
+            rho: Vec::with_capacity(contacts),
+            trial_r: numbers(),
+            trial_u: numbers(),
+        }
+    }
+
     /// Steps from r (with its u) until `done(r, u)`, the limit, or no decrease.
     pub fn run(
         &mut self,

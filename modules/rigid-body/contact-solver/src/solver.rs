@@ -76,6 +76,18 @@ const FIRST_SHIFT: f64 = 1e-2;
 const SHIFTS: [f64; 2] = [1e-10, 1e2];
 
 impl Solver {
+    /// With room for problems of so many contacts.
+    pub fn with_room(contacts: usize) -> Self {
+        let numbers = || Vec::with_capacity(3 * contacts);
+        Self {
+            newton: Newton::with_room(contacts),
+            u: numbers(),
+            best: numbers(),
+            shift: Vec::with_capacity(contacts),
+            anchor: numbers(),
+        }
+    }
+
     /// Solves for r, starting from what r holds; r is the best point found also where the tolerance was not met.
     pub fn solve(&mut self, problem: &Problem, options: &Options, r: &mut [f64]) -> Report {
         let n = problem.q.len();

@@ -97,24 +97,27 @@ pub(crate) struct BodyContacts {
 impl BodyContacts {
     /// Chooses the pairs at the initial pose.
     pub fn new(model: &Model, bodies: &[Motion]) -> Self {
+        let detector = Detector::new(model, bodies);
+        let room = detector.room();
+        let numbers = |per_point: usize| Vec::with_capacity(per_point * room);
         Self {
-            detector: Detector::new(model, bodies),
+            detector,
             surface: Surface { friction: 0.0, restitution: 0.0 },
             gravity: model.gravity.norm(),
-            points: Vec::new(),
-            wrenches: Vec::new(),
-            offsets: Vec::new(),
-            mu: Vec::new(),
-            impulses: Vec::new(),
-            q: Vec::new(),
-            w: Vec::new(),
+            points: Vec::with_capacity(room),
+            wrenches: Vec::with_capacity(room),
+            offsets: numbers(1),
+            mu: numbers(1),
+            impulses: numbers(3),
+            q: numbers(3),
+            w: numbers(9 * room),
             answers: Vec::new(),
             stride: 0,
             push: Vec::new(),
             law: Law::Cone,
-            solver: Solver::default(),
+            solver: Solver::with_room(room),
             pyramid: Pyramid::default(),
-            u: Vec::new(),
+            u: numbers(3),
             residual: 0.0,
         }
     }
@@ -242,6 +245,7 @@ impl BodyContacts {
         let touched = self.points.iter().flat_map(|p| p.bodies).flatten();
         self.stride = touched.map(|b| Path::len(tree, b)).max().unwrap_or(0);
         self.answers.clear();
+        self.answers.reserve(6 * self.detector.room() * self.stride);
         self.answers.resize(6 * n * self.stride, 0.0);
         for (k, (p, wrenches)) in self.points.iter().zip(&self.wrenches).enumerate() {
             for (c, sides) in wrenches.iter().enumerate() {

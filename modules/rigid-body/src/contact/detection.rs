@@ -82,10 +82,18 @@ pub(crate) fn frame(n: V3) -> [V3; 3] {
     [n, t1, n.cross(&t1)]
 }
 
+/// Points for which room is made beforehand at most.
+const MOST_ROOM: usize = 64;
+
 impl Detector {
     /// Whether any bodies can meet.
     pub fn watches(&self) -> bool {
         !self.pairs.is_empty()
+    }
+
+    /// Contact points that a step is expected to have at most: four of every shape.
+    pub fn room(&self) -> usize {
+        (4 * self.colliders.len()).min(MOST_ROOM)
     }
 
     /// Chooses the pairs at the initial pose.

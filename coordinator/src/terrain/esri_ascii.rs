@@ -144,10 +144,10 @@ fn unknown_key(file: &File, line: usize, key: &str) -> Error {
 }
 
 fn count(file: &File, line: usize, key: &str, value: f64) -> Result<usize> {
-    if value.fract() == 0.0 && (2.0..=1e6).contains(&value) {
+    if value.fract() == 0.0 && (1.0..=1e6).contains(&value) {
         Ok(value as usize)
     } else {
-        Err(file.error(line, format!("`{key}` = {value} is not a whole number from 2 to 1000000"), None))
+        Err(file.error(line, format!("`{key}` = {value} is not a whole number from 1 to 1000000"), None))
     }
 }
 

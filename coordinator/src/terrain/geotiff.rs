@@ -25,9 +25,6 @@ pub fn read_geotiff(path: &Path, fill: Option<f64>) -> Result<Raster> {
     let wrong = |message: String| input(path, message, None);
     let mut tiff = Decoder::new(BufReader::new(file)).map_err(|e| wrong(format!("not a TIFF file: {e}")))?;
     let (width, height) = tiff.dimensions().map_err(|e| wrong(e.to_string()))?;
-    if width < 2 || height < 2 {
-        return Err(wrong(format!("{width} × {height} pixels are no ground")));
-    }
     let step = pixel_scale(path, &mut tiff)?;
     let tie = tiff.get_tag_f64_vec(Tag::ModelTiepointTag).unwrap_or_default();
     let missing = tiff.get_tag_ascii_string(Tag::GdalNodata).ok();

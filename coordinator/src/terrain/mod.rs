@@ -81,6 +81,11 @@ const HIGHEST_M: f64 = 500.0;
 /// A file's raster as terrain. Heights beyond the range of the ground are lowered together so that the middle
 /// lies at 0, and the log says by how much.
 fn from_file(path: &str, mut raster: Raster, spacing: f64) -> Result<Box<dyn Terrain>> {
+    let [width, height] = raster.size;
+    if width < 2 || height < 2 {
+        let message = format!("{path}: {width} × {height} heights are no ground");
+        return Err(InputError::plain(message, Some("at least 2 × 2 are needed".to_owned())).into());
+    }
     if raster.heights.iter().any(|h| h.abs() > HIGHEST_M) {
         let middle = raster.heights[raster.size[0] * (raster.size[1] / 2) + raster.size[0] / 2].round();
         raster.heights.iter_mut().for_each(|h| *h -= middle);

@@ -35,9 +35,6 @@ pub fn read_png(path: &Path, greys: Greys, fill: Option<f64>) -> Result<Raster> 
     let mut bytes = vec![0; size];
     let frame = reader.next_frame(&mut bytes).map_err(|e| wrong(format!("cannot be read whole: {e}")))?;
     let [width, height] = [frame.width as usize, frame.height as usize];
-    if width < 2 || height < 2 {
-        return Err(wrong(format!("{width} × {height} pixels are no ground")));
-    }
     let channels = match frame.color_type {
         ColorType::Grayscale => 1,
         ColorType::GrayscaleAlpha => 2,

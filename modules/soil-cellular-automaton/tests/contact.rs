@@ -81,5 +81,5 @@ fn regions_of_a_mask_have_their_laws() {
 
 #[test]
 fn adhesion_pulls_only_where_it_is_set_and_lets_go() {
-    bars::adhesion_holds_until_it_lets_go::<Soil>();
+    bars::adhesion_holds_until_it_lets_go::<Soil>(false);
 }

@@ -31,8 +31,9 @@ pub fn ball_rests<M: Module>(config: &str, iterative: bool) {
     println!("sunk {:.3} mm, F {here:.2} N, evaluations {}", 1e3 * rig.sunk(), rig.evaluations);
 }
 
-/// Soil that clings holds a disc back with adhesion times area, once; without a contact before it never pulls.
-pub fn adhesion_holds_until_it_lets_go<M: Module>() {
+/// Soil that clings holds a disc back with adhesion times area, once; without a contact before it never pulls. Where material
+/// `stays`, the disc meets level soil again after it was lifted; on uneven soil the nodes let go one after the other.
+pub fn adhesion_holds_until_it_lets_go<M: Module>(stays: bool) {
     let (adhesion, radius) = (800.0, 0.0537);
     let area = std::f64::consts::PI * radius * radius;
     let config = LUNAR.replacen('{', &format!("{{\"adhesion_pa\":{adhesion},"), 1);
@@ -42,7 +43,7 @@ pub fn adhesion_holds_until_it_lets_go<M: Module>() {
     let still = [0.0; 6];
     let up = |by: f64| [by, 0.0, 0.0, 0.0, 0.0, 0.0];
     let (mut work, mut turned) = (0.0, 0.0);
-    for cycle in 0..3 {
+    for cycle in 0..if stays { 3 } else { 1 } {
         let mut least = 0.0_f64;
         let mut lift = |rig: &mut Rig, by: f64, steps: u32, least: &mut f64| {
             for _ in 0..steps {

@@ -137,7 +137,7 @@ impl Sweeper {
     /// Sets the angle of repose (rad) and the largest curvature (1/m) on nodes `spacing` (m) apart.
     pub fn set_limits(&mut self, repose: f64, curvature_max: f64, spacing: f64) {
         let straight = curvature_max * spacing * spacing / UNIT_M;
-        let curvature = (straight < SHARPEST).then_some([straight as i32, 2 * straight as i32]);
+        let curvature = (straight < SHARPEST).then(|| [straight as i32, 2 * straight as i32]);
         let repose = (spacing * libm::tan(repose) / UNIT_M) as f32;
         self.limits = Limits { repose, curvature };
     }

@@ -33,7 +33,7 @@ def scenario(folder, rows, text=ROWS):
     """plate_sinkage on dry sand with a mask; the plates lie at x = -0.2 m and 0.2 m."""
     own = SCENARIO.read_text().replace("LETE_sand", "dry_sand_LLL_K010").replace("../models", str(ROOT / "models"))
     own = own.replace("[soil]\n", f'[soil]\nparameters_file = "{ROOT}/models/soils.csv"\n')
-    png(folder / "regions.png", rows)
+    png(folder / "regions.png", rows * 2)
     path = folder / "regions.toml"
     path.write_text(own + text)
     return path
@@ -69,7 +69,7 @@ def test_label_zero_and_the_outside_are_the_own_soil(tmp_path):
 
 def test_wrong_masks_are_refused(tmp_path):
     for rows, text, said in (
-        ([[1, 3]], ROWS, ["label 3 of regions.png", "column 2, row 1", "stands for no soil"]),
+        ([[1, 3]], ROWS, ["label 3 of regions.png", "column 2, row 2", "stands for no soil"]),
         ([[1, 7]], ROWS.replace("1 = ", "one = "), ["`one` is no label"]),
         ([[1, 7]], ROWS.replace("LETE_sand", "LETE_sant"), ["there is no soil `LETE_sant`", "did you mean `LETE_sand`"]),
         ([[1, 7]], ROWS.replace("regions.png", "regio.png"), ["regio.png"]),

@@ -1,5 +1,7 @@
 //! Helpers for tests of whole runs.
 
+use glue_cases::{MassChain, PlanarBodies, PowerColumns, TableOnFeet};
+use terraglue::host::Library;
 use terraglue::scenario::Scenario;
 use terraglue::testbed::Options;
 use terraglue::{Result, Testbed};
@@ -23,6 +25,22 @@ pub fn shipped(name: &str, sets: &[(&str, &str)]) -> Scenario {
 /// Builds with one thread.
 pub fn build(scenario: &Scenario) -> Result<Testbed> {
     Testbed::build(scenario, &Options { threads: 1, ..Options::default() })
+}
+
+/// Builds a scenario of the modules of the glue cases from its text, with one thread.
+pub fn glued(text: &str) -> Result<Testbed> {
+    let scenario = Scenario::parse(text, "test.toml", &[])?;
+    let library = Library::new()
+        .with::<MassChain>()
+        .with::<PlanarBodies>()
+        .with::<TableOnFeet>()
+        .with::<PowerColumns>();
+    Testbed::build_with(&scenario, &Options { threads: 1, ..Options::default() }, &library)
+}
+
+/// The value of a variable that there is.
+pub fn read(testbed: &Testbed, name: &str) -> f64 {
+    testbed.read(name).unwrap_or_else(|| panic!("no variable {name}"))
 }
 
 /// Steps n times.

@@ -1,27 +1,11 @@
 //! Several groups of glued subsystems in one scenario, snapshots of what strategies remember, and steps set by the
 //! energy residual of the interface.
 
-use glue_cases::{MassChain, PlanarBodies, PowerColumns, TableOnFeet};
-use terraglue::host::Library;
-use terraglue::testbed::Options;
-use terraglue::{Result, Testbed, scenario::Scenario};
-
-fn try_build(text: &str) -> Result<Testbed> {
-    let scenario = Scenario::parse(text, "test.toml", &[])?;
-    let library = Library::new()
-        .with::<MassChain>()
-        .with::<PlanarBodies>()
-        .with::<TableOnFeet>()
-        .with::<PowerColumns>();
-    Testbed::build_with(&scenario, &Options { threads: 1, ..Options::default() }, &library)
-}
+use terraglue::Testbed;
+use terraglue_acceptance::{glued, read};
 
 fn build(text: &str) -> Testbed {
-    try_build(text).unwrap_or_else(|e| panic!("{e}\n{text}"))
-}
-
-fn read(testbed: &Testbed, name: &str) -> f64 {
-    testbed.read(name).unwrap_or_else(|| panic!("no variable {name}"))
+    glued(text).unwrap_or_else(|e| panic!("{e}\n{text}"))
 }
 
 fn head(gluing: &str) -> String {
@@ -94,7 +78,7 @@ fn glue_of_one_group_names_one_strategy_and_a_refusal_says_where() {
             + &spring("a", "b", &format!("strategy = \"{b}\""))
             + &spring("c", "b", &format!("strategy = \"{c}\""))
     };
-    let refused = try_build(&chain("jacobi", "gauss-seidel")).err().expect("two strategies in one group");
+    let refused = glued(&chain("jacobi", "gauss-seidel")).err().expect("two strategies in one group");
     assert!(refused.to_string().contains("another strategy is named before"), "{refused}");
     build(&chain("jacobi", "jacobi"));
     // the contact group can be cooperative, the joint between c and d cannot
@@ -108,10 +92,10 @@ fn glue_of_one_group_names_one_strategy_and_a_refusal_says_where() {
             + &joint
             + own
     };
-    let refused = try_build(&mixed("")).err().expect("a joint needs another strategy");
+    let refused = glued(&mixed("")).err().expect("a joint needs another strategy");
     assert!(refused.to_string().contains("co-operates at contacts"), "{refused}");
     build(&mixed("strategy = \"iterative\"\n"));
-    let unchecked = try_build(&(head("strategy = \"semi-implicit\"") + FOOT + FOOT_GLUE)).err();
+    let unchecked = glued(&(head("strategy = \"semi-implicit\"") + FOOT + FOOT_GLUE)).err();
     let unchecked = unchecked.expect("one unchecked step is not enough for a contact").to_string();
     assert!(unchecked.contains("does not check it"), "{unchecked}");
 }
@@ -192,18 +176,18 @@ fn the_energy_residual_sets_the_steps_where_there_is_one() {
         (oscillator(""), oscillator("energy_residual_j = 1e-4"), oscillator("energy_residual_j = 1e-6"));
     println!("{fixed}, {coarse} and {fine} steps");
     assert!(fixed == 100 && fixed < coarse && 2 * coarse < fine);
-    let refused = try_build(&pendulum("energy_residual_j = 1e-4\nstrategy = \"iterative\"")).err();
+    let refused = glued(&pendulum("energy_residual_j = 1e-4\nstrategy = \"iterative\"")).err();
     let refused = refused.expect("rigid joints have no residual").to_string();
     assert!(refused.contains("no soil and no spring is glued"), "{refused}");
     let text =
         head("strategy = \"iterative\"\nenergy_residual_j = 1e-4\nstep_min_s = 0.1") + FOOT + FOOT_GLUE;
-    let refused = try_build(&text).err().expect("the shortest step is longer than the longest").to_string();
+    let refused = glued(&text).err().expect("the shortest step is longer than the longest").to_string();
     assert!(refused.contains("longer than time.step_s"), "{refused}");
 }
 
 #[test]
 fn a_two_parameter_hold_is_refused_where_it_cannot_be() {
-    let refused = |text: &str| try_build(text).err().expect("refused").to_string();
+    let refused = |text: &str| glued(text).err().expect("refused").to_string();
     let rods = refused(&pendulum("strategy = \"iterative\"\nhold = \"two-parameter\""));
     assert!(rods.contains("takes one force per step, not two"), "{rods}");
     let level =

@@ -2,27 +2,11 @@
 //!
 //! Models, integrators and figures: `tests/reference/gluing/README.md`.
 
-use glue_cases::{MassChain, PlanarBodies, PowerColumns, TableOnFeet};
-use terraglue::host::Library;
-use terraglue::testbed::Options;
-use terraglue::{Result, Testbed, scenario::Scenario};
-
-fn try_build(text: &str) -> Result<Testbed> {
-    let scenario = Scenario::parse(text, "test.toml", &[])?;
-    let library = Library::new()
-        .with::<MassChain>()
-        .with::<PlanarBodies>()
-        .with::<TableOnFeet>()
-        .with::<PowerColumns>();
-    Testbed::build_with(&scenario, &Options { threads: 1, ..Options::default() }, &library)
-}
+use terraglue::{Result, Testbed};
+use terraglue_acceptance::{glued, read};
 
 fn build(text: &str) -> Testbed {
-    try_build(text).unwrap_or_else(|e| panic!("{e}"))
-}
-
-fn read(testbed: &Testbed, name: &str) -> f64 {
-    testbed.read(name).unwrap_or_else(|| panic!("no variable {name}"))
+    glued(text).unwrap_or_else(|e| panic!("{e}"))
 }
 
 /// What a run did: mean evaluations of the bodies, Jacobian refreshes, evaluations for them, largest gap.
@@ -179,7 +163,7 @@ fn holds_and_levels_for_subsystems_that_sub_cycle() {
         let (a, b) = (read(&level, "a.m0.v"), read(&level, "b.m0.v"));
         assert!((a - 0.25).abs() < 1e-12 && (b - 0.25).abs() < 1e-12, "{hold}: {a} {b}");
     }
-    let refused = try_build(&masses("hold = \"linear\"")).err().expect("linear hold at position level");
+    let refused = glued(&masses("hold = \"linear\"")).err().expect("linear hold at position level");
     assert!(refused.to_string().contains("2 + √3"), "{refused}");
 }
 

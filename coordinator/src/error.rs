@@ -21,6 +21,16 @@ pub enum Error {
         /// What it said.
         message: String,
     },
+    /// A glued subsystem cannot go to the end of the step; the testbed repeats it with half the length.
+    #[error("`{subsystem}` ended the step early in {function}, at t = {reached_s} s")]
+    Early {
+        /// Name in the scenario.
+        subsystem: String,
+        /// Function of the interface.
+        function: &'static str,
+        /// How far it went, s.
+        reached_s: f64,
+    },
     /// The gluing did not converge (exit code 1).
     #[error("gluing by `{strategy}` did not converge at t = {time_s} s: {message}")]
     NotConverged {

@@ -293,7 +293,10 @@ impl Testbed {
                 group.passage.look(&mut group.exchange);
             }
             // steps 2 to 4: estimate, compatibility, the bodies under the soil's force
-            let outcome = group.strategy.solve(&mut group.exchange, &mut self.instances)?;
+            let outcome = match group.strategy.solve(&mut group.exchange, &mut self.instances) {
+                Err(early @ Error::Early { .. }) => Outcome::NotConverged(early.to_string()),
+                outcome => outcome?,
+            };
             if outcome != Outcome::Converged {
                 self.failed = group.strategy.name();
                 return Ok(outcome);

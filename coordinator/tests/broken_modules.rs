@@ -90,10 +90,13 @@ fn their_twins_without_the_mistake_pass() {
     let mut sources: Vec<String> = defects().into_iter().map(|d| d.source).collect();
     sources.dedup();
     for source in sources {
-        let variants: &[&[String]] =
-            if source == "soil" { &[&[], &["WITH_FIELD".to_owned()]] } else { &[&[]] };
+        let variants: &[&[String]] = match source.as_str() {
+            "soil" => &[&[], &["WITH_FIELD".to_owned()]],
+            "law" => &[&[], &["KEEPS".to_owned()]],
+            _ => &[&[]],
+        };
         for switches in variants {
-            let only: &[&str] = if switches.is_empty() {
+            let only: &[&str] = if switches.is_empty() || source == "law" {
                 &[]
             } else {
                 &["steps", "no-ground-from-nothing", "ground-follows-foot"]

@@ -189,7 +189,7 @@ def test_a_later_minor_runs_and_a_later_major_is_refused(tmp_path):
     place = built_with(tmp_path / "major", text.replace("#define TG_ABI_MAJOR 2", "#define TG_ABI_MAJOR 3"))
     process = terraglue("run", "scenario.toml", "--quiet", cwd=place)
     told = " ".join(process.stderr.replace("│", " ").split())
-    assert process.returncode == 2 and "built for ABI 3.0" in told and "build the module again" in told, told
+    assert process.returncode == 2 and f"built for ABI 3.{minor}" in told and "build the module again" in told, told
 
 
 def test_a_module_for_another_machine_is_refused(tmp_path):

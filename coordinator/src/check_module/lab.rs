@@ -4,7 +4,7 @@ use super::check_file::CheckFile;
 use super::finding::{Stop, Verdict};
 use super::rig::Flat;
 use super::{Level, catalogue::Area};
-use crate::host::{HostServices, Instance, LoadError, LoadedModule};
+use crate::host::{HostServices, Instance, LoadError, LoadedModule, SearchPath, law};
 use crate::terrain::SplitMix64;
 use serde_json::{Map, Value};
 use std::path::PathBuf;
@@ -22,6 +22,9 @@ const SOIL: [(&str, f64); 8] = [
     ("density_kg_m3", 1500.0),
     ("cohesion_pa", 170.0),
 ];
+
+/// The soil in which a law is stepped.
+const SOIL_OF_LAWS: &str = "soil-bekker";
 
 /// The module under test, its parameters, and how hard to try.
 pub struct Lab {
@@ -63,12 +66,30 @@ impl Lab {
         quick * [1, 2, 20][self.level as usize]
     }
 
-    /// The module.
+    /// The module itself.
     ///
     /// # Errors
     /// A finding: it cannot be loaded.
-    pub fn module(&self) -> Verdict<LoadedModule> {
+    pub fn own_module(&self) -> Verdict<LoadedModule> {
         LoadedModule::load(&self.path).map_err(|e| not_usable("loading", &e))
+    }
+
+    /// The module that is stepped: itself, or the soil around a law.
+    ///
+    /// # Errors
+    /// A finding: it cannot be loaded; a skip: a law, and no soil is at hand.
+    pub fn module(&self) -> Verdict<LoadedModule> {
+        let own = self.own_module()?;
+        if own.schema().kind != Kind::Law {
+            return Ok(own);
+        }
+        let search = SearchPath::standard(&[], &self.folder);
+        let Some(path) = search.locate(SOIL_OF_LAWS) else {
+            return Err(Stop::Skip(format!(
+                "the soil `{SOIL_OF_LAWS}` is not beside the program: the law was not stepped"
+            )));
+        };
+        LoadedModule::load(&path).map_err(|e| not_usable("loading", &e))
     }
 
     /// Services as the coordinator gives them: earth's gravity, level ground of a metre, eight slots.
@@ -94,6 +115,11 @@ impl Lab {
             if let Some(value) = value {
                 insert(&mut map, &p.name, value);
             }
+        }
+        let takes_law = schema.parameters.iter().any(|p| p.name == law::KEY);
+        if takes_law && self.kind() == Some(Kind::Law) {
+            let path = std::path::absolute(&self.path).unwrap_or_else(|_| self.path.clone());
+            insert(&mut map, law::KEY, path.to_string_lossy().into());
         }
         for (name, value) in &self.sets {
             insert(&mut map, name, value.clone());

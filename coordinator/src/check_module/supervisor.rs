@@ -1,6 +1,6 @@
 //! Runs the tests, each in a process of its own, several at a time, each with a time limit.
 
-use super::catalogue::{Test, catalogue};
+use super::catalogue::{Area, Test, catalogue};
 use super::check_file::CheckFile;
 use super::finding::{Finding, Outcome};
 use super::report::{Report, Row};
@@ -91,11 +91,34 @@ pub fn check(module: &Path, options: &Options) -> Result<Report, String> {
 }
 
 fn wanted(test: &Test, kind: Option<Kind>, options: &Options) -> bool {
-    let for_it = test.kinds.is_empty() || kind.is_none_or(|k| test.kinds.contains(&k));
+    let for_it = match kind {
+        Some(Kind::Law) => for_law(test),
+        _ => test.kinds.is_empty() || kind.is_none_or(|k| test.kinds.contains(&k)),
+    };
     if options.only.is_empty() {
         return for_it && test.level <= options.level;
     }
     for_it && options.only.iter().any(|n| n == test.name)
+}
+
+/// Tests of soils and of all modules that a law, stepped inside a soil, can break.
+const IN_A_SOIL: [&str; 8] = [
+    "instantiates",
+    "steps",
+    "trials-invisible",
+    "save-restore",
+    "jacobian-soil",
+    "jacobian-force",
+    "no-allocation",
+    "four-threads",
+];
+
+/// Whether a test is one for laws: their own, those of any library, and the physics of the soil that takes the law.
+fn for_law(test: &Test) -> bool {
+    let physics =
+        test.area == Area::Physics && test.level == Level::Quick && test.kinds.contains(&Kind::Soil);
+    let any = test.kinds.is_empty() && test.area == Area::Library;
+    test.kinds.contains(&Kind::Law) || any || physics || IN_A_SOIL.contains(&test.name)
 }
 
 struct Bench<'a> {

@@ -1,8 +1,8 @@
 //! One subsystem's view of the glue of a group: its own ports, and the way between its packed vectors and the
 //! group's.
 
-use crate::Result;
 use crate::host::{Instance, Progress};
+use crate::{Error, Result};
 use terraglue_subsystem::{
     Capabilities, Estimate, Hold, Input, Law, Level, Motion, Node, Port, Response, Step,
 };
@@ -454,14 +454,13 @@ impl Side {
     }
 }
 
-/// Glued subsystems go to the end of the step together; one that cannot is an error of its own.
+/// Glued subsystems go to the end of the step together: one that cannot makes all of them repeat a shorter one.
 fn complete(instance: &Instance, function: &'static str, progress: Progress) -> Result {
     match progress {
         Progress::Complete => Ok(()),
-        Progress::Early { reached_s } => Err(instance.error(
-            function,
-            format!("ended the step early, at t = {reached_s} s; make time.step_s shorter"),
-        )),
+        Progress::Early { reached_s } => {
+            Err(Error::Early { subsystem: instance.name().to_owned(), function, reached_s })
+        }
     }
 }
 

@@ -1,4 +1,5 @@
-//! Why a module cannot be used; each cause with its own message.
+//! Why a module cannot be used; each cause with its own message and a number, under which `docs/plugins/errors.md` tells the
+//! cure at length.
 
 use std::path::PathBuf;
 use terraglue_plugin::TableError;
@@ -8,7 +9,7 @@ use terraglue_plugin::TableError;
 #[non_exhaustive]
 pub enum LoadError {
     /// No file of the name; the search path and the nearest name say what to do.
-    #[error("no module `{name}`{}; looked for {file} in:{}", hint(.nearest), lines(.looked))]
+    #[error("[TG01] no module `{name}`{}; looked for {file} in:{}", hint(.nearest), lines(.looked))]
     Unknown {
         /// Name in the scenario.
         name: String,
@@ -20,21 +21,33 @@ pub enum LoadError {
         nearest: Option<String>,
     },
     /// A path that leads to no file.
-    #[error("there is no module file {}", .path.display())]
+    #[error("[TG02] there is no module file {}", .path.display())]
     MissingFile {
         /// Path.
         path: PathBuf,
     },
     /// Not a shared library at all.
-    #[error("{} is not a shared library: {reason}", .path.display())]
+    #[error("[TG03] {} is not a shared library: {reason}", .path.display())]
     NotALibrary {
         /// Path.
         path: PathBuf,
         /// Why.
         reason: String,
     },
+    /// A shared library for another kind of machine.
+    #[error(
+        "[TG04] {} cannot be loaded: it is made for another kind of machine (ELF number {machine}); build it on this \
+         machine, or for it",
+        .path.display()
+    )]
+    OtherMachine {
+        /// Path.
+        path: PathBuf,
+        /// Its number in the ELF header.
+        machine: usize,
+    },
     /// A shared library that the system does not load.
-    #[error("{} cannot be loaded: {reason}", .path.display())]
+    #[error("[TG05] {} cannot be loaded: {reason}", .path.display())]
     CannotLoad {
         /// Path.
         path: PathBuf,
@@ -43,7 +56,7 @@ pub enum LoadError {
     },
     /// A shared library that is no module.
     #[error(
-        "{} is a shared library but no Terraglue module: it has no symbol `{}` ({reason}); a module in Rust \
+        "[TG06] {} is a shared library but no Terraglue module: it has no symbol `{}` ({reason}); a module in Rust \
          invokes export_subsystem!, one in C defines that function",
         .path.display(),
         terraglue_plugin::ENTRY
@@ -56,7 +69,7 @@ pub enum LoadError {
     },
     /// Another version of the ABI, read from the section `.terraglue` without running the library.
     #[error(
-        "{} was built for ABI {found}, this program speaks ABI {}.{}; build the module again with the header or \
+        "[TG07] {} was built for ABI {found}, this program speaks ABI {}.{}; build the module again with the header or \
          the crate of this version",
         .path.display(),
         terraglue_plugin::abi::TG_ABI_MAJOR,
@@ -69,7 +82,7 @@ pub enum LoadError {
         found: String,
     },
     /// A table of functions that cannot be used.
-    #[error("{} cannot be used: {source}", .path.display())]
+    #[error("[TG08] {} cannot be used: {source}", .path.display())]
     Table {
         /// Path.
         path: PathBuf,
@@ -77,7 +90,7 @@ pub enum LoadError {
         source: TableError,
     },
     /// A module that does not say what it is.
-    #[error("{} does not describe itself: {message}", .path.display())]
+    #[error("[TG09] {} does not describe itself: {message}", .path.display())]
     Schema {
         /// Path.
         path: PathBuf,
@@ -85,7 +98,7 @@ pub enum LoadError {
         message: String,
     },
     /// The parameters of the scenario are not acceptable.
-    #[error("{subsystem} ({module}): {message}")]
+    #[error("[TG10] {subsystem} ({module}): {message}")]
     Refused {
         /// Name in the scenario.
         subsystem: String,
@@ -95,7 +108,7 @@ pub enum LoadError {
         message: String,
     },
     /// The module failed at its start.
-    #[error("{subsystem} ({module}): instantiate failed: {message}")]
+    #[error("[TG11] {subsystem} ({module}): instantiate failed: {message}")]
     Instantiate {
         /// Name in the scenario.
         subsystem: String,

@@ -4,6 +4,7 @@
 use super::elf::{Description, foreign_machine, is_elf, needed_length};
 use super::error::LoadError;
 use super::isolation::{self, Isolation, What};
+use super::law::{self, LawHost};
 use super::python::{self, PythonFile};
 use super::search::{SearchPath, file_name, is_path, python_name};
 use super::{HostServices, Instance};
@@ -120,6 +121,10 @@ impl LoadedModule {
 
     /// The subsystem alone, without supervision.
     pub(crate) fn make(&self, config: &Config, host: Arc<dyn Host>) -> Result<Box<dyn Subsystem>> {
+        let host = match law::of_config(&self.schema, config, Path::new(host.folder()))? {
+            Some(law) => Arc::new(LawHost { host, law }),
+            None => host,
+        };
         match &self.origin {
             Origin::Builtin(instantiate) => instantiate(config, host),
             Origin::Foreign(module, _) => {
@@ -201,8 +206,7 @@ fn inspect(path: &Path) -> std::result::Result<(), LoadError> {
         return Err(LoadError::NotALibrary { path: path_buf(), reason });
     }
     if let Some(machine) = foreign_machine(&bytes) {
-        let reason = format!("it is made for another kind of machine (ELF number {machine})");
-        return Err(LoadError::CannotLoad { path: path_buf(), reason });
+        return Err(LoadError::OtherMachine { path: path_buf(), machine });
     }
     match Description::of(&bytes) {
         Some(d) if d.abi_major() != Some(TG_ABI_MAJOR) => {
@@ -283,17 +287,22 @@ impl Library {
     fn unknown(&self, name: &str, search: &SearchPath) -> LoadError {
         let found = search.all().into_iter().map(|(n, _)| n);
         let names = self.builtins.iter().map(|m| m.schema.name.clone()).chain(found);
-        let near = names
-            .map(|n| (strsim::normalized_damerau_levenshtein(&n, name), n))
-            .filter(|(likeness, _)| *likeness > 0.4)
-            .max_by(|a, b| a.0.total_cmp(&b.0));
         LoadError::Unknown {
             name: name.into(),
             file: format!("{} or {}", file_name(name), python_name(name)),
             looked: search.folders().to_vec(),
-            nearest: near.map(|(_, n)| n),
+            nearest: nearest(name, names),
         }
     }
+}
+
+/// The name that is most like one that was not found.
+pub(super) fn nearest(name: &str, names: impl Iterator<Item = String>) -> Option<String> {
+    let near = names
+        .map(|n| (strsim::normalized_damerau_levenshtein(&n, name), n))
+        .filter(|(likeness, _)| *likeness > 0.4)
+        .max_by(|a, b| a.0.total_cmp(&b.0));
+    near.map(|(_, n)| n)
 }
 
 /// A module on the search path.

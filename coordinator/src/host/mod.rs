@@ -11,6 +11,7 @@ mod error;
 pub mod exit_guard;
 mod instance;
 pub mod isolation;
+pub mod law;
 mod library;
 mod probe;
 mod process;

@@ -47,7 +47,7 @@ impl SearchPath {
     }
 
     /// The first file of a module of this name.
-    pub(super) fn locate(&self, name: &str) -> Option<PathBuf> {
+    pub(crate) fn locate(&self, name: &str) -> Option<PathBuf> {
         let [library, source] = [file_name(name), python_name(name)];
         self.folders.iter().find_map(|f| {
             let found = Some(f.join(&library)).filter(|p| p.is_file());

@@ -64,7 +64,7 @@ impl Kind {
             Self::Controller => {
                 format!("Your control law goes into `control` of `{source}`: inputs in, outputs out.")
             }
-            Self::Law => format!("Your physics goes into `[soil.law]` of `{source}`."),
+            Self::Law => format!("Your physics goes into `pressure` and `shear` of `{source}`."),
         }
     }
 }
@@ -137,7 +137,10 @@ const LAW: File =
 fn source(kind: Kind, language: Language) -> Option<File> {
     Some(match (kind, language) {
         (Kind::Law, Language::Scenario) => LAW,
-        (Kind::Law, _) | (_, Language::Scenario) => return None,
+        (_, Language::Scenario) | (Kind::Law, Language::Python) => return None,
+        (Kind::Law, Language::Rust) => ("src/lib.rs", "the law", include_str!("templates/law.rs.in")),
+        (Kind::Law, Language::C) => ("my_module.c", "the law", include_str!("templates/law.c.in")),
+        (Kind::Law, Language::Cpp) => ("my_module.cpp", "the law", include_str!("templates/law.cpp.in")),
         (Kind::Soil, Language::Rust) => ("src/lib.rs", "the soil", include_str!("templates/soil.rs.in")),
         (Kind::Soil, Language::C) => ("my_module.c", "the soil", include_str!("templates/soil.c.in")),
         (Kind::Soil, Language::Cpp) => ("my_module.cpp", "the soil", include_str!("templates/soil.cpp.in")),
@@ -165,7 +168,7 @@ fn source(kind: Kind, language: Language) -> Option<File> {
     })
 }
 
-fn scenario(kind: Kind) -> &'static [File] {
+fn scenario(kind: Kind, language: Language) -> &'static [File] {
     match kind {
         Kind::Soil => {
             &[("scenario.toml", "a ball falls on it", include_str!("templates/scenario-soil.toml.in")), BALL]
@@ -173,7 +176,11 @@ fn scenario(kind: Kind) -> &'static [File] {
         Kind::Robot => {
             &[("scenario.toml", "it falls on a soil", include_str!("templates/scenario-robot.toml.in"))]
         }
-        Kind::Law => &[BALL],
+        Kind::Law if language == Language::Scenario => &[BALL],
+        Kind::Law => &[
+            ("scenario.toml", "a ball falls on it", include_str!("templates/scenario-law-module.toml.in")),
+            BALL,
+        ],
         Kind::Controller => &[
             ("scenario.toml", "it moves an arm", include_str!("templates/scenario-controller.toml.in")),
             ARM,
@@ -201,11 +208,12 @@ pub(super) fn fill(
     match language {
         Language::Rust => files.extend(RUST),
         Language::C => files.extend([HEADER, MAKEFILE]),
+        Language::Cpp if kind == Kind::Law => files.extend([HEADER, MAKEFILE]),
         Language::Cpp => files.extend([HEADER, CLASS, MAKEFILE]),
         Language::Python => files.extend(PYTHON),
         Language::Scenario => {}
     }
-    files.extend(scenario(kind));
+    files.extend(scenario(kind, language));
     let interfaces = match (&place.interfaces, language) {
         (Some(folder), _) => folder.to_string_lossy().into_owned(),
         (None, Language::Rust) => return Err(ScaffoldError::NoCrates),
@@ -241,7 +249,7 @@ pub(super) fn fill(
         ("@where@", kind.place_of_physics(source.0)),
         ("@starts@", kind.starts().into()),
         ("@kind@", kind.word().into()),
-        ("@table@", kind.word().into()),
+        ("@table@", if kind == Kind::Law { "soil.law.parameters".into() } else { kind.word().into() }),
         ("@language@", language.title().into()),
         ("@interfaces@", interfaces),
         (
@@ -256,7 +264,9 @@ pub(super) fn fill(
         ("my_module", snake),
     ];
     files.push(match kind {
-        Kind::Law => ("README.md", "this page", include_str!("templates/README-law.md.in")),
+        Kind::Law if language == Language::Scenario => {
+            ("README.md", "this page", include_str!("templates/README-law.md.in"))
+        }
         _ => ("README.md", "this page", include_str!("templates/README.md.in")),
     });
     let replaced = |text: &str| words.iter().fold(text.to_owned(), |text, (word, by)| text.replace(word, by));

@@ -25,6 +25,7 @@ mod terrain;
 mod tests;
 
 pub use check::allowed_values;
+pub(crate) use check::check_value;
 pub use mask::resolve as resolve_mask;
 pub use model::*;
 pub use nearest::{did_you_mean, nearest};

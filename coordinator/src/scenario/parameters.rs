@@ -94,7 +94,11 @@ impl Check<'_> {
     }
 
     fn value(&self, parameter: &Parameter, name: &str, value: &Value) -> Result<(), Box<InputError>> {
-        check_value(parameter, None, value).map_err(|c| self.complain(name, c))?;
+        // a name of one's own may be a bare number as well as a number with its unit in quotes
+        let bare = parameter.name.ends_with(".*") && parameter.parameter_type == ParameterType::Text;
+        if !(bare && value.is_number()) {
+            check_value(parameter, None, value).map_err(|c| self.complain(name, c))?;
+        }
         match (parameter.parameter_type, value.as_str()) {
             (ParameterType::Path, Some(text)) => {
                 must_exist(self.source, text).map_err(|c| self.complain(name, c))

@@ -7,6 +7,7 @@ use crate::gluing::glue::Recipe;
 use crate::gluing::step_control::{Passage, StepControl};
 use crate::gluing::{self, Exchange, StepReport};
 use crate::host::isolation::{self, What};
+use crate::host::law;
 use crate::host::{
     HostServices, Instance, Library, LoadError, LoadedModule, Progress, SearchPath, Workers, interpreter,
 };
@@ -157,9 +158,26 @@ fn instantiate(
                 log::warn!("{advice}");
             }
         }
+        let config = with_law(config, &search, scenario, spec)?;
         instances.push(make(scenario, spec, module, config, services)?);
     }
     Ok(instances)
+}
+
+/// The same parameters with the file of the law that they name.
+fn with_law(
+    config: Config,
+    search: &SearchPath,
+    scenario: &Scenario,
+    spec: &SubsystemSpec,
+) -> Result<Config> {
+    let Some(name) = config.get(law::KEY).and_then(|v| v.as_str()) else { return Ok(config) };
+    let path = law::locate(name, search, &scenario.folder).map_err(|e| {
+        let help = e.nearest().map(|n| format!("did you mean `{n}`?"));
+        scenario.source.error_at_value(&[&spec.name, "law", "plugin"], e.to_string(), help)
+    })?;
+    let path = std::path::absolute(&path).unwrap_or(path);
+    Ok(config.with(law::KEY, path.to_string_lossy().as_ref()))
 }
 
 /// A functional mock-up unit as an instance.

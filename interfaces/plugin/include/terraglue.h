@@ -40,7 +40,7 @@
 /* Version of the ABI that breaks: host and module must agree. */
 #define TG_ABI_MAJOR 2
 /* Version of the ABI that grows: new fields at the end of `tg_subsystem` and `tg_host`. */
-#define TG_ABI_MINOR 0
+#define TG_ABI_MINOR 1
 /* Success. */
 #define TG_OK 0
 /* The step is too long: `reached` (s) says how far it could go. The host may repeat with a shorter step. */
@@ -524,6 +524,100 @@ typedef struct {
     double electrical;
 } tg_energy;
 
+/* Nodes of one contact at one trial of a step, one entry per node in each array. */
+typedef struct {
+    /* Number of nodes. */
+    size_t n;
+    /* The numbers of the law, in the order of its schema. */
+    const double *parameters;
+    /* How many. */
+    size_t n_parameters;
+    /* Size of the contact, m: radius of a disc, short side of a rectangle, width of a wheel. */
+    double b;
+    /* Length of the step, s; 0: no time passes. */
+    double h;
+    /* Depth below the level at which the surface would be if the node had never been pressed, m; larger than zero
+     * for a law without state. */
+    const double *depth;
+    /* Laws with state only, else null: depth of the unloaded surface, m. */
+    const double *permanent;
+    /* Laws with state only, else null: accumulated slip, m. */
+    const double *slip;
+    /* Laws with state only, else null: the committed state, `state_doubles` per node. */
+    const double *state;
+} tg_pressure_nodes;
+
+/* Answer of a pressure law; filled with NaN before the call. */
+typedef struct {
+    /* Pressure, Pa; never negative. */
+    double *pressure;
+    /* Its derivative by the depth, Pa/m. */
+    double *slope;
+    /* Laws with state only, else null: depth of the unloaded surface after this step, m. */
+    double *permanent;
+    /* Laws with state only, else null: the state after this step. */
+    double *state;
+    /* Longest step that the law can answer for, s; inf before the call. Smaller than h: the step is repeated
+     * with it. */
+    double longest;
+} tg_pressure_answer;
+
+/* Nodes that are sheared. */
+typedef struct {
+    /* Number of nodes. */
+    size_t n;
+    /* The numbers of the law, in the order of its schema. */
+    const double *parameters;
+    /* How many. */
+    size_t n_parameters;
+    /* Length of the step, s. */
+    double h;
+    /* Pressure, Pa; not negative. */
+    const double *pressure;
+    /* Accumulated slip since the contact began, m. */
+    const double *slip;
+    /* Laws with state only, else null: the committed state. */
+    const double *state;
+} tg_shear_nodes;
+
+/* Answer of a shear law; filled with NaN before the call. */
+typedef struct {
+    /* Stress up to which the soil is elastic, Pa; it falls neither with the pressure nor with the slip. */
+    double *stress;
+    /* Its derivative by the pressure. */
+    double *by_pressure;
+    /* Its derivative by the slip, Pa/m. */
+    double *by_slip;
+    /* As in `tg_pressure_answer`. */
+    double longest;
+} tg_shear_answer;
+
+/* The functions of a law. They keep nothing from call to call and are called from any thread, several at a time.
+ * A law without state is the curve of first loading; unloading is elastic by the rule of the soil. A law with
+ * state answers for unloading, too. */
+typedef struct {
+    /* sizeof(tg_node_law) of the module. Entries beyond it count as null. */
+    uint32_t size;
+    /* Doubles per node that the soil keeps for the law; at most 16. */
+    uint32_t state_doubles;
+    /* Pressure and slope of all nodes; null: the soil's own pressure law acts. */
+    tg_status (*pressure)(const tg_pressure_nodes *nodes, tg_pressure_answer *out);
+    /* Yield stress of all nodes; null: the soil's own shear law acts. */
+    tg_status (*shear)(const tg_shear_nodes *nodes, tg_shear_answer *out);
+} tg_node_law;
+
+/* A law with its numbers, as a soil gets it. */
+typedef struct {
+    /* Name, for messages. */
+    const char *name;
+    /* Its functions. */
+    const tg_node_law *law;
+    /* Its numbers, for `parameters` of every call. */
+    const double *parameters;
+    /* How many. */
+    size_t n_parameters;
+} tg_open_law;
+
 /* One piece of a parallel loop. */
 typedef void (*tg_job)(void *arg, size_t index);
 
@@ -577,6 +671,9 @@ typedef struct {
     uint32_t max_nodes;
     /* 0. */
     uint32_t reserved;
+    /* Since ABI 2.1. The law that the scenario names in the parameter `law.plugin` of this subsystem, valid until
+     * `free`; null: none. */
+    const tg_open_law *law;
 } tg_host;
 
 /* A module: what `terraglue_subsystem()` returns. Constant; lives as long as the process. */
@@ -670,8 +767,7 @@ typedef struct {
     tg_status (*field_tile)(void *instance, size_t field, uint32_t a, uint32_t b, tg_field_tile *out);
     /* Energies of the committed state. */
     tg_status (*energy)(void *instance, tg_energy *out);
-    /* Reserved for modules of kind TG_LAW, null in ABI 1.0: pressure (Pa) and its tangent (Pa/m) at the
-     * sinkages (m) of n nodes below a contact of width `b` (m); `state` holds law_state_doubles per node. */
+    /* Null: kept for the layout of ABI 2.0; see `law`. */
     tg_status (*pressure)(void *instance,
                           size_t n,
                           const double *sinkage,
@@ -679,8 +775,7 @@ typedef struct {
                           double *state,
                           double *pressure,
                           double *tangent);
-    /* Reserved for modules of kind TG_LAW, null in ABI 1.0: shear stress (Pa) along two tangents at the
-     * pressures (Pa) and shear displacements (m, two per node) of n nodes. */
+    /* Null: kept for the layout of ABI 2.0; see `law`. */
     tg_status (*shear)(void *instance,
                        size_t n,
                        const double *pressure,
@@ -688,10 +783,13 @@ typedef struct {
                        double *state,
                        double *stress,
                        double *tangent);
-    /* Reserved for modules of kind TG_LAW: doubles of state per node, owned by the host. */
+    /* 0: kept for the layout of ABI 2.0. */
     uint32_t law_state_doubles;
     /* 0. */
     uint32_t reserved;
+    /* Since ABI 2.1. Modules of kind TG_LAW: their functions; required, while `instantiate`, `free`,
+     * `capabilities`, `advance` and `last_error` are not. Null for the other kinds. */
+    const tg_node_law *law;
 } tg_subsystem;
 
 /* Describes the module in a section that can be read without running the library; once, at file scope:
@@ -702,6 +800,24 @@ typedef struct {
     __attribute__((section(".terraglue"), used)) static const char tg_description[] =               \
         "terraglue module\nname=" module_name "\nversion=" module_version                           \
         "\nabi=" TG_VERSION_TEXT(TG_ABI_MAJOR, TG_ABI_MINOR) "\n"
+
+/* A number in the list of parameters of a schema; `value` is its default, in quotes. */
+#define TG_NUMBER(name, unit, value, help)                                                          \
+    "{\"name\":\"" name "\",\"type\":\"number\",\"unit\":\"" unit "\",\"default\":" value ",\"help\":\"" help "\"}"
+/* The schema of a law; `numbers` are TG_NUMBER(...) with commas in quotes between. */
+#define TG_LAW_SCHEMA(name, help, numbers)                                                          \
+    "{\"name\":\"" name "\",\"kind\":\"law\",\"help\":\"" help "\",\"parameters\":[" numbers "]}"
+/* Exports a law; once, at file scope, after TG_DESCRIBE. `doubles`: state per node; a function that is not offered is null. */
+#define TG_EXPORT_LAW(law_name, law_schema, doubles, pressure_function, shear_function)             \
+    static const char *tg_law_schema(void) { return law_schema; }                                   \
+    const tg_subsystem *terraglue_subsystem(void) {                                                 \
+        static const tg_node_law law = { sizeof(tg_node_law), doubles, pressure_function, shear_function }; \
+        static tg_subsystem table;                                                                  \
+        table.size = sizeof table, table.abi_major = TG_ABI_MAJOR, table.abi_minor = TG_ABI_MINOR;  \
+        table.kind = TG_LAW, table.id = law_name, table.description = tg_description;               \
+        table.schema = tg_law_schema, table.law = &law;                                             \
+        return &table;                                                                              \
+    }
 
 #ifdef __cplusplus
 extern "C" {

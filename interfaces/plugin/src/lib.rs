@@ -16,10 +16,12 @@ pub mod abi;
 mod convert;
 mod export;
 mod foreign;
+mod law;
 mod text;
 
-pub use export::table;
+pub use export::{law_table, table};
 pub use foreign::{ForeignModule, ForeignSubsystem, TableError};
+pub use law::TableLaw;
 
 /// Name of the one symbol that a module exports; its type is [`abi::TgEntry`].
 pub const ENTRY: &str = "terraglue_subsystem";
@@ -41,7 +43,7 @@ unsafe impl Sync for Table {}
 #[macro_export]
 macro_rules! abi_version {
     () => {
-        "2.0"
+        "2.1"
     };
 }
 
@@ -51,8 +53,27 @@ macro_rules! abi_version {
 #[macro_export]
 macro_rules! export_subsystem {
     ($module:ty) => {
+        $crate::export_table!($crate::table::<$module>);
+    };
+}
+
+/// Exports a type that implements [`terraglue_subsystem::LawModule`] as the law of this dynamic library.
+#[macro_export]
+macro_rules! export_law {
+    ($law:ty) => {
+        $crate::export_table!($crate::law_table::<$law>);
+    };
+}
+
+/// The section, the entry and the refusal to be built without unwinding, for a function that makes the table.
+#[doc(hidden)]
+#[macro_export]
+macro_rules! export_table {
+    ($make:expr) => {
         #[cfg(panic = "abort")]
-        compile_error!("a module must be built with panic = \"unwind\": aborting would end the host");
+        compile_error!(
+            "[TG13] a module must be built with panic = \"unwind\": aborting would end the host; take panic = \"abort\" out of the profile"
+        );
 
         /// What this library is, readable without running it.
         #[allow(unsafe_code)]
@@ -84,9 +105,8 @@ macro_rules! export_subsystem {
         #[unsafe(no_mangle)]
         pub extern "C" fn terraglue_subsystem() -> *const $crate::abi::TgSubsystem {
             static TABLE: ::std::sync::OnceLock<$crate::Table> = ::std::sync::OnceLock::new();
-            let table = TABLE.get_or_init(|| {
-                $crate::Table($crate::table::<$module>(env!("CARGO_PKG_NAME"), &TERRAGLUE_DESCRIPTION))
-            });
+            let table =
+                TABLE.get_or_init(|| $crate::Table($make(env!("CARGO_PKG_NAME"), &TERRAGLUE_DESCRIPTION)));
             &raw const table.0
         }
     };

@@ -21,8 +21,8 @@ fn each_fault_has_its_own_error() {
     // SAFETY: null is allowed.
     assert_eq!(unsafe { ForeignModule::new(std::ptr::null()) }.unwrap_err(), TableError::Null);
     let version = refused(|t| t.abi_major = TG_ABI_MAJOR + 1);
-    assert_eq!(version, TableError::Version { found: [TG_ABI_MAJOR + 1, 0] });
-    assert!(version.to_string().contains(&format!("ABI {}.0", TG_ABI_MAJOR + 1)), "{version}");
+    assert_eq!(version, TableError::Version { found: [TG_ABI_MAJOR + 1, TG_ABI_MINOR] });
+    assert!(version.to_string().contains(&format!("ABI {}.{TG_ABI_MINOR}", TG_ABI_MAJOR + 1)), "{version}");
     let needed = offset_of!(TgSubsystem, set_ports) as u32;
     assert_eq!(refused(|t| t.size = 40), TableError::Truncated { size: 40, needed });
     assert_eq!(refused(|t| t.kind = 9), TableError::Kind(9));

@@ -10,8 +10,8 @@ impl Patches {
     /// Wrench on the body (n, t1, t2, mn, mt1, mt2) when the foot of patch `p` has moved by `x`.
     pub fn wrench(&self, p: usize, x: &[f64; 6]) -> [f64; 6] {
         let mut sum = [0.0; 6];
-        self.each_loaded(p, x, |k, pressure, _, moved| {
-            add_force(&mut sum, self.nodes.arm[k], self.node_force(k, pressure, moved));
+        self.each_answer(p, x, |k, pressure, _, r| {
+            add_force(&mut sum, self.nodes.arm[k], self.node_force(k, pressure, r.stress));
         });
         sum
     }
@@ -20,21 +20,23 @@ impl Patches {
     pub fn at_rest(&self, p: usize) -> ([f64; 6], f64) {
         let (mut sum, mut strength) = ([0.0; 6], 0.0);
         let n = &self.nodes;
-        self.each_loaded(p, &[0.0; 6], |k, pressure, _, moved| {
-            add_force(&mut sum, n.arm[k], self.node_force(k, pressure, moved));
+        self.each_answer(p, &[0.0; 6], |k, pressure, _, r| {
+            add_force(&mut sum, n.arm[k], self.node_force(k, pressure, r.stress));
             let inclined = n.area[k] * n.facing[k].stretch;
             let shear = &self.law(k).shear;
-            strength += inclined * shear.yield_stress_at(pressure, n.shear[k].slip, n.mobilised[k]);
+            // soil that clings under tension holds nothing along the underside
+            let pressed = pressure.max(0.0);
+            strength +=
+                inclined * shear.yield_stress_kept(pressed, n.shear[k].slip, n.mobilised[k], n.kept(k));
         });
         (sum, strength)
     }
 
-    /// Force of a node on the body along n, t1, t2 after a displacement along its underside.
+    /// Force of a node on the body along n, t1, t2 under a pressure and a shear stress.
     #[inline]
-    fn node_force(&self, k: usize, pressure: f64, moved: [f64; 2]) -> [f64; 3] {
-        let (n, shear) = (&self.nodes, &self.law(k).shear);
+    fn node_force(&self, k: usize, pressure: f64, tau: [f64; 2]) -> [f64; 3] {
+        let n = &self.nodes;
         let facing = &n.facing[k];
-        let tau = shear.respond_at(&n.shear[k], n.mobilised[k], pressure, moved).stress;
         let area = n.area[k];
         let inclined = area * facing.stretch;
         std::array::from_fn(|c| {
@@ -47,10 +49,8 @@ impl Patches {
     pub fn stiffness(&self, p: usize, x: &[f64; 6]) -> Stiffness {
         let mut sum = [[0.0; 6]; 6];
         let moments = self.ports[p].carries_moments();
-        self.each_loaded(p, x, |k, pressure, slope, moved| {
-            let r =
-                self.law(k).shear.respond_at(&self.nodes.shear[k], self.nodes.mobilised[k], pressure, moved);
-            let node = node_stiffness(&self.nodes.facing[k], self.nodes.area[k], slope, &r);
+        self.each_answer(p, x, |k, _, slope, r| {
+            let node = node_stiffness(&self.nodes.facing[k], self.nodes.area[k], slope, r);
             add_stiffness(&mut sum, self.nodes.arm[k], &node, moments);
         });
         sum
@@ -60,8 +60,14 @@ impl Patches {
     /// elastic line below zero down to the tension that it bears, then lets go.
     #[inline]
     pub fn pressure(&self, k: usize, z: f64) -> (f64, f64) {
+        let n = &self.nodes;
+        self.or_clinging(k, z, self.law(k).curve.at(z, n.z_max[k], n.p_max[k]))
+    }
+
+    /// The same where pressure and slope without clinging are known.
+    #[inline]
+    pub fn or_clinging(&self, k: usize, z: f64, (pressure, slope): (f64, f64)) -> (f64, f64) {
         let (n, law) = (&self.nodes, self.law(k));
-        let (pressure, slope) = law.curve.at(z, n.z_max[k], n.p_max[k]);
         if pressure > 0.0 || law.adhesion == 0.0 || n.stamp[k] == 0 {
             return (pressure, slope);
         }
@@ -70,9 +76,29 @@ impl Patches {
         if tension <= law.adhesion { (-tension, stiffness) } else { (0.0, 0.0) }
     }
 
+    /// Calls `visit(node, pressure, slope, answer of the shear law)` for the nodes with pressure or tension.
+    #[inline]
+    pub fn each_answer(
+        &self,
+        p: usize,
+        x: &[f64; 6],
+        mut visit: impl FnMut(usize, f64, f64, &ShearResponse),
+    ) {
+        if let [law] = &self.laws[self.ports[p].laws.clone()]
+            && (law.curve.is_batched() || law.shear.is_batched())
+        {
+            return self.each_answered(p, x, law, visit);
+        }
+        let n = &self.nodes;
+        self.each_loaded(p, x, |k, pressure, slope, moved| {
+            let shear = &self.law(k).shear;
+            visit(k, pressure, slope, &shear.respond_at(&n.shear[k], n.mobilised[k], pressure, moved));
+        });
+    }
+
     /// Calls `visit(node, pressure, slope, displacement along the underside)` for the nodes with pressure or tension.
     #[inline]
-    pub fn each_loaded(&self, p: usize, x: &[f64; 6], mut visit: impl FnMut(usize, f64, f64, [f64; 2])) {
+    fn each_loaded(&self, p: usize, x: &[f64; 6], mut visit: impl FnMut(usize, f64, f64, [f64; 2])) {
         let patch = &self.ports[p];
         let n = &self.nodes;
         for k in patch.nodes.clone().filter(|k| n.area[*k] > 0.0) {

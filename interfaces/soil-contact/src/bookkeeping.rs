@@ -5,8 +5,8 @@ use crate::contacts::Touch;
 use crate::ground::{Covered, Ground};
 use crate::patch::{Patch, PatchNodes, Patches, key};
 use crate::wheel;
-use terraglue_soil_law::ShearState;
-use terraglue_subsystem::Port;
+use terraglue_soil_law::{KeptNodes, ShearState};
+use terraglue_subsystem::{MOST_LAW_STATE, Port};
 
 /// Sums over the run and what the last commit found. Part of the committed state.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -67,11 +67,19 @@ pub struct Scene<'a> {
 }
 
 /// A node that the foot presses: its number in the arrays, depth and displacement.
-struct Pressed {
+struct Pressed<'a> {
     k: usize,
     depth: f64,
     pressure: f64,
     slip: [f64; 2],
+    kept: &'a Kept,
+}
+
+/// What a law with a state answers for a node beside the pressure.
+#[derive(Default)]
+struct Kept {
+    permanent: f64,
+    state: [f64; MOST_LAW_STATE],
 }
 
 impl Scene<'_> {
@@ -129,7 +137,11 @@ impl Scene<'_> {
             let rise = dot(facing.press, moved);
             let depth = n.depth[k] - rise;
             let curve = &self.patches.law(k).curve;
-            let (pressure, _) = self.patches.pressure(k, depth);
+            let mut kept = Kept::default();
+            let pressure = match curve.keeper() {
+                Some(_) => self.patches.or_clinging(k, depth, (self.kept(k, depth, &mut kept), 0.0)).0,
+                None => self.patches.pressure(k, depth).0,
+            };
             let [i, j] = n.index[k];
             let deep = (depth + relief(n, k)) / patch.slope;
             let lower = n.reference[k] - deep;
@@ -142,13 +154,14 @@ impl Scene<'_> {
                 let slid_in = fresh && patch.wheel.is_none() && depth - n.permanent[k] > -2.0 * rise;
                 lists.slid_in.push(slid_in);
                 touch.add(n, k, pressure, deep);
-                let node = Pressed { k, depth, pressure, slip: facing.slide(moved) };
+                let node = Pressed { k, depth, pressure, slip: facing.slide(moved), kept: &kept };
                 let (slid, surface) = self.press(patch, &node, ground, book);
                 let carried = if patch.wheel.is_some() { moved } else { slid };
                 lists.slid.push(in_world(port, carried));
                 lists.loaded.push([i, j]);
                 covered.surface = surface;
-                covered.virgin = if depth > n.z_max[k] { pressure } else { curve.virgin(depth) };
+                let first = depth > n.z_max[k] || curve.keeper().is_some();
+                covered.virgin = if first { pressure } else { curve.virgin(depth) };
             }
             if n.stamp[k] != 0 && pressure <= 0.0 && self.patches.law(k).adhesion > 0.0 {
                 self.cling(k, pressure, ground, lists, book);
@@ -184,6 +197,19 @@ impl Scene<'_> {
         }
     }
 
+    /// The pressure of a law with a state at node k, and what it keeps.
+    fn kept(&self, k: usize, depth: f64, out: &mut Kept) -> f64 {
+        let Some((law, b)) = self.patches.law(k).curve.keeper() else { return 0.0 };
+        let n = &self.patches.nodes;
+        let (permanent, slip) = (&n.permanent[k..=k], &[n.shear[k].slip]);
+        let nodes = KeptNodes { depth: &[depth], permanent, slip, state: n.kept(k) };
+        let (mut p, mut slope, mut unloaded) = ([0.0], [0.0], [0.0]);
+        let state = &mut out.state[..n.doubles];
+        law.kept(b, &nodes, [&mut p, &mut slope, &mut unloaded], state);
+        out.permanent = unloaded[0];
+        p[0]
+    }
+
     /// One loaded node: plastic depth, slip, heat and elastic energy. Returns how far the foot slipped over the soil
     /// along n, t1 and t2, and the height of the unloaded surface, m.
     fn press(&self, patch: &Patch, node: &Pressed, ground: &mut Ground, book: &mut Book) -> ([f64; 3], f64) {
@@ -192,21 +218,32 @@ impl Scene<'_> {
         let curve = &law.curve;
         let area = n.area[k];
         let inclined = area * n.facing[k].stretch;
-        let shear = law.shear.respond_at(&n.shear[k], n.mobilised[k], pressure, slip);
-        let squeezed = 0.5 * pressure * pressure / curve.unloading();
+        let shear = law.shear.respond_kept(&n.shear[k], n.kept(k), n.mobilised[k], pressure, slip);
+        let kept = curve.keeper().is_some();
+        let squeezed = match kept {
+            true => 0.5 * pressure * (depth - node.kept.permanent).max(0.0),
+            false => 0.5 * pressure * pressure / curve.unloading(),
+        };
         book.dissipated += inclined * shear.dissipated;
         book.elastic += inclined * law.shear.elastic_energy(&shear.state) + area * squeezed;
         let [i, j] = n.index[k];
         let initial = ground.initial(i, j);
         let state = ground.enter(i, j);
         state.largest = n.z_max[k];
-        if depth > n.z_max[k] {
+        if kept {
+            let fresh = state.stamp + 1 != book.stamp;
+            let (p, from) = if fresh { (0.0, n.permanent[k]) } else { (state.pressure, n.depth[k]) };
+            let work = 0.5 * (p + pressure) * (depth - from);
+            let elastic = 0.5 * p * (from - n.permanent[k]).max(0.0);
+            book.dissipated += area * (work - squeezed + elastic).max(0.0);
+            (state.largest, state.permanent) = (depth, node.kept.permanent.max(0.0) / patch.slope);
+        } else if depth > n.z_max[k] {
             let (before, p) = (n.z_max[k], n.p_max[k]);
             book.dissipated += area * curve.plastic_work(before, p, depth, pressure);
             state.permanent = curve.permanent(depth, pressure) / patch.slope;
             state.largest = depth;
         }
-        state.curve = key(curve, patch.slope);
+        state.curve = if kept { [0.0; 3] } else { key(curve, patch.slope) };
         if !n.relief[k].is_nan() {
             // what stays behind the peak is the depth of the underside, whatever its pressure
             let stays = depth - pressure / curve.unloading() + n.relief[k];
@@ -217,6 +254,9 @@ impl Scene<'_> {
         book.max_sinkage =
             book.max_sinkage.max((depth + relief(n, k)) / patch.slope - (state.reference - initial));
         let surface = state.reference - state.permanent.max(0.0);
+        if kept {
+            ground.law_memory.write([i, j], &node.kept.state);
+        }
         let elastic = |c: usize| shear.state.elastic[c] - n.shear[k].elastic[c];
         if shear.state.slip > n.shear[k].slip {
             let [a, b] = [slip[0] - elastic(0), slip[1] - elastic(1)];

@@ -1,6 +1,7 @@
 //! The ground of a soil: heights of its material and what it remembers at each node.
 
 use crate::contacts::Contacts;
+use crate::law_memory::LawMemory;
 use crate::mask::Mask;
 use crate::nodes::{NodeState, NodeStates};
 use crate::wheel::Memory;
@@ -42,6 +43,8 @@ pub struct Ground {
     pub contacts: Contacts,
     /// Which soil lies where.
     pub mask: Mask,
+    /// What a law keeps per node.
+    pub law_memory: LawMemory,
 }
 
 impl Ground {
@@ -55,6 +58,7 @@ impl Ground {
             wheels: Vec::with_capacity(WHEELS),
             contacts: Contacts::default(),
             mask: Mask::default(),
+            law_memory: LawMemory::default(),
         })
     }
 

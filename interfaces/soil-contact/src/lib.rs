@@ -12,8 +12,10 @@
 
 mod assemble;
 mod bookkeeping;
+mod chunk;
 mod contacts;
 mod ground;
+mod law_memory;
 mod mask;
 mod nodes;
 mod normal;

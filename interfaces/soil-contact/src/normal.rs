@@ -140,7 +140,9 @@ impl Patches {
         let area: f64 = loaded().map(|k| n.area[k] * n.facing[k].press[0]).sum();
         let pressure = force.max(0.0) / area;
         let curves = || self.laws[patch.laws.clone()].iter().map(|law| &law.curve);
-        let virgin = curves().fold(0.0_f64, |m, c| m.max(c.virgin_depth(pressure)));
+        // of a law with a state nothing is known but where it begins
+        let first = curves().filter(|c| c.keeper().is_none());
+        let virgin = first.fold(0.0_f64, |m, c| m.max(c.virgin_depth(pressure)));
         let elastic = curves().fold(0.0_f64, |m, c| m.max(pressure / c.unloading()));
         let (mut free, mut full) = (f64::INFINITY, f64::NEG_INFINITY);
         for k in loaded() {
@@ -155,10 +157,9 @@ impl Patches {
     /// dW_n/dX_n at `x`, N/m.
     pub fn normal_stiffness(&self, p: usize, x: &[f64; 6]) -> f64 {
         let mut sum = 0.0;
-        self.each_loaded(p, x, |k, pressure, slope, moved| {
+        self.each_answer(p, x, |k, _, slope, r| {
             let (n, facing) = (&self.nodes, &self.nodes.facing[k]);
-            let r = self.law(k).shear.respond_at(&n.shear[k], n.mobilised[k], pressure, moved);
-            sum += node_stiffness(facing, n.area[k], slope, &r)[0][0];
+            sum += node_stiffness(facing, n.area[k], slope, r)[0][0];
         });
         sum
     }

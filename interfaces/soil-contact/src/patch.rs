@@ -7,7 +7,7 @@ use crate::assemble::dot;
 use crate::ground::Ground;
 use crate::normal::Clinging;
 use crate::wheel::{self, Shift, Wheel};
-use terraglue_soil_law::{PressureCurve, PressureLaw, Rolling, ShearLaw, ShearState};
+use terraglue_soil_law::{PluginLaw, PressureCurve, PressureLaw, Rolling, ShearLaw, ShearState};
 use terraglue_subsystem::{Node, Port, Step};
 
 /// One port's share of the arrays and what is constant during the step.
@@ -38,7 +38,7 @@ pub struct Patch {
 }
 
 /// The laws of one soil under one contact.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Local {
     /// Pressure law for the size of the contact.
     pub curve: PressureCurve,
@@ -133,6 +133,10 @@ pub struct PatchNodes {
     pub law: Vec<usize>,
     /// Shear history.
     pub shear: Vec<ShearState>,
+    /// Doubles per node that a law keeps, and their values, node after node.
+    pub doubles: usize,
+    /// See `doubles`.
+    pub memory: Vec<f64>,
     /// Share of the shear strength that the slip so far has mobilised.
     pub mobilised: Vec<f64>,
     /// Largest depth as the node remembers it, and the curve and normal for which it holds.
@@ -157,6 +161,7 @@ impl PatchNodes {
         self.arm.clear();
         self.law.clear();
         self.shear.clear();
+        self.memory.clear();
         self.mobilised.clear();
         self.remembered.clear();
         self.reference.clear();
@@ -164,8 +169,15 @@ impl PatchNodes {
         self.facing.clear();
     }
 
+    /// What a law keeps of node k.
+    #[inline]
+    pub fn kept(&self, k: usize) -> &[f64] {
+        &self.memory[k * self.doubles..(k + 1) * self.doubles]
+    }
+
     /// Room for `count` nodes, so that later steps do not allocate.
     pub fn reserve(&mut self, count: usize) {
+        self.memory.reserve(count * self.doubles);
         self.index.reserve(count);
         self.arm.reserve(count);
         self.law.reserve(count);
@@ -190,7 +202,7 @@ impl PatchNodes {
 }
 
 /// The soil's laws.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Laws {
     /// Pressure.
     pub pressure: PressureLaw,
@@ -202,6 +214,8 @@ pub struct Laws {
     pub adhesion: f64,
     /// What concerns wheels alone.
     pub rolling: Rolling,
+    /// The module behind one or both of them.
+    pub plugin: Option<PluginLaw>,
 }
 
 /// All patches of a step.
@@ -237,8 +251,12 @@ impl Patches {
         if self.built_for == Some(key) {
             return;
         }
+        if let Some(plugin) = &laws[0].plugin {
+            plugin.forget();
+        }
         self.ports.clear();
         self.nodes.clear();
+        self.nodes.doubles = ground.law_memory.doubles();
         self.laws.clear();
         for port in step.ports {
             let patch = self.read_port(port, port.nodes(step.nodes), ground, laws);
@@ -272,9 +290,9 @@ impl Patches {
         let (local, friction) = self.local_laws(laws, wheel.as_ref(), b, range.clone());
         for k in range.clone() {
             let permanent = self.nodes.permanent[k];
-            if permanent > 0.0 {
+            let curve = &self.laws[self.nodes.law[k]].curve;
+            if permanent > 0.0 && curve.keeper().is_none() {
                 let (largest, curve_then) = self.nodes.remembered[k];
-                let curve = &self.laws[self.nodes.law[k]].curve;
                 let here = key(curve, n_z);
                 let z_max =
                     if curve_then == here { largest } else { curve.largest_depth(permanent, largest) };
@@ -324,7 +342,7 @@ impl Patches {
                     of.pressure.curve_in_slip(b, of.elastic, &of.rolling.sinkage, w.memory.slip),
                     of.shear.travelling(w.heading, of.rolling.across),
                 ),
-                None => (of.pressure.curve(b, of.elastic), of.shear),
+                None => (of.pressure.curve(b, of.elastic), of.shear.clone()),
             };
             friction = friction.max(of.shear.friction);
             self.laws.push(Local { curve, shear, adhesion: of.adhesion });
@@ -371,6 +389,7 @@ impl Patches {
         nodes.arm.push([along(0), along(1), along(2)]);
         nodes.law.push(number);
         nodes.shear.push(state.shear);
+        ground.law_memory.read([node.i, node.j], &mut nodes.memory);
         nodes.mobilised.push(laws[number].shear.mobilised(state.shear.slip));
         nodes.remembered.push((state.largest, state.curve));
         nodes.facing.push(Facing::new(port, node.slope));

@@ -3,13 +3,14 @@
 use crate::bookkeeping::{self, Book, Lists};
 use crate::contacts::Contacts;
 use crate::ground::{Covered, Ground};
+use crate::law_memory::LawMemory;
 use crate::mask::Mask;
 use crate::patch::{Laws, Patches};
 use crate::state::{Committed, Slot, Slots, Target};
 use crate::trial::Last;
 use crate::values;
 use std::sync::Arc;
-use terraglue_soil_law::{PressureLaw, SoilExpressions, SoilParameters};
+use terraglue_soil_law::{PluginLaw, PressureLaw, SlipSinkage, SoilExpressions, SoilParameters};
 use terraglue_subsystem::bytes::{self, Persist};
 use terraglue_subsystem::{
     Capabilities, Config, Energy, Error, Estimate, FieldInfo, FieldTile, Host, Input, Law, Level, LogLevel,
@@ -61,6 +62,7 @@ pub struct FieldSoil<M: Material> {
     host: Arc<dyn Host>,
     parameters: SoilParameters,
     expressions: Option<SoilExpressions>,
+    plugin: Option<PluginLaw>,
     /// Of the scenario's own soil, then of those of the mask.
     laws: Vec<Laws>,
     ground: Ground,
@@ -84,6 +86,7 @@ impl<M: Material> FieldSoil<M> {
     pub fn new(config: &Config, host: Arc<dyn Host>, mut material: M) -> Result<Self> {
         let parameters = SoilParameters::from_config(config, length(host.gravity()))?;
         let expressions = SoilExpressions::from_config(config)?;
+        let plugin = plugin(config, host.as_ref(), &parameters)?;
         let mut ground = Ground::new(host.required_terrain()?)?;
         ground.mask = Mask::from_config(config, length(host.gravity()), ground.heights.lattice())?;
         ground.contacts = Contacts::new(config.optional_number("contacts_shown")?.unwrap_or(0.0) as usize);
@@ -93,12 +96,17 @@ impl<M: Material> FieldSoil<M> {
         let first_contact = variables.len() as u32;
         variables.extend(ground.contacts.variables(first_contact));
         let nodes = host.max_nodes() as usize;
+        if let Some(law) = &plugin {
+            ground.law_memory = LawMemory::new(*ground.heights.lattice(), law.state_doubles());
+        }
         let (mut patches, mut lists) = (Patches::default(), Lists::default());
+        patches.nodes.doubles = ground.law_memory.doubles();
         patches.nodes.reserve(nodes);
         lists.reserve(nodes);
         Ok(Self {
-            laws: all_laws(&parameters, &ground.mask, expressions.as_ref())?,
+            laws: all_laws(&parameters, &ground.mask, expressions.as_ref(), plugin.as_ref())?,
             expressions,
+            plugin,
             fields: [ground.heights.height_info(), ground.heights.sinkage_info()],
             slots: Slots::new(host.slots()),
             book: Book::default(),
@@ -127,8 +135,17 @@ impl<M: Material> FieldSoil<M> {
         &self.material
     }
 
-    fn build(&mut self, step: &Step) {
+    fn build(&mut self, step: &Step) -> Result {
+        if let Some(plugin) = &self.plugin {
+            plugin.begin(step.h);
+        }
         self.patches.build(step, &self.ground, &self.laws);
+        self.plugin.as_ref().map_or(Ok(()), PluginLaw::check)
+    }
+
+    /// The end of a trial: whether a module that is the law has answered for the whole step.
+    fn answered(&self, step: &Step) -> Result {
+        self.plugin.as_ref().map_or(Ok(()), |plugin| plugin.finish(step.t))
     }
 
     /// Fills x, v, a with the committed surface: along n as `set_ports` says, at rest otherwise.
@@ -146,7 +163,7 @@ impl<M: Material> FieldSoil<M> {
         let Self { ground, lists, book, parameters, .. } = self;
         slot.put_back(&mut Target { ground, loaded: &mut lists.loaded, book, parameters })?;
         self.material.restore(&slot.material);
-        self.laws[0] = laws_of(&self.parameters, self.expressions.as_ref())?;
+        self.laws[0] = laws_of(&self.parameters, self.expressions.as_ref(), self.plugin.as_ref())?;
         self.patches.forget();
         self.last.clear();
         Ok(())
@@ -175,18 +192,24 @@ fn length(v: [f64; 3]) -> f64 {
 }
 
 /// The laws of the scenario's own soil and of those of the mask.
-fn all_laws(own: &SoilParameters, mask: &Mask, texts: Option<&SoilExpressions>) -> Result<Vec<Laws>> {
-    std::iter::once(own).chain(&mask.soils).map(|p| laws_of(p, texts)).collect()
+fn all_laws(
+    own: &SoilParameters,
+    mask: &Mask,
+    texts: Option<&SoilExpressions>,
+    plugin: Option<&PluginLaw>,
+) -> Result<Vec<Laws>> {
+    std::iter::once(own).chain(&mask.soils).map(|p| laws_of(p, texts, plugin)).collect()
 }
 
 /// The laws with these numbers; what the scenario writes as text takes the place of the built-in law.
-fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>) -> Result<Laws> {
+fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>, plugin: Option<&PluginLaw>) -> Result<Laws> {
     let mut laws = Laws {
         pressure: p.pressure(),
         shear: p.shear(),
         elastic: p.elastic_stiffness_pa_m,
         adhesion: p.adhesion_pa,
         rolling: p.rolling,
+        plugin: plugin.cloned(),
     };
     if let Some(texts) = texts {
         if let Some(law) = texts.pressure(p)? {
@@ -196,7 +219,47 @@ fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>) -> Result<Laws> 
             laws.shear = laws.shear.with_expression(law);
         }
     }
+    if let Some(law) = plugin {
+        law.begin(0.0);
+        if law.has_pressure() {
+            laws.pressure = PressureLaw::Plugin(law.clone());
+            // as the built-in laws are looked at: one that says nothing sensible here never will
+            laws.pressure.curve(0.1, p.elastic_stiffness_pa_m);
+        }
+        if law.has_shear() {
+            laws.shear = laws.shear.with_plugin(law.clone());
+        }
+        law.check()?;
+    }
     Ok(laws)
+}
+
+/// The module that the scenario names as law.
+fn plugin(config: &Config, host: &dyn Host, p: &SoilParameters) -> Result<Option<PluginLaw>> {
+    let given = |key| config.get(key).is_some_and(|v| !v.is_null());
+    if !given("law.plugin") {
+        return Ok(None);
+    }
+    let refused = |text: &str| Err(Error::Refused(text.into()));
+    let Some(law) = host.law() else {
+        return refused("`law.plugin`: this program hands no law to the soil; it is older than the soil");
+    };
+    let law = PluginLaw::new(law);
+    if law.has_pressure() && given("law.pressure") || law.has_shear() && given("law.shear") {
+        return refused("`law.plugin` and the text beside it give the same law twice; leave one of them out");
+    }
+    if law.has_pressure() && p.rolling.sinkage != SlipSinkage::None {
+        return refused("`slip_sinkage` acts on power laws; with `law.plugin` it must be \"none\"");
+    }
+    if law.state_doubles() > 0 && p.rolling.peak.is_some() {
+        return refused("`wheel_peak_a0` needs a law without state: first loading has to be known apart");
+    }
+    if given("mask.soils") {
+        return refused(
+            "`[….mask]` gives regions numbers of their own, which `law.plugin` does not get; leave one of them out",
+        );
+    }
+    Ok(Some(law))
 }
 
 impl<M: Material> Subsystem for FieldSoil<M> {
@@ -211,7 +274,7 @@ impl<M: Material> Subsystem for FieldSoil<M> {
     }
 
     fn set_ports(&mut self, step: &Step, laws: &mut [Law], now: &mut Response) -> Result {
-        self.build(step);
+        self.build(step)?;
         self.last.clear();
         for (law, patch) in laws.iter_mut().zip(&self.patches.ports) {
             law.mu = law.mu.min(patch.friction);
@@ -226,7 +289,7 @@ impl<M: Material> Subsystem for FieldSoil<M> {
     }
 
     fn solve_compatibility(&mut self, step: &Step, estimate: &Estimate, out: &mut Response) -> Result {
-        self.build(step);
+        self.build(step)?;
         self.last.clear();
         self.law_force.resize(step.n as usize, 0.0);
         self.show_surface(out);
@@ -236,11 +299,11 @@ impl<M: Material> Subsystem for FieldSoil<M> {
             cooperation::plain_pass(port, estimate.t_star, &self.law_force, patch.strength, mu, out.t);
         }
         out.reached = step.t + step.h;
-        Ok(())
+        self.answered(step)
     }
 
     fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result {
-        self.build(step);
+        self.build(step)?;
         match input {
             Input::Motion(motion) => self.last.motion(&mut self.patches, motion, out),
             Input::Force { t, motion, .. } => {
@@ -250,26 +313,27 @@ impl<M: Material> Subsystem for FieldSoil<M> {
         }
         out.a.fill(0.0);
         out.reached = step.t + step.h;
-        Ok(())
+        self.answered(step)
     }
 
     fn interface_jacobian(&mut self, step: &Step, level: Level, out: &mut [f64]) -> Result {
-        self.build(step);
-        self.last.jacobian(&mut self.patches, step.n as usize, level, out)
+        self.build(step)?;
+        self.last.jacobian(&mut self.patches, step.n as usize, level, out)?;
+        self.plugin.as_ref().map_or(Ok(()), PluginLaw::check)
     }
 
     fn commit(&mut self, step: &Step, t: &[f64], partner: &Motion) -> Result {
         if let Some(k) = partner.x.iter().position(|x| !x.is_finite()) {
             return Err(Error::Failed(format!("the foot's motion, component {k}, is not a number")));
         }
-        self.build(step);
+        self.build(step)?;
         let scene = bookkeeping::Scene { patches: &self.patches, h: step.h };
         scene.commit(step.ports, t, partner.x, &mut self.ground, &mut self.lists, &mut self.book);
         self.material.settle(&mut self.ground, &self.lists.covered, &self.lists.released, step.h);
         self.patches.forget();
         self.last.clear();
         self.watch_range();
-        Ok(())
+        self.plugin.as_ref().map_or(Ok(()), PluginLaw::check)
     }
 
     fn save_state(&mut self, slot: u32) -> Result {
@@ -342,7 +406,7 @@ impl<M: Material> Subsystem for FieldSoil<M> {
                 self.material.set_value(*id - values::SHARED, *value)?;
             }
         }
-        match laws_of(&self.parameters, self.expressions.as_ref()) {
+        match laws_of(&self.parameters, self.expressions.as_ref(), self.plugin.as_ref()) {
             Ok(laws) => self.laws[0] = laws,
             Err(refused) => {
                 self.parameters = before;

@@ -3,6 +3,7 @@
 use crate::bookkeeping::Book;
 use crate::contacts::Contacts;
 use crate::ground::Ground;
+use crate::law_memory::LawMemorySnapshot;
 use crate::nodes::NodesSnapshot;
 use crate::wheel::Memory;
 use terraglue_ground::HeightSnapshot;
@@ -11,7 +12,7 @@ use terraglue_subsystem::bytes::{self, Persist};
 use terraglue_subsystem::{Error, Result};
 
 /// Version of the bytes.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// One saved state; `S` is the material's own.
 #[derive(Debug, Default)]
@@ -20,6 +21,7 @@ pub struct Slot<S> {
     nodes: NodesSnapshot,
     wheels: Vec<Memory>,
     contacts: Contacts,
+    law_memory: LawMemorySnapshot,
     loaded: Vec<[i32; 2]>,
     book: Book,
     parameters: Option<SoilParameters>,
@@ -29,8 +31,9 @@ pub struct Slot<S> {
 
 impl<S: Persist> Persist for Slot<S> {
     fn write(&self, out: &mut Vec<u8>) {
-        let Self { heights, nodes, wheels, contacts, loaded, book, parameters, material } = self;
+        let Self { heights, nodes, wheels, contacts, law_memory, loaded, book, parameters, material } = self;
         (heights.write(out), nodes.write(out), wheels.write(out), contacts.write(out));
+        law_memory.write(out);
         (loaded.write(out), book.write(out), parameters.write(out), material.write(out));
     }
     fn read(from: &mut &[u8]) -> Result<Self> {
@@ -39,6 +42,7 @@ impl<S: Persist> Persist for Slot<S> {
             nodes: Persist::read(from)?,
             wheels: Persist::read(from)?,
             contacts: Persist::read(from)?,
+            law_memory: Persist::read(from)?,
             loaded: Persist::read(from)?,
             book: Persist::read(from)?,
             parameters: Persist::read(from)?,
@@ -76,6 +80,7 @@ impl<S> Slot<S> {
     pub fn fill(&mut self, state: &Committed) {
         state.ground.heights.save(&mut self.heights);
         state.ground.nodes.save(&mut self.nodes);
+        state.ground.law_memory.save(&mut self.law_memory);
         self.wheels.clone_from(&state.ground.wheels);
         self.contacts.clone_from(&state.ground.contacts);
         self.loaded.clone_from(state.loaded);
@@ -92,6 +97,7 @@ impl<S> Slot<S> {
         *state.parameters = self.parameters.ok_or_else(empty)?;
         state.ground.heights.restore(&self.heights);
         state.ground.nodes.restore(&self.nodes);
+        state.ground.law_memory.restore(&self.law_memory);
         state.ground.wheels.clone_from(&self.wheels);
         state.ground.contacts.clone_from(&self.contacts);
         state.loaded.clone_from(&self.loaded);
@@ -116,7 +122,9 @@ impl<S: Persist> Slot<S> {
         let inside = |[i, j]: &[i32; 2]| lattice.has(*i, *j);
         let tiles = slot.heights.tiles().all(|(t, _)| (t as usize) < lattice.tile_count());
         let nodes = slot.nodes.contacts().all(inside) && slot.loaded.iter().all(inside);
-        if tiles && nodes && slot.parameters.is_some() {
+        if !slot.law_memory.fits(&ground.law_memory) {
+            Err(bytes::wrong("they hold the state of another law"))
+        } else if tiles && nodes && slot.parameters.is_some() {
             Ok(slot)
         } else {
             Err(bytes::wrong("they speak of nodes that this ground does not have"))

@@ -1,7 +1,9 @@
 //! The pressure law over slices of nodes: one call per patch instead of one per node.
 
-use crate::expression::{Nodes, for_each_node};
 use crate::pressure::PressureCurve;
+
+/// Nodes in first loading that are evaluated together.
+const CHUNK: usize = 64;
 
 /// Pressures (Pa) and slopes (Pa/m) of nodes at depths `depth` that were pressed to `z_max` before, where
 /// `p_max` = virgin(z_max). All slices have the length of `depth`.
@@ -13,13 +15,47 @@ pub fn pressures(
     p: &mut [f64],
     slope: &mut [f64],
 ) {
-    if let Some(program) = curve.program() {
-        let nodes = Nodes { shift: 0.0, depth, z_max, p_max };
-        return for_each_node(curve, program, &nodes, |k, value, by_z| (p[k], slope[k]) = (value, by_z));
+    if curve.is_batched() {
+        return gathered(curve, depth, z_max, p_max, p, slope);
     }
     let nodes = depth.iter().zip(z_max).zip(p_max);
     for (((z, z_max), p_max), (p, slope)) in nodes.zip(p.iter_mut().zip(slope)) {
         (*p, *slope) = curve.at(*z, *z_max, *p_max);
+    }
+}
+
+/// Those in first loading are gathered for the law, the others lie on their elastic line.
+fn gathered(
+    curve: &PressureCurve,
+    depth: &[f64],
+    z_max: &[f64],
+    p_max: &[f64],
+    p: &mut [f64],
+    slope: &mut [f64],
+) {
+    let (mut place, mut z) = ([0usize; CHUNK], [0.0; CHUNK]);
+    let mut waiting = 0;
+    let flush = |count: usize, place: &[usize; CHUNK], z: &[f64; CHUNK], p: &mut [f64], slope: &mut [f64]| {
+        let (mut p_new, mut slope_new) = ([0.0; CHUNK], [0.0; CHUNK]);
+        curve.beyond_many(&z[..count], &mut p_new[..count], &mut slope_new[..count]);
+        for ((place, p_new), slope_new) in place[..count].iter().zip(p_new).zip(slope_new) {
+            (p[*place], slope[*place]) = (p_new, slope_new);
+        }
+    };
+    for k in 0..depth.len() {
+        if depth[k] > z_max[k] && depth[k] > curve.elastic_limit() {
+            (place[waiting], z[waiting]) = (k, depth[k]);
+            waiting += 1;
+            if waiting == CHUNK {
+                flush(CHUNK, &place, &z, p, slope);
+                waiting = 0;
+            }
+        } else {
+            (p[k], slope[k]) = curve.at(depth[k], z_max[k], p_max[k]);
+        }
+    }
+    if waiting > 0 {
+        flush(waiting, &place, &z, p, slope);
     }
 }
 
@@ -35,17 +71,17 @@ pub fn total_force(
     area: &[f64],
 ) -> (f64, f64) {
     let (mut force, mut stiffness) = (0.0, 0.0);
-    if let Some(program) = curve.program() {
-        for_each_node(curve, program, &Nodes { shift, depth, z_max, p_max }, |k, p, slope| {
-            force += area[k] * p;
-            stiffness += area[k] * slope;
-        });
-        return (force, stiffness);
-    }
-    for (((z, z_max), p_max), area) in depth.iter().zip(z_max).zip(p_max).zip(area) {
-        let (p, slope) = curve.at(z + shift, *z_max, *p_max);
-        force += area * p;
-        stiffness += area * slope;
+    let (mut z, mut p, mut slope) = ([0.0; CHUNK], [0.0; CHUNK], [0.0; CHUNK]);
+    let chunks =
+        depth.chunks(CHUNK).zip(z_max.chunks(CHUNK)).zip(p_max.chunks(CHUNK)).zip(area.chunks(CHUNK));
+    for (((depth, z_max), p_max), area) in chunks {
+        let n = depth.len();
+        depth.iter().zip(&mut z).for_each(|(depth, z)| *z = depth + shift);
+        pressures(curve, &z[..n], z_max, p_max, &mut p[..n], &mut slope[..n]);
+        for ((area, p), slope) in area.iter().zip(&p).zip(&slope) {
+            force += area * p;
+            stiffness += area * slope;
+        }
     }
     (force, stiffness)
 }

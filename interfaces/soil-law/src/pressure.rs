@@ -6,11 +6,12 @@
 //! No soil is stiffer in virgin loading than in unloading, so for n < 1, where the power law starts with an
 //! infinite slope, the line p = k_u·z holds up to where it meets the power law.
 
-use crate::expression::{self, PressureExpression, Program};
+use crate::expression::{PressureExpression, Program, curve};
+use crate::plugin::PluginLaw;
 use crate::slip_sinkage::SlipSinkage;
 
 /// A family of pressure–sinkage laws; [`PressureLaw::curve`] fixes one for the size of a contact.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum PressureLaw {
     /// p = (k_c/b + k_φ)·zⁿ (Bekker 1956).
@@ -47,6 +48,8 @@ pub enum PressureLaw {
     },
     /// Written in the scenario, see [`crate::expression`].
     Expression(PressureExpression),
+    /// A module of its own.
+    Plugin(PluginLaw),
 }
 
 /// Names of the families as a scenario writes them.
@@ -62,12 +65,13 @@ impl PressureLaw {
     /// The same under a contact that slips by `slip` (0: rolls or stands, 1: spins on the spot), which sinks deeper
     /// as `sinkage` says.
     pub fn curve_in_slip(&self, b: f64, k_u: f64, sinkage: &SlipSinkage, slip: f64) -> PressureCurve {
-        let (modulus, n) = match *self {
-            Self::Bekker { k_c, k_phi, n } => (k_c / b + k_phi, n),
-            Self::Reece { cohesive, frictional, n } => ((cohesive + frictional * b) * libm::pow(b, -n), n),
+        let (modulus, n) = match self {
+            Self::Bekker { k_c, k_phi, n } => (k_c / b + k_phi, *n),
+            Self::Reece { cohesive, frictional, n } => ((cohesive + frictional * b) * libm::pow(b, -n), *n),
             Self::Bearing { cohesive, frictional, reference, n } => {
-                ((cohesive + frictional * b) * libm::pow(reference, -n), n)
+                ((cohesive + frictional * b) * libm::pow(*reference, -n), *n)
             }
+            Self::Plugin(law) => return PressureCurve::of_law(law.clone(), b, k_u),
             Self::Expression(law) => {
                 let program = law.at_size(b);
                 match program.power_law() {
@@ -81,18 +85,32 @@ impl PressureLaw {
     }
 }
 
-/// p(z) for one contact: a power law or a program, elastic below the largest depth.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// First loading beyond the elastic limit.
+#[derive(Clone, Debug, PartialEq)]
+#[allow(clippy::large_enum_variant)] // one per contact and step; a box would allocate
+enum Shape {
+    /// modulus·z^exponent.
+    Power,
+    /// Written in the scenario.
+    Program(Program),
+    /// A module of its own, under a contact of this size.
+    Law(PluginLaw, f64),
+}
+
+/// p(z) for one contact: a power law, a program or a module, elastic below the largest depth.
+#[derive(Clone, Debug, PartialEq)]
 pub struct PressureCurve {
     modulus: f64,
     exponent: f64,
     unloading: f64,
     /// Depth up to which the elastic line holds in virgin loading, m; 0 for n ≥ 1.
     elastic_limit: f64,
-    /// First loading beyond the elastic limit, where it is no power law; `modulus` and `exponent` are then those of
-    /// the power law that touches it at 1 cm.
-    program: Option<Program>,
+    /// Where it is no power law, `modulus` and `exponent` are those of the power law that touches it at 1 cm.
+    shape: Shape,
 }
+
+/// Depth at which a law that is no power law is compared with one, m.
+const TYPICAL_DEPTH: f64 = 0.01;
 
 impl PressureCurve {
     /// p = modulus·z^exponent with unloading stiffness `k_u` (Pa/m).
@@ -100,29 +118,77 @@ impl PressureCurve {
         let elastic_limit =
             if exponent < 1.0 { libm::pow(modulus / k_u, 1.0 / (1.0 - exponent)) } else { 0.0 };
         let modulus = if exponent == 1.0 { modulus.min(0.99 * k_u) } else { modulus };
-        Self { modulus, exponent, unloading: k_u, elastic_limit, program: None }
+        Self { modulus, exponent, unloading: k_u, elastic_limit, shape: Shape::Power }
     }
 
     /// First loading by a program of z with unloading stiffness `k_u` (Pa/m). A power law becomes the built-in one.
     pub fn of_program(program: Program, k_u: f64) -> Self {
-        const TYPICAL_DEPTH: f64 = 0.01;
         if let Some((modulus, exponent)) = program.power_law() {
             return Self::new(modulus, exponent, k_u);
         }
-        let (p, [slope]) = program.eval([TYPICAL_DEPTH]);
-        let exponent = slope * TYPICAL_DEPTH / p;
-        Self {
-            modulus: p * libm::pow(TYPICAL_DEPTH, -exponent),
-            exponent,
-            unloading: k_u,
-            elastic_limit: expression::curve::elastic_limit(&program, k_u),
-            program: Some(program),
+        Self::of_shape(Shape::Program(program), k_u)
+    }
+
+    /// First loading by a module under a contact of size `b` (m). A law with a state answers for unloading, too, and is
+    /// asked by [`PressureCurve::keeper`] alone.
+    pub fn of_law(law: PluginLaw, b: f64, k_u: f64) -> Self {
+        if law.state_doubles() > 0 {
+            let shape = Shape::Law(law, b);
+            return Self { modulus: b, exponent: 1.0, unloading: k_u, elastic_limit: 0.0, shape };
+        }
+        Self::of_shape(Shape::Law(law, b), k_u)
+    }
+
+    fn of_shape(shape: Shape, k_u: f64) -> Self {
+        let mut out = Self { modulus: 0.0, exponent: 1.0, unloading: k_u, elastic_limit: 0.0, shape };
+        let (p, slope) = out.beyond(TYPICAL_DEPTH);
+        out.exponent = slope * TYPICAL_DEPTH / p;
+        out.modulus = p * libm::pow(TYPICAL_DEPTH, -out.exponent);
+        out.elastic_limit = curve::elastic_limit(&|z| out.beyond(z), k_u);
+        out
+    }
+
+    /// Pressure and slope of first loading beyond the elastic limit.
+    #[inline]
+    fn beyond(&self, z: f64) -> (f64, f64) {
+        match &self.shape {
+            Shape::Power if self.exponent == 1.0 => (self.modulus * z, self.modulus),
+            Shape::Power => {
+                let p = self.modulus * libm::pow(z, self.exponent);
+                (p, self.exponent * p / z)
+            }
+            Shape::Program(program) => program.depth(z),
+            Shape::Law(law, b) => law.at(*b, z),
         }
     }
 
-    /// The program of first loading, where it is no power law.
-    pub fn program(&self) -> Option<&Program> {
-        self.program.as_ref()
+    /// Whether first loading is better evaluated for many nodes at a time.
+    #[inline]
+    pub fn is_batched(&self) -> bool {
+        !matches!(self.shape, Shape::Power)
+    }
+
+    /// First loading beyond the elastic limit at all depths of a chunk: pressures and slopes.
+    #[inline]
+    pub(crate) fn beyond_many(&self, z: &[f64], p: &mut [f64], slope: &mut [f64]) {
+        match &self.shape {
+            Shape::Program(program) => program.eval_all([z], p, [slope]),
+            Shape::Law(law, b) => law.first_loading(*b, z, p, slope),
+            Shape::Power => {
+                for ((z, p), slope) in z.iter().zip(p).zip(slope) {
+                    (*p, *slope) = self.beyond(*z);
+                }
+            }
+        }
+    }
+
+    /// The module with a state that answers for all pressures, and the size of the contact.
+    #[inline]
+    pub fn keeper(&self) -> Option<(&PluginLaw, f64)> {
+        match &self.shape {
+            Shape::Law(law, b) if law.state_doubles() > 0 => Some((law, *b)),
+            _ => None,
+        }
     }
 
     /// Depth up to which first loading is elastic, m.
@@ -145,8 +211,8 @@ impl PressureCurve {
     pub fn virgin(&self, z: f64) -> f64 {
         if z <= self.elastic_limit {
             self.unloading * z.max(0.0)
-        } else if let Some(program) = &self.program {
-            program.eval([z]).0
+        } else if self.is_batched() {
+            self.beyond(z).0
         } else if self.exponent == 1.0 {
             self.modulus * z
         } else {
@@ -161,8 +227,8 @@ impl PressureCurve {
             0.0
         } else if z <= self.elastic_limit {
             self.unloading
-        } else if let Some(program) = &self.program {
-            program.eval([z]).1[0]
+        } else if self.is_batched() {
+            self.beyond(z).1
         } else if self.exponent == 1.0 {
             self.modulus
         } else if z == 0.0 {
@@ -176,8 +242,8 @@ impl PressureCurve {
     pub fn virgin_depth(&self, p: f64) -> f64 {
         if p <= self.unloading * self.elastic_limit {
             p.max(0.0) / self.unloading
-        } else if let Some(program) = &self.program {
-            expression::curve::depth(program, p, self.elastic_limit)
+        } else if self.is_batched() {
+            curve::depth(&|z| self.beyond(z), p, self.elastic_limit)
         } else if self.exponent == 1.0 {
             p / self.modulus
         } else {
@@ -191,8 +257,8 @@ impl PressureCurve {
             return 0.5 * p * z.max(0.0);
         }
         let e = self.elastic_limit;
-        if let Some(program) = &self.program {
-            return 0.5 * self.unloading * e * e + expression::curve::work(program, e, z);
+        if self.is_batched() {
+            return 0.5 * self.unloading * e * e + curve::work(&|z| self.beyond(z), e, z);
         }
         let below = self.unloading * e * e;
         0.5 * below + (z * p - below) / (self.exponent + 1.0)
@@ -202,10 +268,10 @@ impl PressureCurve {
     /// keeps; `p_from` and `p_to` are the pressures there.
     pub fn plastic_work(&self, from: f64, p_from: f64, to: f64, p_to: f64) -> f64 {
         let elastic = |p: f64| 0.5 * p * p / self.unloading;
-        if let Some(program) = &self.program {
+        if self.is_batched() {
             let plastic = from.max(self.elastic_limit);
             let line = 0.5 * self.unloading * (plastic * plastic - from * from).max(0.0);
-            let work = if to > plastic { expression::curve::work(program, plastic, to) } else { 0.0 };
+            let work = if to > plastic { curve::work(&|z| self.beyond(z), plastic, to) } else { 0.0 };
             return (line + work - elastic(p_to) + elastic(p_from)).max(0.0);
         }
         let kept = self.virgin_work(from, p_from) - elastic(p_from);
@@ -216,9 +282,8 @@ impl PressureCurve {
     #[inline]
     pub fn at(&self, z: f64, z_max: f64, p_max: f64) -> (f64, f64) {
         if z > z_max {
-            if let Some(program) = self.program.as_ref().filter(|_| z > self.elastic_limit) {
-                let (p, [slope]) = program.eval([z]);
-                return (p, slope);
+            if self.is_batched() && z > self.elastic_limit {
+                return self.beyond(z);
             }
             let p = self.virgin(z);
             return (p, self.virgin_slope(z, p));
@@ -241,8 +306,8 @@ impl PressureCurve {
             return 0.0;
         }
         let (k, e) = (self.unloading, self.exponent);
-        if let Some(program) = &self.program {
-            return expression::curve::largest_depth(program, k, permanent, self.elastic_limit, guess);
+        if self.is_batched() {
+            return curve::largest_depth(&|z| self.beyond(z), k, permanent, self.elastic_limit, guess);
         }
         if e == 1.0 {
             return k * permanent / (k - self.modulus);

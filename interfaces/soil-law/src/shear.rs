@@ -14,12 +14,14 @@
 const MINDLIN_RATIO: f64 = 1.4 / 1.7;
 
 /// A stress so little above the yield stress is on it: a foot that slid and now stands does not slip by rounding.
-const ON_YIELD: f64 = 1.0 + 1e-13;
+pub(crate) const ON_YIELD: f64 = 1.0 + 1e-13;
 
-use crate::expression::ShearExpression;
+use crate::expression::{ShearExpression, built_up, cohesion_and_friction};
+use crate::plugin::PluginLaw;
+use terraglue_subsystem::MOST_LAW_STATE;
 
 /// Parameters of the shear law.
-#[derive(Clone, Copy, Debug, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct ShearLaw {
     /// Cohesion c, Pa.
     pub cohesion: f64,
@@ -33,6 +35,8 @@ pub struct ShearLaw {
     pub travel: Option<Travel>,
     /// Written in the scenario: takes the place of cohesion, friction and modulus in the yield stress.
     pub expression: Option<ShearExpression>,
+    /// A module of its own, which does the same.
+    pub plugin: Option<PluginLaw>,
 }
 
 /// Shear moduli along and across a direction.
@@ -72,12 +76,25 @@ impl ShearLaw {
     /// From cohesion (Pa), angle of friction (rad), deformation modulus (m) and normal elastic stiffness k_u (Pa/m).
     pub fn new(cohesion: f64, phi: f64, modulus: f64, k_u: f64) -> Self {
         let (friction, stiffness) = (libm::tan(phi), MINDLIN_RATIO * k_u);
-        Self { cohesion, friction, modulus, stiffness, travel: None, expression: None }
+        Self { cohesion, friction, modulus, stiffness, travel: None, expression: None, plugin: None }
     }
 
     /// The same with a yield stress of its own, see [`crate::expression`].
     pub fn with_expression(self, law: ShearExpression) -> Self {
         Self { cohesion: law.cohesion, friction: law.friction, expression: Some(law), ..self }
+    }
+
+    /// The same with the yield stress of a module.
+    pub fn with_plugin(self, law: PluginLaw) -> Self {
+        let state = [0.0; MOST_LAW_STATE];
+        let state = &state[..law.state_doubles()];
+        let [cohesion, friction] = cohesion_and_friction(|p, j| law.strength(p, j, state));
+        Self { cohesion, friction, expression: None, plugin: Some(law), ..self }
+    }
+
+    /// Whether many nodes at a time are better than one after the other.
+    pub fn is_batched(&self) -> bool {
+        self.plugin.is_some() || self.expression.is_some()
     }
 
     /// The same with the deformation modulus `across` (m) across the unit vector `heading` (along t1, t2). Slip in a
@@ -86,12 +103,12 @@ impl ShearLaw {
     /// have the two moduli).
     pub fn travelling(&self, heading: [f64; 2], across: Option<f64>) -> Self {
         let travel = across.map(|across| Travel { heading, ratio: self.modulus / across });
-        Self { travel, ..*self }
+        Self { travel, ..self.clone() }
     }
 
     /// How much a slip along `u` counts.
     #[inline]
-    fn weight(&self, u: [f64; 2], length: f64) -> f64 {
+    pub(crate) fn weight(&self, u: [f64; 2], length: f64) -> f64 {
         let Some(Travel { heading, ratio }) = self.travel else { return 1.0 };
         let along = (u[0] * heading[0] + u[1] * heading[1]) / length;
         let across = (1.0 - along * along).max(0.0);
@@ -106,10 +123,26 @@ impl ShearLaw {
     /// [`ShearLaw::yield_stress`] where `mobilised` = [`ShearLaw::mobilised`] of the slip is known already.
     #[inline]
     pub fn yield_stress_at(&self, p: f64, slip: f64, mobilised: f64) -> f64 {
-        match &self.expression {
-            Some(law) => law.strength(p, slip).0,
+        self.yield_stress_kept(p, slip, mobilised, &[])
+    }
+
+    /// The same; `kept` is what a law with a state remembers of the node.
+    #[inline]
+    pub fn yield_stress_kept(&self, p: f64, slip: f64, mobilised: f64, kept: &[f64]) -> f64 {
+        match self.own(p, slip, kept) {
+            Some((y, _)) => y,
             None => self.strength(p).0 * mobilised,
         }
+    }
+
+    /// The yield stress of an expression or a module, with its derivatives by pressure and slip.
+    #[inline]
+    pub(crate) fn own(&self, p: f64, slip: f64, kept: &[f64]) -> Option<(f64, [f64; 2])> {
+        if let Some(law) = &self.expression {
+            return Some(law.strength(p, slip));
+        }
+        let law = self.plugin.as_ref()?;
+        Some(built_up(self.cohesion, p, |p| law.strength(p, slip, kept)))
     }
 
     /// Full strength S at pressure p and its derivative, Pa. Cohesion builds up over the first c/10 of pressure,
@@ -139,14 +172,27 @@ impl ShearLaw {
     /// [`ShearLaw::respond`] where `mobilised` = [`ShearLaw::mobilised`] of the state's slip is known already.
     #[inline]
     pub fn respond_at(&self, state: &ShearState, mobilised: f64, p: f64, s: [f64; 2]) -> ShearResponse {
+        self.respond_kept(state, &[], mobilised, p, s)
+    }
+
+    /// The same; `kept` is what a law with a state remembers of the node.
+    #[inline]
+    pub fn respond_kept(
+        &self,
+        state: &ShearState,
+        kept: &[f64],
+        mobilised: f64,
+        p: f64,
+        s: [f64; 2],
+    ) -> ShearResponse {
         if p <= 0.0 {
             return ShearResponse::default();
         }
         let u = [state.elastic[0] + s[0], state.elastic[1] + s[1]];
         let length = (u[0] * u[0] + u[1] * u[1]).sqrt();
         let trial = self.stiffness * length;
-        if let Some(law) = &self.expression {
-            return self.respond_by(law, state, p, u);
+        if self.is_batched() {
+            return self.respond_by(state, kept, p, u);
         }
         let (strength, by_p) = self.strength(p);
         if trial <= strength * mobilised * ON_YIELD {
@@ -163,39 +209,7 @@ impl ShearLaw {
         self.plastic(u, length, &answer)
     }
 
-    /// The same with the yield stress of an expression: trial − k_t·Δj = Y(p, j + Δj), Newton inside a bracket.
-    fn respond_by(&self, law: &ShearExpression, state: &ShearState, p: f64, u: [f64; 2]) -> ShearResponse {
-        let length = (u[0] * u[0] + u[1] * u[1]).sqrt();
-        let trial = self.stiffness * length;
-        let (mut y, mut by) = law.strength(p, state.slip);
-        if trial <= y {
-            return self.elastic(u, state.slip);
-        }
-        let weight = self.weight(u, length);
-        let (mut low, mut high, mut step) = (0.0, length, 0.0);
-        for _ in 0..60 {
-            let residual = trial - self.stiffness * step - y;
-            if residual > 0.0 {
-                low = step
-            } else {
-                high = step
-            }
-            let mut next = step + residual / (self.stiffness + weight * by[1].max(0.0));
-            if !(next >= low && next <= high) {
-                next = 0.5 * (low + high);
-            }
-            let change = (next - step).abs();
-            step = next;
-            (y, by) = law.strength(p, state.slip + weight * step);
-            if change <= 1e-15 * step {
-                break;
-            }
-        }
-        let slip = state.slip + weight * step;
-        self.plastic(u, length, &Plastic { step, slip, hardening: weight * by[1].max(0.0), by_p: by[0] })
-    }
-
-    fn elastic(&self, u: [f64; 2], slip: f64) -> ShearResponse {
+    pub(crate) fn elastic(&self, u: [f64; 2], slip: f64) -> ShearResponse {
         ShearResponse {
             stress: [self.stiffness * u[0], self.stiffness * u[1]],
             tangent: [self.stiffness, 0.0, self.stiffness],
@@ -223,7 +237,7 @@ impl ShearLaw {
         (step, left)
     }
 
-    fn plastic(&self, u: [f64; 2], length: f64, answer: &Plastic) -> ShearResponse {
+    pub(crate) fn plastic(&self, u: [f64; 2], length: f64, answer: &Plastic) -> ShearResponse {
         let Plastic { step, slip, hardening, by_p } = *answer;
         let k = self.stiffness;
         let stress = (k * (length - step)).max(0.0);
@@ -249,11 +263,11 @@ impl ShearLaw {
 
 /// What a slip increment has done: its length, the slip counted since the contact began, d(yield)/d(length) and
 /// d(yield)/dp at fixed slip.
-struct Plastic {
-    step: f64,
-    slip: f64,
-    hardening: f64,
-    by_p: f64,
+pub(crate) struct Plastic {
+    pub step: f64,
+    pub slip: f64,
+    pub hardening: f64,
+    pub by_p: f64,
 }
 
 terraglue_subsystem::persist!(ShearState { elastic, slip });

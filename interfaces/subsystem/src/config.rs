@@ -30,6 +30,12 @@ impl Config {
         self
     }
 
+    /// The same with another value for a dotted name.
+    pub fn with(mut self, name: &str, value: impl Into<Value>) -> Self {
+        insert(&mut self.values, name, value.into());
+        self
+    }
+
     /// Value of a dotted name.
     pub fn get(&self, name: &str) -> Option<&Value> {
         let mut parts = name.split('.');

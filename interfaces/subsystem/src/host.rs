@@ -1,6 +1,8 @@
 //! What the host offers a subsystem at `instantiate`, and for as long as it lives.
 
 use crate::error::{Error, Result};
+use crate::node_law::NodeLaw;
+use std::sync::Arc;
 
 /// Severity of a log line.
 #[repr(i32)]
@@ -40,6 +42,10 @@ pub trait Host: Send + Sync {
     fn gravity(&self) -> [f64; 3];
     /// The ground of the scenario at the start, for the soil that will own it.
     fn terrain(&self) -> Option<&dyn Terrain>;
+    /// The law that the scenario names in the parameter `law.plugin` of this subsystem.
+    fn law(&self) -> Option<Arc<dyn NodeLaw>> {
+        None
+    }
 }
 
 /// Ground at the start of the run; nodes (i, j), 0 ≤ i < nx, lie at `origin + (i, j)·spacing`.

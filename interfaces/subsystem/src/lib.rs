@@ -30,6 +30,7 @@ mod energy;
 mod error;
 mod field;
 mod host;
+mod node_law;
 mod port;
 mod scene;
 mod schema;
@@ -44,6 +45,9 @@ pub use energy::Energy;
 pub use error::{Error, Result};
 pub use field::{FieldInfo, FieldTile, TileValues};
 pub use host::{Host, LogLevel, Standalone, Terrain, TerrainTile};
+pub use node_law::{
+    LawModule, MOST_LAW_STATE, NodeLaw, PressureAnswer, PressureNodes, ShearAnswer, ShearNodes,
+};
 pub use port::{Law, Node, Port, PortKind, component};
 pub use scene::{BodyState, Geometry, Pose, Scene, SceneBody, SceneShape};
 pub use schema::{Kind, Parameter, ParameterType, Schema};

@@ -100,7 +100,7 @@ fn description(lab: &Lab) -> Verdict {
             "a description: TG_DESCRIBE(name, version) in C, export_subsystem! in Rust",
         ));
     };
-    let module = lab.module()?;
+    let module = lab.own_module()?;
     if module.is_python() {
         return named_as_its_file(lab, &section.name);
     }
@@ -140,7 +140,7 @@ fn named_as_its_file(lab: &Lab, name: &str) -> Verdict {
 }
 
 fn schema(lab: &Lab) -> Verdict {
-    let module = lab.module()?;
+    let module = lab.own_module()?;
     let schema = module.schema();
     let wrong = |p: &Parameter, got: String, expected: &str| {
         Err(Stop::fail("schema", format!("parameter `{}`", p.name), got, expected))
@@ -209,10 +209,10 @@ fn default_fits(p: &Parameter) -> Verdict {
 }
 
 fn schema_again(lab: &Lab) -> Verdict {
-    let first = lab.module()?;
+    let first = lab.own_module()?;
     drop(lab.instance());
     for _ in 0..3 {
-        let again = lab.module()?;
+        let again = lab.own_module()?;
         if again.schema() != first.schema() {
             return Err(Stop::fail("schema", "asked again", "another text", "the same text as at first"));
         }

@@ -1,6 +1,7 @@
 //! The tests, one file per area.
 
 mod host_untouched;
+mod law;
 mod library;
 mod life_cycle;
 mod numbers;
@@ -17,7 +18,7 @@ use super::catalogue::Test;
 pub use host_untouched::OUTPUT;
 
 /// The lists of all areas, in the order in which they build on each other.
-pub const ALL: [fn() -> Vec<Test>; 12] = [
+pub const ALL: [fn() -> Vec<Test>; 13] = [
     library::tests,
     life_cycle::tests,
     host_untouched::tests,
@@ -30,4 +31,5 @@ pub const ALL: [fn() -> Vec<Test>; 12] = [
     physics_robot::tests,
     physics_controller::tests,
     resources::tests,
+    law::tests,
 ];

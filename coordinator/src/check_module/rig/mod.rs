@@ -3,12 +3,14 @@
 
 mod bodies;
 mod flat;
+mod law;
 mod script;
 mod signals;
 mod soil;
 
 pub use bodies::BodyBench;
 pub use flat::Flat;
+pub use law::LawBench;
 pub use script::{Runner, committed, script};
 pub use signals::{numbers, outputs, set_numbers};
 pub use soil::{Foot, Moved, SoilBench, dot};

@@ -131,6 +131,7 @@ impl Bundle<'_> {
                 self.parameter(spec, key)?;
             }
             self.soil_table(spec)?;
+            self.law(spec)?;
             if let Some(path) = module.path() {
                 let file = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
                 let to = self.take(path, format!("modules/{}/{file}", spec.name))?;
@@ -172,6 +173,24 @@ impl Bundle<'_> {
             item = &mut item[part];
         }
         *item = value(to);
+        Ok(())
+    }
+
+    /// The module that is the law of a soil.
+    fn law(&mut self, spec: &SubsystemSpec) -> Result {
+        let named = spec.parameters.get("law").and_then(|law| law.get("plugin"));
+        let Some(name) = named.and_then(|v| v.as_str()) else { return Ok(()) };
+        let path = crate::host::law::locate(name, self.search, &self.scenario.folder);
+        let path = path.map_err(|e| {
+            let place = [spec.name.as_str(), "law", "plugin"];
+            self.scenario.source.error_at_value(&place, e.to_string(), None)
+        })?;
+        let file = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let to = self.take(&path, format!("modules/{}/law/{file}", spec.name))?;
+        let law = self.document.get_mut(&spec.name).and_then(|t| t.get_mut("law"));
+        if let Some(law) = law.and_then(Item::as_table_like_mut) {
+            law.insert("plugin", value(to));
+        }
         Ok(())
     }
 

@@ -81,7 +81,7 @@ fn files_that_are_no_library() {
     foreign[0x12] = 0x28;
     std::fs::write(&path, &foreign).expect("written");
     let other = LoadedModule::load(&path).expect_err("another machine");
-    assert!(other.to_string().ends_with("another kind of machine (ELF number 40)"), "{other}");
+    assert!(other.to_string().contains("another kind of machine (ELF number 40)"), "{other}");
 }
 
 #[test]

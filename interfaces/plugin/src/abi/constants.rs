@@ -3,7 +3,7 @@
 /// Version of the ABI that breaks: host and module must agree.
 pub const TG_ABI_MAJOR: u32 = 2;
 /// Version of the ABI that grows: new fields at the end of `tg_subsystem` and `tg_host`.
-pub const TG_ABI_MINOR: u32 = 0;
+pub const TG_ABI_MINOR: u32 = 1;
 
 /// What a call answers; anything else than the values below counts as `TG_FATAL`.
 pub type TgStatus = i32;

@@ -1,5 +1,6 @@
 //! What the host offers at `instantiate`.
 use super::constants::TgStatus;
+use super::law::TgOpenLaw;
 use std::ffi::{c_char, c_void};
 
 /// One piece of a parallel loop.
@@ -69,4 +70,7 @@ pub struct TgHost {
     pub max_nodes: u32,
     /// 0.
     pub reserved: u32,
+    /// Since ABI 2.1. The law that the scenario names in the parameter `law.plugin` of this subsystem, valid until
+    /// `free`; null: none.
+    pub law: *const TgOpenLaw,
 }

@@ -4,6 +4,7 @@
 
 mod constants;
 mod host;
+mod law;
 mod layout;
 mod scene;
 mod step;
@@ -12,6 +13,7 @@ mod variable;
 
 pub use constants::*;
 pub use host::{TgHost, TgJob, TgTerrain};
+pub use law::{TgNodeLaw, TgOpenLaw, TgPressureAnswer, TgPressureNodes, TgShearAnswer, TgShearNodes};
 pub use scene::{TgBody, TgBodyState, TgEnergy, TgField, TgFieldTile, TgPose, TgScene, TgShape};
 pub use step::{TgEstimate, TgInput, TgLaw, TgMotion, TgNode, TgPort, TgResponse, TgStep};
 pub use table::{TgEntry, TgSubsystem};

@@ -1,6 +1,7 @@
 //! The table of functions that a module hands out.
 use super::constants::TgStatus;
 use super::host::TgHost;
+use super::law::TgNodeLaw;
 use super::scene::{TgBodyState, TgEnergy, TgField, TgFieldTile, TgScene};
 use super::step::{TgEstimate, TgInput, TgLaw, TgMotion, TgResponse, TgStep};
 use super::variable::{TgAction, TgBytes, TgValues, TgVariable};
@@ -153,8 +154,7 @@ pub struct TgSubsystem {
     /// Energies of the committed state.
     pub energy: Option<unsafe extern "C" fn(instance: *mut c_void, out: *mut TgEnergy) -> TgStatus>,
 
-    /// Reserved for modules of kind TG_LAW, null in ABI 1.0: pressure (Pa) and its tangent (Pa/m) at the
-    /// sinkages (m) of n nodes below a contact of width `b` (m); `state` holds law_state_doubles per node.
+    /// Null: kept for the layout of ABI 2.0; see `law`.
     pub pressure: Option<
         unsafe extern "C" fn(
             instance: *mut c_void,
@@ -166,8 +166,7 @@ pub struct TgSubsystem {
             tangent: *mut f64,
         ) -> TgStatus,
     >,
-    /// Reserved for modules of kind TG_LAW, null in ABI 1.0: shear stress (Pa) along two tangents at the
-    /// pressures (Pa) and shear displacements (m, two per node) of n nodes.
+    /// Null: kept for the layout of ABI 2.0; see `law`.
     pub shear: Option<
         unsafe extern "C" fn(
             instance: *mut c_void,
@@ -179,10 +178,13 @@ pub struct TgSubsystem {
             tangent: *mut f64,
         ) -> TgStatus,
     >,
-    /// Reserved for modules of kind TG_LAW: doubles of state per node, owned by the host.
+    /// 0: kept for the layout of ABI 2.0.
     pub law_state_doubles: u32,
     /// 0.
     pub reserved: u32,
+    /// Since ABI 2.1. Modules of kind TG_LAW: their functions; required, while `instantiate`, `free`,
+    /// `capabilities`, `advance` and `last_error` are not. Null for the other kinds.
+    pub law: *const TgNodeLaw,
 }
 
 /// What a module exports under the name `terraglue_subsystem`.

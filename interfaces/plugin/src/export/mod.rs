@@ -17,7 +17,7 @@ use std::cell::{Cell, RefCell};
 use std::ffi::{CString, c_char, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
-use terraglue_subsystem::{Config, Error, Module, Result, Subsystem};
+use terraglue_subsystem::{Config, Error, LawModule, Module, Result, Schema, Subsystem};
 
 thread_local! {
     /// Why `instantiate` or `schema` failed on this thread; instances keep their own text.
@@ -148,11 +148,39 @@ pub fn table<M: Module>(fallback_name: &str, description: &'static [u8]) -> TgSu
         shear: None,
         law_state_doubles: 0,
         reserved: 0,
+        law: std::ptr::null(),
     }
 }
 
+/// The table of a law; as [`table`].
+pub fn law_table<L: LawModule>(fallback_name: &str, description: &'static [u8]) -> TgSubsystem {
+    let name = catch_unwind(L::schema).map(|s| s.name).ok();
+    let id = c_string(name.as_deref().unwrap_or(fallback_name));
+    // SAFETY: all zero is a table whose functions are null.
+    let empty: TgSubsystem = unsafe { std::mem::zeroed() };
+    TgSubsystem {
+        size: size_of::<TgSubsystem>() as u32,
+        abi_major: TG_ABI_MAJOR,
+        abi_minor: TG_ABI_MINOR,
+        kind: TG_LAW,
+        id: id.into_raw(),
+        description: description.as_ptr().cast(),
+        schema: Some(law_schema::<L>),
+        law: Box::into_raw(Box::new(crate::law::functions::<L>())),
+        ..empty
+    }
+}
+
+unsafe extern "C" fn law_schema<L: LawModule>() -> *const c_char {
+    schema_text(L::schema)
+}
+
 unsafe extern "C" fn schema_json<M: Module>() -> *const c_char {
-    let json = catch_unwind(|| serde_json::to_string(&M::schema()));
+    schema_text(M::schema)
+}
+
+fn schema_text(schema: fn() -> Schema) -> *const c_char {
+    let json = catch_unwind(|| serde_json::to_string(&schema()));
     let text = match json {
         Ok(Ok(text)) => text,
         Ok(Err(error)) => {

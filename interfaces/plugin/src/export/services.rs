@@ -1,13 +1,16 @@
 //! The host as a Rust module sees it: [`Host`] on top of the host's table.
 
 use crate::abi::*;
+use crate::law::TableLaw;
 use crate::text::{borrowed, c_string};
 use std::any::Any;
 use std::ffi::c_void;
+use std::mem::offset_of;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
+use std::sync::Arc;
 use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, Ordering};
-use terraglue_subsystem::{Error, Host, LogLevel, Result, Terrain, TerrainTile};
+use terraglue_subsystem::{Error, Host, LogLevel, NodeLaw, Result, Terrain, TerrainTile};
 
 /// Services behind a table of a foreign host.
 pub(super) struct ForeignHost {
@@ -15,6 +18,7 @@ pub(super) struct ForeignHost {
     name: String,
     folder: String,
     terrain: Option<ForeignTerrain>,
+    law: Option<Arc<dyn NodeLaw>>,
     terrain_open: AtomicBool,
 }
 
@@ -33,19 +37,23 @@ impl ForeignHost {
         }
         // SAFETY: size and versions are the first fields of every version.
         let (size, major) = unsafe { ((*host).size as usize, (*host).abi_major) };
-        if major != TG_ABI_MAJOR || size < size_of::<TgHost>() {
+        // what came with later minors may be missing
+        const FIRST: usize = offset_of!(TgHost, law);
+        if major != TG_ABI_MAJOR || size < FIRST {
             return Err(Error::Fatal(format!(
                 "the host speaks ABI {major} with a table of {size} bytes; this module needs ABI \
-                 {TG_ABI_MAJOR}.{TG_ABI_MINOR} and {} bytes",
-                size_of::<TgHost>()
+                 {TG_ABI_MAJOR} and at least {FIRST} bytes"
             )));
         }
-        // SAFETY: the table is at least as long as ours; texts and terrain by the contract.
+        // SAFETY: `size` bytes may be read, and zero means null; texts, terrain and law by the contract.
         unsafe {
-            let raw = *host;
+            let mut raw: TgHost = std::mem::zeroed();
+            let bytes = size.min(size_of::<TgHost>());
+            std::ptr::copy_nonoverlapping(host.cast::<u8>(), (&raw mut raw).cast::<u8>(), bytes);
+            let law = TableLaw::of_host(raw.law);
             let terrain = raw.terrain.as_ref().map(|t| ForeignTerrain(*t));
             let (name, folder) = (borrowed(raw.name)?.to_owned(), borrowed(raw.folder)?.to_owned());
-            Ok(Self { raw, name, folder, terrain, terrain_open: AtomicBool::new(true) })
+            Ok(Self { raw, name, folder, terrain, law, terrain_open: AtomicBool::new(true) })
         }
     }
 
@@ -109,6 +117,10 @@ impl Host for ForeignHost {
     fn terrain(&self) -> Option<&dyn Terrain> {
         let open = self.terrain_open.load(Ordering::Relaxed);
         self.terrain.as_ref().filter(|_| open).map(|t| t as &dyn Terrain)
+    }
+
+    fn law(&self) -> Option<Arc<dyn NodeLaw>> {
+        self.law.clone()
     }
 }
 

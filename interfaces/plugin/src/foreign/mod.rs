@@ -7,10 +7,11 @@ mod values;
 
 use crate::abi::*;
 use crate::convert;
+use crate::law::TableLaw;
 use crate::text::{borrowed, c_string};
 use std::mem::offset_of;
 use std::sync::Arc;
-use terraglue_subsystem::{Config, Error, Host, Kind, Result, Schema};
+use terraglue_subsystem::{Config, Error, Host, Kind, NodeLaw, Result, Schema};
 
 pub use subsystem::ForeignSubsystem;
 
@@ -36,6 +37,8 @@ pub enum TableError {
     Missing(&'static str),
     /// A kind that this host does not know.
     Kind(u32),
+    /// A law without functions that can be used.
+    Law(String),
 }
 
 impl std::fmt::Display for TableError {
@@ -55,6 +58,7 @@ impl std::fmt::Display for TableError {
             ),
             Self::Missing(name) => write!(f, "the required function `{name}` of its table is null"),
             Self::Kind(kind) => write!(f, "its kind is the unknown number {kind}"),
+            Self::Law(why) => f.write_str(why),
         }
     }
 }
@@ -99,19 +103,24 @@ impl ForeignModule {
             std::ptr::copy_nonoverlapping(table.cast::<u8>(), (&raw mut whole).cast::<u8>(), bytes);
             whole
         };
+        let is_law = table.kind == TG_LAW;
         for (name, missing) in [
             ("schema", table.schema.is_none()),
-            ("instantiate", table.instantiate.is_none()),
-            ("free", table.free.is_none()),
-            ("capabilities", table.capabilities.is_none()),
-            ("advance", table.advance.is_none()),
-            ("last_error", table.last_error.is_none()),
+            ("instantiate", !is_law && table.instantiate.is_none()),
+            ("free", !is_law && table.free.is_none()),
+            ("capabilities", !is_law && table.capabilities.is_none()),
+            ("advance", !is_law && table.advance.is_none()),
+            ("last_error", !is_law && table.last_error.is_none()),
         ] {
             if missing {
                 return Err(TableError::Missing(name));
             }
         }
         let kind = convert::kind(table.kind).ok_or(TableError::Kind(table.kind))?;
+        if is_law {
+            // SAFETY: the module keeps to the contract of its table.
+            unsafe { TableLaw::new("", table.law, Vec::new()) }.map_err(TableError::Law)?;
+        }
         Ok(Self { table, kind })
     }
 
@@ -141,9 +150,19 @@ impl ForeignModule {
         )))
     }
 
+    /// A law with these numbers, in the order of its schema.
+    pub fn law(&self, name: &str, numbers: Vec<f64>) -> Result<Arc<dyn NodeLaw>> {
+        // SAFETY: the table was checked in `new` and lives as long as the process.
+        let law = unsafe { TableLaw::new(name, self.table.law, numbers) };
+        law.map(|law| Arc::new(law) as Arc<dyn NodeLaw>).map_err(Error::Failed)
+    }
+
     /// Makes an instance; `config` is complete (`Config::with_defaults`).
     pub fn instantiate(&self, config: &Config, host: Arc<dyn Host>) -> Result<ForeignSubsystem> {
-        let instantiate = self.table.instantiate.ok_or(Error::Unsupported)?;
+        let Some(instantiate) = self.table.instantiate else {
+            let text = "it is a law, not a subsystem: name it in `[soil.law] plugin` of a soil";
+            return Err(Error::Refused(text.into()));
+        };
         let services = services::Services::new(host);
         let config = c_string(&config.to_json());
         let mut instance = std::ptr::null_mut();

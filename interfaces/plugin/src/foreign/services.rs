@@ -2,12 +2,13 @@
 
 use crate::abi::*;
 use crate::convert;
+use crate::law::TableLaw;
 use crate::text::{borrowed, c_string, panic_text, slice_mut};
 use std::ffi::{CString, c_char, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
-use terraglue_subsystem::{Host, LogLevel, TerrainTile};
+use terraglue_subsystem::{Host, LogLevel, NodeLaw, TerrainTile};
 
 /// The services of one instance. Boxed: the table points at it.
 pub(super) struct Services {
@@ -16,6 +17,8 @@ pub(super) struct Services {
     _name: CString,
     _folder: CString,
     terrain: TgTerrain,
+    _law: Option<Arc<dyn NodeLaw>>,
+    open_law: Option<TgOpenLaw>,
     table: TgHost,
 }
 
@@ -46,16 +49,29 @@ impl Services {
             terrain: std::ptr::null(),
             max_nodes: host.max_nodes(),
             reserved: 0,
+            law: std::ptr::null(),
         };
+        let law = host.law();
+        let open_law = law.as_ref().and_then(|law| law.as_any().downcast_ref()).map(TableLaw::open);
         let has_terrain = host.terrain().is_some();
         let terrain_open = AtomicBool::new(true);
-        let mut this = Box::new(Self { host, terrain_open, _name: name, _folder: folder, terrain, table });
+        let mut this = Box::new(Self {
+            host,
+            terrain_open,
+            _name: name,
+            _folder: folder,
+            terrain,
+            _law: law,
+            open_law,
+            table,
+        });
         let ctx = (&raw const *this).cast_mut().cast();
         this.table.ctx = ctx;
         this.terrain.ctx = ctx;
         if has_terrain {
             this.table.terrain = &raw const this.terrain;
         }
+        this.table.law = this.open_law.as_ref().map_or(std::ptr::null(), |open| &raw const *open);
         this
     }
 

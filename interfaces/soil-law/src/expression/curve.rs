@@ -1,6 +1,5 @@
-//! What a soil asks of a pressure–sinkage curve beyond its value: inverses and work of a curve given by a program.
-
-use super::program::Program;
+//! What a soil asks of a pressure–sinkage curve beyond its value: inverses and work of a curve given by a function of the
+//! depth that answers pressure and slope.
 
 /// Smallest depth at which a law is looked at, m.
 const SHALLOWEST: f64 = 1e-9;
@@ -10,25 +9,25 @@ const DEEPEST: f64 = 1e3;
 const STEPS: usize = 200;
 
 /// Depth where the law meets the elastic line k_u·z from above, m; 0 where it starts below it.
-pub fn elastic_limit(law: &Program, k_u: f64) -> f64 {
-    if law.eval([SHALLOWEST]).0 <= k_u * SHALLOWEST {
+pub fn elastic_limit(law: &impl Fn(f64) -> (f64, f64), k_u: f64) -> f64 {
+    if law(SHALLOWEST).0 <= k_u * SHALLOWEST {
         return 0.0;
     }
     // ln(p/(k_u z)) over ln z is a straight line for a power law: one Newton step then hits
     root_in_logarithms([SHALLOWEST, DEEPEST], SHALLOWEST, |z| {
-        let (p, [slope]) = law.eval([z]);
+        let (p, slope) = law(z);
         (p / (k_u * z), slope * z / p - 1.0)
     })
 }
 
 /// Depth at which the law gives the pressure `p` > 0, m.
-pub fn depth(law: &Program, p: f64, shallowest: f64) -> f64 {
+pub fn depth(law: &impl Fn(f64) -> (f64, f64), p: f64, shallowest: f64) -> f64 {
     let shallowest = shallowest.max(SHALLOWEST);
-    if law.eval([shallowest]).0 >= p {
+    if law(shallowest).0 >= p {
         return shallowest;
     }
     root_in_logarithms([shallowest, DEEPEST], 0.01_f64.max(shallowest), |z| {
-        let (value, [slope]) = law.eval([z]);
+        let (value, slope) = law(z);
         (value / p, slope * z / value)
     })
 }
@@ -60,19 +59,25 @@ fn root_in_logarithms([mut low, mut high]: [f64; 2], start: f64, f: impl Fn(f64)
 }
 
 /// ∫p dz from `from` to `to` with three Gauss points: exact enough for the depth that a foot gains in a step.
-pub fn work(law: &Program, from: f64, to: f64) -> f64 {
+pub fn work(law: &impl Fn(f64) -> (f64, f64), from: f64, to: f64) -> f64 {
     const POINTS: [(f64, f64); 3] =
         [(-0.774_596_669_241_483_4, 5.0 / 9.0), (0.0, 8.0 / 9.0), (0.774_596_669_241_483_4, 5.0 / 9.0)];
     let (middle, half) = (0.5 * (from + to), 0.5 * (to - from));
-    POINTS.iter().map(|(x, weight)| weight * half * law.eval([middle + half * x]).0).sum()
+    POINTS.iter().map(|(x, weight)| weight * half * law(middle + half * x).0).sum()
 }
 
 /// z with k_u·(z − permanent) = p(z), beyond the elastic limit: see `PressureCurve::largest_depth`.
-pub fn largest_depth(law: &Program, k_u: f64, permanent: f64, limit: f64, guess: f64) -> f64 {
+pub fn largest_depth(
+    law: &impl Fn(f64) -> (f64, f64),
+    k_u: f64,
+    permanent: f64,
+    limit: f64,
+    guess: f64,
+) -> f64 {
     let (mut low, mut high) = (permanent.max(limit), DEEPEST);
     let mut z = guess.clamp(low, high);
     for _ in 0..STEPS {
-        let (p, [slope]) = law.eval([z]);
+        let (p, slope) = law(z);
         let residual = k_u * (z - permanent) - p;
         if residual < 0.0 {
             low = z

@@ -53,26 +53,53 @@ const TYPICAL_PRESSURE: f64 = 1e4;
 
 impl ShearExpression {
     fn new(program: Program) -> Self {
-        let full = |sigma| program.eval([sigma, SLIPS[1]]).0;
-        let cohesion = full(0.0);
-        Self { program, cohesion, friction: (full(TYPICAL_PRESSURE) - cohesion) / TYPICAL_PRESSURE }
+        let [cohesion, friction] = cohesion_and_friction(|sigma, j| program.eval([sigma, j]));
+        Self { program, cohesion, friction }
     }
 
-    /// Largest stress at the pressure `sigma` (Pa) after the slip `j` (m), and its derivatives by both. What the soil
-    /// holds without pressure builds up over the first tenth of it, as in the built-in law.
+    /// Largest stress at the pressure `sigma` (Pa) after the slip `j` (m), and its derivatives by both.
     #[inline]
     pub fn strength(&self, sigma: f64, j: f64) -> (f64, [f64; 2]) {
-        const BUILD_UP: f64 = 10.0;
-        let (mut y, mut d) = self.program.eval([sigma, j]);
-        if BUILD_UP * sigma < self.cohesion {
-            let (held, [_, by_j]) = self.program.eval([0.0, j]);
-            let missing = 1.0 - BUILD_UP * sigma / self.cohesion;
-            y -= held * missing;
-            d[0] += held * BUILD_UP / self.cohesion;
-            d[1] -= by_j * missing;
-        }
-        (y, d)
+        built_up(self.cohesion, sigma, |sigma| self.program.eval([sigma, j]))
     }
+
+    /// The same at many places, without what builds up.
+    #[inline]
+    pub(crate) fn strengths(&self, sigma: &[f64], j: &[f64], [y, by_sigma, by_j]: [&mut [f64]; 3]) {
+        self.program.eval_all([sigma, j], y, [by_sigma, by_j]);
+    }
+}
+
+/// Share of the cohesion over which it builds up, inverse.
+const BUILD_UP: f64 = 10.0;
+
+/// Whether the pressure is so small that strength without pressure is still building up.
+#[inline]
+pub(crate) fn is_building_up(cohesion: f64, sigma: f64) -> bool {
+    BUILD_UP * sigma < cohesion
+}
+
+/// A stress with its derivatives by pressure and slip. What the soil holds without pressure, `cohesion` once it has
+/// slipped, builds up over the first tenth of it, as in the built-in law.
+#[inline]
+pub(crate) fn built_up(cohesion: f64, sigma: f64, at: impl Fn(f64) -> (f64, [f64; 2])) -> (f64, [f64; 2]) {
+    let (mut y, mut d) = at(sigma);
+    if is_building_up(cohesion, sigma) {
+        let (held, [_, by_j]) = at(0.0);
+        let missing = 1.0 - BUILD_UP * sigma / cohesion;
+        y -= held * missing;
+        d[0] += held * BUILD_UP / cohesion;
+        d[1] -= by_j * missing;
+    }
+    (y, d)
+}
+
+/// What a law that answers (stress, derivatives) at (pressure, slip) holds without pressure, Pa, and its friction
+/// once the soil has slipped far.
+pub(crate) fn cohesion_and_friction(at: impl Fn(f64, f64) -> (f64, [f64; 2])) -> [f64; 2] {
+    let full = |sigma| at(sigma, SLIPS[1]).0;
+    let cohesion = full(0.0);
+    [cohesion, (full(TYPICAL_PRESSURE) - cohesion) / TYPICAL_PRESSURE]
 }
 
 /// The texts of `[soil.law]`; the programs are made anew when a parameter changes.
@@ -96,7 +123,11 @@ impl SoilExpressions {
                 "law.shear",
                 "shear stress (Pa) at the pressure sigma after the slip j, e.g. (c + sigma*tan(phi))*(1 - exp(-j/K))",
             ),
-            text("law.parameters.*", "a name of your own for the laws: \"VALUE UNIT [MIN, MAX]\""),
+            text("law.plugin", "a module of kind law: its name, or the path of its file"),
+            text(
+                "law.parameters.*",
+                "a name of your own for the laws, \"VALUE UNIT [MIN, MAX]\", or a number of the module",
+            ),
         ]
     }
 
@@ -115,6 +146,7 @@ impl SoilExpressions {
         if pressure.is_none() && shear.is_none() {
             return match own.first() {
                 None => Ok(None),
+                Some(_) if text("law.plugin")?.is_some() => Ok(None),
                 Some(symbol) => Err(Error::Refused(format!(
                     "`law.parameters.{}` is given, but neither `law.pressure` nor `law.shear` uses it",
                     symbol.name
@@ -254,7 +286,7 @@ fn physical_pressure(
             }
             before = (z, p);
         }
-        let (last, limit) = (at.eval([DEPTHS[1]]).0, curve::elastic_limit(&at, k_u));
+        let (last, limit) = (at.eval([DEPTHS[1]]).0, curve::elastic_limit(&|z| at.depth(z), k_u));
         if last <= 0.0 {
             return Err(whole(format!("the pressure is 0 down to z = {} m at b = {b:.4} m", DEPTHS[1])));
         }

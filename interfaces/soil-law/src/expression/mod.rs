@@ -17,7 +17,6 @@
 //! assert_eq!(curve.virgin(0.02), built_in.virgin(0.02));
 //! ```
 
-mod batch;
 mod build;
 pub(crate) mod curve;
 mod dimension;
@@ -28,9 +27,9 @@ mod program;
 mod range;
 mod symbol;
 
-pub(crate) use batch::{Nodes, for_each_node};
 pub use error::ExpressionError;
 pub use law::{PressureExpression, ShearExpression, SoilExpressions};
+pub(crate) use law::{built_up, cohesion_and_friction, is_building_up};
 pub use parse::{Binary, Function, Tree};
 pub use program::Program;
 pub use symbol::{Role, Symbol};

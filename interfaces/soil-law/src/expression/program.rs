@@ -162,26 +162,124 @@ impl Program {
         (v[last], d[last])
     }
 
-    /// Values and derivatives of a law of one variable at up to [`CHUNK`] places.
-    pub fn eval_chunk(&self, x: &[f64; CHUNK], out: &mut [f64; CHUNK], slope: &mut [f64; CHUNK]) {
-        match self.registers {
-            0..=2 => self.chunk::<2>(x, out, slope),
-            3..=5 => self.chunk::<5>(x, out, slope),
-            _ => self.chunk::<REGISTERS>(x, out, slope),
+    /// Value and slope of a law of one variable.
+    #[inline]
+    pub fn depth(&self, z: f64) -> (f64, f64) {
+        let (p, [slope]) = self.eval([z]);
+        (p, slope)
+    }
+
+    /// Values and derivatives of a law of D variables at the places `x`, one array per variable.
+    pub fn eval_all<const D: usize>(&self, x: [&[f64]; D], out: &mut [f64], mut slopes: [&mut [f64]; D]) {
+        let mut first = 0;
+        while first < out.len() {
+            let n = CHUNK.min(out.len() - first);
+            let range = first..first + n;
+            let x = x.map(|x| {
+                let mut all = [x[first]; CHUNK];
+                all[..n].copy_from_slice(&x[range.clone()]);
+                all
+            });
+            let mut lanes = Lanes { v: [0.0; CHUNK], d: [[0.0; CHUNK]; D] };
+            match self.registers {
+                0..=3 => self.chunk::<3, D>(n, &x, &mut lanes),
+                4..=6 => self.chunk::<6, D>(n, &x, &mut lanes),
+                _ => self.chunk::<REGISTERS, D>(n, &x, &mut lanes),
+            }
+            out[range.clone()].copy_from_slice(&lanes.v[..n]);
+            for (slope, d) in slopes.iter_mut().zip(&lanes.d) {
+                slope[range.clone()].copy_from_slice(&d[..n]);
+            }
+            first += n;
         }
     }
 
-    fn chunk<const R: usize>(&self, x: &[f64; CHUNK], out: &mut [f64; CHUNK], slope: &mut [f64; CHUNK]) {
-        let mut v = [[0.0; CHUNK]; R];
-        let mut d = [[0.0; CHUNK]; R];
+    fn chunk<const R: usize, const D: usize>(&self, n: usize, x: &[[f64; CHUNK]; D], out: &mut Lanes<D>) {
+        let mut registers = [Lanes { v: [0.0; CHUNK], d: [[0.0; CHUNK]; D] }; R];
         let mut last = 0;
         for (step, to) in self.steps() {
             last = *to as usize;
             if last < R {
-                lanes(step, last, x, &mut v, &mut d);
+                registers[last] = step.lanes(n, x, &registers);
             }
         }
-        (*out, *slope) = (v[last], d[last]);
+        *out = registers[last];
+    }
+}
+
+/// A value with its derivatives by D variables at [`CHUNK`] places.
+#[derive(Clone, Copy)]
+struct Lanes<const D: usize> {
+    v: [f64; CHUNK],
+    d: [[f64; CHUNK]; D],
+}
+
+impl<const D: usize> Lanes<D> {
+    /// f of one operand, which answers value and slope; places from n on are left out.
+    #[inline(always)]
+    fn one(&self, n: usize, f: impl Fn(f64) -> (f64, f64)) -> Self {
+        let (mut v, mut slope) = ([0.0; CHUNK], [0.0; CHUNK]);
+        for l in 0..n {
+            (v[l], slope[l]) = f(self.v[l]);
+        }
+        Self { v, d: self.d.map(|d| std::array::from_fn(|l| d[l] * slope[l])) }
+    }
+
+    /// a·x + b.
+    #[inline(always)]
+    fn affine(&self, a: f64, b: f64) -> Self {
+        Self { v: self.v.map(|v| a * v + b), d: self.d.map(|d| d.map(|d| a * d)) }
+    }
+
+    /// f of two operands, which answers value and slopes.
+    #[inline(always)]
+    fn two(&self, other: &Self, n: usize, f: impl Fn(f64, f64) -> (f64, f64, f64)) -> Self {
+        let (mut v, mut by_a, mut by_b) = ([0.0; CHUNK], [0.0; CHUNK], [0.0; CHUNK]);
+        for l in 0..n {
+            (v[l], by_a[l], by_b[l]) = f(self.v[l], other.v[l]);
+        }
+        let d = std::array::from_fn(|i| {
+            std::array::from_fn(|l| by_a[l] * self.d[i][l] + by_b[l] * other.d[i][l])
+        });
+        Self { v, d }
+    }
+}
+
+impl Operation {
+    /// The operation over n places of a chunk.
+    #[inline(always)]
+    fn lanes<const R: usize, const D: usize>(
+        &self,
+        n: usize,
+        x: &[[f64; CHUNK]; D],
+        r: &[Lanes<D>; R],
+    ) -> Lanes<D> {
+        let at = |k: u8| &r[(k as usize).min(R - 1)];
+        match *self {
+            Self::Constant(c) => Lanes { v: [c; CHUNK], d: [[0.0; CHUNK]; D] },
+            Self::Variable(k) => {
+                let one = |i: usize| if i == k as usize { 1.0 } else { 0.0 };
+                Lanes { v: x[(k as usize).min(D - 1)], d: std::array::from_fn(|i| [one(i); CHUNK]) }
+            }
+            Self::Add(a, b) => at(a).two(at(b), CHUNK, |p, q| (p + q, 1.0, 1.0)),
+            Self::AddConstant(a, c) => at(a).affine(1.0, c),
+            Self::Sub(a, b) => at(a).two(at(b), CHUNK, |p, q| (p - q, 1.0, -1.0)),
+            Self::Mul(a, b) => at(a).two(at(b), CHUNK, |p, q| (p * q, q, p)),
+            Self::Scale(a, c) => at(a).affine(c, 0.0),
+            Self::Div(a, b) => at(a).two(at(b), CHUNK, |p, q| (p / q, 1.0 / q, -p / (q * q))),
+            Self::Power(a, c) => at(a).one(n, |p| power(p, c)),
+            Self::PowerOf(a, b) => at(a).two(at(b), n, power_of),
+            Self::Min(a, b) => {
+                at(a).two(at(b), CHUNK, |p, q| if p <= q { (p, 1.0, 0.0) } else { (q, 0.0, 1.0) })
+            }
+            Self::Max(a, b) => {
+                at(a).two(at(b), CHUNK, |p, q| if p >= q { (p, 1.0, 0.0) } else { (q, 0.0, 1.0) })
+            }
+            Self::Function(f, a) => at(a).one(n, |p| {
+                let value = f.value(p);
+                (value, f.slope(p, value))
+            }),
+        }
     }
 }
 
@@ -259,66 +357,5 @@ fn scalar<const N: usize>(
             let value = f.value(at(a).0);
             (value, times(at(a).1, f.slope(at(a).0, value)))
         }
-    }
-}
-
-/// One operation over a chunk. Operands are copied out first: a register may be its own operand.
-#[inline(always)]
-fn lanes<const R: usize>(
-    step: &Operation,
-    to: usize,
-    x: &[f64; CHUNK],
-    v: &mut [[f64; CHUNK]; R],
-    d: &mut [[f64; CHUNK]; R],
-) {
-    let one = |v: &mut [[f64; CHUNK]; R], d: &mut [[f64; CHUNK]; R], a: u8, f: &dyn Fn(f64) -> (f64, f64)| {
-        let (va, da) = (v[a as usize], d[a as usize]);
-        for l in 0..CHUNK {
-            let (value, slope) = f(va[l]);
-            (v[to][l], d[to][l]) = (value, slope * da[l]);
-        }
-    };
-    macro_rules! two {
-        ($a:expr, $b:expr, |$p:ident, $q:ident| $f:expr) => {{
-            let (va, da, vb, db) = (v[$a as usize], d[$a as usize], v[$b as usize], d[$b as usize]);
-            for l in 0..CHUNK {
-                let ($p, $q) = (va[l], vb[l]);
-                let (value, by_a, by_b): (f64, f64, f64) = $f;
-                (v[to][l], d[to][l]) = (value, by_a * da[l] + by_b * db[l]);
-            }
-        }};
-    }
-    macro_rules! affine {
-        ($a:expr, |$p:ident| $f:expr, $scale:expr) => {{
-            let (va, da) = (v[$a as usize], d[$a as usize]);
-            for l in 0..CHUNK {
-                let $p = va[l];
-                (v[to][l], d[to][l]) = ($f, da[l] * $scale);
-            }
-        }};
-    }
-    match *step {
-        Operation::Constant(c) => (v[to], d[to]) = ([c; CHUNK], [0.0; CHUNK]),
-        Operation::Variable(_) => (v[to], d[to]) = (*x, [1.0; CHUNK]),
-        Operation::Add(a, b) => two!(a, b, |p, q| (p + q, 1.0, 1.0)),
-        Operation::AddConstant(a, c) => affine!(a, |p| p + c, 1.0),
-        Operation::Sub(a, b) => two!(a, b, |p, q| (p - q, 1.0, -1.0)),
-        Operation::Mul(a, b) => two!(a, b, |p, q| (p * q, q, p)),
-        Operation::Scale(a, c) => affine!(a, |p| p * c, c),
-        Operation::Div(a, b) => two!(a, b, |p, q| (p / q, 1.0 / q, -p / (q * q))),
-        Operation::Power(a, c) => {
-            let (va, da) = (v[a as usize], d[a as usize]);
-            for l in 0..CHUNK {
-                let (value, slope) = power(va[l], c);
-                (v[to][l], d[to][l]) = (value, slope * da[l]);
-            }
-        }
-        Operation::PowerOf(a, b) => two!(a, b, |p, q| power_of(p, q)),
-        Operation::Min(a, b) => two!(a, b, |p, q| if p <= q { (p, 1.0, 0.0) } else { (q, 0.0, 1.0) }),
-        Operation::Max(a, b) => two!(a, b, |p, q| if p >= q { (p, 1.0, 0.0) } else { (q, 0.0, 1.0) }),
-        Operation::Function(f, a) => one(v, d, a, &|p| {
-            let value = f.value(p);
-            (value, f.slope(p, value))
-        }),
     }
 }

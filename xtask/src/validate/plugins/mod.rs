@@ -95,7 +95,7 @@ fn broken(context: &Context, out: &mut Vec<Figure>) -> Outcome {
         "share caught by the test meant for them",
     ));
     let mut alarms = 0;
-    for source in ["soil", "robot", "controller"] {
+    for source in ["soil", "robot", "controller", "law"] {
         alarms += report(context, &compiled(context, source, "")?, |_| {})?.broken().len();
     }
     out.push(Figure::new(

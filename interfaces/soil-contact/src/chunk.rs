@@ -1,0 +1,157 @@
+//! The nodes of a patch in chunks, for laws that answer many nodes at once: an expression, a module.
+
+use crate::assemble::{displacement, dot};
+use crate::patch::{Local, Patches};
+use terraglue_soil_law::{KeptNodes, ShearResponse, ShearState, Sheared, pressures};
+use terraglue_subsystem::MOST_LAW_STATE;
+
+/// Nodes that are evaluated together.
+const CHUNK: usize = 64;
+
+/// Nodes of a patch in one place of its foot.
+pub struct Chunk {
+    count: usize,
+    /// How many of them, at the front, are under pressure.
+    pressed: usize,
+    node: [usize; CHUNK],
+    depth: [f64; CHUNK],
+    pressure: [f64; CHUNK],
+    slope: [f64; CHUNK],
+    slide: [[f64; 2]; CHUNK],
+}
+
+impl Patches {
+    /// Calls `visit` for chunks of the nodes with pressure or tension when the foot of patch `p` has moved by `x`.
+    fn each_chunk(&self, p: usize, x: &[f64; 6], law: &Local, mut visit: impl FnMut(&Chunk)) {
+        let mut chunk = Chunk {
+            count: 0,
+            pressed: 0,
+            node: [0; CHUNK],
+            depth: [0.0; CHUNK],
+            pressure: [0.0; CHUNK],
+            slope: [0.0; CHUNK],
+            slide: [[0.0; 2]; CHUNK],
+        };
+        let n = &self.nodes;
+        for k in self.ports[p].nodes.clone().filter(|k| n.area[*k] > 0.0) {
+            let moved = displacement(n.arm[k], x);
+            let at = chunk.count;
+            chunk.node[at] = k;
+            chunk.depth[at] = n.depth[k] - dot(n.facing[k].press, moved);
+            chunk.slide[at] = n.facing[k].slide(moved);
+            chunk.count += 1;
+            if chunk.count == CHUNK {
+                self.press_chunk(law, &mut chunk);
+                visit(&chunk);
+                chunk.count = 0;
+            }
+        }
+        if chunk.count > 0 {
+            self.press_chunk(law, &mut chunk);
+            visit(&chunk);
+        }
+    }
+
+    /// Pressures and slopes; nodes without are left out, those that cling stand at the end.
+    fn press_chunk(&self, law: &Local, chunk: &mut Chunk) {
+        let (curve, n, count) = (&law.curve, &self.nodes, chunk.count);
+        let (pressure, slope) = (&mut chunk.pressure[..count], &mut chunk.slope[..count]);
+        if curve.keeper().is_some() {
+            self.kept_pressures(law, &chunk.node[..count], &chunk.depth[..count], pressure, slope);
+        } else {
+            let gather = |from: &[f64]| {
+                let mut out = [0.0; CHUNK];
+                out.iter_mut().zip(&chunk.node[..count]).for_each(|(out, k)| *out = from[*k]);
+                out
+            };
+            let (z_max, p_max) = (gather(&n.z_max), gather(&n.p_max));
+            pressures(curve, &chunk.depth[..count], &z_max[..count], &p_max[..count], pressure, slope);
+        }
+        let (mut left, mut clings) = (0, 0);
+        let mut clinging = [(0, 0.0, 0.0, [0.0; 2]); CHUNK];
+        for at in 0..count {
+            let (k, pressed) = (chunk.node[at], (chunk.pressure[at], chunk.slope[at]));
+            let (pressure, slope) = self.or_clinging(k, chunk.depth[at], pressed);
+            let slide = chunk.slide[at];
+            if pressure > 0.0 {
+                (chunk.node[left], chunk.pressure[left]) = (k, pressure);
+                (chunk.slope[left], chunk.slide[left]) = (slope, slide);
+                left += 1;
+            } else if pressure < 0.0 {
+                clinging[clings] = (k, pressure, slope, slide);
+                clings += 1;
+            }
+        }
+        chunk.pressed = left;
+        for (k, pressure, slope, slide) in &clinging[..clings] {
+            (chunk.node[left], chunk.pressure[left]) = (*k, *pressure);
+            (chunk.slope[left], chunk.slide[left]) = (*slope, *slide);
+            left += 1;
+        }
+        chunk.count = left;
+    }
+
+    /// Pressures of a law that keeps a state; what it would keep after the step is dropped.
+    fn kept_pressures(
+        &self,
+        law: &Local,
+        nodes: &[usize],
+        depth: &[f64],
+        pressure: &mut [f64],
+        slope: &mut [f64],
+    ) {
+        let Some((law, b)) = law.curve.keeper() else { return };
+        let (n, doubles) = (&self.nodes, law.state_doubles());
+        let (mut permanent, mut slip) = ([0.0; CHUNK], [0.0; CHUNK]);
+        let mut state = [0.0; CHUNK * MOST_LAW_STATE];
+        for (at, k) in nodes.iter().enumerate() {
+            (permanent[at], slip[at]) = (n.permanent[*k], n.shear[*k].slip);
+            state[at * doubles..(at + 1) * doubles].copy_from_slice(n.kept(*k));
+        }
+        let count = nodes.len();
+        let (permanent, slip) = (&permanent[..count], &slip[..count]);
+        let (mut unloaded, mut new) = ([0.0; CHUNK], [0.0; CHUNK * MOST_LAW_STATE]);
+        let given = KeptNodes { depth, permanent, slip, state: &state[..count * doubles] };
+        let out = [pressure, slope, &mut unloaded[..count]];
+        law.kept(b, &given, out, &mut new[..count * doubles]);
+    }
+
+    /// As [`Patches::each_answer`] for a patch on one soil, in chunks.
+    pub fn each_answered(
+        &self,
+        p: usize,
+        x: &[f64; 6],
+        law: &Local,
+        mut visit: impl FnMut(usize, f64, f64, &ShearResponse),
+    ) {
+        let (n, shear) = (&self.nodes, &law.shear);
+        self.each_chunk(p, x, law, |c| {
+            let count = c.pressed;
+            let mut answers = [ShearResponse::default(); CHUNK];
+            if shear.is_batched() {
+                let mut states = [ShearState::default(); CHUNK];
+                let mut kept = [0.0; CHUNK * MOST_LAW_STATE];
+                let doubles = n.doubles;
+                for (at, k) in c.node[..count].iter().enumerate() {
+                    states[at] = n.shear[*k];
+                    kept[at * doubles..(at + 1) * doubles].copy_from_slice(n.kept(*k));
+                }
+                let sheared = Sheared {
+                    states: &states[..count],
+                    kept: &kept[..count * doubles],
+                    pressure: &c.pressure[..count],
+                    slide: &c.slide[..count],
+                };
+                shear.respond_many(&sheared, &mut answers[..count]);
+            } else {
+                for (at, k) in c.node[..count].iter().enumerate() {
+                    answers[at] =
+                        shear.respond_at(&n.shear[*k], n.mobilised[*k], c.pressure[at], c.slide[at]);
+                }
+            }
+            for (at, answer) in answers[..c.count].iter().enumerate() {
+                visit(c.node[at], c.pressure[at], c.slope[at], answer);
+            }
+        });
+    }
+}

@@ -1,0 +1,216 @@
+//! A law that comes as a module of its own, in use by one soil: calls over nodes, and what went wrong in them.
+//!
+//! The soil's own functions answer numbers, not results. A law that fails or answers what no soil does is remembered here
+//! with the first reason, its answer counts as zero, and the soil asks [`PluginLaw::finish`] at the end of its call.
+
+use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
+use std::sync::{Arc, Mutex, PoisonError};
+use terraglue_subsystem::{Error, NodeLaw, PressureAnswer, PressureNodes, Result, ShearAnswer, ShearNodes};
+
+struct InUse {
+    law: Arc<dyn NodeLaw>,
+    h: AtomicU64,
+    longest: AtomicU64,
+    trouble: Mutex<Option<Error>>,
+}
+
+/// A law module in the hands of a soil. Copies share what went wrong.
+#[derive(Clone)]
+pub struct PluginLaw(Arc<InUse>);
+
+/// Nodes below one contact, for a law that keeps a state.
+#[derive(Clone, Copy, Debug)]
+pub struct KeptNodes<'a> {
+    /// Depths, m.
+    pub depth: &'a [f64],
+    /// Depths of the unloaded surface, m.
+    pub permanent: &'a [f64],
+    /// Accumulated slips, m.
+    pub slip: &'a [f64],
+    /// Committed state.
+    pub state: &'a [f64],
+}
+
+impl PluginLaw {
+    /// Takes a law into use.
+    pub fn new(law: Arc<dyn NodeLaw>) -> Self {
+        let (h, longest) = (AtomicU64::new(0), AtomicU64::new(f64::INFINITY.to_bits()));
+        Self(Arc::new(InUse { law, h, longest, trouble: Mutex::new(None) }))
+    }
+
+    /// Name, for messages.
+    pub fn name(&self) -> &str {
+        self.0.law.name()
+    }
+
+    /// Doubles per node.
+    #[inline]
+    pub fn state_doubles(&self) -> usize {
+        self.0.law.state_doubles()
+    }
+
+    /// Whether it has a pressure law.
+    pub fn has_pressure(&self) -> bool {
+        self.0.law.has_pressure()
+    }
+
+    /// Whether it has a shear law.
+    pub fn has_shear(&self) -> bool {
+        self.0.law.has_shear()
+    }
+
+    /// A call of the soil begins that takes a step of `h` (s).
+    pub fn begin(&self, h: f64) {
+        self.0.h.store(h.to_bits(), Relaxed);
+    }
+
+    /// The committed state has changed: what the law has said of the length of a step holds no more.
+    pub fn forget(&self) {
+        self.0.longest.store(f64::INFINITY.to_bits(), Relaxed);
+    }
+
+    /// Whether the law has answered.
+    ///
+    /// # Errors
+    /// Its first failure since this was asked last.
+    pub fn check(&self) -> Result {
+        self.0.trouble.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
+    }
+
+    /// Whether the law has answered for the whole step, which starts at `t` (s).
+    ///
+    /// # Errors
+    /// Its failure, or [`Error::Discard`] with the time that it can reach.
+    pub fn finish(&self, t: f64) -> Result {
+        self.check()?;
+        let (h, longest) = (self.h(), f64::from_bits(self.0.longest.load(Relaxed)));
+        if longest < h { Err(Error::Discard { reached: t + longest.max(0.0) }) } else { Ok(()) }
+    }
+
+    #[inline]
+    fn h(&self) -> f64 {
+        f64::from_bits(self.0.h.load(Relaxed))
+    }
+
+    #[inline]
+    fn limit(&self, longest: f64) {
+        if longest < f64::INFINITY {
+            let before = f64::from_bits(self.0.longest.load(Relaxed));
+            self.0.longest.store(before.min(longest).to_bits(), Relaxed);
+        }
+    }
+
+    #[cold]
+    fn fail(&self, error: Error) {
+        self.0.trouble.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+    }
+
+    #[cold]
+    fn impossible(&self, what: String) {
+        self.fail(Error::Failed(format!("[TG15] the law `{}`: {what}", self.name())));
+    }
+
+    /// First loading at one depth by a law without state: pressure, slope.
+    #[inline]
+    pub(crate) fn at(&self, b: f64, z: f64) -> (f64, f64) {
+        let (mut p, mut slope) = ([0.0], [0.0]);
+        self.first_loading(b, &[z], &mut p, &mut slope);
+        (p[0], slope[0])
+    }
+
+    /// First loading of nodes by a law without state.
+    #[inline]
+    pub(crate) fn first_loading(&self, b: f64, depth: &[f64], p: &mut [f64], slope: &mut [f64]) {
+        let nodes = PressureNodes { b, h: self.h(), depth, ..PressureNodes::default() };
+        self.answer(&nodes, p, slope, &mut [], &mut []);
+    }
+
+    /// Pressures, slopes, unloaded surfaces and new states by a law with a state.
+    pub fn kept(&self, b: f64, nodes: &KeptNodes, [p, slope, permanent]: [&mut [f64]; 3], state: &mut [f64]) {
+        let KeptNodes { depth, permanent: unloaded, slip, state: committed } = *nodes;
+        let nodes = PressureNodes { b, h: self.h(), depth, permanent: unloaded, slip, state: committed };
+        self.answer(&nodes, p, slope, permanent, state);
+        if let Some(k) = permanent.iter().chain(&*state).position(|x| !x.is_finite()) {
+            let what = if k < permanent.len() { "depth of the unloaded surface" } else { "state" };
+            self.impossible(format!("a {what} is not a finite number"));
+            permanent.copy_from_slice(unloaded);
+            state.copy_from_slice(committed);
+        }
+    }
+
+    fn answer(
+        &self,
+        nodes: &PressureNodes,
+        p: &mut [f64],
+        slope: &mut [f64],
+        permanent: &mut [f64],
+        state: &mut [f64],
+    ) {
+        for out in [&mut *p, &mut *slope, &mut *permanent, &mut *state] {
+            out.fill(f64::NAN);
+        }
+        let mut out = PressureAnswer { pressure: p, slope, permanent, state, longest_s: f64::INFINITY };
+        if let Err(error) = self.0.law.pressure(nodes, &mut out) {
+            self.fail(error);
+        }
+        self.limit(out.longest_s);
+        let good = |(p, slope): (&f64, &f64)| *p >= 0.0 && p.is_finite() && slope.is_finite();
+        if !p.iter().zip(&*slope).fold(true, |all, one| all & good(one)) {
+            if let Some(k) = p.iter().zip(&*slope).position(|one| !good(one)) {
+                let (z, b) = (nodes.depth[k], nodes.b);
+                let what = format!("pressure {} Pa, slope {} Pa/m at z = {z} m, b = {b} m", p[k], slope[k]);
+                self.impossible(what);
+            }
+            p.fill(0.0);
+            slope.fill(0.0);
+        }
+    }
+
+    /// Yield stress and its derivatives at one node; `state` as committed.
+    #[inline]
+    pub(crate) fn strength(&self, pressure: f64, slip: f64, state: &[f64]) -> (f64, [f64; 2]) {
+        let (mut stress, mut by_p, mut by_slip) = ([0.0], [0.0], [0.0]);
+        let out = [&mut stress[..], &mut by_p, &mut by_slip];
+        self.strengths(&[pressure], &[slip], state, out);
+        (stress[0], [by_p[0], by_slip[0]])
+    }
+
+    /// Yield stresses of nodes with their derivatives by pressure and slip.
+    #[inline]
+    pub(crate) fn strengths(&self, pressure: &[f64], slip: &[f64], state: &[f64], out: [&mut [f64]; 3]) {
+        let [stress, by_pressure, by_slip] = out;
+        for out in [&mut *stress, &mut *by_pressure, &mut *by_slip] {
+            out.fill(f64::NAN);
+        }
+        let nodes = ShearNodes { h: self.h(), pressure, slip, state };
+        let mut out = ShearAnswer { stress, by_pressure, by_slip, longest_s: f64::INFINITY };
+        if let Err(error) = self.0.law.shear(&nodes, &mut out) {
+            self.fail(error);
+        }
+        self.limit(out.longest_s);
+        let good = |k: usize| {
+            stress[k] >= 0.0 && stress[k].is_finite() && by_pressure[k].is_finite() && by_slip[k].is_finite()
+        };
+        if let Some(k) = (0..stress.len()).find(|k| !good(*k)) {
+            self.impossible(format!(
+                "shear stress {} Pa at sigma = {} Pa, j = {} m, derivatives {} and {} Pa/m",
+                stress[k], pressure[k], slip[k], by_pressure[k], by_slip[k]
+            ));
+            for out in [stress, by_pressure, by_slip] {
+                out.fill(0.0);
+            }
+        }
+    }
+}
+
+impl std::fmt::Debug for PluginLaw {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_tuple("PluginLaw").field(&self.name()).finish()
+    }
+}
+
+impl PartialEq for PluginLaw {
+    fn eq(&self, other: &Self) -> bool {
+        Arc::ptr_eq(&self.0, &other.0)
+    }
+}

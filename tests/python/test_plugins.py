@@ -5,11 +5,13 @@ import os
 import re
 import shutil
 import subprocess
+import sys
+import zipfile
 
 import pytest
 from conftest import PROGRAM, ROOT, terraglue
 
-KINDS = ["soil", "robot", "controller"]
+KINDS = ["soil", "robot", "controller", "law"]
 
 
 def made(folder, kind, language):
@@ -215,5 +217,80 @@ def test_a_new_law_is_five_lines_of_a_scenario(tmp_path):
     (place / "scenario.toml").write_text(text.replace("z/z_1", "z/z_2"))
     process = terraglue("check", "scenario.toml", cwd=place)
     assert process.returncode == 2 and "z_2" in process.stderr
-    process = terraglue("new", "law", "another", "--lang", "c", cwd=tmp_path)
-    assert process.returncode == 2 and "languages: scenario" in " ".join(process.stderr.split())
+    process = terraglue("new", "soil", "another", "--lang", "scenario", cwd=tmp_path)
+    assert process.returncode == 2 and "is not offered" in " ".join(process.stderr.split())
+
+
+def law_with(place, *edits):
+    """The law of the scaffold in C, edited and built."""
+    source = place / "my_law.c"
+    text = source.read_text()
+    for old, new in edits:
+        assert text.count(old) == 1, old
+        text = text.replace(old, new)
+    source.write_text(text)
+    subprocess.run(["make"], cwd=place, check=True, capture_output=True)
+
+
+def test_a_law_is_at_most_forty_lines_and_its_mistakes_are_named(tmp_path):
+    place, commands = made(tmp_path, "law", "c")
+    assert len((place / "my_law.c").read_text().splitlines()) <= 40
+    law_with(place, ("p[N] * out->pressure[i] / z + bekker / p[Z_1]", "out->pressure[i] / z"))
+    process = terraglue("check-module", place)
+    assert process.returncode == 1 and "fail     law-slope" in process.stdout, process.stdout
+    scenario = place / "scenario.toml"
+    text = scenario.read_text()
+    for old, new, told in [("z_1 = 0.1", "z_2 = 0.1", "has no parameter `z_2`"),
+                           ('plugin = "./libmy_law_plugin.so"', 'plugin = "soil-bekker"', "is no law but a soil"),
+                           ('plugin = "./libmy_law_plugin.so"', 'plugin = "my-lwa"', "[TG01]")]:
+        assert old in text
+        scenario.write_text(text.replace(old, new))
+        process = terraglue("check", "scenario.toml", cwd=place)
+        said = " ".join(process.stderr.replace("│", " ").split())
+        assert process.returncode == 2 and told in said, said
+
+
+def test_the_law_of_the_page_that_remembers_passes(tmp_path):
+    place, commands = made(tmp_path, "law", "c")
+    page = (ROOT / "docs" / "plugins" / "law-as-a-module.md").read_text()
+    code = re.search(r"```c\n(.*?)```", page, re.S).group(1)
+    text = (place / "my_law.c").read_text()
+    old = re.search(r"static tg_status pressure\(.*?\n}\n", text, re.S).group(0)
+    law_with(place, (old, code), ("SCHEMA, 0, pressure", "SCHEMA, 1, pressure"))
+    process = terraglue("check-module", place)
+    assert process.returncode == 0, process.stdout
+    assert terraglue("run", "scenario.toml", "--quiet", cwd=place).returncode == 0
+
+
+def test_a_soil_with_a_law_runs_isolated_and_is_exported(tmp_path):
+    place, commands = made(tmp_path, "law", "c")
+    subprocess.run(["make"], cwd=place, check=True, capture_output=True)
+    for soil in ["soil-bekker", "soil-cellular-automaton"]:
+        process = terraglue("run", "scenario.toml", "--quiet", "--duration", "0.2", "--set", f"soil.module={soil}",
+                            "--set", "soil.isolate=true", "--out", tmp_path / soil, cwd=place)
+        assert process.returncode == 0, process.stderr
+    process = terraglue("export", "scenario.toml", "-o", tmp_path / "unit.fmu", cwd=place)
+    assert process.returncode == 0, process.stderr
+    with zipfile.ZipFile(tmp_path / "unit.fmu") as unit:
+        assert any(name.endswith("law/libmy_law_plugin.so") for name in unit.namelist())
+
+
+def test_a_module_that_would_abort_does_not_compile(tmp_path, rust_target):
+    place, commands = made(tmp_path, "law", "rust")
+    (place / "target").symlink_to(rust_target)
+    manifest = place / "Cargo.toml"
+    manifest.write_text(manifest.read_text().replace("[profile.dev]", '[profile.dev]\npanic = "abort"'))
+    done = subprocess.run(["cargo", "check"], cwd=place, capture_output=True, text=True)
+    assert done.returncode != 0 and "[TG13]" in done.stderr and "out of the profile" in done.stderr, done.stderr
+
+
+def test_the_checker_is_called_from_c_and_pytest_as_the_page_shows(tmp_path):
+    place, commands = made(tmp_path, "law", "c")
+    subprocess.run(["make"], cwd=place, check=True, capture_output=True)
+    page = (ROOT / "docs" / "plugins" / "check-module.md").read_text()
+    (place / "check.c").write_text(re.search(r"```c\n(.*?)```", page, re.S).group(1))
+    (place / "test_my_law.py").write_text(re.search(r"```python\n(.*?)```", page, re.S).group(1))
+    environment = {**os.environ, "PATH": f"{os.path.dirname(PROGRAM)}:{os.environ['PATH']}"}
+    for command in ["cc check.c -o check && ./check", f"{sys.executable} -m pytest -q test_my_law.py"]:
+        done = subprocess.run(command, shell=True, cwd=place, env=environment, capture_output=True, text=True)
+        assert done.returncode == 0, f"{command}\n{done.stdout}{done.stderr}"

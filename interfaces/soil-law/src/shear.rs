@@ -165,6 +165,10 @@ impl ShearLaw {
     }
 
     /// Stress, tangents and new history after the foot has moved by `s` (m, along t1, t2) under the pressure p.
+    ///
+    /// On the yield stress the tangent is the elastic one, that of going back. This holds for untouched soil at s = 0, too,
+    /// where the stress is 0 = Y(0), although there the derivative is that of slipping soil in every direction, near S/K: an
+    /// iteration that starts there makes a first step along the ground that is too short, never one that is too long.
     pub fn respond(&self, state: &ShearState, p: f64, s: [f64; 2]) -> ShearResponse {
         self.respond_at(state, self.mobilised(state.slip), p, s)
     }

@@ -1,5 +1,6 @@
 //! Figures of the plugin interface: the checker, its broken modules, its time, and what it says of our own modules.
 
+mod newcomer;
 mod python;
 mod reload;
 mod speed;
@@ -27,9 +28,10 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     own(context, &mut out)?;
     seeds(context, &mut out)?;
     if context.timing {
-        speed::figures(&mut out)?;
+        speed::figures(context, &mut out)?;
         python::figures(context, &mut out)?;
         reload::figures(context, &mut out)?;
+        newcomer::figures(context, &mut out)?;
     }
     Ok(out)
 }
@@ -131,6 +133,10 @@ fn own(context: &Context, out: &mut Vec<Figure>) -> Outcome {
     }
     if context.timing {
         let start = Instant::now();
+        report(context, &compiled(context, "law", "")?, |_| {})?;
+        let took = start.elapsed().as_secs_f64();
+        out.push(Figure::new("plugins.time.law", took, Limit::AtMost(5.0), "check of a law in C, s"));
+        let start = Instant::now();
         report(context, &compiled(context, "soil", "")?, |o| o.level = Level::Quick)?;
         let took = start.elapsed().as_secs_f64();
         out.push(Figure::new(
@@ -146,16 +152,21 @@ fn own(context: &Context, out: &mut Vec<Figure>) -> Outcome {
 /// False alarms over many seeds: the tests that draw numbers, on a soil that is right.
 fn seeds(context: &Context, out: &mut Vec<Figure>) -> Outcome {
     let library = compiled(context, "soil", "")?;
+    let law = compiled(context, "law", "")?;
     let bekker = context.program.with_file_name("deps").join("libsoil_bekker_plugin.so");
     let seeds = if context.quick { 3 } else { 100 };
     let mut alarms = 0;
     for seed in 1..=seeds {
-        for module in [&library, &bekker] {
-            let drawn = ["passive", "slots", "serialize-garbage"].map(str::to_owned).to_vec();
+        for (module, drawn) in [
+            (&library, &["passive", "slots", "serialize-garbage"][..]),
+            (&bekker, &["passive", "slots", "serialize-garbage"]),
+            (&law, &["law-cycles"]),
+        ] {
+            let drawn: Vec<String> = drawn.iter().map(|name| (*name).to_owned()).collect();
             alarms += report(context, module, |o| (o.seed, o.only) = (seed, drawn.clone()))?.broken().len();
         }
     }
-    let what = format!("false alarms of the tests that draw numbers, two soils, {seeds} seeds");
+    let what = format!("false alarms of the tests that draw numbers, two soils and a law, {seeds} seeds");
     out.push(Figure::new(
         "plugins.false-alarms",
         f64::from(u32::try_from(alarms).unwrap_or(u32::MAX)),

@@ -126,8 +126,11 @@ fn a_law_with_a_state_unloads_by_itself_and_goes_back_with_a_snapshot() {
     testbed.restore(&start).expect("restored");
     let again = turn(&mut testbed);
     assert_eq!(first, again, "a snapshot brings the state of the law back");
+    let difference = largest_difference(&expected[..130], &first[..130]);
+    assert!(difference < 1e-9, "down and up: {difference:e}");
+    // where no foot stands the soil keeps the depth of a print in sixteenths of a unit, the law its double
     let difference = largest_difference(&expected, &first);
-    assert!(difference < 1e-9, "{difference:e}");
+    assert!(difference < 1e-4, "down again: {difference:e}");
     assert!(first[64] > 10.0 && first[129] == 0.0, "pressed {}, lifted {}", first[64], first[129]);
 }
 

@@ -174,7 +174,9 @@ fn an_unknown_module_lists_where_it_was_looked_for_and_the_nearest_name() {
     assert_eq!(error.nearest(), Some("odd"));
     let text = error.to_string();
     assert!(
-        text.starts_with("no module `od`, did you mean `odd`?; looked for libod_plugin.so or od.py in:\n"),
+        text.starts_with(
+            "[TG01] no module `od`, did you mean `odd`?; looked for libod_plugin.so or od.py in:\n"
+        ),
         "{text}"
     );
     assert!(

@@ -81,3 +81,13 @@ fn a_capability_without_its_function_is_refused_by_name() {
 fn the_version_in_the_section_is_that_of_the_table() {
     assert_eq!(terraglue_plugin::abi_version!(), format!("{TG_ABI_MAJOR}.{TG_ABI_MINOR}"));
 }
+
+#[test]
+fn asking_again_for_the_schema_gives_the_same_text() {
+    let table = table::<Everything>("everything-plugin", b"\0");
+    let schema = table.schema.unwrap();
+    // SAFETY: the function of our own table.
+    let (first, second) = unsafe { (schema(), schema()) };
+    assert!(!first.is_null());
+    assert_eq!(first, second);
+}

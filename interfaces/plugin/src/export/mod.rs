@@ -14,9 +14,10 @@ use crate::text::{borrowed, c_string, panic_text};
 use descriptions::Descriptions;
 use services::ForeignHost;
 use std::cell::{Cell, RefCell};
+use std::collections::BTreeSet;
 use std::ffi::{CString, c_char, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use std::sync::Arc;
+use std::sync::{Arc, Mutex, PoisonError};
 use terraglue_subsystem::{Config, Error, LawModule, Module, Result, Schema, Subsystem};
 
 thread_local! {
@@ -192,8 +193,20 @@ fn schema_text(schema: fn() -> Schema) -> *const c_char {
             return std::ptr::null();
         }
     };
-    // A library is asked once; the text belongs to the process from here on.
-    c_string(&text).into_raw()
+    kept(c_string(&text))
+}
+
+/// The same text as one that belongs to the process: asking again costs no memory.
+fn kept(text: CString) -> *const c_char {
+    static KEPT: Mutex<BTreeSet<CString>> = Mutex::new(BTreeSet::new());
+    let mut kept = KEPT.lock().unwrap_or_else(PoisonError::into_inner);
+    let known = kept.get(&text).map(|known| known.as_ptr());
+    // the characters stay where they are when the owner moves into the set
+    known.unwrap_or_else(|| {
+        let new = text.as_ptr();
+        kept.insert(text);
+        new
+    })
 }
 
 unsafe extern "C" fn instantiate<M: Module>(

@@ -1,6 +1,6 @@
 //! A unit as a subsystem: trials by its saved states, values by name, every error with what the unit said.
 
-use super::bodies::Bodies;
+use super::bodies::{Axis, Bodies};
 use super::map::{self, Place};
 use crate::host::Partings;
 use crate::scenario::did_you_mean;
@@ -100,8 +100,10 @@ impl FmuSubsystem {
             subsystem.set_start(&name, &value)?;
         }
         let places = &subsystem.places;
-        let scalar = |id: u32| places.get(id as usize).filter(|p| p.count == 1).map(|p| p.reference);
-        subsystem.bodies = Bodies::read(&options.bodies, &subsystem.variables, scalar)?;
+        let axis = |p: &Place| Axis { reference: p.reference, element: p.element, count: p.count };
+        let place = |id: u32| places.get(id as usize).map(axis);
+        let terminals = terminals(fmu.description());
+        subsystem.bodies = Bodies::read(&options.bodies, &subsystem.variables, &terminals, place)?;
         if !subsystem.bodies.is_empty() && !subsystem.can_go_back {
             let text = "glued bodies need a unit that can save its state, to repeat a step";
             return Err(Error::Refused(text.into()));
@@ -207,6 +209,14 @@ impl FmuSubsystem {
         }
         Ok(true)
     }
+}
+
+/// Terminals with the names of their members and of the variables behind them.
+fn terminals(description: &terraglue_fmi::ModelDescription) -> Vec<(String, Vec<(String, String)>)> {
+    let names = |t: &terraglue_fmi::description::Terminal| {
+        t.members.iter().map(|(name, k)| (name.clone(), description.variables[*k].name.clone())).collect()
+    };
+    description.terminals.iter().map(|t| (t.name.clone(), names(t))).collect()
 }
 
 /// Whether an output at the start may depend on an input of the same time.
@@ -385,6 +395,21 @@ impl Subsystem for FmuSubsystem {
         let done = self.slave.restore(&state).map_err(error);
         self.slave.release(&mut state).map_err(error)?;
         done
+    }
+
+    fn directional_derivative(
+        &self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        out: &mut [f64],
+    ) -> Result {
+        let (mut z, mut v) = (Vec::new(), Vec::new());
+        let offered = self.slave.fmu().description().capabilities.directional_derivatives;
+        if !offered || !self.collect(unknowns, &mut z)? || !self.collect(knowns, &mut v)? {
+            return Err(Error::Unsupported);
+        }
+        self.slave.directional_derivative(&z, &v, seed, out).map_err(error)
     }
 
     fn variables(&self) -> &[Variable] {

@@ -1,11 +1,12 @@
 //! Glue by a map of names: variables of a unit that are the place, the velocity and the force of a body.
 //!
 //! `[x.bodies.NAME]` with `position`, `velocity` and `force`, each a list of the names along world x, y and z (`""` for
-//! none). The body can then be named by `[[glue]]`. It translates; it has no orientation.
+//! none), or with `terminal`, the name of a terminal of FMI 3 whose members are these. The body can then be named by
+//! `[[glue]]`. It translates; it has no orientation.
 
 use terraglue_fmi::{Slave, SlaveState};
 use terraglue_subsystem::{
-    BodyState, Error, Pose, Response, Result, Scene, SceneBody, Step, ValueType, Values, Variable, component,
+    BodyState, Error, Pose, Response, Result, Scene, SceneBody, Step, ValueType, Variable, component,
 };
 
 use serde_json::{Map, Value};
@@ -14,9 +15,53 @@ use serde_json::{Map, Value};
 #[derive(Clone, Debug)]
 struct Body {
     name: String,
-    position: [Option<u32>; 3],
-    velocity: [Option<u32>; 3],
-    force: [Option<u32>; 3],
+    position: [Option<Axis>; 3],
+    velocity: [Option<Axis>; 3],
+    force: [Option<Axis>; 3],
+}
+
+/// Where a component lies in the unit: a variable, or an element of an array.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Axis {
+    /// Number in calls.
+    pub reference: u32,
+    /// Element, row by row.
+    pub element: usize,
+    /// Elements of the whole variable.
+    pub count: usize,
+}
+
+/// Elements of an array that fit without asking for memory.
+const SMALL: usize = 48;
+
+impl Axis {
+    /// Runs `look` on all elements, as they are now.
+    fn whole<R>(self, slave: &Slave, fail: Fail, look: impl FnOnce(&mut [f64]) -> R) -> Result<R> {
+        let (mut few, mut many) = ([f64::NAN; SMALL], Vec::new());
+        let all = match few.get_mut(..self.count) {
+            Some(few) => few,
+            None => {
+                many.resize(self.count, f64::NAN);
+                &mut many[..]
+            }
+        };
+        slave.get_f64(&[self.reference], all).map_err(fail)?;
+        Ok(look(all))
+    }
+
+    fn get(self, slave: &Slave, fail: Fail) -> Result<f64> {
+        self.whole(slave, fail, |all| all[self.element])
+    }
+
+    fn set(self, slave: &Slave, value: f64, fail: Fail) -> Result {
+        if self.count == 1 {
+            return slave.set_f64(&[self.reference], &[value]).map_err(fail);
+        }
+        self.whole(slave, fail, |all| {
+            all[self.element] = value;
+            slave.set_f64(&[self.reference], all).map_err(fail)
+        })?
+    }
 }
 
 /// All bodies that a scenario maps onto variables of a unit.
@@ -31,22 +76,32 @@ pub struct Bodies {
 type Fail = fn(terraglue_fmi::Error) -> Error;
 
 impl Bodies {
-    /// Reads the table `bodies` of a unit; `reference` finds the number of a variable in calls.
+    /// Reads the table `bodies` of a unit with these terminals; `place` finds where a variable lies.
     ///
     /// # Errors
     /// A name that the unit does not have, or that is no f64, or that cannot be set where it must be.
     pub fn read(
         table: &Map<String, Value>,
         variables: &[Variable],
-        reference: impl Fn(u32) -> Option<u32>,
+        terminals: &[(String, Vec<(String, String)>)],
+        place: impl Fn(u32) -> Option<Axis>,
     ) -> Result<Self> {
         let all = table.iter().map(|(name, keys)| {
             let keys = keys.as_object().ok_or_else(|| wrong(name, "takes a table"))?;
-            if let Some(key) = keys.keys().find(|k| !["position", "velocity", "force"].contains(&k.as_str()))
-            {
-                return Err(wrong(name, &format!("has no key `{key}`; it has position, velocity and force")));
+            const KEYS: [&str; 4] = ["position", "velocity", "force", "terminal"];
+            if let Some(key) = keys.keys().find(|k| !KEYS.contains(&k.as_str())) {
+                let text = format!("has no key `{key}`; it has position, velocity and force, or terminal");
+                return Err(wrong(name, &text));
             }
-            let axes = |key: &str, set: bool| axes(name, key, keys.get(key), variables, &reference, set);
+            let plug = keys.get("terminal").map(|t| members(name, t, terminals, variables)).transpose()?;
+            let keys = match &plug {
+                Some(_) if keys.len() > 1 => {
+                    return Err(wrong(name, "`terminal` stands for the three others"));
+                }
+                Some(found) => found,
+                None => keys,
+            };
+            let axes = |key: &str, set: bool| axes(name, key, keys.get(key), variables, &place, set);
             let body = Body {
                 name: name.clone(),
                 position: axes("position", false)?,
@@ -98,8 +153,8 @@ impl Bodies {
         let mut out = [[0.0; 3]; 2];
         for (row, names) in out.iter_mut().zip([&body.position, &body.velocity]) {
             for (value, reference) in row.iter_mut().zip(names) {
-                if let Some(reference) = reference {
-                    slave.get_f64(&[*reference], std::slice::from_mut(value)).map_err(fail)?;
+                if let Some(axis) = reference {
+                    *value = axis.get(slave, fail)?;
                     if !value.is_finite() {
                         return Err(Error::Failed(format!("the motion of body `{}` is {value}", body.name)));
                     }
@@ -133,10 +188,8 @@ impl Bodies {
                 let (own, _) = port.wrench_in_world(t);
                 (0..3).for_each(|k| force[k] += f64::from(port.side) * own[k]);
             }
-            for (value, reference) in force.iter().zip(&body.force) {
-                if let Some(reference) = reference {
-                    slave.set(&[*reference], Values::F64(&[*value])).map_err(fail)?;
-                }
+            for (value, axis) in force.iter().zip(&body.force) {
+                axis.map_or(Ok(()), |axis| axis.set(slave, *value, fail))?;
             }
         }
         Ok(())
@@ -192,14 +245,54 @@ fn wrong(body: &str, text: &str) -> Error {
     Error::Refused(format!("body `{body}` of the unit: {text}"))
 }
 
+/// Names of the variables of a terminal along x, y and z, as the three lists that stand for it. Its members are arrays
+/// `position`, `velocity`, `force`, or numbers `x`, `vx`, `force_x` and so on; others are left alone.
+fn members(
+    body: &str,
+    terminal: &Value,
+    terminals: &[(String, Vec<(String, String)>)],
+    variables: &[Variable],
+) -> Result<Map<String, Value>> {
+    let name = terminal.as_str().ok_or_else(|| wrong(body, "`terminal` takes a name in quotes"))?;
+    let Some((_, members)) = terminals.iter().find(|(n, _)| n == name) else {
+        let near = crate::scenario::did_you_mean(name, terminals.iter().map(|(n, _)| n.as_str()));
+        let near = near.map(|n| format!("; {n}")).unwrap_or_default();
+        return Err(wrong(body, &format!("the unit has no terminal `{name}`{near}")));
+    };
+    let of = |member: &str| members.iter().find(|(m, _)| m == member).map(|(_, v)| v.as_str());
+    let elements = |base: &str| {
+        let own = variables.iter().filter(|v| v.name.strip_prefix(base).is_some_and(|r| r.starts_with('[')));
+        own.take(3).map(|v| v.name.clone()).collect::<Vec<_>>()
+    };
+    let mut out = Map::new();
+    for (key, axes) in [
+        ("position", ["x", "y", "z"]),
+        ("velocity", ["vx", "vy", "vz"]),
+        ("force", ["force_x", "force_y", "force_z"]),
+    ] {
+        let whole = of(key).map(elements).filter(|names| names.len() == 3);
+        let single = axes.map(|axis| of(axis).unwrap_or_default().to_owned());
+        let names = whole.unwrap_or_else(|| single.to_vec());
+        if names.iter().any(|n| !n.is_empty()) {
+            out.insert(key.into(), names.into());
+        }
+    }
+    if out.contains_key("position") && out.contains_key("force") {
+        return Ok(out);
+    }
+    let has: Vec<&str> = members.iter().map(|(m, _)| m.as_str()).collect();
+    let text = format!("terminal `{name}` has no position or no force; its members are {}", has.join(", "));
+    Err(wrong(body, &text))
+}
+
 fn axes(
     body: &str,
     key: &str,
     names: Option<&Value>,
     variables: &[Variable],
-    reference: &impl Fn(u32) -> Option<u32>,
+    locate: &impl Fn(u32) -> Option<Axis>,
     set: bool,
-) -> Result<[Option<u32>; 3]> {
+) -> Result<[Option<Axis>; 3]> {
     let Some(names) = names else { return Ok([None; 3]) };
     let list = names.as_array().filter(|l| l.len() <= 3);
     let list = list.ok_or_else(|| wrong(body, &format!("`{key}` takes up to three names, along x, y, z")))?;
@@ -218,10 +311,7 @@ fn axes(
         if set && found.effect != terraglue_subsystem::Effect::Live {
             return Err(wrong(body, &format!("`{name}` cannot be set between steps")));
         }
-        *place = reference(found.id);
-        if place.is_none() {
-            return Err(wrong(body, &format!("`{name}` is an element of an array; export it with scalars")));
-        }
+        *place = locate(found.id);
     }
     Ok(out)
 }

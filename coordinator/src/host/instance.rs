@@ -312,6 +312,20 @@ impl Instance {
         self.reply("set", result)
     }
 
+    /// d(unknowns)/d(known) of f64 variables where the subsystem knows it; false where it must be tried.
+    pub fn derivative(&self, unknowns: &[u32], known: u32, out: &mut [f64]) -> Result<bool> {
+        const NAME: &str = "directional_derivative";
+        self.alive(NAME)?;
+        out.fill(f64::NAN);
+        match self.subsystem.directional_derivative(unknowns, &[known], &[1.0], out) {
+            Err(Failure::Unsupported) => Ok(false),
+            result => {
+                self.outcome(NAME, result)?;
+                Ok(out.iter().all(|x| x.is_finite()))
+            }
+        }
+    }
+
     /// All actions.
     pub fn actions(&self) -> &[Action] {
         self.subsystem.actions()

@@ -45,6 +45,18 @@ impl Link {
         Ok(&self.values)
     }
 
+    /// Derivatives of its values by entry `k` of the inputs that `other` feeds, where the subsystem between knows them.
+    pub fn derivatives(&self, instances: &[Instance], other: &Self, k: usize) -> Result<Option<Vec<f64>>> {
+        let mut out = vec![0.0; self.len()];
+        if self.from == other.to {
+            if !instances[self.from].derivative(&self.from_ids, other.to_ids[k], &mut out)? {
+                return Ok(None);
+            }
+            out.iter_mut().zip(&self.conversion).for_each(|(x, (a, _))| *x *= a);
+        }
+        Ok(Some(out))
+    }
+
     /// Sets the inputs.
     pub fn write(&self, instances: &mut [Instance], values: &[f64]) -> Result {
         let target = &mut instances[self.to];

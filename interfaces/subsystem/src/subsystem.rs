@@ -102,6 +102,18 @@ pub trait Subsystem: Send {
         Err(Error::Unsupported)
     }
 
+    /// d(unknowns)/d(knowns)·seed of f64 variables at the committed time, where it is known without trying. Loops of
+    /// connected values at the start are solved with it; without it they are solved with differences.
+    fn directional_derivative(
+        &self,
+        _unknowns: &[u32],
+        _knowns: &[u32],
+        _seed: &[f64],
+        _out: &mut [f64],
+    ) -> Result {
+        Err(Error::Unsupported)
+    }
+
     /// All actions of this instance.
     fn actions(&self) -> &[Action] {
         &[]

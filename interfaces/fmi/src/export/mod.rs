@@ -10,6 +10,7 @@ mod describe;
 mod layout;
 mod pack;
 mod states;
+mod terminals;
 mod values;
 mod xml;
 
@@ -18,6 +19,7 @@ pub use describe::{About, describe, identifier};
 pub use layout::{Entry, Layout};
 pub use pack::{Content, pack};
 pub use states::Handle;
+pub use terminals::terminals;
 pub use values::Value;
 
 /// What a call of a unit did not do, with the status that the standards give it.

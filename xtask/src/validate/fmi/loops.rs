@@ -1,6 +1,6 @@
 //! Loops of connections at the start: solved to 1e-10, or refused by name.
 
-use super::{testbed, units};
+use super::{built, testbed, units};
 use crate::process::Outcome;
 use crate::validate::{Figure, Limit};
 use std::path::Path;
@@ -32,6 +32,16 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
             left.into_iter().map(f64::abs).fold(0.0, f64::max)
         },
     )?;
+    // outputs in steps of 1e-4, which no difference of 1e-7 can see
+    let coarse = |name: &str, calc: &str, slope: &str| {
+        let all = [("u", 'i', 0.5), ("asked", 'o', 0.0), ("y", 'o', 0.0)];
+        units::build_with_slope(folder, name, &all, calc, slope)
+    };
+    coarse("coarse", "v[2] = floor(1e4 * (3 - 2 * v[0])) / 1e4;", "-2.0")?;
+    coarse("fine", "v[2] = 1 + 0.5 * v[0];", "0.5")?;
+    let text = scenario(&[("a", "coarse"), ("b", "fine")], &[("b.y", "a.u"), ("a.y", "b.u")]);
+    let testbed = built(folder, &text)?;
+    let asked = testbed.read("a.asked").unwrap_or(f64::NAN).min(testbed.read("b.asked").unwrap_or(f64::NAN));
     let text = scenario(&[("a", "one"), ("b", "same")], &[("b.y", "a.u"), ("a.y", "b.u")]);
     let said = testbed(folder, &text).err().map(|e| e.to_string()).unwrap_or_default();
     let named = ["a.y → b.u", "b.y → a.u", "no solution"].iter().all(|word| said.contains(word));
@@ -47,6 +57,12 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
             three,
             Limit::AtMost(1e-10),
             "loop of three equations at the start: residual",
+        ),
+        Figure::new(
+            "fmi.loop.derivatives",
+            asked,
+            Limit::AtLeast(1.0),
+            "a loop that only directional derivatives can solve: times that each unit was asked for them",
         ),
         Figure::new(
             "fmi.loop.refused",

@@ -50,19 +50,50 @@ int fmi2GetRealStatus(Unit *u, int k, double *x) { return 3; }
 int fmi2GetIntegerStatus(Unit *u, int k, int *x) { return 3; }
 int fmi2GetBooleanStatus(Unit *u, int k, int *x) { return 3; }
 int fmi2GetStringStatus(Unit *u, int k, const char **x) { return 3; }
-int fmi2GetDirectionalDerivative(Unit *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s,
-    double *x) { return 3; }
 "#;
+
+/// What a unit without derivatives answers.
+const NO_SLOPE: &str = "int fmi2GetDirectionalDerivative(Unit *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s, double *x) { return 3; }";
 
 /// A variable: name, role (`p`arameter, `i`nput, `o`utput) and start value.
 pub type Variable<'a> = (&'a str, char, f64);
 
+/// Builds a unit that knows the derivative of its last output by its first input, `slope` in C, and counts in the output
+/// before it how often it was asked.
+pub fn build_with_slope(
+    folder: &Path,
+    name: &str,
+    variables: &[Variable],
+    calc: &str,
+    slope: &str,
+) -> Outcome<PathBuf> {
+    let last = variables.len() - 1;
+    let code = format!(
+        "int fmi2GetDirectionalDerivative(Unit *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s, \
+         double *x) {{ double *v = u->v; v[{}] += 1; for (size_t i = 0; i < n; i++) x[i] = z[i] == {last} && k[0] == 0 ? ({slope}) * s[0] : 0; return 0; }}",
+        last - 1
+    );
+    compile(folder, name, variables, calc, "", &code, " providesDirectionalDerivative=\"true\"")
+}
+
 /// Builds a unit; `calc` and `step` are bodies in C over the values `v` in the order of the variables.
 pub fn build(folder: &Path, name: &str, variables: &[Variable], calc: &str, step: &str) -> Outcome<PathBuf> {
+    compile(folder, name, variables, calc, step, NO_SLOPE, "")
+}
+
+fn compile(
+    folder: &Path,
+    name: &str,
+    variables: &[Variable],
+    calc: &str,
+    step: &str,
+    more: &str,
+    capabilities: &str,
+) -> Outcome<PathBuf> {
     let starts: String = variables.iter().enumerate().map(|(k, v)| format!("v[{k}] = {:?}; ", v.2)).collect();
     let code = format!(
         "static void start(double *v) {{ {starts} }}\n{FRAME}\nstatic void calc(double *v) {{ {calc} }}\n\
-         static void step(double *v, double h) {{ {step} }}\n{UNUSED}"
+         static void step(double *v, double h) {{ {step} }}\n{UNUSED}{more}\n"
     )
     .replacen("static void start", "#include <stddef.h>\nstatic void start", 1);
     let (source, library) = (folder.join(format!("{name}.c")), folder.join(format!("{name}.so")));
@@ -71,14 +102,14 @@ pub fn build(folder: &Path, name: &str, variables: &[Variable], calc: &str, step
     must(&mut command("cc", &flags).arg(&library).arg(&source).arg("-lm"))?;
     let unit = folder.join(format!("{name}.fmu"));
     let entries = [
-        ("modelDescription.xml".to_owned(), Content::Text(describe(variables))),
+        ("modelDescription.xml".to_owned(), Content::Text(describe(variables, capabilities))),
         ("binaries/linux64/m.so".to_owned(), Content::File(library)),
     ];
     pack(&unit, &entries)?;
     Ok(unit)
 }
 
-fn describe(variables: &[Variable]) -> String {
+fn describe(variables: &[Variable], capabilities: &str) -> String {
     let one = |(k, (name, role, start)): (usize, &Variable)| {
         let (causality, real) = match role {
             'p' => ("parameter\" variability=\"tunable", format!("<Real start=\"{start:?}\"/>")),
@@ -94,7 +125,7 @@ fn describe(variables: &[Variable]) -> String {
     let outputs: String = outputs.map(|(k, _)| format!("<Unknown index=\"{}\"/>", k + 1)).collect();
     format!(
         "<?xml version=\"1.0\"?><fmiModelDescription fmiVersion=\"2.0\" modelName=\"m\" guid=\"g\"><CoSimulation \
-         modelIdentifier=\"m\" canGetAndSetFMUstate=\"true\" canHandleVariableCommunicationStepSize=\"true\"/>\
+         modelIdentifier=\"m\" canGetAndSetFMUstate=\"true\" canHandleVariableCommunicationStepSize=\"true\"{capabilities}/>\
          <ModelVariables>{all}</ModelVariables><ModelStructure><Outputs>{outputs}</Outputs></ModelStructure>\
          </fmiModelDescription>"
     )

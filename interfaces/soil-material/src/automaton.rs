@@ -55,6 +55,8 @@ impl Settings {
 pub struct Automaton {
     settings: Settings,
     friction_angle: f64,
+    /// Angles of internal friction of the soils of the mask, rad.
+    others: Vec<f64>,
     spacing: f64,
     sweeper: Sweeper,
     compaction: Compaction,
@@ -73,6 +75,7 @@ impl Automaton {
         Self {
             settings,
             friction_angle: 0.5,
+            others: Vec::new(),
             spacing: 1.0,
             sweeper: Sweeper::new(nowhere, host.clone(), 0),
             compaction: Compaction::new(nowhere, 0.0),
@@ -110,7 +113,9 @@ impl Automaton {
     }
 
     fn limit(&mut self) {
-        self.sweeper.set_limits(self.repose(), self.settings.curvature_max, self.spacing);
+        // one that the scenario gives holds everywhere
+        let others = if self.settings.angle_of_repose.is_some() { &[][..] } else { &self.others };
+        self.sweeper.set_limits(self.repose(), others, self.settings.curvature_max, self.spacing);
         self.compaction.set_fraction(self.settings.compacted_fraction);
     }
 
@@ -175,6 +180,7 @@ impl Material for Automaton {
     fn begin(&mut self, ground: &Ground, parameters: &SoilParameters) {
         let lattice = *ground.heights.lattice();
         self.friction_angle = parameters.phi_rad;
+        self.others = ground.mask.soils.iter().map(|soil| soil.phi_rad).collect();
         self.spacing = lattice.spacing;
         self.sweeper = Sweeper::new(lattice, self.host.clone(), self.reserve);
         self.compaction = Compaction::new(lattice, self.settings.compacted_fraction);

@@ -42,7 +42,7 @@ impl Bounds {
     /// Whether neither rule would move a node between such faces.
     fn still(&self, limits: &Limits) -> bool {
         let steepest = [0, 1].map(|k| f64::from(self.least[k]).abs().max(f64::from(self.most[k]).abs()));
-        let thr = f64::from(limits.repose);
+        let thr = f64::from(limits.least_repose);
         // a little less than the threshold, since the rule computes in single precision
         let flat = steepest[0] * steepest[0] + steepest[1] * steepest[1] <= thr * thr * (1.0 - 1e-6);
         let [x, y] = [0, 1].map(|k| i64::from(self.most[k]) - i64::from(self.least[k]));

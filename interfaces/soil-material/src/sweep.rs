@@ -45,6 +45,8 @@ pub struct Sweeper {
     /// What was done.
     pub counts: Counts,
     limits: Limits,
+    /// Δ·tan φ_r by the number of the mask; empty: one holds everywhere.
+    by_soil: Vec<f32>,
     host: Arc<dyn Host>,
     areas: Vec<Rectangle>,
     windows: Vec<Mutex<Window>>,
@@ -128,18 +130,26 @@ impl Sweeper {
             curvature: Marks::new(lattice),
             counts: Counts::default(),
             limits: Limits::default(),
+            by_soil: Vec::new(),
             host,
             areas: Vec::with_capacity(64),
             windows: (0..WINDOWS).map(|_| Mutex::new(Window::with_room(WINDOW_SIDE))).collect(),
         }
     }
 
-    /// Sets the angle of repose (rad) and the largest curvature (1/m) on nodes `spacing` (m) apart.
-    pub fn set_limits(&mut self, repose: f64, curvature_max: f64, spacing: f64) {
+    /// Sets the angle of repose (rad) and the largest curvature (1/m) on nodes `spacing` (m) apart; `others` has the
+    /// angles of the soils of the mask from number 1 on.
+    pub fn set_limits(&mut self, repose: f64, others: &[f64], curvature_max: f64, spacing: f64) {
         let straight = curvature_max * spacing * spacing / UNIT_M;
         let curvature = (straight < SHARPEST).then(|| [straight as i32, 2 * straight as i32]);
-        let repose = (spacing * libm::tan(repose) / UNIT_M) as f32;
-        self.limits = Limits { repose, curvature };
+        let threshold = |angle: f64| (spacing * libm::tan(angle) / UNIT_M) as f32;
+        self.by_soil.clear();
+        if others.iter().any(|angle| *angle != repose) {
+            self.by_soil.extend(std::iter::once(&repose).chain(others).map(|angle| threshold(*angle)));
+        }
+        let repose = threshold(repose);
+        let least_repose = self.by_soil.iter().fold(repose, |least, thr| least.min(*thr));
+        self.limits = Limits { repose, least_repose, curvature };
     }
 
     /// Whether all sleep.
@@ -171,7 +181,7 @@ impl Sweeper {
             for a in (0..nx).step_by(BLOCK_TILES as usize) {
                 let end = [(a + BLOCK_TILES).min(nx), (b + BLOCK_TILES).min(ny)];
                 let Some(area) = still.restless([a, b], end, &self.limits) else { continue };
-                window.fill(ground, &self.feet.list, area, 2);
+                window.fill(ground, &self.by_soil, &self.feet.list, area, 2);
                 window.wake_all();
                 pulp::Arch::new().dispatch(Look { window: &mut window, limits: &self.limits });
                 let (repose, curvature) = (&mut self.repose, &mut self.curvature);
@@ -230,7 +240,7 @@ impl Sweeper {
     fn fill(&mut self, ground: &Ground, k: usize, reach: usize) {
         let window = self.windows[k].get_mut().unwrap_or_else(PoisonError::into_inner);
         let area = self.areas[k];
-        window.fill(ground, &self.feet.list, area, reach);
+        window.fill(ground, &self.by_soil, &self.feet.list, area, reach);
         let nx = ground.heights.lattice().tiles()[0];
         for (bent, set) in [(false, &self.repose), (true, &self.curvature)] {
             for tile in &set.tiles {

@@ -20,8 +20,10 @@ const WORK_ROWS: usize = 13;
 /// The rules in units of height on one lattice.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Limits {
-    /// Δ·tan φ_r.
+    /// Δ·tan φ_r of the scenario's own soil.
     pub repose: f32,
+    /// The smallest Δ·tan φ_r of all soils.
+    pub least_repose: f32,
     /// κ_max·d² for straight and diagonal triples; `None`: nothing is too sharp.
     pub curvature: Option<[i32; 2]>,
 }
@@ -65,6 +67,8 @@ pub struct Window {
     height: usize,
     stride: usize,
     levels: Vec<i32>,
+    /// Δ·tan φ_r per node; empty where one holds everywhere.
+    repose_of: Vec<f32>,
     inlets: Vec<i32>,
     /// Rows with nodes that do not admit everything.
     limited: Vec<bool>,
@@ -110,8 +114,9 @@ impl Window {
         }
     }
 
-    /// Copies the ground around `area`, `reach` nodes farther on every side, with the load of the feet.
-    pub fn fill(&mut self, ground: &Ground, feet: &[Foot], area: Rectangle, reach: usize) {
+    /// Copies the ground around `area`, `reach` nodes farther on every side, with the load of the feet. `by_soil` has
+    /// Δ·tan φ_r by the number of the mask; empty: one holds everywhere.
+    pub fn fill(&mut self, ground: &Ground, by_soil: &[f32], feet: &[Foot], area: Rectangle, reach: usize) {
         let lattice = *ground.heights.lattice();
         let around = (reach + HALO) as i32;
         self.origin = area.first.map(|k| k - around);
@@ -121,6 +126,7 @@ impl Window {
         self.reset();
         self.find_borders(&lattice);
         self.copy_heights(ground);
+        self.copy_thresholds(ground, by_soil);
         self.put_feet(feet);
         // with the load of feet at the edge
         self.repeat_borders();
@@ -210,6 +216,17 @@ impl Window {
                         Err(units) => self.levels[at..at + n].fill(units),
                     }
                 }
+            }
+        }
+    }
+
+    fn copy_thresholds(&mut self, ground: &Ground, by_soil: &[f32]) {
+        self.repose_of.clear();
+        let Some(own) = by_soil.first() else { return };
+        self.repose_of.resize(self.stride * self.height, *own);
+        for (j, row) in (self.origin[1]..).zip(self.repose_of.chunks_exact_mut(self.stride)) {
+            for (i, thr) in (self.origin[0]..).zip(&mut row[LEFT..LEFT + self.width]) {
+                *thr = by_soil[ground.mask.at(i, j)];
             }
         }
     }
@@ -343,6 +360,11 @@ impl Window {
     }
 
     #[inline(always)]
+    fn row_thresholds(&self, y: usize) -> &[f32] {
+        &self.repose_of[y * self.stride..(y + 1) * self.stride]
+    }
+
+    #[inline(always)]
     fn row_inlets(&self, y: usize) -> &[i32] {
         &self.inlets[y * self.stride..(y + 1) * self.stride]
     }
@@ -351,7 +373,12 @@ impl Window {
     #[inline(always)]
     fn across(&self, y: usize, span: Span, thr: f32, out: &mut [i32]) {
         let Span { lo, hi } = span.whole_groups();
-        faces_across([self.row(y), self.row(y + 1)], [lo, hi], thr, out);
+        let rows = [self.row(y), self.row(y + 1)];
+        if self.repose_of.is_empty() {
+            faces_across(rows, [lo, hi], [thr; 2], out);
+        } else {
+            faces_across(rows, [lo, hi], [y, y + 1].map(|y| self.row_thresholds(y)), out);
+        }
         if self.limited[y] || self.limited[y + 1] {
             admit(&mut out[lo..hi], &self.row_inlets(y)[lo..hi], &self.row_inlets(y + 1)[lo..hi]);
         }
@@ -361,7 +388,12 @@ impl Window {
     #[inline(always)]
     fn along(&self, y: usize, span: Span, thr: f32, out: &mut [i32]) {
         let Span { lo, hi } = Span { lo: span.lo - 1, hi: span.hi }.whole_groups();
-        faces_along([self.row(y - 1), self.row(y), self.row(y + 1)], [lo, hi], thr, out);
+        let rows = [self.row(y - 1), self.row(y), self.row(y + 1)];
+        if self.repose_of.is_empty() {
+            faces_along(rows, [lo, hi], thr, out);
+        } else {
+            faces_along(rows, [lo, hi], self.row_thresholds(y), out);
+        }
         if self.limited[y] {
             let inlets = self.row_inlets(y);
             admit(&mut out[lo..hi], &inlets[lo..hi], &inlets[lo + 1..=hi]);

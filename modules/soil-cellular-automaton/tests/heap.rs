@@ -33,10 +33,15 @@ fn steps(soil: &mut dyn Subsystem, most: u64) -> u64 {
 
 /// Slope along a ray from the middle: straight-line fit between 0.2 and 0.85 of the foot's radius.
 fn slope(surface: &Shown, angle: f64) -> f64 {
+    slope_around(surface, 0.5 * f64::from(surface.lattice.size[0] - 1), angle)
+}
+
+/// The same from another column of the middle row.
+fn slope_around(surface: &Shown, column: f64, angle: f64) -> f64 {
     let d = surface.lattice.spacing;
-    let middle = 0.5 * f64::from(surface.lattice.size[0] - 1);
+    let middle = 0.5 * f64::from(surface.lattice.size[1] - 1);
     let at = |r: f64| {
-        let (x, y) = (middle + r * angle.cos(), middle + r * angle.sin());
+        let (x, y) = (column + r * angle.cos(), middle + r * angle.sin());
         let (i, j, fx, fy) = (x.floor() as i32, y.floor() as i32, x.fract(), y.fract());
         let h = |a, b| surface.height(i + a, j + b);
         (h(0, 0) * (1.0 - fx) + h(1, 0) * fx) * (1.0 - fy) + (h(0, 1) * (1.0 - fx) + h(1, 1) * fx) * fy
@@ -76,6 +81,27 @@ fn a_column_collapses_to_a_cone_at_the_angle_of_repose() {
     println!("at rest after {rest} steps, slope {mean:.2}°, {low:.2} … {high:.2}");
     assert!((mean - 35.0).abs() < 1.0, "{mean}");
     assert_eq!(read(&*soil, "active_nodes"), 0.0);
+}
+
+/// Two columns on the soils of a mask: each becomes a cone at the angle of its own soil.
+#[test]
+fn every_soil_of_a_mask_has_its_own_angle_of_repose() {
+    const OTHER: f64 = 0.436332;
+    fn columns(x: f64, y: f64) -> f64 {
+        column(x + 0.32, y) + column(x - 0.32, y)
+    }
+    let own = LUNAR.trim_end_matches('}');
+    let runs = vec!["64,0,65,1"; 129].join(",");
+    let config = format!(r#"{own},"mask":{{"soils":[{{"phi_rad":{OTHER}}}],"runs":[{runs}]}}}}"#);
+    let mut soil = soil::<SoilCellularAutomaton>(&config, 129, 0.01, columns);
+    steps(&mut *soil, 8000);
+    assert_eq!(read(&*soil, "mass_error_units"), 0.0);
+    let shown = Shown::new(&*soil);
+    for (middle, angle) in [(32.0, PHI), (96.0, OTHER)] {
+        let slopes = (0..360).map(|k| slope_around(&shown, middle, f64::from(k).to_radians()).atan());
+        let mean = slopes.sum::<f64>() / 360.0;
+        assert!((mean - angle).to_degrees().abs() < 1.0, "{} for {}", mean.to_degrees(), angle.to_degrees());
+    }
 }
 
 #[test]

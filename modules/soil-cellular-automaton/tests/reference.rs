@@ -6,13 +6,15 @@ mod plain;
 use plain::Plain;
 use proptest::prelude::*;
 use std::sync::Arc;
-use terraglue_ground::{UNIT_M, lower_surface};
+use terraglue_ground::{Lattice, UNIT_M, lower_surface};
 use terraglue_soil_cellular_automaton::Sweeper;
-use terraglue_soil_contact::{Covered, Ground};
-use terraglue_subsystem::{Geometry, Host, LogLevel, Pose, Terrain, TerrainTile};
+use terraglue_soil_contact::{Covered, Ground, Mask};
+use terraglue_subsystem::{Config, Geometry, Host, LogLevel, Pose, Terrain, TerrainTile};
 
 const SPACING: f64 = 0.01;
 const PHI: f64 = 0.610865238198;
+/// Of the soil on the right of a border.
+const OTHER_PHI: f64 = 0.4;
 const CURVATURE: f64 = 40.0;
 
 /// Heaps, holes and a slope.
@@ -110,11 +112,32 @@ impl Host for Machine {
 
 /// Ground with a sweeper that has looked at it.
 fn begin(heaps: &Heaps, order: Order) -> (Ground, Sweeper) {
-    let ground = Ground::new(heaps).expect("heights in range");
+    begin_with_border(heaps, order, None)
+}
+
+/// The same with another soil from a share of the ground's width on.
+fn begin_with_border(heaps: &Heaps, order: Order, border: Option<f64>) -> (Ground, Sweeper) {
+    let mut ground = Ground::new(heaps).expect("heights in range");
+    if let Some(border) = border {
+        ground.mask = mask(heaps.size, border);
+    }
     let mut sweeper = Sweeper::new(*ground.heights.lattice(), Arc::new(Machine(order)), 64);
-    sweeper.set_limits(PHI, CURVATURE, SPACING);
+    let others: &[f64] = if border.is_some() { &[OTHER_PHI] } else { &[] };
+    sweeper.set_limits(PHI, others, CURVATURE, SPACING);
     sweeper.scan(&ground);
     (ground, sweeper)
+}
+
+fn mask([nx, ny]: [u32; 2], border: f64) -> Mask {
+    let left = 1 + (border * f64::from(nx - 2)) as u32;
+    let row = format!("{left},0,{},1", nx - left);
+    let runs = vec![row; ny as usize].join(",");
+    let config = Config::parse(&format!(
+        r#"{{"n":1,"k_c":1400,"k_phi":820000,"c_pa":170,"phi_rad":{PHI},"K_m":0.018,
+            "mask":{{"soils":[{{"phi_rad":{OTHER_PHI}}}],"runs":[{runs}]}}}}"#
+    ));
+    let lattice = Lattice { origin: [0.0; 2], spacing: SPACING, size: [nx, ny] };
+    Mask::from_config(&config.expect("a table"), 9.81, &lattice).expect("a mask")
 }
 
 /// A ball over the ground: nodes that it presses by `pressed` (m) carry it, others are roofed.
@@ -156,7 +179,7 @@ fn sleepers_are_at_rest(heaps: &Heaps, dropped: i32) -> Result<(), TestCaseError
         for _ in 0..400 {
             sweeper.sweep(&mut ground, 1);
         }
-        let mut plain = Plain::new(&ground, PHI, CURVATURE);
+        let mut plain = Plain::new(&ground, &[PHI, OTHER_PHI], CURVATURE);
         let first = sweeper.counts.parity;
         sweeper.sweep(&mut ground, 40);
         (0..40).for_each(|k| plain.sweep(first + k));
@@ -178,10 +201,11 @@ proptest! {
     fn every_unit_is_that_of_the_plain_reference(
         heaps in heaps(),
         order in any_order(),
+        border in prop::option::of(0.0..1.0f64),
         turns in prop::collection::vec((1..21u32, prop::option::of((0.0..1.0f64, 0.0..1.0f64, -0.01..0.02f64))), 1..5),
     ) {
-        let (mut ground, mut sweeper) = begin(&heaps, order);
-        let mut plain = Plain::new(&ground, PHI, CURVATURE);
+        let (mut ground, mut sweeper) = begin_with_border(&heaps, order, border);
+        let mut plain = Plain::new(&ground, &[PHI, OTHER_PHI], CURVATURE);
         for (sweeps, foot) in turns {
             let covered = foot.map_or(Vec::new(), |(x, y, pressed)| ball(&ground, [x, y], pressed));
             sweeper.feet.take(&ground, &covered, &mut sweeper.changed);

@@ -15,7 +15,8 @@ pub struct Plain {
     load: Vec<i32>,
     /// `None`: open sky.
     room: Vec<Option<i32>>,
-    threshold: f32,
+    /// Δ·tan φ_r of every node.
+    threshold: Vec<f32>,
     curvature: i32,
 }
 
@@ -26,19 +27,20 @@ fn whole(magnitude: f32, direction: i32) -> i32 {
 }
 
 impl Plain {
-    /// A copy of the ground without feet.
-    pub fn new(ground: &Ground, repose: f64, curvature: f64) -> Self {
+    /// A copy of the ground without feet; `repose` has the angle of every soil of its mask.
+    pub fn new(ground: &Ground, repose: &[f64], curvature: f64) -> Self {
         let lattice = ground.heights.lattice();
         let size = lattice.size.map(|n| n as i32);
         let nodes = (0..size[1]).flat_map(|j| (0..size[0]).map(move |i| (i, j)));
-        let heights: Vec<i32> = nodes.map(|(i, j)| ground.heights.units(i, j)).collect();
+        let heights: Vec<i32> = nodes.clone().map(|(i, j)| ground.heights.units(i, j)).collect();
+        let of = |(i, j)| (lattice.spacing * libm::tan(repose[ground.mask.at(i, j)]) / UNIT_M) as f32;
         let n = heights.len();
         Self {
             size,
             heights,
             load: vec![0; n],
             room: vec![None; n],
-            threshold: (lattice.spacing * libm::tan(repose) / UNIT_M) as f32,
+            threshold: nodes.map(of).collect(),
             curvature: (curvature * lattice.spacing * lattice.spacing / UNIT_M) as i32,
         }
     }
@@ -104,10 +106,13 @@ impl Plain {
                     let across = |[i, j]: [i32; 2]| self.level(i + b, j + a) - self.level(i - b, j - a);
                     let (along_f, across_f) = (along as f32, (across(n) + across(m)) as f32 * 0.25);
                     let squared = along_f * along_f + across_f * across_f;
-                    if squared <= self.threshold * self.threshold {
+                    // the upper node's material slides
+                    let upper = if along > 0 { n } else { m };
+                    let threshold = self.threshold[self.place(upper[0], upper[1])];
+                    if squared <= threshold * threshold {
                         continue;
                     }
-                    let share = 1.0 - self.threshold / squared.sqrt();
+                    let share = 1.0 - threshold / squared.sqrt();
                     let flux = whole(0.25 * along_f.abs() * share, along);
                     let flux = flux.clamp(-self.inlet(i, j), self.inlet(m[0], m[1]));
                     change[self.place(i, j)] -= flux;

@@ -28,8 +28,13 @@ pub trait Material: Send {
     /// Exact copy of its own committed state.
     type Saved: Default + Send + Persist;
 
-    /// Looks at the ground before the first step.
-    fn begin(&mut self, _ground: &Ground, _parameters: &SoilParameters) {}
+    /// Looks at the ground before the first step, and may bring it to rest.
+    ///
+    /// # Errors
+    /// The ground cannot be brought to rest.
+    fn begin(&mut self, _ground: &mut Ground, _parameters: &SoilParameters) -> Result {
+        Ok(())
+    }
     /// Its variables, numbered from `first`; all are f64.
     fn variables(&self, _first: u32) -> Vec<Variable> {
         Vec::new()
@@ -90,7 +95,7 @@ impl<M: Material> FieldSoil<M> {
         let mut ground = Ground::new(host.required_terrain()?)?;
         ground.mask = Mask::from_config(config, length(host.gravity()), ground.heights.lattice())?;
         ground.contacts = Contacts::new(config.optional_number("contacts_shown")?.unwrap_or(0.0) as usize);
-        material.begin(&ground, &parameters);
+        material.begin(&mut ground, &parameters)?;
         let mut variables = values::shared();
         variables.extend(material.variables(values::SHARED));
         let first_contact = variables.len() as u32;

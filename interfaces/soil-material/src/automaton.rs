@@ -1,5 +1,6 @@
 //! The automaton as the material rule of a soil: load, displacement, a bounded number of sweeps a step.
 
+use crate::coarse::{as_found, settle};
 use crate::compaction::{Compaction, SavedCompaction};
 use crate::displace::Site;
 use crate::feet::Foot;
@@ -18,6 +19,9 @@ pub const DEFAULT_COMPACTION: f64 = 0.25;
 /// Speed of the front of a slide where a scenario is silent, m/s: two sweeps per ms at 1 cm.
 const FRONT_SPEED: f64 = 20.0;
 
+/// Sweeps before the first step at most; what is not at rest then goes on in the run.
+const MOST_SWEEPS: u32 = 100_000;
+
 /// Parameters of the automaton.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Settings {
@@ -29,6 +33,8 @@ pub struct Settings {
     pub sweeps_per_step: Option<f64>,
     /// Share of the pressed volume that becomes denser, 0 … 1.
     pub compacted_fraction: f64,
+    /// Whether steep ground comes to rest before the first step.
+    pub settle_at_start: bool,
 }
 
 impl Settings {
@@ -39,6 +45,7 @@ impl Settings {
             angle_of_repose: config.optional_number("angle_of_repose_rad")?,
             sweeps_per_step: config.optional_number("sweeps_per_step")?.filter(|s| *s > 0.0),
             compacted_fraction: config.optional_number("compacted_fraction")?.unwrap_or(DEFAULT_COMPACTION),
+            settle_at_start: config.flag("settle_at_start")?,
         };
         let angle = settings.angle_of_repose.unwrap_or(0.5);
         if !(settings.curvature_max > 0.0 && angle > 0.0 && angle < 1.5) {
@@ -177,7 +184,7 @@ pub struct Saved {
 impl Material for Automaton {
     type Saved = Saved;
 
-    fn begin(&mut self, ground: &Ground, parameters: &SoilParameters) {
+    fn begin(&mut self, ground: &mut Ground, parameters: &SoilParameters) -> Result {
         let lattice = *ground.heights.lattice();
         self.friction_angle = parameters.phi_rad;
         self.others = ground.mask.soils.iter().map(|soil| soil.phi_rad).collect();
@@ -186,6 +193,12 @@ impl Material for Automaton {
         self.compaction = Compaction::new(lattice, self.settings.compacted_fraction);
         self.limit();
         self.sweeper.scan(ground);
+        if self.settings.settle_at_start {
+            settle(&mut self.sweeper, ground, MOST_SWEEPS)?;
+            as_found(ground)?;
+            self.sweeper.counts = Counts { parity: self.sweeper.counts.parity, ..Counts::default() };
+        }
+        Ok(())
     }
 
     fn variables(&self, first: u32) -> Vec<Variable> {
@@ -256,7 +269,8 @@ terraglue_subsystem::persist!(Settings {
     curvature_max,
     angle_of_repose,
     sweeps_per_step,
-    compacted_fraction
+    compacted_fraction,
+    settle_at_start,
 });
 terraglue_subsystem::persist!(Saved {
     settings,

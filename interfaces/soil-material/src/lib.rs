@@ -24,6 +24,7 @@
 
 mod active;
 mod automaton;
+mod coarse;
 mod compaction;
 mod displace;
 mod feet;
@@ -36,6 +37,7 @@ mod values;
 mod window;
 
 pub use automaton::{Automaton, DEFAULT_COMPACTION, Settings};
+pub use coarse::settle;
 pub use compaction::Compaction;
 pub use sweep::{Counts, Sweeper};
 
@@ -68,6 +70,12 @@ pub fn schema(compacted: f64) -> Vec<Parameter> {
         )
         .within(0.0, 1e6)
         .optional(),
+        Parameter::of(
+            "settle_at_start",
+            ParameterType::Bool,
+            "bring ground that is steeper than its angle of repose to rest before the first step",
+        )
+        .or(false),
         Parameter::number(
             "compacted_fraction",
             "",

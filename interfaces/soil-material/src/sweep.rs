@@ -152,6 +152,15 @@ impl Sweeper {
         self.limits = Limits { repose, least_repose, curvature };
     }
 
+    /// A sweeper with the largest angle of repose of this one, times `steeper`, on a lattice of blocks: no feet, and no
+    /// rule of curvature, which is one of single nodes.
+    pub(crate) fn of_blocks(&self, lattice: Lattice, steeper: f32) -> Self {
+        let largest = self.by_soil.iter().fold(self.limits.repose, |most, thr| most.max(*thr));
+        let repose = 2.0 * largest * steeper;
+        let limits = Limits { repose, least_repose: repose, curvature: None };
+        Self { limits, ..Self::new(lattice, self.host.clone(), 0) }
+    }
+
     /// Whether all sleep.
     pub fn sleeps(&self) -> bool {
         self.repose.is_empty() && self.curvature.is_empty()

@@ -6,7 +6,7 @@
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use std::sync::Arc;
-use terraglue_soil_cellular_automaton::Sweeper;
+use terraglue_soil_cellular_automaton::{Sweeper, settle};
 use terraglue_soil_contact::Ground;
 use terraglue_subsystem::{Standalone, Terrain, TerrainTile};
 
@@ -71,17 +71,24 @@ fn at_rest(bencher: Bencher) {
     bencher.counter(ItemsCount::new(256u32 * 256)).bench_local(|| sweeper.scan(black_box(&ground)));
 }
 
-/// A column collapses to a cone of so many cells radius.
+/// A column collapses to a cone of so many cells radius, sweep by sweep.
 #[divan::bench(args = [32], sample_count = 20)]
 fn collapse(bencher: Bencher, radius: u32) {
-    let column = || {
-        let half = f64::from(radius / 4);
-        let volume = std::f64::consts::FRAC_PI_3 * (f64::from(radius) * SPACING).powi(3) * REPOSE.tan();
-        let height = volume / ((2.0 * half + 1.0) * SPACING).powi(2);
-        let middle = f64::from(2 * radius);
-        ground(4 * radius + 1, UNLIMITED, move |i, j| {
-            if (i - middle).abs() <= half && (j - middle).abs() <= half { height } else { 0.0 }
-        })
-    };
-    bencher.with_inputs(column).bench_local_refs(|(g, s)| while s.sweep(g, 8) > 4 {});
+    bencher.with_inputs(|| released(radius)).bench_local_refs(|(g, s)| while s.sweep(g, 8) > 4 {});
+}
+
+/// The same by way of a coarse lattice.
+#[divan::bench(args = [32, 64], sample_count = 20)]
+fn collapse_settled(bencher: Bencher, radius: u32) {
+    bencher.with_inputs(|| released(radius)).bench_local_refs(|(g, s)| settle(s, g, 100_000));
+}
+
+fn released(radius: u32) -> (Ground, Sweeper) {
+    let half = f64::from(radius / 4);
+    let volume = std::f64::consts::FRAC_PI_3 * (f64::from(radius) * SPACING).powi(3) * REPOSE.tan();
+    let height = volume / ((2.0 * half + 1.0) * SPACING).powi(2);
+    let middle = f64::from(2 * radius);
+    ground(4 * radius + 1, UNLIMITED, move |i, j| {
+        if (i - middle).abs() <= half && (j - middle).abs() <= half { height } else { 0.0 }
+    })
 }

@@ -2,7 +2,7 @@
 //!
 //! Where the material goes is told in `terraglue-soil-material`, what a foot feels in `terraglue-soil-contact`.
 
-pub use terraglue_soil_material::{Automaton, Compaction, Counts, Settings, Sweeper};
+pub use terraglue_soil_material::{Automaton, Compaction, Counts, Settings, Sweeper, settle};
 
 use std::sync::Arc;
 use terraglue_soil_contact::FieldSoil;

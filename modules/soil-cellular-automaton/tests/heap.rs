@@ -83,6 +83,25 @@ fn a_column_collapses_to_a_cone_at_the_angle_of_repose() {
     assert_eq!(read(&*soil, "active_nodes"), 0.0);
 }
 
+#[test]
+fn a_column_that_settles_at_the_start_is_the_same_cone_at_rest() {
+    let own = LUNAR.trim_end_matches('}');
+    let soil = soil::<SoilCellularAutomaton>(&format!("{own},\"settle_at_start\":true}}"), 65, 0.01, column);
+    let shown = Shown::new(&*soil);
+    let before: i64 = {
+        let place = |k: i32| f64::from(k - 32) * 0.01;
+        let nodes = (0..65).flat_map(|j| (0..65).map(move |i| (i, j)));
+        nodes.map(|(i, j)| (column(place(i), place(j)) / UNIT_M).round() as i64).sum()
+    };
+    assert_eq!(total(&*soil), before, "material was lost");
+    let slopes = (0..360).map(|k| slope(&shown, f64::from(k).to_radians()).atan().to_degrees());
+    let mean = slopes.sum::<f64>() / 360.0;
+    assert!((mean - 35.0).abs() < 1.0, "{mean}");
+    for (name, value) in [("moved_volume", 0.0), ("max_sinkage", 0.0), ("mass_error_units", 0.0)] {
+        assert_eq!(read(&*soil, name), value, "{name}");
+    }
+}
+
 /// Two columns on the soils of a mask: each becomes a cone at the angle of its own soil.
 #[test]
 fn every_soil_of_a_mask_has_its_own_angle_of_repose() {

@@ -68,16 +68,20 @@ pub fn cones(context: &Context) -> Outcome<Vec<Figure>> {
         if long && context.quick {
             continue;
         }
-        for (curvature, rules) in [(UNLIMITED, ""), (super::CURVATURE, ".curved")] {
+        let cases =
+            [(UNLIMITED, false, ""), (UNLIMITED, true, ".settled"), (super::CURVATURE, false, ".curved")];
+        for (curvature, settled, rules) in cases {
             let mut field = released(radius, spacing, curvature)?;
             let before = field.total();
-            let sweeps = field.rest(MICROMETRE, 200_000)?;
+            let [coarse, fine] =
+                if settled { field.settle(200_000)? } else { [0, field.rest(MICROMETRE, 200_000)?] };
             let slopes: Vec<f64> = (0..360)
                 .map(|k| slope(&field.ground.heights, f64::from(k).to_radians(), f64::from(middle(radius))))
                 .collect();
             let worst = slopes.iter().map(|s| (s - 35.0).abs()).fold(0.0, f64::max);
             let (low, high) = slopes.iter().fold((90.0f64, 0.0f64), |(a, b), s| (a.min(*s), b.max(*s)));
             let lost = if field.total() == before { "" } else { ", MASS LOST" };
+            let sweeps = if settled { format!("{coarse} coarse and {fine}") } else { fine.to_string() };
             let what = format!(
                 "largest deviation from 35° on 360 azimuths ({low:.2}° … {high:.2}°, {sweeps} sweeps{lost})"
             );

@@ -3,7 +3,7 @@
 
 use super::cone::released;
 use super::feet::{Feet, instance, walk::walk};
-use super::field::{Field, Function, MICROMETRE, PHI, UNLIMITED};
+use super::field::{Field, Function, PHI, UNLIMITED};
 use super::machine::Machine;
 use crate::process::Outcome;
 use crate::validate::soil::rig::LUNAR;
@@ -150,11 +150,11 @@ fn collapses(context: &Context) -> Outcome<Vec<Figure>> {
         for _ in 0..3 {
             let mut field = released(radius, 0.01, UNLIMITED)?;
             let before = cpu();
-            field.rest(MICROMETRE, 200_000)?;
+            field.settle(200_000)?;
             times.push(1e3 * (cpu() - before));
         }
         let best = times.into_iter().fold(f64::INFINITY, f64::min);
-        let what = format!("collapse of a column to a cone of {radius} cells, ms of CPU time");
+        let what = format!("collapse of a column to a cone of {radius} cells by `settle`, ms of CPU time");
         figures.push(Figure::new(format!("soil.automaton.cost.collapse_r{radius}"), best, limit, what));
     }
     Ok(figures)

@@ -3,7 +3,7 @@
 use crate::process::Outcome;
 use std::sync::Arc;
 use terraglue_ground::{Surface, UNIT_M};
-use terraglue_soil_cellular_automaton::Sweeper;
+use terraglue_soil_cellular_automaton::{Sweeper, settle};
 use terraglue_soil_contact::Ground;
 use terraglue_subsystem::{Standalone, Terrain, TerrainTile};
 
@@ -77,6 +77,15 @@ impl Field {
             }
         }
         Err(format!("not at rest after {most} sweeps"))
+    }
+
+    /// The same by way of a coarse lattice; sweeps on the coarse and on the fine one. An error after `most`.
+    pub fn settle(&mut self, most: u32) -> Outcome<[u32; 2]> {
+        let sweeps = settle(&mut self.sweeper, &mut self.ground, most).map_err(|e| e.to_string())?;
+        if sweeps.iter().any(|s| *s >= most) {
+            return Err(format!("not at rest after {most} sweeps"));
+        }
+        Ok(sweeps)
     }
 
     /// Sum of all heights, units.

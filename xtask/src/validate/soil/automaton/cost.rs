@@ -171,7 +171,8 @@ fn rates() -> Outcome<Vec<Figure>> {
         (0..scans).for_each(|_| still.sweeper.scan(&still.ground));
         f64::from(scans) * cells
     });
-    let steep = |i: i64, _: i64| 0.01 * 1.2 * i as f64;
+    // rough, since on a plane only the ends change
+    let steep = |i: i64, j: i64| 0.012 * i as f64 + 1e-3 * libm::sin(12.9898 * i as f64 + 78.233 * j as f64);
     let mut slope = Field::new(&Function { size, spacing: 0.01, height: steep }, PHI, UNLIMITED)?;
     let flowing = median_rate(|| {
         let before = slope.sweeper.counts.visited;

@@ -27,7 +27,7 @@ mod hosted;
 mod reload;
 mod unglued;
 
-pub(crate) use build::{find, make, services};
+pub(crate) use build::{find, make, services, with_law};
 use group::Group;
 
 /// What a run needs beside its scenario.

@@ -156,6 +156,31 @@ def test_modules_are_listed_without_running_them(tmp_path):
     assert process.returncode == 0 and "elastic_stiffness_pa_m" in process.stdout
 
 
+def test_the_last_check_is_shown_by_the_bytes_of_the_file(tmp_path, monkeypatch):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    place, commands = made(tmp_path, "law", "c")
+
+    def shown():
+        process = terraglue("modules", "my-law", "--module-path", place)
+        assert process.returncode == 0, process.stderr
+        return process.stdout
+
+    subprocess.run(["make"], cwd=place, check=True, capture_output=True)
+    assert "not checked since it was built" in shown()
+    assert terraglue("check-module", place, "--level", "quick").returncode == 0
+    assert "last check: passed (quick)" in shown() and "seed 1" in shown()
+    table = " ".join(terraglue("modules", "--module-path", place).stdout.split())
+    assert "last check" in table and "passed" in table
+    law_with(place, ("p[N] * out->pressure[i] / z + bekker / p[Z_1]", "out->pressure[i] / z"))
+    assert "not checked since it was built" in shown()
+    assert terraglue("check-module", place, "--level", "quick").returncode == 1
+    assert "last check: failed" in shown() and " fail" in shown()
+    # one test alone says nothing of the module
+    law_with(place, ("out->pressure[i] / z;", "p[N] * out->pressure[i] / z + bekker / p[Z_1];"))
+    assert terraglue("check-module", place, "--only", "loads").returncode == 0
+    assert "failed" not in shown()
+
+
 HEADERS = sorted((ROOT / "tests" / "abi").glob("terraglue-*.h"))
 
 

@@ -13,7 +13,7 @@ from conftest import ROOT, terraglue
 from test_plugins import made, played
 
 PAGE = ROOT / "docs" / "plugins" / "python.md"
-KINDS = ["soil", "robot", "controller"]
+KINDS = ["soil", "robot", "controller", "law"]
 
 
 def flat(text):
@@ -38,6 +38,63 @@ def test_a_new_soil_passes_the_checker(tmp_path):
     process = terraglue("check-module", place, "--level", "quick", "--jobs", "2")
     assert process.returncode == 0, process.stdout
     assert "in a process of its own" in flat(process.stdout)
+
+
+def test_a_new_law_is_at_most_forty_lines_and_passes_the_checker(tmp_path):
+    place, commands = made(tmp_path, "law", "python")
+    assert len((place / "my_law.py").read_text().splitlines()) <= 40
+    process = terraglue("check-module", place, "--level", "quick", "--jobs", "2")
+    assert process.returncode == 0, process.stdout
+    source = place / "my_law.py"
+    text = source.read_text()
+    source.write_text(text.replace("law.n * out.pressure[i] / z + bekker", "law.n * out.pressure[i] / z + 2.0 * bekker"))
+    assert source.read_text() != text
+    process = terraglue("check-module", place, "--only", "law-slope")
+    assert process.returncode == 1 and "fail     law-slope" in process.stdout, process.stdout
+
+
+LAW_FAULTS = {
+    "raising": ("1 / 0", ["ZeroDivisionError", "my_law.py", "line", "function pressure"]),
+    "killed": ("import os; os.kill(os.getpid(), 9)", ["signal 9 (killed)", "function pressure"]),
+    "hanging": ("[0 for _ in iter(int, 1)]", ["did not answer within 0.5 s", "my_law.py", "function pressure"]),
+}
+
+
+@pytest.mark.parametrize("fault", LAW_FAULTS)
+@pytest.mark.parametrize("isolate", [False, True])
+def test_a_law_that_fails_is_named_with_function_and_time(tmp_path, fault, isolate):
+    if isolate and fault == "hanging":
+        pytest.skip("the worker of the soil is ended first")
+    line, told = LAW_FAULTS[fault]
+    place, _ = made(tmp_path, "law", "python")
+    source = place / "my_law.py"
+    text = source.read_text()
+    assert text.count("    k = law.k_c / nodes.b + law.k_phi\n") == 1
+    source.write_text(text.replace("    k = law.k_c / nodes.b + law.k_phi\n",
+                                   f"    k = law.k_c / nodes.b + law.k_phi\n    if nodes.depth[0] > 0.012 and nodes.h > 0.0: {line}\n"))
+    process = terraglue("run", "scenario.toml", "--quiet", "--out", tmp_path / "out", "--set", "soil.step_timeout_s=0.5",
+                        *(["--set", "soil.isolate=true", "--set", "soil.step_timeout_s=30"] if isolate else []), cwd=place)
+    assert process.returncode == 1, process.stderr
+    for part in ["soil", "[TG14]", "my-law", *told]:
+        assert part in flat(process.stderr), process.stderr
+    assert re.search(r"t = 0\.\d+ s", flat(process.stderr)), process.stderr
+    assert left_behind() == set()
+
+
+def test_a_law_may_keep_a_state_and_use_another_interpreter(tmp_path):
+    page = PAGE.read_text()
+    place, _ = made(tmp_path, "law", "python")
+    source = place / "my_law.py"
+    code = re.search(r"```python\n(STATE_DOUBLES.*?)```", page, re.S).group(1)
+    old = re.search(r"def pressure\(.*?\n\n\n", source.read_text(), re.S).group(0)
+    source.write_text(source.read_text().replace(old, code + "\n\n"))
+    process = terraglue("check-module", place, "--level", "quick", "--jobs", "2")
+    assert process.returncode == 0 and "pass     law-unloads" in process.stdout, process.stdout
+    wrapper = place / "my-python"
+    wrapper.write_text(f"#!/bin/sh\ntouch {tmp_path}/mark\nexec {sys.executable} \"$@\"\n")
+    wrapper.chmod(0o755)
+    process = terraglue("run", "scenario.toml", "--quiet", "--duration", "0.1", "--set", "soil.python=./my-python", cwd=place)
+    assert process.returncode == 0 and (tmp_path / "mark").exists(), process.stderr
 
 
 def controller(folder, body, **keys):

@@ -48,9 +48,10 @@ def built(folder, kind, language):
     return place
 
 
-@pytest.mark.parametrize("kind, language", [("soil", "c"), ("controller", "cpp"), ("robot", "python")])
+@pytest.mark.parametrize("kind, language", [("soil", "c"), ("controller", "cpp"), ("robot", "python"), ("law", "c"), ("law", "python")])
 def test_the_same_code_in_mid_run_changes_no_number(tmp_path, kind, language):
     place = built(tmp_path, kind, language)
+    kind = "soil.law" if kind == "law" else kind
     assert run(place, tmp_path / "a", "--duration", "0.2").returncode == 0
     process = run(place, tmp_path / "b", "--duration", "0.2", "--watch", "--reload-at", f"{kind}=90", "--reload-at",
                   f"{kind}=133")
@@ -119,6 +120,52 @@ def test_what_cannot_be_taken_over_is_refused_and_the_old_code_goes_on(tmp_path,
     assert rows(tmp_path / "a") == rows(tmp_path / "b")
     assert "refused, the old code goes on" in events(tmp_path / "b")[0]
     assert set(pathlib.Path(tempfile.gettempdir()).glob("terraglue-reload-*")) <= before
+
+
+def test_variables_may_be_added_behind_the_others(tmp_path):
+    place = built(tmp_path, "controller", "python")
+    text = (place / "my_controller.py").read_text()
+    last = re.search(r'\n( +tg.Variable\("time_constant".*\n)', text).group(1)
+    added = text.replace(last, last + '            tg.Variable("limit", "rad", tg.LOCAL, "A new one"),\n')
+    added = added.replace("        self.variables = [", "        self.limit = 7.0\n        self.variables = [")
+    (place / "new.py").write_text(added)
+    scenario = place / "scenario.toml"
+    scenario.write_text(scenario.read_text().replace('module = "./my_controller.py"',
+                                                     'module = "./my_controller.py"\nbuild = "cp new.py my_controller.py"'))
+    process = run(place, tmp_path / "a", "--duration", "0.1", "--watch", "--reload-at", "controller=40", "--reload-reset")
+    assert process.returncode == 0 and "started afresh" in events(tmp_path / "a")[0], process.stderr
+
+
+def test_a_law_takes_the_place_of_another_with_the_state_of_the_soil(tmp_path):
+    place = built(tmp_path, "law", "c")
+    source = (place / "my_law.c").read_text()
+    assert source.count("k = p[K_C] / at->b + p[K_PHI];") == 1
+    (place / "new.c").write_text(source.replace("k = p[K_C] / at->b + p[K_PHI];", "k = 0.25 * (p[K_C] / at->b + p[K_PHI]);"))
+    scenario = place / "scenario.toml"
+    scenario.write_text(re.sub(r"^build = .*$", 'build = "cp new.c my_law.c && make"', scenario.read_text(), flags=re.M))
+    assert run(place, tmp_path / "a", "--duration", "0.3").returncode == 0
+    process = run(place, tmp_path / "b", "--duration", "0.3", "--watch", "--reload-at", "soil.law=150")
+    assert process.returncode == 0, process.stderr
+    told = events(tmp_path / "b")
+    assert re.match(r"reload soil.law: \w{16} to \w{16}, state of \d+ bytes carried over", told[0]), told
+    a, b = (column(tmp_path / f, "soil.max_sinkage") for f in "ab")
+    assert a[:30] == b[:30] and b[-1] > 1.2 * a[-1] > 0.0
+
+
+def test_a_law_on_the_module_path_stays_where_its_soil_is_exchanged(tmp_path):
+    place = built(tmp_path, "law", "c")
+    scenario = place / "scenario.toml"
+    (tmp_path / "elsewhere").mkdir()
+    (place / "libmy_law_plugin.so").rename(tmp_path / "elsewhere" / "libmy_law_plugin.so")
+    text = scenario.read_text()
+    assert text.count('"./libmy_law_plugin.so"') == 1
+    scenario.write_text(re.sub(r"^build = .*\n", "", text.replace('"./libmy_law_plugin.so"', '"my-law"'), flags=re.M))
+    path = ["--duration", "0.1", "--module-path", tmp_path / "elsewhere"]
+    assert run(place, tmp_path / "a", *path).returncode == 0
+    process = run(place, tmp_path / "b", *path, "--watch", "--reload-at", "soil=60", "--reload-at", "soil.law=70")
+    assert process.returncode == 0 and not complaints(process), process.stderr
+    assert [e.split(":")[0] for e in events(tmp_path / "b")] == ["reload soil", "reload soil.law"]
+    assert rows(tmp_path / "a") == rows(tmp_path / "b")
 
 
 def test_python_hands_its_state_to_other_code_by_migrate(tmp_path):

@@ -6,8 +6,8 @@ use super::output::outln;
 use std::path::Path;
 use terraglue::Result;
 use terraglue::check_module::{
-    Errand, Lab, Level, Options, Outcome, Told, catalogue, check, module_file, run_errand, run_here,
-    sanitize, sources_of,
+    Errand, Lab, Level, Options, Outcome, Told, catalogue, check, module_file, remember, run_errand,
+    run_here, sanitize, sources_of,
 };
 use terraglue::scenario::InputError;
 
@@ -29,6 +29,9 @@ pub fn check_module(arguments: &CheckModuleArguments) -> Result<Exit> {
         return in_process(arguments, &module);
     }
     let report = check(&module, &options(arguments)?).map_err(wrong)?;
+    if arguments.only.is_empty() {
+        remember(&module, &report);
+    }
     for (file, text) in [(&arguments.json, report.json()), (&arguments.junit, report.junit())] {
         if let Some(file) = file {
             write(file, &text)?;

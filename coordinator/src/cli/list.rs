@@ -6,6 +6,7 @@ use super::run::build;
 use super::{Exit, show};
 use std::path::{Path, PathBuf};
 use terraglue::Result;
+use terraglue::check_module::{LastCheck, last_check};
 use terraglue::host::{AvailableModule, Library, SearchPath, available_modules, listed_modules};
 use terraglue::scenario::{InputError, Scenario, allowed_values};
 use terraglue::subsystem::{Causality, Effect, Kind, Schema, ValueType, Variable};
@@ -85,7 +86,10 @@ pub fn modules(name: Option<&str>, module_path: &[PathBuf], json: bool) -> Resul
     }
     if json {
         let describe = |m: &AvailableModule| match &m.schema {
-            Ok(schema) => serde_json::json!({ "name": m.name, "path": m.path, "schema": schema }),
+            Ok(schema) => {
+                let check = last_check(&m.path);
+                serde_json::json!({ "name": m.name, "path": m.path, "schema": schema, "last_check": check })
+            }
             Err(e) => serde_json::json!({ "name": m.name, "path": m.path, "error": e.to_string() }),
         };
         outln!("{}", serde_json::Value::Array(found.iter().map(describe).collect()));
@@ -102,7 +106,7 @@ pub fn modules(name: Option<&str>, module_path: &[PathBuf], json: bool) -> Resul
 
 /// One line per file, from the section of the library: no code of it runs.
 fn listing(search: &SearchPath) -> Exit {
-    let mut table = show::table(&["module", "version", "ABI", "licence", "file", ""]);
+    let mut table = show::table(&["module", "version", "ABI", "licence", "file", "last check", ""]);
     let found = listed_modules(search);
     for m in &found {
         let described = m.description.clone().unwrap_or_default();
@@ -113,7 +117,9 @@ fn listing(search: &SearchPath) -> Exit {
             (None, None) => String::new(),
         };
         let file = m.path.display().to_string();
-        table.add_row([m.name.clone(), described.version, described.abi, described.license, file, note]);
+        let check = last_check(&m.path).map_or_else(|| "–".to_owned(), |last| last.words());
+        let name = m.name.clone();
+        table.add_row([name, described.version, described.abi, described.license, file, check, note]);
     }
     if found.is_empty() {
         outln!("no module found; see --module-path");
@@ -121,6 +127,11 @@ fn listing(search: &SearchPath) -> Exit {
         outln!("{table}\n`terraglue modules NAME` shows what a module takes.");
     }
     Exit::Done
+}
+
+/// What a check said, and with which version of the program.
+fn told(last: &LastCheck) -> String {
+    format!("{} (seed {}, terraglue {})", last.summary, last.seed, last.version)
 }
 
 fn describe(module: &AvailableModule, schema: &Schema) {
@@ -131,6 +142,10 @@ fn describe(module: &AvailableModule, schema: &Schema) {
         Kind::Law => "law",
     };
     outln!("{} ({kind}): {}\n{}", schema.name, schema.help, module.path.display());
+    match last_check(&module.path) {
+        None => outln!("not checked since it was built: terraglue check-module {}", module.path.display()),
+        Some(last) => outln!("last check: {}; {}", last.words(), told(&last)),
+    }
     let mut table = show::table(&["parameter", "takes", "default", "help"]);
     for p in &schema.parameters {
         let default = match (&p.default, p.optional) {

@@ -1,7 +1,8 @@
 //! The law that a scenario names below a soil, `[soil.law] plugin = "my-law"`: found, given its numbers, and handed to the
 //! soil through the services of its host.
 
-use super::{LoadedModule, SearchPath};
+use super::isolation::{self, What};
+use super::{HostServices, LoadedModule, SearchPath};
 use std::path::Path;
 use std::sync::Arc;
 use terraglue_subsystem::{
@@ -10,6 +11,8 @@ use terraglue_subsystem::{
 
 /// The parameter of a soil that names a law.
 pub const KEY: &str = "law.plugin";
+/// Interpreter of a law in Python; the host puts the key `python` of the soil's table there.
+pub const INTERPRETER: &str = "law.python";
 /// Where a scenario gives the numbers of a law.
 const NUMBERS: &str = "law.parameters";
 
@@ -38,20 +41,33 @@ pub fn locate(
 ///
 /// # Errors
 /// The file is no law, or its numbers are wrong.
-pub(super) fn of_config(schema: &Schema, config: &Config, folder: &Path) -> Result<Option<Arc<dyn NodeLaw>>> {
+pub(super) fn of_config(
+    schema: &Schema,
+    config: &Config,
+    host: &dyn Host,
+    services: &HostServices,
+) -> Result<Option<Arc<dyn NodeLaw>>> {
     let takes = schema.parameters.iter().any(|p| p.name == KEY);
     let Some(path) = config.get(KEY).and_then(|v| v.as_str()).filter(|_| takes) else { return Ok(None) };
     let refused = |e: &dyn std::fmt::Display| Error::Refused(format!("[TG12] `{KEY}`: {e}"));
+    let folder = Path::new(host.folder());
     let path = locate(path, &SearchPath::standard(&[], folder), folder).map_err(|e| refused(&e))?;
     let law = LoadedModule::load(&path).map_err(|e| refused(&e))?;
-    open(&law, config).map(Some).map_err(|e| refused(&e))
+    let named = config.get(INTERPRETER).and_then(|v| v.as_str());
+    let law = law.run_by(super::interpreter(named, folder));
+    open(&law, config, host.name(), services).map(Some).map_err(|e| refused(&e))
 }
 
-/// A law with the numbers that the parameters of a soil give it.
+/// A law with the numbers that the parameters of a soil give it; one in Python in a process of its own.
 ///
 /// # Errors
-/// The module is no law, a number is missing, unknown or out of range.
-pub fn open(law: &LoadedModule, config: &Config) -> std::result::Result<Arc<dyn NodeLaw>, String> {
+/// The module is no law, a number is missing, unknown or out of range, the process does not start.
+pub fn open(
+    law: &LoadedModule,
+    config: &Config,
+    instance_name: &str,
+    services: &HostServices,
+) -> std::result::Result<Arc<dyn NodeLaw>, String> {
     let schema = law.schema();
     if schema.kind != Kind::Law {
         return Err(format!(
@@ -60,6 +76,26 @@ pub fn open(law: &LoadedModule, config: &Config) -> std::result::Result<Arc<dyn 
             format!("{:?}", schema.kind).to_lowercase()
         ));
     }
+    let numbers = numbers(schema, config)?;
+    if let Some((python, path)) = law.python() {
+        let names = schema.parameters.iter().map(|p| p.name.clone());
+        let what = What::Law {
+            path: std::path::absolute(path).unwrap_or_else(|_| path.to_owned()),
+            numbers: names.zip(numbers.into_iter().map(Into::into)).collect(),
+            python: python.to_owned(),
+        };
+        let host = services.for_instance(instance_name);
+        return isolation::start_law(&schema.name, what, &host, services).map_err(|e| e.to_string());
+    }
+    let foreign = law.foreign().ok_or("a law is a library of its own")?;
+    foreign.law(&schema.name, numbers).map_err(|e| e.to_string())
+}
+
+/// The numbers of a law, in the order of its schema, as the parameters of a soil give them.
+///
+/// # Errors
+/// One is missing, unknown or out of range.
+pub fn numbers(schema: &Schema, config: &Config) -> std::result::Result<Vec<f64>, String> {
     let own = config.get(NUMBERS).and_then(|v| v.as_object());
     for name in own.into_iter().flat_map(|o| o.keys()) {
         if !schema.parameters.iter().any(|p| p.name == *name) {
@@ -71,11 +107,8 @@ pub fn open(law: &LoadedModule, config: &Config) -> std::result::Result<Arc<dyn 
             ));
         }
     }
-    let numbers =
-        schema.parameters.iter().map(|p| number(schema, p, config, own.and_then(|o| o.get(&p.name))));
-    let numbers = numbers.collect::<std::result::Result<Vec<f64>, String>>()?;
-    let foreign = law.foreign().ok_or("a law is a library of its own")?;
-    foreign.law(&schema.name, numbers).map_err(|e| e.to_string())
+    let number = |p: &Parameter| number(schema, p, config, own.and_then(|o| o.get(&p.name)));
+    schema.parameters.iter().map(number).collect()
 }
 
 /// A number of a law: its own, else the soil's of that name, else its default.

@@ -96,6 +96,14 @@ impl LoadedModule {
         matches!(self.origin, Origin::Python(_))
     }
 
+    /// Who runs it, and its file, where it is in Python.
+    pub(super) fn python(&self) -> Option<(&Path, &Path)> {
+        match &self.origin {
+            Origin::Python(source) => Some((&source.interpreter, &source.path)),
+            _ => None,
+        }
+    }
+
     /// The same run by this interpreter, where it is in Python.
     pub(crate) fn run_by(mut self, interpreter: PathBuf) -> Self {
         if let Origin::Python(source) = &mut self.origin {
@@ -115,13 +123,18 @@ impl LoadedModule {
             return self.instantiate_isolated(instance_name, config, services, Isolation::default());
         }
         let config = config.with_defaults(&self.schema);
-        let made = self.make(&config, services.for_instance(instance_name));
+        let made = self.make(&config, services.for_instance(instance_name), services);
         self.supervised(instance_name, made)
     }
 
     /// The subsystem alone, without supervision.
-    pub(crate) fn make(&self, config: &Config, host: Arc<dyn Host>) -> Result<Box<dyn Subsystem>> {
-        let host = match law::of_config(&self.schema, config, Path::new(host.folder()))? {
+    pub(crate) fn make(
+        &self,
+        config: &Config,
+        host: Arc<dyn Host>,
+        services: &HostServices,
+    ) -> Result<Box<dyn Subsystem>> {
+        let host = match law::of_config(&self.schema, config, host.as_ref(), services)? {
             Some(law) => Arc::new(LawHost { host, law }),
             None => host,
         };
@@ -148,7 +161,7 @@ impl LoadedModule {
         let config = config.with_defaults(&self.schema);
         let host = services.for_instance(instance_name);
         let made = match self.path() {
-            None => self.make(&config, host),
+            None => self.make(&config, host, services),
             Some(path) => {
                 let path = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
                 let config = serde_json::from_str(&config.to_json()).unwrap_or_default();

@@ -1,6 +1,6 @@
 //! What an instance is offered: log, threads, cancel flag, seed, folder, gravity, terrain.
 
-use super::Workers;
+use super::{Isolation, Workers};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
@@ -48,6 +48,8 @@ pub struct HostServices {
     pub slots: u32,
     /// Largest number of ground nodes that a step may show; a hint.
     pub max_nodes: u32,
+    /// Limits of a process that an instance needs beside it: of its law in Python.
+    pub isolation: Isolation,
 }
 
 impl HostServices {
@@ -64,6 +66,7 @@ impl HostServices {
             partings: Partings::default(),
             slots: 8,
             max_nodes: 1 << 14,
+            isolation: Isolation::default(),
         }
     }
 

@@ -12,7 +12,7 @@ mod candidate;
 mod sources;
 
 use crate::host::isolation::end_group;
-use crate::host::{HostServices, Library, LoadedModule};
+use crate::host::{HostServices, Library, LoadError, LoadedModule, SearchPath, law};
 use crate::observer::Observer;
 use crate::scenario::{self, Scenario, SubsystemSpec};
 use crate::testbed::{Options, Testbed};
@@ -52,11 +52,23 @@ pub struct Reloader {
     folder: tempfile::TempDir,
 }
 
-/// A subsystem whose code can be exchanged.
+/// Which code of a subsystem is meant.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Part {
+    /// Its module.
+    Module,
+    /// The law of a soil that is a module of its own.
+    Law,
+}
+
+/// Code of a subsystem that can be exchanged.
 struct Watched {
     spec: SubsystemSpec,
+    part: Part,
     schema: Arc<Schema>,
     file: PathBuf,
+    /// Where the code in use was loaded from.
+    used: PathBuf,
     /// The file and the sources when they were last looked at.
     seen: [Stamp; 2],
     /// Fingerprint of the code in use.
@@ -73,8 +85,56 @@ struct Job {
     build: Arc<AtomicU32>,
 }
 
+impl Watched {
+    fn new(scenario: &Scenario, spec: &SubsystemSpec, part: Part, module: &LoadedModule) -> Option<Self> {
+        let file = module.path()?;
+        let file = std::path::absolute(file).unwrap_or_else(|_| file.to_owned());
+        let mut watched = Self {
+            spec: spec.clone(),
+            part,
+            schema: Arc::new(module.schema().clone()),
+            seen: [Stamp::of(&file); 2],
+            hash: std::fs::read(&file).map(|b| fingerprint(&b)).unwrap_or_default(),
+            used: file.clone(),
+            file,
+            count: 0,
+            job: None,
+        };
+        watched.seen = watched.now(scenario);
+        Some(watched)
+    }
+
+    /// `soil` or `soil.law`.
+    fn name(&self) -> String {
+        match self.part {
+            Part::Module => self.spec.name.clone(),
+            Part::Law => format!("{}.law", self.spec.name),
+        }
+    }
+
+    /// The build command. Where a soil has a law of its own, that is what the scenario builds.
+    fn command(&self) -> Option<&String> {
+        let is_law = self.part == Part::Law;
+        self.spec.build.as_ref().filter(|_| is_law == law_of(&self.spec).is_some())
+    }
+
+    /// The file and the sources as they are.
+    fn now(&self, scenario: &Scenario) -> [Stamp; 2] {
+        let sources = match self.command() {
+            Some(_) => Stamp::of_sources(&self.spec, &scenario.folder),
+            None => Stamp::default(),
+        };
+        [Stamp::of(&self.file), sources]
+    }
+}
+
+/// The law that a scenario names below a subsystem.
+fn law_of(spec: &SubsystemSpec) -> Option<&str> {
+    spec.parameters.get("law")?.get("plugin")?.as_str()
+}
+
 impl Reloader {
-    /// Watches every subsystem of the scenario that is a module from a file.
+    /// Watches every subsystem of the scenario that is a module from a file, and the laws of soils that are.
     ///
     /// # Errors
     /// A module is not found, or no folder for copies can be made.
@@ -84,17 +144,14 @@ impl Reloader {
         let mut watched = Vec::new();
         for spec in scenario.subsystems.iter().filter(|s| !crate::fmu::is_fmu(&s.module)) {
             let module = crate::testbed::find(scenario, spec, run, &Library::new())?;
-            let Some(file) = module.path() else { continue };
-            let file = std::path::absolute(file).unwrap_or_else(|_| file.to_owned());
-            watched.push(Watched {
-                seen: [Stamp::of(&file), Stamp::of_sources(spec, &scenario.folder)],
-                hash: std::fs::read(&file).map(|b| fingerprint(&b)).unwrap_or_default(),
-                schema: Arc::new(module.schema().clone()),
-                spec: spec.clone(),
-                file,
-                count: 0,
-                job: None,
-            });
+            watched.extend(Watched::new(scenario, spec, Part::Module, &module));
+            if let Some(name) = law_of(spec) {
+                let search = SearchPath::standard(&run.module_paths, &scenario.folder);
+                let plain = |e: LoadError| scenario::InputError::plain(e.to_string(), None);
+                let path = law::locate(name, &search, &scenario.folder).map_err(plain)?;
+                let module = LoadedModule::load(&path).map_err(plain)?;
+                watched.extend(Watched::new(scenario, spec, Part::Law, &module));
+            }
         }
         let (scenario, run) = (scenario.clone(), run.clone());
         Ok(Self { scenario, options, run, watched, next_look: Instant::now(), folder })
@@ -122,7 +179,7 @@ impl Reloader {
     fn between_steps(&mut self, testbed: &mut Testbed) {
         let is_due = |w: &Watched| {
             let step = testbed.step_index();
-            self.options.at_steps.iter().any(|(name, at)| *name == w.spec.name && *at == step)
+            self.options.at_steps.iter().any(|(name, at)| *name == w.name() && *at == step)
         };
         let due: Vec<usize> = (0..self.watched.len()).filter(|k| is_due(&self.watched[*k])).collect();
         for k in due {
@@ -151,7 +208,7 @@ impl Reloader {
             if w.job.is_some() {
                 continue;
             }
-            let now = [Stamp::of(&w.file), Stamp::of_sources(&w.spec, &self.scenario.folder)];
+            let now = w.now(&self.scenario);
             let builds = now[1] != w.seen[1];
             if now == w.seen || !builds && now[0].is_missing() {
                 continue;
@@ -170,18 +227,25 @@ impl Reloader {
         let w = &self.watched[k];
         Preparation {
             folder: self.scenario.folder.clone(),
-            command: w.spec.build.clone().filter(|_| builds),
+            command: w.command().cloned().filter(|_| builds),
             build: Arc::default(),
             file: w.file.clone(),
             hash: w.hash,
-            copy: self.folder.path().join(format!("{}-{}", w.spec.name, w.count + 1)),
+            copy: self.folder.path().join(format!("{}-{}", w.name(), w.count + 1)),
             program: self.options.program.clone(),
             sets: self.parameters(w),
         }
     }
 
-    /// The parameters of the subsystem for the tests; paths as the tests find them.
+    /// The parameters of the subsystem for the tests; paths as the tests find them. Of a law its numbers.
     fn parameters(&self, w: &Watched) -> Vec<(String, String)> {
+        let soil = self.watched.iter().find(|m| m.part == Part::Module && m.spec.name == w.spec.name);
+        if let (Part::Law, Some(soil)) = (w.part, soil) {
+            let config = scenario::check_parameters(&soil.schema, &w.spec, &self.scenario.source);
+            let numbers = config.ok().and_then(|config| law::numbers(&w.schema, &config).ok());
+            let names = w.schema.parameters.iter().map(|p| p.name.clone());
+            return names.zip(numbers.into_iter().flatten().map(|x| x.to_string())).collect();
+        }
         let config = scenario::check_parameters(&w.schema, &w.spec, &self.scenario.source);
         let text = config.map(|c| c.to_json()).unwrap_or_default();
         let Ok(serde_json::Value::Object(map)) = serde_json::from_str(&text) else { return Vec::new() };
@@ -205,7 +269,7 @@ impl Reloader {
         ready: std::result::Result<Option<Candidate>, String>,
         testbed: &mut Testbed,
     ) {
-        let name = self.watched[k].spec.name.clone();
+        let name = self.watched[k].name();
         // What a build command has written is known now.
         self.watched[k].seen[0] = Stamp::of(&self.watched[k].file);
         let done = match ready {
@@ -230,24 +294,47 @@ impl Reloader {
         testbed: &mut Testbed,
     ) -> std::result::Result<String, String> {
         let w = &self.watched[k];
-        let module = LoadedModule::load(&new.path).map_err(|e| e.to_string())?;
+        // The other part of the subsystem stays what it is.
+        let used = |part: Part| {
+            let other = self.watched.iter().find(|o| o.spec.name == w.spec.name && o.part == part);
+            if w.part == part { Some(&new.path) } else { other.map(|o| &o.used) }
+        };
+        let path = used(Part::Module).ok_or("its module is not from a file")?;
+        let module = LoadedModule::load(path).map_err(|e| e.to_string())?;
         let config = scenario::check_parameters(module.schema(), &w.spec, &self.scenario.source)
             .map_err(|e| e.to_string())?;
+        let config = match used(Part::Law) {
+            None => config,
+            Some(path) => {
+                let search = SearchPath::only(Vec::new());
+                let config = config.with(law::KEY, path.to_string_lossy().as_ref());
+                let done = crate::testbed::with_law(config, &search, &self.scenario, &w.spec);
+                done.map_err(|e| e.to_string())?
+            }
+        };
+        let schema = match w.part {
+            Part::Module => Arc::new(module.schema().clone()),
+            Part::Law => {
+                let law = LoadedModule::load(&new.path).map_err(|e| e.to_string())?;
+                Arc::new(law.schema().clone())
+            }
+        };
         let ground = module.schema().kind == Kind::Soil;
         let services = crate::testbed::services(&self.scenario, &self.run, ground);
         let services = services.map_err(|e| e.to_string())?;
         let services = HostServices { partings: testbed.partings(), ..services };
-        let schema = Arc::new(module.schema().clone());
         let made = crate::testbed::make(&self.scenario, &w.spec, module, config, &services);
         let made = made.map_err(|e| e.to_string())?;
-        let carried = testbed.exchange(made, self.options.reset, w.count + 1)?;
+        let earlier: u64 = self.watched.iter().filter(|o| o.spec.name == w.spec.name).map(|o| o.count).sum();
+        let carried = testbed.exchange(made, self.options.reset, earlier + 1)?;
         let state = match carried {
             Some(bytes) => format!("state of {bytes} bytes carried over"),
             None => "started afresh".into(),
         };
-        let told = format!("reload {}: {:016x} to {:016x}, {state}", w.spec.name, w.hash, new.hash);
+        let told = format!("reload {}: {:016x} to {:016x}, {state}", w.name(), w.hash, new.hash);
         let w = &mut self.watched[k];
         (w.hash, w.schema, w.count) = (new.hash, schema, w.count + 1);
+        w.used.clone_from(&new.path);
         Ok(told)
     }
 }
@@ -263,6 +350,6 @@ impl Drop for Reloader {
 }
 
 /// FNV-1a (64 bit): tells two builds apart.
-fn fingerprint(bytes: &[u8]) -> u64 {
+pub(crate) fn fingerprint(bytes: &[u8]) -> u64 {
     bytes.iter().fold(0xcbf2_9ce4_8422_2325, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0100_0000_01b3))
 }

@@ -137,7 +137,8 @@ const LAW: File =
 fn source(kind: Kind, language: Language) -> Option<File> {
     Some(match (kind, language) {
         (Kind::Law, Language::Scenario) => LAW,
-        (_, Language::Scenario) | (Kind::Law, Language::Python) => return None,
+        (_, Language::Scenario) => return None,
+        (Kind::Law, Language::Python) => ("my_module.py", "the law", include_str!("templates/law.py.in")),
         (Kind::Law, Language::Rust) => ("src/lib.rs", "the law", include_str!("templates/law.rs.in")),
         (Kind::Law, Language::C) => ("my_module.c", "the law", include_str!("templates/law.c.in")),
         (Kind::Law, Language::Cpp) => ("my_module.cpp", "the law", include_str!("templates/law.cpp.in")),

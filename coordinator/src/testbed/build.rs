@@ -10,6 +10,7 @@ use crate::host::isolation::{self, What};
 use crate::host::law;
 use crate::host::{
     HostServices, Instance, Library, LoadError, LoadedModule, Progress, SearchPath, Workers, interpreter,
+    is_python,
 };
 use crate::scenario::{self, GlueSpec, GluingSpec, InputError, Scenario, SubsystemSpec};
 use crate::signals::{self, Directory, TimeLine};
@@ -130,7 +131,10 @@ pub(crate) fn make(
     let module = module.run_by(interpreter(spec.python.as_deref(), &scenario.folder));
     let made = match spec.isolate || module.is_python() {
         true => module.instantiate_isolated(&spec.name, config, services, spec.isolation),
-        false => module.instantiate(&spec.name, config, services),
+        false => {
+            let services = HostServices { isolation: spec.isolation, ..services.clone() };
+            module.instantiate(&spec.name, config, &services)
+        }
     };
     made.map_err(|e| module_error(scenario, spec, &e).into())
 }
@@ -165,7 +169,7 @@ fn instantiate(
 }
 
 /// The same parameters with the file of the law that they name.
-fn with_law(
+pub(crate) fn with_law(
     config: Config,
     search: &SearchPath,
     scenario: &Scenario,
@@ -177,7 +181,14 @@ fn with_law(
         scenario.source.error_at_value(&[&spec.name, "law", "plugin"], e.to_string(), help)
     })?;
     let path = std::path::absolute(&path).unwrap_or(path);
-    Ok(config.with(law::KEY, path.to_string_lossy().as_ref()))
+    let config = config.with(law::KEY, path.to_string_lossy().as_ref());
+    Ok(match spec.python.as_deref().filter(|_| is_python(&path)) {
+        None => config,
+        Some(python) => {
+            let python = interpreter(Some(python), &scenario.folder);
+            config.with(law::INTERPRETER, python.to_string_lossy().as_ref())
+        }
+    })
 }
 
 /// A functional mock-up unit as an instance.

@@ -4,6 +4,7 @@ use super::Testbed;
 use crate::Error;
 use crate::host::{Instance, Partings};
 use crate::observer::Happening;
+use crate::signals::Directory;
 use terraglue_subsystem::{
     Action, BodyState, Capabilities, Energy, Estimate, FieldInfo, FieldTile, Input, Kind, Law, Level, Motion,
     Response, Scene, Step, Subsystem, Values, ValuesMut, Variable,
@@ -59,6 +60,8 @@ impl Testbed {
         new.body_states(&mut states).map_err(told)?;
         self.members[slot].states = states;
         self.instances[slot] = new;
+        // New variables can be read and set from now on.
+        self.directory = Directory::new(&self.instances);
         Ok(carried)
     }
 }
@@ -79,11 +82,12 @@ fn misfit(old: &Instance, new: &Instance) -> Option<String> {
             == (b.id, &b.name, b.value_type, b.causality, &b.dims)
     };
     let (a, b) = (old.variables(), new.variables());
-    if let Some(k) = (0..a.len().max(b.len()))
-        .find(|k| !matches!((a.get(*k), b.get(*k)), (Some(a), Some(b)) if same(a, b)))
-    {
-        let name = b.get(k).or(a.get(k)).map_or("", |v| &v.name);
-        return Some(format!("its variables changed, at `{name}`; start the run again"));
+    if let Some(k) = (0..a.len()).find(|k| !b.get(*k).is_some_and(|b| same(&a[*k], b))) {
+        let name = &a[k].name;
+        return Some(format!(
+            "its variables changed: `{name}` is recorded and read by its place and number, which other code has to keep; \
+             new variables stand behind all others; start the run again"
+        ));
     }
     if old.scene() != new.scene() {
         return Some("its bodies or shapes changed; start the run again".into());

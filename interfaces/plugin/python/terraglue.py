@@ -118,6 +118,31 @@ class Estimate:
     __slots__ = ("t_star", "x_free", "g", "active", "unique")
 
 
+class PressureNodes:
+    """Nodes below a contact of size b (m) in a step of h (s): depth (m); for a law with STATE_DOUBLES also permanent, the
+    depth of the unloaded surface (m), slip (m) and the committed state, node after node."""
+
+    __slots__ = ("b", "h", "depth", "permanent", "slip", "state")
+
+
+class PressureAnswer:
+    """To be filled by a law: pressure (Pa), slope (Pa/m), with STATE_DOUBLES also permanent and state; longest step (s)."""
+
+    __slots__ = ("pressure", "slope", "permanent", "state", "longest")
+
+
+class ShearNodes:
+    """Nodes that slide in a step of h (s): pressure (Pa), slip (m) since the contact began, the committed state."""
+
+    __slots__ = ("h", "pressure", "slip", "state")
+
+
+class ShearAnswer:
+    """To be filled by a law: largest stress (Pa) and its derivatives by_pressure and by_slip (Pa/m); longest step (s)."""
+
+    __slots__ = ("stress", "by_pressure", "by_slip", "longest")
+
+
 class Variable:
     """A named, typed value with a unit. `get` and `set` reach it as `state[name]`, else as an attribute of that name with
     its dots as underscores."""

@@ -9,13 +9,16 @@ import struct
 import sys
 import threading
 import traceback
+import types
 import zlib
 
-from terraglue import (BOOL, ENUMERATION, INFO, NEEDS_RESET, READ_ONLY, STRING, U32, WARNING, Discard, Estimate, Force, Host,
-                       Impedance, Law, Motion, Node, Port, Refused, Response, Step, Subsystem, Terrain, Unsupported)
+from terraglue import (BOOL, ENUMERATION, INFINITY, INFO, NEEDS_RESET, READ_ONLY, STRING, U32, WARNING, Discard, Estimate, Force,
+                       Host, Impedance, Law, Motion, Node, Port, PressureAnswer, PressureNodes, Refused, Response, ShearAnswer,
+                       ShearNodes, Step, Subsystem, Terrain, Unsupported)
 from terraglue_wire import AREA, BODY, END, LAW, NODE, OUTCOME, PORT, START, STEP, Call, Reply, Segment
 
 _STATE, _SERIALIZE = 128, 256
+ONE, TWO = struct.Struct("<d"), struct.Struct("<2d")
 _HEAD = b"terraglue python state 1\n"
 
 
@@ -97,7 +100,7 @@ class Worker:
     """Makes one instance and answers its calls."""
 
     NAMES = ("", "start", "set_ports", "estimate", "solve", "advance", "jacobian", "commit", "save", "restore", "serialize",
-             "deserialize", "get", "set", "act", "next_event", "body_states", "energy", "quit")
+             "deserialize", "get", "set", "act", "next_event", "body_states", "energy", "pressure", "shear", "quit")
 
     def __init__(self):
         self.unit, self.lines, self.slots, self.begun = None, [], {}, False
@@ -168,8 +171,10 @@ class Worker:
             size = call.take(struct.Struct("<2I"))
             terrain = Terrain(origin, spacing, size, array.array("d", call.doubles()))
         _confine(start["memory_bytes"])
+        if "Law" in start["what"]:
+            return self._start_law(start["what"]["Law"], reply)
         what = start["what"]["Python"]
-        cls = _load(what["path"])
+        cls = _subsystem(what["path"])
         self.host = Host(start, terrain, self.lines)
         unit = cls(self.host, what["config"])
         self.unit, self.fields = unit, list(unit.fields)
@@ -178,6 +183,35 @@ class Worker:
         can = unit.can | (_STATE | _SERIALIZE if unit.state is not None else 0)
         reply.u32(can)
         self._describe(reply)
+
+    def _start_law(self, what, reply):
+        module = _load(what["path"])
+        self.numbers = types.SimpleNamespace(**what["numbers"])
+        self.pressure, self.shear = [getattr(module, name, None) for name in ("pressure", "shear")]
+        if not (callable(self.pressure) or callable(self.shear)):
+            raise Refused(f"{what['path']} must hold a function pressure(law, nodes, out), shear(law, nodes, out) or both")
+        reply.u32(int(getattr(module, "STATE_DOUBLES", 0)))
+        reply.u8(callable(self.pressure))
+        reply.u8(callable(self.shear))
+
+    def _pressure(self, call, reply):
+        nodes, out = PressureNodes(), PressureAnswer()
+        nodes.b, nodes.h = call.take(TWO)
+        nodes.depth, nodes.permanent, nodes.slip, nodes.state = [call.doubles() for _ in range(4)]
+        n, kept = len(nodes.depth), len(nodes.permanent)
+        out.pressure, out.slope, out.permanent, out.state = [reply.doubles(k) for k in (n, n, kept, len(nodes.state))]
+        out.longest = INFINITY
+        self.pressure(self.numbers, nodes, out)
+        reply.put(ONE, out.longest)
+
+    def _shear(self, call, reply):
+        nodes, out = ShearNodes(), ShearAnswer()
+        nodes.h, = call.take(ONE)
+        nodes.pressure, nodes.slip, nodes.state = [call.doubles() for _ in range(3)]
+        out.stress, out.by_pressure, out.by_slip = [reply.doubles(len(nodes.pressure)) for _ in range(3)]
+        out.longest = INFINITY
+        self.shear(self.numbers, nodes, out)
+        reply.put(ONE, out.longest)
 
     def _describe(self, reply):
         unit = self.unit
@@ -436,8 +470,7 @@ class _Print:
 
 
 def _load(path):
-    """The class of a module. The file is read afresh, and no compiled copy is left beside it."""
-    import types
+    """The file as a module. It is read afresh, and no compiled copy is left beside it."""
     sys.path.insert(1, os.path.dirname(path))
     with open(path, encoding="utf-8") as file:
         text = file.read()
@@ -445,6 +478,12 @@ def _load(path):
     module.__file__ = path
     sys.modules[module.__name__] = module
     exec(compile(text, path, "exec"), module.__dict__)
+    return module
+
+
+def _subsystem(path):
+    """The class of a module."""
+    module = _load(path)
     found = [c for c in vars(module).values()
              if isinstance(c, type) and issubclass(c, Subsystem) and c.__module__ == module.__name__]
     if len(found) != 1:

@@ -39,14 +39,34 @@ unsafe extern "C" fn pressure<L: LawModule>(
     nodes: *const TgPressureNodes,
     out: *mut TgPressureAnswer,
 ) -> TgStatus {
+    // SAFETY: by the contract of the table.
+    unsafe { pressed(nodes, out, L::STATE_DOUBLES, L::pressure) }
+}
+
+unsafe extern "C" fn shear<L: LawModule>(nodes: *const TgShearNodes, out: *mut TgShearAnswer) -> TgStatus {
+    // SAFETY: by the contract of the table.
+    unsafe { sheared(nodes, out, L::STATE_DOUBLES, L::shear) }
+}
+
+/// A pressure function of C around one in Rust; a panic is a status.
+///
+/// # Safety
+/// The pointers are null or as the header says, for a law that keeps `doubles` per node.
+#[inline]
+pub(crate) unsafe fn pressed(
+    nodes: *const TgPressureNodes,
+    out: *mut TgPressureAnswer,
+    doubles: usize,
+    law: impl FnOnce(&[f64], &PressureNodes, &mut PressureAnswer) -> Result,
+) -> TgStatus {
     if nodes.is_null() || out.is_null() {
         return TG_ERROR;
     }
     // SAFETY: not null; the host passes arrays of the lengths that the header names, for this call.
     unsafe {
         let (raw, answer) = (&*nodes, &mut *out);
-        let (n, states) = (raw.n, raw.n * L::STATE_DOUBLES);
-        let kept = if L::STATE_DOUBLES > 0 { n } else { 0 };
+        let (n, states) = (raw.n, raw.n * doubles);
+        let kept = if doubles > 0 { n } else { 0 };
         let nodes = PressureNodes {
             b: raw.b,
             h: raw.h,
@@ -63,7 +83,7 @@ unsafe extern "C" fn pressure<L: LawModule>(
             longest_s: answer.longest,
         };
         let parameters = slice(raw.parameters, raw.n_parameters);
-        let done = catch_unwind(AssertUnwindSafe(|| L::pressure(parameters, &nodes, &mut into)));
+        let done = catch_unwind(AssertUnwindSafe(|| law(parameters, &nodes, &mut into)));
         let mut longest = into.longest_s;
         let done = status(done, raw.h, &mut longest);
         answer.longest = longest;
@@ -71,11 +91,21 @@ unsafe extern "C" fn pressure<L: LawModule>(
     }
 }
 
-unsafe extern "C" fn shear<L: LawModule>(nodes: *const TgShearNodes, out: *mut TgShearAnswer) -> TgStatus {
+/// A shear function of C around one in Rust.
+///
+/// # Safety
+/// As [`pressed`].
+#[inline]
+pub(crate) unsafe fn sheared(
+    nodes: *const TgShearNodes,
+    out: *mut TgShearAnswer,
+    doubles: usize,
+    law: impl FnOnce(&[f64], &ShearNodes, &mut ShearAnswer) -> Result,
+) -> TgStatus {
     if nodes.is_null() || out.is_null() {
         return TG_ERROR;
     }
-    // SAFETY: as in `pressure`.
+    // SAFETY: as in `pressed`.
     unsafe {
         let (raw, answer) = (&*nodes, &mut *out);
         let n = raw.n;
@@ -83,7 +113,7 @@ unsafe extern "C" fn shear<L: LawModule>(nodes: *const TgShearNodes, out: *mut T
             h: raw.h,
             pressure: slice(raw.pressure, n),
             slip: slice(raw.slip, n),
-            state: slice(raw.state, n * L::STATE_DOUBLES),
+            state: slice(raw.state, n * doubles),
         };
         let mut into = ShearAnswer {
             stress: slice_mut(answer.stress, n),
@@ -92,7 +122,7 @@ unsafe extern "C" fn shear<L: LawModule>(nodes: *const TgShearNodes, out: *mut T
             longest_s: answer.longest,
         };
         let parameters = slice(raw.parameters, raw.n_parameters);
-        let done = catch_unwind(AssertUnwindSafe(|| L::shear(parameters, &nodes, &mut into)));
+        let done = catch_unwind(AssertUnwindSafe(|| law(parameters, &nodes, &mut into)));
         let mut longest = into.longest_s;
         let done = status(done, raw.h, &mut longest);
         answer.longest = longest;

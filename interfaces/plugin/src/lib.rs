@@ -16,6 +16,7 @@ pub mod abi;
 mod convert;
 mod export;
 mod foreign;
+mod hosted_law;
 mod law;
 mod text;
 

@@ -1,5 +1,6 @@
 //! Wrench and stiffness of a patch at a motion of its foot.
 
+use crate::bound::Bound;
 use crate::patch::{Facing, Patches};
 use terraglue_soil_law::ShearResponse;
 
@@ -20,16 +21,20 @@ impl Patches {
     pub fn at_rest(&self, p: usize) -> ([f64; 6], f64) {
         let (mut sum, mut strength) = ([0.0; 6], 0.0);
         let n = &self.nodes;
+        let mut bound = Bound::new(n.doubles);
         self.each_answer(p, &[0.0; 6], |k, pressure, _, r| {
             add_force(&mut sum, n.arm[k], self.node_force(k, pressure, r.stress));
             let inclined = n.area[k] * n.facing[k].stretch;
             let shear = &self.law(k).shear;
             // soil that clings under tension holds nothing along the underside
-            let pressed = pressure.max(0.0);
-            strength +=
-                inclined * shear.yield_stress_kept(pressed, n.shear[k].slip, n.mobilised[k], n.kept(k));
+            let (pressed, slip) = (pressure.max(0.0), n.shear[k].slip);
+            if shear.is_batched() {
+                strength += bound.add(&self.laws, n.law[k], inclined, [pressed, slip], n.kept(k));
+            } else {
+                strength += inclined * shear.yield_stress_kept(pressed, slip, n.mobilised[k], n.kept(k));
+            }
         });
-        (sum, strength)
+        (sum, strength + bound.take(&self.laws))
     }
 
     /// Force of a node on the body along n, t1, t2 under a pressure and a shear stress.

@@ -12,6 +12,7 @@
 
 mod assemble;
 mod bookkeeping;
+mod bound;
 mod chunk;
 mod contacts;
 mod ground;

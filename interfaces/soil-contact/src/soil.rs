@@ -196,6 +196,9 @@ fn length(v: [f64; 3]) -> f64 {
     v.iter().map(|c| c * c).sum::<f64>().sqrt()
 }
 
+/// Size of a contact for which a law is looked at before there is any, m.
+const TYPICAL_SIZE: f64 = 0.1;
+
 /// The laws of the scenario's own soil and of those of the mask.
 fn all_laws(
     own: &SoilParameters,
@@ -218,6 +221,11 @@ fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>, plugin: Option<&
     };
     if let Some(texts) = texts {
         if let Some(law) = texts.pressure(p)? {
+            if p.rolling.sinkage != SlipSinkage::None && law.at_size(TYPICAL_SIZE).power_law().is_none() {
+                let text =
+                    "`slip_sinkage` acts on power laws, and `law.pressure` is none; it must be \"none\" here";
+                return Err(Error::Refused(text.into()));
+            }
             laws.pressure = PressureLaw::Expression(law);
         }
         if let Some(law) = texts.shear(p)? {
@@ -229,7 +237,7 @@ fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>, plugin: Option<&
         if law.has_pressure() {
             laws.pressure = PressureLaw::Plugin(law.clone());
             // as the built-in laws are looked at: one that says nothing sensible here never will
-            laws.pressure.curve(0.1, p.elastic_stiffness_pa_m);
+            laws.pressure.curve(TYPICAL_SIZE, p.elastic_stiffness_pa_m);
         }
         if law.has_shear() {
             laws.shear = laws.shear.with_plugin(law.clone());

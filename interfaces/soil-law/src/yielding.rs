@@ -216,6 +216,18 @@ impl ShearLaw {
         slipping.take_all(|node, by_p, by_j| out[node.k] = self.slipped(node, by_p, by_j));
     }
 
+    /// [`ShearLaw::yield_stress_kept`] of nodes of an expression or a module, many at once.
+    pub fn yield_stresses(&self, pressure: &[f64], slip: &[f64], kept: &[f64], out: &mut [f64]) {
+        let doubles = kept.len() / pressure.len().max(1);
+        for (k, part) in out.chunks_mut(CHUNK).enumerate() {
+            let at = k * CHUNK..k * CHUNK + part.len();
+            let [mut by_p, mut by_j] = [[0.0; CHUNK]; 2];
+            let kept = &kept[at.start * doubles..at.end * doubles];
+            let n = part.len();
+            self.strengths(&pressure[at.clone()], &slip[at], kept, [part, &mut by_p[..n], &mut by_j[..n]]);
+        }
+    }
+
     /// Yield stresses of nodes and their derivatives by pressure and slip.
     fn strengths(&self, pressure: &[f64], slip: &[f64], kept: &[f64], out: [&mut [f64]; 3]) {
         let [y, by_p, by_j] = out;

@@ -72,7 +72,7 @@ impl LawBench {
     pub fn open(lab: &Lab) -> Verdict<Self> {
         let module = lab.own_module()?;
         let config = lab.config(module.schema()).with_defaults(module.schema());
-        let law = open(&module, &config)
+        let law = open(&module, &config, "checked", &lab.services())
             .map_err(|why| Stop::fail("loading", "numbers of the check", why, "a law that can be called"))?;
         Ok(Self { law, schema: module.schema().clone(), config })
     }

@@ -26,7 +26,7 @@ macro_rules! calls {
 
 calls! {
     Start, SetPorts, Estimate, Solve, Advance, Jacobian, Commit, Save, Restore, Serialize, Deserialize, Get, Set, Act,
-    NextEvent, BodyStates, Energy, Quit,
+    NextEvent, BodyStates, Energy, Pressure, Shear, Quit,
 }
 
 impl Call {

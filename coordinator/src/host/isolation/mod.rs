@@ -7,6 +7,7 @@
 
 mod calls;
 mod channel;
+mod law;
 mod proxy;
 mod python;
 mod tiles;
@@ -19,6 +20,7 @@ pub use worker::serve;
 
 use super::{HostServices, Partings};
 use channel::Segment;
+use law::IsolatedLaw;
 use proxy::Isolated;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -27,7 +29,7 @@ use std::process::{Child, Command, ExitStatus, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use terraglue_subsystem::{Error, Host, LogLevel, Result, Subsystem};
+use terraglue_subsystem::{Error, Host, LogLevel, NodeLaw, Result, Subsystem};
 
 /// How an instance is kept apart.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -72,6 +74,15 @@ pub(crate) enum What {
         /// Interpreter.
         python: PathBuf,
     },
+    /// A law in Python with its numbers.
+    Law {
+        /// File.
+        path: PathBuf,
+        /// By name.
+        numbers: serde_json::Map<String, Value>,
+        /// Interpreter.
+        python: PathBuf,
+    },
 }
 
 /// All that a worker is told at the start, beside the terrain.
@@ -97,6 +108,30 @@ pub(crate) fn start(
     services: &HostServices,
     isolation: Isolation,
 ) -> Result<Box<dyn Subsystem>> {
+    let (link, start) = linked(what, host, services, isolation)?;
+    Ok(Box::new(Isolated::start(link, &start, host.terrain())?))
+}
+
+/// Opens a law in Python in a worker of its own.
+///
+/// # Errors
+/// As [`start`].
+pub(crate) fn start_law(
+    name: &str,
+    what: What,
+    host: &Arc<dyn Host>,
+    services: &HostServices,
+) -> Result<Arc<dyn NodeLaw>> {
+    let (link, start) = linked(what, host, services, services.isolation)?;
+    Ok(Arc::new(IsolatedLaw::start(name, link, &start)?))
+}
+
+fn linked(
+    what: What,
+    host: &Arc<dyn Host>,
+    services: &HostServices,
+    isolation: Isolation,
+) -> Result<(Link, Start)> {
     let link = Link::new(&what, host.clone(), services, isolation)?;
     let start = Start {
         what,
@@ -108,7 +143,7 @@ pub(crate) fn start(
         gravity: host.gravity(),
         memory_bytes: isolation.memory_bytes,
     };
-    Ok(Box::new(Isolated::start(link, &start, host.terrain())?))
+    Ok((link, start))
 }
 
 /// How often a waiting host looks whether the worker still lives.
@@ -151,7 +186,9 @@ impl Link {
         };
         command.env("TMPDIR", folder.path()).stdout(Stdio::null()).process_group(0);
         let child = command.spawn().map_err(|e| match what {
-            What::Python { python, .. } => Error::Refused(python::not_started(python, &e)),
+            What::Python { python, .. } | What::Law { python, .. } => {
+                Error::Refused(python::not_started(python, &e))
+            }
             _ => failed(&command.get_program().to_string_lossy(), &e),
         })?;
         let (cancel, partings) = (services.cancel.clone(), services.partings.clone());

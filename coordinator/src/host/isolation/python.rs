@@ -26,7 +26,7 @@ const DIARY: &str = "stderr.txt";
 
 /// The command that serves the segment; None: this is no module in Python.
 pub fn command(what: &What, folder: &Path, segment: &str) -> io::Result<Option<Command>> {
-    let What::Python { python, .. } = what else { return Ok(None) };
+    let (What::Python { python, .. } | What::Law { python, .. }) = what else { return Ok(None) };
     for (name, text) in FILES {
         std::fs::write(folder.join(name), text)?;
     }

@@ -6,7 +6,7 @@ use super::proxy::About;
 use super::tiles::Tiles;
 use super::wire::{Reader, Writer};
 use super::{Line, Start, What};
-use crate::host::{LoadedModule, Partings, Workers};
+use crate::host::{HostServices, LoadedModule, Partings, Workers};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::process::ExitCode;
@@ -57,7 +57,7 @@ pub fn serve(path: &Path) -> ExitCode {
 #[derive(Default)]
 struct Log {
     lines: Mutex<Vec<Line>>,
-    cancel: AtomicBool,
+    cancel: Arc<AtomicBool>,
 }
 
 /// Most lines between two answers.
@@ -167,13 +167,24 @@ impl Worker {
             What::Module { path, config } => {
                 let module = LoadedModule::load(&path).map_err(|e| Error::Refused(e.to_string()))?;
                 let config = Config::parse(&config.to_string())?;
-                module.make(&config, host)?
+                module.make(&config, host, &self.services(&start.folder))?
             }
-            What::Python { path, .. } => {
+            What::Python { path, .. } | What::Law { path, .. } => {
                 return Err(Error::Refused(format!("{} is served by an interpreter", path.display())));
             }
         });
         Ok(())
+    }
+
+    /// What a process beside the instance is offered.
+    fn services(&self, folder: &str) -> HostServices {
+        let log = self.log.clone();
+        HostServices {
+            cancel: self.log.cancel.clone(),
+            log: Some(Arc::new(move |_, level, text| log.put(level, text))),
+            partings: self.partings.clone(),
+            ..HostServices::new(0, Path::new(folder))
+        }
     }
 
     /// Does a call on the instance; what it answers goes into `body`.
@@ -257,7 +268,7 @@ impl Worker {
                 out.write(|w| w.put(&states))
             }
             Call::Energy => out.write(|w| w.put(&unit.energy())),
-            Call::Start | Call::Quit => Err(garbled()),
+            Call::Start | Call::Quit | Call::Pressure | Call::Shear => Err(garbled()),
         }
     }
 }

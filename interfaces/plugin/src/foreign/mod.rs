@@ -170,7 +170,7 @@ impl ForeignModule {
         let status = unsafe { instantiate(services.table(), config.as_ptr(), &raw mut instance) };
         services.close_terrain();
         if status != TG_OK {
-            return Err(convert::error(status, self.failure(), f64::NAN));
+            return Err(convert::error(status, services.said(self.failure()), f64::NAN));
         }
         if instance.is_null() {
             return Err(Error::Fatal("answered TG_OK but made no instance".into()));

@@ -2,6 +2,7 @@
 
 use crate::abi::*;
 use crate::convert;
+use crate::hosted_law::HostedLaw;
 use crate::law::TableLaw;
 use crate::text::{borrowed, c_string, panic_text, slice_mut};
 use std::ffi::{CString, c_char, c_void};
@@ -18,6 +19,7 @@ pub(super) struct Services {
     _folder: CString,
     terrain: TgTerrain,
     _law: Option<Arc<dyn NodeLaw>>,
+    hosted_law: Option<HostedLaw>,
     open_law: Option<TgOpenLaw>,
     table: TgHost,
 }
@@ -52,7 +54,9 @@ impl Services {
             law: std::ptr::null(),
         };
         let law = host.law();
-        let open_law = law.as_ref().and_then(|law| law.as_any().downcast_ref()).map(TableLaw::open);
+        let own = law.as_ref().and_then(|law| law.as_any().downcast_ref()).map(TableLaw::open);
+        let hosted_law = law.clone().filter(|_| own.is_none()).and_then(HostedLaw::new);
+        let open_law = own.or_else(|| hosted_law.as_ref().map(HostedLaw::open));
         let has_terrain = host.terrain().is_some();
         let terrain_open = AtomicBool::new(true);
         let mut this = Box::new(Self {
@@ -62,6 +66,7 @@ impl Services {
             _folder: folder,
             terrain,
             _law: law,
+            hosted_law,
             open_law,
             table,
         });
@@ -77,6 +82,11 @@ impl Services {
 
     pub(super) fn table(&self) -> *const TgHost {
         &raw const self.table
+    }
+
+    /// What a law of the host has said since this was asked last; `text`, the module's own words, where it said nothing.
+    pub(super) fn said(&self, text: String) -> String {
+        self.hosted_law.as_ref().and_then(HostedLaw::words).unwrap_or(text)
     }
 
     /// After `instantiate` the terrain answers with an error.

@@ -18,8 +18,6 @@ pub struct ForeignSubsystem {
     capabilities: Capabilities,
     descriptions: Descriptions,
     pub(super) scratch: RefCell<Vec<TgBytes>>,
-    // Dropped after `raw`: the module may call its services until it is freed.
-    _services: Box<Services>,
 }
 
 // SAFETY: the ABI asks for calls from one thread at a time, not always the same; `&self` is not shared
@@ -30,6 +28,8 @@ unsafe impl Send for ForeignSubsystem {}
 pub(super) struct Raw {
     pub(super) table: TgSubsystem,
     pub(super) instance: *mut c_void,
+    // Outlives the instance, which may call its services until it is freed.
+    services: Box<Services>,
 }
 
 impl Drop for Raw {
@@ -57,7 +57,7 @@ impl Raw {
             Some(Err(error)) => error.to_string(),
             _ => "no reason given".to_owned(),
         };
-        convert::error(status, text, reached)
+        convert::error(status, self.services.said(text), reached)
     }
 }
 
@@ -130,13 +130,13 @@ impl ForeignSubsystem {
     }
 
     pub(super) fn new(table: TgSubsystem, instance: *mut c_void, services: Box<Services>) -> Result<Self> {
-        let raw = Raw { table, instance };
+        let raw = Raw { table, instance, services };
         let descriptions = Descriptions::of(&raw)?;
         // SAFETY: a required function with the live instance.
         let bits = table.capabilities.map_or(0, |f| unsafe { f(instance) });
         let capabilities = Capabilities(bits);
         check_capabilities(capabilities, &table)?;
-        Ok(Self { raw, capabilities, descriptions, scratch: RefCell::default(), _services: services })
+        Ok(Self { raw, capabilities, descriptions, scratch: RefCell::default() })
     }
 
     /// Runs a call that answers with a response.

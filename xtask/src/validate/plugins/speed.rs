@@ -57,7 +57,8 @@ pub fn figures(context: &Context, out: &mut Vec<Figure>) -> Outcome {
 
 fn plugin(path: &Path, config: &Config) -> Outcome<PluginLaw> {
     let module = LoadedModule::load(path).map_err(|e| e.to_string())?;
-    Ok(PluginLaw::new(law::open(&module, config)?))
+    let services = HostServices::new(1, Path::new("."));
+    Ok(PluginLaw::new(law::open(&module, config, "law", &services)?))
 }
 
 /// The law in C, by the system's compiler.

@@ -10,7 +10,7 @@ use crate::gluing::step_control::StepControl;
 use crate::gluing::{self, Instant, Outcome, StepReport};
 use crate::host::{Instance, Partings, Progress, Reply};
 use crate::observer::{Happening, Observer, SubsystemView, View};
-use crate::signals::{Directory, Links, TimeLine};
+use crate::signals::{Directory, Faults, Links, TimeLine};
 use crate::timing::{Part, Timings};
 use crate::{Error, Result};
 use serde_json::Value;
@@ -22,12 +22,14 @@ use terraglue_subsystem::{BodyState, Energy};
 use unglued::Unglued;
 
 mod build;
+mod explain;
 mod group;
 mod hosted;
 mod reload;
 mod unglued;
 
 pub(crate) use build::{find, make, services, with_law};
+pub use explain::{ConnectionNote, Explanation};
 use group::Group;
 
 /// What a run needs beside its scenario.
@@ -63,6 +65,9 @@ pub struct Testbed {
     detector: ContactDetector,
     links: Links,
     time_line: TimeLine,
+    faults: Faults,
+    /// Whether steps may be cut so that one ends at the time of an event.
+    exact: bool,
     directory: Directory,
     happenings: Vec<Happening>,
     /// How the last nominal step was glued, all groups and parts.
@@ -183,7 +188,7 @@ impl Testbed {
 
     /// Length of the next communication step: as long as is left, unless halving or the control asks for less.
     fn next_length(&mut self, longest: f64, end: f64) -> Result<f64> {
-        let left = end - self.t;
+        let left = self.next_stop(end) - self.t;
         let Some(mut control) = self.control else { return Ok(longest.min(left)) };
         if let Some(residual) = self.energy_residual(control.h)? {
             control.learn(residual, control.last_h);
@@ -194,6 +199,16 @@ impl Testbed {
         control.last_h = h;
         self.control = Some(control);
         Ok(h)
+    }
+
+    /// The end of the nominal step, or the time of an event or a fault before it.
+    fn next_stop(&self, end: f64) -> f64 {
+        if !self.exact {
+            return end;
+        }
+        let next = self.time_line.next_time(self.t).min(self.faults.next_time(self.t));
+        let apart = 1e-6 * self.step_s;
+        if next - self.t > apart && end - next > apart { next } else { end }
     }
 
     /// The energy residual of the step before, J, by the forces of all laws at t; none before the first.
@@ -253,8 +268,23 @@ impl Testbed {
         if self.index == 0 && self.t == 0.0 {
             self.settle()?;
         }
-        self.links.numbers.iter_mut().try_for_each(|l| l.transfer(&mut self.instances))?;
+        // all are read before any is set: a unit whose outputs follow its inputs at once shows nobody the inputs of t
+        self.links.numbers.iter_mut().try_for_each(|l| l.read(&self.instances).map(|_| ()))?;
+        if !self.faults.is_empty() {
+            self.apply_faults()?;
+        }
+        self.links.numbers.iter().try_for_each(|l| l.pass_on(&mut self.instances))?;
         self.links.discrete.iter().try_for_each(|l| l.transfer(&mut self.instances))
+    }
+
+    /// What is wrong with the values on their way.
+    fn apply_faults(&mut self) -> Result {
+        let (t_s, happenings) = (self.t, &mut self.happenings);
+        let links = &mut self.links.numbers;
+        self.faults.apply((t_s, self.step_s), links, &mut self.instances, |(label, begins)| {
+            let what = format!("fault {}: {label}", if begins { "begins" } else { "ends" });
+            happenings.push(Happening { t_s, what });
+        })
     }
 
     /// (3) to (5) for one step of length h; nothing is committed unless it converged.
@@ -499,6 +529,9 @@ impl Testbed {
         for (group, kept) in self.groups.iter_mut().zip(&snapshot.memory) {
             group.recall(kept);
         }
+        if let Some(kept) = snapshot.memory.get(self.groups.len()) {
+            self.faults.recall(kept);
+        }
         if let (Some(control), Some(kept)) = (&mut self.control, snapshot.memory.last()) {
             control.recall(&mut Recall(kept));
         }
@@ -508,6 +541,7 @@ impl Testbed {
     /// What each group and the control of the steps keep from step to step.
     fn memory(&self) -> Vec<Vec<u64>> {
         let mut all: Vec<Vec<u64>> = self.groups.iter().map(Group::memory).collect();
+        all.push(self.faults.remember());
         let mut last = Vec::new();
         self.control.iter().for_each(|c| c.remember(&mut last));
         all.push(last);

@@ -131,3 +131,34 @@ def test_what_does_not_fit_is_refused(made, tmp_path, second, pair, says):
     done, _ = run(made, tmp_path, second, [pair])
     assert done.returncode == 2
     assert all(word in done.stderr for word in says), done.stderr
+
+
+def test_explain_and_the_report_say_how_values_go_round(made, tmp_path):
+    (made / "circle.toml").write_text("""
+[time]
+step_s = 0.1
+duration_s = 0.4
+[a]
+fmu = "metres.fmu"
+[b]
+fmu = "feet.fmu"
+step_multiple = 2
+[[connect]]
+from = "a.y"
+to = "b.u"
+[[connect]]
+from = "b.y[1,1]"
+to = "a.u[1,1]"
+""")
+    done = terraglue("run", made / "circle.toml", "--explain", "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    lines = done.stdout.splitlines()
+    to = next(line for line in lines if "a.y[1,1] → b.u[1,1]" in line)
+    back = next(line for line in lines if "b.y[1,1] → a.u[1,1]" in line)
+    assert "3.2808" in to and "m → m × 0.3048" in to and "delay 1:" in to
+    assert "delay 1 to 2:" in back and "one step of 2" in back
+    assert any("a ⇄ b" in line for line in lines) and any("all outputs are read: a, b" in line for line in lines)
+    assert sum("µs" in line for line in lines) == 2, "the cost of each subsystem"
+    page = (tmp_path / "out" / "report.html").read_text()
+    for words in ("How values went round", "a.y[1,1]", "delay (steps)", "a ⇄ b", "per step (µs)"):
+        assert words in page

@@ -59,6 +59,8 @@ pub enum Command {
     Fmu(FmuCommand),
     /// Write a module or a scenario as a functional mock-up unit for other programs.
     Export(ExportArguments),
+    /// Write a system structure (SSP, .ssp or .ssd) as a scenario; `run` takes one as it is.
+    Convert(ConvertArguments),
     /// Serve an isolated subsystem; started by `run` itself.
     #[command(hide = true)]
     Worker {
@@ -125,6 +127,10 @@ pub struct RunCommand {
     /// As for `compare`.
     #[command(flatten)]
     pub run: RunArguments,
+    /// Say how values go round: the order of a step, every connection with its units and delay, loops; after the run what
+    /// each subsystem cost. The report shows the same.
+    #[arg(long)]
+    pub explain: bool,
     /// Watch the files of modules, and exchange their code while the run goes on.
     #[arg(long)]
     pub watch: bool,
@@ -134,6 +140,18 @@ pub struct RunCommand {
     /// Exchange this subsystem before this step, changed or not. May be repeated.
     #[arg(long, value_name = "NAME=STEP", requires = "watch", hide = true, value_parser = parse_set)]
     pub reload_at: Vec<(String, String)>,
+}
+
+/// What `convert` takes.
+#[derive(Args, Debug, Clone)]
+pub struct ConvertArguments {
+    /// The structure.
+    #[arg(value_name = "SYSTEM.ssp|.ssd")]
+    pub structure: PathBuf,
+    /// The scenario to write [default: the structure's name with .toml, beside it]; the units of an archive go into a
+    /// folder of the same name.
+    #[arg(short, long, value_name = "FILE.toml")]
+    pub output: Option<PathBuf>,
 }
 
 /// What `export` takes.

@@ -6,7 +6,7 @@ use super::{Exit, apart, show};
 use std::fmt::Debug;
 use std::io::Write;
 use std::path::Path;
-use terraglue::fmu::simulate::{self, Settings, Table};
+use terraglue::fmu::simulate::{self, Row, Settings, Table};
 use terraglue::host::exit_guard;
 use terraglue::scenario::InputError;
 use terraglue::{Error, Result};
@@ -97,16 +97,19 @@ fn table(path: &Path) -> Result<Table> {
     if header.get(0) != Some("time") {
         return Err(wrong(&"the first column is not `time`"));
     }
-    let mut rows: Vec<Vec<f64>> = Vec::new();
+    let mut rows: Vec<Row> = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|e| wrong(&e))?;
-        let row: Option<Vec<f64>> =
-            record.iter().map(|t| t.trim().parse().ok().filter(|x: &f64| x.is_finite())).collect();
-        let row = row.ok_or_else(|| wrong(&format!("line {}: not all are numbers", rows.len() + 2)))?;
-        if rows.last().is_some_and(|before| before[0] >= row[0]) {
-            return Err(wrong(&format!("line {}: the time does not grow", rows.len() + 2)));
+        let line = rows.len() + 2;
+        let mut cells = record.iter().map(|t| t.trim().to_owned());
+        let time = cells.next().and_then(|t| t.parse().ok()).filter(|t: &f64| t.is_finite());
+        let time = time.ok_or_else(|| wrong(&format!("line {line}: the time is no number")))?;
+        if rows.last().is_some_and(|before| before.time >= time) {
+            return Err(wrong(&format!("line {line}: the time does not grow")));
         }
-        rows.push(row);
+        let cells: Vec<String> = cells.collect();
+        let numbers = cells.iter().map(|t| t.parse().unwrap_or(f64::NAN)).collect();
+        rows.push(Row { time, cells, numbers });
     }
     Ok(Table { names: header.iter().skip(1).map(str::to_owned).collect(), rows })
 }

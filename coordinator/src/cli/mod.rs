@@ -7,6 +7,7 @@ mod arguments;
 mod check;
 mod check_module;
 mod compare;
+mod convert;
 mod export;
 mod fit_soil;
 mod fmu;
@@ -69,6 +70,7 @@ pub fn main() -> ExitCode {
         Command::Variables(arguments) => list::variables(&arguments),
         Command::Fmu(command) => fmu::fmu(&command),
         Command::Export(arguments) => export::export(&arguments),
+        Command::Convert(arguments) => convert::convert(&arguments),
         Command::Worker { .. } => Ok(Exit::Failed),
         Command::New(arguments) => new::new(&arguments),
         Command::Soils { name, file } => soils::soils(name.as_deref(), file.as_deref()),

@@ -11,7 +11,9 @@ use std::sync::atomic::AtomicBool;
 use std::time::Instant;
 use terraglue::host::exit_guard;
 use terraglue::observer::Observer;
-use terraglue::recording::{self, Recorder, RecorderOptions, Status, Summary, TimingRow, write_timing};
+use terraglue::recording::{
+    self, Recorder, RecorderOptions, Status, Summary, TimingRow, write_exchange, write_timing,
+};
 use terraglue::reload::{ReloadOptions, Reloader};
 use terraglue::scenario::{InputError, Scenario};
 use terraglue::testbed::{Options, Testbed};
@@ -25,6 +27,8 @@ pub struct Outcome {
     pub error: Option<Error>,
     /// Wall time per step of the exchange, of Jacobians, and of all else, s.
     pub parts_s: [f64; 3],
+    /// What each subsystem cost, s.
+    pub costs: Vec<(String, f64)>,
 }
 
 impl Outcome {
@@ -46,6 +50,9 @@ pub fn run(command: &RunCommand) -> Result<Exit> {
     let options = options(arguments, &interrupt::cancel_flag());
     let testbed = build(&scenario, &options)?;
     let mut reloader = reloader(command, &scenario, &options)?;
+    if command.explain {
+        say(arguments, &testbed.explain().text(&scenario));
+    }
     let folder = results_folder(arguments.out.as_deref(), &scenario.name)?;
     let steps = (scenario.time.duration_s / scenario.time.step_s).round() as u64;
     let bar = progress::bar(steps, arguments.quiet);
@@ -53,8 +60,20 @@ pub fn run(command: &RunCommand) -> Result<Exit> {
     let outcome = run_testbed(testbed, reloader.as_mut(), &scenario, &folder, arguments.csv, &mut progress)?;
     bar.finish_and_clear();
     let report = recording::report::write(&folder)?;
+    if command.explain {
+        say(arguments, &show::costs(&outcome.costs, outcome.summary.steps).to_string());
+    }
     print(arguments, &outcome, &report)?;
     Ok(outcome.exit())
+}
+
+/// To standard output, or beside it where that is JSON.
+fn say(arguments: &RunArguments, text: &str) {
+    if arguments.json {
+        eprintln!("{text}");
+    } else {
+        outln!("{text}");
+    }
 }
 
 /// What watches the modules, where that is wanted.
@@ -104,6 +123,7 @@ pub fn run_testbed(
     exit_guard::arm();
     let mut recorder = Recorder::create(folder, scenario, RecorderOptions { csv })?;
     testbed.view(|view| recorder.started(view))?;
+    write_exchange(folder, &testbed.explain())?;
     let (wall, cpu) = (Instant::now(), cpu_s());
     let until_s = scenario.time.duration_s;
     let ran = match reloader {
@@ -115,6 +135,7 @@ pub fn run_testbed(
     testbed.view(|view| recorder.finished(view, error.as_ref()))?;
     write_timing(folder, &timing_rows(&testbed, wall_s, cpu_s))?;
     let parts_s = parts_s(&testbed, wall_s);
+    let costs = testbed.costs().map(|(name, s)| (name.to_owned(), s)).collect();
     let cancelled = testbed.cancelled();
     let closed = testbed.close();
     let error = error.or(closed.err());
@@ -125,7 +146,7 @@ pub fn run_testbed(
     };
     exit_guard::disarm();
     let summary = recorder.finish(wall_s, cpu_s, error.as_ref(), status)?;
-    Ok(Outcome { summary, error, parts_s })
+    Ok(Outcome { summary, error, parts_s, costs })
 }
 
 /// Wall time per step of the exchange with the subsystems, of Jacobians, and of all else, recording included, s.
@@ -145,7 +166,9 @@ fn timing_rows(testbed: &Testbed, wall_s: f64, cpu_s: f64) -> Vec<TimingRow> {
     let timings = testbed.timings();
     let parts = timings.rows().map(|(section, wall_s)| (section, wall_s, None));
     let all = parts.chain([("step loop with recording", wall_s, Some(cpu_s))]);
-    all.map(|(section, wall_s, cpu_s)| TimingRow { section: section.into(), wall_s, cpu_s, steps }).collect()
+    let all = all.map(|(section, wall_s, cpu_s)| (section.to_owned(), wall_s, cpu_s));
+    let own = testbed.costs().map(|(name, wall_s)| (format!("subsystem {name}"), wall_s, None));
+    all.chain(own).map(|(section, wall_s, cpu_s)| TimingRow { section, wall_s, cpu_s, steps }).collect()
 }
 
 fn print(arguments: &RunArguments, outcome: &Outcome, report: &Path) -> Result {

@@ -27,6 +27,15 @@ pub fn table(headers: &[&str]) -> Table {
     table
 }
 
+/// What each subsystem cost.
+pub fn costs(costs: &[(String, f64)], steps: u64) -> Table {
+    let mut t = table(&["subsystem", "wall time", "per step"]);
+    for (name, s) in costs {
+        t.add_row([name.clone(), format!("{s:.3} s"), format!("{:.2} µs", 1e6 * s / steps.max(1) as f64)]);
+    }
+    t
+}
+
 /// The figures of a run.
 pub fn summary(s: &Summary) -> Table {
     let mut t = table(&["figure", "value"]);

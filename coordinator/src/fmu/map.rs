@@ -78,7 +78,7 @@ fn effect(v: &fmi::Variable) -> Effect {
 
 /// Its name where our own reading of it agrees with the unit's definition, or else the definition in SI symbols with
 /// factor and offset. Nothing where the unit is not defined, so that no connection converts by a guess.
-fn unit(description: &ModelDescription, v: &fmi::Variable) -> String {
+pub(super) fn unit(description: &ModelDescription, v: &fmi::Variable) -> String {
     let Some(name) = &v.unit else { return String::new() };
     let theirs = description.units.iter().find(|(n, _)| n == name).map(|(_, unit)| *unit);
     match (Unit::parse(name), theirs) {

@@ -1,6 +1,7 @@
 //! Functional mock-up units as subsystems of a scenario, on their own, and made from scenarios and modules.
 //!
-//! A table `[x] fmu = "path.fmu"` makes a [`FmuSubsystem`]; [`simulate`] runs one unit alone; [`export`] writes one.
+//! A table `[x] fmu = "path.fmu"` makes a [`FmuSubsystem`]; [`simulate`] runs one unit alone; [`export`] writes
+//! one; [`ssp`] says a system structure as a scenario.
 
 mod adapter;
 mod bodies;
@@ -8,6 +9,7 @@ pub mod export;
 mod feet;
 mod map;
 pub mod simulate;
+pub mod ssp;
 
 pub use adapter::{FmuSubsystem, OnNan, is_fmu};
 pub use feet::Feet;

@@ -28,27 +28,51 @@ pub struct Settings {
     pub input: Table,
 }
 
-/// Inputs over time: first column is the time, s.
+/// Inputs over time. Cells stay as they are written, because whole numbers of 64 bits do not fit into f64.
 #[derive(Clone, Debug, Default)]
 pub struct Table {
     /// Names after `time`.
     pub names: Vec<String>,
-    /// Rows of time and values, ascending.
-    pub rows: Vec<Vec<f64>>,
+    /// Rows, ascending in time.
+    pub rows: Vec<Row>,
+}
+
+/// Inputs at a time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Row {
+    /// s.
+    pub time: f64,
+    /// A cell for each name.
+    pub cells: Vec<String>,
+    /// The same as numbers; NaN where they are none.
+    pub numbers: Vec<f64>,
 }
 
 impl Table {
-    /// Values at t by straight lines between the rows; the first and last row hold beyond.
-    fn at(&self, t: f64, column: usize, hold: bool) -> f64 {
-        let next = self.rows.partition_point(|r| r[0] <= t);
-        match (next.checked_sub(1).map(|k| &self.rows[k]), self.rows.get(next)) {
-            (Some(a), Some(b)) if !hold => {
-                let s = (t - a[0]) / (b[0] - a[0]);
-                a[column + 1] + s * (b[column + 1] - a[column + 1])
-            }
-            (Some(row), _) | (None, Some(row)) => row[column + 1],
-            (None, None) => 0.0,
+    /// The last row at or before t, or the first of all, and the row after it.
+    fn around(&self, t: f64) -> Option<(&Row, Option<&Row>)> {
+        let next = self.rows.partition_point(|r| r.time <= t);
+        match next.checked_sub(1) {
+            Some(k) => Some((&self.rows[k], self.rows.get(next))),
+            None => self.rows.first().map(|row| (row, None)),
         }
+    }
+
+    /// A number at t by straight lines between the rows; the first and last row hold beyond.
+    fn number(&self, t: f64, column: usize) -> f64 {
+        match self.around(t) {
+            Some((a, Some(b))) => {
+                let s = (t - a.time) / (b.time - a.time);
+                a.numbers[column] + s * (b.numbers[column] - a.numbers[column])
+            }
+            Some((row, None)) => row.numbers[column],
+            None => 0.0,
+        }
+    }
+
+    /// The cell that holds at t.
+    fn cell(&self, t: f64, column: usize) -> &str {
+        self.around(t).map_or("0", |(row, _)| &row.cells[column])
     }
 }
 
@@ -250,11 +274,15 @@ fn set_text(slave: &Slave, v: &Variable, text: &str) -> Result {
 fn set_inputs(slave: &Slave, settings: &Settings, t: f64) -> Result {
     for (column, name) in settings.input.names.iter().enumerate() {
         let v = find(slave.fmu(), name)?;
-        let float = matches!(v.value_type, ValueType::F64 | ValueType::F32);
-        let value = settings.input.at(t, column, !float);
+        let number = |t| {
+            let x = settings.input.number(t, column);
+            let none = || Error::Refused(format!("`{name}`: the input is no number beside t = {t} s"));
+            if x.is_finite() { Ok(x) } else { Err(none()) }
+        };
         match v.value_type {
-            ValueType::F64 => slave.set_f64(&[v.reference], &[value])?,
-            _ => set_text(slave, v, &value.to_string())?,
+            ValueType::F64 => slave.set_f64(&[v.reference], &[number(t)?])?,
+            ValueType::F32 => slave.set(&[v.reference], Values::F32(&[number(t)? as f32]))?,
+            _ => set_text(slave, v, settings.input.cell(t, column))?,
         }
     }
     Ok(())

@@ -3,6 +3,7 @@
 use super::check;
 use crate::error::{Error, Result};
 use std::cell::Cell;
+use std::time::{Duration, Instant as Clock};
 use terraglue_subsystem::{
     Action, BodyState, Capabilities, Energy, Error as Failure, Estimate, FieldInfo, FieldTile, Input, Kind,
     Law, Level, Motion, Response, Scene, Step, Subsystem, Values, ValuesMut, Variable,
@@ -39,6 +40,9 @@ pub struct Instance {
     scene: Scene,
     time_s: Cell<f64>,
     dead: Cell<bool>,
+    /// Whether its calls are timed, and what they took.
+    watched: bool,
+    cost: Duration,
 }
 
 impl Instance {
@@ -53,6 +57,28 @@ impl Instance {
             subsystem,
             time_s: Cell::new(0.0),
             dead: Cell::new(false),
+            watched: false,
+            cost: Duration::ZERO,
+        }
+    }
+
+    /// Times its calls from now on.
+    pub fn watch(&mut self) {
+        self.watched = true;
+    }
+
+    /// What its calls in steps took while it was watched.
+    pub fn cost(&self) -> Duration {
+        self.cost
+    }
+
+    fn begin(&self) -> Option<Clock> {
+        self.watched.then(Clock::now)
+    }
+
+    fn charge(&mut self, start: Option<Clock>) {
+        if let Some(start) = start {
+            self.cost += start.elapsed();
         }
     }
 
@@ -140,8 +166,11 @@ impl Instance {
         const NAME: &str = "set_ports";
         self.time_s.set(step.t);
         self.alive(NAME)?;
-        prepare(step, now);
+        prepare(now);
+        (now.reached, now.flags) = (step.t + step.h, 0);
+        let start = self.begin();
         let result = self.subsystem.set_ports(step, laws, now);
+        self.charge(start);
         self.outcome(NAME, result)?;
         self.all_finite(NAME, check::packed(step, "x", now.x))?;
         self.all_finite(NAME, check::packed(step, "v", now.v))?;
@@ -163,7 +192,10 @@ impl Instance {
             vector.fill(f64::NAN);
         }
         out.active.fill(0);
-        match self.subsystem.estimate_forces(step, partner, out) {
+        let start = self.begin();
+        let result = self.subsystem.estimate_forces(step, partner, out);
+        self.charge(start);
+        match result {
             Err(Failure::Discard { reached }) => return self.early(NAME, step, reached),
             result => self.outcome(NAME, result)?,
         }
@@ -198,18 +230,27 @@ impl Instance {
     ) -> Result<Progress> {
         self.time_s.set(step.t);
         self.alive(name)?;
-        prepare(step, out);
-        match call(self.subsystem.as_mut(), out) {
+        let ports = step.n != 0;
+        if ports {
+            prepare(out);
+        }
+        (out.reached, out.flags) = (step.t + step.h, 0);
+        let start = self.begin();
+        let result = call(self.subsystem.as_mut(), out);
+        self.charge(start);
+        match result {
             Err(Failure::Discard { reached }) => {
                 out.reached = reached;
                 return self.early(name, step, reached);
             }
             result => self.outcome(name, result)?,
         }
-        self.all_finite(name, check::packed(step, "x", out.x))?;
-        self.all_finite(name, check::packed(step, "v", out.v))?;
-        self.all_finite(name, check::packed(step, "a", out.a))?;
-        self.all_finite(name, check::packed(step, "t", out.t))?;
+        if ports {
+            self.all_finite(name, check::packed(step, "x", out.x))?;
+            self.all_finite(name, check::packed(step, "v", out.v))?;
+            self.all_finite(name, check::packed(step, "a", out.a))?;
+            self.all_finite(name, check::packed(step, "t", out.t))?;
+        }
         let end = step.t + step.h;
         if out.reached < end - 1e-9 * step.h || out.reached.is_nan() {
             return self.early(name, step, out.reached);
@@ -231,7 +272,9 @@ impl Instance {
         const NAME: &str = "interface_jacobian";
         self.alive(NAME)?;
         out.fill(f64::NAN);
+        let start = self.begin();
         let result = self.subsystem.interface_jacobian(step, level, out);
+        self.charge(start);
         self.outcome(NAME, result)?;
         self.all_finite(NAME, check::matrix(step.n as usize, "the derivative", out))
     }
@@ -239,7 +282,9 @@ impl Instance {
     /// Paper, step 5.
     pub fn commit(&mut self, step: &Step, t: &[f64], partner: &Motion) -> Result {
         self.alive("commit")?;
+        let start = self.begin();
         let result = self.subsystem.commit(step, t, partner);
+        self.charge(start);
         self.outcome("commit", result)?;
         self.time_s.set(step.t + step.h);
         Ok(())
@@ -396,9 +441,8 @@ impl Instance {
 }
 
 /// Fills a response with NaN, to find what a subsystem does not answer.
-fn prepare(step: &Step, out: &mut Response) {
+fn prepare(out: &mut Response) {
     for vector in [&mut *out.x, &mut *out.v, &mut *out.a, &mut *out.t] {
         vector.fill(f64::NAN);
     }
-    (out.reached, out.flags) = (step.t + step.h, 0);
 }

@@ -11,6 +11,8 @@ pub const SUMMARY: &str = "summary.json";
 pub const VARIABLES: &str = "variables.csv";
 /// What a clock measured.
 pub const TIMING: &str = "timing.csv";
+/// How values went round.
+pub const EXCHANGE: &str = "exchange.json";
 /// The ground at the end, ESRI ASCII grid.
 pub const FINAL_GROUND: &str = "final_ground.asc";
 /// The report page.
@@ -22,7 +24,9 @@ pub(crate) fn remove_earlier_run(folder: &Path) -> Result {
     if ![RECORDING, SUMMARY].iter().any(|f| folder.join(f).exists()) {
         return Ok(());
     }
-    for path in [VARIABLES, REPORT, SUMMARY, TIMING, FINAL_GROUND, RECORDING].map(|f| folder.join(f)) {
+    for path in
+        [VARIABLES, REPORT, SUMMARY, TIMING, EXCHANGE, FINAL_GROUND, RECORDING].map(|f| folder.join(f))
+    {
         if path.exists() {
             std::fs::remove_file(&path).map_err(at(&path))?;
         }

@@ -8,6 +8,7 @@
 //! | `summary.json` | the figures of the run ([`Summary`]) |
 //! | `variables.csv` | on request: all scalar variables in one table |
 //! | `timing.csv` | what a clock measured, apart from everything else |
+//! | `exchange.json` | how values went round: order, connections with their delays, loops |
 //! | `final_ground.asc` | the ground at the end as ESRI ASCII grid |
 //!
 //! Topics of the recording; all messages are JSON, log times are simulated nanoseconds:
@@ -29,6 +30,7 @@
 
 mod body_track;
 mod csv;
+mod exchange;
 mod ground_grid;
 mod json;
 mod layout;
@@ -53,6 +55,7 @@ pub mod report;
 mod tests;
 
 pub use csv::{TimingRow, write_timing};
+pub use exchange::write_exchange;
 pub use layout::{FINAL_GROUND, RECORDING, REPORT, SUMMARY, TIMING, VARIABLES};
 pub use mend::mend;
 pub use messages::{GluingRecord, PortRecord, WindowRecord};

@@ -1,7 +1,7 @@
-//! `[[connect]]`, `[[glue]]` and `[[event]]`.
+//! `[[connect]]`, `[[glue]]`, `[[event]]` and `[[fault]]`.
 
 use super::keys::{self, Table};
-use super::model::{Comparison, Connection, EventSpec, GlueSpec, Trigger};
+use super::model::{Comparison, Connection, EventSpec, FaultEnd, FaultKind, FaultSpec, GlueSpec, Trigger};
 use super::node::{Node, Raw};
 use super::section::Section;
 use super::source::{InputError, Source};
@@ -21,7 +21,14 @@ pub fn connections(source: &Source, names: &[&str]) -> Checked<Vec<Connection>> 
             let message = format!("`to` has {stars_to} `*`, `from` only {stars_from} to fill them");
             return Err(s.error("to", message, None));
         }
-        Ok(Connection { from: s.text("from"), to: s.text("to"), span: node.extent() })
+        Ok(Connection {
+            from: s.text("from"),
+            to: s.text("to"),
+            factor: s.number("factor"),
+            offset: s.number("offset"),
+            convert: s.value("convert") != Value::Bool(false),
+            span: node.extent(),
+        })
     })
 }
 
@@ -92,6 +99,45 @@ pub fn events(source: &Source, names: &[&str]) -> Checked<Vec<EventSpec>> {
     })
 }
 
+/// All faults in the order of the file.
+pub fn faults(source: &Source, names: &[&str]) -> Checked<Vec<FaultSpec>> {
+    each(source, "fault", |s, node| {
+        let variable = s.text("variable");
+        check_reference(&variable, names).map_err(|c| s.error("variable", c.message, c.help))?;
+        let kind = match s.text("kind").as_str() {
+            "override" => FaultKind::Override(s.number("value")),
+            "offset" => FaultKind::Offset(s.number("value")),
+            "gain" => FaultKind::Gain(s.number("value")),
+            "ramp" => FaultKind::Ramp(s.number("rate_per_s")),
+            "delay" => FaultKind::Delay(s.number("delay_s")),
+            "drop-out" => FaultKind::DropOut(s.number("probability")),
+            "noise" => FaultKind::Noise(s.number("deviation")),
+            _ => FaultKind::Freeze,
+        };
+        let ends = [
+            s.optional_number("until_s").map(|t| FaultEnd::At(Trigger::At(t))),
+            s.optional_text("until")
+                .map(|text| when(s, "until", &text, names))
+                .transpose()?
+                .map(FaultEnd::At),
+            s.optional_number("for_s").map(FaultEnd::After),
+        ];
+        let mut ends = ends.into_iter().flatten();
+        let end = ends.next().unwrap_or(FaultEnd::Never);
+        if ends.next().is_some() {
+            return Err(s.error("kind", "a fault has one of `until_s`, `until` and `for_s`".into(), None));
+        }
+        Ok(FaultSpec {
+            variable,
+            kind,
+            start: trigger(s, names)?,
+            end,
+            seed: s.optional_count("seed"),
+            span: node.extent(),
+        })
+    })
+}
+
 fn each<T>(source: &Source, name: &str, read: impl Fn(&Section, &Node) -> Checked<T>) -> Checked<Vec<T>> {
     let (Some(table), Some(node)) = (keys::table(name), source.root.get(name)) else { return Ok(Vec::new()) };
     let Raw::List(items) = &node.value else { return Err(not_repeated(source, &table, node)) };
@@ -106,11 +152,11 @@ fn not_repeated(source: &Source, table: &Table, node: &Node) -> Box<InputError> 
 fn trigger(s: &Section, names: &[&str]) -> Checked<Trigger> {
     match (s.optional_number("at_s"), s.optional_text("when")) {
         (Some(at), None) => Ok(Trigger::At(at)),
-        (None, Some(text)) => when(s, &text, names),
-        (Some(_), Some(_)) => Err(s.error("when", "an event has `at_s` or `when`, not both".into(), None)),
+        (None, Some(text)) => when(s, "when", &text, names),
+        (Some(_), Some(_)) => Err(s.error("when", "it has `at_s` or `when`, not both".into(), None)),
         (None, None) => {
             let help = Some("at_s = 3.0, or when = \"robot.body.z < 0.1\"".into());
-            Err(s.error("set", "an event needs `at_s` or `when`".into(), help))
+            Err(s.error("set", "it needs `at_s` or `when`".into(), help))
         }
     }
 }
@@ -124,10 +170,10 @@ const OPERATORS: [(&str, Comparison); 6] = [
     (">", Comparison::Greater),
 ];
 
-fn when(s: &Section, text: &str, names: &[&str]) -> Checked<Trigger> {
+fn when(s: &Section, key: &str, text: &str, names: &[&str]) -> Checked<Trigger> {
     let refuse = |what: String| {
         let help = Some("write `subsystem.variable < number`; operators: < <= > >= == !=".into());
-        s.error("when", what, help)
+        s.error(key, what, help)
     };
     let split = OPERATORS
         .iter()
@@ -143,7 +189,7 @@ fn when(s: &Section, text: &str, names: &[&str]) -> Checked<Trigger> {
             _ => return Err(refuse(format!("`{right}` in `{text}` is no number"))),
         },
     };
-    check_reference(variable, names).map_err(|c| s.error("when", c.message, c.help))?;
+    check_reference(variable, names).map_err(|c| s.error(key, c.message, c.help))?;
     if variable.contains('*') || variable.contains(char::is_whitespace) {
         return Err(refuse(format!("`{variable}` in `{text}` is no name of one variable")));
     }

@@ -86,7 +86,7 @@ pub const READ: &[&str] = &["esri-ascii", "geotiff", "png"];
 
 /// All reserved tables in the order of the documentation.
 pub fn tables() -> Vec<Table> {
-    vec![time(), world(), terrain(), gluing(), recording(), report(), connect(), glue(), event()]
+    vec![time(), world(), terrain(), gluing(), recording(), report(), connect(), glue(), event(), fault()]
 }
 
 /// The reserved table of that name.
@@ -282,6 +282,11 @@ fn connect() -> Table {
     let keys = vec![
         text("from", "`subsystem.variable`; each `*` matches within one dotted part").into(),
         text("to", "the same; its `*` take what matched in `from`").into(),
+        number("factor", "", 1.0, "to = factor · from + offset, after the conversion of units").into(),
+        number("offset", "", 0.0, "see `factor`").into(),
+        Parameter::of("convert", ParameterType::Bool, "false: units are neither converted nor compared")
+            .or(true)
+            .into(),
     ];
     Table { repeated: true, ..of("connect", "An output that feeds an input, once per step.", keys) }
 }
@@ -347,8 +352,40 @@ fn event() -> Table {
     ];
     Table {
         repeated: true,
-        ..of("event", "Something that happens once: a fault, an operator's change.", keys)
+        ..of("event", "Something that happens once: something breaks, an operator's change.", keys)
     }
+}
+
+/// Kinds of faults.
+const FAULTS: &[&str] = &["override", "offset", "gain", "ramp", "freeze", "delay", "drop-out", "noise"];
+
+fn fault() -> Table {
+    let text = |name, help| Parameter::of(name, ParameterType::Text, help);
+    let seconds = |name, help| required(name, "s", help).within(0.0, f64::INFINITY);
+    let value = required("value", "", "override: the value; offset: is added; gain: the factor");
+    let keys = vec![
+        text("variable", "`subsystem.variable`: an output on all its connections, or an input").into(),
+        text("kind", "what is wrong with its number").choices(FAULTS).into(),
+        Key::from(value).only(&["override", "offset", "gain"]),
+        Key::from(required("rate_per_s", "", "what is added grows by this")).only(&["ramp"]),
+        Key::from(required("delay_s", "s", "how old the number is").positive()).only(&["delay"]),
+        Key::from(required("probability", "", "of each step that the last number stays").within(0.0, 1.0))
+            .only(&["drop-out"]),
+        Key::from(
+            required("deviation", "", "standard deviation of what is added").within(0.0, f64::INFINITY),
+        )
+        .only(&["noise"]),
+        seconds("at_s", "when it begins; either this or `when`").optional().into(),
+        text("when", "a comparison, e.g. `robot.body.z < 0.1`, at which it begins").optional().into(),
+        seconds("until_s", "when it ends; the end of the run where nothing says so").optional().into(),
+        text("until", "a comparison at which it ends").optional().into(),
+        seconds("for_s", "how long it lasts").optional().into(),
+        Parameter::of("seed", ParameterType::Integer, "of noise and drop-outs; by `world.seed` where absent")
+            .optional()
+            .within(0.0, f64::INFINITY)
+            .into(),
+    ];
+    Table { repeated: true, ..of("fault", "A number that goes wrong on its way, once, for a while.", keys) }
 }
 
 /// Keys of the host in the table of a subsystem; everything else there is a parameter of the module.

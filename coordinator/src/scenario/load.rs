@@ -1,6 +1,6 @@
 //! From the text to the [`Scenario`].
 
-use super::events::{connections, events, glue};
+use super::events::{connections, events, faults, glue};
 use super::keys::{self, Table};
 use super::model::*;
 use super::nearest::did_you_mean;
@@ -11,6 +11,7 @@ use super::source::{InputError, Source};
 use super::{subsystems, terrain};
 use std::path::Path;
 use std::sync::Arc;
+use terraglue_fmi::ssp::Package;
 use toml_edit::Document;
 
 type Checked<T> = Result<T, Box<InputError>>;
@@ -22,13 +23,30 @@ impl Scenario {
     /// Wrong input, with the place in the file or in the edit. Parameters of modules are checked later, by
     /// [`super::check_parameters`].
     pub fn load(path: &Path, sets: &[(String, String)]) -> Checked<Self> {
+        if Package::is_one(path) {
+            return Self::structure(path, sets);
+        }
         let text = std::fs::read_to_string(path).map_err(|e| unreadable(path, &e))?;
         Self::parse(&text, &path.display().to_string(), sets)
     }
 
+    /// A system structure (SSP) as a scenario.
+    fn structure(path: &Path, sets: &[(String, String)]) -> Checked<Self> {
+        let wrong = |e: terraglue_fmi::Error| InputError::plain(e.to_string(), None);
+        let package = Package::open(path).map_err(wrong)?;
+        let converted = crate::fmu::ssp::convert(&package, "").map_err(wrong)?;
+        converted.notes.iter().for_each(|note| log::warn!("{}: {note}", path.display()));
+        let mut source = read_source(&converted.text, &path.display().to_string(), sets)?;
+        source.package = Some(Arc::new(package));
+        Self::checked(source)
+    }
+
     /// The same for a text; `path` gives its name and folder.
     pub fn parse(text: &str, path: &str, sets: &[(String, String)]) -> Checked<Self> {
-        let source = read_source(text, path, sets)?;
+        Self::checked(read_source(text, path, sets)?)
+    }
+
+    fn checked(source: Source) -> Checked<Self> {
         check_top_level(&source)?;
         let specs = subsystems::all(&source)?;
         let names: Vec<&str> = specs.iter().map(|s| s.name.as_str()).collect();
@@ -51,7 +69,8 @@ impl Scenario {
         let connections = connections(&source, &names)?;
         let glue = glue(&source, &names)?;
         let events = events(&source, &names)?;
-        let stem = Path::new(path).file_stem().map(|s| s.to_string_lossy().into_owned());
+        let faults = faults(&source, &names)?;
+        let stem = Path::new(&source.path).file_stem().map(|s| s.to_string_lossy().into_owned());
         Ok(Self {
             name: stem.unwrap_or_else(|| "scenario".into()),
             folder: source.folder(),
@@ -65,6 +84,7 @@ impl Scenario {
             connections,
             glue,
             events,
+            faults,
             source,
         })
     }
@@ -92,6 +112,7 @@ fn read_source(text: &str, path: &str, sets: &[(String, String)]) -> Checked<Sou
         file_text: text.into(),
         sets: sets.iter().map(|(key, value)| edit_text(key, value)).collect(),
         root: Arc::default(),
+        package: None,
     };
     if text.trim().is_empty() {
         let help = Some("docs/scenario.md shows what a scenario holds".into());

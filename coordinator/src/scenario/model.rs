@@ -31,6 +31,8 @@ pub struct Scenario {
     pub glue: Vec<GlueSpec>,
     /// `[[event]]` in the order of the file.
     pub events: Vec<EventSpec>,
+    /// `[[fault]]` in the order of the file.
+    pub faults: Vec<FaultSpec>,
     /// The text it came from, for errors found later (unknown variables, units).
     pub source: super::Source,
 }
@@ -229,6 +231,12 @@ pub struct Connection {
     pub from: String,
     /// The same; its `*` take what matched in `from`.
     pub to: String,
+    /// to = factor · from + offset, after the conversion of units.
+    pub factor: f64,
+    /// See `factor`.
+    pub offset: f64,
+    /// Whether units are compared and converted.
+    pub convert: bool,
     /// Byte range of the table in the source.
     pub span: std::ops::Range<usize>,
 }
@@ -295,6 +303,71 @@ pub struct EventSpec {
     pub act: Vec<String>,
     /// Byte range of the table in the source.
     pub span: std::ops::Range<usize>,
+}
+
+/// `[[fault]]`.
+#[derive(Clone, Debug, PartialEq)]
+pub struct FaultSpec {
+    /// `subsystem.variable`.
+    pub variable: String,
+    /// What happens to its numbers.
+    pub kind: FaultKind,
+    /// From when on.
+    pub start: Trigger,
+    /// Until when.
+    pub end: FaultEnd,
+    /// Seed of noise and drop-outs; absent: by the world's and the place in the file.
+    pub seed: Option<u64>,
+    /// Byte range of the table in the source.
+    pub span: std::ops::Range<usize>,
+}
+
+/// What a fault makes of a number x.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum FaultKind {
+    /// This value.
+    Override(f64),
+    /// x + this.
+    Offset(f64),
+    /// x · this.
+    Gain(f64),
+    /// x + this · time since the fault began, 1/s.
+    Ramp(f64),
+    /// What x was when the fault began.
+    Freeze,
+    /// What x was so long ago, s.
+    Delay(f64),
+    /// With this probability per step what was told last.
+    DropOut(f64),
+    /// x + a normal random number with this deviation.
+    Noise(f64),
+}
+
+impl FaultKind {
+    /// As written in a scenario.
+    pub fn name(self) -> &'static str {
+        match self {
+            Self::Override(_) => "override",
+            Self::Offset(_) => "offset",
+            Self::Gain(_) => "gain",
+            Self::Ramp(_) => "ramp",
+            Self::Freeze => "freeze",
+            Self::Delay(_) => "delay",
+            Self::DropOut(_) => "drop-out",
+            Self::Noise(_) => "noise",
+        }
+    }
+}
+
+/// When a fault ends.
+#[derive(Clone, Debug, PartialEq)]
+pub enum FaultEnd {
+    /// Not in this run.
+    Never,
+    /// At a time or when a comparison holds.
+    At(Trigger),
+    /// So long after its begin, s.
+    After(f64),
 }
 
 /// When an event fires; once.

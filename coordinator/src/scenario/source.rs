@@ -5,6 +5,7 @@ use miette::{NamedSource, SourceSpan};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use terraglue_fmi::ssp::Package;
 
 /// A scenario's text, kept for errors.
 #[derive(Clone, Debug, Default)]
@@ -19,6 +20,8 @@ pub struct Source {
     pub(super) sets: Arc<[String]>,
     /// The parsed text after the edits.
     pub(super) root: Arc<Node>,
+    /// The system structure that it was made from, whose files lie elsewhere.
+    pub(super) package: Option<Arc<Package>>,
 }
 
 /// Wrong input: what, where, and the way out.
@@ -98,6 +101,9 @@ impl Source {
 
     /// The folder of the file; relative paths refer to it.
     pub fn folder(&self) -> PathBuf {
+        if let Some(package) = &self.package {
+            return package.folder().to_owned();
+        }
         match Path::new(&self.path).parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder.to_owned(),
             _ => PathBuf::from("."),

@@ -155,7 +155,7 @@ fn unknown_strategies_and_subsystems_are_answered_with_the_valid_ones() {
 
 #[test]
 fn events_need_a_time_and_something_to_do() {
-    assert_holds(&message("at_s = 1.0\n", "", &[]), &["an event needs `at_s` or `when`"]);
+    assert_holds(&message("at_s = 1.0\n", "", &[]), &["it needs `at_s` or `when`"]);
     assert_holds(&message("act = \"robot.LF_j2.break\"\n", "", &[]), &["an event that does nothing"]);
     assert_holds(&message("z < 0.1", "z 0.1", &[]), &["`robot.body.z 0.1` is no comparison"]);
     assert_holds(&message("z < 0.1", "z < low", &[]), &["`low` in `robot.body.z < low` is no number"]);

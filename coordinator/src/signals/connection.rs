@@ -9,6 +9,9 @@ use crate::scenario::{Connection, InputError, Source};
 use terraglue_subsystem::unit::Unit;
 use terraglue_subsystem::{Causality, ValueType, Values, ValuesMut};
 
+/// Subsystem and variable on either side of a value, and value_to = a·value_from + b.
+pub type Ends = ([(usize, u32); 2], (f64, f64));
+
 /// All f64 connections from one subsystem to another, copied in one call each way.
 #[derive(Debug)]
 pub struct Link {
@@ -27,13 +30,10 @@ impl Link {
         self.to == slot && self.to_ids.contains(&id)
     }
 
-    /// Copies the committed values.
-    pub fn transfer(&mut self, instances: &mut [Instance]) -> Result {
-        self.read(instances)?;
-        let values = std::mem::take(&mut self.values);
-        let done = self.write(instances, &values);
-        self.values = values;
-        done
+    /// Sets the inputs to the values that were read last.
+    #[inline]
+    pub fn pass_on(&self, instances: &mut [Instance]) -> Result {
+        self.write(instances, &self.values)
     }
 
     /// Values of the outputs, in the units of the inputs.
@@ -64,6 +64,33 @@ impl Link {
             Reply::Accepted => Ok(()),
             Reply::Refused(reason) => Err(target.error("set", reason)),
         }
+    }
+
+    /// Places of the values of a variable: those that come from it, or, with `fed`, those that it is given.
+    pub fn numbers_of(&self, slot: usize, id: u32, fed: bool) -> impl Iterator<Item = usize> + '_ {
+        let (own, ids) = if fed { (self.to, &self.to_ids) } else { (self.from, &self.from_ids) };
+        (0..ids.len()).filter(move |k| own == slot && ids[*k] == id)
+    }
+
+    /// Subsystem and variable on either side of every value, and how it is converted.
+    pub fn ends(&self) -> impl Iterator<Item = Ends> + '_ {
+        let pairs = self.from_ids.iter().zip(&self.to_ids).zip(&self.conversion);
+        pairs.map(|((from, to), conversion)| ([(self.from, *from), (self.to, *to)], *conversion))
+    }
+
+    /// value_to = a·value_from + b of one value.
+    pub fn conversion(&self, k: usize) -> (f64, f64) {
+        self.conversion[k]
+    }
+
+    /// A value that was read last.
+    pub fn value(&self, k: usize) -> f64 {
+        self.values[k]
+    }
+
+    /// The same, to change it on its way.
+    pub fn value_mut(&mut self, k: usize) -> &mut f64 {
+        &mut self.values[k]
     }
 
     /// Whether it leaves a subsystem of some kind.
@@ -148,7 +175,7 @@ pub fn connect(
                 let message = format!("`{name}` is connected to `{target}`, which does not exist");
                 source.error_at(connection.span.clone(), message, directory.hint(&target))
             })?;
-            let conversion = check(instances, (name, from), (&target, to))
+            let conversion = check(connection, instances, (name, from), (&target, to))
                 .map_err(|message| source.error_at(connection.span.clone(), message, None))?;
             if let Some((other, _)) = fed.iter().find(|(_, input)| *input == to) {
                 let message = format!("`{target}` is fed by `{other}` already and cannot take `{name}` too");
@@ -169,7 +196,9 @@ pub fn connect(
     Ok(links)
 }
 
+/// value_to = a·value_from + b, or why the two cannot be connected.
 fn check(
+    connection: &Connection,
     instances: &[Instance],
     (from_name, from): (&str, VariableRef),
     (to_name, to): (&str, VariableRef),
@@ -190,14 +219,19 @@ fn check(
     if !matches!(b.causality, Causality::Input | Causality::Parameter) {
         return Err(format!("`{to_name}` is not an input and cannot be connected to"));
     }
-    if a.unit.is_empty() || b.unit.is_empty() {
-        return Ok((1.0, 0.0));
+    let Connection { factor, offset, convert, .. } = *connection;
+    if (factor, offset) != (1.0, 0.0) && a.value_type != ValueType::F64 {
+        return Err(format!("`{from_name}` is of a type that takes neither `factor` nor `offset`"));
+    }
+    if a.unit.is_empty() || b.unit.is_empty() || !convert {
+        return Ok((factor, offset));
     }
     let parse = |name: &str, unit: &str| Unit::parse(unit).map_err(|e| format!("unit of `{name}`: {e}"));
     let (unit_a, unit_b) = (parse(from_name, &a.unit)?, parse(to_name, &b.unit)?);
-    unit_a.conversion_to(&unit_b).ok_or_else(|| {
+    let conversion = unit_a.conversion_to(&unit_b).ok_or_else(|| {
         format!("`{from_name}` is in {} and `{to_name}` in {}: these cannot be connected", a.unit, b.unit)
-    })
+    })?;
+    Ok((factor * conversion.0, factor * conversion.1 + offset))
 }
 
 fn add(

@@ -41,6 +41,11 @@ impl Discrete {
         Self { from, to }
     }
 
+    /// The variables on either side.
+    pub fn ends(&self) -> [VariableRef; 2] {
+        [self.from, self.to]
+    }
+
     /// Whether it feeds a variable of a subsystem.
     pub fn feeds(&self, instances: &[Instance], slot: usize, id: u32) -> bool {
         self.to.slot == slot && self.to.describe(instances).id == id

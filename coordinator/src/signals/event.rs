@@ -13,9 +13,12 @@ struct Event {
     fired: bool,
 }
 
+/// A trigger with its name resolved.
 #[derive(Debug)]
-enum Resolved {
+pub enum Resolved {
+    /// At a time, s.
     At(f64),
+    /// When a comparison holds.
     When(VariableRef, Comparison, f64),
 }
 
@@ -59,12 +62,7 @@ impl TimeLine {
                 check_action(action, instances)
                     .map_err(|(message, help)| source.error_at(spec.span.clone(), message, help))?;
             }
-            let trigger = match &spec.trigger {
-                Trigger::At(t) => Resolved::At(*t),
-                Trigger::When { variable: name, comparison, value } => {
-                    Resolved::When(variable(name, spec)?, *comparison, *value)
-                }
-            };
+            let trigger = Resolved::new(&spec.trigger, |name| variable(name, spec))?;
             let due = Due { set: spec.set.clone(), act: spec.act.clone() };
             events.push(Event { trigger, due, fired: false });
         }
@@ -76,6 +74,12 @@ impl TimeLine {
         let event = self.events.iter_mut().find(|e| !e.fired && e.trigger.holds(t, h, instances))?;
         event.fired = true;
         Some(event.due.clone())
+    }
+
+    /// The next time after t at which an event fires, s; ∞: none that is known.
+    pub fn next_time(&self, t: f64) -> f64 {
+        let times = self.events.iter().filter(|e| !e.fired).map(|e| e.trigger.time());
+        times.filter(|time| *time > t).fold(f64::INFINITY, f64::min)
     }
 
     /// Which events have fired, for a snapshot.
@@ -92,7 +96,24 @@ impl TimeLine {
 }
 
 impl Resolved {
-    fn holds(&self, t: f64, h: f64, instances: &[Instance]) -> bool {
+    /// Finds the variable of a condition.
+    pub fn new<E>(trigger: &Trigger, find: impl Fn(&str) -> Result<VariableRef, E>) -> Result<Self, E> {
+        Ok(match trigger {
+            Trigger::At(t) => Self::At(*t),
+            Trigger::When { variable, comparison, value } => Self::When(find(variable)?, *comparison, *value),
+        })
+    }
+
+    /// When it holds, where that is known beforehand, s.
+    pub fn time(&self) -> f64 {
+        match self {
+            Self::At(at) => *at,
+            Self::When(..) => f64::INFINITY,
+        }
+    }
+
+    /// Whether it holds at the communication point t.
+    pub fn holds(&self, t: f64, h: f64, instances: &[Instance]) -> bool {
         match self {
             // t is a multiple of h up to rounding
             Self::At(at) => t >= at - 1e-9 * h,

@@ -1,15 +1,19 @@
 //! What flows between subsystems besides glue: connections between variables, and the time line of events that
-//! set variables or call actions. Faults are events.
+//! set variables or call actions. What breaks in a subsystem is an event; what is wrong with a number on its way is a
+//! fault of its own kind.
 
 mod access;
 mod connection;
 mod discrete;
 mod event;
+mod fault;
 mod initial;
+mod modifier;
 pub mod pattern;
 
 pub use access::{Directory, VariableRef};
 pub use connection::{Link, Links, connect};
 pub use discrete::Discrete;
 pub use event::{Due, TimeLine};
+pub use fault::Faults;
 pub use initial::settle;

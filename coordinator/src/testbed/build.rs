@@ -13,7 +13,7 @@ use crate::host::{
     is_python,
 };
 use crate::scenario::{self, GlueSpec, GluingSpec, InputError, Scenario, SubsystemSpec};
-use crate::signals::{self, Directory, TimeLine};
+use crate::signals::{self, Directory, Faults, TimeLine};
 use crate::timing::Timings;
 use crate::{Error, Result, terrain};
 use std::sync::Arc;
@@ -49,6 +49,9 @@ impl Testbed {
         let directory = Directory::new(&instances);
         let links = signals::connect(&scenario.connections, &directory, &instances, &scenario.source)?;
         let time_line = TimeLine::new(&scenario.events, &directory, &instances, &scenario.source)?;
+        let random = (scenario.world.seed, scenario.time.step_s);
+        let source = &scenario.source;
+        let faults = Faults::new(&scenario.faults, &links.numbers, &directory, &instances, source, random)?;
         check_report(scenario, &directory, &instances)?;
         let groups = groups(scenario, &instances)?;
         let ground = groups.iter().find(|g| g.exchange.has_grounds());
@@ -64,6 +67,8 @@ impl Testbed {
             failed: "none",
             links,
             time_line,
+            faults,
+            exact: takes_parts(scenario, &instances),
             directory,
             instances,
             happenings: Vec::new(),
@@ -83,6 +88,8 @@ impl Testbed {
             hold: hold(&scenario.gluing.hold),
             started: false,
         };
+        let glued = testbed.instances.iter_mut().zip(&testbed.members).filter(|(_, m)| m.glued);
+        glued.for_each(|(instance, _)| instance.watch());
         testbed.settle()?;
         testbed.read_states()?;
         if let Err(Error::Simulation { message, .. }) = testbed.detect_contacts(scenario.time.step_s) {
@@ -90,6 +97,12 @@ impl Testbed {
         }
         Ok(testbed)
     }
+}
+
+/// Whether a step of the run may end at any time: all subsystems make every step, and of any length.
+fn takes_parts(scenario: &Scenario, instances: &[Instance]) -> bool {
+    let any = |i: &Instance| !i.capabilities().has(Capabilities::FIXED_STEP);
+    scenario.subsystems.iter().all(|s| s.step_multiple <= 1) && instances.iter().all(any)
 }
 
 /// What instances of a scenario are offered; `ground`: with the terrain, where it has one.

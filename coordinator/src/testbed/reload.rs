@@ -62,6 +62,9 @@ impl Testbed {
         self.instances[slot] = new;
         // New variables can be read and set from now on.
         self.directory = Directory::new(&self.instances);
+        if self.members[slot].glued {
+            self.instances[slot].watch();
+        }
         Ok(carried)
     }
 }

@@ -36,13 +36,20 @@ const SMALL: u64 = 16 << 20;
 /// A zip archive that was checked as a whole.
 pub struct Archive {
     path: PathBuf,
+    /// What must lie at its top, and what it is then.
+    top: [&'static str; 2],
     zip: ZipArchive<File>,
     limits: Limits,
 }
 
 impl Archive {
-    /// Opens an archive and checks the names, kinds and stated sizes of all entries.
+    /// Opens the archive of a unit and checks the names, kinds and stated sizes of all entries.
     pub fn open(path: &Path, limits: Limits) -> Result<Self> {
+        Self::open_with(path, limits, ["modelDescription.xml", "FMU"])
+    }
+
+    /// The same for another kind of archive: the file that must lie at its top, and what it is then.
+    pub fn open_with(path: &Path, limits: Limits, top: [&'static str; 2]) -> Result<Self> {
         let fail = |message: String| Error::Archive { path: path.into(), entry: None, message };
         let meta = std::fs::metadata(path).map_err(|e| fail(format!("cannot be read: {e}")))?;
         if !meta.is_file() {
@@ -53,14 +60,15 @@ impl Archive {
         if let Some(n) = stated.filter(|n| *n > limits.entries as u64) {
             return Err(fail(format!("has {n} entries; {} are accepted", limits.entries)));
         }
+        let twins = twins_are_equal(&mut file).map_err(|e| fail(format!("cannot be read: {e}")))?;
         let zip = ZipArchive::new(file).map_err(|e| fail(format!("is no readable zip archive: {e}")))?;
-        if let Some(n) = stated.filter(|n| *n != zip.len() as u64) {
+        if let Some(n) = stated.filter(|n| *n != zip.len() as u64 && !twins) {
             let found = zip.len();
             return Err(fail(format!(
                 "states {n} entries but has {found} different names: one occurs twice"
             )));
         }
-        let mut archive = Self { path: path.into(), zip, limits };
+        let mut archive = Self { path: path.into(), top, zip, limits };
         archive.check()?;
         Ok(archive)
     }
@@ -86,8 +94,9 @@ impl Archive {
             }
             self.check_clash(&facts, &parts, &mut kinds)?;
         }
-        if !kinds.contains_key("modelDescription.xml") {
-            let message = "has no modelDescription.xml at its top: it is no FMU".into();
+        let [file, kind] = self.top;
+        if !kinds.contains_key(file) {
+            let message = format!("has no {file} at its top: it is no {kind}");
             return Err(Error::Archive { path: self.path.clone(), entry: None, message });
         }
         Ok(())
@@ -266,6 +275,42 @@ fn printable(name: &str) -> String {
 
 /// Number of entries that the end record states; none: zip64, or no such record.
 fn stated_entries(file: &mut File) -> std::io::Result<Option<u64>> {
+    let count = end_record(file)?.map(|r| u16::from_le_bytes([r[10], r[11]]));
+    Ok(count.filter(|n| *n != u16::MAX).map(u64::from))
+}
+
+/// Whether every name that the directory lists twice stands for the same content both times: some build tools add a
+/// file again. Anything odd is no.
+fn twins_are_equal(file: &mut File) -> std::io::Result<bool> {
+    const HEADER: usize = 46;
+    let Some(end) = end_record(file)? else { return Ok(false) };
+    let word = |bytes: &[u8], at: usize| {
+        u32::from_le_bytes([bytes[at], bytes[at + 1], bytes[at + 2], bytes[at + 3]])
+    };
+    let (size, start) = (word(&end, 12), word(&end, 16));
+    file.seek(SeekFrom::Start(u64::from(start)))?;
+    let mut directory = Vec::new();
+    file.take(u64::from(size)).read_to_end(&mut directory)?;
+    file.seek(SeekFrom::Start(0))?;
+    let mut seen: BTreeMap<&[u8], [u32; 2]> = BTreeMap::new();
+    let mut rest = directory.as_slice();
+    while rest.len() >= HEADER && rest.starts_with(b"PK\x01\x02") {
+        let length = |at: usize| usize::from(u16::from_le_bytes([rest[at], rest[at + 1]]));
+        let (name, all) = (length(28), HEADER + length(28) + length(30) + length(32));
+        let (Some(name), Some(next)) = (rest.get(HEADER..HEADER + name), rest.get(all..)) else {
+            return Ok(false);
+        };
+        let content = [word(rest, 16), word(rest, 24)];
+        if seen.insert(name, content).is_some_and(|before| before != content) {
+            return Ok(false);
+        }
+        rest = next;
+    }
+    Ok(rest.is_empty())
+}
+
+/// The end record of an archive.
+fn end_record(file: &mut File) -> std::io::Result<Option<[u8; 22]>> {
     const RECORD: usize = 22;
     let length = file.seek(SeekFrom::End(0))?;
     let tail = length.min((RECORD + 0xffff) as u64);
@@ -274,9 +319,8 @@ fn stated_entries(file: &mut File) -> std::io::Result<Option<u64>> {
     file.take(tail).read_to_end(&mut bytes)?;
     file.seek(SeekFrom::Start(0))?;
     let starts = (0..(bytes.len() + 1).saturating_sub(RECORD)).rev();
-    let record = starts.map(|k| &bytes[k..k + RECORD]).find(|r| r.starts_with(b"PK\x05\x06"));
-    let count = record.map(|r| u16::from_le_bytes([r[10], r[11]]));
-    Ok(count.filter(|n| *n != u16::MAX).map(u64::from))
+    let mut records = starts.filter_map(|k| bytes[k..k + RECORD].try_into().ok());
+    Ok(records.find(|r: &[u8; RECORD]| r.starts_with(b"PK\x05\x06")))
 }
 
 #[cfg(test)]

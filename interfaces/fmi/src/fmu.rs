@@ -93,13 +93,14 @@ impl Fmu {
 
 /// A temporary folder that is locked while its process lives.
 #[derive(Debug)]
-struct Folder {
+pub(crate) struct Folder {
     folder: TempDir,
     _lock: File,
 }
 
 impl Folder {
-    fn new() -> std::io::Result<Self> {
+    /// Makes one, and removes those of processes that were killed.
+    pub(crate) fn new() -> std::io::Result<Self> {
         sweep();
         loop {
             let folder = tempfile::Builder::new().prefix(PREFIX).tempdir()?;
@@ -113,7 +114,8 @@ impl Folder {
         }
     }
 
-    fn path(&self) -> &Path {
+    /// Where it is.
+    pub(crate) fn path(&self) -> &Path {
         self.folder.path()
     }
 }

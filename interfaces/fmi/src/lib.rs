@@ -5,6 +5,8 @@
 //! and functions of the C interfaces are declared here from the text of the standards (Modelica Association, FMI
 //! 2.0.4 and 3.0.2).
 //!
+//! [`ssp::Package`] reads a system structure, several units with their connections and parameters.
+//!
 //! Every status of every call is looked at. What is not success becomes an [`Error`] that names the file, the
 //! function, the time and what the unit logged last; after `fatal` nothing of the instance is called again.
 
@@ -15,6 +17,7 @@ mod error;
 pub mod export;
 mod fmu;
 pub mod slave;
+pub mod ssp;
 
 pub use archive::Limits;
 pub use binary::{library_entry, platforms};

@@ -143,6 +143,20 @@ fn names_that_clash_are_refused() {
 }
 
 #[test]
+fn a_file_that_is_listed_twice_with_the_same_content_is_one_file() {
+    let good: Entry = ("modelDescription.xml", GOOD.as_bytes(), 0o644);
+    let mut twin = archive(&[good, ("aaaa", b"x", 0o644), ("aaab", b"x", 0o644)]);
+    for at in (0..twin.len() - 4).filter(|k| twin[*k..].starts_with(b"aaab")).collect::<Vec<_>>() {
+        twin[at + 3] = b'a';
+    }
+    let folder = tempfile::tempdir().expect("a folder");
+    let path = folder.path().join("twin.fmu");
+    std::fs::write(&path, &twin).expect("written");
+    let fmu = Fmu::open(&path).expect("a unit");
+    assert_eq!(std::fs::read(fmu.folder().join("aaaa")).expect("extracted"), b"x");
+}
+
+#[test]
 fn bombs_are_refused_before_they_are_unpacked() {
     let zeros = vec![0_u8; 40 << 20];
     let bomb =

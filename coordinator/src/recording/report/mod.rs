@@ -4,6 +4,7 @@
 
 mod cards;
 mod colour_map;
+mod exchange;
 pub(crate) mod figure;
 mod figures;
 pub(crate) mod footprints;
@@ -25,17 +26,25 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
     let recording = Recording::open(folder)?;
     let summary = Summary::read(folder).ok();
     let path = folder.join(REPORT);
-    std::fs::write(&path, render(&recording, summary.as_ref())?).map_err(at(&path))?;
+    let exchange = exchange::render(folder);
+    std::fs::write(&path, page(&recording, summary.as_ref(), exchange.as_deref())?).map_err(at(&path))?;
     Ok(path)
 }
 
-/// The page as text.
+/// The page as text, of the recording alone.
 pub fn render(recording: &Recording, summary: Option<&Summary>) -> Result<String> {
+    page(recording, summary, None)
+}
+
+fn page(recording: &Recording, summary: Option<&Summary>, exchange: Option<&str>) -> Result<String> {
     let legs = footprints::legs(recording);
     let mut page = page::Page::new(&title(recording));
     page.header(&setup::headline(recording, summary));
     page.section("At a glance", "figures", &cards::render(recording, summary));
     page.section("What was simulated", "setup", &setup::render(recording));
+    if let Some(html) = exchange {
+        page.section("How values went round", "exchange", html);
+    }
     if let Some(map) = ground_map::data(recording, &legs)? {
         page.section("The ground from above", "ground", ground_map::FRAME);
         page.data("map", map);

@@ -234,6 +234,7 @@ pub fn scenario(strategy: &str) -> Scenario {
         glue: Vec::new(),
         connections: Vec::new(),
         events: Vec::new(),
+        faults: Vec::new(),
         source,
     }
 }

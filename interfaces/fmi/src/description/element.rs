@@ -8,6 +8,9 @@ use std::path::Path;
 /// Deepest nesting that is accepted; the standard needs about ten levels, annotations of tools a few more.
 const DEPTH: usize = 200;
 
+/// Beginning of the namespaces of system structures; those of FMI have none.
+const SSP: &str = "http://ssp-standard.org/SSP";
+
 /// The file that is read.
 pub struct Reader<'a> {
     pub path: &'a Path,
@@ -104,10 +107,10 @@ impl<'a> Element<'a> {
         Error::Unsupported { path: self.reader.path.into(), message: message.into() }
     }
 
-    /// Child elements of the standard; those of foreign namespaces are not looked at.
+    /// Child elements of the standards; those of foreign namespaces are not looked at.
     pub fn children(&self) -> impl Iterator<Item = Element<'a>> + use<'a> {
         let (reader, document) = (self.reader, self.document);
-        let own = |n: &Node| n.is_element() && n.tag_name().namespace().is_none();
+        let own = |n: &Node| n.is_element() && n.tag_name().namespace().is_none_or(|n| n.starts_with(SSP));
         self.node.children().filter(own).map(move |node| Element { reader, document, node })
     }
 

@@ -1,10 +1,10 @@
 //! What a unit says of itself: `modelDescription.xml` of FMI 2.0 and 3.0 as one plain structure.
 
-mod element;
+pub(crate) mod element;
 mod model;
 mod structure;
 mod terminals;
-mod types;
+pub(crate) mod types;
 mod variables;
 
 pub use model::*;
@@ -37,7 +37,7 @@ pub fn read(path: &Path, bytes: &[u8], terminals: Option<&[u8]>) -> Result<Model
     Ok(description)
 }
 
-fn parse<'a>(reader: &Reader, text: &'a str) -> Result<Document<'a>> {
+pub(crate) fn parse<'a>(reader: &Reader, text: &'a str) -> Result<Document<'a>> {
     let options = ParsingOptions { allow_dtd: false, nodes_limit: NODES, ..ParsingOptions::default() };
     reader.depth(text)?;
     Document::parse_with_options(text, options).map_err(|e| reader.error(e.pos().row, "xml", e.to_string()))

@@ -9,8 +9,12 @@ const BASE: [&str; 8] = ["kg", "m", "s", "A", "K", "mol", "cd", "rad"];
 
 /// Units whose base unit is given; the others are names without a meaning.
 pub fn units(root: &Element) -> Result<Vec<(String, Unit)>> {
+    root.child("UnitDefinitions").map_or(Ok(Vec::new()), |list| listed(&list))
+}
+
+/// The same below the element that holds the list.
+pub fn listed(list: &Element) -> Result<Vec<(String, Unit)>> {
     let mut all = Vec::new();
-    let Some(list) = root.child("UnitDefinitions") else { return Ok(all) };
     for element in list.children().filter(|e| e.name() == "Unit") {
         let name = element.required("name")?;
         let Some(base) = element.child("BaseUnit") else { continue };

@@ -51,6 +51,7 @@ impl From<c_int> for Status {
 
 impl Slave {
     /// Calls a function that must succeed.
+    #[inline]
     pub(super) fn call<F>(
         &self,
         function: &'static str,
@@ -82,6 +83,7 @@ impl Slave {
     }
 
     /// Calls a function and answers its status; what may not be called is an error.
+    #[inline]
     pub(super) fn status<F>(
         &self,
         function: &'static str,

@@ -77,14 +77,24 @@ impl LogBook {
     }
 
     /// A call begins: its lines count anew.
+    #[inline]
     pub fn begin(&self) {
-        if !self.said.load(Ordering::Relaxed) {
-            return;
+        if self.said.load(Ordering::Relaxed) {
+            self.forget();
         }
+    }
+
+    #[cold]
+    fn forget(&self) {
         self.said.store(false, Ordering::Relaxed);
         let mut lines = self.lines.lock().unwrap_or_else(PoisonError::into_inner);
         lines.this_call = 0;
         lines.kept.clear();
+    }
+
+    /// A warning of ours about the unit.
+    pub fn note(&self, text: &str) {
+        (self.sink)(&LogLine { level: LogLevel::Warning, text: text.to_owned() });
     }
 
     /// What the call that failed has said.

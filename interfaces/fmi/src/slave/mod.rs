@@ -66,6 +66,8 @@ pub struct Slave {
     phase: Phase,
     event_mode: bool,
     warnings: Cell<u64>,
+    /// Whether it was said that its clock runs ahead.
+    ran_past: Cell<bool>,
     // The order matters: call-backs and log outlive the instance, the library both, the folder all.
     log: Arc<LogBook>,
     _callbacks: Option<Box<Callbacks2>>,
@@ -149,6 +151,7 @@ impl Slave {
             phase: Phase::Instantiated,
             event_mode,
             warnings: Cell::new(0),
+            ran_past: Cell::new(false),
             log,
             _callbacks: callbacks,
             loaded,

@@ -41,7 +41,8 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
     coarse("fine", "v[2] = 1 + 0.5 * v[0];", "0.5")?;
     let text = scenario(&[("a", "coarse"), ("b", "fine")], &[("b.y", "a.u"), ("a.y", "b.u")]);
     let solved_so = built(folder, &text)?;
-    let asked = solved_so.read("a.asked").unwrap_or(f64::NAN).min(solved_so.read("b.asked").unwrap_or(f64::NAN));
+    let asked =
+        solved_so.read("a.asked").unwrap_or(f64::NAN).min(solved_so.read("b.asked").unwrap_or(f64::NAN));
     let text = scenario(&[("a", "one"), ("b", "same")], &[("b.y", "a.u"), ("a.y", "b.u")]);
     let said = testbed(folder, &text).err().map(|e| e.to_string()).unwrap_or_default();
     let named = ["a.y → b.u", "b.y → a.u", "no solution"].iter().all(|word| said.contains(word));

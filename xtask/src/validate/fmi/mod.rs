@@ -18,7 +18,7 @@ use terraglue::testbed::Options;
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     let folder = context.scratch.join("fmi");
     std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    let mut all = pair::figures(&folder)?;
+    let mut all = pair::figures(&folder, !context.quick)?;
     all.extend(loops::figures(&folder)?);
     all.extend(cycles::figures(&folder, context.quick)?);
     all.extend(reference::figures(context)?);

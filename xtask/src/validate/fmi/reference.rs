@@ -1,5 +1,8 @@
 //! The Modelica Reference FMUs, built outside the repository: `TERRAGLUE_FMU_DIR` holds them and their tables
 //! `NAME_out.csv`, in any subfolder.
+//!
+//! The table of Feedthrough was made without its inputs; with them every whole number, truth value and text must come out as it
+//! went in. Roberts has no table of its own: it is held against the solution in the literature.
 
 use crate::process::{Outcome, command};
 use crate::validate::{Context, Figure, Limit};
@@ -29,19 +32,45 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
         let id = format!("fmi.reference.{number}.{name}");
         match tables.get(&name) {
             None if name == "Clocks" => refused(id, unit),
+            _ if name == "Roberts" => judged(id, roberts(context, unit)),
             None => Figure::skipped(id, format!("{}: there is no {name}_out.csv", unit.display())),
-            Some(table) => match worst(context, unit, table) {
-                Ok(share) => Figure::new(
-                    id,
-                    share,
-                    Limit::AtMost(SHARE),
-                    "largest difference over the range, away from events",
-                ),
-                Err(why) => Figure::new(id, f64::NAN, Limit::AtMost(SHARE), why.replace(['\n', '\t'], " ")),
-            },
+            Some(table) => judged(id, worst(context, unit, table)),
         }
     };
     Ok(units.enumerate().map(figure).collect())
+}
+
+fn judged(id: String, share: Outcome<f64>) -> Figure {
+    let what = "largest difference over the range, away from events";
+    match share {
+        Ok(share) => Figure::new(id, share, Limit::AtMost(SHARE), what),
+        Err(why) => Figure::new(id, f64::NAN, Limit::AtMost(SHARE), why.replace(['\n', '\t'], " ")),
+    }
+}
+
+/// Robertson's reaction from 0 s to 40 s in steps of 0.4 s, against y1 and y3 at 0.4, 4 and 40 s (Hindmarsh 1980, ODEPACK).
+fn roberts(context: &Context, unit: &Path) -> Outcome<f64> {
+    const KNOWN: [(usize, f64, f64); 3] =
+        [(1, 9.8517e-1, 1.4794e-2), (10, 9.0551e-1, 9.4462e-2), (100, 7.1583e-1, 2.8416e-1)];
+    let mut run = command(&context.program, &["fmu", "run"]);
+    run.arg(unit).args(["--start-time", "0", "--stop", "40", "--step", "0.4", "--output", "y1,y3"]);
+    let (_, rows) = read(&output(&mut run)?);
+    let mut worst = 0.0_f64;
+    for (row, y1, y3) in KNOWN {
+        let cell = |k: usize| rows.get(row).and_then(|r| r.get(k)?.parse::<f64>().ok()).unwrap_or(f64::NAN);
+        let off = (cell(1) - y1).abs().max((cell(2) - y3).abs());
+        worst = if off.is_nan() { f64::INFINITY } else { worst.max(off) };
+    }
+    Ok(worst)
+}
+
+/// What a run writes to standard output.
+fn output(run: &mut std::process::Command) -> Outcome<String> {
+    let done = run.output().map_err(|e| e.to_string())?;
+    if !done.status.success() {
+        return Err(String::from_utf8_lossy(&done.stderr).into_owned());
+    }
+    Ok(String::from_utf8_lossy(&done.stdout).into_owned())
 }
 
 /// Whether a unit made for scheduled execution is refused by its name.
@@ -69,7 +98,7 @@ fn read(text: &str) -> Table {
 
 /// Runs a unit on the times of its table. Rows beside a jump are left out; texts and whole numbers must be equal.
 fn worst(context: &Context, unit: &Path, table: &Path) -> Outcome<f64> {
-    let (names, rows) = read(&std::fs::read_to_string(table).map_err(|e| e.to_string())?);
+    let (names, rows) = expanded(read(&std::fs::read_to_string(table).map_err(|e| e.to_string())?));
     let time = |row: &[String]| row.first().and_then(|t| t.parse::<f64>().ok()).unwrap_or(f64::NAN);
     let (Some(first), Some(last)) = (rows.first(), rows.last()) else {
         return Err("the table is empty".into());
@@ -79,19 +108,22 @@ fn worst(context: &Context, unit: &Path, table: &Path) -> Outcome<f64> {
     run.arg(unit).args(["--stop", &time(last).to_string(), "--step", &step.to_string()]);
     // Tables are written for both versions; a unit of FMI 2 has some of their columns only.
     let (description, _) = terraglue_fmi::Fmu::inspect(unit).map_err(|e| e.to_string())?;
-    let has = |name: &&String| description.position(name).is_some();
-    let wanted: Vec<&String> = names[1..].iter().filter(has).collect();
-    run.args(["--output", &wanted.iter().map(|n| n.as_str()).collect::<Vec<_>>().join(",")]);
+    let mut wanted: Vec<&str> = names[1..].iter().map(|n| n.split('[').next().unwrap_or(n)).collect();
+    wanted.retain(|name| description.position(name).is_some());
+    wanted.dedup();
+    let outputs = ["--output".to_owned(), wanted.join(",")];
+    run.args(&outputs);
     let input =
         table.with_file_name(table.file_name().unwrap_or_default().to_string_lossy().replace("_out", "_in"));
+    let (own, ours) = read(&output(&mut run)?);
     if let Ok(text) = std::fs::read_to_string(&input) {
-        run.arg("--input").arg(kept(context, &text, |name| description.position(name).is_some())?);
+        let kept = kept(context, &text, |name| description.position(name).is_some())?;
+        let mut fed = command(&context.program, &["fmu", "run"]);
+        fed.arg(unit).args(["--stop", &time(last).to_string(), "--step", &step.to_string()]);
+        fed.arg("--input").arg(&kept).args(&outputs);
+        let inputs = read(&std::fs::read_to_string(&kept).map_err(|e| e.to_string())?);
+        fed_through(&inputs, &read(&output(&mut fed)?))?;
     }
-    let done = run.output().map_err(|e| e.to_string())?;
-    if !done.status.success() {
-        return Err(String::from_utf8_lossy(&done.stderr).into_owned());
-    }
-    let (own, ours) = read(&String::from_utf8_lossy(&done.stdout));
     if ours.len() != rows.len() {
         return Err(format!("{} rows, the table has {}", ours.len(), rows.len()));
     }
@@ -105,6 +137,46 @@ fn worst(context: &Context, unit: &Path, table: &Path) -> Outcome<f64> {
         worst = worst.max(difference(name, &a, &b)?);
     }
     Ok(worst)
+}
+
+/// Splits columns whose cells are arrays of numbers into one for each element.
+fn expanded((names, rows): Table) -> Table {
+    let split = |cell: &str| -> Option<Vec<String>> {
+        let words: Vec<String> = cell.split_whitespace().map(str::to_owned).collect();
+        (words.len() > 1 && words.iter().all(|w| w.parse::<f64>().is_ok())).then_some(words)
+    };
+    let sizes: Vec<usize> = (0..names.len())
+        .map(|c| rows.first().and_then(|r| split(r.get(c)?)).map_or(0, |w| w.len()))
+        .collect();
+    let name = |(name, size): (&String, &usize)| match size {
+        0 => vec![name.clone()],
+        n => (1..=*n).map(|k| format!("{name}[{k}]")).collect(),
+    };
+    let row = |row: &Vec<String>| {
+        let cells = row.iter().zip(&sizes);
+        cells
+            .flat_map(|(c, size)| split(c).filter(|_| *size > 0).unwrap_or_else(|| vec![c.clone()]))
+            .collect()
+    };
+    (names.iter().zip(&sizes).flat_map(name).collect(), rows.iter().map(row).collect())
+}
+
+/// Whether every whole number comes out of `NAME_output` as it went into `NAME_input` a step before.
+fn fed_through((names, inputs): &Table, (outputs, rows): &Table) -> Outcome {
+    let time = |row: &[String]| row.first().and_then(|t| t.parse::<f64>().ok()).unwrap_or(f64::NAN);
+    for (column, name) in names.iter().enumerate().skip(1) {
+        let output = name.replace("_input", "_output");
+        let Some(place) = outputs.iter().position(|n| *n == output) else { continue };
+        for pair in rows.windows(2) {
+            let told = inputs.iter().rev().find(|r| time(r) <= time(&pair[0]) + 1e-9).or(inputs.first());
+            let told = told.and_then(|r| r.get(column)).cloned().unwrap_or_default();
+            let found = &pair[1][place];
+            if told.parse::<i128>().is_ok() && *found != told {
+                return Err(format!("`{output}` is {found} after {told} at t = {} s", pair[0][0]));
+            }
+        }
+    }
+    Ok(())
 }
 
 /// A copy of a table of inputs with the columns that a unit has.

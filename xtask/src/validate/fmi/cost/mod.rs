@@ -1,7 +1,7 @@
 //! What units cost: per communication step beside a bare loop in C and other masters, over two cores, and in isolation.
 
 mod exchange;
-mod peers;
+pub mod peers;
 mod steps;
 mod two_cores;
 

@@ -4,11 +4,11 @@ use super::steps::{CASES, unit};
 use crate::process::{Outcome, command, target};
 use crate::validate::{Figure, Limit};
 use std::path::{Path, PathBuf};
-use std::process::Stdio;
+use std::process::{Command, Stdio};
 
 const SCRIPT: &str = "xtask/src/validate/fmi/cost/peers.py";
-const PACKAGES: [&str; 5] =
-    ["fmpy==0.3.32", "ecospy==0.7.2", "tbb", "libcosimpy==0.0.6", "fmu-manipulation-toolbox"];
+const PACKAGES: [&str; 6] =
+    ["fmpy==0.3.32", "ecospy==0.7.2", "tbb", "libcosimpy==0.0.6", "fmu-manipulation-toolbox", "pyfmi"];
 
 /// Figures of all peers; none of them is judged.
 pub fn figures(folder: &Path) -> Vec<Figure> {
@@ -24,30 +24,36 @@ fn measured(folder: &Path) -> Outcome<Vec<Figure>> {
             let mut child = command(&python, &[SCRIPT, peer]);
             child.arg(&file).arg(case.units.to_string()).arg(if case.pair { "pair" } else { "chain" });
             child.arg(folder.join("bare_loop"));
-            child.env("LD_LIBRARY_PATH", target().join("peers-fmi/lib"));
-            let output = child.output().map_err(|e| format!("{SCRIPT}: {e}"))?;
-            let text = String::from_utf8_lossy(&output.stdout).into_owned();
-            let value = text.lines().find_map(|l| l.strip_prefix("RESULT ")?.trim().parse().ok());
             let id = format!("fmi.cost.peer.{peer}.{}", case.name);
+            let value = result(child).and_then(|t| t.trim().parse().map_err(|_| format!("it said {t}")));
             all.push(match value {
-                Some(value) => Figure::new(
+                Ok(value) => Figure::new(
                     id,
                     value,
                     Limit::None,
                     format!("µs of CPU per unit and step, nothing recorded: {peer}"),
                 ),
-                None => {
-                    let said = String::from_utf8_lossy(&output.stderr).into_owned();
-                    Figure::skipped(id, said.trim().lines().last().unwrap_or("it said nothing").to_owned())
-                }
+                Err(why) => Figure::skipped(id, why),
             });
         }
     }
     Ok(all)
 }
 
+/// What a script says after `RESULT`, or the last line of its complaint.
+pub fn result(mut script: Command) -> Outcome<String> {
+    script.env("LD_LIBRARY_PATH", target().join("peers-fmi/lib"));
+    let output = script.output().map_err(|e| e.to_string())?;
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let found = text.lines().find_map(|l| l.strip_prefix("RESULT ")).map(str::to_owned);
+    found.ok_or_else(|| {
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        said.trim().lines().last().unwrap_or("it said nothing").to_owned()
+    })
+}
+
 /// The Python of `target/peers-fmi`, with what could be installed of the peers.
-fn python() -> Outcome<PathBuf> {
+pub fn python() -> Outcome<PathBuf> {
     let folder = target().join("peers-fmi");
     let python = folder.join("bin/python");
     if python.exists() {

@@ -14,7 +14,7 @@ const TURNS: u32 = 25;
 
 pub fn figure(folder: &Path) -> Outcome<Figure> {
     // a few thousand dependent operations: 20 to 40 µs
-    let work = "double x = v[1]; for (int i = 0; i < 8000; i++) x = x * 0.999 + h * v[0]; v[1] = x;";
+    let work = "double x = v[1]; for (int i = 0; i < 16000; i++) x = x * 0.999 + h * v[0]; v[1] = x;";
     units::build(folder, "heavy", &[("u", 'i', 1.0), ("y", 'o', 0.0)], "", work)?;
     let tables: String =
         (0..UNITS).map(|k| format!("[u{k}]\nfmu = \"heavy.fmu\"\nrollback = false\n")).collect();

@@ -1,0 +1,167 @@
+//! Parameter sets of a system structure as start values of its units.
+//!
+//! Outer bindings go before inner ones, later ones before earlier ones of the same element. A binding with a mapping
+//! gives what is mapped and nothing else.
+
+use super::network::{Key, Network, below, changed, refused, shown};
+use std::collections::BTreeMap;
+use terraglue_fmi::Result;
+use terraglue_fmi::ssp::{Binding, Element, Package, Parameter, System, Transformation, Value};
+use terraglue_subsystem::{ValueType, unit::Unit};
+
+/// Start values by the path of the unit and the name of the variable.
+#[derive(Default)]
+pub struct Values {
+    /// What a variable starts with.
+    pub start: BTreeMap<Key, Value>,
+    /// Parameters that fit nothing.
+    pub notes: Vec<String>,
+}
+
+/// A parameter on its way to a variable.
+struct Given<'a> {
+    target: String,
+    parameter: &'a Parameter,
+    transformation: Transformation,
+}
+
+/// Start values of all units.
+///
+/// # Errors
+/// A value that cannot be converted.
+pub fn values(package: &Package, network: &Network) -> Result<Values> {
+    let mut values = Values::default();
+    of_system(package, network, "", &package.structure().system, &mut values)?;
+    Ok(values)
+}
+
+fn of_system(
+    package: &Package,
+    network: &Network,
+    path: &str,
+    system: &System,
+    values: &mut Values,
+) -> Result {
+    for element in &system.elements {
+        let inner = below(path, element.name());
+        match element {
+            Element::System(nested) => of_system(package, network, &inner, nested, values)?,
+            Element::Component(component) => {
+                for given in component.bindings.iter().flat_map(|b| given(b, values)).collect::<Vec<_>>() {
+                    set(package, network, (inner.clone(), given.target.clone()), &given, values)?;
+                }
+            }
+        }
+    }
+    for given in system.bindings.iter().flat_map(|b| given(b, values)).collect::<Vec<_>>() {
+        to_system(package, network, path, system, given, values)?;
+    }
+    Ok(())
+}
+
+/// What a binding gives, under the names of the element that it is bound to.
+fn given<'a>(binding: &'a Binding, values: &mut Values) -> Vec<Given<'a>> {
+    let name = |p: &Parameter| format!("{}{}", binding.prefix, p.name);
+    let Some(mapping) = &binding.mapping else {
+        let plain = Transformation::default();
+        let own = |p: &'a Parameter| Given { target: name(p), parameter: p, transformation: plain };
+        return binding.parameters.iter().map(own).collect();
+    };
+    let mut all = Vec::new();
+    for entry in mapping {
+        match binding.parameters.iter().find(|p| name(p) == entry.source) {
+            Some(parameter) => {
+                let (target, transformation) = (entry.target.clone(), entry.transformation);
+                all.push(Given { target, parameter, transformation });
+            }
+            None => values.notes.push(format!("a mapping names `{}`, which no set has", entry.source)),
+        }
+    }
+    all
+}
+
+/// Gives a parameter to a connector of a system, or to an element of it by a dotted name.
+fn to_system(
+    package: &Package,
+    network: &Network,
+    path: &str,
+    system: &System,
+    given: Given,
+    values: &mut Values,
+) -> Result {
+    if system.connectors.iter().any(|c| c.name == given.target) {
+        return along(package, network, (path.to_owned(), given.target.clone()), &given, values);
+    }
+    let inside = |e: &&Element| given.target.strip_prefix(e.name()).is_some_and(|rest| rest.starts_with('.'));
+    let Some(element) = system.elements.iter().filter(inside).max_by_key(|e| e.name().len()) else {
+        values.notes.push(format!("the parameter {} fits nothing", shown(&(path.to_owned(), given.target))));
+        return Ok(());
+    };
+    let target = given.target[element.name().len() + 1..].to_owned();
+    let inner = below(path, element.name());
+    match element {
+        Element::System(nested) => {
+            to_system(package, network, &inner, nested, Given { target, ..given }, values)
+        }
+        Element::Component(_) => set(package, network, (inner, target), &given, values),
+    }
+}
+
+/// Gives a parameter to all units that a connector of a system leads to.
+fn along(package: &Package, network: &Network, key: Key, given: &Given, values: &mut Values) -> Result {
+    let unit = network.unit(&key);
+    let Some((a, b)) = changed((1.0, 0.0), given.parameter.unit, unit, given.transformation) else {
+        return Err(dimensions(package, &key));
+    };
+    let ends = network.leads_to(package, &key, (a, b), unit.or(given.parameter.unit))?;
+    if ends.is_empty() {
+        values.notes.push(format!("the parameter {} leads to no unit", shown(&key)));
+    }
+    for (end, affine) in ends {
+        keep(package, network, end, &given.parameter.value, affine, values)?;
+    }
+    Ok(())
+}
+
+/// Gives a parameter to a variable of a unit.
+fn set(package: &Package, network: &Network, key: Key, given: &Given, values: &mut Values) -> Result {
+    let own: Option<Unit> = network.unit(&key);
+    match changed((1.0, 0.0), given.parameter.unit, own, given.transformation) {
+        Some(affine) => keep(package, network, key, &given.parameter.value, affine, values),
+        None => Err(dimensions(package, &key)),
+    }
+}
+
+fn dimensions(package: &Package, key: &Key) -> terraglue_fmi::Error {
+    refused(package, format!("the parameter {}: {}", shown(key), super::network::DIMENSIONS))
+}
+
+fn keep(
+    package: &Package,
+    network: &Network,
+    key: Key,
+    value: &Value,
+    (a, b): (f64, f64),
+    values: &mut Values,
+) -> Result {
+    let Some(variable) = network.part(&key.0).and_then(|part| part.variable(&key.1)) else {
+        values.notes.push(format!("the parameter {} fits nothing", shown(&key)));
+        return Ok(());
+    };
+    let plain = (a, b) == (1.0, 0.0);
+    let real = matches!(variable.value_type, ValueType::F64 | ValueType::F32);
+    let number = match value {
+        Value::Real(x) => Some(a * x + b),
+        Value::Integer(n) if !plain => Some(a * *n as f64 + b),
+        _ => None,
+    };
+    let value = match (number, value) {
+        (Some(x), _) if real => Value::Real(x),
+        (Some(x), _) if x.fract() == 0.0 && x.abs() < 9e15 => Value::Integer(x as i64),
+        (Some(x), _) => return Err(refused(package, format!("{} takes no {x}", shown(&key)))),
+        (None, other) if plain => other.clone(),
+        (None, _) => return Err(refused(package, format!("{} is no number to be transformed", shown(&key)))),
+    };
+    values.start.insert(key, value);
+    Ok(())
+}

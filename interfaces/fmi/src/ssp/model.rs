@@ -1,0 +1,155 @@
+//! A system structure as plain data: systems, components, connectors, connections, parameters.
+
+use terraglue_subsystem::unit::Unit;
+
+/// `SystemStructure.ssd`.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Structure {
+    /// Name.
+    pub name: String,
+    /// The outermost system.
+    pub system: System,
+    /// Start of the default experiment, s.
+    pub start_s: Option<f64>,
+    /// End of the default experiment, s.
+    pub stop_s: Option<f64>,
+}
+
+/// A system: elements, and how they are connected.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct System {
+    /// Name.
+    pub name: String,
+    /// Its own connectors.
+    pub connectors: Vec<Connector>,
+    /// Parameters for all that is inside.
+    pub bindings: Vec<Binding>,
+    /// Components and systems.
+    pub elements: Vec<Element>,
+    /// Between connectors of elements and its own.
+    pub connections: Vec<Connection>,
+}
+
+/// What a system consists of.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Element {
+    /// A unit.
+    Component(Component),
+    /// A nested system.
+    System(System),
+}
+
+impl Element {
+    /// Name.
+    pub fn name(&self) -> &str {
+        match self {
+            Self::Component(c) => &c.name,
+            Self::System(s) => &s.name,
+        }
+    }
+}
+
+/// A functional mock-up unit inside a system.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Component {
+    /// Name.
+    pub name: String,
+    /// File, relative to the structure's folder.
+    pub source: String,
+    /// Connectors.
+    pub connectors: Vec<Connector>,
+    /// Parameters.
+    pub bindings: Vec<Binding>,
+}
+
+/// A connector.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Connector {
+    /// Name: that of a variable of the unit.
+    pub name: String,
+    /// Unit where the structure gives one that has a meaning; it goes before that of the FMU.
+    pub unit: Option<Unit>,
+}
+
+/// A connection.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Connection {
+    /// Where it comes from.
+    pub start: End,
+    /// Where it goes to.
+    pub end: End,
+    /// How the value changes on the way.
+    pub transformation: Transformation,
+}
+
+/// An end of a connection.
+#[derive(Clone, Debug, PartialEq)]
+pub struct End {
+    /// Element; none: the system itself.
+    pub element: Option<String>,
+    /// Connector.
+    pub connector: String,
+}
+
+/// How a value changes: target = factor · value + offset, after the conversion of units.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Transformation {
+    /// Factor.
+    pub factor: f64,
+    /// Offset.
+    pub offset: f64,
+    /// Whether units are left alone.
+    pub keeps_unit: bool,
+}
+
+impl Default for Transformation {
+    fn default() -> Self {
+        Self { factor: 1.0, offset: 0.0, keeps_unit: false }
+    }
+}
+
+/// A parameter set that is bound to a system or a component.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Binding {
+    /// Stands before the names of all parameters.
+    pub prefix: String,
+    /// Values.
+    pub parameters: Vec<Parameter>,
+    /// Which parameter goes where; none: each to its own name.
+    pub mapping: Option<Vec<MappingEntry>>,
+}
+
+/// A parameter with its value.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Parameter {
+    /// Name.
+    pub name: String,
+    /// Value.
+    pub value: Value,
+    /// Unit of the value, where it has a meaning.
+    pub unit: Option<Unit>,
+}
+
+/// A value.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Value {
+    /// Real.
+    Real(f64),
+    /// Integer.
+    Integer(i64),
+    /// Truth value.
+    Boolean(bool),
+    /// Text, or the name of an item of an enumeration.
+    Text(String),
+}
+
+/// An entry of a parameter mapping.
+#[derive(Clone, Debug, PartialEq)]
+pub struct MappingEntry {
+    /// Parameter of the set.
+    pub source: String,
+    /// Parameter of the system or component.
+    pub target: String,
+    /// How the value changes on the way.
+    pub transformation: Transformation,
+}

@@ -1,0 +1,181 @@
+//! Reads `SystemStructure.ssd`.
+
+use super::{
+    Component, Connection, Connector, Element as Inner, End, Files, Structure, System, Transformation,
+    parameters,
+};
+use crate::description::element::{Element, Reader};
+use crate::description::{parse, types};
+use crate::error::Result;
+use terraglue_subsystem::unit::Unit;
+
+/// Deepest nesting of systems, those in files of their own counted.
+const DEPTH: usize = 50;
+
+/// Where something is read.
+#[derive(Clone, Copy)]
+pub struct Context<'a> {
+    /// Files that may be named.
+    pub files: &'a Files<'a>,
+    /// Units that the structure defines.
+    pub units: &'a [(String, Unit)],
+    /// Systems around it.
+    depth: usize,
+}
+
+impl Context<'_> {
+    /// What the name of a unit means: by `own` definitions, by those of the structure, or else in our reading.
+    pub fn unit(&self, name: &str, own: &[(String, Unit)]) -> Option<Unit> {
+        let defined = own.iter().chain(self.units).find(|(n, _)| n == name).map(|(_, unit)| *unit);
+        defined.or_else(|| Unit::parse(name).ok().filter(|_| !name.is_empty()))
+    }
+}
+
+/// Reads a description; `file` names it in errors.
+pub fn read(files: &Files, bytes: &[u8], file: &'static str) -> Result<Structure> {
+    read_at(files, bytes, file, 0)
+}
+
+fn read_at(files: &Files, bytes: &[u8], file: &'static str, depth: usize) -> Result<Structure> {
+    let reader = Reader { path: files.path, file };
+    let text = reader.text(bytes)?;
+    let document = parse(&reader, text)?;
+    let root = Element { reader: &reader, document: &document, node: document.root_element() };
+    if root.name() != "SystemStructureDescription" {
+        return Err(root.error("the root is not <SystemStructureDescription>: it is no system structure"));
+    }
+    let version = root.required("version")?;
+    if !version.starts_with("1.") && !version.starts_with("2.") {
+        return Err(root.error(format!("version = \"{version}\": SSP 1.0 and 2.0 are known")));
+    }
+    let top = root.child("System").ok_or_else(|| root.error("has no <System>"))?;
+    let experiment = root.child("DefaultExperiment");
+    let time = |name: &str| experiment.map_or(Ok(None), |e| e.optional_number(name));
+    let units = root.child("Units").map_or(Ok(Vec::new()), |list| types::listed(&list))?;
+    Ok(Structure {
+        name: root.text("name").to_owned(),
+        system: system(Context { files, units: &units, depth }, &top)?,
+        start_s: time("startTime")?,
+        stop_s: time("stopTime")?,
+    })
+}
+
+fn system(context: Context, element: &Element) -> Result<System> {
+    if context.depth > DEPTH {
+        return Err(element.error(format!("systems are nested deeper than {DEPTH} levels")));
+    }
+    if let Some(dictionaries) = element.child("SignalDictionaries").filter(|d| d.children().next().is_some())
+    {
+        return Err(
+            dictionaries.error("signal dictionaries are not read here: connect the components directly")
+        );
+    }
+    let name = element.text("name").to_owned();
+    let mut elements: Vec<Inner> = Vec::new();
+    for inner in element.child("Elements").iter().flat_map(Element::children) {
+        let read = match inner.name() {
+            "Component" => component(context, &inner)?,
+            "System" => Inner::System(named(
+                system(Context { depth: context.depth + 1, ..context }, &inner)?,
+                &inner,
+            )?),
+            other => return Err(inner.error(format!("<{other}> is not read here"))),
+        };
+        if elements.iter().any(|e| e.name() == read.name()) {
+            return Err(
+                inner.error(format!("the name `{}` occurs twice in the system `{name}`", read.name()))
+            );
+        }
+        elements.push(read);
+    }
+    let connections = element.child("Connections").map_or(Ok(Vec::new()), |list| {
+        list.children().filter(|e| e.name() == "Connection").map(|e| connection(&e)).collect()
+    })?;
+    Ok(System {
+        name,
+        connectors: connectors(context, element)?,
+        bindings: parameters::bindings(context, element)?,
+        elements,
+        connections,
+    })
+}
+
+/// Elements need a name, the outermost system does not.
+fn named(system: System, element: &Element) -> Result<System> {
+    element.required("name").map(|_| system)
+}
+
+fn component(context: Context, element: &Element) -> Result<Inner> {
+    const UNIT: &str = "application/x-fmu-sharedlibrary";
+    const STRUCTURE: &str = "application/x-ssp-definition";
+    let name = element.required("name")?.to_owned();
+    let source = element.required("source")?;
+    let kind = element.attribute("type").unwrap_or(UNIT);
+    if kind == STRUCTURE {
+        let bytes = context.files.bytes(source)?;
+        let inner = read_at(context.files, &bytes, "a nested .ssd", context.depth + 1)?;
+        let mut bindings = inner.system.bindings;
+        bindings.extend(parameters::bindings(context, element)?);
+        return Ok(Inner::System(System { name, bindings, ..inner.system }));
+    }
+    if kind != UNIT {
+        return Err(element.error(format!("type = \"{kind}\": {UNIT} and {STRUCTURE} are read here")));
+    }
+    if element.text("implementation") == "ModelExchange" {
+        return Err(
+            element.error(format!("`{name}` is wanted for model exchange; co-simulation is run here"))
+        );
+    }
+    let path =
+        super::relative(source).map_err(|why| element.error(format!("source = \"{source}\" {why}")))?;
+    Ok(Inner::Component(Component {
+        name,
+        source: path.display().to_string(),
+        connectors: connectors(context, element)?,
+        bindings: parameters::bindings(context, element)?,
+    }))
+}
+
+fn connectors(context: Context, element: &Element) -> Result<Vec<Connector>> {
+    let Some(list) = element.child("Connectors") else { return Ok(Vec::new()) };
+    let one = |e: Element| -> Result<Connector> {
+        let unit = e.children().find_map(|of_type| of_type.attribute("unit"));
+        let unit = unit.and_then(|name| context.unit(name, &[]));
+        Ok(Connector { name: e.required("name")?.to_owned(), unit })
+    };
+    list.children().filter(|e| e.name() == "Connector").map(one).collect()
+}
+
+fn connection(element: &Element) -> Result<Connection> {
+    let end = |of: &str, connector: &str| -> Result<End> {
+        let element_name = element.attribute(of).map(str::to_owned);
+        Ok(End { element: element_name, connector: element.required(connector)?.to_owned() })
+    };
+    Ok(Connection {
+        start: end("startElement", "startConnector")?,
+        end: end("endElement", "endConnector")?,
+        transformation: transformation(element)?,
+    })
+}
+
+/// The transformation inside a connection or an entry of a mapping.
+pub fn transformation(element: &Element) -> Result<Transformation> {
+    let mut found =
+        Transformation { keeps_unit: element.flag("suppressUnitConversion")?, ..Transformation::default() };
+    for inner in element.children() {
+        match inner.name() {
+            "LinearTransformation" => {
+                found.factor = inner.optional_number("factor")?.unwrap_or(1.0);
+                found.offset = inner.optional_number("offset")?.unwrap_or(0.0);
+                if !(found.factor.is_finite() && found.offset.is_finite()) {
+                    return Err(inner.error("factor and offset must be finite"));
+                }
+            }
+            name if name.ends_with("MappingTransformation") => {
+                return Err(inner.error("tables as transformations are not read here; a linear one is"));
+            }
+            _ => {}
+        }
+    }
+    Ok(found)
+}

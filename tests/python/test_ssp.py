@@ -1,0 +1,184 @@
+"""System structures: run as they are, converted into a scenario, and refused where they cannot be read."""
+
+import csv
+import zipfile
+
+import pytest
+
+from cfmu import build
+from conftest import ROOT, terraglue
+from fmus import export
+
+NAMES = (
+    'xmlns:ssd="http://ssp-standard.org/SSP1/SystemStructureDescription" '
+    'xmlns:ssc="http://ssp-standard.org/SSP1/SystemStructureCommon" '
+    'xmlns:ssv="http://ssp-standard.org/SSP1/SystemStructureParameterValues" '
+    'xmlns:ssm="http://ssp-standard.org/SSP1/SystemStructureParameterMapping" version="1.0"'
+)
+UNITS = '<Unit name="m"><BaseUnit m="1"/></Unit>'
+
+# a gives 3 m; `inner` takes millimetres and doubles plus one metre; d is told millimetres, although it says metres
+SYSTEM = f"""<?xml version="1.0" encoding="UTF-8"?>
+<ssd:SystemStructureDescription {NAMES} name="plant">
+<ssd:System name="plant">
+ <ssd:ParameterBindings>
+  <ssd:ParameterBinding><ssd:ParameterValues><ssv:ParameterSet version="1.0" name="p"><ssv:Parameters>
+    <ssv:Parameter name="a.c"><ssv:Real value="300" unit="cm"/></ssv:Parameter>
+    <ssv:Parameter name="a.k"><ssv:Integer value="0"/></ssv:Parameter>
+    <ssv:Parameter name="inner.k"><ssv:Real value="5"/></ssv:Parameter>
+    <ssv:Parameter name="inner.b.n"><ssv:Integer value="4"/></ssv:Parameter>
+    <ssv:Parameter name="inner.b.s"><ssv:String value="&quot;b&quot;"/></ssv:Parameter>
+  </ssv:Parameters></ssv:ParameterSet></ssd:ParameterValues></ssd:ParameterBinding>
+  <ssd:ParameterBinding source="resources/gains.ssv" prefix="of.">
+    <ssd:ParameterMapping source="resources/gains.ssm"/></ssd:ParameterBinding>
+ </ssd:ParameterBindings>
+ <ssd:Elements>
+  <ssd:Component name="a" source="resources/line.fmu">
+   <ssd:Connectors><ssd:Connector name="y" kind="output"><ssc:Real/></ssd:Connector></ssd:Connectors>
+  </ssd:Component>
+  <ssd:System name="inner">
+   <ssd:Connectors>
+    <ssd:Connector name="in" kind="input"><ssc:Real unit="mm"/></ssd:Connector>
+    <ssd:Connector name="out" kind="output"><ssc:Real/></ssd:Connector>
+    <ssd:Connector name="k" kind="parameter"><ssc:Real/></ssd:Connector>
+   </ssd:Connectors>
+   <ssd:Elements><ssd:Component name="b" source="resources/line.fmu" type="application/x-fmu-sharedlibrary"/></ssd:Elements>
+   <ssd:Connections>
+    <ssd:Connection startConnector="in" endElement="b" endConnector="u">
+     <ssc:LinearTransformation factor="2" offset="1"/></ssd:Connection>
+    <ssd:Connection startElement="b" startConnector="y" endConnector="out"/>
+    <ssd:Connection startConnector="k" endElement="b" endConnector="k"/>
+   </ssd:Connections>
+  </ssd:System>
+  <ssd:Component name="d" source="resources/line.fmu">
+   <ssd:Connectors><ssd:Connector name="u" kind="input"><ssc:Real unit="mm"/></ssd:Connector></ssd:Connectors>
+   <ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues><ssv:ParameterSet version="1.0" name="own">
+     <ssv:Parameters><ssv:Parameter name="k"><ssv:Real value="99"/></ssv:Parameter>
+     <ssv:Parameter name="c"><ssv:Real value="0.25"/></ssv:Parameter></ssv:Parameters></ssv:ParameterSet>
+     </ssd:ParameterValues></ssd:ParameterBinding></ssd:ParameterBindings>
+  </ssd:Component>
+ </ssd:Elements>
+ <ssd:Connections>
+  <ssd:Connection startElement="a" startConnector="y" endElement="inner" endConnector="in"/>
+  <ssd:Connection startElement="inner" startConnector="out" endElement="d" endConnector="u"/>
+ </ssd:Connections>
+</ssd:System>
+<ssd:Units><ssc:Unit name="mm"><ssc:BaseUnit m="1" factor="0.001"/></ssc:Unit></ssd:Units>
+<ssd:DefaultExperiment startTime="0" stopTime="1"/>
+</ssd:SystemStructureDescription>"""
+
+GAINS = f"""<?xml version="1.0"?><ssv:ParameterSet {NAMES} name="gains"><ssv:Parameters>
+<ssv:Parameter name="d"><ssv:Real value="2"/></ssv:Parameter>
+<ssv:Parameter name="unused"><ssv:Real value="2"/></ssv:Parameter></ssv:Parameters></ssv:ParameterSet>"""
+MAPPING = f"""<?xml version="1.0"?><ssm:ParameterMapping {NAMES}>
+<ssm:MappingEntry source="of.d" target="d.k"><ssc:LinearTransformation factor="10" offset="0.5"/></ssm:MappingEntry>
+</ssm:ParameterMapping>"""
+
+
+@pytest.fixture(scope="session")
+def files(tmp_path_factory):
+    """The files of the structure: y = k·u + c in metres."""
+    folder = tmp_path_factory.mktemp("structure")
+    (folder / "resources").mkdir()
+    reals = [("u", "input", 0, "m"), ("y", "output", 0, "m"), ("k", "parameter", 1, ""), ("c", "parameter", 0, "m")]
+    reals.append(("n_seen", "output", 0, ""))
+    others = (
+        '<ScalarVariable name="n" valueReference="0" causality="parameter"><Integer start="1"/></ScalarVariable>'
+        '<ScalarVariable name="s" valueReference="0" causality="parameter"><String start="none"/></ScalarVariable>'
+    )
+    step = 'r[1] = r[2] * r[0] + r[3]; r[4] = i[0] + (strcmp(u->text, "\\"b\\"") ? 0 : 0.5);'
+    build(folder / "resources", "line", reals, step, others, UNITS)
+    (folder / "resources" / "gains.ssv").write_text(GAINS)
+    (folder / "resources" / "gains.ssm").write_text(MAPPING)
+    return folder
+
+
+def pack(files, path, text=SYSTEM, more=()):
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("SystemStructure.ssd", text)
+        for name in ("line.fmu", "gains.ssv", "gains.ssm"):
+            archive.write(files / "resources" / name, f"resources/{name}")
+        for name, content in more:
+            archive.writestr(name, content)
+    return path
+
+
+def run(path, out):
+    done = terraglue("run", path, "--csv", "--quiet", "--out", out)
+    assert done.returncode == 0, done.stderr
+    return list(csv.DictReader((out / "variables.csv").open()))
+
+
+def test_a_structure_runs_and_its_scenario_gives_the_same(files, tmp_path):
+    rows = run(pack(files, tmp_path / "plant.ssp"), tmp_path / "archive")
+    last = {name: float(value) for name, value in rows[-1].items() if name[:1] in "aid" and "." in name}
+    assert last["a.y"] == 3.0
+    assert last["inner_b.u"] == pytest.approx(7.0, rel=1e-15), "3000 mm are 3 m, doubled plus 1"
+    assert last["inner_b.y"] == pytest.approx(35.0, rel=1e-15) and last["inner_b.n_seen"] == 4.5
+    assert last["d.u"] == pytest.approx(35_000.0, rel=1e-15), "the unit of the structure goes before that of the FMU"
+    assert last["d.y"] == pytest.approx(20.5 * 35_000.0 + 0.25, rel=1e-15)
+    ssd = files / "plant.ssd"
+    ssd.write_text(SYSTEM)
+    assert run(ssd, tmp_path / "plain") == rows
+    for source in (tmp_path / "plant.ssp", ssd):
+        made = tmp_path / source.suffix[1:] / "scenario.toml"
+        made.parent.mkdir()
+        done = terraglue("convert", source, "-o", made)
+        assert done.returncode == 0 and "3 units, 2 connections" in done.stdout, done.stderr
+        assert run(made, tmp_path / f"out-{source.suffix[1:]}") == rows
+    done = terraglue("run", ssd, "--set", "d.start.k=1.0", "--set", "time.step_s=0.5", "--quiet", "--out", tmp_path / "x")
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_structure_of_exported_units_runs(tmp_path):
+    press = f"robot.model={ROOT}/models/bevameter.urdf"
+    sets = ("robot.fixed_base=true", "robot.motor=velocity", press)
+    unit = export("rigid-body", tmp_path / "press.fmu", *(word for edit in sets for word in ("--set", edit)))
+    text = f"""<ssd:SystemStructureDescription {NAMES} name="press"><ssd:System name="press"><ssd:Elements>
+<ssd:Component name="one" source="press.fmu"><ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues>
+<ssv:ParameterSet version="1.0" name="p"><ssv:Parameters><ssv:Parameter name="small_press.velocity_target">
+<ssv:Real value="0.02"/></ssv:Parameter></ssv:Parameters></ssv:ParameterSet></ssd:ParameterValues></ssd:ParameterBinding>
+</ssd:ParameterBindings></ssd:Component><ssd:Component name="two" source="press.fmu"/></ssd:Elements>
+<ssd:Connections><ssd:Connection startElement="one" startConnector="small_press.velocity" endElement="two"
+endConnector="small_press.velocity_target"/></ssd:Connections></ssd:System>
+<ssd:DefaultExperiment stopTime="0.1"/></ssd:SystemStructureDescription>"""
+    with zipfile.ZipFile(tmp_path / "press.ssp", "w") as archive:
+        archive.writestr("SystemStructure.ssd", text)
+        archive.write(unit, "press.fmu")
+    rows = run(tmp_path / "press.ssp", tmp_path / "out")
+    moved = [float(rows[-1][f"{name}.small_press.angle"]) for name in ("one", "two")]
+    assert moved[0] == pytest.approx(0.002, rel=0.05) and moved[1] == pytest.approx(moved[0], rel=0.1)
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('source="resources/line.fmu"', 'source="../line.fmu"', ["leads out of the folder", "SystemStructure.ssd:"]),
+        ('source="resources/line.fmu"', 'source="resources/lime.fmu"', ["lime.fmu"]),
+        ('endConnector="in"', 'endConnector="inn"', ["inner.inn"]),
+        ('startElement="inner"', 'startElement="outer"', ["outer"]),
+        ('m="1" factor="0.001"', 's="1" factor="0.001"', ["different dimensions", "a.y"]),
+        ('startTime="0"', 'startTime="3"', ["does not start at 0"]),
+        ("<ssc:LinearTransformation", "<ssc:BooleanMappingTransformation", ["tables as transformations"]),
+        ('name="inner"', 'name="a"', ["occurs twice"]),
+        ('endElement="d" endConnector="u"', 'endElement="inner" endConnector="in"', ["is fed by"]),
+        ('name="plant">\n<ssd:System', 'name="plant"><ssd:Sistem', ["SystemStructure.ssd:"]),
+    ],
+)
+def test_a_structure_that_is_wrong_is_refused_by_place(files, tmp_path, old, new, says):
+    assert old in SYSTEM
+    path = pack(files, tmp_path / "wrong.ssp", SYSTEM.replace(old, new))
+    done = terraglue("run", path, "--quiet", "--out", tmp_path / "out")
+    assert done.returncode == 2 and not (tmp_path / "out").exists(), done.stderr
+    flat = " ".join(done.stderr.replace("│", " ").split())
+    assert all(word in flat for word in says), done.stderr
+
+
+def test_an_archive_that_leads_out_of_its_folder_is_refused(files, tmp_path):
+    path = pack(files, tmp_path / "evil.ssp", more=[("../evil", "x")])
+    done = terraglue("convert", path)
+    assert done.returncode == 2 and "leads out" in done.stderr and not (tmp_path / "evil.toml").exists()
+    with zipfile.ZipFile(tmp_path / "empty.ssp", "w") as archive:
+        archive.writestr("other.ssd", SYSTEM)
+    done = terraglue("run", tmp_path / "empty.ssp")
+    assert done.returncode == 2 and "it is no SSP" in " ".join(done.stderr.split())

@@ -5,6 +5,7 @@
 //! | file | what |
 //! |---|---|
 //! | `module`, `schema`, `objects`, `placement` | from parameters and robot files to an instance on the ground |
+//! | `cut` | one part of a robot that a scenario divides at joints |
 //! | `robot` | an instance and the calls of the interface |
 //! | `model`, `state` | what stays and what changes |
 //! | `dynamics` | one step: joint rows, gyroscopic term, the whole KKT matrix, corrections |
@@ -20,6 +21,7 @@
 mod actuator;
 mod closure;
 mod contact;
+mod cut;
 mod dense;
 mod drive;
 mod dynamics;

@@ -4,6 +4,7 @@ use crate::actuator::{Actuator, Item, configure};
 use crate::closure::configure::closures;
 use crate::contact::bodies::{Law, Surface};
 use crate::contact::plane::Plane;
+use crate::cut;
 use crate::drive::{Mode, Motor};
 use crate::dynamics::Dynamics;
 use crate::dynamics::scheme::{Acceleration, Integrator, Weights};
@@ -53,9 +54,12 @@ impl Module for RigidBody {
             rotation: vector(&config, "rotation_rate_rad_s")?,
             joints: joint_rates(&model, &config.number_table("joint_rates")?)?,
         };
-        let bodies = start(&config, &*host, &mut model, base, (&angles, &rates))?;
+        let mut bodies = start(&config, &*host, &mut model, base, (&angles, &rates))?;
         let mut joints = joint_states((&config, said), &model, &angles, &rates.joints)?;
         without_own_motor(said, &model, &file.couplings, &mut joints);
+        let whole =
+            cut::Start { model: &mut model, bodies: &mut bodies, angles: &mut angles, joints: &mut joints };
+        cut::keep(&config, &base, whole, &mut file)?;
         model.closures = closures(&config, &model, (&bodies, &angles), (&file.couplings, &file.loops))?;
         file.warnings.iter().for_each(|w| host.log(LogLevel::Warning, w));
         file.notices.iter().for_each(|n| host.log(LogLevel::Info, n));

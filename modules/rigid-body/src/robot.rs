@@ -4,7 +4,7 @@ use crate::actuator::Item;
 use crate::actuator::battery::Draw;
 use crate::actuator::book::Outcome;
 use crate::contact::estimate::{Estimator, Problem};
-use crate::contact::ports::{Ports, committed, displacement, response};
+use crate::contact::ports::{Ports, committed, displacement, response, standing};
 use crate::drive::{FULL_BLOCK, Motor};
 use crate::dynamics::joint_rows::coordinate;
 use crate::dynamics::{Dynamics, Failure};
@@ -110,13 +110,29 @@ impl Robot {
             self.prepared = Some(wanted);
         }
         if stepped || self.step_ports != step.ports || self.ports.len() != step.n as usize {
-            self.step_ports.clear();
-            self.step_ports.extend_from_slice(step.ports);
-            if !self.ports.assign(step.ports, step.n as usize, &self.state.bodies) {
-                self.prepared = None;
-                return Err(Error::Refused("a port names a body that the robot does not have".into()));
-            }
+            self.assign(step)?;
         }
+        Ok(())
+    }
+
+    fn assign(&mut self, step: &Step) -> Result {
+        self.step_ports.clear();
+        self.step_ports.extend_from_slice(step.ports);
+        if !self.ports.assign(step.ports, step.n as usize, &self.state.bodies) {
+            self.prepared = None;
+            return Err(Error::Refused("a port names a body that the robot does not have".into()));
+        }
+        Ok(())
+    }
+
+    /// A step of no length: accelerations at t under T, for the forces of glued joints at the start.
+    fn stand_still(&mut self, step: &Step, t: &[f64], out: &mut Response) -> Result {
+        self.prepared = None;
+        self.assign(step)?;
+        self.dynamics.h = 0.0;
+        self.ports.load(&mut self.dynamics, t);
+        self.dynamics.stand_still(&self.state).map_err(failed)?;
+        standing(step.ports, &self.dynamics, out);
         Ok(())
     }
 
@@ -334,13 +350,17 @@ impl Subsystem for Robot {
 
     fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result {
         let Input::Force { t, .. } = input else { return Err(Error::Unsupported) };
-        self.prepare(step)?;
         self.trial = false;
         if let Some(bad) = t.iter().position(|t| !t.is_finite()) {
             return Err(Error::Refused(format!("component {bad} of the wrench is not a finite number")));
         }
-        self.try_wrenches(t)?;
-        response(step.ports, &self.dynamics, out);
+        if step.h == 0.0 {
+            self.stand_still(step, t, out)?;
+        } else {
+            self.prepare(step)?;
+            self.try_wrenches(t)?;
+            response(step.ports, &self.dynamics, out);
+        }
         out.t.copy_from_slice(t);
         out.reached = step.t + step.h;
         self.trial = true;
@@ -348,9 +368,12 @@ impl Subsystem for Robot {
     }
 
     fn interface_jacobian(&mut self, step: &Step, level: Level, out: &mut [f64]) -> Result {
-        self.prepare(step)?;
-        self.dynamics.ensure_factor().map_err(failed)?;
+        if step.h > 0.0 {
+            self.prepare(step)?;
+            self.dynamics.ensure_factor().map_err(failed)?;
+        }
         let per = match level {
+            _ if step.h == 0.0 => f64::from(u8::from(level == Level::Acceleration)),
             Level::Position => 1.0,
             Level::Velocity => self.dynamics.integrator.rate_weight() / step.h,
             Level::Acceleration => 1.0 / (step.h * self.dynamics.impulse_per_force()),
@@ -363,6 +386,12 @@ impl Subsystem for Robot {
     fn commit(&mut self, step: &Step, t: &[f64], _partner: &Motion) -> Result {
         if !self.trial {
             return Err(Error::Failed("commit without a trial of this step".into()));
+        }
+        if step.h == 0.0 {
+            self.state.accelerations.clone_from(&self.dynamics.start_accelerations);
+            self.state.accelerated = true;
+            self.changed();
+            return Ok(());
         }
         self.scratch.free.resize(step.n as usize, 0.0);
         self.book_contacts();

@@ -117,6 +117,7 @@ pub(crate) fn schema() -> Schema {
         ]
         .into_iter()
         .chain([crate::objects::parameter()])
+        .chain(crate::cut::parameters())
         .chain(crate::closure::configure::parameters())
         .chain(crate::actuator::configure::parameters())
         .collect(),

@@ -73,18 +73,19 @@ impl Ports {
         self.g[c * self.components.len() + r]
     }
 
-    /// Writes the impulses h·T into the external impulses of a trial.
+    /// Writes the impulses h·T into the external impulses of a trial; T itself in a step of no length.
     pub fn load(&self, dynamics: &mut Dynamics, t: &[f64]) {
+        let per_force = if dynamics.h > 0.0 { dynamics.impulse_per_force() } else { 1.0 };
         dynamics.external.fill(0.0);
         for (component, t) in self.components.iter().zip(t).filter(|(_, t)| **t != 0.0) {
             let at = dynamics.kkt.body_at[component.body];
-            let impulse = dynamics.impulse_per_force() * component.side * t;
+            let impulse = per_force * component.side * t;
             let target = &mut dynamics.external[at..at + 6];
             target.iter_mut().zip(&component.row).for_each(|(e, r)| *e += impulse * r);
         }
     }
 
-    /// G = dX/d(wrench on itself) = h²·J·K⁻¹·Jᵀ for the current factor, column-major.
+    /// G = dX/d(wrench on itself) = h²·J·K⁻¹·Jᵀ for the current factor, column-major; in a step of no length dA/d(wrench).
     ///
     /// Only along the paths of the bodies to the root: see [`Path`].
     pub fn compliance(&mut self, dynamics: &Dynamics) -> &[f64] {
@@ -101,7 +102,7 @@ impl Ports {
         }
         self.g.clear();
         self.g.resize(n * n, 0.0);
-        let h2 = dynamics.h * dynamics.impulse_per_force();
+        let h2 = if dynamics.h > 0.0 { dynamics.h * dynamics.impulse_per_force() } else { 1.0 };
         let (mut pair, mut shared) = ([usize::MAX; 2], 0);
         for i in 0..n {
             for k in 0..=i {
@@ -190,16 +191,30 @@ pub(crate) fn response(ports: &[Port], dynamics: &Dynamics, out: &mut Response) 
     }
 }
 
+/// Own velocity and acceleration at t after a trial of no length; X = 0.
+pub(crate) fn standing(ports: &[Port], dynamics: &Dynamics, out: &mut Response) {
+    committed(ports, dynamics.starts(), out);
+    for port in ports {
+        let b = port.body as usize;
+        let (motion, real) = (&dynamics.starts()[b], &dynamics.start_accelerations[b].real);
+        let arm = V3::from(port.origin) - motion.c;
+        for (i, c) in port.components() {
+            out.a[i] = along(port, c, real, &motion.w, &arm);
+        }
+    }
+}
+
 /// Acceleration of the material point at the port's origin (angular: of the body) at the end of the trial.
 fn acceleration(port: &Port, dynamics: &Dynamics, c: usize) -> f64 {
     let b = port.body as usize;
     let (end, real) = (&dynamics.ends[b], &dynamics.end_accelerations[b].real);
-    let (linear, angular) = (V3::from_row_slice(&real[..3]), V3::from_row_slice(&real[3..]));
     let arm = cayley(&dynamics.turns[b]) * (V3::from(port.origin) - dynamics.starts()[b].c);
+    along(port, c, real, &end.w, &arm)
+}
+
+/// Component c of the acceleration of a point at `arm` from the centre of mass (angular: of the body).
+fn along(port: &Port, c: usize, real: &[f64; 6], w: &V3, arm: &V3) -> f64 {
+    let (linear, angular) = (V3::from_row_slice(&real[..3]), V3::from_row_slice(&real[3..]));
     let d = V3::from(port.direction(c));
-    if c < 3 {
-        (linear + angular.cross(&arm) + end.w.cross(&end.w.cross(&arm))).dot(&d)
-    } else {
-        angular.dot(&d)
-    }
+    if c < 3 { (linear + angular.cross(arm) + w.cross(&w.cross(arm))).dot(&d) } else { angular.dot(&d) }
 }

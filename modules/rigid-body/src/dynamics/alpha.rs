@@ -49,6 +49,14 @@ impl Dynamics {
         }
     }
 
+    /// A step of no length: the accelerations at t under `external`, which holds N and N m here, into
+    /// `start_accelerations`.
+    pub fn stand_still(&mut self, state: &State) -> Result<(), Failure> {
+        self.h = 0.0;
+        self.starts.clone_from(&state.bodies);
+        self.accelerate(state)
+    }
+
     /// Accelerations at the start under the forces there and `external` (N, N m), into `start_accelerations`.
     ///
     /// Rigid rows ask for J·v̇ = −J̇·v; the right-hand side is differenced from the gaps that open when all bodies

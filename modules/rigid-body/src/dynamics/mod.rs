@@ -91,7 +91,7 @@ pub(crate) struct Dynamics {
     pub integrator: Integrator,
     starts: Vec<Motion>,
     /// Accelerations at both ends of the step and what else the second-order option reads of the state.
-    start_accelerations: Vec<Acceleration>,
+    pub start_accelerations: Vec<Acceleration>,
     pub end_accelerations: Vec<Acceleration>,
     angles: Vec<f64>,
     forces: Vec<V3>,

@@ -1,45 +1,40 @@
 //! Interface Jacobians of the members: from the modules' own derivatives, or by finite differences over their trials.
 
 use super::exchange::Exchange;
+use super::side::Side;
 use crate::Result;
 use crate::host::Instance;
 use crate::timing::Part;
 use std::time::Instant as Clock;
-use terraglue_subsystem::Level;
+use terraglue_subsystem::{Capabilities, Level, Port};
 
 /// Where the bodies' interface Jacobian comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Derivatives {
-    /// The modules' own, by differences where one has none.
+    /// The modules' own, by forward differences where one has none.
     Analytic,
-    /// Central differences: the directional derivative along every component.
+    /// Directional derivatives of units that have them; else central differences along every component.
     Central,
     /// Forward differences, all columns in one exchange.
     Forward,
 }
 
 impl Exchange {
-    /// d(x1 − x2)/dT of all bodies at their last trial into `estimate.g`, from the modules' derivatives.
+    /// d(x1 − x2)/dT of all bodies at their last trial into `estimate.g`.
     pub fn linearise_bodies(&mut self, source: Derivatives, instances: &mut [Instance]) -> Result {
         let start = Clock::now();
         let level = if self.at.h == 0.0 { Level::Acceleration } else { Level::Position };
+        self.take_slopes(source, |_| true, instances)?;
         self.estimate.g.fill(0.0);
-        let mut complete = source == Derivatives::Analytic;
         for side in &mut self.bodies {
-            if complete {
-                let (instance, g) = (&mut instances[side.slot], &mut self.estimate.g);
-                complete = side.add_compliance(instance, &self.nodes, &self.at, level, g)?;
-            }
+            let (instance, g) = (&mut instances[side.slot], &mut self.estimate.g);
+            side.add_compliance(instance, &self.nodes, &self.at, level, g)?;
         }
-        if !complete {
-            self.difference_trials(source == Derivatives::Central, instances)?;
-        } else {
-            if self.at.h > 0.0 && self.damping.iter().any(|d| *d > 0.0) {
-                self.add_dampers(instances)?;
-            }
-            if (0..self.n()).any(|i| self.is_above_position(i)) {
-                self.raise_levels(instances)?;
-            }
+        if self.at.h > 0.0 && self.damping.iter().any(|d| *d > 0.0) {
+            self.add_dampers(instances)?;
+        }
+        if (0..self.n()).any(|i| self.is_above_position(i)) {
+            self.raise_levels(instances)?;
         }
         for i in (0..self.n()).filter(|i| self.at.h == 0.0 && self.compliance[*i] > 0.0) {
             // a spring's force at t is given by positions and velocities alone
@@ -48,6 +43,38 @@ impl Exchange {
         }
         self.report.jacobian_refreshes += 1;
         self.timings.charge(Part::Jacobian, start);
+        Ok(())
+    }
+
+    /// Differences for the members that do not know their derivatives, or for all where `source` says so. Members hang
+    /// together in the wrenches only, so each makes its own trials, all columns in one exchange, and all of them do it side
+    /// by side: that counts as many evaluations as the member with the most components needs. Their last trial is then
+    /// another one: see [`Exchange::settle_bodies`].
+    pub(super) fn take_slopes(
+        &mut self,
+        source: Derivatives,
+        who: impl Fn(&Side) -> bool,
+        instances: &mut [Instance],
+    ) -> Result {
+        let mut most = 0;
+        for side in self.bodies.iter_mut().filter(|s| who(s)) {
+            let instance = &mut instances[side.slot];
+            side.forget_slopes();
+            let knows = instance.capabilities().has(Capabilities::DERIVATIVES);
+            let told = match source {
+                Derivatives::Analytic => knows,
+                Derivatives::Central => knows && crate::fmu::is_fmu(instance.module()),
+                Derivatives::Forward => false,
+            };
+            if told {
+                continue;
+            }
+            let how = (source == Derivatives::Central, 1.0);
+            most = most.max(side.take_slopes(instance, &self.nodes, &self.at, &self.t, how)?);
+            self.displaced |= side.n() > 0;
+        }
+        self.at.trial += most;
+        self.report.evaluations_jacobian += most;
         Ok(())
     }
 
@@ -95,55 +122,6 @@ impl Exchange {
         Ok(())
     }
 
-    /// The same by differences of trials: δT = 1e-6·max(1, |T|), forward or central. The bodies' last trial is
-    /// then another one: see [`Exchange::settle_bodies`].
-    fn difference_trials(&mut self, central: bool, instances: &mut [Instance]) -> Result {
-        let n = self.n();
-        let before = self.report.evaluations_bodies;
-        let mut kept = std::mem::take(&mut self.kept);
-        for (kept, value) in
-            kept.iter_mut().zip([&self.t, &self.x1, &self.v1, &self.a1, &self.x2, &self.v2, &self.a2])
-        {
-            kept.clear();
-            kept.extend_from_slice(value);
-        }
-        let mut base = std::mem::take(&mut self.work);
-        base.clear();
-        base.extend((0..n).map(|i| self.bodies_part(i)));
-        for column in 0..n {
-            let delta = 1e-6 * kept[0][column].abs().max(1.0);
-            if central {
-                self.t[column] = kept[0][column] - delta;
-                self.advance_bodies(instances)?;
-                base.clear();
-                base.extend((0..n).map(|i| self.bodies_part(i)));
-            }
-            self.t[column] = kept[0][column] + delta;
-            self.advance_bodies(instances)?;
-            self.t[column] = kept[0][column];
-            let width = if central { 2.0 * delta } else { delta };
-            for (row, base) in base.iter().enumerate() {
-                self.estimate.g[column * n + row] = (self.bodies_part(row) - base) / width;
-            }
-        }
-        self.work = base;
-        self.report.evaluations_jacobian += self.report.evaluations_bodies - before;
-        self.report.evaluations_bodies = before;
-        for (value, kept) in
-            [&mut self.t, &mut self.x1, &mut self.v1, &mut self.a1, &mut self.x2, &mut self.v2, &mut self.a2]
-                .into_iter()
-                .zip(&kept)
-        {
-            value.copy_from_slice(kept);
-        }
-        for (base, kept) in self.base.iter_mut().zip(&kept) {
-            base.copy_from_slice(kept);
-        }
-        self.kept = kept;
-        self.displaced = true;
-        Ok(())
-    }
-
     /// The grounds' Jacobian at their last trial into `out` (n × n, column-major); by finite differences where
     /// a module has none.
     pub fn ground_jacobian(&mut self, instances: &mut [Instance], xt: bool, out: &mut Vec<f64>) -> Result {
@@ -156,7 +134,7 @@ impl Exchange {
             let slot = side.slot;
             if !side.jacobian(&mut instances[slot], &self.nodes, &self.at, out)? {
                 if xt {
-                    self.difference_motion(instances, out)?
+                    self.difference_motion(false, instances, out)?
                 } else {
                     self.difference_force(instances, out)?
                 }
@@ -168,45 +146,79 @@ impl Exchange {
         Ok(())
     }
 
-    /// K = −dF/dX1 by forward differences of 1 nm towards the soil, one component of all ports at a time.
-    fn difference_motion(&mut self, instances: &mut [Instance], out: &mut [f64]) -> Result {
-        let n = self.n();
+    /// K = −dF/dX1 of the grounds, or of all of side 2, by forward differences of 1 nm towards it: one trial for a component
+    /// of all ports that lie apart (see [`Side::colours`]).
+    pub(super) fn difference_motion(
+        &mut self,
+        second: bool,
+        instances: &mut [Instance],
+        out: &mut [f64],
+    ) -> Result {
         let delta = -1e-9;
-        self.zeros.copy_from_slice(&self.f);
-        for column in 0..n {
-            self.x1[column] += delta;
-            self.advance_grounds_under_motion(instances)?;
-            self.x1[column] -= delta;
+        let mut kept = std::mem::take(&mut self.kept);
+        kept[0].clone_from(&self.f);
+        kept[2].clone_from(&self.x2);
+        let (colours, count) = self.colour_ports(second);
+        for (colour, c) in (0..count).flat_map(|k| (0..6).map(move |c| (k, c))) {
+            let columns = |e: &Self, p: usize| column(&e.ports[p], &colours[p], colour, c);
+            if !(0..self.ports.len()).any(|p| columns(self, p).is_some()) {
+                continue;
+            }
+            kept[1].clone_from(&self.x1);
+            for p in 0..self.ports.len() {
+                if let Some(i) = columns(self, p) {
+                    self.x1[i] += delta;
+                }
+            }
+            if second {
+                self.advance_second_under_motion(instances)?;
+            } else {
+                self.advance_grounds_under_motion(instances)?;
+            }
+            self.x1.copy_from_slice(&kept[1]);
             self.count_difference();
-            for row in 0..n {
-                out[column * n + row] = -(self.f[row] - self.zeros[row]) / delta;
+            let (m, n) = (self.ports.len(), self.n());
+            for (p, column) in (0..m).filter_map(|p| Some((p, columns(self, p)?))) {
+                for q in (0..m).filter(|q| self.meets[p * m + q]) {
+                    for row in self.ports[q].range() {
+                        out[column * n + row] = -(self.f[row] - kept[0][row]) / delta;
+                    }
+                }
             }
         }
-        self.f.copy_from_slice(&self.zeros);
-        self.zeros.fill(0.0);
+        self.f.copy_from_slice(&kept[0]);
+        self.x2.copy_from_slice(&kept[2]);
+        (self.kept, self.colours) = (kept, colours);
         Ok(())
     }
 
-    /// The mixed Jacobian after force: normal columns by ΔT, the others by ΔX.
+    /// The mixed Jacobian after force: normal columns by ΔT, the others by ΔX; one trial for a component of all ports that
+    /// lie apart.
     fn difference_force(&mut self, instances: &mut [Instance], out: &mut [f64]) -> Result {
         let n = self.n();
-        let mut kept_before = std::mem::take(&mut self.kept);
-        let [f, x2, ..] = &mut kept_before;
-        f.clone_from(&self.f);
-        x2.clone_from(&self.x2);
-        for p in 0..self.ports.len() {
-            for (column, c) in self.ports[p].components() {
-                let delta = if c == 0 { 1e-6 * self.t[column].abs().max(1.0) } else { -1e-9 };
-                let target = if c == 0 { &mut self.t[column] } else { &mut self.x1[column] };
-                let kept = *target;
-                *target += delta;
-                self.advance_grounds_under_force(instances)?;
-                if c == 0 {
-                    self.t[column] = kept
-                } else {
-                    self.x1[column] = kept
+        let mut kept = std::mem::take(&mut self.kept);
+        for (kept, value) in kept.iter_mut().zip([&self.f, &self.x2, &self.t, &self.x1]) {
+            kept.clone_from(value);
+        }
+        let [f, x2, t, x1, ..] = &kept;
+        let (colours, count) = self.colour_ports(false);
+        for (colour, c) in (0..count).flat_map(|k| (0..6).map(move |c| (k, c))) {
+            let delta = |i: usize| if c == 0 { 1e-6 * t[i].abs().max(1.0) } else { -1e-9 };
+            let columns = |e: &Self, p: usize| column(&e.ports[p], &colours[p], colour, c);
+            if !(0..self.ports.len()).any(|p| columns(self, p).is_some()) {
+                continue;
+            }
+            for p in 0..self.ports.len() {
+                if let Some(i) = columns(self, p) {
+                    if c == 0 { self.t[i] += delta(i) } else { self.x1[i] += delta(i) }
                 }
-                self.count_difference();
+            }
+            self.advance_grounds_under_force(instances)?;
+            self.t.copy_from_slice(t);
+            self.x1.copy_from_slice(x1);
+            self.count_difference();
+            for (p, column) in (0..self.ports.len()).filter_map(|p| Some((p, columns(self, p)?))) {
+                let delta = delta(column);
                 for (row, r) in self.ports[p].components() {
                     out[column * n + row] = match (r, c) {
                         (0, 0) => -(self.x2[row] - x2[row]) / delta,
@@ -219,12 +231,36 @@ impl Exchange {
         }
         self.f.copy_from_slice(f);
         self.x2.copy_from_slice(x2);
-        self.kept = kept_before;
+        (self.kept, self.colours) = (kept, colours);
         Ok(())
+    }
+
+    /// Numbers of the ports of the grounds, or of all of side 2, by which they may be perturbed together, and how many
+    /// numbers there are.
+    fn colour_ports(&mut self, second: bool) -> (Vec<u32>, u32) {
+        let mut colours = std::mem::take(&mut self.colours);
+        let m = self.ports.len();
+        self.meets.clear();
+        self.meets.resize(m * m, false);
+        colours.clear();
+        colours.resize(m, u32::MAX);
+        for side in self.bodies.iter().filter(|s| second && s.is_second()) {
+            side.colours(None, m, &mut self.meets, &mut colours);
+        }
+        for side in &self.grounds {
+            side.colours(Some(&self.nodes), m, &mut self.meets, &mut colours);
+        }
+        let count = colours.iter().filter(|c| **c != u32::MAX).max().map_or(0, |c| c + 1);
+        (colours, count)
     }
 
     fn count_difference(&mut self) {
         self.report.evaluations_soil -= 1;
         self.report.evaluations_jacobian += 1;
     }
+}
+
+/// Place of component c of a port of that colour, if it carries it.
+fn column(port: &Port, own: &u32, colour: u32, c: usize) -> Option<usize> {
+    port.components().find(|(_, k)| *own == colour && *k == c).map(|(i, _)| i)
 }

@@ -69,6 +69,9 @@ pub struct Exchange {
     /// The bodies' last trial is not that of T.
     pub(super) displaced: bool,
     pub(super) zeros: Vec<f64>,
+    /// Which ports may be perturbed together, and which share ground: see [`Side::colours`].
+    pub(super) colours: Vec<u32>,
+    pub(super) meets: Vec<bool>,
     /// Committed wrench of every port of the step before, by key.
     pub last: Vec<(u64, [f64; 6])>,
     pub(super) work: Vec<f64>,
@@ -115,6 +118,8 @@ impl Exchange {
             rates: Vec::new(),
             displaced: false,
             zeros: Vec::new(),
+            colours: Vec::new(),
+            meets: Vec::new(),
             last: Vec::new(),
             work: Vec::new(),
             rigid: RigidContact::default(),
@@ -246,28 +251,14 @@ impl Exchange {
         let out = Answer { x: Some(&mut self.estimate.x_free), ..Answer::default() };
         side.advance_under_force(instance, &self.nodes, &self.at, &self.zeros, None, out)?;
         if !side.jacobian(instance, &self.nodes, &self.at, &mut self.estimate.g)? {
-            self.difference_bodies(k, instances)?;
+            // exact for bodies that are linear within the step
+            let how = (false, self.t_ref.max(1.0));
+            let trials = side.take_slopes(instance, &self.nodes, &self.at, &self.zeros, how)?;
+            side.slopes(&mut self.estimate.g);
+            self.at.trial += trials;
+            self.report.evaluations_jacobian += trials;
         }
         self.rigid.solve(&self.ports, &self.x2, &mut self.estimate);
-        Ok(())
-    }
-
-    /// G1 by finite differences of `advance`; exact for bodies that are linear within the step.
-    fn difference_bodies(&mut self, k: usize, instances: &mut [Instance]) -> Result {
-        let n = self.n();
-        let side = &mut self.bodies[k];
-        for column in 0..n {
-            let delta = 1e-6 * self.t_ref.max(1.0);
-            self.f.fill(0.0);
-            self.f[column] = delta;
-            self.x1.copy_from_slice(&self.estimate.x_free);
-            let out = Answer { x: Some(&mut self.x1), ..Answer::default() };
-            side.advance_under_force(&mut instances[side.slot], &self.nodes, &self.at, &self.f, None, out)?;
-            self.report.evaluations_jacobian += 1;
-            for row in 0..n {
-                self.estimate.g[column * n + row] = (self.x1[row] - self.estimate.x_free[row]) / delta;
-            }
-        }
         Ok(())
     }
 

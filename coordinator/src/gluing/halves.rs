@@ -2,6 +2,7 @@
 //!
 //! Side 2 of a group are its soils and the bodies that are side 2 of all their glue; all other bodies are side 1.
 
+use super::derivatives::Derivatives;
 use super::exchange::Exchange;
 use super::glue::Row;
 use super::linear::max_norm;
@@ -169,16 +170,11 @@ impl Exchange {
 
     /// G1 = dX1/dT of side 1 at its last trial into `estimate.g`, by forward differences where a module has none.
     pub fn linearise_first(&mut self, instances: &mut [Instance]) -> Result {
+        self.take_slopes(Derivatives::Analytic, |side| !side.is_second(), instances)?;
         self.estimate.g.fill(0.0);
-        let mut complete = true;
         for side in self.bodies.iter_mut().filter(|s| !s.is_second()) {
-            if complete {
-                let (instance, g) = (&mut instances[side.slot], &mut self.estimate.g);
-                complete = side.add_compliance(instance, &self.nodes, &self.at, Level::Position, g)?;
-            }
-        }
-        if !complete {
-            self.difference_half(false, instances)?;
+            let (instance, g) = (&mut instances[side.slot], &mut self.estimate.g);
+            side.add_compliance(instance, &self.nodes, &self.at, Level::Position, g)?;
         }
         self.report.jacobian_refreshes += 1;
         Ok(())
@@ -197,12 +193,8 @@ impl Exchange {
             }
         }
         if !complete {
-            let kept = std::mem::take(&mut self.estimate.g);
-            self.estimate.g.resize(n * n, 0.0);
-            self.difference_half(true, instances)?;
-            out.copy_from_slice(&self.estimate.g);
-            self.estimate.g = kept;
-            out.iter_mut().for_each(|k| *k = -*k);
+            out.fill(0.0);
+            self.difference_motion(true, instances, out)?;
         }
         self.report.jacobian_refreshes += 1;
         Ok(())
@@ -219,40 +211,5 @@ impl Exchange {
             }
         }
         Ok(true)
-    }
-
-    /// Columns by forward differences into `estimate.g`: dX1/dT of side 1 or dF/dX1 of side 2.
-    fn difference_half(&mut self, second: bool, instances: &mut [Instance]) -> Result {
-        let n = self.n();
-        let before = (self.report.evaluations_bodies, self.report.evaluations_soil);
-        let mut kept = std::mem::take(&mut self.kept);
-        for (kept, value) in kept.iter_mut().zip([&self.x1, &self.f, &self.x2]) {
-            kept.clone_from(value);
-        }
-        for column in 0..n {
-            let delta = if second { -1e-9 } else { 1e-6 * self.t[column].abs().max(1.0) };
-            let before = if second { self.x1[column] } else { self.t[column] };
-            if second {
-                self.x1[column] += delta;
-                self.advance_second_under_motion(instances)?;
-                self.x1[column] = before;
-            } else {
-                self.t[column] += delta;
-                self.advance_half(false, instances)?;
-                self.t[column] = before;
-            }
-            let (new, old) = if second { (&self.f, &kept[1]) } else { (&self.x1, &kept[0]) };
-            for row in 0..n {
-                self.estimate.g[column * n + row] = (new[row] - old[row]) / delta;
-            }
-        }
-        let done = self.report.evaluations_bodies - before.0 + self.report.evaluations_soil - before.1;
-        self.report.evaluations_jacobian += done;
-        (self.report.evaluations_bodies, self.report.evaluations_soil) = before;
-        for (value, kept) in [&mut self.x1, &mut self.f, &mut self.x2].into_iter().zip(&kept) {
-            value.copy_from_slice(kept);
-        }
-        self.kept = kept;
-        Ok(())
     }
 }

@@ -15,7 +15,7 @@ enum Way {
     /// The modules' own derivatives, anew at every iteration: they cost no evaluation.
     #[default]
     Analytic,
-    /// Central differences at the first iteration of a step.
+    /// Directional derivatives, or central differences, at the first iteration of a step.
     Central,
     /// Forward differences at the first iteration of a step.
     Forward,

@@ -4,7 +4,7 @@
 use crate::host::{Instance, Progress};
 use crate::{Error, Result};
 use terraglue_subsystem::{
-    Capabilities, Estimate, Hold, Input, Law, Level, Motion, Node, Port, Response, Step,
+    Batch, Capabilities, Estimate, Hold, Input, Law, Level, Motion, Node, Port, Response, Step,
 };
 
 /// Time and number of the present trial.
@@ -67,6 +67,12 @@ pub struct Side {
     partner_v: Vec<f64>,
     matrix: Vec<f64>,
     active: Vec<u8>,
+    /// dX, dV and dA/d(wrench on itself) by differences of trials, own n × n, column-major; in use until the next ones.
+    slopes: [Vec<f64>; 3],
+    by_differences: bool,
+    /// Wrenches of a batch of trials, one after the other, and its answers.
+    batch_t: Vec<f64>,
+    batch: [Vec<f64>; 3],
 }
 
 impl Side {
@@ -396,7 +402,8 @@ impl Side {
         Ok(true)
     }
 
-    /// Adds the module's own Jacobian at the last trial to d(x1 − x2)/dT of the group; `false` if it has none.
+    /// Adds the Jacobian at the last trial to d(x1 − x2)/dT of the group: the module's own, or that of
+    /// [`Side::take_slopes`].
     pub fn add_compliance(
         &mut self,
         instance: &mut Instance,
@@ -404,21 +411,100 @@ impl Side {
         at: &Instant,
         level: Level,
         out: &mut [f64],
-    ) -> Result<bool> {
-        if !instance.capabilities().has(Capabilities::DERIVATIVES) {
-            return Ok(false);
-        }
+    ) -> Result {
         let (n, n_group) = (self.n(), out.len().isqrt());
-        self.matrix.clear();
-        self.matrix.resize(n * n, 0.0);
-        let step = Self::step(&self.ports, n, nodes, at);
-        instance.interface_jacobian(&step, level, &mut self.matrix)?;
-        for (c, column) in self.matrix.chunks_exact(n.max(1)).enumerate() {
+        if !self.by_differences {
+            self.matrix.clear();
+            self.matrix.resize(n * n, 0.0);
+            let step = Self::step(&self.ports, n, nodes, at);
+            instance.interface_jacobian(&step, level, &mut self.matrix)?;
+        }
+        let own = if self.by_differences { &self.slopes[level as usize] } else { &self.matrix };
+        for (c, column) in own.chunks_exact(n.max(1)).enumerate() {
             for (r, value) in column.iter().enumerate() {
                 out[self.index[c] * n_group + self.index[r]] += self.signs[r] * self.signs[c] * value;
             }
         }
-        Ok(true)
+        Ok(())
+    }
+
+    /// From now on the module's own Jacobian counts.
+    pub fn forget_slopes(&mut self) {
+        self.by_differences = false;
+    }
+
+    /// The Jacobian by differences of trials about T, forward from the last trial or central: all columns in one exchange.
+    /// The number of trials, each of which is then the instance's last one.
+    pub fn take_slopes(
+        &mut self,
+        instance: &mut Instance,
+        nodes: &[Node],
+        at: &Instant,
+        t: &[f64],
+        (central, least): (bool, f64),
+    ) -> Result<u32> {
+        let n = self.n();
+        self.given_t.clear();
+        self.given_t.resize(n, 0.0);
+        Self::gather(&mut self.given_t, &self.index, t);
+        if at.hold == Hold::Ramp {
+            self.given_t.extend_from_slice(&self.start_t);
+        }
+        let delta = |t: f64| 1e-6 * t.abs().max(least);
+        let ways: &[f64] = if central { &[-1.0, 1.0] } else { &[1.0] };
+        let count = n * ways.len();
+        self.batch_t.clear();
+        for column in 0..n {
+            for way in ways {
+                let place = self.batch_t.len() + column;
+                self.batch_t.extend_from_slice(&self.given_t);
+                self.batch_t[place] += way * delta(self.given_t[column]);
+            }
+        }
+        for answers in &mut self.batch {
+            answers.clear();
+            answers.resize(n * count, 0.0);
+        }
+        let step = Self::step(&self.ports, n, nodes, at);
+        let [x, v, a] = &mut self.batch;
+        let mut batch = Batch { x, v, a, t: &mut self.t, reached: at.t + at.h };
+        let progress = instance.advance_batch(&step, &self.batch_t, at.hold, &mut batch)?;
+        complete(instance, "advance_batch", progress)?;
+        let here = [&self.x, &self.v, &self.a];
+        for ((slopes, answers), here) in self.slopes.iter_mut().zip(&self.batch).zip(here) {
+            slopes.clear();
+            for column in 0..n {
+                let of = |k: usize| &answers[(column * ways.len() + k) * n..][..n];
+                let (before, after) = if central { (of(0), of(1)) } else { (here.as_slice(), of(0)) };
+                let width = ways.len() as f64 * delta(self.given_t[column]) * self.signs[column];
+                slopes.extend(after.iter().zip(before).map(|(new, old)| (new - old) / width));
+            }
+        }
+        self.by_differences = true;
+        Ok(count as u32)
+    }
+
+    /// dX/d(wrench on itself) of [`Side::take_slopes`] into the group's matrix.
+    pub fn slopes(&mut self, out: &mut [f64]) {
+        self.matrix.clone_from(&self.slopes[Level::Position as usize]);
+        self.scatter_matrix(out);
+    }
+
+    /// Numbers the own ports so that those of one number can be perturbed together: the columns of one component of them all
+    /// then cost one trial (Curtis, Powell and Reid 1974). On a soil, whose `nodes` are given, ports meet that share a
+    /// ground node, or without nodes a cell; on another body all do. Ports of one number do not meet, nor does a third one
+    /// meet two of them. `meets[p·m + q]`: ports p and q of the group's m meet.
+    pub fn colours(&self, nodes: Option<&[Node]>, m: usize, meets: &mut [bool], colours: &mut [u32]) {
+        for (a, p) in self.ports.iter().zip(&self.port_index) {
+            for (b, q) in self.ports.iter().zip(&self.port_index) {
+                meets[p * m + q] = p == q || nodes.is_none_or(|nodes| meet(a, b, nodes));
+            }
+        }
+        for p in &self.port_index {
+            let near = |q: &usize| self.port_index.iter().any(|k| meets[k * m + p] && meets[k * m + q]);
+            let taken = |c: u32| self.port_index.iter().any(|q| colours[*q] == c && near(q));
+            colours[*p] = (0..m as u32).find(|c| !taken(*c)).unwrap_or(0);
+        }
     }
 
     /// The last trial becomes the state at t + h.
@@ -452,6 +538,21 @@ impl Side {
             Self::gather(own_column, &self.index, &group[column * n_group..][..n_group]);
         }
     }
+}
+
+/// Whether the boxes around the ground nodes of two ports overlap; without nodes, whether they lie in one cell.
+fn meet(a: &Port, b: &Port, nodes: &[Node]) -> bool {
+    let range = |port: &Port| {
+        let none = [i32::MAX, i32::MIN, i32::MAX, i32::MIN];
+        port.nodes(nodes)
+            .iter()
+            .fold(none, |r, n| [r[0].min(n.i), r[1].max(n.i), r[2].min(n.j), r[3].max(n.j)])
+    };
+    if a.node_count == 0 || b.node_count == 0 {
+        return a.body == b.body;
+    }
+    let (a, b) = (range(a), range(b));
+    a[0] <= b[1] && b[0] <= a[1] && a[2] <= b[3] && b[2] <= a[3]
 }
 
 /// Glued subsystems go to the end of the step together: one that cannot makes all of them repeat a shorter one.

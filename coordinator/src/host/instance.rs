@@ -5,8 +5,8 @@ use crate::error::{Error, Result};
 use std::cell::Cell;
 use std::time::{Duration, Instant as Clock};
 use terraglue_subsystem::{
-    Action, BodyState, Capabilities, Energy, Error as Failure, Estimate, FieldInfo, FieldTile, Input, Kind,
-    Law, Level, Motion, Response, Scene, Step, Subsystem, Values, ValuesMut, Variable,
+    Action, Batch, BodyState, Capabilities, Energy, Error as Failure, Estimate, FieldInfo, FieldTile, Hold,
+    Input, Kind, Law, Level, Motion, Response, Scene, Step, Subsystem, Values, ValuesMut, Variable,
 };
 
 /// How far a trial went.
@@ -218,6 +218,34 @@ impl Instance {
     /// Paper, steps 3 and 4.
     pub fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result<Progress> {
         self.trial("advance", step, out, |s, out| s.advance(step, input, out))
+    }
+
+    /// Trials under several wrenches in one exchange.
+    pub fn advance_batch(&mut self, step: &Step, t: &[f64], hold: Hold, out: &mut Batch) -> Result<Progress> {
+        const NAME: &str = "advance_batch";
+        self.time_s.set(step.t);
+        self.alive(NAME)?;
+        for vector in [&mut *out.x, &mut *out.v, &mut *out.a, &mut *out.t] {
+            vector.fill(f64::NAN);
+        }
+        out.reached = step.t + step.h;
+        let start = self.begin();
+        let result = self.subsystem.advance_batch(step, t, hold, out);
+        self.charge(start);
+        match result {
+            Err(Failure::Discard { reached }) => return self.early(NAME, step, reached),
+            result => self.outcome(NAME, result)?,
+        }
+        for (vector, values) in [("x", &*out.x), ("v", &*out.v), ("a", &*out.a)] {
+            for values in values.chunks_exact((step.n as usize).max(1)) {
+                self.all_finite(NAME, check::packed(step, vector, values))?;
+            }
+        }
+        let end = step.t + step.h;
+        if out.reached < end - 1e-9 * step.h || out.reached.is_nan() {
+            return self.early(NAME, step, out.reached);
+        }
+        Ok(Progress::Complete)
     }
 
     /// Runs a trial on vectors filled with NaN and looks for what stayed so.

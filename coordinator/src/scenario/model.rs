@@ -147,8 +147,8 @@ pub struct GluingSpec {
     pub start: String,
     /// How `relaxed` accelerates its fixed point: `none`, `aitken`, `anderson` or `broyden`.
     pub relaxation: String,
-    /// Where the bodies' interface Jacobian comes from: `analytic`, `directional` (central differences),
-    /// `finite-differences`, or `frozen` (a control: never refreshed).
+    /// Where the bodies' interface Jacobian comes from: `analytic`, `directional` (of units, else central
+    /// differences), `finite-differences`, or `frozen` (a control: never refreshed).
     pub jacobian: String,
     /// Level of the condition at joints: `position`, `velocity` or `acceleration`.
     pub level: String,

@@ -9,7 +9,7 @@ use crate::host::Host;
 use crate::port::Law;
 use crate::scene::{BodyState, Scene};
 use crate::schema::Schema;
-use crate::trial::{Estimate, Input, Level, Motion, Response, Step};
+use crate::trial::{Batch, Estimate, Hold, Input, Level, Motion, Response, Step};
 use crate::variable::{Action, Values, ValuesMut, Variable};
 use std::sync::Arc;
 
@@ -53,6 +53,13 @@ pub trait Subsystem: Send {
 
     /// Paper, steps 3 and 4. A trial from the committed state; without ports, a plain step.
     fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result;
+
+    /// Trials of one step under several wrenches (packed one after the other in `t`), each from the committed state: all
+    /// columns of a difference in one exchange. The last one counts as the last trial. Worth an implementation of its own
+    /// where every call has a price.
+    fn advance_batch(&mut self, step: &Step, t: &[f64], hold: Hold, out: &mut Batch) -> Result {
+        out.one_by_one(step, t, hold, |step, input, out| self.advance(step, input, out))
+    }
 
     /// Derivatives at the last trial, n × n, column-major. After `Force`: G = dX/d(wrench on itself) at `level`.
     /// After `Motion`: K = d(wrench on itself)/dX (position) or /dV (velocity), sign as for a spring: the

@@ -107,6 +107,53 @@ pub struct Response<'a> {
     pub flags: u32,
 }
 
+/// Answers of several trials of one step, one after the other; filled with NaN before the call like a [`Response`].
+#[derive(Debug)]
+pub struct Batch<'a> {
+    /// X of all trials.
+    pub x: &'a mut [f64],
+    /// V of all trials.
+    pub v: &'a mut [f64],
+    /// A of all trials.
+    pub a: &'a mut [f64],
+    /// Room for T of one trial.
+    pub t: &'a mut [f64],
+    /// Earliest time reached, s.
+    pub reached: f64,
+}
+
+impl Batch<'_> {
+    /// Makes the trials one by one: `t` holds one wrench after the other (twice as long under [`Hold::Ramp`]).
+    ///
+    /// # Errors
+    /// Those of `advance`.
+    pub fn one_by_one(
+        &mut self,
+        step: &Step,
+        t: &[f64],
+        hold: Hold,
+        mut advance: impl FnMut(&Step, &Input, &mut Response) -> crate::Result,
+    ) -> crate::Result {
+        let n = step.n as usize;
+        let width = if hold == Hold::Ramp { 2 * n } else { n };
+        for (k, t) in t.chunks_exact(width.max(1)).enumerate() {
+            let own = k * n..(k + 1) * n;
+            let mut out = Response {
+                x: &mut self.x[own.clone()],
+                v: &mut self.v[own.clone()],
+                a: &mut self.a[own],
+                t: self.t,
+                reached: step.t + step.h,
+                flags: 0,
+            };
+            let step = Step { trial: step.trial + k as u32, ..*step };
+            advance(&step, &Input::Force { t, hold, motion: None }, &mut out)?;
+            self.reached = self.reached.min(out.reached);
+        }
+        Ok(())
+    }
+}
+
 /// Bits of [`Response::flags`].
 pub mod flag {
     /// Something happened at `reached`.

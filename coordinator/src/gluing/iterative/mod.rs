@@ -6,8 +6,9 @@
 //!   Λ = (G1 + G2)⁻¹ is full and unilateral contact is an active set on the linearised problem;
 //! - [`xt`]: the soil takes the motion and answers the wrench; r = T − F(X1(T)), J = I + K·G1.
 //!
-//! `auto` takes X-T where κ = λmax(K·G1) ≤ 0.3 or where the soil takes motion only, T-T otherwise, and the other
-//! one on failure. The start is the co-operational answer min(T*, F), never the T of the step before, which
+//! `auto` takes X-T where κ = λmax(K·G1) ≤ 10 or where the soil takes motion only, T-T otherwise, and the other
+//! one on failure. X-T iterates with the full Newton matrix against the linearised bodies, so it is not bound to the
+//! κ < 1 of its fixed point. The start is the co-operational answer min(T*, F), never the T of the step before, which
 //! lands on the wrong side of the unloading kink by rounding.
 
 pub(super) mod friction;

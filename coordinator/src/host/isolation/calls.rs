@@ -26,7 +26,7 @@ macro_rules! calls {
 
 calls! {
     Start, SetPorts, Estimate, Solve, Advance, Jacobian, Commit, Save, Restore, Serialize, Deserialize, Get, Set, Act,
-    NextEvent, BodyStates, Energy, Pressure, Shear, Quit,
+    NextEvent, BodyStates, Energy, Pressure, Shear, Quit, AdvanceBatch,
 }
 
 impl Call {
@@ -174,7 +174,8 @@ pub fn with_input<T>(r: &mut Reader, run: impl FnOnce(&Input) -> T) -> Option<T>
     }
 }
 
-fn hold_of(number: u32) -> Option<Hold> {
+/// The hold of this number.
+pub fn hold_of(number: u32) -> Option<Hold> {
     [Hold::End, Hold::Constant, Hold::Linear, Hold::Ramp].into_iter().find(|h| *h as u32 == number)
 }
 

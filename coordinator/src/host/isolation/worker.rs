@@ -14,7 +14,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use terraglue_subsystem::{
-    BodyState, Config, Error, Estimate, Host, LogLevel, Motion, Result, Subsystem, Terrain, TerrainTile,
+    Batch, BodyState, Config, Error, Estimate, Hold, Host, LogLevel, Motion, Result, Subsystem, Terrain,
+    TerrainTile,
 };
 
 /// Serves the host that made the segment at `path`.
@@ -214,6 +215,26 @@ impl Worker {
                     })
                 });
                 done.ok_or_else(garbled)?
+            }
+            Call::AdvanceBatch => {
+                let step = OwnedStep::take(r).ok_or_else(garbled)?;
+                let hold = r.take().and_then(calls::hold_of).ok_or_else(garbled)?;
+                let (count, t): (u32, Vec<f64>) =
+                    (r.take().ok_or_else(garbled)?, r.take().ok_or_else(garbled)?);
+                let n = step.step().n as usize;
+                let width = if hold == Hold::Ramp { 2 * n } else { n };
+                if t.len() != width * count as usize {
+                    return Err(garbled());
+                }
+                let [mut x, mut v, mut a] = [(); 3].map(|()| vec![f64::NAN; n * count as usize]);
+                let reached = step.step().t + step.step().h;
+                let mut all = Batch { x: &mut x, v: &mut v, a: &mut a, t: &mut vec![f64::NAN; n], reached };
+                unit.advance_batch(&step.step(), &t, hold, &mut all)?;
+                let reached = all.reached;
+                out.write(|w| {
+                    [&x, &v, &a].into_iter().for_each(|values| w.put(values.as_slice()));
+                    w.put(&reached);
+                })
             }
             Call::Jacobian => {
                 let step = OwnedStep::take(r).ok_or_else(garbled)?;

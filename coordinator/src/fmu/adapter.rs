@@ -12,7 +12,7 @@ use std::sync::Arc;
 use terraglue_fmi::description::Start;
 use terraglue_fmi::{Advance, Error as FmiError, Fmu, Slave, SlaveOptions, SlaveState};
 use terraglue_subsystem::{
-    BodyState, Capabilities, Error, Host, Input, Law, LogLevel, Motion, Response, Result, Scene, Step,
+    BodyState, Capabilities, Error, Host, Input, Law, Level, LogLevel, Motion, Response, Result, Scene, Step,
     Subsystem, ValueType, Values, ValuesMut, Variable,
 };
 
@@ -292,7 +292,18 @@ impl Subsystem for FmuSubsystem {
         let force = if self.bodies.is_empty() { Capabilities::default() } else { Capabilities::FORCE };
         let through = if self.feeds_through { Capabilities::FEEDTHROUGH } else { Capabilities::default() };
         let fixed = if c.variable_step { Capabilities::default() } else { Capabilities::FIXED_STEP };
-        retry | bytes | force | through | fixed
+        let slopes = match c.directional_derivatives && self.can_go_back && self.bodies.tell_slopes() {
+            true => Capabilities::DERIVATIVES,
+            false => Capabilities::default(),
+        };
+        retry | bytes | force | through | fixed | slopes
+    }
+
+    fn interface_jacobian(&mut self, step: &Step, level: Level, out: &mut [f64]) -> Result {
+        if !self.capabilities().has(Capabilities::DERIVATIVES) {
+            return Err(Error::Unsupported);
+        }
+        self.bodies.slopes(&self.slave, step, level, out, error)
     }
 
     fn set_ports(&mut self, step: &Step, _: &mut [Law], now: &mut Response) -> Result {
@@ -330,8 +341,11 @@ impl Subsystem for FmuSubsystem {
         }
         if self.open {
             self.slave.restore(&self.before).map_err(error)?;
-        } else if self.can_go_back {
-            self.slave.save(&mut self.before).map_err(error)?;
+        } else {
+            self.bodies.forget_trials();
+            if self.can_go_back {
+                self.slave.save(&mut self.before).map_err(error)?;
+            }
         }
         self.open = true;
         if !self.bodies.is_empty() {

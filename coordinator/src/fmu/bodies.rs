@@ -1,12 +1,13 @@
 //! Glue by a map of names: variables of a unit that are the place, the velocity and the force of a body.
 //!
-//! `[x.bodies.NAME]` with `position`, `velocity` and `force`, each a list of the names along world x, y and z (`""` for
+//! `[x.bodies.NAME]` with `position`, `velocity`, `acceleration` and `force`, each a list of the names along world x, y and z (`""` for
 //! none), or with `terminal`, the name of a terminal of FMI 3 whose members are these. The body can then be named by
 //! `[[glue]]`. It translates; it has no orientation.
 
 use terraglue_fmi::{Slave, SlaveState};
 use terraglue_subsystem::{
-    BodyState, Error, Pose, Response, Result, Scene, SceneBody, Step, ValueType, Variable, component,
+    BodyState, Error, Level, Port, Pose, Response, Result, Scene, SceneBody, Step, ValueType, Variable,
+    component,
 };
 
 use serde_json::{Map, Value};
@@ -17,6 +18,7 @@ struct Body {
     name: String,
     position: [Option<Axis>; 3],
     velocity: [Option<Axis>; 3],
+    acceleration: [Option<Axis>; 3],
     force: [Option<Axis>; 3],
 }
 
@@ -70,7 +72,12 @@ pub struct Bodies {
     all: Vec<Body>,
     /// States before the present trial, in the order of the bodies.
     before: Vec<[[f64; 3]; 2]>,
+    /// T and X of the last two trials of the step.
+    trials: Vec<[Vec<f64>; 2]>,
 }
+
+/// dX = ½·h²·dA where a force stays over the step and the unit integrates well.
+const SHARE: f64 = 0.5;
 
 /// How a state that is read becomes an error of the subsystem.
 type Fail = fn(terraglue_fmi::Error) -> Error;
@@ -88,15 +95,17 @@ impl Bodies {
     ) -> Result<Self> {
         let all = table.iter().map(|(name, keys)| {
             let keys = keys.as_object().ok_or_else(|| wrong(name, "takes a table"))?;
-            const KEYS: [&str; 4] = ["position", "velocity", "force", "terminal"];
+            const KEYS: [&str; 5] = ["position", "velocity", "acceleration", "force", "terminal"];
             if let Some(key) = keys.keys().find(|k| !KEYS.contains(&k.as_str())) {
-                let text = format!("has no key `{key}`; it has position, velocity and force, or terminal");
+                let text = format!(
+                    "has no key `{key}`; it has position, velocity, acceleration and force, or terminal"
+                );
                 return Err(wrong(name, &text));
             }
             let plug = keys.get("terminal").map(|t| members(name, t, terminals, variables)).transpose()?;
             let keys = match &plug {
                 Some(_) if keys.len() > 1 => {
-                    return Err(wrong(name, "`terminal` stands for the three others"));
+                    return Err(wrong(name, "`terminal` stands for the others"));
                 }
                 Some(found) => found,
                 None => keys,
@@ -106,6 +115,7 @@ impl Bodies {
                 name: name.clone(),
                 position: axes("position", false)?,
                 velocity: axes("velocity", false)?,
+                acceleration: axes("acceleration", false)?,
                 force: axes("force", true)?,
             };
             match (0..3).find(|k| body.force[*k].is_some() && body.position[*k].is_none()) {
@@ -116,7 +126,7 @@ impl Bodies {
                 None => Ok(body),
             }
         });
-        Ok(Self { all: all.collect::<Result<_>>()?, before: Vec::new() })
+        Ok(Self { all: all.collect::<Result<_>>()?, before: Vec::new(), trials: Vec::new() })
     }
 
     /// Whether nothing is mapped.
@@ -196,7 +206,7 @@ impl Bodies {
     }
 
     /// After a trial: the motion at all ports.
-    pub fn pull(&self, slave: &Slave, step: &Step, t: &[f64], out: &mut Response, fail: Fail) -> Result {
+    pub fn pull(&mut self, slave: &Slave, step: &Step, t: &[f64], out: &mut Response, fail: Fail) -> Result {
         let mut after = Vec::with_capacity(self.all.len());
         for body in &self.all {
             after.push(self.motion(slave, body, fail)?);
@@ -213,8 +223,102 @@ impl Bodies {
                 out.a[i] = along(v0, v1) / step.h;
             }
         }
+        self.pull_accelerations(slave, step, out, fail)?;
         out.t.copy_from_slice(t);
+        if self.trials.len() > 1 {
+            self.trials.remove(0);
+        }
+        self.trials.push([t.to_vec(), out.x.to_vec()]);
         Ok(())
+    }
+
+    /// Accelerations at the ports of bodies that tell them.
+    fn pull_accelerations(&self, slave: &Slave, step: &Step, out: &mut Response, fail: Fail) -> Result {
+        for port in step.ports {
+            let axes = &self.all[port.body as usize].acceleration;
+            if axes.iter().all(Option::is_none) {
+                continue;
+            }
+            let mut a = [0.0; 3];
+            for (a, axis) in a.iter_mut().zip(axes) {
+                *a = axis.map_or(Ok(0.0), |axis| axis.get(slave, fail))?;
+            }
+            for (i, c) in port.components() {
+                let d = port.direction(c);
+                out.a[i] = (0..3).map(|k| d[k] * a[k]).sum();
+            }
+        }
+        Ok(())
+    }
+
+    /// A new step begins.
+    pub fn forget_trials(&mut self) {
+        self.trials.clear();
+    }
+
+    /// Whether directional derivatives can tell dA/d(force): every force has its acceleration, none in an array.
+    pub fn tell_slopes(&self) -> bool {
+        let own = |b: &Body| {
+            (0..3).all(|k| match (b.force[k], b.acceleration[k]) {
+                (None, _) => true,
+                (Some(f), Some(a)) => f.count == 1 && a.count == 1,
+                (Some(_), None) => false,
+            })
+        };
+        self.all.iter().flat_map(|b| &b.force).any(Option::is_some) && self.all.iter().all(own)
+    }
+
+    /// dX, dV or dA/d(wrench on itself), n × n, column-major, from the unit's directional derivatives.
+    ///
+    /// Those speak of outputs at one time, so they give dA; a force that stays over the step makes dV = h·dA and
+    /// dX = c·h²·dA of it, with c = ½ until two trials of the step say what the unit's own integration makes of it.
+    pub fn slopes(&self, slave: &Slave, step: &Step, level: Level, out: &mut [f64], fail: Fail) -> Result {
+        let n = step.n as usize;
+        let told = |b: &Body| b.acceleration.into_iter().flatten().map(|a| a.reference);
+        let unknowns: Vec<u32> = self.all.iter().flat_map(told).collect();
+        let mut change = vec![f64::NAN; unknowns.len()];
+        for (column, port, d) in components(step) {
+            let force = self.all[port.body as usize].force;
+            let along = |k: usize| force[k].filter(|_| d[k] != 0.0).map(|axis| (axis.reference, d[k]));
+            let (knowns, seed): (Vec<u32>, Vec<f64>) = (0..3).filter_map(along).unzip();
+            slave.directional_derivative(&unknowns, &knowns, &seed, &mut change).map_err(fail)?;
+            for (row, port, d) in components(step) {
+                let mut next = self.all[..port.body as usize].iter().map(|b| told(b).count()).sum::<usize>();
+                let mut sum = 0.0;
+                for k in (0..3).filter(|k| self.all[port.body as usize].acceleration[*k].is_some()) {
+                    sum += d[k] * change[next];
+                    next += 1;
+                }
+                out[column * n + row] = sum;
+            }
+        }
+        let scale = match level {
+            Level::Acceleration => 1.0,
+            Level::Velocity => step.h,
+            Level::Position => step.h * step.h * self.share(step, out),
+        };
+        out.iter_mut().for_each(|g| *g *= scale);
+        Ok(())
+    }
+
+    /// c of [`Bodies::slopes`] by the last two trials, from dA/d(wrench on itself).
+    fn share(&self, step: &Step, slopes: &[f64]) -> f64 {
+        let [[t0, x0], [t1, x1]] = self.trials.as_slice() else { return SHARE };
+        let n = step.n as usize;
+        if [t0, x0, t1, x1].iter().any(|v| v.len() != n) {
+            return SHARE;
+        }
+        let (mut both, mut square) = (0.0, 0.0);
+        for row in 0..n {
+            let of = |(c, port, _): (usize, &Port, _)| {
+                slopes[c * n + row] * f64::from(port.side) * (t1[c] - t0[c])
+            };
+            let told = step.h * step.h * components(step).map(of).sum::<f64>();
+            both += told * (x1[row] - x0[row]);
+            square += told * told;
+        }
+        let share = both / square;
+        if share > 0.01 && share < 100.0 { share } else { SHARE }
     }
 
     /// A step of h = 0: place and velocity stay, the acceleration comes from a very short step that is taken back.
@@ -239,6 +343,11 @@ impl Bodies {
         out.x.fill(0.0);
         Ok(())
     }
+}
+
+/// Number in packed vectors, port and world direction of every component.
+fn components<'a>(step: &'a Step) -> impl Iterator<Item = (usize, &'a Port, [f64; 3])> {
+    step.ports.iter().flat_map(|port| port.components().map(move |(i, c)| (i, port, port.direction(c))))
 }
 
 fn wrong(body: &str, text: &str) -> Error {
@@ -268,6 +377,7 @@ fn members(
     for (key, axes) in [
         ("position", ["x", "y", "z"]),
         ("velocity", ["vx", "vy", "vz"]),
+        ("acceleration", ["ax", "ay", "az"]),
         ("force", ["force_x", "force_y", "force_z"]),
     ] {
         let whole = of(key).map(elements).filter(|names| names.len() == 3);

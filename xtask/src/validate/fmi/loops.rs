@@ -35,7 +35,7 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
     // outputs in steps of 1e-4, which no difference of 1e-7 can see
     let coarse = |name: &str, calc: &str, slope: &str| {
         let all = [("u", 'i', 0.5), ("asked", 'o', 0.0), ("y", 'o', 0.0)];
-        units::build_with_slope(folder, name, &all, calc, slope)
+        units::build_with_slope(folder, name, &all, (calc, ""), slope)
     };
     coarse("coarse", "v[2] = floor(1e4 * (3 - 2 * v[0])) / 1e4;", "-2.0")?;
     coarse("fine", "v[2] = 1 + 0.5 * v[0];", "0.5")?;

@@ -5,7 +5,7 @@ mod cycles;
 mod loops;
 mod pair;
 mod reference;
-mod units;
+pub(super) mod units;
 
 use super::{Context, Figure};
 use crate::process::Outcome;

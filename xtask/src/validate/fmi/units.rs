@@ -64,7 +64,7 @@ pub fn build_with_slope(
     folder: &Path,
     name: &str,
     variables: &[Variable],
-    calc: &str,
+    (calc, step): (&str, &str),
     slope: &str,
 ) -> Outcome<PathBuf> {
     let last = variables.len() - 1;
@@ -73,7 +73,7 @@ pub fn build_with_slope(
          double *x) {{ double *v = u->v; v[{}] += 1; for (size_t i = 0; i < n; i++) x[i] = z[i] == {last} && k[0] == 0 ? ({slope}) * s[0] : 0; return 0; }}",
         last - 1
     );
-    compile(folder, name, variables, calc, "", &code, " providesDirectionalDerivative=\"true\"")
+    compile(folder, name, variables, calc, step, &code, " providesDirectionalDerivative=\"true\"")
 }
 
 /// Builds a unit; `calc` and `step` are bodies in C over the values `v` in the order of the variables.

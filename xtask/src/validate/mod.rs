@@ -36,6 +36,9 @@ pub struct Arguments {
     /// Evaluate this table of values instead of the area's own figures (area gluing only).
     #[arg(long, value_name = "FILE", requires = "area")]
     table: Option<PathBuf>,
+    /// One part of the area only, for a look (area gluing only).
+    #[arg(long, value_name = "NAME", requires = "area")]
+    part: Option<String>,
     /// Write the tables of docs/.
     #[arg(long)]
     write_docs: bool,
@@ -60,6 +63,8 @@ pub struct Context {
     pub scratch: PathBuf,
     /// A table of values to evaluate instead of the area's own figures.
     pub table: Option<PathBuf>,
+    /// The only part to measure.
+    pub part: Option<String>,
 }
 
 type Measure = fn(&Context) -> Outcome<Vec<Figure>>;
@@ -101,6 +106,7 @@ pub fn validate(arguments: &Arguments) -> Outcome {
         quick: arguments.quick,
         scratch,
         table: arguments.table.clone(),
+        part: arguments.part.clone(),
     };
     let mut known = KnownFailures::read(&root().join("tests/known-failures.tsv"))?;
     let mut complaints = Vec::new();
@@ -115,7 +121,7 @@ pub fn validate(arguments: &Arguments) -> Outcome {
             println!("{}", figure.line());
             complaints.extend(known.judge(figure));
         }
-        if arguments.write_docs && measure.is_some() && arguments.table.is_none() {
+        if arguments.write_docs && measure.is_some() && context.table.is_none() && context.part.is_none() {
             documents::write_area(area, &figures)?;
         }
     }
@@ -126,6 +132,7 @@ pub fn validate(arguments: &Arguments) -> Outcome {
 fn again_in_release(arguments: &Arguments) -> Outcome {
     let mut command = cargo(&["run", "--release", "--package", "xtask", "--", "validate"]);
     command.args(&arguments.area);
+    command.args(arguments.part.iter().flat_map(|part| ["--part", part]));
     let flags = [(arguments.quick, "--quick"), (arguments.write_docs, "--write-docs")];
     command.args(flags.iter().filter(|(on, _)| *on).map(|(_, flag)| flag));
     must(&mut command)

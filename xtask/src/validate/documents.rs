@@ -4,12 +4,22 @@ use super::Figure;
 use crate::process::{Outcome, read, root, write};
 use crate::schema::between;
 
-/// Replaces the table of an area.
+/// Replaces the tables of an area.
 pub fn write_area(area: &str, figures: &[Figure]) -> Outcome {
-    let path = root().join("docs/validation.md");
-    let (begin, end) = (format!("<!-- {area}: begin -->\n"), format!("<!-- {area}: end -->"));
-    let text = between(&read(&path)?, (&begin, &end), &table(figures));
-    let text = text.ok_or_else(|| format!("{} has no table of the area `{area}`", path.display()))?;
+    replace("docs/validation.md", area, &table(figures))?;
+    // the peers are measured in long runs only
+    match super::rigid_body::comparison(figures) {
+        Some(text) => replace("docs/rigid-body.md", "peers", &text),
+        None => Ok(()),
+    }
+}
+
+/// Replaces the table called `name` of a page.
+fn replace(page: &str, name: &str, table: &str) -> Outcome {
+    let path = root().join(page);
+    let (begin, end) = (format!("<!-- {name}: begin -->\n"), format!("<!-- {name}: end -->"));
+    let text = between(&read(&path)?, (&begin, &end), table);
+    let text = text.ok_or_else(|| format!("{} has no table `{name}`", path.display()))?;
     write(&path, &text)
 }
 

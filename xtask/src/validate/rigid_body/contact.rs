@@ -2,9 +2,9 @@
 
 mod analytic;
 mod gait;
-mod peers;
 mod problems;
 mod scenes;
+mod shapes;
 mod small;
 mod walking;
 
@@ -15,8 +15,8 @@ use crate::validate::{Context, Figure};
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     let mut all = walking::figures(context)?;
     all.extend(small::figures(context)?);
+    all.extend(shapes::figures(context)?);
     all.extend(analytic::figures(context)?);
     all.extend(problems::figures(context)?);
-    all.extend(peers::figures(context)?);
     Ok(all)
 }

@@ -27,7 +27,8 @@ struct Run {
     gap: f64,
 }
 
-/// The spatial chain with a rule of second order.
+/// The spatial chain with a rule of second order. The one that conserves energy is held against the limit of the energy;
+/// what generalized-alpha, which damps what a step cannot resolve, makes of it is told beside it.
 fn spatial_second_order(integrator: &str) -> Outcome<Vec<Figure>> {
     let (file, joints, tip) = TIP[0];
     let [coarse, fine] = [1e-3, 5e-4].map(|h| run(file, joints, tip, integrator, h, 10.0));
@@ -36,13 +37,15 @@ fn spatial_second_order(integrator: &str) -> Outcome<Vec<Figure>> {
         Figure::new(format!("rigid-body.chain8.{integrator}.{name}"), value, limit, what)
     };
     let conserves = coarse.energy[0] < EXACT;
+    let judged = integrator == "energy-momentum";
+    let bar = if judged { Limit::AtMost(0.05) } else { Limit::None };
     let (ratio, of) = if conserves {
         (coarse.tip / fine.tip, "error of the tip at 1 s (the energy is conserved at any step)")
     } else {
         (coarse.energy[0] / fine.energy[0], "largest |ΔE|")
     };
     Ok(vec![
-        figure("energy", coarse.energy[0], Limit::AtMost(0.05), "spatial chain, 10 s: largest |ΔE|, J"),
+        figure("energy", coarse.energy[0], bar, "spatial chain, 10 s: largest |ΔE|, J"),
         figure("energy_end", coarse.energy[1], Limit::None, "the same: ΔE at the end, J"),
         figure("ratio", ratio, Limit::AtLeast(3.0), &format!("{of}: at h over that at h/2")),
         figure("gap", 1e3 * coarse.gap, Limit::AtMost(1e-6), "the same: largest gap of a joint, mm"),

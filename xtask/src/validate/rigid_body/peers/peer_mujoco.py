@@ -1,14 +1,17 @@
 """MuJoCo on the cases of `cargo xtask validate rigid-body`: one line per figure, `name<TAB>value<TAB>what`.
 
-Usage: peer_mujoco.py HEXAPOD.xml GAIT.csv. Step 1 ms, default (soft) contacts, and contacts as stiff as the step admits.
+Usage: peer_mujoco.py REFERENCE_FOLDER. Step 1 ms, default (soft) contacts, and contacts as stiff as the step admits.
+Passive motion with both of its integrators, Euler and RK4.
 """
 
 import csv
 import math
+import pathlib
 import sys
 import time
 
 import mujoco
+import numpy
 
 STAND = [0.0, 0.9581921787462744, -1.3796341802638374, -1.1493543252773333]
 CYCLE = 1.2
@@ -85,10 +88,77 @@ def incline(degrees):
     return scene((9.81 * math.sin(a), -9.81 * math.cos(a)), [(1.0, (0.1, 0.1, 0.05), 0.05)], 0.5)
 
 
+INTEGRATORS = {"euler": mujoco.mjtIntegrator.mjINT_EULER, "rk4": mujoco.mjtIntegrator.mjINT_RK4}
+
+
+def spin(name):
+    xml = (
+        '<mujoco><option timestep="0.001" gravity="0 0 0"/><worldbody><body><freejoint/>'
+        '<inertial pos="0 0 0" mass="1" diaginertia="0.1 0.2 0.3"/></body></worldbody></mujoco>'
+    )
+    model = mujoco.MjModel.from_xml_string(xml)
+    model.opt.integrator = INTEGRATORS[name]
+    data = mujoco.MjData(model)
+    data.qvel[3:6] = [0.01, 10.0, 0.01]
+    moments = (0.1, 0.2, 0.3)
+    turned = numpy.zeros(3)
+
+    def state():
+        w = data.qvel[3:6]
+        mujoco.mju_rotVecQuat(turned, w * moments, data.qpos[3:7])
+        return 0.5 * float(w * moments @ w), turned.copy(), float(w[1])
+
+    e0, l0, last = state()
+    energy = momentum = flips = 0.0
+    for _ in range(60_000):
+        mujoco.mj_step(model, data)
+        e, l, rate = state()
+        energy = max(energy, abs(e / e0 - 1))
+        momentum = max(momentum, float(numpy.linalg.norm(l - l0) / numpy.linalg.norm(l0)))
+        flips += rate * last < 0
+        last = rate
+    figure(f"dzhanibekov.{name}.energy", energy, "free body, 60 s: largest |ΔE|/E")
+    figure(f"dzhanibekov.{name}.momentum", momentum, "the same: largest |ΔL|/L")
+    figure(f"dzhanibekov.{name}.flips", flips, "sign changes of the middle rate")
+
+
+def chain(folder, file, angles, reference, name):
+    model = mujoco.MjModel.from_xml_path(str(folder / f"{file}.urdf"))
+    model.opt.timestep = 1e-3
+    model.opt.integrator = INTEGRATORS[name]
+    model.opt.enableflags |= mujoco.mjtEnableBit.mjENBL_ENERGY
+    data = mujoco.MjData(model)
+    data.qpos[:] = angles
+
+    def energy():
+        mujoco.mj_energyPos(model, data)
+        mujoco.mj_energyVel(model, data)
+        return float(data.energy.sum())
+
+    mujoco.mj_forward(model, data)
+    start, largest, change, tip = energy(), 0.0, 0.0, math.nan
+    for step in range(1, 10_001):
+        mujoco.mj_step(model, data)
+        mujoco.mj_forward(model, data)
+        change = energy() - start
+        largest = max(largest, abs(change))
+        if step == 1000:
+            body = model.nbody - 1
+            end = data.xpos[body] + data.xmat[body].reshape(3, 3) @ [0.25, 0.0, 0.0]
+            tip = float(numpy.linalg.norm(end - reference))
+    if data.warning[mujoco.mjtWarning.mjWARN_BADQACC].number > 0:
+        # it started anew by itself
+        largest = change = math.nan
+    figure(f"{file}.{name}.energy", largest, "chain of eight, 10 s: largest |ΔE|, J")
+    figure(f"{file}.{name}.energy_end", change, "the same: ΔE at the end, J")
+    figure(f"{file}.{name}.tip", 1e3 * tip, "the same: tip at 1 s, mm from the reference")
+
+
 def main():
-    with open(sys.argv[1], encoding="utf-8") as file:
+    folder = pathlib.Path(sys.argv[1])
+    with open(folder / "hexapod.xml", encoding="utf-8") as file:
         xml = file.read()
-    with open(sys.argv[2], encoding="utf-8") as file:
+    with open(folder / "gait_tripod.csv", encoding="utf-8") as file:
         rows = [[float(x) for x in row[1:]] for row in list(csv.reader(file))[1:]]
     figure("version", int("".join(f"{int(part):03d}" for part in mujoco.__version__.split(".")[:3])), mujoco.__version__)
     walk(xml, rows, "soft")
@@ -110,6 +180,11 @@ def main():
         start = data.qpos[-5]
         run(model, data, 5.0)
         figure(name, 1e3 * abs(start - data.qpos[-5]), "5 s: sink of the top, mm")
+    for name in INTEGRATORS:
+        spin(name)
+        chain(folder, "chain8", [0.0, 0.2] * 4, [-1.640621154, -0.580129864, -0.919078146], name)
+        hanging = [-1.0707963267948966] + [0.0] * 7
+        chain(folder, "chain8_m1000", hanging, [-0.566796969, 0.0, -1.918003510], name)
 
 
 main()

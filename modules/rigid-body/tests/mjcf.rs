@@ -159,3 +159,28 @@ fn connected_and_welded_bodies_stay_together() {
     assert!(rig.get("jc.angle").abs() < 1e-9 && rig.get("jr.angle") > 1.0, "{}", rig.get("jr.angle"));
     assert!(rig.get("hold.force") > 19.0);
 }
+
+#[test]
+fn a_body_on_two_hinges_swings_as_on_a_universal_joint() {
+    let body = |joints: &str| {
+        format!(
+            r#"<body name="a">{joints}<inertial pos="0.3 0.2 -0.4" mass="2" diaginertia="0.05 0.06 0.03"/></body>"#
+        )
+    };
+    let hinges = body(r#"<joint name="jx" axis="1 0 0"/><joint name="jz" axis="0 0 1"/>"#);
+    let (two, one) = (
+        scene("two_hinges", &hinges, ""),
+        scene("universal", &body(r#"<joint name="j" axis="1 0 0"/>"#), ""),
+    );
+    let kind = r#", "joint_kind": {"j": "universal"}"#;
+    let places = [(two, ""), (one, kind)].map(|(model, more)| {
+        let mut rig = Rig::new(&format!(r#"{{"model": "{model}", "motor": "off"{more}}}"#), 9.81, 1e-3);
+        (0..1000).for_each(|_| rig.free_step());
+        ["a.x", "a.y", "a.z", "a.vx", "a.vy", "a.vz"].map(|name| rig.get(name))
+    });
+    // It swings far, and the body between the hinges weighs a millionth.
+    assert!(places[1][5].abs() + places[1][3].abs() > 0.1, "{places:?}");
+    for (ours, exact) in places[0].iter().zip(&places[1]) {
+        assert!((ours - exact).abs() < 1e-4, "{places:?}");
+    }
+}

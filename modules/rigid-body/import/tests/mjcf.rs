@@ -130,6 +130,14 @@ fn attributes_that_act_and_are_not_supported_are_named() {
             "plane on a body",
         ),
         (
+            "<body name=\"a\"><freejoint/><geom size=\"1\" solref=\"0.01 1\"/><geom size=\"1\" solref=\"0.1 1\"/></body>",
+            "<geom> has `solref` = \"0.01 1\", which is not supported and does nothing (1 more like it)",
+        ),
+        (
+            "<body name=\"a\"><freejoint/><geom size=\"1\" spin=\"fast\"/></body>",
+            "<geom> has `spin` = \"fast\"",
+        ),
+        (
             "<frame><body name=\"b\"/></frame><body name=\"a\"><freejoint/><geom size=\"1\"/></body>",
             "<frame> is not",
         ),
@@ -147,6 +155,11 @@ fn attributes_that_act_and_are_not_supported_are_named() {
         ("<actuator><muscle joint=\"j\"/></actuator>", "<muscle> is not supported"),
         ("<actuator><position joint=\"j\" dampratio=\"1\"/></actuator>", "<position> has `dampratio`"),
         ("<contact><pair geom1=\"x\" geom2=\"y\"/></contact>", "<pair> is not supported"),
+        (
+            "<option><flag contact=\"disable\" energy=\"enable\"/></option>",
+            "<flag> has `contact` = \"disable\"",
+        ),
+        ("<actuator><position joint=\"j\" ctrlrange=\"-1 1\"/></actuator>", "<position> has `ctrlrange`"),
         ("<keyframe><key qpos=\"1\"/></keyframe>", "<key> is not supported"),
         ("<default><joint springdamper=\"1 1\"/></default>", "<joint> `j` has `springdamper`"),
     ] {
@@ -247,7 +260,10 @@ fn what_would_be_another_mechanism_is_refused() {
         r#"<body name="a"><joint type="screw"/><geom size="0.1"/></body>"#,
         &["m.xml:4", "`screw` cannot be simulated", "hinge"],
     );
-    refused(r#"<body name="a"><joint/><joint/><geom size="0.1"/></body>"#, &["body `a`", "2 joints"]);
+    refused(
+        r#"<body name="a"><freejoint/><joint/><geom size="0.1"/></body>"#,
+        &["m.xml:4", "free (alone, in the world)"],
+    );
     refused(r#"<body name="a"><freejoint/></body>"#, &["body `a`", "no mass"]);
     refused(r#"<body name="a"><freejoint/><geom size="0"/></body>"#, &["positive"]);
     refused(r#"<body name="a" pos="0 0"><freejoint/><geom size="1"/></body>"#, &["pos has 2 numbers"]);

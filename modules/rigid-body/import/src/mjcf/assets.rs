@@ -156,7 +156,7 @@ struct Files {
 impl Files {
     fn new(root: Node, folders: &Folders) -> Self {
         let compilers = || root.children().filter(|n| n.has_tag_name("compiler"));
-        let text = |name: &str| compilers().find_map(|c| c.attribute(name)).map(str::to_owned);
+        let text = |name: &str| compilers().filter_map(|c| c.attribute(name)).last().map(str::to_owned);
         let below = text("meshdir").or_else(|| text("assetdir")).unwrap_or_default();
         let folders = Folders { beside: folders.beside.join(below), ..folders.clone() };
         Self { folders, strip: text("strippath").as_deref() == Some("true") }

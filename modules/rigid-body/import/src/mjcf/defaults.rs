@@ -1,6 +1,7 @@
 //! Attributes of an element: its own, else those of its default class.
 
-use crate::error::{Error, Source};
+use super::include::Whole;
+use crate::error::Error;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use roxmltree::Node;
 use std::collections::BTreeMap;
@@ -10,11 +11,15 @@ type Class = BTreeMap<(String, String), String>;
 
 /// The default classes of a file and how it writes angles.
 pub(crate) struct Defaults<'a> {
-    pub source: Source<'a>,
+    whole: &'a Whole,
     classes: BTreeMap<String, Class>,
     /// rad per unit of angle.
     pub angle: f64,
     eulerseq: String,
+    /// Whether a range alone makes a limit.
+    pub autolimits: bool,
+    /// Whether geoms weigh although there is an `<inertial>`.
+    pub weigh_geoms: bool,
 }
 
 /// An element with the class that it takes defaults from.
@@ -37,14 +42,23 @@ impl<'a, 'i> Element<'a, 'i> {
 }
 
 impl<'a> Defaults<'a> {
-    pub fn new(source: Source<'a>, root: Node) -> Self {
-        let compiler = root.children().find(|n| n.has_tag_name("compiler"));
-        let text = |name: &str| compiler.and_then(|c| c.attribute(name));
-        let angle = if text("angle") == Some("radian") { 1.0 } else { std::f64::consts::PI / 180.0 };
-        let eulerseq = text("eulerseq").unwrap_or("xyz").to_owned();
-        let mut me = Self { source, classes: BTreeMap::new(), angle, eulerseq };
+    pub fn new(whole: &'a Whole, root: Node) -> Self {
+        // of several the last one counts
+        let compilers = || root.children().filter(|n| n.has_tag_name("compiler"));
+        let text = |name: &str| compilers().filter_map(|c| c.attribute(name).map(str::to_owned)).last();
+        let angle =
+            if text("angle").as_deref() == Some("radian") { 1.0 } else { std::f64::consts::PI / 180.0 };
+        let eulerseq = text("eulerseq").unwrap_or_else(|| "xyz".into());
+        let autolimits = text("autolimits").as_deref() != Some("false");
+        let weigh_geoms = text("inertiafromgeom").as_deref() == Some("true");
+        let mut me = Self { whole, classes: BTreeMap::new(), angle, eulerseq, autolimits, weigh_geoms };
         for node in root.children().filter(|n| n.has_tag_name("default")) {
-            me.read(node, &Class::new(), "main");
+            // a further section goes on with what was said before
+            let before = me.classes.get("main").cloned().unwrap_or_default();
+            let name = node.attribute("class").unwrap_or("main");
+            me.read(node, &before, name);
+            let main = me.classes.get(name).cloned().unwrap_or_default();
+            me.classes.insert("main".into(), main);
         }
         me
     }
@@ -71,8 +85,21 @@ impl<'a> Defaults<'a> {
     pub fn text<'e>(&'e self, e: &'e Element, name: &str) -> Option<&'e str> {
         e.node.attribute(name).or_else(|| {
             let class = self.classes.get(e.class.unwrap_or("main"))?;
-            class.get(&(e.node.tag_name().name().into(), name.into())).map(String::as_str)
+            tags(e).find_map(|tag| class.get(&(tag.into(), name.into()))).map(String::as_str)
         })
+    }
+
+    /// All attributes of an element, its own first.
+    pub fn attributes(&self, e: &Element) -> Vec<(String, String)> {
+        let own = e.node.attributes().map(|a| (a.name().to_owned(), a.value().to_owned()));
+        let mut all: Vec<_> = own.collect();
+        let class = self.classes.get(e.class.unwrap_or("main"));
+        for ((tag, name), value) in class.into_iter().flatten() {
+            if tags(e).any(|t| t == tag) && !all.iter().any(|(n, _)| n == name) {
+                all.push((name.clone(), value.clone()));
+            }
+        }
+        all
     }
 
     /// Numbers of an attribute; none where it is not there.
@@ -157,21 +184,29 @@ impl<'a> Defaults<'a> {
         q
     }
 
-    /// Line of an element.
-    pub fn line(&self, node: Node) -> usize {
-        self.source.text[..node.range().start].matches('\n').count() + 1
+    /// File and line of an element.
+    pub fn place(&self, node: Node) -> (&str, usize) {
+        self.whole.place(node.range().start)
     }
 
     /// What is wrong with an element.
     pub fn wrong(&self, e: &Element, problem: String) -> Error {
         let name = e.node.attribute("name").map(|n| format!(" `{n}`")).unwrap_or_default();
+        let (file, line) = self.place(e.node);
         Error::Element {
-            file: self.source.file.into(),
-            line: self.line(e.node),
+            file: file.into(),
+            line,
             element: format!("{}{name}", e.node.tag_name().name()),
             problem,
         }
     }
+}
+
+/// The names under which a default class speaks of an element: all actuators are also `<general>`.
+fn tags<'n>(e: &Element<'n, '_>) -> impl Iterator<Item = &'n str> + use<'n> {
+    let tag = e.node.tag_name().name();
+    let general = ["position", "velocity", "motor"].contains(&tag).then_some("general");
+    std::iter::once(tag).chain(general)
 }
 
 /// A rotation that takes z to a direction.

@@ -5,6 +5,7 @@ use super::defaults::Element;
 use crate::error::Error;
 use crate::model::{AxisData, Joint, JointKind};
 use nalgebra::{Isometry3, Translation3, Unit, Vector3};
+use roxmltree::Node;
 
 impl Reader<'_, '_> {
     /// Hangs a body on its parent; `frame`: its pose there or in the world.
@@ -37,13 +38,13 @@ impl Reader<'_, '_> {
             "hinge" => JointKind::Revolute,
             "slide" => JointKind::Prismatic,
             "ball" => JointKind::Spherical,
-            "free" if parent.is_none() => {
+            "free" if parent.is_none() && !self.is_one_of_several(e.node) => {
                 self.robot.others.push((child, frame));
                 return Ok(());
             }
             other => {
                 let problem = format!(
-                    "type `{other}` cannot be simulated here; hinge, slide, ball and free (in the world) can"
+                    "type `{other}` cannot be simulated here; hinge, slide, ball and free (alone, in the world) can"
                 );
                 return Err(d.wrong(&e, problem));
             }
@@ -89,6 +90,11 @@ impl Reader<'_, '_> {
         Ok(())
     }
 
+    fn is_one_of_several(&self, joint: Node) -> bool {
+        let of_body = joint.parent().into_iter().flat_map(|body| body.children());
+        of_body.filter(|n| n.has_tag_name("joint") || n.has_tag_name("freejoint")).count() > 1
+    }
+
     /// A ball turns freely: what else it says is named.
     fn ball(&mut self, e: &Element) -> Result<(), Error> {
         for name in ["range", "damping", "frictionloss", "armature", "stiffness"] {
@@ -106,6 +112,7 @@ impl Reader<'_, '_> {
         let range = self.d.numbers(e, "range")?;
         match (self.d.text(e, "limited"), range.as_deref()) {
             (Some("false"), _) | (_, None) => Ok(None),
+            (None | Some("auto"), _) if !self.d.autolimits => Ok(None),
             (_, Some([lower, upper])) if lower < upper => Ok(Some([unit * lower, unit * upper])),
             (_, Some(other)) => Err(self.d.wrong(e, format!("range = {other:?} leaves no room"))),
         }

@@ -1,7 +1,7 @@
 //! From the text of an MJCF file to the checked robot.
 //!
-//! Bodies, free, hinge and slide joints, geoms, planes, position, velocity and torque motors, armature, damping,
-//! friction, springs, limits, default classes, excluded pairs. What acts on the mechanics and is not known here is
+//! Bodies, free, hinge, slide and ball joints, geoms, planes, position, velocity and torque motors, armature, damping,
+//! friction, springs, limits, default classes, excluded pairs, included files. What acts on the mechanics and is not known here is
 //! named in a warning with its line; what would make another mechanism of it is refused. Step, gravity and solver are
 //! the scenario's.
 
@@ -12,14 +12,18 @@ mod equality;
 mod geom;
 mod hang;
 mod ignored;
+mod include;
+mod several;
 
 use crate::Options;
 use crate::check::{mass_spread, physical};
 use crate::error::{Error, Source};
-use crate::model::{Base, Body, Robot, Shape};
+use crate::model::{Base, Robot, Shape};
 use assets::Assets;
 use defaults::Defaults;
 use geom::{Around, Geom, compound, geom};
+use ignored::Ignored;
+use include::Whole;
 use nalgebra::{Isometry3, Matrix3, Vector3};
 use roxmltree::{Document, Node};
 use std::collections::BTreeMap;
@@ -30,17 +34,21 @@ const SEEN_ONLY: [&str; 9] =
 
 /// Reads the text of a file; `file` appears in messages and tells the folder of meshes.
 pub fn read_mjcf_text(file: &str, text: &str, options: &Options) -> Result<Robot, Error> {
-    let source = Source { file, text };
-    let document = Document::parse(text).map_err(|e| source.syntax(e.pos().row as usize, e.to_string()))?;
+    let whole = Whole::read(file, text)?;
+    let source = Source { file, text: &whole.text };
+    let document = Document::parse(&whole.text);
+    let document = document.map_err(|e| source.syntax(e.pos().row as usize, e.to_string()))?;
     let root = document.root_element();
-    let defaults = Defaults::new(source, root);
+    let defaults = Defaults::new(&whole, root);
     let assets = Assets::read(&defaults, root, &options.folders(file))?;
     let robot = empty(root.attribute("model").unwrap_or("robot"));
-    let mut reader = Reader { d: &defaults, robot, assets: &assets, frames: BTreeMap::new() };
+    let mut reader =
+        Reader { d: &defaults, robot, assets: &assets, frames: BTreeMap::new(), ignored: Ignored::default() };
     reader.sections(root)?;
     let mut robot = reader.robot;
+    robot.warnings.extend(reader.ignored.warnings());
     if robot.bodies.is_empty() {
-        return Err(defaults.source.tree("there is no body that moves; a robot needs at least one"));
+        return Err(source.tree("there is no body that moves; a robot needs at least one"));
     }
     // The first body that moves freely is the robot's; others start where the file says.
     robot.base = match robot.others.first() {
@@ -86,6 +94,7 @@ struct Reader<'d, 's> {
     assets: &'d Assets,
     /// By name of a body of the file: the body that it belongs to (none: the world) and its frame there.
     frames: BTreeMap<String, (Option<usize>, Isometry3<f64>)>,
+    ignored: Ignored,
 }
 
 impl<'d, 's> Reader<'d, 's> {
@@ -99,10 +108,6 @@ impl<'d, 's> Reader<'d, 's> {
                 .flat_map(|n| n.children())
                 .filter(Node::is_element)
         };
-        if let Some(include) = root.descendants().find(|n| n.has_tag_name("include")) {
-            let problem = "files are not included; put its text here";
-            return Err(self.d.wrong(&self.d.element(include, None), problem.into()));
-        }
         for node in root.children().filter(|n| n.has_tag_name("worldbody")) {
             let world =
                 Place { body: None, frame: Isometry3::identity(), class: node.attribute("childclass") };
@@ -116,10 +121,11 @@ impl<'d, 's> Reader<'d, 's> {
             self.actuator(node)?;
         }
         for node in section("equality") {
+            self.warn_ignored(node, None);
             self.equality(node)?;
         }
         let heads = root.children().filter(|n| n.has_tag_name("compiler") || n.has_tag_name("option"));
-        for node in heads.chain(section("asset")) {
+        for node in heads.chain(section("asset")).chain(section("option")) {
             self.warn_ignored(node, None);
         }
         let known = ["worldbody", "contact", "actuator", "equality", "option"];
@@ -141,7 +147,7 @@ impl<'d, 's> Reader<'d, 's> {
 
     /// What is to be said about an element, with its place.
     fn place(&self, node: Node, what: &str) -> String {
-        let (file, line) = (self.d.source.file, self.d.line(node));
+        let (file, line) = self.d.place(node);
         let name = node.attribute("name").map(|n| format!(" `{n}`")).unwrap_or_default();
         format!("{file}:{line}: <{}>{name} {what}", node.tag_name().name())
     }
@@ -152,7 +158,8 @@ impl<'d, 's> Reader<'d, 's> {
             match child.tag_name().name() {
                 "geom" => self.shape(child, place, owner)?,
                 "body" => self.body(child, place)?,
-                "inertial" | "joint" | "freejoint" => {}
+                "inertial" | "freejoint" => self.warn_ignored(child, None),
+                "joint" => {}
                 name if SEEN_ONLY.contains(&name) => {}
                 _ => self.warn(child, "is not supported and does nothing"),
             }
@@ -199,13 +206,6 @@ impl<'d, 's> Reader<'d, 's> {
             node.attribute("name").map_or_else(|| format!("body{}", self.robot.bodies.len()), str::to_owned);
         let joints: Vec<Node> =
             node.children().filter(|n| n.has_tag_name("joint") || n.has_tag_name("freejoint")).collect();
-        if joints.len() > 1 {
-            let problem = format!(
-                "has {} joints; one joint per body can be simulated: put a body with a mass of its own between them",
-                joints.len()
-            );
-            return Err(self.d.wrong(&e, problem));
-        }
         let inertial = self.inertial(node, class, &name)?;
         let place = match (joints.first(), inertial) {
             // It moves with what is above it and weighs nothing.
@@ -216,17 +216,15 @@ impl<'d, 's> Reader<'d, 's> {
                 let problem = "moves but has no mass; give it an <inertial> or a geom with mass";
                 return Err(self.d.wrong(&e, problem.into()));
             }
-            (joint, Some((mass, com, inertia))) => {
+            (_, Some((mass, com, inertia))) => {
                 physical(&inertia).map_err(|problem| self.d.wrong(&e, problem))?;
                 if self.robot.bodies.iter().any(|b| b.name == name) {
                     return Err(self
                         .d
                         .wrong(&e, "the name is used twice; names of bodies are unique".into()));
                 }
-                let child = self.robot.bodies.len();
-                self.robot.bodies.push(Body { name: name.clone(), mass, com, inertia, shapes: Vec::new() });
-                let joint = joint.map(|j| self.d.element(*j, class));
-                self.hang(joint, above.body, child, frame, &name)?;
+                let hangs = Place { class, ..above };
+                let child = self.hang_by(&joints, hangs, (&name, frame), (mass, com, inertia))?;
                 Place { body: Some(child), frame: Isometry3::identity(), class }
             }
         };
@@ -242,7 +240,8 @@ impl<'d, 's> Reader<'d, 's> {
         name: &str,
     ) -> Result<Option<(f64, Vector3<f64>, Matrix3<f64>)>, Error> {
         let d = self.d;
-        if let Some(inertial) = node.children().find(|n| n.has_tag_name("inertial")) {
+        let inertial = node.children().find(|n| n.has_tag_name("inertial"));
+        if let Some(inertial) = inertial.filter(|_| !d.weigh_geoms) {
             let e = d.element(inertial, None);
             let mass = d.number(&e, "mass")?.filter(|m| *m > 0.0);
             let mass = mass.ok_or_else(|| d.wrong(&e, "needs a positive mass".into()))?;
@@ -268,6 +267,7 @@ impl<'d, 's> Reader<'d, 's> {
     }
 
     fn exclude(&mut self, node: Node) -> Result<(), Error> {
+        self.warn_ignored(node, None);
         if !node.has_tag_name("exclude") {
             self.warn(node, "is not supported and does nothing");
             return Ok(());

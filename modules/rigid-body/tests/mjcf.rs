@@ -176,10 +176,10 @@ fn a_body_on_two_hinges_swings_as_on_a_universal_joint() {
     let places = [(two, ""), (one, kind)].map(|(model, more)| {
         let mut rig = Rig::new(&format!(r#"{{"model": "{model}", "motor": "off"{more}}}"#), 9.81, 1e-3);
         (0..1000).for_each(|_| rig.free_step());
-        ["a.x", "a.y", "a.z", "a.vx", "a.vy", "a.vz"].map(|name| rig.get(name))
+        ["a.roll", "a.pitch", "a.yaw"].map(|name| rig.get(name))
     });
     // It swings far, and the body between the hinges weighs a millionth.
-    assert!(places[1][5].abs() + places[1][3].abs() > 0.1, "{places:?}");
+    assert!(places[1][0].abs() > 0.2 && places[1][2].abs() > 0.2, "{places:?}");
     for (ours, exact) in places[0].iter().zip(&places[1]) {
         assert!((ours - exact).abs() < 1e-4, "{places:?}");
     }

@@ -4,7 +4,6 @@ mod analytic;
 mod gait;
 mod problems;
 mod scenes;
-mod shapes;
 mod small;
 mod walking;
 
@@ -15,7 +14,6 @@ use crate::validate::{Context, Figure};
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     let mut all = walking::figures(context)?;
     all.extend(small::figures(context)?);
-    all.extend(shapes::figures(context)?);
     all.extend(analytic::figures(context)?);
     all.extend(problems::figures(context)?);
     Ok(all)

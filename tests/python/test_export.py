@@ -1,6 +1,8 @@
 """Exported units, driven by FMPy: valid, equal to `terraglue run`, and right about states, resets, threads, errors."""
 
 import csv
+import shutil
+import subprocess
 import threading
 
 import numpy as np
@@ -10,6 +12,7 @@ from fmpy.validation import validate_fmu
 
 from conftest import ROOT, terraglue
 from fmus import Unit, export
+from test_plugins import made
 
 GROUND = ("terrain.size_m=[1.0,0.6]", "terrain.spacing_m=0.005")
 PLATE = ("foot.shape=cylinder", "foot.radius_m=0.025", "foot.half_length_m=0.01")
@@ -222,3 +225,26 @@ def test_our_own_import_gives_the_same(units, pressed, tmp_path):
     row = list(csv.DictReader(out.open()))[-1]
     for name in names:
         assert abs(float(row[name]) - float(pressed[-1][name])) <= 1e-12 * abs(float(pressed[-1][name]))
+
+
+@pytest.mark.parametrize("language", ["c", "python", "scenario"])
+def test_a_soil_with_a_law_of_its_own_gives_the_run(tmp_path, language):
+    place, _ = made(tmp_path, "law", language)
+    if language == "c":
+        subprocess.run(["make"], cwd=place, check=True, capture_output=True)
+    path = export(place / "scenario.toml", tmp_path / "law.fmu", "--fmi", "3", "--scalars", *EXACT)
+    every = ("--set", "recording.every_steps=1", "--duration", "0.3", "--csv", "--quiet", "--out", tmp_path / "out")
+    done = terraglue("run", place / "scenario.toml", *EXACT, *every)
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader((tmp_path / "out" / "variables.csv").open()))
+    # the law that the unit calls is its own
+    shutil.rmtree(place)
+    unit = Unit(path)
+    instance = unit.instance()
+    for _ in rows[1:]:
+        instance.step(1e-3)
+    assert float(rows[-1]["soil.max_sinkage"]) > 1e-3
+    for name in ["soil.max_sinkage", "robot.ball.z", "robot.ball.contact_normal"]:
+        assert abs(instance[name][0] - float(rows[-1][name])) <= 1e-12 * max(1.0, abs(float(rows[-1][name]))), name
+    instance.end()
+    unit.remove()

@@ -2,8 +2,12 @@
 
 import csv
 import json
+import subprocess
+
+import pytest
 
 from conftest import ROOT, terraglue
+from test_plugins import made
 
 PLATES = ROOT / "tests" / "reference" / "terramechanics" / "cmu_plate_pressure_sinkage_d60_d100.csv"
 
@@ -50,3 +54,31 @@ def test_one_soil():
     shown = terraglue("soils", "Toyoura_sand_Ishigami")
     assert shown.returncode == 0 and "ambiguous" in shown.stdout and "confidence" in shown.stdout
     assert "no soil is called" in terraglue("soils", "cheese").stderr
+
+
+@pytest.mark.parametrize("language", ["c", "python"])
+def test_a_law_that_is_a_module_is_fitted_within_its_ranges(tmp_path, language):
+    place, _ = made(tmp_path, "law", language)
+    file = "my_law.py" if language == "python" else "libmy_law_plugin.so"
+    if language == "c":
+        subprocess.run(["make"], cwd=place, check=True, capture_output=True)
+    out = tmp_path / "law.toml"
+    arguments = ["fit-soil", PLATES, "--law", place / file, "--soil", "CMU_Direct90_s0", "--out", out]
+    process = terraglue(*arguments, "--json")
+    assert process.returncode == 0, process.stderr
+    found = json.loads(process.stdout)
+    bekker = json.loads(terraglue("fit-soil", PLATES, "--law", "bekker", "--json").stdout)
+    # Bekker's law is this one where z_1 is large: it can fit no better.
+    assert found["rms"] <= bekker["rms"] + 1e-4
+    k_phi, cohesion = found["parameters"]["k_phi"], found["parameters"]["c_pa"]
+    assert k_phi["low"] < k_phi["value"] < k_phi["high"] and cohesion["low"] is None
+    assert (tmp_path / "law.svg").read_text().count("<polyline") == 2
+    assert "plates do not tell it" in terraglue(*arguments).stdout
+    scenario = place / "scenario.toml"
+    text = scenario.read_text()
+    old = text[text.index("[soil.law]"):text.index("[robot]")]
+    scenario.write_text(text.replace(old, out.read_text() + "\n"))
+    process = terraglue("run", scenario, "--quiet", "--duration", "0.05", "--out", tmp_path / "run")
+    assert process.returncode == 0 and (tmp_path / "run" / "report.html").exists(), process.stderr
+    process = terraglue("fit-soil", PLATES, "--law", "beker")
+    assert process.returncode == 2 and "beker" in process.stderr

@@ -3,7 +3,6 @@
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use terraglue::scaffold::{Kind, Language};
-use terraglue_soil_law::PRESSURE_LAWS;
 
 /// Simulates robots on deformable ground: rigid bodies, soils and controllers, glued into one run.
 #[derive(Parser, Debug)]
@@ -272,9 +271,9 @@ pub struct FitSoilArguments {
     /// Plate tests: columns sinkage_mm, pressure_kPa and plate_diam_mm or b_mm (also in m); equal cells in the other
     /// columns make one press.
     pub data: PathBuf,
-    /// Pressure-sinkage law.
-    #[arg(long, default_value = "bearing", value_parser = one_of(PRESSURE_LAWS, |law| law))]
-    pub law: &'static str,
+    /// Pressure-sinkage law: bekker, reece, bearing, or a law that is a module, by its name or the path of its file.
+    #[arg(long, default_value = "bearing")]
+    pub law: String,
     /// Write the soil here, for `parameters = "soil.toml"` in a scenario, and a drawing beside it (.svg).
     #[arg(long, value_name = "TOML")]
     pub out: Option<PathBuf>,

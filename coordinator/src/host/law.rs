@@ -69,6 +69,12 @@ pub fn open(
     services: &HostServices,
 ) -> std::result::Result<Arc<dyn NodeLaw>, String> {
     let schema = law.schema();
+    is_law(schema)?;
+    let numbers = numbers(schema, config)?;
+    with_numbers(law, numbers, instance_name, services)
+}
+
+fn is_law(schema: &Schema) -> std::result::Result<(), String> {
     if schema.kind != Kind::Law {
         return Err(format!(
             "`{}` is no law but a {}",
@@ -76,12 +82,20 @@ pub fn open(
             format!("{:?}", schema.kind).to_lowercase()
         ));
     }
-    let numbers = numbers(schema, config)?;
+    Ok(())
+}
+
+fn with_numbers(
+    law: &LoadedModule,
+    numbers: Vec<f64>,
+    instance_name: &str,
+    services: &HostServices,
+) -> std::result::Result<Arc<dyn NodeLaw>, String> {
+    let schema = law.schema();
     if let Some((python, path)) = law.python() {
-        let names = schema.parameters.iter().map(|p| p.name.clone());
         let what = What::Law {
             path: std::path::absolute(path).unwrap_or_else(|_| path.to_owned()),
-            numbers: names.zip(numbers.into_iter().map(Into::into)).collect(),
+            numbers: by_name(schema, &numbers),
             python: python.to_owned(),
         };
         let host = services.for_instance(instance_name);
@@ -89,6 +103,50 @@ pub fn open(
     }
     let foreign = law.foreign().ok_or("a law is a library of its own")?;
     foreign.law(&schema.name, numbers).map_err(|e| e.to_string())
+}
+
+fn by_name(schema: &Schema, numbers: &[f64]) -> serde_json::Map<String, serde_json::Value> {
+    schema.parameters.iter().zip(numbers).map(|(p, x)| (p.name.clone(), (*x).into())).collect()
+}
+
+/// A law whose numbers are tried out, one set after the other.
+pub struct Bench<'a> {
+    module: &'a LoadedModule,
+    services: &'a HostServices,
+    law: Arc<dyn NodeLaw>,
+}
+
+impl<'a> Bench<'a> {
+    /// A law with these numbers to begin with, in the order of its schema.
+    ///
+    /// # Errors
+    /// The module is no law, or its process does not start.
+    pub fn open(
+        module: &'a LoadedModule,
+        numbers: &[f64],
+        services: &'a HostServices,
+    ) -> std::result::Result<Self, String> {
+        is_law(module.schema())?;
+        let law = with_numbers(module, numbers.to_vec(), "law", services)?;
+        Ok(Self { module, services, law })
+    }
+
+    /// The law with some of the numbers.
+    pub fn law(&self) -> &dyn NodeLaw {
+        self.law.as_ref()
+    }
+
+    /// The law with other numbers; one in Python has the numbers of the last call.
+    ///
+    /// # Errors
+    /// Its process was lost.
+    pub fn with(&self, numbers: &[f64]) -> std::result::Result<Arc<dyn NodeLaw>, String> {
+        let Some(isolated) = self.law.as_any().downcast_ref::<isolation::IsolatedLaw>() else {
+            return with_numbers(self.module, numbers.to_vec(), "law", self.services);
+        };
+        isolated.renumber(by_name(self.module.schema(), numbers)).map_err(|e| e.to_string())?;
+        Ok(self.law.clone())
+    }
 }
 
 /// The numbers of a law, in the order of its schema, as the parameters of a soil give them.

@@ -1,6 +1,6 @@
 //! The fitted curve over the data, as a drawing in SVG.
 
-use super::{PlateTests, SoilFit};
+use super::PlateTests;
 use std::fmt::Write as _;
 use terraglue_soil_law::fit::Reading;
 
@@ -12,9 +12,19 @@ const TOP: f64 = 28.0;
 const BOTTOM: f64 = 48.0;
 const COLOURS: [&str; 6] = ["#1f77b4", "#d95f02", "#2a9d4a", "#9b3fb5", "#8c564b", "#444444"];
 
+/// A law to be drawn.
+pub struct Curve<'a> {
+    /// Its name.
+    pub law: &'a str,
+    /// Root of the mean square of ln(p/p_measured).
+    pub rms: f64,
+    /// Pressure (Pa) under a contact of that size (m) at that depth (m).
+    pub pressure: Box<dyn Fn(f64, f64) -> f64 + 'a>,
+}
+
 /// Pressure over sinkage: the readings as dots, the law as a line for every size. `seen` are those that the law was
 /// fitted to, `unseen` those that it predicts.
-pub fn svg(fit: &SoilFit, seen: &PlateTests, unseen: Option<&PlateTests>) -> String {
+pub fn svg(fit: &Curve, seen: &PlateTests, unseen: Option<&PlateTests>) -> String {
     let all: Vec<(&Reading, bool)> = seen
         .readings
         .iter()
@@ -38,7 +48,7 @@ pub fn svg(fit: &SoilFit, seen: &PlateTests, unseen: Option<&PlateTests>) -> Str
         let points: String = (1..=100)
             .map(|k| {
                 let z = deepest * f64::from(k) / 100.0;
-                let (x, y) = axes.place(z, fit.fit.numbers.ln_pressure(&fit.fit.law, size, z).exp());
+                let (x, y) = axes.place(z, (fit.pressure)(size, z));
                 format!("{x:.1},{y:.1} ")
             })
             .collect();
@@ -53,12 +63,8 @@ pub fn svg(fit: &SoilFit, seen: &PlateTests, unseen: Option<&PlateTests>) -> Str
             1e3 * size
         );
     }
-    let _ = writeln!(
-        text,
-        r#"<text x="{LEFT}" y="18">{}, rms {:.1} %</text></svg>"#,
-        fit.law,
-        100.0 * fit.fit.rms
-    );
+    let _ =
+        writeln!(text, r#"<text x="{LEFT}" y="18">{}, rms {:.1} %</text></svg>"#, fit.law, 100.0 * fit.rms);
     text
 }
 

@@ -3,12 +3,14 @@
 //! The fit itself is in `terraglue_soil_law::fit`; here are files, names and units.
 
 mod drawing;
+mod module_law;
 mod readings;
 mod written;
 
-pub use drawing::svg;
+pub use drawing::{Curve, svg};
+pub use module_law::{LawFit, LawNumber, fit_module};
 pub use readings::{PlateTests, read};
-pub use written::{basis, json, toml};
+pub use written::{basis, json, law_json, law_toml, rests, toml};
 
 use crate::scenario::InputError;
 use terraglue_soil_law::fit::{Fit, FitLaw, Interval, fit};
@@ -93,4 +95,12 @@ pub fn fit_law(name: &'static str, tests: &PlateTests, known: Known) -> Result<S
         row(names[1], fit.numbers.frictional / weight, scaled(frictional, weight)),
     ];
     Ok(SoilFit { law: name, fit, parameters, known })
+}
+
+impl SoilFit {
+    /// The fitted curve, to be drawn.
+    pub fn curve(&self) -> Curve<'_> {
+        let pressure = Box::new(|b, z| self.fit.numbers.ln_pressure(&self.fit.law, b, z).exp());
+        Curve { law: self.law, rms: self.fit.rms, pressure }
+    }
 }

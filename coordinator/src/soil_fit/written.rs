@@ -1,6 +1,6 @@
 //! A fit as a soil file for scenarios, and as JSON.
 
-use super::{Known, SoilFit};
+use super::{Known, LawFit, SoilFit};
 use serde_json::{Value, json as value};
 use terraglue_soil_law::fit::Basis;
 
@@ -45,7 +45,14 @@ fn others(known: &Known) -> [(&'static str, Option<f64>, &'static str); 4] {
 
 /// How good the fit is and what its intervals rest on, in words.
 pub fn basis(fit: &SoilFit) -> String {
-    let rests = match fit.fit.basis {
+    let size =
+        if fit.fit.one_size { "; one size of plate only: the cohesive factor is set to 0" } else { "" };
+    rests(fit.fit.rms, fit.fit.basis) + size
+}
+
+/// The same of any law.
+pub fn rests(rms: f64, basis: Basis) -> String {
+    let rests = match basis {
         Basis::Curves(n) => format!("intervals: each of {n} presses left out in turn"),
         Basis::Pieces(n) => {
             format!(
@@ -53,9 +60,51 @@ pub fn basis(fit: &SoilFit) -> String {
             )
         }
     };
-    let size =
-        if fit.fit.one_size { "; one size of plate only: the cohesive factor is set to 0" } else { "" };
-    format!("rms of ln(p/p_measured) {:.2} %; {rests}{size}", 100.0 * fit.fit.rms)
+    format!("rms of ln(p/p_measured) {:.2} %; {rests}", 100.0 * rms)
+}
+
+/// A law that is a module with its numbers, as lines for the table of a soil in a scenario. Numbers that plates do not
+/// tell are left to the soil and to their defaults.
+pub fn law_toml(fit: &LawFit, source: &str) -> String {
+    let mut text = format!(
+        "# {source}\n# {}\n# Into a scenario, below its soil:\n\n[soil.law]\nplugin = {:?}\n[soil.law.parameters]\n",
+        rests(fit.rms, fit.basis),
+        fit.plugin
+    );
+    for n in &fit.numbers {
+        match n.interval {
+            Some(i) => {
+                let known = format!("95 %: {} … {}", digits(i.low), digits(i.high));
+                text += &format!("{} = {}  # {}; {known}\n", n.name, digits(n.value), n.help);
+            }
+            None => {
+                text += &format!("# {} = {}  # {}; plates do not tell it\n", n.name, digits(n.value), n.help)
+            }
+        }
+    }
+    text
+}
+
+/// Everything of it for programs. `predicted` is (file, rms, readings).
+pub fn law_json(fit: &LawFit, from: f64, predicted: Option<(&str, f64, usize)>) -> Value {
+    let (basis, groups) = match fit.basis {
+        Basis::Curves(n) => ("curves", n),
+        Basis::Pieces(n) => ("pieces", n),
+    };
+    let ends = |n: &super::LawNumber| {
+        let [low, high] = [n.interval.map(|i| i.low), n.interval.map(|i| i.high)];
+        value!({ "value": n.value, "low": low, "high": high })
+    };
+    let parameters: serde_json::Map<_, _> = fit.numbers.iter().map(|n| (n.name.clone(), ends(n))).collect();
+    value!({
+        "law": fit.name,
+        "plugin": fit.plugin,
+        "parameters": parameters,
+        "rms": fit.rms,
+        "from_m": from,
+        "intervals_from": { "basis": basis, "groups": groups, "confidence": 0.95 },
+        "predicted": predicted.map(|(file, rms, readings)| value!({ "file": file, "rms": rms, "readings": readings })),
+    })
 }
 
 /// Everything for programs. `predicted` is (file, rms, readings).

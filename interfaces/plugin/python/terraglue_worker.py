@@ -103,7 +103,7 @@ class Worker:
              "deserialize", "get", "set", "act", "next_event", "body_states", "energy", "pressure", "shear", "quit")
 
     def __init__(self):
-        self.unit, self.lines, self.slots, self.begun = None, [], {}, False
+        self.unit, self.law, self.lines, self.slots, self.begun = None, None, [], {}, False
         self.ports_seen, self.ports, self.nodes = None, [], []
         self.generation = 0
         self.file = ""
@@ -185,7 +185,8 @@ class Worker:
         self._describe(reply)
 
     def _start_law(self, what, reply):
-        module = _load(what["path"])
+        # Started again it gets other numbers.
+        self.law = module = self.law or _load(what["path"])
         self.numbers = types.SimpleNamespace(**what["numbers"])
         self.pressure, self.shear = [getattr(module, name, None) for name in ("pressure", "shear")]
         if not (callable(self.pressure) or callable(self.shear)):

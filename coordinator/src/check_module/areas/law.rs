@@ -436,8 +436,10 @@ fn cycles(lab: &Lab) -> Verdict {
             for k in 1..=100 {
                 let next = depth + (to - depth) * f64::from(k) / 100.0;
                 let now = node.commit(&mut law, 0.05, next)?;
-                let step = 0.5 * (p + now) * (next - node.last);
-                (work, turned, p, node.last) = (work + step, turned + step.abs(), now, next);
+                let line = 0.5 * (p + now) * (next - node.last);
+                // unloaded within the step: it gives out between nothing and the straight line
+                let step = if now <= 0.0 && line < 0.0 { 0.0 } else { line };
+                (work, turned, p, node.last) = (work + step, turned + line.abs(), now, next);
             }
             depth = to;
         }

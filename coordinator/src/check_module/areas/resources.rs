@@ -133,9 +133,7 @@ fn growth(mut round: impl FnMut() -> Verdict<Option<usize>>) -> Verdict<usize> {
 fn four_threads(lab: &Lab) -> Verdict {
     let module = lab.module()?;
     let (alone, _) = script(lab.instance_on(&module, Flat::LEVEL)?, 60, 0)?;
-    // Each instance of a module or law in Python starts a process.
-    let rounds = if crate::host::is_python(&lab.path) { 1 } else { lab.count(4) };
-    for round in 0..rounds {
+    for round in 0..lab.count(4) {
         let together: Vec<Verdict<Vec<u64>>> = std::thread::scope(|scope| {
             let run = || script(lab.instance_on(&module, Flat::LEVEL)?, 60, 0).map(|(bits, _)| bits);
             let jobs: Vec<_> = (0..4).map(|_| scope.spawn(run)).collect();

@@ -4,7 +4,7 @@
 //! every trial of a step and while a foot rests. Answers to single nodes are kept: a law without state is a function.
 
 use super::calls::Call;
-use super::{Link, Start};
+use super::{Link, Start, What};
 use std::any::Any;
 use std::sync::{Mutex, PoisonError};
 use terraglue_subsystem::{
@@ -21,9 +21,13 @@ struct Single {
     answer: [f64; 4],
 }
 
+/// No call has the number 0.
+const UNASKED: Single = Single { asked: [0; 4], answer: [0.0; 4] };
+
 /// The worker, and its answers to single nodes, each at a place that follows from what was asked.
 struct Asked {
     link: Link,
+    start: Start,
     kept: Box<[Single]>,
 }
 
@@ -56,6 +60,16 @@ impl Asked {
     }
 }
 
+/// Doubles per node, whether it has pressure, whether it has shear.
+fn opened(link: &mut Link, start: &Start) -> Result<(u32, bool, bool)> {
+    let text = serde_json::to_string(start).map_err(|e| Error::Failed(e.to_string()))?;
+    let write = |w: &mut super::wire::Writer| {
+        w.put(&text);
+        w.put(&0_u8);
+    };
+    link.call(Call::Start, write, |r| Some((r.take()?, r.take()?, r.take()?)))
+}
+
 /// A law in a worker.
 pub struct IsolatedLaw {
     name: String,
@@ -66,14 +80,8 @@ pub struct IsolatedLaw {
 }
 
 impl IsolatedLaw {
-    pub fn start(name: &str, mut link: Link, start: &Start) -> Result<Self> {
-        let text = serde_json::to_string(start).map_err(|e| Error::Failed(e.to_string()))?;
-        let write = |w: &mut super::wire::Writer| {
-            w.put(&text);
-            w.put(&0_u8);
-        };
-        let about: (u32, bool, bool) =
-            link.call(Call::Start, write, |r| Some((r.take()?, r.take()?, r.take()?)))?;
+    pub(super) fn start(name: &str, mut link: Link, start: &Start) -> Result<Self> {
+        let about = opened(&mut link, start)?;
         let (doubles, has_pressure, has_shear) = about;
         let doubles = doubles as usize;
         if doubles > MOST_LAW_STATE {
@@ -85,10 +93,23 @@ impl IsolatedLaw {
                 "STATE_DOUBLES needs a function `pressure`, which writes the state".into(),
             ));
         }
-        // No call has the number 0.
-        let kept = vec![Single { asked: [0; 4], answer: [0.0; 4] }; KEPT].into();
-        let asked = Mutex::new(Asked { link, kept });
+        let kept = vec![UNASKED; KEPT].into();
+        let asked = Mutex::new(Asked { link, start: start.clone(), kept });
         Ok(Self { name: name.to_owned(), asked, doubles, has_pressure, has_shear })
+    }
+
+    /// The same law with other numbers, by name.
+    ///
+    /// # Errors
+    /// The process was lost.
+    pub fn renumber(&self, new: serde_json::Map<String, serde_json::Value>) -> Result {
+        let mut asked = self.asked.lock().unwrap_or_else(PoisonError::into_inner);
+        let Asked { link, start, kept } = &mut *asked;
+        if let What::Law { numbers, .. } = &mut start.what {
+            *numbers = new;
+        }
+        kept.fill(UNASKED);
+        opened(link, start).map(drop)
     }
 
     #[cold]

@@ -15,12 +15,12 @@ mod wire;
 mod worker;
 
 pub use channel::end_group;
+pub(super) use law::IsolatedLaw;
 pub use python::SDK;
 pub use worker::serve;
 
 use super::{HostServices, Partings};
 use channel::Segment;
-use law::IsolatedLaw;
 use proxy::Isolated;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;

@@ -30,6 +30,23 @@ pub enum Basis {
 
 /// Intervals of A, B and n.
 pub fn intervals(law: &FitLaw, readings: &[Reading], both: bool, at: &Numbers) -> ([Interval; 3], Basis) {
+    let of = |n: Numbers| vec![n.cohesive, n.frictional, n.n];
+    let mut answer = |rest: &[Reading]| solve(law, rest, both).ok().map(of);
+    let (found, basis) = jackknife(readings, &mut answer, &of(*at));
+    let unknown = Interval { low: f64::NAN, high: f64::NAN };
+    let mut all = [unknown; 3];
+    for (all, found) in all.iter_mut().zip(found).filter(|(_, found)| !found.low.is_nan()) {
+        *all = Interval { low: found.low.max(0.0), ..found };
+    }
+    (all, basis)
+}
+
+/// Intervals of the numbers `at` that `answer` finds: it is asked again with whole curves, or pieces of them, left out.
+pub(super) fn jackknife(
+    readings: &[Reading],
+    answer: &mut dyn FnMut(&[Reading]) -> Option<Vec<f64>>,
+    at: &[f64],
+) -> (Vec<Interval>, Basis) {
     let curves = groups(readings.iter().map(|r| r.curve).collect());
     let (group_of, basis) = if curves.count >= 3 {
         let basis = Basis::Curves(curves.count);
@@ -39,14 +56,14 @@ pub fn intervals(law: &FitLaw, readings: &[Reading], both: bool, at: &Numbers) -
         let basis = Basis::Pieces(pieces.count);
         (pieces, basis)
     };
-    let answers: Vec<Numbers> = (0..group_of.count)
+    let answers: Vec<Vec<f64>> = (0..group_of.count)
         .filter_map(|left_out| {
             let rest = readings.iter().zip(&group_of.of).filter(|(_, g)| **g != left_out);
-            solve(law, &rest.map(|(r, _)| *r).collect::<Vec<_>>(), both).ok()
+            answer(&rest.map(|(r, _)| *r).collect::<Vec<_>>())
         })
         .collect();
-    let of = |pick: fn(&Numbers) -> f64| interval(&answers.iter().map(pick).collect::<Vec<_>>(), pick(at));
-    ([of(|n| n.cohesive), of(|n| n.frictional), of(|n| n.n)], basis)
+    let of = |k: usize| interval(&answers.iter().map(|a| a[k]).collect::<Vec<_>>(), at[k]);
+    ((0..at.len()).map(of).collect(), basis)
 }
 
 fn interval(answers: &[f64], at: f64) -> Interval {
@@ -58,7 +75,7 @@ fn interval(answers: &[f64], at: f64) -> Interval {
     let squares: f64 = answers.iter().map(|a| (a - mean) * (a - mean)).sum();
     let error = ((count - 1.0) / count * squares).sqrt();
     let half = student::quantile(0.5 + 0.5 * CONFIDENCE, count - 1.0) * error;
-    Interval { low: (at - half).max(0.0), high: at + half }
+    Interval { low: at - half, high: at + half }
 }
 
 struct Groups {

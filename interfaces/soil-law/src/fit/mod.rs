@@ -5,10 +5,12 @@
 //! p = (A·u(b) + B·w(b))·x(z, b)ⁿ with A, B ≥ 0; see [`FitLaw`].
 
 mod interval;
+mod numbers;
 mod solve;
 mod student;
 
 pub use interval::{Basis, Interval};
+pub use numbers::{Free, NumbersFit, Pressures, fit_numbers};
 
 /// One reading of a plate test.
 #[derive(Clone, Copy, Debug, PartialEq)]

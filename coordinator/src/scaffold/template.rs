@@ -234,7 +234,7 @@ pub(super) fn fill(
             "build = \"{build}\"                  # what `run --watch` does on a change of the source\n"
         ),
     };
-    let listing: Vec<_> = files.iter().map(|(path, what, _)| format!("| `{path}` | {what} |")).collect();
+    let listing: Vec<_> = files.iter().map(|(path, what, _)| format!("* `{path}`: {what}")).collect();
     let (flags, compile) = match language {
         Language::Cpp => (
             "CXXFLAGS ?= -std=c++17 -O2 -Wall -Wextra",

@@ -274,11 +274,14 @@ fn jacobian_force(lab: &Lab) -> Verdict {
             bench.meet(&velocities, 1e-3)?;
             let (x, v) = bench.motion_of(&velocities, 1e-3);
             bench.try_motion(&x, &v, 1e-3)?;
+            // Where a foot hardly touches, soils take another slope than that of a law that starts flat.
+            let pressed = bench.components_above(0.1);
             let mut t = bench.out.t.clone();
             t.iter_mut().for_each(|t| *t *= 1.02);
             bench.try_force(&t, None, 1e-3)?;
             let g = bench.jacobian(Derivative::Position, 1e-3)?;
-            let normals = bench.normal_components();
+            let mut normals = bench.normal_components();
+            normals.retain(|place| pressed.contains(place));
             // The soil feels -T: dX/d(wrench on itself) = -dX/dT.
             let all = Columns::of(
                 &g,

@@ -275,16 +275,28 @@ def test_a_law_is_at_most_forty_lines_and_its_mistakes_are_named(tmp_path):
         assert process.returncode == 2 and told in said, said
 
 
-def test_the_law_of_the_page_that_remembers_passes(tmp_path):
-    place, commands = made(tmp_path, "law", "c")
+REMEMBERS = {
+    "c": ("my_law.c", r"static tg_status pressure\(.*?\n}\n", ("SCHEMA, 0, pressure", "SCHEMA, 1, pressure")),
+    "cpp": ("my_law.cpp", r"static tg_status pressure\(.*?\n}\n", ("schema, 0, pressure", "schema, 1, pressure")),
+    "rust": ("src/lib.rs", r"    fn pressure\(.*?\n    }\n", ("", "")),
+}
+
+
+@pytest.mark.parametrize("language", REMEMBERS)
+def test_the_law_of_the_page_that_remembers_passes(tmp_path, rust_target, language):
+    file, old, (without, keeps) = REMEMBERS[language]
+    place, commands = made(tmp_path, "law", language)
     page = (ROOT / "docs" / "plugins" / "law-as-a-module.md").read_text()
-    code = re.search(r"```c\n(.*?)```", page, re.S).group(1)
-    text = (place / "my_law.c").read_text()
-    old = re.search(r"static tg_status pressure\(.*?\n}\n", text, re.S).group(0)
-    law_with(place, (old, code), ("SCHEMA, 0, pressure", "SCHEMA, 1, pressure"))
-    process = terraglue("check-module", place)
-    assert process.returncode == 0, process.stdout
-    assert terraglue("run", "scenario.toml", "--quiet", cwd=place).returncode == 0
+    code = re.search(rf"```{language}\n(.*?)```", page, re.S).group(1)
+    text = (place / file).read_text()
+    first = re.search(old, text, re.S).group(0)
+    text = text.replace(first, code)
+    assert without in text
+    (place / file).write_text(text.replace(without, keeps, 1))
+    if language == "rust":
+        (place / "target").symlink_to(rust_target)
+    told = played(place, commands)
+    assert "pass     law-unloads" in told and " fail" not in told.splitlines()[-1]
 
 
 def test_a_soil_with_a_law_runs_isolated_and_is_exported(tmp_path):

@@ -326,8 +326,8 @@ pub struct CompareArguments {
     /// Communication steps in seconds, separated by commas [default: that of the scenario].
     #[arg(long, value_delimiter = ',', value_name = "SECONDS")]
     pub steps: Vec<f64>,
-    /// Compare the path of the reported body with this: `monolithic`, another strategy, run with the smallest step on
-    /// each soil, or the folder or recording of an earlier run.
+    /// Compare the path of the reported body with this: `monolithic`, another strategy, run on each soil (of
+    /// several steps with half the smallest), or the folder or recording of an earlier run.
     #[arg(long, value_name = "STRATEGY|DIR")]
     pub reference: Option<String>,
 }

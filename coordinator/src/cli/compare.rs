@@ -133,7 +133,10 @@ fn plan(arguments: &CompareArguments) -> Result<Vec<Plan>> {
     }
     match &arguments.reference {
         Some(name) if STRATEGIES.contains(&name.as_str()) => {
+            // of several steps the error is that against the step, so the reference must be finer than all of them
+            let several = arguments.steps.len() > 1;
             let finest = arguments.steps.iter().copied().reduce(f64::min);
+            let finest = finest.map(|h| if several { 0.5 * h } else { h });
             wanted.extend(soils.iter().map(|module| (name.clone(), module.clone(), finest, true)));
         }
         Some(path) if !Path::new(path).exists() => {

@@ -112,6 +112,8 @@ pub struct Summary {
     pub evaluations_soil_mean: f64,
     /// Evaluations of the soils per step, largest.
     pub evaluations_soil_max: u32,
+    /// Evaluations of the soils per step that 95 % of the steps do not exceed.
+    pub evaluations_soil_p95: u32,
     /// Largest |T* − T1| along n, N.
     pub max_estimate_gap_n: f64,
     /// Sum over the steps of the magnitude of the work that the interface gains, J.

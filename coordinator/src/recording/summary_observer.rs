@@ -62,6 +62,7 @@ struct Motors {
 struct GluingFigures {
     steps: u64,
     histogram: Vec<u64>,
+    soil_histogram: Vec<u64>,
     bodies: u64,
     soil: u64,
     soil_max: u32,
@@ -137,17 +138,26 @@ impl Motors {
     }
 }
 
+/// Counts a step with so many evaluations.
+fn count(histogram: &mut Vec<u64>, evaluations: u32) {
+    let n = (evaluations as usize).min(9999);
+    if histogram.is_empty() {
+        histogram.reserve(256);
+    }
+    if histogram.len() <= n {
+        histogram.resize(n + 1, 0);
+    }
+    histogram[n] += 1;
+}
+
 impl GluingFigures {
     fn add(&mut self, g: &StepReport) {
         if g.evaluations_bodies == 0 && g.evaluations_soil == 0 {
             return;
         }
         self.steps += 1;
-        let n = (g.evaluations_bodies as usize).min(9999);
-        if self.histogram.len() <= n {
-            self.histogram.resize(n + 1, 0);
-        }
-        self.histogram[n] += 1;
+        count(&mut self.histogram, g.evaluations_bodies);
+        count(&mut self.soil_histogram, g.evaluations_soil);
         self.bodies += u64::from(g.evaluations_bodies);
         self.soil += u64::from(g.evaluations_soil);
         self.soil_max = self.soil_max.max(g.evaluations_soil);
@@ -170,10 +180,10 @@ impl GluingFigures {
     }
 
     /// Smallest number of evaluations that `share` of the steps do not exceed.
-    fn percentile(&self, share: f64) -> u32 {
+    fn percentile(&self, histogram: &[u64], share: f64) -> u32 {
         let wanted = share * self.steps as f64;
         let mut seen = 0;
-        for (n, count) in self.histogram.iter().enumerate() {
+        for (n, count) in histogram.iter().enumerate() {
             seen += count;
             if seen as f64 >= wanted {
                 return n as u32;
@@ -283,9 +293,10 @@ impl SummaryObserver {
             recording: RECORDING.into(),
             report: REPORT.into(),
             form: g.form().into(),
-            evaluations_p95: g.percentile(0.95),
+            evaluations_p95: g.percentile(&g.histogram, 0.95),
             evaluations_soil_mean: g.mean(g.soil),
             evaluations_soil_max: g.soil_max,
+            evaluations_soil_p95: g.percentile(&g.soil_histogram, 0.95),
             max_estimate_gap_n: g.max_estimate_gap_n,
             interface_work_error_j: g.interface_work_error_j,
             energy_balance_j: self.energy_book.map_or(0.0, |(first, last)| last - first),

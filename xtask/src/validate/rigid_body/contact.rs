@@ -4,6 +4,7 @@ mod analytic;
 mod gait;
 mod problems;
 mod scenes;
+mod shapes;
 mod small;
 mod walking;
 
@@ -14,6 +15,7 @@ use crate::validate::{Context, Figure};
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     let mut all = walking::figures(context)?;
     all.extend(small::figures(context)?);
+    all.extend(shapes::figures(context)?);
     all.extend(analytic::figures(context)?);
     all.extend(problems::figures(context)?);
     Ok(all)

@@ -8,6 +8,7 @@ import zipfile
 import pytest
 from fmpy.validation import validate_fmu
 
+from cfmu import build
 from conftest import terraglue
 from fmus import Unit, export
 
@@ -152,3 +153,23 @@ def test_a_terminal_that_does_not_fit_is_refused(folder, tmp_path, terminal, say
     )
     done = terraglue("run", path, "--quiet", "--out", tmp_path / "out")
     assert done.returncode == 2 and says in done.stderr, done.stderr
+
+
+def test_a_unit_that_does_not_come_back_to_its_saved_state_is_refused(tmp_path):
+    reals = [("x", "output", 0, ""), ("v", "output", 0, ""), ("f", "input", 0, "")]
+    honest = "r[1] += h * r[2]; r[0] += h * r[1];"
+    build(tmp_path, "honest", reals, honest)
+    build(tmp_path, "forgetful", reals, "static double hidden = 0; hidden += 1e-3; " + honest + " r[0] += hidden;")
+    body = 'position = ["x"]\nvelocity = ["v"]\nforce = ["f"]\n'
+    path = tmp_path / "pair.toml"
+    path.write_text(
+        '[time]\nstep_s = 0.01\nduration_s = 0.1\n[gluing]\nstrategy = "iterative"\n'
+        f'[a]\nfmu = "honest.fmu"\n[a.bodies.m]\n{body}[b]\nfmu = "forgetful.fmu"\n[b.bodies.m]\n{body}'
+        '[[glue]]\nside_1 = "a.m"\nside_2 = "b.m"\ncomponents = ["x"]\n'
+    )
+    done = terraglue("run", path, "--quiet", "--out", tmp_path / "out")
+    assert done.returncode == 1, done.stderr
+    for words in ("forgetful.fmu", "come back to the state", "`x` is", "deviation 1.0e-3"):
+        assert words in done.stderr, done.stderr
+    path.write_text(path.read_text().replace("forgetful.fmu", "honest.fmu"))
+    assert terraglue("run", path, "--quiet", "--out", tmp_path / "out").returncode == 0

@@ -405,6 +405,7 @@ pub struct FmuRunArguments {
     #[arg(long, value_name = "S", default_value_t = 3600.0)]
     pub timeout: f64,
     /// Handle events in event mode (FMI 3).
-    #[arg(long, value_parser = clap::builder::BoolishValueParser::new(), default_value = "off")]
+    #[arg(long, value_name = "on|off", action = clap::ArgAction::Set, default_value = "off",
+          value_parser = clap::builder::BoolishValueParser::new())]
     pub event_mode: bool,
 }

@@ -2,6 +2,7 @@
 
 use super::bodies::{Axis, Bodies};
 use super::map::{self, Place};
+use super::rollback;
 use crate::host::Partings;
 use crate::scenario::did_you_mean;
 use serde_json::{Map, Value};
@@ -43,6 +44,8 @@ pub struct FmuSubsystem {
     open: bool,
     /// Whether the initialisation is over.
     running: bool,
+    /// Whether it was seen that the unit comes back to a saved state.
+    proved: bool,
     slots: Vec<SlaveState>,
     on_nan: OnNan,
     warned: Cell<bool>,
@@ -86,6 +89,7 @@ impl FmuSubsystem {
             can_go_back: capabilities.state && options.rollback,
             open: false,
             running: false,
+            proved: false,
             slots: (0..host.slots()).map(|_| SlaveState::default()).collect(),
             on_nan: options.on_nan,
             warned: Cell::new(false),
@@ -171,6 +175,36 @@ impl FmuSubsystem {
         });
         whole[place.element] = value;
         self.slave.set_f64(&[place.reference], whole).map_err(error)
+    }
+
+    /// Once: does the unit come back to the state before this step?
+    fn prove(&mut self, step: &Step, wrench: &[f64]) -> Result {
+        if std::mem::replace(&mut self.proved, true) {
+            return Ok(());
+        }
+        let Self { slave, bodies, variables, places, before, .. } = self;
+        let number = |(v, place): &(&Variable, &Place)| {
+            let output = v.causality == terraglue_subsystem::Causality::Output;
+            output && v.value_type == ValueType::F64 && place.count == 1
+        };
+        let outputs = variables.iter().zip(places.iter()).filter(number);
+        let outputs: Vec<(&str, u32)> = outputs.map(|(v, p)| (v.name.as_str(), p.reference)).collect();
+        let short = Advance { t: step.t, h: step.h, for_good: false };
+        rollback::prove(
+            slave,
+            before,
+            &outputs,
+            short,
+            |slave| bodies.push(slave, step, wrench, error),
+            error,
+        )
+    }
+
+    /// The number in calls, where one f64 that is no element of an array is asked for.
+    #[inline]
+    fn single(&self, ids: &[u32]) -> Option<u32> {
+        let [id] = ids else { return None };
+        self.places.get(*id as usize).filter(|p| p.count == 1).map(|p| p.reference)
     }
 
     fn place(&self, id: u32) -> Result<&Place> {
@@ -349,6 +383,7 @@ impl Subsystem for FmuSubsystem {
         }
         self.open = true;
         if !self.bodies.is_empty() {
+            self.prove(step, wrench)?;
             self.bodies.push(&mut self.slave, step, wrench, error)?;
         }
         let step_now = Advance { t: step.t, h: step.h, for_good: !self.can_go_back };
@@ -431,6 +466,13 @@ impl Subsystem for FmuSubsystem {
     }
 
     fn get(&self, ids: &[u32], out: ValuesMut) -> Result {
+        let out = match (out, self.single(ids)) {
+            (ValuesMut::F64(out), Some(reference)) => {
+                self.slave.get_f64(&[reference], out).map_err(error)?;
+                return self.check_numbers(ids, out);
+            }
+            (out, _) => out,
+        };
         let mut references = self.references.borrow_mut();
         if self.collect(ids, &mut references)? {
             return match out {
@@ -488,6 +530,9 @@ impl Subsystem for FmuSubsystem {
                 let name = &self.variables[*id as usize].name;
                 return Err(Error::Refused(format!("`{name}` can only be set before the first step")));
             }
+        }
+        if let (Values::F64(values), Some(reference)) = (&values, self.single(ids)) {
+            return self.slave.set_f64(&[reference], values).map_err(error);
         }
         let mut references = self.references.borrow_mut();
         if self.collect(ids, &mut references)? {

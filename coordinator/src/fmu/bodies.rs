@@ -74,6 +74,8 @@ pub struct Bodies {
     before: Vec<[[f64; 3]; 2]>,
     /// T and X of the last two trials of the step.
     trials: Vec<[Vec<f64>; 2]>,
+    /// The same after it.
+    after: Vec<[[f64; 3]; 2]>,
 }
 
 /// dX = ½·h²·dA where a force stays over the step and the unit integrates well.
@@ -126,7 +128,12 @@ impl Bodies {
                 None => Ok(body),
             }
         });
-        Ok(Self { all: all.collect::<Result<_>>()?, before: Vec::new(), trials: Vec::new() })
+        Ok(Self {
+            all: all.collect::<Result<_>>()?,
+            before: Vec::new(),
+            after: Vec::new(),
+            trials: Vec::new(),
+        })
     }
 
     /// Whether nothing is mapped.
@@ -207,7 +214,8 @@ impl Bodies {
 
     /// After a trial: the motion at all ports.
     pub fn pull(&mut self, slave: &Slave, step: &Step, t: &[f64], out: &mut Response, fail: Fail) -> Result {
-        let mut after = Vec::with_capacity(self.all.len());
+        let mut after = std::mem::take(&mut self.after);
+        after.clear();
         for body in &self.all {
             after.push(self.motion(slave, body, fail)?);
         }
@@ -223,6 +231,7 @@ impl Bodies {
                 out.a[i] = along(v0, v1) / step.h;
             }
         }
+        self.after = after;
         self.pull_accelerations(slave, step, out, fail)?;
         out.t.copy_from_slice(t);
         if self.trials.len() > 1 {

@@ -8,6 +8,7 @@ mod bodies;
 pub mod export;
 mod feet;
 mod map;
+mod rollback;
 pub mod simulate;
 pub mod ssp;
 

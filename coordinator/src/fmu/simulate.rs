@@ -108,8 +108,14 @@ pub fn run(
     slave.enter_initialization(start, Some(stop), settings.tolerance.or(experiment.tolerance))?;
     set_inputs(&slave, settings, start)?;
     slave.exit_initialization()?;
-    row(&header(&columns))?;
-    row(&line(&slave, start, &columns)?)?;
+    // with event mode a last column says how many events were handled since the row before
+    let marked = |text: String, events: u32| match settings.event_mode {
+        true if text.starts_with("time") => text + ",events",
+        true => format!("{text},{events}"),
+        false => text,
+    };
+    row(&marked(header(&columns), 0))?;
+    row(&marked(line(&slave, start, &columns)?, 0))?;
     let mut state = SlaveState::default();
     let mut ended = None;
     let outcome = (0..steps as u64).try_for_each(|k| {
@@ -119,9 +125,10 @@ pub fn run(
         let (t, end) = (start + k as f64 * step, start + (k + 1) as f64 * step);
         let at = |e: Error| named(e, t);
         set_inputs(&slave, settings, t).map_err(at)?;
-        ended = halving(&mut slave, &mut state, t, end).map_err(at)?;
+        let events;
+        (ended, events) = halving(&mut slave, &mut state, t, end).map_err(at)?;
         let now = ended.unwrap_or(end);
-        row(&line(&slave, now, &columns).map_err(|e| named(e, now))?)
+        row(&marked(line(&slave, now, &columns).map_err(|e| named(e, now))?, events))
     });
     drop(slave.release(&mut state));
     outcome?;
@@ -129,17 +136,21 @@ pub fn run(
     Ok(ended)
 }
 
-/// A step, in halves where the unit discards it and can go back.
-fn halving(slave: &mut Slave, state: &mut SlaveState, start: f64, end: f64) -> Result<Option<f64>> {
+/// A step, in halves where the unit discards it and can go back. Answers when the unit asked for the end, and how many
+/// events there were.
+fn halving(slave: &mut Slave, state: &mut SlaveState, start: f64, end: f64) -> Result<(Option<f64>, u32)> {
     let c = slave.fmu().description().capabilities;
-    let (mut t, mut h, mut halvings) = (start, end - start, 0);
+    let (mut t, mut h, mut halvings, mut events) = (start, end - start, 0, 0);
     while end - t > 1e-9 * (end - start) {
         if c.state {
             slave.save(state)?;
         }
         match slave.do_step(Advance { t, h: h.min(end - t), for_good: !c.state }) {
-            Ok(done) if done.terminate => return Ok(Some(done.reached)),
-            Ok(_) => t = if h >= end - t { end } else { t + h },
+            Ok(done) if done.terminate => return Ok((Some(done.reached), events + done.events)),
+            Ok(done) => {
+                events += done.events;
+                t = if h >= end - t { end } else { t + h };
+            }
             Err(Error::Discard { .. }) if c.state && c.variable_step && halvings < 10 => {
                 slave.restore(state)?;
                 (h, halvings) = (0.5 * h, halvings + 1);
@@ -147,7 +158,7 @@ fn halving(slave: &mut Slave, state: &mut SlaveState, start: f64, end: f64) -> R
             Err(error) => return Err(error),
         }
     }
-    Ok(None)
+    Ok((None, events))
 }
 
 fn named(error: Error, t: f64) -> Error {

@@ -216,6 +216,41 @@ pub struct Variable {
     pub line: u32,
     /// Whether this is another name of an earlier variable.
     pub alias: bool,
+    /// When it ticks, of an input clock whose times are known beforehand.
+    pub ticks: Option<Ticks>,
+}
+
+/// Times of a periodic clock: shift, shift + interval, …
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Ticks {
+    /// s.
+    pub interval: f64,
+    /// s.
+    pub shift: f64,
+}
+
+impl Ticks {
+    /// The number of the tick that is nearest to t, and how far t is behind it, s.
+    fn nearest(self, t: f64) -> (f64, f64) {
+        let k = ((t - self.shift) / self.interval).round().max(0.0);
+        (k, t - (self.shift + k * self.interval))
+    }
+
+    fn slack(self, t: f64) -> f64 {
+        1e-9 * self.interval + 4.0 * f64::EPSILON * t.abs()
+    }
+
+    /// Whether it ticks at t.
+    pub fn at(self, t: f64) -> bool {
+        self.nearest(t).1.abs() <= self.slack(t)
+    }
+
+    /// The first tick after t, s.
+    pub fn after(self, t: f64) -> f64 {
+        let (k, behind) = self.nearest(t);
+        let k = if behind >= -self.slack(t) { k + 1.0 } else { k };
+        self.shift + k * self.interval
+    }
 }
 
 impl Variable {

@@ -181,7 +181,30 @@ fn variable(
         description: element.text("description").to_owned(),
         line,
         alias: false,
+        ticks: if value_type == ValueType::Clock { ticks(inner, causality)? } else { None },
     })
+}
+
+/// When a clock ticks; nothing where that is not known beforehand.
+fn ticks(element: &Element, causality: Causality) -> Result<Option<Ticks>> {
+    let periodic = matches!(element.text("intervalVariability"), "constant" | "fixed");
+    if causality != Causality::Input || !periodic {
+        return Ok(None);
+    }
+    let decimal = |name: &str| element.optional_number(name);
+    let resolution = decimal("resolution")?;
+    let time =
+        |decimal: Option<f64>, counter: Option<f64>| decimal.or(counter.zip(resolution).map(|(c, r)| c / r));
+    let interval = time(decimal("intervalDecimal")?, decimal("intervalCounter")?);
+    let shift = time(decimal("shiftDecimal")?, decimal("shiftCounter")?).unwrap_or(0.0);
+    match interval {
+        Some(interval) if interval > 0.0 && interval.is_finite() && shift >= 0.0 && shift.is_finite() => {
+            Ok(Some(Ticks { interval, shift }))
+        }
+        _ => {
+            Err(element.error("a periodic clock needs an interval greater than 0 and a shift of at least 0"))
+        }
+    }
 }
 
 fn role(element: &Element, value_type: ValueType) -> Result<(Causality, Variability)> {

@@ -16,6 +16,7 @@ pub use state::SlaveState;
 pub use step::{Advance, Stepped};
 
 use crate::binary::Loaded;
+use crate::description::{Ticks, Variable};
 use crate::error::{Error, Result};
 use crate::fmu::Fmu;
 use call::{Health, Status};
@@ -65,6 +66,9 @@ pub struct Slave {
     health: Cell<Health>,
     phase: Phase,
     event_mode: bool,
+    /// Periodic input clocks, ticked in event mode.
+    clocks: Vec<(u32, Ticks)>,
+    start: f64,
     warnings: Cell<u64>,
     /// Whether it was said that its clock runs ahead.
     ran_past: Cell<bool>,
@@ -150,6 +154,8 @@ impl Slave {
             health: Cell::new(Health::Good),
             phase: Phase::Instantiated,
             event_mode,
+            clocks: clocks(&description.variables, event_mode, &log),
+            start: 0.0,
             warnings: Cell::new(0),
             ran_past: Cell::new(false),
             log,
@@ -176,6 +182,7 @@ impl Slave {
 
     /// Enters initialisation mode, after start values were set.
     pub fn enter_initialization(&mut self, start: f64, stop: Option<f64>, tolerance: Option<f64>) -> Result {
+        self.start = start;
         let (has_tolerance, tolerance) = (tolerance.is_some(), tolerance.unwrap_or(0.0));
         let (has_stop, stop) = (stop.is_some(), stop.unwrap_or(0.0));
         match self.api {
@@ -205,6 +212,7 @@ impl Slave {
             Api::Three(three) => {
                 self.call("fmi3ExitInitializationMode", three.exit_initialization, |f, c| unsafe { f(c) })?;
                 if self.event_mode {
+                    self.tick(self.start)?;
                     self.settle_events()?;
                     self.call("fmi3EnterStepMode", three.enter_step_mode, |f, c| unsafe { f(c) })?;
                 }
@@ -283,6 +291,17 @@ impl std::fmt::Debug for Slave {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Slave").field("fmu", &self.fmu.path()).field("phase", &self.phase).finish()
     }
+}
+
+/// Clocks that tick in a run, which they do in event mode only.
+fn clocks(variables: &[Variable], event_mode: bool, log: &LogBook) -> Vec<(u32, Ticks)> {
+    let clock = |v: &Variable| v.ticks.map(|ticks| (v.reference, ticks));
+    let all: Vec<(u32, Ticks)> = variables.iter().filter_map(clock).collect();
+    if event_mode || all.is_empty() {
+        return all;
+    }
+    log.note("has periodic clocks, which tick in event mode only: set event_mode");
+    Vec::new()
 }
 
 fn log_needs_tool(sink: &Sink, description: &crate::ModelDescription) {

@@ -90,11 +90,14 @@ impl Slave {
         let Api::Three(three) = self.api else { return Err(Error::Refused(NAME.into())) };
         let end = step.t + step.h;
         let (mut t, mut events) = (step.t, 0);
+        let tolerance = 1e-9 * step.h + 4.0 * f64::EPSILON * end.abs();
         loop {
+            let tick = self.clocks.iter().map(|(_, ticks)| ticks.after(t)).fold(end, f64::min);
+            let stop = if end - tick > tolerance { tick } else { end };
             let (mut event, mut terminate, mut early, mut last) = (false, false, false, f64::NAN);
             let for_good = step.for_good;
             let status = self.status(NAME, three.do_step, |f, c| unsafe {
-                f(c, t, end - t, for_good, &raw mut event, &raw mut terminate, &raw mut early, &raw mut last)
+                f(c, t, stop - t, for_good, &raw mut event, &raw mut terminate, &raw mut early, &raw mut last)
             })?;
             if status == Status::Discard {
                 let reached = if last >= step.t && last <= end { last } else { step.t };
@@ -103,41 +106,58 @@ impl Slave {
             if !goes_on(status) {
                 return Err(self.failed(NAME, status));
             }
-            let tolerance = 1e-9 * step.h + 4.0 * f64::EPSILON * end.abs();
-            let past = last > end + tolerance && last - end <= PAST * step.h;
+            let past = last > stop + tolerance && last - stop <= PAST * step.h;
             if past && !self.ran_past.replace(true) {
                 let text =
-                    format!("says that it came to t = {last} s in a step to {end} s; taken as {end} s");
+                    format!("says that it came to t = {last} s in a step to {stop} s; taken as {stop} s");
                 self.log.note(&text);
             }
-            let at_end = past || (last - end).abs() <= tolerance;
-            if !at_end && !early || last.is_nan() || last < t - tolerance || last > end + tolerance && !past {
-                let outcome = format!("says that it came to t = {last} s in the step from {t} s to {end} s");
+            let at_stop = past || (last - stop).abs() <= tolerance;
+            if !at_stop && !early || last.is_nan() || last < t - tolerance || last > stop + tolerance && !past
+            {
+                let outcome = format!("says that it came to t = {last} s in the step from {t} s to {stop} s");
                 return Err(self.lied(NAME, outcome));
             }
             if terminate {
                 return Ok(Stepped { reached: last, terminate, events });
             }
-            if event && self.event_mode {
+            let ticks = at_stop && self.clocks.iter().any(|(_, ticks)| ticks.at(stop));
+            if event && self.event_mode || ticks {
                 events += 1;
                 self.call("fmi3EnterEventMode", three.enter_event_mode, |f, c| unsafe { f(c) })?;
+                if at_stop {
+                    self.tick(stop)?;
+                }
                 if self.settle_events()? {
                     return Ok(Stepped { reached: last, terminate: true, events });
                 }
                 self.call("fmi3EnterStepMode", three.enter_step_mode, |f, c| unsafe { f(c) })?;
             }
-            if at_end {
+            if at_stop && stop >= end {
                 return Ok(Stepped { reached: end, terminate: false, events });
             }
-            if !event && last <= t {
+            if !event && !at_stop && last <= t {
                 let outcome = format!("came no further than t = {last} s in the step to {end} s");
                 return Err(self.lied(NAME, outcome));
             }
             if events > ROUNDS {
                 return Err(self.lied(NAME, format!("found more than {ROUNDS} events in one step")));
             }
-            t = last;
+            t = if at_stop { stop } else { last };
         }
+    }
+
+    /// In event mode: activates the input clocks that tick at t.
+    pub(super) fn tick(&self, t: f64) -> Result {
+        let Api::Three(three) = self.api else { return Ok(()) };
+        let due: Vec<u32> = self.clocks.iter().filter(|(_, ticks)| ticks.at(t)).map(|(vr, _)| *vr).collect();
+        if due.is_empty() {
+            return Ok(());
+        }
+        let on = vec![true; due.len()];
+        let (r, n, p) = (due.as_ptr(), due.len(), on.as_ptr());
+        // SAFETY: as many values as references.
+        self.call("fmi3SetClock", three.set_clock, |f, c| unsafe { f(c, r, n, p) })
     }
 
     /// Updates discrete states until nothing changes; whether the unit asks for the end.

@@ -34,7 +34,7 @@ pub fn figures(folder: &Path, peers: bool) -> Outcome<Vec<Figure>> {
 }
 
 /// Stiffness and damping of the spring between the masses, N/m and N s/m.
-const SPRING: [f64; 2] = [1e4, 1.0];
+const SPRING: [f64; 2] = [1e3, 1.0];
 
 /// Both masses at once by backward Euler: places of the first.
 fn at_once() -> Vec<f64> {

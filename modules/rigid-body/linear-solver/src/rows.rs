@@ -29,8 +29,8 @@ impl Rows {
         wrench(&-self.directions[r], &self.lever, r < 3)
     }
 
-    /// Velocity of the child's anchor against the parent's, and rotation rate.
-    fn relative(&self, child: &[f64], parent: Option<&[f64]>) -> (V3, V3) {
+    /// J·v of all six rows. `child`, `parent`: six rates each.
+    pub fn rates(&self, child: &[f64], parent: Option<&[f64]>) -> [f64; 6] {
         let (mut slide, mut turn) = split(child);
         slide += turn.cross(&self.anchor);
         if let Some(parent) = parent {
@@ -38,18 +38,6 @@ impl Rows {
             slide -= v + w.cross(&self.lever);
             turn -= w;
         }
-        (slide, turn)
-    }
-
-    /// J·v of row r. `child`, `parent`: six rates each.
-    pub fn rate(&self, r: usize, child: &[f64], parent: Option<&[f64]>) -> f64 {
-        let (slide, turn) = self.relative(child, parent);
-        self.directions[r].dot(if r < 3 { &slide } else { &turn })
-    }
-
-    /// J·v of all six rows. `child`, `parent`: six rates each.
-    pub fn rates(&self, child: &[f64], parent: Option<&[f64]>) -> [f64; 6] {
-        let (slide, turn) = self.relative(child, parent);
         let d = &self.directions;
         [
             d[0].dot(&slide),
@@ -71,30 +59,6 @@ impl Rows {
             let v = self.anchor.cross(&d);
             [v.x, v.y, v.z, d.x, d.y, d.z]
         }
-    }
-    /// The same for rates along all rows at once.
-    #[inline]
-    pub(crate) fn motions(&self, rates: &[f64; 6]) -> [f64; 6] {
-        let [a, b, c, d, e, f] = &self.directions;
-        let turn = d * rates[3] + e * rates[4] + f * rates[5];
-        let slide = a * rates[0] + b * rates[1] + c * rates[2] + self.anchor.cross(&turn);
-        [slide.x, slide.y, slide.z, turn.x, turn.y, turn.z]
-    }
-
-    /// motion(r)·p of all rows: what they carry of a force and a moment about the child's centre of mass.
-    #[inline]
-    pub(crate) fn carried(&self, p: &[f64; 6]) -> [f64; 6] {
-        let (force, moment) = split(p);
-        let moment = moment + force.cross(&self.anchor);
-        let d = &self.directions;
-        [
-            d[0].dot(&force),
-            d[1].dot(&force),
-            d[2].dot(&force),
-            d[3].dot(&moment),
-            d[4].dot(&moment),
-            d[5].dot(&moment),
-        ]
     }
 }
 

@@ -302,8 +302,15 @@ impl Node {
     /// Rates of the body that the rigid rows ask for against a parent at rest.
     #[inline]
     fn asked(&self, b: &Wrench) -> Option<Wrench> {
-        let rates: Wrench = std::array::from_fn(|r| if self.rigid[r] { b[r] } else { 0.0 });
-        rates.iter().any(|rate| *rate != 0.0).then(|| self.rows.motions(&rates))
+        let mut asked = [0.0; 6];
+        let mut any = false;
+        for r in 0..6 {
+            if self.rigid[r] && b[r] != 0.0 {
+                add(&mut asked, b[r], &self.rows.motion(r));
+                any = true;
+            }
+        }
+        any.then_some(asked)
     }
 
     /// Eliminates the body from the right-hand side; what is left for the parent. Leaves each freedom's own share
@@ -363,9 +370,9 @@ impl Node {
         // What the joint carries: Jᵀμ = p − A·v.
         let mut carried = p;
         add(&mut carried, -1.0, &times(&self.inertia, &v));
-        let (exists, carried) = (self.exists(), self.rows.carried(&carried));
+        let exists: [bool; 6] = self.exists();
         for r in 0..6 {
-            x[row_at + r] = if exists[r] { carried[r] } else { 0.0 };
+            x[row_at + r] = if exists[r] { dot(&self.rows.motion(r), &carried) } else { 0.0 };
         }
         x[6 * b..6 * b + 6].copy_from_slice(&v);
     }

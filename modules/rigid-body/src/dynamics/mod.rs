@@ -18,7 +18,6 @@ pub(crate) mod joint_rows;
 pub(crate) mod kkt;
 mod midpoint;
 mod reaction;
-mod resolve;
 pub(crate) mod scheme;
 mod second_order;
 
@@ -31,7 +30,6 @@ use anderson::Anderson;
 use closing::Closing;
 use joint_rows::{coordinate, gap};
 use kkt::Kkt;
-use resolve::FirstTrial;
 use scheme::{Acceleration, Integrator};
 use terraglue_linear_solver::{Error as SolverError, Rows};
 
@@ -122,7 +120,6 @@ pub(crate) struct Dynamics {
     pub external: Vec<f64>,
     rhs: Vec<f64>,
     correction: Vec<f64>,
-    first: FirstTrial,
     anderson: Anderson,
     /// Per joint what its explicit PD motor weighs, as checked last.
     explicit: Vec<f64>,
@@ -167,7 +164,6 @@ impl Dynamics {
             external: vec![0.0; n],
             rhs: vec![0.0; n],
             correction: vec![0.0; n],
-            first: FirstTrial::new(n),
             anderson: Anderson::new(n, 6 * nb),
             explicit: vec![0.0; nj],
             solution: vec![0.0; n],
@@ -273,13 +269,6 @@ impl Dynamics {
         self.rows[j].rates(of(joint.child), joint.parent.map(of))
     }
 
-    /// J·v of row r of joint j.
-    fn rate(&self, j: usize, r: usize, v: &[f64]) -> f64 {
-        let joint = &self.model.joints[j];
-        let of = |b: usize| &v[self.kkt.body_at[b]..][..6];
-        self.rows[j].rate(r, of(joint.child), joint.parent.map(of))
-    }
-
     /// The free axis of joint j in the trial; none where nothing moves or it is broken.
     pub fn axis_result(&self, j: usize) -> Option<AxisResult> {
         let joint = &self.model.joints[j];
@@ -287,8 +276,8 @@ impl Dynamics {
         if self.integrator.is_second_order() {
             return Some(self.axis_result_second_order(j, free));
         }
-        let rate = self.rate(j, free, &self.solution);
-        let mean_rate = 0.5 * (rate + self.rate(j, free, &self.free));
+        let rate = self.rates(j, &self.solution)[free];
+        let mean_rate = 0.5 * (rate + self.rates(j, &self.free)[free]);
         let row = self.axes[j].row(self.modes[j]).is_some();
         let impulse = if row {
             -self.solution[self.kkt.joint_at[j] + free]
@@ -361,10 +350,7 @@ impl Dynamics {
                         return Err(open);
                     }
                 }
-                Ok(()) if !self.change_branches(one_at_a_time) => {
-                    self.keep_first_trial();
-                    return Ok(());
-                }
+                Ok(()) if !self.change_branches(one_at_a_time) => return Ok(()),
                 Ok(()) => {}
             }
         }
@@ -373,9 +359,6 @@ impl Dynamics {
 
     /// The step on the present branches, but for what it leaves open of the joints.
     fn solve_branch(&mut self) -> Result<(), Failure> {
-        if self.has_first_trial() {
-            return self.solve_again();
-        }
         self.assemble();
         self.kkt.solver.solve(&self.rhs, &mut self.solution)?;
         self.contacts.resolve(&self.kkt.solver, &self.kkt.body_at, &mut self.solution)?;

@@ -31,11 +31,11 @@ def test_compare_runs_steps_against_a_reference(tmp_path):
     rows = json.loads((tmp_path / "compare.json").read_text())["rows"]
     assert [(row["strategy"], row["step_s"]) for row in rows] == [
         ("cooperative", 1e-3), ("cooperative", 2e-3), ("iterative", 1e-3), ("iterative", 2e-3),
-        ("xx-newton", 1e-3), ("xx-newton", 2e-3), ("iterative", 1e-3)]
+        ("xx-newton", 1e-3), ("xx-newton", 2e-3), ("iterative", 5e-4)]
     refused = [row for row in rows if row["strategy"] == "xx-newton"]
     assert all("refused" in row["error"] for row in refused)
-    assert rows[2]["reference_error_m"] == 0.0
-    assert rows[3]["reference_error_m"] > 0.0
+    # the reference is a run at half the smallest step
+    assert 0.0 < rows[2]["reference_error_m"] < rows[3]["reference_error_m"]
     page = (tmp_path / "compare.html").read_text()
     assert "error-step" in page and "work-precision" in page
 

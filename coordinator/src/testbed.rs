@@ -25,6 +25,7 @@ mod build;
 mod explain;
 mod group;
 mod hosted;
+mod pieces;
 mod reload;
 mod unglued;
 

@@ -48,6 +48,8 @@ pub struct Exchange {
     pub a2: Vec<f64>,
     /// What every component is.
     pub rows: Vec<Row>,
+    /// Which components are answered by a soil.
+    pub(super) of_soil: Vec<bool>,
     /// Where the points of both sides of a joint lay apart at t, packed.
     pub gap: Vec<f64>,
     /// Compliance of the glue by component, m/N.
@@ -107,6 +109,7 @@ impl Exchange {
             a1: Vec::new(),
             a2: Vec::new(),
             rows: Vec::new(),
+            of_soil: Vec::new(),
             gap: Vec::new(),
             compliance: Vec::new(),
             damping: Vec::new(),
@@ -173,6 +176,7 @@ impl Exchange {
             }
         }
         self.rows.clear();
+        self.of_soil.clear();
         self.gap.clear();
         self.compliance.clear();
         self.damping.clear();
@@ -180,6 +184,7 @@ impl Exchange {
             let glued = p.checked_sub(found_ports).and_then(|k| glue.joint(k));
             for (_, c) in port.components() {
                 self.rows.push(glued.map_or(if c == 0 { Row::Normal } else { Row::Law }, |j| j.row(c)));
+                self.of_soil.push(glued.is_none_or(|j| j.is_on_soil()));
                 self.gap.push(glued.map_or(0.0, |j| j.gap(port, c)));
                 self.compliance.push(port.law.compliance);
                 self.damping.push(glued.map_or(0.0, |j| j.damping()));
@@ -345,6 +350,11 @@ impl Exchange {
         self.x1[i] + self.gap[i] + damper - if soil { 0.0 } else { self.x2[i] }
     }
 
+    /// Whether a component's wrench is known: that of a soil at t, where a step of no length moves nothing.
+    pub fn is_given(&self, i: usize) -> bool {
+        self.at.h == 0.0 && self.of_soil[i]
+    }
+
     fn surface_part(&self, i: usize) -> f64 {
         if self.has_grounds() && self.rows[i] != Row::Joint && self.at.h > 0.0 { -self.x2[i] } else { 0.0 }
     }
@@ -475,7 +485,8 @@ impl Exchange {
         }
         self.timings.charge(Part::CommitBodies, start);
         let start = Clock::now();
-        for side in &mut self.grounds {
+        // a step of no length tells accelerations, which soils have none
+        for side in self.grounds.iter_mut().filter(|_| self.at.h > 0.0) {
             let partner = (self.x1.as_slice(), self.v1.as_slice());
             side.commit(&mut instances[side.slot], &self.nodes, &self.at, &self.t, partner)?;
         }

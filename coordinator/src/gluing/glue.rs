@@ -234,6 +234,11 @@ impl Joint {
         self.port.kind == PortKind::Contact as u32
     }
 
+    /// Whether side 2 is a soil.
+    pub fn is_on_soil(&self) -> bool {
+        self.soil
+    }
+
     /// What a component is.
     pub fn row(&self, component: usize) -> Row {
         match (self.is_contact(), component, self.soil) {

@@ -42,6 +42,14 @@ fn hold_refused(spec: &GluingSpec, exchange: &Exchange, instances: &[Instance]) 
         let help = "use hold = \"end\", \"constant\" or \"two-parameter\", or level = \"velocity\"";
         return refused(reason.into(), help);
     }
+    let sub_cycles = |slot: usize| instances[slot].capabilities().has(Capabilities::SUBCYCLES);
+    if matches!(spec.hold.as_str(), "constant" | "linear") && !exchange.members().any(sub_cycles) {
+        let reason = format!(
+            "a {} hold would have no effect: none of the glued subsystems sub-cycles, all read T at the end of the step",
+            spec.hold
+        );
+        return refused(reason, "leave `hold` out");
+    }
     if spec.hold != "two-parameter" {
         return None;
     }

@@ -433,7 +433,7 @@ impl Side {
         self.by_differences = false;
     }
 
-    /// The Jacobian by differences of trials about T, forward from the last trial or central: all columns in one exchange.
+    /// The Jacobian by differences of trials about T (under a two-parameter hold about T at both ends), forward from the last trial or central: all columns in one exchange.
     /// The number of trials, each of which is then the instance's last one.
     pub fn take_slopes(
         &mut self,
@@ -452,9 +452,10 @@ impl Side {
         }
         let delta = |t: f64| 1e-6 * t.abs().max(least);
         let ways: &[f64] = if central { &[-1.0, 1.0] } else { &[1.0] };
-        let count = n * ways.len();
+        let width = self.given_t.len();
+        let count = width * ways.len();
         self.batch_t.clear();
-        for column in 0..n {
+        for column in 0..width {
             for way in ways {
                 let place = self.batch_t.len() + column;
                 self.batch_t.extend_from_slice(&self.given_t);
@@ -473,15 +474,31 @@ impl Side {
         let here = [&self.x, &self.v, &self.a];
         for ((slopes, answers), here) in self.slopes.iter_mut().zip(&self.batch).zip(here) {
             slopes.clear();
-            for column in 0..n {
+            for column in 0..width {
                 let of = |k: usize| &answers[(column * ways.len() + k) * n..][..n];
                 let (before, after) = if central { (of(0), of(1)) } else { (here.as_slice(), of(0)) };
-                let width = ways.len() as f64 * delta(self.given_t[column]) * self.signs[column];
-                slopes.extend(after.iter().zip(before).map(|(new, old)| (new - old) / width));
+                let change = ways.len() as f64 * delta(self.given_t[column]) * self.signs[column % n];
+                slopes.extend(after.iter().zip(before).map(|(new, old)| (new - old) / change));
             }
         }
         self.by_differences = true;
         Ok(count as u32)
+    }
+
+    /// Adds those of [`Side::take_slopes`] under a two-parameter hold to d(x1 − x2, h·(v1 − v2))/d(T at t + h, T at t) of
+    /// the group, 2·n_group × 2·n_group, column-major.
+    pub fn add_ramp_slopes(&self, h: f64, out: &mut [f64]) {
+        let (n, both) = (self.n(), out.len().isqrt());
+        for (level, factor) in [(Level::Position, 1.0), (Level::Velocity, h)] {
+            let first = level as usize * both / 2;
+            for (c, column) in self.slopes[level as usize].chunks_exact(n.max(1)).enumerate() {
+                let at = self.index[c % n] + c / n * both / 2;
+                for (r, value) in column.iter().enumerate() {
+                    out[at * both + first + self.index[r]] +=
+                        factor * self.signs[r] * self.signs[c % n] * value;
+                }
+            }
+        }
     }
 
     /// dX/d(wrench on itself) of [`Side::take_slopes`] into the group's matrix.

@@ -1,4 +1,6 @@
 //! The forces of joints and the accelerations at the start: a step of h = 0, the same for all strategies.
+//!
+//! The force of a soil follows from places and rates, so at t it is what `set_ports` answered, and soils are not asked.
 
 use super::exchange::Exchange;
 use super::iterative::Iterative;

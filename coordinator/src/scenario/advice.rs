@@ -1,8 +1,9 @@
 //! What of a scenario has no effect although nothing is wrong with it: said in warnings, never an error.
 
-use super::model::{Scenario, SubsystemSpec, Trigger};
+use super::model::{GluingSpec, Scenario, SubsystemSpec, Trigger};
 use super::parameters::check_own_table;
 use super::source::{InputError, Source};
+use crate::gluing::{cooperative_compliant, iterative, relaxed, semi_implicit};
 use terraglue_subsystem::Schema;
 
 /// Events after the end of the run.
@@ -17,6 +18,44 @@ pub fn late_events(scenario: &Scenario) -> Vec<String> {
         line_of(&scenario.source.error_at(event.span.clone(), message, None))
     })
     .collect()
+}
+
+/// Keys of `[gluing]` that only some strategies read, with what they say where they say nothing.
+type Reader = (&'static str, fn(&GluingSpec) -> bool, &'static [&'static str]);
+const READERS: [Reader; 6] = [
+    ("form", |g| g.form != "auto", &[iterative::NAME, cooperative_compliant::NAME]),
+    ("start", |g| g.start != "estimate", &[iterative::NAME]),
+    ("relaxation", |g| g.relaxation != "anderson", &[relaxed::NAME]),
+    ("jacobian", |g| g.jacobian != "analytic", &[iterative::NAME, semi_implicit::NAME]),
+    ("level", |g| g.level != "position", &[iterative::NAME, semi_implicit::NAME]),
+    ("stabilisation", |g| g.stabilisation != 0.0, &[iterative::NAME, semi_implicit::NAME]),
+];
+
+/// Keys of `[gluing]` that none of the scenario's strategies reads.
+pub fn unread_keys(scenario: &Scenario) -> Vec<String> {
+    let (gluing, glue) = (&scenario.gluing, &scenario.glue);
+    let own = glue.iter().filter_map(|g| g.strategy.as_deref());
+    let used: Vec<&str> = own.chain([gluing.strategy.as_str()]).collect();
+    let warn = |key: &str, why: String| {
+        line_of(&scenario.source.error_at_value(
+            &["gluing", key],
+            format!("`{key}` has no effect: {why}"),
+            None,
+        ))
+    };
+    let unread = READERS.iter().filter(|(_, said, by)| said(gluing) && !used.iter().any(|u| by.contains(u)));
+    let mut all: Vec<String> = unread
+        .map(|(key, _, by)| {
+            warn(key, format!("`{}` does not read it ({} does)", gluing.strategy, by.join(", ")))
+        })
+        .collect();
+    if gluing.stabilisation != 0.0 && gluing.level == "position" {
+        all.push(warn("stabilisation", "at position level nothing drifts that it could take out".into()));
+    }
+    if gluing.step_min_s.is_some() && gluing.energy_residual_j.is_none() {
+        all.push(warn("step_min_s", "all steps are `time.step_s` long without `energy_residual_j`".into()));
+    }
+    all
 }
 
 /// Keys of a module that is not chosen, in its own table `[NAME.MODULE]`: what is wrong with them shows when it is.

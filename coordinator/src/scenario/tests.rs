@@ -243,6 +243,31 @@ fn a_module_named_by_its_path_has_a_sub_table_too() {
 }
 
 #[test]
+fn keys_that_the_strategy_does_not_read_are_said() {
+    let said = |keys: &str| {
+        let text =
+            format!("{GOOD}\n[gluing]\n{keys}\n").replacen("[gluing]\nstrategy = \"cooperative\"\n", "", 1);
+        advice::unread_keys(&parse(&text).expect("parses"))
+    };
+    for good in [
+        "strategy = \"iterative\"\nform = \"tt\"\nstart = \"zero\"\njacobian = \"broyden\"",
+        "strategy = \"relaxed\"\nrelaxation = \"aitken\"",
+        "strategy = \"semi-implicit\"\nlevel = \"velocity\"\nstabilisation = 0.2",
+    ] {
+        assert_eq!(said(good), Vec::<String>::new());
+    }
+    let one = said("strategy = \"iterative\"\nrelaxation = \"aitken\"");
+    assert_holds(&one[0], &["`relaxation` has no effect", "`iterative` does not read it (relaxed does)"]);
+    let level = said("strategy = \"monolithic\"\nlevel = \"velocity\"");
+    assert_holds(&level[0], &["`level` has no effect", "iterative, semi-implicit does"]);
+    assert_holds(
+        &said("strategy = \"iterative\"\nstabilisation = 0.2")[0],
+        &["at position level nothing drifts"],
+    );
+    assert_holds(&said("step_min_s = 1e-4")[0], &["without `energy_residual_j`"]);
+}
+
+#[test]
 fn what_has_no_effect_is_said() {
     let good = parse(GOOD).expect("parses");
     assert!(advice::late_events(&good).is_empty());

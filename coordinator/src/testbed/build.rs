@@ -1,5 +1,6 @@
 //! From a checked scenario to a testbed: terrain, modules, instances, the group of glued subsystems, signals.
 
+use super::pieces;
 use super::unglued::Unglued;
 use super::{Group, Member, Options, Testbed};
 use crate::contact::{BodySide, ContactDetector, GroundSide, PortSet};
@@ -44,7 +45,8 @@ impl Testbed {
         let services = services(scenario, options, true)?;
         let terrain = services.terrain.clone();
         let services = change(services);
-        scenario::advice::late_events(scenario).iter().for_each(|advice| log::warn!("{advice}"));
+        let advice = [scenario::advice::late_events(scenario), scenario::advice::unread_keys(scenario)];
+        advice.iter().flatten().for_each(|advice| log::warn!("{advice}"));
         let instances = instantiate(scenario, options, library, &services)?;
         let directory = Directory::new(&instances);
         let links = signals::connect(&scenario.connections, &directory, &instances, &scenario.source)?;
@@ -264,6 +266,7 @@ fn members(scenario: &Scenario, instances: &[Instance], groups: &[Group]) -> Vec
 /// Bodies that can touch the ground, with the ground, and all that glue connects: one group each.
 fn groups(scenario: &Scenario, instances: &[Instance]) -> Result<Vec<Group>> {
     let glue = glue(scenario, instances)?;
+    pieces::check(scenario, instances, &glue, &body_states(instances)?)?;
     let grounds: Vec<usize> = (0..instances.len()).filter(|k| instances[*k].kind() == Kind::Soil).collect();
     if let [first, second, ..] = grounds[..] {
         let message = format!(
@@ -356,7 +359,7 @@ fn group(
     }
     let can_start = |s: usize| instances[s].capabilities().has(Capabilities::FORCE | Capabilities::RETRY);
     let start =
-        (exchange.glue.has_joints() && exchange.members().all(can_start)).then(|| gluing::start(spec));
+        (exchange.glue.has_joints() && exchange.body_slots().all(can_start)).then(|| gluing::start(spec));
     let strategy = gluing::strategy(spec);
     Ok(Group { exchange, strategy, own, start, closed: Vec::new(), passage: Passage::default() })
 }

@@ -157,6 +157,7 @@ fn divide(model: &mut Model, cuts: &[(usize, Side)], share: f64, kept: &[bool]) 
             )));
         }
         let body = &mut model.bodies[b];
+        body.share = part;
         body.mass *= part;
         body.inertia *= part;
         body.inverse_inertia /= part;

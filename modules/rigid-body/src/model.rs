@@ -16,6 +16,8 @@ pub(crate) struct Body {
     pub inertia: M3,
     pub inverse_inertia: M3,
     pub shapes: Vec<import::Shape>,
+    /// Share of the link that this body is, where a cut divides it: in its mass and inertia already.
+    pub share: f64,
 }
 
 /// What a joint leaves free.
@@ -179,6 +181,7 @@ fn body(b: &import::Body) -> Body {
         // The import has checked that the inertia is positive.
         inverse_inertia: b.inertia.try_inverse().unwrap_or_else(M3::zeros),
         shapes: b.shapes.clone(),
+        share: 1.0,
     }
 }
 

@@ -5,6 +5,7 @@ use crate::actuator::battery::Draw;
 use crate::actuator::book::Outcome;
 use crate::contact::estimate::{Estimator, Problem};
 use crate::contact::ports::{Ports, committed, displacement, response, standing};
+use crate::contact::slopes::Slopes;
 use crate::drive::{FULL_BLOCK, Motor};
 use crate::dynamics::joint_rows::coordinate;
 use crate::dynamics::{Dynamics, Failure};
@@ -16,7 +17,7 @@ use crate::variables;
 use std::sync::Arc;
 use terraglue_subsystem::{
     Action, BodyState, Capabilities, Energy, Error, Estimate, Host, Input, Law, Level, Motion, Port,
-    Response, Result, Scene, Step, Subsystem, Values, ValuesMut, Variable,
+    PortKind, Response, Result, Scene, Step, Subsystem, Values, ValuesMut, Variable,
 };
 
 /// A partial block that is off by more than this has given way, rad or m.
@@ -34,6 +35,7 @@ pub(crate) struct Robot {
     variables: Vec<Variable>,
     actions: Vec<Action>,
     ports: Ports,
+    slopes: Slopes,
     estimator: Estimator,
     /// Step for which `dynamics` and `ports` are prepared.
     prepared: Option<Prepared>,
@@ -76,6 +78,7 @@ impl Robot {
             slots,
             backup: State::default(),
             ports: Ports::default(),
+            slopes: Slopes::default(),
             estimator: Estimator::default(),
             prepared: None,
             step_ports: Vec::new(),
@@ -116,6 +119,7 @@ impl Robot {
     }
 
     fn assign(&mut self, step: &Step) -> Result {
+        self.slopes.forget();
         self.step_ports.clear();
         self.step_ports.extend_from_slice(step.ports);
         if !self.ports.assign(step.ports, step.n as usize, &self.state.bodies) {
@@ -371,6 +375,12 @@ impl Subsystem for Robot {
         if step.h > 0.0 {
             self.prepare(step)?;
             self.dynamics.ensure_factor().map_err(failed)?;
+            let joint = |p: &Port| p.kind == PortKind::Joint as u32;
+            if step.ports.iter().any(joint) && self.dynamics.contacts.pressing() == 0 {
+                let slopes = self.slopes.at(level, step.ports, &self.ports, &mut self.dynamics);
+                out.copy_from_slice(slopes);
+                return Ok(());
+            }
         }
         let per = match level {
             _ if step.h == 0.0 => f64::from(u8::from(level == Level::Acceleration)),

@@ -27,6 +27,8 @@ pub(crate) enum Meaning {
     Robot(usize),
     /// Number of dependent rows of loops.
     RedundantRows,
+    /// Share of a divided link that this piece of it is.
+    Share(usize),
     /// Of a connection beyond the tree: place in [`CLOSURE_ITEMS`].
     Closure {
         closure: usize,
@@ -141,6 +143,8 @@ const CLOSURE_ITEMS: [(&str, &str, &str); 2] = [
     ("moment", "N m", "Magnitude of the moment in the last step"),
 ];
 const CLOSURE_BROKEN: u32 = 2;
+/// Ids of the shares of divided links, by body.
+const SHARES: u32 = 1 << 25;
 /// Nearer than this an energy per metre says nothing, m.
 const SHORTEST: f64 = 1e-2;
 
@@ -176,6 +180,11 @@ pub(crate) fn describe(model: &Model, state: &State) -> Vec<Variable> {
         all.push(Variable::real(first + item as u32, *name, unit, Causality::Output, help));
     }
     describe_closures(model, &mut all);
+    for (b, body) in model.bodies.iter().enumerate().filter(|(_, b)| b.share < 1.0) {
+        let (id, name) = (SHARES + b as u32, format!("{}.link_share", body.name));
+        let help = "Share of the link's mass and inertia in this piece of it, where `cut` divides the link";
+        all.push(Variable::real(id, name, "", Causality::Local, help));
+    }
     all
 }
 
@@ -289,6 +298,10 @@ pub(crate) fn actions(model: &Model) -> Vec<Action> {
 pub(crate) fn meaning(model: &Model, id: u32) -> Result<Meaning> {
     let first = model.bodies.len() as u32 * BODY_STRIDE;
     let unknown = || Error::Refused(format!("there is no variable number {id}"));
+    if let Some(body) = id.checked_sub(SHARES).map(|b| b as usize) {
+        let known = model.bodies.get(body).is_some_and(|b| b.share < 1.0);
+        return if known { Ok(Meaning::Share(body)) } else { Err(unknown()) };
+    }
     if id >= CLOSURES {
         let (closure, item) = ((id - CLOSURES) / CLOSURE_STRIDE, (id - CLOSURES) % CLOSURE_STRIDE);
         let known = (closure as usize) < model.closures.len() && item <= CLOSURE_BROKEN;
@@ -346,6 +359,7 @@ pub(crate) fn number(model: &Model, state: &State, id: u32) -> Result<f64> {
         }
         Meaning::Robot(item) => Ok(robot_number(state, item)),
         Meaning::RedundantRows => Ok(state.redundant_rows as f64),
+        Meaning::Share(body) => Ok(model.bodies[body].share),
         Meaning::Closure { item: CLOSURE_BROKEN, .. } => Err(wrong_type(id)),
         Meaning::Closure { closure, item } => {
             let s = &state.closures[closure];
@@ -401,6 +415,7 @@ pub(crate) fn set_number(model: &Model, state: &mut State, id: u32, value: f64) 
             Ok(())
         }
         Meaning::Body { .. } => Err(Error::Refused("the motion of a body can be read only".into())),
+        Meaning::Share(_) => Err(Error::Refused("the share of a divided link can be read only".into())),
         Meaning::Robot(_) | Meaning::RedundantRows => {
             Err(Error::Refused("what the robot as a whole tells can be read only".into()))
         }

@@ -16,7 +16,6 @@ use crate::host::Instance;
 pub struct RampForm {
     jacobian: Vec<f64>,
     residual: Vec<f64>,
-    at_base: Vec<f64>,
     d: Vec<f64>,
     lu: Lu,
 }
@@ -44,6 +43,7 @@ impl RampForm {
             self.lu.solve(&mut self.d);
             size = max_norm(&self.d);
             if size <= limits.threshold(exchange) {
+                exchange.settle_bodies(instances)?;
                 exchange.report.residual = size / exchange.t_ref;
                 exchange.report.converged = true;
                 let gap = (0..exchange.n()).map(|i| exchange.joint_gap(i)).fold(0.0, f64::max);
@@ -57,29 +57,10 @@ impl RampForm {
         Ok(limits.give_up(exchange, "T-T form with a two-parameter hold: |Λ·e|", size))
     }
 
-    /// d(x1 − x2, h·(v1 − v2))/d(T_b, T_a), factored; the trial under the present wrenches is repeated at the end.
+    /// d(x1 − x2, h·(v1 − v2))/d(T_b, T_a), factored; leaves the members in other trials.
     fn differentiate(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result {
         let n = exchange.n();
-        let before = exchange.report.evaluations_bodies;
-        self.jacobian.clear();
-        for column in 0..2 * n {
-            let which = |e: &mut Exchange, value: f64| {
-                if column < n { e.t[column] = value } else { e.t_start[column - n] = value }
-            };
-            let kept = if column < n { exchange.t[column] } else { exchange.t_start[column - n] };
-            let delta = 1e-6 * kept.abs().max(exchange.t_ref);
-            which(exchange, kept + delta);
-            exchange.advance_bodies(instances)?;
-            which(exchange, kept);
-            read(exchange, &mut self.at_base);
-            let moved = self.at_base.iter().zip(&self.residual).map(|(new, old)| (new - old) / delta);
-            self.jacobian.extend(moved);
-        }
-        exchange.advance_bodies(instances)?;
-        let spent = exchange.report.evaluations_bodies - before;
-        exchange.report.evaluations_bodies = before;
-        exchange.report.evaluations_jacobian += spent;
-        exchange.report.jacobian_refreshes += 1;
+        exchange.linearise_ramp(instances, &mut self.jacobian)?;
         let jacobian = &self.jacobian;
         let rank = self.lu.factor(2 * n, |r, c| jacobian[c * 2 * n + r]);
         exchange.report.rank = (rank as u32, 2 * n as u32);

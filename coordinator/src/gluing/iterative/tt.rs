@@ -40,7 +40,7 @@ pub struct TtForm {
     d: Vec<f64>,
     base: Vec<f64>,
     work: Vec<f64>,
-    /// X1 by the linearisation, before the bodies confirm it.
+    /// The bodies' part of the mismatch by the linearisation, before they confirm it.
     predicted: Vec<f64>,
     lower: Vec<f64>,
     upper: Vec<f64>,
@@ -77,8 +77,10 @@ impl TtForm {
     ) -> Result<Outcome> {
         let (mut size, mut before) = (f64::INFINITY, f64::NAN);
         let own_start = exchange.needs_linearisation();
+        let soils = exchange.has_grounds() && exchange.at.h > 0.0;
         for iteration in 0..=limits.max_iterations {
-            self.predicted.clone_from(&exchange.x1);
+            self.predicted.clear();
+            self.predicted.extend((0..exchange.n()).map(|i| exchange.bodies_part(i)));
             exchange.advance_bodies(instances)?;
             if iteration == 0 || !self.as_predicted(limits, exchange) {
                 self.evaluate_grounds(exchange, instances)?;
@@ -94,7 +96,7 @@ impl TtForm {
             let solved = self.newton_step(exchange, instances)?;
             let last = std::mem::replace(&mut size, max_norm(&self.d));
             // where Λ is nearly singular, rounding of the places is all that is left in e, and Λ·e never ends
-            let rounding = !exchange.has_grounds() && size > 0.5 * last && left <= ROUNDING_M;
+            let rounding = !soils && size > 0.5 * last && left <= ROUNDING_M;
             if size <= limits.threshold(exchange) || rounding {
                 exchange.settle_bodies(instances)?;
                 return Ok(self.converged(exchange, size));
@@ -102,7 +104,7 @@ impl TtForm {
             if !solved {
                 break;
             }
-            if exchange.has_grounds() && !self.diagonal {
+            if soils && !self.diagonal {
                 self.solve_linearised(limits, exchange, instances)?;
             } else {
                 exchange.t.iter_mut().zip(&self.d).for_each(|(t, d)| *t += d);
@@ -118,7 +120,7 @@ impl TtForm {
         exchange.has_grounds()
             && !self.diagonal
             && (0..n).all(|i| {
-                let off = (exchange.x1[i] - self.predicted[i]).abs();
+                let off = (exchange.bodies_part(i) - self.predicted[i]).abs();
                 let stiffness = match exchange.rows[i] {
                     Row::Law => self.k[i * n + i],
                     _ => 1.0 / self.matrix[i * n + i],
@@ -206,7 +208,7 @@ impl TtForm {
 
     /// One evaluation of the soils at the bodies' present motion and the residual of every row.
     fn evaluate_grounds(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result {
-        if exchange.has_grounds() {
+        if exchange.has_grounds() && exchange.at.h > 0.0 {
             exchange.advance_grounds_under_force(instances)?;
         }
         self.residuals(exchange);
@@ -218,6 +220,7 @@ impl TtForm {
         for port in &exchange.ports {
             for (i, _) in port.components() {
                 self.e.push(match exchange.rows[i] {
+                    _ if exchange.is_given(i) => 0.0,
                     Row::Law => exchange.t[i] - exchange.f[i],
                     _ => exchange.mismatch(i),
                 });
@@ -228,7 +231,9 @@ impl TtForm {
     /// The solution of the linearised problem at the last trial; `false` if none was found.
     fn newton_step(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<bool> {
         let n = exchange.n();
-        exchange.ground_jacobian(instances, false, &mut self.mixed)?;
+        if exchange.at.h > 0.0 {
+            exchange.ground_jacobian(instances, false, &mut self.mixed)?;
+        }
         self.assemble(exchange);
         for port in exchange.ports.iter().filter(|p| p.len() > 1) {
             if exchange.rows[port.first as usize + 1] == Row::Coulomb {
@@ -267,12 +272,16 @@ impl TtForm {
         for port in &exchange.ports {
             for (row, r) in port.components() {
                 let out = &mut self.matrix[row * n..][..n];
+                if exchange.is_given(row) {
+                    out[row] = 1.0;
+                    continue;
+                }
                 let law = exchange.rows[row] == Row::Law;
                 out[row] += if law { 1.0 } else { exchange.compliance_now(row) };
                 if !law {
                     (0..n).for_each(|column| out[column] += g[column * n + row]);
                 }
-                if matches!(exchange.rows[row], Row::Joint | Row::Coulomb) {
+                if !exchange.of_soil[row] {
                     continue;
                 }
                 for (other, c) in port.components() {

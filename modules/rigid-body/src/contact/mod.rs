@@ -10,4 +10,5 @@ pub(crate) mod plane;
 pub(crate) mod ports;
 pub(crate) mod reduce;
 pub(crate) mod shapes;
+pub(crate) mod slopes;
 pub(crate) mod triangles;

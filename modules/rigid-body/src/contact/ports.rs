@@ -85,6 +85,14 @@ impl Ports {
         }
     }
 
+    /// The impulse of a unit of component i on its own body into a load of the system.
+    pub fn load_unit(&self, dynamics: &Dynamics, i: usize, load: &mut [f64]) {
+        let Component { body, row, .. } = &self.components[i];
+        let at = dynamics.kkt.body_at[*body];
+        let unit = row.map(|r| dynamics.impulse_per_force() * r);
+        load[at..at + 6].copy_from_slice(&unit);
+    }
+
     /// G = dX/d(wrench on itself) = h²·J·K⁻¹·Jᵀ for the current factor, column-major; in a step of no length dA/d(wrench).
     ///
     /// Only along the paths of the bodies to the root: see [`Path`].

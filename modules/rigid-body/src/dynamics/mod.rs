@@ -20,6 +20,7 @@ mod midpoint;
 mod reaction;
 pub(crate) mod scheme;
 mod second_order;
+pub(crate) mod sensitivity;
 
 use crate::contact::bodies::{BodyContacts, Unsolved};
 use crate::drive::{Axis, MOST_YIELDING, Mode, Span, YIELDING};

@@ -131,7 +131,7 @@ impl Dynamics {
         AxisResult { rate, end_rate, mean_rate: rate, impulse }
     }
 
-    fn find_ends_second_order(&mut self) {
+    pub(super) fn find_ends_second_order(&mut self) {
         match self.integrator {
             Integrator::EnergyMomentum => self.find_ends_midpoint(),
             _ => self.find_ends_alpha(),
@@ -139,7 +139,7 @@ impl Dynamics {
     }
 
     /// Fills `correction` with what is missing to equilibrium at the end and to closed joints.
-    fn residual_second_order(&mut self) {
+    pub(super) fn residual_second_order(&mut self) {
         let weight = self.integrator.force_weight();
         let midpoint = self.integrator == Integrator::EnergyMomentum;
         self.correction.copy_from_slice(&self.external);

@@ -4,6 +4,7 @@
 //! with the name of the entry. Sizes are counted while reading, whatever the archive says of itself.
 
 use crate::error::{Error, Result};
+use crate::fmu::Folder;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};
@@ -166,8 +167,18 @@ impl Archive {
         self.zip.file_names()
     }
 
-    /// Writes all files below `folder`, which is empty and ours.
-    pub fn extract(&mut self, folder: &Path) -> Result {
+    /// Writes all files into a new temporary folder, which goes when it is dropped.
+    pub fn unpack(&mut self) -> Result<Folder> {
+        let folder = Folder::new().map_err(|e| Error::Archive {
+            path: self.path.clone(),
+            entry: None,
+            message: format!("no temporary folder can be made: {e}"),
+        })?;
+        self.extract(folder.path())?;
+        Ok(folder)
+    }
+
+    fn extract(&mut self, folder: &Path) -> Result {
         let mut left = self.limits.total;
         for k in 0..self.zip.len() {
             let path = self.path.clone();

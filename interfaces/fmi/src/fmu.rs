@@ -3,7 +3,7 @@
 use crate::archive::{Archive, Limits};
 use crate::binary::{self, Loaded};
 use crate::description::{self, ModelDescription};
-use crate::error::{Error, Result};
+use crate::error::Result;
 use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
@@ -37,12 +37,7 @@ impl Fmu {
     pub fn open_within(path: &Path, limits: Limits) -> Result<Arc<Self>> {
         let mut archive = Archive::open(path, limits)?;
         let description = Self::describe(path, &mut archive)?;
-        let folder = Folder::new().map_err(|e| Error::Archive {
-            path: path.into(),
-            entry: None,
-            message: format!("no temporary folder can be made: {e}"),
-        })?;
-        archive.extract(folder.path())?;
+        let folder = archive.unpack()?;
         Ok(Arc::new(Self { path: path.into(), description, loaded: Mutex::default(), folder }))
     }
 

@@ -36,7 +36,7 @@ pub struct Arguments {
     /// Evaluate this table of values instead of the area's own figures (area gluing only).
     #[arg(long, value_name = "FILE", requires = "area")]
     table: Option<PathBuf>,
-    /// One part of the area only, for a look (area gluing only).
+    /// One part of the area only, for a look; a wrong name lists the parts.
     #[arg(long, value_name = "NAME", requires = "area")]
     part: Option<String>,
     /// Write the tables of docs/.
@@ -67,16 +67,17 @@ pub struct Context {
     pub part: Option<String>,
 }
 
-type Measure = fn(&Context) -> Outcome<Vec<Figure>>;
+/// A part of an area: its name, and what measures it.
+type Part = (&'static str, fn(&Context) -> Outcome<Vec<Figure>>);
 
-/// Areas with their figures; an area without any says so.
-const AREAS: [(&str, Option<Measure>); 6] = [
-    ("walk", Some(walk::figures)),
-    ("rigid-body", Some(rigid_body::figures)),
-    ("soil", Some(soil::figures)),
-    ("gluing", Some(gluing::figures)),
-    ("fmi", Some(fmi::figures)),
-    ("plugins", Some(plugins::figures)),
+/// Areas with their parts, in the order of the tables.
+const AREAS: [(&str, &[Part]); 6] = [
+    ("walk", &[("walk", walk::figures)]),
+    ("rigid-body", &rigid_body::PARTS),
+    ("soil", &soil::PARTS),
+    ("gluing", &gluing::PARTS),
+    ("fmi", &fmi::PARTS),
+    ("plugins", &plugins::PARTS),
 ];
 
 fn area_names() -> Vec<&'static str> {
@@ -106,26 +107,34 @@ pub fn validate(arguments: &Arguments) -> Outcome {
         quick: arguments.quick,
         scratch,
         table: arguments.table.clone(),
-        part: arguments.part.clone(),
+        part: arguments.table.as_ref().map(|_| "values".to_owned()).or_else(|| arguments.part.clone()),
     };
     let mut known = KnownFailures::read(&root().join("tests/known-failures.tsv"))?;
     let mut complaints = Vec::new();
-    for (area, measure) in
-        AREAS.iter().filter(|(name, _)| arguments.area.as_deref().is_none_or(|a| a == *name))
+    for (area, parts) in AREAS.iter().filter(|(name, _)| arguments.area.as_deref().is_none_or(|a| a == *name))
     {
-        let figures = match measure {
-            Some(measure) => measure(&context)?,
-            None => vec![Figure::skipped(format!("{area}.figures"), "this area promises no figure yet")],
-        };
-        for figure in &figures {
-            println!("{}", figure.line());
-            complaints.extend(known.judge(figure));
+        let mut figures = Vec::new();
+        for (_, measure) in chosen(parts, context.part.as_deref())? {
+            let measured = measure(&context)?;
+            for figure in &measured {
+                println!("{}", figure.line());
+                complaints.extend(known.judge(figure));
+            }
+            figures.extend(measured);
         }
-        if arguments.write_docs && measure.is_some() && context.table.is_none() && context.part.is_none() {
+        if arguments.write_docs && context.table.is_none() && context.part.is_none() {
             documents::write_area(area, &figures)?;
         }
     }
     if complaints.is_empty() { Ok(()) } else { Err(complaints.join("\n       ")) }
+}
+
+/// The parts to measure: all, or the one that was asked for.
+fn chosen<'a>(parts: &'a [Part], wanted: Option<&str>) -> Outcome<&'a [Part]> {
+    let Some(wanted) = wanted else { return Ok(parts) };
+    let found = parts.iter().position(|(name, _)| *name == wanted);
+    let names = || parts.iter().map(|(name, _)| *name).collect::<Vec<_>>().join(", ");
+    found.map(|k| &parts[k..=k]).ok_or_else(|| format!("--part {wanted}: the parts are {}", names()))
 }
 
 /// Timing figures count in the release profile only.

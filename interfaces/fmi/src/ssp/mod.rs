@@ -49,12 +49,7 @@ impl Package {
             return Ok(Self { path: path.into(), structure, base, _folder: None });
         }
         let mut archive = Archive::open_with(path, Limits::default(), [DESCRIPTION, "SSP"])?;
-        let folder = Folder::new().map_err(|e| Error::Archive {
-            path: path.into(),
-            entry: None,
-            message: format!("no temporary folder can be made: {e}"),
-        })?;
-        archive.extract(folder.path())?;
+        let folder = archive.unpack()?;
         let base = folder.path().to_owned();
         let files = Files { path, base: &base };
         let structure = structure::read(&files, &files.bytes(DESCRIPTION)?, DESCRIPTION)?;

@@ -7,25 +7,27 @@ mod pair;
 mod reference;
 pub(super) mod units;
 
-use super::{Context, Figure};
+use super::{Context, Part};
 use crate::process::Outcome;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use terraglue::Testbed;
 use terraglue::scenario::Scenario;
 use terraglue::testbed::Options;
 
-/// All figures of the area.
-pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
+/// The parts, in the order of the table.
+pub const PARTS: [Part; 5] = [
+    ("pair", |context| pair::figures(&folder(context)?, !context.quick)),
+    ("loops", |context| loops::figures(&folder(context)?)),
+    ("cycles", |context| cycles::figures(&folder(context)?, context.quick)),
+    ("reference", reference::figures),
+    ("cost", |context| cost::figures(&folder(context)?, context)),
+];
+
+/// Where the units are made.
+fn folder(context: &Context) -> Outcome<PathBuf> {
     let folder = context.scratch.join("fmi");
     std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    let mut all = pair::figures(&folder, !context.quick)?;
-    all.extend(loops::figures(&folder)?);
-    all.extend(cycles::figures(&folder, context.quick)?);
-    all.extend(reference::figures(context)?);
-    if context.timing {
-        all.extend(cost::figures(&folder, context)?);
-    }
-    Ok(all)
+    Ok(folder)
 }
 
 /// A testbed from the text of a scenario that lies in `folder`.

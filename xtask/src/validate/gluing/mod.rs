@@ -23,13 +23,12 @@ mod table;
 mod units;
 mod walk_forms;
 
-use super::{Context, Figure, Limit};
+use super::{Context, Figure, Limit, Part};
 use crate::process::{Outcome, root};
 
-type Part = fn(&Context) -> Outcome<Vec<Figure>>;
-
 /// The parts by name, in the order of the table.
-const PARTS: [(&str, Part); 10] = [
+pub const PARTS: [Part; 11] = [
+    ("values", values),
     ("linear", linear::figures),
     ("mechanisms", mechanisms::figures),
     ("holds", holds::figures),
@@ -42,23 +41,8 @@ const PARTS: [(&str, Part); 10] = [
     ("walk-forms", walk_forms::figures),
 ];
 
-/// All figures of the area, or those of the file that `--table` names.
-pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
-    if let Some(file) = &context.table {
-        return table::figures(file);
-    }
-    if let Some(part) = context.part.as_deref().filter(|p| *p != "values" && PARTS.iter().all(|n| n.0 != *p))
-    {
-        let names: Vec<&str> = PARTS.iter().map(|p| p.0).collect();
-        return Err(format!("--part {part}: the parts are values, {}", names.join(", ")));
-    }
-    let wanted = |name: &str| context.part.as_deref().is_none_or(|part| part == name);
-    let mut all = Vec::new();
-    if wanted("values") {
-        all = table::figures(&root().join("tests/reference/gluing/acceptance.csv"))?;
-    }
-    for (_, part) in PARTS.iter().filter(|(name, _)| wanted(name)) {
-        all.extend(part(context)?);
-    }
-    Ok(all)
+/// The values of the table of the project, or of the file that `--table` names.
+fn values(context: &Context) -> Outcome<Vec<Figure>> {
+    let own = || root().join("tests/reference/gluing/acceptance.csv");
+    table::figures(&context.table.clone().unwrap_or_else(own))
 }

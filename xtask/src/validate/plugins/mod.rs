@@ -5,7 +5,7 @@ mod python;
 mod reload;
 mod speed;
 
-use super::{Context, Figure, Limit};
+use super::{Context, Figure, Limit, Part};
 use crate::process::{Outcome, root};
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -15,28 +15,39 @@ use terraglue::scaffold::{Kind, Language, Place, scaffold};
 use terraglue::scenario::read_soil_table;
 use terraglue_soil_law::{COLUMNS, SoilRow};
 
-/// All figures.
-pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
-    let physical = catalogue().iter().filter(|t| t.area == Area::Physics).count();
-    let mut out = vec![
-        Figure::new(
-            "plugins.tests",
-            catalogue().len() as f64,
-            Limit::AtLeast(50.0),
-            "named tests of check-module",
-        ),
-        Figure::new("plugins.tests.physical", physical as f64, Limit::AtLeast(12.0), "of them about physics"),
-    ];
-    broken(context, &mut out)?;
-    own(context, &mut out)?;
-    seeds(context, &mut out)?;
-    if context.timing {
-        speed::figures(context, &mut out)?;
-        python::figures(context, &mut out)?;
-        reload::figures(context, &mut out)?;
-        newcomer::figures(context, &mut out)?;
-    }
+/// The parts, in the order of the table.
+pub const PARTS: [Part; 8] = [
+    ("tests", tests),
+    ("broken", |context| collected(context, broken)),
+    ("own", |context| collected(context, own)),
+    ("seeds", |context| collected(context, seeds)),
+    ("speed", |context| timed(context, speed::figures)),
+    ("python", |context| timed(context, python::figures)),
+    ("reload", |context| timed(context, reload::figures)),
+    ("newcomer", |context| timed(context, newcomer::figures)),
+];
+
+type Fill = fn(&Context, &mut Vec<Figure>) -> Outcome;
+
+fn collected(context: &Context, fill: Fill) -> Outcome<Vec<Figure>> {
+    std::fs::create_dir_all(&context.scratch).map_err(|e| format!("{}: {e}", context.scratch.display()))?;
+    let mut out = Vec::new();
+    fill(context, &mut out)?;
     Ok(out)
+}
+
+fn timed(context: &Context, fill: Fill) -> Outcome<Vec<Figure>> {
+    if context.timing { collected(context, fill) } else { Ok(Vec::new()) }
+}
+
+/// How many tests the checker has.
+fn tests(_: &Context) -> Outcome<Vec<Figure>> {
+    let physical = catalogue().iter().filter(|t| t.area == Area::Physics).count();
+    let all = catalogue().len() as f64;
+    Ok(vec![
+        Figure::new("plugins.tests", all, Limit::AtLeast(50.0), "named tests of check-module"),
+        Figure::new("plugins.tests.physical", physical as f64, Limit::AtLeast(12.0), "of them about physics"),
+    ])
 }
 
 fn options(context: &Context) -> Options {

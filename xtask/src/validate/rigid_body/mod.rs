@@ -7,13 +7,8 @@ mod solver;
 
 pub use peers::comparison;
 
-use super::{Context, Figure};
-use crate::process::Outcome;
+use super::Part;
 
-/// All figures of the area.
-pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
-    let mut all = contact::figures(context)?;
-    all.extend(solver::figures(context)?);
-    all.extend(peers::figures(context));
-    Ok(all)
-}
+/// The parts, in the order of the table.
+pub const PARTS: [Part; 3] =
+    [("contact", contact::figures), ("solver", solver::figures), ("peers", peers::figures)];

@@ -17,7 +17,7 @@ mod wong_reece;
 
 pub use automaton::print_hash;
 
-use super::{Context, Figure};
+use super::Part;
 use crate::process::Outcome;
 use plates::{Maker, level};
 use std::sync::atomic::{AtomicUsize, Ordering};
@@ -25,27 +25,16 @@ use std::sync::{Mutex, PoisonError};
 use terraglue_soil_bekker::SoilBekker;
 use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
 
-type Part = fn(&Context) -> Outcome<Vec<Figure>>;
-
 /// The parts, in the order of the table.
-const PARTS: [Part; 7] = [
-    automaton::figures,
-    plates::figures,
-    fit::figures,
-    wheels::figures,
-    rig_scenario::figures,
-    stick::figures,
-    wong_reece::figures,
+pub const PARTS: [Part; 7] = [
+    ("automaton", automaton::figures),
+    ("plates", plates::figures),
+    ("fit", fit::figures),
+    ("wheels", wheels::figures),
+    ("rig-scenario", rig_scenario::figures),
+    ("stick", stick::figures),
+    ("wong-reece", wong_reece::figures),
 ];
-
-/// All figures of the area.
-pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
-    let mut all = Vec::new();
-    for part in PARTS {
-        all.extend(part(context)?);
-    }
-    Ok(all)
-}
 
 /// Draws the pictures of docs/images.
 pub fn write_pictures() -> Outcome {

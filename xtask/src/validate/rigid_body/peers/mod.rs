@@ -14,9 +14,9 @@ use std::path::PathBuf;
 use std::process::Command;
 
 /// All figures of the peers; none of them is judged.
-pub fn figures(context: &Context) -> Vec<Figure> {
+pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     if !context.timing || context.quick {
-        return Vec::new();
+        return Ok(Vec::new());
     }
     let engines: [(&str, &str, fn() -> Outcome<Command>); 2] =
         [("mujoco", "MuJoCo", mujoco::command), ("rapier", "Rapier", rapier::command)];
@@ -25,7 +25,7 @@ pub fn figures(context: &Context) -> Vec<Figure> {
         let figures = command().and_then(|mut c| measure(&mut c, &id, name));
         figures.unwrap_or_else(|why| vec![Figure::skipped(id, why)])
     };
-    engines.into_iter().flat_map(measured).collect()
+    Ok(engines.into_iter().flat_map(measured).collect())
 }
 
 /// Runs a peer that prints lines `name<TAB>value<TAB>what`.

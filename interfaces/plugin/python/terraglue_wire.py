@@ -21,8 +21,9 @@ class Segment:
     """Shared memory: at its start call, answer, call_length, answer_length, cancel as 32-bit words."""
 
     WAIT, WAKE = 0, 1
-    # Looks at the counter before it sleeps (some 20 us), and how many waits go without after looks in vain.
-    LOOKS, PAUSE = 400, 256
+    # Looks at the counter before it sleeps (some 150 us, longer than it takes to wake the host), and how many waits go
+    # without after looks in vain.
+    LOOKS, PAUSE = 3000, 256
 
     def __init__(self, path):
         with open(path, "r+b") as file:

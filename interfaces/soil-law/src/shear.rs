@@ -192,12 +192,12 @@ impl ShearLaw {
         if p <= 0.0 {
             return ShearResponse::default();
         }
+        if self.is_batched() {
+            return self.respond_by(state, kept, p, s);
+        }
         let u = [state.elastic[0] + s[0], state.elastic[1] + s[1]];
         let length = (u[0] * u[0] + u[1] * u[1]).sqrt();
         let trial = self.stiffness * length;
-        if self.is_batched() {
-            return self.respond_by(state, kept, p, u);
-        }
         let (strength, by_p) = self.strength(p);
         if trial <= strength * mobilised * ON_YIELD {
             return self.elastic(u, state.slip);

@@ -8,8 +8,11 @@ use terraglue_subsystem::MOST_LAW_STATE;
 const CHUNK: usize = 32;
 /// Newton steps until bisection has the last word.
 const STEPS: usize = 60;
-/// Relative change of a slip at which Newton has arrived: the error left is of the order of its square.
-const CONVERGED: f64 = 1e-8;
+/// Relative change of a slip at which Newton has arrived: the error left is of the order of its square, that of the
+/// derivatives, which were asked for before it, of its own.
+const CONVERGED: f64 = 1e-10;
+/// A displacement that grows by less, relative, has not grown.
+const STANDS: f64 = 1e-9;
 
 /// Nodes with pressure and how far each is dragged.
 #[derive(Clone, Copy, Debug)]
@@ -32,22 +35,46 @@ struct Slip {
     u: [f64; 2],
     length: f64,
     weight: f64,
+    /// Bracket of the step; below zero while nothing is known of no slip at all.
     low: f64,
     high: f64,
     step: f64,
     before: f64,
 }
 
+/// Where a node stands.
+#[derive(Clone, Copy, PartialEq)]
+enum Stand {
+    Elastic,
+    Arrived,
+    UnderWay,
+}
+
 impl Slip {
+    /// A node that is dragged by `slide` from the history `state`. It starts where the elastic displacement would stay as
+    /// it is, which for stiff soil that slides on is next to the answer.
+    fn start(k: usize, law: &ShearLaw, state: &ShearState, slide: [f64; 2]) -> Self {
+        let norm = |u: [f64; 2]| (u[0] * u[0] + u[1] * u[1]).sqrt();
+        let u = [state.elastic[0] + slide[0], state.elastic[1] + slide[1]];
+        let (length, before) = (norm(u), state.slip);
+        let grown = length - norm(state.elastic);
+        let step = if grown > STANDS * length { grown } else { 0.0 };
+        Self { k, u, length, weight: law.weight(u, length), low: -1.0, high: length, step, before }
+    }
+
     /// Slip counted since the contact began, m.
     #[inline]
     fn slip(&self) -> f64 {
         self.before + self.weight * self.step
     }
 
-    /// A step of Newton's method, kept inside the bracket; the yield stress is y with the slope by_j. Returns its size.
+    /// A step of Newton's method, kept inside the bracket; the yield stress is y with the slope by_j. The yield stress
+    /// does not fall with the slip, so a node that is above it after some slip was above it before.
     #[inline]
-    fn newton(&mut self, stiffness: f64, y: f64, by_j: f64) -> f64 {
+    fn newton(&mut self, stiffness: f64, y: f64, by_j: f64) -> Stand {
+        if self.step == 0.0 && stiffness * self.length <= y * ON_YIELD {
+            return Stand::Elastic;
+        }
         let residual = stiffness * (self.length - self.step) - y;
         if residual > 0.0 {
             self.low = self.step
@@ -55,21 +82,21 @@ impl Slip {
             self.high = self.step
         }
         let mut next = self.step + residual / (stiffness + self.weight * by_j.max(0.0));
-        if !(next >= self.low && next <= self.high) {
-            next = 0.5 * (self.low + self.high);
+        if self.low < 0.0 && next <= 0.0 {
+            next = 0.0;
+        } else if !(next >= self.low && next <= self.high) {
+            next = 0.5 * (self.low.max(0.0) + self.high);
         }
         let change = (next - self.step).abs();
         self.step = next;
-        change
+        if change <= CONVERGED * next { Stand::Arrived } else { Stand::UnderWay }
     }
 }
 
-/// The nodes of a chunk that still slip, gathered at the front.
+/// The nodes of a chunk that are still under way, gathered at the front.
 struct Slipping {
     count: usize,
-    doubles: usize,
     nodes: [Slip; CHUNK],
-    change: [f64; CHUNK],
     pressure: [f64; CHUNK],
     slip: [f64; CHUNK],
     y: [f64; CHUNK],
@@ -78,90 +105,75 @@ struct Slipping {
     kept: [f64; CHUNK * MOST_LAW_STATE],
 }
 
-impl Default for Slipping {
-    fn default() -> Self {
+impl Slipping {
+    fn new(law: &ShearLaw, nodes: &Sheared) -> Self {
         let zero = [0.0; CHUNK];
-        Self {
-            count: 0,
-            doubles: 0,
+        let mut all = Self {
+            count: nodes.pressure.len(),
             nodes: [Slip::default(); CHUNK],
-            change: zero,
             pressure: zero,
             slip: zero,
             y: zero,
             by_p: zero,
             by_j: zero,
             kept: [0.0; CHUNK * MOST_LAW_STATE],
+        };
+        for (k, (state, slide)) in nodes.states.iter().zip(nodes.slide).enumerate() {
+            all.nodes[k] = Slip::start(k, law, state, *slide);
+            all.slip[k] = all.nodes[k].slip();
         }
-    }
-}
-
-impl Slipping {
-    fn add(&mut self, node: Slip, pressure: f64, kept: &[f64], [y, by_j]: [f64; 2]) {
-        let at = self.count;
-        self.count += 1;
-        self.doubles = kept.len();
-        self.nodes[at] = node;
-        (self.pressure[at], self.y[at], self.by_j[at]) = (pressure, y, by_j);
-        self.kept[at * kept.len()..(at + 1) * kept.len()].copy_from_slice(kept);
+        all.pressure[..all.count].copy_from_slice(nodes.pressure);
+        all.kept[..nodes.kept.len()].copy_from_slice(nodes.kept);
+        all
     }
 
-    /// A Newton step of every node, kept inside its bracket.
-    fn newton(&mut self, stiffness: f64) {
-        for at in 0..self.count {
-            self.change[at] = self.nodes[at].newton(stiffness, self.y[at], self.by_j[at]);
-            self.slip[at] = self.nodes[at].slip();
-        }
-    }
-
-    fn take_converged(&mut self, mut take: impl FnMut(&Slip, f64, f64)) {
+    /// A Newton step of every node; those that have ended are given away.
+    fn newton(&mut self, doubles: usize, stiffness: f64, mut take: impl FnMut(&Slip, Stand, [f64; 2])) {
         let mut left = 0;
         for at in 0..self.count {
-            if self.change[at] <= CONVERGED * self.nodes[at].step {
-                take(&self.nodes[at], self.by_p[at], self.by_j[at]);
+            let stand = self.nodes[at].newton(stiffness, self.y[at], self.by_j[at]);
+            if stand != Stand::UnderWay {
+                take(&self.nodes[at], stand, [self.by_p[at], self.by_j[at]]);
                 continue;
             }
+            self.slip[left] = self.nodes[at].slip();
             if left < at {
                 self.nodes[left] = self.nodes[at];
-                (self.pressure[left], self.y[left], self.by_j[left]) =
-                    (self.pressure[at], self.y[at], self.by_j[at]);
-                let d = self.doubles;
-                self.kept.copy_within(at * d..(at + 1) * d, left * d);
+                self.pressure[left] = self.pressure[at];
+                self.kept.copy_within(at * doubles..(at + 1) * doubles, left * doubles);
             }
             left += 1;
         }
         self.count = left;
     }
-
-    fn take_all(&mut self, mut take: impl FnMut(&Slip, f64, f64)) {
-        (0..self.count).for_each(|at| take(&self.nodes[at], self.by_p[at], self.by_j[at]));
-        self.count = 0;
-    }
 }
 
 impl ShearLaw {
     /// The same by an expression or a module, for one node.
-    pub(crate) fn respond_by(&self, state: &ShearState, kept: &[f64], p: f64, u: [f64; 2]) -> ShearResponse {
-        let length = (u[0] * u[0] + u[1] * u[1]).sqrt();
-        let at = |slip| self.own(p, slip, kept).unwrap_or_default();
-        let (mut y, mut by) = at(state.slip);
-        if self.stiffness * length <= y * ON_YIELD {
-            return self.elastic(u, state.slip);
-        }
-        let weight = self.weight(u, length);
-        let mut node =
-            Slip { k: 0, u, length, weight, low: 0.0, high: length, step: 0.0, before: state.slip };
+    pub(crate) fn respond_by(
+        &self,
+        state: &ShearState,
+        kept: &[f64],
+        p: f64,
+        slide: [f64; 2],
+    ) -> ShearResponse {
+        let mut node = Slip::start(0, self, state, slide);
+        let mut by = [0.0; 2];
         for _ in 0..STEPS {
-            let change = node.newton(self.stiffness, y, by[1]);
-            (y, by) = at(node.slip());
-            if change <= CONVERGED * node.step {
-                break;
+            let y;
+            (y, by) = self.own(p, node.slip(), kept).unwrap_or_default();
+            match node.newton(self.stiffness, y, by[1]) {
+                Stand::UnderWay => {}
+                stand => return self.ended(&node, stand, by),
             }
         }
-        self.slipped(&node, by[0], by[1])
+        self.ended(&node, Stand::Arrived, by)
     }
 
-    fn slipped(&self, node: &Slip, by_p: f64, by_j: f64) -> ShearResponse {
+    fn ended(&self, node: &Slip, stand: Stand, [by_p, by_j]: [f64; 2]) -> ShearResponse {
+        if stand == Stand::Elastic {
+            return self.elastic(node.u, node.before);
+        }
         let hardening = node.weight * by_j.max(0.0);
         self.plastic(node.u, node.length, &Plastic { step: node.step, slip: node.slip(), hardening, by_p })
     }
@@ -186,34 +198,23 @@ impl ShearLaw {
 
     fn respond_chunk(&self, nodes: &Sheared, out: &mut [ShearResponse]) {
         let doubles = nodes.kept.len() / nodes.pressure.len().max(1);
-        let mut slipping = Slipping::default();
-        let mut slip = [0.0; CHUNK];
-        slip.iter_mut().zip(nodes.states).for_each(|(slip, state)| *slip = state.slip);
-        let [mut y, mut by_p, mut by_j] = [[0.0; CHUNK]; 3];
-        let n = nodes.pressure.len();
-        self.strengths(nodes.pressure, &slip[..n], nodes.kept, [&mut y[..n], &mut by_p[..n], &mut by_j[..n]]);
-        for (k, (state, slide)) in nodes.states.iter().zip(nodes.slide).enumerate() {
-            let u = [state.elastic[0] + slide[0], state.elastic[1] + slide[1]];
-            let length = (u[0] * u[0] + u[1] * u[1]).sqrt();
-            if self.stiffness * length <= y[k] * ON_YIELD {
-                out[k] = self.elastic(u, state.slip);
-            } else {
-                let kept = &nodes.kept[k * doubles..(k + 1) * doubles];
-                let weight = self.weight(u, length);
-                let node =
-                    Slip { k, u, length, weight, low: 0.0, high: length, step: 0.0, before: state.slip };
-                slipping.add(node, nodes.pressure[k], kept, [y[k], by_j[k]]);
-            }
-        }
-        for _ in 0..STEPS {
-            if slipping.count == 0 {
+        let mut slipping = Slipping::new(self, nodes);
+        for round in 0..=STEPS {
+            let n = slipping.count;
+            if n == 0 {
                 return;
             }
-            slipping.newton(self.stiffness);
-            self.strengths_of(&mut slipping);
-            slipping.take_converged(|node, by_p, by_j| out[node.k] = self.slipped(node, by_p, by_j));
+            let Slipping { slip, pressure, y, by_p, by_j, kept, .. } = &mut slipping;
+            let answer = [&mut y[..n], &mut by_p[..n], &mut by_j[..n]];
+            self.strengths(&pressure[..n], &slip[..n], &kept[..n * doubles], answer);
+            let mut take = |node: &Slip, stand, by| out[node.k] = self.ended(node, stand, by);
+            slipping.newton(doubles, self.stiffness, &mut take);
+            if round == STEPS {
+                for at in 0..slipping.count {
+                    take(&slipping.nodes[at], Stand::Arrived, [slipping.by_p[at], slipping.by_j[at]]);
+                }
+            }
         }
-        slipping.take_all(|node, by_p, by_j| out[node.k] = self.slipped(node, by_p, by_j));
     }
 
     /// [`ShearLaw::yield_stress_kept`] of nodes of an expression or a module, many at once.
@@ -243,12 +244,5 @@ impl ShearLaw {
                 (y[k], [by_p[k], by_j[k]]) = (value, d);
             }
         }
-    }
-
-    fn strengths_of(&self, slipping: &mut Slipping) {
-        let n = slipping.count;
-        let Slipping { slip, pressure, y, by_p, by_j, kept, doubles, .. } = slipping;
-        let out = [&mut y[..n], &mut by_p[..n], &mut by_j[..n]];
-        self.strengths(&pressure[..n], &slip[..n], &kept[..n * *doubles], out);
     }
 }

@@ -32,8 +32,9 @@ pub struct Segment {
     luck: Cell<i32>,
 }
 
-/// How long the host looks for an answer before it sleeps: waking a processor that sleeps takes longer.
-const LOOK: Duration = Duration::from_micros(20);
+/// How long either side looks for the other before it sleeps. Longer than it takes to wake the other, so that two sides
+/// that both sleep come to look at each other again.
+const LOOK: Duration = Duration::from_micros(150);
 /// How many waits go without a look after looks in vain: a slow worker or a busy machine is not worth them.
 const PAUSE: i32 = 256;
 

@@ -180,7 +180,7 @@ impl Program {
                 all[..n].copy_from_slice(&x[range.clone()]);
                 all
             });
-            let mut lanes = Lanes { v: [0.0; CHUNK], d: [[0.0; CHUNK]; D] };
+            let mut lanes = Lanes { by: 0, v: [0.0; CHUNK], d: [[0.0; CHUNK]; D] };
             match self.registers {
                 0..=3 => self.chunk::<3, D>(n, &x, &mut lanes),
                 4..=6 => self.chunk::<6, D>(n, &x, &mut lanes),
@@ -195,90 +195,145 @@ impl Program {
     }
 
     fn chunk<const R: usize, const D: usize>(&self, n: usize, x: &[[f64; CHUNK]; D], out: &mut Lanes<D>) {
-        let mut registers = [Lanes { v: [0.0; CHUNK], d: [[0.0; CHUNK]; D] }; R];
+        let mut registers = [Lanes { by: 0, v: [0.0; CHUNK], d: [[0.0; CHUNK]; D] }; R];
         let mut last = 0;
         for (step, to) in self.steps() {
             last = *to as usize;
             if last < R {
-                registers[last] = step.lanes(n, x, &registers);
+                step.lanes(n, x, &mut registers, last);
             }
         }
         *out = registers[last];
+        for i in 0..D {
+            if !out.is_by(i) {
+                out.d[i] = [0.0; CHUNK];
+            }
+        }
     }
 }
 
 /// A value with its derivatives by D variables at [`CHUNK`] places.
 #[derive(Clone, Copy)]
 struct Lanes<const D: usize> {
+    /// Bit i: it depends on variable i; where it does not the derivative is not written.
+    by: u8,
     v: [f64; CHUNK],
     d: [[f64; CHUNK]; D],
 }
 
 impl<const D: usize> Lanes<D> {
-    /// f of one operand, which answers value and slope; places from n on are left out.
     #[inline(always)]
-    fn one(&self, n: usize, f: impl Fn(f64) -> (f64, f64)) -> Self {
-        let (mut v, mut slope) = ([0.0; CHUNK], [0.0; CHUNK]);
-        for l in 0..n {
-            (v[l], slope[l]) = f(self.v[l]);
-        }
-        Self { v, d: self.d.map(|d| std::array::from_fn(|l| d[l] * slope[l])) }
+    fn is_by(&self, i: usize) -> bool {
+        self.by & (1 << i) != 0
     }
 
-    /// a·x + b.
+    /// f of one operand, which answers value and slope; places from n on are left out.
     #[inline(always)]
-    fn affine(&self, a: f64, b: f64) -> Self {
-        Self { v: self.v.map(|v| a * v + b), d: self.d.map(|d| d.map(|d| a * d)) }
+    fn one(&mut self, a: &Self, n: usize, f: impl Fn(f64) -> (f64, f64)) {
+        let mut slope = [0.0; CHUNK];
+        for l in 0..n {
+            (self.v[l], slope[l]) = f(a.v[l]);
+        }
+        self.by = a.by;
+        for i in (0..D).filter(|i| a.is_by(*i)) {
+            (0..CHUNK).for_each(|l| self.d[i][l] = a.d[i][l] * slope[l]);
+        }
+    }
+
+    /// p·x + q.
+    #[inline(always)]
+    fn affine(&mut self, a: &Self, p: f64, q: f64) {
+        (0..CHUNK).for_each(|l| self.v[l] = p * a.v[l] + q);
+        self.by = a.by;
+        for i in (0..D).filter(|i| a.is_by(*i)) {
+            (0..CHUNK).for_each(|l| self.d[i][l] = p * a.d[i][l]);
+        }
     }
 
     /// f of two operands, which answers value and slopes.
     #[inline(always)]
-    fn two(&self, other: &Self, n: usize, f: impl Fn(f64, f64) -> (f64, f64, f64)) -> Self {
-        let (mut v, mut by_a, mut by_b) = ([0.0; CHUNK], [0.0; CHUNK], [0.0; CHUNK]);
+    fn two(&mut self, [a, b]: [&Self; 2], n: usize, f: impl Fn(f64, f64) -> (f64, f64, f64)) {
+        let (mut by_a, mut by_b) = ([0.0; CHUNK], [0.0; CHUNK]);
         for l in 0..n {
-            (v[l], by_a[l], by_b[l]) = f(self.v[l], other.v[l]);
+            (self.v[l], by_a[l], by_b[l]) = f(a.v[l], b.v[l]);
         }
-        let d = std::array::from_fn(|i| {
-            std::array::from_fn(|l| by_a[l] * self.d[i][l] + by_b[l] * other.d[i][l])
-        });
-        Self { v, d }
+        self.by = a.by | b.by;
+        for i in 0..D {
+            let d = &mut self.d[i];
+            match (a.is_by(i), b.is_by(i)) {
+                (true, true) => (0..CHUNK).for_each(|l| d[l] = by_a[l] * a.d[i][l] + by_b[l] * b.d[i][l]),
+                (true, false) => (0..CHUNK).for_each(|l| d[l] = by_a[l] * a.d[i][l]),
+                (false, true) => (0..CHUNK).for_each(|l| d[l] = by_b[l] * b.d[i][l]),
+                (false, false) => {}
+            }
+        }
     }
 }
 
 impl Operation {
-    /// The operation over n places of a chunk.
+    /// The operation over n places of a chunk, into register `to`, which is none of its operands.
     #[inline(always)]
     fn lanes<const R: usize, const D: usize>(
         &self,
         n: usize,
         x: &[[f64; CHUNK]; D],
-        r: &[Lanes<D>; R],
-    ) -> Lanes<D> {
-        let at = |k: u8| &r[(k as usize).min(R - 1)];
+        r: &mut [Lanes<D>; R],
+        to: usize,
+    ) {
+        match (*self, self.operands().map(|k| k.map(|k| (k as usize).min(R - 1)))) {
+            (Self::Constant(c), _) => (r[to].by, r[to].v) = (0, [c; CHUNK]),
+            (Self::Variable(k), _) => {
+                let k = (k as usize).min(D - 1);
+                (r[to].by, r[to].v, r[to].d[k]) = (1 << k, x[k], [1.0; CHUNK]);
+            }
+            (_, [Some(a), None]) => {
+                if let Ok([a, out]) = r.get_disjoint_mut([a, to]) {
+                    self.of_one(n, a, out);
+                }
+            }
+            (_, [Some(a), Some(b)]) if a == b => {
+                if let Ok([a, out]) = r.get_disjoint_mut([a, to]) {
+                    self.of_two(n, [a, a], out);
+                }
+            }
+            (_, [Some(a), Some(b)]) => {
+                if let Ok([a, b, out]) = r.get_disjoint_mut([a, b, to]) {
+                    self.of_two(n, [a, b], out);
+                }
+            }
+            (_, [None, _]) => {}
+        }
+    }
+
+    #[inline(always)]
+    fn of_one<const D: usize>(&self, n: usize, a: &Lanes<D>, out: &mut Lanes<D>) {
         match *self {
-            Self::Constant(c) => Lanes { v: [c; CHUNK], d: [[0.0; CHUNK]; D] },
-            Self::Variable(k) => {
-                let one = |i: usize| if i == k as usize { 1.0 } else { 0.0 };
-                Lanes { v: x[(k as usize).min(D - 1)], d: std::array::from_fn(|i| [one(i); CHUNK]) }
-            }
-            Self::Add(a, b) => at(a).two(at(b), CHUNK, |p, q| (p + q, 1.0, 1.0)),
-            Self::AddConstant(a, c) => at(a).affine(1.0, c),
-            Self::Sub(a, b) => at(a).two(at(b), CHUNK, |p, q| (p - q, 1.0, -1.0)),
-            Self::Mul(a, b) => at(a).two(at(b), CHUNK, |p, q| (p * q, q, p)),
-            Self::Scale(a, c) => at(a).affine(c, 0.0),
-            Self::Div(a, b) => at(a).two(at(b), CHUNK, |p, q| (p / q, 1.0 / q, -p / (q * q))),
-            Self::Power(a, c) => at(a).one(n, |p| power(p, c)),
-            Self::PowerOf(a, b) => at(a).two(at(b), n, power_of),
-            Self::Min(a, b) => {
-                at(a).two(at(b), CHUNK, |p, q| if p <= q { (p, 1.0, 0.0) } else { (q, 0.0, 1.0) })
-            }
-            Self::Max(a, b) => {
-                at(a).two(at(b), CHUNK, |p, q| if p >= q { (p, 1.0, 0.0) } else { (q, 0.0, 1.0) })
-            }
-            Self::Function(f, a) => at(a).one(n, |p| {
+            Self::AddConstant(_, c) => out.affine(a, 1.0, c),
+            Self::Scale(_, c) => out.affine(a, c, 0.0),
+            Self::Power(_, c) => out.one(a, n, |p| power(p, c)),
+            Self::Function(f, _) => out.one(a, n, |p| {
                 let value = f.value(p);
                 (value, f.slope(p, value))
             }),
+            _ => {}
+        }
+    }
+
+    #[inline(always)]
+    fn of_two<const D: usize>(&self, n: usize, of: [&Lanes<D>; 2], out: &mut Lanes<D>) {
+        match *self {
+            Self::Add(..) => out.two(of, CHUNK, |p, q| (p + q, 1.0, 1.0)),
+            Self::Sub(..) => out.two(of, CHUNK, |p, q| (p - q, 1.0, -1.0)),
+            Self::Mul(..) => out.two(of, CHUNK, |p, q| (p * q, q, p)),
+            Self::Div(..) => out.two(of, CHUNK, |p, q| (p / q, 1.0 / q, -p / (q * q))),
+            Self::PowerOf(..) => out.two(of, n, power_of),
+            Self::Min(..) => {
+                out.two(of, CHUNK, |p, q| if p <= q { (p, 1.0, 0.0) } else { (q, 0.0, 1.0) });
+            }
+            Self::Max(..) => {
+                out.two(of, CHUNK, |p, q| if p >= q { (p, 1.0, 0.0) } else { (q, 0.0, 1.0) });
+            }
+            _ => {}
         }
     }
 }

@@ -162,10 +162,11 @@ fn press(law: &PressureLaw) {
 
 /// Stress of nodes that slide a little further, as the soils ask for it.
 fn slide(law: &ShearLaw) {
-    let states: [ShearState; NODES] =
-        std::array::from_fn(|k| ShearState { elastic: [1e-6, 0.0], slip: 1e-4 * k as f64 });
-    let mobilised = states.map(|state| law.mobilised(state.slip));
     let pressure: [f64; NODES] = std::array::from_fn(|k| 4000.0 + 10.0 * k as f64);
+    let untouched = ShearState::default();
+    let states: [ShearState; NODES] =
+        std::array::from_fn(|k| law.respond(&untouched, pressure[k], [1e-4 * (k + 1) as f64, 0.0]).state);
+    let mobilised = states.map(|state| law.mobilised(state.slip));
     let slide = [[2e-4, 1e-5]; NODES];
     let mut out = [ShearResponse::default(); NODES];
     for _ in 0..ROUNDS {

@@ -184,21 +184,19 @@ def test_modules_lists_it_without_running_it(tmp_path):
     assert (tmp_path / "ran").exists()
 
 
-def test_the_soil_of_the_page_passes(tmp_path):
-    place, commands = made(tmp_path, "soil", "python")
-    source = place / "my_soil.py"
-    text = source.read_text()
-    blocks = re.findall(r"```python\n(    def .*?)```", PAGE.read_text(), re.S)
-    assert len(blocks) == 2
-    for old, new in zip(blocks[0].rstrip().split("\n\n"), blocks[1].rstrip().split("\n\n")):
-        assert text.count(old) == 1, old
-        text = text.replace(old, new)
-    source.write_text(text)
-    process = terraglue("check-module", place, "--only", "jacobian-soil", "--only", "force-and-motion", "--only", "passive")
-    assert process.returncode == 0, process.stdout
-    source.write_text(text.replace("1.2 * self.k * z ** 0.2 if", "self.k * z ** 0.2 if"))
-    process = terraglue("check-module", place, "--only", "jacobian-soil")
-    assert process.returncode == 1 and "fail     jacobian-soil" in process.stdout
+@pytest.mark.parametrize("test, line, told", [
+    ("same-again", "self.state['x'] = float(hash('leg') % 1000)", "the same bytes"),
+    ("steps", "os._exit(3)", "it ended by itself with exit code 3"),
+    ("steps", "os.kill(os.getpid(), 11)", "it was ended by signal 11 (segmentation fault)"),
+    ("steps", "1 / 0", "ZeroDivisionError"),
+    ("two-instances", "tg.made = getattr(tg, 'made', 0) + 1; self.state['x'] = float(tg.made)", None)])
+def test_workers_of_the_checker_are_copies_that_behave_as_if_they_were_started(tmp_path, test, line, told):
+    before = left_behind()
+    source = controller(tmp_path, [line]).with_name("mine.py")
+    process = terraglue("check-module", source, "--only", test)
+    assert process.returncode == (0 if told is None else 1), process.stdout
+    assert told is None or told in flat(process.stdout), process.stdout
+    assert left_behind() == before and not list(pathlib.Path(tempfile.gettempdir()).glob("terraglue-nursery-*"))
 
 
 def test_the_controller_of_the_page_runs(tmp_path):

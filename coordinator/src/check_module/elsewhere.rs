@@ -75,7 +75,8 @@ pub fn elsewhere(lab: &Lab, errand: &Errand, environment: &[(&str, &str)]) -> Ve
     if let Some(state) = &errand.state {
         command.arg("--state").arg(state);
     }
-    command.envs(environment.iter().copied());
+    // In an interpreter of its own, which sees the environment from its start.
+    command.env_remove(crate::host::isolation::NURSERY).envs(environment.iter().copied());
     let done = command.stdin(Stdio::null()).output().map_err(|e| lost(e.to_string()))?;
     let text = std::fs::read_to_string(&result).unwrap_or_default();
     serde_json::from_str(&text).map_err(|_| {

@@ -5,6 +5,7 @@ use super::check_file::CheckFile;
 use super::finding::{Finding, Outcome};
 use super::report::{Report, Row};
 use super::{Level, unknown};
+use crate::host::isolation::Nursery;
 use serde::{Deserialize, Serialize};
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
@@ -69,7 +70,10 @@ pub fn check(module: &Path, options: &Options) -> Result<Report, String> {
         return Err(unknown(name, catalogue()));
     }
     let folder = tempfile::tempdir().map_err(|e| format!("no folder for results: {e}"))?;
-    let bench = Bench { module, options, folder: folder.path() };
+    let python = crate::host::is_python(module).then(|| crate::host::interpreter(None, Path::new(".")));
+    // Without it the workers are started one by one, and say what is wrong with the interpreter.
+    let nursery = python.and_then(|python| Nursery::open(&python).ok());
+    let bench = Bench { module, options, folder: folder.path(), nursery };
     let mut report = Report::new(module, options);
     // Which tests are for it is known only when it has been loaded, and that may end a process.
     let first = &catalogue()[0];
@@ -125,6 +129,8 @@ struct Bench<'a> {
     module: &'a Path,
     options: &'a Options,
     folder: &'a Path,
+    /// Where the workers of a module in Python come from.
+    nursery: Option<Nursery>,
 }
 
 /// A test that runs.
@@ -132,6 +138,30 @@ struct Running<'a> {
     test: &'a Test,
     process: Child,
     since: Instant,
+    looked: Instant,
+    /// Time in which this program could see it run: a machine that sleeps, or stops both, makes no test hang.
+    seen: Duration,
+}
+
+/// The longest time between two looks at a test that counts.
+const BLINK: Duration = Duration::from_millis(100);
+
+impl Running<'_> {
+    /// Time that it has had, s. On a busy machine it stands in line for a processor: that is not its own.
+    fn spent_s(&mut self, limit_s: f64) -> f64 {
+        let now = Instant::now();
+        self.seen += (now - self.looked).min(BLINK);
+        self.looked = now;
+        let seen = self.seen.as_secs_f64();
+        if seen < limit_s { seen } else { seen - self.in_line_s() }
+    }
+
+    /// How long the process stood in line for a processor, s; 0 where the system does not tell.
+    fn in_line_s(&self) -> f64 {
+        let text = std::fs::read_to_string(format!("/proc/{}/schedstat", self.process.id()));
+        let waited = text.ok().and_then(|t| t.split_whitespace().nth(1)?.parse::<f64>().ok());
+        1e-9 * waited.unwrap_or_default()
+    }
 }
 
 impl Bench<'_> {
@@ -202,13 +232,15 @@ impl Bench<'_> {
         command.arg("--result").arg(self.file(test, "json")).env_remove("TERRAGLUE_LOG");
         // Without the allocator's caches per thread, what is freed counts as free.
         command.env("GLIBC_TUNABLES", "glibc.malloc.tcache_count=0");
+        command.envs(self.nursery.as_ref().map(Nursery::variable));
         for (key, value) in &options.environment {
             command.env(key, value.replace("{test}", test.name));
         }
         command.stdin(std::process::Stdio::null()).stdout(file("out")?).stderr(file("err")?);
         let process =
             command.spawn().map_err(|e| format!("{} cannot be started: {e}", options.program.display()))?;
-        Ok(Running { test, process, since: Instant::now() })
+        let now = Instant::now();
+        Ok(Running { test, process, since: now, looked: now, seen: Duration::ZERO })
     }
 
     /// How a running test has ended; None: it still runs.
@@ -216,7 +248,7 @@ impl Bench<'_> {
         let state = running.process.try_wait().map_err(|e| format!("a test cannot be watched: {e}"))?;
         let Some(status) = state else {
             let limit_s = self.options.limit_s;
-            if running.since.elapsed().as_secs_f64() < limit_s {
+            if running.spent_s(limit_s) < limit_s {
                 return Ok(None);
             }
             // It may have ended meanwhile; then there is nothing to end.

@@ -8,6 +8,7 @@
 mod calls;
 mod channel;
 mod law;
+mod nursery;
 mod proxy;
 mod python;
 mod tiles;
@@ -16,16 +17,18 @@ mod worker;
 
 pub use channel::end_group;
 pub(super) use law::IsolatedLaw;
+pub use nursery::{NURSERY, Nursery};
 pub use python::SDK;
 pub use worker::serve;
 
 use super::{HostServices, Partings};
 use channel::Segment;
+use nursery::{Nursed, Process};
 use proxy::Isolated;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use std::process::{Child, Command, ExitStatus, Stdio};
+use std::process::{Command, ExitStatus, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
@@ -154,7 +157,7 @@ const PARTING: Duration = Duration::from_secs(2);
 /// A worker and the way to it.
 struct Link {
     segment: Segment,
-    child: Child,
+    child: Process,
     isolation: Isolation,
     host: Arc<dyn Host>,
     cancel: Arc<AtomicBool>,
@@ -173,6 +176,22 @@ impl Link {
         let segment = Segment::new().map_err(|e| failed("no shared memory", &e))?;
         let folder = tempfile::Builder::new().prefix("terraglue-worker-").tempdir();
         let folder = folder.map_err(|e| failed("no temporary folder", &e))?;
+        let (cancel, partings) = (services.cancel.clone(), services.partings.clone());
+        if let Some(nursed) = Nursed::take(what, folder.path(), &segment.path()) {
+            segment.never_look();
+            let child = Process::Nursed(nursed);
+            return Ok(Self {
+                segment,
+                child,
+                isolation,
+                host,
+                cancel,
+                partings,
+                gone: None,
+                is_python: true,
+                folder,
+            });
+        }
         let python = python::command(what, folder.path(), &segment.path());
         let python = python.map_err(|e| failed("no files for a worker", &e))?;
         let is_python = python.is_some();
@@ -191,7 +210,7 @@ impl Link {
             }
             _ => failed(&command.get_program().to_string_lossy(), &e),
         })?;
-        let (cancel, partings) = (services.cancel.clone(), services.partings.clone());
+        let child = Process::Own(child);
         Ok(Self { segment, child, isolation, host, cancel, partings, gone: None, is_python, folder })
     }
 
@@ -236,7 +255,7 @@ impl Link {
                 return Ok(length);
             }
             self.segment.cancel_flag().store(self.cancel.load(Ordering::Relaxed).into(), Ordering::Relaxed);
-            if let Ok(Some(status)) = self.child.try_wait() {
+            if let Some(status) = self.child.ended() {
                 // It may have answered and then ended.
                 return match self.segment.answer(Duration::ZERO) {
                     Some(length) => Ok(length),
@@ -257,8 +276,7 @@ impl Link {
     /// Ends the worker for good.
     #[cold]
     fn lose(&mut self, why: String) -> Error {
-        channel::end_group(self.child.id());
-        drop(self.child.wait());
+        self.child.end();
         let said = if self.is_python { python::last_words(self.folder.path()) } else { String::new() };
         let why = format!("its process was lost: {why}{said}");
         self.gone = Some(why.clone());
@@ -274,8 +292,7 @@ impl Drop for Link {
                 self.partings.put(format!("`{}` at its end: {error}", self.host.name()));
             }
         }
-        channel::end_group(self.child.id());
-        drop(self.child.wait());
+        self.child.end();
     }
 }
 

@@ -7,19 +7,20 @@ use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// What stands beside a worker, by file name: what modules derive from, what is read and written, the loop.
-const FILES: [(&str, &str); 3] = [
+/// What stands beside a worker, by file name: what modules derive from, what is read and written, the
+/// loop, and the interpreter that is copied.
+pub(super) const FILES: [(&str, &str); 4] = [
     ("terraglue.py", SDK),
     ("terraglue_wire.py", include_str!("../../../../interfaces/plugin/python/terraglue_wire.py")),
     ("terraglue_worker.py", include_str!("../../../../interfaces/plugin/python/terraglue_worker.py")),
+    ("terraglue_nursery.py", include_str!("../../../../interfaces/plugin/python/terraglue_nursery.py")),
 ];
 
 /// What a module in Python derives from.
 pub const SDK: &str = include_str!("../../../../interfaces/plugin/python/terraglue.py");
 
 /// Ahead of everything else on the path stand the files of this program; the working folder does not stand there.
-const RUN: &str = "import sys; sys.path[:] = [sys.argv[1]] + [p for p in sys.path if p]; \
-                   import terraglue_worker; terraglue_worker.serve(sys.argv[2])";
+pub(super) const TAKE_FILES: &str = "import sys; sys.path[:] = [sys.argv[1]] + [p for p in sys.path if p];";
 
 /// File with what the interpreter itself says: faults, and where a module hangs.
 const DIARY: &str = "stderr.txt";
@@ -31,8 +32,9 @@ pub fn command(what: &What, folder: &Path, segment: &str) -> io::Result<Option<C
         std::fs::write(folder.join(name), text)?;
     }
     let mut command = Command::new(python);
+    let run = format!("{TAKE_FILES} import terraglue_worker; terraglue_worker.serve(sys.argv[2])");
     // Compiled copies would be left beside the user's files.
-    command.arg("-B").args(["-c", RUN]).arg(folder).arg(segment);
+    command.arg("-B").args(["-c", &run]).arg(folder).arg(segment);
     command.stdin(Stdio::piped()).stderr(File::create(folder.join(DIARY))?);
     Ok(Some(command))
 }

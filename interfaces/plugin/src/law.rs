@@ -22,8 +22,10 @@ pub(crate) fn functions<L: LawModule>() -> TgNodeLaw {
     }
 }
 
-fn status(answer: std::thread::Result<Result>, h: f64, longest: &mut f64) -> TgStatus {
-    match answer {
+/// Calls a law in Rust; a panic is a status. `longest` is the step that it allows, before and after.
+#[inline]
+fn called(h: f64, longest: &mut f64, law: impl FnOnce(&mut f64) -> Result) -> TgStatus {
+    match catch_unwind(AssertUnwindSafe(|| law(longest))) {
         Ok(Ok(())) => TG_OK,
         Ok(Err(Error::Discard { .. })) => {
             // a law knows no time: half the step unless it has said how much
@@ -83,11 +85,11 @@ pub(crate) unsafe fn pressed(
             longest_s: answer.longest,
         };
         let parameters = slice(raw.parameters, raw.n_parameters);
-        let done = catch_unwind(AssertUnwindSafe(|| law(parameters, &nodes, &mut into)));
-        let mut longest = into.longest_s;
-        let done = status(done, raw.h, &mut longest);
-        answer.longest = longest;
-        done
+        called(raw.h, &mut answer.longest, |longest| {
+            let done = law(parameters, &nodes, &mut into);
+            *longest = into.longest_s;
+            done
+        })
     }
 }
 
@@ -122,11 +124,11 @@ pub(crate) unsafe fn sheared(
             longest_s: answer.longest,
         };
         let parameters = slice(raw.parameters, raw.n_parameters);
-        let done = catch_unwind(AssertUnwindSafe(|| law(parameters, &nodes, &mut into)));
-        let mut longest = into.longest_s;
-        let done = status(done, raw.h, &mut longest);
-        answer.longest = longest;
-        done
+        called(raw.h, &mut answer.longest, |longest| {
+            let done = law(parameters, &nodes, &mut into);
+            *longest = into.longest_s;
+            done
+        })
     }
 }
 

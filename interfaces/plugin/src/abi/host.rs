@@ -21,6 +21,7 @@ pub struct TgTerrain {
     /// Heights (m) of nodes (i0 ... i0 + ni - 1) x (j0 ... j0 + nj - 1), x fastest, into `out` (ni * nj
     /// values). Nodes outside repeat the nearest node of the edge. Answers 1 when all are equal, 0 when not,
     /// a negative status on failure.
+    /// When: in `instantiate`. Thread: any.
     pub heights: Option<
         unsafe extern "C" fn(
             ctx: *mut c_void,
@@ -49,12 +50,15 @@ pub struct TgHost {
     /// First argument of the functions below.
     pub ctx: *mut c_void,
     /// A line for the run's log; level is TG_LOG_ERROR ... TG_LOG_DEBUG.
+    /// When: from `instantiate` to `free`. Thread: any.
     pub log: Option<unsafe extern "C" fn(ctx: *mut c_void, level: i32, text: *const c_char)>,
     /// Runs job(arg, 0) ... job(arg, n - 1), possibly on several threads; returns when all are done. Results
     /// must not depend on the order. A job must not throw or unwind. No module makes threads of its own.
+    /// When: in a call of the instance. Thread: that of the call, or of a job.
     pub parallel_for:
         Option<unsafe extern "C" fn(ctx: *mut c_void, n: usize, job: TgJob, arg: *mut c_void) -> TgStatus>,
     /// 1: the user asked to stop; long calls look at it.
+    /// When: from `instantiate` to `free`. Thread: any.
     pub cancelled: Option<unsafe extern "C" fn(ctx: *mut c_void) -> i32>,
     /// Seed for everything random in this instance.
     pub seed: u64,

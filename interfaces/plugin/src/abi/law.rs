@@ -89,9 +89,11 @@ pub struct TgNodeLaw {
     /// Doubles per node that the soil keeps for the law; at most 16.
     pub state_doubles: u32,
     /// Pressure and slope of all nodes; null: the soil's own pressure law acts.
+    /// When: at any time. Thread: any, several at once.
     pub pressure:
         Option<unsafe extern "C" fn(nodes: *const TgPressureNodes, out: *mut TgPressureAnswer) -> TgStatus>,
     /// Yield stress of all nodes; null: the soil's own shear law acts.
+    /// When: at any time. Thread: any, several at once.
     pub shear: Option<unsafe extern "C" fn(nodes: *const TgShearNodes, out: *mut TgShearAnswer) -> TgStatus>,
 }
 

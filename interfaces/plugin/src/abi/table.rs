@@ -26,10 +26,12 @@ pub struct TgSubsystem {
     /// JSON: {"name", "kind": "soil"|"robot"|"controller"|"law", "help", "parameters": [{"name", "type":
     /// "number"|"integer"|"bool"|"text"|"path"|"numbers"|"number-table", "unit", "help", "default", "optional",
     /// "min", "max", "above_min", "choices"}]}. Constant; null on failure.
+    /// When: at any time. Thread: any thread, several at once.
     pub schema: Option<unsafe extern "C" fn() -> *const c_char>,
     /// Makes an instance. `config` is a JSON object with a value for every parameter of the schema that the
     /// scenario sets or that has a default. May allocate, read files below host->folder and read the terrain.
     /// On failure *instance stays null and last_error(NULL) says why.
+    /// When: at any time. Thread: any thread, several at once.
     pub instantiate: Option<
         unsafe extern "C" fn(
             host: *const TgHost,
@@ -38,10 +40,13 @@ pub struct TgSubsystem {
         ) -> TgStatus,
     >,
     /// Ends an instance.
+    /// When: once, last. Thread: that of the instance.
     pub free: Option<unsafe extern "C" fn(instance: *mut c_void)>,
     /// Bits TG_CAN_...: what this instance can do.
+    /// When: at any time after `instantiate`. Thread: that of the instance.
     pub capabilities: Option<unsafe extern "C" fn(instance: *mut c_void) -> u32>,
     /// Paper, steps 3 and 4. A trial from the committed state; without ports, a plain step.
+    /// When: in a step, after `set_ports`, any number of times. Thread: that of the instance.
     pub advance: Option<
         unsafe extern "C" fn(
             instance: *mut c_void,
@@ -52,6 +57,7 @@ pub struct TgSubsystem {
     >,
     /// Why the last call failed; UTF-8, valid until the next call of the instance. NULL: why `instantiate`
     /// or `schema` failed on this thread.
+    /// When: directly after a call that failed. Thread: that of this call.
     pub last_error: Option<unsafe extern "C" fn(instance: *mut c_void) -> *const c_char>,
 
     /// Required up to here; below, null means: not offered.
@@ -59,6 +65,7 @@ pub struct TgSubsystem {
     /// Paper, step 1. The ports of this step (grounds are asked first). Answers with the committed X, V and,
     /// for a soil, t = the wrench of its law at that X. A ground may narrow `laws` (mu = tan phi, t_max), one
     /// per port; a ground's x along n is its own surface x2 under the body.
+    /// When: in a step, before its trials; again when the step is repeated. Thread: that of the instance.
     pub set_ports: Option<
         unsafe extern "C" fn(
             instance: *mut c_void,
@@ -69,6 +76,7 @@ pub struct TgSubsystem {
     >,
     /// Paper, step 2. If the other side of every contact were rigid and stood at `partner` at t + h: which
     /// wrenches? Solved, not applied.
+    /// When: in a step, after `set_ports`, any number of times. Thread: that of the instance.
     pub estimate_forces: Option<
         unsafe extern "C" fn(
             instance: *mut c_void,
@@ -78,6 +86,7 @@ pub struct TgSubsystem {
         ) -> TgStatus,
     >,
     /// Paper, step 3. Given the estimate: out->t = T1, out->x = own surface under it. A trial.
+    /// When: in a step, after `set_ports`, any number of times. Thread: that of the instance.
     pub solve_compatibility: Option<
         unsafe extern "C" fn(
             instance: *mut c_void,
@@ -90,6 +99,7 @@ pub struct TgSubsystem {
     /// After TG_MOTION: d(wrench on itself)/dX (TG_POSITION) or /dV (TG_VELOCITY), sign as for a spring.
     /// After TG_FORCE with x and v: column n of a port is dX_n/dT_n and dT_t/dT_n, columns t and m as after
     /// TG_MOTION.
+    /// When: directly after a trial. Thread: that of the instance.
     pub interface_jacobian: Option<
         unsafe extern "C" fn(
             instance: *mut c_void,
@@ -99,6 +109,7 @@ pub struct TgSubsystem {
         ) -> TgStatus,
     >,
     /// Paper, step 5. The last trial is accepted under t; the other side has moved to `partner`.
+    /// When: once per step, after its trials. Thread: that of the instance.
     pub commit: Option<
         unsafe extern "C" fn(
             instance: *mut c_void,
@@ -108,23 +119,32 @@ pub struct TgSubsystem {
         ) -> TgStatus,
     >,
     /// The committed state, exactly, into slot 0 ... host->slots - 1.
+    /// When: between steps. Thread: that of the instance.
     pub save_state: Option<unsafe extern "C" fn(instance: *mut c_void, slot: u32) -> TgStatus>,
     /// Back to the state of a slot.
+    /// When: between steps. Thread: that of the instance.
     pub restore_state: Option<unsafe extern "C" fn(instance: *mut c_void, slot: u32) -> TgStatus>,
     /// The committed state as bytes with a version; they stay valid until the next call of the instance.
+    /// When: between steps. Thread: that of the instance.
     pub serialize: Option<unsafe extern "C" fn(instance: *mut c_void, out: *mut TgBytes) -> TgStatus>,
     /// Back to a state made by `serialize`.
+    /// When: between steps. Thread: that of the instance.
     pub deserialize: Option<unsafe extern "C" fn(instance: *mut c_void, bytes: TgBytes) -> TgStatus>,
     /// All variables in ascending order of id, and their number; valid and constant until `free`.
+    /// When: at any time after `instantiate`. Thread: that of the instance.
     pub variables:
         Option<unsafe extern "C" fn(instance: *mut c_void, first: *mut *const TgVariable) -> usize>,
     /// Committed values.
+    /// When: at any time. Thread: that of the instance.
     pub get: Option<unsafe extern "C" fn(instance: *mut c_void, values: *const TgValues) -> TgStatus>,
     /// New values, effective from the next step on.
+    /// When: between steps. Thread: that of the instance.
     pub set: Option<unsafe extern "C" fn(instance: *mut c_void, values: *const TgValues) -> TgStatus>,
     /// All actions, and their number; valid and constant until `free`.
+    /// When: at any time after `instantiate`. Thread: that of the instance.
     pub actions: Option<unsafe extern "C" fn(instance: *mut c_void, first: *mut *const TgAction) -> usize>,
     /// Does an action; `arguments` is a JSON object.
+    /// When: between steps. Thread: that of the instance.
     pub act: Option<
         unsafe extern "C" fn(
             instance: *mut c_void,
@@ -133,15 +153,20 @@ pub struct TgSubsystem {
         ) -> TgStatus,
     >,
     /// Time of the next event known beforehand, s; inf: none.
+    /// When: between steps. Thread: that of the instance.
     pub next_event_time: Option<unsafe extern "C" fn(instance: *mut c_void) -> f64>,
     /// Bodies and shapes; valid and constant until `free`.
+    /// When: at any time after `instantiate`. Thread: that of the instance.
     pub scene: Option<unsafe extern "C" fn(instance: *mut c_void, out: *mut TgScene) -> TgStatus>,
     /// Committed states of the scene's n bodies, in its order.
+    /// When: at any time. Thread: that of the instance.
     pub body_states:
         Option<unsafe extern "C" fn(instance: *mut c_void, n: usize, out: *mut TgBodyState) -> TgStatus>,
     /// All fields, and their number; valid and constant until `free`.
+    /// When: at any time after `instantiate`. Thread: that of the instance.
     pub fields: Option<unsafe extern "C" fn(instance: *mut c_void, first: *mut *const TgField) -> usize>,
     /// Tile (a, b) of a field: nodes (a * tile_edge ..., b * tile_edge ...).
+    /// When: at any time. Thread: that of the instance.
     pub field_tile: Option<
         unsafe extern "C" fn(
             instance: *mut c_void,
@@ -152,6 +177,7 @@ pub struct TgSubsystem {
         ) -> TgStatus,
     >,
     /// Energies of the committed state.
+    /// When: at any time. Thread: that of the instance.
     pub energy: Option<unsafe extern "C" fn(instance: *mut c_void, out: *mut TgEnergy) -> TgStatus>,
 
     /// Null: kept for the layout of ABI 2.0; see `law`.

@@ -142,6 +142,11 @@ impl Instance {
         self.error(function, text)
     }
 
+    /// Whether it failed for good.
+    pub fn has_failed(&self) -> bool {
+        self.dead.get()
+    }
+
     /// Whether it may still be called.
     #[inline]
     fn alive(&self, function: &'static str) -> Result {

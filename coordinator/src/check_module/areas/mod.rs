@@ -1,5 +1,6 @@
 //! The tests, one file per area.
 
+mod call_order;
 mod host_untouched;
 mod law;
 mod library;
@@ -18,9 +19,10 @@ use super::catalogue::Test;
 pub use host_untouched::OUTPUT;
 
 /// The lists of all areas, in the order in which they build on each other.
-pub const ALL: [fn() -> Vec<Test>; 13] = [
+pub const ALL: [fn() -> Vec<Test>; 14] = [
     library::tests,
     life_cycle::tests,
+    call_order::tests,
     host_untouched::tests,
     values::tests,
     state::tests,

@@ -173,7 +173,7 @@ fn own(context: &Context, out: &mut Vec<Figure>) -> Outcome {
 }
 
 /// The tests that draw numbers; all others do the same under every seed.
-const DRAWN: [&str; 4] = ["passive", "slots", "serialize-garbage", "law-cycles"];
+const DRAWN: [&str; 5] = ["any-order", "passive", "slots", "serialize-garbage", "law-cycles"];
 
 /// A new module, built; its file. Rust and Python where there is time.
 fn fresh(context: &Context, kind: Kind, language: Language, file: &str) -> Outcome<PathBuf> {

@@ -46,7 +46,7 @@ fn at_most_eight_files_and_nothing_left_to_fill_in() {
                 }
             }
             let readme = &made.files.iter().find(|(path, _)| path == "README.md").expect("a page").1;
-            assert!((15..=22).contains(&readme.lines().count()), "{}", readme.lines().count());
+            assert!((15..=20).contains(&readme.lines().count()), "{}", readme.lines().count());
         }
     }
 }

@@ -82,3 +82,24 @@ def test_a_law_that_is_a_module_is_fitted_within_its_ranges(tmp_path, language):
     assert process.returncode == 0 and (tmp_path / "run" / "report.html").exists(), process.stderr
     process = terraglue("fit-soil", PLATES, "--law", "beker")
     assert process.returncode == 2 and "beker" in process.stderr
+
+
+def test_rows_of_the_soil_table_reach_a_law_that_is_a_module_and_its_run_is_drawn(tmp_path):
+    place, _ = made(tmp_path, "law", "c")
+    subprocess.run(["make"], cwd=place, check=True, capture_output=True)
+    shown = terraglue("soils", "lunar_nominal_Apollo").stdout
+    assert 'in a scenario: parameters = "lunar_nominal_Apollo"' in shown
+    sets = [word for name, value in (("soil.parameters", "lunar_nominal_Apollo"),
+                                     ("soil.law.plugin", place / "libmy_law_plugin.so"),
+                                     ("soil.law.parameters.z_1", "1e6")) for word in ("--set", f"{name}={value}")]
+    deepest = {}
+    for name, more in (("module", sets), ("built-in", sets[:2])):
+        out = tmp_path / name
+        process = terraglue("run", ROOT / "scenarios" / "plate_sinkage.toml", "--quiet", "--csv", "--out", out, *more)
+        assert process.returncode == 0, process.stderr
+        rows = list(csv.DictReader((out / "variables.csv").open()))
+        deepest[name] = max(float(row["soil.max_sinkage"]) for row in rows)
+        page = (out / "report.html").read_text()
+        assert "<svg" in page and "soil" in page
+    # With z_1 far below every foot the law is Bekker's, with the numbers of the row.
+    assert deepest["module"] == pytest.approx(deepest["built-in"], rel=1e-5) and deepest["module"] > 1e-3

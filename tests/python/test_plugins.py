@@ -118,19 +118,52 @@ def test_the_page_of_a_folder_that_exists_is_left_alone(tmp_path):
     shutil.rmtree(tmp_path / "my-controller")
 
 
-def test_the_power_law_of_the_page_passes_and_its_mistake_is_found(tmp_path):
-    place, commands = made(tmp_path, "soil", "c")
-    page = (ROOT / "docs" / "plugins" / "new-module.md").read_text()
-    blocks = re.findall(r"```c\n(.*?)```", page, re.S)
-    source = place / "my_soil.c"
-    text = source.read_text()
-    for old, new in zip(*[re.findall(r"static double \w+\(.*?\n}\n", block, re.S) for block in blocks[:2]]):
+LANGUAGES = {"rust": ("In Rust", "src/lib.rs"), "c": ("In C:", "my_{}.c"), "cpp": ("In C++", "my_{}.cpp"),
+             "python": ("In Python", "my_{}.py")}
+# The tests that each tutorial speaks of.
+SPOKEN = {"soil": ["jacobian-soil", "jacobian-force", "force-and-motion", "passive", "cycles-dissipate"],
+          "robot": ["falls", "no-gravity", "force-moves", "jacobian-robot", "estimate-holds", "velocity", "described"],
+          "controller": ["time-not-calls", "bounded", "bounded-power", "described", "same-again"]}
+
+
+def changed(text, page, heading):
+    """The text after the changes of a page: lines with - become the lines with + that follow."""
+    steps = re.search(rf"^{re.escape(heading)}.*?```diff\n(.*?)```", page, re.S | re.M).group(1)
+    for old, new in re.findall(r"((?:^-.*\n)+)((?:^\+.*\n)+)", steps, re.M):
+        old, new = (re.sub(r"^.", "", part, flags=re.M) for part in (old, new))
         assert text.count(old) == 1, old
         text = text.replace(old, new)
-    source.write_text(text)
-    subprocess.run(["make"], cwd=place, check=True, capture_output=True)
-    process = terraglue("check-module", place)
+    return text
+
+
+@pytest.mark.parametrize("kind", SPOKEN)
+@pytest.mark.parametrize("language", LANGUAGES)
+def test_the_tutorial_of_a_kind_passes_in_every_language(tmp_path, rust_target, kind, language):
+    page = (ROOT / "docs" / "plugins" / f"{kind}.md").read_text()
+    place, commands = made(tmp_path, kind, language)
+    heading, file = LANGUAGES[language]
+    source = place / file.format(kind)
+    source.write_text(changed(source.read_text(), page, heading))
+    (place / "target").symlink_to(rust_target)
+    subprocess.run(commands[0], shell=True, cwd=place, check=True, capture_output=True)
+    module = place / commands[-1].split()[-1]
+    only = [word for test in SPOKEN[kind] for word in ("--only", test)]
+    process = terraglue("check-module", module, *only)
+    off = re.search(r"```toml\n(.*?)```", page, re.S)
+    if off is not None:
+        expected = set(re.findall(r"^(\S+) =", off.group(1), re.M))
+        assert set(re.findall(r"^ +fail +(\S+)", process.stdout, re.M)) == expected, process.stdout
+        module.with_suffix(".check.toml").write_text(off.group(1))
+        process = terraglue("check-module", module, *only)
     assert process.returncode == 0, process.stdout
+
+
+def test_a_mistake_in_the_tutorial_is_found(tmp_path):
+    page = (ROOT / "docs" / "plugins" / "soil.md").read_text()
+    place, commands = made(tmp_path, "soil", "c")
+    source = place / "my_soil.c"
+    text = changed(source.read_text(), page, "In C:")
+    assert text.count("1.2 * s->k * pow(z, 0.2)") == 1
     source.write_text(text.replace("1.2 * s->k * pow(z, 0.2)", "s->k * pow(z, 0.2)"))
     subprocess.run(["make"], cwd=place, check=True, capture_output=True)
     process = terraglue("check-module", place)
@@ -149,11 +182,42 @@ def test_modules_are_listed_without_running_them(tmp_path):
     process = terraglue("modules", "--module-path", place, "--module-path", other, cwd=tmp_path)
     assert process.returncode == 0, process.stderr
     told = " ".join(process.stdout.replace("│", " ").replace("┆", " ").split())
-    assert "my-soil" in told and "hidden by" in told and "cut off after 900 bytes" in told.replace("- ", "-")
+    assert "my-soil" in told and "soil" in told and "hidden by" in told and "cut off after 900 bytes" in told.replace("- ", "-")
+    process = terraglue("modules", "my-soil", "--module-path", place)
+    assert process.returncode == 0, process.stderr
+    assert "my-soil (soil)" in process.stdout and "ABI: 2." in process.stdout
+    assert "can: force, motion, derivatives, retry, state, serialize" in process.stdout
+    assert "its parameters cannot be asked for: it was ended by signal 6" in process.stdout
     process = terraglue("modules", "soil-bekkr")
     assert process.returncode == 2 and "did you mean" in process.stderr and "soil-bekker" in process.stderr
     process = terraglue("modules", "soil-bekker")
     assert process.returncode == 0 and "elastic_stiffness_pa_m" in process.stdout
+    assert "licence: MIT OR Apache-2.0" in process.stdout and "max_sinkage" in process.stdout
+
+
+@pytest.mark.parametrize("kind, language", [("controller", "c"), ("robot", "cpp"), ("law", "rust"), ("controller", "python")])
+def test_a_description_that_is_wrong_or_missing_is_told(tmp_path, rust_target, kind, language):
+    place, commands = made(tmp_path, kind, language)
+    (place / "target").symlink_to(rust_target)
+    source = place / LANGUAGES[language][1].format(kind)
+    text = source.read_text()
+    wrong = {"controller": ("time_constant", "time_constants"), "robot": ("force estimate", "force"), "law": ("SHEAR", "SHEAR")}
+    test = "law-described" if kind == "law" else "described"
+
+    def told(text):
+        source.write_text(text)
+        subprocess.run(commands[0], shell=True, cwd=place, check=True, capture_output=True)
+        return terraglue("check-module", place / commands[-1].split()[-1], "--only", test).stdout
+
+    assert f"pass     {test}" in told(text)
+    if language == "rust":
+        return
+    old, new = wrong[kind]
+    line = next(part for part in text.split("\n") if old in part and ("TG_" in part or "parameter f64" in part))
+    assert f"fail     {test}" in told(text.replace(line, line.replace(old, new), 1))
+    if language == "c":
+        bare = re.sub(r'(TG_DESCRIBE\("my-controller", "1.0.0").*?\);', r"\1);", text, count=1, flags=re.S)
+        assert "warning  described" in told(bare) and "variable=set_point input f64 rad" in told(bare)
 
 
 def test_the_last_check_is_shown_by_the_bytes_of_the_file(tmp_path, monkeypatch):

@@ -50,6 +50,9 @@ pub enum Command {
         /// Print JSON instead of a table.
         #[arg(long)]
         json: bool,
+        /// Load it here and show its parameters only.
+        #[arg(long, hide = true)]
+        asked: bool,
     },
     /// List the variables and actions of a scenario's subsystems.
     Variables(ScenarioArguments),

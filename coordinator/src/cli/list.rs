@@ -7,9 +7,9 @@ use super::{Exit, show};
 use std::path::{Path, PathBuf};
 use terraglue::Result;
 use terraglue::check_module::{LastCheck, last_check};
-use terraglue::host::{AvailableModule, Library, SearchPath, available_modules, listed_modules};
+use terraglue::host::{AvailableModule, Library, SearchPath, available_modules, described, listed_modules};
 use terraglue::scenario::{InputError, Scenario, allowed_values};
-use terraglue::subsystem::{Causality, Effect, Kind, Schema, ValueType, Variable};
+use terraglue::subsystem::{Causality, Effect, Schema, ValueType, Variable};
 use terraglue::testbed::Options;
 
 /// Every variable and action of the scenario's subsystems.
@@ -70,25 +70,27 @@ fn range(v: &Variable) -> String {
     }
 }
 
-/// The modules on the search path.
-pub fn modules(name: Option<&str>, module_path: &[PathBuf], json: bool) -> Result<Exit> {
+/// The modules on the search path. `asked` loads them to ask for their parameters, in this process.
+pub fn modules(name: Option<&str>, module_path: &[PathBuf], json: bool, asked: bool) -> Result<Exit> {
     let search = SearchPath::standard(module_path, Path::new("."));
     if name.is_none() && !json {
         return Ok(listing(&search));
     }
+    if let (Some(name), false, false) = (name, json, asked) {
+        return shown(name, &search, module_path);
+    }
     let mut found = available_modules(&search);
     found.retain(|m| name.is_none_or(|n| n == m.name));
     if let (Some(name), true) = (name, found.is_empty()) {
-        // Says every folder that was searched, and the nearest name.
-        let unknown = Library::new().find(name, &search, Path::new("."));
-        let told = unknown.err().map_or_else(|| format!("no module `{name}`"), |e| e.to_string());
-        return Err(InputError::plain(told, None).into());
+        return Err(unknown(name, &search));
     }
     if json {
         let describe = |m: &AvailableModule| match &m.schema {
             Ok(schema) => {
                 let check = last_check(&m.path);
-                serde_json::json!({ "name": m.name, "path": m.path, "schema": schema, "last_check": check })
+                let section = described(&m.path);
+                serde_json::json!({ "name": m.name, "path": m.path, "schema": schema, "description": section,
+                    "last_check": check })
             }
             Err(e) => serde_json::json!({ "name": m.name, "path": m.path, "error": e.to_string() }),
         };
@@ -98,15 +100,76 @@ pub fn modules(name: Option<&str>, module_path: &[PathBuf], json: bool) -> Resul
     for module in &found {
         match &module.schema {
             Err(e) => outln!("{}: cannot be used: {e}\n", module.name),
-            Ok(schema) => describe(module, schema),
+            Ok(schema) => describe(schema),
         }
     }
     Ok(Exit::Done)
 }
 
+/// Says every folder that was searched, and the nearest name.
+fn unknown(name: &str, search: &SearchPath) -> terraglue::Error {
+    let unknown = Library::new().find(name, search, Path::new("."));
+    let told = unknown.err().map_or_else(|| format!("no module `{name}`"), |e| e.to_string());
+    InputError::plain(told, None).into()
+}
+
+/// What the section of one module says, in this process; what only its code knows, its parameters, is asked for in
+/// another one.
+fn shown(name: &str, search: &SearchPath, module_path: &[PathBuf]) -> Result<Exit> {
+    let found = listed_modules(search);
+    let Some(m) = found.iter().find(|m| m.name == name && m.hidden_by.is_none()) else {
+        return Err(unknown(name, search));
+    };
+    let d = m.description.clone().unwrap_or_default();
+    let kind = if d.kind.is_empty() { "kind not told".into() } else { d.kind.clone() };
+    outln!("{name} ({kind})\n{}", m.path.display());
+    let facts = [("version", &d.version), ("ABI", &d.abi), ("licence", &d.license), ("authors", &d.authors)];
+    for (what, text) in facts.iter().filter(|(_, text)| !text.is_empty()) {
+        outln!("{what}: {text}");
+    }
+    match last_check(&m.path) {
+        None => outln!("not checked since it was built: terraglue check-module {}", m.path.display()),
+        Some(last) => outln!("last check: {}; {}", last.words(), told(&last)),
+    }
+    if let Some(can) = &d.can {
+        outln!("can: {}", can.join(", "));
+    }
+    if !d.variables.is_empty() {
+        let mut table = show::table(&["variable", "role", "type", "unit"]);
+        for line in &d.variables {
+            let mut cells = line.splitn(4, ' ');
+            table.add_row([(); 4].map(|()| cells.next().unwrap_or_default().replace(" | ", " or ")));
+        }
+        outln!("{table}");
+    }
+    if let Some(why) = &m.refused {
+        outln!("cannot be used: {why}");
+        return Ok(Exit::Done);
+    }
+    parameters(name, module_path);
+    Ok(Exit::Done)
+}
+
+/// Lets another process load a module and show what it takes; what becomes of that process is told.
+fn parameters(name: &str, module_path: &[PathBuf]) {
+    let mut command = std::process::Command::new("/proc/self/exe");
+    command.args(["modules", name, "--asked"]).stdin(std::process::Stdio::null());
+    for path in module_path {
+        command.arg("--module-path").arg(path);
+    }
+    match command.output() {
+        Ok(done) if done.status.success() => outln!("{}", String::from_utf8_lossy(&done.stdout).trim_end()),
+        Ok(done) => {
+            let how = terraglue::host::isolation::last_words(done.status);
+            outln!("its parameters cannot be asked for: {how}");
+        }
+        Err(e) => outln!("its parameters cannot be asked for: {e}"),
+    }
+}
+
 /// One line per file, from the section of the library: no code of it runs.
 fn listing(search: &SearchPath) -> Exit {
-    let mut table = show::table(&["module", "version", "ABI", "licence", "file", "last check", ""]);
+    let mut table = show::table(&["module", "kind", "version", "ABI", "licence", "file", "last check", ""]);
     let found = listed_modules(search);
     for m in &found {
         let described = m.description.clone().unwrap_or_default();
@@ -119,7 +182,8 @@ fn listing(search: &SearchPath) -> Exit {
         let file = m.path.display().to_string();
         let check = last_check(&m.path).map_or_else(|| "–".to_owned(), |last| last.words());
         let name = m.name.clone();
-        table.add_row([name, described.version, described.abi, described.license, file, check, note]);
+        let d = described;
+        table.add_row([name, d.kind, d.version, d.abi, d.license, file, check, note]);
     }
     if found.is_empty() {
         outln!("no module found; see --module-path");
@@ -134,18 +198,8 @@ fn told(last: &LastCheck) -> String {
     format!("{} (seed {}, terraglue {})", last.summary, last.seed, last.version)
 }
 
-fn describe(module: &AvailableModule, schema: &Schema) {
-    let kind = match schema.kind {
-        Kind::Soil => "soil",
-        Kind::Robot => "robot",
-        Kind::Controller => "controller",
-        Kind::Law => "law",
-    };
-    outln!("{} ({kind}): {}\n{}", schema.name, schema.help, module.path.display());
-    match last_check(&module.path) {
-        None => outln!("not checked since it was built: terraglue check-module {}", module.path.display()),
-        Some(last) => outln!("last check: {}; {}", last.words(), told(&last)),
-    }
+fn describe(schema: &Schema) {
+    outln!("{}", schema.help);
     let mut table = show::table(&["parameter", "takes", "default", "help"]);
     for p in &schema.parameters {
         let default = match (&p.default, p.optional) {

@@ -66,7 +66,9 @@ pub fn main() -> ExitCode {
         Command::Report { folder } => report::report(&folder),
         Command::Check(arguments) => check::check(&arguments),
         Command::CheckModule(arguments) => check_module::check_module(&arguments),
-        Command::Modules { name, module_path, json } => list::modules(name.as_deref(), &module_path, json),
+        Command::Modules { name, module_path, json, asked } => {
+            list::modules(name.as_deref(), &module_path, json, asked)
+        }
         Command::Variables(arguments) => list::variables(&arguments),
         Command::Fmu(command) => fmu::fmu(&command),
         Command::Export(arguments) => export::export(&arguments),

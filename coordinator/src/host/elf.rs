@@ -1,22 +1,5 @@
-//! Reads the section `.terraglue` of a shared library without running it: 64-bit little-endian ELF, as on the
+//! Reads sections and symbols of a shared library without running it: 64-bit little-endian ELF, as on the
 //! platforms that are supported (x86-64, aarch64).
-
-use std::path::Path;
-
-/// What a module says about itself in its section.
-#[derive(Clone, Debug, Default, PartialEq, Eq)]
-pub struct Description {
-    /// Name of its package.
-    pub name: String,
-    /// Version of its package.
-    pub version: String,
-    /// MAJOR.MINOR of the ABI that it was built for.
-    pub abi: String,
-    /// Licence; empty: not told.
-    pub license: String,
-    /// Authors, separated by `:`; empty: not told.
-    pub authors: String,
-}
 
 /// Whether the bytes are an ELF file at all.
 pub(super) fn is_elf(bytes: &[u8]) -> bool {
@@ -42,44 +25,6 @@ pub(super) fn needed_length(bytes: &[u8]) -> Option<usize> {
         end = end.max(offset.checked_add(size)?);
     }
     Some(end)
-}
-
-impl Description {
-    /// From a file; None: unreadable, no such section, or not of our form.
-    pub fn read(path: &Path) -> Option<Self> {
-        Self::of(&std::fs::read(path).ok()?)
-    }
-
-    /// From the bytes of a library.
-    pub(super) fn of(bytes: &[u8]) -> Option<Self> {
-        let section = section(bytes, terraglue_plugin::SECTION)?;
-        Self::parse(str::from_utf8(section.split(|b| *b == 0).next()?).ok()?)
-    }
-
-    /// From its text.
-    pub fn parse(text: &str) -> Option<Self> {
-        let mut lines = text.lines();
-        if lines.next() != Some("terraglue module") {
-            return None;
-        }
-        let mut out = Self::default();
-        for (key, value) in lines.filter_map(|l| l.split_once('=')) {
-            match key {
-                "name" => out.name = value.into(),
-                "version" => out.version = value.into(),
-                "abi" => out.abi = value.into(),
-                "license" => out.license = value.into(),
-                "authors" => out.authors = value.into(),
-                _ => {}
-            }
-        }
-        Some(out)
-    }
-
-    /// The major version of the ABI.
-    pub(super) fn abi_major(&self) -> Option<u32> {
-        self.abi.split('.').next()?.parse().ok()
-    }
 }
 
 /// Where the tables of a file lie. Offsets after the ELF-64 specification, file header.
@@ -118,7 +63,7 @@ impl Header {
 }
 
 /// Bytes of a section by name. Offsets after the ELF-64 specification, section header.
-fn section<'a>(bytes: &'a [u8], name: &str) -> Option<&'a [u8]> {
+pub(super) fn section<'a>(bytes: &'a [u8], name: &str) -> Option<&'a [u8]> {
     let header = Header::of(bytes)?;
     let content = |at: usize| {
         let (offset, size) =
@@ -191,9 +136,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn files_that_are_cut_or_no_library_have_no_description() {
-        assert_eq!(Description::of(b""), None);
-        assert_eq!(Description::of(b"#!/bin/sh\n"), None);
+    fn files_that_are_cut_have_no_sections() {
         let own = std::fs::read(std::env::current_exe().expect("own path")).expect("own file");
         assert!(section(&own, ".text").is_some_and(|s| !s.is_empty()));
         assert_eq!(section(&own, ".terraglue"), None);

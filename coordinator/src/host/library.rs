@@ -1,7 +1,8 @@
 //! Modules from shared libraries and modules linked into the program.
 #![allow(unsafe_code)] // Loading a library runs its constructors and calls its entry.
 
-use super::elf::{Description, foreign_machine, is_elf, needed_length};
+use super::description::Description;
+use super::elf::{foreign_machine, is_elf, needed_length};
 use super::error::LoadError;
 use super::isolation::{self, Isolation, What};
 use super::law::{self, LawHost};

@@ -6,6 +6,7 @@
 
 mod allocations;
 mod check;
+mod description;
 mod elf;
 mod error;
 pub mod exit_guard;
@@ -23,7 +24,8 @@ mod tests;
 mod workers;
 
 pub use allocations::AllocationCounter;
-pub use elf::{Description, exported_symbols};
+pub use description::Description;
+pub use elf::exported_symbols;
 pub use error::LoadError;
 pub use instance::{Instance, Progress, Reply};
 pub use isolation::Isolation;

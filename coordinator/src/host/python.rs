@@ -1,10 +1,11 @@
 //! Modules in Python: one file that says in its docstring what it is, so that nothing of it runs to be listed or checked.
 //!
 //! From the line `[module]` on the docstring is TOML. `[module]` gives `name`, `kind`, and as far as wanted `help` (else the
-//! first line of the docstring), `version`, `license`, `authors`; `[parameters]` gives a table per parameter with the
-//! keys of [`Parameter`], the type `number` where none is named.
+//! first line of the docstring), `version`, `license`, `authors`, `can` (what an instance can do, in words); `[parameters]`
+//! gives a table per parameter with the keys of [`Parameter`], the type `number` where none is named; `[variables]` gives
+//! each the text `ROLE TYPE UNIT`.
 
-use super::elf::Description;
+use super::description::Description;
 use super::error::LoadError;
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
@@ -79,11 +80,14 @@ fn parse(text: &str) -> Result<PythonFile, String> {
     }
     let document: toml_edit::DocumentMut =
         block.parse().map_err(|e| format!("its block from `[module]` on is no TOML: {e}"))?;
-    if let Some((key, _)) = document.iter().find(|(key, _)| !["module", "parameters"].contains(key)) {
-        return Err(format!("its block has a table `{key}`; there are [module] and [parameters]"));
+    const TABLES: [&str; 3] = ["module", "parameters", "variables"];
+    if let Some((key, _)) = document.iter().find(|(key, _)| !TABLES.contains(key)) {
+        return Err(format!(
+            "its block has a table `{key}`; there are [module], [parameters] and [variables]"
+        ));
     }
     let about = table(document.get("module"))?;
-    const KEYS: [&str; 6] = ["name", "kind", "help", "version", "license", "authors"];
+    const KEYS: [&str; 7] = ["name", "kind", "help", "version", "license", "authors", "can"];
     known(&about, &KEYS, "[module]")?;
     let word = |key: &str| about.get(key).and_then(Value::as_str).unwrap_or_default().to_owned();
     let first = before.lines().map(str::trim).find(|l| !l.is_empty()).unwrap_or_default();
@@ -97,11 +101,19 @@ fn parse(text: &str) -> Result<PythonFile, String> {
     }
     let parameters = table(document.get("parameters"))?;
     let parameters = parameters.iter().map(|(name, p)| parameter(name, p)).collect::<Result<_, _>>()?;
+    let variables = table(document.get("variables"))?.into_iter().map(|(name, what)| match what {
+        Value::String(what) => Ok(format!("{name} {what}").trim_end().to_owned()),
+        _ => Err(format!("[variables] {name} is no text, e.g. \"{name}\" = \"output f64 N m\"")),
+    });
+    let can = about.contains_key("can").then(|| word("can").split_whitespace().map(Into::into).collect());
     let schema = Schema { name: word("name"), kind, help, parameters };
     let description = Description {
         name: word("name"),
         version: word("version"),
         abi: "Python".into(),
+        kind: word("kind"),
+        can,
+        variables: variables.collect::<Result<_, _>>()?,
         license: word("license"),
         authors: word("authors"),
     };
@@ -151,7 +163,8 @@ mod tests {
     use super::*;
 
     const FILE: &str = "#!/usr/bin/env python3\n# A soil.\n\"\"\"Ground that yields.\n\nMore.\n\n[module]\nname = \"my-soil\"\n\
-        kind = \"soil\"\nversion = \"1.2\"\n\n[parameters]\n\
+        kind = \"soil\"\nversion = \"1.2\"\ncan = \"force retry\"\n\n\
+        [variables]\ndepth = \"output f64 m\"\non = \"parameter bool\"\n\n[parameters]\n\
         k = { unit = \"N/m\", default = 2e4, min = 0.0, above_min = true, help = \"Stiffness\" }\n\
         law = { type = \"text\", default = \"a\", choices = [\"a\", \"b\"], help = \"Which\" }\n\"\"\"\nraise SystemExit\n";
 
@@ -161,6 +174,8 @@ mod tests {
         assert_eq!((file.schema.name.as_str(), file.schema.kind), ("my-soil", Kind::Soil));
         assert_eq!(file.schema.help, "Ground that yields.");
         assert_eq!(file.description.version, "1.2");
+        assert_eq!((file.description.kind.as_str(), file.description.can.is_some()), ("soil", true));
+        assert_eq!(file.description.variables, ["depth output f64 m", "on parameter bool"]);
         let [k, law] = &file.schema.parameters[..] else { panic!("{:?}", file.schema.parameters) };
         assert_eq!((k.name.as_str(), k.default.as_f64(), k.above_min), ("k", Some(2e4), true));
         assert_eq!(law.choices, ["a", "b"]);
@@ -178,6 +193,7 @@ mod tests {
             ("default = 2e4", "default = ", "no TOML"),
             ("\"N/m\"", "\"\\\\N\"", "backslash"),
             ("[parameters]", "[parameter]", "table `parameter`"),
+            ("\"output f64 m\"", "1.0", "[variables] depth is no text"),
         ];
         for (old, new, told) in cases {
             let error = parse(&FILE.replacen(old, new, 1)).expect_err(new);

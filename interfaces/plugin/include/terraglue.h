@@ -8,8 +8,9 @@
  *
  * LIFE OF AN INSTANCE. instantiate makes it from parameters that the host has checked against the schema. It
  * may allocate, read files below host->folder and read the terrain; no later call does, except when a count
- * exceeds every earlier one. Calls for one instance come from one thread at a time, not always the same. Every
- * pointer is borrowed for the call, unless its comment says more. No exception leaves a function.
+ * exceeds every earlier one. Calls for one instance come from one thread at a time, not always the same: "that of
+ * the instance" below; calls for other instances may come at the same time. Every pointer is borrowed for the
+ * call, unless its comment says more. No exception leaves a function.
  *
  * LIFE OF A STEP [t, t + h]. Inputs are set; set_ports; any number of trials (estimate_forces,
  * solve_compatibility, advance, each with interface_jacobian after it), each from the committed state at t, in
@@ -600,9 +601,11 @@ typedef struct {
     uint32_t size;
     /* Doubles per node that the soil keeps for the law; at most 16. */
     uint32_t state_doubles;
-    /* Pressure and slope of all nodes; null: the soil's own pressure law acts. */
+    /* Pressure and slope of all nodes; null: the soil's own pressure law acts.
+     * When: at any time. Thread: any, several at once. */
     tg_status (*pressure)(const tg_pressure_nodes *nodes, tg_pressure_answer *out);
-    /* Yield stress of all nodes; null: the soil's own shear law acts. */
+    /* Yield stress of all nodes; null: the soil's own shear law acts.
+     * When: at any time. Thread: any, several at once. */
     tg_status (*shear)(const tg_shear_nodes *nodes, tg_shear_answer *out);
 } tg_node_law;
 
@@ -633,7 +636,8 @@ typedef struct {
     void *ctx;
     /* Heights (m) of nodes (i0 ... i0 + ni - 1) x (j0 ... j0 + nj - 1), x fastest, into `out` (ni * nj
      * values). Nodes outside repeat the nearest node of the edge. Answers 1 when all are equal, 0 when not,
-     * a negative status on failure. */
+     * a negative status on failure.
+     * When: in `instantiate`. Thread: any. */
     tg_status (*heights)(void *ctx, int64_t i0, int64_t j0, size_t ni, size_t nj, double *out);
 } tg_terrain;
 
@@ -650,12 +654,15 @@ typedef struct {
     uint32_t slots;
     /* First argument of the functions below. */
     void *ctx;
-    /* A line for the run's log; level is TG_LOG_ERROR ... TG_LOG_DEBUG. */
+    /* A line for the run's log; level is TG_LOG_ERROR ... TG_LOG_DEBUG.
+     * When: from `instantiate` to `free`. Thread: any. */
     void (*log)(void *ctx, int32_t level, const char *text);
     /* Runs job(arg, 0) ... job(arg, n - 1), possibly on several threads; returns when all are done. Results
-     * must not depend on the order. A job must not throw or unwind. No module makes threads of its own. */
+     * must not depend on the order. A job must not throw or unwind. No module makes threads of its own.
+     * When: in a call of the instance. Thread: that of the call, or of a job. */
     tg_status (*parallel_for)(void *ctx, size_t n, tg_job job, void *arg);
-    /* 1: the user asked to stop; long calls look at it. */
+    /* 1: the user asked to stop; long calls look at it.
+     * When: from `instantiate` to `free`. Thread: any. */
     int32_t (*cancelled)(void *ctx);
     /* Seed for everything random in this instance. */
     uint64_t seed;
@@ -692,37 +699,46 @@ typedef struct {
     const char *description;
     /* JSON: {"name", "kind": "soil"|"robot"|"controller"|"law", "help", "parameters": [{"name", "type":
      * "number"|"integer"|"bool"|"text"|"path"|"numbers"|"number-table", "unit", "help", "default", "optional",
-     * "min", "max", "above_min", "choices"}]}. Constant; null on failure. */
+     * "min", "max", "above_min", "choices"}]}. Constant; null on failure.
+     * When: at any time. Thread: any thread, several at once. */
     const char *(*schema)(void);
     /* Makes an instance. `config` is a JSON object with a value for every parameter of the schema that the
      * scenario sets or that has a default. May allocate, read files below host->folder and read the terrain.
-     * On failure *instance stays null and last_error(NULL) says why. */
+     * On failure *instance stays null and last_error(NULL) says why.
+     * When: at any time. Thread: any thread, several at once. */
     tg_status (*instantiate)(const tg_host *host, const char *config, void **instance);
-    /* Ends an instance. */
+    /* Ends an instance.
+     * When: once, last. Thread: that of the instance. */
     void (*free)(void *instance);
-    /* Bits TG_CAN_...: what this instance can do. */
+    /* Bits TG_CAN_...: what this instance can do.
+     * When: at any time after `instantiate`. Thread: that of the instance. */
     uint32_t (*capabilities)(void *instance);
-    /* Paper, steps 3 and 4. A trial from the committed state; without ports, a plain step. */
+    /* Paper, steps 3 and 4. A trial from the committed state; without ports, a plain step.
+     * When: in a step, after `set_ports`, any number of times. Thread: that of the instance. */
     tg_status (*advance)(void *instance,
                          const tg_step *step,
                          const tg_input *input,
                          tg_response *out);
     /* Why the last call failed; UTF-8, valid until the next call of the instance. NULL: why `instantiate`
-     * or `schema` failed on this thread. */
+     * or `schema` failed on this thread.
+     * When: directly after a call that failed. Thread: that of this call. */
     const char *(*last_error)(void *instance);
     /* Required up to here; below, null means: not offered.
      *
      * Paper, step 1. The ports of this step (grounds are asked first). Answers with the committed X, V and,
      * for a soil, t = the wrench of its law at that X. A ground may narrow `laws` (mu = tan phi, t_max), one
-     * per port; a ground's x along n is its own surface x2 under the body. */
+     * per port; a ground's x along n is its own surface x2 under the body.
+     * When: in a step, before its trials; again when the step is repeated. Thread: that of the instance. */
     tg_status (*set_ports)(void *instance, const tg_step *step, tg_law *laws, tg_response *now);
     /* Paper, step 2. If the other side of every contact were rigid and stood at `partner` at t + h: which
-     * wrenches? Solved, not applied. */
+     * wrenches? Solved, not applied.
+     * When: in a step, after `set_ports`, any number of times. Thread: that of the instance. */
     tg_status (*estimate_forces)(void *instance,
                                  const tg_step *step,
                                  const tg_motion *partner,
                                  tg_estimate *out);
-    /* Paper, step 3. Given the estimate: out->t = T1, out->x = own surface under it. A trial. */
+    /* Paper, step 3. Given the estimate: out->t = T1, out->x = own surface under it. A trial.
+     * When: in a step, after `set_ports`, any number of times. Thread: that of the instance. */
     tg_status (*solve_compatibility)(void *instance,
                                      const tg_step *step,
                                      const tg_estimate *estimate,
@@ -730,42 +746,59 @@ typedef struct {
     /* Derivatives at the last trial, n x n, column-major. After TG_FORCE: dX/d(wrench on itself) at `level`.
      * After TG_MOTION: d(wrench on itself)/dX (TG_POSITION) or /dV (TG_VELOCITY), sign as for a spring.
      * After TG_FORCE with x and v: column n of a port is dX_n/dT_n and dT_t/dT_n, columns t and m as after
-     * TG_MOTION. */
+     * TG_MOTION.
+     * When: directly after a trial. Thread: that of the instance. */
     tg_status (*interface_jacobian)(void *instance, const tg_step *step, uint32_t level, double *out);
-    /* Paper, step 5. The last trial is accepted under t; the other side has moved to `partner`. */
+    /* Paper, step 5. The last trial is accepted under t; the other side has moved to `partner`.
+     * When: once per step, after its trials. Thread: that of the instance. */
     tg_status (*commit)(void *instance,
                         const tg_step *step,
                         const double *t,
                         const tg_motion *partner);
-    /* The committed state, exactly, into slot 0 ... host->slots - 1. */
+    /* The committed state, exactly, into slot 0 ... host->slots - 1.
+     * When: between steps. Thread: that of the instance. */
     tg_status (*save_state)(void *instance, uint32_t slot);
-    /* Back to the state of a slot. */
+    /* Back to the state of a slot.
+     * When: between steps. Thread: that of the instance. */
     tg_status (*restore_state)(void *instance, uint32_t slot);
-    /* The committed state as bytes with a version; they stay valid until the next call of the instance. */
+    /* The committed state as bytes with a version; they stay valid until the next call of the instance.
+     * When: between steps. Thread: that of the instance. */
     tg_status (*serialize)(void *instance, tg_bytes *out);
-    /* Back to a state made by `serialize`. */
+    /* Back to a state made by `serialize`.
+     * When: between steps. Thread: that of the instance. */
     tg_status (*deserialize)(void *instance, tg_bytes bytes);
-    /* All variables in ascending order of id, and their number; valid and constant until `free`. */
+    /* All variables in ascending order of id, and their number; valid and constant until `free`.
+     * When: at any time after `instantiate`. Thread: that of the instance. */
     size_t (*variables)(void *instance, const tg_variable **first);
-    /* Committed values. */
+    /* Committed values.
+     * When: at any time. Thread: that of the instance. */
     tg_status (*get)(void *instance, const tg_values *values);
-    /* New values, effective from the next step on. */
+    /* New values, effective from the next step on.
+     * When: between steps. Thread: that of the instance. */
     tg_status (*set)(void *instance, const tg_values *values);
-    /* All actions, and their number; valid and constant until `free`. */
+    /* All actions, and their number; valid and constant until `free`.
+     * When: at any time after `instantiate`. Thread: that of the instance. */
     size_t (*actions)(void *instance, const tg_action **first);
-    /* Does an action; `arguments` is a JSON object. */
+    /* Does an action; `arguments` is a JSON object.
+     * When: between steps. Thread: that of the instance. */
     tg_status (*act)(void *instance, const char *action, const char *arguments);
-    /* Time of the next event known beforehand, s; inf: none. */
+    /* Time of the next event known beforehand, s; inf: none.
+     * When: between steps. Thread: that of the instance. */
     double (*next_event_time)(void *instance);
-    /* Bodies and shapes; valid and constant until `free`. */
+    /* Bodies and shapes; valid and constant until `free`.
+     * When: at any time after `instantiate`. Thread: that of the instance. */
     tg_status (*scene)(void *instance, tg_scene *out);
-    /* Committed states of the scene's n bodies, in its order. */
+    /* Committed states of the scene's n bodies, in its order.
+     * When: at any time. Thread: that of the instance. */
     tg_status (*body_states)(void *instance, size_t n, tg_body_state *out);
-    /* All fields, and their number; valid and constant until `free`. */
+    /* All fields, and their number; valid and constant until `free`.
+     * When: at any time after `instantiate`. Thread: that of the instance. */
     size_t (*fields)(void *instance, const tg_field **first);
-    /* Tile (a, b) of a field: nodes (a * tile_edge ..., b * tile_edge ...). */
+    /* Tile (a, b) of a field: nodes (a * tile_edge ..., b * tile_edge ...).
+     * When: at any time. Thread: that of the instance. */
     tg_status (*field_tile)(void *instance, size_t field, uint32_t a, uint32_t b, tg_field_tile *out);
-    /* Energies of the committed state. */
+    /* Energies of the committed state.
+     * When: at any time. Thread: that of the instance. */
     tg_status (*energy)(void *instance, tg_energy *out);
     /* Null: kept for the layout of ABI 2.0; see `law`. */
     tg_status (*pressure)(void *instance,
@@ -793,13 +826,26 @@ typedef struct {
 } tg_subsystem;
 
 /* Describes the module in a section that can be read without running the library; once, at file scope:
- * TG_DESCRIBE("my-soil", "1.0.0"); the table takes the text as .description = tg_description. */
+ * TG_DESCRIBE("my-soil", "1.0.0", TG_IS("soil") TG_CAN("force motion retry") TG_BY("MIT", "A. Author"));
+ * the table takes the text as .description = tg_description. The lines after the version may be left out;
+ * `check-module` compares them with what an instance says, and tells which are missing. */
 #define TG_QUOTED(x) #x
 #define TG_VERSION_TEXT(major, minor) TG_QUOTED(major) "." TG_QUOTED(minor)
-#define TG_DESCRIBE(module_name, module_version)                                                    \
+#define TG_DESCRIBE(module_name, ...) TG_DESCRIBE_2(module_name, __VA_ARGS__, "", "")
+#define TG_DESCRIBE_2(module_name, module_version, lines, ...)                                      \
     __attribute__((section(".terraglue"), used)) static const char tg_description[] =               \
         "terraglue module\nname=" module_name "\nversion=" module_version                           \
-        "\nabi=" TG_VERSION_TEXT(TG_ABI_MAJOR, TG_ABI_MINOR) "\n"
+        "\nabi=" TG_VERSION_TEXT(TG_ABI_MAJOR, TG_ABI_MINOR) "\n" lines
+/* Kind: "soil", "robot", "controller" or "law". */
+#define TG_IS(kind) "kind=" kind "\n"
+/* The bits of `capabilities` as words: force motion impedance estimate solve derivatives retry state serialize
+ * subcycles feedthrough ramp fixed-step. Of a law: its functions, pressure shear. */
+#define TG_CAN(words) "can=" words "\n"
+/* A variable: its role is parameter, input, output or local, its type f64, f32, i8 ... u64, bool, string, binary or
+ * enumeration. A `*` in the name stands for what depends on parameters; units may have alternatives, "N m | N". */
+#define TG_HAS(name, role, type, unit) "variable=" name " " role " " type " " unit "\n"
+/* Licence and authors. */
+#define TG_BY(license, authors) "license=" license "\nauthors=" authors "\n"
 
 /* A number in the list of parameters of a schema; `value` is its default, in quotes. */
 #define TG_NUMBER(name, unit, value, help)                                                          \

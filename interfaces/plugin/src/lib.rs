@@ -14,6 +14,7 @@
 
 pub mod abi;
 mod convert;
+pub mod describe;
 mod export;
 mod foreign;
 mod hosted_law;
@@ -27,8 +28,9 @@ pub use law::TableLaw;
 /// Name of the one symbol that a module exports; its type is [`abi::TgEntry`].
 pub const ENTRY: &str = "terraglue_subsystem";
 
-/// Name of the section of the library that describes the module: lines `terraglue module`, `name=…`,
-/// `version=…`, `abi=MAJOR.MINOR`, closed by a zero byte. It can be read without running the library.
+/// Name of the section of the library that describes the module: lines `terraglue module`, `name=…`, `version=…`,
+/// `abi=MAJOR.MINOR`, `kind=…`, `can=…`, a `variable=NAME ROLE TYPE UNIT` for each, `license=…`, `authors=…`, closed by
+/// a zero byte. It can be read without running the library.
 pub const SECTION: &str = ".terraglue";
 
 /// A table that can be kept in a static.
@@ -50,11 +52,29 @@ macro_rules! abi_version {
 
 /// Exports a type that implements [`terraglue_subsystem::Module`] as the module of this dynamic library.
 ///
-/// The crate is a `cdylib` named `<module name>-plugin` and holds nothing else.
+/// The crate is a `cdylib` named `<module name>-plugin` and holds nothing else. After the type stands what the section of the
+/// library says: the kind, what an instance can do (the words of [`describe`]), and its variables, each as `NAME ROLE TYPE
+/// UNIT`. A `*` in a name stands for what depends on parameters, units may have alternatives: `*.torque output f64 N m | N`.
+/// `check-module` compares it with what an instance says.
+///
+/// ```ignore
+/// terraglue_plugin::export_subsystem! {
+///     MySoil,
+///     kind: "soil",
+///     can: "force motion derivatives retry state serialize",
+///     variables: ["sinkage output f64 m"],
+/// }
+/// ```
 #[macro_export]
 macro_rules! export_subsystem {
-    ($module:ty) => {
-        $crate::export_table!($crate::table::<$module>);
+    ($module:ty $(,)?) => {
+        $crate::export_table!($crate::table::<$module>, [""]);
+    };
+    ($module:ty, kind: $kind:literal, can: $can:literal $(, variables: [$($variable:literal),* $(,)?])? $(,)?) => {
+        $crate::export_table!(
+            $crate::table::<$module>,
+            [concat!("kind=", $kind, "\ncan=", $can, "\n" $($(, "variable=", $variable, "\n")*)?)]
+        );
     };
 }
 
@@ -62,15 +82,19 @@ macro_rules! export_subsystem {
 #[macro_export]
 macro_rules! export_law {
     ($law:ty) => {
-        $crate::export_table!($crate::law_table::<$law>);
+        $crate::export_table!(
+            $crate::law_table::<$law>,
+            ["kind=law\ncan=", $crate::describe::law_words::<$law>(), "\n"]
+        );
     };
 }
 
-/// The section, the entry and the refusal to be built without unwinding, for a function that makes the table.
+/// The section, the entry and the refusal to be built without unwinding, for a function that makes the table and more
+/// lines of the section.
 #[doc(hidden)]
 #[macro_export]
 macro_rules! export_table {
-    ($make:expr) => {
+    ($make:expr, [$($line:expr),*]) => {
         #[cfg(panic = "abort")]
         compile_error!(
             "[TG13] a module must be built with panic = \"unwind\": aborting would end the host; take panic = \"abort\" out of the profile"
@@ -81,24 +105,25 @@ macro_rules! export_table {
         // SAFETY: a section of our own name; nothing else reads or writes it.
         #[unsafe(link_section = ".terraglue")]
         #[used]
-        static TERRAGLUE_DESCRIPTION: [u8; TERRAGLUE_TEXT.len()] = {
-            let mut bytes = [0; TERRAGLUE_TEXT.len()];
-            bytes.copy_from_slice(TERRAGLUE_TEXT.as_bytes());
-            bytes
-        };
-        const TERRAGLUE_TEXT: &str = concat!(
-            "terraglue module\nname=",
-            env!("CARGO_PKG_NAME"),
-            "\nversion=",
-            env!("CARGO_PKG_VERSION"),
-            "\nabi=",
-            $crate::abi_version!(),
-            "\nlicense=",
-            env!("CARGO_PKG_LICENSE"),
-            "\nauthors=",
-            env!("CARGO_PKG_AUTHORS"),
-            "\n\0"
-        );
+        static TERRAGLUE_DESCRIPTION: [u8; $crate::describe::length(TERRAGLUE_LINES)] =
+            $crate::describe::joined(TERRAGLUE_LINES);
+        const TERRAGLUE_LINES: &[&str] = &[
+            concat!(
+                "terraglue module\nname=",
+                env!("CARGO_PKG_NAME"),
+                "\nversion=",
+                env!("CARGO_PKG_VERSION"),
+                "\nabi=",
+                $crate::abi_version!(),
+                "\nlicense=",
+                env!("CARGO_PKG_LICENSE"),
+                "\nauthors=",
+                env!("CARGO_PKG_AUTHORS"),
+                "\n"
+            ),
+            $($line,)*
+            "\0",
+        ];
 
         /// The entry that the host looks for.
         #[allow(unsafe_code)]

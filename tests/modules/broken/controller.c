@@ -1,7 +1,11 @@
 /* broken-controller: a way to a set-point, with a switch for every mistake that the checker must find. */
 #include "broken.h"
 
-TG_DESCRIBE("broken-controller", "1.0.0");
+TG_DESCRIBE("broken-controller", "1.0.0", TG_IS("controller") TG_CAN("force retry state")
+    TG_HAS("set_point", "input", "f64", "rad")
+    TG_HAS("angle_target", "output", "f64", "rad")
+    TG_HAS("speed_target", "output", "f64", "rad/s")
+    TG_HAS("time_constant", "parameter", "f64", "s"));
 typedef struct { double target, speed, set_point, time_constant; } state; /* rad, rad/s, rad, s */
 typedef struct {
     double limit;

@@ -3,7 +3,11 @@
 #include <math.h>
 #include "terraglue.h"
 
-TG_DESCRIBE("broken-law", "1.0.0");
+#if BROKEN_OTHER_FUNCTIONS
+TG_DESCRIBE("broken-law", "1.0.0", TG_IS("law") TG_CAN("pressure"));
+#else
+TG_DESCRIBE("broken-law", "1.0.0", TG_IS("law") TG_CAN("pressure shear"));
+#endif
 
 enum { N, K_PHI, C_PA, PHI, K_M };
 #define SCHEMA TG_LAW_SCHEMA("broken-law", "A power law with the shear of Janosi and Hanamoto", \

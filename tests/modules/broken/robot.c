@@ -1,7 +1,7 @@
 /* broken-robot: a falling ball, with a switch for every mistake that the checker must find. */
 #include "broken.h"
 
-TG_DESCRIBE("broken-robot", "1.0.0");
+TG_DESCRIBE("broken-robot", "1.0.0", TG_IS("robot") TG_CAN("force estimate derivatives retry state"));
 enum { X, Y, Z };
 typedef struct { double position[3], velocity[3], work; } state; /* world, m, m/s, J */
 typedef struct {

@@ -8,7 +8,19 @@
 #include "broken.h"
 
 #if !defined BROKEN_NO_SECTION
-TG_DESCRIBE("broken-soil", "1.0.0");
+#define SAYS(kind, words, unit) TG_DESCRIBE("broken-soil", "1.0.0", TG_IS(kind) TG_CAN(words) \
+    TG_HAS("stiffness", "parameter", "f64", unit) TG_HAS("mu", "parameter", "f64", "") \
+    TG_HAS("deepest", "output", "f64", "m") TG_HAS("work", "output", "f64", "J"))
+#define WORDS "force motion solve derivatives retry state serialize"
+#if BROKEN_OTHER_KIND
+SAYS("robot", WORDS, "N/m");
+#elif BROKEN_OTHER_WORDS
+SAYS("soil", WORDS " ramp", "N/m");
+#elif BROKEN_OTHER_UNIT
+SAYS("soil", WORDS, "N");
+#else
+SAYS("soil", WORDS, "N/m");
+#endif
 #else
 static const char *const tg_description = NULL;
 #endif
@@ -20,7 +32,7 @@ typedef struct { uint32_t magic, n_feet; foot feet[MAX_FEET]; double work, lost,
 typedef struct { double x[3], t[3], slope, trial; bool force, motion; } answer;
 typedef struct {
     double k, k_t, mu, limit, origin[2], spacing, *height, *surface;
-    uint32_t size[2], n_slots, of_port[MAX_FEET], trials, commits, ports_before;
+    uint32_t size[2], n_slots, of_port[MAX_FEET], trials, commits, ports_before, tried;
     state now, *slots;
     uint8_t bytes[sizeof(state)];
     answer last[MAX_FEET];
@@ -210,6 +222,7 @@ static void count_jobs(void *arg, size_t index) { ((double *)arg)[index % 64] +=
 static tg_status advance(void *self, const tg_step *st, const tg_input *in, tg_response *out) {
     soil *s = self;
     state *q = state_of(s);
+    s->tried = 1;
     if (in->kind == TG_IMPEDANCE) return TG_UNSUPPORTED;
     if (BROKEN(HANGS) && s->commits > 5) for (;;) usleep(1000);
     if (BROKEN(CRASHES) && s->commits > 5) *(volatile int *)8 = 1;
@@ -261,6 +274,7 @@ static tg_status solve_compatibility(void *self, const tg_step *st, const tg_est
 }
 static tg_status interface_jacobian(void *self, const tg_step *st, uint32_t level, double *out) {
     soil *s = self;
+    if (BROKEN(JACOBIAN_FIRST) && !s->tried && st->n_ports) abort();
     if (level > TG_VELOCITY) return TG_UNSUPPORTED;
     memset(out, 0, sizeof *out * st->n * st->n);
     for (uint32_t p = 0; p < st->n_ports && level == TG_POSITION; p++) {

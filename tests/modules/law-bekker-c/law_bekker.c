@@ -4,7 +4,7 @@
 #include <math.h>
 #include "terraglue.h"
 
-TG_DESCRIBE("law-bekker-c", "1.0.0");
+TG_DESCRIBE("law-bekker-c", "1.0.0", TG_IS("law") TG_CAN("pressure shear"));
 
 enum { N, K_C, K_PHI, C_PA, PHI, K_M, K_U };
 #define SCHEMA TG_LAW_SCHEMA("law-bekker-c", "Bekker's pressure and the shear of Janosi and Hanamoto, in C", \

@@ -4,6 +4,7 @@
 name = "law-bekker-python"
 kind = "law"
 version = "1.0.0"
+can = "pressure shear"
 
 [parameters]
 n = { default = 1.0, help = "exponent" }

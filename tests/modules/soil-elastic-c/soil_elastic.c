@@ -11,7 +11,7 @@
 #include <string.h>
 #include "terraglue.h"
 
-TG_DESCRIBE("soil-elastic", "1.0.0");
+TG_DESCRIBE("soil-elastic", "1.0.0", TG_IS("soil") TG_CAN("force motion derivatives retry state"));
 #define MAX_FEET 64
 
 typedef struct { uint64_t key; double tangential[3]; } foot; /* committed friction on the body, world, N */

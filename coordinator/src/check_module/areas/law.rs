@@ -1,10 +1,12 @@
 //! What a law of its own promises, straight from its functions: values, slopes, arrays, state. The tests of a soil come on
 //! top of these, with the law in the soil that comes with the program.
 
+use super::values::not_told;
 use crate::check_module::catalogue::{Area, Level, Test};
 use crate::check_module::finding::{Stop, Verdict};
 use crate::check_module::lab::Lab;
 use crate::check_module::rig::LawBench;
+use crate::host::described;
 use std::time::Instant;
 use terraglue_subsystem::Kind;
 
@@ -20,10 +22,17 @@ const fn test(
 
 /// The tests of this area.
 pub fn tests() -> Vec<Test> {
-    use Area::{LifeCycle, Numbers, Physics, Resources, State};
+    use Area::{Library, LifeCycle, Numbers, Physics, Resources, State};
     use Level::{Quick, Standard};
     vec![
         test("law-opens", LifeCycle, Quick, "its functions can be had with usual numbers", opens),
+        test(
+            "law-described",
+            Library,
+            Standard,
+            "its section names the functions that it has",
+            described_functions,
+        ),
         test(
             "law-answers",
             Numbers,
@@ -110,6 +119,20 @@ fn agrees(slope: f64, near: [f64; 2], tolerance: f64) -> bool {
 
 fn opens(lab: &Lab) -> Verdict {
     LawBench::open(lab).map(|_| ())
+}
+
+fn described_functions(lab: &Lab) -> Verdict {
+    let law = LawBench::open(lab)?;
+    let has = [("pressure", law.has_pressure()), ("shear", law.has_shear())];
+    let words: Vec<&str> = has.iter().filter(|(_, has)| *has).map(|(word, _)| *word).collect();
+    let section = described(&lab.path).unwrap_or_default();
+    if !section.is_whole() {
+        return Err(not_told(&["kind=law".into(), format!("can={}", words.join(" "))]));
+    }
+    match section.other_words(&words) {
+        None => Ok(()),
+        Some((got, expected)) => Err(Stop::fail("the table", "the section .terraglue", got, expected)),
+    }
 }
 
 fn answers(lab: &Lab) -> Verdict {

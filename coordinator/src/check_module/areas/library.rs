@@ -104,6 +104,11 @@ fn description(lab: &Lab) -> Verdict {
     if module.is_python() {
         return named_as_its_file(lab, &section.name);
     }
+    let kind = format!("{:?}", module.schema().kind).to_lowercase();
+    if !section.kind.is_empty() && section.kind != kind {
+        let got = format!("the section says `kind={}`, the schema `{kind}`", section.kind);
+        return Err(Stop::fail("schema", "the section .terraglue", got, "the same kind in both"));
+    }
     let (named, own) = (section.name.trim_end_matches("-plugin"), &module.schema().name);
     if named != own {
         let got = format!("the section names `{}`, the schema `{own}`", section.name);

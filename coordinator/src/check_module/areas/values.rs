@@ -5,7 +5,8 @@ use crate::check_module::catalogue::{Area, Level, Test};
 use crate::check_module::finding::{Stop, Verdict};
 use crate::check_module::lab::Lab;
 use crate::check_module::rig::{committed, numbers, script};
-use crate::host::{Instance, Reply};
+use crate::host::{Instance, Reply, described};
+use terraglue_plugin::describe::{variable_line, words};
 use terraglue_subsystem::{Effect, ValueType, Values, ValuesMut, Variable, unit::Unit};
 
 const fn test(
@@ -26,6 +27,15 @@ pub fn tests() -> Vec<Test> {
             "ids, names, units and ranges of the variables agree",
             variables,
         ),
+        Test {
+            level: Level::Standard,
+            ..test(
+                "described",
+                &["variables"],
+                "its section names what an instance can do, and its variables",
+                described_truly,
+            )
+        },
         test(
             "readable",
             &["steps", "variables"],
@@ -75,6 +85,33 @@ fn variables(lab: &Lab) -> Verdict {
         }
     }
     Ok(())
+}
+
+fn described_truly(lab: &Lab) -> Verdict {
+    let instance = lab.instance()?;
+    let section = described(&lab.path).unwrap_or_default();
+    if !section.is_whole() {
+        let kind = lab.kind().map_or_else(String::new, |k| format!("kind={k:?}").to_lowercase());
+        let can = format!("can={}", words(instance.capabilities()).join(" "));
+        let variables = instance.variables().iter().map(|v| format!("variable={}", variable_line(v)));
+        return Err(not_told(&[kind, can].into_iter().chain(variables).collect::<Vec<_>>()));
+    }
+    match section.contradiction(instance.capabilities(), instance.variables()) {
+        None => Ok(()),
+        Some((said, does)) => {
+            Err(Stop::fail("capabilities, variables", "the section .terraglue", said, does))
+        }
+    }
+}
+
+/// A module that keeps part of itself to itself: modules of earlier versions do.
+pub fn not_told(lines: &[String]) -> Stop {
+    let some = lines.iter().take(12).map(|line| format!("\n  {line}")).collect::<String>();
+    let more = if lines.len() > 12 { format!("\n  … {} more", lines.len() - 12) } else { String::new() };
+    Stop::Warning(format!(
+        "`terraglue modules` cannot show its kind, capabilities and variables: its section has no such lines \
+         (TG_IS, TG_CAN, TG_HAS in C, export_subsystem! in Rust, the docstring in Python):{some}{more}"
+    ))
 }
 
 fn readable(lab: &Lab) -> Verdict {

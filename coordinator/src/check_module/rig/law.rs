@@ -87,6 +87,11 @@ impl LawBench {
         self.law.has_pressure()
     }
 
+    /// Whether it has a shear function.
+    pub fn has_shear(&self) -> bool {
+        self.law.has_shear()
+    }
+
     /// One of its numbers, if it has it.
     pub fn number(&self, name: &str) -> Option<f64> {
         self.schema.parameters.iter().find(|p| p.name == name)?;

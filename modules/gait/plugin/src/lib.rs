@@ -1,2 +1,26 @@
-//! The module gait as a dynamic library.
-terraglue_plugin::export_subsystem!(terraglue_gait::Gait);
+//! The module gait as a dynamic library, and what its section says of it.
+terraglue_plugin::export_subsystem! {
+    terraglue_gait::Gait,
+    kind: "controller",
+    can: "retry state serialize",
+    variables: [
+        "*_j*.angle_target output f64 rad",
+        "roll input f64 rad",
+        "pitch input f64 rad",
+        "yaw input f64 rad",
+        "speed parameter f64 m/s",
+        "turn_rate parameter f64 rad/s",
+        "heading parameter f64 rad",
+        "lift parameter f64 m",
+        "posture_feedback parameter bool",
+        "heading_feedback parameter bool",
+        "gait parameter enumeration",
+        "phase local f64",
+        "speed_reached output f64 m/s",
+        "turn_rate_reached output f64 rad/s",
+        "roll_correction local f64 rad",
+        "pitch_correction local f64 rad",
+        "out_of_reach local f64",
+        "*.stance local bool",
+    ],
+}

@@ -1,2 +1,11 @@
-//! The module soil-column as a dynamic library.
-terraglue_plugin::export_subsystem!(soil_column::SoilColumnModule);
+//! The module soil-column as a dynamic library, and what its section says of it.
+terraglue_plugin::export_subsystem! {
+    soil_column::SoilColumnModule,
+    kind: "soil",
+    can: "force motion derivatives retry state serialize",
+    variables: [
+        "max_sinkage output f64 m",
+        "K parameter f64",
+        "columns local u32",
+    ],
+}

@@ -3,6 +3,7 @@
 import csv
 import json
 
+import pytest
 from conftest import MOON_WALK, ROOT, terraglue
 
 SOILS = ["soil-cellular-automaton", "soil-bekker"]
@@ -31,19 +32,119 @@ def test_compare_runs_steps_against_a_reference(tmp_path):
     rows = json.loads((tmp_path / "compare.json").read_text())["rows"]
     assert [(row["strategy"], row["step_s"]) for row in rows] == [
         ("cooperative", 1e-3), ("cooperative", 2e-3), ("iterative", 1e-3), ("iterative", 2e-3),
-        ("xx-newton", 1e-3), ("xx-newton", 2e-3), ("iterative", 5e-4)]
+        ("xx-newton", 1e-3), ("xx-newton", 2e-3), ("iterative", 1.25e-4)]
     refused = [row for row in rows if row["strategy"] == "xx-newton"]
-    assert all("refused" in row["error"] for row in refused)
-    # the reference is a run at half the smallest step
+    assert all("refused" in row["error"] and "these would work: cooperative, " in row["error"] for row in refused)
+    # the reference is a run at an eighth of the smallest step
     assert 0.0 < rows[2]["reference_error_m"] < rows[3]["reference_error_m"]
     page = (tmp_path / "compare.html").read_text()
     assert "error-step" in page and "work-precision" in page
 
 
+CUT_PENDULUM = """
+[time]
+step_s = 0.002
+duration_s = 0.2
+[gluing]
+strategy = "iterative"
+[recording]
+every_steps = 1
+[report]
+body = "forearm.lower"
+[robot]
+CUT = "root"
+[forearm]
+CUT = "tip"
+[[glue]]
+side_1 = "robot.upper"
+side_2 = "forearm.upper"
+"""
+PART = f"""module = "rigid-body"
+model = "{ROOT}/tests/models/double_pendulum.urdf"
+motor = "off"
+integrator = "generalized-alpha"
+joints = {{ shoulder = 1.5, elbow = 0.3 }}
+joint_rates = {{ elbow = 0.5 }}
+cut.elbow"""
+
+
+@pytest.fixture
+def pendulum(tmp_path):
+    """A double pendulum of second order, cut and glued at the elbow."""
+    path = tmp_path / "pendulum.toml"
+    path.write_text(CUT_PENDULUM.replace("CUT", PART))
+    return path
+
+
+def test_a_second_order_integrator_shows_its_order(pendulum, tmp_path):
+    process = terraglue("compare", pendulum, "--out", tmp_path / "out", "--quiet", "--strategies", "iterative",
+                        "--steps", "2e-3,4e-3,8e-3", "--reference", "iterative")
+    assert process.returncode == 0, process.stderr
+    rows = json.loads((tmp_path / "out" / "compare.json").read_text())["rows"]
+    assert [row["step_s"] for row in rows] == [2e-3, 4e-3, 8e-3, 2.5e-4]
+    assert all(1.9 <= row["order"] <= 2.1 for row in rows[1:3]), [row["order"] for row in rows]
+    finer = terraglue("compare", pendulum, "--out", tmp_path / "finer", "--quiet", "--strategies", "iterative",
+                      "--steps", "4e-3,8e-3", "--reference", "iterative", "--reference-step", "1e-3")
+    rows = json.loads((tmp_path / "finer" / "compare.json").read_text())["rows"]
+    assert finer.returncode == 0 and rows[-1]["step_s"] == 1e-3
+
+
+def test_a_reference_folder_must_be_of_the_same_run(tmp_path):
+    made = terraglue("run", MOON_WALK, "--duration", "0.04", "--out", tmp_path / "truth", "--quiet",
+                     "--set", "time.step_s=5e-4", "--set", "gluing.strategy=iterative")
+    assert made.returncode == 0, made.stderr
+
+    def compare(*more, duration="0.04"):
+        return terraglue("compare", MOON_WALK, "--duration", duration, "--out", tmp_path / "out", "--quiet",
+                         "--strategies", "cooperative", "--reference", tmp_path / "truth", *more)
+
+    good = compare()
+    assert good.returncode == 0, good.stderr
+    row, = json.loads((tmp_path / "out" / "compare.json").read_text())["rows"]
+    assert row["reference_error_m"] > 0.0
+    for more, duration, words in (
+        (["--soils", "soil-bekker"], "0.04", ["soil.module", "soil-bekker"]),
+        (["--set", "world.gravity_m_s2=[0.0, 0.0, -9.81]"], "0.04", ["world.gravity_m_s2"]),
+        (["--set", "robot.position_m=[0.0, 0.0, 0.5]"], "0.04", ["robot.position_m"]),
+        ([], "0.08", ["ends at t = 0.04 s"]),
+    ):
+        refused = compare(*more, duration=duration)
+        said = " ".join(refused.stderr.replace("│", " ").split())
+        assert refused.returncode == 2 and "terraglue run" in said, said
+        assert all(word in said for word in words), said
+    assert "folder" in " ".join(terraglue("compare", "--help").stdout.split("--reference ")[1].split("--")[0].split())
+
+
+def test_a_reference_that_cannot_run_is_an_error(pendulum, tmp_path):
+    process = terraglue("compare", pendulum, "--out", tmp_path / "out", "--quiet", "--strategies", "iterative",
+                        "--reference", "cooperative")
+    assert process.returncode == 2
+    assert "--reference: `cooperative`" in process.stderr and "iterative" in process.stderr
+    assert not (tmp_path / "out").exists()
+
+
+def test_rows_that_come_twice_run_once(pendulum, tmp_path):
+    process = terraglue("compare", pendulum, "--out", tmp_path, "--strategies", "iterative,iterative",
+                        "--steps", "4e-3,0.004")
+    assert process.returncode == 0, process.stderr
+    assert len(json.loads((tmp_path / "compare.json").read_text())["rows"]) == 1
+    assert "`iterative` more than once" in process.stderr and "`0.004` more than once" in process.stderr
+
+
+def test_a_comparison_without_any_run_that_ends_fails(pendulum, tmp_path):
+    process = terraglue("compare", pendulum, "--out", tmp_path, "--quiet", "--strategies", "iterative",
+                        "--set", "gluing.max_iterations=1", "--set", "gluing.tolerance=1e-15",
+                        "--set", "gluing.max_halvings=0")
+    assert process.returncode == 1, process.stderr
+    row, = json.loads((tmp_path / "compare.json").read_text())["rows"]
+    assert "did not converge" in row["error"] and "no run reached its end" in process.stderr
+
+
 def test_compare_refuses_unknown_names():
-    for option, name in (("--strategies", "iterativ"), ("--soils", "soil-beker")):
+    for option, name in (("--strategies", "iterativ"), ("--soils", "soil-beker"), ("--soils", "soil-bekker,foo")):
         process = terraglue("compare", MOON_WALK, option, name)
-        assert process.returncode == 2 and name in process.stderr
+        assert process.returncode == 2 and name.split(",")[-1] in process.stderr
+    assert "soil-bekker, soil-cellular-automaton" in " ".join(process.stderr.split())
 
 
 def test_listings():

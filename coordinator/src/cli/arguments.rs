@@ -329,10 +329,13 @@ pub struct CompareArguments {
     /// Communication steps in seconds, separated by commas [default: that of the scenario].
     #[arg(long, value_delimiter = ',', value_name = "SECONDS")]
     pub steps: Vec<f64>,
-    /// Compare the path of the reported body with this: `monolithic`, another strategy, run on each soil (of
-    /// several steps with half the smallest), or the folder or recording of an earlier run.
-    #[arg(long, value_name = "STRATEGY|DIR")]
+    /// Compare the path of the reported body with this: a strategy, e.g. `monolithic`, run on each soil (of several
+    /// steps with an eighth of the smallest), or the folder or .mcap file of an earlier run of the same scenario.
+    #[arg(long, value_name = "STRATEGY|FOLDER|FILE")]
     pub reference: Option<String>,
+    /// Step of the reference in seconds; a smaller one takes longer and leaves less of its own error in the order.
+    #[arg(long, value_name = "SECONDS", requires = "reference")]
+    pub reference_step: Option<f64>,
 }
 
 const COMPARE_EXAMPLES: &str = "\

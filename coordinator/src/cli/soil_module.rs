@@ -4,7 +4,7 @@ use super::arguments::ScenarioArguments;
 use std::path::Path;
 use terraglue::Result;
 use terraglue::host::{Library, SearchPath, available_modules};
-use terraglue::scenario::{InputError, Scenario};
+use terraglue::scenario::{InputError, Scenario, nearest};
 use terraglue::subsystem::Kind;
 
 /// Refuses edits that put another kind of module in the place of a soil; warns of a terrain without any soil.
@@ -17,7 +17,8 @@ pub fn check(scenario: &Scenario, arguments: &ScenarioArguments) -> Result {
             for old in &before.subsystems {
                 let new = scenario.subsystems.iter().find(|s| s.name == old.name);
                 let was_soil = kind(&old.module, &search, &scenario.folder) == Some(Kind::Soil);
-                if let Some(new) = new.filter(|_| was_soil) {
+                let found = |module: &str| kind(module, &search, &scenario.folder).is_some();
+                if let Some(new) = new.filter(|new| was_soil && found(&new.module)) {
                     require_soil(&new.module, scenario, arguments)?;
                 }
             }
@@ -31,17 +32,21 @@ pub fn check(scenario: &Scenario, arguments: &ScenarioArguments) -> Result {
     Ok(())
 }
 
-/// Refuses a module that is found and no soil.
+/// Refuses a module that is no soil, or is not found at all.
 pub fn require_soil(module: &str, scenario: &Scenario, arguments: &ScenarioArguments) -> Result {
     let search = search(scenario, arguments);
-    if kind(module, &search, &scenario.folder).is_none_or(|k| k == Kind::Soil) {
-        return Ok(());
-    }
+    let why = match Library::new().find(module, &search, &scenario.folder) {
+        Ok(found) if found.schema().kind == Kind::Soil => return Ok(()),
+        Ok(_) => format!("module `{module}` is no soil"),
+        Err(error) => error.to_string(),
+    };
     let modules = available_modules(&search);
     let soils = modules.iter().filter(|m| m.schema.as_ref().is_ok_and(|s| s.kind == Kind::Soil));
     let names: Vec<&str> = soils.map(|m| m.name.as_str()).collect();
-    let help = format!("modules of kind soil: {}", names.join(", "));
-    Err(InputError::plain(format!("module `{module}` is no soil"), Some(help)).into())
+    let near =
+        nearest(module, names.iter().copied()).map_or_else(String::new, |n| format!("did you mean `{n}`? "));
+    let help = format!("{near}modules of kind soil: {}", names.join(", "));
+    Err(InputError::plain(why, Some(help)).into())
 }
 
 fn search(scenario: &Scenario, arguments: &ScenarioArguments) -> SearchPath {

@@ -23,7 +23,8 @@
 //! | `/gluing` | `terraglue.StepReport` | the recorded step with its ports, and `since_last`: extremes of all steps between |
 //! | `/events` | `foxglove.Log` | what happened (`t_s`, `what`) |
 //!
-//! A metadata record `terraglue` at the head holds the scenario's text after all edits, strategy and modules.
+//! A metadata record `terraglue` at the head holds the scenario's text after all edits, fingerprints of the files that it
+//! names, strategy and modules.
 //!
 //! [`Recording`] reads any recording, also one that was cut off ([`mend`] gives such a file its footer);
 //! [`report::write`] makes the report from it, [`compare::write`] puts several runs side by side.
@@ -32,6 +33,7 @@ mod body_track;
 mod csv;
 mod exchange;
 mod ground_grid;
+mod inputs;
 mod json;
 mod layout;
 mod mcap_writer;

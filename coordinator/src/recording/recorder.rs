@@ -3,6 +3,7 @@
 use crate::error::{Error, Result};
 use crate::observer::{Happening, Observer, View};
 use crate::recording::csv::VariablesCsv;
+use crate::recording::inputs::fingerprints;
 use crate::recording::layout::{FINAL_GROUND, at, remove_earlier_run};
 use crate::recording::mcap_writer::{FLUSH_STEPS, McapWriter};
 use crate::recording::snapshot::Snapshot;
@@ -50,6 +51,7 @@ fn about(scenario: &Scenario) -> BTreeMap<String, String> {
         ("duration_s", scenario.time.duration_s.to_string()),
         ("gravity_m_s2", format!("{:?}", scenario.world.gravity_m_s2)),
         ("seed", scenario.world.seed.to_string()),
+        ("inputs", fingerprints(scenario)),
         ("subsystems", list.join("\n")),
     ]);
     for (key, value) in [("report_body", &scenario.report.body), ("report_joint", &scenario.report.joint)] {

@@ -169,6 +169,8 @@ fn read_time(s: &Section) -> Checked<Time> {
     let steps = time.duration_s / time.step_s;
     if (steps - steps.round()).abs() > 1e-6 * steps.max(1.0) || steps.round() < 1.0 {
         let below = (steps.floor() * time.step_s).max(time.step_s);
+        // as people write it: 18 steps of 1 ms are 0.018 and not 0.018000000000000002
+        let below: f64 = format!("{below:.12e}").parse().unwrap_or(below);
         let message =
             format!("`duration_s` = {} is no multiple of `step_s` = {}", time.duration_s, time.step_s);
         return Err(s.error("duration_s", message, Some(format!("e.g. {below}"))));

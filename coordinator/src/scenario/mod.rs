@@ -5,6 +5,7 @@
 
 pub mod advice;
 mod check;
+mod difference;
 pub mod docs;
 mod events;
 pub mod keys;
@@ -26,6 +27,7 @@ mod tests;
 
 pub use check::allowed_values;
 pub(crate) use check::check_value;
+pub use difference::{Difference, differences};
 pub use mask::resolve as resolve_mask;
 pub use model::*;
 pub use nearest::{did_you_mean, nearest};

@@ -125,6 +125,8 @@ fn wrong_types_and_ranges_show_what_is_allowed() {
         &message("duration_s = 2.0", "duration_s = 2.0005", &[]),
         &["no multiple of `step_s`", "e.g. 2"],
     );
+    let text = message("duration_s = 2.0", "duration_s = 0.0185", &[]);
+    assert!(text.contains("e.g. 0.018") && !text.contains("0.0180"), "{text}");
     assert_holds(&message("duration_s = 2.0\n", "", &[]), &["`time` lacks `duration_s`"]);
     assert_holds(
         &message("kind = \"undulating\"", "kind = \"undulating\"\nangle_rad = 1.0", &[]),

@@ -5,10 +5,12 @@
 mod columns;
 mod page;
 mod reference;
+mod same;
 mod scatter;
 mod table;
 
 pub use reference::judge;
+pub use same::check_reference;
 
 use crate::error::Result;
 use crate::recording::layout::{at, other_at};
@@ -60,7 +62,7 @@ impl CompareRow {
             name += &format!(" · {}", self.soil);
         }
         if self.name_step {
-            name += &format!(" · {} ms", 1e3 * self.step_s);
+            name += &format!(" · {} ms", (1e9 * self.step_s).round() / 1e6);
         }
         if self.is_reference { name + " (reference)" } else { name }
     }

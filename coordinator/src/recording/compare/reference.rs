@@ -11,7 +11,7 @@ use std::path::Path;
 /// # Errors
 /// The recording cannot be read.
 pub fn judge(rows: &mut [CompareRow], soil: Option<&str>, folder: &Path) -> Result {
-    let reference = if folder.is_dir() { Recording::open(folder)? } else { from_file(folder)? };
+    let reference = open(folder)?;
     let Some((_, truth)) = reference.reported_body() else { return Ok(()) };
     for row in rows.iter_mut().filter(|r| soil.is_none_or(|s| s == r.soil) && !r.is_reference) {
         let Some(own) = row.folder.as_deref().and_then(|f| Recording::open(f).ok()) else { continue };
@@ -22,7 +22,11 @@ pub fn judge(rows: &mut [CompareRow], soil: Option<&str>, folder: &Path) -> Resu
     Ok(())
 }
 
-fn from_file(path: &Path) -> Result<Recording> {
+/// The recording of a results folder, or a recording as a file.
+pub(super) fn open(path: &Path) -> Result<Recording> {
+    if path.is_dir() {
+        return Recording::open(path);
+    }
     let bytes = std::fs::read(path).map_err(at(path))?;
     Recording::read(&bytes).ok_or_else(|| Error::File {
         path: path.display().to_string(),

@@ -1,0 +1,246 @@
+//! Which runs a comparison takes: every combination, each checked before the first one starts.
+
+use crate::cli::arguments::{CompareArguments, RunArguments};
+use crate::cli::{run, soil_module};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+use terraglue::host::{Library, SearchPath};
+use terraglue::recording::compare;
+use terraglue::scenario::{InputError, Scenario, did_you_mean, keys::STRATEGIES};
+use terraglue::subsystem::Kind;
+use terraglue::{Error, Result};
+
+/// The reference of several steps runs with this part of the smallest: at half of it the reference's own error makes an
+/// order of 2 look like 2.32, at an eighth like 2.02.
+const REFERENCE_PART: f64 = 0.125;
+
+/// One row before it ran.
+pub struct Plan {
+    pub strategy: String,
+    pub soil: String,
+    /// Whether the others are compared with it.
+    pub is_reference: bool,
+    /// Whether the comparison has several steps.
+    pub name_step: bool,
+    pub scenario: Scenario,
+    pub folder: PathBuf,
+    /// Why it cannot run: a row of the comparison.
+    pub refused: Option<String>,
+}
+
+impl Plan {
+    /// Whether the iteration also runs from zero, to show what the estimate saves.
+    pub fn has_cold_start(&self) -> bool {
+        self.strategy == "iterative" && !self.is_reference && self.scenario.gluing.start == "estimate"
+    }
+
+    /// Steps of all its runs.
+    pub fn steps(&self) -> u64 {
+        let time = self.scenario.time;
+        let once = (time.duration_s / time.step_s).round() as u64;
+        if self.refused.is_some() {
+            return 0;
+        }
+        if self.has_cold_start() { 2 * once } else { once }
+    }
+}
+
+/// What is combined.
+struct Wanted {
+    strategies: Vec<String>,
+    soils: Vec<String>,
+    steps: Vec<Option<f64>>,
+}
+
+/// Strategy, soil and step of one run.
+struct Choice {
+    strategy: String,
+    soil: String,
+    step_s: Option<f64>,
+    is_reference: bool,
+}
+
+/// All combinations in the order strategies × soils × steps, then the references, each checked.
+pub fn plan(arguments: &CompareArguments) -> Result<Vec<Plan>> {
+    let base = Scenario::load(&arguments.run.scenario.scenario, &arguments.run.sets())?;
+    soil_module::check(&base, &arguments.run.scenario)?;
+    let soil = soil_of(&base, &arguments.run)?;
+    let wanted = wanted(arguments, &base, soil.as_ref())?;
+    let mut choices = Vec::new();
+    for strategy in &wanted.strategies {
+        for soil in &wanted.soils {
+            let one = |step_s: &Option<f64>| Choice {
+                strategy: strategy.clone(),
+                soil: soil.clone(),
+                step_s: *step_s,
+                is_reference: false,
+            };
+            choices.extend(wanted.steps.iter().map(one));
+        }
+    }
+    choices.extend(references(arguments, &wanted)?);
+    let replaced = soil.filter(|_| !arguments.soils.is_empty());
+    let one = |choice| planned(arguments, replaced.as_ref(), choice, wanted.steps.len() > 1);
+    let plans = choices.into_iter().map(one).collect::<Result<Vec<_>>>()?;
+    match arguments.reference.as_deref().filter(|name| !STRATEGIES.contains(name)) {
+        Some(folder) => check_folder(&plans, Path::new(folder))?,
+        None => {}
+    }
+    Ok(plans)
+}
+
+fn wanted(arguments: &CompareArguments, base: &Scenario, soil: Option<&Soil>) -> Result<Wanted> {
+    for module in &arguments.soils {
+        soil_module::require_soil(module, base, &arguments.run.scenario)?;
+    }
+    let strategies = match arguments.strategies.is_empty() {
+        true => STRATEGIES.iter().map(|s| (*s).to_owned()).collect(),
+        false => once("--strategies", &arguments.strategies, String::clone),
+    };
+    if let Some(unknown) = strategies.iter().find(|s| !STRATEGIES.contains(&s.as_str())) {
+        let help = did_you_mean(unknown, STRATEGIES.iter().copied());
+        return Err(InputError::plain(format!("unknown strategy `{unknown}` in --strategies"), help).into());
+    }
+    let soils = match (soil, arguments.soils.is_empty()) {
+        (Some(soil), true) => vec![soil.module.clone()],
+        (Some(_), false) => once("--soils", &arguments.soils, String::clone),
+        (None, true) => vec![String::new()],
+        (None, false) => return Err(InputError::plain("--soils: the scenario has no soil", None).into()),
+    };
+    let steps: Vec<Option<f64>> = match arguments.steps.is_empty() {
+        true => vec![None],
+        false => once("--steps", &arguments.steps, f64::to_string).into_iter().map(Some).collect(),
+    };
+    Ok(Wanted { strategies, soils, steps })
+}
+
+/// Every value once, in the order given; a note says which came again.
+fn once<T: Clone>(option: &str, given: &[T], name: impl Fn(&T) -> String) -> Vec<T> {
+    let mut seen: Vec<String> = Vec::new();
+    let mut all = Vec::new();
+    for value in given {
+        let name = name(value);
+        if seen.contains(&name) {
+            eprintln!("note: {option} names `{name}` more than once: it runs once");
+        } else {
+            seen.push(name);
+            all.push(value.clone());
+        }
+    }
+    all
+}
+
+/// The references that run beside the others; none where the reference is an earlier run.
+fn references(arguments: &CompareArguments, wanted: &Wanted) -> Result<Vec<Choice>> {
+    let given = arguments.reference_step;
+    let Some(name) = &arguments.reference else { return Ok(Vec::new()) };
+    if STRATEGIES.contains(&name.as_str()) {
+        // of several steps the error is that against the step, so the reference must be finer than all of them
+        let several = wanted.steps.len() > 1;
+        let finest = wanted.steps.iter().copied().flatten().reduce(f64::min);
+        let step_s = given.or(finest.map(|h| if several { REFERENCE_PART * h } else { h }));
+        let one =
+            |soil: &String| Choice { strategy: name.clone(), soil: soil.clone(), step_s, is_reference: true };
+        return Ok(wanted.soils.iter().map(one).collect());
+    }
+    if !Path::new(name).exists() {
+        let help = did_you_mean(name, STRATEGIES.iter().copied());
+        let message = format!("--reference: `{name}` is no strategy and no folder or recording of a run");
+        return Err(InputError::plain(message, help).into());
+    }
+    match given {
+        Some(_) => Err(InputError::plain("--reference-step: an earlier run has its own step", None).into()),
+        None => Ok(Vec::new()),
+    }
+}
+
+fn planned(
+    arguments: &CompareArguments,
+    soil: Option<&Soil>,
+    choice: Choice,
+    name_step: bool,
+) -> Result<Plan> {
+    let mut sets = arguments.run.sets();
+    sets.push(("gluing.strategy".into(), choice.strategy.clone()));
+    if let Some(step) = choice.step_s {
+        sets.push(("time.step_s".into(), format!("{step:?}")));
+    }
+    if let Some(soil) = soil {
+        sets.push((format!("{}.module", soil.name), choice.soil.clone()));
+    }
+    Ok(Plan {
+        scenario: Scenario::load(&arguments.run.scenario.scenario, &sets)?,
+        strategy: choice.strategy,
+        soil: choice.soil,
+        is_reference: choice.is_reference,
+        name_step,
+        folder: PathBuf::new(),
+        refused: None,
+    })
+}
+
+/// An earlier run must be one of the same thing as every row; rows that differ in strategy and step only are alike.
+fn check_folder(plans: &[Plan], folder: &Path) -> Result {
+    let mut soils: Vec<&str> = plans.iter().map(|p| p.soil.as_str()).collect();
+    soils.dedup();
+    let first = |soil: &str| plans.iter().find(|p| p.soil == soil);
+    soils.into_iter().filter_map(first).try_for_each(|p| compare::check_reference(&p.scenario, folder))
+}
+
+/// Wrong input shows before the first run starts; a strategy that cannot glue the scenario is a row that says so,
+/// as long as another one can and it is not the reference.
+pub fn refuse(plans: &mut [Plan], arguments: &RunArguments, cancel: &Arc<AtomicBool>) -> Result {
+    let mut first = None;
+    for plan in plans.iter_mut() {
+        let Err(error) = run::build(&plan.scenario, &run::options(arguments, cancel)) else { continue };
+        if plan.is_reference {
+            return Err(refused_reference(plan, error));
+        }
+        plan.refused = Some(match &error {
+            Error::Input(input) => match &input.help {
+                Some(help) => format!("refused: {input}; {help}"),
+                None => format!("refused: {input}"),
+            },
+            other => format!("refused: {other}"),
+        });
+        first = first.or(Some(error));
+    }
+    match first {
+        Some(error) if plans.iter().filter(|p| !p.is_reference).all(|p| p.refused.is_some()) => Err(error),
+        _ => Ok(()),
+    }
+}
+
+fn refused_reference(plan: &Plan, error: Error) -> Error {
+    let help = match &error {
+        Error::Input(input) => input.help.clone(),
+        _ => None,
+    };
+    InputError::plain(format!("--reference: `{}` cannot run: {error}", plan.strategy), help).into()
+}
+
+/// Name and module of the only subsystem of kind soil.
+struct Soil {
+    name: String,
+    module: String,
+}
+
+fn soil_of(scenario: &Scenario, arguments: &RunArguments) -> Result<Option<Soil>> {
+    let search = SearchPath::standard(&arguments.scenario.module_path, &scenario.folder);
+    let mut soils = Vec::new();
+    for spec in &scenario.subsystems {
+        let module = Library::new().find(&spec.module, &search, &scenario.folder).map_err(|e| {
+            let help = e.nearest().map(|n| format!("did you mean `{n}`?"));
+            scenario.source.error_at_value(&[&spec.name, "module"], e.to_string(), help)
+        })?;
+        if module.schema().kind == Kind::Soil {
+            soils.push(Soil { name: spec.name.clone(), module: spec.module.clone() });
+        }
+    }
+    if soils.len() > 1 {
+        let message = "the scenario has several soils: it is not clear which one --soils replaces";
+        return Err(InputError::plain(message, None).into());
+    }
+    Ok(soils.pop())
+}

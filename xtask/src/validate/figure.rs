@@ -11,7 +11,7 @@ pub enum Limit {
     AtLeast(f64),
     /// value = limit, exactly.
     Equal(f64),
-    /// Printed for comparison, never fails.
+    /// Printed for comparison; fails only where it is no number.
     None,
 }
 
@@ -75,9 +75,10 @@ impl Figure {
         }
     }
 
-    /// `pass`, `fail` or `skip`.
+    /// `pass`, `fail`, `info` (nothing that it could fail) or `skip` (not measured).
     pub fn verdict(&self) -> &'static str {
         match self.pass {
+            Some(true) if self.limit == Limit::None => "info",
             Some(true) => "pass",
             Some(false) => "fail",
             None => "skip",
@@ -99,6 +100,8 @@ mod tests {
         let figure = Figure::new("a.b", 0.25, Limit::AtMost(0.2), "share of x");
         assert_eq!(figure.line(), "a.b\t0.25\t<= 0.2\tfail\tshare of x");
         assert_eq!(Figure::skipped("a", "no soil").line(), "a\t-\t-\tskip\tno soil");
+        assert_eq!(Figure::new("a", 2.0, Limit::None, "share").line(), "a\t2\t-\tinfo\tshare");
+        assert_eq!(Figure::new("a", 2.0, Limit::AtMost(2.0), "share").verdict(), "pass");
         assert_eq!(Figure::new("a", 1.5e-9, Limit::None, "").value_text(), "1.500e-9");
     }
 

@@ -29,6 +29,9 @@ impl Answers {
     }
 }
 
+/// Said of every file that cannot be read.
+const COLUMNS: &str = "its columns are case, parameters, t, quantity, value, source, with one row per value";
+
 /// One row.
 struct Row {
     case: String,
@@ -40,7 +43,7 @@ struct Row {
 
 /// A figure per row of a file.
 pub fn figures(file: &Path) -> Outcome<Vec<Figure>> {
-    let rows = rows(&read(file)?).map_err(|e| format!("{}: {e}", file.display()))?;
+    let rows = rows(&read(file)?).map_err(|e| format!("{}: {e}; {COLUMNS}", file.display()))?;
     let mut all = Vec::new();
     for group in rows.chunk_by(|a, b| a.case == b.case && a.parameters == b.parameters) {
         all.extend(judge(group));
@@ -86,9 +89,9 @@ fn rows(text: &str) -> Outcome<Vec<Row>> {
     let mut lines = text.lines().filter(|l| !l.trim().is_empty()).enumerate();
     let head = lines.next().map(|(_, l)| fields(l)).unwrap_or_default();
     if head.len() < 5 || head[..5] != ["case", "parameters", "t", "quantity", "value"] {
-        return Err("the columns are case, parameters, t, quantity, value, source".into());
+        return Err("the header is another".into());
     }
-    lines
+    let rows: Vec<Row> = lines
         .map(|(k, line)| {
             let f = fields(line);
             let wrong = |what: &str| format!("line {}: {what}", k + 1);
@@ -105,7 +108,8 @@ fn rows(text: &str) -> Outcome<Vec<Row>> {
                 value,
             })
         })
-        .collect()
+        .collect::<Outcome<_>>()?;
+    if rows.is_empty() { Err("there is no row below the header".into()) } else { Ok(rows) }
 }
 
 /// Fields of a line; quotes hold commas together.
@@ -124,4 +128,29 @@ fn fields(line: &str) -> Vec<String> {
         }
     }
     out
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_without_values_is_named_with_the_columns_that_it_needs() {
+        let head = "case,parameters,t,quantity,value,source\n";
+        let folder = tempfile::tempdir().expect("a folder");
+        let said = |text: &str| {
+            let path = folder.path().join("values.csv");
+            std::fs::write(&path, text).expect("written");
+            figures(&path).expect_err("no values")
+        };
+        for (text, why) in [(head, "no row"), ("", "header"), ("a,b\n1,2\n", "header")] {
+            let said = said(text);
+            assert!(
+                said.contains("values.csv")
+                    && said.contains(why)
+                    && said.contains("case, parameters, t, quantity"),
+                "{said}"
+            );
+        }
+    }
 }

@@ -14,7 +14,7 @@
 //! | `actuator` | windings, gears, friction, heat, battery, energy |
 //! | `contact` | ports, the rigid estimate T*, contacts among own bodies |
 //! | `lcp` | pivoting methods, from the crate `contact-solver` |
-//! | `variables`, `scene` | what can be read, set, done and seen |
+//! | `variables`, `initial`, `scene` | what can be read, set (also of the motion before the start), done and seen |
 //!
 //! Deliberately absent: ground and soil. The robot knows its ports, never what lies behind them.
 
@@ -25,6 +25,7 @@ mod cut;
 mod dense;
 mod drive;
 mod dynamics;
+mod initial;
 pub use terraglue_contact_solver::lcp;
 mod math;
 mod model;

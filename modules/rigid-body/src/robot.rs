@@ -513,6 +513,8 @@ impl Subsystem for Robot {
         for ((out, body), motion) in out.iter_mut().zip(&self.model().bodies).zip(&self.state.bodies) {
             *out = scene::body_state(body, motion);
         }
+        // what stands still, where the scene has it
+        out.iter_mut().skip(self.state.bodies.len()).for_each(|out| *out = BodyState::REST);
         Ok(())
     }
 

@@ -1,35 +1,52 @@
-//! What of the robot can be seen and hit, and where its bodies are.
+//! What of the robot and of the world in its files can be seen and hit, and where its bodies are.
 
 use crate::math::V3;
 use crate::model::{Body, Model};
 use crate::state::Motion;
 use nalgebra::Isometry3;
-use terraglue_robot_import::ShapeGeometry;
+use terraglue_robot_import::{Heights, Shape, ShapeGeometry};
 use terraglue_subsystem::{BodyState, Geometry, Pose, Scene, SceneBody, SceneShape};
 
+/// Name of the body that carries what stands still; `world'`, … where a robot has a body of that name.
+const WORLD: &str = "world";
+/// A height field is drawn with at most this many nodes along a side: it is looked at, not calculated with.
+const DRAWN_NODES: usize = 129;
+
 /// All bodies and shapes; ids count through the shapes.
+///
+/// What stands still in the world belongs to one more body without mass behind all others. It is seen only: the bodies of
+/// this subsystem hit it inside, and no other subsystem does.
 pub(crate) fn scene(model: &Model) -> Scene {
-    let bodies = model.bodies.iter().map(|b| SceneBody { name: b.name.clone(), mass: b.mass }).collect();
-    let all = model.bodies.iter().enumerate().flat_map(|(b, body)| body.shapes.iter().map(move |s| (b, s)));
-    let shapes = all
-        .enumerate()
-        .filter_map(|(id, (body, shape))| {
-            Some(SceneShape {
-                id: id as u32,
-                body: body as u32,
-                name: shape.name.clone(),
-                geometry: geometry(&shape.geometry)?,
-                body_from_shape: pose(&shape.body_from_shape),
-                collides: shape.collides,
-            })
-        })
-        .collect();
+    let mut bodies: Vec<SceneBody> =
+        model.bodies.iter().map(|b| SceneBody { name: b.name.clone(), mass: b.mass }).collect();
+    let mut shapes = Vec::new();
+    let mut add = |body: usize, shape: &Shape, collides: bool| {
+        shapes.push(SceneShape {
+            id: shapes.len() as u32,
+            body: body as u32,
+            name: shape.name.clone(),
+            geometry: geometry(&shape.geometry),
+            body_from_shape: pose(&shape.body_from_shape),
+            collides,
+        });
+    };
+    for (b, body) in model.bodies.iter().enumerate() {
+        body.shapes.iter().for_each(|shape| add(b, shape, shape.collides));
+    }
+    model.world_shapes.iter().for_each(|shape| add(bodies.len(), shape, false));
+    if !model.world_shapes.is_empty() {
+        let mut name = WORLD.to_owned();
+        while bodies.iter().any(|b| b.name == name) {
+            name.push('\'');
+        }
+        bodies.push(SceneBody { name, mass: 0.0 });
+    }
     Scene { bodies, shapes }
 }
 
-/// Shapes of bodies are convex; ground of triangles is no body's.
-fn geometry(g: &ShapeGeometry) -> Option<Geometry> {
-    Some(match g {
+/// Shapes of bodies are convex. What stands still need not be: nothing is asked of its triangles but to be drawn.
+fn geometry(g: &ShapeGeometry) -> Geometry {
+    match g {
         ShapeGeometry::Sphere { radius } => Geometry::Sphere { radius: *radius },
         ShapeGeometry::Box { half_extents } => Geometry::Box { half_extents: *half_extents },
         ShapeGeometry::Cylinder { half_length, radius } => {
@@ -38,11 +55,32 @@ fn geometry(g: &ShapeGeometry) -> Option<Geometry> {
         ShapeGeometry::Capsule { half_length, radius } => {
             Geometry::Capsule { half_length: *half_length, radius: *radius }
         }
-        ShapeGeometry::Hull(mesh) => {
+        ShapeGeometry::Hull(mesh) | ShapeGeometry::Triangles(mesh) => {
             Geometry::ConvexMesh { points: mesh.points.clone(), triangles: mesh.triangles.clone() }
         }
-        ShapeGeometry::Triangles(_) | ShapeGeometry::Heights(_) => return None,
-    })
+        ShapeGeometry::Heights(heights) => surface(heights),
+    }
+}
+
+/// The triangles of a height field seen from above; of a large one every so many nodes, the last ones always.
+fn surface(h: &Heights) -> Geometry {
+    let kept = |n: usize| -> Vec<usize> {
+        let stride = (n - 1).div_ceil(DRAWN_NODES - 1).max(1);
+        (0..n - 1).step_by(stride).chain([n - 1]).collect()
+    };
+    let [columns, rows] = h.nodes.map(kept);
+    let place = |k: usize, axis: usize| h.lengths[axis] * (k as f64 / (h.nodes[axis] - 1) as f64 - 0.5);
+    let row =
+        |j: usize| columns.iter().map(move |i| [place(*i, 0), place(j, 1), h.heights[j * h.nodes[0] + i]]);
+    let points = rows.iter().flat_map(|j| row(*j)).collect();
+    let width = columns.len() as u32;
+    let cell = |i: u32, j: u32| {
+        let a = j * width + i;
+        [[a, a + 1, a + width + 1], [a, a + width + 1, a + width]]
+    };
+    let triangles =
+        (0..rows.len() as u32 - 1).flat_map(|j| (0..width - 1).flat_map(move |i| cell(i, j))).collect();
+    Geometry::ConvexMesh { points, triangles }
 }
 
 fn pose(iso: &Isometry3<f64>) -> Pose {

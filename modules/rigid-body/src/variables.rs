@@ -3,10 +3,11 @@
 use crate::actuator::SETTINGS;
 use crate::actuator::settings::{Group, Range};
 use crate::drive::Motor;
+use crate::initial;
 use crate::math::euler;
 use crate::model::{Kind, Model};
 use crate::state::{JointState, State};
-use terraglue_subsystem::{Action, Causality, Error, Result, ValueType, Variable};
+use terraglue_subsystem::{Action, Causality, Effect, Error, Result, ValueType, Variable};
 
 /// Ids per body and per joint.
 const BODY_STRIDE: u32 = 16;
@@ -36,7 +37,7 @@ pub(crate) enum Meaning {
     },
 }
 
-/// Items of a body: 0–11 motion, 12 contact force, 13–15 external force.
+/// Items of a body: 0–11 motion (of free bodies settable before the start), 12 contact force, 13–15 external force.
 const BODY_ITEMS: [(&str, &str, &str); 16] = [
     ("x", "m", "Position of the body frame"),
     ("y", "m", "Position of the body frame"),
@@ -155,14 +156,19 @@ pub(crate) fn describe(model: &Model, state: &State) -> Vec<Variable> {
         for (item, (name, unit, help)) in BODY_ITEMS.iter().enumerate() {
             let causality = if item < 13 { Causality::Output } else { Causality::Input };
             let id = b as u32 * BODY_STRIDE + item as u32;
-            all.push(Variable::real(id, format!("{}.{name}", body.name), unit, causality, help));
+            let v = Variable::real(id, format!("{}.{name}", body.name), unit, causality, help);
+            all.push(if item < 12 && initial::is_free(model, b) { at_the_start(v) } else { v });
         }
     }
     let first = model.bodies.len() as u32 * BODY_STRIDE;
     for (j, joint) in model.joints.iter().enumerate() {
         let id = first + j as u32 * JOINT_STRIDE;
         if joint.moves() {
+            let first = all.len();
             describe_moving(id, &joint.name, joint.kind, &mut all);
+            if initial::has_coordinate(model, j) {
+                all[first..].iter_mut().take(2).for_each(|v| *v = at_the_start(v.clone()));
+            }
         }
         let help = "Whether the joint is gone for ever; true breaks it";
         all.push(flag(id + BROKEN, &joint.name, "broken", Causality::Parameter, help));
@@ -186,6 +192,11 @@ pub(crate) fn describe(model: &Model, state: &State) -> Vec<Variable> {
         all.push(Variable::real(id, name, "", Causality::Local, help));
     }
     all
+}
+
+/// An output whose value before the first step can be given.
+fn at_the_start(v: Variable) -> Variable {
+    Variable { effect: Effect::NeedsReset, ..v }
 }
 
 fn describe_closures(model: &Model, all: &mut Vec<Variable>) {
@@ -414,7 +425,10 @@ pub(crate) fn set_number(model: &Model, state: &mut State, id: u32, value: f64) 
             state.forces[body][(id % BODY_STRIDE) as usize - 13] = value;
             Ok(())
         }
-        Meaning::Body { .. } => Err(Error::Refused("the motion of a body can be read only".into())),
+        Meaning::Body { body, item: item @ 0..=11 } => {
+            initial::set_body(model, state, body, item as usize, value)
+        }
+        Meaning::Body { .. } => Err(Error::Refused("the force of contacts can be read only".into())),
         Meaning::Share(_) => Err(Error::Refused("the share of a divided link can be read only".into())),
         Meaning::Robot(_) | Meaning::RedundantRows => {
             Err(Error::Refused("what the robot as a whole tells can be read only".into()))
@@ -436,6 +450,9 @@ pub(crate) fn set_number(model: &Model, state: &mut State, id: u32, value: f64) 
         Meaning::Joint { item: ACTUATOR..SETTING, .. } => {
             Err(Error::Refused("what an actuator tells can be read only".into()))
         }
+        Meaning::Joint { joint, item: item @ (ANGLE | VELOCITY) } => {
+            initial::set_joint(model, state, joint, item == VELOCITY, value)
+        }
         Meaning::Joint { joint, item } => {
             let j = &mut state.joints[joint];
             let (slot, lowest) = match item {
@@ -446,9 +463,7 @@ pub(crate) fn set_number(model: &Model, state: &mut State, id: u32, value: f64) 
                 STIFFNESS => (&mut j.stiffness, 0.0),
                 DAMPING => (&mut j.damping, 0.0),
                 VOLTAGE_TARGET => (&mut j.actuator.voltage_target, f64::NEG_INFINITY),
-                ANGLE..=TORQUE => {
-                    return Err(Error::Refused("the motion of a joint can be read only".into()));
-                }
+                TORQUE => return Err(Error::Refused("what the motor gave can be read only".into())),
                 _ => return Err(wrong_type(id)),
             };
             if value < lowest {

@@ -233,3 +233,31 @@ fn contacts_with_meshes_are_the_same_in_every_run_and_after_a_rewind() {
     (0..200).for_each(|_| one.free_step());
     assert_eq!(one.states(), first);
 }
+
+#[test]
+fn what_stands_still_is_seen_and_does_not_count_as_a_body() {
+    let wall = r#"<mesh name="wall" vertex="0 0 0 1 0 0 0 0 1 0 1 0" face="0 1 2 0 3 1"/>
+        <hfield name="hill" nrow="2" ncol="200" size="2 1 0.5 0.1" elevation="HEIGHTS"/>"#;
+    let heights = (0..400).map(|k| format!("{} ", k % 200)).collect::<String>();
+    let world = r#"<geom type="mesh" mesh="wall" pos="3 0 0"/><geom type="hfield" hfield="hill"/>
+        <geom type="box" size=".1 .2 .3" pos="0 5 0" contype="0" conaffinity="0"/>
+        <body name="b" pos="0 0 4"><freejoint/><geom type="sphere" size="0.1" mass="2"/></body>"#;
+    let mut rig = scene("still", &wall.replace("HEIGHTS", &heights), world, "");
+    let bodies: Vec<(&str, f64)> = rig.scene.bodies.iter().map(|b| (b.name.as_str(), b.mass)).collect();
+    assert_eq!(bodies, [("b", 2.0), ("world", 0.0)]);
+    let seen: Vec<_> = rig.scene.shapes.iter().filter(|s| s.body == 1).collect();
+    assert!(seen.len() == 3 && seen.iter().all(|s| !s.collides), "{seen:?}");
+    let Geometry::ConvexMesh { triangles, .. } = &seen[0].geometry else { panic!("the wall") };
+    assert_eq!((triangles.len(), seen[0].body_from_shape.position), (2, [3.0, 0.0, 0.0]));
+    let Geometry::ConvexMesh { points, triangles } = &seen[1].geometry else { panic!("the hill") };
+    let (first, last) = (points[0], points[points.len() - 1]);
+    assert_eq!((first, last), ([-2.0, -1.0, 0.0], [2.0, 1.0, 0.5]));
+    assert_eq!((points.len(), triangles.len()), (2 * 101, 2 * 100));
+    // all faces look up
+    assert!(triangles.iter().all(|t| {
+        let [a, b, c] = t.map(|k| points[k as usize]);
+        (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0
+    }));
+    rig.free_step();
+    assert_eq!(rig.states()[1], BodyState::REST);
+}

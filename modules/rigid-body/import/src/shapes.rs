@@ -43,7 +43,7 @@ impl<'a> Shapes<'a> {
             let place = Place { link, name: c.name.as_deref(), origin: &c.origin, collides: true, still };
             shapes.push(self.shape(place, &c.geometry)?);
         }
-        for v in link.visual.iter().filter(|_| !still) {
+        for v in &link.visual {
             let place = Place { link, name: v.name.as_deref(), origin: &v.origin, collides: false, still };
             let seen = match self.shape(place, &v.geometry) {
                 Ok(seen) => seen,

@@ -1,0 +1,91 @@
+//! Poses, coordinates and rates set by name before the first step give the robot that parameters give.
+#![allow(clippy::unwrap_used, missing_docs)]
+
+mod common;
+use common::Rig;
+use terraglue_subsystem::{Effect, Values};
+
+const G: f64 = 9.81;
+
+fn hexapod(more: &str) -> Rig {
+    Rig::new(&format!(r#"{{"model": "models/hexapod.urdf" {more}}}"#), G, 1e-3)
+}
+
+fn farthest(a: &Rig, b: &Rig) -> f64 {
+    let apart = |(a, b): (&terraglue_subsystem::BodyState, &terraglue_subsystem::BodyState)| {
+        let (p, q) = (a.world_from_body, b.world_from_body);
+        let place = (0..3).map(|k| (p.position[k] - q.position[k]).abs()).fold(0.0, f64::max);
+        let speed = |k: usize| {
+            let spin = (a.angular_velocity[k] - b.angular_velocity[k]).abs();
+            spin.max((a.linear_velocity[k] - b.linear_velocity[k]).abs())
+        };
+        let turn = (0..4).map(|k| (p.orientation[k] - q.orientation[k]).abs()).fold(0.0, f64::max);
+        (0..3).map(speed).fold(place.max(turn), f64::max)
+    };
+    a.states().iter().zip(&b.states()).map(apart).fold(0.0, f64::max)
+}
+
+#[test]
+fn what_is_set_before_the_start_is_what_parameters_give() {
+    let mut wanted = hexapod(
+        r#", "position_m": [0.4, -0.2, 1.5], "heading_rad": 0.7, "velocity_m_s": [0.3, 0.1, -0.2],
+        "rotation_rate_rad_s": [0, 0, 0.5], "joints": {"LF_j2": 0.6}, "joint_rates": {"LF_j3": 1.5}"#,
+    );
+    let mut rig = hexapod("");
+    for (name, value) in [
+        ("body.x", 0.4),
+        ("body.y", -0.2),
+        ("body.z", 1.5),
+        ("body.yaw", 0.7),
+        ("body.vx", 0.3),
+        ("body.vy", 0.1),
+        ("body.vz", -0.2),
+        ("body.wz", 0.5),
+        ("LF_j2.angle", 0.6),
+        ("LF_j3.velocity", 1.5),
+    ] {
+        rig.set(name, value);
+        assert!((rig.get(name) - value).abs() < 1e-12, "{name} reads {}", rig.get(name));
+    }
+    assert!(farthest(&rig, &wanted) < 1e-12, "{:e}", farthest(&rig, &wanted));
+    assert_eq!(rig.get("LF_j2.angle_target"), 0.6);
+    for _ in 0..100 {
+        rig.free_step();
+        wanted.free_step();
+    }
+    assert!(farthest(&rig, &wanted) < 1e-9, "{:e}", farthest(&rig, &wanted));
+}
+
+#[test]
+fn any_orientation_can_be_given_by_its_angles() {
+    let mut rig = hexapod("");
+    for (name, value) in [("body.yaw", -2.5), ("body.pitch", 1.1), ("body.roll", 2.9)] {
+        rig.set(name, value);
+    }
+    for (name, value) in [("body.yaw", -2.5), ("body.pitch", 1.1), ("body.roll", 2.9)] {
+        assert!((rig.get(name) - value).abs() < 1e-12, "{name} reads {}", rig.get(name));
+    }
+}
+
+#[test]
+fn what_follows_from_joints_and_what_comes_late_is_refused_and_changes_nothing() {
+    let mut rig = hexapod("");
+    let refused = |rig: &mut Rig, name: &str, value: f64, why: &str| {
+        let (id, before) = (rig.id(name), rig.get(name));
+        let said = rig.robot.set(&[id], Values::F64(&[value])).expect_err("refused").to_string();
+        assert!(said.contains(why), "{name}: {said}");
+        assert_eq!(rig.get(name).to_bits(), before.to_bits());
+    };
+    refused(&mut rig, "LF4.z", 1.0, "its joints");
+    refused(&mut rig, "body.pitch", 2.0, "beyond");
+    refused(&mut rig, "LF_j2.angle", 9.0, "limits");
+    refused(&mut rig, "body.contact_normal", 1.0, "read only");
+    let effect =
+        |rig: &Rig, name: &str| rig.robot.variables().iter().find(|v| v.name == name).unwrap().effect;
+    assert_eq!(effect(&rig, "body.z"), Effect::NeedsReset);
+    assert_eq!(effect(&rig, "LF_j2.velocity"), Effect::NeedsReset);
+    assert_eq!(effect(&rig, "LF4.z"), Effect::ReadOnly);
+    rig.free_step();
+    refused(&mut rig, "body.z", 1.0, "before the first step");
+    refused(&mut rig, "LF_j2.angle", 0.1, "before the first step");
+}

@@ -91,11 +91,14 @@ fn early(state: &State) -> Result {
     }
 }
 
-/// Places what hangs on joints, parents first.
+/// Places what hangs on joints that hold, parents first.
 fn follow(model: &Model, state: &mut State) {
     for (b, above) in model.joint_above.iter().enumerate() {
         let Some(j) = *above else { continue };
         let (joint, own) = (&model.joints[j], &state.joints[j]);
+        if own.broken {
+            continue;
+        }
         state.bodies[b] = place_child(joint, joint.parent.map(|p| &state.bodies[p]), own.angle);
         (state.bodies[b].v, state.bodies[b].w) = rates_of_child(joint, &state.bodies, own.velocity);
     }

@@ -178,3 +178,31 @@ def test_a_recording_tells_nothing_of_the_machine(short_run):
     assert len(text) > 100_000
     assert str(folder).encode() not in text and str(ROOT).encode() not in text
     assert b"threads" not in text and b"wall_s" not in text
+
+
+WORLD = """<robot name="room"><link name="world"><visual><geometry><mesh filename="wall.obj"/></geometry></visual>
+<collision><origin xyz="2 0 0"/><geometry><mesh filename="wall.obj"/></geometry></collision></link>
+<link name="bob"><inertial><mass value="1"/><inertia ixx="1" iyy="1" izz="1" ixy="0" ixz="0" iyz="0"/></inertial>
+<visual><geometry><sphere radius="0.1"/></geometry></visual></link>
+<joint name="hinge" type="continuous"><parent link="world"/><child link="bob"/><axis xyz="0 1 0"/></joint></robot>"""
+
+
+def test_what_stands_in_the_world_is_recorded_and_angles_can_be_set_at_the_start(tmp_path):
+    (tmp_path / "wall.obj").write_text("v 0 0 0\nv 0 1 0\nv 0 0 1\nf 1 2 3\n")
+    (tmp_path / "room.urdf").write_text(WORLD)
+    (tmp_path / "room.toml").write_text(
+        "[time]\nduration_s = 0.01\n[robot]\nmodule = \"rigid-body\"\nmodel = \"room.urdf\"\n"
+        "[[event]]\nat_s = 0.0\nset = { \"robot.hinge.angle\" = 0.5 }\n")
+    process = terraglue("run", tmp_path / "room.toml", "--out", tmp_path / "out", "--quiet", "--csv")
+    assert process.returncode == 0, process.stderr
+    all_records = list(records(tmp_path / "out" / "recording.mcap"))
+    scene = next(r.id for r in all_records if isinstance(r, Channel) and r.topic == "/scene")
+    message = next(r for r in all_records if isinstance(r, Message) and r.channel_id == scene)
+    world, = [e for e in json.loads(message.data)["entities"] if e["frame_id"] == "robot/world"]
+    places = [mesh["pose"]["position"]["x"] for mesh in world["triangles"]]
+    assert sorted(places) == [0.0, 2.0] and all(mesh["indices"] == [0, 1, 2] for mesh in world["triangles"])
+    with open(tmp_path / "out" / "variables.csv", newline="") as file:
+        assert abs(float(list(csv.DictReader(file))[-1]["robot.hinge.angle"]) - 0.5) < 1e-2
+    late = terraglue("run", tmp_path / "room.toml", "--out", tmp_path / "late", "--quiet",
+                     "--set", "event=[{ at_s = 0.005, set = { \"robot.hinge.angle\" = 0.5 } }]")
+    assert late.returncode != 0 and "before the first step" in late.stderr

@@ -304,7 +304,7 @@ impl TtForm {
     }
 
     /// Takes the step d: whole when the energy still falls at its end, else the first share s with
-    /// |g(s)| ≤ ½|g(0)|, g(s) = dᵀ·e(T + s·d) over the normal rows.
+    /// |g(s)| ≤ ½|g(0)|, g(s) = dᵀ·e(T + s·d) over the normal rows and the joints.
     ///
     /// Shear laws bend where slip turns back, and Newton can jump to and fro across the bend for ever. Where an
     /// iteration lasts, a step must also pass a filter (Fletcher and Leyffer 2002): no earlier iterate had less left
@@ -372,7 +372,11 @@ impl TtForm {
     }
 
     fn slope(&self, exchange: &Exchange) -> f64 {
-        exchange.ports.iter().map(|p| self.d[p.first as usize] * self.e[p.first as usize]).sum()
+        let of = |(row, de): (&Row, (&f64, &f64))| match row {
+            Row::Normal | Row::Joint => de.0 * de.1,
+            Row::Law | Row::Coulomb => 0.0,
+        };
+        exchange.rows.iter().zip(self.d.iter().zip(&self.e)).map(of).sum()
     }
 
     fn converged(&self, exchange: &mut Exchange, size: f64) -> Outcome {

@@ -1,5 +1,6 @@
 //! Figures of the plugin interface: the checker, its broken modules, its time, and what it says of our own modules.
 
+mod laws;
 mod newcomer;
 mod python;
 mod reload;
@@ -16,14 +17,23 @@ use terraglue::scenario::read_soil_table;
 use terraglue_soil_law::{COLUMNS, SoilRow};
 
 /// The parts, in the order of the table.
-pub const PARTS: [Part; 8] = [
+pub const PARTS: [Part; 9] = [
     ("tests", tests),
     ("broken", |context| collected(context, broken)),
     ("own", |context| collected(context, own)),
     ("seeds", |context| collected(context, seeds)),
+    ("laws", |context| collected(context, laws::figures)),
     ("speed", |context| timed(context, speed::figures)),
-    ("python", |context| timed(context, python::figures)),
-    ("reload", |context| timed(context, reload::figures)),
+    ("python", |context| {
+        let mut out = collected(context, python::faults)?;
+        out.extend(timed(context, python::figures)?);
+        Ok(out)
+    }),
+    ("reload", |context| {
+        let mut out = collected(context, reload::same)?;
+        out.extend(timed(context, reload::figures)?);
+        Ok(out)
+    }),
     ("newcomer", |context| timed(context, newcomer::figures)),
 ];
 
@@ -150,6 +160,12 @@ fn own(context: &Context, out: &mut Vec<Figure>) -> Outcome {
         report(context, &compiled(context, "law", "")?, |_| {})?;
         let took = start.elapsed().as_secs_f64();
         out.push(Figure::new("plugins.time.law", took, Limit::AtMost(5.0), "check of a law in C, s"));
+        let python = fresh(context, Kind::Law, Language::Python, "my_law.py")?;
+        let start = Instant::now();
+        report(context, &python, |_| {})?;
+        let took = start.elapsed().as_secs_f64();
+        let what = "check of a law in Python, s";
+        out.push(Figure::new("plugins.time.law-python", took, Limit::AtMost(5.0), what));
         let deps = context.program.with_file_name("deps");
         for name in ["soil-bekker", "soil-cellular-automaton"] {
             let file = deps.join(format!("lib{}_plugin.so", name.replace('-', "_")));

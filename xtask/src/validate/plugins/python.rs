@@ -23,6 +23,56 @@ class Echo(tg.Subsystem):
         out.x[:] = out.v[:] = out.a[:] = out.t[:] = input.t
 "#;
 
+/// A module that fails in `advance` half a second after the start.
+const FAULTY: &str = r#""""Fails.
+
+[module]
+name = "faulty"
+kind = "controller"
+"""
+import os
+import terraglue as tg
+
+
+class Faulty(tg.Subsystem):
+    def advance(self, step, input, out):
+        if step.t > 0.25:
+            FAULT
+"#;
+
+/// Statements that fail, and what must be told of each.
+const FAULTS: [(&str, &str); 3] = [
+    ("1 / 0", "ZeroDivisionError"),
+    ("os.kill(os.getpid(), 9)", "signal 9"),
+    ("[0 for _ in iter(int, 1)]", "did not answer"),
+];
+
+/// How many of three faults are told with name, function and time.
+pub fn faults(context: &Context, out: &mut Vec<Figure>) -> Outcome {
+    let mut told = 0;
+    for (k, (statement, words)) in FAULTS.iter().enumerate() {
+        let file = context.scratch.join(format!("faulty{k}.py"));
+        std::fs::write(&file, FAULTY.replace("FAULT", statement)).map_err(|e| e.to_string())?;
+        let module = LoadedModule::load(&file).map_err(|e| e.to_string())?;
+        let mut services = HostServices::new(1, &context.scratch);
+        services.isolation.step_timeout_s = 1.0;
+        let made = module.instantiate("mine", Config::default(), &services);
+        let mut instance = made.map_err(|e| e.to_string())?;
+        let input = Input::Force { t: &[], hold: Hold::End, motion: None };
+        let failure = (0..).find_map(|index| {
+            let step = Step::free(0.1 * index as f64, 0.1, index);
+            let [x, v, a, t] = &mut [[0.0; 0]; 4];
+            let mut answer = Response { x, v, a, t, reached: 0.0, flags: 0 };
+            instance.advance(&step, &input, &mut answer).err()
+        });
+        let text = failure.map_or_else(String::new, |e| e.to_string());
+        told += u32::from(["mine", "advance", "t = 0.3", words].iter().all(|part| text.contains(part)));
+    }
+    let what = "faults of a module in Python – raising, killed, hanging – told with name, function and time";
+    out.push(Figure::new("plugins.python.faults", f64::from(told), Limit::Equal(3.0), what));
+    Ok(())
+}
+
 /// Median and 99th percentile of the time of a call.
 pub fn figures(context: &Context, out: &mut Vec<Figure>) -> Outcome {
     let file = context.scratch.join("echo.py");

@@ -27,6 +27,27 @@ pub fn figures(context: &Context, out: &mut Vec<Figure>) -> Outcome {
     Ok(())
 }
 
+/// How many numbers of a run differ where the same code is exchanged for itself in the middle.
+pub fn same(context: &Context, out: &mut Vec<Figure>) -> Outcome {
+    let folder = made(context, Language::C)?;
+    let run = |at_steps| -> Outcome<Vec<u64>> {
+        let (mut testbed, mut reloader) = started(context, &folder, at_steps)?;
+        let mut bits = Vec::new();
+        for k in 1..=200 {
+            reloader.run_until(&mut testbed, 1e-3 * f64::from(k), &mut []).map_err(|e| e.to_string())?;
+            for name in ["controller.angle_target", "controller.speed_target", "robot.shoulder.angle"] {
+                bits.push(testbed.read(name).ok_or_else(|| format!("no variable {name}"))?.to_bits());
+            }
+        }
+        Ok(bits)
+    };
+    let (plain, exchanged) = (run(Vec::new())?, run(vec![("controller".to_owned(), 100)])?);
+    let differ = plain.iter().zip(&exchanged).filter(|(a, b)| a != b).count();
+    let what = "numbers of a run that differ when code is exchanged for the same code at step 100";
+    out.push(Figure::new("plugins.reload.same", differ as f64, Limit::Equal(0.0), what));
+    Ok(())
+}
+
 /// The folder of a new controller, built.
 fn made(context: &Context, language: Language) -> Outcome<PathBuf> {
     let place =

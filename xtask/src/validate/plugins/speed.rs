@@ -62,7 +62,7 @@ fn plugin(path: &Path, config: &Config) -> Outcome<PluginLaw> {
 }
 
 /// The law in C, by the system's compiler.
-fn compiled(context: &Context) -> Outcome<std::path::PathBuf> {
+pub fn compiled(context: &Context) -> Outcome<std::path::PathBuf> {
     let library = context.scratch.join("liblaw_bekker_c_plugin.so");
     let mut cc = Command::new("cc");
     cc.args(["-std=c11", "-O2", "-fPIC", "-shared", "-I"]).arg(root().join("interfaces/plugin/include"));

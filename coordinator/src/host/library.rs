@@ -151,8 +151,12 @@ impl LoadedModule {
         }
     }
 
-    /// The same in a process of its own; a module linked into the program has no library and stays here.
-    pub(crate) fn instantiate_isolated(
+    /// The same in a process of its own, which may take so long for a call; a module linked into the program has no library and
+    /// stays here.
+    ///
+    /// # Errors
+    /// As [`LoadedModule::instantiate`], or no process can be started.
+    pub fn instantiate_isolated(
         &self,
         instance_name: &str,
         config: Config,

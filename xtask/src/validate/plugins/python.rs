@@ -4,7 +4,7 @@ use super::super::timing::median;
 use super::super::{Context, Figure, Limit};
 use crate::process::Outcome;
 use std::time::Instant;
-use terraglue::host::{HostServices, LoadedModule};
+use terraglue::host::{HostServices, Isolation, LoadedModule};
 use terraglue::subsystem::{Config, Hold, Input, Response, Step};
 
 const NUMBERS: usize = 64;
@@ -54,9 +54,9 @@ pub fn faults(context: &Context, out: &mut Vec<Figure>) -> Outcome {
         let file = context.scratch.join(format!("faulty{k}.py"));
         std::fs::write(&file, FAULTY.replace("FAULT", statement)).map_err(|e| e.to_string())?;
         let module = LoadedModule::load(&file).map_err(|e| e.to_string())?;
-        let mut services = HostServices::new(1, &context.scratch);
-        services.isolation.step_timeout_s = 1.0;
-        let made = module.instantiate("mine", Config::default(), &services);
+        let services = HostServices::new(1, &context.scratch);
+        let isolation = Isolation { step_timeout_s: 1.0, ..Isolation::default() };
+        let made = module.instantiate_isolated("mine", Config::default(), &services, isolation);
         let mut instance = made.map_err(|e| e.to_string())?;
         let input = Input::Force { t: &[], hold: Hold::End, motion: None };
         let failure = (0..).find_map(|index| {

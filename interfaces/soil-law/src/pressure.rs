@@ -4,7 +4,8 @@
 //! soil is elastic: p = p_max − k_u·(z_max − z), never tension (Wong 1984, "repetitive normal load").
 //! The families differ in how the power law depends on the size b of the contact; see [`PressureLaw`].
 //! No soil is stiffer in virgin loading than in unloading, so for n < 1, where the power law starts with an
-//! infinite slope, the line p = k_u·z holds up to where it meets the power law.
+//! infinite slope, the line p = k_u·z holds up to where it meets the power law. For n > 1, whose slope grows without bound,
+//! it goes on straight where the slope has come to 0.99 k_u: beyond, unloading would give back more than was put in.
 
 use crate::expression::{PressureExpression, Program, curve};
 use crate::plugin::PluginLaw;
@@ -105,20 +106,33 @@ pub struct PressureCurve {
     unloading: f64,
     /// Depth up to which the elastic line holds in virgin loading, m; 0 for n ≥ 1.
     elastic_limit: f64,
+    /// Depth from which first loading goes on straight, m; infinite for n ≤ 1, for what is no power law, and where nothing
+    /// sinks as deep.
+    stiff_limit: f64,
     /// Where it is no power law, `modulus` and `exponent` are those of the power law that touches it at 1 cm.
     shape: Shape,
 }
 
 /// Depth at which a law that is no power law is compared with one, m.
 const TYPICAL_DEPTH: f64 = 0.01;
+/// Largest slope of a power law in first loading over that of unloading.
+const STIFFEST: f64 = 0.99;
+/// Depth that no contact reaches, m.
+const BOTTOMLESS: f64 = 1e3;
 
 impl PressureCurve {
     /// p = modulus·z^exponent with unloading stiffness `k_u` (Pa/m).
     pub fn new(modulus: f64, exponent: f64, k_u: f64) -> Self {
         let elastic_limit =
             if exponent < 1.0 { libm::pow(modulus / k_u, 1.0 / (1.0 - exponent)) } else { 0.0 };
-        let modulus = if exponent == 1.0 { modulus.min(0.99 * k_u) } else { modulus };
-        Self { modulus, exponent, unloading: k_u, elastic_limit, shape: Shape::Power }
+        let stiff_limit = if exponent > 1.0 {
+            let z = libm::pow(STIFFEST * k_u / (exponent * modulus), 1.0 / (exponent - 1.0));
+            if z < BOTTOMLESS { z } else { f64::INFINITY }
+        } else {
+            f64::INFINITY
+        };
+        let modulus = if exponent == 1.0 { modulus.min(STIFFEST * k_u) } else { modulus };
+        Self { modulus, exponent, unloading: k_u, elastic_limit, stiff_limit, shape: Shape::Power }
     }
 
     /// First loading by a program of z with unloading stiffness `k_u` (Pa/m). A power law becomes the built-in one.
@@ -134,13 +148,15 @@ impl PressureCurve {
     pub fn of_law(law: PluginLaw, b: f64, k_u: f64) -> Self {
         if law.state_doubles() > 0 {
             let shape = Shape::Law(law, b);
-            return Self { modulus: b, exponent: 1.0, unloading: k_u, elastic_limit: 0.0, shape };
+            let (elastic_limit, stiff_limit) = (0.0, f64::INFINITY);
+            return Self { modulus: b, exponent: 1.0, unloading: k_u, elastic_limit, stiff_limit, shape };
         }
         Self::of_shape(Shape::Law(law, b), k_u)
     }
 
     fn of_shape(shape: Shape, k_u: f64) -> Self {
-        let mut out = Self { modulus: 0.0, exponent: 1.0, unloading: k_u, elastic_limit: 0.0, shape };
+        let (elastic_limit, stiff_limit) = (0.0, f64::INFINITY);
+        let mut out = Self { modulus: 0.0, exponent: 1.0, unloading: k_u, elastic_limit, stiff_limit, shape };
         let (p, slope) = out.beyond(TYPICAL_DEPTH);
         out.exponent = slope * TYPICAL_DEPTH / p;
         out.modulus = p * libm::pow(TYPICAL_DEPTH, -out.exponent);
@@ -196,6 +212,11 @@ impl PressureCurve {
         self.elastic_limit
     }
 
+    /// Pressure where first loading begins to go on straight, Pa.
+    fn stiff_pressure(&self) -> f64 {
+        STIFFEST * self.unloading * self.stiff_limit / self.exponent
+    }
+
     /// Tells curves of one soil apart.
     pub fn key(&self) -> [f64; 2] {
         [self.modulus, self.exponent]
@@ -215,6 +236,8 @@ impl PressureCurve {
             self.beyond(z).0
         } else if self.exponent == 1.0 {
             self.modulus * z
+        } else if z > self.stiff_limit {
+            self.stiff_pressure() + STIFFEST * self.unloading * (z - self.stiff_limit)
         } else {
             self.modulus * libm::pow(z, self.exponent)
         }
@@ -231,6 +254,8 @@ impl PressureCurve {
             self.beyond(z).1
         } else if self.exponent == 1.0 {
             self.modulus
+        } else if z > self.stiff_limit {
+            STIFFEST * self.unloading
         } else if z == 0.0 {
             0.0
         } else {
@@ -246,6 +271,8 @@ impl PressureCurve {
             curve::depth(&|z| self.beyond(z), p, self.elastic_limit)
         } else if self.exponent == 1.0 {
             p / self.modulus
+        } else if p > self.stiff_pressure() {
+            self.stiff_limit + (p - self.stiff_pressure()) / (STIFFEST * self.unloading)
         } else {
             libm::pow(p / self.modulus, 1.0 / self.exponent)
         }
@@ -259,6 +286,10 @@ impl PressureCurve {
         let e = self.elastic_limit;
         if self.is_batched() {
             return 0.5 * self.unloading * e * e + curve::work(&|z| self.beyond(z), e, z);
+        }
+        if z > self.stiff_limit {
+            let (z_s, p_s) = (self.stiff_limit, self.stiff_pressure());
+            return z_s * p_s / (self.exponent + 1.0) + 0.5 * (p + p_s) * (z - z_s);
         }
         let below = self.unloading * e * e;
         0.5 * below + (z * p - below) / (self.exponent + 1.0)
@@ -312,6 +343,10 @@ impl PressureCurve {
         if e == 1.0 {
             return k * permanent / (k - self.modulus);
         }
+        let (z_s, p_s) = (self.stiff_limit, self.stiff_pressure());
+        if z_s.is_finite() && permanent > z_s - p_s / k {
+            return (k * permanent + p_s - STIFFEST * k * z_s) / (k - STIFFEST * k);
+        }
         // the difference is convex for n < 1 (Newton from the right) and concave for n > 1 (from the left)
         let mut z = if e < 1.0 { guess.max(permanent).max(self.elastic_limit) } else { permanent };
         for _ in 0..20 {
@@ -342,7 +377,29 @@ mod tests {
         (3.0e4..2.0e7, 0.11..1.7).prop_map(|(k, n)| PressureCurve::new(k, n, 4e8))
     }
 
+    /// Exponents above 1 over elastic lines that are hardly stiffer than the law, or softer.
+    fn soft_lines() -> impl Strategy<Value = PressureCurve> {
+        (3.0e4..2.0e7, 1.01..2.8, 3.0..8.0f64)
+            .prop_map(|(k, n, k_u)| PressureCurve::new(k, n, 10f64.powf(k_u)))
+    }
+
     proptest! {
+        #[test]
+        fn soil_gives_back_no_more_than_was_put_in(curve in soft_lines(), a in 1e-6..0.5f64, b in 1e-6..0.5f64) {
+            let (from, to) = (a.min(b), a.max(b));
+            let [p_from, p_to] = [from, to].map(|z| curve.virgin(z));
+            prop_assert!(curve.virgin_slope(to, p_to) <= curve.unloading());
+            let kept = |z: f64, p: f64| curve.virgin_work(z, p) - 0.5 * p * p / curve.unloading();
+            prop_assert!(kept(to, p_to) >= kept(from, p_from) - 1e-9 * curve.virgin_work(to, p_to));
+            let deepest = curve.largest_depth(curve.permanent(to, p_to), to);
+            prop_assert!((deepest - to).abs() <= 1e-9 * to + 1e-12, "{deepest} {to}");
+            prop_assert!((curve.virgin_depth(p_to) - to).abs() <= 1e-9 * to);
+            let steps = 4000;
+            let p = |k: i32| curve.virgin(to * f64::from(k) / f64::from(steps));
+            let sum: f64 = (1..=steps).map(|k| 0.5 * (p(k) + p(k - 1)) * to / f64::from(steps)).sum();
+            prop_assert!((sum - curve.virgin_work(to, p_to)).abs() <= 1e-4 * sum);
+        }
+
         #[test]
         fn the_inverse_undoes_the_law(curve in curves(), z in 1e-9..0.2f64, z_max in 0.0..0.1f64) {
             let (p, _) = curve.at(z, z_max, curve.virgin(z_max));

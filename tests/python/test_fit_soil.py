@@ -103,3 +103,47 @@ def test_rows_of_the_soil_table_reach_a_law_that_is_a_module_and_its_run_is_draw
         assert "<svg" in page and "soil" in page
     # With z_1 far below every foot the law is Bekker's, with the numbers of the row.
     assert deepest["module"] == pytest.approx(deepest["built-in"], rel=1e-5) and deepest["module"] > 1e-3
+
+
+def written(folder, name, rows, header="sinkage_mm,pressure_kPa,b_mm"):
+    path = folder / name
+    path.write_text("\n".join([header, *rows]) + "\n")
+    return path
+
+
+def test_too_few_readings_give_no_interval(tmp_path):
+    data = written(tmp_path, "few.csv", ["5,10,50", "10,20,50", "20,40,50"])
+    out = tmp_path / "soil.toml"
+    process = terraglue("fit-soil", data, "--law", "bekker", "--out", out)
+    assert process.returncode == 0, process.stderr
+    assert "unknown" in process.stdout and "nan" not in process.stdout.lower()
+    assert "95 %: unknown" in out.read_text() and "0.0 … 0.0" not in out.read_text()
+    found = json.loads(terraglue("fit-soil", data, "--law", "bekker", "--json").stdout)
+    assert found["parameters"]["n"]["low"] is None and found["parameters"]["n"]["value"] == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize("option", ["--density=nan", "--density=-3", "--cohesion-pa=-1000", "--phi-deg=95", "--shear-m=-1",
+                                    "--from-mm=nan"])
+def test_options_have_ranges(tmp_path, option):
+    out = tmp_path / "soil.toml"
+    process = terraglue("fit-soil", PLATES, "--law", "reece", "--density=1500", "--cohesion-pa=1000", option, "--out", out) \
+        if option.split("=")[0] not in ("--density", "--cohesion-pa") else \
+        terraglue("fit-soil", PLATES, "--law", "reece", option, "--out", out)
+    assert process.returncode == 2 and f"`{option.split('=')[0]}`" in process.stderr, process.stderr
+    assert "a number" in process.stderr and not out.exists()
+
+
+def test_refused_rows_are_refused_and_the_table_is_found_from_elsewhere(tmp_path):
+    for row in ("Toyoura_sand_Ishigami", "GRC-1_GRC-3_JSC-1A"):
+        process = terraglue("fit-soil", PLATES, "--law", "bekker", "--soil", row)
+        assert process.returncode == 2 and "cannot be used" in process.stderr, process.stderr
+    process = terraglue("fit-soil", PLATES, "--law", "bearing", "--soil", "CMU_Direct90_s0", cwd=tmp_path)
+    assert process.returncode == 0, process.stderr
+
+
+def test_doubtful_units_and_seen_readings_are_said(tmp_path):
+    rows = ["5,10,50", "10,20,50", "20,40,50"]
+    data = written(tmp_path, "m.csv", rows, "sinkage_m,pressure_kPa,b_mm")
+    assert "largest sinkage is 20 m" in terraglue("fit-soil", data, "--law", "bekker").stderr
+    process = terraglue("fit-soil", PLATES, "--law", "bekker", "--predict", PLATES)
+    assert "the very readings of the fit" in process.stdout and "not seen before" not in process.stdout, process.stdout

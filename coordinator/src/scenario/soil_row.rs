@@ -9,15 +9,16 @@ use std::path::{Path, PathBuf};
 use terraglue_soil_law::{SoilTable, TableError};
 
 /// The soil table beside a scenario: `../models/soils.csv` or `models/soils.csv` from its folder or from the
-/// current one, or that of the installation.
+/// current one, that of the installation, or that of the sources from whose `target` folder the program runs.
 pub fn find_soil_table(folder: &Path) -> Option<PathBuf> {
-    let beside_program = || {
-        let program = std::env::current_exe().ok()?;
-        Some(program.parent()?.join("../share/terraglue/models/soils.csv"))
-    };
+    let program = std::env::current_exe().ok();
+    let program = program.as_deref().and_then(Path::parent);
+    let beside_program = ["../share/terraglue/models/soils.csv", "../../models/soils.csv"]
+        .into_iter()
+        .filter_map(|p| Some(program?.join(p)));
     let near = ["../models/soils.csv", "models/soils.csv"].map(|p| folder.join(p));
     let here = Some(PathBuf::from("models/soils.csv"));
-    near.into_iter().chain(here).chain(beside_program()).find(|path| path.is_file())
+    near.into_iter().chain(here).chain(beside_program).find(|path| path.is_file())
 }
 
 /// Reads a soil table.

@@ -3,14 +3,16 @@
 //! The fit itself is in `terraglue_soil_law::fit`; here are files, names and units.
 
 mod drawing;
+mod known;
 mod module_law;
 mod readings;
 mod written;
 
 pub use drawing::{Curve, svg};
+pub use known::{Options, known};
 pub use module_law::{LawFit, LawNumber, fit_module};
 pub use readings::{PlateTests, read};
-pub use written::{basis, json, law_json, law_toml, rests, toml};
+pub use written::{Predicted, basis, json, law_json, law_toml, rests, shown, toml};
 
 use crate::scenario::InputError;
 use terraglue_soil_law::fit::{Fit, FitLaw, Interval, fit};

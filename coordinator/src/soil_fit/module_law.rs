@@ -17,7 +17,7 @@ pub struct LawNumber {
     pub help: String,
     /// Value.
     pub value: f64,
-    /// 95 % confidence; None: it was given, or plates do not tell it.
+    /// 95 % confidence, NaN: unknown; None: it was given, or plates do not tell it.
     pub interval: Option<Interval>,
 }
 
@@ -81,7 +81,7 @@ pub fn fit_module(plugin: &str, tests: &PlateTests, known: Known) -> Result<LawF
     let law = bench.with(&values).map_err(plain)?;
     let interval = |k: usize| {
         let at = sought.iter().position(|s| *s == k)?;
-        Some(fit.intervals[at]).filter(|i| !i.low.is_nan())
+        Some(fit.intervals[at]).filter(|i| !i.low.is_nan() || values[k] != all[k])
     };
     let numbers = parameters.iter().enumerate().map(|(k, p)| LawNumber {
         name: p.name.clone(),

@@ -13,6 +13,30 @@ pub struct PlateTests {
     pub rows: usize,
     /// Rows left out because the plate was not seated yet.
     pub shallow: usize,
+    /// Names of the columns of sinkage and pressure.
+    pub columns: [String; 2],
+}
+
+/// Largest sinkage (m) and range of the largest pressure (Pa) that plate tests have.
+const DEEPEST: f64 = 1.0;
+const PRESSURES: [f64; 2] = [100.0, 1e8];
+
+impl PlateTests {
+    /// What makes the unit of a column doubtful; None: nothing.
+    pub fn doubt(&self) -> Option<String> {
+        let largest = |of: fn(&Reading) -> f64| self.readings.iter().map(of).fold(0.0, f64::max);
+        let (depth, pressure) = (largest(|r| r.depth), largest(|r| r.pressure));
+        let [sinkages, pressures] = &self.columns;
+        if depth > DEEPEST {
+            return Some(format!(
+                "the largest sinkage is {depth} m: is the column `{sinkages}` in that unit?"
+            ));
+        }
+        let wrong = pressure > 0.0 && !(PRESSURES[0]..=PRESSURES[1]).contains(&pressure);
+        wrong.then(|| {
+            format!("the largest pressure is {pressure} Pa: is the column `{pressures}` in that unit?")
+        })
+    }
 }
 
 /// Name of a column and how many SI units its unit has.
@@ -56,7 +80,8 @@ fn parse(text: &str, from: f64) -> Result<PlateTests, Wrong> {
     let columns = [find(&header, SINKAGE)?, find(&header, PRESSURE)?, find(&header, SIZE)?];
     let labels: Vec<usize> =
         (0..header.len()).filter(|k| !MEASURED.iter().any(|m| header[*k].starts_with(m))).collect();
-    let mut tests = PlateTests { readings: Vec::new(), rows: 0, shallow: 0 };
+    let names = [columns[0].0, columns[1].0].map(|place| header[place].to_owned());
+    let mut tests = PlateTests { readings: Vec::new(), rows: 0, shallow: 0, columns: names };
     let mut curves: Vec<Vec<&str>> = Vec::new();
     for (k, line) in lines {
         let cells: Vec<&str> = line.split(',').map(str::trim).collect();
@@ -110,6 +135,17 @@ mod tests {
         let r = tests.readings[1];
         assert!((r.b - 0.03).abs() < 1e-12 && (r.depth - 3e-3).abs() < 1e-12 && r.pressure == 2500.0);
         assert_eq!(tests.readings.iter().map(|r| r.curve).collect::<Vec<_>>(), [0, 1, 1]);
+    }
+
+    #[test]
+    fn units_that_cannot_be_are_doubted() {
+        let doubt = |text: &str| parse(text, 0.0).unwrap().doubt();
+        assert_eq!(doubt("sinkage_mm,b_m,pressure_kPa\n20,0.05,30\n"), None);
+        let deep = doubt("sinkage_m,b_m,pressure_kPa\n20,0.05,30\n").unwrap();
+        assert!(deep.contains("sinkage is 20 m") && deep.contains("`sinkage_m`"), "{deep}");
+        let light = doubt("sinkage_mm,b_m,pressure_Pa\n20,0.05,30\n").unwrap();
+        assert!(light.contains("pressure is 30 Pa") && light.contains("`pressure_Pa`"), "{light}");
+        assert!(doubt("sinkage_mm,b_m,pressure_MPa\n20,0.05,300\n").is_some());
     }
 
     #[test]

@@ -1,17 +1,73 @@
 //! A fit as a soil file for scenarios, and as JSON.
 
-use super::{Known, LawFit, SoilFit};
+use super::{Known, LawFit, PlateTests, SoilFit};
 use serde_json::{Value, json as value};
-use terraglue_soil_law::fit::Basis;
+use terraglue_soil_law::fit::{Basis, Interval};
 
 /// Significant digits of what is written: more than any plate test knows.
 fn digits(x: f64) -> String {
-    if x == 0.0 || !x.is_finite() {
+    if x == 0.0 {
         return "0.0".into();
+    }
+    if !x.is_finite() {
+        return "unknown".into();
     }
     let rounded: f64 = format!("{x:.6e}").parse().unwrap_or(x);
     let text = format!("{rounded}");
     if text.contains('.') { text } else { format!("{text}.0") }
+}
+
+/// `low … high` with each end as `number` writes it; "unknown" where readings were too few for an interval.
+fn ends(i: Interval, number: impl Fn(f64) -> String) -> String {
+    if i.low.is_finite() && i.high.is_finite() {
+        format!("{} … {}", number(i.low), number(i.high))
+    } else {
+        "unknown".into()
+    }
+}
+
+/// An interval for the screen.
+pub fn shown(i: Interval) -> String {
+    ends(i, |x| format!("{x:.4}"))
+}
+
+/// How a fit does on other tests.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Predicted {
+    /// Name of the file.
+    pub file: String,
+    /// Root of the mean square of ln(p/p_measured).
+    pub rms: f64,
+    /// Readings.
+    pub readings: usize,
+    /// Those of them that the fit has seen.
+    pub seen: usize,
+}
+
+impl Predicted {
+    /// Of the tests `other`, after a fit to `fitted`.
+    pub fn of(file: String, rms: f64, other: &PlateTests, fitted: &PlateTests) -> Self {
+        let same = |r: &&terraglue_soil_law::fit::Reading| {
+            fitted.readings.iter().any(|f| [f.b, f.depth, f.pressure] == [r.b, r.depth, r.pressure])
+        };
+        let seen = other.readings.iter().filter(same).count();
+        Self { file, rms, readings: other.readings.len(), seen }
+    }
+
+    fn json(&self) -> Value {
+        value!({ "file": self.file, "rms": self.rms, "readings": self.readings, "readings_of_the_fit": self.seen })
+    }
+}
+
+impl std::fmt::Display for Predicted {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let new = match self.seen {
+            0 => "not seen before".to_owned(),
+            all if all == self.readings => "the very readings of the fit: no test of it".to_owned(),
+            some => format!("{some} of its readings are those of the fit: no clean test of it"),
+        };
+        write!(f, "{}, {new}: rms {:.2} % over {} readings", self.file, 100.0 * self.rms, self.readings)
+    }
 }
 
 /// The table of a soil, for `parameters = "soil.toml"` or to be copied into a scenario. `source` says where the
@@ -19,7 +75,7 @@ fn digits(x: f64) -> String {
 pub fn toml(fit: &SoilFit, source: &str) -> String {
     let mut text = format!("# {source}\n# {}\n\n[soil]\npressure_law = \"{}\"\n", basis(fit), fit.law);
     for p in &fit.parameters {
-        let known = format!("95 %: {} … {}", digits(p.interval.low), digits(p.interval.high));
+        let known = format!("95 %: {}", ends(p.interval, digits));
         text += &format!("{} = {}  # {}; {known}\n", p.name, digits(p.value), p.help);
     }
     if fit.law == "bearing" {
@@ -74,7 +130,7 @@ pub fn law_toml(fit: &LawFit, source: &str) -> String {
     for n in &fit.numbers {
         match n.interval {
             Some(i) => {
-                let known = format!("95 %: {} … {}", digits(i.low), digits(i.high));
+                let known = format!("95 %: {}", ends(i, digits));
                 text += &format!("{} = {}  # {}; {known}\n", n.name, digits(n.value), n.help);
             }
             None => {
@@ -85,8 +141,8 @@ pub fn law_toml(fit: &LawFit, source: &str) -> String {
     text
 }
 
-/// Everything of it for programs. `predicted` is (file, rms, readings).
-pub fn law_json(fit: &LawFit, from: f64, predicted: Option<(&str, f64, usize)>) -> Value {
+/// Everything of it for programs.
+pub fn law_json(fit: &LawFit, from: f64, predicted: Option<&Predicted>) -> Value {
     let (basis, groups) = match fit.basis {
         Basis::Curves(n) => ("curves", n),
         Basis::Pieces(n) => ("pieces", n),
@@ -103,12 +159,12 @@ pub fn law_json(fit: &LawFit, from: f64, predicted: Option<(&str, f64, usize)>) 
         "rms": fit.rms,
         "from_m": from,
         "intervals_from": { "basis": basis, "groups": groups, "confidence": 0.95 },
-        "predicted": predicted.map(|(file, rms, readings)| value!({ "file": file, "rms": rms, "readings": readings })),
+        "predicted": predicted.map(Predicted::json),
     })
 }
 
-/// Everything for programs. `predicted` is (file, rms, readings).
-pub fn json(fit: &SoilFit, all: &[SoilFit], from: f64, predicted: Option<(&str, f64, usize)>) -> Value {
+/// Everything for programs.
+pub fn json(fit: &SoilFit, all: &[SoilFit], from: f64, predicted: Option<&Predicted>) -> Value {
     let (basis, groups) = match fit.fit.basis {
         Basis::Curves(n) => ("curves", n),
         Basis::Pieces(n) => ("pieces", n),
@@ -131,6 +187,6 @@ pub fn json(fit: &SoilFit, all: &[SoilFit], from: f64, predicted: Option<(&str, 
         "from_m": from,
         "intervals_from": { "basis": basis, "groups": groups, "confidence": 0.95 },
         "rms_of_laws": laws,
-        "predicted": predicted.map(|(file, rms, readings)| value!({ "file": file, "rms": rms, "readings": readings })),
+        "predicted": predicted.map(Predicted::json),
     })
 }

@@ -79,6 +79,22 @@ def test_wrong_masks_are_refused(tmp_path):
         assert all(part in process.stderr for part in said), process.stderr
 
 
+def test_a_label_without_nodes_is_warned_of(tmp_path):
+    process = terraglue("check", scenario(tmp_path, [[1, 0]]))
+    assert process.returncode == 0, process.stderr
+    assert "label 7 of regions.png" in process.stderr and "covers no node" in process.stderr
+    assert "label 1 " not in process.stderr
+
+
+def test_an_elastic_line_in_place_of_the_law_is_warned_of(tmp_path):
+    path = scenario(tmp_path, [[1, 7]], ROWS.replace("LETE_sand", "heavy_clay_WES_25pct"))
+    process = terraglue("check", path)
+    assert process.returncode == 0 and "`elastic_stiffness_pa_m` = 4e8" in process.stderr, process.stderr
+    assert "of label 1 (heavy_clay_WES_25pct) down to 2.5" in process.stderr and process.stderr.count("takes the place") == 1
+    path.write_text(path.read_text().replace("[soil]\n", "[soil]\nelastic_stiffness_pa_m = 1e10\n"))
+    assert "takes the place" not in terraglue("check", path).stderr
+
+
 def test_an_exported_unit_carries_the_mask(tmp_path):
     path = scenario(tmp_path, [[1, 0, 7]])
     plain = forces(tmp_path / "plain", path)

@@ -4,7 +4,9 @@ use super::model::{GluingSpec, Scenario, SubsystemSpec, Trigger};
 use super::parameters::check_own_table;
 use super::source::{InputError, Source};
 use crate::gluing::{cooperative_compliant, iterative, relaxed, semi_implicit};
-use terraglue_subsystem::Schema;
+use serde_json::Value;
+use terraglue_soil_law::SoilParameters;
+use terraglue_subsystem::{Config, Schema};
 
 /// Events after the end of the run.
 pub fn late_events(scenario: &Scenario) -> Vec<String> {
@@ -65,8 +67,59 @@ pub fn unchosen(schema: &Schema, spec: &SubsystemSpec, source: &Source) -> Optio
     Some(format!("{} (no effect now: `{}` has `module = \"{module}\"`)", line_of(&wrong), spec.name))
 }
 
+/// Size of a small foot, m: under it the power law of a soil is looked at.
+const SMALL: f64 = 0.02;
+/// Depth up to which nobody minds that the elastic line stands for the law, m.
+const UNNOTICED: f64 = 1e-4;
+
+/// Soils of a subsystem whose power law the elastic line replaces down to a depth that matters. Pressures written as text
+/// or answered by modules are not looked at. `gravity` in m/s².
+pub fn replaced_laws(
+    scenario: &Scenario,
+    spec: &SubsystemSpec,
+    config: &Config,
+    gravity: f64,
+) -> Vec<String> {
+    let own = std::iter::once((String::new(), Some(config.clone())));
+    let regions = spec.regions.iter().map(|region| {
+        let numbers = region.numbers.iter();
+        let all: Option<Value> = serde_json::from_str(&config.to_json()).ok();
+        let merged = all.and_then(|mut all| {
+            all.as_object_mut()?.extend(numbers.map(|(key, value)| (key.clone(), value.clone())));
+            Config::parse(&all.to_string()).ok()
+        });
+        (format!(" of label {} ({})", region.label, region.soil), merged)
+    });
+    let of = |(whose, config): (String, Option<Config>)| {
+        let config = config?;
+        let other =
+            ["law.pressure", "law.plugin"].iter().any(|key| config.get(key).is_some_and(|v| !v.is_null()));
+        if other || config.get(STIFFNESS).is_none_or(Value::is_null) {
+            return None;
+        }
+        let soil = SoilParameters::from_config(&config, gravity).ok()?;
+        let stiffness = soil.elastic_stiffness_pa_m;
+        let depth = soil.pressure().curve(SMALL, stiffness).elastic_limit();
+        if depth <= UNNOTICED {
+            return None;
+        }
+        let needed = stiffness * (depth / UNNOTICED).powf(1.0 - soil.n);
+        let message = format!(
+            "`{STIFFNESS}` = {stiffness:e} takes the place of the soil's law{whose} down to {:.2} mm under a contact of b = {} \
+             mm; {needed:.1e} would down to {} mm",
+            1e3 * depth,
+            1e3 * SMALL,
+            1e3 * UNNOTICED
+        );
+        Some(line_of(&scenario.source.error_at_value(&[&spec.name, STIFFNESS], message, None)))
+    };
+    own.chain(regions).filter_map(of).collect()
+}
+
+const STIFFNESS: &str = "elastic_stiffness_pa_m";
+
 /// An error in one line: place and message.
-fn line_of(error: &InputError) -> String {
+pub(super) fn line_of(error: &InputError) -> String {
     let (file, text) = (error.source_code.name(), error.source_code.inner());
     let start = error.span.map_or(0, |s| s.offset());
     let line = text.get(..start).map_or(1, |head| head.matches('\n').count() + 1);

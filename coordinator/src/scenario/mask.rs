@@ -1,5 +1,6 @@
 //! `[soil.mask]`: a file of labels becomes the number of a soil at every node of the ground.
 
+use super::advice::line_of;
 use super::model::{Region, Scenario, SubsystemSpec};
 use super::node::{Node, Raw};
 use super::soil_row;
@@ -89,6 +90,14 @@ pub fn resolve(
         match runs.last_mut() {
             Some([count, last]) if *last == soil => *count += 1,
             _ => runs.push([1, soil]),
+        }
+    }
+    for (k, region) in spec.regions.iter().enumerate() {
+        if !runs.iter().any(|[_, soil]| *soil == k as u32 + 1) {
+            let message =
+                format!("label {} of {file} ({}) covers no node of the ground", region.label, region.soil);
+            let path: [&str; 4] = [&spec.name, "mask", "rows", &region.label.to_string()];
+            log::warn!("{}", line_of(&scenario.source.error_at_value(&path, message, None)));
         }
     }
     let soils: Vec<&Map<String, Value>> = spec.regions.iter().map(|region| &region.numbers).collect();

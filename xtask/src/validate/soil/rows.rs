@@ -1,7 +1,7 @@
 //! The soils of the figures: rows of `models/soils.csv`, as a module's configuration and as numbers.
 
 use crate::process::{Outcome, read, root};
-use terraglue_soil_law::{COLUMNS, SoilTable};
+use terraglue_soil_law::{COLUMNS, DEFAULT_ELASTIC_STIFFNESS, SoilTable};
 
 /// Row of the table, and the short name under which the reference data know the soil.
 pub const EIGHT: [(&str, &str); 8] = [
@@ -46,9 +46,12 @@ impl Row {
         self.modulus(b) * z.powf(self.value("n"))
     }
 
-    /// Depth at which Bekker's law gives the pressure p, m.
+    /// Depth at which soil pressed for the first time gives the pressure p, m: Bekker's law, or the elastic line where the
+    /// law would be stiffer than it (n < 1 near the surface). There the line is the deeper of both.
     pub fn depth(&self, p: f64, b: f64) -> f64 {
-        (p / self.modulus(b)).powf(1.0 / self.value("n"))
+        let n = self.value("n");
+        let law = (p / self.modulus(b)).powf(1.0 / n);
+        if n < 1.0 { law.max(p / DEFAULT_ELASTIC_STIFFNESS) } else { law }
     }
 }
 

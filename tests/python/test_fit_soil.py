@@ -112,7 +112,7 @@ def written(folder, name, rows, header="sinkage_mm,pressure_kPa,b_mm"):
 
 
 def test_too_few_readings_give_no_interval(tmp_path):
-    data = written(tmp_path, "few.csv", ["5,10,50", "10,20,50", "20,40,50"])
+    data = written(tmp_path, "few.csv", ["5,10,50", "10,20,50", "20,40,50", "40,80,50"])
     out = tmp_path / "soil.toml"
     process = terraglue("fit-soil", data, "--law", "bekker", "--out", out)
     assert process.returncode == 0, process.stderr

@@ -368,8 +368,9 @@ impl Testbed {
             strategy: self.failed,
             time_s: self.t,
             message: format!(
-                "{message}; the step was halved {} times. Try a smaller time.step_s, another \
-                 gluing.form, or the strategy `cooperative`",
+                "{message}; the step was halved {} times. Try a smaller time.step_s, another gluing.form, \
+                 gluing.jacobian or strategy: `terraglue compare SCENARIO --strategies iterative,relaxed,…` runs several \
+                 side by side and names those that cannot",
                 self.max_halvings
             ),
         }

@@ -28,7 +28,8 @@ pub fn compare(arguments: &CompareArguments) -> Result<Exit> {
     for plan in &mut plans {
         let step = if plan.name_step { format!("_{}s", plan.scenario.time.step_s) } else { String::new() };
         let reference = if plan.is_reference { "reference_" } else { "" };
-        plan.folder = folder.join(format!("{reference}{}_{}{step}", plan.strategy, file_name(&plan.soil)));
+        let soil = if plan.soil.is_empty() { String::new() } else { format!("_{}", file_name(&plan.soil)) };
+        plan.folder = folder.join(format!("{reference}{}{soil}{step}", plan.strategy));
     }
     let bar = progress::bar(plans.iter().map(Plan::steps).sum(), arguments.run.quiet);
     let mut rows = run_all(&plans, &arguments.run, &cancel, &bar);

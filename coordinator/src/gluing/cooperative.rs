@@ -27,7 +27,7 @@ impl Strategy for Cooperative {
     }
 
     fn refuses(&self, exchange: &Exchange) -> Option<String> {
-        super::joints_refused(NAME, exchange)
+        super::joints_refused(NAME, exchange).or_else(|| super::body_contacts_refused(NAME, exchange))
     }
 
     fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {

@@ -49,13 +49,27 @@ pub fn glue(source: &Source, names: &[&str]) -> Checked<Vec<GlueSpec>> {
             let message = "a damper stands beside the spring of a joint: give compliance_m_n too".into();
             return Err(s.error("damping_n_s_m", message, None));
         }
+        let normal: [f64; 3] = s.numbers("normal");
+        if contact && normal.iter().map(|n| n * n).sum::<f64>() < 1e-12 {
+            let message = "a normal of no length points nowhere".into();
+            return Err(s.error(
+                "normal",
+                message,
+                Some("from side 2 to side 1, such as [0.0, 0.0, 1.0]".into()),
+            ));
+        }
+        if let Some(key) = ["normal", "mu", "t_max_n"].into_iter().find(|k| !contact && s.entry(k).is_some())
+        {
+            let help = "leave it out, or give kind = \"contact\"".to_owned();
+            return Err(s.error(key, format!("`{key}` is of contacts; this glue is a joint"), Some(help)));
+        }
         Ok(GlueSpec {
             sides: [s.text("side_1"), s.text("side_2")],
             contact,
             at_m: s.entry("at_m").map(|_| s.numbers("at_m")),
             mask: if contact { if mu > 0.0 { 7 } else { 1 } } else { mask(s)? },
             turning: s.text("axes") == "body",
-            normal: s.numbers("normal"),
+            normal,
             compliance: s.number("compliance_m_n"),
             damping: s.number("damping_n_s_m"),
             t_max: s.optional_number("t_max_n").unwrap_or(f64::INFINITY),

@@ -216,6 +216,20 @@ fn a_block_slides_stops_and_sticks_by_coulombs_law() {
     assert!((read(&pushed, "block.b0.vx") - 1.0760).abs() < 1e-4);
 }
 
+#[test]
+fn a_contact_of_bodies_is_refused_where_a_soil_would_be_asked() {
+    let said = |text: &str| glued(text).err().map(|e| format!("{e:?}")).unwrap_or_default();
+    for strategy in ["cooperative", "cooperative-compliant", "xt-newton", "relaxed"] {
+        let refused = said(&block(1.5, 0.0).replace("\"iterative\"", &format!("\"{strategy}\"")));
+        assert!(refused.contains("side 2 of glue 1 is a body"), "{strategy}: {refused}");
+        assert!(refused.contains("these would work: iterative, monolithic"), "{strategy}: {refused}");
+    }
+    let flat = said(&block(1.5, 0.0).replace("[0.0, 1.0, 0.0]\nmu", "[0.0, 0.0, 0.0]\nmu"));
+    assert!(flat.contains("a normal of no length"), "{flat}");
+    let joint = said(&block(1.5, 0.0).replace("kind = \"contact\"", "kind = \"joint\""));
+    assert!(joint.contains("`normal` is of contacts; this glue is a joint"), "{joint}");
+}
+
 /// A foot above one column of soil, trapezoidal rule or implicit Euler.
 fn foot(integrator: &str, soil: &str, duration: f64) -> String {
     format!(

@@ -68,15 +68,21 @@ pub(crate) const ALL: &[Column] = &[
     column!("evaluations_max", "evaluations of bodies", "max", "", Smallest, |r| {
         of(r, |s| f64::from(s.evaluations_max))
     }),
-    column!("evaluations_soil_mean", "evaluations of soil", "mean", "", Smallest, |r| {
+    column!("evaluations_soil_mean", "evaluations of soil or side 2", "mean", "", Smallest, |r| {
         of(r, |s| s.evaluations_soil_mean)
     }),
-    column!("cold_start_mean", "evaluations of soil", "mean without the estimate", "", Neither, |r| r
-        .cold_start_mean),
-    column!("evaluations_soil_p95", "evaluations of soil", "95 %", "", Smallest, |r| {
+    column!(
+        "cold_start_mean",
+        "evaluations of soil or side 2",
+        "mean without the estimate",
+        "",
+        Neither,
+        |r| r.cold_start_mean
+    ),
+    column!("evaluations_soil_p95", "evaluations of soil or side 2", "95 %", "", Smallest, |r| {
         of(r, |s| f64::from(s.evaluations_soil_p95))
     }),
-    column!("evaluations_soil_max", "evaluations of soil", "max", "", Smallest, |r| {
+    column!("evaluations_soil_max", "evaluations of soil or side 2", "max", "", Smallest, |r| {
         of(r, |s| f64::from(s.evaluations_soil_max))
     }),
     column!("evaluations_jacobian_mean", "", "evaluations for differences", "", Smallest, |r| {

@@ -16,7 +16,8 @@ pub fn judge(rows: &mut [CompareRow], soil: Option<&str>, folder: &Path) -> Resu
     for row in rows.iter_mut().filter(|r| soil.is_none_or(|s| s == r.soil) && !r.is_reference) {
         let Some(own) = row.folder.as_deref().and_then(|f| Recording::open(f).ok()) else { continue };
         let Some((_, poses)) = own.reported_body() else { continue };
-        row.reference_error_m = largest_distance(poses, truth);
+        // a run that ended early was not far off for long: its error would look better than it is
+        row.reference_error_m = largest_distance(poses, truth).filter(|_| row.error.is_none());
     }
     orders(rows);
     Ok(())
@@ -52,15 +53,19 @@ fn largest_distance(own: &PoseSeries, truth: &PoseSeries) -> Option<f64> {
     own.t_s.iter().zip(&own.position).filter(|(t, _)| inside(t)).map(distance).reduce(f64::max)
 }
 
+/// Errors below this are rounding and the tolerance of the iterations, m; they have no order.
+const NOISE_M: f64 = 1e-9;
+
 /// Observed order of each row against the row of the same strategy and soil with the next smaller step.
 fn orders(rows: &mut [CompareRow]) {
     let known: Vec<(String, String, f64, f64)> = rows
         .iter()
         .filter(|r| r.error.is_none())
         .filter_map(|r| Some((r.strategy.clone(), r.soil.clone(), r.step_s, r.reference_error_m?)))
+        .filter(|(.., error)| *error > NOISE_M)
         .collect();
     for row in rows.iter_mut() {
-        let Some(error) = row.reference_error_m.filter(|_| row.error.is_none()) else { continue };
+        let Some(error) = row.reference_error_m.filter(|error| *error > NOISE_M) else { continue };
         let finer = known
             .iter()
             .filter(|(strategy, soil, h, _)| {

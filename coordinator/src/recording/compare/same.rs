@@ -1,7 +1,7 @@
 //! Whether an earlier run can be the reference of others: it must be a run of the same thing.
 
 use super::reference;
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::recording::inputs::fingerprints;
 use crate::recording::reader::Recording;
 use crate::scenario::{InputError, Scenario, differences};
@@ -31,7 +31,11 @@ const LISTED: usize = 4;
 /// # Errors
 /// The recording cannot be read ([`crate::Error::File`]); wrong input with what differs and the way out.
 pub fn check_reference(scenario: &Scenario, folder: &Path) -> Result {
-    let recording = reference::open(folder)?;
+    let unreadable = |e: Error| {
+        let help = "it takes a strategy, the folder of an earlier run, or its recording.mcap";
+        InputError::plain(format!("--reference: {e}"), Some(help.into()))
+    };
+    let recording = reference::open(folder).map_err(unreadable)?;
     let differences = found(scenario, &recording);
     if differences.is_empty() {
         return Ok(());

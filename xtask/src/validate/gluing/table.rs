@@ -1,6 +1,6 @@
 //! A table of values: `case, parameters, t, quantity, value, source`. Cases go by their prefix.
 
-use super::extrapolate::Limits;
+use super::extrapolate::{Limits, batches};
 use super::parameters::Parameters;
 use super::{Figure, Limit, foot, oscillator, planar, six_feet};
 use crate::process::{Outcome, read};
@@ -51,38 +51,54 @@ pub fn figures(file: &Path) -> Outcome<Vec<Figure>> {
     Ok(all)
 }
 
-/// All rows of a case, which share one set of runs. A case that cannot be run is rows that fail.
+/// All rows of a case; those whose times have a step in common share one set of runs.
 fn judge(group: &[Row]) -> Vec<Figure> {
-    let Some(first) = group.first() else { return Vec::new() };
-    let wanted: Vec<(Option<f64>, String)> = group.iter().map(|r| (r.t, r.quantity.clone())).collect();
+    let times: Vec<Option<f64>> = group.iter().map(|r| r.t).collect();
+    let mut all: Vec<(usize, Figure)> = Vec::new();
+    for batch in batches(&times) {
+        let rows: Vec<&Row> = batch.iter().map(|k| &group[*k]).collect();
+        all.extend(batch.into_iter().zip(judge_together(&rows)));
+    }
+    all.sort_by_key(|(k, _)| *k);
+    all.into_iter().map(|(_, figure)| figure).collect()
+}
+
+/// Rows of one set of runs. Where they cannot be answered each is tried alone; one that cannot is a row that fails.
+fn judge_together(rows: &[&Row]) -> Vec<Figure> {
+    match (answer(rows), rows) {
+        (Ok(answers), _) => rows.iter().enumerate().map(|(k, row)| figure(row, &answers, k)).collect(),
+        (Err(why), [row]) => {
+            let note = why.lines().next().unwrap_or_default().to_owned();
+            let none = Answers { values: vec![f64::NAN], tolerance: vec![0.0], relative: false, note };
+            vec![figure(row, &none, 0)]
+        }
+        (Err(_), _) => rows.iter().flat_map(|row| judge_together(&[row])).collect(),
+    }
+}
+
+fn answer(rows: &[&Row]) -> Outcome<Answers> {
+    let Some(first) = rows.first() else { return Err("no row".into()) };
+    let wanted: Vec<(Option<f64>, String)> = rows.iter().map(|r| (r.t, r.quantity.clone())).collect();
     let p = Parameters(&first.parameters);
     let case = first.case.as_str();
-    let answers = match case.split('-').next().unwrap_or_default() {
+    match case.split('-').next().unwrap_or_default() {
         "OSC" => oscillator::answer(p, &wanted),
         "PEND" | "DP" | "FB" => planar::answer(case, p, &wanted),
         "FOOT" => foot::answer(p, &wanted),
         "TABLE" => six_feet::answer(case, p, &wanted),
         other => Err(format!("no case begins with `{other}`")),
-    };
-    let answers = answers.unwrap_or_else(|e| Answers {
-        values: vec![f64::NAN; group.len()],
-        tolerance: vec![0.0; group.len()],
-        relative: false,
-        note: e.lines().next().unwrap_or_default().to_owned(),
-    });
-    let figure = |(k, row): (usize, &Row)| {
-        let scale = if answers.relative { row.value.abs() } else { row.value.abs().max(1.0) };
-        let difference = (answers.values[k] - row.value).abs() / scale;
-        let at = row.t.map_or_else(String::new, |t| format!(".t{t}"));
-        let what = format!("{} against {}; {}", answers.values[k], row.value, answers.note);
-        Figure::new(
-            format!("gluing.{case}{at}.{}", row.quantity),
-            difference,
-            Limit::AtMost(answers.tolerance[k]),
-            what,
-        )
-    };
-    group.iter().enumerate().map(figure).collect()
+    }
+}
+
+fn figure(row: &Row, answers: &Answers, k: usize) -> Figure {
+    // a difference from nothing is no share of it
+    let relative = answers.relative && row.value != 0.0;
+    let scale = if relative { row.value.abs() } else { row.value.abs().max(1.0) };
+    let difference = (answers.values[k] - row.value).abs() / scale;
+    let at = row.t.map_or_else(String::new, |t| format!(".t{t}"));
+    let what = format!("{} against {}; {}", answers.values[k], row.value, answers.note);
+    let id = format!("gluing.{}{at}.{}", row.case, row.quantity);
+    Figure::new(id, difference, Limit::AtMost(answers.tolerance[k]), what)
 }
 
 fn rows(text: &str) -> Outcome<Vec<Row>> {
@@ -98,7 +114,13 @@ fn rows(text: &str) -> Outcome<Vec<Row>> {
             let [case, parameters, t, quantity, value, ..] = f.as_slice() else {
                 return Err(wrong("five fields are needed"));
             };
-            let t = if t.is_empty() { None } else { Some(t.parse().map_err(|_| wrong("t is no number"))?) };
+            let t = match t.is_empty() {
+                true => None,
+                false => Some(t.parse().map_err(|_| wrong("t is no number"))?),
+            };
+            if t.is_some_and(|t: f64| !(t.is_finite() && t > 0.0)) {
+                return Err(wrong("t is no time after the start, s"));
+            }
             let value = value.parse().map_err(|_| wrong("the value is no number"))?;
             Ok(Row {
                 case: case.clone(),

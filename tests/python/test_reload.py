@@ -122,6 +122,22 @@ def test_what_cannot_be_taken_over_is_refused_and_the_old_code_goes_on(tmp_path,
     assert set(pathlib.Path(tempfile.gettempdir()).glob("terraglue-reload-*")) <= before
 
 
+def test_after_a_refusal_good_code_is_taken_over(tmp_path):
+    place = built(tmp_path, "controller", "c")
+    source, scenario = (place / "my_controller.c").read_text(), place / "scenario.toml"
+    mark, rule = '#define MARK "state 1"', "+ (away + slope * h) * left;"
+    assert source.count(mark) == 1 and source.count(rule) == 1
+    (place / "1.c").write_text(source.replace(mark, '#define MARK "state 2"'))
+    (place / "2.c").write_text(source.replace(rule, rule.replace(";", " + 0.1 * h;")))
+    build = "build = 'if [ -e once ]; then cp 2.c my_controller.c; else touch once; cp 1.c my_controller.c; fi; make'"
+    scenario.write_text(re.sub(r"^build = .*$", build, scenario.read_text(), flags=re.M))
+    process = run(place, tmp_path / "a", "--duration", "0.1", "--watch", "--reload-at", "controller=40", "--reload-at",
+                  "controller=60")
+    told = events(tmp_path / "a")
+    assert process.returncode == 0 and "no state of this code" in process.stderr and len(told) == 2, process.stderr
+    assert "refused, the old code goes on" in told[0] and "carried over" in told[1], told
+
+
 def test_variables_may_be_added_behind_the_others(tmp_path):
     place = built(tmp_path, "controller", "python")
     text = (place / "my_controller.py").read_text()

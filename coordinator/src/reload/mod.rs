@@ -48,6 +48,8 @@ pub struct Reloader {
     run: Options,
     watched: Vec<Watched>,
     next_look: Instant,
+    /// Copies made so far. A name that was loaded once gives the code of that time again, also where it was refused.
+    copies: u64,
     // Copies of libraries; they stay until the run has ended.
     folder: tempfile::TempDir,
 }
@@ -154,7 +156,7 @@ impl Reloader {
             }
         }
         let (scenario, run) = (scenario.clone(), run.clone());
-        Ok(Self { scenario, options, run, watched, next_look: Instant::now(), folder })
+        Ok(Self { scenario, options, run, watched, next_look: Instant::now(), copies: 0, folder })
     }
 
     /// As [`Testbed::run_until`], with a look at the files between steps.
@@ -223,7 +225,8 @@ impl Reloader {
         }
     }
 
-    fn preparation(&self, k: usize, builds: bool) -> Preparation {
+    fn preparation(&mut self, k: usize, builds: bool) -> Preparation {
+        self.copies += 1;
         let w = &self.watched[k];
         Preparation {
             folder: self.scenario.folder.clone(),
@@ -231,7 +234,7 @@ impl Reloader {
             build: Arc::default(),
             file: w.file.clone(),
             hash: w.hash,
-            copy: self.folder.path().join(format!("{}-{}", w.name(), w.count + 1)),
+            copy: self.folder.path().join(format!("{}-{}", w.name(), self.copies)),
             program: self.options.program.clone(),
             sets: self.parameters(w),
         }

@@ -858,10 +858,10 @@ typedef struct {
     static const char *tg_law_schema(void) { return law_schema; }                                   \
     const tg_subsystem *terraglue_subsystem(void) {                                                 \
         static const tg_node_law law = { sizeof(tg_node_law), doubles, pressure_function, shear_function }; \
-        static tg_subsystem table;                                                                  \
-        table.size = sizeof table, table.abi_major = TG_ABI_MAJOR, table.abi_minor = TG_ABI_MINOR;  \
-        table.kind = TG_LAW, table.id = law_name, table.description = tg_description;               \
-        table.schema = tg_law_schema, table.law = &law;                                             \
+        /* In the order of tg_subsystem, constant: this is called from several threads. */          \
+        static const tg_subsystem table = {                                                         \
+            sizeof(tg_subsystem), TG_ABI_MAJOR, TG_ABI_MINOR, TG_LAW, law_name, tg_description, tg_law_schema,\
+            0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, &law };\
         return &table;                                                                              \
     }
 

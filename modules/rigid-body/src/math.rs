@@ -23,6 +23,13 @@ pub(crate) fn cayley_vector(r: &V3) -> V3 {
     r * factor
 }
 
+/// Way of the tip of an arm under the Cayley transform R of a rotation vector, (R − 1)·arm, without cancellation.
+pub(crate) fn cayley_shift(r: &V3, arm: &V3) -> V3 {
+    let q = cayley(r);
+    let twice = 2.0 * q.imag().cross(arm);
+    q.w * twice + q.imag().cross(&twice)
+}
+
 /// x× as a matrix.
 pub(crate) fn skew(v: &V3) -> M3 {
     v.cross_matrix()

@@ -180,7 +180,8 @@ fn a_restored_state_repeats_the_run_bit_by_bit() {
 #[test]
 fn what_cannot_be_set_is_refused() {
     let mut rig = Rig::hexapod(0.33, MOON, 1e-3);
-    let (x, bound, motor) = (rig.id("body.contact_normal"), rig.id("LF_j1.max_torque"), rig.id("LF_j1.motor"));
+    let (x, bound, motor) =
+        (rig.id("body.contact_normal"), rig.id("LF_j1.max_torque"), rig.id("LF_j1.motor"));
     assert!(rig.robot.set(&[x], Values::F64(&[1.0])).is_err());
     assert!(rig.robot.set(&[bound], Values::F64(&[-1.0])).is_err());
     assert!(rig.robot.set(&[bound], Values::F64(&[f64::NAN])).is_err());

@@ -18,7 +18,12 @@ fn falling_chain(integrator: &str) -> Rig {
     rig
 }
 
-/// Ports of six components on two bodies.
+fn beside(rig: &Rig, body: u32) -> [f64; 3] {
+    let [x, y, z] = rig.states()[body as usize].world_from_body.position;
+    [x + 0.3, y - 0.4, z + 0.2]
+}
+
+/// Ports of six components on two bodies, half a metre beside their centres of mass.
 fn ports(rig: &Rig, kind: PortKind) -> [Port; 2] {
     [(3, 0), (7, 6)].map(|(body, first)| Port {
         key: u64::from(first),
@@ -30,7 +35,7 @@ fn ports(rig: &Rig, kind: PortKind) -> [Port; 2] {
         shape: u32::MAX,
         first_node: 0,
         node_count: 0,
-        origin: rig.states()[body as usize].world_from_body.position,
+        origin: beside(rig, body),
         frame: [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0],
         extent: [0.0; 2],
         law: Law::BILATERAL,

@@ -1,10 +1,11 @@
 //! Ports of the step: how impulses there act on the bodies, how the bodies move there, and the compliance G.
 
 use crate::dynamics::Dynamics;
-use crate::math::{V3, cayley, cayley_vector};
+use crate::dynamics::carried::Carried;
+use crate::math::{V3, cayley, cayley_shift, cayley_vector};
 use crate::state::Motion;
 use terraglue_linear_solver::Path;
-use terraglue_subsystem::{Port, Response};
+use terraglue_subsystem::{Port, PortKind, Response};
 
 /// One packed component: a generalised direction on one body.
 #[derive(Clone, Copy, Debug)]
@@ -12,8 +13,20 @@ struct Component {
     body: usize,
     /// +1 where T acts on the body, −1 where −T does.
     side: f64,
-    /// World force and moment about the centre of mass of a unit wrench on the body; also rates → own motion.
+    /// World force and moment about the centre of mass of a unit wrench on the body at the start of the step; also
+    /// rates → own motion.
     row: [f64; 6],
+    /// From the centre of mass to the port at the start of the step where the port goes with the body: glued joints.
+    carried: Option<V3>,
+}
+
+impl Component {
+    /// A share of a unit as a force that goes with its body; none for moments and for contacts, whose soils answer
+    /// for the place where they were at the start of the step.
+    fn carried(&self, share: f64) -> Option<Carried> {
+        let force = share * V3::from_row_slice(&self.row[..3]);
+        self.carried.map(|arm| Carried { body: self.body, arm, force })
+    }
 }
 
 /// Ports of the step with the factor's answer to each component.
@@ -32,7 +45,7 @@ pub(crate) struct Ports {
 impl Ports {
     /// Takes over the ports; false when one names a body that does not exist or packs badly.
     pub fn assign(&mut self, ports: &[Port], n: usize, bodies: &[Motion]) -> bool {
-        let idle = Component { body: 0, side: 1.0, row: [0.0; 6] };
+        let idle = Component { body: 0, side: 1.0, row: [0.0; 6], carried: None };
         self.components.clear();
         self.components.resize(n, idle);
         self.g_of = 0;
@@ -45,8 +58,9 @@ impl Ports {
                 let d = V3::from(port.direction(c));
                 let (force, moment) = if c < 3 { (d, arm.cross(&d)) } else { (V3::zeros(), d) };
                 let row = [force.x, force.y, force.z, moment.x, moment.y, moment.z];
-                self.components[i] =
-                    Component { body: port.body as usize, side: f64::from(port.side.signum()), row };
+                let carried = (c < 3 && port.kind == PortKind::Joint as u32).then_some(arm);
+                let side = f64::from(port.side.signum());
+                self.components[i] = Component { body: port.body as usize, side, row, carried };
             }
         }
         true
@@ -77,11 +91,13 @@ impl Ports {
     pub fn load(&self, dynamics: &mut Dynamics, t: &[f64]) {
         let per_force = if dynamics.h > 0.0 { dynamics.impulse_per_force() } else { 1.0 };
         dynamics.external.fill(0.0);
+        dynamics.carried.clear();
         for (component, t) in self.components.iter().zip(t).filter(|(_, t)| **t != 0.0) {
             let at = dynamics.kkt.body_at[component.body];
             let impulse = per_force * component.side * t;
             let target = &mut dynamics.external[at..at + 6];
             target.iter_mut().zip(&component.row).for_each(|(e, r)| *e += impulse * r);
+            dynamics.carried.extend(component.carried(impulse));
         }
     }
 
@@ -89,8 +105,13 @@ impl Ports {
     pub fn load_unit(&self, dynamics: &Dynamics, i: usize, load: &mut [f64]) {
         let Component { body, row, .. } = &self.components[i];
         let at = dynamics.kkt.body_at[*body];
-        let unit = row.map(|r| dynamics.impulse_per_force() * r);
+        let per_force = dynamics.impulse_per_force();
+        let unit = row.map(|r| per_force * r);
         load[at..at + 6].copy_from_slice(&unit);
+        if let Some(carried) = self.components[i].carried(per_force) {
+            let moment = dynamics.turned(&carried);
+            load[at + 3..at + 6].iter_mut().zip(&moment).for_each(|(l, m)| *l += m);
+        }
     }
 
     /// G = dX/d(wrench on itself) = h²·J·K⁻¹·Jᵀ for the current factor, column-major; in a step of no length dA/d(wrench).
@@ -165,11 +186,8 @@ pub(crate) fn displacement(ports: &[Port], dynamics: &Dynamics, x: &mut [f64]) {
     for port in ports {
         let b = port.body as usize;
         let arm = V3::from(port.origin) - dynamics.starts()[b].c;
-        // (R − 1)·arm without cancellation.
-        let q = cayley(&dynamics.turns[b]);
-        let twice = 2.0 * q.imag().cross(&arm);
         let mean = &dynamics.solution[dynamics.kkt.body_at[b]..];
-        let shift = dynamics.h * V3::new(mean[0], mean[1], mean[2]) + q.w * twice + q.imag().cross(&twice);
+        let shift = dynamics.h * V3::new(mean[0], mean[1], mean[2]) + cayley_shift(&dynamics.turns[b], &arm);
         let turn = cayley_vector(&dynamics.turns[b]);
         for (i, c) in port.components() {
             let d = V3::from(port.direction(c));

@@ -11,6 +11,7 @@
 
 mod alpha;
 mod anderson;
+pub(crate) mod carried;
 mod closing;
 mod explicit;
 mod gyro;
@@ -28,6 +29,7 @@ use crate::math::{M3, V3, cayley};
 use crate::model::Model;
 use crate::state::{Motion, State};
 use anderson::Anderson;
+use carried::Carried;
 use closing::Closing;
 use joint_rows::{coordinate, gap};
 use kkt::Kkt;
@@ -119,6 +121,8 @@ pub(crate) struct Dynamics {
     pub factor_count: u64,
     /// External impulses of the trial, laid out as the unknowns.
     pub external: Vec<f64>,
+    /// Those of them that act on points of bodies.
+    pub carried: Vec<Carried>,
     rhs: Vec<f64>,
     correction: Vec<f64>,
     anderson: Anderson,
@@ -163,6 +167,7 @@ impl Dynamics {
             factored: false,
             factor_count: 0,
             external: vec![0.0; n],
+            carried: Vec::new(),
             rhs: vec![0.0; n],
             correction: vec![0.0; n],
             anderson: Anderson::new(n, 6 * nb),

@@ -143,6 +143,7 @@ impl Dynamics {
         let weight = self.integrator.force_weight();
         let midpoint = self.integrator == Integrator::EnergyMomentum;
         self.correction.copy_from_slice(&self.external);
+        self.turn_carried();
         for b in 0..self.ends.len() {
             if midpoint {
                 self.equilibrium_midpoint(b);

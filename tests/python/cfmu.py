@@ -1,4 +1,4 @@
-"""Small units of FMI 2.0 in C, made while the tests run."""
+"""Small units in C, made while the tests run."""
 
 import subprocess
 import zipfile
@@ -55,4 +55,78 @@ def build(folder, name, reals, step, others="", units="", variable_step=True):
     with zipfile.ZipFile(folder / f"{name}.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", description)
         archive.write(folder / f"{name}.so", "binaries/linux64/m.so")
+    return folder / f"{name}.fmu"
+
+
+# Variables of FMI 3.0 are arrays of numbers by value reference, `v[r]`; `n` is the structural parameter with reference 1 (up to 5).
+FRAME_3 = r"""
+#include <stdbool.h>
+#include <stdlib.h>
+#include <string.h>
+typedef void Log(void *, int, const char *, const char *);
+typedef void Update(void *, double, bool, bool, bool, bool, bool *, double *);
+typedef struct { double v[16][64]; unsigned long n; int mode; void *env; Log *log; Update *update; bool early; } Unit;
+static size_t size(Unit *u, unsigned r) { size_t n = u->n; switch (r) { %(sizes)s } return 1; }
+static int no(Unit *u, const char *text) { u->log(u->env, 3, "logStatusError", text); return 3; }
+static void start(Unit *u) { double (*v)[64] = u->v; %(start)s }
+void *fmi3InstantiateCoSimulation(const char *n, const char *t, const char *r, bool v, bool l, bool e, bool a,
+    const unsigned *q, size_t k, void *env, Log *log, Update *update) {
+    Unit *u = calloc(1, sizeof *u);
+    u->env = env; u->log = log; u->update = update; u->early = a; u->n = %(n)d; start(u); return u; }
+void fmi3FreeInstance(Unit *u) { free(u); }
+#ifndef PLAIN
+int fmi3EnterConfigurationMode(Unit *u) { if (u->mode) return no(u, "too late"); u->mode = 1; return 0; }
+int fmi3ExitConfigurationMode(Unit *u) { if (u->mode != 1) return 3; u->mode = 0; start(u); return 0; }
+int fmi3SetUInt64(Unit *u, const unsigned *r, size_t k, const unsigned long *x, size_t m) {
+    if (u->mode != 1 || *r != 1) return no(u, "n is set in configuration mode only");
+    if (*x == 4) return no(u, "four is not for me");
+    u->n = *x; return 0; }
+#endif
+int fmi3GetUInt64(Unit *u, const unsigned *r, size_t k, unsigned long *x, size_t m) { *x = u->n; return 0; }
+int fmi3EnterInitializationMode(Unit *u, bool a, double b, double c, bool d, double e) { u->mode = 2; return 0; }
+int fmi3ExitInitializationMode(Unit *u) { u->mode = 3; return 0; }
+int fmi3Terminate(Unit *u) { return 0; }
+int fmi3GetFloat64(Unit *u, const unsigned *r, size_t k, double *x, size_t m) {
+    if (u->mode < 2) return no(u, "nothing to be read yet");
+    for (size_t i = 0; i < k; i++) { size_t s = size(u, r[i]); memcpy(x, u->v[r[i]], 8 * s); x += s; m -= s; }
+    return m ? no(u, "wrong number of values") : 0; }
+int fmi3SetFloat64(Unit *u, const unsigned *r, size_t k, const double *x, size_t m) {
+    for (size_t i = 0; i < k; i++) { size_t s = size(u, r[i]); memcpy(u->v[r[i]], x, 8 * s); x += s; m -= s; }
+    return m ? no(u, "wrong number of values") : 0; }
+int fmi3GetFMUState(Unit *u, void **s) { if (!*s) *s = malloc(sizeof *u); memcpy(*s, u, sizeof *u); return 0; }
+int fmi3SetFMUState(Unit *u, void *s) { memcpy(u, s, sizeof *u); return 0; }
+int fmi3FreeFMUState(Unit *u, void **s) { free(*s); *s = 0; return 0; }
+%(more)s
+int fmi3DoStep(Unit *u, double t, double h, bool g, bool *event, bool *end, bool *early, double *last) {
+    size_t n = u->n; double (*v)[64] = u->v; *event = *end = *early = false; *last = t + h; %(step)s return 0; }
+"""
+
+
+def build_3(folder, name, variables, step, start="", more="", flags="", n=0, macros=()):
+    """The unit `name`.fmu of FMI 3.0; `variables` are (name, causality, start, sides), a side being a number or "n"; the first has the
+    reference 2 where there is an `n` (not 0), else 1."""
+    first = 2 if n else 1
+    sizes = "".join(f"case {first + k}: return {' * '.join(map(str, v[3]))};" for k, v in enumerate(variables) if v[3])
+    code = FRAME_3 % {"sizes": sizes, "start": start, "more": more, "step": step, "n": n}
+    (folder / f"{name}.c").write_text(code)
+    command = ["cc", "-shared", "-fPIC", "-w", *(f"-D{m}" for m in macros), f"{name}.c", "-o", f"{name}.so", "-lm"]
+    subprocess.run(command, cwd=folder, check=True, capture_output=True)
+    text = outputs = ""
+    if n:
+        text += f'<UInt64 name="n" valueReference="1" causality="structuralParameter" start="{n}" min="1" max="5"/>'
+    for k, (own, causality, value, sides) in enumerate(variables):
+        value = f' start="{value}"' if value else ""
+        tunable = ' variability="tunable"' if causality == "parameter" else ""
+        text += f'<Float64 name="{own}" valueReference="{first + k}" causality="{causality}"{tunable}{value}>'
+        text += "".join(f'<Dimension {"valueReference=" if s == "n" else "start="}"{1 if s == "n" else s}"/>' for s in sides)
+        text += "</Float64>"
+        outputs += f'<Output valueReference="{first + k}"/>' if causality == "output" else ""
+    description = f"""<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="3.0" modelName="{name}" instantiationToken="g">
+<CoSimulation modelIdentifier="m" canGetAndSetFMUState="true" canHandleVariableCommunicationStepSize="true" {flags}/>
+<ModelVariables><Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>{text}</ModelVariables>
+<ModelStructure>{outputs}</ModelStructure></fmiModelDescription>"""
+    with zipfile.ZipFile(folder / f"{name}.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", description)
+        archive.write(folder / f"{name}.so", "binaries/x86_64-linux/m.so")
     return folder / f"{name}.fmu"

@@ -52,7 +52,7 @@ pub struct FmuSubsystem {
     references: RefCell<Vec<u32>>,
     bodies: Bodies,
     /// Arrays by reference that are being set element by element before the initialisation.
-    starts: BTreeMap<u32, Vec<f64>>,
+    starts: BTreeMap<u32, Vec<Option<f64>>>,
     feeds_through: bool,
     partings: Partings,
 }
@@ -79,10 +79,15 @@ impl FmuSubsystem {
                 sink: Box::new(move |line| sink.log(line.level, &line.text)),
             },
         );
-        let capabilities = fmu.description().capabilities;
-        let (variables, places) = map::variables(fmu.description());
+        let mut slave = slave.map_err(error)?;
+        let (structure, start) = structure(slave.description(), start)?;
+        let structure: Vec<(&str, i128)> = structure.iter().map(|(name, n)| (name.as_str(), *n)).collect();
+        slave.configure(&structure).map_err(error)?;
+        let description = slave.description().clone();
+        let capabilities = description.capabilities;
+        let (variables, places) = map::variables(&description);
         let mut subsystem = Self {
-            slave: slave.map_err(error)?,
+            slave,
             variables,
             places,
             before: SlaveState::default(),
@@ -96,17 +101,18 @@ impl FmuSubsystem {
             references: RefCell::default(),
             bodies: Bodies::default(),
             starts: BTreeMap::new(),
-            feeds_through: feeds_through(fmu.description()),
+            feeds_through: feeds_through(&description),
             partings: Partings::default(),
             host,
         };
         for (name, value) in start {
             subsystem.set_start(&name, &value)?;
         }
+        subsystem.start_arrays()?;
         let places = &subsystem.places;
         let axis = |p: &Place| Axis { reference: p.reference, element: p.element, count: p.count };
         let place = |id: u32| places.get(id as usize).map(axis);
-        let terminals = terminals(fmu.description());
+        let terminals = terminals(&description);
         subsystem.bodies = Bodies::read(&options.bodies, &subsystem.variables, &terminals, place)?;
         if !subsystem.bodies.is_empty() && !subsystem.can_go_back {
             let text = "glued bodies need a unit that can save its state, to repeat a step";
@@ -163,18 +169,38 @@ impl FmuSubsystem {
         }
     }
 
-    /// Sets an element of an array whose other elements have their start values: nothing can be read yet.
+    /// Keeps an element of an array until all are known: nothing can be read yet.
     fn start_element(&mut self, id: u32, value: f64) -> Result {
         let place = *self.place(id)?;
-        let whole = self.starts.entry(place.reference).or_insert_with(|| {
-            let given = match &self.slave.fmu().description().variables[place.variable].start {
-                Start::Numbers(given) => given.clone(),
-                _ => Vec::new(),
+        self.starts.entry(place.reference).or_insert_with(|| vec![None; place.count])[place.element] =
+            Some(value);
+        Ok(())
+    }
+
+    /// Sets arrays of which elements were given; the others have the start values of the description.
+    fn start_arrays(&mut self) -> Result {
+        let description = self.slave.description().clone();
+        for (reference, given) in std::mem::take(&mut self.starts) {
+            let found = description.variables.iter().find(|v| v.reference == reference && !v.alias);
+            let Some(v) = found else { continue };
+            if let Some(k) = given.iter().position(Option::is_none).filter(|_| v.resized) {
+                return Err(Error::Refused(format!(
+                    "`{}` lacks a value: structural parameters changed the shape of `{}` and with it the start values \
+                     of the unit, so give all {} or none",
+                    map::element_name(v, k),
+                    v.name,
+                    given.len()
+                )));
+            }
+            let own = match &v.start {
+                Start::Numbers(own) => own.as_slice(),
+                _ => &[],
             };
-            (0..place.count).map(|k| given.get(k).or(given.first()).copied().unwrap_or(0.0)).collect()
-        });
-        whole[place.element] = value;
-        self.slave.set_f64(&[place.reference], whole).map_err(error)
+            let known = |k: usize| own.get(k).or(own.first()).copied().unwrap_or(0.0);
+            let whole: Vec<f64> = given.iter().enumerate().map(|(k, x)| x.unwrap_or(known(k))).collect();
+            self.slave.set_f64(&[reference], &whole).map_err(error)?;
+        }
+        Ok(())
     }
 
     /// Once: does the unit come back to the state before this step?
@@ -213,7 +239,7 @@ impl FmuSubsystem {
 
     /// Item values of an enumeration where they are not simply 0, 1, 2, …
     fn items(&self, place: &Place) -> &[(String, i64)] {
-        &self.slave.fmu().description().variables[place.variable].items
+        &self.slave.description().variables[place.variable].items
     }
 
     fn check_numbers(&self, ids: &[u32], values: &[f64]) -> Result {
@@ -295,11 +321,43 @@ fn options(parameters: &Map<String, Value>) -> Result<(Options, Vec<(String, Val
     Ok((options, start))
 }
 
+/// Values of structural parameters, and all others, which may be elements of the arrays that those give their sizes.
+type Structure = (Vec<(String, i128)>, Vec<(String, Value)>);
+
+fn structure(
+    description: &terraglue_fmi::ModelDescription,
+    start: Vec<(String, Value)>,
+) -> Result<Structure> {
+    use terraglue_fmi::description::Causality;
+    let structural = |name: &str| {
+        let variable = description.position(name).map(|k| &description.variables[k]);
+        variable.is_some_and(|v| v.causality == Causality::StructuralParameter)
+    };
+    let (own, others): (Vec<_>, Vec<_>) = start.into_iter().partition(|(name, _)| structural(name));
+    let whole = |(name, value): (String, Value)| {
+        let number = value.as_i64().map(i128::from).or(value.as_u64().map(i128::from));
+        match number {
+            Some(number) => Ok((name, number)),
+            None => Err(Error::Refused(format!(
+                "`{name}` of the unit is a structural parameter and takes a whole number, not {value}"
+            ))),
+        }
+    };
+    Ok((own.into_iter().map(whole).collect::<Result<_>>()?, others))
+}
+
+/// Names of single values: `a.b` of tables, `a[2]` and `a[2,1]` of lists and lists of lists.
 fn flatten(name: String, value: &Value, all: &mut Vec<(String, Value)>) {
     match value {
         Value::Object(below) => below.iter().for_each(|(k, v)| flatten(format!("{name}.{k}"), v, all)),
         Value::Array(items) => {
-            items.iter().enumerate().for_each(|(k, v)| all.push((format!("{name}[{}]", k + 1), v.clone())));
+            for (k, v) in items.iter().enumerate() {
+                let index = match name.strip_suffix(']') {
+                    Some(outer) => format!("{outer},{}]", k + 1),
+                    None => format!("{name}[{}]", k + 1),
+                };
+                flatten(index, v, all);
+            }
         }
         other => all.push((name, other.clone())),
     }
@@ -316,7 +374,7 @@ fn error(error: FmiError) -> Error {
 
 impl Subsystem for FmuSubsystem {
     fn capabilities(&self) -> Capabilities {
-        let c = self.slave.fmu().description().capabilities;
+        let c = self.slave.description().capabilities;
         let retry = if self.can_go_back {
             Capabilities::RETRY | Capabilities::STATE
         } else {
@@ -400,7 +458,7 @@ impl Subsystem for FmuSubsystem {
                 }
             }
             Err(discard @ FmiError::Discard { .. }) => {
-                let variable = self.slave.fmu().description().capabilities.variable_step;
+                let variable = self.slave.description().capabilities.variable_step;
                 if !self.can_go_back || !variable {
                     let lack = if variable { "save its state" } else { "make steps of another length" };
                     return Err(Error::Failed(format!(
@@ -454,7 +512,7 @@ impl Subsystem for FmuSubsystem {
         out: &mut [f64],
     ) -> Result {
         let (mut z, mut v) = (Vec::new(), Vec::new());
-        let offered = self.slave.fmu().description().capabilities.directional_derivatives;
+        let offered = self.slave.description().capabilities.directional_derivatives;
         if !offered || !self.collect(unknowns, &mut z)? || !self.collect(knowns, &mut v)? {
             return Err(Error::Unsupported);
         }
@@ -525,10 +583,13 @@ impl Subsystem for FmuSubsystem {
     }
 
     fn set(&mut self, ids: &[u32], values: Values) -> Result {
-        for id in ids.iter().filter(|_| self.running) {
-            if !self.place(*id)?.live {
+        for id in ids {
+            let place = self.place(*id)?;
+            if place.structural || self.running && !place.live {
                 let name = &self.variables[*id as usize].name;
-                return Err(Error::Refused(format!("`{name}` can only be set before the first step")));
+                let when =
+                    if place.structural { "in the table of its unit" } else { "before the first step" };
+                return Err(Error::Refused(format!("`{name}` can only be set {when}")));
             }
         }
         if let (Values::F64(values), Some(reference)) = (&values, self.single(ids)) {

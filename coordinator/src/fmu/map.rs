@@ -17,6 +17,8 @@ pub struct Place {
     pub reference: u32,
     /// Whether it may be set after the initialisation.
     pub live: bool,
+    /// Whether it gives arrays their sizes, and is set in configuration mode only.
+    pub structural: bool,
 }
 
 /// All variables that a scenario can see, and where they lie.
@@ -44,7 +46,9 @@ pub fn variables(description: &ModelDescription) -> (Vec<Variable>, Vec<Place>) 
                 enumeration: v.items.iter().map(|(name, _)| name.clone()).collect(),
             });
             let live = effect == Effect::Live;
-            places.push(Place { variable: k, element, count: v.len(), reference: v.reference, live });
+            let structural = v.causality == fmi::Causality::StructuralParameter;
+            let (count, reference) = (v.len(), v.reference);
+            places.push(Place { variable: k, element, count, reference, live, structural });
         }
     }
     (all, places)
@@ -68,7 +72,7 @@ pub fn element_name(v: &fmi::Variable, element: usize) -> String {
 fn effect(v: &fmi::Variable) -> Effect {
     match (v.causality, v.variability) {
         (fmi::Causality::Input, _) | (fmi::Causality::Parameter, Variability::Tunable) => Effect::Live,
-        (fmi::Causality::Parameter, _) => Effect::NeedsReset,
+        (fmi::Causality::Parameter | fmi::Causality::StructuralParameter, _) => Effect::NeedsReset,
         _ if v.initial == Some(fmi::Initial::Exact) && v.variability != Variability::Constant => {
             Effect::NeedsReset
         }

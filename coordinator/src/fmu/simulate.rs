@@ -5,7 +5,7 @@ use crate::scenario::did_you_mean;
 use std::sync::Arc;
 use terraglue_fmi::description::{Causality, Variable};
 use terraglue_fmi::slave::Sink;
-use terraglue_fmi::{Advance, Error, Fmu, Result, Slave, SlaveOptions, SlaveState};
+use terraglue_fmi::{Advance, Error, Fmu, ModelDescription, Result, Slave, SlaveOptions, SlaveState};
 use terraglue_subsystem::{ValueType, Values, ValuesMut};
 
 /// How a unit is run.
@@ -99,11 +99,16 @@ pub fn run(
     if !(step > 0.0 && steps >= 1.0 && steps <= STEPS) {
         return Err(Error::Refused(format!("from {start} s to {stop} s in steps of {step} s cannot be run")));
     }
-    let columns = columns(fmu, &settings.outputs)?;
     let options = SlaveOptions { name: "unit".into(), verbose: false, event_mode: settings.event_mode, sink };
     let mut slave = Slave::instantiate(fmu, options)?;
+    configure(&mut slave, &settings.start)?;
+    let description = slave.description().clone();
+    let columns = columns(&description, &settings.outputs)?;
     for (name, text) in &settings.start {
-        set_text(&slave, find(fmu, name)?, text)?;
+        let v = find(&description, name)?;
+        if v.causality != Causality::StructuralParameter {
+            set_text(&slave, v, text)?;
+        }
     }
     slave.enter_initialization(start, Some(stop), settings.tolerance.or(experiment.tolerance))?;
     set_inputs(&slave, settings, start)?;
@@ -139,7 +144,7 @@ pub fn run(
 /// A step, in halves where the unit discards it and can go back. Answers when the unit asked for the end, and how many
 /// events there were.
 fn halving(slave: &mut Slave, state: &mut SlaveState, start: f64, end: f64) -> Result<(Option<f64>, u32)> {
-    let c = slave.fmu().description().capabilities;
+    let c = slave.description().capabilities;
     let (mut t, mut h, mut halvings, mut events) = (start, end - start, 0, 0);
     while end - t > 1e-9 * (end - start) {
         if c.state {
@@ -165,8 +170,22 @@ fn named(error: Error, t: f64) -> Error {
     Error::Refused(format!("at t = {t} s: {error}"))
 }
 
-fn find<'a>(fmu: &'a Fmu, name: &str) -> Result<&'a Variable> {
-    let all = &fmu.description().variables;
+/// Sets the structural parameters among the start values.
+fn configure(slave: &mut Slave, start: &[(String, String)]) -> Result {
+    let mut values: Vec<(&str, i128)> = Vec::new();
+    for (name, text) in start {
+        if find(slave.description(), name)?.causality != Causality::StructuralParameter {
+            continue;
+        }
+        let wrong =
+            || Error::Refused(format!("`{name}` = {text}: a structural parameter takes a whole number"));
+        values.push((name, text.trim().parse().map_err(|_| wrong())?));
+    }
+    slave.configure(&values)
+}
+
+fn find<'a>(description: &'a ModelDescription, name: &str) -> Result<&'a Variable> {
+    let all = &description.variables;
     all.iter().find(|v| v.name == name).ok_or_else(|| {
         let hint = did_you_mean(name, all.iter().map(|v| v.name.as_str()));
         Error::Refused(format!(
@@ -176,12 +195,12 @@ fn find<'a>(fmu: &'a Fmu, name: &str) -> Result<&'a Variable> {
     })
 }
 
-fn columns<'a>(fmu: &'a Fmu, names: &[String]) -> Result<Vec<&'a Variable>> {
+fn columns<'a>(description: &'a ModelDescription, names: &[String]) -> Result<Vec<&'a Variable>> {
     if !names.is_empty() {
-        return names.iter().map(|n| find(fmu, n)).collect();
+        return names.iter().map(|n| find(description, n)).collect();
     }
     let output = |v: &&Variable| v.causality == Causality::Output && v.value_type != ValueType::Clock;
-    Ok(fmu.description().variables.iter().filter(output).collect())
+    Ok(description.variables.iter().filter(output).collect())
 }
 
 fn header(columns: &[&Variable]) -> String {
@@ -284,7 +303,7 @@ fn set_text(slave: &Slave, v: &Variable, text: &str) -> Result {
 
 fn set_inputs(slave: &Slave, settings: &Settings, t: f64) -> Result {
     for (column, name) in settings.input.names.iter().enumerate() {
-        let v = find(slave.fmu(), name)?;
+        let v = find(slave.description(), name)?;
         let number = |t| {
             let x = settings.input.number(t, column);
             let none = || Error::Refused(format!("`{name}`: the input is no number beside t = {t} s"));

@@ -18,7 +18,7 @@ const LOCK: &str = ".terraglue-lock";
 #[derive(Debug)]
 pub struct Fmu {
     path: PathBuf,
-    description: ModelDescription,
+    description: Arc<ModelDescription>,
     loaded: Mutex<Weak<Loaded>>,
     // After everything that may use the folder.
     folder: Folder,
@@ -38,6 +38,7 @@ impl Fmu {
         let mut archive = Archive::open(path, limits)?;
         let description = Self::describe(path, &mut archive)?;
         let folder = archive.unpack()?;
+        let description = Arc::new(description);
         Ok(Arc::new(Self { path: path.into(), description, loaded: Mutex::default(), folder }))
     }
 
@@ -65,7 +66,7 @@ impl Fmu {
     }
 
     /// What it says of itself.
-    pub fn description(&self) -> &ModelDescription {
+    pub fn description(&self) -> &Arc<ModelDescription> {
         &self.description
     }
 

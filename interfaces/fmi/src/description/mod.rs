@@ -2,6 +2,7 @@
 
 pub(crate) mod element;
 mod model;
+mod resize;
 mod structure;
 mod terminals;
 pub(crate) mod types;

@@ -218,6 +218,8 @@ pub struct Variable {
     pub alias: bool,
     /// When it ticks, of an input clock whose times are known beforehand.
     pub ticks: Option<Ticks>,
+    /// Whether a structural parameter changed its shape, so that the start values of the description are not for it.
+    pub resized: bool,
 }
 
 /// Times of a periodic clock: shift, shift + interval, …

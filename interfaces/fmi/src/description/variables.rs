@@ -7,9 +7,6 @@ use crate::error::Result;
 use std::collections::BTreeMap;
 use terraglue_subsystem::ValueType;
 
-/// Most elements of one array.
-const ELEMENTS: u64 = 1 << 28;
-
 /// Reads all variables into the description.
 pub fn read(root: &Element, description: &mut ModelDescription) -> Result {
     let list = root.child("ModelVariables").ok_or_else(|| root.error("has no <ModelVariables>"))?;
@@ -182,6 +179,7 @@ fn variable(
         line,
         alias: false,
         ticks: if value_type == ValueType::Clock { ticks(inner, causality)? } else { None },
+        resized: false,
     })
 }
 
@@ -288,34 +286,12 @@ fn hexadecimal(text: &str) -> Option<Vec<u8>> {
 
 /// Sizes of all arrays, with the start values of the structural parameters.
 fn sizes(root: &Element, description: &mut ModelDescription) -> Result {
-    let value = |v: &Variable| match &v.start {
-        Start::Integers(all) => all.first().and_then(|n| u64::try_from(*n).ok()),
-        _ => None,
+    let parameters = description.structure();
+    let own = |v: &Variable| match v.shape(&parameters) {
+        Ok(sizes) => Ok(sizes),
+        Err(message) => Err(root.reader.error(v.line, "Dimension", message)),
     };
-    let parameters: BTreeMap<u32, u64> = description
-        .variables
-        .iter()
-        .filter(|v| {
-            matches!(v.causality, Causality::StructuralParameter) || v.variability == Variability::Constant
-        })
-        .filter_map(|v| Some((v.reference, value(v)?)))
-        .collect();
-    for v in description.variables.iter_mut().filter(|v| !v.dimensions.is_empty()) {
-        let fail = |message: String| root.reader.error(v.line, "Dimension", message);
-        let mut product = 1_u64;
-        for dimension in &v.dimensions {
-            let size = match dimension {
-                Dimension::Fixed(n) => *n,
-                Dimension::Parameter(reference) => *parameters.get(reference).ok_or_else(|| {
-                    fail(format!("`{}`: {reference} is no structural parameter with a start value", v.name))
-                })?,
-            };
-            product = product
-                .checked_mul(size)
-                .filter(|p| *p <= ELEMENTS)
-                .ok_or_else(|| fail(format!("`{}` has more than {ELEMENTS} elements", printable(&v.name))))?;
-            v.sizes.push(size as u32);
-        }
-    }
+    let all = description.variables.iter().map(own).collect::<Result<Vec<_>>>()?;
+    description.variables.iter_mut().zip(all).for_each(|(v, sizes)| v.sizes = sizes);
     Ok(())
 }

@@ -98,6 +98,8 @@ table! {
             Text, Text, Text, bool, bool, bool, bool, *const Vr, usize, *mut c_void, Logger3, *const c_void
         ) -> Component;
         free = "fmi3FreeInstance": fn(Component);
+        enter_configuration = "fmi3EnterConfigurationMode": fn(Component) -> c_int;
+        exit_configuration = "fmi3ExitConfigurationMode": fn(Component) -> c_int;
         enter_initialization = "fmi3EnterInitializationMode": fn(Component, bool, f64, f64, bool, f64) -> c_int;
         exit_initialization = "fmi3ExitInitializationMode": fn(Component) -> c_int;
         enter_event_mode = "fmi3EnterEventMode": fn(Component) -> c_int;

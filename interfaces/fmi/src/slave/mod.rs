@@ -5,6 +5,7 @@
 #![allow(unsafe_code)] // Functions of foreign libraries are called.
 
 mod call;
+mod configure;
 mod functions;
 mod log;
 mod state;
@@ -16,7 +17,7 @@ pub use state::SlaveState;
 pub use step::{Advance, Stepped};
 
 use crate::binary::Loaded;
-use crate::description::{Ticks, Variable};
+use crate::description::{ModelDescription, Ticks, Variable};
 use crate::error::{Error, Result};
 use crate::fmu::Fmu;
 use call::{Health, Status};
@@ -63,6 +64,8 @@ enum Phase {
 pub struct Slave {
     api: Api,
     component: Component,
+    /// What the unit says of itself, with the array sizes of this instance.
+    description: Arc<ModelDescription>,
     health: Cell<Health>,
     phase: Phase,
     event_mode: bool,
@@ -151,6 +154,7 @@ impl Slave {
         Ok(Self {
             api,
             component,
+            description: description.clone(),
             health: Cell::new(Health::Good),
             phase: Phase::Instantiated,
             event_mode,
@@ -168,6 +172,11 @@ impl Slave {
     /// The unit.
     pub fn fmu(&self) -> &Arc<Fmu> {
         &self.fmu
+    }
+
+    /// What the unit says of itself, with the array sizes of this instance.
+    pub fn description(&self) -> &Arc<ModelDescription> {
+        &self.description
     }
 
     /// Calls that ended with a warning.
@@ -256,6 +265,7 @@ impl Slave {
             Api::Three(three) => self.call_after_error("fmi3Reset", three.reset, |f, c| unsafe { f(c) })?,
         }
         self.phase = Phase::Instantiated;
+        self.description = self.fmu.description().clone();
         self.health.set(Health::Good);
         Ok(())
     }

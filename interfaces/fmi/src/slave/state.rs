@@ -34,7 +34,7 @@ impl Slave {
 
     /// Saves the state; the memory of an earlier one in `state` is used again.
     pub fn save(&self, state: &mut SlaveState) -> Result {
-        self.can(self.fmu.description().capabilities.state, "to save its state")?;
+        self.can(self.description.capabilities.state, "to save its state")?;
         let place = &raw mut state.0;
         // SAFETY: `state` is null or a state of this instance, here and below.
         match self.api {
@@ -85,7 +85,7 @@ impl Slave {
 
     /// A saved state as bytes.
     pub fn serialize(&self, state: &SlaveState) -> Result<Vec<u8>> {
-        self.can(self.fmu.description().capabilities.serialize, "to serialise its state")?;
+        self.can(self.description.capabilities.serialize, "to serialise its state")?;
         let state = state.0;
         let mut size = 0_usize;
         let place = &raw mut size;
@@ -118,7 +118,7 @@ impl Slave {
 
     /// A state from bytes.
     pub fn deserialize(&self, bytes: &[u8], state: &mut SlaveState) -> Result {
-        self.can(self.fmu.description().capabilities.serialize, "to serialise its state")?;
+        self.can(self.description.capabilities.serialize, "to serialise its state")?;
         let (place, data, n) = (&raw mut state.0, bytes.as_ptr(), bytes.len());
         match self.api {
             Api::Two(two) => self.call("fmi2DeSerializeFMUstate", two.deserialize, |f, c| unsafe {
@@ -137,7 +137,7 @@ impl Slave {
         seed: &[f64],
         out: &mut [f64],
     ) -> Result {
-        self.can(self.fmu.description().capabilities.directional_derivatives, "directional derivatives")?;
+        self.can(self.description.capabilities.directional_derivatives, "directional derivatives")?;
         let (z, n_z, v, n_v) = (unknowns.as_ptr(), unknowns.len(), knowns.as_ptr(), knowns.len());
         let (s, n_s, o, n_o) = (seed.as_ptr(), seed.len(), out.as_mut_ptr(), out.len());
         match self.api {

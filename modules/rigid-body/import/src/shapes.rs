@@ -110,7 +110,11 @@ impl<'a> Shapes<'a> {
             return Err(wrong(format!("its scale {scale:?} is not three finite numbers other than 0")));
         }
         let path = self.folders.find(file).map_err(wrong)?;
-        let mesh = load(&path).map_err(|p| wrong(format!("{}: {p}", path.display())))?.scaled(scale);
+        let loaded = load(&path).map_err(|p| wrong(format!("{}: {p}", path.display())))?;
+        let mesh = loaded.mesh.scaled(scale);
+        if let Some(remark) = loaded.remark.filter(|_| place.collides) {
+            self.notices.push(wrong(remark).to_string());
+        }
         if place.still {
             return Ok(ShapeGeometry::Triangles(Arc::new(mesh)));
         }

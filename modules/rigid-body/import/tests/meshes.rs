@@ -165,7 +165,7 @@ fn meshes_that_cannot_be_used_are_refused() {
     write(&folder.join("empty.stl"), "solid x\nendsolid x\n");
     write(&folder.join("far.obj"), "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n");
     write(&folder.join("cut.stl"), &binary_stl()[..150]);
-    write(&folder.join("wheel.dae"), "<COLLADA/>");
+    write(&folder.join("wheel.ply"), "ply");
     let refused = |mesh: &str, expected: &[&str]| {
         let message = read(&robot(&folder, mesh)).expect_err(mesh);
         assert!(message.contains("r.urdf:1: link `a`"), "{message}");
@@ -178,7 +178,7 @@ fn meshes_that_cannot_be_used_are_refused() {
     refused("filename=\"empty.stl\"", &["no triangles"]);
     refused("filename=\"far.obj\"", &["far.obj"]);
     refused("filename=\"cut.stl\"", &["cut.stl"]);
-    refused("filename=\"wheel.dae\"", &[".dae", "STL or OBJ"]);
+    refused("filename=\"wheel.ply\"", &[".ply", "STL, OBJ or COLLADA"]);
 }
 
 #[test]

@@ -1,5 +1,6 @@
 //! Triangles from a file or from the text: what they enclose, and their convex hull.
 
+mod collada;
 mod find;
 mod read;
 

@@ -1,23 +1,46 @@
-//! Mesh files: STL, ascii and binary, and OBJ, by the crate `mesh-loader`.
+//! Mesh files: STL, ascii and binary, and OBJ, by the crate `mesh-loader`; COLLADA by [`super::collada`].
 
-use super::Mesh;
+use super::{Mesh, collada};
 use mesh_loader::Loader;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+/// A file as it was read.
+pub(crate) struct Loaded {
+    pub mesh: Mesh,
+    /// What the file says and nobody heeds.
+    pub remark: Option<String>,
+}
+
 /// Reads all triangles of a file.
-pub(crate) fn load(path: &Path) -> Result<Mesh, String> {
+pub(crate) fn load(path: &Path) -> Result<Loaded, String> {
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-    if !["stl", "obj"].contains(&ending.as_str()) {
-        let problem = format!(
-            "meshes of kind `.{ending}` cannot be read; convert it to STL or OBJ, which mesh editors write"
-        );
-        return Err(problem);
+    let bytes = || std::fs::read(path).map_err(|e| e.to_string());
+    match ending.as_str() {
+        "stl" | "obj" => Ok(Loaded { mesh: by_loader(path, &ending, &bytes()?)?, remark: None }),
+        "dae" => {
+            let text = String::from_utf8(bytes()?).map_err(|e| e.to_string())?;
+            let scene = collada::read(&text)?;
+            let mut mesh = Builder::default();
+            scene.triangles.into_iter().for_each(|t| mesh.add(t));
+            let remark = (scene.up != "Z_UP").then(|| {
+                format!(
+                    "<up_axis> {} is not heeded, as in RViz and Gazebo; turn it by <origin rpy=…>",
+                    scene.up
+                )
+            });
+            Ok(Loaded { mesh: mesh.finish()?, remark })
+        }
+        _ => Err(format!(
+            "meshes of kind `.{ending}` cannot be read; convert it to STL, OBJ or COLLADA (.dae), which mesh editors write"
+        )),
     }
-    let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
+}
+
+fn by_loader(path: &Path, ending: &str, bytes: &[u8]) -> Result<Mesh, String> {
     // The loader chooses by the ending as it is written most often.
-    let named = path.with_extension(&ending);
-    let scene = Loader::default().load_from_slice(&bytes, &named).map_err(|e| e.to_string())?;
+    let named = path.with_extension(ending);
+    let scene = Loader::default().load_from_slice(bytes, &named).map_err(|e| e.to_string())?;
     let mut mesh = Builder::default();
     for part in &scene.meshes {
         for face in &part.faces {

@@ -169,7 +169,7 @@ impl Files {
 
     fn mesh(&self, file: &str) -> Asset<Mesh> {
         let path = self.find(file)?;
-        load(&path).map_err(|p| format!("{}: {p}", path.display()))
+        load(&path).map(|l| l.mesh).map_err(|p| format!("{}: {p}", path.display()))
     }
 
     /// MuJoCo's binary height field: rows and columns as i32, then f32 from the row of the smallest y on.

@@ -60,6 +60,8 @@ def build(folder, name, reals, step, others="", units="", variable_step=True):
 
 # Variables of FMI 3.0 are arrays of numbers by value reference, `v[r]`; `n` is the structural parameter with reference 1 (up to 5).
 FRAME_3 = r"""
+#include <math.h>
+#include <pthread.h>
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
@@ -67,13 +69,15 @@ typedef void Log(void *, int, const char *, const char *);
 typedef void Update(void *, double, bool, bool, bool, bool, bool *, double *);
 typedef struct { double v[16][64]; unsigned long n; int mode; void *env; Log *log; Update *update; bool early; } Unit;
 static size_t size(Unit *u, unsigned r) { size_t n = u->n; switch (r) { %(sizes)s } return 1; }
+static void calc(Unit *u, double (*v)[64]) { %(calc)s }
+static int odd(Unit *u) { %(odd)s return 0; }
 static int no(Unit *u, const char *text) { u->log(u->env, 3, "logStatusError", text); return 3; }
 static void start(Unit *u) { double (*v)[64] = u->v; %(start)s }
 void *fmi3InstantiateCoSimulation(const char *n, const char *t, const char *r, bool v, bool l, bool e, bool a,
     const unsigned *q, size_t k, void *env, Log *log, Update *update) {
     Unit *u = calloc(1, sizeof *u);
-    u->env = env; u->log = log; u->update = update; u->early = a; u->n = %(n)d; start(u); return u; }
-void fmi3FreeInstance(Unit *u) { free(u); }
+    u->env = env; u->log = log; u->update = update; u->early = a; u->n = %(n)d; start(u); odd(u); return u; }
+void fmi3FreeInstance(Unit *u) { odd(u); free(u); }
 #ifndef PLAIN
 int fmi3EnterConfigurationMode(Unit *u) { if (u->mode) return no(u, "too late"); u->mode = 1; return 0; }
 int fmi3ExitConfigurationMode(Unit *u) { if (u->mode != 1) return 3; u->mode = 0; start(u); return 0; }
@@ -84,10 +88,11 @@ int fmi3SetUInt64(Unit *u, const unsigned *r, size_t k, const unsigned long *x, 
 #endif
 int fmi3GetUInt64(Unit *u, const unsigned *r, size_t k, unsigned long *x, size_t m) { *x = u->n; return 0; }
 int fmi3EnterInitializationMode(Unit *u, bool a, double b, double c, bool d, double e) { u->mode = 2; return 0; }
-int fmi3ExitInitializationMode(Unit *u) { u->mode = 3; return 0; }
-int fmi3Terminate(Unit *u) { return 0; }
+int fmi3ExitInitializationMode(Unit *u) { u->mode = 3; return odd(u); }
+int fmi3Terminate(Unit *u) { return odd(u); }
 int fmi3GetFloat64(Unit *u, const unsigned *r, size_t k, double *x, size_t m) {
     if (u->mode < 2) return no(u, "nothing to be read yet");
+    odd(u); calc(u, u->v);
     for (size_t i = 0; i < k; i++) { size_t s = size(u, r[i]); memcpy(x, u->v[r[i]], 8 * s); x += s; m -= s; }
     return m ? no(u, "wrong number of values") : 0; }
 int fmi3SetFloat64(Unit *u, const unsigned *r, size_t k, const double *x, size_t m) {
@@ -102,14 +107,14 @@ int fmi3DoStep(Unit *u, double t, double h, bool g, bool *event, bool *end, bool
 """
 
 
-def build_3(folder, name, variables, step, start="", more="", flags="", n=0, macros=()):
+def build_3(folder, name, variables, step, start="", more="", flags="", n=0, macros=(), calc="", odd=""):
     """The unit `name`.fmu of FMI 3.0; `variables` are (name, causality, start, sides), a side being a number or "n"; the first has the
     reference 2 where there is an `n` (not 0), else 1."""
     first = 2 if n else 1
     sizes = "".join(f"case {first + k}: return {' * '.join(map(str, v[3]))};" for k, v in enumerate(variables) if v[3])
-    code = FRAME_3 % {"sizes": sizes, "start": start, "more": more, "step": step, "n": n}
+    code = FRAME_3 % {"sizes": sizes, "start": start, "more": more, "step": step, "n": n, "calc": calc, "odd": odd}
     (folder / f"{name}.c").write_text(code)
-    command = ["cc", "-shared", "-fPIC", "-w", *(f"-D{m}" for m in macros), f"{name}.c", "-o", f"{name}.so", "-lm"]
+    command = ["cc", "-shared", "-fPIC", "-w", *(f"-D{m}" for m in macros), f"{name}.c", "-o", f"{name}.so", "-lm", "-pthread"]
     subprocess.run(command, cwd=folder, check=True, capture_output=True)
     text = outputs = ""
     if n:
@@ -117,7 +122,8 @@ def build_3(folder, name, variables, step, start="", more="", flags="", n=0, mac
     for k, (own, causality, value, sides) in enumerate(variables):
         value = f' start="{value}"' if value else ""
         tunable = ' variability="tunable"' if causality == "parameter" else ""
-        text += f'<Float64 name="{own}" valueReference="{first + k}" causality="{causality}"{tunable}{value}>'
+        between = ' intermediateUpdate="true"' if causality == "output" and "IntermediateUpdate" in flags else ""
+        text += f'<Float64 name="{own}" valueReference="{first + k}" causality="{causality}"{between}{tunable}{value}>'
         text += "".join(f'<Dimension {"valueReference=" if s == "n" else "start="}"{1 if s == "n" else s}"/>' for s in sides)
         text += "</Float64>"
         outputs += f'<Output valueReference="{first + k}"/>' if causality == "output" else ""

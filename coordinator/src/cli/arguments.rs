@@ -386,6 +386,9 @@ pub struct FmuRunArguments {
     /// Inputs over time: a header with `time` and names, straight lines between the rows.
     #[arg(long, value_name = "FILE")]
     pub input: Option<PathBuf>,
+    /// Write what the unit shows at its inner steps here (FMI 3, intermediate update).
+    #[arg(long, value_name = "FILE")]
+    pub intermediate: Option<PathBuf>,
     /// A start value. May be repeated.
     #[arg(long = "start", value_name = "NAME=VALUE", value_parser = parse_set)]
     pub start: Vec<(String, String)>,

@@ -4,9 +4,10 @@ use super::arguments::{FmuCommand, FmuRunArguments};
 use super::output::outln;
 use super::{Exit, apart, show};
 use std::fmt::Debug;
-use std::io::Write;
+use std::fs::File;
+use std::io::{BufWriter, Write};
 use std::path::Path;
-use terraglue::fmu::simulate::{self, Row, Settings, Table};
+use terraglue::fmu::simulate::{self, Row, Settings, Table, Tables};
 use terraglue::host::exit_guard;
 use terraglue::scenario::InputError;
 use terraglue::{Error, Result};
@@ -39,12 +40,8 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
         event_mode: arguments.event_mode,
         input: arguments.input.as_deref().map(table).transpose()?.unwrap_or_default(),
     };
-    let mut file = None;
-    if let Some(path) = &arguments.csv {
-        let created = std::fs::File::create(path);
-        let created = created.map_err(|source| Error::File { path: path.display().to_string(), source })?;
-        file = Some(std::io::BufWriter::new(created));
-    }
+    let mut file = arguments.csv.as_deref().map(created).transpose()?;
+    let mut between = arguments.intermediate.as_deref().map(created).transpose()?;
     let sink = Box::new(|line: &terraglue_fmi::LogLine| {
         log::log!(target: "terraglue::fmu", level(line), "{}", line.text);
     });
@@ -53,12 +50,15 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
             outln!("{text}");
             Ok(())
         }
-        Some(file) => writeln!(file, "{text}").map_err(|e| FmiError::Refused(format!("the table: {e}"))),
+        Some(file) => line(file, text),
     };
+    let mut row_between = between.as_mut().map(|file| move |text: &str| line(file, text));
+    let intermediate = row_between.as_mut().map(|row| row as simulate::Line);
     exit_guard::arm();
-    let ran = simulate::run(&fmu, &settings, sink, &mut row);
+    let ran = simulate::run(&fmu, &settings, sink, &mut Tables { rows: &mut row, intermediate });
     exit_guard::disarm();
-    if let Some(file) = &mut file {
+    drop(row_between);
+    for file in [&mut file, &mut between].into_iter().flatten() {
         file.flush().map_err(|source| Error::File { path: "the table".into(), source })?;
     }
     match ran {
@@ -78,6 +78,15 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
             Ok(Exit::Failed)
         }
     }
+}
+
+fn created(path: &Path) -> Result<BufWriter<File>> {
+    let file = File::create(path);
+    file.map(BufWriter::new).map_err(|source| Error::File { path: path.display().to_string(), source })
+}
+
+fn line(file: &mut BufWriter<File>, text: &str) -> terraglue_fmi::Result {
+    writeln!(file, "{text}").map_err(|e| FmiError::Refused(format!("the table: {e}")))
 }
 
 fn level(line: &terraglue_fmi::LogLine) -> log::Level {

@@ -76,6 +76,7 @@ impl FmuSubsystem {
                 name: host.name().to_owned(),
                 verbose: false,
                 event_mode: options.event_mode,
+                intermediate: Vec::new(),
                 sink: Box::new(move |line| sink.log(line.level, &line.text)),
             },
         );
@@ -384,7 +385,7 @@ impl Subsystem for FmuSubsystem {
         let force = if self.bodies.is_empty() { Capabilities::default() } else { Capabilities::FORCE };
         let through = if self.feeds_through { Capabilities::FEEDTHROUGH } else { Capabilities::default() };
         let fixed = if c.variable_step { Capabilities::default() } else { Capabilities::FIXED_STEP };
-        let slopes = match c.directional_derivatives && self.can_go_back && self.bodies.tell_slopes() {
+        let slopes = match self.slave.tells_derivatives() && self.can_go_back && self.bodies.tell_slopes() {
             true => Capabilities::DERIVATIVES,
             false => Capabilities::default(),
         };
@@ -512,8 +513,10 @@ impl Subsystem for FmuSubsystem {
         out: &mut [f64],
     ) -> Result {
         let (mut z, mut v) = (Vec::new(), Vec::new());
-        let offered = self.slave.description().capabilities.directional_derivatives;
-        if !offered || !self.collect(unknowns, &mut z)? || !self.collect(knowns, &mut v)? {
+        if !self.slave.tells_derivatives()
+            || !self.collect(unknowns, &mut z)?
+            || !self.collect(knowns, &mut v)?
+        {
             return Err(Error::Unsupported);
         }
         self.slave.directional_derivative(&z, &v, seed, out).map_err(error)

@@ -277,11 +277,26 @@ impl Bodies {
         self.all.iter().flat_map(|b| &b.force).any(Option::is_some) && self.all.iter().all(own)
     }
 
-    /// dX, dV or dA/d(wrench on itself), n × n, column-major, from the unit's directional derivatives.
+    /// dX, dV or dA/d(wrench on itself), n × n, column-major, from the unit's derivatives.
     ///
     /// Those speak of outputs at one time, so they give dA; a force that stays over the step makes dV = h·dA and
     /// dX = c·h²·dA of it, with c = ½ until two trials of the step say what the unit's own integration makes of it.
     pub fn slopes(&self, slave: &Slave, step: &Step, level: Level, out: &mut [f64], fail: Fail) -> Result {
+        match slave.description().capabilities.directional_derivatives {
+            true => self.columns(slave, step, out, fail)?,
+            false => self.rows(slave, step, out, fail)?,
+        }
+        let scale = match level {
+            Level::Acceleration => 1.0,
+            Level::Velocity => step.h,
+            Level::Position => step.h * step.h * self.share(step, out),
+        };
+        out.iter_mut().for_each(|g| *g *= scale);
+        Ok(())
+    }
+
+    /// dA/d(wrench on itself) by directional derivatives: one call for each component of the wrench.
+    fn columns(&self, slave: &Slave, step: &Step, out: &mut [f64], fail: Fail) -> Result {
         let n = step.n as usize;
         let told = |b: &Body| b.acceleration.into_iter().flatten().map(|a| a.reference);
         let unknowns: Vec<u32> = self.all.iter().flat_map(told).collect();
@@ -301,12 +316,26 @@ impl Bodies {
                 out[column * n + row] = sum;
             }
         }
-        let scale = match level {
-            Level::Acceleration => 1.0,
-            Level::Velocity => step.h,
-            Level::Position => step.h * step.h * self.share(step, out),
-        };
-        out.iter_mut().for_each(|g| *g *= scale);
+        Ok(())
+    }
+
+    /// The same by adjoint derivatives: one call for each component of the acceleration.
+    fn rows(&self, slave: &Slave, step: &Step, out: &mut [f64], fail: Fail) -> Result {
+        let n = step.n as usize;
+        let taken = |b: &Body| b.force.into_iter().flatten().map(|f| f.reference);
+        let knowns: Vec<u32> = self.all.iter().flat_map(taken).collect();
+        let mut change = vec![f64::NAN; knowns.len()];
+        for (row, port, d) in components(step) {
+            let acceleration = self.all[port.body as usize].acceleration;
+            let along = |k: usize| acceleration[k].filter(|_| d[k] != 0.0).map(|axis| (axis.reference, d[k]));
+            let (unknowns, seed): (Vec<u32>, Vec<f64>) = (0..3).filter_map(along).unzip();
+            slave.adjoint_derivative(&unknowns, &knowns, &seed, &mut change).map_err(fail)?;
+            for (column, port, d) in components(step) {
+                let first = self.all[..port.body as usize].iter().map(|b| taken(b).count()).sum::<usize>();
+                let own = (0..3).filter(|k| self.all[port.body as usize].force[*k].is_some());
+                out[column * n + row] = own.zip(&change[first..]).map(|(k, change)| d[k] * change).sum();
+            }
+        }
         Ok(())
     }
 

@@ -28,6 +28,17 @@ pub struct Settings {
     pub input: Table,
 }
 
+/// Takes a line of a table.
+pub type Line<'a> = &'a mut dyn FnMut(&str) -> Result;
+
+/// Where the tables of a run go, line by line, the header first.
+pub struct Tables<'a> {
+    /// Outputs at communication points.
+    pub rows: Line<'a>,
+    /// Outputs that the unit shows at intermediate times, of the steps that stand.
+    pub intermediate: Option<Line<'a>>,
+}
+
 /// Inputs over time. Cells stay as they are written, because whole numbers of 64 bits do not fit into f64.
 #[derive(Clone, Debug, Default)]
 pub struct Table {
@@ -79,17 +90,12 @@ impl Table {
 /// Longest run, in steps.
 const STEPS: f64 = 1e9;
 
-/// Runs a unit and hands `row` each line of the table, the header first. Answers when the unit itself asked for the end
-/// of the run before its time, s.
+/// Runs a unit and writes its tables. Answers when the unit itself asked for the end of the run before its time, s.
 ///
 /// # Errors
 /// What the unit or its input does wrong, with the time.
-pub fn run(
-    fmu: &Arc<Fmu>,
-    settings: &Settings,
-    sink: Sink,
-    row: &mut dyn FnMut(&str) -> Result,
-) -> Result<Option<f64>> {
+pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables) -> Result<Option<f64>> {
+    let row = &mut *tables.rows;
     let experiment = fmu.description().experiment;
     let start = settings.start_time.or(experiment.start).unwrap_or(0.0);
     let stop = settings.stop.or(experiment.stop).unwrap_or(start + 1.0);
@@ -99,7 +105,12 @@ pub fn run(
     if !(step > 0.0 && steps >= 1.0 && steps <= STEPS) {
         return Err(Error::Refused(format!("from {start} s to {stop} s in steps of {step} s cannot be run")));
     }
-    let options = SlaveOptions { name: "unit".into(), verbose: false, event_mode: settings.event_mode, sink };
+    let intermediate = match &tables.intermediate {
+        Some(_) => shown_between(fmu.description(), &settings.outputs)?,
+        None => Vec::new(),
+    };
+    let (event_mode, name) = (settings.event_mode, "unit".into());
+    let options = SlaveOptions { name, verbose: false, event_mode, intermediate: intermediate.clone(), sink };
     let mut slave = Slave::instantiate(fmu, options)?;
     configure(&mut slave, &settings.start)?;
     let description = slave.description().clone();
@@ -119,6 +130,10 @@ pub fn run(
         true => format!("{text},{events}"),
         false => text,
     };
+    if let Some(write) = &mut tables.intermediate {
+        let all = self::columns(&description, &intermediate)?;
+        write(&(header(&all) + ",step_finished"))?;
+    }
     row(&marked(header(&columns), 0))?;
     row(&marked(line(&slave, start, &columns)?, 0))?;
     let mut state = SlaveState::default();
@@ -131,7 +146,7 @@ pub fn run(
         let at = |e: Error| named(e, t);
         set_inputs(&slave, settings, t).map_err(at)?;
         let events;
-        (ended, events) = halving(&mut slave, &mut state, t, end).map_err(at)?;
+        (ended, events) = halving(&mut slave, &mut state, (t, end), &mut tables.intermediate).map_err(at)?;
         let now = ended.unwrap_or(end);
         row(&marked(line(&slave, now, &columns).map_err(|e| named(e, now))?, events))
     });
@@ -143,14 +158,26 @@ pub fn run(
 
 /// A step, in halves where the unit discards it and can go back. Answers when the unit asked for the end, and how many
 /// events there were.
-fn halving(slave: &mut Slave, state: &mut SlaveState, start: f64, end: f64) -> Result<(Option<f64>, u32)> {
+fn halving(
+    slave: &mut Slave,
+    state: &mut SlaveState,
+    (start, end): (f64, f64),
+    between: &mut Option<Line>,
+) -> Result<(Option<f64>, u32)> {
     let c = slave.description().capabilities;
     let (mut t, mut h, mut halvings, mut events) = (start, end - start, 0, 0);
     while end - t > 1e-9 * (end - start) {
         if c.state {
             slave.save(state)?;
         }
-        match slave.do_step(Advance { t, h: h.min(end - t), for_good: !c.state }) {
+        let made = slave.do_step(Advance { t, h: h.min(end - t), for_good: !c.state });
+        if let (Ok(_), Some(write)) = (&made, &mut *between) {
+            for row in slave.take_intermediate() {
+                let values: String = row.values.iter().map(|x| format!(",{x}")).collect();
+                write(&format!("{}{values},{}", row.t, u8::from(row.finished)))?;
+            }
+        }
+        match made {
             Ok(done) if done.terminate => return Ok((Some(done.reached), events + done.events)),
             Ok(done) => {
                 events += done.events;
@@ -201,6 +228,20 @@ fn columns<'a>(description: &'a ModelDescription, names: &[String]) -> Result<Ve
     }
     let output = |v: &&Variable| v.causality == Causality::Output && v.value_type != ValueType::Clock;
     Ok(description.variables.iter().filter(output).collect())
+}
+
+/// Those of the outputs that can be read at intermediate times.
+fn shown_between(description: &ModelDescription, names: &[String]) -> Result<Vec<String>> {
+    let shown = |v: &&Variable| v.intermediate && v.value_type == ValueType::F64;
+    let all: Vec<String> =
+        columns(description, names)?.into_iter().filter(shown).map(|v| v.name.clone()).collect();
+    match all.is_empty() {
+        false => Ok(all),
+        true => Err(Error::Refused(
+            "none of the outputs is a Float64 with intermediateUpdate = \"true\", which can be read at intermediate times"
+                .into(),
+        )),
+    }
 }
 
 fn header(columns: &[&Variable]) -> String {

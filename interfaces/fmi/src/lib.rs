@@ -24,4 +24,4 @@ pub use binary::{library_entry, platforms};
 pub use description::{ModelDescription, Version};
 pub use error::{Error, Result};
 pub use fmu::Fmu;
-pub use slave::{Advance, LogLine, Slave, SlaveOptions, SlaveState, Stepped};
+pub use slave::{Advance, IntermediateRow, LogLine, Slave, SlaveOptions, SlaveState, Stepped};

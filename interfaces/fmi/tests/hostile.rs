@@ -266,6 +266,7 @@ fn loading(entries: &[Entry], description: &str) -> String {
         name: "x".into(),
         verbose: false,
         event_mode: false,
+        intermediate: Vec::new(),
         sink: Box::new(|_| {}),
     };
     let error = terraglue_fmi::Slave::instantiate(&fmu, options).expect_err("no library");

@@ -119,6 +119,7 @@ fn capabilities(element: &Element, version: Version) -> Result<(String, Capabili
         event_mode: flag("hasEventMode")?,
         may_return_early: flag("mightReturnEarlyFromDoStep")?,
         intermediate_update: flag("providesIntermediateUpdate")?,
+        return_early: flag("canReturnEarlyAfterIntermediateUpdate")?,
         interpolates_inputs: flag("canInterpolateInputs")?,
     };
     Ok((identifier.to_owned(), capabilities))

@@ -79,6 +79,8 @@ pub struct Capabilities {
     pub may_return_early: bool,
     /// Intermediate update (FMI 3).
     pub intermediate_update: bool,
+    /// Ends a step early where it is asked to in an intermediate update (FMI 3).
+    pub return_early: bool,
     /// Takes derivatives of its inputs (FMI 2).
     pub interpolates_inputs: bool,
 }
@@ -220,6 +222,8 @@ pub struct Variable {
     pub ticks: Option<Ticks>,
     /// Whether a structural parameter changed its shape, so that the start values of the description are not for it.
     pub resized: bool,
+    /// Whether it can be read at intermediate times.
+    pub intermediate: bool,
 }
 
 /// Times of a periodic clock: shift, shift + interval, …

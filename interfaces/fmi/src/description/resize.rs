@@ -93,6 +93,7 @@ mod tests {
             alias: false,
             ticks: None,
             resized: false,
+            intermediate: false,
         };
         let array = Variable {
             name: "a".into(),

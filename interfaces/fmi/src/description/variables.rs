@@ -180,6 +180,7 @@ fn variable(
         alias: false,
         ticks: if value_type == ValueType::Clock { ticks(inner, causality)? } else { None },
         resized: false,
+        intermediate: element.flag("intermediateUpdate")?,
     })
 }
 

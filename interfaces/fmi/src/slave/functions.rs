@@ -59,6 +59,9 @@ pub struct Callbacks2 {
 /// `fmi3LogMessageCallback`.
 pub type Logger3 = unsafe extern "C" fn(*mut c_void, c_int, Text, Text);
 
+/// `fmi3IntermediateUpdateCallback`.
+pub type Update3 = unsafe extern "C" fn(*mut c_void, f64, bool, bool, bool, bool, *mut bool, *mut f64);
+
 table! {
     /// FMI 2.0 for co-simulation.
     Two {
@@ -95,7 +98,7 @@ table! {
     /// FMI 3.0 for co-simulation.
     Three {
         instantiate = "fmi3InstantiateCoSimulation": fn(
-            Text, Text, Text, bool, bool, bool, bool, *const Vr, usize, *mut c_void, Logger3, *const c_void
+            Text, Text, Text, bool, bool, bool, bool, *const Vr, usize, *mut c_void, Logger3, Option<Update3>
         ) -> Component;
         free = "fmi3FreeInstance": fn(Component);
         enter_configuration = "fmi3EnterConfigurationMode": fn(Component) -> c_int;
@@ -148,6 +151,8 @@ table! {
         deserialize = "fmi3DeserializeFMUState": fn(Component, *const u8, usize, *mut State) -> c_int;
         directional = "fmi3GetDirectionalDerivative":
             fn(Component, *const Vr, usize, *const Vr, usize, *const f64, usize, *mut f64, usize) -> c_int;
+        adjoint = "fmi3GetAdjointDerivative":
+            fn(Component, *const Vr, usize, *const Vr, usize, *const f64, usize, *mut f64, usize) -> c_int;
     }
 }
 
@@ -186,6 +191,7 @@ pub fn find(fmu: &Fmu, library: &Library) -> Result<Api> {
             || bytes && c.serialize
             || state && !bytes && c.state
             || name == "GetDirectionalDerivative" && c.directional_derivatives
+            || name == "GetAdjointDerivative" && c.adjoint_derivatives
     };
     match missing.iter().find(|s| needed(s)) {
         None => Ok(api),

@@ -1,5 +1,6 @@
 //! What a unit logs: kept for errors, handed on with a limit, because some units log without end.
 
+use super::intermediate::Updates;
 use std::collections::{BTreeMap, VecDeque};
 use std::ffi::{c_char, c_int, c_void};
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -33,6 +34,8 @@ pub struct LogBook {
     lines: Mutex<Lines>,
     /// Whether anything was said since the last call began; most calls say nothing and need no lock.
     said: AtomicBool,
+    /// What intermediate updates are answered with: they come with the same environment.
+    pub(super) updates: Updates,
 }
 
 #[derive(Default)]
@@ -52,7 +55,7 @@ fn books() -> MutexGuard<'static, BTreeMap<usize, (String, Weak<LogBook>)>> {
 }
 
 /// The book that a call of the logger means: that of the environment, or else of the instance's name, or the only one.
-fn meant(environment: usize, name: &str) -> Option<Arc<LogBook>> {
+pub(super) fn meant(environment: usize, name: &str) -> Option<Arc<LogBook>> {
     let books = books();
     let named = || {
         let mut found = books.values().filter(|(n, _)| n == name);
@@ -71,7 +74,12 @@ impl Drop for LogBook {
 impl LogBook {
     /// A book of the instance `name`.
     pub fn new(sink: Sink, name: &str) -> Arc<Self> {
-        let book = Arc::new(Self { sink, lines: Mutex::default(), said: AtomicBool::new(false) });
+        let book = Arc::new(Self {
+            sink,
+            lines: Mutex::default(),
+            said: AtomicBool::new(false),
+            updates: Updates::default(),
+        });
         books().insert(Arc::as_ptr(&book) as usize, (name.to_owned(), Arc::downgrade(&book)));
         book
     }

@@ -7,11 +7,13 @@
 mod call;
 mod configure;
 mod functions;
+mod intermediate;
 mod log;
 mod state;
 mod step;
 mod values;
 
+pub use intermediate::IntermediateRow;
 pub use log::{LogLine, Sink};
 pub use state::SlaveState;
 pub use step::{Advance, Stepped};
@@ -47,6 +49,8 @@ pub struct SlaveOptions {
     pub verbose: bool,
     /// Whether events are handled in event mode (FMI 3, where the unit has it).
     pub event_mode: bool,
+    /// Variables that are read at intermediate times (FMI 3).
+    pub intermediate: Vec<String>,
     /// Where its log goes.
     pub sink: Sink,
 }
@@ -72,6 +76,9 @@ pub struct Slave {
     /// Periodic input clocks, ticked in event mode.
     clocks: Vec<(u32, Ticks)>,
     start: f64,
+    /// Whether the unit may call for an intermediate update, and what is read there.
+    updates: bool,
+    shown: Vec<u32>,
     warnings: Cell<u64>,
     /// Whether it was said that its clock runs ahead.
     ran_past: Cell<bool>,
@@ -92,6 +99,8 @@ impl Slave {
         if description.capabilities.needs_tool {
             log_needs_tool(&options.sink, description);
         }
+        let shown = Self::shown_between(description, &options.intermediate)?;
+        let updates = description.capabilities.intermediate_update;
         let loaded = fmu.library()?;
         let api = functions::find(fmu, &loaded.library)?;
         let log = LogBook::new(options.sink, &options.name);
@@ -124,7 +133,11 @@ impl Slave {
             }
             Api::Three(three) => {
                 let resources = text(&format!("{path}/"))?;
-                let (verbose, none) = (options.verbose, std::ptr::null::<u32>());
+                let verbose = options.verbose;
+                let update: Option<functions::Update3> = updates.then_some(intermediate::update);
+                // only where the rest of the step can be made in a step of another length
+                let c = description.capabilities;
+                let early = c.variable_step && (c.may_return_early || c.return_early);
                 // SAFETY: the arguments are those of the standard and live long enough.
                 three.instantiate.map(|f| unsafe {
                     f(
@@ -134,12 +147,12 @@ impl Slave {
                         false,
                         verbose,
                         event_mode,
-                        false,
-                        none,
-                        0,
+                        early,
+                        shown.as_ptr(),
+                        shown.len(),
                         environment,
                         log::log_3,
-                        std::ptr::null(),
+                        update,
                     )
                 })
             }
@@ -160,6 +173,8 @@ impl Slave {
             event_mode,
             clocks: clocks(&description.variables, event_mode, &log),
             start: 0.0,
+            updates,
+            shown,
             warnings: Cell::new(0),
             ran_past: Cell::new(false),
             log,
@@ -192,6 +207,9 @@ impl Slave {
     /// Enters initialisation mode, after start values were set.
     pub fn enter_initialization(&mut self, start: f64, stop: Option<f64>, tolerance: Option<f64>) -> Result {
         self.start = start;
+        if self.updates {
+            self.watch_between();
+        }
         let (has_tolerance, tolerance) = (tolerance.is_some(), tolerance.unwrap_or(0.0));
         let (has_stop, stop) = (stop.is_some(), stop.unwrap_or(0.0));
         match self.api {

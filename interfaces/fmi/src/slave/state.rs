@@ -129,7 +129,14 @@ impl Slave {
         }
     }
 
-    /// d(unknowns)/d(knowns)·seed, all of type f64.
+    /// Whether derivatives of outputs are known: directional or adjoint ones.
+    pub fn tells_derivatives(&self) -> bool {
+        let c = self.description.capabilities;
+        c.directional_derivatives || c.adjoint_derivatives
+    }
+
+    /// d(unknowns)/d(knowns)·seed, all of type f64 and no arrays; from adjoint derivatives row by row where the unit
+    /// offers no directional ones.
     pub fn directional_derivative(
         &self,
         unknowns: &[u32],
@@ -137,7 +144,16 @@ impl Slave {
         seed: &[f64],
         out: &mut [f64],
     ) -> Result {
-        self.can(self.description.capabilities.directional_derivatives, "directional derivatives")?;
+        let c = self.description.capabilities;
+        if c.adjoint_derivatives && !c.directional_derivatives {
+            let mut row = vec![f64::NAN; knowns.len()];
+            for (unknown, out) in unknowns.iter().zip(out) {
+                self.adjoint_derivative(&[*unknown], knowns, &[1.0], &mut row)?;
+                *out = row.iter().zip(seed).map(|(a, b)| a * b).sum();
+            }
+            return Ok(());
+        }
+        self.can(c.directional_derivatives, "directional derivatives")?;
         let (z, n_z, v, n_v) = (unknowns.as_ptr(), unknowns.len(), knowns.as_ptr(), knowns.len());
         let (s, n_s, o, n_o) = (seed.as_ptr(), seed.len(), out.as_mut_ptr(), out.len());
         match self.api {
@@ -150,5 +166,25 @@ impl Slave {
                 })
             }
         }
+    }
+
+    /// seedᵀ·d(unknowns)/d(knowns): a number for each known (FMI 3.0, 2.2.11).
+    pub fn adjoint_derivative(
+        &self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        out: &mut [f64],
+    ) -> Result {
+        self.can(self.description.capabilities.adjoint_derivatives, "adjoint derivatives")?;
+        let Api::Three(three) = self.api else {
+            return Err(Error::Refused("FMI 2.0 has no adjoint derivatives".into()));
+        };
+        let (z, n_z, v, n_v) = (unknowns.as_ptr(), unknowns.len(), knowns.as_ptr(), knowns.len());
+        let (s, n_s, o, n_o) = (seed.as_ptr(), seed.len(), out.as_mut_ptr(), out.len());
+        // SAFETY: so many references and values.
+        self.call("fmi3GetAdjointDerivative", three.adjoint, |f, c| unsafe {
+            f(c, z, n_z, v, n_v, s, n_s, o, n_o)
+        })
     }
 }

@@ -14,6 +14,8 @@ const TERMINATED: c_int = 3;
 const PAST: f64 = 1e-3;
 /// Rounds of discrete updates at one time before a unit is taken to loop for ever.
 const ROUNDS: u32 = 1000;
+/// Early returns in one step before a unit is taken to go on for ever.
+const RETURNS: u32 = 100_000;
 
 /// A communication step to do.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -89,22 +91,33 @@ impl Slave {
         const NAME: &str = "fmi3DoStep";
         let Api::Three(three) = self.api else { return Err(Error::Refused(NAME.into())) };
         let end = step.t + step.h;
-        let (mut t, mut events) = (step.t, 0);
+        let (mut t, mut events, mut returns) = (step.t, 0, 0);
+        if self.updates {
+            self.forget_between();
+        }
         let tolerance = 1e-9 * step.h + 4.0 * f64::EPSILON * end.abs();
         loop {
             let tick = self.clocks.iter().map(|(_, ticks)| ticks.after(t)).fold(end, f64::min);
             let stop = if end - tick > tolerance { tick } else { end };
             let (mut event, mut terminate, mut early, mut last) = (false, false, false, f64::NAN);
             let for_good = step.for_good;
+            if self.updates {
+                self.open_between(t, stop, three.get_f64);
+            }
             let status = self.status(NAME, three.do_step, |f, c| unsafe {
                 f(c, t, stop - t, for_good, &raw mut event, &raw mut terminate, &raw mut early, &raw mut last)
-            })?;
+            });
+            let wrong = if self.updates { self.close_between() } else { None };
+            let status = status?;
             if status == Status::Discard {
                 let reached = if last >= step.t && last <= end { last } else { step.t };
                 return Err(Error::Discard { function: NAME, reached, log: self.log.last() });
             }
             if !goes_on(status) {
                 return Err(self.failed(NAME, status));
+            }
+            if let Some(outcome) = wrong {
+                return Err(self.lied(NAME, outcome));
             }
             let past = last > stop + tolerance && last - stop <= PAST * step.h;
             if past && !self.ran_past.replace(true) {
@@ -136,12 +149,16 @@ impl Slave {
             if at_stop && stop >= end {
                 return Ok(Stepped { reached: end, terminate: false, events });
             }
-            if !event && !at_stop && last <= t {
+            if !(event && self.event_mode) && !at_stop && last <= t {
                 let outcome = format!("came no further than t = {last} s in the step to {end} s");
                 return Err(self.lied(NAME, outcome));
             }
             if events > ROUNDS {
                 return Err(self.lied(NAME, format!("found more than {ROUNDS} events in one step")));
+            }
+            returns += u32::from(!at_stop);
+            if returns > RETURNS {
+                return Err(self.lied(NAME, format!("returned early more than {RETURNS} times in one step")));
             }
             t = if at_stop { stop } else { last };
         }

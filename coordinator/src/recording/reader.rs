@@ -5,6 +5,7 @@ use crate::observer::Happening;
 use crate::recording::layout::{RECORDING, at};
 use crate::recording::messages::GluingRecord;
 use crate::recording::records::{Piece, Records};
+use crate::recording::solids::{SceneMessage, Solid, Vector};
 use crate::recording::table::Table;
 use base64::Engine;
 use serde::Deserialize;
@@ -26,6 +27,8 @@ pub struct Recording {
     pub first_frame: Option<String>,
     /// Radius of the first sphere of every body that has one, by frame, m.
     pub radii: BTreeMap<String, f64>,
+    /// Shapes of every body in its frame, by frame.
+    pub solids: BTreeMap<String, Vec<Solid>>,
     /// How the steps were glued.
     pub gluing: Vec<GluingRecord>,
     /// Energies, J: `kinetic`, …, and `<subsystem>.kinetic`, ….
@@ -108,16 +111,6 @@ impl GroundRecord {
 }
 
 #[derive(Deserialize)]
-struct Vector {
-    x: f64,
-    y: f64,
-    #[serde(default)]
-    z: f64,
-    #[serde(default)]
-    w: f64,
-}
-
-#[derive(Deserialize)]
 struct Transforms {
     transforms: Vec<Transform>,
 }
@@ -127,22 +120,6 @@ struct Transform {
     child_frame_id: String,
     translation: Vector,
     rotation: Vector,
-}
-
-#[derive(Deserialize)]
-struct SceneMessage {
-    entities: Vec<Entity>,
-}
-
-#[derive(Deserialize)]
-struct Entity {
-    frame_id: String,
-    spheres: Vec<Sphere>,
-}
-
-#[derive(Deserialize)]
-struct Sphere {
-    size: Vector,
 }
 
 #[derive(Deserialize)]
@@ -238,6 +215,7 @@ impl Recording {
         let spheres =
             scene.entities.iter().filter_map(|e| Some((e.frame_id.clone(), e.spheres.first()?.size.x / 2.0)));
         self.radii.extend(spheres);
+        self.solids.extend(scene.entities.iter().map(|e| (e.frame_id.clone(), e.solids())));
     }
 
     fn take_ground(&mut self, data: &[u8], t_s: f64) {

@@ -1,4 +1,4 @@
-// The ground from above: picture, footprints and path in metres; drag a rectangle to zoom.
+// The ground from above: picture, outlines, footprints and path in metres; drag a rectangle to zoom.
 class GroundMap {
   static margin = { left: 46, right: 8, top: 8, bottom: 34 };
 
@@ -7,7 +7,8 @@ class GroundMap {
     this.svg = document.getElementById("map-svg");
     this.readout = document.getElementById("map-readout");
     this.path = map.path && { x: unpack(map.path.x), y: unpack(map.path.y) };
-    this.view = this.track();
+    this.outlines = map.outlines.map((o) => ({ name: o.name, x: unpack(o.x), y: unpack(o.y) }));
+    this.view = map.image ? this.track() : this.whole();
     for (const button of document.querySelectorAll("#map [data-view]")) {
       button.onclick = () => this.show(button.dataset.view === "track" ? this.track() : this.whole());
     }
@@ -66,11 +67,13 @@ class GroundMap {
     svgElement(clip, "rect", { x: left, y: top, width: this.width, height: this.height });
     const group = svgElement(this.svg, "g", { "clip-path": "url(#map-clip)" });
     const [x, y] = [this.map.x, this.map.y];
-    svgElement(group, "image", {
-      href: this.map.image, x: this.x(x[0]), y: this.y(y[1]), preserveAspectRatio: "none",
-      width: (x[1] - x[0]) * this.scale, height: (y[1] - y[0]) * this.scale,
-    });
+    const ground = {
+      x: this.x(x[0]), y: this.y(y[1]), width: (x[1] - x[0]) * this.scale, height: (y[1] - y[0]) * this.scale,
+    };
+    if (this.map.image) svgElement(group, "image", { href: this.map.image, preserveAspectRatio: "none", ...ground });
+    else svgElement(group, "rect", { class: "bare", ...ground });
     this.drawGrid(group);
+    this.drawOutlines(group);
     this.drawPrints(group);
     this.drawPath(group);
     this.brush = svgElement(this.svg, "rect", { class: "brush", width: 0, height: 0 });
@@ -108,10 +111,23 @@ class GroundMap {
     }
   }
 
+  // The path of an SVG line through these places.
+  line({ x, y }) {
+    return `M${Array.from(x, (x, k) => `${this.x(x).toFixed(1)} ${this.y(y[k]).toFixed(1)}`).join("L")}`;
+  }
+
+  drawOutlines(group) {
+    for (const outline of this.outlines) {
+      const d = this.line(outline);
+      svgElement(group, "path", { class: "halo", d });
+      svgElement(svgElement(group, "path", { class: "outline", d }), "title").textContent = outline.name;
+    }
+  }
+
   drawPath(group) {
     if (!this.path || this.path.x.length < 2) return;
-    const points = Array.from(this.path.x, (x, k) => `${this.x(x).toFixed(1)} ${this.y(this.path.y[k]).toFixed(1)}`);
-    for (const name of ["halo", "path"]) svgElement(group, "path", { class: name, d: `M${points.join("L")}` });
+    const d = this.line(this.path);
+    for (const name of ["halo", "path"]) svgElement(group, "path", { class: name, d });
     const dot = (k, fill) => svgElement(group, "circle", {
       cx: this.x(this.path.x.at(k)), cy: this.y(this.path.y.at(k)), r: 4.5, fill, stroke: "#16181b", "stroke-width": 1.6,
     });
@@ -155,6 +171,9 @@ class GroundMap {
     this.map.legs.forEach((leg, k) => {
       htmlElement(legend, "span", "key", leg).style.setProperty("--curve", colourOf(k));
     });
+    if (this.outlines.length) {
+      htmlElement(legend, "span", "key dashed", "stands still").style.setProperty("--curve", "var(--ink)");
+    }
     if (this.path) htmlElement(legend, "span", "key", "path of the body").style.setProperty("--curve", "var(--ink)");
   }
 

@@ -10,6 +10,7 @@ mod figures;
 pub(crate) mod footprints;
 mod ground_map;
 pub(crate) mod html;
+mod outlines;
 pub(crate) mod page;
 mod picture;
 mod setup;

@@ -7,6 +7,7 @@ import threading
 
 import numpy as np
 import pytest
+from fmpy import simulate_fmu
 from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 
@@ -128,6 +129,73 @@ set = {{ "{PRESSES[0]}" = 0.01, "{PRESSES[1]}" = 0.02 }}
         wanted = float(row[f"robot.{name}"])
         assert abs(instance[name][0] - wanted) <= 1e-12 * max(1.0, abs(wanted)), name
     instance.end()
+
+
+FREE = """<robot name="swing"><link name="base"><inertial><mass value="2"/>
+<inertia ixx="0.02" iyy="0.03" izz="0.04" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<link name="arm"><inertial><origin xyz="0.3 0 0"/><mass value="1"/>
+<inertia ixx="0.01" iyy="0.01" izz="0.01" ixy="0" ixz="0" iyz="0"/></inertial></link>
+<joint name="hinge" type="revolute"><parent link="base"/><child link="arm"/><origin xyz="0.1 0 0"/><axis xyz="0 1 0"/>
+<limit lower="-1" upper="1" effort="5" velocity="9"/></joint></robot>"""
+
+
+@pytest.mark.parametrize("version", ["2", "3"])
+def test_poses_and_coordinates_are_set_before_the_start(tmp_path, version):
+    (tmp_path / "swing.urdf").write_text(FREE)
+    wanted = {"base.z": 0.75, "base.yaw": 0.4, "base.vx": 0.2, "base.wz": 1.5, "hinge.angle": 0.6, "hinge.velocity": -2.0}
+    values = ", ".join(f'"robot.{name}" = {value}' for name, value in wanted.items())
+    (tmp_path / "swing.toml").write_text(f"""
+[time]
+step_s = 0.001
+duration_s = 0.1
+[world]
+gravity_m_s2 = [0.0, 0.0, -9.81]
+[recording]
+every_steps = 1
+[robot]
+module = "rigid-body"
+model = "swing.urdf"
+motor = "off"
+[[event]]
+at_s = 0.0
+set = {{ {values} }}
+""")
+    done = terraglue("run", tmp_path / "swing.toml", "--csv", "--quiet", "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    row = list(csv.DictReader((tmp_path / "out" / "variables.csv").open()))[-1]
+
+    edits = sets(f"robot.model={tmp_path}/swing.urdf", "robot.motor=off")
+    unit = Unit(export("rigid-body", tmp_path / "swing.fmu", "--fmi", version, *edits))
+    assert validate_fmu(unit.path) == []
+    for name, what in {"base.z": "m", "base.yaw": "rad", "hinge.angle": "rad", "hinge.velocity": "rad/s"}.items():
+        found = unit.variables[name]
+        assert (found.causality, found.initial, found.unit, float(found.start)) == ("output", "exact", what, 0.0), name
+    unknown = {v.variable.name for v in unit.description.initialUnknowns}
+    assert "arm.z" in unknown and not unknown & wanted.keys() and unit.variables["arm.z"].start is None
+
+    instance = unit.instance(running=False)
+    instance["hinge.angle"] = 0.1  # before the initialisation, too; the later value counts
+    with pytest.raises(FMICallException):
+        instance["hinge.angle"] = 1.5  # beyond its limit
+    with pytest.raises(FMICallException):
+        instance["arm.z"] = 1.0  # its joint says where it is
+    instance.initialize({name.replace(".", "__"): value for name, value in wanted.items()})
+    assert instance["base.z"][0] == 0.75 and abs(instance["hinge.angle"][0] - 0.6) < 1e-15
+    with pytest.raises(FMICallException):
+        instance["base.z"] = 1.0
+    for _ in range(100):
+        instance.step(1e-3)
+    outputs = [n for n, v in unit.variables.items() if v.causality == "output" and f"robot.{n}" in row]
+    assert len(outputs) > 30
+    for name in outputs:
+        assert abs(instance[name][0] - float(row[f"robot.{name}"])) <= 1e-12 * max(1.0, abs(float(row[f"robot.{name}"]))), name
+    instance.end()
+
+    # A master that knows nothing but the description.
+    result = simulate_fmu(unit.path, start_values=wanted, stop_time=0.1, step_size=1e-3, output=["base.x", "hinge.angle"])
+    for name in ("base.x", "hinge.angle"):
+        assert abs(result[name][-1] - float(row[f"robot.{name}"])) < 1e-12, name
+    unit.remove()
 
 
 @pytest.mark.parametrize(("name", "feet"), [("soil3", 1), ("soil2", 2)])

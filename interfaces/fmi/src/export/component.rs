@@ -405,11 +405,12 @@ impl Component {
 
 fn may_set(v: &Variable, running: bool) -> Answer {
     match (v.causality, v.effect) {
-        (Causality::Output | Causality::Local, _) | (_, Effect::ReadOnly) => {
-            wrong(format!("`{}` can only be read", v.name))
-        }
         (_, Effect::NeedsReset) if running => {
             wrong(format!("`{}` can be set before the first step only", v.name))
+        }
+        (Causality::Output | Causality::Local, Effect::NeedsReset) => Ok(()),
+        (Causality::Output | Causality::Local, _) | (_, Effect::ReadOnly) => {
+            wrong(format!("`{}` can only be read", v.name))
         }
         _ => Ok(()),
     }

@@ -235,6 +235,9 @@ impl Writer<'_> {
             ("causality", &causality),
             ("variability", &variability),
         ];
+        if settable_at_start(v) {
+            common.push(("initial", &"exact"));
+        }
         if !v.help.is_empty() {
             common.push(("description", &v.help));
         }
@@ -288,7 +291,7 @@ impl Writer<'_> {
 
     /// Start values of what can be set, in the words of the standard.
     fn start(&self, entry: &Entry, v: &Variable) -> Result<Option<String>> {
-        if !matches!(causality(v), "parameter" | "input") {
+        if !matches!(causality(v), "parameter" | "input") && !settable_at_start(v) {
             return Ok(None);
         }
         let s = self.subsystem;
@@ -336,15 +339,20 @@ impl Writer<'_> {
         }
         if self.two() && !outputs.is_empty() {
             xml.close("Outputs");
+        }
+        let unknown = |k: &&usize| !settable_at_start(&self.variables[self.layout.entries[**k - 1].variable]);
+        let unknowns: Vec<usize> = outputs.iter().filter(unknown).copied().collect();
+        let list = self.two() && !unknowns.is_empty();
+        if list {
             xml.open("InitialUnknowns", &[]);
         }
-        for k in &outputs {
+        for k in &unknowns {
             match self.two() {
                 true => xml.leaf("Unknown", &[("index", k)]),
                 false => xml.leaf("InitialUnknown", &[("valueReference", k)]),
             }
         }
-        if self.two() && !outputs.is_empty() {
+        if list {
             xml.close("InitialUnknowns");
         }
         xml.close("ModelStructure");
@@ -380,6 +388,11 @@ fn causality(v: &Variable) -> &'static str {
         (Causality::Input, _) => "input",
         (Causality::Output, _) => "output",
     }
+}
+
+/// Whether an output is a start value, too: `initial` = exact, and known where the initialisation begins.
+pub(super) fn settable_at_start(v: &Variable) -> bool {
+    matches!(v.causality, Causality::Output | Causality::Local) && v.effect == Effect::NeedsReset
 }
 
 fn variability(v: &Variable) -> &'static str {

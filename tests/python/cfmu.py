@@ -31,7 +31,7 @@ int fmi2DoStep(Unit *u, double t, double h, int p) { double *r = u->r; int *i = 
 """
 
 
-def build(folder, name, reals, step, others="", units="", variable_step=True):
+def build(folder, name, reals, step, others="", units="", variable_step=True, types=""):
     """The unit `name`.fmu; `reals` are (name, causality, start, unit), `step` is C over r, i and b at t, of length h."""
     starts = ", ".join(repr(float(start)) for _, _, start, _ in reals)
     (folder / f"{name}.c").write_text(FRAME % {"start": starts, "step": step})
@@ -46,11 +46,12 @@ def build(folder, name, reals, step, others="", units="", variable_step=True):
         text += f"<Real{value}{unit}/></ScalarVariable>"
     outputs = "".join(f'<Unknown index="{k + 1}"/>' for k, v in enumerate(reals) if v[1] == "output")
     units = f"<UnitDefinitions>{units}</UnitDefinitions>" if units else ""
+    types = f"<TypeDefinitions>{types}</TypeDefinitions>" if types else ""
     variable = str(variable_step).lower()
     description = f"""<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="{name}" guid="g">
 <CoSimulation modelIdentifier="m" canGetAndSetFMUstate="true" canHandleVariableCommunicationStepSize="{variable}"/>
-{units}<ModelVariables>{text}{others}</ModelVariables>
+{units}{types}<ModelVariables>{text}{others}</ModelVariables>
 <ModelStructure><Outputs>{outputs}</Outputs></ModelStructure></fmiModelDescription>"""
     with zipfile.ZipFile(folder / f"{name}.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", description)

@@ -162,3 +162,43 @@ to = "a.u[1,1]"
     page = (tmp_path / "out" / "report.html").read_text()
     for words in ("How values went round", "a.y[1,1]", "delay (steps)", "a ⇄ b", "per step (µs)"):
         assert words in page
+
+
+def mapped(made, tmp_path, pairs):
+    path = made / "mapped.toml"
+    connect = "".join(f'[[connect]]\nfrom = "a.{a}"\nto = "b.{b}"\nmap = {{ {m} }}\n' for a, b, m in pairs)
+    path.write_text(
+        "[time]\nstep_s = 0.1\nduration_s = 0.4\n[recording]\nevery_steps = 1\n"
+        f'[a]\nfmu = "metres.fmu"\ni_in = 7\nb_in = true\n[b]\nfmu = "metres.fmu"\n{connect}'
+    )
+    done = terraglue("run", path, "--csv", "--quiet", "--out", tmp_path / "out")
+    rows = list(csv.DictReader((tmp_path / "out" / "variables.csv").open())) if done.returncode == 0 else []
+    return done, rows[-1] if rows else None, path
+
+
+def test_values_become_others_by_a_table(made, tmp_path):
+    pairs = [("i_out", "i_in", '"0" = 1, "14" = -3'), ("b_out", "b_in", "true = false, false = true")]
+    done, row, path = mapped(made, tmp_path, pairs)
+    assert done.returncode == 0, done.stderr
+    assert float(row["b.i_out"]) == -6.0 and row["b.b_out"] in ("false", "0", "0.0")
+    done, row, _ = mapped(made, tmp_path, [("i_out", "b_in", '"0" = false, "14" = true')])
+    assert done.returncode == 0 and row["b.b_out"] in ("true", "1", "1.0"), done.stderr
+    done = terraglue("run", path, "--explain", "--out", tmp_path / "explained")
+    assert any("a.i_out → b.b_in" in line and "by a table" in line for line in done.stdout.splitlines()), done.stdout
+
+
+@pytest.mark.parametrize(
+    ("pair", "code", "says"),
+    [
+        (("i_out", "i_in", '"0" = 1'), 1, ["`i_out` is 14", "no entry"]),
+        (("i_out", "i_in", '"0" = 1.5'), 2, ["`0` of `map`", "whole number"]),
+        (("b_out", "b_in", "yes = true"), 2, ["`map` has `yes`", "no value of `b_out`"]),
+        (("b_out", "b_in", "true = 2"), 2, ["`map` has `2`", "no value of `b_in`"]),
+        (("y[1,1]", "u[1,1]", '"0" = 1'), 2, ["`map` is for truth values"]),
+        (("i_out", "i_in", '"0" = 1, "00" = 2'), 2, ["twice"]),
+    ],
+)
+def test_a_table_that_does_not_fit_is_refused(made, tmp_path, pair, code, says):
+    done, _, _ = mapped(made, tmp_path, [pair])
+    flat = " ".join(done.stderr.replace("│", " ").split())
+    assert done.returncode == code and all(word in flat for word in says), done.stderr

@@ -86,8 +86,18 @@ def files(tmp_path_factory):
         '<ScalarVariable name="n" valueReference="0" causality="parameter"><Integer start="1"/></ScalarVariable>'
         '<ScalarVariable name="s" valueReference="0" causality="parameter"><String start="none"/></ScalarVariable>'
     )
-    step = 'r[1] = r[2] * r[0] + r[3]; r[4] = i[0] + (strcmp(u->text, "\\"b\\"") ? 0 : 0.5);'
-    build(folder / "resources", "line", reals, step, others, UNITS)
+    others += "".join(
+        f'<ScalarVariable name="{name}" valueReference="{k}" causality="{role}" variability="{change}"><{kind}/></ScalarVariable>'
+        for name, k, role, change, kind in (
+            ("i_out", 1, "output", "discrete", "Integer"),
+            ("i_in", 2, "input", "discrete", 'Integer start="0"'),
+            ("e", 3, "parameter", "fixed", 'Enumeration declaredType="E" start="1"'),
+            ("p", 0, "parameter", "fixed", 'Boolean start="true"'),
+        )
+    )
+    types = '<SimpleType name="E"><Enumeration><Item name="off" value="1"/><Item name="on" value="2"/></Enumeration></SimpleType>'
+    step = 'r[1] = r[2] * r[0] + r[3]; r[4] = i[0] + (strcmp(u->text, "\\"b\\"") ? 0 : 0.5) + 100 * i[3] + 1000 * b[0];'
+    build(folder / "resources", "line", reals, step + " i[1] = 5;", others, UNITS, types=types)
     (folder / "resources" / "gains.ssv").write_text(GAINS)
     (folder / "resources" / "gains.ssm").write_text(MAPPING)
     return folder
@@ -159,7 +169,8 @@ endConnector="small_press.velocity_target"/></ssd:Connections></ssd:System>
         ('startElement="inner"', 'startElement="outer"', ["outer"]),
         ('m="1" factor="0.001"', 's="1" factor="0.001"', ["different dimensions", "a.y"]),
         ('startTime="0"', 'startTime="3"', ["does not start at 0"]),
-        ("<ssc:LinearTransformation", "<ssc:BooleanMappingTransformation", ["tables as transformations"]),
+        ("<ssc:LinearTransformation", "<ssc:BooleanMappingTransformation", ["has no <MapEntry>"]),
+        ("<ssc:LinearTransformation", "<ssc:OtherTransformation", ["transformation is not read"]),
         ('name="inner"', 'name="a"', ["occurs twice"]),
         ('endElement="d" endConnector="u"', 'endElement="inner" endConnector="in"', ["is fed by"]),
         ('name="plant">\n<ssd:System', 'name="plant"><ssd:Sistem', ["SystemStructure.ssd:"]),
@@ -182,3 +193,85 @@ def test_an_archive_that_leads_out_of_its_folder_is_refused(files, tmp_path):
         archive.writestr("other.ssd", SYSTEM)
     done = terraglue("run", tmp_path / "empty.ssp")
     assert done.returncode == 2 and "it is no SSP" in " ".join(done.stderr.split())
+
+
+# a tells a signal in millimetres and a state; the nested b and d hear both, d by another table
+SHARED = f"""<?xml version="1.0"?><ssd:SystemStructureDescription {NAMES} xmlns:ssb="http://ssp-standard.org/SSP1/SystemStructureSignalDictionary"
+ name="shared"><ssd:System name="shared">
+ <ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues><ssv:ParameterSet version="1.0" name="p"><ssv:Parameters>
+   <ssv:Parameter name="c"><ssv:Real value="3"/></ssv:Parameter><ssv:Parameter name="go"><ssv:Boolean value="true"/></ssv:Parameter>
+   <ssv:Parameter name="level"><ssv:Integer value="7"/></ssv:Parameter><ssv:Parameter name="kind"><ssv:Enumeration value="dry"/></ssv:Parameter>
+  </ssv:Parameters></ssv:ParameterSet></ssd:ParameterValues>
+  <ssd:ParameterMapping><ssm:ParameterMapping version="1.0">
+   <ssm:MappingEntry source="c" target="a.c"/>
+   <ssm:MappingEntry source="go" target="a.p"><ssc:BooleanMappingTransformation><ssc:MapEntry source="true" target="false"/>
+    <ssc:MapEntry source="false" target="true"/></ssc:BooleanMappingTransformation></ssm:MappingEntry>
+   <ssm:MappingEntry source="level" target="a.n"><ssc:IntegerMappingTransformation><ssc:MapEntry source="7" target="4"/>
+    </ssc:IntegerMappingTransformation></ssm:MappingEntry>
+   <ssm:MappingEntry source="kind" target="a.e"><ssc:EnumerationMappingTransformation><ssc:MapEntry source="dry" target="on"/>
+    <ssc:MapEntry source="wet" target="off"/></ssc:EnumerationMappingTransformation></ssm:MappingEntry>
+  </ssm:ParameterMapping></ssd:ParameterMapping></ssd:ParameterBinding></ssd:ParameterBindings>
+ <ssd:Elements>
+  <ssd:Component name="a" source="resources/line.fmu"/>
+  <ssd:SignalDictionaryReference name="bus" dictionary="signals"/>
+  <ssd:System name="inner"><ssd:Elements><ssd:Component name="b" source="resources/line.fmu"/>
+   <ssd:SignalDictionaryReference name="here" dictionary="signals"/></ssd:Elements><ssd:Connections>
+   <ssd:Connection startElement="here" startConnector="way" endElement="b" endConnector="u"/>
+   <ssd:Connection startElement="here" startConnector="state" endElement="b" endConnector="i_in"/></ssd:Connections></ssd:System>
+  <ssd:Component name="d" source="resources/line.fmu"/>
+ </ssd:Elements>
+ <ssd:Connections>
+  <ssd:Connection startElement="a" startConnector="y" endElement="bus" endConnector="way"/>
+  <ssd:Connection startElement="a" startConnector="i_out" endElement="bus" endConnector="state"><ssc:IntegerMappingTransformation>
+   <ssc:MapEntry source="0" target="10"/><ssc:MapEntry source="5" target="20"/></ssc:IntegerMappingTransformation></ssd:Connection>
+  <ssd:Connection startElement="bus" startConnector="state" endElement="d" endConnector="i_in"><ssc:IntegerMappingTransformation>
+   <ssc:MapEntry source="10" target="-1"/><ssc:MapEntry source="20" target="-2"/><ssc:MapEntry source="30" target="-3"/>
+  </ssc:IntegerMappingTransformation></ssd:Connection>
+ </ssd:Connections>
+ <ssd:SignalDictionaries><ssd:SignalDictionary name="signals" source="resources/signals.ssb"/></ssd:SignalDictionaries>
+</ssd:System><ssd:DefaultExperiment stopTime="1"/></ssd:SystemStructureDescription>"""
+
+SIGNALS = f"""<?xml version="1.0"?><ssb:SignalDictionary {NAMES} xmlns:ssb="http://ssp-standard.org/SSP1/SystemStructureSignalDictionary">
+<ssb:DictionaryEntry name="way"><ssc:Real unit="mm"/></ssb:DictionaryEntry><ssb:DictionaryEntry name="state"><ssc:Integer/></ssb:DictionaryEntry>
+<ssc:Units><ssc:Unit name="mm"><ssc:BaseUnit m="1" factor="0.001"/></ssc:Unit></ssc:Units></ssb:SignalDictionary>"""
+
+
+def test_dictionaries_and_tables(files, tmp_path):
+    path = pack(files, tmp_path / "shared.ssp", SHARED, [("resources/signals.ssb", SIGNALS)])
+    rows = run(path, tmp_path / "out")
+    last = {name: float(value) for name, value in rows[-1].items() if name[:1] in "aid" and "." in name}
+    assert last["a.y"] == 3.0 and last["inner_b.u"] == 3.0 and last["inner_b.y"] == 3.0
+    assert last["a.n_seen"] == 4 + 100 * 2 + 1000 * 0, "level 7 is 4, dry is on (2), go is no"
+    assert last["a.i_out"] == 5 and last["inner_b.i_in"] == 20 and last["d.i_in"] == -2
+    done = terraglue("convert", path, "-o", tmp_path / "shared.toml")
+    text = (tmp_path / "shared.toml").read_text()
+    assert done.returncode == 0 and 'map = { "0" = -1, "5" = -2 }' in text and 'map = { "0" = 10, "5" = 20 }' in text, text
+    assert run(tmp_path / "shared.toml", tmp_path / "again") == rows
+    inside = SHARED.replace(' source="resources/signals.ssb"/>', f'>{SIGNALS.split("?>")[1]}</ssd:SignalDictionary>')
+    assert run(pack(files, tmp_path / "inside.ssp", inside), tmp_path / "inside") == rows
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "says"),
+    [
+        ('dictionary="signals"/>\n  <ssd:System', 'dictionary="signs"/>\n  <ssd:System', ["no signal dictionary `signs`"]),
+        ('startConnector="way"', 'startConnector="weigh"', ["signals.weigh"]),
+        ('source="7" target="4"', 'source="8" target="4"', ["a.n", "no entry"]),
+        ('source="7" target="4"', 'source="x" target="4"', ['source = "x"', "whole number"]),
+        ('source="5" target="20"', 'source="0" target="20"', ["occurs twice"]),
+        ('startElement="a" startConnector="i_out"', 'startElement="d" startConnector="i_out"', None),
+        ('endElement="bus" endConnector="state">', 'endElement="bus" endConnector="way">', ["is fed by"]),
+        ('unit="mm"/>', 'unit="kg"/>', ["different dimensions", "signals.way"]),
+        ("signals.ssb", "sings.ssb", ["sings.ssb"]),
+    ],
+)
+def test_a_dictionary_or_table_that_is_wrong_is_refused(files, tmp_path, old, new, says):
+    text, signals = (t.replace(old, new) for t in (SHARED, SIGNALS))
+    assert (text, signals) != (SHARED, SIGNALS)
+    path = pack(files, tmp_path / "wrong.ssp", text, [("resources/signals.ssb", signals)])
+    done = terraglue("run", path, "--quiet", "--out", tmp_path / "out")
+    if says is None:
+        assert done.returncode == 0, "a signal may come from anywhere"
+        return
+    flat = " ".join(done.stderr.replace("│", " ").split())
+    assert done.returncode == 2 and all(word in flat for word in says), done.stderr

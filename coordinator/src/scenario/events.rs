@@ -27,9 +27,24 @@ pub fn connections(source: &Source, names: &[&str]) -> Checked<Vec<Connection>> 
             factor: s.number("factor"),
             offset: s.number("offset"),
             convert: s.value("convert") != Value::Bool(false),
+            map: table(s)?,
             span: node.extent(),
         })
     })
+}
+
+/// The entries of `map`.
+fn table(s: &Section) -> Checked<Vec<(String, Value)>> {
+    let entries = s.entry("map").map(Node::entries).unwrap_or_default();
+    let one = |(key, node): &(String, Node)| match node.to_json() {
+        value if value.is_boolean() || value.is_i64() || value.is_string() => Ok((key.clone(), value)),
+        _ => {
+            let message =
+                format!("`{key}` of `map` becomes true, false, a whole number or the name of an item");
+            Err(s.error("map", message, None))
+        }
+    };
+    entries.iter().map(one).collect()
 }
 
 const COMPONENTS: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];

@@ -38,6 +38,8 @@ pub enum Form {
     Texts,
     /// A table of values by variable name.
     Assignments,
+    /// A table of new values by value.
+    Map,
 }
 
 impl Key {
@@ -54,6 +56,7 @@ impl Key {
         match self.form {
             Form::Texts => "text in quotes or a list of texts".into(),
             Form::Assignments => "a table { \"subsystem.variable\" = value }".into(),
+            Form::Map => "a table { \"value\" = new value }".into(),
             _ => allowed(&self.parameter, self.count()),
         }
     }
@@ -287,6 +290,15 @@ fn connect() -> Table {
         Parameter::of("convert", ParameterType::Bool, "false: units are neither converted nor compared")
             .or(true)
             .into(),
+        Key::from(
+            Parameter::of(
+                "map",
+                ParameterType::NumberTable,
+                "what each value becomes, of truth values, whole numbers and enumerations: `{ off = 0, on = 2 }`",
+            )
+            .optional(),
+        )
+        .form(Form::Map),
     ];
     Table { repeated: true, ..of("connect", "An output that feeds an input, once per step.", keys) }
 }

@@ -237,6 +237,8 @@ pub struct Connection {
     pub offset: f64,
     /// Whether units are compared and converted.
     pub convert: bool,
+    /// What each value becomes, of truth values, whole numbers and enumerations; empty: what it is.
+    pub map: Vec<(String, Value)>,
     /// Byte range of the table in the source.
     pub span: std::ops::Range<usize>,
 }

@@ -138,7 +138,7 @@ impl<'a> Section<'a> {
 pub fn check_entry(source: &Source, key: &Key, entry: &Node) -> Checked<()> {
     let ok = match key.form {
         Form::Texts => matches!(&entry.value, Raw::Text(_)) || is_list_of_texts(entry),
-        Form::Assignments => entry.is_table() && !entry.entries().is_empty(),
+        Form::Assignments | Form::Map => entry.is_table() && !entry.entries().is_empty(),
         _ => {
             let value = entry.to_json();
             let complain = |c: Complaint| source.error(&worst_place(entry), c.message, c.help);

@@ -3,6 +3,7 @@
 use super::access::{Directory, VariableRef};
 use super::discrete::{self, Discrete};
 use super::pattern;
+use super::table;
 use crate::Result;
 use crate::host::{Instance, Reply};
 use crate::scenario::{Connection, InputError, Source};
@@ -184,7 +185,16 @@ pub fn connect(
             fed.push((name.to_owned(), to));
             match from.describe(instances).value_type {
                 ValueType::F64 => add(&mut links.numbers, instances, from, to, conversion),
-                _ => links.discrete.push(Discrete::new(from, to)),
+                _ => {
+                    let table = table::resolve(&connection.map, instances, from, to).map_err(|message| {
+                        source.error_at(
+                            connection.span.clone(),
+                            format!("`{name}` → `{target}`: {message}"),
+                            None,
+                        )
+                    })?;
+                    links.discrete.push(Discrete::new(from, to, table));
+                }
             }
         }
         if !matched {
@@ -207,7 +217,13 @@ fn check(
     if a.len() != 1 || b.len() != 1 {
         return Err(format!("`{from_name}` → `{to_name}`: arrays of a module cannot be connected"));
     }
-    if !discrete::fits(a.value_type, b.value_type) {
+    let mapped = !connection.map.is_empty();
+    if mapped && !(table::takes(a.value_type) && table::takes(b.value_type)) {
+        return Err(format!(
+            "`{from_name}` → `{to_name}`: `map` is for truth values, whole numbers and enumerations"
+        ));
+    }
+    if !mapped && !discrete::fits(a.value_type, b.value_type) {
         let [own, other] = [a.value_type, b.value_type].map(|t| format!("{t:?}").to_lowercase());
         return Err(format!(
             "`{from_name}` is of type {own} and `{to_name}` of {other}: these cannot be connected"

@@ -1,15 +1,17 @@
 //! Connections of what is no f64: truth values, whole numbers, enumerations, texts and bytes, one value each.
 
 use super::access::VariableRef;
+use super::table::Table;
 use crate::Result;
 use crate::host::{Instance, Reply};
 use terraglue_subsystem::{ValueType, Values, ValuesMut};
 
 /// One connection.
-#[derive(Clone, Copy, Debug)]
+#[derive(Clone, Debug)]
 pub struct Discrete {
     from: VariableRef,
     to: VariableRef,
+    table: Option<Table>,
 }
 
 /// A value on its way.
@@ -37,8 +39,13 @@ pub fn fits(from: ValueType, to: ValueType) -> bool {
 
 impl Discrete {
     /// A connection whose types were found to fit.
-    pub fn new(from: VariableRef, to: VariableRef) -> Self {
-        Self { from, to }
+    pub fn new(from: VariableRef, to: VariableRef, table: Option<Table>) -> Self {
+        Self { from, to, table }
+    }
+
+    /// Whether values change on their way.
+    pub fn has_table(&self) -> bool {
+        self.table.is_some()
     }
 
     /// The variables on either side.
@@ -53,7 +60,16 @@ impl Discrete {
 
     /// Copies the committed value.
     pub fn transfer(&self, instances: &mut [Instance]) -> Result {
-        let value = self.read(instances)?;
+        let value = match (self.read(instances)?, &self.table) {
+            (Value::Whole(w), Some(table)) => Value::Whole(*table.get(&w).ok_or_else(|| {
+                let v = self.from.describe(instances);
+                let shown = usize::try_from(w).ok().and_then(|k| v.enumeration.get(k).cloned());
+                let shown = shown.unwrap_or_else(|| w.to_string());
+                instances[self.from.slot]
+                    .error("get", format!("`{}` is {shown}, for which `map` has no entry", v.name))
+            })?),
+            (value, _) => value,
+        };
         let v = self.to.describe(instances);
         let (id, kind, name) = ([v.id], v.value_type, v.name.clone());
         let target = &mut instances[self.to.slot];

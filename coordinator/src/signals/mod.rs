@@ -10,6 +10,7 @@ mod fault;
 mod initial;
 mod modifier;
 pub mod pattern;
+mod table;
 
 pub use access::{Directory, VariableRef};
 pub use connection::{Link, Links, connect};

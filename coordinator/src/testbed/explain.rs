@@ -44,12 +44,17 @@ impl Testbed {
 
     fn ends(&self) -> Vec<End> {
         let numbers = self.links.numbers.iter().flat_map(|link| {
-            link.ends().map(|([from, to], conversion)| End { from, to, conversion: Some(conversion) })
+            link.ends().map(|([from, to], conversion)| End {
+                from,
+                to,
+                conversion: Some(conversion),
+                by_table: false,
+            })
         });
         let variable = |at: crate::signals::VariableRef| (at.slot, at.describe(&self.instances).id);
         let discrete = self.links.discrete.iter().map(|d| {
             let [from, to] = d.ends().map(variable);
-            End { from, to, conversion: None }
+            End { from, to, conversion: None, by_table: d.has_table() }
         });
         numbers.chain(discrete).collect()
     }
@@ -114,6 +119,7 @@ impl Testbed {
             _ => " (no conversion: only one side has a unit)".into(),
         };
         let value = match end.conversion {
+            None if end.by_table => "by a table".to_owned(),
             None | Some((1.0, 0.0)) => "x".to_owned(),
             Some((a, 0.0)) => format!("{a}·x"),
             Some((a, b)) => format!("{a}·x + {b}"),
@@ -160,6 +166,7 @@ struct End {
     from: (usize, u32),
     to: (usize, u32),
     conversion: Option<(f64, f64)>,
+    by_table: bool,
 }
 
 impl Explanation {

@@ -8,7 +8,7 @@ mod values;
 use network::{Network, Part, Way};
 use std::fmt::Write;
 use terraglue_fmi::Result;
-use terraglue_fmi::ssp::{Package, Value};
+use terraglue_fmi::ssp::{Package, Table, Value};
 
 /// A structure as a scenario.
 pub struct Converted {
@@ -56,7 +56,9 @@ pub fn convert(package: &Package, prefix: &str) -> Result<Converted> {
         let [start, end] =
             [(from, &way.from.1), (to, &way.to.1)].map(|(p, v)| quoted(&format!("{}.{v}", p.name)));
         let _ = write!(text, "\n[[connect]]\nfrom = {start}\nto = {end}\n");
-        if way.affine != usual(from, to, &way) {
+        if let Some(table) = &way.table {
+            let _ = writeln!(text, "map = {{ {} }}", entries(table));
+        } else if way.affine != usual(from, to, &way) {
             let (a, b) = way.affine;
             let _ = write!(text, "factor = {a:?}\noffset = {b:?}\nconvert = false\n");
         }
@@ -105,6 +107,15 @@ fn times(package: &Package, network: &Network, notes: &mut Vec<String>) -> Resul
     let whole = (steps - steps.round()).abs() < 1e-9 * steps;
     let step = if whole && wanted <= 1.0 { wanted } else { duration / steps.ceil().max(1.0) };
     Ok((duration, step))
+}
+
+/// A table as a connection of a scenario takes it.
+fn entries(table: &Table) -> String {
+    let one = |(source, target): &(Value, Value)| {
+        let key = if let Value::Text(text) = source { text.clone() } else { shown(source) };
+        format!("{} = {}", quoted(&key), shown(target))
+    };
+    table.0.iter().map(one).collect::<Vec<_>>().join(", ")
 }
 
 fn shown(value: &Value) -> String {

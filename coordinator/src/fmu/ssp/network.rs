@@ -3,7 +3,9 @@
 use super::super::map;
 use std::collections::BTreeMap;
 use terraglue_fmi::description::{ModelDescription, Variable};
-use terraglue_fmi::ssp::{Component, Connector, Element, End, Package, System, Transformation};
+use terraglue_fmi::ssp::{
+    Component, Connector, Dictionary, Element, End, Package, System, Table, Transformation,
+};
 use terraglue_fmi::{Error, Fmu, Result};
 use terraglue_subsystem::unit::Unit;
 
@@ -46,8 +48,49 @@ pub struct Way {
     pub from: Key,
     /// Input.
     pub to: Key,
-    /// How the value changes on the way.
+    /// How the value changes on the way: a number by this,
     pub affine: Affine,
+    /// anything else by a table.
+    pub table: Option<Table>,
+}
+
+/// A value on its way: what became of it, and its unit.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Carried {
+    /// Of a number.
+    pub affine: Affine,
+    /// Of what is no f64.
+    pub table: Option<Table>,
+    /// Physical unit, where it is known.
+    pub unit: Option<Unit>,
+}
+
+impl Carried {
+    /// A value as it is.
+    pub fn new(unit: Option<Unit>) -> Self {
+        Self { affine: (1.0, 0.0), table: None, unit }
+    }
+
+    /// The same after the conversion of units and a transformation; the reason where that cannot be.
+    pub fn changed(
+        &self,
+        to: Option<Unit>,
+        transformation: &Transformation,
+    ) -> std::result::Result<Self, &'static str> {
+        if let Some(table) = &transformation.table {
+            if self.affine != (1.0, 0.0) {
+                return Err(MIXED);
+            }
+            let table = self.table.as_ref().map_or_else(|| table.clone(), |first| table.after(first));
+            return Ok(Self { table: Some(table), unit: to, ..*self });
+        }
+        if self.table.is_some() {
+            return if transformation.is_plain() { Ok(self.clone()) } else { Err(MIXED) };
+        }
+        let affine = changed(self.affine, self.unit, to, transformation).ok_or(DIMENSIONS)?;
+        let same = *transformation == Transformation::default();
+        Ok(Self { affine, table: None, unit: to.or(self.unit.filter(|_| same)) })
+    }
 }
 
 struct Edge {
@@ -63,6 +106,8 @@ pub struct Network<'a> {
     edges: Vec<Edge>,
     /// Units that the structure gives connectors.
     units: BTreeMap<Key, Unit>,
+    /// Dictionaries of the systems around the one that is read, the outermost first, with the path of their signals.
+    dictionaries: Vec<(String, &'a Dictionary)>,
 }
 
 /// Path of an element inside a system.
@@ -76,17 +121,31 @@ impl<'a> Network<'a> {
     /// # Errors
     /// A unit that cannot be read, a connection to what does not exist.
     pub fn new(package: &'a Package) -> Result<Self> {
-        let mut network = Self { parts: Vec::new(), edges: Vec::new(), units: BTreeMap::new() };
+        let (units, dictionaries) = (BTreeMap::new(), Vec::new());
+        let mut network = Self { parts: Vec::new(), edges: Vec::new(), units, dictionaries };
         network.system(package, "", &package.structure().system)?;
         Ok(network)
     }
 
     fn system(&mut self, package: &Package, path: &str, system: &'a System) -> Result {
         self.connectors(path, &system.connectors);
+        let around = self.dictionaries.len();
+        for dictionary in &system.dictionaries {
+            // no element has such a path: names of elements do not begin like this
+            let own = below(path, &format!("\u{0}{}", dictionary.name));
+            self.connectors(&own, &dictionary.entries);
+            self.dictionaries.push((own, dictionary));
+        }
         for element in &system.elements {
             let inner = below(path, element.name());
             match element {
                 Element::System(nested) => self.system(package, &inner, nested)?,
+                Element::Dictionary(reference) => {
+                    self.dictionary(&reference.dictionary).ok_or_else(|| {
+                        let message = format!("there is no signal dictionary `{}`", reference.dictionary);
+                        refused(package, message)
+                    })?;
+                }
                 Element::Component(component) => {
                     let (description, _) = Fmu::inspect(&package.folder().join(&component.source))?;
                     self.connectors(&inner, &component.connectors);
@@ -98,7 +157,7 @@ impl<'a> Network<'a> {
         for connection in &system.connections {
             let ends = [&connection.start, &connection.end].map(|end| self.end(package, path, system, end));
             let [start, end] = ends;
-            let edge = Edge { start: start?, end: end?, transformation: connection.transformation };
+            let edge = Edge { start: start?, end: end?, transformation: connection.transformation.clone() };
             if let Some(other) = self.edges.iter().find(|e| e.end == edge.end) {
                 let ends = [&edge.end, &other.start, &edge.start].map(shown);
                 let message = format!("{} is fed by {} and by {}", ends[0], ends[1], ends[2]);
@@ -106,7 +165,13 @@ impl<'a> Network<'a> {
             }
             self.edges.push(edge);
         }
+        self.dictionaries.truncate(around);
         Ok(())
+    }
+
+    /// The nearest dictionary of that name around the system that is read, with the path of its signals.
+    fn dictionary(&self, name: &str) -> Option<&(String, &'a Dictionary)> {
+        self.dictionaries.iter().rev().find(|(_, d)| d.name == name)
     }
 
     fn connectors(&mut self, path: &str, connectors: &[Connector]) {
@@ -124,8 +189,15 @@ impl<'a> Network<'a> {
             };
         };
         let element = system.elements.iter().find(|e| e.name() == name);
-        let key = (below(path, name), end.connector.clone());
+        let mut key = (below(path, name), end.connector.clone());
         let known = match element {
+            Some(Element::Dictionary(reference)) => match self.dictionary(&reference.dictionary) {
+                Some((own, dictionary)) => {
+                    key.0.clone_from(own);
+                    dictionary.entries.iter().any(|e| e.name == end.connector)
+                }
+                None => false,
+            },
             None => return Err(refused(package, format!("there is no element `{}`", key.0))),
             Some(Element::System(inner)) => inner.connectors.iter().any(|c| c.name == end.connector),
             Some(Element::Component(_)) => {
@@ -160,27 +232,24 @@ impl<'a> Network<'a> {
     /// Every way from an output of a unit to an input of a unit.
     ///
     /// # Errors
-    /// Units of different dimensions on the way.
+    /// Units of different dimensions on the way, or a table and a linear transformation one after the other.
     pub fn ways(&self, package: &Package) -> Result<Vec<Way>> {
         let mut all = Vec::new();
         for edge in self.edges.iter().filter(|e| self.part(&e.end.0).is_some()) {
-            if let Some((from, affine, _)) = self.traced(package, edge, self.edges.len())? {
-                all.push(Way { from, to: edge.end.clone(), affine });
+            if let Some((from, Carried { affine, table, .. })) =
+                self.traced(package, edge, self.edges.len())?
+            {
+                all.push(Way { from, to: edge.end.clone(), affine, table });
             }
         }
         Ok(all)
     }
 
-    /// Where an edge comes from in the end, and the value at its end with its unit.
-    fn traced(
-        &self,
-        package: &Package,
-        edge: &Edge,
-        left: usize,
-    ) -> Result<Option<(Key, Affine, Option<Unit>)>> {
+    /// Where an edge comes from in the end, and the value at its end.
+    fn traced(&self, package: &Package, edge: &Edge, left: usize) -> Result<Option<(Key, Carried)>> {
         if self.part(&edge.start.0).is_some() {
-            let (affine, unit) = self.along(package, edge, (1.0, 0.0), self.unit(&edge.start))?;
-            return Ok(Some((edge.start.clone(), affine, unit)));
+            let value = self.along(package, edge, &Carried::new(self.unit(&edge.start)))?;
+            return Ok(Some((edge.start.clone(), value)));
         }
         let Some(before) = self.edges.iter().find(|e| e.end == edge.start) else { return Ok(None) };
         if left == 0 {
@@ -189,46 +258,30 @@ impl<'a> Network<'a> {
                 format!("the connections of {} go round in a circle", shown(&edge.start)),
             ));
         }
-        let Some((from, affine, unit)) = self.traced(package, before, left - 1)? else { return Ok(None) };
-        let (affine, unit) = self.along(package, edge, affine, unit)?;
-        Ok(Some((from, affine, unit)))
+        let Some((from, value)) = self.traced(package, before, left - 1)? else { return Ok(None) };
+        Ok(Some((from, self.along(package, edge, &value)?)))
     }
 
-    /// A value with its unit after an edge.
-    fn along(
-        &self,
-        package: &Package,
-        edge: &Edge,
-        value: Affine,
-        unit: Option<Unit>,
-    ) -> Result<(Affine, Option<Unit>)> {
-        let end = self.unit(&edge.end);
-        let after = changed(value, unit, end, edge.transformation).ok_or_else(|| {
-            refused(package, format!("{} → {}: {DIMENSIONS}", shown(&edge.start), shown(&edge.end)))
-        })?;
-        let same = edge.transformation == Transformation::default();
-        Ok((after, end.or(unit.filter(|_| same))))
+    /// A value after an edge.
+    fn along(&self, package: &Package, edge: &Edge, value: &Carried) -> Result<Carried> {
+        value
+            .changed(self.unit(&edge.end), &edge.transformation)
+            .map_err(|why| refused(package, format!("{} → {}: {why}", shown(&edge.start), shown(&edge.end))))
     }
 
     /// The inputs and parameters of units that a connector of a system leads to, with what becomes of a value there.
     ///
     /// # Errors
-    /// Units of different dimensions on the way.
-    pub fn leads_to(
-        &self,
-        package: &Package,
-        key: &Key,
-        value: Affine,
-        unit: Option<Unit>,
-    ) -> Result<Vec<(Key, Affine)>> {
+    /// As of [`Network::ways`].
+    pub fn leads_to(&self, package: &Package, key: &Key, value: Carried) -> Result<Vec<(Key, Carried)>> {
         let mut found = Vec::new();
-        let mut open = vec![(key.clone(), value, unit, self.edges.len())];
-        while let Some((key, value, unit, left)) = open.pop() {
+        let mut open = vec![(key.clone(), value, self.edges.len())];
+        while let Some((key, value, left)) = open.pop() {
             for edge in self.edges.iter().filter(|e| e.start == key && left > 0) {
-                let (value, unit) = self.along(package, edge, value, unit)?;
+                let value = self.along(package, edge, &value)?;
                 match self.part(&edge.end.0) {
                     Some(_) => found.push((edge.end.clone(), value)),
-                    None => open.push((edge.end.clone(), value, unit, left - 1)),
+                    None => open.push((edge.end.clone(), value, left - 1)),
                 }
             }
         }
@@ -237,26 +290,29 @@ impl<'a> Network<'a> {
 }
 
 /// Why two connectors do not fit.
-pub const DIMENSIONS: &str = "their units are of different dimensions";
+const DIMENSIONS: &str = "their units are of different dimensions";
+/// The same of transformations.
+const MIXED: &str = "a table and a conversion of numbers follow each other, which is not read here";
 
 /// A value after the conversion of units and a transformation; nothing where the dimensions differ.
-pub fn changed(
+fn changed(
     value: Affine,
     from: Option<Unit>,
     to: Option<Unit>,
-    transformation: Transformation,
+    transformation: &Transformation,
 ) -> Option<Affine> {
     let (a, b) = match (from, to) {
         (Some(from), Some(to)) if !transformation.keeps_unit => from.conversion_to(&to)?,
         _ => (1.0, 0.0),
     };
-    let Transformation { factor, offset, .. } = transformation;
+    let Transformation { factor, offset, .. } = *transformation;
     Some((factor * a * value.0, factor * (a * value.1 + b) + offset))
 }
 
 /// A connector for people.
 pub fn shown(key: &Key) -> String {
-    if key.0.is_empty() { format!("`{}`", key.1) } else { format!("`{}.{}`", key.0, key.1) }
+    let path = key.0.replace('\u{0}', "");
+    if path.is_empty() { format!("`{}`", key.1) } else { format!("`{path}.{}`", key.1) }
 }
 
 /// What makes the structure unusable.

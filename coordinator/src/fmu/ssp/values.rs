@@ -3,7 +3,7 @@
 //! Outer bindings go before inner ones, later ones before earlier ones of the same element. A binding with a mapping
 //! gives what is mapped and nothing else.
 
-use super::network::{Key, Network, below, changed, refused, shown};
+use super::network::{Carried, Key, Network, below, refused, shown};
 use std::collections::BTreeMap;
 use terraglue_fmi::Result;
 use terraglue_fmi::ssp::{Binding, Element, Package, Parameter, System, Transformation, Value};
@@ -46,6 +46,7 @@ fn of_system(
         let inner = below(path, element.name());
         match element {
             Element::System(nested) => of_system(package, network, &inner, nested, values)?,
+            Element::Dictionary(_) => {}
             Element::Component(component) => {
                 for given in component.bindings.iter().flat_map(|b| given(b, values)).collect::<Vec<_>>() {
                     set(package, network, (inner.clone(), given.target.clone()), &given, values)?;
@@ -63,15 +64,18 @@ fn of_system(
 fn given<'a>(binding: &'a Binding, values: &mut Values) -> Vec<Given<'a>> {
     let name = |p: &Parameter| format!("{}{}", binding.prefix, p.name);
     let Some(mapping) = &binding.mapping else {
-        let plain = Transformation::default();
-        let own = |p: &'a Parameter| Given { target: name(p), parameter: p, transformation: plain };
+        let own = |p: &'a Parameter| Given {
+            target: name(p),
+            parameter: p,
+            transformation: Transformation::default(),
+        };
         return binding.parameters.iter().map(own).collect();
     };
     let mut all = Vec::new();
     for entry in mapping {
         match binding.parameters.iter().find(|p| name(p) == entry.source) {
             Some(parameter) => {
-                let (target, transformation) = (entry.target.clone(), entry.transformation);
+                let (target, transformation) = (entry.target.clone(), entry.transformation.clone());
                 all.push(Given { target, parameter, transformation });
             }
             None => values.notes.push(format!("a mapping names `{}`, which no set has", entry.source)),
@@ -104,36 +108,39 @@ fn to_system(
             to_system(package, network, &inner, nested, Given { target, ..given }, values)
         }
         Element::Component(_) => set(package, network, (inner, target), &given, values),
+        Element::Dictionary(_) => {
+            values.notes.push(format!("the parameter {} fits no unit", shown(&(inner, target))));
+            Ok(())
+        }
     }
 }
 
 /// Gives a parameter to all units that a connector of a system leads to.
 fn along(package: &Package, network: &Network, key: Key, given: &Given, values: &mut Values) -> Result {
     let unit = network.unit(&key);
-    let Some((a, b)) = changed((1.0, 0.0), given.parameter.unit, unit, given.transformation) else {
-        return Err(dimensions(package, &key));
-    };
-    let ends = network.leads_to(package, &key, (a, b), unit.or(given.parameter.unit))?;
+    let mut value = start(package, &key, given, unit)?;
+    value.unit = unit.or(given.parameter.unit);
+    let ends = network.leads_to(package, &key, value)?;
     if ends.is_empty() {
         values.notes.push(format!("the parameter {} leads to no unit", shown(&key)));
     }
-    for (end, affine) in ends {
-        keep(package, network, end, &given.parameter.value, affine, values)?;
+    for (end, carried) in ends {
+        keep(package, network, end, &given.parameter.value, &carried, values)?;
     }
     Ok(())
 }
 
-/// Gives a parameter to a variable of a unit.
-fn set(package: &Package, network: &Network, key: Key, given: &Given, values: &mut Values) -> Result {
-    let own: Option<Unit> = network.unit(&key);
-    match changed((1.0, 0.0), given.parameter.unit, own, given.transformation) {
-        Some(affine) => keep(package, network, key, &given.parameter.value, affine, values),
-        None => Err(dimensions(package, &key)),
-    }
+/// A parameter after its mapping, in the unit of where it goes.
+fn start(package: &Package, key: &Key, given: &Given, unit: Option<Unit>) -> Result<Carried> {
+    let own = Carried::new(given.parameter.unit);
+    own.changed(unit, &given.transformation)
+        .map_err(|why| refused(package, format!("the parameter {}: {why}", shown(key))))
 }
 
-fn dimensions(package: &Package, key: &Key) -> terraglue_fmi::Error {
-    refused(package, format!("the parameter {}: {}", shown(key), super::network::DIMENSIONS))
+/// Gives a parameter to a variable of a unit.
+fn set(package: &Package, network: &Network, key: Key, given: &Given, values: &mut Values) -> Result {
+    let carried = start(package, &key, given, network.unit(&key))?;
+    keep(package, network, key, &given.parameter.value, &carried, values)
 }
 
 fn keep(
@@ -141,14 +148,21 @@ fn keep(
     network: &Network,
     key: Key,
     value: &Value,
-    (a, b): (f64, f64),
+    carried: &Carried,
     values: &mut Values,
 ) -> Result {
+    let (a, b) = carried.affine;
     let Some(variable) = network.part(&key.0).and_then(|part| part.variable(&key.1)) else {
         values.notes.push(format!("the parameter {} fits nothing", shown(&key)));
         return Ok(());
     };
     let plain = (a, b) == (1.0, 0.0);
+    let value = match &carried.table {
+        None => value,
+        Some(table) => table.of(value).ok_or_else(|| {
+            refused(package, format!("{}: the table of its mapping has no entry for {value:?}", shown(&key)))
+        })?,
+    };
     let real = matches!(variable.value_type, ValueType::F64 | ValueType::F32);
     let number = match value {
         Value::Real(x) => Some(a * x + b),

@@ -28,6 +28,8 @@ pub struct System {
     pub elements: Vec<Element>,
     /// Between connectors of elements and its own.
     pub connections: Vec<Connection>,
+    /// Signals that it and all systems inside may share.
+    pub dictionaries: Vec<Dictionary>,
 }
 
 /// What a system consists of.
@@ -37,6 +39,8 @@ pub enum Element {
     Component(Component),
     /// A nested system.
     System(System),
+    /// The signals of a dictionary of this system or one around it.
+    Dictionary(DictionaryReference),
 }
 
 impl Element {
@@ -45,8 +49,27 @@ impl Element {
         match self {
             Self::Component(c) => &c.name,
             Self::System(s) => &s.name,
+            Self::Dictionary(d) => &d.name,
         }
     }
+}
+
+/// A list of signals that everything below its system can connect to: each has one source and any number of readers.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Dictionary {
+    /// Name.
+    pub name: String,
+    /// Its signals.
+    pub entries: Vec<Connector>,
+}
+
+/// A place where the signals of a dictionary are connected.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct DictionaryReference {
+    /// Name as an element.
+    pub name: String,
+    /// Name of the dictionary.
+    pub dictionary: String,
 }
 
 /// A functional mock-up unit inside a system.
@@ -91,8 +114,8 @@ pub struct End {
     pub connector: String,
 }
 
-/// How a value changes: target = factor · value + offset, after the conversion of units.
-#[derive(Clone, Copy, Debug, PartialEq)]
+/// How a value changes: target = factor · value + offset, after the conversion of units, or by a table.
+#[derive(Clone, Debug, PartialEq)]
 pub struct Transformation {
     /// Factor.
     pub factor: f64,
@@ -100,11 +123,37 @@ pub struct Transformation {
     pub offset: f64,
     /// Whether units are left alone.
     pub keeps_unit: bool,
+    /// What each value becomes, of truth values, whole numbers or items of enumerations.
+    pub table: Option<Table>,
 }
 
 impl Default for Transformation {
     fn default() -> Self {
-        Self { factor: 1.0, offset: 0.0, keeps_unit: false }
+        Self { factor: 1.0, offset: 0.0, keeps_unit: false, table: None }
+    }
+}
+
+impl Transformation {
+    /// Whether nothing changes.
+    pub fn is_plain(&self) -> bool {
+        self.factor == 1.0 && self.offset == 0.0 && self.table.is_none()
+    }
+}
+
+/// What single values become: pairs of value and new value, each value once.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Table(pub Vec<(Value, Value)>);
+
+impl Table {
+    /// What a value becomes; nothing where the table does not have it.
+    pub fn of(&self, value: &Value) -> Option<&Value> {
+        self.0.iter().find(|(source, _)| source == value).map(|(_, target)| target)
+    }
+
+    /// This table after another one; values whose way ends are gone.
+    pub fn after(&self, first: &Self) -> Self {
+        let both = |(source, between): &(Value, Value)| Some((source.clone(), self.of(between)?.clone()));
+        Self(first.0.iter().filter_map(both).collect())
     }
 }
 

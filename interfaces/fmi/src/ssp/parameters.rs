@@ -39,7 +39,7 @@ fn binding(context: Context, element: &Element) -> Result<Binding> {
 }
 
 /// Reads a file that `element` names.
-fn in_file(
+pub fn in_file(
     context: Context,
     element: &Element,
     source: &str,

@@ -1,8 +1,8 @@
 //! Reads `SystemStructure.ssd`.
 
 use super::{
-    Component, Connection, Connector, Element as Inner, End, Files, Structure, System, Transformation,
-    parameters,
+    Component, Connection, Connector, Dictionary, DictionaryReference, Element as Inner, End, Files,
+    Structure, System, Table, Transformation, Value, parameters,
 };
 use crate::description::element::{Element, Reader};
 use crate::description::{parse, types};
@@ -64,12 +64,6 @@ fn system(context: Context, element: &Element) -> Result<System> {
     if context.depth > DEPTH {
         return Err(element.error(format!("systems are nested deeper than {DEPTH} levels")));
     }
-    if let Some(dictionaries) = element.child("SignalDictionaries").filter(|d| d.children().next().is_some())
-    {
-        return Err(
-            dictionaries.error("signal dictionaries are not read here: connect the components directly")
-        );
-    }
     let name = element.text("name").to_owned();
     let mut elements: Vec<Inner> = Vec::new();
     for inner in element.child("Elements").iter().flat_map(Element::children) {
@@ -79,6 +73,10 @@ fn system(context: Context, element: &Element) -> Result<System> {
                 system(Context { depth: context.depth + 1, ..context }, &inner)?,
                 &inner,
             )?),
+            "SignalDictionaryReference" => Inner::Dictionary(DictionaryReference {
+                name: inner.required("name")?.to_owned(),
+                dictionary: inner.required("dictionary")?.to_owned(),
+            }),
             other => return Err(inner.error(format!("<{other}> is not read here"))),
         };
         if elements.iter().any(|e| e.name() == read.name()) {
@@ -97,7 +95,47 @@ fn system(context: Context, element: &Element) -> Result<System> {
         bindings: parameters::bindings(context, element)?,
         elements,
         connections,
+        dictionaries: dictionaries(context, element)?,
     })
+}
+
+/// Signal dictionaries of a system, inside or in files of their own (`.ssb`).
+fn dictionaries(context: Context, element: &Element) -> Result<Vec<Dictionary>> {
+    let mut all: Vec<Dictionary> = Vec::new();
+    for one in element.child("SignalDictionaries").iter().flat_map(Element::children) {
+        if one.name() != "SignalDictionary" {
+            continue;
+        }
+        let mut found = Dictionary { name: one.required("name")?.to_owned(), entries: Vec::new() };
+        if all.iter().any(|d| d.name == found.name) {
+            return Err(one.error(format!("the dictionary `{}` occurs twice", found.name)));
+        }
+        match (one.attribute("source"), one.child("SignalDictionary")) {
+            (Some(source), _) => parameters::in_file(context, &one, source, "a signal dictionary", |root| {
+                entries(context, root, &mut found.entries)
+            })?,
+            (None, Some(inside)) => entries(context, &inside, &mut found.entries)?,
+            (None, None) => return Err(one.error("has neither `source` nor a <SignalDictionary> inside")),
+        }
+        all.push(found);
+    }
+    Ok(all)
+}
+
+fn entries(context: Context, root: &Element, entries: &mut Vec<Connector>) -> Result {
+    if root.name() != "SignalDictionary" {
+        return Err(root.error("the root is not <SignalDictionary>"));
+    }
+    let units = root.child("Units").map_or(Ok(Vec::new()), |list| types::listed(&list))?;
+    for entry in root.children().filter(|e| e.name() == "DictionaryEntry") {
+        let name = entry.required("name")?.to_owned();
+        if entries.iter().any(|e| e.name == name) {
+            return Err(entry.error(format!("the signal `{name}` occurs twice")));
+        }
+        let unit = entry.children().find_map(|of_type| of_type.attribute("unit"));
+        entries.push(Connector { name, unit: unit.and_then(|name| context.unit(name, &units)) });
+    }
+    Ok(())
 }
 
 /// Elements need a name, the outermost system does not.
@@ -171,11 +209,43 @@ pub fn transformation(element: &Element) -> Result<Transformation> {
                     return Err(inner.error("factor and offset must be finite"));
                 }
             }
-            name if name.ends_with("MappingTransformation") => {
-                return Err(inner.error("tables as transformations are not read here; a linear one is"));
+            "BooleanMappingTransformation" => {
+                found.table =
+                    Some(table(&inner, |e, key| e.required(key).and(e.flag(key)).map(Value::Boolean))?);
+            }
+            "IntegerMappingTransformation" => {
+                let whole = |e: &Element, key: &str| {
+                    e.required(key)?;
+                    let number = e.whole(key, "a whole number")?;
+                    number.map(Value::Integer).ok_or_else(|| e.error(format!("lacks the attribute `{key}`")))
+                };
+                found.table = Some(table(&inner, whole)?);
+            }
+            "EnumerationMappingTransformation" => {
+                let text = |e: &Element, key: &str| Ok(Value::Text(e.required(key)?.to_owned()));
+                found.table = Some(table(&inner, text)?);
+            }
+            name if name.ends_with("Transformation") => {
+                return Err(inner.error("this transformation is not read here"));
             }
             _ => {}
         }
     }
     Ok(found)
+}
+
+/// The entries of a table, each value once.
+fn table(element: &Element, value: impl Fn(&Element, &str) -> Result<Value>) -> Result<Table> {
+    let mut found = Table::default();
+    for entry in element.children().filter(|e| e.name() == "MapEntry") {
+        let (source, target) = (value(&entry, "source")?, value(&entry, "target")?);
+        if found.of(&source).is_some() {
+            return Err(entry.error(format!("the value {} occurs twice", entry.text("source"))));
+        }
+        found.0.push((source, target));
+    }
+    match found.0.is_empty() {
+        true => Err(element.error("has no <MapEntry>")),
+        false => Ok(found),
+    }
 }

@@ -1,4 +1,5 @@
-"""Event mode of FMI 3: periodic input clocks tick at their times, events inside a step are handled and marked."""
+"""Event mode of FMI 3: periodic input clocks tick at their times, triggered ones when they are told to, output clocks are seen; events
+inside a step are handled and marked."""
 
 import csv
 import subprocess
@@ -8,29 +9,38 @@ import pytest
 
 from conftest import terraglue
 
-# `x` is the time; every tick samples it and counts; at t = 0.62 the unit asks for event mode by itself, and counts that.
+# `x` is the time; every tick samples it and counts; at t = 0.62 the unit asks for event mode by itself, counts that, and its output
+# clock `beat` ticks. The triggered clock `hit` counts and keeps the input `in`, which can only be set while it ticks.
 CODE = r"""
 #include <stdbool.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-typedef struct { double v[8], t; bool due, events, asked; } Unit;
-enum { X = 1, SAMPLE, COUNT, EVENTS };
+typedef struct { double v[8], t; bool due, events, asked, hit, inside; } Unit;
+enum { X = 1, SAMPLE, COUNT, EVENTS, HITS, KEPT, IN };
 void *fmi3InstantiateCoSimulation(const char *n, const char *t, const char *r, bool v, bool l, bool e, bool a,
     const unsigned *q, size_t k, void *env, void *log, void *up) {
     Unit *u = calloc(1, sizeof(Unit)); u->events = e; return u; }
 void fmi3FreeInstance(Unit *u) { free(u); }
 int fmi3EnterInitializationMode(Unit *u, bool a, double b, double c, bool d, double e) { return 0; }
-int fmi3ExitInitializationMode(Unit *u) { return 0; }
-int fmi3EnterEventMode(Unit *u) { return 0; }
-int fmi3EnterStepMode(Unit *u) { return 0; }
+int fmi3ExitInitializationMode(Unit *u) { u->inside = u->events; return 0; }
+int fmi3EnterEventMode(Unit *u) { u->inside = true; return 0; }
+int fmi3EnterStepMode(Unit *u) { u->inside = false; return 0; }
 int fmi3Terminate(Unit *u) { return 0; }
 int fmi3GetFloat64(Unit *u, const unsigned *r, size_t n, double *x, size_t m) { while (n--) x[n] = u->v[r[n]]; return 0; }
-int fmi3SetFloat64(Unit *u, const unsigned *r, size_t n, const double *x, size_t m) { return 0; }
-int fmi3SetClock(Unit *u, const unsigned *r, size_t n, const bool *on) { u->due = r[0] == 9 && on[0]; return n == 1 ? 0 : 3; }
+int fmi3SetFloat64(Unit *u, const unsigned *r, size_t n, const double *x, size_t m) {
+    if (n != 1 || r[0] != IN || u->events && !u->hit) return 3; u->v[IN] = x[0]; return 0; }
+int fmi3SetClock(Unit *u, const unsigned *r, size_t n, const bool *on) {
+    if (!u->inside) return 3;
+    for (size_t k = 0; k < n; k++) { if (r[k] == 9) u->due = on[k]; else if (r[k] == 10) u->hit = on[k]; else return 3; }
+    return 0; }
+int fmi3GetClock(Unit *u, const unsigned *r, size_t n, bool *on) {
+    if (!u->inside || n != 1 || r[0] != 11) return 3; *on = u->asked; return 0; }
 int fmi3UpdateDiscreteStates(Unit *u, bool *again, bool *end, bool *nominals, bool *values, bool *defined, double *next) {
     *again = *end = *nominals = *values = *defined = false;
     if (u->due) { u->v[SAMPLE] = u->t; u->v[COUNT] += 1; u->due = false; }
+    if (!u->inside) return 3;
+    if (u->hit) { u->v[HITS] += 1; u->v[KEPT] = u->v[IN]; u->hit = false; }
     if (u->asked) { u->v[EVENTS] += 1; u->asked = false; }
     return 0; }
 int fmi3DoStep(Unit *u, double t, double h, bool g, bool *e, bool *d, bool *early, double *last) {
@@ -47,8 +57,11 @@ def clocked(tmp_path_factory):
     folder = tmp_path_factory.mktemp("clocked")
     (folder / "m.c").write_text(CODE)
     subprocess.run(["cc", "-shared", "-fPIC", "-w", "m.c", "-o", "m.so"], cwd=folder, check=True, capture_output=True)
-    names = ("x", "sample", "count", "events_seen")
+    names = ("x", "sample", "count", "events_seen", "hits", "kept")
     variables = "".join(f'<Float64 name="{n}" valueReference="{k + 1}" causality="output"/>' for k, n in enumerate(names))
+    variables += '<Float64 name="in" valueReference="7" causality="input" variability="discrete" clocks="10" start="0"/>'
+    variables += '<Clock name="hit" valueReference="10" causality="input" intervalVariability="triggered"/>'
+    variables += '<Clock name="beat" valueReference="11" causality="output" intervalVariability="triggered"/>'
     outputs = "".join(f'<Output valueReference="{k + 1}"/>' for k in range(len(names)))
     with zipfile.ZipFile(folder / "m.fmu", "w") as archive:
         archive.writestr(
@@ -101,3 +114,52 @@ def test_clocks_tick_in_a_scenario(clocked, tmp_path):
     assert done.returncode == 0, done.stderr
     rows = list(csv.DictReader((tmp_path / "out" / "variables.csv").open()))
     assert [float(row["m.count"]) for row in rows[1:]] == [ticks(0.1 * (k + 1)) for k in range(10)]
+
+
+def test_an_output_clock_is_seen_and_a_triggered_one_ticks_by_input(clocked, tmp_path):
+    table = tmp_path / "in.csv"
+    table.write_text("time,hit,in\n0,0,5\n0.3,1,6\n0.35,0,7\n0.7,1,8\n1,0,8\n")
+    done = terraglue("fmu", "run", clocked, "--stop", "1", "--step", "0.1", "--event-mode", "on", "--input", table)
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader(done.stdout.splitlines()))
+    assert [row["beat"] for row in rows] == ["0"] * 7 + ["1"] + ["0"] * 3
+    # the clock is up at 0.3 (once) and at 0.7, 0.8, 0.9
+    assert [int(row["hits"]) for row in rows] == [0, 0, 0, 0, 1, 1, 1, 1, 2, 3, 4]
+    assert [float(row["kept"]) for row in rows] == [0, 0, 0, 0, 6, 6, 6, 6, 8, 8, 8]
+
+
+def test_clocks_are_connected_and_set_by_events(clocked, tmp_path):
+    path = tmp_path / "clocked.toml"
+    unit = f'fmu = "{clocked}"\nevent_mode = true\n'
+    path.write_text(
+        "[time]\nstep_s = 0.1\nduration_s = 1.0\n[recording]\nevery_steps = 1\n"
+        f'[a]\n{unit}[b]\n{unit}[c]\n{unit}[[connect]]\nfrom = "a.beat"\nto = "b.hit"\n[[connect]]\nfrom = "a.x"\nto = "b.in"\n'
+        '[[event]]\nat_s = 0.3\nset = { "c.hit" = true }\n[[event]]\nat_s = 0.3\nset = { "c.in" = 4.5 }\n'
+    )
+    for isolate in ("", "isolate = true\n"):
+        path.write_text(path.read_text().replace("[b]\n", "[b]\n" + isolate))
+        done = terraglue("run", path, "--csv", "--quiet", "--out", tmp_path / "out")
+        assert done.returncode == 0, done.stderr
+        rows = list(csv.DictReader((tmp_path / "out" / "variables.csv").open()))
+        assert len(rows) == 11
+        column = {name: [float(row[name]) for row in rows] for name in ("b.hits", "b.kept", "c.hits", "c.kept", "a.events_seen")}
+        # a's event at 0.62 is seen at 0.7, where b ticks and keeps a.x of that time
+        assert column["a.events_seen"] == [0] * 7 + [1] * 4
+        assert column["b.hits"] == [0] * 8 + [1] * 3
+        assert column["b.kept"] == [0] * 8 + [pytest.approx(0.7, abs=1e-12)] * 3
+        assert column["c.hits"] == [0] * 4 + [1] * 7 and column["c.kept"] == [0] * 4 + [4.5] * 7
+        beats = [row["a.beat"] in ("true", "1", "1.0") for row in rows]
+        assert beats == [False] * 7 + [True] + [False] * 3
+
+
+def test_without_event_mode_clocks_are_not_there(clocked, tmp_path):
+    path = tmp_path / "clocked.toml"
+    path.write_text(
+        f'[time]\nstep_s = 0.1\nduration_s = 1.0\n[a]\nfmu = "{clocked}"\n[[event]]\nat_s = 0.3\nset = {{ "a.hit" = true }}\n'
+    )
+    done = terraglue("run", path, "--quiet", "--out", tmp_path / "out")
+    assert done.returncode == 2 and "a.hit" in done.stderr, done.stderr
+    table = tmp_path / "in.csv"
+    table.write_text("time,hit\n0,1\n")
+    done = terraglue("fmu", "run", clocked, "--stop", "1", "--step", "0.1", "--input", table)
+    assert done.returncode == 1 and "`hit` cannot be made to tick" in done.stderr, done.stderr

@@ -1,8 +1,10 @@
 //! A unit as a subsystem: trials by its saved states, values by name, every error with what the unit said.
 
 use super::bodies::{Axis, Bodies};
+use super::clocks;
 use super::map::{self, Place};
 use super::rollback;
+use super::settings::{OnNan, options, structure};
 use crate::host::Partings;
 use crate::scenario::did_you_mean;
 use serde_json::{Map, Value};
@@ -17,15 +19,6 @@ use terraglue_subsystem::{
     Subsystem, ValueType, Values, ValuesMut, Variable,
 };
 
-/// What a value that is no number does.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum OnNan {
-    /// It stops the run.
-    Stop,
-    /// It is logged; what reads it decides.
-    Warn,
-}
-
 /// Whether a module of a scenario is a functional mock-up unit.
 pub fn is_fmu(module: &str) -> bool {
     Path::new(module).extension().is_some_and(|e| e.eq_ignore_ascii_case("fmu"))
@@ -37,6 +30,8 @@ pub struct FmuSubsystem {
     host: Arc<dyn Host>,
     variables: Vec<Variable>,
     places: Vec<Place>,
+    /// Whether any of them is a clock or belongs to one.
+    clocks: bool,
     /// State at the start of the step, where the unit can save it.
     before: SlaveState,
     can_go_back: bool,
@@ -86,10 +81,11 @@ impl FmuSubsystem {
         slave.configure(&structure).map_err(error)?;
         let description = slave.description().clone();
         let capabilities = description.capabilities;
-        let (variables, places) = map::variables(&description);
+        let (variables, places) = map::variables(&description, options.event_mode && capabilities.event_mode);
         let mut subsystem = Self {
             slave,
             variables,
+            clocks: clocks::concerned(&places),
             places,
             before: SlaveState::default(),
             can_go_back: capabilities.state && options.rollback,
@@ -258,6 +254,14 @@ impl FmuSubsystem {
         }
     }
 
+    /// Sets values of which some belong to clocks.
+    fn set_one_by_one(&mut self, ids: &[u32], values: Values) -> Result {
+        let Values::F64(values) = values else {
+            return Err(Error::Refused("clocks and what belongs to them is set one by one".into()));
+        };
+        ids.iter().zip(values).try_for_each(|(id, x)| self.set(&[*id], Values::F64(&[*x])))
+    }
+
     /// References of variables that are all scalars; false where one is an element of an array.
     fn collect(&self, ids: &[u32], references: &mut Vec<u32>) -> Result<bool> {
         references.clear();
@@ -288,80 +292,6 @@ fn feeds_through(description: &terraglue_fmi::ModelDescription) -> bool {
     let mut all = unknowns.map(|u| u.dependencies.as_ref().is_none_or(|d| d.iter().any(is_input)));
     let inputs = (0..description.variables.len()).any(|k| is_input(&k));
     inputs && all.any(|depends| depends)
-}
-
-/// Keys of the host in the table of a unit.
-struct Options {
-    on_nan: OnNan,
-    event_mode: bool,
-    rollback: bool,
-    bodies: Map<String, Value>,
-}
-
-/// The host's keys and the start values, whose nested tables become dotted names.
-fn options(parameters: &Map<String, Value>) -> Result<(Options, Vec<(String, Value)>)> {
-    let mut options = Options { on_nan: OnNan::Stop, event_mode: false, rollback: true, bodies: Map::new() };
-    let mut start = Vec::new();
-    for (key, value) in parameters {
-        let wrong = |takes: &str| Error::Refused(format!("`{key}` takes {takes}, not {value}"));
-        match (key.as_str(), value) {
-            ("on_nan", Value::String(t)) if t == "stop" => options.on_nan = OnNan::Stop,
-            ("on_nan", Value::String(t)) if t == "warn" => options.on_nan = OnNan::Warn,
-            ("on_nan", _) => return Err(wrong("\"stop\" or \"warn\"")),
-            ("event_mode", Value::Bool(on)) => options.event_mode = *on,
-            ("event_mode", _) => return Err(wrong("true or false")),
-            ("rollback", Value::Bool(on)) => options.rollback = *on,
-            ("rollback", _) => return Err(wrong("true or false")),
-            ("bodies", Value::Object(table)) => options.bodies = table.clone(),
-            ("start", Value::Object(below)) => {
-                below.iter().for_each(|(k, v)| flatten(k.clone(), v, &mut start));
-            }
-            _ => flatten(key.clone(), value, &mut start),
-        }
-    }
-    Ok((options, start))
-}
-
-/// Values of structural parameters, and all others, which may be elements of the arrays that those give their sizes.
-type Structure = (Vec<(String, i128)>, Vec<(String, Value)>);
-
-fn structure(
-    description: &terraglue_fmi::ModelDescription,
-    start: Vec<(String, Value)>,
-) -> Result<Structure> {
-    use terraglue_fmi::description::Causality;
-    let structural = |name: &str| {
-        let variable = description.position(name).map(|k| &description.variables[k]);
-        variable.is_some_and(|v| v.causality == Causality::StructuralParameter)
-    };
-    let (own, others): (Vec<_>, Vec<_>) = start.into_iter().partition(|(name, _)| structural(name));
-    let whole = |(name, value): (String, Value)| {
-        let number = value.as_i64().map(i128::from).or(value.as_u64().map(i128::from));
-        match number {
-            Some(number) => Ok((name, number)),
-            None => Err(Error::Refused(format!(
-                "`{name}` of the unit is a structural parameter and takes a whole number, not {value}"
-            ))),
-        }
-    };
-    Ok((own.into_iter().map(whole).collect::<Result<_>>()?, others))
-}
-
-/// Names of single values: `a.b` of tables, `a[2]` and `a[2,1]` of lists and lists of lists.
-fn flatten(name: String, value: &Value, all: &mut Vec<(String, Value)>) {
-    match value {
-        Value::Object(below) => below.iter().for_each(|(k, v)| flatten(format!("{name}.{k}"), v, all)),
-        Value::Array(items) => {
-            for (k, v) in items.iter().enumerate() {
-                let index = match name.strip_suffix(']') {
-                    Some(outer) => format!("{outer},{}]", k + 1),
-                    None => format!("{name}[{}]", k + 1),
-                };
-                flatten(index, v, all);
-            }
-        }
-        other => all.push((name, other.clone())),
-    }
 }
 
 /// An error of a unit as an error of a subsystem.
@@ -416,7 +346,8 @@ impl Subsystem for FmuSubsystem {
     }
 
     fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result {
-        if self.slave.is_initializing() {
+        let begins = self.slave.is_initializing();
+        if begins {
             self.slave.exit_initialization().map_err(error)?;
             self.running = true;
         }
@@ -441,6 +372,9 @@ impl Subsystem for FmuSubsystem {
             }
         }
         self.open = true;
+        if self.clocks && !begins {
+            self.slave.forget_ticks();
+        }
         if !self.bodies.is_empty() {
             self.prove(step, wrench)?;
             self.bodies.push(&mut self.slave, step, wrench, error)?;
@@ -475,6 +409,9 @@ impl Subsystem for FmuSubsystem {
 
     fn commit(&mut self, _: &Step, _: &[f64], _: &Motion) -> Result {
         self.open = false;
+        if self.clocks {
+            self.slave.forget_triggers();
+        }
         Ok(())
     }
 
@@ -534,6 +471,13 @@ impl Subsystem for FmuSubsystem {
             }
             (out, _) => out,
         };
+        let mut out = out;
+        if self.clocks {
+            let places = ids.iter().map(|id| self.place(*id)).collect::<Result<Vec<_>>>()?;
+            if clocks::get(&self.slave, &places, &mut out, error)? {
+                return Ok(());
+            }
+        }
         let mut references = self.references.borrow_mut();
         if self.collect(ids, &mut references)? {
             return match out {
@@ -593,6 +537,16 @@ impl Subsystem for FmuSubsystem {
                 let when =
                     if place.structural { "in the table of its unit" } else { "before the first step" };
                 return Err(Error::Refused(format!("`{name}` can only be set {when}")));
+            }
+        }
+        if self.clocks {
+            let place = |id: &u32| self.places.get(*id as usize);
+            let places: Vec<&Place> = ids.iter().filter_map(place).collect();
+            if places.iter().any(|p| p.clock || p.clocked) && ids.len() > 1 {
+                return self.set_one_by_one(ids, values);
+            }
+            if clocks::set(&mut self.slave, &places, &values, error)? {
+                return Ok(());
             }
         }
         if let (Values::F64(values), Some(reference)) = (&values, self.single(ids)) {

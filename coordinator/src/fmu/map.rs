@@ -19,13 +19,19 @@ pub struct Place {
     pub live: bool,
     /// Whether it gives arrays their sizes, and is set in configuration mode only.
     pub structural: bool,
+    /// Whether it is a clock.
+    pub clock: bool,
+    /// Whether it is an input that waits for a tick of its clocks.
+    pub clocked: bool,
 }
 
-/// All variables that a scenario can see, and where they lie.
-pub fn variables(description: &ModelDescription) -> (Vec<Variable>, Vec<Place>) {
+/// All variables that a scenario can see, and where they lie; clocks that others make tick are among them in event mode,
+/// as truth values.
+pub fn variables(description: &ModelDescription, event_mode: bool) -> (Vec<Variable>, Vec<Place>) {
     let (mut all, mut places) = (Vec::new(), Vec::new());
     for (k, v) in description.variables.iter().enumerate() {
-        let seen = !matches!(v.value_type, ValueType::Clock) && v.causality != fmi::Causality::Independent;
+        let clock = v.value_type == ValueType::Clock;
+        let seen = (!clock || event_mode && v.triggered) && v.causality != fmi::Causality::Independent;
         if !seen {
             continue;
         }
@@ -35,7 +41,7 @@ pub fn variables(description: &ModelDescription) -> (Vec<Variable>, Vec<Place>) 
             all.push(Variable {
                 id,
                 name: element_name(v, element),
-                value_type: v.value_type,
+                value_type: if clock { ValueType::Bool } else { v.value_type },
                 causality: v.causality.role(),
                 effect,
                 unit: unit(description, v),
@@ -48,7 +54,8 @@ pub fn variables(description: &ModelDescription) -> (Vec<Variable>, Vec<Place>) 
             let live = effect == Effect::Live;
             let structural = v.causality == fmi::Causality::StructuralParameter;
             let (count, reference) = (v.len(), v.reference);
-            places.push(Place { variable: k, element, count, reference, live, structural });
+            let clocked = event_mode && v.causality == fmi::Causality::Input && !v.clocks.is_empty();
+            places.push(Place { variable: k, element, count, reference, live, structural, clock, clocked });
         }
     }
     (all, places)

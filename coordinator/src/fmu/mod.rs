@@ -5,12 +5,15 @@
 
 mod adapter;
 mod bodies;
+mod clocks;
 pub mod export;
 mod feet;
 mod map;
 mod rollback;
+mod settings;
 pub mod simulate;
 pub mod ssp;
 
-pub use adapter::{FmuSubsystem, OnNan, is_fmu};
+pub use adapter::{FmuSubsystem, is_fmu};
 pub use feet::Feet;
+pub use settings::OnNan;

@@ -114,7 +114,7 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
     let mut slave = Slave::instantiate(fmu, options)?;
     configure(&mut slave, &settings.start)?;
     let description = slave.description().clone();
-    let columns = columns(&description, &settings.outputs)?;
+    let columns = columns(&description, &settings.outputs, event_mode)?;
     for (name, text) in &settings.start {
         let v = find(&description, name)?;
         if v.causality != Causality::StructuralParameter {
@@ -122,7 +122,7 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         }
     }
     slave.enter_initialization(start, Some(stop), settings.tolerance.or(experiment.tolerance))?;
-    set_inputs(&slave, settings, start)?;
+    set_inputs(&mut slave, settings, start)?;
     slave.exit_initialization()?;
     // with event mode a last column says how many events were handled since the row before
     let marked = |text: String, events: u32| match settings.event_mode {
@@ -131,7 +131,7 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         false => text,
     };
     if let Some(write) = &mut tables.intermediate {
-        let all = self::columns(&description, &intermediate)?;
+        let all = self::columns(&description, &intermediate, false)?;
         write(&(header(&all) + ",step_finished"))?;
     }
     row(&marked(header(&columns), 0))?;
@@ -144,7 +144,8 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         }
         let (t, end) = (start + k as f64 * step, start + (k + 1) as f64 * step);
         let at = |e: Error| named(e, t);
-        set_inputs(&slave, settings, t).map_err(at)?;
+        set_inputs(&mut slave, settings, t).map_err(at)?;
+        slave.forget_ticks();
         let events;
         (ended, events) = halving(&mut slave, &mut state, (t, end), &mut tables.intermediate).map_err(at)?;
         let now = ended.unwrap_or(end);
@@ -176,6 +177,9 @@ fn halving(
                 let values: String = row.values.iter().map(|x| format!(",{x}")).collect();
                 write(&format!("{}{values},{}", row.t, u8::from(row.finished)))?;
             }
+        }
+        if made.is_ok() {
+            slave.forget_triggers();
         }
         match made {
             Ok(done) if done.terminate => return Ok((Some(done.reached), events + done.events)),
@@ -222,11 +226,16 @@ fn find<'a>(description: &'a ModelDescription, name: &str) -> Result<&'a Variabl
     })
 }
 
-fn columns<'a>(description: &'a ModelDescription, names: &[String]) -> Result<Vec<&'a Variable>> {
+fn columns<'a>(
+    description: &'a ModelDescription,
+    names: &[String],
+    event_mode: bool,
+) -> Result<Vec<&'a Variable>> {
     if !names.is_empty() {
         return names.iter().map(|n| find(description, n)).collect();
     }
-    let output = |v: &&Variable| v.causality == Causality::Output && v.value_type != ValueType::Clock;
+    let output =
+        |v: &&Variable| v.causality == Causality::Output && (event_mode || v.value_type != ValueType::Clock);
     Ok(description.variables.iter().filter(output).collect())
 }
 
@@ -234,7 +243,7 @@ fn columns<'a>(description: &'a ModelDescription, names: &[String]) -> Result<Ve
 fn shown_between(description: &ModelDescription, names: &[String]) -> Result<Vec<String>> {
     let shown = |v: &&Variable| v.intermediate && v.value_type == ValueType::F64;
     let all: Vec<String> =
-        columns(description, names)?.into_iter().filter(shown).map(|v| v.name.clone()).collect();
+        columns(description, names, false)?.into_iter().filter(shown).map(|v| v.name.clone()).collect();
     match all.is_empty() {
         false => Ok(all),
         true => Err(Error::Refused(
@@ -301,7 +310,7 @@ fn read(slave: &Slave, v: &Variable) -> Result<Vec<String>> {
         ValueType::Binary => values!(Binary, Vec::new(), |x: &Vec<u8>| {
             x.iter().map(|b| format!("{b:02x}")).collect::<String>()
         }),
-        ValueType::Clock => Ok(Vec::new()),
+        ValueType::Clock => Ok(vec![u8::from(slave.ticks(v.reference)).to_string()]),
     }
 }
 
@@ -342,14 +351,25 @@ fn set_text(slave: &Slave, v: &Variable, text: &str) -> Result {
     }
 }
 
-fn set_inputs(slave: &Slave, settings: &Settings, t: f64) -> Result {
+fn set_inputs(slave: &mut Slave, settings: &Settings, t: f64) -> Result {
     for (column, name) in settings.input.names.iter().enumerate() {
-        let v = find(slave.description(), name)?;
+        let description = slave.description().clone();
+        let v = find(&description, name)?;
         let number = |t| {
             let x = settings.input.number(t, column);
             let none = || Error::Refused(format!("`{name}`: the input is no number beside t = {t} s"));
             if x.is_finite() { Ok(x) } else { Err(none()) }
         };
+        if v.value_type == ValueType::Clock {
+            slave.can_trigger(v)?;
+            slave.trigger(v.reference, matches!(settings.input.cell(t, column), "1" | "true"));
+            continue;
+        }
+        if slave.waits_for_clock(v.reference) {
+            let (v, cell) = (v.clone(), settings.input.cell(t, column).to_owned());
+            slave.hold(v.reference, move |slave| set_text(slave, &v, &cell));
+            continue;
+        }
         match v.value_type {
             ValueType::F64 => slave.set_f64(&[v.reference], &[number(t)?])?,
             ValueType::F32 => slave.set(&[v.reference], Values::F32(&[number(t)? as f32]))?,

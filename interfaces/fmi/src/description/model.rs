@@ -220,6 +220,10 @@ pub struct Variable {
     pub alias: bool,
     /// When it ticks, of an input clock whose times are known beforehand.
     pub ticks: Option<Ticks>,
+    /// Whether it is a clock that others make tick: an output clock, or a triggered input clock.
+    pub triggered: bool,
+    /// Clocks by number in calls with which it changes; empty: at any time.
+    pub clocks: Vec<u32>,
     /// Whether a structural parameter changed its shape, so that the start values of the description are not for it.
     pub resized: bool,
     /// Whether it can be read at intermediate times.

@@ -92,6 +92,8 @@ mod tests {
             line: 1,
             alias: false,
             ticks: None,
+            triggered: false,
+            clocks: Vec::new(),
             resized: false,
             intermediate: false,
         };

@@ -179,9 +179,21 @@ fn variable(
         line,
         alias: false,
         ticks: if value_type == ValueType::Clock { ticks(inner, causality)? } else { None },
+        triggered: value_type == ValueType::Clock
+            && (causality == Causality::Output
+                || causality == Causality::Input && inner.text("intervalVariability") == "triggered"),
+        clocks: clocks(element)?,
         resized: false,
         intermediate: element.flag("intermediateUpdate")?,
     })
+}
+
+/// The list of clocks of a variable.
+fn clocks(element: &Element) -> Result<Vec<u32>> {
+    let text = element.text("clocks");
+    let one =
+        |word: &str| word.parse().map_err(|_| element.wrong("clocks", text, "a list of value references"));
+    text.split_whitespace().map(one).collect()
 }
 
 /// When a clock ticks; nothing where that is not known beforehand.

@@ -5,6 +5,7 @@
 #![allow(unsafe_code)] // Functions of foreign libraries are called.
 
 mod call;
+mod clocks;
 mod configure;
 mod functions;
 mod intermediate;
@@ -19,10 +20,11 @@ pub use state::SlaveState;
 pub use step::{Advance, Stepped};
 
 use crate::binary::Loaded;
-use crate::description::{ModelDescription, Ticks, Variable};
+use crate::description::ModelDescription;
 use crate::error::{Error, Result};
 use crate::fmu::Fmu;
 use call::{Health, Status};
+use clocks::Clocks;
 use functions::{Api, Callbacks2, Component};
 use log::LogBook;
 use std::cell::Cell;
@@ -73,8 +75,7 @@ pub struct Slave {
     health: Cell<Health>,
     phase: Phase,
     event_mode: bool,
-    /// Periodic input clocks, ticked in event mode.
-    clocks: Vec<(u32, Ticks)>,
+    clocks: Clocks,
     start: f64,
     /// Whether the unit may call for an intermediate update, and what is read there.
     updates: bool,
@@ -171,7 +172,7 @@ impl Slave {
             health: Cell::new(Health::Good),
             phase: Phase::Instantiated,
             event_mode,
-            clocks: clocks(&description.variables, event_mode, &log),
+            clocks: Clocks::new(&description.variables, event_mode, &log),
             start: 0.0,
             updates,
             shown,
@@ -239,7 +240,8 @@ impl Slave {
             Api::Three(three) => {
                 self.call("fmi3ExitInitializationMode", three.exit_initialization, |f, c| unsafe { f(c) })?;
                 if self.event_mode {
-                    self.tick(self.start)?;
+                    self.tick(self.start, true)?;
+                    self.forget_triggers();
                     self.settle_events()?;
                     self.call("fmi3EnterStepMode", three.enter_step_mode, |f, c| unsafe { f(c) })?;
                 }
@@ -319,17 +321,6 @@ impl std::fmt::Debug for Slave {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.debug_struct("Slave").field("fmu", &self.fmu.path()).field("phase", &self.phase).finish()
     }
-}
-
-/// Clocks that tick in a run, which they do in event mode only.
-fn clocks(variables: &[Variable], event_mode: bool, log: &LogBook) -> Vec<(u32, Ticks)> {
-    let clock = |v: &Variable| v.ticks.map(|ticks| (v.reference, ticks));
-    let all: Vec<(u32, Ticks)> = variables.iter().filter_map(clock).collect();
-    if event_mode || all.is_empty() {
-        return all;
-    }
-    log.note("has periodic clocks, which tick in event mode only: set event_mode");
-    Vec::new()
 }
 
 fn log_needs_tool(sink: &Sink, description: &crate::ModelDescription) {

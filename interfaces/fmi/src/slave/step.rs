@@ -96,8 +96,14 @@ impl Slave {
             self.forget_between();
         }
         let tolerance = 1e-9 * step.h + 4.0 * f64::EPSILON * end.abs();
+        if self.clocks.is_due() {
+            events += 1;
+            if self.fire(t)? {
+                return Ok(Stepped { reached: t, terminate: true, events });
+            }
+        }
         loop {
-            let tick = self.clocks.iter().map(|(_, ticks)| ticks.after(t)).fold(end, f64::min);
+            let tick = self.clocks.next(t, end);
             let stop = if end - tick > tolerance { tick } else { end };
             let (mut event, mut terminate, mut early, mut last) = (false, false, false, f64::NAN);
             let for_good = step.for_good;
@@ -134,12 +140,12 @@ impl Slave {
             if terminate {
                 return Ok(Stepped { reached: last, terminate, events });
             }
-            let ticks = at_stop && self.clocks.iter().any(|(_, ticks)| ticks.at(stop));
+            let ticks = at_stop && self.clocks.tick_at(stop);
             if event && self.event_mode || ticks {
                 events += 1;
                 self.call("fmi3EnterEventMode", three.enter_event_mode, |f, c| unsafe { f(c) })?;
                 if at_stop {
-                    self.tick(stop)?;
+                    self.tick(stop, false)?;
                 }
                 if self.settle_events()? {
                     return Ok(Stepped { reached: last, terminate: true, events });
@@ -164,19 +170,6 @@ impl Slave {
         }
     }
 
-    /// In event mode: activates the input clocks that tick at t.
-    pub(super) fn tick(&self, t: f64) -> Result {
-        let Api::Three(three) = self.api else { return Ok(()) };
-        let due: Vec<u32> = self.clocks.iter().filter(|(_, ticks)| ticks.at(t)).map(|(vr, _)| *vr).collect();
-        if due.is_empty() {
-            return Ok(());
-        }
-        let on = vec![true; due.len()];
-        let (r, n, p) = (due.as_ptr(), due.len(), on.as_ptr());
-        // SAFETY: as many values as references.
-        self.call("fmi3SetClock", three.set_clock, |f, c| unsafe { f(c, r, n, p) })
-    }
-
     /// Updates discrete states until nothing changes; whether the unit asks for the end.
     pub(super) fn settle_events(&mut self) -> Result<bool> {
         const NAME: &str = "fmi3UpdateDiscreteStates";
@@ -185,6 +178,7 @@ impl Slave {
             let (mut again, mut terminate, mut nominals, mut values, mut defined) =
                 (false, false, false, false, false);
             let mut next = f64::INFINITY;
+            self.look_at_clocks()?;
             self.call(NAME, three.update_discrete, |f, c| unsafe {
                 f(
                     c,

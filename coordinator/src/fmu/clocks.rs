@@ -1,0 +1,91 @@
+//! Clocks of units in a scenario: truth values. An output clock is true where it ticked in the last step, a triggered input clock
+//! ticks when the next step begins; inputs of a clock take their values then.
+
+use super::map::Place;
+use terraglue_fmi::{Error as FmiError, Result as FmiResult, Slave};
+use terraglue_subsystem::{Error, Result, Values, ValuesMut};
+
+/// How an error of a unit becomes one of the subsystem.
+type Fail = fn(FmiError) -> Error;
+
+/// Whether any of the variables needs this module.
+pub fn concerned(places: &[Place]) -> bool {
+    places.iter().any(|p| p.clock || p.clocked)
+}
+
+/// Truth values of which some are clocks; answers whether there are such.
+pub fn get(slave: &Slave, places: &[&Place], out: &mut ValuesMut, fail: Fail) -> Result<bool> {
+    let ValuesMut::Bool(out) = out else { return Ok(false) };
+    if !places.iter().any(|p| p.clock) {
+        return Ok(false);
+    }
+    for (place, out) in places.iter().zip(out.iter_mut()) {
+        *out = if place.clock {
+            slave.ticks(place.reference)
+        } else {
+            let mut whole = vec![false; place.count];
+            slave.get(&[place.reference], ValuesMut::Bool(&mut whole)).map_err(fail)?;
+            whole[place.element]
+        };
+    }
+    Ok(true)
+}
+
+/// Sets clocks, and keeps inputs of clocks for their next tick; answers whether all of them were such.
+pub fn set(slave: &mut Slave, places: &[&Place], values: &Values, fail: Fail) -> Result<bool> {
+    if let (Values::Bool(values), true) = (values, places.iter().all(|p| p.clock)) {
+        for (place, on) in places.iter().zip(*values) {
+            let clock = slave.description().variables[place.variable].clone();
+            slave.can_trigger(&clock).map_err(fail)?;
+            slave.trigger(place.reference, *on);
+        }
+        return Ok(true);
+    }
+    if !places.iter().all(|p| p.clocked && p.count == 1) {
+        return mixed(places);
+    }
+    macro_rules! held {
+        ($variant:ident, $all:expr) => {
+            for (place, value) in places.iter().zip($all.iter().cloned()) {
+                let reference = place.reference;
+                slave.hold(reference, move |slave: &Slave| -> FmiResult {
+                    slave.set(&[reference], Values::$variant(&[value.clone()]))
+                });
+            }
+        };
+    }
+    match values {
+        Values::F64(all) => held!(F64, all),
+        Values::F32(all) => held!(F32, all),
+        Values::I8(all) => held!(I8, all),
+        Values::I16(all) => held!(I16, all),
+        Values::I32(all) => held!(I32, all),
+        Values::I64(all) => held!(I64, all),
+        Values::U8(all) => held!(U8, all),
+        Values::U16(all) => held!(U16, all),
+        Values::U32(all) => held!(U32, all),
+        Values::U64(all) => held!(U64, all),
+        Values::Bool(all) => held!(Bool, all),
+        Values::String(all) => held!(String, all),
+        Values::Binary(all) => held!(Binary, all),
+        Values::Enumeration(all) => {
+            let items = |place: &Place, k: i64| {
+                let items = &slave.description().variables[place.variable].items;
+                usize::try_from(k).ok().and_then(|k| items.get(k)).map_or(k, |(_, own)| *own)
+            };
+            let own: Vec<i64> = places.iter().zip(*all).map(|(place, k)| items(place, *k)).collect();
+            held!(Enumeration, own);
+        }
+    }
+    Ok(true)
+}
+
+/// What is no single input of a clock: none of this module's, or something that is not done.
+fn mixed(places: &[&Place]) -> Result<bool> {
+    match places.iter().any(|p| p.clocked && p.count > 1) {
+        true => {
+            Err(Error::Refused("an array that belongs to a clock cannot be set element by element".into()))
+        }
+        false => Ok(false),
+    }
+}

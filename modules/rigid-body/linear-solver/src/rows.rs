@@ -29,6 +29,19 @@ impl Rows {
         wrench(&-self.directions[r], &self.lever, r < 3)
     }
 
+    /// J·v of row r alone. `child`, `parent`: six rates each.
+    pub fn rate(&self, r: usize, child: &[f64], parent: Option<&[f64]>) -> f64 {
+        let (v, w) = split(child);
+        let other = parent.map(split);
+        let along = if r < 3 {
+            let own = v + w.cross(&self.anchor);
+            other.map_or(own, |(v, w)| own - (v + w.cross(&self.lever)))
+        } else {
+            other.map_or(w, |(_, turn)| w - turn)
+        };
+        self.directions[r].dot(&along)
+    }
+
     /// J·v of all six rows. `child`, `parent`: six rates each.
     pub fn rates(&self, child: &[f64], parent: Option<&[f64]>) -> [f64; 6] {
         let (mut slide, mut turn) = split(child);
@@ -52,13 +65,33 @@ impl Rows {
     /// Rates of the child (centre of mass, rotation) that move it by a unit rate along row r against a parent at
     /// rest, and along no other row.
     pub(crate) fn motion(&self, r: usize) -> [f64; 6] {
-        let d = self.directions[r];
-        if r < 3 {
-            [d.x, d.y, d.z, 0.0, 0.0, 0.0]
-        } else {
-            let v = self.anchor.cross(&d);
-            [v.x, v.y, v.z, d.x, d.y, d.z]
-        }
+        let mut unit = [0.0; 6];
+        unit[r] = 1.0;
+        self.motion_of(&unit)
+    }
+
+    /// The same for any rates along all rows.
+    #[inline]
+    pub(crate) fn motion_of(&self, b: &[f64; 6]) -> [f64; 6] {
+        let d = &self.directions;
+        let turn = b[3] * d[3] + b[4] * d[4] + b[5] * d[5];
+        let slide = b[0] * d[0] + b[1] * d[1] + b[2] * d[2] + self.anchor.cross(&turn);
+        [slide.x, slide.y, slide.z, turn.x, turn.y, turn.z]
+    }
+
+    /// What a wrench on the child does along each row: motion(r)·wrench.
+    #[inline]
+    pub(crate) fn along(&self, wrench: &[f64; 6]) -> [f64; 6] {
+        let (force, moment) = split(wrench);
+        let (d, moment) = (&self.directions, moment + force.cross(&self.anchor));
+        [
+            d[0].dot(&force),
+            d[1].dot(&force),
+            d[2].dot(&force),
+            d[3].dot(&moment),
+            d[4].dot(&moment),
+            d[5].dot(&moment),
+        ]
     }
 }
 
@@ -71,6 +104,7 @@ fn wrench(d: &V3, arm: &V3, force: bool) -> [f64; 6] {
     }
 }
 
+#[inline]
 fn split(v: &[f64]) -> (V3, V3) {
     (V3::new(v[0], v[1], v[2]), V3::new(v[3], v[4], v[5]))
 }

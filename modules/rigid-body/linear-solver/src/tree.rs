@@ -78,6 +78,8 @@ struct Node {
     shift: Vector3<f64>,
     rows: Rows,
     rigid: [bool; 6],
+    /// Rows that hold at all: rigid and compliant ones.
+    exists: [bool; 6],
     freedoms: [Freedom; 6],
     count: usize,
     /// Freedoms of this body and all above it.
@@ -259,7 +261,7 @@ impl Node {
     fn set_rows(&mut self, rows: &[Rows], compliance: &[[Option<f64>; 6]]) {
         let given = self.joint.map(|j| (&rows[j], &compliance[j]));
         self.count = 0;
-        self.rigid = [false; 6];
+        (self.rigid, self.exists) = ([false; 6], [false; 6]);
         let Some((rows, compliance)) = given.filter(|(_, c)| c.iter().any(Option::is_some)) else {
             self.hangs = false;
             for k in 0..6 {
@@ -273,6 +275,7 @@ impl Node {
         self.rows = *rows;
         self.shift = rows.lever - rows.anchor;
         for (r, c) in compliance.iter().enumerate() {
+            self.exists[r] = c.is_some_and(|c| c <= 0.0 || 1.0 / c > 0.0);
             match c {
                 Some(c) if *c <= 0.0 => self.rigid[r] = true,
                 _ => {
@@ -302,15 +305,8 @@ impl Node {
     /// Rates of the body that the rigid rows ask for against a parent at rest.
     #[inline]
     fn asked(&self, b: &Wrench) -> Option<Wrench> {
-        let mut asked = [0.0; 6];
-        let mut any = false;
-        for r in 0..6 {
-            if self.rigid[r] && b[r] != 0.0 {
-                add(&mut asked, b[r], &self.rows.motion(r));
-                any = true;
-            }
-        }
-        any.then_some(asked)
+        let rigid: Wrench = std::array::from_fn(|r| if self.rigid[r] { b[r] } else { 0.0 });
+        rigid.iter().any(|b| *b != 0.0).then(|| self.rows.motion_of(&rigid))
     }
 
     /// Eliminates the body from the right-hand side; what is left for the parent. Leaves each freedom's own share
@@ -370,16 +366,10 @@ impl Node {
         // What the joint carries: Jᵀμ = p − A·v.
         let mut carried = p;
         add(&mut carried, -1.0, &times(&self.inertia, &v));
-        let exists: [bool; 6] = self.exists();
-        for r in 0..6 {
-            x[row_at + r] = if exists[r] { dot(&self.rows.motion(r), &carried) } else { 0.0 };
+        let along = self.rows.along(&carried);
+        for (x, (along, exists)) in x[row_at..row_at + 6].iter_mut().zip(along.iter().zip(self.exists)) {
+            *x = if exists { *along } else { 0.0 };
         }
         x[6 * b..6 * b + 6].copy_from_slice(&v);
-    }
-
-    fn exists(&self) -> [bool; 6] {
-        let mut exists = self.rigid;
-        self.freedoms[..self.count].iter().for_each(|f| exists[f.row] |= f.stiffness > 0.0);
-        exists
     }
 }

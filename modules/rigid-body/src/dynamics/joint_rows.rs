@@ -66,8 +66,9 @@ pub(crate) fn gap(joint: &Joint, bodies: &[Motion]) -> [f64; 6] {
         V3::new(0.0, 0.0, -(relative * V3::y()).x)
     } else if joint.aligns_axes() {
         // u_parent × u_child, in the frame of the parent: the axis alone has to agree.
-        let axis = relative * V3::x();
-        V3::new(0.0, -axis.z, axis.y)
+        let (w, i, j, k) = (relative.w, relative.i, relative.j, relative.k);
+        let (y, z) = (2.0 * (i * j + w * k), 2.0 * (i * k - w * j));
+        V3::new(0.0, -z, y)
     } else {
         relative.imag() * (2.0_f64.copysign(relative.w))
     };

@@ -237,7 +237,7 @@ impl Dynamics {
             self.free[at + 3..at + 6].copy_from_slice(self.free_rate[b].as_slice());
         }
         self.solution.copy_from_slice(&self.free);
-        self.find_ends();
+        self.find_places();
         let span = self.span(state, self.h, 1.0);
         for (j, joint) in self.model.joints.iter().enumerate() {
             let s = &state.joints[j];
@@ -275,6 +275,13 @@ impl Dynamics {
         self.rows[j].rates(of(joint.child), joint.parent.map(of))
     }
 
+    /// J·v of one row of joint j.
+    fn rate(&self, j: usize, row: usize, v: &[f64]) -> f64 {
+        let joint = &self.model.joints[j];
+        let of = |b: usize| &v[self.kkt.body_at[b]..][..6];
+        self.rows[j].rate(row, of(joint.child), joint.parent.map(of))
+    }
+
     /// The free axis of joint j in the trial; none where nothing moves or it is broken.
     pub fn axis_result(&self, j: usize) -> Option<AxisResult> {
         let joint = &self.model.joints[j];
@@ -282,16 +289,28 @@ impl Dynamics {
         if self.integrator.is_second_order() {
             return Some(self.axis_result_second_order(j, free));
         }
-        let rate = self.rates(j, &self.solution)[free];
-        let mean_rate = 0.5 * (rate + self.rates(j, &self.free)[free]);
-        let row = self.axes[j].row(self.modes[j]).is_some();
-        let impulse = if row {
-            -self.solution[self.kkt.joint_at[j] + free]
-        } else {
-            self.axes[j].impulse(self.modes[j])
-        };
-        let rate = rate + self.curvature[j];
+        let rate = self.rate(j, free, &self.solution);
+        let mean_rate = 0.5 * (rate + self.rate(j, free, &self.free));
+        let (rate, impulse) = (rate + self.curvature[j], self.impulse_of(j, free));
         Some(AxisResult { rate, end_rate: rate, mean_rate, impulse })
+    }
+
+    /// What decides on the branch of an axis: the change of its coordinate over h, and its impulse.
+    fn axis_state(&self, j: usize) -> Option<(f64, f64)> {
+        let free = self.model.joints[j].free_row().filter(|_| !self.broken[j])?;
+        Some(if self.integrator.is_second_order() {
+            (self.travel(j) / self.h, self.impulse_of(j, free))
+        } else {
+            (self.rate(j, free, &self.solution) + self.curvature[j], self.impulse_of(j, free))
+        })
+    }
+
+    /// Impulse along the free axis of a joint in the trial.
+    fn impulse_of(&self, j: usize, free: usize) -> f64 {
+        match self.axes[j].row(self.modes[j]) {
+            Some(_) => -self.solution[self.kkt.joint_at[j] + free] / self.integrator.force_weight(),
+            None => self.axes[j].impulse(self.modes[j]),
+        }
     }
 
     /// Work of the contact impulses of the trial: at the mean of the rates before and after, so that it is exactly
@@ -400,9 +419,10 @@ impl Dynamics {
     fn close_joints(&mut self) -> Result<(), Failure> {
         let mut before = f64::INFINITY;
         for _ in 0..MAX_CORRECTIONS {
-            self.find_ends();
+            self.find_places();
             let open = self.gaps_into_correction().1;
             if open <= GAP_TOLERANCE {
+                self.find_rates();
                 return Ok(());
             }
             // Not at all, or to rounding; a NaN ends it too.
@@ -434,10 +454,11 @@ impl Dynamics {
     fn gaps_into_correction(&mut self) -> (usize, f64) {
         let mut worst = (0, 0.0);
         self.correction.fill(0.0);
+        let per_step = 1.0 / self.h;
         for (j, joint) in self.model.joints.iter().enumerate().filter(|(j, _)| !self.broken[*j]) {
-            let at = self.kkt.joint_at[j];
-            for (r, open) in gap(joint, &self.ends).iter().enumerate() {
-                self.correction[at + r] = -open / self.h;
+            let row = &mut self.correction[self.kkt.joint_at[j]..][..6];
+            for (row, open) in row.iter_mut().zip(gap(joint, &self.ends)) {
+                *row = -open * per_step;
                 // A NaN is the worst and stays it.
                 if open.abs() > worst.1 || open.is_nan() {
                     worst = (j, open.abs());
@@ -453,18 +474,34 @@ impl Dynamics {
 
     /// Positions and rates at the end of the step from `solution`.
     fn find_ends(&mut self) {
+        self.find_places();
+        self.find_rates();
+    }
+
+    /// Positions at the end of the step.
+    fn find_places(&mut self) {
         for b in 0..self.ends.len() {
             let (start, at) = (&self.starts[b], self.kkt.body_at[b]);
-            let v = V3::from_column_slice(&self.solution[at..at + 3]);
-            let w = V3::from_column_slice(&self.solution[at + 3..at + 6]);
+            let u = &self.solution[at..at + 6];
+            let (v, w) = (V3::new(u[0], u[1], u[2]), V3::new(u[3], u[4], u[5]));
             let turn = self.h * (w + self.middle_rate[b] - self.free_rate[b]);
             let mut q = cayley(&turn) * start.q;
             q.renormalize_fast();
+            self.turns[b] = turn;
+            (self.ends[b].c, self.ends[b].q) = (start.c + self.h * v, q);
+        }
+    }
+
+    /// Rates at the end of the step, after its positions.
+    fn find_rates(&mut self) {
+        for b in 0..self.ends.len() {
+            let (start, at) = (&self.starts[b], self.kkt.body_at[b]);
+            let u = &self.solution[at..at + 6];
+            let (v, w, q) = (V3::new(u[0], u[1], u[2]), V3::new(u[3], u[4], u[5]), self.ends[b].q);
             // The impulses change the angular momentum; the rate follows with the inertia of the new orientation.
             let momentum = self.inertia[b] * (w - self.free_rate[b] + start.w);
             let rate = q * (self.model.bodies[b].inverse_inertia * q.inverse_transform_vector(&momentum));
-            self.turns[b] = turn;
-            self.ends[b] = Motion { c: start.c + self.h * v, q, v, w: rate };
+            (self.ends[b].v, self.ends[b].w) = (v, rate);
         }
     }
 
@@ -473,8 +510,8 @@ impl Dynamics {
         let mut changed = false;
         self.next_modes.clone_from(&self.modes);
         for j in 0..self.axes.len() {
-            let Some(axis) = self.axis_result(j) else { continue };
-            let next = self.axes[j].next(self.modes[j], axis.rate, axis.impulse);
+            let Some((rate, impulse)) = self.axis_state(j) else { continue };
+            let next = self.axes[j].next(self.modes[j], rate, impulse);
             if next != self.modes[j] && !(one_at_a_time && changed) {
                 self.next_modes[j] = next;
                 changed = true;

@@ -119,16 +119,17 @@ impl Dynamics {
     /// The free axis of a joint.
     pub(super) fn axis_result_second_order(&self, j: usize, free: usize) -> AxisResult {
         let joint = &self.model.joints[j];
-        let rate = (coordinate(joint, &self.ends, self.angles[j]) - self.angles[j]) / self.h;
+        let rate = self.travel(j) / self.h;
         let rows = rows(joint, &self.ends);
         let child = rates(&self.ends[joint.child]);
         let parent = joint.parent.map(|p| rates(&self.ends[p]));
         let end_rate = rows.rates(&child, parent.as_ref().map(|p| p.as_slice()))[free];
-        let impulse = match self.axes[j].row(self.modes[j]) {
-            Some(_) => -self.solution[self.kkt.joint_at[j] + free] / self.integrator.force_weight(),
-            None => self.axes[j].impulse(self.modes[j]),
-        };
-        AxisResult { rate, end_rate, mean_rate: rate, impulse }
+        AxisResult { rate, end_rate, mean_rate: rate, impulse: self.impulse_of(j, free) }
+    }
+
+    /// Change of the coordinate of joint j in the trial.
+    pub(super) fn travel(&self, j: usize) -> f64 {
+        coordinate(&self.model.joints[j], &self.ends, self.angles[j]) - self.angles[j]
     }
 
     pub(super) fn find_ends_second_order(&mut self) {
@@ -165,8 +166,7 @@ impl Dynamics {
                 if free == Some(r) {
                     match self.axes[j].row(self.modes[j]) {
                         Some((c, b)) => {
-                            let travel = coordinate(joint, &self.ends, self.angles[j]) - self.angles[j];
-                            self.correction[at + r] = b - travel / self.h - c / weight * impulse;
+                            self.correction[at + r] = b - self.travel(j) / self.h - c / weight * impulse;
                         }
                         None => impulse = weight * self.axes[j].impulse(self.modes[j]),
                     }

@@ -26,7 +26,7 @@ pub(crate) mod sensitivity;
 use crate::contact::bodies::{BodyContacts, Unsolved};
 use crate::drive::{Axis, MOST_YIELDING, Mode, Span, YIELDING};
 use crate::math::{M3, V3, cayley};
-use crate::model::Model;
+use crate::model::{Joint, Kind, Model};
 use crate::state::{Motion, State};
 use anderson::Anderson;
 use carried::Carried;
@@ -109,6 +109,8 @@ pub(crate) struct Dynamics {
     /// Per axis: change of the coordinate over h less J·v⁺, from the curvature of the motion.
     curvature: Vec<f64>,
     broken: Vec<bool>,
+    /// From a centre of mass to a joint at most, m; infinite where that does not bound how rows turn.
+    longest_arm: f64,
     base_rhs: Vec<f64>,
     /// Rates of the force-free motion.
     free: Vec<f64>,
@@ -140,7 +142,15 @@ impl Dynamics {
         let kkt = Kkt::new(&model)?;
         let (nb, nj, n) = (model.bodies.len(), model.joints.len(), kkt.len());
         let rest = Motion::at(V3::zeros(), crate::math::Q::identity());
+        // What slides changes its lever beyond any turn, and rows of universal joints turn faster than their bodies.
+        let arm = |j: &Joint| match j.kind {
+            Kind::Fixed | Kind::Revolute | Kind::Spherical => {
+                j.child_anchor.norm().max(j.parent_anchor.norm())
+            }
+            _ => f64::INFINITY,
+        };
         Ok(Self {
+            longest_arm: model.joints.iter().map(arm).fold(0.0, f64::max),
             contacts: BodyContacts::new(&model, bodies),
             closing: Closing::new(&model),
             kkt,
@@ -432,9 +442,24 @@ impl Dynamics {
             before = open;
             self.kkt.solver.substitute(&mut self.correction);
             self.solution.iter_mut().zip(&self.correction).for_each(|(s, c)| *s += c);
+            if self.surely_closes() {
+                self.find_ends();
+                return Ok(());
+            }
         }
         self.find_ends();
         self.check_gaps()
+    }
+
+    /// Whether what the correction leaves open is surely below the tolerance, so that it need not be measured: rows are
+    /// those of the start, which bodies turn by θ in the step, and the correction itself turns them a little more. Where it
+    /// moves bodies by up to m along each axis (m, rad), joints are left open by at most 2(θ + m)·2√3·m(1 + arm).
+    fn surely_closes(&self) -> bool {
+        let largest = |x: &[f64]| x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
+        let moved = 2.0 * self.h * largest(&self.correction[..6 * self.ends.len()]);
+        let turned = self.turns.iter().fold(0.0_f64, |m, t| m.max(t.norm_squared())).sqrt();
+        // A NaN is never sure.
+        !self.closes() && 4.0 * (turned + moved) * moved * (1.0 + self.longest_arm) <= GAP_TOLERANCE
     }
 
     /// Refuses a step that leaves a joint or a loop open.

@@ -7,6 +7,7 @@ import zipfile
 
 import pytest
 
+from cfmu import build_3
 from conftest import terraglue
 
 # `x` is the time; every tick samples it and counts; at t = 0.62 the unit asks for event mode by itself, counts that, and its output
@@ -16,8 +17,8 @@ CODE = r"""
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-typedef struct { double v[8], t; bool due, events, asked, hit, inside; } Unit;
-enum { X = 1, SAMPLE, COUNT, EVENTS, HITS, KEPT, IN };
+typedef struct { double v[16], t; bool due, events, asked, hit, inside, down, next; int grown; } Unit;
+enum { X = 1, SAMPLE, COUNT, EVENTS, HITS, KEPT, IN, DOWN = 12, GROWN };
 void *fmi3InstantiateCoSimulation(const char *n, const char *t, const char *r, bool v, bool l, bool e, bool a,
     const unsigned *q, size_t k, void *env, void *log, void *up) {
     Unit *u = calloc(1, sizeof(Unit)); u->events = e; return u; }
@@ -32,14 +33,23 @@ int fmi3SetFloat64(Unit *u, const unsigned *r, size_t n, const double *x, size_t
     if (n != 1 || r[0] != IN || u->events && !u->hit) return 3; u->v[IN] = x[0]; return 0; }
 int fmi3SetClock(Unit *u, const unsigned *r, size_t n, const bool *on) {
     if (!u->inside) return 3;
-    for (size_t k = 0; k < n; k++) { if (r[k] == 9) u->due = on[k]; else if (r[k] == 10) u->hit = on[k]; else return 3; }
+    for (size_t k = 0; k < n; k++) { if (r[k] == 9) u->due = on[k]; else if (r[k] == 10) u->hit = on[k]; else if (r[k] == 14) u->down = on[k];
+        else if (r[k] == 15) u->next = on[k]; else return 3; }
     return 0; }
+int fmi3GetIntervalDecimal(Unit *u, const unsigned *r, size_t n, double *x, int *q) {
+    if (!u->inside || n != 2 || r[0] != 14 || r[1] != 15) return 3;
+    // 0.13 s after the event at 0.62, and at once after that; the other one ticks at 0, 0.1, 0.3, 0.6, 1
+    q[0] = u->v[DOWN] == 1 ? 2 : u->v[EVENTS] == 1 && u->v[DOWN] == 0 && u->v[8] == 0 ? 2 : 1;
+    x[0] = u->v[DOWN] == 1 ? 0 : %INTERVAL%; u->v[8] = u->v[EVENTS];
+    q[1] = 2; x[1] = 0.1 * u->grown; return 0; }
 int fmi3GetClock(Unit *u, const unsigned *r, size_t n, bool *on) {
     if (!u->inside || n != 1 || r[0] != 11) return 3; *on = u->asked; return 0; }
 int fmi3UpdateDiscreteStates(Unit *u, bool *again, bool *end, bool *nominals, bool *values, bool *defined, double *next) {
     *again = *end = *nominals = *values = *defined = false;
     if (u->due) { u->v[SAMPLE] = u->t; u->v[COUNT] += 1; u->due = false; }
     if (!u->inside) return 3;
+    if (u->down) { u->v[DOWN] += 1; u->v[9] = u->t; u->down = false; }
+    if (u->next) { u->grown += 1; u->v[GROWN] = u->t; u->next = false; }
     if (u->hit) { u->v[HITS] += 1; u->v[KEPT] = u->v[IN]; u->hit = false; }
     if (u->asked) { u->v[EVENTS] += 1; u->asked = false; }
     return 0; }
@@ -54,14 +64,18 @@ int fmi3DoStep(Unit *u, double t, double h, bool g, bool *e, bool *d, bool *earl
 
 @pytest.fixture(scope="session")
 def clocked(tmp_path_factory):
-    folder = tmp_path_factory.mktemp("clocked")
-    (folder / "m.c").write_text(CODE)
+    return made(tmp_path_factory.mktemp("clocked"))
+
+
+def made(folder, more="", interval="0.13"):
+    (folder / "m.c").write_text(CODE.replace("%INTERVAL%", interval))
     subprocess.run(["cc", "-shared", "-fPIC", "-w", "m.c", "-o", "m.so"], cwd=folder, check=True, capture_output=True)
     names = ("x", "sample", "count", "events_seen", "hits", "kept")
     variables = "".join(f'<Float64 name="{n}" valueReference="{k + 1}" causality="output"/>' for k, n in enumerate(names))
     variables += '<Float64 name="in" valueReference="7" causality="input" variability="discrete" clocks="10" start="0"/>'
     variables += '<Clock name="hit" valueReference="10" causality="input" intervalVariability="triggered"/>'
     variables += '<Clock name="beat" valueReference="11" causality="output" intervalVariability="triggered"/>'
+    variables += more
     outputs = "".join(f'<Output valueReference="{k + 1}"/>' for k in range(len(names)))
     with zipfile.ZipFile(folder / "m.fmu", "w") as archive:
         archive.writestr(
@@ -163,3 +177,39 @@ def test_without_event_mode_clocks_are_not_there(clocked, tmp_path):
     table.write_text("time,hit\n0,1\n")
     done = terraglue("fmu", "run", clocked, "--stop", "1", "--step", "0.1", "--input", table)
     assert done.returncode == 1 and "`hit` cannot be made to tick" in done.stderr, done.stderr
+
+
+TOLD = (
+    '<Float64 name="down" valueReference="12" causality="output"/>'
+    '<Float64 name="grown_at" valueReference="13" causality="output"/>'
+    '<Clock name="count_down" valueReference="14" causality="input" intervalVariability="countdown"/>'
+    '<Clock name="growing" valueReference="15" causality="input" intervalVariability="changing"/>'
+)
+
+
+def told(tmp_path, interval="0.13"):
+    unit = made(tmp_path, TOLD, interval)
+    return terraglue("fmu", "run", unit, "--stop", "1", "--step", "0.25", "--event-mode", "on", "--output", "x,down,grown_at,count")
+
+
+def test_clocks_tick_when_the_unit_told(tmp_path):
+    done = told(tmp_path)
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader(done.stdout.splitlines()))
+    # a countdown from 0.62 to 0.75, and one of no length there
+    assert [float(row["down"]) for row in rows] == [0, 0, 0, 2, 2]
+    assert [float(row["grown_at"]) for row in rows] == pytest.approx([0, 0.1, 0.3, 0.6, 1.0], abs=1e-12)
+    assert [float(row["count"]) for row in rows] == [1, 2, 3, 4, 5], "the periodic one ticks as before"
+
+
+def test_an_interval_that_is_none_is_refused(tmp_path):
+    done = told(tmp_path, "-0.5")
+    assert done.returncode == 1 and "told the interval -0.5 s" in done.stderr and "fmi3GetIntervalDecimal" in done.stderr, done.stderr
+
+
+def test_a_failure_before_the_first_step_is_told_as_it_is(tmp_path):
+    build_3(tmp_path, "nan", [("x", "output", "", ())], "", "v[1][0] = NAN;")
+    path = tmp_path / "nan.toml"
+    path.write_text('[time]\nstep_s = 0.1\nduration_s = 1.0\n[a]\nfmu = "nan.fmu"\n[recording]\nevery_steps = 1\n')
+    done = terraglue("run", path, "--quiet", "--out", tmp_path / "out")
+    assert done.returncode == 1 and "`x` is NaN" in done.stderr and "ended the program" not in done.stderr, done.stderr

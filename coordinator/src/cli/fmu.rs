@@ -54,9 +54,9 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
     };
     let mut row_between = between.as_mut().map(|file| move |text: &str| line(file, text));
     let intermediate = row_between.as_mut().map(|row| row as simulate::Line);
-    exit_guard::arm();
+    let armed = exit_guard::arm();
     let ran = simulate::run(&fmu, &settings, sink, &mut Tables { rows: &mut row, intermediate });
-    exit_guard::disarm();
+    drop(armed);
     drop(row_between);
     for file in [&mut file, &mut between].into_iter().flatten() {
         file.flush().map_err(|source| Error::File { path: "the table".into(), source })?;

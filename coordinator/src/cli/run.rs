@@ -113,14 +113,16 @@ pub fn build(scenario: &Scenario, options: &Options) -> Result<Testbed> {
 
 /// Steps a testbed to the end of its scenario and records it into `folder`.
 pub fn run_testbed(
-    mut testbed: Testbed,
+    testbed: Testbed,
     reloader: Option<&mut Reloader>,
     scenario: &Scenario,
     folder: &Path,
     csv: bool,
     progress: &mut dyn Observer,
 ) -> Result<Outcome> {
-    exit_guard::arm();
+    let armed = exit_guard::arm();
+    // an error below drops the testbed, and with it what modules do at their end, before the guard
+    let mut testbed = testbed;
     let mut recorder = Recorder::create(folder, scenario, RecorderOptions { csv })?;
     testbed.view(|view| recorder.started(view))?;
     write_exchange(folder, &testbed.explain())?;
@@ -144,7 +146,7 @@ pub fn run_testbed(
         None if cancelled => Status::Stopped,
         None => Status::Done,
     };
-    exit_guard::disarm();
+    drop(armed);
     let summary = recorder.finish(wall_s, cpu_s, error.as_ref(), status)?;
     Ok(Outcome { summary, error, parts_s, costs })
 }

@@ -7,18 +7,25 @@ use std::sync::atomic::{AtomicBool, Ordering};
 static ARMED: AtomicBool = AtomicBool::new(false);
 static REGISTERED: Once = Once::new();
 
-/// From here on until [`disarm`] an `exit` of the process is an error, with exit code 1.
-pub fn arm() {
+/// While this lives, an `exit` of the process is an error.
+#[derive(Debug)]
+pub struct Armed(());
+
+impl Drop for Armed {
+    fn drop(&mut self) {
+        ARMED.store(false, Ordering::SeqCst);
+    }
+}
+
+/// From here on until the answer is dropped an `exit` of the process is an error, with exit code 1.
+#[must_use]
+pub fn arm() -> Armed {
     ARMED.store(true, Ordering::SeqCst);
     REGISTERED.call_once(|| {
         // SAFETY: the function takes nothing and never unwinds. Without room for it the run is merely less guarded.
         let _ = unsafe { libc::atexit(at_exit) };
     });
-}
-
-/// The program may end.
-pub fn disarm() {
-    ARMED.store(false, Ordering::SeqCst);
+    Armed(())
 }
 
 extern "C" fn at_exit() {

@@ -220,6 +220,8 @@ pub struct Variable {
     pub alias: bool,
     /// When it ticks, of an input clock whose times are known beforehand.
     pub ticks: Option<Ticks>,
+    /// When it first ticks and how it goes on, of an input clock whose intervals the unit tells while it runs.
+    pub told: Option<Told>,
     /// Whether it is a clock that others make tick: an output clock, or a triggered input clock.
     pub triggered: bool,
     /// Clocks by number in calls with which it changes; empty: at any time.
@@ -228,6 +230,15 @@ pub struct Variable {
     pub resized: bool,
     /// Whether it can be read at intermediate times.
     pub intermediate: bool,
+}
+
+/// A clock whose intervals the unit tells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum Told {
+    /// It first ticks here, s; each tick tells the time to the next.
+    Each(f64),
+    /// Any event may tell the time to one tick.
+    Countdown,
 }
 
 /// Times of a periodic clock: shift, shift + interval, …

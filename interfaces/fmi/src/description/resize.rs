@@ -92,6 +92,7 @@ mod tests {
             line: 1,
             alias: false,
             ticks: None,
+            told: None,
             triggered: false,
             clocks: Vec::new(),
             resized: false,

@@ -179,6 +179,7 @@ fn variable(
         line,
         alias: false,
         ticks: if value_type == ValueType::Clock { ticks(inner, causality)? } else { None },
+        told: if value_type == ValueType::Clock { told(inner, causality)? } else { None },
         triggered: value_type == ValueType::Clock
             && (causality == Causality::Output
                 || causality == Causality::Input && inner.text("intervalVariability") == "triggered"),
@@ -194,6 +195,17 @@ fn clocks(element: &Element) -> Result<Vec<u32>> {
     let one =
         |word: &str| word.parse().map_err(|_| element.wrong("clocks", text, "a list of value references"));
     text.split_whitespace().map(one).collect()
+}
+
+/// How an input clock ticks whose intervals are known while the unit runs.
+fn told(element: &Element, causality: Causality) -> Result<Option<Told>> {
+    let shift = element.optional_number("shiftDecimal")?.unwrap_or(0.0);
+    let shift = if shift.is_finite() { shift.max(0.0) } else { 0.0 };
+    Ok(match (causality, element.text("intervalVariability")) {
+        (Causality::Input, "countdown") => Some(Told::Countdown),
+        (Causality::Input, "calculated" | "tunable" | "changing") => Some(Told::Each(shift)),
+        _ => None,
+    })
 }
 
 /// When a clock ticks; nothing where that is not known beforehand.

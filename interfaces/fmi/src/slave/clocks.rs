@@ -2,6 +2,7 @@
 //! clocks when the unit says so. Inputs that belong to clocks wait for a tick of one of them.
 
 use super::functions::Api;
+use super::intervals::ToldClock;
 use super::log::LogBook;
 use super::{Phase, Slave};
 use crate::description::{Causality, Ticks, Variable};
@@ -23,6 +24,8 @@ struct Clocked {
 pub struct Clocks {
     /// Input clocks that tick by themselves.
     periodic: Vec<(u32, Ticks)>,
+    /// Input clocks that tick when the unit told.
+    pub(super) told: Vec<ToldClock>,
     /// Input clocks that tick when the next step begins.
     due: Vec<u32>,
     /// Output clocks, and whether they ticked since that was last forgotten.
@@ -41,13 +44,6 @@ impl Clocks {
             }
             return Self::default();
         }
-        let lost = |v: &&Variable| v.causality == Causality::Input && v.ticks.is_none() && !v.triggered;
-        for v in clocks().filter(lost) {
-            log.note(&format!(
-                "`{}` is a clock whose interval the unit changes: it never ticks here",
-                v.name
-            ));
-        }
         let outputs: Vec<u32> =
             clocks().filter(|v| v.causality == Causality::Output).map(|v| v.reference).collect();
         let input = |v: &&Variable| v.causality == Causality::Input && !v.clocks.is_empty() && !v.alias;
@@ -55,6 +51,7 @@ impl Clocks {
             |v: &Variable| Clocked { reference: v.reference, clocks: v.clocks.clone(), value: None };
         Self {
             periodic: clocks().filter_map(|v| Some((v.reference, v.ticks?))).collect(),
+            told: clocks().filter_map(|v| Some(ToldClock::new(v.reference, v.told?))).collect(),
             due: Vec::new(),
             ticked: vec![false; outputs.len()],
             outputs,
@@ -62,16 +59,23 @@ impl Clocks {
         }
     }
 
-    /// The first periodic tick after t, or `end`, s.
+    /// The first tick after t that is known, or `end`, s.
     #[inline]
     pub fn next(&self, t: f64, end: f64) -> f64 {
-        self.periodic.iter().map(|(_, ticks)| ticks.after(t)).fold(end, f64::min)
+        let first = self.periodic.iter().map(|(_, ticks)| ticks.after(t)).fold(end, f64::min);
+        self.told.iter().map(ToldClock::next).fold(first, f64::min)
     }
 
-    /// Whether a periodic clock ticks at t.
+    /// Whether a clock ticks at t by itself.
     #[inline]
     pub fn tick_at(&self, t: f64) -> bool {
-        self.periodic.iter().any(|(_, ticks)| ticks.at(t))
+        self.periodic.iter().any(|(_, ticks)| ticks.at(t)) || self.told.iter().any(|clock| clock.is_due(t))
+    }
+
+    /// Whether a clock ticks at t because the unit told so just now.
+    #[inline]
+    pub fn told_at(&self, t: f64) -> bool {
+        self.told.iter().any(|clock| clock.is_due(t))
     }
 
     /// Whether a triggered clock waits for the next step.
@@ -118,12 +122,25 @@ impl Slave {
         }
     }
 
+    /// In event mode: activates the clocks that the unit told to tick at once.
+    pub(super) fn tick_told(&mut self, t: f64) -> Result {
+        self.tick_without_periodic(t, false)
+    }
+
+    fn tick_without_periodic(&mut self, t: f64, begins: bool) -> Result {
+        let periodic = std::mem::take(&mut self.clocks.periodic);
+        let ticked = self.tick(t, begins);
+        self.clocks.periodic = periodic;
+        ticked
+    }
+
     /// In event mode: activates the input clocks that tick at t, and those that were triggered where a step begins there.
     pub(super) fn tick(&self, t: f64, begins: bool) -> Result {
         let Api::Three(three) = self.api else { return Ok(()) };
         let periodic = self.clocks.periodic.iter().filter(|(_, ticks)| ticks.at(t)).map(|(vr, _)| *vr);
         let triggered = self.clocks.due.iter().copied().filter(|_| begins);
-        let due: Vec<u32> = periodic.chain(triggered).collect();
+        let told = self.clocks.told.iter().filter(|clock| clock.take(t));
+        let due: Vec<u32> = periodic.chain(triggered).chain(told.map(|clock| clock.reference)).collect();
         if due.is_empty() {
             return Ok(());
         }
@@ -141,11 +158,8 @@ impl Slave {
         let Api::Three(three) = self.api else { return Ok(false) };
         self.call("fmi3EnterEventMode", three.enter_event_mode, |f, c| unsafe { f(c) })?;
         // a periodic clock that ticks at t did so when the step before ended there
-        let due = std::mem::take(&mut self.clocks.periodic);
-        let ticked = self.tick(t, true);
-        self.clocks.periodic = due;
-        ticked?;
-        let end = self.settle_events()?;
+        self.tick_without_periodic(t, true)?;
+        let end = self.settle_events(t)?;
         self.call("fmi3EnterStepMode", three.enter_step_mode, |f, c| unsafe { f(c) })?;
         Ok(end)
     }

@@ -9,6 +9,7 @@ mod clocks;
 mod configure;
 mod functions;
 mod intermediate;
+mod intervals;
 mod log;
 mod state;
 mod step;
@@ -240,9 +241,10 @@ impl Slave {
             Api::Three(three) => {
                 self.call("fmi3ExitInitializationMode", three.exit_initialization, |f, c| unsafe { f(c) })?;
                 if self.event_mode {
+                    self.clocks.told.iter().for_each(|clock| clock.begin(self.start));
                     self.tick(self.start, true)?;
                     self.forget_triggers();
-                    self.settle_events()?;
+                    self.settle_events(self.start)?;
                     self.call("fmi3EnterStepMode", three.enter_step_mode, |f, c| unsafe { f(c) })?;
                 }
             }

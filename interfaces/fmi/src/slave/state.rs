@@ -9,21 +9,25 @@ const LARGEST_STATE: usize = 4 << 30;
 
 /// A saved state; belongs to the instance that made it and is given back to it.
 #[derive(Debug)]
-pub struct SlaveState(State);
+pub struct SlaveState {
+    handle: State,
+    /// When clocks tick whose intervals the unit tells.
+    schedule: Vec<f64>,
+}
 
 // SAFETY: a handle that only its instance looks into.
 unsafe impl Send for SlaveState {}
 
 impl Default for SlaveState {
     fn default() -> Self {
-        Self(std::ptr::null_mut())
+        Self { handle: std::ptr::null_mut(), schedule: Vec::new() }
     }
 }
 
 impl SlaveState {
     /// Whether nothing was saved yet.
     pub fn is_empty(&self) -> bool {
-        self.0.is_null()
+        self.handle.is_null()
     }
 }
 
@@ -35,7 +39,7 @@ impl Slave {
     /// Saves the state; the memory of an earlier one in `state` is used again.
     pub fn save(&self, state: &mut SlaveState) -> Result {
         self.can(self.description.capabilities.state, "to save its state")?;
-        let place = &raw mut state.0;
+        let place = &raw mut state.handle;
         // SAFETY: `state` is null or a state of this instance, here and below.
         match self.api {
             Api::Two(two) => self.call("fmi2GetFMUstate", two.get_state, |f, c| unsafe { f(c, place) })?,
@@ -43,9 +47,10 @@ impl Slave {
                 self.call("fmi3GetFMUState", three.get_state, |f, c| unsafe { f(c, place) })?;
             }
         }
-        if state.0.is_null() {
+        if state.handle.is_null() {
             return Err(self.lied("getFMUState", "saved nothing (its state is NULL)".into()));
         }
+        self.schedule(&mut state.schedule);
         Ok(())
     }
 
@@ -54,7 +59,8 @@ impl Slave {
         if state.is_empty() {
             return Err(Error::Refused("no state was saved".into()));
         }
-        let state = state.0;
+        self.reschedule(&state.schedule);
+        let state = state.handle;
         match self.api {
             Api::Two(two) => {
                 self.call_after_error("fmi2SetFMUstate", two.set_state, |f, c| unsafe { f(c, state) })
@@ -70,7 +76,7 @@ impl Slave {
         if state.is_empty() || self.is_dead() {
             return Ok(());
         }
-        let place = &raw mut state.0;
+        let place = &raw mut state.handle;
         let done = match self.api {
             Api::Two(two) => {
                 self.call_after_error("fmi2FreeFMUstate", two.free_state, |f, c| unsafe { f(c, place) })
@@ -79,14 +85,14 @@ impl Slave {
                 self.call_after_error("fmi3FreeFMUState", three.free_state, |f, c| unsafe { f(c, place) })
             }
         };
-        state.0 = std::ptr::null_mut();
+        state.handle = std::ptr::null_mut();
         done
     }
 
     /// A saved state as bytes.
     pub fn serialize(&self, state: &SlaveState) -> Result<Vec<u8>> {
         self.can(self.description.capabilities.serialize, "to serialise its state")?;
-        let state = state.0;
+        let (state, schedule) = (state.handle, &state.schedule);
         let mut size = 0_usize;
         let place = &raw mut size;
         match self.api {
@@ -113,13 +119,21 @@ impl Slave {
                 self.call("fmi3SerializeFMUState", three.serialize, |f, c| unsafe { f(c, state, out, size) })?
             }
         }
+        // what belongs to the state but lies with the master goes behind it
+        bytes.extend(schedule.iter().flat_map(|x| x.to_le_bytes()));
         Ok(bytes)
     }
 
     /// A state from bytes.
     pub fn deserialize(&self, bytes: &[u8], state: &mut SlaveState) -> Result {
         self.can(self.description.capabilities.serialize, "to serialise its state")?;
-        let (place, data, n) = (&raw mut state.0, bytes.as_ptr(), bytes.len());
+        let schedule = 8 * self.schedule_len();
+        let Some((bytes, schedule)) = bytes.len().checked_sub(schedule).map(|n| bytes.split_at(n)) else {
+            return Err(Error::Refused("the bytes of a state are too few for the clocks of the unit".into()));
+        };
+        let number = |b: &[u8]| b.try_into().map_or(f64::INFINITY, f64::from_le_bytes);
+        state.schedule = schedule.chunks_exact(8).map(number).collect();
+        let (place, data, n) = (&raw mut state.handle, bytes.as_ptr(), bytes.len());
         match self.api {
             Api::Two(two) => self.call("fmi2DeSerializeFMUstate", two.deserialize, |f, c| unsafe {
                 f(c, data.cast(), n, place)

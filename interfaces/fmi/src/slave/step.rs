@@ -147,7 +147,7 @@ impl Slave {
                 if at_stop {
                     self.tick(stop, false)?;
                 }
-                if self.settle_events()? {
+                if self.settle_events(if at_stop { stop } else { last })? {
                     return Ok(Stepped { reached: last, terminate: true, events });
                 }
                 self.call("fmi3EnterStepMode", three.enter_step_mode, |f, c| unsafe { f(c) })?;
@@ -170,8 +170,8 @@ impl Slave {
         }
     }
 
-    /// Updates discrete states until nothing changes; whether the unit asks for the end.
-    pub(super) fn settle_events(&mut self) -> Result<bool> {
+    /// Updates discrete states at t until nothing changes and no clock ticks; whether the unit asks for the end.
+    pub(super) fn settle_events(&mut self, t: f64) -> Result<bool> {
         const NAME: &str = "fmi3UpdateDiscreteStates";
         let Api::Three(three) = self.api else { return Ok(false) };
         for _ in 0..ROUNDS {
@@ -190,8 +190,15 @@ impl Slave {
                     &raw mut next,
                 )
             })?;
-            if terminate || !again {
-                return Ok(terminate);
+            if terminate {
+                return Ok(true);
+            }
+            if !again {
+                self.ask_intervals(t)?;
+                if !self.clocks.told_at(t) {
+                    return Ok(false);
+                }
+                self.tick_told(t)?;
             }
         }
         Err(self.lied(NAME, format!("asks for more than {ROUNDS} rounds at one time")))

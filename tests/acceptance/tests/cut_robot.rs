@@ -99,6 +99,57 @@ fn one_unchecked_newton_step_holds_the_elbow_for_ten_seconds() {
     }
 }
 
+/// A rod of the double pendulum as a robot of its own; `joint`: what hangs it up.
+fn rod(name: &str, joint: &str) -> String {
+    let text = format!(
+        "<robot name=\"{name}\">{joint}<link name=\"{name}\"><inertial><origin xyz=\"0 0 -0.5\"/><mass value=\"1.0\"/>\
+         <inertia ixx=\"0.0833333333333\" ixy=\"0\" ixz=\"0\" iyy=\"0.0833333333333\" iyz=\"0\" izz=\"0.002\"/>\
+         </inertial></link></robot>"
+    );
+    let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join(format!("rod-{name}.urdf"));
+    std::fs::write(&path, text).unwrap_or_else(|e| panic!("{}: {e}", path.display()));
+    format!("model = \"{}\"\nmotor = \"off\"\n", path.display())
+}
+
+/// The joint itself is glue here, half a metre from the centres of mass of both rods: the arm of its force has to turn
+/// with the rods as that of a joint does.
+#[test]
+fn rods_that_glue_joins_move_like_rods_on_a_joint() {
+    let shoulder = "<link name=\"world\"/><joint name=\"shoulder\" type=\"continuous\"><parent link=\"world\"/>\
+        <child link=\"upper\"/><axis xyz=\"0 1 0\"/></joint>";
+    // 1.5 rad about y takes the hanging rod from (0, 0, −1) here.
+    let (sin, cos) = (f64::sin(1.5), f64::cos(1.5));
+    let end = format!("{:?}, 0.0, {:?}", -sin, -cos);
+    let lower = rod("lower", "") + &format!("position_m = [{end}]\nplace_on_ground = false\n");
+    let glue = format!(
+        "[[glue]]\nside_1 = \"robot.upper\"\nside_2 = \"rod.lower\"\nat_m = [{end}]\ncomponents = [\"x\", \"y\", \"z\"]\n"
+    );
+    let pairs = [
+        ("robot.shoulder.angle", "robot.shoulder.angle"),
+        ("robot.lower.x", "rod.lower.x"),
+        ("robot.lower.z", "rod.lower.z"),
+    ];
+    for integrator in ["symplectic-euler", "generalized-alpha", "energy-momentum"] {
+        let rule = format!("integrator = \"{integrator}\"\n");
+        let upper = rod("upper", shoulder) + "joints = { shoulder = 1.5 }\n" + &rule;
+        // The elbow of the whole robot turns about an axis askew; here both turn about y.
+        let model =
+            std::fs::read_to_string(format!("{ROOT}/tests/models/double_pendulum.urdf")).expect("the model");
+        let path = std::path::Path::new(env!("CARGO_TARGET_TMPDIR")).join("straight_pendulum.urdf");
+        std::fs::write(&path, model.replace("0.6 0.8 0", "0 1 0")).expect("written");
+        let whole = format!(
+            "model = \"{}\"\nmotor = \"off\"\njoints = {{ shoulder = 1.5, elbow = -1.5 }}\n{rule}",
+            path.display()
+        );
+        let parts = [("robot", upper), ("rod", lower.clone() + &rule)];
+        let (whole, cut) = (text(0.005, -9.81, &[("robot", whole)], ""), text(0.005, -9.81, &parts, &glue));
+        let (worst, evaluations, gap) = compare(&whole, &cut, 200, &pairs);
+        println!("{integrator}: {worst:e} rad or m, {evaluations} evaluations, gap {gap:e} m");
+        assert!(worst <= 1e-8 && gap <= 1e-9, "{integrator}: {worst:e} rad or m, gap {gap:e} m");
+        assert!(evaluations <= 3.3, "{integrator}: {evaluations} evaluations");
+    }
+}
+
 fn hexapod(cut: &str) -> String {
     format!(
         "model = \"{ROOT}/models/hexapod.urdf\"\nposition_m = [0.0, 0.0, 0.5]\n\

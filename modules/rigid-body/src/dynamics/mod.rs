@@ -15,6 +15,7 @@ pub(crate) mod carried;
 mod closing;
 mod explicit;
 mod gyro;
+mod joint_gaps;
 pub(crate) mod joint_rows;
 pub(crate) mod kkt;
 mod midpoint;
@@ -36,13 +37,6 @@ use kkt::Kkt;
 use scheme::{Acceleration, Integrator};
 use terraglue_linear_solver::{Error as SolverError, Rows};
 
-/// Joints are closed to this at the end of every step, m and rad.
-const GAP_TOLERANCE: f64 = 1e-11;
-/// Most corrections per solve. Two or three are usual; each leaves about a share of the angle by which bodies turn in
-/// the step, and after an impact that is not small.
-const MAX_CORRECTIONS: usize = 60;
-/// Corrections go on as long as one leaves less than this share of the gap before it.
-const CLOSES: f64 = 0.9;
 /// Rounds in which all axes change branch at once; after them one at a time.
 const FREE_ROUNDS: usize = 8;
 /// Rounds one at a time before rigid motors are softened.
@@ -422,111 +416,6 @@ impl Dynamics {
             if let Some(parent) = joint.parent {
                 add(parent, self.rows[j].on_parent(free));
             }
-        }
-    }
-
-    /// Takes out what is left of the joints' gaps at the end of the step.
-    fn close_joints(&mut self) -> Result<(), Failure> {
-        let mut before = f64::INFINITY;
-        for _ in 0..MAX_CORRECTIONS {
-            self.find_places();
-            let open = self.gaps_into_correction().1;
-            if open <= GAP_TOLERANCE {
-                self.find_rates();
-                return Ok(());
-            }
-            // Not at all, or to rounding; a NaN ends it too.
-            if !(open < CLOSES * before) {
-                break;
-            }
-            before = open;
-            self.kkt.solver.substitute(&mut self.correction);
-            self.solution.iter_mut().zip(&self.correction).for_each(|(s, c)| *s += c);
-            if self.surely_closes() {
-                self.find_ends();
-                return Ok(());
-            }
-        }
-        self.find_ends();
-        self.check_gaps()
-    }
-
-    /// Whether what the correction leaves open is surely below the tolerance, so that it need not be measured: rows are
-    /// those of the start, which bodies turn by θ in the step, and the correction itself turns them a little more. Where it
-    /// moves bodies by up to m along each axis (m, rad), joints are left open by at most 2(θ + m)·2√3·m(1 + arm).
-    fn surely_closes(&self) -> bool {
-        let largest = |x: &[f64]| x.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-        let moved = 2.0 * self.h * largest(&self.correction[..6 * self.ends.len()]);
-        let turned = self.turns.iter().fold(0.0_f64, |m, t| m.max(t.norm_squared())).sqrt();
-        // A NaN is never sure.
-        !self.closes() && 4.0 * (turned + moved) * moved * (1.0 + self.longest_arm) <= GAP_TOLERANCE
-    }
-
-    /// Refuses a step that leaves a joint or a loop open.
-    fn check_gaps(&mut self) -> Result<(), Failure> {
-        match self.gaps_into_correction() {
-            (_, gap) if gap <= 1e3 * GAP_TOLERANCE => Ok(()),
-            (part, gap) => {
-                let joint = self.model.joints.get(part).map(|j| &j.name);
-                let closure = || self.model.closures.get(part - self.model.joints.len()).map(|c| &c.name);
-                let name = joint.or_else(closure).cloned().unwrap_or_default();
-                Err(Failure::Gap { joint: name, gap })
-            }
-        }
-    }
-
-    /// Right-hand side of a correction; the worst joint (connections beyond the tree after the joints) and its gap.
-    fn gaps_into_correction(&mut self) -> (usize, f64) {
-        let mut worst = (0, 0.0);
-        self.correction.fill(0.0);
-        let per_step = 1.0 / self.h;
-        for (j, joint) in self.model.joints.iter().enumerate().filter(|(j, _)| !self.broken[*j]) {
-            let row = &mut self.correction[self.kkt.joint_at[j]..][..6];
-            for (row, open) in row.iter_mut().zip(gap(joint, &self.ends)) {
-                *row = -open * per_step;
-                // A NaN is the worst and stays it.
-                if open.abs() > worst.1 || open.is_nan() {
-                    worst = (j, open.abs());
-                }
-            }
-        }
-        let (closure, open) = self.closures_into_correction();
-        if open > worst.1 || open.is_nan() {
-            worst = (self.model.joints.len() + closure, open);
-        }
-        worst
-    }
-
-    /// Positions and rates at the end of the step from `solution`.
-    fn find_ends(&mut self) {
-        self.find_places();
-        self.find_rates();
-    }
-
-    /// Positions at the end of the step.
-    fn find_places(&mut self) {
-        for b in 0..self.ends.len() {
-            let (start, at) = (&self.starts[b], self.kkt.body_at[b]);
-            let u = &self.solution[at..at + 6];
-            let (v, w) = (V3::new(u[0], u[1], u[2]), V3::new(u[3], u[4], u[5]));
-            let turn = self.h * (w + self.middle_rate[b] - self.free_rate[b]);
-            let mut q = cayley(&turn) * start.q;
-            q.renormalize_fast();
-            self.turns[b] = turn;
-            (self.ends[b].c, self.ends[b].q) = (start.c + self.h * v, q);
-        }
-    }
-
-    /// Rates at the end of the step, after its positions.
-    fn find_rates(&mut self) {
-        for b in 0..self.ends.len() {
-            let (start, at) = (&self.starts[b], self.kkt.body_at[b]);
-            let u = &self.solution[at..at + 6];
-            let (v, w, q) = (V3::new(u[0], u[1], u[2]), V3::new(u[3], u[4], u[5]), self.ends[b].q);
-            // The impulses change the angular momentum; the rate follows with the inertia of the new orientation.
-            let momentum = self.inertia[b] * (w - self.free_rate[b] + start.w);
-            let rate = q * (self.model.bodies[b].inverse_inertia * q.inverse_transform_vector(&momentum));
-            (self.ends[b].v, self.ends[b].w) = (v, rate);
         }
     }
 

@@ -100,3 +100,25 @@ def test_what_is_not_there_or_too_late_is_refused(space, tmp_path):
     event = '[[event]]\nat_s = 0.0\nset = { "s.n" = 2 }\n'
     done = scenario(space, tmp_path / "a.toml", event)
     assert done.returncode != 0 and "in the table of its unit" in " ".join(done.stderr.replace("│", " ").split()), done.stderr
+
+
+def test_arrays_are_fed_over_time_whole_or_by_elements(space, tmp_path):
+    tables = {
+        "whole.csv": "time,u\n0,0 1\n1,2 1\n",
+        "elements.csv": "time,u[2],u[1]\n0,1,0\n1,1,2\n",
+    }
+    x = [1.0, 2.0]
+    for k in range(8):
+        u = [2 * k / 8, 1.0]
+        x = [a + 0.125 * (b + a) for a, b in zip(x, u, strict=True)]
+    command = ("fmu", "run", space / "space.fmu", "--stop", "1", "--step", "0.125", "--start", "n=2", "--input")
+    for name, text in tables.items():
+        (tmp_path / name).write_text(text)
+        done = terraglue(*command, tmp_path / name)
+        assert done.returncode == 0, done.stderr
+        last = list(csv.DictReader(done.stdout.splitlines()))[-1]
+        assert [float(last[f"x[{k}]"]) for k in (1, 2)] == pytest.approx(x, rel=1e-14)
+    for text, says in (("time,u\n0,0 1 2\n", "not 2 numbers"), ("time,u[3]\n0,1\n", "no variable `u[3]`"), ("time,u\n0,nan 1\n", "not 2")):
+        (tmp_path / "wrong.csv").write_text(text)
+        done = terraglue(*command, tmp_path / "wrong.csv")
+        assert done.returncode == 1 and says in done.stderr, done.stderr

@@ -383,7 +383,8 @@ pub struct FmuRunArguments {
     /// Write the table here [default: standard output].
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
-    /// Inputs over time: a header with `time` and names, straight lines between the rows.
+    /// Inputs over time: a header with `time` and names, straight lines between the rows. Elements of arrays of Float64 may have
+    /// columns of their own (`u[2]`); whole arrays are written with spaces between their values.
     #[arg(long, value_name = "FILE")]
     pub input: Option<PathBuf>,
     /// Write what the unit shows at its inner steps here (FMI 3, intermediate update).

@@ -8,6 +8,7 @@ mod bodies;
 mod clocks;
 pub mod export;
 mod feet;
+mod inputs;
 mod map;
 mod rollback;
 mod settings;

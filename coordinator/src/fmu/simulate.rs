@@ -1,12 +1,15 @@
 //! One unit alone: from its start to its end in equal steps, its outputs as rows of a table.
 
+use super::inputs::{self, set_text};
 use super::map::element_name;
 use crate::scenario::did_you_mean;
 use std::sync::Arc;
 use terraglue_fmi::description::{Causality, Variable};
 use terraglue_fmi::slave::Sink;
 use terraglue_fmi::{Advance, Error, Fmu, ModelDescription, Result, Slave, SlaveOptions, SlaveState};
-use terraglue_subsystem::{ValueType, Values, ValuesMut};
+use terraglue_subsystem::{ValueType, ValuesMut};
+
+pub use super::inputs::{Row, Table};
 
 /// How a unit is run.
 pub struct Settings {
@@ -37,54 +40,6 @@ pub struct Tables<'a> {
     pub rows: Line<'a>,
     /// Outputs that the unit shows at intermediate times, of the steps that stand.
     pub intermediate: Option<Line<'a>>,
-}
-
-/// Inputs over time. Cells stay as they are written, because whole numbers of 64 bits do not fit into f64.
-#[derive(Clone, Debug, Default)]
-pub struct Table {
-    /// Names after `time`.
-    pub names: Vec<String>,
-    /// Rows, ascending in time.
-    pub rows: Vec<Row>,
-}
-
-/// Inputs at a time.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Row {
-    /// s.
-    pub time: f64,
-    /// A cell for each name.
-    pub cells: Vec<String>,
-    /// The same as numbers; NaN where they are none.
-    pub numbers: Vec<f64>,
-}
-
-impl Table {
-    /// The last row at or before t, or the first of all, and the row after it.
-    fn around(&self, t: f64) -> Option<(&Row, Option<&Row>)> {
-        let next = self.rows.partition_point(|r| r.time <= t);
-        match next.checked_sub(1) {
-            Some(k) => Some((&self.rows[k], self.rows.get(next))),
-            None => self.rows.first().map(|row| (row, None)),
-        }
-    }
-
-    /// A number at t by straight lines between the rows; the first and last row hold beyond.
-    fn number(&self, t: f64, column: usize) -> f64 {
-        match self.around(t) {
-            Some((a, Some(b))) => {
-                let s = (t - a.time) / (b.time - a.time);
-                a.numbers[column] + s * (b.numbers[column] - a.numbers[column])
-            }
-            Some((row, None)) => row.numbers[column],
-            None => 0.0,
-        }
-    }
-
-    /// The cell that holds at t.
-    fn cell(&self, t: f64, column: usize) -> &str {
-        self.around(t).map_or("0", |(row, _)| &row.cells[column])
-    }
 }
 
 /// Longest run, in steps.
@@ -122,7 +77,8 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         }
     }
     slave.enter_initialization(start, Some(stop), settings.tolerance.or(experiment.tolerance))?;
-    set_inputs(&mut slave, settings, start)?;
+    let inputs = inputs::find_all(&description, &settings.input)?;
+    inputs::set_all(&mut slave, &inputs, &settings.input, start)?;
     slave.exit_initialization()?;
     // with event mode a last column says how many events were handled since the row before
     let marked = |text: String, events: u32| match settings.event_mode {
@@ -144,7 +100,7 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         }
         let (t, end) = (start + k as f64 * step, start + (k + 1) as f64 * step);
         let at = |e: Error| named(e, t);
-        set_inputs(&mut slave, settings, t).map_err(at)?;
+        inputs::set_all(&mut slave, &inputs, &settings.input, t).map_err(at)?;
         slave.forget_ticks();
         let events;
         (ended, events) = halving(&mut slave, &mut state, (t, end), &mut tables.intermediate).map_err(at)?;
@@ -215,7 +171,11 @@ fn configure(slave: &mut Slave, start: &[(String, String)]) -> Result {
     slave.configure(&values)
 }
 
-fn find<'a>(description: &'a ModelDescription, name: &str) -> Result<&'a Variable> {
+/// A variable by its name.
+///
+/// # Errors
+/// The name, with the one that looks most like it.
+pub(super) fn find<'a>(description: &'a ModelDescription, name: &str) -> Result<&'a Variable> {
     let all = &description.variables;
     all.iter().find(|v| v.name == name).ok_or_else(|| {
         let hint = did_you_mean(name, all.iter().map(|v| v.name.as_str()));
@@ -312,69 +272,4 @@ fn read(slave: &Slave, v: &Variable) -> Result<Vec<String>> {
         }),
         ValueType::Clock => Ok(vec![u8::from(slave.ticks(v.reference)).to_string()]),
     }
-}
-
-/// Sets a variable from text; arrays take their elements separated by spaces.
-fn set_text(slave: &Slave, v: &Variable, text: &str) -> Result {
-    let wrong =
-        || Error::Refused(format!("`{}` = {text}: it takes {} values of another kind", v.name, v.len()));
-    let words: Vec<&str> = text.split_whitespace().collect();
-    macro_rules! parsed {
-        ($variant:ident, $t:ty) => {{
-            let values: Option<Vec<$t>> = words.iter().map(|w| w.parse().ok()).collect();
-            let values = values.filter(|x| x.len() == v.len()).ok_or_else(wrong)?;
-            slave.set(&[v.reference], Values::$variant(&values))
-        }};
-    }
-    match v.value_type {
-        ValueType::F64 => parsed!(F64, f64),
-        ValueType::F32 => parsed!(F32, f32),
-        ValueType::I8 => parsed!(I8, i8),
-        ValueType::I16 => parsed!(I16, i16),
-        ValueType::I32 => parsed!(I32, i32),
-        ValueType::I64 => parsed!(I64, i64),
-        ValueType::U8 => parsed!(U8, u8),
-        ValueType::U16 => parsed!(U16, u16),
-        ValueType::U32 => parsed!(U32, u32),
-        ValueType::U64 => parsed!(U64, u64),
-        ValueType::Enumeration => parsed!(Enumeration, i64),
-        ValueType::Bool => {
-            let value = match text {
-                "true" | "1" => true,
-                "false" | "0" => false,
-                _ => return Err(wrong()),
-            };
-            slave.set(&[v.reference], Values::Bool(&[value]))
-        }
-        ValueType::String => slave.set(&[v.reference], Values::String(&[text.to_owned()])),
-        ValueType::Binary | ValueType::Clock => Err(wrong()),
-    }
-}
-
-fn set_inputs(slave: &mut Slave, settings: &Settings, t: f64) -> Result {
-    for (column, name) in settings.input.names.iter().enumerate() {
-        let description = slave.description().clone();
-        let v = find(&description, name)?;
-        let number = |t| {
-            let x = settings.input.number(t, column);
-            let none = || Error::Refused(format!("`{name}`: the input is no number beside t = {t} s"));
-            if x.is_finite() { Ok(x) } else { Err(none()) }
-        };
-        if v.value_type == ValueType::Clock {
-            slave.can_trigger(v)?;
-            slave.trigger(v.reference, matches!(settings.input.cell(t, column), "1" | "true"));
-            continue;
-        }
-        if slave.waits_for_clock(v.reference) {
-            let (v, cell) = (v.clone(), settings.input.cell(t, column).to_owned());
-            slave.hold(v.reference, move |slave| set_text(slave, &v, &cell));
-            continue;
-        }
-        match v.value_type {
-            ValueType::F64 => slave.set_f64(&[v.reference], &[number(t)?])?,
-            ValueType::F32 => slave.set(&[v.reference], Values::F32(&[number(t)? as f32]))?,
-            _ => set_text(slave, v, settings.input.cell(t, column))?,
-        }
-    }
-    Ok(())
 }

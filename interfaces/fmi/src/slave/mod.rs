@@ -288,6 +288,7 @@ impl Slave {
         }
         self.phase = Phase::Instantiated;
         self.description = self.fmu.description().clone();
+        self.clocks = Clocks::new(&self.description.variables, self.event_mode, &self.log);
         self.health.set(Health::Good);
         Ok(())
     }

@@ -53,8 +53,15 @@ int fmi3UpdateDiscreteStates(Unit *u, bool *again, bool *end, bool *nominals, bo
     if (u->hit) { u->v[HITS] += 1; u->v[KEPT] = u->v[IN]; u->hit = false; }
     if (u->asked) { u->v[EVENTS] += 1; u->asked = false; }
     return 0; }
+int fmi3GetFMUState(Unit *u, void **s) { if (!*s) *s = malloc(sizeof *u); memcpy(*s, u, sizeof *u); return 0; }
+int fmi3SetFMUState(Unit *u, void *s) { memcpy(u, s, sizeof *u); return 0; }
+int fmi3FreeFMUState(Unit *u, void **s) { free(*s); *s = 0; return 0; }
 int fmi3DoStep(Unit *u, double t, double h, bool g, bool *e, bool *d, bool *early, double *last) {
     *e = *d = *early = false;
+#ifdef SHORT
+    *last = t;
+    if (h > 0.11) return 2;
+#endif
     if (!(h > 1e-9)) return 3;
     u->t = t + h;
     if (u->events && t < 0.62 - 1e-9 && t + h > 0.62 + 1e-9) { u->t = 0.62; u->asked = *e = *early = true; }
@@ -67,9 +74,9 @@ def clocked(tmp_path_factory):
     return made(tmp_path_factory.mktemp("clocked"))
 
 
-def made(folder, more="", interval="0.13"):
+def made(folder, more="", interval="0.13", options=()):
     (folder / "m.c").write_text(CODE.replace("%INTERVAL%", interval))
-    subprocess.run(["cc", "-shared", "-fPIC", "-w", "m.c", "-o", "m.so"], cwd=folder, check=True, capture_output=True)
+    subprocess.run(["cc", "-shared", "-fPIC", "-w", *options, "m.c", "-o", "m.so"], cwd=folder, check=True, capture_output=True)
     names = ("x", "sample", "count", "events_seen", "hits", "kept")
     variables = "".join(f'<Float64 name="{n}" valueReference="{k + 1}" causality="output"/>' for k, n in enumerate(names))
     variables += '<Float64 name="in" valueReference="7" causality="input" variability="discrete" clocks="10" start="0"/>'
@@ -81,7 +88,7 @@ def made(folder, more="", interval="0.13"):
         archive.writestr(
             "modelDescription.xml",
             '<?xml version="1.0"?><fmiModelDescription fmiVersion="3.0" modelName="m" instantiationToken="g">'
-            '<CoSimulation modelIdentifier="m" hasEventMode="true" canHandleVariableCommunicationStepSize="true" '
+            '<CoSimulation modelIdentifier="m" hasEventMode="true" canHandleVariableCommunicationStepSize="true" canGetAndSetFMUState="true" '
             'mightReturnEarlyFromDoStep="true"/><ModelVariables><Float64 name="time" valueReference="0" '
             f'causality="independent" variability="continuous"/>{variables}<Clock name="c" valueReference="9" '
             'causality="input" intervalVariability="constant" intervalDecimal="0.25"/></ModelVariables>'
@@ -187,8 +194,8 @@ TOLD = (
 )
 
 
-def told(tmp_path, interval="0.13"):
-    unit = made(tmp_path, TOLD, interval)
+def told(tmp_path, interval="0.13", options=()):
+    unit = made(tmp_path, TOLD, interval, options)
     return terraglue("fmu", "run", unit, "--stop", "1", "--step", "0.25", "--event-mode", "on", "--output", "x,down,grown_at,count")
 
 
@@ -200,6 +207,16 @@ def test_clocks_tick_when_the_unit_told(tmp_path):
     assert [float(row["down"]) for row in rows] == [0, 0, 0, 2, 2]
     assert [float(row["grown_at"]) for row in rows] == pytest.approx([0, 0.1, 0.3, 0.6, 1.0], abs=1e-12)
     assert [float(row["count"]) for row in rows] == [1, 2, 3, 4, 5], "the periodic one ticks as before"
+
+
+def test_what_the_unit_told_goes_back_with_its_state(tmp_path):
+    # steps over 0.11 s are discarded, also behind a tick: the step is halved from the saved state, in which that tick is to come
+    done = told(tmp_path, options=["-DSHORT"])
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader(done.stdout.splitlines()))
+    assert [float(row["down"]) for row in rows] == [0, 0, 0, 2, 2]
+    assert [float(row["grown_at"]) for row in rows] == pytest.approx([0, 0.1, 0.3, 0.6, 1.0], abs=1e-12)
+    assert [float(row["count"]) for row in rows] == [1, 2, 3, 4, 5]
 
 
 def test_an_interval_that_is_none_is_refused(tmp_path):

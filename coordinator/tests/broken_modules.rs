@@ -85,6 +85,15 @@ fn every_broken_module_is_caught_by_the_test_meant_for_it() {
 }
 
 #[test]
+fn a_library_that_flushes_denormal_numbers_is_one_finding() {
+    let into = tempfile::tempdir().expect("folder");
+    let switches = ["AT_LOAD", "FLUSHES", "NAN_ANSWER"].map(str::to_owned);
+    let report =
+        checked(&compiled(into.path(), "soil", &switches), &["host-loading", "steps", "host-floating-point"]);
+    assert_eq!(report.broken(), ["host-loading"], "{}", report.text());
+}
+
+#[test]
 fn their_twins_without_the_mistake_pass() {
     let into = tempfile::tempdir().expect("folder");
     let mut sources: Vec<String> = defects().into_iter().map(|d| d.source).collect();

@@ -16,7 +16,9 @@ const fn test(name: &'static str, promise: &'static str, run: fn(&Lab) -> Verdic
 
 /// The tests of this area.
 pub fn tests() -> Vec<Test> {
+    let loading = "loading leaves rounding, denormal numbers and traps as they were";
     vec![
+        Test { after: &["loads"], ..test("host-loading", loading, floating_point_loading) },
         test("host-floating-point", "rounding, denormal numbers and traps stay as they were", floating_point),
         test("host-signals", "no signal handler is set", |lab| {
             untouched(lab, "signal handlers", |p| p.signals.clone())
@@ -55,6 +57,21 @@ fn untouched(lab: &Lab, what: &str, look: fn(&Process) -> String) -> Verdict {
     then("a run of 60 steps")?;
     drop(instance);
     then("free")
+}
+
+/// Alone, since after it every answer can be another: a library built with -ffast-math is one finding.
+fn floating_point_loading(lab: &Lab) -> Verdict {
+    lab.needs_a_library("it cannot touch that of the host, nothing is lost")?;
+    let before = Process::now().floating_point;
+    lab.own_module()?;
+    let now = Process::now().floating_point;
+    if now == before {
+        return Ok(());
+    }
+    let got = format!("the floating-point mode changed from {before} to {now}");
+    let expected =
+        "no change; libraries that are linked with -ffast-math or -Ofast flush denormal numbers to 0";
+    Err(Stop::fail("loading", "the process of the host", got, expected))
 }
 
 /// On this thread, in which the library is loaded and called.

@@ -35,7 +35,7 @@ pub fn tests() -> Vec<Test> {
             "steps",
             Quick,
             &[],
-            &["instantiates"],
+            &["instantiates", "host-loading"],
             "a run of a tenth of a second answers every call",
             steps,
         ),

@@ -50,6 +50,9 @@ __attribute__((unused)) static void *sleeper(void *unused) { for (;;) sleep(1000
 __attribute__((unused)) static void on_signal(int unused) { (void)unused; }
 static void disturb(void) {
     if (BROKEN(ROUNDING)) fesetround(FE_UPWARD);
+#ifdef __SSE2__
+    if (BROKEN(FLUSHES)) __builtin_ia32_ldmxcsr(__builtin_ia32_stmxcsr() | 0x8040); /* as crtfastmath.o does */
+#endif
     if (BROKEN(SIGNALS)) signal(SIGUSR1, on_signal);
     if (BROKEN(LOCALE)) setlocale(LC_ALL, "C.UTF-8");
     if (BROKEN(DIRECTORY) && chdir("/")) return;
@@ -149,11 +152,13 @@ static double law(const soil *s, double z, double *slope) {
     if (BROKEN(PUSHES_DOWN) && z > 0.006) return -s->k * z;
     if (BROKEN(GIVES_WAY) && z > 0.01) return 0.2 * s->k * z;
     if (BROKEN(OVERFLOWS)) return in ? s->k * z * (1.0 + 1e-300 * exp(8000.0 * z)) : 0.0;
+    if (BROKEN(ENDS_AT_DEPTH) && z > 0.6) return NAN;
     return in ? s->k * z : 0.0;
 }
 static double depth_at(const soil *s, double force, double *slope) {
     double k = BROKEN(WRONG_INVERSE) ? 0.5 * s->k : s->k;
     *slope = 1.0 / k;
+    if (BROKEN(ENDS_AT_FORCE) && force > 1e5) return NAN;
     return force / k;
 }
 /* The law at X for a normal force (given, or NAN: that of the spring): fills the answer of a port. */

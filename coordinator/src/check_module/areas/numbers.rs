@@ -154,7 +154,7 @@ fn locale(lab: &Lab) -> Verdict {
 
 fn extremes(lab: &Lab) -> Verdict {
     let feet = [Foot::sphere(-0.1, 0.0), Foot::plate(0.1, 0.0)];
-    for depth in [1e-12, 1e-6, 1e-2, 0.2] {
+    for depth in [1e-12, 1e-6, 1e-2, 0.2, 1.0] {
         let mut bench = SoilBench::new(lab, &feet)?;
         for (sideways, v) in [(0.0, depth / 1e-3), (5.0, 0.0), (-5.0, -2.0 * depth / 1e-3)] {
             let velocities = [[sideways, 0.0, -v], [0.0, sideways, -v]];
@@ -169,7 +169,7 @@ fn extremes(lab: &Lab) -> Verdict {
     for _ in 0..10 {
         bench.go(&still, 1e-3)?;
     }
-    for size in [0.0, 1e-12, 1.0, 1e4] {
+    for size in [0.0, 1e-12, 1.0, 1e4, 1e5, 1e6, 1e7] {
         bench.meet(&still, 1e-3)?;
         let (x, v) = bench.motion_of(&still, 1e-3);
         let t = bench.packed_normal(size);
@@ -182,7 +182,7 @@ fn extremes(lab: &Lab) -> Verdict {
 fn extremes_robot(lab: &Lab) -> Verdict {
     let mut bench = BodyBench::new(lab.instance()?);
     bench.place_port()?;
-    for size in [0.0, 1e-12, 1.0, 1e4, -1e4] {
+    for size in [0.0, 1e-12, 1.0, 1e4, -1e4, 1e7, -1e7] {
         for h in [1e-6, 1e-3, 1e-2] {
             bench.try_force(&[size, 0.1 * size, -0.3 * size], h)?;
         }

@@ -7,7 +7,10 @@ use super::{Exit, show};
 use std::path::{Path, PathBuf};
 use terraglue::Result;
 use terraglue::check_module::{LastCheck, last_check};
-use terraglue::host::{AvailableModule, Library, SearchPath, available_modules, described, listed_modules};
+use terraglue::host::{
+    AvailableModule, Library, ListedModule, LoadError, LoadedModule, SearchPath, available_modules,
+    described, is_path, listed_file, listed_modules,
+};
 use terraglue::scenario::{InputError, Scenario, allowed_values};
 use terraglue::subsystem::{Causality, Effect, Schema, ValueType, Variable};
 use terraglue::testbed::Options;
@@ -79,8 +82,11 @@ pub fn modules(name: Option<&str>, module_path: &[PathBuf], json: bool, asked: b
     if let (Some(name), false, false) = (name, json, asked) {
         return shown(name, &search, module_path);
     }
-    let mut found = available_modules(&search);
-    found.retain(|m| name.is_none_or(|n| n == m.name));
+    let mut found = match name {
+        Some(path) if is_path(path) => vec![available(listed_file(Path::new(path)).map_err(wrong)?)],
+        _ => available_modules(&search),
+    };
+    found.retain(|m| name.is_none_or(|n| n == m.name || is_path(n)));
     if let (Some(name), true) = (name, found.is_empty()) {
         return Err(unknown(name, &search));
     }
@@ -106,6 +112,16 @@ pub fn modules(name: Option<&str>, module_path: &[PathBuf], json: bool, asked: b
     Ok(Exit::Done)
 }
 
+fn wrong(error: LoadError) -> terraglue::Error {
+    InputError::plain(error.to_string(), None).into()
+}
+
+/// A file with its parameters; it is loaded.
+fn available(file: ListedModule) -> AvailableModule {
+    let schema = LoadedModule::load(&file.path).map(|m| m.schema().clone());
+    AvailableModule { name: file.name, path: file.path, schema }
+}
+
 /// Says every folder that was searched, and the nearest name.
 fn unknown(name: &str, search: &SearchPath) -> terraglue::Error {
     let unknown = Library::new().find(name, search, Path::new("."));
@@ -116,13 +132,17 @@ fn unknown(name: &str, search: &SearchPath) -> terraglue::Error {
 /// What the section of one module says, in this process; what only its code knows, its parameters, is asked for in
 /// another one.
 fn shown(name: &str, search: &SearchPath, module_path: &[PathBuf]) -> Result<Exit> {
-    let found = listed_modules(search);
-    let Some(m) = found.iter().find(|m| m.name == name && m.hidden_by.is_none()) else {
-        return Err(unknown(name, search));
+    let m = match is_path(name) {
+        true => listed_file(Path::new(name)).map_err(wrong)?,
+        false => {
+            let mut found = listed_modules(search).into_iter();
+            let found = found.find(|m| m.name == name && m.hidden_by.is_none());
+            found.ok_or_else(|| unknown(name, search))?
+        }
     };
     let d = m.description.clone().unwrap_or_default();
     let kind = if d.kind.is_empty() { "kind not told".into() } else { d.kind.clone() };
-    outln!("{name} ({kind})\n{}", m.path.display());
+    outln!("{} ({kind})\n{}", m.name, m.path.display());
     let facts = [("version", &d.version), ("ABI", &d.abi), ("licence", &d.license), ("authors", &d.authors)];
     for (what, text) in facts.iter().filter(|(_, text)| !text.is_empty()) {
         outln!("{what}: {text}");

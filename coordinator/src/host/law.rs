@@ -26,7 +26,7 @@ pub fn locate(
     folder: &Path,
 ) -> std::result::Result<std::path::PathBuf, super::LoadError> {
     if super::search::is_path(name) {
-        return Ok(folder.join(name));
+        return Ok(super::search::below(folder, name));
     }
     search.locate(name).ok_or_else(|| super::LoadError::Unknown {
         name: name.into(),

@@ -7,7 +7,7 @@ use super::error::LoadError;
 use super::isolation::{self, Isolation, What};
 use super::law::{self, LawHost};
 use super::python::{self, PythonFile};
-use super::search::{SearchPath, file_name, is_path, python_name};
+use super::search::{SearchPath, below, file_name, is_path, module_name, python_name};
 use super::{HostServices, Instance};
 use libloading::os::unix::{Library as Handle, RTLD_LOCAL, RTLD_NOW, Symbol};
 use std::error::Error as _;
@@ -290,7 +290,7 @@ impl Library {
         folder: &Path,
     ) -> std::result::Result<LoadedModule, LoadError> {
         if is_path(name) {
-            return LoadedModule::load(&folder.join(name));
+            return LoadedModule::load(&below(folder, name));
         }
         if let Some(module) = self.builtins.iter().find(|m| m.schema.name == name) {
             return Ok(module.clone());
@@ -361,6 +361,25 @@ pub fn listed_modules(search: &SearchPath) -> Vec<ListedModule> {
         hidden_by: first(name).filter(|f| f != path),
     };
     every.iter().map(listed).collect()
+}
+
+/// The file of a module by its path, wherever it lies. No code of it runs.
+///
+/// # Errors
+/// There is no such file.
+pub fn listed_file(path: &Path) -> std::result::Result<ListedModule, LoadError> {
+    if !path.is_file() {
+        return Err(LoadError::MissingFile { path: path.to_path_buf() });
+    }
+    let file = path.file_name().and_then(|f| f.to_str()).unwrap_or_default();
+    let stem = path.file_stem().and_then(|s| s.to_str()).unwrap_or_default().replace('_', "-");
+    Ok(ListedModule {
+        name: module_name(file).unwrap_or(stem),
+        path: path.to_path_buf(),
+        description: described(path),
+        refused: inspect(path).err(),
+        hidden_by: None,
+    })
 }
 
 /// What a file says about itself, without running it.

@@ -30,11 +30,12 @@ pub use error::LoadError;
 pub use instance::{Instance, Progress, Reply};
 pub use isolation::Isolation;
 pub use library::{
-    AvailableModule, Library, ListedModule, LoadedModule, available_modules, described, listed_modules,
+    AvailableModule, Library, ListedModule, LoadedModule, available_modules, described, listed_file,
+    listed_modules,
 };
 pub use probe::{TableFacts, probe_odd_calls, table_of};
 pub use process::{Process, adopt_locale, has_locale, heap_in_use};
 pub(crate) use python::{describes_module, interpreter, is_python};
-pub use search::SearchPath;
+pub use search::{SearchPath, is_path};
 pub use services::{HostServices, LogSink, Partings, instance_seed};
 pub use workers::Workers;

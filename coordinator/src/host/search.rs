@@ -98,14 +98,19 @@ pub(super) fn python_name(module: &str) -> String {
 }
 
 /// `libsoil_bekker_plugin.so` → `soil-bekker`; None: not the file of a module.
-fn module_name(file: &str) -> Option<String> {
+pub(super) fn module_name(file: &str) -> Option<String> {
     let stem = file.strip_prefix(std::env::consts::DLL_PREFIX)?.strip_suffix(std::env::consts::DLL_SUFFIX)?;
     Some(stem.strip_suffix("_plugin")?.replace('_', "-"))
 }
 
 /// Whether the value of `module` is a path.
-pub(super) fn is_path(module: &str) -> bool {
+pub fn is_path(module: &str) -> bool {
     module.contains('/') || module.ends_with(std::env::consts::DLL_SUFFIX) || module.ends_with(".py")
+}
+
+/// A path below a folder without steps on the spot: ./cut.so, not ././cut.so.
+pub(super) fn below(folder: &Path, path: &str) -> PathBuf {
+    folder.join(path).components().collect()
 }
 
 fn user_folder() -> Option<PathBuf> {

@@ -5,6 +5,7 @@ use super::finding::{Stop, Verdict};
 use super::rig::Flat;
 use super::{Level, catalogue::Area};
 use crate::host::{HostServices, Instance, LoadError, LoadedModule, SearchPath, law};
+use crate::scenario::{check_value, did_you_mean};
 use crate::terrain::SplitMix64;
 use serde_json::{Map, Value};
 use std::path::PathBuf;
@@ -170,6 +171,24 @@ impl Lab {
         lab.instance_on(module, ground)
     }
 
+    /// What is wrong with the parameters that were given (`--set`, or the file beside the module); None: nothing, or the
+    /// module cannot be loaded. A law takes its own numbers and those of the soil around it.
+    pub fn wrong_set(&self) -> Option<String> {
+        if self.sets.is_empty() {
+            return None;
+        }
+        let own = self.own_module().ok()?;
+        let stepped = self.module().ok()?;
+        let law = own.schema().kind == Kind::Law;
+        self.sets.iter().find_map(|(key, value)| {
+            let number = key.strip_prefix("law.parameters.").unwrap_or(key);
+            match law && own.schema().parameters.iter().any(|p| p.name == number) {
+                true => wrong_value(own.schema(), number, value),
+                false => wrong_value(stepped.schema(), key, value),
+            }
+        })
+    }
+
     /// Whether the module needs a path that nobody gave; then hardly anything can be tried.
     pub fn missing_path(&self, schema: &Schema) -> Option<String> {
         let given = |name: &str| self.sets.iter().any(|(key, _)| key == name);
@@ -213,6 +232,31 @@ fn not_usable(call: &str, error: &LoadError) -> Stop {
     Stop::fail(call, "parameters of the check", error.to_string(), "success")
 }
 
+/// What is wrong with a value for the parameter of this dotted name.
+fn wrong_value(schema: &Schema, key: &str, value: &Value) -> Option<String> {
+    let all = &schema.parameters;
+    let below = |head: &str| key.strip_prefix(head).is_some_and(|rest| rest.starts_with('.'));
+    let wildcard = |name: &str| name.strip_suffix('*').is_some_and(|head| key.starts_with(head));
+    if let Some(p) = all.iter().find(|p| p.name == key) {
+        let wrong = check_value(p, None, value).err()?;
+        let help = wrong.help.map_or_else(String::new, |help| format!("; {help}"));
+        return Some(format!("`{key}` of `{}`: {}{help}", schema.name, wrong.message));
+    }
+    if all.iter().any(|p| wildcard(&p.name) || below(&p.name)) {
+        return None;
+    }
+    match value {
+        Value::Object(table) if all.iter().any(|p| p.name.starts_with(&format!("{key}."))) => {
+            table.iter().find_map(|(name, value)| wrong_value(schema, &format!("{key}.{name}"), value))
+        }
+        _ => {
+            let names = did_you_mean(key, all.iter().map(|p| p.name.as_str()));
+            let names = names.map_or_else(String::new, |names| format!("; {names}"));
+            Some(format!("`{}` has no parameter `{key}`{names}", schema.name))
+        }
+    }
+}
+
 /// A value inside the range of a parameter.
 fn middle(p: &Parameter) -> Option<Value> {
     let number = match (p.min, p.max) {
@@ -244,5 +288,30 @@ fn insert(map: &mut Map<String, Value>, name: &str, value: Value) {
                 insert(below, rest, value);
             }
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn given_parameters_are_held_against_the_schema() {
+        let mu = Parameter::number("mu", "", 0.7, "Coulomb coefficient").positive();
+        let own = Parameter::of("law.parameters.*", ParameterType::Text, "a name of your own").optional();
+        let schema = Schema {
+            name: "springs".into(),
+            kind: Kind::Soil,
+            help: "springs".into(),
+            parameters: vec![mu, own],
+        };
+        let said = |key: &str, value: serde_json::Value| wrong_value(&schema, key, &value);
+        assert_eq!(said("mu", 0.5.into()), None);
+        assert_eq!(said("law.parameters.k", 3.into()), None);
+        assert_eq!(said("law", serde_json::json!({ "parameters": {} })), None);
+        let range = said("mu", (-1).into()).expect("out of range");
+        assert!(range.contains("`mu` of `springs`") && range.contains("-1"), "{range}");
+        let name = said("muu", 1.into()).expect("unknown");
+        assert!(name.contains("no parameter `muu`") && name.contains("did you mean `mu`"), "{name}");
     }
 }

@@ -33,6 +33,7 @@ pub use report::{Report, Row};
 pub use sanitize::{Fault, Sanitized, sanitize, sources_of};
 pub use supervisor::{Options, Told, check};
 
+use crate::host::{Library, SearchPath, is_path};
 use std::path::Path;
 
 /// Runs one test in this process.
@@ -53,15 +54,16 @@ fn unknown(name: &str, tests: &[Test]) -> String {
     format!("there is no test `{name}`; the nearest is `{near}`")
 }
 
-/// The module file that a path means: the file itself, or the only module in a folder.
+/// The module file that a path means: the file itself, the only module in a folder, or the module of that name on the
+/// search path.
 ///
 /// # Errors
-/// No file there, or not exactly one module.
+/// No file there, not exactly one module in the folder, no module of that name: every place tried and the nearest name.
 pub fn module_file(path: &Path) -> Result<std::path::PathBuf, String> {
     if !path.is_dir() {
         return match path.is_file() {
             true => Ok(path.to_owned()),
-            false => Err(format!("there is no module file {}", path.display())),
+            false => named(path),
         };
     }
     let is_module = |p: &Path| {
@@ -82,5 +84,16 @@ pub fn module_file(path: &Path) -> Result<std::path::PathBuf, String> {
             path.display(),
             std::env::consts::DLL_SUFFIX
         )),
+    }
+}
+
+fn named(path: &Path) -> Result<std::path::PathBuf, String> {
+    let (search, name) = (SearchPath::standard(&[], Path::new(".")), path.to_string_lossy());
+    if let Some(file) = search.locate(&name).filter(|_| !is_path(&name)) {
+        return Ok(file);
+    }
+    match Library::new().find(&name, &search, Path::new(".")) {
+        Ok(_) => Err(format!("`{name}` is part of the program, not a file that can be checked")),
+        Err(e) => Err(e.to_string()),
     }
 }

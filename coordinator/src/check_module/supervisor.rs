@@ -57,12 +57,15 @@ pub struct Told {
     pub outcome: Outcome,
     /// Kind of the module, as far as it could be loaded.
     pub kind: Option<Kind>,
+    /// What is wrong with the parameters that were given, once the module has said what it takes.
+    #[serde(default)]
+    pub wrong_set: Option<String>,
 }
 
 /// Puts a module to the test.
 ///
 /// # Errors
-/// A test of this name does not exist, the file beside the module is wrong, or a process cannot be started.
+/// A test of this name does not exist, a given parameter is none of the module's or out of its range, the file beside the module is wrong, or a process cannot be started.
 pub fn check(module: &Path, options: &Options) -> Result<Report, String> {
     let beside = CheckFile::beside(module)?;
     let names = options.only.iter().chain(beside.off.iter().map(|(name, _)| name));
@@ -78,6 +81,10 @@ pub fn check(module: &Path, options: &Options) -> Result<Report, String> {
     // Which tests are for it is known only when it has been loaded, and that may end a process.
     let first = &catalogue()[0];
     let kind = bench.alone(first, &mut report)?;
+    let told = std::fs::read_to_string(bench.file(first, "json")).unwrap_or_default();
+    if let Some(wrong) = serde_json::from_str::<Told>(&told).ok().and_then(|told| told.wrong_set) {
+        return Err(wrong);
+    }
     let mut waiting: Vec<&Test> = catalogue().iter().skip(1).filter(|t| wanted(t, kind, options)).collect();
     if !options.only.is_empty() && !options.only.iter().any(|n| n == first.name) {
         report.rows.clear();

@@ -42,7 +42,7 @@ pub enum Command {
     CheckModule(CheckModuleArguments),
     /// List the modules that are found, without running them; with a name, show its parameters.
     Modules {
-        /// Show this module with its parameters.
+        /// Show this module with its parameters: its name, or the path of its file.
         name: Option<String>,
         /// Search this folder first; may be repeated.
         #[arg(long, value_name = "DIR")]
@@ -192,7 +192,7 @@ A module is exported inside a small scenario: [time], [world], and [robot], [uni
 /// What `check-module` takes.
 #[derive(Args, Debug, Clone)]
 pub struct CheckModuleArguments {
-    /// File of the module (lib…_plugin.so), or a folder that holds one.
+    /// File of the module (lib…_plugin.so, ….py), a folder that holds one, or a name that `terraglue modules` lists.
     #[arg(required_unless_present = "list")]
     pub path: Option<PathBuf>,
     /// How much is tried: quick, standard or thorough.
@@ -215,9 +215,9 @@ pub struct CheckModuleArguments {
     pub junit: Option<PathBuf>,
     /// Processes at a time [default: one per core].
     #[arg(long, value_name = "N")]
-    pub jobs: Option<usize>,
+    pub jobs: Option<std::num::NonZeroUsize>,
     /// Time that a test may take, s.
-    #[arg(long, value_name = "S", default_value_t = 30.0)]
+    #[arg(long, value_name = "S", default_value_t = 30.0, value_parser = super::check_module::seconds)]
     pub time_limit: f64,
     /// Run in this process, for a debugger.
     #[arg(long)]

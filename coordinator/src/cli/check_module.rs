@@ -28,6 +28,10 @@ pub fn check_module(arguments: &CheckModuleArguments) -> Result<Exit> {
     if arguments.in_process {
         return in_process(arguments, &module);
     }
+    for file in [&arguments.json, &arguments.junit].into_iter().flatten() {
+        let opened = std::fs::OpenOptions::new().append(true).create(true).open(file);
+        opened.map_err(|e| wrong(format!("{} cannot be written: {e}", file.display())))?;
+    }
     let report = check(&module, &options(arguments)?).map_err(wrong)?;
     if arguments.only.is_empty() {
         remember(&module, &report);
@@ -50,7 +54,7 @@ fn options(arguments: &CheckModuleArguments) -> Result<Options> {
         only: arguments.only.clone(),
         sets: arguments.sets.clone(),
         limit_s: arguments.time_limit,
-        jobs: arguments.jobs.unwrap_or(options.jobs),
+        jobs: arguments.jobs.map_or(options.jobs, usize::from),
         ..options
     })
 }
@@ -101,7 +105,9 @@ fn in_process(arguments: &CheckModuleArguments, module: &Path) -> Result<Exit> {
             None => outln!("{name}: {} {}", outcome.word(), outcome.detail()),
             Some(file) => {
                 let kind = (name == catalogue()[0].name).then(|| lab.kind()).flatten();
-                write(file, &serde_json::to_string(&Told { outcome, kind }).unwrap_or_default())?;
+                let wrong_set = kind.and_then(|_| lab.wrong_set());
+                let told = Told { outcome, kind, wrong_set };
+                write(file, &serde_json::to_string(&told).unwrap_or_default())?;
             }
         }
     }
@@ -116,4 +122,10 @@ fn write(file: &Path, text: &str) -> Result {
 /// The levels as words of the command line.
 pub fn level(word: &str) -> std::result::Result<Level, String> {
     Level::ALL.into_iter().find(|l| l.word() == word).ok_or_else(|| "quick, standard or thorough".into())
+}
+
+/// A time limit of the command line, s.
+pub fn seconds(word: &str) -> std::result::Result<f64, String> {
+    let above_zero = word.parse::<f64>().ok().filter(|s| s.is_finite() && *s > 0.0);
+    above_zero.ok_or_else(|| "a number of seconds above 0".into())
 }

@@ -4,6 +4,7 @@
 //! words between at signs are replaced.
 
 mod place;
+mod reserved;
 mod template;
 
 pub use place::Place;
@@ -32,6 +33,14 @@ pub enum ScaffoldError {
     /// A module of the program has the name.
     #[error("`{0}` is a module of Terraglue itself; choose another name")]
     Taken(String),
+    /// The language has taken the name.
+    #[error("`{name}` is the name of {what}, which it would hide; choose another one, e.g. my-{name}")]
+    Reserved {
+        /// The name.
+        name: String,
+        /// Whose name it is.
+        what: &'static str,
+    },
     /// This kind cannot be written in this language.
     #[error("a {kind} in {language} is not offered; languages: {offered}")]
     Language {
@@ -72,6 +81,9 @@ pub fn scaffold(
     place: &Place,
 ) -> Result<Scaffold, ScaffoldError> {
     check_name(name)?;
+    if let Some(what) = reserved::taken(name, language) {
+        return Err(ScaffoldError::Reserved { name: name.into(), what });
+    }
     template::fill(kind, language, name, place)
 }
 

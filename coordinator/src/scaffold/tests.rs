@@ -61,3 +61,24 @@ fn rust_needs_the_crates_and_nothing_is_overwritten() {
     made.write(&folder.path().join("a")).expect("written");
     assert!(folder.path().join("a/terraglue.h").is_file());
 }
+
+#[test]
+fn names_that_the_language_has_taken() {
+    for (name, language) in [
+        ("terraglue", Language::Python),
+        ("terraglue-soil", Language::Python),
+        ("math", Language::Python),
+        ("py-compile", Language::Python),
+        ("class", Language::Python),
+        ("test", Language::Rust),
+        ("proc-macro", Language::Rust),
+    ] {
+        let refused = scaffold(Kind::Soil, language, name, &place());
+        assert!(
+            matches!(&refused, Err(e @ ScaffoldError::Reserved { .. }) if e.to_string().contains("my-")),
+            "{name}"
+        );
+    }
+    assert!(scaffold(Kind::Soil, Language::C, "math", &place()).is_ok());
+    assert!(scaffold(Kind::Soil, Language::Python, "my-math", &place()).is_ok());
+}

@@ -118,6 +118,39 @@ pub fn replaced_laws(
 
 const STIFFNESS: &str = "elastic_stiffness_pa_m";
 
+/// Names of one's own in `[SOIL.law.parameters]` that no text of the law uses, or that stand for a number of the soil.
+pub fn law_parameters(schema: &Schema, spec: &SubsystemSpec, source: &Source) -> Vec<String> {
+    let Some(law) = spec.parameters.get("law").and_then(|law| law.as_object()) else { return Vec::new() };
+    let own = law.get("parameters").and_then(|own| own.as_object());
+    let texts: Vec<&str> = ["pressure", "shear"].iter().filter_map(|k| law.get(*k)?.as_str()).collect();
+    if texts.is_empty() {
+        return Vec::new();
+    }
+    let uses = |text: &str, name: &str| {
+        text.split(|c: char| !c.is_alphanumeric() && c != '_').any(|word| word == name)
+    };
+    let warn = |name: &str, why: String| {
+        line_of(&source.error_at_value(&[&spec.name, "law", "parameters", name], why, None))
+    };
+    let said = |name: &String| {
+        // The exponents of a unit may name a pure number: "820e3 N/m^(n+2)".
+        let units = own.into_iter().flatten().filter(|(other, _)| *other != name);
+        let mut all = texts.iter().copied().chain(units.filter_map(|(_, value)| value.as_str()));
+        if !all.any(|text| uses(text, name)) {
+            return Some(warn(name, format!("`{name}` has no effect: no text of the law uses it")));
+        }
+        let hides = schema.parameters.iter().any(|p| p.name == *name);
+        hides.then(|| {
+            let soil = &spec.name;
+            warn(
+                name,
+                format!("`{name}` hides the `{name}` of `[{soil}]`: the law takes the number given here"),
+            )
+        })
+    };
+    own.into_iter().flat_map(|own| own.keys()).filter_map(said).collect()
+}
+
 /// An error in one line: place and message.
 pub(super) fn line_of(error: &InputError) -> String {
     let (file, text) = (error.source_code.name(), error.source_code.inner());

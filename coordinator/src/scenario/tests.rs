@@ -379,3 +379,18 @@ fn the_json_schema_knows_every_key() {
         }
     }
 }
+
+#[test]
+fn names_of_a_law_that_are_not_used_or_hide_the_soils_are_said() {
+    let said = |own: &str| {
+        let law = format!("[soil.law]\npressure = \"k*z^n\"\nparameters = {{ {own} }}\n");
+        let s = parse(&format!("{GOOD}\n{law}")).expect("parses");
+        let schema = Schema { parameters: vec![Parameter::number("n", "", 1.0, "exponent")], ..schema() };
+        advice::law_parameters(&schema, &s.subsystems[1], &s.source)
+    };
+    assert_eq!(said("k = \"1e5 N/m^(q+2)\", q = \"1\""), Vec::<String>::new());
+    let two = said("k = \"1e5 N/m^(n+2)\", n = \"2\", unused = \"3 kg\"");
+    assert_eq!(two.len(), 2, "{two:?}");
+    assert_holds(&two[0], &["scenarios/walk.toml:", "`n` hides the `n` of `[soil]`"]);
+    assert_holds(&two[1], &["scenarios/walk.toml:", "`unused` has no effect"]);
+}

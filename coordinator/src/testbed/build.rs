@@ -180,6 +180,8 @@ fn instantiate(
         let gravity = services.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
         let replaced = scenario::advice::replaced_laws(scenario, spec, &config, gravity);
         replaced.iter().for_each(|advice| log::warn!("{advice}"));
+        let advice = scenario::advice::law_parameters(module.schema(), spec, &scenario.source);
+        advice.iter().for_each(|advice| log::warn!("{advice}"));
         let config = with_law(config, &search, scenario, spec)?;
         instances.push(make(scenario, spec, module, config, services)?);
     }

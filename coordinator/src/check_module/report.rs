@@ -83,7 +83,8 @@ impl Report {
 
     pub(super) fn sort(&mut self) {
         let place = |name: &str| catalogue().iter().position(|t| t.name == name);
-        self.rows.sort_by_key(|r| place(r.test));
+        let area = |title: &str| catalogue().iter().position(|t| t.area.title() == title);
+        self.rows.sort_by_key(|r| (area(r.area), place(r.test)));
         let sets: String = self.sets.iter().map(|(k, v)| format!(" --set {k}={v}")).collect();
         let (program, module) = (self.program.display(), self.module.display());
         let (level, seed) = (self.level, self.seed);

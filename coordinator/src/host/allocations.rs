@@ -8,6 +8,9 @@ use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
 static COUNT: AtomicUsize = AtomicUsize::new(0);
+/// Addresses of `operator new` and `operator new[]`; 0: not seen.
+static NEW: AtomicUsize = AtomicUsize::new(0);
+static NEW_ARRAY: AtomicUsize = AtomicUsize::new(0);
 
 fn note() {
     COUNT.fetch_add(1, Ordering::Relaxed);
@@ -43,15 +46,46 @@ unsafe extern "C" fn aligned_alloc(align: usize, size: usize) -> *mut c_void {
     unsafe { libc::aligned_alloc(align, size) }
 }
 
-/// What is counted. `operator new` of C++ takes its memory from malloc, and `operator delete` gives it back to free.
+/// `operator new` of the process, so that its `operator delete` fits: a sanitizer brings its own of both. Where none can be
+/// seen, malloc: that is where the one of the system takes its memory from.
+unsafe extern "C-unwind" fn operator_new(size: usize) -> *mut c_void {
+    note();
+    match NEW.load(Ordering::Relaxed) {
+        // SAFETY: passed on as it came.
+        0 => unsafe { libc::malloc(size) },
+        new => {
+            // SAFETY: the address of a function of this signature, found by its name.
+            let new: unsafe extern "C-unwind" fn(usize) -> *mut c_void = unsafe { std::mem::transmute(new) };
+            // SAFETY: passed on as it came.
+            unsafe { new(size) }
+        }
+    }
+}
+
+/// As [`operator_new`], of arrays.
+unsafe extern "C-unwind" fn operator_new_array(size: usize) -> *mut c_void {
+    note();
+    match NEW_ARRAY.load(Ordering::Relaxed) {
+        // SAFETY: passed on as it came.
+        0 => unsafe { libc::malloc(size) },
+        new => {
+            // SAFETY: the address of a function of this signature, found by its name.
+            let new: unsafe extern "C-unwind" fn(usize) -> *mut c_void = unsafe { std::mem::transmute(new) };
+            // SAFETY: passed on as it came.
+            unsafe { new(size) }
+        }
+    }
+}
+
+/// What is counted.
 const COUNTED: [(&str, *const c_void); 7] = [
     ("malloc", malloc as *const c_void),
     ("calloc", calloc as *const c_void),
     ("realloc", realloc as *const c_void),
     ("posix_memalign", posix_memalign as *const c_void),
     ("aligned_alloc", aligned_alloc as *const c_void),
-    ("_Znwm", malloc as *const c_void),
-    ("_Znam", malloc as *const c_void),
+    ("_Znwm", operator_new as *const c_void),
+    ("_Znam", operator_new_array as *const c_void),
 ];
 
 /// Counts the allocations of one library, for as long as the process lives.
@@ -61,6 +95,11 @@ impl AllocationCounter {
     /// Of a library that is loaded; None: it cannot be found in memory, or its format is another one.
     pub fn new(library: &Path) -> Option<Self> {
         let bytes = std::fs::read(library).ok()?;
+        for (place, name) in [(&NEW, c"_Znwm"), (&NEW_ARRAY, c"_Znam")] {
+            // SAFETY: looks a name up among what the whole process sees.
+            let found = unsafe { libc::dlsym(libc::RTLD_DEFAULT, name.as_ptr()) };
+            place.store(found as usize, Ordering::Relaxed);
+        }
         let base = base_address(&library.canonicalize().ok()?)?;
         for (name, offset) in imported_slots(&bytes)? {
             if let Some((_, function)) = COUNTED.iter().find(|(counted, _)| *counted == name) {

@@ -14,11 +14,15 @@ const fn test(name: &'static str, promise: &'static str, run: fn(&Lab) -> Verdic
     Test { name, area: Area::Library, level: Level::Quick, kinds: &[], after, promise, run }
 }
 
-/// The tests of this area.
+/// What is looked at before an instance takes its first step: what a changed mode does to its numbers is the same finding.
+pub fn at_loading() -> Vec<Test> {
+    let promise = "loading leaves rounding, denormal numbers and traps as they were";
+    vec![Test { after: &["loads"], ..test("host-loading", promise, floating_point_loading) }]
+}
+
+/// The other tests of this area.
 pub fn tests() -> Vec<Test> {
-    let loading = "loading leaves rounding, denormal numbers and traps as they were";
     vec![
-        Test { after: &["loads"], ..test("host-loading", loading, floating_point_loading) },
         test("host-floating-point", "rounding, denormal numbers and traps stay as they were", floating_point),
         test("host-signals", "no signal handler is set", |lab| {
             untouched(lab, "signal handlers", |p| p.signals.clone())

@@ -19,8 +19,10 @@ use super::catalogue::Test;
 pub use host_untouched::OUTPUT;
 
 /// The lists of all areas, in the order in which they build on each other.
-pub const ALL: [fn() -> Vec<Test>; 14] = [
+pub const ALL: [fn() -> Vec<Test>; 15] = [
     library::tests,
+    host_untouched::at_loading,
+    law::tests,
     life_cycle::tests,
     call_order::tests,
     host_untouched::tests,
@@ -33,5 +35,4 @@ pub const ALL: [fn() -> Vec<Test>; 14] = [
     physics_robot::tests,
     physics_controller::tests,
     resources::tests,
-    law::tests,
 ];

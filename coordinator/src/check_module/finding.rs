@@ -35,6 +35,9 @@ pub enum Stop {
 /// Result of a test.
 pub type Verdict<T = ()> = Result<T, Stop>;
 
+/// What is expected where a call is refused.
+pub const ANSWER: &str = "an answer";
+
 impl Stop {
     /// A broken promise.
     pub fn fail(
@@ -56,9 +59,9 @@ impl From<crate::Error> for Stop {
     fn from(error: crate::Error) -> Self {
         match error {
             crate::Error::Module { function, time_s, message, .. } => {
-                Self::fail(function, format!("t = {time_s} s"), message, "an answer")
+                Self::fail(function, format!("t = {time_s} s"), message, ANSWER)
             }
-            other => Self::fail("a step", "the scripted run", other.to_string(), "an answer"),
+            other => Self::fail("a step", "the scripted run", other.to_string(), ANSWER),
         }
     }
 }

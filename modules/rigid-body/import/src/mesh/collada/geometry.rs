@@ -41,7 +41,10 @@ fn faces<'a>(part: Node<'a, 'a>, ids: &Ids<'a>, out: &mut Vec<Triangle>) -> Resu
                 lists.push(these.collect::<Result<Vec<_>, _>>()?);
             }
             "ph" => {
-                return Err(wrong(p, "polygons with holes are not read; let the mesh editor write triangles"));
+                return Err(wrong(
+                    p,
+                    "polygons with holes are not read; let the mesh editor write triangles",
+                ));
             }
             _ => {}
         }

@@ -8,11 +8,11 @@
 use super::Dynamics;
 use crate::math::{V3, cayley_shift};
 
-/// An impulse on a point of a body.
+/// An impulse on a point of a body, or below one: a ball is pressed at its lowest point, which stays below its centre.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Carried {
     pub body: usize,
-    /// From the centre of mass to the point at the start of the step, m, world axes.
+    /// From the centre of mass to the point that turns with the body at the start of the step, m, world axes.
     pub arm: V3,
     /// Impulse, N s, world axes.
     pub force: V3,

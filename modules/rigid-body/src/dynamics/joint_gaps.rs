@@ -6,30 +6,46 @@ use crate::math::{V3, cayley};
 
 /// Joints are closed to this at the end of every step, m and rad.
 const GAP_TOLERANCE: f64 = 1e-11;
+/// Above this a step is refused, m and rad; below, what does not shrink is rounding.
+const GAP_REFUSED: f64 = 1e3 * GAP_TOLERANCE;
 /// Most corrections per solve. Two or three are usual; each leaves about a share of the angle by which bodies turn in
-/// the step, and after an impact that is not small.
+/// the step, times the square root of what they weigh in each other's terms, and after an impact that is not small.
 const MAX_CORRECTIONS: usize = 60;
-/// Corrections go on as long as one leaves less than this share of the gap before it.
+/// Corrections go on plainly as long as one leaves less than this share of the gap before it …
 const CLOSES: f64 = 0.9;
+/// … and so many do not suffice; then earlier ones help (see [`super::anderson`]).
+const PLAIN: usize = 8;
+/// With their help the gap need not shrink every time, but once in so many.
+const PATIENCE: usize = 6;
+
 impl Dynamics {
     /// Takes out what is left of the joints' gaps at the end of the step.
     pub(super) fn close_joints(&mut self) -> Result<(), Failure> {
-        let mut before = f64::INFINITY;
-        for _ in 0..MAX_CORRECTIONS {
+        let (mut least, mut since, mut mixed) = (f64::INFINITY, 0, None);
+        for round in 0..MAX_CORRECTIONS {
             self.find_places();
             let open = self.gaps_into_correction().1;
             if open <= GAP_TOLERANCE {
                 self.find_rates();
                 return Ok(());
             }
-            // Not at all, or to rounding; a NaN ends it too.
-            if !(open < CLOSES * before) {
+            let shrinks = open < CLOSES * least;
+            since = if shrinks { 0 } else { since + 1 };
+            // To rounding, or not at all; a NaN ends it too.
+            if !shrinks && (open <= GAP_REFUSED || open.is_nan() || since > PATIENCE) {
                 break;
             }
-            before = open;
+            if mixed.is_none() && (!shrinks || round >= PLAIN) {
+                mixed = Some(0);
+            }
+            least = least.min(open);
             self.kkt.solver.substitute(&mut self.correction);
+            if let Some(rounds) = &mut mixed {
+                self.anderson.mix(*rounds, &self.solution, &mut self.correction);
+                *rounds += 1;
+            }
             self.solution.iter_mut().zip(&self.correction).for_each(|(s, c)| *s += c);
-            if self.surely_closes() {
+            if mixed.is_none() && self.surely_closes() {
                 self.find_ends();
                 return Ok(());
             }
@@ -52,7 +68,7 @@ impl Dynamics {
     /// Refuses a step that leaves a joint or a loop open.
     pub(super) fn check_gaps(&mut self) -> Result<(), Failure> {
         match self.gaps_into_correction() {
-            (_, gap) if gap <= 1e3 * GAP_TOLERANCE => Ok(()),
+            (_, gap) if gap <= GAP_REFUSED => Ok(()),
             (part, gap) => {
                 let joint = self.model.joints.get(part).map(|j| &j.name);
                 let closure = || self.model.closures.get(part - self.model.joints.len()).map(|c| &c.name);

@@ -23,6 +23,7 @@ mod reaction;
 pub(crate) mod scheme;
 mod second_order;
 pub(crate) mod sensitivity;
+mod swinging;
 
 use crate::contact::bodies::{BodyContacts, Unsolved};
 use crate::drive::{Axis, MOST_YIELDING, Mode, Span, YIELDING};
@@ -49,8 +50,14 @@ pub(crate) enum Failure {
     Solver(#[from] SolverError),
     #[error("motors and joint limits found no consistent state in {rounds} rounds; a shorter step may help")]
     Branches { rounds: usize },
-    #[error("joint `{joint}` stays open by {gap:e} (m or rad); a shorter step may help")]
+    #[error("joint `{joint}` stays open by {gap:.1e} (m or rad); a shorter step may help")]
     Gap { joint: String, gap: f64 },
+    #[error(
+        "joint `{joint}` stays open by {gap:.1e} (m or rad): its forces of up to {force:.2e} N swing link `{link}` of \
+         {mass} kg faster than steps of {h} s follow; take steps below {longest:.1e} s, or integrator = \
+         \"energy-momentum\" where nothing hits"
+    )]
+    Swinging { joint: String, gap: f64, force: f64, link: String, mass: f64, h: f64, longest: f64 },
     #[error(
         "the step of second order did not converge in {corrections} corrections; shorten the step, or take \
          integrator = \"symplectic-euler\" where something hits or sticks"
@@ -376,7 +383,7 @@ impl Dynamics {
                 Err(open) => {
                     self.solve_branch()?;
                     if !self.change_branches(one_at_a_time) {
-                        return Err(open);
+                        return Err(self.explained(open));
                     }
                 }
                 Ok(()) if !self.change_branches(one_at_a_time) => return Ok(()),

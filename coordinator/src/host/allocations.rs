@@ -46,11 +46,14 @@ unsafe extern "C" fn aligned_alloc(align: usize, size: usize) -> *mut c_void {
     unsafe { libc::aligned_alloc(align, size) }
 }
 
-/// `operator new` of the process, so that its `operator delete` fits: a sanitizer brings its own of both. Where none can be
-/// seen, malloc: that is where the one of the system takes its memory from.
-unsafe extern "C-unwind" fn operator_new(size: usize) -> *mut c_void {
+/// To `operator new` of the process, so that its `operator delete` fits: a sanitizer brings its own of both. Where none can be
+/// seen, to malloc: that is where the one of the system takes its memory from.
+///
+/// # Safety
+/// `place` holds 0 or the address of a function of this signature.
+unsafe fn passed_on(place: &AtomicUsize, size: usize) -> *mut c_void {
     note();
-    match NEW.load(Ordering::Relaxed) {
+    match place.load(Ordering::Relaxed) {
         // SAFETY: passed on as it came.
         0 => unsafe { libc::malloc(size) },
         new => {
@@ -62,19 +65,14 @@ unsafe extern "C-unwind" fn operator_new(size: usize) -> *mut c_void {
     }
 }
 
-/// As [`operator_new`], of arrays.
+unsafe extern "C-unwind" fn operator_new(size: usize) -> *mut c_void {
+    // SAFETY: the place of this function.
+    unsafe { passed_on(&NEW, size) }
+}
+
 unsafe extern "C-unwind" fn operator_new_array(size: usize) -> *mut c_void {
-    note();
-    match NEW_ARRAY.load(Ordering::Relaxed) {
-        // SAFETY: passed on as it came.
-        0 => unsafe { libc::malloc(size) },
-        new => {
-            // SAFETY: the address of a function of this signature, found by its name.
-            let new: unsafe extern "C-unwind" fn(usize) -> *mut c_void = unsafe { std::mem::transmute(new) };
-            // SAFETY: passed on as it came.
-            unsafe { new(size) }
-        }
-    }
+    // SAFETY: the place of this function.
+    unsafe { passed_on(&NEW_ARRAY, size) }
 }
 
 /// What is counted.

@@ -107,7 +107,7 @@ fn names_that_lead_elsewhere_are_refused() {
         ("../evil", "leads out"),
         ("resources/../../evil", "leads out"),
         ("resources/..\\..\\evil", "leads out"),
-        ("/tmp/evil", "absolute"),
+        ("/evil", "absolute"),
         ("C:/evil", "absolute"),
         ("\\\\host\\evil", "absolute"),
     ] {

@@ -11,6 +11,8 @@ const STEPS: usize = 60;
 /// Relative change of a slip at which Newton has arrived: the error left is of the order of its square, that of the
 /// derivatives, which were asked for before it, of its own.
 const CONVERGED: f64 = 1e-10;
+/// Change of a slip, relative to the displacement, that is nothing but the rounding of the stress.
+const ROUNDING: f64 = 4.0 * f64::EPSILON;
 /// A displacement that grows by less, relative, has not grown.
 const STANDS: f64 = 1e-9;
 
@@ -89,7 +91,8 @@ impl Slip {
         }
         let change = (next - self.step).abs();
         self.step = next;
-        if change <= CONVERGED * next { Stand::Arrived } else { Stand::UnderWay }
+        let nothing = CONVERGED * next + ROUNDING * self.length;
+        if change <= nothing { Stand::Arrived } else { Stand::UnderWay }
     }
 }
 

@@ -1,7 +1,7 @@
 //! Wrench and stiffness of a patch at a motion of its foot.
 
 use crate::bound::Bound;
-use crate::patch::{Facing, Patches};
+use crate::patch::{Facing, Local, Patches};
 use terraglue_soil_law::ShearResponse;
 
 /// A 6 × 6 stiffness, rows: components of the wrench on the soil, columns: components of X.
@@ -89,9 +89,7 @@ impl Patches {
         x: &[f64; 6],
         mut visit: impl FnMut(usize, f64, f64, &ShearResponse),
     ) {
-        if let [law] = &self.laws[self.ports[p].laws.clone()]
-            && (law.curve.is_batched() || law.shear.is_batched())
-        {
+        if let Some(law) = self.batched(p) {
             return self.each_answered(p, x, law, visit);
         }
         let n = &self.nodes;
@@ -99,6 +97,15 @@ impl Patches {
             let shear = &self.law(k).shear;
             visit(k, pressure, slope, &shear.respond_at(&n.shear[k], n.mobilised[k], pressure, moved));
         });
+    }
+
+    /// The law of patch `p`, if it is a single one that answers many nodes better than one after the other.
+    #[inline]
+    pub fn batched(&self, p: usize) -> Option<&Local> {
+        match &self.laws[self.ports[p].laws.clone()] {
+            [law] if law.curve.is_batched() || law.shear.is_batched() => Some(law),
+            _ => None,
+        }
     }
 
     /// Calls `visit(node, pressure, slope, displacement along the underside)` for the nodes with pressure or tension.

@@ -5,7 +5,7 @@ use crate::contacts::Touch;
 use crate::ground::{Covered, Ground};
 use crate::patch::{Patch, PatchNodes, Patches, key};
 use crate::wheel;
-use terraglue_soil_law::{KeptNodes, ShearState};
+use terraglue_soil_law::{KeptNodes, ShearResponse, ShearState};
 use terraglue_subsystem::{MOST_LAW_STATE, Port};
 
 /// Sums over the run and what the last commit found. Part of the committed state.
@@ -43,6 +43,8 @@ pub struct Lists {
     carried: Vec<f64>,
     /// Nodes that were loaded before and are not any more.
     pub released: Vec<[i32; 2]>,
+    /// Pressures and shear of the nodes of a patch, asked of its law together; empty: it is asked node by node.
+    answers: Vec<(f64, ShearResponse)>,
 }
 
 impl Lists {
@@ -55,6 +57,7 @@ impl Lists {
         self.slid_in.reserve(count);
         self.slid.reserve(count);
         self.released.reserve(count);
+        self.answers.reserve(count);
     }
 }
 
@@ -72,6 +75,7 @@ struct Pressed<'a> {
     depth: f64,
     pressure: f64,
     slip: [f64; 2],
+    shear: ShearResponse,
     kept: &'a Kept,
 }
 
@@ -101,10 +105,11 @@ impl Scene<'_> {
         lists.slid.clear();
         lists.covered.clear();
         ground.contacts.begin();
-        for (patch, port) in self.patches.ports.iter().zip(ports) {
+        for (p, (patch, port)) in self.patches.ports.iter().zip(ports).enumerate() {
             book.port_work -= port.range().map(|k| t[k] * x[k]).sum::<f64>();
             let (x, wrench) = (patch.unpack(x), patch.unpack(t));
             let mut touch = Touch::default();
+            self.ask_together(p, &x, &mut lists.answers);
             let loaded = self.commit_patch(patch, port, &x, ground, lists, book, &mut touch);
             if loaded > 0 && ground.contacts.any() {
                 touch.under(patch, &wrench, &x, self.h);
@@ -116,6 +121,18 @@ impl Scene<'_> {
             book.loaded += loaded;
         }
         release(ground, lists, book.stamp);
+    }
+
+    /// Pressures and shear of all nodes of patch `p` where its law answers many nodes at a time.
+    fn ask_together(&self, p: usize, x: &[f64; 6], answers: &mut Vec<(f64, ShearResponse)>) {
+        answers.clear();
+        if let Some(law) = self.patches.batched(p) {
+            let nodes = &self.patches.ports[p].nodes;
+            answers.resize(nodes.len(), (0.0, ShearResponse::default()));
+            self.patches.each_answered(p, x, law, |k, pressure, _, shear| {
+                answers[k - nodes.start] = (pressure, *shear);
+            });
+        }
     }
 
     #[allow(clippy::too_many_arguments)]
@@ -138,9 +155,11 @@ impl Scene<'_> {
             let depth = n.depth[k] - rise;
             let curve = &self.patches.law(k).curve;
             let mut kept = Kept::default();
-            let pressure = match curve.keeper() {
-                Some(_) => self.patches.or_clinging(k, depth, (self.kept(k, depth, &mut kept), 0.0)).0,
-                None => self.patches.pressure(k, depth).0,
+            let asked = lists.answers.get(k - patch.nodes.start).copied();
+            let pressure = match (curve.keeper(), asked) {
+                (Some(_), _) => self.patches.or_clinging(k, depth, (self.kept(k, depth, &mut kept), 0.0)).0,
+                (None, Some((pressure, _))) => pressure,
+                (None, None) => self.patches.pressure(k, depth).0,
             };
             let [i, j] = n.index[k];
             let deep = (depth + relief(n, k)) / patch.slope;
@@ -154,7 +173,9 @@ impl Scene<'_> {
                 let slid_in = fresh && patch.wheel.is_none() && depth - n.permanent[k] > -2.0 * rise;
                 lists.slid_in.push(slid_in);
                 touch.add(n, k, pressure, deep);
-                let node = Pressed { k, depth, pressure, slip: facing.slide(moved), kept: &kept };
+                let slip = facing.slide(moved);
+                let shear = asked.map_or_else(|| self.sheared(k, pressure, slip), |(_, shear)| shear);
+                let node = Pressed { k, depth, pressure, slip, shear, kept: &kept };
                 let (slid, surface) = self.press(patch, &node, ground, book);
                 let carried = if patch.wheel.is_some() { moved } else { slid };
                 lists.slid.push(in_world(port, carried));
@@ -210,15 +231,20 @@ impl Scene<'_> {
         p[0]
     }
 
+    /// Shear of node k alone.
+    fn sheared(&self, k: usize, pressure: f64, slip: [f64; 2]) -> ShearResponse {
+        let n = &self.patches.nodes;
+        self.patches.law(k).shear.respond_kept(&n.shear[k], n.kept(k), n.mobilised[k], pressure, slip)
+    }
+
     /// One loaded node: plastic depth, slip, heat and elastic energy. Returns how far the foot slipped over the soil
     /// along n, t1 and t2, and the height of the unloaded surface, m.
     fn press(&self, patch: &Patch, node: &Pressed, ground: &mut Ground, book: &mut Book) -> ([f64; 3], f64) {
-        let Pressed { k, depth, pressure, slip, .. } = *node;
+        let Pressed { k, depth, pressure, slip, shear, .. } = *node;
         let (n, law) = (&self.patches.nodes, self.patches.law(k));
         let curve = &law.curve;
         let area = n.area[k];
         let inclined = area * n.facing[k].stretch;
-        let shear = law.shear.respond_kept(&n.shear[k], n.kept(k), n.mobilised[k], pressure, slip);
         let kept = curve.keeper().is_some();
         let squeezed = match kept {
             true => 0.5 * pressure * (depth - node.kept.permanent).max(0.0),

@@ -155,35 +155,37 @@ fn own(context: &Context, out: &mut Vec<Figure>) -> Outcome {
             out.push(Figure::new(format!("plugins.time.{name}"), took, Limit::AtMost(60.0), what));
         }
     }
-    if context.timing {
+    if context.timing { times(context, out) } else { Ok(()) }
+}
+
+/// How long whoever writes a module waits for its check.
+fn times(context: &Context, out: &mut Vec<Figure>) -> Outcome {
+    let deps = context.program.with_file_name("deps");
+    let own = |name: &str| deps.join(format!("lib{}_plugin.so", name.replace('-', "_")));
+    let (soil, law) = (compiled(context, "soil", "")?, compiled(context, "law", "")?);
+    let python_soil = fresh(context, Kind::Soil, Language::Python, "my_soil.py")?;
+    let python_law = fresh(context, Kind::Law, Language::Python, "my_law.py")?;
+    let cases = [
+        ("law", "a law in C", &law, Level::Standard),
+        ("law-python", "a law in Python", &python_law, Level::Standard),
+        ("quick.soil-bekker", "soil-bekker", &own("soil-bekker"), Level::Quick),
+        (
+            "quick.soil-cellular-automaton",
+            "soil-cellular-automaton",
+            &own("soil-cellular-automaton"),
+            Level::Quick,
+        ),
+        ("quick", "a soil in C", &soil, Level::Quick),
+        ("quick.soil-python", "a soil in Python", &python_soil, Level::Quick),
+        ("quick.law-python", "a law in Python", &python_law, Level::Quick),
+    ];
+    for (id, of, file, level) in cases {
         let start = Instant::now();
-        report(context, &compiled(context, "law", "")?, |_| {})?;
+        report(context, file, |o| o.level = level)?;
         let took = start.elapsed().as_secs_f64();
-        out.push(Figure::new("plugins.time.law", took, Limit::AtMost(5.0), "check of a law in C, s"));
-        let python = fresh(context, Kind::Law, Language::Python, "my_law.py")?;
-        let start = Instant::now();
-        report(context, &python, |_| {})?;
-        let took = start.elapsed().as_secs_f64();
-        let what = "check of a law in Python, s";
-        out.push(Figure::new("plugins.time.law-python", took, Limit::AtMost(5.0), what));
-        let deps = context.program.with_file_name("deps");
-        for name in ["soil-bekker", "soil-cellular-automaton"] {
-            let file = deps.join(format!("lib{}_plugin.so", name.replace('-', "_")));
-            let start = Instant::now();
-            report(context, &file, |o| o.level = Level::Quick)?;
-            let what = format!("quick check of {name}, s");
-            let took = start.elapsed().as_secs_f64();
-            out.push(Figure::new(format!("plugins.time.quick.{name}"), took, Limit::AtMost(2.0), what));
-        }
-        let start = Instant::now();
-        report(context, &compiled(context, "soil", "")?, |o| o.level = Level::Quick)?;
-        let took = start.elapsed().as_secs_f64();
-        out.push(Figure::new(
-            "plugins.time.quick",
-            took,
-            Limit::AtMost(2.0),
-            "quick check of a soil in C, s",
-        ));
+        let (prefix, limit) = if level == Level::Quick { ("quick check", 2.0) } else { ("check", 5.0) };
+        let what = format!("{prefix} of {of}, s");
+        out.push(Figure::new(format!("plugins.time.{id}"), took, Limit::AtMost(limit), what));
     }
     Ok(())
 }

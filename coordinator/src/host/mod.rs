@@ -14,6 +14,7 @@ mod instance;
 pub mod isolation;
 pub mod law;
 mod library;
+mod patience;
 mod probe;
 mod process;
 mod python;

@@ -1,13 +1,15 @@
 //! The threads of a run: modules make none of their own, they ask for `parallel_for`.
 //!
 //! A pool of our own, because the step loop must not allocate: queues of general pools take memory block by
-//! block. Threads sleep between loops (no spinning, which costs the more the busier the machine is), and a thread
-//! that wakes late delays nobody: the caller takes the pieces itself until none is left.
+//! block. A thread that wakes late delays nobody: the caller takes the pieces itself until none is left. Waking one
+//! takes longer than many a loop, so threads look for the next loop for some microseconds before they sleep
+//! ([`Patience`]); looking for ever would cost the more the busier the machine is.
 #![allow(unsafe_code)] // The pieces of a loop borrow from the caller, who waits for all threads.
 
+use super::patience::Patience;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
-use std::sync::atomic::{AtomicUsize, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError, TryLockError};
 use std::thread::JoinHandle;
 
@@ -15,8 +17,9 @@ use std::thread::JoinHandle;
 pub struct Workers {
     shared: Arc<Shared>,
     threads: Vec<JoinHandle<()>>,
-    /// Held during a loop: a loop inside a loop, or from another thread meanwhile, runs on its caller alone.
-    busy: Mutex<()>,
+    /// Held during a loop: a loop inside a loop, or from another thread meanwhile, runs on its caller alone. How long the
+    /// caller waits awake for the others to leave one.
+    busy: Mutex<Patience>,
 }
 
 struct Shared {
@@ -25,6 +28,12 @@ struct Shared {
     ended: Condvar,
     /// The next piece to take.
     next: AtomicUsize,
+    /// `State::number`, `State::inside` and `State::stop`, to be looked at without the lock.
+    announced: AtomicU64,
+    inside: AtomicUsize,
+    stopping: AtomicBool,
+    /// Whether there is a processor for each thread: looking is in the way otherwise.
+    roomy: bool,
 }
 
 /// Start of a list whose items go to one thread each.
@@ -52,6 +61,8 @@ struct State {
     number: u64,
     /// Threads inside the loop.
     inside: usize,
+    /// Threads that sleep until the next one.
+    asleep: usize,
     stop: bool,
     panicked: Option<Box<dyn Any + Send>>,
 }
@@ -75,13 +86,18 @@ impl Workers {
             begun: Condvar::new(),
             ended: Condvar::new(),
             next: AtomicUsize::new(0),
+            announced: AtomicU64::new(0),
+            inside: AtomicUsize::new(0),
+            stopping: AtomicBool::new(false),
+            roomy: threads <= processors(),
         });
         let spawn = |k: usize| {
             let shared = shared.clone();
             std::thread::Builder::new().name(format!("terraglue {k}")).spawn(move || shared.work()).ok()
         };
         let threads = (1..threads).filter_map(spawn).collect();
-        Self { shared, threads, busy: Mutex::default() }
+        let patience = Patience::new(shared.roomy);
+        Self { shared, threads, busy: Mutex::new(patience) }
     }
 
     /// Number of threads, the caller's included.
@@ -92,21 +108,25 @@ impl Workers {
     /// Runs job(0) … job(n − 1) in any order; returns when all are done. A panic of a job goes on in the caller.
     pub fn parallel_for(&self, n: usize, job: &(dyn Fn(usize) + Sync)) {
         let alone = self.threads.is_empty() || n < 2;
-        let Some(_busy) = (!alone).then(|| self.enter()).flatten() else {
+        let Some(mut patience) = (!alone).then(|| self.enter()).flatten() else {
             return (0..n).for_each(job);
         };
         // SAFETY: only the lifetime is erased; `finish` does not return before every thread has left the loop.
         let job: &'static (dyn Fn(usize) + Sync) = unsafe { std::mem::transmute(job) };
         self.shared.next.store(0, Ordering::Relaxed);
         let this = Loop { job, n };
-        {
+        let sleepers = {
             let mut state = self.shared.lock();
             state.current = Some(this);
             state.number += 1;
+            self.shared.announced.store(state.number, Ordering::Release);
+            state.asleep > 0
+        };
+        if sleepers {
+            self.shared.begun.notify_all();
         }
-        self.shared.begun.notify_all();
         self.shared.take_pieces(this);
-        self.shared.finish();
+        self.shared.finish(&mut patience);
     }
 }
 
@@ -128,7 +148,7 @@ impl Workers {
     }
 
     /// The right to run a loop on all threads; None: one is running.
-    fn enter(&self) -> Option<MutexGuard<'_, ()>> {
+    fn enter(&self) -> Option<MutexGuard<'_, Patience>> {
         match self.busy.try_lock() {
             Ok(guard) => Some(guard),
             // A job panicked; its loop was finished before the panic went on.
@@ -141,6 +161,7 @@ impl Workers {
 impl Drop for Workers {
     fn drop(&mut self) {
         self.shared.lock().stop = true;
+        self.shared.stopping.store(true, Ordering::Release);
         self.shared.begun.notify_all();
         for thread in self.threads.drain(..) {
             // A thread ends by `stop` alone; its jobs' panics were handed to their callers.
@@ -156,25 +177,38 @@ impl Shared {
 
     /// Life of a thread.
     fn work(&self) {
-        let mut last = 0;
+        let (mut last, mut patience) = (0, Patience::new(self.roomy));
         let mut state = self.lock();
-        loop {
-            match state.current {
-                _ if state.stop => return,
-                Some(current) if state.number != last => {
-                    last = state.number;
-                    state.inside += 1;
-                    drop(state);
-                    self.take_pieces(current);
-                    state = self.lock();
-                    state.inside -= 1;
-                    if state.inside == 0 {
-                        self.ended.notify_one();
-                    }
+        while !state.stop {
+            let fresh = state.number != last;
+            last = state.number;
+            if let Some(current) = state.current.filter(|_| fresh) {
+                self.count(&mut state, 1);
+                drop(state);
+                self.take_pieces(current);
+                state = self.lock();
+                self.count(&mut state, -1);
+                if state.inside == 0 {
+                    self.ended.notify_one();
                 }
-                _ => state = self.begun.wait(state).unwrap_or_else(PoisonError::into_inner),
+            }
+            if fresh {
+                drop(state);
+                let begun = || self.announced.load(Ordering::Acquire) != last;
+                patience.wait(|| begun() || self.stopping.load(Ordering::Acquire));
+                state = self.lock();
+            } else {
+                state.asleep += 1;
+                state = self.begun.wait(state).unwrap_or_else(PoisonError::into_inner);
+                state.asleep -= 1;
             }
         }
+    }
+
+    /// One thread more, or one less, is inside the loop.
+    fn count(&self, state: &mut State, change: isize) {
+        state.inside = state.inside.saturating_add_signed(change);
+        self.inside.store(state.inside, Ordering::Release);
     }
 
     /// Takes pieces until none is left; after a panic of its own a thread takes no more.
@@ -196,9 +230,14 @@ impl Shared {
     }
 
     /// Closes the loop to threads that wake late, waits for those inside, and passes a panic on.
-    fn finish(&self) {
+    fn finish(&self, patience: &mut Patience) {
         let mut state = self.lock();
         state.current = None;
+        if state.inside > 0 {
+            drop(state);
+            patience.wait(|| self.inside.load(Ordering::Acquire) == 0);
+            state = self.lock();
+        }
         while state.inside > 0 {
             state = self.ended.wait(state).unwrap_or_else(PoisonError::into_inner);
         }

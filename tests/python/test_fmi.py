@@ -8,6 +8,7 @@ import zipfile
 
 import pytest
 
+import cfmu
 from conftest import terraglue
 
 DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
@@ -105,6 +106,19 @@ def test_a_discarded_step_is_halved(decay):
     assert done.returncode == 0, done.stderr
     last = done.stdout.splitlines()[-1].split(",")
     assert float(last[1]) == pytest.approx(0.875**3 * 0.9375**10, rel=1e-14)
+
+
+def test_steps_are_for_good_unless_a_state_is_kept(tmp_path):
+    """Some units stay where they are in a step after which an earlier state might be set again."""
+    unit = cfmu.build(tmp_path, "wary", [("x", "output", 0, "")], "if (p) r[0] += h;")
+    done = terraglue("fmu", "run", unit, "--stop", "1", "--step", "0.25")
+    assert [line.split(",")[1] for line in done.stdout.splitlines()[1:]] == ["0", "0.25", "0.5", "0.75", "1"]
+    scenario = tmp_path / "wary.toml"
+    scenario.write_text('[time]\nstep_s = 0.25\nduration_s = 1.0\n[recording]\nevery_steps = 1\n[wary]\nfmu = "wary.fmu"\n')
+    done = terraglue("run", scenario, "--out", tmp_path / "out", "--csv", "--quiet")
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader((tmp_path / "out" / "variables.csv").open()))
+    assert float(rows[-1]["wary.x"]) == 1.0
 
 
 def test_a_unit_runs_alone(decay, tmp_path):

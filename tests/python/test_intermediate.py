@@ -31,8 +31,13 @@ ODD = r"""bool stop = true; double when; static int deep;
 if (deep || !u->update) return 0; deep = 1;
 u->update(u->env, 0.1, true, true, true, true, &stop, &when); u->update((void *)8, NAN, false, true, false, true, 0, 0); deep = 0;
 if (stop) abort();"""
+# event mode of a unit without events of its own
+EVENTS = r"""int fmi3EnterEventMode(Unit *u) { return 0; }
+int fmi3EnterStepMode(Unit *u) { return 0; }
+int fmi3UpdateDiscreteStates(Unit *u, bool *a, bool *b, bool *c, bool *d, bool *e, double *t) { flip(u); return *a = *b = *c = *d = *e = false, 0; }"""
+MORE += "\nstatic void flip(Unit *u) {}\n" + EVENTS
 START = "v[1][0] = v[2][0] = 1; v[2][1] = -1;"
-FLAGS = 'providesIntermediateUpdate="true" canReturnEarlyAfterIntermediateUpdate="true" mightReturnEarlyFromDoStep="true"'
+FLAGS = 'providesIntermediateUpdate="true" canReturnEarlyAfterIntermediateUpdate="true" mightReturnEarlyFromDoStep="true" hasEventMode="true"'
 
 
 @pytest.fixture(scope="session")
@@ -76,7 +81,7 @@ def test_inner_steps_are_recorded(folder, tmp_path, mode):
 
 
 def test_early_returns_are_gone_on_from(folder, tmp_path):
-    done = run(folder, 3, "--intermediate", tmp_path / "i.csv")
+    done = run(folder, 3, "--intermediate", tmp_path / "i.csv", "--event-mode", "on")
     assert done.returncode == 0, done.stderr
     last = list(csv.DictReader(done.stdout.splitlines()))[-1]
     # a return half-way makes steps of h/2, h/4, …; the time is reached all the same
@@ -84,6 +89,23 @@ def test_early_returns_are_gone_on_from(folder, tmp_path):
     times = [float(row["time"]) for row in rows(tmp_path / "i.csv")]
     assert times == sorted(times) and times[-1] == pytest.approx(1.0, abs=1e-9)
     assert float(last["x"]) == pytest.approx(2.718, rel=0.03)
+
+
+def test_an_event_is_never_left_to_nobody(tmp_path):
+    """x' = 1 up to the event at 0.55 s, then -1. A unit that may return early leaves the event to event mode; else it handles it itself."""
+    step = """if (t < 0.55 - 1e-12 && t + h >= 0.55) {
+    v[1][0] += 0.55 - t;
+    if (u->early) { *early = *event = true; *last = 0.55; return 0; }
+    v[2][0] = -1; v[1][0] -= t + h - 0.55; return 0; }
+v[1][0] += h * v[2][0];"""
+    more = "static void flip(Unit *u) { if (u->v[1][0] > 0.5) u->v[2][0] = -1; }\n" + EVENTS
+    flags = 'hasEventMode="true" mightReturnEarlyFromDoStep="true"'
+    variables = [("x", "output", "", ()), ("slope", "output", "", ())]
+    unit = build_3(tmp_path, "turns", variables, step, start="v[2][0] = 1;", more=more, flags=flags)
+    for mode in ("off", "on"):
+        done = terraglue("fmu", "run", unit, "--stop", "1", "--step", "0.1", "--event-mode", mode)
+        last = list(csv.DictReader(done.stdout.splitlines()))[-1]
+        assert float(last["x"]) == pytest.approx(0.1, abs=1e-12), mode
 
 
 @pytest.mark.parametrize(
@@ -113,7 +135,7 @@ def test_calls_outside_a_step_are_not_followed(folder, monkeypatch, tmp_path):
     assert done.returncode == 0 and done.stderr.count("that is not followed") == 1, done.stderr
     assert [float(row["x"]) for row in rows(tmp_path / "i.csv")] == inner(16)[1:]
     path = tmp_path / "odd.toml"
-    path.write_text(f'[time]\nstep_s = 0.25\nduration_s = 1.0\n[a]\nfmu = "{folder}/odd.fmu"\n[b]\nfmu = "{folder}/inner.fmu"\nmode = 3\n')
+    path.write_text(f'[time]\nstep_s = 0.25\nduration_s = 1.0\n[a]\nfmu = "{folder}/odd.fmu"\n[b]\nfmu = "{folder}/inner.fmu"\nevent_mode = true\nmode = 3\n')
     done = terraglue("run", path, "--quiet", "--out", tmp_path / "out")
     assert done.returncode == 0 and done.stderr.count("that is not followed") == 1, done.stderr
 

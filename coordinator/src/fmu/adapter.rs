@@ -42,6 +42,8 @@ pub struct FmuSubsystem {
     /// Whether it was seen that the unit comes back to a saved state.
     proved: bool,
     slots: Vec<SlaveState>,
+    /// Whether a state was saved to which a run may go back over more than the last step.
+    kept: Cell<bool>,
     on_nan: OnNan,
     warned: Cell<bool>,
     references: RefCell<Vec<u32>>,
@@ -93,6 +95,7 @@ impl FmuSubsystem {
             running: false,
             proved: false,
             slots: (0..host.slots()).map(|_| SlaveState::default()).collect(),
+            kept: Cell::new(false),
             on_nan: options.on_nan,
             warned: Cell::new(false),
             references: RefCell::default(),
@@ -205,6 +208,7 @@ impl FmuSubsystem {
         if std::mem::replace(&mut self.proved, true) {
             return Ok(());
         }
+        let for_good = !self.kept.get();
         let Self { slave, bodies, variables, places, before, .. } = self;
         let number = |(v, place): &(&Variable, &Place)| {
             let output = v.causality == terraglue_subsystem::Causality::Output;
@@ -212,7 +216,7 @@ impl FmuSubsystem {
         };
         let outputs = variables.iter().zip(places.iter()).filter(number);
         let outputs: Vec<(&str, u32)> = outputs.map(|(v, p)| (v.name.as_str(), p.reference)).collect();
-        let short = Advance { t: step.t, h: step.h, for_good: false };
+        let short = Advance { t: step.t, h: step.h, for_good };
         rollback::prove(
             slave,
             before,
@@ -379,7 +383,7 @@ impl Subsystem for FmuSubsystem {
             self.prove(step, wrench)?;
             self.bodies.push(&mut self.slave, step, wrench, error)?;
         }
-        let step_now = Advance { t: step.t, h: step.h, for_good: !self.can_go_back };
+        let step_now = Advance { t: step.t, h: step.h, for_good: !self.kept.get() };
         match self.slave.do_step(step_now) {
             Ok(done) if done.terminate => {
                 let reached = done.reached;
@@ -417,6 +421,7 @@ impl Subsystem for FmuSubsystem {
 
     fn save_state(&mut self, slot: u32) -> Result {
         let state = self.slots.get_mut(slot as usize).ok_or(Error::Unsupported)?;
+        self.kept.set(true);
         self.slave.save(state).map_err(error)
     }
 
@@ -427,6 +432,7 @@ impl Subsystem for FmuSubsystem {
     }
 
     fn serialize(&self) -> Result<Vec<u8>> {
+        self.kept.set(true);
         let mut state = SlaveState::default();
         self.slave.save(&mut state).map_err(error)?;
         let bytes = self.slave.serialize(&state).map_err(error);

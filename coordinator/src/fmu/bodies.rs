@@ -372,7 +372,7 @@ impl Bodies {
         let mut here = SlaveState::default();
         slave.save(&mut here).map_err(fail)?;
         self.push(slave, step, t, fail)?;
-        let done = slave.do_step(terraglue_fmi::Advance { t: step.t, h: SHORT_S, for_good: false });
+        let done = slave.do_step(terraglue_fmi::Advance { t: step.t, h: SHORT_S, for_good: true });
         let short = Step { h: SHORT_S, ..*step };
         let told = done.map_err(fail).and_then(|_| self.pull(slave, &short, t, out, fail));
         slave.restore(&here).map_err(fail)?;

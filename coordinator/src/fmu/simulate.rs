@@ -127,7 +127,7 @@ fn halving(
         if c.state {
             slave.save(state)?;
         }
-        let made = slave.do_step(Advance { t, h: h.min(end - t), for_good: !c.state });
+        let made = slave.do_step(Advance { t, h: h.min(end - t), for_good: true });
         if let (Ok(_), Some(write)) = (&made, &mut *between) {
             for row in slave.take_intermediate() {
                 let values: String = row.values.iter().map(|x| format!(",{x}")).collect();

@@ -269,7 +269,8 @@ fn safe_parts(name: &str) -> std::result::Result<Vec<String>, String> {
     if parts.contains(&"..") {
         return Err("leads out of the folder of the unit".into());
     }
-    if parts.is_empty() || parts.iter().any(|p| p.len() > 255) || parts.len() > 64 {
+    // `./` names the folder of the unit itself
+    if parts.is_empty() && !name.ends_with('/') || parts.iter().any(|p| p.len() > 255) || parts.len() > 64 {
         return Err("has no usable name".into());
     }
     Ok(parts.into_iter().map(str::to_owned).collect())

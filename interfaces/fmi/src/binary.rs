@@ -79,6 +79,16 @@ fn missing(fmu: &Fmu, name: &str) -> String {
     let mut found: Vec<String> = entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect();
     found.sort();
     let wanted = platform(fmu.description().version);
+    let beside =
+        std::fs::read_dir(fmu.folder().join("binaries").join(wanted)).into_iter().flatten().flatten();
+    let mut beside: Vec<String> = beside.map(|e| format!("`{}`", e.file_name().to_string_lossy())).collect();
+    beside.sort();
+    if !beside.is_empty() {
+        let beside = beside.join(", ");
+        return format!(
+            "has no library `binaries/{wanted}/{name}`, which its modelIdentifier asks for; beside it is {beside}"
+        );
+    }
     let has = match (found.is_empty(), fmu.folder().join("sources").is_dir()) {
         (true, true) => "it holds source code only".to_owned(),
         (true, false) => "it holds no library at all".to_owned(),

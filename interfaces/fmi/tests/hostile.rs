@@ -307,8 +307,11 @@ fn odd_but_legal_units_are_read() {
         Fmu::open(&path).unwrap_or_else(|e| panic!("{e}\n{description}"));
     }
     let place = Place::new();
-    let folders =
-        [("modelDescription.xml", GOOD.as_bytes(), 0o644), ("resources/", b"".as_slice(), 0o040_755)];
+    let folders = [
+        ("./", b"".as_slice(), 0o040_755),
+        ("modelDescription.xml", GOOD.as_bytes(), 0o644),
+        ("resources/", b"", 0o040_755),
+    ];
     Fmu::open(&place.write(&archive(&folders))).expect("entries of folders are legal");
 }
 

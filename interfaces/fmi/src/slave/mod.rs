@@ -137,9 +137,10 @@ impl Slave {
                 let resources = text(&format!("{path}/"))?;
                 let verbose = options.verbose;
                 let update: Option<functions::Update3> = updates.then_some(intermediate::update);
-                // only where the rest of the step can be made in a step of another length
+                // Only where the event is handled then, and the rest of the step can be made in a step of another length. Without
+                // event mode a unit handles its events inside the step, unless it may leave it at one.
                 let c = description.capabilities;
-                let early = c.variable_step && (c.may_return_early || c.return_early);
+                let early = event_mode && c.variable_step && (c.may_return_early || c.return_early);
                 // SAFETY: the arguments are those of the standard and live long enough.
                 three.instantiate.map(|f| unsafe {
                     f(

@@ -24,7 +24,7 @@ pub struct Advance {
     pub t: f64,
     /// Length, s.
     pub h: f64,
-    /// Whether no state from before `t` is ever set again.
+    /// Whether no state from before `t` is ever set again. Going back to `t` itself, to repeat this step, is no such thing.
     pub for_good: bool,
 }
 
@@ -106,7 +106,8 @@ impl Slave {
             let tick = self.clocks.next(t, end);
             let stop = if end - tick > tolerance { tick } else { end };
             let (mut event, mut terminate, mut early, mut last) = (false, false, false, f64::NAN);
-            let for_good = step.for_good;
+            // a step that is repeated goes back to where its first part began
+            let for_good = step.for_good && (t <= step.t || !self.description.capabilities.state);
             if self.updates {
                 self.open_between(t, stop, three.get_f64);
             }

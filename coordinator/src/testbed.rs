@@ -271,11 +271,12 @@ impl Testbed {
         }
         // all are read before any is set: a unit whose outputs follow its inputs at once shows nobody the inputs of t
         self.links.numbers.iter_mut().try_for_each(|l| l.read(&self.instances).map(|_| ()))?;
+        self.links.discrete.iter_mut().try_for_each(|l| l.read(&self.instances))?;
         if !self.faults.is_empty() {
             self.apply_faults()?;
         }
         self.links.numbers.iter().try_for_each(|l| l.pass_on(&mut self.instances))?;
-        self.links.discrete.iter().try_for_each(|l| l.transfer(&mut self.instances))
+        self.links.discrete.iter().try_for_each(|l| l.pass_on(&mut self.instances))
     }
 
     /// What is wrong with the values on their way.

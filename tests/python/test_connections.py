@@ -6,6 +6,7 @@ import zipfile
 
 import pytest
 
+import cfmu
 from conftest import terraglue
 
 # All values of a type lie in one array, by reference; `twice` hands on what it gets, doubled or as it is.
@@ -111,6 +112,44 @@ def test_whole_arrays_and_other_types_are_connected(made, tmp_path):
     assert done.returncode == 0, done.stderr
     assert [float(row[f"b.y[{i},{j}]"]) for i in (1, 2) for j in (1, 2)] == [1.0, 2.0, 3.0, 4.0]
     assert float(row["b.i_out"]) == 28.0 and row["b.b_out"] in ("true", "1", "1.0")
+
+
+def test_what_two_units_swap_is_never_lost(tmp_path):
+    """Outputs that follow inputs at once: all values are read before any is set, so each step swaps them."""
+    kinds = (("i", "Integer", "0"), ("b", "Boolean", "false"), ("s", "String", ""))
+    others = ""
+    for name, kind, start in kinds:
+        for end, causality, value in (("in", "input", f' start="{start}"'), ("out", "output", "")):
+            others += f'<ScalarVariable name="{name}_{end}" valueReference="0" causality="{causality}" variability="discrete">'
+            others += f"<{kind}{value}/></ScalarVariable>"
+    cfmu.build(tmp_path, "glass", [("x", "output", 0, "")], "", others)
+    path, connect = tmp_path / "swap.toml", ""
+    for name, _, _ in kinds:
+        for a, b in ("ab", "ba"):
+            connect += f'[[connect]]\nfrom = "{a}.{name}_out"\nto = "{b}.{name}_in"\n'
+    path.write_text(f"""
+[time]
+step_s = 0.1
+duration_s = 0.5
+[recording]
+every_steps = 1
+[a]
+fmu = "glass.fmu"
+i_in = 7
+b_in = true
+s_in = "left"
+[b]
+fmu = "glass.fmu"
+i_in = 9
+s_in = "right"
+{connect}""")
+    done = terraglue("run", path, "--csv", "--quiet", "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    rows = list(csv.DictReader((tmp_path / "out" / "variables.csv").open()))
+    pairs = [[{row["a.i_out"], row["b.i_out"]}, {row["a.b_out"], row["b.b_out"]}] for row in rows]
+    assert all(len(whole) == 2 and len(truth) == 2 for whole, truth in pairs), rows
+    seen = [float(row["a.i_out"]) for row in rows]
+    assert len(seen) > 4 and all(x != y for x, y in zip(seen, seen[1:])), seen
 
 
 def test_units_are_converted_at_connections(made, tmp_path):

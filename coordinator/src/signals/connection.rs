@@ -193,7 +193,7 @@ pub fn connect(
                             None,
                         )
                     })?;
-                    links.discrete.push(Discrete::new(from, to, table));
+                    links.discrete.push(Discrete::new(from, to, table, conversion));
                 }
             }
         }
@@ -236,7 +236,9 @@ fn check(
         return Err(format!("`{to_name}` is not an input and cannot be connected to"));
     }
     let Connection { factor, offset, convert, .. } = *connection;
-    if (factor, offset) != (1.0, 0.0) && a.value_type != ValueType::F64 {
+    let takes_factor = matches!(a.value_type, ValueType::F64 | ValueType::F32)
+        || discrete::is_whole(a.value_type) && !mapped;
+    if (factor, offset) != (1.0, 0.0) && !takes_factor {
         return Err(format!("`{from_name}` is of a type that takes neither `factor` nor `offset`"));
     }
     if a.unit.is_empty() || b.unit.is_empty() || !convert {

@@ -2,9 +2,12 @@
 
 use super::access::VariableRef;
 use super::table::Table;
-use crate::Result;
 use crate::host::{Instance, Reply};
+use crate::{Error, Result};
 use terraglue_subsystem::{ValueType, Values, ValuesMut};
+
+/// Whole numbers up to here are exact in f64.
+const EXACT: f64 = 9_007_199_254_740_992.0;
 
 /// One connection.
 #[derive(Clone, Debug)]
@@ -12,14 +15,18 @@ pub struct Discrete {
     from: VariableRef,
     to: VariableRef,
     table: Option<Table>,
+    /// value_to = a·value_from + b of numbers, where that is another one.
+    conversion: Option<(f64, f64)>,
+    value: Value,
 }
 
 /// A value on its way.
+#[derive(Clone, Debug)]
 enum Value {
     Whole(i128),
-    Single(f32),
-    Text(String),
-    Bytes(Vec<u8>),
+    Single([f32; 1]),
+    Text([String; 1]),
+    Bytes([Vec<u8>; 1]),
 }
 
 /// Whether values of one type can become values of another.
@@ -37,15 +44,27 @@ pub fn fits(from: ValueType, to: ValueType) -> bool {
     from != ValueType::Clock && class(from) == class(to)
 }
 
+/// Whether a type is one of whole numbers.
+pub fn is_whole(value_type: ValueType) -> bool {
+    use ValueType::{I8, I16, I32, I64, U8, U16, U32, U64};
+    matches!(value_type, I8 | I16 | I32 | I64 | U8 | U16 | U32 | U64)
+}
+
 impl Discrete {
     /// A connection whose types were found to fit.
-    pub fn new(from: VariableRef, to: VariableRef, table: Option<Table>) -> Self {
-        Self { from, to, table }
+    pub fn new(from: VariableRef, to: VariableRef, table: Option<Table>, conversion: (f64, f64)) -> Self {
+        let conversion = Some(conversion).filter(|c| *c != (1.0, 0.0));
+        Self { from, to, table, conversion, value: Value::Whole(0) }
     }
 
     /// Whether values change on their way.
     pub fn has_table(&self) -> bool {
         self.table.is_some()
+    }
+
+    /// value_to = a·value_from + b, where the value changes so on its way.
+    pub fn conversion(&self) -> Option<(f64, f64)> {
+        self.conversion
     }
 
     /// The variables on either side.
@@ -58,30 +77,64 @@ impl Discrete {
         self.to.slot == slot && self.to.describe(instances).id == id
     }
 
-    /// Copies the committed value.
-    pub fn transfer(&self, instances: &mut [Instance]) -> Result {
-        let value = match (self.read(instances)?, &self.table) {
-            (Value::Whole(w), Some(table)) => Value::Whole(*table.get(&w).ok_or_else(|| {
-                let v = self.from.describe(instances);
-                let shown = usize::try_from(w).ok().and_then(|k| v.enumeration.get(k).cloned());
-                let shown = shown.unwrap_or_else(|| w.to_string());
-                instances[self.from.slot]
-                    .error("get", format!("`{}` is {shown}, for which `map` has no entry", v.name))
-            })?),
-            (value, _) => value,
-        };
+    /// Takes the committed value.
+    pub fn read(&mut self, instances: &[Instance]) -> Result {
+        self.take(instances)?;
+        if let (Value::Whole(w), Some(table)) = (&self.value, &self.table) {
+            let target = table.get(w).copied().ok_or_else(|| self.unlisted(instances, *w))?;
+            self.value = Value::Whole(target);
+        }
+        match (&mut self.value, self.conversion) {
+            (Value::Whole(w), Some(conversion)) => {
+                let w = *w;
+                self.value = Value::Whole(self.converted(instances, w, conversion)?);
+            }
+            (Value::Single([x]), Some((a, b))) => *x = (a * f64::from(*x) + b) as f32,
+            _ => {}
+        }
+        Ok(())
+    }
+
+    fn converted(&self, instances: &[Instance], w: i128, (a, b): (f64, f64)) -> Result<i128> {
+        let x = a * w as f64 + b;
+        if x.fract() == 0.0 && x.abs() <= EXACT {
+            return Ok(x as i128);
+        }
+        let v = self.from.describe(instances);
+        let text = format!(
+            "`{}` is {w}, of which `factor` and `offset` make {x}: no whole number that f64 holds exactly",
+            v.name
+        );
+        Err(instances[self.from.slot].error("get", text))
+    }
+
+    /// The error of a value for which the table has no entry.
+    #[cold]
+    fn unlisted(&self, instances: &[Instance], w: i128) -> Error {
+        let v = self.from.describe(instances);
+        let shown = usize::try_from(w).ok().and_then(|k| v.enumeration.get(k).cloned());
+        let shown = shown.unwrap_or_else(|| w.to_string());
+        let text = format!("`{}` is {shown}, for which `map` has no entry", v.name);
+        instances[self.from.slot].error("get", text)
+    }
+
+    /// Sets the input to the value that was taken last.
+    pub fn pass_on(&self, instances: &mut [Instance]) -> Result {
         let v = self.to.describe(instances);
-        let (id, kind, name) = ([v.id], v.value_type, v.name.clone());
-        let target = &mut instances[self.to.slot];
-        let narrow = |w: i128| target.error("set", format!("{w} does not fit the variable `{name}`"));
+        let (id, kind) = ([v.id], v.value_type);
+        let to = self.to;
+        let narrow = |instances: &[Instance], w: i128| {
+            let name = &to.describe(instances).name;
+            instances[to.slot].error("set", format!("{w} does not fit the variable `{name}`"))
+        };
         macro_rules! whole {
             ($variant:ident, $w:expr) => {{
-                let own = $w.try_into().map_err(|_| narrow($w))?;
-                target.set(&id, Values::$variant(&[own]))?
+                let own = (*$w).try_into().map_err(|_| narrow(instances, *$w))?;
+                instances[to.slot].set(&id, Values::$variant(&[own]))?
             }};
         }
-        let reply = match (kind, value) {
-            (ValueType::Bool, Value::Whole(w)) => target.set(&id, Values::Bool(&[w != 0]))?,
+        let reply = match (kind, &self.value) {
+            (ValueType::Bool, Value::Whole(w)) => instances[to.slot].set(&id, Values::Bool(&[*w != 0]))?,
             (ValueType::I8, Value::Whole(w)) => whole!(I8, w),
             (ValueType::I16, Value::Whole(w)) => whole!(I16, w),
             (ValueType::I32, Value::Whole(w)) => whole!(I32, w),
@@ -91,25 +144,36 @@ impl Discrete {
             (ValueType::U32, Value::Whole(w)) => whole!(U32, w),
             (ValueType::U64, Value::Whole(w)) => whole!(U64, w),
             (ValueType::Enumeration, Value::Whole(w)) => whole!(Enumeration, w),
-            (_, Value::Single(x)) => target.set(&id, Values::F32(&[x]))?,
-            (_, Value::Text(text)) => target.set(&id, Values::String(&[text]))?,
-            (_, Value::Bytes(bytes)) => target.set(&id, Values::Binary(&[bytes]))?,
-            (_, Value::Whole(w)) => return Err(narrow(w)),
+            (_, Value::Single(x)) => instances[to.slot].set(&id, Values::F32(x))?,
+            (_, Value::Text(text)) => instances[to.slot].set(&id, Values::String(text))?,
+            (_, Value::Bytes(bytes)) => instances[to.slot].set(&id, Values::Binary(bytes))?,
+            (_, Value::Whole(w)) => return Err(narrow(instances, *w)),
         };
         match reply {
             Reply::Accepted => Ok(()),
-            Reply::Refused(reason) => Err(target.error("set", reason)),
+            Reply::Refused(reason) => Err(instances[to.slot].error("set", reason)),
         }
     }
 
-    fn read(&self, instances: &[Instance]) -> Result<Value> {
+    fn take(&mut self, instances: &[Instance]) -> Result {
         let v = self.from.describe(instances);
         let (id, source) = ([v.id], &instances[self.from.slot]);
         macro_rules! whole {
             ($variant:ident, $zero:expr) => {{
                 let mut out = [$zero];
                 source.get(&id, ValuesMut::$variant(&mut out))?;
-                Ok(Value::Whole(out[0].into()))
+                self.value = Value::Whole(out[0].into());
+            }};
+        }
+        // texts and bytes stay in the room that they had in the step before
+        macro_rules! kept {
+            ($variant:ident, $kind:ident, $empty:expr) => {{
+                if !matches!(self.value, Value::$variant(_)) {
+                    self.value = Value::$variant([$empty]);
+                }
+                if let Value::$variant(out) = &mut self.value {
+                    source.get(&id, ValuesMut::$kind(out))?;
+                }
             }};
         }
         match v.value_type {
@@ -124,25 +188,14 @@ impl Discrete {
             ValueType::U64 => whole!(U64, 0),
             ValueType::Enumeration => whole!(Enumeration, 0),
             ValueType::F32 => {
-                let mut out = [f32::NAN];
-                source.get(&id, ValuesMut::F32(&mut out))?;
-                match out[0].is_nan() {
-                    true => Err(source.error("get", format!("the variable `{}` is NaN", v.name))),
-                    false => Ok(Value::Single(out[0])),
+                kept!(Single, F32, f32::NAN);
+                if matches!(self.value, Value::Single([x]) if x.is_nan()) {
+                    return Err(source.error("get", format!("the variable `{}` is NaN", v.name)));
                 }
             }
-            ValueType::Binary => {
-                let mut out = [Vec::new()];
-                source.get(&id, ValuesMut::Binary(&mut out))?;
-                let [bytes] = out;
-                Ok(Value::Bytes(bytes))
-            }
-            ValueType::String | ValueType::F64 | ValueType::Clock => {
-                let mut out = [String::new()];
-                source.get(&id, ValuesMut::String(&mut out))?;
-                let [text] = out;
-                Ok(Value::Text(text))
-            }
+            ValueType::Binary => kept!(Bytes, Binary, Vec::new()),
+            ValueType::String | ValueType::F64 | ValueType::Clock => kept!(Text, String, String::new()),
         }
+        Ok(())
     }
 }

@@ -54,7 +54,7 @@ impl Testbed {
         let variable = |at: crate::signals::VariableRef| (at.slot, at.describe(&self.instances).id);
         let discrete = self.links.discrete.iter().map(|d| {
             let [from, to] = d.ends().map(variable);
-            End { from, to, conversion: None, by_table: d.has_table() }
+            End { from, to, conversion: d.conversion(), by_table: d.has_table() }
         });
         numbers.chain(discrete).collect()
     }

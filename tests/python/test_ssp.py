@@ -251,6 +251,27 @@ def test_dictionaries_and_tables(files, tmp_path):
     assert run(pack(files, tmp_path / "inside.ssp", inside), tmp_path / "inside") == rows
 
 
+LINEAR = '<ssc:LinearTransformation factor="{}" offset="{}"/></ssd:Connection>'
+PLAIN_END = 'startConnector="state" endElement="b" endConnector="i_in"/>'
+
+
+def test_a_table_follows_a_conversion_and_the_reverse(files, tmp_path):
+    # a tells 5: 2 * 5 + 10 = 20 on the bus, which d makes -2 by its table; behind a table it is 3 * 20 - 1 for b
+    at = SHARED.index('<ssc:IntegerMappingTransformation>\n   <ssc:MapEntry source="0"')
+    end = SHARED.index("</ssd:Connection>", at) + len("</ssd:Connection>")
+    first = SHARED[:at] + LINEAR.format(2, 10) + SHARED[end:]
+    rows = run(pack(files, tmp_path / "first.ssp", first, [("resources/signals.ssb", SIGNALS)]), tmp_path / "first")
+    assert [float(rows[-1][name]) for name in ("a.i_out", "inner_b.i_in", "d.i_in")] == [5, 20, -2]
+    then = SHARED.replace(PLAIN_END, PLAIN_END[:-2] + ">" + LINEAR.format(3, -1))
+    assert then != SHARED
+    rows = run(pack(files, tmp_path / "then.ssp", then, [("resources/signals.ssb", SIGNALS)]), tmp_path / "then")
+    assert float(rows[-1]["inner_b.i_in"]) == 59 and float(rows[-1]["d.i_in"]) == -2
+    odd = then.replace('factor="3"', 'factor="0.125"')
+    path = pack(files, tmp_path / "odd.ssp", odd, [("resources/signals.ssb", SIGNALS)])
+    done = terraglue("run", path, "--quiet", "--out", tmp_path / "odd")
+    assert done.returncode == 2 and "`0` of `map` becomes true, false, a whole number" in done.stderr, done.stderr
+
+
 @pytest.mark.parametrize(
     ("old", "new", "says"),
     [

@@ -78,14 +78,19 @@ impl Carried {
         transformation: &Transformation,
     ) -> std::result::Result<Self, &'static str> {
         if let Some(table) = &transformation.table {
-            if self.affine != (1.0, 0.0) {
-                return Err(MIXED);
-            }
-            let table = self.table.as_ref().map_or_else(|| table.clone(), |first| table.after(first));
-            return Ok(Self { table: Some(table), unit: to, ..*self });
+            let table = match (&self.table, self.affine) {
+                (Some(first), _) => table.after(first),
+                (None, (1.0, 0.0)) => table.clone(),
+                (None, affine) => table.after_linear(affine).ok_or(MIXED)?,
+            };
+            return Ok(Self { affine: (1.0, 0.0), table: Some(table), unit: to });
         }
-        if self.table.is_some() {
-            return if transformation.is_plain() { Ok(self.clone()) } else { Err(MIXED) };
+        if let Some(table) = &self.table {
+            let Transformation { factor, offset, .. } = *transformation;
+            let plain = transformation.is_plain();
+            let table =
+                if plain { table.clone() } else { table.before_linear((factor, offset)).ok_or(MIXED)? };
+            return Ok(Self { table: Some(table), ..self.clone() });
         }
         let affine = changed(self.affine, self.unit, to, transformation).ok_or(DIMENSIONS)?;
         let same = *transformation == Transformation::default();
@@ -232,7 +237,7 @@ impl<'a> Network<'a> {
     /// Every way from an output of a unit to an input of a unit.
     ///
     /// # Errors
-    /// Units of different dimensions on the way, or a table and a linear transformation one after the other.
+    /// Units of different dimensions on the way, or a table of what is no number and a linear transformation.
     pub fn ways(&self, package: &Package) -> Result<Vec<Way>> {
         let mut all = Vec::new();
         for edge in self.edges.iter().filter(|e| self.part(&e.end.0).is_some()) {
@@ -292,7 +297,7 @@ impl<'a> Network<'a> {
 /// Why two connectors do not fit.
 const DIMENSIONS: &str = "their units are of different dimensions";
 /// The same of transformations.
-const MIXED: &str = "a table and a conversion of numbers follow each other, which is not read here";
+const MIXED: &str = "numbers are converted before or behind a table of what are none";
 
 /// A value after the conversion of units and a transformation; nothing where the dimensions differ.
 fn changed(

@@ -155,6 +155,35 @@ impl Table {
         let both = |(source, between): &(Value, Value)| Some((source.clone(), self.of(between)?.clone()));
         Self(first.0.iter().filter_map(both).collect())
     }
+
+    /// This table after value · a + b; values that become none of its whole numbers are gone. Nothing where the table is not
+    /// one of whole numbers, or where all values become the same.
+    pub fn after_linear(&self, (a, b): (f64, f64)) -> Option<Self> {
+        let whole =
+            |x: f64| (x.is_finite() && (x - x.round()).abs() <= 1e-9 * x.abs().max(1.0)).then(|| x.round());
+        let mut entries = Vec::new();
+        for (source, target) in &self.0 {
+            let Value::Integer(k) = source else { return None };
+            if let Some(before) = whole((*k as f64 - b) / a) {
+                entries.push((Value::Integer(before as i64), target.clone()));
+            }
+        }
+        (a != 0.0).then_some(Self(entries))
+    }
+
+    /// This table before value · a + b. Nothing where its new values are no numbers.
+    pub fn before_linear(&self, (a, b): (f64, f64)) -> Option<Self> {
+        let changed = |(source, target): &(Value, Value)| {
+            let x = match target {
+                Value::Integer(k) => a * *k as f64 + b,
+                Value::Real(x) => a * x + b,
+                Value::Boolean(_) | Value::Text(_) => return None,
+            };
+            let exact = x.fract() == 0.0 && x.abs() < 9e15;
+            Some((source.clone(), if exact { Value::Integer(x as i64) } else { Value::Real(x) }))
+        };
+        self.0.iter().map(changed).collect::<Option<_>>().map(Self)
+    }
 }
 
 /// A parameter set that is bound to a system or a component.

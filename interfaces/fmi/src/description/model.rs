@@ -222,6 +222,8 @@ pub struct Variable {
     pub ticks: Option<Ticks>,
     /// When it first ticks and how it goes on, of an input clock whose intervals the unit tells while it runs.
     pub told: Option<Told>,
+    /// Whether it tells them as fractions too, of an input clock.
+    pub fraction: bool,
     /// Whether it is a clock that others make tick: an output clock, or a triggered input clock.
     pub triggered: bool,
     /// Clocks by number in calls with which it changes; empty: at any time.

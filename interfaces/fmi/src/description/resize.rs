@@ -93,6 +93,7 @@ mod tests {
             alias: false,
             ticks: None,
             told: None,
+            fraction: false,
             triggered: false,
             clocks: Vec::new(),
             resized: false,

@@ -180,6 +180,7 @@ fn variable(
         alias: false,
         ticks: if value_type == ValueType::Clock { ticks(inner, causality)? } else { None },
         told: if value_type == ValueType::Clock { told(inner, causality)? } else { None },
+        fraction: value_type == ValueType::Clock && inner.flag("supportsFraction")?,
         triggered: value_type == ValueType::Clock
             && (causality == Causality::Output
                 || causality == Causality::Input && inner.text("intervalVariability") == "triggered"),
@@ -199,7 +200,11 @@ fn clocks(element: &Element) -> Result<Vec<u32>> {
 
 /// How an input clock ticks whose intervals are known while the unit runs.
 fn told(element: &Element, causality: Causality) -> Result<Option<Told>> {
-    let shift = element.optional_number("shiftDecimal")?.unwrap_or(0.0);
+    let decimal = |name: &str| element.optional_number(name);
+    let counted = decimal("shiftCounter")?
+        .zip(decimal("resolution")?)
+        .map(|(counter, resolution)| counter / resolution);
+    let shift = decimal("shiftDecimal")?.or(counted).unwrap_or(0.0);
     let shift = if shift.is_finite() { shift.max(0.0) } else { 0.0 };
     Ok(match (causality, element.text("intervalVariability")) {
         (Causality::Input, "countdown") => Some(Told::Countdown),

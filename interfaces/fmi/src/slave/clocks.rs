@@ -51,7 +51,7 @@ impl Clocks {
             |v: &Variable| Clocked { reference: v.reference, clocks: v.clocks.clone(), value: None };
         Self {
             periodic: clocks().filter_map(|v| Some((v.reference, v.ticks?))).collect(),
-            told: clocks().filter_map(|v| Some(ToldClock::new(v.reference, v.told?))).collect(),
+            told: clocks().filter_map(|v| Some(ToldClock::new(v.reference, v.told?, v.fraction))).collect(),
             due: Vec::new(),
             ticked: vec![false; outputs.len()],
             outputs,

@@ -141,6 +141,7 @@ table! {
             fn(Component, *const Vr, usize, *const usize, *const *const u8, usize) -> c_int;
         get_clock = "fmi3GetClock": fn(Component, *const Vr, usize, *mut u8) -> c_int;
         get_interval = "fmi3GetIntervalDecimal": fn(Component, *const Vr, usize, *mut f64, *mut c_int) -> c_int;
+        get_fraction = "fmi3GetIntervalFraction": fn(Component, *const Vr, usize, *mut u64, *mut u64, *mut c_int) -> c_int;
         set_clock = "fmi3SetClock": fn(Component, *const Vr, usize, *const bool) -> c_int;
         do_step = "fmi3DoStep": fn(
             Component, f64, f64, bool, *mut bool, *mut bool, *mut bool, *mut f64

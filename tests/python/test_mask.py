@@ -2,6 +2,7 @@
 
 import csv
 import math
+import re
 import struct
 import zlib
 
@@ -93,6 +94,19 @@ def test_an_elastic_line_in_place_of_the_law_is_warned_of(tmp_path):
     assert "of label 1 (heavy_clay_WES_25pct) down to 2.5" in process.stderr and process.stderr.count("takes the place") == 1
     path.write_text(path.read_text().replace("[soil]\n", "[soil]\nelastic_stiffness_pa_m = 1e10\n"))
     assert "takes the place" not in terraglue("check", path).stderr
+
+
+@pytest.mark.parametrize("law", ["", '[soil.law]\npressure = "(k_c/b + k_phi)*z^n + 0*c*tanh(z/b)"\n'])
+def test_a_law_stiffer_than_unloading_is_warned_of_with_the_way_out(tmp_path, law):
+    path = scenario(tmp_path, [[1, 7]])
+    path.write_text(path.read_text().replace("[soil]\n", "[soil]\nn = 1.5\nelastic_stiffness_pa_m = 4e5\n") + law)
+    told = terraglue("check", path).stderr
+    warning = next(line for line in told.splitlines() if "is softer than the law from" in line)
+    line = path.read_text().splitlines().index("elastic_stiffness_pa_m = 4e5") + 1
+    assert f"{path.name}:{line}: `elastic_stiffness_pa_m` = 4e5" in warning and "yield energy" in warning, warning
+    enough = re.search(r"yield energy; (\S+) leaves the law as it is down to 300 mm", warning).group(1)
+    path.write_text(path.read_text().replace("= 4e5", f"= {enough}"))
+    assert "is softer than the law from" not in terraglue("check", path).stderr
 
 
 def test_an_exported_unit_carries_the_mask(tmp_path):

@@ -5,7 +5,7 @@ use super::parameters::check_own_table;
 use super::source::{InputError, Source};
 use crate::gluing::{cooperative_compliant, iterative, relaxed, semi_implicit};
 use serde_json::Value;
-use terraglue_soil_law::SoilParameters;
+use terraglue_soil_law::{PressureLaw, SMALL_CONTACT, SoilExpressions, SoilParameters};
 use terraglue_subsystem::{Config, Schema};
 
 /// Events after the end of the run.
@@ -67,53 +67,55 @@ pub fn unchosen(schema: &Schema, spec: &SubsystemSpec, source: &Source) -> Optio
     Some(format!("{} (no effect now: `{}` has `module = \"{module}\"`)", line_of(&wrong), spec.name))
 }
 
-/// Size of a small foot, m: under it the power law of a soil is looked at.
-const SMALL: f64 = 0.02;
 /// Depth up to which nobody minds that the elastic line stands for the law, m.
 const UNNOTICED: f64 = 1e-4;
 
-/// Soils of a subsystem whose power law the elastic line replaces down to a depth that matters. Pressures written as text
-/// or answered by modules are not looked at. `gravity` in m/s².
+/// Soils of a subsystem whose law the elastic line of unloading changes at depths that matter: it stands for the start of a
+/// power law, and bounds the slope of any. Of laws that are modules the soil speaks itself. `gravity` in m/s².
 pub fn replaced_laws(
     scenario: &Scenario,
     spec: &SubsystemSpec,
     config: &Config,
     gravity: f64,
 ) -> Vec<String> {
+    if config.get("law.plugin").is_some_and(|v| !v.is_null())
+        || config.get(STIFFNESS).is_none_or(Value::is_null)
+    {
+        return Vec::new();
+    }
     let own = std::iter::once((String::new(), Some(config.clone())));
     let regions = spec.regions.iter().map(|region| {
-        let numbers = region.numbers.iter();
-        let all: Option<Value> = serde_json::from_str(&config.to_json()).ok();
-        let merged = all.and_then(|mut all| {
-            all.as_object_mut()?.extend(numbers.map(|(key, value)| (key.clone(), value.clone())));
-            Config::parse(&all.to_string()).ok()
-        });
+        let merged = SoilParameters::of_region(config, &region.numbers).ok();
         (format!(" of label {} ({})", region.label, region.soil), merged)
     });
-    let of = |(whose, config): (String, Option<Config>)| {
-        let config = config?;
-        let other =
-            ["law.pressure", "law.plugin"].iter().any(|key| config.get(key).is_some_and(|v| !v.is_null()));
-        if other || config.get(STIFFNESS).is_none_or(Value::is_null) {
-            return None;
-        }
-        let soil = SoilParameters::from_config(&config, gravity).ok()?;
-        let stiffness = soil.elastic_stiffness_pa_m;
-        let depth = soil.pressure().curve(SMALL, stiffness).elastic_limit();
-        if depth <= UNNOTICED {
-            return None;
-        }
+    let said = own.chain(regions).filter_map(|(whose, config)| replaced_law(&config?, &whose, gravity));
+    said.flatten()
+        .map(|message| line_of(&scenario.source.error_at_value(&[&spec.name, STIFFNESS], message, None)))
+        .collect()
+}
+
+/// What the elastic line does to one soil.
+fn replaced_law(config: &Config, whose: &str, gravity: f64) -> Option<Vec<String>> {
+    let soil = SoilParameters::from_config(config, gravity).ok()?;
+    let stiffness = soil.elastic_stiffness_pa_m;
+    let text = SoilExpressions::from_config(config).ok()?;
+    let law = match text.and_then(|text| text.pressure(&soil).transpose()) {
+        Some(law) => PressureLaw::Expression(law.ok()?),
+        None => soil.pressure(),
+    };
+    let mut all: Vec<String> = law.softened(stiffness).map(|s| s.message(whose)).into_iter().collect();
+    let depth = law.curve(SMALL_CONTACT, stiffness).elastic_limit();
+    if depth > UNNOTICED && !matches!(law, PressureLaw::Expression(_)) {
         let needed = stiffness * (depth / UNNOTICED).powf(1.0 - soil.n);
-        let message = format!(
+        all.push(format!(
             "`{STIFFNESS}` = {stiffness:e} takes the place of the soil's law{whose} down to {:.2} mm under a contact of b = {} \
              mm; {needed:.1e} would down to {} mm",
             1e3 * depth,
-            1e3 * SMALL,
+            1e3 * SMALL_CONTACT,
             1e3 * UNNOTICED
-        );
-        Some(line_of(&scenario.source.error_at_value(&[&spec.name, STIFFNESS], message, None)))
-    };
-    own.chain(regions).filter_map(of).collect()
+        ));
+    }
+    Some(all)
 }
 
 const STIFFNESS: &str = "elastic_stiffness_pa_m";

@@ -76,7 +76,12 @@ impl Mask {
         if soils.len() > MOST_SOILS {
             return Err(Error::Refused(format!("`mask` has {} soils, at most {MOST_SOILS}", soils.len())));
         }
-        let of = |numbers: &Value| SoilParameters::from_config(&merged(config, numbers)?, gravity);
+        let of = |numbers: &Value| {
+            let numbers = numbers
+                .as_object()
+                .ok_or_else(|| Error::Refused("`mask.soils` takes a list of tables".into()))?;
+            SoilParameters::from_config(&SoilParameters::of_region(config, numbers)?, gravity)
+        };
         let soils = soils.iter().map(of).collect::<Result<Vec<_>>>()?;
         let numbers = expand(&config.numbers("mask.runs")?, soils.len(), lattice.node_count())?;
         Ok(Self { lattice: Some(*lattice), numbers, soils })
@@ -89,19 +94,6 @@ impl Mask {
         let (i, j) = lattice.clamp(i, j);
         usize::from(self.numbers[j as usize * lattice.size[0] as usize + i as usize])
     }
-}
-
-/// The table with the numbers of another soil in place of its own.
-fn merged(config: &Config, numbers: &Value) -> Result<Config> {
-    let mut all: Value = serde_json::from_str(&config.to_json())
-        .map_err(|e| Error::Refused(format!("the soil's table cannot be read again: {e}")))?;
-    let (Some(all_of), Some(own)) = (all.as_object_mut(), numbers.as_object()) else {
-        return Err(Error::Refused("`mask.soils` takes a list of tables".into()));
-    };
-    // what the row does not know is not known of this soil
-    all_of.remove("density_kg_m3");
-    all_of.extend(own.iter().map(|(key, value)| (key.clone(), value.clone())));
-    Config::parse(&all.to_string())
 }
 
 fn expand(runs: &[f64], soils: usize, nodes: usize) -> Result<Vec<u8>> {

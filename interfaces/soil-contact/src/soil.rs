@@ -10,15 +10,15 @@ use crate::state::{Committed, Slot, Slots, Target};
 use crate::trial::Last;
 use crate::values;
 use std::sync::Arc;
-use terraglue_soil_law::{PluginLaw, PressureLaw, SlipSinkage, SoilExpressions, SoilParameters};
+use terraglue_soil_law::{
+    DEEPEST_TESTED, PluginLaw, PressureLaw, SlipSinkage, SoilExpressions, SoilParameters,
+};
 use terraglue_subsystem::bytes::{self, Persist};
 use terraglue_subsystem::{
     Capabilities, Config, Energy, Error, Estimate, FieldInfo, FieldTile, Host, Input, Law, Level, LogLevel,
     Motion, Response, Result, Step, Subsystem, Values, ValuesMut, Variable, cooperation,
 };
 
-/// Sinkage beyond which the plate tests behind the laws say nothing, m.
-const DEEPEST_M: f64 = 0.3;
 /// Contact that is this small for so many commits in a row is worth a warning.
 const FEW_NODES: u32 = 3;
 const FEW_NODES_COMMITS: u32 = 100;
@@ -108,8 +108,10 @@ impl<M: Material> FieldSoil<M> {
         patches.nodes.doubles = ground.law_memory.doubles();
         patches.nodes.reserve(nodes);
         lists.reserve(nodes);
+        let laws = all_laws(&parameters, &ground.mask, expressions.as_ref(), plugin.as_ref())?;
+        warn_of_module(&laws[0], host.as_ref());
         Ok(Self {
-            laws: all_laws(&parameters, &ground.mask, expressions.as_ref(), plugin.as_ref())?,
+            laws,
             expressions,
             plugin,
             fields: [ground.heights.height_info(), ground.heights.sinkage_info()],
@@ -186,7 +188,7 @@ impl<M: Material> FieldSoil<M> {
         if self.few_nodes >= FEW_NODES_COMMITS {
             self.warn(0, "a contact spans fewer than three cells; a finer spacing resolves it better");
         }
-        if self.book.max_sinkage > DEEPEST_M {
+        if self.book.max_sinkage > DEEPEST_TESTED {
             self.warn(1, "a foot sinks deeper than 0.3 m, beyond the range of the pressure law");
         }
     }
@@ -209,6 +211,14 @@ fn all_laws(
     std::iter::once(own).chain(&mask.soils).map(|p| laws_of(p, texts, plugin)).collect()
 }
 
+/// Says where unloading is softer than a law that is a module; the host knows of the others and where they are written.
+fn warn_of_module(laws: &Laws, host: &dyn Host) {
+    if let (PressureLaw::Plugin(law), Some(softened)) = (&laws.pressure, laws.pressure.softened(laws.elastic))
+    {
+        host.log(LogLevel::Warning, &softened.message(&format!(" `{}`", law.name())));
+    }
+}
+
 /// The laws with these numbers; what the scenario writes as text takes the place of the built-in law.
 fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>, plugin: Option<&PluginLaw>) -> Result<Laws> {
     let mut laws = Laws {
@@ -226,7 +236,7 @@ fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>, plugin: Option<&
                     "`slip_sinkage` acts on power laws, and `law.pressure` is none; it must be \"none\" here";
                 return Err(Error::Refused(text.into()));
             }
-            laws.pressure = PressureLaw::Expression(law);
+            laws.pressure = PressureLaw::Expression(law).looked_at(p.elastic_stiffness_pa_m);
         }
         if let Some(law) = texts.shear(p)? {
             laws.shear = laws.shear.with_expression(law);
@@ -235,7 +245,7 @@ fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>, plugin: Option<&
     if let Some(law) = plugin {
         law.begin(0.0);
         if law.has_pressure() {
-            laws.pressure = PressureLaw::Plugin(law.clone());
+            laws.pressure = PressureLaw::Plugin(law.clone()).looked_at(p.elastic_stiffness_pa_m);
             // as the built-in laws are looked at: one that says nothing sensible here never will
             laws.pressure.curve(TYPICAL_SIZE, p.elastic_stiffness_pa_m);
         }

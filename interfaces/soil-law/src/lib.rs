@@ -12,6 +12,7 @@ mod pressure;
 mod rolling;
 mod shear;
 mod slip_sinkage;
+mod straight;
 mod table;
 mod yielding;
 
@@ -23,5 +24,6 @@ pub use pressure::{PRESSURE_LAWS, PressureCurve, PressureLaw};
 pub use rolling::{Rolling, SLIP_SINKAGES};
 pub use shear::{ShearLaw, ShearResponse, ShearState, Travel};
 pub use slip_sinkage::SlipSinkage;
+pub use straight::{DEEPEST_TESTED, SMALL_CONTACT, Softened};
 pub use table::{COLUMNS, SoilRow, SoilTable, TableError};
 pub use yielding::Sheared;

@@ -155,6 +155,22 @@ impl SoilParameters {
         parameters
     }
 
+    /// The table of a soil with the numbers of another soil, that of a region of the ground, in place of its own.
+    ///
+    /// # Errors
+    /// The table cannot be read again.
+    pub fn of_region(
+        config: &Config,
+        numbers: &serde_json::Map<String, serde_json::Value>,
+    ) -> Result<Config> {
+        let mut all: serde_json::Map<_, _> = serde_json::from_str(&config.to_json())
+            .map_err(|e| Error::Refused(format!("the soil's table cannot be read again: {e}")))?;
+        // what a region does not know is not known of its soil
+        all.remove("density_kg_m3");
+        all.extend(numbers.iter().map(|(key, value)| (key.clone(), value.clone())));
+        Config::parse(&serde_json::Value::Object(all).to_string())
+    }
+
     /// Reads the parameters of an instance under `gravity` (m/s²). Refused: a missing or non-positive number where
     /// one is needed.
     pub fn from_config(config: &Config, gravity: f64) -> Result<Self> {

@@ -16,7 +16,11 @@ struct InUse {
 
 /// A law module in the hands of a soil. Copies share what went wrong.
 #[derive(Clone)]
-pub struct PluginLaw(Arc<InUse>);
+pub struct PluginLaw {
+    used: Arc<InUse>,
+    /// Stiffness of unloading (Pa/m) below which its slopes are known to stay.
+    gentle_at: Option<f64>,
+}
 
 /// Nodes below one contact, for a law that keeps a state.
 #[derive(Clone, Copy, Debug)]
@@ -35,38 +39,50 @@ impl PluginLaw {
     /// Takes a law into use.
     pub fn new(law: Arc<dyn NodeLaw>) -> Self {
         let (h, longest) = (AtomicU64::new(0), AtomicU64::new(f64::INFINITY.to_bits()));
-        Self(Arc::new(InUse { law, h, longest, trouble: Mutex::new(None) }))
+        let used = Arc::new(InUse { law, h, longest, trouble: Mutex::new(None) });
+        Self { used, gentle_at: None }
+    }
+
+    /// The same law, whose slopes are known to stay below `k_u` (Pa/m) beyond the elastic limit.
+    pub(crate) fn gentle_at(self, k_u: f64) -> Self {
+        Self { gentle_at: Some(k_u), ..self }
+    }
+
+    /// Whether that is known.
+    #[inline]
+    pub(crate) fn is_gentle_at(&self, k_u: f64) -> bool {
+        self.gentle_at == Some(k_u)
     }
 
     /// Name, for messages.
     pub fn name(&self) -> &str {
-        self.0.law.name()
+        self.used.law.name()
     }
 
     /// Doubles per node.
     #[inline]
     pub fn state_doubles(&self) -> usize {
-        self.0.law.state_doubles()
+        self.used.law.state_doubles()
     }
 
     /// Whether it has a pressure law.
     pub fn has_pressure(&self) -> bool {
-        self.0.law.has_pressure()
+        self.used.law.has_pressure()
     }
 
     /// Whether it has a shear law.
     pub fn has_shear(&self) -> bool {
-        self.0.law.has_shear()
+        self.used.law.has_shear()
     }
 
     /// A call of the soil begins that takes a step of `h` (s).
     pub fn begin(&self, h: f64) {
-        self.0.h.store(h.to_bits(), Relaxed);
+        self.used.h.store(h.to_bits(), Relaxed);
     }
 
     /// The committed state has changed: what the law has said of the length of a step holds no more.
     pub fn forget(&self) {
-        self.0.longest.store(f64::INFINITY.to_bits(), Relaxed);
+        self.used.longest.store(f64::INFINITY.to_bits(), Relaxed);
     }
 
     /// Whether the law has answered.
@@ -74,7 +90,7 @@ impl PluginLaw {
     /// # Errors
     /// Its first failure since this was asked last.
     pub fn check(&self) -> Result {
-        self.0.trouble.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
+        self.used.trouble.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
     }
 
     /// Whether the law has answered for the whole step, which starts at `t` (s).
@@ -83,26 +99,26 @@ impl PluginLaw {
     /// Its failure, or [`Error::Discard`] with the time that it can reach.
     pub fn finish(&self, t: f64) -> Result {
         self.check()?;
-        let (h, longest) = (self.h(), f64::from_bits(self.0.longest.load(Relaxed)));
+        let (h, longest) = (self.h(), f64::from_bits(self.used.longest.load(Relaxed)));
         if longest < h { Err(Error::Discard { reached: t + longest.max(0.0) }) } else { Ok(()) }
     }
 
     #[inline]
     fn h(&self) -> f64 {
-        f64::from_bits(self.0.h.load(Relaxed))
+        f64::from_bits(self.used.h.load(Relaxed))
     }
 
     #[inline]
     fn limit(&self, longest: f64) {
         if longest < f64::INFINITY {
-            let before = f64::from_bits(self.0.longest.load(Relaxed));
-            self.0.longest.store(before.min(longest).to_bits(), Relaxed);
+            let before = f64::from_bits(self.used.longest.load(Relaxed));
+            self.used.longest.store(before.min(longest).to_bits(), Relaxed);
         }
     }
 
     #[cold]
     fn fail(&self, error: Error) {
-        self.0.trouble.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
+        self.used.trouble.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
     }
 
     #[cold]
@@ -116,6 +132,25 @@ impl PluginLaw {
         let (mut p, mut slope) = ([0.0], [0.0]);
         self.first_loading(b, &[z], &mut p, &mut slope);
         (p[0], slope[0])
+    }
+
+    /// First loading of nodes by a law without state, to look at it: where it has no answer there is NaN, and nothing of it
+    /// is remembered.
+    pub(crate) fn look(&self, b: f64, depth: &[f64], p: &mut [f64], slope: &mut [f64]) {
+        p.fill(f64::NAN);
+        slope.fill(f64::NAN);
+        let nodes = PressureNodes { b, h: self.h(), depth, ..PressureNodes::default() };
+        let (permanent, state) = (&mut [][..], &mut [][..]);
+        let mut out = PressureAnswer {
+            pressure: &mut *p,
+            slope: &mut *slope,
+            permanent,
+            state,
+            longest_s: f64::INFINITY,
+        };
+        if self.used.law.pressure(&nodes, &mut out).is_err() {
+            p.fill(f64::NAN);
+        }
     }
 
     /// First loading of nodes by a law without state.
@@ -150,7 +185,7 @@ impl PluginLaw {
             out.fill(f64::NAN);
         }
         let mut out = PressureAnswer { pressure: p, slope, permanent, state, longest_s: f64::INFINITY };
-        if let Err(error) = self.0.law.pressure(nodes, &mut out) {
+        if let Err(error) = self.used.law.pressure(nodes, &mut out) {
             self.fail(error);
         }
         self.limit(out.longest_s);
@@ -184,7 +219,7 @@ impl PluginLaw {
         }
         let nodes = ShearNodes { h: self.h(), pressure, slip, state };
         let mut out = ShearAnswer { stress, by_pressure, by_slip, longest_s: f64::INFINITY };
-        if let Err(error) = self.0.law.shear(&nodes, &mut out) {
+        if let Err(error) = self.used.law.shear(&nodes, &mut out) {
             self.fail(error);
         }
         self.limit(out.longest_s);
@@ -211,6 +246,6 @@ impl std::fmt::Debug for PluginLaw {
 
 impl PartialEq for PluginLaw {
     fn eq(&self, other: &Self) -> bool {
-        Arc::ptr_eq(&self.0, &other.0)
+        Arc::ptr_eq(&self.used, &other.used)
     }
 }

@@ -5,11 +5,13 @@
 //! The families differ in how the power law depends on the size b of the contact; see [`PressureLaw`].
 //! No soil is stiffer in virgin loading than in unloading, so for n < 1, where the power law starts with an
 //! infinite slope, the line p = k_u·z holds up to where it meets the power law. For n > 1, whose slope grows without bound,
-//! it goes on straight where the slope has come to 0.99 k_u: beyond, unloading would give back more than was put in.
+//! it goes on straight where the slope has come to 0.99 k_u: beyond, unloading would give back more than was put in. So do
+//! laws as text and as modules.
 
 use crate::expression::{PressureExpression, Program, curve};
 use crate::plugin::PluginLaw;
 use crate::slip_sinkage::SlipSinkage;
+use crate::straight::{STIFFEST, Straight};
 
 /// A family of pressure–sinkage laws; [`PressureLaw::curve`] fixes one for the size of a contact.
 #[derive(Clone, Debug, PartialEq)]
@@ -77,7 +79,10 @@ impl PressureLaw {
                 let program = law.at_size(b);
                 match program.power_law() {
                     Some(law) => law,
-                    None => return PressureCurve::of_program(program, k_u),
+                    None => {
+                        let gentle = law.is_gentle_at(k_u);
+                        return PressureCurve::of_shape(Shape::Program(program), k_u, gentle);
+                    }
                 }
             }
         };
@@ -106,17 +111,17 @@ pub struct PressureCurve {
     unloading: f64,
     /// Depth up to which the elastic line holds in virgin loading, m; 0 for n ≥ 1.
     elastic_limit: f64,
-    /// Depth from which first loading goes on straight, m; infinite for n ≤ 1, for what is no power law, and where nothing
-    /// sinks as deep.
+    /// Depth from which first loading goes on straight, m; infinite where nothing sinks as deep. 0 where n = 1 and the modulus
+    /// itself is bounded.
     stiff_limit: f64,
+    /// How a law that is no power law goes on there.
+    straight: Straight,
     /// Where it is no power law, `modulus` and `exponent` are those of the power law that touches it at 1 cm.
     shape: Shape,
 }
 
 /// Depth at which a law that is no power law is compared with one, m.
 const TYPICAL_DEPTH: f64 = 0.01;
-/// Largest slope of a power law in first loading over that of unloading.
-const STIFFEST: f64 = 0.99;
 /// Depth that no contact reaches, m.
 const BOTTOMLESS: f64 = 1e3;
 
@@ -128,54 +133,69 @@ impl PressureCurve {
         let stiff_limit = if exponent > 1.0 {
             let z = libm::pow(STIFFEST * k_u / (exponent * modulus), 1.0 / (exponent - 1.0));
             if z < BOTTOMLESS { z } else { f64::INFINITY }
+        } else if exponent == 1.0 && modulus > STIFFEST * k_u {
+            0.0
         } else {
             f64::INFINITY
         };
         let modulus = if exponent == 1.0 { modulus.min(STIFFEST * k_u) } else { modulus };
-        Self { modulus, exponent, unloading: k_u, elastic_limit, stiff_limit, shape: Shape::Power }
-    }
-
-    /// First loading by a program of z with unloading stiffness `k_u` (Pa/m). A power law becomes the built-in one.
-    pub fn of_program(program: Program, k_u: f64) -> Self {
-        if let Some((modulus, exponent)) = program.power_law() {
-            return Self::new(modulus, exponent, k_u);
-        }
-        Self::of_shape(Shape::Program(program), k_u)
+        let straight = Straight::NONE;
+        Self { modulus, exponent, unloading: k_u, elastic_limit, stiff_limit, straight, shape: Shape::Power }
     }
 
     /// First loading by a module under a contact of size `b` (m). A law with a state answers for unloading, too, and is
     /// asked by [`PressureCurve::keeper`] alone.
     pub fn of_law(law: PluginLaw, b: f64, k_u: f64) -> Self {
         if law.state_doubles() > 0 {
-            let shape = Shape::Law(law, b);
-            let (elastic_limit, stiff_limit) = (0.0, f64::INFINITY);
-            return Self { modulus: b, exponent: 1.0, unloading: k_u, elastic_limit, stiff_limit, shape };
+            return Self { modulus: b, ..Self::bare(Shape::Law(law, b), k_u) };
         }
-        Self::of_shape(Shape::Law(law, b), k_u)
+        let gentle = law.is_gentle_at(k_u);
+        Self::of_shape(Shape::Law(law, b), k_u, gentle)
     }
 
-    fn of_shape(shape: Shape, k_u: f64) -> Self {
-        let (elastic_limit, stiff_limit) = (0.0, f64::INFINITY);
-        let mut out = Self { modulus: 0.0, exponent: 1.0, unloading: k_u, elastic_limit, stiff_limit, shape };
+    fn bare(shape: Shape, k_u: f64) -> Self {
+        Self {
+            modulus: 0.0,
+            exponent: 1.0,
+            unloading: k_u,
+            elastic_limit: 0.0,
+            stiff_limit: f64::INFINITY,
+            straight: Straight::NONE,
+            shape,
+        }
+    }
+
+    /// `gentle`: nowhere stiffer than unloading beyond the elastic limit.
+    fn of_shape(shape: Shape, k_u: f64, gentle: bool) -> Self {
+        let mut out = Self::bare(shape, k_u);
         let (p, slope) = out.beyond(TYPICAL_DEPTH);
         out.exponent = slope * TYPICAL_DEPTH / p;
         out.modulus = p * libm::pow(TYPICAL_DEPTH, -out.exponent);
         out.elastic_limit = curve::elastic_limit(&|z| out.beyond(z), k_u);
+        if !gentle {
+            let look = |z: &[f64], p: &mut [f64], slope: &mut [f64]| match &out.shape {
+                Shape::Law(law, b) => law.look(*b, z, p, slope),
+                _ => out.beyond_many(z, p, slope),
+            };
+            out.straight = Straight::find(&look, out.elastic_limit, k_u);
+            out.stiff_limit = out.straight.begin();
+        }
         out
     }
 
     /// Pressure and slope of first loading beyond the elastic limit.
     #[inline]
     fn beyond(&self, z: f64) -> (f64, f64) {
-        match &self.shape {
-            Shape::Power if self.exponent == 1.0 => (self.modulus * z, self.modulus),
+        let own = match &self.shape {
+            Shape::Power if self.exponent == 1.0 => return (self.modulus * z, self.modulus),
             Shape::Power => {
                 let p = self.modulus * libm::pow(z, self.exponent);
-                (p, self.exponent * p / z)
+                return (p, self.exponent * p / z);
             }
             Shape::Program(program) => program.depth(z),
             Shape::Law(law, b) => law.at(*b, z),
-        }
+        };
+        if z > self.stiff_limit { self.straight.bend(z, own) } else { own }
     }
 
     /// Whether first loading is better evaluated for many nodes at a time.
@@ -191,9 +211,14 @@ impl PressureCurve {
             Shape::Program(program) => program.eval_all([z], p, [slope]),
             Shape::Law(law, b) => law.first_loading(*b, z, p, slope),
             Shape::Power => {
-                for ((z, p), slope) in z.iter().zip(p).zip(slope) {
+                for ((z, p), slope) in z.iter().zip(&mut *p).zip(&mut *slope) {
                     (*p, *slope) = self.beyond(*z);
                 }
+            }
+        }
+        if self.is_batched() && self.stiff_limit < f64::INFINITY {
+            for ((z, p), slope) in z.iter().zip(p).zip(slope).filter(|((z, _), _)| **z > self.stiff_limit) {
+                (*p, *slope) = self.straight.bend(*z, (*p, *slope));
             }
         }
     }
@@ -210,6 +235,12 @@ impl PressureCurve {
     /// Depth up to which first loading is elastic, m.
     pub fn elastic_limit(&self) -> f64 {
         self.elastic_limit
+    }
+
+    /// Depth from which first loading goes on straight, m, since the law is stiffer than unloading there; infinite where it
+    /// is not.
+    pub fn straight_from(&self) -> f64 {
+        self.stiff_limit
     }
 
     /// Pressure where first loading begins to go on straight, Pa.

@@ -83,3 +83,8 @@ fn regions_of_a_mask_have_their_laws() {
 fn adhesion_pulls_only_where_it_is_set_and_lets_go() {
     bars::adhesion_holds_until_it_lets_go::<Soil>(true);
 }
+
+#[test]
+fn no_law_yields_energy_in_cycles() {
+    bars::cycles_yield_no_energy::<Soil>(true);
+}

@@ -2,7 +2,10 @@
 #![allow(dead_code, clippy::unwrap_used)]
 
 use super::support::*;
-use terraglue_subsystem::{Geometry, Module};
+use std::sync::Arc;
+use terraglue_subsystem::{
+    Error, Geometry, Module, NodeLaw, PressureAnswer, PressureNodes, Result, ShearAnswer, ShearNodes,
+};
 
 const FOOT: Geometry = Geometry::Sphere { radius: 0.03 };
 
@@ -326,4 +329,105 @@ pub fn energy_balances<M: Module>(config: &str) {
     let stored = e.potential + e.dissipated;
     assert!((stored / e.port_work - 1.0).abs() < 0.05, "{e:?}");
     assert!(e.potential > 0.0 && e.dissipated > 0.0);
+}
+
+/// A law that is a module: p = a·z + c·z², stiffer than unloading from some depth on.
+struct Stiffening {
+    a: f64,
+    c: f64,
+}
+
+impl NodeLaw for Stiffening {
+    fn name(&self) -> &str {
+        "stiffening"
+    }
+    fn has_pressure(&self) -> bool {
+        true
+    }
+    fn has_shear(&self) -> bool {
+        false
+    }
+    fn pressure(&self, nodes: &PressureNodes, out: &mut PressureAnswer) -> Result {
+        for (k, z) in nodes.depth.iter().enumerate() {
+            out.pressure[k] = (self.a + self.c * z) * z;
+            out.slope[k] = self.a + 2.0 * self.c * z;
+        }
+        Ok(())
+    }
+    fn shear(&self, _: &ShearNodes, _: &mut ShearAnswer) -> Result {
+        Err(Error::Unsupported)
+    }
+    fn as_any(&self) -> &dyn std::any::Any {
+        self
+    }
+}
+
+/// Pressed and released again and again, ever deeper, a stiff convex law yields no energy, whoever wrote it: built in, as text,
+/// as a module. Where it is softer than unloading it is untouched. Where material `stays`, all work becomes heat that is booked.
+pub fn cycles_yield_no_energy<M: Module>(stays: bool) {
+    let text = r#""law":{"pressure":"a*z + q*z^2","parameters":{"a":"2e5 Pa/m","q":"1e8 Pa/m^2"}},"#;
+    let module = r#""law":{"plugin":"stiffening"},"#;
+    let power = r#""n":2.0,"k_c":0,"k_phi":1e8,"#;
+    for stiffness in [1e6, 5e6, 4e8] {
+        let soft = format!("\"elastic_stiffness_pa_m\":{stiffness:e},\"compacted_fraction\":1.0,");
+        let mut forces = Vec::new();
+        for keys in [text, module, power] {
+            let config = match keys == power {
+                true => LUNAR.replacen(r#""n":1.0,"k_c":1400,"k_phi":820000,"#, power, 1),
+                false => LUNAR.replacen('{', &format!("{{{keys}"), 1),
+            };
+            let config = config.replacen('{', &format!("{{{soft}"), 1);
+            let config = if M::schema().parameters.iter().any(|p| p.name == "compacted_fraction") {
+                config
+            } else {
+                config.replace("\"compacted_fraction\":1.0,", "")
+            };
+            let law: Arc<dyn NodeLaw> = Arc::new(Stiffening { a: 2e5, c: 1e8 });
+            let terrain = Shaped { size: [65; 2], spacing: 0.01, height: flat };
+            let (soil, host) = hosted::<M>(&config, terrain, (keys == module).then_some(law));
+            let said = host.said.lock().unwrap().join(" ");
+            assert_eq!(
+                said.contains("`elastic_stiffness_pa_m`"),
+                keys == module && stiffness < 1e8,
+                "{said}"
+            );
+            let geometry = Geometry::Cylinder { half_length: 0.1, radius: 0.0537 };
+            forces.push(cycle(Rig::new(soil, geometry, 1.0, 0.1), stays));
+        }
+        // text and module are the same law
+        let [text, module] = [&forces[0], &forces[1]];
+        assert!(text.iter().zip(module).all(|(a, b)| (a - b).abs() <= 1e-9 * b.abs()), "{text:?} {module:?}");
+        if stiffness > 1e8 {
+            let area = std::f64::consts::PI * 0.0537 * 0.0537;
+            let law = (2e5 + 1e8 * 0.02) * 0.02 * area;
+            assert!((text[0] / law - 1.0).abs() < 0.01, "{} {law}", text[0]);
+        }
+    }
+}
+
+/// Forces at the deepest points of cycles between the surface and 2, 4 and 5 cm.
+fn cycle(mut rig: Rig, stays: bool) -> Vec<f64> {
+    let (still, step) = ([0.0; 6], 1e-4);
+    let (mut work, mut turned, mut deepest) = (0.0, 0.0, Vec::new());
+    for end in [200, 400, 500] {
+        for (by, down) in [(-step, true), (step, false)] {
+            for _ in 0..end {
+                rig.set_ports();
+                let before = rig.under_motion(&still)[0];
+                let after = rig.prescribed_step(&[by, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
+                assert!(after >= 0.0 && after.is_finite());
+                work -= 0.5 * by * (before + after);
+                turned += 0.5 * step * (before + after);
+                if down && rig.sunk() > step * (f64::from(end) - 0.5) {
+                    deepest.push(after);
+                }
+            }
+        }
+        let energy = rig.soil.energy();
+        assert!(work > -1e-6 * turned, "cycle to {end}: the soil gave out {:e} J of {turned:e} J", -work);
+        assert!(energy.dissipated >= 0.0 && energy.potential.abs() < 1e-9 * turned, "{energy:?}");
+        assert!(!stays || (energy.dissipated - work).abs() < 0.02 * turned, "{work:e} J in, {energy:?}");
+    }
+    assert_eq!(deepest.len(), 3);
+    deepest
 }

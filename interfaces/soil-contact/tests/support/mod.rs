@@ -1,11 +1,11 @@
 //! A point mass with a foot on a soil, for the tests of all soils: gluing in its plainest form.
 #![allow(dead_code, clippy::unwrap_used)]
 
-use std::sync::Arc;
+use std::sync::{Arc, Mutex};
 use terraglue_ground::{Lattice, Placed, Surface, nodes_below};
 use terraglue_subsystem::{
-    Config, Estimate, Geometry, Hold, Host, Input, Law, Level, Module, Motion, Node, Port, PortKind, Pose,
-    Response, Standalone, Step, Subsystem, Terrain, TerrainTile, ValuesMut, component,
+    Config, Estimate, Geometry, Hold, Host, Input, Law, Level, LogLevel, Module, Motion, Node, NodeLaw, Port,
+    PortKind, Pose, Response, Standalone, Step, Subsystem, Terrain, TerrainTile, ValuesMut, component,
 };
 
 pub const LUNAR: &str =
@@ -56,14 +56,57 @@ pub fn soil<M: Module>(
     spacing: f64,
     height: fn(f64, f64) -> f64,
 ) -> Box<dyn Subsystem> {
-    let terrain = Shaped { size: [size; 2], spacing, height };
-    let host: Arc<dyn Host> = Arc::new(Standalone {
-        gravity: [0.0, 0.0, -9.81],
-        terrain: Some(Box::new(terrain)),
-        ..Default::default()
-    });
+    hosted::<M>(config, Shaped { size: [size; 2], spacing, height }, None).0
+}
+
+/// An instance with a law of its own, and what it has logged so far.
+pub fn hosted<M: Module>(
+    config: &str,
+    terrain: Shaped,
+    law: Option<Arc<dyn NodeLaw>>,
+) -> (Box<dyn Subsystem>, Arc<Handed>) {
+    let plain =
+        Standalone { gravity: [0.0, 0.0, -9.81], terrain: Some(Box::new(terrain)), ..Default::default() };
+    let host = Arc::new(Handed { plain, law, said: Mutex::default() });
     let config = Config::parse(config).unwrap().with_defaults(&M::schema());
-    M::instantiate(&config, host).unwrap()
+    (M::instantiate(&config, host.clone()).unwrap(), host)
+}
+
+/// A host that hands a law to the soil and keeps what it says.
+pub struct Handed {
+    plain: Standalone,
+    law: Option<Arc<dyn NodeLaw>>,
+    pub said: Mutex<Vec<String>>,
+}
+
+impl Host for Handed {
+    fn name(&self) -> &str {
+        self.plain.name()
+    }
+    fn log(&self, _: LogLevel, text: &str) {
+        self.said.lock().unwrap().push(text.into());
+    }
+    fn seed(&self) -> u64 {
+        self.plain.seed()
+    }
+    fn folder(&self) -> &str {
+        self.plain.folder()
+    }
+    fn slots(&self) -> u32 {
+        self.plain.slots()
+    }
+    fn max_nodes(&self) -> u32 {
+        self.plain.max_nodes()
+    }
+    fn gravity(&self) -> [f64; 3] {
+        self.plain.gravity()
+    }
+    fn terrain(&self) -> Option<&dyn Terrain> {
+        self.plain.terrain()
+    }
+    fn law(&self) -> Option<Arc<dyn NodeLaw>> {
+        self.law.clone()
+    }
 }
 
 /// Heights that a soil shows.

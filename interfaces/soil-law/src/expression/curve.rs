@@ -5,8 +5,15 @@
 const SHALLOWEST: f64 = 1e-9;
 /// Largest depth that a law is asked for, m.
 const DEEPEST: f64 = 1e3;
-/// Newton steps until bisection has the last word.
+/// Steps at most.
 const STEPS: usize = 200;
+/// Newton steps after which every other step is a bisection: where a law bends sharply Newton's jump to and fro.
+const QUICK: usize = 20;
+
+/// Whether step number `k` halves the bracket, whatever Newton says.
+fn halves(k: usize) -> bool {
+    k >= QUICK && k % 2 == 0
+}
 
 /// Depth where the law meets the elastic line k_u·z from above, m; 0 where it starts below it.
 pub fn elastic_limit(law: &impl Fn(f64) -> (f64, f64), k_u: f64) -> f64 {
@@ -36,7 +43,7 @@ pub fn depth(law: &impl Fn(f64) -> (f64, f64), p: f64, shallowest: f64) -> f64 {
 fn root_in_logarithms([mut low, mut high]: [f64; 2], start: f64, f: impl Fn(f64) -> (f64, f64)) -> f64 {
     let rising = f(low).0 < 1.0;
     let mut z = start;
-    for _ in 0..STEPS {
+    for k in 0..STEPS {
         let (ratio, exponent) = f(z);
         if ratio == 1.0 {
             return z;
@@ -47,7 +54,7 @@ fn root_in_logarithms([mut low, mut high]: [f64; 2], start: f64, f: impl Fn(f64)
             high = z
         }
         let mut next = z * libm::pow(ratio, -1.0 / exponent);
-        if !(next > low && next < high) {
+        if halves(k) || !(next > low && next < high) {
             next = (low * high).sqrt();
         }
         if (next - z).abs() <= 1e-15 * z {
@@ -76,7 +83,7 @@ pub fn largest_depth(
 ) -> f64 {
     let (mut low, mut high) = (permanent.max(limit), DEEPEST);
     let mut z = guess.clamp(low, high);
-    for _ in 0..STEPS {
+    for k in 0..STEPS {
         let (p, slope) = law(z);
         let residual = k_u * (z - permanent) - p;
         if residual < 0.0 {
@@ -85,7 +92,7 @@ pub fn largest_depth(
             high = z
         }
         let mut next = z - residual / (k_u - slope);
-        if !(next >= low && next <= high) {
+        if halves(k) || !(next >= low && next <= high) {
             next = 0.5 * (low + high);
         }
         if (next - z).abs() <= 1e-15 * z {

@@ -26,9 +26,22 @@ pub struct PressureExpression {
     builder: Builder,
     root: u8,
     program: Program,
+    /// Stiffness of unloading (Pa/m) below which its slopes are known to stay.
+    gentle_at: Option<f64>,
 }
 
 impl PressureExpression {
+    /// The same law, whose slopes are known to stay below `k_u` (Pa/m) beyond the elastic limit.
+    pub(crate) fn gentle_at(self, k_u: f64) -> Self {
+        Self { gentle_at: Some(k_u), ..self }
+    }
+
+    /// Whether that is known.
+    #[inline]
+    pub(crate) fn is_gentle_at(&self, k_u: f64) -> bool {
+        self.gentle_at == Some(k_u)
+    }
+
     /// The law under a contact of size `b` (m), a program of z.
     pub fn at_size(&self, b: f64) -> Program {
         let bind = |v| if v == 1 { Binding::Constant(b) } else { Binding::Variable(v) };
@@ -240,7 +253,7 @@ fn compile(tree: &Tree, symbols: &[Symbol]) -> std::result::Result<PressureExpre
         _ => Binding::Variable(s as u8),
     };
     let compiled = Builder::of(tree, bind).and_then(|(builder, root)| {
-        Some(PressureExpression { program: Program::new(&builder, root)?, builder, root })
+        Some(PressureExpression { program: Program::new(&builder, root)?, builder, root, gentle_at: None })
     });
     compiled.ok_or_else(|| {
         let message = format!("the law is too long: at most {} operations", super::program::LONGEST);

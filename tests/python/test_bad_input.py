@@ -87,3 +87,38 @@ def test_wrong_usage():
     assert "Usage" in refused("run")
     assert refused("run", MOON_WALK, "--no-such-option")
     assert "recording.mcap" in refused("report", ROOT / "docs")
+
+
+def test_values_in_other_units_are_warned_of_with_the_likely_slip(tmp_path):
+    text = (ROOT / "scenarios" / "plate_sinkage.toml").read_text().replace("../models", str(ROOT / "models"))
+    path = tmp_path / "units.toml"
+    path.write_text(text.replace("[soil]\n", f'[soil]\nparameters_file = "{ROOT}/models/soils.csv"\nk_phi = 1528\n'))
+    line = path.read_text().splitlines().index("k_phi = 1528") + 1
+    process = terraglue("check", path, "--set", "soil.K_m=1.8", "--set", "soil.c_pa=1.04", "--set", "soil.density_kg_m3=1.6")
+    assert process.returncode == 0, process.stderr
+    told = process.stderr
+    assert f"{path.name}:{line}: `k_phi` = 1528 N/m^(n+2) is 9.82 times below the usual" in told and "in kN (1530000 N/m^(n+2))?" in told
+    assert "`K_m` = 1.8 m" in told and "in cm (0.018 m)?" in told
+    assert "`c_pa` = 1.04 Pa" in told and "in kPa (1040 Pa)" in told and "in t/m³ or g/cm³ (1600 kg/m^3)?" in told
+    assert told.count(" usual ") == 4, told
+    coarse = terraglue("check", path, "--set", "terrain.spacing_m=10", "--set", "terrain.size_m=[600, 400]")
+    assert "`spacing_m` = 10 m is 20 times above" in coarse.stderr and "in cm (0.1 m) or mm (0.01 m)?" in coarse.stderr, coarse.stderr
+    degrees = terraglue("check", path, "--set", "soil.phi_rad=35")
+    assert degrees.returncode == 2 and "35 degrees are 0.611 rad" in degrees.stderr, degrees.stderr
+
+
+def test_values_of_a_row_and_of_a_soil_file_are_looked_at_too(tmp_path):
+    text = (ROOT / "scenarios" / "plate_sinkage.toml").read_text().replace("../models", str(ROOT / "models"))
+    (tmp_path / "soil.toml").write_text("[soil]\nn = 1.1\nk_c = 0.99\nk_phi = 1528.43\nc_pa = 1040\nphi_rad = 0.49\nK_m = 0.01\n")
+    path = tmp_path / "file.toml"
+    old = next(line for line in text.splitlines() if line.startswith("parameters ="))
+    path.write_text(text.replace(old, 'parameters = "soil.toml"', 1))
+    line = path.read_text().splitlines().index('parameters = "soil.toml"') + 1
+    told = terraglue("check", path).stderr
+    assert f"file.toml:{line}: `k_phi` = 1528.43" in told and "`k_c` = 0.99" in told and told.count("in kN (") == 2, told
+
+
+@pytest.mark.parametrize("scenario", sorted(p.name for p in (ROOT / "scenarios").glob("*.toml")))
+def test_no_value_of_a_shipped_scenario_is_doubted(scenario):
+    told = terraglue("check", ROOT / "scenarios" / scenario).stderr
+    assert " usual " not in told and "is softer than" not in told, told

@@ -144,6 +144,8 @@ def test_refused_rows_are_refused_and_the_table_is_found_from_elsewhere(tmp_path
 def test_doubtful_units_and_seen_readings_are_said(tmp_path):
     rows = ["5,10,50", "10,20,50", "20,40,50"]
     data = written(tmp_path, "m.csv", rows, "sinkage_m,pressure_kPa,b_mm")
-    assert "largest sinkage is 20 m" in terraglue("fit-soil", data, "--law", "bekker").stderr
+    told = terraglue("fit-soil", data, "--law", "bekker", "--density", "1.6").stderr
+    assert "the largest of the column `sinkage_m` = 20 m is 20 times above" in told and "or mm (0.02 m)?" in told, told
+    assert "`--density` = 1.6 kg/m^3" in told and "(1600 kg/m^3)?" in told, told
     process = terraglue("fit-soil", PLATES, "--law", "bekker", "--predict", PLATES)
     assert "the very readings of the fit" in process.stdout and "not seen before" not in process.stdout, process.stdout

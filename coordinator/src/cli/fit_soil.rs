@@ -23,6 +23,7 @@ pub fn fit_soil(a: &FitSoilArguments) -> Result<Exit> {
     let options =
         Options { cohesion_pa: a.cohesion_pa, phi_deg: a.phi_deg, shear_m: a.shear_m, density: a.density };
     let known = known(&options, a.soil.as_deref(), &a.data)?;
+    options.doubts().iter().for_each(|doubt| eprintln!("warning: {doubt}"));
     let tests = read_plausible(&a.data, from)?;
     let Some(built_in) = PRESSURE_LAWS.into_iter().find(|law| *law == a.law) else {
         return module(a, &tests, known);

@@ -2,6 +2,7 @@
 //! the parameters of modules.
 
 use super::nearest::did_you_mean;
+use super::plausible;
 use serde_json::Value;
 use terraglue_subsystem::{Parameter, ParameterType};
 
@@ -83,7 +84,9 @@ fn in_range(p: &Parameter, count: Option<usize>, x: f64, value: &Value) -> Resul
     }
     let message =
         format!("`{}` = {value} is out of range: it takes {}", last_part(&p.name), allowed(p, count));
-    Err(Complaint { message, help: help_line(p) })
+    let degrees =
+        plausible::in_radians(&p.unit, x, |x| p.min.is_none_or(|a| x >= a) && p.max.is_none_or(|b| x <= b));
+    Err(Complaint { message, help: degrees.or_else(|| help_line(p)) })
 }
 
 fn typed(p: &Parameter, count: Option<usize>, ok: bool, value: &Value) -> Result<(), Complaint> {

@@ -15,6 +15,7 @@ mod model;
 mod nearest;
 mod node;
 mod parameters;
+pub mod plausible;
 pub mod schema;
 mod section;
 mod set;

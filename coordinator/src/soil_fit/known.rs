@@ -2,6 +2,7 @@
 //! soil table.
 
 use super::Known;
+use crate::scenario::plausible;
 use crate::scenario::{InputError, check_value, find_soil_table, read_soil_table};
 use serde_json::Value;
 use std::path::Path;
@@ -30,6 +31,16 @@ impl Options {
             ("--shear-m", "K_m", self.shear_m),
             ("--density", "density_kg_m3", self.density),
         ]
+    }
+
+    /// What is doubtful about the values, as of the keys of a scenario.
+    pub fn doubts(&self) -> Vec<String> {
+        let doubt = |(option, key, value): (&str, &str, Option<f64>)| {
+            let usual =
+                if key == "phi_rad" { Some(plausible::FRICTION_DEGREES) } else { plausible::of_soil(key) };
+            usual?.doubt(&format!("`{option}`"), value?)
+        };
+        self.all().into_iter().filter_map(doubt).collect()
     }
 
     fn check(&self) -> Result<(), Box<InputError>> {
@@ -136,6 +147,23 @@ mod tests {
         assert!(
             (known(&good, None, Path::new(DATA)).expect("good").phi_rad.unwrap_or(0.0) - 0.5236).abs() < 1e-4
         );
+    }
+
+    #[test]
+    fn options_in_other_units_are_doubted() {
+        let slips =
+            Options { cohesion_pa: Some(1.04), phi_deg: Some(0.61), shear_m: Some(1.8), density: Some(1.6) };
+        let doubts = slips.doubts();
+        for (doubt, said) in doubts.iter().zip([
+            "in kPa (1040 Pa)",
+            "in rad (35 degrees)?",
+            "in cm (0.018 m)?",
+            "in t/m³ or g/cm³ (1600 kg/m^3)?",
+        ]) {
+            assert!(doubt.contains(said), "{doubt}");
+        }
+        assert_eq!(doubts.len(), 4);
+        assert!(Options { density: Some(1500.0), ..Options::default() }.doubts().is_empty());
     }
 
     #[test]

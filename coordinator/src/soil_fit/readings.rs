@@ -1,6 +1,7 @@
 //! Plate tests from comma-separated text; the unit stands in the name of a column.
 
 use crate::scenario::InputError;
+use crate::scenario::plausible::{PLATE_PRESSURE, PLATE_SINKAGE};
 use std::path::Path;
 use terraglue_soil_law::fit::Reading;
 
@@ -17,25 +18,14 @@ pub struct PlateTests {
     pub columns: [String; 2],
 }
 
-/// Largest sinkage (m) and range of the largest pressure (Pa) that plate tests have.
-const DEEPEST: f64 = 1.0;
-const PRESSURES: [f64; 2] = [100.0, 1e8];
-
 impl PlateTests {
     /// What makes the unit of a column doubtful; None: nothing.
     pub fn doubt(&self) -> Option<String> {
         let largest = |of: fn(&Reading) -> f64| self.readings.iter().map(of).fold(0.0, f64::max);
-        let (depth, pressure) = (largest(|r| r.depth), largest(|r| r.pressure));
         let [sinkages, pressures] = &self.columns;
-        if depth > DEEPEST {
-            return Some(format!(
-                "the largest sinkage is {depth} m: is the column `{sinkages}` in that unit?"
-            ));
-        }
-        let wrong = pressure > 0.0 && !(PRESSURES[0]..=PRESSURES[1]).contains(&pressure);
-        wrong.then(|| {
-            format!("the largest pressure is {pressure} Pa: is the column `{pressures}` in that unit?")
-        })
+        let of = |column: &str| format!("the largest of the column `{column}`");
+        let depth = PLATE_SINKAGE.doubt(&of(sinkages), largest(|r| r.depth));
+        depth.or_else(|| PLATE_PRESSURE.doubt(&of(pressures), largest(|r| r.pressure)))
     }
 }
 
@@ -142,9 +132,17 @@ mod tests {
         let doubt = |text: &str| parse(text, 0.0).unwrap().doubt();
         assert_eq!(doubt("sinkage_mm,b_m,pressure_kPa\n20,0.05,30\n"), None);
         let deep = doubt("sinkage_m,b_m,pressure_kPa\n20,0.05,30\n").unwrap();
-        assert!(deep.contains("sinkage is 20 m") && deep.contains("`sinkage_m`"), "{deep}");
+        assert!(
+            deep.contains("`sinkage_m` = 20 m is 20 times above")
+                && deep.contains("given in cm (0.2 m) or mm (0.02 m)?"),
+            "{deep}"
+        );
         let light = doubt("sinkage_mm,b_m,pressure_Pa\n20,0.05,30\n").unwrap();
-        assert!(light.contains("pressure is 30 Pa") && light.contains("`pressure_Pa`"), "{light}");
+        assert!(
+            light.contains("`pressure_Pa` = 30 Pa is 3.33 times below")
+                && light.contains("given in kPa (30000 Pa)"),
+            "{light}"
+        );
         assert!(doubt("sinkage_mm,b_m,pressure_MPa\n20,0.05,300\n").is_some());
     }
 

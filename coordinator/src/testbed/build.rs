@@ -46,7 +46,8 @@ impl Testbed {
         let terrain = services.terrain.clone();
         let services = change(services);
         let advice = [scenario::advice::late_events(scenario), scenario::advice::unread_keys(scenario)];
-        advice.iter().flatten().for_each(|advice| log::warn!("{advice}"));
+        let doubt = scenario::plausible::terrain(scenario);
+        advice.iter().flatten().chain(&doubt).for_each(|advice| log::warn!("{advice}"));
         let instances = instantiate(scenario, options, library, &services)?;
         let directory = Directory::new(&instances);
         let links = signals::connect(&scenario.connections, &directory, &instances, &scenario.source)?;
@@ -179,7 +180,8 @@ fn instantiate(
         }
         let gravity = services.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
         let replaced = scenario::advice::replaced_laws(scenario, spec, &config, gravity);
-        replaced.iter().for_each(|advice| log::warn!("{advice}"));
+        let doubts = scenario::plausible::soil(scenario, spec, module.schema(), &config);
+        replaced.iter().chain(&doubts).for_each(|advice| log::warn!("{advice}"));
         let advice = scenario::advice::law_parameters(module.schema(), spec, &scenario.source);
         advice.iter().for_each(|advice| log::warn!("{advice}"));
         let config = with_law(config, &search, scenario, spec)?;

@@ -130,15 +130,19 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
                 fitting.map(|(_, e)| *e).reduce(|a, b| if b.is_nan() || b > a { b } else { a })
             };
             for (part, from, to, limit) in
-                [("fine", 10.0, f64::INFINITY, 1.0), ("coarse", 3.0, 10.0, 3.0), ("few_cells", 0.0, 3.0, 0.0)]
+                [("fine", 10.0, f64::INFINITY, 1.0), ("coarse", 3.0, 10.0, 3.0), ("few_cells", 0.0, 3.0, 3.0)]
             {
                 let Some(error) = worst(from, to) else { continue };
-                let limit = if limit > 0.0 { Limit::AtMost(limit) } else { Limit::None };
                 let what = format!(
                     "largest error of the pressure, %, {} soils, 10 to 50 mm, R/spacing {from} to {to}",
                     if context.quick { 2 } else { 8 }
                 );
-                all.push(Figure::new(format!("soil.{module}.{name}.{part}"), 100.0 * error, limit, what));
+                all.push(Figure::new(
+                    format!("soil.{module}.{name}.{part}"),
+                    100.0 * error,
+                    Limit::AtMost(limit),
+                    what,
+                ));
             }
         }
         all.push(load_control(context, module, make)?);

@@ -169,48 +169,46 @@ struct Link {
     folder: tempfile::TempDir,
 }
 
+fn failed(what: &str, error: &dyn std::fmt::Display) -> Error {
+    Error::Failed(format!("isolation: {what}: {error}"))
+}
+
+/// Starts a worker of its own; whether it is one of Python.
+fn spawn(what: &What, folder: &Path, segment: &str) -> Result<(Process, bool)> {
+    use std::os::unix::process::CommandExt;
+    let python = python::command(what, folder, segment).map_err(|e| failed("no files for a worker", &e))?;
+    let is_python = python.is_some();
+    let mut command = match python {
+        Some(command) => command,
+        None => {
+            let mut command = Command::new(program()?);
+            command.args(["worker", segment]).stdin(Stdio::null()).stderr(Stdio::null());
+            command
+        }
+    };
+    command.env("TMPDIR", folder).stdout(Stdio::null()).process_group(0);
+    let child = command.spawn().map_err(|e| match what {
+        What::Python { python, .. } | What::Law { python, .. } => {
+            Error::Refused(python::not_started(python, &e))
+        }
+        _ => failed(&command.get_program().to_string_lossy(), &e),
+    })?;
+    Ok((Process::Own(child), is_python))
+}
+
 impl Link {
     fn new(what: &What, host: Arc<dyn Host>, services: &HostServices, isolation: Isolation) -> Result<Self> {
-        use std::os::unix::process::CommandExt;
-        let failed = |what: &str, e: &dyn std::fmt::Display| Error::Failed(format!("isolation: {what}: {e}"));
         let segment = Segment::new().map_err(|e| failed("no shared memory", &e))?;
         let folder = tempfile::Builder::new().prefix("terraglue-worker-").tempdir();
         let folder = folder.map_err(|e| failed("no temporary folder", &e))?;
         let (cancel, partings) = (services.cancel.clone(), services.partings.clone());
-        if let Some(nursed) = Nursed::take(what, folder.path(), &segment.path()) {
-            segment.never_look();
-            let child = Process::Nursed(nursed);
-            return Ok(Self {
-                segment,
-                child,
-                isolation,
-                host,
-                cancel,
-                partings,
-                gone: None,
-                is_python: true,
-                folder,
-            });
-        }
-        let python = python::command(what, folder.path(), &segment.path());
-        let python = python.map_err(|e| failed("no files for a worker", &e))?;
-        let is_python = python.is_some();
-        let mut command = match python {
-            Some(command) => command,
-            None => {
-                let mut command = Command::new(program()?);
-                command.args(["worker", &segment.path()]).stdin(Stdio::null()).stderr(Stdio::null());
-                command
+        let (child, is_python) = match Nursed::take(what, folder.path(), &segment.path()) {
+            Some(nursed) => {
+                segment.never_look();
+                (Process::Nursed(nursed), true)
             }
+            None => spawn(what, folder.path(), &segment.path())?,
         };
-        command.env("TMPDIR", folder.path()).stdout(Stdio::null()).process_group(0);
-        let child = command.spawn().map_err(|e| match what {
-            What::Python { python, .. } | What::Law { python, .. } => {
-                Error::Refused(python::not_started(python, &e))
-            }
-            _ => failed(&command.get_program().to_string_lossy(), &e),
-        })?;
-        let child = Process::Own(child);
         Ok(Self { segment, child, isolation, host, cancel, partings, gone: None, is_python, folder })
     }
 

@@ -21,6 +21,7 @@ mod mask;
 mod nodes;
 mod normal;
 mod patch;
+mod recall;
 mod soil;
 mod state;
 mod trial;

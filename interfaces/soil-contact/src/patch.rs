@@ -140,7 +140,7 @@ pub struct PatchNodes {
     /// Share of the shear strength that the slip so far has mobilised.
     pub mobilised: Vec<f64>,
     /// Largest depth as the node remembers it, and the curve and normal for which it holds.
-    remembered: Vec<(f64, [f64; 3])>,
+    pub(crate) remembered: Vec<(f64, [f64; 3])>,
     /// Reference level, world, m.
     pub reference: Vec<f64>,
     /// Number of the commit at which the node was last loaded; 0: no foot stood here.
@@ -288,18 +288,7 @@ impl Patches {
             None => contact_size(port, nodes, &self.nodes, range.clone(), spacing),
         };
         let (local, friction) = self.local_laws(laws, wheel.as_ref(), b, range.clone());
-        for k in range.clone() {
-            let permanent = self.nodes.permanent[k];
-            let curve = &self.laws[self.nodes.law[k]].curve;
-            if permanent > 0.0 && curve.keeper().is_none() {
-                let (largest, curve_then) = self.nodes.remembered[k];
-                let here = key(curve, n_z);
-                let z_max =
-                    if curve_then == here { largest } else { curve.largest_depth(permanent, largest) };
-                self.nodes.z_max[k] = z_max;
-                self.nodes.p_max[k] = curve.unloading() * (z_max - permanent);
-            }
-        }
+        self.recall_depths(range.clone(), n_z);
         if let Some(wheel) = &wheel {
             if let Some(shift) = wheel.shift(&laws[0].rolling, &self.nodes, range.clone()) {
                 self.shift_peak(wheel, &shift, range.clone());

@@ -369,7 +369,9 @@ impl PressureCurve {
         }
         let (k, e) = (self.unloading, self.exponent);
         if self.is_batched() {
-            return curve::largest_depth(&|z| self.beyond(z), k, permanent, self.elastic_limit, guess);
+            let mut depth = [guess];
+            self.largest_depths(&[permanent], &mut depth);
+            return depth[0];
         }
         if e == 1.0 {
             return k * permanent / (k - self.modulus);
@@ -390,6 +392,17 @@ impl PressureCurve {
             }
         }
         z.max(permanent)
+    }
+
+    /// [`PressureCurve::largest_depth`] of nodes where something stays: `depth` holds guesses and gets the answers.
+    pub fn largest_depths(&self, permanent: &[f64], depth: &mut [f64]) {
+        if self.is_batched() {
+            let law = |z: &[f64], p: &mut [f64], slope: &mut [f64]| self.beyond_many(z, p, slope);
+            return curve::largest_depths(&law, self.unloading, self.elastic_limit, permanent, depth);
+        }
+        for (permanent, depth) in permanent.iter().zip(depth) {
+            *depth = self.largest_depth(*permanent, *depth);
+        }
     }
 
     /// Depth at which soil pressed to z_max before gives the pressure p > 0, m; the free surface for p = 0.

@@ -73,32 +73,63 @@ pub fn work(law: &impl Fn(f64) -> (f64, f64), from: f64, to: f64) -> f64 {
     POINTS.iter().map(|(x, weight)| weight * half * law(middle + half * x).0).sum()
 }
 
-/// z with k_u·(z − permanent) = p(z), beyond the elastic limit: see `PressureCurve::largest_depth`.
-pub fn largest_depth(
-    law: &impl Fn(f64) -> (f64, f64),
+/// Nodes that are asked for together.
+const CHUNK: usize = 64;
+
+/// z with k_u·(z − permanent) = p(z), beyond the elastic limit, of several nodes: see `PressureCurve::largest_depth`. `law`
+/// answers pressures and slopes at a row of depths; `z` holds guesses and gets the answers.
+pub fn largest_depths(
+    law: &impl Fn(&[f64], &mut [f64], &mut [f64]),
     k_u: f64,
-    permanent: f64,
     limit: f64,
-    guess: f64,
-) -> f64 {
-    let (mut low, mut high) = (permanent.max(limit), DEEPEST);
-    let mut z = guess.clamp(low, high);
-    for k in 0..STEPS {
-        let (p, slope) = law(z);
-        let residual = k_u * (z - permanent) - p;
-        if residual < 0.0 {
-            low = z
-        } else {
-            high = z
-        }
-        let mut next = z - residual / (k_u - slope);
-        if halves(k) || !(next >= low && next <= high) {
-            next = 0.5 * (low + high);
-        }
-        if (next - z).abs() <= 1e-15 * z {
-            return next;
-        }
-        z = next;
+    permanent: &[f64],
+    z: &mut [f64],
+) {
+    for (permanent, z) in permanent.chunks(CHUNK).zip(z.chunks_mut(CHUNK)) {
+        largest_of_chunk(law, k_u, limit, permanent, z);
     }
-    z
+}
+
+fn largest_of_chunk(
+    law: &impl Fn(&[f64], &mut [f64], &mut [f64]),
+    k_u: f64,
+    limit: f64,
+    permanent: &[f64],
+    z: &mut [f64],
+) {
+    let (mut low, mut high) = ([0.0; CHUNK], [DEEPEST; CHUNK]);
+    let mut under_way: [usize; CHUNK] = std::array::from_fn(|i| i);
+    for i in 0..z.len() {
+        low[i] = permanent[i].max(limit);
+        z[i] = z[i].clamp(low[i], high[i]);
+    }
+    let mut count = z.len();
+    for k in 0..STEPS {
+        if count == 0 {
+            return;
+        }
+        let (mut at, mut p, mut slope) = ([0.0; CHUNK], [0.0; CHUNK], [0.0; CHUNK]);
+        at.iter_mut().zip(&under_way[..count]).for_each(|(at, i)| *at = z[*i]);
+        law(&at[..count], &mut p[..count], &mut slope[..count]);
+        let mut left = 0;
+        for m in 0..count {
+            let i = under_way[m];
+            let residual = k_u * (z[i] - permanent[i]) - p[m];
+            if residual < 0.0 {
+                low[i] = z[i]
+            } else {
+                high[i] = z[i]
+            }
+            let mut next = z[i] - residual / (k_u - slope[m]);
+            if halves(k) || !(next >= low[i] && next <= high[i]) {
+                next = 0.5 * (low[i] + high[i]);
+            }
+            if (next - z[i]).abs() > 1e-15 * z[i] {
+                under_way[left] = i;
+                left += 1;
+            }
+            z[i] = next;
+        }
+        count = left;
+    }
 }

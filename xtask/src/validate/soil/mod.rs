@@ -45,6 +45,10 @@ pub fn write_pictures() -> Outcome {
 const MODULES: [(&str, Maker); 2] =
     [("automaton", level::<SoilCellularAutomaton>), ("bekker", level::<SoilBekker>)];
 
+/// Keys of the automaton for material that stays where it is pressed, as integrals of stresses assume: all becomes denser in
+/// place, and walls stand.
+const STILL: &str = r#""compacted_fraction":1.0,"angle_of_repose_rad":1.4"#;
+
 /// `job` on every item, on as many threads as there are processors; answers in the order of the items.
 fn in_parallel<T: Sync, R: Send>(items: &[T], job: impl Fn(&T) -> R + Sync) -> Vec<R> {
     let (next, done) = (AtomicUsize::new(0), Mutex::new(Vec::new()));

@@ -1,10 +1,10 @@
 //! A real wheel: the smooth wheel of Carnegie Mellon's bench in Direct-90 sand. The integral of the stresses is
 //! calibrated on some slips, the soil with these numbers drives at all of them.
 
-use super::in_parallel;
 use super::plates::Maker;
 use super::wheel_rig::{Bench, Reading};
 use super::wong_reece::Wheel;
+use super::{STILL, in_parallel};
 use crate::process::{Outcome, read, root};
 use crate::validate::{Context, Figure, Limit};
 use terraglue_soil_law::DEFAULT_ELASTIC_STIFFNESS;
@@ -138,7 +138,7 @@ fn solve(mut m: [[f64; 7]; 6]) -> Numbers {
 fn config(x: &Numbers) -> String {
     format!(
         r#"{{"n":{},"k_c":0.0,"k_phi":{},"c_pa":1000.0,"phi_rad":0.506145483078,"K_m":{},"density_kg_m3":1330.0,
-            "interface_c_pa":{},"interface_phi_rad":{},"slip_sinkage":"ding","slip_sinkage_n1":{},"compacted_fraction":1.0}}"#,
+            "interface_c_pa":{},"interface_phi_rad":{},"slip_sinkage":"ding","slip_sinkage_n1":{},{STILL}}}"#,
         x[1],
         x[0].exp(),
         x[5].exp(),

@@ -42,6 +42,7 @@ impl Case {
             format!("soil.n={:?}", self.soil.value("n")),
             // the integral knows no material that moves
             "soil.soil-cellular-automaton.compacted_fraction=1.0".to_owned(),
+            "soil.soil-cellular-automaton.angle_of_repose_rad=1.4".to_owned(),
             format!("rig.velocity_target.travel={speed:?}"),
             format!("rig.torque_target.press={:?}", LOAD - WEIGHT),
         ];

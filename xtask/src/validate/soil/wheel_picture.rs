@@ -1,5 +1,6 @@
 //! `cargo xtask pictures`: pressure and shear below a driven wheel, as an SVG file for docs/soil-laws.md.
 
+use super::STILL;
 use super::automaton::{Soil, automaton_on};
 use super::panel::Panel;
 use super::rows::eight;
@@ -135,7 +136,7 @@ fn draw_stresses(out: &mut String, [moving, denser]: [&Contact; 2], wheel: &Whee
     for (y, colour, text) in [
         (58, "#c60", "normal stress, middle row"),
         (74, "#06c", "shear stress, middle row"),
-        (90, "#555", "full: soil becomes denser"),
+        (90, "#555", "full: soil becomes denser in place"),
         (106, "#555", "hollow: 75 % of it moves"),
         (122, "#555", "lines: Wong and Reece"),
     ] {
@@ -155,7 +156,7 @@ pub fn write_picture() -> Outcome {
     let soils = eight()?;
     let soil = soils.iter().find(|row| row.name == "lunar_nominal").ok_or("no lunar soil")?;
     let moving = drive(&soil.config);
-    let denser = drive(&soil.with(r#""compacted_fraction":1.0"#));
+    let denser = drive(&soil.with(STILL));
     let wheel = Wheel { unloading: DEFAULT_ELASTIC_STIFFNESS, ..wheel_on(soil, WHEEL, [0.0; 2]) };
     let mut out = String::from(
         "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 840 380' font-family='sans-serif' font-size='12'>\n\

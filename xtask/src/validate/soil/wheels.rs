@@ -4,7 +4,7 @@ use super::plates::Maker;
 use super::rows::{Row, eight};
 use super::wheel_rig::{Bench, Reading};
 use super::wong_reece::{State, Wheel, wheel_of, wheel_on};
-use super::{MODULES, in_parallel, real_wheel};
+use super::{MODULES, STILL, in_parallel, real_wheel};
 use crate::process::Outcome;
 use crate::validate::{Context, Figure, Limit};
 use terraglue_soil_law::DEFAULT_ELASTIC_STIFFNESS;
@@ -27,8 +27,8 @@ struct Case {
     slip: f64,
     peak: [f64; 2],
     spacing: f64,
-    /// Whether all that is pressed becomes denser in place; the automaton moves material otherwise.
-    denser: bool,
+    /// Whether all that is pressed becomes denser in place and nothing slides; the automaton moves material otherwise.
+    still: bool,
 }
 
 impl Case {
@@ -41,8 +41,8 @@ impl Case {
     fn driven(&self) -> Reading {
         let [radius, width, load] = self.wheel;
         let [a0, a1] = self.peak;
-        let denser = if self.denser { r#","compacted_fraction":1.0"# } else { "" };
-        let config = self.soil.with(&format!(r#""wheel_peak_a0":{a0},"wheel_peak_a1":{a1}{denser}"#));
+        let still = if self.still { format!(",{STILL}") } else { String::new() };
+        let config = self.soil.with(&format!(r#""wheel_peak_a0":{a0},"wheel_peak_a1":{a1}{still}"#));
         let soil = (self.make)(&config, (GROUND / self.spacing) as u32 + 1, self.spacing);
         Bench::new(soil, [radius, width], load, -0.5 * WAY).drive(self.slip, WAY, MEASURED)
     }
@@ -62,8 +62,8 @@ const SLIPS: [f64; 7] = [0.0, 0.1, 0.2, 0.3, 0.4, 0.6, 0.8];
 
 /// All figures.
 ///
-/// The integral knows no material that moves: what it is held against is soil that becomes denser where it is pressed. What
-/// the heap ahead of a wheel does to it on the automaton is told beside.
+/// The integral knows no material that moves: what it is held against is soil that becomes denser where it is pressed, and
+/// walls of ruts that stand. What heaps and slides do to it on the automaton is told beside.
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     let mut all = Vec::new();
     let depth = "the integral of the stresses with a0 = a1 = 0 and elastic exit";
@@ -97,7 +97,7 @@ fn errors(id: &str, of: &str, cases: &[Case]) -> [Figure; 2] {
 }
 
 /// The lines of the reference table; quickly two of them.
-fn cases(context: &Context, make: Maker, peak: [f64; 2], denser: bool) -> Outcome<Vec<Case>> {
+fn cases(context: &Context, make: Maker, peak: [f64; 2], still: bool) -> Outcome<Vec<Case>> {
     let rows = eight()?;
     let mut cases = Vec::new();
     for wheel in WHEELS {
@@ -108,7 +108,7 @@ fn cases(context: &Context, make: Maker, peak: [f64; 2], denser: bool) -> Outcom
                 if !context.quick || shown && (slip == 0.2 || slip == 0.6) {
                     let wheel = wheel_of(wheel).ok_or("no such wheel")?;
                     let spacing = SPACINGS[usize::from(!context.quick)];
-                    cases.push(Case { make, soil: soil.clone(), wheel, slip, peak, spacing, denser });
+                    cases.push(Case { make, soil: soil.clone(), wheel, slip, peak, spacing, still });
                 }
             }
         }

@@ -149,3 +149,52 @@ def test_doubtful_units_and_seen_readings_are_said(tmp_path):
     assert "`--density` = 1.6 kg/m^3" in told and "(1600 kg/m^3)?" in told, told
     process = terraglue("fit-soil", PLATES, "--law", "bekker", "--predict", PLATES)
     assert "the very readings of the fit" in process.stdout and "not seen before" not in process.stdout, process.stdout
+
+
+WHEEL = ROOT / "tests" / "reference" / "terramechanics" / "cmu_smooth_beta0_mean.csv"
+
+
+def slips(path, chosen):
+    rows = list(csv.DictReader(WHEEL.open()))
+    with path.open("w", newline="") as file:
+        writer = csv.DictWriter(file, rows[0].keys())
+        writer.writeheader()
+        writer.writerows(r for r in rows if round(float(r["slip"]), 1) in chosen)
+    return path
+
+
+def test_a_real_wheel_is_fitted_and_predicted(tmp_path):
+    seen, unseen = slips(tmp_path / "seen.csv", [-0.5, 0.0, 0.5, 0.9]), slips(tmp_path / "unseen.csv", [0.2, 0.8])
+    out = tmp_path / "soil.toml"
+    command = ["fit-soil", seen, "--wheel", "radius=0.058,width=0.05", "--soil", "CMU_Direct90_s0", "--predict", unseen]
+    process = terraglue(*command, "--out", out, "--json")
+    assert process.returncode == 0, process.stderr
+    found = json.loads(process.stdout)
+    assert [round(s["slip"], 2) for s in found["slips"]] == [0.0, 0.5, 0.9]
+    assert len(found["predicted"]["slips"]) == 2 and found["predicted"]["file"] == "unseen.csv"
+    for errors in (found["largest_error"], found["predicted"]["largest_error"]):
+        assert errors["sinkage"] < 0.15 and errors["pull_N"] < 2.0, errors
+    n = found["parameters"]["n"]
+    assert n["low"] <= n["value"] <= n["high"] and 0.8 < n["value"] < 2.0
+    drawing = (tmp_path / "soil.svg").read_text()
+    assert drawing.count("<polyline") == 2 and drawing.count("<circle") == 10
+    text = out.read_text()
+    assert 'slip_sinkage = "ding"' in text and "interface_phi_rad = " in text and "95 %:" in text
+    told = terraglue(*command).stdout
+    assert "1 rows of a braked wheel left out" in told and told.count("not seen") == 2, told
+    rig = (ROOT / "scenarios" / "wheel_rig.toml").read_text()
+    old = next(line for line in rig.splitlines() if line.startswith("parameters ="))
+    scenario = tmp_path / "rig.toml"
+    scenario.write_text(rig.replace(old, 'parameters = "soil.toml"', 1).replace("../models", str(ROOT / "models")))
+    checked = terraglue("check", scenario, "--set", "soil.module=soil-bekker")
+    assert checked.returncode == 0 and " usual " not in checked.stderr, checked.stderr
+
+
+def test_wrong_wheels_are_told(tmp_path):
+    wrong = lambda *more: terraglue("fit-soil", WHEEL, *more)
+    assert "radius and width" in wrong("--wheel", "radius=0.05").stderr
+    process = wrong("--wheel", "radius=0.058,width=0.05", "--law", "reece")
+    assert process.returncode == 2 and "Bekker's law" in process.stderr
+    small = wrong("--wheel", "radius=58,width=50", "--soil", "cheese")
+    assert small.returncode == 2 and "no soil is called" in small.stderr
+    assert terraglue("fit-soil", PLATES, "--wheel", "radius=1,width=1").returncode == 2

@@ -274,6 +274,10 @@ pub struct FitSoilArguments {
     /// Plate tests: columns sinkage_mm, pressure_kPa and plate_diam_mm or b_mm (also in m); equal cells in the other
     /// columns make one press.
     pub data: PathBuf,
+    /// The data are those of a driven wheel instead: columns slip, sinkage_mm (or in m), DP_N and Fz_N. Fitted are Bekker's law,
+    /// Ding's slip sinkage and the shear at the rim.
+    #[arg(long, value_name = "radius=M,width=M[,load=N]")]
+    pub wheel: Option<terraglue::soil_fit::Wheel>,
     /// Pressure-sinkage law: bekker, reece, bearing, or a law that is a module, by its name or the path of its file.
     #[arg(long, default_value = "bearing")]
     pub law: String,
@@ -309,6 +313,7 @@ pub struct FitSoilArguments {
 const FIT_EXAMPLES: &str = "\
 Example:
   terraglue fit-soil plates.csv --law bearing --density 1330 --cohesion-pa 1000 --out soil.toml --predict other.csv
+  terraglue fit-soil wheel.csv --wheel radius=0.058,width=0.05 --soil CMU_Direct90_s0 --out soil.toml
 
 The error is the root of the mean square of ln(p/p_measured). b is the radius of a disc or the short side of a
 rectangle. Confidence intervals: whole presses are left out in turn.";

@@ -1,6 +1,7 @@
 //! `terraglue fit-soil`: a soil from plate tests.
 
 use super::arguments::FitSoilArguments;
+use super::fit_wheel::wheel;
 use super::output::outln;
 use super::{Exit, show};
 use std::path::{Path, PathBuf};
@@ -24,6 +25,9 @@ pub fn fit_soil(a: &FitSoilArguments) -> Result<Exit> {
         Options { cohesion_pa: a.cohesion_pa, phi_deg: a.phi_deg, shear_m: a.shear_m, density: a.density };
     let known = known(&options, a.soil.as_deref(), &a.data)?;
     options.doubts().iter().for_each(|doubt| eprintln!("warning: {doubt}"));
+    if let Some(of) = a.wheel {
+        return wheel(a, of, &options, known);
+    }
     let tests = read_plausible(&a.data, from)?;
     let Some(built_in) = PRESSURE_LAWS.into_iter().find(|law| *law == a.law) else {
         return module(a, &tests, known);
@@ -31,31 +35,34 @@ pub fn fit_soil(a: &FitSoilArguments) -> Result<Exit> {
     let fit = fit_law(built_in, &tests, known)?;
     let all: Vec<SoilFit> = PRESSURE_LAWS.iter().filter_map(|law| fit_law(law, &tests, known).ok()).collect();
     let rms = |tests: &PlateTests| fit.fit.numbers.rms(&fit.fit.law, &tests.readings);
-    let unseen = a.predict.as_deref().map(|path| predict(path, from, &rms)).transpose()?;
+    let unseen = predict(a, &tests, &rms)?;
     if let Some(out) = &a.out {
         let source = format!("terraglue fit-soil {} --law {}", name(&a.data), a.law);
         write(out, &toml(&fit, &source))?;
         write(&drawing_of(out), &svg(&fit.curve(), &tests, unseen.as_ref().map(|(tests, _)| tests)))?;
     }
-    let predicted = unseen
-        .as_ref()
-        .zip(a.predict.as_deref())
-        .map(|((t, rms), p)| Predicted::of(name(p), *rms, t, &tests));
-    if a.json {
-        outln!("{}", json(&fit, &all, from, predicted.as_ref()));
-        return Ok(Exit::Done);
+    let predicted = unseen.map(|(_, predicted)| predicted);
+    match a.json {
+        true => outln!("{}", json(&fit, &all, from, predicted.as_ref())),
+        false => {
+            print(a, &tests, &fit, &all);
+            told(a, predicted.as_ref());
+        }
     }
-    print(a, &tests, &fit, &all);
+    Ok(Exit::Done)
+}
+
+/// How the fit does on unseen tests, and what was written.
+fn told(a: &FitSoilArguments, predicted: Option<&Predicted>) {
     if let Some(predicted) = predicted {
         outln!("{predicted}");
     }
     if let Some(out) = &a.out {
         outln!("{} and {} written", out.display(), drawing_of(out).display());
     }
-    Ok(Exit::Done)
 }
 
-fn name(path: &Path) -> String {
+pub(super) fn name(path: &Path) -> String {
     path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned())
 }
 
@@ -63,21 +70,19 @@ fn name(path: &Path) -> String {
 fn module(a: &FitSoilArguments, tests: &PlateTests, known: Known) -> Result<Exit> {
     let from = 1e-3 * a.from_mm;
     let fit = fit_module(&a.law, tests, known)?;
-    let unseen = a.predict.as_deref().map(|path| predict(path, from, &|t| fit.rms_of(t))).transpose()?;
+    let unseen = predict(a, tests, &|t| fit.rms_of(t))?;
     if let Some(out) = &a.out {
         write(out, &law_toml(&fit, &format!("terraglue fit-soil {} --law {}", name(&a.data), a.law)))?;
         let curve = Curve { law: &fit.name, rms: fit.rms, pressure: Box::new(|b, z| fit.pressure(b, z)) };
         write(&drawing_of(out), &svg(&curve, tests, unseen.as_ref().map(|(tests, _)| tests)))?;
     }
-    let predicted =
-        unseen.as_ref().zip(a.predict.as_deref()).map(|((t, rms), p)| Predicted::of(name(p), *rms, t, tests));
-    if a.json {
-        outln!("{}", law_json(&fit, from, predicted.as_ref()));
-        return Ok(Exit::Done);
-    }
-    print_law(a, tests, &fit);
-    if let Some(predicted) = predicted {
-        outln!("{predicted}");
+    let predicted = unseen.map(|(_, predicted)| predicted);
+    match a.json {
+        true => outln!("{}", law_json(&fit, from, predicted.as_ref())),
+        false => {
+            print_law(a, tests, &fit);
+            told(a, predicted.as_ref());
+        }
     }
     Ok(Exit::Done)
 }
@@ -93,14 +98,20 @@ fn print_law(a: &FitSoilArguments, tests: &PlateTests, fit: &LawFit) {
     outln!("{} of {} readings, those from {} mm of sinkage on", tests.readings.len(), tests.rows, a.from_mm);
 }
 
-fn predict(path: &Path, from: f64, rms: &dyn Fn(&PlateTests) -> f64) -> Result<(PlateTests, f64)> {
-    let tests = read_plausible(path, from)?;
+/// The tests of `--predict`, and how a fit to `fitted` does on them.
+fn predict(
+    a: &FitSoilArguments,
+    fitted: &PlateTests,
+    rms: &dyn Fn(&PlateTests) -> f64,
+) -> Result<Option<(PlateTests, Predicted)>> {
+    let Some(path) = &a.predict else { return Ok(None) };
+    let tests = read_plausible(path, 1e-3 * a.from_mm)?;
     if tests.readings.is_empty() {
         let message = format!("{}: no reading is deep enough", path.display());
         return Err(InputError::plain(message, Some("lower --from-mm".into())).into());
     }
-    let rms = rms(&tests);
-    Ok((tests, rms))
+    let predicted = Predicted::of(name(path), rms(&tests), &tests, fitted);
+    Ok(Some((tests, predicted)))
 }
 
 /// Reads tests and says what makes their units doubtful.
@@ -112,11 +123,11 @@ fn read_plausible(path: &Path, from: f64) -> Result<PlateTests> {
     Ok(tests)
 }
 
-fn drawing_of(out: &Path) -> PathBuf {
+pub(super) fn drawing_of(out: &Path) -> PathBuf {
     out.with_extension("svg")
 }
 
-fn write(path: &Path, text: &str) -> Result {
+pub(super) fn write(path: &Path, text: &str) -> Result {
     std::fs::write(path, text).map_err(|source| Error::File { path: path.display().to_string(), source })
 }
 

@@ -10,6 +10,7 @@ mod compare;
 mod convert;
 mod export;
 mod fit_soil;
+mod fit_wheel;
 mod fmu;
 mod folder;
 mod interrupt;

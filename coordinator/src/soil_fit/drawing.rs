@@ -97,12 +97,9 @@ impl Axes {
     }
 
     fn frame(&self) -> String {
-        let mut text = format!(
-            r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {WIDTH} {HEIGHT}" font-family="sans-serif" font-size="12"><rect width="100%" height="100%" fill="#ffffff"/>
-"##
-        );
+        let mut text = open_svg([WIDTH, HEIGHT]);
         let (right, bottom) = (WIDTH - RIGHT, HEIGHT - BOTTOM);
-        for value in ticks(1e3 * self.depth) {
+        for value in grid_lines([0.0, 1e3 * self.depth]) {
             let (x, _) = self.place(1e-3 * value, 0.0);
             let _ = writeln!(text, r##"<path d="M{x:.1} {TOP}V{bottom}" stroke="#dddddd"/>"##);
             let _ = writeln!(
@@ -111,7 +108,7 @@ impl Axes {
                 bottom + 16.0
             );
         }
-        for value in ticks(1e-3 * self.pressure) {
+        for value in grid_lines([0.0, 1e-3 * self.pressure]) {
             let (_, y) = self.place(0.0, 1e3 * value);
             let _ = writeln!(text, r##"<path d="M{LEFT} {y:.1}H{right}" stroke="#dddddd"/>"##);
             let _ = writeln!(
@@ -133,12 +130,20 @@ impl Axes {
     }
 }
 
-/// Round values from 0 up to `end`, about six.
-fn ticks(end: f64) -> Vec<f64> {
-    let rough = end / 6.0;
+/// The head of a drawing of that size, on white.
+pub(super) fn open_svg([width, height]: [f64; 2]) -> String {
+    format!(
+        r##"<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" font-family="sans-serif" font-size="12"><rect width="100%" height="100%" fill="#ffffff"/>
+"##
+    )
+}
+
+/// Round values between the ends, about six.
+pub(super) fn grid_lines([from, to]: [f64; 2]) -> Vec<f64> {
+    let rough = (to - from) / 6.0;
     let power = 10f64.powf(rough.log10().floor());
     let step =
         [1.0, 2.0, 5.0, 10.0].map(|f| f * power).into_iter().find(|s| *s >= rough).unwrap_or(10.0 * power);
     let round = |x: f64| format!("{x:.6e}").parse().unwrap_or(x);
-    (0..=(end / step) as u32).map(|k| round(f64::from(k) * step)).collect()
+    ((from / step).ceil() as i32..=(to / step).floor() as i32).map(|k| round(f64::from(k) * step)).collect()
 }

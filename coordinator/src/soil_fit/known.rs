@@ -1,12 +1,12 @@
 //! What the command line gives beside the tests: options, each within the range of its scenario key, over a row of the
 //! soil table.
 
-use super::Known;
+use super::{Known, WheelStart};
 use crate::scenario::plausible;
 use crate::scenario::{InputError, check_value, find_soil_table, read_soil_table};
 use serde_json::Value;
 use std::path::Path;
-use terraglue_soil_law::{SoilParameters, TableError};
+use terraglue_soil_law::{SoilParameters, SoilRow, TableError};
 use terraglue_subsystem::Parameter;
 
 /// Numbers given as options; None: not given.
@@ -80,7 +80,32 @@ pub fn known(options: &Options, soil: Option<&str>, data: &Path) -> Result<Known
     })
 }
 
+/// The row of the table beside the file `data` in which the fit of a wheel begins; loose soil where none is named.
+///
+/// # Errors
+/// A row that is not there, or that scenarios refuse, too.
+pub fn wheel_start(
+    options: &Options,
+    soil: Option<&str>,
+    data: &Path,
+) -> Result<WheelStart, Box<InputError>> {
+    let Some(name) = soil else { return Ok(WheelStart::default()) };
+    let row = find_row(options, name, data)?;
+    let start = WheelStart::default();
+    Ok(WheelStart { n: row.value("n").unwrap_or(start.n), k_phi: row.value("k_phi").unwrap_or(start.k_phi) })
+}
+
 fn of_row(options: &Options, name: &str, data: &Path) -> Result<Known, Box<InputError>> {
+    let row = find_row(options, name, data)?;
+    Ok(Known {
+        c_pa: row.value("c_pa"),
+        phi_rad: row.value("phi_rad"),
+        shear_m: row.value("K_m"),
+        density: row.value("density_kg_m3"),
+    })
+}
+
+fn find_row(options: &Options, name: &str, data: &Path) -> Result<SoilRow, Box<InputError>> {
     let plain = |message: String, help: Option<String>| InputError::plain(message, help);
     let beside = data.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let path = find_soil_table(beside).or_else(|| find_soil_table(Path::new("."))).ok_or_else(|| {
@@ -100,12 +125,7 @@ fn of_row(options: &Options, name: &str, data: &Path) -> Result<Known, Box<Input
         });
         plain(format!("--soil {name}: {e}"), help)
     })?;
-    Ok(Known {
-        c_pa: row.value("c_pa"),
-        phi_rad: row.value("phi_rad"),
-        shear_m: row.value("K_m"),
-        density: row.value("density_kg_m3"),
-    })
+    Ok(row.clone())
 }
 
 #[cfg(test)]

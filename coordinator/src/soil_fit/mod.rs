@@ -1,18 +1,27 @@
-//! Plate tests from a file to the parameters of a soil: readings, fit, soil file, drawing.
+//! Plate tests, or a wheel's, from a file to the parameters of a soil: readings, fit, soil file, drawing.
 //!
 //! The fit itself is in `terraglue_soil_law::fit`; here are files, names and units.
 
+mod columns;
 mod drawing;
 mod known;
 mod module_law;
 mod readings;
+mod rim;
+mod wheel;
+mod wheel_drawing;
 mod written;
+mod written_wheel;
 
 pub use drawing::{Curve, svg};
-pub use known::{Options, known};
+pub use known::{Options, known, wheel_start};
 pub use module_law::{LawFit, LawNumber, fit_module};
 pub use readings::{PlateTests, read};
+pub use rim::{Rim, Rolling};
+pub use wheel::{Wheel, WheelFit, WheelNumber, WheelPoint, WheelStart, WheelTests, fit_wheel, read_wheel};
+pub use wheel_drawing::wheel_svg;
 pub use written::{Predicted, basis, json, law_json, law_toml, rests, shown, toml};
+pub use written_wheel::{wheel_json, wheel_toml};
 
 use crate::scenario::InputError;
 use terraglue_soil_law::fit::{Fit, FitLaw, Interval, fit};

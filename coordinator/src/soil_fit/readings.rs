@@ -1,5 +1,6 @@
-//! Plate tests from comma-separated text; the unit stands in the name of a column.
+//! Plate tests from comma-separated text.
 
+use super::columns::{Columns, Names, SINKAGE, Wrong};
 use crate::scenario::InputError;
 use crate::scenario::plausible::{PLATE_PRESSURE, PLATE_SINKAGE};
 use std::path::Path;
@@ -29,11 +30,9 @@ impl PlateTests {
     }
 }
 
-/// Name of a column and how many SI units its unit has.
-const SINKAGE: &[(&str, f64)] = &[("sinkage_m", 1.0), ("sinkage_cm", 1e-2), ("sinkage_mm", 1e-3)];
-const PRESSURE: &[(&str, f64)] = &[("pressure_Pa", 1.0), ("pressure_kPa", 1e3), ("pressure_MPa", 1e6)];
+const PRESSURE: Names = &[("pressure_Pa", 1.0), ("pressure_kPa", 1e3), ("pressure_MPa", 1e6)];
 /// Size b: radius of a disc or short side of a rectangle.
-const SIZE: &[(&str, f64)] = &[
+const SIZE: Names = &[
     ("b_m", 1.0),
     ("b_cm", 1e-2),
     ("b_mm", 1e-3),
@@ -59,42 +58,28 @@ pub fn read(path: &Path, from: f64) -> Result<PlateTests, Box<InputError>> {
         .map_err(|(message, help)| InputError::plain(format!("{}: {message}", path.display()), help))
 }
 
-type Wrong = (String, Option<String>);
-
 fn parse(text: &str, from: f64) -> Result<PlateTests, Wrong> {
-    let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'));
-    let header: Vec<&str> = match lines.next() {
-        Some((_, line)) => line.split(',').map(str::trim).collect(),
-        None => return Err(("the file is empty".into(), None)),
-    };
-    let columns = [find(&header, SINKAGE)?, find(&header, PRESSURE)?, find(&header, SIZE)?];
+    let table = Columns::parse(text)?;
+    let header = &table.header;
+    let columns = [table.find(SINKAGE)?, table.find(PRESSURE)?, table.find(SIZE)?];
     let labels: Vec<usize> =
         (0..header.len()).filter(|k| !MEASURED.iter().any(|m| header[*k].starts_with(m))).collect();
     let names = [columns[0].0, columns[1].0].map(|place| header[place].to_owned());
     let mut tests = PlateTests { readings: Vec::new(), rows: 0, shallow: 0, columns: names };
     let mut curves: Vec<Vec<&str>> = Vec::new();
-    for (k, line) in lines {
-        let cells: Vec<&str> = line.split(',').map(str::trim).collect();
-        if cells.len() != header.len() {
-            return Err((format!("line {}: {} cells instead of {}", k + 1, cells.len(), header.len()), None));
-        }
+    for row in &table.rows {
         tests.rows += 1;
-        let number = |(place, scale): (usize, f64)| {
-            let value = cells[place].parse::<f64>().ok().filter(|v| v.is_finite());
-            let message =
-                || format!("line {}: `{}` in `{}` is not a number", k + 1, cells[place], header[place]);
-            value.map(|v| v * scale).ok_or_else(|| (message(), None))
-        };
+        let number = |column| table.number(row, column);
         let [depth, pressure, b] = [number(columns[0])?, number(columns[1])?, number(columns[2])?];
         if b <= 0.0 {
-            return Err((format!("line {}: the size of the plate must be larger than zero", k + 1), None));
+            return Err((format!("line {}: the size of the plate must be larger than zero", row.0), None));
         }
         // a reading in the middle of a bin of a millimetre is printed with rounding
         if depth < from * (1.0 - 1e-9) || depth <= 0.0 || pressure <= 0.0 {
             tests.shallow += 1;
             continue;
         }
-        let label: Vec<&str> = labels.iter().map(|k| cells[*k]).collect();
+        let label: Vec<&str> = labels.iter().map(|k| row.1[*k]).collect();
         let curve = curves.iter().position(|c| *c == label).unwrap_or_else(|| {
             curves.push(label);
             curves.len() - 1
@@ -102,15 +87,6 @@ fn parse(text: &str, from: f64) -> Result<PlateTests, Wrong> {
         tests.readings.push(Reading { curve, b, depth, pressure });
     }
     Ok(tests)
-}
-
-fn find(header: &[&str], names: &[(&str, f64)]) -> Result<(usize, f64), Wrong> {
-    let found = names.iter().find_map(|(name, scale)| Some((header.iter().position(|h| h == name)?, *scale)));
-    found.ok_or_else(|| {
-        let known: Vec<&str> = names.iter().map(|n| n.0).collect();
-        let message = format!("no column is called {}", known.join(" or "));
-        (message, Some(format!("the columns are {}", header.join(", "))))
-    })
 }
 
 #[cfg(test)]

@@ -5,7 +5,7 @@ use serde_json::{Value, json as value};
 use terraglue_soil_law::fit::{Basis, Interval};
 
 /// Significant digits of what is written: more than any plate test knows.
-fn digits(x: f64) -> String {
+pub(super) fn digits(x: f64) -> String {
     if x == 0.0 {
         return "0.0".into();
     }
@@ -18,7 +18,7 @@ fn digits(x: f64) -> String {
 }
 
 /// `low … high` with each end as `number` writes it; "unknown" where readings were too few for an interval.
-fn ends(i: Interval, number: impl Fn(f64) -> String) -> String {
+pub(super) fn ends(i: Interval, number: impl Fn(f64) -> String) -> String {
     if i.low.is_finite() && i.high.is_finite() {
         format!("{} … {}", number(i.low), number(i.high))
     } else {
@@ -141,52 +141,49 @@ pub fn law_toml(fit: &LawFit, source: &str) -> String {
     text
 }
 
-/// Everything of it for programs.
-pub fn law_json(fit: &LawFit, from: f64, predicted: Option<&Predicted>) -> Value {
-    let (basis, groups) = match fit.basis {
+/// A number with the ends of its interval, for programs; null where it is unknown.
+pub(super) fn number_json(number: f64, interval: Option<Interval>) -> Value {
+    let end = |end: fn(Interval) -> f64| interval.map(end).filter(|x| x.is_finite());
+    value!({ "value": number, "low": end(|i| i.low), "high": end(|i| i.high) })
+}
+
+/// What the JSON of every fit holds.
+fn fit_json(
+    law: &str,
+    rms: f64,
+    basis: Basis,
+    from: f64,
+    parameters: serde_json::Map<String, Value>,
+    predicted: Option<&Predicted>,
+) -> Value {
+    let (basis, groups) = match basis {
         Basis::Curves(n) => ("curves", n),
         Basis::Pieces(n) => ("pieces", n),
     };
-    let ends = |n: &super::LawNumber| {
-        let [low, high] = [n.interval.map(|i| i.low), n.interval.map(|i| i.high)];
-        value!({ "value": n.value, "low": low, "high": high })
-    };
-    let parameters: serde_json::Map<_, _> = fit.numbers.iter().map(|n| (n.name.clone(), ends(n))).collect();
     value!({
-        "law": fit.name,
-        "plugin": fit.plugin,
+        "law": law,
         "parameters": parameters,
-        "rms": fit.rms,
+        "rms": rms,
         "from_m": from,
         "intervals_from": { "basis": basis, "groups": groups, "confidence": 0.95 },
         "predicted": predicted.map(Predicted::json),
     })
 }
 
+/// A law that is a module, for programs.
+pub fn law_json(fit: &LawFit, from: f64, predicted: Option<&Predicted>) -> Value {
+    let parameters = fit.numbers.iter().map(|n| (n.name.clone(), number_json(n.value, n.interval))).collect();
+    let mut all = fit_json(&fit.name, fit.rms, fit.basis, from, parameters, predicted);
+    all["plugin"] = value!(fit.plugin);
+    all
+}
+
 /// Everything for programs.
 pub fn json(fit: &SoilFit, all: &[SoilFit], from: f64, predicted: Option<&Predicted>) -> Value {
-    let (basis, groups) = match fit.fit.basis {
-        Basis::Curves(n) => ("curves", n),
-        Basis::Pieces(n) => ("pieces", n),
-    };
-    let finite = |x: f64| if x.is_finite() { value!(x) } else { Value::Null };
-    let parameters: serde_json::Map<_, _> = fit
-        .parameters
-        .iter()
-        .map(|p| {
-            let ends =
-                value!({ "value": p.value, "low": finite(p.interval.low), "high": finite(p.interval.high) });
-            (p.name.to_owned(), ends)
-        })
-        .collect();
+    let number = |p: &super::Fitted| (p.name.to_owned(), number_json(p.value, Some(p.interval)));
+    let parameters = fit.parameters.iter().map(number).collect();
     let laws: serde_json::Map<_, _> = all.iter().map(|f| (f.law.to_owned(), value!(f.fit.rms))).collect();
-    value!({
-        "law": fit.law,
-        "parameters": parameters,
-        "rms": fit.fit.rms,
-        "from_m": from,
-        "intervals_from": { "basis": basis, "groups": groups, "confidence": 0.95 },
-        "rms_of_laws": laws,
-        "predicted": predicted.map(Predicted::json),
-    })
+    let mut out = fit_json(fit.law, fit.fit.rms, fit.fit.basis, from, parameters, predicted);
+    out["rms_of_laws"] = value!(laws);
+    out
 }

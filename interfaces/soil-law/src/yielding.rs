@@ -202,7 +202,7 @@ impl ShearLaw {
     fn respond_chunk(&self, nodes: &Sheared, out: &mut [ShearResponse]) {
         let doubles = nodes.kept.len() / nodes.pressure.len().max(1);
         let mut slipping = Slipping::new(self, nodes);
-        for round in 0..=STEPS {
+        for _ in 0..=STEPS {
             let n = slipping.count;
             if n == 0 {
                 return;
@@ -212,11 +212,10 @@ impl ShearLaw {
             self.strengths(&pressure[..n], &slip[..n], &kept[..n * doubles], answer);
             let mut take = |node: &Slip, stand, by| out[node.k] = self.ended(node, stand, by);
             slipping.newton(doubles, self.stiffness, &mut take);
-            if round == STEPS {
-                for at in 0..slipping.count {
-                    take(&slipping.nodes[at], Stand::Arrived, [slipping.by_p[at], slipping.by_j[at]]);
-                }
-            }
+        }
+        for at in 0..slipping.count {
+            let by = [slipping.by_p[at], slipping.by_j[at]];
+            out[slipping.nodes[at].k] = self.ended(&slipping.nodes[at], Stand::Arrived, by);
         }
     }
 

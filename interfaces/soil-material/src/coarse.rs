@@ -50,10 +50,9 @@ impl Heights {
         Self::new(Lattice { origin: fine.origin, spacing: 2.0 * fine.spacing, size }, mean)
     }
 
-    fn at(&self, a: i64, b: i64) -> i32 {
-        let within = |k: i64, n: u32| k.clamp(0, i64::from(n) - 1) as usize;
-        let size = self.lattice.size;
-        self.units[within(b, size[1]) * size[0] as usize + within(a, size[0])]
+    fn at(&self, a: i32, b: i32) -> i32 {
+        let (a, b) = self.lattice.clamp(a, b);
+        self.units[b as usize * self.lattice.size[0] as usize + a as usize]
     }
 }
 
@@ -70,7 +69,7 @@ impl Terrain for Heights {
     fn heights(&self, i0: i64, j0: i64, ni: usize, nj: usize, out: &mut [f64]) -> TerrainTile {
         for (b, row) in (j0..).zip(out.chunks_exact_mut(ni)).take(nj) {
             for (a, height) in (i0..).zip(row) {
-                *height = f64::from(self.at(a, b)) * UNIT_M;
+                *height = f64::from(self.at(a as i32, b as i32)) * UNIT_M;
             }
         }
         TerrainTile::Varied
@@ -136,7 +135,7 @@ fn settle_blocks(sweeper: &mut Sweeper, ground: &mut Ground, most: u32) -> Resul
     let sweeps = rest(&mut slides, &mut blocks, NEARLY_AT_REST, most);
     for b in 0..before.lattice.size[1] as i32 {
         for a in 0..before.lattice.size[0] as i32 {
-            let change = blocks.heights.units(a, b) - before.at(i64::from(a), i64::from(b));
+            let change = blocks.heights.units(a, b) - before.at(a, b);
             if change != 0 {
                 spread(change, &lattice, [a, b], |i, j, units| {
                     ground.add_material(i, j, units);

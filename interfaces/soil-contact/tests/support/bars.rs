@@ -7,6 +7,93 @@ use terraglue_subsystem::{
     Error, Geometry, Module, NodeLaw, PressureAnswer, PressureNodes, Result, ShearAnswer, ShearNodes,
 };
 
+/// The tests of a soil of type `$soil`; `$stays`: material stays where it is pressed.
+macro_rules! contact_tests {
+    ($soil:ty, $stays:expr) => {
+        #[test]
+        fn a_ball_rests_in_the_plain_pass() {
+            for soil in [support::LUNAR, support::LETE, support::DRY_SAND] {
+                bars::ball_rests::<$soil>(soil, false);
+            }
+        }
+
+        #[test]
+        fn a_ball_rests_under_the_iteration() {
+            for soil in [support::LUNAR, support::LETE, support::DRY_SAND] {
+                bars::ball_rests::<$soil>(soil, true);
+            }
+        }
+
+        #[test]
+        fn plates_follow_the_pressure_law() {
+            bars::plates_follow_bekker::<$soil>(support::LUNAR, [1.0, 1400.0, 820e3], $stays);
+            bars::plates_follow_bekker::<$soil>(support::LETE, [0.793, 102e3, 5301e3], $stays);
+            bars::plates_follow_bekker::<$soil>(support::DRY_SAND, [1.1, 990.0, 1_528_430.0], $stays);
+        }
+
+        #[test]
+        fn a_disc_sticks_below_its_limit_and_slides_above() {
+            for share in [0.3, 0.9] {
+                bars::disc_sticks::<$soil>(share);
+            }
+        }
+
+        #[test]
+        fn a_plate_shears_after_janosi_and_hanamoto() {
+            bars::plate_shears::<$soil>();
+        }
+
+        #[test]
+        fn derivatives_are_those_of_the_answers() {
+            for soil in [support::LUNAR, support::LETE, support::DRY_SAND] {
+                bars::derivatives_are_exact::<$soil>(soil);
+            }
+        }
+
+        #[test]
+        fn the_inverse_of_the_normal_law_is_exact() {
+            for soil in [support::LUNAR, support::LETE, support::DRY_SAND] {
+                bars::normal_inverse_is_exact::<$soil>(soil);
+            }
+        }
+
+        #[test]
+        fn a_gap_is_reported_from_the_unrounded_state() {
+            bars::gap_is_reported::<$soil>();
+        }
+
+        #[test]
+        fn saved_states_come_back_exactly() {
+            bars::states_are_exact::<$soil>();
+        }
+
+        #[test]
+        fn energy_goes_into_storage_or_heat() {
+            for soil in [support::LUNAR, support::LETE, support::DRY_SAND] {
+                bars::energy_balances::<$soil>(soil);
+            }
+        }
+
+        #[test]
+        fn regions_of_a_mask_have_their_laws() {
+            bars::regions_have_their_laws::<$soil>();
+            bars::derivatives_are_exact::<$soil>(&bars::two_soils());
+            bars::normal_inverse_is_exact::<$soil>(&bars::two_soils());
+        }
+
+        #[test]
+        fn adhesion_pulls_only_where_it_is_set_and_lets_go() {
+            bars::adhesion_holds_until_it_lets_go::<$soil>($stays);
+        }
+
+        #[test]
+        fn no_law_yields_energy_in_cycles() {
+            bars::cycles_yield_no_energy::<$soil>($stays);
+        }
+    };
+}
+pub(crate) use contact_tests;
+
 const FOOT: Geometry = Geometry::Sphere { radius: 0.03 };
 
 /// A ball of 5 kg comes to rest: T1 = m·g, no drift, at a depth where the law carries it.

@@ -62,8 +62,13 @@ pub(super) fn jackknife(
             answer(&rest.map(|(r, _)| *r).collect::<Vec<_>>())
         })
         .collect();
+    (spread(&answers, at), basis)
+}
+
+/// Intervals of the numbers `at` from the answers that were found with one group of readings left out each.
+pub fn spread(answers: &[Vec<f64>], at: &[f64]) -> Vec<Interval> {
     let of = |k: usize| interval(&answers.iter().map(|a| a[k]).collect::<Vec<_>>(), at[k]);
-    ((0..at.len()).map(of).collect(), basis)
+    (0..at.len()).map(of).collect()
 }
 
 fn interval(answers: &[f64], at: f64) -> Interval {

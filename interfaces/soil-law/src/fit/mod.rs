@@ -9,8 +9,8 @@ mod numbers;
 mod solve;
 mod student;
 
-pub use interval::{Basis, Interval};
-pub use numbers::{Free, NumbersFit, Pressures, fit_numbers};
+pub use interval::{Basis, Interval, spread};
+pub use numbers::{Free, Least, NumbersFit, Pressures, Residuals, fit_numbers, least_squares};
 
 /// One reading of a plate test.
 #[derive(Clone, Copy, Debug, PartialEq)]

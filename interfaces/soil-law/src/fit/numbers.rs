@@ -46,10 +46,12 @@ pub fn fit_numbers(law: &mut Pressures, free: &[Free], readings: &[Reading]) -> 
     if readings.len() < 4.max(free.len()) {
         return Err(FitError::TooFew);
     }
-    let start: Vec<f64> = free.iter().map(|f| f.start.clamp(f.min, f.max)).collect();
-    let mut search = Search { law, free };
-    let Some(found) = search.from(&start, readings) else { return Err(FitError::TooFew) };
-    let mut solve = |rest: &[Reading]| search.from(&found.numbers, rest).map(|f| f.numbers);
+    let start: Vec<f64> = free.iter().map(|f| f.start).collect();
+    let mut from = |start: &[f64], readings: &[Reading]| {
+        least_squares(&mut |x| logarithms(law, x, readings), free, start)
+    };
+    let Some(found) = from(&start, readings) else { return Err(FitError::TooFew) };
+    let mut solve = |rest: &[Reading]| from(&found.numbers, rest).map(|f| f.numbers);
     let (mut intervals, basis) = jackknife(readings, &mut solve, &found.numbers);
     for (interval, _) in intervals.iter_mut().zip(&found.felt).filter(|(_, felt)| !**felt) {
         *interval = Interval { low: f64::NAN, high: f64::NAN };
@@ -58,28 +60,47 @@ pub fn fit_numbers(law: &mut Pressures, free: &[Free], readings: &[Reading]) -> 
     Ok(NumbersFit { numbers: found.numbers, intervals, basis, rms })
 }
 
+/// ln(p/p_measured) of every reading; None: a pressure is none.
+fn logarithms(law: &mut Pressures, x: &[f64], readings: &[Reading]) -> Option<Vec<f64>> {
+    let mut p = vec![f64::NAN; readings.len()];
+    let good = law(x, readings, &mut p) && p.iter().all(|p| *p > 0.0 && p.is_finite());
+    let each = |(p, r): (&f64, &Reading)| libm::log(p / r.pressure);
+    good.then(|| p.iter().zip(readings).map(each).collect())
+}
+
+/// What least squares found.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Least {
+    /// The numbers in their order.
+    pub numbers: Vec<f64>,
+    /// Whether the residuals feel each of them; what they do not feel is left at its start.
+    pub felt: Vec<bool>,
+    /// Sum of the squares of the residuals.
+    pub squares: f64,
+}
+
+/// Residuals with these numbers; None: there are none.
+pub type Residuals<'a> = dyn FnMut(&[f64]) -> Option<Vec<f64>> + 'a;
+
+/// The numbers with the least squares of residuals, each within its range, sought from `start`; None: there are no residuals
+/// there.
+pub fn least_squares(residuals: &mut Residuals, free: &[Free], start: &[f64]) -> Option<Least> {
+    let start: Vec<f64> = start.iter().zip(free).map(|(x, f)| x.clamp(f.min, f.max)).collect();
+    Search { residuals, free }.from(&start)
+}
+
 struct Search<'a, 'b> {
-    law: &'a mut Pressures<'b>,
+    residuals: &'a mut Residuals<'b>,
     free: &'a [Free],
 }
 
-struct Found {
-    numbers: Vec<f64>,
-    felt: Vec<bool>,
-    squares: f64,
-}
-
 impl Search<'_, '_> {
-    /// ln(p/p_measured) of every reading; None: a pressure is none.
-    fn residuals(&mut self, x: &[f64], readings: &[Reading]) -> Option<Vec<f64>> {
-        let mut p = vec![f64::NAN; readings.len()];
-        let good = (self.law)(x, readings, &mut p) && p.iter().all(|p| *p > 0.0 && p.is_finite());
-        let each = |(p, r): (&f64, &Reading)| libm::log(p / r.pressure);
-        good.then(|| p.iter().zip(readings).map(each).collect())
+    fn residuals(&mut self, x: &[f64]) -> Option<Vec<f64>> {
+        (self.residuals)(x)
     }
 
     /// The derivative of the residuals `r` by number k; None: it is not felt.
-    fn column(&mut self, x: &[f64], k: usize, r: &[f64], readings: &[Reading]) -> Option<Vec<f64>> {
+    fn column(&mut self, x: &[f64], k: usize, r: &[f64]) -> Option<Vec<f64>> {
         let range = self.free[k];
         let mut step = 1e-7 * x[k].abs().max(1e-3);
         while step < 1e9 {
@@ -89,7 +110,7 @@ impl Search<'_, '_> {
                 if moved[k] > range.max || moved[k] < range.min {
                     continue;
                 }
-                let Some(there) = self.residuals(&moved, readings) else { continue };
+                let Some(there) = self.residuals(&moved) else { continue };
                 let taken = moved[k] - x[k];
                 if there.iter().zip(r).any(|(a, b)| (a - b).abs() > FELT) {
                     return Some(there.iter().zip(r).map(|(a, b)| (a - b) / taken).collect());
@@ -100,14 +121,14 @@ impl Search<'_, '_> {
         None
     }
 
-    fn from(&mut self, start: &[f64], readings: &[Reading]) -> Option<Found> {
+    fn from(&mut self, start: &[f64]) -> Option<Least> {
         let n = start.len();
         let mut x = start.to_vec();
-        let mut r = self.residuals(&x, readings)?;
+        let mut r = self.residuals(&x)?;
         let mut squares = sum_of_squares(&r);
         let (mut damping, mut felt) = (1e-3, vec![false; n]);
         for _ in 0..STEPS {
-            let columns: Vec<Option<Vec<f64>>> = (0..n).map(|k| self.column(&x, k, &r, readings)).collect();
+            let columns: Vec<Option<Vec<f64>>> = (0..n).map(|k| self.column(&x, k, &r)).collect();
             felt.iter_mut().zip(&columns).for_each(|(felt, c)| *felt |= c.is_some());
             let slope = |c: &Vec<f64>| c.iter().zip(&r).map(|(c, r)| c * r).sum::<f64>();
             // a number at its bound that would go beyond it stays
@@ -119,7 +140,7 @@ impl Search<'_, '_> {
                 .filter_map(|(k, c)| c.as_ref().map(|c| (k, c, slope(c))))
                 .filter(|(k, _, g)| !stays(*k, *g))
                 .collect();
-            let Some((next, there)) = self.step(&x, &moving, squares, &mut damping, readings) else { break };
+            let Some((next, there)) = self.step(&x, &moving, squares, &mut damping) else { break };
             let now = sum_of_squares(&there);
             let gain = squares - now;
             (x, r, squares) = (next, there, now);
@@ -127,7 +148,7 @@ impl Search<'_, '_> {
                 break;
             }
         }
-        Some(Found { numbers: x, felt, squares })
+        Some(Least { numbers: x, felt, squares })
     }
 
     /// A step that makes the squares smaller; None: there is none.
@@ -137,7 +158,6 @@ impl Search<'_, '_> {
         moving: &[(usize, &Vec<f64>, f64)],
         squares: f64,
         damping: &mut f64,
-        readings: &[Reading],
     ) -> Option<(Vec<f64>, Vec<f64>)> {
         let m = moving.len();
         if m == 0 {
@@ -160,7 +180,7 @@ impl Search<'_, '_> {
                 for ((k, ..), change) in moving.iter().zip(change) {
                     next[*k] = (next[*k] + change).clamp(self.free[*k].min, self.free[*k].max);
                 }
-                if let Some(there) = self.residuals(&next, readings)
+                if let Some(there) = self.residuals(&next)
                     && sum_of_squares(&there) < squares
                 {
                     *damping = (*damping * 0.2).max(1e-12);

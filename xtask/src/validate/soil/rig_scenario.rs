@@ -1,11 +1,12 @@
 //! `scenarios/wheel_rig.toml` as a user runs it, against the integral of the stresses: sinkage and drawbar pull by slip.
 
 use super::rows::{EIGHT, Row, eight};
-use super::wong_reece::{State, Wheel, wheel_on};
+use super::wong_reece::wheel_on;
 use super::{MODULES, in_parallel};
 use crate::process::{Outcome, read, run_scenario};
 use crate::validate::{Context, Figure, Limit};
 use std::collections::BTreeMap;
+use terraglue::soil_fit::{Rim, Rolling};
 use terraglue_soil_law::DEFAULT_ELASTIC_STIFFNESS;
 
 const SCENARIO: &str = "scenarios/wheel_rig.toml";
@@ -57,9 +58,9 @@ impl Case {
             .ok_or_else(|| format!("{id}: no table"))
     }
 
-    fn expected(&self) -> State {
+    fn expected(&self) -> Rolling {
         let wheel = wheel_on(&self.soil, WHEEL, [0.0; 2]);
-        Wheel { unloading: DEFAULT_ELASTIC_STIFFNESS, ..wheel }.under(LOAD, self.slip)
+        Rim { unloading: DEFAULT_ELASTIC_STIFFNESS, ..wheel }.under(LOAD, self.slip)
     }
 
     /// Errors of sinkage (%), of drawbar pull and of the load (% of the load), and of the slip that the soil tells.

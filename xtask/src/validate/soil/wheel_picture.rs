@@ -5,10 +5,11 @@ use super::automaton::{Soil, automaton_on};
 use super::panel::Panel;
 use super::rows::eight;
 use super::wheel_rig::Bench;
-use super::wong_reece::{Wheel, wheel_on};
+use super::wong_reece::wheel_on;
 use crate::process::{Outcome, root, write};
 use std::borrow::{Borrow, BorrowMut};
 use std::fmt::Write;
+use terraglue::soil_fit::Rim;
 use terraglue_soil_law::{DEFAULT_ELASTIC_STIFFNESS, ShearLaw};
 use terraglue_subsystem::Subsystem;
 
@@ -106,7 +107,7 @@ fn draw_map(out: &mut String, contact: &Contact) {
     out.push_str("<text x='352' y='30'>kPa</text>\n");
 }
 
-fn draw_stresses(out: &mut String, [moving, denser]: [&Contact; 2], wheel: &Wheel) {
+fn draw_stresses(out: &mut String, [moving, denser]: [&Contact; 2], wheel: &Rim) {
     let panel = Panel { at: [470.0, 40.0], size: [350.0, 280.0], low: [-10.0, 0.0], high: [45.0, HIGHEST] };
     panel.axes(
         out,
@@ -157,7 +158,7 @@ pub fn write_picture() -> Outcome {
     let soil = soils.iter().find(|row| row.name == "lunar_nominal").ok_or("no lunar soil")?;
     let moving = drive(&soil.config);
     let denser = drive(&soil.with(STILL));
-    let wheel = Wheel { unloading: DEFAULT_ELASTIC_STIFFNESS, ..wheel_on(soil, WHEEL, [0.0; 2]) };
+    let wheel = Rim { unloading: DEFAULT_ELASTIC_STIFFNESS, ..wheel_on(soil, WHEEL, [0.0; 2]) };
     let mut out = String::from(
         "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 840 380' font-family='sans-serif' font-size='12'>\n\
          <rect width='840' height='380' fill='white'/>\n\

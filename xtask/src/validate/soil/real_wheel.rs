@@ -74,7 +74,7 @@ pub fn figures(context: &Context, name: &str, make: Maker) -> Outcome<Vec<Figure
         let falls = found.windows(2).filter(|w| w[1].sinkage <= w[0].sinkage).count();
         let what = format!("slips between 0 and 0.9 at which the sinkage does not rise; {of}");
         all.push(Figure::new(format!("{id}.falls"), falls as f64, Limit::Equal(0.0), what));
-        if automaton {
+        if automaton && !context.quick {
             all.extend(moving(&id, of, &points, &drive("")));
         }
     }

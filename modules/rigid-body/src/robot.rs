@@ -363,6 +363,9 @@ impl Subsystem for Robot {
         } else {
             self.prepare(step)?;
             self.try_wrenches(t)?;
+            if !self.dynamics.integrator.is_second_order() {
+                step.ports.iter().for_each(|p| self.dynamics.find_rates(p.body as usize));
+            }
             response(step.ports, &self.dynamics, out);
         }
         out.t.copy_from_slice(t);
@@ -403,6 +406,7 @@ impl Subsystem for Robot {
             self.changed();
             return Ok(());
         }
+        self.dynamics.complete();
         self.scratch.free.resize(step.n as usize, 0.0);
         self.book_contacts();
         self.book_ports(step, t);

@@ -58,7 +58,9 @@ struct Freedom {
     motion: Wrench,
     /// A·motion, with the freedoms before it taken out.
     response: Wrench,
-    /// 1/(motionᵀ·response + K).
+    /// motionᵀ·response.
+    own: f64,
+    /// 1/(own + K).
     inverse: f64,
     /// K: 1/compliance of the row; 0: free.
     stiffness: f64,
@@ -248,15 +250,72 @@ impl Tree {
         }
     }
 
-    /// The same for a right-hand side that is kept; says so when the solution is not finite.
+    /// The same without the impulses of rigid rows, which become 0 and which [`Tree::impulses`] tells; for trees without
+    /// loops.
+    pub fn substitute_rates(&self, x: &mut [f64]) {
+        for (b, node) in self.nodes.iter().enumerate().rev() {
+            let rest = node.forward_rates(b, x, 6 * self.nodes.len());
+            if let Some(p) = node.parent.filter(|_| node.hangs) {
+                x[6 * p..6 * p + 6].iter_mut().zip(rest).for_each(|(x, r)| *x += r);
+            }
+        }
+        for (b, node) in self.nodes.iter().enumerate() {
+            node.backward_rates(b, x, 6 * self.nodes.len());
+        }
+    }
+
+    /// Writes the impulses of rigid rows into a solution whose rates are known: what a body and all below it get of the
+    /// right-hand side and do not need for their rates, their joint carries. `masses`, `inertia`: as factored; `below`: a
+    /// buffer.
+    pub fn impulses(
+        &self,
+        masses: &[f64],
+        inertia: &[Matrix3<f64>],
+        rhs: &[f64],
+        x: &mut [f64],
+        below: &mut Vec<Wrench>,
+    ) {
+        below.clear();
+        below.resize(self.nodes.len(), [0.0; 6]);
+        for (b, node) in self.nodes.iter().enumerate().rev() {
+            let Some(joint) = node.joint.filter(|_| node.hangs) else { continue };
+            let (v, f) = (at(x, 6 * b), at(rhs, 6 * b));
+            let turn = inertia[b] * Vector3::new(v[3], v[4], v[5]);
+            let mut carried = below[b];
+            for k in 0..3 {
+                carried[k] += f[k] - masses[b] * v[k];
+                carried[3 + k] += f[3 + k] - turn[k];
+            }
+            let row_at = self.joint_at(joint);
+            let along = node.rows.along(&carried);
+            (0..6).filter(|r| node.rigid[*r]).for_each(|r| x[row_at + r] = along[r]);
+            if let Some(p) = node.parent {
+                add(&mut below[p], 1.0, &wrench_back(&carried, &node.shift));
+            }
+        }
+    }
+
+    /// [`Tree::substitute`] for a right-hand side that is kept; says so when the solution is not finite.
     pub fn solve(&self, rhs: &[f64], x: &mut [f64]) -> Result<(), Error> {
         x.copy_from_slice(rhs);
         self.substitute(x);
-        // In eight sums, which need not wait for each other; a sum is finite only if all its terms are.
-        let mut sums = [0.0_f64; 8];
-        x.chunks(8).for_each(|part| sums.iter_mut().zip(part).for_each(|(s, x)| *s += x));
-        if sums.iter().all(|s| s.is_finite()) { Ok(()) } else { Err(Error::NotFinite) }
+        finite(x)
     }
+
+    /// [`Tree::substitute_rates`] likewise.
+    pub fn solve_rates(&self, rhs: &[f64], x: &mut [f64]) -> Result<(), Error> {
+        x.copy_from_slice(rhs);
+        self.substitute_rates(x);
+        finite(x)
+    }
+}
+
+/// Says so when a solution is not finite.
+fn finite(x: &[f64]) -> Result<(), Error> {
+    // In eight sums, which need not wait for each other; a sum is finite only if all its terms are.
+    let mut sums = [0.0_f64; 8];
+    x.chunks(8).for_each(|part| sums.iter_mut().zip(part).for_each(|(s, x)| *s += x));
+    if sums.iter().all(|s| s.is_finite()) { Ok(()) } else { Err(Error::NotFinite) }
 }
 
 impl Node {
@@ -294,7 +353,8 @@ impl Node {
     fn eliminate(&mut self, a: &mut Inertia) -> Result<(), f64> {
         for f in &mut self.freedoms[..self.count] {
             f.response = times(a, &f.motion);
-            let pivot = dot(&f.motion, &f.response) + f.stiffness;
+            f.own = dot(&f.motion, &f.response);
+            let pivot = f.own + f.stiffness;
             if !(pivot > 0.0 && pivot.is_finite()) {
                 return Err(pivot);
             }
@@ -335,6 +395,47 @@ impl Node {
             x[row_at + f.row] = share;
         }
         wrench_back(&p, &self.shift)
+    }
+
+    /// The same, but leaves what each freedom feels in the rates of the body.
+    #[inline]
+    fn forward_rates(&self, b: usize, x: &mut [f64], joints_at: usize) -> Wrench {
+        let Some(joint) = self.joint.filter(|_| self.hangs) else { return self.forward(b, x, joints_at) };
+        let mut p = at(x, 6 * b);
+        let rhs = at(x, joints_at + 6 * joint);
+        if let Some(asked) = self.asked(&rhs) {
+            add(&mut p, -1.0, &times(&self.inertia, &asked));
+        }
+        for (k, f) in self.freedoms[..self.count].iter().enumerate() {
+            let felt = dot(&f.motion, &p);
+            add(&mut p, -(felt + f.stiffness * rhs[f.row]) * f.inverse, &f.response);
+            x[6 * b + k] = felt;
+        }
+        wrench_back(&p, &self.shift)
+    }
+
+    /// Rates of the body from those of its parent, and the impulses of compliant rows of its joint.
+    #[inline]
+    fn backward_rates(&self, b: usize, x: &mut [f64], joints_at: usize) {
+        let Some(joint) = self.joint.filter(|_| self.hangs) else { return self.backward(b, x, joints_at) };
+        let row_at = joints_at + 6 * joint;
+        let (felt, rhs) = (at(x, 6 * b), at(x, row_at));
+        let mut v = match self.parent {
+            Some(parent) => rates_further(&at(x, 6 * parent), &self.shift),
+            None => [0.0; 6],
+        };
+        let mut impulses = [0.0; 6];
+        for (f, felt) in self.freedoms[..self.count].iter().zip(felt).rev() {
+            let (left, asked) = (felt - dot(&f.response, &v), rhs[f.row]);
+            // μ = K·(rate − b), without the difference of what may be nearly equal
+            impulses[f.row] = f.stiffness * f.inverse * (left - f.own * asked);
+            add(&mut v, (left + f.stiffness * asked) * f.inverse, &f.motion);
+        }
+        if let Some(asked) = self.asked(&rhs) {
+            add(&mut v, 1.0, &asked);
+        }
+        x[row_at..row_at + 6].copy_from_slice(&impulses);
+        x[6 * b..6 * b + 6].copy_from_slice(&v);
     }
 
     /// Rates of the body from those of its parent, and the impulses of its joint.

@@ -121,6 +121,28 @@ proptest! {
     }
 
     #[test]
+    fn rates_first_and_impulses_of_rigid_rows_later_are_the_whole_solution(raw in prop::collection::vec(body(), 1..12)) {
+        let f = forest(&raw);
+        let tree = f.tree();
+        let (k, rhs) = (f.dense(&tree), f.rhs(&tree));
+        let mut x = vec![0.0; tree.len()];
+        tree.solve_rates(&rhs, &mut x).expect("finite");
+        let rates = x.clone();
+        tree.impulses(&f.masses, &f.inertia, &rhs, &mut x, &mut Vec::new());
+        let bodies = 6 * f.links.len();
+        prop_assert_eq!(&rates[..bodies], &x[..bodies]);
+        for (j, rows) in f.compliance.iter().enumerate() {
+            for r in (0..6).filter(|r| rows[*r].is_some_and(|c| c > 0.0)) {
+                prop_assert_eq!(rates[tree.joint_at(j) + r], x[tree.joint_at(j) + r]);
+            }
+        }
+        let x = DVector::from_vec(x);
+        let residual = &k * &x - DVector::from_vec(rhs);
+        let scale = (k.abs() * x.abs()).amax().max(1.0);
+        prop_assert!(residual.amax() <= 1e-12 * scale, "{} {scale}", residual.amax());
+    }
+
+    #[test]
     fn paths_give_the_inverse_between_bodies(raw in prop::collection::vec(body(), 2..10)) {
         let f = forest(&raw);
         let tree = f.tree();

@@ -26,7 +26,6 @@ impl Dynamics {
             self.find_places();
             let open = self.gaps_into_correction().1;
             if open <= GAP_TOLERANCE {
-                self.find_rates();
                 return Ok(());
             }
             let shrinks = open < CLOSES * least;
@@ -39,18 +38,22 @@ impl Dynamics {
                 mixed = Some(0);
             }
             least = least.min(open);
-            self.kkt.solver.substitute(&mut self.correction);
+            if self.lean {
+                self.kkt.solver.substitute_rates(&mut self.correction);
+            } else {
+                self.kkt.solver.substitute(&mut self.correction);
+            }
             if let Some(rounds) = &mut mixed {
                 self.anderson.mix(*rounds, &self.solution, &mut self.correction);
                 *rounds += 1;
             }
             self.solution.iter_mut().zip(&self.correction).for_each(|(s, c)| *s += c);
             if mixed.is_none() && self.surely_closes() {
-                self.find_ends();
+                self.find_places();
                 return Ok(());
             }
         }
-        self.find_ends();
+        self.find_places();
         self.check_gaps()
     }
 
@@ -103,7 +106,7 @@ impl Dynamics {
     /// Positions and rates at the end of the step from `solution`.
     pub(super) fn find_ends(&mut self) {
         self.find_places();
-        self.find_rates();
+        (0..self.ends.len()).for_each(|b| self.find_rates(b));
     }
 
     /// Positions at the end of the step.
@@ -120,16 +123,14 @@ impl Dynamics {
         }
     }
 
-    /// Rates at the end of the step, after its positions.
-    pub(super) fn find_rates(&mut self) {
-        for b in 0..self.ends.len() {
-            let (start, at) = (&self.starts[b], self.kkt.body_at[b]);
-            let u = &self.solution[at..at + 6];
-            let (v, w, q) = (V3::new(u[0], u[1], u[2]), V3::new(u[3], u[4], u[5]), self.ends[b].q);
-            // The impulses change the angular momentum; the rate follows with the inertia of the new orientation.
-            let momentum = self.inertia[b] * (w - self.free_rate[b] + start.w);
-            let rate = q * (self.model.bodies[b].inverse_inertia * q.inverse_transform_vector(&momentum));
-            (self.ends[b].v, self.ends[b].w) = (v, rate);
-        }
+    /// Rates of a body at the end of the step, after its position.
+    pub fn find_rates(&mut self, b: usize) {
+        let (start, at) = (&self.starts[b], self.kkt.body_at[b]);
+        let u = &self.solution[at..at + 6];
+        let (v, w, q) = (V3::new(u[0], u[1], u[2]), V3::new(u[3], u[4], u[5]), self.ends[b].q);
+        // The impulses change the angular momentum; the rate follows with the inertia of the new orientation.
+        let momentum = self.inertia[b] * (w - self.free_rate[b] + start.w);
+        let rate = q * (self.model.bodies[b].inverse_inertia * q.inverse_transform_vector(&momentum));
+        (self.ends[b].v, self.ends[b].w) = (v, rate);
     }
 }

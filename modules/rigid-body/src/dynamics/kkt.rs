@@ -10,6 +10,7 @@ pub(crate) struct Kkt {
     pub body_at: Vec<usize>,
     pub joint_at: Vec<usize>,
     masses: Vec<f64>,
+    below: Vec<[f64; 6]>,
 }
 
 impl Kkt {
@@ -25,6 +26,7 @@ impl Kkt {
             body_at: (0..model.bodies.len()).map(|b| solver.body_at(b)).collect(),
             joint_at: (0..model.joints.len()).map(|j| solver.joint_at(j)).collect(),
             masses: model.bodies.iter().map(|b| b.mass).collect(),
+            below: Vec::with_capacity(model.bodies.len()),
             solver,
         })
     }
@@ -44,5 +46,10 @@ impl Kkt {
         cuts: &[Cut],
     ) -> Result<(), Error> {
         self.solver.factor(&self.masses, inertia, rows, compliance, cuts)
+    }
+
+    /// Writes the impulses of rigid rows into a solution that has the rates only.
+    pub fn complete(&mut self, inertia: &[M3], rhs: &[f64], solution: &mut [f64]) {
+        self.solver.impulses(&self.masses, inertia, rhs, solution, &mut self.below);
     }
 }

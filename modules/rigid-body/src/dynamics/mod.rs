@@ -120,6 +120,8 @@ pub(crate) struct Dynamics {
     pub modes: Vec<Mode>,
     next_modes: Vec<Mode>,
     factored: bool,
+    /// Whether trials leave out what the commit alone asks for (see [`Dynamics::complete`]).
+    lean: bool,
     /// Counts factorisations; tells whether a compliance matrix is still valid.
     pub factor_count: u64,
     /// External impulses of the trial, laid out as the unknowns.
@@ -176,6 +178,7 @@ impl Dynamics {
             modes: vec![Mode::Free; nj],
             next_modes: vec![Mode::Free; nj],
             factored: false,
+            lean: false,
             factor_count: 0,
             external: vec![0.0; n],
             carried: Vec::new(),
@@ -352,6 +355,11 @@ impl Dynamics {
         self.kkt.factor(&self.inertia, &self.rows, &self.compliance, &self.closing.cuts)?;
         self.factored = true;
         self.factor_count += 1;
+        // Rigid rows along axes are asked for their impulses by every trial.
+        let rigid =
+            |(joint, c): (&Joint, &[Option<f64>; 6])| joint.free_row().is_some_and(|r| c[r] == Some(0.0));
+        let plain = !self.integrator.is_second_order() && !self.contacts.any() && !self.closes();
+        self.lean = plain && !self.model.joints.iter().zip(&self.compliance).any(rigid);
         Ok(())
     }
 
@@ -383,6 +391,7 @@ impl Dynamics {
                 Err(open) => {
                     self.solve_branch()?;
                     if !self.change_branches(one_at_a_time) {
+                        self.complete_impulses();
                         return Err(self.explained(open));
                     }
                 }
@@ -396,6 +405,10 @@ impl Dynamics {
     /// The step on the present branches, but for what it leaves open of the joints.
     fn solve_branch(&mut self) -> Result<(), Failure> {
         self.assemble();
+        if self.lean {
+            self.kkt.solver.solve_rates(&self.rhs, &mut self.solution)?;
+            return Ok(());
+        }
         self.kkt.solver.solve(&self.rhs, &mut self.solution)?;
         self.contacts.resolve(&self.kkt.solver, &self.kkt.body_at, &mut self.solution)?;
         Ok(())

@@ -5,6 +5,21 @@ use super::{Dynamics, joint_rows};
 use crate::math::V3;
 
 impl Dynamics {
+    /// What the commit asks for beyond a trial: rates at the end of the step, impulses of rigid rows.
+    pub fn complete(&mut self) {
+        if !self.integrator.is_second_order() {
+            (0..self.ends.len()).for_each(|b| self.find_rates(b));
+            self.complete_impulses();
+        }
+    }
+
+    /// Impulses of rigid rows, where trials leave them out.
+    pub(super) fn complete_impulses(&mut self) {
+        if self.lean {
+            self.kkt.complete(&self.inertia, &self.rhs, &mut self.solution);
+        }
+    }
+
     /// Force (N) at the joint's anchor and moment (N m) about it that the joint exerts on the child, world axes; the
     /// parent feels the opposite. `axis`: impulse along the free axis, N m s or N s. Mean of the step in first order,
     /// at its end (generalized-α) or in its middle in second.

@@ -63,6 +63,8 @@ struct State {
     inside: usize,
     /// Threads that sleep until the next one.
     asleep: usize,
+    /// Whether the caller sleeps until they have left it.
+    awaited: bool,
     stop: bool,
     panicked: Option<Box<dyn Any + Send>>,
 }
@@ -188,7 +190,7 @@ impl Shared {
                 self.take_pieces(current);
                 state = self.lock();
                 self.count(&mut state, -1);
-                if state.inside == 0 {
+                if state.inside == 0 && state.awaited {
                     self.ended.notify_one();
                 }
             }
@@ -238,9 +240,11 @@ impl Shared {
             patience.wait(|| self.inside.load(Ordering::Acquire) == 0);
             state = self.lock();
         }
+        state.awaited = true;
         while state.inside > 0 {
             state = self.ended.wait(state).unwrap_or_else(PoisonError::into_inner);
         }
+        state.awaited = false;
         let panicked = state.panicked.take();
         drop(state);
         if let Some(payload) = panicked {

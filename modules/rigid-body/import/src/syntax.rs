@@ -37,8 +37,53 @@ const NUMBERS: [(&str, &str, usize); 27] = [
 /// Kinds of joints of the format.
 const KINDS: [&str; 7] = ["revolute", "continuous", "prismatic", "fixed", "floating", "planar", "spherical"];
 
+/// Deepest nesting of elements that is read: readers of trees of elements call themselves.
+const DEEPEST: usize = 500;
+
+/// Refuses elements in each other beyond that, before anything walks down.
+pub(crate) fn check_depth(source: &Source) -> Result<(), Error> {
+    let (text, mut depth, mut at) = (source.text, 0_usize, 0);
+    while let Some(found) = text[at..].find('<').map(|k| at + k) {
+        let rest = &text[found..];
+        let end = |mark: &str| rest.find(mark).map_or(text.len(), |k| found + k + mark.len());
+        if rest.starts_with("<!--") {
+            at = end("-->");
+        } else if rest.starts_with("<![CDATA[") {
+            at = end("]]>");
+        } else {
+            at = found + tag_length(rest);
+            let open = !rest.starts_with("</") && !rest.starts_with("<!") && !rest.starts_with("<?");
+            if open && !text[found..at].ends_with("/>") {
+                depth += 1;
+            } else if rest.starts_with("</") {
+                depth = depth.saturating_sub(1);
+            }
+        }
+        if depth > DEEPEST {
+            let line = 1 + text[..found].matches('\n').count();
+            return Err(source.syntax(line, format!("elements lie more than {DEEPEST} deep in each other")));
+        }
+    }
+    Ok(())
+}
+
+/// Length of a tag to its `>`; one in a quoted value does not end it.
+fn tag_length(tag: &str) -> usize {
+    let mut quote = None;
+    for (k, c) in tag.char_indices() {
+        match (quote, c) {
+            (None, '>') => return k + 1,
+            (None, '"' | '\'') => quote = Some(c),
+            (Some(q), c) if q == c => quote = None,
+            _ => {}
+        }
+    }
+    tag.len()
+}
+
 /// Refuses text that is no XML or not URDF, attributes that are not there and numbers that are none.
 pub(crate) fn check(source: &Source) -> Result<(), Error> {
+    check_depth(source)?;
     let document =
         Document::parse(source.text).map_err(|e| source.syntax(e.pos().row as usize, e.to_string()))?;
     let wrong = |node: Node, problem: String| {

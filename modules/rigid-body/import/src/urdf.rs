@@ -157,6 +157,14 @@ fn couplings(source: &Source, robot: &urdf_rs::Robot, joints: &[Joint]) -> Resul
         }
         all.push(Coupling { name: format!("{}_mimic", joint.name), follower, leader, ratio, offset });
     }
+    for coupling in &all {
+        let next = |j: usize| all.iter().find(|c: &&Coupling| c.follower == j).map(|c| c.leader);
+        let mut chain = std::iter::successors(Some(coupling.leader), |j: &usize| next(*j)).take(joints.len());
+        if chain.any(|j| j == coupling.follower) {
+            let problem = "<mimic>: joints follow each other in a circle; one of them has to lead";
+            return Err(source.joint(&joints[coupling.follower].name, problem));
+        }
+    }
     Ok(all)
 }
 

@@ -227,6 +227,12 @@ fn mimic_joints_become_couplings() {
     assert_eq!((c.name.as_str(), c.follower, c.leader, c.ratio, c.offset), ("jc_mimic", 1, 0, -2.0, 0.5));
     refused(&with("no"), &["joint `jc`", "<mimic>", "`no`"]);
     refused(&with("jc"), &["joint `jc`", "another"]);
+    let circle = [
+        links.clone(),
+        joint("jb", "continuous", "a", "b").replace("</joint>", "<mimic joint=\"jc\"/></joint>"),
+        mimic("jb"),
+    ];
+    refused(&circle, &["joint `jb`", "<mimic>", "circle"]);
 }
 
 #[test]
@@ -246,4 +252,14 @@ fn what_cannot_be_read_is_refused() {
     for text in ["", "not xml", "<robot>", "<sdf></sdf>"] {
         assert!(read(text).is_err(), "{text}");
     }
+}
+
+#[test]
+fn elements_too_deep_in_each_other_are_refused() {
+    let deep = format!("<robot name=\"r\">\n{}{}</robot>", "<a>".repeat(100_000), "</a>".repeat(100_000));
+    assert!(read(&deep).unwrap_err().contains("robot.urdf:2: "));
+    let bodies = ("<body><geom size=\"1\"/>".repeat(100_000), "</body>".repeat(100_000));
+    let deep = format!("<mujoco><worldbody>{}{}</worldbody></mujoco>", bodies.0, bodies.1);
+    let message = terraglue_robot_import::read_mjcf_text("m.xml", &deep, &Options::default()).unwrap_err();
+    assert!(message.to_string().contains("500 deep"), "{message}");
 }

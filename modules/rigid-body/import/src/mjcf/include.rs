@@ -102,6 +102,7 @@ struct Origin<'a> {
 
 fn parse<'a>(file: &str, text: &'a str) -> Result<Document<'a>, Error> {
     let source = Source { file, text };
+    crate::syntax::check_depth(&source)?;
     Document::parse(text).map_err(|e| source.syntax(e.pos().row as usize, e.to_string()))
 }
 

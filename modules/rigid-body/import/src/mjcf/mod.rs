@@ -36,6 +36,7 @@ const SEEN_ONLY: [&str; 9] =
 pub fn read_mjcf_text(file: &str, text: &str, options: &Options) -> Result<Robot, Error> {
     let whole = Whole::read(file, text)?;
     let source = Source { file, text: &whole.text };
+    crate::syntax::check_depth(&source)?;
     let document = Document::parse(&whole.text);
     let document = document.map_err(|e| source.syntax(e.pos().row as usize, e.to_string()))?;
     let root = document.root_element();

@@ -299,7 +299,8 @@ impl PressureCurve {
         if p <= self.unloading * self.elastic_limit {
             p.max(0.0) / self.unloading
         } else if self.is_batched() {
-            curve::depth(&|z| self.beyond(z), p, self.elastic_limit)
+            let alike = libm::pow(p / self.modulus, 1.0 / self.exponent);
+            curve::depth(&|z| self.beyond(z), p, self.elastic_limit, alike)
         } else if self.exponent == 1.0 {
             p / self.modulus
         } else if p > self.stiff_pressure() {

@@ -5,7 +5,7 @@ use crate::shear::{ON_YIELD, Plastic, ShearLaw, ShearResponse, ShearState};
 use terraglue_subsystem::MOST_LAW_STATE;
 
 /// Nodes whose yield stress is asked together.
-const CHUNK: usize = 32;
+const CHUNK: usize = 64;
 /// Newton steps until bisection has the last word.
 const STEPS: usize = 60;
 /// Relative change of a slip at which Newton has arrived: the error left is of the order of its square, that of the

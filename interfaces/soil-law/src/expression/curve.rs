@@ -21,27 +21,32 @@ pub fn elastic_limit(law: &impl Fn(f64) -> (f64, f64), k_u: f64) -> f64 {
         return 0.0;
     }
     // ln(p/(k_u z)) over ln z is a straight line for a power law: one Newton step then hits
-    root_in_logarithms([SHALLOWEST, DEEPEST], SHALLOWEST, |z| {
+    root_in_logarithms([SHALLOWEST, DEEPEST], SHALLOWEST, false, |z| {
         let (p, slope) = law(z);
         (p / (k_u * z), slope * z / p - 1.0)
     })
 }
 
-/// Depth at which the law gives the pressure `p` > 0, m.
-pub fn depth(law: &impl Fn(f64) -> (f64, f64), p: f64, shallowest: f64) -> f64 {
+/// Depth at which the law gives the pressure `p` > 0, m, sought from `guess` on.
+pub fn depth(law: &impl Fn(f64) -> (f64, f64), p: f64, shallowest: f64, guess: f64) -> f64 {
     let shallowest = shallowest.max(SHALLOWEST);
     if law(shallowest).0 >= p {
         return shallowest;
     }
-    root_in_logarithms([shallowest, DEEPEST], 0.01_f64.max(shallowest), |z| {
+    let start = if guess > shallowest && guess < DEEPEST { guess } else { shallowest.max(0.01) };
+    root_in_logarithms([shallowest, DEEPEST], start, true, |z| {
         let (value, slope) = law(z);
         (value / p, slope * z / value)
     })
 }
 
-/// Root of ln f over ln z between the bounds, where f crosses 1; `f` answers f and d ln f / d ln z.
-fn root_in_logarithms([mut low, mut high]: [f64; 2], start: f64, f: impl Fn(f64) -> (f64, f64)) -> f64 {
-    let rising = f(low).0 < 1.0;
+/// Root of ln f over ln z between the bounds, where f crosses 1, upwards or not; `f` answers f and d ln f / d ln z.
+fn root_in_logarithms(
+    [mut low, mut high]: [f64; 2],
+    start: f64,
+    rising: bool,
+    f: impl Fn(f64) -> (f64, f64),
+) -> f64 {
     let mut z = start;
     for k in 0..STEPS {
         let (ratio, exponent) = f(z);

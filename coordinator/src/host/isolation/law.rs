@@ -1,8 +1,8 @@
 //! The host's side of a law in Python: arrays of nodes go to its process and come back, one call at a time.
 //!
-//! A soil asks many nodes at once, but where it looks for a depth it asks for one after the other, and the same again in
-//! every trial of a step and while a foot rests. Answers to single nodes are kept: a law without state is a function.
+//! Answers are kept: a law without state is a function.
 
+use super::answers::{Answers, Question};
 use super::calls::Call;
 use super::{Link, Start, What};
 use std::any::Any;
@@ -11,53 +11,11 @@ use terraglue_subsystem::{
     Error, MOST_LAW_STATE, NodeLaw, PressureAnswer, PressureNodes, Result, ShearAnswer, ShearNodes,
 };
 
-/// Answers that are kept, a power of two.
-const KEPT: usize = 1 << 13;
-
-/// What was asked of a single node – which function, size or pressure, depth or slip, step – and the answer.
-#[derive(Clone, Copy)]
-struct Single {
-    asked: [u64; 4],
-    answer: [f64; 4],
-}
-
-/// No call has the number 0.
-const UNASKED: Single = Single { asked: [0; 4], answer: [0.0; 4] };
-
-/// The worker, and its answers to single nodes, each at a place that follows from what was asked.
+/// The worker, and its answers so far.
 struct Asked {
     link: Link,
     start: Start,
-    kept: Box<[Single]>,
-}
-
-/// What is asked of a single node of a law without state; None: it is asked more than that.
-fn single(function: u64, h: f64, doubles: usize, values: [&[f64]; 2]) -> Option<[u64; 4]> {
-    match values {
-        [[a], [b]] if doubles == 0 => Some([function, a.to_bits(), b.to_bits(), h.to_bits()]),
-        _ => None,
-    }
-}
-
-impl Asked {
-    /// The place of an answer: by FNV-1a over whole words.
-    fn place(&mut self, asked: &[u64; 4]) -> &mut Single {
-        let mix = |hash: u64, word: &u64| (hash ^ word ^ (word >> 29)).wrapping_mul(0x0100_0000_01b3_9e37);
-        let hash = asked.iter().fold(0xcbf2_9ce4_8422_2325, mix);
-        &mut self.kept[(hash >> 40) as usize & (KEPT - 1)]
-    }
-
-    fn known(&mut self, asked: Option<[u64; 4]>) -> Option<[f64; 4]> {
-        let asked = asked?;
-        let place = self.place(&asked);
-        (place.asked == asked).then_some(place.answer)
-    }
-
-    fn keep(&mut self, asked: Option<[u64; 4]>, answer: [f64; 4]) {
-        if let Some(asked) = asked {
-            *self.place(&asked) = Single { asked, answer };
-        }
-    }
+    answers: Answers,
 }
 
 /// Doubles per node, whether it has pressure, whether it has shear.
@@ -93,8 +51,7 @@ impl IsolatedLaw {
                 "STATE_DOUBLES needs a function `pressure`, which writes the state".into(),
             ));
         }
-        let kept = vec![UNASKED; KEPT].into();
-        let asked = Mutex::new(Asked { link, start: start.clone(), kept });
+        let asked = Mutex::new(Asked { link, start: start.clone(), answers: Answers::new() });
         Ok(Self { name: name.to_owned(), asked, doubles, has_pressure, has_shear })
     }
 
@@ -104,11 +61,11 @@ impl IsolatedLaw {
     /// The process was lost.
     pub fn renumber(&self, new: serde_json::Map<String, serde_json::Value>) -> Result {
         let mut asked = self.asked.lock().unwrap_or_else(PoisonError::into_inner);
-        let Asked { link, start, kept } = &mut *asked;
+        let Asked { link, start, answers } = &mut *asked;
         if let What::Law { numbers, .. } = &mut start.what {
             *numbers = new;
         }
-        kept.fill(UNASKED);
+        *answers = Answers::new();
         opened(link, start).map(drop)
     }
 
@@ -141,9 +98,12 @@ impl NodeLaw for IsolatedLaw {
 
     fn pressure(&self, nodes: &PressureNodes, out: &mut PressureAnswer) -> Result {
         let mut asked = self.asked.lock().unwrap_or_else(PoisonError::into_inner);
-        let question = single(Call::Pressure as u64, nodes.h, self.doubles, [&[nodes.b], nodes.depth]);
-        if let Some([p, slope, longest, _]) = asked.known(question) {
-            (out.pressure[0], out.slope[0], out.longest_s) = (p, slope, longest);
+        let b = [nodes.b];
+        let question = Question { function: Call::Pressure, h: nodes.h, given: [&b, nodes.depth] };
+        if self.doubles == 0
+            && let Some(longest) = asked.answers.recall(&question, &mut [&mut *out.pressure, &mut *out.slope])
+        {
+            out.longest_s = longest;
             return Ok(());
         }
         let done = asked.link.call(
@@ -162,17 +122,19 @@ impl NodeLaw for IsolatedLaw {
             },
         );
         done.map_err(|e| self.failed("pressure", e))?;
-        if question.is_some() {
-            asked.keep(question, [out.pressure[0], out.slope[0], out.longest_s, 0.0]);
+        if self.doubles == 0 {
+            asked.answers.keep(&question, &[&*out.pressure, &*out.slope], out.longest_s);
         }
         Ok(())
     }
 
     fn shear(&self, nodes: &ShearNodes, out: &mut ShearAnswer) -> Result {
         let mut asked = self.asked.lock().unwrap_or_else(PoisonError::into_inner);
-        let question = single(Call::Shear as u64, nodes.h, self.doubles, [nodes.pressure, nodes.slip]);
-        if let Some([stress, by_pressure, by_slip, longest]) = asked.known(question) {
-            (out.stress[0], out.by_pressure[0], out.by_slip[0]) = (stress, by_pressure, by_slip);
+        let question = Question { function: Call::Shear, h: nodes.h, given: [nodes.pressure, nodes.slip] };
+        let arrays = &mut [&mut *out.stress, &mut *out.by_pressure, &mut *out.by_slip];
+        if self.doubles == 0
+            && let Some(longest) = asked.answers.recall(&question, arrays)
+        {
             out.longest_s = longest;
             return Ok(());
         }
@@ -191,9 +153,9 @@ impl NodeLaw for IsolatedLaw {
             },
         );
         done.map_err(|e| self.failed("shear", e))?;
-        if question.is_some() {
-            let answer = [out.stress[0], out.by_pressure[0], out.by_slip[0], out.longest_s];
-            asked.keep(question, answer);
+        if self.doubles == 0 {
+            let answer = [&*out.stress, &*out.by_pressure, &*out.by_slip];
+            asked.answers.keep(&question, &answer, out.longest_s);
         }
         Ok(())
     }

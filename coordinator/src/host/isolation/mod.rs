@@ -5,6 +5,7 @@
 //! a limit of memory and a temporary folder of its own. Calls and answers cross through a shared segment; both sides sleep
 //! in between, after a short look. What a worker leaves behind, processes and files, goes with it.
 
+mod answers;
 mod calls;
 mod channel;
 mod law;

@@ -95,10 +95,6 @@ struct Search<'a, 'b> {
 }
 
 impl Search<'_, '_> {
-    fn residuals(&mut self, x: &[f64]) -> Option<Vec<f64>> {
-        (self.residuals)(x)
-    }
-
     /// The derivative of the residuals `r` by number k; None: it is not felt.
     fn column(&mut self, x: &[f64], k: usize, r: &[f64]) -> Option<Vec<f64>> {
         let range = self.free[k];
@@ -110,7 +106,7 @@ impl Search<'_, '_> {
                 if moved[k] > range.max || moved[k] < range.min {
                     continue;
                 }
-                let Some(there) = self.residuals(&moved) else { continue };
+                let Some(there) = (self.residuals)(&moved) else { continue };
                 let taken = moved[k] - x[k];
                 if there.iter().zip(r).any(|(a, b)| (a - b).abs() > FELT) {
                     return Some(there.iter().zip(r).map(|(a, b)| (a - b) / taken).collect());
@@ -124,7 +120,7 @@ impl Search<'_, '_> {
     fn from(&mut self, start: &[f64]) -> Option<Least> {
         let n = start.len();
         let mut x = start.to_vec();
-        let mut r = self.residuals(&x)?;
+        let mut r = (self.residuals)(&x)?;
         let mut squares = sum_of_squares(&r);
         let (mut damping, mut felt) = (1e-3, vec![false; n]);
         for _ in 0..STEPS {
@@ -180,7 +176,7 @@ impl Search<'_, '_> {
                 for ((k, ..), change) in moving.iter().zip(change) {
                     next[*k] = (next[*k] + change).clamp(self.free[*k].min, self.free[*k].max);
                 }
-                if let Some(there) = self.residuals(&next)
+                if let Some(there) = (self.residuals)(&next)
                     && sum_of_squares(&there) < squares
                 {
                     *damping = (*damping * 0.2).max(1e-12);

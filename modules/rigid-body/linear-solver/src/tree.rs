@@ -239,28 +239,32 @@ impl Tree {
 
     /// The same without loops.
     pub(crate) fn substitute_trees(&self, x: &mut [f64]) {
-        for (b, node) in self.nodes.iter().enumerate().rev() {
-            let rest = node.forward(b, x, 6 * self.nodes.len());
-            if let Some(p) = node.parent.filter(|_| node.hangs) {
-                x[6 * p..6 * p + 6].iter_mut().zip(rest).for_each(|(x, r)| *x += r);
-            }
-        }
-        for (b, node) in self.nodes.iter().enumerate() {
-            node.backward(b, x, 6 * self.nodes.len());
-        }
+        self.sweep(x, Node::forward, Node::backward);
     }
 
     /// The same without the impulses of rigid rows, which become 0 and which [`Tree::impulses`] tells; for trees without
     /// loops.
     pub fn substitute_rates(&self, x: &mut [f64]) {
+        self.sweep(x, Node::forward_rates, Node::backward_rates);
+    }
+
+    /// From the leaves to the roots, each body handing what is left to its parent, and back.
+    #[inline]
+    fn sweep(
+        &self,
+        x: &mut [f64],
+        forward: impl Fn(&Node, usize, &mut [f64], usize) -> Wrench,
+        backward: impl Fn(&Node, usize, &mut [f64], usize),
+    ) {
+        let joints_at = 6 * self.nodes.len();
         for (b, node) in self.nodes.iter().enumerate().rev() {
-            let rest = node.forward_rates(b, x, 6 * self.nodes.len());
+            let rest = forward(node, b, x, joints_at);
             if let Some(p) = node.parent.filter(|_| node.hangs) {
                 x[6 * p..6 * p + 6].iter_mut().zip(rest).for_each(|(x, r)| *x += r);
             }
         }
         for (b, node) in self.nodes.iter().enumerate() {
-            node.backward_rates(b, x, 6 * self.nodes.len());
+            backward(node, b, x, joints_at);
         }
     }
 

@@ -26,8 +26,9 @@ use terraglue_soil_bekker::SoilBekker;
 use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
 
 /// The parts, in the order of the table.
-pub const PARTS: [Part; 7] = [
+pub const PARTS: [Part; 8] = [
     ("automaton", automaton::figures),
+    ("cost", automaton::cost),
     ("plates", plates::figures),
     ("fit", fit::figures),
     ("wheels", wheels::figures),

@@ -22,7 +22,7 @@ use crate::validate::{Context, Figure};
 /// κ_max where a scenario is silent, 1/m.
 const CURVATURE: f64 = 40.0;
 
-/// All figures.
+/// All figures but those that a clock measures.
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     let mut all = cone::cones(context)?;
     all.extend(cone::planes(context)?);
@@ -30,10 +30,12 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     all.push(mass::figure(context)?);
     all.extend(hash::figures(context)?);
     all.extend(geometry::figures(context));
-    if context.timing {
-        all.extend(cost::figures(context)?);
-    }
     Ok(all)
+}
+
+/// What the automaton costs; nothing where no clock is to be read.
+pub fn cost(context: &Context) -> Outcome<Vec<Figure>> {
+    if context.timing { cost::figures(context) } else { Ok(Vec::new()) }
 }
 
 /// The automaton itself on level ground.

@@ -1,8 +1,10 @@
-//! Checks of single links (mass, inertia, places) and of masses against each other.
+//! Checks of single links (mass, inertia), of masses against each other and of names.
 
 use crate::error::{Error, Source};
-use crate::model::Body;
+use crate::model::{Body, Robot};
+use crate::values::LARGEST;
 use nalgebra::{Isometry3, Matrix3, SymmetricEigen, Translation3, UnitQuaternion, Vector3};
+use std::collections::BTreeSet;
 use urdf_rs::{Link, Pose};
 
 /// Mass, centre of mass and inertia about it in link axes; none where the link has no mass at all.
@@ -17,33 +19,6 @@ pub(crate) fn isometry(pose: &Pose) -> Isometry3<f64> {
 
 /// Masses further apart than this leave few of sixteen digits to the lighter body.
 const WIDEST_MASS_RATIO: f64 = 1e12;
-
-/// What is wrong with a place: URDF reads `nan` and `inf` as numbers.
-fn not_finite(what: &str, pose: &Pose) -> Option<String> {
-    let (xyz, rpy) = (pose.xyz.0, pose.rpy.0);
-    let bad = xyz.iter().chain(&rpy).any(|x| !x.is_finite());
-    bad.then(|| {
-        format!("the <origin> of {what} is xyz {xyz:?} rpy {rpy:?}; write finite numbers in m and rad")
-    })
-}
-
-/// Refuses places of joints, masses and shapes that are not finite.
-pub(crate) fn places(source: &Source, robot: &urdf_rs::Robot) -> Result<(), Error> {
-    for joint in &robot.joints {
-        if let Some(problem) = not_finite("the joint", &joint.origin) {
-            return Err(source.joint(&joint.name, problem));
-        }
-    }
-    for link in &robot.links {
-        let mass = not_finite("<inertial>", &link.inertial.origin);
-        let hit = link.collision.iter().find_map(|c| not_finite("a <collision>", &c.origin));
-        let seen = link.visual.iter().find_map(|v| not_finite("a <visual>", &v.origin));
-        if let Some(problem) = mass.or(hit).or(seen) {
-            return Err(source.link(&link.name, problem));
-        }
-    }
-    Ok(())
-}
 
 /// A warning where masses of one file are too far apart for double precision.
 pub(crate) fn mass_spread(file: &str, bodies: &[Body]) -> Option<String> {
@@ -65,26 +40,36 @@ pub(crate) fn inertial(source: &Source, link: &Link) -> Result<Inertial, Error> 
     if mass == 0.0 && tensor == Matrix3::zeros() {
         return Ok(None);
     }
-    if !(mass > 0.0 && mass.is_finite()) {
+    if mass <= 0.0 {
         let problem =
             format!("mass {mass} kg is not positive; give it a mass, or leave <inertial> out and fix it");
         return Err(source.link(&link.name, problem));
     }
-    physical(&tensor).map_err(|problem| source.link(&link.name, problem))?;
+    physical(mass, &tensor).map_err(|problem| source.link(&link.name, problem))?;
     let frame = isometry(&link.inertial.origin);
     let r = frame.rotation.to_rotation_matrix();
     Ok(Some((mass, frame.translation.vector, r * tensor * r.transpose())))
 }
 
-/// Principal moments must be positive and each at most the sum of the others (with 1e-6 for rounding in files).
-pub(crate) fn physical(tensor: &Matrix3<f64>) -> Result<(), String> {
-    if !tensor.iter().all(|v| v.is_finite()) {
-        return Err("the inertia is not finite; write numbers in kg m²".into());
+/// Mass and moments must be of a size that can be computed with. Principal moments must be positive and each at most the
+/// sum of the others (with 1e-6 for rounding in files).
+pub(crate) fn physical(mass: f64, tensor: &Matrix3<f64>) -> Result<(), String> {
+    let range = 1.0 / LARGEST..=LARGEST;
+    if !range.contains(&mass) {
+        return Err(format!(
+            "mass {mass:e} kg is not within {:e} … {LARGEST:e}; check its unit",
+            1.0 / LARGEST
+        ));
+    }
+    if !tensor.iter().all(|v| v.abs() <= LARGEST) {
+        return Err(format!(
+            "a moment of inertia is beyond {LARGEST:e} kg m²; check mass, size and their units"
+        ));
     }
     let mut p = SymmetricEigen::new(*tensor).eigenvalues;
     p.as_mut_slice().sort_by(f64::total_cmp);
     let shown = format!("principal moments {:.6e}, {:.6e}, {:.6e} kg m²", p[0], p[1], p[2]);
-    if p[0] <= 1e-12 * p[2] || p[2] <= 0.0 {
+    if p[0] <= 1e-12 * p[2] || p[2] <= 0.0 || p[0] < 1.0 / LARGEST {
         return Err(format!(
             "{shown}: the inertia is not positive; a solid body of its mass and size has one"
         ));
@@ -96,4 +81,24 @@ pub(crate) fn physical(tensor: &Matrix3<f64>) -> Result<(), String> {
         ));
     }
     Ok(())
+}
+
+/// Names of bodies and of joints are unique, also those that the reader has made up.
+pub(crate) fn unique(source: &Source, robot: &Robot) -> Result<(), Error> {
+    let bodies = robot.bodies.iter().map(|b| b.name.as_str());
+    let joints = robot.joints.iter().map(|j| j.name.as_str());
+    for (what, name) in [("bodies", twice(bodies)), ("joints", twice(joints))] {
+        if let Some(name) = name {
+            let problem = format!(
+                "two {what} are called `{name}`, one of them because it has no name of its own; give it another one"
+            );
+            return Err(source.tree(problem));
+        }
+    }
+    Ok(())
+}
+
+fn twice<'a>(mut names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+    let mut known = BTreeSet::new();
+    names.find(|name| !known.insert(*name))
 }

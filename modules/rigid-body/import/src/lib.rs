@@ -13,7 +13,9 @@ mod model;
 mod shapes;
 mod syntax;
 mod tree;
+mod unread;
 mod urdf;
+mod values;
 
 pub use error::Error;
 pub use mesh::Mesh;
@@ -24,6 +26,7 @@ pub use model::{
 };
 pub use urdf::read_urdf_text;
 
+use error::Source;
 use std::path::{Path, PathBuf};
 
 /// How a file is read.
@@ -57,9 +60,12 @@ pub fn read_robot(path: &Path, options: &Options) -> Result<Robot, Error> {
     let file = path.display().to_string();
     let text = std::fs::read_to_string(path)
         .map_err(|e| Error::Read { file: file.clone(), reason: e.to_string() })?;
-    if text.contains("<mujoco") {
-        read_mjcf_text(&file, &text, options)
-    } else {
-        read_urdf_text(&file, &text, options)
-    }
+    syntax::check_depth(&Source { file: &file, text: &text })?;
+    // URDF may hold an element <mujoco>, too, for MuJoCo's own reader. What is no XML its reader complains of.
+    let is_mjcf = match roxmltree::Document::parse(&text) {
+        Ok(document) => document.root_element().has_tag_name("mujoco"),
+        Err(_) => text.contains("<mujoco"),
+    };
+    let read = if is_mjcf { read_mjcf_text } else { read_urdf_text };
+    read(&file, &text, options)
 }

@@ -94,7 +94,7 @@ impl<'a> Shapes<'a> {
                 (self.mesh(place, filename, scale)?, Vec::new())
             }
         };
-        if let Some(bad) = sizes.iter().find(|s| !(**s > 0.0 && s.is_finite())) {
+        if let Some(bad) = sizes.iter().find(|s| **s <= 0.0) {
             let problem = format!("a shape has the size {bad} m; sizes are positive");
             return Err(self.source.link(&link.name, problem));
         }
@@ -106,8 +106,8 @@ impl<'a> Shapes<'a> {
     fn mesh(&mut self, place: Place, file: &str, scale: [f64; 3]) -> Result<ShapeGeometry, Error> {
         let link = place.link.name.as_str();
         let wrong = |problem: String| self.source.link(link, format!("the mesh `{file}`: {problem}"));
-        if scale.iter().any(|s| *s == 0.0 || !s.is_finite()) {
-            return Err(wrong(format!("its scale {scale:?} is not three finite numbers other than 0")));
+        if scale.contains(&0.0) {
+            return Err(wrong(format!("its scale {scale:?} has a 0; it flattens the mesh")));
         }
         let path = self.folders.find(file).map_err(wrong)?;
         let loaded = load(&path).map_err(|p| wrong(format!("{}: {p}", path.display())))?;

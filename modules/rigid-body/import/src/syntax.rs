@@ -1,6 +1,7 @@
 //! What can be said about the text of a URDF file with a line, before `urdf-rs` reads it: its messages have no place.
 
 use crate::error::{Error, Source};
+use crate::values::{self, check_name};
 use roxmltree::{Document, Node};
 
 /// Attributes that hold numbers: element, attribute, how many.
@@ -88,16 +89,12 @@ pub(crate) fn check(source: &Source) -> Result<(), Error> {
         Document::parse(source.text).map_err(|e| source.syntax(e.pos().row as usize, e.to_string()))?;
     let wrong = |node: Node, problem: String| {
         let line = document.text_pos_at(node.range().start).row as usize;
-        let name = node.attribute("name").map(|n| format!(" `{n}`")).unwrap_or_default();
-        let element = format!("<{}>{name}", node.tag_name().name());
+        let element = called(node);
         Err(Error::Element { file: source.file.into(), line, element, problem })
     };
     let root = document.root_element();
-    let xacro = |n: &Node| n.tag_name().namespace().is_some_and(|s| s.contains("xacro"));
-    if let Some(node) = document.descendants().find(xacro) {
-        let problem =
-            "is xacro, which is a language of its own: `xacro ROBOT.xacro > ROBOT.urdf` makes URDF of it";
-        return wrong(node, problem.into());
+    if let Some(node) = document.descendants().find(is_xacro) {
+        return wrong(node, way_out_of_xacro(source.file));
     }
     if !root.has_tag_name("robot") {
         return wrong(root, "the root of URDF is <robot>".into());
@@ -111,14 +108,45 @@ pub(crate) fn check(source: &Source) -> Result<(), Error> {
         if let Some(lacks) = needed.iter().find(|a| node.attribute(**a).is_none()) {
             return wrong(node, format!("has no `{lacks}`"));
         }
+        check_name(node).or_else(|problem| wrong(node, problem))?;
         if node.has_tag_name("joint") {
             joint(node).or_else(|problem| wrong(node, problem))?;
         }
         for below in node.descendants().filter(Node::is_element) {
-            numbers(below).or_else(|problem| wrong(below, problem))?;
+            numbers(below).and_then(|()| values::check(below)).or_else(|problem| wrong(below, problem))?;
         }
     }
     Ok(())
+}
+
+/// Tag and name of an element, or of the one around it that has a name.
+fn called(node: Node) -> String {
+    let tag = |n: Node| match n.attribute("name") {
+        Some(name) => format!("<{}> `{name}`", n.tag_name().name()),
+        None => format!("<{}>", n.tag_name().name()),
+    };
+    let around = node.ancestors().find(|n| n.attribute("name").is_some() && n.parent_element().is_some());
+    match around.filter(|n| *n != node) {
+        Some(owner) => format!("{} of {}", tag(node), tag(owner)),
+        None => tag(node),
+    }
+}
+
+/// Whether an element is of xacro, or has one of its expressions.
+fn is_xacro(node: &Node) -> bool {
+    let expression = |text: &str| ["${", "$(arg ", "$(find ", "$(eval "].iter().any(|e| text.contains(e));
+    node.tag_name().namespace().is_some_and(|s| s.contains("xacro"))
+        || node.attributes().any(|a| expression(a.value()))
+}
+
+fn way_out_of_xacro(file: &str) -> String {
+    let bare =
+        [".urdf.xacro", ".xacro", ".urdf"].iter().find_map(|end| file.strip_suffix(end)).unwrap_or(file);
+    let end = if file.ends_with(".urdf") { "expanded.urdf" } else { "urdf" };
+    format!(
+        "is xacro, which is a language of its own: `xacro {file} > {bare}.{end}` makes URDF of it (`pip install xacro` \
+         where ROS is not installed)"
+    )
 }
 
 fn joint(node: Node) -> Result<(), String> {

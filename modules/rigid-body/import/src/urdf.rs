@@ -1,11 +1,12 @@
 //! From the text of a URDF file to the checked robot; links without mass are merged into their neighbours.
 
 use crate::Options;
-use crate::check::{Inertial, inertial, isometry, mass_spread, places};
+use crate::check::{Inertial, inertial, isometry, mass_spread};
 use crate::error::{Error, Source};
 use crate::model::{AxisData, Base, Body, Coupling, Joint, JointKind, Robot, Shape};
 use crate::shapes::Shapes;
 use crate::tree::{Place, order};
+use crate::unread;
 use nalgebra::{Isometry3, Unit, Vector3};
 use urdf_rs::JointType;
 
@@ -14,7 +15,6 @@ pub fn read_urdf_text(file: &str, text: &str, options: &Options) -> Result<Robot
     let source = Source { file, text };
     crate::syntax::check(&source)?;
     let robot = urdf_rs::read_from_string(text).map_err(|e| source.syntax(0, e.to_string()))?;
-    places(&source, &robot)?;
     let order = order(&source, &robot)?;
     let inertials = robot.links.iter().map(|l| inertial(&source, l)).collect::<Result<Vec<_>, _>>()?;
     let merged = merge(&robot, &order, &inertials);
@@ -112,7 +112,9 @@ fn build(
         Some(link) => Base::Free(merged.group_from_link[link]),
         None => Base::World,
     };
-    let (mut warnings, notices) = shapes.said();
+    let (mut warnings, mut notices) = shapes.said();
+    warnings.extend(unread::warnings(source));
+    notices.extend(unread::notice(source, robot));
     warnings.extend(mass_spread(source.file, &bodies));
     let couplings = couplings(source, robot, &joints)?;
     Ok(Robot {
@@ -134,8 +136,8 @@ fn build(
 /// Friction in the joint, from `<dynamics>`.
 fn data(source: &Source, joint: &urdf_rs::Joint) -> Result<AxisData, Error> {
     let (damping, friction) = joint.dynamics.as_ref().map_or((0.0, 0.0), |d| (d.damping, d.friction));
-    if let Some(bad) = [damping, friction].iter().find(|x| !(**x >= 0.0 && x.is_finite())) {
-        let problem = format!("<dynamics> has {bad}; damping and friction are finite and not below 0");
+    if let Some(bad) = [damping, friction].iter().find(|x| **x < 0.0) {
+        let problem = format!("<dynamics> has {bad}; damping and friction are not below 0");
         return Err(source.joint(&joint.name, problem));
     }
     Ok(AxisData { damping, friction, ..AxisData::default() })
@@ -152,8 +154,8 @@ fn couplings(source: &Source, robot: &urdf_rs::Robot, joints: &[Joint]) -> Resul
         let leader = moving(&mimic.joint);
         let leader = leader.ok_or_else(|| wrong(format!("no moving joint is called `{}`", mimic.joint)))?;
         let (ratio, offset) = (mimic.multiplier.unwrap_or(1.0), mimic.offset.unwrap_or(0.0));
-        if leader == follower || !ratio.is_finite() || !offset.is_finite() {
-            return Err(wrong("it follows another joint, by a finite multiplier and offset".into()));
+        if leader == follower {
+            return Err(wrong("it follows another joint, not itself".into()));
         }
         all.push(Coupling { name: format!("{}_mimic", joint.name), follower, leader, ratio, offset });
     }
@@ -199,7 +201,7 @@ fn joint(
     let (kind, limited) = kind(source, joint)?;
     let parent_link = robot.links.iter().position(|l| l.name == joint.parent.link).unwrap_or(0);
     let axis = Vector3::from(joint.axis.xyz.0);
-    if kind != JointKind::Fixed && !(axis.norm() > 1e-9 && axis.norm().is_finite()) {
+    if kind != JointKind::Fixed && axis.norm() <= 1e-9 {
         let problem =
             format!("the axis {:?} has no direction; write e.g. <axis xyz=\"0 0 1\"/>", joint.axis.xyz.0);
         return Err(source.joint(&joint.name, problem));
@@ -236,12 +238,11 @@ fn kind(source: &Source, joint: &urdf_rs::Joint) -> Result<(JointKind, bool), Er
 
 fn limits(source: &Source, joint: &urdf_rs::Joint) -> Result<[f64; 2], Error> {
     let (lower, upper) = (joint.limit.lower, joint.limit.upper);
-    if lower < upper && lower.is_finite() && upper.is_finite() {
+    if lower < upper {
         return Ok([lower, upper]);
     }
     let problem = format!(
-        "the limits {lower} … {upper} leave no room or are not finite; write <limit lower= upper= …> with \
-         lower < upper, or make it continuous or fixed"
+        "the limits {lower} … {upper} leave no room; write <limit lower= upper= …> with lower < upper, or make it continuous or fixed"
     );
     Err(source.joint(&joint.name, problem))
 }

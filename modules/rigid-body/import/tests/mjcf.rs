@@ -134,6 +134,10 @@ fn attributes_that_act_and_are_not_supported_are_named() {
             "<geom> has `solref` = \"0.01 1\", which is not supported and does nothing (1 more like it)",
         ),
         (
+            "<body name=\"a\"><freejoint/><geom size=\"1\" condim=\"6\"/></body>",
+            "<geom> has `condim` = \"6\"",
+        ),
+        (
             "<body name=\"a\"><freejoint/><geom size=\"1\" spin=\"fast\"/></body>",
             "<geom> has `spin` = \"fast\"",
         ),
@@ -262,7 +266,7 @@ fn what_would_be_another_mechanism_is_refused() {
     );
     refused(
         r#"<body name="a"><freejoint/><joint/><geom size="0.1"/></body>"#,
-        &["m.xml:4", "free (alone, in the world)"],
+        &["m.xml:4", "free (alone, on a body of <worldbody> itself)"],
     );
     refused(r#"<body name="a"><freejoint/></body>"#, &["body `a`", "no mass"]);
     refused(r#"<body name="a"><freejoint/><geom size="0"/></body>"#, &["positive"]);

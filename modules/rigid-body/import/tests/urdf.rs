@@ -65,6 +65,14 @@ fn a_chain_hangs_from_the_world() {
 }
 
 #[test]
+fn urdf_with_settings_for_mujoco_is_urdf() {
+    let settings = "<mujoco><compiler discardvisual=\"false\"/></mujoco>\n";
+    let path = Path::new(env!("CARGO_TARGET_TMPDIR")).join("with_settings.urdf");
+    std::fs::write(&path, robot(&[settings.into(), good("a")])).unwrap();
+    assert_eq!(read_robot(&path, &Options::default()).unwrap().bodies[0].name, "a");
+}
+
+#[test]
 fn links_without_mass_are_merged() {
     let text = robot(&[
         "<link name=\"footprint\"/>".into(),
@@ -94,35 +102,6 @@ fn inertia_that_no_body_has_is_refused() {
     refused(&[body("a", 1.0, [0.1, 0.1, 0.5])], &["link `a`", "5.000000e-1", "sum of the other two"]);
     refused(&[body("a", -2.0, [0.1; 3])], &["link `a`", "mass -2 kg"]);
     refused(&[body("a", 0.0, [0.1; 3])], &["link `a`", "mass 0 kg"]);
-}
-
-#[test]
-fn numbers_that_are_not_finite_are_refused() {
-    let nan = |text: String, from: &str, to: &str| {
-        let changed = text.replacen(from, to, 1);
-        assert_ne!(changed, text);
-        changed
-    };
-    refused(&[nan(good("a"), "0.1", "nan")], &["robot.urdf:2", "link `a`", "not finite"]);
-    refused(&[nan(good("a"), "value=\"1\"", "value=\"NaN\"")], &["link `a`", "mass NaN kg"]);
-    refused(&[nan(good("a"), "value=\"1\"", "value=\"inf\"")], &["link `a`", "mass inf kg"]);
-    let place = "<inertial><origin xyz=\"0 nan 0\"/>";
-    refused(&[nan(good("a"), "<inertial>", place)], &["link `a`", "<inertial>", "NaN", "finite"]);
-    let ball =
-        "<collision><origin rpy=\"0 0 inf\"/><geometry><sphere radius=\"1\"/></geometry></collision></link>";
-    refused(&[nan(good("a"), "</link>", ball)], &["link `a`", "<collision>", "inf"]);
-    let two = [good("a"), good("b")].concat();
-    let j = joint("j", "continuous", "a", "b");
-    refused(
-        &[two.clone(), nan(j.clone(), "1 0 0", "nan 0 0")],
-        &["robot.urdf:6", "joint `j`", "<origin>", "NaN"],
-    );
-    refused(&[two.clone(), nan(j, "0 0 1", "0 nan 1")], &["joint `j`", "axis"]);
-    for limit in ["lower=\"-inf\" upper=\"1\"", "lower=\"0\" upper=\"nan\""] {
-        let with = format!("<limit {limit} effort=\"1\" velocity=\"1\"/></joint>");
-        let j = nan(joint("j", "revolute", "a", "b"), "</joint>", &with);
-        refused(&[two.clone(), j], &["joint `j`", "not finite", "continuous"]);
-    }
 }
 
 #[test]
@@ -208,7 +187,8 @@ fn errors_of_the_text_name_their_line() {
     let message =
         read("<robot name=\"r\" xmlns:xacro=\"http://www.ros.org/wiki/xacro\">\n<xacro:arm/></robot>");
     let message = message.unwrap_err();
-    assert!(message.contains("robot.urdf:2") && message.contains("xacro ROBOT.xacro"), "{message}");
+    let command = "`xacro robot.urdf > robot.expanded.urdf`";
+    assert!(message.contains("robot.urdf:2") && message.contains(command), "{message}");
     let message = read("<mars/>").unwrap_err();
     assert!(message.contains("robot.urdf:1") && message.contains("<robot>"), "{message}");
 }
@@ -233,6 +213,26 @@ fn mimic_joints_become_couplings() {
         mimic("jb"),
     ];
     refused(&circle, &["joint `jb`", "<mimic>", "circle"]);
+}
+
+#[test]
+fn what_nothing_reads_is_named_once() {
+    let inertial = good("a").replace("</link>", "<sensor name=\"s\"/></link>");
+    let with = "<dynamics damping=\"1\" stiction=\"2\"/><safety_controller k_velocity=\"1\"/>\
+                <limit effort=\"3\" velocity=\"4\"/></joint>";
+    let joint = |name: &str, child: &str| joint(name, "continuous", "a", child).replace("</joint>", with);
+    let gazebo = "<gazebo reference=\"a\"><mu1>0.9</mu1></gazebo>\n".to_owned();
+    let parts = [inertial, good("b"), good("c"), joint("j", "b"), joint("k", "c"), gazebo];
+    let robot = read(&robot(&parts)).unwrap();
+    let expected = [
+        "robot.urdf:8: `stiction` = \"2\" of <dynamics> is not supported and does nothing (1 more like it)",
+        "robot.urdf:8: <safety_controller> in <joint> is not supported and does nothing (1 more like it)",
+        "robot.urdf:3: <sensor> in <link> is not supported and does nothing",
+        "robot.urdf:10: <gazebo> in <robot> is not supported and does nothing",
+    ];
+    assert_eq!(robot.warnings, expected);
+    assert_eq!(robot.notices.len(), 1);
+    assert!(robot.notices[0].contains("joint `j`: `effort` and `velocity`"), "{}", robot.notices[0]);
 }
 
 #[test]

@@ -116,6 +116,7 @@ fn farthest(points: &[Vector], directions: usize) -> Vec<Vector> {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

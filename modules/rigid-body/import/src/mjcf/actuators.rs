@@ -25,8 +25,8 @@ impl Reader<'_, '_> {
         let law: Result<Law, String> = match node.tag_name().name() {
             "position" => Ok(Law {
                 kind: DriveKind::Position,
-                stiffness: d.number(&e, "kp")?.unwrap_or(1.0),
-                damping: d.number(&e, "kv")?.unwrap_or(0.0),
+                stiffness: d.not_negative(&e, "kp", "it would drive the joint away")?.unwrap_or(1.0),
+                damping: d.not_negative(&e, "kv", "it would drive the joint on")?.unwrap_or(0.0),
                 gain: 1.0,
             }),
             "velocity" => plain(DriveKind::Velocity),
@@ -50,7 +50,7 @@ impl Reader<'_, '_> {
             self.warn(node, "holds its rate rigidly within the largest torque; its gain is not used");
         }
         // Along the joint instead of the transmission, whose coordinate is gear times the joint's.
-        let gear = d.number(&e, "gear")?.unwrap_or(1.0);
+        let gear = d.first(&e, "gear")?.unwrap_or(1.0);
         let max_torque = self.bound(&e, &law)?.map(|force| gear.abs() * force);
         let (stiffness, damping) = (gear * gear * law.stiffness, gear * gear * law.damping);
         let joint = self.robot.joints.iter_mut().find(|j| j.name == wanted);
@@ -98,8 +98,13 @@ impl Reader<'_, '_> {
     /// Largest magnitude of the force along the transmission: of the force itself, for a motor also by the control.
     fn bound(&self, e: &Element, law: &Law) -> Result<Option<f64>, Error> {
         let largest = |name: &str, switch: &str| -> Result<Option<f64>, Error> {
-            let off = self.d.text(e, switch) == Some("false");
+            let off = self.d.choice(e, switch, &["true", "false", "auto"])? == Some("false");
             let range = self.d.numbers(e, name)?.filter(|_| !off);
+            if let Some(bad) = range.as_ref().filter(|r| r.len() != 2 || r[0] > r[1]) {
+                return Err(self
+                    .d
+                    .wrong(e, format!("{name} = {bad:?} is not a smallest and a largest number")));
+            }
             Ok(range.map(|r| r.iter().fold(0.0_f64, |m, x| m.max(x.abs()))))
         };
         let force = largest("forcerange", "forcelimited")?;

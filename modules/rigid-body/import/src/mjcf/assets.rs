@@ -11,6 +11,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 
+/// Most nodes of a height field along one direction.
+const MOST_NODES: u32 = 1 << 14;
+
 /// An asset, or why there is none: that matters only where a shape needs it.
 pub(super) type Asset<T> = Result<T, String>;
 
@@ -62,7 +65,7 @@ impl Assets {
         }
         let read = match (file, d.numbers(&e, "vertex")?) {
             (Some(file), _) => files.mesh(file),
-            (None, Some(numbers)) if numbers.len() % 3 == 0 => {
+            (None, Some(numbers)) if numbers.len().is_multiple_of(3) => {
                 let faces = d.numbers(&e, "face")?.unwrap_or_default();
                 with_faces(corners_of(&numbers), &faces)
             }
@@ -70,10 +73,13 @@ impl Assets {
         };
         let scale = d.vector(&e, "scale")?.unwrap_or_else(|| Vector3::repeat(1.0));
         let (place, turn) = (d.vector(&e, "refpos")?, d.numbers(&e, "refquat")?);
+        let turn = turn.unwrap_or_else(|| vec![1.0, 0.0, 0.0, 0.0]);
+        let [w, i, j, k] = turn[..] else {
+            return Err(d.wrong(&e, format!("refquat has {} numbers; four are needed", turn.len())));
+        };
         let asset = read.and_then(|mesh| {
             let mut mesh = mesh.scaled(scale.into());
-            let turn = turn.filter(|q| q.len() == 4).unwrap_or_else(|| vec![1.0, 0.0, 0.0, 0.0]);
-            let turn = UnitQuaternion::try_new(Quaternion::new(turn[0], turn[1], turn[2], turn[3]), 1e-9);
+            let turn = UnitQuaternion::try_new(Quaternion::new(w, i, j, k), 1e-9);
             let turn = turn.ok_or("refquat is 0")?.inverse();
             let place = place.unwrap_or_else(Vector3::zeros);
             mesh.points.iter_mut().for_each(|p| *p = (turn * (Vector3::from(*p) - place)).into());
@@ -87,6 +93,9 @@ impl Assets {
         let e = d.element(node, None);
         let file = node.attribute("file");
         let name = node.attribute("name").or_else(|| file.and_then(stem)).unwrap_or_default().to_owned();
+        if self.fields.contains_key(&name) || name.is_empty() {
+            return Err(d.wrong(&e, "its name is empty or used twice".into()));
+        }
         let size = d.numbers(&e, "size")?.unwrap_or_default();
         let [x, y, z, _] = size[..] else {
             return Err(d.wrong(&e, "size needs four numbers: half lengths x and y, height, depth".into()));
@@ -97,7 +106,7 @@ impl Assets {
         let grid = match file {
             Some(file) => files.grid(file),
             None => {
-                let count = |name| d.number(&e, name).map(|n| n.unwrap_or(0.0) as usize);
+                let count = |name| d.count(&e, name, MOST_NODES).map(|n| n.unwrap_or(0) as usize);
                 let nodes = [count("ncol")?, count("nrow")?];
                 let text = d.numbers(&e, "elevation")?.unwrap_or_else(|| vec![0.0; nodes[0] * nodes[1]]);
                 // The text starts with the row of the largest y.
@@ -136,7 +145,7 @@ fn asset(mesh: Mesh) -> Asset<MeshAsset> {
 
 fn with_faces(mut mesh: Mesh, faces: &[f64]) -> Asset<Mesh> {
     let corners = mesh.points.len() as f64;
-    if faces.len() % 3 != 0 || faces.iter().any(|k| k.fract() != 0.0 || *k < 0.0 || *k >= corners) {
+    if !faces.len().is_multiple_of(3) || faces.iter().any(|k| k.fract() != 0.0 || *k < 0.0 || *k >= corners) {
         return Err("face: three numbers of vertices each".into());
     }
     mesh.triangles = faces.chunks_exact(3).map(|f| [f[0] as u32, f[1] as u32, f[2] as u32]).collect();
@@ -156,7 +165,7 @@ struct Files {
 impl Files {
     fn new(root: Node, folders: &Folders) -> Self {
         let compilers = || root.children().filter(|n| n.has_tag_name("compiler"));
-        let text = |name: &str| compilers().filter_map(|c| c.attribute(name)).last().map(str::to_owned);
+        let text = |name: &str| compilers().filter_map(|c| c.attribute(name)).next_back().map(str::to_owned);
         let below = text("meshdir").or_else(|| text("assetdir")).unwrap_or_default();
         let folders = Folders { beside: folders.beside.join(below), ..folders.clone() };
         Self { folders, strip: text("strippath").as_deref() == Some("true") }

@@ -42,28 +42,45 @@ impl<'a, 'i> Element<'a, 'i> {
 }
 
 impl<'a> Defaults<'a> {
-    pub fn new(whole: &'a Whole, root: Node) -> Self {
+    pub fn new(whole: &'a Whole, root: Node) -> Result<Self, Error> {
         // of several the last one counts
         let compilers = || root.children().filter(|n| n.has_tag_name("compiler"));
-        let text = |name: &str| compilers().filter_map(|c| c.attribute(name).map(str::to_owned)).last();
+        let text = |name: &str| compilers().filter_map(|c| c.attribute(name).map(str::to_owned)).next_back();
         let angle =
             if text("angle").as_deref() == Some("radian") { 1.0 } else { std::f64::consts::PI / 180.0 };
         let eulerseq = text("eulerseq").unwrap_or_else(|| "xyz".into());
         let autolimits = text("autolimits").as_deref() != Some("false");
         let weigh_geoms = text("inertiafromgeom").as_deref() == Some("true");
         let mut me = Self { whole, classes: BTreeMap::new(), angle, eulerseq, autolimits, weigh_geoms };
+        compilers().try_for_each(|c| me.check_compiler(c))?;
         for node in root.children().filter(|n| n.has_tag_name("default")) {
             // a further section goes on with what was said before
             let before = me.classes.get("main").cloned().unwrap_or_default();
             let name = node.attribute("class").unwrap_or("main");
-            me.read(node, &before, name);
+            me.read(node, &before, name)?;
             let main = me.classes.get(name).cloned().unwrap_or_default();
             me.classes.insert("main".into(), main);
         }
-        me
+        Ok(me)
     }
 
-    fn read(&mut self, node: Node, above: &Class, otherwise: &str) {
+    /// Refuses words that choose nothing.
+    fn check_compiler(&self, node: Node) -> Result<(), Error> {
+        let e = self.element(node, None);
+        self.choice(&e, "angle", &["degree", "radian"])?;
+        for switch in ["autolimits", "strippath"] {
+            self.choice(&e, switch, &["true", "false"])?;
+        }
+        self.choice(&e, "inertiafromgeom", &["true", "false", "auto"])?;
+        match node.attribute("eulerseq") {
+            Some(seq) if seq.len() != 3 || !seq.chars().all(|c| "xyzXYZ".contains(c)) => {
+                Err(self.wrong(&e, format!("eulerseq = \"{seq}\" is not three of the letters x y z X Y Z")))
+            }
+            _ => Ok(()),
+        }
+    }
+
+    fn read(&mut self, node: Node, above: &Class, otherwise: &str) -> Result<(), Error> {
         let mut class = above.clone();
         for element in node.children().filter(|n| n.is_element() && !n.has_tag_name("default")) {
             for a in element.attributes() {
@@ -71,9 +88,26 @@ impl<'a> Defaults<'a> {
             }
         }
         for below in node.children().filter(|n| n.has_tag_name("default")) {
-            self.read(below, &class, "");
+            let name = below.attribute("class").unwrap_or_default();
+            if name.is_empty() || self.classes.contains_key(name) {
+                let problem =
+                    format!("class = \"{name}\" is empty or used twice; names of classes are unique");
+                return Err(self.wrong(&self.element(below, None), problem));
+            }
+            self.read(below, &class, "")?;
         }
         self.classes.insert(node.attribute("class").unwrap_or(otherwise).into(), class);
+        Ok(())
+    }
+
+    /// Whether a default class has this name; `main` is always there.
+    pub fn has_class(&self, name: &str) -> bool {
+        name == "main" || self.classes.contains_key(name)
+    }
+
+    /// Names of all default classes.
+    pub fn class_names(&self) -> impl Iterator<Item = &str> {
+        self.classes.keys().map(String::as_str)
     }
 
     /// An element with its class; `inherited`: the `childclass` of the bodies around it.
@@ -102,18 +136,57 @@ impl<'a> Defaults<'a> {
         all
     }
 
+    /// One of some words; none where it is not there.
+    pub fn choice(
+        &self,
+        e: &Element,
+        name: &str,
+        words: &[&'static str],
+    ) -> Result<Option<&'static str>, Error> {
+        let Some(text) = self.text(e, name) else { return Ok(None) };
+        let found = words.iter().find(|w| **w == text).copied();
+        let wrong = || self.wrong(e, format!("{name} = \"{text}\" is none of {}", words.join(", ")));
+        found.ok_or_else(wrong).map(Some)
+    }
+
     /// Numbers of an attribute; none where it is not there.
     pub fn numbers(&self, e: &Element, name: &str) -> Result<Option<Vec<f64>>, Error> {
         let Some(text) = self.text(e, name) else { return Ok(None) };
         let numbers: Result<Vec<f64>, _> = text.split_whitespace().map(str::parse::<f64>).collect();
         match numbers {
-            Ok(n) if !n.is_empty() && n.iter().all(|x| x.is_finite()) => Ok(Some(n)),
-            _ => Err(self.wrong(e, format!("{name} = \"{text}\" is not a list of finite numbers"))),
+            Ok(n) if !n.is_empty() => Ok(Some(n)),
+            _ => Err(self.wrong(e, format!("{name} = \"{text}\" is not a list of numbers"))),
         }
     }
 
     /// A number.
     pub fn number(&self, e: &Element, name: &str) -> Result<Option<f64>, Error> {
+        match self.numbers(e, name)?.as_deref() {
+            None => Ok(None),
+            Some([number]) => Ok(Some(*number)),
+            Some(other) => Err(self.wrong(e, format!("{name} has {} numbers; one is needed", other.len()))),
+        }
+    }
+
+    /// A number that is not negative; `why` says what else it would do.
+    pub fn not_negative(&self, e: &Element, name: &str, why: &str) -> Result<Option<f64>, Error> {
+        match self.number(e, name)? {
+            Some(x) if x < 0.0 => Err(self.wrong(e, format!("{name} = {x} is negative: {why}"))),
+            other => Ok(other),
+        }
+    }
+
+    /// A whole number from 0 to `most`.
+    pub fn count(&self, e: &Element, name: &str, most: u32) -> Result<Option<u32>, Error> {
+        match self.number(e, name)? {
+            None => Ok(None),
+            Some(x) if x.fract() == 0.0 && (0.0..=f64::from(most)).contains(&x) => Ok(Some(x as u32)),
+            Some(x) => Err(self.wrong(e, format!("{name} = {x} is not a whole number from 0 to {most}"))),
+        }
+    }
+
+    /// The first of several numbers, where the others say nothing here.
+    pub fn first(&self, e: &Element, name: &str) -> Result<Option<f64>, Error> {
         Ok(self.numbers(e, name)?.map(|n| n[0]))
     }
 

@@ -13,7 +13,7 @@ const DENSITY: f64 = 1000.0;
 
 /// What a geom is.
 pub(crate) enum Geom {
-    Shape(Weighed),
+    Shape(Box<Weighed>),
     Plane(Plane),
     /// Cannot be used, and why.
     Unused(String),
@@ -57,8 +57,11 @@ pub(super) fn geom(d: &Defaults, e: &Element, around: Around) -> Result<Geom, Er
     }
     let friction = match d.text(e, "condim") {
         Some("1") => Some(0.0),
-        _ => d.number(e, "friction")?,
+        _ => d.first(e, "friction")?,
     };
+    if let Some(bad) = friction.filter(|mu| *mu < 0.0) {
+        return Err(d.wrong(e, format!("friction = {bad} is negative: it would drive what slides")));
+    }
     if kind == "plane" {
         let normal = pose.rotation * Vector3::z_axis();
         return Ok(Geom::Plane(Plane { normal, offset: normal.dot(&pose.translation.vector), friction }));
@@ -70,7 +73,7 @@ pub(super) fn geom(d: &Defaults, e: &Element, around: Around) -> Result<Geom, Er
         }
     };
     let half = |k: usize| length.map_or_else(|| at(k), Ok);
-    let bits = |name: &str| d.number(e, name).map(|b| b.unwrap_or(1.0) as u32);
+    let bits = |name: &str| d.count(e, name, i32::MAX as u32).map(|b| b.unwrap_or(1));
     let (group, mask) = (bits("contype")?, bits("conaffinity")?);
     let collides = group != 0 || mask != 0;
     let name = e.node.attribute("name").unwrap_or(around.owner).to_owned();
@@ -108,10 +111,11 @@ pub(super) fn geom(d: &Defaults, e: &Element, around: Around) -> Result<Geom, Er
         }
         other => solid(other),
     };
-    let density = d.number(e, "density")?.unwrap_or(DENSITY);
-    let mass = d.number(e, "mass")?.unwrap_or(density * solid.volume);
+    let weighs = |name: &str| d.not_negative(e, name, "nothing weighs less than nothing");
+    let density = weighs("density")?.unwrap_or(DENSITY);
+    let mass = weighs("mass")?.unwrap_or(density * solid.volume);
     let shape = Shape { name, geometry, body_from_shape: pose, collides, friction, group, mask };
-    Ok(Geom::Shape(Weighed { shape, mass, solid, notice }))
+    Ok(Geom::Shape(Box::new(Weighed { shape, mass, solid, notice })))
 }
 
 /// A mesh by its name: triangles where it stands still, else its hull.
@@ -162,7 +166,7 @@ fn solid(g: &ShapeGeometry) -> Solid {
 }
 
 /// Mass, centre of mass and inertia about it of shapes in their common frame.
-pub(super) fn compound(shapes: &[Weighed]) -> Option<(f64, Vector3<f64>, Matrix3<f64>)> {
+pub(super) fn compound(shapes: &[Box<Weighed>]) -> Option<(f64, Vector3<f64>, Matrix3<f64>)> {
     let mass: f64 = shapes.iter().map(|s| s.mass).sum();
     if mass <= 0.0 {
         return None;

@@ -7,6 +7,12 @@ use crate::model::{AxisData, Joint, JointKind};
 use nalgebra::{Isometry3, Translation3, Unit, Vector3};
 use roxmltree::Node;
 
+/// Whether the body of a joint is one of the world's own.
+fn is_at_the_top(joint: Node) -> bool {
+    let around = joint.parent_element().and_then(|body| body.parent_element());
+    around.is_some_and(|n| n.has_tag_name("worldbody"))
+}
+
 impl Reader<'_, '_> {
     /// Hangs a body on its parent; `frame`: its pose there or in the world.
     pub(super) fn hang(
@@ -38,13 +44,14 @@ impl Reader<'_, '_> {
             "hinge" => JointKind::Revolute,
             "slide" => JointKind::Prismatic,
             "ball" => JointKind::Spherical,
-            "free" if parent.is_none() && !self.is_one_of_several(e.node) => {
+            "free" if is_at_the_top(e.node) && !self.is_one_of_several(e.node) => {
                 self.robot.others.push((child, frame));
                 return Ok(());
             }
             other => {
                 let problem = format!(
-                    "type `{other}` cannot be simulated here; hinge, slide, ball and free (alone, in the world) can"
+                    "type `{other}` cannot be simulated here; hinge, slide, ball and free (alone, on a body of <worldbody> \
+                     itself) can"
                 );
                 return Err(d.wrong(&e, problem));
             }
@@ -54,14 +61,9 @@ impl Reader<'_, '_> {
         let axis = d.vector(&e, "axis")?.unwrap_or_else(Vector3::z);
         let axis = Unit::try_new(axis, 1e-9).ok_or_else(|| d.wrong(&e, "axis has no direction".into()))?;
         let anchor = Isometry3::from(Translation3::from(d.vector(&e, "pos")?.unwrap_or_else(Vector3::zeros)));
-        if self.robot.joints.iter().any(|j| j.name == name) {
-            return Err(d.wrong(&e, format!("the name `{name}` is used twice; names of joints are unique")));
-        }
         let unit = if kind == JointKind::Revolute { d.angle } else { 1.0 };
-        let not_negative = |what: &str| match d.number(&e, what)?.unwrap_or(0.0) {
-            x if x >= 0.0 => Ok(x),
-            x => Err(d.wrong(&e, format!("{what} = {x} is negative: it would drive the joint"))),
-        };
+        let not_negative =
+            |what: &str| Ok(d.not_negative(&e, what, "it would drive the joint")?.unwrap_or(0.0));
         let data = AxisData {
             damping: not_negative("damping")?,
             friction: not_negative("frictionloss")?,
@@ -110,11 +112,13 @@ impl Reader<'_, '_> {
 
     fn limits(&self, e: &Element, unit: f64) -> Result<Option<[f64; 2]>, Error> {
         let range = self.d.numbers(e, "range")?;
-        match (self.d.text(e, "limited"), range.as_deref()) {
+        match (self.d.choice(e, "limited", &["true", "false", "auto"])?, range.as_deref()) {
             (Some("false"), _) | (_, None) => Ok(None),
             (None | Some("auto"), _) if !self.d.autolimits => Ok(None),
             (_, Some([lower, upper])) if lower < upper => Ok(Some([unit * lower, unit * upper])),
-            (_, Some(other)) => Err(self.d.wrong(e, format!("range = {other:?} leaves no room"))),
+            (_, Some(other)) => Err(self
+                .d
+                .wrong(e, format!("range = {other:?} leaves no room; write the smaller number first"))),
         }
     }
 }

@@ -190,9 +190,15 @@ impl Reader<'_, '_> {
             if read(&name) || value.split_whitespace().all(|v| off.contains(&v)) {
                 continue;
             }
-            let text = format!("has `{name}` = \"{value}\", which is not supported and does nothing");
-            let text = self.place(node, &text);
-            self.ignored.found.entry((tag.into(), name)).or_insert((text, 0)).1 += 1;
+            self.ignore(node, &name, &value);
         }
+    }
+
+    /// Notes that what an attribute says does nothing.
+    pub(super) fn ignore(&mut self, node: Node, name: &str, value: &str) {
+        let text = format!("has `{name}` = \"{value}\", which is not supported and does nothing");
+        let text = self.place(node, &text);
+        let key = (node.tag_name().name().to_owned(), name.to_owned());
+        self.ignored.found.entry(key).or_insert((text, 0)).1 += 1;
     }
 }

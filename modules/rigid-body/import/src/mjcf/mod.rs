@@ -14,9 +14,10 @@ mod hang;
 mod ignored;
 mod include;
 mod several;
+mod survey;
 
 use crate::Options;
-use crate::check::{mass_spread, physical};
+use crate::check::{Inertial, mass_spread, physical, unique};
 use crate::error::{Error, Source};
 use crate::model::{Base, Robot, Shape};
 use assets::Assets;
@@ -24,9 +25,10 @@ use defaults::Defaults;
 use geom::{Around, Geom, compound, geom};
 use ignored::Ignored;
 use include::Whole;
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use nalgebra::{Isometry3, Matrix3};
 use roxmltree::{Document, Node};
 use std::collections::BTreeMap;
+use survey::survey;
 
 /// Elements that say nothing about the mechanics.
 const SEEN_ONLY: [&str; 9] =
@@ -40,7 +42,8 @@ pub fn read_mjcf_text(file: &str, text: &str, options: &Options) -> Result<Robot
     let document = Document::parse(&whole.text);
     let document = document.map_err(|e| source.syntax(e.pos().row as usize, e.to_string()))?;
     let root = document.root_element();
-    let defaults = Defaults::new(&whole, root);
+    let defaults = Defaults::new(&whole, root)?;
+    survey(&defaults, root)?;
     let assets = Assets::read(&defaults, root, &options.folders(file))?;
     let robot = empty(root.attribute("model").unwrap_or("robot"));
     let mut reader =
@@ -58,6 +61,7 @@ pub fn read_mjcf_text(file: &str, text: &str, options: &Options) -> Result<Robot
     };
     robot.others.retain(|(body, _)| *body != 0);
     robot.warnings.extend(mass_spread(file, &robot.bodies));
+    unique(&source, &robot)?;
     Ok(robot)
 }
 
@@ -171,6 +175,9 @@ impl<'d, 's> Reader<'d, 's> {
     fn shape<'a>(&mut self, node: Node<'a, '_>, place: Place<'a>, owner: &str) -> Result<(), Error> {
         self.warn_ignored(node, place.class);
         let e = self.d.element(node, place.class);
+        if let Some(condim @ ("4" | "6")) = self.d.text(&e, "condim") {
+            self.ignore(node, "condim", condim);
+        }
         let around = Around { assets: self.assets, owner, still: place.body.is_none() };
         match geom(self.d, &e, around)? {
             Geom::Shape(weighed) => {
@@ -218,12 +225,7 @@ impl<'d, 's> Reader<'d, 's> {
                 return Err(self.d.wrong(&e, problem.into()));
             }
             (_, Some((mass, com, inertia))) => {
-                physical(&inertia).map_err(|problem| self.d.wrong(&e, problem))?;
-                if self.robot.bodies.iter().any(|b| b.name == name) {
-                    return Err(self
-                        .d
-                        .wrong(&e, "the name is used twice; names of bodies are unique".into()));
-                }
+                physical(mass, &inertia).map_err(|problem| self.d.wrong(&e, problem))?;
                 let hangs = Place { class, ..above };
                 let child = self.hang_by(&joints, hangs, (&name, frame), (mass, com, inertia))?;
                 Place { body: Some(child), frame: Isometry3::identity(), class }
@@ -234,18 +236,15 @@ impl<'d, 's> Reader<'d, 's> {
     }
 
     /// `<inertial>`, or what the geoms weigh.
-    fn inertial(
-        &self,
-        node: Node,
-        class: Option<&str>,
-        name: &str,
-    ) -> Result<Option<(f64, Vector3<f64>, Matrix3<f64>)>, Error> {
+    fn inertial(&self, node: Node, class: Option<&str>, name: &str) -> Result<Inertial, Error> {
         let d = self.d;
         let inertial = node.children().find(|n| n.has_tag_name("inertial"));
         if let Some(inertial) = inertial.filter(|_| !d.weigh_geoms) {
             let e = d.element(inertial, None);
-            let mass = d.number(&e, "mass")?.filter(|m| *m > 0.0);
-            let mass = mass.ok_or_else(|| d.wrong(&e, "needs a positive mass".into()))?;
+            let mass = d.number(&e, "mass")?.unwrap_or(0.0);
+            if mass <= 0.0 {
+                return Err(d.wrong(&e, format!("mass = {mass}: needs a positive mass in kg")));
+            }
             let tensor = match (d.vector(&e, "diaginertia")?, d.numbers(&e, "fullinertia")?.as_deref()) {
                 (Some(diagonal), _) => Matrix3::from_diagonal(&diagonal),
                 (None, Some([xx, yy, zz, xy, xz, yz])) => {

@@ -14,11 +14,13 @@
 //! | `actuator` | windings, gears, friction, heat, battery, energy |
 //! | `contact` | ports, the rigid estimate T*, contacts among own bodies |
 //! | `lcp` | pivoting methods, from the crate `contact-solver` |
+//! | `balance` | energy and gaps of the committed state |
 //! | `variables`, `initial`, `scene` | what can be read, set (also of the motion before the start), done and seen |
 //!
 //! Deliberately absent: ground and soil. The robot knows its ports, never what lies behind them.
 
 mod actuator;
+mod balance;
 mod closure;
 mod contact;
 mod cut;

@@ -103,7 +103,7 @@ impl Module for RigidBody {
         })?;
         dynamics.contacts.set_surroundings(law, surface(&config)?, ground);
         settle_loops(&*host, &mut dynamics, &mut state)?;
-        Ok(Box::new(Robot::new(host, dynamics, state)))
+        Ok(Box::new(Robot::new(host, dynamics, state)?))
     }
 }
 

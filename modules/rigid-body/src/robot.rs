@@ -3,6 +3,7 @@
 use crate::actuator::Item;
 use crate::actuator::battery::Draw;
 use crate::actuator::book::Outcome;
+use crate::balance;
 use crate::contact::estimate::{Estimator, Problem};
 use crate::contact::ports::{Ports, committed, displacement, response, standing};
 use crate::contact::slopes::Slopes;
@@ -67,11 +68,13 @@ fn failed(failure: Failure) -> Error {
 }
 
 impl Robot {
-    pub fn new(host: Arc<dyn Host>, dynamics: Dynamics, state: State) -> Self {
+    pub fn new(host: Arc<dyn Host>, dynamics: Dynamics, state: State) -> Result<Self> {
         let slots = (0..host.slots()).map(|_| State::default()).collect();
-        Self {
+        let variables = variables::describe(&dynamics.model, &state);
+        variables::check_names(&variables)?;
+        Ok(Self {
             _host: host,
-            variables: variables::describe(&dynamics.model, &state),
+            variables,
             actions: variables::actions(&dynamics.model),
             ports: Ports::new(&dynamics.model),
             dynamics,
@@ -85,7 +88,7 @@ impl Robot {
             revision: 0,
             trial: false,
             scratch: Scratch::default(),
-        }
+        })
     }
 
     fn model(&self) -> &Model {
@@ -523,21 +526,7 @@ impl Subsystem for Robot {
     }
 
     fn energy(&self) -> Energy {
-        let (mut kinetic, mut potential) = (0.0, 0.0);
-        for (body, m) in self.model().bodies.iter().zip(&self.state.bodies) {
-            let w = m.q.inverse_transform_vector(&m.w);
-            kinetic += 0.5 * (body.mass * m.v.norm_squared() + w.dot(&(body.inertia * w)));
-            // Rates and positions of the scheme are half a step apart; the book is kept at the time of the rates.
-            potential -= body.mass * self.model().gravity.dot(&(m.c - self.state.stagger * m.v));
-        }
-        for (s, joint) in self.state.joints.iter().zip(&self.model().joints).filter(|(s, _)| !s.broken) {
-            if joint.moves() {
-                let (spring, armature) = s.actuator.stored(s.angle);
-                (potential, kinetic) = (potential + spring, kinetic + armature);
-            }
-        }
-        potential += self.state.closures.iter().filter(|s| !s.broken).map(|s| s.stored).sum::<f64>();
-        Energy { kinetic, potential, ..self.state.energy }
+        balance::energy(self.model(), &self.state)
     }
 }
 

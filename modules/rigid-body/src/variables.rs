@@ -2,6 +2,7 @@
 
 use crate::actuator::SETTINGS;
 use crate::actuator::settings::{Group, Range};
+use crate::balance::{energy, widest_gap};
 use crate::drive::Motor;
 use crate::initial;
 use crate::math::euler;
@@ -115,7 +116,7 @@ const ACTUATOR_ITEMS: [ActuatorItem; 14] = [
 ];
 
 /// What the robot as a whole tells.
-const ROBOT_ITEMS: [(&str, &str, &str); 13] = [
+const ROBOT_ITEMS: [(&str, &str, &str); 17] = [
     ("energy.motor_work", "J", "Mechanical work of all motors since the start"),
     ("energy.electrical", "J", "Electrical energy drawn by all motors since the start"),
     ("energy.distance", "m", "Horizontal distance of the first body from its start"),
@@ -130,12 +131,16 @@ const ROBOT_ITEMS: [(&str, &str, &str); 13] = [
         "Lost in impacts and friction among the bodies and on rigid ground since the start",
     ),
     ("contact.yielding", "", "By how much rigid motors gave way at their largest torque, rad/s or m/s"),
+    ("energy.kinetic", "J", "Kinetic energy of bodies and armatures"),
+    ("energy.potential", "J", "Potential energy of bodies against the origin, and of springs"),
+    ("energy.dissipated", "J", "Turned into heat since the start"),
+    ("joints.gap", "", "Farthest that a joint or loop is out of place, m or rad"),
     ("battery.charge", "", "Share of the capacity that is left"),
     ("battery.lost", "J", "Lost in the internal resistance since the start"),
     ("battery.missing", "J", "Asked for beyond what the battery could give"),
 ];
 /// Those before are there without a battery.
-const WITHOUT_BATTERY: usize = 10;
+const WITHOUT_BATTERY: usize = 14;
 /// Ids of connections beyond the tree; the one before is the number of dependent rows.
 const CLOSURES: u32 = 1 << 24;
 const CLOSURE_STRIDE: u32 = 8;
@@ -192,6 +197,18 @@ pub(crate) fn describe(model: &Model, state: &State) -> Vec<Variable> {
         all.push(Variable::real(id, name, "", Causality::Local, help));
     }
     all
+}
+
+/// Refuses names that two variables have: of things that are called alike, or like the robot's own.
+pub(crate) fn check_names(all: &[Variable]) -> Result {
+    let mut known = std::collections::BTreeSet::new();
+    let Some(twice) = all.iter().find(|v| !known.insert(v.name.as_str())) else { return Ok(()) };
+    let own: Vec<&str> = ROBOT_ITEMS.iter().filter_map(|(n, ..)| Some(n.split_once('.')?.0)).collect();
+    let (name, own) = (&twice.name, own.iter().collect::<std::collections::BTreeSet<_>>());
+    Err(Error::Refused(format!(
+        "two variables would be called `{name}`: give links, joints and connections of the robot file and of objects \
+         different names, other than {own:?} and `base` for the joint of a fixed base"
+    )))
 }
 
 /// An output whose value before the first step can be given.
@@ -368,7 +385,7 @@ pub(crate) fn number(model: &Model, state: &State, id: u32) -> Result<f64> {
                 _ => Ok(j.actuator.settings[(item - SETTING) as usize]),
             }
         }
-        Meaning::Robot(item) => Ok(robot_number(state, item)),
+        Meaning::Robot(item) => Ok(robot_number(model, state, item)),
         Meaning::RedundantRows => Ok(state.redundant_rows as f64),
         Meaning::Share(body) => Ok(model.bodies[body].share),
         Meaning::Closure { item: CLOSURE_BROKEN, .. } => Err(wrong_type(id)),
@@ -379,7 +396,7 @@ pub(crate) fn number(model: &Model, state: &State, id: u32) -> Result<f64> {
     }
 }
 
-fn robot_number(state: &State, item: usize) -> f64 {
+fn robot_number(model: &Model, state: &State, item: usize) -> f64 {
     let distance = || match (state.start, state.bodies.first()) {
         (Some(start), Some(body)) => (body.c - start).xy().norm(),
         _ => 0.0,
@@ -396,8 +413,12 @@ fn robot_number(state: &State, item: usize) -> f64 {
         7 => state.contact.residual,
         8 => state.contact.lost,
         9 => state.contact.yielding,
-        10 => state.supply.charge,
-        11 => state.supply.lost,
+        10 => energy(model, state).kinetic,
+        11 => energy(model, state).potential,
+        12 => state.energy.dissipated,
+        13 => widest_gap(model, state),
+        14 => state.supply.charge,
+        15 => state.supply.lost,
         _ => state.supply.missing,
     }
 }
@@ -512,8 +533,8 @@ pub(crate) fn set_flag(model: &Model, state: &mut State, id: u32, value: bool) -
 /// Blocks a joint where it stands, or lets it go.
 pub(crate) fn block(state: &mut State, joint: usize, hold: bool) -> Result {
     let j = &mut state.joints[joint];
-    if j.broken {
-        return Err(Error::Refused("the joint is broken: there is nothing to block or release".into()));
+    if j.broken && hold {
+        return Err(Error::Refused("the joint is broken: there is nothing to block".into()));
     }
     j.blocked = match (hold, j.blocked) {
         (true, Some(held)) => Some(held),

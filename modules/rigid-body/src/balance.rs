@@ -1,0 +1,48 @@
+//! Energy of the committed state, and how far its joints are out of place: what a run is judged by.
+
+use crate::closure::Poses;
+use crate::dynamics::joint_rows::gap;
+use crate::model::Model;
+use crate::state::State;
+use terraglue_subsystem::Energy;
+
+/// Kinetic and potential energy beside the sums that the state keeps.
+pub(crate) fn energy(model: &Model, state: &State) -> Energy {
+    let (mut kinetic, mut potential) = (0.0, 0.0);
+    for (body, m) in model.bodies.iter().zip(&state.bodies) {
+        let w = m.q.inverse_transform_vector(&m.w);
+        kinetic += 0.5 * (body.mass * m.v.norm_squared() + w.dot(&(body.inertia * w)));
+        // Rates and positions of the scheme are half a step apart; the book is kept at the time of the rates.
+        potential -= body.mass * model.gravity.dot(&(m.c - state.stagger * m.v));
+    }
+    for (s, joint) in state.joints.iter().zip(&model.joints).filter(|(s, _)| !s.broken) {
+        if joint.moves() {
+            let (spring, armature) = s.actuator.stored(s.angle);
+            (potential, kinetic) = (potential + spring, kinetic + armature);
+        }
+    }
+    potential += state.closures.iter().filter(|s| !s.broken).map(|s| s.stored).sum::<f64>();
+    Energy { kinetic, potential, ..state.energy }
+}
+
+/// Largest gap of a joint or of what closes a loop, in any of its rows, m or rad.
+pub(crate) fn widest_gap(model: &Model, state: &State) -> f64 {
+    let joints = model.joints.iter().zip(&state.joints).filter(|(_, s)| !s.broken);
+    let mut widest = joints.flat_map(|(joint, _)| gap(joint, &state.bodies)).fold(0.0, wider);
+    if model.closures.is_empty() {
+        return widest;
+    }
+    let near: Vec<f64> = state.joints.iter().map(|j| j.angle).collect();
+    let poses = Poses { joints: &model.joints, before: None, bodies: &state.bodies, near: &near };
+    let loops = model.closures.iter().zip(&state.closures).filter(|(_, s)| !s.broken);
+    for (closure, _) in loops.filter(|(c, _)| c.spring().is_none()) {
+        let mut open = [0.0; 6];
+        closure.values(&poses, &mut open[..closure.len()]);
+        widest = open.into_iter().fold(widest, wider);
+    }
+    widest
+}
+
+fn wider(widest: f64, gap: f64) -> f64 {
+    widest.max(gap.abs())
+}

@@ -210,6 +210,25 @@ fn equality_becomes_loops_and_couplings() {
 }
 
 #[test]
+fn excluded_pairs_may_name_parts_of_bodies_and_bodies_that_stand_still() {
+    let post = r#"<body name="post" pos="5 0 0"><geom size="0.1"/></body>"#;
+    let exclude = |one: &str, other: &str| {
+        let more = format!(r#"<contact><exclude body1="{one}" body2="{other}"/></contact>"#);
+        read(&format!("{PAIR}{post}"), &more)
+    };
+    // `c` is a part of `b`, so the pair is that of a and b.
+    assert_eq!(exclude("a", "c").unwrap().excluded, [[0, 1]]);
+    let own = exclude("b", "c").unwrap();
+    assert!(own.excluded.is_empty() && own.warnings.is_empty(), "{:?}", own.warnings);
+    for still in ["post", "world"] {
+        let robot = exclude("a", still).unwrap();
+        assert!(robot.excluded.is_empty());
+        assert!(robot.warnings[0].contains("m.xml:2: <exclude> names a body that stands still"));
+    }
+    assert!(exclude("a", "d").unwrap_err().contains("m.xml:2: exclude: body2: there is no body `d`"));
+}
+
+#[test]
 fn meshes_and_height_fields_come_from_assets() {
     let robot = read(
         r#"<geom type="hfield" hfield="f" pos="0 0 0.2"/><geom type="mesh" mesh="wedge"/>

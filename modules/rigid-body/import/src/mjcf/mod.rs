@@ -272,18 +272,18 @@ impl<'d, 's> Reader<'d, 's> {
             self.warn(node, "is not supported and does nothing");
             return Ok(());
         }
-        let mut pair = [0; 2];
-        for (slot, name) in pair.iter_mut().zip(["body1", "body2"]) {
+        let moving = |name: &str| {
             let wanted = node.attribute(name).unwrap_or_default();
-            let found = self.robot.bodies.iter().position(|b| b.name == wanted);
-            *slot = found.ok_or_else(|| {
-                self.d.wrong(
-                    &self.d.element(node, None),
-                    format!("{name}: there is no body `{wanted}` that moves"),
-                )
-            })?;
+            let found = if wanted == "world" { Some(None) } else { self.frames.get(wanted).map(|f| f.0) };
+            let unknown = || format!("{name}: there is no body `{wanted}`");
+            found.ok_or_else(|| self.d.wrong(&self.d.element(node, None), unknown()))
+        };
+        match (moving("body1")?, moving("body2")?) {
+            (Some(a), Some(b)) if a != b => self.robot.excluded.push([a, b]),
+            // Parts of one body never touch.
+            (a, b) if a == b => {}
+            _ => self.warn(node, "names a body that stands still: what moves touches it all the same"),
         }
-        self.robot.excluded.push(pair);
         Ok(())
     }
 }

@@ -7,6 +7,7 @@ use std::path::Path;
 
 const H: f64 = 1e-3;
 const STEPS: usize = 10_000;
+const RUNS: usize = 5;
 /// From here on figures are taken.
 const WALKS: usize = 2_000;
 const CYCLE: f64 = 1.2;
@@ -39,14 +40,44 @@ fn open(world: &PhysicsWorld, robot: &Robot) -> [f64; 2] {
     })
 }
 
-/// Runs ten seconds of `drive` on a robot and prints its figures.
+/// What was seen in ten seconds.
+struct Seen {
+    /// CPU time of every step, µs.
+    times: Vec<f64>,
+    deepest: f64,
+    slip: f64,
+    gap: [f64; 2],
+    x: f64,
+}
+
+/// Runs `drive` on a robot five times and prints its figures: each step counts with the least of its times, as it does on
+/// our side.
 pub fn walk(model: &Path, gait: &Path, name: &str, stiff: bool) -> Outcome {
     let rows = table(gait)?;
+    let wanted: Vec<Vec<f64>> = (0..STEPS).map(|k| targets(k as f64 * H, &rows)).collect();
+    let mut seen = run(model, &wanted, stiff)?;
+    for _ in 1..RUNS {
+        let again = run(model, &wanted, stiff)?.times;
+        seen.times.iter_mut().zip(again).for_each(|(time, again)| *time = time.min(again));
+    }
+    let Seen { mut times, deepest, slip, gap, x } = seen;
+    times.sort_by(f64::total_cmp);
+    let id = |what: &str| format!("gait.{name}.{what}");
+    figure(&id("step"), times[STEPS / 2], "CPU time of a step, least of five runs, median, µs");
+    figure(&id("tail"), times[STEPS / 100 * 99] / times[STEPS / 2], "99th percentile of that / median");
+    figure(&id("penetration"), 1e3 * deepest, "deepest foot after 2 s, mm");
+    figure(&id("slip"), 1e3 * slip, "mean speed of feet that stand, mm/s");
+    figure(&id("joint_gap"), 1e3 * gap[0], "largest distance of two anchors, mm");
+    figure(&id("axis_error"), 1e3 * gap[1], "largest angle between two axes, mrad");
+    figure(&id("x"), x, "distance in 10 s, m");
+    Ok(())
+}
+
+fn run(model: &Path, wanted: &[Vec<f64>], stiff: bool) -> Outcome<Seen> {
     let mut world = world([0.0, 0.0, -9.81], H);
     world.insert_collider(ColliderBuilder::halfspace(na::Unit::new_unchecked(Vector::Z)).friction(0.8), None);
     let stand = |joint: &str| STAND[joint.as_bytes().last().map_or(0, |b| usize::from(b - b'1') % 4)];
     let robot = read(&mut world, model, Some(Pose::translation(0.0, 0.0, 0.33)), stand)?;
-    let wanted: Vec<Vec<f64>> = (0..STEPS).map(|k| targets(k as f64 * H, &rows)).collect();
     let mut times = Vec::with_capacity(STEPS);
     let (mut deepest, mut slip, mut slips, mut gap) = (0.0_f64, 0.0, 0.0, [0.0_f64; 2]);
     let mut before = vec![None; robot.feet.len()];
@@ -71,16 +102,8 @@ pub fn walk(model: &Path, gait: &Path, name: &str, stiff: bool) -> Outcome {
             *last = stands.then_some(p);
         }
     }
-    times.sort_by(f64::total_cmp);
-    let id = |what: &str| format!("gait.{name}.{what}");
-    figure(&id("step"), times[STEPS / 2], "CPU time of a step, median, µs");
-    figure(&id("tail"), times[STEPS / 100 * 99] / times[STEPS / 2], "99th percentile / median");
-    figure(&id("penetration"), 1e3 * deepest, "deepest foot after 2 s, mm");
-    figure(&id("slip"), 1e3 * slip / f64::max(slips, 1.0), "mean speed of feet that stand, mm/s");
-    figure(&id("joint_gap"), 1e3 * gap[0], "largest distance of two anchors, mm");
-    figure(&id("axis_error"), 1e3 * gap[1], "largest angle between two axes, mrad");
-    figure(&id("x"), world.bodies[robot.bodies[0]].translation().x, "distance in 10 s, m");
-    Ok(())
+    let x = world.bodies[robot.bodies[0]].translation().x;
+    Ok(Seen { times, deepest, slip: slip / f64::max(slips, 1.0), gap, x })
 }
 
 /// Implicit PD, or the error taken back within ten steps at 20 rad/s at most by a motor of nearly no compliance.

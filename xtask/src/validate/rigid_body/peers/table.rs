@@ -13,7 +13,7 @@ const ROWS: [Row; 20] = [
         &["gait.soft.step"],
     ),
     Row(
-        "the same: 99th percentile / median",
+        "the same: 99th percentile / median (each step the least of five runs)",
         &["gait.six.tail"],
         &["gait.soft.tail", "gait.stiff_contacts.tail"],
         &["gait.soft.tail"],

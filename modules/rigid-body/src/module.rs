@@ -2,8 +2,9 @@
 
 use crate::actuator::{Actuator, Item, configure};
 use crate::closure::configure::closures;
-use crate::contact::bodies::{Law, Surface};
+use crate::contact::bodies::Law;
 use crate::contact::plane::Plane;
+use crate::contact::surfaces::Surfaces;
 use crate::cut;
 use crate::drive::{Mode, Motor};
 use crate::dynamics::Dynamics;
@@ -101,7 +102,8 @@ impl Module for RigidBody {
         let law = Law::from_name(name).ok_or_else(|| {
             Error::Refused(format!("parameter `contact_solver` = `{name}` is none of {:?}", Law::NAMES))
         })?;
-        dynamics.contacts.set_surroundings(law, surface(&config)?, ground);
+        let surfaces = Surfaces::from_config(&config, &dynamics.model)?;
+        dynamics.contacts.set_surroundings(law, surfaces, ground);
         settle_loops(&*host, &mut dynamics, &mut state)?;
         Ok(Box::new(Robot::new(host, dynamics, state)?))
     }
@@ -144,11 +146,6 @@ fn set_kinds(config: &Config, model: &mut Model) -> Result<()> {
         joint.limits = None;
     }
     Ok(())
-}
-
-/// Friction and restitution among bodies and with rigid ground.
-fn surface(config: &Config) -> Result<Surface> {
-    Ok(Surface { friction: config.number("friction")?, restitution: config.number("restitution")? })
 }
 
 /// The rigid ground, if there is one.

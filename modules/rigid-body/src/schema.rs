@@ -110,12 +110,9 @@ pub(crate) fn schema() -> Schema {
             )
             .or("ncp")
             .choices(&crate::contact::bodies::Law::NAMES),
-            Parameter::number("friction", "1", 0.8, "Coulomb friction among bodies and with rigid ground")
-                .within(0.0, f64::INFINITY),
-            Parameter::number("restitution", "1", 0.0, "Newton's coefficient of restitution among bodies and with rigid ground")
-                .within(0.0, 1.0),
         ]
         .into_iter()
+        .chain(crate::contact::surfaces::parameters())
         .chain([crate::objects::parameter()])
         .chain(crate::cut::parameters())
         .chain(crate::closure::configure::parameters())

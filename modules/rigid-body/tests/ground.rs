@@ -192,3 +192,57 @@ proptest! {
         prop_assert!(rig.states().iter().skip(1).all(|b| b.world_from_body.position[2] > -1e-2));
     }
 }
+
+#[test]
+fn a_pair_has_a_restitution_of_its_own() {
+    for pair in ["s & ground", "ground&s", "* & ground"] {
+        let name = format!("pair{}", pair.len());
+        let more = format!(r#", "restitution": {{"*": 0.1, "{pair}": 0.8}}"#);
+        let mut rig = on_incline(&name, &sphere_link("s", 1.0, 0.1), 1.1, 0.0, &more);
+        let mut apex: f64 = 0.0;
+        for step in 0..1000 {
+            rig.free_step();
+            if step > 500 {
+                apex = apex.max(rig.states()[0].world_from_body.position[2] - 0.1);
+            }
+        }
+        assert!((apex - 0.64).abs() < 0.01, "{pair}: {apex}");
+    }
+}
+
+#[test]
+fn a_pair_has_a_friction_of_its_own() {
+    // Pulled by half its weight, the upper box slides on the lower one, which the ground holds.
+    let bodies =
+        [(box_link("b0", 1.0, [4.0, 4.0, 0.2]), 0.05), (box_link("b1", 1.0, [0.2, 0.2, 0.02]), 0.16)];
+    let speeds = |friction: &str| {
+        let mut rig =
+            loose(&format!("pairs{}", friction.len()), &bodies, &format!(r#", "friction": {friction}"#));
+        for _ in 0..200 {
+            rig.push("b1", [0.5 * G, 0.0, 0.0]);
+            rig.free_step();
+        }
+        [1, 2].map(|k| rig.states()[k].linear_velocity[0])
+    };
+    let [low, high] = speeds(r#"{"*": 0.8, "b0 & b1": 0.1}"#);
+    assert!(low.abs() < 1e-9 && (high / (0.4 * G * 0.2) - 1.0).abs() < 1e-6, "{low} {high}");
+    // a name that is written out goes before a pattern
+    assert_eq!(speeds(r#"{"*": 0.8, "b* & b*": 0.9, "b0 & b1": 0.1}"#), [low, high]);
+    assert!(speeds("0.8")[1].abs() < 1e-9);
+}
+
+#[test]
+fn a_pair_that_is_none_is_refused() {
+    let model =
+        temporary_urdf("nopair", &format!(r#"<robot name="r">{}</robot>"#, sphere_link("s", 1.0, 0.1)));
+    for (key, says) in [
+        ("s", "is no pair; write `A & B`"),
+        ("t & ground", "fits no two bodies"),
+        ("s & s", "the bodies are s"),
+    ] {
+        let refused =
+            common::instantiate(&format!(r#"{{"model": "{model}", "friction": {{"{key}": 0.5}}}}"#), G);
+        let message = refused.err().map(|e| e.to_string()).unwrap_or_default();
+        assert!(message.contains("parameter `friction`") && message.contains(says), "{key}: {message}");
+    }
+}

@@ -8,6 +8,7 @@
 use crate::contact::detection::{ContactPoint, Detector};
 use crate::contact::memory::{Pressed, recall, remember};
 use crate::contact::plane::Plane;
+use crate::contact::surfaces::Surfaces;
 use crate::dense::{cholesky, cholesky_solve};
 use crate::model::Model;
 use crate::state::Motion;
@@ -60,17 +61,10 @@ pub(crate) enum Unsolved {
     Pivots(u32),
 }
 
-/// Friction and restitution of all pairs.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Surface {
-    pub friction: f64,
-    pub restitution: f64,
-}
-
 /// The contact points of the step and their impulses.
 pub(crate) struct BodyContacts {
     detector: Detector,
-    surface: Surface,
+    surfaces: Surfaces,
     gravity: f64,
     points: Vec<ContactPoint>,
     /// Per point and component the wrench of a unit impulse on a and on b, about their centres of mass.
@@ -102,7 +96,7 @@ impl BodyContacts {
         let numbers = |per_point: usize| Vec::with_capacity(per_point * room);
         Self {
             detector,
-            surface: Surface { friction: 0.0, restitution: 0.0 },
+            surfaces: Surfaces::default(),
             gravity: model.gravity.norm(),
             points: Vec::with_capacity(room),
             wrenches: Vec::with_capacity(room),
@@ -133,8 +127,8 @@ impl BodyContacts {
     }
 
     /// Law, friction, restitution and the rigid ground.
-    pub fn set_surroundings(&mut self, law: Law, surface: Surface, ground: Option<Plane>) {
-        (self.law, self.surface) = (law, surface);
+    pub fn set_surroundings(&mut self, law: Law, surfaces: Surfaces, ground: Option<Plane>) {
+        (self.law, self.surfaces) = (law, surfaces);
         self.detector.planes.extend(ground);
     }
 
@@ -159,12 +153,15 @@ impl BodyContacts {
                 })
             };
             let approach = p.frame[0].dot(&(velocity(1) - velocity(0)));
-            self.offsets.push(self.offset(p.gap, approach, h));
+            let restitution = self.surfaces.of(p.bodies).restitution.unwrap_or(self.surfaces.restitution);
+            self.offsets.push(self.offset(p.gap, approach, restitution, h));
         }
         let n = self.points.len();
         self.mu.clear();
-        let scenario = self.surface.friction;
-        self.mu.extend(self.points.iter().map(|p| p.friction.unwrap_or(scenario)));
+        let surfaces = &self.surfaces;
+        let friction =
+            |p: &ContactPoint| surfaces.of(p.bodies).friction.or(p.friction).unwrap_or(surfaces.friction);
+        self.mu.extend(self.points.iter().map(friction));
         self.impulses.clear();
         self.impulses.resize(3 * n, 0.0);
         recall(memory, &self.points, bodies, h, &mut self.impulses);
@@ -175,10 +172,10 @@ impl BodyContacts {
         remember(memory, &self.points, &self.impulses, bodies, h);
     }
 
-    fn offset(&self, gap: f64, approach: f64, h: f64) -> f64 {
+    fn offset(&self, gap: f64, approach: f64, restitution: f64, h: f64) -> f64 {
         let hits = gap + h * approach <= 0.0 && -approach > REBOUND * h * self.gravity;
-        if hits && self.surface.restitution > 0.0 {
-            return self.surface.restitution * approach;
+        if hits && restitution > 0.0 {
+            return restitution * approach;
         }
         if gap >= -FULL_RECOVERY {
             gap / h

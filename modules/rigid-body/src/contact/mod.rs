@@ -11,4 +11,5 @@ pub(crate) mod ports;
 pub(crate) mod reduce;
 pub(crate) mod shapes;
 pub(crate) mod slopes;
+pub(crate) mod surfaces;
 pub(crate) mod triangles;

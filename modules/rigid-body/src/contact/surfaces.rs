@@ -1,0 +1,134 @@
+//! Friction and restitution of pairs of bodies as a scenario gives them: a number for all, or a table by pairs `A & B`, where
+//! `*` stands for any text and `ground` is all that stands still.
+
+use crate::model::Model;
+use crate::placement::matches;
+use serde_json::Value;
+use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};
+
+/// Name of what stands still.
+const GROUND: &str = "ground";
+/// Pattern of all pairs.
+const ALL: &str = "*";
+/// Coulomb friction and restitution where a scenario is silent.
+const DEFAULTS: [(&str, f64, f64, &str); 2] = [
+    ("friction", 0.8, f64::INFINITY, "Coulomb friction among bodies and with rigid ground"),
+    ("restitution", 0.0, 1.0, "Newton's coefficient of restitution among bodies and with rigid ground"),
+];
+
+/// What holds where two bodies touch; none: what holds everywhere.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub(crate) struct Pair {
+    pub friction: Option<f64>,
+    pub restitution: Option<f64>,
+}
+
+/// Friction and restitution of all pairs.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Surfaces {
+    /// Of pairs that nothing else is said of: by the scenario, and friction not by the robot file either.
+    pub friction: f64,
+    pub restitution: f64,
+    /// By both bodies, what stands still last; empty where no pair has numbers of its own.
+    pairs: Vec<Pair>,
+    bodies: usize,
+}
+
+/// The parameters of the scenario.
+pub(crate) fn parameters() -> impl Iterator<Item = Parameter> {
+    DEFAULTS.into_iter().map(|(name, default, most, help)| {
+        let help = format!(
+            "{help}, for all or by pairs of bodies: `{{ \"{ALL}\" = {default:?}, \"*_foot & {GROUND}\" = … }}`, where `{GROUND}` \
+             is all that stands still"
+        );
+        let of = Parameter::of(name, ParameterType::NumberByName, &help).or(default).within(0.0, most);
+        Parameter { unit: "1".into(), ..of }
+    })
+}
+
+impl Surfaces {
+    /// Refused: a pattern that is no pair, or fits none.
+    pub fn from_config(config: &Config, model: &Model) -> Result<Self> {
+        let names: Vec<&str> = model.bodies.iter().map(|b| b.name.as_str()).chain([GROUND]).collect();
+        let [(_, friction, ..), (_, restitution, ..)] = DEFAULTS;
+        let mut me = Self { friction, restitution, pairs: Vec::new(), bodies: model.bodies.len() };
+        let everywhere = [&mut me.friction, &mut me.restitution];
+        let mut tables = [None, None];
+        for ((key, ..), (value, table)) in DEFAULTS.iter().zip(everywhere.into_iter().zip(&mut tables)) {
+            match config.get(key) {
+                Some(Value::Object(by_pair)) => {
+                    *value = by_pair.get(ALL).and_then(Value::as_f64).unwrap_or(*value);
+                    *table = Some(rows(key, by_pair, &names)?);
+                }
+                _ => *value = config.number(key)?,
+            }
+        }
+        if tables.iter().flatten().any(|rows| !rows.is_empty()) {
+            let [friction, restitution] = tables.map(Option::unwrap_or_default);
+            let n = names.len();
+            let pair = |k: usize| [names[k / n], names[k % n]];
+            me.pairs = (0..n * n)
+                .map(|k| Pair {
+                    friction: best(&friction, pair(k)),
+                    restitution: best(&restitution, pair(k)),
+                })
+                .collect();
+        }
+        Ok(me)
+    }
+
+    /// What the scenario says of two bodies; none: what stands still.
+    pub fn of(&self, bodies: [Option<usize>; 2]) -> Pair {
+        let [a, b] = bodies.map(|b| b.unwrap_or(self.bodies));
+        self.pairs.get(a * (self.bodies + 1) + b).copied().unwrap_or_default()
+    }
+}
+
+/// A pattern of two names and its number.
+struct Row<'a> {
+    names: [&'a str; 2],
+    value: f64,
+}
+
+impl Row<'_> {
+    fn fits(&self, [a, b]: [&str; 2]) -> bool {
+        let [p, q] = self.names;
+        matches(p, a) && matches(q, b) || matches(p, b) && matches(q, a)
+    }
+
+    /// Names that are written out, then the length of the patterns: what says more of a pair goes first.
+    fn rank(&self) -> (usize, usize) {
+        let plain = self.names.iter().filter(|p| !p.contains('*')).count();
+        (plain, self.names.iter().map(|p| p.len()).sum())
+    }
+}
+
+fn rows<'a>(key: &str, table: &'a serde_json::Map<String, Value>, names: &[&str]) -> Result<Vec<Row<'a>>> {
+    let row = |(pattern, value): (&'a String, &Value)| {
+        let wrong = |text: &str| Error::Refused(format!("parameter `{key}`: `{pattern}` {text}"));
+        let (a, b) = pattern
+            .split_once('&')
+            .ok_or_else(|| wrong(&format!("is no pair; write `A & B`, or `{ALL}` for all pairs")))?;
+        let value = value.as_f64().ok_or_else(|| wrong(&format!("= {value} is not a number")))?;
+        let row = Row { names: [a.trim(), b.trim()], value };
+        let met = names.iter().enumerate().any(|(k, a)| names[..k].iter().any(|b| row.fits([a, b])));
+        met.then_some(row).ok_or_else(|| {
+            wrong(&format!(
+                "fits no two bodies; `{GROUND}` is all that stands still, the bodies are {}",
+                some(names)
+            ))
+        })
+    };
+    table.iter().filter(|(pattern, _)| *pattern != ALL).map(row).collect()
+}
+
+/// The first names, for a message.
+fn some(names: &[&str]) -> String {
+    const SHOWN: usize = 8;
+    let shown = names.iter().filter(|n| **n != GROUND).take(SHOWN).copied().collect::<Vec<_>>().join(", ");
+    if names.len() > SHOWN + 1 { format!("{shown}, …") } else { shown }
+}
+
+fn best(rows: &[Row], pair: [&str; 2]) -> Option<f64> {
+    rows.iter().filter(|row| row.fits(pair)).max_by_key(|row| row.rank()).map(|row| row.value)
+}

@@ -8,6 +8,7 @@ mod figure;
 mod fmi;
 mod gluing;
 mod known;
+mod parallel;
 mod plugins;
 mod rigid_body;
 mod soil;
@@ -19,6 +20,7 @@ pub use soil::{print_hash as print_soil_hash, write_pictures as write_soil_pictu
 
 use crate::process::{Outcome, cargo, must, program, root};
 use known::KnownFailures;
+use std::io::IsTerminal;
 use std::path::PathBuf;
 
 /// What to validate.
@@ -114,7 +116,10 @@ pub fn validate(arguments: &Arguments) -> Outcome {
     for (area, parts) in AREAS.iter().filter(|(name, _)| arguments.area.as_deref().is_none_or(|a| a == *name))
     {
         let mut figures = Vec::new();
-        for (_, measure) in chosen(parts, context.part.as_deref())? {
+        for (part, measure) in chosen(parts, context.part.as_deref())? {
+            if std::io::stderr().is_terminal() {
+                eprintln!("measuring {area}: {part}");
+            }
             let measured = measure(&context)?;
             for figure in &measured {
                 println!("{}", figure.line());

@@ -1,5 +1,6 @@
 //! Area `walk`: `scenarios/moon_walk.toml` with both soils and both strategies, run as a user runs it.
 
+use super::parallel::in_parallel;
 use super::timing::{calibration_s, median};
 use super::{Context, Figure, Limit};
 use crate::process::{Outcome, run_scenario};
@@ -139,17 +140,4 @@ impl Run<'_> {
         let path = self.folder().join("recording.mcap");
         std::fs::read(&path).map_err(|e| format!("{}: {e}", path.display()))
     }
-}
-
-/// The results of `job` in the order of `items`, on as many threads as there are cores.
-fn in_parallel<T: Sync, R: Send>(items: &[T], job: impl Fn(&T) -> R + Sync) -> Vec<R> {
-    let cores = std::thread::available_parallelism().map_or(1, usize::from);
-    let mut results = Vec::new();
-    for chunk in items.chunks(cores) {
-        std::thread::scope(|scope| {
-            let handles: Vec<_> = chunk.iter().map(|item| scope.spawn(|| job(item))).collect();
-            results.extend(handles.into_iter().filter_map(|h| h.join().ok()));
-        });
-    }
-    results
 }

@@ -1,9 +1,10 @@
 //! Plates pressed into level ground: the soils give the pressure that their law promises, whatever the grid.
 
+use super::MODULES;
 use super::rig::{Rig, flat, soil};
 use super::rows::{Row, eight};
-use super::{MODULES, in_parallel};
 use crate::process::Outcome;
+use crate::validate::parallel::in_parallel;
 use crate::validate::{Context, Figure, Limit};
 use terraglue_subsystem::{Geometry, Subsystem};
 

@@ -1,10 +1,11 @@
 //! A real wheel: the smooth wheel of Carnegie Mellon's bench in Direct-90 sand. The integral of the stresses is
 //! calibrated on some slips, the soil with these numbers drives at all of them.
 
+use super::STILL;
 use super::plates::Maker;
 use super::wheel_rig::{Bench, Reading};
-use super::{STILL, in_parallel};
 use crate::process::{Outcome, root};
+use crate::validate::parallel::in_parallel;
 use crate::validate::{Context, Figure, Limit};
 use terraglue::soil_fit::{Known, Wheel, WheelFit, WheelPoint, WheelStart, fit_wheel, read_wheel};
 

@@ -1,9 +1,10 @@
 //! `scenarios/wheel_rig.toml` as a user runs it, against the integral of the stresses: sinkage and drawbar pull by slip.
 
+use super::MODULES;
 use super::rows::{EIGHT, Row, eight};
 use super::wong_reece::wheel_on;
-use super::{MODULES, in_parallel};
 use crate::process::{Outcome, read, run_scenario};
+use crate::validate::parallel::in_parallel;
 use crate::validate::{Context, Figure, Limit};
 use std::collections::BTreeMap;
 use terraglue::soil_fit::{Rim, Rolling};

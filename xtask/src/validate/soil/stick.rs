@@ -1,8 +1,8 @@
 //! A loaded disc under a lateral force below the friction limit stays where it is, on the level and on a slope.
 
-use super::in_parallel;
 use super::rig::{LUNAR, Rig, flat, soil};
 use crate::process::Outcome;
+use crate::validate::parallel::in_parallel;
 use crate::validate::{Context, Figure, Limit};
 use terraglue_soil_bekker::SoilBekker;
 use terraglue_soil_cellular_automaton::SoilCellularAutomaton;

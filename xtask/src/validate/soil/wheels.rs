@@ -8,6 +8,7 @@ use super::{MODULES, STILL, real_wheel};
 use crate::process::Outcome;
 use crate::validate::parallel::in_parallel;
 use crate::validate::{Context, Figure, Limit};
+use std::fmt;
 use terraglue::soil_fit::{Rim, Rolling};
 use terraglue_soil_law::DEFAULT_ELASTIC_STIFFNESS;
 
@@ -23,6 +24,7 @@ const SHIFTED: [f64; 2] = [0.4, 0.15];
 
 /// One wheel on one soil at one slip.
 struct Case {
+    name: &'static str,
     make: Maker,
     soil: Row,
     wheel: [f64; 3],
@@ -31,6 +33,12 @@ struct Case {
     spacing: f64,
     /// Whether all that is pressed becomes denser in place and nothing slides; the automaton moves material otherwise.
     still: bool,
+}
+
+impl fmt::Display for Case {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(f, "{}, {}, slip {}", self.name, self.soil.name, self.slip)
+    }
 }
 
 impl Case {
@@ -85,15 +93,18 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     Ok(all)
 }
 
-/// The largest errors of sinkage and drawbar pull.
+/// The largest errors of sinkage and drawbar pull, and where they are.
 fn errors(id: &str, of: &str, cases: &[Case]) -> [Figure; 2] {
     let errors = in_parallel(cases, Case::errors);
-    let worst =
-        |k: usize| errors.iter().map(|e| e[k]).fold(0.0, |m: f64, e| if e.is_nan() { e } else { m.max(e) });
     let figure = |k: usize, quantity: &str, unit: &str| {
-        let what =
-            format!("largest error of the {unit}, against {of}, {} wheels, soils and slips", cases.len());
-        Figure::new(format!("soil.{id}.{quantity}"), worst(k), Limit::AtMost(5.0), what)
+        // a NaN is larger than any number here
+        let worst = errors.iter().zip(cases).max_by(|(a, _), (b, _)| a[k].total_cmp(&b[k]));
+        let (error, at) = worst.map_or((f64::NAN, String::new()), |(e, case)| (e[k], case.to_string()));
+        let what = format!(
+            "largest error of the {unit}, against {of}, {} wheels, soils and slips; {at}",
+            cases.len()
+        );
+        Figure::new(format!("soil.{id}.{quantity}"), error, Limit::AtMost(5.0), what)
     };
     [figure(0, "sinkage", "sinkage, %"), figure(1, "pull", "drawbar pull, % of the load")]
 }
@@ -108,9 +119,9 @@ fn cases(context: &Context, make: Maker, peak: [f64; 2], still: bool) -> Outcome
                 let shown =
                     wheel == WHEELS[0] && (soil.name == "lunar_nominal" || soil.name == "dry_sand_LLL");
                 if !context.quick || shown && (slip == 0.2 || slip == 0.6) {
-                    let wheel = wheel_of(wheel).ok_or("no such wheel")?;
                     let spacing = SPACINGS[usize::from(!context.quick)];
-                    cases.push(Case { make, soil: soil.clone(), wheel, slip, peak, spacing, still });
+                    let (name, wheel) = (wheel, wheel_of(wheel).ok_or("no such wheel")?);
+                    cases.push(Case { name, make, soil: soil.clone(), wheel, slip, peak, spacing, still });
                 }
             }
         }

@@ -264,7 +264,7 @@ fn members(scenario: &Scenario, instances: &[Instance], groups: &[Group]) -> Vec
         states: vec![BodyState::REST; instance.scene().bodies.len()],
         step_multiple: u64::from(spec.step_multiple.max(1)),
         glued: glued(slot),
-        trial: Ok(Progress::Complete),
+        trial: None,
         cost: Duration::ZERO,
     };
     scenario.subsystems.iter().zip(instances).enumerate().map(member).collect()

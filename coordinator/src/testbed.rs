@@ -19,7 +19,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant as Clock};
 use terraglue_subsystem::{BodyState, Energy};
-use unglued::Unglued;
+use unglued::{Pace, Unglued};
 
 mod build;
 mod explain;
@@ -48,9 +48,7 @@ pub struct Options {
 #[derive(Debug)]
 struct Member {
     states: Vec<BodyState>,
-    /// Steps of the testbed per step of this subsystem.
-    step_multiple: u64,
-    glued: bool,
+    pace: Pace,
     /// How its last trial without glue ended where that was not at t + h; apart, because an error is large.
     trial: Option<Box<Result<Progress>>>,
     /// CPU cost of its trials without glue, sampled, s.
@@ -270,12 +268,16 @@ impl Testbed {
             self.settle()?;
         }
         // all are read before any is set: a unit whose outputs follow its inputs at once shows nobody the inputs of t
-        self.links.numbers.iter_mut().try_for_each(|l| l.read(&self.instances).map(|_| ()))?;
+        for link in &mut self.links.numbers {
+            link.read(&self.instances)?;
+        }
         self.links.discrete.iter_mut().try_for_each(|l| l.read(&self.instances))?;
         if !self.faults.is_empty() {
             self.apply_faults()?;
         }
-        self.links.numbers.iter().try_for_each(|l| l.pass_on(&mut self.instances))?;
+        for link in &self.links.numbers {
+            link.pass_on(&mut self.instances)?;
+        }
         self.links.discrete.iter().try_for_each(|l| l.pass_on(&mut self.instances))
     }
 

@@ -1,7 +1,7 @@
 //! From a checked scenario to a testbed: terrain, modules, instances, the group of glued subsystems, signals.
 
 use super::pieces;
-use super::unglued::Unglued;
+use super::unglued::{Pace, Unglued};
 use super::{Group, Member, Options, Testbed};
 use crate::contact::{BodySide, ContactDetector, GroundSide, PortSet};
 use crate::gluing::glue::Recipe;
@@ -10,8 +10,7 @@ use crate::gluing::{self, Exchange, StepReport};
 use crate::host::isolation::{self, What};
 use crate::host::law;
 use crate::host::{
-    HostServices, Instance, Library, LoadError, LoadedModule, Progress, SearchPath, Workers, interpreter,
-    is_python,
+    HostServices, Instance, Library, LoadError, LoadedModule, SearchPath, Workers, interpreter, is_python,
 };
 use crate::scenario::{self, GlueSpec, GluingSpec, InputError, Scenario, SubsystemSpec};
 use crate::signals::{self, Directory, Faults, TimeLine};
@@ -91,7 +90,7 @@ impl Testbed {
             hold: hold(&scenario.gluing.hold),
             started: false,
         };
-        let glued = testbed.instances.iter_mut().zip(&testbed.members).filter(|(_, m)| m.glued);
+        let glued = testbed.instances.iter_mut().zip(&testbed.members).filter(|(_, m)| m.pace.glued);
         glued.for_each(|(instance, _)| instance.watch());
         testbed.settle()?;
         testbed.read_states()?;
@@ -262,8 +261,7 @@ fn members(scenario: &Scenario, instances: &[Instance], groups: &[Group]) -> Vec
     let glued = |slot| groups.iter().any(|g| g.exchange.members().any(|m| m == slot));
     let member = |(slot, (spec, instance)): (usize, (&SubsystemSpec, &Instance))| Member {
         states: vec![BodyState::REST; instance.scene().bodies.len()],
-        step_multiple: u64::from(spec.step_multiple.max(1)),
-        glued: glued(slot),
+        pace: Pace { step_multiple: u64::from(spec.step_multiple.max(1)), glued: glued(slot) },
         trial: None,
         cost: Duration::ZERO,
     };

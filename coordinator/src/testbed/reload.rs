@@ -62,7 +62,7 @@ impl Testbed {
         self.instances[slot] = new;
         // New variables can be read and set from now on.
         self.directory = Directory::new(&self.instances);
-        if self.members[slot].glued {
+        if self.members[slot].pace.glued {
             self.instances[slot].watch();
         }
         Ok(carried)

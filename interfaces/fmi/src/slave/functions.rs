@@ -21,6 +21,7 @@ macro_rules! table {
     ($(#[$doc:meta])* $name:ident { $($field:ident = $symbol:literal : fn($($argument:ty),*) $(-> $ret:ty)?;)* }) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug)]
+        #[repr(C)]
         #[allow(missing_docs)]
         pub struct $name { $(pub $field: Option<unsafe extern "C" fn($($argument),*) $(-> $ret)?>,)* }
 

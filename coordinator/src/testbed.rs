@@ -8,7 +8,7 @@ use crate::contact::{ContactDetector, Now, PortSet};
 use crate::gluing::memory::Recall;
 use crate::gluing::step_control::StepControl;
 use crate::gluing::{self, Instant, Outcome, StepReport};
-use crate::host::{Instance, Partings, Progress, Reply};
+use crate::host::{Instance, Partings, Reply};
 use crate::observer::{Happening, Observer, SubsystemView, View};
 use crate::signals::{Directory, Faults, Links, TimeLine};
 use crate::timing::{Part, Timings};
@@ -19,7 +19,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant as Clock};
 use terraglue_subsystem::{BodyState, Energy};
-use unglued::{Pace, Unglued};
+use unglued::{Turn, Unglued};
 
 mod build;
 mod explain;
@@ -48,9 +48,6 @@ pub struct Options {
 #[derive(Debug)]
 struct Member {
     states: Vec<BodyState>,
-    pace: Pace,
-    /// How its last trial without glue ended where that was not at t + h; apart, because an error is large.
-    trial: Option<Box<Result<Progress>>>,
     /// CPU cost of its trials without glue, sampled, s.
     cost: Duration,
 }
@@ -58,6 +55,8 @@ struct Member {
 /// A simulation of a whole mission. Several live side by side; there are no globals.
 pub struct Testbed {
     instances: Vec<Instance>,
+    /// When each makes a step by itself.
+    turns: Vec<Turn>,
     members: Vec<Member>,
     /// Subsystems that are glued to each other, in the order of their first member.
     groups: Vec<Group>,
@@ -358,10 +357,8 @@ impl Testbed {
     }
 
     fn read_states(&mut self) -> Result {
-        for (instance, member) in self.instances.iter().zip(&mut self.members) {
-            if !member.states.is_empty() {
-                instance.body_states(&mut member.states)?;
-            }
+        for (slot, _) in self.turns.iter().enumerate().filter(|(_, turn)| turn.has_bodies) {
+            self.instances[slot].body_states(&mut self.members[slot].states)?;
         }
         Ok(())
     }

@@ -52,6 +52,10 @@ impl Link {
         let n = self.ids.len() / 2;
         let (values, conversion) = self.numbers.split_at_mut(n);
         instances[self.from].get(&self.ids[..n], ValuesMut::F64(values))?;
+        if let ([value], [a, b]) = (&mut *values, &*conversion) {
+            *value = a * *value + b;
+            return Ok(values);
+        }
         let (factors, offsets) = conversion.split_at(n);
         for ((value, a), b) in values.iter_mut().zip(factors).zip(offsets) {
             *value = a * *value + b;

@@ -58,7 +58,7 @@ impl Slave {
         f: Option<F>,
         run: impl FnOnce(F, Component) -> c_int,
     ) -> Result {
-        let Some(f) = f.filter(|_| self.health.get() == Health::Good) else {
+        let (Health::Good, Some(f)) = (self.health.get(), f) else {
             return Err(self.not_called(function));
         };
         self.log.begin();
@@ -102,7 +102,7 @@ impl Slave {
         f: Option<F>,
         run: impl FnOnce(F, Component) -> c_int,
     ) -> Result<Status> {
-        let Some(f) = f.filter(|_| self.health.get() == Health::Good) else {
+        let (Health::Good, Some(f)) = (self.health.get(), f) else {
             return Err(self.not_called(function));
         };
         self.log.begin();

@@ -288,37 +288,34 @@ impl Instance {
         let start = self.begin();
         let result = call(self.subsystem.as_mut(), out);
         self.charge(start);
-        if let Err(failure) = result {
-            return self.no_trial(name, step, failure, out);
+        if result.is_err() || step.n != 0 || out.reached.is_nan() || out.reached < end - 1e-9 * step.h {
+            return self.look_at(name, step, result, out);
         }
-        if step.n != 0 {
-            self.all_packed(name, step, out)?;
-        }
-        match out.reached >= end - 1e-9 * step.h {
-            true => Ok(Progress::Complete),
-            false => self.early(name, step, out.reached),
-        }
+        Ok(Progress::Complete)
     }
 
+    /// What a trial was that had ports or did not go as it should.
     #[inline(never)]
-    fn all_packed(&self, name: &'static str, step: &Step, out: &Response) -> Result {
-        for (vector, values) in [("x", &*out.x), ("v", &*out.v), ("a", &*out.a), ("t", &*out.t)] {
-            self.all_finite(name, check::packed(step, vector, values))?;
-        }
-        Ok(())
-    }
-
-    #[cold]
-    fn no_trial(
+    fn look_at(
         &self,
         name: &'static str,
         step: &Step,
-        failure: Failure,
+        result: terraglue_subsystem::Result,
         out: &mut Response,
     ) -> Result<Progress> {
-        let Failure::Discard { reached } = failure else { return Err(self.failed(name, failure)) };
-        out.reached = reached;
-        self.early(name, step, reached)
+        if let Err(Failure::Discard { reached }) = result {
+            out.reached = reached;
+            return self.early(name, step, reached);
+        }
+        self.outcome(name, result)?;
+        let answers = [("x", &*out.x), ("v", &*out.v), ("a", &*out.a), ("t", &*out.t)];
+        for (vector, values) in answers.into_iter().filter(|_| step.n != 0) {
+            self.all_finite(name, check::packed(step, vector, values))?;
+        }
+        match out.reached >= step.t + step.h - 1e-9 * step.h {
+            true => Ok(Progress::Complete),
+            false => self.early(name, step, out.reached),
+        }
     }
 
     #[cold]

@@ -157,12 +157,13 @@ impl Turn {
     #[inline]
     fn try_alone(&mut self, instance: &mut Instance, span: &Span, out: &mut Response) {
         let none = Input::Force { t: &[], hold: gluing::HOLD, motion: None };
-        match self.own_step(span, |step| instance.advance(step, &none, out)) {
-            None | Some(Ok(Progress::Complete)) => {}
-            Some(other) => {
-                self.trial = Some(Box::new(other));
-                span.broken.store(true, Ordering::Relaxed);
-            }
+        let broken = self.own_step(span, |step| match instance.advance(step, &none, out) {
+            Ok(Progress::Complete) => None,
+            other => Some(Box::new(other)),
+        });
+        if let Some(Some(trial)) = broken {
+            self.trial = Some(trial);
+            span.broken.store(true, Ordering::Relaxed);
         }
     }
 

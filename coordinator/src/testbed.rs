@@ -8,7 +8,7 @@ use crate::contact::{ContactDetector, Now, PortSet};
 use crate::gluing::memory::Recall;
 use crate::gluing::step_control::StepControl;
 use crate::gluing::{self, Instant, Outcome, StepReport};
-use crate::host::{Instance, Partings, Progress, Reply};
+use crate::host::{Instance, Partings, Reply};
 use crate::observer::{Happening, Observer, SubsystemView, View};
 use crate::signals::{Directory, Faults, Links, TimeLine};
 use crate::timing::{Part, Timings};
@@ -19,7 +19,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant as Clock};
 use terraglue_subsystem::{BodyState, Energy};
-use unglued::Unglued;
+use unglued::{Turn, Unglued};
 
 mod build;
 mod explain;
@@ -48,11 +48,6 @@ pub struct Options {
 #[derive(Debug)]
 struct Member {
     states: Vec<BodyState>,
-    /// Steps of the testbed per step of this subsystem.
-    step_multiple: u64,
-    glued: bool,
-    /// How its last trial without glue ended.
-    trial: Result<Progress>,
     /// CPU cost of its trials without glue, sampled, s.
     cost: Duration,
 }
@@ -60,6 +55,8 @@ struct Member {
 /// A simulation of a whole mission. Several live side by side; there are no globals.
 pub struct Testbed {
     instances: Vec<Instance>,
+    /// When each makes a step by itself.
+    turns: Vec<Turn>,
     members: Vec<Member>,
     /// Subsystems that are glued to each other, in the order of their first member.
     groups: Vec<Group>,
@@ -270,12 +267,16 @@ impl Testbed {
             self.settle()?;
         }
         // all are read before any is set: a unit whose outputs follow its inputs at once shows nobody the inputs of t
-        self.links.numbers.iter_mut().try_for_each(|l| l.read(&self.instances).map(|_| ()))?;
+        for link in &mut self.links.numbers {
+            link.read(&self.instances)?;
+        }
         self.links.discrete.iter_mut().try_for_each(|l| l.read(&self.instances))?;
         if !self.faults.is_empty() {
             self.apply_faults()?;
         }
-        self.links.numbers.iter().try_for_each(|l| l.pass_on(&mut self.instances))?;
+        for link in &self.links.numbers {
+            link.pass_on(&mut self.instances)?;
+        }
         self.links.discrete.iter().try_for_each(|l| l.pass_on(&mut self.instances))
     }
 
@@ -356,10 +357,8 @@ impl Testbed {
     }
 
     fn read_states(&mut self) -> Result {
-        for (instance, member) in self.instances.iter().zip(&mut self.members) {
-            if !member.states.is_empty() {
-                instance.body_states(&mut member.states)?;
-            }
+        for (slot, _) in self.turns.iter().enumerate().filter(|(_, turn)| turn.has_bodies) {
+            self.instances[slot].body_states(&mut self.members[slot].states)?;
         }
         Ok(())
     }

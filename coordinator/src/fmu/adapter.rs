@@ -13,7 +13,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use terraglue_fmi::description::Start;
-use terraglue_fmi::{Advance, Error as FmiError, Fmu, Slave, SlaveOptions, SlaveState};
+use terraglue_fmi::{Advance, Error as FmiError, Fmu, Slave, SlaveOptions, SlaveState, Stepped};
 use terraglue_subsystem::{
     BodyState, Capabilities, Error, Host, Input, Law, Level, LogLevel, Motion, Response, Result, Scene, Step,
     Subsystem, ValueType, Values, ValuesMut, Variable,
@@ -24,26 +24,29 @@ pub fn is_fmu(module: &str) -> bool {
     Path::new(module).extension().is_some_and(|e| e.eq_ignore_ascii_case("fmu"))
 }
 
-/// An instance of a unit as a subsystem.
+/// An instance of a unit as a subsystem. What every step looks at stands first and in this order, on two lines of the
+/// cache with the beginning of the instance.
+#[repr(C, align(64))]
 pub struct FmuSubsystem {
-    slave: Slave,
-    host: Arc<dyn Host>,
-    variables: Vec<Variable>,
-    places: Vec<Place>,
-    /// Whether any of them is a clock or belongs to one.
-    clocks: bool,
-    /// State at the start of the step, where the unit can save it.
-    before: SlaveState,
-    can_go_back: bool,
+    places: Box<[Place]>,
     /// Whether a trial was made that is not committed.
     open: bool,
     /// Whether the initialisation is over.
     running: bool,
+    /// Whether any variable is a clock or belongs to one.
+    clocks: bool,
+    can_go_back: bool,
+    has_bodies: bool,
+    /// Whether a state was saved to which a run may go back over more than the last step.
+    kept: Cell<bool>,
+    slave: Slave,
+    host: Arc<dyn Host>,
+    variables: Vec<Variable>,
+    /// State at the start of the step, where the unit can save it.
+    before: SlaveState,
     /// Whether it was seen that the unit comes back to a saved state.
     proved: bool,
     slots: Vec<SlaveState>,
-    /// Whether a state was saved to which a run may go back over more than the last step.
-    kept: Cell<bool>,
     on_nan: OnNan,
     warned: Cell<bool>,
     references: RefCell<Vec<u32>>,
@@ -88,7 +91,8 @@ impl FmuSubsystem {
             slave,
             variables,
             clocks: clocks::concerned(&places),
-            places,
+            places: places.into(),
+            has_bodies: false,
             before: SlaveState::default(),
             can_go_back: capabilities.state && options.rollback,
             open: false,
@@ -110,11 +114,13 @@ impl FmuSubsystem {
         }
         subsystem.start_arrays()?;
         let places = &subsystem.places;
-        let axis = |p: &Place| Axis { reference: p.reference, element: p.element, count: p.count };
+        let axis =
+            |p: &Place| Axis { reference: p.reference, element: p.element as usize, count: p.count as usize };
         let place = |id: u32| places.get(id as usize).map(axis);
         let terminals = terminals(&description);
         subsystem.bodies = Bodies::read(&options.bodies, &subsystem.variables, &terminals, place)?;
-        if !subsystem.bodies.is_empty() && !subsystem.can_go_back {
+        subsystem.has_bodies = !subsystem.bodies.is_empty();
+        if subsystem.has_bodies && !subsystem.can_go_back {
             let text = "glued bodies need a unit that can save its state, to repeat a step";
             return Err(Error::Refused(text.into()));
         }
@@ -172,8 +178,8 @@ impl FmuSubsystem {
     /// Keeps an element of an array until all are known: nothing can be read yet.
     fn start_element(&mut self, id: u32, value: f64) -> Result {
         let place = *self.place(id)?;
-        self.starts.entry(place.reference).or_insert_with(|| vec![None; place.count])[place.element] =
-            Some(value);
+        let whole = self.starts.entry(place.reference).or_insert_with(|| vec![None; place.count as usize]);
+        whole[place.element as usize] = Some(value);
         Ok(())
     }
 
@@ -227,11 +233,74 @@ impl FmuSubsystem {
         )
     }
 
-    /// The number in calls, where one f64 that is no element of an array is asked for.
+    /// What is to be done before a step: the initialisation ends, a trial is taken back, a state is saved, wrenches are set.
+    /// Whether the step is to be made then.
+    #[inline(never)]
+    fn prepare(&mut self, step: &Step, wrench: &[f64], out: &mut Response) -> Result<bool> {
+        let begins = !self.running;
+        if begins {
+            self.slave.exit_initialization().map_err(error)?;
+            self.running = true;
+        }
+        if step.h == 0.0 && self.has_bodies {
+            self.bodies.still(&mut self.slave, step, wrench, out, error)?;
+            return Ok(false);
+        }
+        if self.open && !self.can_go_back {
+            let text =
+                "a step had to be repeated, but the unit cannot save its state; make time.step_s shorter";
+            return Err(Error::Failed(text.into()));
+        }
+        if self.open {
+            self.slave.restore(&self.before).map_err(error)?;
+        } else {
+            self.bodies.forget_trials();
+            if self.can_go_back {
+                self.slave.save(&mut self.before).map_err(error)?;
+            }
+        }
+        self.open = true;
+        if self.clocks && !begins {
+            self.slave.forget_ticks();
+        }
+        if self.has_bodies {
+            self.prove(step, wrench)?;
+            self.bodies.push(&mut self.slave, step, wrench, error)?;
+        }
+        Ok(true)
+    }
+
+    /// Why a step was not made to its end.
+    #[cold]
+    fn stopped(&self, step: &Step, done: terraglue_fmi::Result<Stepped>) -> Error {
+        match done {
+            Ok(Stepped { reached, .. }) => {
+                Error::Failed(format!("the unit asks for the end of the simulation at t = {reached} s"))
+            }
+            Err(discard @ FmiError::Discard { .. }) => {
+                let variable = self.slave.description().capabilities.variable_step;
+                if !self.can_go_back || !variable {
+                    let lack = if variable { "save its state" } else { "make steps of another length" };
+                    return Error::Failed(format!("{discard}; the step cannot be halved: it cannot {lack}"));
+                }
+                self.host.log(LogLevel::Info, &discard.to_string());
+                Error::Discard { reached: step.t + 0.5 * step.h }
+            }
+            Err(other) => error(other),
+        }
+    }
+
+    /// Where one variable lies that is asked for and is no element of an array.
     #[inline]
-    fn single(&self, ids: &[u32]) -> Option<u32> {
+    fn single(&self, ids: &[u32]) -> Option<&Place> {
         let [id] = ids else { return None };
-        self.places.get(*id as usize).filter(|p| p.count == 1).map(|p| p.reference)
+        self.places.get(*id as usize).filter(|p| p.count == 1)
+    }
+
+    /// Whether a variable may be set now.
+    #[inline]
+    fn takes(&self, place: &Place) -> bool {
+        !place.structural && (place.live || !self.running)
     }
 
     fn place(&self, id: u32) -> Result<&Place> {
@@ -240,11 +309,19 @@ impl FmuSubsystem {
 
     /// Item values of an enumeration where they are not simply 0, 1, 2, …
     fn items(&self, place: &Place) -> &[(String, i64)] {
-        &self.slave.description().variables[place.variable].items
+        &self.slave.description().variables[place.variable as usize].items
     }
 
+    #[inline]
     fn check_numbers(&self, ids: &[u32], values: &[f64]) -> Result {
-        let Some(k) = values.iter().position(|v| !v.is_finite()) else { return Ok(()) };
+        match values.iter().position(|v| !v.is_finite()) {
+            None => Ok(()),
+            Some(k) => self.not_finite(ids, values, k),
+        }
+    }
+
+    #[cold]
+    fn not_finite(&self, ids: &[u32], values: &[f64], k: usize) -> Result {
         let name = ids.get(k).and_then(|id| self.variables.get(*id as usize)).map_or("?", |v| &v.name);
         let text = format!("the variable `{name}` is {}", values[k]);
         match self.on_nan {
@@ -299,6 +376,7 @@ fn feeds_through(description: &terraglue_fmi::ModelDescription) -> bool {
 }
 
 /// An error of a unit as an error of a subsystem.
+#[cold]
 fn error(error: FmiError) -> Error {
     match error {
         FmiError::Call { fatal: true, .. } => Error::Fatal(error.to_string()),
@@ -350,64 +428,21 @@ impl Subsystem for FmuSubsystem {
     }
 
     fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result {
-        let begins = self.slave.is_initializing();
-        if begins {
-            self.slave.exit_initialization().map_err(error)?;
-            self.running = true;
-        }
-        let wrench = match input {
-            Input::Force { t, .. } => *t,
-            _ => return Err(Error::Unsupported),
-        };
-        if step.h == 0.0 && !self.bodies.is_empty() {
-            return self.bodies.still(&mut self.slave, step, wrench, out, error);
-        }
-        if self.open && !self.can_go_back {
-            let text =
-                "a step had to be repeated, but the unit cannot save its state; make time.step_s shorter";
-            return Err(Error::Failed(text.into()));
-        }
-        if self.open {
-            self.slave.restore(&self.before).map_err(error)?;
-        } else {
-            self.bodies.forget_trials();
-            if self.can_go_back {
-                self.slave.save(&mut self.before).map_err(error)?;
+        let Input::Force { t: wrench, .. } = *input else { return Err(Error::Unsupported) };
+        if self.open || !self.running || self.clocks || self.can_go_back || self.has_bodies {
+            if !self.prepare(step, wrench, out)? {
+                return Ok(());
             }
         }
         self.open = true;
-        if self.clocks && !begins {
-            self.slave.forget_ticks();
+        match self.slave.do_step(Advance { t: step.t, h: step.h, for_good: !self.kept.get() }) {
+            Ok(Stepped { terminate: false, .. }) => {}
+            other => return Err(self.stopped(step, other)),
         }
-        if !self.bodies.is_empty() {
-            self.prove(step, wrench)?;
-            self.bodies.push(&mut self.slave, step, wrench, error)?;
-        }
-        let step_now = Advance { t: step.t, h: step.h, for_good: !self.kept.get() };
-        match self.slave.do_step(step_now) {
-            Ok(done) if done.terminate => {
-                let reached = done.reached;
-                Err(Error::Failed(format!("the unit asks for the end of the simulation at t = {reached} s")))
-            }
-            Ok(_) => {
-                out.reached = step.t + step.h;
-                match self.bodies.is_empty() {
-                    true => Ok(()),
-                    false => self.bodies.pull(&self.slave, step, wrench, out, error),
-                }
-            }
-            Err(discard @ FmiError::Discard { .. }) => {
-                let variable = self.slave.description().capabilities.variable_step;
-                if !self.can_go_back || !variable {
-                    let lack = if variable { "save its state" } else { "make steps of another length" };
-                    return Err(Error::Failed(format!(
-                        "{discard}; the step cannot be halved: it cannot {lack}"
-                    )));
-                }
-                self.host.log(LogLevel::Info, &discard.to_string());
-                Err(Error::Discard { reached: step.t + 0.5 * step.h })
-            }
-            Err(other) => Err(error(other)),
+        out.reached = step.t + step.h;
+        match self.has_bodies {
+            true => self.bodies.pull(&self.slave, step, wrench, out, error),
+            false => Ok(()),
         }
     }
 
@@ -470,14 +505,31 @@ impl Subsystem for FmuSubsystem {
     }
 
     fn get(&self, ids: &[u32], out: ValuesMut) -> Result {
-        let out = match (out, self.single(ids)) {
-            (ValuesMut::F64(out), Some(reference)) => {
-                self.slave.get_f64(&[reference], out).map_err(error)?;
-                return self.check_numbers(ids, out);
+        match (out, self.single(ids)) {
+            (ValuesMut::F64(out), Some(place)) => {
+                if let Err(failure) = self.slave.get_f64(&[place.reference], out) {
+                    return Err(error(failure));
+                }
+                self.check_numbers(ids, out)
             }
-            (out, _) => out,
-        };
-        let mut out = out;
+            (out, _) => self.get_all(ids, out),
+        }
+    }
+
+    fn set(&mut self, ids: &[u32], values: Values) -> Result {
+        match (values, self.single(ids)) {
+            (Values::F64(values), Some(place)) if self.takes(place) && !place.clocked => {
+                self.slave.set_f64(&[place.reference], values).map_err(error)
+            }
+            (values, _) => self.set_all(ids, values),
+        }
+    }
+}
+
+impl FmuSubsystem {
+    /// Values of any type and number.
+    #[inline(never)]
+    fn get_all(&self, ids: &[u32], mut out: ValuesMut) -> Result {
         if self.clocks {
             let places = ids.iter().map(|id| self.place(*id)).collect::<Result<Vec<_>>>()?;
             if clocks::get(&self.slave, &places, &mut out, error)? {
@@ -507,9 +559,9 @@ impl Subsystem for FmuSubsystem {
             ($variant:ident, $out:expr, $zero:expr) => {{
                 for (id, out) in ids.iter().zip($out.iter_mut()) {
                     let place = *self.place(*id)?;
-                    let mut whole = vec![$zero; place.count];
+                    let mut whole = vec![$zero; place.count as usize];
                     self.slave.get(&[place.reference], ValuesMut::$variant(&mut whole)).map_err(error)?;
-                    *out = whole.swap_remove(place.element);
+                    *out = whole.swap_remove(place.element as usize);
                 }
                 Ok(())
             }};
@@ -535,10 +587,12 @@ impl Subsystem for FmuSubsystem {
         }
     }
 
-    fn set(&mut self, ids: &[u32], values: Values) -> Result {
+    /// New values of any type and number.
+    #[inline(never)]
+    fn set_all(&mut self, ids: &[u32], values: Values) -> Result {
         for id in ids {
             let place = self.place(*id)?;
-            if place.structural || self.running && !place.live {
+            if !self.takes(place) {
                 let name = &self.variables[*id as usize].name;
                 let when =
                     if place.structural { "in the table of its unit" } else { "before the first step" };
@@ -554,9 +608,6 @@ impl Subsystem for FmuSubsystem {
             if clocks::set(&mut self.slave, &places, &values, error)? {
                 return Ok(());
             }
-        }
-        if let (Values::F64(values), Some(reference)) = (&values, self.single(ids)) {
-            return self.slave.set_f64(&[reference], values).map_err(error);
         }
         let mut references = self.references.borrow_mut();
         if self.collect(ids, &mut references)? {
@@ -575,9 +626,9 @@ impl Subsystem for FmuSubsystem {
             ($variant:ident, $values:expr, $zero:expr) => {{
                 for (id, value) in ids.iter().zip($values) {
                     let place = *self.place(*id)?;
-                    let mut whole = vec![$zero; place.count];
+                    let mut whole = vec![$zero; place.count as usize];
                     self.slave.get(&[place.reference], ValuesMut::$variant(&mut whole)).map_err(error)?;
-                    whole[place.element] = value.clone();
+                    whole[place.element as usize] = value.clone();
                     self.slave.set(&[place.reference], Values::$variant(&whole)).map_err(error)?;
                 }
                 Ok(())

@@ -23,9 +23,9 @@ pub fn get(slave: &Slave, places: &[&Place], out: &mut ValuesMut, fail: Fail) ->
         *out = if place.clock {
             slave.ticks(place.reference)
         } else {
-            let mut whole = vec![false; place.count];
+            let mut whole = vec![false; place.count as usize];
             slave.get(&[place.reference], ValuesMut::Bool(&mut whole)).map_err(fail)?;
-            whole[place.element]
+            whole[place.element as usize]
         };
     }
     Ok(true)
@@ -35,7 +35,7 @@ pub fn get(slave: &Slave, places: &[&Place], out: &mut ValuesMut, fail: Fail) ->
 pub fn set(slave: &mut Slave, places: &[&Place], values: &Values, fail: Fail) -> Result<bool> {
     if let (Values::Bool(values), true) = (values, places.iter().all(|p| p.clock)) {
         for (place, on) in places.iter().zip(*values) {
-            let clock = slave.description().variables[place.variable].clone();
+            let clock = slave.description().variables[place.variable as usize].clone();
             slave.can_trigger(&clock).map_err(fail)?;
             slave.trigger(place.reference, *on);
         }
@@ -70,7 +70,7 @@ pub fn set(slave: &mut Slave, places: &[&Place], values: &Values, fail: Fail) ->
         Values::Binary(all) => held!(Binary, all),
         Values::Enumeration(all) => {
             let items = |place: &Place, k: i64| {
-                let items = &slave.description().variables[place.variable].items;
+                let items = &slave.description().variables[place.variable as usize].items;
                 usize::try_from(k).ok().and_then(|k| items.get(k)).map_or(k, |(_, own)| *own)
             };
             let own: Vec<i64> = places.iter().zip(*all).map(|(place, k)| items(place, *k)).collect();

@@ -8,11 +8,11 @@ use terraglue_subsystem::{Effect, ValueType, Variable};
 #[derive(Clone, Copy, Debug)]
 pub struct Place {
     /// Position in the description.
-    pub variable: usize,
+    pub variable: u32,
     /// Element, row by row.
-    pub element: usize,
+    pub element: u32,
     /// Elements of the whole variable.
-    pub count: usize,
+    pub count: u32,
     /// Number in calls.
     pub reference: u32,
     /// Whether it may be set after the initialisation.
@@ -53,9 +53,10 @@ pub fn variables(description: &ModelDescription, event_mode: bool) -> (Vec<Varia
             });
             let live = effect == Effect::Live;
             let structural = v.causality == fmi::Causality::StructuralParameter;
-            let (count, reference) = (v.len(), v.reference);
+            let (variable, element, count) = (k as u32, element as u32, v.len() as u32);
+            let reference = v.reference;
             let clocked = event_mode && v.causality == fmi::Causality::Input && !v.clocks.is_empty();
-            places.push(Place { variable: k, element, count, reference, live, structural, clock, clocked });
+            places.push(Place { variable, element, count, reference, live, structural, clock, clocked });
         }
     }
     (all, places)

@@ -30,30 +30,38 @@ pub enum Reply {
     Refused(String),
 }
 
-/// A subsystem of a run.
+/// A subsystem of a run. What no step asks for lies apart: the cost of many cheap subsystems is that of their memory.
 pub struct Instance {
-    name: String,
-    module: String,
-    kind: Kind,
-    capabilities: Capabilities,
     subsystem: Box<dyn Subsystem>,
-    scene: Scene,
     time_s: Cell<f64>,
     dead: Cell<bool>,
     /// Whether its calls are timed, and what they took.
     watched: bool,
     cost: Duration,
+    kind: Kind,
+    about: Box<About>,
+}
+
+/// What an instance is.
+struct About {
+    name: String,
+    module: String,
+    capabilities: Capabilities,
+    scene: Scene,
 }
 
 impl Instance {
     /// Takes a subsystem under supervision; `name` is that of the scenario.
     pub fn new(name: &str, module: &str, kind: Kind, subsystem: Box<dyn Subsystem>) -> Self {
-        Self {
+        let about = About {
             name: name.to_owned(),
             module: module.to_owned(),
-            kind,
             capabilities: subsystem.capabilities(),
             scene: subsystem.scene(),
+        };
+        Self {
+            about: Box::new(about),
+            kind,
             subsystem,
             time_s: Cell::new(0.0),
             dead: Cell::new(false),
@@ -72,10 +80,12 @@ impl Instance {
         self.cost
     }
 
+    #[inline]
     fn begin(&self) -> Option<Clock> {
         self.watched.then(Clock::now)
     }
 
+    #[inline]
     fn charge(&mut self, start: Option<Clock>) {
         if let Some(start) = start {
             self.cost += start.elapsed();
@@ -90,12 +100,12 @@ impl Instance {
 
     /// Name in the scenario.
     pub fn name(&self) -> &str {
-        &self.name
+        &self.about.name
     }
 
     /// Module name.
     pub fn module(&self) -> &str {
-        &self.module
+        &self.about.module
     }
 
     /// Kind.
@@ -105,12 +115,12 @@ impl Instance {
 
     /// What it can do.
     pub fn capabilities(&self) -> Capabilities {
-        self.capabilities
+        self.about.capabilities
     }
 
     /// Bodies and shapes.
     pub fn scene(&self) -> &Scene {
-        &self.scene
+        &self.about.scene
     }
 
     /// For observers: committed values only.
@@ -122,8 +132,8 @@ impl Instance {
     #[cold]
     pub fn error(&self, function: &'static str, message: impl Into<String>) -> Error {
         Error::Module {
-            subsystem: self.name.clone(),
-            module: self.module.clone(),
+            subsystem: self.about.name.clone(),
+            module: self.about.module.clone(),
             function,
             time_s: self.time_s.get(),
             message: message.into(),
@@ -150,10 +160,15 @@ impl Instance {
     /// Whether it may still be called.
     #[inline]
     fn alive(&self, function: &'static str) -> Result {
-        if self.dead.get() {
-            return Err(self.error(function, "not called: it failed for good before"));
+        match self.dead.get() {
+            true => Err(self.is_dead(function)),
+            false => Ok(()),
         }
-        Ok(())
+    }
+
+    #[cold]
+    fn is_dead(&self, function: &'static str) -> Error {
+        self.error(function, "not called: it failed for good before")
     }
 
     #[inline]
@@ -221,6 +236,7 @@ impl Instance {
     }
 
     /// Paper, steps 3 and 4.
+    #[inline]
     pub fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result<Progress> {
         self.trial("advance", step, out, |s, out| s.advance(step, input, out))
     }
@@ -254,6 +270,7 @@ impl Instance {
     }
 
     /// Runs a trial on vectors filled with NaN and looks for what stayed so.
+    #[inline]
     fn trial(
         &mut self,
         name: &'static str,
@@ -263,32 +280,42 @@ impl Instance {
     ) -> Result<Progress> {
         self.time_s.set(step.t);
         self.alive(name)?;
-        let ports = step.n != 0;
-        if ports {
+        let end = step.t + step.h;
+        (out.reached, out.flags) = (end, 0);
+        if step.n != 0 {
             prepare(out);
         }
-        (out.reached, out.flags) = (step.t + step.h, 0);
         let start = self.begin();
         let result = call(self.subsystem.as_mut(), out);
         self.charge(start);
-        match result {
-            Err(Failure::Discard { reached }) => {
-                out.reached = reached;
-                return self.early(name, step, reached);
-            }
-            result => self.outcome(name, result)?,
-        }
-        if ports {
-            self.all_finite(name, check::packed(step, "x", out.x))?;
-            self.all_finite(name, check::packed(step, "v", out.v))?;
-            self.all_finite(name, check::packed(step, "a", out.a))?;
-            self.all_finite(name, check::packed(step, "t", out.t))?;
-        }
-        let end = step.t + step.h;
-        if out.reached < end - 1e-9 * step.h || out.reached.is_nan() {
-            return self.early(name, step, out.reached);
+        if result.is_err() || step.n != 0 || out.reached.is_nan() || out.reached < end - 1e-9 * step.h {
+            return self.look_at(name, step, result, out);
         }
         Ok(Progress::Complete)
+    }
+
+    /// What a trial was that had ports or did not go as it should.
+    #[inline(never)]
+    fn look_at(
+        &self,
+        name: &'static str,
+        step: &Step,
+        result: terraglue_subsystem::Result,
+        out: &mut Response,
+    ) -> Result<Progress> {
+        if let Err(Failure::Discard { reached }) = result {
+            out.reached = reached;
+            return self.early(name, step, reached);
+        }
+        self.outcome(name, result)?;
+        let answers = [("x", &*out.x), ("v", &*out.v), ("a", &*out.a), ("t", &*out.t)];
+        for (vector, values) in answers.into_iter().filter(|_| step.n != 0) {
+            self.all_finite(name, check::packed(step, vector, values))?;
+        }
+        match out.reached >= step.t + step.h - 1e-9 * step.h {
+            true => Ok(Progress::Complete),
+            false => self.early(name, step, out.reached),
+        }
     }
 
     #[cold]
@@ -313,12 +340,15 @@ impl Instance {
     }
 
     /// Paper, step 5.
+    #[inline]
     pub fn commit(&mut self, step: &Step, t: &[f64], partner: &Motion) -> Result {
         self.alive("commit")?;
         let start = self.begin();
         let result = self.subsystem.commit(step, t, partner);
         self.charge(start);
-        self.outcome("commit", result)?;
+        if let Err(failure) = result {
+            return Err(self.failed("commit", failure));
+        }
         self.time_s.set(step.t + step.h);
         Ok(())
     }
@@ -356,21 +386,28 @@ impl Instance {
     }
 
     /// Committed values. Numbers that are not finite are an error.
-    pub fn get(&self, ids: &[u32], mut out: ValuesMut) -> Result {
+    #[inline]
+    pub fn get(&self, ids: &[u32], out: ValuesMut) -> Result {
         self.alive("get")?;
-        if let ValuesMut::F64(values) = &mut out {
-            values.fill(f64::NAN);
-            let result = self.subsystem.get(ids, ValuesMut::F64(values));
-            self.outcome("get", result)?;
-            return match values.iter().position(|v| v.is_nan()) {
-                Some(k) => Err(self.error("get", self.nan_variable(ids, k))),
-                None => Ok(()),
-            };
+        let ValuesMut::F64(values) = out else { return self.outcome("get", self.subsystem.get(ids, out)) };
+        match &mut *values {
+            [value] => *value = f64::NAN,
+            all => all.fill(f64::NAN),
         }
-        self.outcome("get", self.subsystem.get(ids, out))
+        if let Err(failure) = self.subsystem.get(ids, ValuesMut::F64(values)) {
+            return Err(self.failed("get", failure));
+        }
+        match values.iter().position(|v| v.is_nan()) {
+            Some(k) => Err(self.is_nan(ids, k)),
+            None => Ok(()),
+        }
     }
 
     #[cold]
+    fn is_nan(&self, ids: &[u32], element: usize) -> Error {
+        self.error("get", self.nan_variable(ids, element))
+    }
+
     fn nan_variable(&self, ids: &[u32], element: usize) -> String {
         let mut first = 0;
         for id in ids {
@@ -384,6 +421,7 @@ impl Instance {
     }
 
     /// New values, or why not.
+    #[inline]
     pub fn set(&mut self, ids: &[u32], values: Values) -> Result<Reply> {
         self.alive("set")?;
         let result = self.subsystem.set(ids, values);
@@ -416,11 +454,19 @@ impl Instance {
         self.reply("act", result)
     }
 
+    #[inline]
     fn reply(&self, function: &'static str, result: terraglue_subsystem::Result) -> Result<Reply> {
         match result {
             Ok(()) => Ok(Reply::Accepted),
-            Err(Failure::Refused(reason)) => Ok(Reply::Refused(reason)),
-            Err(failure) => Err(self.failed(function, failure)),
+            Err(failure) => self.not_accepted(function, failure),
+        }
+    }
+
+    #[cold]
+    fn not_accepted(&self, function: &'static str, failure: Failure) -> Result<Reply> {
+        match failure {
+            Failure::Refused(reason) => Ok(Reply::Refused(reason)),
+            failure => Err(self.failed(function, failure)),
         }
     }
 
@@ -443,7 +489,7 @@ impl Instance {
         };
         match out.iter().position(|s| !numbers(s)) {
             Some(k) => {
-                let body = self.scene.bodies.get(k).map_or("?", |b| &b.name);
+                let body = self.about.scene.bodies.get(k).map_or("?", |b| &b.name);
                 Err(self.error("body_states", format!("the state of body `{body}` is not finite")))
             }
             None => Ok(()),
@@ -474,6 +520,7 @@ impl Instance {
 }
 
 /// Fills a response with NaN, to find what a subsystem does not answer.
+#[inline(never)]
 fn prepare(out: &mut Response) {
     for vector in [&mut *out.x, &mut *out.v, &mut *out.a, &mut *out.t] {
         vector.fill(f64::NAN);

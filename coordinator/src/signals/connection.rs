@@ -13,47 +13,64 @@ use terraglue_subsystem::{Causality, ValueType, Values, ValuesMut};
 /// Subsystem and variable on either side of a value, and value_to = a·value_from + b.
 pub type Ends = ([(usize, u32); 2], (f64, f64));
 
-/// All f64 connections from one subsystem to another, copied in one call each way.
+/// All f64 connections from one subsystem to another, copied in one call each way. In few pieces: the cost of a chain of
+/// cheap subsystems is that of its memory.
 #[derive(Debug)]
 pub struct Link {
     from: usize,
     to: usize,
-    from_ids: Vec<u32>,
-    to_ids: Vec<u32>,
-    /// value_to = a·value_from + b.
-    conversion: Vec<(f64, f64)>,
-    values: Vec<f64>,
+    /// Of the outputs, then of the inputs.
+    ids: Vec<u32>,
+    /// Values, then a and then b of value_to = a·value_from + b.
+    numbers: Vec<f64>,
 }
 
 impl Link {
+    #[inline]
+    fn from_ids(&self) -> &[u32] {
+        &self.ids[..self.len()]
+    }
+
+    #[inline]
+    fn to_ids(&self) -> &[u32] {
+        &self.ids[self.len()..]
+    }
+
     /// Whether it feeds a variable of a subsystem.
     pub fn feeds(&self, slot: usize, id: u32) -> bool {
-        self.to == slot && self.to_ids.contains(&id)
+        self.to == slot && self.to_ids().contains(&id)
     }
 
     /// Sets the inputs to the values that were read last.
     #[inline]
     pub fn pass_on(&self, instances: &mut [Instance]) -> Result {
-        self.write(instances, &self.values)
+        self.write(instances, &self.numbers[..self.len()])
     }
 
     /// Values of the outputs, in the units of the inputs.
     pub fn read(&mut self, instances: &[Instance]) -> Result<&[f64]> {
-        instances[self.from].get(&self.from_ids, ValuesMut::F64(&mut self.values))?;
-        for (value, (a, b)) in self.values.iter_mut().zip(&self.conversion) {
+        let n = self.ids.len() / 2;
+        let (values, conversion) = self.numbers.split_at_mut(n);
+        instances[self.from].get(&self.ids[..n], ValuesMut::F64(values))?;
+        if let ([value], [a, b]) = (&mut *values, &*conversion) {
+            *value = a * *value + b;
+            return Ok(values);
+        }
+        let (factors, offsets) = conversion.split_at(n);
+        for ((value, a), b) in values.iter_mut().zip(factors).zip(offsets) {
             *value = a * *value + b;
         }
-        Ok(&self.values)
+        Ok(values)
     }
 
     /// Derivatives of its values by entry `k` of the inputs that `other` feeds, where the subsystem between knows them.
     pub fn derivatives(&self, instances: &[Instance], other: &Self, k: usize) -> Result<Option<Vec<f64>>> {
         let mut out = vec![0.0; self.len()];
         if self.from == other.to {
-            if !instances[self.from].derivative(&self.from_ids, other.to_ids[k], &mut out)? {
+            if !instances[self.from].derivative(self.from_ids(), other.to_ids()[k], &mut out)? {
                 return Ok(None);
             }
-            out.iter_mut().zip(&self.conversion).for_each(|(x, (a, _))| *x *= a);
+            out.iter_mut().enumerate().for_each(|(k, x)| *x *= self.conversion(k).0);
         }
         Ok(Some(out))
     }
@@ -61,7 +78,7 @@ impl Link {
     /// Sets the inputs.
     pub fn write(&self, instances: &mut [Instance], values: &[f64]) -> Result {
         let target = &mut instances[self.to];
-        match target.set(&self.to_ids, Values::F64(values))? {
+        match target.set(self.to_ids(), Values::F64(values))? {
             Reply::Accepted => Ok(()),
             Reply::Refused(reason) => Err(target.error("set", reason)),
         }
@@ -69,29 +86,30 @@ impl Link {
 
     /// Places of the values of a variable: those that come from it, or, with `fed`, those that it is given.
     pub fn numbers_of(&self, slot: usize, id: u32, fed: bool) -> impl Iterator<Item = usize> + '_ {
-        let (own, ids) = if fed { (self.to, &self.to_ids) } else { (self.from, &self.from_ids) };
+        let (own, ids) = if fed { (self.to, self.to_ids()) } else { (self.from, self.from_ids()) };
         (0..ids.len()).filter(move |k| own == slot && ids[*k] == id)
     }
 
     /// Subsystem and variable on either side of every value, and how it is converted.
     pub fn ends(&self) -> impl Iterator<Item = Ends> + '_ {
-        let pairs = self.from_ids.iter().zip(&self.to_ids).zip(&self.conversion);
-        pairs.map(|((from, to), conversion)| ([(self.from, *from), (self.to, *to)], *conversion))
+        let pairs = self.from_ids().iter().zip(self.to_ids()).enumerate();
+        pairs.map(|(k, (from, to))| ([(self.from, *from), (self.to, *to)], self.conversion(k)))
     }
 
     /// value_to = a·value_from + b of one value.
     pub fn conversion(&self, k: usize) -> (f64, f64) {
-        self.conversion[k]
+        let n = self.len();
+        (self.numbers[n + k], self.numbers[2 * n + k])
     }
 
     /// A value that was read last.
     pub fn value(&self, k: usize) -> f64 {
-        self.values[k]
+        self.numbers[k]
     }
 
     /// The same, to change it on its way.
     pub fn value_mut(&mut self, k: usize) -> &mut f64 {
-        &mut self.values[k]
+        &mut self.numbers[k]
     }
 
     /// Whether it leaves a subsystem of some kind.
@@ -100,8 +118,9 @@ impl Link {
     }
 
     /// Number of values.
+    #[inline]
     pub fn len(&self) -> usize {
-        self.to_ids.len()
+        self.ids.len() / 2
     }
 
     /// `a.y → b.u` of every value.
@@ -110,7 +129,7 @@ impl Link {
             let variable = instances[slot].variables().iter().find(|v| v.id == *id);
             format!("{}.{}", instances[slot].name(), variable.map_or("?", |v| &v.name))
         };
-        let pairs = self.from_ids.iter().zip(&self.to_ids);
+        let pairs = self.from_ids().iter().zip(self.to_ids());
         pairs.map(|(from, to)| format!("{} → {}", name(self.from, from), name(self.to, to))).collect()
     }
 }
@@ -261,19 +280,15 @@ fn add(
 ) {
     let position = links.iter().position(|l| l.from == from.slot && l.to == to.slot);
     let k = position.unwrap_or_else(|| {
-        links.push(Link {
-            from: from.slot,
-            to: to.slot,
-            from_ids: Vec::new(),
-            to_ids: Vec::new(),
-            conversion: Vec::new(),
-            values: Vec::new(),
-        });
+        links.push(Link { from: from.slot, to: to.slot, ids: Vec::new(), numbers: Vec::new() });
         links.len() - 1
     });
     let link = &mut links[k];
-    link.from_ids.push(from.describe(instances).id);
-    link.to_ids.push(to.describe(instances).id);
-    link.conversion.push(conversion);
-    link.values.push(0.0);
+    let n = link.len();
+    link.ids.insert(n, from.describe(instances).id);
+    link.ids.push(to.describe(instances).id);
+    // from the last place on, as each moves what is behind it
+    link.numbers.push(conversion.1);
+    link.numbers.insert(2 * n, conversion.0);
+    link.numbers.insert(n, 0.0);
 }

@@ -1,7 +1,7 @@
 //! From a checked scenario to a testbed: terrain, modules, instances, the group of glued subsystems, signals.
 
 use super::pieces;
-use super::unglued::Unglued;
+use super::unglued::{Turn, Unglued};
 use super::{Group, Member, Options, Testbed};
 use crate::contact::{BodySide, ContactDetector, GroundSide, PortSet};
 use crate::gluing::glue::Recipe;
@@ -10,8 +10,7 @@ use crate::gluing::{self, Exchange, StepReport};
 use crate::host::isolation::{self, What};
 use crate::host::law;
 use crate::host::{
-    HostServices, Instance, Library, LoadError, LoadedModule, Progress, SearchPath, Workers, interpreter,
-    is_python,
+    HostServices, Instance, Library, LoadError, LoadedModule, SearchPath, Workers, interpreter, is_python,
 };
 use crate::scenario::{self, GlueSpec, GluingSpec, InputError, Scenario, SubsystemSpec};
 use crate::signals::{self, Directory, Faults, TimeLine};
@@ -60,7 +59,8 @@ impl Testbed {
         let ground = groups.iter().find(|g| g.exchange.has_grounds());
         let detector = detector(ground, &instances, terrain.as_deref())?;
         let mut testbed = Self {
-            members: members(scenario, &instances, &groups),
+            turns: turns(scenario, &instances, &groups),
+            members: instances.iter().map(member).collect(),
             detector,
             gravity: services.gravity,
             contact_margin_m: scenario.gluing.contact_margin_m,
@@ -91,7 +91,7 @@ impl Testbed {
             hold: hold(&scenario.gluing.hold),
             started: false,
         };
-        let glued = testbed.instances.iter_mut().zip(&testbed.members).filter(|(_, m)| m.glued);
+        let glued = testbed.instances.iter_mut().zip(&testbed.turns).filter(|(_, turn)| turn.glued);
         glued.for_each(|(instance, _)| instance.watch());
         testbed.settle()?;
         testbed.read_states()?;
@@ -258,16 +258,19 @@ fn module_error(scenario: &Scenario, spec: &SubsystemSpec, error: &LoadError) ->
     scenario.source.error_at_value(&key, error.to_string(), help)
 }
 
-fn members(scenario: &Scenario, instances: &[Instance], groups: &[Group]) -> Vec<Member> {
+fn member(instance: &Instance) -> Member {
+    Member { states: vec![BodyState::REST; instance.scene().bodies.len()], cost: Duration::ZERO }
+}
+
+fn turns(scenario: &Scenario, instances: &[Instance], groups: &[Group]) -> Vec<Turn> {
     let glued = |slot| groups.iter().any(|g| g.exchange.members().any(|m| m == slot));
-    let member = |(slot, (spec, instance)): (usize, (&SubsystemSpec, &Instance))| Member {
-        states: vec![BodyState::REST; instance.scene().bodies.len()],
-        step_multiple: u64::from(spec.step_multiple.max(1)),
+    let turn = |(slot, (spec, instance)): (usize, (&SubsystemSpec, &Instance))| Turn {
+        step_multiple: spec.step_multiple.max(1),
         glued: glued(slot),
-        trial: Ok(Progress::Complete),
-        cost: Duration::ZERO,
+        has_bodies: !instance.scene().bodies.is_empty(),
+        trial: None,
     };
-    scenario.subsystems.iter().zip(instances).enumerate().map(member).collect()
+    scenario.subsystems.iter().zip(instances).enumerate().map(turn).collect()
 }
 
 /// Bodies that can touch the ground, with the ground, and all that glue connects: one group each.

@@ -83,9 +83,9 @@ impl Testbed {
                 list(&to)
             ));
         }
-        let alone = self.instances.iter().zip(&self.members).filter(|(_, m)| !m.glued);
+        let alone = self.instances.iter().zip(&self.turns).filter(|(_, turn)| !turn.glued);
         let alone: Vec<String> = alone
-            .map(|(instance, member)| match member.step_multiple {
+            .map(|(instance, turn)| match turn.step_multiple {
                 1 => instance.name().to_owned(),
                 n => format!("{} (every {n} steps)", instance.name()),
             })
@@ -124,7 +124,7 @@ impl Testbed {
             Some((a, 0.0)) => format!("{a}·x"),
             Some((a, b)) => format!("{a}·x + {b}"),
         };
-        let (delay, why) = match self.members[end.from.0].step_multiple {
+        let (delay, why) = match self.turns[end.from.0].step_multiple {
             1 => ("1".to_owned(), "read at the start of a step and held to its end".to_owned()),
             n => (
                 format!("1 to {n}"),

@@ -39,7 +39,7 @@ impl Testbed {
 
     /// Whether all subsystems make every step, so that its length may change.
     pub(crate) fn takes_any_step(&self) -> bool {
-        self.members.iter().all(|m| m.step_multiple == 1)
+        self.turns.iter().all(|turn| turn.step_multiple == 1)
     }
 
     /// An instance by its number, to set its values.

@@ -58,11 +58,12 @@ impl Testbed {
         }
         let mut states = vec![BodyState::REST; new.scene().bodies.len()];
         new.body_states(&mut states).map_err(told)?;
+        self.turns[slot].has_bodies = !states.is_empty();
         self.members[slot].states = states;
         self.instances[slot] = new;
         // New variables can be read and set from now on.
         self.directory = Directory::new(&self.instances);
-        if self.members[slot].glued {
+        if self.turns[slot].glued {
             self.instances[slot].watch();
         }
         Ok(carried)

@@ -3,11 +3,12 @@
 //! Their trials see committed values only, so the order, and the thread that runs one, cannot be seen in any result.
 //! Every 64th step runs one after the other under a watch: it tells what each costs, and whether threads gain.
 
-use super::{Member, Testbed};
+use super::Testbed;
 use crate::Result;
 use crate::gluing;
 use crate::host::{Instance, Progress, Workers};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use terraglue_subsystem::{Input, Motion, Response, Step};
 
@@ -26,14 +27,25 @@ pub(super) struct Unglued {
 }
 
 /// A step of the testbed as subsystems see it.
-#[derive(Clone, Copy)]
 struct Span {
-    t: f64,
-    h: f64,
+    step: Step<'static>,
     end: f64,
     nominal: u64,
     step_s: f64,
-    index: u64,
+    /// Whether a trial ended otherwise than at t + h.
+    broken: AtomicBool,
+}
+
+/// When a subsystem makes a step by itself, and how it ended. Apart from all else of a subsystem, as every step asks for it.
+pub(super) struct Turn {
+    /// Steps of the testbed per step of this subsystem.
+    pub step_multiple: u32,
+    /// Whether it is glued: it makes none by itself.
+    pub glued: bool,
+    /// Whether it has bodies, whose states are read after every step.
+    pub has_bodies: bool,
+    /// How its last trial ended where that was not at t + h.
+    pub trial: Option<Box<Result<Progress>>>,
 }
 
 impl Unglued {
@@ -61,45 +73,51 @@ impl Testbed {
     }
 
     fn span(&self, h: f64, end: f64) -> Span {
-        Span { t: self.t, h, end, nominal: self.nominal, step_s: self.step_s, index: self.index }
+        let step = Step::free(self.t, h, self.index);
+        Span { step, end, nominal: self.nominal, step_s: self.step_s, broken: AtomicBool::new(false) }
     }
 
     /// (3) A trial of every subsystem without glue. What discarded the step, if any.
     pub(super) fn advance_unglued(&mut self, h: f64, end: f64) -> Result<Option<String>> {
         let span = self.span(h, end);
         if self.is_sampled() {
-            self.sample(span);
+            self.sample(&span);
         } else if self.unglued.pays() {
-            let job = |instance: &mut Instance, member: &mut Member| member.try_alone(instance, span);
-            self.unglued.workers.for_each_pair(&mut self.instances, &mut self.members, &job);
+            let job =
+                |instance: &mut Instance, turn: &mut Turn| turn.try_alone(instance, &span, &mut nothing());
+            self.unglued.workers.for_each_pair(&mut self.instances, &mut self.turns, &job);
         } else {
-            let all = self.instances.iter_mut().zip(&mut self.members);
-            all.for_each(|(instance, member)| member.try_alone(instance, span));
-        }
-        for (instance, member) in self.instances.iter().zip(&mut self.members) {
-            if matches!(member.trial, Ok(Progress::Complete)) {
-                continue;
-            }
-            match std::mem::replace(&mut member.trial, Ok(Progress::Complete))? {
-                Progress::Complete => {}
-                Progress::Early { reached_s } if member.step_multiple > 1 => {
-                    let message = format!("ended its long step early, at t = {reached_s} s");
-                    return Err(instance.error("advance", message));
-                }
-                Progress::Early { .. } => {
-                    return Ok(Some(format!("`{}` discarded the step", instance.name())));
-                }
+            let mut out = nothing();
+            for (instance, turn) in self.instances.iter_mut().zip(&mut self.turns) {
+                turn.try_alone(instance, &span, &mut out);
             }
         }
-        Ok(None)
+        if span.broken.into_inner() { self.broken_trial() } else { Ok(None) }
+    }
+
+    /// What the first trial says that did not end at t + h; all are forgotten.
+    #[cold]
+    fn broken_trial(&mut self) -> Result<Option<String>> {
+        let all = self.instances.iter().zip(&mut self.turns);
+        let broken: Vec<_> =
+            all.filter_map(|(i, turn)| Some((i, turn.step_multiple, turn.trial.take()?))).collect();
+        let Some((instance, multiple, trial)) = broken.into_iter().next() else { return Ok(None) };
+        match (*trial)? {
+            Progress::Complete => Ok(None),
+            Progress::Early { reached_s } if multiple > 1 => {
+                Err(instance.error("advance", format!("ended its long step early, at t = {reached_s} s")))
+            }
+            Progress::Early { .. } => Ok(Some(format!("`{}` discarded the step", instance.name()))),
+        }
     }
 
     /// One after the other, each under a watch.
-    fn sample(&mut self, span: Span) {
+    fn sample(&mut self, span: &Span) {
         let (mut sum, mut longest) = (Duration::ZERO, Duration::ZERO);
-        for (instance, member) in self.instances.iter_mut().zip(&mut self.members).filter(|(_, m)| !m.glued) {
+        let all = self.instances.iter_mut().zip(&mut self.turns).zip(&mut self.members);
+        for ((instance, turn), member) in all.filter(|((_, turn), _)| !turn.glued) {
             let start = Instant::now();
-            member.try_alone(instance, span);
+            turn.try_alone(instance, span, &mut nothing());
             let took = start.elapsed();
             member.cost += took * SAMPLED as u32;
             sum += took;
@@ -114,9 +132,10 @@ impl Testbed {
     pub(super) fn commit_unglued(&mut self, h: f64, end: f64) -> Result {
         let still = Motion { x: &[], v: &[] };
         let span = self.span(h, end);
-        for (instance, member) in self.instances.iter_mut().zip(&self.members) {
-            if let Some(step) = member.own_step(span) {
-                instance.commit(&step, &[], &still)?;
+        for (instance, turn) in self.instances.iter_mut().zip(&self.turns) {
+            let committed = turn.own_step(&span, |step| instance.commit(step, &[], &still));
+            if let Some(Err(error)) = committed {
+                return Err(error);
             }
         }
         Ok(())
@@ -125,43 +144,57 @@ impl Testbed {
     /// What the steps of each subsystem have cost so far, s of wall time. Without glue: the steps that were watched, times
     /// the steps that each stands for; with glue: all calls in a step.
     pub fn costs(&self) -> impl Iterator<Item = (&str, f64)> {
-        let cost = |(instance, member): (&Instance, &Member)| match member.glued {
-            true => instance.cost(),
-            false => member.cost,
+        let cost = |slot: usize| match self.turns[slot].glued {
+            true => self.instances[slot].cost(),
+            false => self.members[slot].cost,
         };
-        let all = self.instances.iter().zip(&self.members);
-        all.map(move |both| (both.0.name(), cost(both).as_secs_f64()))
+        self.instances.iter().enumerate().map(move |(slot, i)| (i.name(), cost(slot).as_secs_f64()))
     }
 }
 
-impl Member {
+impl Turn {
     /// Its trial of this step, if it makes one.
-    fn try_alone(&mut self, instance: &mut Instance, span: Span) {
-        let Some(step) = self.own_step(span) else { return };
+    #[inline]
+    fn try_alone(&mut self, instance: &mut Instance, span: &Span, out: &mut Response) {
         let none = Input::Force { t: &[], hold: gluing::HOLD, motion: None };
-        let reached = step.t + step.h;
-        let mut out = Response { x: &mut [], v: &mut [], a: &mut [], t: &mut [], reached, flags: 0 };
-        // what is complete already is left alone: an error is large, and moving room for one costs more than a cheap step
-        match instance.advance(&step, &none, &mut out) {
-            Ok(Progress::Complete) => {}
-            other => self.trial = other,
+        let broken = self.own_step(span, |step| match instance.advance(step, &none, out) {
+            Ok(Progress::Complete) => None,
+            other => Some(Box::new(other)),
+        });
+        if let Some(Some(trial)) = broken {
+            self.trial = Some(trial);
+            span.broken.store(true, Ordering::Relaxed);
         }
     }
 
-    /// The step that this subsystem makes by itself now, if any: one of `step_multiple` nominal steps is made
-    /// when its last part is reached, so its outputs never run ahead.
+    /// Does something with the step that the subsystem makes by itself now, if any.
     #[inline]
-    fn own_step(&self, span: Span) -> Option<Step<'static>> {
-        if self.glued {
-            return None;
-        }
-        let Span { t, h, end, nominal, step_s, index } = span;
-        if self.step_multiple == 1 {
-            return Some(Step::free(t, h, index));
-        }
-        let at_end = end - (t + h) <= 1e-6 * step_s;
-        let whole = (nominal + 1).is_multiple_of(self.step_multiple);
-        let length = self.step_multiple as f64 * step_s;
-        (at_end && whole).then(|| Step::free(end - length, length, (nominal + 1) / self.step_multiple - 1))
+    fn own_step<R>(&self, span: &Span, make: impl FnOnce(&Step) -> R) -> Option<R> {
+        let long;
+        let step = match (self.glued, self.step_multiple) {
+            (true, _) => return None,
+            (false, 1) => &span.step,
+            (false, _) => {
+                long = self.long_step(span)?;
+                &long
+            }
+        };
+        Some(make(step))
     }
+
+    /// One of `step_multiple` nominal steps is made when its last part is reached, so its outputs never run ahead.
+    #[inline(never)]
+    fn long_step(&self, span: &Span) -> Option<Step<'static>> {
+        let Span { step, end, nominal, step_s, .. } = span;
+        let multiple = u64::from(self.step_multiple);
+        let at_end = end - (step.t + step.h) <= 1e-6 * step_s;
+        let whole = (nominal + 1).is_multiple_of(multiple);
+        let length = multiple as f64 * step_s;
+        (at_end && whole).then(|| Step::free(end - length, length, (nominal + 1) / multiple - 1))
+    }
+}
+
+/// What a subsystem without ports answers.
+fn nothing() -> Response<'static> {
+    Response { x: &mut [], v: &mut [], a: &mut [], t: &mut [], reached: 0.0, flags: 0 }
 }

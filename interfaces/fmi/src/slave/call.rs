@@ -51,14 +51,26 @@ impl From<c_int> for Status {
 
 impl Slave {
     /// Calls a function that must succeed.
-    #[inline]
+    #[inline(always)]
     pub(super) fn call<F>(
         &self,
         function: &'static str,
         f: Option<F>,
         run: impl FnOnce(F, Component) -> c_int,
     ) -> Result {
-        match self.status(function, f, run)? {
+        let (Health::Good, Some(f)) = (self.health.get(), f) else {
+            return Err(self.not_called(function));
+        };
+        self.log.begin();
+        match run(f, self.component) {
+            0 => Ok(()),
+            other => self.no_plain_success(function, other),
+        }
+    }
+
+    #[cold]
+    fn no_plain_success(&self, function: &'static str, status: c_int) -> Result {
+        match self.unlike_ok(status) {
             status if goes_on(status) => Ok(()),
             status => Err(self.failed(function, status)),
         }
@@ -83,26 +95,40 @@ impl Slave {
     }
 
     /// Calls a function and answers its status; what may not be called is an error.
-    #[inline]
+    #[inline(always)]
     pub(super) fn status<F>(
         &self,
         function: &'static str,
         f: Option<F>,
         run: impl FnOnce(F, Component) -> c_int,
     ) -> Result<Status> {
-        if self.health.get() != Health::Good {
-            let outcome = "was not called: the instance failed before".into();
-            return Err(Error::Call { function, outcome, log: Vec::new(), fatal: true });
-        }
-        let Some(f) = f else {
-            return Err(Error::Refused(format!("its library has no function `{function}`")));
+        let (Health::Good, Some(f)) = (self.health.get(), f) else {
+            return Err(self.not_called(function));
         };
         self.log.begin();
-        let status = Status::from(run(f, self.component));
+        match run(f, self.component) {
+            0 => Ok(Status::Ok),
+            other => Ok(self.unlike_ok(other)),
+        }
+    }
+
+    /// Why a function was not called: the instance may not be, or there is no such function.
+    #[cold]
+    fn not_called(&self, function: &'static str) -> Error {
+        if self.health.get() == Health::Good {
+            return Error::Refused(format!("its library has no function `{function}`"));
+        }
+        let outcome = "was not called: the instance failed before".into();
+        Error::Call { function, outcome, log: Vec::new(), fatal: true }
+    }
+
+    #[cold]
+    fn unlike_ok(&self, status: c_int) -> Status {
+        let status = Status::from(status);
         if status == Status::Warning {
             self.warnings.set(self.warnings.get() + 1);
         }
-        Ok(status)
+        status
     }
 
     /// The error of a status that is no success, remembered where the standard asks for it.

@@ -1,7 +1,8 @@
 //! The functions of the C interfaces, by hand from the text of the standards.
 //!
 //! Every function is optional here: a missing one is an error of the call that needs it, or at load time where the
-//! standard demands it or the description promises it.
+//! standard demands it or the description promises it. What every step calls stands first in a table, on one line of the
+//! cache: a chain of units is as quick as its memory.
 
 use crate::error::{Error, Result};
 use crate::fmu::Fmu;
@@ -20,6 +21,7 @@ macro_rules! table {
     ($(#[$doc:meta])* $name:ident { $($field:ident = $symbol:literal : fn($($argument:ty),*) $(-> $ret:ty)?;)* }) => {
         $(#[$doc])*
         #[derive(Clone, Copy, Debug)]
+        #[repr(C)]
         #[allow(missing_docs)]
         pub struct $name { $(pub $field: Option<unsafe extern "C" fn($($argument),*) $(-> $ret)?>,)* }
 
@@ -65,6 +67,9 @@ pub type Update3 = unsafe extern "C" fn(*mut c_void, f64, bool, bool, bool, bool
 table! {
     /// FMI 2.0 for co-simulation.
     Two {
+        do_step = "fmi2DoStep": fn(Component, f64, f64, c_int) -> c_int;
+        get_real = "fmi2GetReal": fn(Component, *const Vr, usize, *mut f64) -> c_int;
+        set_real = "fmi2SetReal": fn(Component, *const Vr, usize, *const f64) -> c_int;
         instantiate = "fmi2Instantiate": fn(Text, c_int, Text, Text, *const Callbacks2, c_int, c_int) -> Component;
         free = "fmi2FreeInstance": fn(Component);
         setup = "fmi2SetupExperiment": fn(Component, c_int, f64, f64, c_int, f64) -> c_int;
@@ -72,15 +77,12 @@ table! {
         exit_initialization = "fmi2ExitInitializationMode": fn(Component) -> c_int;
         terminate = "fmi2Terminate": fn(Component) -> c_int;
         reset = "fmi2Reset": fn(Component) -> c_int;
-        get_real = "fmi2GetReal": fn(Component, *const Vr, usize, *mut f64) -> c_int;
         get_integer = "fmi2GetInteger": fn(Component, *const Vr, usize, *mut c_int) -> c_int;
         get_boolean = "fmi2GetBoolean": fn(Component, *const Vr, usize, *mut c_int) -> c_int;
         get_string = "fmi2GetString": fn(Component, *const Vr, usize, *mut Text) -> c_int;
-        set_real = "fmi2SetReal": fn(Component, *const Vr, usize, *const f64) -> c_int;
         set_integer = "fmi2SetInteger": fn(Component, *const Vr, usize, *const c_int) -> c_int;
         set_boolean = "fmi2SetBoolean": fn(Component, *const Vr, usize, *const c_int) -> c_int;
         set_string = "fmi2SetString": fn(Component, *const Vr, usize, *const Text) -> c_int;
-        do_step = "fmi2DoStep": fn(Component, f64, f64, c_int) -> c_int;
         get_real_status = "fmi2GetRealStatus": fn(Component, c_int, *mut f64) -> c_int;
         get_boolean_status = "fmi2GetBooleanStatus": fn(Component, c_int, *mut c_int) -> c_int;
         get_state = "fmi2GetFMUstate": fn(Component, *mut State) -> c_int;
@@ -97,6 +99,11 @@ table! {
 table! {
     /// FMI 3.0 for co-simulation.
     Three {
+        do_step = "fmi3DoStep": fn(
+            Component, f64, f64, bool, *mut bool, *mut bool, *mut bool, *mut f64
+        ) -> c_int;
+        get_f64 = "fmi3GetFloat64": fn(Component, *const Vr, usize, *mut f64, usize) -> c_int;
+        set_f64 = "fmi3SetFloat64": fn(Component, *const Vr, usize, *const f64, usize) -> c_int;
         instantiate = "fmi3InstantiateCoSimulation": fn(
             Text, Text, Text, bool, bool, bool, bool, *const Vr, usize, *mut c_void, Logger3, Option<Update3>
         ) -> Component;
@@ -112,7 +119,6 @@ table! {
         ) -> c_int;
         terminate = "fmi3Terminate": fn(Component) -> c_int;
         reset = "fmi3Reset": fn(Component) -> c_int;
-        get_f64 = "fmi3GetFloat64": fn(Component, *const Vr, usize, *mut f64, usize) -> c_int;
         get_f32 = "fmi3GetFloat32": fn(Component, *const Vr, usize, *mut f32, usize) -> c_int;
         get_i8 = "fmi3GetInt8": fn(Component, *const Vr, usize, *mut i8, usize) -> c_int;
         get_u8 = "fmi3GetUInt8": fn(Component, *const Vr, usize, *mut u8, usize) -> c_int;
@@ -125,7 +131,6 @@ table! {
         get_bool = "fmi3GetBoolean": fn(Component, *const Vr, usize, *mut u8, usize) -> c_int;
         get_string = "fmi3GetString": fn(Component, *const Vr, usize, *mut Text, usize) -> c_int;
         get_binary = "fmi3GetBinary": fn(Component, *const Vr, usize, *mut usize, *mut *const u8, usize) -> c_int;
-        set_f64 = "fmi3SetFloat64": fn(Component, *const Vr, usize, *const f64, usize) -> c_int;
         set_f32 = "fmi3SetFloat32": fn(Component, *const Vr, usize, *const f32, usize) -> c_int;
         set_i8 = "fmi3SetInt8": fn(Component, *const Vr, usize, *const i8, usize) -> c_int;
         set_u8 = "fmi3SetUInt8": fn(Component, *const Vr, usize, *const u8, usize) -> c_int;
@@ -143,9 +148,6 @@ table! {
         get_interval = "fmi3GetIntervalDecimal": fn(Component, *const Vr, usize, *mut f64, *mut c_int) -> c_int;
         get_fraction = "fmi3GetIntervalFraction": fn(Component, *const Vr, usize, *mut u64, *mut u64, *mut c_int) -> c_int;
         set_clock = "fmi3SetClock": fn(Component, *const Vr, usize, *const bool) -> c_int;
-        do_step = "fmi3DoStep": fn(
-            Component, f64, f64, bool, *mut bool, *mut bool, *mut bool, *mut f64
-        ) -> c_int;
         get_state = "fmi3GetFMUState": fn(Component, *mut State) -> c_int;
         set_state = "fmi3SetFMUState": fn(Component, State) -> c_int;
         free_state = "fmi3FreeFMUState": fn(Component, *mut State) -> c_int;

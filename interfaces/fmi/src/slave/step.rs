@@ -1,11 +1,12 @@
 //! `doStep`, events between steps, and what both answer.
 
 use super::call::Status;
-use super::functions::Api;
+use super::functions::{Api, Three};
 use super::{Phase, Slave, goes_on};
 use crate::error::{Error, Result};
 use std::ffi::c_int;
 
+const DO_STEP_2: &str = "fmi2DoStep";
 /// `fmi2LastSuccessfulTime` of `fmi2StatusKind`.
 const LAST_SUCCESSFUL_TIME: c_int = 2;
 /// `fmi2Terminated` of `fmi2StatusKind`.
@@ -39,37 +40,45 @@ pub struct Stepped {
     pub events: u32,
 }
 
+#[cold]
+fn too_soon() -> Error {
+    Error::Refused("doStep before the end of the initialisation".into())
+}
+
 impl Slave {
     /// Goes from t to t + h.
     ///
     /// # Errors
     /// [`Error::Discard`] where the unit could not go so far; it is then at `reached` and cannot be stepped on
     /// before a state is restored.
+    #[inline(always)]
     pub fn do_step(&mut self, step: Advance) -> Result<Stepped> {
         if self.phase != Phase::Stepping {
-            return Err(Error::Refused("doStep before the end of the initialisation".into()));
+            return Err(too_soon());
         }
-        match self.api {
-            Api::Two(..) => self.do_step_2(step),
-            Api::Three(..) => self.do_step_3(step),
+        let Api::Two(two) = &self.api else { return self.do_step_3(step) };
+        let for_good = c_int::from(step.for_good);
+        // SAFETY: the arguments are those of the standard.
+        match self.status(DO_STEP_2, two.do_step, |f, c| unsafe { f(c, step.t, step.h, for_good) })? {
+            status if goes_on(status) => {
+                Ok(Stepped { reached: step.t + step.h, terminate: false, events: 0 })
+            }
+            status => self.stopped_2(step, status),
         }
     }
 
-    fn do_step_2(&mut self, step: Advance) -> Result<Stepped> {
-        const NAME: &str = "fmi2DoStep";
+    /// How far a unit of FMI 2.0 came that did not make its step.
+    #[cold]
+    fn stopped_2(&self, step: Advance, status: Status) -> Result<Stepped> {
+        const NAME: &str = DO_STEP_2;
         let Api::Two(two) = self.api else { return Err(Error::Refused(NAME.into())) };
-        let for_good = c_int::from(step.for_good);
-        // SAFETY: the arguments are those of the standard, here and below.
-        let status = self.status(NAME, two.do_step, |f, c| unsafe { f(c, step.t, step.h, for_good) })?;
         let end = step.t + step.h;
-        if goes_on(status) {
-            return Ok(Stepped { reached: end, terminate: false, events: 0 });
-        }
         if status != Status::Discard {
             return Err(self.failed(NAME, status));
         }
         let log = self.log.last();
         let mut reached = f64::NAN;
+        // SAFETY: the arguments are those of the standard, here and below.
         let answer = self.status("fmi2GetRealStatus", two.get_real_status, |f, c| unsafe {
             f(c, LAST_SUCCESSFUL_TIME, &raw mut reached)
         });
@@ -89,7 +98,9 @@ impl Slave {
 
     fn do_step_3(&mut self, step: Advance) -> Result<Stepped> {
         const NAME: &str = "fmi3DoStep";
-        let Api::Three(three) = self.api else { return Err(Error::Refused(NAME.into())) };
+        let Api::Three(Three { do_step, get_f64, enter_event_mode, enter_step_mode, .. }) = self.api else {
+            return Err(Error::Refused(NAME.into()));
+        };
         let end = step.t + step.h;
         let (mut t, mut events, mut returns) = (step.t, 0, 0);
         if self.updates {
@@ -109,9 +120,9 @@ impl Slave {
             // a step that is repeated goes back to where its first part began
             let for_good = step.for_good && (t <= step.t || !self.description.capabilities.state);
             if self.updates {
-                self.open_between(t, stop, three.get_f64);
+                self.open_between(t, stop, get_f64);
             }
-            let status = self.status(NAME, three.do_step, |f, c| unsafe {
+            let status = self.status(NAME, do_step, |f, c| unsafe {
                 f(c, t, stop - t, for_good, &raw mut event, &raw mut terminate, &raw mut early, &raw mut last)
             });
             let wrong = if self.updates { self.close_between() } else { None };
@@ -144,14 +155,14 @@ impl Slave {
             let ticks = at_stop && self.clocks.tick_at(stop);
             if event && self.event_mode || ticks {
                 events += 1;
-                self.call("fmi3EnterEventMode", three.enter_event_mode, |f, c| unsafe { f(c) })?;
+                self.call("fmi3EnterEventMode", enter_event_mode, |f, c| unsafe { f(c) })?;
                 if at_stop {
                     self.tick(stop, false)?;
                 }
                 if self.settle_events(if at_stop { stop } else { last })? {
                     return Ok(Stepped { reached: last, terminate: true, events });
                 }
-                self.call("fmi3EnterStepMode", three.enter_step_mode, |f, c| unsafe { f(c) })?;
+                self.call("fmi3EnterStepMode", enter_step_mode, |f, c| unsafe { f(c) })?;
             }
             if at_stop && stop >= end {
                 return Ok(Stepped { reached: end, terminate: false, events });

@@ -17,8 +17,9 @@ macro_rules! plain {
 
 impl Slave {
     /// Values of f64 variables.
+    #[inline(always)]
     pub fn get_f64(&self, references: &[u32], out: &mut [f64]) -> Result {
-        match self.api {
+        match &self.api {
             Api::Two(two) => {
                 if out.len() < references.len() {
                     return Err(wrong_length(references, out.len()));
@@ -32,8 +33,9 @@ impl Slave {
     }
 
     /// New values of f64 variables.
+    #[inline(always)]
     pub fn set_f64(&self, references: &[u32], values: &[f64]) -> Result {
-        match self.api {
+        match &self.api {
             Api::Two(two) => {
                 if values.len() < references.len() {
                     return Err(wrong_length(references, values.len()));
@@ -241,6 +243,7 @@ fn texts(values: &[String]) -> Result<Vec<CString>> {
     all.map_err(|_| Error::Refused("a text has a zero in it".into()))
 }
 
+#[cold]
 fn wrong_length(references: &[u32], values: usize) -> Error {
     Error::Refused(format!("{} references but {values} values", references.len()))
 }

@@ -1,6 +1,6 @@
 //! The same units in other masters, measured in the same run: installed by name into a virtual environment of its own.
 
-use super::steps::{CASES, unit};
+use super::steps::{CASES, Case, unit};
 use crate::process::{Outcome, command, target};
 use crate::validate::{Figure, Limit};
 use std::path::{Path, PathBuf};
@@ -16,28 +16,28 @@ pub fn figures(folder: &Path) -> Vec<Figure> {
 }
 
 fn measured(folder: &Path) -> Outcome<Vec<Figure>> {
-    let python = python()?;
+    python()?;
     let mut all = Vec::new();
     for peer in ["ecos", "libcosim", "fmpy", "fmucontainer"] {
         for case in &CASES {
-            let file = folder.join(format!("{}.fmu", unit(case)));
-            let mut child = command(&python, &[SCRIPT, peer]);
-            child.arg(&file).arg(case.units.to_string()).arg(if case.pair { "pair" } else { "chain" });
-            child.arg(folder.join("bare_loop"));
             let id = format!("fmi.cost.peer.{peer}.{}", case.name);
-            let value = result(child).and_then(|t| t.trim().parse().map_err(|_| format!("it said {t}")));
-            all.push(match value {
-                Ok(value) => Figure::new(
-                    id,
-                    value,
-                    Limit::None,
-                    format!("µs of CPU per unit and step, nothing recorded: {peer}"),
-                ),
+            let what = format!("µs of CPU per unit and step, nothing recorded: {peer}");
+            all.push(match cost(folder, case, peer) {
+                Ok(value) => Figure::new(id, value, Limit::None, what),
                 Err(why) => Figure::skipped(id, why),
             });
         }
     }
     Ok(all)
+}
+
+/// What a step of a case costs with another master, µs of CPU per unit.
+pub fn cost(folder: &Path, case: &Case, peer: &str) -> Outcome<f64> {
+    let file = folder.join(format!("{}.fmu", unit(case)));
+    let mut child = command(&python()?, &[SCRIPT, peer]);
+    child.arg(&file).arg(case.units.to_string()).arg(if case.pair { "pair" } else { "chain" });
+    child.arg(folder.join("bare_loop"));
+    result(child).and_then(|t| t.trim().parse().map_err(|_| format!("it said {t}")))
 }
 
 /// What a script says after `RESULT`, or the last line of its complaint.

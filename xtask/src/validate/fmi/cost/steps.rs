@@ -36,6 +36,14 @@ struct Manner {
     save: bool,
 }
 
+/// Nothing recorded, no step taken back.
+const BLIND: Manner = Manner { record: false, save: false };
+
+/// What a step of a case costs in a testbed, µs of CPU per unit.
+pub fn blind(folder: &Path, case: &Case) -> Outcome<f64> {
+    testbed(folder, case, BLIND)
+}
+
 pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
     units::build(folder, "cheap", &[("u", 'i', 1.0), ("y", 'o', 0.0)], "", "v[1] += h * v[0];")?;
     // the outputs of a chain depend on the inputs of the same time
@@ -43,15 +51,14 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
     let program = folder.join("bare_loop");
     read(&root().join(LOOP))?;
     must(&mut command("cc", &["-O2", "-w", LOOP, "-ldl", "-o"]).arg(&program))?;
-    let blind = Manner { record: false, save: false };
     let mut all = Vec::new();
     for case in &CASES {
-        all.extend(compared(folder, &program, case, "", blind)?);
+        all.extend(compared(folder, &program, case, "", BLIND)?);
     }
     for case in &CASES {
-        all.extend(compared(folder, &program, case, "recorded.", Manner { record: true, ..blind })?);
+        all.extend(compared(folder, &program, case, "recorded.", Manner { record: true, ..BLIND })?);
     }
-    all.extend(compared(folder, &program, &CASES[0], "rollback.", Manner { save: true, ..blind })?);
+    all.extend(compared(folder, &program, &CASES[0], "rollback.", Manner { save: true, ..BLIND })?);
     Ok(all)
 }
 

@@ -4,9 +4,12 @@ use crate::error::Source;
 use roxmltree::{Document, Node};
 use std::collections::BTreeMap;
 
+/// Says which controller drives a joint: nearly every robot of ROS has them, and nothing mechanical is lost without.
+const TRANSMISSION: &str = "transmission";
+
 /// An element, what may stand in it, and its attributes. Colours and textures are left to viewers.
 const KNOWN: [(&str, &[&str], &[&str]); 21] = [
-    ("robot", &["link", "joint", "material"], &["name", "version"]),
+    ("robot", &["link", "joint", "material", TRANSMISSION], &["name", "version"]),
     ("link", &["inertial", "visual", "collision"], &["name"]),
     ("inertial", &["origin", "mass", "inertia"], &[]),
     ("mass", &[], &["value"]),
@@ -66,7 +69,20 @@ fn look(source: &Source, node: Node, found: &mut Found) {
 }
 
 /// What is known and still not used.
-pub(crate) fn notice(source: &Source, robot: &urdf_rs::Robot) -> Option<String> {
+pub(crate) fn notices(source: &Source, robot: &urdf_rs::Robot) -> Vec<String> {
+    effort(source, robot).into_iter().chain(transmissions(source)).collect()
+}
+
+fn transmissions(source: &Source) -> Option<String> {
+    let document = Document::parse(source.text).ok()?;
+    let mut all = document.root_element().children().filter(|c| c.has_tag_name(TRANSMISSION));
+    let line = document.text_pos_at(all.next()?.range().start).row;
+    let text =
+        format!("<{TRANSMISSION}> is for controllers of ROS and does nothing ({} in all)", all.count() + 1);
+    Some(format!("{}:{line}: {text}", source.file))
+}
+
+fn effort(source: &Source, robot: &urdf_rs::Robot) -> Option<String> {
     let bounded = robot.joints.iter().find(|j| j.limit.effort != 0.0 || j.limit.velocity != 0.0)?;
     let text =
         "`effort` and `velocity` of <limit> are not used: the scenario's `max_torque` bounds the motors";

@@ -114,7 +114,7 @@ fn build(
     };
     let (mut warnings, mut notices) = shapes.said();
     warnings.extend(unread::warnings(source));
-    notices.extend(unread::notice(source, robot));
+    notices.extend(unread::notices(source, robot));
     warnings.extend(mass_spread(source.file, &bodies));
     let couplings = couplings(source, robot, &joints)?;
     Ok(Robot {

@@ -222,7 +222,8 @@ fn what_nothing_reads_is_named_once() {
                 <limit effort=\"3\" velocity=\"4\"/></joint>";
     let joint = |name: &str, child: &str| joint(name, "continuous", "a", child).replace("</joint>", with);
     let gazebo = "<gazebo reference=\"a\"><mu1>0.9</mu1></gazebo>\n".to_owned();
-    let parts = [inertial, good("b"), good("c"), joint("j", "b"), joint("k", "c"), gazebo];
+    let drive = "<transmission name=\"t\"/><transmission name=\"u\"/>\n".to_owned();
+    let parts = [inertial, good("b"), good("c"), joint("j", "b"), joint("k", "c"), gazebo, drive];
     let robot = read(&robot(&parts)).unwrap();
     let expected = [
         "robot.urdf:8: `stiction` = \"2\" of <dynamics> is not supported and does nothing (1 more like it)",
@@ -231,8 +232,11 @@ fn what_nothing_reads_is_named_once() {
         "robot.urdf:10: <gazebo> in <robot> is not supported and does nothing",
     ];
     assert_eq!(robot.warnings, expected);
-    assert_eq!(robot.notices.len(), 1);
+    assert_eq!(robot.notices.len(), 2);
     assert!(robot.notices[0].contains("joint `j`: `effort` and `velocity`"), "{}", robot.notices[0]);
+    // every robot of ROS has them; a warning would be there in every run
+    let said = "robot.urdf:11: <transmission> is for controllers of ROS and does nothing (2 in all)";
+    assert_eq!(robot.notices[1], said);
 }
 
 #[test]

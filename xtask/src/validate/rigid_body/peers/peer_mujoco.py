@@ -38,7 +38,7 @@ def walk(xml, rows, name):
     """Five runs: each step counts with the least of its times, as it does on our side."""
     model = mujoco.MjModel.from_xml_string(xml)
     wanted = [targets(i * 1e-3, rows) for i in range(10_000)]
-    runs = [run(model, wanted) for _ in range(5)]
+    runs = [gait(model, wanted) for _ in range(5)]
     times = sorted(min(of) for of in zip(*(r[0] for r in runs)))
     _, deepest, slips, x = runs[0]
     figure(f"gait.{name}.step", 1e6 * times[5000], "CPU time of a step, least of five runs, median, µs")
@@ -48,7 +48,7 @@ def walk(xml, rows, name):
     figure(f"gait.{name}.x", x, "distance in 10 s, m")
 
 
-def run(model, wanted):
+def gait(model, wanted):
     data = mujoco.MjData(model)
     data.qpos[7:31] = STAND * 6
     feet = [model.geom(f"{leg}4_foot").id for leg in ("LF", "LM", "LR", "RF", "RM", "RR")]

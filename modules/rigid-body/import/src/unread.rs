@@ -35,16 +35,17 @@ const KNOWN: [(&str, &[&str], &[&str]); 21] = [
 /// By kind: the warning of the first, and how many there are.
 type Found = BTreeMap<String, (String, usize)>;
 
-/// One warning for every kind of element or attribute that does nothing.
-pub(crate) fn warnings(source: &Source) -> Vec<String> {
-    let Ok(document) = Document::parse(source.text) else { return Vec::new() };
+/// Warnings, one for every kind of element or attribute that does nothing, and notices of what is known and still not used.
+pub(crate) fn told(source: &Source, robot: &urdf_rs::Robot) -> (Vec<String>, Vec<String>) {
+    let Ok(document) = Document::parse(source.text) else { return Default::default() };
     let mut found = Found::new();
     look(source, document.root_element(), &mut found);
-    let told = found.into_values().map(|(text, count)| match count {
+    let warnings = found.into_values().map(|(text, count)| match count {
         1 => text,
         more => format!("{text} ({} more like it)", more - 1),
     });
-    told.collect()
+    let notices = effort(source, robot).into_iter().chain(transmissions(source, &document));
+    (warnings.collect(), notices.collect())
 }
 
 fn look(source: &Source, node: Node, found: &mut Found) {
@@ -68,13 +69,7 @@ fn look(source: &Source, node: Node, found: &mut Found) {
     node.children().filter(|c| children.contains(&c.tag_name().name())).for_each(|c| look(source, c, found));
 }
 
-/// What is known and still not used.
-pub(crate) fn notices(source: &Source, robot: &urdf_rs::Robot) -> Vec<String> {
-    effort(source, robot).into_iter().chain(transmissions(source)).collect()
-}
-
-fn transmissions(source: &Source) -> Option<String> {
-    let document = Document::parse(source.text).ok()?;
+fn transmissions(source: &Source, document: &Document) -> Option<String> {
     let mut all = document.root_element().children().filter(|c| c.has_tag_name(TRANSMISSION));
     let line = document.text_pos_at(all.next()?.range().start).row;
     let text =

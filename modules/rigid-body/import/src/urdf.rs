@@ -113,8 +113,9 @@ fn build(
         None => Base::World,
     };
     let (mut warnings, mut notices) = shapes.said();
-    warnings.extend(unread::warnings(source));
-    notices.extend(unread::notices(source, robot));
+    let (unread, unused) = unread::told(source, robot);
+    warnings.extend(unread);
+    notices.extend(unused);
     warnings.extend(mass_spread(source.file, &bodies));
     let couplings = couplings(source, robot, &joints)?;
     Ok(Robot {

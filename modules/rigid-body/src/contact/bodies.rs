@@ -138,6 +138,7 @@ impl BodyContacts {
         self.detector.detect(bodies, h, &mut self.points);
         self.wrenches.clear();
         self.offsets.clear();
+        self.mu.clear();
         for p in &self.points {
             let wrench = |c: usize, side: usize, sign: f64| match p.bodies[side] {
                 None => [0.0; 6],
@@ -153,15 +154,12 @@ impl BodyContacts {
                 })
             };
             let approach = p.frame[0].dot(&(velocity(1) - velocity(0)));
-            let restitution = self.surfaces.of(p.bodies).restitution.unwrap_or(self.surfaces.restitution);
+            let given = self.surfaces.of(p.bodies);
+            let restitution = given.restitution.unwrap_or(self.surfaces.restitution);
             self.offsets.push(self.offset(p.gap, approach, restitution, h));
+            self.mu.push(given.friction.or(p.friction).unwrap_or(self.surfaces.friction));
         }
         let n = self.points.len();
-        self.mu.clear();
-        let surfaces = &self.surfaces;
-        let friction =
-            |p: &ContactPoint| surfaces.of(p.bodies).friction.or(p.friction).unwrap_or(surfaces.friction);
-        self.mu.extend(self.points.iter().map(friction));
         self.impulses.clear();
         self.impulses.resize(3 * n, 0.0);
         recall(memory, &self.points, bodies, h, &mut self.impulses);

@@ -10,11 +10,13 @@ use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};
 const GROUND: &str = "ground";
 /// Pattern of all pairs.
 const ALL: &str = "*";
-/// Coulomb friction and restitution where a scenario is silent.
-const DEFAULTS: [(&str, f64, f64, &str); 2] = [
-    ("friction", 0.8, f64::INFINITY, "Coulomb friction among bodies and with rigid ground"),
-    ("restitution", 0.0, 1.0, "Newton's coefficient of restitution among bodies and with rigid ground"),
-];
+/// A parameter: name, value where a scenario is silent, largest value, help.
+type Item = (&'static str, f64, f64, &'static str);
+
+const FRICTION: Item =
+    ("friction", 0.8, f64::INFINITY, "Coulomb friction among bodies and with rigid ground");
+const RESTITUTION: Item =
+    ("restitution", 0.0, 1.0, "Newton's coefficient of restitution among bodies and with rigid ground");
 
 /// What holds where two bodies touch; none: what holds everywhere.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -36,7 +38,7 @@ pub(crate) struct Surfaces {
 
 /// The parameters of the scenario.
 pub(crate) fn parameters() -> impl Iterator<Item = Parameter> {
-    DEFAULTS.into_iter().map(|(name, default, most, help)| {
+    [FRICTION, RESTITUTION].into_iter().map(|(name, default, most, help)| {
         let help = format!(
             "{help}, for all or by pairs of bodies: `{{ \"{ALL}\" = {default:?}, \"*_foot & {GROUND}\" = … }}`, where `{GROUND}` \
              is all that stands still"
@@ -50,31 +52,16 @@ impl Surfaces {
     /// Refused: a pattern that is no pair, or fits none.
     pub fn from_config(config: &Config, model: &Model) -> Result<Self> {
         let names: Vec<&str> = model.bodies.iter().map(|b| b.name.as_str()).chain([GROUND]).collect();
-        let [(_, friction, ..), (_, restitution, ..)] = DEFAULTS;
-        let mut me = Self { friction, restitution, pairs: Vec::new(), bodies: model.bodies.len() };
-        let everywhere = [&mut me.friction, &mut me.restitution];
-        let mut tables = [None, None];
-        for ((key, ..), (value, table)) in DEFAULTS.iter().zip(everywhere.into_iter().zip(&mut tables)) {
-            match config.get(key) {
-                Some(Value::Object(by_pair)) => {
-                    *value = by_pair.get(ALL).and_then(Value::as_f64).unwrap_or(*value);
-                    *table = Some(rows(key, by_pair, &names)?);
-                }
-                _ => *value = config.number(key)?,
-            }
-        }
-        if tables.iter().flatten().any(|rows| !rows.is_empty()) {
-            let [friction, restitution] = tables.map(Option::unwrap_or_default);
-            let n = names.len();
-            let pair = |k: usize| [names[k / n], names[k % n]];
-            me.pairs = (0..n * n)
-                .map(|k| Pair {
-                    friction: best(&friction, pair(k)),
-                    restitution: best(&restitution, pair(k)),
-                })
-                .collect();
-        }
-        Ok(me)
+        let (friction, frictions) = read(config, FRICTION, &names)?;
+        let (restitution, restitutions) = read(config, RESTITUTION, &names)?;
+        let n = names.len();
+        let of = |k: usize| {
+            let pair = [names[k / n], names[k % n]];
+            Pair { friction: best(&frictions, pair), restitution: best(&restitutions, pair) }
+        };
+        let silent = frictions.is_empty() && restitutions.is_empty();
+        let pairs = if silent { Vec::new() } else { (0..n * n).map(of).collect() };
+        Ok(Self { friction, restitution, pairs, bodies: model.bodies.len() })
     }
 
     /// What the scenario says of two bodies; none: what stands still.
@@ -101,6 +88,13 @@ impl Row<'_> {
         let plain = self.names.iter().filter(|p| !p.contains('*')).count();
         (plain, self.names.iter().map(|p| p.len()).sum())
     }
+}
+
+/// The number of all pairs, and those of some.
+fn read<'a>(config: &'a Config, (key, default, ..): Item, names: &[&str]) -> Result<(f64, Vec<Row<'a>>)> {
+    let Some(Value::Object(table)) = config.get(key) else { return Ok((config.number(key)?, Vec::new())) };
+    let everywhere = table.get(ALL).and_then(Value::as_f64).unwrap_or(default);
+    Ok((everywhere, rows(key, table, names)?))
 }
 
 fn rows<'a>(key: &str, table: &'a serde_json::Map<String, Value>, names: &[&str]) -> Result<Vec<Row<'a>>> {

@@ -59,6 +59,17 @@ fn rolled_back(steps: u32) -> Outcome<[u64; 2]> {
     Ok(ends)
 }
 
+/// Goes on in a new instance from the state that another one wrote as bytes.
+fn restarted(steps: u32) -> Outcome<u64> {
+    let (mut rig, mut wanderers) = begin(1);
+    go(&mut rig, &mut wanderers, steps / 2);
+    let bytes = rig.soil.serialize().map_err(|e| e.to_string())?;
+    let (mut other, _) = begin(1);
+    other.soil.deserialize(&bytes).map_err(|e| e.to_string())?;
+    other.return_to(&rig.moment());
+    Ok(go(&mut other, &mut wanderers, steps - steps / 2))
+}
+
 /// Prints the hash of the run on one thread: for a process with other settings.
 pub fn print(quick: bool) {
     println!("{:016x}", plain(1, STEPS[usize::from(!quick)]));
@@ -95,6 +106,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
             other(&rolled_back(steps)?),
             "runs rolled back and replayed, after 7 and after all steps,",
         ),
+        figure("restart", other(&[restarted(steps)?]), "new instances that go on from written bytes"),
         figure(
             "processor",
             other(&[in_other_process(context.quick)?]),

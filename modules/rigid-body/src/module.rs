@@ -14,7 +14,7 @@ use crate::model::{Kind, Model};
 use crate::objects;
 use crate::placement::{StartRates, at_rest, base_pose, clearance, coordinates, joint_rates, set_moving};
 use crate::robot::Robot;
-use crate::state::{ClosureState, ContactBook, JointState, Motion, State};
+use crate::state::{ClosureState, ContactBook, JointState, Load, Motion, State};
 use nalgebra::Isometry3;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -65,7 +65,7 @@ impl Module for RigidBody {
         file.warnings.iter().for_each(|w| host.log(LogLevel::Warning, w));
         file.notices.iter().for_each(|n| host.log(LogLevel::Info, n));
         let mut state = State {
-            forces: vec![V3::zeros(); bodies.len()],
+            loads: vec![Load::default(); bodies.len()],
             reactions: vec![[0.0; 6]; model.joints.len()],
             contact_normal: vec![0.0; bodies.len()],
             accelerations: vec![Acceleration::default(); bodies.len()],

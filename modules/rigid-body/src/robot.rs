@@ -226,12 +226,15 @@ impl Robot {
             e.electrical += s.actuator.book.electrical_power * h;
         }
         state.supply.advance(&draw, h);
-        for (b, force) in state.forces.iter().enumerate() {
-            let mut mean = V3::from_row_slice(&dynamics.solution[dynamics.kkt.body_at[b]..][..3]);
+        for (b, load) in state.loads.iter().enumerate() {
+            let at = dynamics.kkt.body_at[b];
+            let [mut way, mut turn] = [0, 3].map(|k| V3::from_row_slice(&dynamics.solution[at + k..][..3]));
             if !dynamics.integrator.is_second_order() {
-                mean -= 0.5 * V3::from_row_slice(&dynamics.kick(b)[..3]);
+                let kick = dynamics.kick(b);
+                way -= 0.5 * V3::from_row_slice(&kick[..3]);
+                turn -= 0.5 * V3::from_row_slice(&kick[3..]);
             }
-            state.energy.actuator_work += h * force.dot(&mean);
+            state.energy.actuator_work += h * (load.force.dot(&way) + load.moment.dot(&turn));
         }
         // Positions of the first-order scheme are half a step ahead of its rates.
         state.stagger = if dynamics.integrator.is_second_order() { 0.0 } else { 0.5 * h };

@@ -30,6 +30,15 @@ impl Motion {
     }
 }
 
+/// What pushes a body from outside, world axes.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub(crate) struct Load {
+    /// Force at the centre of mass, N.
+    pub force: V3,
+    /// Moment about it, N m.
+    pub moment: V3,
+}
+
 /// Settings, inputs and memory of a joint.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct JointState {
@@ -85,8 +94,8 @@ pub(crate) struct State {
     pub closures: Vec<ClosureState>,
     /// Rows that close loops and say nothing that the others do not say, at the last step.
     pub redundant_rows: usize,
-    /// External force at the centre of mass, N.
-    pub forces: Vec<V3>,
+    /// External force and moment of each body.
+    pub loads: Vec<Load>,
     /// What each joint exerts on its child in the last step: force at the anchor, moment about it, world axes, N and N m.
     pub reactions: Vec<[f64; 6]>,
     /// Normal force of all ports of a body, N.
@@ -113,7 +122,7 @@ impl State {
         self.joints.clone_from(&other.joints);
         self.closures.clone_from(&other.closures);
         self.redundant_rows = other.redundant_rows;
-        self.forces.clone_from(&other.forces);
+        self.loads.clone_from(&other.loads);
         self.contact_normal.clone_from(&other.contact_normal);
         self.reactions.clone_from(&other.reactions);
         self.accelerations.clone_from(&other.accelerations);

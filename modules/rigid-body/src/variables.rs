@@ -11,7 +11,7 @@ use crate::state::{JointState, State};
 use terraglue_subsystem::{Action, Causality, Effect, Error, Result, ValueType, Variable};
 
 /// Ids per body and per joint.
-const BODY_STRIDE: u32 = 16;
+const BODY_STRIDE: u32 = 32;
 const JOINT_STRIDE: u32 = 128;
 
 /// What an id means.
@@ -38,8 +38,9 @@ pub(crate) enum Meaning {
     },
 }
 
-/// Items of a body: 0–11 motion (of free bodies settable before the start), 12 contact force, 13–15 external force.
-const BODY_ITEMS: [(&str, &str, &str); 16] = [
+/// Items of a body: 0–11 motion (of free bodies settable before the start), 12 contact force, 13–15 external force, 16–18
+/// external moment, 19–21 where they act, 22–25 orientation.
+const BODY_ITEMS: [(&str, &str, &str); 26] = [
     ("x", "m", "Position of the body frame"),
     ("y", "m", "Position of the body frame"),
     ("z", "m", "Position of the body frame"),
@@ -56,6 +57,16 @@ const BODY_ITEMS: [(&str, &str, &str); 16] = [
     ("force_x", "N", "External force at the centre of mass, world axes"),
     ("force_y", "N", "External force at the centre of mass, world axes"),
     ("force_z", "N", "External force at the centre of mass, world axes"),
+    ("moment_x", "N m", "External moment about the centre of mass, world axes"),
+    ("moment_y", "N m", "External moment about the centre of mass, world axes"),
+    ("moment_z", "N m", "External moment about the centre of mass, world axes"),
+    ("force_at_x", "m", "Centre of mass, where the external force acts, axes of the body frame"),
+    ("force_at_y", "m", "Centre of mass, where the external force acts, axes of the body frame"),
+    ("force_at_z", "m", "Centre of mass, where the external force acts, axes of the body frame"),
+    ("qw", "", "Orientation of the body frame as a unit quaternion, world from body: real part"),
+    ("qx", "", "Orientation of the body frame as a unit quaternion, world from body: along x"),
+    ("qy", "", "Orientation of the body frame as a unit quaternion, world from body: along y"),
+    ("qz", "", "Orientation of the body frame as a unit quaternion, world from body: along z"),
 ];
 
 const ANGLE: u32 = 0;
@@ -159,7 +170,11 @@ pub(crate) fn describe(model: &Model, state: &State) -> Vec<Variable> {
     let mut all = Vec::new();
     for (b, body) in model.bodies.iter().enumerate() {
         for (item, (name, unit, help)) in BODY_ITEMS.iter().enumerate() {
-            let causality = if item < 13 { Causality::Output } else { Causality::Input };
+            let causality = match item {
+                13..19 => Causality::Input,
+                19..22 => Causality::Local,
+                _ => Causality::Output,
+            };
             let id = b as u32 * BODY_STRIDE + item as u32;
             let v = Variable::real(id, format!("{}.{name}", body.name), unit, causality, help);
             all.push(if item < 12 && initial::is_free(model, b) { at_the_start(v) } else { v });
@@ -340,7 +355,9 @@ pub(crate) fn meaning(model: &Model, id: u32) -> Result<Meaning> {
         return Ok(Meaning::RedundantRows);
     }
     if id < first {
-        return Ok(Meaning::Body { body: (id / BODY_STRIDE) as usize, item: id % BODY_STRIDE });
+        let (body, item) = ((id / BODY_STRIDE) as usize, id % BODY_STRIDE);
+        let known = (item as usize) < BODY_ITEMS.len();
+        return if known { Ok(Meaning::Body { body, item }) } else { Err(unknown()) };
     }
     let (joint, item) = (((id - first) / JOINT_STRIDE) as usize, (id - first) % JOINT_STRIDE);
     if joint >= model.joints.len() {
@@ -432,7 +449,10 @@ fn body_number(model: &Model, state: &State, body: usize, item: u32) -> f64 {
         6..9 => (m.v - m.w.cross(&(m.q * model.bodies[body].com)))[k],
         9..12 => m.w[k],
         12 => state.contact_normal[body],
-        _ => state.forces[body][item as usize - 13],
+        13..16 => state.loads[body].force[item as usize - 13],
+        16..19 => state.loads[body].moment[item as usize - 16],
+        19..22 => model.bodies[body].com[item as usize - 19],
+        _ => [m.q.w, m.q.i, m.q.j, m.q.k][item as usize - 22],
     }
 }
 
@@ -442,14 +462,24 @@ pub(crate) fn set_number(model: &Model, state: &mut State, id: u32, value: f64) 
         return Err(Error::Refused(format!("{value} is not a finite number")));
     }
     match meaning(model, id)? {
-        Meaning::Body { body, item: 13..16 } => {
-            state.forces[body][(id % BODY_STRIDE) as usize - 13] = value;
+        Meaning::Body { body, item: item @ 13..16 } => {
+            state.loads[body].force[item as usize - 13] = value;
+            Ok(())
+        }
+        Meaning::Body { body, item: item @ 16..19 } => {
+            state.loads[body].moment[item as usize - 16] = value;
             Ok(())
         }
         Meaning::Body { body, item: item @ 0..=11 } => {
             initial::set_body(model, state, body, item as usize, value)
         }
-        Meaning::Body { .. } => Err(Error::Refused("the force of contacts can be read only".into())),
+        Meaning::Body { item: 12, .. } => {
+            Err(Error::Refused("the force of contacts can be read only".into()))
+        }
+        Meaning::Body { .. } => Err(Error::Refused(
+            "the place of the centre of mass and the quaternion can be read only; before the first step roll, pitch and \
+             yaw can be set".into(),
+        )),
         Meaning::Share(_) => Err(Error::Refused("the share of a divided link can be read only".into())),
         Meaning::Robot(_) | Meaning::RedundantRows => {
             Err(Error::Refused("what the robot as a whole tells can be read only".into()))

@@ -40,8 +40,9 @@ impl Dynamics {
         let body = &self.model.bodies[b];
         let scale = self.integrator.force_weight() * self.h;
         let (end, real) = (&self.ends[b], &self.end_accelerations[b].real);
-        let force = body.mass * (self.model.gravity - V3::from_row_slice(&real[..3])) + self.forces[b];
-        let moment = -inertial_moment(&body.inertia, end, &V3::from_row_slice(&real[3..]));
+        let load = &self.loads[b];
+        let force = body.mass * (self.model.gravity - V3::from_row_slice(&real[..3])) + load.force;
+        let moment = load.moment - inertial_moment(&body.inertia, end, &V3::from_row_slice(&real[3..]));
         let at = self.kkt.body_at[b];
         for k in 0..3 {
             self.correction[at + k] += scale * force[k];
@@ -68,8 +69,9 @@ impl Dynamics {
             let m = &state.bodies[b];
             let r = m.q.to_rotation_matrix();
             self.inertia[b] = r * body.inertia * r.transpose();
-            let force = body.mass * self.model.gravity + state.forces[b];
-            let moment = -inertial_moment(&body.inertia, m, &V3::zeros());
+            let load = &state.loads[b];
+            let force = body.mass * self.model.gravity + load.force;
+            let moment = load.moment - inertial_moment(&body.inertia, m, &V3::zeros());
             let at = self.kkt.body_at[b];
             for k in 0..3 {
                 self.rhs[at + k] += force[k];

@@ -37,10 +37,11 @@ impl Dynamics {
     pub(super) fn equilibrium_midpoint(&mut self, b: usize) {
         let body = &self.model.bodies[b];
         let (start, end) = (&self.starts[b], &self.ends[b]);
-        let force = body.mass * self.model.gravity + self.forces[b];
+        let load = &self.loads[b];
+        let force = body.mass * self.model.gravity + load.force;
         let push = self.h * force - body.mass * (end.v - start.v);
         let spin = |m: &Motion| m.q * (body.inertia * m.q.inverse_transform_vector(&m.w));
-        let turn = spin(start) - spin(end);
+        let turn = self.h * load.moment + spin(start) - spin(end);
         let at = self.kkt.body_at[b];
         for k in 0..3 {
             self.correction[at + k] += 0.5 * push[k];

@@ -29,7 +29,7 @@ use crate::contact::bodies::{BodyContacts, Unsolved};
 use crate::drive::{Axis, MOST_YIELDING, Mode, Span, YIELDING};
 use crate::math::{M3, V3, cayley};
 use crate::model::{Joint, Kind, Model};
-use crate::state::{Motion, State};
+use crate::state::{Load, Motion, State};
 use anderson::Anderson;
 use carried::Carried;
 use closing::Closing;
@@ -98,7 +98,7 @@ pub(crate) struct Dynamics {
     pub start_accelerations: Vec<Acceleration>,
     pub end_accelerations: Vec<Acceleration>,
     angles: Vec<f64>,
-    forces: Vec<V3>,
+    loads: Vec<Load>,
     inertia: Vec<M3>,
     /// World rates of free rotation in the middle and at the end of the step.
     middle_rate: Vec<V3>,
@@ -163,7 +163,7 @@ impl Dynamics {
             start_accelerations: vec![Acceleration::default(); nb],
             end_accelerations: vec![Acceleration::default(); nb],
             angles: vec![0.0; nj],
-            forces: vec![V3::zeros(); nb],
+            loads: vec![Load::default(); nb],
             inertia: vec![M3::zeros(); nb],
             middle_rate: vec![V3::zeros(); nb],
             free_rate: vec![V3::zeros(); nb],
@@ -235,8 +235,9 @@ impl Dynamics {
             // Rates at the end are given in the axes of the turned body.
             self.middle_rate[b] = m.q * middle;
             self.free_rate[b] = cayley(&(h * self.middle_rate[b])) * (m.q * end);
-            let push = body.mass * m.v + h * (body.mass * self.model.gravity + state.forces[b]);
-            let spin = self.inertia[b] * self.free_rate[b];
+            let load = &state.loads[b];
+            let push = body.mass * m.v + h * (body.mass * self.model.gravity + load.force);
+            let spin = self.inertia[b] * self.free_rate[b] + h * load.moment;
             let at = self.kkt.body_at[b];
             self.base_rhs[at..at + 3].copy_from_slice(push.as_slice());
             self.base_rhs[at + 3..at + 6].copy_from_slice(spin.as_slice());

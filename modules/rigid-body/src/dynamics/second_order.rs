@@ -34,7 +34,7 @@ impl Dynamics {
         self.start_accelerations.clone_from(&state.accelerations);
         self.angles.clear();
         self.angles.extend(state.joints.iter().map(|j| j.angle));
-        self.forces.clone_from(&state.forces);
+        self.loads.clone_from(&state.loads);
         if !state.accelerated && self.integrator != Integrator::EnergyMomentum {
             self.external.fill(0.0);
             self.accelerate(state)?;

@@ -1,6 +1,6 @@
 //! The state as bytes, taken back by a robot of the same model only.
 
-use super::{ClosureState, ContactBook, JointState, Motion, State};
+use super::{ClosureState, ContactBook, JointState, Load, Motion, State};
 use crate::math::{Q, V3};
 use crate::model::Model;
 use nalgebra::{Quaternion, Unit};
@@ -8,7 +8,7 @@ use terraglue_subsystem::bytes::{self, Persist, hash};
 use terraglue_subsystem::{Result, persist};
 
 /// Version of the bytes.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 impl Persist for Motion {
     fn write(&self, out: &mut Vec<u8>) {
@@ -20,6 +20,16 @@ impl Persist for Motion {
         let [c, v, w] = <[[f64; 3]; 3]>::read(from)?.map(V3::from);
         let q: Q = Unit::new_unchecked(Quaternion::from(<[f64; 4]>::read(from)?));
         Ok(Self { c, q, v, w })
+    }
+}
+
+impl Persist for Load {
+    fn write(&self, out: &mut Vec<u8>) {
+        [self.force, self.moment].map(<[f64; 3]>::from).write(out);
+    }
+    fn read(from: &mut &[u8]) -> Result<Self> {
+        let [force, moment] = <[[f64; 3]; 2]>::read(from)?.map(V3::from);
+        Ok(Self { force, moment })
     }
 }
 
@@ -44,12 +54,11 @@ persist!(ContactBook { points, residual, lost, yielding });
 
 impl Persist for State {
     fn write(&self, out: &mut Vec<u8>) {
-        let Self {
-            bodies, joints, closures, redundant_rows, forces, contact_normal, energy, contact, ..
-        } = self;
+        let Self { bodies, joints, closures, redundant_rows, loads, contact_normal, energy, contact, .. } =
+            self;
         let Self { pressed, supply, start, stagger, reactions, accelerations, accelerated, .. } = self;
         (bodies.write(out), joints.write(out), closures.write(out), redundant_rows.write(out));
-        forces.iter().map(|f| (*f).into()).collect::<Vec<[f64; 3]>>().write(out);
+        loads.write(out);
         (contact_normal.write(out), energy.write(out), contact.write(out), pressed.write(out));
         (supply.write(out), start.map(<[f64; 3]>::from).write(out), stagger.write(out));
         (reactions.write(out), accelerations.write(out), accelerated.write(out));
@@ -60,7 +69,7 @@ impl Persist for State {
             joints: Persist::read(from)?,
             closures: Persist::read(from)?,
             redundant_rows: Persist::read(from)?,
-            forces: Vec::<[f64; 3]>::read(from)?.into_iter().map(V3::from).collect(),
+            loads: Persist::read(from)?,
             contact_normal: Persist::read(from)?,
             energy: Persist::read(from)?,
             contact: Persist::read(from)?,
@@ -91,7 +100,7 @@ impl State {
             (state.bodies.len(), self.bodies.len()),
             (state.joints.len(), self.joints.len()),
             (state.closures.len(), self.closures.len()),
-            (state.forces.len(), self.forces.len()),
+            (state.loads.len(), self.loads.len()),
             (state.reactions.len(), self.reactions.len()),
             (state.contact_normal.len(), self.contact_normal.len()),
         ];

@@ -12,6 +12,7 @@ pub mod host;
 pub mod observer;
 pub mod recording;
 pub mod reload;
+mod rotation;
 pub mod scaffold;
 pub mod scenario;
 pub mod signals;

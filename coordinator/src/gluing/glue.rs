@@ -5,6 +5,7 @@
 
 use super::side::End;
 use crate::contact::PortOwner;
+use crate::rotation::{IDENTITY, conjugate, minus, plus, product, turned};
 use terraglue_subsystem::{BodyState, Law, Port, PortKind};
 
 /// What one packed component is.
@@ -86,10 +87,9 @@ impl Glue {
             let state = end.map_or(BodyState::REST, |(slot, body)| states(slot, body));
             let pose = state.world_from_body;
             let place = recipe.at.unwrap_or(pose.position);
-            let d = [0, 1, 2].map(|k| place[k] - pose.position[k]);
-            let local = turn(conjugate(pose.orientation), d);
+            let local = turned(conjugate(pose.orientation), minus(place, pose.position));
             let (slot, body) = (end.map(|e| e.0), end.map_or(0, |e| e.1));
-            Terminal { slot, body, local, start: pose.orientation, place, turn: [1.0, 0.0, 0.0, 0.0] }
+            Terminal { slot, body, local, start: pose.orientation, place, turn: IDENTITY }
         };
         let kind = if recipe.contact { PortKind::Contact } else { PortKind::Joint };
         let port = Port {
@@ -188,15 +188,14 @@ impl Glue {
             for end in &mut joint.ends {
                 if let Some(slot) = end.slot {
                     let pose = states(slot, end.body).world_from_body;
-                    let arm = turn(pose.orientation, end.local);
-                    end.place = [0, 1, 2].map(|k| pose.position[k] + arm[k]);
+                    end.place = plus(pose.position, turned(pose.orientation, end.local));
                     end.turn = product(pose.orientation, conjugate(end.start));
                 }
             }
             if joint.turning {
                 let axes = joint.axes;
                 for k in 0..3 {
-                    let axis = turn(joint.ends[0].turn, [axes[3 * k], axes[3 * k + 1], axes[3 * k + 2]]);
+                    let axis = turned(joint.ends[0].turn, [axes[3 * k], axes[3 * k + 1], axes[3 * k + 2]]);
                     joint.port.frame[3 * k..][..3].copy_from_slice(&axis);
                 }
             }
@@ -274,24 +273,4 @@ impl Joint {
         let d = port.direction(component);
         (0..3).map(|k| (a.place[k] - b.place[k]) * d[k]).sum()
     }
-}
-
-/// q·p.
-fn product(q: [f64; 4], p: [f64; 4]) -> [f64; 4] {
-    [
-        q[0] * p[0] - q[1] * p[1] - q[2] * p[2] - q[3] * p[3],
-        q[0] * p[1] + q[1] * p[0] + q[2] * p[3] - q[3] * p[2],
-        q[0] * p[2] - q[1] * p[3] + q[2] * p[0] + q[3] * p[1],
-        q[0] * p[3] + q[1] * p[2] - q[2] * p[1] + q[3] * p[0],
-    ]
-}
-
-fn conjugate(q: [f64; 4]) -> [f64; 4] {
-    [q[0], -q[1], -q[2], -q[3]]
-}
-
-/// A vector turned by a unit quaternion.
-fn turn(q: [f64; 4], v: [f64; 3]) -> [f64; 3] {
-    let p = product(product(q, [0.0, v[0], v[1], v[2]]), conjugate(q));
-    [p[1], p[2], p[3]]
 }

@@ -1,10 +1,8 @@
 //! One foot on its way from a pose to the next, at constant velocity and angular velocity.
 
 use super::State;
+use crate::rotation::{Vector, conjugate, cross, minus, product, quaternion, rotation_vector, turned};
 use terraglue_subsystem::{BodyState, Pose};
-
-type Vector = [f64; 3];
-type Quaternion = [f64; 4];
 
 /// A foot.
 #[derive(Clone, Debug, PartialEq)]
@@ -66,7 +64,7 @@ impl Foot {
         let share = self.share(h);
         let turn = self.turn().map(|x| x * share);
         let arm = minus(point, self.now.position);
-        let swung = minus(rotated(quaternion(turn), arm), arm);
+        let swung = minus(turned(quaternion(turn), arm), arm);
         let (a, b) = (self.now.position, self.target.position);
         [std::array::from_fn(|k| share * (b[k] - a[k]) + swung[k]), turn]
     }
@@ -141,57 +139,6 @@ impl State {
         let feet = feet.as_chunks::<21>().0.iter().map(Foot::from_numbers).collect();
         Some(Self { feet, duration_s: head[0], jump: head[1] != 0.0 })
     }
-}
-
-fn minus(a: Vector, b: Vector) -> Vector {
-    std::array::from_fn(|k| a[k] - b[k])
-}
-
-fn cross(a: Vector, b: Vector) -> Vector {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
-}
-
-fn conjugate([w, x, y, z]: Quaternion) -> Quaternion {
-    [w, -x, -y, -z]
-}
-
-fn product([aw, ax, ay, az]: Quaternion, [bw, bx, by, bz]: Quaternion) -> Quaternion {
-    [
-        aw * bw - ax * bx - ay * by - az * bz,
-        aw * bx + ax * bw + ay * bz - az * by,
-        aw * by - ax * bz + ay * bw + az * bx,
-        aw * bz + ax * by - ay * bx + az * bw,
-    ]
-}
-
-fn rotated(q: Quaternion, v: Vector) -> Vector {
-    let [_, x, y, z] = product(product(q, [0.0, v[0], v[1], v[2]]), conjugate(q));
-    [x, y, z]
-}
-
-fn length(v: Vector) -> f64 {
-    v.iter().map(|x| x * x).sum::<f64>().sqrt()
-}
-
-/// Unit quaternion of a rotation vector, rad.
-fn quaternion(turn: Vector) -> Quaternion {
-    let angle = length(turn);
-    if angle == 0.0 {
-        return Pose::IDENTITY.orientation;
-    }
-    let s = libm::sin(0.5 * angle) / angle;
-    [libm::cos(0.5 * angle), s * turn[0], s * turn[1], s * turn[2]]
-}
-
-/// Rotation vector of a unit quaternion, the short way round, rad.
-fn rotation_vector([w, x, y, z]: Quaternion) -> Vector {
-    let flip = if w < 0.0 { -1.0 } else { 1.0 };
-    let s = length([x, y, z]);
-    if s == 0.0 {
-        return [0.0; 3];
-    }
-    let factor = flip * 2.0 * libm::atan2(s, flip * w) / s;
-    [factor * x, factor * y, factor * z]
 }
 
 #[cfg(test)]

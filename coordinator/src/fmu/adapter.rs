@@ -1,6 +1,6 @@
 //! A unit as a subsystem: trials by its saved states, values by name, every error with what the unit said.
 
-use super::bodies::{Axis, Bodies};
+use super::bodies::{Axis, Bodies, terminals};
 use super::clocks;
 use super::map::{self, Place};
 use super::rollback;
@@ -355,14 +355,6 @@ impl FmuSubsystem {
         }
         Ok(true)
     }
-}
-
-/// Terminals with the names of their members and of the variables behind them.
-fn terminals(description: &terraglue_fmi::ModelDescription) -> Vec<(String, Vec<(String, String)>)> {
-    let names = |t: &terraglue_fmi::description::Terminal| {
-        t.members.iter().map(|(name, k)| (name.clone(), description.variables[*k].name.clone())).collect()
-    };
-    description.terminals.iter().map(|t| (t.name.clone(), names(t))).collect()
 }
 
 /// Whether an output at the start may depend on an input of the same time.

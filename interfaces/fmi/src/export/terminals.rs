@@ -7,10 +7,34 @@ use super::Layout;
 use super::xml::Xml;
 use crate::description::Version;
 
-/// Members of a body: place, orientation (z-y-x Euler angles), velocities, and the force on its centre of mass.
-const BODY: [&str; 15] = [
-    "x", "y", "z", "roll", "pitch", "yaw", "vx", "vy", "vz", "wx", "wy", "wz", "force_x", "force_y",
+/// Members of a body: place, orientation (z-y-x Euler angles, unit quaternion), velocities, and the force at a point of the
+/// body and the moment about it.
+const BODY: [&str; 25] = [
+    "x",
+    "y",
+    "z",
+    "roll",
+    "pitch",
+    "yaw",
+    "qw",
+    "qx",
+    "qy",
+    "qz",
+    "vx",
+    "vy",
+    "vz",
+    "wx",
+    "wy",
+    "wz",
+    "force_x",
+    "force_y",
     "force_z",
+    "moment_x",
+    "moment_y",
+    "moment_z",
+    "force_at_x",
+    "force_at_y",
+    "force_at_z",
 ];
 /// Members of feet.
 const FEET: [&str; 4] = ["position", "orientation", "force", "moment"];
@@ -76,14 +100,22 @@ mod tests {
 
     #[test]
     fn bodies_and_feet_are_terminals_and_nothing_else_is() {
-        let names = ["gait.speed", "robot.leg.x", "robot.leg.y", "robot.leg.z", "robot.leg.force_x", "map.x"];
+        let names = [
+            "gait.speed",
+            "robot.leg.x",
+            "robot.leg.y",
+            "robot.leg.z",
+            "robot.leg.force_x",
+            "robot.leg.qw",
+            "map.x",
+        ];
         let feet = ["foot.position", "foot.force"];
         let real = |(k, name): (usize, &&str)| Variable::real(k as u32, *name, "m", Causality::Output, "");
         let variables: Vec<Variable> = names.iter().chain(&feet).enumerate().map(real).collect();
         let layout = Layout::new(Version::V3, false, &variables);
         let found = groups(&layout);
         let wanted = vec![
-            ("robot.leg", "org.terraglue.body", vec!["x", "y", "z", "force_x"]),
+            ("robot.leg", "org.terraglue.body", vec!["x", "y", "z", "qw", "force_x"]),
             ("foot", "org.terraglue.feet", vec!["position", "force"]),
         ];
         assert_eq!(found, wanted);

@@ -1,10 +1,11 @@
-//! Figures of functional mock-up units: glued pairs, loops at the start, cycles of life, cost, the reference units.
+//! Figures of functional mock-up units: glued pairs, bodies that turn, loops at the start, cycles of life, cost, the reference units.
 
 mod cost;
 mod cycles;
 mod loops;
 mod pair;
 mod reference;
+mod turning;
 pub(super) mod units;
 
 use super::{Context, Part};
@@ -15,8 +16,9 @@ use terraglue::scenario::Scenario;
 use terraglue::testbed::Options;
 
 /// The parts, in the order of the table.
-pub const PARTS: [Part; 5] = [
+pub const PARTS: [Part; 6] = [
     ("pair", |context| pair::figures(&folder(context)?, !context.quick)),
+    ("turning", |context| turning::figures(&folder(context)?)),
     ("loops", |context| loops::figures(&folder(context)?)),
     ("cycles", |context| cycles::figures(&folder(context)?, context.quick)),
     ("reference", reference::figures),

@@ -147,8 +147,10 @@ impl<Place: Fn(u32) -> Option<Axis>> Lookup<'_, Place> {
             return Ok(out);
         }
         let has: Vec<&str> = members.iter().map(|(m, _)| m.as_str()).collect();
-        let text =
-            format!("terminal `{name}` has no position or no force; its members are {}", has.join(", "));
+        let text = format!(
+            "terminal `{name}` has neither position and force nor orientation and moment; its members are {}",
+            has.join(", ")
+        );
         Err(wrong(body, &text))
     }
 

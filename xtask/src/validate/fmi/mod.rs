@@ -1,10 +1,12 @@
-//! Figures of functional mock-up units: glued pairs, loops at the start, cycles of life, cost, the reference units.
+//! Figures of functional mock-up units: glued pairs, loops at the start, cycles of life, cost, the reference units, those of other tools.
 
 mod cost;
 mod cycles;
+mod folder;
 mod loops;
 mod pair;
 mod reference;
+mod third_party;
 pub(super) mod units;
 
 use super::{Context, Part};
@@ -15,16 +17,17 @@ use terraglue::scenario::Scenario;
 use terraglue::testbed::Options;
 
 /// The parts, in the order of the table.
-pub const PARTS: [Part; 5] = [
-    ("pair", |context| pair::figures(&folder(context)?, !context.quick)),
-    ("loops", |context| loops::figures(&folder(context)?)),
-    ("cycles", |context| cycles::figures(&folder(context)?, context.quick)),
+pub const PARTS: [Part; 6] = [
+    ("pair", |context| pair::figures(&workplace(context)?, !context.quick)),
+    ("loops", |context| loops::figures(&workplace(context)?)),
+    ("cycles", |context| cycles::figures(&workplace(context)?, context.quick)),
     ("reference", reference::figures),
-    ("cost", |context| cost::figures(&folder(context)?, context)),
+    ("third-party", |context| third_party::figures(&workplace(context)?, context)),
+    ("cost", |context| cost::figures(&workplace(context)?, context)),
 ];
 
 /// Where the units are made.
-fn folder(context: &Context) -> Outcome<PathBuf> {
+fn workplace(context: &Context) -> Outcome<PathBuf> {
     let folder = context.scratch.join("fmi");
     std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     Ok(folder)

@@ -115,13 +115,15 @@ impl Wheel {
         range: std::ops::Range<usize>,
     ) -> Option<Shift> {
         let share = rolling.peak_share(self.memory.slip);
+        let used = || range.clone().filter(|k| nodes.area[*k] > 0.0).map(|k| (k, self.angle(nodes.arm[k])));
+        // Nodes near the bottom may carry nothing: what the wheel has left there is not the soil ahead.
+        let front = used().filter(|(k, _)| nodes.stamp[*k] != 0).fold(0.0_f64, |front, (_, a)| front.max(a));
         let (mut bottom, mut sum, mut count) = (0.0_f64, 0.0, 0.0);
-        for k in range.filter(|k| nodes.area[*k] > 0.0) {
-            let angle = self.angle(nodes.arm[k]);
+        for (k, angle) in used() {
             if nodes.depth[k] > nodes.permanent[k] {
                 bottom = bottom.max(nodes.depth[k] + self.radius * (1.0 - libm::cos(angle)));
             }
-            if nodes.stamp[k] == 0 && angle > 0.0 {
+            if nodes.stamp[k] == 0 && angle > front {
                 sum += nodes.permanent[k];
                 count += 1.0;
             }
@@ -250,6 +252,7 @@ mod tests {
         nodes.depth.push(0.01 - arm[0]);
         nodes.permanent.push(0.0);
         nodes.area.push(1e-4);
+        nodes.stamp.push(0);
         let press = [1.0, -slope[0], -slope[1]];
         let stretch = (1.0 + slope[0] * slope[0] + slope[1] * slope[1]).sqrt();
         nodes.facing.push(Facing { press, along: [[0.0; 3]; 2], stretch });
@@ -282,6 +285,23 @@ mod tests {
         }
         assert_eq!(find(&flat), None);
         assert_eq!(find(&round), None);
+    }
+
+    #[test]
+    fn what_a_wheel_has_left_is_not_the_soil_ahead() {
+        let mut nodes = wheel(0.0, 0.0);
+        let found = Wheel { memory: recall(&[], 1), ..find(&nodes).expect("a wheel") };
+        let rolling = Rolling { peak: Some([0.4, 0.15]), ..Rolling::default() };
+        for k in 0..nodes.arm.len() {
+            let along = nodes.arm[k][1];
+            // loaded in front of the peak; behind it all is pressed down, next to the bottom nothing is loaded
+            nodes.stamp[k] = u64::from(along > 0.015 && nodes.depth[k] > 0.0);
+            nodes.permanent[k] = if along < 0.015 { 0.01 } else { 0.0 };
+        }
+        let shift = found.shift(&rolling, &nodes, 0..nodes.arm.len()).expect("a shifted peak");
+        assert_eq!(shift.before, 0.0);
+        let entry = libm::acos(1.0 - 0.01 / RADIUS);
+        assert!((shift.entry - entry).abs() < 0.01 * entry, "{shift:?}");
     }
 
     #[test]

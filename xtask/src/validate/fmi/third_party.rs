@@ -35,7 +35,8 @@ enum Fate {
     Equal,
     Different(String),
     OnlyHere,
-    Neither,
+    /// Why not here.
+    Neither(String),
     /// FMPy simulates it; it is refused here with what in it breaks the standard.
     Refused(String),
     /// FMPy simulates it; here it does not run.
@@ -73,7 +74,7 @@ pub fn figures(place: &Path, context: &Context) -> Outcome<Vec<Figure>> {
         let fate = std::fs::create_dir_all(&own)
             .map_err(|e| e.to_string())
             .and_then(|()| fate(&own, (context, &python), unit, steps))
-            .unwrap_or_else(|why| Fate::Failed(why));
+            .unwrap_or_else(Fate::Failed);
         drop(std::fs::remove_dir_all(&own));
         (folder::stem(unit), fate)
     };
@@ -128,7 +129,7 @@ fn counted(fates: &[(String, Fate)]) -> Vec<Figure> {
             (*f == Fate::OnlyHere).then_some("")
         }),
         figure("neither", Limit::None, "run neither here nor in FMPy", |f| {
-            (*f == Fate::Neither).then_some("")
+            if let Fate::Neither(why) = f { Some(why) } else { None }
         }),
         figure(
             "refused",
@@ -175,7 +176,7 @@ fn fate(place: &Path, (context, python): (&Context, &Path), unit: &Path, steps: 
             Some(why) => Fate::Different(why),
         },
         (true, None) => Fate::OnlyHere,
-        (false, None) => Fate::Neither,
+        (false, None) => Fate::Neither(complaint),
         (false, Some(row)) => match breach(unit, &complaint, row) {
             Some(why) => Fate::Refused(why),
             None => Fate::Failed(complaint),

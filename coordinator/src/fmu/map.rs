@@ -64,17 +64,7 @@ pub fn variables(description: &ModelDescription, event_mode: bool) -> (Vec<Varia
 
 /// `name`, or `name[i,j]` from 1 for an element of an array.
 pub fn element_name(v: &fmi::Variable, element: usize) -> String {
-    if v.sizes.is_empty() {
-        return v.name.clone();
-    }
-    let mut rest = element;
-    let mut index = vec![0; v.sizes.len()];
-    for (k, size) in v.sizes.iter().enumerate().rev() {
-        index[k] = rest % *size as usize + 1;
-        rest /= *size as usize;
-    }
-    let index: Vec<String> = index.iter().map(usize::to_string).collect();
-    format!("{}[{}]", v.name, index.join(","))
+    terraglue_subsystem::element_name(&v.name, &v.sizes, element)
 }
 
 fn effect(v: &fmi::Variable) -> Effect {

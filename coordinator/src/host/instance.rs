@@ -1,6 +1,7 @@
 //! An instance under supervision: answers are checked, failures get name, function and time.
 
 use super::check;
+use super::elements::Elements;
 use crate::error::{Error, Result};
 use std::cell::Cell;
 use std::time::{Duration, Instant as Clock};
@@ -39,6 +40,8 @@ pub struct Instance {
     watched: bool,
     cost: Duration,
     kind: Kind,
+    /// Only where there are arrays.
+    elements: Option<Box<Elements>>,
     about: Box<About>,
 }
 
@@ -62,6 +65,7 @@ impl Instance {
         Self {
             about: Box::new(about),
             kind,
+            elements: Elements::of(subsystem.variables()),
             subsystem,
             time_s: Cell::new(0.0),
             dead: Cell::new(false),
@@ -380,21 +384,36 @@ impl Instance {
         self.outcome("deserialize", result)
     }
 
-    /// All variables.
+    /// All variables; an array is shown as its elements.
     pub fn variables(&self) -> &[Variable] {
-        self.subsystem.variables()
+        self.elements.as_ref().map_or_else(|| self.subsystem.variables(), |e| &e.variables)
+    }
+
+    /// Numbers of the elements of an array among [`Instance::variables`]; that of a scalar itself.
+    pub(crate) fn elements_of(&self, id: u32) -> Vec<u32> {
+        let elements: Vec<u32> = self.elements.iter().flat_map(|e| e.of_array(id)).collect();
+        if elements.is_empty() { vec![id] } else { elements }
+    }
+
+    /// Committed values as they are.
+    #[inline]
+    pub(crate) fn peek(&self, ids: &[u32], out: ValuesMut) -> terraglue_subsystem::Result {
+        match &self.elements {
+            None => self.subsystem.get(ids, out),
+            Some(elements) => elements.get(self.subsystem.as_ref(), ids, out),
+        }
     }
 
     /// Committed values. Numbers that are not finite are an error.
     #[inline]
     pub fn get(&self, ids: &[u32], out: ValuesMut) -> Result {
         self.alive("get")?;
-        let ValuesMut::F64(values) = out else { return self.outcome("get", self.subsystem.get(ids, out)) };
+        let ValuesMut::F64(values) = out else { return self.outcome("get", self.peek(ids, out)) };
         match &mut *values {
             [value] => *value = f64::NAN,
             all => all.fill(f64::NAN),
         }
-        if let Err(failure) = self.subsystem.get(ids, ValuesMut::F64(values)) {
+        if let Err(failure) = self.peek(ids, ValuesMut::F64(values)) {
             return Err(self.failed("get", failure));
         }
         match values.iter().position(|v| v.is_nan()) {
@@ -411,7 +430,8 @@ impl Instance {
     fn nan_variable(&self, ids: &[u32], element: usize) -> String {
         let mut first = 0;
         for id in ids {
-            let Some(variable) = self.variables().iter().find(|v| v.id == *id) else { break };
+            let mut all = self.variables().iter().chain(self.subsystem.variables());
+            let Some(variable) = all.find(|v| v.id == *id) else { break };
             first += variable.len();
             if element < first {
                 return format!("the variable `{}` is NaN", variable.name);
@@ -424,7 +444,10 @@ impl Instance {
     #[inline]
     pub fn set(&mut self, ids: &[u32], values: Values) -> Result<Reply> {
         self.alive("set")?;
-        let result = self.subsystem.set(ids, values);
+        let result = match &self.elements {
+            None => self.subsystem.set(ids, values),
+            Some(elements) => elements.set(self.subsystem.as_mut(), ids, values),
+        };
         self.reply("set", result)
     }
 
@@ -432,6 +455,10 @@ impl Instance {
     pub fn derivative(&self, unknowns: &[u32], known: u32, out: &mut [f64]) -> Result<bool> {
         const NAME: &str = "directional_derivative";
         self.alive(NAME)?;
+        let mut of_element = unknowns.iter().chain([&known]);
+        if self.elements.as_ref().is_some_and(|e| of_element.any(|id| e.has(*id))) {
+            return Ok(false);
+        }
         out.fill(f64::NAN);
         match self.subsystem.directional_derivative(unknowns, &[known], &[1.0], out) {
             Err(Failure::Unsupported) => Ok(false),

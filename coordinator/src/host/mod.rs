@@ -7,6 +7,7 @@
 mod allocations;
 mod check;
 mod description;
+mod elements;
 mod elf;
 mod error;
 pub mod exit_guard;

@@ -6,7 +6,7 @@
 //! |---|---|
 //! | `recording.mcap` | everything simulated, in the schemas that robotics viewers read; equal bytes for equal runs |
 //! | `summary.json` | the figures of the run ([`Summary`]) |
-//! | `variables.csv` | on request: all scalar variables in one table |
+//! | `variables.csv` | on request: all variables in one table, arrays by their elements |
 //! | `timing.csv` | what a clock measured, apart from everything else |
 //! | `exchange.json` | how values went round: order, connections with their delays, loops |
 //! | `final_ground.asc` | the ground at the end as ESRI ASCII grid |
@@ -15,7 +15,7 @@
 //!
 //! | topic | schema | what |
 //! |---|---|---|
-//! | `/<subsystem>` | its own, with units | `t` and all scalar variables by name; `null` where one has no bound |
+//! | `/<subsystem>` | its own, with units | `t` and all variables by name, arrays by their elements; `null` where one has no bound |
 //! | `/tf` | `foxglove.FrameTransforms` | pose of every body, frame `subsystem/body` in `world` |
 //! | `/scene` | `foxglove.SceneUpdate` | shapes, once, locked to the frames |
 //! | `/ground` | `foxglove.Grid` | `height` and `sinkage` as f32: all at the start and the end, in between what changed |

@@ -1,4 +1,4 @@
-//! The scalar variables of all subsystems, read once per recorded step for every writer that wants them.
+//! The scalar variables of all subsystems and the elements of arrays, read once per recorded step for every writer that wants them.
 
 use crate::error::{Error, Result};
 use crate::observer::{SubsystemView, View};
@@ -117,7 +117,7 @@ impl Scalars {
             Self { name: view.name.into(), columns: Vec::new(), values: Vec::new(), batches: Vec::new() };
         let mut by_type: Vec<(ValueType, Vec<u32>, Vec<usize>)> = Vec::new();
         for variable in view.instance.variables() {
-            if !variable.dims.is_empty() || room(variable.value_type, 0).is_none() {
+            if room(variable.value_type, 0).is_none() {
                 continue;
             }
             let place = by_type.iter().position(|b| b.0 == variable.value_type).unwrap_or_else(|| {
@@ -125,19 +125,22 @@ impl Scalars {
                 by_type.len() - 1
             });
             by_type[place].1.push(variable.id);
-            by_type[place].2.push(scalars.columns.len());
-            scalars.columns.push(Column {
-                name: variable.name.clone(),
-                key: format!("{}:", serde_json::Value::from(variable.name.as_str())).into_bytes(),
-                unit: variable.unit.clone(),
-                help: variable.help.clone(),
-                kind: kind(variable),
-            });
+            for element in 0..variable.len() {
+                by_type[place].2.push(scalars.columns.len());
+                let name = variable.element_name(element);
+                scalars.columns.push(Column {
+                    key: format!("{}:", serde_json::Value::from(name.as_str())).into_bytes(),
+                    name,
+                    unit: variable.unit.clone(),
+                    help: variable.help.clone(),
+                    kind: kind(variable),
+                });
+            }
         }
         scalars.values = vec![0.0; scalars.columns.len()];
         scalars.batches = by_type
             .into_iter()
-            .filter_map(|(t, ids, columns)| Some(Batch { room: room(t, ids.len())?, ids, columns }))
+            .filter_map(|(t, ids, columns)| Some(Batch { room: room(t, columns.len())?, ids, columns }))
             .collect();
         scalars
     }

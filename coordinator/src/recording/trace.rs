@@ -50,8 +50,8 @@ impl Trace {
                 return Err(wrong(format!("cannot record `{name}`: there is no such variable{hint}")));
             };
             let variable = found.describe(testbed.instances());
-            if variable.value_type != ValueType::F64 || variable.len() != 1 {
-                return Err(wrong(format!("cannot record `{name}`: it is no single f64")));
+            if variable.value_type != ValueType::F64 {
+                return Err(wrong(format!("cannot record `{name}`: it is no f64")));
             }
             match reads.last_mut().filter(|r| r.slot == found.slot()) {
                 Some(read) => read.ids.push(variable.id),

@@ -283,7 +283,7 @@ fn report() -> Table {
 fn connect() -> Table {
     let text = |name, help| Parameter::of(name, ParameterType::Text, help);
     let keys = vec![
-        text("from", "`subsystem.variable`; each `*` matches within one dotted part").into(),
+        text("from", "`subsystem.variable`, an array or an element of one (`feet.position[2,1]`); each `*` matches within one dotted part").into(),
         text("to", "the same; its `*` take what matched in `from`").into(),
         number("factor", "", 1.0, "to = factor · from + offset, after the conversion of units").into(),
         number("offset", "", 0.0, "see `factor`").into(),

@@ -25,7 +25,7 @@ impl Directory {
     pub fn new(instances: &[Instance]) -> Self {
         let mut directory = Self::default();
         for (slot, instance) in instances.iter().enumerate() {
-            for (variable, v) in instance.subsystem().variables().iter().enumerate() {
+            for (variable, v) in instance.variables().iter().enumerate() {
                 directory.names.push(format!("{}.{}", instance.name(), v.name));
                 directory.refs.push(VariableRef { slot, variable });
             }
@@ -63,18 +63,18 @@ impl VariableRef {
 
     /// Description.
     pub fn describe(self, instances: &[Instance]) -> &Variable {
-        &instances[self.slot].subsystem().variables()[self.variable]
+        &instances[self.slot].variables()[self.variable]
     }
 
     /// Committed value of a scalar number, boolean or enumeration as f64.
     pub fn number(self, instances: &[Instance]) -> Result<f64> {
-        let subsystem = instances[self.slot].subsystem();
-        let v = &subsystem.variables()[self.variable];
+        let instance = &instances[self.slot];
+        let v = &instance.variables()[self.variable];
         let ids = [v.id];
         macro_rules! read {
             ($variant:ident, $t:ty, $convert:expr) => {{
                 let mut out = [<$t>::default()];
-                subsystem.get(&ids, ValuesMut::$variant(&mut out))?;
+                instance.peek(&ids, ValuesMut::$variant(&mut out))?;
                 Ok($convert(out[0]))
             }};
         }

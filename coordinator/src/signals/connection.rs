@@ -233,9 +233,6 @@ fn check(
     (to_name, to): (&str, VariableRef),
 ) -> std::result::Result<(f64, f64), String> {
     let (a, b) = (from.describe(instances), to.describe(instances));
-    if a.len() != 1 || b.len() != 1 {
-        return Err(format!("`{from_name}` → `{to_name}`: arrays of a module cannot be connected"));
-    }
     let mapped = !connection.map.is_empty();
     if mapped && !(table::takes(a.value_type) && table::takes(b.value_type)) {
         return Err(format!(

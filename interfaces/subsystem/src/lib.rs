@@ -53,4 +53,4 @@ pub use scene::{BodyState, Geometry, Pose, Scene, SceneBody, SceneShape};
 pub use schema::{Kind, Parameter, ParameterType, Schema};
 pub use subsystem::{Module, Subsystem};
 pub use trial::{Batch, Estimate, Hold, Input, Level, Motion, Response, Step, flag};
-pub use variable::{Action, Causality, Effect, ValueType, Values, ValuesMut, Variable};
+pub use variable::{Action, Causality, Effect, ValueType, Values, ValuesMut, Variable, element_name};

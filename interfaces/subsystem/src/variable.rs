@@ -27,6 +27,21 @@ pub struct Variable {
     pub enumeration: Vec<String>,
 }
 
+/// `name[i,j]`, counted from 1, for an element of an array of these sizes, counted row by row from 0; `name` without sizes.
+pub fn element_name(name: &str, sizes: &[u32], element: usize) -> String {
+    if sizes.is_empty() {
+        return name.to_owned();
+    }
+    let mut rest = element;
+    let mut index: Vec<String> = Vec::with_capacity(sizes.len());
+    for size in sizes.iter().rev().map(|size| (*size).max(1) as usize) {
+        index.push((rest % size + 1).to_string());
+        rest /= size;
+    }
+    index.reverse();
+    format!("{name}[{}]", index.join(","))
+}
+
 impl Variable {
     /// A scalar f64 of the given role; refine it with struct update syntax.
     pub fn real(id: u32, name: impl Into<String>, unit: &str, causality: Causality, help: &str) -> Self {
@@ -71,6 +86,11 @@ impl Variable {
     /// Number of elements.
     pub fn len(&self) -> usize {
         self.dims.iter().map(|d| *d as usize).product()
+    }
+
+    /// Name of an element, counted row by row from 0: `name[i,j]` with i and j from 1; of a scalar its own.
+    pub fn element_name(&self, element: usize) -> String {
+        element_name(&self.name, &self.dims, element)
     }
 
     /// Whether an array dimension is zero.

@@ -59,7 +59,7 @@ fn variables(lab: &Lab) -> Verdict {
     let instance = lab.instance()?;
     let mut names: Vec<&str> = Vec::new();
     let mut last = None;
-    for v in instance.variables() {
+    for v in instance.subsystem().variables() {
         let wrong = |got: String, expected: &str| {
             Err(Stop::fail("variables", format!("variable `{}`", v.name), got, expected))
         };
@@ -93,10 +93,11 @@ fn described_truly(lab: &Lab) -> Verdict {
     if !section.is_whole() {
         let kind = lab.kind().map_or_else(String::new, |k| format!("kind={k:?}").to_lowercase());
         let can = format!("can={}", words(instance.capabilities()).join(" "));
-        let variables = instance.variables().iter().map(|v| format!("variable={}", variable_line(v)));
+        let variables =
+            instance.subsystem().variables().iter().map(|v| format!("variable={}", variable_line(v)));
         return Err(not_told(&[kind, can].into_iter().chain(variables).collect::<Vec<_>>()));
     }
-    match section.contradiction(instance.capabilities(), instance.variables()) {
+    match section.contradiction(instance.capabilities(), instance.subsystem().variables()) {
         None => Ok(()),
         Some((said, does)) => {
             Err(Stop::fail("capabilities, variables", "the section .terraglue", said, does))
@@ -130,7 +131,7 @@ fn readable(lab: &Lab) -> Verdict {
 
 fn wrong_reference(lab: &Lab) -> Verdict {
     let mut instance = lab.instance()?;
-    let unknown = instance.variables().iter().map(|v| v.id).max().map_or(0, |id| id + 1000);
+    let unknown = instance.subsystem().variables().iter().map(|v| v.id).max().map_or(0, |id| id + 1000);
     let mut room = [0.0];
     let read = instance.get(&[unknown], ValuesMut::F64(&mut room));
     if read.is_ok() {

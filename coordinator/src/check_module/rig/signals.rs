@@ -6,7 +6,8 @@ use terraglue_subsystem::{Causality, Effect, ValueType, Values, ValuesMut, Varia
 
 /// Variables that are doubles.
 pub fn numbers(instance: &Instance) -> Vec<Variable> {
-    let doubles = instance.variables().iter().filter(|v| v.value_type == ValueType::F64 && !v.is_empty());
+    let doubles =
+        instance.subsystem().variables().iter().filter(|v| v.value_type == ValueType::F64 && !v.is_empty());
     doubles.cloned().collect()
 }
 

@@ -91,12 +91,12 @@ fn variables(testbed: &Testbed, bare: Option<&str>, feet: &[usize]) -> (Vec<Vari
     for (slot, instance) in testbed.instances().iter().enumerate() {
         let own =
             |v: &&Variable| feet.contains(&slot) && [feet::id::DURATION, feet::id::JUMP].contains(&v.id);
-        for v in instance.variables().iter().filter(|v| !own(v)) {
+        for v in instance.subsystem().variables().iter().filter(|v| !own(v)) {
             let mut shown = Variable { id: all.len() as u32, ..v.clone() };
             if bare != Some(instance.name()) {
                 shown.name = format!("{}.{}", instance.name(), v.name);
             }
-            if testbed.is_fed(slot, v.id) {
+            if instance.elements_of(v.id).iter().any(|id| testbed.is_fed(slot, *id)) {
                 (shown.causality, shown.effect) = (Causality::Local, Effect::ReadOnly);
             }
             all.push(shown);

@@ -35,8 +35,7 @@ impl Layout {
                 continue;
             }
             for element in 0..v.len() {
-                let name = format!("{}[{}]", v.name, index(&v.dims, element));
-                entries.push(Entry { name, variable: k, element: Some(element) });
+                entries.push(Entry { name: v.element_name(element), variable: k, element: Some(element) });
             }
         }
         Self { version, entries }
@@ -52,17 +51,6 @@ impl Layout {
         let out = |v: &&Variable| !has_type(self.version, v.value_type);
         variables.iter().filter(out).map(|v| v.name.as_str())
     }
-}
-
-/// `2,1`: an element counted from 1 in each dimension, the last one fastest.
-fn index(dims: &[u32], element: usize) -> String {
-    let mut rest = element;
-    let mut parts = vec![String::new(); dims.len()];
-    for (part, size) in parts.iter_mut().zip(dims).rev() {
-        *part = (rest % *size as usize + 1).to_string();
-        rest /= *size as usize;
-    }
-    parts.join(",")
 }
 
 fn has_type(version: Version, value_type: ValueType) -> bool {

@@ -101,6 +101,89 @@ def test_a_unit_that_fails_stops_the_run_and_is_named(decay, tmp_path, mode, say
     assert len(rows) >= 4, "the recording up to the failure is readable"
 
 
+@pytest.mark.parametrize("value", ["NAN", "-INFINITY"])
+def test_a_single_precision_output_that_is_no_number_stops_the_run(tmp_path, value):
+    get = """int fmi3GetFloat32(Unit *u, const unsigned *r, size_t k, float *x, size_t m) {
+        for (size_t i = 0; i < m; i++) x[i] = u->v[1][0] > 0.3 ? %s : 1.5f; return 0; }""" % value
+    unit = cfmu.build_3(tmp_path, "single", [("x", "output", "", ())], "v[1][0] += h;", more=get)
+    with zipfile.ZipFile(unit) as archive:
+        entries = {name: archive.read(name) for name in archive.namelist()}
+    entries["modelDescription.xml"] = entries["modelDescription.xml"].replace(
+        b'<Float64 name="x" valueReference="1" causality="output"></Float64>',
+        b'<Float32 name="x" valueReference="1" causality="output"/>',
+    )
+    assert b"Float32" in entries["modelDescription.xml"]
+    with zipfile.ZipFile(unit, "w") as archive:
+        for name, content in entries.items():
+            archive.writestr(name, content)
+    scenario = tmp_path / "single.toml"
+    scenario.write_text('[time]\nstep_s = 0.125\nduration_s = 1.0\n[recording]\nevery_steps = 1\n[single]\nfmu = "single.fmu"\n')
+    for done in (
+        terraglue("fmu", "run", unit, "--stop", "1", "--step", "0.125"),
+        terraglue("run", scenario, "--out", tmp_path / "out", "--quiet"),
+    ):
+        assert done.returncode == 1, done.stderr
+        assert f"`x` is {'NaN' if value == 'NAN' else '-inf'}" in done.stderr, done.stderr
+
+
+def test_a_library_whose_name_is_no_identifier_of_c_runs_with_a_warning(tmp_path):
+    unit = cfmu.build(tmp_path, "tank", [("x", "output", 0, "")], "r[0] += h;")
+    with zipfile.ZipFile(unit) as archive:
+        text = archive.read("modelDescription.xml").decode()
+        library = archive.read("binaries/linux64/m.so")
+    with zipfile.ZipFile(unit, "w") as archive:
+        archive.writestr("modelDescription.xml", text.replace('modelIdentifier="m"', 'modelIdentifier="tank-c"'))
+        archive.writestr("binaries/linux64/tank-c.so", library)
+    scenario = tmp_path / "tank.toml"
+    scenario.write_text('[time]\nstep_s = 0.25\nduration_s = 1.0\n[tank]\nfmu = "tank.fmu"\n')
+    runs = [
+        terraglue("fmu", "run", unit, "--stop", "1", "--step", "0.25"),
+        terraglue("run", scenario, "--out", tmp_path / "out", "--quiet"),
+    ]
+    for done in runs:
+        assert done.returncode == 0, done.stderr
+        assert 'modelIdentifier = "tank-c" is no identifier of C' in done.stderr
+    assert runs[0].stdout.splitlines()[-1] == "1,1"
+    assert "is no identifier of C" in terraglue("fmu", "check", unit).stdout
+
+
+def both_ways(unit, tmp_path, more=""):
+    """A unit of FMI 3.0 run alone and as a subsystem, 1 s in steps of 0.25 s; the end of x of each where it got there."""
+    scenario = tmp_path / "both.toml"
+    scenario.write_text(
+        f'[time]\nstep_s = 0.25\nduration_s = 1.0\n[recording]\nevery_steps = 1\n[unit]\nfmu = "{unit}"\n{more}\n'
+    )
+    alone = terraglue("fmu", "run", unit, "--stop", "1", "--step", "0.25")
+    inside = terraglue("run", scenario, "--out", tmp_path / "out", "--csv", "--quiet")
+    rows = list(csv.DictReader((tmp_path / "out" / "variables.csv").open()))
+    return alone, inside, (alone.stdout.splitlines() or [""])[-1], float(rows[-1]["unit.x"])
+
+
+@pytest.mark.parametrize(("macros", "step"), [(["SILENT"], ""), ([], "*last = NAN;"), (["SILENT"], "*early = true;")])
+def test_a_step_counts_as_made_where_the_unit_does_not_say_how_far_it_came(tmp_path, macros, step):
+    """A value that it does write is looked at, and a step that it leaves early needs one."""
+    unit = cfmu.build_3(tmp_path, "silent", [("x", "output", "", ())], f"v[1][0] += h; {step}", macros=macros)
+    alone, inside, last, end = both_ways(unit, tmp_path)
+    if step:
+        assert (alone.returncode, inside.returncode) == (1, 1)
+        assert "came to t = NaN s" in alone.stderr and "came to t = NaN s" in inside.stderr
+        return
+    assert (alone.returncode, inside.returncode) == (0, 0), alone.stderr + inside.stderr
+    assert (last, end) == ("1,1", 1.0)
+    for done in (alone, inside):
+        assert done.stderr.count("does not say how far it came (lastSuccessfulTime)") == 1, done.stderr
+
+
+def test_a_unit_that_saves_nothing_runs_without_its_state(tmp_path):
+    unit = cfmu.build_3(tmp_path, "forgetful", [("x", "output", "", ())], "v[1][0] += h;", macros=["SAVES_NOTHING"])
+    alone, inside, last, _ = both_ways(unit, tmp_path)
+    assert (alone.returncode, last) == (0, "1,1"), alone.stderr
+    assert alone.stderr.count("saved nothing") == 1
+    assert inside.returncode == 1 and "`rollback = false`" in inside.stderr, inside.stderr
+    _, inside, _, end = both_ways(unit, tmp_path, "rollback = false")
+    assert (inside.returncode, end) == (0, 1.0), inside.stderr
+
+
 def test_a_discarded_step_is_halved(decay):
     done = terraglue("fmu", "run", decay, "--stop", "1", "--step", "0.125", "--start", "mode=4")
     assert done.returncode == 0, done.stderr

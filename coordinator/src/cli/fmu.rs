@@ -30,6 +30,9 @@ fn input(message: impl ToString) -> Error {
 
 fn run(arguments: &FmuRunArguments) -> Result<Exit> {
     let fmu = Fmu::open(&arguments.unit).map_err(input)?;
+    for problem in &fmu.description().problems {
+        log::warn!(target: "terraglue::fmu", "{problem}");
+    }
     let settings = Settings {
         start: arguments.start.clone(),
         start_time: arguments.start_time,

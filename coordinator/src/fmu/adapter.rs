@@ -256,7 +256,7 @@ impl FmuSubsystem {
         } else {
             self.bodies.forget_trials();
             if self.can_go_back {
-                self.slave.save(&mut self.before).map_err(error)?;
+                self.slave.save(&mut self.before).map_err(unsaved)?;
             }
         }
         self.open = true;
@@ -313,17 +313,17 @@ impl FmuSubsystem {
     }
 
     #[inline]
-    fn check_numbers(&self, ids: &[u32], values: &[f64]) -> Result {
-        match values.iter().position(|v| !v.is_finite()) {
+    fn check_numbers<T: Copy + Into<f64>>(&self, ids: &[u32], values: &[T]) -> Result {
+        match values.iter().position(|v| !(*v).into().is_finite()) {
             None => Ok(()),
-            Some(k) => self.not_finite(ids, values, k),
+            Some(k) => self.not_finite(ids, values[k].into(), k),
         }
     }
 
     #[cold]
-    fn not_finite(&self, ids: &[u32], values: &[f64], k: usize) -> Result {
+    fn not_finite(&self, ids: &[u32], value: f64, k: usize) -> Result {
         let name = ids.get(k).and_then(|id| self.variables.get(*id as usize)).map_or("?", |v| &v.name);
-        let text = format!("the variable `{name}` is {}", values[k]);
+        let text = format!("the variable `{name}` is {value}");
         match self.on_nan {
             OnNan::Stop => Err(Error::Failed(format!("{text}; on_nan = \"warn\" lets the run go on"))),
             OnNan::Warn => {
@@ -374,6 +374,17 @@ fn error(error: FmiError) -> Error {
         FmiError::Call { fatal: true, .. } => Error::Fatal(error.to_string()),
         FmiError::Call { .. } => Error::Failed(error.to_string()),
         other => Error::Refused(other.to_string()),
+    }
+}
+
+/// The same where the state before a step could not be saved.
+#[cold]
+fn unsaved(why: FmiError) -> Error {
+    match why {
+        FmiError::Refused(text) => {
+            Error::Refused(format!("{text}; `rollback = false` in its table does without"))
+        }
+        other => error(other),
     }
 }
 
@@ -535,6 +546,10 @@ impl FmuSubsystem {
                     self.slave.get_f64(&references, out).map_err(error)?;
                     self.check_numbers(ids, out)
                 }
+                ValuesMut::F32(out) => {
+                    self.slave.get(&references, ValuesMut::F32(&mut *out)).map_err(error)?;
+                    self.check_numbers(ids, out)
+                }
                 ValuesMut::Enumeration(out) => {
                     self.slave.get(&references, ValuesMut::Enumeration(out)).map_err(error)?;
                     for (id, value) in ids.iter().zip(out) {
@@ -563,7 +578,10 @@ impl FmuSubsystem {
                 let done: Result = elements!(F64, out, 0.0);
                 done.and_then(|()| self.check_numbers(ids, out))
             }
-            ValuesMut::F32(out) => elements!(F32, out, 0.0),
+            ValuesMut::F32(out) => {
+                let done: Result = elements!(F32, out, 0.0);
+                done.and_then(|()| self.check_numbers(ids, out))
+            }
             ValuesMut::I8(out) => elements!(I8, out, 0),
             ValuesMut::I16(out) => elements!(I16, out, 0),
             ValuesMut::I32(out) => elements!(I32, out, 0),

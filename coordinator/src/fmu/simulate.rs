@@ -92,7 +92,7 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
     }
     row(&marked(header(&columns), 0))?;
     row(&marked(line(&slave, start, &columns)?, 0))?;
-    let mut state = SlaveState::default();
+    let mut before = Before { state: SlaveState::default(), saves: description.capabilities.state };
     let mut ended = None;
     let outcome = (0..steps as u64).try_for_each(|k| {
         if ended.is_some() {
@@ -103,29 +103,50 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         inputs::set_all(&mut slave, &inputs, &settings.input, t).map_err(at)?;
         slave.forget_ticks();
         let events;
-        (ended, events) = halving(&mut slave, &mut state, (t, end), &mut tables.intermediate).map_err(at)?;
+        (ended, events) = halving(&mut slave, &mut before, (t, end), &mut tables.intermediate).map_err(at)?;
         let now = ended.unwrap_or(end);
         row(&marked(line(&slave, now, &columns).map_err(|e| named(e, now))?, events))
     });
-    drop(slave.release(&mut state));
+    drop(slave.release(&mut before.state));
     outcome?;
     slave.terminate()?;
     Ok(ended)
+}
+
+/// The state before a step.
+struct Before {
+    state: SlaveState,
+    /// Whether the unit can save it.
+    saves: bool,
+}
+
+impl Before {
+    /// Saves it, where that is possible: it is needed for steps that the unit discards only.
+    fn save(&mut self, slave: &Slave) -> Result {
+        match slave.save(&mut self.state) {
+            Err(Error::Refused(why)) => {
+                slave.note(&format!("{why}; a step that it discards cannot be halved"));
+                self.saves = false;
+                Ok(())
+            }
+            other => other,
+        }
+    }
 }
 
 /// A step, in halves where the unit discards it and can go back. Answers when the unit asked for the end, and how many
 /// events there were.
 fn halving(
     slave: &mut Slave,
-    state: &mut SlaveState,
+    before: &mut Before,
     (start, end): (f64, f64),
     between: &mut Option<Line>,
 ) -> Result<(Option<f64>, u32)> {
-    let c = slave.description().capabilities;
+    let variable_step = slave.description().capabilities.variable_step;
     let (mut t, mut h, mut halvings, mut events) = (start, end - start, 0, 0);
     while end - t > 1e-9 * (end - start) {
-        if c.state {
-            slave.save(state)?;
+        if before.saves {
+            before.save(slave)?;
         }
         let made = slave.do_step(Advance { t, h: h.min(end - t), for_good: true });
         if let (Ok(_), Some(write)) = (&made, &mut *between) {
@@ -143,8 +164,8 @@ fn halving(
                 events += done.events;
                 t = if h >= end - t { end } else { t + h };
             }
-            Err(Error::Discard { .. }) if c.state && c.variable_step && halvings < 10 => {
-                slave.restore(state)?;
+            Err(Error::Discard { .. }) if before.saves && variable_step && halvings < 10 => {
+                slave.restore(&before.state)?;
                 (h, halvings) = (0.5 * h, halvings + 1);
             }
             Err(error) => return Err(error),
@@ -246,16 +267,19 @@ fn read(slave: &Slave, v: &Variable) -> Result<Vec<String>> {
             Ok(out.iter().map($show).collect())
         }};
     }
-    match v.value_type {
-        ValueType::F64 => {
-            let mut out = vec![f64::NAN; v.len()];
-            slave.get_f64(&[v.reference], &mut out)?;
+    macro_rules! numbers {
+        ($variant:ident, $zero:expr) => {{
+            let mut out = vec![$zero; v.len()];
+            slave.get(&[v.reference], ValuesMut::$variant(&mut out))?;
             if let Some(wrong) = out.iter().find(|x| !x.is_finite()) {
                 return Err(Error::Refused(format!("the variable `{}` is {wrong}", v.name)));
             }
-            Ok(out.iter().map(f64::to_string).collect())
-        }
-        ValueType::F32 => values!(F32, 0.0, |x: &f32| x.to_string()),
+            Ok(out.iter().map(ToString::to_string).collect())
+        }};
+    }
+    match v.value_type {
+        ValueType::F64 => numbers!(F64, f64::NAN),
+        ValueType::F32 => numbers!(F32, f32::NAN),
         ValueType::I8 => values!(I8, 0, |x: &i8| x.to_string()),
         ValueType::I16 => values!(I16, 0, |x: &i16| x.to_string()),
         ValueType::I32 => values!(I32, 0, |x: &i32| x.to_string()),

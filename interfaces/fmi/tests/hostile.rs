@@ -213,6 +213,13 @@ fn descriptions_that_break_the_standard_are_refused_with_their_line() {
     let cases = [
         (with(r#"modelIdentifier="m""#, r#"modelIdentifier="$(touch evil)""#), "no identifier of C"),
         (with(r#"modelIdentifier="m""#, r#"modelIdentifier="../../lib/evil""#), "no identifier of C"),
+        (with(r#"modelIdentifier="m""#, r#"modelIdentifier="..""#), "no identifier of C"),
+        (with(r#"modelIdentifier="m""#, r#"modelIdentifier=".m""#), "no identifier of C"),
+        (with(r#"modelIdentifier="m""#, r#"modelIdentifier="-m""#), "no identifier of C"),
+        (with(r#"modelIdentifier="m""#, r#"modelIdentifier="m\m""#), "no identifier of C"),
+        (with(r#"modelIdentifier="m""#, r#"modelIdentifier="a;b""#), "no identifier of C"),
+        (with(r#"modelIdentifier="m""#, r#"modelIdentifier="a b""#), "no identifier of C"),
+        (with(r#"modelIdentifier="m""#, r#"modelIdentifier="""#), "no identifier of C"),
         (with(r#"valueReference="0""#, r#"valueReference="-1""#), "4294967295"),
         (with(r#"valueReference="0""#, r#"valueReference="18446744073709551616""#), "4294967295"),
         (with(variable, &format!("{variable}{variable}")), "occurs twice"),
@@ -313,6 +320,19 @@ fn odd_but_legal_units_are_read() {
         ("resources/", b"", 0o040_755),
     ];
     Fmu::open(&place.write(&archive(&folders))).expect("entries of folders are legal");
+}
+
+#[test]
+fn a_plain_file_name_as_identifier_is_taken_with_a_warning() {
+    for name in ["tank-c", "2tank", "tank.v1", "Tank-Standalone.2"] {
+        let place = Place::new();
+        let text = GOOD.replace(r#"modelIdentifier="m""#, &format!(r#"modelIdentifier="{name}""#));
+        let fmu = Fmu::open(&place.write(&unit(&text))).unwrap_or_else(|e| panic!("{e}"));
+        let description = fmu.description();
+        assert_eq!(description.identifier, name);
+        let told = description.problems.iter().any(|p| p.contains(name) && p.contains("no identifier of C"));
+        assert!(told, "{:?}", description.problems);
+    }
 }
 
 #[test]

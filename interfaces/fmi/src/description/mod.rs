@@ -54,7 +54,7 @@ fn read_root(root: &Element) -> Result<ModelDescription> {
         Version::V3 => root.required("instantiationToken")?,
     };
     let co_simulation = co_simulation(root)?;
-    let (identifier, capabilities) = capabilities(&co_simulation, version)?;
+    let (identifier, odd) = identifier(&co_simulation)?;
     let mut description = ModelDescription {
         version,
         model_name: root.required("modelName")?.to_owned(),
@@ -63,7 +63,8 @@ fn read_root(root: &Element) -> Result<ModelDescription> {
         author: root.text("author").to_owned(),
         generation_tool: root.text("generationTool").to_owned(),
         identifier,
-        capabilities,
+        capabilities: capabilities(&co_simulation, version)?,
+        problems: odd.into_iter().collect(),
         model_exchange: root.child("ModelExchange").is_some(),
         scheduled_execution: root.child("ScheduledExecution").is_some(),
         experiment: experiment(root)?,
@@ -99,15 +100,22 @@ fn co_simulation<'a>(root: &Element<'a>) -> Result<Element<'a>> {
     }))
 }
 
-fn capabilities(element: &Element, version: Version) -> Result<(String, Capabilities)> {
-    let identifier = element.required("modelIdentifier")?;
-    if !is_identifier(identifier) {
-        let message = format!("modelIdentifier = \"{}\" is no identifier of C", printable(identifier));
-        return Err(element.error(message));
+/// The name of the library, and what is odd about it. The standards want an identifier of C, as prefix of functions in source
+/// code; a shared library has it in its file name only, so that a plain name breaks the standard and nothing else.
+fn identifier(element: &Element) -> Result<(String, Option<String>)> {
+    let text = element.required("modelIdentifier")?;
+    let odd = format!("modelIdentifier = \"{}\" is no identifier of C", printable(text));
+    match (is_identifier(text), is_plain_name(text)) {
+        (true, _) => Ok((text.to_owned(), None)),
+        (false, true) => Ok((text.to_owned(), Some(format!("line {}: {odd}", element.line())))),
+        (false, false) => Err(element.error(odd + ", nor a name of letters, digits, `_`, `-` and `.`")),
     }
+}
+
+fn capabilities(element: &Element, version: Version) -> Result<Capabilities> {
     let flag = |name| element.flag(name);
     let own = |v2, v3| element.flag(if version == Version::V2 { v2 } else { v3 });
-    let capabilities = Capabilities {
+    Ok(Capabilities {
         state: own("canGetAndSetFMUstate", "canGetAndSetFMUState")?,
         serialize: own("canSerializeFMUstate", "canSerializeFMUState")?,
         directional_derivatives: own("providesDirectionalDerivative", "providesDirectionalDerivatives")?,
@@ -121,8 +129,7 @@ fn capabilities(element: &Element, version: Version) -> Result<(String, Capabili
         intermediate_update: flag("providesIntermediateUpdate")?,
         return_early: flag("canReturnEarlyAfterIntermediateUpdate")?,
         interpolates_inputs: flag("canInterpolateInputs")?,
-    };
-    Ok((identifier.to_owned(), capabilities))
+    })
 }
 
 fn experiment(root: &Element) -> Result<Experiment> {
@@ -139,6 +146,12 @@ fn is_identifier(text: &str) -> bool {
     let mut characters = text.chars();
     let first = characters.next().is_some_and(|c| c.is_ascii_alphabetic() || c == '_');
     first && text.len() <= 200 && characters.all(|c| c.is_ascii_alphanumeric() || c == '_')
+}
+
+/// Whether it can be part of the name of a file and of nothing else: no path, no option, no text for a shell.
+fn is_plain_name(text: &str) -> bool {
+    let first = text.starts_with(|c: char| c.is_ascii_alphanumeric() || c == '_');
+    first && text.len() <= 200 && text.chars().all(|c| c.is_ascii_alphanumeric() || "_-.".contains(c))
 }
 
 /// Foreign text for a message: short and without control characters.

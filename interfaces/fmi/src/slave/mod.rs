@@ -90,6 +90,8 @@ pub struct Slave {
     warnings: Cell<u64>,
     /// Whether it was said that its clock runs ahead.
     ran_past: Cell<bool>,
+    /// Whether it was said that it does not tell how far it came.
+    untold: Cell<bool>,
     _callbacks: Option<Box<Callbacks2>>,
     loaded: Arc<Loaded>,
     fmu: Arc<Fmu>,
@@ -184,6 +186,7 @@ impl Slave {
             shown,
             warnings: Cell::new(0),
             ran_past: Cell::new(false),
+            untold: Cell::new(false),
             log,
             _callbacks: callbacks,
             loaded,
@@ -194,6 +197,11 @@ impl Slave {
     /// The unit.
     pub fn fmu(&self) -> &Arc<Fmu> {
         &self.fmu
+    }
+
+    /// A warning of the host's about the unit, among the lines that it logs.
+    pub fn note(&self, text: &str) {
+        self.log.note(text);
     }
 
     /// What the unit says of itself, with the array sizes of this instance.

@@ -37,6 +37,9 @@ impl Slave {
     }
 
     /// Saves the state; the memory of an earlier one in `state` is used again.
+    ///
+    /// # Errors
+    /// [`Error::Refused`] where the unit cannot; it is unharmed then and goes on.
     pub fn save(&self, state: &mut SlaveState) -> Result {
         self.can(self.description.capabilities.state, "to save its state")?;
         let place = &raw mut state.handle;
@@ -48,7 +51,10 @@ impl Slave {
             }
         }
         if state.handle.is_null() {
-            return Err(self.lied("getFMUState", "saved nothing (its state is NULL)".into()));
+            return Err(Error::Refused(
+                "getFMUState saved nothing (its state is NULL), although the description says that it can"
+                    .into(),
+            ));
         }
         self.schedule(&mut state.schedule);
         Ok(())

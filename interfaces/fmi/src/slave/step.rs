@@ -13,6 +13,8 @@ const LAST_SUCCESSFUL_TIME: c_int = 2;
 const TERMINATED: c_int = 3;
 /// How far past the end of a step a unit may say it is, as a share of the step: some round to a grid of their own.
 const PAST: f64 = 1e-3;
+/// What stands in `lastSuccessfulTime` before a step, a NaN of its own: does the unit write there at all?
+const UNTOLD: f64 = f64::from_bits(0x7ff8_756e_746f_6c64);
 /// Rounds of discrete updates at one time before a unit is taken to loop for ever.
 const ROUNDS: u32 = 1000;
 /// Early returns in one step before a unit is taken to go on for ever.
@@ -116,7 +118,7 @@ impl Slave {
         loop {
             let tick = self.clocks.next(t, end);
             let stop = if end - tick > tolerance { tick } else { end };
-            let (mut event, mut terminate, mut early, mut last) = (false, false, false, f64::NAN);
+            let (mut event, mut terminate, mut early, mut last) = (false, false, false, UNTOLD);
             // a step that is repeated goes back to where its first part began
             let for_good = step.for_good && (t <= step.t || !self.description.capabilities.state);
             if self.updates {
@@ -136,6 +138,9 @@ impl Slave {
             }
             if let Some(outcome) = wrong {
                 return Err(self.lied(NAME, outcome));
+            }
+            if last.to_bits() == UNTOLD.to_bits() && !early && !terminate {
+                last = self.untold(stop);
             }
             let past = last > stop + tolerance && last - stop <= PAST * step.h;
             if past && !self.ran_past.replace(true) {
@@ -180,6 +185,15 @@ impl Slave {
             }
             t = if at_stop { stop } else { last };
         }
+    }
+
+    /// Where a unit is that said its step is made and not how far it came.
+    #[cold]
+    fn untold(&self, stop: f64) -> f64 {
+        if !self.untold.replace(true) {
+            self.log.note("fmi3DoStep does not say how far it came (lastSuccessfulTime), which breaks the standard; its steps count as made");
+        }
+        stop
     }
 
     /// Updates discrete states at t until nothing changes and no clock ticks; whether the unit asks for the end.

@@ -1,10 +1,13 @@
-//! Figures of functional mock-up units: glued pairs, bodies that turn, loops at the start, cycles of life, cost, the reference units.
+//! Figures of functional mock-up units: glued pairs, bodies that turn, loops at the start, cycles of life, cost, the reference
+//! units, those of other tools.
 
 mod cost;
 mod cycles;
+mod folder;
 mod loops;
 mod pair;
 mod reference;
+mod third_party;
 mod turning;
 pub(super) mod units;
 
@@ -16,17 +19,18 @@ use terraglue::scenario::Scenario;
 use terraglue::testbed::Options;
 
 /// The parts, in the order of the table.
-pub const PARTS: [Part; 6] = [
-    ("pair", |context| pair::figures(&folder(context)?, !context.quick)),
-    ("turning", |context| turning::figures(&folder(context)?)),
-    ("loops", |context| loops::figures(&folder(context)?)),
-    ("cycles", |context| cycles::figures(&folder(context)?, context.quick)),
+pub const PARTS: [Part; 7] = [
+    ("pair", |context| pair::figures(&workplace(context)?, !context.quick)),
+    ("turning", |context| turning::figures(&workplace(context)?)),
+    ("loops", |context| loops::figures(&workplace(context)?)),
+    ("cycles", |context| cycles::figures(&workplace(context)?, context.quick)),
     ("reference", reference::figures),
-    ("cost", |context| cost::figures(&folder(context)?, context)),
+    ("third-party", |context| third_party::figures(&workplace(context)?, context)),
+    ("cost", |context| cost::figures(&workplace(context)?, context)),
 ];
 
 /// Where the units are made.
-fn folder(context: &Context) -> Outcome<PathBuf> {
+fn workplace(context: &Context) -> Outcome<PathBuf> {
     let folder = context.scratch.join("fmi");
     std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
     Ok(folder)

@@ -4,40 +4,31 @@
 //! The table of Feedthrough was made without its inputs; with them every whole number, truth value and text must come out as it
 //! went in. Roberts has no table of its own: it is held against the solution in the literature.
 
+use super::folder;
 use crate::process::{Outcome, command};
 use crate::validate::{Context, Figure, Limit};
-use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
 /// Largest difference of a real, as a share of its range.
 const SHARE: f64 = 1e-3;
 
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
-    let Some(folder) = std::env::var_os("TERRAGLUE_FMU_DIR") else {
-        return Ok(vec![Figure::skipped("fmi.reference", "TERRAGLUE_FMU_DIR is not set")]);
+    let Some(units) = folder::units() else {
+        return Ok(vec![Figure::skipped("fmi.reference", folder::NOT_SET)]);
     };
-    let mut files = Vec::new();
-    collect(Path::new(&folder), &mut files);
-    files.sort();
-    let stem = |p: &Path| p.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default();
-    let is = |p: &Path, e: &str| p.extension().is_some_and(|x| x == e);
-    let tables: BTreeMap<String, PathBuf> = files
-        .iter()
-        .filter(|p| is(p, "csv"))
-        .filter_map(|p| Some((stem(p).strip_suffix("_out")?.to_owned(), p.clone())))
-        .collect();
-    let units = files.iter().filter(|p| is(p, "fmu"));
+    if units.reference.is_empty() {
+        return Ok(vec![Figure::skipped("fmi.reference", "TERRAGLUE_FMU_DIR holds no reference units")]);
+    }
     let figure = |(number, unit): (usize, &PathBuf)| {
-        let name = stem(unit);
+        let name = folder::stem(unit);
         let id = format!("fmi.reference.{number}.{name}");
-        match tables.get(&name) {
+        match units.tables.get(&name) {
             None if name == "Clocks" => refused(id, unit),
-            _ if name == "Roberts" => judged(id, roberts(context, unit)),
-            None => Figure::skipped(id, format!("{}: there is no {name}_out.csv", unit.display())),
-            Some(table) => judged(id, worst(context, unit, table)),
+            Some(table) if name != "Roberts" => judged(id, worst(context, unit, table)),
+            _ => judged(id, roberts(context, unit)),
         }
     };
-    Ok(units.enumerate().map(figure).collect())
+    Ok(units.reference.iter().enumerate().map(figure).collect())
 }
 
 fn judged(id: String, share: Outcome<f64>) -> Figure {
@@ -79,13 +70,6 @@ fn refused(id: String, unit: &Path) -> Figure {
     let named = said.contains("`Clocks` is made for scheduled execution");
     let what = "refused by name as made for scheduled execution (1: yes)";
     Figure::new(id, f64::from(u8::from(named)), Limit::Equal(1.0), what)
-}
-
-fn collect(folder: &Path, files: &mut Vec<PathBuf>) {
-    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
-        let path = entry.path();
-        if path.is_dir() { collect(&path, files) } else { files.push(path) }
-    }
 }
 
 type Table = (Vec<String>, Vec<Vec<String>>);

@@ -1,0 +1,75 @@
+//! The units in `TERRAGLUE_FMU_DIR`, in any subfolder: the Modelica Reference FMUs with their tables `NAME_out.csv`, and those of
+//! other tools.
+
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// Why there is no figure.
+pub const NOT_SET: &str = "TERRAGLUE_FMU_DIR is not set";
+
+/// Reference units that have no table of their own.
+const WITHOUT_TABLE: [&str; 2] = ["Clocks", "Roberts"];
+
+/// What lies in the folder, in the order of the paths.
+pub struct Units {
+    /// Reference units.
+    pub reference: Vec<PathBuf>,
+    /// Tables of the reference units by name.
+    pub tables: BTreeMap<String, PathBuf>,
+    /// All other units.
+    pub third_party: Vec<PathBuf>,
+}
+
+/// The units of the folder, where it is set.
+pub fn units() -> Option<Units> {
+    std::env::var_os("TERRAGLUE_FMU_DIR").map(|folder| below(Path::new(&folder)))
+}
+
+fn below(folder: &Path) -> Units {
+    let mut files = Vec::new();
+    collect(folder, &mut files);
+    files.sort();
+    let is = |p: &Path, e: &str| p.extension().is_some_and(|x| x == e);
+    let tables: BTreeMap<String, PathBuf> = files
+        .iter()
+        .filter(|p| is(p, "csv"))
+        .filter_map(|p| Some((stem(p).strip_suffix("_out")?.to_owned(), p.clone())))
+        .collect();
+    let known = |p: &PathBuf| tables.contains_key(&stem(p)) || WITHOUT_TABLE.contains(&stem(p).as_str());
+    let all = files.into_iter().filter(|p| is(p, "fmu"));
+    let (reference, third_party) = all.partition(known);
+    Units { reference, tables, third_party }
+}
+
+/// Name of a file without its extension.
+pub fn stem(path: &Path) -> String {
+    path.file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+fn collect(folder: &Path, files: &mut Vec<PathBuf>) {
+    for entry in std::fs::read_dir(folder).into_iter().flatten().flatten() {
+        let path = entry.path();
+        if path.is_dir() { collect(&path, files) } else { files.push(path) }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn units_with_a_table_are_reference_units() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let names = ["a/Stair.fmu", "tables/Stair_out.csv", "Clocks.fmu", "b/pump.fmu", "b/readme.md"];
+        for name in names {
+            crate::process::write(&folder.path().join(name), "").expect("a file");
+        }
+        let units = below(folder.path());
+        let stems = |all: &[PathBuf]| all.iter().map(|p| stem(p)).collect::<Vec<_>>();
+        assert_eq!(
+            (stems(&units.reference), stems(&units.third_party)),
+            (vec!["Clocks".into(), "Stair".into()], vec!["pump".into()])
+        );
+        assert!(units.tables["Stair"].ends_with("tables/Stair_out.csv"));
+    }
+}

@@ -23,7 +23,7 @@ use terraglue_fmi::{Error, Fmu};
 
 const SCRIPT: &str = "xtask/src/validate/fmi/third_party.py";
 /// Longest run of a unit, s.
-const PATIENCE: u64 = 60;
+const PATIENCE: u64 = 300;
 /// Largest difference of two numbers, relative to the larger of 1 and their size.
 const ACCURACY: f64 = 1e-9;
 
@@ -215,7 +215,8 @@ fn watched(run: &mut Command, place: &Path) -> Outcome<(bool, String, String)> {
     let read =
         |path: &Path| std::fs::read(path).map(|b| String::from_utf8_lossy(&b).into_owned()).map_err(wrong);
     let said = read(&complaint)?;
-    let error = said.lines().rev().find_map(|line| line.strip_prefix("error: "));
+    let last = || said.lines().map(str::trim).rfind(|line| !line.is_empty());
+    let error = said.lines().rev().find_map(|line| line.strip_prefix("error: ")).or_else(last);
     Ok((done, read(&table)?, error.unwrap_or("it ended without a word").to_owned()))
 }
 

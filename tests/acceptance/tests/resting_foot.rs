@@ -41,6 +41,42 @@ fn both_strategies_on_both_soils() {
     }
 }
 
+/// A driven foot goes 1 cm into the soil within 0.1 s and stands there.
+#[test]
+fn a_driven_foot_that_stands_keeps_its_force() {
+    let forces = ["cooperative", "iterative"].map(|strategy| {
+        let text = format!(
+            "event = [{{ at_s = 0.0, set = {{ \"feet.position[1,3]\" = 0.02 }} }}]
+[time]
+step_s = 0.001
+duration_s = 1.0
+[terrain]
+kind = \"flat\"
+size_m = [1.0, 1.0]
+spacing_m = 0.01
+[gluing]
+strategy = \"{strategy}\"
+[soil]
+module = \"soil-bekker\"
+parameters = \"LETE_sand\"
+[feet]
+module = \"feet\"
+position_m = [0.0, 0.0, 0.035]
+duration_s = 0.1
+"
+        );
+        let mut testbed = build(&scenario(&text)).unwrap_or_else(|e| panic!("{e}"));
+        let mut told = || {
+            steps(&mut testbed, 150);
+            testbed.read("feet.force[1,3]").expect("a force")
+        };
+        let [early, late] = [told(), told()];
+        assert_eq!(early, late, "{strategy}");
+        early
+    });
+    assert!(forces[0] > 100.0 && (forces[0] / forces[1] - 1.0).abs() < 1e-9, "{forces:?}");
+}
+
 #[test]
 fn columns_hold_the_foot_to_a_picometre() {
     for strategy in ["cooperative", "iterative"] {

@@ -96,12 +96,9 @@ impl Subsystem for DrivenFeet {
         self.move_ports(step, out.x_free, None);
         out.g.fill(0.0);
         out.t_star.fill(0.0);
-        for (port, active) in step.ports.iter().zip(out.active.iter_mut()) {
-            let n = port.first as usize;
-            *active = u8::from(out.x_free[n] < partner.x[n]);
-            if *active == 0 {
-                continue;
-            }
+        // nothing but the soil's law bounds the force on what goes, or stands, where it is told
+        out.active.fill(1);
+        for port in step.ports {
             for (i, c) in port.components() {
                 let against = partner.x[i] - out.x_free[i];
                 out.t_star[i] = if c == 0 { UNSTOPPABLE_N } else { UNSTOPPABLE_N * sign(against) };

@@ -25,7 +25,9 @@ fn replace(page: &str, name: &str, table: &str) -> Outcome {
 
 fn table(figures: &[Figure]) -> String {
     let row = |f: &Figure| {
-        format!("| `{}` | {} | {} | {} | {} |\n", f.id, f.value_text(), f.limit, f.verdict(), f.what)
+        // a bar would end the cell
+        let what = f.what.replace('|', "\\|");
+        format!("| `{}` | {} | {} | {} | {what} |\n", f.id, f.value_text(), f.limit, f.verdict())
     };
     let head = "| figure | value | limit | verdict | what |\n|---|---|---|---|---|\n";
     std::iter::once(head.to_owned()).chain(figures.iter().map(row)).collect()

@@ -67,7 +67,7 @@ type Set<T> = fn(&mut dyn Subsystem, &[u32], &[T]) -> Result;
 
 impl Elements {
     /// `None` where no variable is an array.
-    pub fn of(own: &[Variable]) -> Option<Box<Self>> {
+    pub fn of(own: &[Variable]) -> Option<Self> {
         let arrays: Vec<_> = own.iter().filter(|v| !v.dims.is_empty()).map(|v| (v.id, v.len())).collect();
         if arrays.is_empty() {
             return None;
@@ -87,13 +87,7 @@ impl Elements {
             }
         }
         let longest = arrays.iter().map(|a| a.1).max().unwrap_or(0);
-        Some(Box::new(Self {
-            variables,
-            first,
-            places,
-            arrays,
-            room: RefCell::new(Vec::with_capacity(longest)),
-        }))
+        Some(Self { variables, first, places, arrays, room: RefCell::new(Vec::with_capacity(longest)) })
     }
 
     /// Whether a number is that of an element.

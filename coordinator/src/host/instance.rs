@@ -40,8 +40,8 @@ pub struct Instance {
     watched: bool,
     cost: Duration,
     kind: Kind,
-    /// Only where there are arrays.
-    elements: Option<Box<Elements>>,
+    /// Whether variables are arrays.
+    arrays: bool,
     about: Box<About>,
 }
 
@@ -51,6 +51,7 @@ struct About {
     module: String,
     capabilities: Capabilities,
     scene: Scene,
+    elements: Option<Elements>,
 }
 
 impl Instance {
@@ -61,11 +62,12 @@ impl Instance {
             module: module.to_owned(),
             capabilities: subsystem.capabilities(),
             scene: subsystem.scene(),
+            elements: Elements::of(subsystem.variables()),
         };
         Self {
+            arrays: about.elements.is_some(),
             about: Box::new(about),
             kind,
-            elements: Elements::of(subsystem.variables()),
             subsystem,
             time_s: Cell::new(0.0),
             dead: Cell::new(false),
@@ -386,19 +388,24 @@ impl Instance {
 
     /// All variables; an array is shown as its elements.
     pub fn variables(&self) -> &[Variable] {
-        self.elements.as_ref().map_or_else(|| self.subsystem.variables(), |e| &e.variables)
+        self.elements().map_or_else(|| self.subsystem.variables(), |e| &e.variables)
+    }
+
+    #[inline]
+    fn elements(&self) -> Option<&Elements> {
+        if self.arrays { self.about.elements.as_ref() } else { None }
     }
 
     /// Numbers of the elements of an array among [`Instance::variables`]; that of a scalar itself.
     pub(crate) fn elements_of(&self, id: u32) -> Vec<u32> {
-        let elements: Vec<u32> = self.elements.iter().flat_map(|e| e.of_array(id)).collect();
+        let elements: Vec<u32> = self.elements().into_iter().flat_map(|e| e.of_array(id)).collect();
         if elements.is_empty() { vec![id] } else { elements }
     }
 
     /// Committed values as they are.
     #[inline]
     pub(crate) fn peek(&self, ids: &[u32], out: ValuesMut) -> terraglue_subsystem::Result {
-        match &self.elements {
+        match self.elements() {
             None => self.subsystem.get(ids, out),
             Some(elements) => elements.get(self.subsystem.as_ref(), ids, out),
         }
@@ -444,9 +451,12 @@ impl Instance {
     #[inline]
     pub fn set(&mut self, ids: &[u32], values: Values) -> Result<Reply> {
         self.alive("set")?;
-        let result = match &self.elements {
-            None => self.subsystem.set(ids, values),
-            Some(elements) => elements.set(self.subsystem.as_mut(), ids, values),
+        let result = if self.arrays
+            && let Some(elements) = &self.about.elements
+        {
+            elements.set(self.subsystem.as_mut(), ids, values)
+        } else {
+            self.subsystem.set(ids, values)
         };
         self.reply("set", result)
     }
@@ -456,7 +466,7 @@ impl Instance {
         const NAME: &str = "directional_derivative";
         self.alive(NAME)?;
         let mut of_element = unknowns.iter().chain([&known]);
-        if self.elements.as_ref().is_some_and(|e| of_element.any(|id| e.has(*id))) {
+        if self.elements().is_some_and(|e| of_element.any(|id| e.has(*id))) {
             return Ok(false);
         }
         out.fill(f64::NAN);

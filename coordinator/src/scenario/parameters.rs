@@ -153,7 +153,10 @@ impl Check<'_> {
                     "`[{}]` lacks `{}`, which module `{}` needs",
                     self.spec.name, p.name, self.schema.name
                 );
-                let help = format!("{}: {}; takes {}", p.name, p.help, super::check::allowed(p, None));
+                let mut help = format!("{}: {}; takes {}", p.name, p.help, super::check::allowed(p, None));
+                if self.spec.offered.is_empty() && super::soil_row::gives(&p.name) {
+                    help += ". Or parameters = \"LETE_sand\": a soil that `terraglue soils` lists gives all its numbers";
+                }
                 return Err(self.source.error_at_value(&[&self.spec.name], what, Some(help)));
             }
         }

@@ -6,7 +6,7 @@ use super::source::{InputError, Source};
 use super::subsystems::text;
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
-use terraglue_soil_law::{SoilTable, TableError};
+use terraglue_soil_law::{COLUMNS, SoilTable, TableError};
 
 /// The soil table beside a scenario: `../models/soils.csv` or `models/soils.csv` from its folder or from the
 /// current one, that of the installation, or that of the sources from whose `target` folder the program runs.
@@ -19,6 +19,11 @@ pub fn find_soil_table(folder: &Path) -> Option<PathBuf> {
     let near = ["../models/soils.csv", "models/soils.csv"].map(|p| folder.join(p));
     let here = Some(PathBuf::from("models/soils.csv"));
     near.into_iter().chain(here).chain(beside_program).find(|path| path.is_file())
+}
+
+/// Whether the rows of a soil table have a number of this name.
+pub fn gives(parameter: &str) -> bool {
+    COLUMNS.contains(&parameter)
 }
 
 /// Reads a soil table.

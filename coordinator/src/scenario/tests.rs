@@ -338,6 +338,10 @@ fn a_required_parameter_is_asked_for() {
     let s = parse(&GOOD.replacen("mass_kg = 5.0", "", 1)).expect("parses");
     let error = check_parameters(&needs, &s.subsystems[0], &s.source).expect_err("lacks");
     assert_holds(&rendered(&error), &["`[robot]` lacks `mass_kg`, which module `rigid-body` needs"]);
+    assert!(!rendered(&error).contains("terraglue soils"));
+    needs.parameters[0] = Parameter::of("k_phi", ParameterType::Number, "modulus");
+    let error = check_parameters(&needs, &s.subsystems[0], &s.source).expect_err("lacks");
+    assert_holds(&rendered(&error), &["lacks `k_phi`", "terraglue soils"]);
 }
 
 #[test]

@@ -8,7 +8,6 @@ mod allocations;
 mod check;
 mod description;
 mod elements;
-mod elf;
 mod error;
 pub mod exit_guard;
 mod instance;
@@ -29,7 +28,6 @@ mod workers;
 
 pub use allocations::AllocationCounter;
 pub use description::Description;
-pub use elf::exported_symbols;
 pub use error::LoadError;
 pub use instance::{Instance, Progress, Reply};
 pub use isolation::Isolation;

@@ -13,6 +13,7 @@
 mod archive;
 mod binary;
 pub mod description;
+pub mod elf;
 mod error;
 pub mod export;
 mod fmu;

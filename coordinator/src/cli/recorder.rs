@@ -1,7 +1,7 @@
 //! The recorder of a run, also within reach when foreign code ends the process: it is closed with the error then.
 
 use super::show;
-use std::path::{Path, PathBuf};
+use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use terraglue::host::exit_guard::{Will, leave_will};
 use terraglue::observer::{Happening, Observer, View};
@@ -33,7 +33,7 @@ impl SharedRecorder {
     }
 }
 
-fn close(recorder: &Mutex<Recorder>, suspects: String, folder: &PathBuf) {
+fn close(recorder: &Mutex<Recorder>, suspects: String, folder: &Path) {
     let message = format!("{suspects} ended the program by exit()");
     // held where that happened while values were read for the recorder: what was written before is kept
     let Ok(mut recorder) = recorder.try_lock() else {

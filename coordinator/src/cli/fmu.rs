@@ -41,7 +41,8 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
         tolerance: arguments.tolerance,
         outputs: arguments.output.clone(),
         event_mode: arguments.event_mode,
-        input: arguments.input.as_deref().map(table).transpose()?.unwrap_or_default(),
+        input: arguments.input.as_deref().map(table).transpose()?.unwrap_or_default().into(),
+        hold_inputs: arguments.hold_inputs,
     };
     let mut file = arguments.csv.as_deref().map(created).transpose()?;
     let mut between = arguments.intermediate.as_deref().map(created).transpose()?;

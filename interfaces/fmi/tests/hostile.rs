@@ -274,6 +274,7 @@ fn loading(entries: &[Entry], description: &str) -> String {
         verbose: false,
         event_mode: false,
         intermediate: Vec::new(),
+        followed: Vec::new(),
         sink: Box::new(|_| {}),
     };
     let error = terraglue_fmi::Slave::instantiate(&fmu, options).expect_err("no library");

@@ -186,10 +186,13 @@ def test_only_inputs_with_a_column_are_announced_and_only_when_they_are_asked_fo
     step = """v[5][0] = u->count; v[6][0] = u->announced[0]; X = u->announced[1]; v[4][0] = 7; v[7][0] = 0;
 for (int k = 1; k <= 2; k++) {
     double before = v[1][0]; bool stop; double when;
+    u->mode = 9;
     if (u->update) u->update(u->env, t + k * h / 2, k == 2, true, true, false, &stop, &when);
+    u->mode = 3;
     if (k == 1 && v[1][0] != before || v[4][0] != 7) return no(u, "nobody asked");
     v[7][0] += v[1][0] != before; Y += h / 2 * v[1][0]; }"""
-    unit = build_3(tmp_path, "counts", variables, step, more=ASK, flags=ABLE)
+    once_set = {"sets": "if (u->mode == 9) u->mode = 10;", "odd": "if (u->mode == 10) abort();"}
+    unit = build_3(tmp_path, "counts", variables, step, more=ASK, flags=ABLE, **once_set)
     rows = table(tmp_path, (0, 0), (2, 2))
     done, found = run(unit, rows)
     assert done.returncode == 0, done.stderr
@@ -271,22 +274,24 @@ int fmi3GetFloat32(Unit *u, const unsigned *r, size_t k, float *x, size_t m) { *
     assert done.returncode == 0 and [found[-1][name] for name in ("x[1]", "x[2]")] == [1, 2], done.stderr
 
 
-def test_after_an_early_return_the_input_is_of_that_time(tmp_path):
-    """A trial of the solver looks at the end of the step; then the unit returns at an event half-way."""
-    step = r"""double half = t + h / 2; int first = t == 0.25;
-ask(u, t + h);
-if (first && u->early) { Y += h / 2 * ask(u, t + h / 4); ask(u, t + h); *early = *event = true; *last = half; return 0; }
+@pytest.mark.parametrize("event", [True, False])
+def test_after_an_early_return_the_input_is_of_that_time(tmp_path, event):
+    """A trial of the solver looks at the end of the step; then the unit returns half-way. `x` is what it finds there."""
+    step = r"""double half = t + h / 2;
+if (t == 0.375 && EVENT == 0) X = v[1][0];
+if (t == 0.25 && u->early) { Y += h / 2 * ask(u, t + h / 4); ask(u, t + h); *early = true; *event = EVENT; *last = half; return 0; }
 Y += h * ask(u, half);"""
     events = r"""
 int fmi3EnterEventMode(Unit *u) { return 0; }
 int fmi3EnterStepMode(Unit *u) { return 0; }
 int fmi3UpdateDiscreteStates(Unit *u, bool *a, bool *b, bool *c, bool *d, bool *e, double *t) {
     u->v[2][0] = u->v[1][0]; return *a = *b = *c = *d = *e = false, 0; }"""
-    unit = three(tmp_path, step=step, more=ASK + events, flags=ABLE + ' mightReturnEarlyFromDoStep="true" hasEventMode="true"')
+    flags = ABLE + ' mightReturnEarlyFromDoStep="true" hasEventMode="true"'
+    unit = three(tmp_path, step=step, more=ASK + events, flags=flags, macros=(f"EVENT={int(event)}",))
     done, found = run(unit, table(tmp_path, (0, 0), (2, 2)), "--event-mode", "on")
     assert done.returncode == 0, done.stderr
-    assert [row["events"] for row in found] == [0, 0, 1, 0, 0]
-    assert found[-1]["x"] == 0.375, "what the event saw"
+    assert [row["events"] for row in found] == [0, 0, int(event), 0, 0]
+    assert found[-1]["x"] == 0.375
     assert found[-1]["y"] == pytest.approx(0.5, abs=1e-12)
 
 

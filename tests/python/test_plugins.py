@@ -9,7 +9,7 @@ import sys
 import zipfile
 
 import pytest
-from conftest import PROGRAM, ROOT, terraglue
+from conftest import MOON_WALK, PROGRAM, ROOT, terraglue
 
 KINDS = ["soil", "robot", "controller", "law"]
 
@@ -398,3 +398,15 @@ def test_the_checker_is_called_from_c_and_pytest_as_the_page_shows(tmp_path):
     for command in ["cc check.c -o check && ./check", f"{sys.executable} -m pytest -q test_my_law.py"]:
         done = subprocess.run(command, shell=True, cwd=place, env=environment, capture_output=True, text=True)
         assert done.returncode == 0, f"{command}\n{done.stdout}{done.stderr}"
+
+
+def test_plugins_can_be_isolated(tmp_path):
+    """A walk over an isolated soil is the walk, bit by bit."""
+    rows = []
+    for isolate in ("false", "true"):
+        out = tmp_path / isolate
+        sets = ["--set", f"soil.isolate={isolate}", "--set", "recording.every_steps=1"]
+        done = terraglue("run", MOON_WALK, "--duration", "0.05", "--csv", "--quiet", "--out", out, *sets)
+        assert done.returncode == 0, done.stderr
+        rows.append((out / "variables.csv").read_bytes())
+    assert rows[0] == rows[1]

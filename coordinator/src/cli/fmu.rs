@@ -8,7 +8,6 @@ use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 use terraglue::fmu::simulate::{self, Row, Settings, Table, Tables};
-use terraglue::host::exit_guard;
 use terraglue::scenario::InputError;
 use terraglue::{Error, Result};
 use terraglue_fmi::description::ModelDescription;
@@ -58,9 +57,7 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
     };
     let mut row_between = between.as_mut().map(|file| move |text: &str| line(file, text));
     let intermediate = row_between.as_mut().map(|row| row as simulate::Line);
-    let armed = exit_guard::arm();
     let ran = simulate::run(&fmu, &settings, sink, &mut Tables { rows: &mut row, intermediate });
-    drop(armed);
     drop(row_between);
     for file in [&mut file, &mut between].into_iter().flatten() {
         file.flush().map_err(|source| Error::File { path: "the table".into(), source })?;

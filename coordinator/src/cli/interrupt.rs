@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
+use terraglue::host::exit_guard;
 
 /// A flag that Ctrl-C sets.
 pub fn cancel_flag() -> Arc<AtomicBool> {
@@ -9,7 +10,7 @@ pub fn cancel_flag() -> Arc<AtomicBool> {
     let shared = Arc::clone(&flag);
     let installed = ctrlc::set_handler(move || {
         if shared.swap(true, Ordering::Relaxed) {
-            std::process::exit(130);
+            exit_guard::leave(130);
         }
     });
     if let Err(e) = installed {

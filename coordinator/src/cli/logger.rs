@@ -1,6 +1,6 @@
 //! Log lines of modules and of the library on standard error: warnings and errors, and all with `TERRAGLUE_LOG=info`.
 
-use log::{LevelFilter, Log, Metadata, Record};
+use log::{Level, LevelFilter, Log, Metadata, Record};
 
 struct Logger;
 
@@ -11,7 +11,10 @@ impl Log for Logger {
 
     fn log(&self, record: &Record) {
         if self.enabled(record.metadata()) {
-            eprintln!("{}: {}", record.level().as_str().to_lowercase(), record.args());
+            // an error that a module or unit speaks of is not yet one of the program
+            let said = ["terraglue::module", "terraglue::fmu"].contains(&record.target());
+            let by = if said && record.level() == Level::Error { "logged " } else { "" };
+            eprintln!("{by}{}: {}", record.level().as_str().to_lowercase(), record.args());
         }
     }
 

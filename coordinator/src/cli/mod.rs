@@ -19,6 +19,7 @@ mod logger;
 mod new;
 mod output;
 mod progress;
+mod recorder;
 mod report;
 mod run;
 mod show;
@@ -29,6 +30,7 @@ use arguments::{Arguments, Command};
 use clap::Parser;
 use std::process::ExitCode;
 use terraglue::Error;
+use terraglue::host::{exit_guard, orphans};
 
 /// How a command ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -61,7 +63,21 @@ pub fn main() -> ExitCode {
         return terraglue::host::isolation::serve(segment);
     }
     logger::install();
-    let done = match arguments.command {
+    orphans::adopt();
+    // what the checker makes of modules that end the program is its own affair
+    let armed = !matches!(arguments.command, Command::CheckModule(_) | Command::Modules { .. });
+    let armed = armed.then(exit_guard::arm);
+    let exit = command(arguments.command);
+    drop(armed);
+    let left = orphans::end_all();
+    if left > 0 {
+        log::warn!("modules or units left {left} processes behind; they were ended");
+    }
+    exit.into()
+}
+
+fn command(command: Command) -> Exit {
+    let done = match command {
         Command::Run(arguments) => run::run(&arguments),
         Command::Compare(arguments) => compare::compare(&arguments),
         Command::Report { folder } => report::report(&folder),
@@ -79,13 +95,10 @@ pub fn main() -> ExitCode {
         Command::Soils { name, file } => soils::soils(name.as_deref(), file.as_deref()),
         Command::FitSoil(arguments) => fit_soil::fit_soil(&arguments),
     };
-    match done {
-        Ok(exit) => exit.into(),
-        Err(error) => {
-            show::error(&error);
-            exit_of(&error).into()
-        }
-    }
+    done.unwrap_or_else(|error| {
+        show::error(&error);
+        exit_of(&error)
+    })
 }
 
 /// Exit of a command that an error ended.

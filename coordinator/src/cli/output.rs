@@ -2,6 +2,7 @@
 
 use std::fmt::Arguments;
 use std::io::{ErrorKind, Write};
+use terraglue::host::exit_guard;
 
 /// Writes one line to standard output. Ends the program with code 0 when nobody reads on, with 1 when the
 /// output cannot be written for another reason.
@@ -9,10 +10,10 @@ pub fn line(text: Arguments) {
     let mut out = std::io::stdout().lock();
     if let Err(error) = write_line(&mut out, text) {
         if error.kind() == ErrorKind::BrokenPipe {
-            std::process::exit(0);
+            exit_guard::leave(0);
         }
         eprintln!("error: standard output: {error}");
-        std::process::exit(1);
+        exit_guard::leave(1);
     }
 }
 

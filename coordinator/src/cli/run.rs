@@ -4,12 +4,13 @@ use super::arguments::{RunArguments, RunCommand};
 use super::folder::results_folder;
 use super::output::outln;
 use super::progress::{self, Progress};
+use super::recorder::SharedRecorder;
 use super::{Exit, exit_of, interrupt, show, soil_module};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
-use terraglue::host::exit_guard;
+use terraglue::host::Surroundings;
 use terraglue::observer::Observer;
 use terraglue::recording::{
     self, Recorder, RecorderOptions, Status, Summary, TimingRow, write_exchange, write_timing,
@@ -105,10 +106,24 @@ pub fn options(arguments: &RunArguments, cancel: &Arc<AtomicBool>) -> Options {
 
 /// Builds a testbed. Whatever stops it, a module that refuses its files among them, is wrong input.
 pub fn build(scenario: &Scenario, options: &Options) -> Result<Testbed> {
-    Testbed::build(scenario, options).map_err(|error| match error {
+    let surroundings = Surroundings::now();
+    let built = Testbed::build(scenario, options).map_err(|error| match error {
         Error::Input(_) | Error::Module { function: "instantiate", .. } => error,
         other => Error::Input(InputError::plain(other.to_string(), None)),
-    })
+    });
+    set_back(&surroundings);
+    built
+}
+
+/// Tells what had to be set back.
+fn set_back(surroundings: &Surroundings) {
+    let changed = surroundings.restore();
+    if !changed.is_empty() {
+        let changed = changed.join(", ");
+        log::warn!(
+            "a module or unit changed what all share, {changed}: it is set back; `isolate = true` keeps such a one apart"
+        );
+    }
 }
 
 /// Steps a testbed to the end of its scenario and records it into `folder`.
@@ -120,10 +135,11 @@ pub fn run_testbed(
     csv: bool,
     progress: &mut dyn Observer,
 ) -> Result<Outcome> {
-    let armed = exit_guard::arm();
-    // an error below drops the testbed, and with it what modules do at their end, before the guard
+    let mut recorder = SharedRecorder::new(Recorder::create(folder, scenario, RecorderOptions { csv })?);
+    let will = recorder.will(scenario, folder);
+    // an error below drops the testbed, and with it what modules do at their end, before the will
     let mut testbed = testbed;
-    let mut recorder = Recorder::create(folder, scenario, RecorderOptions { csv })?;
+    let surroundings = Surroundings::now();
     testbed.view(|view| recorder.started(view))?;
     write_exchange(folder, &testbed.explain())?;
     let (wall, cpu) = (Instant::now(), cpu_s());
@@ -134,20 +150,22 @@ pub fn run_testbed(
     };
     let (wall_s, cpu_s) = (wall.elapsed().as_secs_f64(), cpu_s() - cpu);
     let error = ran.err();
+    set_back(&surroundings);
     testbed.view(|view| recorder.finished(view, error.as_ref()))?;
     write_timing(folder, &timing_rows(&testbed, wall_s, cpu_s))?;
     let parts_s = parts_s(&testbed, wall_s);
     let costs = testbed.costs().map(|(name, s)| (name.to_owned(), s)).collect();
     let cancelled = testbed.cancelled();
     let closed = testbed.close();
+    set_back(&surroundings);
     let error = error.or(closed.err());
     let status = match &error {
         Some(_) => Status::Failed,
         None if cancelled => Status::Stopped,
         None => Status::Done,
     };
-    drop(armed);
-    let summary = recorder.finish(wall_s, cpu_s, error.as_ref(), status)?;
+    drop(will);
+    let summary = recorder.lock().finish(wall_s, cpu_s, error.as_ref(), status)?;
     Ok(Outcome { summary, error, parts_s, costs })
 }
 

@@ -2,10 +2,10 @@
 //! functions that count and pass on. Only for the process of a test.
 #![allow(unsafe_code)] // Changes the table through which a library calls others.
 
-use super::elf::imported_slots;
 use std::ffi::c_void;
 use std::path::Path;
 use std::sync::atomic::{AtomicUsize, Ordering};
+use terraglue_fmi::elf::imported_slots;
 
 static COUNT: AtomicUsize = AtomicUsize::new(0);
 /// Addresses of `operator new` and `operator new[]`; 0: not seen.

@@ -1,8 +1,8 @@
 //! What a module says about itself without being run: the section `.terraglue` of a library, or the docstring of a
 //! file in Python, and whether an instance says the same.
 
-use super::elf::section;
 use std::path::Path;
+use terraglue_fmi::elf::section;
 use terraglue_plugin::describe::{variable_line, words};
 use terraglue_subsystem::{Capabilities, Variable};
 

@@ -1,11 +1,20 @@
-//! No foreign code ends the program with success: `exit(0)` inside a module or unit is a failure of the run.
+//! No foreign code ends the program with success: `exit(0)` inside a module or unit is a failure of the run, and its
+//! recording is closed first.
 #![allow(unsafe_code)] // Registers a function that the C library calls at `exit`.
 
-use std::sync::Once;
-use std::sync::atomic::{AtomicBool, Ordering};
+use super::orphans;
+use std::collections::BTreeMap;
+use std::panic::{AssertUnwindSafe, catch_unwind};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
+use std::sync::{Mutex, Once, PoisonError};
 
 static ARMED: AtomicBool = AtomicBool::new(false);
 static REGISTERED: Once = Once::new();
+static WILLS: Mutex<BTreeMap<u64, Work>> = Mutex::new(BTreeMap::new());
+static NEXT: AtomicU64 = AtomicU64::new(0);
+
+/// What is done before the process ends.
+type Work = Box<dyn FnOnce() + Send>;
 
 /// While this lives, an `exit` of the process is an error.
 #[derive(Debug)]
@@ -14,6 +23,16 @@ pub struct Armed(());
 impl Drop for Armed {
     fn drop(&mut self) {
         ARMED.store(false, Ordering::SeqCst);
+    }
+}
+
+/// While this lives, its work is done before foreign code ends the process.
+#[derive(Debug)]
+pub struct Will(u64);
+
+impl Drop for Will {
+    fn drop(&mut self) {
+        WILLS.lock().unwrap_or_else(PoisonError::into_inner).remove(&self.0);
     }
 }
 
@@ -28,15 +47,44 @@ pub fn arm() -> Armed {
     Armed(())
 }
 
+/// Leaves `work` to be done when foreign code ends the process. It tells the error; it must not wait for anything that a
+/// thread may hold.
+#[must_use]
+pub fn leave_will(work: impl FnOnce() + Send + 'static) -> Will {
+    let id = NEXT.fetch_add(1, Ordering::Relaxed);
+    WILLS.lock().unwrap_or_else(PoisonError::into_inner).insert(id, Box::new(work));
+    Will(id)
+}
+
+/// Ends the program by its own will.
+pub fn leave(code: i32) -> ! {
+    ARMED.store(false, Ordering::SeqCst);
+    terraglue_fmi::remove_folders();
+    orphans::end_all();
+    std::process::exit(code)
+}
+
 extern "C" fn at_exit() {
-    if !ARMED.load(Ordering::SeqCst) {
+    if !ARMED.swap(false, Ordering::SeqCst) {
         return;
     }
-    let text =
-        b"error: a module or unit ended the program in the middle of the run; `isolate = true` names it\n";
+    // the thread that calls this may hold the wills, but only between two of them
+    let wills = WILLS.try_lock().map(|mut all| std::mem::take(&mut *all)).unwrap_or_default();
+    let told = !wills.is_empty();
+    for (_, work) in wills {
+        // what cannot be done any more is left
+        drop(catch_unwind(AssertUnwindSafe(work)));
+    }
+    let _ = catch_unwind(|| {
+        terraglue_fmi::remove_folders();
+        orphans::end_all();
+    });
+    let text = b"error: a module or unit ended the program; `isolate = true` names it\n";
     // SAFETY: plain system calls; the process ends here.
     unsafe {
-        libc::write(libc::STDERR_FILENO, text.as_ptr().cast(), text.len());
+        if !told {
+            libc::write(libc::STDERR_FILENO, text.as_ptr().cast(), text.len());
+        }
         libc::_exit(1);
     }
 }

@@ -2,7 +2,6 @@
 #![allow(unsafe_code)] // Loading a library runs its constructors and calls its entry.
 
 use super::description::Description;
-use super::elf::{foreign_machine, is_elf, needed_length};
 use super::error::LoadError;
 use super::isolation::{self, Isolation, What};
 use super::law::{self, LawHost};
@@ -13,6 +12,7 @@ use libloading::os::unix::{Library as Handle, RTLD_LOCAL, RTLD_NOW, Symbol};
 use std::error::Error as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use terraglue_fmi::elf::{foreign_machine, is_elf, needed_length};
 use terraglue_plugin::ForeignModule;
 use terraglue_plugin::abi::{TG_ABI_MAJOR, TgEntry};
 use terraglue_subsystem::{Config, Error as Failure, Host, Module, Result, Schema, Subsystem};

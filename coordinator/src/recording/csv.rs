@@ -1,6 +1,7 @@
 //! `variables.csv`, all scalar variables over time, and `timing.csv`, what a clock measured.
 
 use crate::error::Result;
+use crate::recording::kept_file::KeptFile;
 use crate::recording::layout::{TIMING, VARIABLES, at, other_at};
 use crate::recording::snapshot::{ScalarKind, Snapshot};
 use std::fs::File;
@@ -10,7 +11,7 @@ use std::path::{Path, PathBuf};
 /// Writes `t_s,robot.LF_j2.angle,…`, one row per recorded communication point.
 pub(crate) struct VariablesCsv {
     path: PathBuf,
-    rows: csv::Writer<File>,
+    rows: csv::Writer<KeptFile>,
     number: Vec<u8>,
 }
 
@@ -18,7 +19,7 @@ impl VariablesCsv {
     /// Creates the file with its head line.
     pub fn create(folder: &Path, snapshot: &Snapshot) -> Result<Self> {
         let path = folder.join(VARIABLES);
-        let mut rows = csv::Writer::from_writer(File::create(&path).map_err(at(&path))?);
+        let mut rows = csv::Writer::from_writer(KeptFile::create(&path).map_err(at(&path))?);
         let names = snapshot
             .subsystems
             .iter()

@@ -8,6 +8,7 @@ use crate::gluing::StepReport;
 use crate::observer::{Happening, View};
 use crate::recording::ground_grid::{GroundGrid, Rectangle};
 use crate::recording::json::JsonBuffer;
+use crate::recording::kept_file::KeptFile;
 use crate::recording::layout::{RECORDING, at, nanoseconds, other_at};
 use crate::recording::messages::{self, WindowRecord};
 use crate::recording::snapshot::{ScalarKind, Snapshot, failed};
@@ -16,14 +17,13 @@ use base64::Engine;
 use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
 use std::collections::BTreeMap;
-use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
 /// A chunk ends every so many steps; that many can be lost when the process is killed.
 pub(crate) const FLUSH_STEPS: u64 = 100;
 
-type Sink = mcap::Writer<NoSeek<BufWriter<File>>>;
+type Sink = mcap::Writer<NoSeek<BufWriter<KeptFile>>>;
 
 /// How every recording is laid out, also a mended one.
 pub(crate) fn options() -> mcap::WriteOptions {
@@ -64,7 +64,7 @@ impl McapWriter {
     /// Creates the file; `about` is the description of the run that stands at its head.
     pub fn create(folder: &Path, about: BTreeMap<String, String>) -> Result<Self> {
         let path = folder.join(RECORDING);
-        let file = File::create(&path).map_err(at(&path))?;
+        let file = KeptFile::create(&path).map_err(at(&path))?;
         // No chunk size: chunks end by count only.
         let sink = options().chunk_size(None).create(NoSeek::new(BufWriter::new(file)));
         let mut sink = sink.map_err(other_at(&path))?;

@@ -35,6 +35,7 @@ mod exchange;
 mod ground_grid;
 mod inputs;
 mod json;
+mod kept_file;
 mod layout;
 mod mcap_writer;
 mod mend;

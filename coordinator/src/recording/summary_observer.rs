@@ -211,6 +211,11 @@ fn soils<'a>(view: &'a View) -> impl Iterator<Item = (usize, &'a SubsystemView<'
 }
 
 impl SummaryObserver {
+    /// Simulated time of the last step, s.
+    pub fn t_s(&self) -> f64 {
+        self.t_s
+    }
+
     /// For a run of this scenario.
     pub fn new(scenario: &Scenario) -> Self {
         let g = scenario.world.gravity_m_s2;

@@ -165,7 +165,9 @@ fn instantiate(
     let mut instances = Vec::new();
     for spec in &scenario.subsystems {
         if crate::fmu::is_fmu(&spec.module) {
+            let folder = std::env::current_dir();
             instances.push(unit(scenario, spec, services)?);
+            stay_in(folder, &spec.name);
             continue;
         }
         let module = find(scenario, spec, options, library)?;
@@ -188,6 +190,19 @@ fn instantiate(
         instances.push(make(scenario, spec, module, config, services)?);
     }
     Ok(instances)
+}
+
+/// Goes back to the working folder, on which the paths of the other subsystems may rest, where `name` has left it.
+fn stay_in(folder: std::io::Result<std::path::PathBuf>, name: &str) {
+    if let Ok(folder) = folder
+        && std::env::current_dir().is_ok_and(|now| now != folder)
+        && std::env::set_current_dir(&folder).is_ok()
+    {
+        log::warn!(
+            "`{name}` changed the working folder of the process; it is set back to `{}`",
+            folder.display()
+        );
+    }
 }
 
 /// The same parameters with the file of the law that they name.

@@ -21,18 +21,18 @@ pub struct Limits {
     pub total: u64,
     /// `modelDescription.xml`, bytes.
     pub description: u64,
-    /// Smallest share of its extracted size that a large entry takes in the archive.
+    /// Smallest share of their extracted size that large files take in the archive.
     pub ratio: f64,
 }
 
 impl Default for Limits {
     fn default() -> Self {
-        Self { entries: 100_000, total: 4 << 30, description: 256 << 20, ratio: 1.0 / 1100.0 }
+        Self { entries: 100_000, total: 4 << 30, description: 256 << 20, ratio: 1.0 / 200.0 }
     }
 }
 
-/// Entries below this size are not looked at as bombs.
-const SMALL: u64 = 16 << 20;
+/// Up to this size nothing is looked at as a bomb: tables of one number may shrink to a thousandth.
+const SMALL: u64 = 256 << 20;
 
 /// A zip archive that was checked as a whole.
 pub struct Archive {
@@ -80,7 +80,8 @@ impl Archive {
 
     fn check(&mut self) -> Result {
         let mut kinds: BTreeMap<String, bool> = BTreeMap::new();
-        let mut total = 0_u64;
+        let (mut total, mut packed) = (0_u64, 0_u64);
+        let length = std::fs::metadata(&self.path).map_or(u64::MAX, |m| m.len());
         for k in 0..self.zip.len() {
             let raw = self.zip.by_index_raw(k);
             let facts = raw.map(|e| Facts::of(&e)).map_err(|e| Error::Archive {
@@ -90,6 +91,13 @@ impl Archive {
             })?;
             let parts = self.check_entry(&facts)?;
             total = total.saturating_add(facts.size);
+            packed = packed.saturating_add(facts.packed);
+            if packed > length {
+                return Err(self.fail(&facts.name, "shares its bytes with other entries: a bomb"));
+            }
+            if let Some(bomb) = self.bomb(packed, total) {
+                return Err(self.fail(&facts.name, bomb));
+            }
             if total > self.limits.total {
                 return Err(self.fail(&facts.name, too_large(self.limits.total)));
             }
@@ -117,11 +125,13 @@ impl Archive {
             Some(0o120_000) => return Err(self.fail(&facts.name, "is a symbolic link")),
             Some(_) => return Err(self.fail(&facts.name, "is neither a file nor a folder")),
         }
-        if facts.size > SMALL && (facts.packed as f64) < facts.size as f64 * self.limits.ratio {
-            let message = format!("{} bytes claim to hold {}: a bomb", facts.packed, facts.size);
-            return Err(self.fail(&facts.name, message));
-        }
         Ok(parts)
+    }
+
+    /// What is said of files up to an entry that take so few bytes for what they hold; none: nothing.
+    fn bomb(&self, packed: u64, size: u64) -> Option<String> {
+        let blown_up = size > SMALL && (packed as f64) < size as f64 * self.limits.ratio;
+        blown_up.then(|| format!("brings {packed} bytes to the claim to hold {size}: a bomb"))
     }
 
     /// A name may stand for one thing only: no file that is a folder too.

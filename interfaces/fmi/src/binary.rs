@@ -2,6 +2,7 @@
 #![allow(unsafe_code)] // Loading a library runs its constructors.
 
 use crate::description::Version;
+use crate::elf;
 use crate::error::{Error, Result};
 use crate::fmu::Fmu;
 use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_LOCAL, RTLD_NOW};
@@ -99,18 +100,18 @@ fn missing(fmu: &Fmu, name: &str) -> String {
 
 /// Whether the file can be a library of this machine, as far as its bytes say.
 fn inspect(path: &Path) -> std::result::Result<(), String> {
-    use std::io::Read;
-    let mut head = [0_u8; 20];
-    let read = std::fs::File::open(path).and_then(|mut f| f.read_exact(&mut head));
-    if read.is_err() || &head[..4] != b"\x7fELF" {
+    let bytes = std::fs::read(path).map_err(|e| e.to_string())?;
+    if !elf::is_elf(&bytes) {
         return Err("it is no shared library (no ELF header)".into());
     }
-    let machine = u16::from_le_bytes([head[18], head[19]]);
-    let own = if cfg!(target_arch = "aarch64") { 183 } else { 62 };
-    if head[4] != 2 || machine != own {
+    if let Some(machine) = elf::foreign_machine(&bytes) {
         return Err(format!("it is made for another kind of machine (ELF number {machine})"));
     }
-    Ok(())
+    match elf::mapped_length(&bytes) {
+        None => Err("it is no library for 64 bits, or its head is cut off".into()),
+        Some(whole) if whole > bytes.len() => Err(format!("it is cut off after {} bytes", bytes.len())),
+        Some(_) => Ok(()),
+    }
 }
 
 /// Opens a library. Some units forget to link the mathematics library: they get a second try with it.

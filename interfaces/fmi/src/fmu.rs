@@ -4,7 +4,10 @@ use crate::archive::{Archive, Limits};
 use crate::binary::{self, Loaded};
 use crate::description::{self, ModelDescription};
 use crate::error::Result;
-use std::fs::{File, TryLockError};
+use std::collections::BTreeSet;
+use std::fs::{File, Metadata, TryLockError};
+use std::os::fd::IntoRawFd;
+use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
 use std::sync::{Arc, Mutex, PoisonError, Weak};
 use tempfile::TempDir;
@@ -87,11 +90,22 @@ impl Fmu {
     }
 }
 
+/// Folders of this process that are there.
+static FOLDERS: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+/// Removes all folders of this process, before it ends in the middle of what it does.
+pub fn remove_folders() {
+    for folder in std::mem::take(&mut *FOLDERS.lock().unwrap_or_else(PoisonError::into_inner)) {
+        // What cannot be removed now is removed by the next process that makes one.
+        drop(std::fs::remove_dir_all(folder));
+    }
+}
+
 /// A temporary folder that is locked while its process lives.
 #[derive(Debug)]
 pub(crate) struct Folder {
     folder: TempDir,
-    _lock: File,
+    lock: Option<File>,
 }
 
 impl Folder {
@@ -105,7 +119,8 @@ impl Folder {
             lock.lock()?;
             // Another process may have swept it between these two lines.
             if path.exists() {
-                return Ok(Self { folder, _lock: lock });
+                FOLDERS.lock().unwrap_or_else(PoisonError::into_inner).insert(folder.path().into());
+                return Ok(Self { folder, lock: Some(lock) });
             }
         }
     }
@@ -113,6 +128,19 @@ impl Folder {
     /// Where it is.
     pub(crate) fn path(&self) -> &Path {
         self.folder.path()
+    }
+}
+
+impl Drop for Folder {
+    fn drop(&mut self) {
+        FOLDERS.lock().unwrap_or_else(PoisonError::into_inner).remove(self.folder.path());
+        let identity = |of: Metadata| (of.dev(), of.ino());
+        let own = std::fs::metadata(self.folder.path().join(LOCK)).ok().map(identity);
+        let now = self.lock.as_ref().and_then(|lock| lock.metadata().ok()).map(identity);
+        if own.is_none() || own != now {
+            // The unit closed a descriptor that is not its own; the number may be another file's by now.
+            let _ = self.lock.take().map(IntoRawFd::into_raw_fd);
+        }
     }
 }
 

@@ -13,6 +13,7 @@
 mod archive;
 mod binary;
 pub mod description;
+pub mod elf;
 mod error;
 pub mod export;
 mod fmu;
@@ -23,5 +24,5 @@ pub use archive::Limits;
 pub use binary::{library_entry, platforms};
 pub use description::{ModelDescription, Version};
 pub use error::{Error, Result};
-pub use fmu::Fmu;
+pub use fmu::{Fmu, remove_folders};
 pub use slave::{Advance, IntermediateRow, LogLine, Slave, SlaveOptions, SlaveState, Stepped};

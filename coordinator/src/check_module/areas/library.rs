@@ -3,7 +3,8 @@
 use crate::check_module::catalogue::{Area, Level, Test};
 use crate::check_module::finding::{Stop, Verdict};
 use crate::check_module::lab::Lab;
-use crate::host::{LoadedModule, described, exported_symbols, table_of};
+use crate::host::{LoadedModule, described, table_of};
+use terraglue_fmi::elf::exported_symbols;
 use terraglue_plugin::abi::{TG_ABI_MAJOR, TG_ABI_MINOR, TgSubsystem};
 use terraglue_subsystem::{Parameter, ParameterType, unit::Unit};
 

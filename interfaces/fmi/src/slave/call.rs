@@ -137,6 +137,10 @@ impl Slave {
         let (health, outcome) = match status {
             Status::Error => (Health::Erroneous, "answered the status error".to_owned()),
             Status::Fatal => (Health::Dead, "answered the status fatal".to_owned()),
+            Status::Discard if changes_mode(function) => {
+                let text = "answered the status discard, which only steps and values may be answered with";
+                (Health::Erroneous, text.to_owned())
+            }
             Status::Discard => (Health::Good, "answered the status discard".to_owned()),
             Status::Pending => {
                 let text = "answered the status pending, although nothing was to be done in the background";
@@ -161,4 +165,9 @@ impl Slave {
         self.health.set(Health::Erroneous);
         Error::Call { function, outcome, log: self.log.last(), fatal: true }
     }
+}
+
+/// Whether a function takes the instance from one mode to another.
+fn changes_mode(function: &str) -> bool {
+    ["Setup", "Enter", "Exit", "Terminate"].iter().any(|verb| function["fmi2".len()..].starts_with(verb))
 }

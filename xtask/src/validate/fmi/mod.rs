@@ -4,12 +4,14 @@
 mod cost;
 mod cycles;
 mod folder;
+mod hostile;
 mod loops;
 mod pair;
 mod reference;
 mod third_party;
 mod turning;
 pub(super) mod units;
+mod watched;
 
 use super::{Context, Part};
 use crate::process::Outcome;
@@ -19,11 +21,13 @@ use terraglue::scenario::Scenario;
 use terraglue::testbed::Options;
 
 /// The parts, in the order of the table.
-pub const PARTS: [Part; 7] = [
+pub const PARTS: [Part; 9] = [
     ("pair", |context| pair::figures(&workplace(context)?, !context.quick)),
     ("turning", |context| turning::figures(&workplace(context)?)),
     ("loops", |context| loops::figures(&workplace(context)?)),
     ("cycles", |context| cycles::figures(&workplace(context)?, context.quick)),
+    ("archives", |context| hostile::archives::figures(&workplace(context)?, context)),
+    ("behaviour", |context| hostile::behaviour::figures(&workplace(context)?, context)),
     ("reference", reference::figures),
     ("third-party", |context| third_party::figures(&workplace(context)?, context)),
     ("cost", |context| cost::figures(&workplace(context)?, context)),

@@ -7,16 +7,14 @@
 
 use super::cost::peers;
 use super::folder;
+use super::watched::watched;
 use crate::process::{Outcome, root};
 use crate::validate::parallel::in_parallel;
 use crate::validate::{Context, Figure, Limit};
 use serde_json::Value;
-use std::fs::File;
-use std::os::unix::process::CommandExt;
 use std::path::{Path, PathBuf};
 use std::process::Command;
-use std::time::{Duration, Instant};
-use terraglue::host::isolation::end_group;
+use std::time::Duration;
 use terraglue::subsystem::ValueType;
 use terraglue_fmi::description::Causality;
 use terraglue_fmi::{Error, Fmu};
@@ -24,6 +22,8 @@ use terraglue_fmi::{Error, Fmu};
 const SCRIPT: &str = "xtask/src/validate/fmi/third_party.py";
 /// Longest run of a unit, s.
 const PATIENCE: u64 = 300;
+/// The same for what watches it: the program's own limit comes first.
+const LONGEST: Duration = Duration::from_secs(PATIENCE + 30);
 /// Largest difference of two numbers, relative to the larger of 1 and their size.
 const ACCURACY: f64 = 1e-9;
 
@@ -157,7 +157,7 @@ fn fate(place: &Path, (context, python): (&Context, &Path), unit: &Path, steps: 
     let unit = &unit.canonicalize().map_err(|e| format!("{}: {e}", unit.display()))?;
     let mut script = Command::new(python);
     script.arg(root().join(SCRIPT)).arg(unit).arg(steps.to_string());
-    let told = told(&watched(&mut script, place)?.1);
+    let told = told(&watched(&mut script, place, LONGEST)?.output);
     let Some(times) = &told.times else { return Ok(Fate::Other) };
     let mut own = Command::new(&context.program);
     own.args(["fmu", "run", "--isolate", "--timeout", &PATIENCE.to_string()]).arg(unit);
@@ -168,9 +168,9 @@ fn fate(place: &Path, (context, python): (&Context, &Path), unit: &Path, steps: 
             .map(|(key, value)| format!("{key}={value}")),
     );
     let table = place.join("table.csv");
-    let (done, _, complaint) = watched(own.arg("--csv").arg(&table), place)?;
-    let complaint = complaint.replace(&format!("{}: ", unit.display()), "");
-    Ok(match (done, &told.row) {
+    let ended = watched(own.arg("--csv").arg(&table), place, LONGEST)?;
+    let complaint = ended.error().replace(&format!("{}: ", unit.display()), "");
+    Ok(match (ended.code == Some(0), &told.row) {
         (true, Some(row)) => match difference(unit, &table, row, times.last().is_some_and(|t| t == "on"))? {
             None => Fate::Equal,
             Some(why) => Fate::Different(why),
@@ -190,34 +190,6 @@ fn told(text: &str) -> Told {
         times: after("EXPERIMENT ").map(|t| t.split(' ').map(str::to_owned).collect()),
         row: after("RESULT ").and_then(|t| serde_json::from_str(t).ok()),
     }
-}
-
-/// Whether a command succeeded, what it wrote, and its error in one line; it is ended with its children.
-fn watched(run: &mut Command, place: &Path) -> Outcome<(bool, String, String)> {
-    let wrong = |e: std::io::Error| format!("{}: {e}", place.display());
-    let [table, complaint] = ["output", "errors"].map(|name| place.join(name));
-    run.stdin(std::process::Stdio::null());
-    run.stdout(File::create(&table).map_err(wrong)?).stderr(File::create(&complaint).map_err(wrong)?);
-    // some units write files wherever they are run
-    let mut child =
-        run.current_dir(place).env("TMPDIR", place).process_group(0).spawn().map_err(|e| e.to_string())?;
-    // the program's own limit comes first
-    let end = Instant::now() + Duration::from_secs(PATIENCE + 30);
-    let done = loop {
-        match child.try_wait().map_err(wrong)? {
-            Some(status) => break status.success(),
-            None if Instant::now() >= end => break false,
-            None => std::thread::sleep(Duration::from_millis(5)),
-        }
-    };
-    end_group(child.id());
-    drop(child.wait());
-    let read =
-        |path: &Path| std::fs::read(path).map(|b| String::from_utf8_lossy(&b).into_owned()).map_err(wrong);
-    let said = read(&complaint)?;
-    let last = || said.lines().map(str::trim).rfind(|line| !line.is_empty());
-    let error = said.lines().rev().find_map(|line| line.strip_prefix("error: ")).or_else(last);
-    Ok((done, read(&table)?, error.unwrap_or("it ended without a word").to_owned()))
 }
 
 /// What in a unit breaks the standard, where the refusal says so.

@@ -2,12 +2,12 @@
 //! platforms that are supported (x86-64, aarch64).
 
 /// Whether the bytes are an ELF file at all.
-pub(super) fn is_elf(bytes: &[u8]) -> bool {
+pub fn is_elf(bytes: &[u8]) -> bool {
     bytes.starts_with(b"\x7fELF")
 }
 
 /// Number of the kind of machine in the file header, where it is not this one.
-pub(super) fn foreign_machine(bytes: &[u8]) -> Option<usize> {
+pub fn foreign_machine(bytes: &[u8]) -> Option<usize> {
     const OWN: usize = if cfg!(target_arch = "aarch64") { 183 } else { 62 };
     number::<2>(bytes, 0x12).filter(|machine| *machine != OWN)
 }
@@ -15,11 +15,22 @@ pub(super) fn foreign_machine(bytes: &[u8]) -> Option<usize> {
 /// Length that the file must have for its sections and loaded segments, or None: not a 64-bit little-endian ELF
 /// file with complete headers. A shorter file must not be loaded: the system maps the segments without looking,
 /// and the first touch beyond the end is a bus error.
-pub(super) fn needed_length(bytes: &[u8]) -> Option<usize> {
+pub fn needed_length(bytes: &[u8]) -> Option<usize> {
     let header = Header::of(bytes)?;
-    let mut end = header.sections.checked_add(header.section_count.checked_mul(header.section_size)?)?;
+    let sections = header.sections.checked_add(header.section_count.checked_mul(header.section_size)?)?;
+    Some(sections.max(mapped_length(bytes)?))
+}
+
+/// The same for its loaded segments alone, which is all that the system looks at.
+pub fn mapped_length(bytes: &[u8]) -> Option<usize> {
+    const LOADED: usize = 1;
+    let header = Header::of(bytes)?;
+    let mut end = 0_usize;
     for k in 0..header.segment_count {
         let at = header.segments.checked_add(k.checked_mul(header.segment_size)?)?;
+        if number::<4>(bytes, at)? != LOADED {
+            continue;
+        }
         let (offset, size) =
             (number::<8>(bytes, at.checked_add(0x08)?)?, number::<8>(bytes, at.checked_add(0x20)?)?);
         end = end.max(offset.checked_add(size)?);
@@ -63,7 +74,7 @@ impl Header {
 }
 
 /// Bytes of a section by name. Offsets after the ELF-64 specification, section header.
-pub(super) fn section<'a>(bytes: &'a [u8], name: &str) -> Option<&'a [u8]> {
+pub fn section<'a>(bytes: &'a [u8], name: &str) -> Option<&'a [u8]> {
     let header = Header::of(bytes)?;
     let content = |at: usize| {
         let (offset, size) =
@@ -103,7 +114,7 @@ pub fn exported_symbols(bytes: &[u8]) -> Option<Vec<String>> {
 
 /// Names of what a library takes from others, each with the place of the pointer to it, relative to where the library
 /// is loaded.
-pub(super) fn imported_slots(bytes: &[u8]) -> Option<Vec<(String, usize)>> {
+pub fn imported_slots(bytes: &[u8]) -> Option<Vec<(String, usize)>> {
     const RELOCATION: usize = 24;
     const SYMBOL: usize = 24;
     // A pointer to a function by name: R_X86_64_64, GLOB_DAT, JUMP_SLOT; R_AARCH64_ABS64, GLOB_DAT, JUMP_SLOT.

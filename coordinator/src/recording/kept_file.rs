@@ -1,0 +1,72 @@
+//! A file that is written while foreign code runs in this process. Such code may close descriptors that are not its own, and
+//! the number may mean another file afterwards: before each write it is looked at, and where it is ours no more, the file is
+//! opened again and goes on where it was.
+
+use std::fs::{File, Metadata};
+use std::io::{Result, Write};
+use std::os::fd::IntoRawFd;
+use std::os::unix::fs::MetadataExt;
+use std::path::{Path, PathBuf};
+
+/// A file that stays ours.
+pub struct KeptFile {
+    file: Option<File>,
+    path: PathBuf,
+    identity: (u64, u64),
+}
+
+impl KeptFile {
+    /// Creates the file, or empties it. Writers that gather what they write keep the look before each write cheap.
+    pub fn create(path: &Path) -> Result<Self> {
+        let path = std::path::absolute(path)?;
+        let file = File::create(&path)?;
+        let identity = identity(&file.metadata()?);
+        Ok(Self { file: Some(file), path, identity })
+    }
+
+    fn is_ours(&self) -> bool {
+        let now = self.file.as_ref().and_then(|file| file.metadata().ok());
+        now.is_some_and(|now| identity(&now) == self.identity)
+    }
+
+    fn ours(&mut self) -> Result<&mut File> {
+        if !self.is_ours() {
+            self.forget();
+            let again = File::options().append(true).open(&self.path)?;
+            self.identity = identity(&again.metadata()?);
+            log::warn!(
+                "`{}` was closed by a module or unit in this process and is opened again; `isolate = true` keeps such a one apart",
+                self.path.display()
+            );
+            self.file = Some(again);
+        }
+        self.file.as_mut().ok_or_else(|| std::io::Error::other("it is closed"))
+    }
+
+    /// Leaves the descriptor to whom it belongs now.
+    fn forget(&mut self) {
+        let _ = self.file.take().map(IntoRawFd::into_raw_fd);
+    }
+}
+
+impl Write for KeptFile {
+    fn write(&mut self, bytes: &[u8]) -> Result<usize> {
+        self.ours()?.write(bytes)
+    }
+
+    fn flush(&mut self) -> Result<()> {
+        Ok(())
+    }
+}
+
+impl Drop for KeptFile {
+    fn drop(&mut self) {
+        if !self.is_ours() {
+            self.forget();
+        }
+    }
+}
+
+fn identity(of: &Metadata) -> (u64, u64) {
+    (of.dev(), of.ino())
+}

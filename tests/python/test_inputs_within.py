@@ -258,18 +258,20 @@ def test_arrays_and_single_precision(tmp_path):
     """Elements without a column keep their start value while the others go on; whole arrays and Float32 go on likewise."""
     variables = [("u", "input", "5 6", (2,)), ("x", "output", "", (2,)), ("f", "output", "", ())]
     more = ASK + r"""
-static float narrow;
-int fmi3SetFloat32(Unit *u, const unsigned *r, size_t k, const float *x, size_t m) { return m == 1 && *r == 4 ? narrow = *x, 0 : 3; }
-int fmi3GetFloat32(Unit *u, const unsigned *r, size_t k, float *x, size_t m) { *x = narrow; return 0; }"""
+static float narrow[3];
+int fmi3SetFloat32(Unit *u, const unsigned *r, size_t k, const float *x, size_t m) {
+    if (k != 1 || m != (*r == 4 ? 1 : 2)) return 3;
+    memcpy(narrow + (*r == 4 ? 0 : 1), x, 4 * m); return 0; }"""
     step = r"""for (int k = 0; k < 4; k++) {
     double d = h / 4; ask(u, t + (k + 0.5) * d); STOP;
     for (int i = 0; i < 2; i++) v[2][i] += d * v[1][i];
-    v[3][0] += d * narrow; }"""
-    single = '<Float32 name="g" valueReference="4" causality="input" intermediateUpdate="true" start="0"/>'
+    for (int i = 0; i < 3; i++) v[3][0] += d * narrow[i]; }"""
+    single = """<Float32 name="g" valueReference="4" causality="input" intermediateUpdate="true" start="0"/>
+<Float32 name="k" valueReference="5" causality="input" intermediateUpdate="true" start="0 0"><Dimension start="2"/></Float32>"""
     unit = build_3(tmp_path, "wide", variables, step, "v[1][0] = 5; v[1][1] = 6;", more, ABLE, others=single)
-    done, found = run(unit, table(tmp_path, (0, 1, 0), (2, 5, 1), names="u[2],g"))
+    done, found = run(unit, table(tmp_path, (0, 1, 0, "0 0"), (2, 5, 1, "1 2"), names="u[2],g,k"))
     assert done.returncode == 0, done.stderr
-    assert [found[-1][name] for name in ("x[1]", "x[2]", "f")] == [5, 2, 0.25]
+    assert [found[-1][name] for name in ("x[1]", "x[2]", "f")] == [5, 2, 0.25 + 0.25 + 0.5]
     done, found = run(unit, table(tmp_path, (0, "0 1"), (2, "4 5")))
     assert done.returncode == 0 and [found[-1][name] for name in ("x[1]", "x[2]")] == [1, 2], done.stderr
 

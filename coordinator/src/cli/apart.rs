@@ -3,6 +3,7 @@
 use super::Exit;
 use super::arguments::FmuRunArguments;
 use std::os::unix::process::CommandExt;
+use std::path::Path;
 use std::process::Command;
 use std::time::{Duration, Instant};
 use terraglue::host::isolation::{end_group, last_words};
@@ -15,11 +16,28 @@ const LOOK: Duration = Duration::from_millis(5);
 /// Variable with the file that a command writes when it has done all of its work.
 const DONE: &str = "TERRAGLUE_DONE";
 
+/// Whether another process waits for this one and tells how it ended.
+pub fn is_child() -> bool {
+    std::env::var_os(DONE).is_some()
+}
+
 /// Tells the process that waits for this one, if there is one, that all is done.
 pub fn done() {
     if let Some(path) = std::env::var_os(DONE) {
         // Where it cannot be written, the run counts as failed.
         drop(std::fs::write(path, ""));
+    }
+}
+
+/// File with the time of the last row.
+const REACHED: &str = "reached";
+
+/// Tells the process that waits for this one how far it has come: the row that is written now.
+pub fn reached(row: &str) {
+    let time = row.split(',').next().filter(|t| t.parse::<f64>().is_ok());
+    if let (Some(path), Some(time)) = (std::env::var_os(DONE), time) {
+        // It is missed only where the process is lost.
+        drop(std::fs::write(Path::new(&path).with_file_name(REACHED), time));
     }
 }
 
@@ -47,22 +65,20 @@ pub fn run(arguments: &FmuRunArguments) -> Result<Exit> {
     };
     end_group(child.id());
     drop(child.wait());
+    let lost = |why: &str| {
+        let reached = std::fs::read_to_string(folder.path().join(REACHED));
+        let when = reached.map_or_else(|_| "before its first row".to_owned(), |t| format!("after t = {t} s"));
+        eprintln!("error: {}: its process was lost {when}: {why}", arguments.unit.display());
+        Exit::Failed
+    };
     let Some(status) = status else {
-        return Ok(lost(
-            arguments,
-            &format!("it did not end within {} s (--timeout) and was ended", arguments.timeout),
-        ));
+        return Ok(lost(&format!("it did not end within {} s (--timeout) and was ended", arguments.timeout)));
     };
     // Its own errors are told already; success is believed where the command itself says so.
     Ok(match status.code() {
         Some(0) if folder.path().join(DONE).is_file() => Exit::Done,
         Some(1) => Exit::Failed,
         Some(2) => Exit::WrongInput,
-        _ => lost(arguments, &last_words(status)),
+        _ => lost(&last_words(status)),
     })
-}
-
-fn lost(arguments: &FmuRunArguments, why: &str) -> Exit {
-    eprintln!("error: {}: its process was lost: {why}", arguments.unit.display());
-    Exit::Failed
 }

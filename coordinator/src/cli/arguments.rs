@@ -422,6 +422,9 @@ pub struct FmuRunArguments {
     /// Longest time of the whole run where it is isolated, s.
     #[arg(long, value_name = "S", default_value_t = 3600.0)]
     pub timeout: f64,
+    /// Most memory where it is isolated, MiB.
+    #[arg(long, value_name = "MIB", default_value_t = 8192)]
+    pub memory_mb: u64,
     /// Handle events in event mode (FMI 3).
     #[arg(long, value_name = "on|off", action = clap::ArgAction::Set, default_value = "off",
           value_parser = clap::builder::BoolishValueParser::new())]

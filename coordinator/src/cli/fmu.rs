@@ -2,12 +2,12 @@
 
 use super::arguments::{FmuCommand, FmuRunArguments};
 use super::output::outln;
+use super::table_file::{self, TableFile};
 use super::{Exit, apart, show};
 use std::fmt::Debug;
-use std::fs::File;
-use std::io::{BufWriter, Write};
 use std::path::Path;
 use terraglue::fmu::simulate::{self, Row, Settings, Table, Tables};
+use terraglue::host::isolation::confine;
 use terraglue::scenario::InputError;
 use terraglue::{Error, Result};
 use terraglue_fmi::description::ModelDescription;
@@ -28,6 +28,9 @@ fn input(message: impl ToString) -> Error {
 }
 
 fn run(arguments: &FmuRunArguments) -> Result<Exit> {
+    if apart::is_child() {
+        confine(arguments.memory_mb.saturating_mul(1 << 20));
+    }
     let fmu = Fmu::open(&arguments.unit).map_err(input)?;
     for problem in &fmu.description().problems {
         log::warn!(target: "terraglue::fmu", "{problem}");
@@ -43,24 +46,29 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
         input: arguments.input.as_deref().map(table).transpose()?.unwrap_or_default().into(),
         hold_inputs: arguments.hold_inputs,
     };
-    let mut file = arguments.csv.as_deref().map(created).transpose()?;
-    let mut between = arguments.intermediate.as_deref().map(created).transpose()?;
+    let file = arguments.csv.as_deref().map(TableFile::create).transpose()?;
+    let between = arguments.intermediate.as_deref().map(TableFile::create).transpose()?;
+    let tables: Vec<TableFile> = [&file, &between].into_iter().flatten().cloned().collect();
+    let _will = table_file::will(&arguments.unit, tables.clone());
     let sink = Box::new(|line: &terraglue_fmi::LogLine| {
         log::log!(target: "terraglue::fmu", level(line), "{}", line.text);
     });
-    let mut row = |text: &str| match &mut file {
-        None => {
-            outln!("{text}");
-            Ok(())
+    let child = apart::is_child();
+    let mut row = |text: &str| {
+        match &file {
+            None => outln!("{text}"),
+            Some(file) => line(file, text)?,
         }
-        Some(file) => line(file, text),
+        if child {
+            apart::reached(text);
+        }
+        Ok(())
     };
-    let mut row_between = between.as_mut().map(|file| move |text: &str| line(file, text));
+    let mut row_between = between.as_ref().map(|file| |text: &str| line(file, text));
     let intermediate = row_between.as_mut().map(|row| row as simulate::Line);
     let ran = simulate::run(&fmu, &settings, sink, &mut Tables { rows: &mut row, intermediate });
-    drop(row_between);
-    for file in [&mut file, &mut between].into_iter().flatten() {
-        file.flush().map_err(|source| Error::File { path: "the table".into(), source })?;
+    for table in &tables {
+        table.flush().map_err(|source| Error::File { path: "the table".into(), source })?;
     }
     match ran {
         Ok(ended) => {
@@ -81,13 +89,8 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
     }
 }
 
-fn created(path: &Path) -> Result<BufWriter<File>> {
-    let file = File::create(path);
-    file.map(BufWriter::new).map_err(|source| Error::File { path: path.display().to_string(), source })
-}
-
-fn line(file: &mut BufWriter<File>, text: &str) -> terraglue_fmi::Result {
-    writeln!(file, "{text}").map_err(|e| FmiError::Refused(format!("the table: {e}")))
+fn line(file: &TableFile, text: &str) -> terraglue_fmi::Result {
+    file.line(text).map_err(|e| FmiError::Refused(format!("the table: {e}")))
 }
 
 fn level(line: &terraglue_fmi::LogLine) -> log::Level {

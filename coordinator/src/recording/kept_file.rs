@@ -13,6 +13,7 @@ pub struct KeptFile {
     file: Option<File>,
     path: PathBuf,
     identity: (u64, u64),
+    told: bool,
 }
 
 impl KeptFile {
@@ -21,7 +22,7 @@ impl KeptFile {
         let path = std::path::absolute(path)?;
         let file = File::create(&path)?;
         let identity = identity(&file.metadata()?);
-        Ok(Self { file: Some(file), path, identity })
+        Ok(Self { file: Some(file), path, identity, told: false })
     }
 
     fn is_ours(&self) -> bool {
@@ -34,10 +35,12 @@ impl KeptFile {
             self.forget();
             let again = File::options().append(true).open(&self.path)?;
             self.identity = identity(&again.metadata()?);
-            log::warn!(
-                "`{}` was closed by a module or unit in this process and is opened again; `isolate = true` keeps such a one apart",
-                self.path.display()
-            );
+            if !std::mem::replace(&mut self.told, true) {
+                let name = self.path.display();
+                log::warn!(
+                    "`{name}` was closed by a module or unit and is opened again; `isolate = true` keeps such a one apart"
+                );
+            }
             self.file = Some(again);
         }
         self.file.as_mut().ok_or_else(|| std::io::Error::other("it is closed"))

@@ -60,6 +60,7 @@ mod tests;
 
 pub use csv::{TimingRow, write_timing};
 pub use exchange::write_exchange;
+pub use kept_file::KeptFile;
 pub use layout::{FINAL_GROUND, RECORDING, REPORT, SUMMARY, TIMING, VARIABLES};
 pub use mend::mend;
 pub use messages::{GluingRecord, PortRecord, WindowRecord};

@@ -16,7 +16,7 @@ mod tiles;
 mod wire;
 mod worker;
 
-pub use channel::end_group;
+pub use channel::{confine, end_group};
 pub(super) use law::IsolatedLaw;
 pub use nursery::{NURSERY, Nursery};
 pub use python::SDK;

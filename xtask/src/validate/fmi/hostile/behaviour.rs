@@ -1,5 +1,5 @@
-//! Units that misbehave at each stage of their life, without and with isolation: the run tells it, or goes on unharmed; its
-//! recording is read, and nothing is left behind.
+//! Units that misbehave at each stage of their life, in a scenario and alone, without and with isolation: the run tells it,
+//! or goes on unharmed; what it recorded is read, and nothing is left behind.
 
 use super::super::watched::{Ended, watched};
 use crate::process::{Outcome, command, must, read, write};
@@ -34,6 +34,8 @@ const WRONG: [(&str, &[&str]); 5] = [
 const LOGS: [&str; 4] = ["flood", "null", "utf", "huge"];
 /// Changes of the process, and what is left in it.
 const CHANGES: [&str; 7] = ["close", "folder", "locale", "mask", "signal", "thread", "child"];
+/// Table of a unit that is run alone.
+const TABLE: &str = "table.csv";
 /// Longest run, s: the program's own limits come first.
 const LONGEST: Duration = Duration::from_secs(60);
 /// Samples of a complete recording, and of one whose unit misbehaves in its first step after 0.25 s.
@@ -46,6 +48,8 @@ struct Case {
     what: &'static str,
     stage: &'static str,
     isolated: bool,
+    /// By `terraglue fmu run`; else in a scenario.
+    alone: bool,
 }
 
 /// How it must end.
@@ -60,8 +64,8 @@ enum Promise {
 impl Case {
     fn all() -> Vec<Self> {
         let mut all = Vec::new();
-        for isolated in [true, false] {
-            let mut add = |what, stage| all.push(Self { what, stage, isolated });
+        for (isolated, alone) in [(true, false), (false, false), (true, true), (false, true)] {
+            let mut add = |what, stage| all.push(Self { what, stage, isolated, alone });
             for what in DEADLY.into_iter().filter(|what| isolated || *what == "exit") {
                 STAGES.iter().for_each(|stage| add(what, stage));
             }
@@ -87,6 +91,18 @@ impl Case {
         }
     }
 
+    /// Folder of its run.
+    fn folder(self) -> String {
+        let alone = if self.alone { "-alone" } else { "" };
+        let isolated = if self.isolated { "-isolated" } else { "" };
+        format!("{}{alone}{isolated}", self.name())
+    }
+
+    /// Longest time of a call of it, s.
+    fn patience(self) -> f64 {
+        if ["hang", "stop"].contains(&self.what) { 1.0 } else { 60.0 }
+    }
+
     /// Samples that the recording must hold; none: the run does not begin.
     fn samples(self) -> Option<usize> {
         match (self.promise(), self.stage) {
@@ -98,7 +114,7 @@ impl Case {
 
     fn scenario(self, unit: &Path) -> String {
         let (name, unit, isolated) = (self.name(), unit.display(), self.isolated);
-        let patience = if ["hang", "stop"].contains(&self.what) { 1.0 } else { 60.0 };
+        let patience = self.patience();
         format!(
             "[time]\nstep_s = 0.125\nduration_s = 1.0\n[recording]\nevery_steps = 1\n[{name}]\nfmu = \"{unit}\"\nisolate = \
              {isolated}\nstep_timeout_s = {patience}\nload_timeout_s = {patience}\nmemory_mb = 500\n"
@@ -114,21 +130,19 @@ pub fn figures(folder: &Path, context: &Context) -> Outcome<Vec<Figure>> {
         let wrong = judge(folder, context, unit, *case).unwrap_or_else(|e| vec![e]);
         (!wrong.is_empty()).then(|| format!("{}: {}", case.name(), wrong.join(", ")))
     });
-    let figure = |isolated: bool, id: &str, what: &str| {
-        let of = || cases.iter().zip(&broken).filter(|(case, _)| case.isolated == isolated);
+    let figure = |(isolated, alone), id: &str, what: &str| {
+        let of = || cases.iter().zip(&broken).filter(|(c, _)| (c.isolated, c.alone) == (isolated, alone));
         let told: Vec<&str> = of().filter_map(|(_, broken)| broken.as_deref()).collect();
-        let text = format!("{what} that end otherwise than promised, of {}", of().count());
+        let text = format!("units {what} that end otherwise than promised, of {}", of().count());
         let text = if told.is_empty() { text } else { format!("{text}: {}", told.join("; ")) };
-        Figure::new(
-            format!("fmi.behaviour.{id}"),
-            told.len() as f64,
-            Limit::Equal(0.0),
-            text.replace(['\n', '\t'], " "),
-        )
+        let text = text.replace(['\n', '\t'], " ");
+        Figure::new(format!("fmi.behaviour.{id}"), told.len() as f64, Limit::Equal(0.0), text)
     };
     Ok(vec![
-        figure(true, "isolated", "units in a process of their own that misbehave while they live"),
-        figure(false, "same_process", "units in the process of the run that misbehave without killing it"),
+        figure((true, false), "isolated", "of a scenario in a process of their own that misbehave"),
+        figure((false, false), "same_process", "of a scenario that misbehave without killing its process"),
+        figure((true, true), "alone.isolated", "run alone in a process of their own that misbehave"),
+        figure((false, true), "alone.same_process", "run alone that misbehave without killing the process"),
     ])
 }
 
@@ -151,17 +165,29 @@ fn unit(folder: &Path) -> Outcome<std::path::PathBuf> {
 
 /// What is otherwise than promised.
 fn judge(folder: &Path, context: &Context, unit: &Path, case: Case) -> Outcome<Vec<String>> {
-    let place = folder.join(format!("{}-{}", case.name(), case.isolated));
-    write(&place.join("x.toml"), &case.scenario(unit))?;
+    let place = folder.join(case.folder());
     let mut run = Command::new(&context.program);
-    run.args(["run", "x.toml", "--csv", "--quiet", "--out", "out"]);
+    if case.alone {
+        std::fs::create_dir_all(&place).map_err(|e| format!("{}: {e}", place.display()))?;
+        run.args(["fmu", "run", "--stop", "1", "--step", "0.125", "--csv", TABLE]).arg(unit);
+        if case.isolated {
+            run.args(["--isolate", "--memory-mb", "500", "--timeout", &case.patience().to_string()]);
+        }
+        run.env("HOSTILE_NAME", case.name());
+    } else {
+        write(&place.join("x.toml"), &case.scenario(unit))?;
+        run.args(["run", "x.toml", "--csv", "--quiet", "--out", "out"]);
+    }
     if case.stage == "load" {
         run.env("HOSTILE_LOAD", case.what);
     }
     let ended = watched(&mut run, &place, LONGEST)?;
     let mut wrong = about_end(case, &ended);
     if let Some(samples) = case.samples() {
-        wrong.extend(about_recording(&place.join("out"), &case.name(), samples));
+        wrong.extend(match case.alone {
+            true => about_table(&place.join(TABLE), samples),
+            false => about_recording(&place.join("out"), &case.name(), samples),
+        });
     }
     wrong.extend(ended.left.iter().map(|what| format!("{what} is left")));
     if wrong.is_empty() {
@@ -182,9 +208,11 @@ fn about_end(case: Case, ended: &Ended) -> Vec<String> {
     if told != usize::try_from(wanted).unwrap_or(0) {
         wrong.push(format!("{told} errors are told"));
     }
-    // a library that ends the process of the run itself has no name yet
-    let named = case.isolated || case.what != "exit";
-    if wanted == 1 && named && !ended.error().contains(&case.name()) {
+    // a library that ends the process of the run while it is loaded has no name yet
+    let named =
+        case.isolated || case.what != "exit" || !["load", "instantiate", "initialise"].contains(&case.stage);
+    let name = if case.alone { "hostile.fmu".to_owned() } else { case.name() };
+    if wanted == 1 && (named || case.alone) && !ended.error().contains(&name) {
         wrong.push(format!("`{}` does not name it", ended.error()));
     }
     if errors.contains("panicked") || errors.len() > 100_000 {
@@ -202,9 +230,8 @@ fn about_recording(folder: &Path, name: &str, samples: usize) -> Option<String> 
     if found != samples {
         return Some(format!("{found} samples in its recording, not {samples}"));
     }
-    let rows = read(&folder.join("variables.csv")).map_or(0, |text| text.lines().count());
-    if rows != samples + 1 {
-        return Some(format!("{rows} lines in its table, not {}", samples + 1));
+    if let Some(wrong) = about_table(&folder.join("variables.csv"), samples) {
+        return Some(wrong);
     }
     let closed = |name: &&str| {
         let mode = std::fs::metadata(folder.join(name)).map_or(0, |of| of.permissions().mode());
@@ -212,4 +239,9 @@ fn about_recording(folder: &Path, name: &str, samples: usize) -> Option<String> 
     };
     let unread = ["recording.mcap", "variables.csv", "summary.json", "report.html"].into_iter().find(closed);
     unread.map(|name| format!("{name} is missing or cannot be read"))
+}
+
+fn about_table(path: &Path, samples: usize) -> Option<String> {
+    let rows = read(path).map_or(0, |text| text.lines().count());
+    (rows != samples + 1).then(|| format!("{rows} lines in its table, not {}", samples + 1))
 }

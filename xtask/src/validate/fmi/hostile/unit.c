@@ -1,5 +1,5 @@
-/* A unit of FMI 2.0 that misbehaves at one stage of its life. Its name says how and when: `segv_step`; while it is
- * loaded it has no name yet, HOSTILE_LOAD says how. Steps misbehave after t = 0.25 s. */
+/* A unit of FMI 2.0 that misbehaves at one stage of its life. Its name says how and when: `segv_step`, or HOSTILE_NAME
+ * does; while it is loaded it has no name yet, HOSTILE_LOAD says how. Steps misbehave after t = 0.25 s. */
 #define _GNU_SOURCE
 #include <fcntl.h>
 #include <locale.h>
@@ -92,7 +92,8 @@ __attribute__((constructor)) static void load(void) {
 
 void *fmi2Instantiate(const char *n, int t, const char *g, const char *r, const Back *b, int v, int l) {
     Unit *u = calloc(1, sizeof *u);
-    strncpy(u->name, n, 63);
+    const char *name = getenv("HOSTILE_NAME");
+    strncpy(u->name, name ? name : n, 63);
     u->back = *b;
     u->x = 1;
     return at(u, "instantiate") ? 0 : u;

@@ -7,7 +7,7 @@ FRAME = r"""
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-typedef struct { double r[32]; int i[8], b[8]; char text[64]; } Unit;
+typedef struct { double r[32], slope[32]; int i[8], b[8]; char text[64]; } Unit;
 static const double start[32] = {%(start)s};
 void *fmi2Instantiate(const char *n, int t, const char *g, const char *r, const void *b, int v, int l) {
     Unit *u = calloc(1, sizeof *u); memcpy(u->r, start, sizeof start); return u; }
@@ -27,14 +27,16 @@ int fmi2SetString(Unit *u, const unsigned *r, size_t n, const char *const *x) { 
 int fmi2GetFMUstate(Unit *u, void **s) { if (!*s) *s = malloc(sizeof *u); memcpy(*s, u, sizeof *u); return 0; }
 int fmi2SetFMUstate(Unit *u, void *s) { memcpy(u, s, sizeof *u); return 0; }
 int fmi2FreeFMUstate(Unit *u, void **s) { free(*s); *s = 0; return 0; }
+%(more)s
 int fmi2DoStep(Unit *u, double t, double h, int p) { double *r = u->r; int *i = u->i, *b = u->b; %(step)s return 0; }
 """
 
 
-def build(folder, name, reals, step, others="", units="", variable_step=True, types=""):
-    """The unit `name`.fmu; `reals` are (name, causality, start, unit), `step` is C over r, i and b at t, of length h."""
+def build(folder, name, reals, step, others="", units="", variable_step=True, types="", more="", flags=""):
+    """The unit `name`.fmu; `reals` are (name, causality, start, unit), `step` is C over r, i and b at t, of length h; `more` are functions
+    of its own, `flags` attributes of <CoSimulation>."""
     starts = ", ".join(repr(float(start)) for _, _, start, _ in reals)
-    (folder / f"{name}.c").write_text(FRAME % {"start": starts, "step": step})
+    (folder / f"{name}.c").write_text(FRAME % {"start": starts, "step": step, "more": more})
     command = ["cc", "-shared", "-fPIC", "-w", f"{name}.c", "-o", f"{name}.so", "-lm"]
     subprocess.run(command, cwd=folder, check=True, capture_output=True)
     text = ""
@@ -50,7 +52,7 @@ def build(folder, name, reals, step, others="", units="", variable_step=True, ty
     variable = str(variable_step).lower()
     description = f"""<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="{name}" guid="g">
-<CoSimulation modelIdentifier="m" canGetAndSetFMUstate="true" canHandleVariableCommunicationStepSize="{variable}"/>
+<CoSimulation modelIdentifier="m" canGetAndSetFMUstate="true" canHandleVariableCommunicationStepSize="{variable}" {flags}/>
 {units}{types}<ModelVariables>{text}{others}</ModelVariables>
 <ModelStructure><Outputs>{outputs}</Outputs></ModelStructure></fmiModelDescription>"""
     with zipfile.ZipFile(folder / f"{name}.fmu", "w") as archive:
@@ -68,7 +70,8 @@ FRAME_3 = r"""
 #include <string.h>
 typedef void Log(void *, int, const char *, const char *);
 typedef void Update(void *, double, bool, bool, bool, bool, bool *, double *);
-typedef struct { double v[16][64]; unsigned long n; int mode; void *env; Log *log; Update *update; bool early; } Unit;
+typedef struct { double v[16][64]; unsigned long n; int mode; void *env; Log *log; Update *update; bool early;
+    unsigned announced[8]; size_t count; } Unit;
 static size_t size(Unit *u, unsigned r) { size_t n = u->n; switch (r) { %(sizes)s } return 1; }
 static void calc(Unit *u, double (*v)[64]) { %(calc)s }
 static int odd(Unit *u) { %(odd)s return 0; }
@@ -77,7 +80,9 @@ static void start(Unit *u) { double (*v)[64] = u->v; %(start)s }
 void *fmi3InstantiateCoSimulation(const char *n, const char *t, const char *r, bool v, bool l, bool e, bool a,
     const unsigned *q, size_t k, void *env, Log *log, Update *update) {
     Unit *u = calloc(1, sizeof *u);
-    u->env = env; u->log = log; u->update = update; u->early = a; u->n = %(n)d; start(u); odd(u); return u; }
+    u->env = env; u->log = log; u->update = update; u->early = a; u->n = %(n)d;
+    for (u->count = k; k-- > 0;) if (k < 8) u->announced[k] = q[k];
+    start(u); odd(u); return u; }
 void fmi3FreeInstance(Unit *u) { odd(u); free(u); }
 #ifndef PLAIN
 int fmi3EnterConfigurationMode(Unit *u) { if (u->mode) return no(u, "too late"); u->mode = 1; return 0; }
@@ -97,6 +102,7 @@ int fmi3GetFloat64(Unit *u, const unsigned *r, size_t k, double *x, size_t m) {
     for (size_t i = 0; i < k; i++) { size_t s = size(u, r[i]); memcpy(x, u->v[r[i]], 8 * s); x += s; m -= s; }
     return m ? no(u, "wrong number of values") : 0; }
 int fmi3SetFloat64(Unit *u, const unsigned *r, size_t k, const double *x, size_t m) {
+    %(sets)s
     for (size_t i = 0; i < k; i++) { size_t s = size(u, r[i]); memcpy(u->v[r[i]], x, 8 * s); x += s; m -= s; }
     return m ? no(u, "wrong number of values") : 0; }
 int fmi3GetFMUState(Unit *u, void **s) {
@@ -116,12 +122,13 @@ int fmi3DoStep(Unit *u, double t, double h, bool g, bool *event, bool *end, bool
 """
 
 
-def build_3(folder, name, variables, step, start="", more="", flags="", n=0, macros=(), calc="", odd=""):
+def build_3(folder, name, variables, step, start="", more="", flags="", n=0, macros=(), calc="", odd="", others="", sets=""):
     """The unit `name`.fmu of FMI 3.0; `variables` are (name, causality, start, sides), a side being a number or "n"; the first has the
-    reference 2 where there is an `n` (not 0), else 1."""
+    reference 2 where there is an `n` (not 0), else 1; `others` are more variables as XML, `sets` is what setting numbers begins
+    with."""
     first = 2 if n else 1
     sizes = "".join(f"case {first + k}: return {' * '.join(map(str, v[3]))};" for k, v in enumerate(variables) if v[3])
-    code = FRAME_3 % {"sizes": sizes, "start": start, "more": more, "step": step, "n": n, "calc": calc, "odd": odd}
+    code = FRAME_3 % {"sizes": sizes, "start": start, "more": more, "step": step, "n": n, "calc": calc, "odd": odd, "sets": sets}
     (folder / f"{name}.c").write_text(code)
     command = ["cc", "-shared", "-fPIC", "-w", *(f"-D{m}" for m in macros), f"{name}.c", "-o", f"{name}.so", "-lm", "-pthread"]
     subprocess.run(command, cwd=folder, check=True, capture_output=True)
@@ -131,7 +138,7 @@ def build_3(folder, name, variables, step, start="", more="", flags="", n=0, mac
     for k, (own, causality, value, sides) in enumerate(variables):
         value = f' start="{value}"' if value else ""
         tunable = ' variability="tunable"' if causality == "parameter" else ""
-        between = ' intermediateUpdate="true"' if causality == "output" and "IntermediateUpdate" in flags else ""
+        between = ' intermediateUpdate="true"' if causality in ("input", "output") and "IntermediateUpdate" in flags else ""
         text += f'<Float64 name="{own}" valueReference="{first + k}" causality="{causality}"{between}{tunable}{value}>'
         text += "".join(f'<Dimension {"valueReference=" if s == "n" else "start="}"{1 if s == "n" else s}"/>' for s in sides)
         text += "</Float64>"
@@ -139,7 +146,7 @@ def build_3(folder, name, variables, step, start="", more="", flags="", n=0, mac
     description = f"""<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="3.0" modelName="{name}" instantiationToken="g">
 <CoSimulation modelIdentifier="m" canGetAndSetFMUState="true" canHandleVariableCommunicationStepSize="true" {flags}/>
-<ModelVariables><Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>{text}</ModelVariables>
+<ModelVariables><Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>{text}{others}</ModelVariables>
 <ModelStructure>{outputs}</ModelStructure></fmiModelDescription>"""
     with zipfile.ZipFile(folder / f"{name}.fmu", "w") as archive:
         archive.writestr("modelDescription.xml", description)

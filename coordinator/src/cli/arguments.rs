@@ -389,9 +389,12 @@ pub struct FmuRunArguments {
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
     /// Inputs over time: a header with `time` and names, straight lines between the rows. Elements of arrays of Float64 may have
-    /// columns of their own (`u[2]`); whole arrays are written with spaces between their values.
+    /// columns of their own (`u[2]`); whole arrays are written with spaces between their values. Units that can follow inputs within steps do so.
     #[arg(long, value_name = "FILE")]
     pub input: Option<PathBuf>,
+    /// Hold inputs over each step, also of units that can follow them within (FMI 3: intermediate update; FMI 2: canInterpolateInputs).
+    #[arg(long)]
+    pub hold_inputs: bool,
     /// Write what the unit shows at its inner steps here (FMI 3, intermediate update).
     #[arg(long, value_name = "FILE")]
     pub intermediate: Option<PathBuf>,

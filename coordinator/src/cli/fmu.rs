@@ -43,7 +43,8 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
         tolerance: arguments.tolerance,
         outputs: arguments.output.clone(),
         event_mode: arguments.event_mode,
-        input: arguments.input.as_deref().map(table).transpose()?.unwrap_or_default(),
+        input: arguments.input.as_deref().map(table).transpose()?.unwrap_or_default().into(),
+        hold_inputs: arguments.hold_inputs,
     };
     let file = arguments.csv.as_deref().map(TableFile::create).transpose()?;
     let between = arguments.intermediate.as_deref().map(TableFile::create).transpose()?;

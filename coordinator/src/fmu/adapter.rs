@@ -77,6 +77,7 @@ impl FmuSubsystem {
                 verbose: false,
                 event_mode: options.event_mode,
                 intermediate: Vec::new(),
+                followed: Vec::new(),
                 sink: Box::new(move |line| sink.log(line.level, &line.text)),
             },
         );

@@ -1,142 +1,194 @@
-//! Inputs over time of a unit that is run alone: a table of numbers, arrays, texts and clocks.
+//! What the columns of a table of inputs feed in a unit that is run alone: numbers, arrays, texts and clocks, at communication
+//! points and – numbers of units that follow their inputs – within steps.
 
 use super::map::element_name;
 use super::simulate::find;
+use super::table::Table;
+use std::sync::Arc;
 use terraglue_fmi::description::Variable;
-use terraglue_fmi::{Error, ModelDescription, Result, Slave};
+use terraglue_fmi::{Error, ModelDescription, Result, Slave, Version};
 use terraglue_subsystem::{ValueType, Values};
 
-/// Inputs over time. Cells stay as they are written, because whole numbers of 64 bits do not fit into f64.
-#[derive(Clone, Debug, Default)]
-pub struct Table {
-    /// Names after `time`.
-    pub names: Vec<String>,
-    /// Rows, ascending in time.
-    pub rows: Vec<Row>,
+/// All that a table feeds.
+pub struct Inputs {
+    table: Arc<Table>,
+    all: Vec<Input>,
+    /// Inputs whose slopes are told (FMI 2), and their columns.
+    slopes: Vec<u32>,
+    columns: Vec<usize>,
 }
 
-/// Inputs at a time.
-#[derive(Clone, Debug, Default, PartialEq)]
-pub struct Row {
-    /// s.
-    pub time: f64,
-    /// A cell for each name.
-    pub cells: Vec<String>,
-    /// The same as numbers; NaN where they are none.
-    pub numbers: Vec<f64>,
-}
-
-impl Table {
-    /// The last row at or before t, or the first of all, and the row after it.
-    fn around(&self, t: f64) -> Option<(&Row, Option<&Row>)> {
-        let next = self.rows.partition_point(|r| r.time <= t);
-        match next.checked_sub(1) {
-            Some(k) => Some((&self.rows[k], self.rows.get(next))),
-            None => self.rows.first().map(|row| (row, None)),
-        }
-    }
-
-    /// A number at t by straight lines between the rows; the first and last row hold beyond.
-    fn number(&self, t: f64, column: usize) -> f64 {
-        match self.around(t) {
-            Some((a, Some(b))) => {
-                let s = (t - a.time) / (b.time - a.time);
-                a.numbers[column] + s * (b.numbers[column] - a.numbers[column])
-            }
-            Some((row, None)) => row.numbers[column],
-            None => 0.0,
-        }
-    }
-
-    /// Numbers of an array at t, written with spaces between them; nothing where a cell has not so many.
-    fn numbers(&self, t: f64, column: usize, count: usize) -> Option<Vec<f64>> {
-        let read = |row: &Row| {
-            let words = row.cells[column].split_whitespace();
-            let all: Option<Vec<f64>> =
-                words.map(|w| w.parse().ok().filter(|x: &f64| x.is_finite())).collect();
-            all.filter(|x| x.len() == count)
-        };
-        let Some((a, b)) = self.around(t) else { return Some(vec![0.0; count]) };
-        let (first, Some(b)) = (read(a)?, b) else { return read(a) };
-        let s = (t - a.time) / (b.time - a.time);
-        Some(first.iter().zip(read(b)?).map(|(x, y)| x + s * (y - x)).collect())
-    }
-
-    /// The cell that holds at t.
-    fn cell(&self, t: f64, column: usize) -> &str {
-        self.around(t).map_or("0", |(row, _)| &row.cells[column])
-    }
-}
-
-/// A column of a table and what it feeds.
-pub struct Input {
-    column: usize,
+/// A variable and what feeds it.
+struct Input {
     variable: Variable,
-    /// Of an array.
-    element: Option<usize>,
+    /// Columns, with the element of an array where that has its own.
+    columns: Vec<(usize, Option<usize>)>,
+    /// Elements, of which those stay so that have no column.
+    rest: Vec<f64>,
+    /// Whether the unit follows it within steps.
+    followed: bool,
 }
 
-/// Finds what the columns of a table feed: variables, whole arrays or elements of arrays of f64.
-///
-/// # Errors
-/// A column that is no variable of the unit.
-pub fn find_all(description: &ModelDescription, table: &Table) -> Result<Vec<Input>> {
-    let one = |(column, name): (usize, &String)| {
-        let array = |v: &&Variable| {
-            v.value_type == ValueType::F64
-                && name.strip_prefix(v.name.as_str()).is_some_and(|r| r.starts_with('['))
+/// Inputs with columns that a unit of FMI 3 sets at intermediate times, as far as that is known before arrays have their
+/// sizes.
+pub fn followed(description: &ModelDescription, table: &Table) -> Vec<String> {
+    let fed = |v: &Variable| {
+        let own = |name: &String| {
+            name.strip_prefix(v.name.as_str()).is_some_and(|r| r.is_empty() || r.starts_with('['))
         };
-        let element = |v: &Variable| (0..v.len()).find(|k| element_name(v, *k) == *name);
-        let mut elements = description.variables.iter().filter(array).filter_map(|v| Some((v, element(v)?)));
-        if description.position(name).is_none()
-            && let Some((v, k)) = elements.next()
-        {
-            return Ok(Input { column, variable: v.clone(), element: Some(k) });
-        }
-        Ok(Input { column, variable: find(description, name)?.clone(), element: None })
+        table.names.iter().any(own)
     };
-    table.names.iter().enumerate().map(one).collect()
+    let three = description.version == Version::V3;
+    let followed = description.variables.iter().filter(|v| three && description.follows(v) && fed(v));
+    followed.map(|v| v.name.clone()).collect()
 }
 
-/// Sets all inputs to what they are at t.
-///
-/// # Errors
-/// What is no value of its variable, or what the unit does not take.
-pub fn set_all(slave: &mut Slave, inputs: &[Input], table: &Table, t: f64) -> Result {
-    inputs.iter().try_for_each(|input| set(slave, input, table, t))
-}
-
-fn set(slave: &mut Slave, input: &Input, table: &Table, t: f64) -> Result {
-    let (column, v, reference) = (input.column, &input.variable, [input.variable.reference]);
-    let none =
-        || Error::Refused(format!("`{}`: the input is no number beside t = {t} s", table.names[column]));
-    let number = || Some(table.number(t, column)).filter(|x| x.is_finite()).ok_or_else(none);
-    if v.value_type == ValueType::Clock {
-        slave.can_trigger(v)?;
-        slave.trigger(v.reference, matches!(table.cell(t, column), "1" | "true"));
-        return Ok(());
-    }
-    if slave.waits_for_clock(v.reference) {
-        let (v, cell) = (v.clone(), table.cell(t, column).to_owned());
-        slave.hold(v.reference, move |slave| set_text(slave, &v, &cell));
-        return Ok(());
-    }
-    match (v.value_type, input.element) {
-        (ValueType::F64, Some(k)) => {
-            let mut whole = vec![f64::NAN; v.len()];
-            slave.get_f64(&reference, &mut whole)?;
-            whole[k] = number()?;
-            slave.set_f64(&reference, &whole)
+impl Inputs {
+    /// Finds what the columns of a table feed: variables, whole arrays or elements of arrays of f64. The unit is in
+    /// initialisation mode; `hold`: it follows nothing within steps.
+    ///
+    /// # Errors
+    /// A column that is no variable of the unit.
+    pub fn find(slave: &Slave, table: &Arc<Table>, hold: bool) -> Result<Self> {
+        let description = slave.description();
+        let mut all: Vec<Input> = Vec::new();
+        for (column, name) in table.names.iter().enumerate() {
+            let (v, element) = place(description, name)?;
+            let same =
+                |i: &&mut Input| (i.variable.reference, i.variable.value_type) == (v.reference, v.value_type);
+            match all.iter_mut().find(same) {
+                Some(input) => input.columns.push((column, element)),
+                None => all.push(Input {
+                    variable: v.clone(),
+                    columns: vec![(column, element)],
+                    rest: vec![f64::NAN; v.len()],
+                    followed: !hold && description.follows(v),
+                }),
+            }
         }
-        (ValueType::F64, None) if !v.sizes.is_empty() => {
-            let whole = table.numbers(t, column, v.len()).ok_or_else(|| {
-                Error::Refused(format!("`{}`: the input is not {} numbers beside t = {t} s", v.name, v.len()))
+        for input in &mut all {
+            if input.columns.iter().any(|(_, element)| element.is_some()) {
+                slave.get_f64(&[input.variable.reference], &mut input.rest)?;
+            }
+        }
+        let told = all.iter().filter(|i| i.followed && description.version == Version::V2);
+        let (slopes, columns) = told.map(|i| (i.variable.reference, i.last())).unzip();
+        Ok(Self { table: table.clone(), all, slopes, columns })
+    }
+
+    /// Lets a unit of FMI 3 ask for its inputs within steps.
+    pub fn follow(&self, slave: &mut Slave) -> Result {
+        if slave.description().version != Version::V3 {
+            return Ok(());
+        }
+        for input in self.all.iter().filter(|i| i.followed) {
+            let (table, columns, rest) = (self.table.clone(), input.columns.clone(), input.rest.clone());
+            slave.follow(&input.variable, move |t, out| {
+                out.copy_from_slice(&rest);
+                columns.iter().for_each(|(column, element)| table.write(t, *column, *element, out));
             })?;
-            slave.set_f64(&reference, &whole)
         }
-        (ValueType::F64, None) => slave.set_f64(&reference, &[number()?]),
-        (ValueType::F32, _) if v.sizes.is_empty() => slave.set(&reference, Values::F32(&[number()? as f32])),
-        _ => set_text(slave, v, table.cell(t, column)),
+        Ok(())
+    }
+
+    /// Sets all inputs to what they are at t.
+    ///
+    /// # Errors
+    /// What is no value of its variable, or what the unit does not take.
+    pub fn set(&self, slave: &mut Slave, t: f64) -> Result {
+        self.all.iter().try_for_each(|input| input.set(slave, &self.table, t))
+    }
+
+    /// The error of a step with what may be tried.
+    pub fn way_out(&self, error: Error) -> Error {
+        match error {
+            Error::Call { function, outcome, log, fatal } if self.all.iter().any(|i| i.followed) => {
+                Error::Call { function, outcome: format!("{outcome} ({WAY_OUT})"), log, fatal }
+            }
+            other => other,
+        }
+    }
+
+    /// A part of a step begins, from t to `end`: what the unit follows is set where the part is not the first, and slopes
+    /// are told.
+    pub fn begin_part(&self, slave: &mut Slave, (t, end): (f64, f64), first: bool) -> Result {
+        if !first {
+            let mut followed = self.all.iter().filter(|i| i.followed);
+            followed.try_for_each(|input| input.set(slave, &self.table, t))?;
+        }
+        if self.slopes.is_empty() {
+            return Ok(());
+        }
+        let slope = |column: &usize| {
+            let slope = self.table.slope(t, end, *column);
+            if slope.is_finite() { Ok(slope) } else { Err(self.table.none(*column, end)) }
+        };
+        let slopes = self.columns.iter().map(slope).collect::<Result<Vec<f64>>>()?;
+        slave.set_slopes(&self.slopes, &slopes)
+    }
+}
+
+/// What to try where a unit fails that follows its inputs.
+const WAY_OUT: &str = "it follows its inputs within steps; --hold-inputs holds them over each step instead";
+
+/// The variable that a column feeds, and the element of it.
+fn place<'a>(description: &'a ModelDescription, name: &str) -> Result<(&'a Variable, Option<usize>)> {
+    let array = |v: &&Variable| {
+        v.value_type == ValueType::F64
+            && name.strip_prefix(v.name.as_str()).is_some_and(|r| r.starts_with('['))
+    };
+    let element = |v: &Variable| (0..v.len()).find(|k| element_name(v, *k) == *name);
+    let mut elements = description.variables.iter().filter(array).filter_map(|v| Some((v, element(v)?)));
+    match elements.next().filter(|_| description.position(name).is_none()) {
+        Some((v, k)) => Ok((v, Some(k))),
+        None => Ok((find(description, name)?, None)),
+    }
+}
+
+impl Input {
+    /// The column that counts where several feed it whole.
+    fn last(&self) -> usize {
+        self.columns.last().map_or(0, |(column, _)| *column)
+    }
+
+    fn set(&self, slave: &mut Slave, table: &Table, t: f64) -> Result {
+        let (v, column, reference) = (&self.variable, self.last(), [self.variable.reference]);
+        if v.value_type == ValueType::Clock {
+            slave.can_trigger(v)?;
+            slave.trigger(v.reference, matches!(table.cell(t, column), "1" | "true"));
+            return Ok(());
+        }
+        if slave.waits_for_clock(v.reference) {
+            let (v, cell) = (v.clone(), table.cell(t, column).to_owned());
+            slave.hold(v.reference, move |slave| set_text(slave, &v, &cell));
+            return Ok(());
+        }
+        match v.value_type {
+            ValueType::F64 => slave.set_f64(&reference, &self.numbers(table, t)?),
+            ValueType::F32 => {
+                let narrow: Vec<f32> = self.numbers(table, t)?.into_iter().map(|x| x as f32).collect();
+                slave.set(&reference, Values::F32(&narrow))
+            }
+            _ => set_text(slave, v, table.cell(t, column)),
+        }
+    }
+
+    fn numbers(&self, table: &Table, t: f64) -> Result<Vec<f64>> {
+        let mut out = self.rest.clone();
+        for (column, element) in &self.columns {
+            table.write(t, *column, *element, &mut out);
+            let written = element.map_or(&out[..], |k| &out[k..=k]);
+            if written.iter().any(|x| !x.is_finite()) {
+                return Err(match written.len() {
+                    1 => table.none(*column, t),
+                    n => Error::Refused(format!(
+                        "`{}`: the input is not {n} numbers beside t = {t} s",
+                        self.variable.name
+                    )),
+                });
+            }
+        }
+        Ok(out)
     }
 }
 

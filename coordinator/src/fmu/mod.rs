@@ -14,6 +14,7 @@ mod rollback;
 mod settings;
 pub mod simulate;
 pub mod ssp;
+mod table;
 
 pub use adapter::{FmuSubsystem, is_fmu};
 pub use feet::Feet;

@@ -1,6 +1,6 @@
 //! One unit alone: from its start to its end in equal steps, its outputs as rows of a table.
 
-use super::inputs::{self, set_text};
+use super::inputs::{self, Inputs, set_text};
 use super::map::element_name;
 use crate::scenario::did_you_mean;
 use std::sync::Arc;
@@ -9,7 +9,7 @@ use terraglue_fmi::slave::Sink;
 use terraglue_fmi::{Advance, Error, Fmu, ModelDescription, Result, Slave, SlaveOptions, SlaveState};
 use terraglue_subsystem::{ValueType, ValuesMut};
 
-pub use super::inputs::{Row, Table};
+pub use super::table::{Row, Table};
 
 /// How a unit is run.
 pub struct Settings {
@@ -28,7 +28,9 @@ pub struct Settings {
     /// Whether events are handled in event mode.
     pub event_mode: bool,
     /// Inputs over time.
-    pub input: Table,
+    pub input: Arc<Table>,
+    /// Whether inputs are held over each step, also of units that follow them within.
+    pub hold_inputs: bool,
 }
 
 /// Takes a line of a table.
@@ -65,7 +67,12 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         None => Vec::new(),
     };
     let (event_mode, name) = (settings.event_mode, "unit".into());
-    let options = SlaveOptions { name, verbose: false, event_mode, intermediate: intermediate.clone(), sink };
+    let followed = match settings.hold_inputs {
+        true => Vec::new(),
+        false => inputs::followed(fmu.description(), &settings.input),
+    };
+    let options =
+        SlaveOptions { name, verbose: false, event_mode, intermediate: intermediate.clone(), followed, sink };
     let mut slave = Slave::instantiate(fmu, options)?;
     configure(&mut slave, &settings.start)?;
     let description = slave.description().clone();
@@ -77,9 +84,10 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         }
     }
     slave.enter_initialization(start, Some(stop), settings.tolerance.or(experiment.tolerance))?;
-    let inputs = inputs::find_all(&description, &settings.input)?;
-    inputs::set_all(&mut slave, &inputs, &settings.input, start)?;
+    let inputs = Inputs::find(&slave, &settings.input, settings.hold_inputs)?;
+    inputs.set(&mut slave, start)?;
     slave.exit_initialization()?;
+    inputs.follow(&mut slave)?;
     // with event mode a last column says how many events were handled since the row before
     let marked = |text: String, events: u32| match settings.event_mode {
         true if text.starts_with("time") => text + ",events",
@@ -100,10 +108,11 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         }
         let (t, end) = (start + k as f64 * step, start + (k + 1) as f64 * step);
         let at = |e: Error| named(e, t);
-        inputs::set_all(&mut slave, &inputs, &settings.input, t).map_err(at)?;
+        inputs.set(&mut slave, t).map_err(at)?;
         slave.forget_ticks();
         let events;
-        (ended, events) = halving(&mut slave, &mut before, (t, end), &mut tables.intermediate).map_err(at)?;
+        let step = halving(&mut slave, &inputs, &mut before, (t, end), &mut tables.intermediate);
+        (ended, events) = step.map_err(|e| at(inputs.way_out(e)))?;
         let now = ended.unwrap_or(end);
         row(&marked(line(&slave, now, &columns).map_err(|e| named(e, now))?, events))
     });
@@ -138,6 +147,7 @@ impl Before {
 /// events there were.
 fn halving(
     slave: &mut Slave,
+    inputs: &Inputs,
     before: &mut Before,
     (start, end): (f64, f64),
     between: &mut Option<Line>,
@@ -148,6 +158,8 @@ fn halving(
         if before.saves {
             before.save(slave)?;
         }
+        let part = (t, if h >= end - t { end } else { t + h });
+        inputs.begin_part(slave, part, t == start && halvings == 0)?;
         let made = slave.do_step(Advance { t, h: h.min(end - t), for_good: true });
         if let (Ok(_), Some(write)) = (&made, &mut *between) {
             for row in slave.take_intermediate() {

@@ -100,6 +100,7 @@ fn loading(bytes: &[u8]) -> String {
         verbose: false,
         event_mode: false,
         intermediate: Vec::new(),
+        followed: Vec::new(),
         sink: Box::new(|_| {}),
     };
     let error = Slave::instantiate(&fmu, options).expect_err("no library");

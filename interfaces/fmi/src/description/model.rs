@@ -230,7 +230,7 @@ pub struct Variable {
     pub clocks: Vec<u32>,
     /// Whether a structural parameter changed its shape, so that the start values of the description are not for it.
     pub resized: bool,
-    /// Whether it can be read at intermediate times.
+    /// Whether it can be read, or set where it is an input, at intermediate times.
     pub intermediate: bool,
 }
 
@@ -319,5 +319,17 @@ impl ModelDescription {
     /// Position of a variable.
     pub fn position(&self, name: &str) -> Option<usize> {
         self.variables.iter().position(|v| v.name == name)
+    }
+
+    /// Whether the unit follows this input within its steps: by its slope in FMI 2, in its intermediate update in FMI 3.
+    pub fn follows(&self, v: &Variable) -> bool {
+        let able = match self.version {
+            Version::V2 => self.capabilities.interpolates_inputs && v.value_type == ValueType::F64,
+            Version::V3 => {
+                let float = matches!(v.value_type, ValueType::F64 | ValueType::F32);
+                self.capabilities.intermediate_update && v.intermediate && float
+            }
+        };
+        able && v.causality == Causality::Input && v.variability == Variability::Continuous
     }
 }

@@ -153,6 +153,12 @@ impl Slave {
         Error::Call { function, outcome, log: self.log.last(), fatal: health != Health::Good }
     }
 
+    /// Nothing of the instance is called any more.
+    #[cold]
+    pub(super) fn die(&self) {
+        self.health.set(Health::Dead);
+    }
+
     /// An error in what a function answered.
     #[cold]
     pub(super) fn lied(&self, function: &'static str, outcome: String) -> Error {

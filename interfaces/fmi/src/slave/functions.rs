@@ -93,6 +93,7 @@ table! {
         deserialize = "fmi2DeSerializeFMUstate": fn(Component, *const c_char, usize, *mut State) -> c_int;
         directional = "fmi2GetDirectionalDerivative":
             fn(Component, *const Vr, usize, *const Vr, usize, *const f64, *mut f64) -> c_int;
+        set_slopes = "fmi2SetRealInputDerivatives": fn(Component, *const Vr, usize, *const c_int, *const f64) -> c_int;
     }
 }
 
@@ -197,6 +198,7 @@ pub fn find(fmu: &Fmu, library: &Library) -> Result<Api> {
             || state && !bytes && c.state
             || name == "GetDirectionalDerivative" && c.directional_derivatives
             || name == "GetAdjointDerivative" && c.adjoint_derivatives
+            || name == "SetRealInputDerivatives" && c.interpolates_inputs
     };
     match missing.iter().find(|s| needed(s)) {
         None => Ok(api),

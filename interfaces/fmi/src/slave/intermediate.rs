@@ -1,9 +1,11 @@
-//! Intermediate update (FMI 3.0, 4.2.2): a unit shows values at its own inner steps and may be asked to stop there.
+//! Intermediate update (FMI 3.0, 4.2.2): a unit shows values at its own inner steps, takes inputs there and may be asked to
+//! stop there.
 //!
 //! A unit calls from inside its `doStep`. What it calls at another time, from another thread, from inside another call of
 //! its own or without places for an answer is not followed and said once.
 
 use super::Slave;
+use super::follow::Followed;
 use super::functions::Vr;
 use super::log::meant;
 use crate::error::{Error, Result};
@@ -26,24 +28,56 @@ pub struct IntermediateRow {
     pub values: Vec<f64>,
 }
 
+/// What happens to calls at a wrong time.
+const UNHEARD: &str = "; that is not followed";
+
 /// What an instance's intermediate updates are answered with.
 #[derive(Default)]
 pub struct Updates {
     inner: Mutex<Inner>,
-    /// Whether it was said that a call is not followed.
+    /// Whether it was said that a call is odd.
     said: AtomicBool,
 }
 
 #[derive(Default)]
-struct Inner {
+pub(super) struct Inner {
     window: Option<Window>,
+    /// What is read.
     references: Vec<Vr>,
     names: Vec<String>,
     /// Numbers behind all references.
     count: usize,
     rows: Vec<IntermediateRow>,
+    /// What is set.
+    pub followed: Vec<Followed>,
     /// Why the step cannot stand.
-    wrong: Option<String>,
+    wrong: Option<Wrong>,
+}
+
+/// Why a step cannot stand.
+pub(super) struct Wrong {
+    pub text: String,
+    /// Whether nothing of the instance may be called any more.
+    pub fatal: bool,
+}
+
+impl From<String> for Wrong {
+    fn from(text: String) -> Self {
+        Self { text, fatal: false }
+    }
+}
+
+impl Wrong {
+    /// What a status of a call inside the call-back means; `call` says which one.
+    pub fn of(status: c_int, call: impl Fn() -> String) -> std::result::Result<(), Self> {
+        match status {
+            0 | 1 => Ok(()),
+            _ => Err(Self {
+                text: format!("answered {status} to {}", call()),
+                fatal: !matches!(status, 2 | 3),
+            }),
+        }
+    }
 }
 
 /// The step inside which the unit may call.
@@ -57,58 +91,83 @@ struct Window {
 }
 
 impl Updates {
-    fn inner(&self) -> MutexGuard<'_, Inner> {
+    pub(super) fn inner(&self) -> MutexGuard<'_, Inner> {
         self.inner.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Takes the call of a unit; answers where the step shall end early, if so, or why the call is not followed.
+    /// Takes the call of a unit; answers where the step shall end early, if so, or what is odd about the call.
     fn take(
         &self,
         t: f64,
-        [allowed, finished, early]: [bool; 3],
+        [requested, allowed, finished, early]: [bool; 4],
     ) -> std::result::Result<Option<f64>, String> {
         let mut inner = match self.inner.try_lock() {
             Ok(inner) => inner,
             Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
-            Err(TryLockError::WouldBlock) => return Err("from inside another call".into()),
+            Err(TryLockError::WouldBlock) => return Err("from inside another call".to_owned() + UNHEARD),
         };
-        let Some(window) = inner.window else { return Err("outside doStep".into()) };
+        let Some(window) = inner.window else { return Err("outside doStep".to_owned() + UNHEARD) };
         if window.thread != std::thread::current().id() {
-            return Err("from another thread".into());
+            return Err("from another thread".to_owned() + UNHEARD);
         }
         if inner.wrong.is_some() {
             return Ok(early.then_some(t));
         }
         let slack = 1e-9 * (window.end - window.start) + 4.0 * f64::EPSILON * window.end.abs();
         if !(t >= window.start - slack && t <= window.end + slack) {
-            let text = format!("for t = {t} s in the step from {} s to {} s", window.start, window.end);
-            if inner.references.is_empty() {
-                return Err(text);
-            }
-            inner.wrong = Some(format!("called its intermediate update {text}"));
-        } else if allowed && !inner.references.is_empty() {
-            inner.wrong = inner.read(window, t, finished).err();
+            inner.outside(window, t, requested)?;
+        } else {
+            inner.inside(window, t, [requested, allowed, finished]);
         }
         Ok(inner.wrong.as_ref().filter(|_| early).map(|_| t))
     }
 }
 
 impl Inner {
-    fn read(&mut self, window: Window, t: f64, finished: bool) -> std::result::Result<(), String> {
+    fn inside(&mut self, window: Window, t: f64, [requested, allowed, finished]: [bool; 3]) {
+        // the standard wants all that is read to be read before anything is set
+        let read = allowed && !self.references.is_empty();
+        let mut done = if read { self.read(window, t, finished) } else { Ok(()) };
+        if requested && done.is_ok() {
+            done = self.set(window, t);
+        }
+        self.wrong = done.err();
+    }
+
+    /// A call for a time that is none of the step; what is odd about it where the step stands all the same.
+    fn outside(&mut self, window: Window, t: f64, requested: bool) -> std::result::Result<(), String> {
+        let text = format!("for t = {t} s in the step from {} s to {} s", window.start, window.end);
+        let (reads, sets) = (!self.references.is_empty(), requested && !self.followed.is_empty());
+        // solvers step over the end and come back; inputs are known there, what the unit shows is none of this step
+        if sets && !reads && t > window.end && t.is_finite() {
+            self.wrong = self.set(window, t).err();
+            let given = "; the standard wants times within the step, it was given the inputs of that time";
+            return if self.wrong.is_none() { Err(text + given) } else { Ok(()) };
+        }
+        if !reads && !sets {
+            return Err(text + UNHEARD);
+        }
+        self.wrong = Some(format!("called its intermediate update {text}").into());
+        Ok(())
+    }
+
+    fn set(&mut self, window: Window, t: f64) -> std::result::Result<(), Wrong> {
+        self.followed.iter_mut().try_for_each(|input| input.set(window.component, t))
+    }
+
+    fn read(&mut self, window: Window, t: f64, finished: bool) -> std::result::Result<(), Wrong> {
         let mut values = vec![f64::NAN; self.count];
-        let read = window.read.ok_or("has no function fmi3GetFloat64")?;
+        let read = window.read.ok_or_else(|| "has no function fmi3GetFloat64".to_owned())?;
         let (r, n) = (self.references.as_ptr(), self.references.len());
         // SAFETY: a live instance inside its own call-back, so many references and values.
         let status =
             unsafe { read(window.component as *mut c_void, r, n, values.as_mut_ptr(), values.len()) };
-        if status != 0 && status != 1 {
-            return Err(format!(
-                "answered {status} to fmi3GetFloat64 in its intermediate update at t = {t} s"
-            ));
-        }
+        Wrong::of(status, || format!("fmi3GetFloat64 in its intermediate update at t = {t} s"))?;
         if let Some(wrong) = values.iter().find(|x| !x.is_finite()) {
             let names = self.names.join("`, `");
-            return Err(format!("showed {wrong} in its intermediate update at t = {t} s, among `{names}`"));
+            return Err(
+                format!("showed {wrong} in its intermediate update at t = {t} s, among `{names}`").into()
+            );
         }
         self.rows.push(IntermediateRow { t, finished, values });
         Ok(())
@@ -122,7 +181,7 @@ impl Inner {
 pub unsafe extern "C" fn update(
     environment: *mut c_void,
     t: f64,
-    _set_requested: bool,
+    set_requested: bool,
     get_allowed: bool,
     finished: bool,
     can_return: bool,
@@ -132,11 +191,11 @@ pub unsafe extern "C" fn update(
     // A panic must not cross; nothing here is left half done.
     let answer = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
         let book = meant(environment as usize, "")?;
-        match book.updates.take(t, [get_allowed, finished, can_return]) {
+        match book.updates.take(t, [set_requested, get_allowed, finished, can_return]) {
             Ok(end) => end,
             Err(why) => {
                 if !book.updates.said.swap(true, Ordering::Relaxed) {
-                    book.note(&format!("called its intermediate update {why}; that is not followed"));
+                    book.note(&format!("called its intermediate update {why}"));
                 }
                 None
             }
@@ -193,7 +252,7 @@ impl Slave {
     }
 
     /// The step has ended; why it cannot stand, if so.
-    pub(super) fn close_between(&self) -> Option<String> {
+    pub(super) fn close_between(&self) -> Option<Wrong> {
         let mut inner = self.log.updates.inner();
         inner.window = None;
         inner.wrong.take()

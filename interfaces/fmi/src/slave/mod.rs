@@ -7,6 +7,7 @@
 mod call;
 mod clocks;
 mod configure;
+mod follow;
 mod functions;
 mod intermediate;
 mod intervals;
@@ -54,6 +55,8 @@ pub struct SlaveOptions {
     pub event_mode: bool,
     /// Variables that are read at intermediate times (FMI 3).
     pub intermediate: Vec<String>,
+    /// Inputs that are set at intermediate times (FMI 3), by [`Slave::follow`].
+    pub followed: Vec<String>,
     /// Where its log goes.
     pub sink: Sink,
 }
@@ -87,6 +90,8 @@ pub struct Slave {
     start: f64,
     /// What is read in intermediate updates.
     shown: Vec<u32>,
+    /// What may be read or set in intermediate updates.
+    announced: Vec<u32>,
     warnings: Cell<u64>,
     /// Whether it was said that its clock runs ahead.
     ran_past: Cell<bool>,
@@ -108,6 +113,10 @@ impl Slave {
             log_needs_tool(&options.sink, description);
         }
         let shown = Self::shown_between(description, &options.intermediate)?;
+        let mut announced = Self::followed_between(description, &options.followed)?;
+        announced.extend(&shown);
+        announced.sort_unstable();
+        announced.dedup();
         let updates = description.capabilities.intermediate_update;
         let loaded = fmu.library()?;
         let api = functions::find(fmu, &loaded.library)?;
@@ -157,8 +166,8 @@ impl Slave {
                         verbose,
                         event_mode,
                         early,
-                        shown.as_ptr(),
-                        shown.len(),
+                        announced.as_ptr(),
+                        announced.len(),
                         environment,
                         log::log_3,
                         update,
@@ -184,6 +193,7 @@ impl Slave {
             start: 0.0,
             updates,
             shown,
+            announced,
             warnings: Cell::new(0),
             ran_past: Cell::new(false),
             untold: Cell::new(false),
@@ -305,6 +315,7 @@ impl Slave {
             Api::Three(three) => self.call_after_error("fmi3Reset", three.reset, |f, c| unsafe { f(c) })?,
         }
         self.phase = Phase::Instantiated;
+        self.forget_followed();
         self.description = self.fmu.description().clone();
         self.clocks = Clocks::new(&self.description.variables, self.event_mode, &self.log);
         self.health.set(Health::Good);

@@ -129,15 +129,15 @@ impl Slave {
             });
             let wrong = if self.updates { self.close_between() } else { None };
             let status = status?;
-            if status == Status::Discard {
+            if status == Status::Discard && !wrong.as_ref().is_some_and(|w| w.fatal) {
                 let reached = if last >= step.t && last <= end { last } else { step.t };
                 return Err(Error::Discard { function: NAME, reached, log: self.log.last() });
             }
+            if let Some(wrong) = wrong {
+                return Err(self.stopped_between(NAME, wrong, status));
+            }
             if !goes_on(status) {
                 return Err(self.failed(NAME, status));
-            }
-            if let Some(outcome) = wrong {
-                return Err(self.lied(NAME, outcome));
             }
             if last.to_bits() == UNTOLD.to_bits() && !early && !terminate {
                 last = self.untold(stop);
@@ -157,14 +157,19 @@ impl Slave {
             if terminate {
                 return Ok(Stepped { reached: last, terminate, events });
             }
+            let now = if at_stop { stop } else { last };
             let ticks = at_stop && self.clocks.tick_at(stop);
-            if event && self.event_mode || ticks {
+            let settles = event && self.event_mode || ticks;
+            if settles {
                 events += 1;
                 self.call("fmi3EnterEventMode", enter_event_mode, |f, c| unsafe { f(c) })?;
+                if self.updates {
+                    self.set_followed(now)?;
+                }
                 if at_stop {
                     self.tick(stop, false)?;
                 }
-                if self.settle_events(if at_stop { stop } else { last })? {
+                if self.settle_events(now)? {
                     return Ok(Stepped { reached: last, terminate: true, events });
                 }
                 self.call("fmi3EnterStepMode", enter_step_mode, |f, c| unsafe { f(c) })?;
@@ -183,7 +188,10 @@ impl Slave {
             if returns > RETURNS {
                 return Err(self.lied(NAME, format!("returned early more than {RETURNS} times in one step")));
             }
-            t = if at_stop { stop } else { last };
+            t = now;
+            if self.updates && !settles {
+                self.set_followed(t)?;
+            }
         }
     }
 

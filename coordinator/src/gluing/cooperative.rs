@@ -36,8 +36,12 @@ impl Strategy for Cooperative {
         exchange.advance_bodies(instances)?;
         // the soil was loaded with T* and the body with T1; it takes the body's motion as its own at commit
         let (report, estimate) = (&mut exchange.report, &exchange.estimate);
-        for port in &exchange.ports {
-            let i = port.first as usize;
+        let n = estimate.t_star.len();
+        for i in exchange.ports.iter().map(|port| port.first as usize) {
+            // whose motion is given, like that of driven feet, bears whatever the soil gives
+            if estimate.g[i * n + i] == 0.0 {
+                continue;
+            }
             let difference = (estimate.t_star[i] - exchange.t[i]).abs();
             report.max_action_reaction_gap_n = report.max_action_reaction_gap_n.max(difference);
         }

@@ -4,6 +4,7 @@
 use super::{built, units};
 use crate::process::{Outcome, write};
 use crate::validate::{Figure, Limit};
+use nalgebra::Vector3;
 use std::fmt::Write;
 use std::path::Path;
 use terraglue::Testbed;
@@ -30,11 +31,11 @@ const STEP: &str = "for (int k = 0; k < 3; k++) { v[7 + k] += h * v[13 + k] / v[
 type Vector = [f64; 3];
 
 fn cross(a: Vector, b: Vector) -> Vector {
-    [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+    Vector3::from(a).cross(&b.into()).into()
 }
 
 fn minus(a: Vector, b: Vector) -> Vector {
-    std::array::from_fn(|k| a[k] - b[k])
+    (Vector3::from(a) - Vector3::from(b)).into()
 }
 
 /// Largest distance from the robot, and largest change of the angular momentum.

@@ -31,7 +31,7 @@ const STEP: &str = "for (int k = 0; k < 3; k++) { v[7 + k] += h * v[13 + k] / v[
 type Vector = [f64; 3];
 
 fn cross(a: Vector, b: Vector) -> Vector {
-    Vector3::from(a).cross(&b.into()).into()
+    Vector3::from(a).cross(&Vector3::from(b)).into()
 }
 
 fn minus(a: Vector, b: Vector) -> Vector {

@@ -36,7 +36,7 @@ pub enum Command {
         #[arg(value_name = "DIR")]
         folder: PathBuf,
     },
-    /// Check a scenario and everything that it refers to, without running it.
+    /// Check a scenario and everything that it refers to, without a step of it; modules and units are made.
     Check(ScenarioArguments),
     /// Put a module to the test: named tests of what it promises, each in a process of its own.
     CheckModule(CheckModuleArguments),
@@ -411,7 +411,7 @@ pub struct FmuRunArguments {
     #[arg(long, value_name = "S")]
     pub step: Option<f64>,
     /// Relative tolerance.
-    #[arg(long)]
+    #[arg(long, value_parser = positive)]
     pub tolerance: Option<f64>,
     /// Names to write, separated by commas [default: all outputs].
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
@@ -420,7 +420,7 @@ pub struct FmuRunArguments {
     #[arg(long)]
     pub isolate: bool,
     /// Longest time of the whole run where it is isolated, s.
-    #[arg(long, value_name = "S", default_value_t = 3600.0)]
+    #[arg(long, value_name = "S", default_value_t = 3600.0, value_parser = positive)]
     pub timeout: f64,
     /// Most memory where it is isolated, MiB.
     #[arg(long, value_name = "MIB", default_value_t = 8192)]
@@ -429,4 +429,10 @@ pub struct FmuRunArguments {
     #[arg(long, value_name = "on|off", action = clap::ArgAction::Set, default_value = "off",
           value_parser = clap::builder::BoolishValueParser::new())]
     pub event_mode: bool,
+}
+
+/// A finite number above 0.
+fn positive(text: &str) -> Result<f64, String> {
+    let number = text.parse().ok().filter(|x: &f64| x.is_finite() && *x > 0.0);
+    number.ok_or_else(|| "a number above 0 is wanted".to_owned())
 }

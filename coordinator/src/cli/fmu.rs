@@ -3,9 +3,10 @@
 use super::arguments::{FmuCommand, FmuRunArguments};
 use super::output::outln;
 use super::table_file::{self, TableFile};
-use super::{Exit, apart, show};
+use super::{Exit, apart, interrupt, show};
 use std::fmt::Debug;
 use std::path::Path;
+use std::sync::atomic::Ordering;
 use terraglue::fmu::simulate::{self, Row, Settings, Table, Tables};
 use terraglue::host::isolation::confine;
 use terraglue::scenario::InputError;
@@ -29,6 +30,7 @@ fn input(message: impl ToString) -> Error {
 
 fn run(arguments: &FmuRunArguments) -> Result<Exit> {
     if apart::is_child() {
+        apart::end_with_parent();
         confine(arguments.memory_mb.saturating_mul(1 << 20));
     }
     let fmu = Fmu::open(&arguments.unit).map_err(input)?;
@@ -53,8 +55,11 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
     let sink = Box::new(|line: &terraglue_fmi::LogLine| {
         log::log!(target: "terraglue::fmu", level(line), "{}", line.text);
     });
-    let child = apart::is_child();
+    let (child, stopped) = (apart::is_child(), interrupt::cancel_flag());
     let mut row = |text: &str| {
+        if stopped.load(Ordering::Relaxed) {
+            return Err(FmiError::Refused("stopped".into()));
+        }
         match &file {
             None => outln!("{text}"),
             Some(file) => line(file, text)?,
@@ -78,10 +83,9 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
                     arguments.unit.display()
                 );
             }
-            drop(fmu);
-            apart::done();
             Ok(Exit::Done)
         }
+        Err(_) if stopped.load(Ordering::Relaxed) => Ok(Exit::Interrupted),
         Err(error) => {
             eprintln!("error: {}: {error}", arguments.unit.display());
             Ok(Exit::Failed)

@@ -1,4 +1,4 @@
-//! Ctrl-C: the first asks the run to stop and close its recording, the second ends the program at once.
+//! Ctrl-C, SIGTERM and SIGHUP: the first asks the run to stop and close its recording, the second ends the program at once.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
@@ -12,6 +12,7 @@ pub fn cancel_flag() -> Arc<AtomicBool> {
         if shared.swap(true, Ordering::Relaxed) {
             exit_guard::leave(130);
         }
+        eprintln!("stopping after this step; once more ends the program at once");
     });
     if let Err(e) = installed {
         eprintln!("Ctrl-C will not close the recording: {e}");

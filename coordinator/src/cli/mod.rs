@@ -46,14 +46,15 @@ pub enum Exit {
     Interrupted,
 }
 
-impl From<Exit> for ExitCode {
-    fn from(exit: Exit) -> Self {
-        ExitCode::from(match exit {
-            Exit::Done => 0,
-            Exit::Failed => 1,
-            Exit::WrongInput => 2,
-            Exit::Interrupted => 130,
-        })
+impl Exit {
+    /// Exit code of the program.
+    fn code(self) -> u8 {
+        match self {
+            Self::Done => 0,
+            Self::Failed => 1,
+            Self::WrongInput => 2,
+            Self::Interrupted => 130,
+        }
     }
 }
 
@@ -69,12 +70,13 @@ pub fn main() -> ExitCode {
     let armed = !matches!(arguments.command, Command::CheckModule(_) | Command::Modules { .. });
     let armed = armed.then(exit_guard::arm);
     let exit = command(arguments.command);
+    apart::done(exit.code());
     drop(armed);
     let left = orphans::end_all();
     if left > 0 {
         log::warn!("modules or units left {left} processes behind; they were ended");
     }
-    exit.into()
+    exit.code().into()
 }
 
 fn command(command: Command) -> Exit {

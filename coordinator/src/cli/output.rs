@@ -1,5 +1,6 @@
 //! Standard output: a reader that closes the pipe early, such as `head`, ends the program quietly.
 
+use super::apart;
 use std::fmt::Arguments;
 use std::io::{ErrorKind, Write};
 use terraglue::host::exit_guard;
@@ -10,6 +11,7 @@ pub fn line(text: Arguments) {
     let mut out = std::io::stdout().lock();
     if let Err(error) = write_line(&mut out, text) {
         if error.kind() == ErrorKind::BrokenPipe {
+            apart::done(0);
             exit_guard::leave(0);
         }
         eprintln!("error: standard output: {error}");

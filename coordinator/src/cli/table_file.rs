@@ -58,5 +58,6 @@ pub fn will(unit: &Path, tables: Vec<TableFile>) -> Will {
             }
         }
         eprintln!("error: {name}: the unit ended the program by exit()");
+        apart::done(1);
     })
 }

@@ -44,6 +44,8 @@ pub struct Tables<'a> {
     pub intermediate: Option<Line<'a>>,
 }
 
+/// Share of a step that a number of steps may be off a whole one: it was typed with so many digits.
+const NEARLY_WHOLE: f64 = 1e-5;
 /// Longest run, in steps.
 const STEPS: f64 = 1e9;
 
@@ -58,7 +60,16 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
     let stop = settings.stop.or(experiment.stop).unwrap_or(start + 1.0);
     let step = settings.step.or(experiment.step).or(fmu.description().capabilities.fixed_step);
     let step = step.unwrap_or((stop - start) / 500.0);
-    let steps = ((stop - start) / step).round();
+    let exact = (stop - start) / step;
+    let whole = (exact - exact.round()).abs() <= NEARLY_WHOLE;
+    let variable = fmu.description().capabilities.variable_step;
+    let steps = if whole {
+        exact.round()
+    } else if variable {
+        exact.ceil()
+    } else {
+        exact.floor()
+    };
     if !(step > 0.0 && steps >= 1.0 && steps <= STEPS) {
         return Err(Error::Refused(format!("from {start} s to {stop} s in steps of {step} s cannot be run")));
     }
@@ -98,6 +109,12 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         let all = self::columns(&description, &intermediate, false)?;
         write(&(header(&all) + ",step_finished"))?;
     }
+    if !whole && !variable {
+        let end = start + steps * step;
+        slave.note(&format!(
+            "the run ends at t = {end} s, before {stop} s: the unit takes steps of one length only"
+        ));
+    }
     row(&marked(header(&columns), 0))?;
     row(&marked(line(&slave, start, &columns)?, 0))?;
     let mut before = Before { state: SlaveState::default(), saves: description.capabilities.state };
@@ -107,6 +124,7 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
             return Ok(());
         }
         let (t, end) = (start + k as f64 * step, start + (k + 1) as f64 * step);
+        let end = if whole { end } else { end.min(stop) };
         let at = |e: Error| named(e, t);
         inputs.set(&mut slave, t).map_err(at)?;
         slave.forget_ticks();

@@ -13,6 +13,11 @@ static REGISTERED: Once = Once::new();
 static WILLS: Mutex<BTreeMap<u64, Work>> = Mutex::new(BTreeMap::new());
 static NEXT: AtomicU64 = AtomicU64::new(0);
 
+unsafe extern "C" {
+    /// C11, 7.22.4.3.
+    fn at_quick_exit(work: extern "C" fn()) -> libc::c_int;
+}
+
 /// What is done before the process ends.
 type Work = Box<dyn FnOnce() + Send>;
 
@@ -43,6 +48,8 @@ pub fn arm() -> Armed {
     REGISTERED.call_once(|| {
         // SAFETY: the function takes nothing and never unwinds. Without room for it the run is merely less guarded.
         let _ = unsafe { libc::atexit(at_exit) };
+        // SAFETY: the same for the other way to leave in good order.
+        let _ = unsafe { at_quick_exit(at_exit) };
     });
     Armed(())
 }

@@ -164,6 +164,9 @@ impl Observer for Recorder {
         // After a failure the last state may be unreadable; the recording is closed all the same.
         let end = self.record_end(view);
         self.mcap.close()?;
+        if let Some(csv) = &mut self.csv {
+            csv.flush()?;
+        }
         if error.is_some() { Ok(()) } else { end }
     }
 }

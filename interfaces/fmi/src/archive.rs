@@ -179,7 +179,7 @@ impl Archive {
 
     /// Writes all files into a new temporary folder, which goes when it is dropped.
     pub fn unpack(&mut self) -> Result<Folder> {
-        let folder = Folder::new().map_err(|e| Error::Archive {
+        let folder = Folder::new("fmu").map_err(|e| Error::Archive {
             path: self.path.clone(),
             entry: None,
             message: format!("no temporary folder can be made: {e}"),

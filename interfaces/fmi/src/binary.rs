@@ -4,6 +4,7 @@
 use crate::description::Version;
 use crate::elf;
 use crate::error::{Error, Result};
+use crate::floating_point::Keep;
 use crate::fmu::Fmu;
 use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_LOCAL, RTLD_NOW};
 use std::error::Error as _;
@@ -70,6 +71,7 @@ pub fn load(fmu: &Fmu) -> Result<Loaded> {
     }
     inspect(&path).map_err(|why| fail(format!("`{name}` cannot be loaded: {why}")))?;
     let threads = threads();
+    let _mode = Keep::new();
     open(&path)
         .map(|library| Loaded { library: ManuallyDrop::new(library), threads })
         .map_err(|why| fail(format!("`{name}` cannot be loaded: {why}")))

@@ -13,7 +13,7 @@ use std::sync::{Arc, Mutex, PoisonError, Weak};
 use tempfile::TempDir;
 
 /// Beginning of the names of our folders below the system's temporary folder.
-const PREFIX: &str = "terraglue-fmu-";
+const PREFIX: &str = "terraglue-";
 /// File in such a folder that its process holds locked.
 const LOCK: &str = ".terraglue-lock";
 
@@ -103,17 +103,20 @@ pub fn remove_folders() {
 
 /// A temporary folder that is locked while its process lives.
 #[derive(Debug)]
-pub(crate) struct Folder {
+pub struct Folder {
     folder: TempDir,
     lock: Option<File>,
 }
 
 impl Folder {
-    /// Makes one, and removes those of processes that were killed.
-    pub(crate) fn new() -> std::io::Result<Self> {
+    /// Makes one for a purpose that its name shows, and removes those of processes that were killed.
+    ///
+    /// # Errors
+    /// No temporary folder can be made.
+    pub fn new(purpose: &str) -> std::io::Result<Self> {
         sweep();
         loop {
-            let folder = tempfile::Builder::new().prefix(PREFIX).tempdir()?;
+            let folder = tempfile::Builder::new().prefix(&format!("{PREFIX}{purpose}-")).tempdir()?;
             let path = folder.path().join(LOCK);
             let lock = File::create(&path)?;
             lock.lock()?;
@@ -126,7 +129,8 @@ impl Folder {
     }
 
     /// Where it is.
-    pub(crate) fn path(&self) -> &Path {
+    #[must_use]
+    pub fn path(&self) -> &Path {
         self.folder.path()
     }
 }

@@ -167,7 +167,7 @@ struct Link {
     gone: Option<String>,
     is_python: bool,
     // After the child, whose files it holds.
-    folder: tempfile::TempDir,
+    folder: terraglue_fmi::Folder,
 }
 
 fn failed(what: &str, error: &dyn std::fmt::Display) -> Error {
@@ -200,7 +200,7 @@ fn spawn(what: &What, folder: &Path, segment: &str) -> Result<(Process, bool)> {
 impl Link {
     fn new(what: &What, host: Arc<dyn Host>, services: &HostServices, isolation: Isolation) -> Result<Self> {
         let segment = Segment::new().map_err(|e| failed("no shared memory", &e))?;
-        let folder = tempfile::Builder::new().prefix("terraglue-worker-").tempdir();
+        let folder = terraglue_fmi::Folder::new("worker");
         let folder = folder.map_err(|e| failed("no temporary folder", &e))?;
         let (cancel, partings) = (services.cancel.clone(), services.partings.clone());
         let (child, is_python) = match Nursed::take(what, folder.path(), &segment.path()) {

@@ -24,6 +24,7 @@ pub use step::{Advance, Stepped};
 use crate::binary::Loaded;
 use crate::description::ModelDescription;
 use crate::error::{Error, Result};
+use crate::floating_point::Keep;
 use crate::fmu::Fmu;
 use call::{Health, Status};
 use clocks::Clocks;
@@ -97,6 +98,8 @@ pub struct Slave {
     ran_past: Cell<bool>,
     /// Whether it was said that it does not tell how far it came.
     untold: Cell<bool>,
+    /// Whether it was said that it changes the floating-point mode.
+    mode_told: Cell<bool>,
     _callbacks: Option<Box<Callbacks2>>,
     loaded: Arc<Loaded>,
     fmu: Arc<Fmu>,
@@ -108,6 +111,7 @@ unsafe impl Send for Slave {}
 impl Slave {
     /// Loads the library where that was not done yet, and makes an instance.
     pub fn instantiate(fmu: &Arc<Fmu>, options: SlaveOptions) -> Result<Self> {
+        let _mode = Keep::new();
         let description = fmu.description();
         if description.capabilities.needs_tool {
             log_needs_tool(&options.sink, description);
@@ -197,6 +201,7 @@ impl Slave {
             warnings: Cell::new(0),
             ran_past: Cell::new(false),
             untold: Cell::new(false),
+            mode_told: Cell::new(false),
             log,
             _callbacks: callbacks,
             loaded,
@@ -233,6 +238,7 @@ impl Slave {
 
     /// Enters initialisation mode, after start values were set.
     pub fn enter_initialization(&mut self, start: f64, stop: Option<f64>, tolerance: Option<f64>) -> Result {
+        let _mode = Keep::new();
         self.start = start;
         if self.updates {
             self.watch_between();
@@ -259,6 +265,7 @@ impl Slave {
 
     /// Leaves initialisation mode; the unit can be stepped.
     pub fn exit_initialization(&mut self) -> Result {
+        let _mode = Keep::new();
         match self.api {
             Api::Two(two) => {
                 self.call("fmi2ExitInitializationMode", two.exit_initialization, |f, c| unsafe { f(c) })?;
@@ -302,6 +309,7 @@ impl Slave {
             return Ok(());
         }
         self.phase = Phase::Terminated;
+        let _mode = Keep::new();
         match self.api {
             Api::Two(two) => self.call("fmi2Terminate", two.terminate, |f, c| unsafe { f(c) }),
             Api::Three(three) => self.call("fmi3Terminate", three.terminate, |f, c| unsafe { f(c) }),
@@ -325,6 +333,7 @@ impl Slave {
 
 impl Drop for Slave {
     fn drop(&mut self) {
+        let _mode = Keep::new();
         if self.health.get() == Health::Dead {
             // Nothing of it may be called, so what it still holds must stay loaded.
             std::mem::forget(self.loaded.clone());

@@ -4,6 +4,7 @@ use super::call::Status;
 use super::functions::{Api, Three};
 use super::{Phase, Slave, goes_on};
 use crate::error::{Error, Result};
+use crate::floating_point::Mode;
 use std::ffi::c_int;
 
 const DO_STEP_2: &str = "fmi2DoStep";
@@ -60,12 +61,27 @@ impl Slave {
         }
         let Api::Two(two) = &self.api else { return self.do_step_3(step) };
         let for_good = c_int::from(step.for_good);
+        let mode = Mode::now();
         // SAFETY: the arguments are those of the standard.
-        match self.status(DO_STEP_2, two.do_step, |f, c| unsafe { f(c, step.t, step.h, for_good) })? {
+        let status = self.status(DO_STEP_2, two.do_step, |f, c| unsafe { f(c, step.t, step.h, for_good) });
+        if mode.restore() {
+            self.mode_changed(DO_STEP_2);
+        }
+        match status? {
             status if goes_on(status) => {
                 Ok(Stepped { reached: step.t + step.h, terminate: false, events: 0 })
             }
             status => self.stopped_2(step, status),
+        }
+    }
+
+    /// Says once that all others would round otherwise.
+    #[cold]
+    fn mode_changed(&self, function: &str) {
+        if !self.mode_told.replace(true) {
+            self.log.note(&format!(
+                "{function} changed how this thread rounds or treats tiny numbers; it is set back after each step"
+            ));
         }
     }
 
@@ -124,9 +140,13 @@ impl Slave {
             if self.updates {
                 self.open_between(t, stop, get_f64);
             }
+            let mode = Mode::now();
             let status = self.status(NAME, do_step, |f, c| unsafe {
                 f(c, t, stop - t, for_good, &raw mut event, &raw mut terminate, &raw mut early, &raw mut last)
             });
+            if mode.restore() {
+                self.mode_changed(NAME);
+            }
             let wrong = if self.updates { self.close_between() } else { None };
             let status = status?;
             if status == Status::Discard && !wrong.as_ref().is_some_and(|w| w.fatal) {

@@ -33,13 +33,13 @@ const WRONG: [(&str, &[&str]); 5] = [
 /// Floods of the log; there is none while the library is loaded.
 const LOGS: [&str; 4] = ["flood", "null", "utf", "huge"];
 /// Changes of the process, and what is left in it.
-const CHANGES: [&str; 7] = ["close", "folder", "locale", "mask", "signal", "thread", "child"];
+const CHANGES: [&str; 8] = ["close", "folder", "locale", "mask", "signal", "round", "thread", "child"];
 /// Table of a unit that is run alone.
 const TABLE: &str = "table.csv";
 /// Longest run, s: the program's own limits come first.
 const LONGEST: Duration = Duration::from_secs(60);
 /// Samples of a complete recording, and of one whose unit misbehaves in its first step after 0.25 s.
-const ALL: usize = 9;
+const ALL: usize = 11;
 const SOME: usize = 4;
 
 /// One run.
@@ -116,7 +116,7 @@ impl Case {
         let (name, unit, isolated) = (self.name(), unit.display(), self.isolated);
         let patience = self.patience();
         format!(
-            "[time]\nstep_s = 0.125\nduration_s = 1.0\n[recording]\nevery_steps = 1\n[{name}]\nfmu = \"{unit}\"\nisolate = \
+            "[time]\nstep_s = 0.1\nduration_s = 1.0\n[recording]\nevery_steps = 1\n[{name}]\nfmu = \"{unit}\"\nisolate = \
              {isolated}\nstep_timeout_s = {patience}\nload_timeout_s = {patience}\nmemory_mb = 500\n"
         )
     }
@@ -169,7 +169,7 @@ fn judge(folder: &Path, context: &Context, unit: &Path, case: Case) -> Outcome<V
     let mut run = Command::new(&context.program);
     if case.alone {
         std::fs::create_dir_all(&place).map_err(|e| format!("{}: {e}", place.display()))?;
-        run.args(["fmu", "run", "--stop", "1", "--step", "0.125", "--csv", TABLE]).arg(unit);
+        run.args(["fmu", "run", "--stop", "1", "--step", "0.1", "--csv", TABLE]).arg(unit);
         if case.isolated {
             run.args(["--isolate", "--memory-mb", "500", "--timeout", &case.patience().to_string()]);
         }
@@ -225,7 +225,14 @@ fn about_recording(folder: &Path, name: &str, samples: usize) -> Option<String> 
     let found = match Recording::open(folder) {
         Err(e) => return Some(format!("no recording: {e}")),
         Ok(recording) if recording.damaged > 0 => return Some("its recording is damaged".into()),
-        Ok(recording) => recording.series(&format!("{name}.x")).map_or(0, |(t, _)| t.len()),
+        Ok(recording) => {
+            // the sum of tenths shows how it was rounded
+            let (end, numbers) = (recording.end_s(), recording.series(&format!("{name}.x")));
+            if samples == ALL && end != 1.0 {
+                return Some(format!("its recording ends at {end} s"));
+            }
+            numbers.map_or(0, |(t, _)| t.len())
+        }
     };
     if found != samples {
         return Some(format!("{found} samples in its recording, not {samples}"));

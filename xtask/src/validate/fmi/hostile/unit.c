@@ -2,6 +2,7 @@
  * does; while it is loaded it has no name yet, HOSTILE_LOAD says how. Steps misbehave after t = 0.25 s. */
 #define _GNU_SOURCE
 #include <fcntl.h>
+#include <fenv.h>
 #include <locale.h>
 #include <math.h>
 #include <pthread.h>
@@ -68,6 +69,7 @@ static int act(Unit *u, const char *what) {
         pthread_sigmask(SIG_BLOCK, &all, 0);
         for (int i = 1; i < 32; i++) signal(i, SIG_IGN);
     }
+    if (!strcmp(what, "round")) fesetround(FE_UPWARD);
     if (!strcmp(what, "thread")) threads(idle, 20);
     if (!strcmp(what, "late")) { threads(late, 1); usleep(40000); }
     if (!strcmp(what, "child")) { child(0); child(1); }

@@ -54,6 +54,7 @@ pub fn reached(row: &str) {
 pub fn run(arguments: &FmuRunArguments) -> Result<Exit> {
     let failed =
         |what: &dyn std::fmt::Display| Error::from(InputError::plain(format!("isolation: {what}"), None));
+    let stopped = interrupt::cancel_flag();
     let folder = Folder::new("worker").map_err(|e| failed(&e))?;
     let own = std::env::current_exe().map_err(|e| failed(&e))?;
     let words = std::env::args_os().skip(1).filter(|word| word != "--isolate");
@@ -65,7 +66,6 @@ pub fn run(arguments: &FmuRunArguments) -> Result<Exit> {
         .spawn()
         .map_err(|e| failed(&e))?;
     let end = Instant::now() + Duration::from_secs_f64(arguments.timeout.min(1e7));
-    let stopped = interrupt::cancel_flag();
     let status = loop {
         match child.try_wait().map_err(|e| failed(&e))? {
             Some(status) => break Some(status),

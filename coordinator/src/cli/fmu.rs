@@ -29,6 +29,7 @@ fn input(message: impl ToString) -> Error {
 }
 
 fn run(arguments: &FmuRunArguments) -> Result<Exit> {
+    let stopped = interrupt::cancel_flag();
     if apart::is_child() {
         apart::end_with_parent();
         confine(arguments.memory_mb.saturating_mul(1 << 20));
@@ -55,7 +56,7 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
     let sink = Box::new(|line: &terraglue_fmi::LogLine| {
         log::log!(target: "terraglue::fmu", level(line), "{}", line.text);
     });
-    let (child, stopped) = (apart::is_child(), interrupt::cancel_flag());
+    let child = apart::is_child();
     let mut row = |text: &str| {
         if stopped.load(Ordering::Relaxed) {
             return Err(FmiError::Refused("stopped".into()));

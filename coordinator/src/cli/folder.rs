@@ -1,21 +1,35 @@
 //! The folder for results: an earlier run is renamed, never overwritten.
 
+use std::fs::{File, TryLockError};
 use std::path::{Path, PathBuf};
+use terraglue::recording::RECORDING;
 use terraglue::scenario::InputError;
 use terraglue::{Error, Result};
 
 /// The folder of `--out`, or `runs/<name>` after an earlier run there was renamed to `.1`, `.2`, …
 pub fn results_folder(out: Option<&Path>, name: &str) -> Result<PathBuf> {
+    let usual = Path::new("runs").join(name);
+    free(out.unwrap_or(&usual))?;
     let folder = match out {
         Some(folder) => folder.to_owned(),
         None => {
-            let folder = Path::new("runs").join(name);
-            set_aside(&folder)?;
-            folder
+            set_aside(&usual)?;
+            usual
         }
     };
     std::fs::create_dir_all(&folder).map_err(|e| at(&folder, e))?;
     Ok(folder)
+}
+
+/// Refuses a folder that another run is writing into.
+fn free(folder: &Path) -> Result {
+    let locked = File::open(folder.join(RECORDING))
+        .is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)));
+    if !locked {
+        return Ok(());
+    }
+    let message = format!("another run is writing into `{}`", folder.display());
+    Err(InputError::plain(message, Some("name another folder with --out, or wait for its end".into())).into())
 }
 
 /// Renames a folder to the first free of `folder.1`, `folder.2`, …
@@ -48,6 +62,17 @@ mod tests {
             assert!(error.to_string().contains(&out.display().to_string()), "{error}");
         }
         assert_eq!(std::fs::read_to_string(&file).expect("there"), "text");
+    }
+
+    #[test]
+    fn a_folder_that_a_run_writes_into_is_refused() {
+        let temporary = tempfile::tempdir().expect("folder");
+        let running =
+            terraglue::recording::KeptFile::create(&temporary.path().join(RECORDING)).expect("file");
+        let error = results_folder(Some(temporary.path()), "walk").expect_err("refused");
+        assert!(error.to_string().contains("another run"), "{error}");
+        drop(running);
+        results_folder(Some(temporary.path()), "walk").expect("free");
     }
 
     #[test]

@@ -17,10 +17,12 @@ pub struct KeptFile {
 }
 
 impl KeptFile {
-    /// Creates the file, or empties it. Writers that gather what they write keep the look before each write cheap.
+    /// Creates the file, or empties it, and locks it. Writers that gather what they write keep the look before each write cheap.
     pub fn create(path: &Path) -> Result<Self> {
         let path = std::path::absolute(path)?;
         let file = File::create(&path)?;
+        // Where the file system knows no locks, two runs into one folder are not noticed.
+        drop(file.try_lock());
         let identity = identity(&file.metadata()?);
         Ok(Self { file: Some(file), path, identity, told: false })
     }

@@ -13,7 +13,6 @@ use std::error::Error as _;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use terraglue_fmi::elf::{foreign_machine, is_elf, needed_length};
-use terraglue_fmi::floating_point::Keep;
 use terraglue_plugin::ForeignModule;
 use terraglue_plugin::abi::{TG_ABI_MAJOR, TgEntry};
 use terraglue_subsystem::{Config, Error as Failure, Host, Module, Result, Schema, Subsystem};
@@ -239,7 +238,6 @@ fn inspect(path: &Path) -> std::result::Result<(), LoadError> {
 pub(super) fn entry(path: &Path) -> std::result::Result<TgEntry, LoadError> {
     // A bare file name would be searched by the system, so the path is made absolute.
     let full = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
-    let _mode = Keep::new();
     // SAFETY: the user asked for this library in the scenario; its constructors run.
     let handle = unsafe { Handle::open(Some(&full), RTLD_NOW | RTLD_LOCAL) };
     let handle = handle.map_err(|e| LoadError::CannotLoad { path: path.to_path_buf(), reason: cause(&e) })?;

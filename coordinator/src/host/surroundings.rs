@@ -4,6 +4,7 @@
 
 use std::ffi::{CStr, CString};
 use std::path::PathBuf;
+use terraglue_fmi::floating_point::Mode;
 
 /// Signals whose handling matters here: Ctrl-C and its like, closed pipes, ended children.
 const SIGNALS: [libc::c_int; 5] = [libc::SIGINT, libc::SIGTERM, libc::SIGHUP, libc::SIGPIPE, libc::SIGCHLD];
@@ -15,6 +16,7 @@ pub struct Surroundings {
     locale: CString,
     handlers: [libc::sigaction; SIGNALS.len()],
     blocked: libc::sigset_t,
+    mode: Mode,
 }
 
 impl Surroundings {
@@ -32,6 +34,7 @@ impl Surroundings {
             locale: locale(),
             handlers,
             blocked: blocked(),
+            mode: Mode::now(),
         }
     }
 
@@ -54,6 +57,9 @@ impl Surroundings {
             // SAFETY: the text ends with zero and is one that the library gave.
             unsafe { libc::setlocale(libc::LC_ALL, self.locale.as_ptr()) };
             changed.push("locale");
+        }
+        if self.mode.restore() {
+            changed.push("rounding or the treatment of tiny numbers");
         }
         if self.restore_signals(&now) {
             changed.push("signals");

@@ -97,7 +97,7 @@ pub fn replaced_laws(
 /// What the elastic line does to one soil.
 fn replaced_law(config: &Config, whose: &str, gravity: f64) -> Option<Vec<String>> {
     let soil = SoilParameters::from_config(config, gravity).ok()?;
-    let stiffness = soil.elastic_stiffness_pa_m;
+    let stiffness = soil.elastic_stiffness_pa_m?;
     let text = SoilExpressions::from_config(config).ok()?;
     let law = match text.and_then(|text| text.pressure(&soil).transpose()) {
         Some(law) => PressureLaw::Expression(law.ok()?),

@@ -9,7 +9,7 @@ use super::columns::{Columns, Names, SINKAGE};
 use super::rim::{Rim, Rolling};
 use crate::scenario::InputError;
 use std::path::Path;
-use terraglue_soil_law::DEFAULT_ELASTIC_STIFFNESS;
+use terraglue_soil_law::PressureLaw;
 use terraglue_soil_law::fit::{Free, Interval, least_squares, spread};
 
 /// A wheel on a test bench.
@@ -253,7 +253,7 @@ fn rim(wheel: &Wheel, x: &[f64], slip: f64) -> Rim {
         friction: x[4],
         shear: x[5].exp(),
         peak: [0.0; 2],
-        unloading: DEFAULT_ELASTIC_STIFFNESS,
+        unloading: PressureLaw::Bekker { k_c: 0.0, k_phi: x[0].exp(), n: x[1] }.unloading(),
         points: POINTS,
     }
 }

@@ -280,6 +280,18 @@ impl HeightField {
         self.touched.iter().map(gained).sum()
     }
 
+    /// Lowest and highest node, units.
+    pub fn bounds(&self) -> (i32, i32) {
+        let of = |tile: usize| {
+            let (_, [nx, ny]) = self.lattice.tile_nodes(tile);
+            match self.tile(tile) {
+                Err(u) => (u, u),
+                Ok(units) => rows(units, nx, ny).fold((i32::MAX, i32::MIN), |(a, b), u| (a.min(*u), b.max(*u))),
+            }
+        };
+        (0..self.tiles.len()).map(of).fold((i32::MAX, i32::MIN), |(a, b), (c, d)| (a.min(c), b.max(d)))
+    }
+
     /// Describes the field `height`.
     pub fn height_info(&self) -> FieldInfo {
         self.lattice.field_info("height", "m")

@@ -2,6 +2,7 @@
 
 use crate::bound::Bound;
 use crate::patch::{Facing, Local, Patches};
+use crate::wall;
 use terraglue_soil_law::ShearResponse;
 
 /// A 6 × 6 stiffness, rows: components of the wrench on the soil, columns: components of X.
@@ -14,7 +15,18 @@ impl Patches {
         self.each_answer(p, x, |k, pressure, _, r| {
             add_force(&mut sum, self.nodes.arm[k], self.node_force(k, pressure, r.stress));
         });
+        let patch = &self.ports[p];
+        if !patch.wall.is_empty() {
+            let beside = patch.wall.wrench(&self.beside(p, x));
+            sum.iter_mut().zip(beside).for_each(|(s, b)| *s += b);
+        }
         sum
+    }
+
+    /// What the soil beside patch `p` answers when its foot has moved by `x`.
+    pub fn beside(&self, p: usize, x: &[f64; 6]) -> wall::Answer {
+        let wall = &self.ports[p].wall;
+        wall.answer(&self.sides, wall.way_of(x))
     }
 
     /// Wrench on the body at rest, and the largest tangential force there, N.
@@ -34,12 +46,18 @@ impl Patches {
                 strength += inclined * shear.yield_stress_kept(pressed, slip, n.mobilised[k], n.kept(k));
             }
         });
+        let patch = &self.ports[p];
+        if !patch.wall.is_empty() {
+            let beside = patch.wall.wrench(&self.beside(p, &[0.0; 6]));
+            sum.iter_mut().zip(beside).for_each(|(s, b)| *s += b);
+            strength += self.sides[patch.wall.sides.clone()].iter().map(|side| side.force).sum::<f64>();
+        }
         (sum, strength + bound.take(&self.laws))
     }
 
     /// Force of a node on the body along n, t1, t2 under a pressure and a shear stress.
     #[inline]
-    fn node_force(&self, k: usize, pressure: f64, tau: [f64; 2]) -> [f64; 3] {
+    pub fn node_force(&self, k: usize, pressure: f64, tau: [f64; 2]) -> [f64; 3] {
         let n = &self.nodes;
         let facing = &n.facing[k];
         let area = n.area[k];
@@ -58,27 +76,14 @@ impl Patches {
             let node = node_stiffness(&self.nodes.facing[k], self.nodes.area[k], slope, r);
             add_stiffness(&mut sum, self.nodes.arm[k], &node, moments);
         });
-        sum
-    }
-
-    /// Pressure at node k when the foot is at depth z there, and its slope. Soil that was in contact and clings follows the
-    /// elastic line below zero down to the tension that it bears, then lets go.
-    #[inline]
-    pub fn pressure(&self, k: usize, z: f64) -> (f64, f64) {
-        let n = &self.nodes;
-        self.or_clinging(k, z, self.law(k).curve.at(z, n.z_max[k], n.p_max[k]))
-    }
-
-    /// The same where pressure and slope without clinging are known.
-    #[inline]
-    pub fn or_clinging(&self, k: usize, z: f64, (pressure, slope): (f64, f64)) -> (f64, f64) {
-        let (n, law) = (&self.nodes, self.law(k));
-        if pressure > 0.0 || law.adhesion == 0.0 || n.stamp[k] == 0 {
-            return (pressure, slope);
+        let wall = &self.ports[p].wall;
+        if !wall.is_empty() {
+            let block = wall.stiffness(&self.beside(p, x));
+            for (row, values) in sum.iter_mut().zip(&block) {
+                row.iter_mut().zip(values).for_each(|(s, v)| *s += v);
+            }
         }
-        let stiffness = law.curve.unloading();
-        let tension = stiffness * (n.permanent[k] - z);
-        if tension <= law.adhesion { (-tension, stiffness) } else { (0.0, 0.0) }
+        sum
     }
 
     /// Calls `visit(node, pressure, slope, answer of the shear law)` for the nodes with pressure or tension.

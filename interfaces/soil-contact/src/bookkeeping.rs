@@ -3,21 +3,29 @@
 use crate::assemble::{displacement, dot};
 use crate::contacts::Touch;
 use crate::ground::{Covered, Ground};
-use crate::patch::{Patch, PatchNodes, Patches, key};
-use crate::wheel;
-use terraglue_soil_law::{KeptNodes, ShearResponse, ShearState};
+use crate::nodes::NodeState;
+use crate::patch::{Patch, PatchNodes, Patches};
+use crate::{wall, wheel};
+use terraglue_soil_law::{KeptNodes, PressureCurve, ShearResponse, ShearState};
 use terraglue_subsystem::{MOST_LAW_STATE, Port};
 
 /// Sums over the run and what the last commit found. Part of the committed state.
+///
+/// Heat + elastic energy + gravitational energy of the material = work of the feet: what plastic flow and friction turn into
+/// heat is summed up node by node and not taken from the difference, so that the sum can be held against the work.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Book {
     /// Number of commits.
     pub stamp: u64,
-    /// Elastic energy of the loaded nodes, J.
+    /// Elastic energy of the loaded nodes and of the soil beside the feet, J.
     pub elastic: f64,
+    /// Gravitational energy that the material has gained since the start, J.
+    pub lifted: f64,
     /// Heat since the start, J.
     pub dissipated: f64,
-    /// Work of the feet on the soil since the start, J.
+    /// Energy that the soil has taken up and that heat has not paid for yet, J; see [`Book::pay`].
+    pub owed: f64,
+    /// Work of the feet on the soil since the start under the forces of its own laws, J.
     pub port_work: f64,
     /// Largest committed depth of a loaded node below the initial surface since the start, m.
     pub max_sinkage: f64,
@@ -25,6 +33,29 @@ pub struct Book {
     pub loaded: u32,
     /// Smallest number of loaded nodes of a patch with any; 0: none is loaded.
     pub fewest: u32,
+}
+
+impl Book {
+    /// Takes `due` (J) of energy that the soil has taken up beside the flow of its nodes out of the heat that was made since it
+    /// was `before` (J), or of later heat; < 0: it becomes heat. Two things are due: what the material is lifted by (where the
+    /// pressure begins with nothing, the first soil that is pushed aside weighs more than it resists), and the elastic energy
+    /// of soil that a foot slides onto, which is loaded a node at a time, while what drives the foot works steadily.
+    pub fn pay(&mut self, due: f64, before: f64) {
+        let due = self.owed + due;
+        let paid = due.min(self.dissipated - before);
+        (self.dissipated, self.owed) = (self.dissipated - paid, due - paid);
+    }
+}
+
+/// What happens to the energy under one foot in one commit, J.
+#[derive(Clone, Copy, Debug, Default)]
+struct Turnover {
+    /// Work on the soil.
+    work: f64,
+    /// Turned into heat.
+    heat: f64,
+    /// Elastic energy of soil that the foot has come over from the side; the force that drove it there has paid for it.
+    entered: f64,
 }
 
 /// Work lists of a commit; reused.
@@ -43,6 +74,8 @@ pub struct Lists {
     carried: Vec<f64>,
     /// Nodes that were loaded before and are not any more.
     pub released: Vec<[i32; 2]>,
+    /// Per port whether it touches the soil.
+    touching: Vec<bool>,
     /// Pressures and shear of the nodes of a patch, asked of its law together; empty: it is asked node by node.
     answers: Vec<(f64, ShearResponse)>,
 }
@@ -57,6 +90,7 @@ impl Lists {
         self.slid_in.reserve(count);
         self.slid.reserve(count);
         self.released.reserve(count);
+        self.touching.reserve(count);
         self.answers.reserve(count);
     }
 }
@@ -104,13 +138,14 @@ impl Scene<'_> {
         lists.slid_in.clear();
         lists.slid.clear();
         lists.covered.clear();
+        lists.touching.clear();
         ground.contacts.begin();
         for (p, (patch, port)) in self.patches.ports.iter().zip(ports).enumerate() {
-            book.port_work -= port.range().map(|k| t[k] * x[k]).sum::<f64>();
             let (x, wrench) = (patch.unpack(x), patch.unpack(t));
             let mut touch = Touch::default();
             self.ask_together(p, &x, &mut lists.answers);
             let loaded = self.commit_patch(patch, port, &x, ground, lists, book, &mut touch);
+            lists.touching.push(loaded > 0);
             if loaded > 0 && ground.contacts.any() {
                 touch.under(patch, &wrench, &x, self.h);
                 ground.contacts.tell(port.key, &touch);
@@ -120,7 +155,10 @@ impl Scene<'_> {
             }
             book.loaded += loaded;
         }
-        release(ground, lists, book.stamp);
+        let stamp = book.stamp;
+        book.dissipated += release(ground, lists, stamp);
+        let touching = |key| ports.iter().zip(&lists.touching).any(|(port, touches)| *touches && port.key == key);
+        book.dissipated += wall::release(&mut ground.pushes, touching);
     }
 
     /// Pressures and shear of all nodes of patch `p` where its law answers many nodes at a time.
@@ -149,46 +187,52 @@ impl Scene<'_> {
         let n = &self.patches.nodes;
         let first = lists.loaded.len();
         let mut loaded = 0;
+        let mut turnover = Turnover::default();
         for k in patch.nodes.clone().filter(|k| n.area[*k] > 0.0) {
             let (moved, facing) = (displacement(n.arm[k], x), &n.facing[k]);
-            let rise = dot(facing.press, moved);
-            let depth = n.depth[k] - rise;
+            let depth = n.depth[k] - dot(facing.press, moved);
             let curve = &self.patches.law(k).curve;
             let mut kept = Kept::default();
             let asked = lists.answers.get(k - patch.nodes.start).copied();
             let pressure = match (curve.keeper(), asked) {
-                (Some(_), _) => self.patches.or_clinging(k, depth, (self.kept(k, depth, &mut kept), 0.0)).0,
+                (Some(_), _) => self.kept(k, depth, &mut kept),
                 (None, Some((pressure, _))) => pressure,
                 (None, None) => self.patches.pressure(k, depth).0,
             };
             let [i, j] = n.index[k];
             let deep = (depth + relief(n, k)) / patch.slope;
             let lower = n.reference[k] - deep;
-            let mut covered = Covered { i, j, lower, depth: deep, pressure, virgin: 0.0, surface: f64::NAN };
+            let (virgin, surface, flow) = (0.0, f64::NAN, [0.0; 2]);
+            let mut covered = Covered { i, j, lower, depth: deep, pressure, virgin, surface, flow };
             if pressure > 0.0 {
                 loaded += 1;
-                let fresh = n.stamp[k] == 0 || n.stamp[k] + 1 != book.stamp;
-                // a point that has just come down from above is no deeper in the soil than its own descent; those of
-                // a rim all come from above
-                let slid_in = fresh && patch.wheel.is_none() && depth - n.permanent[k] > -2.0 * rise;
-                lists.slid_in.push(slid_in);
+                lists.slid_in.push(n.entered[k] && patch.wheel.is_none());
                 touch.add(n, k, pressure, deep);
                 let slip = facing.slide(moved);
                 let shear = asked.map_or_else(|| self.sheared(k, pressure, slip), |(_, shear)| shear);
+                let force = self.patches.node_force(k, pressure, shear.stress);
+                turnover.work -= dot(force, moved);
                 let node = Pressed { k, depth, pressure, slip, shear, kept: &kept };
-                let (slid, surface) = self.press(patch, &node, ground, book);
+                let (slid, surface) = self.press(patch, &node, ground, book, &mut turnover);
                 let carried = if patch.wheel.is_some() { moved } else { slid };
                 lists.slid.push(in_world(port, carried));
                 lists.loaded.push([i, j]);
                 covered.surface = surface;
-                let first = depth > n.z_max[k] || curve.keeper().is_some();
-                covered.virgin = if first { pressure } else { curve.virgin(depth) };
+                covered.flow = flow_along(port, moved);
+                covered.virgin = if kept_by_law(curve) { pressure } else { self.patches.yields(k, depth).0 };
             }
             if n.stamp[k] != 0 && pressure <= 0.0 && self.patches.law(k).adhesion > 0.0 {
-                self.cling(k, pressure, ground, lists, book);
+                turnover.work -= dot(self.patches.node_force(k, pressure, [0.0; 2]), moved);
+                self.cling(k, pressure, ground, lists, book, &mut turnover);
             }
             lists.covered.push(covered);
         }
+        if loaded > 0 {
+            self.push_aside(patch, port, x, ground, book, &mut turnover);
+        }
+        book.port_work += turnover.work;
+        book.dissipated += turnover.heat;
+        book.owed += turnover.entered;
         if let Some(wheel) = patch.wheel.as_ref().filter(|_| loaded > 0) {
             wheel::remember(&mut ground.wheels, wheel, x);
         }
@@ -200,22 +244,60 @@ impl Scene<'_> {
         loaded
     }
 
+    /// The soil beside a foot: how far it was pushed, its work, heat and elastic energy.
+    fn push_aside(
+        &self,
+        patch: &Patch,
+        port: &Port,
+        x: &[f64; 6],
+        ground: &mut Ground,
+        book: &mut Book,
+        turnover: &mut Turnover,
+    ) {
+        let (wall, sides) = (&patch.wall, &self.patches.sides);
+        let u = wall.way_of(x);
+        let answer = wall.answer(sides, u);
+        let before = wall.before.mobilised;
+        let [from, to] = [before, answer.mobilised].map(|e| wall.energy(sides, e));
+        let of = |way: [f64; 3]| -dot(answer.force, way);
+        let elastic = [0, 1, 2].map(|k| wall.way * (answer.mobilised[k] - before[k]));
+        turnover.work += of(u);
+        // plastic flow, what the end-of-step rule damps, and what is left behind where sides have gone
+        turnover.heat += of([0, 1, 2].map(|k| u[k] - elastic[k])) + (of(elastic) - to + from).max(0.0);
+        turnover.heat += (wall.before.energy - from).max(0.0);
+        turnover.entered += (from - wall.before.energy).max(0.0);
+        book.elastic += to;
+        let new = wall::Push { key: port.key, mobilised: answer.mobilised, energy: to };
+        wall::remember(&mut ground.pushes, new);
+    }
+
     /// A node that was in contact and is not pressed any more: it clings under tension, or lets go, and what its stretched
     /// soil held becomes heat.
-    fn cling(&self, k: usize, pressure: f64, ground: &mut Ground, lists: &mut Lists, book: &mut Book) {
+    fn cling(
+        &self,
+        k: usize,
+        pressure: f64,
+        ground: &mut Ground,
+        lists: &mut Lists,
+        book: &mut Book,
+        turnover: &mut Turnover,
+    ) {
         let [i, j] = self.patches.nodes.index[k];
-        let held = |p: f64| 0.5 * self.patches.nodes.area[k] * p * p / self.patches.law(k).curve.unloading();
-        let before = ground.nodes.get(i, j).pressure;
-        if pressure < 0.0 {
-            let state = ground.enter(i, j);
-            (state.pressure, state.shear, state.stamp) = (pressure, ShearState::default(), book.stamp);
-            lists.loaded.push([i, j]);
-            lists.slid_in.push(false);
-            lists.slid.push([0.0; 2]);
-            book.elastic += held(pressure);
-        } else if before < 0.0 {
-            book.dissipated += held(before);
+        if pressure >= 0.0 {
+            return;
         }
+        let state = ground.enter(i, j);
+        self.take_over(k, state, turnover);
+        // the end-of-step rule damps, and shear is not held any more
+        let held = self.held(k, pressure);
+        turnover.heat += self.held(k, pressure - self.pressure_at_start(k)) + self.sheared_before(k);
+        state.area = self.patches.nodes.area[k];
+        (state.pressure, state.shear, state.stamp, state.energy) =
+            (pressure, ShearState::default(), book.stamp, held);
+        lists.loaded.push([i, j]);
+        lists.slid_in.push(false);
+        lists.slid.push([0.0; 2]);
+        book.elastic += held;
     }
 
     /// The pressure of a law with a state at node k, and what it keeps.
@@ -228,7 +310,7 @@ impl Scene<'_> {
         let state = &mut out.state[..n.doubles];
         law.kept(b, &nodes, [&mut p, &mut slope, &mut unloaded], state);
         out.permanent = unloaded[0];
-        p[0]
+        if p[0] > 0.0 { n.share[k] * p[0] } else { self.patches.clinging_at(k, depth).0 }
     }
 
     /// Shear of node k alone.
@@ -239,48 +321,38 @@ impl Scene<'_> {
 
     /// One loaded node: plastic depth, slip, heat and elastic energy. Returns how far the foot slipped over the soil
     /// along n, t1 and t2, and the height of the unloaded surface, m.
-    fn press(&self, patch: &Patch, node: &Pressed, ground: &mut Ground, book: &mut Book) -> ([f64; 3], f64) {
+    fn press(
+        &self,
+        patch: &Patch,
+        node: &Pressed,
+        ground: &mut Ground,
+        book: &mut Book,
+        turnover: &mut Turnover,
+    ) -> ([f64; 3], f64) {
         let Pressed { k, depth, pressure, slip, shear, .. } = *node;
-        let (n, law) = (&self.patches.nodes, self.patches.law(k));
-        let curve = &law.curve;
-        let area = n.area[k];
-        let inclined = area * n.facing[k].stretch;
-        let kept = curve.keeper().is_some();
-        let squeezed = match kept {
-            true => 0.5 * pressure * (depth - node.kept.permanent).max(0.0),
-            false => 0.5 * pressure * pressure / curve.unloading(),
-        };
-        book.dissipated += inclined * shear.dissipated;
-        book.elastic += inclined * law.shear.elastic_energy(&shear.state) + area * squeezed;
+        let n = &self.patches.nodes;
         let [i, j] = n.index[k];
         let initial = ground.initial(i, j);
         let state = ground.enter(i, j);
-        state.largest = n.z_max[k];
-        if kept {
-            let fresh = state.stamp + 1 != book.stamp;
-            let (p, from) = if fresh { (0.0, n.permanent[k]) } else { (state.pressure, n.depth[k]) };
-            let work = 0.5 * (p + pressure) * (depth - from);
-            let elastic = 0.5 * p * (from - n.permanent[k]).max(0.0);
-            book.dissipated += area * (work - squeezed + elastic).max(0.0);
-            (state.largest, state.permanent) = (depth, node.kept.permanent.max(0.0) / patch.slope);
-        } else if depth > n.z_max[k] {
-            let (before, p) = (n.z_max[k], n.p_max[k]);
-            book.dissipated += area * curve.plastic_work(before, p, depth, pressure);
-            state.permanent = curve.permanent(depth, pressure) / patch.slope;
-            state.largest = depth;
+        self.take_over(k, state, turnover);
+        let (permanent, energy) = match self.patches.law(k).curve.keeper() {
+            Some(_) => self.squeeze_kept(node, turnover),
+            None => self.squeeze(node, turnover),
+        };
+        let energy = energy + self.shear_off(node, turnover);
+        book.elastic += energy;
+        state.area = n.area[k];
+        state.permanent = permanent / patch.slope;
+        (state.pressure, state.shear, state.energy) = (pressure, shear.state, energy);
+        if depth <= n.bed[k] {
+            // loose soil slides along with the foot: the bed below has not been sheared
+            state.shear.slip = 0.0;
         }
-        state.curve = if kept { [0.0; 3] } else { key(curve, patch.slope) };
-        if !n.relief[k].is_nan() {
-            // what stays behind the peak is the depth of the underside, whatever its pressure
-            let stays = depth - pressure / curve.unloading() + n.relief[k];
-            state.permanent = state.permanent.max(stays / patch.slope);
-            state.curve = [0.0; 3];
-        }
-        (state.pressure, state.shear, state.stamp) = (pressure, shear.state, book.stamp);
+        state.stamp = book.stamp;
         book.max_sinkage =
             book.max_sinkage.max((depth + relief(n, k)) / patch.slope - (state.reference - initial));
-        let surface = state.reference - state.permanent.max(0.0);
-        if kept {
+        let surface = state.reference - state.permanent;
+        if kept_by_law(&self.patches.law(k).curve) {
             ground.law_memory.write([i, j], &node.kept.state);
         }
         let elastic = |c: usize| shear.state.elastic[c] - n.shear[k].elastic[c];
@@ -292,12 +364,94 @@ impl Scene<'_> {
             ([0.0; 3], surface)
         }
     }
+
+    /// Elastic energy of node k between the commits: what belongs to area that the foot has come over, and what is left behind
+    /// where it has gone.
+    fn take_over(&self, k: usize, state: &NodeState, turnover: &mut Turnover) {
+        let n = &self.patches.nodes;
+        let now = self.held(k, self.pressure_at_start(k)) + self.sheared_before(k);
+        let new = if state.area < n.area[k] { (1.0 - state.area / n.area[k]) * now } else { 0.0 };
+        turnover.entered += new;
+        turnover.heat += (state.energy - (now - new)).max(0.0);
+    }
+
+    /// Elastic energy of node k under the pressure p (Pa), J.
+    fn held(&self, k: usize, p: f64) -> f64 {
+        0.5 * self.patches.nodes.area[k] * p * p / self.patches.law(k).curve.unloading()
+    }
+
+    /// Pressure at node k at X = 0 before it yields, Pa.
+    fn pressure_at_start(&self, k: usize) -> f64 {
+        let (n, curve) = (&self.patches.nodes, &self.patches.law(k).curve);
+        if kept_by_law(curve) {
+            return n.before[k].max(0.0);
+        }
+        let p = curve.unloading() * (n.depth[k] - n.permanent[k]);
+        if p > 0.0 || n.before[k] < 0.0 { p } else { 0.0 }
+    }
+
+    /// Normal part of a node: its new unloaded surface along n (m) and elastic energy (J).
+    fn squeeze(&self, node: &Pressed, turnover: &mut Turnover) -> (f64, f64) {
+        let Pressed { k, depth, pressure: p, .. } = *node;
+        let (n, k_u) = (&self.patches.nodes, self.patches.law(k).curve.unloading());
+        let from = n.permanent[k];
+        let to = (depth - p / k_u).max(from);
+        let start = self.pressure_at_start(k);
+        // the end-of-step rule lets the force act over the gap, too, that a foot closes as it touches
+        let gap = if start == 0.0 { (from - n.depth[k]).max(0.0) } else { 0.0 };
+        turnover.heat += n.area[k] * p * (to - from + gap) + self.held(k, p - start);
+        // what stays behind the peak of a wheel is the depth of the underside, whatever its pressure
+        (to.max(depth - p / k_u + relief(n, k)), self.held(k, p))
+    }
+
+    /// The same for a law that answers for unloading itself.
+    fn squeeze_kept(&self, node: &Pressed, turnover: &mut Turnover) -> (f64, f64) {
+        let Pressed { k, depth, pressure, kept, .. } = *node;
+        let n = &self.patches.nodes;
+        let held = 0.5 * n.area[k] * pressure * (depth - kept.permanent).max(0.0);
+        let from = if n.stamp[k] == 0 { n.permanent[k].min(depth) } else { n.depth[k] };
+        let before = self.held(k, self.pressure_at_start(k));
+        turnover.heat += (n.area[k] * pressure * (depth - from) - held + before).max(0.0);
+        (kept.permanent.max(0.0), held)
+    }
+
+    /// Elastic energy of the shear of node k at the start of the step, J.
+    fn sheared_before(&self, k: usize) -> f64 {
+        let n = &self.patches.nodes;
+        if n.stamp[k] == 0 {
+            return 0.0;
+        }
+        n.area[k] * n.facing[k].stretch * self.patches.law(k).shear.elastic_energy(&n.shear[k])
+    }
+
+    /// Shear of a node: its elastic energy, J. Friction and what the end-of-step rule damps become heat.
+    fn shear_off(&self, node: &Pressed, turnover: &mut Turnover) -> f64 {
+        let Pressed { k, shear, .. } = node;
+        let (n, law) = (&self.patches.nodes, &self.patches.law(*k).shear);
+        let area = n.area[*k] * n.facing[*k].stretch;
+        let before = n.shear[*k].elastic;
+        let change = [0, 1].map(|c| shear.state.elastic[c] - before[c]);
+        let damped = law.elastic_energy(&ShearState { elastic: change, ..ShearState::default() });
+        turnover.heat += area * (shear.dissipated + damped);
+        area * law.elastic_energy(&shear.state)
+    }
+}
+
+/// Whether a law answers for unloading itself.
+fn kept_by_law(curve: &PressureCurve) -> bool {
+    curve.keeper().is_some()
 }
 
 /// How much deeper than it counts node k lies, m.
 fn relief(nodes: &PatchNodes, k: usize) -> f64 {
     let relief = nodes.relief[k];
     if relief.is_nan() { 0.0 } else { relief }
+}
+
+/// Where soil that is pressed out flows under an underside that moves by `moved`, see [`Covered::flow`].
+fn flow_along(port: &Port, moved: [f64; 3]) -> [f64; 2] {
+    let length = dot(moved, moved).sqrt();
+    in_world(port, moved).map(|c| if length > 0.0 { c / length } else { 0.0 })
 }
 
 /// Horizontal world components of a vector along n, t1, t2.
@@ -361,15 +515,30 @@ fn mean_slip(ground: &Ground, nodes: &[[i32; 2]], slid_in: &[bool]) -> f64 {
     if weights > 0.0 { sum / weights } else { 0.0 }
 }
 
-/// Lift-off: the nodes that were loaded before and are not now forget pressure and shear.
-fn release(ground: &mut Ground, lists: &mut Lists, stamp: u64) {
+/// Lift-off: the nodes that were loaded before and are not now forget pressure and shear. Returns the elastic energy that
+/// they held, J: nothing takes it up.
+fn release(ground: &mut Ground, lists: &mut Lists, stamp: u64) -> f64 {
     lists.released.clear();
+    let mut heat = 0.0;
     for [i, j] in &lists.previous {
-        if ground.nodes.get(*i, *j).stamp != stamp {
+        let state = ground.nodes.get(*i, *j);
+        if state.stamp != stamp {
+            heat += state.energy;
             ground.leave(*i, *j);
             lists.released.push([*i, *j]);
         }
     }
+    heat
 }
 
-terraglue_subsystem::persist!(Book { stamp, elastic, dissipated, port_work, max_sinkage, loaded, fewest });
+terraglue_subsystem::persist!(Book {
+    stamp,
+    elastic,
+    lifted,
+    dissipated,
+    owed,
+    port_work,
+    max_sinkage,
+    loaded,
+    fewest,
+});

@@ -2,7 +2,7 @@
 
 use crate::assemble::{displacement, dot};
 use crate::patch::{Local, Patches};
-use terraglue_soil_law::{KeptNodes, ShearResponse, ShearState, Sheared, pressures};
+use terraglue_soil_law::{KeptNodes, ShearResponse, ShearState, Sheared, first_loading};
 use terraglue_subsystem::MOST_LAW_STATE;
 
 /// Nodes that are evaluated together.
@@ -54,24 +54,19 @@ impl Patches {
 
     /// Pressures and slopes; nodes without are left out, those that cling stand at the end.
     fn press_chunk(&self, law: &Local, chunk: &mut Chunk) {
-        let (curve, n, count) = (&law.curve, &self.nodes, chunk.count);
+        let (curve, count) = (&law.curve, chunk.count);
         let (pressure, slope) = (&mut chunk.pressure[..count], &mut chunk.slope[..count]);
         if curve.keeper().is_some() {
             self.kept_pressures(law, &chunk.node[..count], &chunk.depth[..count], pressure, slope);
         } else {
-            let gather = |from: &[f64]| {
-                let mut out = [0.0; CHUNK];
-                out.iter_mut().zip(&chunk.node[..count]).for_each(|(out, k)| *out = from[*k]);
-                out
-            };
-            let (z_max, p_max) = (gather(&n.z_max), gather(&n.p_max));
-            pressures(curve, &chunk.depth[..count], &z_max[..count], &p_max[..count], pressure, slope);
+            self.yielding(law, &chunk.node[..count], &chunk.depth[..count], pressure, slope);
         }
         let (mut left, mut clings) = (0, 0);
         let mut clinging = [(0, 0.0, 0.0, [0.0; 2]); CHUNK];
         for at in 0..count {
             let (k, pressed) = (chunk.node[at], (chunk.pressure[at], chunk.slope[at]));
-            let (pressure, slope) = self.or_clinging(k, chunk.depth[at], pressed);
+            let (pressure, slope) =
+                if pressed.0 > 0.0 { pressed } else { self.clinging_at(k, chunk.depth[at]) };
             let slide = chunk.slide[at];
             if pressure > 0.0 {
                 (chunk.node[left], chunk.pressure[left]) = (k, pressure);
@@ -89,6 +84,35 @@ impl Patches {
             left += 1;
         }
         chunk.count = left;
+    }
+
+    /// Pressures of nodes at depths: those that may yield are gathered for the law.
+    fn yielding(&self, law: &Local, nodes: &[usize], depth: &[f64], pressure: &mut [f64], slope: &mut [f64]) {
+        let (n, k_u) = (&self.nodes, law.curve.unloading());
+        let [mut bed, mut bed_slope, mut top, mut loose, mut loose_slope, mut z] = [[0.0; CHUNK]; 6];
+        let (mut place, mut count, mut covered) = ([0; CHUNK], 0, false);
+        for (at, (k, depth)) in nodes.iter().zip(depth).enumerate() {
+            let elastic = k_u * (depth - n.permanent[*k]);
+            (pressure[at], slope[at]) = if elastic > 0.0 { (elastic, k_u) } else { (0.0, 0.0) };
+            if elastic > n.bound[*k].max(0.0) {
+                (place[count], z[count]) = (at, *depth);
+                top[count] = n.above_bed(*k, *depth).unwrap_or(0.0);
+                covered |= n.loose[*k] > 0.0;
+                count += 1;
+            }
+        }
+        first_loading(&law.curve, &z[..count], &mut bed[..count], &mut bed_slope[..count]);
+        if covered {
+            first_loading(&law.curve, &top[..count], &mut loose[..count], &mut loose_slope[..count]);
+        }
+        for c in 0..count {
+            let (at, k) = (place[c], nodes[place[c]]);
+            let on_bed = (n.loose[k] > 0.0).then_some((loose[c], loose_slope[c]));
+            let yields = self.yields_from(k, z[c], (bed[c], bed_slope[c]), on_bed, law);
+            if yields.0 < pressure[at] {
+                (pressure[at], slope[at]) = yields;
+            }
+        }
     }
 
     /// Pressures of a law that keeps a state; what it would keep after the step is dropped.
@@ -112,8 +136,11 @@ impl Patches {
         let (permanent, slip) = (&permanent[..count], &slip[..count]);
         let (mut unloaded, mut new) = ([0.0; CHUNK], [0.0; CHUNK * MOST_LAW_STATE]);
         let given = KeptNodes { depth, permanent, slip, state: &state[..count * doubles] };
-        let out = [pressure, slope, &mut unloaded[..count]];
+        let out = [&mut *pressure, &mut *slope, &mut unloaded[..count]];
         law.kept(b, &given, out, &mut new[..count * doubles]);
+        for ((k, p), slope) in nodes.iter().zip(pressure).zip(slope) {
+            (*p, *slope) = (n.share[*k] * *p, n.share[*k] * *slope);
+        }
     }
 
     /// As [`Patches::each_answer`] for a patch on one soil, in chunks.

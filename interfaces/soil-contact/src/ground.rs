@@ -4,6 +4,7 @@ use crate::contacts::Contacts;
 use crate::law_memory::LawMemory;
 use crate::mask::Mask;
 use crate::nodes::{NodeState, NodeStates};
+use crate::wall::Push;
 use crate::wheel::Memory;
 use terraglue_ground::{HeightField, TILE_EDGE, UNIT_M};
 use terraglue_subsystem::{Result, Terrain};
@@ -24,10 +25,12 @@ pub struct Covered {
     pub depth: f64,
     /// Pressure, Pa; 0: the foot does not touch here.
     pub pressure: f64,
-    /// Pressure of first loading at this depth, Pa; 0 where the foot does not touch.
+    /// Pressure at which the soil yields at this depth, Pa; 0 where the foot does not touch.
     pub virgin: f64,
     /// Height of the unloaded surface, from the unrounded state, m; NaN where the foot does not touch.
     pub surface: f64,
+    /// Horizontal part of the direction in which the underside moves, world x and y: what is pressed out flows with it.
+    pub flow: [f64; 2],
 }
 
 /// Heights and node states on one lattice.
@@ -39,6 +42,8 @@ pub struct Ground {
     pub nodes: NodeStates,
     /// Wheels that have touched it.
     pub wheels: Vec<Memory>,
+    /// How far contacts have pushed the soil beside them.
+    pub pushes: Vec<Push>,
     /// What is told of the contacts.
     pub contacts: Contacts,
     /// Which soil lies where.
@@ -56,6 +61,7 @@ impl Ground {
             heights,
             nodes,
             wheels: Vec::with_capacity(WHEELS),
+            pushes: Vec::with_capacity(WHEELS),
             contacts: Contacts::default(),
             mask: Mask::default(),
             law_memory: LawMemory::default(),
@@ -68,7 +74,7 @@ impl Ground {
         f64::from(self.heights.initial_units(i, j)) * UNIT_M
     }
 
-    /// Reference level of a node, m: the surface itself where the soil was never pressed.
+    /// Reference level of the bed at a node, m: its surface where the soil was never pressed.
     #[inline]
     pub fn reference(&self, i: i32, j: i32, state: &NodeState) -> f64 {
         if state.loaded() {
@@ -78,13 +84,21 @@ impl Ground {
         }
     }
 
+    /// World height of the bed at a node and height of the loose soil on it, m; outside the lattice those of its edge.
+    pub fn levels(&self, i: i32, j: i32) -> [f64; 2] {
+        let lattice = self.heights.lattice();
+        let (u, v) = lattice.clamp(i, j);
+        let (i, j) = (u as i32, v as i32);
+        let loose = self.nodes.get(i, j).loose_left();
+        [self.heights.height(i, j) - loose, loose]
+    }
+
     /// The state of a node on which a foot stands from now on, for writing.
     #[inline]
     pub fn enter(&mut self, i: i32, j: i32) -> &mut NodeState {
         let height = self.heights.height(i, j);
         let state = self.nodes.enter(i, j);
-        // what was never pressed has its reference level at the surface
-        if !state.loaded() || state.permanent <= 0.0 {
+        if !state.loaded() {
             state.reference = height + state.remainder + state.permanent;
         }
         state
@@ -100,14 +114,14 @@ impl Ground {
     #[inline]
     pub fn surface_units(&self, i: i32, j: i32) -> i32 {
         let state = self.nodes.get(i, j);
-        if !state.loaded() || state.permanent <= 0.0 {
+        if !state.loaded() {
             return self.heights.units(i, j);
         }
         ((state.reference - state.permanent) / UNIT_M).round() as i32
     }
 
-    /// Books `units` of material that came to a node (or went, < 0). What comes lies loose: it first fills
-    /// the hollow that was pressed before and takes its compaction away; beyond that it raises the reference level.
+    /// Books `units` of material that came to a node without a foot (or went, < 0). What comes lies loose on the bed, which
+    /// stays as it was pressed; what goes is loose soil first.
     #[inline]
     pub fn add_material(&mut self, i: i32, j: i32, units: i32) {
         if units == 0 || !self.heights.lattice().has(i, j) {
@@ -118,9 +132,10 @@ impl Ground {
     }
 
     /// Puts the nodes from (i, j) on along x at `heights` (units), as [`Ground::add_material`] books it. All are nodes
-    /// of the lattice. Returns what they gained together and the sum of what single ones gained.
-    pub fn put_row(&mut self, i: i32, j: i32, heights: &[i32]) -> [i64; 2] {
-        let (mut gained, mut moved) = (0, 0);
+    /// of the lattice. Returns what they gained together, the sum of what single ones gained, and by how much the sum of the
+    /// squares of the heights has grown: twice the gravitational energy.
+    pub fn put_row(&mut self, i: i32, j: i32, heights: &[i32]) -> [i64; 3] {
+        let (mut gained, mut moved, mut lifted) = (0, 0, 0);
         let (mut i, mut rest) = (i, heights);
         let mut changes = [0; TILE_EDGE as usize];
         while !rest.is_empty() {
@@ -129,13 +144,20 @@ impl Ground {
             let (part, left) = rest.split_at(n);
             if self.heights.write_row(tile, first, part, &mut changes) {
                 self.nodes.add_loose_row(tile, first, &changes[..n]);
-                for change in &changes[..n] {
+                for (height, change) in part.iter().zip(&changes[..n]) {
                     gained += i64::from(*change);
                     moved += i64::from((*change).max(0));
+                    lifted += squares_grown(*height, *change);
                 }
             }
             (i, rest) = (i + n as i32, left);
         }
-        [gained, moved]
+        [gained, moved, lifted]
     }
+}
+
+/// By how much the square of a height (units) has grown, that is `height` after it has changed by `change`.
+#[inline]
+pub fn squares_grown(height: i32, change: i32) -> i64 {
+    i64::from(change) * (2 * i64::from(height) - i64::from(change))
 }

@@ -5,15 +5,16 @@
 //! height field only books what stays.
 //!
 //! # Depths
-//! A node has a *reference level*, where the surface would be if the node had never been pressed, and a
-//! *permanent* depth of the unloaded surface below it. The depth under a foot is counted from the reference
-//! level along the port's normal n: δ = (reference − underside)·n_z − X_n − (rotation). Loading follows the
-//! pressure law of δ where it is below the elastic line k_u·(δ − permanent), the elastic line otherwise.
+//! A node has a *reference level*, where the surface of its bed would be if it had never been pressed, and an *unloaded
+//! surface* at the depth z₀ below it, above it where loose soil lies on the bed. The depth under a foot is counted from the
+//! reference level along the port's normal n: z = (reference − underside)·n_z − X_n − (rotation). The soil is elastic above
+//! z₀ up to the pressure at which it yields; what yields moves z₀ down.
 
 mod assemble;
 mod bookkeeping;
 mod bound;
 mod chunk;
+mod compatibility;
 mod contacts;
 mod ground;
 mod law_memory;
@@ -21,14 +22,16 @@ mod mask;
 mod nodes;
 mod normal;
 mod patch;
-mod recall;
+mod size;
 mod soil;
 mod state;
 mod trial;
 mod values;
+mod wall;
 mod wheel;
+mod yielding;
 
-pub use ground::{Covered, Ground};
+pub use ground::{Covered, Ground, squares_grown};
 pub use mask::{MOST_SOILS, Mask, schema};
 pub use nodes::{NodeState, NodeStates, NodesSnapshot};
 pub use soil::{FieldSoil, Material};

@@ -21,12 +21,16 @@ pub struct NodeState {
     pub reference: f64,
     /// Unrounded height of the surface minus the booked one where no foot stands, m.
     pub remainder: f64,
-    /// Depth of the unloaded surface below the reference level, m, vertical.
+    /// Depth of the unloaded surface below the reference level, m, vertical; below zero where loose soil lies higher.
     pub permanent: f64,
-    /// Largest depth along the normal that belongs to `permanent` under `curve`, m; a cache.
-    pub largest: f64,
-    /// Modulus of the pressure curve and n_z for which `largest` holds.
-    pub curve: [f64; 3],
+    /// Depth of the bed's surface below the reference level when the present contact began, m, vertical.
+    pub bed: f64,
+    /// Height of loose soil on the bed: where no foot stands now, else when the present contact began, m.
+    pub loose: f64,
+    /// Elastic energy of the soil here at the last commit, J.
+    pub energy: f64,
+    /// Area that carried pressure at the last commit, m².
+    pub area: f64,
     /// Committed pressure, Pa; > 0: a foot stands here.
     pub pressure: f64,
     /// Shear history of the present contact.
@@ -42,19 +46,21 @@ impl NodeState {
         self.stamp != 0
     }
 
-    fn add_loose(&mut self, change: f64) {
-        let filled = change.clamp(0.0, self.permanent);
-        self.permanent -= filled;
-        self.reference += change - filled;
-        self.curve = [0.0; 3];
+    /// What is left of the loose soil, m: all that the foot has not pressed through.
+    pub fn loose_left(&self) -> f64 {
+        (self.bed - self.permanent).clamp(0.0, self.loose)
     }
 }
 
-/// What is kept of a node that no foot stands on, in 40 bits: the permanent depth in sixteenths of a unit of height (26
-/// bits, to 1 m) and the remainder of the surface in 1/16384 of a unit (14 bits). A foot that comes back finds its
+/// What is kept of a node that no foot stands on, in 56 bits: the permanent depth of the bed in sixteenths of a unit of
+/// height (26 bits, to 1 m), the remainder of the surface in 1/16384 of a unit (14 bits), and the height of the loose soil on
+/// the bed in sixteen units (16 bits, to 0.25 m; what is higher lies as firm as the bed). A foot that comes back finds its
 /// pressure to 1e-6 from a depth of a centimetre on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-struct Kept([u8; 5]);
+struct Kept {
+    bed: [u8; 5],
+    loose: [u8; 2],
+}
 
 impl Kept {
     const STEP: f64 = UNIT_M / 16.0;
@@ -62,25 +68,28 @@ impl Kept {
     const FINE: f64 = UNIT_M / 16_384.0;
     const FINE_BITS: u32 = 14;
     const HALF: i64 = 1 << (Self::FINE_BITS - 1);
+    /// Units in a step of loose height.
+    const LOOSE: i32 = 16;
 
-    fn new(permanent: f64, remainder: f64) -> Self {
+    fn new(permanent: f64, remainder: f64, loose: f64) -> Self {
         let steps = (permanent / Self::STEP).round().clamp(0.0, Self::DEEPEST) as u64;
         let half = Self::HALF as f64;
         let fine = (remainder / Self::FINE).round().clamp(-half, half - 1.0) as i64 + Self::HALF;
-        Self::pack(steps, fine as u64)
+        let loose = (loose / (UNIT_M * f64::from(Self::LOOSE))).round().clamp(0.0, f64::from(u16::MAX));
+        Self { bed: Self::pack(steps, fine as u64), loose: (loose as u16).to_le_bytes() }
     }
 
-    /// Without depth nothing is kept.
+    /// Without depth nothing is kept of the bed.
     #[inline]
-    fn pack(steps: u64, fine: u64) -> Self {
+    fn pack(steps: u64, fine: u64) -> [u8; 5] {
         let [a, b, c, d, e, ..] = (steps << Self::FINE_BITS | fine).to_le_bytes();
-        if steps == 0 { Self::default() } else { Self([a, b, c, d, e]) }
+        if steps == 0 { [0; 5] } else { [a, b, c, d, e] }
     }
 
     /// (steps of depth, fine steps of the remainder above their lowest).
     #[inline]
     fn unpack(self) -> (u64, u64) {
-        let [a, b, c, d, e] = self.0;
+        let [a, b, c, d, e] = self.bed;
         let all = u64::from_le_bytes([a, b, c, d, e, 0, 0, 0]);
         (all >> Self::FINE_BITS, all & ((1 << Self::FINE_BITS) - 1))
     }
@@ -96,11 +105,17 @@ impl Kept {
         }
     }
 
-    /// After `units` of loose material have filled the hollow.
+    fn loose(self) -> f64 {
+        f64::from(i32::from(u16::from_le_bytes(self.loose)) * Self::LOOSE) * UNIT_M
+    }
+
+    /// After `units` of material have come to lie loose on the bed, or have gone from it (< 0), loose ones first.
     #[inline]
-    fn filled(self, units: i32) -> Self {
-        let (steps, fine) = self.unpack();
-        Self::pack(steps.saturating_sub(16 * u64::from(units.max(0) as u32)), fine)
+    fn changed(self, units: i32) -> Self {
+        let loose = i32::from(u16::from_le_bytes(self.loose));
+        // rounded down when they come and up when they go: no soil becomes loose by rounding
+        let loose = (loose + units.div_euclid(Self::LOOSE)).clamp(0, i32::from(u16::MAX));
+        Self { loose: (loose as u16).to_le_bytes(), ..self }
     }
 }
 
@@ -176,7 +191,8 @@ impl NodeStates {
             return self.contacts[place as usize];
         }
         let kept = self.kept.tile(tile).map_or(Kept::default(), |tile| tile[k]);
-        NodeState { permanent: kept.permanent(), remainder: kept.remainder(), ..NodeState::default() }
+        let (bed, loose) = (kept.permanent(), kept.loose());
+        NodeState { permanent: bed - loose, bed, loose, remainder: kept.remainder(), ..NodeState::default() }
     }
 
     /// The state of a node where a foot stands, for writing; made when it is not there.
@@ -228,7 +244,8 @@ impl NodeStates {
         }
         self.unlist(tile, k);
         let remainder = state.reference - state.permanent - height;
-        self.keep(tile, k, Kept::new(state.permanent, remainder));
+        let loose = state.loose_left();
+        self.keep(tile, k, Kept::new(state.permanent + loose, remainder, loose));
     }
 
     fn keep(&mut self, tile: usize, k: usize, kept: Kept) {
@@ -251,33 +268,23 @@ impl NodeStates {
         }
     }
 
-    /// `units` of material came to node (i, j) or went (< 0).
+    /// `units` of material came to node (i, j) or went (< 0), where no foot stands: what comes lies loose.
     #[inline]
     pub fn add_loose(&mut self, i: i32, j: i32, units: i32) {
         let (tile, k, place) = self.place(i, j);
-        if place != ABSENT {
-            self.contacts[place as usize].add_loose(f64::from(units) * UNIT_M);
-        } else if units > 0 && self.kept.tile(tile).is_some_and(|tile| tile[k] != Kept::default()) {
+        if place == ABSENT && (units > 0 || self.kept.tile(tile).is_some()) {
             let kept = &mut self.kept.tile_mut(tile)[k];
-            *kept = kept.filled(units);
+            *kept = kept.changed(units);
         }
     }
 
-    /// The same for nodes of a tile from place `first` on.
+    /// The same for nodes of a tile from place `first` on; nodes with a foot neither gain nor lose.
     pub fn add_loose_row(&mut self, tile: usize, first: usize, units: &[i32]) {
-        if self.tiles[tile] != ABSENT {
-            let index = &self.indices[self.tiles[tile] as usize];
-            for (place, units) in index.places[first..].iter().zip(units) {
-                if *units != 0 && *place != ABSENT {
-                    self.contacts[*place as usize].add_loose(f64::from(*units) * UNIT_M);
-                }
-            }
-        }
-        // where a foot stands the kept depth is not read until it leaves, which writes it
-        if units.iter().any(|u| *u > 0) && self.kept.tile(tile).is_some() {
+        if units.iter().any(|u| *u > 0) || self.kept.tile(tile).is_some() {
+            // where a foot stands the kept numbers are not read until it leaves, which writes them
             let kept = &mut self.kept.tile_mut(tile)[first..];
-            for (kept, units) in kept.iter_mut().zip(units) {
-                *kept = kept.filled(*units);
+            for (kept, units) in kept.iter_mut().zip(units).filter(|(_, units)| **units != 0) {
+                *kept = kept.changed(*units);
             }
         }
     }
@@ -312,8 +319,10 @@ terraglue_subsystem::persist!(NodeState {
     reference,
     remainder,
     permanent,
-    largest,
-    curve,
+    bed,
+    loose,
+    energy,
+    area,
     pressure,
     shear,
     stamp,
@@ -321,12 +330,14 @@ terraglue_subsystem::persist!(NodeState {
 
 impl Persist for Kept {
     fn write(&self, out: &mut Vec<u8>) {
-        let [a, b, c, d, e] = self.0;
-        u64::from_le_bytes([a, b, c, d, e, 0, 0, 0]).write(out);
+        let ([a, b, c, d, e], [f, g]) = (self.bed, self.loose);
+        u64::from_le_bytes([a, b, c, d, e, f, g, 0]).write(out);
     }
     fn read(from: &mut &[u8]) -> Result<Self> {
-        let [a, b, c, d, e, rest @ ..] = u64::read(from)?.to_le_bytes();
-        if rest == [0; 3] { Ok(Self([a, b, c, d, e])) } else { Err(bytes::wrong("a depth is too large")) }
+        match u64::read(from)?.to_le_bytes() {
+            [a, b, c, d, e, f, g, 0] => Ok(Self { bed: [a, b, c, d, e], loose: [f, g] }),
+            _ => Err(bytes::wrong("a depth is too large")),
+        }
     }
 }
 
@@ -364,12 +375,12 @@ mod tests {
                 match action {
                     0 | 1 => {
                         let state = states.enter(i, j);
-                        (state.permanent, state.reference, state.stamp) = (depth, depth, 1);
+                        (state.permanent, state.bed, state.reference, state.stamp) = (depth, depth, depth, 1);
                         *entry = (true, depth);
                     }
                     2 => {
                         states.leave(i, j, 0.0);
-                        *entry = (false, Kept::new(entry.1, 0.0).permanent());
+                        *entry = (false, Kept::new(entry.1, 0.0, 0.0).permanent());
                     }
                     _ if depth < 0.01 => {
                         states.restore(&saved.0);

@@ -1,4 +1,4 @@
-//! The contact patches of a step: per port the curve of its pressure law, per node depth, area and history.
+//! The contact patches of a step: per port the curve of its pressure law, per node depth, area, history and what it bears.
 //!
 //! Built once per step from the committed state into flat arrays, so that trials touch neither the lattice nor
 //! the allocator.
@@ -6,8 +6,13 @@
 use crate::assemble::dot;
 use crate::ground::Ground;
 use crate::normal::Clinging;
+use crate::size::Size;
+use crate::wall::{self, Beside, Rows, Side, Wall};
 use crate::wheel::{self, Shift, Wheel};
-use terraglue_soil_law::{PluginLaw, PressureCurve, PressureLaw, Rolling, ShearLaw, ShearState};
+use terraglue_soil_law::strength::{Inclination, slope_factor};
+use terraglue_soil_law::{
+    Direction, PluginLaw, PressureCurve, PressureLaw, Rolling, ShearLaw, ShearState, Strength,
+};
 use terraglue_subsystem::{Node, Port, Step};
 
 /// One port's share of the arrays and what is constant during the step.
@@ -35,6 +40,8 @@ pub struct Patch {
     pub friction: f64,
     /// Largest force with which the soil holds the foot back, N.
     pub pull: f64,
+    /// Its sides in the soil.
+    pub wall: Wall,
 }
 
 /// The laws of one soil under one contact.
@@ -46,6 +53,12 @@ pub struct Local {
     pub shear: ShearLaw,
     /// Tension up to which soil clings, Pa.
     pub adhesion: f64,
+    /// Cohesion, friction and weight of the soil itself.
+    pub strength: Strength,
+    /// What an inclined load leaves of its capacity.
+    pub inclination: Inclination,
+    /// Modulus of loose soil over that of the bed.
+    pub loose: f64,
 }
 
 impl Patch {
@@ -101,6 +114,12 @@ impl Facing {
         Self { press, along: [turned(1), turned(2)], stretch }
     }
 
+    /// Inward unit normal along n, t1, t2.
+    #[inline]
+    pub fn inward(&self) -> [f64; 3] {
+        self.press.map(|c| c / self.stretch)
+    }
+
     /// Displacement along the underside.
     #[inline]
     pub fn slide(&self, moved: [f64; 3]) -> [f64; 2] {
@@ -113,14 +132,24 @@ impl Facing {
 pub struct PatchNodes {
     /// Lattice indices.
     pub index: Vec<[i32; 2]>,
-    /// Depth below the reference level along n at X = 0, m.
+    /// Depth below the reference level of the bed along n at X = 0, m.
     pub depth: Vec<f64>,
-    /// Largest depth along n so far, m.
-    pub z_max: Vec<f64>,
-    /// Pressure at the largest depth, Pa.
-    pub p_max: Vec<f64>,
     /// Depth of the unloaded surface along n, m.
     pub permanent: Vec<f64>,
+    /// Depth of the bed's surface along n when the contact began, m.
+    pub bed: Vec<f64>,
+    /// Height of the loose soil on it then, along n, m.
+    pub loose: Vec<f64>,
+    /// Part of the pressure of first loading that the soil bears here.
+    pub share: Vec<f64>,
+    /// Passive pressure that it bears beside, a + b·z: Pa and Pa/m.
+    pub passive: Vec<[f64; 2]>,
+    /// Pressure up to which the node is elastic wherever it is, Pa; −∞: it yields at X = 0.
+    pub bound: Vec<f64>,
+    /// Pressure at the last commit, Pa.
+    pub before: Vec<f64>,
+    /// Whether the foot has come over the node from the side, deeper than its surface.
+    pub entered: Vec<bool>,
     /// How much deeper than `depth` the underside lies, m: behind the peak of a wheel's stress; NaN elsewhere.
     pub relief: Vec<f64>,
     /// Area in the tangent plane, m²; 0 where another port presses deeper.
@@ -139,8 +168,6 @@ pub struct PatchNodes {
     pub memory: Vec<f64>,
     /// Share of the shear strength that the slip so far has mobilised.
     pub mobilised: Vec<f64>,
-    /// Largest depth as the node remembers it, and the curve and normal for which it holds.
-    pub(crate) remembered: Vec<(f64, [f64; 3])>,
     /// Reference level, world, m.
     pub reference: Vec<f64>,
     /// Number of the commit at which the node was last loaded; 0: no foot stood here.
@@ -150,12 +177,28 @@ pub struct PatchNodes {
 }
 
 impl PatchNodes {
+    /// Shear stress on the soil at node k at the last commit, Pa, turned from the underside into the plane of t1 and t2;
+    /// `stiffness`: of the shear law, Pa/m.
+    #[inline]
+    fn shear_stress(&self, k: usize, stiffness: f64) -> [f64; 2] {
+        let (e, along) = (self.shear[k].elastic, &self.facing[k].along);
+        let flat = [1, 2].map(|c| e[0] * along[0][c] + e[1] * along[1][c]);
+        let (all, in_plane) = (e[0] * e[0] + e[1] * e[1], flat[0] * flat[0] + flat[1] * flat[1]);
+        let scale = if in_plane > 0.0 { stiffness * (all / in_plane).sqrt() } else { 0.0 };
+        flat.map(|c| scale * c)
+    }
+
     fn clear(&mut self) {
         self.index.clear();
         self.depth.clear();
-        self.z_max.clear();
-        self.p_max.clear();
         self.permanent.clear();
+        self.bed.clear();
+        self.loose.clear();
+        self.share.clear();
+        self.passive.clear();
+        self.bound.clear();
+        self.before.clear();
+        self.entered.clear();
         self.relief.clear();
         self.area.clear();
         self.arm.clear();
@@ -163,7 +206,6 @@ impl PatchNodes {
         self.shear.clear();
         self.memory.clear();
         self.mobilised.clear();
-        self.remembered.clear();
         self.reference.clear();
         self.stamp.clear();
         self.facing.clear();
@@ -182,16 +224,20 @@ impl PatchNodes {
         self.arm.reserve(count);
         self.law.reserve(count);
         self.shear.reserve(count);
-        self.remembered.reserve(count);
+        self.passive.reserve(count);
+        self.entered.reserve(count);
         self.stamp.reserve(count);
         self.facing.reserve(count);
         for v in [
             &mut self.mobilised,
             &mut self.reference,
             &mut self.depth,
-            &mut self.z_max,
-            &mut self.p_max,
             &mut self.permanent,
+            &mut self.bed,
+            &mut self.loose,
+            &mut self.share,
+            &mut self.bound,
+            &mut self.before,
             &mut self.relief,
             &mut self.area,
             &mut self.turned,
@@ -214,6 +260,14 @@ pub struct Laws {
     pub adhesion: f64,
     /// What concerns wheels alone.
     pub rolling: Rolling,
+    /// How the direction of motion and the slope of the underside enter.
+    pub direction: Direction,
+    /// Cohesion, friction and weight of the soil itself.
+    pub strength: Strength,
+    /// What an inclined load leaves of its capacity.
+    pub inclination: Inclination,
+    /// Modulus of loose soil over that of the bed.
+    pub loose: f64,
     /// The module behind one or both of them.
     pub plugin: Option<PluginLaw>,
 }
@@ -227,8 +281,11 @@ pub struct Patches {
     pub nodes: PatchNodes,
     /// The laws of the soils under each of them, port after port.
     pub laws: Vec<Local>,
+    /// Sides in the soil, port after port.
+    pub sides: Vec<Side>,
     /// Clinging nodes; scratch of [`Patches::pull`].
     pub(crate) clinging: Vec<Clinging>,
+    rows: Rows,
     built_for: Option<(u64, u64, usize, usize)>,
 }
 
@@ -258,6 +315,7 @@ impl Patches {
         self.nodes.clear();
         self.nodes.doubles = ground.law_memory.doubles();
         self.laws.clear();
+        self.sides.clear();
         for port in step.ports {
             let patch = self.read_port(port, port.nodes(step.nodes), ground, laws);
             self.ports.push(patch);
@@ -283,12 +341,32 @@ impl Patches {
             .then(found)
             .flatten()
             .map(|w| Wheel { memory: wheel::recall(&ground.wheels, port.key), ..w });
-        let b = match &wheel {
-            Some(w) => w.width,
-            None => contact_size(port, nodes, &self.nodes, range.clone(), spacing),
-        };
-        let (local, friction) = self.local_laws(laws, wheel.as_ref(), b, range.clone());
-        self.recall_depths(range.clone(), n_z);
+        let size = Size::of(&self.nodes, range.clone(), spacing);
+        let (local, friction) = self.local_laws(laws, wheel.as_ref(), size.b(spacing), range.clone());
+        let mut wall = Wall::none(port, wall::recall(&ground.pushes, port.key));
+        self.bear(&laws[0].direction, &wall, size.b(spacing), range.clone());
+        self.start(range.clone());
+        if laws[0].direction.passive_pressure {
+            let law = &self.laws[local.start];
+            let beside = Beside {
+                lattice: ground.heights.lattice(),
+                levels: &|i, j| ground.levels(i, j),
+                passive: law.strength.passive(),
+                stiffness: law.curve.unloading(),
+            };
+            let mut rows = std::mem::take(&mut self.rows);
+            let mut sides = std::mem::take(&mut self.sides);
+            let pressed = |k: usize| {
+                let (p, yields) = (self.pressure(k, self.nodes.depth[k]).0, self.nodes.bound[k]);
+                if p <= 0.0 { 0.0 } else if yields > p { p / yields } else { 1.0 }
+            };
+            wall::gather(&self.nodes, range.clone(), n_z, &beside, pressed, &mut rows, &mut sides, &mut wall);
+            (self.rows, self.sides) = (rows, sides);
+            if let Some(wheel) = &wheel {
+                // a rim pushes with its axle, however it turns
+                wall.arm = [wheel.radius, 0.0, 0.0];
+            }
+        }
         if let Some(wheel) = &wheel {
             if let Some(shift) = wheel.shift(&laws[0].rolling, &self.nodes, range.clone()) {
                 self.shift_peak(wheel, &shift, range.clone());
@@ -308,6 +386,76 @@ impl Patches {
             wheel,
             friction,
             pull: 0.0,
+            wall,
+        }
+    }
+
+    /// What the nodes in `range` bear of the pressure of first loading, and beside it: less on inclined faces, less under
+    /// shear, more on faces that are pushed sideways.
+    fn bear(
+        &mut self,
+        direction: &Direction,
+        wall: &Wall,
+        b: f64,
+        range: std::ops::Range<usize>,
+    ) {
+        let inclination = direction.load_inclination.then(|| self.inclination(range.clone())).flatten();
+        for k in range {
+            let (n, law) = (&self.nodes, &self.laws[self.nodes.law[k]]);
+            let facing = &n.facing[k];
+            let mut share = if direction.slope_factor { slope_factor(1.0 / facing.stretch) } else { 1.0 };
+            if let Some(e) = inclination.filter(|_| n.before[k] > 0.0) {
+                let tau = n.shear_stress(k, law.shear.stiffness);
+                let along = (tau[0] * e[0] + tau[1] * e[1]).max(0.0);
+                let tan = along / (n.before[k] + law.strength.cohesive_pressure());
+                share *= law.inclination.factor(tan, n.depth[k], b);
+            }
+            let part = if direction.passive_pressure { wall.share(facing.inward()) } else { 0.0 };
+            let passive = law.strength.passive().map(|p| part * p);
+            (self.nodes.share[k], self.nodes.passive[k]) = (share, passive);
+        }
+    }
+
+    /// Resultant of the shear along t1 and t2 over the sum of the magnitudes: what balances within the contact, as under a sphere
+    /// that is pressed straight down, does not incline its load.
+    fn inclination(&self, range: std::ops::Range<usize>) -> Option<[f64; 2]> {
+        let n = &self.nodes;
+        let (mut sum, mut all) = ([0.0; 2], 0.0);
+        for k in range.filter(|k| n.before[*k] > 0.0) {
+            let tau = n.shear_stress(k, self.laws[n.law[k]].shear.stiffness);
+            let area = n.area[k] * n.facing[k].stretch;
+            sum = [sum[0] + area * tau[0], sum[1] + area * tau[1]];
+            all += area * (tau[0] * tau[0] + tau[1] * tau[1]).sqrt();
+        }
+        (all > 0.0).then(|| sum.map(|s| s / all))
+    }
+
+    /// Starts the nodes in `range` where the last commit left them, and finds up to which pressure they are elastic.
+    ///
+    /// Within a step the underside moves as its slope says; by how much the exact one lies elsewhere afterwards (its
+    /// curvature, an edge that passes) moves the unloaded surface and not the pressure, so that no energy comes of it. Where the
+    /// underside has gone up by more than half of what the soil springs back, the foot is leaving the node.
+    fn start(&mut self, range: std::ops::Range<usize>) {
+        for k in range {
+            let (n, law) = (&self.nodes, self.law(k));
+            if law.curve.keeper().is_some() {
+                continue;
+            }
+            let (depth, before, k_u) = (n.depth[k], n.before[k], law.curve.unloading());
+            let follows = before > 0.0 && depth - n.permanent[k] > 0.5 * before / k_u;
+            let permanent = if follows { depth - before / k_u } else { n.permanent[k] };
+            self.nodes.permanent[k] = permanent;
+            if depth <= permanent {
+                continue;
+            }
+            let (elastic, yields) = (k_u * (depth - permanent), self.yields(k, depth).0);
+            let n = &mut self.nodes;
+            n.bound[k] = if elastic <= yields { yields } else { f64::NEG_INFINITY };
+            if n.stamp[k] == 0 {
+                n.entered[k] = true;
+                n.permanent[k] = depth - elastic.min(yields) / k_u;
+                n.bound[k] = yields;
+            }
         }
     }
 
@@ -334,7 +482,8 @@ impl Patches {
                 None => (of.pressure.curve(b, of.elastic), of.shear.clone()),
             };
             friction = friction.max(of.shear.friction);
-            self.laws.push(Local { curve, shear, adhesion: of.adhesion });
+            let Laws { adhesion, strength, inclination, loose, .. } = *of;
+            self.laws.push(Local { curve, shear, adhesion, strength, inclination, loose });
         }
         for number in &mut self.nodes.law[nodes] {
             *number = first + (present & ((1 << *number) - 1)).count_ones() as usize;
@@ -344,16 +493,15 @@ impl Patches {
 
     /// Takes the soil behind the peak of a wheel's stress as if it were less deep, and first loaded there.
     fn shift_peak(&mut self, wheel: &Wheel, shift: &Shift, range: std::ops::Range<usize>) {
-        let (n, laws) = (&mut self.nodes, &self.laws);
         for k in range {
-            let Some(relief) = wheel.relief(shift, n.arm[k]) else { continue };
-            let curve = &laws[n.law[k]].curve;
-            let largest = curve.largest_depth(shift.before, shift.before);
+            let Some(relief) = wheel.relief(shift, self.nodes.arm[k]) else { continue };
+            let depth = self.nodes.depth[k] - relief;
+            let (p, k_u) = (self.yields(k, depth).0, self.law(k).curve.unloading());
+            let n = &mut self.nodes;
             n.relief[k] = relief;
-            n.depth[k] -= relief;
-            n.z_max[k] = n.depth[k].max(largest);
-            n.p_max[k] = curve.virgin(n.z_max[k]);
-            n.permanent[k] = curve.permanent(n.z_max[k], n.p_max[k]);
+            n.depth[k] = depth;
+            n.permanent[k] = shift.before.max(depth - p / k_u);
+            (n.bound[k], n.entered[k]) = (f64::NEG_INFINITY, false);
         }
     }
 
@@ -370,9 +518,14 @@ impl Patches {
         nodes.reference.push(reference);
         nodes.stamp.push(state.stamp);
         nodes.depth.push((reference - node.lower) * n_z);
-        nodes.z_max.push(0.0);
-        nodes.p_max.push(0.0);
         nodes.permanent.push(state.permanent * n_z);
+        nodes.bed.push(state.bed * n_z);
+        nodes.loose.push(state.loose * n_z);
+        nodes.share.push(1.0);
+        nodes.passive.push([0.0; 2]);
+        nodes.bound.push(f64::NEG_INFINITY);
+        nodes.before.push(state.pressure);
+        nodes.entered.push(false);
         nodes.relief.push(f64::NAN);
         nodes.area.push(node.area / n_z);
         nodes.arm.push([along(0), along(1), along(2)]);
@@ -380,7 +533,6 @@ impl Patches {
         nodes.shear.push(state.shear);
         ground.law_memory.read([node.i, node.j], &mut nodes.memory);
         nodes.mobilised.push(laws[number].shear.mobilised(state.shear.slip));
-        nodes.remembered.push((state.largest, state.curve));
         nodes.facing.push(Facing::new(port, node.slope));
     }
 
@@ -423,12 +575,6 @@ impl Patches {
 /// Gap that is reported below a port without nodes, m.
 const FAR: f64 = 1.0;
 
-/// Tells for which curve and normal a largest depth holds.
-pub fn key(curve: &PressureCurve, n_z: f64) -> [f64; 3] {
-    let [a, b] = curve.key();
-    [a, b, n_z]
-}
-
 /// Whether the index ranges of two node lists meet.
 fn overlap(a: &[Node], b: &[Node]) -> bool {
     let bounds = |nodes: &[Node]| {
@@ -438,37 +584,4 @@ fn overlap(a: &[Node], b: &[Node]) -> bool {
     };
     let (a, b) = (bounds(a), bounds(b));
     a[0] <= b[1] && b[0] <= a[1] && a[2] <= b[3] && b[2] <= a[3]
-}
-
-/// b of the pressure law, m, constant during a step.
-///
-/// Sphere: radius of the contact circle, from the displaced volume V = ½·π·b²·δ_max of a paraboloid cap, which
-/// grows smoothly where the number of touching nodes would jump; at least half a spacing. Otherwise from the
-/// half lengths e of the footprint and the covered share f = A/(4·e1·e2): R of a disc (f = π/4), the short
-/// side of a rectangle (f = 1), linear between.
-fn contact_size(
-    port: &Port,
-    nodes: &[Node],
-    arrays: &PatchNodes,
-    range: std::ops::Range<usize>,
-    spacing: f64,
-) -> f64 {
-    let floor = 0.5 * spacing;
-    let [e1, e2] = port.extent;
-    if e1 > 0.0 && e2 > 0.0 {
-        let disc = std::f64::consts::FRAC_PI_4;
-        let covered: f64 = nodes.iter().map(|n| n.area).sum::<f64>() / port.frame[2];
-        let share = ((covered / (4.0 * e1 * e2) - disc) / (1.0 - disc)).clamp(0.0, 1.0);
-        return (e1.min(e2) * (1.0 + share)).max(floor);
-    }
-    let (mut volume, mut deepest) = (0.0, 0.0_f64);
-    for k in range {
-        let depth = arrays.depth[k].max(0.0);
-        volume += arrays.area[k] * depth;
-        deepest = deepest.max(depth);
-    }
-    if deepest <= 0.0 {
-        return floor;
-    }
-    (2.0 * volume / (std::f64::consts::PI * deepest)).sqrt().max(floor)
 }

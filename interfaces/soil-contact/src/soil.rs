@@ -1,6 +1,7 @@
 //! A subsystem from the shared contact machinery and a soil's own rule for its material.
 
 use crate::bookkeeping::{self, Book, Lists};
+use crate::compatibility::Compatibility;
 use crate::contacts::Contacts;
 use crate::ground::{Covered, Ground};
 use crate::law_memory::LawMemory;
@@ -10,13 +11,14 @@ use crate::state::{Committed, Slot, Slots, Target};
 use crate::trial::Last;
 use crate::values;
 use std::sync::Arc;
+use terraglue_soil_law::strength::Inclination;
 use terraglue_soil_law::{
     DEEPEST_TESTED, PluginLaw, PressureLaw, SlipSinkage, SoilExpressions, SoilParameters,
 };
 use terraglue_subsystem::bytes::{self, Persist};
 use terraglue_subsystem::{
     Capabilities, Config, Energy, Error, Estimate, FieldInfo, FieldTile, Host, Input, Law, Level, LogLevel,
-    Motion, Response, Result, Step, Subsystem, Values, ValuesMut, Variable, cooperation,
+    Motion, Response, Result, Step, Subsystem, Values, ValuesMut, Variable,
 };
 
 /// Contact that is this small for so many commits in a row is worth a warning.
@@ -48,10 +50,11 @@ pub trait Material: Send {
         Err(Error::Refused("this value can only be read".into()))
     }
     /// The laws' parameters have changed.
-    fn parameters_changed(&mut self, _parameters: &SoilParameters) {}
+    fn parameters_changed(&mut self, _ground: &Ground, _parameters: &SoilParameters) {}
     /// After the laws have taken a step of h seconds: puts the material where it belongs. `covered` are the nodes
-    /// below feet, `released` those that a foot has just left.
-    fn settle(&mut self, ground: &mut Ground, covered: &[Covered], released: &[[i32; 2]], h: f64);
+    /// below feet, `released` those that a foot has just left. Returns the gravitational energy that the material has gained,
+    /// J; what it loses becomes heat.
+    fn settle(&mut self, ground: &mut Ground, covered: &[Covered], released: &[[i32; 2]], h: f64) -> f64;
     /// Copies the state into `out`.
     fn save(&self, _out: &mut Self::Saved) {}
     /// Whether a saved state speaks of nodes of this ground only.
@@ -76,7 +79,7 @@ pub struct FieldSoil<M: Material> {
     lists: Lists,
     book: Book,
     last: Last,
-    law_force: Vec<f64>,
+    compatibility: Compatibility,
     fields: [FieldInfo; 2],
     variables: Vec<Variable>,
     /// Number of the first variable of the contacts.
@@ -118,7 +121,7 @@ impl<M: Material> FieldSoil<M> {
             slots: Slots::new(host.slots()),
             book: Book::default(),
             last: Last::default(),
-            law_force: Vec::new(),
+            compatibility: Compatibility::default(),
             few_nodes: 0,
             warned: [false; 2],
             host,
@@ -224,9 +227,13 @@ fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>, plugin: Option<&
     let mut laws = Laws {
         pressure: p.pressure(),
         shear: p.shear(),
-        elastic: p.elastic_stiffness_pa_m,
+        elastic: p.unloading(),
         adhesion: p.adhesion_pa,
         rolling: p.rolling,
+        direction: p.direction,
+        strength: p.strength(),
+        inclination: Inclination::new(p.phi_rad),
+        loose: p.strength().loose_share(),
         plugin: plugin.cloned(),
     };
     if let Some(texts) = texts {
@@ -236,7 +243,7 @@ fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>, plugin: Option<&
                     "`slip_sinkage` acts on power laws, and `law.pressure` is none; it must be \"none\" here";
                 return Err(Error::Refused(text.into()));
             }
-            laws.pressure = PressureLaw::Expression(law).looked_at(p.elastic_stiffness_pa_m);
+            laws.take_pressure(PressureLaw::Expression(law), p);
         }
         if let Some(law) = texts.shear(p)? {
             laws.shear = laws.shear.with_expression(law);
@@ -245,9 +252,9 @@ fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>, plugin: Option<&
     if let Some(law) = plugin {
         law.begin(0.0);
         if law.has_pressure() {
-            laws.pressure = PressureLaw::Plugin(law.clone()).looked_at(p.elastic_stiffness_pa_m);
+            laws.take_pressure(PressureLaw::Plugin(law.clone()), p);
             // as the built-in laws are looked at: one that says nothing sensible here never will
-            laws.pressure.curve(TYPICAL_SIZE, p.elastic_stiffness_pa_m);
+            laws.pressure.curve(TYPICAL_SIZE, laws.elastic);
         }
         if law.has_shear() {
             laws.shear = laws.shear.with_plugin(law.clone());
@@ -255,6 +262,15 @@ fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>, plugin: Option<&
         law.check()?;
     }
     Ok(laws)
+}
+
+impl Laws {
+    /// A pressure law takes the place of the built-in one, and the soil springs back as it does where nobody says how.
+    fn take_pressure(&mut self, law: PressureLaw, p: &SoilParameters) {
+        self.elastic = p.elastic_stiffness_pa_m.unwrap_or_else(|| law.unloading());
+        self.shear = self.shear.above(self.elastic);
+        self.pressure = law.looked_at(self.elastic);
+    }
 }
 
 /// The module that the scenario names as law.
@@ -300,7 +316,9 @@ impl<M: Material> Subsystem for FieldSoil<M> {
         self.build(step)?;
         self.last.clear();
         for (law, patch) in laws.iter_mut().zip(&self.patches.ports) {
-            law.mu = law.mu.min(patch.friction);
+            // cohesion and the soil beside hold a foot that hardly presses, too
+            let held = if patch.force[0] > 0.0 { patch.strength / patch.force[0] } else { 0.0 };
+            law.mu = law.mu.min(patch.friction.max(held));
             law.t_min = law.t_min.min(-patch.pull);
         }
         self.show_surface(now);
@@ -313,16 +331,18 @@ impl<M: Material> Subsystem for FieldSoil<M> {
 
     fn solve_compatibility(&mut self, step: &Step, estimate: &Estimate, out: &mut Response) -> Result {
         self.build(step)?;
+        let left = self.compatibility.solve(&mut self.patches, step.n as usize, estimate);
         self.last.clear();
-        self.law_force.resize(step.n as usize, 0.0);
-        self.show_surface(out);
-        for (port, patch) in step.ports.iter().zip(&self.patches.ports) {
-            patch.pack(&patch.force, &mut self.law_force);
-            let mu = port.law.mu.min(patch.friction);
-            cooperation::plain_pass(port, estimate.t_star, &self.law_force, patch.strength, mu, out.t);
-        }
+        out.t.copy_from_slice(&self.compatibility.t);
+        out.x.copy_from_slice(&self.compatibility.x);
+        out.v.fill(0.0);
+        out.a.fill(0.0);
         out.reached = step.t + step.h;
-        self.answered(step)
+        self.answered(step)?;
+        match left {
+            Some(_) => Err(Error::Discard { reached: step.t + 0.5 * step.h }),
+            None => Ok(()),
+        }
     }
 
     fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result {
@@ -351,8 +371,12 @@ impl<M: Material> Subsystem for FieldSoil<M> {
         }
         self.build(step)?;
         let scene = bookkeeping::Scene { patches: &self.patches, h: step.h };
+        let heat = self.book.dissipated;
         scene.commit(step.ports, t, partner.x, &mut self.ground, &mut self.lists, &mut self.book);
-        self.material.settle(&mut self.ground, &self.lists.covered, &self.lists.released, step.h);
+        let lifted =
+            self.material.settle(&mut self.ground, &self.lists.covered, &self.lists.released, step.h);
+        self.book.lifted += lifted;
+        self.book.pay(lifted, heat);
         self.patches.forget();
         self.last.clear();
         self.watch_range();
@@ -436,7 +460,7 @@ impl<M: Material> Subsystem for FieldSoil<M> {
                 return Err(refused);
             }
         }
-        self.material.parameters_changed(&self.parameters);
+        self.material.parameters_changed(&self.ground, &self.parameters);
         self.patches.forget();
         Ok(())
     }
@@ -457,7 +481,7 @@ impl<M: Material> Subsystem for FieldSoil<M> {
 
     fn energy(&self) -> Energy {
         Energy {
-            potential: self.book.elastic,
+            potential: self.book.elastic + self.book.lifted,
             dissipated: self.book.dissipated,
             port_work: self.book.port_work,
             ..Energy::default()

@@ -5,6 +5,7 @@ use crate::contacts::Contacts;
 use crate::ground::Ground;
 use crate::law_memory::LawMemorySnapshot;
 use crate::nodes::NodesSnapshot;
+use crate::wall::Push;
 use crate::wheel::Memory;
 use terraglue_ground::HeightSnapshot;
 use terraglue_soil_law::SoilParameters;
@@ -12,7 +13,7 @@ use terraglue_subsystem::bytes::{self, Persist};
 use terraglue_subsystem::{Error, Result};
 
 /// Version of the bytes.
-const VERSION: u32 = 2;
+const VERSION: u32 = 3;
 
 /// One saved state; `S` is the material's own.
 #[derive(Debug, Default)]
@@ -20,6 +21,7 @@ pub struct Slot<S> {
     heights: HeightSnapshot,
     nodes: NodesSnapshot,
     wheels: Vec<Memory>,
+    pushes: Vec<Push>,
     contacts: Contacts,
     law_memory: LawMemorySnapshot,
     loaded: Vec<[i32; 2]>,
@@ -31,8 +33,9 @@ pub struct Slot<S> {
 
 impl<S: Persist> Persist for Slot<S> {
     fn write(&self, out: &mut Vec<u8>) {
-        let Self { heights, nodes, wheels, contacts, law_memory, loaded, book, parameters, material } = self;
-        (heights.write(out), nodes.write(out), wheels.write(out), contacts.write(out));
+        let Self { heights, nodes, wheels, pushes, contacts, law_memory, .. } = self;
+        (heights.write(out), nodes.write(out), wheels.write(out), pushes.write(out), contacts.write(out));
+        let Self { loaded, book, parameters, material, .. } = self;
         law_memory.write(out);
         (loaded.write(out), book.write(out), parameters.write(out), material.write(out));
     }
@@ -41,6 +44,7 @@ impl<S: Persist> Persist for Slot<S> {
             heights: Persist::read(from)?,
             nodes: Persist::read(from)?,
             wheels: Persist::read(from)?,
+            pushes: Persist::read(from)?,
             contacts: Persist::read(from)?,
             law_memory: Persist::read(from)?,
             loaded: Persist::read(from)?,
@@ -82,6 +86,7 @@ impl<S> Slot<S> {
         state.ground.nodes.save(&mut self.nodes);
         state.ground.law_memory.save(&mut self.law_memory);
         self.wheels.clone_from(&state.ground.wheels);
+        self.pushes.clone_from(&state.ground.pushes);
         self.contacts.clone_from(&state.ground.contacts);
         self.loaded.clone_from(state.loaded);
         self.book = *state.book;
@@ -99,6 +104,7 @@ impl<S> Slot<S> {
         state.ground.nodes.restore(&self.nodes);
         state.ground.law_memory.restore(&self.law_memory);
         state.ground.wheels.clone_from(&self.wheels);
+        state.ground.pushes.clone_from(&self.pushes);
         state.ground.contacts.clone_from(&self.contacts);
         state.loaded.clone_from(&self.loaded);
         *state.book = self.book;

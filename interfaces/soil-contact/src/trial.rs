@@ -124,7 +124,8 @@ fn hybrid(k: &Stiffness, normal: f64, with_motion: bool) -> Stiffness {
     block
 }
 
-fn scatter(patch: &Patch, block: &Stiffness, n: usize, out: &mut [f64]) {
+/// Adds a block of a patch to a packed matrix of n columns.
+pub fn scatter(patch: &Patch, block: &Stiffness, n: usize, out: &mut [f64]) {
     for (row, place_r) in block.iter().zip(patch.place) {
         for (value, place_c) in row.iter().zip(patch.place) {
             if let (Some(r), Some(c)) = (place_r, place_c) {

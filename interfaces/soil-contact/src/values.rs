@@ -5,7 +5,7 @@ use terraglue_soil_law::SoilParameters;
 use terraglue_subsystem::{Causality, Error, Result, Variable};
 
 /// Number of shared variables; a material's own follow.
-pub const SHARED: u32 = 9;
+pub const SHARED: u32 = 12;
 
 /// The shared variables.
 pub fn shared() -> Vec<Variable> {
@@ -21,6 +21,9 @@ pub fn shared() -> Vec<Variable> {
         live(6, "phi_rad", "rad", "angle of internal friction").within(0.01, 1.2),
         live(7, "K_m", "m", "shear deformation modulus of Janosi and Hanamoto").within(1e-6, 10.0),
         live(8, "elastic_stiffness_pa_m", "Pa/m", "stiffness of unloading and reloading").within(1e4, 1e12),
+        out(9, "heat", "J", "energy that the soil has turned into heat since the start"),
+        out(10, "elastic_energy", "J", "elastic energy of the soil below and beside feet"),
+        out(11, "gravitational_energy", "J", "gravitational energy that the material has gained since the start"),
     ]
 }
 
@@ -35,7 +38,10 @@ pub fn get(id: u32, book: &Book, p: &SoilParameters) -> Option<f64> {
         5 => p.c_pa,
         6 => p.phi_rad,
         7 => p.K_m,
-        8 => p.elastic_stiffness_pa_m,
+        8 => p.unloading(),
+        9 => book.dissipated,
+        10 => book.elastic,
+        11 => book.lifted,
         _ => return None,
     })
 }
@@ -51,7 +57,7 @@ pub fn set(variable: &Variable, value: f64, p: &mut SoilParameters) -> Result {
         5 => changed.c_pa = value,
         6 => changed.phi_rad = value,
         7 => changed.K_m = value,
-        8 => changed.elastic_stiffness_pa_m = value,
+        8 => changed.elastic_stiffness_pa_m = Some(value),
         _ => return Err(Error::Refused(format!("`{}` can only be read", variable.name))),
     }
     changed.check()?;

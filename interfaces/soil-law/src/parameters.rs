@@ -4,10 +4,12 @@ use crate::expression::SoilExpressions;
 use crate::pressure::{PRESSURE_LAWS, PressureLaw};
 use crate::rolling::Rolling;
 use crate::shear::ShearLaw;
+use crate::strength::Strength;
 use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};
 
-/// Elastic stiffness of unloading where a scenario is silent, Pa/m.
-pub const DEFAULT_ELASTIC_STIFFNESS: f64 = 4e8;
+/// Density where a scenario is silent, kg/m³: the upper 15 cm of lunar soil (Carrier, Olhoeft and Mendell 1991, Lunar
+/// Sourcebook, table 9.4).
+pub const DEFAULT_DENSITY: f64 = 1500.0;
 
 /// Parameters of a soil; the names are the keys of a scenario and the columns of `models/soils.csv`.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,8 +31,8 @@ pub struct SoilParameters {
     pub K_m: f64,
     /// Bulk density where known, kg/m³.
     pub density_kg_m3: Option<f64>,
-    /// Stiffness of unloading and reloading, Pa/m.
-    pub elastic_stiffness_pa_m: f64,
+    /// Stiffness of unloading and reloading, Pa/m; `None`: as [`PressureLaw::unloading`] says.
+    pub elastic_stiffness_pa_m: Option<f64>,
     /// Acceleration of gravity, m/s²: makes a weight of the density.
     pub gravity: f64,
     /// Angle of friction and adhesive strength between feet and soil, rad and Pa, where they are not those of the soil.
@@ -39,6 +41,51 @@ pub struct SoilParameters {
     pub adhesion_pa: f64,
     /// What concerns wheels alone.
     pub rolling: Rolling,
+    /// How the direction of motion and the slope of the underside enter.
+    pub direction: Direction,
+}
+
+/// Stiffness that no law comes near, Pa/m.
+const STIFF: f64 = 1e18;
+
+/// How the direction of motion and the slope of the underside of a body enter the pressure.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Direction {
+    /// Inclined faces bear less than level ones: [`crate::strength::slope_factor`].
+    pub slope_factor: bool,
+    /// A contact that carries shear bears less: [`crate::strength::Inclination`].
+    pub load_inclination: bool,
+    /// Faces that are pushed sideways meet passive earth pressure: [`Strength::passive`].
+    pub passive_pressure: bool,
+}
+
+impl Default for Direction {
+    fn default() -> Self {
+        Self { slope_factor: true, load_inclination: true, passive_pressure: true }
+    }
+}
+
+impl Direction {
+    /// Nothing of it: the pressure depends on the depth alone.
+    pub const NONE: Self = Self { slope_factor: false, load_inclination: false, passive_pressure: false };
+
+    fn schema() -> [Parameter; 3] {
+        let flag = |name, help| Parameter::of(name, ParameterType::Bool, help).or(true);
+        [
+            flag("slope_factor", "inclined undersides bear less than level ones, as plates do (Li et al. 2013)"),
+            flag("load_inclination", "a contact that carries shear bears less and sinks (Sokolovskii 1965)"),
+            flag("passive_pressure", "faces that are pushed sideways meet passive earth pressure (Rankine 1857)"),
+        ]
+    }
+
+    fn from_config(config: &Config) -> Result<Self> {
+        let flag = |key| if config.get(key).is_some() { config.flag(key) } else { Ok(true) };
+        Ok(Self {
+            slope_factor: flag("slope_factor")?,
+            load_inclination: flag("load_inclination")?,
+            passive_pressure: flag("passive_pressure")?,
+        })
+    }
 }
 
 /// A pressure–sinkage law and the numbers that it alone has.
@@ -77,11 +124,12 @@ impl Default for SoilParameters {
             phi_rad: 35f64.to_radians(),
             K_m: 0.018,
             density_kg_m3: None,
-            elastic_stiffness_pa_m: DEFAULT_ELASTIC_STIFFNESS,
+            elastic_stiffness_pa_m: None,
             gravity: 1.62,
             interface: [None; 2],
             adhesion_pa: 0.0,
             rolling: Rolling::default(),
+            direction: Direction::default(),
         }
     }
 }
@@ -112,13 +160,13 @@ impl SoilParameters {
             number("phi_rad", "rad", "angle of internal friction").within(0.01, 1.2),
             number("K_m", "m", "shear deformation modulus of Janosi and Hanamoto").positive(),
             number("density_kg_m3", "kg/m^3", "bulk density").positive().optional(),
-            Parameter::number(
+            number(
                 "elastic_stiffness_pa_m",
                 "Pa/m",
-                DEFAULT_ELASTIC_STIFFNESS,
-                "stiffness of unloading and reloading",
+                "stiffness of unloading and reloading; where absent 4.4 times that of first loading down to 2 cm (Wong 1984)",
             )
-            .positive(),
+            .positive()
+            .optional(),
             number(
                 "interface_phi_rad",
                 "rad",
@@ -150,6 +198,7 @@ impl SoilParameters {
             .or(0)
             .within(0.0, 64.0),
         );
+        parameters.extend(Direction::schema());
         parameters.extend(Rolling::schema());
         parameters.extend(SoilExpressions::schema());
         parameters
@@ -184,11 +233,12 @@ impl SoilParameters {
             phi_rad: config.number("phi_rad")?,
             K_m: config.number("K_m")?,
             density_kg_m3: number("density_kg_m3")?,
-            elastic_stiffness_pa_m: number("elastic_stiffness_pa_m")?.unwrap_or(DEFAULT_ELASTIC_STIFFNESS),
+            elastic_stiffness_pa_m: number("elastic_stiffness_pa_m")?,
             gravity,
             interface: [number("interface_phi_rad")?, number("interface_c_pa")?],
             adhesion_pa: number("adhesion_pa")?.unwrap_or(0.0),
             rolling: Rolling::from_config(config)?,
+            direction: Direction::from_config(config)?,
         };
         parameters.check().map(|()| parameters)
     }
@@ -199,7 +249,7 @@ impl SoilParameters {
             ("n", self.n),
             ("phi_rad", self.phi_rad),
             ("K_m", self.K_m),
-            ("elastic_stiffness_pa_m", self.elastic_stiffness_pa_m),
+            ("elastic_stiffness_pa_m", self.elastic_stiffness_pa_m.unwrap_or(1.0)),
         ] {
             if !(value.is_finite() && value > 0.0) {
                 return Err(Error::Refused(format!("`{name}` = {value} must be larger than zero")));
@@ -212,7 +262,7 @@ impl SoilParameters {
                 return Err(Error::Refused(format!("`{name}` = {value} must not be negative")));
             }
         }
-        let modulus = self.pressure().curve(0.1, self.elastic_stiffness_pa_m).virgin(0.01);
+        let modulus = self.pressure().curve(0.1, STIFF).virgin(0.01);
         if modulus.is_finite() && modulus > 0.0 {
             return Ok(());
         }
@@ -241,12 +291,29 @@ impl SoilParameters {
         }
     }
 
+    /// Stiffness of unloading and reloading, Pa/m.
+    pub fn unloading(&self) -> f64 {
+        let own = || self.pressure().unloading();
+        // a law that the scenario writes as text may leave the built-in one without numbers
+        self.elastic_stiffness_pa_m.unwrap_or_else(own).max(1.0)
+    }
+
+    /// Weight of the soil per volume, N/m³.
+    pub fn weight(&self) -> f64 {
+        self.density_kg_m3.unwrap_or(DEFAULT_DENSITY) * self.gravity
+    }
+
+    /// Cohesion, friction and weight of the soil itself.
+    pub fn strength(&self) -> Strength {
+        Strength { cohesion: self.c_pa, phi: self.phi_rad, weight: self.weight() }
+    }
+
     /// The shear law between feet and soil: the weaker of the soil's own strength and that of the interface acts.
     pub fn shear(&self) -> ShearLaw {
         let [phi, c] = self.interface;
         let cohesion = c.map_or(self.c_pa, |c| c.min(self.c_pa));
         let phi = phi.map_or(self.phi_rad, |phi| phi.min(self.phi_rad));
-        ShearLaw::new(cohesion, phi, self.K_m, self.elastic_stiffness_pa_m)
+        ShearLaw::new(cohesion, phi, self.K_m, self.unloading())
     }
 }
 
@@ -319,4 +386,6 @@ terraglue_subsystem::persist!(SoilParameters {
     interface,
     adhesion_pa,
     rolling,
+    direction,
 });
+terraglue_subsystem::persist!(Direction { slope_factor, load_inclination, passive_pressure });

@@ -91,6 +91,42 @@ impl PressureLaw {
     }
 }
 
+/// Depth and size at which [`PressureLaw::unloading`] looks at a law, m.
+const LOOK: [f64; 2] = [0.02, 0.05];
+/// Stiffness of unloading over the secant of first loading there: LETE sand, whose k_u = A_u·z_u with A_u = 503 MPa/m² (Wong
+/// 1984; Wong 2010, table 4.1) is 10.1 MPa/m at 2 cm, where k_c = 1.16 kN/m^1.611, k_φ = 475 kN/m^2.611 and n = 0.611 of the same
+/// tests give a secant of 2.28 MPa/m.
+const UNLOADING: f64 = 4.4;
+/// Stiffness of unloading under a law that answers for unloading itself, Pa/m; its shear springs back with it.
+const KEEPERS: f64 = 1e7;
+
+impl PressureLaw {
+    /// Stiffness of unloading and reloading where nobody gives one, Pa/m: 4.4 times that of first loading down to 2 cm
+    /// under a contact of 5 cm, as Wong (1984) measured in sand.
+    pub fn unloading(&self) -> f64 {
+        let [depth, size] = LOOK;
+        if matches!(self, Self::Plugin(law) if law.state_doubles() > 0) {
+            return KEEPERS;
+        }
+        UNLOADING * self.raw(size, depth) / depth
+    }
+
+    /// The law itself at a depth z (m) under a contact of size b (m), whatever unloading does, Pa.
+    fn raw(&self, b: f64, z: f64) -> f64 {
+        match self {
+            Self::Plugin(law) => law.at(b, z).0,
+            Self::Expression(law) => {
+                let program = law.at_size(b);
+                program.power_law().map_or_else(|| program.depth(z).0, |(k, n)| k * libm::pow(z, n))
+            }
+            _ => {
+                let p = self.curve(b, 1e18);
+                p.modulus * libm::pow(z, p.exponent)
+            }
+        }
+    }
+}
+
 /// First loading beyond the elastic limit.
 #[derive(Clone, Debug, PartialEq)]
 #[allow(clippy::large_enum_variant)] // one per contact and step; a box would allocate
@@ -248,11 +284,6 @@ impl PressureCurve {
         STIFFEST * self.unloading * self.stiff_limit / self.exponent
     }
 
-    /// Tells curves of one soil apart.
-    pub fn key(&self) -> [f64; 2] {
-        [self.modulus, self.exponent]
-    }
-
     /// Stiffness of unloading and reloading, Pa/m.
     pub fn unloading(&self) -> f64 {
         self.unloading
@@ -310,37 +341,6 @@ impl PressureCurve {
         }
     }
 
-    /// Work of first loading from 0 to depth z per area, J/m², where p = virgin(z): ∫p dz.
-    pub fn virgin_work(&self, z: f64, p: f64) -> f64 {
-        if z <= self.elastic_limit {
-            return 0.5 * p * z.max(0.0);
-        }
-        let e = self.elastic_limit;
-        if self.is_batched() {
-            return 0.5 * self.unloading * e * e + curve::work(&|z| self.beyond(z), e, z);
-        }
-        if z > self.stiff_limit {
-            let (z_s, p_s) = (self.stiff_limit, self.stiff_pressure());
-            return z_s * p_s / (self.exponent + 1.0) + 0.5 * (p + p_s) * (z - z_s);
-        }
-        let below = self.unloading * e * e;
-        0.5 * below + (z * p - below) / (self.exponent + 1.0)
-    }
-
-    /// Energy per area that first loading from `from` to `to` turns into heat, J/m²: work minus what the elastic line
-    /// keeps; `p_from` and `p_to` are the pressures there.
-    pub fn plastic_work(&self, from: f64, p_from: f64, to: f64, p_to: f64) -> f64 {
-        let elastic = |p: f64| 0.5 * p * p / self.unloading;
-        if self.is_batched() {
-            let plastic = from.max(self.elastic_limit);
-            let line = 0.5 * self.unloading * (plastic * plastic - from * from).max(0.0);
-            let work = if to > plastic { curve::work(&|z| self.beyond(z), plastic, to) } else { 0.0 };
-            return (line + work - elastic(p_to) + elastic(p_from)).max(0.0);
-        }
-        let kept = self.virgin_work(from, p_from) - elastic(p_from);
-        (self.virgin_work(to, p_to) - elastic(p_to) - kept).max(0.0)
-    }
-
     /// Pressure and slope dp/dz at depth z of soil pressed to z_max before, where p_max = virgin(z_max).
     #[inline]
     pub fn at(&self, z: f64, z_max: f64, p_max: f64) -> (f64, f64) {
@@ -355,62 +355,6 @@ impl PressureCurve {
         if p > 0.0 { (p, self.unloading) } else { (0.0, 0.0) }
     }
 
-    /// Depth of the unloaded surface after loading to z_max: what stays, m.
-    #[inline]
-    pub fn permanent(&self, z_max: f64, p_max: f64) -> f64 {
-        (z_max - p_max / self.unloading).max(0.0)
-    }
-
-    /// Largest depth that leaves `permanent` (m) behind: where the elastic line p = k_u·(z − permanent) meets first
-    /// loading. Lets soil remember what stays rather than under which curve it was pressed, so that the law is
-    /// continuous when the size of a contact changes.
-    pub fn largest_depth(&self, permanent: f64, guess: f64) -> f64 {
-        if permanent <= 0.0 {
-            return 0.0;
-        }
-        let (k, e) = (self.unloading, self.exponent);
-        if self.is_batched() {
-            let mut depth = [guess];
-            self.largest_depths(&[permanent], &mut depth);
-            return depth[0];
-        }
-        if e == 1.0 {
-            return k * permanent / (k - self.modulus);
-        }
-        let (z_s, p_s) = (self.stiff_limit, self.stiff_pressure());
-        if z_s.is_finite() && permanent > z_s - p_s / k {
-            return (k * permanent + p_s - STIFFEST * k * z_s) / (k - STIFFEST * k);
-        }
-        // the difference is convex for n < 1 (Newton from the right) and concave for n > 1 (from the left)
-        let mut z = if e < 1.0 { guess.max(permanent).max(self.elastic_limit) } else { permanent };
-        for _ in 0..20 {
-            let p = self.virgin(z);
-            let slope = k - self.virgin_slope(z, p);
-            let change = (k * (z - permanent) - p) / slope.max(0.01 * k);
-            z -= change;
-            if change.abs() <= 1e-15 * z {
-                break;
-            }
-        }
-        z.max(permanent)
-    }
-
-    /// [`PressureCurve::largest_depth`] of nodes where something stays: `depth` holds guesses and gets the answers.
-    pub fn largest_depths(&self, permanent: &[f64], depth: &mut [f64]) {
-        if self.is_batched() {
-            let law = |z: &[f64], p: &mut [f64], slope: &mut [f64]| self.beyond_many(z, p, slope);
-            return curve::largest_depths(&law, self.unloading, self.elastic_limit, permanent, depth);
-        }
-        for (permanent, depth) in permanent.iter().zip(depth) {
-            *depth = self.largest_depth(*permanent, *depth);
-        }
-    }
-
-    /// Depth at which soil pressed to z_max before gives the pressure p > 0, m; the free surface for p = 0.
-    pub fn depth(&self, p: f64, z_max: f64) -> f64 {
-        let p_max = self.virgin(z_max);
-        if p > p_max { self.virgin_depth(p) } else { z_max - (p_max - p.max(0.0)) / self.unloading }
-    }
 }
 
 #[cfg(test)]
@@ -434,24 +378,19 @@ mod tests {
             let (from, to) = (a.min(b), a.max(b));
             let [p_from, p_to] = [from, to].map(|z| curve.virgin(z));
             prop_assert!(curve.virgin_slope(to, p_to) <= curve.unloading());
-            let kept = |z: f64, p: f64| curve.virgin_work(z, p) - 0.5 * p * p / curve.unloading();
-            prop_assert!(kept(to, p_to) >= kept(from, p_from) - 1e-9 * curve.virgin_work(to, p_to));
-            let deepest = curve.largest_depth(curve.permanent(to, p_to), to);
-            prop_assert!((deepest - to).abs() <= 1e-9 * to + 1e-12, "{deepest} {to}");
             prop_assert!((curve.virgin_depth(p_to) - to).abs() <= 1e-9 * to);
+            // first loading does more work than the elastic line takes up
             let steps = 4000;
-            let p = |k: i32| curve.virgin(to * f64::from(k) / f64::from(steps));
-            let sum: f64 = (1..=steps).map(|k| 0.5 * (p(k) + p(k - 1)) * to / f64::from(steps)).sum();
-            prop_assert!((sum - curve.virgin_work(to, p_to)).abs() <= 1e-4 * sum);
+            let p = |k: i32| curve.virgin(from + (to - from) * f64::from(k) / f64::from(steps));
+            let work: f64 = (1..=steps).map(|k| 0.5 * (p(k) + p(k - 1)) * (to - from) / f64::from(steps)).sum();
+            let stored = (p_to * p_to - p_from * p_from) / (2.0 * curve.unloading());
+            prop_assert!(stored <= work * (1.0 + 1e-5), "{stored} {work}");
         }
 
         #[test]
-        fn the_inverse_undoes_the_law(curve in curves(), z in 1e-9..0.2f64, z_max in 0.0..0.1f64) {
-            let (p, _) = curve.at(z, z_max, curve.virgin(z_max));
-            if p > 0.0 {
-                let back = curve.depth(p, z_max);
-                prop_assert!((back - z).abs() <= 1e-12 + 1e-12 * z, "{back} {z}");
-            }
+        fn the_inverse_undoes_the_law(curve in curves(), z in 1e-9..0.2f64) {
+            let back = curve.virgin_depth(curve.virgin(z));
+            prop_assert!((back - z).abs() <= 1e-12 + 1e-12 * z, "{back} {z}");
         }
 
         #[test]
@@ -459,7 +398,7 @@ mod tests {
             let p_max = curve.virgin(z_max);
             let d = 1e-7;
             prop_assume!((z - z_max).abs() > 2.0 * d && (z - curve.elastic_limit).abs() > 2.0 * d);
-            prop_assume!((z - curve.permanent(z_max, p_max)).abs() > 2.0 * d);
+            prop_assume!((z - (z_max - p_max / curve.unloading())).abs() > 2.0 * d);
             let (_, slope) = curve.at(z, z_max, p_max);
             let numeric = (curve.at(z + d, z_max, p_max).0 - curve.at(z - d, z_max, p_max).0) / (2.0 * d);
             prop_assert!((slope - numeric).abs() <= 1e-4 * slope.abs() + 1.0, "{slope} {numeric}");
@@ -471,35 +410,6 @@ mod tests {
             let p_max = curve.virgin(z_max);
             let (low, high) = (curve.at(a.min(b), z_max, p_max).0, curve.at(a.max(b), z_max, p_max).0);
             prop_assert!(0.0 <= low && low <= high);
-        }
-
-        #[test]
-        fn what_stays_tells_the_largest_depth(curve in curves(), z_max in 1e-4..0.2f64, off in 0.9..1.1f64) {
-            let p_max = curve.virgin(z_max);
-            let permanent = curve.permanent(z_max, p_max);
-            prop_assume!(permanent > 1e-9);
-            let back = curve.largest_depth(permanent, z_max * off);
-            prop_assert!((back - z_max).abs() < 1e-10 * z_max + 1e-13, "{back} {z_max}");
-        }
-
-        #[test]
-        fn work_is_the_integral(curve in curves(), z in 1e-3..0.1f64) {
-            let steps = 20_000;
-            let sum: f64 = (0..steps).map(|k| curve.virgin((f64::from(k) + 0.5) * z / f64::from(steps))).sum();
-            let numeric = sum * z / f64::from(steps);
-            let exact = curve.virgin_work(z, curve.virgin(z));
-            prop_assert!((exact - numeric).abs() < 2e-3 * exact, "{exact} {numeric}");
-        }
-
-        #[test]
-        fn loading_dissipates(curve in curves(), a in 0.0..0.1f64, d in 0.0..0.1f64) {
-            let free = |z: f64| {
-                let p = curve.virgin(z);
-                curve.virgin_work(z, p) - 0.5 * p * p / curve.unloading()
-            };
-            // on the elastic line both terms are equal and only the rounding of the work is left
-            let rounding = 1e-14 * curve.virgin_work(a + d, curve.virgin(a + d));
-            prop_assert!(free(a + d) >= free(a) - rounding);
         }
     }
 

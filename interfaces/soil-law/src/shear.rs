@@ -79,6 +79,11 @@ impl ShearLaw {
         Self { cohesion, friction, modulus, stiffness, travel: None, expression: None, plugin: None }
     }
 
+    /// The same above a soil of the normal elastic stiffness k_u (Pa/m).
+    pub fn above(&self, k_u: f64) -> Self {
+        Self { stiffness: MINDLIN_RATIO * k_u, ..self.clone() }
+    }
+
     /// The same with a yield stress of its own, see [`crate::expression`].
     pub fn with_expression(self, law: ShearExpression) -> Self {
         Self { cohesion: law.cohesion, friction: law.friction, expression: Some(law), ..self }

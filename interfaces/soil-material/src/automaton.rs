@@ -4,7 +4,7 @@ use crate::coarse::{as_found, settle};
 use crate::compaction::{Compaction, SavedCompaction};
 use crate::displace::Site;
 use crate::feet::Foot;
-use crate::sweep::{Counts, SavedAwake, Sweeper};
+use crate::sweep::{Counts, ROUND, SavedAwake, Sweeper};
 use crate::values;
 use std::sync::Arc;
 use terraglue_ground::{Lattice, UNIT_M};
@@ -14,10 +14,12 @@ use terraglue_subsystem::{Config, Error, Host, Result, Variable};
 
 /// κ_max where a scenario is silent, 1/m: a ridge rounded at 2.5 cm.
 pub const DEFAULT_CURVATURE: f64 = 40.0;
-/// Share of the pressed volume that becomes denser where a scenario is silent.
-pub const DEFAULT_COMPACTION: f64 = 0.25;
-/// Speed of the front of a slide where a scenario is silent, m/s: two sweeps per ms at 1 cm.
-const FRONT_SPEED: f64 = 20.0;
+/// Share of the pressed volume that becomes denser where a scenario is silent: 1 − D_r. Loose soil (D_r = 0) gives way by
+/// compaction alone, dense soil (D_r = 1) is pushed aside whole (Vesić 1973, general and punching shear failure). The
+/// relative density of the upper 15 cm of lunar soil is 65 % (Carrier, Olhoeft and Mendell 1991, Lunar Sourcebook, table 9.5).
+pub const DEFAULT_COMPACTION: f64 = 0.35;
+/// Height of a slide of which nothing is known yet, m.
+const FIRST_SLIDE: f64 = 0.1;
 
 /// Sweeps before the first step at most; what is not at rest then goes on in the run.
 const MOST_SWEEPS: u32 = 100_000;
@@ -29,8 +31,10 @@ pub struct Settings {
     pub curvature_max: f64,
     /// Angle of repose, rad; `None`: the angle of internal friction.
     pub angle_of_repose: Option<f64>,
-    /// Sweeps per step at most; `None`: in proportion to the step and the spacing.
+    /// Sweeps per step at most; `None`: as many as a front with the speed of shallow water, √(g·h), passes nodes.
     pub sweeps_per_step: Option<f64>,
+    /// Height of steep slopes that stand, m; `None`: that of the cohesion.
+    pub critical_height: Option<f64>,
     /// Share of the pressed volume that becomes denser, 0 … 1.
     pub compacted_fraction: f64,
     /// Whether steep ground comes to rest before the first step.
@@ -46,6 +50,7 @@ impl Settings {
             sweeps_per_step: config.optional_number("sweeps_per_step")?.filter(|s| *s > 0.0),
             compacted_fraction: config.optional_number("compacted_fraction")?.unwrap_or(DEFAULT_COMPACTION),
             settle_at_start: config.flag("settle_at_start")?,
+            critical_height: config.optional_number("critical_height_m")?,
         };
         let angle = settings.angle_of_repose.unwrap_or(0.5);
         if !(settings.curvature_max > 0.0 && angle > 0.0 && angle < 1.5) {
@@ -64,10 +69,15 @@ pub struct Automaton {
     friction_angle: f64,
     /// Angles of internal friction of the soils of the mask, rad.
     others: Vec<f64>,
+    /// Smallest height of a steep slope that stands in any of the soils, m.
+    critical_height: f64,
+    gravity: f64,
+    /// ½·ρ·g·Δ²·unit²: energy of a unit of the sum of the squares of the heights, J.
+    weight: f64,
     spacing: f64,
     sweeper: Sweeper,
     compaction: Compaction,
-    /// Sweeps that the steps so far have earned and not used.
+    /// Time that was not swept yet, s; with `sweeps_per_step` sweeps that were not used.
     credit: f64,
     commits: u32,
     rescan: bool,
@@ -83,6 +93,9 @@ impl Automaton {
             settings,
             friction_angle: 0.5,
             others: Vec::new(),
+            critical_height: 0.0,
+            gravity: 0.0,
+            weight: 0.0,
             spacing: 1.0,
             sweeper: Sweeper::new(nowhere, host.clone(), 0),
             compaction: Compaction::new(nowhere, 0.0),
@@ -122,12 +135,23 @@ impl Automaton {
     fn limit(&mut self) {
         // one that the scenario gives holds everywhere
         let others = if self.settings.angle_of_repose.is_some() { &[][..] } else { &self.others };
-        self.sweeper.set_limits(self.repose(), others, self.settings.curvature_max, self.spacing);
+        let critical = self.settings.critical_height.unwrap_or(self.critical_height);
+        let Settings { curvature_max, .. } = self.settings;
+        self.sweeper.set_limits(self.repose(), others, curvature_max, critical, self.spacing);
         self.compaction.set_fraction(self.settings.compacted_fraction);
     }
 
+    fn take(&mut self, ground: &Ground, parameters: &SoilParameters) {
+        let critical = |soil: &SoilParameters| soil.strength().critical_height();
+        let others = ground.mask.soils.iter().map(critical);
+        self.critical_height = others.fold(critical(parameters), f64::min);
+        let cell = self.spacing * UNIT_M;
+        self.weight = 0.5 * parameters.weight() * cell * cell;
+    }
+
     /// Moves what the feet have pressed out of their nodes to free ones.
-    fn displace(&mut self, ground: &mut Ground, covered: &[Covered]) {
+    fn displace(&mut self, ground: &mut Ground, covered: &[Covered]) -> f64 {
+        let mut lifted = 0.0;
         for node in covered.iter().filter(|n| n.pressure > 0.0) {
             let before = ground.heights.units(node.i, node.j);
             let excess = before - nearest_unit(node.surface);
@@ -140,25 +164,63 @@ impl Automaton {
                 feet: &sweeper.feet,
                 compaction: &mut self.compaction,
                 changed: &mut sweeper.changed,
+                lifted: 0,
             };
             let dense = site.compaction.total();
-            let moved = site.displace([node.i, node.j], excess, self.commits);
+            let moved = site.displace([node.i, node.j], excess, node.flow, self.commits);
+            lifted += site.lifted as f64;
             let dense = self.compaction.total() - dense;
             let left = before - ground.heights.units(node.i, node.j);
             sweeper.counts.gained += i64::from(moved - left) + dense;
             sweeper.counts.moved += i64::from(moved);
         }
+        lifted
     }
 
-    /// Sweeps of a step of h seconds at most: what the steps have earned, so that halving h does not double them.
-    fn budget(&mut self, h: f64) -> u32 {
-        let earned = self.settings.sweeps_per_step.unwrap_or(FRONT_SPEED * h / self.spacing);
-        self.credit += if h > 0.0 { earned } else { 0.0 };
-        // a hair more, so that rounding does not drop a sweep
-        let whole = (self.credit + 1e-9).floor();
-        self.credit = (self.credit - whole).max(0.0);
-        whole as u32
+    /// Slides for h seconds. Returns by how much the sum of the squares of the heights has grown.
+    fn slide(&mut self, ground: &mut Ground, h: f64) -> f64 {
+        self.sweeper.counts.lifted = 0.0;
+        if h <= 0.0 {
+            return 0.0;
+        }
+        match self.settings.sweeps_per_step {
+            Some(sweeps) => {
+                self.credit += sweeps;
+                let whole = whole(self.credit);
+                self.credit -= f64::from(whole);
+                self.sweeper.sweep(ground, whole);
+            }
+            None => self.slide_freely(ground, h),
+        }
+        self.sweeper.counts.lifted
     }
+
+    /// A front passes a node in Δ/√(g·h'), h' the height of what slides: no slide is faster than a wave on shallow water
+    /// (Savage and Hutter 1989). What a step leaves of the time counts for the next, so that halving the step does not
+    /// double the slides.
+    fn slide_freely(&mut self, ground: &mut Ground, h: f64) {
+        self.credit += h;
+        self.sweeper.wake_changed();
+        while !self.sweeper.sleeps() {
+            let tallest = f64::from(self.sweeper.counts.tallest) * UNIT_M;
+            let height = if tallest > 0.0 { tallest } else { FIRST_SLIDE };
+            let speed = (self.gravity * height).sqrt();
+            // a hair more, so that rounding does not drop a sweep
+            let most = whole((self.credit * speed / self.spacing).min(f64::from(MOST_SWEEPS)));
+            if most == 0 {
+                return;
+            }
+            let before = self.sweeper.counts.sweeps;
+            self.sweeper.sweep(ground, most.min(ROUND));
+            let swept = f64::from(self.sweeper.counts.sweeps - before);
+            self.credit = (self.credit - swept * self.spacing / speed).max(0.0);
+        }
+        (self.credit, self.sweeper.counts.tallest) = (0.0, 0);
+    }
+}
+
+fn whole(number: f64) -> u32 {
+    (number + 1e-9).floor() as u32
 }
 
 /// A height (m, within the range of units) in units, halves upwards.
@@ -173,6 +235,7 @@ fn nearest_unit(height: f64) -> i32 {
 pub struct Saved {
     settings: Option<Settings>,
     friction_angle: f64,
+    critical_height: f64,
     awake: SavedAwake,
     feet: Vec<Foot>,
     compaction: SavedCompaction,
@@ -189,6 +252,8 @@ impl Material for Automaton {
         self.friction_angle = parameters.phi_rad;
         self.others = ground.mask.soils.iter().map(|soil| soil.phi_rad).collect();
         self.spacing = lattice.spacing;
+        self.gravity = parameters.gravity;
+        self.take(ground, parameters);
         self.sweeper = Sweeper::new(lattice, self.host.clone(), self.reserve);
         self.compaction = Compaction::new(lattice, self.settings.compacted_fraction);
         self.limit();
@@ -221,12 +286,14 @@ impl Material for Automaton {
         Ok(())
     }
 
-    fn parameters_changed(&mut self, parameters: &SoilParameters) {
-        self.rescan |= self.friction_angle != parameters.phi_rad;
+    fn parameters_changed(&mut self, ground: &Ground, parameters: &SoilParameters) {
+        let before = (self.friction_angle, self.critical_height);
         self.friction_angle = parameters.phi_rad;
+        self.take(ground, parameters);
+        self.rescan |= before != (self.friction_angle, self.critical_height);
     }
 
-    fn settle(&mut self, ground: &mut Ground, covered: &[Covered], _: &[[i32; 2]], h: f64) {
+    fn settle(&mut self, ground: &mut Ground, covered: &[Covered], _: &[[i32; 2]], h: f64) -> f64 {
         self.commits = self.commits.wrapping_add(1);
         (self.sweeper.counts.visited, self.sweeper.counts.sweeps) = (0, 0);
         if std::mem::take(&mut self.rescan) {
@@ -235,14 +302,13 @@ impl Material for Automaton {
         }
         let sweeper = &mut self.sweeper;
         sweeper.feet.take(ground, covered, &mut sweeper.changed);
-        self.displace(ground, covered);
-        let most = self.budget(h);
-        self.sweeper.sweep(ground, most);
+        let lifted = self.displace(ground, covered);
+        self.weight * (lifted + self.slide(ground, h))
     }
 
     fn save(&self, out: &mut Saved) {
         out.settings = Some(self.settings);
-        out.friction_angle = self.friction_angle;
+        (out.friction_angle, out.critical_height) = (self.friction_angle, self.critical_height);
         self.sweeper.save(&mut out.awake);
         self.sweeper.feet.save(&mut out.feet);
         self.compaction.save(&mut out.compaction);
@@ -256,7 +322,7 @@ impl Material for Automaton {
 
     fn restore(&mut self, saved: &Saved) {
         self.settings = saved.settings.unwrap_or(self.settings);
-        self.friction_angle = saved.friction_angle;
+        (self.friction_angle, self.critical_height) = (saved.friction_angle, saved.critical_height);
         self.sweeper.restore(&saved.awake);
         self.sweeper.feet.restore(&saved.feet);
         self.compaction.restore(&saved.compaction);
@@ -271,10 +337,12 @@ terraglue_subsystem::persist!(Settings {
     sweeps_per_step,
     compacted_fraction,
     settle_at_start,
+    critical_height,
 });
 terraglue_subsystem::persist!(Saved {
     settings,
     friction_angle,
+    critical_height,
     awake,
     feet,
     compaction,

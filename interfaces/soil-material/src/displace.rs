@@ -1,21 +1,23 @@
-//! Displacement: what a foot presses out of a node is compacted in part; the rest goes to the ring around the foot.
+//! Displacement: what a foot presses out of a node is compacted in part; the rest flows to the ring around the foot, to where the
+//! pressure falls and where the underside drags it (the flow zones below a rim, Wong 1967), trench and rims by conservation.
 
 use crate::active::Marks;
 use crate::compaction::Compaction;
 use crate::feet::Feet;
-use terraglue_soil_contact::Ground;
+use terraglue_soil_contact::{Ground, squares_grown};
 
 /// The eight directions with the squared distance of one step.
-const DIRECTIONS: [([i32; 2], f64); 8] = [
-    ([1, 0], 1.0),
-    ([1, 1], 2.0),
-    ([0, 1], 1.0),
-    ([-1, 1], 2.0),
-    ([-1, 0], 1.0),
-    ([-1, -1], 2.0),
-    ([0, -1], 1.0),
-    ([1, -1], 2.0),
+const DIRECTIONS: [([i32; 2], i32); 8] = [
+    ([1, 0], 1),
+    ([1, 1], 2),
+    ([0, 1], 1),
+    ([-1, 1], 2),
+    ([-1, 0], 1),
+    ([-1, -1], 2),
+    ([0, -1], 1),
+    ([1, -1], 2),
 ];
+
 
 /// What displacement changes.
 pub struct Site<'a> {
@@ -27,27 +29,32 @@ pub struct Site<'a> {
     pub compaction: &'a mut Compaction,
     /// Nodes that have changed.
     pub changed: &'a mut Marks,
+    /// By how much the sum of the squares of the heights has grown.
+    pub lifted: i64,
 }
 
 impl Site<'_> {
     /// Takes `excess` units out of the loaded node (i, j): its compacted part, and the rest to the nearest nodes without
-    /// a foot in eight directions, weighted with 1/distance². Returns how many units were moved; those without a place
-    /// stay and are tried again at the next commit. `turn` rotates the direction that gets what cannot be split.
-    pub fn displace(&mut self, [i, j]: [i32; 2], excess: i32, turn: u32) -> i32 {
+    /// a foot in eight directions d, weighted with (1 + flow·d)₊/distance². Returns how many units were moved; those without a
+    /// place stay and are tried again at the next commit. `turn` rotates the direction that gets what cannot be split.
+    pub fn displace(&mut self, [i, j]: [i32; 2], excess: i32, flow: [f64; 2], turn: u32) -> i32 {
         let dense = self.compaction.take([i, j], excess);
         let loose = excess - dense;
         let mut places = [None; 8];
         let mut sum = 0.0;
         for (place, (direction, squared)) in places.iter_mut().zip(DIRECTIONS) {
             *place = self.nearest_free([i, j], direction).map(|(at, steps)| {
-                let weight = 1.0 / (squared * f64::from(steps) * f64::from(steps));
+                let along = flow[0] * f64::from(direction[0]) + flow[1] * f64::from(direction[1]);
+                let towards = (1.0 + along / f64::from(squared).sqrt()).max(0.0);
+                let weight = towards / (f64::from(squared) * f64::from(steps) * f64::from(steps));
                 sum += weight;
                 (at, weight)
             });
         }
         let mut left = loose;
         if sum == 0.0 {
-            if let Some(at) = self.nearest_anywhere([i, j]) {
+            let any = places.iter().flatten().map(|(at, _)| *at).next();
+            if let Some(at) = any.or_else(|| self.nearest_anywhere([i, j])) {
                 left -= self.give(at, left);
             }
         } else {
@@ -55,13 +62,16 @@ impl Site<'_> {
                 let share = (f64::from(loose) * weight / sum) as i32;
                 left -= self.give(*at, share.min(left));
             }
-            let last = (0..8).find_map(|k| places[(turn as usize + k) % 8]);
+            let last = (0..8).find_map(|k| places[(turn as usize + k) % 8].filter(|(_, weight)| *weight > 0.0));
             left -= last.map_or(0, |(at, _)| self.give(at, left));
         }
         let gone = excess - left;
         if gone > 0 {
             self.ground.heights.add_units(i, j, -gone);
             self.changed.mark([i, j]);
+            // what becomes denser stays at its height
+            let all = squares_grown(self.ground.heights.units(i, j), -gone);
+            self.lifted += all - all / i64::from(gone) * i64::from(dense);
         }
         loose - left
     }
@@ -103,6 +113,7 @@ impl Site<'_> {
     fn give(&mut self, [i, j]: [i32; 2], units: i32) -> i32 {
         if units > 0 {
             self.ground.add_material(i, j, units);
+            self.lifted += squares_grown(self.ground.heights.units(i, j), units);
             self.changed.mark([i, j]);
         }
         units.max(0)

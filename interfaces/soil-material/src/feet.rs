@@ -54,7 +54,7 @@ fn load_units(node: &Covered) -> i32 {
     (height / (UNIT_M * f64::from(QUANTUM)) + 0.5) as i32 * QUANTUM
 }
 
-/// What fits between the ground and a foot that does not touch it, units.
+/// What fits between the ground and a foot that does not touch it, units; 0: the foot stands here and the node is closed.
 fn room_units(node: &Covered, height: f64) -> i32 {
     const LARGEST: f64 = 65_536.0;
     if node.pressure > 0.0 { 0 } else { ((node.lower - height) / UNIT_M).clamp(1.0, LARGEST) as i32 }

@@ -151,12 +151,13 @@ pub fn faces_across<T: Thresholds>(
 }
 
 /// Cuts fluxes from nodes with the inlets `from` to nodes with the inlets `to` (slices of the same length) to what
-/// the receiver admits.
+/// the receiver admits. A node without inlet is closed: it gives nothing, either.
 #[inline(always)]
 pub fn admit(flux: &mut [i32], from: &[i32], to: &[i32]) {
     for ((q, from), to) in flux.iter_mut().zip(from).zip(to) {
+        let open = -i32::from(*from != 0 && *to != 0);
         // not `clamp`, whose check of its limits keeps compilers from vectors
-        *q = (*q).max(-*from).min(*to);
+        *q = (*q).max(-(*from & open)).min(*to & open);
     }
 }
 
@@ -167,6 +168,14 @@ pub fn admit_triples(flux: &mut [i32], middle: &[i32], ends: [&[i32]; 2]) {
     for (((q, m), a), b) in flux.iter_mut().zip(middle).zip(ends[0]).zip(ends[1]) {
         let least = (*a).min(*b).min(*m);
         *q = (*q).max(-least).min(least);
+    }
+}
+
+/// Takes the fluxes away over faces that stand.
+#[inline(always)]
+pub fn hold(flux: &mut [i32], stands: &[bool]) {
+    for (q, stands) in flux.iter_mut().zip(stands) {
+        *q &= i32::from(*stands) - 1;
     }
 }
 

@@ -31,6 +31,7 @@ mod feet;
 mod kernel;
 mod regions;
 mod span;
+mod standing;
 mod still;
 mod sweep;
 mod values;
@@ -66,10 +67,21 @@ pub fn schema(compacted: f64) -> Vec<Parameter> {
         Parameter::of(
             "sweeps_per_step",
             ParameterType::Integer,
-            "sweeps of the automaton per communication step; where it is left out a slide's front runs 20 m/s",
+            "sweeps of the automaton per communication step; where it is left out a slide's front runs as fast as a wave \
+             on shallow water, sqrt(g h)",
         )
         .within(0.0, 1e6)
         .optional(),
+        Parameter {
+            unit: "m".into(),
+            ..Parameter::of(
+                "critical_height_m",
+                ParameterType::Number,
+                "height up to which steep slopes stand; where it is left out that of the cohesion, 4 c/gamma tan(45 deg + phi/2)",
+            )
+            .within(0.0, 1e3)
+            .optional()
+        },
         Parameter::of(
             "settle_at_start",
             ParameterType::Bool,

@@ -11,14 +11,14 @@ use terraglue_soil_contact::Ground;
 use terraglue_subsystem::Host;
 
 /// Sweeps of a round at most: windows are filled again after so many.
-const ROUND: u32 = 8;
+pub const ROUND: u32 = 8;
 /// Nodes of a window beyond which it pays to give windows to several threads.
 const PARALLEL_NODES: i64 = 4096;
 /// Edge of the blocks in which the ground is looked through, in tiles.
 const BLOCK_TILES: u32 = 4;
 
 /// What the last step did, and sums since the start.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Counts {
     /// Visits of nodes in the last step.
     pub visited: u64,
@@ -30,6 +30,19 @@ pub struct Counts {
     pub gained: i64,
     /// Number of sweeps since the start: curvature acts in every second one.
     pub parity: u32,
+    /// By how much the sum of the squares of the heights (units) has grown in the last step.
+    pub lifted: f64,
+    /// Difference of the heights around the nodes that were awake last, units: how high what slides is.
+    pub tallest: i32,
+    /// Lowest and highest level that was ever seen where something slid, units.
+    pub range: [i32; 2],
+}
+
+impl Default for Counts {
+    fn default() -> Self {
+        let (visited, sweeps, moved, gained, parity) = (0, 0, 0, 0, 0);
+        Self { visited, sweeps, moved, gained, parity, lifted: 0.0, tallest: 0, range: [i32::MAX, i32::MIN] }
+    }
 }
 
 /// Feet and awake nodes of a ground, and the rules that act on them.
@@ -114,6 +127,8 @@ fn reach(sweeps: u32, parity: u32) -> usize {
     repose.max(curvature)
 }
 
+/// A critical height that no ground reaches, units (512 m).
+const HIGHEST: i32 = i32::MAX;
 /// A limit of curvature beyond which the rule rests, units per triple: higher than any ground.
 const SHARPEST: f64 = 5e8;
 /// Windows that stand ready, and the side (nodes) up to which using one allocates nothing.
@@ -139,8 +154,17 @@ impl Sweeper {
 
     /// Sets the angle of repose (rad) and the largest curvature (1/m) on nodes `spacing` (m) apart; `others` has the
     /// angles of the soils of the mask from number 1 on.
-    pub fn set_limits(&mut self, repose: f64, others: &[f64], curvature_max: f64, spacing: f64) {
-        let straight = curvature_max * spacing * spacing / UNIT_M;
+    /// `critical`: height (m) of steep slopes that stand by cohesion; ridges and notches as high stand, too.
+    pub fn set_limits(
+        &mut self,
+        repose: f64,
+        others: &[f64],
+        curvature_max: f64,
+        critical: f64,
+        spacing: f64,
+    ) {
+        let critical = (critical / UNIT_M).min(f64::from(HIGHEST)) as i32;
+        let straight = (curvature_max * spacing * spacing / UNIT_M).max(f64::from(critical));
         let curvature = (straight < SHARPEST).then(|| [straight as i32, 2 * straight as i32]);
         let threshold = |angle: f64| (spacing * libm::tan(angle) / UNIT_M) as f32;
         self.by_soil.clear();
@@ -149,7 +173,7 @@ impl Sweeper {
         }
         let repose = threshold(repose);
         let least_repose = self.by_soil.iter().fold(repose, |least, thr| least.min(*thr));
-        self.limits = Limits { repose, least_repose, curvature };
+        self.limits = Limits { repose, least_repose, curvature, critical };
     }
 
     /// A sweeper with the largest angle of repose of this one, times `steeper`, on a lattice of blocks: no feet, and no
@@ -157,7 +181,7 @@ impl Sweeper {
     pub(crate) fn of_blocks(&self, lattice: Lattice, steeper: f32) -> Self {
         let largest = self.by_soil.iter().fold(self.limits.repose, |most, thr| most.max(*thr));
         let repose = 2.0 * largest * steeper;
-        let limits = Limits { repose, least_repose: repose, curvature: None };
+        let limits = Limits { repose, least_repose: repose, curvature: None, critical: self.limits.critical };
         Self { limits, ..Self::new(lattice, self.host.clone(), 0) }
     }
 
@@ -186,11 +210,17 @@ impl Sweeper {
         let [nx, ny] = ground.heights.lattice().tiles();
         let still = Still::new(ground, &self.feet.list);
         let mut window = Window::default();
+        let (low, high) = ground.heights.bounds();
+        self.counts.range = [low, high];
         for b in (0..ny).step_by(BLOCK_TILES as usize) {
             for a in (0..nx).step_by(BLOCK_TILES as usize) {
                 let end = [(a + BLOCK_TILES).min(nx), (b + BLOCK_TILES).min(ny)];
                 let Some(area) = still.restless([a, b], end, &self.limits) else { continue };
                 window.fill(ground, &self.by_soil, &self.feet.list, area, 2);
+                window.all_stands = self.limits.critical > 0 && high.saturating_sub(low) <= self.limits.critical;
+                if self.limits.critical > 0 && !window.all_stands {
+                    window.look_beyond(ground, self.limits.repose);
+                }
                 window.wake_all();
                 pulp::Arch::new().dispatch(Look { window: &mut window, limits: &self.limits });
                 let (repose, curvature) = (&mut self.repose, &mut self.curvature);
@@ -224,8 +254,24 @@ impl Sweeper {
         while self.windows.len() < self.areas.len() {
             self.windows.push(Mutex::default());
         }
+        self.counts.tallest = 0;
         for k in 0..self.areas.len() {
             self.fill(ground, k, reach);
+            let [low, high] = self.windows[k].get_mut().unwrap_or_else(PoisonError::into_inner).range();
+            self.counts.tallest = self.counts.tallest.max(high.saturating_sub(low));
+            let range = &mut self.counts.range;
+            *range = [range[0].min(low), range[1].max(high)];
+        }
+        // where all that ever slid lies within the critical height, every slope stands
+        let [low, high] = self.counts.range;
+        let critical = self.limits.critical;
+        let stands = critical > 0 && high.saturating_sub(low) <= critical;
+        for k in 0..self.areas.len() {
+            let window = self.windows[k].get_mut().unwrap_or_else(PoisonError::into_inner);
+            window.all_stands = stands;
+            if critical > 0 && !stands {
+                window.look_beyond(ground, self.limits.repose);
+            }
         }
         self.repose.clear();
         self.curvature.clear();
@@ -277,9 +323,10 @@ impl Sweeper {
         let counts = &mut self.counts;
         counts.visited += window.visited;
         window.empty(&mut self.feet.list, |[i, j], heights| {
-            let [gained, moved] = ground.put_row(i, j, heights);
+            let [gained, moved, lifted] = ground.put_row(i, j, heights);
             counts.gained += gained;
             counts.moved += moved;
+            counts.lifted += lifted as f64;
         });
         let (repose, curvature) = (&mut self.repose, &mut self.curvature);
         window.awake(|bent, [i, j], end| {
@@ -316,5 +363,5 @@ fn inside(bits: u32, first: i32, area: &Rectangle) -> u32 {
     bits & (u32::MAX << low) & (u32::MAX >> (31 - high))
 }
 
-terraglue_subsystem::persist!(Counts { visited, sweeps, moved, gained, parity });
+terraglue_subsystem::persist!(Counts { visited, sweeps, moved, gained, parity, lifted, tallest, range });
 terraglue_subsystem::persist!(SavedAwake { repose, curvature, counts });

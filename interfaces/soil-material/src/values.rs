@@ -28,7 +28,7 @@ pub fn variables(first: u32) -> Vec<Variable> {
         ),
         live(6, "curvature_max_per_m", "", "largest curvature of the surface, 1/m").within(0.1, 1e6),
         live(7, "angle_of_repose_rad", "rad", "angle of repose").within(0.01, 1.4),
-        live(8, "sweeps_per_step", "", "sweeps per step at most; 0: a slide's front runs 20 m/s")
+        live(8, "sweeps_per_step", "", "sweeps per step at most; 0: a slide's front runs sqrt(g h)")
             .within(0.0, 1e6),
         live(9, "compacted_fraction", "", "share of the pressed volume that becomes denser").within(0.0, 1.0),
         out(10, "compacted_volume", "m^3", "volume that became denser under feet since the start"),

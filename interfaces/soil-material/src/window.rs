@@ -4,7 +4,8 @@
 //! neither see nor disturb each other and their number and shape cannot be seen in the result.
 
 use crate::feet::{Foot, OPEN_INLET, inlet};
-use crate::kernel::{LANES, admit, admit_triples, faces_across, faces_along, triples};
+use crate::kernel::{LANES, admit, admit_triples, faces_across, faces_along, hold, triples};
+use crate::standing::{Field, Standing};
 use crate::span::Span;
 use terraglue_ground::{Lattice, TILE_EDGE};
 use terraglue_soil_contact::Ground;
@@ -26,6 +27,8 @@ pub struct Limits {
     pub least_repose: f32,
     /// κ_max·d² for straight and diagonal triples; `None`: nothing is too sharp.
     pub curvature: Option<[i32; 2]>,
+    /// Height of a steep slope that stands by cohesion, units.
+    pub critical: i32,
 }
 
 /// Nodes first … last of the lattice along x and y.
@@ -92,6 +95,10 @@ pub struct Window {
     pub visited: u64,
     /// Largest change of the last sweep, units.
     pub largest: i32,
+    /// Whether every slope stands by cohesion.
+    pub all_stands: bool,
+    /// Which slopes stand, where not all do.
+    standing: Standing,
 }
 
 impl Window {
@@ -148,6 +155,8 @@ impl Window {
             row.resize(self.stride.max(row.len()), 0);
         }
         self.visited = 0;
+        self.all_stands = false;
+        self.standing.clear();
     }
 
     fn find_borders(&mut self, lattice: &Lattice) {
@@ -291,6 +300,19 @@ impl Window {
         }
     }
 
+    /// Lowest and highest level.
+    pub fn range(&self) -> [i32; 2] {
+        let (Some(x), Some(y)) = (self.columns, self.rows) else { return [0, 0] };
+        let rows = (y.lo..y.hi).map(|r| &self.levels[r * self.stride..][x.lo..x.hi]);
+        rows.flatten().fold([i32::MAX, i32::MIN], |[low, high], h| [low.min(*h), high.max(*h)])
+    }
+
+    /// Looks how steep slopes at the border of the window go on outside; `thr`: Δ·tan φ_r, units.
+    pub fn look_beyond(&mut self, ground: &Ground, thr: f32) {
+        let bounds = [self.width, self.height];
+        self.standing.look_beyond(ground, self.origin, bounds, thr as i32);
+    }
+
     /// Wakes the columns of a row of the lattice (first node and a bit per node) for one of the rules.
     pub fn wake(&mut self, curvature: bool, [i, j]: [i32; 2], bits: u32) {
         if bits == 0 {
@@ -315,6 +337,13 @@ impl Window {
     #[inline(always)]
     pub fn repose_pass(&mut self, limits: &Limits, apply: bool) -> i32 {
         let rows = self.rows.unwrap_or(Span::NONE);
+        if self.all_stands {
+            self.repose.fill(Span::NONE);
+            return 0;
+        }
+        if limits.critical > 0 {
+            self.find_standing(limits);
+        }
         let mut work = std::mem::take(&mut self.work);
         let [along, lower, upper, change, waiting] = &mut work[..5] else { return 0 };
         let (mut lower, mut upper) = (lower.as_mut_slice(), upper.as_mut_slice());
@@ -382,6 +411,17 @@ impl Window {
         if self.limited[y] || self.limited[y + 1] {
             admit(&mut out[lo..hi], &self.row_inlets(y)[lo..hi], &self.row_inlets(y + 1)[lo..hi]);
         }
+        if let Some(stands) = self.standing.across(y * self.stride + lo, hi - lo) {
+            hold(&mut out[lo..hi], stands);
+        }
+    }
+
+    /// Finds the faces whose slope stands by cohesion.
+    fn find_standing(&mut self, limits: &Limits) {
+        let (Some(x), Some(y)) = (self.columns, self.rows) else { return };
+        let thr = |at: usize| self.repose_of.get(at).copied().unwrap_or(limits.repose);
+        let field = Field { levels: &self.levels, stride: self.stride, columns: x, rows: y, left: LEFT };
+        self.standing.find(&field, &self.repose, thr, limits.critical);
     }
 
     /// Fluxes along row y over the faces on either side of the nodes of `span`.
@@ -397,6 +437,9 @@ impl Window {
         if self.limited[y] {
             let inlets = self.row_inlets(y);
             admit(&mut out[lo..hi], &inlets[lo..hi], &inlets[lo + 1..=hi]);
+        }
+        if let Some(stands) = self.standing.along(y * self.stride + lo, hi - lo) {
+            hold(&mut out[lo..hi], stands);
         }
     }
 
@@ -442,6 +485,10 @@ impl Window {
     #[inline(always)]
     fn after_pass(&mut self, apply: bool) {
         self.wake_around();
+        for (next, wake) in self.next.iter_mut().zip(&self.standing.wake) {
+            *next = next.hull(*wake);
+        }
+        self.standing.wake.clear();
         if apply {
             self.repeat_borders();
             for node in &mut self.below {

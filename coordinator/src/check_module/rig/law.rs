@@ -4,10 +4,13 @@ use crate::check_module::finding::{Stop, Verdict};
 use crate::check_module::lab::Lab;
 use crate::host::law::open;
 use std::sync::Arc;
-use terraglue_soil_law::{DEFAULT_ELASTIC_STIFFNESS, PluginLaw, PressureCurve};
+use terraglue_soil_law::{PluginLaw, PressureCurve};
 use terraglue_subsystem::{
     Config, Error, NodeLaw, PressureAnswer, PressureNodes, Schema, ShearAnswer, ShearNodes,
 };
+
+/// Stiffness of unloading above which a law is looked at, Pa/m: stiffer than soft ground anywhere.
+const UNLOADING_PA_M: f64 = 4e8;
 
 /// Doubles before and after every array that must stay as they are.
 const MARGIN: usize = 8;
@@ -256,7 +259,7 @@ impl Node {
             return Ok((out.pressure[0], out.slope[0]));
         }
         let plugin = PluginLaw::new(law.law.clone());
-        let curve = PressureCurve::of_law(plugin.clone(), b, DEFAULT_ELASTIC_STIFFNESS);
+        let curve = PressureCurve::of_law(plugin.clone(), b, UNLOADING_PA_M);
         let answer = curve.at(depth, self.z_max, self.p_max);
         answered("pressure", &format!("z = {depth} m, b = {b} m"), plugin.check())?;
         Ok(answer)

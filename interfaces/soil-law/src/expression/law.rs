@@ -9,6 +9,7 @@ use super::program::Program;
 use super::range;
 use super::symbol::{Role, Symbol};
 use crate::parameters::SoilParameters;
+use crate::pressure::PressureLaw;
 use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};
 
 /// Depths for which a pressure law must make sense, m.
@@ -178,7 +179,8 @@ impl SoilExpressions {
         ];
         let law = self.checked(text, &variables, p).and_then(|(tree, symbols)| {
             let law = compile(&tree, &symbols)?;
-            physical_pressure(&tree, &law, p.elastic_stiffness_pa_m)?;
+            let own = || PressureLaw::Expression(law.clone()).unloading();
+            physical_pressure(&tree, &law, p.elastic_stiffness_pa_m.unwrap_or_else(own))?;
             Ok(law)
         });
         law.map(Some).map_err(|e| refuse("law.pressure", &e))
@@ -241,7 +243,7 @@ fn known_symbols(p: &SoilParameters) -> Vec<Symbol> {
         Symbol::fixed("c", "Pa", p.c_pa),
         Symbol::fixed("phi", "rad", p.phi_rad),
         Symbol::fixed("K", "m", p.K_m),
-        Symbol::fixed("k_u", "Pa/m", p.elastic_stiffness_pa_m),
+        Symbol::fixed("k_u", "Pa/m", p.unloading()),
     ];
     known.extend(p.density_kg_m3.map(|rho| Symbol::fixed("rho", "kg/m^3", rho)));
     known

@@ -201,7 +201,7 @@ impl Feet {
                 sum.add(ground.heights.units(i, j) as u64);
                 sum.add(ground.heights.sinkage_units(i, j) as u64);
                 let state = ground.nodes.get(i, j);
-                for part in [state.reference, state.remainder, state.permanent, state.pressure, state.largest]
+                for part in [state.reference, state.remainder, state.permanent, state.pressure, state.energy]
                 {
                     sum.add(part.to_bits());
                 }

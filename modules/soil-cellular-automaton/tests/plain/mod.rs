@@ -18,6 +18,8 @@ pub struct Plain {
     /// Δ·tan φ_r of every node.
     threshold: Vec<f32>,
     curvature: i32,
+    /// Height of steep slopes that stand, units.
+    critical: i32,
 }
 
 /// |flux| rounded down to whole units, with the sign of `direction`: a whole flux loses at most one unit more, since half
@@ -27,8 +29,9 @@ fn whole(magnitude: f32, direction: i32) -> i32 {
 }
 
 impl Plain {
-    /// A copy of the ground without feet; `repose` has the angle of every soil of its mask.
-    pub fn new(ground: &Ground, repose: &[f64], curvature: f64) -> Self {
+    /// A copy of the ground without feet; `repose` has the angle of every soil of its mask, `critical` (m) is the height of
+    /// steep slopes that stand.
+    pub fn new(ground: &Ground, repose: &[f64], curvature: f64, critical: f64) -> Self {
         let lattice = ground.heights.lattice();
         let size = lattice.size.map(|n| n as i32);
         let nodes = (0..size[1]).flat_map(|j| (0..size[0]).map(move |i| (i, j)));
@@ -41,7 +44,8 @@ impl Plain {
             load: vec![0; n],
             room: vec![None; n],
             threshold: nodes.map(of).collect(),
-            curvature: (curvature * lattice.spacing * lattice.spacing / UNIT_M) as i32,
+            curvature: (curvature * lattice.spacing * lattice.spacing / UNIT_M).max(critical / UNIT_M) as i32,
+            critical: (critical / UNIT_M) as i32,
         }
     }
 
@@ -101,25 +105,52 @@ impl Plain {
         for j in 0..self.size[1] {
             for i in 0..self.size[0] {
                 for [a, b] in [[1, 0], [0, 1]] {
-                    let (n, m) = ([i, j], [i + a, j + b]);
-                    let along = self.level(i, j) - self.level(m[0], m[1]);
-                    let across = |[i, j]: [i32; 2]| self.level(i + b, j + a) - self.level(i - b, j - a);
-                    let (along_f, across_f) = (along as f32, (across(n) + across(m)) as f32 * 0.25);
-                    let squared = along_f * along_f + across_f * across_f;
-                    // the upper node's material slides
-                    let upper = if along > 0 { n } else { m };
-                    let threshold = self.threshold[self.place(upper[0], upper[1])];
-                    if squared <= threshold * threshold {
+                    let m = [i + a, j + b];
+                    let Some((along, share)) = self.steep([i, j], [a, b]) else { continue };
+                    let inlets = [self.inlet(i, j), self.inlet(m[0], m[1])];
+                    // a node without inlet is closed; a low steep slope stands
+                    if inlets.contains(&0) || self.critical > 0 && self.run([i, j], [a, b]) <= i64::from(self.critical) {
                         continue;
                     }
-                    let share = 1.0 - threshold / squared.sqrt();
-                    let flux = whole(0.25 * along_f.abs() * share, along);
-                    let flux = flux.clamp(-self.inlet(i, j), self.inlet(m[0], m[1]));
+                    let flux = whole(0.25 * (along as f32).abs() * share, along);
+                    let flux = flux.clamp(-inlets[0], inlets[1]);
                     change[self.place(i, j)] -= flux;
                     change[self.place(m[0], m[1])] += flux;
                 }
             }
         }
+    }
+
+    /// The fall over the face from a node in the direction [a, b] where it is steeper than the angle of repose, and (g −
+    /// threshold)/g.
+    fn steep(&self, [i, j]: [i32; 2], [a, b]: [i32; 2]) -> Option<(i32, f32)> {
+        let (n, m) = ([i, j], [i + a, j + b]);
+        let along = self.level(i, j) - self.level(m[0], m[1]);
+        let across = |[i, j]: [i32; 2]| self.level(i + b, j + a) - self.level(i - b, j - a);
+        let (along_f, across_f) = (along as f32, (across(n) + across(m)) as f32 * 0.25);
+        let squared = along_f * along_f + across_f * across_f;
+        // the upper node's material slides
+        let upper = if along > 0 { n } else { m };
+        let threshold = self.threshold[self.place(upper[0], upper[1])];
+        (squared > threshold * threshold).then(|| (along, 1.0 - threshold / squared.sqrt()))
+    }
+
+    /// Height of the steep run through the face from a node in the direction [a, b].
+    fn run(&self, [i, j]: [i32; 2], [a, b]: [i32; 2]) -> i64 {
+        let Some((own, _)) = self.steep([i, j], [a, b]) else { return 0 };
+        let inside = |[i, j]: [i32; 2]| i >= 0 && j >= 0 && i < self.size[0] && j < self.size[1];
+        let mut height = i64::from(own);
+        for way in [-1, 1] {
+            let mut at = [i + way * a, j + way * b];
+            while inside(at) && inside([at[0] + a, at[1] + b]) {
+                match self.steep(at, [a, b]) {
+                    Some((next, _)) if next != 0 && (next > 0) == (own > 0) => height += i64::from(next),
+                    _ => break,
+                }
+                at = [at[0] + way * a, at[1] + way * b];
+            }
+        }
+        height.abs()
     }
 
     fn curvature(&self, change: &mut [i32]) {

@@ -13,7 +13,7 @@ use terraglue::subsystem::{Terrain, TerrainTile, ValuesMut};
 use terraglue_soil_bekker::SoilBekker;
 use terraglue_soil_law::{
     PluginLaw, PressureLaw, ShearLaw, ShearResponse, ShearState, Sheared, SoilExpressions, SoilParameters,
-    pressures,
+    first_loading,
 };
 use terraglue_subsystem::Config;
 
@@ -81,9 +81,9 @@ fn slopes(soil: &SoilParameters, module: &PluginLaw, out: &mut Vec<Figure>) -> O
     let (k, n, z_1) = (soil.k_c / b + soil.k_phi, soil.n, soil.K_m);
     let depths: Vec<f64> = (0..200).map(|i| 1e-4 + 1e-3 * f64::from(i)).collect();
     let worst = |law: &PressureLaw, closed: &dyn Fn(f64) -> f64| {
-        let (curve, before) = (law.curve(b, 4e8), vec![0.0; depths.len()]);
-        let (mut p, mut slope) = (before.clone(), before.clone());
-        pressures(&curve, &depths, &before, &before, &mut p, &mut slope);
+        let curve = law.curve(b, 4e8);
+        let (mut p, mut slope) = (vec![0.0; depths.len()], vec![0.0; depths.len()]);
+        first_loading(&curve, &depths, &mut p, &mut slope);
         depths.iter().zip(&slope).fold(0.0_f64, |m, (z, s)| m.max((s / closed(*z) - 1.0).abs()))
     };
     let bekker = |z: f64| k * n * libm::pow(z, n - 1.0);
@@ -151,11 +151,10 @@ fn over(text: impl Fn(), built_in: impl Fn()) -> f64 {
 /// Pressures and slopes of nodes in first loading.
 fn press(law: &PressureLaw) {
     let depth: [f64; NODES] = std::array::from_fn(|k| 0.002 + 2e-4 * k as f64);
-    let before = [0.0; NODES];
     let (mut p, mut slope) = ([0.0; NODES], [0.0; NODES]);
     let curve = law.curve(black_box(0.05), 4e8);
     for _ in 0..ROUNDS {
-        pressures(&curve, black_box(&depth), &before, &before, &mut p, &mut slope);
+        first_loading(&curve, black_box(&depth), &mut p, &mut slope);
         black_box((&p, &slope));
     }
 }

@@ -8,7 +8,7 @@ use crate::validate::parallel::in_parallel;
 use crate::validate::{Context, Figure, Limit};
 use std::collections::BTreeMap;
 use terraglue::soil_fit::{Rim, Rolling};
-use terraglue_soil_law::DEFAULT_ELASTIC_STIFFNESS;
+use super::rows::DEFAULT_ELASTIC_STIFFNESS;
 
 const SCENARIO: &str = "scenarios/wheel_rig.toml";
 /// Radius and width of the wheel in models/wheel_rig.urdf, m; its load, N.

@@ -1,7 +1,10 @@
 //! The soils of the figures: rows of `models/soils.csv`, as a module's configuration and as numbers.
 
 use crate::process::{Outcome, read, root};
-use terraglue_soil_law::{COLUMNS, DEFAULT_ELASTIC_STIFFNESS, SoilTable};
+use terraglue_soil_law::{COLUMNS, SoilTable};
+
+/// Stiffness of unloading of the protocols, Pa/m.
+pub const DEFAULT_ELASTIC_STIFFNESS: f64 = 4e8;
 
 /// Row of the table, and the short name under which the reference data know the soil.
 pub const EIGHT: [(&str, &str); 8] = [

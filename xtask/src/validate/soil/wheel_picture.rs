@@ -10,7 +10,8 @@ use crate::process::{Outcome, root, write};
 use std::borrow::{Borrow, BorrowMut};
 use std::fmt::Write;
 use terraglue::soil_fit::Rim;
-use terraglue_soil_law::{DEFAULT_ELASTIC_STIFFNESS, ShearLaw};
+use super::rows::DEFAULT_ELASTIC_STIFFNESS;
+use terraglue_soil_law::ShearLaw;
 use terraglue_subsystem::Subsystem;
 
 /// Radius and width, m, and load, N.

@@ -10,7 +10,7 @@ use crate::validate::parallel::in_parallel;
 use crate::validate::{Context, Figure, Limit};
 use std::fmt;
 use terraglue::soil_fit::{Rim, Rolling};
-use terraglue_soil_law::DEFAULT_ELASTIC_STIFFNESS;
+use super::rows::DEFAULT_ELASTIC_STIFFNESS;
 
 /// Spacing of the lattice, m, quickly and else: a contact of 2 cm spans eight cells.
 const SPACINGS: [f64; 2] = [0.005, 0.0025];

@@ -1,0 +1,63 @@
+//! The size of a contact: b of the pressure law.
+
+use crate::patch::PatchNodes;
+
+/// Area of a contact and its second moments.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Size {
+    /// Area below the reference level, in the tangent plane, m².
+    pub area: f64,
+    /// Mean squares of the place along t1 and t2 about their mean, and their mean product, m².
+    square: [f64; 3],
+}
+
+/// Width of a strip over the radius of the disc that bears the same pressure: the width term of bearing capacity counts ½ for a
+/// strip and 0.3 for a disc of the same breadth (Terzaghi 1943, art. 45 and 50), and a disc of radius R is 2R broad.
+const STRIP: f64 = 5.0 / 6.0;
+/// σ of a strip's width over the width is 1/√12.
+const WIDTH: f64 = 3.464_101_615_137_754_6;
+
+impl Size {
+    /// Of the nodes in `range` on a lattice of `spacing` (m). A cell that the reference level cuts counts with its part
+    /// below, as the slope of the underside has it.
+    pub fn of(nodes: &PatchNodes, range: std::ops::Range<usize>, spacing: f64) -> Self {
+        let (mut area, mut mean, mut square) = (0.0, [0.0; 2], [0.0; 3]);
+        for k in range {
+            let weight = nodes.area[k] * below(nodes, k, spacing);
+            let [_, x, y] = nodes.arm[k];
+            area += weight;
+            mean = [mean[0] + weight * x, mean[1] + weight * y];
+            square = [square[0] + weight * x * x, square[1] + weight * y * y, square[2] + weight * x * y];
+        }
+        if area <= 0.0 {
+            return Self::default();
+        }
+        let [x, y] = mean.map(|m| m / area);
+        let [xx, yy, xy] = square.map(|s| s / area);
+        // each cell is a square itself
+        let cell = spacing * spacing / 12.0;
+        Self { area, square: [xx - x * x + cell, yy - y * y + cell, xy - x * y] }
+    }
+
+    /// b of the pressure law, m: radius of the disc of equal area, but no more than that of the disc which bears what an
+    /// endless strip of this breadth does.
+    pub fn b(&self, spacing: f64) -> f64 {
+        let disc = (self.area / std::f64::consts::PI).sqrt();
+        disc.min(STRIP * self.breadth()).max(0.5 * spacing)
+    }
+
+    /// Breadth of the rectangle with the smaller of the principal moments, m.
+    fn breadth(&self) -> f64 {
+        let [xx, yy, xy] = self.square;
+        let (half, middle) = ((0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt(), 0.5 * (xx + yy));
+        WIDTH * (middle - half).max(0.0).sqrt()
+    }
+}
+
+/// Part of the cell of node k that lies below the reference level.
+fn below(nodes: &PatchNodes, k: usize, spacing: f64) -> f64 {
+    let [_, a, b] = nodes.facing[k].press;
+    let falls = (a.abs() + b.abs()) * spacing;
+    let depth = nodes.depth[k];
+    if 2.0 * depth.abs() >= falls { f64::from(u8::from(depth > 0.0)) } else { 0.5 + depth / falls }
+}

@@ -1,0 +1,328 @@
+//! Passive earth pressure: what the soil beside a contact answers when the contact is pushed sideways.
+//!
+//! The sides of a foot that stands in the soil are walls. A wall that is pushed against the soil meets the passive pressure
+//! a + b·z of Rankine (1857), which is built up like friction: elastic over the way w₀, then it yields. A wall that is pushed
+//! obliquely meets the part n·e of it, with n the normal of the wall and e the way over w₀; a contact that was pressed straight
+//! down has no way to the side and meets none of it. The same way mobilises the passive pressure on inclined undersides.
+
+use crate::assemble::{displacement, dot};
+use crate::patch::PatchNodes;
+use terraglue_ground::Lattice;
+use terraglue_subsystem::Port;
+
+/// How far a contact has pushed the soil beside it, elastically. Part of the committed state.
+#[derive(Clone, Copy, Debug, PartialEq, Default)]
+pub struct Push {
+    /// Key of the port.
+    pub key: u64,
+    /// Elastic way over the way at which the soil yields: world x and y, and rotation about the vertical times the radius of
+    /// gyration of the sides; at most of length 1.
+    pub mobilised: [f64; 3],
+    /// Elastic energy, J.
+    pub energy: f64,
+}
+
+/// A side of a contact in the soil.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Side {
+    /// Outward normal, world x and y, of unit length, and its lever arm about the vertical over the radius of gyration.
+    pub normal: [f64; 3],
+    /// Force of the whole passive pressure, N.
+    pub force: f64,
+}
+
+/// The sides of one contact during a step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Wall {
+    /// Its sides in [`crate::patch::Patches::sides`].
+    pub sides: std::ops::Range<usize>,
+    /// Way at which the soil yields, m.
+    pub way: f64,
+    /// Point at which the resultant acts and whose motion pushes, from the port's origin along n, t1, t2, m.
+    pub arm: [f64; 3],
+    /// World x and y of the directions n, t1, t2.
+    pub axes: [[f64; 2]; 3],
+    /// Radius of gyration of the sides about the vertical through that point, m.
+    pub gyration: f64,
+    /// World z of the directions n, t1, t2.
+    up: [f64; 3],
+    /// As of the last commit.
+    pub before: Push,
+}
+
+/// What the soil beside a contact answers.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Answer {
+    /// Force on the body, world x and y, N, and moment about the vertical over the radius of gyration.
+    pub force: [f64; 3],
+    /// d(force on the soil)/d(way), N/m.
+    pub stiffness: [[f64; 3]; 3],
+    /// The new elastic way over that of yielding.
+    pub mobilised: [f64; 3],
+}
+
+impl Wall {
+    /// No sides.
+    pub fn none(port: &Port, before: Push) -> Self {
+        let axes = [0, 1, 2].map(|c| {
+            let [x, y, _] = port.direction(c);
+            [x, y]
+        });
+        let up = [0, 1, 2].map(|c| port.direction(c)[2]);
+        Self { sides: 0..0, way: 1.0, arm: [0.0; 3], axes, gyration: 0.0, up, before }
+    }
+
+    /// Way of the sides for a motion `x` (n, t1, t2 and rotations) of the port: see [`Push::mobilised`].
+    pub fn way_of(&self, x: &[f64; 6]) -> [f64; 3] {
+        let [u, v] = self.in_world(displacement(self.arm, x));
+        let turn = x[3..].iter().zip(&self.up).map(|(w, up)| w * up).sum::<f64>();
+        [u, v, self.gyration * turn]
+    }
+
+    /// Horizontal world components of a vector along n, t1, t2.
+    fn in_world(&self, v: [f64; 3]) -> [f64; 2] {
+        [0, 1].map(|k| v.iter().zip(&self.axes).map(|(v, axis)| v * axis[k]).sum())
+    }
+
+    /// Derivative of the way by the motion of the port: a row of six for each of its components.
+    fn gradient(&self) -> [[f64; 6]; 3] {
+        let unit = |c: usize| std::array::from_fn(|k| f64::from(u8::from(k == c)));
+        let columns: [[f64; 3]; 6] = std::array::from_fn(|c| self.way_of(&unit(c)));
+        std::array::from_fn(|r| std::array::from_fn(|c| columns[c][r]))
+    }
+
+    /// The answer to a way `u` (see [`Wall::way_of`]) since the last commit.
+    pub fn answer(&self, sides: &[Side], u: [f64; 3]) -> Answer {
+        let trial = [0, 1, 2].map(|k| self.before.mobilised[k] + u[k] / self.way);
+        let length = trial.iter().map(|t| t * t).sum::<f64>().sqrt();
+        let yields = length > 1.0;
+        let scale = if yields { 1.0 / length } else { 1.0 };
+        let e = trial.map(|t| scale * t);
+        let mut out = Answer { mobilised: e, ..Answer::default() };
+        let mut by_e = [[0.0; 3]; 3];
+        for side in &sides[self.sides.clone()] {
+            let n = side.normal;
+            let pushed = dot(n, e);
+            if pushed > 0.0 {
+                for r in 0..3 {
+                    out.force[r] -= side.force * pushed * n[r];
+                    (0..3).for_each(|c| by_e[r][c] += side.force * n[r] * n[c]);
+                }
+            }
+        }
+        // d(e)/d(u): the identity, or what is left of it across e, over the way
+        let own = scale / self.way;
+        let de: [[f64; 3]; 3] = std::array::from_fn(|r| {
+            std::array::from_fn(|c| {
+                let one = f64::from(u8::from(r == c));
+                own * (one - if yields { e[r] * e[c] } else { 0.0 })
+            })
+        });
+        out.stiffness = std::array::from_fn(|r| {
+            std::array::from_fn(|c| (0..3).map(|k| by_e[r][k] * de[k][c]).sum())
+        });
+        out
+    }
+
+    /// Wrench on the body of a force of the sides, along n, t1, t2 and about them.
+    pub fn wrench(&self, answer: &Answer) -> [f64; 6] {
+        let gradient = self.gradient();
+        std::array::from_fn(|c| (0..3).map(|r| gradient[r][c] * answer.force[r]).sum())
+    }
+
+    /// d(wrench on the soil)/d(motion of the port).
+    pub fn stiffness(&self, answer: &Answer) -> [[f64; 6]; 6] {
+        let (g, k) = (self.gradient(), &answer.stiffness);
+        std::array::from_fn(|r| {
+            std::array::from_fn(|c| {
+                (0..3).map(|a| (0..3).map(|b| g[a][r] * k[a][b] * g[b][c]).sum::<f64>()).sum()
+            })
+        })
+    }
+
+    /// Elastic energy at the elastic way `e` over that of yielding, J.
+    pub fn energy(&self, sides: &[Side], e: [f64; 3]) -> f64 {
+        let each = |side: &Side| {
+            let pushed = dot(side.normal, e).max(0.0);
+            0.5 * side.force * self.way * pushed * pushed
+        };
+        sides[self.sides.clone()].iter().map(each).sum()
+    }
+
+    /// Gives the sides, which lie at `places` (world x and y from the port), their lever arms; `sum`: of their forces, N.
+    fn turn_about_middle(&mut self, sides: &mut [Side], places: &[[f64; 2]], sum: f64) {
+        let middle = self.in_world(self.arm);
+        let lever = |side: &Side, at: &[f64; 2]| {
+            (at[0] - middle[0]) * side.normal[1] - (at[1] - middle[1]) * side.normal[0]
+        };
+        let squares = |(side, at): (&Side, &[f64; 2])| {
+            let r = [at[0] - middle[0], at[1] - middle[1]];
+            side.force * (r[0] * r[0] + r[1] * r[1])
+        };
+        self.gyration = (sides.iter().zip(places).map(squares).sum::<f64>() / sum).sqrt();
+        if self.gyration > 0.0 {
+            for (side, at) in sides.iter_mut().zip(places) {
+                side.normal[2] = lever(side, at) / self.gyration;
+            }
+        }
+    }
+
+    /// Whether there is anything to answer.
+    pub fn is_empty(&self) -> bool {
+        self.sides.is_empty()
+    }
+
+    /// Passive pressure on an underside with the inward normal `nu` (along n, t1, t2), as a part of the whole.
+    pub fn share(&self, nu: [f64; 3]) -> f64 {
+        let [x, y] = self.in_world(nu);
+        let [a, b, _] = self.before.mobilised;
+        (-x * a - y * b).max(0.0)
+    }
+}
+
+/// The ground beside a contact.
+pub struct Beside<'a> {
+    /// Where its nodes lie.
+    pub lattice: &'a Lattice,
+    /// World height of the bed at a node and height of the loose soil on it, m.
+    pub levels: &'a dyn Fn(i32, i32) -> [f64; 2],
+    /// a and b of the passive stress of the soil, Pa and Pa/m.
+    pub passive: [f64; 2],
+    /// Stiffness of the soil, Pa/m.
+    pub stiffness: f64,
+}
+
+/// Gathers the sides of the contact whose nodes are `range`: where the covered part of the cells falls from a node to its
+/// neighbour and soil stands above the underside. The parts of a node make one side, so that the normal follows the
+/// outline and not the lattice. `n_z`: of the port's normal; `pressed`: pressure at a node over that at which it yields: where
+/// the underside rises again, as behind the lowest line of a wheel, it leaves the soil that the sides have pushed away.
+pub fn gather(
+    nodes: &PatchNodes,
+    range: std::ops::Range<usize>,
+    n_z: f64,
+    beside: &Beside,
+    pressed: impl Fn(usize) -> f64,
+    rows: &mut Rows,
+    sides: &mut Vec<Side>,
+    wall: &mut Wall,
+) {
+    let first = sides.len();
+    let spacing = beside.lattice.spacing;
+    rows.list(nodes, range.clone());
+    rows.places.clear();
+    let (mut arm, mut sum, mut face) = ([0.0; 3], 0.0, 0.0);
+    let covered = |k: Option<usize>| k.map_or(0.0, |k| nodes.area[k] * n_z / (spacing * spacing));
+    for k in range {
+        let part = pressed(k);
+        if part <= 0.0 || nodes.area[k] <= 0.0 {
+            continue;
+        }
+        let [i, j] = nodes.index[k];
+        let lower = nodes.reference[k] - nodes.depth[k] / n_z;
+        let own = covered(Some(k));
+        let mut vector = [0.0; 2];
+        let (mut height, mut loose) = (0.0, 0.0);
+        for [di, dj] in [[1, 0], [-1, 0], [0, 1], [0, -1]] {
+            let next = rows.find(nodes, [i + di, j + dj]);
+            let outside = own - covered(next);
+            // soil in a cell that is covered in part stands as high as it did before it was pressed
+            let [bed, on_bed] =
+                next.map_or_else(|| (beside.levels)(i + di, j + dj), |k| [nodes.reference[k], 0.0]);
+            let above = bed - lower;
+            if outside > 0.0 && above > 0.0 {
+                let face = outside * spacing;
+                vector = [vector[0] + face * f64::from(di), vector[1] + face * f64::from(dj)];
+                height += face * above;
+                loose += face * on_bed;
+            }
+        }
+        let length = (vector[0] * vector[0] + vector[1] * vector[1]).sqrt();
+        if length <= 1e-9 * spacing {
+            continue;
+        }
+        let parts = vector[0].abs() + vector[1].abs();
+        let [h, on_bed] = [height, loose].map(|sum| sum / parts);
+        let [a, b] = beside.passive;
+        // loose soil weighs on the bed and has no cohesion of its own
+        let a = a + b * on_bed;
+        let force = part * length * h * (a + 0.5 * b * h);
+        let [x, y] = vector.map(|v| v / length);
+        sides.push(Side { normal: [x, y, 0.0], force });
+        rows.places.push(wall.in_world(nodes.arm[k]));
+        let up = if a + b * h > 0.0 { h * (3.0 * a + b * h) / (6.0 * a + 3.0 * b * h) } else { 0.0 };
+        let at = nodes.arm[k];
+        arm = [arm[0] + force * (at[0] + up * n_z), arm[1] + force * at[1], arm[2] + force * at[2]];
+        (sum, face) = (sum + force, face + part * length * h);
+    }
+    wall.sides = first..sides.len();
+    if sum > 0.0 {
+        wall.arm = arm.map(|a| a / sum);
+        wall.way = sum / face / beside.stiffness;
+        wall.turn_about_middle(&mut sides[first..], &rows.places, sum);
+    }
+}
+
+/// Where the rows of a patch begin; the storage is reused.
+#[derive(Clone, Debug, Default)]
+pub struct Rows {
+    /// Index along y of the first row.
+    first: i32,
+    /// First node of each row, and one past the last node.
+    begins: Vec<usize>,
+    /// Where the sides of a contact lie, world x and y from the port, m.
+    places: Vec<[f64; 2]>,
+}
+
+impl Rows {
+    fn list(&mut self, nodes: &PatchNodes, range: std::ops::Range<usize>) {
+        self.begins.clear();
+        self.first = nodes.index.get(range.start).map_or(0, |at| at[1]);
+        for k in range.clone() {
+            // a row without nodes is empty
+            while self.first + self.begins.len() as i32 <= nodes.index[k][1] {
+                self.begins.push(k);
+            }
+        }
+        self.begins.push(range.end);
+    }
+
+    /// The node at an index.
+    fn find(&self, nodes: &PatchNodes, at: [i32; 2]) -> Option<usize> {
+        let row = usize::try_from(at[1] - self.first).ok()?;
+        let range = *self.begins.get(row)?..*self.begins.get(row + 1)?;
+        let begin = nodes.index.get(range.start)?[0];
+        // mostly the nodes of a row follow one after the other
+        let guess = range.start.checked_add_signed((at[0] - begin) as isize);
+        match guess.filter(|g| range.contains(g) && nodes.index[*g] == at) {
+            Some(guess) => Some(guess),
+            None => nodes.index[range.clone()].iter().position(|index| *index == at).map(|k| range.start + k),
+        }
+    }
+}
+
+/// Keeps how far a contact has pushed, in ascending order of keys.
+pub fn remember(pushes: &mut Vec<Push>, new: Push) {
+    match pushes.binary_search_by_key(&new.key, |p| p.key) {
+        Ok(k) => pushes[k] = new,
+        Err(k) => pushes.insert(k, new),
+    }
+}
+
+/// How far the contact `key` has pushed so far.
+pub fn recall(pushes: &[Push], key: u64) -> Push {
+    let found = pushes.binary_search_by_key(&key, |p| p.key);
+    found.map_or(Push { key, ..Push::default() }, |k| pushes[k])
+}
+
+/// Forgets the contacts that have left the soil; what their soil held elastically becomes heat, J.
+pub fn release(pushes: &mut Vec<Push>, touching: impl Fn(u64) -> bool) -> f64 {
+    let mut heat = 0.0;
+    pushes.retain(|p| {
+        let stays = touching(p.key);
+        heat += if stays { 0.0 } else { p.energy };
+        stays
+    });
+    heat
+}
+
+terraglue_subsystem::persist!(Push { key, mobilised, energy });

@@ -1,0 +1,89 @@
+//! What a node bears: the pressure law where the face is level and nothing but the foot's weight acts, less on inclined faces
+//! and under shear, more where it is pushed sideways; and soil that was poured on the bed.
+//!
+//! The soil is elastic, p = k_u·(z − z₀) above its unloaded surface at the depth z₀, up to the pressure at which it yields:
+//! p ≤ s·V(z) + a + b·z. V is first loading of the bed (Bekker 1956 and others), elastic up to where it was pressed before; or,
+//! where it lies on the bed, of loose soil, whose modulus is a part κ of the bed's (Terzaghi 1943, art. 46): the larger of both.
+
+use crate::patch::{Local, Patches};
+
+impl Patches {
+    /// Pressure (Pa) at which node k yields at the depth z (m), and its slope (Pa/m).
+    #[inline]
+    pub fn yields(&self, k: usize, z: f64) -> (f64, f64) {
+        let law = self.law(k);
+        let p = law.curve.virgin(z);
+        let bed = (p, law.curve.virgin_slope(z, p));
+        let loose = self.nodes.above_bed(k, z).map(|d| {
+            let p = law.curve.virgin(d);
+            (p, law.curve.virgin_slope(d, p))
+        });
+        self.yields_from(k, z, bed, loose, law)
+    }
+
+    /// The same where first loading of the bed, and of a bed in the place of the loose soil, are known.
+    #[inline]
+    pub fn yields_from(
+        &self,
+        k: usize,
+        z: f64,
+        bed: (f64, f64),
+        loose: Option<(f64, f64)>,
+        law: &Local,
+    ) -> (f64, f64) {
+        let n = &self.nodes;
+        let (mut p, mut slope) = bed;
+        if let Some((p_loose, slope_loose)) = loose {
+            let k_u = law.curve.unloading();
+            let elastic = k_u * (z - n.bed[k]);
+            if elastic < p {
+                (p, slope) = if elastic > 0.0 { (elastic, k_u) } else { (0.0, 0.0) };
+            }
+            if law.loose * p_loose > p {
+                (p, slope) = (law.loose * p_loose, law.loose * slope_loose);
+            }
+        }
+        let (share, [a, b]) = (n.share[k], n.passive[k]);
+        if a + b == 0.0 || z <= 0.0 {
+            return (share * p, share * slope);
+        }
+        (share * p + a + b * z, share * slope + b)
+    }
+
+    /// Pressure at node k when the foot is at depth z there, and its slope. Soil that was in contact and clings follows the
+    /// elastic line below zero down to the tension that it bears, then lets go.
+    #[inline]
+    pub fn pressure(&self, k: usize, z: f64) -> (f64, f64) {
+        let (n, k_u) = (&self.nodes, self.law(k).curve.unloading());
+        let elastic = k_u * (z - n.permanent[k]);
+        if elastic <= 0.0 {
+            return self.clinging_at(k, z);
+        }
+        if elastic <= n.bound[k] {
+            return (elastic, k_u);
+        }
+        let yields = self.yields(k, z);
+        if elastic <= yields.0 { (elastic, k_u) } else { yields }
+    }
+
+    /// Tension at node k above the unloaded surface, Pa (< 0), and its slope.
+    #[inline]
+    pub fn clinging_at(&self, k: usize, z: f64) -> (f64, f64) {
+        let (n, law) = (&self.nodes, self.law(k));
+        if law.adhesion == 0.0 || n.stamp[k] == 0 {
+            return (0.0, 0.0);
+        }
+        let stiffness = law.curve.unloading();
+        let tension = stiffness * (n.permanent[k] - z);
+        if tension <= law.adhesion { (-tension, stiffness) } else { (0.0, 0.0) }
+    }
+}
+
+impl crate::patch::PatchNodes {
+    /// Depth z (m) of the foot at node k below the top of the loose soil that lay on the bed; `None`: there was none.
+    #[inline]
+    pub fn above_bed(&self, k: usize, z: f64) -> Option<f64> {
+        let loose = self.loose[k];
+        (loose > 0.0).then(|| z - self.bed[k] + loose)
+    }
+}

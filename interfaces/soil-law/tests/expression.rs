@@ -13,7 +13,7 @@ fn texts(law: serde_json::Value) -> Result<SoilExpressions, String> {
 }
 
 fn refusal(law: serde_json::Value) -> String {
-    let soil = SoilParameters::default();
+    let soil = SoilParameters { elastic_stiffness_pa_m: Some(4e8), ..SoilParameters::default() };
     let made = texts(law).and_then(|t| {
         t.pressure(&soil).map_err(|e| e.to_string())?;
         t.shear(&soil).map_err(|e| e.to_string())

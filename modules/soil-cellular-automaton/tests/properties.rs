@@ -36,9 +36,9 @@ proptest! {
     fn bodies_pressed_and_dragged_keep_mass_slopes_and_sense(
         seed in 1..u64::MAX, kinds in prop::collection::vec(0..5u32, 1..4), row in 0..4usize, level in any::<bool>(),
     ) {
-        let config = [LUNAR, LETE, DRY_SAND, SMOOTH][row];
+        let config = [LUNAR, LETE, DRY_SAND, SMOOTH][row].replacen('{', r#"{"critical_height_m":0.0,"#, 1);
         let phi = [35.0, 31.1, 28.0, 35.0][row];
-        let mut rig = Feet::new(instance::<SoilCellularAutomaton>(config, ground(61, if level { flat } else { bumpy })));
+        let mut rig = Feet::new(instance::<SoilCellularAutomaton>(&config, ground(61, if level { flat } else { bumpy })));
         let mut wanderers = Vec::new();
         for (k, kind) in kinds.iter().enumerate() {
             let wanderer = Wanderer::new(seed ^ k as u64, 0.27, 0.02);

@@ -9,7 +9,6 @@ use super::program::Program;
 use super::range;
 use super::symbol::{Role, Symbol};
 use crate::parameters::SoilParameters;
-use crate::pressure::PressureLaw;
 use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};
 
 /// Depths for which a pressure law must make sense, m.
@@ -179,8 +178,7 @@ impl SoilExpressions {
         ];
         let law = self.checked(text, &variables, p).and_then(|(tree, symbols)| {
             let law = compile(&tree, &symbols)?;
-            let own = || PressureLaw::Expression(law.clone()).unloading();
-            physical_pressure(&tree, &law, p.elastic_stiffness_pa_m.unwrap_or_else(own))?;
+            physical_pressure(&tree, &law, p.elastic_stiffness_pa_m)?;
             Ok(law)
         });
         law.map(Some).map_err(|e| refuse("law.pressure", &e))
@@ -272,11 +270,11 @@ fn points(range: [f64; 2], count: usize) -> impl Iterator<Item = f64> {
 }
 
 /// Soil never pulls, its pressure never falls with the depth (the depth under a force would not be unique), and it
-/// is softer in first loading than in unloading once the law has left the elastic line.
+/// is softer in first loading than in unloading once the law has left the elastic line, where `k_u` (Pa/m) is given.
 fn physical_pressure(
     tree: &Tree,
     law: &PressureExpression,
-    k_u: f64,
+    k_u: Option<f64>,
 ) -> std::result::Result<(), Box<ExpressionError>> {
     let whole = |message: String| tree.error(tree.root(), message);
     for b in points(SIZES, 6) {
@@ -301,10 +299,12 @@ fn physical_pressure(
             }
             before = (z, p);
         }
-        let (last, limit) = (at.eval([DEPTHS[1]]).0, curve::elastic_limit(&|z| at.depth(z), k_u));
+        let last = at.eval([DEPTHS[1]]).0;
         if last <= 0.0 {
             return Err(whole(format!("the pressure is 0 down to z = {} m at b = {b:.4} m", DEPTHS[1])));
         }
+        let Some(k_u) = k_u else { continue };
+        let limit = curve::elastic_limit(&|z| at.depth(z), k_u);
         if limit > 0.1 {
             return Err(whole(format!(
                 "the law is stiffer than unloading ({k_u} Pa/m) down to z = {limit:.3} m at b = {b:.4} m"

@@ -1,7 +1,7 @@
 //! Finds the ports of a step: broad phase on boxes and tiles, then frame and nodes of each patch.
 
 use super::frame::{Patch, extent, mask};
-use super::ground::{Bounds, Ground, Reader};
+use super::ground::{Bounds, Cut, Ground, Reader};
 use super::port_set::{PortOwner, PortSet, port_key};
 use crate::error::{Error, Result};
 use parry3d_f64::bounding_volume::Aabb;
@@ -196,6 +196,7 @@ impl Bodies {
             if !self.is_over(now, shape, reader, &swept)? || !bounds.meets(reader, &swept) {
                 continue;
             }
+            self.is_carried(now, shape, reader)?;
             let first_node = set.nodes.len();
             let Some(port) = shape.port(reader, reach, &mut set.nodes) else { continue };
             let node_count = (set.nodes.len() - first_node) as u32;
@@ -209,6 +210,23 @@ impl Bodies {
             set.owners.push(owner);
         }
         Ok(())
+    }
+
+    /// An error where a shape is buried by more than its own height: what then lies on top of it no soil knows.
+    fn is_carried(&self, now: &Now, shape: &Shape, reader: &Reader) -> Result<()> {
+        let [x, y, _] = shape.bounds.centre();
+        let [i, j] = reader.lattice().coordinates(x, y).map(|c| c.round() as i32);
+        let level = reader.undisturbed().height(i, j);
+        let (height, covered) = (shape.bounds.max[2] - shape.bounds.min[2], level - shape.bounds.max[2]);
+        if covered <= height {
+            return Ok(());
+        }
+        let message = format!(
+            "`{}` of {} is buried: the ground at x = {x:.3} m, y = {y:.3} m was {covered:.3} m above its top, and it is \
+             {height:.3} m high; the ground is too weak for its load (take a stronger soil or a larger foot), or it starts below it",
+            shape.name, self.name
+        );
+        Err(failed(now, message))
     }
 
     /// Whether the middle of a shape lies over the ground; an error where it does not and is so low that it
@@ -263,7 +281,7 @@ impl Shape {
         let patch = Patch::find(&self.placed, &self.bounds, &reader.undisturbed(), reader);
         let vertical = patch.vertical(reach);
         let first = nodes.len();
-        nodes_below(&self.placed, reader, vertical, nodes);
+        nodes_below(&self.placed, &Cut(reader), vertical, nodes);
         if nodes.len() == first && patch.origin[2] < patch.ground + vertical {
             nodes.extend(self.node_between(reader, &patch));
         }

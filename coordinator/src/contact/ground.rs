@@ -231,6 +231,23 @@ impl Surface for Undisturbed<'_, '_> {
     }
 }
 
+/// The ground where it is higher: now, or before anything pressed it.
+///
+/// A node that a body has pressed below itself still belongs to the cut that the body stands in: the size of a contact is
+/// that of the cut, not of the part that bears in this step.
+pub struct Cut<'r, 'a>(pub &'r Reader<'a>);
+
+impl Surface for Cut<'_, '_> {
+    fn lattice(&self) -> &Lattice {
+        self.0.lattice
+    }
+
+    #[inline]
+    fn height(&self, i: i32, j: i32) -> f64 {
+        self.0.height(i, j).max(self.0.undisturbed().height(i, j))
+    }
+}
+
 /// Bounds of tiles, valid as long as the tile's generation stays.
 pub struct Bounds<'a> {
     tiles: &'a mut [Bound],

@@ -9,7 +9,9 @@ pub fn wheel_toml(fit: &WheelFit, seen: &[WheelPoint], source: &str) -> String {
     let [sinkage, pull] = fit.errors(seen);
     let mut text = format!(
         "# {source}\n# largest errors over {} slips: sinkage {:.1} %, drawbar pull {pull:.2} N; intervals: each slip left out in \
-         turn\n\n[soil]\npressure_law = \"bekker\"\nk_c = 0.0\nslip_sinkage = \"ding\"\n",
+         turn\n\n[soil]\npressure_law = \"bekker\"\nk_c = 0.0\nslip_sinkage = \"ding\"\n\
+         # the integral knows the depth alone, and digs by Ding's exponent\nslope_factor = false\nload_inclination = false\n\
+         passive_pressure = false\n",
         seen.len(),
         100.0 * sinkage
     );

@@ -1,8 +1,12 @@
 //! Area `soil`: what both soils promise, part by part.
 
 mod automaton;
+mod drive;
+mod energy;
 mod fit;
+mod moves;
 mod panel;
+mod plate_wheel;
 mod plates;
 mod real_wheel;
 #[path = "../../../../interfaces/soil-contact/tests/support/mod.rs"]
@@ -24,11 +28,14 @@ use terraglue_soil_bekker::SoilBekker;
 use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
 
 /// The parts, in the order of the table.
-pub const PARTS: [Part; 8] = [
+pub const PARTS: [Part; 11] = [
     ("automaton", automaton::figures),
     ("cost", automaton::cost),
     ("plates", plates::figures),
     ("fit", fit::figures),
+    ("plate-wheel", plate_wheel::figures),
+    ("moves", moves::figures),
+    ("energy", energy::figures),
     ("wheels", wheels::figures),
     ("rig-scenario", rig_scenario::figures),
     ("stick", stick::figures),

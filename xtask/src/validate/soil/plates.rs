@@ -27,7 +27,9 @@ fn shapes() -> [(&'static str, Geometry, f64, f64); 6] {
         )
     };
     let rectangle = |name, a: f64, b: f64| {
-        (name, Geometry::Box { half_extents: [0.5 * a, 0.5 * b, 0.1] }, a.min(b), a * b)
+        // the disc of equal area, or that which bears what an endless strip as broad does (Terzaghi 1943)
+        let size = (a * b / std::f64::consts::PI).sqrt().min(5.0 / 6.0 * a.min(b));
+        (name, Geometry::Box { half_extents: [0.5 * a, 0.5 * b, 0.1] }, size, a * b)
     };
     [
         disc("disc_r3cm", 0.03),
@@ -68,7 +70,7 @@ impl Case {
     /// Half the width of the plate over the spacing.
     fn resolution(&self) -> f64 {
         let (_, geometry, b, _) = shapes()[self.shape].clone();
-        let half = if matches!(geometry, Geometry::Box { .. }) { 0.5 * b } else { b };
+        let half = if let Geometry::Box { half_extents: [x, y, _] } = geometry { x.min(y) } else { b };
         half / self.spacing
     }
 

@@ -22,7 +22,8 @@ const START: WheelStart = WheelStart { n: 1.46, k_phi: 8e6 };
 fn config(fit: &WheelFit, keys: &str) -> String {
     let numbers: Vec<String> = fit.numbers.iter().map(|n| format!(r#""{}":{},"#, n.key, n.value)).collect();
     format!(
-        r#"{{{}"k_c":0.0,"c_pa":1000.0,"phi_rad":0.506145483078,"density_kg_m3":1330.0,"slip_sinkage":"ding"{keys}}}"#,
+        r#"{{{}"k_c":0.0,"c_pa":1000.0,"phi_rad":0.506145483078,"density_kg_m3":1330.0,"slip_sinkage":"ding",
+            "slope_factor":false,"load_inclination":false,"passive_pressure":false{keys}}}"#,
         numbers.concat()
     )
 }

@@ -3,8 +3,11 @@
 use crate::process::{Outcome, read, root};
 use terraglue_soil_law::{COLUMNS, SoilTable};
 
-/// Stiffness of unloading of the protocols, Pa/m.
-pub const DEFAULT_ELASTIC_STIFFNESS: f64 = 4e8;
+/// Stiffness of unloading of closed forms and integrals, Pa/m.
+pub const STIFF: f64 = 4e8;
+
+/// Keys of a soil whose pressure follows the depth alone, whatever the slope, the shear and the way of the body.
+const BY_DEPTH: &str = r#""slope_factor":false,"load_inclination":false,"passive_pressure":false,"elastic_stiffness_pa_m":4e8"#;
 
 /// Row of the table, and the short name under which the reference data know the soil.
 pub const EIGHT: [(&str, &str); 8] = [
@@ -23,8 +26,10 @@ pub const EIGHT: [(&str, &str); 8] = [
 pub struct Row {
     /// Short name.
     pub name: &'static str,
-    /// As a module's parameters, JSON.
+    /// As a module's parameters, JSON: pressure by the depth alone, as closed forms and integrals have it.
     pub config: String,
+    /// As a module's parameters with all defaults, JSON.
+    pub own: String,
     values: [f64; COLUMNS.len()],
 }
 
@@ -37,6 +42,18 @@ impl Row {
     /// The configuration with more keys, written as JSON.
     pub fn with(&self, keys: &str) -> String {
         self.config.replacen('{', &format!("{{{keys},"), 1)
+    }
+
+    /// The same soil for contacts of one size b (m), as integrals have it.
+    pub fn of_size(&self, b: f64) -> Self {
+        let modulus = format!(r#""k_c":0.0,"k_phi":{:?},"#, self.modulus(b));
+        let take = |text: &str| {
+            let mut keys: serde_json::Map<String, serde_json::Value> = serde_json::from_str(text).unwrap_or_default();
+            keys.remove("k_c");
+            keys.remove("k_phi");
+            serde_json::Value::Object(keys).to_string().replacen('{', &format!("{{{modulus}"), 1)
+        };
+        Self { config: take(&self.config), own: take(&self.own), ..self.clone() }
     }
 
     /// k_c/b + k_φ of Bekker's law, Pa/mⁿ.
@@ -54,7 +71,7 @@ impl Row {
     pub fn depth(&self, p: f64, b: f64) -> f64 {
         let n = self.value("n");
         let law = (p / self.modulus(b)).powf(1.0 / n);
-        if n < 1.0 { law.max(p / DEFAULT_ELASTIC_STIFFNESS) } else { law }
+        if n < 1.0 { law.max(p / STIFF) } else { law }
     }
 }
 
@@ -68,5 +85,6 @@ fn of(table: &SoilTable, row: &str, name: &'static str) -> Outcome<Row> {
     let offered = table.row(row).and_then(|r| r.offered(&[])).map_err(|e| e.to_string())?;
     let values = COLUMNS.map(|c| offered.iter().find(|(k, _)| *k == c).map_or(f64::NAN, |(_, v)| *v));
     let config: serde_json::Map<_, _> = offered.into_iter().map(|(k, v)| (k.to_owned(), v.into())).collect();
-    Ok(Row { name, config: serde_json::Value::Object(config).to_string(), values })
+    let own = serde_json::Value::Object(config).to_string();
+    Ok(Row { name, config: own.replacen('{', &format!("{{{BY_DEPTH},"), 1), own, values })
 }

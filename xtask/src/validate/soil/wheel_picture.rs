@@ -10,7 +10,7 @@ use crate::process::{Outcome, root, write};
 use std::borrow::{Borrow, BorrowMut};
 use std::fmt::Write;
 use terraglue::soil_fit::Rim;
-use super::rows::DEFAULT_ELASTIC_STIFFNESS;
+use super::rows::STIFF;
 use terraglue_soil_law::ShearLaw;
 use terraglue_subsystem::Subsystem;
 
@@ -52,7 +52,7 @@ fn drive(config: &str) -> Contact {
     let mut bench = Bench::new(open, WHEEL, LOAD, -0.5 * WAY);
     let sinkage = bench.drive(SLIP, WAY, 0.02).sinkage;
     let ground = bench.soil.0.ground();
-    let law = ShearLaw::new(0.0, 0.5, 1.0, DEFAULT_ELASTIC_STIFFNESS);
+    let law = ShearLaw::new(0.0, 0.5, 1.0, STIFF);
     let lattice = *ground.heights.lattice();
     let all = (0..size as i32).flat_map(|j| (0..size as i32).map(move |i| [i, j]));
     let nodes = all.filter_map(|[i, j]| {
@@ -159,7 +159,7 @@ pub fn write_picture() -> Outcome {
     let soil = soils.iter().find(|row| row.name == "lunar_nominal").ok_or("no lunar soil")?;
     let moving = drive(&soil.config);
     let denser = drive(&soil.with(STILL));
-    let wheel = Rim { unloading: DEFAULT_ELASTIC_STIFFNESS, ..wheel_on(soil, WHEEL, [0.0; 2]) };
+    let wheel = Rim { unloading: STIFF, ..wheel_on(soil, WHEEL, [0.0; 2]) };
     let mut out = String::from(
         "<svg xmlns='http://www.w3.org/2000/svg' viewBox='0 0 840 380' font-family='sans-serif' font-size='12'>\n\
          <rect width='840' height='380' fill='white'/>\n\

@@ -1,7 +1,7 @@
 //! Wheels: the soils against the integral of Wong and Reece over the same stresses, and against its shifted peak.
 
 use super::plates::Maker;
-use super::rows::{Row, eight};
+use super::rows::{Row, STIFF, eight};
 use super::wheel_rig::{Bench, Reading};
 use super::wong_reece::{wheel_of, wheel_on};
 use super::{MODULES, STILL, real_wheel};
@@ -10,7 +10,6 @@ use crate::validate::parallel::in_parallel;
 use crate::validate::{Context, Figure, Limit};
 use std::fmt;
 use terraglue::soil_fit::{Rim, Rolling};
-use super::rows::DEFAULT_ELASTIC_STIFFNESS;
 
 /// Spacing of the lattice, m, quickly and else: a contact of 2 cm spans eight cells.
 const SPACINGS: [f64; 2] = [0.005, 0.0025];
@@ -45,14 +44,14 @@ impl Case {
     fn expected(&self) -> Rolling {
         let [radius, width, load] = self.wheel;
         let wheel = wheel_on(&self.soil, [radius, width], self.peak);
-        Rim { unloading: DEFAULT_ELASTIC_STIFFNESS, ..wheel }.under(load, self.slip)
+        Rim { unloading: STIFF, ..wheel }.under(load, self.slip)
     }
 
     fn driven(&self) -> Reading {
         let [radius, width, load] = self.wheel;
         let [a0, a1] = self.peak;
         let still = if self.still { format!(",{STILL}") } else { String::new() };
-        let config = self.soil.with(&format!(r#""wheel_peak_a0":{a0},"wheel_peak_a1":{a1}{still}"#));
+        let config = self.soil.of_size(width).with(&format!(r#""wheel_peak_a0":{a0},"wheel_peak_a1":{a1}{still}"#));
         let soil = (self.make)(&config, (GROUND / self.spacing) as u32 + 1, self.spacing);
         Bench::new(soil, [radius, width], load, -0.5 * WAY).drive(self.slip, WAY, MEASURED)
     }

@@ -1,0 +1,179 @@
+//! The balance of energies of whole runs: a foot or a wheel on a rig of four joints is pressed, dragged, twisted, rolled and
+//! yawed on both soils, glued by four strategies, on three grids. Soil, bodies and motors must account for every joule: the
+//! drift is at most 1 % of the work of the motors.
+
+use crate::process::{Outcome, run_scenario, write};
+use crate::validate::parallel::in_parallel;
+use crate::validate::{Context, Figure, Limit};
+use serde_json::Value;
+
+const SOILS: [&str; 2] = ["soil-bekker", "soil-cellular-automaton"];
+const STRATEGIES: [&str; 4] = ["cooperative", "cooperative-compliant", "iterative", "xt-newton"];
+const ROWS: [&str; 4] = ["lunar_nominal_Apollo", "LETE_sand", "snow_US_Harrison", "clayey_Thai38"];
+const SPACINGS: [f64; 3] = [0.02, 0.01, 0.005];
+
+/// What the rig does.
+struct Way {
+    name: &'static str,
+    shape: &'static str,
+    /// Lowest point below the middle of the shape, m.
+    low: f64,
+    /// m/s, rad/s, rad/s.
+    travel: f64,
+    turn: f64,
+    roll: f64,
+    /// Angle between the plane of the wheel and the way, degrees.
+    yaw: f64,
+}
+
+const SPHERE: &str = r#"<sphere radius="0.03"/>"#;
+const BOX: &str = r#"<box size="0.08 0.05 0.04"/>"#;
+const WHEEL: &str = r#"<cylinder radius="0.092" length="0.107"/>"#;
+const fn foot(name: &'static str, shape: &'static str, low: f64, travel: f64, turn: f64) -> Way {
+    Way { name, shape, low, travel, turn, roll: 0.0, yaw: 0.0 }
+}
+/// A wheel at a slip (rolling radius 92 mm, 0.1 m/s) and a yaw.
+const fn wheel(name: &'static str, roll: f64, yaw: f64) -> Way {
+    Way { name, shape: WHEEL, low: 0.092, travel: 0.1, turn: 0.0, roll, yaw }
+}
+const WAYS: [Way; 11] = [
+    foot("press_sphere", SPHERE, 0.03, 0.0, 0.0),
+    foot("press_box", BOX, 0.02, 0.0, 0.0),
+    foot("drag_sphere", SPHERE, 0.03, 0.1, 0.0),
+    foot("drag_box", BOX, 0.02, 0.1, 0.0),
+    foot("twist_box", BOX, 0.02, 0.0, 1.0),
+    wheel("roll_braked", 0.1 * 0.5 / 0.092, 0.0),
+    wheel("roll_0", 0.1 / 0.092, 0.0),
+    wheel("roll_0.5", 0.1 / 0.5 / 0.092, 0.0),
+    wheel("roll_0.9", 0.1 / 0.1 / 0.092, 0.0),
+    wheel("yaw_15", 0.1 / 0.8 / 0.092, 15.0),
+    wheel("yaw_30", 0.1 / 0.8 / 0.092, 30.0),
+];
+
+struct Case {
+    way: usize,
+    soil: &'static str,
+    strategy: &'static str,
+    row: &'static str,
+    spacing: f64,
+}
+
+impl Case {
+    fn id(&self) -> String {
+        let millimetres = (1e3 * self.spacing).round();
+        format!("{}.{}.{}.{}.{millimetres}mm", WAYS[self.way].name, self.soil, self.strategy, self.row)
+    }
+
+    fn run(&self, context: &Context) -> Outcome<Value> {
+        let (way, id) = (&WAYS[self.way], self.id());
+        let folder = context.scratch.join(format!("energy.{id}"));
+        write(&folder.join("rig.urdf"), &way.model())?;
+        write(&folder.join("rig.toml"), &self.scenario())?;
+        let scenario = folder.join("rig.toml").display().to_string();
+        run_scenario(&context.program, &id, &scenario, &folder.join("out"), &[])
+    }
+
+    fn scenario(&self) -> String {
+        let Way { low, travel, turn, roll, .. } = WAYS[self.way];
+        // 20 N on a foot, 64.7 N on a wheel: weak snow carries a foot of 20 N no deeper than its height
+        let load = if WAYS[self.way].shape == WHEEL { 64.7 } else { 20.0 } - 9.81;
+        // k_u of snow: Wong (2008) gives A_u = 109.6 MPa/m² at 2 cm
+        let stiff = if self.row.starts_with("snow") { "elastic_stiffness_pa_m = 2.2e6\n" } else { "" };
+        format!(
+            "[time]\nstep_s = 0.001\nduration_s = 0.6\n[world]\ngravity_m_s2 = [0.0, 0.0, -9.81]\n\
+             [terrain]\nkind = \"flat\"\nsize_m = [0.8, 0.6]\nspacing_m = {:?}\n[gluing]\nstrategy = \"{}\"\n\
+             [soil]\nmodule = \"{}\"\nparameters = \"{}\"\n{stiff}\
+             [rig]\nmodule = \"rigid-body\"\nmodel = \"rig.urdf\"\nposition_m = [-0.1, 0.0013, {low:?}]\nfixed_base = true\n\
+             motor = {{ travel = \"velocity\", press = \"torque\", turn = \"velocity\", roll = \"velocity\" }}\n\
+             max_torque = 5000.0\nvelocity_target = {{ travel = {travel:?}, turn = {turn:?}, roll = {roll:?} }}\n\
+             torque_target = {{ press = {load:?} }}\n",
+            self.spacing, self.strategy, self.soil, self.row
+        )
+    }
+}
+
+impl Way {
+    /// A carriage along x, a fork that slides down, a mount that turns about z, and the shape that rolls about its y axis.
+    fn model(&self) -> String {
+        let link = |name: &str, mass: f64, more: &str| {
+            format!(
+                r#"<link name="{name}"><inertial><mass value="{mass}"/><inertia ixx="0.002" ixy="0" ixz="0" iyy="0.002" iyz="0"
+                izz="0.002"/></inertial>{more}</link>"#
+            )
+        };
+        let joint = |name: &str, kind: &str, [parent, child]: [&str; 2], axis: &str, yaw: f64| {
+            format!(
+                r#"<joint name="{name}" type="{kind}"><parent link="{parent}"/><child link="{child}"/><origin rpy="0 0 {yaw}"/>
+                <axis xyz="{axis}"/><limit lower="-10" upper="10" effort="5000" velocity="100"/></joint>"#
+            )
+        };
+        let lying = if self.shape == WHEEL { "1.5707963267948966 0 0" } else { "0 0 0" };
+        let shape =
+            format!(r#"<collision><origin rpy="{lying}"/><geometry>{}</geometry></collision>"#, self.shape);
+        [
+            r#"<robot name="rig"><link name="frame"/>"#.to_owned(),
+            joint("travel", "prismatic", ["frame", "carriage"], "1 0 0", 0.0),
+            link("carriage", 2.0, ""),
+            joint("press", "prismatic", ["carriage", "fork"], "0 0 -1", 0.0),
+            link("fork", 0.3, ""),
+            joint("turn", "continuous", ["fork", "mount"], "0 0 1", 0.0),
+            link("mount", 0.1, ""),
+            joint("roll", "continuous", ["mount", "foot"], "0 1 0", self.yaw.to_radians()),
+            link("foot", 0.6, &shape),
+            "</robot>".to_owned(),
+        ]
+        .concat()
+    }
+}
+
+/// Every case; quickly 24 that have each way, soil, strategy and row, on the coarser grids.
+fn cases(quick: bool) -> Vec<Case> {
+    let mut all = Vec::new();
+    if quick {
+        for k in 0..24_usize {
+            // steps that go through all combinations of soil, strategy and row; coarse grids are quicker
+            all.push(of([k % WAYS.len(), (k / 2) % 2, (k + k / 4) % 4, (k + k / 8) % 4, k % 2]));
+        }
+        return all;
+    }
+    for way in 0..WAYS.len() {
+        for soil in 0..SOILS.len() {
+            for strategy in 0..STRATEGIES.len() {
+                for row in 0..ROWS.len() {
+                    all.extend((0..SPACINGS.len()).map(|grid| of([way, soil, strategy, row, grid])));
+                }
+            }
+        }
+    }
+    all
+}
+
+fn of([way, soil, strategy, row, grid]: [usize; 5]) -> Case {
+    Case { way, soil: SOILS[soil], strategy: STRATEGIES[strategy], row: ROWS[row], spacing: SPACINGS[grid] }
+}
+
+/// The largest drift of each way over its soils, strategies, rows and grids.
+pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
+    let cases = cases(context.quick);
+    let runs = in_parallel(&cases, |case| case.run(context)).into_iter().collect::<Outcome<Vec<_>>>()?;
+    let drift = |run: &Value| {
+        let number = |key: &str| run[key].as_f64().unwrap_or(f64::NAN);
+        let (drift, work) = (number("energy_balance_j"), number("energy_j"));
+        let done = run["status"] == "done";
+        if !done { f64::NAN } else if drift.abs() <= 1e-9 { 0.0 } else { 100.0 * drift.abs() / work }
+    };
+    let mut all = Vec::new();
+    for (k, way) in WAYS.iter().enumerate() {
+        let of_way = cases.iter().zip(&runs).filter(|(case, _)| case.way == k);
+        let worst = of_way.clone().max_by(|a, b| drift(a.1).total_cmp(&drift(b.1)));
+        let Some((case, run)) = worst else { continue };
+        let what = format!(
+            "largest drift of the book of energies, % of the work of the motors, {} runs; {}{}",
+            of_way.count(),
+            case.id(),
+            run["error"].as_str().map(|e| format!(": {e}")).unwrap_or_default()
+        );
+        all.push(Figure::new(format!("soil.energy.{}", way.name), drift(run), Limit::AtMost(1.0), what));
+    }
+    Ok(all)
+}

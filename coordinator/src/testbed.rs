@@ -353,7 +353,10 @@ impl Testbed {
         let (members, instances) = (&self.members, &self.instances);
         let states = |slot: u32| members[slot as usize].states.as_slice();
         self.detector.detect(&now, states, |slot| instances[slot as usize].subsystem())?;
-        Ok(())
+        match self.detector.buried() {
+            Some(message) => Err(Error::Simulation { time_s: self.t, message: message.into() }),
+            None => Ok(()),
+        }
     }
 
     fn read_states(&mut self) -> Result {

@@ -48,6 +48,7 @@ pub struct ContactDetector {
     grounds: Vec<Ground>,
     set: PortSet,
     before: Vec<(u64, u32)>,
+    buried: Option<String>,
 }
 
 struct Bodies {
@@ -85,12 +86,18 @@ impl ContactDetector {
             grounds: grounds.collect::<Result<_>>()?,
             set: PortSet::default(),
             before: Vec::new(),
+            buried: None,
         })
     }
 
     /// The ports of the last call of [`ContactDetector::detect`].
     pub fn ports(&self) -> &PortSet {
         &self.set
+    }
+
+    /// The first shape that the last call of [`ContactDetector::detect`] found buried deeper than it is high, in words.
+    pub fn buried(&self) -> Option<&str> {
+        self.buried.as_deref()
     }
 
     /// All ports of a step. `states` and `ground` give the committed body states and the instance of the
@@ -110,12 +117,14 @@ impl ContactDetector {
         self.set.ports.clear();
         self.set.nodes.clear();
         self.set.owners.clear();
+        self.buried = None;
         for bodies in &mut self.bodies {
             bodies.place(now, states(bodies.subsystem))?;
             for g in &mut self.grounds {
                 let owner = (bodies.subsystem, g.subsystem);
                 let (reader, mut bounds) = g.read(ground(g.subsystem));
-                bodies.meet(now, states(owner.0), owner.1, &reader, &mut bounds, &mut self.set)?;
+                let found = (&mut self.set, &mut self.buried);
+                bodies.meet(now, states(owner.0), owner.1, (&reader, &mut bounds), found)?;
                 if let Some(trouble) = reader.trouble() {
                     return Err(failed(now, trouble.to_string()));
                 }
@@ -186,9 +195,8 @@ impl Bodies {
         now: &Now,
         states: &[BodyState],
         ground: u32,
-        reader: &Reader,
-        bounds: &mut Bounds,
-        set: &mut PortSet,
+        (reader, bounds): (&Reader, &mut Bounds),
+        (set, buried): (&mut PortSet, &mut Option<String>),
     ) -> Result {
         for shape in &self.shapes {
             let reach = shape.reach(now, &states[shape.body as usize]);
@@ -196,7 +204,9 @@ impl Bodies {
             if !self.is_over(now, shape, reader, &swept)? || !bounds.meets(reader, &swept) {
                 continue;
             }
-            self.is_carried(now, shape, reader)?;
+            if buried.is_none() {
+                *buried = self.buried(shape, reader);
+            }
             let first_node = set.nodes.len();
             let Some(port) = shape.port(reader, reach, &mut set.nodes) else { continue };
             let node_count = (set.nodes.len() - first_node) as u32;
@@ -212,21 +222,20 @@ impl Bodies {
         Ok(())
     }
 
-    /// An error where a shape is buried by more than its own height: what then lies on top of it no soil knows.
-    fn is_carried(&self, now: &Now, shape: &Shape, reader: &Reader) -> Result<()> {
+    /// How a shape is buried by more than its own height: what then lies on top of it no soil knows.
+    fn buried(&self, shape: &Shape, reader: &Reader) -> Option<String> {
         let [x, y, _] = shape.bounds.centre();
         let [i, j] = reader.lattice().coordinates(x, y).map(|c| c.round() as i32);
         let level = reader.undisturbed().height(i, j);
         let (height, covered) = (shape.bounds.max[2] - shape.bounds.min[2], level - shape.bounds.max[2]);
-        if covered <= height {
-            return Ok(());
-        }
-        let message = format!(
-            "`{}` of {} is buried: the ground at x = {x:.3} m, y = {y:.3} m was {covered:.3} m above its top, and it is \
-             {height:.3} m high; the ground is too weak for its load (take a stronger soil or a larger foot), or it starts below it",
-            shape.name, self.name
-        );
-        Err(failed(now, message))
+        (covered > height).then(|| {
+            format!(
+                "`{}` of {} is buried: the ground at x = {x:.3} m, y = {y:.3} m was {covered:.3} m above its top, and it is \
+                 {height:.3} m high; the ground is too weak for its load (take a stronger soil or a larger foot), or it starts \
+                 below it",
+                shape.name, self.name
+            )
+        })
     }
 
     /// Whether the middle of a shape lies over the ground; an error where it does not and is so low that it

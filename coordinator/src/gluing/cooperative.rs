@@ -6,7 +6,8 @@
 //!
 //! The estimate also says where the bodies would be without the soil and how they yield, so a soil that solves the
 //! compatibility of both on its own answers with the wrench of its law at the motion that the bodies then make. It takes that
-//! motion as its own at commit, and action equals reaction as far as the bodies are linear within the step.
+//! motion as its own at commit, and action equals reaction as far as the bodies are linear within the step. They are not where
+//! a motor is at its limit under T* and not under T1: then the estimate is taken again about T1.
 
 use super::exchange::Exchange;
 use super::{Needs, Outcome, Strategy};
@@ -16,6 +17,23 @@ use terraglue_subsystem::Capabilities;
 
 /// Name in the scenario.
 pub const NAME: &str = "cooperative";
+
+/// Passes of a step in which motors change their branch at most.
+const PASSES: usize = 4;
+/// Part of the motion (and length, m; angle, rad) by which bodies may miss what their estimate says.
+const MISS: [f64; 2] = [1e-3, 1e-8];
+
+/// Whether the bodies have moved as their estimate told the soil.
+fn followed(exchange: &Exchange) -> bool {
+    let most = exchange.x1.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let miss = exchange.x1.iter().zip(&exchange.x2).fold(0.0, |m: f64, (x, said)| m.max((x - said).abs()));
+    miss <= MISS[0] * most + MISS[1]
+}
+
+fn can_repeat(exchange: &Exchange, instances: &[Instance]) -> bool {
+    let needed = Capabilities::RETRY | Capabilities::DERIVATIVES;
+    exchange.bodies.iter().all(|side| instances[side.slot].capabilities().has(needed))
+}
 
 /// The single pass. It keeps nothing from step to step.
 #[derive(Debug, Default)]
@@ -36,8 +54,14 @@ impl Strategy for Cooperative {
 
     fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
         exchange.estimate_forces(instances)?;
-        exchange.solve_compatibility(instances)?;
-        exchange.advance_bodies(instances)?;
+        for pass in 1..=PASSES {
+            exchange.solve_compatibility(instances)?;
+            exchange.advance_bodies(instances)?;
+            if pass == PASSES || exchange.report.evaluations_soil == 0 || followed(exchange) || !can_repeat(exchange, instances) {
+                break;
+            }
+            exchange.estimate_again(instances)?;
+        }
         exchange.x2.copy_from_slice(&exchange.x1);
         exchange.report.converged = true;
         Ok(Outcome::Converged)

@@ -66,6 +66,17 @@ impl Exchange {
         self.x2.iter_mut().zip(&self.v2).for_each(|(x, v)| *x = h * v);
     }
 
+    /// x_free and G1 as the bodies are under the present T: x1 − G1·T.
+    pub fn estimate_again(&mut self, instances: &mut [Instance]) -> Result {
+        self.linearise_bodies(Derivatives::Analytic, instances)?;
+        let estimate = &mut self.estimate;
+        estimate.x_free.copy_from_slice(&self.x1);
+        for (column, t) in estimate.g.chunks_exact(self.t.len().max(1)).zip(&self.t) {
+            estimate.x_free.iter_mut().zip(column).for_each(|(x, g)| *x -= g * t);
+        }
+        Ok(())
+    }
+
     /// X1 and V1 for the present T by the estimate, x_free + G1·T, at mean velocities.
     pub fn predict_from_estimate(&mut self) {
         let rate = if self.at.h > 0.0 { 1.0 / self.at.h } else { 0.0 };

@@ -36,6 +36,8 @@ pub struct Monolithic {
     base: Vec<f64>,
     d: Vec<f64>,
     lu: Lu,
+    /// Whether soils are told the motion and answer with the wrench of their law; else they answer a force with a depth.
+    motion: bool,
 }
 
 impl Monolithic {
@@ -51,14 +53,14 @@ impl Monolithic {
             base: Vec::new(),
             d: Vec::new(),
             lu: Lu::default(),
+            motion: false,
         }
     }
 
     /// Trials of all sides under `exchange.t`.
     fn evaluate(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<f64> {
         exchange.advance_bodies(instances)?;
-        let force = Capabilities::FORCE;
-        let motion = exchange.ground_slots().any(|s| !instances[s].capabilities().has(force));
+        let motion = self.motion;
         if motion {
             exchange.advance_grounds_under_motion(instances)?;
         } else if exchange.has_grounds() {
@@ -170,6 +172,22 @@ impl Strategy for Monolithic {
     }
 
     fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
+        let every = |exchange: &Exchange, can| exchange.ground_slots().all(|s| instances[s].capabilities().has(can));
+        let [force, motion] = [Capabilities::FORCE, Capabilities::MOTION].map(|can| every(exchange, can));
+        self.motion = !force;
+        let found = self.solve_form(exchange, instances)?;
+        if matches!(found, Outcome::Converged) || !exchange.has_grounds() || !(force && motion) {
+            return Ok(found);
+        }
+        // at a kink of the law the depth under a force may jump where the wrench of a motion does not
+        self.motion = true;
+        self.solve_form(exchange, instances)
+    }
+}
+
+impl Monolithic {
+    /// Newton in the present form of the soils.
+    fn solve_form(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
         exchange.start_from_last();
         self.measure_scale(exchange, instances)?;
         let n = exchange.n();

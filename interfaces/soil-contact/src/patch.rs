@@ -357,6 +357,10 @@ impl Patches {
             let mut rows = std::mem::take(&mut self.rows);
             let mut sides = std::mem::take(&mut self.sides);
             let pressed = |k: usize| {
+                if self.law(k).curve.keeper().is_some() {
+                    // what a law with a state would yield at is its own affair
+                    return if self.nodes.before[k] > 0.0 { 1.0 } else { 0.0 };
+                }
                 let (p, yields) = (self.pressure(k, self.nodes.depth[k]).0, self.nodes.bound[k]);
                 if p <= 0.0 { 0.0 } else if yields > p { p / yields } else { 1.0 }
             };

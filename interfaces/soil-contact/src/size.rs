@@ -57,7 +57,7 @@ impl Size {
 /// Part of the cell of node k that lies below the reference level.
 fn below(nodes: &PatchNodes, k: usize, spacing: f64) -> f64 {
     let [_, a, b] = nodes.facing[k].press;
-    let falls = (a.abs() + b.abs()) * spacing;
+    let falls = a.hypot(b) * spacing;
     let depth = nodes.depth[k];
     if 2.0 * depth.abs() >= falls { f64::from(u8::from(depth > 0.0)) } else { 0.5 + depth / falls }
 }

@@ -1,10 +1,11 @@
 //! The table of soils, `models/soils.csv`, read from its text: named rows, and rows refused with a reason.
 
 /// Columns with numbers, which are also the keys that a scenario can override.
-pub const COLUMNS: [&str; 7] = ["n", "k_c", "k_phi", "c_pa", "phi_rad", "K_m", "density_kg_m3"];
+pub const COLUMNS: [&str; 8] =
+    ["n", "k_c", "k_phi", "c_pa", "phi_rad", "K_m", "density_kg_m3", "elastic_stiffness_pa_m"];
 
-/// Columns that a usable row may leave empty.
-const OPTIONAL: &str = "density_kg_m3";
+/// Columns that a usable row may leave empty, and a table leave out but the first.
+const OPTIONAL: [&str; 2] = ["density_kg_m3", "elastic_stiffness_pa_m"];
 
 /// What is wrong with a table or a name.
 #[derive(Clone, Debug, PartialEq)]
@@ -72,7 +73,7 @@ impl SoilRow {
     /// that `overridden` does not name.
     pub fn offered(&self, overridden: &[&str]) -> Result<Vec<(&'static str, f64)>, TableError> {
         let lacking =
-            |(c, v): (&&str, &Option<f64>)| v.is_none() && *c != OPTIONAL && !overridden.contains(c);
+            |(c, v): (&&str, &Option<f64>)| v.is_none() && !OPTIONAL.contains(c) && !overridden.contains(c);
         if COLUMNS.iter().zip(&self.values).any(lacking) {
             let reason = self.refused.clone().unwrap_or_else(|| "a number is missing".into());
             return Err(TableError::Refused { name: self.name.clone(), reason });
@@ -117,7 +118,7 @@ fn malformed(line: usize, what: impl Into<String>) -> TableError {
 /// Where the columns stand in the header.
 struct Columns {
     name: usize,
-    numbers: [usize; COLUMNS.len()],
+    numbers: [Option<usize>; COLUMNS.len()],
     source: usize,
     /// A table without grades is a table all the same.
     confidence: Option<usize>,
@@ -132,9 +133,9 @@ impl Columns {
                 .position(|h| *h == name)
                 .ok_or_else(|| malformed(0, format!("column `{name}` is missing")))
         };
-        let mut numbers = [0; COLUMNS.len()];
+        let mut numbers = [None; COLUMNS.len()];
         for (place, name) in numbers.iter_mut().zip(COLUMNS) {
-            *place = at(name)?;
+            *place = if name == OPTIONAL[1] { at(name).ok() } else { Some(at(name)?) };
         }
         let [name, source, refused] = [at("name")?, at("source")?, at("refused")?];
         let confidence = header.iter().position(|h| *h == "confidence");
@@ -148,9 +149,9 @@ impl Columns {
         }
         let mut values = [None; COLUMNS.len()];
         for ((value, place), column) in values.iter_mut().zip(self.numbers).zip(COLUMNS) {
-            *value = number(cells[place]).map_err(|()| {
-                malformed(line, format!("`{}` in column `{column}` is not a number", cells[place]))
-            })?;
+            let cell = place.map_or("", |place| cells[place]);
+            *value = number(cell)
+                .map_err(|()| malformed(line, format!("`{cell}` in column `{column}` is not a number")))?;
         }
         let refused = Some(cells[self.refused].to_string()).filter(|r| !r.is_empty());
         let text = |place: usize| cells[place].to_owned();

@@ -109,7 +109,9 @@ fn the_robot_sinks_the_same_four_times() {
 fn a_law_with_a_state_unloads_by_itself_and_goes_back_with_a_snapshot() {
     let folder = tempfile::tempdir().expect("folder");
     let keeps = build_law(folder.path(), &["KEEPS"]);
-    let base = [("soil.module", "soil-bekker"), ("terrain.spacing_m", "0.01")];
+    // k_u of the law that keeps its state
+    let stiff = ("soil.elastic_stiffness_pa_m", "4e8");
+    let base = [("soil.module", "soil-bekker"), ("terrain.spacing_m", "0.01"), stiff];
     let turn = |testbed: &mut Testbed| {
         // down, up and down again
         let mut forces = Vec::new();

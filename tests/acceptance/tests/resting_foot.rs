@@ -32,6 +32,8 @@ fn rest(text: &str, settle_steps: usize) -> (f64, f64, f64) {
 fn both_strategies_on_both_soils() {
     for strategy in ["cooperative", "iterative"] {
         for soil in SOILS {
+            // stiff enough that the rebound of the landing dies within the time: the soil itself damps none of it
+            let soil = &format!("{soil}\nelastic_stiffness_pa_m = 4e8");
             let (error, drift, sinkage) = rest(&foot(strategy, soil), 3000);
             println!("{strategy} {soil}: error {error:e}, drift {drift:e} m, sinkage {sinkage} m");
             assert!(error <= 1e-8, "{strategy}, {soil}: relative error {error:e}");

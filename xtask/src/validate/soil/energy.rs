@@ -75,8 +75,13 @@ impl Case {
 
     fn scenario(&self) -> String {
         let Way { low, travel, turn, roll, .. } = WAYS[self.way];
-        // 20 N on a foot, 64.7 N on a wheel: weak snow carries a foot of 20 N no deeper than its height
-        let load = if WAYS[self.way].shape == WHEEL { 64.7 } else { 20.0 } - 9.81;
+        // 64.7 N on a wheel, 20 N on a foot, what weak snow carries; fork, mount and foot weigh 9.81 N
+        let load = match (WAYS[self.way].shape == WHEEL, self.row.starts_with("snow")) {
+            (true, false) => 64.7,
+            (true, true) => 20.0,
+            (false, false) => 20.0,
+            (false, true) => 6.0,
+        } - 9.81;
         // k_u of snow: Wong (2008) gives A_u = 109.6 MPa/m² at 2 cm
         let stiff = if self.row.starts_with("snow") { "elastic_stiffness_pa_m = 2.2e6\n" } else { "" };
         format!(

@@ -198,8 +198,12 @@ fn balances(context: &Context) -> Outcome<Vec<Figure>> {
         let config = if name.starts_with("snow") { row.own.replacen('{', r#"{"elastic_stiffness_pa_m":2.2e6,"#, 1) } else { row.own.clone() };
         let (_, geometry, lies, _) = feet[*shape].clone();
         let mut bench = Drive::new(make(&config, (0.6 / spacing) as u32 + 1, *spacing), geometry, lies, [0.0031, 0.0017]);
+        // weak snow carries a quarter without burying the foot
+        let share = if name.starts_with("snow") { 0.25 } else { 1.0 };
         for k in 0..300 {
-            bench.step(&SCRIPTS[*script].1(k));
+            let now = SCRIPTS[*script].1(k);
+            let vertical = if let Vertical::Load(load) = now.vertical { Vertical::Load(share * load) } else { now.vertical };
+            bench.step(&Move { vertical, ..now });
         }
         [bench.balance.relative(), bench.balance.fall]
     };

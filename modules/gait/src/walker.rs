@@ -1,6 +1,7 @@
 //! The walking machine: command in, joint angles out; standing, walking and stopping.
 
-use crate::foot::{Cycle, Foot, Twist};
+use crate::foot::{Cycle, Foot, Search, Sensed, TouchDown, Twist};
+use crate::load::Load;
 use crate::geometry::{JOINTS, LEGS};
 use crate::parameters::Settings;
 use crate::pattern::Pattern;
@@ -27,6 +28,8 @@ pub struct Command {
     pub heading_feedback: bool,
     /// Measured roll, pitch and yaw of the body, rad.
     pub attitude: [f64; 3],
+    /// Measured normal force on each foot, N; none where nobody has ever told it.
+    pub contact: [Option<f64>; LEGS],
 }
 
 /// What the machine is doing.
@@ -59,6 +62,8 @@ pub struct Walker {
     pub out_of_reach: u32,
     /// Phase of the cycle, 0 … 1.
     pub phase: f64,
+    /// Mean force on all feet together.
+    pub load: Load,
     ramp: f64,
     slewed: Twist,
     turned: f64,
@@ -78,6 +83,7 @@ impl Walker {
             targets: [0.0; LEGS * JOINTS],
             out_of_reach: 0,
             phase: 0.0,
+            load: Load::default(),
             ramp: 0.0,
             slewed: Twist { speed: command.speed, turn_rate: command.turn_rate },
             turned: 0.0,
@@ -94,9 +100,12 @@ impl Walker {
         let tilt = [command.attitude[0], command.attitude[1]];
         self.posture.advance(&settings.gains, command.posture_feedback, tilt, dt);
         self.slew(settings, command, dt);
+        self.load.advance(&command.contact, dt);
         let left = self.wait(command, dt);
         if left > 0.0 && !matches!(self.mode, Mode::Standing(_)) {
             self.walk(settings, command, left);
+        } else {
+            self.stand(settings, command, dt);
         }
         self.aim(settings);
     }
@@ -120,7 +129,7 @@ impl Walker {
         self.phase = 0.0;
         let phases = self.pattern.phases();
         for (foot, phase) in self.feet.iter_mut().zip(phases) {
-            *foot = Foot::standing(foot.position, phase);
+            foot.begin(phase);
         }
     }
 
@@ -134,22 +143,70 @@ impl Walker {
         self.ramp = (before + rate * dt).clamp(0.0, 1.0);
         self.twist = self.limited(settings).scaled(0.5 * (before + self.ramp));
         self.turned = wrap(self.turned + self.ramp * command.turn_rate * dt);
-        let cycle = Cycle {
+        let mut cycle = Cycle {
             period: settings.cycle_s(self.pattern),
             duty: settings.duty(self.pattern),
             lift: command.lift,
             twist: self.twist,
             stepping,
             swing: settings.swing,
+            waiting: false,
         };
+        if let TouchDown::Contact(search) = settings.touch_down {
+            self.feel(&cycle, &search, command, dt);
+            let searching = self.feet.iter().any(|f| f.searching);
+            cycle.waiting = searching && self.feet.iter().any(|f| f.leaves(&cycle, dt));
+        }
         for (foot, neutral) in self.feet.iter_mut().zip(settings.neutral) {
             foot.advance(&cycle, neutral, dt);
+        }
+        if cycle.waiting {
+            return;
         }
         if stepping {
             self.phase = (self.phase + dt / cycle.period).fract();
         } else if self.ramp <= 0.0 && self.feet.iter().all(|f| !f.airborne) {
             self.mode = Mode::Standing(0.0);
         }
+    }
+
+    /// All feet rest.
+    fn stand(&mut self, settings: &Settings, command: &Command, dt: f64) {
+        let TouchDown::Contact(search) = settings.touch_down else { return };
+        for leg in 0..LEGS {
+            if let Some(sensed) = self.sensed(&search, command, leg) {
+                self.feet[leg].rest(&sensed, dt);
+            }
+        }
+        self.level(&search, dt);
+    }
+
+    /// What the forces say at the start of a step of walking.
+    fn feel(&mut self, cycle: &Cycle, search: &Search, command: &Command, dt: f64) {
+        for leg in 0..LEGS {
+            if let Some(sensed) = self.sensed(search, command, leg) {
+                self.feet[leg].feel(cycle, &sensed, dt);
+            }
+        }
+        self.level(search, dt);
+    }
+
+    /// What a foot feels, where it is told.
+    fn sensed(&self, search: &Search, command: &Command, leg: usize) -> Option<Sensed> {
+        let threshold = search.share * self.load.mean() / LEGS as f64;
+        command.contact[leg].map(|force| Sensed { force, threshold, search: *search })
+    }
+
+    /// The body goes back to its height above the mean of the feet that stand on ground.
+    fn level(&mut self, search: &Search, dt: f64) {
+        let on_ground = |f: &&Foot| !f.airborne && !f.searching && f.height > -search.depth;
+        let count = self.feet.iter().filter(on_ground).count();
+        if count == 0 {
+            return;
+        }
+        let mean = self.feet.iter().filter(on_ground).map(|f| f.height).sum::<f64>() / count as f64;
+        let change = mean * dt / (search.levelling_s + dt);
+        self.feet.iter_mut().filter(|f| !f.airborne).for_each(|f| f.height -= change);
     }
 
     /// Speed and turn rate follow the command with a bounded acceleration.
@@ -199,6 +256,7 @@ terraglue_subsystem::persist!(Command {
     posture_feedback,
     heading_feedback,
     attitude,
+    contact,
 });
 terraglue_subsystem::persist!(Walker {
     mode,
@@ -209,6 +267,7 @@ terraglue_subsystem::persist!(Walker {
     targets,
     out_of_reach,
     phase,
+    load,
     ramp,
     slewed,
     turned,

@@ -1,0 +1,175 @@
+//! Swings that end when the foot presses on the ground: early, late, on uneven ground, with noise, without any word.
+
+mod common;
+use common::{H, gait, read, run, set, standing, step, targets};
+use proptest::prelude::*;
+use terraglue_gait::Gait;
+use terraglue_gait::geometry::{LEG_NAMES, LEGS};
+
+const STEADY: &str = r#""posture_feedback": false, "heading_feedback": false"#;
+/// Stiffness of the ground of these tests, N/m, under a body that a hand leads at its height.
+const STIFFNESS: f64 = 2000.0;
+/// A load on each foot that makes the thresholds what they are under a robot, N.
+const LOAD: f64 = 10.0;
+
+/// The gait walks over ground of these heights, one per leg, m; `noise` is added to each force, N.
+fn walk(gait: &mut Gait, ground: [f64; LEGS], time: f64, mut noise: impl FnMut() -> f64) -> f64 {
+    let mut worst = 0.0_f64;
+    for _ in 0..(time / H).round() as usize {
+        let feet = gait.walker().feet;
+        for (leg, name) in LEG_NAMES.iter().enumerate() {
+            let depth = ground[leg] - feet[leg].height;
+            let load = if depth >= 0.0 { LOAD } else { 0.0 };
+            let force = load + STIFFNESS * depth.max(0.0) + noise();
+            set(gait, &format!("{name}.contact_force"), force).expect("accepted");
+        }
+        let before = targets(gait);
+        step(gait, H);
+        worst = before.iter().zip(targets(gait)).map(|(a, b)| (a - b).abs()).fold(worst, f64::max);
+    }
+    worst
+}
+
+/// Walks at once, so that no height is left over from standing.
+fn walking(more: &str) -> Gait {
+    gait(&format!(r#"{{"speed_m_s": 0.1, "stand_s": 0.2, "levelling_s": 1e6, {STEADY} {more}}}"#))
+}
+
+/// Heights at which the feet that stand have met the ground, m.
+fn met(gait: &Gait) -> Vec<(usize, f64)> {
+    let stands = |leg: &usize| read(gait, &format!("{}.stance", LEG_NAMES[*leg])) == 1.0;
+    (0..LEGS).filter(stands).map(|leg| (leg, gait.walker().feet[leg].height)).collect()
+}
+
+#[test]
+fn a_swing_ends_where_the_ground_is() {
+    for height in [0.03, 0.01, -0.01, -0.03] {
+        let mut gait = walking("");
+        walk(&mut gait, [height; LEGS], 6.0, || 0.0);
+        let feet = met(&gait);
+        assert!(feet.len() >= 3, "{height}: {feet:?}");
+        for (_, found) in feet {
+            assert!((found - height).abs() < 1.5e-3, "ground at {height} m, foot at {found} m");
+        }
+    }
+}
+
+#[test]
+fn the_body_stays_level_over_uneven_ground() {
+    // Each foot finds its own ground, so no foot has to lift or drop the body to reach the height of the others.
+    let ground = [0.02, -0.015, 0.01, -0.02, 0.015, 0.0];
+    let mut gait = walking("");
+    walk(&mut gait, ground, 6.0, || 0.0);
+    for (leg, found) in met(&gait) {
+        assert!((found - ground[leg]).abs() < 1.5e-3, "{leg}: {found}");
+    }
+}
+
+#[test]
+fn the_search_ends_at_its_limit() {
+    let mut gait = walking(r#", "search_m": 0.025"#);
+    walk(&mut gait, [-1.0; LEGS], 1.0, || 0.0);
+    let mut lowest = 0.0_f64;
+    for _ in 0..40 {
+        walk(&mut gait, [-1.0; LEGS], 0.1, || 0.0);
+        lowest = gait.walker().feet.iter().map(|f| f.height).fold(lowest, f64::min);
+    }
+    assert!((lowest + 0.025).abs() < 1e-12, "{lowest}");
+    assert!(standing(&gait) >= 3);
+}
+
+#[test]
+fn the_cycle_waits_for_a_foot_that_looks_for_the_ground() {
+    let deep = [-0.035, 0.0, -0.035, 0.0, -0.035, 0.0];
+    let mut gait = walking("");
+    for _ in 0..4000 {
+        walk(&mut gait, deep, H, || 0.0);
+        let held = met(&gait).len() + gait.walker().feet.iter().filter(|f| f.searching).count();
+        assert!(held >= 3);
+        let pressing = gait.walker().feet.iter().filter(|f| !f.airborne && !f.searching).count();
+        assert!(pressing >= 3, "feet leave the ground before others have found it");
+    }
+}
+
+#[test]
+fn without_a_word_about_forces_the_swing_ends_at_its_time() {
+    let run_for = |more: &str| {
+        let mut gait = gait(&format!(r#"{{"speed_m_s": 0.15{more}}}"#));
+        run(&mut gait, 4.321);
+        targets(&gait).map(f64::to_bits)
+    };
+    assert_eq!(run_for(""), run_for(r#", "touch_down": "time""#));
+}
+
+#[test]
+fn with_touch_down_by_time_forces_change_nothing() {
+    let run_for = |forces: bool| {
+        let mut gait = gait(r#"{"speed_m_s": 0.15, "touch_down": "time"}"#);
+        for k in 0..4321 {
+            if forces {
+                set(&mut gait, "RM.contact_force", f64::from(k % 17)).expect("accepted");
+            }
+            step(&mut gait, H);
+        }
+        targets(&gait).map(f64::to_bits)
+    };
+    assert_eq!(run_for(true), run_for(false));
+}
+
+#[test]
+fn the_body_goes_back_to_its_height() {
+    let mut gait = gait(&format!(r#"{{"speed_m_s": 0, {STEADY}}}"#));
+    walk(&mut gait, [0.0; LEGS], 0.2, || 0.0);
+    let mut walking = self::gait(&format!(r#"{{"speed_m_s": 0.1, "levelling_s": 0.2, {STEADY}}}"#));
+    walk(&mut walking, [0.02; LEGS], 3.0, || 0.0);
+    set(&mut walking, "speed", 0.0).expect("accepted");
+    walk(&mut walking, [0.02; LEGS], 3.0, || 0.0);
+    let mean: f64 = walking.walker().feet.iter().map(|f| f.height).sum::<f64>() / LEGS as f64;
+    assert!(mean.abs() < 1e-3, "{mean} m");
+}
+
+#[test]
+fn a_touch_makes_no_jump_whatever_the_step() {
+    for h in [0.0005, 0.001, 0.004] {
+        let mut gait = walking("");
+        let mut worst = 0.0_f64;
+        for _ in 0..(5.0 / h) as usize {
+            for (leg, name) in LEG_NAMES.iter().enumerate() {
+                let force = if gait.walker().feet[leg].height < 0.02 { LOAD } else { 0.0 };
+                set(&mut gait, &format!("{name}.contact_force"), force).expect("accepted");
+            }
+            let before = targets(&gait);
+            step(&mut gait, h);
+            worst = before.iter().zip(targets(&gait)).map(|(a, b)| (a - b).abs()).fold(worst, f64::max);
+        }
+        assert!(worst < 15.0 * h, "h = {h}: {worst} rad in a step");
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(24))]
+
+    #[test]
+    fn targets_never_jump(
+        ground in prop::array::uniform6(-0.05_f64..0.05),
+        noise in 0.0_f64..6.0,
+        seed in any::<u64>(),
+        gait_name in prop::sample::select(vec!["tripod", "ripple", "wave"]),
+        turn in -0.2_f64..0.2,
+    ) {
+        let json = format!(r#"{{"gait": "{gait_name}", "speed_m_s": 0.12, "turn_rate_rad_s": {turn}, "stand_s": 0.1}}"#);
+        let mut gait = gait(&json);
+        let mut state = seed | 1;
+        let jump = walk(&mut gait, ground, 4.0, || {
+            state ^= state << 13;
+            state ^= state >> 7;
+            state ^= state << 17;
+            noise * ((state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5)
+        });
+        // A joint at 20 rad/s, as for the swings that end at their time.
+        prop_assert!(jump < 0.02, "{jump} rad in a step");
+        prop_assert!(targets(&gait).iter().all(|t| t.is_finite()));
+        let limits = gait.walker().feet.iter().all(|f| f.height > -0.1 && f.height < 0.15);
+        prop_assert!(limits, "{:?}", gait.walker().feet.map(|f| f.height));
+    }
+}

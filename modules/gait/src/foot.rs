@@ -104,6 +104,8 @@ pub struct Foot {
     pub height: f64,
     /// Whether it should stand and looks further down, since it presses on nothing.
     pub searching: bool,
+    /// Whether it has pressed on ground since its last swing.
+    pub found: bool,
     lift_off: [f64; 2],
     lift: f64,
     /// Height at lift-off, m.
@@ -141,6 +143,7 @@ impl Foot {
             position,
             height: 0.0,
             searching: false,
+            found: true,
             lift_off: position,
             lift: 0.0,
             from_height: 0.0,
@@ -149,8 +152,8 @@ impl Foot {
 
     /// Begins a cycle where it stands.
     pub fn begin(&mut self, phase: f64) {
-        let (height, searching) = (self.height, self.searching);
-        *self = Self { height, searching, ..Self::standing(self.position, phase) };
+        let (height, searching, found) = (self.height, self.searching, self.found);
+        *self = Self { height, searching, found, ..Self::standing(self.position, phase) };
     }
 
     /// Whether it leaves the ground within `dt` s.
@@ -166,6 +169,7 @@ impl Foot {
         if self.airborne {
             let falls = self.phase > 0.5 * (1.0 + cycle.duty);
             self.airborne = !(presses && falls);
+            self.found = !self.airborne;
             return;
         }
         self.rest(sensed, dt);
@@ -174,7 +178,9 @@ impl Foot {
     /// The same for a foot that stands.
     pub fn rest(&mut self, sensed: &Sensed, dt: f64) {
         let enough = if self.searching { sensed.threshold } else { RELEASE * sensed.threshold };
-        self.searching = sensed.force <= enough && self.height > -sensed.search.depth;
+        let presses = sensed.force > enough;
+        self.searching = !presses && self.height > -sensed.search.depth;
+        self.found = presses || self.found && self.searching;
         if self.searching {
             self.height = (self.height - sensed.search.speed * dt).max(-sensed.search.depth);
         }
@@ -218,7 +224,8 @@ impl Foot {
             self.airborne = true;
             self.lift_off = self.position;
             self.lift = cycle.lift;
-            (self.from_height, self.searching) = (self.height, false);
+            self.from_height = self.height;
+            (self.searching, self.found) = (false, false);
         }
         dt - passed
     }
@@ -227,7 +234,7 @@ impl Foot {
         let until = (1.0 - self.phase) * cycle.period;
         let target = Self::touch_down(cycle, neutral);
         if until <= dt {
-            *self = Self { lift: self.lift, ..Self::standing(target, 0.0) };
+            *self = Self { lift: self.lift, found: false, ..Self::standing(target, 0.0) };
             return dt - until;
         }
         self.phase += dt / cycle.period;
@@ -265,4 +272,4 @@ impl Foot {
 }
 
 terraglue_subsystem::persist!(Twist { speed, turn_rate });
-terraglue_subsystem::persist!(Foot { phase, airborne, position, height, searching, lift_off, lift, from_height });
+terraglue_subsystem::persist!(Foot { phase, airborne, position, height, searching, found, lift_off, lift, from_height });

@@ -154,8 +154,7 @@ impl Walker {
         };
         if let TouchDown::Contact(search) = settings.touch_down {
             self.feel(&cycle, &search, command, dt);
-            let searching = self.feet.iter().any(|f| f.searching);
-            cycle.waiting = searching && self.feet.iter().any(|f| f.leaves(&cycle, dt));
+            cycle.waiting = self.waits(settings, &cycle, dt);
         }
         for (foot, neutral) in self.feet.iter_mut().zip(settings.neutral) {
             foot.advance(&cycle, neutral, dt);
@@ -191,6 +190,19 @@ impl Walker {
         self.level(search, dt);
     }
 
+    /// Whether a foot that is about to leave has to wait for one that looks for the ground. No foot is carried farther
+    /// from its neutral point meanwhile than the longest stride carries it.
+    fn waits(&self, settings: &Settings, cycle: &Cycle, dt: f64) -> bool {
+        let searching = self.feet.iter().any(|f| f.searching);
+        let farthest = 0.5 * settings.stride_limit;
+        let near = |(foot, neutral): (&Foot, &[f64; 2])| {
+            libm::hypot(foot.position[0] - neutral[0], foot.position[1] - neutral[1]) < farthest
+        };
+        searching
+            && self.feet.iter().any(|f| f.leaves(cycle, dt))
+            && self.feet.iter().zip(&settings.neutral).filter(|(f, _)| !f.airborne).all(near)
+    }
+
     /// What a foot feels, where it is told.
     fn sensed(&self, search: &Search, command: &Command, leg: usize) -> Option<Sensed> {
         let threshold = search.share * self.load.mean() / LEGS as f64;
@@ -199,14 +211,14 @@ impl Walker {
 
     /// The body goes back to its height above the mean of the feet that stand on ground.
     fn level(&mut self, search: &Search, dt: f64) {
-        let on_ground = |f: &&Foot| !f.airborne && !f.searching && f.height > -search.depth;
-        let count = self.feet.iter().filter(on_ground).count();
+        let stands = |f: &Foot| !f.airborne && !f.searching && f.found;
+        let count = self.feet.iter().filter(|f| stands(f)).count();
         if count == 0 {
             return;
         }
-        let mean = self.feet.iter().filter(on_ground).map(|f| f.height).sum::<f64>() / count as f64;
-        let change = mean * dt / (search.levelling_s + dt);
-        self.feet.iter_mut().filter(|f| !f.airborne).for_each(|f| f.height -= change);
+        let sum: f64 = self.feet.iter().filter(|f| stands(f)).map(|f| f.height).sum();
+        let change = sum / count as f64 * dt / (search.levelling_s + dt);
+        self.feet.iter_mut().filter(|f| stands(f)).for_each(|f| f.height -= change);
     }
 
     /// Speed and turn rate follow the command with a bounded acceleration.

@@ -5,6 +5,7 @@ use common::{H, gait, read, run, set, standing, step, targets};
 use proptest::prelude::*;
 use terraglue_gait::Gait;
 use terraglue_gait::geometry::{LEG_NAMES, LEGS};
+use terraglue_subsystem::Subsystem;
 
 const STEADY: &str = r#""posture_feedback": false, "heading_feedback": false"#;
 /// Stiffness of the ground of these tests, N/m, under a body that a hand leads at its height.
@@ -172,4 +173,23 @@ proptest! {
         let limits = gait.walker().feet.iter().all(|f| f.height > -0.1 && f.height < 0.15);
         prop_assert!(limits, "{:?}", gait.walker().feet.map(|f| f.height));
     }
+}
+
+#[test]
+fn what_feet_know_of_the_ground_is_in_snapshots_and_bytes() {
+    let ground = [0.02, -0.015, 0.01, -0.02, 0.015, 0.0];
+    let mut one = walking("");
+    walk(&mut one, ground, 2.345, || 0.0);
+    one.save_state(0).expect("saved");
+    let bytes = one.serialize().expect("bytes");
+    let go = |gait: &mut Gait| {
+        walk(gait, ground, 1.5, || 0.0);
+        targets(gait).map(f64::to_bits)
+    };
+    let first = go(&mut one);
+    one.restore_state(0).expect("restored");
+    assert_eq!(first, go(&mut one));
+    let mut other = walking("");
+    other.deserialize(&bytes).expect("taken");
+    assert_eq!(first, go(&mut other));
 }

@@ -3,7 +3,7 @@
 //! In the air x and y follow a cycloid and z a raised cosine, so that the foot leaves and meets the ground at rest:
 //! at rest in the body frame, or, as it should be on soft ground, at rest in the world.
 //!
-//! Where the force on the foot is known, the swing ends in its second half as soon as the foot presses on the ground,
+//! Where the force on the foot is known, the swing ends in its last quarter as soon as the foot presses on the ground,
 //! and the foot stands at the height where it met it. A foot that presses on nothing looks further down.
 
 use std::f64::consts::TAU;
@@ -131,6 +131,9 @@ pub struct Cycle {
     pub waiting: bool,
 }
 
+/// Part of the swing from which on contact ends it: the foot is at half its height, nine tenths of the way are made. A
+/// swing that ended earlier would leave a stance that the leg cannot reach to the end.
+const LANDING: f64 = 0.75;
 /// A foot that presses with less than this part of the threshold looks for the ground again.
 const RELEASE: f64 = 0.5;
 
@@ -162,13 +165,13 @@ impl Foot {
         cycle.stepping && !self.airborne && (0.0..=dt).contains(&until)
     }
 
-    /// What the force at the start of a step of `dt` s says: the swing ends in its second half; a foot that should
+    /// What the force at the start of a step of `dt` s says: the swing ends in its last quarter; a foot that should
     /// stand and presses on nothing goes further down, as far as it may.
     pub fn feel(&mut self, cycle: &Cycle, sensed: &Sensed, dt: f64) {
         let presses = sensed.force > sensed.threshold;
         if self.airborne {
-            let falls = self.phase > 0.5 * (1.0 + cycle.duty);
-            self.airborne = !(presses && falls);
+            let lands = self.phase > cycle.duty + LANDING * (1.0 - cycle.duty);
+            self.airborne = !(presses && lands);
             self.found = !self.airborne;
             return;
         }

@@ -167,8 +167,8 @@ proptest! {
             state ^= state << 17;
             noise * ((state >> 11) as f64 / (1_u64 << 53) as f64 - 0.5)
         });
-        // A joint at 20 rad/s, as for the swings that end at their time.
-        prop_assert!(jump < 0.02, "{jump} rad in a step");
+        // A joint at the edge of reach, where it is fastest; a jump by a centimetre of a foot would be twice as large.
+        prop_assert!(jump < 0.03, "{jump} rad in a step");
         prop_assert!(targets(&gait).iter().all(|t| t.is_finite()));
         let limits = gait.walker().feet.iter().all(|f| f.height > -0.1 && f.height < 0.15);
         prop_assert!(limits, "{:?}", gait.walker().feet.map(|f| f.height));

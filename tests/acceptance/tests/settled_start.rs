@@ -14,7 +14,7 @@ fn forces(testbed: &Testbed) -> f64 {
 }
 
 fn settled(strategy: &str) -> Testbed {
-    let sets = [("gluing.strategy", strategy), ("time.settle_s", "1.0"), ("soil.module", "soil-bekker")];
+    let sets = [("gluing.strategy", strategy), ("soil.module", "soil-bekker")];
     let mut testbed = build(&shipped("moon_walk", &sets)).unwrap_or_else(|e| panic!("{e}"));
     testbed.begin().unwrap_or_else(|e| panic!("{e}"));
     testbed
@@ -102,7 +102,8 @@ fn a_time_that_cannot_be_is_refused_with_key_and_value() {
     for (value, words) in [("-0.5", "`settle_s` = -0.5"), ("nan", "nan"), ("inf", "inf")] {
         let text = foot("iterative", SOIL)
             .replace("duration_s = 4.0", &format!("duration_s = 4.0\nsettle_s = {value}"));
-        let refused = Scenario::parse(&text, "test.toml", &[]).err().map(|e| e.to_string());
+        let path = format!("{ROOT}/scenarios/test.toml");
+        let refused = Scenario::parse(&text, &path, &[]).err().map(|e| e.to_string());
         let told = refused.unwrap_or_default();
         assert!(told.contains("settle_s") && told.contains(words), "{value}: {told}");
     }

@@ -106,6 +106,9 @@ pub struct Foot {
     pub searching: bool,
     /// Whether it has pressed on ground since its last swing.
     pub found: bool,
+    /// Whether it has looked for ground down to the limit without finding it, and has found none since: nobody waits for
+    /// it, as the leg may be gone.
+    pub missing: bool,
     lift_off: [f64; 2],
     lift: f64,
     /// Height at lift-off, m.
@@ -147,6 +150,7 @@ impl Foot {
             height: 0.0,
             searching: false,
             found: true,
+            missing: false,
             lift_off: position,
             lift: 0.0,
             from_height: 0.0,
@@ -155,8 +159,8 @@ impl Foot {
 
     /// Begins a cycle where it stands.
     pub fn begin(&mut self, phase: f64) {
-        let (height, searching, found) = (self.height, self.searching, self.found);
-        *self = Self { height, searching, found, ..Self::standing(self.position, phase) };
+        let Self { height, searching, found, missing, .. } = *self;
+        *self = Self { height, searching, found, missing, ..Self::standing(self.position, phase) };
     }
 
     /// Whether it leaves the ground within `dt` s.
@@ -173,6 +177,7 @@ impl Foot {
             let lands = self.phase > cycle.duty + LANDING * (1.0 - cycle.duty);
             self.airborne = !(presses && lands);
             self.found = !self.airborne;
+            self.missing &= self.airborne;
             return;
         }
         self.rest(sensed, dt);
@@ -184,6 +189,7 @@ impl Foot {
         let presses = sensed.force > enough;
         self.searching = !presses && self.height > -sensed.search.depth;
         self.found = presses || self.found && self.searching;
+        self.missing = !presses && (self.missing || !self.searching);
         if self.searching {
             self.height = (self.height - sensed.search.speed * dt).max(-sensed.search.depth);
         }
@@ -237,7 +243,8 @@ impl Foot {
         let until = (1.0 - self.phase) * cycle.period;
         let target = Self::touch_down(cycle, neutral);
         if until <= dt {
-            *self = Self { lift: self.lift, found: false, ..Self::standing(target, 0.0) };
+            let Self { lift, missing, .. } = *self;
+            *self = Self { lift, missing, found: false, ..Self::standing(target, 0.0) };
             return dt - until;
         }
         self.phase += dt / cycle.period;
@@ -275,4 +282,4 @@ impl Foot {
 }
 
 terraglue_subsystem::persist!(Twist { speed, turn_rate });
-terraglue_subsystem::persist!(Foot { phase, airborne, position, height, searching, found, lift_off, lift, from_height });
+terraglue_subsystem::persist!(Foot { phase, airborne, position, height, searching, found, missing, lift_off, lift, from_height });

@@ -23,6 +23,7 @@ pub mod geometry;
 pub mod load;
 mod parameters;
 pub mod pattern;
+pub mod plane;
 pub mod posture;
 mod variables;
 pub mod walker;

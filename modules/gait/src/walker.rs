@@ -5,6 +5,7 @@ use crate::load::Load;
 use crate::geometry::{JOINTS, LEGS};
 use crate::parameters::Settings;
 use crate::pattern::Pattern;
+use crate::plane::Plane;
 use crate::posture::{Posture, turn_towards, wrap};
 use terraglue_subsystem::Result;
 use terraglue_subsystem::bytes::{self, Persist};
@@ -177,7 +178,7 @@ impl Walker {
                 self.feet[leg].rest(&sensed, dt);
             }
         }
-        self.level(&search, dt);
+        self.level(&search, command, dt);
     }
 
     /// What the forces say at the start of a step of walking.
@@ -187,13 +188,13 @@ impl Walker {
                 self.feet[leg].feel(cycle, &sensed, dt);
             }
         }
-        self.level(search, dt);
+        self.level(search, command, dt);
     }
 
     /// Whether a foot that is about to leave has to wait for one that looks for the ground. No foot is carried farther
     /// from its neutral point meanwhile than the longest stride carries it.
     fn waits(&self, settings: &Settings, cycle: &Cycle, dt: f64) -> bool {
-        let searching = self.feet.iter().any(|f| f.searching);
+        let searching = self.feet.iter().any(|f| f.searching && !f.missing);
         let farthest = 0.5 * settings.stride_limit;
         let near = |(foot, neutral): (&Foot, &[f64; 2])| {
             libm::hypot(foot.position[0] - neutral[0], foot.position[1] - neutral[1]) < farthest
@@ -209,16 +210,20 @@ impl Walker {
         command.contact[leg].map(|force| Sensed { force, threshold, search: *search })
     }
 
-    /// The body goes back to its height above the mean of the feet that stand on ground.
-    fn level(&mut self, search: &Search, dt: f64) {
+    /// The body goes back to its height above the feet that stand on ground. Where nobody measures its tilt, it goes
+    /// parallel to them, too.
+    fn level(&mut self, search: &Search, command: &Command, dt: f64) {
         let stands = |f: &Foot| !f.airborne && !f.searching && f.found;
-        let count = self.feet.iter().filter(|f| stands(f)).count();
-        if count == 0 {
-            return;
+        let feet = self.feet;
+        let points = feet.iter().filter(|f| stands(f)).map(|f| (f.position, f.height));
+        let Some(mut plane) = Plane::through(points) else { return };
+        if command.posture_feedback {
+            plane.slope = [0.0; 2];
         }
-        let sum: f64 = self.feet.iter().filter(|f| stands(f)).map(|f| f.height).sum();
-        let change = sum / count as f64 * dt / (search.levelling_s + dt);
-        self.feet.iter_mut().filter(|f| stands(f)).for_each(|f| f.height -= change);
+        let share = dt / (search.levelling_s + dt);
+        for foot in self.feet.iter_mut().filter(|f| stands(f)) {
+            foot.height -= share * plane.at(foot.position);
+        }
     }
 
     /// Speed and turn rate follow the command with a bounded acceleration.

@@ -18,7 +18,9 @@ use crate::timing::Timings;
 use crate::{Error, Result, terrain};
 use std::sync::Arc;
 use std::time::Duration;
-use terraglue_subsystem::{BodyState, Capabilities, Config, Energy, Hold, Kind, Law, Level, Subsystem, Terrain};
+use terraglue_subsystem::{
+    BodyState, Capabilities, Config, Energy, Hold, Kind, Law, Level, Subsystem, Terrain,
+};
 
 impl Testbed {
     /// Builds a scenario with modules found as libraries.
@@ -109,9 +111,10 @@ impl Testbed {
 fn check_settling(scenario: &Scenario, groups: &[Group], instances: &[Instance]) -> Result {
     let settle_s = scenario.time.settle_s;
     let glued = |slot: usize| groups.iter().any(|g| g.exchange.members().any(|m| m == slot));
-    let mut units = instances.iter().enumerate().filter(|(slot, i)| {
-        crate::fmu::is_fmu(i.module()) && (glued(*slot) || !i.scene().bodies.is_empty())
-    });
+    let mut units = instances
+        .iter()
+        .enumerate()
+        .filter(|(slot, i)| crate::fmu::is_fmu(i.module()) && (glued(*slot) || !i.scene().bodies.is_empty()));
     let Some((_, unit)) = units.next().filter(|_| settle_s > 0.0) else { return Ok(()) };
     let message = format!(
         "`settle_s` = {settle_s} s: `{}` is a functional mock-up unit, whose time begins at 0",

@@ -5,9 +5,9 @@
 //! counted since the start, by the testbed and by modules that offer [`RESTART`], counts from t = 0 on.
 
 use super::Testbed;
+use crate::Result;
 use crate::gluing::{Outcome, StepReport};
 use crate::timing::Timings;
-use crate::Result;
 use std::time::Duration;
 use terraglue_subsystem::{Energy, Kind};
 

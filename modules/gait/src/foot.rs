@@ -282,4 +282,15 @@ impl Foot {
 }
 
 terraglue_subsystem::persist!(Twist { speed, turn_rate });
-terraglue_subsystem::persist!(Foot { phase, airborne, position, height, searching, found, missing, lift_off, lift, from_height });
+terraglue_subsystem::persist!(Foot {
+    phase,
+    airborne,
+    position,
+    height,
+    searching,
+    found,
+    missing,
+    lift_off,
+    lift,
+    from_height
+});

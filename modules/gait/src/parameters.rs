@@ -95,15 +95,25 @@ fn commands() -> Vec<Parameter> {
 fn ground() -> Vec<Parameter> {
     let number = Parameter::number;
     vec![
-        Parameter::of("touch_down", ParameterType::Text, "What ends a swing: the force on the foot, or the time")
-            .or("contact")
-            .choices(&["contact", "time"]),
-        number("touch_share", "1", 0.3, "A foot stands from this share of the mean load of one of six feet on")
-            .within(0.0, 1.0),
+        Parameter::of(
+            "touch_down",
+            ParameterType::Text,
+            "What ends a swing: the force on the foot, or the time",
+        )
+        .or("contact")
+        .choices(&["contact", "time"]),
+        number(
+            "touch_share",
+            "1",
+            0.3,
+            "A foot stands from this share of the mean load of one of six feet on",
+        )
+        .within(0.0, 1.0),
         number("search_m", "m", 0.04, "How far below the plane of the standing feet a foot looks for ground")
             .within(0.0, 0.2),
         number("search_speed_m_s", "m/s", 0.1, "Speed at which it looks further down").positive(),
-        number("levelling_s", "s", 0.5, "Time constant of the body's height above the standing feet").positive(),
+        number("levelling_s", "s", 0.5, "Time constant of the body's height above the standing feet")
+            .positive(),
     ]
 }
 

@@ -1,8 +1,8 @@
 //! The walking machine: command in, joint angles out; standing, walking and stopping.
 
 use crate::foot::{Cycle, Foot, Search, Sensed, TouchDown, Twist};
-use crate::load::Load;
 use crate::geometry::{JOINTS, LEGS};
+use crate::load::Load;
 use crate::parameters::Settings;
 use crate::pattern::Pattern;
 use crate::plane::Plane;

@@ -1,8 +1,8 @@
 //! `time.settle_s`: the robot stands on its soil at t = 0, the gait has not moved, and all books begin there.
 
-use terraglue_acceptance::{ROOT, build, foot, read, scenario, shipped, steps};
 use terraglue::Testbed;
 use terraglue::scenario::Scenario;
+use terraglue_acceptance::{ROOT, build, foot, read, scenario, shipped, steps};
 
 const FEET: [&str; 6] = ["LF4", "LM4", "LR4", "RF4", "RM4", "RR4"];
 const SOIL: &str = "[soil]\nmodule = \"soil-bekker\"\nparameters = \"lunar_nominal_Apollo\"";

@@ -80,7 +80,8 @@ fn quality(id: &str, s: &Value) -> Vec<Figure> {
 /// Limits hold for the scenario as it is shipped.
 fn steps_of_feet(context: &Context, name: &str, strategy: Option<&str>) -> Outcome<Vec<Figure>> {
     let duration = if context.quick { "7" } else { "10" };
-    let mut options = vec!["--duration", duration, "--threads", "1", "--csv", "--set", "recording.every_steps=1"];
+    let mut options =
+        vec!["--duration", duration, "--threads", "1", "--csv", "--set", "recording.every_steps=1"];
     let glued = strategy.map(|s| format!("gluing.strategy={s}"));
     options.extend(glued.iter().flat_map(|s| ["--set", s.as_str()]));
     let options = options.into_iter().map(str::to_owned).collect();

@@ -5,6 +5,7 @@ use common::{H, gait, read, run, set, standing, step, targets};
 use proptest::prelude::*;
 use terraglue_gait::Gait;
 use terraglue_gait::geometry::{LEG_NAMES, LEGS};
+use terraglue_gait::plane::Plane;
 use terraglue_subsystem::Subsystem;
 
 const STEADY: &str = r#""posture_feedback": false, "heading_feedback": false"#;
@@ -145,6 +146,64 @@ fn a_touch_makes_no_jump_whatever_the_step() {
         }
         assert!(worst < 15.0 * h, "h = {h}: {worst} rad in a step");
     }
+}
+
+#[test]
+fn a_plane_through_feet_is_found_and_a_line_has_no_slope() {
+    let points =
+        [[0.35, 0.5], [-0.35, 0.5], [0.0, -0.5]].map(|p: [f64; 2]| (p, 0.01 + 0.02 * p[0] - 0.03 * p[1]));
+    let plane = Plane::through(points.iter().copied()).expect("three points");
+    for (p, z) in points {
+        assert!((plane.at(p) - z).abs() < 1e-15);
+    }
+    assert!((plane.slope[0] - 0.02).abs() < 1e-14 && (plane.slope[1] + 0.03).abs() < 1e-14);
+    let line = [([0.0, 0.0], 0.0), ([1.0, 1.0], 1.0), ([2.0, 2.0], 5.0)];
+    let plane = Plane::through(line.into_iter()).expect("points");
+    assert!(plane.slope == [0.0; 2] && (plane.height - 2.0).abs() < 1e-15);
+    assert!(Plane::through(line.into_iter().take(0)).is_none());
+}
+
+#[test]
+fn without_measured_tilt_the_body_goes_parallel_to_its_feet() {
+    let ground = [0.02, 0.02, 0.02, -0.02, -0.02, -0.02];
+    let slope = |feedback: bool| {
+        let mut gait = gait(&format!(
+            r#"{{"speed_m_s": 0.1, "stand_s": 0.2, "heading_feedback": false, "posture_feedback": {feedback}}}"#
+        ));
+        walk(&mut gait, ground, 4.0, || 0.0);
+        set(&mut gait, "speed", 0.0).expect("accepted");
+        // The ground goes where the feet are: a body that moves takes its feet along.
+        for _ in 0..6000 {
+            let here = gait.walker().feet.map(|f| f.height);
+            walk(&mut gait, here, H, || 0.0);
+        }
+        let feet = gait.walker().feet;
+        Plane::through(feet.iter().map(|f| (f.position, f.height))).expect("feet").slope[1]
+    };
+    let [with, without] = [true, false].map(slope);
+    assert!(without.abs() < 1e-6, "{without}: the feet are in a plane of the body");
+    assert!(with > 0.01, "{with}: what was found stays, tilt is measured");
+}
+
+#[test]
+fn nobody_waits_for_a_leg_that_is_gone() {
+    let cycles = |lost: f64| {
+        let mut gait = gait(&format!(r#"{{"gait": "ripple", "speed_m_s": 0.1, {STEADY}}}"#));
+        let mut ground = [0.0; LEGS];
+        walk(&mut gait, ground, 3.0, || 0.0);
+        ground[0] = lost;
+        walk(&mut gait, ground, 4.0, || 0.0);
+        let (mut turned, mut before) = (0.0, read(&gait, "phase"));
+        for _ in 0..1800 {
+            walk(&mut gait, ground, H, || 0.0);
+            let phase = read(&gait, "phase");
+            turned += (phase - before).rem_euclid(1.0);
+            before = phase;
+        }
+        turned
+    };
+    let (whole, lost) = (cycles(0.0), cycles(-1.0));
+    assert!((whole - lost).abs() < 1e-9, "{whole} and {lost} cycles");
 }
 
 proptest! {

@@ -98,7 +98,12 @@ fn steps_of_feet(context: &Context, name: &str, strategy: Option<&str>) -> Outco
     Ok(vec![
         figure("airborne", feet.airborne as f64, limit(Limit::Equal(0.0)), "steps in which no foot presses"),
         figure("peak", feet.peak / weight, limit(Limit::AtMost(2.5)), "largest force on a foot / weight"),
-        figure("peak_sum", feet.peak_sum / weight, Limit::None, "largest force on all feet / weight"),
+        figure(
+            "peak_sum",
+            feet.peak_sum / weight,
+            limit(Limit::AtMost(2.5)),
+            "largest force on all feet / weight",
+        ),
         figure("cost_of_transport", cost, Limit::None, "energy of the motors / (weight · distance)"),
     ])
 }

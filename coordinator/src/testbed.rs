@@ -27,6 +27,7 @@ mod group;
 mod hosted;
 mod pieces;
 mod reload;
+mod standing;
 mod unglued;
 
 pub(crate) use build::{find, make, services, with_law};
@@ -91,6 +92,10 @@ pub struct Testbed {
     index: u64,
     t: f64,
     last_h: f64,
+    /// Time before t = 0 in which bodies come to rest on the ground, s.
+    settle_s: f64,
+    /// Energies that were counted before t = 0.
+    before: Energy,
     halvings: u32,
     max_halvings: u32,
     hold: terraglue_subsystem::Hold,
@@ -116,6 +121,8 @@ struct TimeKept {
     index: u64,
     t: f64,
     started: bool,
+    /// Energies that were counted before t = 0.
+    before: Energy,
 }
 
 impl Testbed {
@@ -146,10 +153,7 @@ impl Testbed {
 
     /// Goes to the next nominal communication point t + h.
     pub fn step(&mut self) -> Result {
-        if self.index == 0 && self.t == 0.0 && !self.started {
-            self.started = true;
-            self.start_joints()?;
-        }
+        self.begin()?;
         let end = self.origin_s + (self.nominal + 1) as f64 * self.step_s;
         let mut longest = self.step_s;
         self.halvings = 0;
@@ -266,14 +270,28 @@ impl Testbed {
         if self.index == 0 && self.t == 0.0 {
             self.settle()?;
         }
+        self.read_signals()?;
+        if !self.faults.is_empty() {
+            self.apply_faults()?;
+        }
+        self.write_signals()
+    }
+
+    /// Outputs become inputs with nothing wrong on their way.
+    fn pass_signals(&mut self) -> Result {
+        self.read_signals()?;
+        self.write_signals()
+    }
+
+    fn read_signals(&mut self) -> Result {
         // all are read before any is set: a unit whose outputs follow its inputs at once shows nobody the inputs of t
         for link in &mut self.links.numbers {
             link.read(&self.instances)?;
         }
-        self.links.discrete.iter_mut().try_for_each(|l| l.read(&self.instances))?;
-        if !self.faults.is_empty() {
-            self.apply_faults()?;
-        }
+        self.links.discrete.iter_mut().try_for_each(|l| l.read(&self.instances))
+    }
+
+    fn write_signals(&mut self) -> Result {
         for link in &self.links.numbers {
             link.pass_on(&mut self.instances)?;
         }
@@ -432,9 +450,9 @@ impl Testbed {
         })
     }
 
-    /// Sum over all subsystems.
+    /// Sum over all subsystems; work and heat since t = 0.
     pub fn energy(&self) -> Energy {
-        self.instances.iter().fold(Energy::default(), |sum, i| {
+        let sum = self.instances.iter().fold(Energy::default(), |sum, i| {
             let e = i.subsystem().energy();
             Energy {
                 kinetic: sum.kinetic + e.kinetic,
@@ -444,7 +462,8 @@ impl Testbed {
                 actuator_work: sum.actuator_work + e.actuator_work,
                 electrical: sum.electrical + e.electrical,
             }
-        })
+        });
+        standing::since(&self.before, sum)
     }
 
     /// Committed value of a scalar number by full name; `None` where there is no such variable.

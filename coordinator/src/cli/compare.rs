@@ -161,6 +161,7 @@ fn cold_start_mean(
     let mut testbed = run::build(&scenario, &run::options(arguments, cancel)).ok()?;
     let mut progress = Progress::new(bar.clone(), scenario.time.duration_s, "without the estimate: ");
     let mut figures = SummaryObserver::new(&scenario);
+    testbed.begin().ok()?;
     testbed.view(|view| figures.started(view)).ok()?;
     testbed.run_until(scenario.time.duration_s, &mut [&mut figures, &mut progress]).ok()?;
     testbed.view(|view| figures.finished(view, None)).ok()?;

@@ -140,13 +140,15 @@ pub fn run_testbed(
     // an error below drops the testbed, and with it what modules do at their end, before the will
     let mut testbed = testbed;
     let surroundings = Surroundings::now();
+    let begun = testbed.begin();
     testbed.view(|view| recorder.started(view))?;
     write_exchange(folder, &testbed.explain())?;
     let (wall, cpu) = (Instant::now(), cpu_s());
     let until_s = scenario.time.duration_s;
-    let ran = match reloader {
-        None => testbed.run_until(until_s, &mut [&mut recorder, progress]),
-        Some(reloader) => reloader.run_until(&mut testbed, until_s, &mut [&mut recorder, progress]),
+    let ran = match (begun, reloader) {
+        (Err(error), _) => Err(error),
+        (_, None) => testbed.run_until(until_s, &mut [&mut recorder, progress]),
+        (_, Some(reloader)) => reloader.run_until(&mut testbed, until_s, &mut [&mut recorder, progress]),
     };
     let (wall_s, cpu_s) = (wall.elapsed().as_secs_f64(), cpu_s() - cpu);
     let error = ran.err();

@@ -105,6 +105,9 @@ fn time() -> Table {
     let keys = vec![
         number("step_s", "s", 0.001, "communication step h").positive().within_max(1.0).into(),
         required("duration_s", "s", "simulated time; a multiple of `step_s`").positive().into(),
+        number("settle_s", "s", 0.0, "time before the start in which what touches the ground comes to rest")
+            .within(0.0, 1e3)
+            .into(),
     ];
     Table { required: true, ..of("time", "How long and in which steps.", keys) }
 }

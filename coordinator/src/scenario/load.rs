@@ -165,7 +165,11 @@ fn with_section<T>(source: &Source, name: &str, read: impl FnOnce(&Section) -> C
 }
 
 fn read_time(s: &Section) -> Checked<Time> {
-    let time = Time { step_s: s.number("step_s"), duration_s: s.number("duration_s") };
+    let time = Time {
+        step_s: s.number("step_s"),
+        duration_s: s.number("duration_s"),
+        settle_s: s.number("settle_s"),
+    };
     let steps = time.duration_s / time.step_s;
     if (steps - steps.round()).abs() > 1e-6 * steps.max(1.0) || steps.round() < 1.0 {
         let below = (steps.floor() * time.step_s).max(time.step_s);

@@ -44,6 +44,8 @@ pub struct Time {
     pub step_s: f64,
     /// Simulated time, s.
     pub duration_s: f64,
+    /// Time before the start in which what touches the ground comes to rest, s.
+    pub settle_s: f64,
 }
 
 /// `[world]`.

@@ -18,7 +18,9 @@ use crate::timing::Timings;
 use crate::{Error, Result, terrain};
 use std::sync::Arc;
 use std::time::Duration;
-use terraglue_subsystem::{BodyState, Capabilities, Config, Hold, Kind, Law, Level, Subsystem, Terrain};
+use terraglue_subsystem::{
+    BodyState, Capabilities, Config, Energy, Hold, Kind, Law, Level, Subsystem, Terrain,
+};
 
 impl Testbed {
     /// Builds a scenario with modules found as libraries.
@@ -56,6 +58,7 @@ impl Testbed {
         let faults = Faults::new(&scenario.faults, &links.numbers, &directory, &instances, source, random)?;
         check_report(scenario, &directory, &instances)?;
         let groups = groups(scenario, &instances)?;
+        check_settling(scenario, &groups, &instances)?;
         let ground = groups.iter().find(|g| g.exchange.has_grounds());
         let detector = detector(ground, &instances, terrain.as_deref())?;
         let mut testbed = Self {
@@ -86,6 +89,8 @@ impl Testbed {
             index: 0,
             t: 0.0,
             last_h: 0.0,
+            settle_s: scenario.time.settle_s,
+            before: Energy::default(),
             halvings: 0,
             max_halvings: scenario.gluing.max_halvings,
             hold: hold(&scenario.gluing.hold),
@@ -100,6 +105,23 @@ impl Testbed {
         }
         Ok(testbed)
     }
+}
+
+/// Units know no time before their start, so none can be among what comes to rest before t = 0.
+fn check_settling(scenario: &Scenario, groups: &[Group], instances: &[Instance]) -> Result {
+    let settle_s = scenario.time.settle_s;
+    let glued = |slot: usize| groups.iter().any(|g| g.exchange.members().any(|m| m == slot));
+    let mut units = instances
+        .iter()
+        .enumerate()
+        .filter(|(slot, i)| crate::fmu::is_fmu(i.module()) && (glued(*slot) || !i.scene().bodies.is_empty()));
+    let Some((_, unit)) = units.next().filter(|_| settle_s > 0.0) else { return Ok(()) };
+    let message = format!(
+        "`settle_s` = {settle_s} s: `{}` is a functional mock-up unit, whose time begins at 0",
+        unit.name()
+    );
+    let help = Some("leave `settle_s` out, or give the body a module".to_owned());
+    Err(scenario.source.error_at_value(&["time", "settle_s"], message, help).into())
 }
 
 /// Whether a step of the run may end at any time: all subsystems make every step, and of any length.
@@ -282,6 +304,7 @@ fn turns(scenario: &Scenario, instances: &[Instance], groups: &[Group]) -> Vec<T
     let turn = |(slot, (spec, instance)): (usize, (&SubsystemSpec, &Instance))| Turn {
         step_multiple: spec.step_multiple.max(1),
         glued: glued(slot),
+        holds: false,
         has_bodies: !instance.scene().bodies.is_empty(),
         trial: None,
     };

@@ -4,7 +4,7 @@ use super::{Snapshot, Testbed, TimeKept};
 use crate::host::Instance;
 use crate::{Error, Result};
 use serde_json::{Value, json};
-use terraglue_subsystem::{Capabilities, bytes};
+use terraglue_subsystem::{Capabilities, Energy, bytes};
 
 impl Testbed {
     pub(super) fn time_kept(&self) -> TimeKept {
@@ -15,13 +15,14 @@ impl Testbed {
             index: self.index,
             t: self.t,
             started: self.started,
+            before: self.before,
         }
     }
 
     pub(super) fn set_time(&mut self, kept: TimeKept) {
         (self.step_s, self.origin_s) = (kept.step_s, kept.origin_s);
         (self.nominal, self.index, self.t) = (kept.nominal, kept.index, kept.t);
-        self.started = kept.started;
+        (self.started, self.before) = (kept.started, kept.before);
     }
 
     /// Length of a nominal step, s.
@@ -77,6 +78,7 @@ impl Testbed {
             "bits": bits,
             "counts": [kept.nominal, kept.index],
             "started": kept.started,
+            "before": before_bits(&kept.before),
             "fired": self.time_line.fired(),
             "memory": self.memory(),
             "lengths": parts.iter().map(Vec::len).collect::<Vec<_>>(),
@@ -109,6 +111,11 @@ impl Testbed {
     }
 }
 
+/// What is counted of an energy book, bit by bit.
+fn before_bits(e: &Energy) -> [u64; 4] {
+    [e.dissipated, e.port_work, e.actuator_work, e.electrical].map(f64::to_bits)
+}
+
 /// The bytes before their hash, where it is theirs.
 fn unsealed(all: &[u8]) -> Option<&[u8]> {
     let (content, sum) = all.split_last_chunk::<8>()?;
@@ -133,6 +140,9 @@ fn read_head(head: &Value) -> Option<Head> {
         |key: &str| -> Option<Vec<u64>> { head[key].as_array()?.iter().map(Value::as_u64).collect() };
     let (bits, counts) = (numbers("bits")?, numbers("counts")?);
     let (&[step, origin, t], &[nominal, index]) = (bits.as_slice(), counts.as_slice()) else { return None };
+    let counted: [u64; 4] = numbers("before")?.try_into().ok()?;
+    let [dissipated, port_work, actuator_work, electrical] = counted.map(f64::from_bits);
+    let before = Energy { dissipated, port_work, actuator_work, electrical, ..Energy::default() };
     let fired: Option<Vec<bool>> = head["fired"].as_array()?.iter().map(Value::as_bool).collect();
     let memory: Option<Vec<Vec<u64>>> = head["memory"]
         .as_array()?
@@ -141,6 +151,7 @@ fn read_head(head: &Value) -> Option<Head> {
         .collect();
     let [step_s, origin_s, t] = [step, origin, t].map(f64::from_bits);
     let good = [step_s, origin_s, t].iter().all(|x| x.is_finite()) && step_s > 0.0;
-    let kept = TimeKept { step_s, origin_s, nominal, index, t, started: head["started"].as_bool()? };
+    let started = head["started"].as_bool()?;
+    let kept = TimeKept { step_s, origin_s, nominal, index, t, started, before };
     good.then_some((kept, fired?, memory?))
 }

@@ -42,6 +42,8 @@ pub(super) struct Turn {
     pub step_multiple: u32,
     /// Whether it is glued: it makes none by itself.
     pub glued: bool,
+    /// Whether it makes no step now, as controllers do before the start.
+    pub holds: bool,
     /// Whether it has bodies, whose states are read after every step.
     pub has_bodies: bool,
     /// How its last trial ended where that was not at t + h.
@@ -173,6 +175,7 @@ impl Turn {
         let long;
         let step = match (self.glued, self.step_multiple) {
             (true, _) => return None,
+            _ if self.holds => return None,
             (false, 1) => &span.step,
             (false, _) => {
                 long = self.long_step(span)?;

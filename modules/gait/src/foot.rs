@@ -2,6 +2,9 @@
 //!
 //! In the air x and y follow a cycloid and z a raised cosine, so that the foot leaves and meets the ground at rest:
 //! at rest in the body frame, or, as it should be on soft ground, at rest in the world.
+//!
+//! Where the force on the foot is known, the swing ends in its last quarter as soon as the foot presses on the ground,
+//! and the foot stands at the height where it met it. A foot that presses on nothing looks further down.
 
 use std::f64::consts::TAU;
 
@@ -55,6 +58,39 @@ pub enum Swing {
     Ground,
 }
 
+/// When a swing ends.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum TouchDown {
+    /// At its time, at the height of the plane of the standing feet.
+    Time,
+    /// When the foot presses on the ground.
+    Contact(Search),
+}
+
+/// How a foot finds the ground.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Search {
+    /// Force at which the foot counts as standing, as a share of the mean load over the number of legs.
+    pub share: f64,
+    /// How far below the plane of the standing feet it looks for the ground, m.
+    pub depth: f64,
+    /// Speed at which it looks further down, m/s.
+    pub speed: f64,
+    /// Time constant at which the body goes back to its height above the standing feet, s.
+    pub levelling_s: f64,
+}
+
+/// What a foot knows of the ground during a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sensed {
+    /// Normal force on the foot, N.
+    pub force: f64,
+    /// Force from which on it stands, N.
+    pub threshold: f64,
+    /// How it looks for ground.
+    pub search: Search,
+}
+
 /// State of a foot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Foot {
@@ -66,8 +102,17 @@ pub struct Foot {
     pub position: [f64; 2],
     /// Height above the plane of the standing feet, m.
     pub height: f64,
+    /// Whether it should stand and looks further down, since it presses on nothing.
+    pub searching: bool,
+    /// Whether it has pressed on ground since its last swing.
+    pub found: bool,
+    /// Whether it has looked for ground down to the limit without finding it, and has found none since: nobody waits for
+    /// it, as the leg may be gone.
+    pub missing: bool,
     lift_off: [f64; 2],
     lift: f64,
+    /// Height at lift-off, m.
+    from_height: f64,
 }
 
 /// What holds for all feet during a step.
@@ -85,16 +130,76 @@ pub struct Cycle {
     pub stepping: bool,
     /// Where the swing begins and ends at rest.
     pub swing: Swing,
+    /// Whether the cycle stands still, until a foot that looks for the ground has found it.
+    pub waiting: bool,
 }
+
+/// Part of the swing from which on contact ends it: the foot is at half its height, nine tenths of the way are made. A
+/// swing that ended earlier would leave a stance that the leg cannot reach to the end.
+const LANDING: f64 = 0.75;
+/// A foot that presses with less than this part of the threshold looks for the ground again.
+const RELEASE: f64 = 0.5;
 
 impl Foot {
     /// Standing at a point of the body frame, m.
     pub fn standing(position: [f64; 2], phase: f64) -> Self {
-        Self { phase, airborne: false, position, height: 0.0, lift_off: position, lift: 0.0 }
+        Self {
+            phase,
+            airborne: false,
+            position,
+            height: 0.0,
+            searching: false,
+            found: true,
+            missing: false,
+            lift_off: position,
+            lift: 0.0,
+            from_height: 0.0,
+        }
+    }
+
+    /// Begins a cycle where it stands.
+    pub fn begin(&mut self, phase: f64) {
+        let Self { height, searching, found, missing, .. } = *self;
+        *self = Self { height, searching, found, missing, ..Self::standing(self.position, phase) };
+    }
+
+    /// Whether it leaves the ground within `dt` s.
+    pub fn leaves(&self, cycle: &Cycle, dt: f64) -> bool {
+        let until = (cycle.duty - self.phase) * cycle.period;
+        cycle.stepping && !self.airborne && (0.0..=dt).contains(&until)
+    }
+
+    /// What the force at the start of a step of `dt` s says: the swing ends in its last quarter; a foot that should
+    /// stand and presses on nothing goes further down, as far as it may.
+    pub fn feel(&mut self, cycle: &Cycle, sensed: &Sensed, dt: f64) {
+        let presses = sensed.force > sensed.threshold;
+        if self.airborne {
+            let lands = self.phase > cycle.duty + LANDING * (1.0 - cycle.duty);
+            self.airborne = !(presses && lands);
+            self.found = !self.airborne;
+            self.missing &= self.airborne;
+            return;
+        }
+        self.rest(sensed, dt);
+    }
+
+    /// The same for a foot that stands.
+    pub fn rest(&mut self, sensed: &Sensed, dt: f64) {
+        let enough = if self.searching { sensed.threshold } else { RELEASE * sensed.threshold };
+        let presses = sensed.force > enough;
+        self.searching = !presses && self.height > -sensed.search.depth;
+        self.found = presses || self.found && self.searching;
+        self.missing = !presses && (self.missing || !self.searching);
+        if self.searching {
+            self.height = (self.height - sensed.search.speed * dt).max(-sensed.search.depth);
+        }
     }
 
     /// Moves on by `dt` s; events inside the step are met exactly. `neutral` is the middle of the stance, m.
     pub fn advance(&mut self, cycle: &Cycle, neutral: [f64; 2], dt: f64) {
+        if cycle.waiting {
+            return self.wait(cycle, neutral, dt);
+        }
         let mut left = dt;
         while left > 0.0 {
             left = if self.airborne { self.fly(cycle, neutral, left) } else { self.stand(cycle, left) };
@@ -128,6 +233,8 @@ impl Foot {
             self.airborne = true;
             self.lift_off = self.position;
             self.lift = cycle.lift;
+            self.from_height = self.height;
+            (self.searching, self.found) = (false, false);
         }
         dt - passed
     }
@@ -136,10 +243,17 @@ impl Foot {
         let until = (1.0 - self.phase) * cycle.period;
         let target = Self::touch_down(cycle, neutral);
         if until <= dt {
-            *self = Self { lift: self.lift, ..Self::standing(target, 0.0) };
+            let Self { lift, missing, .. } = *self;
+            *self = Self { lift, missing, found: false, ..Self::standing(target, 0.0) };
             return dt - until;
         }
         self.phase += dt / cycle.period;
+        self.swing(cycle, target, dt);
+        0.0
+    }
+
+    /// The place in the air at its phase.
+    fn swing(&mut self, cycle: &Cycle, target: [f64; 2], dt: f64) {
         let target = match cycle.swing {
             Swing::Body => target,
             Swing::Ground => {
@@ -152,9 +266,31 @@ impl Foot {
         let along = u - libm::sin(TAU * u) / TAU;
         self.position = std::array::from_fn(|k| self.lift_off[k] + (target[k] - self.lift_off[k]) * along);
         self.height = self.lift * 0.5 * (1.0 - libm::cos(TAU * u));
-        0.0
+        if self.from_height != 0.0 {
+            self.height += self.from_height * (1.0 - along);
+        }
+    }
+
+    /// The body moves on by `dt` s while the cycle stands still: what stands passes below it, what flies hovers.
+    fn wait(&mut self, cycle: &Cycle, neutral: [f64; 2], dt: f64) {
+        if self.airborne {
+            self.swing(cycle, Self::touch_down(cycle, neutral), dt);
+        } else {
+            self.position = cycle.twist.pass_below(self.position, dt);
+        }
     }
 }
 
 terraglue_subsystem::persist!(Twist { speed, turn_rate });
-terraglue_subsystem::persist!(Foot { phase, airborne, position, height, lift_off, lift });
+terraglue_subsystem::persist!(Foot {
+    phase,
+    airborne,
+    position,
+    height,
+    searching,
+    found,
+    missing,
+    lift_off,
+    lift,
+    from_height
+});

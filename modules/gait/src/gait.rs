@@ -11,7 +11,7 @@ use terraglue_subsystem::{
 };
 
 /// Version of its states as bytes.
-const VERSION: u32 = 1;
+const VERSION: u32 = 2;
 
 /// Walks a robot with six legs of four joints. Outputs are the targets at the committed time: those that the joints
 /// shall follow during the next step. Inputs are taken at the start of a step.

@@ -1,13 +1,13 @@
 //! Walks a robot with legs of four joints: inverse kinematics, gait patterns, posture feedback.
 //!
 //! [`Gait`] is the module. It knows the robot only through variables: it reads `roll`, `pitch` and `yaw` of the
-//! body and offers `J.angle_target` for each joint J.
+//! body and `L.contact_force` of each leg L, and offers `J.angle_target` for each joint J.
 //!
 //! # How a target comes about
 //! 1. [`walker`]: a command (speed, turn rate, heading) becomes a planar twist of the body, within what the legs reach.
 //! 2. [`pattern`]: each leg runs through its own cycle, first on the ground, then in the air.
 //! 3. [`foot`]: on the ground a foot stays where it is in the world, so it moves against the twist in the body frame;
-//!    in the air it flies to where its next stance has to begin.
+//!    in the air it flies to where its next stance has to begin, until it presses on the ground.
 //! 4. [`posture`]: the measured tilt raises the feet of the high side and lowers those of the low side.
 //! 5. [`geometry`]: foot positions become joint angles, the last link vertical in the body frame.
 //!
@@ -20,8 +20,10 @@
 pub mod foot;
 mod gait;
 pub mod geometry;
+pub mod load;
 mod parameters;
 pub mod pattern;
+pub mod plane;
 pub mod posture;
 mod variables;
 pub mod walker;

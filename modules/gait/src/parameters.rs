@@ -1,6 +1,6 @@
 //! Parameters of the module: the schema that the host checks a scenario against, and the checked values.
 
-use crate::foot::Swing;
+use crate::foot::{Search, Swing, TouchDown};
 use crate::geometry::{LEGS, Leg};
 use crate::pattern::{NAMES, Pattern};
 use crate::posture::Gains;
@@ -21,6 +21,8 @@ pub struct Settings {
     pub stride_limit: f64,
     /// In which frame a swing begins and ends at rest.
     pub swing: Swing,
+    /// When a swing ends.
+    pub touch_down: TouchDown,
     /// Time of standing at the start, s.
     pub stand_s: f64,
     /// Time in which the speed grows from zero, s.
@@ -50,6 +52,7 @@ impl Settings {
 /// Name, kind and parameters of the module.
 pub fn schema() -> Schema {
     let mut parameters = commands();
+    parameters.extend(ground());
     parameters.extend(geometry());
     parameters.extend(feedback());
     Schema {
@@ -86,6 +89,31 @@ fn commands() -> Vec<Parameter> {
         number("ramp_s", "s", 1.0, "Time in which the speed grows from zero").positive(),
         number("acceleration_m_s2", "m/s^2", 0.3, "Largest change of the speed").positive(),
         number("turn_acceleration_rad_s2", "rad/s^2", 0.6, "Largest change of the turn rate").positive(),
+    ]
+}
+
+fn ground() -> Vec<Parameter> {
+    let number = Parameter::number;
+    vec![
+        Parameter::of(
+            "touch_down",
+            ParameterType::Text,
+            "What ends a swing: the force on the foot, or the time",
+        )
+        .or("contact")
+        .choices(&["contact", "time"]),
+        number(
+            "touch_share",
+            "1",
+            0.3,
+            "A foot stands from this share of the mean load of one of six feet on",
+        )
+        .within(0.0, 1.0),
+        number("search_m", "m", 0.04, "How far below the plane of the standing feet a foot looks for ground")
+            .within(0.0, 0.2),
+        number("search_speed_m_s", "m/s", 0.1, "Speed at which it looks further down").positive(),
+        number("levelling_s", "s", 0.5, "Time constant of the body's height above the standing feet")
+            .positive(),
     ]
 }
 
@@ -133,6 +161,7 @@ pub fn settings(config: &Config) -> Result<(Settings, Command)> {
         body_height,
         stride_limit: number("stride_max_m")?.min(reach),
         swing: if config.text("swing")? == "body" { Swing::Body } else { Swing::Ground },
+        touch_down: touch_down(&config)?,
         stand_s: number("stand_s")?,
         ramp_s: number("ramp_s")?,
         acceleration: number("acceleration_m_s2")?,
@@ -157,7 +186,20 @@ fn command(config: &Config) -> Result<Command> {
         posture_feedback: config.flag("posture_feedback")?,
         heading_feedback: config.flag("heading_feedback")?,
         attitude: [0.0; 3],
+        contact: [None; LEGS],
     })
+}
+
+fn touch_down(config: &Config) -> Result<TouchDown> {
+    if config.text("touch_down")? == "time" {
+        return Ok(TouchDown::Time);
+    }
+    Ok(TouchDown::Contact(Search {
+        share: config.number("touch_share")?,
+        depth: config.number("search_m")?,
+        speed: config.number("search_speed_m_s")?,
+        levelling_s: config.number("levelling_s")?,
+    }))
 }
 
 fn gains(config: &Config) -> Result<Gains> {

@@ -8,6 +8,7 @@ use terraglue_subsystem::{Causality, Error, Result, ValueType, Variable};
 /// Number of joint targets, the first variables.
 pub const TARGETS: u32 = (LEGS * JOINTS) as u32;
 const STANCES: (u32, u32) = (48, 48 + LEGS as u32);
+const FORCES: (u32, u32) = (56, 56 + LEGS as u32);
 
 /// A scalar of the module apart from targets and stance flags.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -110,16 +111,23 @@ pub fn table() -> Vec<Variable> {
         Variable::real(id, name, "rad", Causality::Output, "Angle that the joint shall take")
     });
     let stances = LEG_NAMES.iter().zip(STANCES.0..).map(|(leg, id)| {
-        let help = "Whether the foot is meant to stand on the ground";
+        let help = "Whether the foot stands on the ground, as far as the gait knows";
         Variable::real(id, format!("{leg}.stance"), "", Causality::Local, help).typed(ValueType::Bool)
     });
-    targets.chain(Id::ALL.into_iter().map(Id::variable)).chain(stances).collect()
+    let forces = LEG_NAMES.iter().zip(FORCES.0..).map(|(leg, id)| {
+        let help = "Normal force of the ground on the foot; once set, it ends the swing of this foot";
+        Variable::real(id, format!("{leg}.contact_force"), "N", Causality::Input, help)
+    });
+    targets.chain(Id::ALL.into_iter().map(Id::variable)).chain(stances).chain(forces).collect()
 }
 
 /// A number.
 pub fn number(id: u32, walker: &Walker, command: &Command) -> Result<f64> {
     if id < TARGETS {
         return Ok(walker.targets[id as usize]);
+    }
+    if let Some(leg) = force(id) {
+        return Ok(command.contact[leg].unwrap_or(0.0));
     }
     Ok(match Id::of(id)? {
         Id::Roll => command.attitude[0],
@@ -142,7 +150,8 @@ pub fn number(id: u32, walker: &Walker, command: &Command) -> Result<f64> {
 /// true or false.
 pub fn flag(id: u32, walker: &Walker, command: &Command) -> Result<bool> {
     if (STANCES.0..STANCES.1).contains(&id) {
-        return Ok(!walker.feet[(id - STANCES.0) as usize].airborne);
+        let foot = &walker.feet[(id - STANCES.0) as usize];
+        return Ok(!foot.airborne && !foot.searching);
     }
     match Id::of(id)? {
         Id::PostureFeedback => Ok(command.posture_feedback),
@@ -159,8 +168,21 @@ pub fn choice(id: u32, command: &Command) -> Result<i64> {
     }
 }
 
+/// The leg whose force a variable is.
+fn force(id: u32) -> Option<usize> {
+    (FORCES.0..FORCES.1).contains(&id).then(|| (id - FORCES.0) as usize)
+}
+
 /// Writes a number into the command.
 pub fn set_number(id: u32, value: f64, command: &mut Command, table: &[Variable]) -> Result {
+    if let Some(leg) = force(id) {
+        if !value.is_finite() {
+            let name = LEG_NAMES[leg];
+            return Err(Error::Refused(format!("`{name}.contact_force` = {value} is not a finite number")));
+        }
+        command.contact[leg] = Some(value);
+        return Ok(());
+    }
     let place = match Id::of(id)? {
         Id::Roll => &mut command.attitude[0],
         Id::Pitch => &mut command.attitude[1],

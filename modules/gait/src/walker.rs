@@ -1,9 +1,11 @@
 //! The walking machine: command in, joint angles out; standing, walking and stopping.
 
-use crate::foot::{Cycle, Foot, Twist};
+use crate::foot::{Cycle, Foot, Search, Sensed, TouchDown, Twist};
 use crate::geometry::{JOINTS, LEGS};
+use crate::load::Load;
 use crate::parameters::Settings;
 use crate::pattern::Pattern;
+use crate::plane::Plane;
 use crate::posture::{Posture, turn_towards, wrap};
 use terraglue_subsystem::Result;
 use terraglue_subsystem::bytes::{self, Persist};
@@ -27,6 +29,8 @@ pub struct Command {
     pub heading_feedback: bool,
     /// Measured roll, pitch and yaw of the body, rad.
     pub attitude: [f64; 3],
+    /// Measured normal force on each foot, N; none where nobody has ever told it.
+    pub contact: [Option<f64>; LEGS],
 }
 
 /// What the machine is doing.
@@ -59,6 +63,8 @@ pub struct Walker {
     pub out_of_reach: u32,
     /// Phase of the cycle, 0 … 1.
     pub phase: f64,
+    /// Mean force on all feet together.
+    pub load: Load,
     ramp: f64,
     slewed: Twist,
     turned: f64,
@@ -78,6 +84,7 @@ impl Walker {
             targets: [0.0; LEGS * JOINTS],
             out_of_reach: 0,
             phase: 0.0,
+            load: Load::default(),
             ramp: 0.0,
             slewed: Twist { speed: command.speed, turn_rate: command.turn_rate },
             turned: 0.0,
@@ -94,9 +101,12 @@ impl Walker {
         let tilt = [command.attitude[0], command.attitude[1]];
         self.posture.advance(&settings.gains, command.posture_feedback, tilt, dt);
         self.slew(settings, command, dt);
+        self.load.advance(&command.contact, dt);
         let left = self.wait(command, dt);
         if left > 0.0 && !matches!(self.mode, Mode::Standing(_)) {
             self.walk(settings, command, left);
+        } else {
+            self.stand(settings, command, dt);
         }
         self.aim(settings);
     }
@@ -120,7 +130,7 @@ impl Walker {
         self.phase = 0.0;
         let phases = self.pattern.phases();
         for (foot, phase) in self.feet.iter_mut().zip(phases) {
-            *foot = Foot::standing(foot.position, phase);
+            foot.begin(phase);
         }
     }
 
@@ -134,21 +144,85 @@ impl Walker {
         self.ramp = (before + rate * dt).clamp(0.0, 1.0);
         self.twist = self.limited(settings).scaled(0.5 * (before + self.ramp));
         self.turned = wrap(self.turned + self.ramp * command.turn_rate * dt);
-        let cycle = Cycle {
+        let mut cycle = Cycle {
             period: settings.cycle_s(self.pattern),
             duty: settings.duty(self.pattern),
             lift: command.lift,
             twist: self.twist,
             stepping,
             swing: settings.swing,
+            waiting: false,
         };
+        if let TouchDown::Contact(search) = settings.touch_down {
+            self.feel(&cycle, &search, command, dt);
+            cycle.waiting = self.waits(settings, &cycle, dt);
+        }
         for (foot, neutral) in self.feet.iter_mut().zip(settings.neutral) {
             foot.advance(&cycle, neutral, dt);
+        }
+        if cycle.waiting {
+            return;
         }
         if stepping {
             self.phase = (self.phase + dt / cycle.period).fract();
         } else if self.ramp <= 0.0 && self.feet.iter().all(|f| !f.airborne) {
             self.mode = Mode::Standing(0.0);
+        }
+    }
+
+    /// All feet rest.
+    fn stand(&mut self, settings: &Settings, command: &Command, dt: f64) {
+        let TouchDown::Contact(search) = settings.touch_down else { return };
+        for leg in 0..LEGS {
+            if let Some(sensed) = self.sensed(&search, command, leg) {
+                self.feet[leg].rest(&sensed, dt);
+            }
+        }
+        self.level(&search, command, dt);
+    }
+
+    /// What the forces say at the start of a step of walking.
+    fn feel(&mut self, cycle: &Cycle, search: &Search, command: &Command, dt: f64) {
+        for leg in 0..LEGS {
+            if let Some(sensed) = self.sensed(search, command, leg) {
+                self.feet[leg].feel(cycle, &sensed, dt);
+            }
+        }
+        self.level(search, command, dt);
+    }
+
+    /// Whether a foot that is about to leave has to wait for one that looks for the ground. No foot is carried farther
+    /// from its neutral point meanwhile than the longest stride carries it.
+    fn waits(&self, settings: &Settings, cycle: &Cycle, dt: f64) -> bool {
+        let searching = self.feet.iter().any(|f| f.searching && !f.missing);
+        let farthest = 0.5 * settings.stride_limit;
+        let near = |(foot, neutral): (&Foot, &[f64; 2])| {
+            libm::hypot(foot.position[0] - neutral[0], foot.position[1] - neutral[1]) < farthest
+        };
+        searching
+            && self.feet.iter().any(|f| f.leaves(cycle, dt))
+            && self.feet.iter().zip(&settings.neutral).filter(|(f, _)| !f.airborne).all(near)
+    }
+
+    /// What a foot feels, where it is told.
+    fn sensed(&self, search: &Search, command: &Command, leg: usize) -> Option<Sensed> {
+        let threshold = search.share * self.load.mean() / LEGS as f64;
+        command.contact[leg].map(|force| Sensed { force, threshold, search: *search })
+    }
+
+    /// The body goes back to its height above the feet that stand on ground. Where nobody measures its tilt, it goes
+    /// parallel to them, too.
+    fn level(&mut self, search: &Search, command: &Command, dt: f64) {
+        let stands = |f: &Foot| !f.airborne && !f.searching && f.found;
+        let feet = self.feet;
+        let points = feet.iter().filter(|f| stands(f)).map(|f| (f.position, f.height));
+        let Some(mut plane) = Plane::through(points) else { return };
+        if command.posture_feedback {
+            plane.slope = [0.0; 2];
+        }
+        let share = dt / (search.levelling_s + dt);
+        for foot in self.feet.iter_mut().filter(|f| stands(f)) {
+            foot.height -= share * plane.at(foot.position);
         }
     }
 
@@ -199,6 +273,7 @@ terraglue_subsystem::persist!(Command {
     posture_feedback,
     heading_feedback,
     attitude,
+    contact,
 });
 terraglue_subsystem::persist!(Walker {
     mode,
@@ -209,6 +284,7 @@ terraglue_subsystem::persist!(Walker {
     targets,
     out_of_reach,
     phase,
+    load,
     ramp,
     slewed,
     turned,

@@ -494,6 +494,11 @@ impl Subsystem for Robot {
 
     fn act(&mut self, action: &str, _arguments: &str) -> Result {
         let unknown = || Error::Refused(format!("there is no action `{action}`"));
+        if action == variables::RESTART {
+            self.state.restart_books();
+            self.changed();
+            return Ok(());
+        }
         let (name, what) = action.rsplit_once('.').ok_or_else(unknown)?;
         if let Some(closure) = self.model().closures.iter().position(|c| c.name == name) {
             if what != "break" {

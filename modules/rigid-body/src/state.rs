@@ -116,6 +116,15 @@ pub(crate) struct State {
 }
 
 impl State {
+    /// Counts work, heat, drawn energy and distance from here on. What batteries and windings hold stays.
+    pub fn restart_books(&mut self) {
+        let Energy { kinetic, potential, .. } = self.energy;
+        self.energy = Energy { kinetic, potential, ..Energy::default() };
+        (self.contact.lost, self.start) = (0.0, None);
+        (self.supply.delivered, self.supply.lost, self.supply.missing) = (0.0, 0.0, 0.0);
+        self.joints.iter_mut().for_each(|j| j.actuator.restart_book());
+    }
+
     /// Takes over another state without allocating once the sizes are equal.
     pub fn copy_from(&mut self, other: &Self) {
         self.bodies.clone_from(&other.bodies);

@@ -321,11 +321,15 @@ fn flag(id: u32, joint: &str, what: &str, causality: Causality, help: &str) -> V
     Variable::real(id, format!("{joint}.{what}"), "", causality, help).typed(ValueType::Bool)
 }
 
+/// Action that begins to count work and heat afresh.
+pub(crate) const RESTART: &str = "energy.restart";
+
 /// All actions of a robot.
 pub(crate) fn actions(model: &Model) -> Vec<Action> {
     let action =
         |name: &str, what: &str, help: &str| Action { name: format!("{name}.{what}"), help: help.into() };
-    let mut all = Vec::new();
+    let help = "Count work, heat, drawn energy and distance from here on";
+    let mut all = vec![Action { name: RESTART.into(), help: help.into() }];
     for joint in &model.joints {
         all.push(action(&joint.name, "break", "Remove the joint for ever"));
         if joint.moves() {

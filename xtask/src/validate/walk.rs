@@ -1,15 +1,20 @@
-//! Area `walk`: `scenarios/moon_walk.toml` with both soils and both strategies, run as a user runs it.
+//! Area `walk`: `scenarios/moon_walk.toml` with both soils and both strategies, run as a user runs it; and what its gait
+//! does to the feet.
 
 use super::parallel::in_parallel;
 use super::timing::{calibration_s, median};
 use super::{Context, Figure, Limit};
 use crate::process::{Outcome, run_scenario};
 use serde_json::Value;
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 const SCENARIO: &str = "scenarios/moon_walk.toml";
 const SOILS: [&str; 2] = ["soil-cellular-automaton", "soil-bekker"];
 const STRATEGIES: [&str; 2] = ["cooperative", "iterative"];
+
+/// The scenario as it is shipped, and glued otherwise.
+const GAITS: [(&str, Option<&str>); 3] =
+    [("default", None), ("compliant", Some("cooperative-compliant")), ("iterative", Some("iterative"))];
 
 /// One run of the program.
 struct Run<'a> {
@@ -30,6 +35,9 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     });
     for ((soil, strategy), summary) in combinations.iter().zip(summaries) {
         all.extend(quality(&format!("walk.{soil}.{strategy}"), &summary?));
+    }
+    for (name, strategy) in GAITS {
+        all.extend(steps_of_feet(context, name, strategy)?);
     }
     for soil in SOILS {
         all.push(same_bytes(context, soil)?);
@@ -66,6 +74,84 @@ fn quality(id: &str, s: &Value) -> Vec<Figure> {
         ),
         mass,
     ]
+}
+
+/// The forces on the feet in every step: whether the robot ever leaves the ground, and how hard a foot meets it.
+/// Limits hold for the scenario as it is shipped.
+fn steps_of_feet(context: &Context, name: &str, strategy: Option<&str>) -> Outcome<Vec<Figure>> {
+    let duration = if context.quick { "7" } else { "10" };
+    let mut options =
+        vec!["--duration", duration, "--threads", "1", "--csv", "--set", "recording.every_steps=1"];
+    let glued = strategy.map(|s| format!("gluing.strategy={s}"));
+    options.extend(glued.iter().flat_map(|s| ["--set", s.as_str()]));
+    let options = options.into_iter().map(str::to_owned).collect();
+    let run = Run { context, name: format!("gait.{name}"), options };
+    let summary = run.summary()?;
+    let feet = Feet::read(&run.folder().join("variables.csv"))?;
+    let number = |key: &str| summary[key].as_f64().unwrap_or(f64::NAN);
+    let cost = number("cost_of_transport");
+    let weight = number("energy_j") / (cost * number("distance_m").abs());
+    let limit = |limit| if strategy.is_none() { limit } else { Limit::None };
+    let figure = |what: &str, value: f64, limit, help: &str| {
+        Figure::new(format!("walk.gait.{name}.{what}"), value, limit, help)
+    };
+    Ok(vec![
+        figure("airborne", feet.airborne as f64, limit(Limit::Equal(0.0)), "steps in which no foot presses"),
+        figure("peak", feet.peak / weight, limit(Limit::AtMost(2.5)), "largest force on a foot / weight"),
+        figure(
+            "peak_sum",
+            feet.peak_sum / weight,
+            limit(Limit::AtMost(2.5)),
+            "largest force on all feet / weight",
+        ),
+        figure("cost_of_transport", cost, Limit::None, "energy of the motors / (weight · distance)"),
+    ])
+}
+
+/// Normal forces of the ground over a run.
+#[derive(Default)]
+struct Feet {
+    /// Steps without any.
+    airborne: usize,
+    /// Largest of one foot, N.
+    peak: f64,
+    /// Largest of all feet together, N.
+    peak_sum: f64,
+}
+
+impl Feet {
+    /// From the variables of every step.
+    fn read(path: &Path) -> Outcome<Self> {
+        let failed = |e: csv::Error| format!("{}: {e}", path.display());
+        let mut reader = csv::Reader::from_path(path).map_err(failed)?;
+        let columns: Vec<usize> = reader
+            .headers()
+            .map_err(failed)?
+            .iter()
+            .enumerate()
+            .filter(|(_, name)| name.starts_with("robot.") && name.ends_with("4.contact_normal"))
+            .map(|(k, _)| k)
+            .collect();
+        if columns.is_empty() {
+            return Err(format!("{}: no force on any foot", path.display()));
+        }
+        let mut feet = Self::default();
+        for row in reader.records() {
+            let row = row.map_err(failed)?;
+            let mut sum = 0.0;
+            for column in &columns {
+                let force: f64 = row.get(*column).and_then(|x| x.parse().ok()).unwrap_or(f64::NAN);
+                if !force.is_finite() {
+                    return Err(format!("{}: a force is no number", path.display()));
+                }
+                feet.peak = feet.peak.max(force);
+                sum += force;
+            }
+            feet.airborne += usize::from(sum <= 0.0);
+            feet.peak_sum = feet.peak_sum.max(sum);
+        }
+        Ok(feet)
+    }
 }
 
 /// The same run with one and with two threads, and once more: recordings equal byte for byte.

@@ -212,7 +212,7 @@ pub fn scenario(strategy: &str) -> Scenario {
     Scenario {
         name: "synthetic_walk".into(),
         folder: "scenarios".into(),
-        time: Time { step_s: H, duration_s: 4.0 },
+        time: Time { step_s: H, duration_s: 4.0, settle_s: 0.0 },
         world: World { gravity_m_s2: [0.0, 0.0, -1.62], seed: 1 },
         terrain: None,
         gluing: GluingSpec {

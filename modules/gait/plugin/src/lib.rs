@@ -22,5 +22,6 @@ terraglue_plugin::export_subsystem! {
         "pitch_correction local f64 rad",
         "out_of_reach local f64",
         "*.stance local bool",
+        "*.contact_force input f64 N",
     ],
 }

@@ -51,6 +51,13 @@ pub(crate) struct Outcome {
 }
 
 impl Actuator {
+    /// Energies count from here on. What the winding holds counts as drawn, so that giving it back is no gain.
+    pub fn restart_book(&mut self) {
+        let Book { power, electrical_power, friction, stop, .. } = self.book;
+        let electrical = 0.5 * self[Item::Inductance] * self.current * self.current;
+        self.book = Book { power, electrical_power, friction, stop, electrical, ..Book::default() };
+    }
+
     /// Advances the actuator by a step of length h at the voltage of the supply; adds to what is drawn from it.
     pub fn commit(&mut self, o: &Outcome, supply_v: f64, h: f64, draw: &mut Draw) {
         let torque = o.shares.motor / h;

@@ -29,13 +29,16 @@ impl Patches {
         wall.answer(&self.sides, wall.way_of(x))
     }
 
-    /// Wrench on the body at rest, and the largest tangential force there, N.
+    /// Wrench on the body as of the last commit, and the largest tangential force at rest, N.
     pub fn at_rest(&self, p: usize) -> ([f64; 6], f64) {
         let (mut sum, mut strength) = ([0.0; 6], 0.0);
         let n = &self.nodes;
         let mut bound = Bound::new(n.doubles);
         self.each_answer(p, &[0.0; 6], |k, pressure, _, r| {
-            add_force(&mut sum, n.arm[k], self.node_force(k, pressure, r.stress));
+            // what the shear and the way of the last step change in what the soil bears belongs to the step that begins
+            let committed = n.stamp[k] != 0 && n.before[k] > 0.0 && pressure > 0.0;
+            let now = if committed { n.before[k] } else { pressure };
+            add_force(&mut sum, n.arm[k], self.node_force(k, now, r.stress));
             let inclined = n.area[k] * n.facing[k].stretch;
             let shear = &self.law(k).shear;
             // soil that clings under tension holds nothing along the underside

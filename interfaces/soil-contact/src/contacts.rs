@@ -81,6 +81,9 @@ impl Contacts {
     }
 }
 
+/// A wheel whose rim and axle are slower stands, m/s: soil under load creeps on the last nanometres of its balance.
+const STANDS: f64 = 1e-4;
+
 /// What a commit has found below a contact.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Touch {
@@ -119,7 +122,8 @@ impl Touch {
 
     fn roll(&mut self, wheel: &Wheel, wrench: &[f64; 6], x: &[f64; 6], h: f64) {
         let [a, b] = wheel.driven(x);
-        self.slip = wheel.rolled(x).slip;
+        let fastest = wheel.ways(x).into_iter().fold(0.0, |m: f64, way| m.max(way.abs()));
+        self.slip = if fastest > STANDS * h { wheel.rolled(x).slip } else { 0.0 };
         self.pull = a * wrench[1] + b * wrench[2];
         // about the axle, which lies r·n above the port
         self.torque = wheel.radius * self.pull - (a * wrench[5] - b * wrench[4]);

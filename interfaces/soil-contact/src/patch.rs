@@ -336,11 +336,8 @@ impl Patches {
         let range = first..self.nodes.index.len();
         let spacing = ground.heights.lattice().spacing;
         // a sphere has no extent and does not roll
-        let found = || Wheel::find(&self.nodes, range.clone(), spacing, port.key);
-        let wheel = (port.extent[0] > 0.0 && port.extent[1] > 0.0)
-            .then(found)
-            .flatten()
-            .map(|w| Wheel { memory: wheel::recall(&ground.wheels, port.key), ..w });
+        let found = || Wheel::find(&self.nodes, range.clone(), spacing, wheel::recall(&ground.wheels, port.key));
+        let wheel = (port.extent[0] > 0.0 && port.extent[1] > 0.0).then(found).flatten();
         let size = Size::of(&self.nodes, range.clone(), spacing);
         let (local, friction) = self.local_laws(laws, wheel.as_ref(), size.b(spacing), range.clone());
         let mut wall = Wall::none(port, wall::recall(&ground.pushes, port.key));

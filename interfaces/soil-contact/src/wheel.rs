@@ -26,6 +26,10 @@ pub struct Memory {
     pub slip: f64,
     /// Whether the way of the axle points along [`Wheel::heading`].
     pub forward: bool,
+    /// Radius of the underside as it was found last, m; 0: never.
+    pub radius: f64,
+    /// Direction of travel along t1 and t2, as it was found last.
+    pub heading: [f64; 2],
 }
 
 /// A contact that can roll, at the start of a step.
@@ -44,12 +48,16 @@ pub struct Wheel {
 }
 
 impl Wheel {
-    /// The wheel whose underside the nodes in `range` are; `None` where the contact does not roll.
-    pub fn find(nodes: &PatchNodes, range: std::ops::Range<usize>, spacing: f64, key: u64) -> Option<Self> {
+    /// The wheel whose underside the nodes in `range` are; `None` where the contact does not roll. What was a wheel stays one
+    /// while it is loaded, also where too few nodes are left to look round, as on an edge or a crest.
+    pub fn find(nodes: &PatchNodes, range: std::ops::Range<usize>, spacing: f64, memory: Memory) -> Option<Self> {
         let used =
             || range.clone().filter(|k| nodes.area[*k] > 0.0 && normal(&nodes.facing[*k])[0] > LEANING);
-        let heading = heading(used().map(|k| normal(&nodes.facing[k])))?;
-        let radius = radius(used().map(|k| (nodes.arm[k], normal(&nodes.facing[k]))), heading)?;
+        let found = heading(used().map(|k| normal(&nodes.facing[k]))).and_then(|heading| {
+            let radius = radius(used().map(|k| (nodes.arm[k], normal(&nodes.facing[k]))), heading)?;
+            Some((heading, radius))
+        });
+        let (heading, radius) = found.or((memory.radius > 0.0).then_some((memory.heading, memory.radius)))?;
         let pressed = || used().filter(|k| nodes.depth[*k] > nodes.permanent[*k]);
         let across = |k: usize| nodes.arm[k][2] * heading[0] - nodes.arm[k][1] * heading[1];
         let (sum, mean) =
@@ -66,12 +74,12 @@ impl Wheel {
             // rows of cells of equal load scatter by (W² − Δ²)/12
             width: (12.0 * variance + spacing * spacing).sqrt(),
             length: (deepest * (2.0 * radius - deepest).max(0.0)).sqrt(),
-            memory: Memory { key, ..Memory::default() },
+            memory: Memory { radius, heading, ..memory },
         })
     }
 
     /// Ways of the rim and of the axle along the heading for a motion `x` (n, t1, t2 and rotations), m.
-    fn ways(&self, x: &[f64; 6]) -> [f64; 2] {
+    pub fn ways(&self, x: &[f64; 6]) -> [f64; 2] {
         let along = |v: [f64; 2]| v[0] * self.heading[0] + v[1] * self.heading[1];
         // the axle lies r·n above the lowest point: θ × r·n along t1 and t2
         let rim = along([self.radius * x[5], -self.radius * x[4]]);
@@ -219,10 +227,10 @@ pub fn remember(memories: &mut Vec<Memory>, wheel: &Wheel, x: &[f64; 6]) {
 /// The memory of a port; a wheel that was never seen rolls forward without slip.
 pub fn recall(memories: &[Memory], key: u64) -> Memory {
     let found = memories.binary_search_by_key(&key, |m| m.key);
-    found.map_or(Memory { key, slip: 0.0, forward: true }, |k| memories[k])
+    found.map_or(Memory { key, forward: true, ..Memory::default() }, |k| memories[k])
 }
 
-terraglue_subsystem::persist!(Memory { key, slip, forward });
+terraglue_subsystem::persist!(Memory { key, slip, forward, radius, heading });
 
 #[cfg(test)]
 mod tests {
@@ -259,7 +267,7 @@ mod tests {
     }
 
     fn find(nodes: &PatchNodes) -> Option<Wheel> {
-        Wheel::find(nodes, 0..nodes.index.len(), 0.01, 1)
+        Wheel::find(nodes, 0..nodes.index.len(), 0.01, recall(&[], 1))
     }
 
     #[test]
@@ -270,6 +278,18 @@ mod tests {
             let along = (w.heading[0] * libm::cos(angle) + w.heading[1] * libm::sin(angle)).abs();
             assert!(along > 1.0 - 1e-4 && (w.width - 0.11).abs() < 0.005, "{w:?}");
         }
+    }
+
+    #[test]
+    fn a_wheel_stays_one_on_a_single_row_of_nodes() {
+        let whole = wheel(0.7, 0.0);
+        let seen = find(&whole).expect("a wheel");
+        let row = 0..1;
+        assert_eq!(Wheel::find(&whole, row.clone(), 0.01, recall(&[], 1)), None);
+        let mut nodes = whole.clone();
+        nodes.permanent.fill(-1.0);
+        let kept = Wheel::find(&nodes, row, 0.01, seen.memory).expect("a wheel");
+        assert_eq!((kept.radius, kept.heading), (seen.radius, seen.heading));
     }
 
     #[test]

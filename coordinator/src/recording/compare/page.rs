@@ -3,6 +3,7 @@
 use crate::recording::compare::scatter::{self, Series};
 use crate::recording::compare::{CompareRow, columns, relative, table};
 use crate::recording::reader::Recording;
+use crate::recording::report::energy_card;
 use crate::recording::report::figure::{Curve, Figure, Panel};
 use crate::recording::report::footprints::{self, Leg};
 use crate::recording::report::html::escape;
@@ -29,6 +30,8 @@ pub(crate) fn render(folder: &Path, rows: &[CompareRow]) -> String {
         rows.len(),
         escape(scenario)
     ));
+    let books = rows.iter().filter_map(|r| Some((r.name(), &r.summary.as_ref()?.energies)));
+    page.section("Where the energy went", "energies", &energy_card::table(books));
     page.section("At a glance", "figures", &html_table(folder, rows));
     for (title, id, html) in diagrams(rows) {
         page.section(title, id, &html);
@@ -151,7 +154,7 @@ fn gluing(runs: &[Run]) -> Option<Figure> {
     let panels = vec![
         panel(runs, "evaluations of bodies", "", true, |w| f64::from(w.evaluations_bodies_max)),
         panel(runs, "evaluations of soil", "", true, |w| f64::from(w.evaluations_soil_max)),
-        panel(runs, "gap", "m", false, |w| w.max_gap_m).log(true),
+        panel(runs, "gap", "m", false, |w| w.max_gap_m.unwrap_or(f64::NAN)).log(true),
         panel(runs, "action–reaction gap", "N", false, |w| w.max_action_reaction_gap_n).log(true),
     ];
     let note = "Per step; the largest of all steps since the record before.".into();

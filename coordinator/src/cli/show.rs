@@ -125,6 +125,7 @@ mod tests {
         let scenario = Scenario::load(path.as_ref(), &[]).expect("good");
         let mut summary = SummaryObserver::new(&scenario).summary(1.0, 1.0, None, Status::Done);
         (summary.energies.drift_j, summary.energies.turnover_j) = (Some(-0.0125), 5.0);
+        summary.energies.by_ports = false;
         let line = |s: &Summary| {
             let table = super::summary(s).to_string();
             table

@@ -279,7 +279,8 @@ fn what_is_unknown_or_does_not_apply_is_said_and_never_a_number() {
     assert_eq!((last.converged, last.max_gap_m, last.since_last.max_gap_m), (None, None, None));
     assert!(last.interface_work_error_j.is_none() && last.since_last.interface_work_error_j.is_nan());
     let html = std::fs::read_to_string(report::write(f.path()).expect("written")).expect("readable");
-    let shown = html.split("<script").next().expect("text");
+    let shown = &html[html.find("<section").expect("sections")..];
+    let shown = shown.split("<script").next().expect("text");
     assert!(shown.contains("unknown") && shown.contains("soil keeps no book") && !shown.contains("NaN"));
     assert!(shown.contains("not applicable") && html.contains("Gap and convergence: not applicable"));
     let row = compare::CompareRow { summary: Some(s), ..Default::default() };

@@ -122,13 +122,17 @@ fn go(mut bench: SoilBench, way: &Way, spacing: f64, look: &mut impl FnMut(Shown
     Ok(())
 }
 
+/// Whether a difference is tolerated; one that is no number is not.
+fn within(difference: f64, tolerated: f64) -> bool {
+    difference.abs() <= tolerated
+}
+
 fn balance(lab: &Lab) -> Verdict {
     each_step(lab, |Shown { given, work, path, book, .. }| {
         let tolerated = (SHARE * path).max(ROUNDING_J);
         let held = book.dissipated + book.potential;
         let of = format!("by 1 % of the {path:.4e} J that went to and fro");
-        // a book that has stopped being a number fails too
-        if !((held - book.port_work).abs() <= tolerated) {
+        if !within(held - book.port_work, tolerated) {
             let got = format!(
                 "heat {:.4e} J and stored {:.4e} J, {:+.3e} J beside `port_work`",
                 book.dissipated,
@@ -138,7 +142,7 @@ fn balance(lab: &Lab) -> Verdict {
             let expected = format!("`port_work` = {:.4e} J, {of}", book.port_work);
             return Err(Stop::fail("energy", given, got, expected));
         }
-        if !((book.port_work - work).abs() <= tolerated) {
+        if !within(book.port_work - work, tolerated) {
             let got = format!("`port_work` = {:.4e} J", book.port_work);
             let expected = format!("{work:.4e} J, its answers times the motions, {of}");
             return Err(Stop::fail("energy", given, got, expected));

@@ -1,7 +1,7 @@
 //! The figures that are compared, each with the direction in which it is better.
 
 use crate::recording::Energies;
-use crate::recording::compare::CompareRow;
+use crate::recording::compare::{CompareRow, table};
 use crate::recording::summary::Summary;
 
 /// Which end of a column is the best.
@@ -33,6 +33,30 @@ impl Column {
     /// Group and title in one line.
     pub fn name(&self) -> String {
         if self.group.is_empty() { self.title.into() } else { format!("{}, {}", self.group, self.title) }
+    }
+}
+
+impl Column {
+    /// What stands in the cell of a row: the figure, that it is unknown or does not apply, or a dash.
+    pub fn text(&self, row: &CompareRow) -> String {
+        let value = (self.value)(row);
+        let Some(summary) = row.summary.as_ref().filter(|_| value.is_none()) else {
+            return table::cell(value, self.unit);
+        };
+        match self.key {
+            "max_gap_m" | "steps_not_converged" | "max_action_reaction_gap_n" => "not applicable".into(),
+            "energy_balance_j" | "energy_drift_share" | "soil_heat_j" | "interface_work_error_j"
+                if summary.energies.drift_j.is_none() =>
+            {
+                "unknown".into()
+            }
+            _ => table::cell(None, self.unit),
+        }
+    }
+
+    /// Whether any row has something to say.
+    pub fn is_shown(&self, rows: &[CompareRow]) -> bool {
+        rows.iter().any(|row| self.text(row) != table::cell(None, self.unit))
     }
 }
 

@@ -1,7 +1,7 @@
 //! `compare.html`: the table with the best figure of each column marked, and curves of all runs in one picture.
 
 use crate::recording::compare::scatter::{self, Series};
-use crate::recording::compare::{CompareRow, columns, relative, table};
+use crate::recording::compare::{CompareRow, columns, relative};
 use crate::recording::reader::Recording;
 use crate::recording::report::energy_card;
 use crate::recording::report::figure::{Curve, Figure, Panel};
@@ -81,8 +81,7 @@ fn open(colour: usize, row: &CompareRow) -> Option<Run> {
 }
 
 fn html_table(folder: &Path, rows: &[CompareRow]) -> String {
-    let shown: Vec<&columns::Column> =
-        columns::ALL.iter().filter(|c| rows.iter().any(|r| (c.value)(r).is_some())).collect();
+    let shown: Vec<&columns::Column> = columns::ALL.iter().filter(|c| c.is_shown(rows)).collect();
     let marks: Vec<Vec<bool>> = shown.iter().map(|c| columns::best(c, rows)).collect();
     let mut out = String::from("<div class=\"wide\"><table class=\"rows\"><thead><tr>");
     head(&mut out, &shown);
@@ -103,7 +102,7 @@ fn html_table(folder: &Path, rows: &[CompareRow]) -> String {
         }
         for (column, best) in shown.iter().zip(&marks) {
             let class = if best[k] { " class=\"best\"" } else { "" };
-            let _ = write!(out, "<td{class}>{}</td>", escape(&table::cell((column.value)(row), column.unit)));
+            let _ = write!(out, "<td{class}>{}</td>", escape(&column.text(row)));
         }
         out.push_str("</tr>");
         if let Some(failure) = failure {

@@ -42,13 +42,13 @@ pub(crate) fn terminal(rows: &[CompareRow]) -> String {
     let shown: Vec<&columns::Column> = columns::ALL
         .iter()
         .filter(|c| !many || SHORT.contains(&c.key))
-        .filter(|c| rows.iter().any(|r| (c.value)(r).is_some()))
+        .filter(|c| c.is_shown(rows))
         .collect();
     let cells: Vec<Vec<String>> = shown
         .iter()
         .map(|column| {
             let mark = |(r, best): (&CompareRow, bool)| {
-                let text = cell((column.value)(r), column.unit);
+                let text = column.text(r);
                 if best { format!("* {text}") } else { text }
             };
             rows.iter().zip(columns::best(column, rows)).map(mark).collect()

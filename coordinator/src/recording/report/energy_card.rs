@@ -4,8 +4,11 @@ use crate::recording::energies::Energies;
 use crate::recording::report::html::{escape, number, with_prefix};
 use std::fmt::Write;
 
-/// Heads of the lines and what they are, in the order in which they add up.
-pub(crate) const LINES: [(&str, fn(&Energies) -> Option<f64>); 6] = [
+/// Head of a line and its figure, J.
+type Line = (&'static str, fn(&Energies) -> Option<f64>);
+
+/// The lines in the order in which they add up.
+pub(crate) const LINES: [Line; 6] = [
     ("work of motors and loads", |e| e.work_j),
     ("change of kinetic energy", |e| e.kinetic_change_j),
     ("change of potential energy", |e| e.potential_change_j),

@@ -285,6 +285,8 @@ fn what_is_unknown_or_does_not_apply_is_said_and_never_a_number() {
     assert!(shown.contains("not applicable") && html.contains("Gap and convergence: not applicable"));
     let row = compare::CompareRow { summary: Some(s), ..Default::default() };
     let table = compare::terminal_table(&[row]);
+    let gap = table.lines().find(|l| l.contains("largest gap")).expect("line");
+    assert!(gap.contains("not applicable"), "{gap}");
     assert!(
         table.contains("unknown") && table.contains("soil keeps no book") && !table.contains("NaN"),
         "{table}"

@@ -358,13 +358,7 @@ impl Patches {
             let mut sides = std::mem::take(&mut self.sides);
             let pressed = |k: usize| {
                 let (p, yields) = (self.pressure(k, self.nodes.depth[k]).0, self.nodes.bound[k]);
-                if p <= 0.0 {
-                    0.0
-                } else if yields > p {
-                    p / yields
-                } else {
-                    1.0
-                }
+                if p <= 0.0 { 0.0 } else if yields > p { p / yields } else { 1.0 }
             };
             wall::gather(&self.nodes, range.clone(), n_z, &beside, pressed, &mut rows, &mut sides, &mut wall);
             (self.rows, self.sides) = (rows, sides);
@@ -398,7 +392,13 @@ impl Patches {
 
     /// What the nodes in `range` bear of the pressure of first loading, and beside it: less on inclined faces, less under
     /// shear, more on faces that are pushed sideways.
-    fn bear(&mut self, direction: &Direction, wall: &Wall, b: f64, range: std::ops::Range<usize>) {
+    fn bear(
+        &mut self,
+        direction: &Direction,
+        wall: &Wall,
+        b: f64,
+        range: std::ops::Range<usize>,
+    ) {
         let inclination = direction.load_inclination.then(|| self.inclination(range.clone())).flatten();
         for k in range {
             let (n, law) = (&self.nodes, &self.laws[self.nodes.law[k]]);

@@ -1,7 +1,6 @@
 //! `scenarios/wheel_rig.toml` as a user runs it, against the integral of the stresses: sinkage and drawbar pull by slip.
 
 use super::MODULES;
-use super::rows::DEFAULT_ELASTIC_STIFFNESS;
 use super::rows::{EIGHT, Row, eight};
 use super::wong_reece::wheel_on;
 use crate::process::{Outcome, read, run_scenario};
@@ -9,6 +8,7 @@ use crate::validate::parallel::in_parallel;
 use crate::validate::{Context, Figure, Limit};
 use std::collections::BTreeMap;
 use terraglue::soil_fit::{Rim, Rolling};
+use super::rows::DEFAULT_ELASTIC_STIFFNESS;
 
 const SCENARIO: &str = "scenarios/wheel_rig.toml";
 /// Radius and width of the wheel in models/wheel_rig.urdf, m; its load, N.

@@ -3,7 +3,6 @@
 use super::STILL;
 use super::automaton::{Soil, automaton_on};
 use super::panel::Panel;
-use super::rows::DEFAULT_ELASTIC_STIFFNESS;
 use super::rows::eight;
 use super::wheel_rig::Bench;
 use super::wong_reece::wheel_on;
@@ -11,6 +10,7 @@ use crate::process::{Outcome, root, write};
 use std::borrow::{Borrow, BorrowMut};
 use std::fmt::Write;
 use terraglue::soil_fit::Rim;
+use super::rows::DEFAULT_ELASTIC_STIFFNESS;
 use terraglue_soil_law::ShearLaw;
 use terraglue_subsystem::Subsystem;
 

@@ -1,7 +1,6 @@
 //! Wheels: the soils against the integral of Wong and Reece over the same stresses, and against its shifted peak.
 
 use super::plates::Maker;
-use super::rows::DEFAULT_ELASTIC_STIFFNESS;
 use super::rows::{Row, eight};
 use super::wheel_rig::{Bench, Reading};
 use super::wong_reece::{wheel_of, wheel_on};
@@ -11,6 +10,7 @@ use crate::validate::parallel::in_parallel;
 use crate::validate::{Context, Figure, Limit};
 use std::fmt;
 use terraglue::soil_fit::{Rim, Rolling};
+use super::rows::DEFAULT_ELASTIC_STIFFNESS;
 
 /// Spacing of the lattice, m, quickly and else: a contact of 2 cm spans eight cells.
 const SPACINGS: [f64; 2] = [0.005, 0.0025];

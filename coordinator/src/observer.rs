@@ -20,6 +20,28 @@ pub struct SubsystemView<'a> {
     pub instance: &'a dyn Subsystem,
 }
 
+/// The energies of a subsystem as they enter the sum of all: what carries signals only has none, unless it says so, and a
+/// soil has no motors.
+pub fn book_of(kind: Kind, energy: &Energy) -> Energy {
+    let or_none = |value: f64| if value.is_nan() { 0.0 } else { value };
+    match kind {
+        Kind::Robot => *energy,
+        Kind::Soil => Energy {
+            actuator_work: or_none(energy.actuator_work),
+            electrical: or_none(energy.electrical),
+            ..*energy
+        },
+        Kind::Controller | Kind::Law => Energy {
+            kinetic: or_none(energy.kinetic),
+            potential: or_none(energy.potential),
+            dissipated: or_none(energy.dissipated),
+            port_work: or_none(energy.port_work),
+            actuator_work: or_none(energy.actuator_work),
+            electrical: or_none(energy.electrical),
+        },
+    }
+}
+
 /// The whole testbed at a communication point.
 pub struct View<'a> {
     /// Simulated time, s.

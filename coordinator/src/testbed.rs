@@ -9,7 +9,7 @@ use crate::gluing::memory::Recall;
 use crate::gluing::step_control::StepControl;
 use crate::gluing::{self, Instant, Outcome, StepReport};
 use crate::host::{Instance, Partings, Reply};
-use crate::observer::{Happening, Observer, SubsystemView, View};
+use crate::observer::{Happening, Observer, SubsystemView, View, book_of};
 use crate::signals::{Directory, Faults, Links, TimeLine};
 use crate::timing::{Part, Timings};
 use crate::{Error, Result};
@@ -450,20 +450,10 @@ impl Testbed {
         })
     }
 
-    /// Sum over all subsystems; work and heat since t = 0.
+    /// Sum over all subsystems, work and heat since t = 0; unknown where one that has energy keeps no book.
     pub fn energy(&self) -> Energy {
-        let sum = self.instances.iter().fold(Energy::default(), |sum, i| {
-            let e = i.subsystem().energy();
-            Energy {
-                kinetic: sum.kinetic + e.kinetic,
-                potential: sum.potential + e.potential,
-                dissipated: sum.dissipated + e.dissipated,
-                port_work: sum.port_work + e.port_work,
-                actuator_work: sum.actuator_work + e.actuator_work,
-                electrical: sum.electrical + e.electrical,
-            }
-        });
-        standing::since(&self.before, sum)
+        let books = self.instances.iter().map(|i| book_of(i.kind(), &i.subsystem().energy()));
+        standing::since(&self.before, books.fold(Energy::default(), |sum, book| sum.plus(&book)))
     }
 
     /// Committed value of a scalar number by full name; `None` where there is no such variable.

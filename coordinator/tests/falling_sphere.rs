@@ -89,3 +89,31 @@ fn a_snapshot_brings_the_same_bits_back() {
     testbed.restore(&snapshot).expect("restored");
     assert_eq!(run(&mut testbed), first);
 }
+
+/// Both sides of the interface are booked by their own wrenches: where the soil's law carries another force than the body
+/// feels, the work of the interface says so.
+#[test]
+fn the_work_of_the_interface_is_that_of_both_sides() {
+    let fallen = |strategy: &str| {
+        let mut testbed = testbed(strategy, 9.81);
+        let (mut error, mut path) = (0.0, 0.0);
+        for _ in 0..400 {
+            testbed.step().unwrap_or_else(|e| panic!("{strategy}: {e}"));
+            let report = testbed.report();
+            assert_eq!(
+                (report.single_pass, report.has_gap()),
+                (strategy == "cooperative", strategy != "cooperative")
+            );
+            error += report.interface_work_error_j;
+            path += report.port_work_path_j;
+        }
+        (error, path, testbed.energy())
+    };
+    let (error, path, energy) = fallen("iterative");
+    assert!(path > 1.0 && error < 1e-6 * path, "{error:e} of {path} J");
+    // The work on the sphere is that on the columns, and the column's book is whole.
+    assert!(energy.is_known() && energy.port_work.abs() < 1e-6 * path, "{energy:?}");
+    let (error, path, energy) = fallen("cooperative");
+    assert!(error > 1e-4 * path, "{error:e} of {path} J: the column is told T1 and carries its law's force");
+    assert!(energy.port_work.abs() <= error * (1.0 + 1e-9), "{energy:?} against {error}");
+}

@@ -121,7 +121,8 @@ def test_the_page_of_a_folder_that_exists_is_left_alone(tmp_path):
 LANGUAGES = {"rust": ("In Rust", "src/lib.rs"), "c": ("In C:", "my_{}.c"), "cpp": ("In C++", "my_{}.cpp"),
              "python": ("In Python", "my_{}.py")}
 # The tests that each tutorial speaks of.
-SPOKEN = {"soil": ["jacobian-soil", "jacobian-force", "force-and-motion", "passive", "cycles-dissipate"],
+SPOKEN = {"soil": ["jacobian-soil", "jacobian-force", "force-and-motion", "passive", "cycles-dissipate",
+                   "energy-balance", "heat-stays"],
           "robot": ["falls", "no-gravity", "force-moves", "jacobian-robot", "estimate-holds", "velocity", "described"],
           "controller": ["time-not-calls", "bounded", "bounded-power", "described", "same-again"]}
 

@@ -30,7 +30,11 @@ def test_summary_holds_the_promised_figures(short_run):
     assert summary["status"] == "done" and summary["error"] is None
     assert summary["scenario"] == "moon_walk"
     assert summary["steps"] == 500 and math.isclose(summary["simulated_s"], 0.5)
-    assert summary["steps_not_converged"] == 0
+    # The default is a single pass: nothing to converge to.
+    assert summary["steps_not_converged"] is None and summary["max_gap_m"] is None
+    books = summary["energies"]
+    assert books["without_book"] == [] and books["soil_heat_j"] > 0 and books["turnover_j"] >= summary["energy_j"]
+    assert books["drift_j"] == summary["energy_balance_j"] and summary["interface_work_error_j"] >= 0
     assert summary["soil_mass_error_relative"] == 0.0
     assert summary["evaluations_mean"] == 1.0 and summary["evaluations_max"] == 1
     for name in ("recording", "report"):

@@ -1,9 +1,9 @@
 //! What is printed: errors with their place, tables.
 
-use comfy_table::{ContentArrangement, Table, presets};
+use comfy_table::{Cell, Color, ContentArrangement, Table, presets};
 use miette::GraphicalReportHandler;
 use terraglue::Error;
-use terraglue::recording::Summary;
+use terraglue::recording::{Energies, Summary};
 
 /// An error on standard error; wrong input with file, line and the offending text.
 pub fn error(error: &Error) {
@@ -58,17 +58,36 @@ pub fn summary(s: &Summary) -> Table {
         "evaluations of the bodies",
         format!("{:.2} mean, {} at most", s.evaluations_mean, s.evaluations_max),
     );
-    row("steps not converged", s.steps_not_converged.to_string());
-    row("largest gap", format!("{:.2e} m", s.max_gap_m));
-    row("largest action–reaction gap", format!("{:.2e} N", s.max_action_reaction_gap_n));
-    row("drift of the energy book", format!("{:+.2e} J", s.energy_balance_j));
+    row("steps not converged", s.steps_not_converged.map_or_else(not_applicable, |n| n.to_string()));
+    row("largest gap", s.max_gap_m.map_or_else(not_applicable, |gap| format!("{gap:.2e} m")));
+    let gap = s.max_action_reaction_gap_n;
+    row("largest action–reaction gap", gap.map_or_else(not_applicable, |gap| format!("{gap:.2e} N")));
+    let error = s.interface_work_error_j;
+    row("interface work error", error.map_or_else(|| "unknown".into(), |e| format!("{e:.2e} J")));
     row("error of the soil's mass", s.soil_mass_error_relative.map_or_else(none, |e| format!("{e:.1e}")));
+    let drift = Cell::new(drift(&s.energies));
+    t.add_row([
+        Cell::new("drift of the energy book"),
+        if s.energies.is_off() { drift.fg(Color::Red) } else { drift },
+    ]);
     t
+}
+
+fn not_applicable() -> String {
+    "not applicable".into()
+}
+
+/// The drift with what it is held against, or why it is unknown.
+fn drift(e: &Energies) -> String {
+    let Some(drift_j) = e.drift_j else { return format!("unknown: {}", e.why_unknown()) };
+    let share = e.drift_share().map_or_else(String::new, |s| format!(", {:.2} % {}", 100.0 * s, e.measure()));
+    let beyond = if e.is_off() { ": more than 1 %" } else { "" };
+    format!("{drift_j:+.2e} J{share}{beyond}")
 }
 
 fn electrical(s: &Summary) -> String {
     let per_metre = s.electrical_energy_j_per_m.map_or_else(String::new, |e| format!(", {e:.1} J/m"));
-    format!("{:.1} J{per_metre}", s.electrical_energy_j)
+    s.electrical_energy_j.map_or_else(|| "unknown".into(), |e| format!("{e:.1} J{per_metre}"))
 }
 
 fn stall(s: &Summary) -> String {
@@ -97,7 +116,7 @@ fn distance(s: &Summary) -> String {
 
 #[cfg(test)]
 mod tests {
-    use terraglue::recording::{Status, SummaryObserver};
+    use terraglue::recording::{Status, Summary, SummaryObserver};
     use terraglue::scenario::Scenario;
 
     #[test]
@@ -105,9 +124,25 @@ mod tests {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenarios/plate_sinkage.toml");
         let scenario = Scenario::load(path.as_ref(), &[]).expect("good");
         let mut summary = SummaryObserver::new(&scenario).summary(1.0, 1.0, None, Status::Done);
-        summary.energy_balance_j = -0.0125;
-        let table = super::summary(&summary).to_string();
-        let line = table.lines().find(|l| l.contains("drift of the energy book")).expect("row");
-        assert!(line.contains("-1.25e-2 J"), "{line}");
+        (summary.energies.drift_j, summary.energies.turnover_j) = (Some(-0.0125), 5.0);
+        summary.energies.by_ports = false;
+        let line = |s: &Summary| {
+            let table = super::summary(s).to_string();
+            table
+                .lines()
+                .filter(|l| l.contains("drift of the energy book"))
+                .map(str::to_owned)
+                .collect::<String>()
+        };
+        let text = line(&summary);
+        assert!(
+            text.contains("-1.25e-2 J, -0.25 % of the motors' work") && !text.contains("more than"),
+            "{text}"
+        );
+        summary.energies.turnover_j = 1.0;
+        assert!(line(&summary).contains("-1.25 % of the motors' work: more than 1 %"));
+        summary.energies.drift_j = None;
+        summary.energies.without_book = vec!["soil".into()];
+        assert!(line(&summary).contains("unknown: soil keeps no book"));
     }
 }

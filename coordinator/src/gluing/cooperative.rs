@@ -44,6 +44,10 @@ impl Strategy for Cooperative {
         NAME
     }
 
+    fn is_single_pass(&self) -> bool {
+        true
+    }
+
     fn needs(&self) -> Needs {
         Needs { first: Capabilities::FORCE, second: Capabilities::FORCE, grounds: Capabilities::default() }
     }

@@ -86,6 +86,20 @@ pub struct Exchange {
     pub t_ref: f64,
 }
 
+/// What passes a row of the interface in a step, J.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Passed {
+    /// Work on both sides together, beyond what springs stored and what became heat; at a contact with soil the work on the
+    /// body alone.
+    pub gained: f64,
+    /// Stored by a spring.
+    pub stored: f64,
+    /// Turned into heat by a damper, or by friction between bodies.
+    pub heat: f64,
+    /// Magnitude of the work on side 1.
+    pub through: f64,
+}
+
 impl Exchange {
     /// A group of bodies and grounds, given by their instance indices.
     pub fn new(bodies: &[usize], grounds: &[usize], t_ref: f64) -> Self {
@@ -379,18 +393,29 @@ impl Exchange {
         (self.x1[i] - self.x2[i] + self.gap[i] + self.compliance[i] * force).abs()
     }
 
-    /// Work that the interface of a row gains in the step, J: that of the wrench on the gap, or at a spring that of the
-    /// mean wrench beyond the energy that the spring takes and the damper turns into heat.
-    pub fn work_error(&self, i: usize, t_before: Option<f64>) -> f64 {
-        let moved = self.x1[i] - self.x2[i];
-        if self.rows[i] != Row::Joint || self.compliance[i] == 0.0 {
-            return self.t[i] * (moved + self.gap[i]);
+    /// What passes a row in the step: see [`Passed`].
+    pub fn passed(&self, i: usize, t_before: Option<f64>) -> Passed {
+        let t = self.t[i];
+        let through = (t * self.x1[i]).abs();
+        if self.of_soil[i] && self.has_grounds() {
+            // the soil's side is booked at its commit
+            return Passed { gained: t * self.x1[i], through, ..Passed::default() };
         }
-        let mean = 0.5 * (t_before.unwrap_or(self.t[i]) + self.t[i]);
+        let moved = self.x1[i] - self.x2[i];
+        // what side 2 was told differs from what side 1 was
+        let apart = self.t_second.get(i).map_or(0.0, |t2| (t - t2) * self.x2[i]);
         let stretched = moved + self.gap[i];
-        let spring = 0.5 * (stretched * stretched - self.gap[i] * self.gap[i]) / self.compliance[i];
+        if self.rows[i] == Row::Coulomb {
+            return Passed { gained: apart, heat: -t * moved, through, stored: 0.0 };
+        }
+        if self.rows[i] != Row::Joint || self.compliance[i] == 0.0 {
+            return Passed { gained: t * stretched + apart, through, ..Passed::default() };
+        }
+        let mean = 0.5 * (t_before.unwrap_or(t) + t);
+        let stored = 0.5 * (stretched * stretched - self.gap[i] * self.gap[i]) / self.compliance[i];
         let rate = if self.at.h > 0.0 { moved / self.at.h } else { 0.0 };
-        mean * moved + spring + self.damping[i] * rate * moved
+        let heat = self.damping[i] * rate * moved;
+        Passed { gained: mean * moved + stored + heat + apart, stored, heat, through }
     }
 
     /// Levels of the interface Jacobian with their weights in the condition of a constraint.
@@ -476,6 +501,11 @@ impl Exchange {
         Ok(())
     }
 
+    /// Work at the ports of all grounds since the start by their own books, J; not a number where one keeps none.
+    fn work_on_grounds(&self, instances: &[Instance]) -> f64 {
+        self.grounds.iter().map(|side| instances[side.slot].subsystem().energy().port_work).sum()
+    }
+
     /// Paper, step 5: every member takes its last trial as the state at t + h.
     pub fn commit(&mut self, instances: &mut [Instance]) -> Result {
         let start = Clock::now();
@@ -486,10 +516,14 @@ impl Exchange {
         self.timings.charge(Part::CommitBodies, start);
         let start = Clock::now();
         // a step of no length tells accelerations, which soils have none
+        let before = self.work_on_grounds(instances);
         for side in self.grounds.iter_mut().filter(|_| self.at.h > 0.0) {
             let partner = (self.x1.as_slice(), self.v1.as_slice());
             side.commit(&mut instances[side.slot], &self.nodes, &self.at, &self.t, partner)?;
         }
+        let on_grounds = if self.at.h > 0.0 { self.work_on_grounds(instances) - before } else { 0.0 };
+        let report = &mut self.report;
+        report.interface_work_error_j = (report.interface_work_error_j + on_grounds).abs();
         self.timings.charge(Part::CommitGrounds, start);
         self.last.clear();
         for port in &self.ports {

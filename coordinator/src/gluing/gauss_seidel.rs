@@ -22,6 +22,10 @@ impl Strategy for GaussSeidel {
         NAME
     }
 
+    fn is_single_pass(&self) -> bool {
+        true
+    }
+
     fn needs(&self) -> Needs {
         Needs { first: Capabilities::FORCE, second: Capabilities::FORCE, grounds: Capabilities::default() }
     }

@@ -25,6 +25,10 @@ impl Strategy for Jacobi {
         NAME
     }
 
+    fn is_single_pass(&self) -> bool {
+        true
+    }
+
     fn needs(&self) -> Needs {
         Needs { first: Capabilities::FORCE, second: Capabilities::FORCE, grounds: Capabilities::default() }
     }

@@ -91,6 +91,11 @@ pub trait Strategy: Send {
         None
     }
 
+    /// Whether it ends without asking whether both sides agree: it has no tolerance, and no gap at contacts with soil.
+    fn is_single_pass(&self) -> bool {
+        false
+    }
+
     /// What later steps depend on goes into a snapshot.
     fn remember(&self, _out: &mut Vec<u64>) {}
 

@@ -19,6 +19,11 @@ pub struct StepReport {
     pub halvings: u32,
     /// Whether the strategy reached its tolerance (a single pass always does).
     pub converged: bool,
+    /// Whether what ran, in this step, was a single pass: it has no tolerance, and takes the motion of one side for that
+    /// of the other, so that neither convergence nor the gap of a contact says anything.
+    pub single_pass: bool,
+    /// Whether joints were glued, whose gap is measured whatever the strategy.
+    pub joints: bool,
     /// Whether the X-T form ran (else T-T, or a single pass).
     pub xt_form: bool,
     /// Largest |x1 − x2| along n over the ports that were closed after the commit before, m: what the soil itself
@@ -36,14 +41,29 @@ pub struct StepReport {
     pub kappa_max: f64,
     /// Largest |T* − T1| along n, N.
     pub estimate_gap_n: f64,
-    /// Work of T on side 1 plus work of −T on side 2 in the step, J.
+    /// |Work on side 1 + work on side 2| in the step, J, each by the wrench that acted there: on a body the wrench that it
+    /// was told, on a soil that of its own law at the motion committed. What springs of the glue stored and what dampers and
+    /// friction between bodies turned into heat is taken off. Not a number where a soil keeps no book.
     pub interface_work_error_j: f64,
+    /// Σ |T·x1| over the ports in the step, J: how much work went through them.
+    pub port_work_path_j: f64,
+    /// Energy that springs of the glue took up in the step, J.
+    pub glue_stored_j: f64,
+    /// Energy that dampers of the glue, and friction between glued bodies, turned into heat in the step, J.
+    pub glue_heat_j: f64,
     /// Rank of Λ and its size, for the last Jacobian; 0 when none was formed.
     pub rank: (u32, u32),
     /// Condition of Λ by its pivots; 0 when none was formed.
     pub condition: f64,
     /// All ports of the step.
     pub ports: Vec<PortReport>,
+}
+
+impl StepReport {
+    /// Whether [`StepReport::max_gap_m`] says how far the sides lie apart.
+    pub fn has_gap(&self) -> bool {
+        self.joints || !self.single_pass
+    }
 }
 
 /// One port at the end of the step.
@@ -76,6 +96,8 @@ impl StepReport {
         self.add_cost(other);
         self.halvings = self.halvings.max(other.halvings);
         self.converged &= other.converged;
+        self.single_pass |= other.single_pass;
+        self.joints |= other.joints;
         self.xt_form |= other.xt_form;
         self.max_gap_m = self.max_gap_m.max(other.max_gap_m);
         self.max_action_reaction_gap_n = self.max_action_reaction_gap_n.max(other.max_action_reaction_gap_n);
@@ -85,6 +107,9 @@ impl StepReport {
         self.kappa_max = self.kappa_max.max(other.kappa_max);
         self.estimate_gap_n = self.estimate_gap_n.max(other.estimate_gap_n);
         self.interface_work_error_j += other.interface_work_error_j;
+        self.port_work_path_j += other.port_work_path_j;
+        self.glue_stored_j += other.glue_stored_j;
+        self.glue_heat_j += other.glue_heat_j;
         let missing = |rank: (u32, u32)| rank.1 - rank.0.min(rank.1);
         let weaker = self.rank.1 == 0 || missing(other.rank) > missing(self.rank);
         if other.rank.1 > 0 && weaker {

@@ -34,6 +34,10 @@ impl Strategy for SemiImplicit {
         NAME
     }
 
+    fn is_single_pass(&self) -> bool {
+        true
+    }
+
     fn needs(&self) -> Needs {
         let both = Capabilities::FORCE | Capabilities::RETRY;
         Needs { first: both, second: both, grounds: both }

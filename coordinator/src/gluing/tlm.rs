@@ -74,6 +74,10 @@ impl Strategy for Tlm {
         NAME
     }
 
+    fn is_single_pass(&self) -> bool {
+        true
+    }
+
     fn needs(&self) -> Needs {
         let both = Capabilities::IMPEDANCE;
         Needs { first: both, second: both, grounds: both }

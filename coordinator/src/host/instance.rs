@@ -549,15 +549,15 @@ impl Instance {
         self.outcome("field_tile", self.subsystem.field_tile(field, a, b))
     }
 
-    /// Energies of the committed state.
+    /// Energies of the committed state; what is unknown is not a number.
     pub fn energy(&self) -> Result<Energy> {
         self.alive("energy")?;
         let e = self.subsystem.energy();
         let all = [e.kinetic, e.potential, e.dissipated, e.port_work, e.actuator_work, e.electrical];
-        if all.iter().all(|v| v.is_finite()) {
+        if all.iter().all(|v| !v.is_infinite()) {
             return Ok(e);
         }
-        Err(self.error("energy", "an energy is not finite"))
+        Err(self.error("energy", "an energy is infinite"))
     }
 }
 

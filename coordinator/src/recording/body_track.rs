@@ -20,6 +20,9 @@ pub(crate) struct BodyTrack {
     now: Sample,
     samples: Vec<Sample>,
     height_m: f64,
+    before: [f64; 3],
+    /// Length of the way of its origin, m.
+    pub path_m: f64,
     /// Mass of its whole subsystem, kg.
     pub mass_kg: f64,
     /// Horizontal displacement along the initial heading, m.
@@ -53,6 +56,8 @@ impl BodyTrack {
             now: Sample::default(),
             samples: Vec::new(),
             height_m: pose.position[2],
+            before: pose.position,
+            path_m: 0.0,
             mass_kg: s.scene.bodies.iter().map(|b| b.mass).sum(),
             distance_m: 0.0,
             max_roll_rad: 0.0,
@@ -69,6 +74,9 @@ impl BodyTrack {
         let moved = [position[0] - self.start[0], position[1] - self.start[1]];
         self.distance_m = moved[0] * self.heading[0] + moved[1] * self.heading[1];
         self.height_m = position[2];
+        let step = [0, 1, 2].map(|k| position[k] - self.before[k]);
+        self.path_m += (step[0] * step[0] + step[1] * step[1] + step[2] * step[2]).sqrt();
+        self.before = position;
         let [roll, pitch, _] = roll_pitch_yaw(&orientation);
         self.max_roll_rad = self.max_roll_rad.max(roll.abs());
         self.max_pitch_rad = self.max_pitch_rad.max(pitch.abs());

@@ -63,6 +63,11 @@ impl JsonBuffer {
         self
     }
 
+    /// `"key":number`, or `null` where it is unknown or does not apply (NaN).
+    pub fn known(&mut self, key: &str, value: f64) -> &mut Self {
+        if value.is_nan() { self.key(key).raw("null") } else { self.field(key, value) }
+    }
+
     /// A whole number.
     pub fn integer(&mut self, value: impl std::fmt::Display) -> &mut Self {
         let _ = write!(self.bytes, "{value}");

@@ -17,12 +17,12 @@ pub struct GluingRecord {
     pub evaluations_bodies: u32,
     /// Evaluations of the soils in this step.
     pub evaluations_soil: u32,
-    /// Whether the strategy reached its tolerance.
-    pub converged: bool,
+    /// Whether the strategy reached its tolerance; `None`: a single pass has none.
+    pub converged: Option<bool>,
     /// Whether the X-T form ran.
     pub xt_form: bool,
-    /// Largest gap over the closed ports, m.
-    pub max_gap_m: f64,
+    /// Largest gap over the closed ports, m; `None` for a single pass at contacts.
+    pub max_gap_m: Option<f64>,
     /// Largest difference of the wrench on the two sides, N.
     pub max_action_reaction_gap_n: f64,
     /// |Λe| / T_ref; NaN where it is not finite.
@@ -33,8 +33,8 @@ pub struct GluingRecord {
     pub kappa_max: f64,
     /// Largest |T* − T1| along n, N.
     pub estimate_gap_n: f64,
-    /// Work that the interface gains in this step, J.
-    pub interface_work_error_j: f64,
+    /// Work that the interface gains in this step, J; `None`: unknown.
+    pub interface_work_error_j: Option<f64>,
     /// Ports of this step.
     pub ports: Vec<PortRecord>,
     /// Extremes of all steps since the message before.
@@ -88,13 +88,14 @@ pub struct WindowRecord {
     pub evaluations_soil_max: u32,
     /// Steps that did not reach their tolerance.
     pub not_converged: u64,
-    /// Largest gap, m.
-    pub max_gap_m: f64,
+    /// Largest gap, m; `None` where no step had one that says something.
+    pub max_gap_m: Option<f64>,
     /// Largest difference of the wrench on the two sides, N.
     pub max_action_reaction_gap_n: f64,
     /// Largest |T* − T1|, N.
     pub estimate_gap_n: f64,
-    /// Sum of the magnitudes, J.
+    /// Sum of the magnitudes, J; NaN: unknown.
+    #[serde(deserialize_with = "number_or_nan")]
     pub interface_work_error_j: f64,
 }
 
@@ -107,7 +108,9 @@ impl WindowRecord {
         self.evaluations_soil += u64::from(step.evaluations_soil);
         self.evaluations_soil_max = self.evaluations_soil_max.max(step.evaluations_soil);
         self.not_converged += u64::from(!step.converged && step.evaluations_bodies > 0);
-        self.max_gap_m = self.max_gap_m.max(step.max_gap_m);
+        if step.has_gap() {
+            self.max_gap_m = Some(self.max_gap_m.map_or(step.max_gap_m, |gap| gap.max(step.max_gap_m)));
+        }
         self.max_action_reaction_gap_n = self.max_action_reaction_gap_n.max(step.max_action_reaction_gap_n);
         self.estimate_gap_n = self.estimate_gap_n.max(step.estimate_gap_n);
         self.interface_work_error_j += step.interface_work_error_j.abs();
@@ -128,12 +131,16 @@ pub(crate) fn write_gluing(json: &mut JsonBuffer, view: &View, window: &WindowRe
     json.key("evaluations_jacobian").integer(g.evaluations_jacobian);
     json.key("jacobian_refreshes").integer(g.jacobian_refreshes);
     json.key("halvings").integer(g.halvings);
-    json.key("converged").boolean(g.converged).key("xt_form").boolean(g.xt_form);
-    json.field("max_gap_m", g.max_gap_m);
+    match g.single_pass {
+        true => json.key("converged").raw("null"),
+        false => json.key("converged").boolean(g.converged),
+    };
+    json.key("xt_form").boolean(g.xt_form);
+    json.known("max_gap_m", if g.has_gap() { g.max_gap_m } else { f64::NAN });
     json.field("max_action_reaction_gap_n", g.max_action_reaction_gap_n);
     json.field("residual", g.residual).field("complementarity_n", g.complementarity_n);
     json.field("kappa_max", g.kappa_max).field("estimate_gap_n", g.estimate_gap_n);
-    json.field("interface_work_error_j", g.interface_work_error_j);
+    json.known("interface_work_error_j", g.interface_work_error_j);
     json.key("rank").integer(g.rank.0).key("size").integer(g.rank.1);
     json.key("ports").raw("[");
     for port in &g.ports {
@@ -151,13 +158,13 @@ pub(crate) fn write_gluing(json: &mut JsonBuffer, view: &View, window: &WindowRe
     json.key("evaluations_soil").integer(window.evaluations_soil);
     json.key("evaluations_soil_max").integer(window.evaluations_soil_max);
     json.key("not_converged").integer(window.not_converged);
-    json.field("max_gap_m", window.max_gap_m);
+    json.known("max_gap_m", window.max_gap_m.unwrap_or(f64::NAN));
     json.field("max_action_reaction_gap_n", window.max_action_reaction_gap_n);
     json.field("estimate_gap_n", window.estimate_gap_n);
-    json.field("interface_work_error_j", window.interface_work_error_j).raw("}}");
+    json.known("interface_work_error_j", window.interface_work_error_j).raw("}}");
 }
 
-/// Writes a message of `/energy`: the sum, then each subsystem that can have any.
+/// Writes a message of `/energy`: the sum, then each subsystem that can have any; what is unknown is null.
 pub(crate) fn write_energy(json: &mut JsonBuffer, view: &View) {
     json.raw("{").field("t", view.t_s);
     let mut put = |prefix: &str, e: &Energy| {
@@ -171,7 +178,12 @@ pub(crate) fn write_energy(json: &mut JsonBuffer, view: &View) {
         ];
         for (name, value) in parts {
             json.element().raw("\"").raw(prefix).raw(if prefix.is_empty() { "" } else { "." });
-            json.raw(name).raw("\":").number(name, value);
+            json.raw(name).raw("\":");
+            if value.is_nan() {
+                json.raw("null")
+            } else {
+                json.number(name, value)
+            };
         }
     };
     put("", &view.energy);

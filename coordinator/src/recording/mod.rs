@@ -31,6 +31,7 @@
 
 mod body_track;
 mod csv;
+mod energies;
 mod exchange;
 mod ground_grid;
 mod inputs;
@@ -59,6 +60,7 @@ pub mod report;
 mod tests;
 
 pub use csv::{TimingRow, write_timing};
+pub use energies::Energies;
 pub use exchange::write_exchange;
 pub use kept_file::KeptFile;
 pub use layout::{FINAL_GROUND, RECORDING, REPORT, SUMMARY, TIMING, VARIABLES};

@@ -31,6 +31,10 @@ fn number(description: &str) -> Value {
     json!({ "type": "number", "description": description })
 }
 
+fn maybe(what: &str) -> Value {
+    json!({ "type": ["number", "null"], "description": what })
+}
+
 fn time(title: &str) -> Value {
     let mut time = object(json!({
         "sec": { "type": "integer" },
@@ -176,7 +180,7 @@ pub(crate) fn variables(scalars: &Scalars) -> Topic {
 
 /// `/energy`: kinetic, potential, dissipated energy and work, J; the sum and each subsystem.
 pub(crate) fn energy() -> Topic {
-    let joule = |what: &str| json!({ "type": "number", "description": what, "unit": "J" });
+    let joule = |what: &str| json!({ "type": ["number", "null"], "description": format!("{what}; null: unknown"), "unit": "J" });
     let body = object(json!({
         "t": number("simulated time, s"),
         "kinetic": joule("kinetic energy of all subsystems"),
@@ -212,10 +216,10 @@ pub(crate) fn gluing() -> Topic {
         "evaluations_soil": count,
         "evaluations_soil_max": count,
         "not_converged": count,
-        "max_gap_m": number("m"),
+        "max_gap_m": maybe("m; null for a single pass at contacts"),
         "max_action_reaction_gap_n": number("N"),
         "estimate_gap_n": number("N"),
-        "interface_work_error_j": number("sum of magnitudes, J"),
+        "interface_work_error_j": maybe("sum of magnitudes, J; null: unknown"),
     }));
     let body = object(json!({
         "t": number("simulated time, s"),
@@ -225,15 +229,15 @@ pub(crate) fn gluing() -> Topic {
         "evaluations_jacobian": count,
         "jacobian_refreshes": count,
         "halvings": count,
-        "converged": { "type": "boolean" },
+        "converged": { "type": ["boolean", "null"], "description": "null: a single pass has no tolerance" },
         "xt_form": { "type": "boolean" },
-        "max_gap_m": number("largest gap over the closed ports, m"),
+        "max_gap_m": maybe("largest gap over the closed ports, m; null for a single pass at contacts"),
         "max_action_reaction_gap_n": number("N"),
         "residual": number("|Λe| / T_ref at the end"),
         "complementarity_n": number("N"),
         "kappa_max": number("largest eigenvalue of K·G1"),
         "estimate_gap_n": number("largest |T* - T1| along n, N"),
-        "interface_work_error_j": number("J"),
+        "interface_work_error_j": maybe("J; null: unknown"),
         "rank": count,
         "size": count,
         "ports": list(port),

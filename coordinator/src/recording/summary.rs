@@ -2,6 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::observer::Happening;
+use crate::recording::energies::Energies;
 use crate::recording::layout::{SUMMARY, at, other_at};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
@@ -88,16 +89,18 @@ pub struct Summary {
     pub energy_j: f64,
     /// energy_j / (m·g·|distance|), dimensionless; null below 1 mm.
     pub cost_of_transport: Option<f64>,
-    /// Evaluations of the bodies per step, mean; 1 for a single pass.
+    /// Evaluations of the bodies per step, mean; 1 for a single pass, which makes no iterations.
     pub evaluations_mean: f64,
     /// Evaluations of the bodies per step, largest.
     pub evaluations_max: u32,
-    /// Steps that did not reach the tolerance.
-    pub steps_not_converged: u64,
-    /// Largest |C| over closed ports after commit, m.
-    pub max_gap_m: f64,
-    /// Largest difference of the wrench on the two sides, N.
-    pub max_action_reaction_gap_n: f64,
+    /// Steps that did not reach the tolerance; null for a single pass, which has none.
+    pub steps_not_converged: Option<u64>,
+    /// Largest |C| over closed ports after commit, m; null for a single pass at contacts, whose soil takes over the
+    /// motion of the body.
+    pub max_gap_m: Option<f64>,
+    /// Largest difference of the wrench on the two sides, N; null for a single pass at contacts: see
+    /// `interface_work_error_j`.
+    pub max_action_reaction_gap_n: Option<f64>,
     /// Relative error of the soil's mass; null where the soil moves no material.
     pub soil_mass_error_relative: Option<f64>,
     /// File name of the recording beside this file.
@@ -116,20 +119,21 @@ pub struct Summary {
     pub evaluations_soil_p95: u32,
     /// Largest |T* − T1| along n, N.
     pub max_estimate_gap_n: f64,
-    /// Sum over the steps of the magnitude of the work that the interface gains, J.
-    pub interface_work_error_j: f64,
+    /// Sum over the steps of the magnitude of the work that the interface gains, J: work on both sides by each side's own
+    /// wrench; null where a soil keeps no book.
+    pub interface_work_error_j: Option<f64>,
     /// Drift of the energy book: change of (kinetic + potential + dissipated − actuator work) of all
-    /// subsystems since the start, J.
-    pub energy_balance_j: f64,
+    /// subsystems and of the glue since the start, J; null: unknown. The same as `energies.drift_j`.
+    pub energy_balance_j: Option<f64>,
     /// CPU time per step, s.
     pub cpu_per_step_s: f64,
     /// Height of the reported body at the end above that at the start, m.
     pub height_gained_m: Option<f64>,
     /// Where the body has stood still, if it did so for the last 5 s or longer; null: it came on.
     pub stalled: Option<Stall>,
-    /// Electrical energy that the motors drew, J.
+    /// Electrical energy that the motors drew, J; null: unknown.
     #[serde(default)]
-    pub electrical_energy_j: f64,
+    pub electrical_energy_j: Option<f64>,
     /// electrical_energy_j / |distance|, J/m; null below 1 mm.
     #[serde(default)]
     pub electrical_energy_j_per_m: Option<f64>,
@@ -157,6 +161,16 @@ pub struct Summary {
     /// Steps that were halved.
     #[serde(default)]
     pub steps_halved: u64,
+    /// Mean over the steps of the depth under the loaded feet below the initial surface, m; null where no foot was loaded or
+    /// the soil shows no height.
+    #[serde(default)]
+    pub mean_sinkage_m: Option<f64>,
+    /// Length of the way of the reported body's origin, m.
+    #[serde(default)]
+    pub path_m: Option<f64>,
+    /// Where the energy came from and went.
+    #[serde(default)]
+    pub energies: Energies,
 }
 
 /// Since when and where less than a tenth of the commanded distance was made.

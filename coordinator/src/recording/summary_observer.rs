@@ -4,6 +4,7 @@ use crate::error::{Error, Result};
 use crate::gluing::StepReport;
 use crate::observer::{Happening, Observer, SubsystemView, View};
 use crate::recording::body_track::BodyTrack;
+use crate::recording::energies::EnergyTrack;
 use crate::recording::ground_grid::GroundGrid;
 use crate::recording::layout::{RECORDING, REPORT};
 use crate::recording::snapshot::{failed, real, real_id};
@@ -28,12 +29,45 @@ pub struct SummaryObserver {
     body: Option<BodyTrack>,
     speed: Option<Integral>,
     sinkage: Option<Deepest>,
+    mean_sinkage: Option<MeanSinkage>,
     mass_error: Option<(usize, u32, f64)>,
     motors: Vec<Motors>,
     energy_j: f64,
     electrical_j: f64,
-    energy_book: Option<(f64, f64)>,
+    energies: EnergyTrack,
     gluing: GluingFigures,
+}
+
+/// Mean depth below the initial surface under loaded feet.
+struct MeanSinkage {
+    grid: Box<GroundGrid>,
+    sum_m: f64,
+    steps: u64,
+}
+
+impl MeanSinkage {
+    fn find(view: &View) -> Result<Option<Self>> {
+        let grid = GroundGrid::find(view)?;
+        Ok(grid.map(|grid| Self { grid: Box::new(grid), sum_m: 0.0, steps: 0 }))
+    }
+
+    fn follow(&mut self, view: &View) -> Result {
+        let soil = &view.subsystems[self.grid.subsystem];
+        let (mut sum, mut loaded) = (0.0, 0u32);
+        for port in view.gluing.ports.iter().filter(|p| p.wrench[0] > 0.0) {
+            sum += self.grid.sinkage_at(soil, port.origin[0], port.origin[1], view.t_s)?;
+            loaded += 1;
+        }
+        if loaded > 0 {
+            self.sum_m += sum / f64::from(loaded);
+            self.steps += 1;
+        }
+        Ok(())
+    }
+
+    fn mean_m(&self) -> Option<f64> {
+        (self.steps > 0).then(|| self.sum_m / self.steps as f64)
+    }
 }
 
 /// Integral of a variable over time, taken with its value at the start of each step.
@@ -67,6 +101,9 @@ struct GluingFigures {
     soil: u64,
     soil_max: u32,
     not_converged: u64,
+    /// Steps that had a tolerance to reach, and those whose gap says something.
+    checked: u64,
+    with_gap: u64,
     tt_steps: u64,
     xt_steps: u64,
     max_gap_m: f64,
@@ -162,6 +199,8 @@ impl GluingFigures {
         self.soil += u64::from(g.evaluations_soil);
         self.soil_max = self.soil_max.max(g.evaluations_soil);
         self.not_converged += u64::from(!g.converged);
+        self.checked += u64::from(!g.single_pass);
+        self.with_gap += u64::from(g.has_gap());
         let iterated = g.rank.1 > 0 || g.residual > 0.0;
         self.xt_steps += u64::from(g.xt_form);
         self.tt_steps += u64::from(iterated && !g.xt_form);
@@ -232,11 +271,12 @@ impl SummaryObserver {
             body: None,
             speed: None,
             sinkage: None,
+            mean_sinkage: None,
             mass_error: None,
             motors: Vec::new(),
             energy_j: 0.0,
             electrical_j: 0.0,
-            energy_book: None,
+            energies: EnergyTrack::default(),
             gluing: GluingFigures::default(),
         }
     }
@@ -257,8 +297,6 @@ impl SummaryObserver {
             self.energy_j += motors.power(view)? * view.h_s;
         }
         self.electrical_j = view.energy.electrical;
-        let book = view.energy.mechanical() + view.energy.dissipated - view.energy.actuator_work;
-        self.energy_book = Some((self.energy_book.map_or(book, |b| b.0), book));
         Ok(())
     }
 
@@ -270,6 +308,11 @@ impl SummaryObserver {
         let work_j = body.map_or(0.0, |b| weight_n * b.distance_m.abs());
         let moved = body.is_some_and(|b| b.distance_m.abs() >= SMALLEST_DISTANCE_M);
         let g = &self.gluing;
+        let energies = self.energies.figures(self.energy_j);
+        // what no step could say does not apply; before the first step nothing is known to be amiss
+        let applies = |steps: u64| g.steps == 0 || steps > 0;
+        let known = |value: f64| value.is_finite().then_some(value);
+        let electrical_j = known(self.electrical_j);
         Summary {
             status,
             error: error.map(FailureRecord::from),
@@ -291,9 +334,9 @@ impl SummaryObserver {
             cost_of_transport: (moved && work_j > 0.0).then(|| self.energy_j / work_j),
             evaluations_mean: g.mean(g.bodies),
             evaluations_max: g.histogram.len().saturating_sub(1) as u32,
-            steps_not_converged: g.not_converged,
-            max_gap_m: g.max_gap_m,
-            max_action_reaction_gap_n: g.max_action_reaction_gap_n,
+            steps_not_converged: applies(g.checked).then_some(g.not_converged),
+            max_gap_m: applies(g.with_gap).then_some(g.max_gap_m),
+            max_action_reaction_gap_n: applies(g.with_gap).then_some(g.max_action_reaction_gap_n),
             soil_mass_error_relative: self.mass_error.map(|m| m.2),
             recording: RECORDING.into(),
             report: REPORT.into(),
@@ -303,13 +346,15 @@ impl SummaryObserver {
             evaluations_soil_max: g.soil_max,
             evaluations_soil_p95: g.percentile(&g.soil_histogram, 0.95),
             max_estimate_gap_n: g.max_estimate_gap_n,
-            interface_work_error_j: g.interface_work_error_j,
-            energy_balance_j: self.energy_book.map_or(0.0, |(first, last)| last - first),
+            interface_work_error_j: known(g.interface_work_error_j),
+            energy_balance_j: energies.drift_j,
             cpu_per_step_s: per(cpu_s, self.steps as f64),
             height_gained_m: body.map(BodyTrack::height_gained_m),
             stalled: body.and_then(BodyTrack::stall),
-            electrical_energy_j: self.electrical_j,
-            electrical_energy_j_per_m: body.filter(|_| moved).map(|b| self.electrical_j / b.distance_m.abs()),
+            electrical_energy_j: electrical_j,
+            electrical_energy_j_per_m: body
+                .filter(|_| moved)
+                .and_then(|b| Some(electrical_j? / b.distance_m.abs())),
             kappa_max: g.kappa_max,
             jacobian_refreshes_mean: g.mean(g.refreshes),
             evaluations_jacobian_mean: g.mean(g.differences),
@@ -318,6 +363,9 @@ impl SummaryObserver {
             rank_missing_max: g.rank_missing,
             condition_max: g.condition,
             steps_halved: g.halved,
+            mean_sinkage_m: self.mean_sinkage.as_ref().and_then(MeanSinkage::mean_m),
+            path_m: body.map(|b| b.path_m),
+            energies,
         }
     }
 }
@@ -327,6 +375,8 @@ impl Observer for SummaryObserver {
         self.body = BodyTrack::find(view, self.body_name.as_deref());
         self.speed = self.commanded_speed(view)?;
         self.sinkage = Deepest::find(view)?;
+        self.mean_sinkage = MeanSinkage::find(view)?;
+        self.energies.start(view);
         self.soil_module = soils(view).map(|(_, s)| s.module.to_owned()).next();
         let mass =
             |(k, s): (usize, &SubsystemView)| Some((k, real_id(s.instance, "mass_error_relative")?, 0.0));
@@ -351,6 +401,10 @@ impl Observer for SummaryObserver {
         if let Some(sinkage) = &mut self.sinkage {
             sinkage.follow(view)?;
         }
+        if let Some(sinkage) = &mut self.mean_sinkage {
+            sinkage.follow(view)?;
+        }
+        self.energies.follow(view);
         if let Some((soil, id, worst)) = &mut self.mass_error {
             *worst = worst.max(real(&view.subsystems[*soil], *id, view.t_s)?.abs());
         }

@@ -71,6 +71,9 @@ impl Group {
     /// The gap that the last commit left, told by the soil itself in its answer to `set_ports`.
     pub fn measure_gap(&mut self) {
         let exchange = &mut self.exchange;
+        if self.strategy.is_single_pass() {
+            return; // its surface is where the body went, by definition
+        }
         for port in &exchange.ports {
             if exchange.rows[port.first as usize] == Row::Joint {
                 continue; // the strategy itself measures the gap of joints
@@ -82,12 +85,13 @@ impl Group {
         }
     }
 
-    /// Fills the report of what is about to be committed.
+    /// Fills the report of what is about to be committed. The work of soils comes with their commit.
     pub fn describe(&mut self, found: &PortSet, halvings: u32) {
         let exchange = &mut self.exchange;
         exchange.report.halvings = halvings;
         self.closed.clear();
-        let mut work = 0.0;
+        exchange.report.single_pass = self.strategy.is_single_pass();
+        exchange.report.joints = exchange.has_joints();
         for (p, port) in exchange.ports.iter().enumerate() {
             let owner =
                 found.owners.get(p).copied().unwrap_or_else(|| exchange.glue.owner(p - found.owners.len()));
@@ -96,7 +100,12 @@ impl Group {
             let before = exchange.last.iter().find(|(key, _)| *key == port.key);
             for (k, (i, c)) in port.components().enumerate() {
                 wrench[c] = exchange.t[i];
-                work += exchange.work_error(i, before.map(|b| b.1[k]));
+                let passed = exchange.passed(i, before.map(|b| b.1[k]));
+                let report = &mut exchange.report;
+                report.interface_work_error_j += passed.gained;
+                report.port_work_path_j += passed.through;
+                report.glue_stored_j += passed.stored;
+                report.glue_heat_j += passed.heat;
             }
             if wrench[0] > 0.0 && exchange.rows[n] != Row::Joint {
                 self.closed.push(port.key);
@@ -116,7 +125,6 @@ impl Group {
                 gap_m: exchange.x1[n] - exchange.x2[n] + exchange.gap[n],
             });
         }
-        exchange.report.interface_work_error_j = work.abs();
     }
 
     /// What later steps depend on beside the members' own states.

@@ -509,15 +509,17 @@ typedef struct {
     size_t count;
 } tg_field_tile;
 
-/* Energies of the committed state and work done since the start, J. */
+/* Energies of the committed state and work done since the start, J. NAN: unknown, no book is kept of it; it is shown so, and
+ * makes every sum unknown that needs it. */
 typedef struct {
     /* Kinetic energy. */
     double kinetic;
-    /* Potential energy. */
+    /* Potential energy; of a soil its elastic energy and the gravitational energy of its material. */
     double potential;
-    /* Energy turned into heat inside since the start; >= 0. */
+    /* Energy turned into heat inside since the start; >= 0, never falls. */
     double dissipated;
-    /* Work done on this subsystem through its ports since the start. */
+    /* Work done on this subsystem through its ports since the start. Of a soil: by the wrench of its own law at the motion
+     * that was committed, not by the wrench that `commit` tells it. */
     double port_work;
     /* Mechanical work that its own motors have put in since the start. */
     double actuator_work;
@@ -797,7 +799,7 @@ typedef struct {
     /* Tile (a, b) of a field: nodes (a * tile_edge ..., b * tile_edge ...).
      * When: at any time. Thread: that of the instance. */
     tg_status (*field_tile)(void *instance, size_t field, uint32_t a, uint32_t b, tg_field_tile *out);
-    /* Energies of the committed state.
+    /* Energies of the committed state. Null: all are unknown.
      * When: at any time. Thread: that of the instance. */
     tg_status (*energy)(void *instance, tg_energy *out);
     /* Null: kept for the layout of ABI 2.0; see `law`. */

@@ -288,8 +288,8 @@ class Subsystem:
         return []
 
     def energy(self):
-        """(kinetic, potential, dissipated, port work, actuator work, electrical), J."""
-        return (0.0,) * 6
+        """(kinetic, potential, dissipated, port work, actuator work, electrical), J; NAN: unknown."""
+        return (NAN,) * 6
 
     def next_event_time(self):
         """Time of the next event known beforehand, s."""

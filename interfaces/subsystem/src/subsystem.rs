@@ -156,8 +156,8 @@ pub trait Subsystem: Send {
         Err(Error::Unsupported)
     }
 
-    /// Energies of the committed state.
+    /// Energies of the committed state; unknown for a subsystem that keeps no book.
     fn energy(&self) -> Energy {
-        Energy::default()
+        Energy::UNKNOWN
     }
 }

@@ -27,7 +27,7 @@ static const char *const tg_description = NULL;
 #define MAX_FEET 64
 #define STATE_MAGIC 0x736f696cu
 
-typedef struct { uint64_t key; double tangential[3]; } foot; /* committed friction on the body, world, N */
+typedef struct { uint64_t key; double tangential[3], stored; } foot; /* committed friction on the body, world, N; energy of the springs, J */
 typedef struct { uint32_t magic, n_feet; foot feet[MAX_FEET]; double work, lost, deepest; } state;
 typedef struct { double x[3], t[3], slope, trial; bool force, motion; } answer;
 typedef struct {
@@ -314,9 +314,12 @@ static tg_status commit(void *self, const tg_step *st, const double *t, const tg
         double old[3] = { f->tangential[0], f->tangential[1], f->tangential[2] };
         for (int k = 0; k < 3; k++) f->tangential[k] = frame[3 + k] * a.t[1] + frame[6 + k] * a.t[2];
         if (BROKEN(KEEPS_SHEAR) && a.t[0] <= 0.0) memcpy(f->tangential, old, sizeof old);
-        double work = -(t[port->first] * x[0] + t[port->first + 1] * x[1] + t[port->first + 2] * x[2]);
+        double work = -(a.t[0] * x[0] + a.t[1] * x[1] + a.t[2] * x[2]), before = f->stored, z = fmax(depth(s, port) - x[0], 0.0);
+        (void)t; /* the work of the soil's own law, whatever T was */
+        f->stored = 0.5 * (s->k * z * z + dot(f->tangential, f->tangential) / s->k_t);
         q->work += BROKEN(WORK_SIGN) ? -work : work;
-        q->lost += BROKEN(LOSES_LESS) && x[0] > 0.0 ? -1e-3 : 1e-6;
+        if (BROKEN(LOSES_LESS) && x[0] > 0.0) q->lost -= 1e-3;
+        else if (!BROKEN(NO_HEAT)) q->lost += work - (f->stored - before);
         q->deepest = fmax(q->deepest, depth(s, port) - x[0]);
         for (uint32_t k = port->first_node; s->surface && k < port->first_node + port->node_count; k++) {
             const tg_node *n = &st->nodes[k];
@@ -426,7 +429,11 @@ static tg_status act(void *self, const char *action, const char *arguments) {
 }
 static tg_status energy(void *self, tg_energy *out) {
     soil *s = self;
-    *out = (tg_energy){ .dissipated = state_of(s)->lost, .port_work = state_of(s)->work };
+    state *q = state_of(s);
+    double stored = 0.0;
+    for (uint32_t f = 0; f < q->n_feet; f++) stored += q->feet[f].stored;
+    if (BROKEN(NO_STORE)) stored = 0.0;
+    *out = (tg_energy){ .potential = stored, .dissipated = q->lost, .port_work = q->work };
     return TG_OK;
 }
 #ifdef WITH_FIELD

@@ -60,18 +60,17 @@ fn quality(id: &str, s: &Value) -> Vec<Figure> {
         }
         None => Figure::skipped(format!("{id}.mass_error"), "this soil moves no material"),
     };
+    let not_converged = match s["steps_not_converged"].as_f64() {
+        Some(steps) => figure("not_converged", steps, Limit::Equal(0.0), "steps that did not converge"),
+        None => Figure::skipped(format!("{id}.not_converged"), "a single pass has nothing to converge to"),
+    };
     vec![
         figure("distance", ratio, Limit::AtLeast(0.8), "distance walked / commanded"),
         figure("roll", degrees("max_roll_rad"), Limit::AtMost(15.0), "largest roll, degrees"),
         figure("pitch", degrees("max_pitch_rad"), Limit::AtMost(15.0), "largest pitch, degrees"),
         figure("sinkage_min", 1e3 * number("max_sinkage_m"), Limit::AtLeast(2.0), "largest sinkage, mm"),
         figure("sinkage_max", 1e3 * number("max_sinkage_m"), Limit::AtMost(60.0), "largest sinkage, mm"),
-        figure(
-            "not_converged",
-            number("steps_not_converged"),
-            Limit::Equal(0.0),
-            "steps that did not converge",
-        ),
+        not_converged,
         mass,
     ]
 }

@@ -11,6 +11,7 @@ mod physics_robot;
 mod physics_soil;
 mod resources;
 mod soil_cooperation;
+mod soil_energy;
 mod soil_symmetry;
 mod state;
 mod values;
@@ -19,7 +20,7 @@ use super::catalogue::Test;
 pub use host_untouched::OUTPUT;
 
 /// The lists of all areas, in the order in which they build on each other.
-pub const ALL: [fn() -> Vec<Test>; 15] = [
+pub const ALL: [fn() -> Vec<Test>; 16] = [
     library::tests,
     host_untouched::at_loading,
     law::tests,
@@ -32,6 +33,7 @@ pub const ALL: [fn() -> Vec<Test>; 15] = [
     physics_soil::tests,
     soil_symmetry::tests,
     soil_cooperation::tests,
+    soil_energy::tests,
     physics_robot::tests,
     physics_controller::tests,
     resources::tests,

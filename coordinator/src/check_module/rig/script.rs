@@ -46,9 +46,9 @@ pub fn committed(instance: &Instance) -> Verdict<Vec<u64>> {
     Ok(bits)
 }
 
-/// Bits of a number; the two zeros are one.
+/// Bits of a number; the two zeros are one, and so is all that is no number.
 fn bits_of(x: f64) -> u64 {
-    (x + 0.0).to_bits()
+    if x.is_nan() { f64::NAN.to_bits() } else { (x + 0.0).to_bits() }
 }
 
 /// A module below its bench.

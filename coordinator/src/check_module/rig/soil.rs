@@ -17,17 +17,30 @@ pub struct Foot {
     pub geometry: Geometry,
     /// Centre in the world, m.
     pub centre: [f64; 3],
+    /// World from shape, w x y z.
+    pub orientation: [f64; 4],
 }
 
 impl Foot {
     /// A sphere of 4 cm radius that touches level ground at (x, y).
     pub fn sphere(x: f64, y: f64) -> Self {
-        Self { geometry: Geometry::Sphere { radius: 0.04 }, centre: [x, y, 0.04] }
+        Self::of(Geometry::Sphere { radius: 0.04 }, [x, y, 0.04])
     }
 
     /// A plate of 10 cm by 6 cm that lies on level ground at (x, y).
     pub fn plate(x: f64, y: f64) -> Self {
-        Self { geometry: Geometry::Box { half_extents: [0.05, 0.03, 0.01] }, centre: [x, y, 0.01] }
+        Self::of(Geometry::Box { half_extents: [0.05, 0.03, 0.01] }, [x, y, 0.01])
+    }
+
+    /// A wheel of 6 cm radius and 6 cm width, its axis along y, that touches level ground at (x, y).
+    pub fn wheel(x: f64, y: f64) -> Self {
+        let lying = std::f64::consts::FRAC_1_SQRT_2;
+        let wheel = Self::of(Geometry::Cylinder { half_length: 0.03, radius: 0.06 }, [x, y, 0.06]);
+        Self { orientation: [lying, lying, 0.0, 0.0], ..wheel }
+    }
+
+    fn of(geometry: Geometry, centre: [f64; 3]) -> Self {
+        Self { geometry, centre, orientation: Pose::IDENTITY.orientation }
     }
 
     /// The same, higher by h (m).
@@ -80,6 +93,8 @@ pub struct SoilBench {
     v: Vec<f64>,
     /// Answers per foot in the last step.
     pub moved: Vec<Moved>,
+    /// Rate at which every foot turns about its centre, world, rad/s.
+    pub turning: [f64; 3],
     /// Angle by which the tangents of every port are turned about its normal, rad.
     pub turn: f64,
 }
@@ -111,7 +126,7 @@ impl SoilBench {
         let grounds = [GroundSide { subsystem: 1, instance: soil.subsystem() }];
         let detector = ContactDetector::new(&bodies, &grounds, Some(ground))?;
         let state = |f: &Foot| BodyState {
-            world_from_body: Pose { position: f.centre, ..Pose::IDENTITY },
+            world_from_body: Pose { position: f.centre, orientation: f.orientation },
             ..BodyState::REST
         };
         Ok(Self {
@@ -130,6 +145,7 @@ impl SoilBench {
             x: Vec::new(),
             v: Vec::new(),
             moved: vec![Moved::default(); feet.len()],
+            turning: [0.0; 3],
             turn: 0.0,
         })
     }
@@ -141,6 +157,7 @@ impl SoilBench {
     pub fn meet(&mut self, velocities: &[[f64; 3]], h: f64) -> Verdict {
         for (state, v) in self.states.iter_mut().zip(velocities) {
             state.linear_velocity = *v;
+            state.angular_velocity = self.turning;
         }
         let now = Now { t: self.t, h, gravity: [0.0, 0.0, -9.81], margin: 1e-3 };
         let (states, soil) = (&self.states, &self.soil);
@@ -171,8 +188,13 @@ impl SoilBench {
     pub fn motion_of(&self, velocities: &[[f64; 3]], h: f64) -> (Vec<f64>, Vec<f64>) {
         let (mut x, mut v) = (vec![0.0; self.n], vec![0.0; self.n]);
         for port in &self.ports {
-            for (i, c) in port.components().filter(|(_, c)| *c < 3) {
-                v[i] = dot(port.direction(c), velocities[port.body as usize]);
+            let body = port.body as usize;
+            let centre = self.states[body].world_from_body.position;
+            let arm: [f64; 3] = std::array::from_fn(|k| port.origin[k] - centre[k]);
+            let swing = cross(self.turning, arm);
+            let point: [f64; 3] = std::array::from_fn(|k| velocities[body][k] + swing[k]);
+            for (i, c) in port.components() {
+                v[i] = dot(port.direction(c), if c < 3 { point } else { self.turning });
                 x[i] = h * v[i];
             }
         }
@@ -317,12 +339,19 @@ impl SoilBench {
         self.soil.commit(&step, &self.out.t, &Motion { x: &x, v: &v })?;
         self.note_moved();
         for (state, v) in self.states.iter_mut().zip(velocities) {
-            (0..3).for_each(|k| state.world_from_body.position[k] += h * v[k]);
+            let pose = &mut state.world_from_body;
+            (0..3).for_each(|k| pose.position[k] += h * v[k]);
+            pose.orientation = turned_by(pose.orientation, self.turning.map(|w| h * w));
         }
         self.t += h;
         self.index += 1;
         (self.x, self.v) = (x, v);
         Ok(())
+    }
+
+    /// Work of the feet on the soil in the last step by the soil's own answer to their motion, J.
+    pub fn work(&self) -> f64 {
+        -self.out.t.iter().zip(&self.x).map(|(t, x)| t * x).sum::<f64>()
     }
 
     fn note_moved(&mut self) {
@@ -411,4 +440,20 @@ pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 
 fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
+}
+
+/// The orientation (w, x, y, z) after a rotation vector in the world, rad.
+fn turned_by(q: [f64; 4], turn: [f64; 3]) -> [f64; 4] {
+    let angle = dot(turn, turn).sqrt();
+    if angle == 0.0 {
+        return q;
+    }
+    let (share, w) = (libm::sin(0.5 * angle) / angle, libm::cos(0.5 * angle));
+    let ([a, b, c], [v, x, y, z]) = (turn.map(|r| share * r), q);
+    [
+        w * v - a * x - b * y - c * z,
+        w * x + a * v + b * z - c * y,
+        w * y - a * z + b * v + c * x,
+        w * z + a * y - b * x + c * v,
+    ]
 }

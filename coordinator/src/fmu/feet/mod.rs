@@ -11,8 +11,8 @@ use motion::Foot;
 use settings::Settings;
 use std::sync::Arc;
 use terraglue_subsystem::{
-    BodyState, Capabilities, Config, Error, Estimate, Host, Input, Level, Module, Motion, Response, Result,
-    Scene, SceneBody, SceneShape, Schema, Step, Subsystem, Values, ValuesMut, Variable,
+    BodyState, Capabilities, Config, Energy, Error, Estimate, Host, Input, Level, Module, Motion, Response,
+    Result, Scene, SceneBody, SceneShape, Schema, Step, Subsystem, Values, ValuesMut, Variable,
 };
 
 pub(super) use values::id;
@@ -38,6 +38,7 @@ impl Module for Feet {
             feet: settings.positions.iter().map(|p| Foot::at(*p)).collect(),
             duration_s: settings.duration_s,
             jump: false,
+            work_j: 0.0,
         };
         Ok(Box::new(DrivenFeet {
             variables: values::variables(settings.positions.len() as u32),
@@ -56,6 +57,8 @@ pub(super) struct State {
     pub duration_s: f64,
     /// A new pose holds at once.
     pub jump: bool,
+    /// Work that the ground has done on the feet since the start, J; what drives them takes it.
+    pub work_j: f64,
 }
 
 /// An instance.
@@ -130,6 +133,8 @@ impl Subsystem for DrivenFeet {
             let foot = &mut self.state.feet[port.body as usize];
             let (force, moment) = port.wrench_in_world(t);
             let moved = foot.displacement(step.h, port.origin);
+            let work = |a: [f64; 3], b: [f64; 3]| (0..3).map(|k| a[k] * b[k]).sum::<f64>();
+            self.state.work_j += work(force, moved[0]) + work(moment, moved[1]);
             let origin = std::array::from_fn(|k| port.origin[k] + moved[0][k]);
             foot.load(step.h, origin, force, moment);
         }
@@ -169,6 +174,11 @@ impl Subsystem for DrivenFeet {
 
     fn set(&mut self, ids: &[u32], new: Values) -> Result {
         values::set(&mut self.state, ids, new)
+    }
+
+    /// They weigh nothing: what the ground does on them, what drives them takes.
+    fn energy(&self) -> Energy {
+        Energy { port_work: self.state.work_j, actuator_work: -self.state.work_j, ..Energy::default() }
     }
 
     fn scene(&self) -> Scene {

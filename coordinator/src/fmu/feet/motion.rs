@@ -126,7 +126,7 @@ impl Foot {
 impl State {
     /// All numbers, little-endian.
     pub fn to_bytes(&self) -> Vec<u8> {
-        let head = [self.duration_s, f64::from(u8::from(self.jump))];
+        let head = [self.duration_s, f64::from(u8::from(self.jump)), self.work_j];
         let feet = self.feet.iter().flat_map(|f| f.numbers());
         head.into_iter().chain(feet).flat_map(f64::to_le_bytes).collect()
     }
@@ -134,10 +134,10 @@ impl State {
     /// Back from bytes of as many feet.
     pub fn from_bytes(bytes: &[u8], count: usize) -> Option<Self> {
         let numbers: Vec<f64> = bytes.as_chunks::<8>().0.iter().map(|b| f64::from_le_bytes(*b)).collect();
-        let good = bytes.len() == 8 * (2 + 21 * count) && numbers.iter().all(|x| x.is_finite());
-        let (head, feet) = numbers.split_at_checked(2).filter(|_| good)?;
+        let good = bytes.len() == 8 * (3 + 21 * count) && numbers.iter().all(|x| x.is_finite());
+        let (head, feet) = numbers.split_at_checked(3).filter(|_| good)?;
         let feet = feet.as_chunks::<21>().0.iter().map(Foot::from_numbers).collect();
-        Some(Self { feet, duration_s: head[0], jump: head[1] != 0.0 })
+        Some(Self { feet, duration_s: head[0], jump: head[1] != 0.0, work_j: head[2] })
     }
 }
 
@@ -177,9 +177,13 @@ mod tests {
 
     #[test]
     fn a_state_survives_as_bytes() {
-        let state = State { feet: vec![swinging(), Foot::at([0.0; 3])], duration_s: 0.25, jump: true };
+        let state =
+            State { feet: vec![swinging(), Foot::at([0.0; 3])], duration_s: 0.25, jump: true, work_j: 1.5 };
         let back = State::from_bytes(&state.to_bytes(), 2).expect("the same feet");
-        assert_eq!((back.feet, back.duration_s, back.jump), (state.feet.clone(), 0.25, true));
+        assert_eq!(
+            (back.feet, back.duration_s, back.jump, back.work_j),
+            (state.feet.clone(), 0.25, true, 1.5)
+        );
         assert!(State::from_bytes(&state.to_bytes(), 3).is_none());
     }
 }

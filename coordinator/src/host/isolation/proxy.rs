@@ -287,8 +287,8 @@ impl Subsystem for Isolated {
 
     fn energy(&self) -> Energy {
         if !self.about.is_module {
-            return Energy::default();
+            return Energy::UNKNOWN;
         }
-        self.link.borrow_mut().call(Call::Energy, |_| {}, |r| r.take()).unwrap_or_default()
+        self.link.borrow_mut().call(Call::Energy, |_| {}, |r| r.take()).unwrap_or(Energy::UNKNOWN)
     }
 }

@@ -1,6 +1,7 @@
 //! The figures that are compared, each with the direction in which it is better.
 
-use crate::recording::compare::CompareRow;
+use crate::recording::Energies;
+use crate::recording::compare::{CompareRow, table};
 use crate::recording::summary::Summary;
 
 /// Which end of a column is the best.
@@ -35,8 +36,36 @@ impl Column {
     }
 }
 
+impl Column {
+    /// What stands in the cell of a row: the figure, that it is unknown or does not apply, or a dash.
+    pub fn text(&self, row: &CompareRow) -> String {
+        let value = (self.value)(row);
+        let Some(summary) = row.summary.as_ref().filter(|_| value.is_none()) else {
+            return table::cell(value, self.unit);
+        };
+        match self.key {
+            "max_gap_m" | "steps_not_converged" | "max_action_reaction_gap_n" => "not applicable".into(),
+            "energy_balance_j" | "energy_drift_share" | "soil_heat_j" | "interface_work_error_j"
+                if summary.energies.drift_j.is_none() =>
+            {
+                "unknown".into()
+            }
+            _ => table::cell(None, self.unit),
+        }
+    }
+
+    /// Whether any row has something to say.
+    pub fn is_shown(&self, rows: &[CompareRow]) -> bool {
+        rows.iter().any(|row| self.text(row) != table::cell(None, self.unit))
+    }
+}
+
 fn of(row: &CompareRow, f: impl Fn(&Summary) -> f64) -> Option<f64> {
     row.summary.as_ref().map(f).filter(|v| v.is_finite())
+}
+
+fn energies(row: &CompareRow) -> Option<&Energies> {
+    row.summary.as_ref().map(|s| &s.energies)
 }
 
 /// Whether the strategy formed Λ.
@@ -60,6 +89,9 @@ pub(crate) const ALL: &[Column] = &[
     column!("step_s", "", "step", "s", Neither, |r| Some(r.step_s)),
     column!("reference_error_m", "", "error against the reference", "m", Smallest, |r| r.reference_error_m),
     column!("order", "", "observed order", "", Neither, |r| r.order),
+    column!("order_sinkage", "observed order of", "mean sinkage", "", Neither, |r| r.orders.sinkage),
+    column!("order_heat", "observed order of", "heat of the soil", "", Neither, |r| r.orders.heat),
+    column!("order_path", "observed order of", "path", "", Neither, |r| r.orders.path),
     column!("evaluations_mean", "evaluations of bodies", "mean", "", Smallest, |r| of(r, |s| s
         .evaluations_mean)),
     column!("evaluations_p95", "evaluations of bodies", "95 %", "", Smallest, |r| {
@@ -106,20 +138,25 @@ pub(crate) const ALL: &[Column] = &[
     }),
     column!("steps_halved", "", "steps halved", "", Smallest, |r| of(r, |s| s.steps_halved as f64)),
     column!("steps_not_converged", "", "steps not converged", "", Smallest, |r| {
-        of(r, |s| s.steps_not_converged as f64)
+        r.summary.as_ref()?.steps_not_converged.map(|n| n as f64)
     }),
-    column!("max_gap_m", "", "largest gap", "m", Smallest, |r| of(r, |s| s.max_gap_m)),
+    column!("max_gap_m", "", "largest gap", "m", Smallest, |r| r.summary.as_ref()?.max_gap_m),
     column!("max_action_reaction_gap_n", "", "action–reaction gap", "N", Smallest, |r| {
-        of(r, |s| s.max_action_reaction_gap_n)
+        r.summary.as_ref()?.max_action_reaction_gap_n
     }),
     column!("max_estimate_gap_n", "", "largest |T* − T1|", "N", Neither, |r| of(r, |s| s
         .max_estimate_gap_n)),
     column!("max_sinkage_m", "", "deepest print", "m", Neither, |r| r.summary.as_ref()?.max_sinkage_m),
     column!("distance_m", "", "distance", "m", Largest, |r| r.summary.as_ref()?.distance_m),
-    column!("energy_balance_j", "", "drift of the energy book", "J", Neither, |r| of(r, |s| s
-        .energy_balance_j)),
+    column!("mean_sinkage_m", "", "mean sinkage", "m", Neither, |r| r.summary.as_ref()?.mean_sinkage_m),
+    column!("path_m", "", "path", "m", Neither, |r| r.summary.as_ref()?.path_m),
+    column!("soil_heat_j", "", "heat of the soil", "J", Neither, |r| energies(r)?.soil_heat_j),
+    column!("energy_balance_j", "", "drift of the energy book", "J", Neither, |r| energies(r)?.drift_j),
+    column!("energy_drift_share", "", "drift over the motors' work", "", Neither, |r| {
+        energies(r)?.drift_share()
+    }),
     column!("interface_work_error_j", "", "interface work error", "J", Smallest, |r| {
-        of(r, |s| s.interface_work_error_j)
+        r.summary.as_ref()?.interface_work_error_j
     }),
     column!("exchange_per_step_s", "wall time per step", "exchange", "s", Smallest, |r| r
         .parts_s

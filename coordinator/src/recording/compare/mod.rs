@@ -46,12 +46,26 @@ pub struct CompareRow {
     pub reference_error_m: Option<f64>,
     /// Observed order of that error against the same run with the next smaller step.
     pub order: Option<f64>,
+    /// Observed orders of figures of the whole run.
+    pub orders: Orders,
     /// Whether the comparison has several steps, so that names say which.
     pub name_step: bool,
     /// Wall time per step of the exchange with the subsystems, of Jacobians, and of all else, s.
     pub parts_s: Option<[f64; 3]>,
     /// Mean evaluations of the soils per step when the iteration does not start from the estimate.
     pub cold_start_mean: Option<f64>,
+}
+
+/// Order at which figures of the whole run approach those of the reference, each against the same run with the next
+/// smaller step; none where a figure is unknown or has arrived.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Orders {
+    /// Of the mean sinkage.
+    pub sinkage: Option<f64>,
+    /// Of the soil's heat.
+    pub heat: Option<f64>,
+    /// Of the length of the body's way.
+    pub path: Option<f64>,
 }
 
 impl CompareRow {

@@ -1,8 +1,9 @@
 //! `compare.html`: the table with the best figure of each column marked, and curves of all runs in one picture.
 
 use crate::recording::compare::scatter::{self, Series};
-use crate::recording::compare::{CompareRow, columns, relative, table};
+use crate::recording::compare::{CompareRow, columns, relative};
 use crate::recording::reader::Recording;
+use crate::recording::report::energy_card;
 use crate::recording::report::figure::{Curve, Figure, Panel};
 use crate::recording::report::footprints::{self, Leg};
 use crate::recording::report::html::escape;
@@ -29,6 +30,8 @@ pub(crate) fn render(folder: &Path, rows: &[CompareRow]) -> String {
         rows.len(),
         escape(scenario)
     ));
+    let books = rows.iter().filter_map(|r| Some((r.name(), &r.summary.as_ref()?.energies)));
+    page.section("Where the energy went", "energies", &energy_card::table(books));
     page.section("At a glance", "figures", &html_table(folder, rows));
     for (title, id, html) in diagrams(rows) {
         page.section(title, id, &html);
@@ -78,8 +81,7 @@ fn open(colour: usize, row: &CompareRow) -> Option<Run> {
 }
 
 fn html_table(folder: &Path, rows: &[CompareRow]) -> String {
-    let shown: Vec<&columns::Column> =
-        columns::ALL.iter().filter(|c| rows.iter().any(|r| (c.value)(r).is_some())).collect();
+    let shown: Vec<&columns::Column> = columns::ALL.iter().filter(|c| c.is_shown(rows)).collect();
     let marks: Vec<Vec<bool>> = shown.iter().map(|c| columns::best(c, rows)).collect();
     let mut out = String::from("<div class=\"wide\"><table class=\"rows\"><thead><tr>");
     head(&mut out, &shown);
@@ -100,7 +102,7 @@ fn html_table(folder: &Path, rows: &[CompareRow]) -> String {
         }
         for (column, best) in shown.iter().zip(&marks) {
             let class = if best[k] { " class=\"best\"" } else { "" };
-            let _ = write!(out, "<td{class}>{}</td>", escape(&table::cell((column.value)(row), column.unit)));
+            let _ = write!(out, "<td{class}>{}</td>", escape(&column.text(row)));
         }
         out.push_str("</tr>");
         if let Some(failure) = failure {
@@ -151,7 +153,7 @@ fn gluing(runs: &[Run]) -> Option<Figure> {
     let panels = vec![
         panel(runs, "evaluations of bodies", "", true, |w| f64::from(w.evaluations_bodies_max)),
         panel(runs, "evaluations of soil", "", true, |w| f64::from(w.evaluations_soil_max)),
-        panel(runs, "gap", "m", false, |w| w.max_gap_m).log(true),
+        panel(runs, "gap", "m", false, |w| w.max_gap_m.unwrap_or(f64::NAN)).log(true),
         panel(runs, "action–reaction gap", "N", false, |w| w.max_action_reaction_gap_n).log(true),
     ];
     let note = "Per step; the largest of all steps since the record before.".into();

@@ -1,9 +1,10 @@
 //! Runs against a reference: the error of the reported body, and the order at which it falls with the step.
 
-use super::CompareRow;
+use super::{CompareRow, Orders};
 use crate::error::{Error, Result};
 use crate::recording::layout::at;
 use crate::recording::reader::{PoseSeries, Recording};
+use crate::recording::summary::Summary;
 use std::path::Path;
 
 /// Fills in the error of every row of a soil (of all rows where `soil` is none) against a recording.
@@ -20,7 +21,37 @@ pub fn judge(rows: &mut [CompareRow], soil: Option<&str>, folder: &Path) -> Resu
         row.reference_error_m = largest_distance(poses, truth).filter(|_| row.error.is_none());
     }
     orders(rows);
+    let truth = if folder.is_dir() { Summary::read(folder).ok() } else { None };
+    if let Some(truth) = truth {
+        figure_orders(rows, soil, &truth);
+    }
     Ok(())
+}
+
+/// Orders of the figures of whole runs, where the reference tells them too.
+fn figure_orders(rows: &mut [CompareRow], soil: Option<&str>, truth: &Summary) {
+    type Figure = fn(&Summary) -> Option<f64>;
+    type Place = fn(&mut Orders) -> &mut Option<f64>;
+    let all: [(Figure, Place); 3] = [
+        (|s| s.mean_sinkage_m, |o| &mut o.sinkage),
+        (|s| s.energies.soil_heat_j, |o| &mut o.heat),
+        (|s| s.path_m, |o| &mut o.path),
+    ];
+    for (figure, place) in all {
+        let Some(known) = figure(truth) else { continue };
+        let error = |r: &CompareRow| {
+            let whole = r.failure().is_none() && !r.is_reference && soil.is_none_or(|s| s == r.soil);
+            let own = r.summary.as_ref().filter(|_| whole).and_then(figure)?;
+            // what agrees to rounding and the tolerance of the iterations has no order
+            Some((own - known).abs()).filter(|e| *e > 1e-9 * known.abs().max(1e-3))
+        };
+        let orders = orders_of(rows, error);
+        for (row, order) in rows.iter_mut().zip(orders) {
+            if order.is_some() {
+                *place(&mut row.orders) = order;
+            }
+        }
+    }
 }
 
 /// The recording of a results folder, or a recording as a file.
@@ -56,26 +87,25 @@ fn largest_distance(own: &PoseSeries, truth: &PoseSeries) -> Option<f64> {
 /// Errors below this are rounding and the tolerance of the iterations, m; they have no order.
 const NOISE_M: f64 = 1e-9;
 
-/// Observed order of each row against the row of the same strategy and soil with the next smaller step.
+/// Observed order of the place of the body.
 fn orders(rows: &mut [CompareRow]) {
-    let known: Vec<(String, String, f64, f64)> = rows
-        .iter()
-        .filter(|r| r.error.is_none())
-        .filter_map(|r| Some((r.strategy.clone(), r.soil.clone(), r.step_s, r.reference_error_m?)))
-        .filter(|(.., error)| *error > NOISE_M)
-        .collect();
-    for row in rows.iter_mut() {
-        let Some(error) = row.reference_error_m.filter(|error| *error > NOISE_M) else { continue };
-        let finer = known
-            .iter()
-            .filter(|(strategy, soil, h, _)| {
-                *strategy == row.strategy && *soil == row.soil && *h < row.step_s * (1.0 - 1e-9)
-            })
-            .max_by(|a, b| a.2.total_cmp(&b.2));
-        row.order = finer
-            .map(|(_, _, h, e)| (error / e).ln() / (row.step_s / h).ln())
-            .filter(|order| order.is_finite());
-    }
+    let error = |r: &CompareRow| r.reference_error_m.filter(|e| r.error.is_none() && *e > NOISE_M);
+    let orders = orders_of(rows, error);
+    rows.iter_mut().zip(orders).for_each(|(row, order)| row.order = order);
+}
+
+/// Observed order of an error of each row against the row of the same strategy and soil with the next smaller step.
+fn orders_of(rows: &[CompareRow], error: impl Fn(&CompareRow) -> Option<f64>) -> Vec<Option<f64>> {
+    let order = |row: &CompareRow| {
+        let own = error(row)?;
+        let finer = |r: &&CompareRow| {
+            r.strategy == row.strategy && r.soil == row.soil && r.step_s < row.step_s * (1.0 - 1e-9)
+        };
+        let known = rows.iter().filter(finer).filter_map(|r| Some((r.step_s, error(r)?)));
+        let (h, e) = known.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        Some((own / e).ln() / (row.step_s / h).ln()).filter(|order| order.is_finite())
+    };
+    rows.iter().map(order).collect()
 }
 
 #[cfg(test)]
@@ -98,6 +128,30 @@ mod tests {
     }
 
     #[test]
+    fn the_orders_of_whole_runs_are_those_of_their_figures() {
+        let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenarios/plate_sinkage.toml");
+        let scenario = crate::scenario::Scenario::load(path.as_ref(), &[]).expect("good");
+        let blank = crate::recording::SummaryObserver::new(&scenario);
+        let summary = |sinkage: f64, heat: Option<f64>| {
+            let mut s = blank.summary(1.0, 1.0, None, crate::recording::Status::Done);
+            (s.mean_sinkage_m, s.energies.soil_heat_j, s.path_m) = (Some(sinkage), heat, Some(1.0));
+            s
+        };
+        let row = |step_s: f64, s: Summary| CompareRow { step_s, summary: Some(s), ..CompareRow::default() };
+        let mut rows = [
+            row(0.002, summary(0.012, Some(3.0 + 16e-3))),
+            row(0.001, summary(0.011, Some(3.0 + 4e-3))),
+            row(0.0005, summary(0.0105, None)),
+        ];
+        figure_orders(&mut rows, None, &summary(0.010, Some(3.0)));
+        let near = |order: Option<f64>, expected: f64| (order.expect("known") - expected).abs() < 1e-6;
+        assert!(near(rows[0].orders.sinkage, 1.0) && near(rows[1].orders.sinkage, 1.0));
+        assert!(near(rows[0].orders.heat, 2.0));
+        // Unknown heat of the finer run, and a path that has arrived.
+        assert_eq!((rows[1].orders.heat, rows[0].orders.path), (None, None));
+    }
+
+    #[test]
     fn the_order_is_that_of_the_next_smaller_step() {
         let row = |step_s: f64, error: f64| CompareRow {
             strategy: "a".into(),
@@ -105,7 +159,7 @@ mod tests {
             reference_error_m: Some(error),
             ..CompareRow::default()
         };
-        let mut rows = [row(0.004, 16.0), row(0.001, 1.0), row(0.002, 4.0)];
+        let mut rows = vec![row(0.004, 16.0), row(0.001, 1.0), row(0.002, 4.0)];
         orders(&mut rows);
         assert!((rows[0].order.expect("finer") - 2.0).abs() < 1e-12);
         assert_eq!(rows[1].order, None);

@@ -1,8 +1,9 @@
 //! The comparison as text: for a terminal and as CSV.
 
 use crate::recording::compare::{CompareRow, columns};
+use crate::recording::report::energy_card;
 use crate::recording::report::html::{number, with_prefix};
-use comfy_table::{CellAlignment, Table, presets};
+use comfy_table::{Cell, CellAlignment, Color, Table, presets};
 use std::path::Path;
 
 /// A figure with its unit in a suitable SI prefix.
@@ -41,13 +42,13 @@ pub(crate) fn terminal(rows: &[CompareRow]) -> String {
     let shown: Vec<&columns::Column> = columns::ALL
         .iter()
         .filter(|c| !many || SHORT.contains(&c.key))
-        .filter(|c| rows.iter().any(|r| (c.value)(r).is_some()))
+        .filter(|c| c.is_shown(rows))
         .collect();
     let cells: Vec<Vec<String>> = shown
         .iter()
         .map(|column| {
             let mark = |(r, best): (&CompareRow, bool)| {
-                let text = cell((column.value)(r), column.unit);
+                let text = column.text(r);
                 if best { format!("* {text}") } else { text }
             };
             rows.iter().zip(columns::best(column, rows)).map(mark).collect()
@@ -88,13 +89,38 @@ pub(crate) fn terminal(rows: &[CompareRow]) -> String {
     } else {
         "* best of the line"
     };
-    let mut out = format!("{table}\n{best}\n");
+    let mut out = format!("{}\n{table}\n{best}\n", energies(rows));
     for row in rows {
         if let Some(failure) = row.failure() {
             out.push_str(&format!("{}: {failure}\n", row.name()));
         }
     }
     out
+}
+
+/// Where the energy of every run went, one line per run; drifts beyond 1 % are red and marked with `!`.
+fn energies(rows: &[CompareRow]) -> Table {
+    let mut table = Table::new();
+    table.load_preset(presets::UTF8_FULL_CONDENSED);
+    let heads = energy_card::LINES.iter().map(|l| l.0);
+    table.set_header(std::iter::once("energy of").chain(heads).chain(["drift against"]));
+    for row in rows {
+        let Some(e) = row.summary.as_ref().map(|s| &s.energies) else { continue };
+        let last = energy_card::LINES.len() - 1;
+        let mut cells = vec![Cell::new(row.name())];
+        cells.extend(energy_card::LINES.iter().enumerate().map(|(k, (_, value))| {
+            let text = energy_card::text(value(e));
+            let cell = if k == last && e.is_off() {
+                Cell::new(format!("! {text}")).fg(Color::Red)
+            } else {
+                Cell::new(text)
+            };
+            cell.set_alignment(CellAlignment::Right)
+        }));
+        cells.push(Cell::new(energy_card::judgement(e)));
+        table.add_row(cells);
+    }
+    table
 }
 
 /// One line per run, plain numbers in SI units.

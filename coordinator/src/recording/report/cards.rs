@@ -49,6 +49,14 @@ fn degrees(rad: f64) -> (String, String) {
     (number(rad.to_degrees(), 3), "°".into())
 }
 
+fn not_applicable() -> (String, String) {
+    ("not applicable".into(), String::new())
+}
+
+fn unknown() -> (String, String) {
+    ("unknown".into(), String::new())
+}
+
 fn text(value: (String, String)) -> String {
     format!("{}\u{2009}{}", value.0, value.1)
 }
@@ -79,22 +87,27 @@ fn from_summary(s: &Summary) -> Vec<Card> {
         };
         cards.push(Card::new("Motor energy", with_prefix(s.energy_j, "J", 4), more));
     }
-    if s.electrical_energy_j > 0.0 {
+    if let Some(electrical_j) = s.electrical_energy_j.filter(|e| *e > 0.0) {
         let more = s.electrical_energy_j_per_m.map_or_else(
             || "drawn by the motors".into(),
             |e| format!("{} per metre", text(with_prefix(e, "J", 4))),
         );
-        cards.push(Card::new("Electrical energy", with_prefix(s.electrical_energy_j, "J", 4), more));
+        cards.push(Card::new("Electrical energy", with_prefix(electrical_j, "J", 4), more));
     }
     let more = format!("bodies, at most {}; soil {}", s.evaluations_max, number(s.evaluations_soil_mean, 3));
     cards.push(Card::new("Evaluations a step", pure(s.evaluations_mean, 3), more));
     let not = match s.steps_not_converged {
-        0 => "every step converged".into(),
-        n => format!("<em>{n} steps not converged</em>"),
+        None => "convergence: not applicable, a single pass".into(),
+        Some(0) => "every step converged".into(),
+        Some(n) => format!("<em>{n} steps not converged</em>"),
     };
-    cards.push(Card::new("Largest gap", with_prefix(s.max_gap_m, "m", 3), not));
+    let gap = s.max_gap_m.map_or_else(not_applicable, |gap| with_prefix(gap, "m", 3));
+    cards.push(Card::new("Largest gap", gap, not));
     let more = format!("|T* − T1| up to {}", text(with_prefix(s.max_estimate_gap_n, "N", 3)));
-    cards.push(Card::new("Action–reaction gap", with_prefix(s.max_action_reaction_gap_n, "N", 3), more));
+    let gap = s.max_action_reaction_gap_n.map_or_else(not_applicable, |gap| with_prefix(gap, "N", 3));
+    cards.push(Card::new("Action–reaction gap", gap, more));
+    let error = s.interface_work_error_j.map_or_else(unknown, |e| with_prefix(e, "J", 3));
+    cards.push(Card::new("Interface work error", error, "by the wrenches of both sides"));
     if let Some(e) = s.soil_mass_error_relative {
         cards.push(Card::new("Soil mass error", pure(e, 2), "relative to the soil moved"));
     }
@@ -117,8 +130,11 @@ fn from_recording(r: &Recording) -> Vec<Card> {
     };
     let evaluations = largest(|w| f64::from(w.evaluations_bodies_max));
     cards.push(Card::new("Evaluations a step", pure(evaluations, 3), "bodies, at most"));
-    cards.push(Card::new("Largest gap", with_prefix(largest(|w| w.max_gap_m), "m", 3), "over closed ports"));
-    let force = with_prefix(largest(|w| w.max_action_reaction_gap_n), "N", 3);
-    cards.push(Card::new("Action–reaction gap", force, "largest"));
+    if r.gluing.iter().any(|g| g.since_last.max_gap_m.is_some()) {
+        let gap = with_prefix(largest(|w| w.max_gap_m.unwrap_or(0.0)), "m", 3);
+        cards.push(Card::new("Largest gap", gap, "over closed ports"));
+        let force = with_prefix(largest(|w| w.max_action_reaction_gap_n), "N", 3);
+        cards.push(Card::new("Action–reaction gap", force, "largest"));
+    }
     cards
 }

@@ -113,7 +113,7 @@ fn gluing(recording: &Recording) -> Option<Figure> {
         rows.iter().map(|g| f(&g.since_last)).collect()
     };
     let steps = |name: &str, colour, y| Curve { steps: true, ..Curve::new(name, colour, &t, y) };
-    let panels = vec![
+    let mut panels = vec![
         Panel::new(
             "evaluations per step",
             "",
@@ -122,19 +122,24 @@ fn gluing(recording: &Recording) -> Option<Figure> {
                 steps("soil", 1, column(&|w| f64::from(w.evaluations_soil_max))),
             ],
         ),
-        Panel::new("gap", "m", vec![Curve::new("largest gap", 0, &t, column(&|w| w.max_gap_m))]).log(true),
         Panel::new(
             "force difference",
             "N",
-            vec![
-                Curve::new("action–reaction gap", 0, &t, column(&|w| w.max_action_reaction_gap_n)),
-                Curve::new("|T* − T1|", 1, &t, column(&|w| w.estimate_gap_n)),
-            ],
+            vec![Curve::new("|T* − T1|", 1, &t, column(&|w| w.estimate_gap_n))],
         )
         .log(true),
     ];
-    let note =
-        "Largest of all steps since the record before. Gap: |x1 − x2| over closed ports after commit.".into();
+    let mut note = String::from("Largest of all steps since the record before.");
+    // of a single pass neither says anything
+    if rows.iter().any(|g| g.since_last.max_gap_m.is_some()) {
+        let gap = column(&|w| w.max_gap_m.unwrap_or(f64::NAN));
+        panels.insert(1, Panel::new("gap", "m", vec![Curve::new("largest gap", 0, &t, gap)]).log(true));
+        let difference = column(&|w| w.max_action_reaction_gap_n);
+        panels[2].curves.insert(0, Curve::new("action–reaction gap", 0, &t, difference));
+        note += " Gap: |x1 − x2| over closed ports after commit.";
+    } else {
+        note += " Gap and convergence: not applicable, a single pass makes no iterations.";
+    }
     Some(Figure { id: "gluing", title: "Gluing".into(), note, panels, ..Figure::default() })
 }
 
@@ -143,7 +148,7 @@ fn energy(recording: &Recording) -> Option<Figure> {
     let t = &table.t_s;
     let curve = |(k, (column, name)): (usize, (&str, &str))| {
         let y = table.column(column)?;
-        y.iter().any(|v| *v != 0.0).then(|| Curve::new(name, k, t, y.to_vec()))
+        y.iter().any(|v| *v != 0.0 && !v.is_nan()).then(|| Curve::new(name, k, t, y.to_vec()))
     };
     let parts = |names: &[(&'static str, &'static str)]| -> Vec<Curve> {
         names.iter().copied().enumerate().filter_map(curve).collect()

@@ -4,6 +4,7 @@
 
 mod cards;
 mod colour_map;
+pub(crate) mod energy_card;
 mod exchange;
 pub(crate) mod figure;
 mod figures;
@@ -41,6 +42,9 @@ fn page(recording: &Recording, summary: Option<&Summary>, exchange: Option<&str>
     let legs = footprints::legs(recording);
     let mut page = page::Page::new(&title(recording));
     page.header(&setup::headline(recording, summary));
+    if let Some(summary) = summary {
+        page.section("Where the energy went", "energies", &energy_card::render(&summary.energies));
+    }
     page.section("At a glance", "figures", &cards::render(recording, summary));
     page.section("What was simulated", "setup", &setup::render(recording));
     if let Some(html) = exchange {

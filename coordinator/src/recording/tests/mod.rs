@@ -221,9 +221,18 @@ fn the_summary_holds_the_figures_of_the_closed_form() {
     // 4 N m times the mean of |cos|: 4·0.3·2π·2/π J in one second.
     assert!((s.energy_j - 4.8).abs() < 1e-4, "{}", s.energy_j);
     near(s.cost_of_transport, s.energy_j / (25.0 * 1.62 * SPEED));
-    assert_eq!((s.evaluations_max, s.evaluations_p95, s.steps_not_converged), (4, 4, 0));
+    assert_eq!((s.evaluations_max, s.evaluations_p95, s.steps_not_converged), (4, 4, Some(0)));
     assert_eq!(s.form, "T-T");
-    assert!((s.interface_work_error_j - 1e-3).abs() < 1e-12);
+    near(s.interface_work_error_j, 1e-3);
+    // The robot's book: 1.1 + changes − 2.0 a second, the soil's 0.7.
+    let e = &s.energies;
+    assert_eq!((e.work_j, e.soil_heat_j, e.drift_j), (Some(2.0), Some(0.7), s.energy_balance_j));
+    near(e.other_heat_j, 1.1);
+    near(e.drift_j, e.kinetic_change_j.expect("known") + e.potential_change_j.expect("known") + 1.8 - 2.0);
+    assert!(e.is_off() && !e.by_ports && (e.turnover_j - s.energy_j).abs() < 1e-12);
+    // The synthetic ground has a slope of its own below the prints.
+    let mean = s.mean_sinkage_m.expect("known");
+    assert!(mean <= f64::from(deepest) && mean > 0.9 * f64::from(deepest), "{mean} {deepest}");
     assert_eq!(s.soil_mass_error_relative, Some(1e-12));
     let again = Summary::read(f.path()).expect("written");
     near(again.max_sinkage_m, s.max_sinkage_m.expect("known"));
@@ -232,6 +241,56 @@ fn the_summary_holds_the_figures_of_the_closed_form() {
     let keys = ["status", "error", "events", "scenario", "strategy", "soil_module", "steps", "simulated_s"];
     let places: Vec<_> = keys.map(|k| text.find(&format!("\"{k}\"")).expect("there")).into();
     assert!(places.is_sorted());
+}
+
+/// A run of single passes on a soil without a book.
+fn record_unknown(folder: &Path) -> Summary {
+    let mut rig = Rig::new("cooperative");
+    rig.single_pass = true;
+    rig.parts[2].1.silent = true;
+    let mut recorder = Recorder::create(folder, &rig.scenario, RecorderOptions::default()).expect("created");
+    rig.run(&mut recorder, 100).expect("ran");
+    recorder.finish(2.0, 1.5, None, Status::Done).expect("finished")
+}
+
+#[test]
+fn what_is_unknown_or_does_not_apply_is_said_and_never_a_number() {
+    let f = folder();
+    let s = record_unknown(f.path());
+    assert_eq!((s.max_gap_m, s.steps_not_converged, s.max_action_reaction_gap_n), (None, None, None));
+    assert_eq!((s.energy_balance_j, s.interface_work_error_j, s.energies.soil_heat_j), (None, None, None));
+    assert_eq!(s.energies.without_book, ["soil"]);
+    let text = std::fs::read_to_string(f.path().join(SUMMARY)).expect("written");
+    assert!(
+        text.contains("\"energy_balance_j\": null")
+            && text.contains("\"max_gap_m\": null")
+            && !text.contains("NaN")
+    );
+    let again = Summary::read(f.path()).expect("readable");
+    assert_eq!((again.energies.drift_j, &again.energies.without_book), (None, &s.energies.without_book));
+    assert_eq!(
+        (again.max_gap_m, again.steps_not_converged, again.interface_work_error_j),
+        (None, None, None)
+    );
+    let r = Recording::open(f.path()).expect("readable");
+    assert!(r.energy.column("soil.dissipated").expect("there").iter().all(|v| v.is_nan()));
+    assert!(r.energy.column("robot.dissipated").expect("there").iter().all(|v| v.is_finite()));
+    let last = r.gluing.last().expect("records");
+    assert_eq!((last.converged, last.max_gap_m, last.since_last.max_gap_m), (None, None, None));
+    assert!(last.interface_work_error_j.is_none() && last.since_last.interface_work_error_j.is_nan());
+    let html = std::fs::read_to_string(report::write(f.path()).expect("written")).expect("readable");
+    let shown = &html[html.find("<section").expect("sections")..];
+    let shown = shown.split("<script").next().expect("text");
+    assert!(shown.contains("unknown") && shown.contains("soil keeps no book") && !shown.contains("NaN"));
+    assert!(shown.contains("not applicable") && html.contains("Gap and convergence: not applicable"));
+    let row = compare::CompareRow { summary: Some(s), ..Default::default() };
+    let table = compare::terminal_table(&[row]);
+    let gap = table.lines().find(|l| l.contains("largest gap")).expect("line");
+    assert!(gap.contains("not applicable"), "{gap}");
+    assert!(
+        table.contains("unknown") && table.contains("soil keeps no book") && !table.contains("NaN"),
+        "{table}"
+    );
 }
 
 #[test]
@@ -347,7 +406,7 @@ fn compared(f: &Path) -> Vec<compare::CompareRow> {
     failed.folder = None;
     if let Some(s) = &mut failed.summary {
         let message = "gluing by `relaxed` did not converge: residual 3".to_owned();
-        (s.status, s.max_gap_m) = (Status::Failed, 0.0);
+        (s.status, s.max_gap_m) = (Status::Failed, Some(0.0));
         s.error = Some(FailureRecord { module: None, function: None, time_s: Some(1.25), message });
     }
     rows.push(failed);

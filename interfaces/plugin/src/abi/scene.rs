@@ -114,17 +114,19 @@ pub struct TgFieldTile {
     pub count: usize,
 }
 
-/// Energies of the committed state and work done since the start, J.
+/// Energies of the committed state and work done since the start, J. NAN: unknown, no book is kept of it; it is shown so, and
+/// makes every sum unknown that needs it.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct TgEnergy {
     /// Kinetic energy.
     pub kinetic: f64,
-    /// Potential energy.
+    /// Potential energy; of a soil its elastic energy and the gravitational energy of its material.
     pub potential: f64,
-    /// Energy turned into heat inside since the start; >= 0.
+    /// Energy turned into heat inside since the start; >= 0, never falls.
     pub dissipated: f64,
-    /// Work done on this subsystem through its ports since the start.
+    /// Work done on this subsystem through its ports since the start. Of a soil: by the wrench of its own law at the motion
+    /// that was committed, not by the wrench that `commit` tells it.
     pub port_work: f64,
     /// Mechanical work that its own motors have put in since the start.
     pub actuator_work: f64,

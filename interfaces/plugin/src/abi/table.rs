@@ -176,7 +176,7 @@ pub struct TgSubsystem {
             out: *mut TgFieldTile,
         ) -> TgStatus,
     >,
-    /// Energies of the committed state.
+    /// Energies of the committed state. Null: all are unknown.
     /// When: at any time. Thread: that of the instance.
     pub energy: Option<unsafe extern "C" fn(instance: *mut c_void, out: *mut TgEnergy) -> TgStatus>,
 

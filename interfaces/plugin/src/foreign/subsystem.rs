@@ -354,20 +354,12 @@ impl Subsystem for ForeignSubsystem {
     }
 
     fn energy(&self) -> Energy {
-        let mut out = Energy::default();
+        let mut out = Energy::UNKNOWN;
         if let Some(f) = self.raw.table.energy {
             // SAFETY: a live instance and a place for the answer, laid out as ours (`abi::layout`).
             let status = unsafe { f(self.raw.instance, (&raw mut out).cast()) };
             if status != TG_OK {
-                let nan = f64::NAN;
-                return Energy {
-                    kinetic: nan,
-                    potential: nan,
-                    dissipated: nan,
-                    port_work: nan,
-                    actuator_work: nan,
-                    electrical: nan,
-                };
+                return Energy::UNKNOWN;
             }
         }
         out

@@ -27,6 +27,7 @@ pub struct PowerColumns {
     trials: Vec<Trial>,
     under_motion: bool,
     dissipated: f64,
+    port_work: f64,
     variables: Vec<Variable>,
 }
 
@@ -167,6 +168,7 @@ impl Module for PowerColumns {
             trials: Vec::new(),
             under_motion: false,
             dissipated: 0.0,
+            port_work: 0.0,
             variables: OUTPUTS
                 .iter()
                 .enumerate()
@@ -283,6 +285,7 @@ impl Subsystem for PowerColumns {
                 column.v = (z - column.z) / step.h;
             }
             column.z = z;
+            self.port_work -= column.force(z).0 * partner.x[port.first as usize];
             column.z_max = column.z_max.max(z);
             let stored = |z: f64| {
                 let work = column.k * libm::pow(z.max(0.0), column.n + 1.0) / (column.n + 1.0);
@@ -338,6 +341,6 @@ impl Subsystem for PowerColumns {
             0.5 * f * f / c.k_u
         };
         let potential = if self.rigid { 0.0 } else { self.columns.iter().map(elastic).sum() };
-        Energy { potential, dissipated: self.dissipated, ..Energy::default() }
+        Energy { potential, dissipated: self.dissipated, port_work: self.port_work, ..Energy::default() }
     }
 }

@@ -201,11 +201,14 @@ impl Subsystem for SoilColumns {
         Ok(())
     }
 
-    fn commit(&mut self, step: &Step, t: &[f64], partner: &Motion) -> Result {
+    fn commit(&mut self, step: &Step, _: &[f64], partner: &Motion) -> Result {
         for (p, port) in step.ports.iter().enumerate() {
             let answer = self.under_motion(port, p, partner.x, None);
             let z = self.depth_now(port) - partner.x[port.first as usize];
-            let work: f64 = port.components().map(|(i, _)| -t[i] * partner.x[i]).sum();
+            // the work of its own law, whatever it was told
+            let own = [answer.t_n, answer.t_t[0], answer.t_t[1]];
+            let forces = port.components().filter(|(_, c)| *c < 3);
+            let work: f64 = forces.map(|(i, c)| -own[c] * partner.x[i]).sum();
             self.states.column_mut(self.of_port[p]).commit(port, z, answer.t_t);
             self.states.book(work);
         }

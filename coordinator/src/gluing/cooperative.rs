@@ -59,9 +59,13 @@ impl Strategy for Cooperative {
     fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
         exchange.estimate_forces(instances)?;
         for pass in 1..=PASSES {
-            exchange.solve_compatibility(instances)?;
+            exchange.solve_compatibility(false, instances)?;
             exchange.advance_bodies(instances)?;
-            if pass == PASSES || exchange.report.evaluations_soil == 0 || followed(exchange) || !can_repeat(exchange, instances) {
+            if pass == PASSES
+                || exchange.report.evaluations_soil == 0
+                || followed(exchange)
+                || !can_repeat(exchange, instances)
+            {
                 break;
             }
             exchange.estimate_again(instances)?;

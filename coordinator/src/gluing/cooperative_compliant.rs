@@ -63,7 +63,7 @@ impl Strategy for CooperativeCompliant {
 
     fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
         exchange.estimate_forces(instances)?;
-        exchange.solve_compatibility(instances)?;
+        exchange.solve_compatibility(true, instances)?;
         exchange.report.evaluations_soil = 0; // the start is not an evaluation of the iteration
         exchange.predict_from_estimate();
         let form = Form::choose(self.form, self.kappa, exchange, instances);

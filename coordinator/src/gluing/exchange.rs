@@ -281,8 +281,9 @@ impl Exchange {
         Ok(())
     }
 
-    /// Paper, step 3: the soil solves with the estimate. T1 goes to `t`, its surface to `x2`.
-    pub fn solve_compatibility(&mut self, instances: &mut [Instance]) -> Result {
+    /// Paper, step 3: the soil solves with the estimate. T1 goes to `t`, its surface to `x2`. `start_only`: an iteration
+    /// begins there, so a soil that finds no answer in this step is no failure.
+    pub fn solve_compatibility(&mut self, start_only: bool, instances: &mut [Instance]) -> Result {
         let start = Clock::now();
         for port in &self.ports {
             let (t_star, mu) = (&self.estimate.t_star, port.law.mu);
@@ -291,7 +292,7 @@ impl Exchange {
         for side in &mut self.grounds {
             let instance = &mut instances[side.slot];
             let (t, x2) = (&mut self.t, &mut self.x2);
-            if side.solve_compatibility(instance, &self.nodes, &self.at, &self.estimate, t, x2)? {
+            if side.solve_compatibility(start_only, instance, &self.nodes, &self.at, &self.estimate, [t, x2])? {
                 self.report.evaluations_soil += 1;
             }
         }

@@ -172,7 +172,8 @@ impl Strategy for Monolithic {
     }
 
     fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
-        let every = |exchange: &Exchange, can| exchange.ground_slots().all(|s| instances[s].capabilities().has(can));
+        let every =
+            |exchange: &Exchange, can| exchange.ground_slots().all(|s| instances[s].capabilities().has(can));
         let [force, motion] = [Capabilities::FORCE, Capabilities::MOTION].map(|can| every(exchange, can));
         self.motion = !force;
         let found = self.solve_form(exchange, instances)?;

@@ -219,15 +219,16 @@ impl Side {
         Ok(())
     }
 
-    /// Asks the soil for T1 under the estimate, where it can; else `false`.
+    /// Asks the soil for T1 under the estimate, where it can; else `false`. Where the answer only starts an iteration
+    /// (`start`), a soil that finds none in this step leaves T1 as it is.
     pub fn solve_compatibility(
         &mut self,
+        start: bool,
         instance: &mut Instance,
         nodes: &[Node],
         at: &Instant,
         estimate: &super::group_estimate::GroupEstimate,
-        t1: &mut [f64],
-        x2: &mut [f64],
+        [t1, x2]: [&mut [f64]; 2],
     ) -> Result<bool> {
         if !instance.capabilities().has(Capabilities::SOLVE) {
             return Ok(false);
@@ -256,6 +257,9 @@ impl Side {
             flags: 0,
         };
         let progress = instance.solve_compatibility(&step, &estimate, &mut out)?;
+        if start && progress != Progress::Complete {
+            return Ok(true);
+        }
         complete(instance, "solve_compatibility", progress)?;
         Self::scatter(&self.t, &self.index, t1);
         Self::scatter(&self.x, &self.index, x2);

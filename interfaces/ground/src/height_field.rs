@@ -286,7 +286,9 @@ impl HeightField {
             let (_, [nx, ny]) = self.lattice.tile_nodes(tile);
             match self.tile(tile) {
                 Err(u) => (u, u),
-                Ok(units) => rows(units, nx, ny).fold((i32::MAX, i32::MIN), |(a, b), u| (a.min(*u), b.max(*u))),
+                Ok(units) => {
+                    rows(units, nx, ny).fold((i32::MAX, i32::MIN), |(a, b), u| (a.min(*u), b.max(*u)))
+                }
             }
         };
         (0..self.tiles.len()).map(of).fold((i32::MAX, i32::MIN), |(a, b), (c, d)| (a.min(c), b.max(d)))

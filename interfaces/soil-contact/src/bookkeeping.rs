@@ -157,7 +157,8 @@ impl Scene<'_> {
         }
         let stamp = book.stamp;
         book.dissipated += release(ground, lists, stamp);
-        let touching = |key| ports.iter().zip(&lists.touching).any(|(port, touches)| *touches && port.key == key);
+        let touching =
+            |key| ports.iter().zip(&lists.touching).any(|(port, touches)| *touches && port.key == key);
         book.dissipated += wall::release(&mut ground.pushes, touching);
     }
 

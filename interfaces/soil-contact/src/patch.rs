@@ -336,7 +336,8 @@ impl Patches {
         let range = first..self.nodes.index.len();
         let spacing = ground.heights.lattice().spacing;
         // a sphere has no extent and does not roll
-        let found = || Wheel::find(&self.nodes, range.clone(), spacing, wheel::recall(&ground.wheels, port.key));
+        let found =
+            || Wheel::find(&self.nodes, range.clone(), spacing, wheel::recall(&ground.wheels, port.key));
         let wheel = (port.extent[0] > 0.0 && port.extent[1] > 0.0).then(found).flatten();
         let size = Size::of(&self.nodes, range.clone(), spacing);
         let (local, friction) = self.local_laws(laws, wheel.as_ref(), size.b(spacing), range.clone());
@@ -359,7 +360,13 @@ impl Patches {
                     return if self.nodes.before[k] > 0.0 { 1.0 } else { 0.0 };
                 }
                 let (p, yields) = (self.pressure(k, self.nodes.depth[k]).0, self.nodes.bound[k]);
-                if p <= 0.0 { 0.0 } else if yields > p { p / yields } else { 1.0 }
+                if p <= 0.0 {
+                    0.0
+                } else if yields > p {
+                    p / yields
+                } else {
+                    1.0
+                }
             };
             wall::gather(&self.nodes, range.clone(), n_z, &beside, pressed, &mut rows, &mut sides, &mut wall);
             (self.rows, self.sides) = (rows, sides);
@@ -393,13 +400,7 @@ impl Patches {
 
     /// What the nodes in `range` bear of the pressure of first loading, and beside it: less on inclined faces, less under
     /// shear, more on faces that are pushed sideways.
-    fn bear(
-        &mut self,
-        direction: &Direction,
-        wall: &Wall,
-        b: f64,
-        range: std::ops::Range<usize>,
-    ) {
+    fn bear(&mut self, direction: &Direction, wall: &Wall, b: f64, range: std::ops::Range<usize>) {
         let inclination = direction.load_inclination.then(|| self.inclination(range.clone())).flatten();
         for k in range {
             let (n, law) = (&self.nodes, &self.laws[self.nodes.law[k]]);

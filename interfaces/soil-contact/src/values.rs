@@ -23,7 +23,12 @@ pub fn shared() -> Vec<Variable> {
         live(8, "elastic_stiffness_pa_m", "Pa/m", "stiffness of unloading and reloading").within(1e4, 1e12),
         out(9, "heat", "J", "energy that the soil has turned into heat since the start"),
         out(10, "elastic_energy", "J", "elastic energy of the soil below and beside feet"),
-        out(11, "gravitational_energy", "J", "gravitational energy that the material has gained since the start"),
+        out(
+            11,
+            "gravitational_energy",
+            "J",
+            "gravitational energy that the material has gained since the start",
+        ),
     ]
 }
 

@@ -118,9 +118,8 @@ impl Wall {
                 own * (one - if yields { e[r] * e[c] } else { 0.0 })
             })
         });
-        out.stiffness = std::array::from_fn(|r| {
-            std::array::from_fn(|c| (0..3).map(|k| by_e[r][k] * de[k][c]).sum())
-        });
+        out.stiffness =
+            std::array::from_fn(|r| std::array::from_fn(|c| (0..3).map(|k| by_e[r][k] * de[k][c]).sum()));
         out
     }
 

@@ -50,7 +50,12 @@ pub struct Wheel {
 impl Wheel {
     /// The wheel whose underside the nodes in `range` are; `None` where the contact does not roll. What was a wheel stays one
     /// while it is loaded, also where too few nodes are left to look round, as on an edge or a crest.
-    pub fn find(nodes: &PatchNodes, range: std::ops::Range<usize>, spacing: f64, memory: Memory) -> Option<Self> {
+    pub fn find(
+        nodes: &PatchNodes,
+        range: std::ops::Range<usize>,
+        spacing: f64,
+        memory: Memory,
+    ) -> Option<Self> {
         let used =
             || range.clone().filter(|k| nodes.area[*k] > 0.0 && normal(&nodes.facing[*k])[0] > LEANING);
         let found = heading(used().map(|k| normal(&nodes.facing[k]))).and_then(|heading| {

@@ -72,9 +72,15 @@ impl Direction {
     fn schema() -> [Parameter; 3] {
         let flag = |name, help| Parameter::of(name, ParameterType::Bool, help).or(true);
         [
-            flag("slope_factor", "inclined undersides bear less than level ones, as plates do (Li et al. 2013)"),
+            flag(
+                "slope_factor",
+                "inclined undersides bear less than level ones, as plates do (Li et al. 2013)",
+            ),
             flag("load_inclination", "a contact that carries shear bears less and sinks (Sokolovskii 1965)"),
-            flag("passive_pressure", "faces that are pushed sideways meet passive earth pressure (Rankine 1857)"),
+            flag(
+                "passive_pressure",
+                "faces that are pushed sideways meet passive earth pressure (Rankine 1857)",
+            ),
         ]
     }
 

@@ -354,7 +354,6 @@ impl PressureCurve {
         let p = p_max - self.unloading * (z_max - z);
         if p > 0.0 { (p, self.unloading) } else { (0.0, 0.0) }
     }
-
 }
 
 #[cfg(test)]

@@ -128,10 +128,12 @@ mod tests {
 
     /// The generic coefficients of resistive force theory as they are printed, for any plate and direction.
     fn plate(beta: f64, gamma: f64) -> [f64; 2] {
-        let (c, s) = (|m: f64, n: f64| (2.0 * m * beta + n * gamma).cos(), |m: f64, n: f64| {
-            (2.0 * m * beta + n * gamma).sin()
-        });
-        let z = 0.206 + 0.169 * c(1.0, 0.0) + 0.212 * s(1.0, 1.0) + 0.358 * s(0.0, 1.0) + 0.055 * s(-1.0, 1.0);
+        let (c, s) = (
+            |m: f64, n: f64| (2.0 * m * beta + n * gamma).cos(),
+            |m: f64, n: f64| (2.0 * m * beta + n * gamma).sin(),
+        );
+        let z =
+            0.206 + 0.169 * c(1.0, 0.0) + 0.212 * s(1.0, 1.0) + 0.358 * s(0.0, 1.0) + 0.055 * s(-1.0, 1.0);
         let x = -0.124 * c(1.0, 1.0) + 0.253 * c(0.0, 1.0) + 0.007 * c(-1.0, 1.0) + 0.088 * s(1.0, 0.0);
         [z, x]
     }
@@ -157,9 +159,15 @@ mod tests {
         let phi = 30f64.to_radians();
         assert!((depth_factor(phi) - 18.40).abs() < 0.01);
         // deep below the contact the depth term is left: where it slides, a fan of 45° − φ/2 from the passive zone
-        let n_q = |degrees: f64| depth_factor(phi) * Inclination::new(phi).factor(degrees.to_radians().tan(), 1e9, 1e-3);
+        let n_q = |degrees: f64| {
+            depth_factor(phi) * Inclination::new(phi).factor(degrees.to_radians().tan(), 1e9, 1e-3)
+        };
         let slides = (1.0 + 0.5) * (2.0 * (FRAC_PI_4 - 0.5 * phi) * phi.tan()).exp();
-        assert!((n_q(30.0) - slides).abs() < 1e-6 && (n_q(0.0) - 18.40).abs() < 0.01, "{} {slides}", n_q(30.0));
+        assert!(
+            (n_q(30.0) - slides).abs() < 1e-6 && (n_q(0.0) - 18.40).abs() < 0.01,
+            "{} {slides}",
+            n_q(30.0)
+        );
         let falls = (1..30).all(|k| n_q(f64::from(k)) < n_q(f64::from(k - 1)));
         assert!(falls && n_q(60.0) == n_q(30.0));
         let shallow = Inclination::new(phi).factor(phi.tan(), 0.0, 1.0);

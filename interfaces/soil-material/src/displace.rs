@@ -18,7 +18,6 @@ const DIRECTIONS: [([i32; 2], i32); 8] = [
     ([1, -1], 2),
 ];
 
-
 /// What displacement changes.
 pub struct Site<'a> {
     /// Ground.
@@ -62,7 +61,8 @@ impl Site<'_> {
                 let share = (f64::from(loose) * weight / sum) as i32;
                 left -= self.give(*at, share.min(left));
             }
-            let last = (0..8).find_map(|k| places[(turn as usize + k) % 8].filter(|(_, weight)| *weight > 0.0));
+            let last =
+                (0..8).find_map(|k| places[(turn as usize + k) % 8].filter(|(_, weight)| *weight > 0.0));
             left -= last.map_or(0, |(at, _)| self.give(at, left));
         }
         let gone = excess - left;

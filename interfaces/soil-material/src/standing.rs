@@ -37,6 +37,11 @@ pub struct Standing {
     beyond: [Vec<i32>; 4],
 }
 
+fn refill(out: &mut Vec<i32>, from: impl Iterator<Item = i32>) {
+    out.clear();
+    out.extend(from);
+}
+
 /// Faces one behind the other.
 #[derive(Clone, Copy)]
 struct Run {
@@ -46,6 +51,13 @@ struct Run {
 }
 
 impl Standing {
+    /// Room for windows of `rows` rows with `stride` numbers each.
+    pub fn with_capacity(rows: usize, stride: usize) -> Self {
+        let faces = || Vec::with_capacity(rows * stride);
+        let beyond = std::array::from_fn(|_| Vec::with_capacity(rows.max(stride)));
+        Self { along: faces(), across: faces(), wake: Vec::with_capacity(rows), beyond }
+    }
+
     /// Nothing is looked for.
     pub fn clear(&mut self) {
         self.along.clear();
@@ -85,14 +97,10 @@ impl Standing {
         let rows = || (0..size[1] as i32).map(|y| origin[1] + y);
         let columns = || (0..size[0] as i32).map(|x| origin[0] + x);
         let [left, right, below, above] = &mut self.beyond;
-        for (out, from) in [
-            (left, rows().map(|j| -follow([origin[0], j], [-1, 0])).collect::<Vec<_>>()),
-            (right, rows().map(|j| follow([last[0], j], [1, 0])).collect()),
-            (below, columns().map(|i| -follow([i, origin[1]], [0, -1])).collect()),
-            (above, columns().map(|i| follow([i, last[1]], [0, 1])).collect()),
-        ] {
-            *out = from;
-        }
+        refill(left, rows().map(|j| -follow([origin[0], j], [-1, 0])));
+        refill(right, rows().map(|j| follow([last[0], j], [1, 0])));
+        refill(below, columns().map(|i| -follow([i, origin[1]], [0, -1])));
+        refill(above, columns().map(|i| follow([i, last[1]], [0, 1])));
     }
 
     /// Marks the faces that stand; `thr`: Δ·tan φ_r at a place, units; `critical`: H_c, units. A run is longer than what its

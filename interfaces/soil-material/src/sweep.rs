@@ -217,7 +217,8 @@ impl Sweeper {
                 let end = [(a + BLOCK_TILES).min(nx), (b + BLOCK_TILES).min(ny)];
                 let Some(area) = still.restless([a, b], end, &self.limits) else { continue };
                 window.fill(ground, &self.by_soil, &self.feet.list, area, 2);
-                window.all_stands = self.limits.critical > 0 && high.saturating_sub(low) <= self.limits.critical;
+                window.all_stands =
+                    self.limits.critical > 0 && high.saturating_sub(low) <= self.limits.critical;
                 if self.limits.critical > 0 && !window.all_stands {
                     window.look_beyond(ground, self.limits.repose);
                 }

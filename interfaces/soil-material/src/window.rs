@@ -5,8 +5,8 @@
 
 use crate::feet::{Foot, OPEN_INLET, inlet};
 use crate::kernel::{LANES, admit, admit_triples, faces_across, faces_along, hold, triples};
-use crate::standing::{Field, Standing};
 use crate::span::Span;
+use crate::standing::{Field, Standing};
 use terraglue_ground::{Lattice, TILE_EDGE};
 use terraglue_soil_contact::Ground;
 
@@ -117,6 +117,7 @@ impl Window {
             dirty: spans(),
             changed: spans(),
             work: (0..WORK_ROWS).map(|_| Vec::with_capacity(stride)).collect(),
+            standing: Standing::with_capacity(side, stride),
             ..Self::default()
         }
     }

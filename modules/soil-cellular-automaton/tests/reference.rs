@@ -155,7 +155,16 @@ fn ball(ground: &Ground, [x, y]: [f64; 2], pressed: f64) -> Vec<Covered> {
             };
             let depth = ground.heights.height(i, j) - lower;
             let pressure = 8e5 * depth.max(0.0);
-            covered.push(Covered { i, j, lower, depth, pressure, virgin: pressure, surface: lower, flow: [0.0; 2] });
+            covered.push(Covered {
+                i,
+                j,
+                lower,
+                depth,
+                pressure,
+                virgin: pressure,
+                surface: lower,
+                flow: [0.0; 2],
+            });
         }
     }
     covered

@@ -21,7 +21,11 @@ pub fn tests() -> Vec<Test> {
             "the surface under a force gives that force back as a motion",
             force_and_motion,
         ),
-        test("estimate-respected", "T1 is the law's at the motion that follows, or at most T* and the law", estimate),
+        test(
+            "estimate-respected",
+            "T1 is the law's at the motion that follows, or at most T* and the law",
+            estimate,
+        ),
         test("energy-book", "the work in its energy book is the work that feet did", energy_book),
         test("no-ground-from-nothing", "pressing and dragging never raise the volume of the ground", volume),
         test("ground-follows-foot", "where a foot has been, no ground stands in its way", follows),

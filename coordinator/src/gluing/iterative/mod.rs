@@ -190,7 +190,7 @@ impl Strategy for Iterative {
         }
         exchange.estimate_forces(instances)?;
         if self.from_estimate {
-            exchange.solve_compatibility(instances)?;
+            exchange.solve_compatibility(true, instances)?;
             exchange.report.evaluations_soil = 0; // the start is not an evaluation of the iteration
         } else {
             exchange.t.fill(0.0);

@@ -96,7 +96,11 @@ pub(crate) use contact_tests;
 
 /// The same soil with a stiff elastic line, under which feet come to rest at once, and with the laws of level plates alone.
 fn stiff(config: &str) -> String {
-    config.replacen('{', r#"{"elastic_stiffness_pa_m":4e8,"load_inclination":false,"passive_pressure":false,"#, 1)
+    config.replacen(
+        '{',
+        r#"{"elastic_stiffness_pa_m":4e8,"load_inclination":false,"passive_pressure":false,"#,
+        1,
+    )
 }
 
 /// b of the pressure law: radius of the disc of equal area.

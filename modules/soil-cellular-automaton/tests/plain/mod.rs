@@ -109,7 +109,9 @@ impl Plain {
                     let Some((along, share)) = self.steep([i, j], [a, b]) else { continue };
                     let inlets = [self.inlet(i, j), self.inlet(m[0], m[1])];
                     // a node without inlet is closed; a low steep slope stands
-                    if inlets.contains(&0) || self.critical > 0 && self.run([i, j], [a, b]) <= i64::from(self.critical) {
+                    if inlets.contains(&0)
+                        || self.critical > 0 && self.run([i, j], [a, b]) <= i64::from(self.critical)
+                    {
                         continue;
                     }
                     let flux = whole(0.25 * (along as f32).abs() * share, along);

@@ -180,7 +180,9 @@ impl Drive {
         }
         wrench[n..].fill(0.0);
         let v = x.map(|x| x / self.h);
-        self.soil.commit(&step, &wrench[..n], &Motion { x: &x[..n], v: &v[..n] }).expect("the motion is taken");
+        self.soil
+            .commit(&step, &wrench[..n], &Motion { x: &x[..n], v: &v[..n] })
+            .expect("the motion is taken");
         self.book(&wrench, &x);
         self.nodes = nodes;
         self.index += 1;

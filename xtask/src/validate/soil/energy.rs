@@ -165,7 +165,13 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
         let number = |key: &str| run[key].as_f64().unwrap_or(f64::NAN);
         let (drift, work) = (number("energy_balance_j"), number("energy_j"));
         let done = run["status"] == "done";
-        if !done { f64::NAN } else if drift.abs() <= 1e-9 { 0.0 } else { 100.0 * drift.abs() / work }
+        if !done {
+            f64::NAN
+        } else if drift.abs() <= 1e-9 {
+            0.0
+        } else {
+            100.0 * drift.abs() / work
+        }
     };
     let mut all = Vec::new();
     for (k, way) in WAYS.iter().enumerate() {

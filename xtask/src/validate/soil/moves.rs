@@ -144,7 +144,9 @@ fn yawed(context: &Context) -> Outcome<Vec<Figure>> {
             what,
         ));
         let worst = of_angle().map(|(_, balance)| balance.relative()).fold(0.0, larger);
-        let what = format!("largest error of the balance of energies of the wheel yawed by {angle}°, % of the path of the work");
+        let what = format!(
+            "largest error of the balance of energies of the wheel yawed by {angle}°, % of the path of the work"
+        );
         all.push(Figure::new(format!("soil.yaw.{angle}.balance"), worst, Limit::AtMost(1.0), what));
     }
     Ok(all)
@@ -160,9 +162,23 @@ const fn still(ahead: f64, load: f64, turn: [f64; 3]) -> Move {
 /// 300 steps each; loads grow over the first 60.
 const SCRIPTS: [Script; 5] = [
     ("dragged", |k| still(if k < 60 { 0.0 } else { 2e-4 }, laid(k, 20.0), [0.0; 3])),
-    ("reversed", |k| still(if k < 60 { 0.0 } else if k < 180 { 2e-4 } else { -2e-4 }, laid(k, 20.0), [0.0; 3])),
+    ("reversed", |k| {
+        still(
+            if k < 60 {
+                0.0
+            } else if k < 180 {
+                2e-4
+            } else {
+                -2e-4
+            },
+            laid(k, 20.0),
+            [0.0; 3],
+        )
+    }),
     ("twisted", |k| still(0.0, laid(k, 20.0), [0.0, 0.0, if k < 60 { 0.0 } else { 3e-3 }])),
-    ("unloaded", |k| still(0.0, if k < 150 { laid(k, 40.0) } else { 40.0 - f64::from(k - 150) * 0.25 }, [0.0; 3])),
+    ("unloaded", |k| {
+        still(0.0, if k < 150 { laid(k, 40.0) } else { 40.0 - f64::from(k - 150) * 0.25 }, [0.0; 3])
+    }),
     ("lifted", |k| {
         let vertical = if k < 100 { Vertical::Load(laid(k, 20.0)) } else { Vertical::Up(1e-4) };
         Move { ahead: [1e-4, 0.0], vertical, turn: [0.0; 3] }
@@ -195,14 +211,23 @@ fn balances(context: &Context) -> Outcome<Vec<Figure>> {
     let run = |(script, name, make, shape, spacing): &(usize, &str, Maker, usize, f64)| {
         let Some(row) = rows.iter().find(|r| r.name == *name) else { return [f64::NAN; 2] };
         // k_u of snow: Wong (2008) gives A_u = 109.6 MPa/m² at 2 cm
-        let config = if name.starts_with("snow") { row.own.replacen('{', r#"{"elastic_stiffness_pa_m":2.2e6,"#, 1) } else { row.own.clone() };
+        let config = if name.starts_with("snow") {
+            row.own.replacen('{', r#"{"elastic_stiffness_pa_m":2.2e6,"#, 1)
+        } else {
+            row.own.clone()
+        };
         let (_, geometry, lies, _) = feet[*shape].clone();
-        let mut bench = Drive::new(make(&config, (0.6 / spacing) as u32 + 1, *spacing), geometry, lies, [0.0031, 0.0017]);
+        let mut bench =
+            Drive::new(make(&config, (0.6 / spacing) as u32 + 1, *spacing), geometry, lies, [0.0031, 0.0017]);
         // weak snow carries a quarter without burying the foot
         let share = if name.starts_with("snow") { 0.25 } else { 1.0 };
         for k in 0..300 {
             let now = SCRIPTS[*script].1(k);
-            let vertical = if let Vertical::Load(load) = now.vertical { Vertical::Load(share * load) } else { now.vertical };
+            let vertical = if let Vertical::Load(load) = now.vertical {
+                Vertical::Load(share * load)
+            } else {
+                now.vertical
+            };
             bench.step(&Move { vertical, ..now });
         }
         [bench.balance.relative(), bench.balance.fall]
@@ -233,7 +258,8 @@ fn balances(context: &Context) -> Outcome<Vec<Figure>> {
 fn plate(beta: f64) -> f64 {
     let at = |beta: f64| {
         let angle = |m: f64, n: f64| 2.0 * m * beta + n * FRAC_PI_2;
-        0.206 + 0.169 * angle(1.0, 0.0).cos()
+        0.206
+            + 0.169 * angle(1.0, 0.0).cos()
             + 0.212 * angle(1.0, 1.0).sin()
             + 0.358 * angle(0.0, 1.0).sin()
             + 0.055 * angle(-1.0, 1.0).sin()
@@ -261,10 +287,16 @@ fn resistive_force(context: &Context) -> Outcome<Vec<Figure>> {
     let mut all = Vec::new();
     for (name, make) in MODULES {
         let size = (0.4 / spacing) as u32 + 1;
-        let mut bench = Drive::new(make(&soil.own, size, spacing), Geometry::Sphere { radius: RADIUS }, LEVEL, [0.0011, 0.0007]);
+        let mut bench = Drive::new(
+            make(&soil.own, size, spacing),
+            Geometry::Sphere { radius: RADIUS },
+            LEVEL,
+            [0.0011, 0.0007],
+        );
         let mut worst = 0.0;
         for k in 1..=300 {
-            let [force, _] = bench.step(&Move { ahead: [0.0; 2], vertical: Vertical::Up(-1e-4), turn: [0.0; 3] });
+            let [force, _] =
+                bench.step(&Move { ahead: [0.0; 2], vertical: Vertical::Up(-1e-4), turn: [0.0; 3] });
             let z = 1e-4 * f64::from(k);
             if depths.iter().any(|d| (d - z).abs() < 1e-9) {
                 worst = larger(worst, 100.0 * (force[2] / theory(z) - 1.0).abs());

@@ -42,7 +42,8 @@ struct Point {
 fn points(file: &str, columns: [Option<&str>; 6]) -> Outcome<Vec<Point>> {
     let text = read(&root().join(file))?;
     let names: Vec<&str> = text.lines().next().unwrap_or_default().split(',').collect();
-    let place = |name: &str| names.iter().position(|n| *n == name).ok_or(format!("{file} has no column {name}"));
+    let place =
+        |name: &str| names.iter().position(|n| *n == name).ok_or(format!("{file} has no column {name}"));
     let places = columns.map(|c| c.map(place).transpose());
     let mut all = Vec::new();
     for line in text.lines().skip(1) {
@@ -119,17 +120,54 @@ fn percent(found: f64, measured: f64) -> f64 {
 }
 
 const GROUPS: [Group; 6] = [
-    ("driven.sinkage", |p| p.angle == 0.0 && p.slip > -0.01, |f, p| percent(f.sinkage, p.sinkage), 15.0, "sinkage, %, slip 0 to 0.9"),
-    ("driven.pull", |p| p.angle == 0.0 && p.slip > -0.01, |f, p| (f.pull - p.pull).abs(), 2.0, "drawbar pull, N, slip 0 to 0.9"),
-    ("braked.sinkage", |p| p.angle == 0.0 && p.slip < -0.01, |f, p| percent(f.sinkage, p.sinkage), 20.0, "sinkage, %, slip -0.2 to -1"),
-    ("braked.force", |p| p.angle == 0.0 && p.slip < -0.01, |f, p| percent(f.pull, p.pull), 20.0, "force along the way, %, slip -0.2 to -1"),
-    ("aside.sinkage", |p| p.angle > 0.0, |f, p| percent(f.sinkage, p.sinkage), 20.0, "sinkage, %, slip angle 15° and 45°, slip 0 to 0.9"),
-    ("aside.force", |p| p.angle > 0.0, |f, p| percent(f.side, p.side), 25.0, "side force, %, slip angle 15° and 45°, slip 0 to 0.9"),
+    (
+        "driven.sinkage",
+        |p| p.angle == 0.0 && p.slip > -0.01,
+        |f, p| percent(f.sinkage, p.sinkage),
+        15.0,
+        "sinkage, %, slip 0 to 0.9",
+    ),
+    (
+        "driven.pull",
+        |p| p.angle == 0.0 && p.slip > -0.01,
+        |f, p| (f.pull - p.pull).abs(),
+        2.0,
+        "drawbar pull, N, slip 0 to 0.9",
+    ),
+    (
+        "braked.sinkage",
+        |p| p.angle == 0.0 && p.slip < -0.01,
+        |f, p| percent(f.sinkage, p.sinkage),
+        20.0,
+        "sinkage, %, slip -0.2 to -1",
+    ),
+    (
+        "braked.force",
+        |p| p.angle == 0.0 && p.slip < -0.01,
+        |f, p| percent(f.pull, p.pull),
+        20.0,
+        "force along the way, %, slip -0.2 to -1",
+    ),
+    (
+        "aside.sinkage",
+        |p| p.angle > 0.0,
+        |f, p| percent(f.sinkage, p.sinkage),
+        20.0,
+        "sinkage, %, slip angle 15° and 45°, slip 0 to 0.9",
+    ),
+    (
+        "aside.force",
+        |p| p.angle > 0.0,
+        |f, p| percent(f.side, p.side),
+        25.0,
+        "side force, %, slip angle 15° and 45°, slip 0 to 0.9",
+    ),
 ];
 
 /// All figures.
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
-    let mut measured = points(ALONG, [None, Some("slip"), Some("Fz_N"), Some("DP_N"), None, Some("sinkage_mm")])?;
+    let mut measured =
+        points(ALONG, [None, Some("slip"), Some("Fz_N"), Some("DP_N"), None, Some("sinkage_mm")])?;
     let aside = ["beta_deg", "slip", "Fz", "Fx", "Fy", "Z"].map(Some);
     measured.extend(points(ASIDE, aside)?.into_iter().filter(|p| p.slip > -0.01));
     if context.quick {
@@ -153,7 +191,12 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
                 at.slip,
                 at.angle.to_degrees()
             );
-            all.push(Figure::new(format!("soil.{name}.plate_wheel.{group}"), worst, Limit::AtMost(limit), what));
+            all.push(Figure::new(
+                format!("soil.{name}.plate_wheel.{group}"),
+                worst,
+                Limit::AtMost(limit),
+                what,
+            ));
         }
     }
     Ok(all)

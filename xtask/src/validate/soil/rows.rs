@@ -7,7 +7,8 @@ use terraglue_soil_law::{COLUMNS, SoilTable};
 pub const STIFF: f64 = 4e8;
 
 /// Keys of a soil whose pressure follows the depth alone, whatever the slope, the shear and the way of the body.
-const BY_DEPTH: &str = r#""slope_factor":false,"load_inclination":false,"passive_pressure":false,"elastic_stiffness_pa_m":4e8"#;
+const BY_DEPTH: &str =
+    r#""slope_factor":false,"load_inclination":false,"passive_pressure":false,"elastic_stiffness_pa_m":4e8"#;
 
 /// Row of the table, and the short name under which the reference data know the soil.
 pub const EIGHT: [(&str, &str); 8] = [
@@ -48,7 +49,8 @@ impl Row {
     pub fn of_size(&self, b: f64) -> Self {
         let modulus = format!(r#""k_c":0.0,"k_phi":{:?},"#, self.modulus(b));
         let take = |text: &str| {
-            let mut keys: serde_json::Map<String, serde_json::Value> = serde_json::from_str(text).unwrap_or_default();
+            let mut keys: serde_json::Map<String, serde_json::Value> =
+                serde_json::from_str(text).unwrap_or_default();
             keys.remove("k_c");
             keys.remove("k_phi");
             serde_json::Value::Object(keys).to_string().replacen('{', &format!("{{{modulus}"), 1)

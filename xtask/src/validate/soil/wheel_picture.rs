@@ -3,6 +3,7 @@
 use super::STILL;
 use super::automaton::{Soil, automaton_on};
 use super::panel::Panel;
+use super::rows::STIFF;
 use super::rows::eight;
 use super::wheel_rig::Bench;
 use super::wong_reece::wheel_on;
@@ -10,7 +11,6 @@ use crate::process::{Outcome, root, write};
 use std::borrow::{Borrow, BorrowMut};
 use std::fmt::Write;
 use terraglue::soil_fit::Rim;
-use super::rows::STIFF;
 use terraglue_soil_law::ShearLaw;
 use terraglue_subsystem::Subsystem;
 

@@ -51,7 +51,8 @@ impl Case {
         let [radius, width, load] = self.wheel;
         let [a0, a1] = self.peak;
         let still = if self.still { format!(",{STILL}") } else { String::new() };
-        let config = self.soil.of_size(width).with(&format!(r#""wheel_peak_a0":{a0},"wheel_peak_a1":{a1}{still}"#));
+        let config =
+            self.soil.of_size(width).with(&format!(r#""wheel_peak_a0":{a0},"wheel_peak_a1":{a1}{still}"#));
         let soil = (self.make)(&config, (GROUND / self.spacing) as u32 + 1, self.spacing);
         Bench::new(soil, [radius, width], load, -0.5 * WAY).drive(self.slip, WAY, MEASURED)
     }

@@ -89,10 +89,11 @@ def test_a_label_without_nodes_is_warned_of(tmp_path):
 
 def test_an_elastic_line_in_place_of_the_law_is_warned_of(tmp_path):
     path = scenario(tmp_path, [[1, 7]], ROWS.replace("LETE_sand", "heavy_clay_WES_25pct"))
+    path.write_text(path.read_text().replace("[soil]\n", "[soil]\nelastic_stiffness_pa_m = 4e8\n"))
     process = terraglue("check", path)
     assert process.returncode == 0 and "`elastic_stiffness_pa_m` = 4e8" in process.stderr, process.stderr
     assert "of label 1 (heavy_clay_WES_25pct) down to 2.5" in process.stderr and process.stderr.count("takes the place") == 1
-    path.write_text(path.read_text().replace("[soil]\n", "[soil]\nelastic_stiffness_pa_m = 1e10\n"))
+    path.write_text(path.read_text().replace("elastic_stiffness_pa_m = 4e8", "elastic_stiffness_pa_m = 1e10"))
     assert "takes the place" not in terraglue("check", path).stderr
 
 

@@ -292,7 +292,14 @@ impl Exchange {
         for side in &mut self.grounds {
             let instance = &mut instances[side.slot];
             let (t, x2) = (&mut self.t, &mut self.x2);
-            if side.solve_compatibility(start_only, instance, &self.nodes, &self.at, &self.estimate, [t, x2])? {
+            if side.solve_compatibility(
+                start_only,
+                instance,
+                &self.nodes,
+                &self.at,
+                &self.estimate,
+                [t, x2],
+            )? {
                 self.report.evaluations_soil += 1;
             }
         }

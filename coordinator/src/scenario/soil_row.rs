@@ -98,8 +98,10 @@ fn own_file(path: &Path) -> Result<Map<String, Value>, (String, Option<String>)>
     })?;
     let value = |key: &str, item: &toml_edit::Item| {
         let number = item.as_float().or_else(|| item.as_integer().map(|i| i as f64)).map(Value::from);
-        let value = number.or_else(|| item.as_str().map(Value::from));
-        value.map(|v| (key.to_owned(), v)).ok_or_else(|| said(format!("`{key}` takes a number or a text")))
+        let value =
+            number.or_else(|| item.as_str().map(Value::from)).or_else(|| item.as_bool().map(Value::from));
+        let wrong = || said(format!("`{key}` takes a number, a text, true or false"));
+        value.map(|v| (key.to_owned(), v)).ok_or_else(wrong)
     };
     table.iter().map(|(key, item)| value(key, item)).collect()
 }

@@ -53,7 +53,8 @@ impl Patches {
         if !patch.wall.is_empty() {
             let beside = patch.wall.wrench(&self.beside(p, &[0.0; 6]));
             sum.iter_mut().zip(beside).for_each(|(s, b)| *s += b);
-            strength += self.sides[patch.wall.sides.clone()].iter().map(|side| side.force).sum::<f64>();
+            // of the sides of a closed outline at most half look one way
+            strength += 0.5 * self.sides[patch.wall.sides.clone()].iter().map(|side| side.force).sum::<f64>();
         }
         (sum, strength + bound.take(&self.laws))
     }

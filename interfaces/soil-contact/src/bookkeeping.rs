@@ -370,7 +370,7 @@ impl Scene<'_> {
     /// where it has gone.
     fn take_over(&self, k: usize, state: &NodeState, turnover: &mut Turnover) {
         let n = &self.patches.nodes;
-        let now = self.held(k, self.pressure_at_start(k)) + self.sheared_before(k);
+        let now = self.held_at_start(k) + self.sheared_before(k);
         let new = if state.area < n.area[k] { (1.0 - state.area / n.area[k]) * now } else { 0.0 };
         turnover.entered += new;
         turnover.heat += (state.energy - (now - new)).max(0.0);
@@ -381,12 +381,19 @@ impl Scene<'_> {
         0.5 * self.patches.nodes.area[k] * p * p / self.patches.law(k).curve.unloading()
     }
 
+    /// Elastic energy of node k at the start of the step, J. A law that answers for unloading itself says how far the soil would
+    /// spring back.
+    fn held_at_start(&self, k: usize) -> f64 {
+        let n = &self.patches.nodes;
+        if !kept_by_law(&self.patches.law(k).curve) {
+            return self.held(k, self.pressure_at_start(k));
+        }
+        0.5 * n.area[k] * n.before[k].max(0.0) * (n.depth[k] - n.permanent[k]).max(0.0)
+    }
+
     /// Pressure at node k at X = 0 before it yields, Pa.
     fn pressure_at_start(&self, k: usize) -> f64 {
         let (n, curve) = (&self.patches.nodes, &self.patches.law(k).curve);
-        if kept_by_law(curve) {
-            return n.before[k].max(0.0);
-        }
         let p = curve.unloading() * (n.depth[k] - n.permanent[k]);
         if p > 0.0 || n.before[k] < 0.0 { p } else { 0.0 }
     }
@@ -410,9 +417,17 @@ impl Scene<'_> {
         let Pressed { k, depth, pressure, kept, .. } = *node;
         let n = &self.patches.nodes;
         let held = 0.5 * n.area[k] * pressure * (depth - kept.permanent).max(0.0);
-        let from = if n.stamp[k] == 0 { n.permanent[k].min(depth) } else { n.depth[k] };
-        let before = self.held(k, self.pressure_at_start(k));
-        turnover.heat += (n.area[k] * pressure * (depth - from) - held + before).max(0.0);
+        if n.stamp[k] != 0 {
+            let before = self.held_at_start(k);
+            turnover.heat += (n.area[k] * pressure * (depth - n.depth[k]) - held + before).max(0.0);
+            return (kept.permanent.max(0.0), held);
+        }
+        // what the force did in this step, over the gap, too; soil that the foot comes over from the side is loaded by what
+        // drives the foot
+        let from = n.depth[k].min(depth);
+        let left = n.area[k] * pressure * (depth - from) - held;
+        turnover.heat += left.max(0.0);
+        turnover.entered += (-left).max(0.0);
         (kept.permanent.max(0.0), held)
     }
 

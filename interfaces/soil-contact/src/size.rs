@@ -14,8 +14,6 @@ pub struct Size {
 /// Width of a strip over the radius of the disc that bears the same pressure: the width term of bearing capacity counts ½ for a
 /// strip and 0.3 for a disc of the same breadth (Terzaghi 1943, art. 45 and 50), and a disc of radius R is 2R broad.
 const STRIP: f64 = 5.0 / 6.0;
-/// σ of a strip's width over the width is 1/√12.
-const WIDTH: f64 = 3.464_101_615_137_754_6;
 
 impl Size {
     /// Of the nodes in `range` on a lattice of `spacing` (m). A cell that the reference level cuts counts with its part
@@ -46,11 +44,13 @@ impl Size {
         disc.min(STRIP * self.breadth()).max(0.5 * spacing)
     }
 
-    /// Breadth of the rectangle with the smaller of the principal moments, m.
+    /// Breadth of the rectangle of this area whose principal moments have the same ratio, m: what the lattice makes of a moment
+    /// counts with its fourth root.
     fn breadth(&self) -> f64 {
         let [xx, yy, xy] = self.square;
         let (half, middle) = ((0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt(), 0.5 * (xx + yy));
-        WIDTH * (middle - half).max(0.0).sqrt()
+        let ratio = (middle - half).max(0.0) / (middle + half).max(f64::MIN_POSITIVE);
+        (self.area * ratio.sqrt()).sqrt()
     }
 }
 

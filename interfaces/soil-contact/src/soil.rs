@@ -112,7 +112,9 @@ impl<M: Material> FieldSoil<M> {
         patches.nodes.reserve(nodes);
         lists.reserve(nodes);
         let laws = all_laws(&parameters, &ground.mask, expressions.as_ref(), plugin.as_ref())?;
-        warn_of_module(&laws[0], host.as_ref());
+        if parameters.elastic_stiffness_pa_m.is_some() {
+            warn_of_module(&laws[0], host.as_ref());
+        }
         Ok(Self {
             laws,
             expressions,

@@ -13,8 +13,13 @@ const ROUND: f64 = 1e-2;
 const CURVED: f64 = 1e-8;
 /// Largest scatter across the travel over that along it: a wheel may lean a little.
 const LEVEL: f64 = 0.02;
-/// Nodes whose normal leans further, cos = 0.2, are not looked at.
-const LEANING: f64 = 0.2;
+/// Nodes whose normal leans further are not looked at: slopes are cut at 72°, cos = 0.31.
+const LEANING: f64 = 0.35;
+
+/// Part of its cell from which on a node counts as covered.
+const WHOLE: f64 = 0.999;
+/// Fewer covered nodes than these do not tell a circle.
+const FEW: usize = 4;
 
 /// What the soil remembers of a contact that rolls. Part of the committed state.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -58,8 +63,12 @@ impl Wheel {
     ) -> Option<Self> {
         let used =
             || range.clone().filter(|k| nodes.area[*k] > 0.0 && normal(&nodes.facing[*k])[0] > LEANING);
-        let found = heading(used().map(|k| normal(&nodes.facing[k]))).and_then(|heading| {
-            let radius = radius(used().map(|k| (nodes.arm[k], normal(&nodes.facing[k]))), heading)?;
+        // at an edge the underside is that of the nearest point, not that at the node: it makes the circle smaller
+        let whole = |k: &usize| nodes.area[*k] > WHOLE * spacing * spacing;
+        let least = if used().filter(whole).count() < FEW { 0.0 } else { WHOLE * spacing * spacing };
+        let inner = || used().filter(move |k| nodes.area[*k] > least);
+        let found = heading(inner().map(|k| normal(&nodes.facing[k]))).and_then(|heading| {
+            let radius = radius(inner().map(|k| (nodes.arm[k], normal(&nodes.facing[k]))), heading)?;
             Some((heading, radius))
         });
         let (heading, radius) = found.or((memory.radius > 0.0).then_some((memory.heading, memory.radius)))?;

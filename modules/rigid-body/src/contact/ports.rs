@@ -7,7 +7,7 @@ use crate::model::{Body, Model};
 use crate::state::Motion;
 use terraglue_linear_solver::Path;
 use terraglue_robot_import::{Shape, ShapeGeometry};
-use terraglue_subsystem::{Port, Response, component};
+use terraglue_subsystem::{Port, PortKind, Response, component};
 
 /// One packed component: a generalised direction on one body.
 #[derive(Clone, Copy, Debug)]
@@ -212,14 +212,21 @@ pub(crate) fn committed(ports: &[Port], bodies: &[Motion], out: &mut Response) {
     }
 }
 
-/// Own displacement at the ports at the end of the trial: of the material point at the origin, and rotation.
+/// Own displacement at the ports at the end of the trial: of the material point at the origin, and rotation. At a contact it is
+/// that of the velocities, θ × r without the terms of second order: by as much as the point of a rolling rim rises in the
+/// step, its neighbour comes down, and T·X is then the work that the wrench does on the body.
 pub(crate) fn displacement(ports: &[Port], dynamics: &Dynamics, x: &mut [f64]) {
     for port in ports {
         let b = port.body as usize;
         let arm = V3::from(port.origin) - dynamics.starts()[b].c;
         let mean = &dynamics.solution[dynamics.kkt.body_at[b]..];
-        let shift = dynamics.h * V3::new(mean[0], mean[1], mean[2]) + cayley_shift(&dynamics.turns[b], &arm);
         let turn = cayley_vector(&dynamics.turns[b]);
+        let turned = if port.kind == PortKind::Contact as u32 {
+            turn.cross(&arm)
+        } else {
+            cayley_shift(&dynamics.turns[b], &arm)
+        };
+        let shift = dynamics.h * V3::new(mean[0], mean[1], mean[2]) + turned;
         for (i, c) in port.components() {
             let d = V3::from(port.direction(c));
             x[i] = if c < 3 { shift.dot(&d) } else { turn.dot(&d) };

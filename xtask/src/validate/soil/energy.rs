@@ -9,7 +9,7 @@ use serde_json::Value;
 
 const SOILS: [&str; 2] = ["soil-bekker", "soil-cellular-automaton"];
 const STRATEGIES: [&str; 4] = ["cooperative", "cooperative-compliant", "iterative", "xt-newton"];
-const ROWS: [&str; 4] = ["lunar_nominal_Apollo", "LETE_sand", "snow_US_Harrison", "clayey_Thai38"];
+const ROWS: [&str; 4] = ["lunar_nominal_Apollo", "LETE_sand", "snow_US_Harrison", "clayey_Thai38_K010"];
 const SPACINGS: [f64; 3] = [0.02, 0.01, 0.005];
 
 /// What the rig does.

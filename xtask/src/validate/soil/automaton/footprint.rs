@@ -98,6 +98,8 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     let spacings: &[f64] = if context.quick { &[0.01] } else { &[0.02, 0.01, 0.005] };
     let mut figures = Vec::new();
     for (name, config, phi) in SOILS {
+        // material that slides: no cohesion in the walls, and sweeps enough to come to rest
+        let config = &config.replacen('{', r#"{"critical_height_m":0.0,"sweeps_per_step":2,"#, 1);
         for spacing in spacings {
             let mut worst = Worst { standing: -90.0, lifted: -90.0, ..Worst::default() };
             for kind in 0..5 {
@@ -136,6 +138,16 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
                 ),
             ]);
         }
+    }
+    for spacing in spacings {
+        // 3 cm deep, where the cohesion of lunar soil holds 8.9 cm under the gravity of the Earth
+        let wall = print(LUNAR, *spacing, &shape(3), 0.0).lifted;
+        figures.push(Figure::new(
+            format!("soil.automaton.print.lunar_{}mm.wall", spacing * 1e3),
+            wall,
+            Limit::AtLeast(60.0),
+            "largest slope, degrees, of a print whose walls the cohesion holds, when the foot has gone",
+        ));
     }
     Ok(figures)
 }

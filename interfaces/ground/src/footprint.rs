@@ -34,7 +34,7 @@ pub fn nodes_below<S: Surface + ?Sized>(shape: &Placed, surface: &S, margin: f64
     let bounds = shape.aabb();
     if !shape.is_convex() {
         let part = Part { placed: shape, bounds: &bounds };
-        return nodes_below_parts(std::iter::once(part), surface, margin, out);
+        return nodes_below_parts(std::iter::once(part), surface, margin, |_, node| out.push(node));
     }
     let outline = Outline::of(shape);
     let (i0, i1) = lattice.cell_range(0, bounds.min[0], bounds.max[0]);

@@ -28,11 +28,13 @@ pub fn bounds_of<'a>(parts: impl Iterator<Item = Part<'a>>) -> Option<Aabb> {
 /// convex part can cover counts as below that part alone. Of any other cell the part counts above which something lies
 /// lower than the surface + `margin`: all of it where that is so above its corners and its node, from 8 × 8 points
 /// otherwise; where it is not so above the node, the underside is that of the nearest such point.
+///
+/// `found` is given each node with the number of the part whose underside it is.
 pub fn nodes_below_parts<'a, S: Surface + ?Sized>(
     parts: impl Iterator<Item = Part<'a>> + Clone,
     surface: &S,
     margin: f64,
-    out: &mut Vec<Node>,
+    mut found: impl FnMut(usize, Node),
 ) {
     let Some(bounds) = bounds_of(parts.clone()) else { return };
     let lattice = surface.lattice();
@@ -42,50 +44,62 @@ pub fn nodes_below_parts<'a, S: Surface + ?Sized>(
         for i in i0..=i1 {
             let cell = Cell { at: lattice.position(i, j), half: 0.5 * lattice.spacing };
             let reach = surface.height(i, j) + margin;
-            let near = parts.clone().filter(|p| p.bounds.min[2] < reach && cell.meets(p.bounds));
+            let near =
+                parts.clone().enumerate().filter(|(_, p)| p.bounds.min[2] < reach && cell.meets(p.bounds));
             let mut few = near.clone();
             let Some(first) = few.next() else { continue };
-            let found = if few.next().is_none() && first.placed.is_convex() {
-                alone(first.placed, &cell, reach)
+            let below = if few.next().is_none() && first.1.placed.is_convex() {
+                alone(first, &cell, reach)
             } else {
                 below_any(near, &cell, reach)
             };
-            if let Some((area, point, slope)) = found {
-                out.push(Node { i, j, area, lower: point[2], slope });
+            if let Some(Below { area, point, part: (number, part) }) = below {
+                let slope = part.placed.underside_slope(point);
+                found(number, Node { i, j, area, lower: point[2], slope });
             }
         }
     }
 }
 
-/// Area, point of the underside and slope there.
-type Found = (f64, [f64; 3], [f64; 2]);
-
-fn alone(shape: &Placed, cell: &Cell, reach: f64) -> Option<Found> {
-    let (area, point) = Outline::of(shape).node(shape, cell, reach)?;
-    Some((area, point, shape.underside_slope(point)))
+/// What a cell lies below.
+struct Below<'a> {
+    /// Covered, m².
+    area: f64,
+    /// Of the underside.
+    point: [f64; 3],
+    part: (usize, Part<'a>),
 }
 
-fn below_any<'a>(parts: impl Iterator<Item = Part<'a>> + Clone, cell: &Cell, reach: f64) -> Option<Found> {
+fn alone<'a>(part: (usize, Part<'a>), cell: &Cell, reach: f64) -> Option<Below<'a>> {
+    let shape = part.1.placed;
+    let (area, point) = Outline::of(shape).node(shape, cell, reach)?;
+    Some(Below { area, point, part })
+}
+
+fn below_any<'a>(
+    parts: impl Iterator<Item = (usize, Part<'a>)> + Clone,
+    cell: &Cell,
+    reach: f64,
+) -> Option<Below<'a>> {
     let lowest = |[x, y]: [f64; 2]| {
-        let hits = parts.clone().filter_map(|p| Some((p.placed.lower(x, y)?, p.placed)));
-        hits.filter(|(z, _)| *z < reach).min_by(|a, b| a.0.total_cmp(&b.0))
+        let hits = parts.clone().filter_map(|p| Some(([x, y, p.1.placed.lower(x, y)?], p)));
+        hits.filter(|(point, _)| point[2] < reach).min_by(|a, b| a.0[2].total_cmp(&b.0[2]))
     };
-    let here = lowest(cell.at).map(|(z, shape)| ([cell.at[0], cell.at[1], z], shape));
-    let (share, (point, shape)) = if here.is_some() && cell.corners().into_iter().all(|c| lowest(c).is_some())
+    let here = lowest(cell.at);
+    if let Some((point, part)) = here
+        && cell.corners().into_iter().all(|c| lowest(c).is_some())
     {
-        (1.0, here?)
-    } else {
-        let (mut count, mut nearest, mut there) = (0, f64::INFINITY, None);
-        for [dx, dy] in cell.samples() {
-            let [x, y] = [cell.at[0] + dx, cell.at[1] + dy];
-            let Some((z, shape)) = lowest([x, y]) else { continue };
-            count += 1;
-            if dx * dx + dy * dy < nearest {
-                (nearest, there) = (dx * dx + dy * dy, Some(([x, y, z], shape)));
-            }
+        return Some(Below { area: cell.area(), point, part });
+    }
+    let (mut count, mut nearest, mut there) = (0, f64::INFINITY, None);
+    for [dx, dy] in cell.samples() {
+        let Some(hit) = lowest([cell.at[0] + dx, cell.at[1] + dy]) else { continue };
+        count += 1;
+        if dx * dx + dy * dy < nearest {
+            (nearest, there) = (dx * dx + dy * dy, Some(hit));
         }
-        // A node on the very edge may lie below something that no sample does.
-        (f64::from(count) / f64::from(SAMPLES * SAMPLES), here.or(there)?)
-    };
-    (share > 0.0).then(|| (share * cell.area(), point, shape.underside_slope(point)))
+    }
+    // A node on the very edge may lie below something that no sample lies below.
+    let (point, part) = here.or(there).filter(|_| count > 0)?;
+    Some(Below { area: f64::from(count) / f64::from(SAMPLES * SAMPLES) * cell.area(), point, part })
 }

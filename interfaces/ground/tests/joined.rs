@@ -1,9 +1,7 @@
 //! Meshes that are not convex and shapes that are one piece: undersides and nodes against those of the boxes they are made of.
 
 use proptest::prelude::*;
-use terraglue_ground::{
-    Aabb, HeightField, Lattice, Part, Placed, compose, nodes_below, nodes_below_parts,
-};
+use terraglue_ground::{Aabb, HeightField, Lattice, Part, Placed, compose, nodes_below, nodes_below_parts};
 use terraglue_subsystem::{Geometry, Node, Pose};
 
 /// Half length, half of the gap between the legs, height of the gap and of the whole, half width, m.
@@ -68,7 +66,7 @@ fn both(pose: &Pose, margin: f64) -> [Vec<Node>; 2] {
     let (mesh, all) = placed(pose);
     let (mut of_mesh, mut of_parts) = (Vec::new(), Vec::new());
     nodes_below(&mesh, &flat(), margin, &mut of_mesh);
-    nodes_below_parts(parts(&all), &flat(), margin, &mut of_parts);
+    nodes_below_parts(parts(&all), &flat(), margin, |_, node| of_parts.push(node));
     [of_mesh, of_parts]
 }
 

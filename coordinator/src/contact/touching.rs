@@ -52,17 +52,10 @@ impl<'a> Touching<'a> {
         &self.largest.placed
     }
 
-    /// Reference point of the contact with ground of the given unit normal: that of the largest shape, at the level of
-    /// the lowest point of all along −normal.
+    /// Reference point of the contact with ground of the given unit normal: that of the largest shape. The level of what
+    /// sticks out of it, such as grousers, would jump as one after the other passes below.
     pub fn patch_origin(&self, normal: [f64; 3]) -> [f64; 3] {
-        let origin = self.main().patch_origin(normal);
-        if self.which.len() == 1 {
-            return origin;
-        }
-        let level = |p: [f64; 3]| dot(p, normal);
-        let low = self.each().map(|s| level(s.placed.patch_origin(normal))).fold(f64::INFINITY, f64::min);
-        let down = low - level(origin);
-        std::array::from_fn(|k| origin[k] + down * normal[k])
+        self.main().patch_origin(normal)
     }
 
     /// Half of the width of all along a world direction (unit), m.

@@ -39,6 +39,7 @@ struct Driven {
 fn wheels(scratch: &Path) -> Outcome<[Wheel; 3]> {
     let outer = scratch.join("wheel_rig_outer.urdf");
     let text = read(&root().join(SMOOTH))?.replace(&RIM.to_string(), &TIPS.to_string());
+    std::fs::create_dir_all(scratch).map_err(|e| format!("{}: {e}", scratch.display()))?;
     std::fs::write(&outer, text).map_err(|e| format!("{}: {e}", outer.display()))?;
     Ok([
         Wheel { name: "smooth", model: root().join(SMOOTH), radius: RIM },

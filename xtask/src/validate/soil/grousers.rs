@@ -5,6 +5,7 @@ use super::rig_scenario::means;
 use crate::process::{Outcome, read, root, run_scenario};
 use crate::validate::parallel::in_parallel;
 use crate::validate::{Context, Figure, Limit};
+use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
 
 const SCENARIO: &str = "scenarios/wheel_rig.toml";
@@ -15,9 +16,10 @@ const RIM: f64 = 0.092;
 const TIPS: f64 = 0.097;
 /// Rate of the wheel in the scenario, rad/s.
 const RATE: f64 = 0.2 / RIM;
-/// Way of the axle, and the last part of it over which means are taken: 5 grousers of 15°, m.
+/// Way of the axle, m.
 const WAY: f64 = 0.30;
-const MEASURED: f64 = 0.127;
+/// Turn of the wheel at the end over which means are taken: 5 grousers, rad.
+const MEASURED: f64 = 5.0 * TAU / 24.0;
 
 /// A wheel of the comparison: its name, its file and the radius by which its slip is reckoned, m.
 struct Wheel {
@@ -33,6 +35,8 @@ struct Driven {
     sinkage: f64,
     /// Drawbar pull, N.
     pull: f64,
+    /// Drift of the energy book over the work of the motors, %.
+    drift: f64,
 }
 
 /// Smooth, with grousers, and smooth up to the tips, whose file is written to the scratch folder.
@@ -65,10 +69,15 @@ fn driven(context: &Context, wheel: &Wheel, slip: f64) -> Outcome<Driven> {
     if summary["status"] != "done" {
         return Err(format!("{id}: {}", summary["error"]));
     }
-    let found = means(&read(&out.join("variables.csv"))?, (WAY - MEASURED) / speed)
+    let found = means(&read(&out.join("variables.csv"))?, WAY / speed - MEASURED / RATE)
         .ok_or_else(|| format!("{id}: no table"))?;
     let of = |name: &str| found.get(name).copied().unwrap_or(f64::NAN);
-    Ok(Driven { sinkage: 1e3 * of("rig.press.angle"), pull: of("soil.contact1.pull") })
+    let energy = |name: &str| summary[name].as_f64().unwrap_or(f64::NAN);
+    Ok(Driven {
+        sinkage: 1e3 * of("rig.press.angle"),
+        pull: of("soil.contact1.pull"),
+        drift: 100.0 * (energy("energy_balance_j") / energy("electrical_energy_j")).abs(),
+    })
 }
 
 /// All figures.
@@ -104,6 +113,12 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
         most(&mut each().map(|w| w[1].sinkage / w[2].sinkage)),
         Limit::AtMost(1.1),
         "largest depth of the tips over that of a cylinder of their radius",
+    ));
+    all.push(Figure::new(
+        "soil.grousers.energy",
+        most(&mut each().map(|w| w[1].drift)),
+        Limit::AtMost(1.0),
+        "largest drift of the energy book of the wheel with grousers, % of the work of the motors",
     ));
     Ok(all)
 }

@@ -1,15 +1,14 @@
 //! Finds the ports of a step: broad phase on boxes and tiles, then frame and nodes of each patch.
 
-use super::frame::{Patch, extent, mask};
-use super::ground::{Bounds, Cut, Ground, Reader};
+use super::ground::{Bounds, Ground, Reader};
 use super::port_set::{PortOwner, PortSet, port_key};
+use super::shape::{Shape, pieces_of};
+use super::touching::{Found, Touching};
 use crate::error::{Error, Result};
 use parry3d_f64::bounding_volume::Aabb;
-use parry3d_f64::math::Vector;
-use terraglue_ground::{Aabb as Bounding, Placed, Surface, compose, nodes_below};
-use terraglue_subsystem::{
-    BodyState, Law, Node, Port, PortKind, Pose, Scene, SceneShape, Subsystem, Terrain,
-};
+use std::ops::Range;
+use terraglue_ground::{Surface, compose};
+use terraglue_subsystem::{BodyState, Port, Scene, Subsystem, Terrain};
 
 /// A subsystem with bodies.
 pub struct BodySide<'a> {
@@ -54,18 +53,12 @@ pub struct ContactDetector {
 struct Bodies {
     subsystem: u32,
     name: String,
+    /// Those of one piece one after the other.
     shapes: Vec<Shape>,
-}
-
-struct Shape {
-    id: u32,
-    body: u32,
-    name: String,
-    mask: u32,
-    body_from_shape: Pose,
-    placed: Placed,
-    /// Its box in the world at the start of the step.
-    bounds: Bounding,
+    pieces: Vec<Range<usize>>,
+    /// Numbers 0, 1, … of the shapes.
+    numbers: Vec<usize>,
+    found: Found,
 }
 
 impl ContactDetector {
@@ -76,13 +69,8 @@ impl ContactDetector {
     /// [`Error::Simulation`] when a ground has neither.
     pub fn new(bodies: &[BodySide], grounds: &[GroundSide], terrain: Option<&dyn Terrain>) -> Result<Self> {
         let grounds = grounds.iter().map(|g| Ground::new(g.subsystem, g.instance, terrain));
-        let bodies = bodies.iter().map(|b| Bodies {
-            subsystem: b.subsystem,
-            name: b.name.into(),
-            shapes: shapes_of(b.scene),
-        });
         Ok(Self {
-            bodies: bodies.collect(),
+            bodies: bodies.iter().map(Bodies::of).collect(),
             grounds: grounds.collect::<Result<_>>()?,
             set: PortSet::default(),
             before: Vec::new(),
@@ -149,30 +137,18 @@ impl ContactDetector {
     }
 }
 
-/// Shapes that can be hit, in ascending order of id.
-fn shapes_of(scene: &Scene) -> Vec<Shape> {
-    let shape = |s: &SceneShape| {
-        let placed = Placed::new(&s.geometry, &s.body_from_shape);
-        Shape {
-            id: s.id,
-            body: s.body,
-            name: s.name.clone(),
-            mask: mask(&s.geometry),
-            body_from_shape: s.body_from_shape,
-            bounds: placed.aabb(),
-            placed,
-        }
-    };
-    let mut shapes: Vec<Shape> = scene.shapes.iter().filter(|s| s.collides).map(shape).collect();
-    shapes.sort_by_key(|s| s.id);
-    shapes
-}
-
 fn failed(now: &Now, message: String) -> Error {
     Error::Simulation { time_s: now.t, message }
 }
 
 impl Bodies {
+    fn of(side: &BodySide) -> Self {
+        let (shapes, pieces) = pieces_of(side.scene);
+        let found = Found::with_capacity(pieces.iter().map(Range::len).max().unwrap_or(0));
+        let numbers = (0..shapes.len()).collect();
+        Self { subsystem: side.subsystem, name: side.name.into(), shapes, pieces, numbers, found }
+    }
+
     fn place(&mut self, now: &Now, states: &[BodyState]) -> Result {
         for shape in &mut self.shapes {
             let Some(state) = states.get(shape.body as usize) else {
@@ -189,51 +165,74 @@ impl Bodies {
         Ok(())
     }
 
-    /// Adds the ports of all shapes on one ground.
+    /// Adds the ports of all pieces on one ground.
     fn meet(
-        &self,
+        &mut self,
         now: &Now,
         states: &[BodyState],
         ground: u32,
         (reader, bounds): (&Reader, &mut Bounds),
         (set, buried): (&mut PortSet, &mut Option<String>),
     ) -> Result {
-        for shape in &self.shapes {
-            let reach = shape.reach(now, &states[shape.body as usize]);
-            let swept = shape.swept(reach);
-            if !self.is_over(now, shape, reader, &swept)? || !bounds.meets(reader, &swept) {
+        for p in 0..self.pieces.len() {
+            let piece = self.pieces[p].clone();
+            let reach = self.near(now, states, piece.clone(), (reader, bounds))?;
+            if self.found.near.is_empty() {
                 continue;
             }
             if buried.is_none() {
-                *buried = self.buried(shape, reader);
+                *buried = self.buried(piece.clone(), reader);
             }
             let first_node = set.nodes.len();
-            let Some(port) = shape.port(reader, reach, &mut set.nodes) else { continue };
+            let Some(port) = self.found.port(&self.shapes, reader, reach, &mut set.nodes) else { continue };
             let node_count = (set.nodes.len() - first_node) as u32;
+            let (body, shape) = (port.body, port.shape);
             set.ports.push(Port {
-                key: port_key(self.subsystem, ground, shape.id),
+                key: port_key(self.subsystem, ground, self.shapes[piece.start].id),
                 first_node: first_node as u32,
                 node_count,
                 ..port
             });
-            let owner = PortOwner { subsystem: self.subsystem, ground, body: shape.body, shape: shape.id };
-            set.owners.push(owner);
+            set.owners.push(PortOwner { subsystem: self.subsystem, ground, body, shape });
         }
         Ok(())
     }
 
-    /// How a shape is buried by more than its own height: what then lies on top of it no soil knows.
-    fn buried(&self, shape: &Shape, reader: &Reader) -> Option<String> {
-        let [x, y, _] = shape.bounds.centre();
+    /// Finds which shapes of a piece come near the ground, and how far any of them can get, m.
+    fn near(
+        &mut self,
+        now: &Now,
+        states: &[BodyState],
+        piece: Range<usize>,
+        (reader, bounds): (&Reader, &mut Bounds),
+    ) -> Result<f64> {
+        self.found.near.clear();
+        let mut farthest = 0.0_f64;
+        for k in piece {
+            let shape = &self.shapes[k];
+            let reach = shape.reach(now, &states[shape.body as usize]);
+            let swept = shape.swept(reach);
+            if self.is_over(now, shape, reader, &swept)? && bounds.meets(reader, &swept) {
+                self.found.near.push(k);
+                farthest = farthest.max(reach);
+            }
+        }
+        Ok(farthest)
+    }
+
+    /// How a piece is buried by more than its own height: what then lies on top of it no soil knows.
+    fn buried(&self, piece: Range<usize>, reader: &Reader) -> Option<String> {
+        let whole = Touching::of(&self.shapes, &self.numbers[piece.clone()])?.bounds;
+        let [x, y, _] = whole.centre();
         let [i, j] = reader.lattice().coordinates(x, y).map(|c| c.round() as i32);
         let level = reader.undisturbed().height(i, j);
-        let (height, covered) = (shape.bounds.max[2] - shape.bounds.min[2], level - shape.bounds.max[2]);
+        let (height, covered) = (whole.max[2] - whole.min[2], level - whole.max[2]);
         (covered > height).then(|| {
             format!(
                 "`{}` of {} is buried: the ground at x = {x:.3} m, y = {y:.3} m was {covered:.3} m above its top, and it is \
                  {height:.3} m high; the ground is too weak for its load (take a stronger soil or a larger foot), or it starts \
                  below it",
-                shape.name, self.name
+                self.shapes[piece.start].name, self.name
             )
         })
     }
@@ -258,83 +257,6 @@ impl Bodies {
         );
         Err(failed(now, message))
     }
-}
-
-impl Shape {
-    /// How far any point of the shape can get within the step, and the margin: |v|h + ½|g|h² + margin.
-    fn reach(&self, now: &Now, state: &BodyState) -> f64 {
-        let bounds = &self.bounds;
-        let c = bounds.centre();
-        let r: [f64; 3] = std::array::from_fn(|k| c[k] - state.world_from_body.position[k]);
-        let (v, w) = (state.linear_velocity, state.angular_velocity);
-        let at_centre = [
-            v[0] + w[1] * r[2] - w[2] * r[1],
-            v[1] + w[2] * r[0] - w[0] * r[2],
-            v[2] + w[0] * r[1] - w[1] * r[0],
-        ];
-        let speed = length(at_centre) + length(w) * bounds.radius();
-        speed * now.h + 0.5 * length(now.gravity) * now.h * now.h + now.margin
-    }
-
-    /// Its box enlarged by `reach`, sideways not beyond what lies under it.
-    fn swept(&self, reach: f64) -> Aabb {
-        let bounds = &self.bounds;
-        let [x0, y0, z0] = bounds.min;
-        let [x1, y1, z1] = bounds.max;
-        // A height field hit along its normal is hit vertically within five times that (slopes up to 78°).
-        Aabb::new(Vector::new(x0, y0, z0 - 5.0 * reach), Vector::new(x1, y1, z1))
-    }
-
-    /// The port without key and node range, whose nodes are appended; `None` when it cannot touch.
-    fn port(&self, reader: &Reader, reach: f64, nodes: &mut Vec<Node>) -> Option<Port> {
-        let patch = Patch::find(&self.placed, &self.bounds, &reader.undisturbed(), reader);
-        let vertical = patch.vertical(reach);
-        let first = nodes.len();
-        nodes_below(&self.placed, &Cut(reader), vertical, nodes);
-        if nodes.len() == first && patch.origin[2] < patch.ground + vertical {
-            nodes.extend(self.node_between(reader, &patch));
-        }
-        if nodes.len() == first {
-            return None;
-        }
-        let frame = patch.frame();
-        Some(Port {
-            key: 0,
-            kind: PortKind::Contact as u32,
-            side: 1,
-            mask: self.mask,
-            first: 0,
-            body: self.body,
-            shape: self.id,
-            first_node: 0,
-            node_count: 0,
-            origin: patch.origin,
-            frame,
-            extent: extent(&self.placed, reader, &patch, &frame, &nodes[first..]),
-            law: Law::UNILATERAL,
-        })
-    }
-
-    /// A shape smaller than a cell can slip between the nodes: then the nearest one carries it.
-    fn node_between(&self, reader: &Reader, patch: &Patch) -> Option<Node> {
-        let lattice = reader.lattice();
-        let bounds = &self.bounds;
-        let (width, depth) = (bounds.max[0] - bounds.min[0], bounds.max[1] - bounds.min[1]);
-        let small = width < 2.0 * lattice.spacing && depth < 2.0 * lattice.spacing;
-        let [i, j] = lattice.coordinates(patch.origin[0], patch.origin[1]).map(|c| c.round() as i32);
-        let area = (width * depth).min(lattice.spacing * lattice.spacing);
-        (small && lattice.has(i, j)).then_some(Node {
-            i,
-            j,
-            area,
-            lower: patch.origin[2],
-            slope: self.placed.underside_slope(patch.origin),
-        })
-    }
-}
-
-fn length(v: [f64; 3]) -> f64 {
-    v.iter().map(|c| c * c).sum::<f64>().sqrt()
 }
 
 fn is_finite(state: &BodyState) -> bool {

@@ -1,6 +1,7 @@
 //! Frame, origin and extent of a contact patch.
 
-use terraglue_ground::{Aabb, Placed, Surface, fit_plane};
+use super::touching::Touching;
+use terraglue_ground::{Surface, fit_plane};
 use terraglue_subsystem::{Geometry, Node, component};
 
 /// Smallest upward part of a normal that is reckoned with; steeper ground is no height field any more.
@@ -21,12 +22,12 @@ impl Patch {
     /// Lowest point and normal depend on each other: two rounds, from the vertical, settle both. The normal is
     /// that of the `undisturbed` ground, the height that of the present `surface`.
     pub fn find<U: Surface + ?Sized, S: Surface + ?Sized>(
-        shape: &Placed,
-        bounds: &Aabb,
+        shape: &Touching,
         undisturbed: &U,
         surface: &S,
     ) -> Self {
         // Twice the half width: enough ground beyond the foot itself.
+        let bounds = &shape.bounds;
         let radius = (bounds.max[0] - bounds.min[0]).min(bounds.max[1] - bounds.min[1]);
         let mut normal = [0.0, 0.0, 1.0];
         for _ in 0..2 {
@@ -65,13 +66,13 @@ pub fn mask(geometry: &Geometry) -> u32 {
 /// Half lengths of the patch along t1 and t2: how far its nodes reach from the origin, at most half the shape's
 /// width, at least half a cell. Zero for a sphere.
 pub fn extent<S: Surface + ?Sized>(
-    shape: &Placed,
+    shape: &Touching,
     surface: &S,
     patch: &Patch,
     frame: &[f64; 9],
     nodes: &[Node],
 ) -> [f64; 2] {
-    if matches!(shape.geometry(), Geometry::Sphere { .. }) {
+    if shape.is_sphere() {
         return [0.0; 2];
     }
     let lattice = surface.lattice();

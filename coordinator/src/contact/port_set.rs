@@ -26,11 +26,12 @@ pub struct PortOwner {
     pub ground: u32,
     /// Index of the body in the scene of its subsystem.
     pub body: u32,
-    /// Id of the shape.
+    /// Id of the shape; of several that touch as one piece the largest.
     pub shape: u32,
 }
 
-/// Key of the contact of a shape on a ground: the same over the whole run, ascending by subsystem, ground, shape.
+/// Key of the contact of a piece on a ground, by the id of its first shape: the same over the whole run, ascending by
+/// subsystem, ground, shape.
 pub fn port_key(subsystem: u32, ground: u32, shape: u32) -> u64 {
     u64::from(subsystem & 0xffff) << 48 | u64::from(ground & 0xffff) << 32 | u64::from(shape)
 }

@@ -272,3 +272,80 @@ fn the_frame_moves_smoothly_over_rolling_ground() {
         before = Some(frame);
     }
 }
+
+/// A bench on level ground with one body that carries all the shapes.
+fn one_body(parts: &[(Geometry, [f64; 3])]) -> Bench {
+    let geometries: Vec<Geometry> = parts.iter().map(|(g, _)| g.clone()).collect();
+    let mut scene = scene(&geometries);
+    scene.bodies.truncate(1);
+    for (shape, (_, position)) in scene.shapes.iter_mut().zip(parts) {
+        shape.body = 0;
+        shape.body_from_shape = Pose { position: *position, ..Pose::IDENTITY };
+    }
+    let soil: Box<dyn Subsystem> = Box::new(slope(0.0));
+    let bodies = [BodySide { subsystem: 2, name: "robot", scene: &scene }];
+    let grounds = [GroundSide { subsystem: 3, instance: &*soil }];
+    let detector = ContactDetector::new(&bodies, &grounds, None).expect("has ground");
+    Bench { soil, detector }
+}
+
+/// A plate, a foot under each end of it, and a ball beside all.
+fn bridge() -> Vec<(Geometry, [f64; 3])> {
+    let foot = Geometry::Box { half_extents: [0.02, 0.04, 0.02] };
+    vec![
+        (foot.clone(), [-0.1, 0.0, 0.02]),
+        (SPHERE, [0.0, 0.3, 0.03]),
+        (foot, [0.1, 0.0, 0.02]),
+        (Geometry::Box { half_extents: [0.12, 0.04, 0.01] }, [0.0, 0.0, 0.05]),
+    ]
+}
+
+#[test]
+fn shapes_that_hang_together_are_one_contact() {
+    let mut bench = one_body(&bridge());
+    let set = bench.detect(&[at([0.002, 0.001, -1e-3], [0.0; 3])]).expect("on the ground");
+    let keys: Vec<u64> = set.ports.iter().map(|p| p.key & 0xffff).collect();
+    assert_eq!(keys, [10, 11]);
+    let [piece, ball] = &set.ports[..] else { panic!("two ports") };
+    assert_eq!((piece.mask, ball.mask, set.n), (component::WRENCH, component::FORCE, 9));
+    assert_eq!((set.owners[0].shape, piece.body), (10, 0));
+    let nodes = piece.nodes(&set.nodes);
+    let mut seen: Vec<[i32; 2]> = nodes.iter().map(|n| [n.i, n.j]).collect();
+    seen.sort_unstable();
+    seen.dedup();
+    assert_eq!(seen.len(), nodes.len(), "each node once");
+    let area: f64 = nodes.iter().map(|n| n.area).sum();
+    assert!((area - 2.0 * 0.04 * 0.08).abs() < 1e-9, "{area}");
+    assert!(nodes.iter().all(|n| (n.lower + 1e-3).abs() < 1e-12));
+    // The way from one foot to the other and half a foot more.
+    assert!((piece.origin[2] + 1e-3).abs() < 1e-12 && piece.extent[0] <= 0.12 + 1e-12, "{piece:?}");
+}
+
+#[test]
+fn a_part_that_does_not_touch_changes_nothing_but_the_key() {
+    let post = Geometry::Capsule { half_length: 0.1, radius: 0.01 };
+    let mut joined = one_body(&[(post, [0.0, 0.0, 0.16]), (SPHERE, [0.0, 0.0, 0.03])]);
+    let mut alone = one_body(&[(SPHERE, [0.0, 0.0, 0.03])]);
+    let state = [at([0.003, -0.002, -2e-3], [0.1, 0.0, -0.2])];
+    let alone = alone.detect(&state).expect("on the ground");
+    let joined = joined.detect(&state).expect("on the ground");
+    assert_eq!(alone.nodes, joined.nodes);
+    let [a, b] = [&alone.ports[0], &joined.ports[0]];
+    assert_eq!((a.mask, a.origin, a.frame, a.extent), (b.mask, b.origin, b.frame, b.extent));
+    assert_eq!((b.mask, b.key & 0xffff, b.shape), (component::FORCE, 10, 11));
+}
+
+#[test]
+fn a_small_part_is_buried_only_with_all_of_its_piece() {
+    // A rib of 5 mm below a block, 2 cm deep.
+    let parts = [
+        (Geometry::Box { half_extents: [0.05, 0.05, 0.05] }, [0.0, 0.0, 0.05]),
+        (Geometry::Box { half_extents: [0.002, 0.05, 0.0025] }, [0.0, 0.0, -0.0024]),
+    ];
+    let mut bench = one_body(&parts);
+    let set = bench.detect(&[at([0.0, 0.0, -0.02], [0.0; 3])]).expect("fine");
+    assert_eq!(set.ports.len(), 1);
+    assert_eq!(bench.detector.buried(), None);
+    bench.detect(&[at([0.0, 0.0, -0.25], [0.0; 3])]).expect("fine");
+    assert!(bench.detector.buried().is_some_and(|why| why.contains("`foot0` of robot")));
+}

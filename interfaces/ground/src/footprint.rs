@@ -2,18 +2,19 @@
 
 use crate::Surface;
 use crate::coverage::{disc_in_rectangle, polygon_in_rectangle};
+use crate::joined::{Part, nodes_below_parts};
 use crate::math::point;
-use crate::shape::Placed;
+use crate::shape::{Aabb, Placed};
 use terraglue_subsystem::{Geometry, Node};
 
 /// Sub-samples along each side of a cell at the edge of an outline without closed form.
-const SAMPLES: i32 = 8;
+pub(crate) const SAMPLES: i32 = 8;
 
 /// Heights that are read at once.
 const CHUNK: usize = 64;
 
 /// Outline of a shape seen from above.
-enum Outline {
+pub(crate) enum Outline {
     /// Centre and radius.
     Disc([f64; 2], f64),
     /// Corners, counter-clockwise, and their number.
@@ -27,10 +28,14 @@ enum Outline {
 ///
 /// `area` is the covered part of the cell: exact for spheres, boxes and upright cylinders and capsules, from
 /// 8 × 8 points otherwise. `lower` is the exact underside at the node; where the vertical line through the node
-/// misses the shape, that of the nearest covered point.
+/// misses the shape, that of the nearest covered point. A mesh that is not convex: see [`nodes_below_parts`].
 pub fn nodes_below<S: Surface + ?Sized>(shape: &Placed, surface: &S, margin: f64, out: &mut Vec<Node>) {
     let lattice = surface.lattice();
     let bounds = shape.aabb();
+    if !shape.is_convex() {
+        let part = Part { placed: shape, bounds: &bounds };
+        return nodes_below_parts(std::iter::once(part), surface, margin, |_, node| out.push(node));
+    }
     let outline = Outline::of(shape);
     let (i0, i1) = lattice.cell_range(0, bounds.min[0], bounds.max[0]);
     let (j0, j1) = lattice.cell_range(1, bounds.min[1], bounds.max[1]);
@@ -55,9 +60,9 @@ pub fn nodes_below<S: Surface + ?Sized>(shape: &Placed, surface: &S, margin: f64
 }
 
 /// A square of side 2·half around a node.
-struct Cell {
-    at: [f64; 2],
-    half: f64,
+pub(crate) struct Cell {
+    pub at: [f64; 2],
+    pub half: f64,
 }
 
 impl Cell {
@@ -69,16 +74,31 @@ impl Cell {
         self.at.map(|c| c + self.half)
     }
 
-    fn area(&self) -> f64 {
+    pub fn area(&self) -> f64 {
         4.0 * self.half * self.half
+    }
+
+    /// Its four corners.
+    pub fn corners(&self) -> [[f64; 2]; 4] {
+        let (low, high) = (self.low(), self.high());
+        [[low[0], low[1]], [high[0], low[1]], [low[0], high[1]], [high[0], high[1]]]
+    }
+
+    /// Whether a box lies above or below some of it.
+    pub fn meets(&self, bounds: &Aabb) -> bool {
+        (0..2).all(|k| bounds.min[k] <= self.at[k] + self.half && bounds.max[k] >= self.at[k] - self.half)
+    }
+
+    /// Places of the sample points from the node, row by row.
+    pub fn samples(&self) -> impl Iterator<Item = [f64; 2]> {
+        let (step, half) = (2.0 * self.half / f64::from(SAMPLES), self.half);
+        let offset = move |k: i32| (f64::from(k) + 0.5) * step - half;
+        (0..SAMPLES * SAMPLES).map(move |k| [offset(k % SAMPLES), offset(k / SAMPLES)])
     }
 
     /// Whether the shape covers all corners and so, being convex, the whole cell.
     fn inside(&self, shape: &Placed) -> bool {
-        let (low, high) = (self.low(), self.high());
-        [[low[0], low[1]], [high[0], low[1]], [low[0], high[1]], [high[0], high[1]]]
-            .iter()
-            .all(|c| shape.lower(c[0], c[1]).is_some())
+        self.corners().iter().all(|c| shape.lower(c[0], c[1]).is_some())
     }
 
     /// Distance of the corner farthest from a point, m.
@@ -89,18 +109,13 @@ impl Cell {
 
     /// Covered part by sample points, and the point of the underside at the covered one nearest to the node.
     fn sample(&self, shape: &Placed) -> (f64, [f64; 3]) {
-        let step = 2.0 * self.half / f64::from(SAMPLES);
         let (mut count, mut nearest, mut point) = (0, f64::INFINITY, [self.at[0], self.at[1], f64::INFINITY]);
-        for b in 0..SAMPLES {
-            for a in 0..SAMPLES {
-                let offset = |k: i32| (f64::from(k) + 0.5) * step - self.half;
-                let (dx, dy) = (offset(a), offset(b));
-                let (x, y) = (self.at[0] + dx, self.at[1] + dy);
-                if let Some(z) = shape.lower(x, y) {
-                    count += 1;
-                    if dx * dx + dy * dy < nearest {
-                        (nearest, point) = (dx * dx + dy * dy, [x, y, z]);
-                    }
+        for [dx, dy] in self.samples() {
+            let (x, y) = (self.at[0] + dx, self.at[1] + dy);
+            if let Some(z) = shape.lower(x, y) {
+                count += 1;
+                if dx * dx + dy * dy < nearest {
+                    (nearest, point) = (dx * dx + dy * dy, [x, y, z]);
                 }
             }
         }
@@ -109,7 +124,7 @@ impl Cell {
 }
 
 impl Outline {
-    fn of(shape: &Placed) -> Self {
+    pub fn of(shape: &Placed) -> Self {
         let centre = [shape.pose().position[0], shape.pose().position[1]];
         let upright = shape.rotation().0[2][2].abs() > 1.0 - 1e-14;
         match shape.geometry() {
@@ -124,7 +139,7 @@ impl Outline {
 
     /// Covered area and point of the lower surface of a node that is covered and lower than `reach`. The area,
     /// which costs most, is asked for last.
-    fn node(&self, shape: &Placed, cell: &Cell, reach: f64) -> Option<(f64, [f64; 3])> {
+    pub fn node(&self, shape: &Placed, cell: &Cell, reach: f64) -> Option<(f64, [f64; 3])> {
         let hit = shape.lower(cell.at[0], cell.at[1]);
         let (point, sampled) = match (hit, self) {
             (_, Self::Disc(centre, radius)) if at_rim(shape, cell, *centre, *radius) => {

@@ -5,7 +5,7 @@
 //!   that nobody touched costs nothing.
 //! * [`TileMap`]: any state per node in the same tiles, for soils.
 //! * [`Placed`]: a shape at a pose: its exact underside, support point and bounding box.
-//! * [`nodes_below`]: the nodes of a contact patch with their covered areas.
+//! * [`nodes_below`]: the nodes of a contact patch with their covered areas; [`nodes_below_parts`]: of several shapes in one.
 //! * [`fit_plane`]: height and normal of the ground below a footprint.
 //!
 //! Nothing here knows what soil is; contact detection, soils and later sensors share it.
@@ -13,6 +13,7 @@
 mod coverage;
 mod footprint;
 mod height_field;
+mod joined;
 mod lattice;
 mod math;
 mod plane;
@@ -24,6 +25,7 @@ mod tile_map;
 pub use coverage::{disc_in_rectangle, polygon_in_rectangle};
 pub use footprint::nodes_below;
 pub use height_field::{HeightError, HeightField, UNIT_M};
+pub use joined::{Part, bounds_of, nodes_below_parts};
 pub use lattice::{Lattice, TILE_EDGE, TILE_NODES};
 pub use math::{Rotation, compose};
 pub use plane::{Plane, fit_plane};

@@ -290,6 +290,13 @@ pub struct Patches {
 }
 
 impl Patches {
+    /// Room for `nodes` nodes of all contacts.
+    pub fn reserve(&mut self, nodes: usize) {
+        self.nodes.reserve(nodes);
+        self.sides.reserve(nodes);
+        self.rows.reserve(nodes);
+    }
+
     /// Makes the next call of [`Patches::build`] work: the committed state has changed.
     pub fn forget(&mut self) {
         self.built_for = None;

@@ -109,7 +109,7 @@ impl<M: Material> FieldSoil<M> {
         }
         let (mut patches, mut lists) = (Patches::default(), Lists::default());
         patches.nodes.doubles = ground.law_memory.doubles();
-        patches.nodes.reserve(nodes);
+        patches.reserve(nodes);
         lists.reserve(nodes);
         let laws = all_laws(&parameters, &ground.mask, expressions.as_ref(), plugin.as_ref())?;
         if parameters.elastic_stiffness_pa_m.is_some() {

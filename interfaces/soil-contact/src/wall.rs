@@ -273,6 +273,12 @@ pub struct Rows {
 }
 
 impl Rows {
+    /// Room for the sides of contacts with `nodes` nodes.
+    pub fn reserve(&mut self, nodes: usize) {
+        self.begins.reserve(nodes);
+        self.places.reserve(nodes);
+    }
+
     fn list(&mut self, nodes: &PatchNodes, range: std::ops::Range<usize>) {
         self.begins.clear();
         self.first = nodes.index.get(range.start).map_or(0, |at| at[1]);

@@ -60,11 +60,12 @@ pub enum Geometry {
         /// Radius.
         radius: f64,
     },
-    /// Convex hull of points; the triangles index the points and face outwards.
+    /// A mesh: convex where its triangles are the faces of a convex body. Any other, with dents or open, counts on soil by
+    /// its own triangles.
     ConvexMesh {
-        /// Corners.
+        /// Corners, m.
         points: Vec<[f64; 3]>,
-        /// Faces, counter-clockwise seen from outside.
+        /// Three indices of corners each, counter-clockwise seen from outside.
         triangles: Vec<[u32; 3]>,
     },
 }

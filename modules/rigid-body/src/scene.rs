@@ -44,7 +44,8 @@ pub(crate) fn scene(model: &Model) -> Scene {
     Scene { bodies, shapes }
 }
 
-/// Shapes of bodies are convex. What stands still need not be: nothing is asked of its triangles but to be drawn.
+/// A mesh of a body that is not convex is told as it is: soil meets its triangles. Of what stands still nothing is asked
+/// but to be drawn.
 fn geometry(g: &ShapeGeometry) -> Geometry {
     match g {
         ShapeGeometry::Sphere { radius } => Geometry::Sphere { radius: *radius },
@@ -55,7 +56,7 @@ fn geometry(g: &ShapeGeometry) -> Geometry {
         ShapeGeometry::Capsule { half_length, radius } => {
             Geometry::Capsule { half_length: *half_length, radius: *radius }
         }
-        ShapeGeometry::Hull(mesh) | ShapeGeometry::Triangles(mesh) => {
+        ShapeGeometry::Hull(mesh) | ShapeGeometry::Concave { mesh, .. } | ShapeGeometry::Triangles(mesh) => {
             Geometry::ConvexMesh { points: mesh.points.clone(), triangles: mesh.triangles.clone() }
         }
         ShapeGeometry::Heights(heights) => surface(heights),

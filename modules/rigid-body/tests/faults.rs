@@ -64,7 +64,8 @@ fn a_fault_puts_no_energy_in() {
         let before = rig.balance();
         walk_in_place(&mut rig, 1);
         let gain = rig.balance() - before;
-        assert!(gain.abs() <= 3.0 * usual, "{fault}: {gain} {usual}");
+        // beside what a step changes in the book as a rule, rounding of the energies, about 10 J
+        assert!(gain <= 3.0 * usual && gain.abs() <= 3.0 * usual + 1e-8, "{fault}: {gain} {usual}");
     }
 }
 

@@ -132,6 +132,8 @@ fn no_step_allocates_once_the_ports_are_known() {
         let guilty = guilty(&mut testbed, 0.7, 1.0);
         assert!(guilty.is_empty(), "{strategy}: steps that allocate: {guilty:?}");
     }
+    let guilty_on_grousers = guilty(&mut grousers(), 0.7, 1.0);
+    assert!(guilty_on_grousers.is_empty(), "grousers: steps that allocate: {guilty_on_grousers:?}");
     for soil in ["soil-cellular-automaton", "soil-bekker"] {
         for strategy in ["cooperative", "cooperative-compliant", "iterative"] {
             let mut testbed = walk(&[("soil.module", soil), ("gluing.strategy", strategy)]);
@@ -139,6 +141,20 @@ fn no_step_allocates_once_the_ports_are_known() {
             assert!(guilty.is_empty(), "{soil}, {strategy}: steps that allocate: {guilty:?}");
         }
     }
+}
+
+/// A wheel with grousers that creeps on soil.
+fn grousers() -> Testbed {
+    let model = format!("{ROOT}/models/wheel_rig_grousers.urdf");
+    linked(&shipped(
+        "wheel_rig",
+        &[
+            ("rig.model", model.as_str()),
+            ("gluing.strategy", "cooperative-compliant"),
+            ("rig.velocity_target.travel", "0.02"),
+            ("rig.velocity_target.drive", "0.2"),
+        ],
+    ))
 }
 
 /// The walk without its soil, on a half-space or on the terrain as stone.

@@ -1,7 +1,7 @@
 //! The exact underside of every shape: where a vertical line enters it from below, in closed form.
 //!
-//! Every shape is convex, so the line lies inside it over one interval; that of an intersection of slabs and
-//! cylinders is the intersection of theirs.
+//! Every shape but a mesh with dents is convex, so the line lies inside it over one interval; that of an intersection of
+//! slabs and cylinders is the intersection of theirs.
 
 use super::Placed;
 use crate::math::dot;
@@ -18,6 +18,9 @@ impl Placed {
         if let Geometry::Sphere { radius } = &self.geometry {
             let rest = radius * radius - (dx * dx + dy * dy);
             return (rest >= 0.0).then(|| centre[2] - rest.sqrt());
+        }
+        if let Some(tree) = &self.tree {
+            return tree.lowest(&self.rotation, [dx, dy]).map(|hit| centre[2] + hit.z);
         }
         // Points of the line in the shape's frame: start + s·up, s = height above the shape's origin.
         let start = self.rotation.to_shape([dx, dy, 0.0]);

@@ -1,12 +1,14 @@
 //! A shape at a pose: what contact detection, soils and sensors ask of it.
 
 mod lower;
+mod mesh;
 mod slope;
 mod support;
 
 pub use slope::STEEPEST_SLOPE;
 
 use crate::math::{Rotation, cross, dot, point};
+use mesh::MeshTree;
 use terraglue_subsystem::{Geometry, Pose};
 
 /// A plane of a convex mesh: outward unit normal and offset, normal·p ≤ offset inside.
@@ -38,22 +40,38 @@ impl Aabb {
     }
 }
 
-/// A geometry at a pose. Cheap to make for all but convex meshes, whose faces are computed once: keep it and
+/// A geometry at a pose. Cheap to make for all but meshes, whose faces are computed once: keep it and
 /// [`Placed::move_to`] it.
+///
+/// A mesh whose triangles are not the faces of a convex body counts by these triangles.
 #[derive(Clone, Debug)]
 pub struct Placed {
     geometry: Geometry,
     world_from_shape: Pose,
     rotation: Rotation,
+    /// Of a convex mesh.
     faces: Vec<Face>,
+    /// Of a mesh that is not convex.
+    tree: Option<MeshTree>,
 }
 
 impl Placed {
     /// A copy of `geometry` whose frame lies at `world_from_shape`.
     pub fn new(geometry: &Geometry, world_from_shape: &Pose) -> Self {
         let rotation = Rotation::from_quaternion(world_from_shape.orientation);
-        let faces = faces_of(geometry);
-        Self { geometry: geometry.clone(), world_from_shape: *world_from_shape, rotation, faces }
+        let tree = match geometry {
+            Geometry::ConvexMesh { points, triangles } if !mesh::is_convex(points, triangles) => {
+                Some(MeshTree::new(points, triangles))
+            }
+            _ => None,
+        };
+        let faces = if tree.is_some() { Vec::new() } else { faces_of(geometry) };
+        Self { geometry: geometry.clone(), world_from_shape: *world_from_shape, rotation, faces, tree }
+    }
+
+    /// Whether it has no dents: true for all but meshes whose triangles are not the faces of a convex body.
+    pub fn is_convex(&self) -> bool {
+        self.tree.is_none()
     }
 
     /// The same shape at another pose; does not allocate.
@@ -128,11 +146,7 @@ fn faces_of(geometry: &Geometry) -> Vec<Face> {
     };
     let mut faces: Vec<Face> = Vec::new();
     for triangle in triangles {
-        let corner = |k: usize| points.get(triangle[k] as usize).copied();
-        let (Some(a), Some(b), Some(c)) = (corner(0), corner(1), corner(2)) else {
-            continue;
-        };
-        let Some(face) = face(a, b, c) else { continue };
+        let Some(face) = face_of(points, triangle) else { continue };
         let same =
             |f: &Face| dot(f.normal, face.normal) > 1.0 - 1e-14 && (f.offset - face.offset).abs() < 1e-12;
         if !faces.iter().any(same) {
@@ -140,6 +154,12 @@ fn faces_of(geometry: &Geometry) -> Vec<Face> {
         }
     }
     faces
+}
+
+/// The plane of a triangle; none where a corner is missing or it has no area.
+fn face_of(points: &[[f64; 3]], triangle: &[u32; 3]) -> Option<Face> {
+    let corner = |k: usize| points.get(triangle[k] as usize).copied();
+    face(corner(0)?, corner(1)?, corner(2)?)
 }
 
 fn face(a: [f64; 3], b: [f64; 3], c: [f64; 3]) -> Option<Face> {

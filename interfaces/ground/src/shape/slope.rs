@@ -18,6 +18,10 @@ impl Placed {
         if let Geometry::Sphere { .. } = &self.geometry {
             return slope_of(std::array::from_fn(|k| p[k] - centre[k]));
         }
+        if let Some(tree) = &self.tree {
+            let hit = tree.lowest(&self.rotation, [p[0] - centre[0], p[1] - centre[1]]);
+            return hit.map_or([0.0; 2], |hit| slope_of(hit.normal));
+        }
         let local = self.rotation.to_shape(std::array::from_fn(|k| p[k] - centre[k]));
         let mut face = Downwards { placed: self, distance: f64::NEG_INFINITY, normal: [0.0, 0.0, -1.0] };
         match &self.geometry {

@@ -151,6 +151,13 @@ pub enum ShapeGeometry {
     },
     /// What is inside all faces of a convex mesh.
     Hull(Arc<Mesh>),
+    /// A mesh that is not convex and moves.
+    Concave {
+        /// As it is: what soil meets.
+        mesh: Arc<Mesh>,
+        /// Its convex hull: what bodies and rigid ground meet.
+        hull: Arc<Mesh>,
+    },
     /// Triangles as they are; of shapes that stand still only.
     Triangles(Arc<Mesh>),
     /// Ground over a grid; of shapes that stand still only.

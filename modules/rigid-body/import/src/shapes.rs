@@ -1,4 +1,4 @@
-//! Shapes of the links of a URDF file; meshes become hulls where they move.
+//! Shapes of the links of a URDF file; convex meshes become hulls where they move, others keep their own form beside it.
 
 use crate::check::isometry;
 use crate::error::{Error, Source};
@@ -59,7 +59,7 @@ impl<'a> Shapes<'a> {
                 .iter()
                 .any(|s| s.geometry == seen.geometry && s.body_from_shape == seen.body_from_shape)
             {
-                shapes.push(seen);
+                shapes.push(Shape { geometry: drawn(seen.geometry), ..seen });
             }
         }
         Ok(shapes)
@@ -119,12 +119,23 @@ impl<'a> Shapes<'a> {
             return Ok(ShapeGeometry::Triangles(Arc::new(mesh)));
         }
         let (hull, beyond) = mesh.hull().map_err(wrong)?;
+        let convex = mesh.is_convex();
         if place.collides {
-            let said = hull_notice(&mesh, &hull, beyond);
+            let said = hull_notice(&mesh, (&hull, beyond), convex);
             let said = self.source.link(link, format!("the mesh `{file}` {}", said)).to_string();
             if hollow(&mesh, &hull) { self.warnings.push(said) } else { self.notices.push(said) }
         }
-        Ok(ShapeGeometry::Hull(Arc::new(hull)))
+        let hull = Arc::new(hull);
+        let concave = |hull| ShapeGeometry::Concave { mesh: Arc::new(mesh), hull };
+        Ok(if convex { ShapeGeometry::Hull(hull) } else { concave(hull) })
+    }
+}
+
+/// A picture is drawn as its hull: the triangles of a fine one would swell the recording.
+pub(crate) fn drawn(geometry: ShapeGeometry) -> ShapeGeometry {
+    match geometry {
+        ShapeGeometry::Concave { hull, .. } => ShapeGeometry::Hull(hull),
+        _ => geometry,
     }
 }
 
@@ -134,8 +145,17 @@ pub(crate) fn hollow(mesh: &Mesh, hull: &Mesh) -> bool {
 }
 
 /// Says what was made of a mesh that moves.
-pub(crate) fn hull_notice(mesh: &Mesh, hull: &Mesh, beyond: f64) -> String {
-    let mut text = format!("moves and counts as its convex hull of {} corners", hull.points.len());
+pub(crate) fn hull_notice(mesh: &Mesh, (hull, beyond): (&Mesh, f64), convex: bool) -> String {
+    let corners = hull.points.len();
+    let mut text = if convex {
+        format!("moves and counts as its convex hull of {corners} corners")
+    } else {
+        let count = mesh.triangles.len();
+        format!(
+            "moves and is not convex: soil meets its own {count} triangles, bodies and rigid ground meet its convex hull of \
+             {corners} corners"
+        )
+    };
     if hollow(mesh, hull) {
         let times = hull.solid().volume / mesh.solid().volume.abs();
         text += &format!(", whose volume is {times:.2} times its own; take it apart where that matters");

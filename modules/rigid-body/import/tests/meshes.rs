@@ -107,6 +107,11 @@ fn a_hollow_mesh_is_warned_of_and_stands_still_as_it_is() {
     let path = robot(&folder, "filename=\"l.obj\"");
     let moving = read(&path).unwrap();
     assert!(moving.warnings[0].contains("1.17 times its own"), "{:?}", moving.warnings);
+    assert!(moving.warnings[0].contains("soil meets its own 20 triangles"), "{:?}", moving.warnings);
+    let ShapeGeometry::Concave { mesh, hull } = &moving.bodies[0].shapes[0].geometry else {
+        panic!("its own form")
+    };
+    assert_eq!((mesh.triangles.len(), mesh.points.len(), hull.points.len()), (20, 12, 10));
     // The same link without mass is the world's.
     let text = std::fs::read_to_string(&path).unwrap();
     let (head, tail) = (text.find("<inertial>").unwrap(), text.find("</inertial>").unwrap() + 11);

@@ -221,7 +221,7 @@ fn on_ground(
             found.push(Found { on_ground: on_shape - gap * normal, on_shape, normal, gap });
         }
     });
-    if matches!(c.given.geometry, ShapeGeometry::Hull(_)) {
+    if matches!(c.given.geometry, ShapeGeometry::Hull(_) | ShapeGeometry::Concave { .. }) {
         reduce(found);
     }
     out.extend(found.iter().map(|f| {

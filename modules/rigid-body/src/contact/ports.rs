@@ -212,8 +212,8 @@ pub(crate) fn committed(ports: &[Port], bodies: &[Motion], out: &mut Response) {
     }
 }
 
-/// Own displacement at the ports at the end of the trial: of the material point at the origin, and rotation. At a contact it is
-/// that of the velocities, θ × r without the terms of second order: by as much as the point of a rolling rim rises in the
+/// Own displacement at the ports at the end of the trial: of the material point at the origin, and rotation. At a contact it is,
+/// under a rule of first order, that of the velocities, θ × r without the terms of second order: by as much as the point of a rolling rim rises in the
 /// step, its neighbour comes down, and T·X is then the work that the wrench does on the body.
 pub(crate) fn displacement(ports: &[Port], dynamics: &Dynamics, x: &mut [f64]) {
     for port in ports {
@@ -221,7 +221,8 @@ pub(crate) fn displacement(ports: &[Port], dynamics: &Dynamics, x: &mut [f64]) {
         let arm = V3::from(port.origin) - dynamics.starts()[b].c;
         let mean = &dynamics.solution[dynamics.kkt.body_at[b]..];
         let turn = cayley_vector(&dynamics.turns[b]);
-        let turned = if port.kind == PortKind::Contact as u32 {
+        let linear = port.kind == PortKind::Contact as u32 && !dynamics.integrator.is_second_order();
+        let turned = if linear {
             turn.cross(&arm)
         } else {
             cayley_shift(&dynamics.turns[b], &arm)

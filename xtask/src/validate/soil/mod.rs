@@ -4,6 +4,7 @@ mod automaton;
 mod drive;
 mod energy;
 mod fit;
+mod grousers;
 mod moves;
 mod panel;
 mod plate_wheel;
@@ -28,7 +29,7 @@ use terraglue_soil_bekker::SoilBekker;
 use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
 
 /// The parts, in the order of the table.
-pub const PARTS: [Part; 11] = [
+pub const PARTS: [Part; 12] = [
     ("automaton", automaton::figures),
     ("cost", automaton::cost),
     ("plates", plates::figures),
@@ -38,6 +39,7 @@ pub const PARTS: [Part; 11] = [
     ("energy", energy::figures),
     ("wheels", wheels::figures),
     ("rig-scenario", rig_scenario::figures),
+    ("grousers", grousers::figures),
     ("stick", stick::figures),
     ("wong-reece", wong_reece::figures),
 ];

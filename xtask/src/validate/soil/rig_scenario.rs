@@ -84,7 +84,7 @@ impl Case {
 }
 
 /// Means of the columns from `from_s` on.
-fn means(table: &str, from_s: f64) -> Option<BTreeMap<String, f64>> {
+pub fn means(table: &str, from_s: f64) -> Option<BTreeMap<String, f64>> {
     let mut lines = table.lines();
     let names: Vec<&str> = lines.next()?.split(',').collect();
     let (mut sums, mut count) = (vec![0.0; names.len()], 0.0);

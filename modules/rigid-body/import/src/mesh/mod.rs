@@ -16,6 +16,13 @@ use std::f64::consts::PI;
 /// A hull with more corners than this is replaced by that of its farthest corners along as many directions.
 const MOST_CORNERS: usize = 200;
 
+/// A closed mesh is convex where its hull's volume differs from its own by no more than this part: what single precision
+/// makes of the corners of a convex one.
+const SAME_VOLUME: f64 = 1e-5;
+
+/// An open mesh is convex where its triangles lie on its hull, to this part of its size.
+const ON_HULL: f64 = 1e-6;
+
 /// Corners and triangles, m.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Mesh {
@@ -61,6 +68,23 @@ impl Mesh {
         let few = hull_of(&farthest(&points, MOST_CORNERS))?;
         let beyond = whole.points.iter().fold(0.0_f64, |most, p| most.max(few.beyond(p)));
         Ok((few, beyond))
+    }
+
+    /// Whether it fills its convex hull; where it is open, whether all of it lies on the hull. Corners without triangles
+    /// stand for their hull.
+    pub(crate) fn is_convex(&self) -> bool {
+        let points: Vec<Vector> = self.points.iter().map(|p| Vector::new(p[0], p[1], p[2])).collect();
+        let Ok(hull) = hull_of(&points) else { return true };
+        if self.is_closed() {
+            let whole = hull.solid().volume;
+            return (whole - self.solid().volume.abs()).abs() <= SAME_VOLUME * whole;
+        }
+        let size = self.points.iter().flatten().fold(0.0_f64, |m, c| m.max(c.abs()));
+        self.triangles.iter().all(|t| {
+            let corners = t.map(|k| self.points[k as usize]);
+            let middle = std::array::from_fn(|k| corners.iter().map(|c| c[k]).sum::<f64>() / 3.0);
+            hull.beyond(&middle) > -ON_HULL * size
+        })
     }
 
     /// How far a point lies outside a convex mesh along the normals of its faces, m; negative inside.
@@ -155,6 +179,22 @@ mod tests {
         };
         let (hull, beyond) = ball.hull().unwrap();
         assert!(hull.points.len() <= MOST_CORNERS && beyond > 1e-3 && beyond < 0.05, "{beyond}");
+    }
+
+    #[test]
+    fn a_mesh_is_convex_where_it_fills_its_hull_or_lies_on_it() {
+        let (whole, _) = brick(false).hull().unwrap();
+        assert!(whole.is_convex());
+        let open = Mesh { triangles: whole.triangles[1..].to_vec(), ..whole.clone() };
+        assert!(open.is_convex());
+        // A corner pushed in.
+        let mut dent = whole.clone();
+        dent.points.push([0.5, 1.0, 2.0]);
+        let [a, b, c] = dent.triangles[0];
+        dent.triangles.splice(0..1, [[a, b, 8], [b, c, 8], [c, a, 8]]);
+        assert!(dent.is_closed() && !dent.is_convex());
+        dent.triangles.pop();
+        assert!(!dent.is_convex());
     }
 
     #[test]

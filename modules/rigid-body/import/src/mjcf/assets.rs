@@ -21,6 +21,8 @@ pub(super) type Asset<T> = Result<T, String>;
 pub(super) struct MeshAsset {
     pub triangles: Arc<Mesh>,
     pub hull: Arc<Mesh>,
+    /// Whether it is convex.
+    pub convex: bool,
     /// What it weighs: what it encloses, or its hull where it is open.
     pub solid: Solid,
     /// What was made of it.
@@ -139,8 +141,9 @@ fn asset(mesh: Mesh) -> Asset<MeshAsset> {
     // Corners without triangles stand for their hull.
     let mesh = if mesh.triangles.is_empty() { hull.clone() } else { mesh };
     let solid = if mesh.is_closed() { mesh.solid() } else { hull.solid() };
-    let notice = hull_notice(&mesh, &hull, beyond);
-    Ok(MeshAsset { triangles: Arc::new(mesh), hull: Arc::new(hull), solid, notice })
+    let convex = mesh.is_convex();
+    let notice = hull_notice(&mesh, (&hull, beyond), convex);
+    Ok(MeshAsset { triangles: Arc::new(mesh), hull: Arc::new(hull), convex, solid, notice })
 }
 
 fn with_faces(mut mesh: Mesh, faces: &[f64]) -> Asset<Mesh> {

@@ -5,6 +5,7 @@ use super::defaults::{Defaults, Element, from_z};
 use crate::error::Error;
 use crate::mesh::Solid;
 use crate::model::{Plane, Shape, ShapeGeometry};
+use crate::shapes::drawn;
 use nalgebra::{Isometry3, Matrix3, Translation3, Unit, Vector3};
 use std::f64::consts::PI;
 
@@ -82,7 +83,7 @@ pub(super) fn geom(d: &Defaults, e: &Element, around: Around) -> Result<Geom, Er
         "mesh" => match mesh(d, e, around)? {
             Ok((geometry, said)) => {
                 notice = said.filter(|_| collides);
-                geometry
+                if collides { geometry } else { drawn(geometry) }
             }
             Err(why) if collides => return Err(d.wrong(e, why)),
             Err(why) => return Ok(Geom::Unused(format!("is only seen and is not shown: {why}"))),
@@ -105,7 +106,7 @@ pub(super) fn geom(d: &Defaults, e: &Element, around: Around) -> Result<Geom, Er
         _ => return Ok(Geom::Unused(format!("of type `{kind}` is not supported and is left out"))),
     };
     let solid = match &geometry {
-        ShapeGeometry::Hull(_) | ShapeGeometry::Triangles(_) => {
+        ShapeGeometry::Hull(_) | ShapeGeometry::Concave { .. } | ShapeGeometry::Triangles(_) => {
             let asset = around.assets.meshes.get(d.text(e, "mesh").unwrap_or_default());
             asset.and_then(|a| a.as_ref().ok()).map_or_else(nothing, |a| a.solid)
         }
@@ -118,7 +119,7 @@ pub(super) fn geom(d: &Defaults, e: &Element, around: Around) -> Result<Geom, Er
     Ok(Geom::Shape(Box::new(Weighed { shape, mass, solid, notice })))
 }
 
-/// A mesh by its name: triangles where it stands still, else its hull.
+/// A mesh by its name: triangles where it stands still, else its hull, beside its own form where it is not convex.
 fn mesh(
     d: &Defaults,
     e: &Element,
@@ -130,7 +131,13 @@ fn mesh(
         Ok(asset) if around.still => Ok((ShapeGeometry::Triangles(asset.triangles.clone()), None)),
         Ok(asset) => {
             let said = format!("with the mesh `{wanted}` {}", asset.notice);
-            Ok((ShapeGeometry::Hull(asset.hull.clone()), Some(said)))
+            let hull = asset.hull.clone();
+            let own = if asset.convex {
+                ShapeGeometry::Hull(hull)
+            } else {
+                ShapeGeometry::Concave { mesh: asset.triangles.clone(), hull }
+            };
+            Ok((own, Some(said)))
         }
         Err(why) => Err(format!("mesh {why}")),
     })
@@ -159,7 +166,10 @@ fn solid(g: &ShapeGeometry) -> Solid {
             let about = rod * (r * r / 4.0 + l * l / 3.0) + ball * (0.4 * r * r + l * l + 0.75 * l * r);
             (total, [about, about, rod * r * r / 2.0 + 0.4 * ball * r * r])
         }
-        ShapeGeometry::Hull(_) | ShapeGeometry::Triangles(_) | ShapeGeometry::Heights(_) => return nothing(),
+        ShapeGeometry::Hull(_)
+        | ShapeGeometry::Concave { .. }
+        | ShapeGeometry::Triangles(_)
+        | ShapeGeometry::Heights(_) => return nothing(),
     };
     let inertia = Matrix3::from_diagonal(&Vector3::from(moments));
     Solid { volume, centre: Vector3::zeros(), inertia }

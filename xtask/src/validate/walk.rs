@@ -4,9 +4,10 @@
 use super::parallel::in_parallel;
 use super::timing::{calibration_s, median};
 use super::{Context, Figure, Limit};
-use crate::process::{Outcome, run_scenario};
+use crate::process::{Outcome, read, root, run_scenario};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
+use terraglue_soil_law::SoilTable;
 
 const SCENARIO: &str = "scenarios/moon_walk.toml";
 const SOILS: [&str; 2] = ["soil-cellular-automaton", "soil-bekker"];
@@ -33,12 +34,15 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
         let duration = if context.quick { "7" } else { "10" };
         run(context, &format!("{soil}.{strategy}"), soil, strategy, duration, "1").summary()
     });
-    for ((soil, strategy), summary) in combinations.iter().zip(summaries) {
-        all.extend(quality(&format!("walk.{soil}.{strategy}"), &summary?));
+    let summaries = summaries.into_iter().collect::<Outcome<Vec<_>>>()?;
+    for ((soil, strategy), summary) in combinations.iter().zip(&summaries) {
+        all.extend(quality(&format!("walk.{soil}.{strategy}"), summary));
     }
     for (name, strategy) in GAITS {
         all.extend(steps_of_feet(context, name, strategy)?);
     }
+    all.extend(prints(&combinations, &summaries));
+    all.extend(rows(context)?);
     for soil in SOILS {
         all.push(same_bytes(context, soil)?);
     }
@@ -46,6 +50,74 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
         all.extend(speed(context, soil, strategy)?);
     }
     Ok(all)
+}
+
+/// Drift of the book of energies, % of the work of the motors.
+fn drift(s: &Value) -> f64 {
+    let number = |key: &str| s[key].as_f64().unwrap_or(f64::NAN);
+    100.0 * number("energy_balance_j").abs() / number("energy_j")
+}
+
+/// The mean print by the single pass against that by the iteration.
+fn prints(combinations: &[(&str, &str)], summaries: &[Value]) -> Vec<Figure> {
+    let of = |soil: &str, strategy: &str| {
+        let found = combinations.iter().position(|c| *c == (soil, strategy));
+        found.and_then(|k| summaries[k]["mean_sinkage_m"].as_f64()).unwrap_or(f64::NAN)
+    };
+    let figure = |soil: &str| {
+        let [once, iterated] = STRATEGIES.map(|strategy| of(soil, strategy));
+        let what =
+            format!("mean print by cooperative against iterative, {:.1} mm, difference in %", 1e3 * iterated);
+        let difference = 100.0 * (once / iterated - 1.0).abs();
+        Figure::new(format!("walk.{soil}.prints"), difference, Limit::AtMost(5.0), what)
+    };
+    SOILS.map(figure).into()
+}
+
+/// The walk on every row of the table that has all numbers; quickly on two. A soil that buries the robot has to say so.
+fn rows(context: &Context) -> Outcome<Vec<Figure>> {
+    let table = SoilTable::parse(&read(&root().join("models/soils.csv"))?).map_err(|e| e.to_string())?;
+    let usable = table.rows.iter().filter(|row| row.offered(&[]).is_ok()).map(|row| row.name.clone());
+    let names: Vec<String> = usable
+        .filter(|n| !context.quick || ["LETE_sand", "snow_US_Harrison"].contains(&n.as_str()))
+        .collect();
+    let cases: Vec<_> = SOILS.iter().flat_map(|soil| names.iter().map(move |name| (*soil, name))).collect();
+    let runs = in_parallel(&cases, |(soil, name)| {
+        let id = format!("rows.{soil}.{name}");
+        let options = [
+            "--duration",
+            "3",
+            "--set",
+            &format!("soil.parameters={name}"),
+            "--set",
+            &format!("soil.module={soil}"),
+        ];
+        Run { context, name: id, options: options.map(str::to_owned).into() }.summary()
+    });
+    let runs = runs.into_iter().collect::<Outcome<Vec<_>>>()?;
+    let figure = |soil: &&str| {
+        let of_soil = || cases.iter().zip(&runs).filter(|(case, _)| case.0 == *soil);
+        let (mut worst, mut at, mut weak) = (0.0, "", Vec::new());
+        for ((_, name), run) in of_soil() {
+            let reason = run["error"]["message"].as_str().unwrap_or_default();
+            if reason.contains("is buried") {
+                weak.push(name.as_str());
+                continue;
+            }
+            let now = if run["status"] == "done" { drift(run) } else { f64::NAN };
+            if now > worst || now.is_nan() {
+                (worst, at) = (now, name.as_str());
+            }
+        }
+        let what = format!(
+            "largest drift of the book of energies in 3 s of moon_walk, % of the work of the motors, {} soils; {at}; too weak for the \
+             robot, as the run says: {}",
+            of_soil().count(),
+            if weak.is_empty() { "none".to_owned() } else { weak.join(", ") }
+        );
+        Figure::new(format!("walk.rows.{soil}.drift"), worst, Limit::AtMost(1.0), what)
+    };
+    Ok(SOILS.iter().map(figure).collect())
 }
 
 fn quality(id: &str, s: &Value) -> Vec<Figure> {
@@ -66,6 +138,12 @@ fn quality(id: &str, s: &Value) -> Vec<Figure> {
     };
     vec![
         figure("distance", ratio, Limit::AtLeast(0.8), "distance walked / commanded"),
+        figure(
+            "drift",
+            drift(s),
+            Limit::AtMost(1.0),
+            "drift of the book of energies, % of the work of the motors",
+        ),
         figure("roll", degrees("max_roll_rad"), Limit::AtMost(15.0), "largest roll, degrees"),
         figure("pitch", degrees("max_pitch_rad"), Limit::AtMost(15.0), "largest pitch, degrees"),
         figure("sinkage_min", 1e3 * number("max_sinkage_m"), Limit::AtLeast(2.0), "largest sinkage, mm"),

@@ -33,7 +33,9 @@ pub(crate) fn support_points(g: &ShapeGeometry, pose: &Isometry3<f64>, n: &V3, m
                 at(sign(1) * x, sign(2) * y, sign(4) * z);
             }
         }
-        ShapeGeometry::Hull(ref mesh) | ShapeGeometry::Concave { hull: ref mesh, .. } => mesh.points.iter().for_each(|p| at(p[0], p[1], p[2])),
+        ShapeGeometry::Hull(ref mesh) | ShapeGeometry::Concave { hull: ref mesh, .. } => {
+            mesh.points.iter().for_each(|p| at(p[0], p[1], p[2]))
+        }
         // Ground has no ground below it.
         ShapeGeometry::Triangles(_) | ShapeGeometry::Heights(_) => {}
         ShapeGeometry::Cylinder { half_length, radius } => {

@@ -222,11 +222,7 @@ pub(crate) fn displacement(ports: &[Port], dynamics: &Dynamics, x: &mut [f64]) {
         let mean = &dynamics.solution[dynamics.kkt.body_at[b]..];
         let turn = cayley_vector(&dynamics.turns[b]);
         let linear = port.kind == PortKind::Contact as u32 && !dynamics.integrator.is_second_order();
-        let turned = if linear {
-            turn.cross(&arm)
-        } else {
-            cayley_shift(&dynamics.turns[b], &arm)
-        };
+        let turned = if linear { turn.cross(&arm) } else { cayley_shift(&dynamics.turns[b], &arm) };
         let shift = dynamics.h * V3::new(mean[0], mean[1], mean[2]) + turned;
         for (i, c) in port.components() {
             let d = V3::from(port.direction(c));

@@ -15,7 +15,9 @@ pub(crate) fn parry_shape(shape: &Shape) -> Option<SharedShape> {
         // parry's axis is y, ours is z: see `parry_local`.
         ShapeGeometry::Cylinder { half_length, radius } => SharedShape::cylinder(*half_length, *radius),
         ShapeGeometry::Capsule { half_length, radius } => SharedShape::capsule_y(*half_length, *radius),
-        ShapeGeometry::Hull(mesh) | ShapeGeometry::Concave { hull: mesh, .. } => SharedShape::convex_mesh(corners(mesh), &mesh.triangles)?,
+        ShapeGeometry::Hull(mesh) | ShapeGeometry::Concave { hull: mesh, .. } => {
+            SharedShape::convex_mesh(corners(mesh), &mesh.triangles)?
+        }
         ShapeGeometry::Triangles(mesh) => triangles(mesh)?,
         ShapeGeometry::Heights(heights) => height_field(heights),
     })

@@ -27,6 +27,7 @@ struct Way {
 }
 
 const SPHERE: &str = r#"<sphere radius="0.03"/>"#;
+const DISC: &str = r#"<cylinder radius="0.04" length="0.04"/>"#;
 const BOX: &str = r#"<box size="0.08 0.05 0.04"/>"#;
 const WHEEL: &str = r#"<cylinder radius="0.092" length="0.107"/>"#;
 const fn foot(name: &'static str, shape: &'static str, low: f64, travel: f64, turn: f64) -> Way {
@@ -36,11 +37,12 @@ const fn foot(name: &'static str, shape: &'static str, low: f64, travel: f64, tu
 const fn wheel(name: &'static str, roll: f64, yaw: f64) -> Way {
     Way { name, shape: WHEEL, low: 0.092, travel: 0.1, turn: 0.0, roll, yaw }
 }
-const WAYS: [Way; 11] = [
+const WAYS: [Way; 12] = [
     foot("press_sphere", SPHERE, 0.03, 0.0, 0.0),
     foot("press_box", BOX, 0.02, 0.0, 0.0),
     foot("drag_sphere", SPHERE, 0.03, 0.1, 0.0),
     foot("drag_box", BOX, 0.02, 0.1, 0.0),
+    foot("drag_disc", DISC, 0.02, 0.1, 0.0),
     foot("twist_box", BOX, 0.02, 0.0, 1.0),
     wheel("roll_braked", 0.1 * 0.5 / 0.092, 0.0),
     wheel("roll_0", 0.1 / 0.092, 0.0),
@@ -65,15 +67,20 @@ impl Case {
     }
 
     fn run(&self, context: &Context) -> Outcome<Value> {
-        let (way, id) = (&WAYS[self.way], self.id());
+        self.run_with(context, 1e-3)
+    }
+
+    /// A run in steps of `h` (s).
+    fn run_with(&self, context: &Context, h: f64) -> Outcome<Value> {
+        let (way, id) = (&WAYS[self.way], format!("{}.{h}", self.id()));
         let folder = context.scratch.join(format!("energy.{id}"));
         write(&folder.join("rig.urdf"), &way.model())?;
-        write(&folder.join("rig.toml"), &self.scenario())?;
+        write(&folder.join("rig.toml"), &self.scenario(h))?;
         let scenario = folder.join("rig.toml").display().to_string();
         run_scenario(&context.program, &id, &scenario, &folder.join("out"), &[])
     }
 
-    fn scenario(&self) -> String {
+    fn scenario(&self, h: f64) -> String {
         let Way { low, travel, turn, roll, .. } = WAYS[self.way];
         // 64.7 N on a wheel, 20 N on a foot, what weak snow carries; fork, mount and foot weigh 9.81 N
         let load = match (WAYS[self.way].shape == WHEEL, self.row.starts_with("snow")) {
@@ -85,7 +92,7 @@ impl Case {
         // k_u of snow: Wong (2008) gives A_u = 109.6 MPa/m² at 2 cm
         let stiff = if self.row.starts_with("snow") { "elastic_stiffness_pa_m = 2.2e6\n" } else { "" };
         format!(
-            "[time]\nstep_s = 0.001\nduration_s = 0.6\n[world]\ngravity_m_s2 = [0.0, 0.0, -9.81]\n\
+            "[time]\nstep_s = {h:?}\nduration_s = 0.6\n[world]\ngravity_m_s2 = [0.0, 0.0, -9.81]\n\
              [terrain]\nkind = \"flat\"\nsize_m = [0.8, 0.6]\nspacing_m = {:?}\n[gluing]\nstrategy = \"{}\"\n\
              [soil]\nmodule = \"{}\"\nparameters = \"{}\"\n{stiff}\
              [rig]\nmodule = \"rigid-body\"\nmodel = \"rig.urdf\"\nposition_m = [-0.1, 0.0013, {low:?}]\nfixed_base = true\n\
@@ -173,7 +180,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
             100.0 * drift.abs() / work
         }
     };
-    let mut all = Vec::new();
+    let mut all = dragged(context)?;
     for (k, way) in WAYS.iter().enumerate() {
         let of_way = cases.iter().zip(&runs).filter(|(case, _)| case.way == k);
         let worst = of_way.clone().max_by(|a, b| drift(a.1).total_cmp(&drift(b.1)));
@@ -185,6 +192,54 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
             run["error"].as_str().map(|e| format!(": {e}")).unwrap_or_default()
         );
         all.push(Figure::new(format!("soil.energy.{}", way.name), drift(run), Limit::AtMost(1.0), what));
+    }
+    Ok(all)
+}
+
+/// A foot dragged by the single pass against the iteration, at two steps.
+fn dragged(context: &Context) -> Outcome<Vec<Figure>> {
+    let rows = ["LETE_sand", "clayey_Thai38_K010"];
+    let ways = ["drag_sphere", "drag_disc"];
+    let steps: &[f64] = if context.quick { &[1e-3] } else { &[2e-3, 1e-3, 5e-4, 2.5e-4] };
+    let mut cases = Vec::new();
+    for name in ways {
+        let Some(way) = WAYS.iter().position(|w| w.name == name) else { continue };
+        for row in rows {
+            for strategy in ["cooperative", "iterative"] {
+                let case = || Case { way, soil: SOILS[0], strategy, row, spacing: 0.01 };
+                cases.extend(steps.iter().map(|h| (case(), *h)));
+            }
+        }
+    }
+    let runs = in_parallel(&cases, |(case, h)| case.run_with(context, *h))
+        .into_iter()
+        .collect::<Outcome<Vec<_>>>()?;
+    let mut all = Vec::new();
+    for (name, row) in ways.iter().flat_map(|w| rows.map(|r| (*w, r))) {
+        let found = |strategy: &str, h: f64, key: &str| {
+            let is = |(c, step): &&(Case, f64)| {
+                WAYS[c.way].name == name && c.row == row && c.strategy == strategy && *step == h
+            };
+            let place = cases.iter().position(|c| is(&c));
+            place.and_then(|k| runs[k][key].as_f64()).unwrap_or(f64::NAN)
+        };
+        let apart =
+            |key: &str| 100.0 * (found("cooperative", 1e-3, key) / found("iterative", 1e-3, key) - 1.0).abs();
+        let what = format!(
+            "{name} in {row}: sinkage and work of the motors by cooperative against iterative at 1 ms, %"
+        );
+        let worst = apart("max_sinkage_m").max(apart("energy_j"));
+        all.push(Figure::new(format!("soil.{name}.{row}.strategies"), worst, Limit::AtMost(5.0), what));
+        if let [h3, h2, h1, h0] = steps {
+            // Richardson's order from three steps, without a reference
+            let z = |h: &f64| found("cooperative", *h, "max_sinkage_m");
+            let order = |a: &f64, b: &f64, c: &f64| ((z(a) - z(b)) / (z(b) - z(c))).abs().log2();
+            let (coarse, fine) = (order(h3, h2, h1), order(h2, h1, h0));
+            let what = format!(
+                "{name} in {row}: order of the sinkage by cooperative in the step, 1 to 0.25 ms; {coarse:.2} from 2 ms"
+            );
+            all.push(Figure::new(format!("soil.{name}.{row}.order"), fine, Limit::AtLeast(0.9), what));
+        }
     }
     Ok(all)
 }

@@ -99,23 +99,24 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
         ));
         all.push(Figure::new(id("pull"), run.pull, Limit::None, format!("drawbar pull, N, {of}")));
     }
+    let all_slips = |quantity: &str| format!("soil.grousers.{}_slips.{quantity}", runs.len() / wheels.len());
     let each = || runs.chunks_exact(wheels.len());
     let least = |values: &mut dyn Iterator<Item = f64>| values.fold(f64::INFINITY, smaller);
     let most = |values: &mut dyn Iterator<Item = f64>| -least(&mut values.map(|v| -v));
     all.push(Figure::new(
-        "soil.grousers.pull",
+        all_slips("pull"),
         least(&mut each().map(|w| w[1].pull - w[0].pull)),
         Limit::AtLeast(0.0),
         "least gain of drawbar pull by 24 grousers of 5 mm over the smooth wheel, N",
     ));
     all.push(Figure::new(
-        "soil.grousers.sinkage",
+        all_slips("sinkage"),
         most(&mut each().map(|w| w[1].sinkage / w[2].sinkage)),
         Limit::AtMost(1.1),
         "largest depth of the tips over that of a cylinder of their radius",
     ));
     all.push(Figure::new(
-        "soil.grousers.energy",
+        all_slips("energy"),
         most(&mut each().map(|w| w[1].drift)),
         Limit::AtMost(1.0),
         "largest drift of the energy book of the wheel with grousers, % of the work of the motors",

@@ -6,6 +6,7 @@ mod energy;
 mod fit;
 mod grousers;
 mod moves;
+mod moves_picture;
 mod panel;
 mod plate_wheel;
 mod plates;
@@ -46,7 +47,9 @@ pub const PARTS: [Part; 12] = [
 
 /// Draws the pictures of docs/images.
 pub fn write_pictures() -> Outcome {
-    automaton::write_picture().and_then(|()| wheel_picture::write_picture())
+    automaton::write_picture()?;
+    moves_picture::write_picture()?;
+    wheel_picture::write_picture()
 }
 
 /// Both soils: name in the figures and how an instance is made.

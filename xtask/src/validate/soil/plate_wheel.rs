@@ -192,7 +192,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
                 at.angle.to_degrees()
             );
             all.push(Figure::new(
-                format!("soil.{name}.plate_wheel.{group}"),
+                format!("soil.{name}.plate_wheel_{:.0}mm.{group}", 1e3 * spacing),
                 worst,
                 Limit::AtMost(limit),
                 what,

@@ -171,11 +171,32 @@ pub fn admit_triples(flux: &mut [i32], middle: &[i32], ends: [&[i32]; 2]) {
     }
 }
 
-/// Takes the fluxes away over faces that stand.
+/// What may flow over a face.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Face {
+    /// Everything.
+    #[default]
+    Falls,
+    /// What lies loose; cohesion holds the rest.
+    Stands,
+    /// Nothing: a node beside it is not visited.
+    Waits,
+}
+
+/// Cuts the fluxes to what may flow over the faces, from nodes with the loose heights `from` to nodes with `to` (units). A node
+/// has four faces, and each takes a quarter of what lies loose at most.
 #[inline(always)]
-pub fn hold(flux: &mut [i32], stands: &[bool]) {
-    for (q, stands) in flux.iter_mut().zip(stands) {
-        *q &= i32::from(*stands) - 1;
+pub fn hold(flux: &mut [i32], faces: &[Face], loose: impl Fn(usize) -> [i32; 2]) {
+    for (k, (q, face)) in flux.iter_mut().zip(faces).enumerate() {
+        match face {
+            Face::Falls => {}
+            Face::Waits => *q = 0,
+            Face::Stands if *q != 0 => {
+                let [from, to] = loose(k);
+                *q = (*q).max(-(to >> 2)).min(from >> 2);
+            }
+            Face::Stands => {}
+        }
     }
 }
 

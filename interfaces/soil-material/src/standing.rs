@@ -4,6 +4,7 @@
 //! a face may lie between two nodes or be spread over several, so the height that counts is that of the run: of all faces one
 //! behind the other along a row or a column that are steeper than the angle of repose and fall to the same side.
 
+use crate::kernel::Face;
 use crate::span::Span;
 use terraglue_soil_contact::Ground;
 
@@ -14,6 +15,8 @@ const FARTHEST: i32 = 4096;
 pub struct Field<'a> {
     /// Row after row.
     pub levels: &'a [i32],
+    /// Of the bed below what lies loose, row after row.
+    pub beds: &'a [i32],
     /// Numbers from a row to the next.
     pub stride: usize,
     /// Columns on the lattice.
@@ -22,14 +25,18 @@ pub struct Field<'a> {
     pub rows: Span,
     /// Column of the first node of the window.
     pub left: usize,
+    /// Smallest Δ·tan φ_r, units.
+    pub least: f32,
+    /// What each node admits, row after row; 0: it is closed. Empty: all are open.
+    pub inlets: &'a [i32],
 }
 
 /// The faces that stand, and how the slopes at the border of a window go on outside.
 #[derive(Clone, Debug, Default)]
 pub struct Standing {
     /// By the node at whose right (upper) side the face lies; empty: nothing was looked for.
-    along: Vec<bool>,
-    across: Vec<bool>,
+    along: Vec<Face>,
+    across: Vec<Face>,
     /// Nodes beside those that are visited which a run that falls reaches, per row.
     pub wake: Vec<Span>,
     /// How much the run that touches the border falls outside, units, positive towards larger indices: at the left and right of
@@ -50,6 +57,22 @@ struct Run {
     count: usize,
 }
 
+impl Field<'_> {
+    /// Whether loose soil on the higher of two nodes would slide by a unit or two at least; `aside` leads to the nodes beside them.
+    fn sheds(&self, a: usize, b: usize, aside: usize) -> bool {
+        let h = self.levels;
+        if [a, b].iter().any(|k| self.inlets.get(*k) == Some(&0)) {
+            return false;
+        }
+        let high = if h[a] > h[b] { a } else { b };
+        let along = (f64::from(h[a]) - f64::from(h[b])).abs();
+        let slope = |k: usize| f64::from(h[k + aside]) - f64::from(h[k - aside]);
+        let steep = along.hypot(0.25 * (slope(a) + slope(b)));
+        let flux = 0.25 * (steep - f64::from(self.least)) * along / steep.max(1.0);
+        h[high] - self.beds[high] >= 8 && flux >= 2.0
+    }
+}
+
 impl Standing {
     /// Room for windows of `rows` rows with `stride` numbers each.
     pub fn with_capacity(rows: usize, stride: usize) -> Self {
@@ -65,12 +88,12 @@ impl Standing {
     }
 
     /// Whether the faces along a row stand, from place `at` on; `None`: they do not.
-    pub fn along(&self, at: usize, count: usize) -> Option<&[bool]> {
+    pub fn along(&self, at: usize, count: usize) -> Option<&[Face]> {
         self.along.get(at..at + count)
     }
 
     /// The same of the faces to the next row.
-    pub fn across(&self, at: usize, count: usize) -> Option<&[bool]> {
+    pub fn across(&self, at: usize, count: usize) -> Option<&[Face]> {
         self.across.get(at..at + count)
     }
 
@@ -108,9 +131,9 @@ impl Standing {
     /// the node is woken.
     pub fn find(&mut self, field: &Field, awake: &[Span], thr: impl Fn(usize) -> f32, critical: i32) {
         self.along.clear();
-        self.along.resize(field.levels.len(), false);
+        self.along.resize(field.levels.len(), Face::Falls);
         self.across.clear();
-        self.across.resize(field.levels.len(), false);
+        self.across.resize(field.levels.len(), Face::Falls);
         let (stride, left) = (field.stride, field.left);
         let [x, y] = [field.columns, field.rows];
         let outside = |side: usize, k: usize| self.beyond[side].get(k).copied().unwrap_or(0);
@@ -135,18 +158,21 @@ impl Standing {
         for y in rows.lo..rows.hi {
             for x in columns.lo..columns.hi {
                 let at = y * stride + x;
-                for (stands, beside) in
-                    [(&mut self.along[at], [x + 1, y]), (&mut self.across[at], [x, y + 1])]
+                for (stands, beside, aside) in
+                    [(&mut self.along[at], [x + 1, y], stride), (&mut self.across[at], [x, y + 1], 1)]
                 {
                     let [here, there] = [is_awake(x, y), is_awake(beside[0], beside[1])];
-                    if *stands || here && there || beside[0] >= columns.hi || beside[1] >= rows.hi {
+                    if here && there {
                         continue;
                     }
-                    if here || there {
+                    let before = std::mem::replace(stands, Face::Waits);
+                    let inside = beside[0] < columns.hi && beside[1] < rows.hi;
+                    let flows =
+                        before == Face::Falls || field.sheds(at, beside[1] * stride + beside[0], aside);
+                    if inside && flows && (here || there) {
                         let [x, y] = if here { beside } else { [x, y] };
                         self.wake[y] = self.wake[y].hull(Span { lo: x, hi: x + 1 });
                     }
-                    *stands = true;
                 }
             }
         }
@@ -161,7 +187,7 @@ fn mark(
     thr: &impl Fn(usize) -> f32,
     ends: [i32; 2],
     critical: i32,
-    stands: &mut [bool],
+    stands: &mut [Face],
 ) {
     let h = field.levels;
     let face = |k: usize| run.first + k * run.step;
@@ -180,7 +206,7 @@ fn mark(
     while k < faces {
         let first = fall(k);
         if first == 0 {
-            stands[face(k)] = true;
+            stands[face(k)] = Face::Stands;
             k += 1;
             continue;
         }
@@ -198,7 +224,7 @@ fn mark(
             height += if touches && (end > 0) == (first > 0) { end } else { 0 };
         }
         let holds = height.abs() <= i64::from(critical);
-        (begin..k).for_each(|k| stands[face(k)] = holds);
+        (begin..k).for_each(|k| stands[face(k)] = if holds { Face::Stands } else { Face::Falls });
     }
 }
 
@@ -207,15 +233,25 @@ mod tests {
     use super::*;
 
     /// A window of a wall of height `high` spread over `cells` faces, at the angle of repose of `thr` units a cell.
-    fn wall(high: i32, cells: i32, critical: i32) -> (Vec<bool>, Vec<bool>) {
+    fn wall(high: i32, cells: i32, critical: i32) -> (Vec<Face>, Vec<Face>) {
         let (stride, size) = (40, 40);
         let level = |x: i32| high * (x - 15).clamp(0, cells) / cells;
         let levels: Vec<i32> = (0..size).flat_map(|_| (0..stride).map(level)).collect();
         let span = Span { lo: 2, hi: 38 };
-        let field = Field { levels: &levels, stride: 40, columns: span, rows: span, left: 2 };
+        let (beds, least) = (&levels, 50.0);
+        let field = Field {
+            levels: &levels,
+            beds,
+            stride: 40,
+            columns: span,
+            rows: span,
+            left: 2,
+            least,
+            inlets: &[],
+        };
         let mut standing = Standing::default();
         standing.find(&field, &[span; 40], |_| 50.0, critical);
-        let row = standing.along(20 * 40 + 14, cells as usize + 2).map(<[bool]>::to_vec);
+        let row = standing.along(20 * 40 + 14, cells as usize + 2).map(<[Face]>::to_vec);
         (row.unwrap_or_default(), standing.across.clone())
     }
 
@@ -223,7 +259,7 @@ mod tests {
     fn a_wall_stands_up_to_the_critical_height_however_it_lies_on_the_lattice() {
         for cells in [1, 2, 3, 5] {
             // the level faces beside the wall stand
-            let falling = |high: i32| wall(high, cells, 1000).0.iter().filter(|s| !**s).count();
+            let falling = |high: i32| wall(high, cells, 1000).0.iter().filter(|s| **s == Face::Falls).count();
             assert_eq!(falling(990), 0, "{cells}");
             assert_eq!(falling(2000), cells as usize, "{cells}");
         }

@@ -270,7 +270,7 @@ impl Sweeper {
         for k in 0..self.areas.len() {
             let window = self.windows[k].get_mut().unwrap_or_else(PoisonError::into_inner);
             window.all_stands = stands;
-            if critical > 0 && !stands {
+            if critical > 0 && (!stands || window.any_loose) {
                 window.look_beyond(ground, self.limits.repose);
             }
         }

@@ -97,6 +97,10 @@ pub struct Window {
     pub largest: i32,
     /// Whether every slope stands by cohesion.
     pub all_stands: bool,
+    /// Level of the bed below what lies loose, row after row; all that of the ground where no slope can stand.
+    beds: Vec<i32>,
+    /// Whether anything lies loose.
+    pub any_loose: bool,
     /// Which slopes stand, where not all do.
     standing: Standing,
 }
@@ -108,6 +112,7 @@ impl Window {
         let spans = || Vec::with_capacity(side);
         Self {
             levels: Vec::with_capacity(side * stride),
+            beds: Vec::with_capacity(side * stride),
             inlets: Vec::with_capacity(side * stride),
             limited: Vec::with_capacity(side),
             below: Vec::with_capacity(side * side),
@@ -136,6 +141,7 @@ impl Window {
         self.copy_heights(ground);
         self.copy_thresholds(ground, by_soil);
         self.put_feet(feet);
+        self.copy_beds(ground);
         // with the load of feet at the edge
         self.repeat_borders();
     }
@@ -198,6 +204,22 @@ impl Window {
             let end = first + lattice.size[0] as i32;
             if (end as usize) < self.stride {
                 row[end.max(0) as usize..].fill(0);
+            }
+        }
+    }
+
+    /// The levels of the beds; where the lattice ends nothing lies loose.
+    fn copy_beds(&mut self, ground: &Ground) {
+        self.beds.clear();
+        self.beds.extend_from_slice(&self.levels[..self.stride * self.height]);
+        self.any_loose = false;
+        let (Some(columns), Some(rows)) = (self.columns, self.rows) else { return };
+        for y in rows.lo..rows.hi {
+            for x in columns.lo..columns.hi {
+                let [i, j] = [self.origin[0] + (x - LEFT) as i32, self.origin[1] + y as i32];
+                let loose = ground.loose_units(i, j);
+                self.beds[y * self.stride + x] -= loose;
+                self.any_loose |= loose > 0;
             }
         }
     }
@@ -338,7 +360,7 @@ impl Window {
     #[inline(always)]
     pub fn repose_pass(&mut self, limits: &Limits, apply: bool) -> i32 {
         let rows = self.rows.unwrap_or(Span::NONE);
-        if self.all_stands {
+        if self.all_stands && !self.any_loose {
             self.repose.fill(Span::NONE);
             return 0;
         }
@@ -413,15 +435,25 @@ impl Window {
             admit(&mut out[lo..hi], &self.row_inlets(y)[lo..hi], &self.row_inlets(y + 1)[lo..hi]);
         }
         if let Some(stands) = self.standing.across(y * self.stride + lo, hi - lo) {
-            hold(&mut out[lo..hi], stands);
+            let at = y * self.stride + lo;
+            hold(&mut out[lo..hi], stands, |k| [self.loose(at + k), self.loose(at + k + self.stride)]);
         }
+    }
+
+    /// What lies loose at a place, units.
+    #[inline(always)]
+    fn loose(&self, at: usize) -> i32 {
+        (self.levels[at] - self.beds[at]).max(0)
     }
 
     /// Finds the faces whose slope stands by cohesion.
     fn find_standing(&mut self, limits: &Limits) {
         let (Some(x), Some(y)) = (self.columns, self.rows) else { return };
         let thr = |at: usize| self.repose_of.get(at).copied().unwrap_or(limits.repose);
-        let field = Field { levels: &self.levels, stride: self.stride, columns: x, rows: y, left: LEFT };
+        let least = self.repose_of.iter().copied().fold(limits.least_repose, f32::min);
+        let (levels, beds, stride) = (&self.levels, &self.beds, self.stride);
+        let inlets = if self.limited.contains(&true) { &self.inlets[..] } else { &[] };
+        let field = Field { levels, beds, stride, columns: x, rows: y, left: LEFT, least, inlets };
         self.standing.find(&field, &self.repose, thr, limits.critical);
     }
 
@@ -440,7 +472,8 @@ impl Window {
             admit(&mut out[lo..hi], &inlets[lo..hi], &inlets[lo + 1..=hi]);
         }
         if let Some(stands) = self.standing.along(y * self.stride + lo, hi - lo) {
-            hold(&mut out[lo..hi], stands);
+            let at = y * self.stride + lo;
+            hold(&mut out[lo..hi], stands, |k| [self.loose(at + k), self.loose(at + k + 1)]);
         }
     }
 

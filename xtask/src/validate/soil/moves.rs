@@ -193,6 +193,7 @@ const BALANCED: [&str; 4] = ["lunar_nominal", "LETE_sand", "snow_US_Harrison", "
 
 fn balances(context: &Context) -> Outcome<Vec<Figure>> {
     let spacings: &[f64] = if context.quick { &[0.01] } else { &[0.02, 0.01, 0.005] };
+    let form = if context.quick { "" } else { "long." };
     let feet = &shapes()[..];
     let mut cases = Vec::new();
     for (script, _) in SCRIPTS.iter().enumerate() {
@@ -245,7 +246,7 @@ fn balances(context: &Context) -> Outcome<Vec<Figure>> {
             case.1,
             1e3 * case.4
         );
-        all.push(Figure::new(format!("soil.balance.{name}"), *error, Limit::AtMost(1.0), what));
+        all.push(Figure::new(format!("soil.balance.{form}{name}"), *error, Limit::AtMost(1.0), what));
         let fall = of_script().map(|(_, f)| f[1]).fold(0.0, larger);
         let what = format!("largest fall of the heat in a step while a foot is {name}, J");
         all.push(Figure::new(format!("soil.balance.{name}.heat_falls"), fall, Limit::AtMost(1e-9), what));

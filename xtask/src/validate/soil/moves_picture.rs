@@ -53,12 +53,12 @@ fn rut(degrees: f64) -> Line {
     section(&bench, 1, 0.0)
 }
 
-/// The trench of a foot of 3 cm radius under 20 N that was dragged by 16 cm, along its way.
+/// The trench of a foot of 3 cm radius under 8 N that was dragged by 16 cm, along its way.
 fn trench() -> Line {
     let mut bench = bench(LUNAR, Geometry::Sphere { radius: 0.03 }, LEVEL, -0.1);
     for k in 0..1100 {
         let ahead = if k < 300 { 0.0 } else { 2e-4 };
-        let load = 20.0 * f64::from(k.min(300)) / 300.0;
+        let load = 8.0 * f64::from(k.min(300)) / 300.0;
         bench.step(&Move { ahead: [ahead, 0.0], vertical: Vertical::Load(load), turn: [0.0; 3] });
     }
     section(&bench, 0, 0.0013)
@@ -98,7 +98,7 @@ pub fn write_picture() -> Outcome {
             vec![(rut(0.0), "#888", "wheel along its way"), (rut(15.0), "#06c", "yawed by 15°")],
         ),
         (
-            panel(1, [-0.2, -0.07], [0.2, 0.03]),
+            panel(1, [-0.2, -0.06], [0.2, 0.06]),
             "along the way (mm)",
             vec![(trench(), "#06c", "trench of a dragged sphere, dragged to the right")],
         ),

@@ -15,12 +15,17 @@ impl Patches {
         self.each_answer(p, x, |k, pressure, _, r| {
             add_force(&mut sum, self.nodes.arm[k], self.node_force(k, pressure, r.stress));
         });
-        let patch = &self.ports[p];
-        if !patch.wall.is_empty() {
-            let beside = patch.wall.wrench(&self.beside(p, x));
+        self.add_beside(p, x, &mut sum);
+        sum
+    }
+
+    /// Adds the wrench of the soil beside patch `p` on the body.
+    fn add_beside(&self, p: usize, x: &[f64; 6], sum: &mut [f64; 6]) {
+        let wall = &self.ports[p].wall;
+        if !wall.is_empty() {
+            let beside = wall.wrench(&self.beside(p, x));
             sum.iter_mut().zip(beside).for_each(|(s, b)| *s += b);
         }
-        sum
     }
 
     /// What the soil beside patch `p` answers when its foot has moved by `x`.
@@ -49,13 +54,10 @@ impl Patches {
                 strength += inclined * shear.yield_stress_kept(pressed, slip, n.mobilised[k], n.kept(k));
             }
         });
-        let patch = &self.ports[p];
-        if !patch.wall.is_empty() {
-            let beside = patch.wall.wrench(&self.beside(p, &[0.0; 6]));
-            sum.iter_mut().zip(beside).for_each(|(s, b)| *s += b);
-            // of the sides of a closed outline at most half look one way
-            strength += 0.5 * self.sides[patch.wall.sides.clone()].iter().map(|side| side.force).sum::<f64>();
-        }
+        self.add_beside(p, &[0.0; 6], &mut sum);
+        // of the sides of a closed outline at most half look one way
+        let sides = &self.sides[self.ports[p].wall.sides.clone()];
+        strength += 0.5 * sides.iter().map(|side| side.force).sum::<f64>();
         (sum, strength + bound.take(&self.laws))
     }
 

@@ -10,9 +10,7 @@ use crate::size::Size;
 use crate::wall::{self, Beside, Rows, Side, Wall};
 use crate::wheel::{self, Shift, Wheel};
 use terraglue_soil_law::strength::{Inclination, slope_factor};
-use terraglue_soil_law::{
-    Direction, PluginLaw, PressureCurve, PressureLaw, Rolling, ShearLaw, ShearState, Strength,
-};
+use terraglue_soil_law::{Direction, PluginLaw, PressureCurve, PressureLaw, Rolling, ShearLaw, ShearState};
 use terraglue_subsystem::{Node, Port, Step};
 
 /// One port's share of the arrays and what is constant during the step.
@@ -53,8 +51,10 @@ pub struct Local {
     pub shear: ShearLaw,
     /// Tension up to which soil clings, Pa.
     pub adhesion: f64,
-    /// Cohesion, friction and weight of the soil itself.
-    pub strength: Strength,
+    /// a and b of the passive stress a + b·z, Pa and Pa/m.
+    pub passive: [f64; 2],
+    /// c·cot φ of the soil itself, Pa.
+    pub cohesive: f64,
     /// What an inclined load leaves of its capacity.
     pub inclination: Inclination,
     /// Modulus of loose soil over that of the bed.
@@ -262,8 +262,10 @@ pub struct Laws {
     pub rolling: Rolling,
     /// How the direction of motion and the slope of the underside enter.
     pub direction: Direction,
-    /// Cohesion, friction and weight of the soil itself.
-    pub strength: Strength,
+    /// a and b of the passive stress a + b·z, Pa and Pa/m.
+    pub passive: [f64; 2],
+    /// c·cot φ of the soil itself, Pa.
+    pub cohesive: f64,
     /// What an inclined load leaves of its capacity.
     pub inclination: Inclination,
     /// Modulus of loose soil over that of the bed.
@@ -346,17 +348,17 @@ impl Patches {
         let found =
             || Wheel::find(&self.nodes, range.clone(), spacing, wheel::recall(&ground.wheels, port.key));
         let wheel = (port.extent[0] > 0.0 && port.extent[1] > 0.0).then(found).flatten();
-        let size = Size::of(&self.nodes, range.clone(), spacing);
-        let (local, friction) = self.local_laws(laws, wheel.as_ref(), size.b(spacing), range.clone());
+        let b = Size::of(&self.nodes, range.clone(), spacing).b(spacing);
+        let (local, friction) = self.local_laws(laws, wheel.as_ref(), b, range.clone());
         let mut wall = Wall::none(port, wall::recall(&ground.pushes, port.key));
-        self.bear(&laws[0].direction, &wall, size.b(spacing), range.clone());
+        self.bear(&laws[0].direction, &wall, b, range.clone());
         self.start(range.clone());
         if laws[0].direction.passive_pressure {
             let law = &self.laws[local.start];
             let beside = Beside {
                 lattice: ground.heights.lattice(),
                 levels: &|i, j| ground.levels(i, j),
-                passive: law.strength.passive(),
+                passive: law.passive,
                 stiffness: law.curve.unloading(),
             };
             let mut rows = std::mem::take(&mut self.rows);
@@ -416,11 +418,11 @@ impl Patches {
             if let Some(e) = inclination.filter(|_| n.before[k] > 0.0) {
                 let tau = n.shear_stress(k, law.shear.stiffness);
                 let along = (tau[0] * e[0] + tau[1] * e[1]).max(0.0);
-                let tan = along / (n.before[k] + law.strength.cohesive_pressure());
+                let tan = along / (n.before[k] + law.cohesive);
                 share *= law.inclination.factor(tan, n.depth[k], b);
             }
             let part = if direction.passive_pressure { wall.share(facing.inward()) } else { 0.0 };
-            let passive = law.strength.passive().map(|p| part * p);
+            let passive = law.passive.map(|p| part * p);
             (self.nodes.share[k], self.nodes.passive[k]) = (share, passive);
         }
     }
@@ -491,8 +493,8 @@ impl Patches {
                 None => (of.pressure.curve(b, of.elastic), of.shear.clone()),
             };
             friction = friction.max(of.shear.friction);
-            let Laws { adhesion, strength, inclination, loose, .. } = *of;
-            self.laws.push(Local { curve, shear, adhesion, strength, inclination, loose });
+            let Laws { adhesion, passive, cohesive, inclination, loose, .. } = *of;
+            self.laws.push(Local { curve, shear, adhesion, passive, cohesive, inclination, loose });
         }
         for number in &mut self.nodes.law[nodes] {
             *number = first + (present & ((1 << *number) - 1)).count_ones() as usize;

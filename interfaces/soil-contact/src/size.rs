@@ -5,8 +5,8 @@ use crate::patch::PatchNodes;
 /// Area of a contact and its second moments.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Size {
-    /// Area below the reference level, in the tangent plane, m².
-    pub area: f64,
+    /// Below the reference level, in the tangent plane, m².
+    area: f64,
     /// Mean squares of the place along t1 and t2 about their mean, and their mean product, m².
     square: [f64; 3],
 }

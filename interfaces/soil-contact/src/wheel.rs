@@ -4,7 +4,7 @@
 //! r·(n − ν) away from the lowest line, with ν the inward normal there. A flat foot, whose normals are all alike, and
 //! a sphere, which is round in both directions, do not roll.
 
-use crate::patch::{Facing, PatchNodes};
+use crate::patch::PatchNodes;
 use terraglue_soil_law::Rolling;
 
 /// Largest squared distance of nodes from the circle over their squared distance from the lowest line.
@@ -62,13 +62,13 @@ impl Wheel {
         memory: Memory,
     ) -> Option<Self> {
         let used =
-            || range.clone().filter(|k| nodes.area[*k] > 0.0 && normal(&nodes.facing[*k])[0] > LEANING);
+            || range.clone().filter(|k| nodes.area[*k] > 0.0 && nodes.facing[*k].inward()[0] > LEANING);
         // at an edge the underside is that of the nearest point, not that at the node: it makes the circle smaller
         let whole = |k: &usize| nodes.area[*k] > WHOLE * spacing * spacing;
         let least = if used().filter(whole).count() < FEW { 0.0 } else { WHOLE * spacing * spacing };
         let inner = || used().filter(move |k| nodes.area[*k] > least);
-        let found = heading(inner().map(|k| normal(&nodes.facing[k]))).and_then(|heading| {
-            let radius = radius(inner().map(|k| (nodes.arm[k], normal(&nodes.facing[k]))), heading)?;
+        let found = heading(inner().map(|k| nodes.facing[k].inward())).and_then(|heading| {
+            let radius = radius(inner().map(|k| (nodes.arm[k], nodes.facing[k].inward())), heading)?;
             Some((heading, radius))
         });
         let (heading, radius) = found.or((memory.radius > 0.0).then_some((memory.heading, memory.radius)))?;
@@ -179,11 +179,6 @@ pub struct Shift {
     pub before: f64,
 }
 
-/// Inward unit normal of the underside along n, t1, t2.
-fn normal(facing: &Facing) -> [f64; 3] {
-    facing.press.map(|c| c / facing.stretch)
-}
-
 /// Direction in which the normals turn; `None` where they are all alike or turn in both.
 fn heading(normals: impl Iterator<Item = [f64; 3]> + Clone) -> Option<[f64; 2]> {
     let (mut count, mut mean, mut square) = (0.0, [0.0; 2], [0.0; 3]);
@@ -249,6 +244,7 @@ terraglue_subsystem::persist!(Memory { key, slip, forward, radius, heading });
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::patch::Facing;
 
     const RADIUS: f64 = 0.15;
 

@@ -127,8 +127,6 @@ fn reach(sweeps: u32, parity: u32) -> usize {
     repose.max(curvature)
 }
 
-/// A critical height that no ground reaches, units (512 m).
-const HIGHEST: i32 = i32::MAX;
 /// A limit of curvature beyond which the rule rests, units per triple: higher than any ground.
 const SHARPEST: f64 = 5e8;
 /// Windows that stand ready, and the side (nodes) up to which using one allocates nothing.
@@ -163,7 +161,8 @@ impl Sweeper {
         critical: f64,
         spacing: f64,
     ) {
-        let critical = (critical / UNIT_M).min(f64::from(HIGHEST)) as i32;
+        // what no ground reaches, and infinity, becomes the largest number
+        let critical = (critical / UNIT_M) as i32;
         let straight = (curvature_max * spacing * spacing / UNIT_M).max(f64::from(critical));
         let curvature = (straight < SHARPEST).then(|| [straight as i32, 2 * straight as i32]);
         let threshold = |angle: f64| (spacing * libm::tan(angle) / UNIT_M) as f32;
@@ -210,18 +209,13 @@ impl Sweeper {
         let [nx, ny] = ground.heights.lattice().tiles();
         let still = Still::new(ground, &self.feet.list);
         let mut window = Window::default();
-        let (low, high) = ground.heights.bounds();
-        self.counts.range = [low, high];
+        self.counts.range = ground.heights.bounds().into();
         for b in (0..ny).step_by(BLOCK_TILES as usize) {
             for a in (0..nx).step_by(BLOCK_TILES as usize) {
                 let end = [(a + BLOCK_TILES).min(nx), (b + BLOCK_TILES).min(ny)];
                 let Some(area) = still.restless([a, b], end, &self.limits) else { continue };
                 window.fill(ground, &self.by_soil, &self.feet.list, area, 2);
-                window.all_stands =
-                    self.limits.critical > 0 && high.saturating_sub(low) <= self.limits.critical;
-                if self.limits.critical > 0 && !window.all_stands {
-                    window.look_beyond(ground, self.limits.repose);
-                }
+                window.look_for_standing(ground, &self.limits, self.counts.range);
                 window.wake_all();
                 pulp::Arch::new().dispatch(Look { window: &mut window, limits: &self.limits });
                 let (repose, curvature) = (&mut self.repose, &mut self.curvature);
@@ -263,16 +257,9 @@ impl Sweeper {
             let range = &mut self.counts.range;
             *range = [range[0].min(low), range[1].max(high)];
         }
-        // where all that ever slid lies within the critical height, every slope stands
-        let [low, high] = self.counts.range;
-        let critical = self.limits.critical;
-        let stands = critical > 0 && high.saturating_sub(low) <= critical;
-        for k in 0..self.areas.len() {
-            let window = self.windows[k].get_mut().unwrap_or_else(PoisonError::into_inner);
-            window.all_stands = stands;
-            if critical > 0 && (!stands || window.any_loose) {
-                window.look_beyond(ground, self.limits.repose);
-            }
+        for window in &mut self.windows[..self.areas.len()] {
+            let window = window.get_mut().unwrap_or_else(PoisonError::into_inner);
+            window.look_for_standing(ground, &self.limits, self.counts.range);
         }
         self.repose.clear();
         self.curvature.clear();

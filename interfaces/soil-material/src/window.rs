@@ -3,10 +3,12 @@
 //! It holds the awake nodes and as many around them as the sweeps of a round can reach, so that windows of one round
 //! neither see nor disturb each other and their number and shape cannot be seen in the result.
 
+mod walls;
+
 use crate::feet::{Foot, OPEN_INLET, inlet};
 use crate::kernel::{LANES, admit, admit_triples, faces_across, faces_along, hold, triples};
 use crate::span::Span;
-use crate::standing::{Field, Standing};
+use crate::standing::Standing;
 use terraglue_ground::{Lattice, TILE_EDGE};
 use terraglue_soil_contact::Ground;
 
@@ -95,12 +97,10 @@ pub struct Window {
     pub visited: u64,
     /// Largest change of the last sweep, units.
     pub largest: i32,
-    /// Whether every slope stands by cohesion.
-    pub all_stands: bool,
-    /// Level of the bed below what lies loose, row after row; all that of the ground where no slope can stand.
+    /// Whether every slope stands by cohesion, and nothing lies loose on them.
+    all_stands: bool,
+    /// Level of the bed below what lies loose, row after row, where slopes can stand.
     beds: Vec<i32>,
-    /// Whether anything lies loose.
-    pub any_loose: bool,
     /// Which slopes stand, where not all do.
     standing: Standing,
 }
@@ -141,7 +141,6 @@ impl Window {
         self.copy_heights(ground);
         self.copy_thresholds(ground, by_soil);
         self.put_feet(feet);
-        self.copy_beds(ground);
         // with the load of feet at the edge
         self.repeat_borders();
     }
@@ -204,22 +203,6 @@ impl Window {
             let end = first + lattice.size[0] as i32;
             if (end as usize) < self.stride {
                 row[end.max(0) as usize..].fill(0);
-            }
-        }
-    }
-
-    /// The levels of the beds; where the lattice ends nothing lies loose.
-    fn copy_beds(&mut self, ground: &Ground) {
-        self.beds.clear();
-        self.beds.extend_from_slice(&self.levels[..self.stride * self.height]);
-        self.any_loose = false;
-        let (Some(columns), Some(rows)) = (self.columns, self.rows) else { return };
-        for y in rows.lo..rows.hi {
-            for x in columns.lo..columns.hi {
-                let [i, j] = [self.origin[0] + (x - LEFT) as i32, self.origin[1] + y as i32];
-                let loose = ground.loose_units(i, j);
-                self.beds[y * self.stride + x] -= loose;
-                self.any_loose |= loose > 0;
             }
         }
     }
@@ -330,12 +313,6 @@ impl Window {
         rows.flatten().fold([i32::MAX, i32::MIN], |[low, high], h| [low.min(*h), high.max(*h)])
     }
 
-    /// Looks how steep slopes at the border of the window go on outside; `thr`: Δ·tan φ_r, units.
-    pub fn look_beyond(&mut self, ground: &Ground, thr: f32) {
-        let bounds = [self.width, self.height];
-        self.standing.look_beyond(ground, self.origin, bounds, thr as i32);
-    }
-
     /// Wakes the columns of a row of the lattice (first node and a bit per node) for one of the rules.
     pub fn wake(&mut self, curvature: bool, [i, j]: [i32; 2], bits: u32) {
         if bits == 0 {
@@ -360,7 +337,7 @@ impl Window {
     #[inline(always)]
     pub fn repose_pass(&mut self, limits: &Limits, apply: bool) -> i32 {
         let rows = self.rows.unwrap_or(Span::NONE);
-        if self.all_stands && !self.any_loose {
+        if self.all_stands {
             self.repose.fill(Span::NONE);
             return 0;
         }
@@ -438,23 +415,6 @@ impl Window {
             let at = y * self.stride + lo;
             hold(&mut out[lo..hi], stands, |k| [self.loose(at + k), self.loose(at + k + self.stride)]);
         }
-    }
-
-    /// What lies loose at a place, units.
-    #[inline(always)]
-    fn loose(&self, at: usize) -> i32 {
-        (self.levels[at] - self.beds[at]).max(0)
-    }
-
-    /// Finds the faces whose slope stands by cohesion.
-    fn find_standing(&mut self, limits: &Limits) {
-        let (Some(x), Some(y)) = (self.columns, self.rows) else { return };
-        let thr = |at: usize| self.repose_of.get(at).copied().unwrap_or(limits.repose);
-        let least = self.repose_of.iter().copied().fold(limits.least_repose, f32::min);
-        let (levels, beds, stride) = (&self.levels, &self.beds, self.stride);
-        let inlets = if self.limited.contains(&true) { &self.inlets[..] } else { &[] };
-        let field = Field { levels, beds, stride, columns: x, rows: y, left: LEFT, least, inlets };
-        self.standing.find(&field, &self.repose, thr, limits.critical);
     }
 
     /// Fluxes along row y over the faces on either side of the nodes of `span`.

@@ -30,6 +30,20 @@ pub struct Move {
     pub turn: [f64; 3],
 }
 
+/// Orientation of a cylinder that stands on its rim as a wheel does, its plane turned from x by `yaw` (rad).
+pub fn on_rim(yaw: f64) -> [f64; 4] {
+    let (s, c) = (0.5 * yaw).sin_cos();
+    [c, c, s, s].map(|x| x * std::f64::consts::FRAC_1_SQRT_2)
+}
+
+impl Move {
+    /// A wheel yawed by `yaw` (rad) goes on by `ahead` (m) along x under a load (N) and turns by `turn` (rad) about its axle.
+    pub fn rolling(ahead: f64, turn: f64, yaw: f64, load: f64) -> Self {
+        let turn = [-yaw.sin() * turn, yaw.cos() * turn, 0.0];
+        Self { ahead: [ahead, 0.0], vertical: Vertical::Load(load), turn }
+    }
+}
+
 /// Work and energies since the start, J.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Balance {

@@ -2,13 +2,13 @@
 //! the balance of energies, and the force that resistive force theory gives a sphere.
 
 use super::MODULES;
-use super::drive::{Balance, Drive, Move, Vertical};
+use super::drive::{Balance, Drive, Move, Vertical, on_rim};
 use super::plates::Maker;
 use super::rows::{Row, eight};
 use crate::process::Outcome;
 use crate::validate::parallel::in_parallel;
 use crate::validate::{Context, Figure, Limit};
-use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2, PI};
+use std::f64::consts::{FRAC_PI_2, PI};
 use terraglue_subsystem::Geometry;
 
 /// All figures.
@@ -25,15 +25,13 @@ fn row(name: &str) -> Outcome<Row> {
 }
 
 const LEVEL: [f64; 4] = [1.0, 0.0, 0.0, 0.0];
-/// A cylinder or capsule that lies along y.
-const LYING: [f64; 4] = [FRAC_1_SQRT_2, FRAC_1_SQRT_2, 0.0, 0.0];
 
 /// Shapes of feet and wheels, how they lie, and a load (N) that sinks them by a centimetre or two in lunar soil.
 fn shapes() -> [(&'static str, Geometry, [f64; 4], f64); 4] {
     [
         ("sphere", Geometry::Sphere { radius: 0.03 }, LEVEL, 20.0),
-        ("capsule", Geometry::Capsule { half_length: 0.03, radius: 0.02 }, LYING, 25.0),
-        ("wheel", Geometry::Cylinder { half_length: 0.0535, radius: 0.092 }, LYING, 64.7),
+        ("capsule", Geometry::Capsule { half_length: 0.03, radius: 0.02 }, on_rim(0.0), 25.0),
+        ("wheel", Geometry::Cylinder { half_length: 0.0535, radius: 0.092 }, on_rim(0.0), 64.7),
         ("box", Geometry::Box { half_extents: [0.04, 0.03, 0.03] }, LEVEL, 40.0),
     ]
 }
@@ -91,18 +89,12 @@ fn presses(context: &Context) -> Outcome<Vec<Figure>> {
 /// sinkage over the last tenth of the way, and the balance of energies.
 fn rolled(make: Maker, config: &str, yaw: f64, spacing: f64, way: f64) -> (f64, Balance) {
     const RADIUS: f64 = 0.092;
-    let (s, c) = (0.5 * yaw).sin_cos();
-    let orientation = [c, c, s, s].map(|x| x * FRAC_1_SQRT_2);
     let geometry = Geometry::Cylinder { half_length: 0.0535, radius: RADIUS };
     let soil = make(config, ((way + 0.5) / spacing) as u32 + 1, spacing);
-    let mut bench = Drive::new(soil, geometry, orientation, [-0.5 * way, 0.0013]);
+    let mut bench = Drive::new(soil, geometry, on_rim(yaw), [-0.5 * way, 0.0013]);
     let ahead = 5e-4;
     let turn = ahead * yaw.cos() / 0.8 / RADIUS;
-    let now = Move {
-        ahead: [ahead, 0.0],
-        vertical: Vertical::Load(64.7),
-        turn: [-yaw.sin() * turn, yaw.cos() * turn, 0.0],
-    };
+    let now = Move::rolling(ahead, turn, yaw, 64.7);
     let steps = (way / ahead).round() as u32;
     let (mut sum, mut count) = (0.0, 0.0);
     for k in 0..steps {

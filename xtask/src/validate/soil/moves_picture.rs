@@ -1,12 +1,11 @@
 //! `cargo xtask pictures`: sections through the rut of a wheel that runs askew, through the trench of a dragged foot, and through
 //! prints whose walls stand or slide, as an SVG file for docs/soil.md.
 
-use super::drive::{Drive, Move, Vertical};
+use super::drive::{Drive, Move, Vertical, on_rim};
 use super::panel::Panel;
 use super::plates::level;
 use super::rig::{LUNAR, Shown};
 use crate::process::{Outcome, root, write};
-use std::f64::consts::FRAC_1_SQRT_2;
 use std::fmt::Write;
 use terraglue_ground::Surface;
 use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
@@ -38,17 +37,12 @@ fn bench(config: &str, geometry: Geometry, lies: [f64; 4], x: f64) -> Drive {
 fn rut(degrees: f64) -> Line {
     const RADIUS: f64 = 0.092;
     let yaw = degrees.to_radians();
-    let (s, c) = (0.5 * yaw).sin_cos();
     let wheel = Geometry::Cylinder { half_length: 0.0535, radius: RADIUS };
-    let mut bench = bench(LUNAR, wheel, [c, c, s, s].map(|x| x * FRAC_1_SQRT_2), -0.15);
+    let mut bench = bench(LUNAR, wheel, on_rim(yaw), -0.15);
     let ahead = 5e-4;
     let turn = ahead * yaw.cos() / 0.8 / RADIUS;
     for _ in 0..640 {
-        bench.step(&Move {
-            ahead: [ahead, 0.0],
-            vertical: Vertical::Load(64.7),
-            turn: [-yaw.sin() * turn, yaw.cos() * turn, 0.0],
-        });
+        bench.step(&Move::rolling(ahead, turn, yaw, 64.7));
     }
     section(&bench, 1, 0.0)
 }

@@ -3,7 +3,7 @@
 //! from the source of the data; every other key is the default, and nothing is fitted to a wheel.
 
 use super::MODULES;
-use super::drive::{Drive, Move, Vertical};
+use super::drive::{Drive, Move, on_rim};
 use super::plates::Maker;
 use crate::process::{Outcome, read, root};
 use crate::validate::parallel::in_parallel;
@@ -80,22 +80,14 @@ fn config() -> Outcome<String> {
 
 /// The same state of the simulated wheel: means over the last fifth of the way.
 fn driven(make: Maker, config: &str, point: &Point, spacing: f64, way: f64) -> Point {
-    let (sin, cos) = (0.5 * point.angle).sin_cos();
-    let half = std::f64::consts::FRAC_1_SQRT_2;
-    // lying, then yawed
-    let orientation = [cos * half, cos * half, sin * half, sin * half];
     let geometry = Geometry::Cylinder { half_length: 0.5 * WIDTH, radius: RADIUS };
     let soil = make(config, ((way + 0.3) / spacing) as u32 + 1, spacing);
-    let mut bench = Drive::new(soil, geometry, orientation, [-0.5 * way, 0.0013]);
+    let mut bench = Drive::new(soil, geometry, on_rim(point.angle), [-0.5 * way, 0.0013]);
     let rim_per_way = if point.slip < 0.0 { 1.0 + point.slip } else { 1.0 / (1.0 - point.slip) };
     let ahead = STRIDE / rim_per_way.max(1.0);
     let (sin, cos) = point.angle.sin_cos();
     let turn = ahead * rim_per_way / RADIUS;
-    let now = Move {
-        ahead: [ahead, 0.0],
-        vertical: Vertical::Load(point.load),
-        turn: [-sin * turn, cos * turn, 0.0],
-    };
+    let now = Move::rolling(ahead, turn, point.angle, point.load);
     let steps = (way / ahead).round() as u64;
     let from = steps - steps / 5;
     let mut mean = Point { angle: point.angle, slip: point.slip, ..Point::default() };

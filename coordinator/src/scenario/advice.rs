@@ -5,7 +5,7 @@ use super::parameters::check_own_table;
 use super::source::{InputError, Source};
 use crate::gluing::{cooperative_compliant, iterative, relaxed, semi_implicit};
 use serde_json::Value;
-use terraglue_soil_law::{PressureLaw, SMALL_CONTACT, SoilExpressions, SoilParameters};
+use terraglue_soil_law::{Family, PressureLaw, SMALL_CONTACT, SoilExpressions, SoilParameters};
 use terraglue_subsystem::{Config, Schema};
 
 /// Events after the end of the run.
@@ -119,6 +119,37 @@ fn replaced_law(config: &Config, whose: &str, gravity: f64) -> Option<Vec<String
 }
 
 const STIFFNESS: &str = "elastic_stiffness_pa_m";
+
+/// Soils whose moduli were measured under another gravity than that of the scenario (m/s²), and are not scaled.
+pub fn foreign_gravity(
+    scenario: &Scenario,
+    spec: &SubsystemSpec,
+    config: &Config,
+    gravity: f64,
+) -> Vec<String> {
+    let own = std::iter::once((String::new(), Some(config.clone())));
+    let regions = spec.regions.iter().map(|region| {
+        let merged = SoilParameters::of_region(config, &region.numbers).ok();
+        (format!(" of label {} ({})", region.label, region.soil), merged)
+    });
+    let said = own.chain(regions).filter_map(|(whose, config)| {
+        let soil = SoilParameters::from_config(&config?, gravity).ok()?;
+        let measured = soil.measured_gravity.filter(|g| (g - gravity).abs() > SAME_GRAVITY * gravity)?;
+        let own_law = spec.parameters.contains_key("law");
+        (soil.family == Family::Bekker && soil.k_phi > 0.0 && !soil.gravity_scaling && !own_law).then(|| {
+            format!(
+                "`k_phi`{whose} was measured under {measured} m/s², the scenario has {gravity:.4}: soil of this weight bears \
+                 {:.2} of it; `gravity_scaling = true` scales it (Reece 1965)",
+                gravity / measured
+            )
+        })
+    });
+    said.map(|message| line_of(&scenario.source.error_at_value(&[&spec.name, "parameters"], message, None)))
+        .collect()
+}
+
+/// Relative difference of gravities from which on they are different ones.
+const SAME_GRAVITY: f64 = 0.01;
 
 /// Names of one's own in `[SOIL.law.parameters]` that no text of the law uses, or that stand for a number of the soil.
 pub fn law_parameters(schema: &Schema, spec: &SubsystemSpec, source: &Source) -> Vec<String> {

@@ -78,6 +78,9 @@ pub fn toml(fit: &SoilFit, source: &str) -> String {
         let known = format!("95 %: {}", ends(p.interval, digits));
         text += &format!("{} = {}  # {}; {known}\n", p.name, digits(p.value), p.help);
     }
+    if fit.law == "bekker" {
+        text += &measured_gravity();
+    }
     if fit.law == "bearing" {
         text += &format!("reference_depth_m = {}\n", digits(super::REFERENCE_DEPTH));
     }
@@ -88,6 +91,12 @@ pub fn toml(fit: &SoilFit, source: &str) -> String {
         }
     }
     text
+}
+
+/// Under which gravity the moduli of Bekker's law hold.
+pub(super) fn measured_gravity() -> String {
+    let g = digits(super::LABORATORY_GRAVITY);
+    format!("measured_gravity_m_s2 = {g}  # of the tests; k_phi stands for the weight of the soil\n")
 }
 
 fn others(known: &Known) -> [(&'static str, Option<f64>, &'static str); 4] {

@@ -1,7 +1,7 @@
 //! A soil fitted to a wheel, as a soil file for scenarios and as JSON.
 
 use super::wheel::{WheelFit, WheelPoint};
-use super::written::{digits, ends, number_json};
+use super::written::{digits, ends, measured_gravity, number_json};
 use serde_json::{Value, json as value};
 
 /// The table of a soil, for `parameters = "soil.toml"`. `source` says where the numbers come from.
@@ -19,6 +19,7 @@ pub fn wheel_toml(fit: &WheelFit, seen: &[WheelPoint], source: &str) -> String {
         text +=
             &format!("{} = {}  # {}; 95 %: {}\n", n.key, digits(n.value), n.help, ends(n.interval, digits));
     }
+    text += &measured_gravity();
     for (key, number, what) in fit.others() {
         match number {
             Some(x) => text += &format!("{key} = {}\n", digits(x)),

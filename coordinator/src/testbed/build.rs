@@ -205,7 +205,8 @@ fn instantiate(
         let gravity = services.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
         let replaced = scenario::advice::replaced_laws(scenario, spec, &config, gravity);
         let doubts = scenario::plausible::soil(scenario, spec, module.schema(), &config);
-        replaced.iter().chain(&doubts).for_each(|advice| log::warn!("{advice}"));
+        let foreign = scenario::advice::foreign_gravity(scenario, spec, &config, gravity);
+        replaced.iter().chain(&doubts).chain(&foreign).for_each(|advice| log::warn!("{advice}"));
         let advice = scenario::advice::law_parameters(module.schema(), spec, &scenario.source);
         advice.iter().for_each(|advice| log::warn!("{advice}"));
         let config = with_law(config, &search, scenario, spec)?;

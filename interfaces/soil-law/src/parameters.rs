@@ -35,6 +35,10 @@ pub struct SoilParameters {
     pub elastic_stiffness_pa_m: Option<f64>,
     /// Acceleration of gravity, m/s²: makes a weight of the density.
     pub gravity: f64,
+    /// Gravity under which the moduli of Bekker's law were measured, m/s²; `None`: not known.
+    pub measured_gravity: Option<f64>,
+    /// Whether k_φ, which stands for the weight of the soil, is scaled from there to `gravity`.
+    pub gravity_scaling: bool,
     /// Angle of friction and adhesive strength between feet and soil, rad and Pa, where they are not those of the soil.
     pub interface: [Option<f64>; 2],
     /// Tension with which soil clings to a foot that lifts off, Pa; 0: it never pulls.
@@ -132,6 +136,8 @@ impl Default for SoilParameters {
             density_kg_m3: None,
             elastic_stiffness_pa_m: None,
             gravity: 1.62,
+            measured_gravity: Some(1.62),
+            gravity_scaling: false,
             interface: [None; 2],
             adhesion_pa: 0.0,
             rolling: Rolling::default(),
@@ -173,6 +179,19 @@ impl SoilParameters {
             )
             .positive()
             .optional(),
+            number(
+                "measured_gravity_m_s2",
+                "m/s^2",
+                "bekker: acceleration of gravity under which k_phi was measured",
+            )
+            .positive()
+            .optional(),
+            Parameter::of(
+                "gravity_scaling",
+                ParameterType::Bool,
+                "bekker: scale k_phi, which stands for the weight of the soil, from measured_gravity_m_s2 to the gravity of the scenario (Reece 1965)",
+            )
+            .or(false),
             number(
                 "interface_phi_rad",
                 "rad",
@@ -222,6 +241,7 @@ impl SoilParameters {
             .map_err(|e| Error::Refused(format!("the soil's table cannot be read again: {e}")))?;
         // what a region does not know is not known of its soil
         all.remove("density_kg_m3");
+        all.remove("measured_gravity_m_s2");
         all.extend(numbers.iter().map(|(key, value)| (key.clone(), value.clone())));
         Config::parse(&serde_json::Value::Object(all).to_string())
     }
@@ -241,6 +261,8 @@ impl SoilParameters {
             density_kg_m3: number("density_kg_m3")?,
             elastic_stiffness_pa_m: number("elastic_stiffness_pa_m")?,
             gravity,
+            measured_gravity: number("measured_gravity_m_s2")?,
+            gravity_scaling: config.get("gravity_scaling").is_some() && config.flag("gravity_scaling")?,
             interface: [number("interface_phi_rad")?, number("interface_c_pa")?],
             adhesion_pa: number("adhesion_pa")?.unwrap_or(0.0),
             rolling: Rolling::from_config(config)?,
@@ -268,6 +290,10 @@ impl SoilParameters {
                 return Err(Error::Refused(format!("`{name}` = {value} must not be negative")));
             }
         }
+        if self.gravity_scaling && self.family == Family::Bekker && self.measured_gravity.is_none() {
+            let text = "`gravity_scaling` needs `measured_gravity_m_s2`: the gravity under which `k_phi` was measured";
+            return Err(Error::Refused(text.into()));
+        }
         let modulus = self.pressure().curve(0.1, STIFF).virgin(0.01);
         if modulus.is_finite() && modulus > 0.0 {
             return Ok(());
@@ -280,11 +306,28 @@ impl SoilParameters {
         }))
     }
 
+    /// Factor of k_φ for the gravity of the scenario: g over that of the measurement where `gravity_scaling` is set.
+    ///
+    /// The frictional part of the resistance grows with the unit weight of the soil and the cohesive one does not: (c k_c' +
+    /// γ b k_φ')(z/b)ⁿ (Reece 1965). With it the sinkage of a body of given mass hardly depends on gravity, as Kobayashi et
+    /// al. (2010, J. Terramechanics 47, 261) measured with wheels in aircraft.
+    pub fn gravity_factor(&self) -> f64 {
+        match self.measured_gravity {
+            Some(measured) if self.gravity_scaling && self.family == Family::Bekker => {
+                self.gravity / measured
+            }
+            _ => 1.0,
+        }
+    }
+
     /// The pressure law.
     pub fn pressure(&self) -> PressureLaw {
         let weight = self.density_kg_m3.unwrap_or(0.0) * self.gravity;
         match self.family {
-            Family::Bekker => PressureLaw::Bekker { k_c: self.k_c, k_phi: self.k_phi, n: self.n },
+            Family::Bekker => {
+                let k_phi = self.k_phi * self.gravity_factor();
+                PressureLaw::Bekker { k_c: self.k_c, k_phi, n: self.n }
+            }
             Family::Reece { k_c, k_phi } => {
                 PressureLaw::Reece { cohesive: self.c_pa * k_c, frictional: weight * k_phi, n: self.n }
             }
@@ -389,6 +432,8 @@ terraglue_subsystem::persist!(SoilParameters {
     density_kg_m3,
     elastic_stiffness_pa_m,
     gravity,
+    measured_gravity,
+    gravity_scaling,
     interface,
     adhesion_pa,
     rolling,

@@ -1,11 +1,20 @@
 //! The table of soils, `models/soils.csv`, read from its text: named rows, and rows refused with a reason.
 
 /// Columns with numbers, which are also the keys that a scenario can override.
-pub const COLUMNS: [&str; 8] =
-    ["n", "k_c", "k_phi", "c_pa", "phi_rad", "K_m", "density_kg_m3", "elastic_stiffness_pa_m"];
+pub const COLUMNS: [&str; 9] = [
+    "n",
+    "k_c",
+    "k_phi",
+    "c_pa",
+    "phi_rad",
+    "K_m",
+    "density_kg_m3",
+    "elastic_stiffness_pa_m",
+    "measured_gravity_m_s2",
+];
 
 /// Columns that a usable row may leave empty, and a table leave out but the first.
-const OPTIONAL: [&str; 2] = ["density_kg_m3", "elastic_stiffness_pa_m"];
+const OPTIONAL: [&str; 3] = ["density_kg_m3", "elastic_stiffness_pa_m", "measured_gravity_m_s2"];
 
 /// What is wrong with a table or a name.
 #[derive(Clone, Debug, PartialEq)]
@@ -135,7 +144,7 @@ impl Columns {
         };
         let mut numbers = [None; COLUMNS.len()];
         for (place, name) in numbers.iter_mut().zip(COLUMNS) {
-            *place = if name == OPTIONAL[1] { at(name).ok() } else { Some(at(name)?) };
+            *place = if OPTIONAL[1..].contains(&name) { at(name).ok() } else { Some(at(name)?) };
         }
         let [name, source, refused] = [at("name")?, at("source")?, at("refused")?];
         let confidence = header.iter().position(|h| *h == "confidence");

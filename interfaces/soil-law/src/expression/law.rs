@@ -237,7 +237,7 @@ fn known_symbols(p: &SoilParameters) -> Vec<Symbol> {
     let mut known = vec![
         Symbol::fixed("n", "", p.n),
         Symbol::fixed("k_c", "N/m^(n+1)", p.k_c),
-        Symbol::fixed("k_phi", "N/m^(n+2)", p.k_phi),
+        Symbol::fixed("k_phi", "N/m^(n+2)", p.k_phi * p.gravity_factor()),
         Symbol::fixed("c", "Pa", p.c_pa),
         Symbol::fixed("phi", "rad", p.phi_rad),
         Symbol::fixed("K", "m", p.K_m),

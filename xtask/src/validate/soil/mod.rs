@@ -22,10 +22,12 @@ mod wheels;
 mod wong_reece;
 
 pub use automaton::print_hash;
+pub use moves::press_sphere;
 
 use super::Part;
 use crate::process::Outcome;
-use plates::{Maker, level};
+pub use plates::Maker;
+use plates::level;
 use terraglue_soil_bekker::SoilBekker;
 use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
 
@@ -53,7 +55,7 @@ pub fn write_pictures() -> Outcome {
 }
 
 /// Both soils: name in the figures and how an instance is made.
-const MODULES: [(&str, Maker); 2] =
+pub const MODULES: [(&str, Maker); 2] =
     [("automaton", level::<SoilCellularAutomaton>), ("bekker", level::<SoilBekker>)];
 
 /// Keys of the automaton for material that stays where it is pressed, as integrals of stresses assume: all becomes denser in

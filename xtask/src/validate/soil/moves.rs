@@ -260,9 +260,24 @@ fn plate(beta: f64) -> f64 {
     at(beta) / at(0.0)
 }
 
+/// Radius of the sphere, that of a foot of the walking robot, m.
+const RADIUS: f64 = 0.03;
+
+/// Presses the sphere straight down into lunar soil and calls `each` with its depth (m) and the force on it (N) every
+/// 0.1 mm down to 3 cm.
+pub fn press_sphere(make: Maker, spacing: f64, mut each: impl FnMut(f64, f64)) -> Outcome {
+    let soil = make(&row("lunar_nominal")?.own, (0.4 / spacing) as u32 + 1, spacing);
+    let mut bench = Drive::new(soil, Geometry::Sphere { radius: RADIUS }, LEVEL, [0.0011, 0.0007]);
+    for k in 1..=300 {
+        let down = Move { ahead: [0.0; 2], vertical: Vertical::Up(-1e-4), turn: [0.0; 3] };
+        let [force, _] = bench.step(&down);
+        each(1e-4 * f64::from(k), force[2]);
+    }
+    Ok(())
+}
+
 /// A sphere in soil whose pressure grows with the depth (n = 1), against resistive force theory.
 fn resistive_force(context: &Context) -> Outcome<Vec<Figure>> {
-    const RADIUS: f64 = 0.03;
     let soil = row("lunar_nominal")?;
     let depths = [0.005, 0.01, 0.015, 0.02, 0.025, 0.03];
     let theory = |z: f64| {
@@ -279,22 +294,12 @@ fn resistive_force(context: &Context) -> Outcome<Vec<Figure>> {
     let spacing = if context.quick { 0.005 } else { 0.0025 };
     let mut all = Vec::new();
     for (name, make) in MODULES {
-        let size = (0.4 / spacing) as u32 + 1;
-        let mut bench = Drive::new(
-            make(&soil.own, size, spacing),
-            Geometry::Sphere { radius: RADIUS },
-            LEVEL,
-            [0.0011, 0.0007],
-        );
         let mut worst = 0.0;
-        for k in 1..=300 {
-            let [force, _] =
-                bench.step(&Move { ahead: [0.0; 2], vertical: Vertical::Up(-1e-4), turn: [0.0; 3] });
-            let z = 1e-4 * f64::from(k);
+        press_sphere(make, spacing, |z, force| {
             if depths.iter().any(|d| (d - z).abs() < 1e-9) {
-                worst = larger(worst, 100.0 * (force[2] / theory(z) - 1.0).abs());
+                worst = larger(worst, 100.0 * (force / theory(z) - 1.0).abs());
             }
-        }
+        })?;
         let what = "largest error of the force on a sphere of 3 cm pressed 5 to 30 mm deep into lunar soil, %, against resistive force \
                     theory (Li et al. 2013)";
         all.push(Figure::new(format!("soil.{name}.sphere.rft"), worst, Limit::AtMost(15.0), what));

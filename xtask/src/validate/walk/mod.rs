@@ -1,6 +1,8 @@
 //! Area `walk`: `scenarios/moon_walk.toml` with both soils and both strategies, run as a user runs it; and what its gait
 //! does to the feet.
 
+mod prints;
+
 use super::parallel::in_parallel;
 use super::timing::{calibration_s, median};
 use super::{Context, Figure, Limit};
@@ -42,6 +44,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
         all.extend(steps_of_feet(context, name, strategy)?);
     }
     all.extend(prints(&combinations, &summaries));
+    all.extend(prints::figures(context, &summaries[0])?);
     all.extend(rows(context)?);
     for soil in SOILS {
         all.push(same_bytes(context, soil)?);
@@ -199,36 +202,38 @@ struct Feet {
 impl Feet {
     /// From the variables of every step.
     fn read(path: &Path) -> Outcome<Self> {
-        let failed = |e: csv::Error| format!("{}: {e}", path.display());
-        let mut reader = csv::Reader::from_path(path).map_err(failed)?;
-        let columns: Vec<usize> = reader
-            .headers()
-            .map_err(failed)?
-            .iter()
-            .enumerate()
-            .filter(|(_, name)| name.starts_with("robot.") && name.ends_with("4.contact_normal"))
-            .map(|(k, _)| k)
-            .collect();
-        if columns.is_empty() {
-            return Err(format!("{}: no force on any foot", path.display()));
-        }
+        let wanted = |name: &str| name.starts_with("robot.") && name.ends_with("4.contact_normal");
+        let forces = columns(path, wanted)?;
         let mut feet = Self::default();
-        for row in reader.records() {
-            let row = row.map_err(failed)?;
-            let mut sum = 0.0;
-            for column in &columns {
-                let force: f64 = row.get(*column).and_then(|x| x.parse().ok()).unwrap_or(f64::NAN);
-                if !force.is_finite() {
-                    return Err(format!("{}: a force is no number", path.display()));
-                }
-                feet.peak = feet.peak.max(force);
-                sum += force;
-            }
+        for step in 0..forces[0].1.len() {
+            let of_step = || forces.iter().map(|(_, column)| column[step]);
+            let sum: f64 = of_step().sum();
+            feet.peak = of_step().fold(feet.peak, f64::max);
             feet.airborne += usize::from(sum <= 0.0);
             feet.peak_sum = feet.peak_sum.max(sum);
         }
         Ok(feet)
     }
+}
+
+/// Names and values of the wanted columns of a table of variables, in their order; at least one.
+fn columns(path: &Path, wanted: impl Fn(&str) -> bool) -> Outcome<Vec<(String, Vec<f64>)>> {
+    let failed = |e: csv::Error| format!("{}: {e}", path.display());
+    let mut reader = csv::Reader::from_path(path).map_err(failed)?;
+    let headers = reader.headers().map_err(failed)?.iter().enumerate();
+    let (places, mut all): (Vec<usize>, Vec<_>) =
+        headers.filter(|(_, name)| wanted(name)).map(|(k, name)| (k, (name.to_owned(), Vec::new()))).unzip();
+    if all.is_empty() {
+        return Err(format!("{}: none of the wanted columns", path.display()));
+    }
+    for row in reader.records() {
+        let row = row.map_err(failed)?;
+        for (place, (name, values)) in places.iter().zip(&mut all) {
+            let value = row.get(*place).and_then(|x| x.parse().ok()).filter(|x: &f64| x.is_finite());
+            values.push(value.ok_or_else(|| format!("{}: `{name}` is no number", path.display()))?);
+        }
+    }
+    Ok(all)
 }
 
 /// The same run with one and with two threads, and once more: recordings equal byte for byte.

@@ -12,11 +12,13 @@ mod parallel;
 mod plugins;
 mod rigid_body;
 mod soil;
+mod table;
 mod timing;
 mod walk;
 
 pub use figure::{Figure, Limit};
 pub use soil::{print_hash as print_soil_hash, write_pictures as write_soil_pictures};
+pub use table::columns;
 
 use crate::process::{Outcome, cargo, must, program, root};
 use known::KnownFailures;

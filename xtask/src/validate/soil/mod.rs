@@ -4,6 +4,7 @@ mod automaton;
 mod drive;
 mod energy;
 mod fit;
+mod found_wheels;
 mod grousers;
 mod moves;
 mod moves_picture;
@@ -32,7 +33,7 @@ use terraglue_soil_bekker::SoilBekker;
 use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
 
 /// The parts, in the order of the table.
-pub const PARTS: [Part; 12] = [
+pub const PARTS: [Part; 13] = [
     ("automaton", automaton::figures),
     ("cost", automaton::cost),
     ("plates", plates::figures),
@@ -42,6 +43,7 @@ pub const PARTS: [Part; 12] = [
     ("energy", energy::figures),
     ("wheels", wheels::figures),
     ("rig-scenario", rig_scenario::figures),
+    ("found-wheels", found_wheels::figures),
     ("grousers", grousers::figures),
     ("stick", stick::figures),
     ("wong-reece", wong_reece::figures),

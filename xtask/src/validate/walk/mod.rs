@@ -5,7 +5,7 @@ mod prints;
 
 use super::parallel::in_parallel;
 use super::timing::{calibration_s, median};
-use super::{Context, Figure, Limit};
+use super::{Context, Figure, Limit, columns};
 use crate::process::{Outcome, read, root, run_scenario};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
@@ -214,26 +214,6 @@ impl Feet {
         }
         Ok(feet)
     }
-}
-
-/// Names and values of the wanted columns of a table of variables, in their order; at least one.
-fn columns(path: &Path, wanted: impl Fn(&str) -> bool) -> Outcome<Vec<(String, Vec<f64>)>> {
-    let failed = |e: csv::Error| format!("{}: {e}", path.display());
-    let mut reader = csv::Reader::from_path(path).map_err(failed)?;
-    let headers = reader.headers().map_err(failed)?.iter().enumerate();
-    let (places, mut all): (Vec<usize>, Vec<_>) =
-        headers.filter(|(_, name)| wanted(name)).map(|(k, name)| (k, (name.to_owned(), Vec::new()))).unzip();
-    if all.is_empty() {
-        return Err(format!("{}: none of the wanted columns", path.display()));
-    }
-    for row in reader.records() {
-        let row = row.map_err(failed)?;
-        for (place, (name, values)) in places.iter().zip(&mut all) {
-            let value = row.get(*place).and_then(|x| x.parse().ok()).filter(|x: &f64| x.is_finite());
-            values.push(value.ok_or_else(|| format!("{}: `{name}` is no number", path.display()))?);
-        }
-    }
-    Ok(all)
 }
 
 /// The same run with one and with two threads, and once more: recordings equal byte for byte.

@@ -1,10 +1,10 @@
 //! Prints of feet: their depth in a slow gait against the law of a foot that is pressed straight down, and by the step.
 
-use super::{Figure, Limit, Run, SOILS, columns};
+use super::{Figure, Limit, Run, SOILS};
 use crate::process::Outcome;
-use crate::validate::Context;
 use crate::validate::parallel::in_parallel;
 use crate::validate::soil::{MODULES, press_sphere};
+use crate::validate::{Context, columns};
 use serde_json::Value;
 use std::path::Path;
 

@@ -9,13 +9,22 @@ use terraglue_soil_law::ShearResponse;
 pub type Stiffness = [[f64; 6]; 6];
 
 impl Patches {
-    /// Wrench on the body (n, t1, t2, mn, mt1, mt2) when the foot of patch `p` has moved by `x`.
-    pub fn wrench(&self, p: usize, x: &[f64; 6]) -> [f64; 6] {
+    /// Wrench of the laws on the body (n, t1, t2, mn, mt1, mt2) when the foot of patch `p` has moved by `x`.
+    pub fn law_wrench(&self, p: usize, x: &[f64; 6]) -> [f64; 6] {
         let mut sum = [0.0; 6];
         self.each_answer(p, x, |k, pressure, _, r| {
             add_force(&mut sum, self.nodes.arm[k], self.node_force(k, pressure, r.stress));
         });
         self.add_beside(p, x, &mut sum);
+        sum
+    }
+
+    /// The same with the inertia of the soil that moves with the foot.
+    pub fn wrench(&self, p: usize, x: &[f64; 6]) -> [f64; 6] {
+        let mut sum = self.law_wrench(p, x);
+        if let Some(cone) = &self.ports[p].cone {
+            cone.add_to(x, &mut sum);
+        }
         sum
     }
 
@@ -88,6 +97,9 @@ impl Patches {
             for (row, values) in sum.iter_mut().zip(&block) {
                 row.iter_mut().zip(values).for_each(|(s, v)| *s += v);
             }
+        }
+        if let Some(cone) = &self.ports[p].cone {
+            cone.stiffen(x, self.law_wrench(p, x)[0], &mut sum);
         }
         sum
     }

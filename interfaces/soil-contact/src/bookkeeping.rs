@@ -5,7 +5,7 @@ use crate::contacts::Touch;
 use crate::ground::{Covered, Ground};
 use crate::nodes::NodeState;
 use crate::patch::{Patch, PatchNodes, Patches};
-use crate::{wall, wheel};
+use crate::{cone, wall, wheel};
 use terraglue_soil_law::{KeptNodes, PressureCurve, ShearResponse, ShearState};
 use terraglue_subsystem::{MOST_LAW_STATE, Port};
 
@@ -19,6 +19,8 @@ pub struct Book {
     pub stamp: u64,
     /// Elastic energy of the loaded nodes and of the soil beside the feet, J.
     pub elastic: f64,
+    /// Kinetic energy of the soil that moves with the feet, J.
+    pub kinetic: f64,
     /// Gravitational energy that the material has gained since the start, J.
     pub lifted: f64,
     /// Heat since the start, J.
@@ -132,7 +134,7 @@ impl Scene<'_> {
         book: &mut Book,
     ) {
         book.stamp += 1;
-        (book.elastic, book.loaded, book.fewest) = (0.0, 0, 0);
+        (book.elastic, book.kinetic, book.loaded, book.fewest) = (0.0, 0.0, 0, 0);
         std::mem::swap(&mut lists.loaded, &mut lists.previous);
         lists.loaded.clear();
         lists.slid_in.clear();
@@ -146,6 +148,9 @@ impl Scene<'_> {
             self.ask_together(p, &x, &mut lists.answers);
             let loaded = self.commit_patch(patch, port, &x, ground, lists, book, &mut touch);
             lists.touching.push(loaded > 0);
+            if loaded > 0 {
+                self.carry_cone(p, &x, ground, book);
+            }
             if loaded > 0 && ground.contacts.any() {
                 touch.under(patch, &wrench, &x, self.h);
                 ground.contacts.tell(port.key, &touch);
@@ -160,6 +165,7 @@ impl Scene<'_> {
         let touching =
             |key| ports.iter().zip(&lists.touching).any(|(port, touches)| *touches && port.key == key);
         book.dissipated += wall::release(&mut ground.pushes, touching);
+        book.dissipated += cone::release(&mut ground.cones, touching);
     }
 
     /// Pressures and shear of all nodes of patch `p` where its law answers many nodes at a time.
@@ -243,6 +249,16 @@ impl Scene<'_> {
         });
         carry_slip(ground, lists, first, entry, book.stamp);
         loaded
+    }
+
+    /// The soil that moves with the foot of patch `p`: its work, heat and kinetic energy.
+    fn carry_cone(&self, p: usize, x: &[f64; 6], ground: &mut Ground, book: &mut Book) {
+        let Some(cone) = &self.patches.ports[p].cone else { return };
+        let (work, after) = cone.worked(x, self.patches.law_wrench(p, x)[0]);
+        book.port_work += work;
+        book.dissipated += work - (after.energy() - cone.before.energy());
+        book.kinetic += after.energy();
+        cone::remember(&mut ground.cones, after);
     }
 
     /// The soil beside a foot: how far it was pushed, its work, heat and elastic energy.
@@ -550,6 +566,7 @@ fn release(ground: &mut Ground, lists: &mut Lists, stamp: u64) -> f64 {
 terraglue_subsystem::persist!(Book {
     stamp,
     elastic,
+    kinetic,
     lifted,
     dissipated,
     owed,

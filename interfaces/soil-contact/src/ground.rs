@@ -1,5 +1,6 @@
 //! The ground of a soil: heights of its material and what it remembers at each node.
 
+use crate::cone::Carried;
 use crate::contacts::Contacts;
 use crate::law_memory::LawMemory;
 use crate::mask::Mask;
@@ -44,6 +45,8 @@ pub struct Ground {
     pub wheels: Vec<Memory>,
     /// How far contacts have pushed the soil beside them.
     pub pushes: Vec<Push>,
+    /// Soil that moves with contacts.
+    pub cones: Vec<Carried>,
     /// What is told of the contacts.
     pub contacts: Contacts,
     /// Which soil lies where.
@@ -62,6 +65,7 @@ impl Ground {
             nodes,
             wheels: Vec::with_capacity(WHEELS),
             pushes: Vec::with_capacity(WHEELS),
+            cones: Vec::with_capacity(WHEELS),
             contacts: Contacts::default(),
             mask: Mask::default(),
             law_memory: LawMemory::default(),

@@ -15,6 +15,7 @@ mod bookkeeping;
 mod bound;
 mod chunk;
 mod compatibility;
+mod cone;
 mod contacts;
 mod ground;
 mod law_memory;

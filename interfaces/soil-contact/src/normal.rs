@@ -161,6 +161,12 @@ impl Patches {
             let (n, facing) = (&self.nodes, &self.nodes.facing[k]);
             sum += node_stiffness(facing, n.area[k], slope, r)[0][0];
         });
+        if let Some(cone) = &self.ports[p].cone {
+            let mut all = [[0.0; 6]; 6];
+            all[0][0] = sum;
+            cone.stiffen(x, self.law_wrench(p, x)[0], &mut all);
+            sum = all[0][0];
+        }
         sum
     }
 }

@@ -4,6 +4,7 @@
 //! the allocator.
 
 use crate::assemble::dot;
+use crate::cone::{self, Cone};
 use crate::ground::Ground;
 use crate::normal::Clinging;
 use crate::size::Size;
@@ -40,6 +41,8 @@ pub struct Patch {
     pub pull: f64,
     /// Its sides in the soil.
     pub wall: Wall,
+    /// The soil that moves with it.
+    pub cone: Option<Cone>,
 }
 
 /// The laws of one soil under one contact.
@@ -268,6 +271,8 @@ pub struct Laws {
     pub cohesive: f64,
     /// What an inclined load leaves of its capacity.
     pub inclination: Inclination,
+    /// The soil that moves with a foot.
+    pub cone: cone::Material,
     /// Modulus of loose soil over that of the bed.
     pub loose: f64,
     /// The module behind one or both of them.
@@ -326,7 +331,7 @@ impl Patches {
         self.laws.clear();
         self.sides.clear();
         for port in step.ports {
-            let patch = self.read_port(port, port.nodes(step.nodes), ground, laws);
+            let patch = self.read_port(port, step, ground, laws);
             self.ports.push(patch);
         }
         self.share_nodes(step);
@@ -336,10 +341,10 @@ impl Patches {
         self.built_for = Some(key);
     }
 
-    fn read_port(&mut self, port: &Port, nodes: &[Node], ground: &Ground, laws: &[Laws]) -> Patch {
+    fn read_port(&mut self, port: &Port, step: &Step, ground: &Ground, laws: &[Laws]) -> Patch {
         let first = self.nodes.index.len();
         let n_z = port.frame[2];
-        for node in nodes {
+        for node in port.nodes(step.nodes) {
             self.read_node(port, node, ground, laws);
         }
         let range = first..self.nodes.index.len();
@@ -389,6 +394,11 @@ impl Patches {
                 self.shift_peak(wheel, &shift, range.clone());
             }
         }
+        // under a rim the soil flows by
+        let cone = wheel.is_none().then(|| {
+            let before = cone::recall(&ground.cones, port.key);
+            Cone::under(&laws[0].cone, &self.nodes, range.clone(), before, step.h)
+        });
         let mut place = [None; 6];
         port.components().for_each(|(i, c)| place[c] = Some(i));
         Patch {
@@ -404,6 +414,7 @@ impl Patches {
             friction,
             pull: 0.0,
             wall,
+            cone: cone.flatten(),
         }
     }
 

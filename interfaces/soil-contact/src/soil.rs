@@ -2,6 +2,7 @@
 
 use crate::bookkeeping::{self, Book, Lists};
 use crate::compatibility::Compatibility;
+use crate::cone;
 use crate::contacts::Contacts;
 use crate::ground::{Covered, Ground};
 use crate::law_memory::LawMemory;
@@ -13,7 +14,7 @@ use crate::values;
 use std::sync::Arc;
 use terraglue_soil_law::strength::Inclination;
 use terraglue_soil_law::{
-    DEEPEST_TESTED, PluginLaw, PressureLaw, SlipSinkage, SoilExpressions, SoilParameters,
+    DEEPEST_TESTED, DEFAULT_DENSITY, PluginLaw, PressureLaw, SlipSinkage, SoilExpressions, SoilParameters,
 };
 use terraglue_subsystem::bytes::{self, Persist};
 use terraglue_subsystem::{
@@ -234,6 +235,10 @@ fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>, plugin: Option<&
         rolling: p.rolling,
         direction: p.direction,
         passive: p.strength().passive(),
+        cone: cone::Material {
+            density: p.added_mass * p.density_kg_m3.unwrap_or(DEFAULT_DENSITY),
+            slope: p.strength().passive_coefficient().sqrt(),
+        },
         cohesive: p.strength().cohesive_pressure(),
         inclination: Inclination::new(p.phi_rad),
         loose: p.strength().loose_share(),
@@ -484,6 +489,7 @@ impl<M: Material> Subsystem for FieldSoil<M> {
 
     fn energy(&self) -> Energy {
         Energy {
+            kinetic: self.book.kinetic,
             potential: self.book.elastic + self.book.lifted,
             dissipated: self.book.dissipated,
             port_work: self.book.port_work,

@@ -1,6 +1,7 @@
 //! Exact copies of the committed state: in numbered slots, and as bytes.
 
 use crate::bookkeeping::Book;
+use crate::cone::Carried;
 use crate::contacts::Contacts;
 use crate::ground::Ground;
 use crate::law_memory::LawMemorySnapshot;
@@ -13,7 +14,7 @@ use terraglue_subsystem::bytes::{self, Persist};
 use terraglue_subsystem::{Error, Result};
 
 /// Version of the bytes.
-const VERSION: u32 = 3;
+const VERSION: u32 = 4;
 
 /// One saved state; `S` is the material's own.
 #[derive(Debug, Default)]
@@ -22,6 +23,7 @@ pub struct Slot<S> {
     nodes: NodesSnapshot,
     wheels: Vec<Memory>,
     pushes: Vec<Push>,
+    cones: Vec<Carried>,
     contacts: Contacts,
     law_memory: LawMemorySnapshot,
     loaded: Vec<[i32; 2]>,
@@ -33,8 +35,9 @@ pub struct Slot<S> {
 
 impl<S: Persist> Persist for Slot<S> {
     fn write(&self, out: &mut Vec<u8>) {
-        let Self { heights, nodes, wheels, pushes, contacts, law_memory, .. } = self;
-        (heights.write(out), nodes.write(out), wheels.write(out), pushes.write(out), contacts.write(out));
+        let Self { heights, nodes, wheels, pushes, cones, contacts, law_memory, .. } = self;
+        (heights.write(out), nodes.write(out), wheels.write(out), pushes.write(out));
+        (cones.write(out), contacts.write(out));
         let Self { loaded, book, parameters, material, .. } = self;
         law_memory.write(out);
         (loaded.write(out), book.write(out), parameters.write(out), material.write(out));
@@ -45,6 +48,7 @@ impl<S: Persist> Persist for Slot<S> {
             nodes: Persist::read(from)?,
             wheels: Persist::read(from)?,
             pushes: Persist::read(from)?,
+            cones: Persist::read(from)?,
             contacts: Persist::read(from)?,
             law_memory: Persist::read(from)?,
             loaded: Persist::read(from)?,
@@ -87,6 +91,7 @@ impl<S> Slot<S> {
         state.ground.law_memory.save(&mut self.law_memory);
         self.wheels.clone_from(&state.ground.wheels);
         self.pushes.clone_from(&state.ground.pushes);
+        self.cones.clone_from(&state.ground.cones);
         self.contacts.clone_from(&state.ground.contacts);
         self.loaded.clone_from(state.loaded);
         self.book = *state.book;
@@ -105,6 +110,7 @@ impl<S> Slot<S> {
         state.ground.law_memory.restore(&self.law_memory);
         state.ground.wheels.clone_from(&self.wheels);
         state.ground.pushes.clone_from(&self.pushes);
+        state.ground.cones.clone_from(&self.cones);
         state.ground.contacts.clone_from(&self.contacts);
         state.loaded.clone_from(&self.loaded);
         *state.book = self.book;

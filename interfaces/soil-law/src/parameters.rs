@@ -43,6 +43,8 @@ pub struct SoilParameters {
     pub interface: [Option<f64>; 2],
     /// Tension with which soil clings to a foot that lifts off, Pa; 0: it never pulls.
     pub adhesion_pa: f64,
+    /// Part of the mass of the cone of soil under a foot that moves with it; 0: soil has no inertia.
+    pub added_mass: f64,
     /// What concerns wheels alone.
     pub rolling: Rolling,
     /// How the direction of motion and the slope of the underside enter.
@@ -140,6 +142,7 @@ impl Default for SoilParameters {
             gravity_scaling: false,
             interface: [None; 2],
             adhesion_pa: 0.0,
+            added_mass: 0.0,
             rolling: Rolling::default(),
             direction: Direction::default(),
         }
@@ -213,6 +216,13 @@ impl SoilParameters {
             )
             .within(0.0, 1e7)
             .optional(),
+            number(
+                "added_mass",
+                "",
+                "part of the mass of the cone of soil under a foot that moves with it and resists by its inertia (Aguilar and Goldman 2016); 0: none",
+            )
+            .or(0.0)
+            .within(0.0, 10.0),
         ];
         parameters.push(
             Parameter::of(
@@ -265,6 +275,7 @@ impl SoilParameters {
             gravity_scaling: config.get("gravity_scaling").is_some() && config.flag("gravity_scaling")?,
             interface: [number("interface_phi_rad")?, number("interface_c_pa")?],
             adhesion_pa: number("adhesion_pa")?.unwrap_or(0.0),
+            added_mass: number("added_mass")?.unwrap_or(0.0),
             rolling: Rolling::from_config(config)?,
             direction: Direction::from_config(config)?,
         };
@@ -436,6 +447,7 @@ terraglue_subsystem::persist!(SoilParameters {
     gravity_scaling,
     interface,
     adhesion_pa,
+    added_mass,
     rolling,
     direction,
 });

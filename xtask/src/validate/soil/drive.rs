@@ -217,7 +217,7 @@ impl Drive {
         let b = &mut self.balance;
         b.work += work;
         b.path += work.abs();
-        b.error = b.error.max((e.dissipated + e.potential - b.work).abs());
+        b.error = b.error.max((e.dissipated + e.potential + e.kinetic - b.work).abs());
         b.fall = b.fall.max(b.heat - e.dissipated);
         b.heat = e.dissipated;
     }

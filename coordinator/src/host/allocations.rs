@@ -92,7 +92,7 @@ pub struct AllocationCounter(());
 impl AllocationCounter {
     /// Of a library that is loaded; None: it cannot be found in memory, or its format is another one.
     pub fn new(library: &Path) -> Option<Self> {
-        let bytes = std::fs::read(library).ok()?;
+        let bytes = terraglue_subsystem::files::read(library).ok()?;
         for (place, name) in [(&NEW, c"_Znwm"), (&NEW_ARRAY, c"_Znam")] {
             // SAFETY: looks a name up among what the whole process sees.
             let found = unsafe { libc::dlsym(libc::RTLD_DEFAULT, name.as_ptr()) };

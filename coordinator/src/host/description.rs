@@ -30,7 +30,7 @@ pub struct Description {
 impl Description {
     /// From a file; None: unreadable, no such section, or not of our form.
     pub fn read(path: &Path) -> Option<Self> {
-        Self::of(&std::fs::read(path).ok()?)
+        Self::of(&terraglue_subsystem::files::read(path).ok()?)
     }
 
     /// From the bytes of a library.

@@ -212,7 +212,7 @@ fn inspect(path: &Path) -> std::result::Result<(), LoadError> {
     if python::is_python(path) {
         return PythonFile::read(path).map(drop);
     }
-    let bytes = std::fs::read(path)
+    let bytes = terraglue_subsystem::files::read(path)
         .map_err(|e| LoadError::NotALibrary { path: path_buf(), reason: e.to_string() })?;
     if !is_elf(&bytes) {
         let reason = if bytes.is_empty() { "the file is empty" } else { "it has no ELF header" };

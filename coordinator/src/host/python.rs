@@ -25,7 +25,7 @@ pub(crate) fn is_python(path: &Path) -> bool {
 
 /// Whether a file of Python describes a module, well or badly.
 pub(crate) fn describes_module(path: &Path) -> bool {
-    is_python(path) && std::fs::read_to_string(path).is_ok_and(|text| block(&text).is_some())
+    is_python(path) && terraglue_subsystem::files::read_text(path).is_ok_and(|text| block(&text).is_some())
 }
 
 /// The interpreter for modules: the one that is named (relative to `folder` where it has a `/`), else that of the virtual
@@ -45,7 +45,7 @@ pub(crate) fn interpreter(named: Option<&str>, folder: &Path) -> PathBuf {
 impl PythonFile {
     /// Reads the description; no line of the file runs.
     pub fn read(path: &Path) -> Result<Self, LoadError> {
-        let text = std::fs::read_to_string(path)
+        let text = terraglue_subsystem::files::read_text(path)
             .map_err(|e| LoadError::CannotLoad { path: path.into(), reason: e.to_string() })?;
         parse(&text).map_err(|message| LoadError::Schema { path: path.into(), message })
     }

@@ -25,8 +25,11 @@ pub(crate) fn fingerprints(scenario: &Scenario) -> String {
         | TerrainKind::Geotiff { file, .. },
     ) = scenario.terrain.as_ref().map(|t| &t.kind)
     {
-        lines
-            .extend(std::fs::read(scenario.folder.join(file)).ok().map(|bytes| line("terrain.file", &bytes)));
+        lines.extend(
+            terraglue_subsystem::files::read(&scenario.folder.join(file))
+                .ok()
+                .map(|bytes| line("terrain.file", &bytes)),
+        );
     }
     lines.join("\n")
 }
@@ -39,7 +42,7 @@ fn files(folder: &Path, key: &str, value: &Value, lines: &mut Vec<String>) {
     match value {
         Value::String(text) if !text.is_empty() => {
             let path = folder.join(text);
-            let bytes = path.is_file().then(|| std::fs::read(&path).ok()).flatten();
+            let bytes = path.is_file().then(|| terraglue_subsystem::files::read(&path).ok()).flatten();
             lines.extend(bytes.map(|bytes| line(key, &bytes)));
         }
         Value::Array(items) => items.iter().for_each(|item| files(folder, key, item, lines)),

@@ -20,7 +20,7 @@ use std::path::Path;
 /// [`Error::Input`](crate::Error::Input) when the file is empty or no MCAP recording; it is left as it is.
 pub fn mend(folder: &Path) -> Result<bool> {
     let path = folder.join(RECORDING);
-    let bytes = std::fs::read(&path).map_err(at(&path))?;
+    let bytes = terraglue_subsystem::files::read(&path).map_err(at(&path))?;
     let Some(mut records) = Records::new(&bytes) else {
         let what = if bytes.is_empty() { "is empty" } else { "is not an MCAP recording" };
         let help = Some("the file was left as it is".into());

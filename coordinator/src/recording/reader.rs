@@ -153,7 +153,7 @@ impl Recording {
     /// Reads `recording.mcap` of a results folder.
     pub fn open(folder: &Path) -> Result<Self> {
         let path = folder.join(RECORDING);
-        let bytes = std::fs::read(&path).map_err(at(&path))?;
+        let bytes = terraglue_subsystem::files::read(&path).map_err(at(&path))?;
         Self::read(&bytes).ok_or_else(|| Error::File {
             path: path.display().to_string(),
             source: std::io::Error::new(std::io::ErrorKind::InvalidData, "is not an MCAP recording"),

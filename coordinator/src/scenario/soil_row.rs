@@ -31,7 +31,8 @@ pub fn gives(parameter: &str) -> bool {
 /// # Errors
 /// What is wrong with the file, with its path.
 pub fn read_soil_table(path: &Path) -> Result<SoilTable, String> {
-    let text = std::fs::read_to_string(path).map_err(|e| format!("cannot read {}: {e}", path.display()))?;
+    let text = terraglue_subsystem::files::read_text(path)
+        .map_err(|e| format!("cannot read {}: {e}", path.display()))?;
     SoilTable::parse(&text).map_err(|e| format!("{}: {e}", path.display()))
 }
 
@@ -90,7 +91,8 @@ pub fn numbers(
 /// The table `[soil]` of a soil file, as `terraglue fit-soil` writes it.
 fn own_file(path: &Path) -> Result<Map<String, Value>, (String, Option<String>)> {
     let said = |what: String| (format!("{}: {what}", path.display()), None);
-    let text = std::fs::read_to_string(path).map_err(|e| said(format!("cannot read it: {e}")))?;
+    let text =
+        terraglue_subsystem::files::read_text(path).map_err(|e| said(format!("cannot read it: {e}")))?;
     let document: toml_edit::DocumentMut = text.parse().map_err(|e| said(format!("{e}")))?;
     let table = document.get("soil").and_then(|t| t.as_table_like()).ok_or_else(|| {
         let help = Some("`terraglue fit-soil` writes such files".to_owned());

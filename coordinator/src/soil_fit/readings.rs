@@ -52,7 +52,7 @@ const MEASURED: [&str; 4] = ["sinkage_", "pressure_", "force_", "time_"];
 /// # Errors
 /// What is wrong, with file and line.
 pub fn read(path: &Path, from: f64) -> Result<PlateTests, Box<InputError>> {
-    let text = std::fs::read_to_string(path)
+    let text = terraglue_subsystem::files::read_text(path)
         .map_err(|e| InputError::plain(format!("cannot read {}: {e}", path.display()), None))?;
     parse(&text, from)
         .map_err(|(message, help)| InputError::plain(format!("{}: {message}", path.display()), help))

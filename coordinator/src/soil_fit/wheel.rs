@@ -81,7 +81,7 @@ const ROLLS: f64 = -0.01;
 /// # Errors
 /// What is wrong, with file and line.
 pub fn read_wheel(path: &Path, wheel: &Wheel) -> Result<WheelTests, Box<InputError>> {
-    let text = std::fs::read_to_string(path)
+    let text = terraglue_subsystem::files::read_text(path)
         .map_err(|e| InputError::plain(format!("cannot read {}: {e}", path.display()), None))?;
     parse(&text, wheel)
         .map_err(|(message, help)| InputError::plain(format!("{}: {message}", path.display()), help))

@@ -11,7 +11,7 @@ use std::path::Path;
 /// [`Error::File`] when it cannot be read; [`Error::Input`] with file and line when it is not a whole grid, or
 /// has missing data and no `fill`.
 pub fn read_esri_ascii(path: &Path, fill: Option<f64>) -> Result<Raster> {
-    let text = std::fs::read_to_string(path).map_err(|e| unreadable(path, e))?;
+    let text = terraglue_subsystem::files::read_large_text(path).map_err(|e| unreadable(path, e))?;
     let file = File { path, text: &text };
     let (header, first_line) = read_header(&file)?;
     let mut heights = Vec::with_capacity(header.count());

@@ -56,7 +56,8 @@ impl Archive {
         if !meta.is_file() {
             return Err(fail("is not a file".into()));
         }
-        let mut file = File::open(path).map_err(|e| fail(format!("cannot be read: {e}")))?;
+        let mut file =
+            terraglue_subsystem::files::open(path).map_err(|e| fail(format!("cannot be read: {e}")))?;
         let stated = stated_entries(&mut file).map_err(|e| fail(format!("cannot be read: {e}")))?;
         if let Some(n) = stated.filter(|n| *n > limits.entries as u64) {
             return Err(fail(format!("has {n} entries; {} are accepted", limits.entries)));

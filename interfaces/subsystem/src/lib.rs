@@ -29,6 +29,7 @@ pub mod cooperation;
 mod energy;
 mod error;
 mod field;
+pub mod files;
 mod host;
 mod node_law;
 mod port;

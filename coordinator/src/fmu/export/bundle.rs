@@ -100,7 +100,8 @@ struct Bundle<'a> {
 impl Bundle<'_> {
     /// Copies a file that the scenario names; its path in the resources.
     fn take(&self, from: &Path, to: String) -> Result<String> {
-        let bytes = std::fs::read(from).map_err(|e| plain(format!("{}: {e}", from.display())))?;
+        let bytes =
+            terraglue_subsystem::files::read(from).map_err(|e| plain(format!("{}: {e}", from.display())))?;
         place(self.resources, &to, &bytes).map_err(plain)?;
         Ok(to)
     }
@@ -229,7 +230,7 @@ impl Bundle<'_> {
 
 /// What a robot file names by `filename="…"` or `file="…"`: meshes and other files beside it.
 fn named_files(path: &Path) -> Vec<String> {
-    let Ok(text) = std::fs::read_to_string(path) else { return Vec::new() };
+    let Ok(text) = terraglue_subsystem::files::read_text(path) else { return Vec::new() };
     let mut all: Vec<String> = ["filename=\"", "file=\""]
         .iter()
         .flat_map(|key| text.split(key).skip(1).filter_map(|rest| rest.split('"').next()))
@@ -254,7 +255,7 @@ fn token(resources: &Path, request: &Request) -> Result<String> {
     feed(format!("{:?} {}", request.version, request.scalars).as_bytes());
     for file in &files {
         feed(file.strip_prefix(resources).unwrap_or(file).to_string_lossy().as_bytes());
-        feed(&std::fs::read(file).map_err(|e| plain(format!("{}: {e}", file.display())))?);
+        feed(&terraglue_subsystem::files::read(file).map_err(|e| plain(format!("{}: {e}", file.display())))?);
     }
     let [a, b] = hashes;
     let part = |shift: u32, mask: u64| (a >> shift) & mask;
@@ -325,7 +326,8 @@ fn entries(
     files.sort();
     for file in files {
         let name = file.strip_prefix(resources).unwrap_or(&file).to_string_lossy().into_owned();
-        let bytes = std::fs::read(&file).map_err(|e| plain(format!("{}: {e}", file.display())))?;
+        let bytes =
+            terraglue_subsystem::files::read(&file).map_err(|e| plain(format!("{}: {e}", file.display())))?;
         all.push((format!("resources/{name}"), Content::Bytes(bytes)));
     }
     Ok(all)

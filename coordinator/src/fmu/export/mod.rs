@@ -70,7 +70,8 @@ impl Unit {
 /// What is missing or wrong in the resources, in words.
 pub fn open(opening: &Opening) -> Result<Opened, String> {
     let path = opening.resources.join(UNIT);
-    let text = std::fs::read_to_string(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let text =
+        terraglue_subsystem::files::read_text(&path).map_err(|e| format!("{}: {e}", path.display()))?;
     let unit: Unit = serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))?;
     let whole = instance(opening, &unit).map_err(|e| e.to_string())?;
     let subsystem = whole.map_err(|e| e.to_string())?;

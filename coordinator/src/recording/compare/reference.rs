@@ -59,7 +59,7 @@ pub(super) fn open(path: &Path) -> Result<Recording> {
     if path.is_dir() {
         return Recording::open(path);
     }
-    let bytes = std::fs::read(path).map_err(at(path))?;
+    let bytes = terraglue_subsystem::files::read(path).map_err(at(path))?;
     Recording::read(&bytes).ok_or_else(|| Error::File {
         path: path.display().to_string(),
         source: std::io::Error::new(std::io::ErrorKind::InvalidData, "is not an MCAP recording"),

@@ -58,7 +58,7 @@ impl Options {
 /// Reads a file of either format, which the root of its text tells.
 pub fn read_robot(path: &Path, options: &Options) -> Result<Robot, Error> {
     let file = path.display().to_string();
-    let text = std::fs::read_to_string(path)
+    let text = terraglue_subsystem::files::read_text(path)
         .map_err(|e| Error::Read { file: file.clone(), reason: e.to_string() })?;
     syntax::check_depth(&Source { file: &file, text: &text })?;
     // URDF may hold an element <mujoco>, too, for MuJoCo's own reader. What is no XML its reader complains of.

@@ -68,7 +68,7 @@ impl Folders {
 /// Whether a folder is the package: by the name in its `package.xml`, else by its own.
 fn is_package(folder: &Path, name: &str) -> bool {
     let own = folder.file_name().is_some_and(|f| f == name);
-    match std::fs::read_to_string(folder.join("package.xml")) {
+    match terraglue_subsystem::files::read_text(&folder.join("package.xml")) {
         Ok(text) => own || named(&text).as_deref() == Some(name),
         Err(_) => own,
     }

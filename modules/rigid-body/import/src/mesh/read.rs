@@ -15,7 +15,7 @@ pub(crate) struct Loaded {
 /// Reads all triangles of a file.
 pub(crate) fn load(path: &Path) -> Result<Loaded, String> {
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
-    let bytes = || std::fs::read(path).map_err(|e| e.to_string());
+    let bytes = || terraglue_subsystem::files::read(path).map_err(|e| e.to_string());
     match ending.as_str() {
         "stl" | "obj" => Ok(Loaded { mesh: by_loader(path, &ending, &bytes()?)?, remark: None }),
         "dae" => {

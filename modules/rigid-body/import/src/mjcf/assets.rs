@@ -193,7 +193,7 @@ impl Files {
                            \"terrain\" do it, or write elevation = \"…\"";
             return Err(at(way_out.into()));
         }
-        let bytes = std::fs::read(&path).map_err(|e| at(e.to_string()))?;
+        let bytes = terraglue_subsystem::files::read(&path).map_err(|e| at(e.to_string()))?;
         let words: Vec<[u8; 4]> = bytes.chunks_exact(4).map(|c| [c[0], c[1], c[2], c[3]]).collect();
         let [rows, columns, rest @ ..] = words.as_slice() else {
             return Err(at("it is shorter than its head".into()));

@@ -78,7 +78,7 @@ impl Whole {
             return Err(wrong(format!("`{name}` is included twice; a file may be included once")));
         }
         known.push(path.clone());
-        let read = std::fs::read_to_string(&path);
+        let read = terraglue_subsystem::files::read_text(&path);
         let text = read.map_err(|e| wrong(format!("{} cannot be read: {e}", path.display())))?;
         let file = path.display().to_string();
         let document = parse(&file, &text)?;

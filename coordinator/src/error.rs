@@ -49,6 +49,18 @@ pub enum Error {
         /// What happened.
         message: String,
     },
+    /// There is no room for a file of the run (exit code 1).
+    #[error("{path}: {source}; {free} are free there; the run is kept up to t = {kept_s} s")]
+    Full {
+        /// Path as the user knows it.
+        path: String,
+        /// Room on its disk.
+        free: String,
+        /// Simulated time up to which all was written, s.
+        kept_s: f64,
+        /// What the system said.
+        source: std::io::Error,
+    },
     /// A file could not be read or written (exit code 1).
     #[error("{path}: {source}")]
     File {
@@ -57,6 +69,30 @@ pub enum Error {
         /// Why.
         source: std::io::Error,
     },
+}
+
+impl Error {
+    /// The way out, where there is one that fits every cause.
+    pub fn help(&self) -> Option<&'static str> {
+        use std::io::ErrorKind::{FileTooLarge, NotFound, PermissionDenied};
+        match self {
+            Self::Full { source, .. } if source.kind() == FileTooLarge => {
+                Some("raise the limit of the shell (ulimit -f), or record less often: recording.every_steps")
+            }
+            Self::Full { .. } => Some(
+                "free some room, name a folder elsewhere with --out, or record less often: recording.every_steps",
+            ),
+            Self::File { source, .. } => Some(match source.kind() {
+                NotFound => "look whether the path is right",
+                PermissionDenied => "look at the permissions of the file and of its folder",
+                _ => "look at the file and at its folder, or name another one",
+            }),
+            Self::Module { .. } => {
+                Some("`terraglue check-module` puts a module to the test, `isolate = true` keeps it apart")
+            }
+            _ => None,
+        }
+    }
 }
 
 /// Result with the coordinator's error.

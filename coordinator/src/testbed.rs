@@ -10,7 +10,7 @@ use crate::gluing::step_control::StepControl;
 use crate::gluing::{self, Instant, Outcome, StepReport};
 use crate::host::{Instance, Partings, Reply};
 use crate::observer::{Happening, Observer, SubsystemView, View, book_of};
-use crate::signals::{Directory, Faults, Links, TimeLine};
+use crate::signals::{Directory, Faults, Link, Links, TimeLine};
 use crate::timing::{Part, Timings};
 use crate::{Error, Result};
 use serde_json::Value;
@@ -144,6 +144,11 @@ impl Testbed {
     /// All instances in the order of their names.
     pub fn instances(&self) -> &[Instance] {
         &self.instances
+    }
+
+    /// Number of variables that are fed by another one.
+    pub fn connections(&self) -> usize {
+        self.links.numbers.iter().map(Link::len).sum::<usize>() + self.links.discrete.len()
     }
 
     /// How the last step was glued.

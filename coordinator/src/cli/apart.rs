@@ -1,7 +1,8 @@
 //! `terraglue fmu run --isolate`: the same command in a process of its own.
 
+use super::Exit;
 use super::arguments::FmuRunArguments;
-use super::{Exit, interrupt};
+use super::interrupt::Interrupt;
 use rustix::process::{Signal, set_parent_process_death_signal};
 use std::os::unix::process::CommandExt;
 use std::path::Path;
@@ -54,7 +55,9 @@ pub fn reached(row: &str) {
 pub fn run(arguments: &FmuRunArguments) -> Result<Exit> {
     let failed =
         |what: &dyn std::fmt::Display| Error::from(InputError::plain(format!("isolation: {what}"), None));
-    let stopped = interrupt::cancel_flag();
+    let interrupt = Interrupt::listen();
+    interrupt.run();
+    let stopped = interrupt.flag();
     let folder = Folder::new("worker").map_err(|e| failed(&e))?;
     let own = std::env::current_exe().map_err(|e| failed(&e))?;
     let words = std::env::args_os().skip(1).filter(|word| word != "--isolate");

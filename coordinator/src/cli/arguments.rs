@@ -110,7 +110,7 @@ pub struct RunArguments {
     #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub duration: Option<String>,
     /// Threads for the loops inside modules; 0: one per core. Results do not depend on it.
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, value_parser = thread_count, allow_negative_numbers = true)]
     pub threads: usize,
     /// Also write variables.csv.
     #[arg(long)]
@@ -214,7 +214,7 @@ pub struct CheckModuleArguments {
     #[arg(long, value_name = "FILE")]
     pub junit: Option<PathBuf>,
     /// Processes at a time [default: one per core].
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", value_parser = process_count, allow_negative_numbers = true)]
     pub jobs: Option<std::num::NonZeroUsize>,
     /// Time that a test may take, s.
     #[arg(long, value_name = "S", default_value_t = 30.0, value_parser = super::check_module::seconds)]
@@ -357,6 +357,19 @@ impl RunArguments {
         let duration = self.duration.iter().map(|s| ("time.duration_s".to_owned(), s.clone()));
         self.scenario.sets.iter().cloned().chain(duration).collect()
     }
+}
+
+/// Most threads or processes that can be asked for.
+const MOST_THREADS: usize = 1024;
+
+fn thread_count(text: &str) -> Result<usize, String> {
+    let number = text.parse().ok().filter(|n| *n <= MOST_THREADS);
+    number.ok_or_else(|| format!("a whole number from 0 (one per core) to {MOST_THREADS} is wanted"))
+}
+
+fn process_count(text: &str) -> Result<std::num::NonZeroUsize, String> {
+    let number = text.parse().ok().filter(|n: &std::num::NonZeroUsize| n.get() <= MOST_THREADS);
+    number.ok_or_else(|| format!("a whole number from 1 to {MOST_THREADS} is wanted"))
 }
 
 fn parse_set(text: &str) -> Result<(String, String), String> {

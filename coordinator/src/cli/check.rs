@@ -27,7 +27,7 @@ pub fn check(arguments: &ScenarioArguments) -> Result<Exit> {
     outln!(
         "{} is good: {} connections, {} events, {} s in steps of {} s, gluing `{}`",
         arguments.scenario.display(),
-        scenario.connections.len(),
+        testbed.connections(),
         scenario.events.len(),
         scenario.time.duration_s,
         scenario.time.step_s,

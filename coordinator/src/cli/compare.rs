@@ -4,9 +4,10 @@ mod plan;
 
 use super::arguments::{CompareArguments, RunArguments};
 use super::folder::results_folder;
+use super::interrupt::Interrupt;
 use super::output::outln;
 use super::progress::{self, Progress};
-use super::{Exit, interrupt, run};
+use super::{Exit, run};
 use indicatif::ProgressBar;
 use plan::Plan;
 use std::path::{Path, PathBuf};
@@ -20,10 +21,12 @@ use terraglue::{Error, Result};
 
 /// Runs all combinations and writes the comparison.
 pub fn compare(arguments: &CompareArguments) -> Result<Exit> {
-    let cancel = interrupt::cancel_flag();
+    let interrupt = Interrupt::listen();
+    let cancel = interrupt.flag();
     let mut plans = plan::plan(arguments)?;
     plan::refuse(&mut plans, &arguments.run, &cancel)?;
     let name = plans.first().map_or_else(String::new, |p| p.scenario.name.clone());
+    interrupt.run();
     let folder = results_folder(arguments.run.out.as_deref(), &name)?;
     for plan in &mut plans {
         let step = if plan.name_step { format!("_{}s", plan.scenario.time.step_s) } else { String::new() };

@@ -1,9 +1,10 @@
 //! `terraglue fmu run | info | check`: one functional mock-up unit.
 
 use super::arguments::{FmuCommand, FmuRunArguments};
+use super::interrupt::Interrupt;
 use super::output::outln;
 use super::table_file::{self, TableFile};
-use super::{Exit, apart, interrupt, show};
+use super::{Exit, apart, show};
 use std::fmt::Debug;
 use std::path::Path;
 use std::sync::atomic::Ordering;
@@ -29,7 +30,8 @@ fn input(message: impl ToString) -> Error {
 }
 
 fn run(arguments: &FmuRunArguments) -> Result<Exit> {
-    let stopped = interrupt::cancel_flag();
+    let interrupt = Interrupt::listen();
+    let stopped = interrupt.flag();
     if apart::is_child() {
         apart::end_with_parent();
         confine(arguments.memory_mb.saturating_mul(1 << 20));
@@ -49,6 +51,7 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
         input: arguments.input.as_deref().map(table).transpose()?.unwrap_or_default().into(),
         hold_inputs: arguments.hold_inputs,
     };
+    interrupt.run();
     let file = arguments.csv.as_deref().map(TableFile::create).transpose()?;
     let between = arguments.intermediate.as_deref().map(TableFile::create).transpose()?;
     let tables: Vec<TableFile> = [&file, &between].into_iter().flatten().cloned().collect();
@@ -110,7 +113,8 @@ fn level(line: &terraglue_fmi::LogLine) -> log::Level {
 
 fn table(path: &Path) -> Result<Table> {
     let wrong = |e: &dyn std::fmt::Display| input(format!("{}: {e}", path.display()));
-    let mut reader = csv::Reader::from_path(path).map_err(|e| wrong(&e))?;
+    let file = terraglue_subsystem::files::open(path).map_err(|e| wrong(&e))?;
+    let mut reader = csv::Reader::from_reader(file);
     let header = reader.headers().map_err(|e| wrong(&e))?.clone();
     if header.get(0) != Some("time") {
         return Err(wrong(&"the first column is not `time`"));

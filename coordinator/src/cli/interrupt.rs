@@ -1,21 +1,49 @@
-//! Ctrl-C, SIGTERM and SIGHUP: the first asks the run to stop and close its recording, the second ends the program at once.
+//! Ctrl-C, SIGTERM and SIGHUP: while inputs are loaded the first ends the program, as there is nothing to close yet; during a
+//! run it asks the run to stop and close its recording, and the second ends the program at once.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use terraglue::host::exit_guard;
 
-/// A flag that Ctrl-C sets.
-pub fn cancel_flag() -> Arc<AtomicBool> {
-    let flag = Arc::new(AtomicBool::new(false));
-    let shared = Arc::clone(&flag);
-    let installed = ctrlc::set_handler(move || {
-        if shared.swap(true, Ordering::Relaxed) {
-            exit_guard::leave(130);
+/// Exit code of a program that was interrupted.
+const INTERRUPTED: i32 = 130;
+
+/// What signals have asked for, and whether there is something to close.
+#[derive(Clone, Debug, Default)]
+pub struct Interrupt {
+    asked: Arc<AtomicBool>,
+    running: Arc<AtomicBool>,
+}
+
+impl Interrupt {
+    /// Listens from now on.
+    pub fn listen() -> Self {
+        let own = Self::default();
+        let shared = own.clone();
+        if let Err(e) = ctrlc::set_handler(move || shared.signalled()) {
+            log::warn!("Ctrl-C will not close the recording: {e}");
+        }
+        own
+    }
+
+    /// From now on there is a recording to close.
+    pub fn run(&self) {
+        self.running.store(true, Ordering::Relaxed);
+    }
+
+    /// The flag that stops a run; it is set by the first signal.
+    pub fn flag(&self) -> Arc<AtomicBool> {
+        Arc::clone(&self.asked)
+    }
+
+    fn signalled(&self) {
+        if !self.running.load(Ordering::Relaxed) {
+            eprintln!("stopped while loading; nothing was written");
+            exit_guard::leave(INTERRUPTED);
+        }
+        if self.asked.swap(true, Ordering::Relaxed) {
+            exit_guard::leave(INTERRUPTED);
         }
         eprintln!("stopping after this step; once more ends the program at once");
-    });
-    if let Err(e) = installed {
-        eprintln!("Ctrl-C will not close the recording: {e}");
     }
-    flag
 }

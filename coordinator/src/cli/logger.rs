@@ -14,7 +14,11 @@ impl Log for Logger {
             // an error that a module or unit speaks of is not yet one of the program
             let said = ["terraglue::module", "terraglue::fmu"].contains(&record.target());
             let by = if said && record.level() == Level::Error { "logged " } else { "" };
-            eprintln!("{by}{}: {}", record.level().as_str().to_lowercase(), record.args());
+            let level = match record.level() {
+                Level::Warn => "warning".to_owned(),
+                other => other.as_str().to_lowercase(),
+            };
+            eprintln!("{by}{level}: {}", super::shorten::text(&record.args().to_string()));
         }
     }
 

@@ -22,6 +22,7 @@ mod progress;
 mod recorder;
 mod report;
 mod run;
+mod shorten;
 mod show;
 mod soil_module;
 mod soils;

@@ -2,10 +2,11 @@
 
 use super::arguments::{RunArguments, RunCommand};
 use super::folder::results_folder;
+use super::interrupt::Interrupt;
 use super::output::outln;
 use super::progress::{self, Progress};
 use super::recorder::SharedRecorder;
-use super::{Exit, exit_of, interrupt, show, soil_module};
+use super::{Exit, exit_of, show, soil_module};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -46,26 +47,35 @@ impl Outcome {
 /// Runs a scenario as the arguments say.
 pub fn run(command: &RunCommand) -> Result<Exit> {
     let arguments = &command.run;
+    let interrupt = Interrupt::listen();
     let scenario = Scenario::load(&arguments.scenario.scenario, &arguments.sets())?;
     soil_module::check(&scenario, &arguments.scenario)?;
-    let options = options(arguments, &interrupt::cancel_flag());
+    let options = options(arguments, &interrupt.flag());
     let testbed = build(&scenario, &options)?;
     let mut reloader = reloader(command, &scenario, &options)?;
     if command.explain {
         say(arguments, &testbed.explain().text(&scenario));
     }
+    interrupt.run();
     let folder = results_folder(arguments.out.as_deref(), &scenario.name)?;
     let steps = (scenario.time.duration_s / scenario.time.step_s).round() as u64;
     let bar = progress::bar(steps, arguments.quiet);
     let mut progress = Progress::new(bar.clone(), scenario.time.duration_s, "");
     let outcome = run_testbed(testbed, reloader.as_mut(), &scenario, &folder, arguments.csv, &mut progress)?;
     bar.finish_and_clear();
-    let report = recording::report::write(&folder)?;
+    let report = recording::report::write(&folder);
     if command.explain {
         say(arguments, &show::costs(&outcome.costs, outcome.summary.steps).to_string());
     }
-    print(arguments, &outcome, &report)?;
-    Ok(outcome.exit())
+    print(arguments, &outcome, report.as_deref().ok())?;
+    match (report, &outcome.error) {
+        (Err(missing), None) => Err(missing),
+        (Err(missing), Some(_)) => {
+            log::warn!("there is no report: {missing}; `terraglue report {}` makes one", folder.display());
+            Ok(outcome.exit())
+        }
+        (Ok(_), _) => Ok(outcome.exit()),
+    }
 }
 
 /// To standard output, or beside it where that is JSON.
@@ -141,8 +151,8 @@ pub fn run_testbed(
     let mut testbed = testbed;
     let surroundings = Surroundings::now();
     let begun = testbed.begin();
-    testbed.view(|view| recorder.started(view))?;
-    write_exchange(folder, &testbed.explain())?;
+    let begun = begun.and_then(|()| testbed.view(|view| recorder.started(view)));
+    let begun = begun.and_then(|()| write_exchange(folder, &testbed.explain()));
     let (wall, cpu) = (Instant::now(), cpu_s());
     let until_s = scenario.time.duration_s;
     let ran = match (begun, reloader) {
@@ -153,8 +163,9 @@ pub fn run_testbed(
     let (wall_s, cpu_s) = (wall.elapsed().as_secs_f64(), cpu_s() - cpu);
     let error = ran.err();
     set_back(&surroundings);
-    testbed.view(|view| recorder.finished(view, error.as_ref()))?;
-    write_timing(folder, &timing_rows(&testbed, wall_s, cpu_s))?;
+    let finished = testbed.view(|view| recorder.finished(view, error.as_ref()));
+    let timed = write_timing(folder, &timing_rows(&testbed, wall_s, cpu_s));
+    let error = error.or(finished.err()).or(timed.err());
     let parts_s = parts_s(&testbed, wall_s);
     let costs = testbed.costs().map(|(name, s)| (name.to_owned(), s)).collect();
     let cancelled = testbed.cancelled();
@@ -193,14 +204,14 @@ fn timing_rows(testbed: &Testbed, wall_s: f64, cpu_s: f64) -> Vec<TimingRow> {
     all.chain(own).map(|(section, wall_s, cpu_s)| TimingRow { section, wall_s, cpu_s, steps }).collect()
 }
 
-fn print(arguments: &RunArguments, outcome: &Outcome, report: &Path) -> Result {
+fn print(arguments: &RunArguments, outcome: &Outcome, report: Option<&Path>) -> Result {
     if arguments.json {
         let text = serde_json::to_string_pretty(&outcome.summary)
             .map_err(|e| Error::File { path: "standard output".into(), source: e.into() })?;
         outln!("{text}");
     } else if !arguments.quiet {
         outln!("{}", show::summary(&outcome.summary));
-        outln!("report: {}", report.display());
+        report.iter().for_each(|report| outln!("report: {}", report.display()));
     }
     if let Some(error) = &outcome.error {
         show::error(error);

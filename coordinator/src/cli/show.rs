@@ -1,7 +1,8 @@
 //! What is printed: errors with their place, tables.
 
+use super::shorten;
 use comfy_table::{Cell, Color, ContentArrangement, Table, presets};
-use miette::GraphicalReportHandler;
+use miette::{GraphicalReportHandler, GraphicalTheme};
 use terraglue::Error;
 use terraglue::recording::{Energies, Summary};
 
@@ -10,12 +11,18 @@ pub fn error(error: &Error) {
     match error {
         Error::Input(input) => {
             let mut text = String::new();
-            match GraphicalReportHandler::new().render_report(&mut text, input.as_ref()) {
-                Ok(()) => eprint!("{text}"),
-                Err(_) => eprintln!("error: {input}"),
+            let mut theme = GraphicalTheme::default();
+            theme.characters.error = "error:".into();
+            let short = shorten::error(input);
+            match GraphicalReportHandler::new_themed(theme).render_report(&mut text, &short) {
+                Ok(()) => eprint!("{}", text.trim_start()),
+                Err(_) => eprintln!("error: {short}"),
             }
         }
-        other => eprintln!("error: {other}"),
+        other => {
+            eprintln!("error: {}", shorten::text(&other.to_string()));
+            other.help().iter().for_each(|help| eprintln!("  help: {help}"));
+        }
     }
 }
 

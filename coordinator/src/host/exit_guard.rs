@@ -48,6 +48,8 @@ pub fn arm() -> Armed {
     REGISTERED.call_once(|| {
         // SAFETY: the function takes nothing and never unwinds. Without room for it the run is merely less guarded.
         let _ = unsafe { libc::atexit(at_exit) };
+        // SAFETY: nothing is called on this signal: a file that the shell's limit ends is an error of the write then.
+        let _ = unsafe { libc::signal(libc::SIGXFSZ, libc::SIG_IGN) };
         // SAFETY: the same for the other way to leave in good order.
         let _ = unsafe { at_quick_exit(at_exit) };
     });

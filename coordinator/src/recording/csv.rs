@@ -1,6 +1,6 @@
 //! `variables.csv`, all scalar variables over time, and `timing.csv`, what a clock measured.
 
-use crate::error::Result;
+use crate::error::{Error, Result};
 use crate::recording::kept_file::KeptFile;
 use crate::recording::layout::{TIMING, VARIABLES, at, other_at};
 use crate::recording::snapshot::{ScalarKind, Snapshot};
@@ -30,7 +30,7 @@ impl VariablesCsv {
 
     /// One row.
     pub fn row(&mut self, t_s: f64, snapshot: &Snapshot) -> Result {
-        self.write(t_s, snapshot).map_err(other_at(&self.path))
+        self.write(t_s, snapshot).map_err(|e| failed_at(&self.path, e))
     }
 
     fn write(&mut self, t_s: f64, snapshot: &Snapshot) -> csv::Result<()> {
@@ -58,6 +58,14 @@ impl VariablesCsv {
     /// Hands everything to the operating system.
     pub fn flush(&mut self) -> Result {
         self.rows.flush().map_err(at(&self.path))
+    }
+}
+
+/// An error with the file and, where the system has refused the write, its own words.
+fn failed_at(path: &Path, error: csv::Error) -> Error {
+    match error.into_kind() {
+        csv::ErrorKind::Io(source) => at(path)(source),
+        other => other_at(path)(format!("{other:?}")),
     }
 }
 

@@ -3,7 +3,7 @@
 //! opened again and goes on where it was.
 
 use std::fs::{File, Metadata};
-use std::io::{Result, Write};
+use std::io::{ErrorKind, Result, Write};
 use std::os::fd::IntoRawFd;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
@@ -14,6 +14,8 @@ pub struct KeptFile {
     path: PathBuf,
     identity: (u64, u64),
     told: bool,
+    /// Once a write has failed no other is tried: what is there ends with a whole part.
+    failed: bool,
 }
 
 impl KeptFile {
@@ -24,7 +26,7 @@ impl KeptFile {
         // Where the file system knows no locks, two runs into one folder are not noticed.
         drop(file.try_lock());
         let identity = identity(&file.metadata()?);
-        Ok(Self { file: Some(file), path, identity, told: false })
+        Ok(Self { file: Some(file), path, identity, told: false, failed: false })
     }
 
     fn is_ours(&self) -> bool {
@@ -56,7 +58,12 @@ impl KeptFile {
 
 impl Write for KeptFile {
     fn write(&mut self, bytes: &[u8]) -> Result<usize> {
-        self.ours()?.write(bytes)
+        if self.failed {
+            return Err(std::io::Error::other("an earlier write failed"));
+        }
+        let written = self.ours()?.write(bytes);
+        self.failed = written.as_ref().is_err_and(|e| e.kind() != ErrorKind::Interrupted);
+        written
     }
 
     fn flush(&mut self) -> Result<()> {

@@ -1,6 +1,7 @@
 //! Names of the files in a results folder, and errors that carry them.
 
 use crate::error::{Error, Result};
+use crate::recording::space::RESERVE;
 use std::path::Path;
 
 /// Everything simulated.
@@ -24,8 +25,8 @@ pub(crate) fn remove_earlier_run(folder: &Path) -> Result {
     if ![RECORDING, SUMMARY].iter().any(|f| folder.join(f).exists()) {
         return Ok(());
     }
-    for path in
-        [VARIABLES, REPORT, SUMMARY, TIMING, EXCHANGE, FINAL_GROUND, RECORDING].map(|f| folder.join(f))
+    for path in [VARIABLES, REPORT, SUMMARY, TIMING, EXCHANGE, FINAL_GROUND, RESERVE, RECORDING]
+        .map(|f| folder.join(f))
     {
         if path.exists() {
             std::fs::remove_file(&path).map_err(at(&path))?;

@@ -17,6 +17,7 @@ use base64::Engine;
 use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
 use std::collections::BTreeMap;
+use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 
@@ -58,6 +59,8 @@ pub(crate) struct McapWriter {
     packed: Vec<u8>,
     encoded: String,
     window: WindowRecord,
+    /// Bytes and simulated time (s) of what can be read whatever comes after.
+    kept: (u64, f64),
 }
 
 impl McapWriter {
@@ -81,12 +84,14 @@ impl McapWriter {
             packed: Vec::new(),
             encoded: String::new(),
             window: WindowRecord::default(),
+            kept: (0, 0.0),
         })
     }
 
     /// Announces all topics and writes what stands once at the start: shapes and the whole ground.
     pub fn started(&mut self, view: &View, snapshot: &Snapshot) -> Result {
-        self.announce(snapshot).map_err(other_at(&self.path))?;
+        let announced = self.announce(snapshot);
+        self.checked(announced)?;
         self.ground = GroundGrid::find(view)?;
         scene_message::write(self.json.clear(), view);
         self.emit(self.channels.scene, "/scene", view.t_s)?;
@@ -214,23 +219,46 @@ impl McapWriter {
         let log_time = nanoseconds(t_s);
         let header = MessageHeader { channel_id, sequence: self.sequence, log_time, publish_time: log_time };
         self.sequence = self.sequence.wrapping_add(1);
-        sink.write_to_known_channel(&header, self.json.bytes()).map_err(other_at(&self.path))
+        let written = sink.write_to_known_channel(&header, self.json.bytes());
+        self.checked(written)
     }
 
-    /// Ends the chunk and hands everything to the operating system.
-    pub fn flush(&mut self) -> Result {
-        match &mut self.sink {
-            Some(sink) => sink.flush().map_err(other_at(&self.path)),
-            None => Ok(()),
-        }
+    /// Ends the chunk and hands everything up to time `t_s` to the operating system.
+    pub fn flush(&mut self, t_s: f64) -> Result {
+        let Some(sink) = &mut self.sink else { return Ok(()) };
+        let flushed = sink.flush();
+        self.checked(flushed)?;
+        self.kept = (std::fs::metadata(&self.path).map_or(self.kept.0, |m| m.len()), t_s);
+        Ok(())
+    }
+
+    /// Simulated time up to which all can be read whatever comes after, s.
+    pub fn kept_s(&self) -> f64 {
+        self.kept.1
+    }
+
+    /// After a write that failed the file ends with what was whole before, and nothing more is written.
+    fn checked<T>(&mut self, written: mcap::McapResult<T>) -> Result<T> {
+        written.map_err(|e| {
+            self.sink = None;
+            let cut = File::options().write(true).open(&self.path).and_then(|f| f.set_len(self.kept.0));
+            if let Err(e) = cut {
+                log::warn!("{}: its end cannot be cut off: {e}", self.path.display());
+            }
+            match e {
+                mcap::McapError::Io(source) => at(&self.path)(source),
+                other => other_at(&self.path)(other),
+            }
+        })
     }
 
     /// Writes the footer; later calls do nothing.
     pub fn close(&mut self) -> Result {
         let Some(mut sink) = self.sink.take() else { return Ok(()) };
-        sink.finish().map_err(other_at(&self.path))?;
         use std::io::Write;
-        sink.into_inner().into_inner().flush().map_err(at(&self.path))
+        let finished = sink.finish();
+        let finished = finished.and_then(|_| Ok(sink.into_inner().into_inner().flush()?));
+        self.checked(finished)
     }
 }
 

@@ -48,6 +48,7 @@ mod scene_message;
 mod schemas;
 mod snapshot;
 mod solids;
+mod space;
 mod summary;
 mod summary_observer;
 mod table;

@@ -7,6 +7,7 @@ use crate::recording::inputs::fingerprints;
 use crate::recording::layout::{FINAL_GROUND, at, remove_earlier_run};
 use crate::recording::mcap_writer::{FLUSH_STEPS, McapWriter};
 use crate::recording::snapshot::Snapshot;
+use crate::recording::space::{Reserve, explain};
 use crate::recording::summary::{Status, Summary};
 use crate::recording::summary_observer::SummaryObserver;
 use crate::scenario::Scenario;
@@ -37,6 +38,7 @@ pub struct Recorder {
     snapshot: Snapshot,
     summary: SummaryObserver,
     recorded_step: Option<u64>,
+    reserve: Reserve,
 }
 
 /// What a report needs to know of the scenario; stands at the head of the recording.
@@ -67,6 +69,7 @@ impl Recorder {
     pub fn create(folder: &Path, scenario: &Scenario, options: RecorderOptions) -> Result<Self> {
         std::fs::create_dir_all(folder).map_err(at(folder))?;
         remove_earlier_run(folder)?;
+        let reserve = Reserve::take(folder);
         Ok(Self {
             folder: folder.to_owned(),
             options,
@@ -77,6 +80,7 @@ impl Recorder {
             snapshot: Snapshot::default(),
             summary: SummaryObserver::new(scenario),
             recorded_step: None,
+            reserve,
         })
     }
 
@@ -102,7 +106,9 @@ impl Recorder {
         let Some(ground) = self.mcap.ground() else { return Ok(()) };
         let soil = &view.subsystems[ground.subsystem];
         let path = self.folder.join(FINAL_GROUND);
-        write_esri_ascii(&path, &ground.info, |a, b| ground.height_tile(soil, a, b))
+        let written = write_esri_ascii(&path, &ground.info, |a, b| ground.height_tile(soil, a, b));
+        // a part of it would pass for the ground
+        written.inspect_err(|_| drop(std::fs::remove_file(&path)))
     }
 
     /// Closes all files and writes `summary.json`. `wall_s` and `cpu_s` are the times of the step loop, s.
@@ -113,13 +119,26 @@ impl Recorder {
         error: Option<&Error>,
         status: Status,
     ) -> Result<Summary> {
-        self.mcap.close()?;
-        if let Some(csv) = &mut self.csv {
-            csv.flush()?;
-        }
+        let closed = self.close();
+        self.reserve.release();
+        let (error, status) = match (&error, &closed) {
+            (None, Err(e)) => (Some(e), Status::Failed),
+            _ => (error, status),
+        };
         let summary = self.summary.summary(wall_s, cpu_s, error, status);
         summary.write(&self.folder)?;
         Ok(summary)
+    }
+
+    fn close(&mut self) -> Result {
+        let closed = self.mcap.close();
+        let flushed = self.csv.as_mut().map_or(Ok(()), VariablesCsv::flush);
+        closed.and(flushed).map_err(|e| self.explained(e))
+    }
+
+    /// Says of a full disk up to when the run is kept.
+    fn explained(&self, error: Error) -> Error {
+        explain(error, self.mcap.kept_s())
     }
 
     /// The figures so far.
@@ -128,8 +147,8 @@ impl Recorder {
     }
 }
 
-impl Observer for Recorder {
-    fn started(&mut self, view: &View) -> Result {
+impl Recorder {
+    fn start(&mut self, view: &View) -> Result {
         self.snapshot = Snapshot::new(view);
         if self.options.csv {
             self.csv = Some(VariablesCsv::create(&self.folder, &self.snapshot)?);
@@ -137,10 +156,10 @@ impl Observer for Recorder {
         self.summary.started(view)?;
         self.mcap.started(view, &self.snapshot)?;
         self.record(view)?;
-        self.mcap.flush()
+        self.mcap.flush(view.t_s)
     }
 
-    fn stepped(&mut self, view: &View) -> Result {
+    fn step(&mut self, view: &View) -> Result {
         self.mcap.count(view.gluing);
         self.summary.stepped(view)?;
         if view.step_index.is_multiple_of(self.every_steps) {
@@ -150,23 +169,30 @@ impl Observer for Recorder {
             self.mcap.changed_ground(view)?;
         }
         if view.step_index.is_multiple_of(FLUSH_STEPS) {
-            self.mcap.flush()?;
+            self.mcap.flush(view.t_s)?;
         }
         Ok(())
+    }
+}
+
+impl Observer for Recorder {
+    fn started(&mut self, view: &View) -> Result {
+        self.start(view).map_err(|e| self.explained(e))
+    }
+
+    fn stepped(&mut self, view: &View) -> Result {
+        self.step(view).map_err(|e| self.explained(e))
     }
 
     fn happened(&mut self, happening: &Happening) -> Result {
         self.summary.happened(happening)?;
-        self.mcap.happened(happening)
+        self.mcap.happened(happening).map_err(|e| self.explained(e))
     }
 
     fn finished(&mut self, view: &View, error: Option<&Error>) -> Result {
         // After a failure the last state may be unreadable; the recording is closed all the same.
         let end = self.record_end(view);
-        self.mcap.close()?;
-        if let Some(csv) = &mut self.csv {
-            csv.flush()?;
-        }
-        if error.is_some() { Ok(()) } else { end }
+        let closed = self.close();
+        if error.is_some() { Ok(()) } else { end.map_err(|e| self.explained(e)).and(closed) }
     }
 }

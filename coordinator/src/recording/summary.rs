@@ -41,6 +41,7 @@ impl From<&Error> for FailureRecord {
                 record.function = Some((*function).into());
                 record.time_s = Some(*time_s);
             }
+            Error::Full { kept_s, .. } => record.time_s = Some(*kept_s),
             Error::NotConverged { time_s, .. } | Error::Simulation { time_s, .. } => {
                 record.time_s = Some(*time_s);
             }
@@ -196,7 +197,7 @@ impl Summary {
     /// Reads `summary.json` of a results folder.
     pub fn read(folder: &Path) -> Result<Self> {
         let path = folder.join(SUMMARY);
-        let text = std::fs::read(&path).map_err(at(&path))?;
+        let text = terraglue_subsystem::files::read(&path).map_err(at(&path))?;
         serde_json::from_slice(&text).map_err(other_at(&path))
     }
 }

@@ -8,18 +8,40 @@ use serde_json::Value;
 use terraglue_soil_law::{Family, PressureLaw, SMALL_CONTACT, SoilExpressions, SoilParameters};
 use terraglue_subsystem::{Config, Schema};
 
-/// Events after the end of the run.
+/// Events and faults after the end of the run.
 pub fn late_events(scenario: &Scenario) -> Vec<String> {
     let end = scenario.time.duration_s;
-    let late = scenario.events.iter().filter_map(|event| match event.trigger {
-        Trigger::At(at) if at > end => Some((at, event)),
+    let events = scenario.events.iter().map(|e| ("an event", &e.trigger, e.entry));
+    let faults = scenario.faults.iter().map(|f| ("a fault", &f.start, f.entry));
+    let late = events.chain(faults).filter_map(|(what, trigger, entry)| match trigger {
+        Trigger::At(at) if *at > end => Some((what, at, entry)),
         _ => None,
     });
-    late.map(|(at, event)| {
-        let message = format!("an event at {at} s never happens: the run ends at {end} s");
-        line_of(&scenario.source.error_at(event.span.clone(), message, None))
+    late.map(|(what, at, entry)| {
+        let message = format!("{what} at {at} s never happens: the run ends at {end} s");
+        line_of(&scenario.source.error_in(entry, &[], message, None))
     })
     .collect()
+}
+
+/// Steps of a run beyond which it is said before it starts, and beyond which it is refused.
+const MANY_STEPS: f64 = 1e8;
+/// See [`MANY_STEPS`]: at a microsecond a step, which no subsystem needs less than, a quarter of an hour.
+pub(super) const MOST_STEPS: f64 = 1e9;
+
+/// A run of very many steps.
+pub fn many_steps(scenario: &Scenario) -> Option<String> {
+    let time = &scenario.time;
+    let steps = time.duration_s / time.step_s;
+    let message = || {
+        format!(
+            "the run has {steps:.3e} steps of {} s; at 10 µs of wall time each it takes {:.1} hours",
+            time.step_s,
+            steps * 1e-5 / 3600.0
+        )
+    };
+    (steps > MANY_STEPS)
+        .then(|| line_of(&scenario.source.error_at_value(&["time", "step_s"], message(), None)))
 }
 
 /// Keys of `[gluing]` that only some strategies read, with what they say where they say nothing.

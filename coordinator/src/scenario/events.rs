@@ -1,7 +1,9 @@
 //! `[[connect]]`, `[[glue]]`, `[[event]]` and `[[fault]]`.
 
 use super::keys::{self, Table};
-use super::model::{Comparison, Connection, EventSpec, FaultEnd, FaultKind, FaultSpec, GlueSpec, Trigger};
+use super::model::{
+    Comparison, Connection, Entry, EventSpec, FaultEnd, FaultKind, FaultSpec, GlueSpec, Trigger,
+};
 use super::node::{Node, Raw};
 use super::section::Section;
 use super::source::{InputError, Source};
@@ -12,7 +14,7 @@ type Checked<T> = Result<T, Box<InputError>>;
 
 /// All connections in the order of the file.
 pub fn connections(source: &Source, names: &[&str]) -> Checked<Vec<Connection>> {
-    each(source, "connect", |s, node| {
+    each(source, "connect", |s, _, entry| {
         for key in ["from", "to"] {
             check_reference(&s.text(key), names).map_err(|c| s.error(key, c.message, c.help))?;
         }
@@ -28,7 +30,7 @@ pub fn connections(source: &Source, names: &[&str]) -> Checked<Vec<Connection>> 
             offset: s.number("offset"),
             convert: s.value("convert") != Value::Bool(false),
             map: table(s)?,
-            span: node.extent(),
+            entry,
         })
     })
 }
@@ -51,7 +53,7 @@ const COMPONENTS: [&str; 6] = ["x", "y", "z", "rx", "ry", "rz"];
 
 /// All glue in the order of the file.
 pub fn glue(source: &Source, names: &[&str]) -> Checked<Vec<GlueSpec>> {
-    each(source, "glue", |s, node| {
+    each(source, "glue", |s, _, entry| {
         for key in ["side_1", "side_2"] {
             let text = s.text(key);
             if key == "side_1" || text != "world" {
@@ -90,7 +92,7 @@ pub fn glue(source: &Source, names: &[&str]) -> Checked<Vec<GlueSpec>> {
             t_max: s.optional_number("t_max_n").unwrap_or(f64::INFINITY),
             mu,
             strategy: s.optional_text("strategy"),
-            span: node.extent(),
+            entry,
         })
     })
 }
@@ -114,7 +116,7 @@ fn mask(s: &Section) -> Checked<u32> {
 
 /// All events in the order of the file.
 pub fn events(source: &Source, names: &[&str]) -> Checked<Vec<EventSpec>> {
-    each(source, "event", |s, node| {
+    each(source, "event", |s, node, entry| {
         let trigger = trigger(s, names)?;
         let set = assignments(source, s, names)?;
         let act = actions(s, names)?;
@@ -124,13 +126,13 @@ pub fn events(source: &Source, names: &[&str]) -> Checked<Vec<EventSpec>> {
             );
             return Err(source.error(&node.at, "an event that does nothing", help));
         }
-        Ok(EventSpec { trigger, set, act, span: node.extent() })
+        Ok(EventSpec { trigger, set, act, entry })
     })
 }
 
 /// All faults in the order of the file.
 pub fn faults(source: &Source, names: &[&str]) -> Checked<Vec<FaultSpec>> {
-    each(source, "fault", |s, node| {
+    each(source, "fault", |s, _, entry| {
         let variable = s.text("variable");
         check_reference(&variable, names).map_err(|c| s.error("variable", c.message, c.help))?;
         let kind = match s.text("kind").as_str() {
@@ -156,21 +158,29 @@ pub fn faults(source: &Source, names: &[&str]) -> Checked<Vec<FaultSpec>> {
         if ends.next().is_some() {
             return Err(s.error("kind", "a fault has one of `until_s`, `until` and `for_s`".into(), None));
         }
-        Ok(FaultSpec {
-            variable,
-            kind,
-            start: trigger(s, names)?,
-            end,
-            seed: s.optional_count("seed"),
-            span: node.extent(),
-        })
+        let start = trigger(s, names)?;
+        if let (Trigger::At(begin), FaultEnd::At(Trigger::At(end))) = (&start, &end)
+            && end <= begin
+        {
+            let message = format!("the fault ends at {end} s, and begins at {begin} s: it would never act");
+            let help = "give an `until_s` after `at_s`, or `for_s`, how long it lasts".to_owned();
+            return Err(s.error("until_s", message, Some(help)));
+        }
+        Ok(FaultSpec { variable, kind, start, end, seed: s.optional_count("seed"), entry })
     })
 }
 
-fn each<T>(source: &Source, name: &str, read: impl Fn(&Section, &Node) -> Checked<T>) -> Checked<Vec<T>> {
+fn each<T>(
+    source: &Source,
+    name: &'static str,
+    read: impl Fn(&Section, &Node, Entry) -> Checked<T>,
+) -> Checked<Vec<T>> {
     let (Some(table), Some(node)) = (keys::table(name), source.root.get(name)) else { return Ok(Vec::new()) };
     let Raw::List(items) = &node.value else { return Err(not_repeated(source, &table, node)) };
-    items.iter().map(|item| read(&Section::check(source, &table, Some(item))?, item)).collect()
+    let one = |(number, item): (usize, &Node)| {
+        read(&Section::check(source, &table, Some(item))?, item, Entry { table: name, number })
+    };
+    items.iter().enumerate().map(one).collect()
 }
 
 fn not_repeated(source: &Source, table: &Table, node: &Node) -> Box<InputError> {

@@ -1,5 +1,6 @@
 //! From the text to the [`Scenario`].
 
+use super::advice::MOST_STEPS;
 use super::events::{connections, events, faults, glue};
 use super::keys::{self, Table};
 use super::model::*;
@@ -26,7 +27,7 @@ impl Scenario {
         if Package::is_one(path) {
             return Self::structure(path, sets);
         }
-        let text = std::fs::read_to_string(path).map_err(|e| unreadable(path, &e))?;
+        let text = terraglue_subsystem::files::read_text(path).map_err(|e| unreadable(path, &e))?;
         Self::parse(&text, &path.display().to_string(), sets)
     }
 
@@ -92,6 +93,10 @@ impl Scenario {
 
 fn unreadable(path: &Path, error: &std::io::Error) -> Box<InputError> {
     let message = format!("cannot read the scenario `{}`: {error}", path.display());
+    if error.kind() != std::io::ErrorKind::NotFound {
+        let help = "a scenario is a text file in TOML, described in docs/scenario.md".to_owned();
+        return InputError::plain(message, Some(help));
+    }
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let mut files: Vec<String> = std::fs::read_dir(folder)
         .into_iter()
@@ -102,7 +107,11 @@ fn unreadable(path: &Path, error: &std::io::Error) -> Box<InputError> {
         .collect();
     files.sort();
     let wanted = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
-    InputError::plain(message, did_you_mean(&wanted, files.iter().map(String::as_str)))
+    // a link that leads nowhere has the very name
+    files.retain(|name| *name != wanted);
+    let near = did_you_mean(&wanted, files.iter().map(String::as_str));
+    let help = near.or_else(|| Some(format!("there is no scenario (.toml) in `{}`", folder.display())));
+    InputError::plain(message, help)
 }
 
 fn read_source(text: &str, path: &str, sets: &[(String, String)]) -> Checked<Source> {
@@ -120,7 +129,8 @@ fn read_source(text: &str, path: &str, sets: &[(String, String)]) -> Checked<Sou
     }
     let document = Document::parse(text.to_owned()).map_err(|e| {
         let message = format!("not TOML: {}", e.message().lines().collect::<Vec<_>>().join("; "));
-        source.error_at(e.span().unwrap_or(0..0), message, None)
+        let help = "docs/scenario.md shows what a scenario looks like, https://toml.io the form".to_owned();
+        source.error_at(e.span().unwrap_or(0..0), message, Some(help))
     })?;
     let mut root = Node::of_document(document.as_table());
     let mut document = document.into_mut();
@@ -171,6 +181,17 @@ fn read_time(s: &Section) -> Checked<Time> {
         settle_s: s.number("settle_s"),
     };
     let steps = time.duration_s / time.step_s;
+    if steps > MOST_STEPS {
+        let message = format!(
+            "`duration_s` = {} s in steps of {} s are {steps:.3e} steps; a run has at most {MOST_STEPS:e}",
+            time.duration_s, time.step_s
+        );
+        let help = format!(
+            "lengthen `step_s` (0.001 s is usual) or shorten `duration_s`, to at most {:.3e} s at this step",
+            MOST_STEPS * time.step_s
+        );
+        return Err(s.error("step_s", message, Some(help)));
+    }
     if (steps - steps.round()).abs() > 1e-6 * steps.max(1.0) || steps.round() < 1.0 {
         let below = (steps.floor() * time.step_s).max(time.step_s);
         // as people write it: 18 steps of 1 ms are 0.018 and not 0.018000000000000002

@@ -226,6 +226,15 @@ pub struct Region {
     pub numbers: Map<String, Value>,
 }
 
+/// An entry of a repeated table, e.g. `[[event]]`, for errors about it.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Entry {
+    /// Name of the table.
+    pub table: &'static str,
+    /// Number in the order of the file, from 0.
+    pub number: usize,
+}
+
 /// `[[connect]]`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Connection {
@@ -241,8 +250,8 @@ pub struct Connection {
     pub convert: bool,
     /// What each value becomes, of truth values, whole numbers and enumerations; empty: what it is.
     pub map: Vec<(String, Value)>,
-    /// Byte range of the table in the source.
-    pub span: std::ops::Range<usize>,
+    /// Where it stands.
+    pub entry: Entry,
 }
 
 impl Default for GluingSpec {
@@ -292,8 +301,8 @@ pub struct GlueSpec {
     pub mu: f64,
     /// Strategy of its group; absent: that of `[gluing]`.
     pub strategy: Option<String>,
-    /// Byte range of the table in the source.
-    pub span: std::ops::Range<usize>,
+    /// Where it stands.
+    pub entry: Entry,
 }
 
 /// `[[event]]`.
@@ -305,8 +314,8 @@ pub struct EventSpec {
     pub set: Vec<(String, Value)>,
     /// `subsystem.action`.
     pub act: Vec<String>,
-    /// Byte range of the table in the source.
-    pub span: std::ops::Range<usize>,
+    /// Where it stands.
+    pub entry: Entry,
 }
 
 /// `[[fault]]`.
@@ -322,8 +331,8 @@ pub struct FaultSpec {
     pub end: FaultEnd,
     /// Seed of noise and drop-outs; absent: by the world's and the place in the file.
     pub seed: Option<u64>,
-    /// Byte range of the table in the source.
-    pub span: std::ops::Range<usize>,
+    /// Where it stands.
+    pub entry: Entry,
 }
 
 /// What a fault makes of a number x.

@@ -100,6 +100,18 @@ impl Node {
         }
     }
 
+    /// The first key or text below it that holds `words`.
+    pub fn find(&self, words: &str) -> Option<&Place> {
+        match &self.value {
+            Raw::Text(text) => text.contains(words).then_some(&self.at),
+            Raw::List(items) => items.iter().find_map(|n| n.find(words)),
+            Raw::Table(entries) => entries
+                .iter()
+                .find_map(|(key, n)| n.find(words).or_else(|| key.contains(words).then_some(&n.key))),
+            _ => None,
+        }
+    }
+
     /// From the first to the last byte of the file that belongs to it.
     pub fn extent(&self) -> Range<usize> {
         let below: Vec<&Node> = match &self.value {

@@ -182,6 +182,8 @@ pub fn must_exist(source: &Source, text: &str) -> Result<(), Complaint> {
     let mut names: Vec<String> =
         siblings.flatten().map(|e| e.file_name().to_string_lossy().into_owned()).collect();
     names.sort();
+    // a link that leads nowhere has the very name
+    names.retain(|name| *name != wanted);
     let near = super::nearest::nearest(&wanted, names.iter().map(String::as_str));
     let help = match near {
         Some(near) => format!("did you mean `{near}`? Paths are relative to the folder of the scenario"),

@@ -1,5 +1,6 @@
 //! The text of a scenario, kept so that every error can show file, line and the offending words.
 
+use super::model::Entry;
 use super::node::{Node, Place, Raw};
 use miette::{NamedSource, SourceSpan};
 use std::ops::Range;
@@ -72,21 +73,50 @@ impl Source {
         self.error(&Place { set: None, range: span }, message, help)
     }
 
-    /// An error at the first occurrence of `words` in a byte range of the file, or at the whole range; an edit
-    /// by `--set` that contains the words is shown instead.
-    pub fn error_within(
+    /// An error at the key or value of an entry that holds one of `words`, in the file or in the `--set` that brought it;
+    /// at the whole entry where none does.
+    pub fn error_in(
         &self,
-        span: Range<usize>,
-        words: &str,
+        entry: Entry,
+        words: &[&str],
         message: impl Into<String>,
         help: Option<String>,
     ) -> Box<InputError> {
-        let found = self.file_text.get(span.clone()).and_then(|text| text.find(words));
-        let place = match found {
-            Some(at) => Place { set: None, range: span.start + at..span.start + at + words.len() },
-            None => self.place_in_sets(words).unwrap_or(Place { set: None, range: span }),
+        let node = match self.root.get(entry.table).map(|node| &node.value) {
+            Some(Raw::List(items)) => items.get(entry.number),
+            _ => None,
         };
-        self.error(&place, message, help)
+        let found =
+            node.and_then(|node| words.iter().find_map(|w| node.find(w).map(|at| self.narrow(at, w))));
+        let whole = || match node {
+            Some(node) if node.at.set.is_none() => Place { set: None, range: node.extent() },
+            Some(node) => node.at.clone(),
+            None => Place::default(),
+        };
+        self.error(&found.unwrap_or_else(whole), message, help)
+    }
+
+    /// The words within a place, or all of it.
+    fn narrow(&self, place: &Place, words: &str) -> Place {
+        let text = self.text_at(place).1;
+        // a value that an edit brought has no places of its own within it
+        let range = if place.set.is_some() { 0..text.len() } else { place.range.clone() };
+        let at = text.get(range.clone()).and_then(|text| text.find(words));
+        at.map_or_else(
+            || place.clone(),
+            |at| {
+                let start = range.start + at;
+                Place { set: place.set, range: start..start + words.len() }
+            },
+        )
+    }
+
+    /// Name and text of the file, or of the `--set`, that a place is in.
+    fn text_at(&self, place: &Place) -> (&str, &str) {
+        match place.set.and_then(|i| self.sets.get(i)) {
+            Some(set) => ("--set", set.as_str()),
+            None => (self.path.as_str(), self.file_text.as_ref()),
+        }
     }
 
     /// An error at the value of a key path, e.g. `["robot", "model"]`; at the nearest table above when absent.
@@ -116,10 +146,7 @@ impl Source {
         message: impl Into<String>,
         help: Option<String>,
     ) -> Box<InputError> {
-        let (name, text) = match place.set.and_then(|i| self.sets.get(i)) {
-            Some(set) => ("--set", set.as_str()),
-            None => (self.path.as_str(), self.file_text.as_ref()),
-        };
+        let (name, text) = self.text_at(place);
         let end = place.range.end.min(text.len());
         Box::new(InputError {
             message: message.into(),
@@ -157,11 +184,5 @@ impl Source {
             }
         }
         (node, true)
-    }
-
-    fn place_in_sets(&self, words: &str) -> Option<Place> {
-        self.sets.iter().enumerate().find_map(|(i, set)| {
-            set.find(words).map(|at| Place { set: Some(i), range: at..at + words.len() })
-        })
     }
 }

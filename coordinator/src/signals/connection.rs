@@ -185,32 +185,31 @@ pub fn connect(
     let mut fed: Vec<(String, VariableRef)> = Vec::new();
     for connection in connections {
         let mut matched = false;
+        let refuse = |end: &str, message: String, help: Option<String>| {
+            source.error_in(connection.entry, &[end], message, help)
+        };
         for (name, from) in directory.iter() {
             let Some((target, of_array)) = target(connection, name) else { continue };
             matched = true;
             if let Some(message) = of_array.then(|| shapes_differ(directory, name, &target)).flatten() {
-                return Err(source.error_at(connection.span.clone(), message, None));
+                return Err(refuse(&connection.to, message, None));
             }
             let to = directory.find(&target).ok_or_else(|| {
                 let message = format!("`{name}` is connected to `{target}`, which does not exist");
-                source.error_at(connection.span.clone(), message, directory.hint(&target))
+                refuse(&connection.to, message, directory.hint(&target))
             })?;
             let conversion = check(connection, instances, (name, from), (&target, to))
-                .map_err(|message| source.error_at(connection.span.clone(), message, None))?;
+                .map_err(|message| refuse(&connection.to, message, None))?;
             if let Some((other, _)) = fed.iter().find(|(_, input)| *input == to) {
                 let message = format!("`{target}` is fed by `{other}` already and cannot take `{name}` too");
-                return Err(source.error_at(connection.span.clone(), message, None));
+                return Err(refuse(&connection.to, message, None));
             }
             fed.push((name.to_owned(), to));
             match from.describe(instances).value_type {
                 ValueType::F64 => add(&mut links.numbers, instances, from, to, conversion),
                 _ => {
                     let table = table::resolve(&connection.map, instances, from, to).map_err(|message| {
-                        source.error_at(
-                            connection.span.clone(),
-                            format!("`{name}` → `{target}`: {message}"),
-                            None,
-                        )
+                        refuse("map", format!("`{name}` → `{target}`: {message}"), None)
                     })?;
                     links.discrete.push(Discrete::new(from, to, table, conversion));
                 }
@@ -219,7 +218,7 @@ pub fn connect(
         if !matched {
             let message = format!("no variable matches `{}`", connection.from);
             let help = directory.hint(&connection.from);
-            return Err(source.error_at(connection.span.clone(), message, help));
+            return Err(refuse(&connection.from, message, help));
         }
     }
     Ok(links)

@@ -48,19 +48,19 @@ impl TimeLine {
         let variable = |name: &str, spec: &EventSpec| {
             directory.find(name).ok_or_else(|| {
                 let message = format!("variable `{name}` does not exist");
-                source.error_at(spec.span.clone(), message, directory.hint(name))
+                source.error_in(spec.entry, &[name], message, directory.hint(name))
             })
         };
         let mut events = Vec::new();
         for spec in specs {
             for (name, value) in &spec.set {
                 if let Some(reason) = variable(name, spec)?.objection(instances, value) {
-                    return Err(source.error_within(spec.span.clone(), name, reason, None));
+                    return Err(source.error_in(spec.entry, &[name], reason, None));
                 }
             }
             for action in &spec.act {
                 check_action(action, instances)
-                    .map_err(|(message, help)| source.error_at(spec.span.clone(), message, help))?;
+                    .map_err(|(message, help)| source.error_in(spec.entry, &[action], message, help))?;
             }
             let trigger = Resolved::new(&spec.trigger, |name| variable(name, spec))?;
             let due = Due { set: spec.set.clone(), act: spec.act.clone() };

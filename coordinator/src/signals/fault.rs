@@ -78,7 +78,7 @@ impl Faults {
     ) -> std::result::Result<Self, Box<InputError>> {
         let one = |(number, spec): (usize, &FaultSpec)| -> std::result::Result<Fault, Box<InputError>> {
             let refuse = |(message, help): (String, Option<String>)| {
-                source.error_within(spec.span.clone(), &spec.variable, message, help)
+                source.error_in(spec.entry, &[&spec.variable], message, help)
             };
             let find = |name: &str| {
                 let missing = || refuse((format!("variable `{name}` does not exist"), directory.hint(name)));

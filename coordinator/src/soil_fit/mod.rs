@@ -24,7 +24,7 @@ pub use written::{Predicted, basis, json, law_json, law_toml, rests, shown, toml
 pub use written_wheel::{wheel_json, wheel_toml};
 
 use crate::scenario::InputError;
-use terraglue_soil_law::fit::{Fit, FitLaw, Interval, fit};
+use terraglue_soil_law::fit::{Fit, FitError, FitLaw, Interval, fit};
 
 /// Acceleration of gravity under which laboratory plates are pressed, m/s².
 pub const LABORATORY_GRAVITY: f64 = 9.81;
@@ -89,8 +89,7 @@ pub fn fit_law(name: &'static str, tests: &PlateTests, known: Known) -> Result<S
     let cohesion = if weighed { needed(known.c_pa, "cohesion", "--cohesion-pa")? } else { 1.0 };
     let weight =
         if weighed { LABORATORY_GRAVITY * needed(known.density, "density", "--density")? } else { 1.0 };
-    let fit =
-        fit(law, &tests.readings, cohesion > 0.0).map_err(|e| InputError::plain(e.to_string(), None))?;
+    let fit = fit(law, &tests.readings, cohesion > 0.0).map_err(refused)?;
     let [cohesive, frictional, exponent] = fit.intervals;
     let scaled = |i: Interval, s: f64| Interval { low: i.low / s, high: i.high / s };
     let names = match name {
@@ -106,6 +105,18 @@ pub fn fit_law(name: &'static str, tests: &PlateTests, known: Known) -> Result<S
         row(names[1], fit.numbers.frictional / weight, scaled(frictional, weight)),
     ];
     Ok(SoilFit { law: name, fit, parameters, known })
+}
+
+/// What readings from which nothing can be found lack.
+fn refused(error: FitError) -> Box<InputError> {
+    let help = match error {
+        FitError::Falls => {
+            "look whether the columns of sinkage and pressure are exchanged, and leave out what comes after the peak"
+        }
+        FitError::OneDepth => "give readings from several sinkages",
+        _ => "give more readings, or lower --from-mm",
+    };
+    InputError::plain(error.to_string(), Some(help.into()))
 }
 
 impl SoilFit {

@@ -5,7 +5,7 @@ use crate::host::{HostServices, LoadError, LoadedModule, SearchPath, law};
 use crate::scenario::InputError;
 use std::path::Path;
 use std::sync::Arc;
-use terraglue_soil_law::fit::{Basis, Free, Interval, Reading, fit_numbers};
+use terraglue_soil_law::fit::{Basis, FitError, FitLaw, Free, Interval, Reading, fit, fit_numbers};
 use terraglue_subsystem::{NodeLaw, Parameter, PressureAnswer, PressureNodes};
 
 /// A number of the law.
@@ -45,6 +45,9 @@ const TYPICAL: [(&str, f64); 3] = [("n", 1.0), ("k_c", 1400.0), ("k_phi", 820e3)
 /// It is not found or no law with a pressure function, or the readings are too few.
 pub fn fit_module(plugin: &str, tests: &PlateTests, known: Known) -> Result<LawFit, Box<InputError>> {
     let plain = |text: String| InputError::plain(text, None);
+    if fit(FitLaw::Bekker, &tests.readings, false).is_err_and(|e| e == FitError::Falls) {
+        return Err(super::refused(FitError::Falls));
+    }
     let search = SearchPath::standard(&[], Path::new("."));
     let missing = |e: LoadError| plain(format!("--law {plugin}: {e}"));
     let path = law::locate(plugin, &search, Path::new(".")).map_err(missing)?;
@@ -74,14 +77,14 @@ pub fn fit_module(plugin: &str, tests: &PlateTests, known: Known) -> Result<LawF
         sought.iter().zip(x).for_each(|(k, x)| numbers[*k] = *x);
         bench.with(&numbers).is_ok_and(|law| press(law.as_ref(), readings, p))
     };
-    let fit = fit_numbers(&mut pressures, &free, &tests.readings).map_err(|e| {
+    let found = fit_numbers(&mut pressures, &free, &tests.readings).map_err(|e| {
         plain(format!("{e}, or the law has no pressure there with the numbers of its schema"))
     })?;
-    sought.iter().zip(&fit.numbers).for_each(|(k, x)| values[*k] = *x);
+    sought.iter().zip(&found.numbers).for_each(|(k, x)| values[*k] = *x);
     let law = bench.with(&values).map_err(plain)?;
     let interval = |k: usize| {
         let at = sought.iter().position(|s| *s == k)?;
-        Some(fit.intervals[at]).filter(|i| !i.low.is_nan() || values[k] != all[k])
+        Some(found.intervals[at]).filter(|i| !i.low.is_nan() || values[k] != all[k])
     };
     let numbers = parameters.iter().enumerate().map(|(k, p)| LawNumber {
         name: p.name.clone(),
@@ -91,7 +94,7 @@ pub fn fit_module(plugin: &str, tests: &PlateTests, known: Known) -> Result<LawF
     });
     let numbers = numbers.collect();
     let name = module.schema().name.clone();
-    Ok(LawFit { name, plugin: plugin.into(), numbers, rms: fit.rms, basis: fit.basis, law })
+    Ok(LawFit { name, plugin: plugin.into(), numbers, rms: found.rms, basis: found.basis, law })
 }
 
 /// Where the search for a number starts.

@@ -5,10 +5,11 @@ use super::resample::Raster;
 use crate::error::{Error, Result};
 use crate::scenario::InputError;
 use std::fs::File;
-use std::io::BufReader;
+use std::io::{BufReader, ErrorKind};
 use std::path::Path;
 use tiff::decoder::{Decoder, DecodingResult};
 use tiff::tags::Tag;
+use tiff::{TiffError, TiffFormatError};
 
 type Tiff = Decoder<BufReader<File>>;
 
@@ -16,26 +17,29 @@ type Tiff = Decoder<BufReader<File>>;
 const MODEL_TYPE: u16 = 1024;
 const GEOGRAPHIC: u16 = 2;
 
+const CURE: &str = "write it again as one band, e.g. with gdal_translate -b 1 -ot Float32";
+
 /// Reads the first image. Values that stand for missing data become `fill` (m).
 ///
 /// # Errors
 /// [`Error::Input`] when it is not an elevation model in metres, was cut off, or has missing data and no `fill`.
 pub fn read_geotiff(path: &Path, fill: Option<f64>) -> Result<Raster> {
-    let file = File::open(path).map_err(|e| unreadable(path, e))?;
-    let wrong = |message: String| input(path, message, None);
-    let mut tiff = Decoder::new(BufReader::new(file)).map_err(|e| wrong(format!("not a TIFF file: {e}")))?;
-    let (width, height) = tiff.dimensions().map_err(|e| wrong(e.to_string()))?;
+    let file = terraglue_subsystem::files::open(path).map_err(|e| unreadable(path, e))?;
+    let wrong = |message: String| input(path, message, Some(CURE));
+    let mut tiff =
+        Decoder::new(BufReader::new(file)).map_err(|e| wrong(format!("not a TIFF file: {}", fault(&e))))?;
+    let (width, height) = tiff.dimensions().map_err(|e| wrong(fault(&e)))?;
     let step = pixel_scale(path, &mut tiff)?;
     let tie = tiff.get_tag_f64_vec(Tag::ModelTiepointTag).unwrap_or_default();
     let missing = tiff.get_tag_ascii_string(Tag::GdalNodata).ok();
     let missing = missing.and_then(|s| s.trim_matches(['\0', ' ']).parse::<f64>().ok());
-    let values = tiff.read_image().map_err(|e| wrong(format!("cannot be read whole: {e}")))?;
+    let values = tiff.read_image().map_err(|e| wrong(format!("cannot be read whole: {}", fault(&e))))?;
     let values =
         as_numbers(values).ok_or_else(|| wrong("pixels are of a type that is not supported".into()))?;
     let count = width as usize * height as usize;
     if values.len() != count {
         let bands = values.len() / count;
-        return Err(input(path, format!("{bands} bands; an elevation model has one"), None));
+        return Err(input(path, format!("{bands} bands; an elevation model has one"), Some(CURE)));
     }
     let mut heights = Vec::with_capacity(count);
     for row in values.chunks_exact(width as usize).rev() {
@@ -44,6 +48,21 @@ pub fn read_geotiff(path: &Path, fill: Option<f64>) -> Result<Raster> {
         }
     }
     Ok(Raster { size: [width as usize, height as usize], step, corner: corner(&tie, step, height), heights })
+}
+
+/// What is wrong with a file, in words: those of the decoder show its own data structures.
+fn fault(error: &TiffError) -> String {
+    match error {
+        TiffError::FormatError(
+            TiffFormatError::TiffSignatureNotFound | TiffFormatError::TiffSignatureInvalid,
+        ) => "it does not begin like one".into(),
+        TiffError::FormatError(_) => "its structure is damaged".into(),
+        TiffError::UnsupportedError(_) => "it is of a kind that is not supported".into(),
+        TiffError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => "it is cut off".into(),
+        TiffError::IoError(e) => e.to_string(),
+        TiffError::LimitsExceeded => "it needs more memory than an image may".into(),
+        _ => "its numbers make no sense".into(),
+    }
 }
 
 fn input(path: &Path, message: String, help: Option<&str>) -> Error {

@@ -4,9 +4,8 @@ use super::esri_ascii::unreadable;
 use super::resample::Raster;
 use crate::error::{Error, Result};
 use crate::scenario::InputError;
-use png::{BitDepth, ColorType, Decoder, Transformations};
-use std::fs::File;
-use std::io::BufReader;
+use png::{BitDepth, ColorType, Decoder, DecodingError, Transformations};
+use std::io::{BufReader, ErrorKind};
 use std::path::Path;
 
 /// What the grey of a picture means.
@@ -20,20 +19,23 @@ pub struct Greys {
     pub high_m: f64,
 }
 
+const CURE: &str = "write it again as a greyscale PNG of 8 or 16 bits";
+
 /// Reads an image of 8 or 16 bits of grey (fewer are spread over 8); its upper row is the one of the largest y. Pixels that
 /// are wholly transparent are missing data and become `fill` (m).
 ///
 /// # Errors
 /// [`Error::Input`] when it is no greyscale image, was cut off, or has missing data and no `fill`.
 pub fn read_png(path: &Path, greys: Greys, fill: Option<f64>) -> Result<Raster> {
-    let file = File::open(path).map_err(|e| unreadable(path, e))?;
+    let file = terraglue_subsystem::files::open(path).map_err(|e| unreadable(path, e))?;
     let mut decoder = Decoder::new(BufReader::new(file));
     decoder.set_transformations(Transformations::EXPAND);
-    let wrong = |message: String| input(path, message, None);
-    let mut reader = decoder.read_info().map_err(|e| wrong(format!("not a PNG image: {e}")))?;
+    let wrong = |message: String| input(path, message, Some(CURE));
+    let mut reader = decoder.read_info().map_err(|e| wrong(format!("not a PNG image: {}", fault(&e))))?;
     let size = reader.output_buffer_size().ok_or_else(|| wrong("too large".into()))?;
     let mut bytes = vec![0; size];
-    let frame = reader.next_frame(&mut bytes).map_err(|e| wrong(format!("cannot be read whole: {e}")))?;
+    let frame =
+        reader.next_frame(&mut bytes).map_err(|e| wrong(format!("cannot be read whole: {}", fault(&e))))?;
     let [width, height] = [frame.width as usize, frame.height as usize];
     let channels = match frame.color_type {
         ColorType::Grayscale => 1,
@@ -60,6 +62,22 @@ pub fn read_png(path: &Path, greys: Greys, fill: Option<f64>) -> Result<Raster> 
         }
     }
     Ok(Raster { size: [width, height], step: [greys.pixel_m; 2], corner: [0.0; 2], heights })
+}
+
+/// What is wrong with an image, in words: those of the decoder show its own data structures.
+fn fault(error: &DecodingError) -> String {
+    match error {
+        DecodingError::IoError(e) if e.kind() == ErrorKind::UnexpectedEof => "it is cut off".into(),
+        DecodingError::IoError(e) => e.to_string(),
+        DecodingError::LimitsExceeded => "it needs more memory than an image may".into(),
+        DecodingError::Parameter(_) => "its structure is damaged".into(),
+        DecodingError::Format(e) => match e.to_string() {
+            text if text.starts_with("CRC error") => "a checksum is wrong, so it is damaged".into(),
+            text if text.starts_with("Corrupt deflate") => "its compressed data are damaged".into(),
+            text if text.contains('{') || text.contains("Some(") => "its structure is damaged".into(),
+            text => text.trim_end_matches('.').to_owned(),
+        },
+    }
 }
 
 /// Channel k of a pixel, 0 … 1.

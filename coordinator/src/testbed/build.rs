@@ -12,7 +12,7 @@ use crate::host::law;
 use crate::host::{
     HostServices, Instance, Library, LoadError, LoadedModule, SearchPath, Workers, interpreter, is_python,
 };
-use crate::scenario::{self, GlueSpec, GluingSpec, InputError, Scenario, SubsystemSpec};
+use crate::scenario::{self, Entry, GlueSpec, GluingSpec, InputError, Scenario, SubsystemSpec};
 use crate::signals::{self, Directory, Faults, TimeLine};
 use crate::timing::Timings;
 use crate::{Error, Result, terrain};
@@ -48,7 +48,8 @@ impl Testbed {
         let services = change(services);
         let advice = [scenario::advice::late_events(scenario), scenario::advice::unread_keys(scenario)];
         let doubt = scenario::plausible::terrain(scenario);
-        advice.iter().flatten().chain(&doubt).for_each(|advice| log::warn!("{advice}"));
+        let long = scenario::advice::many_steps(scenario);
+        advice.iter().flatten().chain(&doubt).chain(&long).for_each(|advice| log::warn!("{advice}"));
         let instances = instantiate(scenario, options, library, &services)?;
         let directory = Directory::new(&instances);
         let links = signals::connect(&scenario.connections, &directory, &instances, &scenario.source)?;
@@ -401,7 +402,7 @@ fn group(
         };
         let source = &scenario.source;
         return Err(match (at, refusal.key) {
-            (Some(span), "strategy") => source.error_at(span, refusal.reason, Some(help)),
+            (Some(entry), "strategy") => source.error_in(entry, &["strategy"], refusal.reason, Some(help)),
             (_, key) => source.error_at_value(&["gluing", key], refusal.reason, refusal.help.or(Some(help))),
         }
         .into());
@@ -417,7 +418,7 @@ fn group(
 fn own_strategy(
     scenario: &Scenario,
     numbers: impl Iterator<Item = usize>,
-) -> Result<(Option<String>, Option<std::ops::Range<usize>>)> {
+) -> Result<(Option<String>, Option<Entry>)> {
     let mut found: Option<&GlueSpec> = None;
     for spec in numbers.map(|k| &scenario.glue[k]).filter(|s| s.strategy.is_some()) {
         match found {
@@ -425,12 +426,12 @@ fn own_strategy(
                 let message: String = "glue of one group, but another strategy is named before".into();
                 let help =
                     Some("subsystems that are connected by glue are solved together, by one strategy".into());
-                return Err(scenario.source.error_at(spec.span.clone(), message, help).into());
+                return Err(scenario.source.error_in(spec.entry, &["strategy"], message, help).into());
             }
             _ => found = Some(spec),
         }
     }
-    Ok((found.and_then(|s| s.strategy.clone()), found.map(|s| s.span.clone())))
+    Ok((found.and_then(|s| s.strategy.clone()), found.map(|s| s.entry)))
 }
 
 /// The control of the steps, where the scenario asks for it and all can follow.
@@ -483,8 +484,8 @@ fn body_states(instances: &[Instance]) -> Result<Vec<Vec<BodyState>>> {
 fn glue(scenario: &Scenario, instances: &[Instance]) -> Result<Vec<Recipe>> {
     let mut glue = Vec::new();
     let source = &scenario.source;
-    let wrong = |spec: &GlueSpec, message: String, help: Option<String>| {
-        Error::from(source.error_at(spec.span.clone(), message, help))
+    let wrong = |spec: &GlueSpec, words: &[&str], message: String, help: Option<String>| {
+        Error::from(source.error_in(spec.entry, words, message, help))
     };
     let states = body_states(instances)?;
     for (number, spec) in scenario.glue.iter().enumerate() {
@@ -500,17 +501,17 @@ fn glue(scenario: &Scenario, instances: &[Instance]) -> Result<Vec<Recipe>> {
                     .flat_map(|s| instances[*s].scene().bodies.iter().map(|b| b.name.as_str()))
                     .collect();
                 let help = scenario::did_you_mean(body, names.iter().copied());
-                return Err(wrong(spec, format!("glue: body `{side}` does not exist"), help));
+                return Err(wrong(spec, &[side], format!("glue: body `{side}` does not exist"), help));
             };
             *end = Some((slot, k as u32));
         }
         let soil_at = |e: usize| ends[e].is_some_and(|(s, _)| instances[s].kind() == Kind::Soil);
         if soil_at(0) || soil_at(1) && !spec.contact {
             let message = "a soil is side 2 of glue of kind `contact`".into();
-            return Err(wrong(spec, message, None));
+            return Err(wrong(spec, &[&spec.sides[1]], message, None));
         }
         if ends[0].map(|e| e.0) == ends[1].map(|e| e.0) {
-            return Err(wrong(spec, "glue joins two different subsystems".into(), None));
+            return Err(wrong(spec, &[&spec.sides[1]], "glue joins two different subsystems".into(), None));
         }
         let law = Law {
             t_min: if spec.contact { 0.0 } else { f64::NEG_INFINITY },

@@ -104,12 +104,15 @@ pub enum FitError {
     TooFew,
     /// All readings have one depth: the exponent is free.
     OneDepth,
+    /// The pressure falls with the depth: the exponent is not positive.
+    Falls,
 }
 
 impl std::fmt::Display for FitError {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         f.write_str(match self {
             Self::TooFew => "fewer than four readings can be used",
+            Self::Falls => "the pressure falls as the sinkage grows, which no law of a soil does",
             Self::OneDepth => "all readings have the same sinkage: the exponent n cannot be found",
         })
     }
@@ -123,6 +126,9 @@ pub fn fit(law: FitLaw, readings: &[Reading], cohesion: bool) -> Result<Fit, Fit
     let one_size = readings.iter().all(|r| (r.b / first.b - 1.0).abs() < 1e-6);
     let both = cohesion && !one_size;
     let numbers = solve::solve(&law, readings, both)?;
+    if numbers.n <= 0.0 {
+        return Err(FitError::Falls);
+    }
     let (intervals, basis) = interval::intervals(&law, readings, both, &numbers);
     Ok(Fit { law, numbers, intervals, basis, rms: numbers.rms(&law, readings), one_size })
 }
@@ -192,5 +198,15 @@ mod tests {
         assert_eq!(fit(FitLaw::Bekker, &[], true), Err(FitError::TooFew));
         assert_eq!(fit(FitLaw::Bekker, &[reading; 3], true), Err(FitError::TooFew));
         assert_eq!(fit(FitLaw::Bekker, &[reading; 9], true), Err(FitError::OneDepth));
+    }
+
+    #[test]
+    fn a_pressure_that_falls_with_the_depth_is_refused() {
+        let reading =
+            |k: i32| Reading { curve: 0, b: 0.03, depth: 1e-3 * f64::from(k), pressure: 1e3 / f64::from(k) };
+        let readings: Vec<Reading> = (3..30).map(reading).collect();
+        for law in LAWS {
+            assert_eq!(fit(law, &readings, true), Err(FitError::Falls));
+        }
     }
 }

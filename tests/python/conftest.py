@@ -16,6 +16,8 @@ tempfile.tempdir = TEMPORARY
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 PROGRAM = os.environ.get("TERRAGLUE_BIN", str(ROOT / "target" / "debug" / "terraglue"))
+# What new folders say to type calls the program by its name.
+os.environ["PATH"] = os.pathsep.join([os.path.dirname(os.path.abspath(PROGRAM)), os.environ["PATH"]])
 MOON_WALK = ROOT / "scenarios" / "moon_walk.toml"
 
 

@@ -20,7 +20,10 @@ def made(folder, kind, language):
     process = terraglue("new", kind, name, "--lang", language, cwd=folder)
     assert process.returncode == 0, process.stderr
     place = folder / name
-    assert len([p for p in place.rglob("*") if p.is_file()]) <= 8
+    own = [p for p in place.rglob("*") if p.is_file() and p.name != "Cargo.lock" and place / "terraglue" not in p.parents]
+    assert len(own) <= 8
+    for path in own:
+        assert str(ROOT) not in path.read_text(), path
     commands = re.search(r"```sh\n(.*?)```", (place / "README.md").read_text(), re.S).group(1)
     return place, commands.strip().splitlines()
 
@@ -41,6 +44,7 @@ def test_a_new_module_builds_runs_and_passes(tmp_path, kind, language):
     assert len(commands) == 3
     told = played(place, commands)
     assert " fail" not in told.splitlines()[-1] and " pass" in told.splitlines()[-1]
+    assert not re.search(r"^ +warning", told, re.M), told
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ use terraglue::scaffold::{Kind, Language};
 
 /// Simulates robots on deformable ground: rigid bodies, soils and controllers, glued into one run.
 #[derive(Parser, Debug)]
-#[command(name = "terraglue", version, after_help = EXAMPLES, disable_help_subcommand = true)]
+#[command(name = "terraglue", version = env!("TERRAGLUE_VERSION"), after_help = EXAMPLES, disable_help_subcommand = true)]
 pub struct Arguments {
     /// What to do.
     #[command(subcommand)]

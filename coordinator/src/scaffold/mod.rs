@@ -3,11 +3,11 @@
 //! The texts below `templates/` are whole programs in which the name `my-module` (`my_module` in file names) and the
 //! words between at signs are replaced.
 
-mod place;
+mod program;
 mod reserved;
 mod template;
 
-pub use place::Place;
+pub use program::spoken_program;
 pub use template::{Kind, Language};
 
 use std::path::{Path, PathBuf};
@@ -17,6 +17,8 @@ use std::path::{Path, PathBuf};
 pub struct Scaffold {
     /// Files with their texts, relative to the folder.
     pub files: Vec<(String, String)>,
+    /// Files that a module in Rust brings with it: the crates of the interface, and the versions of what they use.
+    pub crates: &'static [(&'static str, &'static str)],
     /// What to type next, inside the folder.
     pub commands: [String; 2],
 }
@@ -51,12 +53,6 @@ pub enum ScaffoldError {
         /// What is offered.
         offered: String,
     },
-    /// The sources of the interface crates are not at hand.
-    #[error(
-        "the crates terraglue-plugin and terraglue-subsystem are not beside this program; \
-         set TERRAGLUE_INTERFACES to the folder `interfaces` of the source"
-    )]
-    NoCrates,
     /// There is something in the way.
     #[error("{0} exists already; nothing was written")]
     Exists(PathBuf),
@@ -70,21 +66,21 @@ pub enum ScaffoldError {
     },
 }
 
-/// The files of a new module.
+/// The files of a new module; `program` stands in the commands to type, the files call it `terraglue`.
 ///
 /// # Errors
-/// A name that cannot be used, a language that is not offered, crates that are not found.
+/// A name that cannot be used, a language that is not offered.
 pub fn scaffold(
     kind: Kind,
     language: Language,
     name: &str,
-    place: &Place,
+    program: &str,
 ) -> Result<Scaffold, ScaffoldError> {
     check_name(name)?;
     if let Some(what) = reserved::taken(name, language) {
         return Err(ScaffoldError::Reserved { name: name.into(), what });
     }
-    template::fill(kind, language, name, place)
+    template::fill(kind, language, name, program)
 }
 
 fn check_name(name: &str) -> Result<(), ScaffoldError> {
@@ -108,7 +104,8 @@ impl Scaffold {
         if folder.exists() {
             return Err(ScaffoldError::Exists(folder.into()));
         }
-        for (file, text) in &self.files {
+        let own = self.files.iter().map(|(file, text)| (file.as_str(), text.as_str()));
+        for (file, text) in own.chain(self.crates.iter().copied()) {
             let path = folder.join(file);
             let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
             made.and_then(|()| std::fs::write(&path, text))

@@ -1,6 +1,9 @@
 //! Which files a kind of module has in which language, and what is filled into them.
 
-use super::{Place, Scaffold, ScaffoldError};
+use super::{Scaffold, ScaffoldError};
+
+/// Paths and texts of the crates that a module in Rust is made of.
+const CRATES: &[(&str, &str)] = include!(concat!(env!("OUT_DIR"), "/crates.rs"));
 
 /// What can be made.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -194,7 +197,7 @@ pub(super) fn fill(
     kind: Kind,
     language: Language,
     name: &str,
-    place: &Place,
+    program: &str,
 ) -> Result<Scaffold, ScaffoldError> {
     let Some(source) = source(kind, language) else {
         let offered: Vec<_> =
@@ -215,11 +218,6 @@ pub(super) fn fill(
         Language::Scenario => {}
     }
     files.extend(scenario(kind, language));
-    let interfaces = match (&place.interfaces, language) {
-        (Some(folder), _) => folder.to_string_lossy().into_owned(),
-        (None, Language::Rust) => return Err(ScaffoldError::NoCrates),
-        (None, _) => String::new(),
-    };
     let snake = name.replace('-', "_");
     let library = format!("lib{snake}_plugin.so");
     let (build, module) = match language {
@@ -252,7 +250,6 @@ pub(super) fn fill(
         ("@kind@", kind.word().into()),
         ("@table@", if kind == Kind::Law { "soil.law.parameters".into() } else { kind.word().into() }),
         ("@language@", language.title().into()),
-        ("@interfaces@", interfaces),
         (
             "@first@",
             if language == Language::Python { "See whether all names fit" } else { "Build it" }.into(),
@@ -260,7 +257,7 @@ pub(super) fn fill(
         ("@build@", build.into()),
         ("@rebuild@", rebuild),
         ("@module@", module),
-        ("@terraglue@", place.program.clone()),
+        ("@terraglue@", "terraglue".into()),
         ("my-module", name.into()),
         ("my_module", snake),
     ];
@@ -271,15 +268,8 @@ pub(super) fn fill(
         _ => ("README.md", "this page", include_str!("templates/README.md.in")),
     });
     let replaced = |text: &str| words.iter().fold(text.to_owned(), |text, (word, by)| text.replace(word, by));
-    let mut out: Vec<(String, String)> =
-        files.iter().map(|(path, _, text)| (replaced(path), replaced(text))).collect();
-    out.extend(lock_file(language, place));
-    let build = build.replace("@terraglue@", &place.program);
-    Ok(Scaffold { files: out, commands: [build, format!("{} run scenario.toml", place.program)] })
-}
-
-/// The versions of the crates that the program was built with, so that what is cached is used.
-fn lock_file(language: Language, place: &Place) -> Option<(String, String)> {
-    let folder = place.interfaces.as_ref().filter(|_| language == Language::Rust)?;
-    Some(("Cargo.lock".into(), std::fs::read_to_string(folder.join("../Cargo.lock")).ok()?))
+    let files = files.iter().map(|(path, _, text)| (replaced(path), replaced(text))).collect();
+    let crates = if language == Language::Rust { CRATES } else { &[] };
+    let build = build.replace("@terraglue@", program);
+    Ok(Scaffold { files, crates, commands: [build, format!("{program} run scenario.toml")] })
 }

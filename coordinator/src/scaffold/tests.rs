@@ -2,9 +2,7 @@
 
 use super::*;
 
-fn place() -> Place {
-    Place { program: "terraglue".into(), interfaces: Some("/src/interfaces".into()) }
-}
+const PROGRAM: &str = "/bin/terraglue";
 
 #[test]
 fn names_that_files_and_crates_can_carry() {
@@ -22,11 +20,11 @@ fn at_most_eight_files_and_nothing_left_to_fill_in() {
     for kind in Kind::ALL {
         for language in Language::ALL {
             if language == Language::Scenario && kind != Kind::Law {
-                let refused = scaffold(kind, language, "loose-sand", &place());
+                let refused = scaffold(kind, language, "loose-sand", PROGRAM);
                 assert!(matches!(refused, Err(ScaffoldError::Language { .. })), "{kind:?} {language:?}");
                 continue;
             }
-            let made = scaffold(kind, language, "loose-sand", &place()).expect("offered");
+            let made = scaffold(kind, language, "loose-sand", PROGRAM).expect("offered");
             assert!(made.files.len() <= 8, "{kind:?} {language:?}");
             let source = made.files.iter().find(|(path, _)| {
                 path.ends_with(".c")
@@ -52,10 +50,23 @@ fn at_most_eight_files_and_nothing_left_to_fill_in() {
 }
 
 #[test]
-fn rust_needs_the_crates_and_nothing_is_overwritten() {
-    let nowhere = Place { interfaces: None, ..place() };
-    assert!(matches!(scaffold(Kind::Soil, Language::Rust, "a", &nowhere), Err(ScaffoldError::NoCrates)));
-    let made = scaffold(Kind::Soil, Language::C, "a", &nowhere).expect("C needs no crates");
+fn a_module_in_rust_brings_the_crates_and_names_no_folder_of_the_machine() {
+    let made = scaffold(Kind::Soil, Language::Rust, "a", PROGRAM).expect("offered");
+    let paths: Vec<&str> = made.crates.iter().map(|(path, _)| *path).collect();
+    for path in ["Cargo.lock", "terraglue/plugin/Cargo.toml", "terraglue/subsystem/src/lib.rs"] {
+        assert!(paths.contains(&path), "{path} is not in {paths:?}");
+    }
+    let own = made.files.iter().map(|(path, text)| (path.as_str(), text.as_str()));
+    for (path, text) in own.chain(made.crates.iter().copied()) {
+        assert!(!text.contains("/bin/terraglue") && !text.contains(env!("CARGO_MANIFEST_DIR")), "{path}");
+        assert!(!path.ends_with("Cargo.toml") || !text.contains("workspace = true"), "{path}: {text}");
+    }
+}
+
+#[test]
+fn nothing_is_overwritten() {
+    let made = scaffold(Kind::Soil, Language::C, "a", PROGRAM).expect("offered");
+    assert!(made.crates.is_empty());
     let folder = tempfile::tempdir().expect("folder");
     assert!(matches!(made.write(folder.path()), Err(ScaffoldError::Exists(_))));
     made.write(&folder.path().join("a")).expect("written");
@@ -73,12 +84,12 @@ fn names_that_the_language_has_taken() {
         ("test", Language::Rust),
         ("proc-macro", Language::Rust),
     ] {
-        let refused = scaffold(Kind::Soil, language, name, &place());
+        let refused = scaffold(Kind::Soil, language, name, PROGRAM);
         assert!(
             matches!(&refused, Err(e @ ScaffoldError::Reserved { .. }) if e.to_string().contains("my-")),
             "{name}"
         );
     }
-    assert!(scaffold(Kind::Soil, Language::C, "math", &place()).is_ok());
-    assert!(scaffold(Kind::Soil, Language::Python, "my-math", &place()).is_ok());
+    assert!(scaffold(Kind::Soil, Language::C, "math", PROGRAM).is_ok());
+    assert!(scaffold(Kind::Soil, Language::Python, "my-math", PROGRAM).is_ok());
 }

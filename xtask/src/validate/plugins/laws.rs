@@ -2,7 +2,7 @@
 //! and how long a new law is.
 
 use super::super::{Context, Figure, Limit};
-use super::{Kind, Language, Place, scaffold, speed};
+use super::{Kind, Language, scaffold, speed};
 use crate::process::{Outcome, root};
 use terraglue::scenario::Scenario;
 use terraglue::testbed::{Options, Testbed};
@@ -100,8 +100,7 @@ fn difference(a: &[f64], b: &[f64]) -> f64 {
 
 /// Lines of a new law, in a language and in a scenario.
 fn lines(out: &mut Vec<Figure>) -> Outcome {
-    let place = Place { program: "terraglue".into(), interfaces: Some(root().join("interfaces")) };
-    let made = |language| scaffold(Kind::Law, language, "my-law", &place).map_err(|e| e.to_string());
+    let made = |language| scaffold(Kind::Law, language, "my-law", "terraglue").map_err(|e| e.to_string());
     let mut longest = 0;
     for language in [Language::Rust, Language::C, Language::Cpp, Language::Python] {
         let (_, source) = &made(language)?.files[0];

@@ -12,7 +12,7 @@ use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 use terraglue::check_module::{Area, Level, Options, Report, catalogue, check};
-use terraglue::scaffold::{Kind, Language, Place, scaffold};
+use terraglue::scaffold::{Kind, Language, scaffold};
 use terraglue::scenario::read_soil_table;
 use terraglue_soil_law::{COLUMNS, SoilRow};
 
@@ -195,10 +195,9 @@ const DRAWN: [&str; 5] = ["any-order", "passive", "slots", "serialize-garbage", 
 
 /// A new module, built; its file. Rust and Python where there is time.
 fn fresh(context: &Context, kind: Kind, language: Language, file: &str) -> Outcome<PathBuf> {
-    let place =
-        Place { program: context.program.display().to_string(), interfaces: Some(root().join("interfaces")) };
+    let program = context.program.display().to_string();
     let name = format!("my-{}", kind.word());
-    let made = scaffold(kind, language, &name, &place).map_err(|e| e.to_string())?;
+    let made = scaffold(kind, language, &name, &program).map_err(|e| e.to_string())?;
     let folder = context.scratch.join(format!("seeds-{}-{}", kind.word(), language.word()));
     drop(std::fs::remove_dir_all(&folder));
     made.write(&folder).map_err(|e| e.to_string())?;

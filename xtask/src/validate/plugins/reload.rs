@@ -1,13 +1,13 @@
 //! New code in a run: how long after its source was saved, and how much memory a hundred exchanges take.
 
 use super::super::{Context, Figure, Limit};
-use crate::process::{Outcome, root};
+use crate::process::Outcome;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
 use terraglue::observer::{Happening, Observer};
 use terraglue::reload::{ReloadOptions, Reloader};
-use terraglue::scaffold::{Kind, Language, Place, scaffold};
+use terraglue::scaffold::{Kind, Language, scaffold};
 use terraglue::scenario::Scenario;
 use terraglue::testbed::{Options, Testbed};
 
@@ -50,9 +50,8 @@ pub fn same(context: &Context, out: &mut Vec<Figure>) -> Outcome {
 
 /// The folder of a new controller, built.
 fn made(context: &Context, language: Language) -> Outcome<PathBuf> {
-    let place =
-        Place { program: context.program.display().to_string(), interfaces: Some(root().join("interfaces")) };
-    let made = scaffold(Kind::Controller, language, "my-controller", &place).map_err(|e| e.to_string())?;
+    let program = context.program.display().to_string();
+    let made = scaffold(Kind::Controller, language, "my-controller", &program).map_err(|e| e.to_string())?;
     let folder = context.scratch.join(format!("reload-{}", language.word()));
     drop(std::fs::remove_dir_all(&folder));
     made.write(&folder).map_err(|e| e.to_string())?;

@@ -175,3 +175,16 @@ def test_warnings_and_errors_have_one_form():
     assert told.startswith("warning: ") and "warn: " not in told, told
     told = refused("check", MOON_WALK, "--set", "soil.modle=x")
     assert told.startswith("error: unknown key") and " x " not in told and "×" not in told, told
+
+
+def test_an_earlier_run_in_a_named_folder_is_kept(tmp_path):
+    for _ in range(2):
+        done = terraglue("run", MOON_WALK, "--duration", "0.01", "--quiet", "--out", "out/", cwd=tmp_path)
+        assert done.returncode == 0, done.stderr
+    assert sorted(p.name for p in tmp_path.iterdir()) == ["out", "out.1"]
+    (tmp_path / "mine").mkdir()
+    (tmp_path / "mine" / "thesis.tex").write_text("text")
+    message = refused("run", MOON_WALK, "--duration", "0.01", "--out", tmp_path / "mine")
+    assert "thesis.tex" in message and "help:" in message
+    assert [p.name for p in (tmp_path / "mine").iterdir()] == ["thesis.tex"]
+    assert "renamed" in terraglue("run", "--help").stdout

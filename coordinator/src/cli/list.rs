@@ -206,7 +206,12 @@ fn listing(search: &SearchPath) -> Exit {
         table.add_row([name, d.kind, d.version, d.abi, d.license, file, check, note]);
     }
     if found.is_empty() {
-        outln!("no module found; see --module-path");
+        let folders: Vec<_> = search.folders().iter().map(|f| format!("\n  {}", f.display())).collect();
+        outln!(
+            "no module found in:{}\n`cargo build` makes those of the project beside the program, `cargo xtask install PREFIX` \
+             installs them with it; --module-path DIR or TERRAGLUE_MODULE_PATH adds a folder",
+            folders.concat()
+        );
     } else {
         outln!("{table}\n`terraglue modules NAME` shows what a module takes.");
     }

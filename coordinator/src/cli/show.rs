@@ -5,6 +5,7 @@ use comfy_table::{Cell, Color, ContentArrangement, Table, presets};
 use miette::{GraphicalReportHandler, GraphicalTheme};
 use terraglue::Error;
 use terraglue::recording::{Energies, Summary};
+use terraglue::scenario::InputError;
 
 /// An error on standard error; wrong input with file, line and the offending text.
 pub fn error(error: &Error) {
@@ -13,7 +14,8 @@ pub fn error(error: &Error) {
             let mut text = String::new();
             let mut theme = GraphicalTheme::default();
             theme.characters.error = "error:".into();
-            let short = shorten::error(input);
+            let mut short = shorten::error(input);
+            short.help = short.help.or_else(|| Some(way_out(input)));
             match GraphicalReportHandler::new_themed(theme).render_report(&mut text, &short) {
                 Ok(()) => eprint!("{}", text.trim_start()),
                 Err(_) => eprintln!("error: {short}"),
@@ -24,6 +26,17 @@ pub fn error(error: &Error) {
             other.help().iter().for_each(|help| eprintln!("  help: {help}"));
         }
     }
+}
+
+/// Where to read on, for an error that has no cure of its own.
+fn way_out(error: &InputError) -> String {
+    if let Some(at) = error.message.find("[TG") {
+        let number: String = error.message[at + 1..].chars().take_while(|c| *c != ']').collect();
+        return format!("docs/plugins/errors.md tells causes and cures of {number}");
+    }
+    let in_scenario = error.span.is_some() && !error.source_code.name().is_empty();
+    let page = "docs/scenario.md has the keys of a scenario and what they take";
+    if in_scenario { page.into() } else { "`terraglue COMMAND --help` tells what the command takes".into() }
 }
 
 /// A table as wide as the terminal.

@@ -120,6 +120,11 @@ pub enum LoadError {
 }
 
 impl LoadError {
+    /// Whether there is no module of that name.
+    pub fn is_unknown(&self) -> bool {
+        matches!(self, Self::Unknown { .. })
+    }
+
     /// The way out, where one is known: the nearest module name.
     pub fn nearest(&self) -> Option<&str> {
         match self {

@@ -288,8 +288,14 @@ fn unit(scenario: &Scenario, spec: &SubsystemSpec, services: &HostServices) -> R
     Ok(Instance::new(&spec.name, &spec.module, Kind::Controller, made))
 }
 
+/// What to do where a module is not found.
+const NO_MODULE: &str = "`terraglue modules` lists those that are found. `cargo build` makes those of the project beside the \
+                         program, `cargo xtask install PREFIX` installs them with it; --module-path DIR or \
+                         TERRAGLUE_MODULE_PATH adds a folder, and `module` may be the path of a file";
+
 fn module_error(scenario: &Scenario, spec: &SubsystemSpec, error: &LoadError) -> Box<InputError> {
-    let help = error.nearest().map(|n| format!("did you mean `{n}`?"));
+    let near = error.nearest().map(|n| format!("did you mean `{n}`?"));
+    let help = near.or_else(|| error.is_unknown().then(|| NO_MODULE.to_owned()));
     let key = match error {
         LoadError::Refused { .. } | LoadError::Instantiate { .. } => vec![spec.name.as_str()],
         _ => vec![spec.name.as_str(), "module"],

@@ -1,0 +1,298 @@
+"""Inputs that are wrong in every way that was thought of. None may panic, hang, or leave the user without place and cure."""
+
+import os
+import pathlib
+import re
+import struct
+import zipfile
+from concurrent.futures import ThreadPoolExecutor
+
+import pytest
+from conftest import MOON_WALK, PROGRAM, ROOT, terraglue
+
+WALK = MOON_WALK.read_text().replace("../models", str(ROOT / "models"))
+ROBOT = (ROOT / "models" / "hexapod.urdf").read_text()
+PLATE = "sinkage_mm,pressure_kPa,plate_diam_mm\n"
+LIMIT_S = 20
+
+# ---------------------------------------------------------------------------------------------------------------------
+# Tables: input, exit code, words that must appear.
+
+# What follows `check WALK --set`.
+SETS = [
+    ("gluing.strategy", 2, "there is no `=`"),
+    ("gluing.strategy=newton", 2, "unknown strategy `newton`"),
+    ("gluing.strategy=3", 2, "not 3"),
+    ("gluing.strategy=", 2, "strategy"),
+    ("=3", 2, "no key path"),
+    ("gluing..strategy=x", 2, "no key path"),
+    ("gluing.stratgy=x", 2, "`strategy`"),
+    ("gluing.tolerance=-1", 2, "out of range"),
+    ("gluing.tolerance=nan", 2, "nan or inf"),
+    ("gluing.max_iterations=0", 2, "max_iterations"),
+    ("gluing.max_iterations=1.5", 2, "1.5"),
+    ("gluing.max_iterations=99999999999999999999", 2, "max_iterations"),
+    ("gluing.form=odd", 2, "form"),
+    ("time.step_s=0", 2, "out of range"),
+    ("time.step_s=-0.001", 2, "out of range"),
+    ("time.step_s=inf", 2, "nan or inf"),
+    ("time.step_s=1e-12", 2, "1.000e13 steps"),
+    ("time.step_s=fast", 2, "the text \"fast\""),
+    ("time.step_s=[0.001]", 2, "step_s"),
+    ("time.step_s={a=1}", 2, "step_s"),
+    ("time.duration_s=0", 2, "duration_s"),
+    ("time.duration_s=1e300", 2, "duration_s"),
+    ("time.duration_s=0.00015", 2, "no multiple"),
+    ("time.settle_s=-1", 2, "settle_s"),
+    ("time=3", 2, "is a table"),
+    ("world.gravity_m_s2=9.81", 2, "gravity_m_s2"),
+    ("world.gravity_m_s2=[0,0]", 2, "gravity_m_s2"),
+    ("world.gravity_m_s2=[0,0,nan]", 2, "gravity_m_s2"),
+    ("world.seed=-1", 2, "seed"),
+    ("terrain.kind=lava", 2, "kind"),
+    ("terrain.size_m=[0,0]", 2, "size_m"),
+    ("terrain.size_m=[-6,4]", 2, "size_m"),
+    ("terrain.size_m=[1e9,1e9]", 2, "size_m"),
+    ("terrain.spacing_m=1e-9", 2, "spacing_m"),
+    ("terrain.spacing_m=0", 2, "out of range"),
+    ("terrain.wavelengths_m=[3.0,0.3]", 2, "wavelengths_m"),
+    ("terrain.file=x.asc", 2, "no file `x.asc`"),
+    ("terrain.pixel_m=1.0", 2, "does not belong to kind"),
+    ("soil.module=soil-beker", 2, "`soil-bekker`"),
+    ("soil.module=/no/such.so", 2, "TG02"),
+    ("soil.module=/etc/passwd", 2, "TG"),
+    ("soil.module=", 2, "module"),
+    ("soil.module=gait", 2, "soil"),
+    ("soil.parameters=lunar", 2, "there is no soil `lunar`"),
+    ("soil.parameters=nothing.toml", 2, "nothing.toml"),
+    ("soil.parameters=[1]", 2, "parameters"),
+    ("soil.parameters_file=/no/such.csv", 2, "/no/such.csv"),
+    ("soil.parameters_file=/tmp", 2, "a folder"),
+    ("soil.n=-1", 2, "`n`"),
+    ("soil.n=two", 2, "the text \"two\""),
+    ("soil.k_phi=nan", 2, "k_phi"),
+    ("soil.phi_rad=35", 2, "0.611 rad"),
+    ("soil.c_pa=-5", 2, "c_pa"),
+    ("soil.modle=x", 2, "`module`"),
+    ("soil.law={pressure=\"k_phi*\"}", 2, "pressure"),
+    ("soil.law={pressure=\"k_phi*z^n/0s\"}", 2, "pressure"),
+    ("soil.law={pressure=\"z\"}", 2, "pressure"),
+    ("soil.law={plugin=\"no-law\"}", 2, "no-law"),
+    ("robot.module=rigid-bdy", 2, "`rigid-body`"),
+    ("robot.model=/no/such.urdf", 2, "/no/such.urdf"),
+    ("robot.model=/tmp", 2, "a folder"),
+    ("robot.model=", 2, "a folder"),
+    ("robot.stiffness=-600", 2, "stiffness"),
+    ("robot.motor=steam", 2, "motor"),
+    ("robot.joints={nothing=1.0}", 2, "nothing"),
+    ("robot.isolate=maybe", 2, "isolate"),
+    ("gait.gait=gallop", 2, "gait"),
+    ("gait.speed_m_s=fast", 2, "speed_m_s"),
+    ("gait.step_multiple=0", 2, "step_multiple"),
+    ("connect.0.from=robot.nothing", 2, "to fill them"),
+    ("connect.2.from=robot.nothing", 2, "no variable matches"),
+    ("connect.0.to=robot.*.*.x", 2, "`*`"),
+    ("connect.1.to=gait.*.angle_target", 2, "does not exist"),
+    ("connect.2.to=robot.body.yaw", 2, "is not an input"),
+    ("connect.2.from=robot.body.x", 2, "cannot be connected"),
+    ("connect=3", 2, "[[connect]]"),
+    ("report.body=robot.bdy", 2, "robot.body"),
+    ("report.joint=robot.none", 2, "robot.none"),
+    ("recording.every_steps=0", 2, "every_steps"),
+    ("recording.every=5", 2, "every_steps"),
+    ("glue=[{side_1=\"robot.body\",side_2=\"moon.x\"}]", 2, "moon"),
+    ("glue=[{side_1=\"robot.none\",side_2=\"world\"}]", 2, "robot.none"),
+    ("event=[{at_s=1.0}]", 2, "does nothing"),
+    ("event=[{set={\"robot.LF_j2.max_torque\"=0.0}}]", 2, "`at_s` or `when`"),
+    ("event=[{at_s=1.0,set={\"robot.LF_j2.max_torqe\"=0.0}}]", 2, "max_torque`?"),
+    ("event=[{at_s=1.0,set={\"robot.LF_j2.max_torque\"=nan}}]", 2, "finite"),
+    ("event=[{at_s=1.0,act=\"robot.LF_j2.explode\"}]", 2, "explode"),
+    ("event=[{when=\"robot.body.z\",act=\"robot.LF_j2.break\"}]", 2, "no comparison"),
+    ("event=[{when=\"robot.body.z < high\",act=\"robot.LF_j2.break\"}]", 2, "no number"),
+    ("fault=[{variable=\"robot.LF_j1.angle_target\",kind=\"melt\",at_s=1.0}]", 2, "kind"),
+    ("fault=[{variable=\"robot.LF_j1.angle\",kind=\"freeze\",at_s=1.0}]", 2, "robot.LF_j1.angle"),
+    ("fault=[{variable=\"robot.LF_j1.angle_target\",kind=\"freeze\",at_s=2.0,until_s=1.0}]", 2, "never act"),
+    ("fault=[{variable=\"robot.LF_j1.angle_target\",kind=\"drop-out\",probability=2.0,at_s=1.0}]", 2, "probability"),
+    ("unknown.key=1", 2, "unknown table"),
+    ("ключ.π=1", 2, "ключ"),
+]
+
+# A whole scenario as text.
+TEXTS = [
+    ("", 2, "is empty"),
+    ("\n\n", 2, "is empty"),
+    ("[time", 2, "not TOML"),
+    ("[time]\nstep_s = 0.001\nstep_s = 0.002\n", 2, "duplicate key"),
+    ("[time]\n[time]\n", 2, "duplicate key"),
+    ("[time]\nstep_s = 0.001.2\n", 2, "not TOML"),
+    ("[time]\nstep_s = 1_000_\n", 2, "not TOML"),
+    ("a = \"\u0000\"", 2, "not TOML"),
+    ("\ufeff[time]\nduration_s = 1.0\n", 2, "no subsystem"),
+    ("a = " + "[" * 50_000, 2, "recursion"),
+    ("a" * 100_000, 2, "not TOML"),
+    ("[time]\nduration_s = 1.0\n[soil]\nmodul = \"x\"\n", 2, "unknown table `[soil]`"),
+    ("time = 3\n[soil]\nmodule = \"soil-bekker\"\n", 2, "is a table"),
+    ("[time]\nduration_s = 1.0\n[event]\nat_s = 1.0\n[soil]\nmodule = \"soil-bekker\"\n", 2, "two brackets"),
+    ("<robot/>", 2, "not TOML"),
+    ("{\"time\": {}}", 2, "not TOML"),
+    ("[time]\nduration_s = 1.0\n[a]\nfmu = \"none.fmu\"\n", 2, "none.fmu"),
+    ("[time]\nduration_s = 1.0\n[a]\nmodule = \"soil-bekker\"\n[b]\nmodule = \"soil-bekker\"\n", 2, "b"),
+    ("[time]\nduration_s = 1.0\n[\"a.b\"]\nmodule = \"gait\"\n", 2, "no name for a subsystem"),
+]
+
+# A robot file as text: put beside the scenario.
+ROBOTS = [
+    ("", "robot"), ("<robot", "robot"), ("<robot name='a'/>", "robot"), ("<mujoco/>", "robot"), ("<html/>", "robot"),
+    ("<robot name='a'>" + "<link>" * 5000, "robot"),
+    (ROBOT.replace("<mass value=", "<mass value=\"-1\" old=", 1), "robot"),
+    (ROBOT.replace("<mass value=", "<mass value=\"heavy\" old=", 1), "robot"),
+    (ROBOT.replace("<mass value=", "<mass value=\"nan\" old=", 1), "robot"),
+    (ROBOT.replace("parent link=\"", "parent link=\"no_", 1), "no_"),
+    (ROBOT[: len(ROBOT) // 2], "robot"),
+    ("<robot name='a'><link name='l'><inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial><collision><geometry><mesh filename='m.stl'/></geometry></collision></link></robot>", "m.stl"),
+]
+
+# Ground: kind, ending, bytes, further keys.
+GROUNDS = [
+    ("esri-ascii", "asc", b"", ""), ("esri-ascii", "asc", b"\xff\xfe", ""), ("esri-ascii", "asc", b"ncols 1e9\nnrows 2\n", ""),
+    ("esri-ascii", "asc", b"ncols 2\nnrows 2\ncellsize 1\n1 2 3\n", ""), ("esri-ascii", "asc", b"ncols 2\nnrows 2\ncellsize 1\n1 2 3 x\n", ""),
+    ("esri-ascii", "asc", b"ncols 2\nnrows 2\ncellsize 0\n1 2 3 4\n", ""), ("esri-ascii", "asc", b"ncols 2\nnrows 2\ncellsize 1\n1 2 3 -9999\n", ""),
+    ("png", "png", b"", "pixel_m = 1.0\nhigh_m = 1.0\n"), ("png", "png", b"\x89PNG\r\n\x1a\n", "pixel_m = 1.0\nhigh_m = 1.0\n"),
+    ("png", "png", b"\x89PNG\r\n\x1a\n" + struct.pack(">I", 13) + b"IHDR" + struct.pack(">IIBBBBB", 2**31 - 1, 2**31 - 1, 16, 0, 0, 0, 0) + b"AAAA", "pixel_m = 1.0\nhigh_m = 1.0\n"),
+    ("geotiff", "tif", b"", ""), ("geotiff", "tif", b"II*\x00" + b"\xff" * 64, ""), ("geotiff", "tif", b"MM\x00*\x00\x00\x00\x08\x00\x00", ""),
+]
+
+# Arguments alone; `{}` is the folder of the test.
+COMMANDS = [
+    ("run", 2, "Usage"), ("", 2, "Usage"), ("fly", 2, "fly"), ("run a.toml b.toml", 2, "b.toml"), ("run {}/none.toml", 2, "none.toml"),
+    ("run {}", 2, "a folder"), ("run /dev/null", 2, "/dev/null"), ("run /dev/zero", 2, "a device"), ("run {}/pipe", 2, "pipe"),
+    ("run {walk} --threads 100000", 2, "1024"), ("run {walk} --threads x", 2, "--threads"), ("run {walk} --duration -1", 2, "duration_s"),
+    ("run {walk} --duration nan", 2, "duration_s"), ("run {walk} --out /dev/null/x", 2, "/dev/null/x"), ("run {walk} --out {}", 2, "no run"),
+    ("run {walk} --out /proc/x", 2, "/proc/x"), ("run {walk} --set", 2, "--set"), ("run {walk} --reload-reset", 2, "--watch"),
+    ("check {walk} --module-path", 2, "--module-path"), ("compare {walk} --strategies none", 2, "`none`"),
+    ("compare {walk} --soils gait", 2, "gait"), ("compare {walk} --steps 0", 2, "step_s"), ("compare {walk} --steps x", 2, "--steps"),
+    ("compare {walk} --reference nothing", 2, "nothing"), ("report {}", 2, "recording.mcap"), ("report {}/cut", 2, "recording.mcap"),
+    ("report {}/noise", 2, "recording.mcap"), ("report /dev/null", 2, "recording.mcap"), ("variables {}/none.toml", 2, "none.toml"),
+    ("modules soil-beker", 2, "soil-bekker"), ("modules {}/none.so", 2, "none.so"), ("soils lunar_nominl_Apollo", 2, "lunar_nominal_Apollo"),
+    ("soils --file {}/none.csv", 2, "none.csv"), ("soils --file {}/text.txt", 2, "text.txt"), ("check-module {}/none.so", 2, "none.so"),
+    ("check-module soil-bekker --only nothing", 2, "nothing"),
+    ("check-module soil-bekker --jobs 0", 2, "--jobs"), ("new soil Soil", 2, "Soil"), ("new soil soil-bekker", 2, "soil-bekker"),
+    ("new moon x", 2, "moon"), ("new soil x --lang fortran", 2, "fortran"), ("export nothing -o {}/x.fmu", 2, "nothing"),
+    ("export soil-bekker -o {}/none/x.fmu --set soil.parameters=LETE_sand", None, "x.fmu"), ("convert {}/none.ssp", 2, "none.ssp"), ("convert {}/text.ssp", 2, "text.ssp"),
+    ("fmu info {}/none.fmu", 2, "none.fmu"), ("fmu info {}/text.fmu", 2, "text.fmu"), ("fmu info {}/empty.fmu", 2, "empty.fmu"),
+    ("fmu run {}/bad.fmu", 2, "bad.fmu"), ("fmu check {}/bad.fmu", 2, "bad.fmu"), ("fmu run {}/text.fmu --step 0", 2, "text.fmu"),
+    ("fit-soil {}/none.csv", 2, "none.csv"), ("fit-soil {}/text.txt", 2, "text.txt"), ("fit-soil {}/head.csv --law bekker", 2, "four readings"),
+    ("fit-soil {}/falls.csv --law bekker", 2, "falls"), ("fit-soil {}/words.csv --law bekker", 2, "words.csv"),
+    ("fit-soil {}/head.csv --from-mm nan", 2, "--from-mm"), ("fit-soil {}/head.csv --law none", 2, "none"),
+    ("fit-soil {}/head.csv --wheel radius=x", 2, "radius"),
+]
+
+# ---------------------------------------------------------------------------------------------------------------------
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("attacks")
+    os.mkfifo(folder / "pipe")
+    (folder / "walk.toml").write_text(WALK)
+    for name in ["text.txt", "text.ssp", "text.fmu"]:
+        (folder / name).write_text("some words\n")
+    (folder / "empty.fmu").write_bytes(b"")
+    with zipfile.ZipFile(folder / "bad.fmu", "w") as unit:
+        unit.writestr("modelDescription.xml", "<fmiModelDescription fmiVersion='9.0'/>")
+    for name, data in [("cut", b""), ("noise", bytes(range(256)) * 40)]:
+        (folder / name).mkdir()
+        (folder / name / "recording.mcap").write_bytes(data)
+    (folder / "head.csv").write_text(PLATE)
+    (folder / "words.csv").write_text(PLATE + "one,two,three\n")
+    (folder / "falls.csv").write_text(PLATE + "".join(f"{z},{100.0 / z},50\n" for z in range(4, 40)))
+    return folder
+
+
+def fault_of(process, code, words):
+    """Why an answer is no good one; None: it is."""
+    told = process.stderr
+    unwrapped = re.sub(r"\n[\s|│]*", " ", told)
+    reasons = [
+        ("panicked", "panicked" in told or process.returncode == 101),
+        ("a signal", process.returncode < 0),
+        (f"exit code {process.returncode}", process.returncode != code if code is not None else process.returncode not in (1, 2)),
+        (f"no `{words}`", words not in unwrapped and words not in told),
+        ("no cure", not re.search(r"help:|--help|Usage|tip:", told)),
+        ("no form", not re.match(r"(warning: .*\n)*(error: |Usage|Simulates)", told)),
+        ("too long", len(told) > 12_000),
+        ("Debug output", re.search(r"Some\(|Error \{|ErrorKind|Os \{", told) is not None),
+    ]
+    found = [reason for reason, holds in reasons if holds]
+    return f"{', '.join(found)}:\n{told[:1500]}" if found else None
+
+
+def attack(rows):
+    """Makes all attacks on two cores; the list of bad answers."""
+    def one(row):
+        name, arguments, code, words, cwd = row
+        process = terraglue(*arguments, cwd=cwd, timeout=LIMIT_S)
+        fault = fault_of(process, code, words)
+        return fault and f"{name[:200]}: {fault}"
+    with ThreadPoolExecutor(2) as pool:
+        return [fault for fault in pool.map(one, rows) if fault]
+
+
+def test_there_are_enough_of_them():
+    assert len(SETS) + len(TEXTS) + len(ROBOTS) + len(GROUNDS) + len(COMMANDS) >= 136
+
+
+def test_edits(place):
+    rows = [(text, ["check", place / "walk.toml", "--set", text], code, words, place) for text, code, words in SETS]
+    faults = attack(rows)
+    assert not faults, "\n\n".join(faults)
+
+
+def test_texts(place):
+    rows = []
+    for k, (text, code, words) in enumerate(TEXTS):
+        path = place / f"text{k}.toml"
+        path.write_text(text)
+        rows.append((text, ["run", path], code, words, place))
+    faults = attack(rows)
+    assert not faults, "\n\n".join(faults)
+
+
+def test_robots(place):
+    rows = []
+    for k, (text, words) in enumerate(ROBOTS):
+        (place / f"robot{k}.urdf").write_text(text)
+        rows.append((text, ["check", place / "walk.toml", "--set", f"robot.model=robot{k}.urdf"], 2, words, place))
+    faults = attack(rows)
+    assert not faults, "\n\n".join(faults)
+
+
+def test_grounds(place):
+    begin, end = WALK.index("[terrain]"), WALK.index("\n[", WALK.index("[terrain]"))
+    rows = []
+    for k, (kind, ending, data, keys) in enumerate(GROUNDS):
+        (place / f"ground{k}.{ending}").write_bytes(data)
+        path = place / f"ground{k}.toml"
+        table = f'[terrain]\nkind = "{kind}"\nfile = "ground{k}.{ending}"\n{keys}'
+        path.write_text(WALK[:begin] + table + WALK[end:])
+        rows.append((f"{kind} {data[:40]}", ["check", path], 2, f"ground{k}.{ending}", place))
+    faults = attack(rows)
+    assert not faults, "\n\n".join(faults)
+
+
+def test_commands(place):
+    rows = []
+    for text, code, words in COMMANDS:
+        arguments = [word.replace("{walk}", str(place / "walk.toml")).replace("{}", str(place)) for word in text.split()]
+        rows.append((text, arguments, code, words, place))
+    faults = attack(rows)
+    assert not faults, "\n\n".join(faults)
+
+
+@pytest.mark.skipif(os.geteuid() == 0, reason="root reads everything")
+def test_what_may_not_be_read(place):
+    path = place / "secret.toml"
+    path.write_text(WALK)
+    path.chmod(0)
+    faults = attack([("unreadable", ["run", path], 2, "secret.toml", place)])
+    assert not faults, "\n\n".join(faults)

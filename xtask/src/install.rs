@@ -1,6 +1,7 @@
-//! `cargo xtask install PREFIX`: bin, lib/terraglue, include and share/terraglue below a prefix.
+//! `cargo xtask install PREFIX`: bin, lib/terraglue, include and share/terraglue below a prefix; `cargo xtask dist`: the same,
+//! with the documentation, as an archive.
 
-use crate::process::{Outcome, cargo, must, root, target};
+use crate::process::{Outcome, cargo, command, must, root, target};
 use std::path::Path;
 use terraglue::scenario::SHIPPED_MODULES;
 
@@ -9,8 +10,53 @@ const UNIT: &str = "libterraglue_unit.so";
 
 /// Builds in the release profile and copies what a user needs.
 pub fn install(prefix: &Path) -> Outcome {
-    must(&mut cargo(&["build", "--release", "--package", "terraglue", "--package", "terraglue-unit"]))?;
-    let release = target().join("release");
+    build()?;
+    lay_out(prefix, "release")?;
+    println!("installed below {}", prefix.display());
+    Ok(())
+}
+
+/// Writes `target/dist/terraglue-VERSION-ARCHITECTURE.tar.gz`; `built`: of what is built in this profile already.
+pub fn dist(built: Option<&str>) -> Outcome {
+    if built.is_none() {
+        build()?;
+    }
+    let name = format!("terraglue-{}-{}-linux", env!("CARGO_PKG_VERSION"), std::env::consts::ARCH);
+    let dist = target().join("dist");
+    let folder = dist.join(&name);
+    if folder.exists() {
+        std::fs::remove_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    }
+    lay_out(&folder, built.unwrap_or("release"))?;
+    for page in ["README.md", "CHANGELOG.md", "LICENSE-MIT", "LICENSE-APACHE"] {
+        copy(&root().join(page), &folder.join(page))?;
+    }
+    copy_tree(&root().join("docs"), &folder.join("docs"))?;
+    let archive = dist.join(format!("{name}.tar.gz")).display().to_string();
+    must(&mut command(
+        "tar",
+        &[
+            "--sort=name",
+            "--owner=0",
+            "--group=0",
+            "-czf",
+            &archive,
+            "-C",
+            &dist.display().to_string(),
+            &name,
+        ],
+    ))?;
+    println!("{archive}");
+    Ok(())
+}
+
+fn build() -> Outcome {
+    must(&mut cargo(&["build", "--release", "--package", "terraglue", "--package", "terraglue-unit"]))
+}
+
+/// Copies what was built in a profile and what belongs to it.
+fn lay_out(prefix: &Path, profile: &str) -> Outcome {
+    let release = target().join(profile);
     copy(&release.join("terraglue"), &prefix.join("bin/terraglue"))?;
     for module in SHIPPED_MODULES {
         let file = format!("lib{}_plugin.so", module.replace('-', "_"));
@@ -22,9 +68,14 @@ pub fn install(prefix: &Path) -> Outcome {
     copy(&release.join(UNIT), &prefix.join("lib/terraglue").join(UNIT))?;
     copy_files(&root().join("interfaces/plugin/include"), &prefix.join("include"))?;
     copy_files(&root().join("models"), &prefix.join("share/terraglue/models"))?;
-    copy_files(&root().join("scenarios"), &prefix.join("share/terraglue/scenarios"))?;
-    println!("installed below {}", prefix.display());
-    Ok(())
+    copy_files(&root().join("scenarios"), &prefix.join("share/terraglue/scenarios"))
+}
+
+fn copy_tree(from: &Path, to: &Path) -> Outcome {
+    copy_files(from, to)?;
+    let entries = std::fs::read_dir(from).map_err(|e| format!("{}: {e}", from.display()))?;
+    let mut folders = entries.flatten().filter(|e| e.path().is_dir());
+    folders.try_for_each(|e| copy_tree(&e.path(), &to.join(e.file_name())))
 }
 
 fn copy_files(from: &Path, to: &Path) -> Outcome {

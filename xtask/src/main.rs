@@ -1,4 +1,4 @@
-//! The developer commands, the same as in CI: `cargo xtask test | validate | faults | header | schema | install`.
+//! The developer commands, the same as in CI: `cargo xtask test | validate | faults | header | schema | install | dist`.
 
 mod faults;
 mod header;
@@ -50,6 +50,12 @@ enum Command {
         #[arg(long)]
         check: bool,
     },
+    /// Build and pack program, modules, models, scenarios and docs: target/dist/terraglue-….tar.gz.
+    Dist {
+        /// Pack what is built already: debug or release.
+        #[arg(long, value_name = "PROFILE", value_parser = ["debug", "release"])]
+        built: Option<String>,
+    },
     /// Build and lay out bin, lib, include and share below PREFIX.
     Install {
         /// Where to, e.g. ~/.local.
@@ -69,6 +75,7 @@ fn main() -> ExitCode {
             Ok(())
         }
         Command::Schema { check } => schema::write_files(check),
+        Command::Dist { built } => install::dist(built.as_deref()),
         Command::Install { prefix } => install::install(&prefix),
     };
     match done {

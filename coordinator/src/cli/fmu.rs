@@ -92,7 +92,9 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
         Err(_) if stopped.load(Ordering::Relaxed) => Ok(Exit::Interrupted),
         Err(error) => {
             eprintln!("error: {}: {error}", arguments.unit.display());
-            eprintln!("  help: `terraglue fmu check` lists what is wrong with a unit, `--isolate` keeps it apart");
+            eprintln!(
+                "  help: `terraglue fmu check` lists what is wrong with a unit, `--isolate` keeps it apart"
+            );
             Ok(Exit::Failed)
         }
     }

@@ -1,0 +1,66 @@
+"""The archive for users runs where nothing else is: an empty environment, another folder, no source beside it."""
+
+import json
+import pathlib
+import subprocess
+import tarfile
+
+import pytest
+from conftest import PROGRAM, ROOT
+
+XTASK = pathlib.Path(PROGRAM).with_name("xtask")
+
+
+@pytest.fixture(scope="module")
+def unpacked(tmp_path_factory):
+    if not XTASK.is_file():
+        pytest.skip("xtask is not built beside the program")
+    profile = XTASK.parent.name
+    packed = subprocess.run([XTASK, "dist", "--built", profile], capture_output=True, text=True)
+    assert packed.returncode == 0, packed.stderr
+    folder = tmp_path_factory.mktemp("unpacked")
+    with tarfile.open(packed.stdout.split()[-1]) as archive:
+        archive.extractall(folder, filter="data")
+    top, = folder.iterdir()
+    return top
+
+
+def bare(program, *arguments, cwd):
+    command = ["env", "-i", program, *map(str, arguments)]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, timeout=120)
+
+
+def test_the_archive_holds_what_a_user_needs(unpacked):
+    for path in ["README.md", "LICENSE-MIT", "docs/scenario.md", "docs/plugins/errors.md", "include/terraglue.h",
+                 "lib/terraglue/libsoil_bekker_plugin.so", "share/terraglue/models/soils.csv"]:
+        assert (unpacked / path).is_file(), path
+
+
+@pytest.mark.parametrize("scenario", ["moon_walk", "plate_sinkage"])
+def test_a_scenario_runs_in_an_empty_environment_from_another_folder(unpacked, tmp_path, scenario):
+    path = unpacked / "share" / "terraglue" / "scenarios" / f"{scenario}.toml"
+    done = bare(unpacked / "bin" / "terraglue", "run", path, "--duration", "0.05", "--json", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert json.loads(done.stdout)["status"] == "done"
+    assert (tmp_path / "runs" / scenario / "report.html").is_file()
+    assert str(ROOT) not in done.stderr
+
+
+def test_modules_and_soils_are_those_of_the_archive(unpacked, tmp_path):
+    program = unpacked / "bin" / "terraglue"
+    modules = bare(program, "modules", "--json", cwd=tmp_path)
+    paths = {m["name"]: m["path"] for m in json.loads(modules.stdout)}
+    assert {"rigid-body", "gait", "soil-bekker", "soil-cellular-automaton"} <= set(paths)
+    assert all(path.startswith(str(unpacked)) for path in paths.values()), paths
+    assert "lunar_nominal_Apollo" in bare(program, "soils", cwd=tmp_path).stdout
+    assert "terraglue 0." in bare(program, "--version", cwd=tmp_path).stdout
+
+
+def test_a_program_without_its_modules_says_what_to_do(unpacked, tmp_path):
+    (tmp_path / "terraglue").write_bytes((unpacked / "bin" / "terraglue").read_bytes())
+    (tmp_path / "terraglue").chmod(0o755)
+    scenario = unpacked / "share" / "terraglue" / "scenarios" / "plate_sinkage.toml"
+    done = bare(tmp_path / "terraglue", "check", scenario, cwd=tmp_path)
+    assert done.returncode == 2, done.stderr
+    for word in ["cargo xtask install", "--module-path", "TERRAGLUE_MODULE_PATH"]:
+        assert word in " ".join(done.stderr.split()), done.stderr

@@ -160,3 +160,19 @@ def test_listings():
     check = terraglue("check", MOON_WALK)
     assert check.returncode == 0 and "is good" in check.stdout
     assert (ROOT / "docs" / "scenario.schema.json").is_file()
+
+
+def test_listings_can_be_narrowed():
+    some = terraglue("variables", MOON_WALK, "robot.*_j2.max_torque", "--json")
+    assert some.returncode == 0, some.stderr
+    found = json.loads(some.stdout)
+    assert len(found["variables"]) == 6 and found["actions"] == []
+    assert found["variables"][0].keys() >= {"name", "type", "unit", "role", "help"}
+    plain = terraglue("variables", MOON_WALK, "lf_j2.MAX")
+    assert "robot.LF_j2.max_torque" in plain.stdout and "│" not in plain.stdout and "RF_" not in plain.stdout
+    none = terraglue("variables", MOON_WALK, "robot.LF_j2.max_torqe")
+    assert none.returncode == 2 and "`robot.LF_j2.max_torque`" in none.stderr
+    lunar = terraglue("soils", "lunar")
+    assert lunar.returncode == 0 and "lunar_nominal_Apollo" in lunar.stdout and "LETE_sand" not in lunar.stdout
+    wrong = terraglue("soils", "lunar_nominl_Apollo")
+    assert wrong.returncode == 2 and "`lunar_nominal_Apollo`" in wrong.stderr

@@ -55,7 +55,7 @@ pub enum Command {
         asked: bool,
     },
     /// List the variables and actions of a scenario's subsystems.
-    Variables(ScenarioArguments),
+    Variables(VariablesArguments),
     /// Run, show or check a functional mock-up unit (FMI 2.0 and 3.0, co-simulation).
     #[command(subcommand)]
     Fmu(FmuCommand),
@@ -75,7 +75,7 @@ pub enum Command {
     FitSoil(FitSoilArguments),
     /// List the soils that a scenario can name, and those that are refused with the reason.
     Soils {
-        /// Everything about this one.
+        /// Everything about this one, or those with this in their names.
         #[arg(value_name = "NAME")]
         name: Option<String>,
         /// Another soil table.
@@ -95,6 +95,19 @@ pub struct ScenarioArguments {
     /// Search this folder for modules first; may be repeated.
     #[arg(long, value_name = "DIR")]
     pub module_path: Vec<PathBuf>,
+}
+
+/// What `variables` takes.
+#[derive(Args, Debug, Clone)]
+pub struct VariablesArguments {
+    /// The scenario.
+    #[command(flatten)]
+    pub scenario: ScenarioArguments,
+    /// Only names with this in them, or that match it: robot.*.max_torque; a `*` is a part of a name between dots, or a piece of one.
+    pub pattern: Option<String>,
+    /// Print JSON instead of columns.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// What `run` and `compare` take.

@@ -1,6 +1,6 @@
 //! `terraglue modules` and `variables`: what there is to choose from.
 
-use super::arguments::ScenarioArguments;
+use super::arguments::VariablesArguments;
 use super::output::outln;
 use super::run::build;
 use super::{Exit, show};
@@ -11,32 +11,74 @@ use terraglue::host::{
     AvailableModule, Library, ListedModule, LoadError, LoadedModule, SearchPath, available_modules,
     described, is_path, listed_file, listed_modules,
 };
-use terraglue::scenario::{InputError, Scenario, allowed_values};
+use terraglue::scenario::{InputError, Scenario, allowed_values, did_you_mean};
+use terraglue::signals::pattern;
 use terraglue::subsystem::{Causality, Effect, Schema, ValueType, Variable};
 use terraglue::testbed::Options;
 
-/// Every variable and action of the scenario's subsystems.
-pub fn variables(arguments: &ScenarioArguments) -> Result<Exit> {
-    let scenario = Scenario::load(&arguments.scenario, &arguments.sets)?;
-    let options = Options { module_paths: arguments.module_path.clone(), ..Options::default() };
+/// Variables and actions of the scenario's subsystems, all or those that are asked for.
+pub fn variables(arguments: &VariablesArguments) -> Result<Exit> {
+    let of = &arguments.scenario;
+    let scenario = Scenario::load(&of.scenario, &of.sets)?;
+    let options = Options { module_paths: of.module_path.clone(), ..Options::default() };
     let testbed = build(&scenario, &options)?;
-    let mut table = show::table(&["variable", "type", "unit", "role", "change", "range", "help"]);
-    let mut actions = show::table(&["action", "help"]);
+    let (mut variables, mut actions) = (Vec::new(), Vec::new());
     testbed.view(|view| {
         for s in view.subsystems {
-            for v in s.instance.variables() {
-                table.add_row(variable_row(s.name, v));
-            }
-            for a in s.instance.actions() {
-                actions.add_row([format!("{}.{}", s.name, a.name), a.help.clone()]);
-            }
+            variables.extend(s.instance.variables().iter().map(|v| variable_row(s.name, v)));
+            actions.extend(
+                s.instance.actions().iter().map(|a| [format!("{}.{}", s.name, a.name), a.help.clone()]),
+            );
         }
     });
-    outln!("{table}");
-    if actions.row_count() > 0 {
-        outln!("{actions}");
+    if let Some(pattern) = &arguments.pattern {
+        let names = variables.iter().map(|v| &v[0]).chain(actions.iter().map(|a| &a[0]));
+        let names: Vec<String> = names.cloned().collect();
+        variables.retain(|row| asked(pattern, &row[0]));
+        actions.retain(|row| asked(pattern, &row[0]));
+        if variables.is_empty() && actions.is_empty() {
+            let help = did_you_mean(pattern, names.iter().map(String::as_str));
+            return Err(InputError::plain(format!("no variable or action matches `{pattern}`"), help).into());
+        }
+    }
+    if arguments.json {
+        outln!("{}", json(&variables, &actions));
+    } else {
+        columns(&["variable", "type", "unit", "role", "change", "range", "help"], variables);
+        columns(&["action", "help"], actions);
     }
     Ok(Exit::Done)
+}
+
+/// Whether a name is one of those that a pattern, or a piece of a name, asks for.
+fn asked(pattern: &str, name: &str) -> bool {
+    match pattern.contains('*') {
+        true => pattern::matches(pattern, name),
+        false => name.to_lowercase().contains(&pattern.to_lowercase()),
+    }
+}
+
+/// Rows under their heads, without lines between them; nothing where there are none.
+fn columns<const N: usize>(heads: &[&str; N], rows: Vec<[String; N]>) {
+    if rows.is_empty() {
+        return;
+    }
+    let mut table = show::table(heads);
+    table.load_preset(comfy_table::presets::NOTHING);
+    rows.into_iter().for_each(|row| {
+        table.add_row(row);
+    });
+    outln!("{}", table.trim_fmt());
+}
+
+fn json(variables: &[[String; 7]], actions: &[[String; 2]]) -> serde_json::Value {
+    let variable = |[name, kind, unit, role, change, range, help]: &[String; 7]| {
+        serde_json::json!({ "name": name, "type": kind, "unit": unit, "role": role, "change": change,
+            "range": range, "help": help })
+    };
+    let action = |[name, help]: &[String; 2]| serde_json::json!({ "name": name, "help": help });
+    serde_json::json!({ "variables": variables.iter().map(variable).collect::<Vec<_>>(),
+        "actions": actions.iter().map(action).collect::<Vec<_>>() })
 }
 
 fn variable_row(subsystem: &str, v: &Variable) -> [String; 7] {

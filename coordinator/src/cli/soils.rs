@@ -4,7 +4,7 @@ use super::output::outln;
 use super::{Exit, show};
 use std::path::Path;
 use terraglue::Result;
-use terraglue::scenario::{InputError, find_soil_table, read_soil_table};
+use terraglue::scenario::{InputError, did_you_mean, find_soil_table, read_soil_table};
 use terraglue_soil_law::{COLUMNS, SoilRow, SoilTable};
 
 /// Units of the columns.
@@ -18,9 +18,21 @@ pub fn soils(name: Option<&str>, file: Option<&Path>) -> Result<Exit> {
         let help = Some("name a table with --file".into());
         InputError::plain("no soil table: models/soils.csv is not there", help)
     })?;
-    let soils = read_soil_table(&path).map_err(|message| InputError::plain(message, None))?;
+    let mut soils = read_soil_table(&path).map_err(|message| InputError::plain(message, None))?;
     match name {
-        Some(name) => one(soils.row(name).map_err(|e| InputError::plain(e.to_string(), None))?),
+        Some(name) if soils.rows.iter().any(|r| r.name == name) => {
+            one(soils.row(name).map_err(|e| InputError::plain(e.to_string(), None))?)
+        }
+        Some(part) => {
+            let names: Vec<String> = soils.rows.iter().map(|r| r.name.clone()).collect();
+            soils.rows.retain(|r| r.name.to_lowercase().contains(&part.to_lowercase()));
+            if soils.rows.is_empty() {
+                let help = did_you_mean(part, names.iter().map(String::as_str));
+                let message = format!("there is no soil `{part}` in {}", path.display());
+                return Err(InputError::plain(message, help).into());
+            }
+            all(&soils);
+        }
         None => all(&soils),
     }
     outln!("from {}", path.display());

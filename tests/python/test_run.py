@@ -212,3 +212,16 @@ def test_what_stands_in_the_world_is_recorded_and_angles_can_be_set_at_the_start
     late = terraglue("run", tmp_path / "room.toml", "--out", tmp_path / "late", "--quiet",
                      "--set", "event=[{ at_s = 0.005, set = { \"robot.hinge.angle\" = 0.5 } }]")
     assert late.returncode != 0 and "before the first step" in late.stderr
+
+
+def test_a_run_at_the_pace_of_the_clock_takes_its_time_and_has_the_same_bytes(tmp_path):
+    plate = ROOT / "scenarios" / "plate_sinkage.toml"
+    recordings, times = [], []
+    for name, option in [("free", []), ("paced", ["--realtime"])]:
+        begin = time.monotonic()
+        done = terraglue("run", plate, "--duration", "2", "--quiet", "--out", tmp_path / name, *option)
+        times.append(time.monotonic() - begin)
+        assert done.returncode == 0, done.stderr
+        recordings.append((tmp_path / name / "recording.mcap").read_bytes())
+    assert recordings[0] == recordings[1]
+    assert times[1] > 1.9 and times[0] < times[1], times

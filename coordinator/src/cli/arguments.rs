@@ -147,6 +147,9 @@ pub struct RunCommand {
     /// each subsystem cost. The report shows the same.
     #[arg(long)]
     pub explain: bool,
+    /// Go no faster than the clock; results do not depend on it.
+    #[arg(long)]
+    pub realtime: bool,
     /// Watch the files of modules, and exchange their code while the run goes on.
     #[arg(long)]
     pub watch: bool,

@@ -18,6 +18,7 @@ mod list;
 mod logger;
 mod new;
 mod output;
+mod pace;
 mod progress;
 mod recorder;
 mod report;

@@ -4,6 +4,7 @@ use super::arguments::{RunArguments, RunCommand};
 use super::folder::results_folder;
 use super::interrupt::Interrupt;
 use super::output::outln;
+use super::pace::Pace;
 use super::progress::{self, Progress};
 use super::recorder::SharedRecorder;
 use super::{Exit, exit_of, show, soil_module};
@@ -61,7 +62,13 @@ pub fn run(command: &RunCommand) -> Result<Exit> {
     let steps = (scenario.time.duration_s / scenario.time.step_s).round() as u64;
     let bar = progress::bar(steps, arguments.quiet);
     let mut progress = Progress::new(bar.clone(), scenario.time.duration_s, "");
-    let outcome = run_testbed(testbed, reloader.as_mut(), &scenario, &folder, arguments.csv, &mut progress)?;
+    let mut paced;
+    let mut observer: &mut dyn Observer = &mut progress;
+    if command.realtime {
+        paced = Pace::new(observer, interrupt.flag());
+        observer = &mut paced;
+    }
+    let outcome = run_testbed(testbed, reloader.as_mut(), &scenario, &folder, arguments.csv, observer)?;
     bar.finish_and_clear();
     let report = recording::report::write(&folder);
     if command.explain {

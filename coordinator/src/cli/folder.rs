@@ -52,6 +52,9 @@ fn free(folder: &Path) -> Result {
 
 /// Renames a folder to the first free of `folder.1`, `folder.2`, …
 fn set_aside(folder: &Path) -> Result {
+    if !folder.exists() {
+        return Ok(());
+    }
     let numbered = |n: u32| PathBuf::from(format!("{}.{n}", folder.display()));
     let free = (1..).map(numbered).find(|f| !f.exists()).unwrap_or_else(|| numbered(u32::MAX));
     std::fs::rename(folder, &free).map_err(|e| at(folder, e))

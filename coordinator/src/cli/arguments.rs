@@ -37,7 +37,7 @@ pub enum Command {
         folder: PathBuf,
     },
     /// Check a scenario and everything that it refers to, without a step of it; modules and units are made.
-    Check(ScenarioArguments),
+    Check(CheckArguments),
     /// Put a module to the test: named tests of what it promises, each in a process of its own.
     CheckModule(CheckModuleArguments),
     /// List the modules that are found, without running them; with a name, show its parameters.
@@ -97,6 +97,17 @@ pub struct ScenarioArguments {
     pub module_path: Vec<PathBuf>,
 }
 
+/// What `check` takes.
+#[derive(Args, Debug, Clone)]
+pub struct CheckArguments {
+    /// The scenario.
+    #[command(flatten)]
+    pub scenario: ScenarioArguments,
+    /// Refuse robot files that have a warning: `strict = true` in the table of every robot.
+    #[arg(long)]
+    pub strict: bool,
+}
+
 /// What `run` and `compare` take.
 #[derive(Args, Debug, Clone)]
 pub struct RunArguments {
@@ -133,6 +144,9 @@ pub struct RunCommand {
     /// each subsystem cost. The report shows the same.
     #[arg(long)]
     pub explain: bool,
+    /// Refuse robot files that have a warning: `strict = true` in the table of every robot.
+    #[arg(long)]
+    pub strict: bool,
     /// Watch the files of modules, and exchange their code while the run goes on.
     #[arg(long)]
     pub watch: bool,

@@ -25,6 +25,7 @@ mod run;
 mod show;
 mod soil_module;
 mod soils;
+mod strict;
 mod table_file;
 
 use arguments::{Arguments, Command};

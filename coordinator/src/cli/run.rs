@@ -5,7 +5,7 @@ use super::folder::results_folder;
 use super::output::outln;
 use super::progress::{self, Progress};
 use super::recorder::SharedRecorder;
-use super::{Exit, exit_of, interrupt, show, soil_module};
+use super::{Exit, exit_of, interrupt, show, soil_module, strict};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -46,7 +46,7 @@ impl Outcome {
 /// Runs a scenario as the arguments say.
 pub fn run(command: &RunCommand) -> Result<Exit> {
     let arguments = &command.run;
-    let scenario = Scenario::load(&arguments.scenario.scenario, &arguments.sets())?;
+    let scenario = strict::load(&arguments.scenario, &arguments.sets(), command.strict)?;
     soil_module::check(&scenario, &arguments.scenario)?;
     let options = options(arguments, &interrupt::cancel_flag());
     let testbed = build(&scenario, &options)?;

@@ -119,6 +119,27 @@ pub(crate) fn check(source: &Source) -> Result<(), Error> {
     Ok(())
 }
 
+/// Attributes that `urdf-rs` wants and that the format leaves out where they say nothing: element, attribute, value.
+const LEFT_OUT: [(&str, &str, &str); 2] = [("limit", "effort", "0"), ("limit", "velocity", "0")];
+
+/// The text with these attributes; lines stay where they are.
+pub(crate) fn complete(text: &str) -> String {
+    let Ok(document) = Document::parse(text) else { return text.into() };
+    let mut whole = String::with_capacity(text.len());
+    let mut done = 0;
+    for node in document.descendants().filter(Node::is_element) {
+        for (element, name, value) in LEFT_OUT {
+            if node.has_tag_name(element) && node.attribute(name).is_none() {
+                let at = node.range().start + 1 + element.len();
+                whole += &text[done..at];
+                whole += &format!(" {name}=\"{value}\"");
+                done = at;
+            }
+        }
+    }
+    whole + &text[done..]
+}
+
 /// Tag and name of an element, or of the one around it that has a name.
 fn called(node: Node) -> String {
     let tag = |n: Node| match n.attribute("name") {

@@ -1,16 +1,20 @@
 //! Reads robot files (URDF, MJCF) into a checked tree of bodies, joints and shapes.
 //!
 //! What comes out can be simulated: every body has a physical mass and inertia, the joints form a tree, links
-//! without mass are merged into the link to which they are fixed. What cannot be is refused with file, line,
-//! link or joint, the offending value and a way out.
+//! that cannot stand alone are merged into the link to which they are fixed. What a simulation can live with is a warning
+//! that says which value is used instead; what it cannot is refused with file, line, link or joint, the offending value
+//! and a way out.
 
 mod attach;
 mod check;
 mod error;
+mod inertia;
+mod merge;
 mod mesh;
 mod mjcf;
 mod model;
 mod shapes;
+mod solid;
 mod syntax;
 mod tree;
 mod unread;
@@ -38,6 +42,8 @@ pub struct Options {
     pub packages: Vec<(String, PathBuf)>,
     /// Folders that hold packages, or are one.
     pub package_path: Vec<PathBuf>,
+    /// Refuse a file where there is a warning.
+    pub strict: bool,
 }
 
 impl Options {
@@ -67,5 +73,9 @@ pub fn read_robot(path: &Path, options: &Options) -> Result<Robot, Error> {
         Err(_) => text.contains("<mujoco"),
     };
     let read = if is_mjcf { read_mjcf_text } else { read_urdf_text };
-    read(&file, &text, options)
+    let robot = read(&file, &text, options)?;
+    match robot.warnings.first().filter(|_| options.strict) {
+        Some(first) => Err(Error::Strict { first: first.clone(), count: robot.warnings.len() }),
+        None => Ok(robot),
+    }
 }

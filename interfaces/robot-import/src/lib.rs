@@ -1,4 +1,4 @@
-//! Reads robot files (URDF, MJCF) into a checked tree of bodies, joints and shapes.
+//! Reads robot files (URDF, xacro, MJCF) into a checked tree of bodies, joints and shapes.
 //!
 //! What comes out can be simulated: every body has a physical mass and inertia, the joints form a tree, links
 //! that cannot stand alone are merged into the link to which they are fixed. What a simulation can live with is a warning
@@ -20,6 +20,7 @@ mod tree;
 mod unread;
 mod urdf;
 mod values;
+mod xacro;
 
 pub use error::Error;
 pub use mesh::Mesh;
@@ -61,16 +62,29 @@ impl Options {
     }
 }
 
-/// Reads a file of either format, which the root of its text tells.
+/// Reads a file of either format, which the root of its text tells; xacro is expanded first.
 pub fn read_robot(path: &Path, options: &Options) -> Result<Robot, Error> {
     let file = path.display().to_string();
-    let text = std::fs::read_to_string(path)
-        .map_err(|e| Error::Read { file: file.clone(), reason: e.to_string() })?;
+    let unreadable = |reason: String| Error::Read { file: file.clone(), reason };
+    // Devices and pipes have no end.
+    if std::fs::metadata(path).is_ok_and(|m| !m.is_file()) {
+        return Err(unreadable("it is no regular file".into()));
+    }
+    let mut text = std::fs::read_to_string(path).map_err(|e| unreadable(e.to_string()))?;
     syntax::check_depth(&Source { file: &file, text: &text })?;
     // URDF may hold an element <mujoco>, too, for MuJoCo's own reader. What is no XML its reader complains of.
-    let is_mjcf = match roxmltree::Document::parse(&text) {
-        Ok(document) => document.root_element().has_tag_name("mujoco"),
-        Err(_) => text.contains("<mujoco"),
+    let (is_mjcf, is_xacro) = match roxmltree::Document::parse(&text) {
+        Ok(document) => {
+            let is_mjcf = document.root_element().has_tag_name("mujoco");
+            (is_mjcf, !is_mjcf && xacro::is_xacro(&document))
+        }
+        Err(_) => (text.contains("<mujoco"), false),
+    };
+    let file = if is_xacro {
+        text = xacro::expand(path, options)?;
+        xacro::expanded_name(&file)
+    } else {
+        file
     };
     let read = if is_mjcf { read_mjcf_text } else { read_urdf_text };
     let robot = read(&file, &text, options)?;

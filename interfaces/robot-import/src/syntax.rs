@@ -93,9 +93,6 @@ pub(crate) fn check(source: &Source) -> Result<(), Error> {
         Err(Error::Element { file: source.file.into(), line, element, problem })
     };
     let root = document.root_element();
-    if let Some(node) = document.descendants().find(is_xacro) {
-        return wrong(node, way_out_of_xacro(source.file));
-    }
     if !root.has_tag_name("robot") {
         return wrong(root, "the root of URDF is <robot>".into());
     }
@@ -151,23 +148,6 @@ fn called(node: Node) -> String {
         Some(owner) => format!("{} of {}", tag(node), tag(owner)),
         None => tag(node),
     }
-}
-
-/// Whether an element is of xacro, or has one of its expressions.
-fn is_xacro(node: &Node) -> bool {
-    let expression = |text: &str| ["${", "$(arg ", "$(find ", "$(eval "].iter().any(|e| text.contains(e));
-    node.tag_name().namespace().is_some_and(|s| s.contains("xacro"))
-        || node.attributes().any(|a| expression(a.value()))
-}
-
-fn way_out_of_xacro(file: &str) -> String {
-    let bare =
-        [".urdf.xacro", ".xacro", ".urdf"].iter().find_map(|end| file.strip_suffix(end)).unwrap_or(file);
-    let end = if file.ends_with(".urdf") { "expanded.urdf" } else { "urdf" };
-    format!(
-        "is xacro, which is a language of its own: `xacro {file} > {bare}.{end}` makes URDF of it (`pip install xacro` \
-         where ROS is not installed)"
-    )
 }
 
 fn joint(node: Node) -> Result<(), String> {

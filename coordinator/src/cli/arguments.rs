@@ -73,6 +73,8 @@ pub enum Command {
     New(NewArguments),
     /// Find the parameters of a soil from plate tests.
     FitSoil(FitSoilArguments),
+    /// Show a robot file as it would be simulated: bodies, joints, mass, inertia, warnings.
+    Robot(RobotArguments),
     /// List the soils that a scenario can name, and those that are refused with the reason.
     Soils {
         /// Everything about this one.
@@ -254,6 +256,26 @@ pub struct CheckModuleArguments {
     /// File with the state that an errand starts from.
     #[arg(long, hide = true)]
     pub state: Option<PathBuf>,
+}
+
+/// What `robot` takes.
+#[derive(Args, Debug, Clone)]
+pub struct RobotArguments {
+    /// URDF, xacro or MJCF.
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// A root without mass is the world.
+    #[arg(long)]
+    pub fixed_base: bool,
+    /// Folder of a package that the file names by `package://`. May be repeated.
+    #[arg(long = "package", value_name = "NAME=DIR", value_parser = parse_set)]
+    pub packages: Vec<(String, String)>,
+    /// Refuse a file that has a warning.
+    #[arg(long)]
+    pub strict: bool,
+    /// Print JSON and nothing else.
+    #[arg(long)]
+    pub json: bool,
 }
 
 /// What `new` takes.

@@ -21,6 +21,7 @@ mod output;
 mod progress;
 mod recorder;
 mod report;
+mod robot;
 mod run;
 mod show;
 mod soil_module;
@@ -96,6 +97,7 @@ fn command(command: Command) -> Exit {
         Command::Convert(arguments) => convert::convert(&arguments),
         Command::Worker { .. } => Ok(Exit::Failed),
         Command::New(arguments) => new::new(&arguments),
+        Command::Robot(arguments) => robot::robot(&arguments),
         Command::Soils { name, file } => soils::soils(name.as_deref(), file.as_deref()),
         Command::FitSoil(arguments) => fit_soil::fit_soil(&arguments),
     };

@@ -16,7 +16,6 @@ use crate::scenario::{self, GlueSpec, GluingSpec, InputError, Scenario, Subsyste
 use crate::signals::{self, Directory, Faults, TimeLine};
 use crate::timing::Timings;
 use crate::{Error, Result, terrain};
-use std::path::PathBuf;
 use std::sync::Arc;
 use std::time::Duration;
 use terraglue_subsystem::{
@@ -289,10 +288,9 @@ fn unit(scenario: &Scenario, spec: &SubsystemSpec, services: &HostServices) -> R
 
 fn module_error(scenario: &Scenario, spec: &SubsystemSpec, error: &LoadError) -> Box<InputError> {
     if let LoadError::Refused { message, .. } = error
-        && let Some((file, line)) = place_in_file(message)
-        && let Ok(text) = std::fs::read_to_string(&file)
+        && let Some(shown) = InputError::of_file(message, &error.to_string())
     {
-        return InputError::in_file(&file, &text, line, error.to_string());
+        return shown;
     }
     let help = error.nearest().map(|n| format!("did you mean `{n}`?"));
     let key = match error {
@@ -300,15 +298,6 @@ fn module_error(scenario: &Scenario, spec: &SubsystemSpec, error: &LoadError) ->
         _ => vec![spec.name.as_str(), "module"],
     };
     scenario.source.error_at_value(&key, error.to_string(), help)
-}
-
-/// File and line that a message begins with, where there is such a file: a module speaks of a file of its own.
-fn place_in_file(message: &str) -> Option<(PathBuf, usize)> {
-    message.match_indices(':').find_map(|(at, _)| {
-        let (line, _) = message[at + 1..].split_once(':')?;
-        let line = line.parse().ok()?;
-        Some((PathBuf::from(&message[..at]), line)).filter(|(file, _)| file.is_file())
-    })
 }
 
 fn member(instance: &Instance) -> Member {

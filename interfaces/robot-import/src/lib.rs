@@ -13,6 +13,7 @@ mod merge;
 mod mesh;
 mod mjcf;
 mod model;
+mod pose;
 mod shapes;
 mod solid;
 mod syntax;
@@ -29,6 +30,7 @@ pub use model::{
     AxisData, Base, Body, Coupling, Drive, DriveKind, Heights, Joint, JointKind, Loop, Plane, Robot, Shape,
     ShapeGeometry,
 };
+pub use pose::Whole;
 pub use urdf::read_urdf_text;
 
 use error::Source;

@@ -14,14 +14,15 @@ use urdf_rs::JointType;
 
 /// Reads the text of a file; `file` appears in messages and tells the folder of meshes.
 pub fn read_urdf_text(file: &str, text: &str, options: &Options) -> Result<Robot, Error> {
-    let source = Source { file, text };
-    crate::syntax::check(&source)?;
-    let robot = urdf_rs::read_from_string(&crate::syntax::complete(text))
+    let text = crate::syntax::declared(text);
+    let source = &Source { file, text: &text };
+    crate::syntax::check(source)?;
+    let robot = urdf_rs::read_from_string(&crate::syntax::complete(&text))
         .map_err(|e| source.syntax(0, e.to_string()))?;
-    let order = order(&source, &robot)?;
-    let inertials = robot.links.iter().map(|l| inertial(&source, l)).collect::<Result<Vec<_>, _>>()?;
+    let order = order(source, &robot)?;
+    let inertials = robot.links.iter().map(|l| inertial(source, l)).collect::<Result<Vec<_>, _>>()?;
     let merged = merge(&robot, &order, &inertials);
-    build(&source, &robot, &order, &inertials, &merged, options)
+    build(source, &robot, &order, &inertials, &merged, options)
 }
 
 fn build(
@@ -80,6 +81,7 @@ fn build(
     warnings.extend(unread);
     notices.extend(unused);
     warnings.extend(without_limits(source, robot));
+    warnings.extend(fixed_followers(source, robot));
     warnings.extend(mass_spread(source.file, &bodies));
     let couplings = couplings(source, robot, &joints)?;
     Ok(Robot {
@@ -113,9 +115,11 @@ fn couplings(source: &Source, robot: &urdf_rs::Robot, joints: &[Joint]) -> Resul
     let moving = |name: &str| joints.iter().position(|j| j.name == name && j.kind != JointKind::Fixed);
     let mut all = Vec::new();
     for joint in &robot.joints {
-        let Some(mimic) = &joint.mimic else { continue };
+        let Some(mimic) = joint.mimic.as_ref().filter(|_| joint.joint_type != JointType::Fixed) else {
+            continue;
+        };
         let wrong = |problem: String| source.joint(&joint.name, format!("<mimic>: {problem}"));
-        let follower = moving(&joint.name).ok_or_else(|| wrong("a fixed joint follows none".into()))?;
+        let Some(follower) = moving(&joint.name) else { continue };
         let leader = moving(&mimic.joint);
         let leader = leader.ok_or_else(|| wrong(format!("no moving joint is called `{}`", mimic.joint)))?;
         let (ratio, offset) = (mimic.multiplier.unwrap_or(1.0), mimic.offset.unwrap_or(0.0));
@@ -227,6 +231,17 @@ fn without_limits(source: &Source, robot: &urdf_rs::Robot) -> Option<String> {
     let more = if more > 0 { format!(" ({more} more like it)") } else { String::new() };
     let text =
         format!("{says}: it moves without limits, as in MuJoCo{more}; write lower < upper, or make it fixed");
+    Some(source.joint(&first.name, text).to_string())
+}
+
+/// Says which fixed joints follow others, which does nothing.
+fn fixed_followers(source: &Source, robot: &urdf_rs::Robot) -> Option<String> {
+    let mut idle = robot.joints.iter().filter(|j| j.mimic.is_some() && j.joint_type == JointType::Fixed);
+    let (first, more) = (idle.next()?, idle.count());
+    let more = if more > 0 { format!(" ({more} more like it)") } else { String::new() };
+    let text = format!(
+        "<mimic> does nothing on a fixed joint{more}; make it revolute or prismatic, or leave <mimic> out"
+    );
     Some(source.joint(&first.name, text).to_string())
 }
 

@@ -267,6 +267,36 @@ fn strict_refuses_where_there_is_a_warning() {
     }
 }
 
+/// What other readers bear: prefixes that nothing declares, an inertial without inertia, a texture without a file, a fixed joint that
+/// follows, shapes of size 0.
+#[test]
+fn what_other_readers_bear_is_borne() {
+    let parts = [
+        link(
+            "base",
+            1.0,
+            ROUND,
+            "<visual><geometry><box size=\"0 0 0\"/></geometry><material name=\"m\"><texture/></material></visual>",
+        ),
+        link("arm", 1.0, ROUND, ""),
+        "<link name=\"cap\"><inertial><mass value=\"0.1\"/></inertial></link>\n".into(),
+        joint("j", "revolute", "base", "arm", "<limit lower=\"-1\" upper=\"1\" drake:acceleration=\"3\"/>"),
+        joint("f", "fixed", "arm", "cap", "<mimic joint=\"j\"/>"),
+    ];
+    let robot = read(&parts);
+    assert_eq!((robot.bodies.len(), robot.couplings.len()), (2, 0));
+    assert!((robot.bodies[1].mass - 1.1).abs() < 1e-12);
+    let said = robot.warnings.join("\n");
+    for words in [
+        "r.urdf:4: link `cap`: it has mass and no inertia",
+        "r.urdf:6: joint `f`: <mimic> does nothing on a fixed joint",
+        "r.urdf:2: link `base`: a shape of size 0 m is left out",
+        "r.urdf:5: `acceleration` = \"3\" of <limit>",
+    ] {
+        assert!(said.contains(words), "`{words}` is not in: {said}");
+    }
+}
+
 /// What hangs from a link called `world` stands still; its mass does not count.
 #[test]
 fn what_is_fixed_to_the_world_stands_still() {

@@ -280,15 +280,54 @@ pub struct RobotArguments {
 
 /// What `new` takes.
 #[derive(Args, Debug, Clone)]
+#[command(after_help = NEW_EXAMPLES)]
 pub struct NewArguments {
     /// What to make.
-    #[arg(value_parser = one_of(Kind::ALL, Kind::word))]
-    pub kind: Kind,
-    /// Name of the module and of its folder, e.g. my-soil.
-    pub name: String,
+    #[arg(value_parser = one_of(New::ALL, New::word))]
+    pub kind: New,
+    /// Name of the module and of its folder, e.g. my-soil; of a scenario: its folder [default: as the robot file].
+    #[arg(required_unless_present = "robot")]
+    pub name: Option<String>,
     /// Language [default: rust; a law: scenario].
     #[arg(long, value_parser = one_of(Language::ALL, Language::word))]
     pub lang: Option<Language>,
+    /// Of a scenario: the robot that stands there (URDF, xacro or MJCF).
+    #[arg(long, value_name = "FILE")]
+    pub robot: Option<PathBuf>,
+    /// Of a scenario: the folder for it.
+    #[arg(short, long, value_name = "DIR", requires = "robot", conflicts_with = "name")]
+    pub output: Option<PathBuf>,
+}
+
+const NEW_EXAMPLES: &str = "\
+Examples:
+  terraglue new soil my-soil --lang c
+  terraglue new scenario --robot my.urdf -o my-moon     it stands on lunar soil and holds its pose";
+
+/// What `new` makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum New {
+    /// A module.
+    Module(Kind),
+    /// A scenario around a robot.
+    Scenario,
+}
+
+impl New {
+    const ALL: [Self; 5] = [
+        Self::Module(Kind::Soil),
+        Self::Module(Kind::Robot),
+        Self::Module(Kind::Controller),
+        Self::Module(Kind::Law),
+        Self::Scenario,
+    ];
+
+    fn word(self) -> &'static str {
+        match self {
+            Self::Module(kind) => kind.word(),
+            Self::Scenario => "scenario",
+        }
+    }
 }
 
 /// Takes the word of one of a few values.

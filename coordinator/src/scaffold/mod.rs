@@ -5,9 +5,11 @@
 
 mod place;
 mod reserved;
+mod standing;
 mod template;
 
 pub use place::Place;
+pub use standing::Standing;
 pub use template::{Kind, Language};
 
 use std::path::{Path, PathBuf};

@@ -84,6 +84,7 @@ fn build(
     warnings.extend(fixed_followers(source, robot));
     warnings.extend(mass_spread(source.file, &bodies));
     let couplings = couplings(source, robot, &joints)?;
+    let excluded = next_to_each_other(bodies.len(), &joints);
     Ok(Robot {
         name: robot.name.clone(),
         base,
@@ -92,12 +93,37 @@ fn build(
         others: Vec::new(),
         world_shapes,
         planes: Vec::new(),
-        excluded: Vec::new(),
+        excluded,
         couplings,
         loops: Vec::new(),
         warnings,
         notices,
     })
+}
+
+/// Pairs of bodies with fixed joints only between them, or one joint that moves besides: their shapes overlap where they are joined,
+/// as those of a body and its parent do, which never touch anyway.
+fn next_to_each_other(bodies: usize, joints: &[Joint]) -> Vec<[usize; 2]> {
+    // Per body: the first of those that move as one with it.
+    let mut leader: Vec<usize> = (0..bodies).collect();
+    for joint in joints.iter().filter(|j| j.kind == JointKind::Fixed) {
+        leader[joint.child] = joint.parent.map_or(joint.child, |p| leader[p]);
+    }
+    let mut joined: Vec<[usize; 2]> = joints
+        .iter()
+        .filter_map(|j| j.parent.map(|p| [leader[p], leader[j.child]]))
+        .filter(|[above, below]| above != below)
+        .collect();
+    joined.sort_unstable();
+    let near = |a: usize, b: usize| {
+        let (a, b) = (leader[a], leader[b]);
+        a == b || joined.binary_search(&[a, b]).is_ok() || joined.binary_search(&[b, a]).is_ok()
+    };
+    let direct = |a: usize, b: usize| joints.iter().any(|j| j.child == b && j.parent == Some(a));
+    (0..bodies)
+        .flat_map(|a| (a + 1..bodies).map(move |b| [a, b]))
+        .filter(|[a, b]| near(*a, *b) && !direct(*a, *b))
+        .collect()
 }
 
 /// Friction in the joint, from `<dynamics>`.

@@ -297,6 +297,22 @@ fn what_other_readers_bear_is_borne() {
     }
 }
 
+/// Where a foot is fixed to its shank, it overlaps what the shank hangs on, too: they never touch.
+#[test]
+fn bodies_across_fixed_joints_never_touch() {
+    let robot = read(&[
+        link("thigh", 1.0, ROUND, ""),
+        link("shank", 1.0, ROUND, ""),
+        link("foot", 1.0, ROUND, ""),
+        link("toe", 1.0, ROUND, ""),
+        joint("knee", "continuous", "thigh", "shank", ""),
+        joint("sole", "fixed", "shank", "foot", ""),
+        joint("hinge", "continuous", "foot", "toe", ""),
+    ]);
+    // Of four bodies the thigh and the toe can meet; the others in line are joined directly.
+    assert_eq!(robot.excluded, [[0, 2], [1, 3]]);
+}
+
 /// What hangs from a link called `world` stands still; its mass does not count.
 #[test]
 fn what_is_fixed_to_the_world_stands_still() {

@@ -61,9 +61,24 @@ pub fn read_mjcf_text(file: &str, text: &str, options: &Options) -> Result<Robot
         _ => Base::World,
     };
     robot.others.retain(|(body, _)| *body != 0);
+    set_total_mass(&defaults, root, &mut robot)?;
     robot.warnings.extend(mass_spread(file, &robot.bodies));
     unique(&source, &robot)?;
     Ok(robot)
+}
+
+/// Scales masses and inertias to what `<compiler settotalmass>` says, where that is above 0.
+fn set_total_mass(d: &Defaults, root: Node, robot: &mut Robot) -> Result<(), Error> {
+    let compilers = root.children().filter(|n| n.has_tag_name("compiler"));
+    for e in compilers.map(|n| d.element(n, None)) {
+        let Some(wanted) = d.number(&e, "settotalmass")?.filter(|m| *m > 0.0) else { continue };
+        let scale = wanted / robot.bodies.iter().map(|b| b.mass).sum::<f64>();
+        for body in &mut robot.bodies {
+            body.mass *= scale;
+            body.inertia *= scale;
+        }
+    }
+    Ok(())
 }
 
 fn empty(name: &str) -> Robot {

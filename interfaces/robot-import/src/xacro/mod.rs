@@ -20,7 +20,9 @@ const ALARM: i32 = 14;
 
 /// Whether a text is xacro: an element of it, or one of its expressions.
 pub(crate) fn is_xacro(document: &Document) -> bool {
-    let expression = |text: &str| ["${", "$(arg ", "$(find ", "$(eval "].iter().any(|e| text.contains(e));
+    const EXPRESSIONS: [&str; 7] =
+        ["${", "$(arg ", "$(find ", "$(eval ", "$(env ", "$(optenv ", "$(dirname)"];
+    let expression = |text: &str| EXPRESSIONS.iter().any(|e| text.contains(e));
     let of_it = |node: Node| {
         node.tag_name().namespace().is_some_and(|s| s.contains("xacro"))
             || node.attributes().any(|a| expression(a.value()))

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 
 import pytest
 from conftest import ROOT, terraglue
@@ -22,7 +23,7 @@ def quadruped():
     """Twelve joints; its knees cannot be straight, so at 0 it would stand behind its hips."""
     parts = [LINK.format(name="trunk", com=0, mass=10, i=0.2, shape=shape('<box size="0.5 0.25 0.12"/>'))]
     for side, y in (("L", 0.15), ("R", -0.15)):
-        for end, x in (("F", 0.2), ("H", -0.2)):
+        for end, x in (("F", 0.2), ("R", -0.2)):
             leg = end + side
             foot = shape('<sphere radius="0.025"/>', "0 0 -0.22")
             parts += [
@@ -31,11 +32,11 @@ def quadruped():
                 LINK.format(name=f"{leg}_shank", com=-0.1, mass=0.2, i=0.001, shape=foot),
             ]
             places = {"at": f"{x} {y} 0", "parent": "trunk", "child": f"{leg}_hip", "axis": "1 0 0"}
-            parts.append(JOINT.format(name=f"{leg}_roll", low=-0.8, high=0.8, **places))
+            parts.append(JOINT.format(name=f"{leg}_hip_joint", low=-0.8, high=0.8, **places))
             places = {"at": "0 0 0", "parent": f"{leg}_hip", "child": f"{leg}_thigh", "axis": "0 1 0"}
-            parts.append(JOINT.format(name=f"{leg}_pitch", low=-1.5, high=3.0, **places))
+            parts.append(JOINT.format(name=f"{leg}_thigh_joint", low=-1.5, high=3.0, **places))
             places = {"at": "0 0 -0.22", "parent": f"{leg}_thigh", "child": f"{leg}_shank", "axis": "0 1 0"}
-            parts.append(JOINT.format(name=f"{leg}_knee", low=-2.7, high=-0.9, **places))
+            parts.append(JOINT.format(name=f"{leg}_calf_joint", low=-2.7, high=-0.888, **places))
     return f'<robot name="quadruped">{"".join(parts)}</robot>'
 
 
@@ -82,7 +83,7 @@ def test_a_new_scenario_stands(tmp_path, name):
     for joint, angle in angles.items():
         assert angle == pytest.approx(starts.get(joint, 0.0), abs=0.03), joint
     if name == "quadruped":
-        assert starts["FL_knee"] == -0.9 and starts["FL_pitch"] == 0.45 and "FL_shank" in text
+        assert starts["FL_calf_joint"] == -0.888 and starts["FL_thigh_joint"] == 0.444 and "FL_shank" in text
 
 
 def test_what_cannot_stand_is_told(tmp_path):
@@ -101,3 +102,30 @@ def test_what_cannot_stand_is_told(tmp_path):
     # nothing is overwritten
     process = terraglue("new", "scenario", "--robot", floating, "-o", tmp_path / "moon")
     assert process.returncode == 2 and "exists already" in process.stderr
+
+
+def test_the_tutorial_walks_and_drives(tmp_path):
+    """What docs/your-robot.md says, with robots of our own whose joints are called as those in it."""
+    page = (ROOT / "docs" / "your-robot.md").read_text()
+    (controller,) = re.findall(r"```python\n(.*?)```", page, re.S)
+    wheels, crawl = re.findall(r"```toml\n(.*?)```", page, re.S)
+    robot = tmp_path / "quadruped.urdf"
+    robot.write_text(quadruped())
+    assert terraglue("new", "scenario", "--robot", robot, "-o", tmp_path / "walk").returncode == 0
+    (tmp_path / "walk" / "crawl.py").write_text(controller)
+    scenario = tmp_path / "walk" / "scenario.toml"
+    scenario.write_text(scenario.read_text() + crawl)
+    run = terraglue("run", scenario, "--duration", "6", "--out", tmp_path / "out", "--json")
+    assert run.returncode == 0, run.stderr
+    walked = json.loads(run.stdout)
+    assert walked["distance_m"] > 0.15 and max(walked["max_roll_rad"], walked["max_pitch_rad"]) < 0.3, walked
+
+    assert terraglue("new", "scenario", "--robot", ROOT / "models" / "rover.urdf", "-o", tmp_path / "drive").returncode == 0
+    scenario = tmp_path / "drive" / "scenario.toml"
+    text = scenario.read_text().replace('motor = "position"\n', wheels.replace("*_wheel", "*_wheel_drive"))
+    assert "*_wheel_drive" in text
+    scenario.write_text(text)
+    run = terraglue("run", scenario, "--duration", "3", "--out", tmp_path / "out2", "--json")
+    assert run.returncode == 0, run.stderr
+    # 0.15 m/s at the rim, less what slips
+    assert 0.3 < json.loads(run.stdout)["distance_m"] < 0.45

@@ -14,6 +14,11 @@ pub(crate) fn isometry(pose: &Pose) -> Isometry3<f64> {
     Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_euler_angles(roll, pitch, yaw))
 }
 
+/// A moment below 0 by this part of the largest entry is rounding.
+const ROUNDING: f64 = 1e-9;
+/// So is everything up to this, kg m².
+const SMALLEST: f64 = 1e-18;
+
 /// Masses further apart than this leave few of sixteen digits to the lighter body.
 const WIDEST_MASS_RATIO: f64 = 1e12;
 
@@ -42,9 +47,12 @@ pub(crate) fn inertial(source: &Source, link: &Link) -> Result<Option<Inertial>,
         return Err(source.link(&link.name, not_positive(mass)));
     }
     in_range(mass, &tensor).map_err(|problem| source.link(&link.name, problem))?;
-    if let Some((name, value)) =
-        [("ixx", i.ixx), ("iyy", i.iyy), ("izz", i.izz)].into_iter().find(|m| m.1 < 0.0)
-    {
+    // What rounding leaves of a 0, on either side, is none; a little below 0 beside larger ones is repaired.
+    let largest = tensor.amax();
+    let tensor = if largest <= SMALLEST { Matrix3::zeros() } else { tensor };
+    let least = -(ROUNDING * largest).max(SMALLEST);
+    let moments = [("ixx", i.ixx), ("iyy", i.iyy), ("izz", i.izz)];
+    if let Some((name, value)) = moments.into_iter().find(|m| m.1 < least) {
         let problem =
             format!("{name} = {value} is negative; a moment is a sum of squares times mass: check its sign");
         return Err(source.link(&link.name, problem));

@@ -174,6 +174,16 @@ fn a_link_without_inertia_gets_that_of_its_shapes() {
     }
 }
 
+/// What rounding leaves of a 0, on either side: icub.
+#[test]
+fn moments_a_rounding_below_0_are_repaired() {
+    for tensor in [[-5e-20, 0.0, 0.0, 0.0, 0.0, 0.0], [-1e-13, 0.0, 0.0, 0.02, 0.0, 0.02]] {
+        let robot = read(&[link("a", 1.0, tensor, "")]);
+        one_warning(&robot, &["r.urdf:2: link `a`", "not positive", "used instead"]);
+        assert!(robot.bodies[0].inertia.symmetric_eigenvalues().min() > 0.0);
+    }
+}
+
 /// `<limit>` without `lower` and `upper`: minitaur.
 #[test]
 fn limits_without_a_range_are_none() {

@@ -61,14 +61,32 @@ def test_edits_are_shown_as_they_were_written():
     assert refused("run", MOON_WALK, "--set", "gluing.strategy")
 
 
-def test_a_robot_with_zero_inertia_is_refused(edited, tmp_path):
+def hexapod_with(edited, tmp_path, element, instead):
+    """The walk with a hexapod whose first such element is another one; the scenario and the line of the element."""
     text = (ROOT / "models" / "hexapod.urdf").read_text()
-    start = text.index("<inertia ")
+    start = text.index(element)
     end = text.index("/>", start)
-    zero = '<inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"'
-    (tmp_path / "zero.urdf").write_text(text[:start] + zero + text[end:])
-    message = refused("check", edited("../models/hexapod.urdf", "../zero.urdf"))
-    assert "inertia" in message and "zero.urdf" in message
+    (tmp_path / "odd.urdf").write_text(text[:start] + instead + text[end:])
+    return edited("../models/hexapod.urdf", "../odd.urdf"), text[:start].count("\n") + 1
+
+
+def test_an_error_in_a_robot_file_shows_its_line(edited, tmp_path):
+    scenario, line = hexapod_with(edited, tmp_path, "<mass ", '<mass value="-7"')
+    message = refused("check", scenario)
+    assert "mass -7 kg is not positive" in message
+    place = re.search(r"-\[(.*):(\d+):\d+\]\n", message)
+    assert place[1].endswith("odd.urdf") and int(place[2]) in (line - 1, line), message
+    assert '<link name="body"' in message and "[robot]" not in message
+
+
+def test_a_robot_with_zero_inertia_is_told_and_strict_refuses_it(edited, tmp_path):
+    scenario, _ = hexapod_with(edited, tmp_path, "<inertia ", '<inertia ixx="0" ixy="0" ixz="0" iyy="0" iyz="0" izz="0"')
+    done = terraglue("check", scenario)
+    assert done.returncode == 0, done.stderr
+    assert "no inertia" in done.stderr and "odd.urdf:" in done.stderr and "filled evenly" in done.stderr
+    for refusal in (refused("check", scenario, "--strict"), refused("run", scenario, "--strict")):
+        assert "no inertia" in refusal and "strict" in refusal and "odd.urdf:" in refusal
+    assert "strict" in refused("check", scenario, "--set", "robot.strict=true")
 
 
 def test_a_truncated_elevation_file_is_refused(edited, tmp_path):

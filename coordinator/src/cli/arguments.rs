@@ -37,7 +37,7 @@ pub enum Command {
         folder: PathBuf,
     },
     /// Check a scenario and everything that it refers to, without a step of it; modules and units are made.
-    Check(ScenarioArguments),
+    Check(CheckArguments),
     /// Put a module to the test: named tests of what it promises, each in a process of its own.
     CheckModule(CheckModuleArguments),
     /// List the modules that are found, without running them; with a name, show its parameters.
@@ -73,6 +73,8 @@ pub enum Command {
     New(NewArguments),
     /// Find the parameters of a soil from plate tests.
     FitSoil(FitSoilArguments),
+    /// Show a robot file as it would be simulated: bodies, joints, mass, inertia, warnings.
+    Robot(RobotArguments),
     /// List the soils that a scenario can name, and those that are refused with the reason.
     Soils {
         /// Everything about this one, or those with this in their names.
@@ -108,6 +110,17 @@ pub struct VariablesArguments {
     /// Print JSON instead of columns.
     #[arg(long)]
     pub json: bool,
+}
+
+/// What `check` takes.
+#[derive(Args, Debug, Clone)]
+pub struct CheckArguments {
+    /// The scenario.
+    #[command(flatten)]
+    pub scenario: ScenarioArguments,
+    /// Refuse robot files that have a warning: `strict = true` in the table of every robot.
+    #[arg(long)]
+    pub strict: bool,
 }
 
 /// What `run` and `compare` take.
@@ -150,6 +163,9 @@ pub struct RunCommand {
     /// Go no faster than the clock; results do not depend on it.
     #[arg(long)]
     pub realtime: bool,
+    /// Refuse robot files that have a warning: `strict = true` in the table of every robot.
+    #[arg(long)]
+    pub strict: bool,
     /// Watch the files of modules, and exchange their code while the run goes on.
     #[arg(long)]
     pub watch: bool,
@@ -259,17 +275,76 @@ pub struct CheckModuleArguments {
     pub state: Option<PathBuf>,
 }
 
+/// What `robot` takes.
+#[derive(Args, Debug, Clone)]
+pub struct RobotArguments {
+    /// URDF, xacro or MJCF.
+    #[arg(value_name = "FILE")]
+    pub file: PathBuf,
+    /// A root without mass is the world.
+    #[arg(long)]
+    pub fixed_base: bool,
+    /// Folder of a package that the file names by `package://`. May be repeated.
+    #[arg(long = "package", value_name = "NAME=DIR", value_parser = parse_set)]
+    pub packages: Vec<(String, String)>,
+    /// Refuse a file that has a warning.
+    #[arg(long)]
+    pub strict: bool,
+    /// Print JSON and nothing else.
+    #[arg(long)]
+    pub json: bool,
+}
+
 /// What `new` takes.
 #[derive(Args, Debug, Clone)]
+#[command(after_help = NEW_EXAMPLES)]
 pub struct NewArguments {
     /// What to make.
-    #[arg(value_parser = one_of(Kind::ALL, Kind::word))]
-    pub kind: Kind,
-    /// Name of the module and of its folder, e.g. my-soil.
-    pub name: String,
+    #[arg(value_parser = one_of(New::ALL, New::word))]
+    pub kind: New,
+    /// Name of the module and of its folder, e.g. my-soil; of a scenario: its folder [default: as the robot file].
+    #[arg(required_unless_present = "robot")]
+    pub name: Option<String>,
     /// Language [default: rust; a law: scenario].
     #[arg(long, value_parser = one_of(Language::ALL, Language::word))]
     pub lang: Option<Language>,
+    /// Of a scenario: the robot that stands there (URDF, xacro or MJCF).
+    #[arg(long, value_name = "FILE")]
+    pub robot: Option<PathBuf>,
+    /// Of a scenario: the folder for it.
+    #[arg(short, long, value_name = "DIR", requires = "robot", conflicts_with = "name")]
+    pub output: Option<PathBuf>,
+}
+
+const NEW_EXAMPLES: &str = "\
+Examples:
+  terraglue new soil my-soil --lang c
+  terraglue new scenario --robot my.urdf -o my-moon     it stands on lunar soil and holds its pose";
+
+/// What `new` makes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum New {
+    /// A module.
+    Module(Kind),
+    /// A scenario around a robot.
+    Scenario,
+}
+
+impl New {
+    const ALL: [Self; 5] = [
+        Self::Module(Kind::Soil),
+        Self::Module(Kind::Robot),
+        Self::Module(Kind::Controller),
+        Self::Module(Kind::Law),
+        Self::Scenario,
+    ];
+
+    fn word(self) -> &'static str {
+        match self {
+            Self::Module(kind) => kind.word(),
+            Self::Scenario => "scenario",
+        }
+    }
 }
 
 /// Takes the word of one of a few values.

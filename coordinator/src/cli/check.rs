@@ -1,17 +1,18 @@
 //! `terraglue check`: everything that can be checked without running.
 
-use super::arguments::ScenarioArguments;
+use super::arguments::CheckArguments;
 use super::output::outln;
 use super::run::build;
-use super::{Exit, show, soil_module};
+use super::{Exit, show, soil_module, strict};
 use terraglue::Result;
 use terraglue::host::{Library, SearchPath};
 use terraglue::scenario::{Scenario, SubsystemSpec};
 use terraglue::testbed::Options;
 
 /// Loads the scenario, its modules and files, and resolves all names.
-pub fn check(arguments: &ScenarioArguments) -> Result<Exit> {
-    let scenario = Scenario::load(&arguments.scenario, &arguments.sets)?;
+pub fn check(arguments: &CheckArguments) -> Result<Exit> {
+    let (arguments, strict) = (&arguments.scenario, arguments.strict);
+    let scenario = strict::load(arguments, &arguments.sets, strict)?;
     soil_module::check(&scenario, arguments)?;
     let options = Options { module_paths: arguments.module_path.clone(), ..Options::default() };
     let testbed = build(&scenario, &options)?;

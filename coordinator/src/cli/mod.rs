@@ -22,11 +22,13 @@ mod pace;
 mod progress;
 mod recorder;
 mod report;
+mod robot;
 mod run;
 mod shorten;
 mod show;
 mod soil_module;
 mod soils;
+mod strict;
 mod table_file;
 
 use arguments::{Arguments, Command};
@@ -97,6 +99,7 @@ fn command(command: Command) -> Exit {
         Command::Convert(arguments) => convert::convert(&arguments),
         Command::Worker { .. } => Ok(Exit::Failed),
         Command::New(arguments) => new::new(&arguments),
+        Command::Robot(arguments) => robot::robot(&arguments),
         Command::Soils { name, file } => soils::soils(name.as_deref(), file.as_deref()),
         Command::FitSoil(arguments) => fit_soil::fit_soil(&arguments),
     };

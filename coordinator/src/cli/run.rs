@@ -7,7 +7,7 @@ use super::output::outln;
 use super::pace::Pace;
 use super::progress::{self, Progress};
 use super::recorder::SharedRecorder;
-use super::{Exit, exit_of, show, soil_module};
+use super::{Exit, exit_of, show, soil_module, strict};
 use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
@@ -49,7 +49,7 @@ impl Outcome {
 pub fn run(command: &RunCommand) -> Result<Exit> {
     let arguments = &command.run;
     let interrupt = Interrupt::listen();
-    let scenario = Scenario::load(&arguments.scenario.scenario, &arguments.sets())?;
+    let scenario = strict::load(&arguments.scenario, &arguments.sets(), command.strict)?;
     soil_module::check(&scenario, &arguments.scenario)?;
     let options = options(arguments, &interrupt.flag());
     let testbed = build(&scenario, &options)?;

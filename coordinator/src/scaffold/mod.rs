@@ -5,9 +5,11 @@
 
 mod program;
 mod reserved;
+mod standing;
 mod template;
 
 pub use program::spoken_program;
+pub use standing::Standing;
 pub use template::{Kind, Language};
 
 use std::path::{Path, PathBuf};

@@ -49,6 +49,17 @@ impl InputError {
         Box::new(Self { message: message.into(), source_code, span: None, help })
     }
 
+    /// An error whose message begins with file and line, where there is such a file: a robot's, as its reader says it. `whole`: what
+    /// is shown.
+    pub fn of_file(message: &str, whole: &str) -> Option<Box<Self>> {
+        message.match_indices(':').find_map(|(at, _)| {
+            let (line, _) = message[at + 1..].split_once(':')?;
+            let (file, line) = (Path::new(&message[..at]), line.parse().ok()?);
+            let text = file.is_file().then(|| std::fs::read_to_string(file).ok())??;
+            Some(Self::in_file(file, &text, line, whole))
+        })
+    }
+
     /// An error about line `line` (from 1) of another input file, e.g. an elevation grid or a robot.
     pub fn in_file(path: &Path, text: &str, line: usize, message: impl Into<String>) -> Box<Self> {
         let start: usize = text.split_inclusive('\n').take(line.saturating_sub(1)).map(str::len).sum();

@@ -294,6 +294,11 @@ const NO_MODULE: &str = "`terraglue modules` lists those that are found. `cargo 
                          TERRAGLUE_MODULE_PATH adds a folder, and `module` may be the path of a file";
 
 fn module_error(scenario: &Scenario, spec: &SubsystemSpec, error: &LoadError) -> Box<InputError> {
+    if let LoadError::Refused { message, .. } = error
+        && let Some(shown) = InputError::of_file(message, &error.to_string())
+    {
+        return shown;
+    }
     let near = error.nearest().map(|n| format!("did you mean `{n}`?"));
     let help = near.or_else(|| error.is_unknown().then(|| NO_MODULE.to_owned()));
     let key = match error {

@@ -37,8 +37,12 @@ impl Module for RigidBody {
         let config = config.clone().with_defaults(&Self::schema());
         let fixed = config.flag("fixed_base")?;
         let folder = Path::new(host.folder());
-        let options =
-            Options { fixed_base: fixed, packages: packages(&config, folder), ..Options::default() };
+        let options = Options {
+            fixed_base: fixed,
+            packages: packages(&config, folder),
+            strict: config.flag("strict")?,
+            ..Options::default()
+        };
         let options = options.with_ros_package_path();
         let file = read_robot(&folder.join(config.text("model")?), &options);
         let mut file = file.map_err(|e| Error::Refused(e.to_string()))?;

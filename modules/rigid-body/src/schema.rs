@@ -17,6 +17,13 @@ pub(crate) fn schema() -> Schema {
                 "Folder of a package that the robot file names by `package://` (else: folders above the file, ROS_PACKAGE_PATH)",
             )
             .optional(),
+            Parameter::of(
+                "strict",
+                ParameterType::Bool,
+                "Refuse a robot file that has a warning: one that says in vain what is not supported, or something that is not \
+                 used as it stands",
+            )
+            .or(false),
             Parameter {
                 unit: "m".into(),
                 ..Parameter::of("position_m", ParameterType::Numbers, "Initial x, y, z of the root link's frame")

@@ -93,9 +93,6 @@ pub(crate) fn check(source: &Source) -> Result<(), Error> {
         Err(Error::Element { file: source.file.into(), line, element, problem })
     };
     let root = document.root_element();
-    if let Some(node) = document.descendants().find(is_xacro) {
-        return wrong(node, way_out_of_xacro(source.file));
-    }
     if !root.has_tag_name("robot") {
         return wrong(root, "the root of URDF is <robot>".into());
     }
@@ -119,6 +116,59 @@ pub(crate) fn check(source: &Source) -> Result<(), Error> {
     Ok(())
 }
 
+/// Attributes that `urdf-rs` wants and that the format leaves out where they say nothing: element, attribute, value.
+const LEFT_OUT: [(&str, &str, &str); 3] =
+    [("limit", "effort", "0"), ("limit", "velocity", "0"), ("texture", "filename", "")];
+
+/// The same for elements: the one around, and what stands in it without being said.
+const EMPTY: [(&str, &str, &str); 2] = [
+    ("inertial", "mass", "<mass value=\"0\"/>"),
+    ("inertial", "inertia", "<inertia ixx=\"0\" ixy=\"0\" ixz=\"0\" iyy=\"0\" iyz=\"0\" izz=\"0\"/>"),
+];
+
+/// The text with the prefixes declared that it uses without saying what they are, as most readers of URDF bear it; lines stay.
+pub(crate) fn declared(text: &str) -> String {
+    let mut text = text.to_owned();
+    // As many as anybody would have.
+    for _ in 0..16 {
+        let Err(roxmltree::Error::UnknownNamespace(prefix, _)) = Document::parse(&text) else { break };
+        let Some(root) = text.find("<robot").map(|at| at + "<robot".len()) else { break };
+        text.insert_str(root, &format!(" xmlns:{prefix}=\"{prefix}\""));
+    }
+    text
+}
+
+/// The text with these attributes; lines stay where they are.
+pub(crate) fn complete(text: &str) -> String {
+    let Ok(document) = Document::parse(text) else { return text.into() };
+    let mut whole = String::with_capacity(text.len());
+    let mut done = 0;
+    for node in document.descendants().filter(Node::is_element) {
+        let of_this = EMPTY.iter().filter(|(element, ..)| node.has_tag_name(*element));
+        for (element, _, instead) in
+            of_this.filter(|(_, name, _)| !node.children().any(|c| c.has_tag_name(*name)))
+        {
+            let start = node.range().start + 1 + element.len();
+            let Some(end) = text[start..node.range().end].find('>').map(|k| start + k + 1) else { continue };
+            // An empty `<inertial/>` has no inside.
+            if !text[..end].ends_with("/>") {
+                whole += &text[done..end];
+                whole += instead;
+                done = end;
+            }
+        }
+        for (element, name, value) in LEFT_OUT {
+            if node.has_tag_name(element) && node.attribute(name).is_none() {
+                let at = node.range().start + 1 + element.len();
+                whole += &text[done..at];
+                whole += &format!(" {name}=\"{value}\"");
+                done = at;
+            }
+        }
+    }
+    whole + &text[done..]
+}
+
 /// Tag and name of an element, or of the one around it that has a name.
 fn called(node: Node) -> String {
     let tag = |n: Node| match n.attribute("name") {
@@ -130,23 +180,6 @@ fn called(node: Node) -> String {
         Some(owner) => format!("{} of {}", tag(node), tag(owner)),
         None => tag(node),
     }
-}
-
-/// Whether an element is of xacro, or has one of its expressions.
-fn is_xacro(node: &Node) -> bool {
-    let expression = |text: &str| ["${", "$(arg ", "$(find ", "$(eval "].iter().any(|e| text.contains(e));
-    node.tag_name().namespace().is_some_and(|s| s.contains("xacro"))
-        || node.attributes().any(|a| expression(a.value()))
-}
-
-fn way_out_of_xacro(file: &str) -> String {
-    let bare =
-        [".urdf.xacro", ".xacro", ".urdf"].iter().find_map(|end| file.strip_suffix(end)).unwrap_or(file);
-    let end = if file.ends_with(".urdf") { "expanded.urdf" } else { "urdf" };
-    format!(
-        "is xacro, which is a language of its own: `xacro {file} > {bare}.{end}` makes URDF of it (`pip install xacro` \
-         where ROS is not installed)"
-    )
 }
 
 fn joint(node: Node) -> Result<(), String> {

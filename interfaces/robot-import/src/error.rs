@@ -58,6 +58,14 @@ pub enum Error {
         /// Value and way out.
         problem: String,
     },
+    /// There is a warning, and none is wanted.
+    #[error("{first}{}; refused because of `strict`", more(*.count))]
+    Strict {
+        /// The first warning, with its place.
+        first: String,
+        /// How many there are.
+        count: usize,
+    },
     /// Links and joints do not form one tree.
     #[error("{file}: {problem}")]
     Tree {
@@ -66,6 +74,10 @@ pub enum Error {
         /// What is not a tree and a way out.
         problem: String,
     },
+}
+
+fn more(count: usize) -> String {
+    if count > 1 { format!(" (and {} more warnings)", count - 1) } else { String::new() }
 }
 
 fn at(line: usize) -> String {

@@ -6,8 +6,9 @@
 
 use super::{Place, Reader};
 use crate::error::Error;
+use crate::inertia::Inertial;
 use crate::model::Body;
-use nalgebra::{Isometry3, Matrix3, Vector3};
+use nalgebra::Isometry3;
 use roxmltree::Node;
 
 /// What a body between two joints carries of the whole.
@@ -20,7 +21,7 @@ impl Reader<'_, '_> {
         joints: &[Node<'a, '_>],
         above: Place<'a>,
         (name, frame): (&str, Isometry3<f64>),
-        (mass, com, inertia): (f64, Vector3<f64>, Matrix3<f64>),
+        whole: Inertial,
     ) -> Result<usize, Error> {
         let between = joints.len().saturating_sub(1);
         let (mut parent, mut at) = (above.body, frame);
@@ -31,9 +32,9 @@ impl Reader<'_, '_> {
             let child = self.robot.bodies.len();
             let body = Body {
                 name: own.clone(),
-                mass: share * mass,
-                com,
-                inertia: share * inertia,
+                mass: share * whole.mass,
+                com: whole.com,
+                inertia: share * whole.tensor,
                 shapes: Vec::new(),
             };
             self.robot.bodies.push(body);

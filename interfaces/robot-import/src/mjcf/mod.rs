@@ -17,8 +17,9 @@ mod several;
 mod survey;
 
 use crate::Options;
-use crate::check::{Inertial, mass_spread, physical, unique};
+use crate::check::{mass_spread, unique};
 use crate::error::{Error, Source};
+use crate::inertia::{Inertial, flaw, in_range};
 use crate::model::{Base, Robot, Shape};
 use assets::Assets;
 use defaults::Defaults;
@@ -60,9 +61,24 @@ pub fn read_mjcf_text(file: &str, text: &str, options: &Options) -> Result<Robot
         _ => Base::World,
     };
     robot.others.retain(|(body, _)| *body != 0);
+    set_total_mass(&defaults, root, &mut robot)?;
     robot.warnings.extend(mass_spread(file, &robot.bodies));
     unique(&source, &robot)?;
     Ok(robot)
+}
+
+/// Scales masses and inertias to what `<compiler settotalmass>` says, where that is above 0.
+fn set_total_mass(d: &Defaults, root: Node, robot: &mut Robot) -> Result<(), Error> {
+    let compilers = root.children().filter(|n| n.has_tag_name("compiler"));
+    for e in compilers.map(|n| d.element(n, None)) {
+        let Some(wanted) = d.number(&e, "settotalmass")?.filter(|m| *m > 0.0) else { continue };
+        let scale = wanted / robot.bodies.iter().map(|b| b.mass).sum::<f64>();
+        for body in &mut robot.bodies {
+            body.mass *= scale;
+            body.inertia *= scale;
+        }
+    }
+    Ok(())
 }
 
 fn empty(name: &str) -> Robot {
@@ -224,10 +240,13 @@ impl<'d, 's> Reader<'d, 's> {
                 let problem = "moves but has no mass; give it an <inertial> or a geom with mass";
                 return Err(self.d.wrong(&e, problem.into()));
             }
-            (_, Some((mass, com, inertia))) => {
-                physical(mass, &inertia).map_err(|problem| self.d.wrong(&e, problem))?;
+            (_, Some(inertial)) => {
+                // MuJoCo refuses such a file, too.
+                in_range(inertial.mass, &inertial.tensor)
+                    .and_then(|()| flaw(&inertial.tensor).map_or(Ok(()), Err))
+                    .map_err(|problem| self.d.wrong(&e, problem))?;
                 let hangs = Place { class, ..above };
-                let child = self.hang_by(&joints, hangs, (&name, frame), (mass, com, inertia))?;
+                let child = self.hang_by(&joints, hangs, (&name, frame), inertial)?;
                 Place { body: Some(child), frame: Isometry3::identity(), class }
             }
         };
@@ -236,7 +255,7 @@ impl<'d, 's> Reader<'d, 's> {
     }
 
     /// `<inertial>`, or what the geoms weigh.
-    fn inertial(&self, node: Node, class: Option<&str>, name: &str) -> Result<Inertial, Error> {
+    fn inertial(&self, node: Node, class: Option<&str>, name: &str) -> Result<Option<Inertial>, Error> {
         let d = self.d;
         let inertial = node.children().find(|n| n.has_tag_name("inertial"));
         if let Some(inertial) = inertial.filter(|_| !d.weigh_geoms) {
@@ -254,7 +273,8 @@ impl<'d, 's> Reader<'d, 's> {
             };
             let pose = d.pose(&e)?;
             let r = pose.rotation.to_rotation_matrix();
-            return Ok(Some((mass, pose.translation.vector, r * tensor * r.transpose())));
+            let tensor = r * tensor * r.transpose();
+            return Ok(Some(Inertial { mass, com: pose.translation.vector, tensor }));
         }
         let mut weighed = Vec::new();
         let around = Around { assets: self.assets, owner: name, still: false };

@@ -3,11 +3,12 @@
 use super::assets::Assets;
 use super::defaults::{Defaults, Element, from_z};
 use crate::error::Error;
+use crate::inertia::Inertial;
 use crate::mesh::Solid;
 use crate::model::{Plane, Shape, ShapeGeometry};
 use crate::shapes::drawn;
-use nalgebra::{Isometry3, Matrix3, Translation3, Unit, Vector3};
-use std::f64::consts::PI;
+use crate::solid::{nothing, placed, solid};
+use nalgebra::{Isometry3, Translation3, Unit, Vector3};
 
 /// Density where a file gives neither mass nor density, kg/m³.
 const DENSITY: f64 = 1000.0;
@@ -143,52 +144,8 @@ fn mesh(
     })
 }
 
-fn nothing() -> Solid {
-    Solid { volume: 0.0, centre: Vector3::zeros(), inertia: Matrix3::zeros() }
-}
-
-/// A homogeneous shape around its centre.
-fn solid(g: &ShapeGeometry) -> Solid {
-    let (volume, moments) = match *g {
-        ShapeGeometry::Sphere { radius: r } => (4.0 / 3.0 * PI * r * r * r, [0.4 * r * r; 3]),
-        ShapeGeometry::Box { half_extents: [x, y, z] } => {
-            let i = |a: f64, b: f64| (a * a + b * b) / 3.0;
-            (8.0 * x * y * z, [i(y, z), i(x, z), i(x, y)])
-        }
-        ShapeGeometry::Cylinder { half_length: l, radius: r } => {
-            let about = r * r / 4.0 + l * l / 3.0;
-            (PI * r * r * 2.0 * l, [about, about, r * r / 2.0])
-        }
-        ShapeGeometry::Capsule { half_length: l, radius: r } => {
-            // A cylinder and two half spheres whose centres lie 3/8·r beyond its ends.
-            let total = PI * r * r * (2.0 * l + 4.0 / 3.0 * r);
-            let (rod, ball) = (PI * r * r * 2.0 * l / total, PI * 4.0 / 3.0 * r * r * r / total);
-            let about = rod * (r * r / 4.0 + l * l / 3.0) + ball * (0.4 * r * r + l * l + 0.75 * l * r);
-            (total, [about, about, rod * r * r / 2.0 + 0.4 * ball * r * r])
-        }
-        ShapeGeometry::Hull(_)
-        | ShapeGeometry::Concave { .. }
-        | ShapeGeometry::Triangles(_)
-        | ShapeGeometry::Heights(_) => return nothing(),
-    };
-    let inertia = Matrix3::from_diagonal(&Vector3::from(moments));
-    Solid { volume, centre: Vector3::zeros(), inertia }
-}
-
 /// Mass, centre of mass and inertia about it of shapes in their common frame.
-pub(super) fn compound(shapes: &[Box<Weighed>]) -> Option<(f64, Vector3<f64>, Matrix3<f64>)> {
-    let mass: f64 = shapes.iter().map(|s| s.mass).sum();
-    if mass <= 0.0 {
-        return None;
-    }
-    let centre_of = |s: &Weighed| (s.shape.body_from_shape * nalgebra::Point3::from(s.solid.centre)).coords;
-    let centre = shapes.iter().map(|s| s.mass * centre_of(s)).sum::<Vector3<f64>>() / mass;
-    let mut total = Matrix3::zeros();
-    for s in shapes {
-        let r = s.shape.body_from_shape.rotation.to_rotation_matrix();
-        let arm = centre_of(s) - centre;
-        let moved = Matrix3::from_diagonal_element(arm.norm_squared()) - arm * arm.transpose();
-        total += s.mass * (r * s.solid.inertia * r.transpose() + moved);
-    }
-    Some((mass, centre, total))
+pub(super) fn compound(shapes: &[Box<Weighed>]) -> Option<Inertial> {
+    let weighed = shapes.iter().map(|s| placed(s.mass, &s.solid, &s.shape.body_from_shape));
+    weighed.reduce(|a, b| a.with(&b)).filter(|whole| whole.mass > 0.0)
 }

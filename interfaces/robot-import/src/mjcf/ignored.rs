@@ -95,6 +95,7 @@ const KNOWN: [(&str, &[&str]); 17] = [
             "usethread",
             "alignfree",
             "saveinertial",
+            "settotalmass",
         ],
     ),
     (

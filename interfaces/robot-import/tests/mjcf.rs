@@ -7,7 +7,7 @@ use terraglue_robot_import::{
 };
 
 fn file(name: &str) -> std::path::PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(name)
 }
 
 fn read(worldbody: &str, more: &str) -> Result<Robot, String> {
@@ -154,7 +154,7 @@ fn attributes_that_act_and_are_not_supported_are_named() {
     let ball = "<body name=\"a\"><joint name=\"j\"/><geom size=\"1\"/></body>";
     for (more, expected) in [
         ("<option density=\"1.2\"/>", "<option> has `density`"),
-        ("<compiler settotalmass=\"3\"/>", "<compiler> has `settotalmass`"),
+        ("<compiler boundmass=\"3\"/>", "<compiler> has `boundmass`"),
         ("<tendon><fixed name=\"t\"/></tendon>", "<fixed> `t` is not supported"),
         ("<actuator><muscle joint=\"j\"/></actuator>", "<muscle> is not supported"),
         ("<actuator><position joint=\"j\" dampratio=\"1\"/></actuator>", "<position> has `dampratio`"),
@@ -316,4 +316,20 @@ fn masses_far_apart_are_warned_of() {
     );
     let warnings = robot.unwrap().warnings;
     assert!(warnings.len() == 1 && warnings[0].contains("m.xml: link `b` weighs 1e-6 kg"), "{warnings:?}");
+}
+
+#[test]
+fn the_total_mass_is_what_the_compiler_says() {
+    let text = |compiler: &str| {
+        format!(
+            "<mujoco>{compiler}<worldbody><body name=\"a\"><joint name=\"j\"/><geom size=\"0.1\" mass=\"3\"/>\
+             <body name=\"b\"><joint name=\"k\"/><geom size=\"0.1\" mass=\"1\"/></body></body></worldbody></mujoco>"
+        )
+    };
+    let read = |compiler: &str| read_mjcf_text("m.xml", &text(compiler), &Options::default()).unwrap();
+    let (plain, scaled) = (read(""), read("<compiler settotalmass=\"14\"/>"));
+    for (a, b) in plain.bodies.iter().zip(&scaled.bodies) {
+        assert!((b.mass - 3.5 * a.mass).abs() < 1e-12 && (b.inertia - 3.5 * a.inertia).norm() < 1e-12);
+    }
+    assert!(scaled.warnings.is_empty(), "{:?}", scaled.warnings);
 }

@@ -1,14 +1,11 @@
-//! Checks of single links (mass, inertia), of masses against each other and of names.
+//! Checks of single links (mass, sign of the moments), of masses against each other and of names.
 
 use crate::error::{Error, Source};
+use crate::inertia::{Inertial, in_range};
 use crate::model::{Body, Robot};
-use crate::values::LARGEST;
-use nalgebra::{Isometry3, Matrix3, SymmetricEigen, Translation3, UnitQuaternion, Vector3};
+use nalgebra::{Isometry3, Matrix3, Translation3, UnitQuaternion};
 use std::collections::BTreeSet;
 use urdf_rs::{Link, Pose};
-
-/// Mass, centre of mass and inertia about it in link axes; none where the link has no mass at all.
-pub(crate) type Inertial = Option<(f64, Vector3<f64>, Matrix3<f64>)>;
 
 /// Roll, pitch, yaw about fixed axes, as URDF has it.
 pub(crate) fn isometry(pose: &Pose) -> Isometry3<f64> {
@@ -16,6 +13,11 @@ pub(crate) fn isometry(pose: &Pose) -> Isometry3<f64> {
     let [roll, pitch, yaw] = pose.rpy.0;
     Isometry3::from_parts(Translation3::new(x, y, z), UnitQuaternion::from_euler_angles(roll, pitch, yaw))
 }
+
+/// A moment below 0 by this part of the largest entry is rounding.
+const ROUNDING: f64 = 1e-9;
+/// So is everything up to this, kg m².
+const SMALLEST: f64 = 1e-18;
 
 /// Masses further apart than this leave few of sixteen digits to the lighter body.
 const WIDEST_MASS_RATIO: f64 = 1e12;
@@ -33,54 +35,36 @@ pub(crate) fn mass_spread(file: &str, bodies: &[Body]) -> Option<String> {
     })
 }
 
-/// Reads and checks the inertial of a link.
-pub(crate) fn inertial(source: &Source, link: &Link) -> Result<Inertial, Error> {
+/// Reads the inertial of a link, in its axes; none where it has neither mass nor inertia. What no body can have is refused
+/// here where it is meant for none: whether the rest can be simulated, the links that move as one decide together.
+pub(crate) fn inertial(source: &Source, link: &Link) -> Result<Option<Inertial>, Error> {
     let (mass, i) = (link.inertial.mass.value, &link.inertial.inertia);
     let tensor = Matrix3::new(i.ixx, i.ixy, i.ixz, i.ixy, i.iyy, i.iyz, i.ixz, i.iyz, i.izz);
     if mass == 0.0 && tensor == Matrix3::zeros() {
         return Ok(None);
     }
-    if mass <= 0.0 {
+    if mass < 0.0 {
+        return Err(source.link(&link.name, not_positive(mass)));
+    }
+    in_range(mass, &tensor).map_err(|problem| source.link(&link.name, problem))?;
+    // What rounding leaves of a 0, on either side, is none; a little below 0 beside larger ones is repaired.
+    let largest = tensor.amax();
+    let tensor = if largest <= SMALLEST { Matrix3::zeros() } else { tensor };
+    let least = -(ROUNDING * largest).max(SMALLEST);
+    let moments = [("ixx", i.ixx), ("iyy", i.iyy), ("izz", i.izz)];
+    if let Some((name, value)) = moments.into_iter().find(|m| m.1 < least) {
         let problem =
-            format!("mass {mass} kg is not positive; give it a mass, or leave <inertial> out and fix it");
+            format!("{name} = {value} is negative; a moment is a sum of squares times mass: check its sign");
         return Err(source.link(&link.name, problem));
     }
-    physical(mass, &tensor).map_err(|problem| source.link(&link.name, problem))?;
     let frame = isometry(&link.inertial.origin);
     let r = frame.rotation.to_rotation_matrix();
-    Ok(Some((mass, frame.translation.vector, r * tensor * r.transpose())))
+    Ok(Some(Inertial { mass, com: frame.translation.vector, tensor: r * tensor * r.transpose() }))
 }
 
-/// Mass and moments must be of a size that can be computed with. Principal moments must be positive and each at most the
-/// sum of the others (with 1e-6 for rounding in files).
-pub(crate) fn physical(mass: f64, tensor: &Matrix3<f64>) -> Result<(), String> {
-    let range = 1.0 / LARGEST..=LARGEST;
-    if !range.contains(&mass) {
-        return Err(format!(
-            "mass {mass:e} kg is not within {:e} … {LARGEST:e}; check its unit",
-            1.0 / LARGEST
-        ));
-    }
-    if !tensor.iter().all(|v| v.abs() <= LARGEST) {
-        return Err(format!(
-            "a moment of inertia is beyond {LARGEST:e} kg m²; check mass, size and their units"
-        ));
-    }
-    let mut p = SymmetricEigen::new(*tensor).eigenvalues;
-    p.as_mut_slice().sort_by(f64::total_cmp);
-    let shown = format!("principal moments {:.6e}, {:.6e}, {:.6e} kg m²", p[0], p[1], p[2]);
-    if p[0] <= 1e-12 * p[2] || p[2] <= 0.0 || p[0] < 1.0 / LARGEST {
-        return Err(format!(
-            "{shown}: the inertia is not positive; a solid body of its mass and size has one"
-        ));
-    }
-    if p[2] > (p[0] + p[1]) * (1.0 + 1e-6) {
-        return Err(format!(
-            "{shown}: no body has such an inertia, each moment is at most the sum of the other two; \
-             check the axes and units of <inertia>"
-        ));
-    }
-    Ok(())
+/// Words for a mass that moves nothing.
+pub(crate) fn not_positive(mass: f64) -> String {
+    format!("mass {mass} kg is not positive; give it a mass, or leave <inertial> out and fix it")
 }
 
 /// Names of bodies and of joints are unique, also those that the reader has made up.

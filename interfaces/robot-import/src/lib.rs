@@ -1,21 +1,27 @@
-//! Reads robot files (URDF, MJCF) into a checked tree of bodies, joints and shapes.
+//! Reads robot files (URDF, xacro, MJCF) into a checked tree of bodies, joints and shapes.
 //!
 //! What comes out can be simulated: every body has a physical mass and inertia, the joints form a tree, links
-//! without mass are merged into the link to which they are fixed. What cannot be is refused with file, line,
-//! link or joint, the offending value and a way out.
+//! that cannot stand alone are merged into the link to which they are fixed. What a simulation can live with is a warning
+//! that says which value is used instead; what it cannot is refused with file, line, link or joint, the offending value
+//! and a way out.
 
 mod attach;
 mod check;
 mod error;
+mod inertia;
+mod merge;
 mod mesh;
 mod mjcf;
 mod model;
+mod pose;
 mod shapes;
+mod solid;
 mod syntax;
 mod tree;
 mod unread;
 mod urdf;
 mod values;
+mod xacro;
 
 pub use error::Error;
 pub use mesh::Mesh;
@@ -24,6 +30,7 @@ pub use model::{
     AxisData, Base, Body, Coupling, Drive, DriveKind, Heights, Joint, JointKind, Loop, Plane, Robot, Shape,
     ShapeGeometry,
 };
+pub use pose::Whole;
 pub use urdf::read_urdf_text;
 
 use error::Source;
@@ -38,6 +45,8 @@ pub struct Options {
     pub packages: Vec<(String, PathBuf)>,
     /// Folders that hold packages, or are one.
     pub package_path: Vec<PathBuf>,
+    /// Refuse a file where there is a warning.
+    pub strict: bool,
 }
 
 impl Options {
@@ -55,17 +64,30 @@ impl Options {
     }
 }
 
-/// Reads a file of either format, which the root of its text tells.
+/// Reads a file of either format, which the root of its text tells; xacro is expanded first.
 pub fn read_robot(path: &Path, options: &Options) -> Result<Robot, Error> {
     let file = path.display().to_string();
-    let text = terraglue_subsystem::files::read_text(path)
+    let mut text = terraglue_subsystem::files::read_text(path)
         .map_err(|e| Error::Read { file: file.clone(), reason: e.to_string() })?;
     syntax::check_depth(&Source { file: &file, text: &text })?;
     // URDF may hold an element <mujoco>, too, for MuJoCo's own reader. What is no XML its reader complains of.
-    let is_mjcf = match roxmltree::Document::parse(&text) {
-        Ok(document) => document.root_element().has_tag_name("mujoco"),
-        Err(_) => text.contains("<mujoco"),
+    let (is_mjcf, is_xacro) = match roxmltree::Document::parse(&text) {
+        Ok(document) => {
+            let is_mjcf = document.root_element().has_tag_name("mujoco");
+            (is_mjcf, !is_mjcf && xacro::is_xacro(&document))
+        }
+        Err(_) => (text.contains("<mujoco"), false),
+    };
+    let file = if is_xacro {
+        text = xacro::expand(path, options)?;
+        xacro::expanded_name(&file)
+    } else {
+        file
     };
     let read = if is_mjcf { read_mjcf_text } else { read_urdf_text };
-    read(&file, &text, options)
+    let robot = read(&file, &text, options)?;
+    match robot.warnings.first().filter(|_| options.strict) {
+        Some(first) => Err(Error::Strict { first: first.clone(), count: robot.warnings.len() }),
+        None => Ok(robot),
+    }
 }

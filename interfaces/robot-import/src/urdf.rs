@@ -1,101 +1,59 @@
 //! From the text of a URDF file to the checked robot; links without mass are merged into their neighbours.
 
 use crate::Options;
-use crate::check::{Inertial, inertial, isometry, mass_spread};
+use crate::check::{inertial, isometry, mass_spread, not_positive};
 use crate::error::{Error, Source};
+use crate::inertia::{Inertial, repair};
+use crate::merge::{Merged, merge};
 use crate::model::{AxisData, Base, Body, Coupling, Joint, JointKind, Robot, Shape};
 use crate::shapes::Shapes;
 use crate::tree::{Place, order};
 use crate::unread;
-use nalgebra::{Isometry3, Unit, Vector3};
+use nalgebra::{Unit, Vector3};
 use urdf_rs::JointType;
 
 /// Reads the text of a file; `file` appears in messages and tells the folder of meshes.
 pub fn read_urdf_text(file: &str, text: &str, options: &Options) -> Result<Robot, Error> {
-    let source = Source { file, text };
-    crate::syntax::check(&source)?;
-    let robot = urdf_rs::read_from_string(text).map_err(|e| source.syntax(0, e.to_string()))?;
-    let order = order(&source, &robot)?;
-    let inertials = robot.links.iter().map(|l| inertial(&source, l)).collect::<Result<Vec<_>, _>>()?;
+    let text = crate::syntax::declared(text);
+    let source = &Source { file, text: &text };
+    crate::syntax::check(source)?;
+    let robot = urdf_rs::read_from_string(&crate::syntax::complete(&text))
+        .map_err(|e| source.syntax(0, e.to_string()))?;
+    let order = order(source, &robot)?;
+    let inertials = robot.links.iter().map(|l| inertial(source, l)).collect::<Result<Vec<_>, _>>()?;
     let merged = merge(&robot, &order, &inertials);
-    build(&source, &robot, &order, &inertials, &merged, options)
-}
-
-/// Links that move as one: at most one of them has mass and gives name and frame.
-struct Merged {
-    /// Per link: its group.
-    group: Vec<usize>,
-    /// Per link: its frame in the frame of the group's first link.
-    group_from_link: Vec<Isometry3<f64>>,
-    /// Per group: the link with mass.
-    massive: Vec<Option<usize>>,
-    /// Per group: its first link and the joint above it.
-    first: Vec<(usize, Option<usize>)>,
-}
-
-fn merge(robot: &urdf_rs::Robot, order: &[Place], inertials: &[Inertial]) -> Merged {
-    let n = robot.links.len();
-    let mut m = Merged {
-        group: vec![0; n],
-        group_from_link: vec![Isometry3::identity(); n],
-        massive: Vec::new(),
-        first: Vec::new(),
-    };
-    for place in order {
-        let massive = inertials[place.link].is_some().then_some(place.link);
-        let joint = place.joint.map(|j| &robot.joints[j]).filter(|j| j.joint_type == JointType::Fixed);
-        let parent = joint.and_then(|j| robot.links.iter().position(|l| l.name == j.parent.link));
-        if let (Some(joint), Some(parent)) = (joint, parent) {
-            let group = m.group[parent];
-            if massive.is_none() || m.massive[group].is_none() {
-                m.group[place.link] = group;
-                m.group_from_link[place.link] = m.group_from_link[parent] * isometry(&joint.origin);
-                m.massive[group] = m.massive[group].or(massive);
-                continue;
-            }
-        }
-        m.group[place.link] = m.massive.len();
-        m.massive.push(massive);
-        m.first.push((place.link, place.joint));
-    }
-    m
-}
-
-impl Merged {
-    /// Frame of a link in the frame of its group's body.
-    fn body_from_link(&self, link: usize) -> Isometry3<f64> {
-        let body = self.massive[self.group[link]].unwrap_or(self.first[self.group[link]].0);
-        self.group_from_link[body].inverse() * self.group_from_link[link]
-    }
+    build(source, &robot, &order, &inertials, &merged, options)
 }
 
 fn build(
     source: &Source,
     robot: &urdf_rs::Robot,
     order: &[Place],
-    inertials: &[Inertial],
+    inertials: &[Option<Inertial>],
     merged: &Merged,
     options: &Options,
 ) -> Result<Robot, Error> {
-    let world = merged.massive[0].is_none();
+    let world = merged.chief[0].is_none();
     if world {
         check_world(source, robot, merged, options.fixed_base)?;
     }
     let shift = usize::from(world);
     let (mut bodies, mut joints) = (Vec::new(), Vec::new());
-    for group in shift..merged.massive.len() {
+    for group in shift..merged.chief.len() {
         let (first, above) = merged.first[group];
-        let Some((link, (mass, com, inertia))) =
-            merged.massive[group].and_then(|l| inertials[l].map(|i| (l, i)))
-        else {
+        let name = &robot.links[merged.chief[group].unwrap_or(first)].name;
+        let Some(Inertial { mass, com, tensor: inertia }) = merged.together(group, inertials) else {
             let problem =
                 "moves on a joint but has no mass; give it an <inertial>, or make a joint next to it fixed";
-            return Err(source.link(&robot.links[first].name, problem));
+            return Err(source.link(name, problem));
         };
+        if mass <= 0.0 {
+            return Err(source.link(name, not_positive(mass)));
+        }
         if let Some(j) = above {
             joints.push(joint(source, robot, merged, j, first, bodies.len(), shift)?);
         }
-        bodies.push(Body { name: robot.links[link].name.clone(), mass, com, inertia, shapes: Vec::new() });
+        bodies.push(Body { name: name.clone(), mass, com, inertia, shapes: Vec::new() });
     }
     let folders = options.folders(source.file);
     let (mut shapes, mut world_shapes) = (Shapes::new(source, &folders), Vec::new());
@@ -108,16 +66,25 @@ fn build(
             None => world_shapes.extend(moved),
         }
     }
-    let base = match merged.massive[0] {
+    let base = match merged.chief[0] {
         Some(link) => Base::Free(merged.group_from_link[link]),
         None => Base::World,
     };
-    let (mut warnings, mut notices) = shapes.said();
+    let mut warnings: Vec<String> = merged.warning(source, robot, inertials).into_iter().collect();
+    for body in &mut bodies {
+        let said = repair(body).map(|text| source.link(&body.name, text).to_string());
+        warnings.extend(said);
+    }
+    let (unclear, mut notices) = shapes.said();
+    warnings.extend(unclear);
     let (unread, unused) = unread::told(source, robot);
     warnings.extend(unread);
     notices.extend(unused);
+    warnings.extend(without_limits(source, robot));
+    warnings.extend(fixed_followers(source, robot));
     warnings.extend(mass_spread(source.file, &bodies));
     let couplings = couplings(source, robot, &joints)?;
+    let excluded = next_to_each_other(bodies.len(), &joints);
     Ok(Robot {
         name: robot.name.clone(),
         base,
@@ -126,12 +93,37 @@ fn build(
         others: Vec::new(),
         world_shapes,
         planes: Vec::new(),
-        excluded: Vec::new(),
+        excluded,
         couplings,
         loops: Vec::new(),
         warnings,
         notices,
     })
+}
+
+/// Pairs of bodies with fixed joints only between them, or one joint that moves besides: their shapes overlap where they are joined,
+/// as those of a body and its parent do, which never touch anyway.
+fn next_to_each_other(bodies: usize, joints: &[Joint]) -> Vec<[usize; 2]> {
+    // Per body: the first of those that move as one with it.
+    let mut leader: Vec<usize> = (0..bodies).collect();
+    for joint in joints.iter().filter(|j| j.kind == JointKind::Fixed) {
+        leader[joint.child] = joint.parent.map_or(joint.child, |p| leader[p]);
+    }
+    let mut joined: Vec<[usize; 2]> = joints
+        .iter()
+        .filter_map(|j| j.parent.map(|p| [leader[p], leader[j.child]]))
+        .filter(|[above, below]| above != below)
+        .collect();
+    joined.sort_unstable();
+    let near = |a: usize, b: usize| {
+        let (a, b) = (leader[a], leader[b]);
+        a == b || joined.binary_search(&[a, b]).is_ok() || joined.binary_search(&[b, a]).is_ok()
+    };
+    let direct = |a: usize, b: usize| joints.iter().any(|j| j.child == b && j.parent == Some(a));
+    (0..bodies)
+        .flat_map(|a| (a + 1..bodies).map(move |b| [a, b]))
+        .filter(|[a, b]| near(*a, *b) && !direct(*a, *b))
+        .collect()
 }
 
 /// Friction in the joint, from `<dynamics>`.
@@ -149,9 +141,11 @@ fn couplings(source: &Source, robot: &urdf_rs::Robot, joints: &[Joint]) -> Resul
     let moving = |name: &str| joints.iter().position(|j| j.name == name && j.kind != JointKind::Fixed);
     let mut all = Vec::new();
     for joint in &robot.joints {
-        let Some(mimic) = &joint.mimic else { continue };
+        let Some(mimic) = joint.mimic.as_ref().filter(|_| joint.joint_type != JointType::Fixed) else {
+            continue;
+        };
         let wrong = |problem: String| source.joint(&joint.name, format!("<mimic>: {problem}"));
-        let follower = moving(&joint.name).ok_or_else(|| wrong("a fixed joint follows none".into()))?;
+        let Some(follower) = moving(&joint.name) else { continue };
         let leader = moving(&mimic.joint);
         let leader = leader.ok_or_else(|| wrong(format!("no moving joint is called `{}`", mimic.joint)))?;
         let (ratio, offset) = (mimic.multiplier.unwrap_or(1.0), mimic.offset.unwrap_or(0.0));
@@ -178,7 +172,7 @@ fn check_world(
     fixed_base: bool,
 ) -> Result<(), Error> {
     let root = &robot.links[merged.first[0].0].name;
-    if merged.massive.len() == 1 {
+    if merged.chief.len() == 1 {
         return Err(source.link(root, "the robot has no mass at all; give at least one link an <inertial>"));
     }
     if root == "world" || fixed_base {
@@ -217,7 +211,7 @@ fn joint(
         parent_from_joint: merged.body_from_link(parent_link) * isometry(&joint.origin),
         child_from_joint: merged.body_from_link(child_link),
         axis: Unit::new_normalize(axis),
-        limits: if limited { Some(limits(source, joint)?) } else { None },
+        limits: if limited { limits(source, joint)? } else { None },
         data: data(source, joint)?,
     })
 }
@@ -237,13 +231,52 @@ fn kind(source: &Source, joint: &urdf_rs::Joint) -> Result<(JointKind, bool), Er
     }
 }
 
-fn limits(source: &Source, joint: &urdf_rs::Joint) -> Result<[f64; 2], Error> {
+/// The range of a joint; where both ends are the same there is none, as in MuJoCo.
+fn limits(source: &Source, joint: &urdf_rs::Joint) -> Result<Option<[f64; 2]>, Error> {
     let (lower, upper) = (joint.limit.lower, joint.limit.upper);
-    if lower < upper {
-        return Ok([lower, upper]);
+    if lower > upper {
+        let problem = format!(
+            "the limits {lower} … {upper} leave no room; write <limit lower= upper= …> with lower < upper, or make it continuous or fixed"
+        );
+        return Err(source.joint(&joint.name, problem));
     }
-    let problem = format!(
-        "the limits {lower} … {upper} leave no room; write <limit lower= upper= …> with lower < upper, or make it continuous or fixed"
+    Ok((lower < upper).then_some([lower, upper]))
+}
+
+/// Says which joints move without limits though their kind has some.
+fn without_limits(source: &Source, robot: &urdf_rs::Robot) -> Option<String> {
+    let mut open = robot.joints.iter().filter(|j| {
+        matches!(j.joint_type, JointType::Revolute | JointType::Prismatic) && j.limit.lower == j.limit.upper
+    });
+    let (first, more) = (open.next()?, open.count());
+    let says = if has_range(source, &first.name) {
+        format!("the limits {0} … {0} leave no room", first.limit.lower)
+    } else {
+        "<limit> has neither `lower` nor `upper`, and 0 … 0 leaves no room".into()
+    };
+    let more = if more > 0 { format!(" ({more} more like it)") } else { String::new() };
+    let text =
+        format!("{says}: it moves without limits, as in MuJoCo{more}; write lower < upper, or make it fixed");
+    Some(source.joint(&first.name, text).to_string())
+}
+
+/// Says which fixed joints follow others, which does nothing.
+fn fixed_followers(source: &Source, robot: &urdf_rs::Robot) -> Option<String> {
+    let mut idle = robot.joints.iter().filter(|j| j.mimic.is_some() && j.joint_type == JointType::Fixed);
+    let (first, more) = (idle.next()?, idle.count());
+    let more = if more > 0 { format!(" ({more} more like it)") } else { String::new() };
+    let text = format!(
+        "<mimic> does nothing on a fixed joint{more}; make it revolute or prismatic, or leave <mimic> out"
     );
-    Err(source.joint(&joint.name, problem))
+    Some(source.joint(&first.name, text).to_string())
+}
+
+/// Whether a joint names one of its limits at all.
+fn has_range(source: &Source, joint: &str) -> bool {
+    let Ok(document) = roxmltree::Document::parse(source.text) else { return false };
+    let mut joints = document.root_element().children().filter(|n| n.attribute("name") == Some(joint));
+    joints.any(|j| {
+        let mut limits = j.children().filter(|n| n.has_tag_name("limit"));
+        limits.any(|l| l.attribute("lower").or(l.attribute("upper")).is_some())
+    })
 }

@@ -40,10 +40,16 @@ impl<'a> Shapes<'a> {
     pub fn of(&mut self, link: &Link, still: bool) -> Result<Vec<Shape>, Error> {
         let mut shapes: Vec<Shape> = Vec::new();
         for c in &link.collision {
+            if self.is_nothing(link, &c.geometry) {
+                continue;
+            }
             let place = Place { link, name: c.name.as_deref(), origin: &c.origin, collides: true, still };
             shapes.push(self.shape(place, &c.geometry)?);
         }
         for v in &link.visual {
+            if self.is_nothing(link, &v.geometry) {
+                continue;
+            }
             let place = Place { link, name: v.name.as_deref(), origin: &v.origin, collides: false, still };
             let seen = match self.shape(place, &v.geometry) {
                 Ok(seen) => seen,
@@ -72,6 +78,23 @@ impl<'a> Shapes<'a> {
             self.notices.push(format!("{count} <visual> meshes are not shown; the first: {first}"));
         }
         (self.warnings, self.notices)
+    }
+
+    /// Whether a shape has no size at all, which is said once: files have them where nothing is meant.
+    fn is_nothing(&mut self, link: &Link, geometry: &Geometry) -> bool {
+        let nothing = match geometry {
+            Geometry::Box { size } => size.0 == [0.0; 3],
+            Geometry::Sphere { radius } => *radius == 0.0,
+            Geometry::Cylinder { radius, length } | Geometry::Capsule { radius, length } => {
+                *radius == 0.0 && *length == 0.0
+            }
+            Geometry::Mesh { .. } => false,
+        };
+        if nothing {
+            let text = self.source.link(&link.name, "a shape of size 0 m is left out").to_string();
+            self.warnings.push(text);
+        }
+        nothing
     }
 
     fn shape(&mut self, place: Place, geometry: &Geometry) -> Result<Shape, Error> {

@@ -17,7 +17,7 @@ pub(crate) fn load(path: &Path) -> Result<Loaded, String> {
     let ending = path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     let bytes = || terraglue_subsystem::files::read(path).map_err(|e| e.to_string());
     match ending.as_str() {
-        "stl" | "obj" => Ok(Loaded { mesh: by_loader(path, &ending, &bytes()?)?, remark: None }),
+        "stl" | "obj" => Ok(Loaded { mesh: by_loader(path, &ending, &mut bytes()?)?, remark: None }),
         "dae" => {
             let text = String::from_utf8(bytes()?).map_err(|e| e.to_string())?;
             let scene = collada::read(&text)?;
@@ -37,7 +37,23 @@ pub(crate) fn load(path: &Path) -> Result<Loaded, String> {
     }
 }
 
-fn by_loader(path: &Path, ending: &str, bytes: &[u8]) -> Result<Mesh, String> {
+/// Bytes of a binary STL file before its triangles, and of each triangle.
+const STL: (usize, usize) = (84, 50);
+
+/// Hides the header of a binary STL file that begins with the word of ascii ones: its length tells them apart.
+fn without_false_start(bytes: &mut [u8]) {
+    let Some(count) = bytes.get(80..84).and_then(|b| b.try_into().ok()).map(u32::from_le_bytes) else {
+        return;
+    };
+    if bytes.len() == STL.0 + STL.1 * count as usize {
+        bytes[..80].fill(b' ');
+    }
+}
+
+fn by_loader(path: &Path, ending: &str, bytes: &mut [u8]) -> Result<Mesh, String> {
+    if ending == "stl" {
+        without_false_start(bytes);
+    }
     // The loader chooses by the ending as it is written most often.
     let named = path.with_extension(ending);
     let scene = Loader::default().load_from_slice(bytes, &named).map_err(|e| e.to_string())?;

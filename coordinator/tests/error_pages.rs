@@ -13,8 +13,11 @@ fn read(path: &Path) -> String {
 
 /// Numbers TGnn that stand after `before` in a text.
 fn numbers(text: &str, before: &str) -> BTreeSet<String> {
-    let found = text.split(before).skip(1);
-    found.filter(|rest| rest.starts_with("TG")).map(|rest| rest.chars().take(4).collect()).collect()
+    let numbered = |rest: &&str| {
+        let digits = rest.strip_prefix("TG").map(|digits| digits.chars().take(2));
+        digits.is_some_and(|mut digits| digits.all(|c| c.is_ascii_digit()))
+    };
+    text.split(before).skip(1).filter(numbered).map(|rest| rest.chars().take(4).collect()).collect()
 }
 
 fn sources(folder: &Path, out: &mut String) {

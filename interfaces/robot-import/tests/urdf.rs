@@ -68,7 +68,7 @@ fn a_chain_hangs_from_the_world() {
 fn devices_and_folders_are_no_robots() {
     for path in ["/dev/zero", "/tmp"] {
         let message = read_robot(Path::new(path), &Options::default()).unwrap_err().to_string();
-        assert!(message.contains(path) && message.contains("no regular file"), "{message}");
+        assert!(message.contains(path) && message.contains("regular file"), "{message}");
     }
 }
 

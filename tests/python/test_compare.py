@@ -124,19 +124,19 @@ def test_a_reference_that_cannot_run_is_an_error(pendulum, tmp_path):
 
 
 def test_rows_that_come_twice_run_once(pendulum, tmp_path):
-    process = terraglue("compare", pendulum, "--out", tmp_path, "--strategies", "iterative,iterative",
+    process = terraglue("compare", pendulum, "--out", tmp_path / "out", "--strategies", "iterative,iterative",
                         "--steps", "4e-3,0.004")
     assert process.returncode == 0, process.stderr
-    assert len(json.loads((tmp_path / "compare.json").read_text())["rows"]) == 1
+    assert len(json.loads((tmp_path / "out" / "compare.json").read_text())["rows"]) == 1
     assert "`iterative` more than once" in process.stderr and "`0.004` more than once" in process.stderr
 
 
 def test_a_comparison_without_any_run_that_ends_fails(pendulum, tmp_path):
-    process = terraglue("compare", pendulum, "--out", tmp_path, "--quiet", "--strategies", "iterative",
+    process = terraglue("compare", pendulum, "--out", tmp_path / "out", "--quiet", "--strategies", "iterative",
                         "--set", "gluing.max_iterations=1", "--set", "gluing.tolerance=1e-15",
                         "--set", "gluing.max_halvings=0")
     assert process.returncode == 1, process.stderr
-    row, = json.loads((tmp_path / "compare.json").read_text())["rows"]
+    row, = json.loads((tmp_path / "out" / "compare.json").read_text())["rows"]
     assert "did not converge" in row["error"] and "no run reached its end" in process.stderr
 
 

@@ -30,6 +30,18 @@ fn virtual_environment() -> Outcome<PathBuf> {
         &python,
         &["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r", &file],
     ))?;
+    // Large wheels that not every platform has; tests that need one are skipped with a reason.
+    let optional = root().join("tests/python/requirements-optional.txt").display().to_string();
+    let installed = command(
+        &python,
+        &["-m", "pip", "install", "--quiet", "--disable-pip-version-check", "-r", &optional],
+    )
+    .status();
+    if !installed.is_ok_and(|status| status.success()) {
+        eprintln!(
+            "tests/python/requirements-optional.txt cannot be installed; the tests that need it are skipped"
+        );
+    }
     write(&stamp, &wanted)?;
     Ok(python)
 }

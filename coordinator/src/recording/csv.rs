@@ -20,10 +20,9 @@ impl VariablesCsv {
     pub fn create(folder: &Path, snapshot: &Snapshot) -> Result<Self> {
         let path = folder.join(VARIABLES);
         let mut rows = csv::Writer::from_writer(KeptFile::create(&path).map_err(at(&path))?);
-        let names = snapshot
-            .subsystems
-            .iter()
-            .flat_map(|s| s.columns.iter().map(move |c| format!("{}.{}", s.name, c.name)));
+        let names = snapshot.subsystems.iter().flat_map(|s| {
+            s.columns.iter().filter(|c| c.recorded).map(move |c| format!("{}.{}", s.name, c.name))
+        });
         rows.write_record(std::iter::once("t_s".to_owned()).chain(names)).map_err(other_at(&path))?;
         Ok(Self { path, rows, number: Vec::new() })
     }
@@ -36,7 +35,8 @@ impl VariablesCsv {
     fn write(&mut self, t_s: f64, snapshot: &Snapshot) -> csv::Result<()> {
         self.field(t_s, true)?;
         for scalars in &snapshot.subsystems {
-            for (column, value) in scalars.columns.iter().zip(&scalars.values) {
+            let all = scalars.columns.iter().zip(&scalars.values);
+            for (column, value) in all.filter(|(column, _)| column.recorded) {
                 self.field(*value, column.kind == ScalarKind::Real)?;
             }
         }

@@ -24,15 +24,6 @@ impl Rectangle {
             j1: (j0 + info.tile_edge).min(info.size[1]),
         }
     }
-
-    fn including(self, other: Self) -> Self {
-        Self {
-            i0: self.i0.min(other.i0),
-            j0: self.j0.min(other.j0),
-            i1: self.i1.max(other.i1),
-            j1: self.j1.max(other.j1),
-        }
-    }
 }
 
 /// The fields `height` and `sinkage` of a soil. Where a soil shows no `sinkage`, it is the initial height minus
@@ -79,21 +70,20 @@ impl GroundGrid {
         Rectangle { i0: 0, j0: 0, i1: self.info.size[0], j1: self.info.size[1] }
     }
 
-    /// Bounding rectangle of the tiles that changed since the last call.
-    pub fn changed(&mut self, soil: &SubsystemView, t_s: f64) -> Result<Option<Rectangle>> {
+    /// The tiles of the soil that changed since the last call.
+    pub fn changed(&mut self, soil: &SubsystemView, t_s: f64) -> Result<Vec<Rectangle>> {
         let tiles_x = self.info.size[0].div_ceil(self.info.tile_edge);
-        let mut bounds: Option<Rectangle> = None;
+        let mut changed = Vec::new();
         for (k, seen) in self.generations.iter_mut().enumerate() {
             let (a, b) = (k as u32 % tiles_x, k as u32 / tiles_x);
             let tile = soil.instance.field_tile(self.height, a, b);
             let generation = tile.map_err(|e| failed(soil, t_s, "field_tile", e.to_string()))?.generation;
             if *seen != generation {
                 *seen = generation;
-                let tile = Rectangle::of_tile(&self.info, a, b);
-                bounds = Some(bounds.map_or(tile, |r| r.including(tile)));
+                changed.push(Rectangle::of_tile(&self.info, a, b));
             }
         }
-        Ok(bounds)
+        Ok(changed)
     }
 
     /// Appends height and sinkage of every node, row by row along x, as little-endian f32.

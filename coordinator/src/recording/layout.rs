@@ -16,6 +16,8 @@ pub const TIMING: &str = "timing.csv";
 pub const EXCHANGE: &str = "exchange.json";
 /// The ground at the end, ESRI ASCII grid.
 pub const FINAL_GROUND: &str = "final_ground.asc";
+/// A layout for Foxglove and Lichtblick.
+pub const VIEWER_LAYOUT: &str = "viewer_layout.json";
 /// The report page.
 pub const REPORT: &str = "report.html";
 
@@ -25,8 +27,9 @@ pub(crate) fn remove_earlier_run(folder: &Path) -> Result {
     if ![RECORDING, SUMMARY].iter().any(|f| folder.join(f).exists()) {
         return Ok(());
     }
-    for path in [VARIABLES, REPORT, SUMMARY, TIMING, EXCHANGE, FINAL_GROUND, RESERVE, RECORDING]
-        .map(|f| folder.join(f))
+    for path in
+        [VARIABLES, REPORT, SUMMARY, TIMING, EXCHANGE, FINAL_GROUND, RESERVE, VIEWER_LAYOUT, RECORDING]
+            .map(|f| folder.join(f))
     {
         if path.exists() {
             std::fs::remove_file(&path).map_err(at(&path))?;
@@ -51,4 +54,11 @@ where
 /// Simulated time in nanoseconds, the time stamp of every message.
 pub(crate) fn nanoseconds(t_s: f64) -> u64 {
     (t_s * 1e9).round().max(0.0) as u64
+}
+
+/// Simulated time as viewers write it.
+pub(crate) fn timestamp(t_s: f64) -> foxglove::messages::Timestamp {
+    let now = nanoseconds(t_s);
+    let seconds = u32::try_from(now / 1_000_000_000).unwrap_or(u32::MAX);
+    foxglove::messages::Timestamp::new(seconds, (now % 1_000_000_000) as u32)
 }

@@ -6,20 +6,30 @@
 use crate::error::{Error, Result};
 use crate::gluing::StepReport;
 use crate::observer::{Happening, View};
+use crate::recording::columns::{About, Columns};
+use crate::recording::force_message::{DRAWN_EVERY_S, Forces};
 use crate::recording::ground_grid::{GroundGrid, Rectangle};
-use crate::recording::json::JsonBuffer;
+use crate::recording::ground_points::GroundPoints;
 use crate::recording::kept_file::KeptFile;
-use crate::recording::layout::{RECORDING, at, nanoseconds, other_at};
-use crate::recording::messages::{self, WindowRecord};
-use crate::recording::snapshot::{ScalarKind, Snapshot, failed};
-use crate::recording::{scene_message, schemas};
-use base64::Engine;
+use crate::recording::layout::{RECORDING, at, nanoseconds, other_at, timestamp};
+use crate::recording::messages::WindowRecord;
+use crate::recording::scene_message::{frame_id, pose, quaternion, scene, vector};
+use crate::recording::selection::Precision;
+use crate::recording::snapshot::{Snapshot, failed};
+use crate::recording::topics::{self, Topic};
+use crate::recording::{energy_message, gluing_message, point_cloud};
+use crate::scenario::Scenario;
+use foxglove::messages::packed_element_field::NumericType;
+use foxglove::messages::{FrameTransform, FrameTransforms, Grid, Log, PackedElementField, Vector2, log};
 use mcap::records::MessageHeader;
 use mcap::write::NoSeek;
+use prost::Message;
+use prost::bytes::Bytes;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
+use terraglue_subsystem::Pose;
 
 /// A chunk ends every so many steps; that many can be lost when the process is killed.
 pub(crate) const FLUSH_STEPS: u64 = 100;
@@ -30,10 +40,35 @@ type Sink = mcap::Writer<NoSeek<BufWriter<KeptFile>>>;
 pub(crate) fn options() -> mcap::WriteOptions {
     mcap::WriteOptions::new()
         .compression(Some(mcap::Compression::Zstd))
-        .compression_level(1)
+        .compression_level(3)
         .compression_threads(0)
         .library("terraglue")
         .disable_seeking(true)
+}
+
+/// The variables of a subsystem on their way into the file.
+struct Variables {
+    channel: u16,
+    columns: Columns,
+    /// Places of the columns among all of the subsystem.
+    places: Vec<usize>,
+    /// Which of them are no real numbers.
+    whole: Vec<bool>,
+    values: Vec<f64>,
+    /// What was written last, of columns that are written when they change.
+    written: Option<Vec<f64>>,
+}
+
+impl Variables {
+    /// Takes the values from all of the subsystem; false where they are still as written.
+    fn take(&mut self, all: &[f64], precision: Precision) -> bool {
+        self.values.clear();
+        // Whole numbers of up to 2^53 would lose their last places.
+        let value = |k: &usize, whole: bool| if whole { all[*k] } else { precision.of(all[*k]) };
+        self.values.extend(self.places.iter().zip(&self.whole).map(|(k, whole)| value(k, *whole)));
+        let same = |a: &Vec<f64>| a.iter().zip(&self.values).all(|(a, b)| a.to_bits() == b.to_bits());
+        !self.written.as_ref().is_some_and(same)
+    }
 }
 
 /// Numbers of the channels.
@@ -42,10 +77,12 @@ struct Channels {
     tf: u16,
     scene: u16,
     ground: u16,
+    tiles: Vec<u16>,
+    forces: u16,
+    force_points: u16,
     energy: u16,
     gluing: u16,
     events: u16,
-    subsystems: Vec<u16>,
 }
 
 /// Writes the topics of a run.
@@ -54,10 +91,17 @@ pub(crate) struct McapWriter {
     sink: Option<Sink>,
     channels: Channels,
     sequence: u32,
-    json: JsonBuffer,
+    message: Vec<u8>,
+    /// Of each subsystem: what is written when it changes, and what is written always.
+    variables: Vec<[Option<Variables>; 2]>,
+    energy: Columns,
     ground: Option<GroundGrid>,
+    points: Option<GroundPoints>,
+    forces: Forces,
+    forces_next_s: f64,
+    gravity_m_s2: f64,
+    precision: Precision,
     packed: Vec<u8>,
-    encoded: String,
     window: WindowRecord,
     /// Bytes and simulated time (s) of what can be read whatever comes after.
     kept: (u64, f64),
@@ -65,7 +109,7 @@ pub(crate) struct McapWriter {
 
 impl McapWriter {
     /// Creates the file; `about` is the description of the run that stands at its head.
-    pub fn create(folder: &Path, about: BTreeMap<String, String>) -> Result<Self> {
+    pub fn create(folder: &Path, about: BTreeMap<String, String>, scenario: &Scenario) -> Result<Self> {
         let path = folder.join(RECORDING);
         let file = KeptFile::create(&path).map_err(at(&path))?;
         // No chunk size: chunks end by count only.
@@ -73,42 +117,92 @@ impl McapWriter {
         let mut sink = sink.map_err(other_at(&path))?;
         let about = mcap::records::Metadata { name: "terraglue".into(), metadata: about };
         sink.write_metadata(&about).map_err(other_at(&path))?;
-        let events = add(&mut sink, &schemas::events()).map_err(other_at(&path))?;
-        Ok(Self {
+        let mut writer = Self {
             path,
             sink: Some(sink),
-            channels: Channels { events, ..Channels::default() },
+            channels: Channels::default(),
             sequence: 0,
-            json: JsonBuffer::default(),
+            message: Vec::new(),
+            variables: Vec::new(),
+            energy: Columns::default(),
             ground: None,
+            points: None,
+            forces: Forces::default(),
+            forces_next_s: f64::NEG_INFINITY,
+            gravity_m_s2: scenario.world.gravity_m_s2.iter().map(|g| g * g).sum::<f64>().sqrt(),
+            precision: Precision::digits(scenario.recording.digits),
             packed: Vec::new(),
-            encoded: String::new(),
             window: WindowRecord::default(),
             kept: (0, 0.0),
-        })
+        };
+        writer.channels.events = writer.add(topics::of::<Log>("/events"))?;
+        Ok(writer)
+    }
+
+    fn add(&mut self, topic: Topic) -> Result<u16> {
+        let Some(sink) = &mut self.sink else { return Ok(0) };
+        let schema = sink.add_schema(&topic.schema, "protobuf", &topic.descriptor);
+        let channel = schema.and_then(|s| sink.add_channel(s, &topic.topic, "protobuf", &topic.metadata));
+        self.checked(channel)
     }
 
     /// Announces all topics and writes what stands once at the start: shapes and the whole ground.
     pub fn started(&mut self, view: &View, snapshot: &Snapshot) -> Result {
-        let announced = self.announce(snapshot);
-        self.checked(announced)?;
         self.ground = GroundGrid::find(view)?;
-        scene_message::write(self.json.clear(), view);
-        self.emit(self.channels.scene, "/scene", view.t_s)?;
-        self.whole_ground(view)
+        self.points = self.ground.as_ref().map(|g| GroundPoints::new(&g.info));
+        self.forces = Forces::new(view, self.gravity_m_s2);
+        self.announce(view, snapshot)?;
+        self.put(self.channels.scene, view.t_s, &scene(view))?;
+        for (frame, cloud) in point_cloud::bodies(view) {
+            let channel = self.add(topics::shape(&frame))?;
+            self.put(channel, view.t_s, &cloud)?;
+        }
+        self.whole_ground(view)?;
+        self.ground_tiles(view, (0..self.channels.tiles.len()).collect())
     }
 
-    fn announce(&mut self, snapshot: &Snapshot) -> mcap::McapResult<()> {
-        let Some(sink) = &mut self.sink else { return Ok(()) };
-        self.channels.tf = add(sink, &schemas::transforms())?;
-        self.channels.scene = add(sink, &schemas::scene())?;
-        self.channels.ground = add(sink, &schemas::ground())?;
-        self.channels.energy = add(sink, &schemas::energy())?;
-        self.channels.gluing = add(sink, &schemas::gluing())?;
+    fn announce(&mut self, view: &View, snapshot: &Snapshot) -> Result {
+        self.channels.tf = self.add(topics::of::<FrameTransforms>("/tf"))?;
+        self.channels.scene = self.add(topics::scene())?;
+        self.channels.forces = self.add(topics::forces(self.forces.metres_per_newton))?;
+        self.channels.force_points = self.add(topics::force_points())?;
+        self.channels.ground = self.add(topics::of::<Grid>("/ground"))?;
+        for tile in 0..self.points.as_ref().map_or(0, GroundPoints::count) {
+            let topic = self.points.as_ref().map(|p| p.topic(tile)).unwrap_or_default();
+            let channel = self.add(topics::tile(&topic))?;
+            self.channels.tiles.push(channel);
+        }
+        let (energy, about) = energy_message::columns(view);
+        self.channels.energy = self.add(topics::energy(&energy, &about))?;
+        self.energy = energy;
+        self.channels.gluing = self.add(topics::gluing())?;
         for scalars in &snapshot.subsystems {
-            self.channels.subsystems.push(add(sink, &schemas::variables(scalars))?);
+            let part = |parameter: bool| {
+                let all = scalars.columns.iter().enumerate();
+                all.filter(move |(_, c)| c.held == parameter && c.recorded)
+            };
+            let parameters = self.variables(&scalars.name, true, Columns::new(part(true)))?;
+            let others = self.variables(&scalars.name, false, Columns::new(part(false)))?;
+            self.variables.push([parameters, others]);
         }
         Ok(())
+    }
+
+    fn variables(
+        &mut self,
+        subsystem: &str,
+        parameters: bool,
+        (columns, about): (Columns, Vec<About>),
+    ) -> Result<Option<Variables>> {
+        // The topic of a subsystem without variables still shows that it is there.
+        if columns.count == 0 && parameters {
+            return Ok(None);
+        }
+        let channel = self.add(topics::variables(subsystem, parameters, &columns, &about))?;
+        let places: Vec<usize> = about.iter().map(|a| a.index).collect();
+        let whole = about.iter().map(|a| !a.kind.is_real()).collect();
+        let written = parameters.then(Vec::new);
+        Ok(Some(Variables { channel, columns, places, whole, values: Vec::new(), written }))
     }
 
     /// Takes the step into the figures of `since_last`; called for every step.
@@ -116,70 +210,118 @@ impl McapWriter {
         self.window.add(report);
     }
 
-    /// Writes variables, poses, energy and gluing of a communication point.
+    /// Writes variables, poses, forces, energy and gluing of a communication point.
     pub fn record(&mut self, view: &View, snapshot: &Snapshot) -> Result {
         self.transforms(view)?;
-        for (k, scalars) in snapshot.subsystems.iter().enumerate() {
-            self.json.clear().raw("{").field("t", view.t_s);
-            for (column, value) in scalars.columns.iter().zip(&scalars.values) {
-                self.json.element().raw(&column.key);
-                match column.kind {
-                    ScalarKind::Real => self.json.number(&column.name, *value),
-                    ScalarKind::Bool => self.json.boolean(*value != 0.0),
-                    ScalarKind::Integer | ScalarKind::Enumeration(_) => self.json.integer(*value as i64),
-                };
-            }
-            self.json.raw("}");
-            self.emit(self.channels.subsystems[k], &scalars.name, view.t_s)?;
-        }
-        messages::write_energy(self.json.clear(), view);
-        self.emit(self.channels.energy, "/energy", view.t_s)?;
-        messages::write_gluing(self.json.clear(), view, &self.window);
+        let mut variables = std::mem::take(&mut self.variables);
+        let written = snapshot.subsystems.iter().zip(&mut variables).try_for_each(|(scalars, parts)| {
+            parts
+                .iter_mut()
+                .flatten()
+                .try_for_each(|part| self.write_variables(view.t_s, part, &scalars.values))
+        });
+        self.variables = variables;
+        written?;
+        self.message.clear();
+        let energy: Vec<f64> = energy_message::values(view).iter().map(|e| self.precision.of(*e)).collect();
+        self.energy.encode(&energy, &mut self.message);
+        self.emit(self.channels.energy, view.t_s)?;
+        let step = gluing_message::step(view, &self.window, self.precision)?;
+        self.put(self.channels.gluing, view.t_s, &step)?;
         self.window = WindowRecord::default();
-        self.emit(self.channels.gluing, "/gluing", view.t_s)
+        self.draw_forces(view)
+    }
+
+    fn write_variables(&mut self, t_s: f64, part: &mut Variables, all: &[f64]) -> Result {
+        let changed = part.take(all, self.precision);
+        if let Some(written) = &mut part.written {
+            if !changed && !written.is_empty() {
+                return Ok(());
+            }
+            written.clone_from(&part.values);
+        }
+        self.message.clear();
+        part.columns.encode(&part.values, &mut self.message);
+        self.emit(part.channel, t_s)
+    }
+
+    fn draw_forces(&mut self, view: &View) -> Result {
+        if view.t_s < self.forces_next_s {
+            return Ok(());
+        }
+        // Not later for the rounding of a sum of steps.
+        self.forces_next_s = view.t_s + DRAWN_EVERY_S * (1.0 - 1e-6);
+        let (arrows, points) = (self.forces.arrows(view), self.forces.points(view));
+        self.put(self.channels.forces, view.t_s, &arrows)?;
+        self.put(self.channels.force_points, view.t_s, &points)
     }
 
     fn transforms(&mut self, view: &View) -> Result {
-        let now = nanoseconds(view.t_s);
-        self.json.clear().raw("{").key("transforms").raw("[");
+        let mut all = FrameTransforms::default();
         for s in view.subsystems {
             for (body, state) in s.scene.bodies.iter().zip(s.body_states) {
-                let pose = &state.world_from_body;
-                self.json.element().raw("{").timestamp(now).key("parent_frame_id").text("world");
-                scene_message::frame_id(self.json.key("child_frame_id"), s.name, &body.name);
-                self.json.vector("translation", &pose.position);
-                self.json.quaternion("rotation", &pose.orientation).raw("}");
-                if self.json.refused().is_some() {
+                let Pose { position, orientation } = state.world_from_body;
+                if position.iter().chain(&orientation).any(|v| v.is_nan()) {
                     let message = format!("pose of body `{}` is not a number (NaN)", body.name);
                     return Err(failed(s, view.t_s, "body_states", message));
                 }
+                all.transforms.push(FrameTransform {
+                    timestamp: Some(timestamp(view.t_s)),
+                    parent_frame_id: "world".into(),
+                    child_frame_id: frame_id(s.name, &body.name),
+                    translation: Some(vector(position.map(|x| self.precision.of(x)))),
+                    rotation: Some(quaternion(orientation.map(|x| self.precision.of(x)))),
+                });
             }
         }
-        self.json.raw("]}");
-        self.emit(self.channels.tf, "/tf", view.t_s)
+        self.put(self.channels.tf, view.t_s, &all)
     }
 
     /// Writes an event.
     pub fn happened(&mut self, happening: &Happening) -> Result {
-        messages::write_event(self.json.clear(), happening);
-        self.emit(self.channels.events, "/events", happening.t_s)
+        let event = Log {
+            timestamp: Some(timestamp(happening.t_s)),
+            level: log::Level::Info.into(),
+            message: happening.what.clone(),
+            name: "terraglue".into(),
+            ..Log::default()
+        };
+        self.put(self.channels.events, happening.t_s, &event)
     }
 
-    /// Writes the rectangle of the ground that has changed since it was last written.
+    /// Writes the tiles of ground that have changed since they were last written.
     pub fn changed_ground(&mut self, view: &View) -> Result {
-        let Some(ground) = &mut self.ground else { return Ok(()) };
-        match ground.changed(&view.subsystems[ground.subsystem], view.t_s)? {
-            Some(rectangle) => self.grid(view, rectangle),
-            None => Ok(()),
-        }
+        let (Some(ground), Some(points)) = (&mut self.ground, &self.points) else { return Ok(()) };
+        let changed = ground.changed(&view.subsystems[ground.subsystem], view.t_s)?;
+        let mut tiles: Vec<usize> = changed.iter().map(|r| points.tile_of(*r)).collect();
+        tiles.sort_unstable();
+        tiles.dedup();
+        self.ground_tiles(view, tiles)
     }
 
-    /// Writes all of the ground.
+    fn ground_tiles(&mut self, view: &View, tiles: Vec<usize>) -> Result {
+        let (Some(ground), Some(points)) = (self.ground.take(), self.points.take()) else { return Ok(()) };
+        let soil = &view.subsystems[ground.subsystem];
+        let mut packed = std::mem::take(&mut self.packed);
+        let written = tiles.into_iter().try_for_each(|tile| {
+            let cloud = points.cloud(&ground, soil, tile, view.t_s, &mut packed)?;
+            self.put(self.channels.tiles[tile], view.t_s, &cloud)
+        });
+        (self.ground, self.points, self.packed) = (Some(ground), Some(points), packed);
+        written
+    }
+
+    /// Writes all of the ground, to the bit.
     pub fn whole_ground(&mut self, view: &View) -> Result {
         match self.ground.as_ref().map(GroundGrid::all) {
             Some(rectangle) => self.grid(view, rectangle),
             None => Ok(()),
         }
+    }
+
+    /// How the ground is cut into topics.
+    pub fn ground_points(&self) -> Option<&GroundPoints> {
+        self.points.as_ref()
     }
 
     /// The ground that is recorded.
@@ -189,37 +331,46 @@ impl McapWriter {
 
     fn grid(&mut self, view: &View, r: Rectangle) -> Result {
         let Some(ground) = &self.ground else { return Ok(()) };
-        self.packed.clear();
-        ground.pack(&view.subsystems[ground.subsystem], r, view.t_s, &mut self.packed)?;
-        self.encoded.clear();
-        base64::engine::general_purpose::STANDARD.encode_string(&self.packed, &mut self.encoded);
+        let mut packed = Vec::new();
+        ground.pack(&view.subsystems[ground.subsystem], r, view.t_s, &mut packed)?;
         let info = &ground.info;
         // A node is the centre of a cell; the grid is placed by the corner of its first cell.
         let corner = |axis: usize, n: u32| info.origin[axis] + (f64::from(n) - 0.5) * info.spacing;
         let columns = r.i1 - r.i0;
-        let json = self.json.clear().raw("{").timestamp(nanoseconds(view.t_s));
-        json.key("frame_id").text("world").key("pose").raw("{");
-        json.vector("position", &[corner(0, r.i0), corner(1, r.j0), 0.0]);
-        json.quaternion("orientation", &[1.0, 0.0, 0.0, 0.0]).raw("}");
-        json.key("column_count").integer(columns).key("cell_size").raw("{");
-        json.field("x", info.spacing).field("y", info.spacing).raw("}");
-        json.key("row_stride").integer(8 * columns).key("cell_stride").integer(8);
-        json.key("fields")
-            .raw(r#"[{"name":"height","offset":0,"type":7},{"name":"sinkage","offset":4,"type":7}]"#);
-        json.key("data").raw("\"").raw(&self.encoded).raw("\"}");
-        self.emit(self.channels.ground, "/ground", view.t_s)
+        let place = Pose { position: [corner(0, r.i0), corner(1, r.j0), 0.0], ..Pose::IDENTITY };
+        let field = |name: &str, offset: u32| PackedElementField {
+            name: name.into(),
+            offset,
+            r#type: NumericType::Float32.into(),
+        };
+        let grid = Grid {
+            timestamp: Some(timestamp(view.t_s)),
+            frame_id: "world".into(),
+            pose: pose(&place),
+            column_count: columns,
+            cell_size: Some(Vector2 { x: info.spacing, y: info.spacing }),
+            row_stride: 8 * columns,
+            cell_stride: 8,
+            fields: vec![field("height", 0), field("sinkage", 4)],
+            data: Bytes::from(packed),
+        };
+        self.put(self.channels.ground, view.t_s, &grid)
     }
 
-    fn emit(&mut self, channel_id: u16, what: &str, t_s: f64) -> Result {
-        if let Some(key) = self.json.refused() {
-            let message = format!("recording {what}: `{key}` is not a number (NaN)");
-            return Err(Error::Simulation { time_s: t_s, message });
-        }
-        let Some(sink) = &mut self.sink else { return Ok(()) };
+    fn put(&mut self, channel: u16, t_s: f64, message: &impl Message) -> Result {
+        self.message.clear();
+        message
+            .encode(&mut self.message)
+            .map_err(|e| Error::Simulation { time_s: t_s, message: e.to_string() })?;
+        self.emit(channel, t_s)
+    }
+
+    fn emit(&mut self, channel_id: u16, t_s: f64) -> Result {
         let log_time = nanoseconds(t_s);
         let header = MessageHeader { channel_id, sequence: self.sequence, log_time, publish_time: log_time };
         self.sequence = self.sequence.wrapping_add(1);
-        let written = sink.write_to_known_channel(&header, self.json.bytes());
+        let Some(sink) = &mut self.sink else { return Ok(()) };
+        let written = sink.write_to_known_channel(&header, &self.message);
         self.checked(written)
     }
 
@@ -243,7 +394,7 @@ impl McapWriter {
             self.sink = None;
             let cut = File::options().write(true).open(&self.path).and_then(|f| f.set_len(self.kept.0));
             if let Err(e) = cut {
-                log::warn!("{}: its end cannot be cut off: {e}", self.path.display());
+                ::log::warn!("{}: its end cannot be cut off: {e}", self.path.display());
             }
             match e {
                 mcap::McapError::Io(source) => at(&self.path)(source),
@@ -260,9 +411,4 @@ impl McapWriter {
         let finished = finished.and_then(|_| Ok(sink.into_inner().into_inner().flush()?));
         self.checked(finished)
     }
-}
-
-fn add(sink: &mut Sink, topic: &schemas::Topic) -> mcap::McapResult<u16> {
-    let schema = sink.add_schema(&topic.schema, "jsonschema", topic.text.as_bytes())?;
-    sink.add_channel(schema, &topic.topic, "json", &BTreeMap::new())
 }

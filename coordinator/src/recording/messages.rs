@@ -1,15 +1,9 @@
-//! Messages of our own topics: how a step was glued, energies, events; written by hand, read by serde.
+//! What `/gluing` says of a step, as the report and programs read it; [`super::gluing_message`] is its form in the file.
 
 use crate::gluing::StepReport;
-use crate::observer::{Happening, View};
-use crate::recording::json::JsonBuffer;
-use crate::recording::layout::nanoseconds;
-use serde::{Deserialize, Deserializer};
-use terraglue_subsystem::{Energy, Kind};
 
 /// One message of `/gluing`.
-#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
-#[serde(default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct GluingRecord {
     /// Simulated time, s.
     pub t: f64,
@@ -26,10 +20,8 @@ pub struct GluingRecord {
     /// Largest difference of the wrench on the two sides, N.
     pub max_action_reaction_gap_n: f64,
     /// |Λe| / T_ref; NaN where it is not finite.
-    #[serde(deserialize_with = "number_or_nan")]
     pub residual: f64,
     /// Largest eigenvalue of K·G1; NaN where it is not finite.
-    #[serde(deserialize_with = "number_or_nan")]
     pub kappa_max: f64,
     /// Largest |T* − T1| along n, N.
     pub estimate_gap_n: f64,
@@ -42,8 +34,7 @@ pub struct GluingRecord {
 }
 
 /// One port of a [`GluingRecord`].
-#[derive(Clone, Debug, Default, PartialEq, Deserialize)]
-#[serde(default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub struct PortRecord {
     /// Subsystem of the body.
     pub subsystem: String,
@@ -62,7 +53,7 @@ pub struct PortRecord {
 }
 
 /// A point as viewers write it.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Point {
     /// m.
     pub x: f64,
@@ -73,8 +64,7 @@ pub struct Point {
 }
 
 /// Figures of all steps since the message before, this one included.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Deserialize)]
-#[serde(default)]
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct WindowRecord {
     /// Number of steps.
     pub steps: u64,
@@ -95,7 +85,6 @@ pub struct WindowRecord {
     /// Largest |T* − T1|, N.
     pub estimate_gap_n: f64,
     /// Sum of the magnitudes, J; NaN: unknown.
-    #[serde(deserialize_with = "number_or_nan")]
     pub interface_work_error_j: f64,
 }
 
@@ -115,87 +104,4 @@ impl WindowRecord {
         self.estimate_gap_n = self.estimate_gap_n.max(step.estimate_gap_n);
         self.interface_work_error_j += step.interface_work_error_j.abs();
     }
-}
-
-fn number_or_nan<'de, D: Deserializer<'de>>(deserializer: D) -> Result<f64, D::Error> {
-    Ok(Option::<f64>::deserialize(deserializer)?.unwrap_or(f64::NAN))
-}
-
-/// Writes a message of `/gluing`.
-pub(crate) fn write_gluing(json: &mut JsonBuffer, view: &View, window: &WindowRecord) {
-    let g = view.gluing;
-    json.raw("{").field("t", view.t_s);
-    json.key("evaluations_bodies").integer(g.evaluations_bodies);
-    json.key("evaluations_soil").integer(g.evaluations_soil);
-    json.key("evaluations_line_search").integer(g.evaluations_line_search);
-    json.key("evaluations_jacobian").integer(g.evaluations_jacobian);
-    json.key("jacobian_refreshes").integer(g.jacobian_refreshes);
-    json.key("halvings").integer(g.halvings);
-    match g.single_pass {
-        true => json.key("converged").raw("null"),
-        false => json.key("converged").boolean(g.converged),
-    };
-    json.key("xt_form").boolean(g.xt_form);
-    json.known("max_gap_m", if g.has_gap() { g.max_gap_m } else { f64::NAN });
-    json.field("max_action_reaction_gap_n", g.max_action_reaction_gap_n);
-    json.field("residual", g.residual).field("complementarity_n", g.complementarity_n);
-    json.field("kappa_max", g.kappa_max).field("estimate_gap_n", g.estimate_gap_n);
-    json.known("interface_work_error_j", g.interface_work_error_j);
-    json.key("rank").integer(g.rank.0).key("size").integer(g.rank.1);
-    json.key("ports").raw("[");
-    for port in &g.ports {
-        let subsystem = view.subsystems.get(port.subsystem as usize);
-        let body = subsystem.and_then(|s| s.scene.bodies.get(port.body as usize));
-        json.element().raw("{").key("key").raw("\"").integer(port.key).raw("\"");
-        json.key("subsystem").text(subsystem.map_or("", |s| s.name));
-        json.key("body").text(body.map_or("", |b| &b.name)).key("shape").integer(port.shape);
-        json.vector("origin", &port.origin).numbers("frame", &port.frame).numbers("wrench", &port.wrench);
-        json.field("t_star_n", port.t_star_n).field("gap_m", port.gap_m).raw("}");
-    }
-    json.raw("]").key("since_last").raw("{").key("steps").integer(window.steps);
-    json.key("evaluations_bodies").integer(window.evaluations_bodies);
-    json.key("evaluations_bodies_max").integer(window.evaluations_bodies_max);
-    json.key("evaluations_soil").integer(window.evaluations_soil);
-    json.key("evaluations_soil_max").integer(window.evaluations_soil_max);
-    json.key("not_converged").integer(window.not_converged);
-    json.known("max_gap_m", window.max_gap_m.unwrap_or(f64::NAN));
-    json.field("max_action_reaction_gap_n", window.max_action_reaction_gap_n);
-    json.field("estimate_gap_n", window.estimate_gap_n);
-    json.known("interface_work_error_j", window.interface_work_error_j).raw("}}");
-}
-
-/// Writes a message of `/energy`: the sum, then each subsystem that can have any; what is unknown is null.
-pub(crate) fn write_energy(json: &mut JsonBuffer, view: &View) {
-    json.raw("{").field("t", view.t_s);
-    let mut put = |prefix: &str, e: &Energy| {
-        let parts = [
-            ("kinetic", e.kinetic),
-            ("potential", e.potential),
-            ("dissipated", e.dissipated),
-            ("port_work", e.port_work),
-            ("actuator_work", e.actuator_work),
-            ("electrical", e.electrical),
-        ];
-        for (name, value) in parts {
-            json.element().raw("\"").raw(prefix).raw(if prefix.is_empty() { "" } else { "." });
-            json.raw(name).raw("\":");
-            if value.is_nan() {
-                json.raw("null")
-            } else {
-                json.number(name, value)
-            };
-        }
-    };
-    put("", &view.energy);
-    for s in view.subsystems.iter().filter(|s| matches!(s.kind, Kind::Robot | Kind::Soil)) {
-        put(s.name, &s.instance.energy());
-    }
-    json.raw("}");
-}
-
-/// Writes a message of `/events`.
-pub(crate) fn write_event(json: &mut JsonBuffer, happening: &Happening) {
-    json.raw("{").timestamp(nanoseconds(happening.t_s)).key("level").integer(2);
-    json.key("message").text(&happening.what).key("name").text("terraglue").key("file").text("");
-    json.key("line").integer(0).field("t_s", happening.t_s).key("what").text(&happening.what).raw("}");
 }

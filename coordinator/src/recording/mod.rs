@@ -9,19 +9,10 @@
 //! | `variables.csv` | on request: all variables in one table, arrays by their elements |
 //! | `timing.csv` | what a clock measured, apart from everything else |
 //! | `exchange.json` | how values went round: order, connections with their delays, loops |
+//! | `viewer_layout.json` | a layout of this run for Foxglove and Lichtblick |
 //! | `final_ground.asc` | the ground at the end as ESRI ASCII grid |
 //!
-//! Topics of the recording; all messages are JSON, log times are simulated nanoseconds:
-//!
-//! | topic | schema | what |
-//! |---|---|---|
-//! | `/<subsystem>` | its own, with units | `t` and all variables by name, arrays by their elements; `null` where one has no bound |
-//! | `/tf` | `foxglove.FrameTransforms` | pose of every body, frame `subsystem/body` in `world` |
-//! | `/scene` | `foxglove.SceneUpdate` | shapes, once, locked to the frames |
-//! | `/ground` | `foxglove.Grid` | `height` and `sinkage` as f32: all at the start and the end, in between what changed |
-//! | `/energy` | `terraglue.Energy` | energies and works, the sum and each subsystem, J |
-//! | `/gluing` | `terraglue.StepReport` | the recorded step with its ports, and `since_last`: extremes of all steps between |
-//! | `/events` | `foxglove.Log` | what happened (`t_s`, `what`) |
+//! Topics, message types and what each viewer makes of them stand in `docs/recording.md`.
 //!
 //! A metadata record `terraglue` at the head holds the scenario's text after all edits, fingerprints of the files that it
 //! names, strategy and modules.
@@ -30,29 +21,37 @@
 //! [`report::write`] makes the report from it, [`compare::write`] puts several runs side by side.
 
 mod body_track;
+mod columns;
 mod csv;
+mod descriptor;
 mod energies;
+mod energy_message;
 mod exchange;
+mod force_message;
+mod gluing_message;
 mod ground_grid;
+mod ground_points;
 mod inputs;
-mod json;
 mod kept_file;
 mod layout;
 mod mcap_writer;
 mod mend;
 mod messages;
+mod point_cloud;
 mod reader;
 mod recorder;
 mod records;
 mod scene_message;
-mod schemas;
+mod selection;
 mod snapshot;
 mod solids;
 mod space;
 mod summary;
 mod summary_observer;
 mod table;
+mod topics;
 mod trace;
+mod viewer_layout;
 
 pub mod compare;
 pub mod report;
@@ -64,7 +63,7 @@ pub use csv::{TimingRow, write_timing};
 pub use energies::Energies;
 pub use exchange::write_exchange;
 pub use kept_file::KeptFile;
-pub use layout::{FINAL_GROUND, RECORDING, REPORT, SUMMARY, TIMING, VARIABLES};
+pub use layout::{FINAL_GROUND, RECORDING, REPORT, SUMMARY, TIMING, VARIABLES, VIEWER_LAYOUT};
 pub use mend::mend;
 pub use messages::{GluingRecord, PortRecord, WindowRecord};
 pub use reader::{GroundRecord, Header, PoseSeries, Recording};

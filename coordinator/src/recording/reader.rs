@@ -2,13 +2,17 @@
 
 use crate::error::{Error, Result};
 use crate::observer::Happening;
+use crate::recording::columns::{About, Columns};
+use crate::recording::gluing_message::StepMessage;
 use crate::recording::layout::{RECORDING, at};
 use crate::recording::messages::GluingRecord;
+use crate::recording::point_cloud;
 use crate::recording::records::{Piece, Records};
-use crate::recording::solids::{SceneMessage, Solid, Vector};
+use crate::recording::solids::{self, Solid};
 use crate::recording::table::Table;
-use base64::Engine;
-use serde::Deserialize;
+use crate::recording::topics::{COLUMNS, SUBSYSTEM};
+use foxglove::messages::{FrameTransforms, Grid, Log, PointCloud, SceneUpdate};
+use prost::Message;
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -43,6 +47,46 @@ pub struct Recording {
     pub complete: bool,
     /// Parts that are damaged and left out.
     pub damaged: usize,
+    /// Whether it is in the JSON of earlier versions, which is no longer read.
+    pub outdated: bool,
+}
+
+/// The columns of a channel.
+struct Source {
+    subsystem: String,
+    columns: Columns,
+    /// Places of the columns in their subsystem.
+    places: Vec<usize>,
+    names: Vec<String>,
+    values: Vec<f64>,
+    /// Whether a message completes a row.
+    row: bool,
+}
+
+/// Names and last values of all columns of a subsystem.
+#[derive(Default)]
+struct Row {
+    names: Vec<String>,
+    values: Vec<f64>,
+}
+
+impl Row {
+    fn take(&mut self, source: &Source) {
+        let end = source.places.iter().max().map_or(0, |k| k + 1).max(self.names.len());
+        self.names.resize(end, String::new());
+        self.values.resize(end, f64::NAN);
+        for ((place, name), value) in source.places.iter().zip(&source.names).zip(&source.values) {
+            self.names[*place].clone_from(name);
+            self.values[*place] = *value;
+        }
+    }
+}
+
+/// What is kept from message to message.
+#[derive(Default)]
+struct State {
+    sources: BTreeMap<u16, Source>,
+    rows: BTreeMap<String, Row>,
 }
 
 /// What was simulated; all texts as in the scenario.
@@ -93,59 +137,32 @@ pub struct GroundRecord {
 }
 
 impl GroundRecord {
-    /// Puts a smaller rectangle of the same lattice in.
-    fn patch(&mut self, patch: &GroundRecord) {
-        let node = |axis: usize| ((patch.origin[axis] - self.origin[axis]) / self.spacing).round() as usize;
-        let (i0, j0) = (node(0), node(1));
-        if i0 + patch.size[0] > self.size[0] || j0 + patch.size[1] > self.size[1] {
-            return;
+    /// Puts the nodes of a tile in.
+    fn patch(&mut self, cloud: &PointCloud, t_s: f64) {
+        for ([x, y, z], sinkage) in point_cloud::unpack(cloud) {
+            let i = ((x - self.origin[0]) / self.spacing).round();
+            let j = ((y - self.origin[1]) / self.spacing).round();
+            let inside = i >= 0.0 && j >= 0.0 && i < self.size[0] as f64 && j < self.size[1] as f64;
+            let node = j.max(0.0) as usize * self.size[0] + i.max(0.0) as usize;
+            if let (true, Some(height)) = (inside, self.height.get_mut(node)) {
+                *height = z as f32;
+                self.sinkage[node] = sinkage;
+            }
         }
-        for j in 0..patch.size[1] {
-            let (from, to) = (j * patch.size[0], (j0 + j) * self.size[0] + i0);
-            let n = patch.size[0];
-            self.height[to..to + n].copy_from_slice(&patch.height[from..from + n]);
-            self.sinkage[to..to + n].copy_from_slice(&patch.sinkage[from..from + n]);
-        }
-        self.t_s = patch.t_s;
+        self.t_s = t_s;
     }
 }
 
-#[derive(Deserialize)]
-struct Transforms {
-    transforms: Vec<Transform>,
-}
-
-#[derive(Deserialize)]
-struct Transform {
-    child_frame_id: String,
-    translation: Vector,
-    rotation: Vector,
-}
-
-#[derive(Deserialize)]
-struct GridMessage<'a> {
-    pose: GridPose,
-    column_count: usize,
-    cell_size: Vector,
-    data: &'a str,
-}
-
-#[derive(Deserialize)]
-struct GridPose {
-    position: Vector,
-}
-
 fn ground(data: &[u8], t_s: f64) -> Option<GroundRecord> {
-    let grid: GridMessage = serde_json::from_slice(data).ok()?;
-    let bytes = base64::engine::general_purpose::STANDARD.decode(grid.data).ok()?;
+    let grid = Grid::decode(data).ok()?;
     let field = |offset: usize| {
         let node = |cell: &[u8]| cell[offset..offset + 4].try_into().map_or(f32::NAN, f32::from_le_bytes);
-        bytes.chunks_exact(8).map(node).collect::<Vec<f32>>()
+        grid.data.chunks_exact(8).map(node).collect::<Vec<f32>>()
     };
-    let spacing = grid.cell_size.x;
-    let corner = [grid.pose.position.x, grid.pose.position.y];
-    let size = [grid.column_count, (bytes.len() / 8).checked_div(grid.column_count)?];
-    let origin = corner.map(|c| c + 0.5 * spacing);
+    let (spacing, corner) = (grid.cell_size?.x, grid.pose?.position?);
+    let columns = grid.column_count as usize;
+    let size = [columns, (grid.data.len() / 8).checked_div(columns)?];
+    let origin = [corner.x, corner.y].map(|c| c + 0.5 * spacing);
     Some(GroundRecord { t_s, origin, spacing, size, height: field(0), sinkage: field(4) })
 }
 
@@ -154,19 +171,27 @@ impl Recording {
     pub fn open(folder: &Path) -> Result<Self> {
         let path = folder.join(RECORDING);
         let bytes = terraglue_subsystem::files::read(&path).map_err(at(&path))?;
-        Self::read(&bytes).ok_or_else(|| Error::File {
+        let unreadable = |what: &str| Error::File {
             path: path.display().to_string(),
-            source: std::io::Error::new(std::io::ErrorKind::InvalidData, "is not an MCAP recording"),
-        })
+            source: std::io::Error::new(std::io::ErrorKind::InvalidData, what),
+        };
+        match Self::read(&bytes) {
+            None => Err(unreadable("is not an MCAP recording")),
+            Some(r) if r.outdated => {
+                Err(unreadable("was written by an earlier version of terraglue; run the scenario again"))
+            }
+            Some(r) => Ok(r),
+        }
     }
 
     /// Reads a recording from memory; `None` where it does not even begin like one.
     pub fn read(bytes: &[u8]) -> Option<Self> {
         let mut records = Records::new(bytes)?;
         let mut recording = Self { complete: mcap::read::footer(bytes).is_ok(), ..Self::default() };
+        let mut state = State::default();
         for piece in &mut records {
             match piece {
-                Piece::Message(message) => recording.take(&message),
+                Piece::Message(message) => recording.take(&message, &mut state),
                 Piece::Metadata(about) if about.name == "terraglue" => {
                     recording.header.entries = about.metadata
                 }
@@ -178,54 +203,95 @@ impl Recording {
         Some(recording)
     }
 
-    fn take(&mut self, message: &mcap::Message) {
-        let t_s = message.log_time as f64 * 1e-9;
+    fn take(&mut self, message: &mcap::Message, state: &mut State) {
+        // Divided, not multiplied by 1e-9: 5 ms are 0.005 s to the bit.
+        let t_s = message.log_time as f64 / 1e9;
         let data = &message.data[..];
+        self.outdated |= message.channel.message_encoding == "json";
+        // A message that does not parse is left out.
         match message.channel.topic.as_str() {
             "/tf" => self.take_transforms(data, t_s),
             "/ground" => self.take_ground(data, t_s),
-            "/gluing" => self.gluing.extend(serde_json::from_slice::<GluingRecord>(data).ok()),
-            "/events" => self.events.extend(serde_json::from_slice::<Happening>(data).ok()),
-            // A message that does not parse is left out; the table stays rectangular.
-            "/energy" => drop(self.energy.push(data)),
-            "/scene" => self.take_scene(data),
-            topic => {
-                let name = topic.trim_start_matches('/');
-                if !self.units.contains_key(name) {
-                    self.units.insert(name.into(), units(message));
-                }
-                drop(self.variables.entry(name.into()).or_default().push(data));
+            "/gluing" => self.gluing.extend(StepMessage::decode(data).ok().map(GluingRecord::from)),
+            "/events" => {
+                self.events.extend(Log::decode(data).ok().map(|e| Happening { t_s, what: e.message }))
             }
+            "/scene" => self.take_scene(data),
+            topic if topic.starts_with("/ground/") => self.take_tile(data, t_s),
+            _ => self.take_numbers(message, t_s, state),
         }
     }
 
+    fn take_numbers(&mut self, message: &mcap::Message, t_s: f64, state: &mut State) {
+        let channel = &message.channel;
+        let source = match state.sources.entry(channel.id) {
+            std::collections::btree_map::Entry::Occupied(known) => known.into_mut(),
+            std::collections::btree_map::Entry::Vacant(new) => {
+                let Some(source) = self.announced(channel) else { return };
+                new.insert(source)
+            }
+        };
+        if source.columns.decode(&message.data, &mut source.values).is_none() {
+            return;
+        }
+        if channel.topic == "/energy" {
+            return self.energy.push(t_s, &source.names, &source.values);
+        }
+        let row = state.rows.entry(source.subsystem.clone()).or_default();
+        row.take(source);
+        if source.row {
+            self.variables.entry(source.subsystem.clone()).or_default().push(t_s, &row.names, &row.values);
+        }
+    }
+
+    /// The columns that a channel announces; notes their units.
+    fn announced(&mut self, channel: &mcap::Channel) -> Option<Source> {
+        let about: Vec<About> = serde_json::from_str(channel.metadata.get(COLUMNS)?).ok()?;
+        let columns = Columns::read(&about);
+        let subsystem = channel.metadata.get(SUBSYSTEM).cloned().unwrap_or_default();
+        let units = self.units.entry(subsystem.clone()).or_default();
+        units.extend(about.iter().map(|a| (a.name.clone(), a.unit.clone())));
+        Some(Source {
+            row: channel.topic == format!("/{subsystem}"),
+            subsystem,
+            places: about.iter().map(|a| a.index).collect(),
+            values: vec![0.0; columns.count],
+            names: about.into_iter().map(|a| a.name).collect(),
+            columns,
+        })
+    }
+
     fn take_transforms(&mut self, data: &[u8], t_s: f64) {
-        let Ok(all) = serde_json::from_slice::<Transforms>(data) else { return };
+        let Ok(all) = FrameTransforms::decode(data) else { return };
         for t in all.transforms {
+            let (Some(p), Some(q)) = (t.translation, t.rotation) else { continue };
             self.first_frame.get_or_insert_with(|| t.child_frame_id.clone());
             let series = self.poses.entry(t.child_frame_id).or_default();
             series.t_s.push(t_s);
-            series.position.push([t.translation.x, t.translation.y, t.translation.z]);
-            series.orientation.push([t.rotation.w, t.rotation.x, t.rotation.y, t.rotation.z]);
+            series.position.push([p.x, p.y, p.z]);
+            series.orientation.push([q.w, q.x, q.y, q.z]);
         }
     }
 
     fn take_scene(&mut self, data: &[u8]) {
-        let Ok(scene) = serde_json::from_slice::<SceneMessage>(data) else { return };
-        let spheres =
-            scene.entities.iter().filter_map(|e| Some((e.frame_id.clone(), e.spheres.first()?.size.x / 2.0)));
-        self.radii.extend(spheres);
-        self.solids.extend(scene.entities.iter().map(|e| (e.frame_id.clone(), e.solids())));
+        let Ok(scene) = SceneUpdate::decode(data) else { return };
+        let radii =
+            scene.entities.iter().filter_map(|e| Some((e.frame_id.clone(), solids::first_radius(e)?)));
+        self.radii.extend(radii);
+        self.solids.extend(scene.entities.iter().map(|e| (e.frame_id.clone(), solids::solids(e))));
     }
 
     fn take_ground(&mut self, data: &[u8], t_s: f64) {
-        let Some(record) = ground(data, t_s) else { return };
-        match &mut self.final_ground {
-            None => {
-                self.initial_ground = Some(record.clone());
-                self.final_ground = Some(record);
-            }
-            Some(now) => now.patch(&record),
+        let record = ground(data, t_s);
+        self.initial_ground = self.initial_ground.take().or_else(|| record.clone());
+        self.final_ground = record.or_else(|| self.final_ground.take());
+    }
+
+    fn take_tile(&mut self, data: &[u8], t_s: f64) {
+        // The tiles of the start say less than the grid that was written with them.
+        let Some(ground) = self.final_ground.as_mut().filter(|_| t_s > 0.0) else { return };
+        if let Ok(cloud) = PointCloud::decode(data) {
+            ground.patch(&cloud, t_s);
         }
     }
 
@@ -261,15 +327,4 @@ impl Recording {
         let poses = self.poses.values().map(|p| last(&p.t_s));
         tables.chain(poses).chain(self.gluing.last().map(|g| g.t)).fold(last(&self.energy.t_s), f64::max)
     }
-}
-
-/// Units from the JSON schema of a channel.
-fn units(message: &mcap::Message) -> BTreeMap<String, String> {
-    let Some(schema) = &message.channel.schema else { return BTreeMap::new() };
-    let Ok(schema) = serde_json::from_slice::<serde_json::Value>(&schema.data) else {
-        return BTreeMap::new();
-    };
-    let Some(properties) = schema["properties"].as_object() else { return BTreeMap::new() };
-    let unit = |p: &serde_json::Value| p["unit"].as_str().unwrap_or_default().to_owned();
-    properties.iter().map(|(name, p)| (name.clone(), unit(p))).collect()
 }

@@ -10,7 +10,8 @@ use crate::recording::snapshot::Snapshot;
 use crate::recording::space::{Reserve, explain};
 use crate::recording::summary::{Status, Summary};
 use crate::recording::summary_observer::SummaryObserver;
-use crate::scenario::Scenario;
+use crate::recording::{selection, viewer_layout};
+use crate::scenario::{Connection, RecordingSpec, ReportSpec, Scenario, Source};
 use crate::terrain::write_esri_ascii;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
@@ -39,6 +40,10 @@ pub struct Recorder {
     summary: SummaryObserver,
     recorded_step: Option<u64>,
     reserve: Reserve,
+    spec: RecordingSpec,
+    report: ReportSpec,
+    connections: Vec<Connection>,
+    source: Source,
 }
 
 /// What a report needs to know of the scenario; stands at the head of the recording.
@@ -75,12 +80,16 @@ impl Recorder {
             options,
             every_steps: scenario.recording.every_steps.max(1),
             ground_every_steps: scenario.recording.ground_every_steps.max(1),
-            mcap: McapWriter::create(folder, about(scenario))?,
+            mcap: McapWriter::create(folder, about(scenario), scenario)?,
             csv: None,
             snapshot: Snapshot::default(),
             summary: SummaryObserver::new(scenario),
             recorded_step: None,
             reserve,
+            spec: scenario.recording.clone(),
+            report: scenario.report.clone(),
+            connections: scenario.connections.clone(),
+            source: scenario.source.clone(),
         })
     }
 
@@ -98,6 +107,7 @@ impl Recorder {
         if self.recorded_step != Some(view.step_index) {
             self.record(view)?;
         }
+        self.mcap.changed_ground(view)?;
         self.mcap.whole_ground(view)?;
         self.write_final_ground(view)
     }
@@ -150,11 +160,14 @@ impl Recorder {
 impl Recorder {
     fn start(&mut self, view: &View) -> Result {
         self.snapshot = Snapshot::new(view);
+        selection::select(&mut self.snapshot, &self.spec, &self.source)?;
+        selection::hold(&mut self.snapshot, &self.connections);
         if self.options.csv {
             self.csv = Some(VariablesCsv::create(&self.folder, &self.snapshot)?);
         }
         self.summary.started(view)?;
         self.mcap.started(view, &self.snapshot)?;
+        viewer_layout::write(&self.folder, view, self.mcap.ground_points(), &self.report)?;
         self.record(view)?;
         self.mcap.flush(view.t_s)
     }

@@ -2,7 +2,7 @@
 
 use crate::error::{Error, Result};
 use crate::observer::{SubsystemView, View};
-use terraglue_subsystem::{Subsystem, ValueType, ValuesMut, Variable};
+use terraglue_subsystem::{Causality, Subsystem, ValueType, ValuesMut, Variable};
 
 /// How a scalar is written.
 #[derive(Clone, Debug, PartialEq)]
@@ -21,11 +21,22 @@ pub(crate) enum ScalarKind {
 #[derive(Clone, Debug)]
 pub(crate) struct Column {
     pub name: String,
-    /// The name as JSON text with its colon.
-    pub key: Vec<u8>,
     pub unit: String,
     pub help: String,
     pub kind: ScalarKind,
+    /// Set from outside and constant between changes: written when it changes.
+    pub held: bool,
+    /// Can be fed by a connection.
+    pub input: bool,
+    /// Whether `[recording]` wants it.
+    pub recorded: bool,
+}
+
+impl Column {
+    /// A column that is written at every record.
+    pub fn new(name: String, unit: String, help: String, kind: ScalarKind) -> Self {
+        Self { name, unit, help, kind, held: false, input: false, recorded: true }
+    }
 }
 
 /// The variables of one subsystem.
@@ -127,13 +138,14 @@ impl Scalars {
             by_type[place].1.push(variable.id);
             for element in 0..variable.len() {
                 by_type[place].2.push(scalars.columns.len());
-                let name = variable.element_name(element);
                 scalars.columns.push(Column {
-                    key: format!("{}:", serde_json::Value::from(name.as_str())).into_bytes(),
-                    name,
+                    name: variable.element_name(element),
                     unit: variable.unit.clone(),
                     help: variable.help.clone(),
                     kind: kind(variable),
+                    held: variable.causality == Causality::Parameter,
+                    input: variable.causality == Causality::Input,
+                    recorded: true,
                 });
             }
         }

@@ -1,6 +1,6 @@
 //! Shapes of the recorded scene as corners and triangles, in the frame of their body.
 
-use serde::Deserialize;
+use foxglove::messages::{Pose as MessagePose, SceneEntity, Vector3};
 use std::f64::consts::TAU;
 use terraglue_subsystem::Pose;
 
@@ -18,76 +18,29 @@ pub struct Solid {
     pub round: Option<f64>,
 }
 
-/// A number triple or quaternion of a message.
-#[derive(Clone, Copy, Debug, Deserialize)]
-pub(super) struct Vector {
-    pub x: f64,
-    pub y: f64,
-    #[serde(default)]
-    pub z: f64,
-    #[serde(default)]
-    pub w: f64,
+/// Radius of the first sphere of a body, m.
+pub(super) fn first_radius(entity: &SceneEntity) -> Option<f64> {
+    Some(0.5 * entity.spheres.first()?.size?.x)
 }
 
-/// The message of `/scene`.
-#[derive(Deserialize)]
-pub(super) struct SceneMessage {
-    pub entities: Vec<Entity>,
+/// All shapes of a body.
+pub(super) fn solids(entity: &SceneEntity) -> Vec<Solid> {
+    let spheres =
+        entity.spheres.iter().filter_map(|b| Some(disc(own(b.pose.as_ref()?).position, 0.5 * b.size?.x)));
+    let cubes = entity.cubes.iter().filter_map(|b| Some(cube(&b.size?).placed(&own(b.pose.as_ref()?))));
+    let cylinders =
+        entity.cylinders.iter().filter_map(|b| Some(cylinder(&b.size?).placed(&own(b.pose.as_ref()?))));
+    let meshes = entity.triangles.iter().filter_map(|t| {
+        let points = t.points.iter().map(|p| [p.x, p.y, p.z]).collect();
+        let triangles = t.indices.chunks_exact(3).map(|k| [k[0], k[1], k[2]]).collect();
+        Some(Solid { points, triangles, round: None }.placed(&own(t.pose.as_ref()?)))
+    });
+    spheres.chain(cubes).chain(cylinders).chain(meshes).collect()
 }
 
-/// The shapes of a body.
-#[derive(Deserialize)]
-pub(super) struct Entity {
-    pub frame_id: String,
-    pub spheres: Vec<Block>,
-    #[serde(default)]
-    cubes: Vec<Block>,
-    #[serde(default)]
-    cylinders: Vec<Block>,
-    #[serde(default)]
-    triangles: Vec<Triangles>,
-}
-
-/// A primitive with full lengths along its axes, m.
-#[derive(Deserialize)]
-pub(super) struct Block {
-    pose: Place,
-    pub size: Vector,
-}
-
-#[derive(Deserialize)]
-struct Place {
-    position: Vector,
-    orientation: Vector,
-}
-
-#[derive(Deserialize)]
-struct Triangles {
-    pose: Place,
-    points: Vec<Vector>,
-    indices: Vec<u32>,
-}
-
-impl Place {
-    fn pose(&self) -> Pose {
-        let (p, q) = (self.position, self.orientation);
-        Pose { position: [p.x, p.y, p.z], orientation: [q.w, q.x, q.y, q.z] }
-    }
-}
-
-impl Entity {
-    /// All shapes.
-    pub fn solids(&self) -> Vec<Solid> {
-        let spheres = self.spheres.iter().map(|b| disc(b.pose.pose().position, 0.5 * b.size.x));
-        let cubes = self.cubes.iter().map(|b| cube(&b.size).placed(&b.pose.pose()));
-        let cylinders = self.cylinders.iter().map(|b| cylinder(&b.size).placed(&b.pose.pose()));
-        let meshes = self.triangles.iter().map(|t| {
-            let points = t.points.iter().map(|p| [p.x, p.y, p.z]).collect();
-            let triangles = t.indices.chunks_exact(3).map(|k| [k[0], k[1], k[2]]).collect();
-            Solid { points, triangles, round: None }.placed(&t.pose.pose())
-        });
-        spheres.chain(cubes).chain(cylinders).chain(meshes).collect()
-    }
+fn own(pose: &MessagePose) -> Pose {
+    let (p, q) = (pose.position.unwrap_or_default(), pose.orientation.unwrap_or_default());
+    Pose { position: [p.x, p.y, p.z], orientation: [q.w, q.x, q.y, q.z] }
 }
 
 impl Solid {
@@ -125,7 +78,7 @@ fn disc(centre: [f64; 3], radius: f64) -> Solid {
 }
 
 /// Corner k lies on the side of bit 0 along x, bit 1 along y, bit 2 along z.
-fn cube(size: &Vector) -> Solid {
+fn cube(size: &Vector3) -> Solid {
     let lengths = [size.x, size.y, size.z];
     let corner = |k: usize| [0, 1, 2].map(|axis| lengths[axis] * if k >> axis & 1 == 1 { 0.5 } else { -0.5 });
     let sides = [[0, 2, 3, 1], [4, 5, 7, 6], [0, 1, 5, 4], [2, 6, 7, 3], [0, 4, 6, 2], [1, 3, 7, 5]];
@@ -134,7 +87,7 @@ fn cube(size: &Vector) -> Solid {
 }
 
 /// Rims below and above in turn.
-fn cylinder(size: &Vector) -> Solid {
+fn cylinder(size: &Vector3) -> Solid {
     let rim = |k: u32| {
         let angle = TAU * f64::from(k / 2) / f64::from(ROUND);
         let z = if k.is_multiple_of(2) { -0.5 } else { 0.5 };

@@ -265,9 +265,24 @@ fn gluing() -> Table {
 
 fn recording() -> Table {
     let every = |name, help| Parameter::of(name, ParameterType::Integer, help).within(1.0, 1e9);
+    let patterns =
+        |name, help| Key::from(Parameter::of(name, ParameterType::Text, help).optional()).form(Form::Texts);
     let keys = vec![
         every("every_steps", "steps between two records of variables and poses").or(5).into(),
         every("ground_every_steps", "steps between two records of the ground that changed").or(100).into(),
+        Parameter::of(
+            "digits",
+            ParameterType::Integer,
+            "significant digits of recorded numbers; from 16 on all bits",
+        )
+        .or(9)
+        .within(3.0, 17.0)
+        .into(),
+        patterns(
+            "include",
+            "variables or groups that are recorded, `robot.*.angle` or `robot.LF_j2`; all where absent",
+        ),
+        patterns("exclude", "variables or groups that are not"),
     ];
     of("recording", "What is written to `recording.mcap`.", keys)
 }

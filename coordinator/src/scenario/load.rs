@@ -64,6 +64,9 @@ impl Scenario {
             Ok(RecordingSpec {
                 every_steps: s.count("every_steps"),
                 ground_every_steps: s.count("ground_every_steps"),
+                digits: s.count("digits"),
+                include: s.entry("include").map(subsystems::texts).unwrap_or_default(),
+                exclude: s.entry("exclude").map(subsystems::texts).unwrap_or_default(),
             })
         })?;
         let report = with_section(&source, "report", |s| read_report(s, &names))?;

@@ -175,6 +175,12 @@ pub struct RecordingSpec {
     pub ground_every_steps: u64,
     /// Every how many steps variables and poses are written.
     pub every_steps: u64,
+    /// Significant digits of what is recorded.
+    pub digits: u64,
+    /// Patterns of the variables that are recorded; all where empty.
+    pub include: Vec<String>,
+    /// Patterns of variables that are not.
+    pub exclude: Vec<String>,
 }
 
 /// `[report]`.

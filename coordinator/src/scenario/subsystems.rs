@@ -80,7 +80,7 @@ fn isolation(node: &Node) -> Isolation {
 }
 
 /// A text or a list of texts.
-fn texts(node: &Node) -> Vec<String> {
+pub(super) fn texts(node: &Node) -> Vec<String> {
     match node.to_json() {
         Value::String(one) => vec![one],
         Value::Array(all) => all.iter().filter_map(|t| t.as_str().map(str::to_owned)).collect(),

@@ -3,7 +3,7 @@
 //! Nothing is loaded from anywhere: style, scripts, curves and the picture of the ground are inside the file.
 
 mod cards;
-mod colour_map;
+pub(crate) mod colour_map;
 pub(crate) mod energy_card;
 mod exchange;
 pub(crate) mod figure;

@@ -139,19 +139,18 @@ mod tests {
     use super::*;
     use crate::recording::reader::PoseSeries;
 
-    fn scene(entity: &str) -> Vec<Solid> {
-        let none = r#""spheres": [], "cubes": [], "cylinders": [], "triangles": []"#;
-        let key = entity.split(':').next().unwrap_or_default();
-        let text = format!(r#"{{"frame_id": "a/world", {}}}"#, none.replace(&format!("{key}: []"), entity));
-        let entity: crate::recording::solids::Entity = serde_json::from_str(&text).expect("an entity");
-        entity.solids()
+    use crate::recording::scene_message::{quaternion, vector};
+    use crate::recording::solids::solids;
+    use foxglove::messages::{CubePrimitive, CylinderPrimitive, SceneEntity, SpherePrimitive};
+    use foxglove::messages::{Point3, Pose as MessagePose, TriangleListPrimitive};
+
+    fn place(x: f64, q: [f64; 4]) -> Option<MessagePose> {
+        Some(MessagePose { position: Some(vector([x, 0.0, 0.0])), orientation: Some(quaternion(q)) })
     }
 
-    fn place(x: f64, quaternion: [f64; 4]) -> String {
-        let [w, i, j, k] = quaternion;
-        format!(
-            r#""pose": {{"position": {{"x": {x}, "y": 0, "z": 0}}, "orientation": {{"x": {i}, "y": {j}, "z": {k}, "w": {w}}}}}"#
-        )
+    fn cube(x: f64, q: [f64; 4], size: [f64; 3]) -> SceneEntity {
+        let cube = CubePrimitive { pose: place(x, q), size: Some(vector(size)), color: None };
+        SceneEntity { cubes: vec![cube], ..Default::default() }
     }
 
     const STRAIGHT: [f64; 4] = [1.0, 0.0, 0.0, 0.0];
@@ -168,22 +167,29 @@ mod tests {
 
     #[test]
     fn every_shape_has_the_outline_of_its_shadow() {
-        let size = r#""size": {"x": 2, "y": 3, "z": 4}"#;
+        let size = [2.0, 3.0, 4.0];
         let (sin, cos) = (libm::sin(0.25), libm::cos(0.25));
-        let block = |q| format!("{{{}, {size}}}", place(1.0, q));
+        let block = |q| cube(1.0, q, size);
+        let sphere =
+            SpherePrimitive { pose: place(1.0, [cos, sin, 0.0, 0.0]), size: Some(vector(size)), color: None };
+        let cylinder =
+            CylinderPrimitive { pose: place(1.0, STRAIGHT), size: Some(vector(size)), ..Default::default() };
         // Turned about z a shadow keeps its area; tilted by 0.5 rad about x a box shows its side, too.
         let shadow = 2.0 * (3.0 * libm::cos(0.5) + 4.0 * libm::sin(0.5));
         let round = 48.0 / 2.0 * libm::sin(std::f64::consts::TAU / 48.0);
         let cases = [
-            (format!(r#""cubes": [{}]"#, block(STRAIGHT)), 6.0),
-            (format!(r#""cubes": [{}]"#, block([cos, 0.0, 0.0, sin])), 6.0),
-            (format!(r#""cubes": [{}]"#, block([cos, sin, 0.0, 0.0])), shadow),
-            (format!(r#""spheres": [{}]"#, block([cos, sin, 0.0, 0.0])), round),
-            (format!(r#""cylinders": [{}]"#, block(STRAIGHT)), 1.5 * round),
+            (block(STRAIGHT), 6.0),
+            (block([cos, 0.0, 0.0, sin]), 6.0),
+            (block([cos, sin, 0.0, 0.0]), shadow),
+            (SceneEntity { spheres: vec![sphere], ..Default::default() }, round),
+            (SceneEntity { cylinders: vec![cylinder], ..Default::default() }, 1.5 * round),
         ];
         for (entity, expected) in cases {
-            let found = areas(&scene(&entity));
-            assert!(found.len() == 1 && (found[0] - expected).abs() < 1e-9, "{entity}: {found:?} {expected}");
+            let found = areas(&solids(&entity));
+            assert!(
+                found.len() == 1 && (found[0] - expected).abs() < 1e-9,
+                "{entity:?}: {found:?} {expected}"
+            );
         }
     }
 
@@ -191,22 +197,22 @@ mod tests {
     #[test]
     fn an_open_mesh_shows_its_ends_and_a_ridge_of_two_slopes_does_not_show() {
         let points = [[0, 0, 0], [1, 0, 1], [2, 0, 0], [0, 3, 0], [1, 3, 1], [2, 3, 0]];
-        let corner = |[x, y, z]: [i32; 3]| format!(r#"{{"x": {x}, "y": {y}, "z": {z}}}"#);
-        let entity = format!(
-            r#""triangles": [{{{}, "points": [{}], "indices": [0,1,4, 0,4,3, 1,2,5, 1,5,4]}}]"#,
-            place(5.0, STRAIGHT),
-            points.map(corner).join(",")
-        );
-        let lines: Vec<_> = scene(&entity).iter().flat_map(contours).collect();
+        let points = points.map(|[x, y, z]: [i32; 3]| Point3 { x: x.into(), y: y.into(), z: z.into() });
+        let roof = TriangleListPrimitive {
+            pose: place(5.0, STRAIGHT),
+            points: points.into(),
+            indices: vec![0, 1, 4, 0, 4, 3, 1, 2, 5, 1, 5, 4],
+            ..Default::default()
+        };
+        let entity = SceneEntity { triangles: vec![roof], ..Default::default() };
+        let lines: Vec<_> = solids(&entity).iter().flat_map(contours).collect();
         assert_eq!((lines.len(), area(&lines[0])), (1, 6.0));
         assert!(lines[0].iter().all(|p| (5.0..=7.0).contains(&p[0])));
     }
 
     #[test]
     fn only_what_never_moves_is_drawn_and_of_too_much_the_longest() {
-        let size = |x: f64| {
-            format!(r#""cubes": [{{{}, "size": {{"x": {x}, "y": 1, "z": 1}}}}]"#, place(0.0, STRAIGHT))
-        };
+        let size = |x: f64| solids(&cube(0.0, STRAIGHT, [x, 1.0, 1.0]));
         let poses = |last: f64| PoseSeries {
             t_s: vec![0.0, 1.0],
             position: vec![[10.0, 0.0, 0.0], [last, 0.0, 0.0]],
@@ -214,7 +220,7 @@ mod tests {
         };
         let mut recording = Recording::default();
         for (frame, last) in [("a/world", 10.0), ("a/robot", 10.1)] {
-            recording.solids.insert(frame.into(), scene(&size(2.0)));
+            recording.solids.insert(frame.into(), size(2.0));
             recording.poses.insert(frame.into(), poses(last));
         }
         let outlines = of(&recording);
@@ -224,7 +230,7 @@ mod tests {
         let map = super::super::ground_map::data(&recording, &[]).expect("a map").expect("a map");
         assert!(map["image"].is_null() && map["outlines"][0]["name"] == "a.world", "{map}");
         assert!(map["x"][0] == 8.8 && map["x"][1] == 11.2, "{}", map["x"]);
-        let many = (0..2000).flat_map(|k| scene(&size(1.0 + f64::from(k)))).collect();
+        let many = (0..2000).flat_map(|k| size(1.0 + f64::from(k))).collect();
         recording.solids.insert("a/world".into(), many);
         let outlines = of(&recording);
         assert_eq!(outlines.iter().map(|o| o.points.len()).sum::<usize>(), MOST_POINTS);

@@ -183,7 +183,7 @@ fn what_was_flushed_is_on_disk_before_the_end() {
 }
 
 #[test]
-fn every_message_and_schema_is_json() {
+fn every_message_is_protobuf_of_the_type_that_its_channel_names() {
     let f = folder();
     record(f.path(), "iterative", 105);
     let bytes = std::fs::read(f.path().join(RECORDING)).expect("written");
@@ -191,18 +191,110 @@ fn every_message_and_schema_is_json() {
     for message in mcap::MessageStream::new(&bytes).expect("complete") {
         let message = message.expect("whole");
         let schema = message.channel.schema.clone().expect("has a schema");
-        let schema: serde_json::Value = serde_json::from_slice(&schema.data).expect("schema is JSON");
-        let value: serde_json::Value = serde_json::from_slice(&message.data).expect("message is JSON");
-        let promised = schema["properties"].as_object().expect("properties");
-        for key in value.as_object().expect("an object").keys() {
-            let known = promised.contains_key(key) || message.channel.topic == "/energy";
-            assert!(known, "{} has `{key}`, which its schema lacks", message.channel.topic);
-        }
-        *topics.entry(message.channel.topic.clone()).or_insert(0) += 1;
+        assert_eq!(
+            (schema.encoding.as_str(), message.channel.message_encoding.as_str()),
+            ("protobuf", "protobuf")
+        );
+        let types =
+            <prost_types::FileDescriptorSet as prost::Message>::decode(&schema.data[..]).expect("types");
+        let named = types
+            .file
+            .iter()
+            .flat_map(|f| f.message_type.iter().map(move |m| format!("{}.{}", f.package(), m.name())));
+        assert!(named.into_iter().any(|name| name == schema.name), "{}", schema.name);
+        let topic = match message.channel.topic.starts_with("/ground/") {
+            true => "/ground/*".to_owned(),
+            false => message.channel.topic.clone(),
+        };
+        *topics.entry(topic).or_insert(0) += 1;
     }
-    let names: Vec<_> = topics.keys().map(String::as_str).collect();
-    assert_eq!(names, ["/energy", "/gait", "/gluing", "/ground", "/robot", "/scene", "/soil", "/tf"]);
-    assert_eq!((topics["/robot"], topics["/scene"]), (22, 1));
+    let common = topics.keys().filter(|t| !t.starts_with("/shapes")).map(String::as_str).collect::<Vec<_>>();
+    let expected = [
+        "/contact_forces",
+        "/contact_forces/points",
+        "/energy",
+        "/gait",
+        "/gait/parameters",
+        "/gluing",
+        "/ground",
+        "/ground/*",
+        "/robot",
+        "/robot/parameters",
+        "/scene",
+        "/soil",
+        "/tf",
+    ];
+    assert_eq!(common, expected);
+    assert_eq!((topics["/robot"], topics["/scene"], topics["/gait/parameters"]), (22, 1, 1));
+    assert_eq!((topics["/contact_forces"], topics["/shapes/robot/body"]), (6, 1));
+}
+
+#[test]
+fn a_parameter_is_written_when_it_changes_and_read_at_every_row() {
+    let f = folder();
+    let mut rig = Rig::new("cooperative");
+    let mut recorder =
+        Recorder::create(f.path(), &rig.scenario, RecorderOptions::default()).expect("created");
+    rig.view(0, &mut |v| crate::observer::Observer::started(&mut recorder, v)).expect("started");
+    for step in [5, 10, 15, 20] {
+        rig.parts[0].1.speed = if step < 15 { 0.15 } else { 0.2 };
+        rig.view(step, &mut |v| crate::observer::Observer::stepped(&mut recorder, v)).expect("stepped");
+    }
+    recorder.finish(1.0, 1.0, None, Status::Done).expect("finished");
+    let bytes = std::fs::read(f.path().join(RECORDING)).expect("written");
+    let written = mcap::MessageStream::new(&bytes).expect("complete");
+    let parameters = written.filter(|m| m.as_ref().is_ok_and(|m| m.channel.topic == "/gait/parameters"));
+    assert_eq!(parameters.count(), 2);
+    let r = Recording::open(f.path()).expect("readable");
+    assert_eq!(r.series("gait.speed").expect("recorded").1, [0.15, 0.15, 0.15, 0.2, 0.2]);
+    assert_eq!(r.unit("gait.speed"), "m/s");
+}
+
+#[test]
+fn what_is_left_out_and_how_many_digits_are_kept_is_a_choice() {
+    let f = folder();
+    let mut rig = Rig::new("cooperative");
+    let list = |patterns: &[&str]| patterns.iter().map(|p| (*p).to_owned()).collect();
+    rig.scenario.recording.include = list(&["robot", "gait.speed"]);
+    rig.scenario.recording.exclude = list(&["robot.*.velocity", "robot.LF_j2.max_torque"]);
+    rig.scenario.recording.digits = 6;
+    let options = RecorderOptions { csv: true };
+    let mut recorder = Recorder::create(f.path(), &rig.scenario, options).expect("created");
+    rig.run(&mut recorder, 10).expect("ran");
+    recorder.finish(1.0, 1.0, None, Status::Done).expect("finished");
+    let r = Recording::open(f.path()).expect("readable");
+    let names = ["body.x", "LF_j2.angle", "LF_j2.torque", "LF_j2.motor", "LF_j2.broken"];
+    assert_eq!(r.variables["robot"].names, names);
+    assert!(r.variables["soil"].names.is_empty() && r.series("gait.speed").is_some());
+    let (t, x) = r.series("robot.body.x").expect("recorded");
+    let errors: Vec<f64> = t.iter().zip(x).map(|(t, x)| (x - SPEED * t).abs() / SPEED).collect();
+    assert!(errors.iter().all(|e| *e < 1e-8) && errors.iter().any(|e| *e > 1e-14), "{errors:?}");
+    let head = std::fs::read_to_string(f.path().join(VARIABLES)).expect("written");
+    let head = head.lines().next().expect("a head");
+    assert_eq!(head.split(',').count(), 7, "{head}");
+    rig.scenario.recording.exclude = list(&["robot.*.velocty"]);
+    let mut recorder = Recorder::create(f.path(), &rig.scenario, options).expect("created");
+    let error = rig.run(&mut recorder, 10).expect_err("refused").to_string();
+    assert!(error.contains("exclude") && error.contains("robot.*.velocty"), "{error}");
+}
+
+#[test]
+fn a_recording_in_the_json_of_earlier_versions_is_refused_with_the_way_out() {
+    let f = folder();
+    let file = std::fs::File::create(f.path().join(RECORDING)).expect("created");
+    let mut sink = mcap::Writer::new(std::io::BufWriter::new(file)).expect("begun");
+    let schema = sink.add_schema("foxglove.Log", "jsonschema", b"{}").expect("added");
+    let channel = sink.add_channel(schema, "/events", "json", &Default::default()).expect("added");
+    let header =
+        mcap::records::MessageHeader { channel_id: channel, sequence: 0, log_time: 0, publish_time: 0 };
+    sink.write_to_known_channel(&header, b"{}").expect("written");
+    sink.finish().expect("finished");
+    drop(sink);
+    let error = Recording::open(f.path()).expect_err("refused").to_string();
+    assert!(
+        error.contains(RECORDING) && error.contains("earlier version") && error.contains("run"),
+        "{error}"
+    );
 }
 
 #[test]

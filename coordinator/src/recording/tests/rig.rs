@@ -21,6 +21,8 @@ pub struct Synthetic {
     pub nan: bool,
     /// Whether it keeps no book of its energy.
     pub silent: bool,
+    /// Commanded speed, m/s.
+    pub speed: f64,
     variables: Vec<Variable>,
     fields: Vec<FieldInfo>,
     tiles: Vec<(u64, Vec<f64>, Vec<f64>)>,
@@ -96,6 +98,7 @@ impl Synthetic {
             t: 0.0,
             nan: false,
             silent: false,
+            speed: SPEED,
             variables,
             fields: Vec::new(),
             tiles: Vec::new(),
@@ -139,7 +142,7 @@ impl Synthetic {
             (Kind::Robot, 3) => 4.0,
             (Kind::Robot, 4) => f64::INFINITY,
             (Kind::Robot, id) if id >= 100 => libm::sin(self.t * f64::from(id)),
-            (Kind::Controller, 0) => SPEED,
+            (Kind::Controller, 0) => self.speed,
             _ => 1e-12,
         }
     }
@@ -238,7 +241,13 @@ pub fn scenario(strategy: &str) -> Scenario {
             contact_margin_m: 1e-3,
             ..GluingSpec::default()
         },
-        recording: RecordingSpec { ground_every_steps: 100, every_steps: 5 },
+        recording: RecordingSpec {
+            ground_every_steps: 100,
+            every_steps: 5,
+            digits: 17,
+            include: Vec::new(),
+            exclude: Vec::new(),
+        },
         report: ReportSpec {
             body: Some("robot.body".into()),
             commanded_speed: Some("gait.speed".into()),

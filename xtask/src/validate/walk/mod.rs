@@ -268,8 +268,11 @@ fn run<'a>(
 ) -> Run<'a> {
     let soil = format!("soil.module={soil}");
     let strategy = format!("gluing.strategy={strategy}");
+    // All bits, so that equal bytes mean equal numbers.
+    let bits = ["--set", "recording.digits=17"];
     let options = ["--set", &soil, "--set", &strategy, "--duration", duration, "--threads", threads];
-    Run { context, name: name.into(), options: options.map(str::to_owned).to_vec() }
+    let options = [&options[..], &bits[..]].concat().into_iter();
+    Run { context, name: name.into(), options: options.map(str::to_owned).collect() }
 }
 
 impl Run<'_> {

@@ -47,13 +47,24 @@ const minus = (text) => text.replace(/-/g, "−");
 const raised = (n) => String(n).replace(/./g, (c) => "⁻⁰¹²³⁴⁵⁶⁷⁸⁹"["-0123456789".indexOf(c)]);
 const decade = (v) => `10${raised(Math.round(Math.log10(v)))}`;
 
-// SI prefix in which a magnitude has one to three digits before the point. Pure numbers get none.
+// Power to which the first factor of a unit is raised ("m^2": 2, "m/s": 1); 0 where it takes no prefix: kg has one already.
+function prefixPower(unit) {
+  const first = /^([A-Za-zµΩ°%]+)(?:\^(-?\d+)|([²³]))?(?=$|[\s*·/])/.exec(unit);
+  if (!first || first[1] === "kg" || first[1] === "%" || first[1] === "°") return 0;
+  const power = first[3] ? "²³".indexOf(first[3]) + 2 : Number(first[2] ?? 1);
+  return Math.max(power, 0);
+}
+
+// SI prefix in which a magnitude has few digits before the point; that of a squared unit is squared: 1 mm² = 1e-6 m². Pure
+// numbers get none.
 function prefixFor(magnitude, unit) {
-  if (!unit || !(magnitude > 0)) return { symbol: "", factor: 1 };
-  const table = [["M", 1e6], ["k", 1e3], ["", 1], ["m", 1e-3], ["µ", 1e-6], ["n", 1e-9], ["p", 1e-12], ["f", 1e-15]];
+  const power = unit ? prefixPower(unit) : 0;
+  if (power === 0 || !(magnitude > 0)) return { symbol: "", factor: 1 };
+  const table = [["M", 1e6], ["k", 1e3], ["", 1], ["m", 1e-3], ["µ", 1e-6], ["n", 1e-9], ["p", 1e-12], ["f", 1e-15]]
+    .map(([symbol, f]) => [symbol, f ** power]);
   const [symbol, factor] = table.find(([, f]) => magnitude >= f * 0.9) ?? table.at(-1);
   // Two digits behind the point read better than a prefix.
-  return factor === 1e-3 && magnitude >= 0.1 ? { symbol: "", factor: 1 } : { symbol, factor };
+  return symbol === "m" && magnitude >= 0.1 ? { symbol: "", factor: 1 } : { symbol, factor };
 }
 
 function short(value, digits = 4) {

@@ -191,7 +191,13 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
             case.id(),
             run["error"].as_str().map(|e| format!(": {e}")).unwrap_or_default()
         );
-        all.push(Figure::new(format!("soil.energy.{}", way.name), drift(run), Limit::AtMost(1.0), what));
+        let form = if context.quick { "" } else { "long." };
+        all.push(Figure::new(
+            format!("soil.energy.{form}{}", way.name),
+            drift(run),
+            Limit::AtMost(1.0),
+            what,
+        ));
     }
     Ok(all)
 }

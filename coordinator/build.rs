@@ -10,7 +10,8 @@ use std::process::Command;
 const CRATES: [&str; 2] = ["plugin", "subsystem"];
 
 fn main() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("..");
+    // where cargo builds it now: the script itself may come from another checkout that shares the target folder
+    let root = PathBuf::from(std::env::var_os("CARGO_MANIFEST_DIR").expect("cargo sets it")).join("..");
     let root = root.canonicalize().expect("the root of the workspace");
     println!("cargo:rerun-if-changed=build.rs");
     println!("cargo:rustc-env=TERRAGLUE_VERSION={}", version(&root));

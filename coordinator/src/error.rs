@@ -8,7 +8,7 @@ pub enum Error {
     #[error(transparent)]
     Input(#[from] Box<crate::scenario::InputError>),
     /// A subsystem failed (exit code 1).
-    #[error("{subsystem} ({module}): {function} failed at t = {time_s} s: {message}")]
+    #[error("{subsystem} ({module}): {function} failed at t = {} s: {message}", nanosecond(*time_s))]
     Module {
         /// Name in the scenario.
         subsystem: String,
@@ -22,7 +22,7 @@ pub enum Error {
         message: String,
     },
     /// A glued subsystem cannot go to the end of the step; the testbed repeats it with half the length.
-    #[error("`{subsystem}` ended the step early in {function}, at t = {reached_s} s")]
+    #[error("`{subsystem}` ended the step early in {function}, at t = {} s", nanosecond(*reached_s))]
     Early {
         /// Name in the scenario.
         subsystem: String,
@@ -32,7 +32,7 @@ pub enum Error {
         reached_s: f64,
     },
     /// The gluing did not converge (exit code 1).
-    #[error("gluing by `{strategy}` did not converge at t = {time_s} s: {message}")]
+    #[error("gluing by `{strategy}` did not converge at t = {} s: {message}", nanosecond(*time_s))]
     NotConverged {
         /// Strategy.
         strategy: &'static str,
@@ -42,7 +42,7 @@ pub enum Error {
         message: String,
     },
     /// The simulation cannot go on for another reason (exit code 1).
-    #[error("simulation failed at t = {time_s} s: {message}")]
+    #[error("simulation failed at t = {} s: {message}", nanosecond(*time_s))]
     Simulation {
         /// Simulated time, s.
         time_s: f64,
@@ -50,7 +50,7 @@ pub enum Error {
         message: String,
     },
     /// There is no room for a file of the run (exit code 1).
-    #[error("{path}: {source}; {free} are free there; the run is kept up to t = {kept_s} s")]
+    #[error("{path}: {source}; {free} are free there; the run is kept up to t = {} s", nanosecond(*kept_s))]
     Full {
         /// Path as the user knows it.
         path: String,
@@ -69,6 +69,11 @@ pub enum Error {
         /// Why.
         source: std::io::Error,
     },
+}
+
+/// A time without the rounding of steps that were added up: 0.172 and not 0.17200000000000001.
+fn nanosecond(t_s: f64) -> f64 {
+    (t_s * 1e9).round() / 1e9
 }
 
 impl Error {
@@ -97,3 +102,15 @@ impl Error {
 
 /// Result with the coordinator's error.
 pub type Result<T = ()> = std::result::Result<T, Error>;
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn times_are_said_without_rounding() {
+        let time_s = (0..86).fold(0.0, |t, _| t + 0.002);
+        let error = Error::Simulation { time_s, message: "buried".into() };
+        assert_eq!(error.to_string(), "simulation failed at t = 0.172 s: buried");
+    }
+}

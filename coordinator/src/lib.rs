@@ -4,6 +4,7 @@
 //! [`observer::Observer`]. Several live side by side in one process; there are no globals.
 
 pub mod check_module;
+pub mod checkpoint;
 pub mod contact;
 pub mod error;
 pub mod fmu;

@@ -67,6 +67,8 @@ pub struct Happening {
     pub what: String,
 }
 
+terraglue_subsystem::persist!(Happening { t_s, what });
+
 /// Follows a run. All methods are called from the stepping thread.
 pub trait Observer {
     /// Before the first step.

@@ -108,7 +108,7 @@ pub struct Snapshot {
     slot: u32,
     clock: TimeKept,
     fired: Vec<bool>,
-    /// What each group, and at the end the control of the steps, keeps from step to step.
+    /// What each group, faults, contact detection and the control of the steps keep from step to step.
     memory: Vec<Vec<u64>>,
 }
 
@@ -548,19 +548,20 @@ impl Testbed {
         for (group, kept) in self.groups.iter_mut().zip(&snapshot.memory) {
             group.recall(kept);
         }
-        if let Some(kept) = snapshot.memory.get(self.groups.len()) {
-            self.faults.recall(kept);
-        }
-        if let (Some(control), Some(kept)) = (&mut self.control, snapshot.memory.last()) {
+        let mut others = snapshot.memory.iter().skip(self.groups.len());
+        others.next().into_iter().for_each(|kept| self.faults.recall(kept));
+        others.next().into_iter().for_each(|kept| self.detector.recall(kept));
+        if let (Some(control), Some(kept)) = (&mut self.control, others.next()) {
             control.recall(&mut Recall(kept));
         }
         self.read_states()
     }
 
-    /// What each group and the control of the steps keep from step to step.
+    /// What each group, faults, contact detection and the control of the steps keep from step to step.
     fn memory(&self) -> Vec<Vec<u64>> {
         let mut all: Vec<Vec<u64>> = self.groups.iter().map(Group::memory).collect();
         all.push(self.faults.remember());
+        all.push(self.detector.remember());
         let mut last = Vec::new();
         self.control.iter().for_each(|c| c.remember(&mut last));
         all.push(last);

@@ -140,6 +140,64 @@ def test_a_comparison_without_any_run_that_ends_fails(pendulum, tmp_path):
     assert "did not converge" in row["error"] and "no run reached its end" in process.stderr
 
 
+SMALL = ["--duration", "0.1", "--set", "time.settle_s=0.1", "--set", "terrain.size_m=[2.0,1.6]", "--set", "terrain.spacing_m=0.02"]
+
+
+def test_any_key_can_be_varied_and_all_combinations_run(tmp_path):
+    process = terraglue("compare", MOON_WALK, *SMALL, "--out", tmp_path,
+                        "--vary", "soil.parameters=lunar_nominal_Apollo,LETE_sand,lunar_nominal_Apollo",
+                        "--vary", "world.gravity_m_s2=[0.0,0.0,-1.62],[0.0, 0.0, -3.7]", "--reference", "cooperative")
+    assert process.returncode == 0, process.stderr
+    assert "`lunar_nominal_Apollo` more than once" in process.stderr
+    rows = json.loads((tmp_path / "compare.json").read_text())["rows"]
+    keys = ("soil.parameters", "world.gravity_m_s2")
+    combinations = [(soil, g) for soil in ("lunar_nominal_Apollo", "LETE_sand") for g in ("[0.0,0.0,-1.62]", "[0.0, 0.0, -3.7]")]
+    # the strategy of the scenario, each combination with a reference of its own
+    assert [row["strategy"] for row in rows] == 8 * ["cooperative"]
+    assert [tuple(row["varied"][key] for key in keys) for row in rows] == 2 * combinations
+    assert [row["reference_error_m"] for row in rows] == 4 * [0.0] + 4 * [None]
+    depths = [row["print_depth_m"] for row in rows[:4]]
+    assert len(set(depths)) == 4 and all(0.0 < depth < 0.05 for depth in depths), depths
+    assert len({row["folder"] for row in rows}) == 8
+    for row in rows[:4]:
+        text = (tmp_path / row["folder"] / "report.html").read_text()
+        assert row["varied"]["soil.parameters"] in text
+    with open(tmp_path / "compare.csv", newline="") as file:
+        assert [tuple(row[key] for key in keys) for row in csv.DictReader(file)] == 2 * combinations
+    table, _, legend = process.stdout.partition("* best")
+    assert table.count("\n") >= 10 and all(len(line) <= 80 for line in table.splitlines()), table
+    heads = [" ".join(words) for words in zip(*(line.strip("│ ").split("┆") for line in table.splitlines()[2:4]))]
+    assert [" ".join(head.split()) for head in heads] == [
+        "run", "distance", "median print", "energy drift", "CPU per step"], table
+    assert "all runs: " in table and "LETE_sand" in table and "--details" in legend
+    page = (tmp_path / "compare.html").read_text()
+    assert page.count("data:image/png;base64,") == 8 and "Grounds side by side" in page
+
+
+def test_details_show_all_figures(tmp_path):
+    process = terraglue("compare", MOON_WALK, *SMALL, "--out", tmp_path, "--strategies", "cooperative", "--details",
+                        "--vary", "soil.parameters=lunar_nominal_Apollo,LETE_sand")
+    assert process.returncode == 0, process.stderr
+    assert "evaluations of bodies, mean" in process.stdout and "heat elsewhere" in process.stdout
+    assert "CPU per" in process.stdout.partition("* best")[0]
+
+
+@pytest.mark.parametrize("vary, words", [
+    ("gluing.strategy=cooperative,iterative", ["--strategies cooperative,iterative"]),
+    ("soil.module=soil-bekker", ["--soils soil-bekker"]),
+    ("time.step_s=1e-3,2e-3", ["--steps 1e-3,2e-3"]),
+    ("soil.parameters=LETE_sand,LETE_sant", ["LETE_sant", "did you mean `LETE_sand`"]),
+    ("gait.speed=1", ["speed_m_s"]),
+    ("soil.parameters=a,,b", ["a value is empty"]),
+    ("soil.parameters", ["KEY.PATH"]),
+])
+def test_what_cannot_be_varied_is_told_with_the_way_out(tmp_path, vary, words):
+    process = terraglue("compare", MOON_WALK, *SMALL, "--out", tmp_path / "out", "--vary", vary)
+    said = " ".join(process.stderr.replace("│", " ").split())
+    assert process.returncode == 2 and all(word in said for word in words), said
+    assert not (tmp_path / "out").exists()
+
+
 def test_compare_refuses_unknown_names():
     for option, name in (("--strategies", "iterativ"), ("--soils", "soil-beker"), ("--soils", "soil-bekker,foo")):
         process = terraglue("compare", MOON_WALK, option, name)
@@ -173,6 +231,25 @@ def test_listings_can_be_narrowed():
     none = terraglue("variables", MOON_WALK, "robot.LF_j2.max_torqe")
     assert none.returncode == 2 and "`robot.LF_j2.max_torque`" in none.stderr
     lunar = terraglue("soils", "lunar")
+    assert "│" not in lunar.stdout
     assert lunar.returncode == 0 and "lunar_nominal_Apollo" in lunar.stdout and "LETE_sand" not in lunar.stdout
     wrong = terraglue("soils", "lunar_nominl_Apollo")
     assert wrong.returncode == 2 and "`lunar_nominal_Apollo`" in wrong.stderr
+
+
+def test_modules_can_be_narrowed():
+    soils = terraglue("modules", "soil")
+    assert soils.returncode == 0, soils.stderr
+    assert all(name in soils.stdout for name in SOILS) and "rigid-body" not in soils.stdout and "│" not in soils.stdout
+    # one row to a line, so that other programs can pick a line
+    head, *rows, _ = soils.stdout.splitlines()
+    assert head.split()[:2] == ["module", "kind"]
+    assert all(row.split()[:2] == [row.split()[0], "soil"] and ".so" in row for row in rows), rows
+    starred = terraglue("modules", "*-bekker", "--json")
+    names = {module["name"] for module in json.loads(starred.stdout)}
+    assert "soil-bekker" in names and all(name.endswith("-bekker") for name in names)
+    one = terraglue("modules", "soil-bekker")
+    assert one.returncode == 0 and "elastic_stiffness_pa_m" in one.stdout
+    for more in ([], ["--json"]):
+        wrong = terraglue("modules", "soil-beker", *more)
+        assert wrong.returncode == 2 and "did you mean `soil-bekker`" in " ".join(wrong.stderr.split())

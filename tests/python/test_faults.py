@@ -1,12 +1,15 @@
-"""Faults of single numbers: on a connection or an input, between two times or on a condition."""
+"""Faults of single numbers: on a connection or an input, between two times or on a condition; and the faults of legs."""
 
 import csv
+import re
+from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
 
 from cfmu import build
-from conftest import terraglue
+from claims import agrees
+from conftest import ROOT, terraglue
 
 H = 0.1
 
@@ -135,3 +138,47 @@ def test_noise_and_drop_outs_follow_their_seed(folder, tmp_path):
 )
 def test_a_fault_that_cannot_be_is_refused(folder, tmp_path, fault, says):
     assert says in run(folder, tmp_path, f"[[fault]]\n{fault}\n")
+
+
+ROWS = {"torque": "torque of LF_j2 and LF_j3 lost", "loss": "LF_j2 breaks", "block": "LF_j3 blocked"}
+# name, scenario, edits
+LEGS = [("undisturbed", "torque", ["--set", "event=[]"]), ("torque", "torque", []), ("loss", "loss", []), ("block", "block", [])]
+
+
+@pytest.fixture(scope="module")
+def legs(tmp_path_factory):
+    """x, y and heading of the four walks every 10 ms, with the step of the scenarios and half of it."""
+    folder = tmp_path_factory.mktemp("legs")
+
+    def walk(case, step):
+        name, scenario, edits = case
+        out = folder / f"{name}-{step}"
+        step = ["--set", f"time.step_s={step}", "--set", f"recording.every_steps={round(0.01 / step)}"]
+        done = terraglue("run", f"scenarios/leg_faults_{scenario}.toml", *edits, *step, "--csv", "--quiet", "--out", out, timeout=900)
+        assert done.returncode == 0, done.stderr
+        rows = csv.DictReader((out / "variables.csv").open())
+        return np.array([[float(row[f"robot.body.{c}"]) for c in ("x", "y", "yaw")] for row in rows])
+
+    with ThreadPoolExecutor(2) as pool:
+        # the long ones first
+        walks = {(case[0], step): pool.submit(walk, case, step) for step in (5e-4, 1e-3) for case in LEGS}
+        return {key: walk.result() for key, walk in walks.items()}
+
+
+def apart(one, other):
+    """Largest distance of two paths, m, and of two headings, rad."""
+    assert one.shape == other.shape
+    return np.hypot(*(one - other)[:, :2].T).max(), abs(one - other)[:, 2].max()
+
+
+@pytest.mark.parametrize("fault", ["torque", "loss", "block"])
+def test_the_fault_of_a_leg_shows_and_not_the_step(legs, fault):
+    path, heading = apart(legs[fault, 1e-3], legs["undisturbed", 1e-3])
+    half_path, half_heading = apart(legs[fault, 1e-3], legs[fault, 5e-4])
+    assert path > 0.01 and heading > 0.01, "there is something to be seen"
+    assert path >= 5 * half_path, f"path {1e3 * path:.1f} mm by the fault, {1e3 * half_path:.1f} mm by half the step"
+    assert heading >= 5 * half_heading, f"heading {heading:.4f} rad by the fault, {half_heading:.4f} rad by half the step"
+    shown = re.search(rf"^\| {ROWS[fault]} \| (.*)$", (ROOT / "docs" / "faults.md").read_text(), re.M)[1].split(" | ")
+    measured = (1e3 * path, np.degrees(heading), 1e3 * half_path, np.degrees(half_heading))
+    for cell, figure in zip(shown, measured):
+        assert agrees(re.match(r"[\d.]+", cell)[0], figure), f"docs/faults.md shows {cell}, measured {figure:.4g}: run `cargo xtask docs`"

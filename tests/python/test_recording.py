@@ -45,7 +45,8 @@ def points(cloud):
 
 
 def test_the_default_walk_takes_fifteen_megabytes(walk):
-    assert (walk / "recording.mcap").stat().st_size <= 15 * MB
+    # its 24 drives show heat, current and energy beside: 0.7 MB more
+    assert (walk / "recording.mcap").stat().st_size <= (15 + 0.7) * MB
 
 
 def test_variables_are_those_of_the_table(walk, decoded):
@@ -74,8 +75,8 @@ def test_what_never_changes_is_written_once(walk, decoded):
         return parts[-1] in {field.name for field, _ in message.ListFields()}
 
     again = [n for n in constant if written(robot, n.split(".")[1:])]
-    # A module does not say of its own outputs that they stay: centres of mass, and the voltage of the supply.
-    expected = [n for n in constant if n.endswith(".force_at_x") and float(table[0][n])] + ["robot.supply.voltage"]
+    # A module does not say of its own outputs that they stay: centres of mass, and the voltages of supply and drives.
+    expected = [n for n in constant if n.endswith((".force_at_x", ".voltage")) and float(table[0][n])]
     assert sorted(again) == sorted(expected)
 
 

@@ -1,5 +1,6 @@
-//! The developer commands, the same as in CI: `cargo xtask test | validate | faults | header | schema | install | dist`.
+//! The developer commands, the same as in CI: `cargo xtask test | docs | validate | faults | header | schema | install | dist`.
 
+mod docs;
 mod faults;
 mod header;
 mod install;
@@ -25,6 +26,8 @@ struct Arguments {
 enum Command {
     /// Run every test: Rust, Python, and the quick figures.
     Test,
+    /// Make everything in docs/, README and scenarios again that is made from code or measured by it (ten minutes).
+    Docs,
     /// Measure the figures that the areas promise and hold them against their limits.
     Validate(validate::Arguments),
     /// Run the fault scenarios and write the tables and the picture of docs/faults.md (some minutes).
@@ -35,7 +38,7 @@ enum Command {
         #[arg(long)]
         check: bool,
     },
-    /// Draw the pictures of docs/ that are computed: docs/images/automaton_crater.svg and wheel_pressure.svg.
+    /// Draw the pictures of docs/ that are computed: docs/images/moon_walk.svg, automaton_crater.svg, …
     Pictures,
     /// Print a hash of the automaton's state after a fixed run: `validate soil` runs this in another environment.
     #[command(hide = true)]
@@ -67,9 +70,10 @@ fn main() -> ExitCode {
     let done: Outcome = match Arguments::parse().command {
         Command::Test => test::test(),
         Command::Validate(arguments) => validate::validate(&arguments),
+        Command::Docs => docs::write_all(),
         Command::Faults => faults::write_page(),
         Command::Header { check } => header::run(check),
-        Command::Pictures => validate::write_soil_pictures(),
+        Command::Pictures => docs::pictures(),
         Command::SoilHash { quick } => {
             validate::print_soil_hash(quick);
             Ok(())

@@ -15,7 +15,7 @@ pub fn test() -> Outcome {
 }
 
 /// The Python of `target/venv`, with what `tests/python/requirements.txt` asks for.
-fn virtual_environment() -> Outcome<PathBuf> {
+pub fn virtual_environment() -> Outcome<PathBuf> {
     let venv = target().join("venv");
     let python = venv.join("bin/python");
     let requirements = root().join("tests/python/requirements.txt");

@@ -1,5 +1,6 @@
 //! The arguments and their help.
 
+use clap::builder::ArgPredicate;
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
 use terraglue::scaffold::{Kind, Language};
@@ -16,9 +17,10 @@ pub struct Arguments {
 const EXAMPLES: &str = "\
 Examples:
   terraglue run scenarios/moon_walk.toml
-  terraglue run scenarios/moon_walk.toml --set soil.module=soil-bekker --out runs/bekker
+  terraglue run scenarios/moon_walk.toml --set soil.module=soil-bekker \\
+      --out runs/bekker
   terraglue compare scenarios/moon_walk.toml --strategies cooperative,iterative
-  terraglue variables scenarios/moon_walk.toml     what can be read, connected and set
+  terraglue variables scenarios/moon_walk.toml
 
 Exit codes: 0 done, 1 the simulation or a check failed, 2 the input is wrong, 130 interrupted.
 TERRAGLUE_LOG=info shows which modules are loaded and what they say; TERRAGLUE_MODULE_PATH adds folders with modules.";
@@ -42,7 +44,9 @@ pub enum Command {
     CheckModule(CheckModuleArguments),
     /// List the modules that are found, without running them; with a name, show its parameters.
     Modules {
-        /// Show this module with its parameters: its name, or the path of its file.
+        /// Show this module with its parameters: its name, or the path of its file. A part of names lists those, as does a pattern
+        /// with `*`.
+        #[arg(value_name = "PATTERN")]
         name: Option<String>,
         /// Search this folder first; may be repeated.
         #[arg(long, value_name = "DIR")]
@@ -150,8 +154,14 @@ pub struct RunArguments {
     pub json: bool,
 }
 
+/// What stands for the scenario of a run that is resumed; the checkpoint knows it.
+const AS_KEPT: &str = "as kept with the checkpoint";
+
 /// What `run` takes.
 #[derive(Args, Debug, Clone)]
+#[command(after_help = RUN_EXAMPLES)]
+#[command(mut_arg("scenario", |a| a.required(false).required_unless_present("resume")
+    .default_value_if("resume", ArgPredicate::IsPresent, AS_KEPT)))]
 pub struct RunCommand {
     /// As for `compare`.
     #[command(flatten)]
@@ -166,6 +176,13 @@ pub struct RunCommand {
     /// Refuse robot files that have a warning: `strict = true` in the table of every robot.
     #[arg(long)]
     pub strict: bool,
+    /// Keep the whole state so often, in simulated time (5, 5s, 500ms, 2min), in DIR/checkpoint.bin; it is also kept where
+    /// Ctrl-C stops the run. Results do not depend on it.
+    #[arg(long, value_name = "TIME", value_parser = simulated_time, allow_negative_numbers = true, conflicts_with = "watch")]
+    pub checkpoint_every: Option<f64>,
+    /// Go on from the last checkpoint of the run in this folder, with its scenario, to the same bytes as without the break.
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["scenario", "sets", "out", "duration", "csv", "strict", "watch"])]
+    pub resume: Option<PathBuf>,
     /// Watch the files of modules, and exchange their code while the run goes on.
     #[arg(long)]
     pub watch: bool,
@@ -175,6 +192,21 @@ pub struct RunCommand {
     /// Exchange this subsystem before this step, changed or not. May be repeated.
     #[arg(long, value_name = "NAME=STEP", requires = "watch", hide = true, value_parser = parse_set)]
     pub reload_at: Vec<(String, String)>,
+}
+
+const RUN_EXAMPLES: &str = "\
+Examples:
+  terraglue run scenarios/moon_walk.toml --duration 60 --checkpoint-every 5s --out runs/long
+  terraglue run --resume runs/long      after a crash, a kill or Ctrl-C: the files end as if nothing had happened";
+
+/// A time in seconds, or with a unit.
+fn simulated_time(text: &str) -> Result<f64, String> {
+    const UNITS: [(&str, f64); 4] = [("ms", 1e-3), ("min", 60.0), ("h", 3600.0), ("s", 1.0)];
+    let unit = UNITS.iter().find_map(|(unit, s)| Some((text.strip_suffix(unit)?, s)));
+    let (number, unit_s) = unit.unwrap_or((text, &1.0));
+    let seconds = number.trim().parse::<f64>().ok().map(|x| x * unit_s);
+    let seconds = seconds.filter(|x| x.is_finite() && *x > 0.0);
+    seconds.ok_or_else(|| "a time above 0 is wanted: 5, 5s, 500ms, 2min or 1h".to_owned())
 }
 
 /// What `convert` takes.
@@ -215,8 +247,10 @@ pub struct ExportArguments {
 
 const EXPORT_EXAMPLES: &str = "\
 Examples:
-  terraglue export soil-bekker -o soil.fmu --set soil.parameters=LETE_sand --set foot.count=6
-  terraglue export rigid-body -o robot.fmu --fmi 2 --set robot.model=models/hexapod.urdf
+  terraglue export soil-bekker -o soil.fmu --set soil.parameters=LETE_sand \\
+      --set foot.count=6
+  terraglue export rigid-body -o robot.fmu --fmi 2 \\
+      --set robot.model=models/hexapod.urdf
   terraglue export scenarios/moon_walk.toml -o walk.fmu
 
 A module is exported inside a small scenario: [time], [world], and [robot], [unit] or, for a soil, [soil] with
@@ -319,7 +353,7 @@ pub struct NewArguments {
 const NEW_EXAMPLES: &str = "\
 Examples:
   terraglue new soil my-soil --lang c
-  terraglue new scenario --robot my.urdf -o my-moon     it stands on lunar soil and holds its pose";
+  terraglue new scenario --robot my.urdf -o my-moon     it stands on the Moon";
 
 /// What `new` makes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -404,8 +438,10 @@ pub struct FitSoilArguments {
 
 const FIT_EXAMPLES: &str = "\
 Example:
-  terraglue fit-soil plates.csv --law bearing --density 1330 --cohesion-pa 1000 --out soil.toml --predict other.csv
-  terraglue fit-soil wheel.csv --wheel radius=0.058,width=0.05 --soil CMU_Direct90_s0 --out soil.toml
+  terraglue fit-soil plates.csv --law bearing --density 1330 --cohesion-pa 1000 \\
+      --out soil.toml --predict other.csv
+  terraglue fit-soil wheel.csv --wheel radius=0.058,width=0.05 \\
+      --soil CMU_Direct90_s0 --out soil.toml
 
 The error is the root of the mean square of ln(p/p_measured). b is the radius of a disc or the short side of a
 rectangle. Confidence intervals: whole presses are left out in turn.";
@@ -417,15 +453,22 @@ pub struct CompareArguments {
     /// As for `run`.
     #[command(flatten)]
     pub run: RunArguments,
-    /// Strategies, separated by commas [default: all].
+    /// Strategies, separated by commas [default: all; with --vary that of the scenario].
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
     pub strategies: Vec<String>,
     /// Soil modules, separated by commas [default: that of the scenario].
     #[arg(long, value_delimiter = ',', value_name = "MODULES")]
     pub soils: Vec<String>,
+    /// Values of any key that --set takes, separated by commas, e.g. rows of the soil table: soil.parameters=LETE_sand,…; may be
+    /// repeated: every combination runs.
+    #[arg(long, value_name = "KEY.PATH=VALUES", value_parser = parse_vary)]
+    pub vary: Vec<(String, Vec<String>)>,
     /// Communication steps in seconds, separated by commas [default: that of the scenario].
     #[arg(long, value_delimiter = ',', value_name = "SECONDS")]
     pub steps: Vec<f64>,
+    /// Print all figures, not only those that tell most.
+    #[arg(long, visible_alias = "all")]
+    pub details: bool,
     /// Compare the path of the reported body with this: a strategy, e.g. `monolithic`, run on each soil (of several
     /// steps with an eighth of the smallest), or the folder or .mcap file of an earlier run of the same scenario.
     #[arg(long, value_name = "STRATEGY|FOLDER|FILE")]
@@ -439,7 +482,10 @@ const COMPARE_EXAMPLES: &str = "\
 Example:
   terraglue compare scenarios/moon_walk.toml --strategies cooperative,iterative \\
       --soils soil-cellular-automaton,soil-bekker
-  terraglue compare scenarios/moon_walk.toml --duration 1 --steps 5e-4,1e-3,2e-3 --reference monolithic
+  terraglue compare scenarios/moon_walk.toml --vary soil.parameters=lunar_nominal_Apollo,LETE_sand \\
+      --vary gait.speed_m_s=0.1,0.2
+  terraglue compare scenarios/moon_walk.toml --duration 1 \\
+      --steps 5e-4,1e-3,2e-3 --reference monolithic
 
 Writes compare.html, compare.csv and compare.json, and each run into a folder of its own beside them.";
 
@@ -466,6 +512,33 @@ fn process_count(text: &str) -> Result<std::num::NonZeroUsize, String> {
 
 fn parse_set(text: &str) -> Result<(String, String), String> {
     terraglue::scenario::split_set(text).ok_or_else(|| "there is no `=`: write KEY.PATH=VALUE".into())
+}
+
+/// A key path and its values; a comma within brackets or quotes parts none.
+fn parse_vary(text: &str) -> Result<(String, Vec<String>), String> {
+    let (key, all) = parse_set(text)?;
+    let (mut values, mut depth, mut quote) = (vec![String::new()], 0_i32, None);
+    for c in all.chars() {
+        match (c, quote) {
+            ('"' | '\'', None) => quote = Some(c),
+            (c, Some(open)) if c == open => quote = None,
+            ('[' | '{', None) => depth += 1,
+            (']' | '}', None) => depth -= 1,
+            (',', None) if depth == 0 => {
+                values.push(String::new());
+                continue;
+            }
+            _ => {}
+        }
+        if let Some(last) = values.last_mut() {
+            last.push(c);
+        }
+    }
+    let values: Vec<String> = values.iter().map(|v| v.trim().to_owned()).collect();
+    match values.iter().any(String::is_empty) {
+        true => Err("a value is empty: write KEY.PATH=A,B,C".into()),
+        false => Ok((key, values)),
+    }
 }
 
 /// What can be done with a functional mock-up unit.

@@ -1,4 +1,4 @@
-//! `terraglue compare`: the product of strategies and soils, each run in a folder of its own.
+//! `terraglue compare`: the product of strategies, soils and other keys, each run in a folder of its own.
 
 mod plan;
 
@@ -28,18 +28,19 @@ pub fn compare(arguments: &CompareArguments) -> Result<Exit> {
     let name = plans.first().map_or_else(String::new, |p| p.scenario.name.clone());
     interrupt.run();
     let folder = results_folder(arguments.run.out.as_deref(), &name)?;
-    for plan in &mut plans {
-        let step = if plan.name_step { format!("_{}s", plan.scenario.time.step_s) } else { String::new() };
-        let reference = if plan.is_reference { "reference_" } else { "" };
-        let soil = if plan.soil.is_empty() { String::new() } else { format!("_{}", file_name(&plan.soil)) };
-        plan.folder = folder.join(format!("{reference}{}{soil}{step}", plan.strategy));
+    for k in 0..plans.len() {
+        let name = folder_name(&plans[k]);
+        let taken = |name: &str| plans[..k].iter().any(|p| p.folder.ends_with(name));
+        let numbered = (2..).map(|n| format!("{name}_{n}"));
+        let free = std::iter::once(name.clone()).chain(numbered).find(|name| !taken(name));
+        plans[k].folder = folder.join(free.unwrap_or(name));
     }
     let bar = progress::bar(plans.iter().map(Plan::steps).sum(), arguments.run.quiet);
     let mut rows = run_all(&plans, &arguments.run, &cancel, &bar);
     bar.finish_and_clear();
     judge(&mut rows, arguments)?;
     compare::write(&folder, &rows)?;
-    print(&arguments.run, &folder, &rows)?;
+    print(arguments, &folder, &rows)?;
     Ok(if cancel.load(Ordering::Relaxed) { Exit::Interrupted } else { exit(&rows) })
 }
 
@@ -63,12 +64,24 @@ fn judge(rows: &mut [CompareRow], arguments: &CompareArguments) -> Result {
     if !STRATEGIES.contains(&reference.as_str()) {
         return compare::judge(rows, None, Path::new(reference));
     }
-    let runs: Vec<(String, PathBuf)> = rows
-        .iter()
-        .filter(|r| r.is_reference && r.failure().is_none())
-        .filter_map(|r| Some((r.soil.clone(), r.folder.clone()?)))
-        .collect();
-    runs.iter().try_for_each(|(soil, folder)| compare::judge(rows, Some(soil), folder))
+    let runs = rows.iter().filter(|r| r.is_reference && r.failure().is_none()).cloned();
+    let runs: Vec<(CompareRow, PathBuf)> = runs.filter_map(|r| Some((r.clone(), r.folder?))).collect();
+    runs.iter().try_for_each(|(run, folder)| compare::judge(rows, Some(run), folder))
+}
+
+/// Longest part of the name of a folder that a value takes.
+const LONGEST_VALUE: usize = 40;
+
+/// What the folder of a run is called.
+fn folder_name(plan: &Plan) -> String {
+    let reference = if plan.is_reference { "reference_" } else { "" };
+    let soil = if plan.soil.is_empty() { String::new() } else { format!("_{}", file_name(&plan.soil)) };
+    let plain = |c: char| if c.is_alphanumeric() || matches!(c, '.' | '-' | '_') { c } else { '-' };
+    let value =
+        |value: &String| value.trim_matches('"').chars().take(LONGEST_VALUE).map(plain).collect::<String>();
+    let varied: String = plan.varied.iter().map(|(_, v)| format!("_{}", value(v))).collect();
+    let step = if plan.name_step { format!("_{}s", plan.scenario.time.step_s) } else { String::new() };
+    format!("{reference}{}{soil}{varied}{step}", plan.strategy)
 }
 
 /// A module's name without what a folder name may not hold.
@@ -109,6 +122,7 @@ fn run_one(plan: &Plan, arguments: &RunArguments, cancel: &Arc<AtomicBool>, bar:
     let mut row = CompareRow {
         strategy: plan.strategy.clone(),
         soil: plan.soil.clone(),
+        varied: plan.varied.clone(),
         step_s: plan.scenario.time.step_s,
         is_reference: plan.is_reference,
         name_step: plan.name_step,
@@ -146,8 +160,14 @@ fn recorded(
     let testbed = run::build(&plan.scenario, &run::options(arguments, cancel))?;
     let label = format!("{} on {}: ", plan.strategy, file_name(&plan.soil));
     let mut progress = Progress::new(bar.clone(), plan.scenario.time.duration_s, &label);
-    let outcome =
-        run::run_testbed(testbed, None, &plan.scenario, &plan.folder, arguments.csv, &mut progress)?;
+    let records = run::Records {
+        scenario: &plan.scenario,
+        folder: &plan.folder,
+        csv: arguments.csv,
+        keeper: None,
+        resumed: None,
+    };
+    let outcome = run::run_testbed(testbed, None, records, &mut progress)?;
     recording::report::write(&plan.folder)?;
     Ok(outcome)
 }
@@ -171,13 +191,16 @@ fn cold_start_mean(
     (!testbed.cancelled()).then(|| figures.summary(0.0, 0.0, None, Status::Done).evaluations_soil_mean)
 }
 
-fn print(arguments: &RunArguments, folder: &Path, rows: &[CompareRow]) -> Result {
-    if arguments.json {
+fn print(arguments: &CompareArguments, folder: &Path, rows: &[CompareRow]) -> Result {
+    if arguments.run.json {
         let path = folder.join(COMPARE_JSON);
         let at = |source| Error::File { path: path.display().to_string(), source };
         outln!("{}", std::fs::read_to_string(&path).map_err(at)?.trim_end());
-    } else if !arguments.quiet {
-        outln!("{}", compare::terminal_table(rows));
+    } else if !arguments.run.quiet {
+        outln!("{}", compare::terminal_table(rows, false));
+        if arguments.details {
+            outln!("{}", compare::terminal_table(rows, true));
+        }
         outln!("comparison: {}", folder.join(COMPARE_PAGE).display());
     }
     Ok(())

@@ -40,7 +40,7 @@ fn holds_a_run(folder: &Path) -> Result<bool> {
 }
 
 /// Refuses a folder that another run is writing into.
-fn free(folder: &Path) -> Result {
+pub fn free(folder: &Path) -> Result {
     let locked = File::open(folder.join(RECORDING))
         .is_ok_and(|file| matches!(file.try_lock_shared(), Err(TryLockError::WouldBlock)));
     if !locked {

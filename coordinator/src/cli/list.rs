@@ -34,8 +34,8 @@ pub fn variables(arguments: &VariablesArguments) -> Result<Exit> {
     if let Some(pattern) = &arguments.pattern {
         let names = variables.iter().map(|v| &v[0]).chain(actions.iter().map(|a| &a[0]));
         let names: Vec<String> = names.cloned().collect();
-        variables.retain(|row| asked(pattern, &row[0]));
-        actions.retain(|row| asked(pattern, &row[0]));
+        variables.retain(|row| fits(pattern, &row[0]));
+        actions.retain(|row| fits(pattern, &row[0]));
         if variables.is_empty() && actions.is_empty() {
             let help = did_you_mean(pattern, names.iter().map(String::as_str));
             return Err(InputError::plain(format!("no variable or action matches `{pattern}`"), help).into());
@@ -51,7 +51,7 @@ pub fn variables(arguments: &VariablesArguments) -> Result<Exit> {
 }
 
 /// Whether a name is one of those that a pattern, or a piece of a name, asks for.
-fn asked(pattern: &str, name: &str) -> bool {
+fn fits(pattern: &str, name: &str) -> bool {
     match pattern.contains('*') {
         true => pattern::matches(pattern, name),
         false => name.to_lowercase().contains(&pattern.to_lowercase()),
@@ -63,8 +63,7 @@ fn columns<const N: usize>(heads: &[&str; N], rows: Vec<[String; N]>) {
     if rows.is_empty() {
         return;
     }
-    let mut table = show::table(heads);
-    table.load_preset(comfy_table::presets::NOTHING);
+    let mut table = show::plain(show::table(heads));
     rows.into_iter().for_each(|row| {
         table.add_row(row);
     });
@@ -115,20 +114,23 @@ fn range(v: &Variable) -> String {
     }
 }
 
-/// The modules on the search path. `asked` loads them to ask for their parameters, in this process.
+/// The modules on the search path, one with its parameters, or those whose names fit a pattern. `asked` loads them to ask
+/// for their parameters, in this process.
 pub fn modules(name: Option<&str>, module_path: &[PathBuf], json: bool, asked: bool) -> Result<Exit> {
     let search = SearchPath::standard(module_path, Path::new("."));
-    if name.is_none() && !json {
-        return Ok(listing(&search));
-    }
-    if let (Some(name), false, false) = (name, json, asked) {
-        return shown(name, &search, module_path);
+    let whole =
+        name.is_some_and(|name| is_path(name) || listed_modules(&search).iter().any(|m| m.name == name));
+    if !json && !asked {
+        return match name {
+            Some(name) if whole => shown(name, &search, module_path),
+            part => listing(part, &search),
+        };
     }
     let mut found = match name {
         Some(path) if is_path(path) => vec![available(listed_file(Path::new(path)).map_err(wrong)?)],
         _ => available_modules(&search),
     };
-    found.retain(|m| name.is_none_or(|n| n == m.name || is_path(n)));
+    found.retain(|m| name.is_none_or(|n| is_path(n) || if whole { n == m.name } else { fits(n, &m.name) }));
     if let (Some(name), true) = (name, found.is_empty()) {
         return Err(unknown(name, &search));
     }
@@ -164,10 +166,15 @@ fn available(file: ListedModule) -> AvailableModule {
     AvailableModule { name: file.name, path: file.path, schema }
 }
 
-/// Says every folder that was searched, and the nearest name.
+/// Says the nearest name, and where none is near every folder that was searched.
 fn unknown(name: &str, search: &SearchPath) -> terraglue::Error {
+    let names: Vec<String> =
+        listed_modules(search).into_iter().filter(|m| m.hidden_by.is_none()).map(|m| m.name).collect();
+    if let Some(near) = did_you_mean(name, names.iter().map(String::as_str)) {
+        return InputError::plain(format!("no module matches `{name}`"), Some(near)).into();
+    }
     let unknown = Library::new().find(name, search, Path::new("."));
-    let told = unknown.err().map_or_else(|| format!("no module `{name}`"), |e| e.to_string());
+    let told = unknown.err().map_or_else(|| format!("no module matches `{name}`"), |e| e.to_string());
     InputError::plain(told, None).into()
 }
 
@@ -229,10 +236,17 @@ fn parameters(name: &str, module_path: &[PathBuf]) {
     }
 }
 
-/// One line per file, from the section of the library: no code of it runs.
-fn listing(search: &SearchPath) -> Exit {
-    let mut table = show::table(&["module", "kind", "version", "ABI", "licence", "file", "last check", ""]);
-    let found = listed_modules(search);
+/// One line per file, all or those whose names fit, from the section of the library: no code of it runs.
+fn listing(part: Option<&str>, search: &SearchPath) -> Result<Exit> {
+    let heads = ["module", "kind", "version", "ABI", "licence", "file", "last check", ""];
+    let mut table = show::listing(&heads);
+    let mut found = listed_modules(search);
+    if let Some(part) = part {
+        found.retain(|m| fits(part, &m.name));
+        if found.is_empty() {
+            return Err(unknown(part, search));
+        }
+    }
     for m in &found {
         let described = m.description.clone().unwrap_or_default();
         let note = match (&m.refused, &m.hidden_by) {
@@ -255,9 +269,9 @@ fn listing(search: &SearchPath) -> Exit {
             folders.concat()
         );
     } else {
-        outln!("{table}\n`terraglue modules NAME` shows what a module takes.");
+        outln!("{}\n`terraglue modules NAME` shows what a module takes.", table.trim_fmt());
     }
-    Exit::Done
+    Ok(Exit::Done)
 }
 
 /// What a check said, and with which version of the program.

@@ -18,7 +18,8 @@ pub fn bar(steps: u64, quiet: bool) -> ProgressBar {
 /// Moves a bar along with a run.
 pub struct Progress {
     bar: ProgressBar,
-    started: Instant,
+    /// When the first step was done, and its time, s.
+    since: Option<(Instant, f64)>,
     duration_s: f64,
     label: String,
 }
@@ -26,16 +27,17 @@ pub struct Progress {
 impl Progress {
     /// Follows a run of `duration_s` seconds; `label` stands before the time.
     pub fn new(bar: ProgressBar, duration_s: f64, label: &str) -> Self {
-        Self { bar, started: Instant::now(), duration_s, label: label.into() }
+        Self { bar, since: None, duration_s, label: label.into() }
     }
 }
 
 impl Observer for Progress {
     fn stepped(&mut self, view: &View) -> Result {
         self.bar.inc(1);
+        let (start, from_s) = *self.since.get_or_insert_with(|| (Instant::now(), view.t_s));
         // Text only now and then: the bar itself draws at a bounded rate.
         if view.step_index.is_multiple_of(50) && !self.bar.is_hidden() {
-            let factor = view.t_s / self.started.elapsed().as_secs_f64().max(1e-9);
+            let factor = (view.t_s - from_s) / start.elapsed().as_secs_f64().max(1e-9);
             let text = format!(
                 "{}t = {:.2} of {} s, {factor:.1} × real time",
                 self.label, view.t_s, self.duration_s

@@ -1,7 +1,7 @@
-//! `terraglue run`: one scenario from file to report.
+//! `terraglue run`: one scenario from file to report, from its start or from a checkpoint.
 
 use super::arguments::{RunArguments, RunCommand};
-use super::folder::results_folder;
+use super::folder::{free, results_folder};
 use super::interrupt::Interrupt;
 use super::output::outln;
 use super::pace::Pace;
@@ -12,6 +12,7 @@ use std::path::Path;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
+use terraglue::checkpoint::{Checkpoint, Keeper, Resumed, require_states};
 use terraglue::host::Surroundings;
 use terraglue::observer::Observer;
 use terraglue::recording::{
@@ -49,18 +50,38 @@ impl Outcome {
 pub fn run(command: &RunCommand) -> Result<Exit> {
     let arguments = &command.run;
     let interrupt = Interrupt::listen();
-    let scenario = strict::load(&arguments.scenario, &arguments.sets(), command.strict)?;
-    soil_module::check(&scenario, &arguments.scenario)?;
-    let options = options(arguments, &interrupt.flag());
-    let testbed = build(&scenario, &options)?;
+    let mut options = options(arguments, &interrupt.flag());
+    let checkpoint = command.resume.as_deref().map(|folder| resumable(folder, &mut options)).transpose()?;
+    let scenario = match &checkpoint {
+        Some(checkpoint) => checkpoint.scenario()?,
+        None => strict::load(&arguments.scenario, &arguments.sets(), command.strict)?,
+    };
+    match &checkpoint {
+        Some(checkpoint) => checkpoint.check(&scenario, &options)?,
+        None => soil_module::check(&scenario, &arguments.scenario)?,
+    }
+    let mut testbed = build(&scenario, &options)?;
     let mut reloader = reloader(command, &scenario, &options)?;
     if command.explain {
         say(arguments, &testbed.explain().text(&scenario));
     }
+    let kept = checkpoint.as_ref().map(Checkpoint::kept);
+    let (every_s, csv) =
+        (command.checkpoint_every.or(kept.map(|k| k.0)), kept.map_or(arguments.csv, |k| k.1));
+    if every_s.is_some() {
+        require_states(&testbed)?;
+    }
     interrupt.run();
-    let folder = results_folder(arguments.out.as_deref(), &scenario.name)?;
+    let folder = match &command.resume {
+        Some(folder) => folder.clone(),
+        None => results_folder(arguments.out.as_deref(), &scenario.name)?,
+    };
+    let keeper =
+        every_s.map(|every_s| Keeper::new(&folder, &scenario, &options, (every_s, csv))).transpose()?;
+    let resumed = checkpoint.map(|checkpoint| checkpoint.restore(&mut testbed)).transpose()?;
     let steps = (scenario.time.duration_s / scenario.time.step_s).round() as u64;
     let bar = progress::bar(steps, arguments.quiet);
+    bar.inc(testbed.step_index());
     let mut progress = Progress::new(bar.clone(), scenario.time.duration_s, "");
     let mut paced;
     let mut observer: &mut dyn Observer = &mut progress;
@@ -68,13 +89,17 @@ pub fn run(command: &RunCommand) -> Result<Exit> {
         paced = Pace::new(observer, interrupt.flag());
         observer = &mut paced;
     }
-    let outcome = run_testbed(testbed, reloader.as_mut(), &scenario, &folder, arguments.csv, observer)?;
+    let records = Records { scenario: &scenario, folder: &folder, csv, keeper, resumed };
+    let outcome = run_testbed(testbed, reloader.as_mut(), records, observer)?;
     bar.finish_and_clear();
     let report = recording::report::write(&folder);
     if command.explain {
         say(arguments, &show::costs(&outcome.costs, outcome.summary.steps).to_string());
     }
     print(arguments, &outcome, report.as_deref().ok())?;
+    if every_s.is_some() && outcome.summary.status == Status::Stopped && !arguments.quiet {
+        eprintln!("`terraglue run --resume {}` goes on from here", folder.display());
+    }
     match (report, &outcome.error) {
         (Err(missing), None) => Err(missing),
         (Err(missing), Some(_)) => {
@@ -83,6 +108,14 @@ pub fn run(command: &RunCommand) -> Result<Exit> {
         }
         (Ok(_), _) => Ok(outcome.exit()),
     }
+}
+
+/// The checkpoint of a folder in which no run goes on; its modules are searched where they were.
+fn resumable(folder: &Path, options: &mut Options) -> Result<Checkpoint> {
+    free(folder)?;
+    let checkpoint = Checkpoint::read(folder)?;
+    options.module_paths.extend(checkpoint.module_paths());
+    Ok(checkpoint)
 }
 
 /// To standard output, or beside it where that is JSON.
@@ -143,35 +176,67 @@ fn set_back(surroundings: &Surroundings) {
     }
 }
 
-/// Steps a testbed to the end of its scenario and records it into `folder`.
+/// What a run is recorded into, and from where on.
+pub struct Records<'a> {
+    /// The scenario.
+    pub scenario: &'a Scenario,
+    /// Folder for the results.
+    pub folder: &'a Path,
+    /// Whether `variables.csv` is written.
+    pub csv: bool,
+    /// What writes checkpoints, where they are asked for.
+    pub keeper: Option<Keeper>,
+    /// Where the run stood, if it goes on; the testbed is there already.
+    pub resumed: Option<Resumed>,
+}
+
+/// Steps a testbed to the end of its scenario and records it.
 pub fn run_testbed(
     testbed: Testbed,
     reloader: Option<&mut Reloader>,
-    scenario: &Scenario,
-    folder: &Path,
-    csv: bool,
+    records: Records,
     progress: &mut dyn Observer,
 ) -> Result<Outcome> {
-    let mut recorder = SharedRecorder::new(Recorder::create(folder, scenario, RecorderOptions { csv })?);
+    let Records { scenario, folder, csv, mut keeper, resumed } = records;
+    let goes_on = resumed.is_some();
+    let mut clock = RunClock::default();
+    let recorder = match resumed {
+        None => {
+            let options = RecorderOptions { csv, checkpoints: keeper.is_some() };
+            Recorder::create(folder, scenario, options)?
+        }
+        Some(mut resumed) => {
+            clock.before = std::mem::take(&mut resumed.timing);
+            resumed.recorder(folder, scenario, &testbed)?
+        }
+    };
+    let mut recorder = SharedRecorder::new(recorder);
     let will = recorder.will(scenario, folder);
     // an error below drops the testbed, and with it what modules do at their end, before the will
     let mut testbed = testbed;
     let surroundings = Surroundings::now();
     let begun = testbed.begin();
-    let begun = begun.and_then(|()| testbed.view(|view| recorder.started(view)));
+    let begun = match goes_on {
+        true => begun,
+        false => begun.and_then(|()| testbed.view(|view| recorder.started(view))),
+    };
     let begun = begun.and_then(|()| write_exchange(folder, &testbed.explain()));
-    let (wall, cpu) = (Instant::now(), cpu_s());
+    clock.start();
     let until_s = scenario.time.duration_s;
     let ran = match (begun, reloader) {
         (Err(error), _) => Err(error),
-        (_, None) => testbed.run_until(until_s, &mut [&mut recorder, progress]),
+        (_, None) => {
+            let keeping = (keeper.as_mut(), &clock);
+            step_and_keep(&mut testbed, until_s, (&mut recorder, progress), keeping)
+        }
         (_, Some(reloader)) => reloader.run_until(&mut testbed, until_s, &mut [&mut recorder, progress]),
     };
-    let (wall_s, cpu_s) = (wall.elapsed().as_secs_f64(), cpu_s() - cpu);
+    let timing = clock.rows(&testbed);
+    let (wall_s, cpu_s) = whole(&timing);
     let error = ran.err();
     set_back(&surroundings);
     let finished = testbed.view(|view| recorder.finished(view, error.as_ref()));
-    let timed = write_timing(folder, &timing_rows(&testbed, wall_s, cpu_s));
+    let timed = write_timing(folder, &timing);
     let error = error.or(finished.err()).or(timed.err());
     let parts_s = parts_s(&testbed, wall_s);
     let costs = testbed.costs().map(|(name, s)| (name.to_owned(), s)).collect();
@@ -186,6 +251,9 @@ pub fn run_testbed(
     };
     drop(will);
     let summary = recorder.lock().finish(wall_s, cpu_s, error.as_ref(), status)?;
+    if summary.status == Status::Done {
+        keeper.iter().for_each(Keeper::remove);
+    }
     Ok(Outcome { summary, error, parts_s, costs })
 }
 
@@ -200,15 +268,66 @@ fn parts_s(testbed: &Testbed, wall_s: f64) -> [f64; 3] {
     [exchange, jacobian, (wall_s - exchange - jacobian).max(0.0)].map(|s| s / steps)
 }
 
-/// The parts of a step, and all of them together.
-fn timing_rows(testbed: &Testbed, wall_s: f64, cpu_s: f64) -> Vec<TimingRow> {
-    let steps = testbed.step_index();
-    let timings = testbed.timings();
-    let parts = timings.rows().map(|(section, wall_s)| (section, wall_s, None));
-    let all = parts.chain([("step loop with recording", wall_s, Some(cpu_s))]);
-    let all = all.map(|(section, wall_s, cpu_s)| (section.to_owned(), wall_s, cpu_s));
-    let own = testbed.costs().map(|(name, wall_s)| (format!("subsystem {name}"), wall_s, None));
-    all.chain(own).map(|(section, wall_s, cpu_s)| TimingRow { section, wall_s, cpu_s, steps }).collect()
+/// Steps up to a time; where checkpoints are wanted, with one at each of their times and one where a run is stopped.
+fn step_and_keep(
+    testbed: &mut Testbed,
+    until_s: f64,
+    (recorder, progress): (&mut SharedRecorder, &mut dyn Observer),
+    (keeper, clock): (Option<&mut Keeper>, &RunClock),
+) -> Result {
+    let Some(keeper) = keeper else { return testbed.run_until(until_s, &mut [recorder, progress]) };
+    loop {
+        let pause_s = keeper.next_s(testbed.t_s()).min(until_s);
+        testbed.run_until(pause_s, &mut [recorder, progress])?;
+        // nothing is left to go on with; a run has at most 1e9 steps
+        if testbed.t_s() >= until_s * (1.0 - 1e-10) {
+            return Ok(());
+        }
+        keeper.keep(testbed, &mut recorder.lock(), clock.rows(testbed))?;
+        if testbed.cancelled() {
+            return Ok(());
+        }
+    }
+}
+
+/// Section of the whole loop in `timing.csv`.
+const LOOP: &str = "step loop with recording";
+
+/// Times the step loop of a run, with what earlier processes have spent on it.
+#[derive(Default)]
+struct RunClock {
+    started: Option<(Instant, f64)>,
+    before: Vec<TimingRow>,
+}
+
+impl RunClock {
+    fn start(&mut self) {
+        self.started = Some((Instant::now(), cpu_s()));
+    }
+
+    /// The parts of a step, and all of them together.
+    fn rows(&self, testbed: &Testbed) -> Vec<TimingRow> {
+        let steps = testbed.step_index();
+        let timings = testbed.timings();
+        let (wall_s, cpu_s) =
+            self.started.map_or((0.0, 0.0), |(wall, cpu)| (wall.elapsed().as_secs_f64(), cpu_s() - cpu));
+        let parts = timings.rows().map(|(section, wall_s)| (section, wall_s, None));
+        let all = parts.chain([(LOOP, wall_s, Some(cpu_s))]);
+        let all = all.map(|(section, wall_s, cpu_s)| (section.to_owned(), wall_s, cpu_s));
+        let own = testbed.costs().map(|(name, wall_s)| (format!("subsystem {name}"), wall_s, None));
+        let row = |(section, wall_s, cpu_s): (String, f64, Option<f64>)| {
+            let before = self.before.iter().find(|row| row.section == section);
+            let [more, more_cpu] = before.map_or([0.0; 2], |row| [row.wall_s, row.cpu_s.unwrap_or_default()]);
+            TimingRow { section, wall_s: wall_s + more, cpu_s: cpu_s.map(|own| own + more_cpu), steps }
+        };
+        all.chain(own).map(row).collect()
+    }
+}
+
+/// Wall and CPU time of the whole loop, s.
+fn whole(timing: &[TimingRow]) -> (f64, f64) {
+    let row = timing.iter().find(|row| row.section == LOOP);
+    row.map_or((0.0, 0.0), |row| (row.wall_s, row.cpu_s.unwrap_or_default()))
 }
 
 fn print(arguments: &RunArguments, outcome: &Outcome, report: Option<&Path>) -> Result {

@@ -4,7 +4,7 @@ use super::shorten;
 use comfy_table::{Cell, Color, ContentArrangement, Table, presets};
 use miette::{GraphicalReportHandler, GraphicalTheme};
 use terraglue::Error;
-use terraglue::recording::{Energies, Summary};
+use terraglue::recording::{Energies, PrintDepth, Summary};
 use terraglue::scenario::InputError;
 
 /// An error on standard error; wrong input with file, line and the offending text.
@@ -47,6 +47,21 @@ pub fn table(headers: &[&str]) -> Table {
     table
 }
 
+/// The same table without lines between its columns.
+pub fn plain(mut table: Table) -> Table {
+    table.load_preset(presets::NOTHING);
+    table
+}
+
+/// A table for people at a terminal; for other programs plain columns, one row to a line.
+pub fn listing(headers: &[&str]) -> Table {
+    let table = table(headers);
+    match table.is_tty() {
+        true => table,
+        false => plain(table),
+    }
+}
+
 /// What each subsystem cost.
 pub fn costs(costs: &[(String, f64)], steps: u64) -> Table {
     let mut t = table(&["subsystem", "wall time", "per step"]);
@@ -66,14 +81,29 @@ pub fn summary(s: &Summary) -> Table {
     row("gluing", format!("{} ({})", s.strategy, s.form));
     row("soil", s.soil_module.clone().unwrap_or_else(|| "none".into()));
     row("simulated", format!("{:.3} s in {} steps", s.simulated_s, s.steps));
-    row("real-time factor", format!("{:.2} ({:.2} s of wall time)", s.real_time_factor, s.wall_s));
     row("distance", distance(s));
+    row("energy per metre", both(s.electrical_energy_j_per_m, s.energy_j_per_m, |e| format!("{e:.1} J/m")));
+    row(
+        "cost of transport",
+        both(s.electrical_cost_of_transport, s.cost_of_transport, |c| format!("{c:.2}")),
+    );
+    let balance = Cell::new(drift(&s.energies));
+    t.add_row([
+        Cell::new("energy balance"),
+        if s.energies.is_off() { balance.fg(Color::Red) } else { balance },
+    ]);
+    let mut row = |name: &str, value: String| {
+        t.add_row([name.to_owned(), value]);
+    };
+    row("depth of the prints", s.print_depth.as_ref().map_or_else(none, prints));
+    row("peak force", s.peak_force_over_weight.map_or_else(none, |f| format!("{f:.2} × the weight")));
+    row("real-time factor", format!("{:.2} ({:.2} s of wall time)", s.real_time_factor, s.wall_s));
     row("height gained", s.height_gained_m.map_or_else(none, |h| format!("{:+.1} mm{}", 1e3 * h, stall(s))));
     row("largest roll, pitch", format!("{}, {}", degrees(s.max_roll_rad), degrees(s.max_pitch_rad)));
-    row("largest sinkage", s.max_sinkage_m.map_or_else(none, |z| format!("{:.1} mm", 1e3 * z)));
-    row("energy at the motors", format!("{:.1} J", s.energy_j));
-    row("electrical energy", electrical(s));
-    row("cost of transport", s.cost_of_transport.map_or_else(none, |c| format!("{c:.2}")));
+    row("work of the motors", work(&s.energies));
+    if let Some(electrical_j) = s.electrical_energy_j.filter(|e| *e > 0.0) {
+        row("electrical energy", format!("{electrical_j:.1} J"));
+    }
     row(
         "evaluations of the bodies",
         format!("{:.2} mean, {} at most", s.evaluations_mean, s.evaluations_max),
@@ -85,11 +115,6 @@ pub fn summary(s: &Summary) -> Table {
     let error = s.interface_work_error_j;
     row("interface work error", error.map_or_else(|| "unknown".into(), |e| format!("{e:.2e} J")));
     row("error of the soil's mass", s.soil_mass_error_relative.map_or_else(none, |e| format!("{e:.1e}")));
-    let drift = Cell::new(drift(&s.energies));
-    t.add_row([
-        Cell::new("drift of the energy book"),
-        if s.energies.is_off() { drift.fg(Color::Red) } else { drift },
-    ]);
     t
 }
 
@@ -105,9 +130,21 @@ fn drift(e: &Energies) -> String {
     format!("{drift_j:+.2e} J{share}{beyond}")
 }
 
-fn electrical(s: &Summary) -> String {
-    let per_metre = s.electrical_energy_j_per_m.map_or_else(String::new, |e| format!(", {e:.1} J/m"));
-    s.electrical_energy_j.map_or_else(|| "unknown".into(), |e| format!("{e:.1} J{per_metre}"))
+/// Electrical energy where a drive with losses says it, and the work of the motors.
+fn both(electrical: Option<f64>, mechanical: Option<f64>, show: fn(f64) -> String) -> String {
+    let part = |value: Option<f64>, what| Some(format!("{} {what}", show(value.filter(|e| *e > 0.0)?)));
+    let all = [part(electrical, "electrical"), part(mechanical, "by the work of the motors")];
+    let all: Vec<String> = all.into_iter().flatten().collect();
+    if all.is_empty() { none() } else { all.join(", ") }
+}
+
+fn work(e: &Energies) -> String {
+    format!("{:.1} J driving, {:.1} J braking", e.driving_j, e.braking_j)
+}
+
+fn prints(p: &PrintDepth) -> String {
+    let [median, low, high] = [p.median_m, p.p10_m, p.p90_m].map(|z| 1e3 * z);
+    format!("{median:.0} mm (median of {}; 10 % to 90 %: {low:.0} mm to {high:.0} mm)", p.count)
 }
 
 fn stall(s: &Summary) -> String {
@@ -127,7 +164,7 @@ fn degrees(angle: Option<f64>) -> String {
 fn distance(s: &Summary) -> String {
     match (s.distance_m, s.commanded_distance_m) {
         (Some(d), Some(c)) if c.abs() > 1e-9 => {
-            format!("{d:.3} m of {c:.3} m commanded ({:.0} %)", 100.0 * d / c)
+            format!("{d:.3} m of {c:.3} m asked for ({:.0} %)", 100.0 * d / c)
         }
         (Some(d), _) => format!("{d:.3} m"),
         _ => none(),
@@ -140,7 +177,7 @@ mod tests {
     use terraglue::scenario::Scenario;
 
     #[test]
-    fn the_table_shows_the_drift_of_the_energy_book() {
+    fn the_table_shows_the_energy_balance() {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../scenarios/plate_sinkage.toml");
         let scenario = Scenario::load(path.as_ref(), &[]).expect("good");
         let mut summary = SummaryObserver::new(&scenario).summary(1.0, 1.0, None, Status::Done);
@@ -148,11 +185,7 @@ mod tests {
         summary.energies.by_ports = false;
         let line = |s: &Summary| {
             let table = super::summary(s).to_string();
-            table
-                .lines()
-                .filter(|l| l.contains("drift of the energy book"))
-                .map(str::to_owned)
-                .collect::<String>()
+            table.lines().filter(|l| l.contains("energy balance")).map(str::to_owned).collect::<String>()
         };
         let text = line(&summary);
         assert!(

@@ -40,7 +40,7 @@ pub fn soils(name: Option<&str>, file: Option<&Path>) -> Result<Exit> {
 }
 
 fn all(soils: &SoilTable) {
-    let mut table = show::table(&[
+    let mut table = show::listing(&[
         "soil",
         "n",
         "k_c",
@@ -52,7 +52,7 @@ fn all(soils: &SoilTable) {
         "source",
         "confidence",
     ]);
-    let mut refused = show::table(&["refused", "reason"]);
+    let mut refused = show::listing(&["refused", "reason"]);
     for row in &soils.rows {
         if let Some(reason) = &row.refused {
             refused.add_row([&row.name, reason]);
@@ -62,19 +62,19 @@ fn all(soils: &SoilTable) {
         let name = std::iter::once(row.name.clone());
         table.add_row(name.chain(cells).chain([row.source.clone(), row.confidence.clone()]));
     }
-    outln!("{table}");
+    outln!("{}", table.trim_fmt());
     if refused.row_count() > 0 {
-        outln!("{refused}");
+        outln!("{}", refused.trim_fmt());
     }
 }
 
 fn one(row: &SoilRow) {
-    let mut table = show::table(&[row.name.as_str(), "value", "unit"]);
+    let mut table = show::listing(&[row.name.as_str(), "value", "unit"]);
     for ((column, value), unit) in COLUMNS.iter().zip(&row.values).zip(UNITS) {
         let value = value.map_or_else(|| "–".to_owned(), |x| x.to_string());
         table.add_row([(*column).to_owned(), value, unit.to_owned()]);
     }
-    outln!("{table}");
+    outln!("{}", table.trim_fmt());
     outln!("source: {}\nconfidence: {}", row.source, row.confidence);
     match &row.refused {
         Some(reason) => outln!("refused as it stands: {reason}"),

@@ -46,7 +46,10 @@ pub struct ContactDetector {
     bodies: Vec<Bodies>,
     grounds: Vec<Ground>,
     set: PortSet,
+    /// Key and mask of the ports that were found last.
     before: Vec<(u64, u32)>,
+    /// The highest epoch so far: none comes again for another set.
+    highest: u32,
     buried: Option<String>,
 }
 
@@ -74,6 +77,7 @@ impl ContactDetector {
             grounds: grounds.collect::<Result<_>>()?,
             set: PortSet::default(),
             before: Vec::new(),
+            highest: 0,
             buried: None,
         })
     }
@@ -100,8 +104,6 @@ impl ContactDetector {
         states: impl Fn(u32) -> &'a [BodyState],
         ground: impl Fn(u32) -> &'a dyn Subsystem,
     ) -> Result<&PortSet> {
-        self.before.clear();
-        self.before.extend(self.set.ports.iter().map(|p| (p.key, p.mask)));
         self.set.ports.clear();
         self.set.nodes.clear();
         self.set.owners.clear();
@@ -130,10 +132,28 @@ impl ContactDetector {
             first += port.mask.count_ones();
         }
         self.set.n = first;
-        let same = self.before.iter().copied().eq(self.set.ports.iter().map(|p| (p.key, p.mask)));
-        if !same {
-            self.set.epoch += 1;
+        let found = self.set.ports.iter().map(|p| (p.key, p.mask));
+        if !self.before.iter().copied().eq(found.clone()) {
+            self.highest += 1;
+            self.set.epoch = self.highest;
+            self.before.clear();
+            self.before.extend(found);
         }
+    }
+
+    /// For a snapshot: the set of ports that was found last, by which strategies know what still holds.
+    pub fn remember(&self) -> Vec<u64> {
+        let ports = self.before.iter().flat_map(|(key, mask)| [*key, u64::from(*mask)]);
+        std::iter::once(u64::from(self.set.epoch)).chain(ports).collect()
+    }
+
+    /// Back to a snapshot.
+    pub fn recall(&mut self, kept: &[u64]) {
+        let Some((epoch, ports)) = kept.split_first() else { return };
+        self.set.epoch = *epoch as u32;
+        self.highest = self.highest.max(self.set.epoch);
+        self.before.clear();
+        self.before.extend(ports.chunks_exact(2).map(|port| (port[0], port[1] as u32)));
     }
 }
 

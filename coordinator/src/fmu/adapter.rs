@@ -397,7 +397,8 @@ impl Subsystem for FmuSubsystem {
         } else {
             Capabilities::default()
         };
-        let bytes = if c.serialize { Capabilities::SERIALIZE } else { Capabilities::default() };
+        let bytes =
+            if c.serialize && !self.clocks { Capabilities::SERIALIZE } else { Capabilities::default() };
         let force = if self.bodies.is_empty() { Capabilities::default() } else { Capabilities::FORCE };
         let through = if self.feeds_through { Capabilities::FEEDTHROUGH } else { Capabilities::default() };
         let fixed = if c.variable_step { Capabilities::default() } else { Capabilities::FIXED_STEP };
@@ -476,14 +477,21 @@ impl Subsystem for FmuSubsystem {
         self.slave.save(&mut state).map_err(error)?;
         let bytes = self.slave.serialize(&state).map_err(error);
         self.slave.release(&mut state).map_err(error)?;
-        bytes
+        // whether it is initialised is the host's to know
+        Ok([&[u8::from(self.running)], bytes?.as_slice()].concat())
     }
 
     fn deserialize(&mut self, bytes: &[u8]) -> Result {
+        let wrong = || Error::Refused("these bytes are no state of a unit".into());
+        let (running, bytes) = bytes.split_first().filter(|(running, _)| **running <= 1).ok_or_else(wrong)?;
         let mut state = SlaveState::default();
         self.slave.deserialize(bytes, &mut state).map_err(error)?;
+        if *running == 1 && !self.running {
+            self.slave.exit_initialization().map_err(error)?;
+        }
         let done = self.slave.restore(&state).map_err(error);
         self.slave.release(&mut state).map_err(error)?;
+        (self.running, self.open) = (*running == 1, false);
         done
     }
 

@@ -1,5 +1,6 @@
 //! Displacement, attitude and progress of the reported body.
 
+use crate::gluing::PortReport;
 use crate::observer::View;
 use crate::recording::summary::Stall;
 use terraglue_subsystem::{Kind, Pose};
@@ -19,8 +20,10 @@ pub(crate) struct BodyTrack {
     heading: [f64; 2],
     now: Sample,
     samples: Vec<Sample>,
-    height_m: f64,
-    before: [f64; 3],
+    /// Against gravity, of length 1; none without gravity.
+    up: Option<[f64; 3]>,
+    now_at: [f64; 3],
+    peak_n: f64,
     /// Length of the way of its origin, m.
     pub path_m: f64,
     /// Mass of its whole subsystem, kg.
@@ -41,9 +44,27 @@ struct Sample {
     position: [f64; 2],
 }
 
+terraglue_subsystem::persist!(Sample { t_s, distance_m, commanded_m, position });
+terraglue_subsystem::persist!(BodyTrack {
+    subsystem,
+    body,
+    start,
+    heading,
+    now,
+    samples,
+    up,
+    now_at,
+    peak_n,
+    path_m,
+    mass_kg,
+    distance_m,
+    max_roll_rad,
+    max_pitch_rad,
+});
+
 impl BodyTrack {
-    /// The body of that name, see [`find_body`]; `None` when there is none.
-    pub fn find(view: &View, name: Option<&str>) -> Option<Self> {
+    /// The body of that name, see [`find_body`]; `None` when there is none. `gravity_m_s2` says where up is.
+    pub fn find(view: &View, name: Option<&str>, gravity_m_s2: &[f64; 3]) -> Option<Self> {
         let (subsystem, body) = find_body(view, name)?;
         let s = &view.subsystems[subsystem];
         let pose = &s.body_states.get(body)?.world_from_body;
@@ -55,8 +76,9 @@ impl BodyTrack {
             heading: [libm::cos(yaw), libm::sin(yaw)],
             now: Sample::default(),
             samples: Vec::new(),
-            height_m: pose.position[2],
-            before: pose.position,
+            up: up(gravity_m_s2),
+            now_at: pose.position,
+            peak_n: 0.0,
             path_m: 0.0,
             mass_kg: s.scene.bodies.iter().map(|b| b.mass).sum(),
             distance_m: 0.0,
@@ -73,10 +95,10 @@ impl BodyTrack {
         };
         let moved = [position[0] - self.start[0], position[1] - self.start[1]];
         self.distance_m = moved[0] * self.heading[0] + moved[1] * self.heading[1];
-        self.height_m = position[2];
-        let step = [0, 1, 2].map(|k| position[k] - self.before[k]);
+        let step = [0, 1, 2].map(|k| position[k] - self.now_at[k]);
         self.path_m += (step[0] * step[0] + step[1] * step[1] + step[2] * step[2]).sqrt();
-        self.before = position;
+        self.now_at = position;
+        self.follow_force(view);
         let [roll, pitch, _] = roll_pitch_yaw(&orientation);
         self.max_roll_rad = self.max_roll_rad.max(roll.abs());
         self.max_pitch_rad = self.max_pitch_rad.max(pitch.abs());
@@ -91,9 +113,25 @@ impl BodyTrack {
         }
     }
 
-    /// Height at the end above that at the start, m.
-    pub fn height_gained_m(&self) -> f64 {
-        self.height_m - self.start[2]
+    /// Height at the end above that at the start, against gravity, m.
+    pub fn height_gained_m(&self) -> Option<f64> {
+        let up = self.up?;
+        Some((0..3).map(|k| (self.now_at[k] - self.start[k]) * up[k]).sum())
+    }
+
+    /// All that the ground bears of the robot in this step.
+    fn follow_force(&mut self, view: &View) {
+        let own = |p: &&PortReport| p.subsystem as usize == self.subsystem && p.wrench[0] > 0.0;
+        // a joint to another subsystem is no ground
+        if !view.gluing.joints {
+            let sum = view.gluing.ports.iter().filter(own).map(|p| p.wrench[0]).sum();
+            self.peak_n = self.peak_n.max(sum);
+        }
+    }
+
+    /// Largest normal force of the ground on its whole subsystem, N; none where nothing ever pressed.
+    pub fn peak_n(&self) -> Option<f64> {
+        (self.peak_n > 0.0).then_some(self.peak_n)
     }
 
     /// Since when and where the body has not come on, at the end of the run.
@@ -108,6 +146,12 @@ impl BodyTrack {
         let since = self.samples.iter().find(stands)?;
         Some(Stall { t_s: since.t_s, x_m: since.position[0], y_m: since.position[1] })
     }
+}
+
+/// Against gravity, of length 1.
+fn up(gravity: &[f64; 3]) -> Option<[f64; 3]> {
+    let g = gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
+    (g > 0.0).then(|| gravity.map(|x| -x / g))
 }
 
 /// Roll, pitch and yaw (z-y-x Euler angles, rad) of a unit quaternion w, x, y, z.

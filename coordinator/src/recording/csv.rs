@@ -27,6 +27,19 @@ impl VariablesCsv {
         Ok(Self { path, rows, number: Vec::new() })
     }
 
+    /// Goes on behind the first `length` bytes of the table of an earlier process.
+    pub fn go_on(folder: &Path, length: u64) -> Result<Self> {
+        let path = folder.join(VARIABLES);
+        let rows = csv::Writer::from_writer(KeptFile::go_on(&path, length).map_err(at(&path))?);
+        Ok(Self { path, rows, number: Vec::new() })
+    }
+
+    /// Hands everything to the operating system; the length of the table, bytes.
+    pub fn length(&mut self) -> Result<u64> {
+        self.flush()?;
+        Ok(std::fs::metadata(&self.path).map_err(at(&self.path))?.len())
+    }
+
     /// One row.
     pub fn row(&mut self, t_s: f64, snapshot: &Snapshot) -> Result {
         self.write(t_s, snapshot).map_err(|e| failed_at(&self.path, e))

@@ -2,6 +2,7 @@
 
 use crate::gluing::StepReport;
 use crate::observer::{View, book_of};
+use crate::recording::motor_work::MotorWork;
 use serde::{Deserialize, Serialize};
 use terraglue_subsystem::Kind;
 
@@ -15,6 +16,12 @@ const ROUNDING_J: f64 = 1e-9;
 pub struct Energies {
     /// Net mechanical work of the motors and of loads from outside, J.
     pub work_j: Option<f64>,
+    /// Work of the motors that pushed their joints the way these went, J.
+    #[serde(default)]
+    pub driving_j: f64,
+    /// Work that motors took out where they held their joints back, J; ≥ 0.
+    #[serde(default)]
+    pub braking_j: f64,
     /// Change of the kinetic energy since the start, J.
     pub kinetic_change_j: Option<f64>,
     /// Change of the potential energy since the start, J: weight and springs of bodies, springs of the glue, elastic
@@ -96,6 +103,17 @@ pub(crate) struct EnergyTrack {
     without_book: Vec<String>,
 }
 
+terraglue_subsystem::persist!(Books { kinetic, potential, soil_heat, heat, work });
+terraglue_subsystem::persist!(EnergyTrack {
+    ends,
+    has_soil,
+    glue_stored_j,
+    glue_heat_j,
+    work_path_j,
+    port_path_j,
+    without_book,
+});
+
 impl EnergyTrack {
     /// At the start.
     pub fn start(&mut self, view: &View) {
@@ -122,11 +140,13 @@ impl EnergyTrack {
         self.port_path_j += glued.port_work_path_j;
     }
 
-    /// The figures so far; `motors_j` is Σ |τ·ω|·h of the joints that show both, J.
-    pub fn figures(&self, motors_j: f64) -> Energies {
-        let driven = motors_j.max(self.work_path_j);
+    /// The figures so far, with the work of the motors of the same run.
+    pub fn figures(&self, motors: &MotorWork) -> Energies {
+        let driven = motors.both_j().max(self.work_path_j);
         let by_ports = driven <= 0.0;
         let base = Energies {
+            driving_j: motors.driving_j,
+            braking_j: motors.braking_j,
             turnover_j: if by_ports { self.port_path_j } else { driven },
             by_ports,
             without_book: self.without_book.clone(),

@@ -290,6 +290,7 @@ impl From<PortMessage> for PortRecord {
             origin: Point { x: axis(0), y: axis(1), z: axis(2) },
             subsystem: m.subsystem,
             body: m.body,
+            shape: m.shape,
             frame: m.frame,
             wrench: m.wrench,
             t_star_n: m.t_star_n,

@@ -2,6 +2,7 @@
 
 use crate::error::Result;
 use crate::observer::{SubsystemView, View};
+use crate::recording::keep::keep;
 use crate::recording::snapshot::failed;
 use terraglue_subsystem::{FieldInfo, FieldTile};
 
@@ -25,6 +26,9 @@ impl Rectangle {
         }
     }
 }
+
+// Another process counts generations afresh; `unseen` says what is left of them.
+keep!(GroundGrid { initial } parts {} same { subsystem, info, height, sinkage, generations });
 
 /// The fields `height` and `sinkage` of a soil. Where a soil shows no `sinkage`, it is the initial height minus
 /// the current one.
@@ -84,6 +88,22 @@ impl GroundGrid {
             }
         }
         Ok(changed)
+    }
+
+    /// The tiles of the soil that changed since the last call of [`GroundGrid::changed`].
+    pub fn unseen(&self, soil: &SubsystemView, t_s: f64) -> Result<Vec<bool>> {
+        let tiles_x = self.info.size[0].div_ceil(self.info.tile_edge);
+        let unseen = |(k, seen): (usize, &u64)| {
+            let tile = soil.instance.field_tile(self.height, k as u32 % tiles_x, k as u32 / tiles_x);
+            Ok(tile.map_err(|e| failed(soil, t_s, "field_tile", e.to_string()))?.generation != *seen)
+        };
+        self.generations.iter().enumerate().map(unseen).collect()
+    }
+
+    /// Tiles that count as changed whatever they are.
+    pub fn forget(&mut self, tiles: &[bool]) {
+        let unseen = self.generations.iter_mut().zip(tiles).filter(|(_, unseen)| **unseen);
+        unseen.for_each(|(seen, _)| *seen = u64::MAX);
     }
 
     /// Appends height and sinkage of every node, row by row along x, as little-endian f32.

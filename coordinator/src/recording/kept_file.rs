@@ -3,7 +3,7 @@
 //! opened again and goes on where it was.
 
 use std::fs::{File, Metadata};
-use std::io::{ErrorKind, Result, Write};
+use std::io::{Error, ErrorKind, Read, Result, Seek, SeekFrom, Write};
 use std::os::fd::IntoRawFd;
 use std::os::unix::fs::MetadataExt;
 use std::path::{Path, PathBuf};
@@ -16,6 +16,8 @@ pub struct KeptFile {
     told: bool,
     /// Once a write has failed no other is tried: what is there ends with a whole part.
     failed: bool,
+    /// Bytes ahead that are there already: what is written is compared with them.
+    ahead: u64,
 }
 
 impl KeptFile {
@@ -23,10 +25,53 @@ impl KeptFile {
     pub fn create(path: &Path) -> Result<Self> {
         let path = std::path::absolute(path)?;
         let file = File::create(&path)?;
+        Self::of(file, path, 0)
+    }
+
+    /// Opens a file of an earlier process to write its first `length` bytes once more, which must be the same; what comes
+    /// behind them is cut off then.
+    pub fn repeat(path: &Path, length: u64) -> Result<Self> {
+        let path = std::path::absolute(path)?;
+        let file = File::options().read(true).write(true).open(&path)?;
+        Self::of(file, path, length)
+    }
+
+    /// Opens a file of an earlier process to go on behind its first `length` bytes.
+    pub fn go_on(path: &Path, length: u64) -> Result<Self> {
+        let mut kept = Self::repeat(path, 0)?;
+        if let Some(file) = &mut kept.file {
+            if file.metadata()?.len() < length {
+                return Err(Error::new(ErrorKind::UnexpectedEof, "it is shorter than it was"));
+            }
+            file.set_len(length)?;
+            file.seek(SeekFrom::End(0))?;
+        }
+        Ok(kept)
+    }
+
+    fn of(file: File, path: PathBuf, ahead: u64) -> Result<Self> {
         // Where the file system knows no locks, two runs into one folder are not noticed.
         drop(file.try_lock());
         let identity = identity(&file.metadata()?);
-        Ok(Self { file: Some(file), path, identity, told: false, failed: false })
+        Ok(Self { file: Some(file), path, identity, told: false, failed: false, ahead })
+    }
+
+    /// Compares with what is there; the last byte of it cuts off the rest.
+    fn compare(&mut self, bytes: &[u8]) -> Result<usize> {
+        let count = bytes.len().min(usize::try_from(self.ahead).unwrap_or(usize::MAX));
+        let mut there = vec![0; count];
+        let file = self.ours()?;
+        file.read_exact(&mut there)?;
+        if there != bytes[..count] {
+            return Err(Error::new(ErrorKind::InvalidData, "it is not as the run has left it"));
+        }
+        self.ahead -= count as u64;
+        if self.ahead == 0 {
+            let file = self.ours()?;
+            let end = file.stream_position()?;
+            file.set_len(end)?;
+        }
+        Ok(count)
     }
 
     fn is_ours(&self) -> bool {
@@ -61,7 +106,10 @@ impl Write for KeptFile {
         if self.failed {
             return Err(std::io::Error::other("an earlier write failed"));
         }
-        let written = self.ours()?.write(bytes);
+        let written = match self.ahead {
+            0 => self.ours()?.write(bytes),
+            _ => self.compare(bytes),
+        };
         self.failed = written.as_ref().is_err_and(|e| e.kind() != ErrorKind::Interrupted);
         written
     }

@@ -21,16 +21,28 @@ pub const VIEWER_LAYOUT: &str = "viewer_layout.json";
 /// The report page.
 pub const REPORT: &str = "report.html";
 
+/// What a run that was ended from outside goes on from.
+pub const CHECKPOINT: &str = "checkpoint.bin";
+
 /// Removes the files of an earlier run, so that none of them stays beside the new ones. Touches nothing in a
 /// folder that holds no run.
 pub(crate) fn remove_earlier_run(folder: &Path) -> Result {
     if ![RECORDING, SUMMARY].iter().any(|f| folder.join(f).exists()) {
         return Ok(());
     }
-    for path in
-        [VARIABLES, REPORT, SUMMARY, TIMING, EXCHANGE, FINAL_GROUND, RESERVE, VIEWER_LAYOUT, RECORDING]
-            .map(|f| folder.join(f))
-    {
+    const FILES: [&str; 10] = [
+        VARIABLES,
+        REPORT,
+        SUMMARY,
+        TIMING,
+        EXCHANGE,
+        FINAL_GROUND,
+        RESERVE,
+        VIEWER_LAYOUT,
+        CHECKPOINT,
+        RECORDING,
+    ];
+    for path in FILES.map(|f| folder.join(f)) {
         if path.exists() {
             std::fs::remove_file(&path).map_err(at(&path))?;
         }

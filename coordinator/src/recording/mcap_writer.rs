@@ -31,6 +31,10 @@ use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use terraglue_subsystem::Pose;
 
+mod resume;
+pub(crate) use resume::McapState;
+use resume::Pending;
+
 /// A chunk ends every so many steps; that many can be lost when the process is killed.
 pub(crate) const FLUSH_STEPS: u64 = 100;
 
@@ -105,6 +109,8 @@ pub(crate) struct McapWriter {
     window: WindowRecord,
     /// Bytes and simulated time (s) of what can be read whatever comes after.
     kept: (u64, f64),
+    /// The messages behind those, where checkpoints ask for them.
+    pending: Option<Vec<Pending>>,
 }
 
 impl McapWriter {
@@ -112,6 +118,16 @@ impl McapWriter {
     pub fn create(folder: &Path, about: BTreeMap<String, String>, scenario: &Scenario) -> Result<Self> {
         let path = folder.join(RECORDING);
         let file = KeptFile::create(&path).map_err(at(&path))?;
+        Self::over(file, path, about, scenario)
+    }
+
+    /// The same for a file that is open.
+    fn over(
+        file: KeptFile,
+        path: PathBuf,
+        about: BTreeMap<String, String>,
+        scenario: &Scenario,
+    ) -> Result<Self> {
         // No chunk size: chunks end by count only.
         let sink = options().chunk_size(None).create(NoSeek::new(BufWriter::new(file)));
         let mut sink = sink.map_err(other_at(&path))?;
@@ -134,6 +150,7 @@ impl McapWriter {
             packed: Vec::new(),
             window: WindowRecord::default(),
             kept: (0, 0.0),
+            pending: None,
         };
         writer.channels.events = writer.add(topics::of::<Log>("/events"))?;
         Ok(writer)
@@ -148,9 +165,7 @@ impl McapWriter {
 
     /// Announces all topics and writes what stands once at the start: shapes and the whole ground.
     pub fn started(&mut self, view: &View, snapshot: &Snapshot) -> Result {
-        self.ground = GroundGrid::find(view)?;
-        self.points = self.ground.as_ref().map(|g| GroundPoints::new(&g.info));
-        self.forces = Forces::new(view, self.gravity_m_s2);
+        self.find(view)?;
         self.announce(view, snapshot)?;
         self.put(self.channels.scene, view.t_s, &scene(view))?;
         for (frame, cloud) in point_cloud::bodies(view) {
@@ -159,6 +174,14 @@ impl McapWriter {
         }
         self.whole_ground(view)?;
         self.ground_tiles(view, (0..self.channels.tiles.len()).collect())
+    }
+
+    /// What of the view is recorded in forms of its own.
+    fn find(&mut self, view: &View) -> Result {
+        self.ground = GroundGrid::find(view)?;
+        self.points = self.ground.as_ref().map(|g| GroundPoints::new(&g.info));
+        self.forces = Forces::new(view, self.gravity_m_s2);
+        Ok(())
     }
 
     fn announce(&mut self, view: &View, snapshot: &Snapshot) -> Result {
@@ -370,6 +393,9 @@ impl McapWriter {
         let header = MessageHeader { channel_id, sequence: self.sequence, log_time, publish_time: log_time };
         self.sequence = self.sequence.wrapping_add(1);
         let Some(sink) = &mut self.sink else { return Ok(()) };
+        if let Some(pending) = &mut self.pending {
+            pending.push(Pending::of(&header, &self.message));
+        }
         let written = sink.write_to_known_channel(&header, &self.message);
         self.checked(written)
     }
@@ -379,6 +405,7 @@ impl McapWriter {
         let Some(sink) = &mut self.sink else { return Ok(()) };
         let flushed = sink.flush();
         self.checked(flushed)?;
+        self.pending.iter_mut().for_each(Vec::clear);
         self.kept = (std::fs::metadata(&self.path).map_or(self.kept.0, |m| m.len()), t_s);
         Ok(())
     }

@@ -40,6 +40,8 @@ pub struct PortRecord {
     pub subsystem: String,
     /// Name of the body.
     pub body: String,
+    /// Id of the shape that touches.
+    pub shape: u32,
     /// Where the foot stands.
     pub origin: Point,
     /// n, t1, t2 in the world.
@@ -87,6 +89,19 @@ pub struct WindowRecord {
     /// Sum of the magnitudes, J; NaN: unknown.
     pub interface_work_error_j: f64,
 }
+
+terraglue_subsystem::persist!(WindowRecord {
+    steps,
+    evaluations_bodies,
+    evaluations_bodies_max,
+    evaluations_soil,
+    evaluations_soil_max,
+    not_converged,
+    max_gap_m,
+    max_action_reaction_gap_n,
+    estimate_gap_n,
+    interface_work_error_j,
+});
 
 impl WindowRecord {
     /// Takes one more step in.

@@ -11,6 +11,7 @@
 //! | `exchange.json` | how values went round: order, connections with their delays, loops |
 //! | `viewer_layout.json` | a layout of this run for Foxglove and Lichtblick |
 //! | `final_ground.asc` | the ground at the end as ESRI ASCII grid |
+//! | `checkpoint.bin` | on request, while a run goes on: what [`Checkpoint`](crate::checkpoint::Checkpoint) goes on from |
 //!
 //! Topics, message types and what each viewer makes of them stand in `docs/recording.md`.
 //!
@@ -32,12 +33,15 @@ mod gluing_message;
 mod ground_grid;
 mod ground_points;
 mod inputs;
+mod keep;
 mod kept_file;
 mod layout;
 mod mcap_writer;
 mod mend;
 mod messages;
+mod motor_work;
 mod point_cloud;
+mod prints;
 mod reader;
 mod recorder;
 mod records;
@@ -62,14 +66,16 @@ mod tests;
 pub use csv::{TimingRow, write_timing};
 pub use energies::Energies;
 pub use exchange::write_exchange;
+pub(crate) use inputs::fingerprints;
 pub use kept_file::KeptFile;
-pub use layout::{FINAL_GROUND, RECORDING, REPORT, SUMMARY, TIMING, VARIABLES, VIEWER_LAYOUT};
+pub(crate) use layout::at;
+pub use layout::{CHECKPOINT, FINAL_GROUND, RECORDING, REPORT, SUMMARY, TIMING, VARIABLES, VIEWER_LAYOUT};
 pub use mend::mend;
 pub use messages::{GluingRecord, PortRecord, WindowRecord};
 pub use reader::{GroundRecord, Header, PoseSeries, Recording};
-pub use recorder::{Recorder, RecorderOptions};
+pub use recorder::{Recorder, RecorderOptions, RecorderState};
 pub use solids::Solid;
-pub use summary::{FailureRecord, Stall, Status, Summary};
+pub use summary::{FailureRecord, PrintDepth, Stall, Status, Summary};
 pub use summary_observer::SummaryObserver;
 pub use table::Table;
 pub use trace::Trace;

@@ -29,8 +29,6 @@ pub struct Recording {
     pub poses: BTreeMap<String, PoseSeries>,
     /// The first frame of the recording.
     pub first_frame: Option<String>,
-    /// Radius of the first sphere of every body that has one, by frame, m.
-    pub radii: BTreeMap<String, f64>,
     /// Shapes of every body in its frame, by frame.
     pub solids: BTreeMap<String, Vec<Solid>>,
     /// How the steps were glued.
@@ -275,9 +273,6 @@ impl Recording {
 
     fn take_scene(&mut self, data: &[u8]) {
         let Ok(scene) = SceneUpdate::decode(data) else { return };
-        let radii =
-            scene.entities.iter().filter_map(|e| Some((e.frame_id.clone(), solids::first_radius(e)?)));
-        self.radii.extend(radii);
         self.solids.extend(scene.entities.iter().map(|e| (e.frame_id.clone(), solids::solids(e))));
     }
 
@@ -293,11 +288,6 @@ impl Recording {
         if let Ok(cloud) = PointCloud::decode(data) {
             ground.patch(&cloud, t_s);
         }
-    }
-
-    /// Radius of a body's first sphere, m.
-    pub fn radius(&self, subsystem: &str, body: &str) -> Option<f64> {
-        self.radii.get(&format!("{subsystem}/{body}")).copied()
     }
 
     /// Frame and motion of the body that the report speaks of: that of the scenario, else the first one.

@@ -16,11 +16,16 @@ use crate::terrain::write_esri_ascii;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
+mod resume;
+pub use resume::RecorderState;
+
 /// What is written beside the recording.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct RecorderOptions {
     /// Also write `variables.csv`.
     pub csv: bool,
+    /// Checkpoints are asked for: [`Recorder::state`].
+    pub checkpoints: bool,
 }
 
 /// Records a run into a folder.
@@ -75,12 +80,26 @@ impl Recorder {
         std::fs::create_dir_all(folder).map_err(at(folder))?;
         remove_earlier_run(folder)?;
         let reserve = Reserve::take(folder);
-        Ok(Self {
+        let mut mcap = McapWriter::create(folder, about(scenario), scenario)?;
+        if options.checkpoints {
+            mcap.keep_pending();
+        }
+        Ok(Self::with(folder, scenario, options, mcap, reserve))
+    }
+
+    fn with(
+        folder: &Path,
+        scenario: &Scenario,
+        options: RecorderOptions,
+        mcap: McapWriter,
+        reserve: Reserve,
+    ) -> Self {
+        Self {
             folder: folder.to_owned(),
             options,
             every_steps: scenario.recording.every_steps.max(1),
             ground_every_steps: scenario.recording.ground_every_steps.max(1),
-            mcap: McapWriter::create(folder, about(scenario), scenario)?,
+            mcap,
             csv: None,
             snapshot: Snapshot::default(),
             summary: SummaryObserver::new(scenario),
@@ -90,7 +109,7 @@ impl Recorder {
             report: scenario.report.clone(),
             connections: scenario.connections.clone(),
             source: scenario.source.clone(),
-        })
+        }
     }
 
     fn record(&mut self, view: &View) -> Result {
@@ -157,11 +176,21 @@ impl Recorder {
     }
 }
 
+/// The variables of a view as the scenario wants them recorded.
+fn selected(
+    view: &View,
+    (spec, source): (&RecordingSpec, &Source),
+    connections: &[Connection],
+) -> Result<Snapshot> {
+    let mut snapshot = Snapshot::new(view);
+    selection::select(&mut snapshot, spec, source)?;
+    selection::hold(&mut snapshot, connections);
+    Ok(snapshot)
+}
+
 impl Recorder {
     fn start(&mut self, view: &View) -> Result {
-        self.snapshot = Snapshot::new(view);
-        selection::select(&mut self.snapshot, &self.spec, &self.source)?;
-        selection::hold(&mut self.snapshot, &self.connections);
+        self.snapshot = selected(view, (&self.spec, &self.source), &self.connections)?;
         if self.options.csv {
             self.csv = Some(VariablesCsv::create(&self.folder, &self.snapshot)?);
         }

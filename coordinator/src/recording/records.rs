@@ -9,7 +9,7 @@ use mcap::records::{Metadata, Record, op};
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
 /// Opcode and length before every record.
-const HEAD: usize = 9;
+pub(crate) const HEAD: usize = 9;
 /// No chunk is larger when decompressed, bytes; a damaged size asks for no more memory than this.
 const LARGEST_CHUNK: usize = 1 << 30;
 
@@ -115,7 +115,7 @@ impl Iterator for Records<'_> {
 }
 
 /// All records of a chunk whose check sum is right.
-fn chunk(mut bytes: &[u8]) -> McapResult<Vec<Record<'static>>> {
+pub(crate) fn chunk(mut bytes: &[u8]) -> McapResult<Vec<Record<'static>>> {
     let options = LinearReaderOptions::default()
         .with_skip_start_magic(true)
         .with_skip_end_magic(true)

@@ -18,11 +18,6 @@ pub struct Solid {
     pub round: Option<f64>,
 }
 
-/// Radius of the first sphere of a body, m.
-pub(super) fn first_radius(entity: &SceneEntity) -> Option<f64> {
-    Some(0.5 * entity.spheres.first()?.size?.x)
-}
-
 /// All shapes of a body.
 pub(super) fn solids(entity: &SceneEntity) -> Vec<Solid> {
     let spheres =

@@ -78,7 +78,7 @@ pub struct Summary {
     pub real_time_factor: f64,
     /// Horizontal displacement of the reported body along its initial heading, m.
     pub distance_m: Option<f64>,
-    /// Integral of the commanded speed over time, m.
+    /// Integral of the variable `report.commanded_speed` over time, m: the distance that was asked for.
     pub commanded_distance_m: Option<f64>,
     /// Largest magnitude of the roll angle (z-y-x Euler), rad.
     pub max_roll_rad: Option<f64>,
@@ -86,9 +86,10 @@ pub struct Summary {
     pub max_pitch_rad: Option<f64>,
     /// Largest committed depth under a foot below the initial surface, m.
     pub max_sinkage_m: Option<f64>,
-    /// Magnitude of the mechanical energy at the motors, Σ |τ·ω|·h, J.
+    /// Mechanical work of the motors, driving and braking together, Σ |power|·h, J: `energies.driving_j` +
+    /// `energies.braking_j`.
     pub energy_j: f64,
-    /// energy_j / (m·g·|distance|), dimensionless; null below 1 mm.
+    /// energy_j / (m·g·|distance|), dimensionless; null below 1 mm. Mechanical; see `electrical_cost_of_transport`.
     pub cost_of_transport: Option<f64>,
     /// Evaluations of the bodies per step, mean; 1 for a single pass, which makes no iterations.
     pub evaluations_mean: f64,
@@ -128,11 +129,11 @@ pub struct Summary {
     pub energy_balance_j: Option<f64>,
     /// CPU time per step, s.
     pub cpu_per_step_s: f64,
-    /// Height of the reported body at the end above that at the start, m.
+    /// Height of the reported body at the end above that at the start, against gravity, m; null without gravity.
     pub height_gained_m: Option<f64>,
     /// Where the body has stood still, if it did so for the last 5 s or longer; null: it came on.
     pub stalled: Option<Stall>,
-    /// Electrical energy that the motors drew, J; null: unknown.
+    /// Electrical energy that the motors drew, J; null where no motor has a drive with losses.
     #[serde(default)]
     pub electrical_energy_j: Option<f64>,
     /// electrical_energy_j / |distance|, J/m; null below 1 mm.
@@ -172,6 +173,32 @@ pub struct Summary {
     /// Where the energy came from and went.
     #[serde(default)]
     pub energies: Energies,
+    /// energy_j / |distance|, J/m; null below 1 mm.
+    #[serde(default)]
+    pub energy_j_per_m: Option<f64>,
+    /// electrical_energy_j / (m·g·|distance|), dimensionless; null below 1 mm and where the electrical energy is.
+    #[serde(default)]
+    pub electrical_cost_of_transport: Option<f64>,
+    /// Depth of the prints below the initial surface; null where nothing pressed or the soil shows no height.
+    #[serde(default)]
+    pub print_depth: Option<PrintDepth>,
+    /// Largest normal force of the ground on the reported robot, all its feet or wheels together, over its weight.
+    #[serde(default)]
+    pub peak_force_over_weight: Option<f64>,
+}
+
+/// Depth of prints: each counts once, with the largest depth under it while it was pressed. A wheel leaves a print every
+/// 3 cm.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct PrintDepth {
+    /// Number of prints.
+    pub count: u64,
+    /// Half of them are deeper, m.
+    pub median_m: f64,
+    /// A tenth of them is less deep, m.
+    pub p10_m: f64,
+    /// A tenth of them is deeper, m.
+    pub p90_m: f64,
 }
 
 /// Since when and where less than a tenth of the commanded distance was made.

@@ -7,10 +7,14 @@ use crate::recording::body_track::BodyTrack;
 use crate::recording::energies::EnergyTrack;
 use crate::recording::ground_grid::GroundGrid;
 use crate::recording::layout::{RECORDING, REPORT};
-use crate::recording::snapshot::{failed, real, real_id};
+use crate::recording::motor_work::MotorWork;
+use crate::recording::prints::PrintTrack;
+use crate::recording::snapshot::{real, real_id};
 use crate::recording::summary::{FailureRecord, Status, Summary};
 use crate::scenario::Scenario;
-use terraglue_subsystem::{Kind, ValuesMut};
+use terraglue_subsystem::{Causality, Kind};
+
+mod state;
 
 /// Over a shorter way, m, the energy per distance says nothing.
 const SMALLEST_DISTANCE_M: f64 = 1e-3;
@@ -21,7 +25,7 @@ pub struct SummaryObserver {
     strategy: String,
     body_name: Option<String>,
     speed_name: Option<String>,
-    gravity_m_s2: f64,
+    gravity_m_s2: [f64; 3],
     soil_module: Option<String>,
     events: Vec<Happening>,
     steps: u64,
@@ -29,51 +33,19 @@ pub struct SummaryObserver {
     body: Option<BodyTrack>,
     speed: Option<Integral>,
     sinkage: Option<Deepest>,
-    mean_sinkage: Option<MeanSinkage>,
+    prints: Option<PrintTrack>,
     mass_error: Option<(usize, u32, f64)>,
-    motors: Vec<Motors>,
-    energy_j: f64,
+    motors: MotorWork,
     electrical_j: f64,
     energies: EnergyTrack,
     gluing: GluingFigures,
 }
 
-/// Mean depth below the initial surface under loaded feet.
-struct MeanSinkage {
-    grid: Box<GroundGrid>,
-    sum_m: f64,
-    steps: u64,
-}
-
-impl MeanSinkage {
-    fn find(view: &View) -> Result<Option<Self>> {
-        let grid = GroundGrid::find(view)?;
-        Ok(grid.map(|grid| Self { grid: Box::new(grid), sum_m: 0.0, steps: 0 }))
-    }
-
-    fn follow(&mut self, view: &View) -> Result {
-        let soil = &view.subsystems[self.grid.subsystem];
-        let (mut sum, mut loaded) = (0.0, 0u32);
-        for port in view.gluing.ports.iter().filter(|p| p.wrench[0] > 0.0) {
-            sum += self.grid.sinkage_at(soil, port.origin[0], port.origin[1], view.t_s)?;
-            loaded += 1;
-        }
-        if loaded > 0 {
-            self.sum_m += sum / f64::from(loaded);
-            self.steps += 1;
-        }
-        Ok(())
-    }
-
-    fn mean_m(&self) -> Option<f64> {
-        (self.steps > 0).then(|| self.sum_m / self.steps as f64)
-    }
-}
-
-/// Integral of a variable over time, taken with its value at the start of each step.
+/// Integral of a variable over time. What is set holds over the step that follows, what is told is of the step before.
 struct Integral {
     subsystem: usize,
     id: u32,
+    told: bool,
     before: f64,
     sum: f64,
 }
@@ -82,13 +54,6 @@ struct Integral {
 enum Deepest {
     Variable { soil: usize, id: u32, largest: f64 },
     Ground { grid: Box<GroundGrid>, largest: f64 },
-}
-
-/// Torques and velocities of a subsystem's joints.
-struct Motors {
-    subsystem: usize,
-    ids: Vec<u32>,
-    values: Vec<f64>,
 }
 
 /// Figures of the gluing over all steps.
@@ -151,27 +116,6 @@ impl Deepest {
         match self {
             Self::Variable { largest, .. } | Self::Ground { largest, .. } => *largest,
         }
-    }
-}
-
-impl Motors {
-    fn find(subsystem: usize, view: &SubsystemView) -> Option<Self> {
-        let joints = view.instance.variables().iter().filter_map(|v| v.name.strip_suffix(".torque"));
-        let pair = |joint: &str| {
-            let torque = real_id(view.instance, &format!("{joint}.torque"))?;
-            Some([torque, real_id(view.instance, &format!("{joint}.velocity"))?])
-        };
-        let ids: Vec<u32> = joints.filter_map(pair).flatten().collect();
-        (!ids.is_empty()).then(|| Self { subsystem, values: vec![0.0; ids.len()], ids })
-    }
-
-    /// Σ |τ·ω|, W.
-    fn power(&mut self, view: &View) -> Result<f64> {
-        let s = &view.subsystems[self.subsystem];
-        s.instance
-            .get(&self.ids, ValuesMut::F64(&mut self.values))
-            .map_err(|e| failed(s, view.t_s, "get", e.to_string()))?;
-        Ok(self.values.chunks_exact(2).map(|p| (p[0] * p[1]).abs()).sum())
     }
 }
 
@@ -257,13 +201,12 @@ impl SummaryObserver {
 
     /// For a run of this scenario.
     pub fn new(scenario: &Scenario) -> Self {
-        let g = scenario.world.gravity_m_s2;
         Self {
             scenario: scenario.name.clone(),
             strategy: scenario.gluing.strategy.clone(),
             body_name: scenario.report.body.clone(),
             speed_name: scenario.report.commanded_speed.clone(),
-            gravity_m_s2: (g[0] * g[0] + g[1] * g[1] + g[2] * g[2]).sqrt(),
+            gravity_m_s2: scenario.world.gravity_m_s2,
             soil_module: None,
             events: Vec::new(),
             steps: 0,
@@ -271,10 +214,9 @@ impl SummaryObserver {
             body: None,
             speed: None,
             sinkage: None,
-            mean_sinkage: None,
+            prints: None,
             mass_error: None,
-            motors: Vec::new(),
-            energy_j: 0.0,
+            motors: MotorWork::default(),
             electrical_j: 0.0,
             energies: EnergyTrack::default(),
             gluing: GluingFigures::default(),
@@ -288,27 +230,24 @@ impl SummaryObserver {
             Some((subsystem, real_id(view.subsystems[subsystem].instance, variable)?))
         };
         let Some((subsystem, id)) = find() else { return Ok(None) };
+        let variables = view.subsystems[subsystem].instance.variables();
+        let causality = variables.iter().find(|v| v.id == id).map(|v| v.causality);
+        let told = matches!(causality, Some(Causality::Output | Causality::Local));
         let before = real(&view.subsystems[subsystem], id, view.t_s)?;
-        Ok(Some(Integral { subsystem, id, before, sum: 0.0 }))
-    }
-
-    fn follow_energy(&mut self, view: &View) -> Result {
-        for motors in &mut self.motors {
-            self.energy_j += motors.power(view)? * view.h_s;
-        }
-        self.electrical_j = view.energy.electrical;
-        Ok(())
+        Ok(Some(Integral { subsystem, id, told, before, sum: 0.0 }))
     }
 
     /// The figures so far. `wall_s` and `cpu_s` are the times of the step loop, s.
     pub fn summary(&self, wall_s: f64, cpu_s: f64, error: Option<&Error>, status: Status) -> Summary {
         let per = |total: f64, n: f64| if n > 0.0 { total / n } else { 0.0 };
         let body = self.body.as_ref();
-        let weight_n = body.map_or(0.0, |b| b.mass_kg * self.gravity_m_s2);
-        let work_j = body.map_or(0.0, |b| weight_n * b.distance_m.abs());
-        let moved = body.is_some_and(|b| b.distance_m.abs() >= SMALLEST_DISTANCE_M);
+        let gravity_m_s2 = self.gravity_m_s2.iter().map(|g| g * g).sum::<f64>().sqrt();
+        let weight_n = body.map(|b| b.mass_kg * gravity_m_s2).filter(|w| *w > 0.0);
+        let way_m = body.map(|b| b.distance_m.abs()).filter(|way| *way >= SMALLEST_DISTANCE_M);
+        let transport = |energy_j: f64| Some(energy_j / (weight_n? * way_m?));
         let g = &self.gluing;
-        let energies = self.energies.figures(self.energy_j);
+        let energy_j = self.motors.both_j();
+        let energies = self.energies.figures(&self.motors);
         // what no step could say does not apply; before the first step nothing is known to be amiss
         let applies = |steps: u64| g.steps == 0 || steps > 0;
         let known = |value: f64| value.is_finite().then_some(value);
@@ -330,8 +269,8 @@ impl SummaryObserver {
             max_roll_rad: body.map(|b| b.max_roll_rad),
             max_pitch_rad: body.map(|b| b.max_pitch_rad),
             max_sinkage_m: self.sinkage.as_ref().map(Deepest::largest),
-            energy_j: self.energy_j,
-            cost_of_transport: (moved && work_j > 0.0).then(|| self.energy_j / work_j),
+            energy_j,
+            cost_of_transport: transport(energy_j),
             evaluations_mean: g.mean(g.bodies),
             evaluations_max: g.histogram.len().saturating_sub(1) as u32,
             steps_not_converged: applies(g.checked).then_some(g.not_converged),
@@ -349,12 +288,10 @@ impl SummaryObserver {
             interface_work_error_j: known(g.interface_work_error_j),
             energy_balance_j: energies.drift_j,
             cpu_per_step_s: per(cpu_s, self.steps as f64),
-            height_gained_m: body.map(BodyTrack::height_gained_m),
+            height_gained_m: body.and_then(BodyTrack::height_gained_m),
             stalled: body.and_then(BodyTrack::stall),
             electrical_energy_j: electrical_j,
-            electrical_energy_j_per_m: body
-                .filter(|_| moved)
-                .and_then(|b| Some(electrical_j? / b.distance_m.abs())),
+            electrical_energy_j_per_m: electrical_j.and_then(|e| Some(e / way_m?)),
             kappa_max: g.kappa_max,
             jacobian_refreshes_mean: g.mean(g.refreshes),
             evaluations_jacobian_mean: g.mean(g.differences),
@@ -363,37 +300,43 @@ impl SummaryObserver {
             rank_missing_max: g.rank_missing,
             condition_max: g.condition,
             steps_halved: g.halved,
-            mean_sinkage_m: self.mean_sinkage.as_ref().and_then(MeanSinkage::mean_m),
+            mean_sinkage_m: self.prints.as_ref().and_then(PrintTrack::mean_m),
             path_m: body.map(|b| b.path_m),
             energies,
+            energy_j_per_m: way_m.map(|way| energy_j / way),
+            electrical_cost_of_transport: electrical_j.and_then(transport),
+            print_depth: self.prints.as_ref().and_then(PrintTrack::depth),
+            peak_force_over_weight: body.and_then(|b| Some(b.peak_n()? / weight_n?)),
         }
     }
 }
 
 impl Observer for SummaryObserver {
     fn started(&mut self, view: &View) -> Result {
-        self.body = BodyTrack::find(view, self.body_name.as_deref());
+        self.body = BodyTrack::find(view, self.body_name.as_deref(), &self.gravity_m_s2);
         self.speed = self.commanded_speed(view)?;
         self.sinkage = Deepest::find(view)?;
-        self.mean_sinkage = MeanSinkage::find(view)?;
+        self.prints = PrintTrack::find(view)?;
         self.energies.start(view);
         self.soil_module = soils(view).map(|(_, s)| s.module.to_owned()).next();
         let mass =
             |(k, s): (usize, &SubsystemView)| Some((k, real_id(s.instance, "mass_error_relative")?, 0.0));
         self.mass_error = soils(view).find_map(mass);
-        self.motors = view.subsystems.iter().enumerate().filter_map(|(k, s)| Motors::find(k, s)).collect();
+        self.motors = MotorWork::find(view);
         if let Some(body) = &mut self.body {
             body.follow(view, 0.0);
         }
-        self.follow_energy(view)
+        self.electrical_j = view.energy.electrical;
+        Ok(())
     }
 
     fn stepped(&mut self, view: &View) -> Result {
         (self.steps, self.t_s) = (view.step_index, view.t_s);
         self.gluing.add(view.gluing);
         if let Some(speed) = &mut self.speed {
-            speed.sum += speed.before * view.h_s;
-            speed.before = real(&view.subsystems[speed.subsystem], speed.id, view.t_s)?;
+            let now = real(&view.subsystems[speed.subsystem], speed.id, view.t_s)?;
+            speed.sum += if speed.told { now } else { speed.before } * view.h_s;
+            speed.before = now;
         }
         if let Some(body) = &mut self.body {
             body.follow(view, self.speed.as_ref().map_or(0.0, |s| s.sum));
@@ -401,14 +344,15 @@ impl Observer for SummaryObserver {
         if let Some(sinkage) = &mut self.sinkage {
             sinkage.follow(view)?;
         }
-        if let Some(sinkage) = &mut self.mean_sinkage {
-            sinkage.follow(view)?;
+        if let Some(prints) = &mut self.prints {
+            prints.follow(view)?;
         }
         self.energies.follow(view);
         if let Some((soil, id, worst)) = &mut self.mass_error {
             *worst = worst.max(real(&view.subsystems[*soil], *id, view.t_s)?.abs());
         }
-        self.follow_energy(view)
+        self.electrical_j = view.energy.electrical;
+        self.motors.follow(view)
     }
 
     fn happened(&mut self, happening: &Happening) -> Result {

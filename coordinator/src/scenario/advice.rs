@@ -105,15 +105,20 @@ pub fn replaced_laws(
     {
         return Vec::new();
     }
-    let own = std::iter::once((String::new(), Some(config.clone())));
-    let regions = spec.regions.iter().map(|region| {
-        let merged = SoilParameters::of_region(config, &region.numbers).ok();
-        (format!(" of label {} ({})", region.label, region.soil), merged)
-    });
-    let said = own.chain(regions).filter_map(|(whose, config)| replaced_law(&config?, &whose, gravity));
+    let said = soils(spec, config).filter_map(|(whose, config)| replaced_law(&config, &whose, gravity));
     said.flatten()
         .map(|message| line_of(&scenario.source.error_at_value(&[&spec.name, STIFFNESS], message, None)))
         .collect()
+}
+
+/// The tables of a subsystem's own soil and of those of its regions, and whose each is as messages say it.
+fn soils<'a>(spec: &'a SubsystemSpec, config: &'a Config) -> impl Iterator<Item = (String, Config)> + 'a {
+    let own = std::iter::once((String::new(), config.clone()));
+    let regions = spec.regions.iter().filter_map(|region| {
+        let merged = SoilParameters::of_region(config, &region.numbers).ok()?;
+        Some((format!(" of label {} ({})", region.label, region.soil), merged))
+    });
+    own.chain(regions)
 }
 
 /// What the elastic line does to one soil.
@@ -149,13 +154,8 @@ pub fn foreign_gravity(
     config: &Config,
     gravity: f64,
 ) -> Vec<String> {
-    let own = std::iter::once((String::new(), Some(config.clone())));
-    let regions = spec.regions.iter().map(|region| {
-        let merged = SoilParameters::of_region(config, &region.numbers).ok();
-        (format!(" of label {} ({})", region.label, region.soil), merged)
-    });
-    let said = own.chain(regions).filter_map(|(whose, config)| {
-        let soil = SoilParameters::from_config(&config?, gravity).ok()?;
+    let said = soils(spec, config).filter_map(|(whose, config)| {
+        let soil = SoilParameters::from_config(&config, gravity).ok()?;
         let measured = soil.measured_gravity.filter(|g| (g - gravity).abs() > SAME_GRAVITY * gravity)?;
         let own_law = spec.parameters.contains_key("law");
         (soil.family == Family::Bekker && soil.k_phi > 0.0 && !soil.gravity_scaling && !own_law).then(|| {

@@ -292,7 +292,7 @@ fn report() -> Table {
     let keys = vec![
         text("body", "`subsystem.body` of distance, roll and pitch; the first body of the first robot")
             .into(),
-        text("commanded_speed", "`subsystem.variable` with the commanded speed, m/s").into(),
+        text("commanded_speed", "`subsystem.variable` with the speed that is asked for, m/s; `gait.speed_reached` leaves out standing and ramp").into(),
         text("joint", "`subsystem.joint` whose torque, velocity and angle are plotted").into(),
     ];
     of("report", "What the summary and the report speak of.", keys)

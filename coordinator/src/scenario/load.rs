@@ -42,6 +42,16 @@ impl Scenario {
         Self::checked(source)
     }
 
+    /// The scenario of an earlier run, whose text after all edits was kept; `path` is that of its file.
+    pub(crate) fn again(path: &Path, text: &str) -> Checked<Self> {
+        let mut source = read_source(text, &path.display().to_string(), &[])?;
+        if Package::is_one(path) {
+            let package = Package::open(path).map_err(|e| InputError::plain(e.to_string(), None))?;
+            source.package = Some(Arc::new(package));
+        }
+        Self::checked(source)
+    }
+
     /// The same for a text; `path` gives its name and folder.
     pub fn parse(text: &str, path: &str, sets: &[(String, String)]) -> Checked<Self> {
         Self::checked(read_source(text, path, sets)?)

@@ -1,11 +1,12 @@
 //! Commit: the foot's motion becomes depths, slip and heat; the nodes that it left forget their contact.
 
 use crate::assemble::{displacement, dot};
+use crate::contact_memory::{self, Remembered};
 use crate::contacts::Touch;
 use crate::ground::{Covered, Ground};
 use crate::nodes::NodeState;
 use crate::patch::{Patch, PatchNodes, Patches};
-use crate::{cone, wall, wheel};
+use crate::wall;
 use terraglue_soil_law::{KeptNodes, PressureCurve, ShearResponse, ShearState};
 use terraglue_subsystem::{MOST_LAW_STATE, Port};
 
@@ -39,13 +40,13 @@ pub struct Book {
 
 impl Book {
     /// Takes `due` (J) of energy that the soil has taken up beside the flow of its nodes out of the heat that was made since it
-    /// was `before` (J), or of later heat; < 0: it becomes heat. Two things are due: what the material is lifted by (where the
-    /// pressure begins with nothing, the first soil that is pushed aside weighs more than it resists), and the elastic energy
-    /// of soil that a foot slides onto, which is loaded a node at a time, while what drives the foot works steadily.
+    /// was `before` (J), or of later heat; < 0: it becomes heat. Two things are due: what the material is lifted by, and the
+    /// elastic energy of soil that a foot slides onto, which is loaded a node at a time, while what drives the foot works
+    /// steadily.
     pub fn pay(&mut self, due: f64, before: f64) {
-        let due = self.owed + due;
-        let paid = due.min(self.dissipated - before);
-        (self.dissipated, self.owed) = (self.dissipated - paid, due - paid);
+        let (due, made) = (self.owed + due, self.dissipated - before);
+        (self.dissipated, self.owed) =
+            if due < made { (self.dissipated - due, 0.0) } else { (before, due - made) };
     }
 }
 
@@ -56,7 +57,8 @@ struct Turnover {
     work: f64,
     /// Turned into heat.
     heat: f64,
-    /// Elastic energy of soil that the foot has come over from the side; the force that drove it there has paid for it.
+    /// Elastic energy of soil that the foot has come over from the side or that it found compressed as its underside turned;
+    /// what drove it there has paid for it.
     entered: f64,
 }
 
@@ -164,8 +166,8 @@ impl Scene<'_> {
         book.dissipated += release(ground, lists, stamp);
         let touching =
             |key| ports.iter().zip(&lists.touching).any(|(port, touches)| *touches && port.key == key);
-        book.dissipated += wall::release(&mut ground.pushes, touching);
-        book.dissipated += cone::release(&mut ground.cones, touching);
+        book.dissipated += contact_memory::release(&mut ground.pushes, touching);
+        book.dissipated += contact_memory::release(&mut ground.cones, touching);
     }
 
     /// Pressures and shear of all nodes of patch `p` where its law answers many nodes at a time.
@@ -241,7 +243,7 @@ impl Scene<'_> {
         book.dissipated += turnover.heat;
         book.owed += turnover.entered;
         if let Some(wheel) = patch.wheel.as_ref().filter(|_| loaded > 0) {
-            wheel::remember(&mut ground.wheels, wheel, x);
+            contact_memory::remember(&mut ground.wheels, wheel.rolled(x));
         }
         let entry = patch.wheel.as_ref().map(|wheel| {
             let [a, b] = wheel.heading.map(|c| if wheel.rolled(x).forward { c } else { -c });
@@ -258,7 +260,7 @@ impl Scene<'_> {
         book.port_work += work;
         book.dissipated += work - (after.energy() - cone.before.energy());
         book.kinetic += after.energy();
-        cone::remember(&mut ground.cones, after);
+        contact_memory::remember(&mut ground.cones, after);
     }
 
     /// The soil beside a foot: how far it was pushed, its work, heat and elastic energy.
@@ -285,7 +287,7 @@ impl Scene<'_> {
         turnover.entered += (from - wall.before.energy).max(0.0);
         book.elastic += to;
         let new = wall::Push { key: port.key, mobilised: answer.mobilised, energy: to };
-        wall::remember(&mut ground.pushes, new);
+        contact_memory::remember(&mut ground.pushes, new);
     }
 
     /// A node that was in contact and is not pressed any more: it clings under tension, or lets go, and what its stretched
@@ -382,14 +384,15 @@ impl Scene<'_> {
         }
     }
 
-    /// Elastic energy of node k between the commits: what belongs to area that the foot has come over, and what is left behind
-    /// where it has gone.
+    /// Elastic energy of node k between the commits: what belongs to area that the foot has come over, what is left behind
+    /// where it has gone, and what an inclined underside that turns has compressed or relieved beyond its way at the node.
     fn take_over(&self, k: usize, state: &NodeState, turnover: &mut Turnover) {
         let n = &self.patches.nodes;
         let now = self.held_at_start(k) + self.sheared_before(k);
         let new = if state.area < n.area[k] { (1.0 - state.area / n.area[k]) * now } else { 0.0 };
-        turnover.entered += new;
-        turnover.heat += (state.energy - (now - new)).max(0.0);
+        let left = state.energy - (now - new);
+        turnover.heat += left.max(0.0);
+        turnover.entered += new + (-left).max(0.0);
     }
 
     /// Elastic energy of node k under the pressure p (Pa), J.

@@ -7,6 +7,7 @@
 //! pull at the foot: where the foot stops or leaves, the cone loses what it has as heat.
 
 use crate::assemble::Stiffness;
+use crate::contact_memory::Remembered;
 use crate::patch::PatchNodes;
 use std::f64::consts::{FRAC_PI_3, PI};
 
@@ -21,9 +22,15 @@ pub struct Carried {
     pub speed: f64,
 }
 
-impl Carried {
+impl Remembered for Carried {
+    fn new(key: u64) -> Self {
+        Self { key, ..Self::default() }
+    }
+    fn key(&self) -> u64 {
+        self.key
+    }
     /// Kinetic energy, J.
-    pub fn energy(&self) -> f64 {
+    fn energy(&self) -> f64 {
         0.5 * self.mass * self.speed * self.speed
     }
 }
@@ -94,6 +101,11 @@ impl Cone {
         [1.0, 0.0, 0.0, 0.0, self.arm[1], -self.arm[0]]
     }
 
+    /// Motion of the middle of the contact along n when the foot has moved by `x`, m.
+    fn up(&self, x: &[f64; 6]) -> f64 {
+        self.direction().iter().zip(x).map(|(g, x)| g * x).sum()
+    }
+
     /// Mass when the lowest point lies at `depth` (m), and its slope, kg and kg/m.
     fn mass(&self, depth: f64) -> [f64; 2] {
         let [full, height] = self.full;
@@ -105,7 +117,7 @@ impl Cone {
 
     /// What it answers when the foot has moved by `x`.
     pub fn answer(&self, x: &[f64; 6]) -> Answer {
-        let up: f64 = self.direction().iter().zip(x).map(|(g, x)| g * x).sum();
+        let up = self.up(x);
         let momentum = self.before.mass * self.before.speed;
         let (key, h) = (self.before.key, self.h);
         if up >= 0.0 {
@@ -144,34 +156,8 @@ impl Cone {
     /// Work of the foot on the cone in the step, J, under the law's force `law` (N) along n, and the cone after it.
     pub fn worked(&self, x: &[f64; 6], law: f64) -> (f64, Carried) {
         let answer = self.answer(x);
-        let up: f64 = self.direction().iter().zip(x).map(|(g, x)| g * x).sum();
-        (-answer.force.max(-law.max(0.0)) * up, answer.after)
+        (-answer.force.max(-law.max(0.0)) * self.up(x), answer.after)
     }
-}
-
-/// Keeps the cone of a contact, in ascending order of keys.
-pub fn remember(cones: &mut Vec<Carried>, new: Carried) {
-    match cones.binary_search_by_key(&new.key, |c| c.key) {
-        Ok(k) => cones[k] = new,
-        Err(k) => cones.insert(k, new),
-    }
-}
-
-/// The cone under the contact `key` so far.
-pub fn recall(cones: &[Carried], key: u64) -> Carried {
-    let found = cones.binary_search_by_key(&key, |c| c.key);
-    found.map_or(Carried { key, ..Carried::default() }, |k| cones[k])
-}
-
-/// Forgets the contacts that have left the soil; the energy of their cones becomes heat, J.
-pub fn release(cones: &mut Vec<Carried>, touching: impl Fn(u64) -> bool) -> f64 {
-    let mut heat = 0.0;
-    cones.retain(|c| {
-        let stays = touching(c.key);
-        heat += if stays { 0.0 } else { c.energy() };
-        stays
-    });
-    heat
 }
 
 terraglue_subsystem::persist!(Carried { key, mass, speed });

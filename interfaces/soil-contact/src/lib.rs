@@ -16,6 +16,7 @@ mod bound;
 mod chunk;
 mod compatibility;
 mod cone;
+mod contact_memory;
 mod contacts;
 mod ground;
 mod law_memory;

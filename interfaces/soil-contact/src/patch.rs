@@ -5,11 +5,12 @@
 
 use crate::assemble::dot;
 use crate::cone::{self, Cone};
+use crate::contact_memory::recall;
 use crate::ground::Ground;
 use crate::normal::Clinging;
 use crate::size::Size;
 use crate::wall::{self, Beside, Rows, Side, Wall};
-use crate::wheel::{self, Shift, Wheel};
+use crate::wheel::{Shift, Wheel};
 use terraglue_soil_law::strength::{Inclination, slope_factor};
 use terraglue_soil_law::{Direction, PluginLaw, PressureCurve, PressureLaw, Rolling, ShearLaw, ShearState};
 use terraglue_subsystem::{Node, Port, Step};
@@ -292,6 +293,8 @@ pub struct Patches {
     pub sides: Vec<Side>,
     /// Clinging nodes; scratch of [`Patches::pull`].
     pub(crate) clinging: Vec<Clinging>,
+    /// Whether the soil owes energy for what its feet have come over, see [`crate::bookkeeping::Book::pay`].
+    pub in_debt: bool,
     rows: Rows,
     built_for: Option<(u64, u64, usize, usize)>,
 }
@@ -350,12 +353,11 @@ impl Patches {
         let range = first..self.nodes.index.len();
         let spacing = ground.heights.lattice().spacing;
         // a sphere has no extent and does not roll
-        let found =
-            || Wheel::find(&self.nodes, range.clone(), spacing, wheel::recall(&ground.wheels, port.key));
+        let found = || Wheel::find(&self.nodes, range.clone(), spacing, recall(&ground.wheels, port.key));
         let wheel = (port.extent[0] > 0.0 && port.extent[1] > 0.0).then(found).flatten();
         let b = Size::of(&self.nodes, range.clone(), spacing).b(spacing);
         let (local, friction) = self.local_laws(laws, wheel.as_ref(), b, range.clone());
-        let mut wall = Wall::none(port, wall::recall(&ground.pushes, port.key));
+        let mut wall = Wall::none(port, recall(&ground.pushes, port.key));
         self.bear(&laws[0].direction, &wall, b, range.clone());
         self.start(range.clone());
         if laws[0].direction.passive_pressure {
@@ -396,7 +398,7 @@ impl Patches {
         }
         // under a rim the soil flows by
         let cone = wheel.is_none().then(|| {
-            let before = cone::recall(&ground.cones, port.key);
+            let before = recall(&ground.cones, port.key);
             Cone::under(&laws[0].cone, &self.nodes, range.clone(), before, step.h)
         });
         let mut place = [None; 6];
@@ -456,7 +458,9 @@ impl Patches {
     ///
     /// Within a step the underside moves as its slope says; by how much the exact one lies elsewhere afterwards (its
     /// curvature, an edge that passes) moves the unloaded surface and not the pressure, so that no energy comes of it. Where the
-    /// underside has gone up by more than half of what the soil springs back, the foot is leaving the node.
+    /// underside has gone up by more than half of what the soil springs back, the foot is leaving the node. A node that the
+    /// foot has come over from the side bears at once what its depth asks for, and what drives the foot pays for it; while
+    /// that is owed, further ones bear only what they are pressed down from there.
     fn start(&mut self, range: std::ops::Range<usize>) {
         for k in range {
             let (n, law) = (&self.nodes, self.law(k));
@@ -471,11 +475,12 @@ impl Patches {
                 continue;
             }
             let (elastic, yields) = (k_u * (depth - permanent), self.yields(k, depth).0);
+            let in_debt = self.in_debt;
             let n = &mut self.nodes;
             n.bound[k] = if elastic <= yields { yields } else { f64::NEG_INFINITY };
             if n.stamp[k] == 0 {
                 n.entered[k] = true;
-                n.permanent[k] = depth - elastic.min(yields) / k_u;
+                n.permanent[k] = if in_debt { depth } else { depth - elastic.min(yields) / k_u };
                 n.bound[k] = yields;
             }
         }

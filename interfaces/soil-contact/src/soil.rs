@@ -152,6 +152,7 @@ impl<M: Material> FieldSoil<M> {
         if let Some(plugin) = &self.plugin {
             plugin.begin(step.h);
         }
+        self.patches.in_debt = self.book.owed > 0.0;
         self.patches.build(step, &self.ground, &self.laws);
         self.plugin.as_ref().map_or(Ok(()), PluginLaw::check)
     }

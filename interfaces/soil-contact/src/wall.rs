@@ -6,6 +6,7 @@
 //! down has no way to the side and meets none of it. The same way mobilises the passive pressure on inclined undersides.
 
 use crate::assemble::{displacement, dot};
+use crate::contact_memory::Remembered;
 use crate::patch::PatchNodes;
 use terraglue_ground::Lattice;
 use terraglue_subsystem::Port;
@@ -191,6 +192,8 @@ pub struct Beside<'a> {
     pub stiffness: f64,
 }
 
+const NEIGHBOURS: [(i32, i32); 4] = [(1, 0), (-1, 0), (0, 1), (0, -1)];
+
 /// Gathers the sides of the contact whose nodes are `range`: where the covered part of the cells falls from a node to its
 /// neighbour and soil stands above the underside. The parts of a node make one side, so that the normal follows the
 /// outline and not the lattice. `n_z`: of the port's normal; `pressed`: pressure at a node over that at which it yields: where
@@ -219,9 +222,9 @@ pub fn gather(
         let [i, j] = nodes.index[k];
         let lower = nodes.reference[k] - nodes.depth[k] / n_z;
         let own = covered(Some(k));
-        let mut vector = [0.0; 2];
-        let (mut height, mut loose) = (0.0, 0.0);
-        for [di, dj] in [[1, 0], [-1, 0], [0, 1], [0, -1]] {
+        // towards +x, −x, +y and −y: width of the face and, times that, height of the bed above it and of the loose soil on the bed
+        let mut faces = [[0.0; 3]; 4];
+        for (face, (di, dj)) in faces.iter_mut().zip(NEIGHBOURS) {
             let next = rows.find(nodes, [i + di, j + dj]);
             let outside = own - covered(next);
             // soil in a cell that is covered in part stands as high as it did before it was pressed
@@ -229,23 +232,24 @@ pub fn gather(
                 next.map_or_else(|| (beside.levels)(i + di, j + dj), |k| [nodes.reference[k], 0.0]);
             let above = bed - lower;
             if outside > 0.0 && above > 0.0 {
-                let face = outside * spacing;
-                vector = [vector[0] + face * f64::from(di), vector[1] + face * f64::from(dj)];
-                height += face * above;
-                loose += face * on_bed;
+                let width = outside * spacing;
+                *face = [width, width * above, width * on_bed];
             }
         }
-        let length = (vector[0] * vector[0] + vector[1] * vector[1]).sqrt();
+        let [east, west, north, south] = faces;
+        let net = [east[0] - west[0], north[0] - south[0]];
+        let [width, height, loose] = [0, 1, 2].map(|c| faces.iter().map(|face| face[c]).sum::<f64>());
+        let length = (net[0] * net[0] + net[1] * net[1]).sqrt();
         if length <= 1e-9 * spacing {
             continue;
         }
-        let parts = vector[0].abs() + vector[1].abs();
-        let [h, on_bed] = [height, loose].map(|sum| sum / parts);
+        // the mean height: parts that lie opposite cancel in the normal, not in the heights
+        let (h, on_bed) = (height / width, loose / width);
         let [a, b] = beside.passive;
         // loose soil weighs on the bed and has no cohesion of its own
         let a = a + b * on_bed;
         let force = part * length * h * (a + 0.5 * b * h);
-        let [x, y] = vector.map(|v| v / length);
+        let [x, y] = net.map(|v| v / length);
         sides.push(Side { normal: [x, y, 0.0], force });
         rows.places.push(wall.in_world(nodes.arm[k]));
         let up = if a + b * h > 0.0 { h * (3.0 * a + b * h) / (6.0 * a + 3.0 * b * h) } else { 0.0 };
@@ -305,29 +309,16 @@ impl Rows {
     }
 }
 
-/// Keeps how far a contact has pushed, in ascending order of keys.
-pub fn remember(pushes: &mut Vec<Push>, new: Push) {
-    match pushes.binary_search_by_key(&new.key, |p| p.key) {
-        Ok(k) => pushes[k] = new,
-        Err(k) => pushes.insert(k, new),
+impl Remembered for Push {
+    fn new(key: u64) -> Self {
+        Self { key, ..Self::default() }
     }
-}
-
-/// How far the contact `key` has pushed so far.
-pub fn recall(pushes: &[Push], key: u64) -> Push {
-    let found = pushes.binary_search_by_key(&key, |p| p.key);
-    found.map_or(Push { key, ..Push::default() }, |k| pushes[k])
-}
-
-/// Forgets the contacts that have left the soil; what their soil held elastically becomes heat, J.
-pub fn release(pushes: &mut Vec<Push>, touching: impl Fn(u64) -> bool) -> f64 {
-    let mut heat = 0.0;
-    pushes.retain(|p| {
-        let stays = touching(p.key);
-        heat += if stays { 0.0 } else { p.energy };
-        stays
-    });
-    heat
+    fn key(&self) -> u64 {
+        self.key
+    }
+    fn energy(&self) -> f64 {
+        self.energy
+    }
 }
 
 terraglue_subsystem::persist!(Push { key, mobilised, energy });

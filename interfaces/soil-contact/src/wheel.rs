@@ -4,6 +4,7 @@
 //! r·(n − ν) away from the lowest line, with ν the inward normal there. A flat foot, whose normals are all alike, and
 //! a sphere, which is round in both directions, do not roll.
 
+use crate::contact_memory::Remembered;
 use crate::patch::PatchNodes;
 use terraglue_soil_law::Rolling;
 
@@ -224,19 +225,14 @@ fn radius(nodes: impl Iterator<Item = ([f64; 3], [f64; 3])> + Clone, heading: [f
     (off.0 <= ROUND * off.1).then_some(radius)
 }
 
-/// Keeps the memories of the wheels that touch, in ascending order of their keys.
-pub fn remember(memories: &mut Vec<Memory>, wheel: &Wheel, x: &[f64; 6]) {
-    let new = wheel.rolled(x);
-    match memories.binary_search_by_key(&new.key, |m| m.key) {
-        Ok(k) => memories[k] = new,
-        Err(k) => memories.insert(k, new),
+impl Remembered for Memory {
+    /// A wheel that was never seen rolls forward without slip.
+    fn new(key: u64) -> Self {
+        Self { key, forward: true, ..Self::default() }
     }
-}
-
-/// The memory of a port; a wheel that was never seen rolls forward without slip.
-pub fn recall(memories: &[Memory], key: u64) -> Memory {
-    let found = memories.binary_search_by_key(&key, |m| m.key);
-    found.map_or(Memory { key, forward: true, ..Memory::default() }, |k| memories[k])
+    fn key(&self) -> u64 {
+        self.key
+    }
 }
 
 terraglue_subsystem::persist!(Memory { key, slip, forward, radius, heading });
@@ -244,6 +240,7 @@ terraglue_subsystem::persist!(Memory { key, slip, forward, radius, heading });
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::contact_memory::recall;
     use crate::patch::Facing;
 
     const RADIUS: f64 = 0.15;

@@ -190,16 +190,39 @@ impl Persist for f64 {
     }
 }
 
+impl Persist for f32 {
+    fn write(&self, out: &mut Vec<u8>) {
+        out.extend(self.to_le_bytes());
+    }
+    fn read(from: &mut &[u8]) -> Result<Self> {
+        take(from).map(Self::from_le_bytes)
+    }
+}
+
+/// Bytes that take a byte each; as numbers every second of them would take two.
+#[derive(Clone, Debug, Default, PartialEq, Eq)]
+pub struct Block(pub Vec<u8>);
+
+impl Persist for Block {
+    fn write(&self, out: &mut Vec<u8>) {
+        self.0.len().write(out);
+        out.extend(&self.0);
+    }
+    fn read(from: &mut &[u8]) -> Result<Self> {
+        let length = usize::read(from)?;
+        let (block, rest) = from.split_at_checked(length).ok_or_else(|| wrong("they end too early"))?;
+        *from = rest;
+        Ok(Self(block.to_vec()))
+    }
+}
+
 impl Persist for String {
     fn write(&self, out: &mut Vec<u8>) {
         self.len().write(out);
         out.extend(self.as_bytes());
     }
     fn read(from: &mut &[u8]) -> Result<Self> {
-        let length = usize::read(from)?;
-        let (text, rest) = from.split_at_checked(length).ok_or_else(|| wrong("they end too early"))?;
-        *from = rest;
-        Self::from_utf8(text.to_vec()).map_err(|_| wrong("a name is no text"))
+        Self::from_utf8(Block::read(from)?.0).map_err(|_| wrong("a name is no text"))
     }
 }
 
@@ -261,6 +284,17 @@ impl<A: Persist, B: Persist> Persist for (A, B) {
     }
 }
 
+impl<A: Persist, B: Persist, C: Persist> Persist for (A, B, C) {
+    fn write(&self, out: &mut Vec<u8>) {
+        self.0.write(out);
+        self.1.write(out);
+        self.2.write(out);
+    }
+    fn read(from: &mut &[u8]) -> Result<Self> {
+        Ok((A::read(from)?, B::read(from)?, C::read(from)?))
+    }
+}
+
 persist!(crate::Energy { kinetic, potential, dissipated, port_work, actuator_work, electrical });
 
 #[cfg(test)]
@@ -286,8 +320,9 @@ mod tests {
         gear: [Gear; 2],
         held: Option<f64>,
         name: String,
+        part: (f32, bool, Block),
     }
-    persist!(State { counts, largest, gear, held, name });
+    persist!(State { counts, largest, gear, held, name, part });
 
     fn state() -> State {
         State {
@@ -296,6 +331,7 @@ mod tests {
             gear: [Gear::On, Gear::Off],
             held: Some(-0.0),
             name: "Fuß".into(),
+            part: (f32::MIN_POSITIVE, true, Block(vec![0, 255])),
         }
     }
 

@@ -33,7 +33,8 @@ pub struct Energy {
     pub port_work: f64,
     /// Mechanical work that its own motors have put in since the start (Σ τ·ω·h, signed), and loads from outside.
     pub actuator_work: f64,
-    /// Electrical energy that its motors have drawn since the start.
+    /// Electrical energy that its motors have drawn since the start, where a drive with losses says so; not a number for motors
+    /// that are ideal.
     pub electrical: f64,
 }
 

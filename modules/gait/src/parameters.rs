@@ -139,6 +139,8 @@ fn feedback() -> Vec<Parameter> {
         number("tilt_integral_gain_per_s", "1/s", 0.8, "The same per second").within(0.0, 20.0),
         number("tilt_limit_rad", "rad", 0.15, "Largest tilt of the plane of the feet").within(0.0, 0.5),
         number("tilt_smoothing_s", "s", 0.2, "Time constant of the smoothing of roll and pitch").positive(),
+        number("heading_smoothing_s", "s", 0.2, "Time constant of the smoothing of the heading error")
+            .positive(),
         number("heading_gain_per_s", "1/s", 0.8, "Turn rate per heading error").within(0.0, 20.0),
         number("heading_turn_limit_rad_s", "rad/s", 0.2, "Largest turn rate for the heading").positive(),
     ]
@@ -208,6 +210,7 @@ fn gains(config: &Config) -> Result<Gains> {
         tilt: config.number("tilt_gain")?,
         tilt_integral: config.number("tilt_integral_gain_per_s")?,
         tilt_limit: config.number("tilt_limit_rad")?,
+        heading_smoothing_s: config.number("heading_smoothing_s")?,
         heading: config.number("heading_gain_per_s")?,
         turn_limit: config.number("heading_turn_limit_rad_s")?,
     })

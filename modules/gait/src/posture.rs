@@ -1,7 +1,8 @@
 //! The loop that is closed through the robot: measured tilt and heading correct the feet.
 //!
 //! Tilt: roll and pitch are smoothed, and a proportional and an integral part tilt the plane of the feet in the body
-//! frame against them: the low side is pushed out, the high side drawn in. Heading: the error turns the body.
+//! frame against them: the low side is pushed out, the high side drawn in. Heading: the smoothed error turns the body; taken
+//! as it is measured, it feeds the vibration of legs and ground about the vertical.
 
 /// Gains and limits.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -14,17 +15,20 @@ pub struct Gains {
     pub tilt_integral: f64,
     /// Largest tilt of the plane of the feet, rad.
     pub tilt_limit: f64,
+    /// Time constant of the smoothing of the heading error, s.
+    pub heading_smoothing_s: f64,
     /// Turn rate per heading error, 1/s.
     pub heading: f64,
     /// Largest turn rate of the heading correction, rad/s.
     pub turn_limit: f64,
 }
 
-/// Smoothed tilt and its integral.
+/// Smoothed tilt and its integral, smoothed heading error.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Posture {
     smooth: [f64; 2],
     integral: [f64; 2],
+    heading_error: f64,
     /// Tilt of the plane of the feet about x and y in the body frame that is in force, rad.
     pub correction: [f64; 2],
 }
@@ -51,6 +55,14 @@ impl Posture {
         }
     }
 
+    /// Turn rate that corrects the error of the heading (rad, wanted less measured, the short way round), rad/s; moves on by
+    /// `dt` s.
+    pub fn turn(&mut self, gains: &Gains, error: f64, dt: f64) -> f64 {
+        let share = dt / (gains.heading_smoothing_s + dt);
+        self.heading_error = wrap(self.heading_error + share * wrap(error - self.heading_error));
+        (gains.heading * self.heading_error).clamp(-gains.turn_limit, gains.turn_limit)
+    }
+
     /// By how much the foot at `p` (body frame, m) is raised, m. Positive roll lifts the left side (y > 0): its feet
     /// are drawn in. Positive pitch lowers the nose (x > 0): its feet are pushed out.
     pub fn raise(&self, p: [f64; 2]) -> f64 {
@@ -64,14 +76,9 @@ fn within(tilt: [f64; 2], limit: f64) -> [f64; 2] {
     if size > limit { tilt.map(|t| t * (limit / size)) } else { tilt }
 }
 
-/// Turn rate that corrects a heading error, rad/s; the error is taken the short way round.
-pub fn turn_towards(gains: &Gains, heading: f64, yaw: f64) -> f64 {
-    (gains.heading * wrap(heading - yaw)).clamp(-gains.turn_limit, gains.turn_limit)
-}
-
 /// An angle as −π … π, rad.
 pub fn wrap(angle: f64) -> f64 {
     libm::atan2(libm::sin(angle), libm::cos(angle))
 }
 
-terraglue_subsystem::persist!(Posture { smooth, integral, correction });
+terraglue_subsystem::persist!(Posture { smooth, integral, heading_error, correction });

@@ -6,7 +6,7 @@ use crate::load::Load;
 use crate::parameters::Settings;
 use crate::pattern::Pattern;
 use crate::plane::Plane;
-use crate::posture::{Posture, turn_towards, wrap};
+use crate::posture::{Posture, wrap};
 use terraglue_subsystem::Result;
 use terraglue_subsystem::bytes::{self, Persist};
 
@@ -230,11 +230,9 @@ impl Walker {
     fn slew(&mut self, settings: &Settings, command: &Command, dt: f64) {
         let change = |from: f64, to: f64, rate: f64| from + (to - from).clamp(-rate * dt, rate * dt);
         self.slewed.speed = change(self.slewed.speed, command.speed, settings.acceleration);
-        let correction = if command.heading_feedback {
-            turn_towards(&settings.gains, command.heading + self.turned, command.attitude[2])
-        } else {
-            0.0
-        };
+        let heading = command.heading + self.turned;
+        let error = if command.heading_feedback { heading - command.attitude[2] } else { 0.0 };
+        let correction = self.posture.turn(&settings.gains, wrap(error), dt);
         let wanted = command.turn_rate + correction;
         self.slewed.turn_rate = change(self.slewed.turn_rate, wanted, settings.turn_acceleration);
     }

@@ -249,7 +249,7 @@ fn a_heading_error_turns_the_robot_the_short_way() {
     assert!(read(&gait, "turn_rate_reached") < -0.1, "from −3 to 3 rad it is shorter through π");
     set(&mut gait, "heading_feedback", 0.0).expect("accepted");
     run(&mut gait, 3.0);
-    assert_eq!(read(&gait, "turn_rate_reached"), 0.0);
+    assert!(read(&gait, "turn_rate_reached").abs() < 1e-6, "the correction fades out with its smoothing");
 }
 
 #[test]

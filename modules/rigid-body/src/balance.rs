@@ -1,12 +1,14 @@
 //! Energy of the committed state, and how far its joints are out of place: what a run is judged by.
 
+use crate::actuator::Drivetrain;
 use crate::closure::Poses;
 use crate::dynamics::joint_rows::gap;
 use crate::model::Model;
 use crate::state::State;
 use terraglue_subsystem::Energy;
 
-/// Kinetic and potential energy beside the sums that the state keeps.
+/// Kinetic and potential energy beside the sums that the state keeps. What the motors drew is unknown unless a drive train
+/// with losses says it: an ideal motor has none, and the work that it does is no figure of what a supply has to give.
 pub(crate) fn energy(model: &Model, state: &State) -> Energy {
     let (mut kinetic, mut potential) = (0.0, 0.0);
     for (body, m) in model.bodies.iter().zip(&state.bodies) {
@@ -22,7 +24,9 @@ pub(crate) fn energy(model: &Model, state: &State) -> Energy {
         }
     }
     potential += state.closures.iter().filter(|s| !s.broken).map(|s| s.stored).sum::<f64>();
-    Energy { kinetic, potential, ..state.energy }
+    let modelled = state.joints.iter().any(|s| s.actuator.kind != Drivetrain::Ideal);
+    let electrical = if modelled { state.energy.electrical } else { f64::NAN };
+    Energy { kinetic, potential, electrical, ..state.energy }
 }
 
 /// Largest gap of a joint or of what closes a loop, in any of its rows, m or rad.

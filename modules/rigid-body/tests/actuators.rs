@@ -273,6 +273,19 @@ fn the_current_formula_of_the_preset_feeds_the_energy_book() {
 }
 
 #[test]
+fn what_ideal_motors_draw_is_unknown() {
+    let electrical = |name: &str, actuator: &str| {
+        let mut rig = rotor(name, actuator, r#", "motor": "torque""#);
+        rig.set("j.torque_target", 2.0);
+        steps(&mut rig, 10);
+        assert!(rig.robot.energy().is_known() && rig.robot.energy().actuator_work > 0.0);
+        rig.robot.energy().electrical
+    };
+    assert!(electrical("without_losses", "").is_nan());
+    assert!(electrical("with_losses", r#""preset": "mars-space-climber""#) > 0.0);
+}
+
+#[test]
 fn a_battery_sags_empties_and_starves_the_motor() {
     let battery = r#", "motor": "voltage", "max_torque": 1000,
         "battery": {"capacity_a_h": 0.01, "internal_resistance": 0.4, "open_circuit_v": [20, 24]}"#;

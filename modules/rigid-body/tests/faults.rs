@@ -170,11 +170,13 @@ fn a_restored_state_repeats_the_run_bit_by_bit() {
     rig.robot.save_state(1).unwrap();
     let t = rig.t;
     walk_in_place(&mut rig, 50);
-    let (first, energy) = (rig.states(), rig.robot.energy());
+    // as text, where what is unknown is the same as itself
+    let energy = |rig: &Rig| format!("{:?}", rig.robot.energy());
+    let first = (rig.states(), energy(&rig));
     rig.robot.restore_state(1).unwrap();
     rig.t = t;
     walk_in_place(&mut rig, 50);
-    assert_eq!((rig.states(), rig.robot.energy()), (first, energy));
+    assert_eq!((rig.states(), energy(&rig)), first);
     assert!(rig.robot.restore_state(3).is_err());
 }
 

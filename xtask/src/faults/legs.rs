@@ -14,6 +14,9 @@ const CASES: [(&str, &str, &str, &[&str]); 4] = [
 /// Step, s, and number of steps from record to record: the same times with either step.
 const STEPS: [(&str, &str); 2] = [("0.001", "10"), ("0.0005", "20")];
 
+/// What a fault moves, in parts of what halving the step moves of the same walk, is at least this.
+const LEAST_RATIO: f64 = 5.0;
+
 /// The four walks.
 pub struct Legs {
     /// With h = 1 ms, in the order of the table.
@@ -39,27 +42,48 @@ impl Legs {
         Ok(Self { walks, halved })
     }
 
+    /// Of a walk with h = 1 ms: path (mm) and heading (degrees) against the undisturbed walk, and against itself with half the step.
+    fn effects(&self, k: usize) -> Outcome<[(f64, f64); 2]> {
+        let walk = &self.walks[k].1;
+        Ok([walk.difference(&self.walks[0].1)?, walk.difference(&self.halved[k])?])
+    }
+
     /// The table of the page.
-    pub fn table(&self) -> String {
-        let mut text =
-            "| | path | heading | halving h: path | halving h: heading | lowest body | largest tilt |\n\
-                        |---|---|---|---|---|---|---|\n"
-                .to_owned();
-        for (k, ((_, walk), half)) in self.walks.iter().zip(&self.halved).enumerate() {
-            let text_of = |difference: Outcome<(f64, f64)>| {
-                difference
-                    .map_or_else(|e| (e, String::new()), |(p, h)| (format!("{p:.1} mm"), format!("{h:.2}°")))
+    pub fn table(&self) -> Outcome<String> {
+        let mut text = "| | path | heading | halving h: path | halving h: heading | fault over step: path | heading | lowest body | \
+                        largest tilt |\n|---|---|---|---|---|---|---|---|---|\n"
+            .to_owned();
+        for (k, (_, walk)) in self.walks.iter().enumerate() {
+            let [(path, heading), (half_path, half_heading)] = self.effects(k)?;
+            let [effect, ratio] = match k {
+                0 => [" | ".to_owned(), " | ".to_owned()],
+                _ => [
+                    format!("{path:.1} mm | {heading:.2}°"),
+                    format!("{:.0} | {:.0}", path / half_path, heading / half_heading),
+                ],
             };
-            let (path, heading) =
-                if k == 0 { Default::default() } else { text_of(walk.difference(&self.walks[0].1)) };
-            let (half_path, half_heading) = text_of(walk.difference(half));
             let lowest = walk.z.iter().copied().fold(f64::INFINITY, f64::min);
             let tilt = walk.tilt.iter().copied().fold(0.0, f64::max).to_degrees();
             text += &format!(
-                "| {} | {path} | {heading} | {half_path} | {half_heading} | {lowest:.2} m | {tilt:.1}° |\n",
+                "| {} | {effect} | {half_path:.1} mm | {half_heading:.2}° | {ratio} | {lowest:.2} m | {tilt:.1}° |\n",
                 CASES[k].0
             );
         }
-        text
+        Ok(text)
+    }
+
+    /// Whether each fault moves path and heading by [`LEAST_RATIO`] times what halving the step moves of the same walk.
+    pub fn hold(&self) -> Outcome {
+        for k in 1..CASES.len() {
+            let [(path, heading), (half_path, half_heading)] = self.effects(k)?;
+            if path < LEAST_RATIO * half_path || heading < LEAST_RATIO * half_heading {
+                return Err(format!(
+                    "{}: the fault moves path and heading by {path:.1} mm and {heading:.2}°, half the step by {half_path:.1} mm and \
+                     {half_heading:.2}°: less than {LEAST_RATIO} times as much shows the step and not the fault",
+                    CASES[k].0
+                ));
+            }
+        }
+        Ok(())
     }
 }

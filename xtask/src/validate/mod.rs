@@ -19,6 +19,7 @@ mod walk;
 pub use figure::{Figure, Limit};
 pub use soil::{print_hash as print_soil_hash, write_pictures as write_soil_pictures};
 pub use table::columns;
+pub use walk::write_picture as write_walk_picture;
 
 use crate::process::{Outcome, cargo, must, program, root};
 use known::KnownFailures;
@@ -46,12 +47,20 @@ pub struct Arguments {
     /// Write the tables of docs/.
     #[arg(long)]
     write_docs: bool,
+    /// Fail where the tables of docs/ show other figures; they are those of `--quick --no-timing`.
+    #[arg(long, requires_all = ["quick", "no_timing"], conflicts_with_all = ["part", "write_docs"])]
+    check_docs: bool,
 }
 
 impl Arguments {
+    /// What `cargo xtask docs` runs.
+    pub fn quick_for_docs() -> Self {
+        Self { no_timing: true, quick: true, write_docs: true, ..Self::default() }
+    }
+
     /// What `cargo xtask test` runs.
     pub fn quick_without_timing() -> Self {
-        Self { no_timing: true, quick: true, ..Self::default() }
+        Self { no_timing: true, quick: true, check_docs: true, ..Self::default() }
     }
 }
 
@@ -131,6 +140,9 @@ pub fn validate(arguments: &Arguments) -> Outcome {
         }
         if arguments.write_docs && context.table.is_none() && context.part.is_none() {
             documents::write_area(area, &figures)?;
+        }
+        if arguments.check_docs && context.table.is_none() {
+            complaints.extend(documents::check_area(area, &figures)?);
         }
     }
     if complaints.is_empty() { Ok(()) } else { Err(complaints.join("\n       ")) }

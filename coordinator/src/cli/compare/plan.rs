@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use terraglue::host::{Library, SearchPath};
-use terraglue::recording::compare;
+use terraglue::recording::compare::{self, Varied};
 use terraglue::scenario::{InputError, Scenario, did_you_mean, keys::STRATEGIES};
 use terraglue::subsystem::Kind;
 use terraglue::{Error, Result};
@@ -19,6 +19,8 @@ const REFERENCE_PART: f64 = 0.125;
 pub struct Plan {
     pub strategy: String,
     pub soil: String,
+    /// Other keys with their values.
+    pub varied: Varied,
     /// Whether the others are compared with it.
     pub is_reference: bool,
     /// Whether the comparison has several steps.
@@ -50,18 +52,21 @@ impl Plan {
 struct Wanted {
     strategies: Vec<String>,
     soils: Vec<String>,
+    varied: Vec<Varied>,
     steps: Vec<Option<f64>>,
 }
 
-/// Strategy, soil and step of one run.
+/// Strategy, soil, other keys and step of one run.
+#[derive(Clone)]
 struct Choice {
     strategy: String,
     soil: String,
+    varied: Varied,
     step_s: Option<f64>,
     is_reference: bool,
 }
 
-/// All combinations in the order strategies × soils × steps, then the references, each checked.
+/// All combinations in the order strategies × soils × other keys × steps, then the references, each checked.
 pub fn plan(arguments: &CompareArguments) -> Result<Vec<Plan>> {
     let base = Scenario::load(&arguments.run.scenario.scenario, &arguments.run.sets())?;
     soil_module::check(&base, &arguments.run.scenario)?;
@@ -69,14 +74,10 @@ pub fn plan(arguments: &CompareArguments) -> Result<Vec<Plan>> {
     let wanted = wanted(arguments, &base, soil.as_ref())?;
     let mut choices = Vec::new();
     for strategy in &wanted.strategies {
-        for soil in &wanted.soils {
-            let one = |step_s: &Option<f64>| Choice {
-                strategy: strategy.clone(),
-                soil: soil.clone(),
-                step_s: *step_s,
-                is_reference: false,
-            };
-            choices.extend(wanted.steps.iter().map(one));
+        for (soil, varied) in wanted.things() {
+            let (strategy, soil, varied) = (strategy.clone(), soil.clone(), varied.clone());
+            let one = Choice { strategy, soil, varied, step_s: None, is_reference: false };
+            choices.extend(wanted.steps.iter().map(|step_s| Choice { step_s: *step_s, ..one.clone() }));
         }
     }
     choices.extend(references(arguments, &wanted)?);
@@ -90,11 +91,49 @@ pub fn plan(arguments: &CompareArguments) -> Result<Vec<Plan>> {
     Ok(plans)
 }
 
+impl Wanted {
+    /// All that is simulated: each soil with each choice of the other keys.
+    fn things(&self) -> impl Iterator<Item = (&String, &Varied)> {
+        self.soils.iter().flat_map(|soil| self.varied.iter().map(move |varied| (soil, varied)))
+    }
+}
+
+/// Keys that have an option of their own.
+const OWN_OPTIONS: [(&str, &str); 3] =
+    [("gluing.strategy", "--strategies"), ("time.step_s", "--steps"), ("module", "--soils")];
+
+/// The product of the values of all `--vary`.
+fn varied(arguments: &CompareArguments, soil: Option<&Soil>) -> Result<Vec<Varied>> {
+    let mut all = vec![Varied::new()];
+    for (number, (key, values)) in arguments.vary.iter().enumerate() {
+        let module = soil.map(|s| format!("{}.module", s.name));
+        let own =
+            OWN_OPTIONS.iter().find(|(k, _)| k == key || (*k == "module" && module.as_ref() == Some(key)));
+        if let Some((_, option)) = own {
+            let message = format!("--vary {key}: this key has an option of its own");
+            return Err(
+                InputError::plain(message, Some(format!("write {option} {}", values.join(",")))).into()
+            );
+        }
+        if arguments.vary[..number].iter().any(|(k, _)| k == key) {
+            let help = Some("write all of its values into one, separated by commas".into());
+            return Err(InputError::plain(format!("--vary names `{key}` twice"), help).into());
+        }
+        let values = once("--vary", values, String::clone);
+        let with = |before: &Varied, value: &String| {
+            before.iter().cloned().chain([(key.clone(), value.clone())]).collect::<Varied>()
+        };
+        all = all.iter().flat_map(|before| values.iter().map(move |value| with(before, value))).collect();
+    }
+    Ok(all)
+}
+
 fn wanted(arguments: &CompareArguments, base: &Scenario, soil: Option<&Soil>) -> Result<Wanted> {
     for module in &arguments.soils {
         soil_module::require_soil(module, base, &arguments.run.scenario)?;
     }
     let strategies = match arguments.strategies.is_empty() {
+        true if !arguments.vary.is_empty() => vec![base.gluing.strategy.clone()],
         true => STRATEGIES.iter().map(|s| (*s).to_owned()).collect(),
         false => once("--strategies", &arguments.strategies, String::clone),
     };
@@ -112,7 +151,7 @@ fn wanted(arguments: &CompareArguments, base: &Scenario, soil: Option<&Soil>) ->
         true => vec![None],
         false => once("--steps", &arguments.steps, f64::to_string).into_iter().map(Some).collect(),
     };
-    Ok(Wanted { strategies, soils, steps })
+    Ok(Wanted { strategies, soils, varied: varied(arguments, soil)?, steps })
 }
 
 /// Every value once, in the order given; a note says which came again.
@@ -140,9 +179,14 @@ fn references(arguments: &CompareArguments, wanted: &Wanted) -> Result<Vec<Choic
         let several = wanted.steps.len() > 1;
         let finest = wanted.steps.iter().copied().flatten().reduce(f64::min);
         let step_s = given.or(finest.map(|h| if several { REFERENCE_PART * h } else { h }));
-        let one =
-            |soil: &String| Choice { strategy: name.clone(), soil: soil.clone(), step_s, is_reference: true };
-        return Ok(wanted.soils.iter().map(one).collect());
+        let one = |(soil, varied): (&String, &Varied)| Choice {
+            strategy: name.clone(),
+            soil: soil.clone(),
+            varied: varied.clone(),
+            step_s,
+            is_reference: true,
+        };
+        return Ok(wanted.things().map(one).collect());
     }
     if !Path::new(name).exists() {
         let help = did_you_mean(name, STRATEGIES.iter().copied());
@@ -169,10 +213,12 @@ fn planned(
     if let Some(soil) = soil {
         sets.push((format!("{}.module", soil.name), choice.soil.clone()));
     }
+    sets.extend(choice.varied.iter().cloned());
     Ok(Plan {
         scenario: Scenario::load(&arguments.run.scenario.scenario, &sets)?,
         strategy: choice.strategy,
         soil: choice.soil,
+        varied: choice.varied,
         is_reference: choice.is_reference,
         name_step,
         folder: PathBuf::new(),
@@ -182,10 +228,10 @@ fn planned(
 
 /// An earlier run must be one of the same thing as every row; rows that differ in strategy and step only are alike.
 fn check_folder(plans: &[Plan], folder: &Path) -> Result {
-    let mut soils: Vec<&str> = plans.iter().map(|p| p.soil.as_str()).collect();
-    soils.dedup();
-    let first = |soil: &str| plans.iter().find(|p| p.soil == soil);
-    soils.into_iter().filter_map(first).try_for_each(|p| compare::check_reference(&p.scenario, folder))
+    let same = |a: &Plan, b: &Plan| a.soil == b.soil && a.varied == b.varied;
+    let first = |(k, plan): &(usize, &Plan)| !plans[..*k].iter().any(|p| same(p, plan));
+    let mut firsts = plans.iter().enumerate().filter(first);
+    firsts.try_for_each(|(_, plan)| compare::check_reference(&plan.scenario, folder))
 }
 
 /// Wrong input shows before the first run starts; a strategy that cannot glue the scenario is a row that says so,

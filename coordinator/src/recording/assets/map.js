@@ -1,4 +1,4 @@
-// The ground from above: picture, outlines, footprints and path in metres; drag a rectangle to zoom.
+// The ground from above: picture, outlines, footprints, tracks and path in metres; drag a rectangle to zoom.
 class GroundMap {
   static margin = { left: 46, right: 8, top: 8, bottom: 34 };
 
@@ -7,7 +7,11 @@ class GroundMap {
     this.svg = document.getElementById("map-svg");
     this.readout = document.getElementById("map-readout");
     this.path = map.path && { x: unpack(map.path.x), y: unpack(map.path.y) };
-    this.outlines = map.outlines.map((o) => ({ name: o.name, x: unpack(o.x), y: unpack(o.y) }));
+    const line = (o) => ({ ...o, x: unpack(o.x), y: unpack(o.y) });
+    this.outlines = map.outlines.map(line);
+    this.marks = map.marks.map(line);
+    this.tracks = map.tracks.map((t) => ({ ...line(t), end: line(t.end) }));
+    if (map.nodes) unpackNodes(map.nodes).catch(() => {});
     this.view = map.image ? this.track() : this.whole();
     for (const button of document.querySelectorAll("#map [data-view]")) {
       button.onclick = () => this.show(button.dataset.view === "track" ? this.track() : this.whole());
@@ -22,8 +26,8 @@ class GroundMap {
 
   // What the feet and the body touched, with some air.
   track() {
-    const xs = [...(this.path?.x ?? []), ...this.map.prints.map((p) => p[0])];
-    const ys = [...(this.path?.y ?? []), ...this.map.prints.map((p) => p[1])];
+    const touched = [...(this.path ? [this.path] : []), ...this.marks, ...this.tracks];
+    const [xs, ys] = [touched.flatMap((l) => [...l.x]), touched.flatMap((l) => [...l.y])];
     if (!xs.length) return this.whole();
     const span = (values, limits) => {
       const [low, high] = [Math.min(...values), Math.max(...values)];
@@ -100,15 +104,27 @@ class GroundMap {
     label("y (m)", { x: 10, y: top + 12, transform: `rotate(-90 10 ${top + 12})`, "text-anchor": "end" });
   }
 
+  // Outlines of what was in the ground, and bands where it rolled or slid.
   drawPrints(group) {
-    for (const [x, y, radius, leg, from, to, force] of this.map.prints) {
-      const place = { cx: this.x(x), cy: this.y(y), r: Math.max(radius * this.scale, 2.5) };
-      svgElement(group, "circle", { class: "print-halo", ...place });
-      const circle = svgElement(group, "circle", { class: "print", ...place });
-      circle.style.stroke = colourOf(leg);
-      svgElement(circle, "title").textContent =
-        `${this.map.legs[leg]}: ${from.toFixed(2)} s to ${to.toFixed(2)} s, up to ${short(force, 3)} N`;
+    const said = (of) => {
+      const depth = Number.isFinite(of.depth) ? `, ${short(1e3 * of.depth, 2)} mm deep at the end` : "";
+      return `${this.map.legs[of.leg]}: ${of.from.toFixed(2)} s to ${of.to.toFixed(2)} s, up to ${short(of.force, 3)} N${depth}`;
+    };
+    const outline = (of, place) => {
+      const d = `${this.line(place)}Z`;
+      svgElement(group, "path", { class: "print-halo", d });
+      const print = svgElement(group, "path", { class: "print", d });
+      print.style.stroke = colourOf(of.leg);
+      svgElement(print, "title").textContent = said(of);
+    };
+    for (const track of this.tracks) {
+      const band = svgElement(group, "path", { class: "band", d: this.line(track) });
+      band.style.stroke = colourOf(track.leg);
+      band.style.strokeWidth = Math.max((track.width ?? 0) * this.scale, 3);
+      svgElement(band, "title").textContent = said(track);
+      outline(track, track.end);
     }
+    for (const mark of this.marks) outline(mark, mark);
   }
 
   // The path of an SVG line through these places.
@@ -140,7 +156,7 @@ class GroundMap {
     this.svg.onpointerdown = (event) => { from = this.at(event); this.svg.setPointerCapture(event.pointerId); };
     this.svg.onpointermove = (event) => {
       const at = this.at(event);
-      this.readout.textContent = `x = ${minus(at[0].toFixed(3))} m, y = ${minus(at[1].toFixed(3))} m`;
+      this.readout.textContent = groundText(this.map.nodes, ...at);
       this.drawBrush(from, at);
     };
     this.svg.onpointerup = (event) => {

@@ -153,11 +153,11 @@ class Plot {
     const { left, top } = Plot.margin;
     const [right, bottom] = [left + this.width, top + this.inner];
     const label = (text, attributes) => { svgElement(this.svg, "text", attributes).textContent = text; };
-    const { ticks, decimals } = niceTicks(...this.axis.window, this.width / 90);
-    for (const t of ticks) {
+    const across = this.acrossTicks();
+    for (const [t, text] of across.ticks) {
       const x = Math.round(this.x(t)) + 0.5;
       svgElement(this.svg, "line", { class: "grid", x1: x, x2: x, y1: top, y2: bottom });
-      label(minus(t.toFixed(decimals)), { x, y: bottom + 15, "text-anchor": "middle" });
+      label(text, { x, y: bottom + 15, "text-anchor": "middle" });
     }
     for (const [value, text] of this.valueTicks()) {
       const y = Math.round(this.y(value)) + 0.5;
@@ -165,7 +165,12 @@ class Plot {
       label(text, { x: left - 7, y: y + 4, "text-anchor": "end" });
     }
     svgElement(this.svg, "rect", { class: "frame", x: left + 0.5, y: top + 0.5, width: this.width, height: this.inner });
-    if (this.last) label("time (s)", { x: right, y: bottom + 30, "text-anchor": "end" });
+    if (this.last) label(across.title, { x: right, y: bottom + 30, "text-anchor": "end" });
+  }
+
+  acrossTicks() {
+    const { ticks, decimals } = niceTicks(...this.axis.window, this.width / 90);
+    return { ticks: ticks.map((t) => [t, minus(t.toFixed(decimals))]), title: "time (s)" };
   }
 
   valueTicks() {
@@ -282,12 +287,13 @@ function buildPlots() {
       axis.plots = axis.plots.filter((plot) => !parent.contains(plot.box));
       parent.replaceChildren();
       const panels = figure.panels.filter((p) => p.choice === null || p.choice === choice);
-      panels.forEach((panel, k) => new Plot(parent, panel, axis, times, k === panels.length - 1));
+      panels.forEach((panel, k) => {
+        const last = k === panels.length - 1;
+        if (panel.x) new XyPlot(parent, panel, last); else new Plot(parent, panel, axis, times, last);
+      });
     };
     show(figure.chosen);
     const select = document.querySelector(`[data-choose="${figure.id}"]`);
     if (select) select.onchange = () => show(Number(select.value));
   }
 }
-
-buildPlots();

@@ -147,6 +147,9 @@ pub(crate) const ALL: &[Column] = &[
     column!("max_estimate_gap_n", "", "largest |T* − T1|", "N", Neither, |r| of(r, |s| s
         .max_estimate_gap_n)),
     column!("max_sinkage_m", "", "deepest print", "m", Neither, |r| r.summary.as_ref()?.max_sinkage_m),
+    column!("print_depth_m", "", "median print", "m", Neither, |r| {
+        Some(r.summary.as_ref()?.print_depth?.median_m)
+    }),
     column!("distance_m", "", "distance", "m", Largest, |r| r.summary.as_ref()?.distance_m),
     column!("mean_sinkage_m", "", "mean sinkage", "m", Neither, |r| r.summary.as_ref()?.mean_sinkage_m),
     column!("path_m", "", "path", "m", Neither, |r| r.summary.as_ref()?.path_m),

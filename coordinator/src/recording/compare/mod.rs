@@ -3,6 +3,8 @@
 //! A run that diverged is data: its row says so and when, and keeps the figures up to then.
 
 mod columns;
+mod grounds;
+mod overview;
 mod page;
 mod reference;
 mod same;
@@ -25,6 +27,9 @@ pub const COMPARE_TABLE: &str = "compare.csv";
 /// The comparison with all of every summary.
 pub const COMPARE_JSON: &str = "compare.json";
 
+/// Key paths of a scenario with the values of one run.
+pub type Varied = Vec<(String, String)>;
+
 /// One run of a comparison.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct CompareRow {
@@ -32,6 +37,8 @@ pub struct CompareRow {
     pub strategy: String,
     /// Soil module.
     pub soil: String,
+    /// What else differs from row to row: key paths of the scenario and their values.
+    pub varied: Varied,
     /// Its figures; `None` where the run could not even start.
     pub summary: Option<Summary>,
     /// Its results folder, for the curves and the link to its report.
@@ -68,13 +75,27 @@ pub struct Orders {
     pub path: Option<f64>,
 }
 
+/// A varied value in a name: itself where it is a word, with its key where it is a number, a truth value or a list.
+fn choice(key: &str, value: &str) -> String {
+    let plain = value.trim_matches(|c| c == '"' || c == '\'');
+    let word = plain.starts_with(char::is_alphabetic) && !["true", "false", "inf", "nan"].contains(&plain);
+    let name = key.rsplit('.').next().unwrap_or(key);
+    if word { plain.to_owned() } else { format!("{name} {plain}") }
+}
+
 impl CompareRow {
+    /// Whether another row simulates the same, by another strategy or step.
+    pub fn is_like(&self, other: &Self) -> bool {
+        self.soil == other.soil && self.varied == other.varied
+    }
+
     /// Name of the run.
     pub fn name(&self) -> String {
         let mut name = self.strategy.clone();
         if !self.soil.is_empty() {
             name += &format!(" · {}", self.soil);
         }
+        name.extend(self.varied.iter().map(|(key, value)| format!(" · {}", choice(key, value))));
         if self.name_step {
             name += &format!(" · {} ms", (1e9 * self.step_s).round() / 1e6);
         }
@@ -100,9 +121,10 @@ impl CompareRow {
     }
 }
 
-/// Writes `compare.html`, `compare.csv` and `compare.json` into a folder.
+/// Reads the recordings of all rows and writes `compare.html`, `compare.csv` and `compare.json` into a folder.
 pub fn write(folder: &Path, rows: &[CompareRow]) -> Result {
     std::fs::create_dir_all(folder).map_err(at(folder))?;
+    let runs = page::open(rows);
     let path = folder.join(COMPARE_TABLE);
     table::write_csv(&path, rows).map_err(other_at(&path))?;
     let path = folder.join(COMPARE_JSON);
@@ -110,12 +132,12 @@ pub fn write(folder: &Path, rows: &[CompareRow]) -> Result {
     text.push('\n');
     std::fs::write(&path, text).map_err(at(&path))?;
     let path = folder.join(COMPARE_PAGE);
-    std::fs::write(&path, page::render(folder, rows)).map_err(at(&path))
+    std::fs::write(&path, page::render(folder, rows, &runs)).map_err(at(&path))
 }
 
-/// The comparison for a terminal: one column per run, the best figure of each line marked with `*`.
-pub fn terminal_table(rows: &[CompareRow]) -> String {
-    table::terminal(rows)
+/// The comparison for a terminal: one line per run with what tells most; `details`: all figures, one column per run.
+pub fn terminal_table(rows: &[CompareRow], details: bool) -> String {
+    if details { table::terminal(rows) } else { overview::terminal(rows) }
 }
 
 /// The folder of a row as it is seen from the comparison's folder.
@@ -129,6 +151,8 @@ fn json(folder: &Path, rows: &[CompareRow]) -> Value {
         let mut object = Map::new();
         object.insert("strategy".into(), row.strategy.as_str().into());
         object.insert("soil".into(), row.soil.as_str().into());
+        let varied = row.varied.iter().map(|(key, value)| (key.clone(), value.as_str().into()));
+        object.insert("varied".into(), Value::Object(varied.collect()));
         object.insert("error".into(), row.failure().into());
         for column in columns::ALL {
             object.insert(column.key.into(), (column.value)(row).into());

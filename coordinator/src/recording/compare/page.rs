@@ -1,7 +1,8 @@
 //! `compare.html`: the table with the best figure of each column marked, and curves of all runs in one picture.
 
 use crate::recording::compare::scatter::{self, Series};
-use crate::recording::compare::{CompareRow, columns, relative};
+use crate::recording::compare::table::{varied, varied_keys};
+use crate::recording::compare::{CompareRow, columns, grounds, relative};
 use crate::recording::reader::Recording;
 use crate::recording::report::energy_card;
 use crate::recording::report::figure::{Curve, Figure, Panel};
@@ -13,7 +14,9 @@ use std::fmt::Write;
 use std::path::Path;
 
 /// A run with what its recording shows.
-struct Run {
+pub(crate) struct Run {
+    /// Number of its row.
+    pub row: usize,
     name: String,
     colour: usize,
     recording: Recording,
@@ -21,7 +24,7 @@ struct Run {
 }
 
 /// The page as text.
-pub(crate) fn render(folder: &Path, rows: &[CompareRow]) -> String {
+pub(crate) fn render(folder: &Path, rows: &[CompareRow], runs: &[Run]) -> String {
     let scenario = rows.iter().find_map(|r| r.summary.as_ref()).map_or("", |s| &s.scenario);
     let mut page = Page::wide(&format!("{scenario}: comparison"));
     let ended = rows.iter().filter(|r| r.failure().is_none()).count();
@@ -33,11 +36,17 @@ pub(crate) fn render(folder: &Path, rows: &[CompareRow]) -> String {
     let books = rows.iter().filter_map(|r| Some((r.name(), &r.summary.as_ref()?.energies)));
     page.section("Where the energy went", "energies", &energy_card::table(books));
     page.section("At a glance", "figures", &html_table(folder, rows));
+    let shown: Vec<_> = runs
+        .iter()
+        .filter_map(|run| Some((run.name.as_str(), relative(folder, &rows[run.row])?, &run.recording)))
+        .collect();
+    if let Some(html) = grounds::pictures(&shown) {
+        page.section("Grounds side by side", "grounds", &html);
+    }
     for (title, id, html) in diagrams(rows) {
         page.section(title, id, &html);
     }
-    let runs: Vec<Run> = rows.iter().enumerate().filter_map(|(k, row)| open(k, row)).collect();
-    for figure in [gluing(&runs), forces(&runs), body(&runs)].into_iter().flatten() {
+    for figure in [gluing(runs), forces(runs), body(runs)].into_iter().flatten() {
         page.figure(figure);
     }
     page.finish()
@@ -45,20 +54,19 @@ pub(crate) fn render(folder: &Path, rows: &[CompareRow]) -> String {
 
 /// Error against the reference over the step and over the work, one line per strategy and soil.
 fn diagrams(rows: &[CompareRow]) -> Vec<(&'static str, &'static str, String)> {
-    let judged = rows.iter().filter(|r| !r.is_reference);
-    let mut names: Vec<(&str, &str)> = judged.map(|r| (r.strategy.as_str(), r.soil.as_str())).collect();
-    names.dedup();
+    let same = |a: &CompareRow, b: &CompareRow| a.strategy == b.strategy && a.is_like(b);
+    let mut lines: Vec<&CompareRow> = rows.iter().filter(|r| !r.is_reference).collect();
+    lines.dedup_by(|a, b| same(a, b));
     let series = |x: fn(&CompareRow) -> Option<f64>| -> Vec<Series> {
-        let one = |(colour, (strategy, soil)): (usize, &(&str, &str))| {
-            let own =
-                rows.iter().filter(|r| r.strategy == *strategy && r.soil == *soil && r.failure().is_none());
+        let one = |(colour, line): (usize, &&CompareRow)| {
+            let own = rows.iter().filter(|r| same(r, line) && r.failure().is_none());
             let mut points: Vec<(f64, f64)> =
                 own.filter_map(|r| Some((x(r)?, r.reference_error_m?))).collect();
             points.sort_by(|a, b| a.0.total_cmp(&b.0));
-            let name = if soil.is_empty() { (*strategy).to_owned() } else { format!("{strategy} · {soil}") };
+            let name = CompareRow { name_step: false, ..(*line).clone() }.name();
             Series { name, colour, points }
         };
-        names.iter().enumerate().map(one).collect()
+        lines.iter().enumerate().map(one).collect()
     };
     let work = |r: &CompareRow| {
         let s = r.summary.as_ref()?;
@@ -73,18 +81,23 @@ fn diagrams(rows: &[CompareRow]) -> Vec<(&'static str, &'static str, String)> {
     .collect()
 }
 
-/// A recording that cannot be read leaves its row without curves; the table says what went wrong with the run.
-fn open(colour: usize, row: &CompareRow) -> Option<Run> {
-    let recording = Recording::open(row.folder.as_deref()?).ok()?;
-    let legs = footprints::legs(&recording);
-    Some(Run { name: row.name(), colour, recording, legs })
+/// The recordings of all rows. One that cannot be read leaves its row without curves; the table says what went wrong with
+/// the run.
+pub(crate) fn open(rows: &[CompareRow]) -> Vec<Run> {
+    let one = |(row, of): (usize, &CompareRow)| {
+        let recording = Recording::open(of.folder.as_deref()?).ok()?;
+        let legs = footprints::legs(&recording);
+        Some(Run { row, name: of.name(), colour: row, recording, legs })
+    };
+    rows.iter().enumerate().filter_map(one).collect()
 }
 
 fn html_table(folder: &Path, rows: &[CompareRow]) -> String {
     let shown: Vec<&columns::Column> = columns::ALL.iter().filter(|c| c.is_shown(rows)).collect();
     let marks: Vec<Vec<bool>> = shown.iter().map(|c| columns::best(c, rows)).collect();
     let mut out = String::from("<div class=\"wide\"><table class=\"rows\"><thead><tr>");
-    head(&mut out, &shown);
+    let keys = varied_keys(rows);
+    head(&mut out, &keys, &shown);
     out.push_str("</tr></thead><tbody>");
     for (k, row) in rows.iter().enumerate() {
         let failure = row.failure();
@@ -97,7 +110,8 @@ fn html_table(folder: &Path, rows: &[CompareRow]) -> String {
             strategy.push_str(" (reference)");
         }
         let form = row.summary.as_ref().map_or("–", |s| &s.form);
-        for text in [strategy, escape(&row.soil), escape(form)] {
+        let others = keys.iter().map(|key| escape(varied(row, key)));
+        for text in [strategy, escape(&row.soil)].into_iter().chain(others).chain([escape(form)]) {
             let _ = write!(out, "<td class=\"name\">{text}</td>");
         }
         for (column, best) in shown.iter().zip(&marks) {
@@ -106,7 +120,7 @@ fn html_table(folder: &Path, rows: &[CompareRow]) -> String {
         }
         out.push_str("</tr>");
         if let Some(failure) = failure {
-            let span = shown.len() + 3;
+            let span = shown.len() + keys.len() + 3;
             let _ = write!(
                 out,
                 "<tr class=\"failed\"><td class=\"why\" colspan=\"{span}\">{}</td></tr>",
@@ -119,9 +133,9 @@ fn html_table(folder: &Path, rows: &[CompareRow]) -> String {
 }
 
 /// Two lines of heads: groups over their columns, single columns over both lines.
-fn head(out: &mut String, shown: &[&columns::Column]) {
-    for name in ["strategy", "soil", "form"] {
-        let _ = write!(out, "<th class=\"name\" rowspan=\"2\">{name}</th>");
+fn head(out: &mut String, keys: &[&str], shown: &[&columns::Column]) {
+    for name in ["strategy", "soil"].iter().chain(keys).chain(&["form"]) {
+        let _ = write!(out, "<th class=\"name\" rowspan=\"2\">{}</th>", escape(name));
     }
     for group in shown.chunk_by(|a, b| a.group == b.group && !a.group.is_empty()) {
         let (n, first) = (group.len(), group[0]);

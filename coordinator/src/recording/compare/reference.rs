@@ -7,14 +7,14 @@ use crate::recording::reader::{PoseSeries, Recording};
 use crate::recording::summary::Summary;
 use std::path::Path;
 
-/// Fills in the error of every row of a soil (of all rows where `soil` is none) against a recording.
+/// Fills in the error of every row that simulates the same as `like` (of all rows where that is none) against a recording.
 ///
 /// # Errors
 /// The recording cannot be read.
-pub fn judge(rows: &mut [CompareRow], soil: Option<&str>, folder: &Path) -> Result {
+pub fn judge(rows: &mut [CompareRow], like: Option<&CompareRow>, folder: &Path) -> Result {
     let reference = open(folder)?;
     let Some((_, truth)) = reference.reported_body() else { return Ok(()) };
-    for row in rows.iter_mut().filter(|r| soil.is_none_or(|s| s == r.soil) && !r.is_reference) {
+    for row in rows.iter_mut().filter(|r| like.is_none_or(|l| l.is_like(r)) && !r.is_reference) {
         let Some(own) = row.folder.as_deref().and_then(|f| Recording::open(f).ok()) else { continue };
         let Some((_, poses)) = own.reported_body() else { continue };
         // a run that ended early was not far off for long: its error would look better than it is
@@ -23,13 +23,13 @@ pub fn judge(rows: &mut [CompareRow], soil: Option<&str>, folder: &Path) -> Resu
     orders(rows);
     let truth = if folder.is_dir() { Summary::read(folder).ok() } else { None };
     if let Some(truth) = truth {
-        figure_orders(rows, soil, &truth);
+        figure_orders(rows, like, &truth);
     }
     Ok(())
 }
 
 /// Orders of the figures of whole runs, where the reference tells them too.
-fn figure_orders(rows: &mut [CompareRow], soil: Option<&str>, truth: &Summary) {
+fn figure_orders(rows: &mut [CompareRow], like: Option<&CompareRow>, truth: &Summary) {
     type Figure = fn(&Summary) -> Option<f64>;
     type Place = fn(&mut Orders) -> &mut Option<f64>;
     let all: [(Figure, Place); 3] = [
@@ -40,7 +40,7 @@ fn figure_orders(rows: &mut [CompareRow], soil: Option<&str>, truth: &Summary) {
     for (figure, place) in all {
         let Some(known) = figure(truth) else { continue };
         let error = |r: &CompareRow| {
-            let whole = r.failure().is_none() && !r.is_reference && soil.is_none_or(|s| s == r.soil);
+            let whole = r.failure().is_none() && !r.is_reference && like.is_none_or(|l| l.is_like(r));
             let own = r.summary.as_ref().filter(|_| whole).and_then(figure)?;
             // what agrees to rounding and the tolerance of the iterations has no order
             Some((own - known).abs()).filter(|e| *e > 1e-9 * known.abs().max(1e-3))
@@ -94,12 +94,12 @@ fn orders(rows: &mut [CompareRow]) {
     rows.iter_mut().zip(orders).for_each(|(row, order)| row.order = order);
 }
 
-/// Observed order of an error of each row against the row of the same strategy and soil with the next smaller step.
+/// Observed order of an error of each row against the row of the same strategy and thing with the next smaller step.
 fn orders_of(rows: &[CompareRow], error: impl Fn(&CompareRow) -> Option<f64>) -> Vec<Option<f64>> {
     let order = |row: &CompareRow| {
         let own = error(row)?;
         let finer = |r: &&CompareRow| {
-            r.strategy == row.strategy && r.soil == row.soil && r.step_s < row.step_s * (1.0 - 1e-9)
+            r.strategy == row.strategy && r.is_like(row) && r.step_s < row.step_s * (1.0 - 1e-9)
         };
         let known = rows.iter().filter(finer).filter_map(|r| Some((r.step_s, error(r)?)));
         let (h, e) = known.max_by(|a, b| a.0.total_cmp(&b.0))?;

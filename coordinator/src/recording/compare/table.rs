@@ -59,12 +59,15 @@ pub(crate) fn terminal(rows: &[CompareRow]) -> String {
         true => format!("{} (reference)", r.strategy),
         false => r.strategy.clone(),
     };
-    let words: [(&str, Vec<String>); 3] = [
-        ("strategy", rows.iter().map(strategy).collect()),
-        ("soil", rows.iter().map(|r| r.soil.clone()).collect()),
-        ("form", rows.iter().map(form).collect()),
+    let mut words: Vec<(String, Vec<String>)> = vec![
+        ("strategy".into(), rows.iter().map(strategy).collect()),
+        ("soil".into(), rows.iter().map(|r| r.soil.clone()).collect()),
+        ("form".into(), rows.iter().map(form).collect()),
     ];
-    let names = words.iter().map(|w| w.0.to_owned()).chain(shown.iter().map(|c| c.name()));
+    for (k, key) in varied_keys(rows).into_iter().enumerate() {
+        words.insert(2 + k, (key.into(), rows.iter().map(|r| varied(r, key).to_owned()).collect()));
+    }
+    let names = words.iter().map(|w| w.0.clone()).chain(shown.iter().map(|c| c.name()));
     let columns: Vec<&Vec<String>> = words.iter().map(|w| &w.1).chain(&cells).collect();
     if many {
         table.set_header(names);
@@ -89,13 +92,22 @@ pub(crate) fn terminal(rows: &[CompareRow]) -> String {
     } else {
         "* best of the line"
     };
-    let mut out = format!("{}\n{table}\n{best}\n", energies(rows));
-    for row in rows {
-        if let Some(failure) = row.failure() {
-            out.push_str(&format!("{}: {failure}\n", row.name()));
-        }
-    }
-    out
+    format!("{}\n{table}\n{best}\n{}", energies(rows), failures(rows))
+}
+
+/// A line for every run that did not reach its end.
+pub(crate) fn failures(rows: &[CompareRow]) -> String {
+    rows.iter().filter_map(|row| Some(format!("{}: {}\n", row.name(), row.failure()?))).collect()
+}
+
+/// The keys that `--vary` names, in its order.
+pub(crate) fn varied_keys(rows: &[CompareRow]) -> Vec<&str> {
+    rows.first().into_iter().flat_map(|r| r.varied.iter().map(|(key, _)| key.as_str())).collect()
+}
+
+/// The value of such a key.
+pub(crate) fn varied<'a>(row: &'a CompareRow, key: &str) -> &'a str {
+    row.varied.iter().find(|(k, _)| k == key).map_or("", |(_, value)| value)
 }
 
 /// Where the energy of every run went, one line per run; drifts beyond 1 % are red and marked with `!`.
@@ -127,13 +139,16 @@ fn energies(rows: &[CompareRow]) -> Table {
 pub(crate) fn write_csv(path: &Path, rows: &[CompareRow]) -> csv::Result<()> {
     let mut out = csv::Writer::from_path(path)?;
     let keys = columns::ALL.iter().map(|c| c.key);
-    out.write_record(["strategy", "soil", "form"].into_iter().chain(keys).chain(["error"]))?;
+    let more = varied_keys(rows);
+    let heads = ["strategy", "soil", "form"].into_iter().chain(keys).chain(["error"]);
+    out.write_record(heads.chain(more.iter().copied()))?;
     for row in rows {
         let form = row.summary.as_ref().map_or("", |s| &s.form);
         let words = [row.strategy.as_str(), &row.soil, form].map(str::to_owned);
         let figures = columns::ALL.iter().map(|c| (c.value)(row).map_or_else(String::new, |v| v.to_string()));
         let failure = row.failure().unwrap_or_default();
-        out.write_record(words.into_iter().chain(figures).chain([failure]))?;
+        let others = more.iter().map(|key| varied(row, key).to_owned());
+        out.write_record(words.into_iter().chain(figures).chain([failure]).chain(others))?;
     }
     out.flush()?;
     Ok(())

@@ -5,6 +5,9 @@ use crate::recording::report::html::{escape, number, with_prefix};
 use crate::recording::summary::Summary;
 use std::fmt::Write;
 
+/// A smaller share of the energies that drifts is nothing to be told in digits.
+const SMALLEST_SHARE: f64 = 1e-5;
+
 /// One figure.
 struct Card {
     label: &'static str,
@@ -12,25 +15,31 @@ struct Card {
     unit: String,
     /// Smaller line below.
     more: String,
+    /// Whether it is red.
+    off: bool,
 }
 
 impl Card {
     fn new(label: &'static str, value: (String, String), more: impl Into<String>) -> Self {
-        Self { label, value: value.0, unit: value.1, more: more.into() }
+        Self { label, value: value.0, unit: value.1, more: more.into(), off: false }
     }
 }
 
-/// The cards as HTML.
+/// The cards as HTML: first what a run is judged by, then the rest.
 pub(crate) fn render(recording: &Recording, summary: Option<&Summary>) -> String {
-    let cards = match summary {
-        Some(summary) => from_summary(summary),
-        None => from_recording(recording),
-    };
-    let mut out = String::from(r#"<dl class="cards">"#);
+    match summary {
+        Some(s) => list("cards first", first(s)) + &list("cards", rest(s)),
+        None => list("cards", from_recording(recording)),
+    }
+}
+
+fn list(class: &str, cards: impl IntoIterator<Item = Card>) -> String {
+    let mut out = format!(r#"<dl class="{class}">"#);
     for c in cards {
         let _ = write!(
             out,
-            r#"<div class="card"><dt>{}</dt><dd><b>{}</b>&#8239;<span class="unit">{}</span></dd><p>{}</p></div>"#,
+            r#"<div class="card{}"><dt>{}</dt><dd><b>{}</b>&#8239;<span class="unit">{}</span></dd><p>{}</p></div>"#,
+            if c.off { " off" } else { "" },
             c.label,
             c.value,
             escape(&c.unit),
@@ -61,38 +70,108 @@ fn text(value: (String, String)) -> String {
     format!("{}\u{2009}{}", value.0, value.1)
 }
 
-fn from_summary(s: &Summary) -> Vec<Card> {
+/// What a roboticist asks first, in this order.
+fn first(s: &Summary) -> impl Iterator<Item = Card> {
+    let real_time =
+        format!("{} s wall, {} s CPU, {} steps", number(s.wall_s, 3), number(s.cpu_s, 3), s.steps);
+    [
+        distance(s),
+        energy_per_metre(s),
+        Some(balance(s)),
+        print_depth(s),
+        s.peak_force_over_weight.map(|f| {
+            Card::new(
+                "Peak force",
+                (number(f, 3), "× weight".into()),
+                "of the ground on all feet or wheels together",
+            )
+        }),
+        Some(Card::new("Real-time factor", pure(s.real_time_factor, 3), real_time)),
+    ]
+    .into_iter()
+    .flatten()
+}
+
+fn distance(s: &Summary) -> Option<Card> {
+    let d = s.distance_m?;
+    let more = match s.commanded_distance_m {
+        Some(c) if c > 0.0 => format!("{} % of the {} m asked for", number(100.0 * d / c, 3), number(c, 4)),
+        _ => "along the initial heading".into(),
+    };
+    Some(Card::new("Distance", (number(d, 4), "m".into()), more))
+}
+
+/// Electrical where a drive with losses says it, else the work of the motors.
+fn energy_per_metre(s: &Summary) -> Option<Card> {
+    let cost =
+        |c: Option<f64>| c.map_or_else(String::new, |c| format!("; cost of transport {}", number(c, 3)));
+    let mechanical = s.energy_j_per_m.filter(|e| *e > 0.0)?;
+    let (label, electrical) = ("Energy per metre", s.electrical_energy_j_per_m.filter(|e| *e > 0.0));
+    let Some(electrical) = electrical else {
+        let more = format!("work of the motors, driving and braking{}", cost(s.cost_of_transport));
+        return Some(Card::new(label, per_metre(mechanical), more));
+    };
+    let work = match s.cost_of_transport {
+        Some(c) => format!(" ({} by the work of the motors alone)", number(c, 3)),
+        None => String::new(),
+    };
+    let more = format!("electrical{}{work}", cost(s.electrical_cost_of_transport));
+    Some(Card::new(label, per_metre(electrical), more))
+}
+
+fn per_metre(energy_j_per_m: f64) -> (String, String) {
+    let (value, unit) = with_prefix(energy_j_per_m, "J", 3);
+    (value, format!("{unit}/m"))
+}
+
+fn balance(s: &Summary) -> Card {
+    let e = &s.energies;
+    let drift = |drift_j: f64| text(with_prefix(drift_j, "J", 2));
+    let (value, more) = match (e.drift_share(), e.drift_j) {
+        (Some(share), _) if share.abs() < SMALLEST_SHARE => {
+            (("< 0.001".into(), "%".into()), e.measure().into())
+        }
+        (Some(share), Some(drift_j)) => {
+            let more = format!("{}: a drift of {}", e.measure(), drift(drift_j));
+            ((number(100.0 * share, 2), "%".into()), more)
+        }
+        (_, Some(drift_j)) => (with_prefix(drift_j, "J", 2), "drift; nothing was turned over".into()),
+        (_, None) => (unknown(), escape(&e.why_unknown())),
+    };
+    Card { off: e.is_off(), ..Card::new("Energy balance", value, more) }
+}
+
+fn print_depth(s: &Summary) -> Option<Card> {
+    let p = s.print_depth?;
+    let [low, high] = [p.p10_m, p.p90_m].map(|z| text(with_prefix(z, "m", 2)));
+    let more = format!("median of {}, below the initial surface; 10 % to 90 %: {low} to {high}", p.count);
+    Some(Card::new("Depth of the prints", with_prefix(p.median_m, "m", 2), more))
+}
+
+fn rest(s: &Summary) -> Vec<Card> {
     let mut cards = Vec::new();
-    if let Some(d) = s.distance_m {
-        let more = match s.commanded_distance_m {
-            Some(c) if c > 0.0 => {
-                format!("{} % of the commanded {} m", number(100.0 * d / c, 3), number(c, 3))
-            }
-            _ => "along the initial heading".into(),
-        };
-        cards.push(Card::new("Distance", (number(d, 4), "m".into()), more));
-    }
     if let (Some(roll), Some(pitch)) = (s.max_roll_rad, s.max_pitch_rad) {
         let tilt = roll.max(pitch);
         let more = format!("roll {}, pitch {}", text(degrees(roll)), text(degrees(pitch)));
         cards.push(Card::new("Largest tilt", degrees(tilt), more));
     }
-    if let Some(z) = s.max_sinkage_m {
-        cards.push(Card::new("Deepest print", with_prefix(z, "m", 3), "below the initial surface"));
+    if let Some(h) = s.height_gained_m {
+        // below a micrometre it is rounding
+        let h = 1e-6 * (1e6 * h).round();
+        cards.push(Card::new(
+            "Height gained",
+            with_prefix(h, "m", 3),
+            "of the reported body, against gravity",
+        ));
     }
     if s.energy_j > 0.0 {
-        let more = match s.cost_of_transport {
-            Some(c) => format!("cost of transport {}", number(c, 3)),
-            None => "at the motors".into(),
-        };
-        cards.push(Card::new("Motor energy", with_prefix(s.energy_j, "J", 4), more));
+        let braking = text(with_prefix(s.energies.braking_j, "J", 3));
+        let more = format!("mechanical, driving; braking takes {braking} out");
+        cards.push(Card::new("Work of the motors", with_prefix(s.energies.driving_j, "J", 3), more));
     }
     if let Some(electrical_j) = s.electrical_energy_j.filter(|e| *e > 0.0) {
-        let more = s.electrical_energy_j_per_m.map_or_else(
-            || "drawn by the motors".into(),
-            |e| format!("{} per metre", text(with_prefix(e, "J", 4))),
-        );
-        cards.push(Card::new("Electrical energy", with_prefix(electrical_j, "J", 4), more));
+        let more = "drawn by the motors, with the losses of their drives";
+        cards.push(Card::new("Electrical energy", with_prefix(electrical_j, "J", 3), more));
     }
     let more = format!("bodies, at most {}; soil {}", s.evaluations_max, number(s.evaluations_soil_mean, 3));
     cards.push(Card::new("Evaluations a step", pure(s.evaluations_mean, 3), more));
@@ -111,8 +190,6 @@ fn from_summary(s: &Summary) -> Vec<Card> {
     if let Some(e) = s.soil_mass_error_relative {
         cards.push(Card::new("Soil mass error", pure(e, 2), "relative to the soil moved"));
     }
-    let more = format!("{} s wall, {} s CPU, {} steps", number(s.wall_s, 3), number(s.cpu_s, 3), s.steps);
-    cards.push(Card::new("Real-time factor", pure(s.real_time_factor, 3), more));
     cards
 }
 

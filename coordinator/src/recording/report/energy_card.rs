@@ -49,6 +49,13 @@ pub(crate) fn render(e: &Energies) -> String {
         let off = if drift && e.is_off() { " off" } else { "" };
         let more = match label {
             "drift" => judgement(e),
+            "work of motors and loads" if e.driving_j > 0.0 || e.braking_j > 0.0 => {
+                format!(
+                    "net; motors: {} driving, {} braking",
+                    text(Some(e.driving_j)),
+                    text(Some(e.braking_j))
+                )
+            }
             "work of motors and loads" if !e.by_ports => {
                 format!("net; {} to and fro", text(Some(e.turnover_j)))
             }

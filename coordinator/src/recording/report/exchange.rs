@@ -12,7 +12,10 @@ const LISTED: usize = 60;
 /// The section of a run's folder; none where it holds no explanation.
 pub(crate) fn render(folder: &Path) -> Option<String> {
     let explanation = read_exchange(folder)?;
-    let mut out = String::from("<ol>");
+    let mut out = format!(
+        "<details><summary>order of a step, {} connections, cost of each subsystem</summary><ol>",
+        explanation.connections.len()
+    );
     for line in &explanation.order {
         let _ = write!(out, "<li>{}</li>", escape(line));
     }
@@ -22,7 +25,7 @@ pub(crate) fn render(folder: &Path) -> Option<String> {
         for c in explanation.connections.iter().take(LISTED) {
             row(&mut out, &[&c.from, &c.to, &c.value, &c.delay, &c.why]);
         }
-        out.push_str("</tbody></table>");
+        out.push_str(TABLE_END);
         let more = explanation.connections.len().saturating_sub(LISTED);
         if more > 0 {
             let _ = write!(out, "<p class=\"note\">and {more} more, in exchange.json</p>");
@@ -37,13 +40,16 @@ pub(crate) fn render(folder: &Path) -> Option<String> {
         for (name, wall_s, per_step_us) in &costs {
             row(&mut out, &[name, &number(*wall_s, 4), &number(*per_step_us, 4)]);
         }
-        out.push_str("</tbody></table>");
+        out.push_str(TABLE_END);
     }
+    out.push_str("</details>");
     Some(out)
 }
 
+const TABLE_END: &str = "</tbody></table></div>";
+
 fn table(out: &mut String, heads: &[&str]) {
-    out.push_str("<table class=\"events\"><thead><tr>");
+    out.push_str("<div class=\"scroll\"><table class=\"events\"><thead><tr>");
     for head in heads {
         let _ = write!(out, "<th>{head}</th>");
     }

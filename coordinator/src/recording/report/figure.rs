@@ -30,6 +30,8 @@ pub(crate) struct Panel {
     /// Logarithmic axis offered, and whether it is on at first.
     pub log: Option<bool>,
     pub choice: Option<usize>,
+    /// What stands along the axis in place of the time: quantity and unit. The times of the curves are its values then.
+    pub across: Option<(&'static str, &'static str)>,
     pub curves: Vec<Curve>,
 }
 
@@ -123,18 +125,22 @@ impl Figure {
     pub fn json(&self, times: &mut Times) -> Value {
         // What is shown on demand only may be coarser.
         let points = if self.choices.len() > 1 { MOST_POINTS / 2 } else { MOST_POINTS };
-        let mut curve = |c: &Curve| {
-            let (t, y) = thinned(&c.t_s, &c.y, points);
-            json!({
-                "name": c.name, "t": times.index(t), "y": packed(&y), "colour": c.colour,
-                "dashed": c.dashed, "steps": c.steps,
-            })
+        let mut curve = |c: &Curve, over_time: bool| {
+            let mut out = json!({ "name": c.name, "colour": c.colour, "dashed": c.dashed, "steps": c.steps });
+            if over_time {
+                let (t, y) = thinned(&c.t_s, &c.y, points);
+                (out["t"], out["y"]) = (json!(times.index(t)), json!(packed(&y)));
+            } else {
+                (out["x"], out["y"]) = (json!(packed(&c.t_s)), json!(packed(&c.y)));
+            }
+            out
         };
         let mut panels = Vec::new();
         for p in &self.panels {
-            let curves: Vec<Value> = p.curves.iter().map(&mut curve).collect();
+            let curves: Vec<Value> = p.curves.iter().map(|c| curve(c, p.across.is_none())).collect();
+            let across = p.across.map(|(quantity, unit)| json!({ "quantity": quantity, "unit": unit }));
             panels.push(json!({
-                "quantity": p.quantity, "unit": p.unit, "log": p.log, "choice": p.choice, "curves": curves,
+                "quantity": p.quantity, "unit": p.unit, "log": p.log, "choice": p.choice, "x": across, "curves": curves,
             }));
         }
         json!({ "id": self.id, "choices": self.choices, "chosen": self.chosen, "panels": panels })

@@ -2,12 +2,16 @@
 
 use crate::recording::body_track::roll_pitch_yaw;
 use crate::recording::reader::Recording;
-use crate::recording::report::figure::{Curve, Figure, Panel};
+use crate::recording::report::figure::{Curve, Figure, MOST_POINTS, Panel};
 use crate::recording::report::footprints::Leg;
+
+/// A contact that slips more than this at any time is a wheel or a foot on its way, and no plate test.
+const SLIPS: f64 = 1e-6;
 
 /// All figures that the recording has data for.
 pub(crate) fn all(recording: &Recording, legs: &[Leg]) -> Vec<Figure> {
     let figures = [
+        pressure(recording),
         body(recording),
         forces(recording, legs),
         joints(recording),
@@ -170,6 +174,39 @@ fn energy(recording: &Recording) -> Option<Figure> {
     let figure =
         Figure { id: "energy", title: "Energy".into(), note: note.into(), panels, ..Figure::default() };
     (!figure.panels.is_empty()).then_some(figure)
+}
+
+/// Pressure over sinkage of what is pressed in without slipping, as a bevameter shows it: one curve a contact.
+fn pressure(recording: &Recording) -> Option<Figure> {
+    let mut curves = Vec::new();
+    for (_, table) in &recording.variables {
+        for name in table.names.iter().filter_map(|n| n.strip_suffix(".mean_pressure")) {
+            let of = |part: &str| table.column(&format!("{name}.{part}"));
+            let (Some(sinkage), Some(pressure)) = (of("sinkage"), of("mean_pressure")) else { continue };
+            let slips = of("slip").is_some_and(|slip| slip.iter().any(|s| s.abs() > SLIPS));
+            // before the first touch and in the air there is no pressure to speak of
+            let loaded = sinkage.iter().zip(pressure).filter(|(_, p)| **p > 0.0);
+            let (x, y): (Vec<f64>, Vec<f64>) = loaded.map(|(z, p)| (*z, *p)).unzip();
+            if !slips && x.len() > 1 {
+                let (x, y) = (spread_out(&x), spread_out(&y));
+                curves.push(Curve::new(name, curves.len(), &x, y));
+            }
+        }
+    }
+    let across = Some(("sinkage", "m"));
+    let panel = Panel { across, ..Panel::new("mean pressure", "Pa", curves) };
+    let note =
+        "Mean pressure below each contact over its sinkage, loading and unloading; as the soil tells.".into();
+    let title = "Pressure over sinkage".into();
+    let figure = Figure { id: "pressure", title, note, panels: vec![panel], ..Figure::default() };
+    (!figure.panels[0].curves.is_empty()).then_some(figure)
+}
+
+/// Every n-th value and the last, so that no more than [`MOST_POINTS`] are left.
+fn spread_out(values: &[f64]) -> Vec<f64> {
+    let every = values.len().div_ceil(MOST_POINTS - 1).max(1);
+    let last = values.last().filter(|_| !(values.len() - 1).is_multiple_of(every));
+    values.iter().step_by(every).chain(last).copied().collect()
 }
 
 /// What a soil tells of wheels and feet: one panel a quantity, one curve a contact.

@@ -11,9 +11,10 @@ mod figures;
 pub(crate) mod footprints;
 mod ground_map;
 pub(crate) mod html;
+mod node_values;
 mod outlines;
 pub(crate) mod page;
-mod picture;
+pub(crate) mod picture;
 mod setup;
 
 use crate::error::Result;
@@ -42,14 +43,11 @@ fn page(recording: &Recording, summary: Option<&Summary>, exchange: Option<&str>
     let legs = footprints::legs(recording);
     let mut page = page::Page::new(&title(recording));
     page.header(&setup::headline(recording, summary));
+    page.section("At a glance", "figures", &cards::render(recording, summary));
     if let Some(summary) = summary {
         page.section("Where the energy went", "energies", &energy_card::render(&summary.energies));
     }
-    page.section("At a glance", "figures", &cards::render(recording, summary));
     page.section("What was simulated", "setup", &setup::render(recording));
-    if let Some(html) = exchange {
-        page.section("How values went round", "exchange", html);
-    }
     if let Some(map) = ground_map::data(recording, &legs)? {
         page.section("The ground from above", "ground", ground_map::FRAME);
         page.data("map", map);
@@ -60,6 +58,9 @@ fn page(recording: &Recording, summary: Option<&Summary>, exchange: Option<&str>
     let events: Vec<_> =
         summary.map_or(&recording.events, |s| &s.events).iter().map(|e| (e.t_s, e.what.as_str())).collect();
     page.events(&events);
+    if let Some(html) = exchange {
+        page.section("How values went round", "exchange", html);
+    }
     Ok(page.finish())
 }
 

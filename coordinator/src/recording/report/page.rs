@@ -9,6 +9,8 @@ const STYLE: &str = include_str!("../assets/page.css");
 const THEME: &str = include_str!("../assets/theme.js");
 const AXES: &str = include_str!("../assets/axes.js");
 const PLOT: &str = include_str!("../assets/plot.js");
+const XY: &str = include_str!("../assets/xy.js");
+const GROUND: &str = include_str!("../assets/ground.js");
 const MAP: &str = include_str!("../assets/map.js");
 
 /// A page under construction.
@@ -78,7 +80,7 @@ impl Page {
             return;
         }
         let mut html = String::from(
-            "<table class=\"events\"><thead><tr><th></th><th>time (s)</th><th>what</th></tr></thead><tbody>",
+            "<div class=\"scroll\"><table class=\"events\"><thead><tr><th></th><th>time (s)</th><th>what</th></tr></thead><tbody>",
         );
         for (k, (t_s, what)) in events.iter().enumerate() {
             let _ = write!(
@@ -89,7 +91,7 @@ impl Page {
                 escape(what)
             );
         }
-        html.push_str("</tbody></table>");
+        html.push_str("</tbody></table></div>");
         self.section("Events", "events", &html);
         self.events.extend(events.iter().map(|(t, what)| json!({ "t": t, "what": what })));
     }
@@ -120,7 +122,7 @@ impl Page {
              <main>\n<h1>{title}</h1>\n{header}\n{body}</main>\n\
              <footer>Made by Terraglue from the recording beside this file. All quantities in SI units; z is up.</footer>\n\
              <script type=\"application/json\" id=\"data\">{data}</script>\n\
-             <script>\n{AXES}{PLOT}{MAP}</script>\n</body>\n</html>\n",
+             <script>\n{AXES}{PLOT}{XY}{GROUND}{MAP}</script>\n</body>\n</html>\n",
             class = self.class,
             header = self.header,
             body = self.body,

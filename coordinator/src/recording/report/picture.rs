@@ -18,8 +18,17 @@ pub(crate) fn range(ground: &GroundRecord) -> (f64, f64) {
 
 /// Draws the ground, north up; `scale_m` is the sinkage of the last colour. Returns PNG bytes.
 pub(crate) fn draw(ground: &GroundRecord, scale_m: f64) -> Result<Vec<u8>, png::EncodingError> {
+    draw_within(ground, scale_m, LONGEST_SIDE)
+}
+
+/// The same with no side longer than so many pixels.
+pub(crate) fn draw_within(
+    ground: &GroundRecord,
+    scale_m: f64,
+    longest: usize,
+) -> Result<Vec<u8>, png::EncodingError> {
     let [nx, ny] = ground.size;
-    let stride = nx.max(ny).div_ceil(LONGEST_SIDE).max(1);
+    let stride = nx.max(ny).div_ceil(longest).max(1);
     let (width, height) = (nx.div_ceil(stride), ny.div_ceil(stride));
     let relief = Relief::new(ground, stride);
     let mut rgb = Vec::with_capacity(width * height * 3);

@@ -1,5 +1,6 @@
 //! Tests of recording, reading, mending and summing up on a synthetic testbed in closed form.
 
+mod figures;
 mod rig;
 
 use super::*;
@@ -9,7 +10,8 @@ use std::path::Path;
 fn record(folder: &Path, strategy: &str, steps: u64) -> Summary {
     let mut rig = Rig::new(strategy);
     let mut recorder =
-        Recorder::create(folder, &rig.scenario, RecorderOptions { csv: true }).expect("created");
+        Recorder::create(folder, &rig.scenario, RecorderOptions { csv: true, ..Default::default() })
+            .expect("created");
     rig.run(&mut recorder, steps).expect("ran");
     recorder.finish(2.0, 1.5, None, Status::Done).expect("finished")
 }
@@ -30,6 +32,38 @@ fn equal_runs_give_equal_bytes() {
     let bytes = std::fs::read(a.path().join(RECORDING)).expect("written");
     let path = a.path().to_string_lossy().into_owned().into_bytes();
     assert!(!bytes.windows(path.len()).any(|w| w == path), "the folder's name is in the recording");
+}
+
+#[test]
+fn a_recorder_goes_on_in_another_process_to_the_same_bytes() {
+    use terraglue_subsystem::bytes::Persist;
+    let whole = folder();
+    record(whole.path(), "iterative", 1203);
+    let options = RecorderOptions { csv: true, checkpoints: true };
+    // at, between and across the ends of chunks, records of the ground and the event
+    for at in [1, 37, 251, 699, 1000] {
+        let f = folder();
+        let mut rig = Rig::new("iterative");
+        let mut recorder = Recorder::create(f.path(), &rig.scenario, options).expect("created");
+        rig.view(0, &mut |view| crate::observer::Observer::started(&mut recorder, view)).expect("started");
+        rig.steps(&mut recorder, 0, at).expect("stepped");
+        let (mut state, mut again) = (Vec::new(), None);
+        rig.view(at, &mut |view| recorder.state(view).map(|s| s.write(&mut state))).expect("a state");
+        // its end is written, and has to be cut off
+        drop(recorder);
+        rig.view(at, &mut |view| {
+            let state = RecorderState::read(&mut state.as_slice()).expect("the same");
+            Recorder::resume(f.path(), &rig.scenario, options, view, state).map(|r| again = Some(r))
+        })
+        .expect("resumed");
+        let mut recorder = again.expect("a recorder");
+        rig.go_on(&mut recorder, at, 1203).expect("ran");
+        recorder.finish(2.0, 1.5, None, Status::Done).expect("finished");
+        for file in [RECORDING, VARIABLES, FINAL_GROUND, SUMMARY] {
+            let read = |f: &Path| std::fs::read(f.join(file)).expect("written");
+            assert!(read(whole.path()) == read(f.path()), "{file} differs after step {at}");
+        }
+    }
 }
 
 #[test]
@@ -258,7 +292,7 @@ fn what_is_left_out_and_how_many_digits_are_kept_is_a_choice() {
     rig.scenario.recording.include = list(&["robot", "gait.speed"]);
     rig.scenario.recording.exclude = list(&["robot.*.velocity", "robot.LF_j2.max_torque"]);
     rig.scenario.recording.digits = 6;
-    let options = RecorderOptions { csv: true };
+    let options = RecorderOptions { csv: true, ..Default::default() };
     let mut recorder = Recorder::create(f.path(), &rig.scenario, options).expect("created");
     rig.run(&mut recorder, 10).expect("ran");
     recorder.finish(1.0, 1.0, None, Status::Done).expect("finished");
@@ -376,7 +410,7 @@ fn what_is_unknown_or_does_not_apply_is_said_and_never_a_number() {
     assert!(shown.contains("unknown") && shown.contains("soil keeps no book") && !shown.contains("NaN"));
     assert!(shown.contains("not applicable") && html.contains("Gap and convergence: not applicable"));
     let row = compare::CompareRow { summary: Some(s), ..Default::default() };
-    let table = compare::terminal_table(&[row]);
+    let table = compare::terminal_table(&[row], true);
     let gap = table.lines().find(|l| l.contains("largest gap")).expect("line");
     assert!(gap.contains("not applicable"), "{gap}");
     assert!(
@@ -517,7 +551,7 @@ fn a_comparison_marks_the_best_and_says_what_diverged_and_when() {
     assert_eq!(json["rows"][0]["folder"], "cooperative");
     let csv = read(compare::COMPARE_TABLE);
     assert!(csv.lines().count() == 4 && csv.contains("diverged at t = 1.2500 s"));
-    let terminal = compare::terminal_table(&rows);
+    let terminal = compare::terminal_table(&rows, true);
     let gap = terminal.lines().find(|l| l.contains("largest gap")).expect("line");
     // 3e-11·2.2 m; the diverged run with gap 0 does not compete.
     assert!(gap.contains("* 66.0") && !gap.contains("* 0"), "{gap}");

@@ -60,6 +60,11 @@ impl Synthetic {
         self.variables.extend((0..n).map(more));
     }
 
+    /// Has this variable in place of its own.
+    pub fn tell(&mut self, variable: Variable) {
+        self.variables = vec![variable];
+    }
+
     pub fn controller() -> Self {
         let speed = Variable::real(0, "speed", "m/s", Causality::Parameter, "commanded speed");
         Self::of(Kind::Controller, vec![speed])
@@ -402,7 +407,18 @@ impl Rig {
     /// Runs `steps` steps under an observer, with one event at step 700.
     pub fn run(&mut self, observer: &mut dyn Observer, steps: u64) -> Result {
         self.view(0, &mut |view| observer.started(view))?;
-        for index in 1..=steps {
+        self.go_on(observer, 0, steps)
+    }
+
+    /// The steps after step `from`, to the end.
+    pub fn go_on(&mut self, observer: &mut dyn Observer, from: u64, steps: u64) -> Result {
+        self.steps(observer, from, steps)?;
+        self.view(steps, &mut |view| observer.finished(view, None))
+    }
+
+    /// The steps after step `from`.
+    pub fn steps(&mut self, observer: &mut dyn Observer, from: u64, steps: u64) -> Result {
+        for index in from + 1..=steps {
             if index == 700 {
                 let what = "set robot.LF_j2.max_torque = 0 (was 60)".into();
                 observer.happened(&Happening { t_s: index as f64 * H, what })?;
@@ -413,6 +429,6 @@ impl Rig {
                 return Err(error);
             }
         }
-        self.view(steps, &mut |view| observer.finished(view, None))
+        Ok(())
     }
 }

@@ -76,7 +76,7 @@ fn driven(context: &Context, wheel: &Wheel, slip: f64) -> Outcome<Driven> {
     Ok(Driven {
         sinkage: 1e3 * of("rig.press.angle"),
         pull: of("soil.contact1.pull"),
-        drift: 100.0 * (energy("energy_balance_j") / energy("electrical_energy_j")).abs(),
+        drift: 100.0 * (energy("energy_balance_j") / energy("energy_j")).abs(),
     })
 }
 

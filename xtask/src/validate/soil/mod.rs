@@ -24,6 +24,7 @@ mod wong_reece;
 
 pub use automaton::print_hash;
 pub use moves::press_sphere;
+pub use panel::Panel;
 
 use super::Part;
 use crate::process::Outcome;

@@ -1,7 +1,10 @@
 //! Area `walk`: `scenarios/moon_walk.toml` with both soils and both strategies, run as a user runs it; and what its gait
 //! does to the feet.
 
+mod picture;
 mod prints;
+
+pub use picture::write_picture;
 
 use super::parallel::in_parallel;
 use super::timing::{calibration_s, median};
@@ -140,7 +143,7 @@ fn quality(id: &str, s: &Value) -> Vec<Figure> {
         None => Figure::skipped(format!("{id}.not_converged"), "a single pass has nothing to converge to"),
     };
     vec![
-        figure("distance", ratio, Limit::AtLeast(0.8), "distance walked / commanded"),
+        figure("distance", ratio, Limit::AtLeast(0.9), "distance walked / asked for after stand and ramp"),
         figure(
             "drift",
             drift(s),

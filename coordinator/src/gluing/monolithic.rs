@@ -207,15 +207,22 @@ impl Monolithic {
             self.lu.solve(&mut self.d);
             let before = size;
             let mut share = 1.0;
+            let mut refused = None;
             for _ in 0..=MAX_HALVINGS {
                 for ((t, base), d) in exchange.t.iter_mut().zip(&self.base).zip(&self.d) {
                     *t = base + share * d;
                 }
-                size = self.evaluate(exchange, instances)?;
+                // A body may refuse forces as wild as those of a long step: a shorter one is tried.
+                let trial = self.evaluate(exchange, instances);
+                size = *trial.as_ref().unwrap_or(&f64::INFINITY);
+                refused = trial.err();
                 if size < before {
                     break;
                 }
                 share *= 0.5;
+            }
+            if let Some(error) = refused {
+                return Err(error);
             }
             if !(size < before) {
                 // rounding: go back to the better one

@@ -8,15 +8,15 @@ use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 use terraglue_soil_law::{COLUMNS, SoilTable, TableError};
 
-/// The soil table beside a scenario: `../models/soils.csv` or `models/soils.csv` from its folder or from the
-/// current one, that of the installation, or that of the sources from whose `target` folder the program runs.
+/// The soil table beside a scenario: `models/soils.csv` or `../models/soils.csv` from its folder, the nearer first, that of the
+/// current folder, that of the installation, or that of the sources from whose `target` folder the program runs.
 pub fn find_soil_table(folder: &Path) -> Option<PathBuf> {
     let program = std::env::current_exe().ok();
     let program = program.as_deref().and_then(Path::parent);
     let beside_program = ["../share/terraglue/models/soils.csv", "../../models/soils.csv"]
         .into_iter()
         .filter_map(|p| Some(program?.join(p)));
-    let near = ["../models/soils.csv", "models/soils.csv"].map(|p| folder.join(p));
+    let near = ["models/soils.csv", "../models/soils.csv"].map(|p| folder.join(p));
     let here = Some(PathBuf::from("models/soils.csv"));
     near.into_iter().chain(here).chain(beside_program).find(|path| path.is_file())
 }

@@ -102,6 +102,10 @@ pub fn run(command: &RunCommand) -> Result<Exit> {
     }
     match (report, &outcome.error) {
         (Err(missing), None) => Err(missing),
+        (Err(_), Some(_)) if outcome.summary.steps == 0 => {
+            log::warn!("the run failed before its first step: {} holds no recording", folder.display());
+            Ok(outcome.exit())
+        }
         (Err(missing), Some(_)) => {
             log::warn!("there is no report: {missing}; `terraglue report {}` makes one", folder.display());
             Ok(outcome.exit())

@@ -354,7 +354,8 @@ fn a_soil_row_is_offered_and_refused_rows_say_why() {
     let path = folder.join("walk.toml");
     std::fs::create_dir_all(folder.join("models")).expect("made");
     std::fs::create_dir(above.path().join("models")).expect("made");
-    std::fs::write(above.path().join("models/soils.csv"), "the table further away is not read").expect("written");
+    std::fs::write(above.path().join("models/soils.csv"), "the table further away is not read")
+        .expect("written");
     let table = "name,n,k_c,k_phi,c_pa,phi_rad,K_m,density_kg_m3,source,refused\nmoon,1.0,1400,820000,170,0.61,0.018,,book,\nclay,0.5,13190,692150,4140,0.22,,,book,K_m is a range\n";
     std::fs::write(folder.join("models/soils.csv"), table).expect("written");
     let text = |row: &str| GOOD.replacen("k_phi = 8.2e5", &format!("parameters = \"{row}\""), 1);

@@ -11,7 +11,10 @@ import pytest
 from conftest import MOON_WALK, PROGRAM, ROOT, terraglue
 from test_bad_input import refused
 
-SLOW_LIBRARY = "#include <unistd.h>\n__attribute__((constructor)) static void wait_long(void) { sleep(60); }\n"
+# a signal wakes `sleep`, which then goes on
+SLOW_LIBRARY = """#include <unistd.h>
+__attribute__((constructor)) static void wait_long(void) { for (unsigned left = 60; left > 0;) left = sleep(left); }
+"""
 
 
 @pytest.mark.parametrize("option", [["--threads", "100000"], ["--threads", "-1"]])
@@ -95,7 +98,7 @@ def test_a_file_that_may_not_grow_leaves_the_run_up_to_then(tmp_path):
 def test_a_full_disk_leaves_the_run_up_to_then(tmp_path):
     disk = tmp_path / "disk"
     disk.mkdir()
-    mounted = shutil.which("mount") and subprocess.run(["mount", "-t", "tmpfs", "-o", "size=2m", "none", disk], capture_output=True)
+    mounted = shutil.which("mount") and subprocess.run(["mount", "-t", "tmpfs", "-o", "size=4m", "none", disk], capture_output=True)
     if not mounted or mounted.returncode:
         pytest.skip("no file system may be mounted here")
     try:

@@ -482,7 +482,8 @@ const COMPARE_EXAMPLES: &str = "\
 Example:
   terraglue compare scenarios/moon_walk.toml --strategies cooperative,iterative \\
       --soils soil-cellular-automaton,soil-bekker
-  terraglue compare scenarios/moon_walk.toml --vary soil.parameters=lunar_nominal_Apollo,LETE_sand \\
+  terraglue compare scenarios/moon_walk.toml \\
+      --vary soil.parameters=lunar_nominal_Apollo,LETE_sand \\
       --vary gait.speed_m_s=0.1,0.2
   terraglue compare scenarios/moon_walk.toml --duration 1 \\
       --steps 5e-4,1e-3,2e-3 --reference monolithic

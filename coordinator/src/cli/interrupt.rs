@@ -1,8 +1,10 @@
 //! Ctrl-C, SIGTERM and SIGHUP: while inputs are loaded the first ends the program, as there is nothing to close yet; during a
 //! run it asks the run to stop and close its recording, and the second ends the program at once.
 
-use std::sync::Arc;
+use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
+use signal_hook::iterator::Signals;
 use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, mpsc};
 use terraglue::host::exit_guard;
 
 /// Exit code of a program that was interrupted.
@@ -19,11 +21,26 @@ impl Interrupt {
     /// Listens from now on.
     pub fn listen() -> Self {
         let own = Self::default();
-        let shared = own.clone();
-        if let Err(e) = ctrlc::set_handler(move || shared.signalled()) {
+        if let Err(e) = own.clone().wait_for_signals() {
             log::warn!("Ctrl-C will not close the recording: {e}");
         }
         own
+    }
+
+    /// Takes the signals on a thread of their own.
+    ///
+    /// # Errors
+    /// No handler can be set, or no thread be made.
+    fn wait_for_signals(self) -> std::io::Result<()> {
+        let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
+        let (started, listening) = mpsc::channel();
+        std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
+            let _ = started.send(());
+            signals.forever().for_each(|_| self.signalled());
+        })?;
+        // A thread that has not started yet cannot while a library is loaded: both need the lock of the loader.
+        let _ = listening.recv();
+        Ok(())
     }
 
     /// From now on there is a recording to close.

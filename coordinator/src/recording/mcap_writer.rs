@@ -36,7 +36,7 @@ pub(crate) use resume::McapState;
 use resume::Pending;
 
 /// A chunk ends every so many steps; that many can be lost when the process is killed.
-pub(crate) const FLUSH_STEPS: u64 = 100;
+pub(crate) const FLUSH_STEPS: u64 = 200;
 
 type Sink = mcap::Writer<NoSeek<BufWriter<KeptFile>>>;
 

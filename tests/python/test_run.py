@@ -3,10 +3,12 @@
 import csv
 import json
 import math
+import shutil
 import signal
 import subprocess
 import time
 
+import pytest
 from conftest import MOON_WALK, PROGRAM, ROOT, terraglue
 from mcap.stream_reader import StreamReader
 from mcap_protobuf.decoder import DecoderFactory
@@ -229,3 +231,26 @@ def test_a_run_at_the_pace_of_the_clock_takes_its_time_and_has_the_same_bytes(tm
         recordings.append((tmp_path / name / "recording.mcap").read_bytes())
     assert recordings[0] == recordings[1]
     assert times[1] > 1.9 and times[0] < times[1], times
+
+
+@pytest.mark.parametrize("strategy", ["cooperative", "cooperative-compliant", "iterative"])
+@pytest.mark.parametrize("soil", ["soil-bekker", "soil-cellular-automaton"])
+def test_a_press_that_holds_its_speed_pays_for_the_soil(strategy, soil, tmp_path):
+    """Under T*, the force of rigid ground, a press gives way; under the soil's force it does not: another branch of its motor."""
+    sets = [f"--set={key}" for key in (f"gluing.strategy={strategy}", f"soil.module={soil}", "terrain.spacing_m=0.01")]
+    process = terraglue("run", ROOT / "scenarios/plate_sinkage.toml", "--duration", "1.2", "--json", "--out", tmp_path / "out", *sets)
+    summary = json.loads(process.stdout)
+    work = summary["energies"]["driving_j"] + summary["energies"]["braking_j"]
+    assert work > 0.5 and abs(summary["energy_balance_j"]) < 1e-3 * work, process.stderr
+    assert summary["evaluations_max"] <= 4 or strategy == "iterative"
+
+
+def test_a_recording_that_was_cut_off_says_so(short_run, tmp_path):
+    folder = tmp_path / "half"
+    shutil.copytree(short_run[0], folder)
+    with open(folder / "recording.mcap", "r+b") as file:
+        file.truncate((folder / "recording.mcap").stat().st_size // 2)
+    process = terraglue("report", folder)
+    assert process.returncode == 0 and "had no end" in process.stderr, process.stderr
+    page = (folder / "report.html").read_text()
+    assert "recording cut off" in page and "the run at 0.5" in page

@@ -14,8 +14,16 @@ pub fn report(folder: &Path) -> Result<Exit> {
         let help = Some("give the folder of a run, e.g. runs/moon_walk".into());
         return Err(InputError::plain(message, help).into());
     }
-    recording::mend(folder)?;
-    let damaged = Recording::open(folder)?.damaged;
+    let mended = recording::mend(folder)?;
+    let recorded = Recording::open(folder)?;
+    if mended {
+        let (path, end) = (folder.join(RECORDING), recorded.end_s());
+        eprintln!(
+            "warning: `{}` had no end: it keeps what arrived whole, up to t = {end:.3} s, and ends there now",
+            path.display()
+        );
+    }
+    let damaged = recorded.damaged;
     if damaged > 0 {
         let path = folder.join(RECORDING);
         eprintln!("warning: `{}` is damaged: {damaged} parts of it are left out", path.display());

@@ -10,6 +10,7 @@
 //! a motor is at its limit under T* and not under T1: then the estimate is taken again about T1.
 
 use super::exchange::Exchange;
+use super::follow::{PASSES, can_repeat, followed};
 use super::{Needs, Outcome, Strategy};
 use crate::Result;
 use crate::host::Instance;
@@ -17,23 +18,6 @@ use terraglue_subsystem::Capabilities;
 
 /// Name in the scenario.
 pub const NAME: &str = "cooperative";
-
-/// Passes of a step in which motors change their branch at most.
-const PASSES: usize = 4;
-/// Part of the motion (and length, m; angle, rad) by which bodies may miss what their estimate says.
-const MISS: [f64; 2] = [1e-3, 1e-8];
-
-/// Whether the bodies have moved as their estimate told the soil.
-fn followed(exchange: &Exchange) -> bool {
-    let most = exchange.x1.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-    let miss = exchange.x1.iter().zip(&exchange.x2).fold(0.0, |m: f64, (x, said)| m.max((x - said).abs()));
-    miss <= MISS[0] * most + MISS[1]
-}
-
-fn can_repeat(exchange: &Exchange, instances: &[Instance]) -> bool {
-    let needed = Capabilities::RETRY | Capabilities::DERIVATIVES;
-    exchange.bodies.iter().all(|side| instances[side.slot].capabilities().has(needed))
-}
 
 /// The single pass. It keeps nothing from step to step.
 #[derive(Debug, Default)]
@@ -63,7 +47,7 @@ impl Strategy for Cooperative {
             exchange.advance_bodies(instances)?;
             if pass == PASSES
                 || exchange.report.evaluations_soil == 0
-                || followed(exchange)
+                || followed(exchange, &exchange.x2)
                 || !can_repeat(exchange, instances)
             {
                 break;

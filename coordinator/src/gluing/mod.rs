@@ -19,6 +19,7 @@ mod derivatives;
 mod eigen;
 mod estimate;
 mod exchange;
+mod follow;
 pub mod gauss_seidel;
 pub mod glue;
 mod group_estimate;

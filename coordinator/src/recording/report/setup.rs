@@ -8,7 +8,9 @@ use std::fmt::Write;
 /// The lines below the title.
 pub(crate) fn headline(recording: &Recording, summary: Option<&Summary>) -> String {
     let mut out = String::new();
+    let missing = summary.filter(|s| recording.end_s() < s.simulated_s - 1e-6 * s.simulated_s.max(1.0));
     let (class, word) = match summary.map(|s| s.status) {
+        Some(Status::Done) if missing.is_some() => ("fair", "recording cut off"),
         Some(Status::Done) => ("good", "done"),
         Some(Status::Failed) => ("bad", "failed"),
         Some(Status::Stopped) => ("fair", "stopped"),
@@ -23,6 +25,14 @@ pub(crate) fn headline(recording: &Recording, summary: Option<&Summary>) -> Stri
     let _ = write!(out, "<span>{}</span></p>", parts.join(" · "));
     if let Some(error) = summary.and_then(|s| s.error.as_ref()) {
         let _ = write!(out, r#"<p class="notice bad">{}</p>"#, escape(&error.message));
+    }
+    if let Some(summary) = missing {
+        let (end, all) = (number(recording.end_s(), 4), number(summary.simulated_s, 4));
+        let _ = write!(
+            out,
+            r#"<p class="notice">The recording ends at t = {end} s, the run at {all} s: curves and pictures show what is left, figures of
+the whole run are those of summary.json.</p>"#
+        );
     }
     if summary.is_none() {
         out.push_str(

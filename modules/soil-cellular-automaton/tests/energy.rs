@@ -124,37 +124,3 @@ fn a_contact_that_hardly_covers_its_neighbours_is_not_thrown_sideways() {
     let error = go(629_968_910_466_154_312, 1, 2, 1, 0.01).unwrap();
     assert!(error <= 1e-9, "{error:e} J");
 }
-
-/// A body at 10 mm below the surface that is dragged by 8 cm, in steps of so many mm: its mean force along the path and up, N.
-fn dragged(kind: u32, step_mm: f64) -> [f64; 2] {
-    let mut rig = Feet::new(instance::<SoilCellularAutomaton>(LETE, ground(0.01)));
-    let upright = [1.0, 0.0, 0.0, 0.0];
-    let mut pose = Pose { position: [-0.03, 0.0013, low(kind, upright)], orientation: upright };
-    rig.add(&shape(kind), pose);
-    let mut sums = [0.0; 2];
-    let parts = (1.0 / step_mm).round() as u32;
-    for _ in 0..10 * parts {
-        pose.position[2] -= 1e-3 * step_mm;
-        rig.step(|_| pose);
-    }
-    for _ in 0..80 * parts {
-        pose.position[0] += 1e-3 * step_mm;
-        rig.step(|_| pose);
-        let force = rig.force(0);
-        sums[0] -= force[0] / f64::from(80 * parts);
-        sums[1] += force[2] / f64::from(80 * parts);
-    }
-    sums
-}
-
-/// What is pressed out comes to its neighbours a few units of height at a time where steps are short: it is as loose as what
-/// comes at once. (It was firm: the force on a sphere grew by half from steps of 0.2 mm to such of 0.0125 mm.)
-#[test]
-fn forces_converge_in_shorter_steps() {
-    for kind in [0, 2, 3] {
-        let [coarse, fine] = [0.1, 0.0125].map(|step_mm| dragged(kind, step_mm));
-        for (coarse, fine) in coarse.iter().zip(fine) {
-            assert!((coarse - fine).abs() <= 0.05 * fine.abs(), "shape {kind}: {coarse} N, {fine} N");
-        }
-    }
-}

@@ -2,13 +2,15 @@
 //! run it asks the run to stop and close its recording, and the second ends the program at once.
 
 use signal_hook::consts::{SIGHUP, SIGINT, SIGTERM};
-use signal_hook::iterator::Signals;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, mpsc};
+use std::time::Duration;
 use terraglue::host::exit_guard;
 
 /// Exit code of a program that was interrupted.
 const INTERRUPTED: i32 = 130;
+/// How late a signal is noticed at most.
+const LOOK_EVERY: Duration = Duration::from_millis(20);
 
 /// What signals have asked for, and whether there is something to close.
 #[derive(Clone, Debug, Default)]
@@ -27,16 +29,24 @@ impl Interrupt {
         own
     }
 
-    /// Takes the signals on a thread of their own.
+    /// Looks for signals on a thread of its own. It holds no descriptor: foreign code may close what it does not own.
     ///
     /// # Errors
     /// No handler can be set, or no thread be made.
     fn wait_for_signals(self) -> std::io::Result<()> {
-        let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
+        let arrived = Arc::new(AtomicBool::new(false));
+        for signal in [SIGINT, SIGTERM, SIGHUP] {
+            signal_hook::flag::register(signal, Arc::clone(&arrived))?;
+        }
         let (started, listening) = mpsc::channel();
         std::thread::Builder::new().name("signals".to_owned()).spawn(move || {
             let _ = started.send(());
-            signals.forever().for_each(|_| self.signalled());
+            loop {
+                if arrived.swap(false, Ordering::Relaxed) {
+                    self.signalled();
+                }
+                std::thread::sleep(LOOK_EVERY);
+            }
         })?;
         // A thread that has not started yet cannot while a library is loaded: both need the lock of the loader.
         let _ = listening.recv();

@@ -16,7 +16,7 @@ use crate::{Error, Result};
 use serde_json::Value;
 use std::path::PathBuf;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::time::{Duration, Instant as Clock};
 use terraglue_subsystem::{BodyState, Energy};
 use unglued::{Turn, Unglued};
@@ -43,6 +43,8 @@ pub struct Options {
     pub module_paths: Vec<PathBuf>,
     /// Set from outside to stop the run at the next communication point.
     pub cancel: Arc<AtomicBool>,
+    /// Bits of the time before the start, s, while what touches the ground comes to rest; 0 otherwise.
+    pub standing: Arc<AtomicU64>,
 }
 
 /// What the coordinator knows of an instance beside the instance itself.
@@ -82,6 +84,7 @@ pub struct Testbed {
     gravity: [f64; 3],
     contact_margin_m: f64,
     cancel: Arc<AtomicBool>,
+    standing: Arc<AtomicU64>,
     partings: Partings,
     step_s: f64,
     /// Time of nominal step 0, s: 0 unless the length of the steps has been changed on the way.

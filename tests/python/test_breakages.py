@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import signal
 import subprocess
@@ -44,6 +45,50 @@ def test_files_that_a_scenario_names_are_regular(key, tmp_path):
         assert process.returncode == 2 and str(path) in process.stderr, process.stderr
 
 
+@pytest.mark.parametrize("kind", ["device", "pipe"])
+def test_a_mesh_is_a_regular_file(kind, tmp_path):
+    mesh = tmp_path / "foot.stl"
+    os.mkfifo(mesh) if kind == "pipe" else mesh.symlink_to("/dev/zero")
+    robot = tmp_path / "robot.urdf"
+    robot.write_text('<robot name="r"><link name="a"><inertial><mass value="1"/><inertia ixx="1" ixy="0" ixz="0" iyy="1" '
+                     'iyz="0" izz="1"/></inertial><collision><geometry><mesh filename="foot.stl"/></geometry></collision>'
+                     '</link></robot>')
+    process = terraglue("robot", robot, timeout=10)
+    assert "foot.stl" in process.stderr and "not a regular file" in process.stderr, process.stderr
+    assert "no such file" not in process.stderr
+
+
+@pytest.mark.parametrize("command", ["run", "check"])
+@pytest.mark.parametrize("edit", ["terrain.size_m=[4e4,4e4]", "terrain.spacing_m=1e-4", "terrain.size_m=[1e9,1.0]"])
+def test_grounds_that_fit_no_memory_are_refused(command, edit, tmp_path):
+    begin = time.monotonic()
+    process = terraglue(command, MOON_WALK, "--set", edit, cwd=tmp_path, timeout=60)
+    told = " ".join(line.strip(" |") for line in process.stderr.splitlines())
+    assert process.returncode == 2 and time.monotonic() - begin < 10
+    for words in ("size_m", "spacing_m", "nodes", "GB of memory", "5e7", "fits this size"):
+        assert words in told, told
+    # what it advises is taken; waves may be too short for it
+    fits = told.split("`spacing_m` = ")[-1].split(" fits")[0]
+    flat = ["--set", 'terrain={kind="flat",size_m=[6.0,4.0],spacing_m=0.01}']
+    again = terraglue("check", MOON_WALK, *flat, "--set", edit, "--set", f"terrain.spacing_m={fits}")
+    assert again.returncode == 0 or "fewer than two cells" in again.stderr, again.stderr
+
+
+def test_whole_numbers_tell_their_range(edited):
+    for edit in ("world.seed=9223372036854775808", "world.seed=99999999999999999999"):
+        message = refused("check", MOON_WALK, "--set", edit)
+        assert "out of range" in message and "9223372036854775807" in message and "text" not in message, message
+    message = refused("check", edited("seed = 1 ", "seed = 9223372036854775808 "))
+    assert "9223372036854775807" in message and "walk.toml:16" in message, message
+
+
+def test_help_of_a_robot_file_is_about_robots(tmp_path):
+    robot = tmp_path / "robot.urdf"
+    robot.write_text('<robot name="x"><link name="a">')
+    message = refused("robot", robot)
+    assert "docs/scenario.md" not in message and "docs/rigid-body.md" in message, message
+
+
 def test_a_signal_ends_the_loading_of_a_run(tmp_path):
     (tmp_path / "slow.c").write_text(SLOW_LIBRARY)
     library = tmp_path / "libslow_plugin.so"
@@ -60,6 +105,18 @@ def test_a_signal_ends_the_loading_of_a_run(tmp_path):
     _, told = process.communicate(timeout=30)
     assert process.returncode == 130 and "while loading" in told, told
     assert time.monotonic() - begin < 5 and not (tmp_path / "out").exists()
+
+
+def test_what_takes_long_before_the_first_step_is_said(tmp_path):
+    terrain = ["--set", "terrain.size_m=[20.0,20.0]", "--set", "time.settle_s=600"]
+    command = [PROGRAM, "run", str(MOON_WALK), "--out", str(tmp_path / "out"), *terrain]
+    process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.PIPE, text=True)
+    told = [process.stderr.readline()]
+    while told[-1] and "comes to rest" not in told[-1]:
+        told.append(process.stderr.readline())
+    process.send_signal(signal.SIGTERM)
+    process.communicate(timeout=60)
+    assert re.search(r"note: .* t = -\d+\.\d+ s \(\d+ s so far\)", told[-1]), told
 
 
 def test_steps_without_number_are_refused_and_very_many_are_warned_of():
@@ -185,6 +242,7 @@ def test_an_earlier_run_in_a_named_folder_is_kept(tmp_path):
         done = terraglue("run", MOON_WALK, "--duration", "0.01", "--quiet", "--out", "out/", cwd=tmp_path)
         assert done.returncode == 0, done.stderr
     assert sorted(p.name for p in tmp_path.iterdir()) == ["out", "out.1"]
+    assert "note: the earlier results in out are in out.1 now" in done.stderr, done.stderr
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "thesis.tex").write_text("text")
     message = refused("run", MOON_WALK, "--duration", "0.01", "--out", tmp_path / "mine")

@@ -174,6 +174,23 @@ def test_any_key_can_be_varied_and_all_combinations_run(tmp_path):
     assert page.count("data:image/png;base64,") == 8 and "Grounds side by side" in page
 
 
+def test_warnings_are_told_once_with_their_runs(tmp_path):
+    process = terraglue("compare", MOON_WALK, "--duration", "0.02", "--quiet", "--strategies", "cooperative,iterative",
+                        "--soils", "soil-bekker", "--vary", "soil.k_phi=1528,9e5", cwd=tmp_path)
+    assert process.returncode in (0, 1, 2), process.stderr
+    doubted = [line for line in process.stderr.splitlines() if "k_phi" in line]
+    assert len(doubted) == 1, process.stderr
+    assert "--vary soil.k_phi=1528: " in doubted[0] and "(2 of 4 runs: cooperative" in doubted[0], doubted
+    assert "--set:" not in process.stderr
+
+
+def test_a_comparison_leaves_the_results_of_a_run_where_they_are(tmp_path):
+    for command in (["run"], ["compare", "--strategies", "cooperative"], ["run"]):
+        assert terraglue(*command, MOON_WALK, "--duration", "0.01", "--quiet", cwd=tmp_path).returncode == 0
+    names = sorted(p.name for p in (tmp_path / "runs").iterdir())
+    assert names == ["moon_walk", "moon_walk-compare", "moon_walk.1"]
+
+
 def test_details_show_all_figures(tmp_path):
     process = terraglue("compare", MOON_WALK, *SMALL, "--out", tmp_path, "--strategies", "cooperative", "--details",
                         "--vary", "soil.parameters=lunar_nominal_Apollo,LETE_sand")

@@ -225,12 +225,12 @@ pub fn require_states(testbed: &Testbed) -> Result {
     let cannot = |i: &&Instance| !i.capabilities().has(Capabilities::SERIALIZE);
     let name = |i: &Instance| format!("`{}` ({})", i.name(), i.module());
     let names: Vec<String> = testbed.instances().iter().filter(cannot).map(name).collect();
-    let (names, cannot, their) = match &names[..] {
-        [] => return Ok(()),
-        [one] => (one.clone(), "cannot", "its state"),
-        many => (many.join(", "), "cannot", "their states"),
+    let their = match names.len() {
+        0 => return Ok(()),
+        1 => "its state",
+        _ => "their states",
     };
-    let message = format!("--checkpoint-every: {names} {cannot} save {their} as bytes");
+    let message = format!("--checkpoint-every: {} cannot save {their} as bytes", names.join(", "));
     let help = "leave the option out; a unit needs `canSerializeFMUState`, a module in Python `self.state`, another one \
                 `serialize` and `deserialize`";
     Err(InputError::plain(message, Some(help.into())).into())

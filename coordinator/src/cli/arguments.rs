@@ -133,8 +133,8 @@ pub struct RunArguments {
     /// The scenario.
     #[command(flatten)]
     pub scenario: ScenarioArguments,
-    /// Folder for the results [default: runs/<scenario>]. An earlier run there is renamed to DIR.1, DIR.2, …; a folder with
-    /// other files is refused.
+    /// Folder for the results [default: runs/<scenario>; of `compare` runs/<scenario>-compare]. An earlier run there is renamed
+    /// to DIR.1, DIR.2, …; a folder with other files is refused.
     #[arg(long, value_name = "DIR")]
     pub out: Option<PathBuf>,
     /// Simulated time in seconds, instead of the scenario's.

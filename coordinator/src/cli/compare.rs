@@ -6,8 +6,8 @@ use super::arguments::{CompareArguments, RunArguments};
 use super::folder::results_folder;
 use super::interrupt::Interrupt;
 use super::output::outln;
-use super::progress::{self, Progress};
-use super::{Exit, run};
+use super::progress::{self, Progress, Waiting};
+use super::{Exit, logger, run};
 use indicatif::ProgressBar;
 use plan::Plan;
 use std::path::{Path, PathBuf};
@@ -23,11 +23,16 @@ use terraglue::{Error, Result};
 pub fn compare(arguments: &CompareArguments) -> Result<Exit> {
     let interrupt = Interrupt::listen();
     let cancel = interrupt.flag();
+    let warnings = logger::collect();
     let mut plans = plan::plan(arguments)?;
+    let loading = Waiting::loading(arguments.run.quiet);
     plan::refuse(&mut plans, &arguments.run, &cancel)?;
+    drop(loading);
+    warnings.tell();
     let name = plans.first().map_or_else(String::new, |p| p.scenario.name.clone());
     interrupt.run();
-    let folder = results_folder(arguments.run.out.as_deref(), &name)?;
+    // apart from that of `run`, whose results it would rename
+    let folder = results_folder(arguments.run.out.as_deref(), &format!("{name}-compare"))?;
     for k in 0..plans.len() {
         let name = folder_name(&plans[k]);
         let taken = |name: &str| plans[..k].iter().any(|p| p.folder.ends_with(name));
@@ -38,6 +43,7 @@ pub fn compare(arguments: &CompareArguments) -> Result<Exit> {
     let bar = progress::bar(plans.iter().map(Plan::steps).sum(), arguments.run.quiet);
     let mut rows = run_all(&plans, &arguments.run, &cancel, &bar);
     bar.finish_and_clear();
+    warnings.tell();
     judge(&mut rows, arguments)?;
     compare::write(&folder, &rows)?;
     print(arguments, &folder, &rows)?;
@@ -119,15 +125,8 @@ fn run_all(
 }
 
 fn run_one(plan: &Plan, arguments: &RunArguments, cancel: &Arc<AtomicBool>, bar: &ProgressBar) -> CompareRow {
-    let mut row = CompareRow {
-        strategy: plan.strategy.clone(),
-        soil: plan.soil.clone(),
-        varied: plan.varied.clone(),
-        step_s: plan.scenario.time.step_s,
-        is_reference: plan.is_reference,
-        name_step: plan.name_step,
-        ..CompareRow::default()
-    };
+    let mut row = plan.row();
+    let _said = logger::of_run(&row.name());
     if plan.refused.is_some() {
         row.error.clone_from(&plan.refused);
         return row;
@@ -157,9 +156,11 @@ fn recorded(
     cancel: &Arc<AtomicBool>,
     bar: &ProgressBar,
 ) -> Result<run::Outcome> {
-    let testbed = run::build(&plan.scenario, &run::options(arguments, cancel))?;
+    let options = run::options(arguments, cancel);
+    let testbed = run::build(&plan.scenario, &options)?;
     let label = format!("{} on {}: ", plan.strategy, file_name(&plan.soil));
-    let mut progress = Progress::new(bar.clone(), plan.scenario.time.duration_s, &label);
+    let waiting = Waiting::standing(arguments.quiet, bar, options.standing);
+    let mut progress = Progress::new(bar.clone(), plan.scenario.time.duration_s, &label).after(waiting);
     let records = run::Records {
         scenario: &plan.scenario,
         folder: &plan.folder,

@@ -7,7 +7,7 @@ use terraglue::recording::{RECORDING, SUMMARY};
 use terraglue::scenario::InputError;
 use terraglue::{Error, Result};
 
-/// The folder of `--out`, or `runs/<name>`, after an earlier run there was renamed to `.1`, `.2`, …
+/// The folder of `--out`, or `runs/<name>`, after an earlier run there was renamed to `.1`, `.2`, …, which standard error tells.
 pub fn results_folder(out: Option<&Path>, name: &str) -> Result<PathBuf> {
     let folder = out.map_or_else(|| Path::new("runs").join(name), Path::to_owned);
     // without a slash at its end, which would lead into it
@@ -57,7 +57,9 @@ fn set_aside(folder: &Path) -> Result {
     }
     let numbered = |n: u32| PathBuf::from(format!("{}.{n}", folder.display()));
     let free = (1..).map(numbered).find(|f| !f.exists()).unwrap_or_else(|| numbered(u32::MAX));
-    std::fs::rename(folder, &free).map_err(|e| at(folder, e))
+    std::fs::rename(folder, &free).map_err(|e| at(folder, e))?;
+    eprintln!("note: the earlier results in {} are in {} now", folder.display(), free.display());
+    Ok(())
 }
 
 fn at(path: &Path, source: std::io::Error) -> Error {

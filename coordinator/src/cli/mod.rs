@@ -35,7 +35,7 @@ use arguments::{Arguments, Command};
 use clap::Parser;
 use std::process::ExitCode;
 use terraglue::Error;
-use terraglue::host::{exit_guard, orphans};
+use terraglue::host::{crash, exit_guard, orphans};
 
 /// How a command ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -72,6 +72,9 @@ pub fn main() -> ExitCode {
     orphans::adopt();
     // what the checker makes of modules that end the program is its own affair
     let armed = !matches!(arguments.command, Command::CheckModule(_) | Command::Modules { .. });
+    if armed {
+        crash::tell();
+    }
     let armed = armed.then(exit_guard::arm);
     let exit = command(arguments.command);
     apart::done(exit.code());

@@ -63,7 +63,11 @@ fn scenario(arguments: &NewArguments, file: &Path) -> Result<Exit> {
         let help = "give its feet or wheels a <collision> (URDF) or a geom that collides (MJCF)".to_owned();
         return Err(plain(&message, Some(help)));
     };
-    standing.doubt().into_iter().for_each(|doubt| log::warn!("{}: {doubt}", file.display()));
+    standing
+        .doubt()
+        .into_iter()
+        .chain(standing.weak())
+        .for_each(|doubt| log::warn!("{}: {doubt}", file.display()));
     let text = standing.scenario(&stem, &from_folder(&folder, file).to_string_lossy());
     let program = spoken_program();
     let commands = [format!("{program} check scenario.toml"), format!("{program} run scenario.toml")];

@@ -9,7 +9,8 @@ use terraglue::scenario::InputError;
 
 /// Mends the recording of a folder where its end is missing, then writes the report.
 pub fn report(folder: &Path) -> Result<Exit> {
-    if !folder.join(RECORDING).is_file() {
+    let path = folder.join(RECORDING);
+    if !path.is_file() {
         let message = format!("there is no {RECORDING} in `{}`", folder.display());
         let help = Some("give the folder of a run, e.g. runs/moon_walk".into());
         return Err(InputError::plain(message, help).into());
@@ -17,15 +18,14 @@ pub fn report(folder: &Path) -> Result<Exit> {
     let mended = recording::mend(folder)?;
     let recorded = Recording::open(folder)?;
     if mended {
-        let (path, end) = (folder.join(RECORDING), recorded.end_s());
         eprintln!(
-            "warning: `{}` had no end: it keeps what arrived whole, up to t = {end:.3} s, and ends there now",
-            path.display()
+            "warning: `{}` had no end: it keeps what arrived whole, up to t = {:.3} s, and ends there now",
+            path.display(),
+            recorded.end_s()
         );
     }
     let damaged = recorded.damaged;
     if damaged > 0 {
-        let path = folder.join(RECORDING);
         eprintln!("warning: `{}` is damaged: {damaged} parts of it are left out", path.display());
     }
     outln!("report: {}", recording::report::write(folder)?.display());

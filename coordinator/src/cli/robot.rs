@@ -56,8 +56,10 @@ fn joints(robot: &Robot) -> comfy_table::Table {
     for joint in &robot.joints {
         let (parent, child) = ends(robot, joint);
         let unit = if joint.kind == JointKind::Prismatic { "m" } else { "rad" };
-        let range =
-            joint.limits.map_or_else(|| "–".into(), |[low, high]| format!("{low:.3} … {high:.3} {unit}"));
+        let range = joint.limits.map_or_else(
+            || "–".into(),
+            |[low, high]| format!("{} … {} {unit}", show::fixed(low, 3), show::fixed(high, 3)),
+        );
         table.add_row([joint.name.as_str(), kind(joint.kind), parent, child, &range]);
     }
     table
@@ -65,7 +67,9 @@ fn joints(robot: &Robot) -> comfy_table::Table {
 
 fn together(robot: &Robot, whole: &Whole) -> comfy_table::Table {
     let mut table = show::table(&["all joints at 0", "value"]);
-    let vector = |v: &Vector3<f64>| format!("{:.4}, {:.4}, {:.4} m", v.x, v.y, v.z);
+    let vector = |v: &Vector3<f64>| {
+        v.as_slice().iter().map(|x| show::fixed(*x, 4)).collect::<Vec<_>>().join(", ") + " m"
+    };
     table.add_row(["root", base(robot)]);
     table.add_row(["degrees of freedom", &robot.freedoms().to_string()]);
     table.add_row(["mass", &format!("{:.6} kg", whole.mass)]);

@@ -5,7 +5,7 @@ use super::folder::{free, results_folder};
 use super::interrupt::Interrupt;
 use super::output::outln;
 use super::pace::Pace;
-use super::progress::{self, Progress};
+use super::progress::{self, Progress, Waiting};
 use super::recorder::SharedRecorder;
 use super::{Exit, exit_of, show, soil_module, strict};
 use std::path::Path;
@@ -53,14 +53,20 @@ pub fn run(command: &RunCommand) -> Result<Exit> {
     let mut options = options(arguments, &interrupt.flag());
     let checkpoint = command.resume.as_deref().map(|folder| resumable(folder, &mut options)).transpose()?;
     let scenario = match &checkpoint {
-        Some(checkpoint) => checkpoint.scenario()?,
-        None => strict::load(&arguments.scenario, &arguments.sets(), command.strict)?,
+        Some(checkpoint) => {
+            let scenario = checkpoint.scenario()?;
+            checkpoint.check(&scenario, &options)?;
+            scenario
+        }
+        None => {
+            let scenario = strict::load(&arguments.scenario, &arguments.sets(), command.strict)?;
+            soil_module::check(&scenario, &arguments.scenario)?;
+            scenario
+        }
     };
-    match &checkpoint {
-        Some(checkpoint) => checkpoint.check(&scenario, &options)?,
-        None => soil_module::check(&scenario, &arguments.scenario)?,
-    }
+    let loading = Waiting::loading(arguments.quiet);
     let mut testbed = build(&scenario, &options)?;
+    drop(loading);
     let mut reloader = reloader(command, &scenario, &options)?;
     if command.explain {
         say(arguments, &testbed.explain().text(&scenario));
@@ -82,7 +88,8 @@ pub fn run(command: &RunCommand) -> Result<Exit> {
     let steps = (scenario.time.duration_s / scenario.time.step_s).round() as u64;
     let bar = progress::bar(steps, arguments.quiet);
     bar.inc(testbed.step_index());
-    let mut progress = Progress::new(bar.clone(), scenario.time.duration_s, "");
+    let waiting = Waiting::standing(arguments.quiet, &bar, options.standing.clone());
+    let mut progress = Progress::new(bar.clone(), scenario.time.duration_s, "").after(waiting);
     let mut paced;
     let mut observer: &mut dyn Observer = &mut progress;
     if command.realtime {
@@ -91,6 +98,7 @@ pub fn run(command: &RunCommand) -> Result<Exit> {
     }
     let records = Records { scenario: &scenario, folder: &folder, csv, keeper, resumed };
     let outcome = run_testbed(testbed, reloader.as_mut(), records, observer)?;
+    drop(progress);
     bar.finish_and_clear();
     let report = recording::report::write(&folder);
     if command.explain {
@@ -155,6 +163,7 @@ pub fn options(arguments: &RunArguments, cancel: &Arc<AtomicBool>) -> Options {
         threads: arguments.threads,
         module_paths: arguments.scenario.module_path.clone(),
         cancel: Arc::clone(cancel),
+        standing: Arc::default(),
     }
 }
 

@@ -34,9 +34,18 @@ fn way_out(error: &InputError) -> String {
         let number: String = error.message[at + 1..].chars().take_while(|c| *c != ']').collect();
         return format!("docs/plugins/errors.md tells causes and cures of {number}");
     }
-    let in_scenario = error.span.is_some() && !error.source_code.name().is_empty();
-    let page = "docs/scenario.md has the keys of a scenario and what they take";
-    if in_scenario { page.into() } else { "`terraglue COMMAND --help` tells what the command takes".into() }
+    if error.span.is_none() || error.source_code.name().is_empty() {
+        return "`terraglue COMMAND --help` tells what the command takes".into();
+    }
+    let robot = [".urdf", ".xacro", ".xml", ".mjcf"];
+    let name = error.source_code.name().to_ascii_lowercase();
+    let page = match robot.iter().any(|ending| name.ends_with(ending)) {
+        true => {
+            "`terraglue robot FILE` shows what is read of it; docs/rigid-body.md says under \"Robot files\" what a robot needs"
+        }
+        false => "docs/scenario.md has the keys of a scenario and what they take",
+    };
+    page.into()
 }
 
 /// A table as wide as the terminal.
@@ -98,7 +107,10 @@ pub fn summary(s: &Summary) -> Table {
     row("depth of the prints", s.print_depth.as_ref().map_or_else(none, prints));
     row("peak force", s.peak_force_over_weight.map_or_else(none, |f| format!("{f:.2} × the weight")));
     row("real-time factor", format!("{:.2} ({:.2} s of wall time)", s.real_time_factor, s.wall_s));
-    row("height gained", s.height_gained_m.map_or_else(none, |h| format!("{:+.1} mm{}", 1e3 * h, stall(s))));
+    row(
+        "height gained",
+        s.height_gained_m.map_or_else(none, |h| format!("{} mm{}", signed(1e3 * h, 1), stall(s))),
+    );
     row("largest roll, pitch", format!("{}, {}", degrees(s.max_roll_rad), degrees(s.max_pitch_rad)));
     row("work of the motors", work(&s.energies));
     if let Some(electrical_j) = s.electrical_energy_j.filter(|e| *e > 0.0) {
@@ -125,7 +137,8 @@ fn not_applicable() -> String {
 /// The drift with what it is held against, or why it is unknown.
 fn drift(e: &Energies) -> String {
     let Some(drift_j) = e.drift_j else { return format!("unknown: {}", e.why_unknown()) };
-    let share = e.drift_share().map_or_else(String::new, |s| format!(", {:.2} % {}", 100.0 * s, e.measure()));
+    let share =
+        e.drift_share().map_or_else(String::new, |s| format!(", {} % {}", fixed(100.0 * s, 2), e.measure()));
     let beyond = if e.is_off() { ": more than 1 %" } else { "" };
     format!("{drift_j:+.2e} J{share}{beyond}")
 }
@@ -139,7 +152,23 @@ fn both(electrical: Option<f64>, mechanical: Option<f64>, show: fn(f64) -> Strin
 }
 
 fn work(e: &Energies) -> String {
-    format!("{:.1} J driving, {:.1} J braking", e.driving_j, e.braking_j)
+    format!("{} J driving, {} J braking", fixed(e.driving_j, 1), fixed(e.braking_j, 1))
+}
+
+/// So many decimals, without the sign of what they round to 0.
+pub fn fixed(x: f64, decimals: usize) -> String {
+    let text = format!("{x:.decimals$}");
+    match text.strip_prefix('-') {
+        Some(rest) if !rest.contains(|c: char| ('1'..='9').contains(&c)) => rest.to_owned(),
+        _ => text,
+    }
+}
+
+/// The same with a sign, except of what rounds to 0.
+fn signed(x: f64, decimals: usize) -> String {
+    let text = fixed(x, decimals);
+    let plus = x > 0.0 && text.contains(|c: char| ('1'..='9').contains(&c));
+    if plus { format!("+{text}") } else { text }
 }
 
 fn prints(p: &PrintDepth) -> String {
@@ -149,7 +178,7 @@ fn prints(p: &PrintDepth) -> String {
 
 fn stall(s: &Summary) -> String {
     s.stalled.map_or_else(String::new, |p| {
-        format!("; stalled since {:.1} s at x = {:.2} m, y = {:.2} m", p.t_s, p.x_m, p.y_m)
+        format!("; stalled since {:.1} s at x = {} m, y = {} m", p.t_s, fixed(p.x_m, 2), fixed(p.y_m, 2))
     })
 }
 
@@ -158,15 +187,16 @@ fn none() -> String {
 }
 
 fn degrees(angle: Option<f64>) -> String {
-    angle.map_or_else(none, |a| format!("{:.1}°", a.to_degrees()))
+    angle.map_or_else(none, |a| format!("{}°", fixed(a.to_degrees(), 1)))
 }
 
 fn distance(s: &Summary) -> String {
     match (s.distance_m, s.commanded_distance_m) {
         (Some(d), Some(c)) if c.abs() > 1e-9 => {
-            format!("{d:.3} m of {c:.3} m asked for ({:.0} %)", 100.0 * d / c)
+            let share = fixed(100.0 * d / c, 0);
+            format!("{} m of {c:.3} m asked for ({share} %)", fixed(d, 3))
         }
-        (Some(d), _) => format!("{d:.3} m"),
+        (Some(d), _) => format!("{} m", fixed(d, 3)),
         _ => none(),
     }
 }
@@ -175,6 +205,13 @@ fn distance(s: &Summary) -> String {
 mod tests {
     use terraglue::recording::{Status, Summary, SummaryObserver};
     use terraglue::scenario::Scenario;
+
+    #[test]
+    fn what_rounds_to_zero_has_no_sign() {
+        let texts = [(-0.004, 2), (-0.0, 0), (-1.006, 2), (f64::NAN, 1)].map(|(x, n)| super::fixed(x, n));
+        assert_eq!(texts, ["0.00", "0", "-1.01", "NaN"]);
+        assert_eq!([0.04, -0.04, 0.06, -2.0].map(|x| super::signed(x, 1)), ["0.0", "0.0", "+0.1", "-2.0"]);
+    }
 
     #[test]
     fn the_table_shows_the_energy_balance() {

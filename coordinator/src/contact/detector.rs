@@ -273,10 +273,20 @@ impl Bodies {
         let message = format!(
             "`{}` of {} has left the ground: it is at x = {x:.3} m, y = {y:.3} m; the ground spans \
              x = {} … {} m, y = {} … {} m (make [terrain] size_m larger)",
-            shape.name, self.name, low[0], high[0], low[1], high[1]
+            shape.name,
+            self.name,
+            plain(low[0]),
+            plain(high[0]),
+            plain(low[1]),
+            plain(high[1])
         );
         Err(failed(now, message))
     }
+}
+
+/// A length without the digits that arithmetic leaves.
+fn plain(x: f64) -> f64 {
+    (x * 1e6).round() / 1e6
 }
 
 fn is_finite(state: &BodyState) -> bool {

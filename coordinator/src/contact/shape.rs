@@ -1,6 +1,7 @@
 //! Shapes that can be hit, and which of them are one piece.
 
 use crate::contact::Now;
+use crate::rotation::length;
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::{Pose as ParryPose, Rot3, Vector};
 use parry3d_f64::query;
@@ -63,10 +64,6 @@ impl Shape {
         // A height field hit along its normal is hit vertically within five times that (slopes up to 78°).
         Aabb::new(Vector::new(x0, y0, z0 - 5.0 * reach), Vector::new(x1, y1, z1))
     }
-}
-
-fn length(v: [f64; 3]) -> f64 {
-    v.iter().map(|c| c * c).sum::<f64>().sqrt()
 }
 
 /// The shapes that can be hit, those of one piece one after the other, pieces in ascending order of their first ids; and

@@ -1,6 +1,7 @@
 //! An instance under supervision: answers are checked, failures get name, function and time.
 
 use super::check;
+use super::crash::{self, Names};
 use super::elements::Elements;
 use crate::error::{Error, Result};
 use std::cell::Cell;
@@ -47,8 +48,7 @@ pub struct Instance {
 
 /// What an instance is.
 struct About {
-    name: String,
-    module: String,
+    names: Names,
     capabilities: Capabilities,
     scene: Scene,
     elements: Option<Elements>,
@@ -58,8 +58,7 @@ impl Instance {
     /// Takes a subsystem under supervision; `name` is that of the scenario.
     pub fn new(name: &str, module: &str, kind: Kind, subsystem: Box<dyn Subsystem>) -> Self {
         let about = About {
-            name: name.to_owned(),
-            module: module.to_owned(),
+            names: Names { instance: name.to_owned(), module: module.to_owned() },
             capabilities: subsystem.capabilities(),
             scene: subsystem.scene(),
             elements: Elements::of(subsystem.variables()),
@@ -111,12 +110,12 @@ impl Instance {
 
     /// Name in the scenario.
     pub fn name(&self) -> &str {
-        &self.about.name
+        &self.about.names.instance
     }
 
     /// Module name.
     pub fn module(&self) -> &str {
-        &self.about.module
+        &self.about.names.module
     }
 
     /// Kind.
@@ -143,8 +142,8 @@ impl Instance {
     #[cold]
     pub fn error(&self, function: &'static str, message: impl Into<String>) -> Error {
         Error::Module {
-            subsystem: self.about.name.clone(),
-            module: self.about.module.clone(),
+            subsystem: self.about.names.instance.clone(),
+            module: self.about.names.module.clone(),
             function,
             time_s: self.time_s.get(),
             message: message.into(),
@@ -173,7 +172,10 @@ impl Instance {
     fn alive(&self, function: &'static str) -> Result {
         match self.dead.get() {
             true => Err(self.is_dead(function)),
-            false => Ok(()),
+            false => {
+                crash::note(&self.about.names, function, self.time_s.get());
+                Ok(())
+            }
         }
     }
 
@@ -558,6 +560,12 @@ impl Instance {
             return Ok(e);
         }
         Err(self.error("energy", "an energy is infinite"))
+    }
+}
+
+impl Drop for About {
+    fn drop(&mut self) {
+        crash::forget(&self.names);
     }
 }
 

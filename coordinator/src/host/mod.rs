@@ -6,6 +6,7 @@
 
 mod allocations;
 mod check;
+pub mod crash;
 mod description;
 mod elements;
 mod error;

@@ -3,6 +3,7 @@
 use crate::gluing::PortReport;
 use crate::observer::View;
 use crate::recording::summary::Stall;
+use crate::rotation;
 use terraglue_subsystem::{Kind, Pose};
 
 /// Time between the samples by which a stall is found, s.
@@ -96,7 +97,7 @@ impl BodyTrack {
         let moved = [position[0] - self.start[0], position[1] - self.start[1]];
         self.distance_m = moved[0] * self.heading[0] + moved[1] * self.heading[1];
         let step = [0, 1, 2].map(|k| position[k] - self.now_at[k]);
-        self.path_m += (step[0] * step[0] + step[1] * step[1] + step[2] * step[2]).sqrt();
+        self.path_m += rotation::length(step);
         self.now_at = position;
         self.follow_force(view);
         let [roll, pitch, _] = roll_pitch_yaw(&orientation);
@@ -150,7 +151,7 @@ impl BodyTrack {
 
 /// Against gravity, of length 1.
 fn up(gravity: &[f64; 3]) -> Option<[f64; 3]> {
-    let g = gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
+    let g = rotation::length(*gravity);
     (g > 0.0).then(|| gravity.map(|x| -x / g))
 }
 

@@ -18,6 +18,7 @@ use crate::recording::selection::Precision;
 use crate::recording::snapshot::{Snapshot, failed};
 use crate::recording::topics::{self, Topic};
 use crate::recording::{energy_message, gluing_message, point_cloud};
+use crate::rotation;
 use crate::scenario::Scenario;
 use foxglove::messages::packed_element_field::NumericType;
 use foxglove::messages::{FrameTransform, FrameTransforms, Grid, Log, PackedElementField, Vector2, log};
@@ -145,7 +146,7 @@ impl McapWriter {
             points: None,
             forces: Forces::default(),
             forces_next_s: f64::NEG_INFINITY,
-            gravity_m_s2: scenario.world.gravity_m_s2.iter().map(|g| g * g).sum::<f64>().sqrt(),
+            gravity_m_s2: rotation::length(scenario.world.gravity_m_s2),
             precision: Precision::digits(scenario.recording.digits),
             packed: Vec::new(),
             window: WindowRecord::default(),

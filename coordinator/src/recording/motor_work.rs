@@ -40,14 +40,8 @@ impl Motors {
                 None => pairs.extend([torque, velocity]),
             }
         }
-        let count = powers.len();
-        powers.extend(pairs);
-        (!powers.is_empty()).then(|| Self {
-            subsystem,
-            powers: count,
-            values: vec![0.0; powers.len()],
-            ids: powers,
-        })
+        let ids = [powers.as_slice(), &pairs].concat();
+        (!ids.is_empty()).then(|| Self { subsystem, powers: powers.len(), values: vec![0.0; ids.len()], ids })
     }
 
     /// Power of those that drive and of those that brake, W; both ≥ 0.

@@ -11,6 +11,7 @@ use crate::recording::motor_work::MotorWork;
 use crate::recording::prints::PrintTrack;
 use crate::recording::snapshot::{real, real_id};
 use crate::recording::summary::{FailureRecord, Status, Summary};
+use crate::rotation;
 use crate::scenario::Scenario;
 use terraglue_subsystem::{Causality, Kind};
 
@@ -241,7 +242,7 @@ impl SummaryObserver {
     pub fn summary(&self, wall_s: f64, cpu_s: f64, error: Option<&Error>, status: Status) -> Summary {
         let per = |total: f64, n: f64| if n > 0.0 { total / n } else { 0.0 };
         let body = self.body.as_ref();
-        let gravity_m_s2 = self.gravity_m_s2.iter().map(|g| g * g).sum::<f64>().sqrt();
+        let gravity_m_s2 = rotation::length(self.gravity_m_s2);
         let weight_n = body.map(|b| b.mass_kg * gravity_m_s2).filter(|w| *w > 0.0);
         let way_m = body.map(|b| b.distance_m.abs()).filter(|way| *way >= SMALLEST_DISTANCE_M);
         let transport = |energy_j: f64| Some(energy_j / (weight_n? * way_m?));

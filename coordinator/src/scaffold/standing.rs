@@ -13,8 +13,12 @@ const GRAVITY: f64 = 1.62;
 const GIVES: [f64; 2] = [0.02, 0.005];
 /// Damping over stiffness, s.
 const SETTLES: f64 = 0.02;
-/// Motors carry the weight this many times.
+/// Motors carry the weight this many times, where the file says nothing.
 const RESERVE: f64 = 5.0;
+/// Most cells along a side of the ground: it is loaded and recorded within seconds.
+const MOST_CELLS: f64 = 3000.0;
+/// Time constants of what is left of a swing after which a robot stands.
+const STOOD: f64 = 5.0;
 
 /// A robot in the pose in which it shall stand.
 pub struct Standing<'a> {
@@ -94,6 +98,8 @@ impl<'a> Standing<'a> {
             ("@mass@", format!("{:.4}", self.whole.mass)),
             ("@size@", format!("{size:?}")),
             ("@spacing@", format!("{spacing:?}")),
+            ("@nodes@", if spacing > 0.02 { COARSE } else { FINE }.to_owned()),
+            ("@settle@", format!("{:?}", self.settle_s())),
             ("@height@", format!("{:?}", rounded(self.height(), 1e4))),
             ("@fixed@", self.fixed_line()),
             ("@touching@", self.touching_names()),
@@ -127,8 +133,11 @@ impl<'a> Standing<'a> {
                 }
             }
         }
-        let spacing = (narrowest / 6.0).clamp(0.004, 0.02);
-        [(2.0 * extent + 2.0).ceil(), (spacing * 1e3).floor() / 1e3]
+        let spacing = ((narrowest / 6.0).clamp(0.004, 0.02) * 1e3).floor() / 1e3;
+        let fits = |size: f64| size / spacing <= MOST_CELLS;
+        let roomy = (2.0 * extent + 2.0).ceil();
+        let size = if fits(roomy) { roomy } else { (1.2 * extent + 1.0).ceil() };
+        [size, if fits(size) { spacing } else { (size / MOST_CELLS * 1e3).ceil() / 1e3 }]
     }
 
     fn fixed_line(&self) -> String {
@@ -145,21 +154,59 @@ impl<'a> Standing<'a> {
     fn start(&self) -> String {
         let turned = self.robot.joints.iter().zip(&self.coordinates).filter(|(_, c)| **c != 0.0);
         turned.fold(String::new(), |mut text, (joint, c)| {
-            let _ = writeln!(text, "{} = {:?}", quoted(&joint.name), c);
+            let _ = writeln!(text, "{} = {:?}", quoted(&joint.name), plain(*c, joint.limits));
             text
         })
     }
 
+    /// Until a robot that is set down has come to rest on its joints: whole seconds.
+    fn settle_s(&self) -> f64 {
+        let reach = |(j, joint): (usize, &Joint)| match joint.kind {
+            JointKind::Prismatic => 0.0,
+            _ => self.reach(j, joint),
+        };
+        let reach = self.driven().map(reach).fold(0.0, f64::max);
+        // A weight on a spring that gives way by d swings at ω² = g/d and fades as exp(−½ω²·SETTLES·t).
+        let fades = 2.0 * GIVES[0] * reach / (GRAVITY * SETTLES);
+        (STOOD * fades).ceil().clamp(1.0, 20.0)
+    }
+
     /// The tables of stiffness, damping and largest torque.
     fn gains(&self) -> String {
-        let rows: Vec<(String, [f64; 3])> =
+        let rows: Vec<(String, Gains)> =
             self.driven().map(|(j, joint)| (quoted(&joint.name), self.gain(j, joint))).collect();
-        let tables = ["stiffness", "damping", "max_torque"];
-        let table = |(k, name): (usize, &&str)| {
-            let rows = rows.iter().map(|(joint, gains)| format!("{joint} = {:?}\n", gains[k]));
+        if rows.is_empty() {
+            return String::new();
+        }
+        let table = |name: &str, value: &dyn Fn(&Gains) -> String| {
+            let rows = rows.iter().map(|(joint, gains)| format!("{joint} = {}\n", value(gains)));
             format!("\n[robot.{name}]\n{}", rows.collect::<String>())
         };
-        if rows.is_empty() { String::new() } else { tables.iter().enumerate().map(table).collect() }
+        table("stiffness", &|g| format!("{:?}", g.stiffness))
+            + &table("damping", &|g| format!("{:?}", g.damping))
+            + "\n# `effort` of the robot file where it says more than 0."
+            + &table("max_torque", &Gains::torque)
+    }
+
+    /// Joints that the limit of the file is too weak for, with it and what they may have to carry.
+    pub fn weak(&self) -> Option<String> {
+        let weak: Vec<String> = self
+            .driven()
+            .map(|(j, joint)| (joint, self.gain(j, joint)))
+            .filter_map(|(joint, g)| {
+                let effort = g.effort.filter(|e| *e < g.share)?;
+                Some(format!("`{}` ({effort} of {})", joint.name, two_digits(g.share)))
+            })
+            .collect();
+        let (last, more) = (weak.len().min(3), weak.len().saturating_sub(3));
+        let more = if more > 0 { format!(" and {more} more") } else { String::new() };
+        (!weak.is_empty()).then(|| {
+            format!(
+                "`effort` of the file is less than a share of the weight asks at full reach, N m: {}{more}; the robot may sink down. \
+                 [robot.max_torque] has what is used",
+                weak[..last].join(", ")
+            )
+        })
     }
 
     /// Joints with a motor of their own.
@@ -170,8 +217,23 @@ impl<'a> Standing<'a> {
     }
 
     /// Stiffness, damping and largest torque of a joint: under a foot it carries the robot, in an arm what hangs on it.
-    fn gain(&self, j: usize, joint: &Joint) -> [f64; 3] {
+    fn gain(&self, j: usize, joint: &Joint) -> Gains {
         let below = self.below(j);
+        let carries = below.iter().any(|b| self.touching.contains(b));
+        let mass: f64 = below.iter().map(|b| self.robot.bodies[*b].mass).sum();
+        let weight = GRAVITY * if carries { self.whole.mass } else { mass };
+        let (load, gives) = match joint.kind {
+            JointKind::Prismatic => (weight, GIVES[1]),
+            _ => (weight * self.reach(j, joint).max(0.01), GIVES[0]),
+        };
+        let [stiffness, damping] = [load / gives, load / gives * SETTLES].map(two_digits);
+        let effort = joint.data.effort.or(joint.data.drive.and_then(|d| d.max_torque).filter(|t| *t > 0.0));
+        let share = if carries { load / self.touching.len() as f64 } else { load };
+        Gains { stiffness, damping, load, share, effort }
+    }
+
+    /// How far from the joint's axis what it moves reaches, m.
+    fn reach(&self, j: usize, joint: &Joint) -> f64 {
         let parent = joint.parent.map_or_else(Isometry3::identity, |p| self.poses[p]);
         let anchor = (parent * joint.parent_from_joint).translation.vector;
         let reach = |b: &usize| {
@@ -183,14 +245,7 @@ impl<'a> Standing<'a> {
             let com = self.poses[*b] * nalgebra::Point3::from(self.robot.bodies[*b].com);
             ends.flatten().chain([com.coords]).map(|p| (p - anchor).norm()).fold(0.0, f64::max)
         };
-        let carries = below.iter().any(|b| self.touching.contains(b));
-        let mass: f64 = below.iter().map(|b| self.robot.bodies[*b].mass).sum();
-        let weight = GRAVITY * if carries { self.whole.mass } else { mass };
-        let (load, gives) = match joint.kind {
-            JointKind::Prismatic => (weight, GIVES[1]),
-            _ => (weight * below.iter().map(reach).fold(0.01, f64::max), GIVES[0]),
-        };
-        [load / gives, load / gives * SETTLES, load * RESERVE].map(two_digits)
+        self.below(j).iter().map(reach).fold(0.0, f64::max)
     }
 
     /// Bodies that a joint moves.
@@ -247,6 +302,42 @@ fn pose(robot: &Robot) -> Vec<f64> {
         coordinates[c.follower] = follow(c, &coordinates);
     }
     coordinates
+}
+
+/// What is said of the spacing.
+const FINE: &str = "six nodes across the narrowest thing that touches";
+/// See [`FINE`]; of a robot so large that its ground would have too many nodes.
+const COARSE: &str = "coarse: a ground of this size with six nodes across what touches would be too large";
+
+/// What a joint is held with.
+struct Gains {
+    stiffness: f64,
+    damping: f64,
+    /// Under the whole weight at full reach.
+    load: f64,
+    /// The same where all that touches carries alike.
+    share: f64,
+    /// Largest torque by the file.
+    effort: Option<f64>,
+}
+
+impl Gains {
+    /// The largest torque, with its reason where it is not that of the file.
+    fn torque(&self) -> String {
+        match self.effort {
+            Some(effort) => format!("{effort:?}"),
+            None => {
+                format!("{:?}      # {RESERVE} times what the weight asks", two_digits(self.load * RESERVE))
+            }
+        }
+    }
+}
+
+/// Without the digits that arithmetic leaves, as long as that stays within the limits.
+fn plain(c: f64, limits: Option<[f64; 2]>) -> f64 {
+    let rounded = rounded(c, 1e9);
+    let inside = limits.is_none_or(|[low, high]| (low..=high).contains(&rounded));
+    if inside { rounded } else { c }
 }
 
 /// A name as a text of TOML.

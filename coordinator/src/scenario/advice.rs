@@ -209,6 +209,9 @@ pub fn law_parameters(schema: &Schema, spec: &SubsystemSpec, source: &Source) ->
 /// An error in one line: place and message.
 pub(super) fn line_of(error: &InputError) -> String {
     let (file, text) = (error.source_code.name(), error.source_code.inner());
+    if file.starts_with("--") {
+        return format!("{file} {text}: {}", error.message);
+    }
     let start = error.span.map_or(0, |s| s.offset());
     let line = text.get(..start).map_or(1, |head| head.matches('\n').count() + 1);
     format!("{file}:{line}: {}", error.message)

@@ -93,8 +93,24 @@ fn typed(p: &Parameter, count: Option<usize>, ok: bool, value: &Value) -> Result
     if ok {
         return Ok(());
     }
+    if let Some(digits) =
+        value.as_str().filter(|text| p.parameter_type == ParameterType::Integer && is_whole(text))
+    {
+        let message =
+            format!("`{}` = {digits} is out of range: it takes {}", last_part(&p.name), allowed(p, count));
+        return Err(Complaint { message, help: Some(LARGEST_WHOLE.into()) });
+    }
     let message = format!("`{}` takes {}, not {}", last_part(&p.name), allowed(p, count), describe(value));
     Err(Complaint { message, help: help_line(p) })
+}
+
+/// What is said of whole numbers that TOML does not hold; an edit brings them as text.
+pub const LARGEST_WHOLE: &str =
+    "whole numbers of a scenario go from -9223372036854775808 to 9223372036854775807 (64 bits, signed)";
+
+fn is_whole(text: &str) -> bool {
+    let digits = text.trim_start_matches(['-', '+']);
+    !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit())
 }
 
 fn help_line(p: &Parameter) -> Option<String> {

@@ -1,6 +1,7 @@
 //! From the text to the [`Scenario`].
 
 use super::advice::MOST_STEPS;
+use super::check::LARGEST_WHOLE;
 use super::events::{connections, events, faults, glue};
 use super::keys::{self, Table};
 use super::model::*;
@@ -24,27 +25,35 @@ impl Scenario {
     /// Wrong input, with the place in the file or in the edit. Parameters of modules are checked later, by
     /// [`super::check_parameters`].
     pub fn load(path: &Path, sets: &[(String, String)]) -> Checked<Self> {
+        Self::load_by(path, sets, &[])
+    }
+
+    /// The same; `options` are the words of the command line that brought each of `sets`, `--set` beyond their end.
+    ///
+    /// # Errors
+    /// As [`Scenario::load`].
+    pub fn load_by(path: &Path, sets: &[(String, String)], options: &[&str]) -> Checked<Self> {
         if Package::is_one(path) {
-            return Self::structure(path, sets);
+            return Self::structure(path, sets, options);
         }
         let text = terraglue_subsystem::files::read_text(path).map_err(|e| unreadable(path, &e))?;
-        Self::parse(&text, &path.display().to_string(), sets)
+        Self::checked(read_source(&text, &path.display().to_string(), sets, options)?)
     }
 
     /// A system structure (SSP) as a scenario.
-    fn structure(path: &Path, sets: &[(String, String)]) -> Checked<Self> {
+    fn structure(path: &Path, sets: &[(String, String)], options: &[&str]) -> Checked<Self> {
         let wrong = |e: terraglue_fmi::Error| InputError::plain(e.to_string(), None);
         let package = Package::open(path).map_err(wrong)?;
         let converted = crate::fmu::ssp::convert(&package, "").map_err(wrong)?;
         converted.notes.iter().for_each(|note| log::warn!("{}: {note}", path.display()));
-        let mut source = read_source(&converted.text, &path.display().to_string(), sets)?;
+        let mut source = read_source(&converted.text, &path.display().to_string(), sets, options)?;
         source.package = Some(Arc::new(package));
         Self::checked(source)
     }
 
     /// The scenario of an earlier run, whose text after all edits was kept; `path` is that of its file.
     pub(crate) fn again(path: &Path, text: &str) -> Checked<Self> {
-        let mut source = read_source(text, &path.display().to_string(), &[])?;
+        let mut source = read_source(text, &path.display().to_string(), &[], &[])?;
         if Package::is_one(path) {
             let package = Package::open(path).map_err(|e| InputError::plain(e.to_string(), None))?;
             source.package = Some(Arc::new(package));
@@ -54,7 +63,7 @@ impl Scenario {
 
     /// The same for a text; `path` gives its name and folder.
     pub fn parse(text: &str, path: &str, sets: &[(String, String)]) -> Checked<Self> {
-        Self::checked(read_source(text, path, sets)?)
+        Self::checked(read_source(text, path, sets, &[])?)
     }
 
     fn checked(source: Source) -> Checked<Self> {
@@ -127,12 +136,17 @@ fn unreadable(path: &Path, error: &std::io::Error) -> Box<InputError> {
     InputError::plain(message, help)
 }
 
-fn read_source(text: &str, path: &str, sets: &[(String, String)]) -> Checked<Source> {
+fn read_source(text: &str, path: &str, sets: &[(String, String)], options: &[&str]) -> Checked<Source> {
+    let option = |number: usize| options.get(number).copied().unwrap_or("--set");
     let mut source = Source {
         path: path.into(),
         text: text.into(),
         file_text: text.into(),
-        sets: sets.iter().map(|(key, value)| edit_text(key, value)).collect(),
+        sets: sets
+            .iter()
+            .enumerate()
+            .map(|(number, (key, value))| (option(number).to_owned(), edit_text(key, value)))
+            .collect(),
         root: Arc::default(),
         package: None,
     };
@@ -142,13 +156,17 @@ fn read_source(text: &str, path: &str, sets: &[(String, String)]) -> Checked<Sou
     }
     let document = Document::parse(text.to_owned()).map_err(|e| {
         let message = format!("not TOML: {}", e.message().lines().collect::<Vec<_>>().join("; "));
-        let help = "docs/scenario.md shows what a scenario looks like, https://toml.io the form".to_owned();
+        let help = match e.message().contains("overflow") {
+            true => LARGEST_WHOLE,
+            false => "docs/scenario.md shows what a scenario looks like, https://toml.io the form",
+        }
+        .to_owned();
         source.error_at(e.span().unwrap_or(0..0), message, Some(help))
     })?;
     let mut root = Node::of_document(document.as_table());
     let mut document = document.into_mut();
     for (number, (key, value)) in sets.iter().enumerate() {
-        let edit = Edit::parse(number, key, value)?;
+        let edit = Edit::parse(number, option(number), key, value)?;
         edit.apply(&mut root);
         edit.apply_to_text(&mut document);
     }

@@ -15,11 +15,11 @@ pub struct Edit {
 }
 
 impl Edit {
-    /// Reads edit number `number`. A value that is not TOML is a bare word, i.e. text.
-    pub fn parse(number: usize, key: &str, value: &str) -> Result<Self, Box<InputError>> {
+    /// Reads edit number `number`, which `option` of the command line brought. A value that is not TOML is a bare word, i.e. text.
+    pub fn parse(number: usize, option: &str, key: &str, value: &str) -> Result<Self, Box<InputError>> {
         let text = edit_text(key, value);
         let refuse = |what: String| {
-            let source_code = miette::NamedSource::new("--set", text.clone());
+            let source_code = miette::NamedSource::new(option, text.clone());
             let help = Some("write --set table.key=value, e.g. --set time.step_s=0.0005".into());
             Box::new(InputError { message: what, source_code, span: Some((0..key.len()).into()), help })
         };

@@ -17,8 +17,8 @@ pub struct Source {
     pub text: String,
     /// Contents of the file; spans refer to it.
     pub(super) file_text: Arc<str>,
-    /// Edits by `--set`, as `key.path=value`.
-    pub(super) sets: Arc<[String]>,
+    /// Edits by `--set` and the like: the option, and `key.path=value`.
+    pub(super) sets: Arc<[(String, String)]>,
     /// The parsed text after the edits.
     pub(super) root: Arc<Node>,
     /// The system structure that it was made from, whose files lie elsewhere.
@@ -125,7 +125,7 @@ impl Source {
     /// Name and text of the file, or of the `--set`, that a place is in.
     fn text_at(&self, place: &Place) -> (&str, &str) {
         match place.set.and_then(|i| self.sets.get(i)) {
-            Some(set) => ("--set", set.as_str()),
+            Some((option, set)) => (option.as_str(), set.as_str()),
             None => (self.path.as_str(), self.file_text.as_ref()),
         }
     }

@@ -4,7 +4,7 @@ use super::keys::READ;
 use super::model::{TerrainKind, TerrainSpec};
 use super::section::Section;
 use super::source::InputError;
-use crate::terrain::Greys;
+use crate::terrain::{Greys, too_many};
 
 /// Reads the checked table.
 pub fn read(s: &Section) -> Result<TerrainSpec, Box<InputError>> {
@@ -57,7 +57,7 @@ fn undulating(s: &Section) -> Result<TerrainKind, Box<InputError>> {
     })
 }
 
-/// The lattice must have a few nodes and not more than memory holds.
+/// The lattice must have a few nodes and not more than fit into memory.
 fn check_lattice(s: &Section, spec: &TerrainSpec) -> Result<(), Box<InputError>> {
     let [nx, ny] = spec.size_m.map(|size| size / spec.spacing_m);
     if spec.spacing_m > 0.0 && (nx < 2.0 || ny < 2.0) {
@@ -68,13 +68,12 @@ fn check_lattice(s: &Section, spec: &TerrainSpec) -> Result<(), Box<InputError>>
             Some("make the spacing smaller or the ground larger".into()),
         ));
     }
-    if spec.spacing_m > 0.0 && nx * ny > 4e9 {
-        let message = format!("`size_m` and `spacing_m` make {:.1e} nodes, more than 4e9", nx * ny);
-        return Err(s.error(
-            "spacing_m",
-            message,
-            Some("make the spacing larger or the ground smaller".into()),
-        ));
+    if spec.spacing_m > 0.0
+        && let Some((what, help)) = too_many(spec.size_m, spec.spacing_m)
+    {
+        let message =
+            format!("`size_m` = {:?} with `spacing_m` = {} makes {what}", spec.size_m, spec.spacing_m);
+        return Err(s.error("spacing_m", message, Some(help)));
     }
     Ok(())
 }

@@ -86,6 +86,12 @@ fn from_file(path: &str, mut raster: Raster, spacing: f64) -> Result<Box<dyn Ter
         let message = format!("{path}: {width} × {height} heights are no ground");
         return Err(InputError::plain(message, Some("at least 2 × 2 are needed".to_owned())).into());
     }
+    let extent = [0, 1].map(|k| (raster.size[k] - 1) as f64 * raster.step[k]);
+    let finest = raster.step[0].min(raster.step[1]);
+    if let Some((what, help)) = too_many(extent, if spacing > 0.0 { spacing } else { finest }) {
+        let message = format!("{path}: {} m by {} m make {what}", extent[0], extent[1]);
+        return Err(InputError::plain(message, Some(help)).into());
+    }
     if raster.heights.iter().any(|h| h.abs() > HIGHEST_M) {
         let middle = raster.heights[raster.size[0] * (raster.size[1] / 2) + raster.size[0] / 2].round();
         raster.heights.iter_mut().for_each(|h| *h -= middle);
@@ -99,14 +105,49 @@ fn from_file(path: &str, mut raster: Raster, spacing: f64) -> Result<Box<dyn Ter
     Ok(Box::new(resample(path, raster, spacing)?))
 }
 
+/// Most nodes of a terrain. A run holds about 45 bytes a node where its ground is largest, when it is recorded: 2.3 GB, which
+/// most machines have, and a recording of 400 MB at the start and once more at the end.
+const MOST_NODES: f64 = 5e7;
+/// See [`MOST_NODES`].
+const BYTES_PER_NODE: f64 = 45.0;
+
+/// Of a ground with more nodes than fit: what it makes and needs, and the way out.
+pub(crate) fn too_many(size_m: [f64; 2], spacing_m: f64) -> Option<(String, String)> {
+    let cells = size_m.map(|s| s / spacing_m);
+    let nodes = (cells[0] + 1.0) * (cells[1] + 1.0);
+    if nodes <= MOST_NODES && cells.iter().all(|n| *n < MOST_CELLS) {
+        return None;
+    }
+    let fits = (size_m[0] * size_m[1] / MOST_NODES).sqrt().max(size_m[0].max(size_m[1]) / MOST_CELLS) * 1.001;
+    let unit = 10_f64.powf(fits.log10().floor() - 1.0);
+    let fits: f64 = format!("{:.1e}", (fits / unit).ceil() * unit).parse().unwrap_or(fits);
+    let bytes = nodes * BYTES_PER_NODE;
+    let what = format!(
+        "{nodes:.2e} nodes, for which a run would need about {}; at most {MOST_NODES:.0e} are taken, and {MOST_CELLS:.0e} cells a side",
+        if bytes < 1e12 {
+            format!("{:.1} GB of memory", bytes * 1e-9)
+        } else {
+            format!("{:.1e} GB of memory", bytes * 1e-9)
+        }
+    );
+    Some((what, format!("`spacing_m` = {fits} fits this size; or make `size_m` smaller")))
+}
+
+/// Most cells along a side.
+const MOST_CELLS: f64 = 1e6;
+
 /// The lattice of a procedural terrain.
 fn centred_lattice(spec: &TerrainSpec) -> Result<Lattice> {
     let cells = spec.size_m.map(|size| (size / spec.spacing_m).round());
-    let sound = spec.spacing_m > 0.0 && cells.iter().all(|n| *n >= 1.0 && *n < 1e6);
+    let sound = spec.spacing_m > 0.0
+        && cells.iter().all(|n| *n >= 1.0)
+        && too_many(spec.size_m, spec.spacing_m).is_none();
     if !sound {
         let message =
             format!("size_m = {:?} and spacing_m = {} do not make a lattice", spec.size_m, spec.spacing_m);
-        return Err(InputError::plain(message, Some("both positive, at most 1e6 cells a side".into())).into());
+        let help =
+            too_many(spec.size_m, spec.spacing_m).map_or_else(|| "both are positive".into(), |(_, h)| h);
+        return Err(InputError::plain(message, Some(help)).into());
     }
     Ok(lattice_of(cells.map(|n| n as u32 + 1), spec.spacing_m))
 }

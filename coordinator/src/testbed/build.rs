@@ -83,6 +83,7 @@ impl Testbed {
             timings: Timings::default(),
             unglued: Unglued::new(services.workers.clone()),
             cancel: options.cancel.clone(),
+            standing: options.standing.clone(),
             partings: services.partings.clone(),
             step_s: scenario.time.step_s,
             origin_s: 0.0,
@@ -203,7 +204,7 @@ fn instantiate(
                 log::warn!("{advice}");
             }
         }
-        let gravity = services.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
+        let gravity = crate::rotation::length(services.gravity);
         let replaced = scenario::advice::replaced_laws(scenario, spec, &config, gravity);
         let doubts = scenario::plausible::soil(scenario, spec, module.schema(), &config);
         let foreign = scenario::advice::foreign_gravity(scenario, spec, &config, gravity);
@@ -386,7 +387,7 @@ fn group(
     grounds: &[usize],
     glue: &[Recipe],
 ) -> Result<Group> {
-    let gravity = scenario.world.gravity_m_s2.iter().map(|g| g * g).sum::<f64>().sqrt();
+    let gravity = crate::rotation::length(scenario.world.gravity_m_s2);
     let mass: f64 = bodies.iter().flat_map(|b| &instances[*b].scene().bodies).map(|b| b.mass).sum();
     let weight = mass * gravity;
     let mut exchange = Exchange::new(bodies, grounds, if weight > 0.0 { weight } else { 1.0 });

@@ -8,6 +8,7 @@ use super::Testbed;
 use crate::Result;
 use crate::gluing::{Outcome, StepReport};
 use crate::timing::Timings;
+use std::sync::atomic::Ordering;
 use std::time::Duration;
 use terraglue_subsystem::{Energy, Kind};
 
@@ -24,8 +25,12 @@ impl Testbed {
             return Ok(());
         }
         self.started = true;
-        let count = (self.settle_s / self.step_s).ceil();
-        self.t = -count * self.step_s;
+        let exact = self.settle_s / self.step_s;
+        // 1.1 s in steps of 1 ms are 1100, whatever the division leaves
+        let whole = (exact - exact.round()).abs() <= 1e-6;
+        let count = if whole { exact.round() } else { exact.ceil() };
+        // 0.0 −, and not −: 0 s has no sign
+        self.t = 0.0 - count * self.step_s;
         if count > 0.0 {
             self.settle()?;
         }
@@ -46,6 +51,7 @@ impl Testbed {
             .collect();
         self.turns.iter_mut().zip(&holds).for_each(|(turn, holds)| turn.holds = *holds);
         let stood = (1..=count).rev().try_for_each(|left| self.stand_step(left));
+        self.standing.store(0, Ordering::Relaxed);
         self.turns.iter_mut().for_each(|turn| turn.holds = false);
         stood?;
         (self.t, self.index, self.halvings) = (0.0, 0, 0);
@@ -57,6 +63,7 @@ impl Testbed {
         if self.cancelled() {
             return Ok(());
         }
+        self.standing.store(self.t.to_bits(), Ordering::Relaxed);
         let end = -((left - 1) as f64) * self.step_s;
         let mut longest = self.step_s;
         self.halvings = 0;

@@ -211,6 +211,8 @@ pub struct AxisData {
     pub stiffness: f64,
     /// See `stiffness`.
     pub reference: f64,
+    /// Largest torque that the file allows at the joint (`effort` of URDF), N m; none: it says nothing.
+    pub effort: Option<f64>,
     /// The motor; none: the file has none.
     pub drive: Option<Drive>,
 }

@@ -79,7 +79,6 @@ fn transmissions(source: &Source, document: &Document) -> Option<String> {
 
 fn effort(source: &Source, robot: &urdf_rs::Robot) -> Option<String> {
     let bounded = robot.joints.iter().find(|j| j.limit.effort != 0.0 || j.limit.velocity != 0.0)?;
-    let text =
-        "`effort` and `velocity` of <limit> are not used: the scenario's `max_torque` bounds the motors";
+    let text = "`effort` and `velocity` of <limit> are not used: the scenario's `max_torque` bounds the motors (`terraglue new scenario` copies `effort` into it)";
     Some(source.joint(&bounded.name, text).to_string())
 }

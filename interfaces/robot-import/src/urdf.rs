@@ -126,14 +126,15 @@ fn next_to_each_other(bodies: usize, joints: &[Joint]) -> Vec<[usize; 2]> {
         .collect()
 }
 
-/// Friction in the joint, from `<dynamics>`.
+/// Friction in the joint, from `<dynamics>`, and its largest torque, from `<limit>`: 0 stands for no limit.
 fn data(source: &Source, joint: &urdf_rs::Joint) -> Result<AxisData, Error> {
     let (damping, friction) = joint.dynamics.as_ref().map_or((0.0, 0.0), |d| (d.damping, d.friction));
     if let Some(bad) = [damping, friction].iter().find(|x| **x < 0.0) {
         let problem = format!("<dynamics> has {bad}; damping and friction are not below 0");
         return Err(source.joint(&joint.name, problem));
     }
-    Ok(AxisData { damping, friction, ..AxisData::default() })
+    let effort = Some(joint.limit.effort).filter(|e| *e > 0.0);
+    Ok(AxisData { damping, friction, effort, ..AxisData::default() })
 }
 
 /// Joints that follow others, from `<mimic>`.

@@ -130,25 +130,33 @@ pub(crate) fn clearance(model: &Model, bodies: &[Motion], terrain: &dyn Terrain)
     smallest
 }
 
+/// Nodes beyond the edge of the terrain that count, whose height is that of the edge.
+const BESIDE: i64 = 100;
+
 /// Of one shape: over the lattice nodes below it, where the soil will feel it, and below its lowest corner.
 fn shape_clearance(shape: &dyn parry3d_f64::shape::Shape, pose: &Pose, terrain: &dyn Terrain) -> f64 {
     let aabb = shape.compute_aabb(pose);
     let (origin, spacing) = (terrain.origin(), terrain.spacing());
-    let index = |x: f64, axis: usize| ((x - origin[axis]) / spacing).floor() as i64;
+    // A shape may be far larger than the terrain.
+    let size = terrain.size().map(i64::from);
+    let index = |x: f64, axis: usize| {
+        (((x - origin[axis]) / spacing).floor() as i64).clamp(-BESIDE, size[axis] + BESIDE)
+    };
     let (i0, j0) = (index(aabb.mins.x, 0), index(aabb.mins.y, 1));
-    let (ni, nj) = ((index(aabb.maxs.x, 0) - i0 + 2) as usize, (index(aabb.maxs.y, 1) - j0 + 2) as usize);
-    let mut heights = vec![0.0; ni * nj];
-    terrain.heights(i0, j0, ni, nj, &mut heights);
+    let (ni, nj) = (index(aabb.maxs.x, 0) - i0 + 2, index(aabb.maxs.y, 1) - j0 + 2);
+    let mut row = vec![0.0; ni as usize];
     let below = aabb.mins.z - 1.0;
     let mut smallest = f64::INFINITY;
     let mut highest = f64::NEG_INFINITY;
-    for (k, height) in heights.iter().enumerate() {
-        highest = highest.max(*height);
-        let x = origin[0] + (i0 + (k % ni) as i64) as f64 * spacing;
-        let y = origin[1] + (j0 + (k / ni) as i64) as f64 * spacing;
-        let ray = Ray::new(Vector::new(x, y, below), Vector::new(0.0, 0.0, 1.0));
-        if let Some(time) = RayCast::cast_ray(shape, pose, &ray, f64::MAX, true) {
-            smallest = smallest.min(below + time - height);
+    for j in j0..j0 + nj {
+        terrain.heights(i0, j, row.len(), 1, &mut row);
+        for (i, height) in (i0..).zip(&row) {
+            highest = highest.max(*height);
+            let (x, y) = (origin[0] + i as f64 * spacing, origin[1] + j as f64 * spacing);
+            let ray = Ray::new(Vector::new(x, y, below), Vector::new(0.0, 0.0, 1.0));
+            if let Some(time) = RayCast::cast_ray(shape, pose, &ray, f64::MAX, true) {
+                smallest = smallest.min(below + time - height);
+            }
         }
     }
     // A shape between the nodes rests on the highest of its neighbours.

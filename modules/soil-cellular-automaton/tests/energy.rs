@@ -11,7 +11,7 @@ use proptest::prelude::*;
 use proptest::test_runner::RngSeed;
 use std::sync::Arc;
 use support::{DRY_SAND, LETE, LUNAR, Shaped, flat};
-use terraglue_ground::Placed;
+use terraglue_ground::{Placed, compose};
 use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
 use terraglue_subsystem::{Energy, Host, Pose, Standalone, Subsystem};
 
@@ -27,17 +27,13 @@ fn ground(spacing: f64) -> Arc<dyn Host> {
     })
 }
 
-/// The product of a small turn by the rotation vector `w` (rad) and q.
-fn turned(w: [f64; 3], [qw, qx, qy, qz]: [f64; 4]) -> [f64; 4] {
+/// q after a small turn by the rotation vector `w` (rad).
+fn turned(w: [f64; 3], q: [f64; 4]) -> [f64; 4] {
     let angle = w.iter().map(|c| c * c).sum::<f64>().sqrt();
     let share = if angle > 0.0 { libm::sin(0.5 * angle) / angle } else { 0.0 };
-    let (c, [x, y, z]) = (libm::cos(0.5 * angle), w.map(|c| c * share));
-    [
-        c * qw - x * qx - y * qy - z * qz,
-        c * qx + x * qw + y * qz - z * qy,
-        c * qy - x * qz + y * qw + z * qx,
-        c * qz + x * qy - y * qx + z * qw,
-    ]
+    let [x, y, z] = w.map(|c| c * share);
+    let of = |orientation| Pose { position: [0.0; 3], orientation };
+    compose(&of([libm::cos(0.5 * angle), x, y, z]), &of(q)).orientation
 }
 
 /// How far the lowest point of a body lies below its middle, m.

@@ -1,12 +1,12 @@
 //! Which runs a comparison takes: every combination, each checked before the first one starts.
 
 use crate::cli::arguments::{CompareArguments, RunArguments};
-use crate::cli::{run, soil_module};
+use crate::cli::{logger, run, soil_module};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use terraglue::host::{Library, SearchPath};
-use terraglue::recording::compare::{self, Varied};
+use terraglue::recording::compare::{self, CompareRow, Varied};
 use terraglue::scenario::{InputError, Scenario, did_you_mean, keys::STRATEGIES};
 use terraglue::subsystem::Kind;
 use terraglue::{Error, Result};
@@ -35,6 +35,19 @@ impl Plan {
     /// Whether the iteration also runs from zero, to show what the estimate saves.
     pub fn has_cold_start(&self) -> bool {
         self.strategy == "iterative" && !self.is_reference && self.scenario.gluing.start == "estimate"
+    }
+
+    /// Its row, before it ran.
+    pub fn row(&self) -> CompareRow {
+        CompareRow {
+            strategy: self.strategy.clone(),
+            soil: self.soil.clone(),
+            varied: self.varied.clone(),
+            step_s: self.scenario.time.step_s,
+            is_reference: self.is_reference,
+            name_step: self.name_step,
+            ..CompareRow::default()
+        }
     }
 
     /// Steps of all its runs.
@@ -206,16 +219,31 @@ fn planned(
     name_step: bool,
 ) -> Result<Plan> {
     let mut sets = arguments.run.sets();
-    sets.push(("gluing.strategy".into(), choice.strategy.clone()));
+    let mut options = vec!["--set"; sets.len()];
+    let mut add = |option, key: String, value| {
+        sets.push((key, value));
+        options.push(option);
+    };
+    add("--strategies", "gluing.strategy".into(), choice.strategy.clone());
     if let Some(step) = choice.step_s {
-        sets.push(("time.step_s".into(), format!("{step:?}")));
+        add("--steps", "time.step_s".into(), format!("{step:?}"));
     }
     if let Some(soil) = soil {
-        sets.push((format!("{}.module", soil.name), choice.soil.clone()));
+        add("--soils", format!("{}.module", soil.name), choice.soil.clone());
     }
-    sets.extend(choice.varied.iter().cloned());
+    choice.varied.iter().cloned().for_each(|(key, value)| add("--vary", key, value));
+    let row = CompareRow {
+        strategy: choice.strategy.clone(),
+        soil: choice.soil.clone(),
+        varied: choice.varied.clone(),
+        step_s: choice.step_s.unwrap_or_default(),
+        is_reference: choice.is_reference,
+        name_step,
+        ..CompareRow::default()
+    };
+    let _said = logger::of_run(&row.name());
     Ok(Plan {
-        scenario: Scenario::load(&arguments.run.scenario.scenario, &sets)?,
+        scenario: Scenario::load_by(&arguments.run.scenario.scenario, &sets, &options)?,
         strategy: choice.strategy,
         soil: choice.soil,
         varied: choice.varied,
@@ -239,6 +267,7 @@ fn check_folder(plans: &[Plan], folder: &Path) -> Result {
 pub fn refuse(plans: &mut [Plan], arguments: &RunArguments, cancel: &Arc<AtomicBool>) -> Result {
     let mut first = None;
     for plan in plans.iter_mut() {
+        let _said = logger::of_run(&plan.row().name());
         let Err(error) = run::build(&plan.scenario, &run::options(arguments, cancel)) else { continue };
         if plan.is_reference {
             return Err(refused_reference(plan, error));

@@ -34,6 +34,15 @@ impl Folders {
         if let Some(found) = tried.iter().find(|p| p.is_file()) {
             return Ok(found.clone());
         }
+        // There, and yet no file that can be read whole: opening it says why.
+        if let Some(other) = tried.iter().find(|p| p.exists())
+            && let Err(why) = terraglue_subsystem::files::open(other)
+        {
+            return Err(format!(
+                "`{}` cannot be read: {why}; a mesh is an STL, OBJ or COLLADA file",
+                other.display()
+            ));
+        }
         let list: Vec<String> = tried.iter().map(|p| p.display().to_string()).collect();
         Err(format!("there is no such file; tried: {}; {way_out}", list.join(", ")))
     }

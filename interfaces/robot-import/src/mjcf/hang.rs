@@ -70,6 +70,7 @@ impl Reader<'_, '_> {
             armature: not_negative("armature")?,
             stiffness: not_negative("stiffness")?,
             reference: unit * d.number(&e, "springref")?.unwrap_or(0.0),
+            effort: None,
             drive: None,
         };
         let limits = if kind == JointKind::Spherical {

@@ -4,6 +4,7 @@
 
 use std::ffi::{CStr, CString};
 use std::path::PathBuf;
+use std::sync::Mutex;
 use terraglue_fmi::floating_point::Mode;
 
 /// Signals whose handling matters here: Ctrl-C and its like, closed pipes, ended children.
@@ -94,14 +95,25 @@ fn no_handler() -> libc::sigaction {
     unsafe { std::mem::zeroed() }
 }
 
-/// The mask can only be read by setting it.
+/// The mask for new files. Linux tells it; elsewhere it can only be read by setting it, which other threads would see.
 fn mask() -> libc::mode_t {
-    // SAFETY: sets a number of the process, and sets it back.
-    unsafe {
-        let mask = libc::umask(0o077);
-        libc::umask(mask);
-        mask
-    }
+    static READING: Mutex<()> = Mutex::new(());
+    told_mask().unwrap_or_else(|| {
+        let _one_at_a_time = READING.lock();
+        // SAFETY: sets a number of the process, and sets it back.
+        unsafe {
+            let mask = libc::umask(0o077);
+            libc::umask(mask);
+            mask
+        }
+    })
+}
+
+/// The mask as `/proc` tells it.
+fn told_mask() -> Option<libc::mode_t> {
+    let status = std::fs::read_to_string("/proc/self/status").ok()?;
+    let mask = status.lines().find_map(|line| line.strip_prefix("Umask:"))?;
+    libc::mode_t::from_str_radix(mask.trim(), 8).ok()
 }
 
 fn locale() -> CString {
@@ -118,5 +130,25 @@ fn blocked() -> libc::sigset_t {
         let mut set: libc::sigset_t = std::mem::zeroed();
         libc::pthread_sigmask(libc::SIG_BLOCK, std::ptr::null(), &raw mut set);
         set
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Runs of a comparison look at the same process from several threads.
+    #[test]
+    fn threads_that_look_at_once_see_no_change() {
+        let before = Surroundings::now();
+        std::thread::scope(|scope| {
+            for _ in 0..4 {
+                scope.spawn(|| {
+                    for _ in 0..2000 {
+                        assert_eq!(mask(), before.mask);
+                    }
+                });
+            }
+        });
     }
 }

@@ -76,8 +76,6 @@ pub struct Lists {
     slid: Vec<[f64; 2]>,
     /// Slip of loaded nodes after it was carried along; scratch.
     carried: Vec<f64>,
-    /// Nodes that were loaded before and are not any more.
-    pub released: Vec<[i32; 2]>,
     /// Per port whether it touches the soil.
     touching: Vec<bool>,
     /// Pressures and shear of the nodes of a patch, asked of its law together; empty: it is asked node by node.
@@ -93,7 +91,6 @@ impl Lists {
         self.carried.reserve(count);
         self.slid_in.reserve(count);
         self.slid.reserve(count);
-        self.released.reserve(count);
         self.touching.reserve(count);
         self.answers.reserve(count);
     }
@@ -553,14 +550,12 @@ fn mean_slip(ground: &Ground, nodes: &[[i32; 2]], slid_in: &[bool]) -> f64 {
 /// Lift-off: the nodes that were loaded before and are not now forget pressure and shear. Returns the elastic energy that
 /// they held, J: nothing takes it up.
 fn release(ground: &mut Ground, lists: &mut Lists, stamp: u64) -> f64 {
-    lists.released.clear();
     let mut heat = 0.0;
     for [i, j] in &lists.previous {
         let state = ground.nodes.get(*i, *j);
         if state.stamp != stamp {
             heat += state.energy;
             ground.leave(*i, *j);
-            lists.released.push([*i, *j]);
         }
     }
     heat

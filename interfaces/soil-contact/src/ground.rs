@@ -100,7 +100,7 @@ impl Ground {
     /// Height of the loose soil on a node of the lattice, units.
     #[inline]
     pub fn loose_units(&self, i: i32, j: i32) -> i32 {
-        (self.nodes.get(i, j).loose_left() / UNIT_M) as i32
+        (self.nodes.get(i, j).loose_left() / UNIT_M).round() as i32
     }
 
     /// The state of a node on which a foot stands from now on, for writing.

@@ -6,7 +6,7 @@
 use terraglue_ground::{Lattice, TILE_NODES, TileMap, TileMapSnapshot, UNIT_M};
 use terraglue_soil_law::ShearState;
 use terraglue_subsystem::Result;
-use terraglue_subsystem::bytes::{self, Persist};
+use terraglue_subsystem::bytes::Persist;
 
 /// Tiles of pressed ground, and nodes below feet, for which memory is asked at the start.
 const RESERVE_TILES: usize = 256;
@@ -52,14 +52,14 @@ impl NodeState {
     }
 }
 
-/// What is kept of a node that no foot stands on, in 56 bits: the permanent depth of the bed in sixteenths of a unit of
+/// What is kept of a node that no foot stands on, in 64 bits: the permanent depth of the bed in sixteenths of a unit of
 /// height (26 bits, to 1 m), the remainder of the surface in 1/16384 of a unit (14 bits), and the height of the loose soil on
-/// the bed in sixteen units (16 bits, to 0.25 m; what is higher lies as firm as the bed). A foot that comes back finds its
+/// the bed in units (24 bits, to 4 m), exactly: it comes a few units at a time where steps are short. A foot that comes back finds its
 /// pressure to 1e-6 from a depth of a centimetre on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 struct Kept {
     bed: [u8; 5],
-    loose: [u8; 2],
+    loose: [u8; 3],
 }
 
 impl Kept {
@@ -68,15 +68,28 @@ impl Kept {
     const FINE: f64 = UNIT_M / 16_384.0;
     const FINE_BITS: u32 = 14;
     const HALF: i64 = 1 << (Self::FINE_BITS - 1);
-    /// Units in a step of loose height.
-    const LOOSE: i32 = 16;
+    const MOST_LOOSE: i32 = (1 << 24) - 1;
+    /// Units (3.8 µm).
+    const TRICKLE: i32 = 16;
 
     fn new(permanent: f64, remainder: f64, loose: f64) -> Self {
         let steps = (permanent / Self::STEP).round().clamp(0.0, Self::DEEPEST) as u64;
         let half = Self::HALF as f64;
         let fine = (remainder / Self::FINE).round().clamp(-half, half - 1.0) as i64 + Self::HALF;
-        let loose = (loose / (UNIT_M * f64::from(Self::LOOSE))).round().clamp(0.0, f64::from(u16::MAX));
-        Self { bed: Self::pack(steps, fine as u64), loose: (loose as u16).to_le_bytes() }
+        let loose = (loose / UNIT_M).round().clamp(0.0, f64::from(Self::MOST_LOOSE)) as i32;
+        Self { bed: Self::pack(steps, fine as u64), loose: [0; 3] }.with_loose(loose)
+    }
+
+    #[inline]
+    fn with_loose(self, units: i32) -> Self {
+        let [a, b, c, _] = units.to_le_bytes();
+        Self { loose: [a, b, c], ..self }
+    }
+
+    #[inline]
+    fn loose_units(self) -> i32 {
+        let [a, b, c] = self.loose;
+        i32::from_le_bytes([a, b, c, 0])
     }
 
     /// Without depth nothing is kept of the bed.
@@ -106,16 +119,16 @@ impl Kept {
     }
 
     fn loose(self) -> f64 {
-        f64::from(i32::from(u16::from_le_bytes(self.loose)) * Self::LOOSE) * UNIT_M
+        f64::from(self.loose_units()) * UNIT_M
     }
 
-    /// After `units` of material have come to lie loose on the bed, or have gone from it (< 0), loose ones first.
+    /// After `units` of material have come to lie loose on the bed, or have gone from it (< 0), loose ones first. What comes
+    /// counts to the unit, however little a short step brings. What goes counts in whole `TRICKLE`s, so that a slide of a
+    /// few micrometres ends.
     #[inline]
     fn changed(self, units: i32) -> Self {
-        let loose = i32::from(u16::from_le_bytes(self.loose));
-        // rounded down when they come and up when they go: no soil becomes loose by rounding
-        let loose = (loose + units.div_euclid(Self::LOOSE)).clamp(0, i32::from(u16::MAX));
-        Self { loose: (loose as u16).to_le_bytes(), ..self }
+        let units = if units < 0 { units.div_euclid(Self::TRICKLE) * Self::TRICKLE } else { units };
+        self.with_loose(self.loose_units().saturating_add(units).clamp(0, Self::MOST_LOOSE))
     }
 }
 
@@ -330,14 +343,12 @@ terraglue_subsystem::persist!(NodeState {
 
 impl Persist for Kept {
     fn write(&self, out: &mut Vec<u8>) {
-        let ([a, b, c, d, e], [f, g]) = (self.bed, self.loose);
-        u64::from_le_bytes([a, b, c, d, e, f, g, 0]).write(out);
+        let ([a, b, c, d, e], [f, g, h]) = (self.bed, self.loose);
+        u64::from_le_bytes([a, b, c, d, e, f, g, h]).write(out);
     }
     fn read(from: &mut &[u8]) -> Result<Self> {
-        match u64::read(from)?.to_le_bytes() {
-            [a, b, c, d, e, f, g, 0] => Ok(Self { bed: [a, b, c, d, e], loose: [f, g] }),
-            _ => Err(bytes::wrong("a depth is too large")),
-        }
+        let [a, b, c, d, e, f, g, h] = u64::read(from)?.to_le_bytes();
+        Ok(Self { bed: [a, b, c, d, e], loose: [f, g, h] })
     }
 }
 
@@ -361,6 +372,23 @@ mod tests {
     use std::collections::BTreeMap;
 
     proptest! {
+        /// However short the steps are in which it comes.
+        #[test]
+        fn loose_soil_is_kept_to_the_unit(
+            depth in 0.0..0.1f64, changes in prop::collection::vec(prop_oneof![1 => -100..0i32, 4 => 0..40i32], 1..200),
+        ) {
+            let mut kept = Kept::new(depth, 0.0, 0.0);
+            let mut units = 0_i32;
+            for change in changes {
+                kept = kept.changed(change);
+                let gone = change.min(0).div_euclid(Kept::TRICKLE) * Kept::TRICKLE;
+                units = (units + gone + change.max(0)).max(0);
+            }
+            prop_assert_eq!(kept.loose(), f64::from(units) * UNIT_M);
+            prop_assert_eq!(kept.permanent(), Kept::new(depth, 0.0, 0.0).permanent());
+            prop_assert_eq!(Kept::new(depth, 0.0, kept.loose()).loose_units(), units);
+        }
+
         #[test]
         fn contacts_come_and_go_and_leave_their_depth(
             actions in prop::collection::vec((0..40i32, 0..40i32, 0..4u32, 0.0..0.1f64), 1..300),

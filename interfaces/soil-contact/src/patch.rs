@@ -295,6 +295,10 @@ pub struct Patches {
     pub(crate) clinging: Vec<Clinging>,
     /// Whether the soil owes energy for what its feet have come over, see [`crate::bookkeeping::Book::pay`].
     pub in_debt: bool,
+    /// Whether this is the first step of all: what is inside the ground then stands in its own print.
+    pub begins: bool,
+    /// Whether something is.
+    pub prints: bool,
     rows: Rows,
     built_for: Option<(u64, u64, usize, usize)>,
 }
@@ -333,6 +337,7 @@ impl Patches {
         self.nodes.doubles = ground.law_memory.doubles();
         self.laws.clear();
         self.sides.clear();
+        self.prints = false;
         for port in step.ports {
             let patch = self.read_port(port, step, ground, laws);
             self.ports.push(patch);
@@ -460,7 +465,8 @@ impl Patches {
     /// curvature, an edge that passes) moves the unloaded surface and not the pressure, so that no energy comes of it. Where the
     /// underside has gone up by more than half of what the soil springs back, the foot is leaving the node. A node that the
     /// foot has come over from the side bears at once what its depth asks for, and what drives the foot pays for it; while
-    /// that is owed, further ones bear only what they are pressed down from there.
+    /// that is owed, further ones bear only what they are pressed down from there. A body that is inside the ground at the very
+    /// start stands in its own print: it was pressed there before, and bears what it is pressed down from there.
     fn start(&mut self, range: std::ops::Range<usize>) {
         for k in range {
             let (n, law) = (&self.nodes, self.law(k));
@@ -475,14 +481,20 @@ impl Patches {
                 continue;
             }
             let (elastic, yields) = (k_u * (depth - permanent), self.yields(k, depth).0);
-            let in_debt = self.in_debt;
+            let Self { in_debt, begins, .. } = *self;
             let n = &mut self.nodes;
             n.bound[k] = if elastic <= yields { yields } else { f64::NEG_INFINITY };
-            if n.stamp[k] == 0 {
-                n.entered[k] = true;
-                n.permanent[k] = if in_debt { depth } else { depth - elastic.min(yields) / k_u };
-                n.bound[k] = yields;
+            if n.stamp[k] != 0 {
+                continue;
             }
+            n.bound[k] = yields;
+            if begins {
+                n.permanent[k] = depth - GRAZE;
+                self.prints |= depth - permanent > GRAZE;
+                continue;
+            }
+            n.entered[k] = true;
+            n.permanent[k] = if in_debt { depth } else { depth - elastic.min(yields) / k_u };
         }
     }
 
@@ -598,6 +610,9 @@ impl Patches {
         loaded.fold(f64::NEG_INFINITY, |h, k| h.max((n.depth[k] - n.permanent[k]) / n.facing[k].press[0]))
     }
 }
+
+/// By how much a body that stands in its own print at the start presses it, m: just so that it touches.
+const GRAZE: f64 = 1e-9;
 
 /// Gap that is reported below a port without nodes, m.
 const FAR: f64 = 1.0;

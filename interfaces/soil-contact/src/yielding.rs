@@ -2,8 +2,9 @@
 //! and under shear, more where it is pushed sideways; and soil that was poured on the bed.
 //!
 //! The soil is elastic, p = k_u·(z − z₀) above its unloaded surface at the depth z₀, up to the pressure at which it yields:
-//! p ≤ s·V(z) + a + b·z. V is first loading of the bed (Bekker 1956 and others), elastic up to where it was pressed before; or,
-//! where it lies on the bed, of loose soil, whose modulus is a part κ of the bed's (Terzaghi 1943, art. 46): the larger of both.
+//! p ≤ s·V(z) + a + b·z. V is first loading of the bed (Bekker 1956 and others). Where loose soil lies on it, the bed is
+//! elastic from its own surface on, whatever it yields at, so that a foot that comes down to it meets no jump; and the loose soil
+//! bears s·κ·V of its own depth, with a modulus that is a part κ of the bed's (Terzaghi 1943, art. 46): the larger of both.
 
 use crate::patch::{Local, Patches};
 
@@ -32,22 +33,23 @@ impl Patches {
         law: &Local,
     ) -> (f64, f64) {
         let n = &self.nodes;
-        let (mut p, mut slope) = bed;
+        let (share, [a, b]) = (n.share[k], n.passive[k]);
+        let (mut p, mut slope) = (share * bed.0, share * bed.1);
+        if z > 0.0 {
+            (p, slope) = (p + a + b * z, slope + b);
+        }
         if let Some((p_loose, slope_loose)) = loose {
             let k_u = law.curve.unloading();
             let elastic = k_u * (z - n.bed[k]);
             if elastic < p {
                 (p, slope) = if elastic > 0.0 { (elastic, k_u) } else { (0.0, 0.0) };
             }
-            if law.loose * p_loose > p {
-                (p, slope) = (law.loose * p_loose, law.loose * slope_loose);
+            let part = share * law.loose;
+            if part * p_loose > p {
+                (p, slope) = (part * p_loose, part * slope_loose);
             }
         }
-        let (share, [a, b]) = (n.share[k], n.passive[k]);
-        if a + b == 0.0 || z <= 0.0 {
-            return (share * p, share * slope);
-        }
-        (share * p + a + b * z, share * slope + b)
+        (p, slope)
     }
 
     /// Pressure at node k when the foot is at depth z there, and its slope. Soil that was in contact and clings follows the

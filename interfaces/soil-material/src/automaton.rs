@@ -149,8 +149,8 @@ impl Automaton {
         self.weight = 0.5 * parameters.weight() * cell * cell;
     }
 
-    /// Moves what the feet have pressed out of their nodes to free ones.
-    fn displace(&mut self, ground: &mut Ground, covered: &[Covered]) -> f64 {
+    /// Moves what the feet have pressed out of their nodes to free ones; `in_debt`: it becomes denser instead.
+    fn displace(&mut self, ground: &mut Ground, covered: &[Covered], in_debt: bool) -> f64 {
         let mut lifted = 0.0;
         for node in covered.iter().filter(|n| n.pressure > 0.0) {
             let before = ground.heights.units(node.i, node.j);
@@ -164,6 +164,7 @@ impl Automaton {
                 feet: &sweeper.feet,
                 compaction: &mut self.compaction,
                 changed: &mut sweeper.changed,
+                in_debt,
                 lifted: 0,
             };
             let dense = site.compaction.total();
@@ -293,7 +294,7 @@ impl Material for Automaton {
         self.rescan |= before != (self.friction_angle, self.critical_height);
     }
 
-    fn settle(&mut self, ground: &mut Ground, covered: &[Covered], _: &[[i32; 2]], h: f64) -> f64 {
+    fn settle(&mut self, ground: &mut Ground, covered: &[Covered], in_debt: bool, h: f64) -> f64 {
         self.commits = self.commits.wrapping_add(1);
         (self.sweeper.counts.visited, self.sweeper.counts.sweeps) = (0, 0);
         if std::mem::take(&mut self.rescan) {
@@ -302,7 +303,7 @@ impl Material for Automaton {
         }
         let sweeper = &mut self.sweeper;
         sweeper.feet.take(ground, covered, &mut sweeper.changed);
-        let lifted = self.displace(ground, covered);
+        let lifted = self.displace(ground, covered, in_debt);
         self.weight * (lifted + self.slide(ground, h))
     }
 

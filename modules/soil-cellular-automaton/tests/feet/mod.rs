@@ -95,7 +95,20 @@ impl Feet {
 
     /// Steps the soil while body k goes to `goal(k)`; the motion of a step is small.
     pub fn step(&mut self, goal: impl Fn(usize) -> Pose) {
-        self.detect(&goal);
+        self.answer(&goal, true);
+        for (k, body) in self.bodies.iter_mut().enumerate() {
+            body.move_to(&goal(k));
+        }
+        self.index += 1;
+    }
+
+    /// Asks for the forces if body k went to `goal(k)`; nothing moves.
+    pub fn ask(&mut self, goal: impl Fn(usize) -> Pose) {
+        self.answer(&goal, false);
+    }
+
+    fn answer(&mut self, goal: &impl Fn(usize) -> Pose, commit: bool) {
+        self.detect(goal);
         let step = Step {
             t: self.index as f64 * H,
             h: H,
@@ -112,11 +125,9 @@ impl Feet {
         let motion = Motion { x: &self.x, v: &self.v };
         self.soil.advance(&step, &Input::Motion(motion), &mut out).unwrap();
         assert!(out.x.iter().chain(&*out.v).chain(&*out.a).chain(&*out.t).all(|v| v.is_finite()));
-        self.soil.commit(&step, &self.t, &motion).unwrap();
-        for (k, body) in self.bodies.iter_mut().enumerate() {
-            body.move_to(&goal(k));
+        if commit {
+            self.soil.commit(&step, &self.t, &motion).unwrap();
         }
-        self.index += 1;
     }
 
     /// Finds the patches and the motion of their origins.

@@ -254,3 +254,20 @@ def test_a_recording_that_was_cut_off_says_so(short_run, tmp_path):
     assert process.returncode == 0 and "had no end" in process.stderr, process.stderr
     page = (folder / "report.html").read_text()
     assert "recording cut off" in page and "the run at 0.5" in page
+
+
+def test_an_open_contact_leaves_no_gap(tmp_path):
+    """A plate that is lifted off, glued in one system: a force of rounding on an open contact is no closed gap."""
+    text = (ROOT / "scenarios/plate_sinkage.toml").read_text()
+    text = text.replace("../models", f"{ROOT}/models").replace('"cooperative"', '"monolithic"')
+    text += """
+[[event]]
+at_s = 0.55
+set = { "bevameter.small_press.velocity_target" = -0.1, "bevameter.large_press.velocity_target" = -0.1 }
+"""
+    (tmp_path / "lift.toml").write_text(text)
+    process = terraglue("run", tmp_path / "lift.toml", "--duration", "0.62", "--out", tmp_path / "lift", "--quiet")
+    assert process.returncode == 0, process.stderr
+    summary = json.loads((tmp_path / "lift/summary.json").read_text())
+    assert summary["steps_not_converged"] == 0
+    assert summary["max_gap_m"] < 1e-9

@@ -158,6 +158,8 @@ pub struct PatchNodes {
     pub relief: Vec<f64>,
     /// Area in the tangent plane, m²; 0 where another port presses deeper.
     pub area: Vec<f64>,
+    /// Part of the area that was loaded at the last commit.
+    pub loaded_part: Vec<f64>,
     /// From the port's origin to the underside at the node along n, t1, t2, m.
     pub arm: Vec<[f64; 3]>,
     /// How the underside faces the soil.
@@ -205,6 +207,7 @@ impl PatchNodes {
         self.entered.clear();
         self.relief.clear();
         self.area.clear();
+        self.loaded_part.clear();
         self.arm.clear();
         self.law.clear();
         self.shear.clear();
@@ -244,6 +247,7 @@ impl PatchNodes {
             &mut self.before,
             &mut self.relief,
             &mut self.area,
+            &mut self.loaded_part,
             &mut self.turned,
         ] {
             v.reserve(count);
@@ -463,17 +467,26 @@ impl Patches {
     ///
     /// Within a step the underside moves as its slope says; by how much the exact one lies elsewhere afterwards (its
     /// curvature, an edge that passes) moves the unloaded surface and not the pressure, so that no energy comes of it. Where the
-    /// underside has gone up by more than half of what the soil springs back, the foot is leaving the node. A node that the
-    /// foot has come over from the side bears at once what its depth asks for, and what drives the foot pays for it; while
-    /// that is owed, further ones bear only what they are pressed down from there. A body that is inside the ground at the very
+    /// underside has gone up by more than half of what the soil springs back, the foot is leaving the node. What the foot has
+    /// come over from the side bears at once what its depth asks for, as far as [`Patches::affordable`] goes, and what drives
+    /// the foot pays for it; the rest bears what it is pressed down from there. A body that is inside the ground at the very
     /// start stands in its own print: it was pressed there before, and bears what it is pressed down from there.
     fn start(&mut self, range: std::ops::Range<usize>) {
+        let share = self.affordable(range.clone());
         for k in range {
             let (n, law) = (&self.nodes, self.law(k));
             if law.curve.keeper().is_some() {
                 continue;
             }
-            let (depth, before, k_u) = (n.depth[k], n.before[k], law.curve.unloading());
+            let k_u = law.curve.unloading();
+            let part = n.loaded_part[k];
+            if part < 1.0 && n.stamp[k] != 0 {
+                let scale = (part + share * (1.0 - part)).sqrt();
+                self.nodes.before[k] *= scale;
+                self.nodes.shear[k].elastic = self.nodes.shear[k].elastic.map(|e| scale * e);
+            }
+            let n = &self.nodes;
+            let (depth, before) = (n.depth[k], n.before[k]);
             let follows = before > 0.0 && depth - n.permanent[k] > 0.5 * before / k_u;
             let permanent = if follows { depth - before / k_u } else { n.permanent[k] };
             self.nodes.permanent[k] = permanent;
@@ -481,7 +494,7 @@ impl Patches {
                 continue;
             }
             let (elastic, yields) = (k_u * (depth - permanent), self.yields(k, depth).0);
-            let Self { in_debt, begins, .. } = *self;
+            let begins = self.begins;
             let n = &mut self.nodes;
             n.bound[k] = if elastic <= yields { yields } else { f64::NEG_INFINITY };
             if n.stamp[k] != 0 {
@@ -494,8 +507,34 @@ impl Patches {
                 continue;
             }
             n.entered[k] = true;
-            n.permanent[k] = if in_debt { depth } else { depth - elastic.min(yields) / k_u };
+            n.permanent[k] = depth - share.sqrt() * elastic.min(yields) / k_u;
         }
+    }
+
+    /// Part of the elastic energy that nodes and areas in `range` bring which the foot has come over from the side: no more than
+    /// this contact holds already, and nothing while the soil owes energy. (A face of a corner that turns through the
+    /// vertical covers whole cells at once.)
+    fn affordable(&self, range: std::ops::Range<usize>) -> f64 {
+        if self.in_debt {
+            return 0.0;
+        }
+        let (mut held, mut brought) = (0.0, 0.0);
+        for k in range {
+            let (n, curve) = (&self.nodes, &self.law(k).curve);
+            if curve.keeper().is_some() {
+                continue;
+            }
+            let energy = |p: f64| n.area[k] * p * p / curve.unloading();
+            if n.stamp[k] != 0 {
+                let now = energy(n.before[k]);
+                held += n.loaded_part[k] * now;
+                brought += (1.0 - n.loaded_part[k]) * now;
+            } else if n.depth[k] > n.permanent[k] {
+                let elastic = curve.unloading() * (n.depth[k] - n.permanent[k]);
+                brought += energy(elastic.min(self.yields(k, n.depth[k]).0));
+            }
+        }
+        if brought > held { held / brought } else { 1.0 }
     }
 
     /// Makes the laws of the soils under a contact of size `b` (m), and lets its nodes, which know the number of their soil,
@@ -552,6 +591,7 @@ impl Patches {
         let reference = ground.reference(node.i, node.j, &state);
         let offset = [x - port.origin[0], y - port.origin[1], node.lower - port.origin[2]];
         let along = |c: usize| port.direction(c).iter().zip(&offset).map(|(a, b)| a * b).sum::<f64>();
+        let area = node.area / n_z;
         let nodes = &mut self.nodes;
         nodes.index.push([node.i, node.j]);
         nodes.reference.push(reference);
@@ -566,7 +606,8 @@ impl Patches {
         nodes.before.push(state.pressure);
         nodes.entered.push(false);
         nodes.relief.push(f64::NAN);
-        nodes.area.push(node.area / n_z);
+        nodes.area.push(area);
+        nodes.loaded_part.push(if state.area < area { state.area / area } else { 1.0 });
         nodes.arm.push([along(0), along(1), along(2)]);
         nodes.law.push(number);
         nodes.shear.push(state.shear);

@@ -32,9 +32,9 @@ impl Size {
         }
         let [x, y] = mean.map(|m| m / area);
         let [xx, yy, xy] = square.map(|s| s / area);
-        // each cell is a square itself
+        // the areas of the cells are the contact smeared over a cell
         let cell = spacing * spacing / 12.0;
-        Self { area, square: [xx - x * x + cell, yy - y * y + cell, xy - x * y] }
+        Self { area, square: [xx - x * x - cell, yy - y * y - cell, xy - x * y] }
     }
 
     /// b of the pressure law, m: radius of the disc of equal area, but no more than that of the disc which bears what an
@@ -44,13 +44,13 @@ impl Size {
         disc.min(STRIP * self.breadth()).max(0.5 * spacing)
     }
 
-    /// Breadth of the rectangle of this area whose principal moments have the same ratio, m: what the lattice makes of a moment
-    /// counts with its fourth root.
+    /// Breadth of the rectangle of this area and of this larger principal moment, m, no longer than broad at least. The lattice
+    /// knows the area exactly and the length well, but not the smaller moment: a blade as broad as a cell covers one row of
+    /// nodes or two.
     fn breadth(&self) -> f64 {
         let [xx, yy, xy] = self.square;
-        let (half, middle) = ((0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt(), 0.5 * (xx + yy));
-        let ratio = (middle - half).max(0.0) / (middle + half).max(f64::MIN_POSITIVE);
-        (self.area * ratio.sqrt()).sqrt()
+        let largest = 0.5 * (xx + yy) + (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt();
+        self.area / (12.0 * largest).max(self.area).sqrt()
     }
 }
 

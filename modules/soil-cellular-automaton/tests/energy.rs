@@ -42,8 +42,9 @@ fn low(kind: u32, orientation: [f64; 4]) -> f64 {
     -body.patch_origin([0.0, 0.0, 1.0])[2].min(0.0)
 }
 
-/// Presses, drags, turns and lifts a body. Returns by how much the book errs at worst beyond `share` of the work to and fro, J.
-fn go(seed: u64, kind: u32, row: usize, grid: usize, share: f64) -> Result<f64, TestCaseError> {
+/// Presses, drags, turns and lifts a body. Returns by how much the book errs at worst beyond `share` of the work to and fro and
+/// `held` of what the soil holds at the moment, J.
+fn go(seed: u64, kind: u32, row: usize, grid: usize, [share, held]: [f64; 2]) -> Result<f64, TestCaseError> {
     let spacing = [0.02, 0.01, 0.005][grid];
     let config = [LUNAR, LETE, DRY_SAND, SNOW][row];
     let mut rig = Feet::new(instance::<SoilCellularAutomaton>(config, ground(spacing)));
@@ -75,7 +76,7 @@ fn go(seed: u64, kind: u32, row: usize, grid: usize, share: f64) -> Result<f64, 
             let Energy { potential, dissipated, port_work, .. } = now;
             path += (port_work - before.port_work).abs();
             prop_assert!(dissipated >= before.dissipated, "heat falls to {dissipated} J");
-            worst = worst.max((dissipated + potential - port_work).abs() - share * path);
+            worst = worst.max((dissipated + potential - port_work).abs() - share * path - held * potential);
             before = now;
         }
     }
@@ -98,26 +99,26 @@ proptest! {
     fn heat_and_stored_energy_are_the_work_at_the_ports(
         seed in 1..u64::MAX, kind in 0..4u32, row in 0..4usize, grid in 0..3usize,
     ) {
-        let error = go(seed, kind, row, grid, 0.01)?;
+        let error = go(seed, kind, row, grid, [0.01, 0.0])?;
         // beside it what a node holds that an edge turns onto, until the next steps have paid for it
         prop_assert!(error <= 1e-3, "{error:e} J beyond 1 % of the work");
     }
 
-    /// A sharp corner of a wedge that is turned in the soil at a speed of its own loads whole nodes at once, more than the
-    /// work of the next steps pays for.
+    /// A sharp corner of a wedge, or a blade as thin as a cell, that is turned in the soil at a speed of its own loads whole nodes at once: the book owes no
+    /// more than they hold, and when they are let go it is even.
     #[test]
     fn a_corner_owes_no_more_than_its_nodes_hold(
-        seed in 1..u64::MAX, row in 0..4usize, grid in 0..3usize,
+        seed in 1..u64::MAX, kind in 4..7u32, row in 0..4usize, grid in 0..3usize,
     ) {
-        let error = go(seed, 4, row, grid, 0.03)?;
-        prop_assert!(error <= 3e-2, "{error:e} J beyond 3 % of the work");
+        let error = go(seed, kind, row, grid, [0.01, 1.0])?;
+        prop_assert!(error <= 1e-4, "{error:e} J beyond 1 % of the work and what the soil holds");
     }
 }
 
 /// A box with a side that looks just past a node on both sides of it: the sides of a contact act where the contact is.
 #[test]
 fn a_contact_that_hardly_covers_its_neighbours_is_not_thrown_sideways() {
-    let error = go(629_968_910_466_154_312, 1, 2, 1, 0.01).unwrap();
+    let error = go(629_968_910_466_154_312, 1, 2, 1, [0.01, 0.0]).unwrap();
     assert!(error <= 1e-9, "{error:e} J");
 }
 
@@ -166,7 +167,9 @@ fn the_force_does_not_jump() {
         let mut pose = Pose { position: [-0.05, 0.0013, low(kind, upright)], orientation: upright };
         rig.add(&shape(kind), pose);
         // a rut with rims, up, and back over the rim
-        for [dx, dz, steps] in [[0.0, -1.5e-4, 100.0], [6e-4, 0.0, 100.0], [0.0, 3e-4, 60.0], [1e-3, 0.0, 40.0]] {
+        for [dx, dz, steps] in
+            [[0.0, -1.5e-4, 100.0], [6e-4, 0.0, 100.0], [0.0, 3e-4, 60.0], [1e-3, 0.0, 40.0]]
+        {
             for _ in 0..steps as u32 {
                 pose.position[0] += dx;
                 pose.position[2] += dz;

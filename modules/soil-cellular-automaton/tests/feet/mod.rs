@@ -266,14 +266,16 @@ fn rotation_vector([aw, ax, ay, az]: [f64; 4], [bw, bx, by, bz]: [f64; 4]) -> [f
     v.map(|c| 2.0 * c / w)
 }
 
-/// One of five shapes, some centimetres large.
+/// One of seven shapes, some centimetres large; the last two are blades.
 pub fn shape(kind: u32) -> Geometry {
-    match kind % 5 {
+    match kind % 7 {
         0 => Geometry::Sphere { radius: 0.035 },
         1 => Geometry::Box { half_extents: [0.04, 0.025, 0.02] },
         2 => Geometry::Capsule { half_length: 0.04, radius: 0.02 },
         3 => Geometry::Cylinder { half_length: 0.02, radius: 0.035 },
-        _ => wedge(),
+        4 => wedge(),
+        5 => Geometry::Box { half_extents: [0.05, 0.01, 0.03] },
+        _ => Geometry::Box { half_extents: [0.05, 0.005, 0.03] },
     }
 }
 

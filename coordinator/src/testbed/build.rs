@@ -103,7 +103,8 @@ impl Testbed {
         testbed.settle()?;
         testbed.read_states()?;
         if let Err(Error::Simulation { message, .. }) = testbed.detect_contacts(scenario.time.step_s) {
-            return Err(InputError::plain(format!("at the start: {message}"), None).into());
+            let help = "docs/scenario.md has the keys of `[terrain]`, `terraglue modules NAME` those that set a body down";
+            return Err(InputError::plain(format!("at the start: {message}"), Some(help.into())).into());
         }
         Ok(testbed)
     }

@@ -81,9 +81,8 @@ pub fn plan(arguments: &CompareArguments) -> Result<Vec<Plan>> {
     let replaced = soil.filter(|_| !arguments.soils.is_empty());
     let one = |choice| planned(arguments, replaced.as_ref(), choice, wanted.steps.len() > 1);
     let plans = choices.into_iter().map(one).collect::<Result<Vec<_>>>()?;
-    match arguments.reference.as_deref().filter(|name| !STRATEGIES.contains(name)) {
-        Some(folder) => check_folder(&plans, Path::new(folder))?,
-        None => {}
+    if let Some(folder) = arguments.reference.as_deref().filter(|name| !STRATEGIES.contains(name)) {
+        check_folder(&plans, Path::new(folder))?;
     }
     Ok(plans)
 }

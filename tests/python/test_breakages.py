@@ -82,11 +82,41 @@ def test_whole_numbers_tell_their_range(edited):
     assert "9223372036854775807" in message and "walk.toml:16" in message, message
 
 
-def test_help_of_a_robot_file_is_about_robots(tmp_path):
+@pytest.mark.parametrize("text", ['<robot name="x"><link name="a">', '<robot name="x"></robot>'], ids=["line", "no line"])
+@pytest.mark.parametrize("command", ["robot", "new", "check"])
+def test_help_of_a_robot_file_is_about_robots(command, text, tmp_path):
     robot = tmp_path / "robot.urdf"
+    robot.write_text(text)
+    message = refused(*{"robot": ["robot", robot],
+                        "new": ["new", "scenario", "--robot", robot, "-o", tmp_path / "new"],
+                        "check": ["check", MOON_WALK, "--set", f"robot.model={robot}"]}[command])
+    told = message.split("help:")[1]
+    assert "docs/rigid-body.md" in told and "terraglue robot" in told and "errors.md" not in told, message
+
+
+def test_help_leads_to_what_the_error_is_about(tmp_path):
+    """By the command that is refused: a part of the help."""
+    robot = tmp_path / "robot.txt"
     robot.write_text('<robot name="x"><link name="a">')
-    message = refused("robot", robot)
-    assert "docs/scenario.md" not in message and "docs/rigid-body.md" in message, message
+    grid = tmp_path / "hill.asc"
+    grid.write_text("ncols 2\nnrows 2\ncellsize 1\n1 2\n3 x\n")
+    structure = tmp_path / "a.ssd"
+    structure.write_text("no structure")
+    ground = f'terrain={{kind="esri-ascii",file="{grid}"}}'
+    law = ["soil.law.plugin=gait", "soil.law.pressure=0"]
+    for command, part in [(["robot", robot], "docs/rigid-body.md"),
+                          (["robot", tmp_path / "none.urdf"], "path is right"),
+                          (["new", "scenario", "--robot", tmp_path / "none.urdf"], "path is right"),
+                          (["fmu", "info", tmp_path / "none.fmu"], "path is right"),
+                          (["fmu", "info", structure], "docs/fmi.md"),
+                          (["run", structure], "docs/fmi.md"),
+                          (["soils", "--file", robot], "models/soils.csv"),
+                          (["check", MOON_WALK, "--set", ground], "NODATA_value"),
+                          (["check", MOON_WALK, "--set", law[0]], "TG12"),
+                          (["check", MOON_WALK, "--set", "robot.position_m=[90.0,0.0,1.0]"], "[terrain]")]:
+        process = terraglue(*command)
+        told = process.stderr.split("help:")[-1]
+        assert process.returncode in (1, 2) and part in told, (command, process.stderr)
 
 
 def test_a_signal_ends_the_loading_of_a_run(tmp_path):

@@ -75,9 +75,15 @@ def test_a_new_scenario_stands(tmp_path, name):
     # it stands still from the start: nothing swings on its joints
     assert summary["peak_force_over_weight"] <= 1.1
     assert 0 < summary["max_sinkage_m"] < 0.03
-    # from where on the summary would say that the energy book is off
-    energies = summary["energies"]
-    assert abs(energies["drift_j"]) < max(0.01 * energies["turnover_j"], 1e-9), energies
+    # at rest next to nothing is turned over: rounding is held against the energy that stands in the sunken weight
+    mass = json.loads(terraglue("robot", robot, "--json").stdout)["mass_kg"]
+    sunken_j = 1.62 * mass * summary["max_sinkage_m"]
+    assert abs(summary["energies"]["drift_j"]) < 1e-8 * sunken_j, summary["energies"]
+    # and while it comes to rest the motors turn over more than that: no floor is needed
+    coming = terraglue("run", tmp_path / "moon" / "scenario.toml", "--set", "time.settle_s=0", "--duration", "1",
+                       "--out", tmp_path / "coming", "--json")
+    energies = json.loads(coming.stdout)["energies"]
+    assert energies["turnover_j"] > 1e-5 and abs(energies["drift_j"]) < 1e-4 * energies["turnover_j"], energies
     # joints stay where they started, within what the gains promise
     angles = {key[len("robot.") : -len(".angle")]: x for key, x in last.items() if key.endswith(".angle")}
     starts = dict(line.split(" = ") for line in text.split("[robot.joints]")[1].split("\n#")[0].split("\n") if " = " in line)

@@ -76,6 +76,33 @@ def test_a_crash_tells_the_module_the_call_and_the_time(tmp_path):
     assert kept.returncode == 1 and "segmentation fault" in kept.stderr and "crashed:" not in kept.stderr, kept.stderr
 
 
+@pytest.mark.parametrize("function", ["dlopen", "terraglue_subsystem", "schema", "instantiate"])
+def test_a_crash_before_the_first_step_tells_the_file_and_the_call(tmp_path, function):
+    place, _ = made(tmp_path, "controller", "c")
+    source, = place.glob("*.c")
+    text = source.read_text()
+    if function == "dlopen":
+        text += "\n__attribute__((constructor)) static void at_load(void) {\n    *(volatile int *)8 = 1;\n}\n"
+    else:
+        text, count = re.subn(rf"(\b{function}\([^;{{]*\)\s*\{{)", r"\1 *(volatile int *)8 = 1;", text)
+        assert count == 1
+    source.write_text(text)
+    built = subprocess.run(["make"], cwd=place, capture_output=True, text=True)
+    assert built.returncode == 0, built.stderr
+    crashed = terraglue("run", "scenario.toml", "--quiet", cwd=place)
+    assert crashed.returncode == -11, crashed.stderr
+    library, = place.glob("*.so")
+    for words in ("signal 11 (segmentation fault)", f"the last call was `{function}`", library.name, "help: "):
+        assert words in crashed.stderr, crashed.stderr
+    assert " at t = " not in crashed.stderr, crashed.stderr
+    if function == "instantiate":
+        assert "`instantiate` of `controller`" in crashed.stderr, crashed.stderr
+        kept = terraglue("run", "scenario.toml", "--quiet", "--set", "controller.isolate=true", cwd=place)
+        assert kept.returncode in (1, 2) and "segmentation fault" in kept.stderr, kept.stderr
+    else:
+        assert "terraglue check-module" in crashed.stderr, crashed.stderr
+
+
 def test_the_check_is_a_target_of_the_makefile_and_writes_what_ci_reads(tmp_path):
     place, commands = made(tmp_path, "soil", "c")
     subprocess.run(["make", "check"], cwd=place, check=True, capture_output=True)

@@ -3,7 +3,6 @@
 mod docs;
 mod faults;
 mod header;
-mod install;
 mod process;
 mod schema;
 mod test;
@@ -11,8 +10,8 @@ mod validate;
 
 use clap::{Parser, Subcommand};
 use process::Outcome;
-use std::path::PathBuf;
 use std::process::ExitCode;
+use xtask_start::Install;
 
 /// Developer commands.
 #[derive(Parser, Debug)]
@@ -53,17 +52,8 @@ enum Command {
         #[arg(long)]
         check: bool,
     },
-    /// Build and pack program, modules, models, scenarios and docs: target/dist/terraglue-….tar.gz.
-    Dist {
-        /// Pack what is built already: debug or release.
-        #[arg(long, value_name = "PROFILE", value_parser = ["debug", "release"])]
-        built: Option<String>,
-    },
-    /// Build and lay out bin, lib, include and share below PREFIX.
-    Install {
-        /// Where to, e.g. ~/.local.
-        prefix: PathBuf,
-    },
+    #[command(flatten)]
+    Install(Install),
 }
 
 fn main() -> ExitCode {
@@ -79,8 +69,7 @@ fn main() -> ExitCode {
             Ok(())
         }
         Command::Schema { check } => schema::write_files(check),
-        Command::Dist { built } => install::dist(built.as_deref()),
-        Command::Install { prefix } => install::install(&prefix),
+        Command::Install(install) => install.done(),
     };
     match done {
         Ok(()) => ExitCode::SUCCESS,

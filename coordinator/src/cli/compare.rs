@@ -34,7 +34,7 @@ pub fn compare(arguments: &CompareArguments) -> Result<Exit> {
     // apart from that of `run`, whose results it would rename
     let folder = results_folder(arguments.run.out.as_deref(), &format!("{name}-compare"))?;
     for k in 0..plans.len() {
-        let name = folder_name(&plans[k]);
+        let name = folder_name(&plans[k].row);
         let taken = |name: &str| plans[..k].iter().any(|p| p.folder.ends_with(name));
         let numbered = (2..).map(|n| format!("{name}_{n}"));
         let free = std::iter::once(name.clone()).chain(numbered).find(|name| !taken(name));
@@ -79,15 +79,15 @@ fn judge(rows: &mut [CompareRow], arguments: &CompareArguments) -> Result {
 const LONGEST_VALUE: usize = 40;
 
 /// What the folder of a run is called.
-fn folder_name(plan: &Plan) -> String {
-    let reference = if plan.is_reference { "reference_" } else { "" };
-    let soil = if plan.soil.is_empty() { String::new() } else { format!("_{}", file_name(&plan.soil)) };
+fn folder_name(row: &CompareRow) -> String {
+    let reference = if row.is_reference { "reference_" } else { "" };
+    let soil = if row.soil.is_empty() { String::new() } else { format!("_{}", file_name(&row.soil)) };
     let plain = |c: char| if c.is_alphanumeric() || matches!(c, '.' | '-' | '_') { c } else { '-' };
     let value =
         |value: &String| value.trim_matches('"').chars().take(LONGEST_VALUE).map(plain).collect::<String>();
-    let varied: String = plan.varied.iter().map(|(_, v)| format!("_{}", value(v))).collect();
-    let step = if plan.name_step { format!("_{}s", plan.scenario.time.step_s) } else { String::new() };
-    format!("{reference}{}{soil}{varied}{step}", plan.strategy)
+    let varied: String = row.varied.iter().map(|(_, v)| format!("_{}", value(v))).collect();
+    let step = if row.name_step { format!("_{}s", row.step_s) } else { String::new() };
+    format!("{reference}{}{soil}{varied}{step}", row.strategy)
 }
 
 /// A module's name without what a folder name may not hold.
@@ -125,8 +125,8 @@ fn run_all(
 }
 
 fn run_one(plan: &Plan, arguments: &RunArguments, cancel: &Arc<AtomicBool>, bar: &ProgressBar) -> CompareRow {
-    let mut row = plan.row();
-    let _said = logger::of_run(&row.name());
+    let mut row = plan.row.clone();
+    let _said = logger::of_run(&plan.name);
     if plan.refused.is_some() {
         row.error.clone_from(&plan.refused);
         return row;
@@ -158,7 +158,7 @@ fn recorded(
 ) -> Result<run::Outcome> {
     let options = run::options(arguments, cancel);
     let testbed = run::build(&plan.scenario, &options)?;
-    let label = format!("{} on {}: ", plan.strategy, file_name(&plan.soil));
+    let label = format!("{} on {}: ", plan.row.strategy, file_name(&plan.row.soil));
     let waiting = Waiting::standing(arguments.quiet, bar, options.standing);
     let mut progress = Progress::new(bar.clone(), plan.scenario.time.duration_s, &label).after(waiting);
     let records = run::Records {

@@ -33,7 +33,14 @@ pub fn robot(arguments: &RobotArguments) -> Result<Exit> {
 /// An error of a robot file, shown at its line.
 pub fn wrong(error: &terraglue_robot_import::Error) -> Box<InputError> {
     let message = error.to_string();
-    InputError::of_file(&message, &message).unwrap_or_else(|| InputError::plain(message, None))
+    let help = match error {
+        terraglue_robot_import::Error::Read { .. } => show::PATH,
+        _ => show::ROBOT_FILES,
+    };
+    let mut shown =
+        InputError::of_file(&message, &message).unwrap_or_else(|| InputError::plain(message, None));
+    shown.help = Some(help.into());
+    shown
 }
 
 fn bodies(robot: &Robot) -> comfy_table::Table {

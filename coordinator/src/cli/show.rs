@@ -28,24 +28,42 @@ pub fn error(error: &Error) {
     }
 }
 
+/// Where to read on about a robot file.
+pub const ROBOT_FILES: &str = "`terraglue robot FILE` shows what is read of it; docs/rigid-body.md says under \"Robot files\" what a robot needs";
+
+/// Where to look for a file that the system does not give.
+pub const PATH: &str = "look whether the path is right, and at the permissions of the file";
+
+/// How files of robots end, and those of units and their structures.
+const ROBOTS: [&str; 4] = [".urdf", ".xacro", ".xml", ".mjcf"];
+const UNITS: [&str; 3] = [".fmu", ".ssp", ".ssd"];
+
 /// Where to read on, for an error that has no cure of its own.
 fn way_out(error: &InputError) -> String {
-    if let Some(at) = error.message.find("[TG") {
-        let number: String = error.message[at + 1..].chars().take_while(|c| *c != ']').collect();
+    let (message, file) = (error.message.as_str(), error.source_code.name());
+    let is_shown = error.span.is_some() && !file.is_empty();
+    // a law inside a soil: the innermost number is that of the cause
+    let number = message.rfind("[TG").and_then(|at| message[at + 1..].split(']').next());
+    if is_shown && names(file, &ROBOTS) || number == Some("TG10") && names(message, &ROBOTS) {
+        return ROBOT_FILES.into();
+    }
+    if let Some(number) = number {
         return format!("docs/plugins/errors.md tells causes and cures of {number}");
     }
-    if error.span.is_none() || error.source_code.name().is_empty() {
-        return "`terraglue COMMAND --help` tells what the command takes".into();
+    match () {
+        () if is_shown => "docs/scenario.md has the keys of a scenario and what they take",
+        () if message.contains("(os error ") => PATH,
+        () if names(message, &UNITS) => "docs/fmi.md tells what is read of units and system structures",
+        () => "`terraglue COMMAND --help` tells what the command takes",
     }
-    let robot = [".urdf", ".xacro", ".xml", ".mjcf"];
-    let name = error.source_code.name().to_ascii_lowercase();
-    let page = match robot.iter().any(|ending| name.ends_with(ending)) {
-        true => {
-            "`terraglue robot FILE` shows what is read of it; docs/rigid-body.md says under \"Robot files\" what a robot needs"
-        }
-        false => "docs/scenario.md has the keys of a scenario and what they take",
-    };
-    page.into()
+    .into()
+}
+
+/// Whether a text names a file with one of these endings.
+fn names(text: &str, endings: &[&str]) -> bool {
+    let text = text.to_ascii_lowercase();
+    let mut words = text.split(|c: char| c.is_whitespace() || "`:,;()".contains(c));
+    words.any(|word| endings.iter().any(|ending| word.ends_with(ending)))
 }
 
 /// A table as wide as the terminal.

@@ -18,7 +18,10 @@ pub fn soils(name: Option<&str>, file: Option<&Path>) -> Result<Exit> {
         let help = Some("name a table with --file".into());
         InputError::plain("no soil table: models/soils.csv is not there", help)
     })?;
-    let mut soils = read_soil_table(&path).map_err(|message| InputError::plain(message, None))?;
+    let mut soils = read_soil_table(&path).map_err(|message| {
+        let help = "its first line names the columns, as that of models/soils.csv does";
+        InputError::plain(message, Some(help.into()))
+    })?;
     match name {
         Some(name) if soils.rows.iter().any(|r| r.name == name) => {
             one(soils.row(name).map_err(|e| InputError::plain(e.to_string(), None))?)

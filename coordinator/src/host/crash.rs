@@ -4,6 +4,7 @@
 #![allow(unsafe_code)] // Signal handlers, and what they may read.
 
 use std::cell::Cell;
+use std::path::Path;
 use std::ptr;
 use std::sync::Once;
 
@@ -15,14 +16,15 @@ const CRASHES: [(libc::c_int, &str); 4] = [
     (libc::SIGILL, "illegal instruction"),
 ];
 
-/// Names that a message holds. Their place in memory stays as long as an instance lives.
+/// Names that a message holds. Their place in memory stays as long as an instance lives. Without a name of an instance the
+/// module is a file that is being loaded.
 #[derive(Debug)]
 pub(super) struct Names {
     pub instance: String,
     pub module: String,
 }
 
-/// The last call of a thread.
+/// The last call of a thread; its time is not a number before there is one.
 #[derive(Clone, Copy)]
 struct Call {
     names: *const Names,
@@ -40,6 +42,43 @@ thread_local! {
 #[inline]
 pub(super) fn note(names: &Names, function: &'static str, time_s: f64) {
     LAST.set(Call { names, function, time_s });
+}
+
+/// What a thread does before there is an instance, until it ends; what was noted before comes back then.
+pub(crate) struct Beginning {
+    before: Call,
+    // in a place of its own: the note stays where this value moves
+    names: Box<Names>,
+}
+
+impl Beginning {
+    /// A module or unit is made an instance, so named in the scenario.
+    pub(crate) fn of_instance(name: &str, file: &Path) -> Self {
+        Self::new(name, file, "instantiate")
+    }
+
+    /// Code of a module's file runs while it is loaded.
+    pub(super) fn of_file(file: &Path, function: &'static str) -> Self {
+        Self::new("", file, function)
+    }
+
+    fn new(instance: &str, file: &Path, function: &'static str) -> Self {
+        let names = Box::new(Names { instance: instance.to_owned(), module: file.display().to_string() });
+        let begun = Self { before: LAST.get(), names };
+        note(&begun.names, function, f64::NAN);
+        begun
+    }
+
+    /// The next function of the file.
+    pub(super) fn goes_on(&self, function: &'static str) {
+        note(&self.names, function, f64::NAN);
+    }
+}
+
+impl Drop for Beginning {
+    fn drop(&mut self) {
+        LAST.set(self.before);
+    }
 }
 
 /// Forgets an instance that ends.
@@ -106,19 +145,31 @@ fn report(index: usize, names: &Names, call: &Call) {
     put(words);
     put("); the last call was `");
     put(call.function);
+    if names.instance.is_empty() {
+        put("` while loading ");
+        put(&names.module);
+        put("\n  help: `terraglue check-module ");
+        put(&names.module);
+        put("` loads it in a process of its own\n");
+        return;
+    }
     put("` of `");
     put(&names.instance);
     put("` (");
     put(&names.module);
-    put(") at t = ");
-    if call.time_s < 0.0 {
-        put("-");
+    put(")");
+    if !call.time_s.is_nan() {
+        put(" at t = ");
+        if call.time_s < 0.0 {
+            put("-");
+        }
+        let micros = (call.time_s.abs() * 1e6) as u64;
+        put(decimal(micros / 1_000_000, 1, &mut room));
+        put(".");
+        put(decimal(micros % 1_000_000, 6, &mut room));
+        put(" s");
     }
-    let micros = (call.time_s.abs() * 1e6) as u64;
-    put(decimal(micros / 1_000_000, 1, &mut room));
-    put(".");
-    put(decimal(micros % 1_000_000, 6, &mut room));
-    put(" s.\n  help: `isolate = true` in [");
+    put(".\n  help: `isolate = true` in [");
     put(&names.instance);
     put("] keeps it in a process of its own: its crash is an error then, and the recording is closed\n");
 }
@@ -142,6 +193,26 @@ fn decimal(mut n: u64, least: usize, room: &mut [u8; 24]) -> &str {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn what_was_noted_before_a_beginning_comes_back() {
+        let outer = Names { instance: "robot".into(), module: "rigid-body".into() };
+        note(&outer, "commit", 0.5);
+        let function = || LAST.get().function;
+        {
+            let _instance = Beginning::of_instance("soil", Path::new("soil.so"));
+            assert_eq!(function(), "instantiate");
+            {
+                let law = Beginning::of_file(Path::new("law.so"), "dlopen");
+                law.goes_on("schema");
+                assert_eq!(function(), "schema");
+            }
+            assert_eq!(function(), "instantiate");
+        }
+        assert_eq!(function(), "commit");
+        forget(&outer);
+        assert!(LAST.get().names.is_null());
+    }
 
     #[test]
     fn numbers_without_an_allocation() {

@@ -1,6 +1,7 @@
 //! Modules from shared libraries and modules linked into the program.
 #![allow(unsafe_code)] // Loading a library runs its constructors and calls its entry.
 
+use super::crash::Beginning;
 use super::description::Description;
 use super::error::LoadError;
 use super::isolation::{self, Isolation, What};
@@ -60,10 +61,12 @@ impl LoadedModule {
             return Ok(Self { schema: Arc::new(file.schema), origin: Origin::Python(source) });
         }
         let table = entry(&path)?;
+        let begun = Beginning::of_file(&path, terraglue_plugin::ENTRY);
         // SAFETY: the symbol is the entry of a Terraglue module, whose contract is terraglue.h; the library is
         // never unloaded.
         let module = unsafe { ForeignModule::new(table()) };
         let module = module.map_err(|source| LoadError::Table { path: path.clone(), source })?;
+        begun.goes_on("schema");
         let schema =
             module.schema().map_err(|e| LoadError::Schema { path: path.clone(), message: e.to_string() })?;
         log::info!("module {} from {}", schema.name, path.display());
@@ -124,6 +127,8 @@ impl LoadedModule {
             return self.instantiate_isolated(instance_name, config, services, Isolation::default());
         }
         let config = config.with_defaults(&self.schema);
+        let _begun =
+            Beginning::of_instance(instance_name, self.path().unwrap_or(Path::new(&self.schema.name)));
         let made = self.make(&config, services.for_instance(instance_name), services);
         self.supervised(instance_name, made)
     }
@@ -238,6 +243,7 @@ fn inspect(path: &Path) -> std::result::Result<(), LoadError> {
 pub(super) fn entry(path: &Path) -> std::result::Result<TgEntry, LoadError> {
     // A bare file name would be searched by the system, so the path is made absolute.
     let full = std::path::absolute(path).unwrap_or_else(|_| path.to_path_buf());
+    let _begun = Beginning::of_file(path, "dlopen");
     // SAFETY: the user asked for this library in the scenario; its constructors run.
     let handle = unsafe { Handle::open(Some(&full), RTLD_NOW | RTLD_LOCAL) };
     let handle = handle.map_err(|e| LoadError::CannotLoad { path: path.to_path_buf(), reason: cause(&e) })?;

@@ -4,7 +4,7 @@ use super::keys::READ;
 use super::model::{TerrainKind, TerrainSpec};
 use super::section::Section;
 use super::source::InputError;
-use crate::terrain::{Greys, too_many};
+use crate::terrain::{Greys, SMALLER, too_many};
 
 /// Reads the checked table.
 pub fn read(s: &Section) -> Result<TerrainSpec, Box<InputError>> {
@@ -69,11 +69,13 @@ fn check_lattice(s: &Section, spec: &TerrainSpec) -> Result<(), Box<InputError>>
         ));
     }
     if spec.spacing_m > 0.0
-        && let Some((what, help)) = too_many(spec.size_m, spec.spacing_m)
+        && let Some(crowd) = too_many(spec.size_m, spec.spacing_m)
     {
-        let message =
-            format!("`size_m` = {:?} with `spacing_m` = {} makes {what}", spec.size_m, spec.spacing_m);
-        return Err(s.error("spacing_m", message, Some(help)));
+        let message = format!(
+            "`size_m` = {:?} with `spacing_m` = {} makes {}",
+            spec.size_m, spec.spacing_m, crowd.what
+        );
+        return Err(s.error("spacing_m", message, Some(crowd.help(SMALLER))));
     }
     Ok(())
 }

@@ -1,19 +1,21 @@
 //! Reads the ESRI ASCII grid: six lines of header, then rows of heights from north to south.
 
+use super::check_declared;
 use super::resample::Raster;
 use crate::error::{Error, Result};
 use crate::scenario::InputError;
 use std::path::Path;
 
-/// Reads a grid. Values that stand for missing data become `fill` (m).
+/// Reads a grid. Values that stand for missing data become `fill` (m). `spacing` (m): that of the ground made of it, where one is.
 ///
 /// # Errors
-/// [`Error::File`] when it cannot be read; [`Error::Input`] with file and line when it is not a whole grid, or
-/// has missing data and no `fill`.
-pub fn read_esri_ascii(path: &Path, fill: Option<f64>) -> Result<Raster> {
+/// [`Error::File`] when it cannot be read; [`Error::Input`] with file and line when it is not a whole grid,
+/// is too large, or has missing data and no `fill`.
+pub fn read_esri_ascii(path: &Path, fill: Option<f64>, spacing: Option<f64>) -> Result<Raster> {
     let text = terraglue_subsystem::files::read_large_text(path).map_err(|e| unreadable(path, e))?;
     let file = File { path, text: &text };
     let (header, first_line) = read_header(&file)?;
+    check_declared(path, header.size, [header.cell; 2], spacing)?;
     let mut heights = Vec::with_capacity(header.count());
     let mut last_line = first_line;
     for (number, line) in file.lines().skip_while(|(n, _)| *n < first_line) {
@@ -31,6 +33,9 @@ pub fn read_esri_ascii(path: &Path, fill: Option<f64>) -> Result<Raster> {
     let rows: Vec<f64> = heights.chunks_exact(header.size[0]).rev().flatten().copied().collect();
     Ok(Raster { size: header.size, step: [header.cell; 2], corner: header.corner, heights: rows })
 }
+
+/// Keys of the header.
+const KEYS: &str = "ncols, nrows, xllcorner, yllcorner, cellsize and NODATA_value";
 
 fn truncated(expected: usize, found: usize) -> String {
     if found < expected {
@@ -64,6 +69,8 @@ impl<'a> File<'a> {
     fn error(&self, line: usize, message: String, help: Option<String>) -> Error {
         let shown = self.text.lines().nth(line.saturating_sub(1)).unwrap_or_default();
         let message = format!("{}:{line}: {message}", self.path.display());
+        let help =
+            help.or_else(|| Some(format!("first {KEYS}, each with a number; then the heights, row by row")));
         if self.text.len() > 100_000 || shown.len() > 200 {
             return InputError::plain(message, help).into();
         }
@@ -139,8 +146,7 @@ fn read_header(file: &File) -> Result<(Header, usize)> {
 }
 
 fn unknown_key(file: &File, line: usize, key: &str) -> Error {
-    let help = "ncols, nrows, xllcorner, yllcorner, cellsize and NODATA_value".to_owned();
-    file.error(line, format!("unknown key `{key}` in the header"), Some(help))
+    file.error(line, format!("unknown key `{key}` in the header"), Some(KEYS.to_owned()))
 }
 
 fn count(file: &File, line: usize, key: &str, value: f64) -> Result<usize> {

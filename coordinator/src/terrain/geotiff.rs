@@ -1,5 +1,6 @@
 //! Reads a GeoTIFF elevation model: one band of integers or floating-point numbers with its pixel scale.
 
+use super::check_declared;
 use super::esri_ascii::unreadable;
 use super::resample::Raster;
 use crate::error::{Error, Result};
@@ -19,17 +20,20 @@ const GEOGRAPHIC: u16 = 2;
 
 const CURE: &str = "write it again as one band, e.g. with gdal_translate -b 1 -ot Float32";
 
-/// Reads the first image. Values that stand for missing data become `fill` (m).
+/// Reads the first image. Values that stand for missing data become `fill` (m). `spacing` (m): that of the ground made of it,
+/// where one is.
 ///
 /// # Errors
-/// [`Error::Input`] when it is not an elevation model in metres, was cut off, or has missing data and no `fill`.
-pub fn read_geotiff(path: &Path, fill: Option<f64>) -> Result<Raster> {
+/// [`Error::Input`] when it is not an elevation model in metres, is too large, was cut off, or has missing data and
+/// no `fill`.
+pub fn read_geotiff(path: &Path, fill: Option<f64>, spacing: Option<f64>) -> Result<Raster> {
     let file = terraglue_subsystem::files::open(path).map_err(|e| unreadable(path, e))?;
     let wrong = |message: String| input(path, message, Some(CURE));
     let mut tiff =
         Decoder::new(BufReader::new(file)).map_err(|e| wrong(format!("not a TIFF file: {}", fault(&e))))?;
     let (width, height) = tiff.dimensions().map_err(|e| wrong(fault(&e)))?;
     let step = pixel_scale(path, &mut tiff)?;
+    check_declared(path, [width as usize, height as usize], step, spacing)?;
     let tie = tiff.get_tag_f64_vec(Tag::ModelTiepointTag).unwrap_or_default();
     let missing = tiff.get_tag_ascii_string(Tag::GdalNodata).ok();
     let missing = missing.and_then(|s| s.trim_matches(['\0', ' ']).parse::<f64>().ok());

@@ -26,7 +26,7 @@ impl Labels {
         let is_png = path.extension().is_some_and(|e| e.eq_ignore_ascii_case("png"));
         let raster = if is_png {
             let greys = Greys { pixel_m: pixel_m.unwrap_or(1.0), low_m: 0.0, high_m: 255.0 };
-            let mut raster = read_png(path, greys, Some(f64::from(NO_LABEL)))?;
+            let mut raster = read_png(path, greys, Some(f64::from(NO_LABEL)), None)?;
             if pixel_m.is_none() {
                 let covered = |k: usize| f64::from(ground.size()[k]) * ground.spacing();
                 raster.step = [0, 1].map(|k| covered(k) / raster.size[k] as f64);
@@ -35,7 +35,7 @@ impl Labels {
             raster.heights.iter_mut().for_each(|h| *h = snapped(*h));
             raster
         } else {
-            read_esri_ascii(path, Some(f64::from(NO_LABEL)))?
+            read_esri_ascii(path, Some(f64::from(NO_LABEL)), None)?
         };
         let no_label = |v: &f64| !(v.fract() == 0.0 && (0.0..=255.0).contains(v));
         if let Some(k) = raster.heights.iter().position(no_label) {

@@ -29,6 +29,7 @@ use crate::error::Result;
 use crate::scenario::{InputError, TerrainKind, TerrainSpec};
 use analytic::Analytic;
 use resample::{Raster, resample};
+use std::path::Path;
 use terraglue_ground::Lattice;
 use terraglue_subsystem::Terrain;
 
@@ -64,15 +65,40 @@ pub fn build(spec: &TerrainSpec, seed: u64) -> Result<Box<dyn Terrain>> {
             }))
         }
         TerrainKind::EsriAscii { file, fill_m } => {
-            from_file(&file.display().to_string(), read_esri_ascii(file, *fill_m)?, spec.spacing_m)?
+            let raster = read_esri_ascii(file, *fill_m, Some(spec.spacing_m))?;
+            from_file(&file.display().to_string(), raster, spec.spacing_m)?
         }
         TerrainKind::Geotiff { file, fill_m } => {
-            from_file(&file.display().to_string(), read_geotiff(file, *fill_m)?, spec.spacing_m)?
+            let raster = read_geotiff(file, *fill_m, Some(spec.spacing_m))?;
+            from_file(&file.display().to_string(), raster, spec.spacing_m)?
         }
         TerrainKind::Png { file, greys, fill_m } => {
-            from_file(&file.display().to_string(), read_png(file, *greys, *fill_m)?, spec.spacing_m)?
+            let raster = read_png(file, *greys, *fill_m, Some(spec.spacing_m))?;
+            from_file(&file.display().to_string(), raster, spec.spacing_m)?
         }
     })
+}
+
+/// Most points of an elevation file or mask: two gigabytes while it is read, most of them as numbers of 8 bytes.
+const MOST_POINTS: f64 = 1e8;
+
+/// Whether the points that a file declares fit into memory, and the nodes of the ground that is made of them, `spacing` (m)
+/// apart: asked before it is read whole. 0: they are the points; none: no ground is made of it.
+fn check_declared(path: &Path, size: [usize; 2], step: [f64; 2], spacing: Option<f64>) -> Result {
+    let path = path.display();
+    let [width, height] = size.map(|n| n as f64);
+    if width * height > MOST_POINTS {
+        let message =
+            format!("{path}: {width} × {height} points are too many: at most {MOST_POINTS:.0e} are read");
+        let help = "cut a part out of it or make it coarser, e.g. with gdalwarp -tr".to_owned();
+        return Err(InputError::plain(message, Some(help)).into());
+    }
+    let Some(spacing) = spacing else { return Ok(()) };
+    let spacing = if spacing > 0.0 { spacing } else { step[0].min(step[1]) };
+    let extent = [(width - 1.0) * step[0], (height - 1.0) * step[1]];
+    let Some(crowd) = too_many(extent, spacing) else { return Ok(()) };
+    let message = format!("{path}: {} m by {} m make {}", extent[0], extent[1], crowd.what);
+    Err(InputError::plain(message, Some(crowd.help("cut a part out of the file"))).into())
 }
 
 /// Largest height that a height field takes, m.
@@ -85,12 +111,6 @@ fn from_file(path: &str, mut raster: Raster, spacing: f64) -> Result<Box<dyn Ter
     if width < 2 || height < 2 {
         let message = format!("{path}: {width} × {height} heights are no ground");
         return Err(InputError::plain(message, Some("at least 2 × 2 are needed".to_owned())).into());
-    }
-    let extent = [0, 1].map(|k| (raster.size[k] - 1) as f64 * raster.step[k]);
-    let finest = raster.step[0].min(raster.step[1]);
-    if let Some((what, help)) = too_many(extent, if spacing > 0.0 { spacing } else { finest }) {
-        let message = format!("{path}: {} m by {} m make {what}", extent[0], extent[1]);
-        return Err(InputError::plain(message, Some(help)).into());
     }
     if raster.heights.iter().any(|h| h.abs() > HIGHEST_M) {
         let middle = raster.heights[raster.size[0] * (raster.size[1] / 2) + raster.size[0] / 2].round();
@@ -111,8 +131,23 @@ const MOST_NODES: f64 = 5e7;
 /// See [`MOST_NODES`].
 const BYTES_PER_NODE: f64 = 45.0;
 
-/// Of a ground with more nodes than fit: what it makes and needs, and the way out.
-pub(crate) fn too_many(size_m: [f64; 2], spacing_m: f64) -> Option<(String, String)> {
+/// A ground with more nodes than fit.
+pub(crate) struct Crowd {
+    /// What it makes and needs.
+    pub what: String,
+    /// A spacing that fits, m.
+    fits_m: f64,
+}
+
+impl Crowd {
+    /// The way out, and another one.
+    pub fn help(&self, other: &str) -> String {
+        format!("`spacing_m` = {} fits this size; or {other}", self.fits_m)
+    }
+}
+
+/// Whether a ground has more nodes than fit.
+pub(crate) fn too_many(size_m: [f64; 2], spacing_m: f64) -> Option<Crowd> {
     let cells = size_m.map(|s| s / spacing_m);
     let nodes = (cells[0] + 1.0) * (cells[1] + 1.0);
     if nodes <= MOST_NODES && cells.iter().all(|n| *n < MOST_CELLS) {
@@ -120,7 +155,7 @@ pub(crate) fn too_many(size_m: [f64; 2], spacing_m: f64) -> Option<(String, Stri
     }
     let fits = (size_m[0] * size_m[1] / MOST_NODES).sqrt().max(size_m[0].max(size_m[1]) / MOST_CELLS) * 1.001;
     let unit = 10_f64.powf(fits.log10().floor() - 1.0);
-    let fits: f64 = format!("{:.1e}", (fits / unit).ceil() * unit).parse().unwrap_or(fits);
+    let fits_m: f64 = format!("{:.1e}", (fits / unit).ceil() * unit).parse().unwrap_or(fits);
     let bytes = nodes * BYTES_PER_NODE;
     let what = format!(
         "{nodes:.2e} nodes, for which a run would need about {}; at most {MOST_NODES:.0e} are taken, and {MOST_CELLS:.0e} cells a side",
@@ -130,8 +165,11 @@ pub(crate) fn too_many(size_m: [f64; 2], spacing_m: f64) -> Option<(String, Stri
             format!("{:.1e} GB of memory", bytes * 1e-9)
         }
     );
-    Some((what, format!("`spacing_m` = {fits} fits this size; or make `size_m` smaller")))
+    Some(Crowd { what, fits_m })
 }
+
+/// What helps where a scenario gives the size.
+pub(crate) const SMALLER: &str = "make `size_m` smaller";
 
 /// Most cells along a side.
 const MOST_CELLS: f64 = 1e6;
@@ -139,17 +177,15 @@ const MOST_CELLS: f64 = 1e6;
 /// The lattice of a procedural terrain.
 fn centred_lattice(spec: &TerrainSpec) -> Result<Lattice> {
     let cells = spec.size_m.map(|size| (size / spec.spacing_m).round());
-    let sound = spec.spacing_m > 0.0
-        && cells.iter().all(|n| *n >= 1.0)
-        && too_many(spec.size_m, spec.spacing_m).is_none();
-    if !sound {
-        let message =
-            format!("size_m = {:?} and spacing_m = {} do not make a lattice", spec.size_m, spec.spacing_m);
-        let help =
-            too_many(spec.size_m, spec.spacing_m).map_or_else(|| "both are positive".into(), |(_, h)| h);
-        return Err(InputError::plain(message, Some(help)).into());
-    }
-    Ok(lattice_of(cells.map(|n| n as u32 + 1), spec.spacing_m))
+    let sound = spec.spacing_m > 0.0 && cells.iter().all(|n| *n >= 1.0);
+    let help = match too_many(spec.size_m, spec.spacing_m) {
+        _ if !sound => "both are positive".to_owned(),
+        Some(crowd) => crowd.help(SMALLER),
+        None => return Ok(lattice_of(cells.map(|n| n as u32 + 1), spec.spacing_m)),
+    };
+    let message =
+        format!("size_m = {:?} and spacing_m = {} do not make a lattice", spec.size_m, spec.spacing_m);
+    Err(InputError::plain(message, Some(help)).into())
 }
 
 /// A lattice of so many nodes with its middle at the world's origin.

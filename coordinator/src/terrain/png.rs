@@ -1,5 +1,6 @@
 //! Reads a greyscale PNG image as heights: black is the lowest, white the highest.
 
+use super::check_declared;
 use super::esri_ascii::unreadable;
 use super::resample::Raster;
 use crate::error::{Error, Result};
@@ -22,16 +23,18 @@ pub struct Greys {
 const CURE: &str = "write it again as a greyscale PNG of 8 or 16 bits";
 
 /// Reads an image of 8 or 16 bits of grey (fewer are spread over 8); its upper row is the one of the largest y. Pixels that
-/// are wholly transparent are missing data and become `fill` (m).
+/// are wholly transparent are missing data and become `fill` (m). `spacing` (m): that of the ground made of it, where one is.
 ///
 /// # Errors
-/// [`Error::Input`] when it is no greyscale image, was cut off, or has missing data and no `fill`.
-pub fn read_png(path: &Path, greys: Greys, fill: Option<f64>) -> Result<Raster> {
+/// [`Error::Input`] when it is no greyscale image, is too large, was cut off, or has missing data and no `fill`.
+pub fn read_png(path: &Path, greys: Greys, fill: Option<f64>, spacing: Option<f64>) -> Result<Raster> {
     let file = terraglue_subsystem::files::open(path).map_err(|e| unreadable(path, e))?;
     let mut decoder = Decoder::new(BufReader::new(file));
     decoder.set_transformations(Transformations::EXPAND);
     let wrong = |message: String| input(path, message, Some(CURE));
     let mut reader = decoder.read_info().map_err(|e| wrong(format!("not a PNG image: {}", fault(&e))))?;
+    let declared = [reader.info().width as usize, reader.info().height as usize];
+    check_declared(path, declared, [greys.pixel_m; 2], spacing)?;
     let size = reader.output_buffer_size().ok_or_else(|| wrong("too large".into()))?;
     let mut bytes = vec![0; size];
     let frame =

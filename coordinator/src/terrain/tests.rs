@@ -103,7 +103,7 @@ fn a_crater_keeps_depth_rim_and_slope() {
 
 #[test]
 fn an_esri_grid_is_read_north_up_and_centred() {
-    let raster = read_esri_ascii(&reference("hill.asc"), None).expect("whole");
+    let raster = read_esri_ascii(&reference("hill.asc"), None, None).expect("whole");
     assert_eq!((raster.size, raster.step, raster.corner), ([4, 3], [0.5, 0.5], [100.25, 200.25]));
     assert_eq!(raster.heights[0], 9.0);
     assert_eq!(raster.heights[11], 4.0);
@@ -115,16 +115,16 @@ fn an_esri_grid_is_read_north_up_and_centred() {
 
 #[test]
 fn broken_esri_grids_say_file_line_and_numbers() {
-    let message = failure(read_esri_ascii(&reference("truncated.asc"), None));
+    let message = failure(read_esri_ascii(&reference("truncated.asc"), None, None));
     assert!(message.contains("truncated.asc:8: expected 12 values (4 × 3), found 7"), "{message}");
-    let message = failure(read_esri_ascii(&reference("hole.asc"), None));
+    let message = failure(read_esri_ascii(&reference("hole.asc"), None, None));
     assert!(message.contains("hole.asc:8: missing data (-9999)") && message.contains("fill_m"), "{message}");
-    assert_eq!(read_esri_ascii(&reference("hole.asc"), Some(0.5)).expect("filled").heights[5], 0.5);
+    assert_eq!(read_esri_ascii(&reference("hole.asc"), Some(0.5), None).expect("filled").heights[5], 0.5);
     let folder = tempfile::tempdir().expect("folder");
     let bad = |text: &str| {
         let path = folder.path().join("bad.asc");
         std::fs::write(&path, text).expect("written");
-        failure(read_esri_ascii(&path, None))
+        failure(read_esri_ascii(&path, None, None))
     };
     assert!(bad("ncols 2\nnrows 2\ncellsize 1\n1 2\n3 x\n").contains("bad.asc:5: `x` is not a number"));
     assert!(bad("ncols 2\nnrows 2\ncellsize 0\n1 2\n3 4\n").contains("bad.asc:3: `cellsize` = 0"));
@@ -132,7 +132,7 @@ fn broken_esri_grids_say_file_line_and_numbers() {
     assert!(bad("ncols 2\nnrows 2\n1 2 3 4\n").contains("no `cellsize`"));
     assert!(bad("ncolumns 2\n").contains("unknown key `ncolumns`"));
     assert!(bad("").contains("no `ncols`"));
-    assert!(failure(read_esri_ascii(&reference("absent.asc"), None)).contains("absent.asc"));
+    assert!(failure(read_esri_ascii(&reference("absent.asc"), None, None)).contains("absent.asc"));
 }
 
 #[test]
@@ -145,7 +145,7 @@ fn a_written_grid_reads_back() {
     let folder = tempfile::tempdir().expect("folder");
     let path = folder.path().join("ground.asc");
     write_esri_ascii(&path, &field.height_info(), |a, b| Ok(field.height_tile(a, b))).expect("written");
-    let raster = read_esri_ascii(&path, None).expect("whole");
+    let raster = read_esri_ascii(&path, None, None).expect("whole");
     assert_eq!(raster.size, [70, 40]);
     assert!((raster.corner[0] - lattice.origin[0]).abs() < 1e-12);
     for (k, h) in raster.heights.iter().enumerate() {
@@ -191,17 +191,17 @@ fn a_geotiff_is_read_and_its_faults_are_named() {
     let path = folder.path().join("dem.tif");
     let metres = [1, 1, 0, 1, 1024, 0, 1, 1];
     write_tiff(&path, &metres, "-3.4028234663852886e+38", &[1.0, 2.0, 3.0, 4.0, 5.0, f32::MIN]);
-    assert!(failure(read_geotiff(&path, None)).contains("missing data"));
-    let raster = read_geotiff(&path, Some(0.25)).expect("filled");
+    assert!(failure(read_geotiff(&path, None, None)).contains("missing data"));
+    let raster = read_geotiff(&path, Some(0.25), None).expect("filled");
     assert_eq!(raster.heights, [4.0, 5.0, 0.25, 1.0, 2.0, 3.0]);
     assert_eq!((raster.size, raster.step, raster.corner), ([3, 2], [0.5, 0.5], [7.0, 8.5]));
     let whole = std::fs::read(&path).expect("read");
     write_tiff(&path, &[1, 1, 0, 1, 1024, 0, 1, 2], "-1", &[1.0; 6]);
-    assert!(failure(read_geotiff(&path, None)).contains("degrees"));
+    assert!(failure(read_geotiff(&path, None, None)).contains("degrees"));
     std::fs::write(&path, &whole[..40]).expect("written");
-    assert!(failure(read_geotiff(&path, None)).contains("dem.tif"));
+    assert!(failure(read_geotiff(&path, None, None)).contains("dem.tif"));
     std::fs::write(&path, "no image").expect("written");
-    assert!(failure(read_geotiff(&path, None)).contains("not a TIFF file"));
+    assert!(failure(read_geotiff(&path, None, None)).contains("not a TIFF file"));
 }
 
 fn write_png(path: &Path, color: ::png::ColorType, depth: ::png::BitDepth, data: &[u8]) {
@@ -218,7 +218,7 @@ fn a_greyscale_image_is_read_and_its_faults_are_named() {
     let path = folder.path().join("hills.png");
     let greys = Greys { pixel_m: 0.5, low_m: -1.0, high_m: 4.1 };
     write_png(&path, ColorType::Grayscale, BitDepth::Eight, &[0, 51, 102, 153, 204, 255]);
-    let raster = read_png(&path, greys, None).expect("eight bits");
+    let raster = read_png(&path, greys, None, None).expect("eight bits");
     // the upper row is the one of the largest y
     for (found, expected) in raster.heights.iter().zip([2.06, 3.08, 4.1, -1.0, 0.02, 1.04]) {
         assert!((found - expected).abs() < 1e-12, "{found} {expected}");
@@ -226,21 +226,80 @@ fn a_greyscale_image_is_read_and_its_faults_are_named() {
     assert_eq!((raster.size, raster.step), ([3, 2], [0.5; 2]));
     let sixteen = [0, 0, 0, 1, 1, 0, 128, 0, 255, 254, 255, 255];
     write_png(&path, ColorType::Grayscale, BitDepth::Sixteen, &sixteen);
-    let raster = read_png(&path, Greys { low_m: 0.0, high_m: 65.535, ..greys }, None).expect("sixteen bits");
+    let raster =
+        read_png(&path, Greys { low_m: 0.0, high_m: 65.535, ..greys }, None, None).expect("sixteen bits");
     for (found, expected) in raster.heights.iter().zip([32.768, 65.534, 65.535, 0.0, 0.001, 0.256]) {
         assert!((found - expected).abs() < 1e-12, "{found} {expected}");
     }
     let clear = [9, 255, 9, 255, 9, 0, 9, 255, 9, 255, 9, 255];
     write_png(&path, ColorType::GrayscaleAlpha, BitDepth::Eight, &clear);
-    assert!(failure(read_png(&path, greys, None)).contains("transparent"));
-    assert_eq!(read_png(&path, greys, Some(7.0)).expect("filled").heights[5], 7.0);
+    assert!(failure(read_png(&path, greys, None, None)).contains("transparent"));
+    assert_eq!(read_png(&path, greys, Some(7.0), None).expect("filled").heights[5], 7.0);
     write_png(&path, ColorType::Rgb, BitDepth::Eight, &[0; 18]);
-    assert!(failure(read_png(&path, greys, None)).contains("coloured"));
+    assert!(failure(read_png(&path, greys, None, None)).contains("coloured"));
     let whole = std::fs::read(&path).expect("read");
     std::fs::write(&path, &whole[..40]).expect("written");
-    assert!(failure(read_png(&path, greys, None)).contains("hills.png"));
+    assert!(failure(read_png(&path, greys, None, None)).contains("hills.png"));
     std::fs::write(&path, "no image").expect("written");
-    assert!(failure(read_png(&path, greys, None)).contains("not a PNG image"));
+    assert!(failure(read_png(&path, greys, None, None)).contains("not a PNG image"));
+}
+
+#[test]
+fn files_that_declare_more_than_fits_are_refused_before_they_are_read() {
+    use ::png::{BitDepth, ColorType};
+    let folder = tempfile::tempdir().expect("folder");
+    let at = |name: &str| folder.path().join(name);
+    // the data end after six points: only what the head declares can be what is refused
+    std::fs::write(at("big.asc"), "ncols 1000000\nnrows 1000000\ncellsize 1\n1 2 3 4 5 6\n")
+        .expect("written");
+    write_tiff(&at("big.tif"), &[1, 1, 0, 1, 1024, 0, 1, 1], "-1", &[1.0; 6]);
+    let mut bytes = std::fs::read(at("big.tif")).expect("read");
+    // width, length, rows of a strip
+    for tag in [256_u16, 257, 278] {
+        let entry =
+            [tag.to_le_bytes(), 4_u16.to_le_bytes(), 1_u16.to_le_bytes(), 0_u16.to_le_bytes()].concat();
+        let place = bytes.windows(8).position(|w| w == entry).expect("a tag") + 8;
+        bytes[place..place + 4].copy_from_slice(&100_000_u32.to_le_bytes());
+    }
+    std::fs::write(at("big.tif"), bytes).expect("written");
+    let png = |path: &Path, size: u32| {
+        let mut encoder = ::png::Encoder::new(std::fs::File::create(path).expect("created"), size, size);
+        encoder.set_color(ColorType::Grayscale);
+        encoder.set_depth(BitDepth::Eight);
+        let mut image = encoder.write_header().expect("header");
+        image.write_chunk(::png::chunk::IDAT, &[0x78]).expect("the first byte of the data");
+    };
+    png(&at("big.png"), 100_000);
+    let greys = Greys { pixel_m: 0.01, low_m: 0.0, high_m: 1.0 };
+    let kinds = |name: &str| match name.rsplit('.').next() {
+        Some("asc") => TerrainKind::EsriAscii { file: at(name), fill_m: None },
+        Some("tif") => TerrainKind::Geotiff { file: at(name), fill_m: None },
+        _ => TerrainKind::Png { file: at(name), greys, fill_m: None },
+    };
+    let refused = |name: &str, spacing_m: f64| {
+        let spec = TerrainSpec { size_m: [0.0; 2], spacing_m, kind: kinds(name) };
+        failure(build(&spec, 1).map(drop))
+    };
+    for name in ["big.asc", "big.tif", "big.png"] {
+        let message = refused(name, 1e6);
+        assert!(
+            message.contains(name) && message.contains("at most 1e8") && message.contains("gdalwarp"),
+            "{message}"
+        );
+    }
+    // fewer than that are read, but not for a ground of as many nodes
+    png(&at("fine.png"), 9_000);
+    let message = refused("fine.png", 0.0);
+    assert!(message.contains("8.10e7 nodes") && message.contains("cut a part out of the file"), "{message}");
+    assert!(!message.contains("size_m"), "{message}");
+    let message = refused("fine.png", 0.1);
+    assert!(message.contains("cannot be read whole"), "{message}");
+    let mask = failure(super::Labels::read(
+        &at("big.png"),
+        None,
+        &super::Analytic::new(lattice_of([5, 5], 1.0), |_, _| 0.0),
+    ));
+    assert!(mask.contains("at most 1e8"), "{mask}");
 }
 
 #[test]

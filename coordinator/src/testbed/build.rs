@@ -7,6 +7,7 @@ use crate::contact::{BodySide, ContactDetector, GroundSide, PortSet};
 use crate::gluing::glue::Recipe;
 use crate::gluing::step_control::{Passage, StepControl};
 use crate::gluing::{self, Exchange, StepReport};
+use crate::host::crash::Beginning;
 use crate::host::isolation::{self, What};
 use crate::host::law;
 use crate::host::{
@@ -103,7 +104,8 @@ impl Testbed {
         testbed.settle()?;
         testbed.read_states()?;
         if let Err(Error::Simulation { message, .. }) = testbed.detect_contacts(scenario.time.step_s) {
-            return Err(InputError::plain(format!("at the start: {message}"), None).into());
+            let help = "docs/scenario.md has the keys of `[terrain]`, `terraglue modules NAME` those that set a body down";
+            return Err(InputError::plain(format!("at the start: {message}"), Some(help.into())).into());
         }
         Ok(testbed)
     }
@@ -257,6 +259,7 @@ pub(crate) fn with_law(
 fn unit(scenario: &Scenario, spec: &SubsystemSpec, services: &HostServices) -> Result<Instance> {
     let path = scenario.folder.join(&spec.module);
     let host = services.for_instance(&spec.name);
+    let _begun = Beginning::of_instance(&spec.name, &path);
     let once = || terraglue_fmi::Fmu::inspect(&path).is_ok_and(|(d, _)| d.capabilities.once_per_process);
     let made: terraglue_subsystem::Result<Box<dyn Subsystem>> = match spec.isolate {
         // One instance per process is all that such a unit stands.

@@ -96,6 +96,20 @@ fn arrows_point_from_modules_and_coordinator_to_interfaces() {
 }
 
 #[test]
+fn what_cargo_xtask_starts_builds_nothing_of_ours() {
+    let aliases: toml::Table = read(Path::new(".cargo/config.toml")).parse().expect("TOML");
+    let started = aliases["alias"]["xtask"].as_str().expect("an alias").split_whitespace().nth(2);
+    let manifests =
+        files("xtask", "toml").into_iter().map(|path| read(&path).parse::<toml::Table>().expect("TOML"));
+    let mut named = manifests.filter(|m| m["package"]["name"].as_str() == started);
+    let manifest = named.next().expect("the package of the alias");
+    let ours = crates();
+    let names = manifest["dependencies"].as_table().expect("dependencies").keys();
+    let built: Vec<&String> = names.filter(|name| ours.contains_key(*name)).collect();
+    assert!(built.is_empty(), "`cargo xtask install` compiles these twice: {built:?}");
+}
+
+#[test]
 fn the_coordinator_uses_no_plugin_in_code() {
     let plugins =
         ["rigid_body_plugin", "soil_cellular_automaton_plugin", "soil_bekker_plugin", "gait_plugin"];

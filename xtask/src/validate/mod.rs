@@ -102,6 +102,9 @@ pub fn validate(arguments: &Arguments) -> Outcome {
     if arguments.table.is_some() && arguments.area.as_deref() != Some("gluing") {
         return Err("--table is for the area gluing: cargo xtask validate gluing --table FILE".into());
     }
+    let areas = || AREAS.iter().filter(|(name, _)| arguments.area.as_deref().is_none_or(|a| a == *name));
+    // before anything is built
+    areas().try_for_each(|(_, parts)| chosen(parts, arguments.part.as_deref()).map(drop))?;
     // a table of values is read without a clock
     let no_timing = arguments.no_timing || arguments.table.is_some();
     if !no_timing && cfg!(debug_assertions) {
@@ -124,8 +127,7 @@ pub fn validate(arguments: &Arguments) -> Outcome {
     };
     let mut known = KnownFailures::read(&root().join("tests/known-failures.tsv"))?;
     let mut complaints = Vec::new();
-    for (area, parts) in AREAS.iter().filter(|(name, _)| arguments.area.as_deref().is_none_or(|a| a == *name))
-    {
+    for (area, parts) in areas() {
         let mut figures = Vec::new();
         for (part, measure) in chosen(parts, context.part.as_deref())? {
             if std::io::stderr().is_terminal() {

@@ -17,14 +17,10 @@ const REFERENCE_PART: f64 = 0.125;
 
 /// One row before it ran.
 pub struct Plan {
-    pub strategy: String,
-    pub soil: String,
-    /// Other keys with their values.
-    pub varied: Varied,
-    /// Whether the others are compared with it.
-    pub is_reference: bool,
-    /// Whether the comparison has several steps.
-    pub name_step: bool,
+    /// What is known of it.
+    pub row: CompareRow,
+    /// That of the row.
+    pub name: String,
     pub scenario: Scenario,
     pub folder: PathBuf,
     /// Why it cannot run: a row of the comparison.
@@ -34,20 +30,8 @@ pub struct Plan {
 impl Plan {
     /// Whether the iteration also runs from zero, to show what the estimate saves.
     pub fn has_cold_start(&self) -> bool {
-        self.strategy == "iterative" && !self.is_reference && self.scenario.gluing.start == "estimate"
-    }
-
-    /// Its row, before it ran.
-    pub fn row(&self) -> CompareRow {
-        CompareRow {
-            strategy: self.strategy.clone(),
-            soil: self.soil.clone(),
-            varied: self.varied.clone(),
-            step_s: self.scenario.time.step_s,
-            is_reference: self.is_reference,
-            name_step: self.name_step,
-            ..CompareRow::default()
-        }
+        let row = &self.row;
+        row.strategy == "iterative" && !row.is_reference && self.scenario.gluing.start == "estimate"
     }
 
     /// Steps of all its runs.
@@ -97,9 +81,8 @@ pub fn plan(arguments: &CompareArguments) -> Result<Vec<Plan>> {
     let replaced = soil.filter(|_| !arguments.soils.is_empty());
     let one = |choice| planned(arguments, replaced.as_ref(), choice, wanted.steps.len() > 1);
     let plans = choices.into_iter().map(one).collect::<Result<Vec<_>>>()?;
-    match arguments.reference.as_deref().filter(|name| !STRATEGIES.contains(name)) {
-        Some(folder) => check_folder(&plans, Path::new(folder))?,
-        None => {}
+    if let Some(folder) = arguments.reference.as_deref().filter(|name| !STRATEGIES.contains(name)) {
+        check_folder(&plans, Path::new(folder))?;
     }
     Ok(plans)
 }
@@ -232,31 +215,26 @@ fn planned(
         add("--soils", format!("{}.module", soil.name), choice.soil.clone());
     }
     choice.varied.iter().cloned().for_each(|(key, value)| add("--vary", key, value));
-    let row = CompareRow {
-        strategy: choice.strategy.clone(),
-        soil: choice.soil.clone(),
-        varied: choice.varied.clone(),
-        step_s: choice.step_s.unwrap_or_default(),
-        is_reference: choice.is_reference,
-        name_step,
-        ..CompareRow::default()
-    };
-    let _said = logger::of_run(&row.name());
-    Ok(Plan {
-        scenario: Scenario::load_by(&arguments.run.scenario.scenario, &sets, &options)?,
+    let mut row = CompareRow {
         strategy: choice.strategy,
         soil: choice.soil,
         varied: choice.varied,
         is_reference: choice.is_reference,
-        name_step,
-        folder: PathBuf::new(),
-        refused: None,
-    })
+        // without a step chosen it is the scenario's own, which is in no name
+        step_s: choice.step_s.unwrap_or_default(),
+        name_step: name_step && choice.step_s.is_some(),
+        ..CompareRow::default()
+    };
+    let name = row.name();
+    let _said = logger::of_run(&name);
+    let scenario = Scenario::load_by(&arguments.run.scenario.scenario, &sets, &options)?;
+    row.step_s = scenario.time.step_s;
+    Ok(Plan { row, name, scenario, folder: PathBuf::new(), refused: None })
 }
 
 /// An earlier run must be one of the same thing as every row; rows that differ in strategy and step only are alike.
 fn check_folder(plans: &[Plan], folder: &Path) -> Result {
-    let same = |a: &Plan, b: &Plan| a.soil == b.soil && a.varied == b.varied;
+    let same = |a: &Plan, b: &Plan| a.row.soil == b.row.soil && a.row.varied == b.row.varied;
     let first = |(k, plan): &(usize, &Plan)| !plans[..*k].iter().any(|p| same(p, plan));
     let mut firsts = plans.iter().enumerate().filter(first);
     firsts.try_for_each(|(_, plan)| compare::check_reference(&plan.scenario, folder))
@@ -267,9 +245,9 @@ fn check_folder(plans: &[Plan], folder: &Path) -> Result {
 pub fn refuse(plans: &mut [Plan], arguments: &RunArguments, cancel: &Arc<AtomicBool>) -> Result {
     let mut first = None;
     for plan in plans.iter_mut() {
-        let _said = logger::of_run(&plan.row().name());
+        let _said = logger::of_run(&plan.name);
         let Err(error) = run::build(&plan.scenario, &run::options(arguments, cancel)) else { continue };
-        if plan.is_reference {
+        if plan.row.is_reference {
             return Err(refused_reference(plan, error));
         }
         plan.refused = Some(match &error {
@@ -282,7 +260,9 @@ pub fn refuse(plans: &mut [Plan], arguments: &RunArguments, cancel: &Arc<AtomicB
         first = first.or(Some(error));
     }
     match first {
-        Some(error) if plans.iter().filter(|p| !p.is_reference).all(|p| p.refused.is_some()) => Err(error),
+        Some(error) if plans.iter().filter(|p| !p.row.is_reference).all(|p| p.refused.is_some()) => {
+            Err(error)
+        }
         _ => Ok(()),
     }
 }
@@ -292,7 +272,7 @@ fn refused_reference(plan: &Plan, error: Error) -> Error {
         Error::Input(input) => input.help.clone(),
         _ => None,
     };
-    InputError::plain(format!("--reference: `{}` cannot run: {error}", plan.strategy), help).into()
+    InputError::plain(format!("--reference: `{}` cannot run: {error}", plan.row.strategy), help).into()
 }
 
 /// Name and module of the only subsystem of kind soil.

@@ -3,7 +3,6 @@
 
 use crate::process::{Outcome, cargo, command, must, root, target};
 use std::path::Path;
-use terraglue::scenario::SHIPPED_MODULES;
 
 /// The library inside exported units.
 const UNIT: &str = "libterraglue_unit.so";
@@ -58,7 +57,7 @@ fn build() -> Outcome {
 fn lay_out(prefix: &Path, profile: &str) -> Outcome {
     let release = target().join(profile);
     copy(&release.join("terraglue"), &prefix.join("bin/terraglue"))?;
-    for module in SHIPPED_MODULES {
+    for module in modules()? {
         let file = format!("lib{}_plugin.so", module.replace('-', "_"));
         // The copy in deps is always fresh; the one beside the program is not after `cargo build -p`.
         let built = [release.join("deps").join(&file), release.join(&file)];
@@ -69,6 +68,14 @@ fn lay_out(prefix: &Path, profile: &str) -> Outcome {
     copy_files(&root().join("interfaces/plugin/include"), &prefix.join("include"))?;
     copy_files(&root().join("models"), &prefix.join("share/terraglue/models"))?;
     copy_files(&root().join("scenarios"), &prefix.join("share/terraglue/scenarios"))
+}
+
+/// Names of the modules that the program brings: the folders of modules/ with a plugin.
+fn modules() -> Outcome<Vec<String>> {
+    let folder = root().join("modules");
+    let entries = std::fs::read_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let with_plugin = entries.flatten().filter(|e| e.path().join("plugin/Cargo.toml").is_file());
+    Ok(with_plugin.map(|e| e.file_name().to_string_lossy().into_owned()).collect())
 }
 
 fn copy_tree(from: &Path, to: &Path) -> Outcome {

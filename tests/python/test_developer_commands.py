@@ -1,0 +1,36 @@
+"""`cargo xtask`: what it builds before it does what it is asked for. Cargo is replaced by a program that only says its arguments."""
+
+import os
+import subprocess
+
+import pytest
+
+from conftest import ROOT
+from documented import xtask
+
+
+def asked(program, *arguments):
+    environment = {**os.environ, "CARGO": "/bin/echo"}
+    return subprocess.run([program, *arguments], cwd=ROOT, env=environment, capture_output=True, text=True, timeout=60)
+
+
+@pytest.mark.parametrize("options", [[], ["--no-timing"], ["--quick"]])
+def test_a_wrong_part_is_told_before_anything_is_built(options):
+    done = asked(xtask(), "validate", "soil", "--part", "wrong", *options)
+    assert done.returncode == 1 and done.stdout == "", done.stdout
+    assert done.stderr.startswith("error: --part wrong: the parts are automaton, "), done.stderr
+
+
+def test_what_cargo_xtask_starts_hands_on_all_but_installing(tmp_path):
+    start = xtask().with_name("xtask-start")
+    for arguments in (["--help"], ["validate", "soil", "--quick"], ["test"], []):
+        done = asked(start, *arguments)
+        assert done.stdout.split() == ["run", "--package", "xtask", "--", *arguments], done.stdout
+    done = asked(start, "install")
+    assert done.returncode == 2 and "<PREFIX>" in done.stderr and done.stdout == ""
+    # the release profile of the program is all that an install builds
+    built = subprocess.run([start, "install", tmp_path / "x"], cwd=ROOT, capture_output=True, text=True,
+                           env={**os.environ, "CARGO": "/bin/false"}, timeout=60)
+    assert built.returncode == 1 and not (tmp_path / "x").exists()
+    lines = [line for line in built.stderr.splitlines() if line.startswith("$")]
+    assert lines == ["$ false build --release --package terraglue --package terraglue-unit"]

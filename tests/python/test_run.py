@@ -257,7 +257,7 @@ def test_a_recording_that_was_cut_off_says_so(short_run, tmp_path):
 
 
 def test_an_open_contact_leaves_no_gap(tmp_path):
-    """A plate that is lifted off, glued in one system: a force of rounding on an open contact is no closed gap."""
+    """A plate that is lifted off, glued in one system: a contact that opens is no gap of a closed one."""
     text = (ROOT / "scenarios/plate_sinkage.toml").read_text()
     text = text.replace("../models", f"{ROOT}/models").replace('"cooperative"', '"monolithic"')
     text += """

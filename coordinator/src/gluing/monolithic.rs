@@ -238,11 +238,12 @@ impl Monolithic {
         for port in &exchange.ports {
             let i = port.first as usize;
             let apart = exchange.joint_gap(i);
-            // an open contact under a force of rounding misses its condition by what that force moves, not by its distance
-            let left = if exchange.rows[i] == Row::Joint {
-                apart
-            } else {
-                apart.min(self.scale[i] * exchange.t[i].max(0.0))
+            let left = match exchange.rows[i] {
+                Row::Joint => apart,
+                // the soil's surface follows the foot
+                _ if self.motion => 0.0,
+                // an open contact under a force of rounding misses its condition by what that force moves, not by its distance
+                _ => apart.min(self.scale[i] * exchange.t[i].max(0.0)),
             };
             exchange.report.max_gap_m = exchange.report.max_gap_m.max(left);
         }

@@ -69,13 +69,13 @@ fn check_lattice(s: &Section, spec: &TerrainSpec) -> Result<(), Box<InputError>>
         ));
     }
     if spec.spacing_m > 0.0
-        && let Some(crowd) = too_many(spec.size_m, spec.spacing_m)
+        && let Some(refused) = too_many(spec.size_m, spec.spacing_m)
     {
         let message = format!(
             "`size_m` = {:?} with `spacing_m` = {} makes {}",
-            spec.size_m, spec.spacing_m, crowd.what
+            spec.size_m, spec.spacing_m, refused.what
         );
-        return Err(s.error("spacing_m", message, Some(crowd.help(SMALLER))));
+        return Err(s.error("spacing_m", message, Some(refused.help(SMALLER))));
     }
     Ok(())
 }

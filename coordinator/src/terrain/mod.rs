@@ -96,9 +96,9 @@ fn check_declared(path: &Path, size: [usize; 2], step: [f64; 2], spacing: Option
     let Some(spacing) = spacing else { return Ok(()) };
     let spacing = if spacing > 0.0 { spacing } else { step[0].min(step[1]) };
     let extent = [(width - 1.0) * step[0], (height - 1.0) * step[1]];
-    let Some(crowd) = too_many(extent, spacing) else { return Ok(()) };
-    let message = format!("{path}: {} m by {} m make {}", extent[0], extent[1], crowd.what);
-    Err(InputError::plain(message, Some(crowd.help("cut a part out of the file"))).into())
+    let Some(refused) = too_many(extent, spacing) else { return Ok(()) };
+    let message = format!("{path}: {} m by {} m make {}", extent[0], extent[1], refused.what);
+    Err(InputError::plain(message, Some(refused.help("cut a part out of the file"))).into())
 }
 
 /// Largest height that a height field takes, m.
@@ -132,14 +132,14 @@ const MOST_NODES: f64 = 5e7;
 const BYTES_PER_NODE: f64 = 45.0;
 
 /// A ground with more nodes than fit.
-pub(crate) struct Crowd {
+pub(crate) struct TooMany {
     /// What it makes and needs.
     pub what: String,
     /// A spacing that fits, m.
     fits_m: f64,
 }
 
-impl Crowd {
+impl TooMany {
     /// The way out, and another one.
     pub fn help(&self, other: &str) -> String {
         format!("`spacing_m` = {} fits this size; or {other}", self.fits_m)
@@ -147,7 +147,7 @@ impl Crowd {
 }
 
 /// Whether a ground has more nodes than fit.
-pub(crate) fn too_many(size_m: [f64; 2], spacing_m: f64) -> Option<Crowd> {
+pub(crate) fn too_many(size_m: [f64; 2], spacing_m: f64) -> Option<TooMany> {
     let cells = size_m.map(|s| s / spacing_m);
     let nodes = (cells[0] + 1.0) * (cells[1] + 1.0);
     if nodes <= MOST_NODES && cells.iter().all(|n| *n < MOST_CELLS) {
@@ -165,7 +165,7 @@ pub(crate) fn too_many(size_m: [f64; 2], spacing_m: f64) -> Option<Crowd> {
             format!("{:.1e} GB of memory", bytes * 1e-9)
         }
     );
-    Some(Crowd { what, fits_m })
+    Some(TooMany { what, fits_m })
 }
 
 /// What helps where a scenario gives the size.
@@ -180,7 +180,7 @@ fn centred_lattice(spec: &TerrainSpec) -> Result<Lattice> {
     let sound = spec.spacing_m > 0.0 && cells.iter().all(|n| *n >= 1.0);
     let help = match too_many(spec.size_m, spec.spacing_m) {
         _ if !sound => "both are positive".to_owned(),
-        Some(crowd) => crowd.help(SMALLER),
+        Some(refused) => refused.help(SMALLER),
         None => return Ok(lattice_of(cells.map(|n| n as u32 + 1), spec.spacing_m)),
     };
     let message =

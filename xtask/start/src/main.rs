@@ -7,7 +7,7 @@ use xtask_start::Install;
 
 /// Developer commands.
 #[derive(Parser, Debug)]
-#[command(name = "cargo xtask", disable_help_subcommand = true)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask", disable_help_subcommand = true)]
 struct Arguments {
     #[command(subcommand)]
     command: Install,

@@ -53,9 +53,9 @@ pub trait Material: Send {
     /// The laws' parameters have changed.
     fn parameters_changed(&mut self, _ground: &Ground, _parameters: &SoilParameters) {}
     /// After the laws have taken a step of h seconds: puts the material where it belongs. `covered` are the nodes
-    /// below feet. `in_debt`: the feet have not paid yet for what the soil has taken up, so that nothing may be lifted. Returns
-    /// the gravitational energy that the material has gained, J; what it loses becomes heat.
-    fn settle(&mut self, ground: &mut Ground, covered: &[Covered], in_debt: bool, h: f64) -> f64;
+    /// below feet. `most` (J): the gravitational energy that the step can pay for; what would gain more waits. Returns the
+    /// gravitational energy that the material has gained, J; what it loses becomes heat.
+    fn settle(&mut self, ground: &mut Ground, covered: &[Covered], most: f64, h: f64) -> f64;
     /// Copies the state into `out`.
     fn save(&self, _out: &mut Self::Saved) {}
     /// Whether a saved state speaks of nodes of this ground only.
@@ -384,9 +384,9 @@ impl<M: Material> Subsystem for FieldSoil<M> {
         let scene = bookkeeping::Scene { patches: &self.patches, h: step.h };
         let heat = self.book.dissipated;
         scene.commit(step.ports, t, partner.x, &mut self.ground, &mut self.lists, &mut self.book);
-        let in_debt = self.book.owed > self.book.dissipated - heat;
-        let lifted = self.material.settle(&mut self.ground, &self.lists.covered, in_debt, step.h);
         // the prints in which bodies stand at the start were made before
+        let most = if prints { f64::INFINITY } else { self.book.dissipated - heat - self.book.owed };
+        let lifted = self.material.settle(&mut self.ground, &self.lists.covered, most, step.h);
         let lifted = if prints { 0.0 } else { lifted };
         self.book.lifted += lifted;
         self.book.pay(lifted, heat);

@@ -149,12 +149,15 @@ impl Automaton {
         self.weight = 0.5 * parameters.weight() * cell * cell;
     }
 
-    /// Moves what the feet have pressed out of their nodes to free ones; `in_debt`: it becomes denser instead.
-    fn displace(&mut self, ground: &mut Ground, covered: &[Covered], in_debt: bool) -> f64 {
+    /// Moves what the feet have pressed out of their nodes to free ones, as far as the sum of the squares of the heights may grow
+    /// by `most`: what does not go in this step waits in its node. Returns by how much it has grown.
+    fn displace(&mut self, ground: &mut Ground, covered: &[Covered], most: f64) -> f64 {
         let mut lifted = 0.0;
         for node in covered.iter().filter(|n| n.pressure > 0.0) {
             let before = ground.heights.units(node.i, node.j);
             let excess = before - nearest_unit(node.surface);
+            let around = (node.lower + node.depth) / UNIT_M;
+            let excess = excess.min(liftable(most - lifted, around - f64::from(before)));
             if excess <= 0 {
                 continue;
             }
@@ -164,7 +167,6 @@ impl Automaton {
                 feet: &sweeper.feet,
                 compaction: &mut self.compaction,
                 changed: &mut sweeper.changed,
-                in_debt,
                 lifted: 0,
             };
             let dense = site.compaction.total();
@@ -218,6 +220,13 @@ impl Automaton {
         }
         (self.credit, self.sweeper.counts.tallest) = (0.0, 0);
     }
+}
+
+/// How many units can go from a column to ground that is `higher` (units) until the sum of the squares of the heights has
+/// grown by `most`.
+fn liftable(most: f64, higher: f64) -> i32 {
+    // n² + 2 n higher = most; what is beyond the range of the integer ends at its largest
+    ((higher * higher + most.max(0.0)).sqrt() - higher) as i32
 }
 
 fn whole(number: f64) -> u32 {
@@ -294,7 +303,7 @@ impl Material for Automaton {
         self.rescan |= before != (self.friction_angle, self.critical_height);
     }
 
-    fn settle(&mut self, ground: &mut Ground, covered: &[Covered], in_debt: bool, h: f64) -> f64 {
+    fn settle(&mut self, ground: &mut Ground, covered: &[Covered], most: f64, h: f64) -> f64 {
         self.commits = self.commits.wrapping_add(1);
         (self.sweeper.counts.visited, self.sweeper.counts.sweeps) = (0, 0);
         if std::mem::take(&mut self.rescan) {
@@ -303,7 +312,9 @@ impl Material for Automaton {
         }
         let sweeper = &mut self.sweeper;
         sweeper.feet.take(ground, covered, &mut sweeper.changed);
-        let lifted = self.displace(ground, covered, in_debt);
+        // soil without weight is lifted for nothing
+        let most = if self.weight > 0.0 { most / self.weight } else { f64::INFINITY };
+        let lifted = self.displace(ground, covered, most);
         self.weight * (lifted + self.slide(ground, h))
     }
 

@@ -47,14 +47,13 @@ impl Compaction {
     }
 
     /// Books the compacted part of `excess` units at node (i, j) and returns it: over many calls the set fraction, however
-    /// little each of them brings. `all`: all of it becomes denser.
-    pub fn take(&mut self, [i, j]: [i32; 2], excess: i32, all: bool) -> i32 {
+    /// little each of them brings.
+    pub fn take(&mut self, [i, j]: [i32; 2], excess: i32) -> i32 {
         let held = i32::from(self.grains.get(i, j));
-        if !all && self.fraction <= 0.0 || held == i32::from(u16::MAX) {
+        if self.fraction <= 0.0 || held == i32::from(u16::MAX) {
             return 0;
         }
-        let fraction = if all { 1.0 } else { self.fraction };
-        let wanted = f64::from(excess) * fraction + self.carried;
+        let wanted = f64::from(excess) * self.fraction + self.carried;
         let most = (i32::from(u16::MAX) - held) * GRAIN - self.unplaced;
         let dense = (wanted as i32).min(excess).min(most).max(0);
         // a node that cannot take more hands over no more than a unit
@@ -111,7 +110,7 @@ mod tests {
             for (i, excess) in pressed {
                 // a foot that sinks slowly brings less than a grain at a time
                 let excess = (excess / slow).max(1);
-                let dense = compaction.take([i, 0], excess, false);
+                let dense = compaction.take([i, 0], excess);
                 prop_assert!(dense >= 0 && dense <= excess);
                 (taken, all) = (taken + dense, all + excess);
             }
@@ -126,9 +125,9 @@ mod tests {
     fn a_node_that_is_full_takes_no_more() {
         let lattice = Lattice { origin: [0.0; 2], spacing: 0.01, size: [2, 1] };
         let mut compaction = Compaction::new(lattice, 1.0);
-        let taken: i64 = (0..3000).map(|_| i64::from(compaction.take([0, 0], 1000, false))).sum();
+        let taken: i64 = (0..3000).map(|_| i64::from(compaction.take([0, 0], 1000))).sum();
         let full = i64::from(u16::MAX) * i64::from(GRAIN);
         assert!((full - i64::from(GRAIN)..=full).contains(&taken), "{taken} of {full}");
-        assert_eq!((compaction.take([0, 0], 1000, false), compaction.take([1, 0], 7, false)), (0, 7));
+        assert_eq!((compaction.take([0, 0], 1000), compaction.take([1, 0], 7)), (0, 7));
     }
 }

@@ -28,8 +28,6 @@ pub struct Site<'a> {
     pub compaction: &'a mut Compaction,
     /// Nodes that have changed.
     pub changed: &'a mut Marks,
-    /// Whether nothing is lifted: all that is pressed out becomes denser.
-    pub in_debt: bool,
     /// By how much the sum of the squares of the heights has grown.
     pub lifted: i64,
 }
@@ -39,7 +37,7 @@ impl Site<'_> {
     /// a foot in eight directions d, weighted with (1 + flow·d)₊/distance². Returns how many units were moved; those without a
     /// place stay and are tried again at the next commit. `turn` rotates the direction that gets what cannot be split.
     pub fn displace(&mut self, [i, j]: [i32; 2], excess: i32, flow: [f64; 2], turn: u32) -> i32 {
-        let dense = self.compaction.take([i, j], excess, self.in_debt);
+        let dense = self.compaction.take([i, j], excess);
         let loose = excess - dense;
         let mut places = [None; 8];
         let mut sum = 0.0;

@@ -156,8 +156,6 @@ impl Automaton {
         for node in covered.iter().filter(|n| n.pressure > 0.0) {
             let before = ground.heights.units(node.i, node.j);
             let excess = before - nearest_unit(node.surface);
-            let around = (node.lower + node.depth) / UNIT_M;
-            let excess = excess.min(liftable(most - lifted, around - f64::from(before)));
             if excess <= 0 {
                 continue;
             }
@@ -167,6 +165,7 @@ impl Automaton {
                 feet: &sweeper.feet,
                 compaction: &mut self.compaction,
                 changed: &mut sweeper.changed,
+                most: most - lifted,
                 lifted: 0,
             };
             let dense = site.compaction.total();
@@ -220,13 +219,6 @@ impl Automaton {
         }
         (self.credit, self.sweeper.counts.tallest) = (0.0, 0);
     }
-}
-
-/// How many units can go from a column to ground that is `higher` (units) until the sum of the squares of the heights has
-/// grown by `most`.
-fn liftable(most: f64, higher: f64) -> i32 {
-    // n² + 2 n higher = most; what is beyond the range of the integer ends at its largest
-    ((higher * higher + most.max(0.0)).sqrt() - higher) as i32
 }
 
 fn whole(number: f64) -> u32 {

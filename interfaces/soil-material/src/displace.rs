@@ -18,6 +18,9 @@ const DIRECTIONS: [([i32; 2], i32); 8] = [
     ([1, -1], 2),
 ];
 
+/// A node without a foot, and its weight among the eight.
+type Place = ([i32; 2], f64);
+
 /// What displacement changes.
 pub struct Site<'a> {
     /// Ground.
@@ -28,17 +31,17 @@ pub struct Site<'a> {
     pub compaction: &'a mut Compaction,
     /// Nodes that have changed.
     pub changed: &'a mut Marks,
-    /// By how much the sum of the squares of the heights has grown.
+    /// By how much the sum of the squares of the heights may grow.
+    pub most: f64,
+    /// By how much it has grown.
     pub lifted: i64,
 }
 
 impl Site<'_> {
     /// Takes `excess` units out of the loaded node (i, j): its compacted part, and the rest to the nearest nodes without
     /// a foot in eight directions d, weighted with (1 + flow·d)₊/distance². Returns how many units were moved; those without a
-    /// place stay and are tried again at the next commit. `turn` rotates the direction that gets what cannot be split.
+    /// place, and those whose lifting is not paid for yet, stay and are tried again at the next commit. `turn` rotates the direction that gets what cannot be split.
     pub fn displace(&mut self, [i, j]: [i32; 2], excess: i32, flow: [f64; 2], turn: u32) -> i32 {
-        let dense = self.compaction.take([i, j], excess);
-        let loose = excess - dense;
         let mut places = [None; 8];
         let mut sum = 0.0;
         for (place, (direction, squared)) in places.iter_mut().zip(DIRECTIONS) {
@@ -50,6 +53,12 @@ impl Site<'_> {
                 (at, weight)
             });
         }
+        let excess = excess.min(self.liftable([i, j], &places, sum));
+        if excess <= 0 {
+            return 0;
+        }
+        let dense = self.compaction.take([i, j], excess);
+        let loose = excess - dense;
         let mut left = loose;
         if sum == 0.0 {
             let any = places.iter().flatten().map(|(at, _)| *at).next();
@@ -74,6 +83,20 @@ impl Site<'_> {
             self.lifted += all - all / i64::from(gone) * i64::from(dense);
         }
         loose - left
+    }
+
+    /// How many units can go from a node to its places until the sum of the squares of the heights has grown by the most.
+    fn liftable(&self, [i, j]: [i32; 2], places: &[Option<Place>; 8], sum: f64) -> i32 {
+        let heights = &self.ground.heights;
+        let (mut higher, mut spread) = (0.0, 1.0);
+        for ([a, b], weight) in places.iter().flatten().filter(|_| sum > 0.0) {
+            let share = weight / sum;
+            higher += share * f64::from(heights.units(*a, *b) - heights.units(i, j));
+            spread += share * share;
+        }
+        // what becomes denser is not lifted: spread·n² + 2·higher·n = most of the rest
+        let most = self.most.max(0.0) / (1.0 - self.compaction.fraction()).max(f64::MIN_POSITIVE);
+        (((higher * higher + spread * most).sqrt() - higher) / spread) as i32
     }
 
     fn free(&self, at: [i32; 2]) -> bool {

@@ -1,7 +1,8 @@
-//! The developer commands, the same as in CI: `cargo xtask test | docs | validate | faults | header | schema | install | dist`.
+//! The developer commands, the same as in CI: `cargo xtask test | docs | validate | freeze | faults | header | schema | install | dist`.
 
 mod docs;
 mod faults;
+mod freeze;
 mod header;
 mod process;
 mod schema;
@@ -29,6 +30,8 @@ enum Command {
     Docs,
     /// Measure the figures that the areas promise and hold them against their limits.
     Validate(validate::Arguments),
+    /// Write hashes of all decoded numbers to tests/freeze.tsv, or hold the numbers against them with --check.
+    Freeze(freeze::Arguments),
     /// Run the fault scenarios and write the tables and the picture of docs/faults.md (some minutes).
     Faults,
     /// Write interfaces/plugin/include/terraglue.h from the Rust definitions of the C ABI.
@@ -61,6 +64,7 @@ fn main() -> ExitCode {
         Command::Test => test::test(),
         Command::Validate(arguments) => validate::validate(&arguments),
         Command::Docs => docs::write_all(),
+        Command::Freeze(arguments) => freeze::freeze(&arguments),
         Command::Faults => faults::write_page(),
         Command::Header { check } => header::run(check),
         Command::Pictures => docs::pictures(),

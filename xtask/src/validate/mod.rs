@@ -80,6 +80,16 @@ pub struct Context {
     pub part: Option<String>,
 }
 
+impl Context {
+    /// What measures with the program of a profile; clocks are read in the release profile only.
+    fn new(profile: &str) -> Self {
+        let scratch = crate::process::target().join("validate");
+        let _ = std::fs::remove_dir_all(&scratch);
+        let timing = profile == "release";
+        Self { program: program(profile), timing, quick: false, scratch, table: None, part: None }
+    }
+}
+
 /// A part of an area: its name, and what measures it.
 type Part = (&'static str, fn(&Context) -> Outcome<Vec<Figure>>);
 
@@ -115,31 +125,16 @@ pub fn validate(arguments: &Arguments) -> Outcome {
     if arguments.table.is_none() {
         must(cargo(build).args(["--package", "terraglue", "--package", "terraglue-unit"]))?;
     }
-    let scratch = crate::process::target().join("validate");
-    let _ = std::fs::remove_dir_all(&scratch);
-    let context = Context {
-        program: program(profile),
-        timing: !no_timing,
-        quick: arguments.quick,
-        scratch,
-        table: arguments.table.clone(),
-        part: arguments.table.as_ref().map(|_| "values".to_owned()).or_else(|| arguments.part.clone()),
-    };
+    let part = arguments.table.as_ref().map(|_| "values".to_owned()).or_else(|| arguments.part.clone());
+    let table = arguments.table.clone();
+    let context = Context { quick: arguments.quick, table, part, ..Context::new(profile) };
     let mut known = KnownFailures::read(&root().join("tests/known-failures.tsv"))?;
     let mut complaints = Vec::new();
     for (area, parts) in areas() {
-        let mut figures = Vec::new();
-        for (part, measure) in chosen(parts, context.part.as_deref())? {
-            if std::io::stderr().is_terminal() {
-                eprintln!("measuring {area}: {part}");
-            }
-            let measured = measure(&context)?;
-            for figure in &measured {
-                println!("{}", figure.line());
-                complaints.extend(known.judge(figure));
-            }
-            figures.extend(measured);
-        }
+        let figures = measured(area, parts, &context, |figure| {
+            println!("{}", figure.line());
+            complaints.extend(known.judge(figure));
+        })?;
         if arguments.write_docs && context.table.is_none() && context.part.is_none() {
             documents::write_area(area, &figures)?;
         }
@@ -148,6 +143,32 @@ pub fn validate(arguments: &Arguments) -> Outcome {
         }
     }
     if complaints.is_empty() { Ok(()) } else { Err(complaints.join("\n       ")) }
+}
+
+/// The figures of the parts of an area that were asked for; each is shown as soon as it is there.
+fn measured(
+    area: &str,
+    parts: &[Part],
+    context: &Context,
+    mut show: impl FnMut(&Figure),
+) -> Outcome<Vec<Figure>> {
+    let mut figures = Vec::new();
+    for (part, measure) in chosen(parts, context.part.as_deref())? {
+        if std::io::stderr().is_terminal() {
+            eprintln!("measuring {area}: {part}");
+        }
+        let of_part = measure(context)?;
+        of_part.iter().for_each(&mut show);
+        figures.extend(of_part);
+    }
+    Ok(figures)
+}
+
+/// All figures of `--quick --no-timing`, with the program of the development profile, which is built.
+pub fn quick_figures() -> Outcome<Vec<Figure>> {
+    let context = Context { quick: true, ..Context::new("debug") };
+    let areas = AREAS.iter().map(|(area, parts)| measured(area, parts, &context, |_| ()));
+    Ok(areas.collect::<Outcome<Vec<_>>>()?.into_iter().flatten().collect())
 }
 
 /// The parts to measure: all, or the one that was asked for.

@@ -1,0 +1,87 @@
+//! `cargo xtask freeze`: hashes of the decoded numbers of all scenarios, of exported FMUs and of the quick figures.
+//!
+//! Code that is moved, split, renamed or deleted must leave every number equal to the bit; a change of physics or of
+//! numerics writes the file anew in a commit of its own that says so. Scenario texts, metadata and timings do not
+//! count. Numbers are equal on one kind of processor only, so CI does not check them.
+
+mod digest;
+mod exported;
+mod runs;
+
+use crate::process::{Outcome, cargo, must, program, read, root, target, write};
+use crate::validate;
+use std::collections::BTreeMap;
+use std::path::{Path, PathBuf};
+
+/// What `cargo xtask freeze` is asked for.
+#[derive(clap::Args, Debug)]
+pub struct Arguments {
+    /// Change nothing; fail where a number differs.
+    #[arg(long)]
+    check: bool,
+    /// Leave the quick figures out (they take most of the time).
+    #[arg(long)]
+    no_figures: bool,
+}
+
+/// Hash by name, e.g. `run.moon_walk.soil-bekker.iterative.energy`.
+pub type Hashes = BTreeMap<String, String>;
+
+fn file() -> PathBuf {
+    root().join("tests/freeze.tsv")
+}
+
+/// Measures; then writes `tests/freeze.tsv`, or compares with it.
+pub fn freeze(arguments: &Arguments) -> Outcome {
+    must(cargo(&["build"]).args(["--package", "terraglue", "--package", "terraglue-unit"]))?;
+    let program = program("debug");
+    let scratch = target().join("freeze");
+    let mut found = runs::hashes(&program, &scratch)?;
+    found.extend(exported::hashes(&program, &scratch)?);
+    if !arguments.no_figures {
+        found.extend(figures()?);
+    }
+    if arguments.check { compare(&found, arguments.no_figures) } else { store(&found, arguments.no_figures) }
+}
+
+fn figures() -> Outcome<Hashes> {
+    let figures = validate::quick_figures()?;
+    let bits = |value: Option<f64>| value.map_or("-".to_owned(), |x| format!("{:016x}", x.to_bits()));
+    Ok(figures.into_iter().map(|f| (format!("figure.{}", f.id), bits(f.value))).collect())
+}
+
+fn stored(path: &Path) -> Outcome<Hashes> {
+    let text = read(path)?;
+    Ok(text
+        .lines()
+        .filter_map(|line| line.split_once('\t'))
+        .map(|(name, hash)| (name.to_owned(), hash.to_owned()))
+        .collect())
+}
+
+fn is_figure(name: &str) -> bool {
+    name.starts_with("figure.")
+}
+
+fn store(found: &Hashes, keep_figures: bool) -> Outcome {
+    let mut all = found.clone();
+    if keep_figures && file().is_file() {
+        all.extend(stored(&file())?.into_iter().filter(|(name, _)| is_figure(name)));
+    }
+    let lines: String = all.iter().map(|(name, hash)| format!("{name}\t{hash}\n")).collect();
+    write(&file(), &lines)
+}
+
+fn compare(found: &Hashes, without_figures: bool) -> Outcome {
+    let mut wanted = stored(&file())?;
+    wanted.retain(|name, _| !(without_figures && is_figure(name)));
+    let names: std::collections::BTreeSet<&String> = wanted.keys().chain(found.keys()).collect();
+    let total = names.len();
+    let changed: Vec<&str> =
+        names.into_iter().filter(|n| wanted.get(*n) != found.get(*n)).map(String::as_str).collect();
+    println!("{} of {total} hashes are equal", total - changed.len());
+    match changed.is_empty() {
+        true => Ok(()),
+        false => Err(format!("numbers differ from tests/freeze.tsv:\n       {}", changed.join("\n       "))),
+    }
+}

@@ -1,27 +1,33 @@
 //! Glues subsystems into one simulation of a whole mission.
 //!
-//! [`Testbed`] is the entry: `build` a [`scenario::Scenario`], `step` it, look at it through an
-//! [`observer::Observer`]. Several live side by side in one process; there are no globals.
+//! [`Testbed`] is the entry: `build_with` a [`scenario::Scenario`] and the modules of [`library`], `step` it, look at it
+//! through an [`observer::Observer`]. Several live side by side in one process; there are no globals.
+//!
+//! Each part is a crate of its own below `coordinator/`; this one gives them one name. Without the feature `program`
+//! neither the command line nor recordings nor the checker are compiled.
 
-pub mod check_module;
-pub mod checkpoint;
-pub mod contact;
-pub mod error;
-pub mod fmu;
-pub mod gluing;
-pub mod host;
-pub mod observer;
-pub mod recording;
-pub mod reload;
-mod rotation;
-pub mod scaffold;
-pub mod scenario;
-pub mod signals;
-pub mod soil_fit;
-pub mod terrain;
-pub mod testbed;
-pub mod timing;
+pub use terraglue_diagnostics::{Error, Result};
+pub use terraglue_engine::Testbed;
+pub use terraglue_fmu::library;
 
-pub use error::{Error, Result};
+pub use terraglue_diagnostics as diagnostics;
+pub use terraglue_engine::{observer, signals, testbed};
+pub use terraglue_fmu as fmu;
+pub use terraglue_gluing::{self as gluing, contact, timing};
+pub use terraglue_host as host;
+pub use terraglue_scenario as scenario;
 pub use terraglue_subsystem as subsystem;
-pub use testbed::Testbed;
+pub use terraglue_terrain as terrain;
+
+#[cfg(feature = "program")]
+pub use terraglue_checkpoint as checkpoint;
+#[cfg(feature = "program")]
+pub use terraglue_conformance as conformance;
+#[cfg(feature = "program")]
+pub use terraglue_recording as recording;
+#[cfg(feature = "program")]
+pub use terraglue_reload as reload;
+#[cfg(feature = "program")]
+pub use terraglue_scaffold as scaffold;
+#[cfg(feature = "program")]
+pub use terraglue_soil_fit as soil_fit;

@@ -1,7 +1,5 @@
-//! The program `terraglue`: arguments in, tables and files out. The simulation is in the library.
-
-mod cli;
+//! The program `terraglue`: arguments in, tables and files out.
 
 fn main() -> std::process::ExitCode {
-    cli::main()
+    terraglue_cli::main()
 }

@@ -54,6 +54,22 @@ pub struct ModelDescription {
     pub problems: Vec<String>,
 }
 
+impl ModelDescription {
+    /// The unit of a variable: its name where our own reading of it agrees with the description's definition, or else the
+    /// definition in SI symbols with factor and offset. Empty where the unit is not defined, so that no connection
+    /// converts by a guess.
+    pub fn unit_of(&self, variable: &Variable) -> String {
+        let Some(name) = &variable.unit else { return String::new() };
+        let theirs = self.units.iter().find(|(n, _)| n == name).map(|(_, unit)| *unit);
+        match (Unit::parse(name), theirs) {
+            (Ok(ours), Some(theirs)) if ours == theirs => name.clone(),
+            (_, Some(theirs)) => theirs.to_string(),
+            (Ok(_), None) => name.clone(),
+            (Err(_), None) => String::new(),
+        }
+    }
+}
+
 /// What a unit can do.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Capabilities {

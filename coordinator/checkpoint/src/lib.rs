@@ -1,0 +1,258 @@
+//! A run that goes on after it was ended from outside: its whole state in one file beside the recording.
+//!
+//! [`Keeper`] writes `checkpoint.bin` while a run goes on; the file is always that of one whole state. [`Checkpoint::read`]
+//! takes it up again in another process: the same scenario, the same files and modules, and then the same bytes as those of
+//! a run that nothing has ended.
+
+mod origin;
+
+use origin::Origin;
+use std::fs::File;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+use terraglue_diagnostics::{Error, Result};
+use terraglue_engine::testbed::{Options, Testbed};
+use terraglue_host::Instance;
+use terraglue_recording::{
+    CHECKPOINT, RECORDING, Recorder, RecorderOptions, RecorderState, SUMMARY, TimingRow, VARIABLES, at,
+};
+use terraglue_scenario::{InputError, Scenario};
+use terraglue_subsystem::bytes::{self, Block};
+use terraglue_subsystem::{Capabilities, persist};
+
+/// Version of the program with the commit that it is built from: a run goes on in the same version only.
+pub const VERSION: &str = env!("TERRAGLUE_VERSION");
+
+/// Version of the form of the file.
+const FORM: u32 = 1;
+/// Mark of the file: other states are sealed in the same way.
+const MARK: u64 = 0x7275_6e00;
+
+/// The state of a run at a communication point.
+pub struct Checkpoint {
+    origin: Origin,
+    /// Simulated time between checkpoints, s.
+    every_s: f64,
+    csv: bool,
+    t_s: f64,
+    /// What a clock measured up to here.
+    timing: Vec<TimingRow>,
+    testbed: Block,
+    recorder: RecorderState,
+}
+persist!(Checkpoint { origin, every_s, csv, t_s, timing, testbed, recorder });
+persist!(TimingRow { section, wall_s, cpu_s, steps });
+
+/// Where a run that was taken up again stood.
+pub struct Resumed {
+    /// What a clock measured before.
+    pub timing: Vec<TimingRow>,
+    options: RecorderOptions,
+    recorder: RecorderState,
+}
+
+impl Checkpoint {
+    /// The checkpoint of a results folder.
+    ///
+    /// # Errors
+    /// [`Error::Input`]: there is none, or it is of another version or damaged.
+    pub fn read(folder: &Path) -> Result<Self> {
+        let path = folder.join(CHECKPOINT);
+        if !path.exists() {
+            return Err(nothing(folder));
+        }
+        let all = std::fs::read(&path).map_err(at(&path))?;
+        bytes::open(FORM, MARK, &all).map_err(|_| {
+            let message = format!("`{}` is damaged, or of another version of terraglue", path.display());
+            let help = "it was written whole: go on with the program that wrote it, or start the run anew";
+            InputError::plain(message, Some(help.into())).into()
+        })
+    }
+
+    /// Simulated time between checkpoints, s, and whether the run writes `variables.csv`.
+    pub fn kept(&self) -> (f64, bool) {
+        (self.every_s, self.csv)
+    }
+
+    /// The scenario of the run, with its edits.
+    ///
+    /// # Errors
+    /// A file that it names is gone, e.g. that of a system structure.
+    pub fn scenario(&self) -> Result<Scenario> {
+        self.origin.scenario()
+    }
+
+    /// Folders that the run searched for modules.
+    pub fn module_paths(&self) -> Vec<PathBuf> {
+        self.origin.module_paths()
+    }
+
+    /// Refuses to go on with other files or modules than those of the run; another build of the same version is warned of.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with what differs.
+    pub fn check(&self, scenario: &Scenario, options: &Options) -> Result {
+        self.origin.check(scenario, options)
+    }
+
+    /// Puts a testbed of the same scenario where the run was.
+    ///
+    /// # Errors
+    /// A module that does not take its state.
+    pub fn restore(self, testbed: &mut Testbed) -> Result<Resumed> {
+        testbed.deserialize(&self.testbed.0)?;
+        let options = RecorderOptions { csv: self.csv, checkpoints: true };
+        Ok(Resumed { timing: self.timing, options, recorder: self.recorder })
+    }
+}
+
+/// Why there is nothing to go on from.
+fn nothing(folder: &Path) -> Error {
+    let shown = folder.display();
+    let summary = std::fs::read(folder.join(SUMMARY)).unwrap_or_default();
+    let summary: serde_json::Value = serde_json::from_slice(&summary).unwrap_or_default();
+    let done = summary["status"] == "done";
+    let (message, help) = match done {
+        true => (
+            format!("the run in `{shown}` reached its end: there is nothing to go on with"),
+            "a longer run starts anew, with --duration",
+        ),
+        false => (
+            format!("`{shown}` holds no checkpoint"),
+            "name the folder of a run that was started with --checkpoint-every and has come so far",
+        ),
+    };
+    InputError::plain(message, Some(help.into())).into()
+}
+
+impl Resumed {
+    /// The recorder as it was, in the folder of the run.
+    ///
+    /// # Errors
+    /// Files of the recording that are not as the run has left them.
+    pub fn recorder(self, folder: &Path, scenario: &Scenario, testbed: &Testbed) -> Result<Recorder> {
+        testbed.view(|view| Recorder::resume(folder, scenario, self.options, view, self.recorder))
+    }
+}
+
+/// Writes the checkpoints of a run.
+pub struct Keeper {
+    path: PathBuf,
+    origin: Origin,
+    every_s: f64,
+    csv: bool,
+    /// Time of the last checkpoint that was written, s.
+    written_s: Option<f64>,
+}
+
+impl Keeper {
+    /// For a run into `folder` with a checkpoint every so many seconds of simulation.
+    ///
+    /// # Errors
+    /// [`Error::Input`] with all subsystems that cannot save their state.
+    pub fn new(
+        folder: &Path,
+        scenario: &Scenario,
+        options: &Options,
+        (every_s, csv): (f64, bool),
+    ) -> Result<Self> {
+        let origin = Origin::of(scenario, options)?;
+        Ok(Self { path: folder.join(CHECKPOINT), origin, every_s, csv, written_s: None })
+    }
+
+    /// The time of the next checkpoint after t, s.
+    pub fn next_s(&self, t_s: f64) -> f64 {
+        let count = (t_s / self.every_s * (1.0 + 1e-9)).floor() + 1.0;
+        count * self.every_s
+    }
+
+    /// Writes the state of now in place of the checkpoint before. Where there is no room for it, that one stays, and a
+    /// warning says so.
+    ///
+    /// # Errors
+    /// A module that does not give its state.
+    pub fn keep(&mut self, testbed: &Testbed, recorder: &mut Recorder, timing: Vec<TimingRow>) -> Result {
+        let state = Checkpoint {
+            origin: self.origin.clone(),
+            every_s: self.every_s,
+            csv: self.csv,
+            t_s: testbed.t_s(),
+            timing,
+            testbed: Block(testbed.serialize()?),
+            recorder: testbed.view(|view| recorder.state(view))?,
+        };
+        let lasting = self.sync_recording();
+        match lasting.and_then(|()| replace(&self.path, &bytes::seal(FORM, MARK, &state))) {
+            Ok(()) => self.written_s = Some(state.t_s),
+            Err(e) => {
+                let left = self.written_s.map_or_else(String::new, |t| format!("; that of t = {t} s stays"));
+                log::warn!("{}: no checkpoint at t = {} s: {e}{left}", self.path.display(), state.t_s);
+            }
+        }
+        Ok(())
+    }
+
+    /// What the checkpoint speaks of is on the disk before it is, also where the power fails.
+    fn sync_recording(&self) -> std::io::Result<()> {
+        let files = if self.csv { &[RECORDING, VARIABLES][..] } else { &[RECORDING] };
+        files.iter().try_for_each(|name| File::open(self.path.with_file_name(name))?.sync_data())
+    }
+
+    /// A run that has reached its end needs none.
+    pub fn remove(&self) {
+        if let Err(e) = std::fs::remove_file(&self.path)
+            && e.kind() != std::io::ErrorKind::NotFound
+        {
+            log::warn!("{}: {e}", self.path.display());
+        }
+    }
+}
+
+/// Writes a file beside `path` and puts it in its place: at any moment there is one whole file.
+fn replace(path: &Path, content: &[u8]) -> std::io::Result<()> {
+    let part = path.with_extension("part");
+    let written = File::create(&part).and_then(|mut file| {
+        file.write_all(content)?;
+        file.sync_data()
+    });
+    let replaced = written.and_then(|()| std::fs::rename(&part, path));
+    // a part of it is of no use
+    replaced.inspect_err(|_| drop(std::fs::remove_file(&part)))
+}
+
+/// Refuses a run whose state cannot be kept.
+///
+/// # Errors
+/// [`Error::Input`] with all subsystems that cannot save their state.
+pub fn require_states(testbed: &Testbed) -> Result {
+    let cannot = |i: &&Instance| !i.capabilities().has(Capabilities::SERIALIZE);
+    let name = |i: &Instance| format!("`{}` ({})", i.name(), i.module());
+    let names: Vec<String> = testbed.instances().iter().filter(cannot).map(name).collect();
+    let their = match names.len() {
+        0 => return Ok(()),
+        1 => "its state",
+        _ => "their states",
+    };
+    let message = format!("--checkpoint-every: {} cannot save {their} as bytes", names.join(", "));
+    let help = "leave the option out; a unit needs `canSerializeFMUState`, a module in Python `self.state`, another one \
+                `serialize` and `deserialize`";
+    Err(InputError::plain(message, Some(help.into())).into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_file_is_replaced_whole_or_stays() {
+        let folder = tempfile::tempdir().expect("folder");
+        let path = folder.path().join("checkpoint.bin");
+        replace(&path, b"first").expect("written");
+        replace(&path, b"second").expect("written");
+        assert_eq!(std::fs::read(&path).expect("there"), b"second");
+        // the part cannot be created: a folder stands in its place
+        std::fs::create_dir(path.with_extension("part")).expect("made");
+        assert!(replace(&path, b"third").is_err());
+        assert_eq!(std::fs::read(&path).expect("there"), b"second");
+    }
+}

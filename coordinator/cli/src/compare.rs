@@ -1,0 +1,209 @@
+//! `terraglue compare`: the product of strategies, soils and other keys, each run in a folder of its own.
+
+mod plan;
+
+use super::arguments::{CompareArguments, RunArguments};
+use super::folder::results_folder;
+use super::interrupt::Interrupt;
+use super::output::outln;
+use super::progress::{self, Progress, Waiting};
+use super::{Exit, logger, run};
+use indicatif::ProgressBar;
+use plan::Plan;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Arc, Mutex};
+use terraglue_diagnostics::{Error, Result};
+use terraglue_engine::observer::Observer;
+use terraglue_recording as recording;
+use terraglue_recording::compare::{self, COMPARE_JSON, COMPARE_PAGE, CompareRow};
+use terraglue_recording::{Status, SummaryObserver};
+use terraglue_scenario::keys::STRATEGIES;
+
+/// Runs all combinations and writes the comparison.
+pub fn compare(arguments: &CompareArguments) -> Result<Exit> {
+    let interrupt = Interrupt::listen();
+    let cancel = interrupt.flag();
+    let warnings = logger::collect();
+    let mut plans = plan::plan(arguments)?;
+    let loading = Waiting::loading(arguments.run.quiet);
+    plan::refuse(&mut plans, &arguments.run, &cancel)?;
+    drop(loading);
+    warnings.tell();
+    let name = plans.first().map_or_else(String::new, |p| p.scenario.name.clone());
+    interrupt.run();
+    // apart from that of `run`, whose results it would rename
+    let folder = results_folder(arguments.run.out.as_deref(), &format!("{name}-compare"))?;
+    for k in 0..plans.len() {
+        let name = folder_name(&plans[k].row);
+        let taken = |name: &str| plans[..k].iter().any(|p| p.folder.ends_with(name));
+        let numbered = (2..).map(|n| format!("{name}_{n}"));
+        let free = std::iter::once(name.clone()).chain(numbered).find(|name| !taken(name));
+        plans[k].folder = folder.join(free.unwrap_or(name));
+    }
+    let bar = progress::bar(plans.iter().map(Plan::steps).sum(), arguments.run.quiet);
+    let mut rows = run_all(&plans, &arguments.run, &cancel, &bar);
+    bar.finish_and_clear();
+    warnings.tell();
+    judge(&mut rows, arguments)?;
+    compare::write(&folder, &rows)?;
+    print(arguments, &folder, &rows)?;
+    Ok(if cancel.load(Ordering::Relaxed) { Exit::Interrupted } else { exit(&rows) })
+}
+
+/// Rows that failed are data, as long as one reached its end and every reference did.
+fn exit(rows: &[CompareRow]) -> Exit {
+    let lost = rows.iter().filter(|r| r.is_reference && r.failure().is_some());
+    let lost: Vec<String> = lost.map(CompareRow::name).collect();
+    for name in &lost {
+        eprintln!("error: {name} did not reach its end: the rows of its soil have no error against it");
+    }
+    let reached = rows.iter().any(|r| !r.is_reference && r.failure().is_none());
+    if !reached {
+        eprintln!("error: no run reached its end; each row says why");
+    }
+    if reached && lost.is_empty() { Exit::Done } else { Exit::Failed }
+}
+
+/// The errors of all rows against the reference, where there is one.
+fn judge(rows: &mut [CompareRow], arguments: &CompareArguments) -> Result {
+    let Some(reference) = &arguments.reference else { return Ok(()) };
+    if !STRATEGIES.contains(&reference.as_str()) {
+        return compare::judge(rows, None, Path::new(reference));
+    }
+    let runs = rows.iter().filter(|r| r.is_reference && r.failure().is_none()).cloned();
+    let runs: Vec<(CompareRow, PathBuf)> = runs.filter_map(|r| Some((r.clone(), r.folder?))).collect();
+    runs.iter().try_for_each(|(run, folder)| compare::judge(rows, Some(run), folder))
+}
+
+/// Longest part of the name of a folder that a value takes.
+const LONGEST_VALUE: usize = 40;
+
+/// What the folder of a run is called.
+fn folder_name(row: &CompareRow) -> String {
+    let reference = if row.is_reference { "reference_" } else { "" };
+    let soil = if row.soil.is_empty() { String::new() } else { format!("_{}", file_name(&row.soil)) };
+    let plain = |c: char| if c.is_alphanumeric() || matches!(c, '.' | '-' | '_') { c } else { '-' };
+    let value =
+        |value: &String| value.trim_matches('"').chars().take(LONGEST_VALUE).map(plain).collect::<String>();
+    let varied: String = row.varied.iter().map(|(_, v)| format!("_{}", value(v))).collect();
+    let step = if row.name_step { format!("_{}s", row.step_s) } else { String::new() };
+    format!("{reference}{}{soil}{varied}{step}", row.strategy)
+}
+
+/// A module's name without what a folder name may not hold.
+fn file_name(module: &str) -> String {
+    Path::new(module).file_stem().map(|s| s.to_string_lossy().into_owned()).unwrap_or_default()
+}
+
+/// Runs the rows on as many threads as there are cores; their order stays.
+fn run_all(
+    plans: &[Plan],
+    arguments: &RunArguments,
+    cancel: &Arc<AtomicBool>,
+    bar: &ProgressBar,
+) -> Vec<CompareRow> {
+    let cores = std::thread::available_parallelism().map_or(1, usize::from);
+    let workers = (cores / arguments.threads.max(1)).clamp(1, plans.len().max(1));
+    let next = Mutex::new(plans.iter().enumerate());
+    let done = Mutex::new(Vec::new());
+    std::thread::scope(|scope| {
+        for _ in 0..workers {
+            scope.spawn(|| {
+                // A poisoned lock means that another row panicked; its row is missing, the others go on.
+                while let Some((i, plan)) = next.lock().ok().and_then(|mut n| n.next()) {
+                    let row = run_one(plan, arguments, cancel, bar);
+                    if let Ok(mut done) = done.lock() {
+                        done.push((i, row));
+                    }
+                }
+            });
+        }
+    });
+    let mut rows = done.into_inner().unwrap_or_default();
+    rows.sort_by_key(|(i, _)| *i);
+    rows.into_iter().map(|(_, row)| row).collect()
+}
+
+fn run_one(plan: &Plan, arguments: &RunArguments, cancel: &Arc<AtomicBool>, bar: &ProgressBar) -> CompareRow {
+    let mut row = plan.row.clone();
+    let _said = logger::of_run(&plan.name);
+    if plan.refused.is_some() {
+        row.error.clone_from(&plan.refused);
+        return row;
+    }
+    if cancel.load(Ordering::Relaxed) {
+        row.error = Some("not started: interrupted".into());
+        return row;
+    }
+    match recorded(plan, arguments, cancel, bar) {
+        Ok(outcome) => {
+            row.error = outcome.error.map(|e| e.to_string());
+            row.summary = Some(outcome.summary);
+            row.folder = Some(plan.folder.clone());
+            row.parts_s = Some(outcome.parts_s);
+        }
+        Err(e) => row.error = Some(e.to_string()),
+    }
+    if row.error.is_none() && plan.has_cold_start() && !cancel.load(Ordering::Relaxed) {
+        row.cold_start_mean = cold_start_mean(plan, arguments, cancel, bar);
+    }
+    row
+}
+
+fn recorded(
+    plan: &Plan,
+    arguments: &RunArguments,
+    cancel: &Arc<AtomicBool>,
+    bar: &ProgressBar,
+) -> Result<run::Outcome> {
+    let options = run::options(arguments, cancel);
+    let testbed = run::build(&plan.scenario, &options)?;
+    let label = format!("{} on {}: ", plan.row.strategy, file_name(&plan.row.soil));
+    let waiting = Waiting::standing(arguments.quiet, bar, options.standing);
+    let mut progress = Progress::new(bar.clone(), plan.scenario.time.duration_s, &label).after(waiting);
+    let records = run::Records {
+        scenario: &plan.scenario,
+        folder: &plan.folder,
+        csv: arguments.csv,
+        keeper: None,
+        resumed: None,
+    };
+    let outcome = run::run_testbed(testbed, None, records, &mut progress)?;
+    recording::report::write(&plan.folder)?;
+    Ok(outcome)
+}
+
+/// Mean evaluations of the soils of the same run when the iteration starts from zero; none where that fails.
+fn cold_start_mean(
+    plan: &Plan,
+    arguments: &RunArguments,
+    cancel: &Arc<AtomicBool>,
+    bar: &ProgressBar,
+) -> Option<f64> {
+    let mut scenario = plan.scenario.clone();
+    scenario.gluing.start = "zero".into();
+    let mut testbed = run::build(&scenario, &run::options(arguments, cancel)).ok()?;
+    let mut progress = Progress::new(bar.clone(), scenario.time.duration_s, "without the estimate: ");
+    let mut figures = SummaryObserver::new(&scenario);
+    testbed.begin().ok()?;
+    testbed.view(|view| figures.started(view)).ok()?;
+    testbed.run_until(scenario.time.duration_s, &mut [&mut figures, &mut progress]).ok()?;
+    testbed.view(|view| figures.finished(view, None)).ok()?;
+    (!testbed.cancelled()).then(|| figures.summary(0.0, 0.0, None, Status::Done).evaluations_soil_mean)
+}
+
+fn print(arguments: &CompareArguments, folder: &Path, rows: &[CompareRow]) -> Result {
+    if arguments.run.json {
+        let path = folder.join(COMPARE_JSON);
+        let at = |source| Error::File { path: path.display().to_string(), source };
+        outln!("{}", std::fs::read_to_string(&path).map_err(at)?.trim_end());
+    } else if !arguments.run.quiet {
+        outln!("{}", compare::terminal_table(rows, false));
+        if arguments.details {
+            outln!("{}", compare::terminal_table(rows, true));
+        }
+        outln!("comparison: {}", folder.join(COMPARE_PAGE).display());
+    }
+    Ok(())
+}

@@ -1,0 +1,121 @@
+//! The command line. No simulation logic: it reads arguments, drives the library and prints.
+//!
+//! Exit codes: 0 done, 1 the simulation or a check failed, 2 the input is wrong, 130 interrupted.
+
+mod apart;
+mod arguments;
+mod check;
+mod check_module;
+mod compare;
+mod convert;
+mod export;
+mod fit_soil;
+mod fit_wheel;
+mod fmu;
+mod folder;
+mod interrupt;
+mod list;
+mod logger;
+mod new;
+mod output;
+mod pace;
+mod progress;
+mod recorder;
+mod report;
+mod robot;
+mod run;
+mod shorten;
+mod show;
+mod soil_module;
+mod soils;
+mod strict;
+mod table_file;
+
+use arguments::{Arguments, Command};
+use clap::Parser;
+use std::process::ExitCode;
+use terraglue_diagnostics::Error;
+use terraglue_host::{crash, exit_guard, orphans};
+
+/// How a command ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Exit {
+    /// Done; diverged rows of a comparison are data.
+    Done,
+    /// The simulation or a check failed.
+    Failed,
+    /// The input is wrong.
+    WrongInput,
+    /// The user stopped it; the recording is closed.
+    Interrupted,
+}
+
+impl Exit {
+    /// Exit code of the program.
+    fn code(self) -> u8 {
+        match self {
+            Self::Done => 0,
+            Self::Failed => 1,
+            Self::WrongInput => 2,
+            Self::Interrupted => 130,
+        }
+    }
+}
+
+/// Reads the arguments and does the command.
+pub fn main() -> ExitCode {
+    let arguments = Arguments::parse();
+    if let Command::Worker { segment } = &arguments.command {
+        return terraglue_host::isolation::serve(segment, &terraglue_fmu::library());
+    }
+    logger::install();
+    orphans::adopt();
+    // what the checker makes of modules that end the program is its own affair
+    let armed = !matches!(arguments.command, Command::CheckModule(_) | Command::Modules { .. });
+    if armed {
+        crash::tell();
+    }
+    let armed = armed.then(exit_guard::arm);
+    let exit = command(arguments.command);
+    apart::done(exit.code());
+    drop(armed);
+    let left = orphans::end_all();
+    if left > 0 {
+        log::warn!("modules or units left {left} processes behind; they were ended");
+    }
+    exit.code().into()
+}
+
+fn command(command: Command) -> Exit {
+    let done = match command {
+        Command::Run(arguments) => run::run(&arguments),
+        Command::Compare(arguments) => compare::compare(&arguments),
+        Command::Report { folder } => report::report(&folder),
+        Command::Check(arguments) => check::check(&arguments),
+        Command::CheckModule(arguments) => check_module::check_module(&arguments),
+        Command::Modules { name, module_path, json, asked } => {
+            list::modules(name.as_deref(), &module_path, json, asked)
+        }
+        Command::Variables(arguments) => list::variables(&arguments),
+        Command::Fmu(command) => fmu::fmu(&command),
+        Command::Export(arguments) => export::export(&arguments),
+        Command::Convert(arguments) => convert::convert(&arguments),
+        Command::Worker { .. } => Ok(Exit::Failed),
+        Command::New(arguments) => new::new(&arguments),
+        Command::Robot(arguments) => robot::robot(&arguments),
+        Command::Soils { name, file } => soils::soils(name.as_deref(), file.as_deref()),
+        Command::FitSoil(arguments) => fit_soil::fit_soil(&arguments),
+    };
+    done.unwrap_or_else(|error| {
+        show::error(&error);
+        exit_of(&error)
+    })
+}
+
+/// Exit of a command that an error ended.
+pub fn exit_of(error: &Error) -> Exit {
+    match error {
+        Error::Input(_) => Exit::WrongInput,
+        _ => Exit::Failed,
+    }
+}

@@ -1,0 +1,31 @@
+//! Standard output: a reader that closes the pipe early, such as `head`, ends the program quietly.
+
+use super::apart;
+use std::fmt::Arguments;
+use std::io::{ErrorKind, Write};
+use terraglue_host::exit_guard;
+
+/// Writes one line to standard output. Ends the program with code 0 when nobody reads on, with 1 when the
+/// output cannot be written for another reason.
+pub fn line(text: Arguments) {
+    let mut out = std::io::stdout().lock();
+    if let Err(error) = write_line(&mut out, text) {
+        if error.kind() == ErrorKind::BrokenPipe {
+            apart::done(0);
+            exit_guard::leave(0);
+        }
+        eprintln!("error: standard output: {error}");
+        exit_guard::leave(1);
+    }
+}
+
+fn write_line(out: &mut impl Write, text: Arguments) -> std::io::Result<()> {
+    writeln!(out, "{text}")?;
+    out.flush()
+}
+
+/// `println!` for a standard output that may be closed.
+macro_rules! outln {
+    ($($text:tt)*) => { $crate::output::line(format_args!($($text)*)) };
+}
+pub(crate) use outln;

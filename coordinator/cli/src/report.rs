@@ -1,0 +1,34 @@
+//! `terraglue report`: the report of any recording, also of one that was cut off.
+
+use super::Exit;
+use super::output::outln;
+use std::path::Path;
+use terraglue_diagnostics::Result;
+use terraglue_recording as recording;
+use terraglue_recording::{RECORDING, Recording};
+use terraglue_scenario::InputError;
+
+/// Mends the recording of a folder where its end is missing, then writes the report.
+pub fn report(folder: &Path) -> Result<Exit> {
+    let path = folder.join(RECORDING);
+    if !path.is_file() {
+        let message = format!("there is no {RECORDING} in `{}`", folder.display());
+        let help = Some("give the folder of a run, e.g. runs/moon_walk".into());
+        return Err(InputError::plain(message, help).into());
+    }
+    let mended = recording::mend(folder)?;
+    let recorded = Recording::open(folder)?;
+    if mended {
+        eprintln!(
+            "warning: `{}` had no end: it keeps what arrived whole, up to t = {:.3} s, and ends there now",
+            path.display(),
+            recorded.end_s()
+        );
+    }
+    let damaged = recorded.damaged;
+    if damaged > 0 {
+        eprintln!("warning: `{}` is damaged: {damaged} parts of it are left out", path.display());
+    }
+    outln!("report: {}", recording::report::write(folder)?.display());
+    Ok(Exit::Done)
+}

@@ -1,0 +1,103 @@
+//! Messages of a length that can be read, whatever the input holds: a file may be one line of a megabyte.
+
+use miette::{NamedSource, SourceSpan};
+use terraglue_scenario::InputError;
+
+/// Longest message, and what is kept of a longer one at its begin and its end, in bytes.
+const LONGEST_TEXT: usize = 1200;
+const HEAD: usize = 700;
+const TAIL: usize = 300;
+/// Longest line of a file that is shown, and what stands before the place that is meant, in bytes.
+const LONGEST_LINE: usize = 160;
+const BEFORE: usize = 60;
+/// Most lines of a file that are marked.
+const MOST_LINES: usize = 8;
+
+/// A text without its middle where it is too long.
+pub fn text(text: &str) -> String {
+    if text.len() <= LONGEST_TEXT {
+        return text.to_owned();
+    }
+    let (head, tail) = (text.floor_char_boundary(HEAD), text.ceil_char_boundary(text.len() - TAIL));
+    format!("{} … ({} characters) … {}", &text[..head], text[head..tail].chars().count(), &text[tail..])
+}
+
+/// An error whose texts and lines are short.
+pub fn error(error: &InputError) -> InputError {
+    let source = error.source_code.inner();
+    let marked = error.span.map_or(0..0, |s| s.offset()..s.offset() + s.len());
+    let (shown, marked) = lines(source, marked);
+    InputError {
+        message: text(&error.message),
+        source_code: NamedSource::new(error.source_code.name(), shown),
+        span: error.span.map(|_| SourceSpan::from(marked)),
+        help: error.help.as_deref().map(text),
+    }
+}
+
+/// The text with long lines cut around what is marked, and the mark in it.
+fn lines(text: &str, marked: std::ops::Range<usize>) -> (String, std::ops::Range<usize>) {
+    let mut out = String::with_capacity(text.len());
+    let (mut start, mut end, mut begin, mut seen) = (None, 0, 0, 0);
+    for line in text.split_inclusive('\n') {
+        let body = line.trim_end_matches(['\n', '\r']);
+        let own = |at: usize| at.clamp(begin, begin + body.len()) - begin;
+        let touched = marked.start < begin + line.len() && (marked.end > begin || marked.start >= begin);
+        let kept = window(body, if touched { own(marked.start) } else { 0 });
+        let (before, after) =
+            (if kept.start > 0 { "…" } else { "" }, if kept.end < body.len() { "…" } else { "" });
+        let base = out.len() + before.len();
+        let place = |at: usize| base + own(at).clamp(kept.start, kept.end) - kept.start;
+        if touched && seen < MOST_LINES {
+            start = start.or(Some(place(marked.start)));
+            end = place(marked.end);
+            seen += 1;
+        }
+        out.extend([before, &body[kept], after, &line[body.len()..]]);
+        begin += line.len();
+    }
+    let start = start.unwrap_or(out.len());
+    (out, start..end.max(start))
+}
+
+/// The part of a line that is shown: all of a short one.
+fn window(line: &str, at: usize) -> std::ops::Range<usize> {
+    if line.len() <= LONGEST_LINE {
+        return 0..line.len();
+    }
+    let from = line.floor_char_boundary(at.saturating_sub(BEFORE));
+    from..line.floor_char_boundary((from + LONGEST_LINE).min(line.len()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn what_is_short_stays() {
+        let source = "a = 1\nb = 2\n\nc = 3";
+        for marked in [0..5, 6..7, 12..12, 13..18, 18..18, 0..18] {
+            assert_eq!(lines(source, marked.clone()), (source.to_owned(), marked));
+        }
+        assert_eq!(text("short"), "short");
+    }
+
+    #[test]
+    fn the_mark_stays_on_its_words_in_a_long_line() {
+        let source = format!("first = 1\n{} here {}\nlast", "ä".repeat(5000), "z".repeat(5000));
+        let at = source.find("here").expect("there");
+        let (shown, marked) = lines(&source, at..at + 4);
+        assert_eq!(&shown[marked], "here");
+        assert!(shown.len() < 300 && shown.contains("first = 1") && shown.ends_with("last"), "{shown}");
+        let (shown, marked) = lines(&source, 0..source.len());
+        assert!(shown.len() < 300 && marked.end <= shown.len());
+    }
+
+    #[test]
+    fn few_lines_are_marked_and_long_messages_lose_their_middle() {
+        let (_, marked) = lines(&"x\n".repeat(1000), 0..2000);
+        assert!(marked.len() <= 2 * MOST_LINES, "{marked:?}");
+        let short = text(&format!("begin {} end", "é".repeat(100_000)));
+        assert!(short.len() < LONGEST_TEXT && short.starts_with("begin") && short.ends_with("end"));
+    }
+}

@@ -1,0 +1,58 @@
+//! Whether a module that stands in for a soil is a soil, and whether the terrain has one at all.
+
+use super::arguments::ScenarioArguments;
+use std::path::Path;
+use terraglue_diagnostics::Result;
+use terraglue_host::{Library, SearchPath, available_modules};
+use terraglue_scenario::{InputError, Scenario, nearest};
+use terraglue_subsystem::Kind;
+
+/// Refuses edits that put another kind of module in the place of a soil; warns of a terrain without any soil.
+pub fn check(scenario: &Scenario, arguments: &ScenarioArguments) -> Result {
+    let search = search(scenario, arguments);
+    if arguments.sets.iter().any(|(key, _)| key.ends_with(".module")) {
+        let others = arguments.sets.iter().filter(|(key, _)| !key.ends_with(".module")).cloned();
+        // Where the scenario is only good with the edit, there is nothing to compare it with.
+        if let Ok(before) = Scenario::load(&arguments.scenario, &others.collect::<Vec<_>>()) {
+            for old in &before.subsystems {
+                let new = scenario.subsystems.iter().find(|s| s.name == old.name);
+                let was_soil = kind(&old.module, &search, &scenario.folder) == Some(Kind::Soil);
+                let found = |module: &str| kind(module, &search, &scenario.folder).is_some();
+                if let Some(new) = new.filter(|new| was_soil && found(&new.module)) {
+                    require_soil(&new.module, scenario, arguments)?;
+                }
+            }
+        }
+    }
+    let mut kinds = scenario.subsystems.iter().map(|s| kind(&s.module, &search, &scenario.folder));
+    // A module that is not found is an error of its own.
+    if scenario.terrain.is_some() && kinds.all(|k| k.is_some_and(|k| k != Kind::Soil)) {
+        eprintln!("warning: terrain is not used: no subsystem of kind soil");
+    }
+    Ok(())
+}
+
+/// Refuses a module that is no soil, or is not found at all.
+pub fn require_soil(module: &str, scenario: &Scenario, arguments: &ScenarioArguments) -> Result {
+    let search = search(scenario, arguments);
+    let why = match terraglue_fmu::library().find(module, &search, &scenario.folder) {
+        Ok(found) if found.schema().kind == Kind::Soil => return Ok(()),
+        Ok(_) => format!("module `{module}` is no soil"),
+        Err(error) => error.to_string(),
+    };
+    let modules = available_modules(&search);
+    let soils = modules.iter().filter(|m| m.schema.as_ref().is_ok_and(|s| s.kind == Kind::Soil));
+    let names: Vec<&str> = soils.map(|m| m.name.as_str()).collect();
+    let near =
+        nearest(module, names.iter().copied()).map_or_else(String::new, |n| format!("did you mean `{n}`? "));
+    let help = format!("{near}modules of kind soil: {}", names.join(", "));
+    Err(InputError::plain(why, Some(help)).into())
+}
+
+fn search(scenario: &Scenario, arguments: &ScenarioArguments) -> SearchPath {
+    SearchPath::standard(&arguments.module_path, &scenario.folder)
+}
+
+fn kind(module: &str, search: &SearchPath, folder: &Path) -> Option<Kind> {
+    terraglue_fmu::library().find(module, search, folder).ok().map(|m| m.schema().kind)
+}

@@ -1,0 +1,213 @@
+//! Making, using, mixing up and ending instances.
+
+use crate::catalogue::{Area, Level, Test};
+use crate::finding::{Stop, Verdict};
+use crate::lab::Lab;
+use crate::rig::{Flat, Foot, SoilBench, script};
+use terraglue_host::probe_odd_calls;
+use terraglue_subsystem::{Config, Kind};
+
+const fn test(
+    name: &'static str,
+    level: Level,
+    kinds: &'static [Kind],
+    after: &'static [&'static str],
+    promise: &'static str,
+    run: fn(&Lab) -> Verdict,
+) -> Test {
+    Test { name, area: Area::LifeCycle, level, kinds, after, promise, run }
+}
+
+/// The tests of this area.
+pub fn tests() -> Vec<Test> {
+    use Level::{Quick, Standard};
+    const SOIL: &[Kind] = &[Kind::Soil];
+    vec![
+        test(
+            "instantiates",
+            Quick,
+            &[],
+            // A soil with a law that is wrong finds the same mistake again.
+            &[
+                "loads",
+                "law-slope",
+                "law-shear-slopes",
+                "law-node-by-node",
+                "law-rises",
+                "law-starts-at-zero",
+                "law-friction-reached",
+                "law-cycles",
+                "law-pause",
+            ],
+            "an instance can be made from usual parameters",
+            instantiates,
+        ),
+        test(
+            "steps",
+            Quick,
+            &[],
+            &["instantiates", "host-loading"],
+            "a run of a tenth of a second answers every call",
+            steps,
+        ),
+        test(
+            "many-instances",
+            Standard,
+            &[],
+            &["steps"],
+            "a thousand instances (in Python forty; thorough: five times that) can be made and ended",
+            many,
+        ),
+        test("two-instances", Quick, &[], &["steps"], "two instances do not feel each other", two),
+        test(
+            "new-is-fresh",
+            Quick,
+            &[],
+            &["steps"],
+            "an instance made after others have run starts afresh",
+            fresh,
+        ),
+        test(
+            "odd-calls",
+            Quick,
+            &[],
+            &["steps"],
+            "null and wrong arguments are answered by a status",
+            odd_calls,
+        ),
+        test(
+            "wrong-config",
+            Quick,
+            &[],
+            &["instantiates"],
+            "parameters that make no sense are refused with a text",
+            wrong_config,
+        ),
+        test("no-contact", Quick, SOIL, &["steps"], "a step without any port works", no_contact),
+        test("come-and-go", Quick, SOIL, &["steps"], "feet may come, go and return", come_and_go),
+        test(
+            "thousand-feet",
+            Standard,
+            SOIL,
+            &["steps"],
+            "a thousand feet are carried, or refused by a status",
+            thousand,
+        ),
+    ]
+}
+
+fn instantiates(lab: &Lab) -> Verdict {
+    lab.instance().map(drop)
+}
+
+fn steps(lab: &Lab) -> Verdict {
+    script(lab.instance()?, 100, 0).map(drop)
+}
+
+fn many(lab: &Lab) -> Verdict {
+    let module = lab.module()?;
+    // Each in Python is a process.
+    let count = if module.is_python() { 40 } else { 1000 } * if lab.level == Level::Thorough { 5 } else { 1 };
+    for _ in 0..count {
+        lab.instance_on(&module, Flat::LEVEL)?;
+    }
+    Ok(())
+}
+
+fn two(lab: &Lab) -> Verdict {
+    let module = lab.module()?;
+    let (alone, _) = script(lab.instance_on(&module, Flat::LEVEL)?, 40, 1)?;
+    // The same run while others live, are made and end.
+    let (first, second) = (lab.instance_on(&module, Flat::LEVEL)?, lab.instance_on(&module, Flat::LEVEL)?);
+    let (_, _second) = script(second, 25, 4)?;
+    let (beside, _) = script(first, 40, 1)?;
+    same("a run beside another instance", &alone, &beside)
+}
+
+fn fresh(lab: &Lab) -> Verdict {
+    let module = lab.module()?;
+    let (first, _) = script(lab.instance_on(&module, Flat::LEVEL)?, 30, 2)?;
+    for variant in 3..6 {
+        script(lab.instance_on(&module, Flat::LEVEL)?, 20, variant)?;
+    }
+    let (again, _) = script(lab.instance_on(&module, Flat::LEVEL)?, 30, 2)?;
+    same("the same run by an instance made later", &first, &again)
+}
+
+/// Whether two runs gave the same bits.
+pub fn same(given: &str, a: &[u64], b: &[u64]) -> Verdict {
+    let Some(k) = (0..a.len().max(b.len())).find(|k| a.get(*k) != b.get(*k)) else { return Ok(()) };
+    let value =
+        |bits: Option<&u64>| bits.map_or("nothing".to_owned(), |b| format!("{:e}", f64::from_bits(*b)));
+    let got = format!("{} instead of {} (number {k} of {})", value(b.get(k)), value(a.get(k)), a.len());
+    Err(Stop::fail("a run", given, got, "the same bytes"))
+}
+
+fn odd_calls(lab: &Lab) -> Verdict {
+    lab.needs_a_library("no null pointer can reach it, nothing is lost")?;
+    let module = lab.module()?;
+    let config = lab.config(module.schema()).with_defaults(module.schema());
+    probe_odd_calls(&lab.path, &config, &lab.services()).map_err(|(call, got)| {
+        Stop::fail(call, "null or wrong arguments", got, "TG_REFUSED, TG_ERROR or TG_UNSUPPORTED")
+    })
+}
+
+fn wrong_config(lab: &Lab) -> Verdict {
+    let module = lab.module()?;
+    let needs_any = module.schema().parameters.iter().any(|p| p.default.is_null() && !p.optional);
+    let mut odd = vec![];
+    for p in module.schema().parameters.iter().filter(|p| !p.name.contains(['.', '*'])) {
+        // What the host refuses before the module sees it is not the module's business; these reach it.
+        odd.push(format!("{{\"{}\": []}}", p.name));
+    }
+    if needs_any {
+        odd.push("{}".to_owned());
+    }
+    for text in odd {
+        let config = Config::parse(&text).unwrap_or_default();
+        if let Err(error) = module.instantiate("checked", config, &lab.services())
+            && error.to_string().ends_with("no reason given")
+        {
+            return Err(Stop::fail(
+                "instantiate",
+                text,
+                "a failure without a text",
+                "last_error(NULL) says why",
+            ));
+        }
+    }
+    // The module is usable afterwards.
+    lab.instance().map(drop)
+}
+
+fn no_contact(lab: &Lab) -> Verdict {
+    let mut bench = SoilBench::new(lab, &[Foot::sphere(0.0, 0.0).lifted(0.3)])?;
+    for _ in 0..5 {
+        bench.go(&[[0.1, 0.0, 0.0]], 1e-3)?;
+    }
+    Ok(())
+}
+
+fn come_and_go(lab: &Lab) -> Verdict {
+    let mut bench =
+        SoilBench::new(lab, &[Foot::sphere(-0.1, 0.0).lifted(-1e-3), Foot::sphere(0.1, 0.0).lifted(7e-3)])?;
+    for k in 0..120 {
+        let up = if (k / 20) % 2 == 0 { 0.4 } else { -0.4 };
+        bench.go(&[[0.0, 0.0, up], [0.0, 0.0, -up]], 1e-3)?;
+    }
+    Ok(())
+}
+
+fn thousand(lab: &Lab) -> Verdict {
+    let place = |k: usize| Foot::sphere(-0.4 + 0.025 * (k % 32) as f64, -0.4 + 0.025 * (k / 32) as f64);
+    let feet: Vec<_> = (0..1000).map(place).collect();
+    let mut bench = SoilBench::new(lab, &feet)?;
+    let down = vec![[0.0, 0.0, -0.1]; feet.len()];
+    match (0..3).try_for_each(|_| bench.go(&down, 1e-3).map(drop)) {
+        // A status is an answer: the soil says how many it carries.
+        Err(Stop::Fail(finding)) if finding.call == "set_ports" && finding.got != "no reason given" => {
+            Err(Stop::Warning(format!("it refuses a thousand feet: {}", finding.got)))
+        }
+        other => other,
+    }
+}

@@ -1,0 +1,337 @@
+//! The same numbers every time, finite ones, and derivatives that are those of the answers.
+
+use super::life_cycle::same;
+use crate::catalogue::{Area, Level, Test};
+use crate::derivative::{Columns, compare};
+use crate::elsewhere::{Errand, elsewhere};
+use crate::finding::{ANSWER, Stop, Verdict};
+use crate::lab::Lab;
+use crate::rig::{BodyBench, Foot, Runner, SoilBench, committed, script};
+use terraglue_host::Workers;
+use terraglue_subsystem::{Capabilities, Kind, Level as Derivative};
+
+const fn test(
+    name: &'static str,
+    level: Level,
+    kinds: &'static [Kind],
+    after: &'static [&'static str],
+    promise: &'static str,
+    run: fn(&Lab) -> Verdict,
+) -> Test {
+    Test { name, area: Area::Numbers, level, kinds, after, promise, run }
+}
+
+/// The tests of this area.
+pub fn tests() -> Vec<Test> {
+    use Level::{Quick, Standard};
+    const SOIL: &[Kind] = &[Kind::Soil];
+    const ROBOT: &[Kind] = &[Kind::Robot];
+    const BOTH: &[Kind] = &[Kind::Soil, Kind::Robot];
+    vec![
+        test("same-again", Quick, &[], &["steps"], "the same run gives the same bytes", again),
+        test("same-process", Standard, &[], &["same-again"], "another process gives the same bytes", process),
+        test(
+            "same-thread",
+            Quick,
+            &[],
+            &["same-again"],
+            "calls from changing threads give the same bytes",
+            thread,
+        ),
+        test("same-workers", Quick, &[], &["same-again"], "the host's threads do not change a byte", workers),
+        test(
+            "same-locale",
+            Standard,
+            &[],
+            &["same-process"],
+            "another locale and time zone give the same bytes",
+            locale,
+        ),
+        test(
+            "extremes-soil",
+            Quick,
+            SOIL,
+            &["steps"],
+            "tiny and huge motions and forces are answered by finite numbers",
+            extremes,
+        ),
+        test(
+            "extremes-robot",
+            Quick,
+            ROBOT,
+            &["steps"],
+            "tiny and huge forces are answered by finite numbers",
+            extremes_robot,
+        ),
+        test(
+            "zero-step",
+            Quick,
+            BOTH,
+            &["steps"],
+            "a step of h = 0 is answered, and nothing moves",
+            zero_step,
+        ),
+        test(
+            "jacobian-soil",
+            Quick,
+            SOIL,
+            &["trials-repeat"],
+            "the derivative after a motion is that of the force",
+            jacobian_soil,
+        ),
+        test(
+            "jacobian-force",
+            Quick,
+            SOIL,
+            &["trials-repeat"],
+            "the derivative after a force is that of the surface",
+            jacobian_force,
+        ),
+        test(
+            "jacobian-robot",
+            Quick,
+            ROBOT,
+            &["trials-repeat"],
+            "the derivative after a force is that of the motion",
+            jacobian_robot,
+        ),
+    ]
+}
+
+fn again(lab: &Lab) -> Verdict {
+    let run = || script(lab.instance()?, 90, 1).map(|(bits, _)| bits);
+    same("the same run again", &run()?, &run()?)
+}
+
+fn process(lab: &Lab) -> Verdict {
+    let (here, _) = script(lab.instance()?, 90, 0)?;
+    same("the same run in another process", &here, &elsewhere(lab, &Errand::fresh(90), &[])?)
+}
+
+/// Every step from another thread, as the coordinator may do.
+fn thread(lab: &Lab) -> Verdict {
+    let (here, _) = script(lab.instance()?, 40, 0)?;
+    let mut runner = Runner::new(lab.instance()?)?;
+    let mut bits = Vec::new();
+    for k in 0..40 {
+        let (back, step) = std::thread::scope(|scope| {
+            let job = scope.spawn(move || {
+                let mut bits = Vec::new();
+                let done = runner.step(k, 0, 0, &mut bits);
+                (runner, done.map(|()| bits))
+            });
+            job.join().map_err(|_| Stop::fail("a step", "from another thread", "a panic", "an answer"))
+        })?;
+        runner = back;
+        bits.extend(step?);
+    }
+    bits.extend(committed(runner.instance())?);
+    same("the run with every step from another thread", &here, &bits)
+}
+
+fn workers(lab: &Lab) -> Verdict {
+    let module = lab.module()?;
+    let run = |threads: usize| {
+        let mut services = lab.services();
+        services.workers = std::sync::Arc::new(Workers::new(threads));
+        let made = module.instantiate("checked", lab.config(module.schema()), &services);
+        let made =
+            made.map_err(|e| Stop::fail("instantiate", "usual parameters", e.to_string(), "an instance"))?;
+        script(made, 90, 0).map(|(bits, _)| bits)
+    };
+    same("the run with three threads of the host", &run(1)?, &run(3)?)
+}
+
+fn locale(lab: &Lab) -> Verdict {
+    let (here, _) = script(lab.instance()?, 60, 0)?;
+    let there = elsewhere(lab, &Errand::fresh(60), &[("LC_ALL", "de_DE.UTF-8"), ("TZ", "Asia/Kolkata")])?;
+    same("the run in a German locale and Indian time", &here, &there)?;
+    match terraglue_host::has_locale("de_DE.UTF-8") {
+        true => Ok(()),
+        false => Err(Stop::Skip("de_DE.UTF-8 is not installed: only the time zone was another".into())),
+    }
+}
+
+fn extremes(lab: &Lab) -> Verdict {
+    let feet = [Foot::sphere(-0.1, 0.0), Foot::plate(0.1, 0.0)];
+    for depth in [1e-12, 1e-6, 1e-2, 0.2, 1.0] {
+        let mut bench = SoilBench::new(lab, &feet)?;
+        for (sideways, v) in [(0.0, depth / 1e-3), (5.0, 0.0), (-5.0, -2.0 * depth / 1e-3)] {
+            let velocities = [[sideways, 0.0, -v], [0.0, sideways, -v]];
+            bench.go(&velocities, 1e-3)?;
+        }
+    }
+    let mut bench = SoilBench::new(lab, &feet)?;
+    if !bench.soil.capabilities().has(Capabilities::FORCE) {
+        return Ok(());
+    }
+    let still = [[0.0, 0.0, -0.05]; 2];
+    for _ in 0..10 {
+        bench.go(&still, 1e-3)?;
+    }
+    for size in [0.0, 1e-12, 1.0, 1e4, 1e5, 1e6, 1e7] {
+        bench.meet(&still, 1e-3)?;
+        let (x, v) = bench.motion_of(&still, 1e-3);
+        let t = bench.packed_normal(size);
+        bench.try_force(&t, None, 1e-3)?;
+        bench.try_force(&t, Some((&x, &v)), 1e-3)?;
+    }
+    Ok(())
+}
+
+fn extremes_robot(lab: &Lab) -> Verdict {
+    let mut bench = BodyBench::new(lab.instance()?);
+    bench.place_port()?;
+    for size in [0.0, 1e-12, 1.0, 1e4, -1e4] {
+        for h in [1e-6, 1e-3, 1e-2] {
+            bench.try_force(&[size, 0.1 * size, -0.3 * size], h)?;
+        }
+    }
+    // joints may be torn by what no robot bears, if the robot says so
+    for size in [1e7, -1e7] {
+        match bench.try_force(&[size, 0.1 * size, -0.3 * size], 1e-3) {
+            Err(Stop::Fail(refused)) if refused.expected == ANSWER => {}
+            other => other?,
+        }
+    }
+    Ok(())
+}
+
+fn zero_step(lab: &Lab) -> Verdict {
+    let moved = |x: &[f64]| {
+        x.iter().find(|x| x.abs() > 1e-12).map(|x| {
+            let got = format!("a displacement of {x:e} m");
+            Stop::fail("advance", "a step of h = 0", got, "accelerations at t only; X and V stay")
+        })
+    };
+    match lab.instance()?.kind() {
+        Kind::Robot => {
+            let mut bench = BodyBench::new(lab.instance()?);
+            bench.fall(1e-3)?;
+            bench.place_port()?;
+            if let Err(Stop::Fail(refused)) = bench.try_force(&[10.0, 0.0, 0.0], 0.0) {
+                let cost = "forces at the start of a run are those of the first step";
+                return Err(Stop::Skip(format!("no step of h = 0 ({}): {cost}", refused.got)));
+            }
+            moved(&bench.out.x).map_or(Ok(()), Err)
+        }
+        _ => {
+            let mut bench = SoilBench::new(lab, &[Foot::sphere(0.0, 0.0)])?;
+            for _ in 0..5 {
+                bench.go(&[[0.0, 0.0, -0.1]], 1e-3)?;
+            }
+            bench.meet(&[[0.0, 0.0, -0.1]], 1e-3)?;
+            bench.ask_ports(0.0)?;
+            let (x, v) = bench.motion_of(&[[0.0, 0.0, 0.0]], 0.0);
+            bench.try_motion(&x, &v, 0.0)
+        }
+    }
+}
+
+/// Along a trajectory with loading, sliding, unloading and reloading, at several points of each.
+fn jacobian_soil(lab: &Lab) -> Verdict {
+    let feet = [Foot::sphere(-0.1, 0.003), Foot::plate(0.15, -0.05)];
+    let mut bench = SoilBench::new(lab, &feet)?;
+    if !bench.soil.capabilities().has(Capabilities::DERIVATIVES) {
+        return Err(Stop::Skip(
+            "no interface_jacobian: the coordinator takes finite differences, at more trials".into(),
+        ));
+    }
+    // Never quite straight down: at rest along the ground, sticking and first slip meet. Never up and down by the same: back
+    // at its largest depth a plate has a corner under all nodes at once, where turning it loads one half from either side.
+    let phases = [[0.004, -0.2], [0.3, -0.02], [0.02, -0.1], [0.01, 0.047], [-0.01, -0.05]];
+    for step in 0..lab.count(40).min(200) {
+        let [vx, vz] = phases[(step / 8) % phases.len()];
+        let velocities = [[vx, 0.3 * vx, vz], [-vx, 0.1 * vx, 0.7 * vz]];
+        if step % 4 == 3 {
+            bench.meet(&velocities, 1e-3)?;
+            let (x, v) = bench.motion_of(&velocities, 1e-3);
+            bench.try_motion(&x, &v, 1e-3)?;
+            // Where a foot hardly touches, node after node comes into contact: corners everywhere.
+            let pressed = bench.components_above(1.0);
+            let k = bench.jacobian(Derivative::Position, 1e-3)?;
+            let columns = Columns::of(
+                &k,
+                |x| {
+                    bench.try_motion(x, &v, 1e-3)?;
+                    // The wrench on the soil is -T, and as for a spring it grows with the motion that presses it.
+                    Ok(bench.out.t.iter().map(|t| -t).collect())
+                },
+                &x,
+                1e-7,
+            )?;
+            compare(&bench.ports, &columns.only(&pressed), "motion", bench.t)?;
+        }
+        bench.go(&velocities, 1e-3)?;
+    }
+    Ok(())
+}
+
+fn jacobian_force(lab: &Lab) -> Verdict {
+    let mut bench = SoilBench::new(lab, &[Foot::sphere(0.0, 0.003)])?;
+    let can = bench.soil.capabilities();
+    if !can.has(Capabilities::DERIVATIVES) || !can.has(Capabilities::FORCE) {
+        return Err(Stop::Skip(
+            "no derivative after a force: the form T-T of the gluing takes finite differences".into(),
+        ));
+    }
+    for step in 0..40 {
+        let velocities = [[0.0, 0.0, if step < 24 { -0.1 } else { 0.02 }]];
+        if step % 6 == 5 {
+            bench.meet(&velocities, 1e-3)?;
+            let (x, v) = bench.motion_of(&velocities, 1e-3);
+            bench.try_motion(&x, &v, 1e-3)?;
+            // Where a foot hardly touches, soils take another slope than that of a law that starts flat.
+            let pressed = bench.components_above(0.1);
+            let mut t = bench.out.t.clone();
+            t.iter_mut().for_each(|t| *t *= 1.02);
+            bench.try_force(&t, None, 1e-3)?;
+            let g = bench.jacobian(Derivative::Position, 1e-3)?;
+            let mut normals = bench.normal_components();
+            normals.retain(|place| pressed.contains(place));
+            // The soil feels -T: dX/d(wrench on itself) = -dX/dT.
+            let all = Columns::of(
+                &g,
+                |t| {
+                    bench.try_force(t, None, 1e-3)?;
+                    Ok(bench.out.x.iter().map(|x| -x).collect())
+                },
+                &t,
+                1e-4,
+            )?;
+            compare(&bench.ports, &all.only(&normals), "force", bench.t)?;
+        }
+        bench.go(&velocities, 1e-3)?;
+    }
+    Ok(())
+}
+
+fn jacobian_robot(lab: &Lab) -> Verdict {
+    let mut bench = BodyBench::new(lab.instance()?);
+    if !bench.robot.capabilities().has(Capabilities::DERIVATIVES) {
+        return Err(Stop::Skip(
+            "no interface_jacobian: the coordinator takes finite differences, at more trials".into(),
+        ));
+    }
+    for step in 0..30 {
+        if step % 5 == 4 {
+            bench.place_port()?;
+            let t = [30.0, 2.0, -1.0];
+            bench.try_force(&t, 1e-3)?;
+            let g = bench.jacobian(1e-3)?;
+            let columns = Columns::of(
+                &g,
+                |t| {
+                    bench.try_force(t, 1e-3)?;
+                    Ok(bench.out.x.clone())
+                },
+                &t,
+                1.0,
+            )?;
+            let ports = bench.ports.clone();
+            compare(&ports, &columns, "force", bench.t)?;
+        }
+        bench.fall(1e-3)?;
+    }
+    Ok(())
+}

@@ -1,0 +1,10 @@
+//! The testbed: steps all subsystems of a scenario from one communication point to the next.
+//!
+//! [`Testbed`] is the entry: `build` a [`terraglue_scenario::Scenario`], `step` it, look at it through an
+//! [`observer::Observer`]. Several live side by side in one process; there are no globals.
+
+pub mod observer;
+pub mod signals;
+pub mod testbed;
+
+pub use testbed::{Options, Testbed};

@@ -1,0 +1,290 @@
+//! Connections: outputs of t become inputs of the step, with units checked once and converted every step.
+
+use super::access::{Directory, VariableRef};
+use super::discrete::{self, Discrete};
+use super::pattern;
+use super::table;
+use terraglue_diagnostics::Result;
+use terraglue_host::{Instance, Reply};
+use terraglue_scenario::{Connection, InputError, Source};
+use terraglue_subsystem::unit::Unit;
+use terraglue_subsystem::{Causality, ValueType, Values, ValuesMut};
+
+/// Subsystem and variable on either side of a value, and value_to = a·value_from + b.
+pub type Ends = ([(usize, u32); 2], (f64, f64));
+
+/// All f64 connections from one subsystem to another, copied in one call each way. In few pieces: the cost of a chain of
+/// cheap subsystems is that of its memory.
+#[derive(Debug)]
+pub struct Link {
+    from: usize,
+    to: usize,
+    /// Of the outputs, then of the inputs.
+    ids: Vec<u32>,
+    /// Values, then a and then b of value_to = a·value_from + b.
+    numbers: Vec<f64>,
+}
+
+impl Link {
+    #[inline]
+    fn from_ids(&self) -> &[u32] {
+        &self.ids[..self.len()]
+    }
+
+    #[inline]
+    fn to_ids(&self) -> &[u32] {
+        &self.ids[self.len()..]
+    }
+
+    /// Whether it feeds a variable of a subsystem.
+    pub fn feeds(&self, slot: usize, id: u32) -> bool {
+        self.to == slot && self.to_ids().contains(&id)
+    }
+
+    /// Sets the inputs to the values that were read last.
+    #[inline]
+    pub fn pass_on(&self, instances: &mut [Instance]) -> Result {
+        self.write(instances, &self.numbers[..self.len()])
+    }
+
+    /// Values of the outputs, in the units of the inputs.
+    pub fn read(&mut self, instances: &[Instance]) -> Result<&[f64]> {
+        let n = self.ids.len() / 2;
+        let (values, conversion) = self.numbers.split_at_mut(n);
+        instances[self.from].get(&self.ids[..n], ValuesMut::F64(values))?;
+        if let ([value], [a, b]) = (&mut *values, &*conversion) {
+            *value = a * *value + b;
+            return Ok(values);
+        }
+        let (factors, offsets) = conversion.split_at(n);
+        for ((value, a), b) in values.iter_mut().zip(factors).zip(offsets) {
+            *value = a * *value + b;
+        }
+        Ok(values)
+    }
+
+    /// Derivatives of its values by entry `k` of the inputs that `other` feeds, where the subsystem between knows them.
+    pub fn derivatives(&self, instances: &[Instance], other: &Self, k: usize) -> Result<Option<Vec<f64>>> {
+        let mut out = vec![0.0; self.len()];
+        if self.from == other.to {
+            if !instances[self.from].derivative(self.from_ids(), other.to_ids()[k], &mut out)? {
+                return Ok(None);
+            }
+            out.iter_mut().enumerate().for_each(|(k, x)| *x *= self.conversion(k).0);
+        }
+        Ok(Some(out))
+    }
+
+    /// Sets the inputs.
+    pub fn write(&self, instances: &mut [Instance], values: &[f64]) -> Result {
+        let target = &mut instances[self.to];
+        match target.set(self.to_ids(), Values::F64(values))? {
+            Reply::Accepted => Ok(()),
+            Reply::Refused(reason) => Err(target.error("set", reason)),
+        }
+    }
+
+    /// Places of the values of a variable: those that come from it, or, with `fed`, those that it is given.
+    pub fn numbers_of(&self, slot: usize, id: u32, fed: bool) -> impl Iterator<Item = usize> + '_ {
+        let (own, ids) = if fed { (self.to, self.to_ids()) } else { (self.from, self.from_ids()) };
+        (0..ids.len()).filter(move |k| own == slot && ids[*k] == id)
+    }
+
+    /// Subsystem and variable on either side of every value, and how it is converted.
+    pub fn ends(&self) -> impl Iterator<Item = Ends> + '_ {
+        let pairs = self.from_ids().iter().zip(self.to_ids()).enumerate();
+        pairs.map(|(k, (from, to))| ([(self.from, *from), (self.to, *to)], self.conversion(k)))
+    }
+
+    /// value_to = a·value_from + b of one value.
+    pub fn conversion(&self, k: usize) -> (f64, f64) {
+        let n = self.len();
+        (self.numbers[n + k], self.numbers[2 * n + k])
+    }
+
+    /// A value that was read last.
+    pub fn value(&self, k: usize) -> f64 {
+        self.numbers[k]
+    }
+
+    /// The same, to change it on its way.
+    pub fn value_mut(&mut self, k: usize) -> &mut f64 {
+        &mut self.numbers[k]
+    }
+
+    /// Whether it leaves a subsystem of some kind.
+    pub fn leaves(&self, kind: impl Fn(usize) -> bool) -> bool {
+        kind(self.from)
+    }
+
+    /// Number of values.
+    #[inline]
+    pub fn len(&self) -> usize {
+        self.ids.len() / 2
+    }
+
+    /// `a.y → b.u` of every value.
+    pub fn names(&self, instances: &[Instance]) -> Vec<String> {
+        let name = |slot: usize, id: &u32| {
+            let variable = instances[slot].variables().iter().find(|v| v.id == *id);
+            format!("{}.{}", instances[slot].name(), variable.map_or("?", |v| &v.name))
+        };
+        let pairs = self.from_ids().iter().zip(self.to_ids());
+        pairs.map(|(from, to)| format!("{} → {}", name(self.from, from), name(self.to, to))).collect()
+    }
+}
+
+/// All connections of a scenario, resolved.
+#[derive(Debug, Default)]
+pub struct Links {
+    /// Of f64.
+    pub numbers: Vec<Link>,
+    /// Of all other types.
+    pub discrete: Vec<Discrete>,
+}
+
+/// Name without the index of an element at its end, and that index: `a.b[2,1]` → `a.b`, `[2,1]`.
+fn element(name: &str) -> Option<(&str, &str)> {
+    name.ends_with(']').then(|| name.rfind('[').map(|at| name.split_at(at))).flatten()
+}
+
+/// What a variable is connected to: by its own name, or as an element of a whole array that is named.
+fn target(connection: &Connection, name: &str) -> Option<(String, bool)> {
+    if let Some(target) = pattern::rewrite(&connection.from, &connection.to, name) {
+        return Some((target, false));
+    }
+    let (base, index) = element(name)?;
+    pattern::rewrite(&connection.from, &connection.to, base).map(|target| (target + index, true))
+}
+
+/// Why two whole arrays cannot be connected, where their shapes differ.
+fn shapes_differ(directory: &Directory, name: &str, target: &str) -> Option<String> {
+    let last = |name: &str| {
+        let base = element(name)?.0;
+        let own = |n: &&String| element(n).is_some_and(|(b, _)| b == base);
+        Some(element(directory.names().iter().rev().find(own)?)?.1.to_owned())
+    };
+    let (from, to) = (last(name)?, last(target));
+    let bases = [name, target].map(|n| element(n).map_or(n, |(base, _)| base));
+    (to.as_ref() != Some(&from)).then(|| match to {
+        Some(to) => {
+            format!("`{}` has the shape {from}, `{}` has {to}: these cannot be connected", bases[0], bases[1])
+        }
+        None => format!("`{}` has the shape {from}, `{}` is no array", bases[0], bases[1]),
+    })
+}
+
+/// Resolves all connections of a scenario into links, in the order of the file.
+pub fn connect(
+    connections: &[Connection],
+    directory: &Directory,
+    instances: &[Instance],
+    source: &Source,
+) -> std::result::Result<Links, Box<InputError>> {
+    let mut links = Links::default();
+    let mut fed: Vec<(String, VariableRef)> = Vec::new();
+    for connection in connections {
+        let mut matched = false;
+        let refuse = |end: &str, message: String, help: Option<String>| {
+            source.error_in(connection.entry, &[end], message, help)
+        };
+        for (name, from) in directory.iter() {
+            let Some((target, of_array)) = target(connection, name) else { continue };
+            matched = true;
+            if let Some(message) = of_array.then(|| shapes_differ(directory, name, &target)).flatten() {
+                return Err(refuse(&connection.to, message, None));
+            }
+            let to = directory.find(&target).ok_or_else(|| {
+                let message = format!("`{name}` is connected to `{target}`, which does not exist");
+                refuse(&connection.to, message, directory.hint(&target))
+            })?;
+            let conversion = check(connection, instances, (name, from), (&target, to))
+                .map_err(|message| refuse(&connection.to, message, None))?;
+            if let Some((other, _)) = fed.iter().find(|(_, input)| *input == to) {
+                let message = format!("`{target}` is fed by `{other}` already and cannot take `{name}` too");
+                return Err(refuse(&connection.to, message, None));
+            }
+            fed.push((name.to_owned(), to));
+            match from.describe(instances).value_type {
+                ValueType::F64 => add(&mut links.numbers, instances, from, to, conversion),
+                _ => {
+                    let table = table::resolve(&connection.map, instances, from, to).map_err(|message| {
+                        refuse("map", format!("`{name}` → `{target}`: {message}"), None)
+                    })?;
+                    links.discrete.push(Discrete::new(from, to, table, conversion));
+                }
+            }
+        }
+        if !matched {
+            let message = format!("no variable matches `{}`", connection.from);
+            let help = directory.hint(&connection.from);
+            return Err(refuse(&connection.from, message, help));
+        }
+    }
+    Ok(links)
+}
+
+/// value_to = a·value_from + b, or why the two cannot be connected.
+fn check(
+    connection: &Connection,
+    instances: &[Instance],
+    (from_name, from): (&str, VariableRef),
+    (to_name, to): (&str, VariableRef),
+) -> std::result::Result<(f64, f64), String> {
+    let (a, b) = (from.describe(instances), to.describe(instances));
+    let mapped = !connection.map.is_empty();
+    if mapped && !(table::takes(a.value_type) && table::takes(b.value_type)) {
+        return Err(format!(
+            "`{from_name}` → `{to_name}`: `map` is for truth values, whole numbers and enumerations"
+        ));
+    }
+    if !mapped && !discrete::fits(a.value_type, b.value_type) {
+        let [own, other] = [a.value_type, b.value_type].map(|t| format!("{t:?}").to_lowercase());
+        return Err(format!(
+            "`{from_name}` is of type {own} and `{to_name}` of {other}: these cannot be connected"
+        ));
+    }
+    if a.causality == Causality::Input {
+        return Err(format!("`{from_name}` is an input and cannot feed another variable"));
+    }
+    if !matches!(b.causality, Causality::Input | Causality::Parameter) {
+        return Err(format!("`{to_name}` is not an input and cannot be connected to"));
+    }
+    let Connection { factor, offset, convert, .. } = *connection;
+    let takes_factor = matches!(a.value_type, ValueType::F64 | ValueType::F32)
+        || discrete::is_whole(a.value_type) && !mapped;
+    if (factor, offset) != (1.0, 0.0) && !takes_factor {
+        return Err(format!("`{from_name}` is of a type that takes neither `factor` nor `offset`"));
+    }
+    if a.unit.is_empty() || b.unit.is_empty() || !convert {
+        return Ok((factor, offset));
+    }
+    let parse = |name: &str, unit: &str| Unit::parse(unit).map_err(|e| format!("unit of `{name}`: {e}"));
+    let (unit_a, unit_b) = (parse(from_name, &a.unit)?, parse(to_name, &b.unit)?);
+    let conversion = unit_a.conversion_to(&unit_b).ok_or_else(|| {
+        format!("`{from_name}` is in {} and `{to_name}` in {}: these cannot be connected", a.unit, b.unit)
+    })?;
+    Ok((factor * conversion.0, factor * conversion.1 + offset))
+}
+
+fn add(
+    links: &mut Vec<Link>,
+    instances: &[Instance],
+    from: VariableRef,
+    to: VariableRef,
+    conversion: (f64, f64),
+) {
+    let position = links.iter().position(|l| l.from == from.slot && l.to == to.slot);
+    let k = position.unwrap_or_else(|| {
+        links.push(Link { from: from.slot, to: to.slot, ids: Vec::new(), numbers: Vec::new() });
+        links.len() - 1
+    });
+    let link = &mut links[k];
+    let n = link.len();
+    link.ids.insert(n, from.describe(instances).id);
+    link.ids.push(to.describe(instances).id);
+    // from the last place on, as each moves what is behind it
+    link.numbers.push(conversion.1);
+    link.numbers.insert(2 * n, conversion.0);
+    link.numbers.insert(n, 0.0);
+}

@@ -1,0 +1,307 @@
+//! Faults of single numbers: what a subsystem is told differs from what was said.
+//!
+//! A fault of an output changes the number on every connection that leaves it, in the unit of the output; the output
+//! itself, and its recording, stay true. A fault of an input changes what it is given: over its connection, or, where it
+//! has none, what it was set to. Begin and end at a time are met exactly, because steps end there.
+
+use super::access::{Directory, VariableRef};
+use super::connection::Link;
+use super::event::Resolved;
+use super::modifier::Modifier;
+use serde_json::Value;
+use terraglue_diagnostics::{Error, Result};
+use terraglue_gluing::memory::{Recall, Remember};
+use terraglue_host::{Instance, Reply};
+use terraglue_scenario::{FaultEnd, FaultSpec, InputError, Source};
+use terraglue_subsystem::{Causality, Effect, ValueType};
+
+/// A number on a connection that a fault changes.
+#[derive(Debug)]
+struct Entry {
+    link: usize,
+    number: usize,
+    /// Conversion of the connection where the fault belongs to the output.
+    conversion: (f64, f64),
+    modifier: Modifier,
+}
+
+/// An input without a connection.
+#[derive(Debug)]
+struct Own {
+    variable: VariableRef,
+    modifier: Modifier,
+    /// What it was set to, and what the fault made of it.
+    sound: f64,
+    told: f64,
+}
+
+#[derive(Debug)]
+struct Fault {
+    label: String,
+    begin: Resolved,
+    end: End,
+    entries: Vec<Entry>,
+    own: Option<Own>,
+    /// Since when it is there, s.
+    since: Option<f64>,
+    over: bool,
+}
+
+#[derive(Debug)]
+enum End {
+    Never,
+    Trigger(Resolved),
+    After(f64),
+}
+
+/// All faults of a scenario, in the order of the file.
+#[derive(Debug, Default)]
+pub struct Faults {
+    all: Vec<Fault>,
+}
+
+/// What became of a fault at a communication point.
+pub type Change<'a> = (&'a str, bool);
+
+impl Faults {
+    /// Resolves names; `seed` is that of the world, `h` the step, s.
+    ///
+    /// # Errors
+    /// A variable that does not exist or that no fault can change.
+    pub fn new(
+        specs: &[FaultSpec],
+        links: &[Link],
+        directory: &Directory,
+        instances: &[Instance],
+        source: &Source,
+        (seed, h): (u64, f64),
+    ) -> std::result::Result<Self, Box<InputError>> {
+        let one = |(number, spec): (usize, &FaultSpec)| -> std::result::Result<Fault, Box<InputError>> {
+            let refuse = |(message, help): (String, Option<String>)| {
+                source.error_in(spec.entry, &[&spec.variable], message, help)
+            };
+            let find = |name: &str| {
+                let missing = || refuse((format!("variable `{name}` does not exist"), directory.hint(name)));
+                directory.find(name).ok_or_else(missing)
+            };
+            let variable = find(&spec.variable)?;
+            let seed = spec.seed.unwrap_or_else(|| seed ^ (number as u64 + 1).rotate_left(32));
+            let modifier = Modifier::new(spec.kind, seed, h);
+            let (entries, own) = place(variable, links, instances, &modifier)
+                .map_err(|why| refuse((format!("`{}` {why}", spec.variable), None)))?;
+            Ok(Fault {
+                label: format!("{} of {}", spec.kind.name(), spec.variable),
+                begin: Resolved::new(&spec.start, find)?,
+                end: match &spec.end {
+                    FaultEnd::Never => End::Never,
+                    FaultEnd::At(trigger) => End::Trigger(Resolved::new(trigger, find)?),
+                    FaultEnd::After(duration) => End::After(*duration),
+                },
+                entries,
+                own,
+                since: None,
+                over: false,
+            })
+        };
+        Ok(Self { all: specs.iter().enumerate().map(one).collect::<std::result::Result<_, _>>()? })
+    }
+
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.all.is_empty()
+    }
+
+    /// The next time after t at which one begins or ends, s; ∞: none that is known.
+    pub fn next_time(&self, t: f64) -> f64 {
+        let times = self.all.iter().filter(|f| !f.over).map(|fault| match (fault.since, &fault.end) {
+            (None, _) => fault.begin.time(),
+            (Some(_), End::Trigger(end)) => end.time(),
+            (Some(since), End::After(duration)) => since + duration,
+            (Some(_), End::Never) => f64::INFINITY,
+        });
+        times.filter(|time| *time > t).fold(f64::INFINITY, f64::min)
+    }
+
+    /// Lets faults see the numbers of time t on all connections, begin and end, and changes what is faulty.
+    ///
+    /// # Errors
+    /// An input that does not take what the fault makes of it.
+    pub fn apply(
+        &mut self,
+        (t, h): (f64, f64),
+        links: &mut [Link],
+        instances: &mut [Instance],
+        mut tell: impl FnMut(Change),
+    ) -> Result {
+        for fault in &mut self.all {
+            fault.see(t, links, instances);
+            if !fault.over && fault.since.is_none() && fault.begin.holds(t, h, instances) {
+                fault.begin(t, links, instances);
+                tell((&fault.label, true));
+            }
+            if fault.since.is_some_and(|since| fault.ends(since, t, h, instances)) {
+                fault.finish(t, instances)?;
+                tell((&fault.label, false));
+            }
+            if fault.since.is_some() {
+                fault.change(t, links, instances)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// For a snapshot.
+    pub fn remember(&self) -> Vec<u64> {
+        let mut out = Vec::new();
+        for fault in &self.all {
+            out.push(u64::from(fault.over) | u64::from(fault.since.is_some()) << 1);
+            out.put(fault.since.unwrap_or(0.0));
+            fault.entries.iter().for_each(|e| e.modifier.remember(&mut out));
+            fault.own.iter().for_each(|own| {
+                own.modifier.remember(&mut out);
+                out.put(own.sound);
+                out.put(own.told);
+            });
+        }
+        out
+    }
+
+    /// Back to a snapshot.
+    pub fn recall(&mut self, kept: &[u64]) {
+        let mut kept = Recall(kept);
+        for fault in &mut self.all {
+            let flags = kept.word();
+            let since = kept.number();
+            (fault.over, fault.since) = (flags & 1 != 0, (flags & 2 != 0).then_some(since));
+            fault.entries.iter_mut().for_each(|e| e.modifier.recall(&mut kept));
+            fault.own.iter_mut().for_each(|own| {
+                own.modifier.recall(&mut kept);
+                (own.sound, own.told) = (kept.number(), kept.number());
+            });
+        }
+    }
+}
+
+/// Where a fault of a variable acts, or why it can act nowhere.
+fn place(
+    variable: VariableRef,
+    links: &[Link],
+    instances: &[Instance],
+    modifier: &Modifier,
+) -> std::result::Result<(Vec<Entry>, Option<Own>), String> {
+    let v = variable.describe(instances);
+    let is_input = matches!(v.causality, Causality::Input | Causality::Parameter);
+    let mut entries = Vec::new();
+    for (link, on) in links.iter().enumerate() {
+        for number in on.numbers_of(variable.slot, v.id, is_input) {
+            let conversion = if is_input { (1.0, 0.0) } else { on.conversion(number) };
+            entries.push(Entry { link, number, conversion, modifier: modifier.clone() });
+        }
+    }
+    if !entries.is_empty() {
+        return Ok((entries, None));
+    }
+    match (is_input, v.value_type, v.effect) {
+        (false, ..) => {
+            Err("feeds no number of another subsystem: a fault of an output acts on its connections".into())
+        }
+        (_, ValueType::String | ValueType::Binary | ValueType::Clock, _) => Err("is no number".into()),
+        (_, _, Effect::Live) => {
+            Ok((entries, Some(Own { variable, modifier: modifier.clone(), sound: 0.0, told: f64::NAN })))
+        }
+        _ => Err("cannot be set between steps".into()),
+    }
+}
+
+impl Fault {
+    fn see(&mut self, t: f64, links: &[Link], instances: &[Instance]) {
+        for e in &mut self.entries {
+            let x = e.sound(links[e.link].value(e.number));
+            e.modifier.see(t, x);
+        }
+        if let Some(own) = &mut self.own {
+            let now = own.variable.number(instances).unwrap_or(f64::NAN);
+            // what the fault itself has set is not what anybody wanted
+            if self.since.is_none() || now != own.told {
+                own.sound = now;
+            }
+            own.modifier.see(t, own.sound);
+        }
+    }
+
+    fn begin(&mut self, t: f64, links: &[Link], instances: &[Instance]) {
+        self.since = Some(t);
+        for e in &mut self.entries {
+            let x = e.sound(links[e.link].value(e.number));
+            e.modifier.begin(t, x);
+        }
+        if let Some(own) = &mut self.own {
+            own.sound = own.variable.number(instances).unwrap_or(f64::NAN);
+            own.told = own.sound;
+            own.modifier.begin(t, own.sound);
+        }
+    }
+
+    fn ends(&self, since: f64, t: f64, h: f64, instances: &[Instance]) -> bool {
+        match &self.end {
+            End::Never => false,
+            End::Trigger(end) => end.holds(t, h, instances),
+            End::After(duration) => t >= since + duration - 1e-9 * h,
+        }
+    }
+
+    fn finish(&mut self, t: f64, instances: &mut [Instance]) -> Result {
+        (self.since, self.over) = (None, true);
+        match &mut self.own {
+            Some(own) => {
+                let sound = own.sound;
+                own.set(t, sound, instances)
+            }
+            None => Ok(()),
+        }
+    }
+
+    fn change(&mut self, t: f64, links: &mut [Link], instances: &mut [Instance]) -> Result {
+        for e in &mut self.entries {
+            let value = links[e.link].value_mut(e.number);
+            let (a, b) = e.conversion;
+            let changed = e.modifier.changed(t, e.sound(*value));
+            *value = if (a, b) == (1.0, 0.0) { changed } else { a * changed + b };
+        }
+        match &mut self.own {
+            Some(own) => {
+                let changed = own.modifier.changed(t, own.sound);
+                own.set(t, changed, instances)
+            }
+            None => Ok(()),
+        }
+    }
+}
+
+impl Entry {
+    /// The number in the unit that the fault is given in.
+    fn sound(&self, value: f64) -> f64 {
+        match self.conversion {
+            (1.0, 0.0) => value,
+            (0.0, b) => b,
+            (a, b) => (value - b) / a,
+        }
+    }
+}
+
+impl Own {
+    fn set(&mut self, time_s: f64, number: f64, instances: &mut [Instance]) -> Result {
+        let v = self.variable.describe(instances);
+        let value = match v.value_type {
+            ValueType::Bool => Value::Bool(number != 0.0),
+            ValueType::F64 | ValueType::F32 => Value::from(number),
+            _ if number.fract() == 0.0 && number.abs() < 9e15 => Value::from(number as i64),
+            _ => Value::from(number),
+        };
+        if let Reply::Refused(reason) = self.variable.set(instances, true, &value)? {
+            return Err(Error::Simulation { time_s, message: format!("a fault: {reason}") });
+        }
+        self.told = self.variable.number(instances).unwrap_or(number);
+        Ok(())
+    }
+}

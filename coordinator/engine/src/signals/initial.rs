@@ -1,0 +1,194 @@
+//! Values that are connected at the start: passed on in the order in which they depend on each other, loops by Newton.
+//!
+//! Units of FMI answer with outputs that depend on inputs of the same time while they initialise. A chain is settled by
+//! passing values on until nothing changes. What still changes then is a loop: r(u) = y(u) − u = 0 over all connected
+//! inputs, Newton with the Jacobian by directional derivatives where all subsystems of a column know them, else by
+//! differences.
+
+use super::connection::Link;
+use terraglue_diagnostics::{Error, Result};
+use terraglue_host::Instance;
+
+/// Iterations of Newton before a loop counts as without a solution.
+const ITERATIONS: u32 = 50;
+/// Relative size of a residual at which it counts as solved.
+const SOLVED: f64 = 1e-12;
+/// Relative step of a difference.
+const DIFFERENCE: f64 = 1e-7;
+
+/// Settles all connected start values.
+///
+/// # Errors
+/// A loop without a solution, with its members and the residual that was left.
+pub fn settle(links: &mut [Link], instances: &mut [Instance]) -> Result {
+    let mut u = read(links, instances)?;
+    let start = u.clone();
+    for _ in 0..=u.len() {
+        write(links, instances, &u)?;
+        let y = read(links, instances)?;
+        if largest(&y, &u) <= SOLVED * scale(&y) {
+            return write(links, instances, &y);
+        }
+        if y.iter().any(|x| !x.is_finite() || x.abs() > 1e100) {
+            break;
+        }
+        u = y;
+    }
+    // What has run away is no start for Newton.
+    newton(links, instances, start)
+}
+
+fn newton(links: &mut [Link], instances: &mut [Instance], mut u: Vec<f64>) -> Result {
+    let mut residual = residual_at(links, instances, &u)?;
+    for _ in 0..ITERATIONS {
+        if size(&residual) <= SOLVED * scale(&u) {
+            return write(links, instances, &u);
+        }
+        let jacobian = differences(links, instances, &u, &residual)?;
+        let Some(step) = solve(jacobian, &residual) else { break };
+        let mut share = 1.0;
+        let (mut best, there) = (None, size(&residual));
+        // The full step, halved while it makes things worse.
+        for _ in 0..20 {
+            let new: Vec<f64> = u.iter().zip(&step).map(|(u, d)| u - share * d).collect();
+            let r = residual_at(links, instances, &new)?;
+            if size(&r) < there || size(&r) <= SOLVED * scale(&new) {
+                best = Some((new, r));
+                break;
+            }
+            share *= 0.5;
+        }
+        let Some((new, r)) = best else { break };
+        (u, residual) = (new, r);
+    }
+    if size(&residual) <= 1e-10 * scale(&u) {
+        return write(links, instances, &u);
+    }
+    Err(unsolved(links, instances, &u, &residual)?)
+}
+
+fn residual_at(links: &mut [Link], instances: &mut [Instance], u: &[f64]) -> Result<Vec<f64>> {
+    write(links, instances, u)?;
+    Ok(read(links, instances)?.iter().zip(u).map(|(y, u)| y - u).collect())
+}
+
+/// dr/du, column by column.
+fn differences(
+    links: &mut [Link],
+    instances: &mut [Instance],
+    u: &[f64],
+    residual: &[f64],
+) -> Result<Vec<Vec<f64>>> {
+    let mut columns = Vec::with_capacity(u.len());
+    let mut at = u.to_vec();
+    let places: Vec<[usize; 2]> =
+        links.iter().enumerate().flat_map(|(l, link)| (0..link.len()).map(move |e| [l, e])).collect();
+    for (k, [l, e]) in places.into_iter().enumerate() {
+        if let Some(mut column) = known(links, instances, l, e)? {
+            column[k] -= 1.0;
+            columns.push(column);
+            continue;
+        }
+        let delta = DIFFERENCE * u[k].abs().max(1.0);
+        at[k] = u[k] + delta;
+        let exact = at[k] - u[k];
+        let r = residual_at(links, instances, &at)?;
+        columns.push(r.iter().zip(residual).map(|(new, old)| (new - old) / exact).collect());
+        at[k] = u[k];
+        write(links, instances, u)?;
+    }
+    Ok(columns)
+}
+
+/// dy/du of entry `e` of link `l`, where it is known without trying.
+fn known(links: &[Link], instances: &[Instance], l: usize, e: usize) -> Result<Option<Vec<f64>>> {
+    let mut column = Vec::new();
+    for link in links {
+        let Some(part) = link.derivatives(instances, &links[l], e)? else { return Ok(None) };
+        column.extend(part);
+    }
+    Ok(Some(column))
+}
+
+/// Gauss with pivoting; none where the matrix is singular.
+fn solve(columns: Vec<Vec<f64>>, right: &[f64]) -> Option<Vec<f64>> {
+    let n = right.len();
+    let mut rows: Vec<Vec<f64>> =
+        (0..n).map(|r| columns.iter().map(|c| c[r]).chain([right[r]]).collect()).collect();
+    for k in 0..n {
+        let pivot = (k..n).max_by(|a, b| rows[*a][k].abs().total_cmp(&rows[*b][k].abs()))?;
+        rows.swap(k, pivot);
+        if rows[k][k].abs() < 1e-9 {
+            return None;
+        }
+        for r in k + 1..n {
+            let factor = rows[r][k] / rows[k][k];
+            for c in k..=n {
+                rows[r][c] -= factor * rows[k][c];
+            }
+        }
+    }
+    let mut x = vec![0.0; n];
+    for k in (0..n).rev() {
+        let sum: f64 = (k + 1..n).map(|c| rows[k][c] * x[c]).sum();
+        x[k] = (rows[k][n] - sum) / rows[k][k];
+    }
+    Some(x)
+}
+
+#[cold]
+fn unsolved(links: &mut [Link], instances: &mut [Instance], u: &[f64], residual: &[f64]) -> Result<Error> {
+    let matrix = differences(links, instances, u, residual)?;
+    // An input is in a loop where its own value comes back to it over other inputs.
+    let n = u.len();
+    let feeds = |from: usize, to: usize| (matrix[from][to] + f64::from(u8::from(from == to))).abs() > 1e-9;
+    let mut reach: Vec<Vec<bool>> = (0..n).map(|a| (0..n).map(|b| feeds(a, b)).collect()).collect();
+    for middle in 0..n {
+        for a in 0..n {
+            for b in 0..n {
+                reach[a][b] |= reach[a][middle] && reach[middle][b];
+            }
+        }
+    }
+    let names: Vec<String> = links.iter().flat_map(|l| l.names(instances)).collect();
+    let in_loop: Vec<&str> =
+        names.iter().enumerate().filter(|(k, _)| reach[*k][*k]).map(|(_, n)| n.as_str()).collect();
+    let left = size(residual);
+    let message = format!(
+        "the loop of connections {} has no solution at the start; the values miss each other by {left:.3e}",
+        in_loop.join(", ")
+    );
+    Ok(Error::Simulation { time_s: 0.0, message })
+}
+
+fn read(links: &mut [Link], instances: &mut [Instance]) -> Result<Vec<f64>> {
+    let mut all = Vec::new();
+    for link in links {
+        all.extend_from_slice(link.read(instances)?);
+    }
+    Ok(all)
+}
+
+fn write(links: &mut [Link], instances: &mut [Instance], mut values: &[f64]) -> Result {
+    for link in links {
+        let (own, rest) = values.split_at(link.len());
+        link.write(instances, own)?;
+        values = rest;
+    }
+    Ok(())
+}
+
+fn size(values: &[f64]) -> f64 {
+    values.iter().fold(0.0, |m, x| if x.is_nan() { f64::INFINITY } else { f64::max(m, x.abs()) })
+}
+
+fn scale(values: &[f64]) -> f64 {
+    size(values).max(1.0)
+}
+
+fn largest(a: &[f64], b: &[f64]) -> f64 {
+    a.iter()
+        .zip(b)
+        .map(|(a, b)| (a - b).abs())
+        .fold(0.0, |m, x| if x.is_nan() { f64::INFINITY } else { m.max(x) })
+}

@@ -1,0 +1,622 @@
+//! From a checked scenario to a testbed: terrain, modules, instances, the group of glued subsystems, signals.
+
+use super::pieces;
+use super::unglued::{Turn, Unglued};
+use super::{Group, Member, Options, Testbed};
+use crate::signals::{self, Directory, Faults, TimeLine};
+use std::sync::Arc;
+use std::time::Duration;
+use terraglue_diagnostics::{Error, Result};
+use terraglue_gluing as gluing;
+use terraglue_gluing::contact::{BodySide, ContactDetector, GroundSide, PortSet};
+use terraglue_gluing::glue::Recipe;
+use terraglue_gluing::step_control::{Passage, StepControl};
+use terraglue_gluing::timing::Timings;
+use terraglue_gluing::{Exchange, StepReport};
+use terraglue_host::crash::Beginning;
+use terraglue_host::isolation::{self, What};
+use terraglue_host::law;
+use terraglue_host::{
+    HostServices, Instance, Library, LoadError, LoadedModule, SearchPath, Workers, interpreter, is_python,
+};
+use terraglue_scenario as scenario;
+use terraglue_scenario::{Entry, GlueSpec, GluingSpec, InputError, Scenario, StrategyKind, SubsystemSpec};
+use terraglue_subsystem::{
+    BodyState, Capabilities, Config, Energy, Hold, Kind, Law, Level, Subsystem, Terrain,
+};
+use terraglue_terrain as terrain;
+
+impl Testbed {
+    /// Builds a scenario with modules found as libraries.
+    ///
+    /// # Errors
+    /// Wrong input ([`Error::Input`]): a module that is not found, a parameter, a name in a connection or event.
+    pub fn build(scenario: &Scenario, options: &Options) -> Result<Self> {
+        Self::build_with(scenario, options, &Library::new())
+    }
+
+    /// The same; modules linked into the program come first.
+    pub fn build_with(scenario: &Scenario, options: &Options, library: &Library) -> Result<Self> {
+        Self::build_hosted(scenario, options, library, |services| services)
+    }
+
+    /// The same with services that the caller changes: the log, the number of states that can be kept.
+    pub fn build_hosted(
+        scenario: &Scenario,
+        options: &Options,
+        library: &Library,
+        change: impl FnOnce(HostServices) -> HostServices,
+    ) -> Result<Self> {
+        let services = services(scenario, options, true)?;
+        let terrain = services.terrain.clone();
+        let services = change(services);
+        let advice = [scenario::advice::late_events(scenario), scenario::advice::unread_keys(scenario)];
+        let doubt = scenario::plausible::terrain(scenario);
+        let long = scenario::advice::many_steps(scenario);
+        advice.iter().flatten().chain(&doubt).chain(&long).for_each(|advice| log::warn!("{advice}"));
+        let instances = instantiate(scenario, options, library, &services)?;
+        let directory = Directory::new(&instances);
+        let links = signals::connect(&scenario.connections, &directory, &instances, &scenario.source)?;
+        let time_line = TimeLine::new(&scenario.events, &directory, &instances, &scenario.source)?;
+        let random = (scenario.world.seed, scenario.time.step_s);
+        let source = &scenario.source;
+        let faults = Faults::new(&scenario.faults, &links.numbers, &directory, &instances, source, random)?;
+        check_report(scenario, &directory, &instances)?;
+        let groups = groups(scenario, &instances)?;
+        check_settling(scenario, &groups, &instances)?;
+        let ground = groups.iter().find(|g| g.exchange.has_grounds());
+        let detector = detector(ground, &instances, terrain.as_deref())?;
+        let mut testbed = Self {
+            turns: turns(scenario, &instances, &groups),
+            members: instances.iter().map(member).collect(),
+            detector,
+            gravity: services.gravity,
+            contact_margin_m: scenario.gluing.contact_margin_m,
+            control: control(scenario, &groups, &instances)?,
+            groups,
+            no_ports: PortSet::default(),
+            failed: "none",
+            links,
+            time_line,
+            faults,
+            exact: takes_parts(scenario, &instances),
+            directory,
+            instances,
+            happenings: Vec::new(),
+            report: StepReport { converged: true, ..StepReport::default() },
+            timings: Timings::default(),
+            unglued: Unglued::new(services.workers.clone()),
+            cancel: options.cancel.clone(),
+            standing: options.standing.clone(),
+            partings: services.partings.clone(),
+            step_s: scenario.time.step_s,
+            origin_s: 0.0,
+            nominal: 0,
+            index: 0,
+            t: 0.0,
+            last_h: 0.0,
+            settle_s: scenario.time.settle_s,
+            before: Energy::default(),
+            halvings: 0,
+            max_halvings: scenario.gluing.max_halvings,
+            hold: hold(&scenario.gluing.hold),
+            started: false,
+        };
+        let glued = testbed.instances.iter_mut().zip(&testbed.turns).filter(|(_, turn)| turn.glued);
+        glued.for_each(|(instance, _)| instance.watch());
+        testbed.settle()?;
+        testbed.read_states()?;
+        if let Err(Error::Simulation { message, .. }) = testbed.detect_contacts(scenario.time.step_s) {
+            let help = "docs/scenario.md has the keys of `[terrain]`, `terraglue modules NAME` those that set a body down";
+            return Err(InputError::plain(format!("at the start: {message}"), Some(help.into())).into());
+        }
+        Ok(testbed)
+    }
+}
+
+/// Units know no time before their start, so none can be among what comes to rest before t = 0.
+fn check_settling(scenario: &Scenario, groups: &[Group], instances: &[Instance]) -> Result {
+    let settle_s = scenario.time.settle_s;
+    let glued = |slot: usize| groups.iter().any(|g| g.exchange.members().any(|m| m == slot));
+    let mut units = instances.iter().enumerate().filter(|(slot, i)| {
+        terraglue_scenario::ModuleKind::is_fmu(i.module()) && (glued(*slot) || !i.scene().bodies.is_empty())
+    });
+    let Some((_, unit)) = units.next().filter(|_| settle_s > 0.0) else { return Ok(()) };
+    let message = format!(
+        "`settle_s` = {settle_s} s: `{}` is a functional mock-up unit, whose time begins at 0",
+        unit.name()
+    );
+    let help = Some("leave `settle_s` out, or give the body a module".to_owned());
+    Err(scenario.source.error_at_value(&["time", "settle_s"], message, help).into())
+}
+
+/// Whether a step of the run may end at any time: all subsystems make every step, and of any length.
+fn takes_parts(scenario: &Scenario, instances: &[Instance]) -> bool {
+    let any = |i: &Instance| !i.capabilities().has(Capabilities::FIXED_STEP);
+    scenario.subsystems.iter().all(|s| s.step_multiple <= 1) && instances.iter().all(any)
+}
+
+/// What instances of a scenario are offered; `ground`: with the terrain, where it has one.
+pub fn services(scenario: &Scenario, options: &Options, ground: bool) -> Result<HostServices> {
+    let terrain: Option<Arc<dyn Terrain>> = match scenario.terrain.as_ref().filter(|_| ground) {
+        Some(spec) => Some(Arc::from(terrain::build(spec, scenario.world.seed)?)),
+        None => None,
+    };
+    Ok(HostServices {
+        gravity: scenario.world.gravity_m_s2,
+        terrain,
+        workers: Arc::new(Workers::new(options.threads)),
+        cancel: options.cancel.clone(),
+        ..HostServices::new(scenario.world.seed, &scenario.folder)
+    })
+}
+
+/// The module of a subsystem.
+pub fn find(
+    scenario: &Scenario,
+    spec: &SubsystemSpec,
+    options: &Options,
+    library: &Library,
+) -> Result<LoadedModule> {
+    let search = SearchPath::standard(&options.module_paths, &scenario.folder);
+    let found = library.find(&spec.module, &search, &scenario.folder);
+    found.map_err(|e| module_error(scenario, spec, &e).into())
+}
+
+/// An instance of a module, in this process or in one of its own.
+pub fn make(
+    scenario: &Scenario,
+    spec: &SubsystemSpec,
+    module: LoadedModule,
+    config: Config,
+    services: &HostServices,
+) -> Result<Instance> {
+    let config = terraglue_terrain::resolve_mask(scenario, spec, config, services.terrain.as_deref())?;
+    let module = module.run_by(interpreter(spec.python.as_deref(), &scenario.folder));
+    let made = match spec.isolate || module.is_python() {
+        true => module.instantiate_isolated(&spec.name, config, services, spec.isolation),
+        false => {
+            let services = HostServices { isolation: spec.isolation, ..services.clone() };
+            module.instantiate(&spec.name, config, &services)
+        }
+    };
+    made.map_err(|e| module_error(scenario, spec, &e).into())
+}
+
+fn instantiate(
+    scenario: &Scenario,
+    options: &Options,
+    library: &Library,
+    services: &HostServices,
+) -> Result<Vec<Instance>> {
+    let search = SearchPath::standard(&options.module_paths, &scenario.folder);
+    let mut instances = Vec::new();
+    for spec in &scenario.subsystems {
+        if terraglue_scenario::ModuleKind::is_fmu(&spec.module) {
+            let folder = std::env::current_dir();
+            instances.push(unit(scenario, spec, library, services)?);
+            stay_in(folder, &spec.name);
+            continue;
+        }
+        let module = find(scenario, spec, options, library)?;
+        let config = scenario::check_parameters(module.schema(), spec, &scenario.source)?;
+        for name in scenario::SHIPPED_MODULES.iter().filter(|name| spec.parameters.contains_key(**name)) {
+            let Ok(other) = library.find(name, &search, &scenario.folder) else { continue };
+            if other.schema().name != module.schema().name
+                && let Some(advice) = scenario::advice::unchosen(other.schema(), spec, &scenario.source)
+            {
+                log::warn!("{advice}");
+            }
+        }
+        let gravity = terraglue_numerics::rotation::length(services.gravity);
+        let replaced = scenario::advice::replaced_laws(scenario, spec, &config, gravity);
+        let doubts = scenario::plausible::soil(scenario, spec, module.schema(), &config);
+        let foreign = scenario::advice::foreign_gravity(scenario, spec, &config, gravity);
+        replaced.iter().chain(&doubts).chain(&foreign).for_each(|advice| log::warn!("{advice}"));
+        let advice = scenario::advice::law_parameters(module.schema(), spec, &scenario.source);
+        advice.iter().for_each(|advice| log::warn!("{advice}"));
+        let config = with_law(config, &search, scenario, spec)?;
+        instances.push(make(scenario, spec, module, config, services)?);
+    }
+    Ok(instances)
+}
+
+/// Goes back to the working folder, on which the paths of the other subsystems may rest, where `name` has left it.
+fn stay_in(folder: std::io::Result<std::path::PathBuf>, name: &str) {
+    if let Ok(folder) = folder
+        && std::env::current_dir().is_ok_and(|now| now != folder)
+        && std::env::set_current_dir(&folder).is_ok()
+    {
+        log::warn!(
+            "`{name}` changed the working folder of the process; it is set back to `{}`",
+            folder.display()
+        );
+    }
+}
+
+/// The same parameters with the file of the law that they name.
+pub fn with_law(
+    config: Config,
+    search: &SearchPath,
+    scenario: &Scenario,
+    spec: &SubsystemSpec,
+) -> Result<Config> {
+    let Some(name) = config.get(law::KEY).and_then(|v| v.as_str()) else { return Ok(config) };
+    let path = law::locate(name, search, &scenario.folder).map_err(|e| {
+        let help = e.nearest().map(|n| format!("did you mean `{n}`?"));
+        scenario.source.error_at_value(&[&spec.name, "law", "plugin"], e.to_string(), help)
+    })?;
+    let path = std::path::absolute(&path).unwrap_or(path);
+    let config = config.with(law::KEY, path.to_string_lossy().as_ref());
+    Ok(match spec.python.as_deref().filter(|_| is_python(&path)) {
+        None => config,
+        Some(python) => {
+            let python = interpreter(Some(python), &scenario.folder);
+            config.with(law::INTERPRETER, python.to_string_lossy().as_ref())
+        }
+    })
+}
+
+/// A functional mock-up unit as an instance.
+fn unit(
+    scenario: &Scenario,
+    spec: &SubsystemSpec,
+    library: &Library,
+    services: &HostServices,
+) -> Result<Instance> {
+    let path = scenario.folder.join(&spec.module);
+    let host = services.for_instance(&spec.name);
+    let _begun = Beginning::of_instance(&spec.name, &path);
+    let once = || terraglue_fmi::Fmu::inspect(&path).is_ok_and(|(d, _)| d.capabilities.once_per_process);
+    let made: terraglue_subsystem::Result<Box<dyn Subsystem>> = match spec.isolate {
+        // One instance per process is all that such a unit stands.
+        false if !once() => {
+            library.fmus().and_then(|make| make(&path, &spec.parameters, host, services.partings.clone()))
+        }
+        _ => {
+            let what = What::Unit {
+                path: std::path::absolute(&path).unwrap_or_else(|_| path.clone()),
+                parameters: spec.parameters.clone(),
+            };
+            isolation::start(what, &host, services, spec.isolation)
+        }
+    };
+    let made = made.map_err(|e| -> Error {
+        match e {
+            // What it did, not what was written about it.
+            terraglue_subsystem::Error::Fatal(message) => Error::Module {
+                subsystem: spec.name.clone(),
+                module: spec.module.clone(),
+                function: "instantiate",
+                time_s: 0.0,
+                message,
+            },
+            other => {
+                let message = format!("{} ({}): {other}", spec.name, spec.module);
+                scenario.source.error_at_value(&[&spec.name, "fmu"], message, None).into()
+            }
+        }
+    })?;
+    Ok(Instance::new(&spec.name, &spec.module, Kind::Controller, made))
+}
+
+/// What to do where a module is not found.
+const NO_MODULE: &str = "`terraglue modules` lists those that are found. `cargo build` makes those of the project beside the \
+                         program, `cargo xtask install PREFIX` installs them with it; --module-path DIR or \
+                         TERRAGLUE_MODULE_PATH adds a folder, and `module` may be the path of a file";
+
+fn module_error(scenario: &Scenario, spec: &SubsystemSpec, error: &LoadError) -> Box<InputError> {
+    if let LoadError::Refused { message, .. } = error
+        && let Some(shown) = InputError::of_file(message, &error.to_string())
+    {
+        return shown;
+    }
+    let near = error.nearest().map(|n| format!("did you mean `{n}`?"));
+    let help = near.or_else(|| error.is_unknown().then(|| NO_MODULE.to_owned()));
+    let key = match error {
+        LoadError::Refused { .. } | LoadError::Instantiate { .. } => vec![spec.name.as_str()],
+        _ => vec![spec.name.as_str(), "module"],
+    };
+    scenario.source.error_at_value(&key, error.to_string(), help)
+}
+
+fn member(instance: &Instance) -> Member {
+    Member { states: vec![BodyState::REST; instance.scene().bodies.len()], cost: Duration::ZERO }
+}
+
+fn turns(scenario: &Scenario, instances: &[Instance], groups: &[Group]) -> Vec<Turn> {
+    let glued = |slot| groups.iter().any(|g| g.exchange.members().any(|m| m == slot));
+    let turn = |(slot, (spec, instance)): (usize, (&SubsystemSpec, &Instance))| Turn {
+        step_multiple: spec.step_multiple.max(1),
+        glued: glued(slot),
+        holds: false,
+        has_bodies: !instance.scene().bodies.is_empty(),
+        trial: None,
+    };
+    scenario.subsystems.iter().zip(instances).enumerate().map(turn).collect()
+}
+
+/// Bodies that can touch the ground, with the ground, and all that glue connects: one group each.
+fn groups(scenario: &Scenario, instances: &[Instance]) -> Result<Vec<Group>> {
+    let glue = glue(scenario, instances)?;
+    pieces::check(scenario, instances, &glue, &body_states(instances)?)?;
+    let grounds: Vec<usize> = (0..instances.len()).filter(|k| instances[*k].kind() == Kind::Soil).collect();
+    if let [first, second, ..] = grounds[..] {
+        let message = format!(
+            "`{}` and `{}` are both soils, but the terrain can belong to one only",
+            instances[first].name(),
+            instances[second].name()
+        );
+        let source = &scenario.source;
+        return Err(source.error_at_value(&[instances[second].name()], message, None).into());
+    }
+    // the smallest member that a subsystem is connected with; none: it is not glued
+    let mut root: Vec<Option<usize>> = vec![None; instances.len()];
+    for (slot, instance) in instances.iter().enumerate() {
+        let stands = instance.kind() == Kind::Robot
+            && instance.capabilities().has(Capabilities::FORCE)
+            && instance.scene().shapes.iter().any(|s| s.collides);
+        if let Some(ground) = grounds.first().filter(|_| stands) {
+            join(&mut root, slot, *ground);
+        }
+    }
+    for ends in &glue {
+        let [a, b] = ends.ends.map(|e| e.map(|(slot, _)| slot));
+        if let Some(a) = a.or(b) {
+            join(&mut root, a, b.unwrap_or(a));
+        }
+    }
+    let mut all = Vec::new();
+    for first in (0..instances.len()).filter(|k| root[*k] == Some(*k)) {
+        let of = |soil: bool| -> Vec<usize> {
+            let is = |k: &usize| root[*k] == Some(first) && (instances[*k].kind() == Kind::Soil) == soil;
+            (0..instances.len()).filter(is).collect()
+        };
+        let (bodies, grounds) = (of(false), of(true));
+        if !bodies.is_empty() {
+            all.push(group(scenario, instances, &bodies, &grounds, &glue)?);
+        }
+    }
+    Ok(all)
+}
+
+/// Makes two subsystems members of one group.
+fn join(root: &mut [Option<usize>], a: usize, b: usize) {
+    let (of_a, of_b) = (root[a].unwrap_or(a), root[b].unwrap_or(b));
+    let smallest = of_a.min(of_b);
+    for entry in root.iter_mut().flatten().filter(|r| **r == of_a || **r == of_b) {
+        *entry = smallest;
+    }
+    (root[a], root[b]) = (Some(smallest), Some(smallest));
+}
+
+/// One group with its strategy.
+fn group(
+    scenario: &Scenario,
+    instances: &[Instance],
+    bodies: &[usize],
+    grounds: &[usize],
+    glue: &[Recipe],
+) -> Result<Group> {
+    let gravity = terraglue_numerics::rotation::length(scenario.world.gravity_m_s2);
+    let mass: f64 = bodies.iter().flat_map(|b| &instances[*b].scene().bodies).map(|b| b.mass).sum();
+    let weight = mass * gravity;
+    let mut exchange = Exchange::new(bodies, grounds, if weight > 0.0 { weight } else { 1.0 });
+    let states = body_states(instances)?;
+    let own = |r: &&Recipe| r.ends.iter().flatten().any(|(slot, _)| bodies.contains(slot));
+    for recipe in glue.iter().filter(own) {
+        exchange.glue.add(recipe, |slot, body| states[slot][body as usize]);
+    }
+    exchange.stabilisation = scenario.gluing.stabilisation;
+    exchange.level = match scenario.gluing.level.as_str() {
+        "velocity" => Level::Velocity,
+        "acceleration" => Level::Acceleration,
+        _ => Level::Position,
+    };
+    let (own, at) = own_strategy(scenario, glue.iter().filter(own).map(|r| r.number))?;
+    let spec = &GluingSpec { strategy: own.unwrap_or(scenario.gluing.strategy), ..scenario.gluing.clone() };
+    if let Some(refusal) = gluing::refusal(spec, &exchange, instances) {
+        let help = match refusal.would_work.as_slice() {
+            [] => "no strategy of this version can glue these subsystems".into(),
+            names => format!("these would work: {}", names.join(", ")),
+        };
+        let source = &scenario.source;
+        return Err(match (at, refusal.key) {
+            (Some(entry), "strategy") => source.error_in(entry, &["strategy"], refusal.reason, Some(help)),
+            (_, key) => source.error_at_value(&["gluing", key], refusal.reason, refusal.help.or(Some(help))),
+        }
+        .into());
+    }
+    let can_start = |s: usize| instances[s].capabilities().has(Capabilities::FORCE | Capabilities::RETRY);
+    let start =
+        (exchange.glue.has_joints() && exchange.body_slots().all(can_start)).then(|| gluing::start(spec));
+    let strategy = gluing::strategy(spec);
+    Ok(Group { exchange, strategy, own, start, closed: Vec::new(), passage: Passage::default() })
+}
+
+/// The strategy that the glue of a group names, and where; all that name one must agree.
+fn own_strategy(
+    scenario: &Scenario,
+    numbers: impl Iterator<Item = usize>,
+) -> Result<(Option<StrategyKind>, Option<Entry>)> {
+    let mut found: Option<&GlueSpec> = None;
+    for spec in numbers.map(|k| &scenario.glue[k]).filter(|s| s.strategy.is_some()) {
+        match found {
+            Some(other) if other.strategy != spec.strategy => {
+                let message: String = "glue of one group, but another strategy is named before".into();
+                let help =
+                    Some("subsystems that are connected by glue are solved together, by one strategy".into());
+                return Err(scenario.source.error_in(spec.entry, &["strategy"], message, help).into());
+            }
+            _ => found = Some(spec),
+        }
+    }
+    Ok((found.and_then(|s| s.strategy), found.map(|s| s.entry)))
+}
+
+/// The control of the steps, where the scenario asks for it and all can follow.
+fn control(scenario: &Scenario, groups: &[Group], instances: &[Instance]) -> Result<Option<StepControl>> {
+    let Some(tolerance) = scenario.gluing.energy_residual_j else { return Ok(None) };
+    let refused = |message: String, help: &str| {
+        let at = &["gluing", "energy_residual_j"];
+        Err(Error::from(scenario.source.error_at_value(at, message, Some(help.into()))))
+    };
+    if let Some(fixed) = instances.iter().find(|i| i.capabilities().has(Capabilities::FIXED_STEP)) {
+        let message = format!("`{}` ({}) makes steps of one length only", fixed.name(), fixed.module());
+        return refused(message, "leave the key out: all steps are then time.step_s long");
+    }
+    if !groups.iter().any(|g| g.exchange.has_grounds() || g.exchange.glue.spring().is_some()) {
+        let message = "no soil and no spring is glued: a constraint passes as much energy as it takes, so there is \
+                       no residual to set the steps by";
+        return refused(message.into(), "give the glue a compliance_m_n, or leave the key out");
+    }
+    let longest = scenario.time.step_s;
+    let shortest = scenario.gluing.step_min_s.unwrap_or(0.01 * longest);
+    if shortest > longest {
+        let at = &["gluing", "step_min_s"];
+        let message = format!("{shortest} s is longer than time.step_s, the longest step");
+        return Err(scenario.source.error_at_value(at, message, None).into());
+    }
+    Ok(Some(StepControl::new(tolerance, [shortest, longest])))
+}
+
+fn hold(text: &str) -> Hold {
+    match text {
+        "constant" => Hold::Constant,
+        "linear" => Hold::Linear,
+        "two-parameter" => Hold::Ramp,
+        _ => Hold::End,
+    }
+}
+
+/// Committed states of all bodies.
+fn body_states(instances: &[Instance]) -> Result<Vec<Vec<BodyState>>> {
+    let mut states: Vec<Vec<BodyState>> = Vec::new();
+    for instance in instances {
+        let mut own = vec![BodyState::REST; instance.scene().bodies.len()];
+        instance.body_states(&mut own)?;
+        states.push(own);
+    }
+    Ok(states)
+}
+
+/// The glue that the scenario declares, between bodies that exist.
+fn glue(scenario: &Scenario, instances: &[Instance]) -> Result<Vec<Recipe>> {
+    let mut glue = Vec::new();
+    let source = &scenario.source;
+    let wrong = |spec: &GlueSpec, words: &[&str], message: String, help: Option<String>| {
+        Error::from(source.error_in(spec.entry, words, message, help))
+    };
+    let states = body_states(instances)?;
+    for (number, spec) in scenario.glue.iter().enumerate() {
+        let mut ends = [None; 2];
+        for (end, side) in ends.iter_mut().zip(&spec.sides).filter(|(_, side)| *side != "world") {
+            let (name, body) = side.split_once('.').unwrap_or((side, ""));
+            let slot = instances.iter().position(|i| i.name() == name);
+            let found = slot
+                .and_then(|s| Some((s, instances[s].scene().bodies.iter().position(|b| b.name == body)?)));
+            let Some((slot, k)) = found else {
+                let names: Vec<&str> = slot
+                    .iter()
+                    .flat_map(|s| instances[*s].scene().bodies.iter().map(|b| b.name.as_str()))
+                    .collect();
+                let help = scenario::did_you_mean(body, names.iter().copied());
+                return Err(wrong(spec, &[side], format!("glue: body `{side}` does not exist"), help));
+            };
+            *end = Some((slot, k as u32));
+        }
+        let soil_at = |e: usize| ends[e].is_some_and(|(s, _)| instances[s].kind() == Kind::Soil);
+        if soil_at(0) || soil_at(1) && !spec.contact {
+            let message = "a soil is side 2 of glue of kind `contact`".into();
+            return Err(wrong(spec, &[&spec.sides[1]], message, None));
+        }
+        if ends[0].map(|e| e.0) == ends[1].map(|e| e.0) {
+            return Err(wrong(spec, &[&spec.sides[1]], "glue joins two different subsystems".into(), None));
+        }
+        let law = Law {
+            t_min: if spec.contact { 0.0 } else { f64::NEG_INFINITY },
+            t_max: spec.t_max,
+            mu: if spec.contact { spec.mu } else { f64::INFINITY },
+            compliance: spec.compliance,
+        };
+        let axes =
+            if spec.contact { axes(spec.normal) } else { [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0] };
+        let at = spec.at_m.or(if spec.contact && soil_at(1) {
+            ends[0].map(|(s, b)| states[s][b as usize].world_from_body.position)
+        } else {
+            None
+        });
+        let (mask, turning, soil) = (spec.mask, spec.turning, soil_at(1));
+        let (damping, contact) = (spec.damping, spec.contact);
+        glue.push(Recipe { number, ends, at, mask, axes, turning, law, damping, contact, soil });
+    }
+    Ok(glue)
+}
+
+/// n along a vector and two tangents: the first in the plane of n and x where that exists.
+fn axes(normal: [f64; 3]) -> [f64; 9] {
+    let size = normal.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let n = normal.map(|x| if size > 0.0 { x / size } else { 0.0 });
+    let seed = if n[0].abs() < 0.9 { [1.0, 0.0, 0.0] } else { [0.0, 1.0, 0.0] };
+    let along: f64 = (0..3).map(|k| seed[k] * n[k]).sum();
+    let t = [0, 1, 2].map(|k| seed[k] - along * n[k]);
+    let length = t.iter().map(|x| x * x).sum::<f64>().sqrt();
+    let t = t.map(|x| x / length);
+    let b = [n[1] * t[2] - n[2] * t[1], n[2] * t[0] - n[0] * t[2], n[0] * t[1] - n[1] * t[0]];
+    [n[0], n[1], n[2], t[0], t[1], t[2], b[0], b[1], b[2]]
+}
+
+fn detector(
+    group: Option<&Group>,
+    instances: &[Instance],
+    terrain: Option<&dyn Terrain>,
+) -> Result<ContactDetector> {
+    let Some(group) = group else { return ContactDetector::new(&[], &[], terrain) };
+    let body = |slot: usize| BodySide {
+        subsystem: slot as u32,
+        name: instances[slot].name(),
+        scene: instances[slot].scene(),
+    };
+    let ground = |slot: usize| GroundSide { subsystem: slot as u32, instance: instances[slot].subsystem() };
+    // a soil that shows no ground is met by declared glue only
+    let shown = |slot: &usize| {
+        terrain.is_some()
+            || instances[*slot].fields().iter().any(|f| f.name == "height")
+            || group.exchange.glue.is_empty()
+    };
+    let bodies: Vec<_> = group.exchange.body_slots().map(body).collect();
+    let grounds: Vec<_> = group.exchange.ground_slots().filter(shown).map(ground).collect();
+    ContactDetector::new(&bodies, &grounds, terrain)
+}
+
+/// The names that the report speaks of must exist.
+fn check_report(scenario: &Scenario, directory: &Directory, instances: &[Instance]) -> Result {
+    let source = &scenario.source;
+    if let Some(name) = &scenario.report.commanded_speed
+        && directory.find(name).is_none()
+    {
+        let help = directory.hint(name);
+        let message = format!("variable `{name}` does not exist");
+        return Err(source.error_at_value(&["report", "commanded_speed"], message, help).into());
+    }
+    if let Some(name) = &scenario.report.joint
+        && directory.find(&format!("{name}.angle")).is_none()
+    {
+        let joints: Vec<&str> = directory.names().iter().filter_map(|n| n.strip_suffix(".angle")).collect();
+        let help = scenario::did_you_mean(name, joints.iter().copied());
+        let message = format!("joint `{name}` does not exist");
+        return Err(source.error_at_value(&["report", "joint"], message, help).into());
+    }
+    if let Some(name) = &scenario.report.body {
+        let bodies: Vec<String> = instances
+            .iter()
+            .flat_map(|i| i.scene().bodies.iter().map(move |b| format!("{}.{}", i.name(), b.name)))
+            .collect();
+        if !bodies.iter().any(|b| b == name) {
+            let help = scenario::did_you_mean(name, bodies.iter().map(String::as_str));
+            let message = format!("body `{name}` does not exist");
+            return Err(source.error_at_value(&["report", "body"], message, help).into());
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,190 @@
+//! How values go round in a run: the order of the exchange, what every connection does and how late it is, loops.
+
+use super::Testbed;
+use serde::{Deserialize, Serialize};
+use terraglue_scenario::Scenario;
+use terraglue_subsystem::Capabilities;
+
+/// What `terraglue run --explain` prints and the report shows; nothing in it was measured.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Explanation {
+    /// What is done in a step, in this order.
+    pub order: Vec<String>,
+    /// All connections.
+    pub connections: Vec<ConnectionNote>,
+    /// Subsystems whose connections come back to them.
+    pub loops: Vec<String>,
+}
+
+/// A connection in words.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct ConnectionNote {
+    /// Full name of the output.
+    pub from: String,
+    /// Full name of the input.
+    pub to: String,
+    /// What becomes of a value x, with units.
+    pub value: String,
+    /// Steps from when a value holds to the end of the step that it acts on.
+    pub delay: String,
+    /// Why.
+    pub why: String,
+}
+
+impl Testbed {
+    /// Explains the exchange of a run.
+    pub fn explain(&self) -> Explanation {
+        let ends = self.ends();
+        Explanation {
+            order: self.order(&ends),
+            connections: ends.iter().map(|end| self.connection_note(end)).collect(),
+            loops: self.loops(&ends),
+        }
+    }
+
+    fn ends(&self) -> Vec<End> {
+        let numbers = self.links.numbers.iter().flat_map(|link| {
+            link.ends().map(|([from, to], conversion)| End {
+                from,
+                to,
+                conversion: Some(conversion),
+                by_table: false,
+            })
+        });
+        let variable = |at: crate::signals::VariableRef| (at.slot, at.describe(&self.instances).id);
+        let discrete = self.links.discrete.iter().map(|d| {
+            let [from, to] = d.ends().map(variable);
+            End { from, to, conversion: d.conversion(), by_table: d.has_table() }
+        });
+        numbers.chain(discrete).collect()
+    }
+
+    fn order(&self, ends: &[End]) -> Vec<String> {
+        let name = |slot: usize| self.instances[slot].name();
+        let mut order = Vec::new();
+        let through = |k: usize| self.instances[k].capabilities().has(Capabilities::FEEDTHROUGH);
+        if self.links.numbers.iter().any(|l| l.leaves(through)) {
+            order.push(
+                "once, at the start: connected values are passed on until they agree, loops by Newton".into(),
+            );
+        }
+        order.push("events and faults of the communication point".into());
+        if !ends.is_empty() {
+            let [mut from, mut to] =
+                [|e: &End| e.from.0, |e: &End| e.to.0].map(|f| ends.iter().map(f).collect::<Vec<_>>());
+            for slots in [&mut from, &mut to] {
+                slots.sort_unstable();
+                slots.dedup();
+            }
+            let list = |slots: &[usize]| slots.iter().map(|s| name(*s)).collect::<Vec<_>>().join(", ");
+            order.push(format!(
+                "all outputs are read: {}; then all inputs are set: {}",
+                list(&from),
+                list(&to)
+            ));
+        }
+        let alone = self.instances.iter().zip(&self.turns).filter(|(_, turn)| !turn.glued);
+        let alone: Vec<String> = alone
+            .map(|(instance, turn)| match turn.step_multiple {
+                1 => instance.name().to_owned(),
+                n => format!("{} (every {n} steps)", instance.name()),
+            })
+            .collect();
+        if !alone.is_empty() {
+            order.push(format!("a step of each subsystem without glue, in any order: {}", alone.join(", ")));
+        }
+        for group in &self.groups {
+            let members: Vec<&str> = group.exchange.members().map(name).collect();
+            order.push(format!(
+                "glued together by `{}`, without delay: {}",
+                group.strategy.name(),
+                members.join(", ")
+            ));
+        }
+        let all: Vec<&str> = self.instances.iter().map(terraglue_host::Instance::name).collect();
+        order.push(format!("the step is accepted by all: {}", all.join(", ")));
+        order
+    }
+
+    fn connection_note(&self, end: &End) -> ConnectionNote {
+        let full = |(slot, id): (usize, u32)| {
+            let variable = self.instances[slot].variables().iter().find(|v| v.id == id);
+            let name = format!("{}.{}", self.instances[slot].name(), variable.map_or("?", |v| &v.name));
+            (name, variable.map(|v| v.unit.clone()).unwrap_or_default())
+        };
+        let ((from, unit_from), (to, unit_to)) = (full(end.from), full(end.to));
+        let units = match (unit_from.is_empty(), unit_to.is_empty()) {
+            (false, false) => format!(" ({unit_from} → {unit_to})"),
+            (true, true) => String::new(),
+            _ => " (no conversion: only one side has a unit)".into(),
+        };
+        let value = match end.conversion {
+            None if end.by_table => "by a table".to_owned(),
+            None | Some((1.0, 0.0)) => "x".to_owned(),
+            Some((a, 0.0)) => format!("{a}·x"),
+            Some((a, b)) => format!("{a}·x + {b}"),
+        };
+        let (delay, why) = match self.turns[end.from.0].step_multiple {
+            1 => ("1".to_owned(), "read at the start of a step and held to its end".to_owned()),
+            n => (
+                format!("1 to {n}"),
+                format!("its source makes one step of {n}, and the value is held between"),
+            ),
+        };
+        ConnectionNote { from, to, value: value + &units, delay, why }
+    }
+
+    /// Each set of subsystems that reach each other over connections.
+    fn loops(&self, ends: &[End]) -> Vec<String> {
+        let count = self.instances.len();
+        let mut next: Vec<Vec<usize>> = vec![Vec::new(); count];
+        ends.iter().for_each(|e| next[e.from.0].push(e.to.0));
+        let reach = |from: usize| {
+            let (mut seen, mut open) = (vec![false; count], vec![from]);
+            while let Some(slot) = open.pop() {
+                for to in next[slot].iter().filter(|to| !std::mem::replace(&mut seen[**to], true)) {
+                    open.push(*to);
+                }
+            }
+            seen
+        };
+        let all: Vec<Vec<bool>> = (0..count).map(reach).collect();
+        let first = |k: &usize| all[*k][*k] && !(0..*k).any(|j| all[*k][j] && all[j][*k]);
+        (0..count)
+            .filter(first)
+            .map(|k| {
+                let members = (0..count).filter(|j| all[k][*j] && all[*j][k]);
+                let names: Vec<&str> = members.map(|j| self.instances[j].name()).collect();
+                format!("{}: explicit, every connection in it is one step late", names.join(" ⇄ "))
+            })
+            .collect()
+    }
+}
+
+/// Slot and variable on either side.
+struct End {
+    from: (usize, u32),
+    to: (usize, u32),
+    conversion: Option<(f64, f64)>,
+    by_table: bool,
+}
+
+impl Explanation {
+    /// For a terminal.
+    pub fn text(&self, scenario: &Scenario) -> String {
+        let mut out = format!("A step of {} s:\n", scenario.time.step_s);
+        for (k, line) in self.order.iter().enumerate() {
+            out += &format!("  {}. {line}\n", k + 1);
+        }
+        if !self.connections.is_empty() {
+            out += "Connections (delay in steps):\n";
+        }
+        for c in &self.connections {
+            out += &format!("  {} → {}: {}; delay {}: {}\n", c.from, c.to, c.value, c.delay, c.why);
+        }
+        for line in &self.loops {
+            out += &format!("Loop: {line}\n");
+        }
+        out
+    }
+}

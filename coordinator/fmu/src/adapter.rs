@@ -1,0 +1,698 @@
+//! A unit as a subsystem: trials by its saved states, values by name, every error with what the unit said.
+
+use super::bodies::{Axis, Bodies, terminals};
+use super::clocks;
+use super::map::{self, Place};
+use super::rollback;
+use super::settings::{OnNan, options, structure};
+use serde_json::{Map, Value};
+use std::cell::{Cell, RefCell};
+use std::collections::BTreeMap;
+use std::path::Path;
+use std::sync::Arc;
+use terraglue_fmi::description::Start;
+use terraglue_fmi::{Advance, Error as FmiError, Fmu, Slave, SlaveOptions, SlaveState, Stepped};
+use terraglue_host::Partings;
+use terraglue_scenario::did_you_mean;
+use terraglue_subsystem::{
+    BodyState, Capabilities, Error, Host, Input, Law, Level, LogLevel, Motion, Response, Result, Scene, Step,
+    Subsystem, ValueType, Values, ValuesMut, Variable,
+};
+
+/// An instance of a unit as a subsystem. What every step looks at stands first and in this order, on two lines of the
+/// cache with the beginning of the instance.
+#[repr(C, align(64))]
+pub struct FmuSubsystem {
+    places: Box<[Place]>,
+    /// Whether a trial was made that is not committed.
+    open: bool,
+    /// Whether the initialisation is over.
+    running: bool,
+    /// Whether any variable is a clock or belongs to one.
+    clocks: bool,
+    can_go_back: bool,
+    has_bodies: bool,
+    /// Whether a state was saved to which a run may go back over more than the last step.
+    kept: Cell<bool>,
+    slave: Slave,
+    host: Arc<dyn Host>,
+    variables: Vec<Variable>,
+    /// State at the start of the step, where the unit can save it.
+    before: SlaveState,
+    /// Whether it was seen that the unit comes back to a saved state.
+    proved: bool,
+    slots: Vec<SlaveState>,
+    on_nan: OnNan,
+    warned: Cell<bool>,
+    references: RefCell<Vec<u32>>,
+    bodies: Bodies,
+    /// Arrays by reference that are being set element by element before the initialisation.
+    starts: BTreeMap<u32, Vec<Option<f64>>>,
+    feeds_through: bool,
+    partings: Partings,
+}
+
+impl FmuSubsystem {
+    /// Opens a unit, sets `start` and enters initialisation mode; the first step ends it, so that values which are
+    /// connected at the start are set while the unit initialises. Host keys: `on_nan`, `event_mode`, `rollback`.
+    ///
+    /// # Errors
+    /// What is wrong with the unit, or a start value that it does not take.
+    pub fn new(path: &Path, parameters: &Map<String, Value>, host: Arc<dyn Host>) -> Result<Self> {
+        let fmu = Fmu::open(path).map_err(error)?;
+        let (options, start) = options(parameters)?;
+        for problem in &fmu.description().problems {
+            host.log(LogLevel::Warning, problem);
+        }
+        let sink = host.clone();
+        let slave = Slave::instantiate(
+            &fmu,
+            SlaveOptions {
+                name: host.name().to_owned(),
+                verbose: false,
+                event_mode: options.event_mode,
+                intermediate: Vec::new(),
+                followed: Vec::new(),
+                sink: Box::new(move |line| sink.log(line.level, &line.text)),
+            },
+        );
+        let mut slave = slave.map_err(error)?;
+        let (structure, start) = structure(slave.description(), start)?;
+        let structure: Vec<(&str, i128)> = structure.iter().map(|(name, n)| (name.as_str(), *n)).collect();
+        slave.configure(&structure).map_err(error)?;
+        let description = slave.description().clone();
+        let capabilities = description.capabilities;
+        let (variables, places) = map::variables(&description, options.event_mode && capabilities.event_mode);
+        let mut subsystem = Self {
+            slave,
+            variables,
+            clocks: clocks::concerned(&places),
+            places: places.into(),
+            has_bodies: false,
+            before: SlaveState::default(),
+            can_go_back: capabilities.state && options.rollback,
+            open: false,
+            running: false,
+            proved: false,
+            slots: (0..host.slots()).map(|_| SlaveState::default()).collect(),
+            kept: Cell::new(false),
+            on_nan: options.on_nan,
+            warned: Cell::new(false),
+            references: RefCell::default(),
+            bodies: Bodies::default(),
+            starts: BTreeMap::new(),
+            feeds_through: feeds_through(&description),
+            partings: Partings::default(),
+            host,
+        };
+        for (name, value) in start {
+            subsystem.set_start(&name, &value)?;
+        }
+        subsystem.start_arrays()?;
+        let places = &subsystem.places;
+        let axis =
+            |p: &Place| Axis { reference: p.reference, element: p.element as usize, count: p.count as usize };
+        let place = |id: u32| places.get(id as usize).map(axis);
+        let terminals = terminals(&description);
+        subsystem.bodies = Bodies::read(&options.bodies, &subsystem.variables, &terminals, place)?;
+        subsystem.has_bodies = !subsystem.bodies.is_empty();
+        if subsystem.has_bodies && !subsystem.can_go_back {
+            let text = "glued bodies need a unit that can save its state, to repeat a step";
+            return Err(Error::Refused(text.into()));
+        }
+        subsystem.slave.enter_initialization(0.0, None, None).map_err(error)?;
+        Ok(subsystem)
+    }
+
+    /// What [`terraglue_host::Library::with_fmus`] takes.
+    ///
+    /// # Errors
+    /// As [`FmuSubsystem::new`].
+    pub fn make(
+        path: &Path,
+        parameters: &Map<String, Value>,
+        host: Arc<dyn Host>,
+        partings: Partings,
+    ) -> Result<Box<dyn Subsystem>> {
+        Ok(Box::new(Self::new(path, parameters, host)?.with_partings(partings)))
+    }
+
+    /// Where an error at the end of its life goes.
+    pub fn with_partings(mut self, partings: Partings) -> Self {
+        self.partings = partings;
+        self
+    }
+
+    fn set_start(&mut self, name: &str, value: &Value) -> Result {
+        let Some(k) = self.variables.iter().position(|v| v.name == name) else {
+            let hint = did_you_mean(name, self.variables.iter().map(|v| v.name.as_str()));
+            let hint = hint.map(|h| format!("; {h}")).unwrap_or_default();
+            return Err(Error::Refused(format!("the unit has no variable `{name}`{hint}")));
+        };
+        if self.variables[k].effect == terraglue_subsystem::Effect::ReadOnly {
+            return Err(Error::Refused(format!("`{name}` of the unit cannot be set")));
+        }
+        let v = &self.variables[k];
+        let wrong = || Error::Refused(format!("`{name}` of the unit does not take {value}"));
+        let (number, whole, id) = (value.as_f64(), value.as_i64(), [v.id]);
+        macro_rules! narrow {
+            ($variant:ident) => {
+                self.set(&id, Values::$variant(&[whole.and_then(|w| w.try_into().ok()).ok_or_else(wrong)?]))
+            };
+        }
+        match v.value_type {
+            ValueType::F64 => self.set(&id, Values::F64(&[number.ok_or_else(wrong)?])),
+            ValueType::F32 => self.set(&id, Values::F32(&[number.ok_or_else(wrong)? as f32])),
+            ValueType::Bool => self.set(&id, Values::Bool(&[value.as_bool().ok_or_else(wrong)?])),
+            ValueType::String => {
+                self.set(&id, Values::String(&[value.as_str().ok_or_else(wrong)?.to_owned()]))
+            }
+            ValueType::Enumeration => {
+                let named = value.as_str().and_then(|t| v.enumeration.iter().position(|n| n == t));
+                let index = named.map(|k| k as i64).or(whole).ok_or_else(wrong)?;
+                self.set(&id, Values::Enumeration(&[index]))
+            }
+            ValueType::I8 => narrow!(I8),
+            ValueType::I16 => narrow!(I16),
+            ValueType::I32 => narrow!(I32),
+            ValueType::I64 => narrow!(I64),
+            ValueType::U8 => narrow!(U8),
+            ValueType::U16 => narrow!(U16),
+            ValueType::U32 => narrow!(U32),
+            ValueType::U64 => self.set(&id, Values::U64(&[value.as_u64().ok_or_else(wrong)?])),
+            ValueType::Binary | ValueType::Clock => Err(wrong()),
+        }
+    }
+
+    /// Keeps an element of an array until all are known: nothing can be read yet.
+    fn start_element(&mut self, id: u32, value: f64) -> Result {
+        let place = *self.place(id)?;
+        let whole = self.starts.entry(place.reference).or_insert_with(|| vec![None; place.count as usize]);
+        whole[place.element as usize] = Some(value);
+        Ok(())
+    }
+
+    /// Sets arrays of which elements were given; the others have the start values of the description.
+    fn start_arrays(&mut self) -> Result {
+        let description = self.slave.description().clone();
+        for (reference, given) in std::mem::take(&mut self.starts) {
+            let found = description.variables.iter().find(|v| v.reference == reference && !v.alias);
+            let Some(v) = found else { continue };
+            if let Some(k) = given.iter().position(Option::is_none).filter(|_| v.resized) {
+                return Err(Error::Refused(format!(
+                    "`{}` lacks a value: structural parameters changed the shape of `{}` and with it the start values \
+                     of the unit, so give all {} or none",
+                    map::element_name(v, k),
+                    v.name,
+                    given.len()
+                )));
+            }
+            let own = match &v.start {
+                Start::Numbers(own) => own.as_slice(),
+                _ => &[],
+            };
+            let known = |k: usize| own.get(k).or(own.first()).copied().unwrap_or(0.0);
+            let whole: Vec<f64> = given.iter().enumerate().map(|(k, x)| x.unwrap_or(known(k))).collect();
+            self.slave.set_f64(&[reference], &whole).map_err(error)?;
+        }
+        Ok(())
+    }
+
+    /// Once: does the unit come back to the state before this step?
+    fn prove(&mut self, step: &Step, wrench: &[f64]) -> Result {
+        if std::mem::replace(&mut self.proved, true) {
+            return Ok(());
+        }
+        let for_good = !self.kept.get();
+        let Self { slave, bodies, variables, places, before, .. } = self;
+        let number = |(v, place): &(&Variable, &Place)| {
+            let output = v.causality == terraglue_subsystem::Causality::Output;
+            output && v.value_type == ValueType::F64 && place.count == 1
+        };
+        let outputs = variables.iter().zip(places.iter()).filter(number);
+        let outputs: Vec<(&str, u32)> = outputs.map(|(v, p)| (v.name.as_str(), p.reference)).collect();
+        let short = Advance { t: step.t, h: step.h, for_good };
+        rollback::prove(
+            slave,
+            before,
+            &outputs,
+            short,
+            |slave| bodies.push(slave, step, wrench, error),
+            error,
+        )
+    }
+
+    /// What is to be done before a step: the initialisation ends, a trial is taken back, a state is saved, wrenches are set.
+    /// Whether the step is to be made then.
+    #[inline(never)]
+    fn prepare(&mut self, step: &Step, wrench: &[f64], out: &mut Response) -> Result<bool> {
+        let begins = !self.running;
+        if begins {
+            self.slave.exit_initialization().map_err(error)?;
+            self.running = true;
+        }
+        if step.h == 0.0 && self.has_bodies {
+            self.bodies.still(&mut self.slave, step, wrench, out, error)?;
+            return Ok(false);
+        }
+        if self.open && !self.can_go_back {
+            let text =
+                "a step had to be repeated, but the unit cannot save its state; make time.step_s shorter";
+            return Err(Error::Failed(text.into()));
+        }
+        if self.open {
+            self.slave.restore(&self.before).map_err(error)?;
+        } else {
+            self.bodies.forget_trials();
+            if self.can_go_back {
+                self.slave.save(&mut self.before).map_err(unsaved)?;
+            }
+        }
+        self.open = true;
+        if self.clocks && !begins {
+            self.slave.forget_ticks();
+        }
+        if self.has_bodies {
+            self.prove(step, wrench)?;
+            self.bodies.push(&mut self.slave, step, wrench, error)?;
+        }
+        Ok(true)
+    }
+
+    /// Why a step was not made to its end.
+    #[cold]
+    fn stopped(&self, step: &Step, done: terraglue_fmi::Result<Stepped>) -> Error {
+        match done {
+            Ok(Stepped { reached, .. }) => {
+                Error::Failed(format!("the unit asks for the end of the simulation at t = {reached} s"))
+            }
+            Err(discard @ FmiError::Discard { .. }) => {
+                let variable = self.slave.description().capabilities.variable_step;
+                if !self.can_go_back || !variable {
+                    let lack = if variable { "save its state" } else { "make steps of another length" };
+                    return Error::Failed(format!("{discard}; the step cannot be halved: it cannot {lack}"));
+                }
+                self.host.log(LogLevel::Info, &discard.to_string());
+                Error::Discard { reached: step.t + 0.5 * step.h }
+            }
+            Err(other) => error(other),
+        }
+    }
+
+    /// Where one variable lies that is asked for and is no element of an array.
+    #[inline]
+    fn single(&self, ids: &[u32]) -> Option<&Place> {
+        let [id] = ids else { return None };
+        self.places.get(*id as usize).filter(|p| p.count == 1)
+    }
+
+    /// Whether a variable may be set now.
+    #[inline]
+    fn takes(&self, place: &Place) -> bool {
+        !place.structural && (place.live || !self.running)
+    }
+
+    fn place(&self, id: u32) -> Result<&Place> {
+        self.places.get(id as usize).ok_or_else(|| Error::Refused(format!("no variable has the number {id}")))
+    }
+
+    /// Item values of an enumeration where they are not simply 0, 1, 2, …
+    fn items(&self, place: &Place) -> &[(String, i64)] {
+        &self.slave.description().variables[place.variable as usize].items
+    }
+
+    #[inline]
+    fn check_numbers<T: Copy + Into<f64>>(&self, ids: &[u32], values: &[T]) -> Result {
+        match values.iter().position(|v| !(*v).into().is_finite()) {
+            None => Ok(()),
+            Some(k) => self.not_finite(ids, values[k].into(), k),
+        }
+    }
+
+    #[cold]
+    fn not_finite(&self, ids: &[u32], value: f64, k: usize) -> Result {
+        let name = ids.get(k).and_then(|id| self.variables.get(*id as usize)).map_or("?", |v| &v.name);
+        let text = format!("the variable `{name}` is {value}");
+        match self.on_nan {
+            OnNan::Stop => Err(Error::Failed(format!("{text}; on_nan = \"warn\" lets the run go on"))),
+            OnNan::Warn => {
+                if !self.warned.replace(true) {
+                    self.host.log(LogLevel::Warning, &text);
+                }
+                Ok(())
+            }
+        }
+    }
+
+    /// Sets values of which some belong to clocks.
+    fn set_one_by_one(&mut self, ids: &[u32], values: Values) -> Result {
+        let Values::F64(values) = values else {
+            return Err(Error::Refused("clocks and what belongs to them is set one by one".into()));
+        };
+        ids.iter().zip(values).try_for_each(|(id, x)| self.set(&[*id], Values::F64(&[*x])))
+    }
+
+    /// References of variables that are all scalars; false where one is an element of an array.
+    fn collect(&self, ids: &[u32], references: &mut Vec<u32>) -> Result<bool> {
+        references.clear();
+        for id in ids {
+            let place = self.place(*id)?;
+            if place.count != 1 {
+                return Ok(false);
+            }
+            references.push(place.reference);
+        }
+        Ok(true)
+    }
+}
+
+/// Whether an output at the start may depend on an input of the same time.
+fn feeds_through(description: &terraglue_fmi::ModelDescription) -> bool {
+    let is_input =
+        |k: &usize| description.variables[*k].causality == terraglue_fmi::description::Causality::Input;
+    let unknowns = description.initial_unknowns.iter().chain(&description.outputs);
+    let mut all = unknowns.map(|u| u.dependencies.as_ref().is_none_or(|d| d.iter().any(is_input)));
+    let inputs = (0..description.variables.len()).any(|k| is_input(&k));
+    inputs && all.any(|depends| depends)
+}
+
+/// An error of a unit as an error of a subsystem.
+#[cold]
+fn error(error: FmiError) -> Error {
+    match error {
+        FmiError::Call { fatal: true, .. } => Error::Fatal(error.to_string()),
+        FmiError::Call { .. } => Error::Failed(error.to_string()),
+        other => Error::Refused(other.to_string()),
+    }
+}
+
+/// The same where the state before a step could not be saved.
+#[cold]
+fn unsaved(why: FmiError) -> Error {
+    match why {
+        FmiError::Refused(text) => {
+            Error::Refused(format!("{text}; `rollback = false` in its table does without"))
+        }
+        other => error(other),
+    }
+}
+
+impl Subsystem for FmuSubsystem {
+    fn capabilities(&self) -> Capabilities {
+        let c = self.slave.description().capabilities;
+        let retry = if self.can_go_back {
+            Capabilities::RETRY | Capabilities::STATE
+        } else {
+            Capabilities::default()
+        };
+        let bytes =
+            if c.serialize && !self.clocks { Capabilities::SERIALIZE } else { Capabilities::default() };
+        let force = if self.bodies.is_empty() { Capabilities::default() } else { Capabilities::FORCE };
+        let through = if self.feeds_through { Capabilities::FEEDTHROUGH } else { Capabilities::default() };
+        let fixed = if c.variable_step { Capabilities::default() } else { Capabilities::FIXED_STEP };
+        let slopes = match self.slave.tells_derivatives() && self.can_go_back && self.bodies.tell_slopes() {
+            true => Capabilities::DERIVATIVES,
+            false => Capabilities::default(),
+        };
+        retry | bytes | force | through | fixed | slopes
+    }
+
+    fn interface_jacobian(&mut self, step: &Step, level: Level, out: &mut [f64]) -> Result {
+        if !self.capabilities().has(Capabilities::DERIVATIVES) {
+            return Err(Error::Unsupported);
+        }
+        self.bodies.slopes(&self.slave, step, level, out, error)
+    }
+
+    fn set_ports(&mut self, step: &Step, _: &mut [Law], now: &mut Response) -> Result {
+        self.bodies.check(step)?;
+        for values in [&mut *now.x, &mut *now.v, &mut *now.a, &mut *now.t] {
+            values.fill(0.0);
+        }
+        Ok(())
+    }
+
+    fn scene(&self) -> Scene {
+        self.bodies.scene()
+    }
+
+    fn body_states(&self, out: &mut [BodyState]) -> Result {
+        self.bodies.states(&self.slave, out, error)
+    }
+
+    fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result {
+        let Input::Force { t: wrench, .. } = *input else { return Err(Error::Unsupported) };
+        if self.open || !self.running || self.clocks || self.can_go_back || self.has_bodies {
+            if !self.prepare(step, wrench, out)? {
+                return Ok(());
+            }
+        }
+        self.open = true;
+        match self.slave.do_step(Advance { t: step.t, h: step.h, for_good: !self.kept.get() }) {
+            Ok(Stepped { terminate: false, .. }) => {}
+            other => return Err(self.stopped(step, other)),
+        }
+        out.reached = step.t + step.h;
+        match self.has_bodies {
+            true => self.bodies.pull(&self.slave, step, wrench, out, error),
+            false => Ok(()),
+        }
+    }
+
+    fn commit(&mut self, _: &Step, _: &[f64], _: &Motion) -> Result {
+        self.open = false;
+        if self.clocks {
+            self.slave.forget_triggers();
+        }
+        Ok(())
+    }
+
+    fn save_state(&mut self, slot: u32) -> Result {
+        let state = self.slots.get_mut(slot as usize).ok_or(Error::Unsupported)?;
+        self.kept.set(true);
+        self.slave.save(state).map_err(error)
+    }
+
+    fn restore_state(&mut self, slot: u32) -> Result {
+        let state = self.slots.get(slot as usize).ok_or(Error::Unsupported)?;
+        self.open = false;
+        self.slave.restore(state).map_err(error)
+    }
+
+    fn serialize(&self) -> Result<Vec<u8>> {
+        self.kept.set(true);
+        let mut state = SlaveState::default();
+        self.slave.save(&mut state).map_err(error)?;
+        let bytes = self.slave.serialize(&state).map_err(error);
+        self.slave.release(&mut state).map_err(error)?;
+        // whether it is initialised is the host's to know
+        Ok([&[u8::from(self.running)], bytes?.as_slice()].concat())
+    }
+
+    fn deserialize(&mut self, bytes: &[u8]) -> Result {
+        let wrong = || Error::Refused("these bytes are no state of a unit".into());
+        let (running, bytes) = bytes.split_first().filter(|(running, _)| **running <= 1).ok_or_else(wrong)?;
+        let mut state = SlaveState::default();
+        self.slave.deserialize(bytes, &mut state).map_err(error)?;
+        if *running == 1 && !self.running {
+            self.slave.exit_initialization().map_err(error)?;
+        }
+        let done = self.slave.restore(&state).map_err(error);
+        self.slave.release(&mut state).map_err(error)?;
+        (self.running, self.open) = (*running == 1, false);
+        done
+    }
+
+    fn directional_derivative(
+        &self,
+        unknowns: &[u32],
+        knowns: &[u32],
+        seed: &[f64],
+        out: &mut [f64],
+    ) -> Result {
+        let (mut z, mut v) = (Vec::new(), Vec::new());
+        if !self.slave.tells_derivatives()
+            || !self.collect(unknowns, &mut z)?
+            || !self.collect(knowns, &mut v)?
+        {
+            return Err(Error::Unsupported);
+        }
+        self.slave.directional_derivative(&z, &v, seed, out).map_err(error)
+    }
+
+    fn variables(&self) -> &[Variable] {
+        &self.variables
+    }
+
+    fn get(&self, ids: &[u32], out: ValuesMut) -> Result {
+        match (out, self.single(ids)) {
+            (ValuesMut::F64(out), Some(place)) => {
+                if let Err(failure) = self.slave.get_f64(&[place.reference], out) {
+                    return Err(error(failure));
+                }
+                self.check_numbers(ids, out)
+            }
+            (out, _) => self.get_all(ids, out),
+        }
+    }
+
+    fn set(&mut self, ids: &[u32], values: Values) -> Result {
+        match (values, self.single(ids)) {
+            (Values::F64(values), Some(place)) if self.takes(place) && !place.clocked => {
+                self.slave.set_f64(&[place.reference], values).map_err(error)
+            }
+            (values, _) => self.set_all(ids, values),
+        }
+    }
+}
+
+impl FmuSubsystem {
+    /// Values of any type and number.
+    #[inline(never)]
+    fn get_all(&self, ids: &[u32], mut out: ValuesMut) -> Result {
+        if self.clocks {
+            let places = ids.iter().map(|id| self.place(*id)).collect::<Result<Vec<_>>>()?;
+            if clocks::get(&self.slave, &places, &mut out, error)? {
+                return Ok(());
+            }
+        }
+        let mut references = self.references.borrow_mut();
+        if self.collect(ids, &mut references)? {
+            return match out {
+                ValuesMut::F64(out) => {
+                    self.slave.get_f64(&references, out).map_err(error)?;
+                    self.check_numbers(ids, out)
+                }
+                ValuesMut::F32(out) => {
+                    self.slave.get(&references, ValuesMut::F32(&mut *out)).map_err(error)?;
+                    self.check_numbers(ids, out)
+                }
+                ValuesMut::Enumeration(out) => {
+                    self.slave.get(&references, ValuesMut::Enumeration(out)).map_err(error)?;
+                    for (id, value) in ids.iter().zip(out) {
+                        let items = self.items(self.place(*id)?);
+                        *value = items.iter().position(|(_, v)| v == value).map_or(*value, |k| k as i64);
+                    }
+                    Ok(())
+                }
+                other => self.slave.get(&references, other).map_err(error),
+            };
+        }
+        drop(references);
+        macro_rules! elements {
+            ($variant:ident, $out:expr, $zero:expr) => {{
+                for (id, out) in ids.iter().zip($out.iter_mut()) {
+                    let place = *self.place(*id)?;
+                    let mut whole = vec![$zero; place.count as usize];
+                    self.slave.get(&[place.reference], ValuesMut::$variant(&mut whole)).map_err(error)?;
+                    *out = whole.swap_remove(place.element as usize);
+                }
+                Ok(())
+            }};
+        }
+        match out {
+            ValuesMut::F64(out) => {
+                let done: Result = elements!(F64, out, 0.0);
+                done.and_then(|()| self.check_numbers(ids, out))
+            }
+            ValuesMut::F32(out) => {
+                let done: Result = elements!(F32, out, 0.0);
+                done.and_then(|()| self.check_numbers(ids, out))
+            }
+            ValuesMut::I8(out) => elements!(I8, out, 0),
+            ValuesMut::I16(out) => elements!(I16, out, 0),
+            ValuesMut::I32(out) => elements!(I32, out, 0),
+            ValuesMut::I64(out) => elements!(I64, out, 0),
+            ValuesMut::U8(out) => elements!(U8, out, 0),
+            ValuesMut::U16(out) => elements!(U16, out, 0),
+            ValuesMut::U32(out) => elements!(U32, out, 0),
+            ValuesMut::U64(out) => elements!(U64, out, 0),
+            ValuesMut::Bool(out) => elements!(Bool, out, false),
+            ValuesMut::String(out) => elements!(String, out, String::new()),
+            ValuesMut::Binary(out) => elements!(Binary, out, Vec::new()),
+            ValuesMut::Enumeration(out) => elements!(Enumeration, out, 0),
+        }
+    }
+
+    /// New values of any type and number.
+    #[inline(never)]
+    fn set_all(&mut self, ids: &[u32], values: Values) -> Result {
+        for id in ids {
+            let place = self.place(*id)?;
+            if !self.takes(place) {
+                let name = &self.variables[*id as usize].name;
+                let when =
+                    if place.structural { "in the table of its unit" } else { "before the first step" };
+                return Err(Error::Refused(format!("`{name}` can only be set {when}")));
+            }
+        }
+        if self.clocks {
+            let place = |id: &u32| self.places.get(*id as usize);
+            let places: Vec<&Place> = ids.iter().filter_map(place).collect();
+            if places.iter().any(|p| p.clock || p.clocked) && ids.len() > 1 {
+                return self.set_one_by_one(ids, values);
+            }
+            if clocks::set(&mut self.slave, &places, &values, error)? {
+                return Ok(());
+            }
+        }
+        let mut references = self.references.borrow_mut();
+        if self.collect(ids, &mut references)? {
+            if let Values::Enumeration(indices) = values {
+                let item = |(id, k): (&u32, &i64)| -> Result<i64> {
+                    let items = self.items(self.place(*id)?);
+                    Ok(usize::try_from(*k).ok().and_then(|k| items.get(k)).map_or(*k, |(_, v)| *v))
+                };
+                let own = ids.iter().zip(indices).map(item).collect::<Result<Vec<i64>>>()?;
+                return self.slave.set(&references, Values::Enumeration(&own)).map_err(error);
+            }
+            return self.slave.set(&references, values).map_err(error);
+        }
+        drop(references);
+        macro_rules! elements {
+            ($variant:ident, $values:expr, $zero:expr) => {{
+                for (id, value) in ids.iter().zip($values) {
+                    let place = *self.place(*id)?;
+                    let mut whole = vec![$zero; place.count as usize];
+                    self.slave.get(&[place.reference], ValuesMut::$variant(&mut whole)).map_err(error)?;
+                    whole[place.element as usize] = value.clone();
+                    self.slave.set(&[place.reference], Values::$variant(&whole)).map_err(error)?;
+                }
+                Ok(())
+            }};
+        }
+        match values {
+            Values::F64(v) if self.slave.is_instantiated() => {
+                ids.iter().zip(v).try_for_each(|(id, value)| self.start_element(*id, *value))
+            }
+            Values::F64(v) => elements!(F64, v, 0.0),
+            Values::F32(v) => elements!(F32, v, 0.0),
+            Values::I8(v) => elements!(I8, v, 0),
+            Values::I16(v) => elements!(I16, v, 0),
+            Values::I32(v) => elements!(I32, v, 0),
+            Values::I64(v) => elements!(I64, v, 0),
+            Values::U8(v) => elements!(U8, v, 0),
+            Values::U16(v) => elements!(U16, v, 0),
+            Values::U32(v) => elements!(U32, v, 0),
+            Values::U64(v) => elements!(U64, v, 0),
+            Values::Bool(v) => elements!(Bool, v, false),
+            Values::String(v) => elements!(String, v, String::new()),
+            Values::Binary(v) => elements!(Binary, v, Vec::new()),
+            Values::Enumeration(v) => elements!(Enumeration, v, 0),
+        }
+    }
+}
+
+impl Drop for FmuSubsystem {
+    fn drop(&mut self) {
+        for state in self.slots.iter_mut().chain([&mut self.before]) {
+            // The instance goes next; what it says to this is in its log.
+            drop(self.slave.release(state));
+        }
+        if self.slave.is_good()
+            && let Err(error) = self.slave.terminate()
+        {
+            self.partings.put(format!("`{}` at its end: {error}", self.host.name()));
+        }
+    }
+}

@@ -1,0 +1,334 @@
+//! Collects everything that a scenario needs, lays it out as a unit and packs it.
+
+use super::{Request, SCENARIO, UNIT, Unit, open, page, place, wrap};
+use std::path::{Path, PathBuf};
+use terraglue_diagnostics::{Error, Result};
+use terraglue_fmi::Version;
+use terraglue_fmi::export::{About, Content, Mailbox, Opened, Opening, describe, identifier, pack};
+use terraglue_host::{Library, SearchPath};
+use terraglue_scenario::{InputError, Scenario, SubsystemSpec, find_soil_table};
+use terraglue_subsystem::{Capabilities, ParameterType};
+use toml_edit::{DocumentMut, Item, value};
+
+/// What was written.
+#[derive(Clone, Debug)]
+pub struct Exported {
+    /// The unit.
+    pub path: PathBuf,
+    /// Variables in its description.
+    pub variables: usize,
+    /// Whether its state can be saved and restored, and whether it can be serialised.
+    pub states: [bool; 2],
+    /// Names that the version of the standard has no type for.
+    pub left_out: Vec<String>,
+}
+
+/// File of the library inside every unit.
+const LIBRARY: &str = "libterraglue_unit.so";
+
+/// Exports a scenario or a module.
+///
+/// # Errors
+/// Wrong input: a scenario or module that cannot be built, a file that cannot be read or written.
+pub fn write(request: &Request) -> Result<Exported> {
+    let (scenario, bare) = scenario(request)?;
+    let search = SearchPath::standard(&request.module_paths, &scenario.folder);
+    let stage = tempfile::tempdir().map_err(|e| plain(format!("a temporary folder: {e}")))?;
+    let resources = stage.path().join("resources");
+    let mut bundle = Bundle {
+        scenario: &scenario,
+        search: &search,
+        resources: &resources,
+        document: document(&scenario)?,
+    };
+    bundle.subsystems()?;
+    bundle.terrain()?;
+    let text = bundle.document.to_string();
+    place(&resources, SCENARIO, text.as_bytes()).map_err(plain)?;
+    let unit = Unit {
+        version: if request.version == Version::V2 { 2 } else { 3 },
+        scalars: request.scalars,
+        token: token(&resources, request)?,
+        bare: bare.map(str::to_owned),
+    };
+    let json = serde_json::to_vec_pretty(&unit).map_err(|e| plain(e.to_string()))?;
+    place(&resources, UNIT, &json).map_err(plain)?;
+    // What is described is what the unit itself will open.
+    let opening = Opening { name: "export".into(), resources: resources.clone(), log: Mailbox::default() };
+    let opened = open(&opening).map_err(plain)?;
+    let about = about(request, &scenario, &unit);
+    let entries = entries(request, &search, &resources, &opened, &about)?;
+    pack(&request.out, &entries).map_err(plain)?;
+    let can = opened.subsystem.capabilities();
+    let state = can.has(Capabilities::STATE);
+    Ok(Exported {
+        path: request.out.clone(),
+        variables: opened.layout.entries.len(),
+        states: [state, state && can.has(Capabilities::SERIALIZE)],
+        left_out: opened.layout.left_out(opened.subsystem.variables()).map(str::to_owned).collect(),
+    })
+}
+
+fn plain(message: impl Into<String>) -> Error {
+    InputError::plain(message, None).into()
+}
+
+/// The scenario, and the subsystem whose variables bear no prefix where it stands for one module.
+fn scenario(request: &Request) -> Result<(Scenario, Option<&'static str>)> {
+    let path = Path::new(&request.target);
+    if path.extension().is_some_and(|e| e == "toml") {
+        return Ok((Scenario::load(path, &request.sets)?, None));
+    }
+    let search = SearchPath::standard(&request.module_paths, Path::new("."));
+    let (text, name) = wrap(&request.target, &search).map_err(plain)?;
+    let stem = path.file_stem().map_or(request.target.clone(), |s| s.to_string_lossy().into_owned());
+    Ok((Scenario::parse(&text, &format!("./{stem}.toml"), &request.sets)?, Some(name)))
+}
+
+fn document(scenario: &Scenario) -> Result<DocumentMut> {
+    scenario.source.text.parse().map_err(|e| plain(format!("the scenario after its edits: {e}")))
+}
+
+/// Copies of files, and a scenario that refers to them.
+struct Bundle<'a> {
+    scenario: &'a Scenario,
+    search: &'a SearchPath,
+    resources: &'a Path,
+    document: DocumentMut,
+}
+
+impl Bundle<'_> {
+    /// Copies a file that the scenario names; its path in the resources.
+    fn take(&self, from: &Path, to: String) -> Result<String> {
+        let bytes =
+            terraglue_subsystem::files::read(from).map_err(|e| plain(format!("{}: {e}", from.display())))?;
+        place(self.resources, &to, &bytes).map_err(plain)?;
+        Ok(to)
+    }
+
+    fn set(&mut self, table: &str, key: &str, to: &str) {
+        if let Some(table) = self.document.get_mut(table).and_then(Item::as_table_like_mut) {
+            table.insert(key, value(to));
+        }
+    }
+
+    fn subsystems(&mut self) -> Result {
+        for spec in &self.scenario.subsystems {
+            if terraglue_scenario::ModuleKind::is_fmu(&spec.module) {
+                let to =
+                    self.take(&self.scenario.folder.join(&spec.module), format!("units/{}.fmu", spec.name))?;
+                self.set(&spec.name, "fmu", &to);
+                continue;
+            }
+            let found = crate::library().find(&spec.module, self.search, &self.scenario.folder);
+            let module = found.map_err(|e| {
+                self.scenario.source.error_at_value(&[&spec.name, "module"], e.to_string(), None)
+            })?;
+            let paths: Vec<&str> = (module.schema().parameters.iter())
+                .filter(|p| p.parameter_type == ParameterType::Path)
+                .map(|p| p.name.as_str())
+                .collect();
+            for key in paths {
+                self.parameter(spec, key)?;
+            }
+            self.soil_table(spec)?;
+            self.law(spec)?;
+            if let Some(path) = module.path() {
+                let file = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+                let to = self.take(path, format!("modules/{}/{file}", spec.name))?;
+                self.set(&spec.name, "module", &to);
+            }
+        }
+        Ok(())
+    }
+
+    /// A parameter that is the path of a file, with the files that this one names.
+    fn parameter(&mut self, spec: &SubsystemSpec, key: &str) -> Result {
+        let below = |value: &serde_json::Value, part: &str| value.get(part).cloned();
+        let all = serde_json::Value::Object(spec.parameters.clone());
+        let given = key.split('.').try_fold(all, |value, part| below(&value, part));
+        let Some(path) = given.as_ref().and_then(|v| v.as_str()) else { return Ok(()) };
+        let from = self.scenario.folder.join(path);
+        let file = from.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let folder = format!("files/{}", spec.name);
+        let to = self.take(&from, format!("{folder}/{file}"))?;
+        for named in named_files(&from) {
+            let below = from.parent().unwrap_or(Path::new("")).join(&named);
+            if named.contains("..") || named.starts_with('/') {
+                let text = format!("{} names `{named}`, which lies outside its folder", from.display());
+                return Err(plain(text + "; put it beside the file"));
+            }
+            if below.is_file() {
+                self.take(&below, format!("{folder}/{named}"))?;
+            }
+        }
+        // The sub-table of the module comes on top of the subsystem's own, so it is changed where it is written.
+        let parts = || key.split('.');
+        let table = self.document.get(&spec.name);
+        let own = table.and_then(|t| parts().try_fold(t.get(&spec.module)?, |item, part| item.get(part)));
+        let mut item = match own.is_some() {
+            true => &mut self.document[&spec.name][&spec.module],
+            false => &mut self.document[&spec.name],
+        };
+        for part in parts() {
+            item = &mut item[part];
+        }
+        *item = value(to);
+        Ok(())
+    }
+
+    /// The module that is the law of a soil.
+    fn law(&mut self, spec: &SubsystemSpec) -> Result {
+        let named = spec.parameters.get("law").and_then(|law| law.get("plugin"));
+        let Some(name) = named.and_then(|v| v.as_str()) else { return Ok(()) };
+        let path = terraglue_host::law::locate(name, self.search, &self.scenario.folder);
+        let path = path.map_err(|e| {
+            let place = [spec.name.as_str(), "law", "plugin"];
+            self.scenario.source.error_at_value(&place, e.to_string(), None)
+        })?;
+        let file = path.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let to = self.take(&path, format!("modules/{}/law/{file}", spec.name))?;
+        let law = self.document.get_mut(&spec.name).and_then(|t| t.get_mut("law"));
+        if let Some(law) = law.and_then(Item::as_table_like_mut) {
+            law.insert("plugin", value(to));
+        }
+        Ok(())
+    }
+
+    /// The soil file that `parameters` names, or the table with the row that it names.
+    fn soil_table(&mut self, spec: &SubsystemSpec) -> Result {
+        if spec.offered.is_empty() && spec.regions.is_empty() {
+            return Ok(());
+        }
+        let folder = &self.scenario.folder;
+        for region in spec.regions.iter().filter(|region| region.soil.ends_with(".toml")) {
+            self.take(&folder.join(&region.soil), region.soil.clone())?;
+        }
+        let text = |key: &str| self.document.get(&spec.name).and_then(|t| t.get(key)).and_then(Item::as_str);
+        if let Some(file) = text("parameters").filter(|p| p.ends_with(".toml")) {
+            let to = self.take(&folder.join(file), format!("models/{}.toml", spec.name))?;
+            self.set(&spec.name, "parameters", &to);
+            return Ok(());
+        }
+        let path = text("parameters_file").map(|f| folder.join(f)).or_else(|| find_soil_table(folder));
+        if let Some(path) = path {
+            let to = self.take(&path, "models/soils.csv".into())?;
+            self.set(&spec.name, "parameters_file", &to);
+        }
+        Ok(())
+    }
+
+    fn terrain(&mut self) -> Result {
+        let named = self.document.get("terrain").and_then(|t| t.get("file")).and_then(Item::as_str);
+        let Some(named) = named.map(|f| self.scenario.folder.join(f)) else { return Ok(()) };
+        let file = named.file_name().map(|n| n.to_string_lossy().into_owned()).unwrap_or_default();
+        let to = self.take(&named, format!("terrain/{file}"))?;
+        self.set("terrain", "file", &to);
+        Ok(())
+    }
+}
+
+/// What a robot file names by `filename="…"` or `file="…"`: meshes and other files beside it.
+fn named_files(path: &Path) -> Vec<String> {
+    let Ok(text) = terraglue_subsystem::files::read_text(path) else { return Vec::new() };
+    let mut all: Vec<String> = ["filename=\"", "file=\""]
+        .iter()
+        .flat_map(|key| text.split(key).skip(1).filter_map(|rest| rest.split('"').next()))
+        .map(|name| name.strip_prefix("package://").unwrap_or(name).to_owned())
+        .collect();
+    all.sort();
+    all.dedup();
+    all
+}
+
+/// 128 bits over all resources and the way they are shown, as a GUID: FNV-1a twice, with two starts.
+fn token(resources: &Path, request: &Request) -> Result<String> {
+    let mut files = Vec::new();
+    collect(resources, &mut files).map_err(|e| plain(format!("{}: {e}", resources.display())))?;
+    files.sort();
+    let mut hashes = [0xcbf2_9ce4_8422_2325_u64, 0x8422_2325_cbf2_9ce4];
+    let mut feed = |bytes: &[u8]| {
+        for hash in &mut hashes {
+            *hash = bytes.iter().fold(*hash, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0100_0000_01b3));
+        }
+    };
+    feed(format!("{:?} {}", request.version, request.scalars).as_bytes());
+    for file in &files {
+        feed(file.strip_prefix(resources).unwrap_or(file).to_string_lossy().as_bytes());
+        feed(&terraglue_subsystem::files::read(file).map_err(|e| plain(format!("{}: {e}", file.display())))?);
+    }
+    let [a, b] = hashes;
+    let part = |shift: u32, mask: u64| (a >> shift) & mask;
+    let guid = format!("{:08x}-{:04x}-{:04x}", part(32, 0xffff_ffff), part(16, 0xffff), part(0, 0xffff));
+    Ok(format!("{{{guid}-{:04x}-{:012x}}}", b >> 48, b & 0xffff_ffff_ffff))
+}
+
+fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
+    for entry in std::fs::read_dir(folder)? {
+        let path = entry?.path();
+        if path.is_dir() { collect(&path, files)? } else { files.push(path) }
+    }
+    Ok(())
+}
+
+fn about(request: &Request, scenario: &Scenario, unit: &Unit) -> About {
+    let help = match unit.bare {
+        Some(_) => format!("The module {} of Terraglue", request.target),
+        None => format!("The scenario {} of Terraglue", scenario.name),
+    };
+    About {
+        name: scenario.name.clone(),
+        identifier: identifier(&scenario.name),
+        description: help,
+        token: unit.token.clone(),
+        tool: format!("Terraglue {}", env!("CARGO_PKG_VERSION")),
+        license: "The library: MIT OR Apache-2.0. The model: that of its files.".into(),
+        stop_s: scenario.time.duration_s,
+        step_s: scenario.time.step_s,
+        fixed_step_s: None,
+    }
+}
+
+/// Everything in the archive, in its order.
+fn entries(
+    request: &Request,
+    search: &SearchPath,
+    resources: &Path,
+    opened: &Opened,
+    about: &About,
+) -> Result<Vec<(String, Content)>> {
+    let library = search.folders().iter().map(|f| f.join(LIBRARY)).find(|p| p.is_file());
+    let library = library.ok_or_else(|| {
+        let help =
+            "build it with `cargo build --package terraglue-unit`, or give its folder by --module-path";
+        InputError::plain(
+            format!("the library of exported units, {LIBRARY}, was not found"),
+            Some(help.into()),
+        )
+    })?;
+    let two = request.version == Version::V2;
+    let description =
+        describe(opened.subsystem.as_ref(), &opened.layout, about).map_err(|e| plain(e.to_string()))?;
+    let platform = if two { "linux64" } else { "x86_64-linux" };
+    let mut all = vec![
+        ("modelDescription.xml".to_owned(), Content::Text(description)),
+        (format!("binaries/{platform}/{}.so", about.identifier), Content::File(library)),
+        ("documentation/index.html".into(), Content::Text(page::page(opened, about))),
+        ("documentation/licenses/license.txt".into(), Content::Text(page::LICENSE.into())),
+    ];
+    let icon = page::icon().map_err(|e| plain(format!("the icon: {e}")))?;
+    all.push((if two { "model.png" } else { "terminalsAndIcons/icon.png" }.into(), Content::Bytes(icon)));
+    if let Some(terminals) = terraglue_fmi::export::terminals(&opened.layout) {
+        all.push(("terminalsAndIcons/terminalsAndIcons.xml".into(), Content::Text(terminals)));
+    }
+    let mut files = Vec::new();
+    collect(resources, &mut files).map_err(|e| plain(format!("{}: {e}", resources.display())))?;
+    files.sort();
+    for file in files {
+        let name = file.strip_prefix(resources).unwrap_or(&file).to_string_lossy().into_owned();
+        let bytes =
+            terraglue_subsystem::files::read(&file).map_err(|e| plain(format!("{}: {e}", file.display())))?;
+        all.push((format!("resources/{name}"), Content::Bytes(bytes)));
+    }
+    Ok(all)
+}

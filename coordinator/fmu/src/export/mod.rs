@@ -1,0 +1,105 @@
+//! A scenario as a functional mock-up unit.
+//!
+//! [`write`] packs a scenario, its modules and its files; [`open`] makes an instance from them inside the unit.
+//! A single module is exported as a small scenario around it: a soil gets ground and `feet` that another program
+//! moves.
+
+mod bundle;
+mod page;
+mod whole;
+mod wrap;
+
+use serde::{Deserialize, Serialize};
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
+use terraglue_engine::testbed::{Options, Testbed};
+use terraglue_fmi::Version;
+use terraglue_fmi::export::{Layout, Opened, Opening};
+use terraglue_host::Library;
+use terraglue_scenario::Scenario;
+use whole::Whole;
+
+pub use bundle::{Exported, write};
+pub use wrap::wrap;
+
+/// States that a master can keep at a time, one for the unit's own use among them.
+const SLOTS: u32 = 33;
+
+/// Names in the resources of a unit.
+const SCENARIO: &str = "scenario.toml";
+const UNIT: &str = "unit.json";
+
+/// What to export, and how.
+#[derive(Clone, Debug)]
+pub struct Request {
+    /// A scenario file, or the name of a module.
+    pub target: String,
+    /// Edits of the scenario.
+    pub sets: Vec<(String, String)>,
+    /// Folders searched for modules before all others.
+    pub module_paths: Vec<PathBuf>,
+    /// Version of the standard.
+    pub version: Version,
+    /// Arrays element by element also in FMI 3.0.
+    pub scalars: bool,
+    /// Where the unit goes.
+    pub out: PathBuf,
+}
+
+/// What the unit's own library must know beside the scenario.
+#[derive(Clone, Debug, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Unit {
+    /// 2 or 3.
+    version: u32,
+    scalars: bool,
+    token: String,
+    /// Subsystem whose variables bear no prefix.
+    bare: Option<String>,
+}
+
+impl Unit {
+    fn fmi(&self) -> Version {
+        if self.version == 2 { Version::V2 } else { Version::V3 }
+    }
+}
+
+/// Makes an instance from the resources of a unit.
+///
+/// # Errors
+/// What is missing or wrong in the resources, in words.
+pub fn open(opening: &Opening) -> Result<Opened, String> {
+    let path = opening.resources.join(UNIT);
+    let text =
+        terraglue_subsystem::files::read_text(&path).map_err(|e| format!("{}: {e}", path.display()))?;
+    let unit: Unit = serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))?;
+    let whole = instance(opening, &unit).map_err(|e| e.to_string())?;
+    let subsystem = whole.map_err(|e| e.to_string())?;
+    let layout = Layout::new(unit.fmi(), unit.scalars, terraglue_subsystem::Subsystem::variables(&subsystem));
+    Ok(Opened { layout, token: unit.token, slots: SLOTS, settles: true, subsystem: Box::new(subsystem) })
+}
+
+fn instance(
+    opening: &Opening,
+    unit: &Unit,
+) -> terraglue_diagnostics::Result<terraglue_subsystem::Result<Whole>> {
+    let scenario = Scenario::load(&opening.resources.join(SCENARIO), &[])?;
+    // Nothing but the unit's own modules: not what the program that runs it happens to have beside it.
+    let options = Options { threads: 1, ..Options::default() };
+    let log = opening.log.clone();
+    let testbed = Testbed::build_hosted(&scenario, &options, &crate::library(), |services| {
+        terraglue_host::HostServices {
+            slots: SLOTS,
+            log: Some(Arc::new(move |name, level, text| log.put(level, &format!("{name}: {text}")))),
+            ..services
+        }
+    })?;
+    Ok(Whole::new(testbed, unit.bare.as_deref(), SLOTS))
+}
+
+/// Writes a file below a folder, with the folders on the way.
+fn place(folder: &Path, name: &str, bytes: &[u8]) -> Result<(), String> {
+    let path = folder.join(name);
+    let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
+    made.and_then(|()| std::fs::write(&path, bytes)).map_err(|e| format!("{}: {e}", path.display()))
+}

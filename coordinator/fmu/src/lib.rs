@@ -1,0 +1,27 @@
+//! Functional mock-up units as subsystems of a scenario, on their own, and made from scenarios and modules.
+//!
+//! A table `[x] fmu = "path.fmu"` makes a [`FmuSubsystem`]; [`simulate`] runs one unit alone; [`export`] writes
+//! one. System structures (SSP) become scenarios in `terraglue_scenario::ssp`.
+
+mod adapter;
+mod bodies;
+mod clocks;
+pub mod export;
+mod feet;
+mod inputs;
+mod map;
+mod rollback;
+mod settings;
+pub mod simulate;
+mod table;
+
+pub use adapter::FmuSubsystem;
+pub use feet::Feet;
+pub use settings::OnNan;
+
+use terraglue_host::Library;
+
+/// What the program brings with it: driven `feet`, and what makes subsystems of FMUs.
+pub fn library() -> Library {
+    Library::new().with::<Feet>().with_fmus(FmuSubsystem::make)
+}

@@ -1,0 +1,78 @@
+//! FMI variables as variables of a scenario: array elements get names of their own, `foot.position[2,1]`.
+
+use terraglue_fmi::description::{self as fmi, ModelDescription, Variability};
+use terraglue_subsystem::{Effect, ValueType, Variable};
+
+/// Where the value of a variable of the scenario lies in the unit.
+#[derive(Clone, Copy, Debug)]
+pub struct Place {
+    /// Position in the description.
+    pub variable: u32,
+    /// Element, row by row.
+    pub element: u32,
+    /// Elements of the whole variable.
+    pub count: u32,
+    /// Number in calls.
+    pub reference: u32,
+    /// Whether it may be set after the initialisation.
+    pub live: bool,
+    /// Whether it gives arrays their sizes, and is set in configuration mode only.
+    pub structural: bool,
+    /// Whether it is a clock.
+    pub clock: bool,
+    /// Whether it is an input that waits for a tick of its clocks.
+    pub clocked: bool,
+}
+
+/// All variables that a scenario can see, and where they lie; clocks that others make tick are among them in event mode,
+/// as truth values.
+pub fn variables(description: &ModelDescription, event_mode: bool) -> (Vec<Variable>, Vec<Place>) {
+    let (mut all, mut places) = (Vec::new(), Vec::new());
+    for (k, v) in description.variables.iter().enumerate() {
+        let clock = v.value_type == ValueType::Clock;
+        let seen = (!clock || event_mode && v.triggered) && v.causality != fmi::Causality::Independent;
+        if !seen {
+            continue;
+        }
+        for element in 0..v.len() {
+            let effect = effect(v);
+            let id = all.len() as u32;
+            all.push(Variable {
+                id,
+                name: element_name(v, element),
+                value_type: if clock { ValueType::Bool } else { v.value_type },
+                causality: v.causality.role(),
+                effect,
+                unit: description.unit_of(v),
+                help: v.description.clone(),
+                min: v.min,
+                max: v.max,
+                dims: Vec::new(),
+                enumeration: v.items.iter().map(|(name, _)| name.clone()).collect(),
+            });
+            let live = effect == Effect::Live;
+            let structural = v.causality == fmi::Causality::StructuralParameter;
+            let (variable, element, count) = (k as u32, element as u32, v.len() as u32);
+            let reference = v.reference;
+            let clocked = event_mode && v.causality == fmi::Causality::Input && !v.clocks.is_empty();
+            places.push(Place { variable, element, count, reference, live, structural, clock, clocked });
+        }
+    }
+    (all, places)
+}
+
+/// `name`, or `name[i,j]` from 1 for an element of an array.
+pub fn element_name(v: &fmi::Variable, element: usize) -> String {
+    terraglue_subsystem::element_name(&v.name, &v.sizes, element)
+}
+
+fn effect(v: &fmi::Variable) -> Effect {
+    match (v.causality, v.variability) {
+        (fmi::Causality::Input, _) | (fmi::Causality::Parameter, Variability::Tunable) => Effect::Live,
+        (fmi::Causality::Parameter | fmi::Causality::StructuralParameter, _) => Effect::NeedsReset,
+        _ if v.initial == Some(fmi::Initial::Exact) && v.variability != Variability::Constant => {
+            Effect::NeedsReset
+        }
+        _ => Effect::ReadOnly,
+    }
+}

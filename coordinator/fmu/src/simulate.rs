@@ -1,0 +1,329 @@
+//! One unit alone: from its start to its end in equal steps, its outputs as rows of a table.
+
+use super::inputs::{self, Inputs, set_text};
+use super::map::element_name;
+use std::sync::Arc;
+use terraglue_fmi::description::{Causality, Variable};
+use terraglue_fmi::slave::Sink;
+use terraglue_fmi::{Advance, Error, Fmu, ModelDescription, Result, Slave, SlaveOptions, SlaveState};
+use terraglue_scenario::did_you_mean;
+use terraglue_subsystem::{ValueType, ValuesMut};
+
+pub use super::table::{Row, Table};
+
+/// How a unit is run.
+pub struct Settings {
+    /// Start values by name, as text.
+    pub start: Vec<(String, String)>,
+    /// s; none: what the unit wants.
+    pub start_time: Option<f64>,
+    /// s.
+    pub stop: Option<f64>,
+    /// s.
+    pub step: Option<f64>,
+    /// Relative.
+    pub tolerance: Option<f64>,
+    /// Names to write; empty: all outputs.
+    pub outputs: Vec<String>,
+    /// Whether events are handled in event mode.
+    pub event_mode: bool,
+    /// Inputs over time.
+    pub input: Arc<Table>,
+    /// Whether inputs are held over each step, also of units that follow them within.
+    pub hold_inputs: bool,
+}
+
+/// Takes a line of a table.
+pub type Line<'a> = &'a mut dyn FnMut(&str) -> Result;
+
+/// Where the tables of a run go, line by line, the header first.
+pub struct Tables<'a> {
+    /// Outputs at communication points.
+    pub rows: Line<'a>,
+    /// Outputs that the unit shows at intermediate times, of the steps that stand.
+    pub intermediate: Option<Line<'a>>,
+}
+
+/// Share of a step that a number of steps may be off a whole one: it was typed with so many digits.
+const NEARLY_WHOLE: f64 = 1e-5;
+/// Longest run, in steps.
+const STEPS: f64 = 1e9;
+
+/// Runs a unit and writes its tables. Answers when the unit itself asked for the end of the run before its time, s.
+///
+/// # Errors
+/// What the unit or its input does wrong, with the time.
+pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables) -> Result<Option<f64>> {
+    let row = &mut *tables.rows;
+    let experiment = fmu.description().experiment;
+    let start = settings.start_time.or(experiment.start).unwrap_or(0.0);
+    let stop = settings.stop.or(experiment.stop).unwrap_or(start + 1.0);
+    let step = settings.step.or(experiment.step).or(fmu.description().capabilities.fixed_step);
+    let step = step.unwrap_or((stop - start) / 500.0);
+    let exact = (stop - start) / step;
+    let whole = (exact - exact.round()).abs() <= NEARLY_WHOLE;
+    let variable = fmu.description().capabilities.variable_step;
+    let steps = if whole {
+        exact.round()
+    } else if variable {
+        exact.ceil()
+    } else {
+        exact.floor()
+    };
+    if !(step > 0.0 && steps >= 1.0 && steps <= STEPS) {
+        return Err(Error::Refused(format!("from {start} s to {stop} s in steps of {step} s cannot be run")));
+    }
+    let intermediate = match &tables.intermediate {
+        Some(_) => shown_between(fmu.description(), &settings.outputs)?,
+        None => Vec::new(),
+    };
+    let (event_mode, name) = (settings.event_mode, "unit".into());
+    let followed = match settings.hold_inputs {
+        true => Vec::new(),
+        false => inputs::followed(fmu.description(), &settings.input),
+    };
+    let options =
+        SlaveOptions { name, verbose: false, event_mode, intermediate: intermediate.clone(), followed, sink };
+    let mut slave = Slave::instantiate(fmu, options)?;
+    configure(&mut slave, &settings.start)?;
+    let description = slave.description().clone();
+    let columns = columns(&description, &settings.outputs, event_mode)?;
+    for (name, text) in &settings.start {
+        let v = find(&description, name)?;
+        if v.causality != Causality::StructuralParameter {
+            set_text(&slave, v, text)?;
+        }
+    }
+    slave.enter_initialization(start, Some(stop), settings.tolerance.or(experiment.tolerance))?;
+    let inputs = Inputs::find(&slave, &settings.input, settings.hold_inputs)?;
+    inputs.set(&mut slave, start)?;
+    slave.exit_initialization()?;
+    inputs.follow(&mut slave)?;
+    // with event mode a last column says how many events were handled since the row before
+    let marked = |text: String, events: u32| match settings.event_mode {
+        true if text.starts_with("time") => text + ",events",
+        true => format!("{text},{events}"),
+        false => text,
+    };
+    if let Some(write) = &mut tables.intermediate {
+        let all = self::columns(&description, &intermediate, false)?;
+        write(&(header(&all) + ",step_finished"))?;
+    }
+    if !whole && !variable {
+        let end = start + steps * step;
+        slave.note(&format!(
+            "the run ends at t = {end} s, before {stop} s: the unit takes steps of one length only"
+        ));
+    }
+    row(&marked(header(&columns), 0))?;
+    row(&marked(line(&slave, start, &columns)?, 0))?;
+    let mut before = Before { state: SlaveState::default(), saves: description.capabilities.state };
+    let mut ended = None;
+    let outcome = (0..steps as u64).try_for_each(|k| {
+        if ended.is_some() {
+            return Ok(());
+        }
+        let (t, end) = (start + k as f64 * step, start + (k + 1) as f64 * step);
+        let end = if whole { end } else { end.min(stop) };
+        let at = |e: Error| named(e, t);
+        inputs.set(&mut slave, t).map_err(at)?;
+        slave.forget_ticks();
+        let events;
+        let step = halving(&mut slave, &inputs, &mut before, (t, end), &mut tables.intermediate);
+        (ended, events) = step.map_err(|e| at(inputs.way_out(e)))?;
+        let now = ended.unwrap_or(end);
+        row(&marked(line(&slave, now, &columns).map_err(|e| named(e, now))?, events))
+    });
+    drop(slave.release(&mut before.state));
+    outcome?;
+    slave.terminate()?;
+    Ok(ended)
+}
+
+/// The state before a step.
+struct Before {
+    state: SlaveState,
+    /// Whether the unit can save it.
+    saves: bool,
+}
+
+impl Before {
+    /// Saves it, where that is possible: it is needed for steps that the unit discards only.
+    fn save(&mut self, slave: &Slave) -> Result {
+        match slave.save(&mut self.state) {
+            Err(Error::Refused(why)) => {
+                slave.note(&format!("{why}; a step that it discards cannot be halved"));
+                self.saves = false;
+                Ok(())
+            }
+            other => other,
+        }
+    }
+}
+
+/// A step, in halves where the unit discards it and can go back. Answers when the unit asked for the end, and how many
+/// events there were.
+fn halving(
+    slave: &mut Slave,
+    inputs: &Inputs,
+    before: &mut Before,
+    (start, end): (f64, f64),
+    between: &mut Option<Line>,
+) -> Result<(Option<f64>, u32)> {
+    let variable_step = slave.description().capabilities.variable_step;
+    let (mut t, mut h, mut halvings, mut events) = (start, end - start, 0, 0);
+    while end - t > 1e-9 * (end - start) {
+        if before.saves {
+            before.save(slave)?;
+        }
+        let part = (t, if h >= end - t { end } else { t + h });
+        inputs.begin_part(slave, part, t == start && halvings == 0)?;
+        let made = slave.do_step(Advance { t, h: h.min(end - t), for_good: true });
+        if let (Ok(_), Some(write)) = (&made, &mut *between) {
+            for row in slave.take_intermediate() {
+                let values: String = row.values.iter().map(|x| format!(",{x}")).collect();
+                write(&format!("{}{values},{}", row.t, u8::from(row.finished)))?;
+            }
+        }
+        if made.is_ok() {
+            slave.forget_triggers();
+        }
+        match made {
+            Ok(done) if done.terminate => return Ok((Some(done.reached), events + done.events)),
+            Ok(done) => {
+                events += done.events;
+                t = if h >= end - t { end } else { t + h };
+            }
+            Err(Error::Discard { .. }) if before.saves && variable_step && halvings < 10 => {
+                slave.restore(&before.state)?;
+                (h, halvings) = (0.5 * h, halvings + 1);
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Ok((None, events))
+}
+
+fn named(error: Error, t: f64) -> Error {
+    Error::Refused(format!("at t = {t} s: {error}"))
+}
+
+/// Sets the structural parameters among the start values.
+fn configure(slave: &mut Slave, start: &[(String, String)]) -> Result {
+    let mut values: Vec<(&str, i128)> = Vec::new();
+    for (name, text) in start {
+        if find(slave.description(), name)?.causality != Causality::StructuralParameter {
+            continue;
+        }
+        let wrong =
+            || Error::Refused(format!("`{name}` = {text}: a structural parameter takes a whole number"));
+        values.push((name, text.trim().parse().map_err(|_| wrong())?));
+    }
+    slave.configure(&values)
+}
+
+/// A variable by its name.
+///
+/// # Errors
+/// The name, with the one that looks most like it.
+pub(super) fn find<'a>(description: &'a ModelDescription, name: &str) -> Result<&'a Variable> {
+    let all = &description.variables;
+    all.iter().find(|v| v.name == name).ok_or_else(|| {
+        let hint = did_you_mean(name, all.iter().map(|v| v.name.as_str()));
+        Error::Refused(format!(
+            "there is no variable `{name}`{}",
+            hint.map(|h| format!("; {h}")).unwrap_or_default()
+        ))
+    })
+}
+
+fn columns<'a>(
+    description: &'a ModelDescription,
+    names: &[String],
+    event_mode: bool,
+) -> Result<Vec<&'a Variable>> {
+    if !names.is_empty() {
+        return names.iter().map(|n| find(description, n)).collect();
+    }
+    let output =
+        |v: &&Variable| v.causality == Causality::Output && (event_mode || v.value_type != ValueType::Clock);
+    Ok(description.variables.iter().filter(output).collect())
+}
+
+/// Those of the outputs that can be read at intermediate times.
+fn shown_between(description: &ModelDescription, names: &[String]) -> Result<Vec<String>> {
+    let shown = |v: &&Variable| v.intermediate && v.value_type == ValueType::F64;
+    let all: Vec<String> =
+        columns(description, names, false)?.into_iter().filter(shown).map(|v| v.name.clone()).collect();
+    match all.is_empty() {
+        false => Ok(all),
+        true => Err(Error::Refused(
+            "none of the outputs is a Float64 with intermediateUpdate = \"true\", which can be read at intermediate times"
+                .into(),
+        )),
+    }
+}
+
+fn header(columns: &[&Variable]) -> String {
+    let names = columns.iter().flat_map(|v| (0..v.len()).map(|k| quoted(&element_name(v, k))));
+    std::iter::once("time".to_owned()).chain(names).collect::<Vec<_>>().join(",")
+}
+
+fn quoted(text: &str) -> String {
+    if text.contains([',', '"', '\n']) {
+        format!("\"{}\"", text.replace('"', "\"\""))
+    } else {
+        text.to_owned()
+    }
+}
+
+/// One line of the table; numbers are written so that reading them gives the same bits.
+fn line(slave: &Slave, t: f64, columns: &[&Variable]) -> Result<String> {
+    let mut text = t.to_string();
+    for v in columns {
+        for value in read(slave, v)? {
+            text.push(',');
+            text.push_str(&quoted(&value));
+        }
+    }
+    Ok(text)
+}
+
+fn read(slave: &Slave, v: &Variable) -> Result<Vec<String>> {
+    macro_rules! values {
+        ($variant:ident, $zero:expr, $show:expr) => {{
+            let mut out = vec![$zero; v.len()];
+            slave.get(&[v.reference], ValuesMut::$variant(&mut out))?;
+            Ok(out.iter().map($show).collect())
+        }};
+    }
+    macro_rules! numbers {
+        ($variant:ident, $zero:expr) => {{
+            let mut out = vec![$zero; v.len()];
+            slave.get(&[v.reference], ValuesMut::$variant(&mut out))?;
+            if let Some(wrong) = out.iter().find(|x| !x.is_finite()) {
+                return Err(Error::Refused(format!("the variable `{}` is {wrong}", v.name)));
+            }
+            Ok(out.iter().map(ToString::to_string).collect())
+        }};
+    }
+    match v.value_type {
+        ValueType::F64 => numbers!(F64, f64::NAN),
+        ValueType::F32 => numbers!(F32, f32::NAN),
+        ValueType::I8 => values!(I8, 0, |x: &i8| x.to_string()),
+        ValueType::I16 => values!(I16, 0, |x: &i16| x.to_string()),
+        ValueType::I32 => values!(I32, 0, |x: &i32| x.to_string()),
+        ValueType::I64 => values!(I64, 0, |x: &i64| x.to_string()),
+        ValueType::U8 => values!(U8, 0, |x: &u8| x.to_string()),
+        ValueType::U16 => values!(U16, 0, |x: &u16| x.to_string()),
+        ValueType::U32 => values!(U32, 0, |x: &u32| x.to_string()),
+        ValueType::U64 => values!(U64, 0, |x: &u64| x.to_string()),
+        ValueType::Bool => values!(Bool, false, |x: &bool| u8::from(*x).to_string()),
+        ValueType::Enumeration => values!(Enumeration, 0, |x: &i64| x.to_string()),
+        ValueType::String => values!(String, String::new(), |x: &String| x.clone()),
+        ValueType::Binary => values!(Binary, Vec::new(), |x: &Vec<u8>| {
+            x.iter().map(|b| format!("{b:02x}")).collect::<String>()
+        }),
+        ValueType::Clock => Ok(vec![u8::from(slave.ticks(v.reference)).to_string()]),
+    }
+}

@@ -1,0 +1,50 @@
+//! Explicit, one side after the other, as co-simulation masters do: the baseline.
+//!
+//! Springs: side 2 steps under T = k_c·(x2 − x1) of t, then side 1 under k_c·(x2⁺ − x1). Contacts: the bodies step
+//! under the soil's force of t, then the soil follows their motion; stable while κ + 2·c·h/m < 4. Never asks for
+//! a derivative and never repeats a step.
+
+use super::exchange::Exchange;
+use super::{Needs, Outcome, Strategy};
+use terraglue_diagnostics::Result;
+use terraglue_host::Instance;
+use terraglue_subsystem::Capabilities;
+
+/// Name in the scenario.
+pub const NAME: &str = terraglue_scenario::StrategyKind::GaussSeidel.name();
+
+/// The explicit pass. It keeps nothing from step to step.
+#[derive(Debug, Default)]
+pub struct GaussSeidel {}
+
+impl Strategy for GaussSeidel {
+    fn name(&self) -> &'static str {
+        NAME
+    }
+
+    fn is_single_pass(&self) -> bool {
+        true
+    }
+
+    fn needs(&self) -> Needs {
+        Needs { first: Capabilities::FORCE, second: Capabilities::FORCE, grounds: Capabilities::default() }
+    }
+
+    fn refuses(&self, exchange: &Exchange) -> Option<String> {
+        super::rigid_refused(NAME, exchange)
+    }
+
+    fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
+        exchange.explicit_forces();
+        if exchange.has_joints() {
+            exchange.advance_half(true, instances)?;
+            exchange.t_second.clone_from(&exchange.t);
+            exchange.spring_forces();
+            exchange.advance_half(false, instances)?;
+        } else {
+            exchange.advance_bodies(instances)?;
+        }
+        exchange.follow_bodies();
+        Ok(super::single_pass(exchange))
+    }
+}

@@ -1,0 +1,143 @@
+//! Gluing: how subsystems that share ports find one wrench per port and step. One file per strategy.
+//!
+//! - [`cooperative`]: the paper's single pass. The bodies estimate, the soil answers, the bodies re-solve.
+//! - [`cooperative_compliant`]: the same, exact for soils that yield: the soil iterates against the estimate.
+//! - [`iterative`]: the generic T-T strategy with its X-T form; repeats trials until both sides agree.
+//! - [`semi_implicit`]: one Newton step of it, no check.
+//! - [`xt_newton`], [`relaxed`]: motion in, force out on side 2; with and without derivatives.
+//! - [`xx_newton`]: motion in on both sides.
+//! - [`jacobi`], [`gauss_seidel`]: explicit, the baseline.
+//! - [`tlm`]: springs as transmission lines.
+//! - [`monolithic`]: the reference.
+//!
+//! All work on an [`Exchange`], where the paper's calls stand by name, and fill one [`StepReport`].
+
+mod complementarity;
+pub mod contact;
+pub mod cooperative;
+pub mod cooperative_compliant;
+mod derivatives;
+mod eigen;
+mod estimate;
+mod exchange;
+mod follow;
+pub mod gauss_seidel;
+pub mod glue;
+mod group_estimate;
+mod halves;
+pub mod iterative;
+pub mod jacobi;
+mod linear;
+pub mod memory;
+pub mod monolithic;
+mod refresh;
+mod refusal;
+pub mod relaxed;
+mod report;
+pub mod semi_implicit;
+mod side;
+mod start;
+pub mod step_control;
+#[cfg(test)]
+mod tests;
+pub mod timing;
+pub mod tlm;
+pub mod xt_newton;
+pub mod xx_newton;
+
+pub use derivatives::Derivatives;
+pub use exchange::Exchange;
+pub use glue::{Glue, Row};
+pub use group_estimate::GroupEstimate;
+pub use refusal::{Refusal, refusal};
+use refusal::{body_contacts_refused, contacts_refused, joints_refused, rigid_refused, second_refused};
+pub use report::{PortReport, StepReport};
+pub use side::Instant;
+/// How wrenches run inside a step: only their end value counts for the integrators in use.
+pub(crate) const HOLD: terraglue_subsystem::Hold = terraglue_subsystem::Hold::End;
+
+use terraglue_diagnostics::Result;
+use terraglue_host::Instance;
+use terraglue_scenario::{GluingSpec, StrategyKind};
+use terraglue_subsystem::Capabilities;
+
+/// How a strategy ended a step. Nothing is committed before it says `Converged`.
+#[derive(Clone, Debug, PartialEq)]
+pub enum Outcome {
+    /// `Exchange::t`, `x1` and `x2` hold what is to be committed.
+    Converged,
+    /// The step may be repeated with half the length.
+    NotConverged(String),
+}
+
+/// What the members of a group must be able to do.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Needs {
+    /// Bodies on side 1.
+    pub first: Capabilities,
+    /// Bodies that are side 2 of all their glue.
+    pub second: Capabilities,
+    /// Soils.
+    pub grounds: Capabilities,
+}
+
+/// A way to find the wrenches of one step (paper, steps 2 to 4; 1 and 5 are the same for all).
+pub trait Strategy: Send {
+    /// Name in the scenario.
+    fn name(&self) -> &'static str;
+
+    /// What the members must be able to do.
+    fn needs(&self) -> Needs;
+
+    /// Why it cannot glue this group, whatever its members can do.
+    fn refuses(&self, _exchange: &Exchange) -> Option<String> {
+        None
+    }
+
+    /// Whether it ends without asking whether both sides agree: it has no tolerance, and no gap at contacts with soil.
+    fn is_single_pass(&self) -> bool {
+        false
+    }
+
+    /// What later steps depend on goes into a snapshot.
+    fn remember(&self, _out: &mut Vec<u64>) {}
+
+    /// Back to what [`Strategy::remember`] wrote.
+    fn recall(&mut self, _kept: &mut memory::Recall) {}
+
+    /// Finds the wrenches of the step.
+    fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome>;
+}
+
+/// The strategy of a scenario.
+pub fn strategy(spec: &GluingSpec) -> Box<dyn Strategy> {
+    match spec.strategy {
+        StrategyKind::Cooperative => Box::new(cooperative::Cooperative::default()),
+        StrategyKind::CooperativeCompliant => {
+            Box::new(cooperative_compliant::CooperativeCompliant::new(spec))
+        }
+        StrategyKind::Iterative => Box::new(iterative::Iterative::new(spec)),
+        StrategyKind::SemiImplicit => Box::new(semi_implicit::SemiImplicit::new(spec)),
+        StrategyKind::XtNewton => Box::new(xt_newton::XtNewton::new(spec)),
+        StrategyKind::Relaxed => Box::new(relaxed::Relaxed::new(spec)),
+        StrategyKind::XxNewton => Box::new(xx_newton::XxNewton::new(spec)),
+        StrategyKind::Jacobi => Box::new(jacobi::Jacobi::default()),
+        StrategyKind::GaussSeidel => Box::new(gauss_seidel::GaussSeidel::default()),
+        StrategyKind::Tlm => Box::new(tlm::Tlm::default()),
+        StrategyKind::Monolithic => Box::new(monolithic::Monolithic::new(spec)),
+    }
+}
+
+/// What finds the forces of joints in a step of h = 0 before the first: the same for all strategies.
+pub fn start(spec: &GluingSpec) -> Box<dyn Strategy> {
+    Box::new(start::Start::new(spec))
+}
+
+/// The end of a pass that does not ask whether it converged.
+fn single_pass(exchange: &mut Exchange) -> Outcome {
+    exchange.report.converged = true;
+    for i in (0..exchange.n()).filter(|i| exchange.rows[*i] == Row::Joint) {
+        exchange.report.max_gap_m = exchange.report.max_gap_m.max(exchange.joint_gap(i));
+    }
+    Outcome::Converged
+}

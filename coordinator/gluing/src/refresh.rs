@@ -1,0 +1,177 @@
+//! When the bodies' interface Jacobian is computed again, and from where.
+
+use super::derivatives::Derivatives;
+use super::exchange::Exchange;
+use super::memory::{Recall, Remember};
+use terraglue_diagnostics::Result;
+use terraglue_host::Instance;
+
+/// The residual may shrink by this factor at least before the Jacobian counts as stale.
+const RATIO: f64 = 0.3;
+
+/// `gluing.jacobian`.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+enum Way {
+    /// The modules' own derivatives, anew at every iteration: they cost no evaluation.
+    #[default]
+    Analytic,
+    /// Directional derivatives, or central differences, at the first iteration of a step.
+    Central,
+    /// Forward differences at the first iteration of a step.
+    Forward,
+    /// Forward differences once.
+    Broyden,
+    /// The control that shows why one must refresh.
+    Frozen,
+}
+
+/// Keeps G from trial to trial.
+///
+/// One that comes from differences is taken at the first iteration of a step, and again when an iteration left more
+/// than 0.3 of the residual. Between, and with `broyden` from step to step, Broyden's rank-one update (1965) brings
+/// it up to what the trials say.
+#[derive(Debug, Default)]
+pub struct Refresh {
+    way: Way,
+    /// n, epoch and h of the kept one.
+    of: Option<(usize, u32, f64)>,
+    g: Vec<f64>,
+    /// T and the bodies' part of the mismatch at the trial before.
+    t: Vec<f64>,
+    motion: Vec<f64>,
+    change: Vec<f64>,
+}
+
+impl Refresh {
+    /// From `gluing.jacobian`.
+    pub fn new(jacobian: &str) -> Self {
+        let way = match jacobian {
+            "directional" => Way::Central,
+            "finite-differences" => Way::Forward,
+            "broyden" => Way::Broyden,
+            "frozen" => Way::Frozen,
+            _ => Way::Analytic,
+        };
+        Self { way, ..Self::default() }
+    }
+
+    /// Puts G for the last trial into `exchange.estimate`. `left` is the present residual, `before` that of the
+    /// iteration before (NaN: this is the first).
+    pub fn provide(
+        &mut self,
+        left: f64,
+        before: f64,
+        exchange: &mut Exchange,
+        instances: &mut [Instance],
+    ) -> Result {
+        if self.is_stale(left, before, exchange) {
+            exchange.linearise_bodies(self.source(), instances)?;
+        } else {
+            self.put_back(before, exchange);
+        }
+        self.of = Some((exchange.n(), exchange.at.epoch, exchange.at.h));
+        self.g.clone_from(&exchange.estimate.g);
+        self.t.clone_from(&exchange.t);
+        self.motion.clear();
+        self.motion.extend((0..exchange.n()).map(|i| exchange.bodies_part(i)));
+        Ok(())
+    }
+
+    /// Part of a snapshot.
+    pub fn remember(&self, out: &mut Vec<u64>) {
+        let (n, epoch, h) = self.of.unwrap_or((0, 0, f64::NAN));
+        out.extend([n as u64, u64::from(epoch)]);
+        out.put(h);
+        [&self.g, &self.t, &self.motion].into_iter().for_each(|list| out.put_all(list));
+    }
+
+    /// Back from a snapshot.
+    pub fn recall(&mut self, kept: &mut Recall) {
+        let (n, epoch, h) = (kept.word() as usize, kept.word() as u32, kept.number());
+        self.of = (!h.is_nan()).then_some((n, epoch, h));
+        [&mut self.g, &mut self.t, &mut self.motion].into_iter().for_each(|list| kept.all(list));
+    }
+
+    fn source(&self) -> Derivatives {
+        match self.way {
+            Way::Central => Derivatives::Central,
+            Way::Forward | Way::Broyden => Derivatives::Forward,
+            Way::Analytic | Way::Frozen => Derivatives::Analytic,
+        }
+    }
+
+    fn is_stale(&self, left: f64, before: f64, exchange: &Exchange) -> bool {
+        let Some((n, epoch, h)) = self.of else { return true };
+        let same = n == exchange.n() && (h == 0.0) == (exchange.at.h == 0.0);
+        match self.way {
+            Way::Analytic => true,
+            Way::Frozen => !same,
+            Way::Central | Way::Forward if before.is_nan() => true,
+            _ => !same || epoch != exchange.at.epoch || h != exchange.at.h || left > RATIO * before,
+        }
+    }
+
+    /// The kept one; brought up to date by the last two trials where they belong to one step.
+    fn put_back(&mut self, before: f64, exchange: &mut Exchange) {
+        let n = exchange.n();
+        if self.way == Way::Frozen {
+            // G grows with h² at position level: what is frozen is the mechanism's position
+            let of = self.of.map_or(exchange.at.h, |of| of.2);
+            let scale = if of > 0.0 { exchange.at.h / of } else { 1.0 };
+            self.g.iter_mut().for_each(|g| *g *= scale * scale);
+        } else if !before.is_nan() {
+            self.change.clear();
+            self.change.extend(exchange.t.iter().zip(&self.t).map(|(new, old)| new - old));
+            let size: f64 = self.change.iter().map(|d| d * d).sum();
+            for row in 0..n {
+                let predicted: f64 = (0..n).map(|c| self.g[c * n + row] * self.change[c]).sum();
+                let missing = exchange.bodies_part(row) - self.motion[row] - predicted;
+                for c in (0..n).filter(|_| size > 0.0) {
+                    self.g[c * n + row] += missing * self.change[c] / size;
+                }
+            }
+        }
+        exchange.estimate.g.copy_from_slice(&self.g);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A kept Jacobian of no component, so that only the ratio of the residuals decides.
+    fn kept(jacobian: &str, exchange: &Exchange) -> Refresh {
+        let of = Some((0, exchange.at.epoch, exchange.at.h));
+        Refresh { of, ..Refresh::new(jacobian) }
+    }
+
+    #[test]
+    fn it_is_taken_again_when_more_than_three_tenths_are_left() {
+        let exchange = Exchange::new(&[], &[], 1.0);
+        for way in ["directional", "finite-differences", "broyden"] {
+            let refresh = kept(way, &exchange);
+            assert!(refresh.is_stale(0.31, 1.0, &exchange), "{way}");
+            assert!(!refresh.is_stale(0.29, 1.0, &exchange), "{way}");
+        }
+        assert!(kept("analytic", &exchange).is_stale(1e-9, 1.0, &exchange));
+        assert!(!kept("frozen", &exchange).is_stale(2.0, 1.0, &exchange));
+        // differences start each step afresh, Broyden's update goes on
+        assert!(kept("finite-differences", &exchange).is_stale(1.0, f64::NAN, &exchange));
+        assert!(!kept("broyden", &exchange).is_stale(1.0, f64::NAN, &exchange));
+    }
+
+    #[test]
+    fn a_snapshot_holds_the_kept_jacobian() {
+        let exchange = Exchange::new(&[], &[], 1.0);
+        let mut refresh = kept("broyden", &exchange);
+        (refresh.g, refresh.t, refresh.motion) = (vec![1.0], vec![2.0], vec![3.0]);
+        let mut words = Vec::new();
+        refresh.remember(&mut words);
+        let mut other = Refresh::new("broyden");
+        other.recall(&mut Recall(&words));
+        assert_eq!(
+            (other.of, other.g, other.t, other.motion),
+            (refresh.of, refresh.g, refresh.t, refresh.motion)
+        );
+    }
+}

@@ -1,0 +1,81 @@
+//! Recordings of a run: written while it goes, read back, summed up, turned into a report and compared.
+//!
+//! [`Recorder`] follows a testbed as an [`Observer`](terraglue_engine::observer::Observer) and fills one folder:
+//!
+//! | file | what |
+//! |---|---|
+//! | `recording.mcap` | everything simulated, in the schemas that robotics viewers read; equal bytes for equal runs |
+//! | `summary.json` | the figures of the run ([`Summary`]) |
+//! | `variables.csv` | on request: all variables in one table, arrays by their elements |
+//! | `timing.csv` | what a clock measured, apart from everything else |
+//! | `exchange.json` | how values went round: order, connections with their delays, loops |
+//! | `viewer_layout.json` | a layout of this run for Foxglove and Lichtblick |
+//! | `final_ground.asc` | the ground at the end as ESRI ASCII grid |
+//! | `checkpoint.bin` | on request, while a run goes on: what [`Checkpoint`](terraglue_checkpoint::Checkpoint) goes on from |
+//!
+//! Topics, message types and what each viewer makes of them stand in `docs/recording.md`.
+//!
+//! A metadata record `terraglue` at the head holds the scenario's text after all edits, fingerprints of the files that it
+//! names, strategy and modules.
+//!
+//! [`Recording`] reads any recording, also one that was cut off ([`mend`] gives such a file its footer);
+//! [`report::write`] makes the report from it, [`compare::write`] puts several runs side by side.
+
+mod body_track;
+mod columns;
+mod csv;
+mod descriptor;
+mod energies;
+mod energy_message;
+mod exchange;
+mod force_message;
+mod gluing_message;
+mod ground_grid;
+mod ground_points;
+mod inputs;
+mod keep;
+mod kept_file;
+mod layout;
+mod mcap_writer;
+mod mend;
+mod messages;
+mod motor_work;
+mod point_cloud;
+mod prints;
+mod reader;
+mod recorder;
+mod records;
+mod scene_message;
+mod selection;
+mod snapshot;
+mod solids;
+mod space;
+mod summary;
+mod summary_observer;
+mod table;
+mod topics;
+mod trace;
+mod viewer_layout;
+
+pub mod compare;
+pub mod report;
+
+#[cfg(test)]
+mod tests;
+
+pub use csv::{TimingRow, write_timing};
+pub use energies::Energies;
+pub use exchange::write_exchange;
+pub use inputs::fingerprints;
+pub use kept_file::KeptFile;
+pub use layout::at;
+pub use layout::{CHECKPOINT, FINAL_GROUND, RECORDING, REPORT, SUMMARY, TIMING, VARIABLES, VIEWER_LAYOUT};
+pub use mend::mend;
+pub use messages::{GluingRecord, PortRecord, WindowRecord};
+pub use reader::{GroundRecord, Header, PoseSeries, Recording};
+pub use recorder::{Recorder, RecorderOptions, RecorderState};
+pub use solids::Solid;
+pub use summary::{FailureRecord, PrintDepth, Stall, Status, Summary};
+pub use summary_observer::SummaryObserver;
+pub use table::Table;
+pub use trace::Trace;

@@ -1,0 +1,442 @@
+//! `recording.mcap`: all topics of a run in one append-only file.
+//!
+//! Equal runs give equal bytes: times are simulated, chunks end by a count of steps, nothing is compressed on
+//! other threads, and no name of a machine or folder is written. What was flushed survives `kill -9`.
+
+use crate::columns::{About, Columns};
+use crate::force_message::{DRAWN_EVERY_S, Forces};
+use crate::ground_grid::{GroundGrid, Rectangle};
+use crate::ground_points::GroundPoints;
+use crate::kept_file::KeptFile;
+use crate::layout::{RECORDING, at, nanoseconds, other_at, timestamp};
+use crate::messages::WindowRecord;
+use crate::scene_message::{frame_id, pose, quaternion, scene, vector};
+use crate::selection::Precision;
+use crate::snapshot::{Snapshot, failed};
+use crate::topics::{self, Topic};
+use crate::{energy_message, gluing_message, point_cloud};
+use foxglove::messages::packed_element_field::NumericType;
+use foxglove::messages::{FrameTransform, FrameTransforms, Grid, Log, PackedElementField, Vector2, log};
+use mcap::records::MessageHeader;
+use mcap::write::NoSeek;
+use prost::Message;
+use prost::bytes::Bytes;
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::{Path, PathBuf};
+use terraglue_diagnostics::error::{Error, Result};
+use terraglue_engine::observer::{Happening, View};
+use terraglue_gluing::StepReport;
+use terraglue_numerics::rotation;
+use terraglue_scenario::Scenario;
+use terraglue_subsystem::Pose;
+
+mod resume;
+pub(crate) use resume::McapState;
+use resume::Pending;
+
+/// A chunk ends every so many steps; that many can be lost when the process is killed.
+pub(crate) const FLUSH_STEPS: u64 = 200;
+
+type Sink = mcap::Writer<NoSeek<BufWriter<KeptFile>>>;
+
+/// How every recording is laid out, also a mended one.
+pub(crate) fn options() -> mcap::WriteOptions {
+    mcap::WriteOptions::new()
+        .compression(Some(mcap::Compression::Zstd))
+        .compression_level(3)
+        .compression_threads(0)
+        .library("terraglue")
+        .disable_seeking(true)
+}
+
+/// The variables of a subsystem on their way into the file.
+struct Variables {
+    channel: u16,
+    columns: Columns,
+    /// Places of the columns among all of the subsystem.
+    places: Vec<usize>,
+    /// Which of them are no real numbers.
+    whole: Vec<bool>,
+    values: Vec<f64>,
+    /// What was written last, of columns that are written when they change.
+    written: Option<Vec<f64>>,
+}
+
+impl Variables {
+    /// Takes the values from all of the subsystem; false where they are still as written.
+    fn take(&mut self, all: &[f64], precision: Precision) -> bool {
+        self.values.clear();
+        // Whole numbers of up to 2^53 would lose their last places.
+        let value = |k: &usize, whole: bool| if whole { all[*k] } else { precision.of(all[*k]) };
+        self.values.extend(self.places.iter().zip(&self.whole).map(|(k, whole)| value(k, *whole)));
+        let same = |a: &Vec<f64>| a.iter().zip(&self.values).all(|(a, b)| a.to_bits() == b.to_bits());
+        !self.written.as_ref().is_some_and(same)
+    }
+}
+
+/// Numbers of the channels.
+#[derive(Default)]
+struct Channels {
+    tf: u16,
+    scene: u16,
+    ground: u16,
+    tiles: Vec<u16>,
+    forces: u16,
+    force_points: u16,
+    energy: u16,
+    gluing: u16,
+    events: u16,
+}
+
+/// Writes the topics of a run.
+pub(crate) struct McapWriter {
+    path: PathBuf,
+    sink: Option<Sink>,
+    channels: Channels,
+    sequence: u32,
+    message: Vec<u8>,
+    /// Of each subsystem: what is written when it changes, and what is written always.
+    variables: Vec<[Option<Variables>; 2]>,
+    energy: Columns,
+    ground: Option<GroundGrid>,
+    points: Option<GroundPoints>,
+    forces: Forces,
+    forces_next_s: f64,
+    gravity_m_s2: f64,
+    precision: Precision,
+    packed: Vec<u8>,
+    window: WindowRecord,
+    /// Bytes and simulated time (s) of what can be read whatever comes after.
+    kept: (u64, f64),
+    /// The messages behind those, where checkpoints ask for them.
+    pending: Option<Vec<Pending>>,
+}
+
+impl McapWriter {
+    /// Creates the file; `about` is the description of the run that stands at its head.
+    pub fn create(folder: &Path, about: BTreeMap<String, String>, scenario: &Scenario) -> Result<Self> {
+        let path = folder.join(RECORDING);
+        let file = KeptFile::create(&path).map_err(at(&path))?;
+        Self::over(file, path, about, scenario)
+    }
+
+    /// The same for a file that is open.
+    fn over(
+        file: KeptFile,
+        path: PathBuf,
+        about: BTreeMap<String, String>,
+        scenario: &Scenario,
+    ) -> Result<Self> {
+        // No chunk size: chunks end by count only.
+        let sink = options().chunk_size(None).create(NoSeek::new(BufWriter::new(file)));
+        let mut sink = sink.map_err(other_at(&path))?;
+        let about = mcap::records::Metadata { name: "terraglue".into(), metadata: about };
+        sink.write_metadata(&about).map_err(other_at(&path))?;
+        let mut writer = Self {
+            path,
+            sink: Some(sink),
+            channels: Channels::default(),
+            sequence: 0,
+            message: Vec::new(),
+            variables: Vec::new(),
+            energy: Columns::default(),
+            ground: None,
+            points: None,
+            forces: Forces::default(),
+            forces_next_s: f64::NEG_INFINITY,
+            gravity_m_s2: rotation::length(scenario.world.gravity_m_s2),
+            precision: Precision::digits(scenario.recording.digits),
+            packed: Vec::new(),
+            window: WindowRecord::default(),
+            kept: (0, 0.0),
+            pending: None,
+        };
+        writer.channels.events = writer.add(topics::of::<Log>("/events"))?;
+        Ok(writer)
+    }
+
+    fn add(&mut self, topic: Topic) -> Result<u16> {
+        let Some(sink) = &mut self.sink else { return Ok(0) };
+        let schema = sink.add_schema(&topic.schema, "protobuf", &topic.descriptor);
+        let channel = schema.and_then(|s| sink.add_channel(s, &topic.topic, "protobuf", &topic.metadata));
+        self.checked(channel)
+    }
+
+    /// Announces all topics and writes what stands once at the start: shapes and the whole ground.
+    pub fn started(&mut self, view: &View, snapshot: &Snapshot) -> Result {
+        self.find(view)?;
+        self.announce(view, snapshot)?;
+        self.put(self.channels.scene, view.t_s, &scene(view))?;
+        for (frame, cloud) in point_cloud::bodies(view) {
+            let channel = self.add(topics::shape(&frame))?;
+            self.put(channel, view.t_s, &cloud)?;
+        }
+        self.whole_ground(view)?;
+        self.ground_tiles(view, (0..self.channels.tiles.len()).collect())
+    }
+
+    /// What of the view is recorded in forms of its own.
+    fn find(&mut self, view: &View) -> Result {
+        self.ground = GroundGrid::find(view)?;
+        self.points = self.ground.as_ref().map(|g| GroundPoints::new(&g.info));
+        self.forces = Forces::new(view, self.gravity_m_s2);
+        Ok(())
+    }
+
+    fn announce(&mut self, view: &View, snapshot: &Snapshot) -> Result {
+        self.channels.tf = self.add(topics::of::<FrameTransforms>("/tf"))?;
+        self.channels.scene = self.add(topics::scene())?;
+        self.channels.forces = self.add(topics::forces(self.forces.metres_per_newton))?;
+        self.channels.force_points = self.add(topics::force_points())?;
+        self.channels.ground = self.add(topics::of::<Grid>("/ground"))?;
+        for tile in 0..self.points.as_ref().map_or(0, GroundPoints::count) {
+            let topic = self.points.as_ref().map(|p| p.topic(tile)).unwrap_or_default();
+            let channel = self.add(topics::tile(&topic))?;
+            self.channels.tiles.push(channel);
+        }
+        let (energy, about) = energy_message::columns(view);
+        self.channels.energy = self.add(topics::energy(&energy, &about))?;
+        self.energy = energy;
+        self.channels.gluing = self.add(topics::gluing())?;
+        for scalars in &snapshot.subsystems {
+            let part = |parameter: bool| {
+                let all = scalars.columns.iter().enumerate();
+                all.filter(move |(_, c)| c.held == parameter && c.recorded)
+            };
+            let parameters = self.variables(&scalars.name, true, Columns::new(part(true)))?;
+            let others = self.variables(&scalars.name, false, Columns::new(part(false)))?;
+            self.variables.push([parameters, others]);
+        }
+        Ok(())
+    }
+
+    fn variables(
+        &mut self,
+        subsystem: &str,
+        parameters: bool,
+        (columns, about): (Columns, Vec<About>),
+    ) -> Result<Option<Variables>> {
+        // The topic of a subsystem without variables still shows that it is there.
+        if columns.count == 0 && parameters {
+            return Ok(None);
+        }
+        let channel = self.add(topics::variables(subsystem, parameters, &columns, &about))?;
+        let places: Vec<usize> = about.iter().map(|a| a.index).collect();
+        let whole = about.iter().map(|a| !a.kind.is_real()).collect();
+        let written = parameters.then(Vec::new);
+        Ok(Some(Variables { channel, columns, places, whole, values: Vec::new(), written }))
+    }
+
+    /// Takes the step into the figures of `since_last`; called for every step.
+    pub fn count(&mut self, report: &StepReport) {
+        self.window.add(report);
+    }
+
+    /// Writes variables, poses, forces, energy and gluing of a communication point.
+    pub fn record(&mut self, view: &View, snapshot: &Snapshot) -> Result {
+        self.transforms(view)?;
+        let mut variables = std::mem::take(&mut self.variables);
+        let written = snapshot.subsystems.iter().zip(&mut variables).try_for_each(|(scalars, parts)| {
+            parts
+                .iter_mut()
+                .flatten()
+                .try_for_each(|part| self.write_variables(view.t_s, part, &scalars.values))
+        });
+        self.variables = variables;
+        written?;
+        self.message.clear();
+        let energy: Vec<f64> = energy_message::values(view).iter().map(|e| self.precision.of(*e)).collect();
+        self.energy.encode(&energy, &mut self.message);
+        self.emit(self.channels.energy, view.t_s)?;
+        let step = gluing_message::step(view, &self.window, self.precision)?;
+        self.put(self.channels.gluing, view.t_s, &step)?;
+        self.window = WindowRecord::default();
+        self.draw_forces(view)
+    }
+
+    fn write_variables(&mut self, t_s: f64, part: &mut Variables, all: &[f64]) -> Result {
+        let changed = part.take(all, self.precision);
+        if let Some(written) = &mut part.written {
+            if !changed && !written.is_empty() {
+                return Ok(());
+            }
+            written.clone_from(&part.values);
+        }
+        self.message.clear();
+        part.columns.encode(&part.values, &mut self.message);
+        self.emit(part.channel, t_s)
+    }
+
+    fn draw_forces(&mut self, view: &View) -> Result {
+        if view.t_s < self.forces_next_s {
+            return Ok(());
+        }
+        // Not later for the rounding of a sum of steps.
+        self.forces_next_s = view.t_s + DRAWN_EVERY_S * (1.0 - 1e-6);
+        let (arrows, points) = (self.forces.arrows(view), self.forces.points(view));
+        self.put(self.channels.forces, view.t_s, &arrows)?;
+        self.put(self.channels.force_points, view.t_s, &points)
+    }
+
+    fn transforms(&mut self, view: &View) -> Result {
+        let mut all = FrameTransforms::default();
+        for s in view.subsystems {
+            for (body, state) in s.scene.bodies.iter().zip(s.body_states) {
+                let Pose { position, orientation } = state.world_from_body;
+                if position.iter().chain(&orientation).any(|v| v.is_nan()) {
+                    let message = format!("pose of body `{}` is not a number (NaN)", body.name);
+                    return Err(failed(s, view.t_s, "body_states", message));
+                }
+                all.transforms.push(FrameTransform {
+                    timestamp: Some(timestamp(view.t_s)),
+                    parent_frame_id: "world".into(),
+                    child_frame_id: frame_id(s.name, &body.name),
+                    translation: Some(vector(position.map(|x| self.precision.of(x)))),
+                    rotation: Some(quaternion(orientation.map(|x| self.precision.of(x)))),
+                });
+            }
+        }
+        self.put(self.channels.tf, view.t_s, &all)
+    }
+
+    /// Writes an event.
+    pub fn happened(&mut self, happening: &Happening) -> Result {
+        let event = Log {
+            timestamp: Some(timestamp(happening.t_s)),
+            level: log::Level::Info.into(),
+            message: happening.what.clone(),
+            name: "terraglue".into(),
+            ..Log::default()
+        };
+        self.put(self.channels.events, happening.t_s, &event)
+    }
+
+    /// Writes the tiles of ground that have changed since they were last written.
+    pub fn changed_ground(&mut self, view: &View) -> Result {
+        let (Some(ground), Some(points)) = (&mut self.ground, &self.points) else { return Ok(()) };
+        let changed = ground.changed(&view.subsystems[ground.subsystem], view.t_s)?;
+        let mut tiles: Vec<usize> = changed.iter().map(|r| points.tile_of(*r)).collect();
+        tiles.sort_unstable();
+        tiles.dedup();
+        self.ground_tiles(view, tiles)
+    }
+
+    fn ground_tiles(&mut self, view: &View, tiles: Vec<usize>) -> Result {
+        let (Some(ground), Some(points)) = (self.ground.take(), self.points.take()) else { return Ok(()) };
+        let soil = &view.subsystems[ground.subsystem];
+        let mut packed = std::mem::take(&mut self.packed);
+        let written = tiles.into_iter().try_for_each(|tile| {
+            let cloud = points.cloud(&ground, soil, tile, view.t_s, &mut packed)?;
+            self.put(self.channels.tiles[tile], view.t_s, &cloud)
+        });
+        (self.ground, self.points, self.packed) = (Some(ground), Some(points), packed);
+        written
+    }
+
+    /// Writes all of the ground, to the bit.
+    pub fn whole_ground(&mut self, view: &View) -> Result {
+        match self.ground.as_ref().map(GroundGrid::all) {
+            Some(rectangle) => self.grid(view, rectangle),
+            None => Ok(()),
+        }
+    }
+
+    /// How the ground is cut into topics.
+    pub fn ground_points(&self) -> Option<&GroundPoints> {
+        self.points.as_ref()
+    }
+
+    /// The ground that is recorded.
+    pub fn ground(&self) -> Option<&GroundGrid> {
+        self.ground.as_ref()
+    }
+
+    fn grid(&mut self, view: &View, r: Rectangle) -> Result {
+        let Some(ground) = &self.ground else { return Ok(()) };
+        let mut packed = Vec::new();
+        ground.pack(&view.subsystems[ground.subsystem], r, view.t_s, &mut packed)?;
+        let info = &ground.info;
+        // A node is the centre of a cell; the grid is placed by the corner of its first cell.
+        let corner = |axis: usize, n: u32| info.origin[axis] + (f64::from(n) - 0.5) * info.spacing;
+        let columns = r.i1 - r.i0;
+        let place = Pose { position: [corner(0, r.i0), corner(1, r.j0), 0.0], ..Pose::IDENTITY };
+        let field = |name: &str, offset: u32| PackedElementField {
+            name: name.into(),
+            offset,
+            r#type: NumericType::Float32.into(),
+        };
+        let grid = Grid {
+            timestamp: Some(timestamp(view.t_s)),
+            frame_id: "world".into(),
+            pose: pose(&place),
+            column_count: columns,
+            cell_size: Some(Vector2 { x: info.spacing, y: info.spacing }),
+            row_stride: 8 * columns,
+            cell_stride: 8,
+            fields: vec![field("height", 0), field("sinkage", 4)],
+            data: Bytes::from(packed),
+        };
+        self.put(self.channels.ground, view.t_s, &grid)
+    }
+
+    fn put(&mut self, channel: u16, t_s: f64, message: &impl Message) -> Result {
+        self.message.clear();
+        message
+            .encode(&mut self.message)
+            .map_err(|e| Error::Simulation { time_s: t_s, message: e.to_string() })?;
+        self.emit(channel, t_s)
+    }
+
+    fn emit(&mut self, channel_id: u16, t_s: f64) -> Result {
+        let log_time = nanoseconds(t_s);
+        let header = MessageHeader { channel_id, sequence: self.sequence, log_time, publish_time: log_time };
+        self.sequence = self.sequence.wrapping_add(1);
+        let Some(sink) = &mut self.sink else { return Ok(()) };
+        if let Some(pending) = &mut self.pending {
+            pending.push(Pending::of(&header, &self.message));
+        }
+        let written = sink.write_to_known_channel(&header, &self.message);
+        self.checked(written)
+    }
+
+    /// Ends the chunk and hands everything up to time `t_s` to the operating system.
+    pub fn flush(&mut self, t_s: f64) -> Result {
+        let Some(sink) = &mut self.sink else { return Ok(()) };
+        let flushed = sink.flush();
+        self.checked(flushed)?;
+        self.pending.iter_mut().for_each(Vec::clear);
+        self.kept = (std::fs::metadata(&self.path).map_or(self.kept.0, |m| m.len()), t_s);
+        Ok(())
+    }
+
+    /// Simulated time up to which all can be read whatever comes after, s.
+    pub fn kept_s(&self) -> f64 {
+        self.kept.1
+    }
+
+    /// After a write that failed the file ends with what was whole before, and nothing more is written.
+    fn checked<T>(&mut self, written: mcap::McapResult<T>) -> Result<T> {
+        written.map_err(|e| {
+            self.sink = None;
+            let cut = File::options().write(true).open(&self.path).and_then(|f| f.set_len(self.kept.0));
+            if let Err(e) = cut {
+                ::log::warn!("{}: its end cannot be cut off: {e}", self.path.display());
+            }
+            match e {
+                mcap::McapError::Io(source) => at(&self.path)(source),
+                other => other_at(&self.path)(other),
+            }
+        })
+    }
+
+    /// Writes the footer; later calls do nothing.
+    pub fn close(&mut self) -> Result {
+        let Some(mut sink) = self.sink.take() else { return Ok(()) };
+        use std::io::Write;
+        let finished = sink.finish();
+        let finished = finished.and_then(|_| Ok(sink.into_inner().into_inner().flush()?));
+        self.checked(finished)
+    }
+}

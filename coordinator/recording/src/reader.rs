@@ -1,0 +1,320 @@
+//! Reads a recording, also one that was cut off or damaged in the middle: whatever arrived whole is there.
+
+use crate::columns::{About, Columns};
+use crate::gluing_message::StepMessage;
+use crate::layout::{RECORDING, at};
+use crate::messages::GluingRecord;
+use crate::point_cloud;
+use crate::records::{Piece, Records};
+use crate::solids::{self, Solid};
+use crate::table::Table;
+use crate::topics::{COLUMNS, SUBSYSTEM};
+use foxglove::messages::{FrameTransforms, Grid, Log, PointCloud, SceneUpdate};
+use prost::Message;
+use std::collections::BTreeMap;
+use std::path::Path;
+use terraglue_diagnostics::error::{Error, Result};
+use terraglue_engine::observer::Happening;
+
+/// Everything in a recording.
+#[derive(Clone, Debug, Default)]
+pub struct Recording {
+    /// What was simulated.
+    pub header: Header,
+    /// Variables by subsystem.
+    pub variables: BTreeMap<String, Table>,
+    /// Units by subsystem and variable.
+    pub units: BTreeMap<String, BTreeMap<String, String>>,
+    /// Poses by frame, e.g. `robot/body`.
+    pub poses: BTreeMap<String, PoseSeries>,
+    /// The first frame of the recording.
+    pub first_frame: Option<String>,
+    /// Shapes of every body in its frame, by frame.
+    pub solids: BTreeMap<String, Vec<Solid>>,
+    /// How the steps were glued.
+    pub gluing: Vec<GluingRecord>,
+    /// Energies, J: `kinetic`, …, and `<subsystem>.kinetic`, ….
+    pub energy: Table,
+    /// What happened.
+    pub events: Vec<Happening>,
+    /// The ground at the start.
+    pub initial_ground: Option<GroundRecord>,
+    /// The ground at the end, or where the recording ends.
+    pub final_ground: Option<GroundRecord>,
+    /// Whether the file has its footer; otherwise it was cut off.
+    pub complete: bool,
+    /// Parts that are damaged and left out.
+    pub damaged: usize,
+    /// Whether it is in the JSON of earlier versions, which is no longer read.
+    pub outdated: bool,
+}
+
+/// The columns of a channel.
+struct Source {
+    subsystem: String,
+    columns: Columns,
+    /// Places of the columns in their subsystem.
+    places: Vec<usize>,
+    names: Vec<String>,
+    values: Vec<f64>,
+    /// Whether a message completes a row.
+    row: bool,
+}
+
+/// Names and last values of all columns of a subsystem.
+#[derive(Default)]
+struct Row {
+    names: Vec<String>,
+    values: Vec<f64>,
+}
+
+impl Row {
+    fn take(&mut self, source: &Source) {
+        let end = source.places.iter().max().map_or(0, |k| k + 1).max(self.names.len());
+        self.names.resize(end, String::new());
+        self.values.resize(end, f64::NAN);
+        for ((place, name), value) in source.places.iter().zip(&source.names).zip(&source.values) {
+            self.names[*place].clone_from(name);
+            self.values[*place] = *value;
+        }
+    }
+}
+
+/// What is kept from message to message.
+#[derive(Default)]
+struct State {
+    sources: BTreeMap<u16, Source>,
+    rows: BTreeMap<String, Row>,
+}
+
+/// What was simulated; all texts as in the scenario.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct Header {
+    /// All entries by name.
+    pub entries: BTreeMap<String, String>,
+}
+
+impl Header {
+    /// An entry; empty where it is missing.
+    pub fn get(&self, name: &str) -> &str {
+        self.entries.get(name).map_or("", String::as_str)
+    }
+
+    /// (name, module) of every subsystem.
+    pub fn subsystems(&self) -> impl Iterator<Item = (&str, &str)> {
+        self.get("subsystems").lines().filter_map(|l| l.split_once('='))
+    }
+}
+
+/// A body's frame over time.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct PoseSeries {
+    /// Simulated time, s.
+    pub t_s: Vec<f64>,
+    /// Position in the world, m.
+    pub position: Vec<[f64; 3]>,
+    /// Unit quaternion w, x, y, z, world from body.
+    pub orientation: Vec<[f64; 4]>,
+}
+
+/// A rectangle of ground.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub struct GroundRecord {
+    /// Simulated time, s.
+    pub t_s: f64,
+    /// World x, y of the first node, m.
+    pub origin: [f64; 2],
+    /// Distance of neighbouring nodes, m.
+    pub spacing: f64,
+    /// Nodes along x and y.
+    pub size: [usize; 2],
+    /// Heights, m, row by row along x.
+    pub height: Vec<f32>,
+    /// Initial minus current height, m.
+    pub sinkage: Vec<f32>,
+}
+
+impl GroundRecord {
+    /// Puts the nodes of a tile in.
+    fn patch(&mut self, cloud: &PointCloud, t_s: f64) {
+        for ([x, y, z], sinkage) in point_cloud::unpack(cloud) {
+            let i = ((x - self.origin[0]) / self.spacing).round();
+            let j = ((y - self.origin[1]) / self.spacing).round();
+            let inside = i >= 0.0 && j >= 0.0 && i < self.size[0] as f64 && j < self.size[1] as f64;
+            let node = j.max(0.0) as usize * self.size[0] + i.max(0.0) as usize;
+            if let (true, Some(height)) = (inside, self.height.get_mut(node)) {
+                *height = z as f32;
+                self.sinkage[node] = sinkage;
+            }
+        }
+        self.t_s = t_s;
+    }
+}
+
+fn ground(data: &[u8], t_s: f64) -> Option<GroundRecord> {
+    let grid = Grid::decode(data).ok()?;
+    let field = |offset: usize| {
+        let node = |cell: &[u8]| cell[offset..offset + 4].try_into().map_or(f32::NAN, f32::from_le_bytes);
+        grid.data.chunks_exact(8).map(node).collect::<Vec<f32>>()
+    };
+    let (spacing, corner) = (grid.cell_size?.x, grid.pose?.position?);
+    let columns = grid.column_count as usize;
+    let size = [columns, (grid.data.len() / 8).checked_div(columns)?];
+    let origin = [corner.x, corner.y].map(|c| c + 0.5 * spacing);
+    Some(GroundRecord { t_s, origin, spacing, size, height: field(0), sinkage: field(4) })
+}
+
+impl Recording {
+    /// Reads `recording.mcap` of a results folder.
+    pub fn open(folder: &Path) -> Result<Self> {
+        let path = folder.join(RECORDING);
+        let bytes = terraglue_subsystem::files::read(&path).map_err(at(&path))?;
+        let unreadable = |what: &str| Error::File {
+            path: path.display().to_string(),
+            source: std::io::Error::new(std::io::ErrorKind::InvalidData, what),
+        };
+        match Self::read(&bytes) {
+            None => Err(unreadable("is not an MCAP recording")),
+            Some(r) if r.outdated => {
+                Err(unreadable("was written by an earlier version of terraglue; run the scenario again"))
+            }
+            Some(r) => Ok(r),
+        }
+    }
+
+    /// Reads a recording from memory; `None` where it does not even begin like one.
+    pub fn read(bytes: &[u8]) -> Option<Self> {
+        let mut records = Records::new(bytes)?;
+        let mut recording = Self { complete: mcap::read::footer(bytes).is_ok(), ..Self::default() };
+        let mut state = State::default();
+        for piece in &mut records {
+            match piece {
+                Piece::Message(message) => recording.take(&message, &mut state),
+                Piece::Metadata(about) if about.name == "terraglue" => {
+                    recording.header.entries = about.metadata
+                }
+                Piece::Metadata(_) => {}
+            }
+        }
+        // With a footer, what ends early is not cut off: a length before it is wrong.
+        recording.damaged = records.damaged + usize::from(recording.complete && !records.ended);
+        Some(recording)
+    }
+
+    fn take(&mut self, message: &mcap::Message, state: &mut State) {
+        // Divided, not multiplied by 1e-9: 5 ms are 0.005 s to the bit.
+        let t_s = message.log_time as f64 / 1e9;
+        let data = &message.data[..];
+        self.outdated |= message.channel.message_encoding == "json";
+        // A message that does not parse is left out.
+        match message.channel.topic.as_str() {
+            "/tf" => self.take_transforms(data, t_s),
+            "/ground" => self.take_ground(data, t_s),
+            "/gluing" => self.gluing.extend(StepMessage::decode(data).ok().map(GluingRecord::from)),
+            "/events" => {
+                self.events.extend(Log::decode(data).ok().map(|e| Happening { t_s, what: e.message }))
+            }
+            "/scene" => self.take_scene(data),
+            topic if topic.starts_with("/ground/") => self.take_tile(data, t_s),
+            _ => self.take_numbers(message, t_s, state),
+        }
+    }
+
+    fn take_numbers(&mut self, message: &mcap::Message, t_s: f64, state: &mut State) {
+        let channel = &message.channel;
+        let source = match state.sources.entry(channel.id) {
+            std::collections::btree_map::Entry::Occupied(known) => known.into_mut(),
+            std::collections::btree_map::Entry::Vacant(new) => {
+                let Some(source) = self.announced(channel) else { return };
+                new.insert(source)
+            }
+        };
+        if source.columns.decode(&message.data, &mut source.values).is_none() {
+            return;
+        }
+        if channel.topic == "/energy" {
+            return self.energy.push(t_s, &source.names, &source.values);
+        }
+        let row = state.rows.entry(source.subsystem.clone()).or_default();
+        row.take(source);
+        if source.row {
+            self.variables.entry(source.subsystem.clone()).or_default().push(t_s, &row.names, &row.values);
+        }
+    }
+
+    /// The columns that a channel announces; notes their units.
+    fn announced(&mut self, channel: &mcap::Channel) -> Option<Source> {
+        let about: Vec<About> = serde_json::from_str(channel.metadata.get(COLUMNS)?).ok()?;
+        let columns = Columns::read(&about);
+        let subsystem = channel.metadata.get(SUBSYSTEM).cloned().unwrap_or_default();
+        let units = self.units.entry(subsystem.clone()).or_default();
+        units.extend(about.iter().map(|a| (a.name.clone(), a.unit.clone())));
+        Some(Source {
+            row: channel.topic == format!("/{subsystem}"),
+            subsystem,
+            places: about.iter().map(|a| a.index).collect(),
+            values: vec![0.0; columns.count],
+            names: about.into_iter().map(|a| a.name).collect(),
+            columns,
+        })
+    }
+
+    fn take_transforms(&mut self, data: &[u8], t_s: f64) {
+        let Ok(all) = FrameTransforms::decode(data) else { return };
+        for t in all.transforms {
+            let (Some(p), Some(q)) = (t.translation, t.rotation) else { continue };
+            self.first_frame.get_or_insert_with(|| t.child_frame_id.clone());
+            let series = self.poses.entry(t.child_frame_id).or_default();
+            series.t_s.push(t_s);
+            series.position.push([p.x, p.y, p.z]);
+            series.orientation.push([q.w, q.x, q.y, q.z]);
+        }
+    }
+
+    fn take_scene(&mut self, data: &[u8]) {
+        let Ok(scene) = SceneUpdate::decode(data) else { return };
+        self.solids.extend(scene.entities.iter().map(|e| (e.frame_id.clone(), solids::solids(e))));
+    }
+
+    fn take_ground(&mut self, data: &[u8], t_s: f64) {
+        let record = ground(data, t_s);
+        self.initial_ground = self.initial_ground.take().or_else(|| record.clone());
+        self.final_ground = record.or_else(|| self.final_ground.take());
+    }
+
+    fn take_tile(&mut self, data: &[u8], t_s: f64) {
+        // The tiles of the start say less than the grid that was written with them.
+        let Some(ground) = self.final_ground.as_mut().filter(|_| t_s > 0.0) else { return };
+        if let Ok(cloud) = PointCloud::decode(data) {
+            ground.patch(&cloud, t_s);
+        }
+    }
+
+    /// Frame and motion of the body that the report speaks of: that of the scenario, else the first one.
+    pub fn reported_body(&self) -> Option<(&str, &PoseSeries)> {
+        let wanted = self.header.get("report_body").replacen('.', "/", 1);
+        let found = self.poses.get_key_value(&wanted);
+        let (name, poses) = found.or_else(|| self.poses.get_key_value(self.first_frame.as_ref()?))?;
+        Some((name, poses))
+    }
+
+    /// Time and values of `subsystem.variable`.
+    pub fn series(&self, name: &str) -> Option<(&[f64], &[f64])> {
+        let (subsystem, variable) = name.split_once('.')?;
+        let table = self.variables.get(subsystem)?;
+        Some((&table.t_s, table.column(variable)?))
+    }
+
+    /// Unit of `subsystem.variable`; empty for a pure number.
+    pub fn unit(&self, name: &str) -> &str {
+        name.split_once('.').and_then(|(s, v)| self.units.get(s)?.get(v)).map_or("", String::as_str)
+    }
+
+    /// Simulated time of the last message, s.
+    pub fn end_s(&self) -> f64 {
+        let last = |t: &[f64]| t.last().copied().unwrap_or(0.0);
+        let tables = self.variables.values().map(|t| last(&t.t_s));
+        let poses = self.poses.values().map(|p| last(&p.t_s));
+        tables.chain(poses).chain(self.gluing.last().map(|g| g.t)).fold(last(&self.energy.t_s), f64::max)
+    }
+}

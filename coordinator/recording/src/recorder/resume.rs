@@ -1,0 +1,65 @@
+//! A recorder that goes on in another process.
+
+use super::{Recorder, RecorderOptions, about, selected};
+use crate::csv::VariablesCsv;
+use crate::keep::Keep;
+use crate::layout::other_at;
+use crate::mcap_writer::{McapState, McapWriter};
+use crate::space::Reserve;
+use std::path::Path;
+use terraglue_diagnostics::error::Result;
+use terraglue_engine::observer::{Observer, View};
+use terraglue_scenario::Scenario;
+use terraglue_subsystem::bytes::Block;
+use terraglue_subsystem::persist;
+
+/// What a recorder goes on from.
+pub struct RecorderState {
+    mcap: McapState,
+    /// Length of `variables.csv`, bytes.
+    csv: Option<u64>,
+    summary: Block,
+    recorded_step: Option<u64>,
+}
+persist!(RecorderState { mcap, csv, summary, recorded_step });
+
+impl Recorder {
+    /// What another process needs to go on from here: everything up to now is with the operating system or in the state.
+    ///
+    /// # Errors
+    /// A file that cannot be written, a soil that does not tell its tiles.
+    pub fn state(&mut self, view: &View) -> Result<RecorderState> {
+        let mut summary = Block::default();
+        self.summary.keep(&mut summary.0);
+        Ok(RecorderState {
+            mcap: self.mcap.state(view)?,
+            csv: self.csv.as_mut().map(VariablesCsv::length).transpose()?,
+            summary,
+            recorded_step: self.recorded_step,
+        })
+    }
+
+    /// Goes on in a folder that another process has recorded into; `view` is the moment of the state. All that was written
+    /// after it is cut off.
+    ///
+    /// # Errors
+    /// Files that are not as they were, or cannot be read and written.
+    pub fn resume(
+        folder: &Path,
+        scenario: &Scenario,
+        options: RecorderOptions,
+        view: &View,
+        state: RecorderState,
+    ) -> Result<Self> {
+        let snapshot = selected(view, (&scenario.recording, &scenario.source), &scenario.connections)?;
+        let at = (view, &snapshot);
+        let mcap = McapWriter::resume(folder, about(scenario), scenario, at, state.mcap)?;
+        let mut recorder = Self::with(folder, scenario, options, mcap, Reserve::take(folder));
+        recorder.snapshot = snapshot;
+        recorder.csv = state.csv.map(|length| VariablesCsv::go_on(folder, length)).transpose()?;
+        recorder.recorded_step = state.recorded_step;
+        recorder.summary.started(view)?;
+        recorder.summary.recall(&mut state.summary.0.as_slice()).map_err(other_at(folder))?;
+        Ok(recorder)
+    }
+}

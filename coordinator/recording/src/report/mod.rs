@@ -1,0 +1,72 @@
+//! `report.html`: one self-contained page about a run, made from its recording.
+//!
+//! Nothing is loaded from anywhere: style, scripts, curves and the picture of the ground are inside the file.
+
+mod cards;
+pub(crate) mod colour_map;
+pub(crate) mod energy_card;
+mod exchange;
+pub(crate) mod figure;
+mod figures;
+pub(crate) mod footprints;
+mod ground_map;
+pub(crate) mod html;
+mod node_values;
+mod outlines;
+pub(crate) mod page;
+pub(crate) mod picture;
+mod setup;
+
+use crate::layout::{REPORT, at};
+use crate::reader::Recording;
+use crate::summary::Summary;
+use std::path::{Path, PathBuf};
+use terraglue_diagnostics::error::Result;
+
+/// Makes the report of a results folder from its recording and, where it is there, `summary.json`. The
+/// recording may be cut off ([`crate::mend`] gives it its footer). Returns the path of the page.
+pub fn write(folder: &Path) -> Result<PathBuf> {
+    let recording = Recording::open(folder)?;
+    let summary = Summary::read(folder).ok();
+    let path = folder.join(REPORT);
+    let exchange = exchange::render(folder);
+    std::fs::write(&path, page(&recording, summary.as_ref(), exchange.as_deref())?).map_err(at(&path))?;
+    Ok(path)
+}
+
+/// The page as text, of the recording alone.
+pub fn render(recording: &Recording, summary: Option<&Summary>) -> Result<String> {
+    page(recording, summary, None)
+}
+
+fn page(recording: &Recording, summary: Option<&Summary>, exchange: Option<&str>) -> Result<String> {
+    let legs = footprints::legs(recording);
+    let mut page = page::Page::new(&title(recording));
+    page.header(&setup::headline(recording, summary));
+    page.section("At a glance", "figures", &cards::render(recording, summary));
+    if let Some(summary) = summary {
+        page.section("Where the energy went", "energies", &energy_card::render(&summary.energies));
+    }
+    page.section("What was simulated", "setup", &setup::render(recording));
+    if let Some(map) = ground_map::data(recording, &legs)? {
+        page.section("The ground from above", "ground", ground_map::FRAME);
+        page.data("map", map);
+    }
+    for figure in figures::all(recording, &legs) {
+        page.figure(figure);
+    }
+    let events: Vec<_> =
+        summary.map_or(&recording.events, |s| &s.events).iter().map(|e| (e.t_s, e.what.as_str())).collect();
+    page.events(&events);
+    if let Some(html) = exchange {
+        page.section("How values went round", "exchange", html);
+    }
+    Ok(page.finish())
+}
+
+fn title(recording: &Recording) -> String {
+    match recording.header.get("scenario") {
+        "" => "Run".into(),
+        name => name.into(),
+    }
+}

@@ -1,0 +1,110 @@
+//! Which variables `[recording]` wants, and with how many digits.
+
+use crate::snapshot::Snapshot;
+use terraglue_diagnostics::error::Result;
+use terraglue_engine::signals::pattern;
+use terraglue_scenario::{Connection, RecordingSpec, Source, did_you_mean};
+
+/// Whether a pattern names a variable, or a group in which it stands: `robot.*_j2` names `robot.LF_j2.angle`.
+fn names(pattern: &str, variable: &str) -> bool {
+    let ends = variable.match_indices(['.', '[']).map(|(k, _)| k).chain([variable.len()]);
+    ends.into_iter().any(|end| pattern::matches(pattern, &variable[..end]))
+}
+
+/// Marks the columns that are recorded.
+///
+/// # Errors
+/// A pattern that names no variable.
+pub(crate) fn select(snapshot: &mut Snapshot, spec: &RecordingSpec, source: &Source) -> Result {
+    let of = |s: &str, column: &str| format!("{s}.{column}");
+    for (key, patterns) in [("include", &spec.include), ("exclude", &spec.exclude)] {
+        for wrong in patterns {
+            let all: Vec<String> = snapshot
+                .subsystems
+                .iter()
+                .flat_map(|s| s.columns.iter().map(|c| of(&s.name, &c.name)))
+                .collect();
+            if !all.iter().any(|name| names(wrong, name)) {
+                let message = format!("`{key}` names no variable: `{wrong}`");
+                let help = did_you_mean(wrong, all.iter().map(String::as_str));
+                return Err(source.error_at_value(&["recording", key], message, help).into());
+            }
+        }
+    }
+    for s in &mut snapshot.subsystems {
+        let subsystem = &s.name;
+        for column in &mut s.columns {
+            let any = |patterns: &[String]| patterns.iter().any(|p| names(p, &of(subsystem, &column.name)));
+            column.recorded = (spec.include.is_empty() || any(&spec.include)) && !any(&spec.exclude);
+        }
+    }
+    Ok(())
+}
+
+/// Marks the inputs that no connection feeds: they keep their value, as parameters do, until an event or a fault changes it.
+pub(crate) fn hold(snapshot: &mut Snapshot, connections: &[Connection]) {
+    for s in &mut snapshot.subsystems {
+        for column in s.columns.iter_mut().filter(|c| c.input) {
+            let name = format!("{}.{}", s.name, column.name);
+            let base = name.split('[').next().unwrap_or(&name);
+            let fed = |to: &str| [name.as_str(), base].iter().any(|n| pattern::matches(to, n));
+            column.held = !connections.iter().any(|c| fed(&c.to));
+        }
+    }
+}
+
+/// Numbers rounded to so many significant digits, in the binary places that hold them: what is left away is zero and
+/// takes no room when compressed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Precision {
+    /// Places of the 52 behind the point that are cleared.
+    cleared: u32,
+}
+
+impl Precision {
+    /// That holds this many decimal digits; from 16 on it holds all bits.
+    pub fn digits(digits: u64) -> Self {
+        // 2^(places + 1) ≥ 10^digits.
+        let places = libm::ceil(digits as f64 * std::f64::consts::LOG2_10) as u32;
+        Self { cleared: 53_u32.saturating_sub(places) }
+    }
+
+    /// The nearest number that is held.
+    pub fn of(self, value: f64) -> f64 {
+        if self.cleared == 0 || !value.is_finite() {
+            return value;
+        }
+        let bits = value.to_bits();
+        // A carry out of the fraction counts the exponent up, as it should.
+        let rounded = f64::from_bits(((bits + (1 << (self.cleared - 1))) >> self.cleared) << self.cleared);
+        if rounded.is_finite() { rounded } else { value }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn digits_are_held() {
+        for digits in 3..=17 {
+            let precision = Precision::digits(digits);
+            for value in
+                [1.0, -2.5e-7, std::f64::consts::PI, 9.999_999_999_999e9, f64::MAX, f64::MIN_POSITIVE]
+            {
+                let error = ((precision.of(value) - value) / value).abs();
+                assert!(error <= 0.5 * libm::pow(10.0, -(digits as f64) + 1.0), "{digits}: {value} {error}");
+                assert!(digits < 16 || error == 0.0);
+            }
+        }
+        assert_eq!(Precision::digits(11).of(0.1 + 0.2), Precision::digits(11).of(0.3));
+        assert!(Precision::digits(5).of(f64::INFINITY).is_infinite() && Precision::digits(5).of(-0.0) == 0.0);
+    }
+
+    #[test]
+    fn a_pattern_names_a_variable_or_a_group() {
+        assert!(names("robot", "robot.LF_j2.angle") && names("robot.*_j2", "robot.LF_j2.angle"));
+        assert!(names("*.*.angle", "robot.LF_j2.angle") && names("a.feet.position", "a.feet.position[2,1]"));
+        assert!(!names("rob", "robot.x") && !names("robot.LF", "robot.LF_j2.angle"));
+    }
+}

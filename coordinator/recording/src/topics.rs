@@ -1,0 +1,96 @@
+//! The topics of a recording: their names, message types, and what the types cannot say.
+//!
+//! Poses, shapes, ground, forces and events are messages that robotics viewers know by name; the types of our own are
+//! made when a run starts, of the names of its variables.
+
+use crate::columns::{About, Columns};
+use crate::{descriptor, gluing_message};
+use foxglove::Encode;
+use foxglove::messages::{PointCloud, SceneUpdate};
+use std::collections::BTreeMap;
+
+/// Key of a channel's metadata under which the columns stand.
+pub(crate) const COLUMNS: &str = "columns";
+/// Key of a channel's metadata: whose variables they are.
+pub(crate) const SUBSYSTEM: &str = "subsystem";
+
+/// Topic, name of the message type, and its file of descriptors.
+pub(crate) struct Topic {
+    pub topic: String,
+    pub schema: String,
+    pub descriptor: Vec<u8>,
+    pub metadata: BTreeMap<String, String>,
+}
+
+impl Topic {
+    fn with(mut self, key: &str, value: String) -> Self {
+        self.metadata.insert(key.into(), value);
+        self
+    }
+}
+
+/// A topic of messages that viewers know.
+pub(crate) fn of<M: Encode>(topic: &str) -> Topic {
+    let (schema, descriptor) = M::get_schema().map(|s| (s.name, s.data.into_owned())).unwrap_or_default();
+    Topic { topic: topic.into(), schema, descriptor, metadata: BTreeMap::new() }
+}
+
+/// `/scene`: the shapes of all bodies, fixed to the frames of `/tf`.
+pub(crate) fn scene() -> Topic {
+    of::<SceneUpdate>("/scene")
+}
+
+/// `/shapes/<subsystem>/<body>`: points on the surface of a body.
+pub(crate) fn shape(frame: &str) -> Topic {
+    of::<PointCloud>(&format!("/shapes/{frame}"))
+}
+
+/// A tile of ground.
+pub(crate) fn tile(topic: &str) -> Topic {
+    of::<PointCloud>(topic)
+}
+
+/// `/contact_forces`: arrows, this long.
+pub(crate) fn forces(metres_per_newton: f64) -> Topic {
+    of::<SceneUpdate>("/contact_forces").with("metres_per_newton", metres_per_newton.to_string())
+}
+
+/// `/contact_forces/points`: the same as rows of points.
+pub(crate) fn force_points() -> Topic {
+    of::<PointCloud>("/contact_forces/points")
+}
+
+/// `/gluing`: how the recorded step was glued.
+pub(crate) fn gluing() -> Topic {
+    Topic {
+        topic: "/gluing".into(),
+        schema: gluing_message::SCHEMA.into(),
+        descriptor: gluing_message::descriptor(),
+        metadata: BTreeMap::new(),
+    }
+}
+
+fn named(topic: String, package: &str, name: &str, columns: &Columns, about: &[About]) -> Topic {
+    let text = serde_json::to_string(about).unwrap_or_default();
+    Topic {
+        topic,
+        schema: format!("{package}.{name}"),
+        descriptor: columns.descriptor(package, name),
+        metadata: BTreeMap::from([(COLUMNS.to_owned(), text)]),
+    }
+}
+
+/// `/energy`: energies and works, J; the sum and each subsystem.
+pub(crate) fn energy(columns: &Columns, about: &[About]) -> Topic {
+    named("/energy".into(), "terraglue", "Energy", columns, about)
+}
+
+/// `/<subsystem>`: variables that move; `/<subsystem>/parameters`: those that are written when they change.
+pub(crate) fn variables(subsystem: &str, parameters: bool, columns: &Columns, about: &[About]) -> Topic {
+    let (tail, package) = match parameters {
+        true => ("/parameters", "terraglue.Parameters"),
+        false => ("", "terraglue.Variables"),
+    };
+    let name = descriptor::identifier(subsystem);
+    named(format!("/{subsystem}{tail}"), package, &name, columns, about).with(SUBSYSTEM, subsystem.into())
+}

@@ -1,0 +1,183 @@
+//! Checks one value against a [`Parameter`]: type, range, choices. The same for the scenario's own keys and for
+//! the parameters of modules.
+
+use super::plausible;
+use serde_json::Value;
+use terraglue_diagnostics::did_you_mean;
+use terraglue_subsystem::{Parameter, ParameterType};
+
+/// What is wrong with a value; the place is the caller's business.
+#[derive(Debug, PartialEq)]
+pub struct Complaint {
+    /// What is wrong.
+    pub message: String,
+    /// The way out.
+    pub help: Option<String>,
+}
+
+/// Checks a value; `count` demands a list of that length.
+pub fn check_value(parameter: &Parameter, count: Option<usize>, value: &Value) -> Result<(), Complaint> {
+    match parameter.parameter_type {
+        ParameterType::Number => check_number(parameter, count, value.as_f64(), value),
+        ParameterType::Integer => {
+            check_number(parameter, count, value.as_i64().map(|i| i as f64).filter(|_| value.is_i64()), value)
+        }
+        ParameterType::Bool => typed(parameter, count, value.is_boolean(), value),
+        ParameterType::Text | ParameterType::Path => check_text(parameter, count, value),
+        ParameterType::Numbers => check_list(parameter, count, value),
+        ParameterType::NumberTable => {
+            let ok = value.as_object().is_some_and(|o| o.values().all(Value::is_number));
+            typed(parameter, count, ok, value)?;
+            let values = value.as_object().into_iter().flat_map(|o| o.values());
+            values.into_iter().try_for_each(|v| in_range(parameter, count, v.as_f64().unwrap_or(f64::NAN), v))
+        }
+        ParameterType::NumberByName => {
+            by_name(value).try_for_each(|v| check_number(parameter, count, v.as_f64(), v))
+        }
+        ParameterType::TextByName => by_name(value).try_for_each(|v| check_text(parameter, count, v)),
+        ParameterType::Tables => {
+            let ok = value.as_array().is_some_and(|list| list.iter().all(Value::is_object));
+            typed(parameter, count, ok, value)
+        }
+    }
+}
+
+/// The values of a table, or the value itself.
+fn by_name(value: &Value) -> Box<dyn Iterator<Item = &Value> + '_> {
+    match value {
+        Value::Object(table) => Box::new(table.values()),
+        one => Box::new(std::iter::once(one)),
+    }
+}
+
+fn check_number(
+    p: &Parameter,
+    count: Option<usize>,
+    number: Option<f64>,
+    value: &Value,
+) -> Result<(), Complaint> {
+    typed(p, count, number.is_some(), value)?;
+    in_range(p, count, number.unwrap_or(f64::NAN), value)
+}
+
+fn check_list(p: &Parameter, count: Option<usize>, value: &Value) -> Result<(), Complaint> {
+    let list = value.as_array().filter(|l| l.iter().all(Value::is_number));
+    typed(p, count, list.is_some_and(|l| count.is_none_or(|n| n == l.len())), value)?;
+    list.into_iter().flatten().try_for_each(|v| in_range(p, count, v.as_f64().unwrap_or(f64::NAN), value))
+}
+
+fn check_text(p: &Parameter, count: Option<usize>, value: &Value) -> Result<(), Complaint> {
+    typed(p, count, value.is_string(), value)?;
+    let text = value.as_str().unwrap_or_default();
+    if p.choices.is_empty() || p.choices.iter().any(|c| c == text) {
+        return Ok(());
+    }
+    let help = did_you_mean(text, p.choices.iter().map(String::as_str));
+    Err(Complaint { message: format!("unknown {} `{text}`", last_part(&p.name)), help })
+}
+
+fn in_range(p: &Parameter, count: Option<usize>, x: f64, value: &Value) -> Result<(), Complaint> {
+    let low = p.min.is_none_or(|min| x > min || x == min && !p.above_min);
+    let high = p.max.is_none_or(|max| x <= max);
+    if x.is_finite() && low && high {
+        return Ok(());
+    }
+    let message =
+        format!("`{}` = {value} is out of range: it takes {}", last_part(&p.name), allowed(p, count));
+    let degrees =
+        plausible::in_radians(&p.unit, x, |x| p.min.is_none_or(|a| x >= a) && p.max.is_none_or(|b| x <= b));
+    Err(Complaint { message, help: degrees.or_else(|| help_line(p)) })
+}
+
+fn typed(p: &Parameter, count: Option<usize>, ok: bool, value: &Value) -> Result<(), Complaint> {
+    if ok {
+        return Ok(());
+    }
+    if let Some(digits) =
+        value.as_str().filter(|text| p.parameter_type == ParameterType::Integer && is_whole(text))
+    {
+        let message =
+            format!("`{}` = {digits} is out of range: it takes {}", last_part(&p.name), allowed(p, count));
+        return Err(Complaint { message, help: Some(LARGEST_WHOLE.into()) });
+    }
+    let message = format!("`{}` takes {}, not {}", last_part(&p.name), allowed(p, count), describe(value));
+    Err(Complaint { message, help: help_line(p) })
+}
+
+/// What is said of whole numbers that TOML does not hold; an edit brings them as text.
+pub const LARGEST_WHOLE: &str =
+    "whole numbers of a scenario go from -9223372036854775808 to 9223372036854775807 (64 bits, signed)";
+
+fn is_whole(text: &str) -> bool {
+    let digits = text.trim_start_matches(['-', '+']);
+    !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_digit())
+}
+
+fn help_line(p: &Parameter) -> Option<String> {
+    let default = if p.default.is_null() { String::new() } else { format!(" (default {})", p.default) };
+    Some(format!("{}: {}{default}", p.name, p.help))
+}
+
+fn last_part(name: &str) -> &str {
+    name.strip_suffix(".*").unwrap_or(name).rsplit('.').next().unwrap_or(name)
+}
+
+fn describe(value: &Value) -> String {
+    match value {
+        Value::Null => "nan or inf".into(),
+        Value::Bool(b) => format!("{b}"),
+        Value::Number(n) => format!("{n}"),
+        Value::String(t) => format!("the text \"{t}\""),
+        Value::Array(items) => format!("the list {} of {}", value, items.len()),
+        Value::Object(_) => "a table".into(),
+    }
+}
+
+/// The allowed values of a parameter in words, e.g. `a number greater than 0 m`.
+pub fn allowed_values(p: &Parameter) -> String {
+    allowed(p, None)
+}
+
+/// The same for a list of `count` numbers.
+pub fn allowed(p: &Parameter, count: Option<usize>) -> String {
+    let range = range(p);
+    match (p.parameter_type, count) {
+        (ParameterType::Number, _) => format!("a number{range}"),
+        (ParameterType::Integer, _) => format!("a whole number{range}"),
+        (ParameterType::Bool, _) => "true or false".into(),
+        (ParameterType::Path, _) => "the path of a file".into(),
+        (ParameterType::Text, _) if p.choices.is_empty() => "text in quotes".into(),
+        (ParameterType::Text, _) => {
+            let quoted: Vec<String> = p.choices.iter().map(|c| format!("\"{c}\"")).collect();
+            quoted.join(" or ")
+        }
+        (ParameterType::Numbers, Some(n)) => format!("a list of {n} numbers{range}"),
+        (ParameterType::Numbers, None) => format!("a list of numbers{range}"),
+        (ParameterType::Tables, _) => "a list of tables, [[...]]".into(),
+        (ParameterType::NumberTable, _) => format!("a table of numbers{range}"),
+        (ParameterType::NumberByName, _) => format!("a number{range}, or a table of them by name"),
+        (ParameterType::TextByName, _) => {
+            let quoted: Vec<String> = p.choices.iter().map(|c| format!("\"{c}\"")).collect();
+            format!("{}, or a table of them by name", quoted.join(" or "))
+        }
+    }
+}
+
+/// ` from 0 to 1 m`, ` greater than 0`, or nothing.
+fn range(p: &Parameter) -> String {
+    let unit = if ["", "1"].contains(&p.unit.as_str()) { String::new() } else { format!(" {}", p.unit) };
+    match (p.min, p.max) {
+        (Some(min), Some(max)) if p.above_min => format!(" greater than {min} and at most {max}{unit}"),
+        (Some(min), Some(max)) => format!(" from {min} to {max}{unit}"),
+        (Some(min), None) if p.above_min => format!(" greater than {min}{unit}"),
+        (Some(min), None) => format!(" of at least {min}{unit}"),
+        (None, Some(max)) => format!(" of at most {max}{unit}"),
+        (None, None) => {
+            if unit.is_empty() {
+                unit
+            } else {
+                format!(" in{unit}")
+            }
+        }
+    }
+}

@@ -1,0 +1,484 @@
+//! Every key of the reserved tables, once: the parser, the JSON Schema and `docs/scenario.md` are made from here.
+
+use super::check::allowed;
+use super::choices::StrategyKind;
+use terraglue_subsystem::{Parameter, ParameterType};
+
+/// A reserved table of a scenario.
+pub struct Table {
+    /// Name.
+    pub name: &'static str,
+    /// Written as `[[name]]`, any number of times.
+    pub repeated: bool,
+    /// Must be there.
+    pub required: bool,
+    /// One line for people.
+    pub help: &'static str,
+    /// Its keys.
+    pub keys: Vec<Key>,
+}
+
+/// A key of a reserved table.
+pub struct Key {
+    /// Name, type, range, default, help.
+    pub parameter: Parameter,
+    /// What else the value may look like.
+    pub form: Form,
+    /// Values of `kind` that know this key; empty: all.
+    pub only: &'static [&'static str],
+}
+
+/// Shapes of values beyond what a [`Parameter`] describes.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Form {
+    /// As the parameter says.
+    Plain,
+    /// A list of exactly so many numbers.
+    Count(usize),
+    /// Text or a list of texts.
+    Texts,
+    /// A table of values by variable name.
+    Assignments,
+    /// A table of new values by value.
+    Map,
+}
+
+impl Key {
+    /// Length that a list must have.
+    pub fn count(&self) -> Option<usize> {
+        match self.form {
+            Form::Count(n) => Some(n),
+            _ => None,
+        }
+    }
+
+    /// The allowed values in words.
+    pub fn allowed(&self) -> String {
+        match self.form {
+            Form::Texts => "text in quotes or a list of texts".into(),
+            Form::Assignments => "a table { \"subsystem.variable\" = value }".into(),
+            Form::Map => "a table { \"value\" = new value }".into(),
+            _ => allowed(&self.parameter, self.count()),
+        }
+    }
+
+    fn only(mut self, kinds: &'static [&'static str]) -> Self {
+        self.only = kinds;
+        self
+    }
+
+    fn form(mut self, form: Form) -> Self {
+        self.form = form;
+        self
+    }
+}
+
+impl From<Parameter> for Key {
+    fn from(parameter: Parameter) -> Self {
+        Self { parameter, form: Form::Plain, only: &[] }
+    }
+}
+
+/// The strategies of this version.
+pub const STRATEGIES: &[&str] = StrategyKind::NAMES;
+/// The kinds of terrain of this version.
+pub const TERRAIN_KINDS: &[&str] = &["flat", "slope", "undulating", "crater", "esri-ascii", "geotiff", "png"];
+/// Kinds of terrain that are made, not read.
+const MADE: &[&str] = &["flat", "slope", "undulating", "crater"];
+/// Kinds of terrain that come from a file.
+pub const READ: &[&str] = &["esri-ascii", "geotiff", "png"];
+
+/// All reserved tables in the order of the documentation.
+pub fn tables() -> Vec<Table> {
+    vec![time(), world(), terrain(), gluing(), recording(), report(), connect(), glue(), event(), fault()]
+}
+
+/// The reserved table of that name.
+pub fn table(name: &str) -> Option<Table> {
+    tables().into_iter().find(|t| t.name == name)
+}
+
+fn of(name: &'static str, help: &'static str, keys: Vec<Key>) -> Table {
+    Table { name, repeated: false, required: false, help, keys }
+}
+
+fn time() -> Table {
+    let keys = vec![
+        number("step_s", "s", 0.001, "communication step h").positive().within_max(1.0).into(),
+        required("duration_s", "s", "simulated time; a multiple of `step_s`").positive().into(),
+        number("settle_s", "s", 0.0, "time before the start in which what touches the ground comes to rest")
+            .within(0.0, 1e3)
+            .into(),
+    ];
+    Table { required: true, ..of("time", "How long and in which steps.", keys) }
+}
+
+fn world() -> Table {
+    let gravity =
+        Parameter { unit: "m/s^2".into(), ..list("gravity_m_s2", "gravity in the world frame, z up") };
+    let seed = Parameter::of("seed", ParameterType::Integer, "seed of everything random");
+    let keys = vec![
+        Key::from(gravity.or(vec![0.0, 0.0, -9.81])).form(Form::Count(3)),
+        seed.or(1).within(0.0, f64::INFINITY).into(),
+    ];
+    of("world", "What holds everywhere.", keys)
+}
+
+fn terrain() -> Table {
+    let kind = Parameter::of("kind", ParameterType::Text, "shape").choices(TERRAIN_KINDS);
+    let size =
+        Parameter { unit: "m".into(), ..list("size_m", "extent along x and y, centred on the origin") };
+    let spacing = required(
+        "spacing_m",
+        "m",
+        "distance of lattice nodes; may be left out for a file, which keeps its own",
+    );
+    let waves = Parameter { unit: "m".into(), ..list("wavelengths_m", "shortest and longest wavelength") };
+    let centre = Parameter { unit: "m".into(), ..list("centre_m", "centre of the crater") };
+    let seed = Parameter::of("seed", ParameterType::Integer, "seed of the waves; `world.seed` where absent");
+    let half_pi = std::f64::consts::FRAC_PI_2;
+    let keys = vec![
+        kind.into(),
+        Key::from(size.positive()).form(Form::Count(2)).only(MADE),
+        spacing.optional().positive().into(),
+        Key::from(number("height_m", "m", 0.0, "height of the plane")).only(&["flat"]),
+        Key::from(required("angle_rad", "rad", "angle against the horizontal").within(-half_pi, half_pi))
+            .only(&["slope"]),
+        Key::from(number("heading_rad", "rad", 0.0, "direction of steepest ascent, from +x"))
+            .only(&["slope"]),
+        Key::from(number("rms_m", "m", 0.015, "root mean square of the height").within(0.0, f64::INFINITY))
+            .only(&["undulating"]),
+        Key::from(waves.or(vec![0.3, 3.0]).positive()).form(Form::Count(2)).only(&["undulating"]),
+        Key::from(seed.optional().within(0.0, f64::INFINITY)).only(&["undulating"]),
+        Key::from(
+            number("flat_radius_m", "m", 0.0, "radius around the origin blended to flat ground")
+                .within(0.0, f64::INFINITY),
+        )
+        .only(&["undulating"]),
+        Key::from(required("diameter_m", "m", "diameter from crest to crest").positive()).only(&["crater"]),
+        Key::from(required("depth_m", "m", "depth of the floor below the crest").positive())
+            .only(&["crater"]),
+        Key::from(
+            number("rim_height_m", "m", 0.0, "height of the crest above the plain")
+                .within(0.0, f64::INFINITY),
+        )
+        .only(&["crater"]),
+        Key::from(number("max_slope_rad", "rad", half_pi, "steepest slope of the shape").positive())
+            .only(&["crater"]),
+        Key::from(centre.or(vec![0.0, 0.0])).form(Form::Count(2)).only(&["crater"]),
+        Key::from(Parameter::of("file", ParameterType::Path, "elevation file, relative to the scenario"))
+            .only(READ),
+        Key::from(
+            Parameter::of(
+                "fill_m",
+                ParameterType::Number,
+                "height that replaces missing data; refused when absent",
+            )
+            .optional(),
+        )
+        .only(READ),
+        Key::from(required("pixel_m", "m", "distance of pixels").positive()).only(&["png"]),
+        Key::from(number("low_m", "m", 0.0, "height of black pixels")).only(&["png"]),
+        Key::from(required("high_m", "m", "height of white pixels")).only(&["png"]),
+    ];
+    of("terrain", "The ground at the start; built by the coordinator, owned by the soil from then on.", keys)
+}
+
+fn gluing() -> Table {
+    let strategy = Parameter::of("strategy", ParameterType::Text, "how the groups are glued");
+    let form = Parameter::of("form", ParameterType::Text, "form of the iteration (iterative only)");
+    let start =
+        Parameter::of("start", ParameterType::Text, "what the iteration starts from (iterative only)");
+    let most =
+        Parameter::of("max_iterations", ParameterType::Integer, "iterations before the step is halved");
+    let keys = vec![
+        strategy.or("cooperative").choices(STRATEGIES).into(),
+        form.or("auto").choices(&["auto", "tt", "xt"]).into(),
+        number("tolerance", "", 1e-8, "residual relative to the largest of weight and force")
+            .positive()
+            .within_max(1.0)
+            .into(),
+        most.or(20).within(1.0, 10_000.0).into(),
+        Parameter::of("max_halvings", ParameterType::Integer, "halvings of a step before the run stops")
+            .or(4)
+            .within(0.0, 16.0)
+            .into(),
+        start.or("estimate").choices(&["estimate", "zero"]).into(),
+        Parameter::of("relaxation", ParameterType::Text, "how the fixed point is accelerated (relaxed only)")
+            .or("anderson")
+            .choices(&["none", "aitken", "anderson", "broyden"])
+            .into(),
+        Parameter::of("jacobian", ParameterType::Text, "where the bodies' interface Jacobian comes from")
+            .or("analytic")
+            .choices(&["analytic", "directional", "finite-differences", "broyden", "diagonal", "frozen"])
+            .into(),
+        Parameter::of("level", ParameterType::Text, "level of the condition at joints")
+            .or("position")
+            .choices(&["position", "velocity", "acceleration"])
+            .into(),
+        Parameter::of(
+            "hold",
+            ParameterType::Text,
+            "how T runs inside the step of a subsystem that sub-cycles",
+        )
+        .or("end")
+        .choices(&["end", "constant", "linear", "two-parameter"])
+        .into(),
+        number(
+            "stabilisation",
+            "",
+            0.0,
+            "share of the error taken out per step at velocity or acceleration level",
+        )
+        .within(0.0, 1.0)
+        .into(),
+        required(
+            "energy_residual_j",
+            "J",
+            "tolerated energy residual of the interface per step: `time.step_s` is then the longest step",
+        )
+        .optional()
+        .positive()
+        .into(),
+        required("step_min_s", "s", "shortest step under `energy_residual_j`; a hundredth of `time.step_s`")
+            .optional()
+            .positive()
+            .into(),
+        number(
+            "start_scale",
+            "",
+            1.0,
+            "factor on the forces of joints at the start; other than 1 it is a control",
+        )
+        .within(0.0, 10.0)
+        .into(),
+        number(
+            "contact_margin_m",
+            "m",
+            1e-3,
+            "contacts are made when a shape can come this near in the step",
+        )
+        .within(0.0, f64::INFINITY)
+        .into(),
+    ];
+    of("gluing", "How subsystems are glued together.", keys)
+}
+
+fn recording() -> Table {
+    let every = |name, help| Parameter::of(name, ParameterType::Integer, help).within(1.0, 1e9);
+    let patterns =
+        |name, help| Key::from(Parameter::of(name, ParameterType::Text, help).optional()).form(Form::Texts);
+    let keys = vec![
+        every("every_steps", "steps between two records of variables and poses").or(5).into(),
+        every("ground_every_steps", "steps between two records of the ground that changed").or(100).into(),
+        Parameter::of(
+            "digits",
+            ParameterType::Integer,
+            "significant digits of recorded numbers; from 16 on all bits",
+        )
+        .or(9)
+        .within(3.0, 17.0)
+        .into(),
+        patterns(
+            "include",
+            "variables or groups that are recorded, `robot.*.angle` or `robot.LF_j2`; all where absent",
+        ),
+        patterns("exclude", "variables or groups that are not"),
+    ];
+    of("recording", "What is written to `recording.mcap`.", keys)
+}
+
+fn report() -> Table {
+    let text = |name, help| Parameter::of(name, ParameterType::Text, help).optional();
+    let keys = vec![
+        text("body", "`subsystem.body` of distance, roll and pitch; the first body of the first robot")
+            .into(),
+        text("commanded_speed", "`subsystem.variable` with the speed that is asked for, m/s; `gait.speed_reached` leaves out standing and ramp").into(),
+        text("joint", "`subsystem.joint` whose torque, velocity and angle are plotted").into(),
+    ];
+    of("report", "What the summary and the report speak of.", keys)
+}
+
+fn connect() -> Table {
+    let text = |name, help| Parameter::of(name, ParameterType::Text, help);
+    let keys = vec![
+        text("from", "`subsystem.variable`, an array or an element of one (`feet.position[2,1]`); each `*` matches within one dotted part").into(),
+        text("to", "the same; its `*` take what matched in `from`").into(),
+        number("factor", "", 1.0, "to = factor · from + offset, after the conversion of units").into(),
+        number("offset", "", 0.0, "see `factor`").into(),
+        Parameter::of("convert", ParameterType::Bool, "false: units are neither converted nor compared")
+            .or(true)
+            .into(),
+        Key::from(
+            Parameter::of(
+                "map",
+                ParameterType::NumberTable,
+                "what each value becomes, of truth values, whole numbers and enumerations: `{ off = 0, on = 2 }`",
+            )
+            .optional(),
+        )
+        .form(Form::Map),
+    ];
+    Table { repeated: true, ..of("connect", "An output that feeds an input, once per step.", keys) }
+}
+
+fn glue() -> Table {
+    let text = |name, help| Parameter::of(name, ParameterType::Text, help);
+    let vector = |name, unit: &str, help| Parameter { unit: unit.into(), ..list(name, help).optional() };
+    let bound =
+        |name, help| Parameter { unit: "N".into(), ..Parameter::of(name, ParameterType::Number, help) };
+    let sign = text("kind", "joint: bilateral; contact: side 2 only pushes, along `normal`");
+    let keys = vec![
+        text("side_1", "`subsystem.body` on which T acts").into(),
+        text("side_2", "`subsystem.body` on which −T acts, or `world`").into(),
+        sign.or("joint").choices(&["joint", "contact"]).into(),
+        Key::from(vector(
+            "at_m",
+            "m",
+            "world point that is glued, at the start; each body's own origin where absent",
+        ))
+        .form(Form::Count(3)),
+        Key::from(text("components", "of a joint: x, y, z, rx, ry, rz; all where absent").optional())
+            .form(Form::Texts),
+        text("axes", "world: fixed axes; body: they turn with side 1")
+            .or("world")
+            .choices(&["world", "body"])
+            .into(),
+        Key::from(vector("normal", "", "of a contact, from side 2 to side 1").or(vec![0.0, 0.0, 1.0]))
+            .form(Form::Count(3)),
+        number("compliance_m_n", "m/N", 0.0, "of the glue itself: 1/stiffness of a spring")
+            .within(0.0, f64::INFINITY)
+            .into(),
+        number("damping_n_s_m", "N s/m", 0.0, "of a damper beside that spring")
+            .within(0.0, f64::INFINITY)
+            .into(),
+        bound("t_max_n", "largest normal force; side 2 yields there")
+            .optional()
+            .within(0.0, f64::INFINITY)
+            .into(),
+        number("mu", "", 0.0, "Coulomb coefficient of a contact; 0: the normal force only")
+            .within(0.0, f64::INFINITY)
+            .into(),
+        text("strategy", "how all that is connected with this glue is glued; `gluing.strategy` where absent")
+            .optional()
+            .choices(STRATEGIES)
+            .into(),
+    ];
+    Table {
+        repeated: true,
+        ..of("glue", "Two bodies glued together: a cut joint, or a contact known beforehand.", keys)
+    }
+}
+
+fn event() -> Table {
+    let text = |name, help| Parameter::of(name, ParameterType::Text, help).optional();
+    let at = Parameter::of("at_s", ParameterType::Number, "simulated time; either this or `when`").optional();
+    let set =
+        Parameter::of("set", ParameterType::NumberTable, "new values by `\"subsystem.variable\"`").optional();
+    let keys = vec![
+        Key::from(Parameter { unit: "s".into(), ..at.within(0.0, f64::INFINITY) }),
+        text("when", "a comparison, e.g. `robot.body.z < 0.1`; fires once").into(),
+        Key::from(set).form(Form::Assignments),
+        Key::from(text("act", "`subsystem.action`, e.g. `robot.LF_j2.break`")).form(Form::Texts),
+    ];
+    Table {
+        repeated: true,
+        ..of("event", "Something that happens once: something breaks, an operator's change.", keys)
+    }
+}
+
+/// Kinds of faults.
+const FAULTS: &[&str] = &["override", "offset", "gain", "ramp", "freeze", "delay", "drop-out", "noise"];
+
+fn fault() -> Table {
+    let text = |name, help| Parameter::of(name, ParameterType::Text, help);
+    let seconds = |name, help| required(name, "s", help).within(0.0, f64::INFINITY);
+    let value = required("value", "", "override: the value; offset: is added; gain: the factor");
+    let keys = vec![
+        text("variable", "`subsystem.variable`: an output on all its connections, or an input").into(),
+        text("kind", "what is wrong with its number").choices(FAULTS).into(),
+        Key::from(value).only(&["override", "offset", "gain"]),
+        Key::from(required("rate_per_s", "", "what is added grows by this")).only(&["ramp"]),
+        Key::from(required("delay_s", "s", "how old the number is").positive()).only(&["delay"]),
+        Key::from(required("probability", "", "of each step that the last number stays").within(0.0, 1.0))
+            .only(&["drop-out"]),
+        Key::from(
+            required("deviation", "", "standard deviation of what is added").within(0.0, f64::INFINITY),
+        )
+        .only(&["noise"]),
+        seconds("at_s", "when it begins; either this or `when`").optional().into(),
+        text("when", "a comparison, e.g. `robot.body.z < 0.1`, at which it begins").optional().into(),
+        seconds("until_s", "when it ends; the end of the run where nothing says so").optional().into(),
+        text("until", "a comparison at which it ends").optional().into(),
+        seconds("for_s", "how long it lasts").optional().into(),
+        Parameter::of("seed", ParameterType::Integer, "of noise and drop-outs; by `world.seed` where absent")
+            .optional()
+            .within(0.0, f64::INFINITY)
+            .into(),
+    ];
+    Table { repeated: true, ..of("fault", "A number that goes wrong on its way, once, for a while.", keys) }
+}
+
+/// Keys of the host in the table of a subsystem; everything else there is a parameter of the module.
+pub fn subsystem_keys() -> Vec<Key> {
+    let multiple = "steps of the testbed per step of this subsystem";
+    let module = "a module's name, or the path of a library or of a file in Python relative to the scenario";
+    let python = "interpreter of a module in Python; by default $VIRTUAL_ENV/bin/python, else python3";
+    let build = "command that builds the module, run by `run --watch` in the scenario's folder on a change of its sources";
+    let sources =
+        "files and folders that `build` depends on; where absent, the sources below the scenario's folder";
+    let unit = "a functional mock-up unit instead of a module; other keys are its start values, `on_nan`, `event_mode`, `rollback`, and \
+                `bodies`, what of it can be glued (docs/fmi.md)";
+    let row = "a row of the soil table, or a soil file (.toml), whose numbers are offered to the module";
+    vec![
+        Parameter::of("module", ParameterType::Text, module).into(),
+        Parameter::of("fmu", ParameterType::Path, unit).optional().into(),
+        Parameter::of("step_multiple", ParameterType::Integer, multiple).or(1).within(1.0, 1e6).into(),
+        Parameter::of(
+            "isolate",
+            ParameterType::Bool,
+            "in a process of its own: a crash or a hang is an error",
+        )
+        .or(false)
+        .into(),
+        number("load_timeout_s", "s", 60.0, "longest time to load it, where isolated or in Python")
+            .positive()
+            .into(),
+        number("step_timeout_s", "s", 30.0, "longest time of one call, where isolated or in Python")
+            .positive()
+            .into(),
+        number("memory_mb", "", 8192.0, "most memory of its process in MiB, where isolated or in Python")
+            .positive()
+            .into(),
+        Parameter::of("python", ParameterType::Text, python).optional().into(),
+        Parameter::of("build", ParameterType::Text, build).optional().into(),
+        Key::from(Parameter::of("sources", ParameterType::Text, sources).optional()).form(Form::Texts),
+        Parameter::of("parameters", ParameterType::Text, row).optional().into(),
+        Parameter::of("parameters_file", ParameterType::Path, "soil table other than `models/soils.csv`")
+            .optional()
+            .into(),
+    ]
+}
+
+fn number(name: &str, unit: &str, default: f64, help: &str) -> Parameter {
+    Parameter::number(name, unit, default, help)
+}
+
+fn required(name: &str, unit: &str, help: &str) -> Parameter {
+    Parameter { unit: unit.into(), ..Parameter::of(name, ParameterType::Number, help) }
+}
+
+fn list(name: &str, help: &str) -> Parameter {
+    Parameter::of(name, ParameterType::Numbers, help)
+}
+
+/// An upper bound beside an exclusive lower one.
+trait WithinMax {
+    fn within_max(self, max: f64) -> Self;
+}
+
+impl WithinMax for Parameter {
+    fn within_max(self, max: f64) -> Self {
+        Self { max: Some(max), ..self }
+    }
+}

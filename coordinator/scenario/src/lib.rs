@@ -1,0 +1,45 @@
+//! A scenario file: TOML in, checked [`Scenario`] out, errors with file, line and key.
+//!
+//! The keys of the reserved tables stand once, in [`keys`]; the parser, the JSON Schema and the documentation
+//! are made from there. Parameters of modules are checked by [`check_parameters`] once their schemas are known.
+
+pub mod advice;
+mod check;
+mod choices;
+mod difference;
+pub mod docs;
+mod events;
+mod ground_size;
+mod isolation;
+pub mod keys;
+mod load;
+mod mask;
+mod model;
+mod module_kind;
+mod node;
+mod parameters;
+pub mod plausible;
+pub mod schema;
+mod section;
+mod set;
+mod soil_row;
+mod source;
+pub mod ssp;
+mod subsystems;
+mod terrain;
+#[cfg(test)]
+mod tests;
+
+pub use check::allowed_values;
+pub use check::{Complaint, check_value};
+pub use choices::StrategyKind;
+pub use difference::{Difference, differences};
+pub use ground_size::{SMALLER, TooMany, too_many};
+pub use isolation::Isolation;
+pub use model::*;
+pub use module_kind::ModuleKind;
+pub use parameters::{SHIPPED_MODULES, check_parameters, check_parameters_among};
+pub use set::split as split_set;
+pub use soil_row::{find_soil_table, read_soil_table};
+pub use source::Source;
+pub use terraglue_diagnostics::{InputError, did_you_mean, nearest};

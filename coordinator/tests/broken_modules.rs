@@ -4,7 +4,7 @@
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
-use terraglue::check_module::{Options, Report, check};
+use terraglue::conformance::{Options, Report, check};
 
 fn folder() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../tests/modules/broken")
@@ -120,7 +120,7 @@ fn their_twins_without_the_mistake_pass() {
 fn every_test_stands_in_the_documents_and_every_defect_names_one() {
     let page = Path::new(env!("CARGO_MANIFEST_DIR")).join("../docs/plugins/check-module.md");
     let page = std::fs::read_to_string(page).expect("the page of the checker");
-    let all = terraglue::check_module::catalogue();
+    let all = terraglue::conformance::catalogue();
     for test in all {
         let row = format!("| `{}` | {} | {} |", test.name, test.level.word(), test.promise);
         assert!(page.contains(&row), "docs/plugins/check-module.md misses the line\n{row}");

@@ -1,5 +1,6 @@
-//! The developer commands, the same as in CI: `cargo xtask test | docs | validate | freeze | faults | header | schema | install | dist`.
+//! The developer commands, the same as in CI: `cargo xtask test | docs | validate | architecture | freeze | faults | header | schema | install | dist`.
 
+mod architecture;
 mod docs;
 mod faults;
 mod freeze;
@@ -30,6 +31,12 @@ enum Command {
     Docs,
     /// Measure the figures that the areas promise and hold them against their limits.
     Validate(validate::Arguments),
+    /// Write the table and the drawing of the crates in docs/architecture.md from their manifests.
+    Architecture {
+        /// Change nothing; fail when the page is out of date.
+        #[arg(long)]
+        check: bool,
+    },
     /// Write hashes of all decoded numbers to tests/freeze.tsv, or hold the numbers against them with --check.
     Freeze(freeze::Arguments),
     /// Run the fault scenarios and write the tables and the picture of docs/faults.md (some minutes).
@@ -64,6 +71,7 @@ fn main() -> ExitCode {
         Command::Test => test::test(),
         Command::Validate(arguments) => validate::validate(&arguments),
         Command::Docs => docs::write_all(),
+        Command::Architecture { check } => architecture::run(check),
         Command::Freeze(arguments) => freeze::freeze(&arguments),
         Command::Faults => faults::write_page(),
         Command::Header { check } => header::run(check),

@@ -1,10 +1,12 @@
-//! Errors with file, line and key, and the nearest name to a wrong one.
+//! Errors with file, line and key, checks of single values, and the nearest name to a wrong one.
 
+mod check;
 pub mod error;
 mod fingerprint;
 mod input_error;
 mod nearest;
 
+pub use check::{Complaint, LARGEST_WHOLE, allowed, allowed_values, check_value};
 pub use error::{Error, Result};
 pub use fingerprint::fingerprint;
 pub use input_error::InputError;

@@ -189,7 +189,7 @@ fn number(
             schema.name, p.name, p.help
         ));
     };
-    terraglue_scenario::check_value(p, None, value)
+    terraglue_diagnostics::check_value(p, None, value)
         .map_err(|c| c.help.map_or_else(|| c.message.clone(), |help| format!("{}; {help}", c.message)))?;
     value.as_f64().ok_or_else(|| format!("`{}` = {value} is no number", p.name))
 }

@@ -31,6 +31,7 @@ pub use allocations::AllocationCounter;
 pub use description::Description;
 pub use error::LoadError;
 pub use instance::{Instance, Progress, Reply};
+pub use isolation::Isolation;
 pub use library::{
     AvailableModule, FmuFactory, Library, ListedModule, LoadedModule, available_modules, described,
     listed_file, listed_modules,

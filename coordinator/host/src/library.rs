@@ -4,7 +4,7 @@
 use super::crash::Beginning;
 use super::description::Description;
 use super::error::LoadError;
-use super::isolation::{self, What};
+use super::isolation::{self, Isolation, What};
 use super::law::{self, LawHost};
 use super::python::{self, PythonFile};
 use super::search::{SearchPath, below, file_name, is_path, module_name, python_name};
@@ -17,7 +17,6 @@ use std::sync::Arc;
 use terraglue_fmi::elf::{foreign_machine, is_elf, needed_length};
 use terraglue_plugin::ForeignModule;
 use terraglue_plugin::abi::{TG_ABI_MAJOR, TgEntry};
-use terraglue_scenario::Isolation;
 use terraglue_subsystem::{Config, Error as Failure, Host, Module, Result, Schema, Subsystem};
 
 type Instantiate = fn(&Config, Arc<dyn Host>) -> Result<Box<dyn Subsystem>>;

@@ -1,10 +1,9 @@
 //! What an instance is offered: log, threads, cancel flag, seed, folder, gravity, terrain.
 
-use super::Workers;
+use super::{Isolation, Workers};
 use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
-use terraglue_scenario::Isolation;
 use terraglue_subsystem::{Host, LogLevel, Terrain};
 
 /// Takes the log lines of instances: name of the instance, severity, text.

@@ -2,7 +2,7 @@
 
 /// How an instance is kept apart.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Isolation {
+pub struct IsolationSpec {
     /// Longest time to load and make it, s.
     pub load_timeout_s: f64,
     /// Longest time for any other call, s.
@@ -11,7 +11,7 @@ pub struct Isolation {
     pub memory_bytes: u64,
 }
 
-impl Default for Isolation {
+impl Default for IsolationSpec {
     fn default() -> Self {
         Self { load_timeout_s: 60.0, step_timeout_s: 30.0, memory_bytes: 8 << 30 }
     }

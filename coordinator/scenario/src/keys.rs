@@ -1,7 +1,7 @@
 //! Every key of the reserved tables, once: the parser, the JSON Schema and `docs/scenario.md` are made from here.
 
-use super::check::allowed;
 use super::choices::StrategyKind;
+use terraglue_diagnostics::allowed;
 use terraglue_subsystem::{Parameter, ParameterType};
 
 /// A reserved table of a scenario.

@@ -4,7 +4,6 @@
 //! are made from there. Parameters of modules are checked by [`check_parameters`] once their schemas are known.
 
 pub mod advice;
-mod check;
 mod choices;
 mod difference;
 pub mod docs;
@@ -30,16 +29,14 @@ mod terrain;
 #[cfg(test)]
 mod tests;
 
-pub use check::allowed_values;
-pub use check::{Complaint, check_value};
 pub use choices::StrategyKind;
 pub use difference::{Difference, differences};
 pub use ground_size::{SMALLER, TooMany, too_many};
-pub use isolation::Isolation;
+pub use isolation::IsolationSpec;
 pub use model::*;
 pub use module_kind::ModuleKind;
 pub use parameters::{SHIPPED_MODULES, check_parameters, check_parameters_among};
 pub use set::split as split_set;
 pub use soil_row::{find_soil_table, read_soil_table};
 pub use source::Source;
-pub use terraglue_diagnostics::{InputError, did_you_mean, nearest};
+pub use terraglue_diagnostics::{Complaint, InputError, allowed_values, check_value, did_you_mean, nearest};

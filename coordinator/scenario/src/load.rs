@@ -1,7 +1,6 @@
 //! From the text to the [`Scenario`].
 
 use super::advice::MOST_STEPS;
-use super::check::LARGEST_WHOLE;
 use super::choices::StrategyKind;
 use super::events::{connections, events, faults, glue};
 use super::keys::{self, Table};
@@ -13,6 +12,7 @@ use super::source::Source;
 use super::{subsystems, terrain};
 use std::path::Path;
 use std::sync::Arc;
+use terraglue_diagnostics::LARGEST_WHOLE;
 use terraglue_diagnostics::{InputError, did_you_mean};
 use terraglue_fmi::ssp::Package;
 use toml_edit::Document;

@@ -1,7 +1,7 @@
 //! A checked scenario: plain data that the testbed is built from.
 
 use super::choices::StrategyKind;
-use super::isolation::Isolation;
+use super::isolation::IsolationSpec;
 use serde_json::{Map, Value};
 use std::path::PathBuf;
 
@@ -218,7 +218,7 @@ pub struct SubsystemSpec {
     /// Whether it lives in a process of its own by `isolate = true`; what is in Python always does.
     pub isolate: bool,
     /// Limits of that process.
-    pub isolation: Isolation,
+    pub isolation: IsolationSpec,
     /// `python`: the interpreter of a module in Python, as written.
     pub python: Option<String>,
     /// `build`: what makes the module anew, for `run --watch`.

@@ -1,12 +1,12 @@
 //! Checks the parameters of a subsystem against the schema of its module.
 
-use super::check::{Complaint, check_value};
 use super::model::SubsystemSpec;
 use super::section::must_exist;
 use super::source::Source;
 use serde_json::{Map, Value};
 use terraglue_diagnostics::InputError;
 use terraglue_diagnostics::did_you_mean;
+use terraglue_diagnostics::{Complaint, check_value};
 use terraglue_subsystem::{Config, Parameter, ParameterType, Schema};
 
 /// Modules that come with the program.
@@ -154,7 +154,8 @@ impl Check<'_> {
                     "`[{}]` lacks `{}`, which module `{}` needs",
                     self.spec.name, p.name, self.schema.name
                 );
-                let mut help = format!("{}: {}; takes {}", p.name, p.help, super::check::allowed(p, None));
+                let mut help =
+                    format!("{}: {}; takes {}", p.name, p.help, terraglue_diagnostics::allowed(p, None));
                 if self.spec.offered.is_empty() && super::soil_row::gives(&p.name) {
                     help += ". Or parameters = \"LETE_sand\": a soil that `terraglue soils` lists gives all its numbers";
                 }

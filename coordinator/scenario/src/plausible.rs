@@ -135,13 +135,6 @@ fn numbers(of: &Map<String, Value>) -> impl Iterator<Item = String> + '_ {
     SOILS.iter().filter_map(|(key, usual)| usual.doubt(&format!("`{key}`"), of.get(*key)?.as_f64()?))
 }
 
-/// The way out where an angle is refused that is one in degrees.
-pub(super) fn in_radians(unit: &str, x: f64, allowed: impl Fn(f64) -> bool) -> Option<String> {
-    let radians = rounded(x.to_radians());
-    (unit == "rad" && x.abs() > 1.0 && allowed(radians))
-        .then(|| format!("angles are in radians: {x} degrees are {radians} rad"))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

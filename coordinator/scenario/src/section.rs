@@ -1,6 +1,5 @@
 //! One table of a scenario, checked against its keys, with the defaults filled in.
 
-use super::check::{Complaint, check_value};
 use super::keys::{Form, Key, Table};
 use super::node::{Node, Place, Raw};
 use super::source::Source;
@@ -8,6 +7,7 @@ use serde_json::Value;
 use std::path::PathBuf;
 use terraglue_diagnostics::InputError;
 use terraglue_diagnostics::did_you_mean;
+use terraglue_diagnostics::{Complaint, check_value};
 use terraglue_subsystem::ParameterType;
 
 type Checked<T> = Result<T, Box<InputError>>;

@@ -1,7 +1,6 @@
 //! Tables with `module`: subsystems. The host's keys are taken out, the rest are parameters of the module.
 
-use super::check::Complaint;
-use super::isolation::Isolation;
+use super::isolation::IsolationSpec;
 use super::keys::subsystem_keys;
 use super::mask;
 use super::model::SubsystemSpec;
@@ -11,6 +10,7 @@ use super::section::check_entry;
 use super::soil_row;
 use super::source::Source;
 use serde_json::{Map, Value};
+use terraglue_diagnostics::Complaint;
 use terraglue_diagnostics::InputError;
 use terraglue_diagnostics::did_you_mean;
 
@@ -70,11 +70,11 @@ fn one(source: &Source, name: &str, node: &Node) -> Result<SubsystemSpec, Box<In
 }
 
 /// How it is kept in a process of its own.
-fn isolation(node: &Node) -> Isolation {
+fn isolation(node: &Node) -> IsolationSpec {
     let number =
         |key: &str, otherwise: f64| node.get(key).and_then(|n| n.to_json().as_f64()).unwrap_or(otherwise);
-    let usual = Isolation::default();
-    Isolation {
+    let usual = IsolationSpec::default();
+    IsolationSpec {
         load_timeout_s: number("load_timeout_s", usual.load_timeout_s),
         step_timeout_s: number("step_timeout_s", usual.step_timeout_s),
         memory_bytes: (number("memory_mb", (usual.memory_bytes >> 20) as f64) as u64) << 20,

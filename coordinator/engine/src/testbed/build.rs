@@ -14,13 +14,16 @@ use terraglue_gluing::step_control::{Passage, StepControl};
 use terraglue_gluing::timing::Timings;
 use terraglue_gluing::{Exchange, StepReport};
 use terraglue_host::crash::Beginning;
-use terraglue_host::isolation::{self, What};
+use terraglue_host::isolation::What;
 use terraglue_host::law;
 use terraglue_host::{
-    HostServices, Instance, Library, LoadError, LoadedModule, SearchPath, Workers, interpreter, is_python,
+    HostServices, Instance, Isolation, Library, LoadError, LoadedModule, SearchPath, Workers, interpreter,
+    is_python,
 };
 use terraglue_scenario as scenario;
-use terraglue_scenario::{Entry, GlueSpec, GluingSpec, InputError, Scenario, StrategyKind, SubsystemSpec};
+use terraglue_scenario::{
+    Entry, GlueSpec, GluingSpec, InputError, IsolationSpec, Scenario, StrategyKind, SubsystemSpec,
+};
 use terraglue_subsystem::{
     BodyState, Capabilities, Config, Energy, Hold, Kind, Law, Level, Subsystem, Terrain,
 };
@@ -163,6 +166,12 @@ pub fn find(
     found.map_err(|e| module_error(scenario, spec, &e).into())
 }
 
+/// The limits of a scenario as the host takes them.
+fn isolation(spec: &IsolationSpec) -> Isolation {
+    let IsolationSpec { load_timeout_s, step_timeout_s, memory_bytes } = *spec;
+    Isolation { load_timeout_s, step_timeout_s, memory_bytes }
+}
+
 /// An instance of a module, in this process or in one of its own.
 pub fn make(
     scenario: &Scenario,
@@ -174,9 +183,9 @@ pub fn make(
     let config = terraglue_terrain::resolve_mask(scenario, spec, config, services.terrain.as_deref())?;
     let module = module.run_by(interpreter(spec.python.as_deref(), &scenario.folder));
     let made = match spec.isolate || module.is_python() {
-        true => module.instantiate_isolated(&spec.name, config, services, spec.isolation),
+        true => module.instantiate_isolated(&spec.name, config, services, isolation(&spec.isolation)),
         false => {
-            let services = HostServices { isolation: spec.isolation, ..services.clone() };
+            let services = HostServices { isolation: isolation(&spec.isolation), ..services.clone() };
             module.instantiate(&spec.name, config, &services)
         }
     };
@@ -278,7 +287,7 @@ fn unit(
                 path: std::path::absolute(&path).unwrap_or_else(|_| path.clone()),
                 parameters: spec.parameters.clone(),
             };
-            isolation::start(what, &host, services, spec.isolation)
+            terraglue_host::isolation::start(what, &host, services, isolation(&spec.isolation))
         }
     };
     let made = made.map_err(|e| -> Error {

@@ -33,8 +33,24 @@ use std::process::{Command, ExitStatus, Stdio};
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
-use terraglue_scenario::Isolation;
 use terraglue_subsystem::{Error, Host, LogLevel, NodeLaw, Result, Subsystem};
+
+/// Limits of an instance that is kept apart.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Isolation {
+    /// Longest time to load and make it, s.
+    pub load_timeout_s: f64,
+    /// Longest time for any other call, s.
+    pub step_timeout_s: f64,
+    /// Most memory, bytes.
+    pub memory_bytes: u64,
+}
+
+impl Default for Isolation {
+    fn default() -> Self {
+        Self { load_timeout_s: 60.0, step_timeout_s: 30.0, memory_bytes: 8 << 30 }
+    }
+}
 
 /// What a worker is to make.
 #[derive(Clone, Debug, Serialize, Deserialize)]

@@ -11,7 +11,7 @@ use crate::process::{Outcome, root};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
-use terraglue::check_module::{Area, Level, Options, Report, catalogue, check};
+use terraglue::conformance::{Area, Level, Options, Report, catalogue, check};
 use terraglue::scaffold::{Kind, Language, scaffold};
 use terraglue::scenario::read_soil_table;
 use terraglue_soil_law::{COLUMNS, SoilRow};

@@ -12,7 +12,7 @@ mod panel;
 mod plate_wheel;
 mod plates;
 mod real_wheel;
-#[path = "../../../../interfaces/soil-contact/tests/support/mod.rs"]
+#[path = "../../../../modules/soil/contact/tests/support/mod.rs"]
 mod rig;
 mod rig_scenario;
 mod rows;

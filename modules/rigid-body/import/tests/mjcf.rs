@@ -7,7 +7,7 @@ use terraglue_robot_import::{
 };
 
 fn file(name: &str) -> std::path::PathBuf {
-    Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").join(name)
+    Path::new(env!("CARGO_MANIFEST_DIR")).join("../../..").join(name)
 }
 
 fn read(worldbody: &str, more: &str) -> Result<Robot, String> {

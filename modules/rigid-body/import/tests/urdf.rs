@@ -39,7 +39,7 @@ fn refused(parts: &[String], expected: &[&str]) {
 
 #[test]
 fn the_hexapod_is_read() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../models/hexapod.urdf");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../models/hexapod.urdf");
     let robot = read_robot(&path, &Options::default()).unwrap();
     assert_eq!((robot.bodies.len(), robot.joints.len()), (25, 24));
     let mass: f64 = robot.bodies.iter().map(|b| b.mass).sum();
@@ -57,7 +57,7 @@ fn the_hexapod_is_read() {
 
 #[test]
 fn a_chain_hangs_from_the_world() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../tests/reference/multibody/chain8.urdf");
+    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../tests/reference/multibody/chain8.urdf");
     let robot = read_robot(&path, &Options::default()).unwrap();
     assert_eq!((robot.bodies.len(), robot.joints.len(), robot.base), (8, 8, Base::World));
     assert_eq!(robot.joints[0].parent, None);

@@ -5,7 +5,7 @@
 
 #[path = "../tests/feet/mod.rs"]
 mod feet;
-#[path = "../../../interfaces/soil-contact/tests/support/mod.rs"]
+#[path = "../../contact/tests/support/mod.rs"]
 #[allow(dead_code, unused_imports)]
 mod support;
 

@@ -2,8 +2,8 @@
 
 use terraglue_soil_law::{COLUMNS, SoilTable, TableError};
 
-const TABLE: &str = include_str!("../../../models/soils.csv");
-const PUBLISHED: &str = include_str!("../../../tests/reference/terramechanics/soils.csv");
+const TABLE: &str = include_str!("../../../../models/soils.csv");
+const PUBLISHED: &str = include_str!("../../../../tests/reference/terramechanics/soils.csv");
 
 fn table() -> SoilTable {
     SoilTable::parse(TABLE).expect("the shipped table is readable")

@@ -1,9 +1,8 @@
 //! Checks one value against a [`Parameter`]: type, range, choices. The same for the scenario's own keys and for
 //! the parameters of modules.
 
-use super::plausible;
+use crate::did_you_mean;
 use serde_json::Value;
-use terraglue_diagnostics::did_you_mean;
 use terraglue_subsystem::{Parameter, ParameterType};
 
 /// What is wrong with a value; the place is the caller's business.
@@ -13,6 +12,17 @@ pub struct Complaint {
     pub message: String,
     /// The way out.
     pub help: Option<String>,
+}
+
+/// The way out where an angle is refused that is one in degrees.
+fn in_radians(unit: &str, x: f64, allowed: impl Fn(f64) -> bool) -> Option<String> {
+    let radians = three_digits(x.to_radians());
+    (unit == "rad" && x.abs() > 1.0 && allowed(radians))
+        .then(|| format!("angles are in radians: {x} degrees are {radians} rad"))
+}
+
+fn three_digits(x: f64) -> f64 {
+    format!("{x:.2e}").parse().unwrap_or(x)
 }
 
 /// Checks a value; `count` demands a list of that length.
@@ -84,8 +94,7 @@ fn in_range(p: &Parameter, count: Option<usize>, x: f64, value: &Value) -> Resul
     }
     let message =
         format!("`{}` = {value} is out of range: it takes {}", last_part(&p.name), allowed(p, count));
-    let degrees =
-        plausible::in_radians(&p.unit, x, |x| p.min.is_none_or(|a| x >= a) && p.max.is_none_or(|b| x <= b));
+    let degrees = in_radians(&p.unit, x, |x| p.min.is_none_or(|a| x >= a) && p.max.is_none_or(|b| x <= b));
     Err(Complaint { message, help: degrees.or_else(|| help_line(p)) })
 }
 

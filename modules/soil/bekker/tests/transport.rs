@@ -1,6 +1,6 @@
 //! `material_transport`: the walls of a print fall in by the automaton's rules and no unit of material is lost.
 
-#[path = "../../../interfaces/soil-contact/tests/support/mod.rs"]
+#[path = "../../contact/tests/support/mod.rs"]
 mod support;
 
 use support::{Rig, Shown, flat, read, soil};

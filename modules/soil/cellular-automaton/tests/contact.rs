@@ -1,8 +1,8 @@
 //! What every soil must hold: rest, plates, stick, shear, derivatives, states, energy.
 
-#[path = "../../../interfaces/soil-contact/tests/support/bars.rs"]
+#[path = "../../contact/tests/support/bars.rs"]
 mod bars;
-#[path = "../../../interfaces/soil-contact/tests/support/mod.rs"]
+#[path = "../../contact/tests/support/mod.rs"]
 mod support;
 
 bars::contact_tests!(terraglue_soil_cellular_automaton::SoilCellularAutomaton, false);

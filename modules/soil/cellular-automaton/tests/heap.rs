@@ -1,6 +1,6 @@
 //! Heaps of loose material: angle of repose, curvature, mass, and silence at rest.
 
-#[path = "../../../interfaces/soil-contact/tests/support/mod.rs"]
+#[path = "../../contact/tests/support/mod.rs"]
 mod support;
 
 use support::{Shown, read, soil};

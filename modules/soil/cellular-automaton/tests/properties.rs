@@ -1,7 +1,7 @@
 //! Random bodies pressed, dragged and lifted in random order: mass, numbers, slopes and pull.
 
 mod feet;
-#[path = "../../../interfaces/soil-contact/tests/support/mod.rs"]
+#[path = "../../contact/tests/support/mod.rs"]
 mod support;
 
 use feet::{Dice, Feet, H, Wanderer, instance, shape, steepest};

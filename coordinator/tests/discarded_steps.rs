@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 use terraglue::Testbed;
-use terraglue::host::Library;
 use terraglue::scenario::Scenario;
 use terraglue::testbed::Options;
 use terraglue_subsystem::{
@@ -51,7 +50,7 @@ fn parts(longest: &[f64]) -> u64 {
     }
     let scenario = Scenario::parse(&text, "discarded_steps.toml", &[]).expect("scenario");
     let options = Options { threads: 1, ..Options::default() };
-    let library = Library::new().with::<Short>();
+    let library = terraglue::library().with::<Short>();
     let mut testbed = Testbed::build_with(&scenario, &options, &library).unwrap_or_else(|e| panic!("{e}"));
     testbed.step().unwrap_or_else(|e| panic!("{e}"));
     testbed.step_index()

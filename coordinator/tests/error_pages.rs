@@ -34,7 +34,7 @@ fn sources(folder: &Path, out: &mut String) {
 #[test]
 fn every_number_has_a_page_and_every_page_a_message() {
     let mut code = String::new();
-    for folder in ["coordinator/src", "interfaces/plugin/src", "modules/soil/laws/src"] {
+    for folder in ["coordinator", "interfaces/plugin/src", "modules/soil/laws/src"] {
         sources(&root().join(folder), &mut code);
     }
     let (said, told) = (numbers(&code, "["), numbers(&read(&root().join("docs/plugins/errors.md")), "\n## "));

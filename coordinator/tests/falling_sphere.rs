@@ -3,7 +3,6 @@
 use point_mass::PointMass;
 use soil_column::SoilColumnModule;
 use terraglue::Testbed;
-use terraglue::host::Library;
 use terraglue::scenario::Scenario;
 use terraglue::testbed::Options;
 
@@ -33,7 +32,7 @@ module = "soil-column"
 "#
     );
     let scenario = Scenario::parse(&text, "falling_sphere.toml", &[]).expect("scenario");
-    let library = Library::new().with::<PointMass>().with::<SoilColumnModule>();
+    let library = terraglue::library().with::<PointMass>().with::<SoilColumnModule>();
     Testbed::build_with(&scenario, &Options::default(), &library).unwrap_or_else(|e| panic!("{e}"))
 }
 

@@ -12,7 +12,7 @@ import zlib
 import pytest
 from conftest import ROOT, terraglue
 
-ASSETS = ROOT / "coordinator/src/recording/assets"
+ASSETS = ROOT / "coordinator/recording/src/assets"
 PHONE = 390  # px
 
 

@@ -48,7 +48,8 @@ fn rooms() -> Outcome<Rooms> {
     let output = cargo(&["metadata", "--no-deps", "--format-version", "1", "--offline"])
         .output()
         .map_err(|e| format!("cargo metadata: {e}"))?;
-    let metadata: Value = serde_json::from_slice(&output.stdout).map_err(|e| format!("cargo metadata: {e}"))?;
+    let metadata: Value =
+        serde_json::from_slice(&output.stdout).map_err(|e| format!("cargo metadata: {e}"))?;
     let packages = metadata["packages"].as_array().ok_or("cargo metadata lists no packages")?;
     let mut rooms: Rooms = packages.iter().filter_map(room).collect();
     let names: BTreeSet<String> = rooms.keys().cloned().collect();
@@ -109,8 +110,11 @@ fn is_coordinator(room: &Room) -> bool {
 }
 
 fn limits(rooms: &Rooms, floors: &BTreeMap<&str, usize>) -> Outcome {
-    let own: BTreeSet<usize> =
-        rooms.iter().filter(|(_, room)| is_coordinator(room)).map(|(name, _)| floors[name.as_str()]).collect();
+    let own: BTreeSet<usize> = rooms
+        .iter()
+        .filter(|(_, room)| is_coordinator(room))
+        .map(|(name, _)| floors[name.as_str()])
+        .collect();
     if own.len() > MOST_FLOORS {
         return Err(format!("the coordinator has {} floors, more than {MOST_FLOORS}", own.len()));
     }

@@ -41,7 +41,6 @@ pub struct Checkpoint {
     recorder: RecorderState,
 }
 persist!(Checkpoint { origin, every_s, csv, t_s, timing, testbed, recorder });
-persist!(TimingRow { section, wall_s, cpu_s, steps });
 
 /// Where a run that was taken up again stood.
 pub struct Resumed {

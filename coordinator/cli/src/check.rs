@@ -6,7 +6,7 @@ use super::run::build;
 use super::{Exit, show, soil_module, strict};
 use terraglue_diagnostics::Result;
 use terraglue_engine::testbed::Options;
-use terraglue_host::{Library, SearchPath};
+use terraglue_host::SearchPath;
 use terraglue_scenario::{Scenario, SubsystemSpec};
 
 /// Loads the scenario, its modules and files, and resolves all names.

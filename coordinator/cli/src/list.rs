@@ -10,8 +10,8 @@ use terraglue_diagnostics::Result;
 use terraglue_engine::signals::pattern;
 use terraglue_engine::testbed::Options;
 use terraglue_host::{
-    AvailableModule, Library, ListedModule, LoadError, LoadedModule, SearchPath, available_modules,
-    described, is_path, listed_file, listed_modules,
+    AvailableModule, ListedModule, LoadError, LoadedModule, SearchPath, available_modules, described,
+    is_path, listed_file, listed_modules,
 };
 use terraglue_scenario::{InputError, Scenario, allowed_values, did_you_mean};
 use terraglue_subsystem::{Causality, Effect, Schema, ValueType, Variable};

@@ -100,7 +100,7 @@ pub fn run(command: &RunCommand) -> Result<Exit> {
     let outcome = run_testbed(testbed, reloader.as_mut(), records, observer)?;
     drop(progress);
     bar.finish_and_clear();
-    let report = recording::report::write(&folder);
+    let report = terraglue_recording::report::write(&folder);
     if command.explain {
         say(arguments, &show::costs(&outcome.costs, outcome.summary.steps).to_string());
     }

@@ -3,7 +3,7 @@
 use super::arguments::ScenarioArguments;
 use std::path::Path;
 use terraglue_diagnostics::Result;
-use terraglue_host::{Library, SearchPath, available_modules};
+use terraglue_host::{SearchPath, available_modules};
 use terraglue_scenario::{InputError, Scenario, nearest};
 use terraglue_subsystem::Kind;
 

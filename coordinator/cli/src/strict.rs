@@ -2,7 +2,7 @@
 
 use super::arguments::ScenarioArguments;
 use terraglue_diagnostics::Result;
-use terraglue_host::{Library, SearchPath};
+use terraglue_host::SearchPath;
 use terraglue_scenario::Scenario;
 
 /// Loads the scenario with its edits, and with `strict = true` where that is wanted and known.

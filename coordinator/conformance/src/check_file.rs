@@ -7,8 +7,9 @@
 //! rotation = "the lattice of this soil is not square"
 //! ```
 
-use serde_json::{Map, Value};
+use serde_json::Value;
 use std::path::{Path, PathBuf};
+use terraglue_host::value_of;
 
 /// What the file says.
 #[derive(Clone, Debug, Default)]
@@ -40,7 +41,7 @@ impl CheckFile {
             match key {
                 "parameters" => {
                     for (name, value) in table.iter() {
-                        let value = value.as_value().and_then(json);
+                        let value = value.as_value().and_then(value_of);
                         let value =
                             value.ok_or_else(|| wrong(format!("`{name}` has no value of a parameter")))?;
                         out.parameters.push((name.to_owned(), value));

@@ -32,7 +32,7 @@ pub use sanitize::{Fault, Sanitized, sanitize, sources_of};
 pub use supervisor::{Options, Told, check};
 
 use std::path::Path;
-use terraglue_host::{Library, SearchPath, is_path};
+use terraglue_host::{SearchPath, is_path};
 
 /// Runs one test in this process.
 ///

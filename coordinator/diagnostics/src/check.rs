@@ -190,3 +190,17 @@ fn range(p: &Parameter) -> String {
         }
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn degrees_are_recognised() {
+        assert_eq!(
+            in_radians("rad", 35.0, |x| x < 1.2),
+            Some("angles are in radians: 35 degrees are 0.611 rad".into())
+        );
+        assert_eq!(in_radians("m", 35.0, |_| true).or(in_radians("rad", 0.5, |_| true)), None);
+    }
+}

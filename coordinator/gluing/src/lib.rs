@@ -54,7 +54,7 @@ use refusal::{body_contacts_refused, contacts_refused, joints_refused, rigid_ref
 pub use report::{PortReport, StepReport};
 pub use side::Instant;
 /// How wrenches run inside a step: only their end value counts for the integrators in use.
-pub(crate) const HOLD: terraglue_subsystem::Hold = terraglue_subsystem::Hold::End;
+pub const HOLD: terraglue_subsystem::Hold = terraglue_subsystem::Hold::End;
 
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;

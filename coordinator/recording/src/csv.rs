@@ -94,6 +94,7 @@ pub struct TimingRow {
     /// Steps.
     pub steps: u64,
 }
+terraglue_subsystem::persist!(TimingRow { section, wall_s, cpu_s, steps });
 
 /// Writes `timing.csv`. Nothing that a clock measured stands in any other file but `summary.json`.
 pub fn write_timing(folder: &Path, rows: &[TimingRow]) -> Result {

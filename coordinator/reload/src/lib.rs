@@ -23,7 +23,7 @@ use terraglue_diagnostics::{Error, Result};
 use terraglue_engine::observer::Observer;
 use terraglue_engine::testbed::{Options, Testbed};
 use terraglue_host::isolation::end_group;
-use terraglue_host::{HostServices, Library, LoadError, LoadedModule, SearchPath, law};
+use terraglue_host::{HostServices, LoadError, LoadedModule, SearchPath, law};
 use terraglue_scenario as scenario;
 use terraglue_scenario::{Scenario, SubsystemSpec};
 use terraglue_subsystem::{Kind, Schema};

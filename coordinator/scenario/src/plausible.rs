@@ -184,10 +184,5 @@ mod tests {
             FRICTION_DEGREES.doubt("--phi-deg", 0.61).is_some_and(|d| d.contains("in rad (35 degrees)?"))
         );
         assert!(doubt("density_kg_m3", 1e9).ends_with("3500 kg/m^3"));
-        assert_eq!(
-            in_radians("rad", 35.0, |x| x < 1.2),
-            Some("angles are in radians: 35 degrees are 0.611 rad".into())
-        );
-        assert_eq!(in_radians("m", 35.0, |_| true).or(in_radians("rad", 0.5, |_| true)), None);
     }
 }

@@ -3,6 +3,7 @@
 use super::*;
 use std::path::{Path, PathBuf};
 use terraglue_ground::HeightField;
+use terraglue_scenario::Greys;
 
 fn spec(kind: TerrainKind) -> TerrainSpec {
     TerrainSpec { size_m: [6.0, 4.0], spacing_m: 0.02, kind }

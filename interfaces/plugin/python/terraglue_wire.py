@@ -1,5 +1,5 @@
 """Calls and answers as bytes in the memory that a worker shares with its host: the segment, and what is read and written
-there. The other side is `coordinator/src/host/isolation`."""
+there. The other side is `coordinator/host/src/isolation`."""
 import array
 import ctypes
 import mmap

@@ -1,7 +1,6 @@
 //! Helpers for tests of whole runs.
 
 use glue_cases::{MassChain, PlanarBodies, PowerColumns, TableOnFeet};
-use terraglue::host::Library;
 use terraglue::scenario::Scenario;
 use terraglue::testbed::Options;
 use terraglue::{Result, Testbed};
@@ -24,13 +23,13 @@ pub fn shipped(name: &str, sets: &[(&str, &str)]) -> Scenario {
 
 /// Builds with one thread.
 pub fn build(scenario: &Scenario) -> Result<Testbed> {
-    Testbed::build(scenario, &Options { threads: 1, ..Options::default() })
+    Testbed::build_with(scenario, &Options { threads: 1, ..Options::default() }, &terraglue::library())
 }
 
 /// Builds a scenario of the modules of the glue cases from its text, with one thread.
 pub fn glued(text: &str) -> Result<Testbed> {
     let scenario = Scenario::parse(text, "test.toml", &[])?;
-    let library = Library::new()
+    let library = terraglue::library()
         .with::<MassChain>()
         .with::<PlanarBodies>()
         .with::<TableOnFeet>()

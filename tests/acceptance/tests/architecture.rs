@@ -124,7 +124,9 @@ fn numeric_folders() -> Vec<String> {
 #[test]
 fn every_module_that_steps_is_numeric() {
     let numeric = numeric_folders();
-    for folder in ["modules/gait", "modules/rigid-body", "modules/soil/cellular-automaton", "modules/soil/bekker"] {
+    for folder in
+        ["modules/gait", "modules/rigid-body", "modules/soil/cellular-automaton", "modules/soil/bekker"]
+    {
         assert!(numeric.contains(&format!("{folder}/src")), "{folder} is not marked `numeric = true`");
     }
 }

@@ -3,13 +3,12 @@
 //! Models, integrators and figures: `tests/reference/gluing/README.md`.
 
 use glue_cases::{MassChain, PlanarBodies};
-use terraglue::host::Library;
 use terraglue::testbed::Options;
 use terraglue::{Testbed, scenario::Scenario};
 
 fn build(text: &str) -> Testbed {
     let scenario = Scenario::parse(text, "test.toml", &[]).unwrap_or_else(|e| panic!("{e}: {:?}", e.help));
-    let library = Library::new().with::<MassChain>().with::<PlanarBodies>();
+    let library = terraglue::library().with::<MassChain>().with::<PlanarBodies>();
     let options = Options { threads: 1, ..Options::default() };
     Testbed::build_with(&scenario, &options, &library).unwrap_or_else(|e| panic!("{e}"))
 }

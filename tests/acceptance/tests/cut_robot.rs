@@ -1,6 +1,5 @@
 //! A robot that a scenario cuts at a joint, and glues again, moves like the whole one.
 
-use terraglue::host::Library;
 use terraglue::testbed::Options;
 use terraglue::{Testbed, scenario::Scenario};
 use terraglue_gait::Gait;
@@ -23,7 +22,7 @@ fn text(step_s: f64, gravity: f64, robots: &[(&str, String)], glue: &str) -> Str
 fn build(text: &str) -> Result<Testbed, String> {
     let scenario = Scenario::parse(text, "test.toml", &[]).map_err(|e| format!("{e}: {:?}", e.help))?;
     let options = Options { threads: 1, ..Options::default() };
-    let library = Library::new()
+    let library = terraglue::library()
         .with::<RigidBody>()
         .with::<SoilBekker>()
         .with::<SoilCellularAutomaton>()

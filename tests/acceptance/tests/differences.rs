@@ -138,8 +138,8 @@ fn row(jacobian: &str) -> String {
 #[test]
 fn members_are_differenced_side_by_side_in_one_exchange_each() {
     let names = ["a.m0.x", "b.m0.x", "c.m0.x", "d.m0.x"];
-    let analytic = Library::new().with::<MassChain>();
-    let mute = Library::new().with::<Mute<MassChain>>();
+    let analytic = terraglue::library().with::<MassChain>();
+    let mute = terraglue::library().with::<Mute<MassChain>>();
     let mut truth = build(&row("analytic"), &analytic);
     let mut other = build(&row("finite-differences"), &mute);
     for k in 0..50 {
@@ -156,7 +156,7 @@ fn members_are_differenced_side_by_side_in_one_exchange_each() {
         assert!(off <= 1e-8, "{off} m");
     }
     // a member that knows its derivatives is not differenced because its partner does not
-    let mixed = Library::new().with::<MassChain>().with::<Mute<TableOnFeet>>();
+    let mixed = terraglue::library().with::<MassChain>().with::<Mute<TableOnFeet>>();
     let mut mixed = build(&row("analytic"), &mixed);
     assert_eq!(step(&mut mixed).0, 0);
 }
@@ -181,8 +181,9 @@ fn table(form: &str) -> String {
 fn ports_that_lie_apart_on_a_soil_cost_one_trial_together() {
     let names = ["table.heave", "table.roll", "table.pitch"];
     for form in ["tt", "xt"] {
-        let mut truth = build(&table(form), &Library::new().with::<TableOnFeet>().with::<PowerColumns>());
-        let mute = Library::new().with::<TableOnFeet>().with::<Mute<PowerColumns>>();
+        let mut truth =
+            build(&table(form), &terraglue::library().with::<TableOnFeet>().with::<PowerColumns>());
+        let mute = terraglue::library().with::<TableOnFeet>().with::<Mute<PowerColumns>>();
         let mut other = build(&table(form), &mute);
         for _ in 0..40 {
             truth.step().unwrap_or_else(|e| panic!("{e}"));

@@ -1,7 +1,6 @@
 //! A wheel with grousers on soil: one contact, the same bits with any number of threads.
 
 use terraglue::Testbed;
-use terraglue::host::Library;
 use terraglue::testbed::Options;
 use terraglue_acceptance::{ROOT, read, shipped};
 
@@ -9,7 +8,7 @@ fn rig(soil: &str, threads: usize) -> Testbed {
     let model = format!("{ROOT}/models/wheel_rig_grousers.urdf");
     let sets =
         [("rig.model", model.as_str()), ("soil.module", soil), ("gluing.strategy", "cooperative-compliant")];
-    let library = Library::new()
+    let library = terraglue::library()
         .with::<terraglue_rigid_body::RigidBody>()
         .with::<terraglue_soil_bekker::SoilBekker>()
         .with::<terraglue_soil_cellular_automaton::SoilCellularAutomaton>();

@@ -26,7 +26,7 @@ fn build_law(folder: &Path, switches: &[&str]) -> String {
 fn build(scenario: &str, sets: &[(&str, &str)]) -> Testbed {
     let scenario = shipped(scenario, sets);
     let options = Options { threads: 1, ..Options::default() };
-    Testbed::build(&scenario, &options).unwrap_or_else(|e| panic!("{e}"))
+    Testbed::build_with(&scenario, &options, &terraglue::library()).unwrap_or_else(|e| panic!("{e}"))
 }
 
 fn read(testbed: &Testbed, name: &str) -> f64 {
@@ -160,6 +160,9 @@ fn slip_sinkage_is_refused_for_a_law_that_it_cannot_act_on() {
     let stiffening = ("soil.law.pressure", "(k_c/b + k_phi)*z^n*(1 + 0.01*z/K)");
     let scenario = shipped("plate_sinkage", &[stiffening, lyasko]);
     let options = Options { threads: 1, ..Options::default() };
-    let told = Testbed::build(&scenario, &options).err().map(|e| e.to_string()).unwrap_or_default();
+    let told = Testbed::build_with(&scenario, &options, &terraglue::library())
+        .err()
+        .map(|e| e.to_string())
+        .unwrap_or_default();
     assert!(told.contains("`slip_sinkage` acts on power laws"), "{told}");
 }

@@ -7,7 +7,6 @@
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 use terraglue::Testbed;
-use terraglue::host::Library;
 use terraglue::scenario::Scenario;
 use terraglue::testbed::Options;
 use terraglue_acceptance::{ROOT, shipped};
@@ -47,7 +46,7 @@ unsafe impl GlobalAlloc for Counting {
 
 /// A scenario with its modules linked in.
 fn linked(scenario: &Scenario) -> Testbed {
-    let library = Library::new()
+    let library = terraglue::library()
         .with::<terraglue_rigid_body::RigidBody>()
         .with::<terraglue_soil_bekker::SoilBekker>()
         .with::<terraglue_soil_cellular_automaton::SoilCellularAutomaton>()
@@ -114,7 +113,7 @@ fn no_step_allocates_once_the_ports_are_known() {
     ] {
         let text = oscillator(gluing, glue);
         let scenario = Scenario::parse(&text, "test.toml", &[]).unwrap_or_else(|e| panic!("{e}"));
-        let library = Library::new().with::<glue_cases::MassChain>();
+        let library = terraglue::library().with::<glue_cases::MassChain>();
         let options = Options { threads: 1, ..Options::default() };
         let mut testbed =
             Testbed::build_with(&scenario, &options, &library).unwrap_or_else(|e| panic!("{e}"));

@@ -2,7 +2,6 @@
 
 use std::sync::Arc;
 use terraglue::Testbed;
-use terraglue::host::Library;
 use terraglue::testbed::Options;
 use terraglue_acceptance::{SOILS, build, foot, scenario, steps};
 use terraglue_soil_bekker::SoilBekker;
@@ -129,7 +128,7 @@ impl Subsystem for Unyielding {
 #[test]
 fn the_negative_control_never_sinks() {
     let soil = "[soil]\nmodule = \"soil-unyielding\"\nparameters = \"lunar_nominal_Apollo\"";
-    let library = Library::new().with::<Unyielding>();
+    let library = terraglue::library().with::<Unyielding>();
     let built = Testbed::build_with(&scenario(&foot("cooperative", soil)), &Options::default(), &library);
     let mut testbed = built.unwrap_or_else(|e| panic!("{e}"));
     for _ in 0..2000 {

@@ -16,7 +16,8 @@ struct Run {
 impl Run {
     fn start(scenario: &Scenario, threads: usize, folder: &Path) -> Self {
         let options = Options { threads, ..Options::default() };
-        let testbed = Testbed::build(scenario, &options).unwrap_or_else(|e| panic!("{e}"));
+        let testbed =
+            Testbed::build_with(scenario, &options, &terraglue::library()).unwrap_or_else(|e| panic!("{e}"));
         let mut recorder = Recorder::create(folder, scenario, RecorderOptions::default()).expect("folder");
         testbed.view(|v| recorder.started(v)).expect("started");
         Self { testbed, recorder }

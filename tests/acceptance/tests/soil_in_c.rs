@@ -33,7 +33,8 @@ fn the_robot_walks_on_it_with_both_strategies() {
         let scenario =
             shipped("moon_walk", &[("soil.module", "soil-elastic"), ("gluing.strategy", strategy)]);
         let options = Options { threads: 1, module_paths: vec![folder.path().into()], ..Options::default() };
-        let mut testbed = Testbed::build(&scenario, &options).unwrap_or_else(|e| panic!("{e}"));
+        let mut testbed =
+            Testbed::build_with(&scenario, &options, &terraglue::library()).unwrap_or_else(|e| panic!("{e}"));
         let start = read(&testbed, "robot.body.x");
         let (mut carried, mut samples) = (0.0, 0.0);
         for step in 0..3000 {

@@ -6,7 +6,7 @@ use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use terraglue_diagnostics::{Error, Result};
-use terraglue_host::{Library, SearchPath};
+use terraglue_host::SearchPath;
 use terraglue_recording::compare::{self, CompareRow, Varied};
 use terraglue_scenario::{InputError, Scenario, did_you_mean, keys::STRATEGIES};
 use terraglue_subsystem::Kind;

@@ -132,7 +132,7 @@ pub unsafe fn create(
             return Err(why.to_owned());
         }
         let token = token.ok_or("no token was given")?;
-        Component::new(terraglue::fmu::export::open, &name, &resources?, Some(&token))
+        Component::new(terraglue_fmu::export::open, &name, &resources?, Some(&token))
     }));
     match made.unwrap_or_else(|_| Err("a defect of the unit while it was made".into())) {
         Ok(component) => {

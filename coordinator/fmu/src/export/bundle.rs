@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use terraglue_diagnostics::{Error, Result};
 use terraglue_fmi::Version;
 use terraglue_fmi::export::{About, Content, Mailbox, Opened, Opening, describe, identifier, pack};
-use terraglue_host::{Library, SearchPath};
+use terraglue_host::SearchPath;
 use terraglue_scenario::{InputError, Scenario, SubsystemSpec, find_soil_table};
 use terraglue_subsystem::{Capabilities, ParameterType};
 use toml_edit::{DocumentMut, Item, value};

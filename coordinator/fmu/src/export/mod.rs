@@ -15,7 +15,6 @@ use std::sync::Arc;
 use terraglue_engine::testbed::{Options, Testbed};
 use terraglue_fmi::Version;
 use terraglue_fmi::export::{Layout, Opened, Opening};
-use terraglue_host::Library;
 use terraglue_scenario::Scenario;
 use whole::Whole;
 

@@ -1,7 +1,7 @@
 //! A single module as a small scenario, so that it can be exported like any other.
 
 use std::path::Path;
-use terraglue_host::{Library, SearchPath};
+use terraglue_host::SearchPath;
 use terraglue_subsystem::Kind;
 
 /// What every small scenario holds; `--set` changes it.

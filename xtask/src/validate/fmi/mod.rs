@@ -49,7 +49,7 @@ fn testbed(folder: &Path, text: &str) -> Result<Testbed, terraglue::Error> {
 fn testbed_on(folder: &Path, text: &str, threads: usize) -> Result<Testbed, terraglue::Error> {
     let path = folder.join("scenario.toml").display().to_string();
     let scenario = Scenario::parse(text, &path, &[])?;
-    Testbed::build(&scenario, &Options { threads, ..Options::default() })
+    Testbed::build_with(&scenario, &Options { threads, ..Options::default() }, &terraglue::library())
 }
 
 /// The same where an error ends the measurement.

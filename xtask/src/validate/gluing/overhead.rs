@@ -15,7 +15,6 @@ use std::marker::PhantomData;
 use std::sync::Arc;
 use std::time::{Duration, Instant};
 use terraglue::Testbed;
-use terraglue::host::Library;
 use terraglue::scenario::Scenario;
 use terraglue::subsystem::{
     BodyState, Capabilities, Config, Energy, Estimate, Hold, Host, Input, Law, Level, Module, Motion,
@@ -120,7 +119,7 @@ fn measure() -> Outcome<[f64; 3]> {
     let setting = Setting { gluing: String::new(), ..Setting::iterative(1e-3, [0.0; 3]) };
     let text = Table::standard("implicit-euler", 0.3).text(&setting, &columns(1.0, false));
     let scenario = Scenario::parse(&text, "overhead.toml", &[]).map_err(|e| e.to_string())?;
-    let library = Library::new().with::<Timed<TableOnFeet>>().with::<Timed<PowerColumns>>();
+    let library = terraglue::library().with::<Timed<TableOnFeet>>().with::<Timed<PowerColumns>>();
     let options = Options { threads: 1, ..Options::default() };
     let mut testbed = Testbed::build_with(&scenario, &options, &library).map_err(|e| e.to_string())?;
     let exchanged = |testbed: &Testbed| {

@@ -4,7 +4,6 @@ use crate::process::Outcome;
 use glue_cases::{MassChain, PlanarBodies, PowerColumns, TableOnFeet};
 use std::fmt::Write;
 use terraglue::Testbed;
-use terraglue::host::Library;
 use terraglue::scenario::Scenario;
 use terraglue::testbed::Options;
 
@@ -57,7 +56,7 @@ pub fn list(values: &[f64]) -> String {
 /// Builds a scenario.
 pub fn build(text: &str) -> Outcome<Testbed> {
     let scenario = Scenario::parse(text, "case.toml", &[]).map_err(|e| format!("{e}\n{text}"))?;
-    let library = Library::new()
+    let library = terraglue::library()
         .with::<MassChain>()
         .with::<PlanarBodies>()
         .with::<TableOnFeet>()

@@ -47,7 +47,8 @@ fn run(context: &Context, rule: &str, jacobian: &str) -> Outcome<Run> {
     let path = folder.join("scenario.toml").display().to_string();
     let scenario = Scenario::parse(&text, &path, &[]).map_err(|e| format!("{e}\n{text}"))?;
     let options = Options { threads: 1, ..Options::default() };
-    let mut testbed = Testbed::build(&scenario, &options).map_err(|e| format!("{e}\n{text}"))?;
+    let mut testbed = Testbed::build_with(&scenario, &options, &terraglue::library())
+        .map_err(|e| format!("{e}\n{text}"))?;
     let (mut evaluations, mut differences) = (0, 0);
     for _ in 0..100 {
         testbed.step().map_err(|e| e.to_string())?;

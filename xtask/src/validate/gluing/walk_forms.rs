@@ -27,7 +27,8 @@ fn forms(soil: &str, context: &Context) -> Outcome<Figure> {
     let scenario =
         Scenario::load(&root().join("scenarios/moon_walk.toml"), &sets).map_err(|e| e.to_string())?;
     let options = Options { threads: 1, ..Options::default() };
-    let mut testbed = Testbed::build(&scenario, &options).map_err(|e| e.to_string())?;
+    let mut testbed =
+        Testbed::build_with(&scenario, &options, &terraglue::library()).map_err(|e| e.to_string())?;
     let form = |form: &str| GluingSpec { form: form.into(), ..scenario.gluing.clone() };
     let (mut worst, mut failed, mut why): (f64, u32, String) = (0.0, 0, String::new());
     for _ in 0..samples {

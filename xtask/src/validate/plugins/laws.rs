@@ -61,7 +61,7 @@ fn built(name: &str, sets: &[Set]) -> Outcome<Testbed> {
     let path = root().join("scenarios").join(format!("{name}.toml"));
     let scenario = Scenario::load(&path, sets).map_err(|e| e.to_string())?;
     let options = Options { threads: 1, ..Options::default() };
-    Testbed::build(&scenario, &options).map_err(|e| e.to_string())
+    Testbed::build_with(&scenario, &options, &terraglue::library()).map_err(|e| e.to_string())
 }
 
 fn stepped(testbed: &mut Testbed, steps: usize) -> Outcome {

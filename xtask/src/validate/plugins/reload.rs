@@ -79,7 +79,8 @@ impl Observer for Heard {
 fn started(context: &Context, folder: &Path, at_steps: Vec<(String, u64)>) -> Outcome<(Testbed, Reloader)> {
     let scenario = Scenario::load(&folder.join("scenario.toml"), &[]).map_err(|e| e.to_string())?;
     let options = Options { threads: 1, ..Options::default() };
-    let testbed = Testbed::build(&scenario, &options).map_err(|e| e.to_string())?;
+    let testbed =
+        Testbed::build_with(&scenario, &options, &terraglue::library()).map_err(|e| e.to_string())?;
     let wanted = ReloadOptions { program: context.program.clone(), reset: false, at_steps };
     let reloader = Reloader::new(&scenario, &options, wanted).map_err(|e| e.to_string())?;
     Ok((testbed, reloader))

@@ -4,6 +4,10 @@
 //! a + b·z of Rankine (1857), which is built up like friction: elastic over the way w₀, then it yields. A wall that is pushed
 //! obliquely meets the part n·e of it, with n the normal of the wall and e the way over w₀; a contact that was pressed straight
 //! down has no way to the side and meets none of it. The same way mobilises the passive pressure on inclined undersides.
+//!
+//! The sides of a wheel that spins slide through the soil with the speed of the rim, v − rω in the plane of the wheel, and not with that
+//! of the axle, v: they carry the soil beside them along, and the part n·e of the passive pressure falls. Where |v − rω| is the
+//! larger of both, the way has a further component √((v − rω)² − v²) = rω·√(2s − 1), s the slip, which no side faces.
 
 use crate::assemble::{displacement, dot};
 use crate::contact_memory::Remembered;
@@ -17,8 +21,8 @@ pub struct Push {
     /// Key of the port.
     pub key: u64,
     /// Elastic way over the way at which the soil yields: world x and y, and rotation about the vertical times the radius of
-    /// gyration of the sides; at most of length 1.
-    pub mobilised: [f64; 3],
+    /// gyration of the sides, and of a rim that spins; at most of length 1.
+    pub mobilised: [f64; 4],
     /// Elastic energy, J.
     pub energy: f64,
 }
@@ -47,6 +51,8 @@ pub struct Wall {
     pub gyration: f64,
     /// World z of the directions n, t1, t2.
     up: [f64; 3],
+    /// Way of a rim that spins per rotation about t1 and t2, m.
+    pub spin: [f64; 2],
     /// As of the last commit.
     pub before: Push,
 }
@@ -57,9 +63,9 @@ pub struct Answer {
     /// Force on the body, world x and y, N, and moment about the vertical over the radius of gyration.
     pub force: [f64; 3],
     /// d(force on the soil)/d(way), N/m.
-    pub stiffness: [[f64; 3]; 3],
+    pub stiffness: [[f64; 4]; 3],
     /// The new elastic way over that of yielding.
-    pub mobilised: [f64; 3],
+    pub mobilised: [f64; 4],
 }
 
 impl Wall {
@@ -70,14 +76,14 @@ impl Wall {
             [x, y]
         });
         let up = [0, 1, 2].map(|c| port.direction(c)[2]);
-        Self { sides: 0..0, way: 1.0, arm: [0.0; 3], axes, gyration: 0.0, up, before }
+        Self { sides: 0..0, way: 1.0, arm: [0.0; 3], axes, gyration: 0.0, up, spin: [0.0; 2], before }
     }
 
     /// Way of the sides for a motion `x` (n, t1, t2 and rotations) of the port: see [`Push::mobilised`].
-    pub fn way_of(&self, x: &[f64; 6]) -> [f64; 3] {
+    pub fn way_of(&self, x: &[f64; 6]) -> [f64; 4] {
         let [u, v] = self.in_world(displacement(self.arm, x));
         let turn = x[3..].iter().zip(&self.up).map(|(w, up)| w * up).sum::<f64>();
-        [u, v, self.gyration * turn]
+        [u, v, self.gyration * turn, self.spin[0] * x[4] + self.spin[1] * x[5]]
     }
 
     /// Horizontal world components of a vector along n, t1, t2.
@@ -86,15 +92,15 @@ impl Wall {
     }
 
     /// Derivative of the way by the motion of the port: a row of six for each of its components.
-    fn gradient(&self) -> [[f64; 6]; 3] {
+    fn gradient(&self) -> [[f64; 6]; 4] {
         let unit = |c: usize| std::array::from_fn(|k| f64::from(u8::from(k == c)));
-        let columns: [[f64; 3]; 6] = std::array::from_fn(|c| self.way_of(&unit(c)));
+        let columns: [[f64; 4]; 6] = std::array::from_fn(|c| self.way_of(&unit(c)));
         std::array::from_fn(|r| std::array::from_fn(|c| columns[c][r]))
     }
 
     /// The answer to a way `u` (see [`Wall::way_of`]) since the last commit.
-    pub fn answer(&self, sides: &[Side], u: [f64; 3]) -> Answer {
-        let trial = [0, 1, 2].map(|k| self.before.mobilised[k] + u[k] / self.way);
+    pub fn answer(&self, sides: &[Side], u: [f64; 4]) -> Answer {
+        let trial = [0, 1, 2, 3].map(|k| self.before.mobilised[k] + u[k] / self.way);
         let length = trial.iter().map(|t| t * t).sum::<f64>().sqrt();
         let yields = length > 1.0;
         let scale = if yields { 1.0 / length } else { 1.0 };
@@ -103,7 +109,7 @@ impl Wall {
         let mut by_e = [[0.0; 3]; 3];
         for side in &sides[self.sides.clone()] {
             let n = side.normal;
-            let pushed = dot(n, e);
+            let pushed = dot(n, [e[0], e[1], e[2]]);
             if pushed > 0.0 {
                 for r in 0..3 {
                     out.force[r] -= side.force * pushed * n[r];
@@ -113,7 +119,7 @@ impl Wall {
         }
         // d(e)/d(u): the identity, or what is left of it across e, over the way
         let own = scale / self.way;
-        let de: [[f64; 3]; 3] = std::array::from_fn(|r| {
+        let de: [[f64; 4]; 3] = std::array::from_fn(|r| {
             std::array::from_fn(|c| {
                 let one = f64::from(u8::from(r == c));
                 own * (one - if yields { e[r] * e[c] } else { 0.0 })
@@ -135,15 +141,15 @@ impl Wall {
         let (g, k) = (self.gradient(), &answer.stiffness);
         std::array::from_fn(|r| {
             std::array::from_fn(|c| {
-                (0..3).map(|a| (0..3).map(|b| g[a][r] * k[a][b] * g[b][c]).sum::<f64>()).sum()
+                (0..3).map(|a| (0..4).map(|b| g[a][r] * k[a][b] * g[b][c]).sum::<f64>()).sum()
             })
         })
     }
 
     /// Elastic energy at the elastic way `e` over that of yielding, J.
-    pub fn energy(&self, sides: &[Side], e: [f64; 3]) -> f64 {
+    pub fn energy(&self, sides: &[Side], [a, b, c, _]: [f64; 4]) -> f64 {
         let each = |side: &Side| {
-            let pushed = dot(side.normal, e).max(0.0);
+            let pushed = dot(side.normal, [a, b, c]).max(0.0);
             0.5 * side.force * self.way * pushed * pushed
         };
         sides[self.sides.clone()].iter().map(each).sum()
@@ -175,7 +181,7 @@ impl Wall {
     /// Passive pressure on an underside with the inward normal `nu` (along n, t1, t2), as a part of the whole.
     pub fn share(&self, nu: [f64; 3]) -> f64 {
         let [x, y] = self.in_world(nu);
-        let [a, b, _] = self.before.mobilised;
+        let [a, b, ..] = self.before.mobilised;
         (-x * a - y * b).max(0.0)
     }
 }

@@ -343,7 +343,9 @@ impl Sweeper {
 
     /// Whether a saved state lies in this ground.
     pub fn fits(&self, saved: &SavedAwake) -> bool {
-        self.moving.fits(&saved.moving) && self.repose.fits(&saved.repose) && self.curvature.fits(&saved.curvature)
+        self.moving.fits(&saved.moving)
+            && self.repose.fits(&saved.repose)
+            && self.curvature.fits(&saved.curvature)
     }
 
     /// Back to a saved state.

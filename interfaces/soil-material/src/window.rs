@@ -416,7 +416,9 @@ impl Window {
         }
         if let Some(stands) = self.standing.across(y * self.stride + lo, hi - lo) {
             let at = y * self.stride + lo;
-            hold(&mut out[lo..hi], stands, |k, face| [at + k, at + k + self.stride].map(|at| self.free(at, face)));
+            hold(&mut out[lo..hi], stands, |k, face| {
+                [at + k, at + k + self.stride].map(|at| self.free(at, face))
+            });
         }
     }
 

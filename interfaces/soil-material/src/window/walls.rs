@@ -1,9 +1,9 @@
 //! Walls that stand by cohesion in a window: the beds below what lies loose, and which of its slopes stand.
 
 use super::{LEFT, Limits, Window};
+use crate::active::Marks;
 use crate::kernel::Face;
 use crate::standing::Field;
-use crate::active::Marks;
 use terraglue_soil_contact::Ground;
 
 impl Window {

@@ -328,3 +328,79 @@ impl Remembered for Push {
 }
 
 terraglue_subsystem::persist!(Push { key, mobilised, energy });
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A wheel that travels along x, with a face ahead and one on its right; `slip` of the last commit.
+    fn wheel(slip: f64) -> (Wall, [Side; 2]) {
+        let way = 0.06 * (2.0 * slip - 1.0_f64).max(0.0).sqrt();
+        let wall = Wall {
+            sides: 0..2,
+            way: 1e-3,
+            arm: [0.06, 0.0, 0.0],
+            axes: [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]],
+            gyration: 0.02,
+            up: [1.0, 0.0, 0.0],
+            spin: [0.0, way],
+            before: Push::default(),
+        };
+        let side = |x: f64, y: f64| Side { normal: [x, y, 0.1], force: 5.0 };
+        (wall, [side(1.0, 0.0), side(0.0, -1.0)])
+    }
+
+    /// Motion of the lowest point: the axle goes ahead by 1 mm and to the right by 0.3 mm at the slip.
+    fn motion(slip: f64) -> [f64; 6] {
+        let rim = 1e-3 / (1.0 - slip);
+        [0.0, 1e-3 - rim, -3e-4, 0.0, 0.0, rim / 0.06]
+    }
+
+    #[test]
+    fn a_rim_that_spins_meets_less_beside_it() {
+        let beside = |slip: f64| {
+            let (mut wall, sides) = wheel(slip);
+            for _ in 0..50 {
+                wall.before.mobilised = wall.answer(&sides, wall.way_of(&motion(slip))).mobilised;
+            }
+            wall.answer(&sides, wall.way_of(&motion(slip))).force[1]
+        };
+        let rolls = beside(0.0);
+        assert!((beside(0.4) / rolls - 1.0).abs() < 1e-9);
+        // v − rω = 9v at slip 0.9: the direction of the way across is 0.3/√(9² + 0.3²) instead of 0.3/√(1 + 0.3²)
+        let expected = (1.09_f64 / 81.09).sqrt();
+        assert!((beside(0.9) / rolls - expected).abs() < 1e-3, "{} {expected}", beside(0.9) / rolls);
+    }
+
+    #[test]
+    fn the_stiffness_is_the_slope_of_the_wrench_and_friction_makes_heat() {
+        for slip in [-1.0, 0.3, 0.8, 0.95] {
+            let (mut wall, sides) = wheel(slip);
+            wall.before.mobilised = [0.3, -0.2, 0.1, 0.4];
+            let x = motion(slip);
+            let at = |x: &[f64; 6]| wall.answer(&sides, wall.way_of(x));
+            let stiffness = wall.stiffness(&at(&x));
+            for c in 0..6 {
+                let moved = |d: f64| {
+                    let mut x = x;
+                    x[c] += d;
+                    wall.wrench(&at(&x))
+                };
+                let [a, b] = [moved(-1e-8), moved(1e-8)];
+                for r in 0..6 {
+                    let slope = -(b[r] - a[r]) / 2e-8;
+                    let error = (slope - stiffness[r][c]).abs();
+                    assert!(
+                        error < 1e-3 * (1.0 + slope.abs()),
+                        "{slip} {r} {c}: {slope} {}",
+                        stiffness[r][c]
+                    );
+                }
+            }
+            let (answer, u) = (at(&x), wall.way_of(&x));
+            let plastic =
+                [0, 1, 2].map(|k| u[k] - wall.way * (answer.mobilised[k] - wall.before.mobilised[k]));
+            assert!(-dot(answer.force, plastic) >= 0.0, "{slip}");
+        }
+    }
+}

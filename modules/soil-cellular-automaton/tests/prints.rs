@@ -33,7 +33,7 @@ fn stands(config: &str, kind: u32, spacing: f64, depth: f64, yaw: f64) -> Feet {
     rig.add(&shape(kind), at(low));
     let steps = (depth / 2e-4).round() as u32;
     (1..=steps).for_each(|k| rig.step(|_| at(low - 2e-4 * f64::from(k))));
-    let rests = (0..4000).any(|_| {
+    let rests = (0..20_000).any(|_| {
         rig.step(|_| at(low - depth));
         rig.soil.material().active_nodes() == 0
     });
@@ -80,13 +80,13 @@ proptest! {
 }
 
 /// What a foot presses out has no cohesion as long as it moves: it slides away from the foot and does not stand around it as a wall
-/// as thin as a cell.
+/// as thin as a cell. 65 % of 80 cm³ around 26 cm are at most 16.7 mm high as a wedge of 35° that leans on the foot.
 #[test]
 fn the_heap_around_a_foot_is_no_wall() {
     for spacing in [0.01, 0.005] {
         let rig = stands(LUNAR, 1, spacing, 0.02, 0.0);
         let highest = heights(&rig).into_iter().max().unwrap();
         let highest = f64::from(highest) * terraglue_ground::UNIT_M;
-        assert!((0.002..0.012).contains(&highest), "{highest} m on a grid of {spacing} m");
+        assert!((0.002..0.0167).contains(&highest), "{highest} m on a grid of {spacing} m");
     }
 }

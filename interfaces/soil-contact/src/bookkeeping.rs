@@ -271,9 +271,8 @@ impl Scene<'_> {
         turnover: &mut Turnover,
     ) {
         let (wall, sides) = (&patch.wall, &self.patches.sides);
-        let all = wall.way_of(x);
-        let answer = wall.answer(sides, all);
-        let u = [all[0], all[1], all[2]];
+        let u = wall.way_of(x);
+        let answer = wall.answer(sides, u);
         let before = wall.before.mobilised;
         let [from, to] = [before, answer.mobilised].map(|e| wall.energy(sides, e));
         let of = |way: [f64; 3]| -dot(answer.force, way);

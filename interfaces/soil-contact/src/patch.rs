@@ -398,7 +398,6 @@ impl Patches {
             if let Some(wheel) = &wheel {
                 // a rim pushes with its axle, however it turns
                 wall.arm = [wheel.radius, 0.0, 0.0];
-                wall.spin = wheel.spin();
             }
         }
         if let Some(wheel) = &wheel {

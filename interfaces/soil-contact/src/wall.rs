@@ -4,10 +4,6 @@
 //! a + b·z of Rankine (1857), which is built up like friction: elastic over the way w₀, then it yields. A wall that is pushed
 //! obliquely meets the part n·e of it, with n the normal of the wall and e the way over w₀; a contact that was pressed straight
 //! down has no way to the side and meets none of it. The same way mobilises the passive pressure on inclined undersides.
-//!
-//! The sides of a wheel that spins slide through the soil with the speed of the rim, v − rω in the plane of the wheel, and not with that
-//! of the axle, v: they carry the soil beside them along, and the part n·e of the passive pressure falls. Where |v − rω| is the
-//! larger of both, the way has a further component √((v − rω)² − v²) = rω·√(2s − 1), s the slip, which no side faces.
 
 use crate::assemble::{displacement, dot};
 use crate::contact_memory::Remembered;
@@ -21,8 +17,8 @@ pub struct Push {
     /// Key of the port.
     pub key: u64,
     /// Elastic way over the way at which the soil yields: world x and y, and rotation about the vertical times the radius of
-    /// gyration of the sides, and of a rim that spins; at most of length 1.
-    pub mobilised: [f64; 4],
+    /// gyration of the sides; at most of length 1.
+    pub mobilised: [f64; 3],
     /// Elastic energy, J.
     pub energy: f64,
 }
@@ -51,8 +47,6 @@ pub struct Wall {
     pub gyration: f64,
     /// World z of the directions n, t1, t2.
     up: [f64; 3],
-    /// Way of a rim that spins per rotation about t1 and t2, m.
-    pub spin: [f64; 2],
     /// As of the last commit.
     pub before: Push,
 }
@@ -63,9 +57,9 @@ pub struct Answer {
     /// Force on the body, world x and y, N, and moment about the vertical over the radius of gyration.
     pub force: [f64; 3],
     /// d(force on the soil)/d(way), N/m.
-    pub stiffness: [[f64; 4]; 3],
+    pub stiffness: [[f64; 3]; 3],
     /// The new elastic way over that of yielding.
-    pub mobilised: [f64; 4],
+    pub mobilised: [f64; 3],
 }
 
 impl Wall {
@@ -76,14 +70,14 @@ impl Wall {
             [x, y]
         });
         let up = [0, 1, 2].map(|c| port.direction(c)[2]);
-        Self { sides: 0..0, way: 1.0, arm: [0.0; 3], axes, gyration: 0.0, up, spin: [0.0; 2], before }
+        Self { sides: 0..0, way: 1.0, arm: [0.0; 3], axes, gyration: 0.0, up, before }
     }
 
     /// Way of the sides for a motion `x` (n, t1, t2 and rotations) of the port: see [`Push::mobilised`].
-    pub fn way_of(&self, x: &[f64; 6]) -> [f64; 4] {
+    pub fn way_of(&self, x: &[f64; 6]) -> [f64; 3] {
         let [u, v] = self.in_world(displacement(self.arm, x));
         let turn = x[3..].iter().zip(&self.up).map(|(w, up)| w * up).sum::<f64>();
-        [u, v, self.gyration * turn, self.spin[0] * x[4] + self.spin[1] * x[5]]
+        [u, v, self.gyration * turn]
     }
 
     /// Horizontal world components of a vector along n, t1, t2.
@@ -92,15 +86,15 @@ impl Wall {
     }
 
     /// Derivative of the way by the motion of the port: a row of six for each of its components.
-    fn gradient(&self) -> [[f64; 6]; 4] {
+    fn gradient(&self) -> [[f64; 6]; 3] {
         let unit = |c: usize| std::array::from_fn(|k| f64::from(u8::from(k == c)));
-        let columns: [[f64; 4]; 6] = std::array::from_fn(|c| self.way_of(&unit(c)));
+        let columns: [[f64; 3]; 6] = std::array::from_fn(|c| self.way_of(&unit(c)));
         std::array::from_fn(|r| std::array::from_fn(|c| columns[c][r]))
     }
 
     /// The answer to a way `u` (see [`Wall::way_of`]) since the last commit.
-    pub fn answer(&self, sides: &[Side], u: [f64; 4]) -> Answer {
-        let trial = [0, 1, 2, 3].map(|k| self.before.mobilised[k] + u[k] / self.way);
+    pub fn answer(&self, sides: &[Side], u: [f64; 3]) -> Answer {
+        let trial = [0, 1, 2].map(|k| self.before.mobilised[k] + u[k] / self.way);
         let length = trial.iter().map(|t| t * t).sum::<f64>().sqrt();
         let yields = length > 1.0;
         let scale = if yields { 1.0 / length } else { 1.0 };
@@ -109,7 +103,7 @@ impl Wall {
         let mut by_e = [[0.0; 3]; 3];
         for side in &sides[self.sides.clone()] {
             let n = side.normal;
-            let pushed = dot(n, [e[0], e[1], e[2]]);
+            let pushed = dot(n, e);
             if pushed > 0.0 {
                 for r in 0..3 {
                     out.force[r] -= side.force * pushed * n[r];
@@ -119,7 +113,7 @@ impl Wall {
         }
         // d(e)/d(u): the identity, or what is left of it across e, over the way
         let own = scale / self.way;
-        let de: [[f64; 4]; 3] = std::array::from_fn(|r| {
+        let de: [[f64; 3]; 3] = std::array::from_fn(|r| {
             std::array::from_fn(|c| {
                 let one = f64::from(u8::from(r == c));
                 own * (one - if yields { e[r] * e[c] } else { 0.0 })
@@ -141,15 +135,15 @@ impl Wall {
         let (g, k) = (self.gradient(), &answer.stiffness);
         std::array::from_fn(|r| {
             std::array::from_fn(|c| {
-                (0..3).map(|a| (0..4).map(|b| g[a][r] * k[a][b] * g[b][c]).sum::<f64>()).sum()
+                (0..3).map(|a| (0..3).map(|b| g[a][r] * k[a][b] * g[b][c]).sum::<f64>()).sum()
             })
         })
     }
 
     /// Elastic energy at the elastic way `e` over that of yielding, J.
-    pub fn energy(&self, sides: &[Side], [a, b, c, _]: [f64; 4]) -> f64 {
+    pub fn energy(&self, sides: &[Side], e: [f64; 3]) -> f64 {
         let each = |side: &Side| {
-            let pushed = dot(side.normal, [a, b, c]).max(0.0);
+            let pushed = dot(side.normal, e).max(0.0);
             0.5 * side.force * self.way * pushed * pushed
         };
         sides[self.sides.clone()].iter().map(each).sum()
@@ -181,7 +175,7 @@ impl Wall {
     /// Passive pressure on an underside with the inward normal `nu` (along n, t1, t2), as a part of the whole.
     pub fn share(&self, nu: [f64; 3]) -> f64 {
         let [x, y] = self.in_world(nu);
-        let [a, b, ..] = self.before.mobilised;
+        let [a, b, _] = self.before.mobilised;
         (-x * a - y * b).max(0.0)
     }
 }
@@ -328,79 +322,3 @@ impl Remembered for Push {
 }
 
 terraglue_subsystem::persist!(Push { key, mobilised, energy });
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// A wheel that travels along x, with a face ahead and one on its right; `slip` of the last commit.
-    fn wheel(slip: f64) -> (Wall, [Side; 2]) {
-        let way = 0.06 * (2.0 * slip - 1.0_f64).max(0.0).sqrt();
-        let wall = Wall {
-            sides: 0..2,
-            way: 1e-3,
-            arm: [0.06, 0.0, 0.0],
-            axes: [[0.0, 0.0], [1.0, 0.0], [0.0, 1.0]],
-            gyration: 0.02,
-            up: [1.0, 0.0, 0.0],
-            spin: [0.0, way],
-            before: Push::default(),
-        };
-        let side = |x: f64, y: f64| Side { normal: [x, y, 0.1], force: 5.0 };
-        (wall, [side(1.0, 0.0), side(0.0, -1.0)])
-    }
-
-    /// Motion of the lowest point: the axle goes ahead by 1 mm and to the right by 0.3 mm at the slip.
-    fn motion(slip: f64) -> [f64; 6] {
-        let rim = 1e-3 / (1.0 - slip);
-        [0.0, 1e-3 - rim, -3e-4, 0.0, 0.0, rim / 0.06]
-    }
-
-    #[test]
-    fn a_rim_that_spins_meets_less_beside_it() {
-        let beside = |slip: f64| {
-            let (mut wall, sides) = wheel(slip);
-            for _ in 0..50 {
-                wall.before.mobilised = wall.answer(&sides, wall.way_of(&motion(slip))).mobilised;
-            }
-            wall.answer(&sides, wall.way_of(&motion(slip))).force[1]
-        };
-        let rolls = beside(0.0);
-        assert!((beside(0.4) / rolls - 1.0).abs() < 1e-9);
-        // v − rω = 9v at slip 0.9: the direction of the way across is 0.3/√(9² + 0.3²) instead of 0.3/√(1 + 0.3²)
-        let expected = (1.09_f64 / 81.09).sqrt();
-        assert!((beside(0.9) / rolls - expected).abs() < 1e-3, "{} {expected}", beside(0.9) / rolls);
-    }
-
-    #[test]
-    fn the_stiffness_is_the_slope_of_the_wrench_and_friction_makes_heat() {
-        for slip in [-1.0, 0.3, 0.8, 0.95] {
-            let (mut wall, sides) = wheel(slip);
-            wall.before.mobilised = [0.3, -0.2, 0.1, 0.4];
-            let x = motion(slip);
-            let at = |x: &[f64; 6]| wall.answer(&sides, wall.way_of(x));
-            let stiffness = wall.stiffness(&at(&x));
-            for c in 0..6 {
-                let moved = |d: f64| {
-                    let mut x = x;
-                    x[c] += d;
-                    wall.wrench(&at(&x))
-                };
-                let [a, b] = [moved(-1e-8), moved(1e-8)];
-                for r in 0..6 {
-                    let slope = -(b[r] - a[r]) / 2e-8;
-                    let error = (slope - stiffness[r][c]).abs();
-                    assert!(
-                        error < 1e-3 * (1.0 + slope.abs()),
-                        "{slip} {r} {c}: {slope} {}",
-                        stiffness[r][c]
-                    );
-                }
-            }
-            let (answer, u) = (at(&x), wall.way_of(&x));
-            let plastic =
-                [0, 1, 2].map(|k| u[k] - wall.way * (answer.mobilised[k] - wall.before.mobilised[k]));
-            assert!(-dot(answer.force, plastic) >= 0.0, "{slip}");
-        }
-    }
-}

@@ -101,13 +101,6 @@ impl Wheel {
         [rim, along([x[1], x[2]]) + rim]
     }
 
-    /// Way of the rim beyond that of the axle per rotation about t1 and t2, m: r·√(2s − 1), 0 up to the slip s = ½ and
-    /// where the wheel is braked.
-    pub fn spin(&self) -> [f64; 2] {
-        let way = self.radius * (2.0 * self.memory.slip - 1.0).max(0.0).sqrt();
-        [-way * self.heading[1], way * self.heading[0]]
-    }
-
     /// Direction along t1 and t2 in which the wheel is driven: that of the larger way of rim and axle.
     pub fn driven(&self, x: &[f64; 6]) -> [f64; 2] {
         let [rim, axle] = self.ways(x);

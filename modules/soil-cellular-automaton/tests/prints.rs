@@ -79,6 +79,17 @@ proptest! {
     }
 }
 
+/// The walls of a print in lunar soil stand; they were 55° steep where half of the heap slid back.
+#[test]
+fn walls_of_lunar_prints_are_steep() {
+    for spacing in [0.01, 0.005] {
+        let mut rig = stands(LUNAR, 3, spacing, 0.03, 0.0);
+        rig.lift_and_rest(20_000);
+        let steep = steepest(&rig.soil).atan().to_degrees();
+        assert!(steep > 60.0, "{steep}° on a grid of {spacing} m");
+    }
+}
+
 /// What a foot presses out has no cohesion as long as it moves: it slides away from the foot and does not stand around it as a wall
 /// as thin as a cell. 65 % of 80 cm³ around 26 cm are at most 16.7 mm high as a wedge of 35° that leans on the foot.
 #[test]

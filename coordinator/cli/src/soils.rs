@@ -9,7 +9,7 @@ use terraglue_soil_law::{COLUMNS, SoilRow, SoilTable};
 
 /// Units of the columns.
 const UNITS: [&str; COLUMNS.len()] =
-    ["", "N/m^(n+1)", "N/m^(n+2)", "Pa", "rad", "m", "kg/m³", "Pa/m", "m/s²"];
+    ["", "N/m^(n+1)", "N/m^(n+2)", "Pa", "rad", "m", "kg/m³", "Pa/m", "m/s²", "Pa"];
 
 /// All soils, or everything about one.
 pub fn soils(name: Option<&str>, file: Option<&Path>) -> Result<Exit> {

@@ -38,6 +38,13 @@ impl Marks {
         &self.bits[tile as usize]
     }
 
+    /// Whether a node of the lattice is in it.
+    #[inline]
+    pub fn has(&self, [i, j]: [i32; 2]) -> bool {
+        let (tile, k) = self.lattice.locate(i as u32, j as u32);
+        self.bits[tile].rows[k / TILE_EDGE as usize] >> (k % TILE_EDGE as usize) & 1 == 1
+    }
+
     /// Number of nodes.
     pub fn len(&self) -> usize {
         self.tiles.iter().flat_map(|t| &self.bits[*t as usize].rows).map(|r| r.count_ones() as usize).sum()
@@ -151,11 +158,6 @@ mod tests {
 
     const LATTICE: Lattice = Lattice { origin: [0.0; 2], spacing: 1.0, size: [70, 70] };
 
-    fn has(set: &Marks, x: i32, y: i32) -> bool {
-        let (tile, k) = LATTICE.locate(x as u32, y as u32);
-        set.tile(tile as u32).rows[k / 32] >> (k % 32) & 1 == 1
-    }
-
     proptest! {
         #[test]
         fn what_is_marked_around_is_near_and_nothing_else(
@@ -169,7 +171,7 @@ mod tests {
                 for x in 0..70 {
                     let near = nodes.iter().any(|(i, j)| (x - i).abs().max((y - j).abs()) <= reach);
                     count += usize::from(near);
-                    prop_assert_eq!(has(&set, x, y), near);
+                    prop_assert_eq!(set.has([x, y]), near);
                 }
             }
             prop_assert_eq!(set.len(), count);
@@ -181,7 +183,7 @@ mod tests {
             let i1 = (i0 + n).min(70);
             set.mark_row(i0, i1, j);
             prop_assert_eq!(set.len() as i32, i1 - i0);
-            prop_assert!(has(&set, i0, j) && has(&set, i1 - 1, j));
+            prop_assert!(set.has([i0, j]) && set.has([i1 - 1, j]));
         }
     }
 }

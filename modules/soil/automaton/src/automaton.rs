@@ -69,8 +69,9 @@ pub struct Automaton {
     friction_angle: f64,
     /// Angles of internal friction of the soils of the mask, rad.
     others: Vec<f64>,
-    /// Smallest height of a steep slope that stands in any of the soils, m.
+    /// Smallest height of a steep slope that stands in any of the soils, m, and smallest share of it up to which loose soil at rest does.
     critical_height: f64,
+    loose_share: f64,
     gravity: f64,
     /// ½·ρ·g·Δ²·unit²: energy of a unit of the sum of the squares of the heights, J.
     weight: f64,
@@ -94,6 +95,7 @@ impl Automaton {
             friction_angle: 0.5,
             others: Vec::new(),
             critical_height: 0.0,
+            loose_share: 0.0,
             gravity: 0.0,
             weight: 0.0,
             spacing: 1.0,
@@ -136,15 +138,16 @@ impl Automaton {
         // one that the scenario gives holds everywhere
         let others = if self.settings.angle_of_repose.is_some() { &[][..] } else { &self.others };
         let critical = self.settings.critical_height.unwrap_or(self.critical_height);
+        let critical = [critical, critical * self.loose_share];
         let Settings { curvature_max, .. } = self.settings;
         self.sweeper.set_limits(self.repose(), others, curvature_max, critical, self.spacing);
         self.compaction.set_fraction(self.settings.compacted_fraction);
     }
 
     fn take(&mut self, ground: &Ground, parameters: &SoilParameters) {
-        let critical = |soil: &SoilParameters| soil.strength().critical_height();
-        let others = ground.mask.soils.iter().map(critical);
-        self.critical_height = others.fold(critical(parameters), f64::min);
+        let soils = || std::iter::once(parameters).chain(&ground.mask.soils).map(SoilParameters::wall);
+        self.critical_height = soils().map(|wall| wall.critical_height()).fold(f64::INFINITY, f64::min);
+        self.loose_share = soils().map(|wall| wall.loose_wall_share()).fold(1.0, f64::min);
         let cell = self.spacing * UNIT_M;
         self.weight = 0.5 * parameters.weight() * cell * cell;
     }
@@ -165,6 +168,7 @@ impl Automaton {
                 feet: &sweeper.feet,
                 compaction: &mut self.compaction,
                 changed: &mut sweeper.changed,
+                moving: &mut sweeper.moving,
                 most: most - lifted,
                 lifted: 0,
             };
@@ -238,6 +242,7 @@ pub struct Saved {
     settings: Option<Settings>,
     friction_angle: f64,
     critical_height: f64,
+    loose_share: f64,
     awake: SavedAwake,
     feet: Vec<Foot>,
     compaction: SavedCompaction,
@@ -289,10 +294,10 @@ impl Material for Automaton {
     }
 
     fn parameters_changed(&mut self, ground: &Ground, parameters: &SoilParameters) {
-        let before = (self.friction_angle, self.critical_height);
+        let before = (self.friction_angle, self.critical_height, self.loose_share);
         self.friction_angle = parameters.phi_rad;
         self.take(ground, parameters);
-        self.rescan |= before != (self.friction_angle, self.critical_height);
+        self.rescan |= before != (self.friction_angle, self.critical_height, self.loose_share);
     }
 
     fn settle(&mut self, ground: &mut Ground, covered: &[Covered], most: f64, h: f64) -> f64 {
@@ -313,6 +318,7 @@ impl Material for Automaton {
     fn save(&self, out: &mut Saved) {
         out.settings = Some(self.settings);
         (out.friction_angle, out.critical_height) = (self.friction_angle, self.critical_height);
+        out.loose_share = self.loose_share;
         self.sweeper.save(&mut out.awake);
         self.sweeper.feet.save(&mut out.feet);
         self.compaction.save(&mut out.compaction);
@@ -327,6 +333,7 @@ impl Material for Automaton {
     fn restore(&mut self, saved: &Saved) {
         self.settings = saved.settings.unwrap_or(self.settings);
         (self.friction_angle, self.critical_height) = (saved.friction_angle, saved.critical_height);
+        self.loose_share = saved.loose_share;
         self.sweeper.restore(&saved.awake);
         self.sweeper.feet.restore(&saved.feet);
         self.compaction.restore(&saved.compaction);
@@ -347,6 +354,7 @@ terraglue_subsystem::persist!(Saved {
     settings,
     friction_angle,
     critical_height,
+    loose_share,
     awake,
     feet,
     compaction,

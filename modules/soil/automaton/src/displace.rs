@@ -31,6 +31,8 @@ pub struct Site<'a> {
     pub compaction: &'a mut Compaction,
     /// Nodes that have changed.
     pub changed: &'a mut Marks,
+    /// Nodes whose loose soil moves.
+    pub moving: &'a mut Marks,
     /// By how much the sum of the squares of the heights may grow.
     pub most: f64,
     /// By how much it has grown.
@@ -138,6 +140,7 @@ impl Site<'_> {
             self.ground.add_material(i, j, units);
             self.lifted += squares_grown(self.ground.heights.units(i, j), units);
             self.changed.mark([i, j]);
+            self.moving.mark([i, j]);
         }
         units.max(0)
     }

@@ -178,24 +178,26 @@ pub enum Face {
     #[default]
     Falls,
     /// What lies loose; cohesion holds the rest.
+    Sheds,
+    /// What is moving: loose soil at rest has cohesion, too.
     Stands,
     /// Nothing: a node beside it is not visited.
     Waits,
 }
 
-/// Cuts the fluxes to what may flow over the faces, from nodes with the loose heights `from` to nodes with `to` (units). A node
-/// has four faces, and each takes a quarter of what lies loose at most.
+/// Cuts the fluxes to what may flow over the faces; `free` tells how much of both nodes beside a face is not held by cohesion
+/// there, units. A node has four faces, and each takes a quarter of it at most.
 #[inline(always)]
-pub fn hold(flux: &mut [i32], faces: &[Face], loose: impl Fn(usize) -> [i32; 2]) {
+pub fn hold(flux: &mut [i32], faces: &[Face], free: impl Fn(usize, Face) -> [i32; 2]) {
     for (k, (q, face)) in flux.iter_mut().zip(faces).enumerate() {
         match face {
             Face::Falls => {}
             Face::Waits => *q = 0,
-            Face::Stands if *q != 0 => {
-                let [from, to] = loose(k);
+            Face::Sheds | Face::Stands if *q != 0 => {
+                let [from, to] = free(k, *face);
                 *q = (*q).max(-(to >> 2)).min(from >> 2);
             }
-            Face::Stands => {}
+            Face::Sheds | Face::Stands => {}
         }
     }
 }

@@ -77,7 +77,7 @@ pub fn schema(compacted: f64) -> Vec<Parameter> {
             ..Parameter::of(
                 "critical_height_m",
                 ParameterType::Number,
-                "height up to which steep slopes stand; where it is left out that of the cohesion, 4 c/gamma tan(45 deg + phi/2)",
+                "height up to which steep slopes stand; where it is left out that of wall_cohesion_pa, 4 c/gamma tan(45 deg + phi/2)",
             )
             .within(0.0, 1e3)
             .optional()

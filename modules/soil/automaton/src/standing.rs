@@ -3,6 +3,9 @@
 //! A vertical face of soil with cohesion c stands up to H_c = (4c/γ)·tan(45° + φ/2) (Rankine 1857; Terzaghi 1943). On a lattice
 //! a face may lie between two nodes or be spread over several, so the height that counts is that of the run: of all faces one
 //! behind the other along a row or a column that are steeper than the angle of repose and fall to the same side.
+//!
+//! What lies loose has c' = ⅔·c and tan φ' = ⅔·tan φ (Terzaghi 1943, art. 46) once it has come to rest, and stands on runs up to the
+//! height H_c' of these; on higher ones, and while it moves, it slides down to the angle of repose.
 
 use crate::kernel::Face;
 use crate::span::Span;
@@ -17,6 +20,8 @@ pub struct Field<'a> {
     pub levels: &'a [i32],
     /// Of the bed below what lies loose, row after row.
     pub beds: &'a [i32],
+    /// Of what is at rest below what moves, row after row.
+    pub resting: &'a [i32],
     /// Numbers from a row to the next.
     pub stride: usize,
     /// Columns on the lattice.
@@ -58,8 +63,9 @@ struct Run {
 }
 
 impl Field<'_> {
-    /// Whether loose soil on the higher of two nodes would slide by a unit or two at least; `aside` leads to the nodes beside them.
-    fn sheds(&self, a: usize, b: usize, aside: usize) -> bool {
+    /// Whether soil above the levels `held` on the higher of two nodes would slide by a unit or two at least; `aside` leads to the
+    /// nodes beside them.
+    fn sheds(&self, a: usize, b: usize, aside: usize, held: &[i32]) -> bool {
         let h = self.levels;
         if [a, b].iter().any(|k| self.inlets.get(*k) == Some(&0)) {
             return false;
@@ -69,7 +75,7 @@ impl Field<'_> {
         let slope = |k: usize| f64::from(h[k + aside]) - f64::from(h[k - aside]);
         let steep = along.hypot(0.25 * (slope(a) + slope(b)));
         let flux = 0.25 * (steep - f64::from(self.least)) * along / steep.max(1.0);
-        h[high] - self.beds[high] >= 8 && flux >= 2.0
+        h[high] - held[high] >= 8 && flux >= 2.0
     }
 }
 
@@ -126,10 +132,10 @@ impl Standing {
         refill(above, columns().map(|i| follow([i, last[1]], [0, 1])));
     }
 
-    /// Marks the faces that stand; `thr`: Δ·tan φ_r at a place, units; `critical`: H_c, units. A run is longer than what its
+    /// Marks the faces that stand; `thr`: Δ·tan φ_r at a place, units; `critical`: H_c and H_c', units. A run is longer than what its
     /// nodes see of each other: over a face with a node that is not visited (`awake`: columns by row) nothing flows yet, and
     /// the node is woken.
-    pub fn find(&mut self, field: &Field, awake: &[Span], thr: impl Fn(usize) -> f32, critical: i32) {
+    pub fn find(&mut self, field: &Field, awake: &[Span], thr: impl Fn(usize) -> f32, critical: [i32; 2]) {
         self.along.clear();
         self.along.resize(field.levels.len(), Face::Falls);
         self.across.clear();
@@ -167,8 +173,12 @@ impl Standing {
                     }
                     let before = std::mem::replace(stands, Face::Waits);
                     let inside = beside[0] < columns.hi && beside[1] < rows.hi;
-                    let flows =
-                        before == Face::Falls || field.sheds(at, beside[1] * stride + beside[0], aside);
+                    let there_at = beside[1] * stride + beside[0];
+                    let flows = match before {
+                        Face::Falls => true,
+                        Face::Sheds => field.sheds(at, there_at, aside, field.beds),
+                        Face::Stands | Face::Waits => field.sheds(at, there_at, aside, field.resting),
+                    };
                     if inside && flows && (here || there) {
                         let [x, y] = if here { beside } else { [x, y] };
                         self.wake[y] = self.wake[y].hull(Span { lo: x, hi: x + 1 });
@@ -186,7 +196,7 @@ fn mark(
     aside: usize,
     thr: &impl Fn(usize) -> f32,
     ends: [i32; 2],
-    critical: i32,
+    critical: [i32; 2],
     stands: &mut [Face],
 ) {
     let h = field.levels;
@@ -223,8 +233,13 @@ fn mark(
             let end = i64::from(end);
             height += if touches && (end > 0) == (first > 0) { end } else { 0 };
         }
-        let holds = height.abs() <= i64::from(critical);
-        (begin..k).for_each(|k| stands[face(k)] = if holds { Face::Stands } else { Face::Falls });
+        let [firm, loose] = critical.map(|critical| height.abs() <= i64::from(critical));
+        let state = match (firm, loose) {
+            (true, true) => Face::Stands,
+            (true, false) => Face::Sheds,
+            _ => Face::Falls,
+        };
+        (begin..k).for_each(|k| stands[face(k)] = state);
     }
 }
 
@@ -238,10 +253,11 @@ mod tests {
         let level = |x: i32| high * (x - 15).clamp(0, cells) / cells;
         let levels: Vec<i32> = (0..size).flat_map(|_| (0..stride).map(level)).collect();
         let span = Span { lo: 2, hi: 38 };
-        let (beds, least) = (&levels, 50.0);
+        let (beds, resting, least) = (&levels, &levels, 50.0);
         let field = Field {
             levels: &levels,
             beds,
+            resting,
             stride: 40,
             columns: span,
             rows: span,
@@ -250,7 +266,7 @@ mod tests {
             inlets: &[],
         };
         let mut standing = Standing::default();
-        standing.find(&field, &[span; 40], |_| 50.0, critical);
+        standing.find(&field, &[span; 40], |_| 50.0, [critical, critical / 2]);
         let row = standing.along(20 * 40 + 14, cells as usize + 2).map(<[Face]>::to_vec);
         (row.unwrap_or_default(), standing.across.clone())
     }
@@ -259,9 +275,13 @@ mod tests {
     fn a_wall_stands_up_to_the_critical_height_however_it_lies_on_the_lattice() {
         for cells in [1, 2, 3, 5] {
             // the level faces beside the wall stand
-            let falling = |high: i32| wall(high, cells, 1000).0.iter().filter(|s| **s == Face::Falls).count();
-            assert_eq!(falling(990), 0, "{cells}");
-            assert_eq!(falling(2000), cells as usize, "{cells}");
+            let count =
+                |high: i32, state: Face| wall(high, cells, 1000).0.iter().filter(|s| **s == state).count();
+            assert_eq!(count(990, Face::Falls), 0, "{cells}");
+            assert_eq!(count(2000, Face::Falls), cells as usize, "{cells}");
+            // loose soil stands as long as it has not to stand as high as the bed
+            assert_eq!(count(990, Face::Sheds), cells as usize, "{cells}");
+            assert_eq!(count(490, Face::Sheds), 0, "{cells}");
         }
     }
 }

@@ -51,6 +51,8 @@ pub struct Sweeper {
     pub feet: Feet,
     /// Nodes that have changed outside sweeps; they wake what is around them.
     pub changed: Marks,
+    /// Nodes whose loose soil moves: material came to them since the last sweep, or they changed in the last round of sweeps.
+    pub moving: Marks,
     /// Awake nodes for the rule of repose.
     pub repose: Marks,
     /// Awake nodes for the rule of curvature.
@@ -68,6 +70,7 @@ pub struct Sweeper {
 /// Exact copy of who is awake.
 #[derive(Clone, Debug, Default)]
 pub struct SavedAwake {
+    moving: Vec<(u32, TileBits)>,
     repose: Vec<(u32, TileBits)>,
     curvature: Vec<(u32, TileBits)>,
     counts: Counts,
@@ -139,6 +142,7 @@ impl Sweeper {
         Self {
             feet: Feet::new(lattice, nodes),
             changed: Marks::new(lattice),
+            moving: Marks::new(lattice),
             repose: Marks::new(lattice),
             curvature: Marks::new(lattice),
             counts: Counts::default(),
@@ -152,18 +156,19 @@ impl Sweeper {
 
     /// Sets the angle of repose (rad) and the largest curvature (1/m) on nodes `spacing` (m) apart; `others` has the
     /// angles of the soils of the mask from number 1 on.
-    /// `critical`: height (m) of steep slopes that stand by cohesion; ridges and notches as high stand, too.
+    /// `critical`: height (m) of steep slopes that stand by cohesion, and of those on which loose soil at rest does; ridges and
+    /// notches as high as the first stand, too.
     pub fn set_limits(
         &mut self,
         repose: f64,
         others: &[f64],
         curvature_max: f64,
-        critical: f64,
+        critical: [f64; 2],
         spacing: f64,
     ) {
         // what no ground reaches, and infinity, becomes the largest number
-        let critical = (critical / UNIT_M) as i32;
-        let straight = (curvature_max * spacing * spacing / UNIT_M).max(f64::from(critical));
+        let critical = critical.map(|height| (height / UNIT_M) as i32);
+        let straight = (curvature_max * spacing * spacing / UNIT_M).max(f64::from(critical[0]));
         let curvature = (straight < SHARPEST).then(|| [straight as i32, 2 * straight as i32]);
         let threshold = |angle: f64| (spacing * libm::tan(angle) / UNIT_M) as f32;
         self.by_soil.clear();
@@ -215,7 +220,7 @@ impl Sweeper {
                 let end = [(a + BLOCK_TILES).min(nx), (b + BLOCK_TILES).min(ny)];
                 let Some(area) = still.restless([a, b], end, &self.limits) else { continue };
                 window.fill(ground, &self.by_soil, &self.feet.list, area, 2);
-                window.look_for_standing(ground, &self.limits, self.counts.range);
+                window.look_for_standing(ground, &self.limits, &self.moving, self.counts.range);
                 window.wake_all();
                 pulp::Arch::new().dispatch(Look { window: &mut window, limits: &self.limits });
                 let (repose, curvature) = (&mut self.repose, &mut self.curvature);
@@ -238,6 +243,10 @@ impl Sweeper {
             self.counts.sweeps += sweeps;
             self.counts.parity = self.counts.parity.wrapping_add(sweeps);
         }
+        if self.sleeps() {
+            // all is at rest
+            self.moving.clear();
+        }
         largest
     }
 
@@ -259,8 +268,9 @@ impl Sweeper {
         }
         for window in &mut self.windows[..self.areas.len()] {
             let window = window.get_mut().unwrap_or_else(PoisonError::into_inner);
-            window.look_for_standing(ground, &self.limits, self.counts.range);
+            window.look_for_standing(ground, &self.limits, &self.moving, self.counts.range);
         }
+        self.moving.clear();
         self.repose.clear();
         self.curvature.clear();
         let limits = self.limits;
@@ -308,10 +318,10 @@ impl Sweeper {
     /// Takes the result of window k back.
     fn empty(&mut self, ground: &mut Ground, k: usize) -> i32 {
         let window = self.windows[k].get_mut().unwrap_or_else(PoisonError::into_inner);
-        let counts = &mut self.counts;
+        let (counts, moving) = (&mut self.counts, &mut self.moving);
         counts.visited += window.visited;
         window.empty(&mut self.feet.list, |[i, j], heights| {
-            let [gained, moved, lifted] = ground.put_row(i, j, heights);
+            let [gained, moved, lifted] = ground.put_row(i, j, heights, |i| moving.mark([i, j]));
             counts.gained += gained;
             counts.moved += moved;
             counts.lifted += lifted as f64;
@@ -325,6 +335,7 @@ impl Sweeper {
 
     /// Copies who is awake.
     pub fn save(&self, out: &mut SavedAwake) {
+        self.moving.save(&mut out.moving);
         self.repose.save(&mut out.repose);
         self.curvature.save(&mut out.curvature);
         out.counts = self.counts;
@@ -332,12 +343,15 @@ impl Sweeper {
 
     /// Whether a saved state lies in this ground.
     pub fn fits(&self, saved: &SavedAwake) -> bool {
-        self.repose.fits(&saved.repose) && self.curvature.fits(&saved.curvature)
+        self.moving.fits(&saved.moving)
+            && self.repose.fits(&saved.repose)
+            && self.curvature.fits(&saved.curvature)
     }
 
     /// Back to a saved state.
     pub fn restore(&mut self, saved: &SavedAwake) {
         self.changed.clear();
+        self.moving.restore(&saved.moving);
         self.repose.restore(&saved.repose);
         self.curvature.restore(&saved.curvature);
         self.counts = saved.counts;
@@ -352,4 +366,4 @@ fn inside(bits: u32, first: i32, area: &Rectangle) -> u32 {
 }
 
 terraglue_subsystem::persist!(Counts { visited, sweeps, moved, gained, parity, lifted, tallest, range });
-terraglue_subsystem::persist!(SavedAwake { repose, curvature, counts });
+terraglue_subsystem::persist!(SavedAwake { moving, repose, curvature, counts });

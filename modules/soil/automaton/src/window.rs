@@ -29,8 +29,8 @@ pub struct Limits {
     pub least_repose: f32,
     /// κ_max·d² for straight and diagonal triples; `None`: nothing is too sharp.
     pub curvature: Option<[i32; 2]>,
-    /// Height of a steep slope that stands by cohesion, units.
-    pub critical: i32,
+    /// Height of a steep slope that stands by cohesion, and of one on which loose soil at rest does, units.
+    pub critical: [i32; 2],
 }
 
 /// Nodes first … last of the lattice along x and y.
@@ -101,6 +101,8 @@ pub struct Window {
     all_stands: bool,
     /// Level of the bed below what lies loose, row after row, where slopes can stand.
     beds: Vec<i32>,
+    /// Level of what is at rest below what moves, in the same way.
+    resting: Vec<i32>,
     /// Which slopes stand, where not all do.
     standing: Standing,
 }
@@ -113,6 +115,7 @@ impl Window {
         Self {
             levels: Vec::with_capacity(side * stride),
             beds: Vec::with_capacity(side * stride),
+            resting: Vec::with_capacity(side * stride),
             inlets: Vec::with_capacity(side * stride),
             limited: Vec::with_capacity(side),
             below: Vec::with_capacity(side * side),
@@ -341,7 +344,7 @@ impl Window {
             self.repose.fill(Span::NONE);
             return 0;
         }
-        if limits.critical > 0 {
+        if limits.critical[0] > 0 {
             self.find_standing(limits);
         }
         let mut work = std::mem::take(&mut self.work);
@@ -413,7 +416,9 @@ impl Window {
         }
         if let Some(stands) = self.standing.across(y * self.stride + lo, hi - lo) {
             let at = y * self.stride + lo;
-            hold(&mut out[lo..hi], stands, |k| [self.loose(at + k), self.loose(at + k + self.stride)]);
+            hold(&mut out[lo..hi], stands, |k, face| {
+                [at + k, at + k + self.stride].map(|at| self.free(at, face))
+            });
         }
     }
 
@@ -433,7 +438,7 @@ impl Window {
         }
         if let Some(stands) = self.standing.along(y * self.stride + lo, hi - lo) {
             let at = y * self.stride + lo;
-            hold(&mut out[lo..hi], stands, |k| [self.loose(at + k), self.loose(at + k + 1)]);
+            hold(&mut out[lo..hi], stands, |k, face| [at + k, at + k + 1].map(|at| self.free(at, face)));
         }
     }
 

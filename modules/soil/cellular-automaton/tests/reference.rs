@@ -123,7 +123,7 @@ fn begin_with_border(heaps: &Heaps, order: Order, border: Option<f64>, critical:
     }
     let mut sweeper = Sweeper::new(*ground.heights.lattice(), Arc::new(Machine(order)), 64);
     let others: &[f64] = if border.is_some() { &[OTHER_PHI] } else { &[] };
-    sweeper.set_limits(PHI, others, CURVATURE, critical, SPACING);
+    sweeper.set_limits(PHI, others, CURVATURE, [critical, 0.5 * critical], SPACING);
     sweeper.scan(&ground);
     (ground, sweeper)
 }

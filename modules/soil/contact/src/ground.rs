@@ -143,8 +143,9 @@ impl Ground {
 
     /// Puts the nodes from (i, j) on along x at `heights` (units), as [`Ground::add_material`] books it. All are nodes
     /// of the lattice. Returns what they gained together, the sum of what single ones gained, and by how much the sum of the
-    /// squares of the heights has grown: twice the gravitational energy.
-    pub fn put_row(&mut self, i: i32, j: i32, heights: &[i32]) -> [i64; 3] {
+    /// squares of the heights has grown: twice the gravitational energy. `told` hears the index along x of every node that
+    /// has changed.
+    pub fn put_row(&mut self, i: i32, j: i32, heights: &[i32], mut told: impl FnMut(i32)) -> [i64; 3] {
         let (mut gained, mut moved, mut lifted) = (0, 0, 0);
         let (mut i, mut rest) = (i, heights);
         let mut changes = [0; TILE_EDGE as usize];
@@ -154,7 +155,10 @@ impl Ground {
             let (part, left) = rest.split_at(n);
             if self.heights.write_row(tile, first, part, &mut changes) {
                 self.nodes.add_loose_row(tile, first, &changes[..n]);
-                for (height, change) in part.iter().zip(&changes[..n]) {
+                for (k, (height, change)) in (i..).zip(part.iter().zip(&changes[..n])) {
+                    if *change != 0 {
+                        told(k);
+                    }
                     gained += i64::from(*change);
                     moved += i64::from((*change).max(0));
                     lifted += squares_grown(*height, *change);

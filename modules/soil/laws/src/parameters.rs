@@ -25,6 +25,9 @@ pub struct SoilParameters {
     pub k_phi: f64,
     /// Cohesion, Pa.
     pub c_pa: f64,
+    /// Cohesion that holds steep slopes, Pa; `None`: `c_pa`. Dry sand has none (Terzaghi 1943, art. 5): its `c_pa` is where
+    /// the line meets the axis that was fitted to tests under pressure.
+    pub wall_cohesion_pa: Option<f64>,
     /// Angle of internal friction, rad.
     pub phi_rad: f64,
     /// Shear deformation modulus, m.
@@ -133,6 +136,7 @@ impl Default for SoilParameters {
             k_c: 1400.0,
             k_phi: 820_000.0,
             c_pa: 170.0,
+            wall_cohesion_pa: None,
             phi_rad: 35f64.to_radians(),
             K_m: 0.018,
             density_kg_m3: None,
@@ -172,6 +176,13 @@ impl SoilParameters {
             number("N_gamma", "", "bearing: N_gamma").within(0.0, 1e9).optional(),
             Parameter::number("reference_depth_m", "m", 0.1, "bearing: reference depth z_r").positive(),
             number("c_pa", "Pa", "cohesion").within(0.0, 1e7),
+            number(
+                "wall_cohesion_pa",
+                "Pa",
+                "cohesion that holds steep slopes; c_pa where absent, 0 in dry sand, whose c_pa is the intercept of a fit",
+            )
+            .within(0.0, 1e7)
+            .optional(),
             number("phi_rad", "rad", "angle of internal friction").within(0.01, 1.2),
             number("K_m", "m", "shear deformation modulus of Janosi and Hanamoto").positive(),
             number("density_kg_m3", "kg/m^3", "bulk density").positive().optional(),
@@ -252,6 +263,7 @@ impl SoilParameters {
         // what a region does not know is not known of its soil
         all.remove("density_kg_m3");
         all.remove("measured_gravity_m_s2");
+        all.remove("wall_cohesion_pa");
         all.extend(numbers.iter().map(|(key, value)| (key.clone(), value.clone())));
         Config::parse(&serde_json::Value::Object(all).to_string())
     }
@@ -266,6 +278,7 @@ impl SoilParameters {
             k_c: number("k_c")?.unwrap_or(0.0),
             k_phi: number("k_phi")?.unwrap_or(0.0),
             c_pa: config.number("c_pa")?,
+            wall_cohesion_pa: number("wall_cohesion_pa")?,
             phi_rad: config.number("phi_rad")?,
             K_m: config.number("K_m")?,
             density_kg_m3: number("density_kg_m3")?,
@@ -294,9 +307,13 @@ impl SoilParameters {
                 return Err(Error::Refused(format!("`{name}` = {value} must be larger than zero")));
             }
         }
-        for (name, value) in
-            [("k_c", self.k_c), ("k_phi", self.k_phi), ("c_pa", self.c_pa), ("adhesion_pa", self.adhesion_pa)]
-        {
+        for (name, value) in [
+            ("k_c", self.k_c),
+            ("k_phi", self.k_phi),
+            ("c_pa", self.c_pa),
+            ("wall_cohesion_pa", self.wall_cohesion_pa.unwrap_or(0.0)),
+            ("adhesion_pa", self.adhesion_pa),
+        ] {
             if !(value.is_finite() && value >= 0.0) {
                 return Err(Error::Refused(format!("`{name}` = {value} must not be negative")));
             }
@@ -366,6 +383,11 @@ impl SoilParameters {
     /// Cohesion, friction and weight of the soil itself.
     pub fn strength(&self) -> Strength {
         Strength { cohesion: self.c_pa, phi: self.phi_rad, weight: self.weight() }
+    }
+
+    /// The same of slopes that stand without anything that presses on them.
+    pub fn wall(&self) -> Strength {
+        Strength { cohesion: self.wall_cohesion_pa.unwrap_or(self.c_pa), ..self.strength() }
     }
 
     /// The shear law between feet and soil: the weaker of the soil's own strength and that of the interface acts.
@@ -438,6 +460,7 @@ terraglue_subsystem::persist!(SoilParameters {
     k_c,
     k_phi,
     c_pa,
+    wall_cohesion_pa,
     phi_rad,
     K_m,
     density_kg_m3,

@@ -44,11 +44,22 @@ impl Strength {
         4.0 * self.cohesion / self.weight * libm::tan(FRAC_PI_4 + 0.5 * self.phi)
     }
 
-    /// Modulus of loose soil over that of the bed, from the width term of bearing capacity: N_γ(φ')/N_γ(φ) with tan φ' =
-    /// ⅔·tan φ, as soil that fails by local shear is to be counted (Terzaghi 1943, art. 46).
+    /// The same soil loose, as soil that fails by local shear is to be counted: c' = ⅔·c, tan φ' = ⅔·tan φ (Terzaghi 1943,
+    /// art. 46).
+    pub fn loosened(&self) -> Self {
+        let phi = libm::atan(2.0 / 3.0 * libm::tan(self.phi));
+        Self { cohesion: 2.0 / 3.0 * self.cohesion, phi, weight: self.weight }
+    }
+
+    /// Modulus of loose soil over that of the bed, from the width term of bearing capacity: N_γ(φ')/N_γ(φ).
     pub fn loose_share(&self) -> f64 {
-        let loose = libm::atan(2.0 / 3.0 * libm::tan(self.phi));
-        width_factor(loose) / width_factor(self.phi)
+        width_factor(self.loosened().phi) / width_factor(self.phi)
+    }
+
+    /// Critical height of loose soil at rest over that of the bed, H_c(c', φ')/H_c(c, φ): 0.55 at 35°.
+    pub fn loose_wall_share(&self) -> f64 {
+        let tan = |phi: f64| libm::tan(FRAC_PI_4 + 0.5 * phi);
+        2.0 / 3.0 * tan(self.loosened().phi) / tan(self.phi)
     }
 }
 
@@ -182,6 +193,15 @@ mod tests {
         let resultant = 0.5 * SAND.weight * h * h * k_a - 2.0 * SAND.cohesion * k_a.sqrt() * h;
         assert!(resultant.abs() < 1e-9 * SAND.weight * h * h);
         assert_eq!(Strength { cohesion: 0.0, ..SAND }.critical_height(), 0.0);
+    }
+
+    #[test]
+    fn loose_soil_stands_to_the_height_of_its_own_cohesion_and_friction() {
+        for phi in [0.05, 0.5, 0.7] {
+            let soil = Strength { phi, ..SAND };
+            let ratio = soil.loosened().critical_height() / soil.critical_height();
+            assert!((soil.loose_wall_share() - ratio).abs() < 1e-12, "{phi}");
+        }
     }
 
     #[test]

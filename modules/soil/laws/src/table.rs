@@ -1,7 +1,7 @@
 //! The table of soils, `models/soils.csv`, read from its text: named rows, and rows refused with a reason.
 
 /// Columns with numbers, which are also the keys that a scenario can override.
-pub const COLUMNS: [&str; 9] = [
+pub const COLUMNS: [&str; 10] = [
     "n",
     "k_c",
     "k_phi",
@@ -11,10 +11,12 @@ pub const COLUMNS: [&str; 9] = [
     "density_kg_m3",
     "elastic_stiffness_pa_m",
     "measured_gravity_m_s2",
+    "wall_cohesion_pa",
 ];
 
 /// Columns that a usable row may leave empty, and a table leave out but the first.
-const OPTIONAL: [&str; 3] = ["density_kg_m3", "elastic_stiffness_pa_m", "measured_gravity_m_s2"];
+const OPTIONAL: [&str; 4] =
+    ["density_kg_m3", "elastic_stiffness_pa_m", "measured_gravity_m_s2", "wall_cohesion_pa"];
 
 /// What is wrong with a table or a name.
 #[derive(Clone, Debug, PartialEq)]

@@ -4,17 +4,20 @@
 use super::MODULES;
 use super::drive::{Balance, Drive, Move, Vertical, on_rim};
 use super::plates::Maker;
+use super::rig::Shown;
 use super::rows::{Row, eight};
 use crate::process::Outcome;
 use crate::validate::parallel::in_parallel;
 use crate::validate::{Context, Figure, Limit};
 use std::f64::consts::{FRAC_PI_2, PI};
+use terraglue_ground::Surface;
 use terraglue_subsystem::Geometry;
 
 /// All figures.
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     let mut all = presses(context)?;
     all.extend(yawed(context)?);
+    all.extend(ruts(context)?);
     all.extend(balances(context)?);
     all.extend(resistive_force(context)?);
     Ok(all)
@@ -140,6 +143,45 @@ fn yawed(context: &Context) -> Outcome<Vec<Figure>> {
             "largest error of the balance of energies of the wheel yawed by {angle}°, % of the path of the work"
         );
         all.push(Figure::new(format!("soil.yaw.{angle}.balance"), worst, Limit::AtMost(1.0), what));
+    }
+    Ok(all)
+}
+
+/// Depth of the rut that a wheel leaves behind it over its sinkage: mean of the nodes along the middle of the way, well behind
+/// the wheel and well after its start.
+fn rut(make: Maker, config: &str, slip: f64, spacing: f64) -> f64 {
+    const RADIUS: f64 = 0.092;
+    let geometry = Geometry::Cylinder { half_length: 0.0535, radius: RADIUS };
+    let soil = make(config, (1.0 / spacing) as u32 + 1, spacing);
+    let mut bench = Drive::new(soil, geometry, on_rim(0.0), [-0.25, 0.0013]);
+    let ahead = 5e-4;
+    let now = Move::rolling(ahead, ahead / (1.0 - slip) / RADIUS, 0.0, 64.7);
+    (0..1000).for_each(|_| {
+        bench.step(&now);
+    });
+    let surface = Shown::new(bench.soil.as_ref());
+    let lattice = *surface.lattice();
+    let place = |x: f64, k: usize| ((x - lattice.origin[k]) / spacing).round() as i32;
+    let nodes = || place(-0.1, 0)..=place(0.1, 0);
+    let depth: f64 = nodes().map(|i| -surface.height(i, place(0.0, 1))).sum::<f64>() / nodes().count() as f64;
+    depth / bench.sinkage()
+}
+
+/// A rut stays behind every wheel: in soil whose walls stand and in dry sand, which slides.
+fn ruts(context: &Context) -> Outcome<Vec<Figure>> {
+    let spacings: &[f64] = if context.quick { &[0.01] } else { &[0.02, 0.01, 0.005] };
+    let slips: &[f64] = if context.quick { &[0.2] } else { &[0.0, 0.2, 0.5] };
+    let mut all = Vec::new();
+    for name in ["lunar_nominal", "LETE_sand", "clayey_Thai38"] {
+        let soil = row(name)?;
+        let mut cases = Vec::new();
+        for (_, make) in MODULES {
+            cases.extend(spacings.iter().flat_map(|s| slips.iter().map(move |slip| (make, *s, *slip))));
+        }
+        let found = in_parallel(&cases, |(make, spacing, slip)| rut(*make, &soil.own, *slip, *spacing));
+        let least = found.into_iter().fold(f64::INFINITY, |a, b| -larger(-a, -b));
+        let what = format!("least depth of the rut behind a wheel over its sinkage, {} runs", cases.len());
+        all.push(Figure::new(format!("soil.rut.{name}"), least, Limit::AtLeast(0.5), what));
     }
     Ok(all)
 }

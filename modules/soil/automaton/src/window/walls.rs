@@ -1,56 +1,79 @@
 //! Walls that stand by cohesion in a window: the beds below what lies loose, and which of its slopes stand.
 
 use super::{LEFT, Limits, Window};
+use crate::active::Marks;
+use crate::kernel::Face;
 use crate::standing::Field;
 use terraglue_soil_contact::Ground;
 
 impl Window {
-    /// Prepares the filled window for slopes that stand by cohesion; `range`: lowest and highest level of all that may slide,
-    /// units. Where it lies within the critical height every slope stands.
-    pub fn look_for_standing(&mut self, ground: &Ground, limits: &Limits, [low, high]: [i32; 2]) {
-        if limits.critical <= 0 {
+    /// Prepares the filled window for slopes that stand by cohesion; `moving`: nodes whose loose soil is not at rest; `range`:
+    /// lowest and highest level of all that may slide, units. Where it lies within the critical height every slope stands.
+    pub fn look_for_standing(
+        &mut self,
+        ground: &Ground,
+        limits: &Limits,
+        moving: &Marks,
+        [low, high]: [i32; 2],
+    ) {
+        if limits.critical[0] <= 0 {
             return;
         }
-        let any_loose = self.copy_beds(ground);
-        self.all_stands = !any_loose && high.saturating_sub(low) <= limits.critical;
+        let any = self.copy_beds(ground, moving);
+        let within = |critical: i32| high.saturating_sub(low) <= critical;
+        let [firm, loose] = limits.critical.map(within);
+        self.all_stands = firm && !any[0] || loose && !any[1];
         if !self.all_stands {
             let bounds = [self.width, self.height];
             self.standing.look_beyond(ground, self.origin, bounds, limits.repose as i32);
         }
     }
 
-    /// The levels of the beds; where the lattice ends nothing lies loose. Returns whether anything does.
-    fn copy_beds(&mut self, ground: &Ground) -> bool {
-        self.beds.clear();
-        self.beds.extend_from_slice(&self.levels[..self.stride * self.height]);
-        let mut any_loose = false;
-        let (Some(columns), Some(rows)) = (self.columns, self.rows) else { return false };
+    /// The levels of the beds and of what is at rest; where the lattice ends nothing lies loose. Returns whether anything lies
+    /// loose, and whether anything of it moves.
+    fn copy_beds(&mut self, ground: &Ground, moving: &Marks) -> [bool; 2] {
+        let Self { beds, resting, levels, .. } = self;
+        for copy in [beds, resting] {
+            copy.clear();
+            copy.extend_from_slice(&levels[..self.stride * self.height]);
+        }
+        let mut any = [false; 2];
+        let (Some(columns), Some(rows)) = (self.columns, self.rows) else { return any };
         for y in rows.lo..rows.hi {
             for x in columns.lo..columns.hi {
                 let [i, j] = [self.origin[0] + (x - LEFT) as i32, self.origin[1] + y as i32];
                 let loose = ground.loose_units(i, j);
+                if loose <= 0 {
+                    continue;
+                }
                 self.beds[y * self.stride + x] -= loose;
-                any_loose |= loose > 0;
+                any[0] = true;
+                if moving.has([i, j]) {
+                    self.resting[y * self.stride + x] -= loose;
+                    any[1] = true;
+                }
             }
         }
-        any_loose
+        any
     }
 
-    /// What lies loose at a place, units.
+    /// What cohesion does not hold at a place over such a face, units. What comes in a round moves to its end.
     #[inline(always)]
-    pub(super) fn loose(&self, at: usize) -> i32 {
-        (self.levels[at] - self.beds[at]).max(0)
+    pub(super) fn free(&self, at: usize, face: Face) -> i32 {
+        let held = if face == Face::Sheds { &self.beds } else { &self.resting };
+        (self.levels[at] - held[at]).max(0)
     }
 
     /// Finds the faces whose slope stands by cohesion.
     pub(super) fn find_standing(&mut self, limits: &Limits) {
         let (Some(x), Some(y)) = (self.columns, self.rows) else { return };
         let thr = |at: usize| self.repose_of.get(at).copied().unwrap_or(limits.repose);
-        let (levels, beds, stride) = (&self.levels, &self.beds, self.stride);
+        let (levels, beds, resting, stride) = (&self.levels, &self.beds, &self.resting, self.stride);
         let inlets = if self.limited.contains(&true) { &self.inlets[..] } else { &[] };
         let field = Field {
             levels,
             beds,
+            resting,
             stride,
             columns: x,
             rows: y,

@@ -10,10 +10,8 @@ use terraglue_subsystem::{
 
 pub const LUNAR: &str =
     r#"{"n":1.0,"k_c":1400,"k_phi":820000,"c_pa":170,"phi_rad":0.610865238198,"K_m":0.018}"#;
-pub const LETE: &str =
-    r#"{"n":0.793,"k_c":102000,"k_phi":5301000,"c_pa":1300,"phi_rad":0.542797397,"K_m":0.012}"#;
-pub const DRY_SAND: &str =
-    r#"{"n":1.1,"k_c":990,"k_phi":1528430,"c_pa":1040,"phi_rad":0.488692191,"K_m":0.01}"#;
+pub const LETE: &str = r#"{"n":0.793,"k_c":102000,"k_phi":5301000,"c_pa":1300,"wall_cohesion_pa":0,"phi_rad":0.542797397,"K_m":0.012}"#;
+pub const DRY_SAND: &str = r#"{"n":1.1,"k_c":990,"k_phi":1528430,"c_pa":1040,"wall_cohesion_pa":0,"phi_rad":0.488692191,"K_m":0.01}"#;
 
 /// Ground given by a function of x and y.
 pub struct Shaped {

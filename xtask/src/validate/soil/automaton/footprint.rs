@@ -93,6 +93,16 @@ fn lost(soil: &Soil) -> i64 {
     sunk - soil.material().compaction().total()
 }
 
+/// A print in a dry sand whose row of the table says that no cohesion holds its walls, with every other key as it is by default.
+fn sand(spacing: f64) -> Figure {
+    Figure::new(
+        format!("soil.automaton.print.dry_sand_{}mm.slides", spacing * 1e3),
+        print(DRY_SAND, spacing, &shape(3), 28.0).lifted,
+        Limit::AtMost(0.5),
+        "largest slope minus angle of repose, degrees, of a print in dry sand at default keys, when the foot has gone",
+    )
+}
+
 /// Three soils, three grids, five bodies.
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     let spacings: &[f64] = if context.quick { &[0.01] } else { &[0.02, 0.01, 0.005] };
@@ -139,6 +149,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
             ]);
         }
     }
+    figures.extend(spacings.iter().map(|s| sand(*s)));
     for spacing in spacings {
         // 3 cm deep, where the cohesion of lunar soil holds 8.9 cm under the gravity of the Earth
         let wall = print(LUNAR, *spacing, &shape(3), 0.0).lifted;

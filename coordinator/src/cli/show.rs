@@ -5,7 +5,7 @@ use comfy_table::{Cell, Color, ContentArrangement, Table, presets};
 use miette::{GraphicalReportHandler, GraphicalTheme};
 use terraglue::Error;
 use terraglue::recording::{Energies, PrintDepth, Summary};
-use terraglue::scenario::InputError;
+use terraglue::scenario::{InputError, keys};
 
 /// An error on standard error; wrong input with file, line and the offending text.
 pub fn error(error: &Error) {
@@ -50,13 +50,32 @@ fn way_out(error: &InputError) -> String {
     if let Some(number) = number {
         return format!("docs/plugins/errors.md tells causes and cures of {number}");
     }
+    if is_shown {
+        return keys_of(error);
+    }
     match () {
-        () if is_shown => "docs/scenario.md has the keys of a scenario and what they take",
         () if message.contains("(os error ") => PATH,
         () if names(message, &UNITS) => "docs/fmi.md tells what is read of units and system structures",
         () => "`terraglue COMMAND --help` tells what the command takes",
     }
     .into()
+}
+
+/// Where the keys are listed of the table in which the error is: of a subsystem those of its module.
+fn keys_of(error: &InputError) -> String {
+    let text = error.source_code.inner();
+    let at = error.span.map_or(0, |s| s.offset());
+    let end = text.get(at..).and_then(|rest| rest.find('\n')).map_or(text.len(), |n| at + n);
+    let head = match error.source_code.name().starts_with("--") {
+        true => text,
+        false => text[..end].lines().rev().find(|l| l.trim_start().starts_with('[')).unwrap_or_default(),
+    };
+    let name = head.trim_start_matches(|c: char| c.is_whitespace() || "[\"'".contains(c));
+    let name = name.split(|c: char| ".]=\"' \t".contains(c)).next().unwrap_or_default();
+    match keys::table(name) {
+        Some(_) => format!("docs/scenario.md has the keys of `[{name}]` and what they take"),
+        None => "docs/scenario.md has the keys of a scenario and what they take; `terraglue modules NAME` has those of a module".into(),
+    }
 }
 
 /// Whether a text names a file with one of these endings.

@@ -6,6 +6,7 @@ use super::run::build;
 use super::{Exit, show, soil_module, strict};
 use terraglue::Result;
 use terraglue::host::{Library, SearchPath};
+use terraglue::recording::Recorder;
 use terraglue::scenario::{Scenario, SubsystemSpec};
 use terraglue::testbed::Options;
 
@@ -16,6 +17,7 @@ pub fn check(arguments: &CheckArguments) -> Result<Exit> {
     soil_module::check(&scenario, arguments)?;
     let options = Options { module_paths: arguments.module_path.clone(), ..Options::default() };
     let testbed = build(&scenario, &options)?;
+    testbed.view(|view| Recorder::check(view, &scenario))?;
     let mut table = show::table(&["subsystem", "module", "bodies", "variables", "note"]);
     testbed.view(|view| {
         for (s, spec) in view.subsystems.iter().zip(&scenario.subsystems) {

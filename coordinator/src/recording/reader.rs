@@ -175,9 +175,9 @@ impl Recording {
         };
         match Self::read(&bytes) {
             None => Err(unreadable("is not an MCAP recording")),
-            Some(r) if r.outdated => {
-                Err(unreadable("was written by an earlier version of terraglue; run the scenario again"))
-            }
+            Some(r) if r.outdated => Err(unreadable(
+                "was written by an earlier version of terraglue, or by another program; run the scenario again",
+            )),
             Some(r) => Ok(r),
         }
     }

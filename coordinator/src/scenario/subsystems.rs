@@ -30,9 +30,12 @@ pub fn all(source: &Source) -> Result<Vec<SubsystemSpec>, Box<InputError>> {
 }
 
 fn one(source: &Source, name: &str, node: &Node) -> Result<SubsystemSpec, Box<InputError>> {
-    if name.contains('.') || name.contains('*') {
-        let message = format!("`{name}` is no name for a subsystem: it may not hold `.` or `*`");
-        return Err(source.error(&node.key, message, None));
+    if name.trim().is_empty() || name.contains(['.', '*']) {
+        let message =
+            format!("`{name}` is no name for a subsystem: it may not be empty, nor hold `.` or `*`");
+        let help =
+            "variables are called `subsystem.variable`, and `*` stands for any: write letters, digits and _";
+        return Err(source.error(&node.key, message, Some(help.into())));
     }
     let host_keys = subsystem_keys();
     for key in &host_keys {

@@ -33,6 +33,8 @@ pub struct Columns<'a> {
 impl<'a> Columns<'a> {
     /// Reads text; empty lines and those that begin with # are left out.
     pub fn parse(text: &'a str) -> Result<Self, Wrong> {
+        // what spreadsheets write before UTF-8
+        let text = text.trim_start_matches('\u{feff}');
         let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'));
         let cells = |line: &'a str| line.split(',').map(str::trim).collect::<Vec<_>>();
         let header = match lines.next() {

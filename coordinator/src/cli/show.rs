@@ -210,7 +210,16 @@ fn signed(x: f64, decimals: usize) -> String {
 
 fn prints(p: &PrintDepth) -> String {
     let [median, low, high] = [p.median_m, p.p10_m, p.p90_m].map(|z| 1e3 * z);
-    format!("{median:.0} mm (median of {}; 10 % to 90 %: {low:.0} mm to {high:.0} mm)", p.count)
+    // two digits for shallow prints, too
+    let decimals = if median < 9.95 { if median < 0.995 { 2 } else { 1 } } else { 0 };
+    let show = |z: f64| fixed(z, decimals);
+    format!(
+        "{} mm (median of {}; 10 % to 90 %: {} mm to {} mm)",
+        show(median),
+        p.count,
+        show(low),
+        show(high)
+    )
 }
 
 fn stall(s: &Summary) -> String {
@@ -240,7 +249,7 @@ fn distance(s: &Summary) -> String {
 
 #[cfg(test)]
 mod tests {
-    use terraglue::recording::{Status, Summary, SummaryObserver};
+    use terraglue::recording::{PrintDepth, Status, Summary, SummaryObserver};
     use terraglue::scenario::Scenario;
 
     #[test]
@@ -248,6 +257,16 @@ mod tests {
         let texts = [(-0.004, 2), (-0.0, 0), (-1.006, 2), (f64::NAN, 1)].map(|(x, n)| super::fixed(x, n));
         assert_eq!(texts, ["0.00", "0", "-1.01", "NaN"]);
         assert_eq!([0.04, -0.04, 0.06, -2.0].map(|x| super::signed(x, 1)), ["0.0", "0.0", "+0.1", "-2.0"]);
+    }
+
+    #[test]
+    fn shallow_prints_have_two_digits() {
+        let of = |median_m: f64| {
+            super::prints(&PrintDepth { count: 3, median_m, p10_m: 0.5 * median_m, p90_m: 2.0 * median_m })
+        };
+        assert_eq!(of(0.0214), "21 mm (median of 3; 10 % to 90 %: 11 mm to 43 mm)");
+        assert_eq!(of(0.00142), "1.4 mm (median of 3; 10 % to 90 %: 0.7 mm to 2.8 mm)");
+        assert_eq!(of(0.000734), "0.73 mm (median of 3; 10 % to 90 %: 0.37 mm to 1.47 mm)");
     }
 
     #[test]

@@ -30,8 +30,7 @@ pub fn soils(name: Option<&str>, file: Option<&Path>) -> Result<Exit> {
             let names: Vec<String> = soils.rows.iter().map(|r| r.name.clone()).collect();
             soils.rows.retain(|r| r.name.to_lowercase().contains(&part.to_lowercase()));
             if soils.rows.is_empty() {
-                let near = did_you_mean(part, names.iter().map(String::as_str));
-                let help = near.or_else(|| Some("`terraglue soils` lists them all".into()));
+                let help = did_you_mean(part, names.iter().map(String::as_str));
                 let message = format!("there is no soil `{part}` in {}", path.display());
                 return Err(InputError::plain(message, help).into());
             }

@@ -230,8 +230,9 @@ fn forces(runs: &[Run]) -> Option<Figure> {
     let panel = |(choice, foot): (usize, &String)| {
         let curve = |run: &Run| {
             let leg = run.legs.iter().find(|l| l.body == *foot)?;
-            let t: Vec<f64> = run.recording.gluing.iter().map(|g| g.t).collect();
-            Some(Curve::new(run.name.clone(), run.colour, &t, leg.normal_n.clone()))
+            let made = run.recording.first_step();
+            let t: Vec<f64> = run.recording.gluing[made..].iter().map(|g| g.t).collect();
+            Some(Curve::new(run.name.clone(), run.colour, &t, leg.normal_n[made..].to_vec()))
         };
         let curves = runs.iter().filter_map(curve).collect();
         Panel { choice: Some(choice), ..Panel::new(&format!("normal force on {foot}"), "N", curves) }

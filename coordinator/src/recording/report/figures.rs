@@ -51,8 +51,7 @@ fn forces(recording: &Recording, legs: &[Leg]) -> Option<Figure> {
     if legs.is_empty() {
         return None;
     }
-    // before the first step nobody has told a force: that is no 0
-    let made = recording.gluing.iter().position(|g| g.evaluations_bodies > 0).unwrap_or(0);
+    let made = recording.first_step();
     let t: Vec<f64> = recording.gluing[made..].iter().map(|g| g.t).collect();
     let curve = |(k, leg): (usize, &Leg)| Curve::new(leg.body.clone(), k, &t, leg.normal_n[made..].to_vec());
     let curves: Vec<Curve> = legs.iter().enumerate().map(curve).collect();

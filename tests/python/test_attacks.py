@@ -296,3 +296,76 @@ def test_what_may_not_be_read(place):
     path.chmod(0)
     faults = attack([("unreadable", ["run", path], 2, "secret.toml", place)])
     assert not faults, "\n\n".join(faults)
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# Found by a second look: each of these passed in silence, hung, or said no way out.
+
+SECOND_SETS = [
+    ("recording.include=[\"nothing.*\"]", 2, "`include` names no variable"),
+    ("recording.include=[\"\"]", 2, "`include` names no variable"),
+    ("recording.exclude=[\"robot.*[\"]", 2, "`exclude` names no variable"),
+    ("event=[{at_s=1.0,when=\"robot.body.z<1\",act=\"robot.LF_j2.break\"}]", 2, "leave one of the two out"),
+    ("connect.0.to=robot.*.*.x", 2, "keys of `[connect]`"),
+]
+
+
+def test_edits_of_a_second_look(place):
+    rows = [(text, ["check", place / "walk.toml", "--set", text], code, words, place) for text, code, words in SECOND_SETS]
+    faults = attack(rows)
+    assert not faults, "\n\n".join(faults)
+
+
+def test_texts_of_a_second_look(place):
+    twice = '\n[[connect]]\nfrom = "gait.LF_j2.angle_target"\nto = "robot.LF_j2.angle_target"\n'
+    rows = []
+    for k, (more, words) in enumerate([('\n[""]\nmodule = "gait"\n', "no name for a subsystem"), (twice, "delete one of the two"),
+                                       ('\n["  "]\nmodule = "gait"\n', "no name for a subsystem"), ('\n[x]\nmodule = ""\n', "terraglue modules")]):
+        path = place / f"second{k}.toml"
+        path.write_text(WALK + more)
+        rows.append((more, ["check", path], 2, words, place))
+    faults = attack(rows)
+    assert not faults, "\n\n".join(faults)
+
+
+def test_commands_of_a_second_look(place):
+    (place / "soup.csv").write_bytes(b"\xff\xfe\x00\x01")
+    (place / "disc.csv").write_text(PLATE + "1,2,0\n")
+    walk = str(place / "walk.toml")
+    rows = [("shortest checkpoint", ["run", walk, "--checkpoint-every", "1e-300", "--out", place / "never"], 2, "a microsecond", place),
+            ("no text", ["fit-soil", place / "soup.csv"], 2, "commas between the cells", place),
+            ("no plate", ["fit-soil", place / "disc.csv"], 2, "diameter or width", place),
+            ("empty", ["fit-soil", place / "empty.fmu"], 2, "names of the columns", place),
+            ("a scenario", ["convert", walk], 2, "ends in .ssp", place),
+            ("robot for a soil", ["new", "soil", "x", "--robot", "r.urdf"], 2, "leave --robot out", place)]
+    faults = attack(rows)
+    assert not faults, "\n\n".join(faults)
+
+
+def test_a_table_of_a_spreadsheet_begins_with_a_mark(place):
+    readings = "".join(f"{z},{3.0 * z**0.9},{b}\n" for z in range(3, 30) for b in (50, 100))
+    fits = []
+    for name, mark in [("plain", b""), ("marked", b"\xef\xbb\xbf")]:
+        (place / f"{name}.csv").write_bytes(mark + (PLATE + readings).replace("\n", "\r\n").encode())
+        done = terraglue("fit-soil", place / f"{name}.csv", "--law", "bekker")
+        assert done.returncode == 0, done.stderr
+        fits.append(done.stdout)
+    assert fits[0] == fits[1]
+
+
+def test_an_stl_file_that_was_cut_off_is_refused(place):
+    corners = struct.pack("<12fH", 0, 0, 1, 0, 0, 0, 1, 0, 0, 0, 1, 0, 0)
+    tetrahedron = corners + struct.pack("<12fH", 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 1, 0) + struct.pack("<12fH", 0, 0, 1, 0, 0, 0, 0, 0, 1, 1, 0, 0, 0)
+    (place / "half.stl").write_bytes(b"x" * 80 + struct.pack("<I", 400) + tetrahedron)
+    inertial = "<inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>"
+    mesh = "<collision><geometry><mesh filename='half.stl'/></geometry></collision>"
+    (place / "half.urdf").write_text(f"<robot name='r'><link name='a'>{inertial}{mesh}</link></robot>")
+    faults = attack([("half.stl", ["robot", place / "half.urdf"], 2, "400 triangles and holds 3", place)])
+    assert not faults, "\n\n".join(faults)
+
+
+def test_a_standard_output_without_room(place):
+    import subprocess
+    with open("/dev/full", "w") as full:
+        done = subprocess.run([PROGRAM, "soils"], stdout=full, stderr=subprocess.PIPE, text=True, timeout=LIMIT_S)
+    assert done.returncode == 1 and "help: look for room" in done.stderr, done.stderr

@@ -2,6 +2,7 @@
 
 import csv
 import json
+import re
 
 import pytest
 from conftest import MOON_WALK, ROOT, terraglue
@@ -270,3 +271,15 @@ def test_modules_can_be_narrowed():
     for more in ([], ["--json"]):
         wrong = terraglue("modules", "soil-beker", *more)
         assert wrong.returncode == 2 and "did you mean `soil-bekker`" in " ".join(wrong.stderr.split())
+
+
+def test_the_page_begins_with_what_is_asked_first(tmp_path):
+    process = terraglue("compare", MOON_WALK, *SMALL, "--out", tmp_path, "--quiet", "--strategies", "cooperative,iterative")
+    assert process.returncode == 0, process.stderr
+    page = (tmp_path / "compare.html").read_text()
+    sections = re.findall(r'<section id="(\w[\w-]*)">', page)
+    assert sections[0] == "figures" and sections[-1] == "all", sections
+    first = page.split('<section id="figures">')[1].split("</section>")[0]
+    assert re.findall(r"<th[^>]*>([^<]*)</th>", first) == ["run", "distance", "median print", "energy drift", "CPU per step"]
+    assert first.count("report.html") == 2 and first.count("<tr>") == 3
+    assert "<details><summary>" in page.split('<section id="all">')[1]

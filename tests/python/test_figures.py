@@ -205,3 +205,22 @@ def test_a_browser_of_the_width_of_a_phone_has_nothing_to_scroll_sideways(which,
     found = re.search(r">width (\d+)<", shown)
     assert found, shown[-500:]
     assert int(found[1]) <= PHONE
+
+
+def test_words_on_cards_are_no_larger_than_their_card(walk):
+    _, page, _ = walk
+    values = re.findall(r'<dd><b([^>]*)>([^<]*)</b>', page)
+    words = [(kind, text) for kind, text in values if not re.search(r"\d", text)]
+    assert ("not applicable" in [text for _, text in words]) and all(kind == ' class="word"' for kind, _ in words), words
+    # 205 px, less the padding, for 14 letters
+    size = int(re.search(r"\.card dd b\.word \{ font-size: (\d+)px", (ASSETS / "page.css").read_text())[1])
+    assert 14 * 0.6 * size < 205 - 32
+
+
+def test_no_force_is_shown_before_the_first_step(walk):
+    """The soil bears the robot from the start; what nobody has told is not 0 N."""
+    data = data_of(walk[1])
+    figures = {figure["id"]: figure for figure in data["figures"]}
+    total = figures["forces"]["panels"][1]["curves"][0]
+    t, y = floats(data["times"][total["t"]]), floats(total["y"])
+    assert len(t) == len(y) and 0 < t[0] <= 0.01 and y[0] > 0.5 * max(y[:20]), (t[:3], y[:3])

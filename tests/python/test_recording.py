@@ -80,6 +80,15 @@ def test_what_never_changes_is_written_once(walk, decoded):
     assert sorted(again) == sorted(expected)
 
 
+def test_what_stays_although_it_is_written_again_takes_no_room(tmp_path):
+    sizes = []
+    for name, more in [("all", []), ("less", ["--set", 'recording.exclude=["robot.*.voltage","robot.*.force_at_x"]'])]:
+        done = terraglue("run", MOON_WALK, "--duration", "1", "--quiet", "--out", tmp_path / name, *more)
+        assert done.returncode == 0, done.stderr
+        sizes.append((tmp_path / name / "recording.mcap").stat().st_size)
+    assert 0.99 * sizes[0] < sizes[1] < sizes[0]
+
+
 def test_every_variable_is_there_by_its_name_with_its_unit(walk):
     names = {}
     with open(walk / "recording.mcap", "rb") as file:

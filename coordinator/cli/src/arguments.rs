@@ -199,14 +199,17 @@ Examples:
   terraglue run scenarios/moon_walk.toml --duration 60 --checkpoint-every 5s --out runs/long
   terraglue run --resume runs/long      after a crash, a kill or Ctrl-C: the files end as if nothing had happened";
 
+/// Multiples of shorter times are no longer told apart from each other in a long run, s.
+const SHORTEST_S: f64 = 1e-6;
+
 /// A time in seconds, or with a unit.
 fn simulated_time(text: &str) -> Result<f64, String> {
     const UNITS: [(&str, f64); 4] = [("ms", 1e-3), ("min", 60.0), ("h", 3600.0), ("s", 1.0)];
     let unit = UNITS.iter().find_map(|(unit, s)| Some((text.strip_suffix(unit)?, s)));
     let (number, unit_s) = unit.unwrap_or((text, &1.0));
     let seconds = number.trim().parse::<f64>().ok().map(|x| x * unit_s);
-    let seconds = seconds.filter(|x| x.is_finite() && *x > 0.0);
-    seconds.ok_or_else(|| "a time above 0 is wanted: 5, 5s, 500ms, 2min or 1h".to_owned())
+    let seconds = seconds.filter(|x| x.is_finite() && *x >= SHORTEST_S);
+    seconds.ok_or_else(|| "a time of a microsecond at least is wanted: 5, 5s, 500ms, 2min or 1h".to_owned())
 }
 
 /// What `convert` takes.

@@ -7,6 +7,7 @@ use super::{Exit, show, soil_module, strict};
 use terraglue_diagnostics::Result;
 use terraglue_engine::testbed::Options;
 use terraglue_host::SearchPath;
+use terraglue_recording::Recorder;
 use terraglue_scenario::{Scenario, SubsystemSpec};
 
 /// Loads the scenario, its modules and files, and resolves all names.
@@ -16,6 +17,7 @@ pub fn check(arguments: &CheckArguments) -> Result<Exit> {
     soil_module::check(&scenario, arguments)?;
     let options = Options { module_paths: arguments.module_path.clone(), ..Options::default() };
     let testbed = build(&scenario, &options)?;
+    testbed.view(|view| Recorder::check(view, &scenario))?;
     let mut table = show::table(&["subsystem", "module", "bodies", "variables", "note"]);
     testbed.view(|view| {
         for (s, spec) in view.subsystems.iter().zip(&scenario.subsystems) {

@@ -15,7 +15,9 @@ pub fn convert(arguments: &ConvertArguments) -> Result<Exit> {
     let out = arguments.output.clone().unwrap_or_else(|| path.with_extension("toml"));
     if !Package::is_one(path) {
         let message = format!("`{}` is no system structure (.ssp, .ssd)", path.display());
-        return Err(InputError::plain(message, None).into());
+        let help =
+            "an archive ends in .ssp, a single description in .ssd; scenarios are run as they are".to_owned();
+        return Err(InputError::plain(message, Some(help)).into());
     }
     let wrong = |e: terraglue_fmi::Error| InputError::plain(e.to_string(), None);
     let package = Package::open(path).map_err(wrong)?;

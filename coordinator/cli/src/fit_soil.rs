@@ -18,7 +18,8 @@ pub fn fit_soil(a: &FitSoilArguments) -> Result<Exit> {
     if !(a.from_mm.is_finite() && a.from_mm >= 0.0) {
         let message =
             format!("`--from-mm` = {} is out of range: it takes a number of at least 0 mm", a.from_mm);
-        return Err(InputError::plain(message, None).into());
+        let help = "leave it out, and every reading counts".to_owned();
+        return Err(InputError::plain(message, Some(help)).into());
     }
     let from = 1e-3 * a.from_mm;
     let options =

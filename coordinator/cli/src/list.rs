@@ -175,7 +175,7 @@ fn unknown(name: &str, search: &SearchPath) -> terraglue_diagnostics::Error {
     }
     let unknown = terraglue_fmu::library().find(name, search, Path::new("."));
     let told = unknown.err().map_or_else(|| format!("no module matches `{name}`"), |e| e.to_string());
-    InputError::plain(told, None).into()
+    InputError::plain(told, Some("`terraglue modules` lists those that are found".into())).into()
 }
 
 /// What the section of one module says, in this process; what only its code knows, its parameters, is asked for in

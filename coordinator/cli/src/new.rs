@@ -19,7 +19,10 @@ pub fn new(arguments: &NewArguments) -> Result<Exit> {
             Err(plain("a new scenario needs a robot", Some(help)))
         }
         (New::Module(kind), None, Some(name)) => module(arguments, kind, name),
-        (New::Module(_), ..) => Err(plain("--robot is for `new scenario`", None)),
+        (New::Module(_), ..) => {
+            let help = "leave --robot out, or write `terraglue new scenario --robot FILE`".to_owned();
+            Err(plain("--robot is for `new scenario`", Some(help)))
+        }
     }
 }
 

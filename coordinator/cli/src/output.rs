@@ -14,7 +14,9 @@ pub fn line(text: Arguments) {
             apart::done(0);
             exit_guard::leave(0);
         }
-        eprintln!("error: standard output: {error}");
+        eprintln!(
+            "error: standard output: {error}\n  help: look for room where it is written to, or send it elsewhere"
+        );
         exit_guard::leave(1);
     }
 }

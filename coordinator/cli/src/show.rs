@@ -5,7 +5,7 @@ use comfy_table::{Cell, Color, ContentArrangement, Table, presets};
 use miette::{GraphicalReportHandler, GraphicalTheme};
 use terraglue_diagnostics::Error;
 use terraglue_recording::{Energies, PrintDepth, Summary};
-use terraglue_scenario::InputError;
+use terraglue_scenario::{InputError, keys};
 
 /// An error on standard error; wrong input with file, line and the offending text.
 pub fn error(error: &Error) {
@@ -50,13 +50,32 @@ fn way_out(error: &InputError) -> String {
     if let Some(number) = number {
         return format!("docs/plugins/errors.md tells causes and cures of {number}");
     }
+    if is_shown {
+        return keys_of(error);
+    }
     match () {
-        () if is_shown => "docs/scenario.md has the keys of a scenario and what they take",
         () if message.contains("(os error ") => PATH,
         () if names(message, &UNITS) => "docs/fmi.md tells what is read of units and system structures",
         () => "`terraglue COMMAND --help` tells what the command takes",
     }
     .into()
+}
+
+/// Where the keys are listed of the table in which the error is: of a subsystem those of its module.
+fn keys_of(error: &InputError) -> String {
+    let text = error.source_code.inner();
+    let at = error.span.map_or(0, |s| s.offset());
+    let end = text.get(at..).and_then(|rest| rest.find('\n')).map_or(text.len(), |n| at + n);
+    let head = match error.source_code.name().starts_with("--") {
+        true => text,
+        false => text[..end].lines().rev().find(|l| l.trim_start().starts_with('[')).unwrap_or_default(),
+    };
+    let name = head.trim_start_matches(|c: char| c.is_whitespace() || "[\"'".contains(c));
+    let name = name.split(|c: char| ".]=\"' \t".contains(c)).next().unwrap_or_default();
+    match keys::table(name) {
+        Some(_) => format!("docs/scenario.md has the keys of `[{name}]` and what they take"),
+        None => "docs/scenario.md has the keys of a scenario and what they take; `terraglue modules NAME` has those of a module".into(),
+    }
 }
 
 /// Whether a text names a file with one of these endings.
@@ -191,7 +210,16 @@ fn signed(x: f64, decimals: usize) -> String {
 
 fn prints(p: &PrintDepth) -> String {
     let [median, low, high] = [p.median_m, p.p10_m, p.p90_m].map(|z| 1e3 * z);
-    format!("{median:.0} mm (median of {}; 10 % to 90 %: {low:.0} mm to {high:.0} mm)", p.count)
+    // two digits for shallow prints, too
+    let decimals = if median < 9.95 { if median < 0.995 { 2 } else { 1 } } else { 0 };
+    let show = |z: f64| fixed(z, decimals);
+    format!(
+        "{} mm (median of {}; 10 % to 90 %: {} mm to {} mm)",
+        show(median),
+        p.count,
+        show(low),
+        show(high)
+    )
 }
 
 fn stall(s: &Summary) -> String {
@@ -221,7 +249,7 @@ fn distance(s: &Summary) -> String {
 
 #[cfg(test)]
 mod tests {
-    use terraglue_recording::{Status, Summary, SummaryObserver};
+    use terraglue_recording::{PrintDepth, Status, Summary, SummaryObserver};
     use terraglue_scenario::Scenario;
 
     #[test]
@@ -229,6 +257,16 @@ mod tests {
         let texts = [(-0.004, 2), (-0.0, 0), (-1.006, 2), (f64::NAN, 1)].map(|(x, n)| super::fixed(x, n));
         assert_eq!(texts, ["0.00", "0", "-1.01", "NaN"]);
         assert_eq!([0.04, -0.04, 0.06, -2.0].map(|x| super::signed(x, 1)), ["0.0", "0.0", "+0.1", "-2.0"]);
+    }
+
+    #[test]
+    fn shallow_prints_have_two_digits() {
+        let of = |median_m: f64| {
+            super::prints(&PrintDepth { count: 3, median_m, p10_m: 0.5 * median_m, p90_m: 2.0 * median_m })
+        };
+        assert_eq!(of(0.0214), "21 mm (median of 3; 10 % to 90 %: 11 mm to 43 mm)");
+        assert_eq!(of(0.00142), "1.4 mm (median of 3; 10 % to 90 %: 0.7 mm to 2.8 mm)");
+        assert_eq!(of(0.000734), "0.73 mm (median of 3; 10 % to 90 %: 0.37 mm to 1.47 mm)");
     }
 
     #[test]

@@ -165,6 +165,11 @@ fn ground(data: &[u8], t_s: f64) -> Option<GroundRecord> {
 }
 
 impl Recording {
+    /// The first record after a step: in the one before it nobody has told a force, which is no 0 N.
+    pub(crate) fn first_step(&self) -> usize {
+        self.gluing.iter().position(|g| g.evaluations_bodies > 0).unwrap_or(0)
+    }
+
     /// Reads `recording.mcap` of a results folder.
     pub fn open(folder: &Path) -> Result<Self> {
         let path = folder.join(RECORDING);
@@ -175,9 +180,9 @@ impl Recording {
         };
         match Self::read(&bytes) {
             None => Err(unreadable("is not an MCAP recording")),
-            Some(r) if r.outdated => {
-                Err(unreadable("was written by an earlier version of terraglue; run the scenario again"))
-            }
+            Some(r) if r.outdated => Err(unreadable(
+                "was written by an earlier version of terraglue, or by another program; run the scenario again",
+            )),
             Some(r) => Ok(r),
         }
     }

@@ -189,6 +189,14 @@ fn selected(
 }
 
 impl Recorder {
+    /// Whether what the scenario wants recorded is there; `check` asks without recording anything.
+    ///
+    /// # Errors
+    /// A pattern of `[recording]` that names no variable.
+    pub fn check(view: &View, scenario: &Scenario) -> Result {
+        selected(view, (&scenario.recording, &scenario.source), &scenario.connections).map(drop)
+    }
+
     fn start(&mut self, view: &View) -> Result {
         self.snapshot = selected(view, (&self.spec, &self.source), &self.connections)?;
         if self.options.csv {

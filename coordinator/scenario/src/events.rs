@@ -194,7 +194,10 @@ fn trigger(s: &Section, names: &[&str]) -> Checked<Trigger> {
     match (s.optional_number("at_s"), s.optional_text("when")) {
         (Some(at), None) => Ok(Trigger::At(at)),
         (None, Some(text)) => when(s, "when", &text, names),
-        (Some(_), Some(_)) => Err(s.error("when", "it has `at_s` or `when`, not both".into(), None)),
+        (Some(_), Some(_)) => {
+            let help = "leave one of the two out";
+            Err(s.error("when", "it has `at_s` or `when`, not both".into(), Some(help.into())))
+        }
         (None, None) => {
             let help = Some("at_s = 3.0, or when = \"robot.body.z < 0.1\"".into());
             Err(s.error("set", "it needs `at_s` or `when`".into(), help))

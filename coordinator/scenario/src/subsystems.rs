@@ -32,9 +32,12 @@ pub fn all(source: &Source) -> Result<Vec<SubsystemSpec>, Box<InputError>> {
 }
 
 fn one(source: &Source, name: &str, node: &Node) -> Result<SubsystemSpec, Box<InputError>> {
-    if name.contains('.') || name.contains('*') {
-        let message = format!("`{name}` is no name for a subsystem: it may not hold `.` or `*`");
-        return Err(source.error(&node.key, message, None));
+    if name.trim().is_empty() || name.contains(['.', '*']) {
+        let message =
+            format!("`{name}` is no name for a subsystem: it may not be empty, nor hold `.` or `*`");
+        let help =
+            "variables are called `subsystem.variable`, and `*` stands for any: write letters, digits and _";
+        return Err(source.error(&node.key, message, Some(help.into())));
     }
     let host_keys = subsystem_keys();
     for key in &host_keys {
@@ -46,12 +49,17 @@ fn one(source: &Source, name: &str, node: &Node) -> Result<SubsystemSpec, Box<In
         (None, Some(unit)) => unit_path(source, unit)?,
         (Some(_), Some(unit)) => {
             let message = format!("`[{name}]` is either a `module` or an `fmu`");
-            return Err(source.error(&unit.key, message, None));
+            return Err(source.error(&unit.key, message, Some("delete one of the two".into())));
         }
         _ => text(node, "module").unwrap_or_default(),
     };
     if module.trim().is_empty() {
-        return Err(source.error_at_value(&[name, "module"], format!("`[{name}]` names no module"), None));
+        let help = "`terraglue modules` lists those that are found; the path of a file does, too".to_owned();
+        return Err(source.error_at_value(
+            &[name, "module"],
+            format!("`[{name}]` names no module"),
+            Some(help),
+        ));
     }
     let is_host_key = |key: &str| host_keys.iter().any(|k| k.parameter.name == key);
     Ok(SubsystemSpec {

@@ -1,5 +1,18 @@
 //! Measurements as comma-separated text; the unit stands in the name of a column.
 
+use crate::scenario::InputError;
+use std::io::ErrorKind;
+use std::path::Path;
+
+/// A file that gives no text.
+pub fn unreadable(path: &Path, error: &std::io::Error) -> Box<InputError> {
+    let help = (error.kind() == ErrorKind::InvalidData).then(|| HEADED.to_owned());
+    InputError::plain(format!("cannot read {}: {error}", path.display()), help)
+}
+
+const HEADED: &str =
+    "measurements are text with commas between the cells and the names of the columns in the first line";
+
 /// What is wrong, and the way out.
 pub type Wrong = (String, Option<String>);
 
@@ -20,11 +33,13 @@ pub struct Columns<'a> {
 impl<'a> Columns<'a> {
     /// Reads text; empty lines and those that begin with # are left out.
     pub fn parse(text: &'a str) -> Result<Self, Wrong> {
+        // what spreadsheets write before UTF-8
+        let text = text.trim_start_matches('\u{feff}');
         let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty() && !l.starts_with('#'));
         let cells = |line: &'a str| line.split(',').map(str::trim).collect::<Vec<_>>();
         let header = match lines.next() {
             Some((_, line)) => cells(line),
-            None => return Err(("the file is empty".into(), None)),
+            None => return Err(("the file is empty".into(), Some(HEADED.into()))),
         };
         let row = |(k, line): (usize, &'a str)| {
             let cells = cells(line);

@@ -1,6 +1,6 @@
 //! Plate tests from comma-separated text.
 
-use super::columns::{Columns, Names, SINKAGE, Wrong};
+use super::columns::{Columns, Names, SINKAGE, Wrong, unreadable};
 use std::path::Path;
 use terraglue_scenario::InputError;
 use terraglue_scenario::plausible::{PLATE_PRESSURE, PLATE_SINKAGE};
@@ -52,8 +52,7 @@ const MEASURED: [&str; 4] = ["sinkage_", "pressure_", "force_", "time_"];
 /// # Errors
 /// What is wrong, with file and line.
 pub fn read(path: &Path, from: f64) -> Result<PlateTests, Box<InputError>> {
-    let text = terraglue_subsystem::files::read_text(path)
-        .map_err(|e| InputError::plain(format!("cannot read {}: {e}", path.display()), None))?;
+    let text = terraglue_subsystem::files::read_text(path).map_err(|e| unreadable(path, &e))?;
     parse(&text, from)
         .map_err(|(message, help)| InputError::plain(format!("{}: {message}", path.display()), help))
 }
@@ -72,7 +71,11 @@ fn parse(text: &str, from: f64) -> Result<PlateTests, Wrong> {
         let number = |column| table.number(row, column);
         let [depth, pressure, b] = [number(columns[0])?, number(columns[1])?, number(columns[2])?];
         if b <= 0.0 {
-            return Err((format!("line {}: the size of the plate must be larger than zero", row.0), None));
+            let help = "the column holds diameter or width of each plate, in the unit of its name".to_owned();
+            return Err((
+                format!("line {}: the size of the plate must be larger than zero", row.0),
+                Some(help),
+            ));
         }
         // a reading in the middle of a bin of a millimetre is printed with rounding
         if depth < from * (1.0 - 1e-9) || depth <= 0.0 || pressure <= 0.0 {

@@ -5,7 +5,7 @@
 //! such numbers are known (Tikhonov's regularisation), and the intervals say what the measured slips add.
 
 use super::Known;
-use super::columns::{Columns, Names, SINKAGE};
+use super::columns::{Columns, Names, SINKAGE, unreadable};
 use super::rim::{Rim, Rolling};
 use std::path::Path;
 use terraglue_scenario::InputError;
@@ -81,8 +81,7 @@ const ROLLS: f64 = -0.01;
 /// # Errors
 /// What is wrong, with file and line.
 pub fn read_wheel(path: &Path, wheel: &Wheel) -> Result<WheelTests, Box<InputError>> {
-    let text = terraglue_subsystem::files::read_text(path)
-        .map_err(|e| InputError::plain(format!("cannot read {}: {e}", path.display()), None))?;
+    let text = terraglue_subsystem::files::read_text(path).map_err(|e| unreadable(path, &e))?;
     parse(&text, wheel)
         .map_err(|(message, help)| InputError::plain(format!("{}: {message}", path.display()), help))
 }
@@ -202,7 +201,8 @@ pub fn fit_wheel(
 ) -> Result<WheelFit, Box<InputError>> {
     if points.len() < 2 {
         let message = format!("{} slips of a driven wheel are too few: two at least", points.len());
-        return Err(InputError::plain(message, None));
+        let help = "give a row for each slip at which the wheel was driven".to_owned();
+        return Err(InputError::plain(message, Some(help)));
     }
     let begin: Numbers = [start.k_phi.ln(), start.n, 0.3, 200.0, 0.4, 0.01f64.ln()];
     let low: Numbers = [8.0, 0.1, 0.0, 0.0, 0.05, -6.9];
@@ -213,7 +213,10 @@ pub fn fit_wheel(
         let mut residuals = |x: &[f64]| Some(residuals(&wheel, &begin, x, points));
         least_squares(&mut residuals, &free, from).map(|least| least.numbers)
     };
-    let none = || InputError::plain("no soil carries this wheel", None);
+    let none = || {
+        let help = "check radius, width and load of --wheel, and the units of the columns".to_owned();
+        InputError::plain("no soil carries this wheel", Some(help))
+    };
     let found = solve(points, &begin).ok_or_else(none)?;
     let answers: Vec<Vec<f64>> = (0..points.len())
         .filter_map(|left_out| {

@@ -48,7 +48,8 @@ fn truncated(expected: usize, found: usize) -> String {
 
 pub(super) fn unreadable(path: &Path, error: std::io::Error) -> Error {
     if error.kind() == std::io::ErrorKind::InvalidData {
-        return InputError::plain(format!("{}: not a text file", path.display()), None).into();
+        let help = "an ESRI grid is text; `kind = \"geotiff\"` and `kind = \"png\"` read pictures".to_owned();
+        return InputError::plain(format!("{}: not a text file", path.display()), Some(help)).into();
     }
     let message = format!("{}: {error}", path.display());
     InputError::plain(message, Some("the path is relative to the scenario's folder".into())).into()

@@ -141,7 +141,10 @@ fn wanted(arguments: &CompareArguments, base: &Scenario, soil: Option<&Soil>) ->
         (Some(soil), true) => vec![soil.module.clone()],
         (Some(_), false) => once("--soils", &arguments.soils, String::clone),
         (None, true) => vec![String::new()],
-        (None, false) => return Err(InputError::plain("--soils: the scenario has no soil", None).into()),
+        (None, false) => {
+            let help = "leave --soils out, or give the scenario a soil".to_owned();
+            return Err(InputError::plain("--soils: the scenario has no soil", Some(help)).into());
+        }
     };
     let steps: Vec<Option<f64>> = match arguments.steps.is_empty() {
         true => vec![None],
@@ -190,7 +193,10 @@ fn references(arguments: &CompareArguments, wanted: &Wanted) -> Result<Vec<Choic
         return Err(InputError::plain(message, help).into());
     }
     match given {
-        Some(_) => Err(InputError::plain("--reference-step: an earlier run has its own step", None).into()),
+        Some(_) => {
+            let help = "leave --reference-step out, or name a strategy with --reference".to_owned();
+            Err(InputError::plain("--reference-step: an earlier run has its own step", Some(help)).into())
+        }
         None => Ok(Vec::new()),
     }
 }
@@ -295,7 +301,8 @@ fn soil_of(scenario: &Scenario, arguments: &RunArguments) -> Result<Option<Soil>
     }
     if soils.len() > 1 {
         let message = "the scenario has several soils: it is not clear which one --soils replaces";
-        return Err(InputError::plain(message, None).into());
+        let help = "take one of them out: the terrain can belong to one only".to_owned();
+        return Err(InputError::plain(message, Some(help)).into());
     }
     Ok(soils.pop())
 }

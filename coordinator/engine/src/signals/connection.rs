@@ -202,7 +202,9 @@ pub fn connect(
                 .map_err(|message| refuse(&connection.to, message, None))?;
             if let Some((other, _)) = fed.iter().find(|(_, input)| *input == to) {
                 let message = format!("`{target}` is fed by `{other}` already and cannot take `{name}` too");
-                return Err(refuse(&connection.to, message, None));
+                let help = "an input takes one number: delete one of the two, or let a module add them up"
+                    .to_owned();
+                return Err(refuse(&connection.to, message, Some(help)));
             }
             fed.push((name.to_owned(), to));
             match from.describe(instances).value_type {

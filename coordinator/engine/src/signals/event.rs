@@ -55,7 +55,8 @@ impl TimeLine {
         for spec in specs {
             for (name, value) in &spec.set {
                 if let Some(reason) = variable(name, spec)?.objection(instances, value) {
-                    return Err(source.error_in(spec.entry, &[name], reason, None));
+                    let help = format!("`terraglue variables SCENARIO {name}` shows what it takes");
+                    return Err(source.error_in(spec.entry, &[name], reason, Some(help)));
                 }
             }
             for action in &spec.act {

@@ -357,7 +357,8 @@ fn groups(scenario: &Scenario, instances: &[Instance]) -> Result<Vec<Group>> {
             instances[second].name()
         );
         let source = &scenario.source;
-        return Err(source.error_at_value(&[instances[second].name()], message, None).into());
+        let help = "take one out; regions of a soil can have other parameters (docs/soil.md)".to_owned();
+        return Err(source.error_at_value(&[instances[second].name()], message, Some(help)).into());
     }
     // the smallest member that a subsystem is connected with; none: it is not glued
     let mut root: Vec<Option<usize>> = vec![None; instances.len()];
@@ -484,7 +485,8 @@ fn control(scenario: &Scenario, groups: &[Group], instances: &[Instance]) -> Res
     if shortest > longest {
         let at = &["gluing", "step_min_s"];
         let message = format!("{shortest} s is longer than time.step_s, the longest step");
-        return Err(scenario.source.error_at_value(at, message, None).into());
+        let help = "make it shorter, or leave it out for a hundredth of time.step_s".to_owned();
+        return Err(scenario.source.error_at_value(at, message, Some(help)).into());
     }
     Ok(Some(StepControl::new(tolerance, [shortest, longest])))
 }

@@ -1,4 +1,4 @@
-//! The comparison at a glance, for a terminal: one line per run with its distance, its prints, its energy balance and its cost. It
+//! The comparison at a glance, for a terminal and the head of the page: one line per run with its distance, its prints, its energy balance and its cost. It
 //! is no wider than the terminal; all figures stand in the files and behind `--details`.
 
 use crate::compare::table::{cell, failures};
@@ -10,7 +10,7 @@ use comfy_table::{Cell, CellAlignment, Color, ColumnConstraint, ContentArrangeme
 const WIDTH: u16 = 80;
 
 /// The figures, by their keys in the files, with short heads.
-const FIGURES: [(&str, &str); 4] = [
+pub(crate) const FIGURES: [(&str, &str); 4] = [
     ("distance_m", "distance"),
     ("print_depth_m", "median\nprint"),
     ("energy_drift_share", "energy\ndrift"),
@@ -38,7 +38,7 @@ pub(crate) fn terminal(rows: &[CompareRow]) -> String {
         if row.failure().is_some() {
             name += if row.summary.is_some() { " (ended early)" } else { " (did not run)" };
         }
-        let figures = FIGURES.iter().map(|(key, _)| figure(key, k, rows));
+        let figures = FIGURES.iter().map(|(key, _)| in_terminal(figure(key, k, rows)));
         table.add_row(std::iter::once(Cell::new(name.trim())).chain(figures));
     }
     for column in table.column_iter_mut().skip(1) {
@@ -62,12 +62,22 @@ fn parts(row: &CompareRow) -> Vec<String> {
     all
 }
 
-fn figure(key: &str, k: usize, rows: &[CompareRow]) -> Cell {
-    let Some(column) = columns::ALL.iter().find(|c| c.key == key) else { return Cell::new("") };
+/// What stands in a cell, and how it is marked.
+pub(crate) struct Figure {
+    pub text: String,
+    /// The best of its column.
+    pub best: bool,
+    /// An energy that drifts by more than 1 %.
+    pub off: bool,
+}
+
+/// The figure of a run, by its key in the files.
+pub(crate) fn figure(key: &str, k: usize, rows: &[CompareRow]) -> Figure {
+    let plain = |text| Figure { text, best: false, off: false };
+    let Some(column) = columns::ALL.iter().find(|c| c.key == key) else { return plain(String::new()) };
     let row = &rows[k];
     let energies = row.summary.as_ref().map(|s| &s.energies);
     if key == "energy_drift_share" {
-        let off = energies.is_some_and(|e| e.is_off());
         let text = match (column.value)(row) {
             Some(share) => format!("{}\u{a0}%", number(100.0 * share, 3)),
             // nothing was turned over
@@ -76,11 +86,18 @@ fn figure(key: &str, k: usize, rows: &[CompareRow]) -> Cell {
                 None => column.text(row),
             },
         };
-        return if off { Cell::new(format!("! {text}")).fg(Color::Red) } else { Cell::new(text) };
+        return Figure { off: energies.is_some_and(|e| e.is_off()), ..plain(text) };
     }
     let best = columns::best(column, rows).get(k).copied().unwrap_or(false);
-    let text = column.text(row);
-    Cell::new(if best { format!("* {text}") } else { text })
+    Figure { best, ..plain(column.text(row)) }
+}
+
+fn in_terminal(figure: Figure) -> Cell {
+    match figure {
+        Figure { off: true, text, .. } => Cell::new(format!("! {text}")).fg(Color::Red),
+        Figure { best: true, text, .. } => Cell::new(format!("* {text}")),
+        Figure { text, .. } => Cell::new(text),
+    }
 }
 
 #[cfg(test)]

@@ -2,7 +2,7 @@
 
 use crate::compare::scatter::{self, Series};
 use crate::compare::table::{varied, varied_keys};
-use crate::compare::{CompareRow, columns, grounds, relative};
+use crate::compare::{CompareRow, columns, grounds, overview, relative};
 use crate::reader::Recording;
 use crate::report::energy_card;
 use crate::report::figure::{Curve, Figure, Panel};
@@ -33,9 +33,9 @@ pub(crate) fn render(folder: &Path, rows: &[CompareRow], runs: &[Run]) -> String
         rows.len(),
         escape(scenario)
     ));
+    page.section("At a glance", "figures", &glance(folder, rows));
     let books = rows.iter().filter_map(|r| Some((r.name(), &r.summary.as_ref()?.energies)));
     page.section("Where the energy went", "energies", &energy_card::table(books));
-    page.section("At a glance", "figures", &html_table(folder, rows));
     let shown: Vec<_> = runs
         .iter()
         .filter_map(|run| Some((run.name.as_str(), relative(folder, &rows[run.row])?, &run.recording)))
@@ -49,6 +49,11 @@ pub(crate) fn render(folder: &Path, rows: &[CompareRow], runs: &[Run]) -> String
     for figure in [gluing(runs), forces(runs), body(runs)].into_iter().flatten() {
         page.figure(figure);
     }
+    let all = format!(
+        "<details><summary>Every figure of every run</summary>{}</details>",
+        html_table(folder, rows)
+    );
+    page.section("All figures", "all", &all);
     page.finish()
 }
 
@@ -90,6 +95,46 @@ pub(crate) fn open(rows: &[CompareRow]) -> Vec<Run> {
         Some(Run { row, name: of.name(), colour: row, recording, legs })
     };
     rows.iter().enumerate().filter_map(one).collect()
+}
+
+/// What is asked first, as in the terminal.
+fn glance(folder: &Path, rows: &[CompareRow]) -> String {
+    let mut out =
+        String::from("<div class=\"wide\"><table class=\"rows\"><thead><tr><th class=\"name\">run</th>");
+    for (_, title) in overview::FIGURES {
+        let _ = write!(out, "<th>{}</th>", title.replace('\n', " "));
+    }
+    out.push_str("</tr></thead><tbody>");
+    for (k, row) in rows.iter().enumerate() {
+        let name = escape(&row.name());
+        let _ = match relative(folder, row) {
+            Some(place) => {
+                write!(out, "<tr><td class=\"name\"><a href=\"{}/{REPORT}\">{name}</a></td>", escape(&place))
+            }
+            None => write!(out, "<tr><td class=\"name\">{name}</td>"),
+        };
+        for (key, _) in overview::FIGURES {
+            let figure = overview::figure(key, k, rows);
+            let class = if figure.off {
+                "off"
+            } else if figure.best {
+                "best"
+            } else {
+                ""
+            };
+            let _ = write!(out, "<td class=\"{class}\">{}</td>", escape(&figure.text));
+        }
+        out.push_str("</tr>");
+        if let Some(failure) = row.failure() {
+            let _ = write!(
+                out,
+                "<tr class=\"failed\"><td class=\"why\" colspan=\"5\">{}</td></tr>",
+                escape(&failure)
+            );
+        }
+    }
+    out.push_str("</tbody></table></div><p class=\"hint\">● best of its column; red: more than 1 % of the energy is missing.</p>");
+    out
 }
 
 fn html_table(folder: &Path, rows: &[CompareRow]) -> String {
@@ -185,8 +230,9 @@ fn forces(runs: &[Run]) -> Option<Figure> {
     let panel = |(choice, foot): (usize, &String)| {
         let curve = |run: &Run| {
             let leg = run.legs.iter().find(|l| l.body == *foot)?;
-            let t: Vec<f64> = run.recording.gluing.iter().map(|g| g.t).collect();
-            Some(Curve::new(run.name.clone(), run.colour, &t, leg.normal_n.clone()))
+            let made = run.recording.first_step();
+            let t: Vec<f64> = run.recording.gluing[made..].iter().map(|g| g.t).collect();
+            Some(Curve::new(run.name.clone(), run.colour, &t, leg.normal_n[made..].to_vec()))
         };
         let curves = runs.iter().filter_map(curve).collect();
         Panel { choice: Some(choice), ..Panel::new(&format!("normal force on {foot}"), "N", curves) }

@@ -38,9 +38,11 @@ fn list(class: &str, cards: impl IntoIterator<Item = Card>) -> String {
     for c in cards {
         let _ = write!(
             out,
-            r#"<div class="card{}"><dt>{}</dt><dd><b>{}</b>&#8239;<span class="unit">{}</span></dd><p>{}</p></div>"#,
+            r#"<div class="card{}"><dt>{}</dt><dd><b{}>{}</b>&#8239;<span class="unit">{}</span></dd><p>{}</p></div>"#,
             if c.off { " off" } else { "" },
             c.label,
+            // words are longer than numbers
+            if c.value.contains(|ch: char| ch.is_ascii_digit()) { "" } else { " class=\"word\"" },
             c.value,
             escape(&c.unit),
             c.more

@@ -51,10 +51,12 @@ fn forces(recording: &Recording, legs: &[Leg]) -> Option<Figure> {
     if legs.is_empty() {
         return None;
     }
-    let t: Vec<f64> = recording.gluing.iter().map(|g| g.t).collect();
-    let curve = |(k, leg): (usize, &Leg)| Curve::new(leg.body.clone(), k, &t, leg.normal_n.clone());
+    let made = recording.first_step();
+    let t: Vec<f64> = recording.gluing[made..].iter().map(|g| g.t).collect();
+    let curve = |(k, leg): (usize, &Leg)| Curve::new(leg.body.clone(), k, &t, leg.normal_n[made..].to_vec());
     let curves: Vec<Curve> = legs.iter().enumerate().map(curve).collect();
-    let total = (0..t.len()).map(|row| legs.iter().map(|l| l.normal_n[row]).sum()).collect();
+    let total =
+        (made..recording.gluing.len()).map(|row| legs.iter().map(|l| l.normal_n[row]).sum()).collect();
     let mut panels = vec![Panel::new("normal force", "N", curves)];
     if legs.len() > 1 {
         panels.push(Panel::new("sum of normal forces", "N", vec![Curve::new("sum", 0, &t, total)]));

@@ -50,9 +50,21 @@ fn without_false_start(bytes: &mut [u8]) {
     }
 }
 
+/// A binary STL file that ends before its triangles do: half a mesh is another shape.
+fn cut_off(bytes: &[u8]) -> Option<String> {
+    let count = u32::from_le_bytes(bytes.get(80..84)?.try_into().ok()?);
+    let there = (bytes.len() - STL.0) / STL.1;
+    let is_text = bytes.starts_with(b"solid") && bytes.iter().take(512).all(|b| b.is_ascii());
+    (!is_text && there < count as usize)
+        .then(|| format!("it names {count} triangles and holds {there}: it was cut off; export it again"))
+}
+
 fn by_loader(path: &Path, ending: &str, bytes: &mut [u8]) -> Result<Mesh, String> {
     if ending == "stl" {
         without_false_start(bytes);
+        if let Some(why) = cut_off(bytes) {
+            return Err(why);
+        }
     }
     // The loader chooses by the ending as it is written most often.
     let named = path.with_extension(ending);

@@ -404,6 +404,20 @@ impl Dynamics {
         Err(Failure::Branches { rounds })
     }
 
+    /// Like [`Dynamics::solve`] where nothing but the branches of the axes is asked for: where the present ones hold, the
+    /// joints are not closed to the last, and `ends` and `turns` stay as they were.
+    pub fn find_branches(&mut self) -> Result<(), Failure> {
+        let plain = !self.integrator.is_second_order() && !self.contacts.any() && !self.closes();
+        if plain {
+            self.ensure_factor()?;
+            self.solve_branch()?;
+            if !self.change_branches(false) {
+                return Ok(());
+            }
+        }
+        self.solve()
+    }
+
     /// The step on the present branches, but for what it leaves open of the joints.
     fn solve_branch(&mut self) -> Result<(), Failure> {
         self.assemble();

@@ -6,23 +6,37 @@ use libm::asin;
 ///
 /// Inclusion and exclusion of four quadrant areas of the unit disc, each in closed form.
 pub fn disc_in_rectangle(centre: [f64; 2], radius: f64, low: [f64; 2], high: [f64; 2]) -> f64 {
-    let unit = |k: usize, v: f64| (v - centre[k]) / radius;
-    let (x0, x1) = (unit(0, low[0]), unit(0, high[0]));
-    let (y0, y1) = (unit(1, low[1]), unit(1, high[1]));
-    let area = quadrant(x1, y1) - quadrant(x0, y1) - quadrant(x1, y0) + quadrant(x0, y0);
+    let edge = |k: usize, v: f64| Edge::at((v - centre[k]) / radius);
+    let [x0, x1] = [low, high].map(|v| edge(0, v[0]));
+    let [y0, y1] = [low, high].map(|v| edge(1, v[1]));
+    let area = quadrant(&x1, &y1) - quadrant(&x0, &y1) - quadrant(&x1, &y0) + quadrant(&x0, &y0);
     (area * radius * radius).max(0.0)
 }
 
-/// Area of the unit disc where X ≤ x and Y ≤ y.
-fn quadrant(x: f64, y: f64) -> f64 {
-    let (x, y) = (x.clamp(-1.0, 1.0), y.clamp(-1.0, 1.0));
-    if x * x + y * y <= 1.0 {
-        return std::f64::consts::FRAC_PI_4 + x * y + 0.5 * (segment(x) + segment(y));
+/// A line across the unit disc.
+struct Edge {
+    /// Its distance from the middle, −1 … 1.
+    at: f64,
+    /// [`segment`] there.
+    segment: f64,
+}
+
+impl Edge {
+    fn at(v: f64) -> Self {
+        let at = v.clamp(-1.0, 1.0);
+        Self { at, segment: segment(at) }
     }
-    match (x > 0.0, y > 0.0) {
-        (true, true) => segment(x) + segment(y),
-        (false, true) => std::f64::consts::FRAC_PI_2 + segment(x),
-        (true, false) => std::f64::consts::FRAC_PI_2 + segment(y),
+}
+
+/// Area of the unit disc where X ≤ x and Y ≤ y.
+fn quadrant(x: &Edge, y: &Edge) -> f64 {
+    if x.at * x.at + y.at * y.at <= 1.0 {
+        return std::f64::consts::FRAC_PI_4 + x.at * y.at + 0.5 * (x.segment + y.segment);
+    }
+    match (x.at > 0.0, y.at > 0.0) {
+        (true, true) => x.segment + y.segment,
+        (false, true) => std::f64::consts::FRAC_PI_2 + x.segment,
+        (true, false) => std::f64::consts::FRAC_PI_2 + y.segment,
         (false, false) => 0.0,
     }
 }

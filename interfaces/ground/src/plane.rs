@@ -13,6 +13,8 @@ pub struct Plane {
 
 /// Nodes along a half axis of the fit; larger footprints are sampled every few nodes.
 const HALF_SAMPLES: f64 = 4.0;
+/// Nodes that are read at once.
+const ROW: usize = 32;
 
 /// Fits a plane to the ground around (x, y) within `radius` (m, raised to two cells).
 ///
@@ -28,13 +30,19 @@ pub fn fit_plane<S: Surface + ?Sized>(surface: &S, x: f64, y: f64, radius: f64) 
     let mut sums = Sums::default();
     // Multiples of the stride: the sample points stay put while the footprint moves over them.
     let first = |k: i32| k.div_euclid(stride) * stride + if k.rem_euclid(stride) > 0 { stride } else { 0 };
+    let mut heights = [0.0; ROW];
     for j in (first(j0)..=j1).step_by(stride as usize) {
+        let mut read = first(i0)..first(i0);
         for i in (first(i0)..=i1).step_by(stride as usize) {
+            if i >= read.end {
+                read = i..(i + ROW as i32).min(i1 + 1);
+                surface.heights(i, j, &mut heights[..read.len()]);
+            }
             let p = lattice.position(i, j);
             let (dx, dy) = (p[0] - x, p[1] - y);
             let w = 1.0 - (dx * dx + dy * dy) / (reach * reach);
             if w > 0.0 {
-                sums.add(w * w, dx, dy, surface.height(i, j));
+                sums.add(w * w, dx, dy, heights[(i - read.start) as usize]);
             }
         }
     }

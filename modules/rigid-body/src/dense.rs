@@ -3,11 +3,11 @@
 /// Overwrites the lower triangle of the positive definite `a` (n × n) with L of A = L·Lᵀ. False: not definite.
 pub(crate) fn cholesky(n: usize, a: &mut [f64]) -> bool {
     for j in 0..n {
-        for k in 0..j {
-            let factor = a[k * n + j];
-            for i in j..n {
-                a[j * n + i] -= factor * a[k * n + i];
-            }
+        let (left, right) = a.split_at_mut(j * n);
+        let column = &mut right[j..n];
+        for other in left.chunks_exact(n) {
+            let (factor, other) = (other[j], &other[j..]);
+            column.iter_mut().zip(other).for_each(|(v, o)| *v -= factor * o);
         }
         let pivot = a[j * n + j];
         if pivot <= 0.0 || pivot.is_nan() {
@@ -21,15 +21,52 @@ pub(crate) fn cholesky(n: usize, a: &mut [f64]) -> bool {
 
 /// x = A⁻¹·x with the factor of [`cholesky`].
 pub(crate) fn cholesky_solve(n: usize, l: &[f64], x: &mut [f64]) {
+    for (j, column) in l.chunks_exact(n.max(1)).take(n).enumerate() {
+        let (head, below) = x.split_at_mut(j + 1);
+        head[j] /= column[j];
+        below.iter_mut().zip(&column[j + 1..]).for_each(|(v, l)| *v -= l * head[j]);
+    }
+    for (j, column) in l.chunks_exact(n.max(1)).take(n).enumerate().rev() {
+        let below: f64 = column[j + 1..].iter().zip(&x[j + 1..n]).map(|(l, x)| l * x).sum();
+        x[j] = (x[j] - below) / column[j];
+    }
+}
+
+/// Overwrites `a` (n × n) with its factors L (below the diagonal, which is 1) and U; `order`: which row takes whose place,
+/// largest pivots first. False: singular.
+pub(crate) fn lu(n: usize, a: &mut [f64], order: &mut Vec<usize>) -> bool {
+    order.clear();
     for j in 0..n {
-        x[j] /= l[j * n + j];
-        for i in j + 1..n {
-            x[i] -= l[j * n + i] * x[j];
+        let column = &a[j * n..(j + 1) * n];
+        let p = (j + 1..n).fold(j, |best, i| if column[i].abs() > column[best].abs() { i } else { best });
+        let pivot = column[p];
+        if pivot == 0.0 || !pivot.is_finite() {
+            return false;
+        }
+        order.push(p);
+        a.chunks_exact_mut(n).for_each(|column| column.swap(j, p));
+        let (left, right) = a.split_at_mut((j + 1) * n);
+        let factors = &mut left[j * n + j + 1..];
+        factors.iter_mut().for_each(|f| *f /= pivot);
+        for column in right.chunks_exact_mut(n) {
+            let (head, below) = column.split_at_mut(j + 1);
+            below.iter_mut().zip(&*factors).for_each(|(v, f)| *v -= f * head[j]);
         }
     }
-    for j in (0..n).rev() {
-        let below: f64 = (j + 1..n).map(|i| l[j * n + i] * x[i]).sum();
-        x[j] = (x[j] - below) / l[j * n + j];
+    true
+}
+
+/// x = A⁻¹·x with the factors of [`lu`].
+pub(crate) fn lu_solve(n: usize, a: &[f64], order: &[usize], x: &mut [f64]) {
+    order.iter().enumerate().for_each(|(j, p)| x.swap(j, *p));
+    for (j, column) in a.chunks_exact(n).enumerate() {
+        let (head, below) = x.split_at_mut(j + 1);
+        below.iter_mut().zip(&column[j + 1..]).for_each(|(v, f)| *v -= f * head[j]);
+    }
+    for (j, column) in a.chunks_exact(n).enumerate().rev() {
+        x[j] /= column[j];
+        let (above, rest) = x.split_at_mut(j);
+        above.iter_mut().zip(column).for_each(|(v, u)| *v -= u * rest[0]);
     }
 }
 
@@ -66,6 +103,17 @@ mod tests {
         cholesky_solve(3, &a, &mut x);
         x.iter().for_each(|x| assert!((x - 1.0).abs() < 1e-15));
         assert!(!cholesky(2, &mut [1.0, 2.0, 2.0, 1.0]));
+    }
+
+    #[test]
+    fn a_system_that_is_not_symmetric_is_solved() {
+        // columns (0, 3, 1), (2, 1, 0), (1, 0, 4); the first pivot is not on the diagonal
+        let mut a = [0.0, 3.0, 1.0, 2.0, 1.0, 0.0, 1.0, 0.0, 4.0];
+        let (mut order, mut x) = (Vec::new(), [7.0, 5.0, 13.0]);
+        assert!(lu(3, &mut a, &mut order));
+        lu_solve(3, &a, &order, &mut x);
+        x.iter().zip([1.0, 2.0, 3.0]).for_each(|(x, right)| assert!((x - right).abs() < 1e-14));
+        assert!(!lu(2, &mut [1.0, 2.0, 0.5, 1.0], &mut order));
     }
 
     #[test]

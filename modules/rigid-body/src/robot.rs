@@ -63,6 +63,9 @@ struct Scratch {
     free: Vec<f64>,
 }
 
+/// How a trial is solved.
+type Solve = fn(&mut Dynamics) -> std::result::Result<(), Failure>;
+
 fn failed(failure: Failure) -> Error {
     Error::Failed(failure.to_string())
 }
@@ -145,9 +148,14 @@ impl Robot {
 
     /// Solves the step under the wrenches t.
     fn try_wrenches(&mut self, t: &[f64]) -> Result {
+        self.solve_under(t, Dynamics::solve)
+    }
+
+    /// Loads the wrenches t and solves by `solve`.
+    fn solve_under(&mut self, t: &[f64], solve: Solve) -> Result {
         self.ports.load(&mut self.dynamics, t);
         loop {
-            match self.dynamics.solve() {
+            match solve(&mut self.dynamics) {
                 Err(Failure::Branches { .. }) if self.dynamics.soften(&self.state) => {}
                 done => return done.map_err(failed),
             }
@@ -338,7 +346,7 @@ impl Subsystem for Robot {
         for _ in 0..4 {
             out.unique = self.solve_contact(step, partner, out)?;
             let factor = self.dynamics.factor_count;
-            if self.try_wrenches(out.t_star).is_err() {
+            if self.solve_under(out.t_star, Dynamics::find_branches).is_err() {
                 // An impact that no step can follow: motors stay on the branches without it.
                 out.t_star.fill(0.0);
                 self.try_wrenches(out.t_star)?;

@@ -5,7 +5,7 @@ use parry3d_f64::math::Vector;
 use std::cell::Cell;
 use terraglue_diagnostics::error::{Error, Result};
 use terraglue_ground::{HeightField, Lattice, Surface, TILE_EDGE};
-use terraglue_subsystem::{FieldInfo, FieldTile, Subsystem, Terrain};
+use terraglue_subsystem::{FieldInfo, FieldTile, Subsystem, Terrain, TileValues};
 
 /// What stays the same of a ground over a run, and the bounds of its tiles.
 pub struct Ground {
@@ -169,18 +169,71 @@ impl<'a> Reader<'a> {
         0.0
     }
 
-    /// Highest node of a range (inclusive); what is above `enough` ends the search.
+    /// Highest node of a range (inclusive) inside one tile; what is above `enough` ends the search.
     fn highest(&self, i: (u32, u32), j: (u32, u32), enough: f64) -> f64 {
-        let mut high = f64::NEG_INFINITY;
+        let (mut high, mut row) = (f64::NEG_INFINITY, [0.0; ROW]);
         for j in j.0..=j.1 {
-            for i in i.0..=i.1 {
-                high = high.max(self.height(i as i32, j as i32));
+            for first in (i.0..=i.1).step_by(ROW) {
+                let row = &mut row[..ROW.min((i.1 - first + 1) as usize)];
+                self.heights(first as i32, j as i32, row);
+                high = highest_of(row).max(high);
             }
             if high > enough {
                 return high;
             }
         }
         high
+    }
+
+    /// Calls `part` for the parts of the row (i, j), (i + 1, j) … of `out` that lie in one tile each: the tile's number, its
+    /// first node of the part, and the part. Nodes outside the lattice are left to `one`.
+    fn each_part(
+        &self,
+        (mut i, j): (i32, i32),
+        mut out: &mut [f64],
+        one: impl Fn(i32) -> f64,
+        mut part: impl FnMut([u32; 2], usize, &mut [f64]),
+    ) {
+        let edge = self.edge;
+        while !out.is_empty() {
+            let inside = self.lattice.has(i, j);
+            let (a, b) = (i as u32 / edge, j as u32 / edge);
+            let end = if inside { ((a + 1) * edge).min(self.lattice.size[0]) - i as u32 } else { 1 };
+            let (now, later) = out.split_at_mut(out.len().min(end as usize));
+            if inside {
+                part([a, b], ((j as u32 - b * edge) * edge + i as u32 - a * edge) as usize, now);
+            } else {
+                now[0] = one(i);
+            }
+            (i, out) = (i + now.len() as i32, later);
+        }
+    }
+}
+
+/// Nodes that are read at once.
+const ROW: usize = 32;
+
+/// The largest of some numbers, in four that need not wait for each other.
+fn highest_of(row: &[f64]) -> f64 {
+    let mut most = [f64::NEG_INFINITY; 4];
+    let larger = |m: &mut f64, x: f64| *m = if x > *m { x } else { *m };
+    let parts = row.chunks_exact(4);
+    let rest = parts.remainder();
+    rest.iter().for_each(|x| larger(&mut most[0], *x));
+    parts.for_each(|part| most.iter_mut().zip(part).for_each(|(m, x)| larger(m, *x)));
+    most.into_iter().fold(f64::NEG_INFINITY, f64::max)
+}
+
+/// Values number `first` … of a tile.
+fn copy_row(values: &TileValues, first: usize, out: &mut [f64]) {
+    let range = first..first + out.len();
+    match values {
+        TileValues::Uniform(v) => out.fill(*v),
+        TileValues::F64(data) => out.copy_from_slice(&data[range]),
+        TileValues::F32(data) => out.iter_mut().zip(&data[range]).for_each(|(o, d)| *o = f64::from(*d)),
+        TileValues::Fixed { data, unit } => {
+            out.iter_mut().zip(&data[range]).for_each(|(o, d)| *o = f64::from(*d) * unit);
+        }
     }
 }
 
@@ -205,6 +258,22 @@ impl Surface for Reader<'_> {
         self.last.set(Some((first, tile)));
         self.checked(tile.values.at(((j - first[1]) * self.edge + i - first[0]) as usize), i, j)
     }
+
+    fn heights(&self, i: i32, j: i32, out: &mut [f64]) {
+        self.each_part(
+            (i, j),
+            out,
+            |i| self.height(i, j),
+            |[a, b], first, part| {
+                let Some(tile) = self.tile(a, b) else { return part.fill(0.0) };
+                copy_row(&tile.values, first, part);
+                let i = a * self.edge + first as u32 % self.edge;
+                for (i, height) in (i..).zip(part).filter(|(_, height)| !height.is_finite()) {
+                    *height = self.checked(*height, i, j as u32);
+                }
+            },
+        );
+    }
 }
 
 /// The ground before anything pressed it: current height plus sinkage, where the soil shows its sinkage.
@@ -220,14 +289,47 @@ impl Surface for Undisturbed<'_, '_> {
 
     #[inline]
     fn height(&self, i: i32, j: i32) -> f64 {
+        self.0.height(i, j) + self.sunk(i, j)
+    }
+
+    fn heights(&self, i: i32, j: i32, out: &mut [f64]) {
+        let mut now = [0.0; ROW];
+        for (i, out) in (i..).step_by(ROW).zip(out.chunks_mut(ROW)) {
+            let now = &mut now[..out.len()];
+            self.0.heights(i, j, now);
+            self.raise((i, j), now, out);
+        }
+    }
+}
+
+impl<'a> Undisturbed<'_, 'a> {
+    /// Tile (a, b) of the field `sinkage`; none where the soil shows none.
+    fn tile(&self, [a, b]: [u32; 2]) -> Option<FieldTile<'a>> {
         let reader = self.0;
-        let now = reader.height(i, j);
-        let Source::Field(_, Some(field)) = reader.source else { return now };
+        let Source::Field(_, Some(field)) = reader.source else { return None };
+        reader.recall(&reader.sunk, a, b, || reader.instance.field_tile(*field, a, b).ok())
+    }
+
+    /// How far node (i, j) has sunk, m.
+    fn sunk(&self, i: i32, j: i32) -> f64 {
+        let (reader, edge) = (self.0, self.0.edge);
         let (i, j) = reader.lattice.clamp(i, j);
-        let (a, b) = (i / reader.edge, j / reader.edge);
-        let look = || reader.instance.field_tile(*field, a, b).ok();
-        let Some(tile) = reader.recall(&reader.sunk, a, b, look) else { return now };
-        now + tile.values.at(((j % reader.edge) * reader.edge + i % reader.edge) as usize)
+        let tile = self.tile([i / edge, j / edge]);
+        tile.map_or(0.0, |tile| tile.values.at(((j % edge) * edge + i % edge) as usize))
+    }
+
+    /// Heights of a row as they are `now` and were before; no longer than [`ROW`].
+    fn raise(&self, (i, j): (i32, i32), now: &[f64], out: &mut [f64]) {
+        self.0.each_part(
+            (i, j),
+            out,
+            |i| self.sunk(i, j),
+            |at, first, part| match self.tile(at) {
+                Some(tile) => copy_row(&tile.values, first, part),
+                None => part.fill(0.0),
+            },
+        );
+        out.iter_mut().zip(now).for_each(|(out, now)| *out += *now);
     }
 }
 
@@ -245,6 +347,16 @@ impl Surface for Cut<'_, '_> {
     #[inline]
     fn height(&self, i: i32, j: i32) -> f64 {
         self.0.height(i, j).max(self.0.undisturbed().height(i, j))
+    }
+
+    fn heights(&self, i: i32, j: i32, out: &mut [f64]) {
+        let mut now = [0.0; ROW];
+        for (i, out) in (i..).step_by(ROW).zip(out.chunks_mut(ROW)) {
+            let now = &mut now[..out.len()];
+            self.0.heights(i, j, now);
+            self.0.undisturbed().raise((i, j), now, out);
+            out.iter_mut().zip(now).for_each(|(out, now)| *out = now.max(*out));
+        }
     }
 }
 

@@ -62,6 +62,8 @@ struct Freedom {
     own: f64,
     /// 1/(own + K).
     inverse: f64,
+    /// Its root.
+    root: f64,
     /// K: 1/compliance of the row; 0: free.
     stiffness: f64,
 }
@@ -203,7 +205,7 @@ impl Tree {
         let node = &self.nodes[b];
         for f in &node.freedoms[..node.count] {
             let share = dot(&f.motion, p) * f.inverse;
-            each(share / f.inverse.sqrt());
+            each(share / f.root);
             add(p, -share, &f.response);
         }
         *p = wrench_back(p, &node.shift);
@@ -363,6 +365,7 @@ impl Node {
                 return Err(pivot);
             }
             f.inverse = 1.0 / pivot;
+            f.root = f.inverse.sqrt();
             deflate(a, f.inverse, &f.response);
         }
         Ok(())

@@ -10,7 +10,7 @@
 //! or its rounds no end. Sweeps over the ports (projected Gauss–Seidel) that stay within friction and footprint then
 //! give another answer, and the one with the smaller defect counts.
 
-use crate::dense::{cholesky, cholesky_solve, rank};
+use crate::dense::{cholesky, cholesky_solve, lu, lu_solve, rank};
 use crate::lcp::{Lemke, Outcome};
 use terraglue_subsystem::Port;
 
@@ -27,6 +27,8 @@ const PROXIMAL_MAX: usize = 40;
 const PROXIMAL_CHANGE: f64 = 1e-12;
 /// Still so large a share of T in the last proximal step: what is held cannot be held, and T grows with every step.
 const GROWS: f64 = 1e-2;
+/// Relative change at which what slips with its normal force has arrived.
+const ARRIVED: f64 = 1e-9;
 /// Rounds in which ports change between open, sticking and slipping.
 const MAX_ROUNDS: usize = 24;
 /// Sweeps where rounds have no end, and the relative change that ends them.
@@ -67,6 +69,14 @@ pub(crate) struct Estimator {
     normal_gap: Vec<f64>,
     normal_rhs: Vec<f64>,
     solution: Vec<f64>,
+    /// Motion left open by all components.
+    open: Vec<f64>,
+    /// What slips in proportion to a normal force: component, which unknown, ratio.
+    slipping: Vec<(usize, usize, f64)>,
+    /// Order of the rows of a factor.
+    order: Vec<usize>,
+    /// T before a round.
+    before: Vec<f64>,
     /// Where the rounds ended without a result.
     rounds: Vec<f64>,
 }
@@ -168,8 +178,8 @@ impl Estimator {
         rank(m, &mut self.matrix, 1e-9) == m
     }
 
-    /// Motion of all held components equals the partner's; the proximal point nearest to the present T. False: there is
-    /// none.
+    /// Motion of all held components equals the partner's; the proximal point nearest to the present T. What slips goes
+    /// with the normal force of its port where that can be solved, and stays as it is otherwise. False: there is none.
     fn solve_held(&mut self, p: &Problem, t: &mut [f64]) -> Result<bool, &'static str> {
         let n = p.gap.len();
         self.unknowns.clear();
@@ -178,25 +188,75 @@ impl Estimator {
         if m == 0 {
             return Ok(true);
         }
+        self.follow_normals(p, t);
+        if !self.slipping.is_empty() {
+            self.before.clear();
+            self.before.extend_from_slice(t);
+            self.fill_matrix(p);
+            if lu(m, &mut self.matrix, &mut self.order) {
+                let (settled, arrived) = self.approach(p, t);
+                if arrived {
+                    return Ok(settled);
+                }
+            }
+            t.copy_from_slice(&self.before);
+            self.slipping.clear();
+        }
+        self.fill_matrix(p);
+        if !cholesky(m, &mut self.matrix) {
+            return Err("the compliance of the contacts is not positive definite");
+        }
+        Ok(self.approach(p, t).0)
+    }
+
+    /// Lists what slips in proportion to a normal force that is unknown: component, unknown, ratio.
+    fn follow_normals(&mut self, p: &Problem, t: &[f64]) {
+        self.slipping.clear();
+        for port in p.ports.iter().filter(|port| unilateral(port)) {
+            let first = port.first as usize;
+            let Ok(normal) = self.unknowns.binary_search(&first) else { continue };
+            for (i, _) in port.components().filter(|(i, _)| self.status[*i] == Status::Slipping) {
+                if t[first] > 0.0 {
+                    self.slipping.push((i, normal, t[i] / t[first]));
+                }
+            }
+        }
+    }
+
+    /// G + ε of the unknowns, with what slips along.
+    fn fill_matrix(&mut self, p: &Problem) {
+        let (n, m) = (p.gap.len(), self.unknowns.len());
         self.matrix.clear();
         for c in &self.unknowns {
             let column =
                 self.unknowns.iter().map(|r| p.g[c * n + r] + if r == c { self.epsilon[*c] } else { 0.0 });
             self.matrix.extend(column);
         }
-        if !cholesky(m, &mut self.matrix) {
-            return Err("the compliance of the contacts is not positive definite");
+        for (i, normal, ratio) in &self.slipping {
+            let column = &mut self.matrix[normal * m..(normal + 1) * m];
+            column.iter_mut().zip(&self.unknowns).for_each(|(a, r)| *a += ratio * p.g[i * n + r]);
         }
-        let mut settled = true;
+    }
+
+    /// Proximal steps with the factor at hand; whether T stays bounded, and whether it has arrived.
+    fn approach(&mut self, p: &Problem, t: &mut [f64]) -> (bool, bool) {
+        let m = self.unknowns.len();
+        let (mut settled, mut change, mut size) = (true, f64::INFINITY, 0.0);
         for step in 0..PROXIMAL_MAX {
             // In increments: (G + ε)·dT = −(x_free + G·T − x2), exact to rounding at any size of T.
+            residuals(p, t, &mut self.open);
             self.rhs.clear();
-            self.rhs.extend(self.unknowns.iter().map(|i| -residual(p, t, *i)));
-            cholesky_solve(m, &self.matrix, &mut self.rhs);
+            self.rhs.extend(self.unknowns.iter().map(|i| -self.open[*i]));
+            if self.slipping.is_empty() {
+                cholesky_solve(m, &self.matrix, &mut self.rhs);
+            } else {
+                lu_solve(m, &self.matrix, &self.order, &mut self.rhs);
+            }
             self.unknowns.iter().zip(&self.rhs).for_each(|(i, d)| t[*i] += d);
+            self.slipping.iter().for_each(|(i, normal, ratio)| t[*i] = ratio * t[self.unknowns[*normal]]);
             let largest = |v: &mut dyn Iterator<Item = f64>| v.fold(0.0_f64, |a, x| a.max(x.abs()));
-            let change = largest(&mut self.rhs.iter().copied());
-            let size = largest(&mut t.iter().copied());
+            change = largest(&mut self.rhs.iter().copied());
+            size = largest(&mut t.iter().copied());
             // what rigid motors hold alone grows until their bounds decide in the next round
             let mobile = |(k, _): &(usize, &f64)| self.epsilon[self.unknowns[*k]] != IMMOBILE_REGULARISATION;
             let growth = largest(&mut self.rhs.iter().enumerate().filter(mobile).map(|(_, x)| *x));
@@ -205,7 +265,7 @@ impl Estimator {
                 break;
             }
         }
-        Ok(settled)
+        (settled, change <= ARRIVED * size && size.is_finite())
     }
 
     /// Opens, closes, clips; true when something changed noticeably.
@@ -338,4 +398,14 @@ fn within_bound(port: &Port, t: &mut [f64], mask: u32) {
 fn residual(p: &Problem, t: &[f64], i: usize) -> f64 {
     let n = p.gap.len();
     p.gap[i] + (0..n).map(|k| p.g[k * n + i] * t[k]).sum::<f64>()
+}
+
+/// [`residual`] of all components, column by column.
+fn residuals(p: &Problem, t: &[f64], out: &mut Vec<f64>) {
+    out.clear();
+    out.resize(p.gap.len(), -0.0);
+    for (column, t) in p.g.chunks_exact(p.gap.len().max(1)).zip(t) {
+        out.iter_mut().zip(column).for_each(|(o, g)| *o += g * t);
+    }
+    out.iter_mut().zip(p.gap).for_each(|(o, gap)| *o = gap + *o);
 }

@@ -55,47 +55,63 @@ pub(crate) fn mean_rows(joint: &Joint, starts: &[Motion], ends: &[Motion]) -> Ro
     Rows { directions, anchor: mean(&before.anchor, &after.anchor), lever: mean(&before.lever, &after.lever) }
 }
 
-/// How far the joint is out of place, in the rows' order, m and rad; rows that do not hold are 0.
-pub(crate) fn gap(joint: &Joint, bodies: &[Motion]) -> [f64; 6] {
-    let (parent, child) = (parent_of(joint, bodies), &bodies[joint.child]);
-    let frame = parent.q * joint.parent_frame;
-    let apart = frame
-        .inverse_transform_vector(&(child.point(&joint.child_anchor) - parent.point(&joint.parent_anchor)));
-    let relative = frame.inverse() * (child.q * joint.child_frame);
-    let turned = if joint.kind == Kind::Universal {
-        V3::new(0.0, 0.0, -(relative * V3::y()).x)
-    } else if joint.aligns_axes() {
-        // u_parent × u_child, in the frame of the parent: the axis alone has to agree.
-        let (w, i, j, k) = (relative.w, relative.i, relative.j, relative.k);
-        let (y, z) = (2.0 * (i * j + w * k), 2.0 * (i * k - w * j));
-        V3::new(0.0, -z, y)
-    } else {
-        relative.imag() * (2.0_f64.copysign(relative.w))
-    };
-    let mut gap = [apart.x, apart.y, apart.z, turned.x, turned.y, turned.z];
-    let rigid = joint.rigid();
-    (0..6).filter(|r| !rigid[*r]).for_each(|r| gap[r] = 0.0);
-    gap
+/// Where the child stands against the parent, in the frame of the joint on the parent.
+pub(crate) struct Stand {
+    /// From the parent's anchor to the child's, m.
+    apart: V3,
+    /// Orientation of the child's frame.
+    turn: Q,
 }
 
-/// Coordinate of the joint, rad (continued from `near` over full turns) or m.
-pub(crate) fn coordinate(joint: &Joint, bodies: &[Motion], near: f64) -> f64 {
-    let (parent, child) = (parent_of(joint, bodies), &bodies[joint.child]);
-    let frame = parent.q * joint.parent_frame;
-    match joint.kind {
-        Kind::Prismatic => {
-            frame
-                .inverse_transform_vector(
-                    &(child.point(&joint.child_anchor) - parent.point(&joint.parent_anchor)),
-                )
-                .x
+impl Stand {
+    /// At the given poses.
+    pub fn of(joint: &Joint, bodies: &[Motion]) -> Self {
+        let (parent, child) = (parent_of(joint, bodies), &bodies[joint.child]);
+        let frame = parent.q * joint.parent_frame;
+        let apart = child.point(&joint.child_anchor) - parent.point(&joint.parent_anchor);
+        Self {
+            apart: frame.inverse_transform_vector(&apart),
+            turn: frame.inverse() * (child.q * joint.child_frame),
         }
-        Kind::Revolute => {
-            let relative = frame.inverse() * (child.q * joint.child_frame);
-            unwrap_angle(2.0 * libm::atan2(relative.i, relative.w), near)
-        }
-        _ => 0.0,
     }
+
+    /// How far the joint is out of place, in the rows' order, m and rad; rows that do not hold are 0.
+    pub fn gap(&self, joint: &Joint) -> [f64; 6] {
+        let Self { apart, turn } = self;
+        let turned = if joint.kind == Kind::Universal {
+            V3::new(0.0, 0.0, -(turn * V3::y()).x)
+        } else if joint.aligns_axes() {
+            // u_parent × u_child, in the frame of the parent: the axis alone has to agree.
+            let (w, i, j, k) = (turn.w, turn.i, turn.j, turn.k);
+            let (y, z) = (2.0 * (i * j + w * k), 2.0 * (i * k - w * j));
+            V3::new(0.0, -z, y)
+        } else {
+            turn.imag() * (2.0_f64.copysign(turn.w))
+        };
+        let mut gap = [apart.x, apart.y, apart.z, turned.x, turned.y, turned.z];
+        let rigid = joint.rigid();
+        (0..6).filter(|r| !rigid[*r]).for_each(|r| gap[r] = 0.0);
+        gap
+    }
+
+    /// Coordinate of the joint, rad (continued from `near` over full turns) or m.
+    pub fn coordinate(&self, joint: &Joint, near: f64) -> f64 {
+        match joint.kind {
+            Kind::Prismatic => self.apart.x,
+            Kind::Revolute => unwrap_angle(2.0 * libm::atan2(self.turn.i, self.turn.w), near),
+            _ => 0.0,
+        }
+    }
+}
+
+/// [`Stand::gap`] at the given poses.
+pub(crate) fn gap(joint: &Joint, bodies: &[Motion]) -> [f64; 6] {
+    Stand::of(joint, bodies).gap(joint)
+}
+
+/// [`Stand::coordinate`] at the given poses.
+pub(crate) fn coordinate(joint: &Joint, bodies: &[Motion], near: f64) -> f64 {
+    Stand::of(joint, bodies).coordinate(joint, near)
 }
 
 /// Pose of the child (centre of mass and orientation) for a coordinate.

@@ -33,7 +33,7 @@ use crate::state::{Load, Motion, State};
 use anderson::Anderson;
 use carried::Carried;
 use closing::Closing;
-use joint_rows::{coordinate, gap};
+use joint_rows::Stand;
 use kkt::Kkt;
 use scheme::{Acceleration, Integrator};
 use terraglue_linear_solver::{Error as SolverError, Rows};
@@ -260,11 +260,12 @@ impl Dynamics {
             self.rows[j] = joint_rows::rows(joint, &self.starts);
             self.axes[j].renew(s, joint.limits, &span);
             self.modes[j] = self.axes[j].start(s.mode);
-            let open = gap(joint, &self.ends);
+            let stand = Stand::of(joint, &self.ends);
+            let open = stand.gap(joint);
             let rates = self.rates(j, &self.free);
             let at = self.kkt.joint_at[j];
             if let Some(free) = joint.free_row() {
-                let travel = coordinate(joint, &self.ends, s.angle) - s.angle;
+                let travel = stand.coordinate(joint, s.angle) - s.angle;
                 self.curvature[j] = travel / self.h - rates[free];
             }
             let rigid = joint.rigid();
@@ -401,6 +402,20 @@ impl Dynamics {
             }
         }
         Err(Failure::Branches { rounds })
+    }
+
+    /// Like [`Dynamics::solve`] where nothing but the branches of the axes is asked for: where the present ones hold, the
+    /// joints are not closed to the last, and `ends` and `turns` stay as they were.
+    pub fn find_branches(&mut self) -> Result<(), Failure> {
+        let plain = !self.integrator.is_second_order() && !self.contacts.any() && !self.closes();
+        if plain {
+            self.ensure_factor()?;
+            self.solve_branch()?;
+            if !self.change_branches(false) {
+                return Ok(());
+            }
+        }
+        self.solve()
     }
 
     /// The step on the present branches, but for what it leaves open of the joints.

@@ -8,6 +8,36 @@ use terraglue_soil_law::ShearResponse;
 /// A 6 × 6 stiffness, rows: components of the wrench on the soil, columns: components of X.
 pub type Stiffness = [[f64; 6]; 6];
 
+/// What the laws answered at the nodes of the patches in one motion of their feet, for the stiffness there: it needs no
+/// second look at the laws.
+#[derive(Clone, Debug, Default)]
+pub struct Noted {
+    /// Node, slope of its pressure (Pa/m), answer of its shear law; patch after patch.
+    nodes: Vec<(usize, f64, ShearResponse)>,
+    /// Per patch one past its last node above, and the force of its law along n, N.
+    patches: Vec<(usize, f64)>,
+}
+
+impl Noted {
+    /// Forgets all patches.
+    pub fn clear(&mut self) {
+        self.nodes.clear();
+        self.patches.clear();
+    }
+
+    /// Room for `nodes` nodes.
+    pub fn reserve(&mut self, nodes: usize) {
+        self.nodes.reserve(nodes);
+    }
+
+    /// The nodes of patch `p`, and the force of its law along n, N.
+    fn of(&self, p: usize) -> (&[(usize, f64, ShearResponse)], f64) {
+        let first = p.checked_sub(1).map_or(0, |before| self.patches[before].0);
+        let (end, force) = self.patches[p];
+        (&self.nodes[first..end], force)
+    }
+}
+
 impl Patches {
     /// Wrench of the laws on the body (n, t1, t2, mn, mt1, mt2) when the foot of patch `p` has moved by `x`.
     pub fn law_wrench(&self, p: usize, x: &[f64; 6]) -> [f64; 6] {
@@ -22,6 +52,21 @@ impl Patches {
     /// The same with the inertia of the soil that moves with the foot.
     pub fn wrench(&self, p: usize, x: &[f64; 6]) -> [f64; 6] {
         let mut sum = self.law_wrench(p, x);
+        if let Some(cone) = &self.ports[p].cone {
+            cone.add_to(x, &mut sum);
+        }
+        sum
+    }
+
+    /// [`Patches::wrench`] of the next patch `p`, with its answers added to `noted`.
+    pub fn noted_wrench(&self, p: usize, x: &[f64; 6], noted: &mut Noted) -> [f64; 6] {
+        let mut sum = [0.0; 6];
+        self.each_answer(p, x, |k, pressure, slope, r| {
+            add_force(&mut sum, self.nodes.arm[k], self.node_force(k, pressure, r.stress));
+            noted.nodes.push((k, slope, *r));
+        });
+        self.add_beside(p, x, &mut sum);
+        noted.patches.push((noted.nodes.len(), sum[0]));
         if let Some(cone) = &self.ports[p].cone {
             cone.add_to(x, &mut sum);
         }
@@ -83,25 +128,66 @@ impl Patches {
         })
     }
 
+    /// Force of patch `p` on the body along n at `x`, N, and by how much it falls with X_n, N/m.
+    pub fn normal_force(&self, p: usize, x: &[f64; 6]) -> [f64; 2] {
+        let (n, mut sum, mut stiffness) = (&self.nodes, [0.0; 6], 0.0);
+        self.each_answer(p, x, |k, pressure, slope, r| {
+            add_force(&mut sum, n.arm[k], self.node_force(k, pressure, r.stress));
+            stiffness += node_slope(&n.facing[k], n.area[k], slope, r, [0, 0]);
+        });
+        self.add_beside(p, x, &mut sum);
+        if let Some(cone) = &self.ports[p].cone {
+            let mut all = [[0.0; 6]; 6];
+            all[0][0] = stiffness;
+            cone.stiffen(x, sum[0], &mut all);
+            cone.add_to(x, &mut sum);
+            stiffness = all[0][0];
+        }
+        [sum[0], stiffness]
+    }
+
     /// d(wrench on the soil)/dX at `x`: consistent tangents of both laws, moved to the port's origin.
     pub fn stiffness(&self, p: usize, x: &[f64; 6]) -> Stiffness {
         let mut sum = [[0.0; 6]; 6];
         let moments = self.ports[p].carries_moments();
-        self.each_answer(p, x, |k, _, slope, r| {
-            let node = node_stiffness(&self.nodes.facing[k], self.nodes.area[k], slope, r);
-            add_stiffness(&mut sum, self.nodes.arm[k], &node, moments);
-        });
-        let wall = &self.ports[p].wall;
-        if !wall.is_empty() {
-            let block = wall.stiffness(&self.beside(p, x));
-            for (row, values) in sum.iter_mut().zip(&block) {
-                row.iter_mut().zip(values).for_each(|(s, v)| *s += v);
-            }
-        }
+        self.each_answer(p, x, |k, _, slope, r| self.stiffen(k, slope, r, moments, &mut sum));
+        self.stiffen_beside(p, x, &mut sum);
         if let Some(cone) = &self.ports[p].cone {
             cone.stiffen(x, self.law_wrench(p, x)[0], &mut sum);
         }
         sum
+    }
+
+    /// The same where [`Patches::noted_wrench`] was asked at `x` before.
+    pub fn noted_stiffness(&self, p: usize, x: &[f64; 6], noted: &Noted) -> Stiffness {
+        let mut sum = [[0.0; 6]; 6];
+        let moments = self.ports[p].carries_moments();
+        let (nodes, force) = noted.of(p);
+        nodes.iter().for_each(|(k, slope, r)| self.stiffen(*k, *slope, r, moments, &mut sum));
+        self.stiffen_beside(p, x, &mut sum);
+        if let Some(cone) = &self.ports[p].cone {
+            cone.stiffen(x, force, &mut sum);
+        }
+        sum
+    }
+
+    /// Adds the stiffness of node k.
+    #[inline]
+    fn stiffen(&self, k: usize, slope: f64, r: &ShearResponse, moments: bool, sum: &mut Stiffness) {
+        let node = node_stiffness(&self.nodes.facing[k], self.nodes.area[k], slope, r);
+        add_stiffness(sum, self.nodes.arm[k], &node, moments);
+    }
+
+    /// Adds the stiffness of the soil beside patch `p`.
+    fn stiffen_beside(&self, p: usize, x: &[f64; 6], sum: &mut Stiffness) {
+        let wall = &self.ports[p].wall;
+        if wall.is_empty() {
+            return;
+        }
+        let block = wall.stiffness(&self.beside(p, x));
+        for (row, values) in sum.iter_mut().zip(&block) {
+            row.iter_mut().zip(values).for_each(|(s, v)| *s += v);
+        }
     }
 
     /// Calls `visit(node, pressure, slope, answer of the shear law)` for the nodes with pressure or tension.
@@ -164,15 +250,17 @@ pub fn dot(a: [f64; 3], b: [f64; 3]) -> f64 {
 /// d(force on the soil)/d(displacement) of a node: area·p acts along `press` and p falls with the displacement along
 /// it; the shear acts on the inclined area.
 pub fn node_stiffness(facing: &Facing, area: f64, slope: f64, r: &ShearResponse) -> [[f64; 3]; 3] {
+    std::array::from_fn(|a| std::array::from_fn(|b| node_slope(facing, area, slope, r, [a, b])))
+}
+
+/// One entry of [`node_stiffness`].
+#[inline]
+fn node_slope(facing: &Facing, area: f64, slope: f64, r: &ShearResponse, [a, b]: [usize; 2]) -> f64 {
     let (g, [e, f], c) = (facing.press, facing.along, r.tangent);
     let inclined = area * facing.stretch;
-    std::array::from_fn(|a| {
-        std::array::from_fn(|b| {
-            let tangent = e[a] * (c[0] * e[b] + c[1] * f[b]) + f[a] * (c[1] * e[b] + c[2] * f[b]);
-            let by_pressure = r.by_pressure[0] * e[a] + r.by_pressure[1] * f[a];
-            area * slope * g[a] * g[b] + inclined * (tangent - by_pressure * slope * g[b])
-        })
-    })
+    let tangent = e[a] * (c[0] * e[b] + c[1] * f[b]) + f[a] * (c[1] * e[b] + c[2] * f[b]);
+    let by_pressure = r.by_pressure[0] * e[a] + r.by_pressure[1] * f[a];
+    area * slope * g[a] * g[b] + inclined * (tangent - by_pressure * slope * g[b])
 }
 
 /// Adds the wrench of a force at `arm`: (f, arm × f).

@@ -5,8 +5,8 @@
 //! kinks of unloading and slip until |r| falls. So T is what the law gives at the motion that the bodies then make: nothing is
 //! left to iterate between both, and action equals reaction as far as the bodies are linear within the step.
 
+use crate::assemble::{Noted, Stiffness};
 use crate::patch::Patches;
-use nalgebra::{DMatrixViewMut, linalg::gauss_step, linalg::gauss_step_swap};
 use terraglue_subsystem::Estimate;
 
 /// Newton steps at most.
@@ -26,14 +26,20 @@ pub struct Compatibility {
     residual: Vec<f64>,
     d: Vec<f64>,
     base: Vec<f64>,
-    stiffness: Vec<f64>,
+    /// What the laws answered at `x`.
+    noted: Noted,
     /// [I + K·G | −r], column-major n × (n + 1).
     matrix: Vec<f64>,
 }
 
 impl Compatibility {
+    /// Room for `nodes` nodes of all contacts.
+    pub fn reserve(&mut self, nodes: usize) {
+        self.noted.reserve(nodes);
+    }
+
     /// Solves for the wrench. `Some(|r|)`, N: it was not found.
-    pub fn solve(&mut self, patches: &mut Patches, n: usize, estimate: &Estimate) -> Option<f64> {
+    pub fn solve(&mut self, patches: &Patches, n: usize, estimate: &Estimate) -> Option<f64> {
         for buffer in [&mut self.t, &mut self.x, &mut self.residual, &mut self.d, &mut self.base] {
             buffer.clear();
             buffer.resize(n, 0.0);
@@ -69,50 +75,29 @@ impl Compatibility {
         for (column, t) in estimate.g.chunks_exact(self.t.len().max(1)).zip(&self.t) {
             self.x.iter_mut().zip(column).for_each(|(x, g)| *x += g * t);
         }
+        self.noted.clear();
         for (p, patch) in patches.ports.iter().enumerate() {
-            let wrench = patches.wrench(p, &patch.unpack(&self.x));
+            let wrench = patches.noted_wrench(p, &patch.unpack(&self.x), &mut self.noted);
             patch.pack(&wrench, &mut self.residual);
         }
         self.residual.iter_mut().zip(&self.t).for_each(|(r, t)| *r = t - *r);
         self.residual.iter().fold(0.0, |m: f64, r| if r.is_nan() { f64::INFINITY } else { m.max(r.abs()) })
     }
 
-    /// d = −(I + K·G)⁻¹·r; whether there is one.
-    fn newton(&mut self, patches: &mut Patches, n: usize, g: &[f64]) -> bool {
-        self.stiffness.clear();
-        self.stiffness.resize(n * n, 0.0);
-        for p in 0..patches.ports.len() {
-            let block = patches.stiffness(p, &patches.ports[p].unpack(&self.x));
-            crate::trial::scatter(&patches.ports[p], &block, n, &mut self.stiffness);
-        }
+    /// d = −(I + K·G)⁻¹·r at the motion of the last evaluation; whether there is one.
+    fn newton(&mut self, patches: &Patches, n: usize, g: &[f64]) -> bool {
         self.matrix.clear();
         self.matrix.resize(n * (n + 1), 0.0);
-        for (c, (out, g)) in self.matrix.chunks_exact_mut(n).zip(g.chunks_exact(n)).enumerate() {
-            out[c] = 1.0;
-            for (k, g) in self.stiffness.chunks_exact(n).zip(g).filter(|(_, g)| **g != 0.0) {
-                out.iter_mut().zip(k).for_each(|(out, k)| *out += k * g);
-            }
+        (0..n).for_each(|c| self.matrix[c * n + c] = 1.0);
+        for (p, patch) in patches.ports.iter().enumerate() {
+            let block = patches.noted_stiffness(p, &patch.unpack(&self.x), &self.noted);
+            add_product(&patch.place, &block, g, &mut self.matrix, n);
         }
         self.matrix[n * n..].iter_mut().zip(&self.residual).for_each(|(m, r)| *m = -r);
-        let mut matrix = DMatrixViewMut::from_slice(&mut self.matrix, n, n + 1);
-        for i in 0..n {
-            let pivot = matrix.view_range(i.., i).icamax() + i;
-            let diagonal = matrix[(pivot, i)];
-            if diagonal == 0.0 || !diagonal.is_finite() {
-                return false;
-            }
-            if pivot == i {
-                gauss_step(&mut matrix, diagonal, i);
-            } else {
-                matrix.columns_range_mut(..i).swap_rows(i, pivot);
-                gauss_step_swap(&mut matrix, diagonal, i, pivot);
-            }
-        }
-        let (upper, mut right) = matrix.columns_range_pair_mut(..n, n..);
-        if !upper.solve_upper_triangular_mut(&mut right) {
+        if !eliminate(&mut self.matrix, n) || !substitute(&mut self.matrix, n) {
             return false;
         }
-        self.d.iter_mut().zip(right.iter()).for_each(|(d, r)| *d = *r);
+        self.d.copy_from_slice(&self.matrix[n * n..]);
         true
     }
 
@@ -132,4 +117,57 @@ impl Compatibility {
         }
         before
     }
+}
+
+/// Adds the rows of K·G that belong to one port: `block` of K at the components `place`.
+fn add_product(place: &[Option<usize>; 6], block: &Stiffness, g: &[f64], matrix: &mut [f64], n: usize) {
+    for (out, g) in matrix.chunks_exact_mut(n).zip(g.chunks_exact(n)) {
+        for (row, r) in block.iter().zip(place) {
+            let Some(r) = r else { continue };
+            for (k, c) in row.iter().zip(place) {
+                if let Some(c) = c {
+                    out[*r] += k * g[*c];
+                }
+            }
+        }
+    }
+}
+
+/// Gauss's elimination of [A | b] (column-major n × (n + 1)) with the largest pivot of each column; whether there is one.
+fn eliminate(matrix: &mut [f64], n: usize) -> bool {
+    for i in 0..n {
+        let (left, right) = matrix.split_at_mut((i + 1) * n);
+        let column = &mut left[i * n..];
+        let pivot = (i + 1..n).fold(i, |best, r| if column[r].abs() > column[best].abs() { r } else { best });
+        let diagonal = column[pivot];
+        if diagonal == 0.0 || !diagonal.is_finite() {
+            return false;
+        }
+        column.swap(i, pivot);
+        let inverse = 1.0 / diagonal;
+        let factors = &mut column[i + 1..];
+        factors.iter_mut().for_each(|f| *f *= inverse);
+        for other in right.chunks_exact_mut(n) {
+            other.swap(i, pivot);
+            let (head, below) = other.split_at_mut(i + 1);
+            let lead = -head[i];
+            below.iter_mut().zip(&*factors).for_each(|(y, f)| *y += lead * f);
+        }
+    }
+    true
+}
+
+/// Solves the upper triangle that [`eliminate`] left; the solution takes the place of the last column.
+fn substitute(matrix: &mut [f64], n: usize) -> bool {
+    let (upper, right) = matrix.split_at_mut(n * n);
+    for i in (0..n).rev() {
+        let diagonal = upper[i * n + i];
+        if diagonal == 0.0 {
+            return false;
+        }
+        right[i] /= diagonal;
+        let lead = -right[i];
+        right[..i].iter_mut().zip(&upper[i * n..i * n + i]).for_each(|(x, u)| *x += lead * u);
+    }
+    true
 }

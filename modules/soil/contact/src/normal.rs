@@ -1,6 +1,6 @@
 //! The inverse of the normal law: how deep is the foot under a normal force?
 
-use crate::assemble::{displacement, dot, node_stiffness};
+use crate::assemble::{displacement, dot};
 use crate::patch::Patches;
 
 /// A node that clings to a foot: it lets go at the shift `end` (m); up to there its normal force is `stiffness`·shift −
@@ -49,7 +49,8 @@ impl Patches {
                 shift = 0.5 * (low + high);
             }
             at[0] = -shift;
-            let residual = self.wrench(p, &at)[0] - force;
+            let [now, stiffness] = self.normal_force(p, &at);
+            let residual = now - force;
             if residual.abs() <= TOLERANCE * force || high - low <= f64::EPSILON * shift.abs() {
                 break;
             }
@@ -58,7 +59,6 @@ impl Patches {
             } else {
                 low = shift
             }
-            let stiffness = self.normal_stiffness(p, &at);
             let next = if stiffness > 0.0 { shift - residual / stiffness } else { f64::NAN };
             if next == shift {
                 break;
@@ -152,21 +152,5 @@ impl Patches {
         }
         let margin = 1e-12 * (1.0 + full.abs());
         (area > 0.0).then_some((free, full + margin))
-    }
-
-    /// dW_n/dX_n at `x`, N/m.
-    pub fn normal_stiffness(&self, p: usize, x: &[f64; 6]) -> f64 {
-        let mut sum = 0.0;
-        self.each_answer(p, x, |k, _, slope, r| {
-            let (n, facing) = (&self.nodes, &self.nodes.facing[k]);
-            sum += node_stiffness(facing, n.area[k], slope, r)[0][0];
-        });
-        if let Some(cone) = &self.ports[p].cone {
-            let mut all = [[0.0; 6]; 6];
-            all[0][0] = sum;
-            cone.stiffen(x, self.law_wrench(p, x)[0], &mut all);
-            sum = all[0][0];
-        }
-        sum
     }
 }

@@ -112,6 +112,8 @@ impl<M: Material> FieldSoil<M> {
         patches.nodes.doubles = ground.law_memory.doubles();
         patches.reserve(nodes);
         lists.reserve(nodes);
+        let mut compatibility = Compatibility::default();
+        compatibility.reserve(nodes);
         let laws = all_laws(&parameters, &ground.mask, expressions.as_ref(), plugin.as_ref())?;
         if parameters.elastic_stiffness_pa_m.is_some() {
             warn_of_module(&laws[0], host.as_ref());
@@ -124,7 +126,7 @@ impl<M: Material> FieldSoil<M> {
             slots: Slots::new(host.slots()),
             book: Book::default(),
             last: Last::default(),
-            compatibility: Compatibility::default(),
+            compatibility,
             few_nodes: 0,
             warned: [false; 2],
             host,
@@ -341,7 +343,7 @@ impl<M: Material> Subsystem for FieldSoil<M> {
 
     fn solve_compatibility(&mut self, step: &Step, estimate: &Estimate, out: &mut Response) -> Result {
         self.build(step)?;
-        let left = self.compatibility.solve(&mut self.patches, step.n as usize, estimate);
+        let left = self.compatibility.solve(&self.patches, step.n as usize, estimate);
         self.last.clear();
         out.t.copy_from_slice(&self.compatibility.t);
         out.x.copy_from_slice(&self.compatibility.x);

@@ -103,7 +103,7 @@ impl Last {
         }
         let mut x = self.x[p];
         x[0] = patches.surface_under(p, SMALLEST_FORCE_N, &x);
-        patches.normal_stiffness(p, &x)
+        patches.normal_force(p, &x)[1]
     }
 }
 

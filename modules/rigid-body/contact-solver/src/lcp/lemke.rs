@@ -144,13 +144,13 @@ impl Lemke {
     fn pivot(&mut self, row: usize, column: usize) {
         let width = self.width();
         let factor = 1.0 / self.at(row, column);
-        self.tableau[row * width..][..width].iter_mut().for_each(|v| *v *= factor);
-        for i in (0..self.n).filter(|i| *i != row) {
-            let factor = self.at(i, column);
+        let (above, rest) = self.tableau.split_at_mut(row * width);
+        let (pivot, below) = rest.split_at_mut(width);
+        pivot.iter_mut().for_each(|v| *v *= factor);
+        for other in above.chunks_exact_mut(width).chain(below.chunks_exact_mut(width)) {
+            let factor = other[column];
             if factor != 0.0 {
-                for k in 0..width {
-                    self.tableau[i * width + k] -= factor * self.tableau[row * width + k];
-                }
+                other.iter_mut().zip(&*pivot).for_each(|(v, p)| *v -= factor * p);
             }
         }
         self.basis[row] = column;

@@ -1,6 +1,6 @@
 //! Measurements as comma-separated text; the unit stands in the name of a column.
 
-use crate::scenario::InputError;
+use terraglue_scenario::InputError;
 use std::io::ErrorKind;
 use std::path::Path;
 

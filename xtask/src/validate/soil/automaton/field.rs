@@ -62,7 +62,7 @@ impl Field {
     pub fn new(terrain: &dyn Terrain, repose: f64, curvature: f64) -> Outcome<Self> {
         let ground = Ground::new(terrain).map_err(|e| e.to_string())?;
         let mut sweeper = Sweeper::new(*ground.heights.lattice(), Arc::new(Standalone::default()), 0);
-        sweeper.set_limits(repose, &[], curvature, 0.0, terrain.spacing());
+        sweeper.set_limits(repose, &[], curvature, [0.0; 2], terrain.spacing());
         sweeper.scan(&ground);
         Ok(Self { ground, sweeper })
     }

@@ -54,7 +54,8 @@ fn without_false_start(bytes: &mut [u8]) {
 fn cut_off(bytes: &[u8]) -> Option<String> {
     let count = u32::from_le_bytes(bytes.get(80..84)?.try_into().ok()?);
     let there = (bytes.len() - STL.0) / STL.1;
-    let is_text = bytes.starts_with(b"solid") && bytes.iter().take(512).all(|b| b.is_ascii());
+    let begin = String::from_utf8_lossy(&bytes[..bytes.len().min(1024)]);
+    let is_text = begin.trim_start().starts_with("solid") && begin.contains("facet");
     (!is_text && there < count as usize)
         .then(|| format!("it names {count} triangles and holds {there}: it was cut off; export it again"))
 }

@@ -48,7 +48,7 @@ impl<F: Fn(f64, f64) -> f64 + Send + Sync> Terrain for Shape<F> {
 fn ground(size: u32, curvature: f64, height: impl Fn(f64, f64) -> f64 + Send + Sync) -> (Ground, Sweeper) {
     let ground = Ground::new(&Shape { size, height }).expect("heights within the range");
     let mut sweeper = Sweeper::new(*ground.heights.lattice(), Arc::new(Standalone::default()), 0);
-    sweeper.set_limits(REPOSE, &[], curvature, 0.0, SPACING);
+    sweeper.set_limits(REPOSE, &[], curvature, [0.0; 2], SPACING);
     sweeper.scan(&ground);
     (ground, sweeper)
 }

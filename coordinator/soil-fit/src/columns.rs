@@ -1,8 +1,8 @@
 //! Measurements as comma-separated text; the unit stands in the name of a column.
 
-use terraglue_scenario::InputError;
 use std::io::ErrorKind;
 use std::path::Path;
+use terraglue_scenario::InputError;
 
 /// A file that gives no text.
 pub fn unreadable(path: &Path, error: &std::io::Error) -> Box<InputError> {

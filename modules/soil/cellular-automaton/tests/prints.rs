@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 mod feet;
-#[path = "../../../interfaces/soil-contact/tests/support/mod.rs"]
+#[path = "../../contact/tests/support/mod.rs"]
 mod support;
 
 use feet::{Feet, instance, shape, steepest};

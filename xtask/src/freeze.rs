@@ -22,6 +22,9 @@ pub struct Arguments {
     /// Leave the quick figures out (they take most of the time).
     #[arg(long)]
     no_figures: bool,
+    /// Measure this program instead of building one, without the quick figures.
+    #[arg(long, value_name = "FILE")]
+    program: Option<PathBuf>,
 }
 
 /// Hash by name, e.g. `run.moon_walk.soil-bekker.iterative.energy`.
@@ -33,15 +36,19 @@ fn file() -> PathBuf {
 
 /// Measures; then writes `tests/freeze.tsv`, or compares with it.
 pub fn freeze(arguments: &Arguments) -> Outcome {
-    must(cargo(&["build"]).args(["--package", "terraglue", "--package", "terraglue-unit"]))?;
-    let program = program("debug");
+    let built = program("debug");
+    let program = arguments.program.as_deref().unwrap_or(&built);
+    if arguments.program.is_none() {
+        must(cargo(&["build"]).args(["--package", "terraglue", "--package", "terraglue-unit"]))?;
+    }
+    let no_figures = arguments.no_figures || arguments.program.is_some();
     let scratch = target().join("freeze");
-    let mut found = runs::hashes(&program, &scratch)?;
-    found.extend(exported::hashes(&program, &scratch)?);
-    if !arguments.no_figures {
+    let mut found = runs::hashes(program, &scratch)?;
+    found.extend(exported::hashes(program, &scratch)?);
+    if !no_figures {
         found.extend(figures()?);
     }
-    if arguments.check { compare(&found, arguments.no_figures) } else { store(&found, arguments.no_figures) }
+    if arguments.check { compare(&found, no_figures) } else { store(&found, no_figures) }
 }
 
 fn figures() -> Outcome<Hashes> {

@@ -11,7 +11,9 @@ use terraglue_subsystem::{ValueType, ValuesMut};
 ///
 /// ```no_run
 /// # use std::path::Path;
-/// use terraglue::{Testbed, recording::Trace, scenario::Scenario, testbed::Options};
+/// use terraglue_engine::testbed::{Options, Testbed};
+/// use terraglue_recording::Trace;
+/// use terraglue_scenario::Scenario;
 /// let scenario = Scenario::load(Path::new("scenarios/moon_walk.toml"), &[])?;
 /// let mut testbed = Testbed::build(&scenario, &Options::default())?;
 /// let mut trace = Trace::new(&testbed, &["robot.body.z"])?;
@@ -20,7 +22,7 @@ use terraglue_subsystem::{ValueType, ValuesMut};
 ///     trace.take(&testbed)?;
 /// }
 /// assert_eq!(trace.rows().count(), 10);
-/// # Ok::<(), terraglue::Error>(())
+/// # Ok::<(), terraglue_diagnostics::Error>(())
 /// ```
 #[derive(Clone, Debug)]
 pub struct Trace {

@@ -6,7 +6,7 @@
 /// The name that `to` makes of `name`, when `name` matches `from`.
 ///
 /// ```
-/// use terraglue::signals::pattern::rewrite;
+/// use terraglue_engine::signals::pattern::rewrite;
 /// let target = rewrite("gait.*.angle_target", "robot.*.angle_target", "gait.LF_j2.angle_target");
 /// assert_eq!(target.as_deref(), Some("robot.LF_j2.angle_target"));
 /// ```

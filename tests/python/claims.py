@@ -149,7 +149,7 @@ CLAIMS = [
     Claim(SOIL, "twice the spacing first (`settle_at_start`) | within {}°", (figure("soil.automaton.cone.*.settled"),)),
     Claim(SOIL, "over the angle of repose, five bodies, three soils, walls without cohesion | + {}°",
           (figure("soil.automaton.print.*.rim", "soil.automaton.print.*.rim_standing"),)),
-    Claim(SOIL, "a print 3 cm deep in lunar soil, walls with cohesion | **{}°**", (figure("soil.automaton.print.lunar_10mm.wall"),)),
+    Claim(SOIL, "a print 3 cm deep in lunar soil, walls with cohesion | {}°", (figure("soil.automaton.print.lunar_10mm.wall"),)),
     Claim(SOIL, "largest curvature at rest over κ_max | {}", (figure("soil.automaton.cone.*.curvature"),)),
     Claim(SOIL, "where material stays where it is pressed, against the integral, four wheels, soils and slips | sinkage {} %, pull {} % of the load",
           (figure("soil.automaton.wheel.integral.sinkage"), figure("soil.automaton.wheel.integral.pull"))),

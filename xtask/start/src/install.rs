@@ -1,7 +1,7 @@
 //! `cargo xtask install PREFIX`: bin, lib/terraglue, include and share/terraglue below a prefix; `cargo xtask dist`: the same,
 //! with the documentation, as an archive.
 
-use crate::process::{Outcome, cargo, command, must, root, target};
+use crate::process::{Outcome, cargo, command, must, read, root, target};
 use std::path::Path;
 
 /// The library inside exported units.
@@ -57,8 +57,8 @@ fn build() -> Outcome {
 fn lay_out(prefix: &Path, profile: &str) -> Outcome {
     let release = target().join(profile);
     copy(&release.join("terraglue"), &prefix.join("bin/terraglue"))?;
-    for module in modules()? {
-        let file = format!("lib{}_plugin.so", module.replace('-', "_"));
+    for plugin in plugins(&root().join("modules"))? {
+        let file = format!("lib{}.so", plugin.replace('-', "_"));
         // The copy in deps is always fresh; the one beside the program is not after `cargo build -p`.
         let built = [release.join("deps").join(&file), release.join(&file)];
         let built = built.iter().find(|f| f.is_file()).ok_or_else(|| format!("{file} was not built"))?;
@@ -70,12 +70,24 @@ fn lay_out(prefix: &Path, profile: &str) -> Outcome {
     copy_files(&root().join("scenarios"), &prefix.join("share/terraglue/scenarios"))
 }
 
-/// Names of the modules that the program brings: the folders of modules/ with a plugin.
-fn modules() -> Outcome<Vec<String>> {
-    let folder = root().join("modules");
-    let entries = std::fs::read_dir(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;
-    let with_plugin = entries.flatten().filter(|e| e.path().join("plugin/Cargo.toml").is_file());
-    Ok(with_plugin.map(|e| e.file_name().to_string_lossy().into_owned()).collect())
+/// Packages of the plugins that the program brings: all folders `plugin` below modules/.
+fn plugins(folder: &Path) -> Outcome<Vec<String>> {
+    let entries = std::fs::read_dir(folder).map_err(|e| format!("{}: {e}", folder.display()))?;
+    let mut found = Vec::new();
+    for path in entries.flatten().map(|e| e.path()).filter(|p| p.is_dir()) {
+        match path.join("Cargo.toml") {
+            manifest if path.ends_with("plugin") && manifest.is_file() => found.push(package(&manifest)?),
+            _ => found.extend(plugins(&path)?),
+        }
+    }
+    Ok(found)
+}
+
+/// The name of a package.
+fn package(manifest: &Path) -> Outcome<String> {
+    let text = read(manifest)?;
+    let name = text.lines().find_map(|line| line.strip_prefix("name = \"")?.strip_suffix('"'));
+    name.map(str::to_owned).ok_or_else(|| format!("{}: no name", manifest.display()))
 }
 
 fn copy_tree(from: &Path, to: &Path) -> Outcome {

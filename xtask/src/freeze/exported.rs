@@ -5,10 +5,13 @@ use super::digest::Digest;
 use crate::process::{Outcome, command, must, write};
 use std::path::Path;
 
+/// Soil of the exported soils.
+const ROW: &str = "soil.parameters=lunar_nominal_Apollo";
+
 /// (name, what `terraglue export` is given, whether a foot is driven).
 const CASES: [(&str, &[&str], bool); 5] = [
-    ("automaton-fmi3", &["soil-cellular-automaton", "--scalars"], true),
-    ("bekker-fmi2", &["soil-bekker", "--fmi", "2"], true),
+    ("automaton-fmi3", &["soil-cellular-automaton", "--scalars", "--set", ROW], true),
+    ("bekker-fmi2", &["soil-bekker", "--fmi", "2", "--set", ROW], true),
     ("robot-fmi2", &["rigid-body", "--fmi", "2", "--set", "robot.model=models/hexapod.urdf"], false),
     ("walk-fmi3", &["scenarios/moon_walk.toml"], false),
     ("walk-fmi2", &["scenarios/moon_walk.toml", "--fmi", "2"], false),

@@ -34,6 +34,7 @@ NOT_RUN = {
     "cargo xtask faults": "takes minutes; tests/acceptance/tests/faults.rs and test_faults.py hold what it writes",
     "cargo xtask docs": "takes minutes; the tests hold what it writes",
     "cargo xtask pictures": "draws pictures of docs/",
+    "cargo xtask freeze": "takes minutes, and numbers are those of one kind of processor",
     "cargo xtask architecture": "a test of xtask holds what it writes",
     "cargo xtask schema": "tests/acceptance/tests/generated_files.rs holds what it writes",
     "cargo xtask header": "tests of the header hold what it writes",

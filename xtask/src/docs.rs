@@ -2,13 +2,14 @@
 //! tests hold the same against the code.
 
 use crate::process::{Outcome, cargo, command, must, program};
-use crate::{faults, header, schema, test, validate};
+use crate::{architecture, faults, header, schema, test, validate};
 
 /// Makes all of it; about ten minutes.
 pub fn write_all() -> Outcome {
     must(&mut cargo(&["build", "--workspace"]))?;
     schema::write_files(false)?;
     header::run(false)?;
+    architecture::run(false)?;
     pictures()?;
     faults::write_page()?;
     validate::validate(&validate::Arguments::quick_for_docs())?;

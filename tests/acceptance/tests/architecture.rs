@@ -29,7 +29,7 @@ fn files(folder: &str, extension: &str) -> Vec<PathBuf> {
 }
 
 fn rust_files() -> Vec<PathBuf> {
-    let folders = ["interfaces", "coordinator", "modules", "tests", "xtask"];
+    let folders = ["interfaces", "coordinator", "modules", "examples", "tests", "xtask"];
     folders.iter().flat_map(|folder| files(folder, "rs")).collect()
 }
 

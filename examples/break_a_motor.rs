@@ -3,7 +3,6 @@
 //! `cargo run --package terraglue-examples --example break_a_motor`
 
 use terraglue::scenario::Scenario;
-use terraglue::subsystem::Value;
 use terraglue::testbed::{Options, Testbed};
 
 /// Angle of a knee (rad) after 0.3 s, with its motor and without.
@@ -15,7 +14,7 @@ fn angles_rad() -> terraglue::Result<[f64; 2]> {
     testbed.run_until(0.3, &mut [])?;
     let sound = testbed.read("robot.LF_j2.angle").unwrap_or(f64::NAN);
     testbed.restore(&start)?;
-    testbed.set("robot.LF_j2.max_torque", &Value::from(0.0))?;
+    testbed.set("robot.LF_j2.max_torque", &0.0.into())?;
     testbed.run_until(0.3, &mut [])?;
     Ok([sound, testbed.read("robot.LF_j2.angle").unwrap_or(f64::NAN)])
 }

@@ -39,6 +39,7 @@ NOT_RUN = {
     "cargo xtask schema": "tests/acceptance/tests/generated_files.rs holds what it writes",
     "cargo xtask header": "tests of the header hold what it writes",
     "cargo bench": "builds the release profile",
+    "cargo fmt": "changes nothing that runs; CI checks it",
     "cargo test": "is a part of `cargo xtask test`",
     "terraglue run --resume": "needs a run that was broken off; test_checkpoints.py breaks runs off and resumes them",
     "pip install": "needs a network",

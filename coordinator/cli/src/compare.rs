@@ -182,7 +182,7 @@ fn cold_start_mean(
     bar: &ProgressBar,
 ) -> Option<f64> {
     let mut scenario = plan.scenario.clone();
-    scenario.gluing.start = "zero".into();
+    scenario.gluing.start = terraglue_scenario::StartChoice::Zero;
     let mut testbed = run::build(&scenario, &run::options(arguments, cancel)).ok()?;
     let mut progress = Progress::new(bar.clone(), scenario.time.duration_s, "without the estimate: ");
     let mut figures = SummaryObserver::new(&scenario);

@@ -5,6 +5,7 @@ use super::exchange::Exchange;
 use super::memory::{Recall, Remember};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
+use terraglue_scenario::JacobianChoice;
 
 /// The residual may shrink by this factor at least before the Jacobian counts as stale.
 const RATIO: f64 = 0.3;
@@ -44,13 +45,13 @@ pub struct Refresh {
 
 impl Refresh {
     /// From `gluing.jacobian`.
-    pub fn new(jacobian: &str) -> Self {
+    pub fn new(jacobian: JacobianChoice) -> Self {
         let way = match jacobian {
-            "directional" => Way::Central,
-            "finite-differences" => Way::Forward,
-            "broyden" => Way::Broyden,
-            "frozen" => Way::Frozen,
-            _ => Way::Analytic,
+            JacobianChoice::Directional => Way::Central,
+            JacobianChoice::FiniteDifferences => Way::Forward,
+            JacobianChoice::Broyden => Way::Broyden,
+            JacobianChoice::Frozen => Way::Frozen,
+            JacobianChoice::Analytic | JacobianChoice::Diagonal => Way::Analytic,
         };
         Self { way, ..Self::default() }
     }
@@ -140,7 +141,7 @@ mod tests {
     use super::*;
 
     /// A kept Jacobian of no component, so that only the ratio of the residuals decides.
-    fn kept(jacobian: &str, exchange: &Exchange) -> Refresh {
+    fn kept(jacobian: JacobianChoice, exchange: &Exchange) -> Refresh {
         let of = Some((0, exchange.at.epoch, exchange.at.h));
         Refresh { of, ..Refresh::new(jacobian) }
     }
@@ -148,26 +149,26 @@ mod tests {
     #[test]
     fn it_is_taken_again_when_more_than_three_tenths_are_left() {
         let exchange = Exchange::new(&[], &[], 1.0);
-        for way in ["directional", "finite-differences", "broyden"] {
+        for way in [JacobianChoice::Directional, JacobianChoice::FiniteDifferences, JacobianChoice::Broyden] {
             let refresh = kept(way, &exchange);
             assert!(refresh.is_stale(0.31, 1.0, &exchange), "{way}");
             assert!(!refresh.is_stale(0.29, 1.0, &exchange), "{way}");
         }
-        assert!(kept("analytic", &exchange).is_stale(1e-9, 1.0, &exchange));
-        assert!(!kept("frozen", &exchange).is_stale(2.0, 1.0, &exchange));
+        assert!(kept(JacobianChoice::Analytic, &exchange).is_stale(1e-9, 1.0, &exchange));
+        assert!(!kept(JacobianChoice::Frozen, &exchange).is_stale(2.0, 1.0, &exchange));
         // differences start each step afresh, Broyden's update goes on
-        assert!(kept("finite-differences", &exchange).is_stale(1.0, f64::NAN, &exchange));
-        assert!(!kept("broyden", &exchange).is_stale(1.0, f64::NAN, &exchange));
+        assert!(kept(JacobianChoice::FiniteDifferences, &exchange).is_stale(1.0, f64::NAN, &exchange));
+        assert!(!kept(JacobianChoice::Broyden, &exchange).is_stale(1.0, f64::NAN, &exchange));
     }
 
     #[test]
     fn a_snapshot_holds_the_kept_jacobian() {
         let exchange = Exchange::new(&[], &[], 1.0);
-        let mut refresh = kept("broyden", &exchange);
+        let mut refresh = kept(JacobianChoice::Broyden, &exchange);
         (refresh.g, refresh.t, refresh.motion) = (vec![1.0], vec![2.0], vec![3.0]);
         let mut words = Vec::new();
         refresh.remember(&mut words);
-        let mut other = Refresh::new("broyden");
+        let mut other = Refresh::new(JacobianChoice::Broyden);
         other.recall(&mut Recall(&words));
         assert_eq!(
             (other.of, other.g, other.t, other.motion),

@@ -2,7 +2,7 @@
 
 use super::{Exchange, Strategy, strategy};
 use terraglue_host::Instance;
-use terraglue_scenario::{GluingSpec, StrategyKind};
+use terraglue_scenario::{GluingSpec, HoldChoice, LevelChoice, StrategyKind};
 use terraglue_subsystem::Capabilities;
 
 /// A refused strategy.
@@ -38,23 +38,23 @@ fn hold_refused(spec: &GluingSpec, exchange: &Exchange, instances: &[Instance]) 
     let refused = |reason: String, help: &str| {
         Some(Refusal { key: "hold", help: Some(help.into()), reason, would_work: Vec::new() })
     };
-    if spec.hold == "linear" && spec.level == "position" {
+    if spec.hold == HoldChoice::Linear && spec.level == LevelChoice::Position {
         let reason = "a linear hold with the condition at position level grows by 2 + √3 = 3.73 per step";
         let help = "use hold = \"end\", \"constant\" or \"two-parameter\", or level = \"velocity\"";
         return refused(reason.into(), help);
     }
     let sub_cycles = |slot: usize| instances[slot].capabilities().has(Capabilities::SUBCYCLES);
-    if matches!(spec.hold.as_str(), "constant" | "linear") && !exchange.members().any(sub_cycles) {
+    if matches!(spec.hold, HoldChoice::Constant | HoldChoice::Linear) && !exchange.members().any(sub_cycles) {
         let reason = format!(
             "a {} hold would have no effect: none of the glued subsystems sub-cycles, all read T at the end of the step",
             spec.hold
         );
         return refused(reason, "leave `hold` out");
     }
-    if spec.hold != "two-parameter" {
+    if spec.hold != HoldChoice::TwoParameter {
         return None;
     }
-    if spec.level != "position" {
+    if spec.level != LevelChoice::Position {
         let reason = "a two-parameter hold closes place and rate at once: it has no other level";
         return refused(reason.into(), "leave `level` out");
     }

@@ -12,7 +12,7 @@ use super::iterative::Limits;
 use super::{Needs, Outcome, Strategy};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
-use terraglue_scenario::GluingSpec;
+use terraglue_scenario::{GluingSpec, Relaxation};
 use terraglue_subsystem::Capabilities;
 
 /// Name in the scenario.
@@ -59,11 +59,11 @@ pub struct Relaxed {
 impl Relaxed {
     /// From the scenario's `[gluing]`.
     pub fn new(spec: &GluingSpec) -> Self {
-        let kind = match spec.relaxation.as_str() {
-            "none" => Kind::None,
-            "aitken" => Kind::Aitken,
-            "broyden" => Kind::Broyden,
-            _ => Kind::Anderson,
+        let kind = match spec.relaxation {
+            Relaxation::None => Kind::None,
+            Relaxation::Aitken => Kind::Aitken,
+            Relaxation::Broyden => Kind::Broyden,
+            Relaxation::Anderson => Kind::Anderson,
         };
         Self {
             kind,

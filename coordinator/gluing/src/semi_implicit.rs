@@ -25,7 +25,7 @@ pub struct SemiImplicit {
 impl SemiImplicit {
     /// From the scenario's `[gluing]`.
     pub fn new(spec: &GluingSpec) -> Self {
-        Self { tt: TtForm::new(&spec.jacobian) }
+        Self { tt: TtForm::new(spec.jacobian) }
     }
 }
 

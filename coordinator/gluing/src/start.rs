@@ -19,7 +19,7 @@ pub struct Start {
 impl Start {
     /// From the scenario's `[gluing]`.
     pub fn new(spec: &GluingSpec) -> Self {
-        let analytic = GluingSpec { jacobian: "analytic".into(), ..spec.clone() };
+        let analytic = GluingSpec { jacobian: terraglue_scenario::JacobianChoice::Analytic, ..spec.clone() };
         Self { solver: Iterative::new(&analytic), scale: spec.start_scale }
     }
 }

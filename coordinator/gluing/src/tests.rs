@@ -4,7 +4,7 @@
 
 use super::*;
 use crate::contact::{PortOwner, PortSet};
-use terraglue_scenario::{GluingSpec, StrategyKind};
+use terraglue_scenario::{FormChoice, GluingSpec, StartChoice, StrategyKind};
 use terraglue_subsystem::{
     Error, Input, Kind, Law, Level, Motion, Port, PortKind, Response, Result as CallResult, Step, Subsystem,
     component,
@@ -190,10 +190,10 @@ fn ports() -> PortSet {
 fn spec(strategy: &str, form: &str, start: &str) -> GluingSpec {
     GluingSpec {
         strategy: StrategyKind::named(strategy).expect("a strategy"),
-        form: form.into(),
+        form: FormChoice::named(form).expect("a form"),
         tolerance: 1e-10,
         max_iterations: 60,
-        start: start.into(),
+        start: StartChoice::named(start).expect("a start"),
         ..GluingSpec::default()
     }
 }

@@ -58,7 +58,7 @@ fn about(scenario: &Scenario) -> BTreeMap<String, String> {
         ("scenario", scenario.name.clone()),
         ("scenario_text", scenario.source.text.clone()),
         ("strategy", scenario.gluing.strategy.name().to_owned()),
-        ("form", scenario.gluing.form.clone()),
+        ("form", scenario.gluing.form.name().to_owned()),
         ("step_s", scenario.time.step_s.to_string()),
         ("duration_s", scenario.time.duration_s.to_string()),
         ("gravity_m_s2", format!("{:?}", scenario.world.gravity_m_s2)),

@@ -1,6 +1,6 @@
 //! What of a scenario has no effect although nothing is wrong with it: said in warnings, never an error.
 
-use super::choices::StrategyKind;
+use super::choices::{FormChoice, JacobianChoice, LevelChoice, Relaxation, StartChoice, StrategyKind};
 use super::model::{GluingSpec, Scenario, SubsystemSpec, Trigger};
 use super::parameters::check_own_table;
 use super::source::Source;
@@ -48,11 +48,15 @@ pub fn many_steps(scenario: &Scenario) -> Option<String> {
 /// Keys of `[gluing]` that only some strategies read, with what they say where they say nothing.
 type Reader = (&'static str, fn(&GluingSpec) -> bool, &'static [StrategyKind]);
 const READERS: [Reader; 6] = [
-    ("form", |g| g.form != "auto", &[StrategyKind::Iterative, StrategyKind::CooperativeCompliant]),
-    ("start", |g| g.start != "estimate", &[StrategyKind::Iterative]),
-    ("relaxation", |g| g.relaxation != "anderson", &[StrategyKind::Relaxed]),
-    ("jacobian", |g| g.jacobian != "analytic", &[StrategyKind::Iterative, StrategyKind::SemiImplicit]),
-    ("level", |g| g.level != "position", &[StrategyKind::Iterative, StrategyKind::SemiImplicit]),
+    ("form", |g| g.form != FormChoice::Auto, &[StrategyKind::Iterative, StrategyKind::CooperativeCompliant]),
+    ("start", |g| g.start != StartChoice::Estimate, &[StrategyKind::Iterative]),
+    ("relaxation", |g| g.relaxation != Relaxation::Anderson, &[StrategyKind::Relaxed]),
+    (
+        "jacobian",
+        |g| g.jacobian != JacobianChoice::Analytic,
+        &[StrategyKind::Iterative, StrategyKind::SemiImplicit],
+    ),
+    ("level", |g| g.level != LevelChoice::Position, &[StrategyKind::Iterative, StrategyKind::SemiImplicit]),
     ("stabilisation", |g| g.stabilisation != 0.0, &[StrategyKind::Iterative, StrategyKind::SemiImplicit]),
 ];
 
@@ -75,7 +79,7 @@ pub fn unread_keys(scenario: &Scenario) -> Vec<String> {
             warn(key, format!("`{}` does not read it ({} does)", gluing.strategy, names.join(", ")))
         })
         .collect();
-    if gluing.stabilisation != 0.0 && gluing.level == "position" {
+    if gluing.stabilisation != 0.0 && gluing.level == LevelChoice::Position {
         all.push(warn("stabilisation", "at position level nothing drifts that it could take out".into()));
     }
     if gluing.step_min_s.is_some() && gluing.energy_residual_j.is_none() {

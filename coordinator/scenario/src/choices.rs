@@ -64,6 +64,86 @@ named! {
     }
 }
 
+named! {
+    /// Which form of the interface problem `iterative` solves: `gluing.form`.
+    FormChoice {
+        /// X-T where the soil yields, T-T elsewhere, the other one on failure.
+        Auto = "auto",
+        /// Force in, motion out.
+        Tt = "tt",
+        /// Motion in, force out.
+        Xt = "xt",
+    }
+}
+
+named! {
+    /// What the iteration of a step begins with: `gluing.start`.
+    StartChoice {
+        /// min(T*, F), from the estimate of the bodies and the law of the soil.
+        Estimate = "estimate",
+        /// T = 0, to show what the estimate saves.
+        Zero = "zero",
+    }
+}
+
+named! {
+    /// How `relaxed` accelerates its fixed point: `gluing.relaxation`.
+    Relaxation {
+        /// Not at all.
+        None = "none",
+        /// By Aitken's factor.
+        Aitken = "aitken",
+        /// By Anderson's mixing of earlier residuals.
+        Anderson = "anderson",
+        /// By Broyden's update of an inverse Jacobian.
+        Broyden = "broyden",
+    }
+}
+
+named! {
+    /// Where the interface Jacobian of the bodies comes from: `gluing.jacobian`.
+    JacobianChoice {
+        /// The modules' own derivatives.
+        Analytic = "analytic",
+        /// Directional derivatives of FMUs, else central differences.
+        Directional = "directional",
+        /// Forward differences at the first iteration of a step.
+        FiniteDifferences = "finite-differences",
+        /// Forward differences once, then Broyden's updates.
+        Broyden = "broyden",
+        /// A control that neglects the coupling of the ports.
+        Diagonal = "diagonal",
+        /// A control that is never refreshed.
+        Frozen = "frozen",
+    }
+}
+
+named! {
+    /// Level of the condition at joints: `gluing.level`.
+    LevelChoice {
+        /// Positions agree.
+        Position = "position",
+        /// Velocities agree.
+        Velocity = "velocity",
+        /// Accelerations agree.
+        Acceleration = "acceleration",
+    }
+}
+
+named! {
+    /// How T runs inside a step: `gluing.hold`.
+    HoldChoice {
+        /// All members read T at the end of the step.
+        End = "end",
+        /// The value of the end holds over the step.
+        Constant = "constant",
+        /// On a line from the T of the step before.
+        Linear = "linear",
+        /// On a line whose two ends are both unknown.
+        TwoParameter = "two-parameter",
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -75,5 +155,6 @@ mod tests {
             assert_eq!(StrategyKind::named(name), Some(*kind));
         }
         assert_eq!(StrategyKind::named("nothing"), None);
+        assert_eq!(HoldChoice::named("two-parameter"), Some(HoldChoice::TwoParameter));
     }
 }

@@ -1,6 +1,8 @@
 //! Every key of the reserved tables, once: the parser, the JSON Schema and `docs/scenario.md` are made from here.
 
-use super::choices::StrategyKind;
+use super::choices::{
+    FormChoice, HoldChoice, JacobianChoice, LevelChoice, Relaxation, StartChoice, StrategyKind,
+};
 use terraglue_diagnostics::allowed;
 use terraglue_subsystem::{Parameter, ParameterType};
 
@@ -193,7 +195,7 @@ fn gluing() -> Table {
         Parameter::of("max_iterations", ParameterType::Integer, "iterations before the step is halved");
     let keys = vec![
         strategy.or("cooperative").choices(STRATEGIES).into(),
-        form.or("auto").choices(&["auto", "tt", "xt"]).into(),
+        form.or("auto").choices(FormChoice::NAMES).into(),
         number("tolerance", "", 1e-8, "residual relative to the largest of weight and force")
             .positive()
             .within_max(1.0)
@@ -203,18 +205,18 @@ fn gluing() -> Table {
             .or(4)
             .within(0.0, 16.0)
             .into(),
-        start.or("estimate").choices(&["estimate", "zero"]).into(),
+        start.or("estimate").choices(StartChoice::NAMES).into(),
         Parameter::of("relaxation", ParameterType::Text, "how the fixed point is accelerated (relaxed only)")
             .or("anderson")
-            .choices(&["none", "aitken", "anderson", "broyden"])
+            .choices(Relaxation::NAMES)
             .into(),
         Parameter::of("jacobian", ParameterType::Text, "where the bodies' interface Jacobian comes from")
             .or("analytic")
-            .choices(&["analytic", "directional", "finite-differences", "broyden", "diagonal", "frozen"])
+            .choices(JacobianChoice::NAMES)
             .into(),
         Parameter::of("level", ParameterType::Text, "level of the condition at joints")
             .or("position")
-            .choices(&["position", "velocity", "acceleration"])
+            .choices(LevelChoice::NAMES)
             .into(),
         Parameter::of(
             "hold",
@@ -222,7 +224,7 @@ fn gluing() -> Table {
             "how T runs inside the step of a subsystem that sub-cycles",
         )
         .or("end")
-        .choices(&["end", "constant", "linear", "two-parameter"])
+        .choices(HoldChoice::NAMES)
         .into(),
         number(
             "stabilisation",

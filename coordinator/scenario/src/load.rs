@@ -1,7 +1,9 @@
 //! From the text to the [`Scenario`].
 
 use super::advice::MOST_STEPS;
-use super::choices::StrategyKind;
+use super::choices::{
+    FormChoice, HoldChoice, JacobianChoice, LevelChoice, Relaxation, StartChoice, StrategyKind,
+};
 use super::events::{connections, events, faults, glue};
 use super::keys::{self, Table};
 use super::model::*;
@@ -236,17 +238,19 @@ fn read_time(s: &Section) -> Checked<Time> {
 }
 
 fn read_gluing(s: &Section) -> Checked<GluingSpec> {
+    // the section has checked that each name is one of the list
+    let usual = GluingSpec::default();
     Ok(GluingSpec {
-        strategy: StrategyKind::named(&s.text("strategy")).unwrap_or(StrategyKind::Cooperative),
-        form: s.text("form"),
+        strategy: StrategyKind::named(&s.text("strategy")).unwrap_or(usual.strategy),
+        form: FormChoice::named(&s.text("form")).unwrap_or(usual.form),
         tolerance: s.number("tolerance"),
         max_iterations: u32::try_from(s.count("max_iterations")).unwrap_or(u32::MAX),
         max_halvings: u32::try_from(s.count("max_halvings")).unwrap_or(0),
-        start: s.text("start"),
-        relaxation: s.text("relaxation"),
-        jacobian: s.text("jacobian"),
-        level: s.text("level"),
-        hold: s.text("hold"),
+        start: StartChoice::named(&s.text("start")).unwrap_or(usual.start),
+        relaxation: Relaxation::named(&s.text("relaxation")).unwrap_or(usual.relaxation),
+        jacobian: JacobianChoice::named(&s.text("jacobian")).unwrap_or(usual.jacobian),
+        level: LevelChoice::named(&s.text("level")).unwrap_or(usual.level),
+        hold: HoldChoice::named(&s.text("hold")).unwrap_or(usual.hold),
         stabilisation: s.number("stabilisation"),
         energy_residual_j: s.optional_number("energy_residual_j"),
         step_min_s: s.optional_number("step_min_s"),

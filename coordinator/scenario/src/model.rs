@@ -1,6 +1,8 @@
 //! A checked scenario: plain data that the testbed is built from.
 
-use super::choices::StrategyKind;
+use super::choices::{
+    FormChoice, HoldChoice, JacobianChoice, LevelChoice, Relaxation, StartChoice, StrategyKind,
+};
 use super::isolation::IsolationSpec;
 use serde_json::{Map, Value};
 use std::path::PathBuf;
@@ -149,25 +151,24 @@ pub struct Greys {
 pub struct GluingSpec {
     /// How steps are glued.
     pub strategy: StrategyKind,
-    /// `auto`, `tt` or `xt` (iterative only).
-    pub form: String,
+    /// Form of the interface problem (iterative only).
+    pub form: FormChoice,
     /// τ in |Λe|∞ ≤ τ·max(T_ref, |T|∞).
     pub tolerance: f64,
     /// Most iterations of one step before it is halved.
     pub max_iterations: u32,
     /// How often a step that does not converge may be halved before the run stops.
     pub max_halvings: u32,
-    /// What the iteration starts from: `estimate` (min(T*, F)) or `zero` (to show what the estimate saves).
-    pub start: String,
-    /// How `relaxed` accelerates its fixed point: `none`, `aitken`, `anderson` or `broyden`.
-    pub relaxation: String,
-    /// Where the bodies' interface Jacobian comes from: `analytic`, `directional` (of units, else central
-    /// differences), `finite-differences`, or `frozen` (a control: never refreshed).
-    pub jacobian: String,
-    /// Level of the condition at joints: `position`, `velocity` or `acceleration`.
-    pub level: String,
-    /// How T runs inside the step: `end`, `constant`, `linear` or `two-parameter`.
-    pub hold: String,
+    /// What the iteration starts from.
+    pub start: StartChoice,
+    /// How `relaxed` accelerates its fixed point.
+    pub relaxation: Relaxation,
+    /// Where the bodies' interface Jacobian comes from.
+    pub jacobian: JacobianChoice,
+    /// Level of the condition at joints.
+    pub level: LevelChoice,
+    /// How T runs inside the step.
+    pub hold: HoldChoice,
     /// Share of the error that is taken out per step at velocity or acceleration level.
     pub stabilisation: f64,
     /// Tolerated energy residual of a step, J; absent: all steps have the same length.
@@ -276,15 +277,15 @@ impl Default for GluingSpec {
     fn default() -> Self {
         Self {
             strategy: StrategyKind::Cooperative,
-            form: "auto".into(),
+            form: FormChoice::Auto,
             tolerance: 1e-8,
             max_iterations: 20,
             max_halvings: 4,
-            start: "estimate".into(),
-            relaxation: "anderson".into(),
-            jacobian: "analytic".into(),
-            level: "position".into(),
-            hold: "end".into(),
+            start: StartChoice::Estimate,
+            relaxation: Relaxation::Anderson,
+            jacobian: JacobianChoice::Analytic,
+            level: LevelChoice::Position,
+            hold: HoldChoice::End,
             stabilisation: 0.0,
             energy_residual_j: None,
             step_min_s: None,

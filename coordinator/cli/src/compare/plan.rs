@@ -31,7 +31,9 @@ impl Plan {
     /// Whether the iteration also runs from zero, to show what the estimate saves.
     pub fn has_cold_start(&self) -> bool {
         let row = &self.row;
-        row.strategy == "iterative" && !row.is_reference && self.scenario.gluing.start == "estimate"
+        row.strategy == "iterative"
+            && !row.is_reference
+            && self.scenario.gluing.start == terraglue_scenario::StartChoice::Estimate
     }
 
     /// Steps of all its runs.

@@ -22,7 +22,8 @@ use terraglue_host::{
 };
 use terraglue_scenario as scenario;
 use terraglue_scenario::{
-    Entry, GlueSpec, GluingSpec, InputError, IsolationSpec, Scenario, StrategyKind, SubsystemSpec,
+    Entry, GlueSpec, GluingSpec, HoldChoice, InputError, IsolationSpec, LevelChoice, Scenario, StrategyKind,
+    SubsystemSpec,
 };
 use terraglue_subsystem::{
     BodyState, Capabilities, Config, Energy, Hold, Kind, Law, Level, Subsystem, Terrain,
@@ -102,7 +103,7 @@ impl Testbed {
             before: Energy::default(),
             halvings: 0,
             max_halvings: scenario.gluing.max_halvings,
-            hold: hold(&scenario.gluing.hold),
+            hold: hold(scenario.gluing.hold),
             started: false,
         };
         let glued = testbed.instances.iter_mut().zip(&testbed.turns).filter(|(_, turn)| turn.glued);
@@ -418,10 +419,10 @@ fn group(
         exchange.glue.add(recipe, |slot, body| states[slot][body as usize]);
     }
     exchange.stabilisation = scenario.gluing.stabilisation;
-    exchange.level = match scenario.gluing.level.as_str() {
-        "velocity" => Level::Velocity,
-        "acceleration" => Level::Acceleration,
-        _ => Level::Position,
+    exchange.level = match scenario.gluing.level {
+        LevelChoice::Position => Level::Position,
+        LevelChoice::Velocity => Level::Velocity,
+        LevelChoice::Acceleration => Level::Acceleration,
     };
     let (own, at) = own_strategy(scenario, glue.iter().filter(own).map(|r| r.number))?;
     let spec = &GluingSpec { strategy: own.unwrap_or(scenario.gluing.strategy), ..scenario.gluing.clone() };
@@ -491,12 +492,12 @@ fn control(scenario: &Scenario, groups: &[Group], instances: &[Instance]) -> Res
     Ok(Some(StepControl::new(tolerance, [shortest, longest])))
 }
 
-fn hold(text: &str) -> Hold {
-    match text {
-        "constant" => Hold::Constant,
-        "linear" => Hold::Linear,
-        "two-parameter" => Hold::Ramp,
-        _ => Hold::End,
+fn hold(choice: HoldChoice) -> Hold {
+    match choice {
+        HoldChoice::End => Hold::End,
+        HoldChoice::Constant => Hold::Constant,
+        HoldChoice::Linear => Hold::Linear,
+        HoldChoice::TwoParameter => Hold::Ramp,
     }
 }
 

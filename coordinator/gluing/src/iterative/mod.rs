@@ -28,7 +28,7 @@ use super::memory::{Recall, Remember};
 use super::{Needs, Outcome, Strategy, linear};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
-use terraglue_scenario::GluingSpec;
+use terraglue_scenario::{FormChoice, GluingSpec, StartChoice};
 use terraglue_subsystem::{Capabilities, Hold};
 
 /// Name in the scenario.
@@ -57,10 +57,10 @@ pub(super) struct Limits {
 impl Form {
     /// From `gluing.form`; none: `auto`.
     pub fn read(spec: &GluingSpec) -> Option<Self> {
-        match spec.form.as_str() {
-            "tt" => Some(Self::Tt),
-            "xt" => Some(Self::Xt),
-            _ => None,
+        match spec.form {
+            FormChoice::Tt => Some(Self::Tt),
+            FormChoice::Xt => Some(Self::Xt),
+            FormChoice::Auto => None,
         }
     }
 
@@ -135,9 +135,9 @@ impl Iterative {
     pub fn new(spec: &GluingSpec) -> Self {
         Self {
             form: Form::read(spec),
-            from_estimate: spec.start != "zero",
+            from_estimate: spec.start == StartChoice::Estimate,
             limits: Limits::read(spec),
-            tt: tt::TtForm::new(&spec.jacobian),
+            tt: tt::TtForm::new(spec.jacobian),
             xt: xt::XtForm::default(),
             ramp: ramp::RampForm::default(),
             start: Vec::new(),

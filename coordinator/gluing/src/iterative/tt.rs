@@ -15,6 +15,7 @@ use super::super::refresh::Refresh;
 use super::{Limits, friction, largest_eigenvalue};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
+use terraglue_scenario::JacobianChoice;
 
 /// Trials of one line search.
 const MAX_TRIALS: u32 = 12;
@@ -54,8 +55,12 @@ pub struct TtForm {
 
 impl TtForm {
     /// With the interface Jacobian from there.
-    pub fn new(jacobian: &str) -> Self {
-        Self { jacobian: Refresh::new(jacobian), diagonal: jacobian == "diagonal", ..Self::default() }
+    pub fn new(jacobian: JacobianChoice) -> Self {
+        Self {
+            jacobian: Refresh::new(jacobian),
+            diagonal: jacobian == JacobianChoice::Diagonal,
+            ..Self::default()
+        }
     }
 
     /// The Jacobian that is kept from step to step.

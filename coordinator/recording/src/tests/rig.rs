@@ -239,10 +239,8 @@ pub fn scenario(strategy: &str) -> Scenario {
         terrain: None,
         gluing: GluingSpec {
             strategy: StrategyKind::named(strategy).unwrap_or(StrategyKind::Iterative),
-            form: "auto".into(),
             tolerance: 1e-8,
             max_iterations: 20,
-            start: "estimate".into(),
             contact_margin_m: 1e-3,
             ..GluingSpec::default()
         },

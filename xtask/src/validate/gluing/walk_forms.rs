@@ -3,7 +3,7 @@
 use super::{Context, Figure, Limit};
 use crate::process::{Outcome, root};
 use terraglue::Testbed;
-use terraglue::scenario::{GluingSpec, Scenario};
+use terraglue::scenario::{FormChoice, GluingSpec, Scenario};
 use terraglue::testbed::Options;
 
 const SOILS: [&str; 2] = ["soil-cellular-automaton", "soil-bekker"];
@@ -29,7 +29,7 @@ fn forms(soil: &str, context: &Context) -> Outcome<Figure> {
     let options = Options { threads: 1, ..Options::default() };
     let mut testbed =
         Testbed::build_with(&scenario, &options, &terraglue::library()).map_err(|e| e.to_string())?;
-    let form = |form: &str| GluingSpec { form: form.into(), ..scenario.gluing.clone() };
+    let form = |form: FormChoice| GluingSpec { form, ..scenario.gluing.clone() };
     let (mut worst, mut failed, mut why): (f64, u32, String) = (0.0, 0, String::new());
     for _ in 0..samples {
         let mut forces = Vec::new();
@@ -37,7 +37,7 @@ fn forms(soil: &str, context: &Context) -> Outcome<Figure> {
             testbed.step().map_err(|e| e.to_string())?;
         }
         let here = testbed.snapshot(0).map_err(|e| e.to_string())?;
-        for name in ["tt", "xt"] {
+        for name in [FormChoice::Tt, FormChoice::Xt] {
             testbed.restore(&here).map_err(|e| e.to_string())?;
             testbed.set_gluing(&form(name)).map_err(|e| e.to_string())?;
             match testbed.step() {
@@ -52,7 +52,7 @@ fn forms(soil: &str, context: &Context) -> Outcome<Figure> {
             worst = tt.iter().zip(xt).fold(worst, |m, (a, b)| m.max((a - b).abs()));
         }
         testbed.restore(&here).map_err(|e| e.to_string())?;
-        testbed.set_gluing(&form("auto")).map_err(|e| e.to_string())?;
+        testbed.set_gluing(&form(FormChoice::Auto)).map_err(|e| e.to_string())?;
         testbed.step().map_err(|e| e.to_string())?;
     }
     let what = format!(

@@ -3,12 +3,12 @@
 //! `cargo run --package terraglue-examples --example break_a_motor`
 
 use terraglue::scenario::Scenario;
-use terraglue::testbed::{Options, Testbed};
+use terraglue::testbed::Testbed;
 
 /// Angle of a knee (rad) after 0.3 s, with its motor and without.
 fn angles_rad() -> terraglue::Result<[f64; 2]> {
     let scenario = Scenario::load(&terraglue_examples::scenario("moon_walk"), &[])?;
-    let mut testbed = Testbed::build_with(&scenario, &Options::default(), &terraglue::library())?;
+    let mut testbed = Testbed::build_with(&scenario, &terraglue_examples::options(), &terraglue::library())?;
     testbed.step()?;
     let start = testbed.snapshot(0)?;
     testbed.run_until(0.3, &mut [])?;

@@ -3,13 +3,13 @@
 //! `cargo run --package terraglue-examples --example testbed`
 
 use terraglue::scenario::Scenario;
-use terraglue::testbed::{Options, Testbed};
+use terraglue::testbed::Testbed;
 
 /// Height of the robot's body (m) after a tenth of a second.
 fn height_m() -> terraglue::Result<f64> {
     let path = terraglue_examples::scenario("moon_walk");
     let scenario = Scenario::load(&path, &[("soil.module".to_owned(), "soil-bekker".to_owned())])?;
-    let mut testbed = Testbed::build_with(&scenario, &Options::default(), &terraglue::library())?;
+    let mut testbed = Testbed::build_with(&scenario, &terraglue_examples::options(), &terraglue::library())?;
     while testbed.t_s() < 0.1 {
         testbed.step()?;
     }

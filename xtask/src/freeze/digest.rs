@@ -1,17 +1,19 @@
 //! A hash over numbers and names that does not change with the compiler: FNV-1a of 64 bits.
 
-/// A hash in the making.
-pub struct Digest(u64);
+use terraglue::diagnostics::fingerprint;
+
+/// A hash in the making: what is to be hashed.
+pub struct Digest(Vec<u8>);
 
 impl Digest {
     /// Nothing hashed yet.
     pub fn new() -> Self {
-        Self(0xcbf2_9ce4_8422_2325)
+        Self(Vec::new())
     }
 
     /// Adds bytes.
     pub fn bytes(&mut self, bytes: &[u8]) {
-        self.0 = bytes.iter().fold(self.0, |h, b| (h ^ u64::from(*b)).wrapping_mul(0x0100_0000_01b3));
+        self.0.extend_from_slice(bytes);
     }
 
     /// Adds a name, with an end that no name contains.
@@ -27,7 +29,7 @@ impl Digest {
 
     /// The hash in hexadecimal digits.
     pub fn text(&self) -> String {
-        format!("{:016x}", self.0)
+        format!("{:016x}", fingerprint(&self.0))
     }
 }
 

@@ -22,6 +22,10 @@ pub enum Content {
 /// What cannot be read or written, with its path.
 pub fn pack(path: &Path, entries: &[(String, Content)]) -> Result<(), String> {
     let failed = |what: &Path, e: &dyn std::fmt::Display| format!("{}: {e}", what.display());
+    // the archive is renamed into its place: what is no file there (`/dev/null`, a pipe) would be gone
+    if std::fs::metadata(path).is_ok_and(|m| !m.is_file()) {
+        return Err(format!("{}: is no file: the archive cannot take its place; name another path", path.display()));
+    }
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     // a name of its own until it is whole
     let part = tempfile::Builder::new().prefix(".unit").tempfile_in(folder);
@@ -53,4 +57,25 @@ pub fn pack(path: &Path, entries: &[(String, Content)]) -> Result<(), String> {
 fn readable(file: &File) -> std::io::Result<()> {
     use std::os::unix::fs::PermissionsExt;
     file.set_permissions(std::fs::Permissions::from_mode(0o644))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::os::unix::fs::FileTypeExt;
+
+    #[test]
+    fn takes_the_place_of_files_only() {
+        let folder = tempfile::tempdir().expect("a folder");
+        let entries = [("a.txt".to_owned(), Content::Text("a".into()))];
+        let socket = folder.path().join("socket");
+        let _open = std::os::unix::net::UnixListener::bind(&socket).expect("a socket");
+        let message = pack(&socket, &entries).expect_err("no file");
+        assert!(message.contains("is no file"), "{message}");
+        assert!(std::fs::metadata(&socket).expect("stands").file_type().is_socket());
+        let file = folder.path().join("unit.fmu");
+        for _ in 0..2 {
+            pack(&file, &entries).expect("new, and in the place of a file");
+        }
+    }
 }

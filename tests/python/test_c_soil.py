@@ -49,8 +49,8 @@ def test_moon_walk_runs_on_the_soil_in_c_by_changing_one_word(tmp_path, strategy
 
 FAULTS = {
     "commit": ("    (void)t; /*", "    if (st->t > 0.2) return fail(s->error, \"worn out\");\n    (void)t; /*", "worn out"),
-    "advance": ("    if (in->kind == TG_IMPEDANCE)", "    if (st->t > 0.2 && st->n) { out->t[0] = NAN; return TG_OK; }\n"
-                "    if (in->kind == TG_IMPEDANCE)", "NaN"),
+    "advance": ("    a->force = in->kind == TG_FORCE", "    if (st->t > 0.2 && st->n) { out->t[0] = NAN; return TG_OK; }\n"
+                "    a->force = in->kind == TG_FORCE", "NaN"),
 }
 
 

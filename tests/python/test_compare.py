@@ -27,14 +27,14 @@ def test_compare_writes_a_row_per_combination(tmp_path):
 
 def test_compare_runs_steps_against_a_reference(tmp_path):
     process = terraglue("compare", MOON_WALK, "--duration", "0.04", "--out", tmp_path, "--quiet",
-                        "--strategies", "cooperative,iterative,xx-newton", "--soils", "soil-bekker",
+                        "--strategies", "cooperative,iterative,semi-implicit", "--soils", "soil-bekker",
                         "--steps", "1e-3,2e-3", "--reference", "iterative")
     assert process.returncode == 0, process.stderr
     rows = json.loads((tmp_path / "compare.json").read_text())["rows"]
     assert [(row["strategy"], row["step_s"]) for row in rows] == [
         ("cooperative", 1e-3), ("cooperative", 2e-3), ("iterative", 1e-3), ("iterative", 2e-3),
-        ("xx-newton", 1e-3), ("xx-newton", 2e-3), ("iterative", 1.25e-4)]
-    refused = [row for row in rows if row["strategy"] == "xx-newton"]
+        ("semi-implicit", 1e-3), ("semi-implicit", 2e-3), ("iterative", 1.25e-4)]
+    refused = [row for row in rows if row["strategy"] == "semi-implicit"]
     assert all("refused" in row["error"] and "these would work: cooperative, " in row["error"] for row in refused)
     # the reference is a run at an eighth of the smallest step
     assert 0.0 < rows[2]["reference_error_m"] < rows[3]["reference_error_m"]

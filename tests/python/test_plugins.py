@@ -307,7 +307,23 @@ def built_with(folder, header):
     return place
 
 
-@pytest.mark.parametrize("header", HEADERS, ids=lambda h: h.stem)
+def major(header):
+    return int(re.search(r"#define TG_ABI_MAJOR (\d+)", header.read_text()).group(1))
+
+
+MAJOR = max(map(major, HEADERS))
+
+
+@pytest.mark.parametrize("header", [h for h in HEADERS if major(h) < MAJOR], ids=lambda h: h.stem)
+def test_modules_of_earlier_majors_are_refused(tmp_path, header):
+    place = built_with(tmp_path, header.read_text())
+    process = terraglue("run", "scenario.toml", "--quiet", cwd=place)
+    told = " ".join(process.stderr.replace("│", " ").split())
+    version = header.stem.removeprefix("terraglue-")
+    assert process.returncode == 2 and f"built for ABI {version}" in told and "build the module again" in told, told
+
+
+@pytest.mark.parametrize("header", [h for h in HEADERS if major(h) == MAJOR], ids=lambda h: h.stem)
 def test_modules_of_every_released_minor_run(tmp_path, header):
     place = built_with(tmp_path, header.read_text())
     process = terraglue("run", "scenario.toml", "--quiet", cwd=place)
@@ -326,12 +342,12 @@ def test_a_later_minor_runs_and_a_later_major_is_refused(tmp_path):
     process = terraglue("run", "scenario.toml", "--quiet", cwd=place)
     assert process.returncode == 0, process.stderr
     process = terraglue("check-module", place, "--level", "quick")
-    assert process.returncode == 0 and f"ABI 2.{minor + 1}" in process.stdout
+    assert process.returncode == 0 and f"ABI {MAJOR}.{minor + 1}" in process.stdout
     (tmp_path / "major").mkdir()
-    place = built_with(tmp_path / "major", text.replace("#define TG_ABI_MAJOR 2", "#define TG_ABI_MAJOR 3"))
+    place = built_with(tmp_path / "major", text.replace(f"#define TG_ABI_MAJOR {MAJOR}", f"#define TG_ABI_MAJOR {MAJOR + 1}"))
     process = terraglue("run", "scenario.toml", "--quiet", cwd=place)
     told = " ".join(process.stderr.replace("│", " ").split())
-    assert process.returncode == 2 and f"built for ABI 3.{minor}" in told and "build the module again" in told, told
+    assert process.returncode == 2 and f"built for ABI {MAJOR + 1}.{minor}" in told and "build the module again" in told, told
 
 
 def test_a_module_for_another_machine_is_refused(tmp_path):

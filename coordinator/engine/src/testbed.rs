@@ -102,7 +102,6 @@ pub struct Testbed {
     before: Energy,
     halvings: u32,
     max_halvings: u32,
-    hold: terraglue_subsystem::Hold,
     started: bool,
 }
 
@@ -228,7 +227,7 @@ impl Testbed {
             return Ok(None);
         }
         self.detect_contacts(h)?;
-        let at = Instant { t: self.t, h, index: self.index, hold: self.hold, ..Instant::default() };
+        let at = Instant { t: self.t, h, index: self.index, ..Instant::default() };
         let mut sum = 0.0;
         for group in &mut self.groups {
             let found = if group.exchange.has_grounds() { self.detector.ports() } else { &self.no_ports };
@@ -338,8 +337,7 @@ impl Testbed {
         if self.groups.is_empty() {
             return Ok(Outcome::Converged);
         }
-        let hold = if h > 0.0 { self.hold } else { gluing::HOLD };
-        let at = Instant { t: self.t, h, index: self.index, hold, ..Instant::default() };
+        let at = Instant { t: self.t, h, index: self.index, ..Instant::default() };
         let start = Clock::now();
         // step 1: collision detection and the constraints of rigid contact
         self.detect_contacts(h)?;

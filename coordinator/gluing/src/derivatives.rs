@@ -6,7 +6,7 @@ use crate::timing::Part;
 use std::time::Instant as Clock;
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
-use terraglue_subsystem::{Capabilities, Hold, Level, Port};
+use terraglue_subsystem::{Capabilities, Level, Port};
 
 /// Where the bodies' interface Jacobian comes from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,26 +69,12 @@ impl Exchange {
             if told {
                 continue;
             }
-            let ramp = self.at.hold == Hold::Ramp;
-            let how = (source == Derivatives::Central, if ramp { self.t_ref } else { 1.0 });
+            let how = (source == Derivatives::Central, 1.0);
             most = most.max(side.take_slopes(instance, &self.nodes, &self.at, &self.t, how)?);
             self.displaced |= side.n() > 0;
         }
         self.at.trial += most;
         self.report.evaluations_jacobian += most;
-        Ok(())
-    }
-
-    /// d(x1 − x2, h·(v1 − v2))/d(T at t + h, T at t) under a two-parameter hold into `out`, by forward differences: all
-    /// columns of a member in one exchange.
-    pub fn linearise_ramp(&mut self, instances: &mut [Instance], out: &mut Vec<f64>) -> Result {
-        let start = Clock::now();
-        self.take_slopes(Derivatives::Forward, |_| true, instances)?;
-        out.clear();
-        out.resize(4 * self.n() * self.n(), 0.0);
-        self.bodies.iter().for_each(|side| side.add_ramp_slopes(self.at.h, out));
-        self.report.jacobian_refreshes += 1;
-        self.timings.charge(Part::Jacobian, start);
         Ok(())
     }
 

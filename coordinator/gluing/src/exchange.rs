@@ -30,8 +30,6 @@ pub struct Exchange {
     pub f_law: Vec<f64>,
     /// The wrench on the bodies; after a strategy the one to commit.
     pub t: Vec<f64>,
-    /// T at the start of the step under a two-parameter hold.
-    pub t_start: Vec<f64>,
     /// What side 2 got where that was another wrench; else empty.
     pub t_second: Vec<f64>,
     /// Wrench of the soil's law at the last trial.
@@ -114,7 +112,6 @@ impl Exchange {
             x2: Vec::new(),
             f_law: Vec::new(),
             t: Vec::new(),
-            t_start: Vec::new(),
             t_second: Vec::new(),
             f: Vec::new(),
             x1: Vec::new(),
@@ -211,7 +208,6 @@ impl Exchange {
             &mut self.x2,
             &mut self.f_law,
             &mut self.t,
-            &mut self.t_start,
             &mut self.f,
             &mut self.x1,
             &mut self.v1,
@@ -314,7 +310,6 @@ impl Exchange {
         self.displaced = false;
         for side in &mut self.bodies {
             let instance = &mut instances[side.slot];
-            side.start_from(&self.t_start);
             side.advance_under_force(instance, &self.nodes, &self.at, &self.t, None, Answer::default())?;
             side.motion_by_side(
                 [&mut self.x1, &mut self.v1, &mut self.a1],

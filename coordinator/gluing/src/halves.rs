@@ -127,20 +127,6 @@ impl Exchange {
         Ok(())
     }
 
-    /// A trial of side 1 under the motion X1: the wrench that acts on it goes to `t`.
-    pub fn advance_first_under_motion(&mut self, instances: &mut [Instance]) -> Result {
-        let start = Clock::now();
-        self.at.trial += 1;
-        let partner = (self.x1.as_slice(), self.v1.as_slice());
-        for side in self.bodies.iter_mut().filter(|s| !s.is_second()) {
-            let out = Answer { t: Some(&mut self.t), ..Answer::default() };
-            side.advance_under_motion(&mut instances[side.slot], &self.nodes, &self.at, partner, out)?;
-        }
-        self.report.evaluations_bodies += 1;
-        self.timings.charge(Part::Bodies, start);
-        Ok(())
-    }
-
     /// What the wrenches of the last trials miss, F − T, into `miss`; returns its largest component, N and N m. The
     /// report takes its ratio to the one `before` and its part of T_ref.
     pub fn force_residual(&mut self, miss: &mut Vec<f64>, before: f64) -> f64 {
@@ -150,33 +136,6 @@ impl Exchange {
         self.report.contraction = size / before;
         self.report.residual = size / self.t_ref;
         size
-    }
-
-    /// A trial of one side under f0 − z·X with one impedance per component.
-    pub fn advance_half_under_impedance(
-        &mut self,
-        second: bool,
-        (f0, z): (&[f64], &[f64]),
-        instances: &mut [Instance],
-    ) -> Result {
-        self.at.trial += 1;
-        for side in self.bodies.iter_mut().filter(|s| s.is_second() == second) {
-            let instance = &mut instances[side.slot];
-            side.advance_under_impedance(instance, &self.nodes, &self.at, f0, z)?;
-            side.motion_by_side(
-                [&mut self.x1, &mut self.v1, &mut self.a1],
-                [&mut self.x2, &mut self.v2, &mut self.a2],
-            );
-            if !second {
-                side.force(&mut self.t);
-            }
-        }
-        if second {
-            self.report.evaluations_soil += 1;
-        } else {
-            self.report.evaluations_bodies += 1;
-        }
-        Ok(())
     }
 
     /// G1 = dX1/dT of side 1 at its last trial into `estimate.g`, by forward differences where a module has none.
@@ -209,18 +168,5 @@ impl Exchange {
         }
         self.report.jacobian_refreshes += 1;
         Ok(())
-    }
-
-    /// K of side 1 after a trial under motion, as [`Exchange::second_stiffness`].
-    pub fn first_stiffness(&mut self, instances: &mut [Instance], out: &mut Vec<f64>) -> Result<bool> {
-        let n = self.n();
-        out.clear();
-        out.resize(n * n, 0.0);
-        for side in self.bodies.iter_mut().filter(|s| !s.is_second()) {
-            if !side.jacobian(&mut instances[side.slot], &self.nodes, &self.at, out)? {
-                return Ok(false);
-            }
-        }
-        Ok(true)
     }
 }

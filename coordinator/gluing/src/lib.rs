@@ -5,9 +5,7 @@
 //! - [`iterative`]: the generic T-T strategy with its X-T form; repeats trials until both sides agree.
 //! - [`semi_implicit`]: one Newton step of it, no check.
 //! - [`xt_newton`], [`relaxed`]: motion in, force out on side 2; with and without derivatives.
-//! - [`xx_newton`]: motion in on both sides.
 //! - [`jacobi`], [`gauss_seidel`]: explicit, the baseline.
-//! - [`tlm`]: springs as transmission lines.
 //! - [`monolithic`]: the reference.
 //!
 //! All work on an [`Exchange`], where the paper's calls stand by name, and fill one [`StepReport`].
@@ -41,20 +39,16 @@ pub mod step_control;
 #[cfg(test)]
 mod tests;
 pub mod timing;
-pub mod tlm;
 pub mod xt_newton;
-pub mod xx_newton;
 
 pub use derivatives::Derivatives;
 pub use exchange::Exchange;
 pub use glue::{Glue, Row};
 pub use group_estimate::GroupEstimate;
 pub use refusal::{Refusal, refusal};
-use refusal::{body_contacts_refused, contacts_refused, joints_refused, rigid_refused, second_refused};
+use refusal::{body_contacts_refused, joints_refused, rigid_refused, second_refused};
 pub use report::{PortReport, StepReport};
 pub use side::Instant;
-/// How wrenches run inside a step: only their end value counts for the integrators in use.
-pub const HOLD: terraglue_subsystem::Hold = terraglue_subsystem::Hold::End;
 
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
@@ -120,10 +114,8 @@ pub fn strategy(spec: &GluingSpec) -> Box<dyn Strategy> {
         StrategyKind::SemiImplicit => Box::new(semi_implicit::SemiImplicit::new(spec)),
         StrategyKind::XtNewton => Box::new(xt_newton::XtNewton::new(spec)),
         StrategyKind::Relaxed => Box::new(relaxed::Relaxed::new(spec)),
-        StrategyKind::XxNewton => Box::new(xx_newton::XxNewton::new(spec)),
         StrategyKind::Jacobi => Box::new(jacobi::Jacobi::default()),
         StrategyKind::GaussSeidel => Box::new(gauss_seidel::GaussSeidel::default()),
-        StrategyKind::Tlm => Box::new(tlm::Tlm::default()),
         StrategyKind::Monolithic => Box::new(monolithic::Monolithic::new(spec)),
     }
 }

@@ -2,16 +2,12 @@
 
 use super::{Exchange, Strategy, strategy};
 use terraglue_host::Instance;
-use terraglue_scenario::{GluingSpec, HoldChoice, LevelChoice, StrategyKind};
+use terraglue_scenario::{GluingSpec, StrategyKind};
 use terraglue_subsystem::Capabilities;
 
 /// A refused strategy.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Refusal {
-    /// The key of `[gluing]` that it is about.
-    pub key: &'static str,
-    /// The way out, where another strategy is none.
-    pub help: Option<String>,
     /// Why.
     pub reason: String,
     /// Strategies that this group could be glued with.
@@ -24,56 +20,10 @@ pub fn refusal(spec: &GluingSpec, exchange: &Exchange, instances: &[Instance]) -
         let spec = GluingSpec { strategy: kind, ..spec.clone() };
         why(strategy(&spec).as_ref(), exchange, instances)
     };
-    if let Some(refusal) = hold_refused(spec, exchange, instances) {
-        return Some(refusal);
-    }
     let reason = of(spec.strategy)?;
     let would_work =
         StrategyKind::ALL.iter().filter(|kind| of(**kind).is_none()).map(|kind| kind.name()).collect();
-    Some(Refusal { key: "strategy", help: None, reason, would_work })
-}
-
-/// Holds that do not go with the level, the strategy, the glue or the members.
-fn hold_refused(spec: &GluingSpec, exchange: &Exchange, instances: &[Instance]) -> Option<Refusal> {
-    let refused = |reason: String, help: &str| {
-        Some(Refusal { key: "hold", help: Some(help.into()), reason, would_work: Vec::new() })
-    };
-    if spec.hold == HoldChoice::Linear && spec.level == LevelChoice::Position {
-        let reason = "a linear hold with the condition at position level grows by 2 + √3 = 3.73 per step";
-        let help = "use hold = \"end\", \"constant\" or \"two-parameter\", or level = \"velocity\"";
-        return refused(reason.into(), help);
-    }
-    let sub_cycles = |slot: usize| instances[slot].capabilities().has(Capabilities::SUBCYCLES);
-    if matches!(spec.hold, HoldChoice::Constant | HoldChoice::Linear) && !exchange.members().any(sub_cycles) {
-        let reason = format!(
-            "a {} hold would have no effect: none of the glued subsystems sub-cycles, all read T at the end of the step",
-            spec.hold
-        );
-        return refused(reason, "leave `hold` out");
-    }
-    if spec.hold != HoldChoice::TwoParameter {
-        return None;
-    }
-    if spec.level != LevelChoice::Position {
-        let reason = "a two-parameter hold closes place and rate at once: it has no other level";
-        return refused(reason.into(), "leave `level` out");
-    }
-    if spec.strategy != StrategyKind::Iterative {
-        let reason = format!("`{}` has no second force per step for a two-parameter hold", spec.strategy);
-        return refused(reason, "use strategy = \"iterative\", or another hold");
-    }
-    if exchange.has_grounds() || exchange.glue.contact().is_some() || exchange.glue.spring().is_some() {
-        let reason = "a two-parameter hold is for rigid joints: a law gives one force per place and rate";
-        return refused(reason.into(), "use another hold");
-    }
-    let lacks = |slot: &usize| !instances[*slot].capabilities().has(Capabilities::RAMP);
-    let slot = exchange.members().find(lacks)?;
-    let (name, module) = (instances[slot].name(), instances[slot].module());
-    let reason = format!("`{name}` (module {module}) takes one force per step, not two");
-    refused(
-        reason,
-        "use another hold; sub-cycling modules may declare `force input with two parameters per step`",
-    )
+    Some(Refusal { reason, would_work })
 }
 
 fn why(strategy: &dyn Strategy, exchange: &Exchange, instances: &[Instance]) -> Option<String> {
@@ -105,12 +55,6 @@ pub fn joints_refused(name: &str, exchange: &Exchange) -> Option<String> {
     exchange.glue.has_joints().then(|| {
         format!("`{name}` co-operates at contacts: the soil cannot say how a joint between bodies pulls")
     })
-}
-
-/// A strategy of joints meets a contact.
-pub fn contacts_refused(name: &str, exchange: &Exchange) -> Option<String> {
-    (exchange.has_grounds() || exchange.glue.contact().is_some())
-        .then(|| format!("`{name}` glues joints: a contact opens and closes, and it cannot see when"))
 }
 
 /// A strategy that asks soils meets a contact between bodies.

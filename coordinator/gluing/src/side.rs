@@ -4,7 +4,7 @@
 use terraglue_diagnostics::{Error, Result};
 use terraglue_host::{Instance, Progress};
 use terraglue_subsystem::{
-    Batch, Capabilities, Estimate, Hold, Input, Law, Level, Motion, Node, Port, Response, Step,
+    Batch, Capabilities, Estimate, Input, Law, Level, Motion, Node, Port, Response, Step,
 };
 
 /// Time and number of the present trial.
@@ -18,15 +18,13 @@ pub struct Instant {
     pub index: u64,
     /// Number of the trial in the step.
     pub trial: u32,
-    /// Epoch of the set of ports.
+    /// Epoch of the set of ports: another one where a port came, went or changed its mask.
     pub epoch: u32,
-    /// How T runs inside the step.
-    pub hold: Hold,
 }
 
 impl Default for Instant {
     fn default() -> Self {
-        Self { t: 0.0, h: 0.0, index: 0, trial: 0, epoch: 0, hold: super::HOLD }
+        Self { t: 0.0, h: 0.0, index: 0, trial: 0, epoch: 0 }
     }
 }
 
@@ -61,8 +59,6 @@ pub struct Side {
     a: Vec<f64>,
     t: Vec<f64>,
     given_t: Vec<f64>,
-    /// T at the start of the step under a two-parameter hold.
-    start_t: Vec<f64>,
     partner_x: Vec<f64>,
     partner_v: Vec<f64>,
     matrix: Vec<f64>,
@@ -122,16 +118,7 @@ impl Side {
     }
 
     fn step<'a>(ports: &'a [Port], n: usize, nodes: &'a [Node], at: &Instant) -> Step<'a> {
-        Step {
-            t: at.t,
-            h: at.h,
-            index: at.index,
-            trial: at.trial,
-            epoch: at.epoch,
-            n: n as u32,
-            ports,
-            nodes,
-        }
+        Step { t: at.t, h: at.h, index: at.index, trial: at.trial, n: n as u32, ports, nodes }
     }
 
     fn gather(own: &mut [f64], index: &[usize], group: &[f64]) {
@@ -266,12 +253,6 @@ impl Side {
         Ok(true)
     }
 
-    /// T at the start of the step, for trials under a two-parameter hold.
-    pub fn start_from(&mut self, t: &[f64]) {
-        self.start_t.clear();
-        self.start_t.extend(self.index.iter().map(|i| t[*i]));
-    }
-
     /// A trial under T (and the partner's motion, where given): own X, V and the wrench at the end.
     pub fn advance_under_force(
         &mut self,
@@ -285,36 +266,7 @@ impl Side {
         self.given_t.clear();
         self.given_t.resize(self.n(), 0.0);
         Self::gather(&mut self.given_t, &self.index, t);
-        if at.hold == Hold::Ramp {
-            self.given_t.extend_from_slice(&self.start_t);
-        }
         self.advance(instance, nodes, at, Given::Force { with_motion: partner.is_some() }, partner, out)
-    }
-
-    /// A trial under the wrench f0 − z·X on side 1, −(f0 − z·X) on side 2; one z per component (N/m).
-    pub fn advance_under_impedance(
-        &mut self,
-        instance: &mut Instance,
-        nodes: &[Node],
-        at: &Instant,
-        f0: &[f64],
-        z: &[f64],
-    ) -> Result {
-        let n = self.n();
-        self.given_t.clear();
-        self.given_t.resize(n, 0.0);
-        Self::gather(&mut self.given_t, &self.index, f0);
-        self.matrix.clear();
-        self.matrix.resize(n * n, 0.0);
-        for (k, i) in self.index.iter().enumerate() {
-            self.matrix[k * n + k] = z[*i];
-        }
-        self.advance(instance, nodes, at, Given::Impedance, None, Answer::default())
-    }
-
-    /// The wrench of the last trial.
-    pub fn force(&self, out: &mut [f64]) {
-        Self::scatter(&self.t, &self.index, out);
     }
 
     /// A trial of a soil under the bodies' motion.
@@ -345,9 +297,8 @@ impl Side {
         let motion = Motion { x: &self.partner_x, v: &self.partner_v };
         let input = match given {
             Given::Motion => Input::Motion(motion),
-            Given::Impedance => Input::Impedance { f0: &self.given_t, z: &self.matrix },
             Given::Force { with_motion } => {
-                Input::Force { t: &self.given_t, hold: at.hold, motion: with_motion.then_some(motion) }
+                Input::Force { t: &self.given_t, motion: with_motion.then_some(motion) }
             }
         };
         let step = Self::step(&self.ports, self.index.len(), nodes, at);
@@ -437,7 +388,7 @@ impl Side {
         self.by_differences = false;
     }
 
-    /// The Jacobian by differences of trials about T (under a two-parameter hold about T at both ends), forward from the last trial or central: all columns in one exchange.
+    /// The Jacobian by differences of trials about T, forward from the last trial or central: all columns in one exchange.
     /// The number of trials, each of which is then the instance's last one.
     pub fn take_slopes(
         &mut self,
@@ -451,9 +402,6 @@ impl Side {
         self.given_t.clear();
         self.given_t.resize(n, 0.0);
         Self::gather(&mut self.given_t, &self.index, t);
-        if at.hold == Hold::Ramp {
-            self.given_t.extend_from_slice(&self.start_t);
-        }
         let delta = |t: f64| 1e-6 * t.abs().max(least);
         let ways: &[f64] = if central { &[-1.0, 1.0] } else { &[1.0] };
         let width = self.given_t.len();
@@ -473,7 +421,7 @@ impl Side {
         let step = Self::step(&self.ports, n, nodes, at);
         let [x, v, a] = &mut self.batch;
         let mut batch = Batch { x, v, a, t: &mut self.t, reached: at.t + at.h };
-        let progress = instance.advance_batch(&step, &self.batch_t, at.hold, &mut batch)?;
+        let progress = instance.advance_batch(&step, &self.batch_t, &mut batch)?;
         complete(instance, "advance_batch", progress)?;
         let here = [&self.x, &self.v, &self.a];
         for ((slopes, answers), here) in self.slopes.iter_mut().zip(&self.batch).zip(here) {
@@ -487,22 +435,6 @@ impl Side {
         }
         self.by_differences = true;
         Ok(count as u32)
-    }
-
-    /// Adds those of [`Side::take_slopes`] under a two-parameter hold to d(x1 − x2, h·(v1 − v2))/d(T at t + h, T at t) of
-    /// the group, 2·n_group × 2·n_group, column-major.
-    pub fn add_ramp_slopes(&self, h: f64, out: &mut [f64]) {
-        let (n, both) = (self.n(), out.len().isqrt());
-        for (level, factor) in [(Level::Position, 1.0), (Level::Velocity, h)] {
-            let first = level as usize * both / 2;
-            for (c, column) in self.slopes[level as usize].chunks_exact(n.max(1)).enumerate() {
-                let at = self.index[c % n] + c / n * both / 2;
-                for (r, value) in column.iter().enumerate() {
-                    out[at * both + first + self.index[r]] +=
-                        factor * self.signs[r] * self.signs[c % n] * value;
-                }
-            }
-        }
     }
 
     /// dX/d(wrench on itself) of [`Side::take_slopes`] into the group's matrix.
@@ -593,8 +525,6 @@ enum Given {
     Force { with_motion: bool },
     /// The partner's motion.
     Motion,
-    /// The wrench in `given_t` less the impedance in `matrix` times X.
-    Impedance,
 }
 
 /// Where a trial's answer goes; packed over the group.

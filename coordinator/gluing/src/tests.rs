@@ -135,7 +135,6 @@ impl Subsystem for Columns {
                     self.trial[i] = self.depth(i, t[i]);
                     (out.x[i], out.t[i]) = (self.z[i] - self.trial[i], t[i]);
                 }
-                Input::Impedance { .. } => return Err(Error::Unsupported),
             }
             (out.v[i], out.a[i]) = (0.0, 0.0);
         }

@@ -7,8 +7,8 @@ use std::cell::Cell;
 use std::time::{Duration, Instant as Clock};
 use terraglue_diagnostics::error::{Error, Result};
 use terraglue_subsystem::{
-    Action, Batch, BodyState, Capabilities, Energy, Error as Failure, Estimate, FieldInfo, FieldTile, Hold,
-    Input, Kind, Law, Level, Motion, Response, Scene, Step, Subsystem, Values, ValuesMut, Variable,
+    Action, Batch, BodyState, Capabilities, Energy, Error as Failure, Estimate, FieldInfo, FieldTile, Input,
+    Kind, Law, Level, Motion, Response, Scene, Step, Subsystem, Values, ValuesMut, Variable,
 };
 
 /// How far a trial went.
@@ -255,7 +255,7 @@ impl Instance {
     }
 
     /// Trials under several wrenches in one exchange.
-    pub fn advance_batch(&mut self, step: &Step, t: &[f64], hold: Hold, out: &mut Batch) -> Result<Progress> {
+    pub fn advance_batch(&mut self, step: &Step, t: &[f64], out: &mut Batch) -> Result<Progress> {
         const NAME: &str = "advance_batch";
         self.time_s.set(step.t);
         self.alive(NAME)?;
@@ -264,7 +264,7 @@ impl Instance {
         }
         out.reached = step.t + step.h;
         let start = self.begin();
-        let result = self.subsystem.advance_batch(step, t, hold, out);
+        let result = self.subsystem.advance_batch(step, t, out);
         self.charge(start);
         match result {
             Err(Failure::Discard { reached }) => return self.early(NAME, step, reached),

@@ -86,26 +86,14 @@ fn made(
 
 /// An empty step at t = 0 of a millisecond.
 fn empty_step() -> TgStep {
-    TgStep {
-        t: 0.0,
-        h: 1e-3,
-        index: 0,
-        trial: 0,
-        epoch: 0,
-        n: 0,
-        n_ports: 0,
-        n_nodes: 0,
-        reserved: 0,
-        ports: null(),
-        nodes: null(),
-    }
+    TgStep { t: 0.0, h: 1e-3, index: 0, trial: 0, n: 0, n_ports: 0, n_nodes: 0, ports: null(), nodes: null() }
 }
 
 unsafe fn steps(table: &TgSubsystem, instance: *mut c_void) -> Result<(), OddCall> {
     let step = empty_step();
     let mut out: TgResponse = unsafe { std::mem::zeroed() };
     out.reached = 1e-3;
-    let input = TgInput { kind: 77, hold: 0, t: null(), x: null(), v: null(), z: null() };
+    let input = TgInput { kind: 77, reserved: 0, t: null(), x: null(), v: null() };
     if let Some(advance) = table.advance {
         let status = unsafe { advance(instance, &raw const step, &raw const input, &raw mut out) };
         // An input without numbers is no input: a step without ports may take it, but must not end the instance.

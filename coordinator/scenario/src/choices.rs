@@ -51,14 +51,10 @@ named! {
         XtNewton = "xt-newton",
         /// A fixed point with acceleration, for subsystems without derivatives.
         Relaxed = "relaxed",
-        /// Newton's method on two subsystems that both take motion.
-        XxNewton = "xx-newton",
         /// All subsystems side by side with the forces of the step before, as FMI masters do.
         Jacobi = "jacobi",
         /// One after the other, each with the newest values.
         GaussSeidel = "gauss-seidel",
-        /// Transmission lines: physical springs only.
-        Tlm = "tlm",
         /// Both sides as one system, as reference.
         Monolithic = "monolithic",
     }
@@ -130,20 +126,6 @@ named! {
     }
 }
 
-named! {
-    /// How T runs inside a step: `gluing.hold`.
-    HoldChoice {
-        /// All members read T at the end of the step.
-        End = "end",
-        /// The value of the end holds over the step.
-        Constant = "constant",
-        /// On a line from the T of the step before.
-        Linear = "linear",
-        /// On a line whose two ends are both unknown.
-        TwoParameter = "two-parameter",
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -155,6 +137,6 @@ mod tests {
             assert_eq!(StrategyKind::named(name), Some(*kind));
         }
         assert_eq!(StrategyKind::named("nothing"), None);
-        assert_eq!(HoldChoice::named("two-parameter"), Some(HoldChoice::TwoParameter));
+        assert_eq!(LevelChoice::named("velocity"), Some(LevelChoice::Velocity));
     }
 }

@@ -1,8 +1,6 @@
 //! Every key of the reserved tables, once: the parser, the JSON Schema and `docs/scenario.md` are made from here.
 
-use super::choices::{
-    FormChoice, HoldChoice, JacobianChoice, LevelChoice, Relaxation, StartChoice, StrategyKind,
-};
+use super::choices::{FormChoice, JacobianChoice, LevelChoice, Relaxation, StartChoice, StrategyKind};
 use terraglue_diagnostics::allowed;
 use terraglue_subsystem::{Parameter, ParameterType};
 
@@ -218,14 +216,6 @@ fn gluing() -> Table {
             .or("position")
             .choices(LevelChoice::NAMES)
             .into(),
-        Parameter::of(
-            "hold",
-            ParameterType::Text,
-            "how T runs inside the step of a subsystem that sub-cycles",
-        )
-        .or("end")
-        .choices(HoldChoice::NAMES)
-        .into(),
         number(
             "stabilisation",
             "",

@@ -29,9 +29,7 @@ mod terrain;
 #[cfg(test)]
 mod tests;
 
-pub use choices::{
-    FormChoice, HoldChoice, JacobianChoice, LevelChoice, Relaxation, StartChoice, StrategyKind,
-};
+pub use choices::{FormChoice, JacobianChoice, LevelChoice, Relaxation, StartChoice, StrategyKind};
 pub use difference::{Difference, differences};
 pub use ground_size::{SMALLER, TooMany, too_many};
 pub use isolation::IsolationSpec;

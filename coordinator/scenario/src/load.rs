@@ -1,9 +1,7 @@
 //! From the text to the [`Scenario`].
 
 use super::advice::MOST_STEPS;
-use super::choices::{
-    FormChoice, HoldChoice, JacobianChoice, LevelChoice, Relaxation, StartChoice, StrategyKind,
-};
+use super::choices::{FormChoice, JacobianChoice, LevelChoice, Relaxation, StartChoice, StrategyKind};
 use super::events::{connections, events, faults, glue};
 use super::keys::{self, Table};
 use super::model::*;
@@ -250,7 +248,6 @@ fn read_gluing(s: &Section) -> Checked<GluingSpec> {
         relaxation: Relaxation::named(&s.text("relaxation")).unwrap_or(usual.relaxation),
         jacobian: JacobianChoice::named(&s.text("jacobian")).unwrap_or(usual.jacobian),
         level: LevelChoice::named(&s.text("level")).unwrap_or(usual.level),
-        hold: HoldChoice::named(&s.text("hold")).unwrap_or(usual.hold),
         stabilisation: s.number("stabilisation"),
         energy_residual_j: s.optional_number("energy_residual_j"),
         step_min_s: s.optional_number("step_min_s"),

@@ -1,8 +1,6 @@
 //! A checked scenario: plain data that the testbed is built from.
 
-use super::choices::{
-    FormChoice, HoldChoice, JacobianChoice, LevelChoice, Relaxation, StartChoice, StrategyKind,
-};
+use super::choices::{FormChoice, JacobianChoice, LevelChoice, Relaxation, StartChoice, StrategyKind};
 use super::isolation::IsolationSpec;
 use serde_json::{Map, Value};
 use std::path::PathBuf;
@@ -167,8 +165,6 @@ pub struct GluingSpec {
     pub jacobian: JacobianChoice,
     /// Level of the condition at joints.
     pub level: LevelChoice,
-    /// How T runs inside the step.
-    pub hold: HoldChoice,
     /// Share of the error that is taken out per step at velocity or acceleration level.
     pub stabilisation: f64,
     /// Tolerated energy residual of a step, J; absent: all steps have the same length.
@@ -285,7 +281,6 @@ impl Default for GluingSpec {
             relaxation: Relaxation::Anderson,
             jacobian: JacobianChoice::Analytic,
             level: LevelChoice::Position,
-            hold: HoldChoice::End,
             stabilisation: 0.0,
             energy_residual_j: None,
             step_min_s: None,

@@ -13,7 +13,7 @@ import array
 import math
 
 # What an instance can do beyond `advance`: the sum stands in `Subsystem.can`.
-FORCE, MOTION, IMPEDANCE, ESTIMATE, SOLVE, DERIVATIVES, RETRY = 1, 2, 4, 8, 16, 32, 64
+FORCE, MOTION, ESTIMATE, SOLVE, DERIVATIVES, RETRY = 1, 2, 8, 16, 32, 64
 SUBCYCLES, FEEDTHROUGH = 512, 1024
 # Roles of a variable, what a change of it does, and the types of its elements.
 PARAMETER, INPUT, OUTPUT, LOCAL = range(4)
@@ -80,9 +80,9 @@ class Node:
 
 
 class Step:
-    """From t to t + h (s): index of the step, number of the trial, epoch of the ports, length n of packed vectors."""
+    """From t to t + h (s): index of the step, number of the trial, length n of packed vectors."""
 
-    __slots__ = ("t", "h", "index", "trial", "epoch", "n", "ports", "nodes")
+    __slots__ = ("t", "h", "index", "trial", "n", "ports", "nodes")
 
 
 class Motion:
@@ -95,15 +95,9 @@ class Motion:
 
 
 class Force:
-    """Input: the wrench t; hold 0 end, 1 constant, 2 linear; `motion` of the other side where it is known, else None."""
+    """Input: the wrench t; `motion` of the other side where it is known, else None."""
 
-    __slots__ = ("t", "hold", "motion")
-
-
-class Impedance:
-    """Input: T = f0 - z X with z of n x n, column by column."""
-
-    __slots__ = ("f0", "z")
+    __slots__ = ("t", "motion")
 
 
 class Response:
@@ -254,7 +248,7 @@ class Subsystem:
             fill(vector, 0.0)
 
     def advance(self, step, input, out):
-        """Paper, steps 3 and 4: a trial from the committed state under Force, Motion or Impedance."""
+        """Paper, steps 3 and 4: a trial from the committed state under Force or Motion."""
         raise Unsupported
 
     def estimate_forces(self, step, partner, out):

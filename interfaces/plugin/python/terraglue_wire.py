@@ -9,7 +9,7 @@ import struct
 from terraglue import BINARY, ENUMERATION, I64, NAN, STRING
 
 AREA, START = 64 << 20, 4096
-U32_FORM, OUTCOME, STEP = struct.Struct("<I"), struct.Struct("<IB"), struct.Struct("<ddQQQQ")
+U32_FORM, OUTCOME, STEP = struct.Struct("<I"), struct.Struct("<IB"), struct.Struct("<ddQQQ")
 PORT, NODE, LAW, BODY, END = (struct.Struct(f) for f in ("<QIiIIIIII18d", "<ii4d", "<4d", "<13d", "<dI"))
 _TYPES = "dfbhiqBHIQ?"
 _SIZES = [struct.calcsize("<" + c) for c in _TYPES]

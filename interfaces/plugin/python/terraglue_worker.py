@@ -13,7 +13,7 @@ import types
 import zlib
 
 from terraglue import (BOOL, ENUMERATION, INFINITY, INFO, NEEDS_RESET, READ_ONLY, STRING, U32, WARNING, Discard, Estimate, Force,
-                       Host, Impedance, Law, Motion, Node, Port, PressureAnswer, PressureNodes, Refused, Response, ShearAnswer,
+                       Host, Law, Motion, Node, Port, PressureAnswer, PressureNodes, Refused, Response, ShearAnswer,
                        ShearNodes, Step, Subsystem, Terrain, Unsupported)
 from terraglue_wire import AREA, BODY, END, LAW, NODE, OUTCOME, PORT, START, STEP, Call, Reply, Segment
 
@@ -276,7 +276,7 @@ class Worker:
 
     def _step(self, call):
         step = Step()
-        step.t, step.h, step.index, step.trial, step.epoch, step.n = call.take(STEP)
+        step.t, step.h, step.index, step.trial, step.n = call.take(STEP)
         at = call.at
         ports = call.u32()
         call.at += ports * PORT.size
@@ -330,13 +330,10 @@ class Worker:
         step, kind = self._step(call), call.u8()
         if kind < 2:
             given = Force()
-            given.t, given.hold = call.doubles(), call.u32()
+            given.t = call.doubles()
             given.motion = Motion(call.doubles(), call.doubles()) if kind else None
-        elif kind == 2:
-            given = Motion(call.doubles(), call.doubles())
         else:
-            given = Impedance()
-            given.f0, given.z = call.doubles(), call.doubles()
+            given = Motion(call.doubles(), call.doubles())
         self._responded(step, reply, lambda out: self.unit.advance(step, given, out))
 
     def _jacobian(self, call, reply):

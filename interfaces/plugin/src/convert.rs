@@ -1,7 +1,7 @@
 //! Integers of the border to the enumerations of the interface, each through a `match`, and statuses to errors.
 
 use crate::abi::*;
-use terraglue_subsystem::{Causality, Effect, Error, Hold, Kind, Level, LogLevel, ValueType};
+use terraglue_subsystem::{Causality, Effect, Error, Kind, Level, LogLevel, ValueType};
 
 /// Kind of a module.
 pub(crate) fn kind(number: u32) -> Option<Kind> {
@@ -10,17 +10,6 @@ pub(crate) fn kind(number: u32) -> Option<Kind> {
         TG_ROBOT => Some(Kind::Robot),
         TG_CONTROLLER => Some(Kind::Controller),
         TG_LAW => Some(Kind::Law),
-        _ => None,
-    }
-}
-
-/// How T runs inside a step.
-pub(crate) fn hold(number: u32) -> Option<Hold> {
-    match number {
-        TG_HOLD_END => Some(Hold::End),
-        TG_HOLD_CONSTANT => Some(Hold::Constant),
-        TG_HOLD_LINEAR => Some(Hold::Linear),
-        TG_HOLD_RAMP => Some(Hold::Ramp),
         _ => None,
     }
 }

@@ -3,10 +3,9 @@
 use terraglue_subsystem::{Capabilities, LawModule, Variable};
 
 /// What an instance can do, as words.
-pub const WORDS: [(Capabilities, &str); 13] = [
+pub const WORDS: [(Capabilities, &str); 11] = [
     (Capabilities::FORCE, "force"),
     (Capabilities::MOTION, "motion"),
-    (Capabilities::IMPEDANCE, "impedance"),
     (Capabilities::ESTIMATE, "estimate"),
     (Capabilities::SOLVE, "solve"),
     (Capabilities::DERIVATIVES, "derivatives"),
@@ -15,7 +14,6 @@ pub const WORDS: [(Capabilities, &str); 13] = [
     (Capabilities::SERIALIZE, "serialize"),
     (Capabilities::SUBCYCLES, "subcycles"),
     (Capabilities::FEEDTHROUGH, "feedthrough"),
-    (Capabilities::RAMP, "ramp"),
     (Capabilities::FIXED_STEP, "fixed-step"),
 ];
 

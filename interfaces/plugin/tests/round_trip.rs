@@ -134,7 +134,7 @@ const NODES: [Node; 2] = [
 const N: usize = 4;
 
 fn step(ports: &[Port]) -> Step<'_> {
-    Step { t: 0.1, h: 1e-3, index: 12, trial: 3, epoch: 4, n: N as u32, ports, nodes: &NODES }
+    Step { t: 0.1, h: 1e-3, index: 12, trial: 3, n: N as u32, ports, nodes: &NODES }
 }
 
 /// All calls of a step; every bit of the answers goes into `bits` (which does not grow beyond its capacity).
@@ -145,8 +145,6 @@ fn calls(s: &mut dyn Subsystem, bits: &mut Vec<u64>) {
     let (mut g, mut active, mut laws) = ([0.0; N * N], [0; 2], [Law::UNILATERAL; 2]);
     let motion = Motion { x: &[1e-3, 2e-3, -3e-3, 4e-3], v: &[0.1, 0.2, 0.3, 0.4] };
     let force = [10.0, 1.0, -2.0, 5.0];
-    let z: [f64; N * N] = std::array::from_fn(|k| k as f64);
-    let hold = Hold::Linear;
     macro_rules! answer {
         ($call:expr) => {{
             let mut out = Response { x: &mut x, v: &mut v, a: &mut a, t: &mut t, reached: 0.101, flags: 0 };
@@ -167,10 +165,9 @@ fn calls(s: &mut dyn Subsystem, bits: &mut Vec<u64>) {
     bits.extend([u64::from(e.unique), u64::from(e.active[0]), u64::from(e.active[1])]);
     answer!(|out| s.solve_compatibility(&step, &e, out));
     for input in [
-        Input::Force { t: &force, hold, motion: None },
-        Input::Force { t: &force, hold: Hold::Constant, motion: Some(motion) },
+        Input::Force { t: &force, motion: None },
+        Input::Force { t: &force, motion: Some(motion) },
         Input::Motion(motion),
-        Input::Impedance { f0: &force, z: &z },
     ] {
         answer!(|out| s.advance(&step, &input, out));
     }
@@ -295,7 +292,7 @@ fn advance(s: &mut dyn Subsystem) -> (Result, f64) {
     let ports = ports();
     let [mut x, mut v, mut a, mut t] = [[0.0; N]; 4];
     let mut out = Response { x: &mut x, v: &mut v, a: &mut a, t: &mut t, reached: 0.101, flags: 0 };
-    let input = Input::Force { t: &[0.0; N], hold: Hold::End, motion: None };
+    let input = Input::Force { t: &[0.0; N], motion: None };
     (s.advance(&step(&ports), &input, &mut out), out.reached)
 }
 
@@ -330,7 +327,7 @@ fn vectors_that_are_too_short_never_reach_the_module() {
     let ports = ports();
     let [mut x, mut v, mut a, mut t] = [[0.0; N]; 4];
     let mut out = Response { x: &mut x[..3], v: &mut v, a: &mut a, t: &mut t, reached: 0.0, flags: 0 };
-    let input = Input::Force { t: &[0.0; N], hold: Hold::End, motion: None };
+    let input = Input::Force { t: &[0.0; N], motion: None };
     assert!(through.advance(&step(&ports), &input, &mut out).is_err());
     let no_nodes = Step { nodes: &[], ..step(&ports) };
     let still = Motion { x: &[0.0; N], v: &[0.0; N] };

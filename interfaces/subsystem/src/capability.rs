@@ -9,8 +9,6 @@ impl Capabilities {
     pub const FORCE: Self = Self(1);
     /// `advance` takes [`crate::Input::Motion`].
     pub const MOTION: Self = Self(2);
-    /// `advance` takes [`crate::Input::Impedance`].
-    pub const IMPEDANCE: Self = Self(4);
     /// `estimate_forces` is implemented.
     pub const ESTIMATE: Self = Self(8);
     /// `solve_compatibility` is implemented.
@@ -27,17 +25,13 @@ impl Capabilities {
     pub const SUBCYCLES: Self = Self(512);
     /// Outputs depend directly on inputs of the same time.
     pub const FEEDTHROUGH: Self = Self(1024);
-
-    /// `advance` takes a force that runs linearly between two values of the step's own, [`crate::Hold::Ramp`].
-    pub const RAMP: Self = Self(2048);
     /// Makes communication steps of one length only.
     pub const FIXED_STEP: Self = Self(4096);
 
     /// All names, for messages and listings.
-    pub const NAMES: [(Self, &'static str); 13] = [
+    pub const NAMES: [(Self, &'static str); 11] = [
         (Self::FORCE, "force input"),
         (Self::MOTION, "motion input"),
-        (Self::IMPEDANCE, "impedance input"),
         (Self::ESTIMATE, "estimate_forces"),
         (Self::SOLVE, "solve_compatibility"),
         (Self::DERIVATIVES, "interface_jacobian"),
@@ -46,7 +40,6 @@ impl Capabilities {
         (Self::SERIALIZE, "serialize"),
         (Self::SUBCYCLES, "sub-cycles"),
         (Self::FEEDTHROUGH, "direct feed-through"),
-        (Self::RAMP, "force input with two parameters per step"),
         (Self::FIXED_STEP, "steps of one length only"),
     ];
 

@@ -53,5 +53,5 @@ pub use port::{Law, Node, Port, PortKind, component};
 pub use scene::{BodyState, Geometry, Pose, Scene, SceneBody, SceneShape};
 pub use schema::{Kind, Parameter, ParameterType, Schema};
 pub use subsystem::{Module, Subsystem};
-pub use trial::{Batch, Estimate, Hold, Input, Level, Motion, Response, Step, flag};
+pub use trial::{Batch, Estimate, Input, Level, Motion, Response, Step, flag};
 pub use variable::{Action, Causality, Effect, ValueType, Values, ValuesMut, Variable, element_name};

@@ -9,7 +9,7 @@ use crate::host::Host;
 use crate::port::Law;
 use crate::scene::{BodyState, Scene};
 use crate::schema::Schema;
-use crate::trial::{Batch, Estimate, Hold, Input, Level, Motion, Response, Step};
+use crate::trial::{Batch, Estimate, Input, Level, Motion, Response, Step};
 use crate::variable::{Action, Values, ValuesMut, Variable};
 use std::sync::Arc;
 
@@ -57,8 +57,8 @@ pub trait Subsystem: Send {
     /// Trials of one step under several wrenches (packed one after the other in `t`), each from the committed state: all
     /// columns of a difference in one exchange. The last one counts as the last trial. Worth an implementation of its own
     /// where every call has a price.
-    fn advance_batch(&mut self, step: &Step, t: &[f64], hold: Hold, out: &mut Batch) -> Result {
-        out.one_by_one(step, t, hold, |step, input, out| self.advance(step, input, out))
+    fn advance_batch(&mut self, step: &Step, t: &[f64], out: &mut Batch) -> Result {
+        out.one_by_one(step, t, |step, input, out| self.advance(step, input, out))
     }
 
     /// Derivatives at the last trial, n × n, column-major. After `Force`: G = dX/d(wrench on itself) at `level`.

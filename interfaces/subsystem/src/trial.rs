@@ -13,8 +13,6 @@ pub struct Step<'a> {
     pub index: u64,
     /// Number of the trial in this step.
     pub trial: u32,
-    /// Grows when a port appears, goes or changes its mask.
-    pub epoch: u32,
     /// Length of packed vectors.
     pub n: u32,
     /// All ports of this subsystem in ascending order of key.
@@ -26,7 +24,7 @@ pub struct Step<'a> {
 impl Step<'_> {
     /// A plain step without ports.
     pub const fn free(t: f64, h: f64, index: u64) -> Step<'static> {
-        Step { t, h, index, trial: 0, epoch: 0, n: 0, ports: &[], nodes: &[] }
+        Step { t, h, index, trial: 0, n: 0, ports: &[], nodes: &[] }
     }
 }
 
@@ -37,36 +35,13 @@ pub enum Input<'a> {
     /// carries the partner's motion at t + h: a soil then answers `x` = its surface under the normal force
     /// and `t` = the whole wrench that its law gives at that motion. Bodies ignore `motion`.
     Force {
-        /// Wrench on side 1; under [`Hold::Ramp`] 2·n values, first those at t + h, then those at t.
+        /// Wrench on side 1; a subsystem with smaller steps of its own holds it over all of them.
         t: &'a [f64],
-        /// How T runs inside the step.
-        hold: Hold,
         /// The partner's motion where it is known.
         motion: Option<Motion<'a>>,
     },
     /// Motion of the other side at t + h.
     Motion(Motion<'a>),
-    /// A linearised partner: T = f0 − z·X.
-    Impedance {
-        /// Wrench at X = 0.
-        f0: &'a [f64],
-        /// Column-major n × n stiffness.
-        z: &'a [f64],
-    },
-}
-
-/// T inside the step.
-#[repr(u32)]
-#[derive(Clone, Copy, PartialEq, Eq, Debug)]
-pub enum Hold {
-    /// Its end value only matters (implicit integrators).
-    End = 0,
-    /// Constant.
-    Constant = 1,
-    /// Linear from the committed T.
-    Linear = 2,
-    /// Linear between two values of the step's own; only for subsystems with `Capabilities::RAMP`.
-    Ramp = 3,
 }
 
 /// Level at which a derivative is asked for.
@@ -123,7 +98,7 @@ pub struct Batch<'a> {
 }
 
 impl Batch<'_> {
-    /// Makes the trials one by one: `t` holds one wrench after the other (twice as long under [`Hold::Ramp`]).
+    /// Makes the trials one by one: `t` holds one wrench after the other.
     ///
     /// # Errors
     /// Those of `advance`.
@@ -131,12 +106,10 @@ impl Batch<'_> {
         &mut self,
         step: &Step,
         t: &[f64],
-        hold: Hold,
         mut advance: impl FnMut(&Step, &Input, &mut Response) -> crate::Result,
     ) -> crate::Result {
         let n = step.n as usize;
-        let width = if hold == Hold::Ramp { 2 * n } else { n };
-        for (k, t) in t.chunks_exact(width.max(1)).enumerate() {
+        for (k, t) in t.chunks_exact(n.max(1)).enumerate() {
             let own = k * n..(k + 1) * n;
             let mut out = Response {
                 x: &mut self.x[own.clone()],
@@ -147,7 +120,7 @@ impl Batch<'_> {
                 flags: 0,
             };
             let step = Step { trial: step.trial + k as u32, ..*step };
-            advance(&step, &Input::Force { t, hold, motion: None }, &mut out)?;
+            advance(&step, &Input::Force { t, motion: None }, &mut out)?;
             self.reached = self.reached.min(out.reached);
         }
         Ok(())

@@ -7,7 +7,7 @@
 
 mod common;
 use common::{Rig, temporary_urdf};
-use terraglue_subsystem::{Hold, Input, Law, Motion, Port, PortKind, Response, Step, component};
+use terraglue_subsystem::{Input, Law, Motion, Port, PortKind, Response, Step, component};
 
 /// Centre of the foot from that of mass in body axes, x and z, and how far below it the sole is, m.
 const FOOT: [f64; 2] = [0.4, -0.3];
@@ -119,7 +119,7 @@ fn step(rig: &mut Rig, foot: Foot, h: f64, middle: bool) {
         let change = t.iter().zip(wanted).fold(0.0_f64, |m, (t, w)| m.max((t - w).abs()));
         t.copy_from_slice(&wanted[..n]);
         let mut out = Response { x: &mut x, v: &mut v, a: &mut a, t: &mut out_t, reached: 0.0, flags: 0 };
-        rig.robot.advance(&step, &Input::Force { t: &t, hold: Hold::End, motion: None }, &mut out).unwrap();
+        rig.robot.advance(&step, &Input::Force { t: &t, motion: None }, &mut out).unwrap();
         if change < 1e-12 {
             rig.robot.commit(&step, &t, &Motion { x: &x, v: &v }).unwrap();
             rig.t += h;

@@ -3,7 +3,7 @@
 
 mod common;
 use common::{Rig, STAND, temporary_urdf};
-use terraglue_subsystem::{Hold, Input, Response};
+use terraglue_subsystem::{Input, Response};
 
 /// A wheel of 0.1 kg m² on an axle that stands still.
 fn wheel(damping: f64, stiffness: f64) -> Rig {
@@ -26,7 +26,7 @@ fn message(rig: &mut Rig) -> Option<String> {
     let (mut x, mut v, mut a) = ([], [], []);
     let step = rig.step(&[]);
     let mut out = Response { x: &mut x, v: &mut v, a: &mut a, t: &mut none, reached: f64::NAN, flags: 0 };
-    let input = Input::Force { t: &[], hold: Hold::End, motion: None };
+    let input = Input::Force { t: &[], motion: None };
     rig.robot.advance(&step, &input, &mut out).err().map(|e| e.to_string())
 }
 

@@ -3,7 +3,7 @@
 
 mod common;
 use common::Rig;
-use terraglue_subsystem::{Hold, Input, Law, Level, Port, PortKind, Response, Step, component};
+use terraglue_subsystem::{Input, Law, Level, Port, PortKind, Response, Step, component};
 
 const INTEGRATORS: [&str; 3] = ["symplectic-euler", "generalized-alpha", "energy-momentum"];
 
@@ -45,7 +45,7 @@ fn ports(rig: &Rig, kind: PortKind) -> [Port; 2] {
 fn trial(rig: &mut Rig, step: &Step, t: &[f64]) -> [Vec<f64>; 3] {
     let [mut x, mut v, mut a, mut out_t] = [0; 4].map(|_| vec![f64::NAN; t.len()]);
     let mut out = Response { x: &mut x, v: &mut v, a: &mut a, t: &mut out_t, reached: 0.0, flags: 0 };
-    rig.robot.advance(step, &Input::Force { t, hold: Hold::End, motion: None }, &mut out).unwrap();
+    rig.robot.advance(step, &Input::Force { t, motion: None }, &mut out).unwrap();
     [x, v, a]
 }
 

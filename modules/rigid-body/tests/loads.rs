@@ -3,9 +3,7 @@
 
 mod common;
 use common::{Rig, temporary_urdf};
-use terraglue_subsystem::{
-    Hold, Input, Law, Motion, Port, PortKind, Response, Step, Values, ValuesMut, component,
-};
+use terraglue_subsystem::{Input, Law, Motion, Port, PortKind, Response, Step, Values, ValuesMut, component};
 
 const INTEGRATORS: [&str; 3] = ["symplectic-euler", "generalized-alpha", "energy-momentum"];
 const COM: [f64; 3] = [0.1, -0.2, 0.05];
@@ -79,7 +77,7 @@ fn step_by_port(rig: &mut Rig, origin: [f64; 3], force: [f64; 3]) {
     let step = Step { ports: &[port], n: 3, ..Step::free(rig.t, rig.h, rig.index) };
     let [mut x, mut v, mut a, mut t] = [[f64::NAN; 3]; 4];
     let mut out = Response { x: &mut x, v: &mut v, a: &mut a, t: &mut t, reached: 0.0, flags: 0 };
-    rig.robot.advance(&step, &Input::Force { t: &force, hold: Hold::End, motion: None }, &mut out).unwrap();
+    rig.robot.advance(&step, &Input::Force { t: &force, motion: None }, &mut out).unwrap();
     rig.robot.commit(&step, &force, &Motion { x: &x, v: &v }).unwrap();
     (rig.t, rig.index) = (rig.t + rig.h, rig.index + 1);
 }

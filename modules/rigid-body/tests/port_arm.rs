@@ -6,7 +6,7 @@
 
 mod common;
 use common::{Rig, temporary_urdf};
-use terraglue_subsystem::{Hold, Input, Law, Motion, Port, PortKind, Response, Step, component};
+use terraglue_subsystem::{Input, Law, Motion, Port, PortKind, Response, Step, component};
 
 /// Arm of the force, m; force, N; inertia, kg m².
 const ARM: [f64; 3] = [0.3, 0.4, 0.0];
@@ -53,7 +53,7 @@ fn step(rig: &mut Rig, h: f64) -> f64 {
     let step = Step { ports: &ports, n: 6, ..Step::free(rig.t, h, rig.index) };
     let [mut x, mut v, mut a, mut t] = [[f64::NAN; 6]; 4];
     let mut out = Response { x: &mut x, v: &mut v, a: &mut a, t: &mut t, reached: 0.0, flags: 0 };
-    rig.robot.advance(&step, &Input::Force { t: &FORCE, hold: Hold::End, motion: None }, &mut out).unwrap();
+    rig.robot.advance(&step, &Input::Force { t: &FORCE, motion: None }, &mut out).unwrap();
     rig.robot.commit(&step, &FORCE, &Motion { x: &x, v: &v }).unwrap();
     rig.t += h;
     rig.index += u64::from(h > 0.0);

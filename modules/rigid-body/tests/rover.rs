@@ -5,7 +5,7 @@
 mod common;
 use common::Rig;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
-use terraglue_subsystem::{Estimate, Hold, Input, Law, Motion, Port, Response, Step, component};
+use terraglue_subsystem::{Estimate, Input, Law, Motion, Port, Response, Step, component};
 
 const G: f64 = 9.81;
 const WHEELS: [&str; 6] = ["LF", "LM", "LR", "RF", "RM", "RR"];
@@ -80,7 +80,7 @@ fn step(rig: &mut Rig) -> f64 {
     let [x, v, a] = &mut free;
     let mut taken = vec![0.0; n];
     let mut out = Response { x, v, a, t: &mut taken, reached: f64::NAN, flags: 0 };
-    rig.robot.advance(&step, &Input::Force { t: &t, hold: Hold::End, motion: None }, &mut out).unwrap();
+    rig.robot.advance(&step, &Input::Force { t: &t, motion: None }, &mut out).unwrap();
     rig.robot.commit(&step, &t, &Motion { x: &x2, v: &still }).unwrap();
     rig.t += rig.h;
     rig.index += 1;

@@ -123,8 +123,7 @@ fn the_compliance_is_the_derivative_of_the_step() {
             reached: 0.0,
             flags: 0,
         };
-        let input =
-            terraglue_subsystem::Input::Force { t, hold: terraglue_subsystem::Hold::End, motion: None };
+        let input = terraglue_subsystem::Input::Force { t, motion: None };
         rig.robot.advance(&step, &input, &mut out).unwrap();
         [x, v, a]
     };

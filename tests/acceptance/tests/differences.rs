@@ -9,7 +9,7 @@ use terraglue::host::Library;
 use terraglue::testbed::Options;
 use terraglue::{Testbed, scenario::Scenario};
 use terraglue_subsystem::{
-    Batch, BodyState, Capabilities, Config, Energy, Hold, Host, Input, Law, Level, Module, Motion, Response,
+    Batch, BodyState, Capabilities, Config, Energy, Host, Input, Law, Level, Module, Motion, Response,
     Result, Scene, Schema, Step, Subsystem, Values, ValuesMut, Variable,
 };
 
@@ -46,10 +46,10 @@ impl Subsystem for MuteSubsystem {
         self.0.advance(step, input, out)
     }
 
-    fn advance_batch(&mut self, step: &Step, t: &[f64], hold: Hold, out: &mut Batch) -> Result {
+    fn advance_batch(&mut self, step: &Step, t: &[f64], out: &mut Batch) -> Result {
         let trials = t.len() as u32 / step.n.max(1);
         BATCHES.with(|b| b.set((b.get().0 + 1, b.get().1 + trials)));
-        self.0.advance_batch(step, t, hold, out)
+        self.0.advance_batch(step, t, out)
     }
 
     fn interface_jacobian(&mut self, _: &Step, _: Level, _: &mut [f64]) -> Result {

@@ -184,20 +184,3 @@ fn the_energy_residual_sets_the_steps_where_there_is_one() {
     let refused = glued(&text).err().expect("the shortest step is longer than the longest").to_string();
     assert!(refused.contains("longer than time.step_s"), "{refused}");
 }
-
-#[test]
-fn a_two_parameter_hold_is_refused_where_it_cannot_be() {
-    let refused = |text: &str| glued(text).err().expect("refused").to_string();
-    let rods = refused(&pendulum("strategy = \"iterative\"\nhold = \"two-parameter\""));
-    assert!(rods.contains("takes one force per step, not two"), "{rods}");
-    let level =
-        refused(&pendulum("strategy = \"iterative\"\nhold = \"two-parameter\"\nlevel = \"velocity\""));
-    assert!(level.contains("no other level"), "{level}");
-    let other = refused(&pendulum("strategy = \"semi-implicit\"\nhold = \"two-parameter\""));
-    assert!(other.contains("no second force"), "{other}");
-    let spring = head("strategy = \"iterative\"\nhold = \"two-parameter\"")
-        + &mass("a", 0.1)
-        + &mass("b", 0.0)
-        + &spring("a", "b", "");
-    assert!(refused(&spring).contains("for rigid joints"));
-}

@@ -104,11 +104,9 @@ fn no_step_allocates_once_the_ports_are_known() {
         ("strategy = \"relaxed\"\nrelaxation = \"anderson\"", ""),
         ("strategy = \"relaxed\"\nrelaxation = \"aitken\"", ""),
         ("strategy = \"relaxed\"\nrelaxation = \"broyden\"", ""),
-        ("strategy = \"xx-newton\"", ""),
         ("strategy = \"jacobi\"", spring),
         ("strategy = \"gauss-seidel\"", spring),
         ("strategy = \"gauss-seidel\"\nenergy_residual_j = 1e-5", spring),
-        ("strategy = \"tlm\"", spring),
         ("strategy = \"monolithic\"", ""),
     ] {
         let text = oscillator(gluing, glue);

@@ -228,7 +228,6 @@ static tg_status advance(void *self, const tg_step *st, const tg_input *in, tg_r
     soil *s = self;
     state *q = state_of(s);
     s->tried = 1;
-    if (in->kind == TG_IMPEDANCE) return TG_UNSUPPORTED;
     if (BROKEN(HANGS) && s->commits > 5) for (;;) usleep(1000);
     if (BROKEN(CRASHES) && s->commits > 5) *(volatile int *)8 = 1;
     if (BROKEN(UNKNOWN_STATUS) && s->commits > 5) return 4711;

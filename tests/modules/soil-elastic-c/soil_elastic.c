@@ -133,7 +133,6 @@ static tg_status set_ports(void *self, const tg_step *st, tg_law *laws, tg_respo
 }
 static tg_status advance(void *self, const tg_step *st, const tg_input *in, tg_response *out) {
     soil *s = self;
-    if (in->kind == TG_IMPEDANCE) return TG_UNSUPPORTED;
     for (uint32_t p = 0; p < st->n_ports; p++) {
         const tg_port *port = &st->ports[p];
         answer *a = &s->last[p];

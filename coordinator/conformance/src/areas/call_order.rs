@@ -7,7 +7,7 @@ use crate::lab::Lab;
 use crate::rig::{Flat, Runner, Vectors};
 use terraglue_host::Instance;
 use terraglue_subsystem::{
-    Capabilities, Estimate, Hold, Input, Law, Level as Derivative, Motion, Node, Port, Step,
+    Capabilities, Estimate, Input, Law, Level as Derivative, Motion, Node, Port, Step,
 };
 use terraglue_terrain::SplitMix64;
 
@@ -118,16 +118,15 @@ impl Frame {
         t: f64,
     ) -> (&'static str, terraglue_diagnostics::Result) {
         let n: usize = self.ports.iter().map(Port::len).sum();
-        let epoch = self.ports.len() as u32;
         let (ports, nodes) = (&self.ports[..], &self.nodes[..]);
-        let step = Step { n: n as u32, epoch, ports, nodes, ..Step::free(t, 1e-3, (1e3 * t) as u64) };
+        let step = Step { n: n as u32, ports, nodes, ..Step::free(t, 1e-3, (1e3 * t) as u64) };
         let (mut out, mut laws) = (Vectors::new(n), vec![Law::UNILATERAL; ports.len()]);
         let (x, force, mut g) = (vec![1e-5; n], vec![1.0; n], vec![0.0; n * n]);
         let motion = Motion { x: &x, v: &x };
         match which {
             0 => ("set_ports", on.set_ports(&step, &mut laws, &mut out.response())),
             1 => {
-                let input = Input::Force { t: &force, hold: Hold::End, motion: None };
+                let input = Input::Force { t: &force, motion: None };
                 ("advance", on.advance(&step, &input, &mut out.response()).map(drop))
             }
             2 => ("advance", on.advance(&step, &Input::Motion(motion), &mut out.response()).map(drop)),

@@ -5,7 +5,7 @@ use crate::finding::{Stop, Verdict};
 use crate::lab::Lab;
 use crate::rig::{numbers, outputs, set_numbers};
 use terraglue_host::Instance;
-use terraglue_subsystem::{Causality, Hold, Input, Kind, Motion, Response, Step};
+use terraglue_subsystem::{Causality, Input, Kind, Motion, Response, Step};
 
 const fn test(name: &'static str, promise: &'static str, run: fn(&Lab) -> Verdict) -> Test {
     let (area, level, after) = (Area::Physics, Level::Quick, &["steps"]);
@@ -28,7 +28,7 @@ pub fn tests() -> Vec<Test> {
 
 fn step(instance: &mut Instance, t: f64, h: f64, index: u64) -> Verdict {
     let step = Step::free(t, h, index);
-    let input = Input::Force { t: &[], hold: Hold::End, motion: None };
+    let input = Input::Force { t: &[], motion: None };
     let mut out = Response { x: &mut [], v: &mut [], a: &mut [], t: &mut [], reached: t + h, flags: 0 };
     instance.advance(&step, &input, &mut out)?;
     instance.commit(&step, &[], &Motion { x: &[], v: &[] })?;

@@ -5,7 +5,7 @@ use crate::finding::{Stop, Verdict};
 use terraglue_ground::{Placed, compose};
 use terraglue_host::Instance;
 use terraglue_subsystem::{
-    BodyState, Estimate, Hold, Input, Law, Level, Motion, Port, PortKind, SceneShape, Step, component,
+    BodyState, Estimate, Input, Law, Level, Motion, Port, PortKind, SceneShape, Step, component,
 };
 
 /// The bench.
@@ -89,7 +89,7 @@ impl BodyBench {
         let ports = std::mem::take(&mut self.ports);
         let step = step_of(&ports, self.t, h, self.index);
         let asked = self.robot.set_ports(&step, &mut laws, &mut now.response());
-        let input = Input::Force { t, hold: Hold::End, motion: None };
+        let input = Input::Force { t, motion: None };
         let done = asked.and_then(|()| self.robot.advance(&step, &input, &mut out.response()));
         (self.ports, self.out) = (ports, out);
         done?;
@@ -168,7 +168,7 @@ impl BodyBench {
 
 fn step_of(ports: &[Port], t: f64, h: f64, index: u64) -> Step<'_> {
     let n = ports.iter().map(|p| p.len() as u32).sum();
-    Step { n, epoch: ports.len() as u32, ports, ..Step::free(t, h, index) }
+    Step { n, ports, ..Step::free(t, h, index) }
 }
 
 fn port_below(shape: &SceneShape, state: &BodyState) -> Port {

@@ -3,7 +3,7 @@
 use super::{BodyBench, Flat, Foot, SoilBench, Vectors, outputs, set_numbers};
 use crate::finding::Verdict;
 use terraglue_host::Instance;
-use terraglue_subsystem::{BodyState, Capabilities, Hold, Input, Kind, Motion, Step};
+use terraglue_subsystem::{BodyState, Capabilities, Input, Kind, Motion, Step};
 
 /// Runs an instance for some steps and collects the bits of every answer; `variant` changes the motion.
 ///
@@ -244,7 +244,7 @@ fn signals(instance: &mut Instance, k: usize, variant: u64, trials: usize, bits:
 /// An input without ports, of a kind that the module takes.
 fn plain(can: Capabilities) -> Input<'static> {
     match can.has(Capabilities::FORCE) {
-        true => Input::Force { t: &[], hold: Hold::End, motion: None },
+        true => Input::Force { t: &[], motion: None },
         false => Input::Motion(Motion { x: &[], v: &[] }),
     }
 }

@@ -6,8 +6,8 @@ use crate::lab::Lab;
 use terraglue_gluing::contact::{BodySide, ContactDetector, GroundSide, Now};
 use terraglue_host::{Instance, LoadedModule, Progress};
 use terraglue_subsystem::{
-    BodyState, Estimate, Geometry, Hold, Input, Law, Level, Motion, Node, Port, Pose, Scene, SceneBody,
-    SceneShape, Step, Terrain,
+    BodyState, Estimate, Geometry, Input, Law, Level, Motion, Node, Port, Pose, Scene, SceneBody, SceneShape,
+    Step, Terrain,
 };
 
 /// A foot: its shape and where its centre is at the start, m.
@@ -80,7 +80,6 @@ pub struct SoilBench {
     pub nodes: Vec<Node>,
     laws: Vec<Law>,
     n: usize,
-    epoch: u32,
     /// Time, s.
     pub t: f64,
     /// Accepted steps.
@@ -137,7 +136,6 @@ impl SoilBench {
             nodes: Vec::new(),
             laws: Vec::new(),
             n: 0,
-            epoch: 0,
             t: 0.0,
             index: 0,
             now: Vectors::default(),
@@ -166,7 +164,7 @@ impl SoilBench {
         let turn = self.turn;
         self.ports.extend(set.ports.iter().map(|p| turned(&Port { side: -1, ..*p }, turn)));
         self.nodes.clone_from(&set.nodes);
-        (self.n, self.epoch) = (set.n as usize, set.epoch);
+        self.n = set.n as usize;
         self.ask_ports(h)
     }
 
@@ -178,9 +176,8 @@ impl SoilBench {
         self.laws.clear();
         self.laws.resize(self.ports.len(), Law::UNILATERAL);
         (self.now, self.out) = (Vectors::new(self.n), Vectors::new(self.n));
-        let (n, epoch) = (self.n as u32, self.epoch);
-        let step =
-            Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
+        let n = self.n as u32;
+        let step = Step { n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
         Ok(self.soil.set_ports(&step, &mut self.laws, &mut self.now.response())?)
     }
 
@@ -206,9 +203,8 @@ impl SoilBench {
     /// # Errors
     /// The soil failed.
     pub fn try_motion(&mut self, x: &[f64], v: &[f64], h: f64) -> Verdict {
-        let (n, epoch) = (self.n as u32, self.epoch);
-        let step =
-            Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
+        let n = self.n as u32;
+        let step = Step { n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
         let progress = self.soil.advance(&step, &Input::Motion(Motion { x, v }), &mut self.out.response())?;
         match progress {
             Progress::Complete => Ok(()),
@@ -226,11 +222,10 @@ impl SoilBench {
     /// # Errors
     /// The soil failed.
     pub fn try_force(&mut self, t: &[f64], motion: Option<(&[f64], &[f64])>, h: f64) -> Verdict {
-        let (n, epoch) = (self.n as u32, self.epoch);
-        let step =
-            Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
+        let n = self.n as u32;
+        let step = Step { n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
         let motion = motion.map(|(x, v)| Motion { x, v });
-        let input = Input::Force { t, hold: Hold::End, motion };
+        let input = Input::Force { t, motion };
         self.soil.advance(&step, &input, &mut self.out.response())?;
         Ok(())
     }
@@ -257,9 +252,8 @@ impl SoilBench {
             active: &mut active,
             unique: true,
         };
-        let (n, epoch) = (self.n as u32, self.epoch);
-        let step =
-            Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
+        let n = self.n as u32;
+        let step = Step { n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
         self.soil.solve_compatibility(&step, &estimate, &mut self.out.response())?;
         Ok(())
     }
@@ -320,9 +314,8 @@ impl SoilBench {
     /// The soil failed.
     pub fn jacobian(&mut self, level: Level, h: f64) -> Verdict<Vec<f64>> {
         let mut k = vec![0.0; self.n * self.n];
-        let (n, epoch) = (self.n as u32, self.epoch);
-        let step =
-            Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
+        let n = self.n as u32;
+        let step = Step { n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
         self.soil.interface_jacobian(&step, level, &mut k)?;
         Ok(k)
     }
@@ -333,9 +326,8 @@ impl SoilBench {
     /// The soil failed.
     pub fn commit(&mut self, velocities: &[[f64; 3]], h: f64) -> Verdict {
         let (x, v) = self.motion_of(velocities, h);
-        let (n, epoch) = (self.n as u32, self.epoch);
-        let step =
-            Step { epoch, n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
+        let n = self.n as u32;
+        let step = Step { n, ports: &self.ports, nodes: &self.nodes, ..Step::free(self.t, h, self.index) };
         self.soil.commit(&step, &self.out.t, &Motion { x: &x, v: &v })?;
         self.note_moved();
         for (state, v) in self.states.iter_mut().zip(velocities) {

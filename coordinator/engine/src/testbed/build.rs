@@ -22,12 +22,10 @@ use terraglue_host::{
 };
 use terraglue_scenario as scenario;
 use terraglue_scenario::{
-    Entry, GlueSpec, GluingSpec, HoldChoice, InputError, IsolationSpec, LevelChoice, Scenario, StrategyKind,
+    Entry, GlueSpec, GluingSpec, InputError, IsolationSpec, LevelChoice, Scenario, StrategyKind,
     SubsystemSpec,
 };
-use terraglue_subsystem::{
-    BodyState, Capabilities, Config, Energy, Hold, Kind, Law, Level, Subsystem, Terrain,
-};
+use terraglue_subsystem::{BodyState, Capabilities, Config, Energy, Kind, Law, Level, Subsystem, Terrain};
 use terraglue_terrain as terrain;
 
 impl Testbed {
@@ -103,7 +101,6 @@ impl Testbed {
             before: Energy::default(),
             halvings: 0,
             max_halvings: scenario.gluing.max_halvings,
-            hold: hold(scenario.gluing.hold),
             started: false,
         };
         let glued = testbed.instances.iter_mut().zip(&testbed.turns).filter(|(_, turn)| turn.glued);
@@ -432,9 +429,9 @@ fn group(
             names => format!("these would work: {}", names.join(", ")),
         };
         let source = &scenario.source;
-        return Err(match (at, refusal.key) {
-            (Some(entry), "strategy") => source.error_in(entry, &["strategy"], refusal.reason, Some(help)),
-            (_, key) => source.error_at_value(&["gluing", key], refusal.reason, refusal.help.or(Some(help))),
+        return Err(match at {
+            Some(entry) => source.error_in(entry, &["strategy"], refusal.reason, Some(help)),
+            None => source.error_at_value(&["gluing", "strategy"], refusal.reason, Some(help)),
         }
         .into());
     }
@@ -490,15 +487,6 @@ fn control(scenario: &Scenario, groups: &[Group], instances: &[Instance]) -> Res
         return Err(scenario.source.error_at_value(at, message, Some(help)).into());
     }
     Ok(Some(StepControl::new(tolerance, [shortest, longest])))
-}
-
-fn hold(choice: HoldChoice) -> Hold {
-    match choice {
-        HoldChoice::End => Hold::End,
-        HoldChoice::Constant => Hold::Constant,
-        HoldChoice::Linear => Hold::Linear,
-        HoldChoice::TwoParameter => Hold::Ramp,
-    }
 }
 
 /// Committed states of all bodies.

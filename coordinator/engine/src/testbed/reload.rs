@@ -6,8 +6,8 @@ use crate::signals::Directory;
 use terraglue_diagnostics::Error;
 use terraglue_host::{Instance, Partings};
 use terraglue_subsystem::{
-    Action, Batch, BodyState, Capabilities, Energy, Estimate, FieldInfo, FieldTile, Hold, Input, Kind, Law,
-    Level, Motion, Response, Scene, Step, Subsystem, Values, ValuesMut, Variable,
+    Action, Batch, BodyState, Capabilities, Energy, Estimate, FieldInfo, FieldTile, Input, Kind, Law, Level,
+    Motion, Response, Scene, Step, Subsystem, Values, ValuesMut, Variable,
 };
 
 impl Testbed {
@@ -153,14 +153,8 @@ impl Subsystem for Renumbered {
     fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> terraglue_subsystem::Result {
         self.inner.advance(step, input, out)
     }
-    fn advance_batch(
-        &mut self,
-        step: &Step,
-        t: &[f64],
-        hold: Hold,
-        out: &mut Batch,
-    ) -> terraglue_subsystem::Result {
-        self.inner.advance_batch(step, t, hold, out)
+    fn advance_batch(&mut self, step: &Step, t: &[f64], out: &mut Batch) -> terraglue_subsystem::Result {
+        self.inner.advance_batch(step, t, out)
     }
     fn interface_jacobian(
         &mut self,

@@ -8,7 +8,6 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use terraglue_diagnostics::Result;
-use terraglue_gluing as gluing;
 use terraglue_host::{Instance, Progress, Workers};
 use terraglue_subsystem::{Input, Motion, Response, Step};
 
@@ -158,7 +157,7 @@ impl Turn {
     /// Its trial of this step, if it makes one.
     #[inline]
     fn try_alone(&mut self, instance: &mut Instance, span: &Span, out: &mut Response) {
-        let none = Input::Force { t: &[], hold: gluing::HOLD, motion: None };
+        let none = Input::Force { t: &[], motion: None };
         let broken = self.own_step(span, |step| match instance.advance(step, &none, out) {
             Ok(Progress::Complete) => None,
             other => Some(Box::new(other)),

@@ -15,7 +15,6 @@
 //! lands on the wrong side of the unloading kink by rounding.
 
 pub(super) mod friction;
-mod ramp;
 mod tt;
 mod xt;
 
@@ -29,7 +28,7 @@ use super::{Needs, Outcome, Strategy, linear};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
 use terraglue_scenario::{FormChoice, GluingSpec, StartChoice};
-use terraglue_subsystem::{Capabilities, Hold};
+use terraglue_subsystem::Capabilities;
 
 /// Name in the scenario.
 pub const NAME: &str = terraglue_scenario::StrategyKind::Iterative.name();
@@ -125,7 +124,6 @@ pub struct Iterative {
     limits: Limits,
     tt: tt::TtForm,
     xt: xt::XtForm,
-    ramp: ramp::RampForm,
     start: Vec<f64>,
     kappa: f64,
 }
@@ -139,7 +137,6 @@ impl Iterative {
             limits: Limits::read(spec),
             tt: tt::TtForm::new(spec.jacobian),
             xt: xt::XtForm::default(),
-            ramp: ramp::RampForm::default(),
             start: Vec::new(),
             kappa: 0.0,
         }
@@ -183,9 +180,6 @@ impl Strategy for Iterative {
             exchange.start_from_last();
             self.start.clear();
             self.start.extend_from_slice(&exchange.t);
-            if exchange.at.hold == Hold::Ramp {
-                return self.ramp.solve(&self.limits, exchange, instances);
-            }
             return self.run(Form::Tt, exchange, instances);
         }
         exchange.estimate_forces(instances)?;

@@ -3,7 +3,7 @@
 use super::Line;
 use super::wire::{Reader, Writer};
 use terraglue_subsystem::{
-    Error, Hold, Input, Law, Level, LogLevel, Motion, Node, Port, Response, Result, Step, ValueType, Values,
+    Error, Input, Law, Level, LogLevel, Motion, Node, Port, Response, Result, Step, ValueType, Values,
     ValuesMut,
 };
 
@@ -86,7 +86,7 @@ pub fn read_answer<T>(
 #[derive(Debug, Default)]
 pub struct OwnedStep {
     numbers: [f64; 2],
-    counts: [u64; 4],
+    counts: [u64; 3],
     ports: Vec<Port>,
     nodes: Vec<Node>,
 }
@@ -95,17 +95,8 @@ impl OwnedStep {
     /// As the interface wants it.
     pub fn step(&self) -> Step<'_> {
         let [t, h] = self.numbers;
-        let [index, trial, epoch, n] = self.counts;
-        Step {
-            t,
-            h,
-            index,
-            trial: trial as u32,
-            epoch: epoch as u32,
-            n: n as u32,
-            ports: &self.ports,
-            nodes: &self.nodes,
-        }
+        let [index, trial, n] = self.counts;
+        Step { t, h, index, trial: trial as u32, n: n as u32, ports: &self.ports, nodes: &self.nodes }
     }
 
     /// Reads a step.
@@ -117,7 +108,7 @@ impl OwnedStep {
 /// Writes a step.
 pub fn put_step(w: &mut Writer, s: &Step) {
     w.put(&[s.t, s.h]);
-    w.put(&[s.index, s.trial.into(), s.epoch.into(), s.n.into()]);
+    w.put(&[s.index, s.trial.into(), s.n.into()]);
     w.put(s.ports);
     w.put(s.nodes);
 }
@@ -125,10 +116,9 @@ pub fn put_step(w: &mut Writer, s: &Step) {
 /// Writes an input.
 pub fn put_input(w: &mut Writer, input: &Input) {
     match input {
-        Input::Force { t, hold, motion } => {
+        Input::Force { t, motion } => {
             w.put(&if motion.is_some() { 1_u8 } else { 0 });
             w.put(*t);
-            w.put(&(*hold as u32));
             if let Some(m) = motion {
                 put_motion(w, m);
             }
@@ -136,11 +126,6 @@ pub fn put_input(w: &mut Writer, input: &Input) {
         Input::Motion(m) => {
             w.put(&2_u8);
             put_motion(w, m);
-        }
-        Input::Impedance { f0, z } => {
-            w.put(&3_u8);
-            w.put(*f0);
-            w.put(*z);
         }
     }
 }
@@ -154,29 +139,20 @@ pub fn put_motion(w: &mut Writer, m: &Motion) {
 /// Reads an input and hands it on.
 pub fn with_input<T>(r: &mut Reader, run: impl FnOnce(&Input) -> T) -> Option<T> {
     let kind: u8 = r.take()?;
-    let (a, hold): (Vec<f64>, u32) = match kind {
-        0 | 1 => (r.take()?, r.take()?),
-        _ => (r.take()?, 0),
-    };
+    let a: Vec<f64> = r.take()?;
     if kind == 0 {
-        return Some(run(&Input::Force { t: &a, hold: hold_of(hold)?, motion: None }));
+        return Some(run(&Input::Force { t: &a, motion: None }));
     }
     let b: Vec<f64> = r.take()?;
     match kind {
         1 => {
             let v: Vec<f64> = r.take()?;
             let motion = Some(Motion { x: &b, v: &v });
-            Some(run(&Input::Force { t: &a, hold: hold_of(hold)?, motion }))
+            Some(run(&Input::Force { t: &a, motion }))
         }
         2 => Some(run(&Input::Motion(Motion { x: &a, v: &b }))),
-        3 => Some(run(&Input::Impedance { f0: &a, z: &b })),
         _ => None,
     }
-}
-
-/// The hold of this number.
-pub fn hold_of(number: u32) -> Option<Hold> {
-    [Hold::End, Hold::Constant, Hold::Linear, Hold::Ramp].into_iter().find(|h| *h as u32 == number)
 }
 
 /// The level of this number.

@@ -6,8 +6,8 @@ use super::wire::{Reader, Writer};
 use super::{Link, Start};
 use std::cell::RefCell;
 use terraglue_subsystem::{
-    Action, Batch, BodyState, Capabilities, Energy, Error, Estimate, FieldInfo, FieldTile, Hold, Input, Law,
-    Level, Motion, Response, Result, Scene, Step, Subsystem, Terrain, Values, ValuesMut, Variable,
+    Action, Batch, BodyState, Capabilities, Energy, Error, Estimate, FieldInfo, FieldTile, Input, Law, Level,
+    Motion, Response, Result, Scene, Step, Subsystem, Terrain, Values, ValuesMut, Variable,
 };
 
 /// An instance in a worker.
@@ -158,16 +158,15 @@ impl Subsystem for Isolated {
         )
     }
 
-    fn advance_batch(&mut self, step: &Step, t: &[f64], hold: Hold, out: &mut Batch) -> Result {
+    fn advance_batch(&mut self, step: &Step, t: &[f64], out: &mut Batch) -> Result {
         if self.link.get_mut().is_python {
-            return out.one_by_one(step, t, hold, |step, input, out| self.advance(step, input, out));
+            return out.one_by_one(step, t, |step, input, out| self.advance(step, input, out));
         }
         let count = (out.x.len() / (step.n as usize).max(1)) as u32;
         self.link.get_mut().call(
             Call::AdvanceBatch,
             |w| {
                 calls::put_step(w, step);
-                w.put(&(hold as u32));
                 w.put(&count);
                 w.put(t);
             },

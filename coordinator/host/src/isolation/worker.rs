@@ -14,7 +14,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 use terraglue_subsystem::{
-    Batch, BodyState, Config, Error, Estimate, Hold, Host, LogLevel, Motion, Result, Subsystem, Terrain,
+    Batch, BodyState, Config, Error, Estimate, Host, LogLevel, Motion, Result, Subsystem, Terrain,
     TerrainTile,
 };
 
@@ -219,18 +219,16 @@ impl Worker {
             }
             Call::AdvanceBatch => {
                 let step = OwnedStep::take(r).ok_or_else(garbled)?;
-                let hold = r.take().and_then(calls::hold_of).ok_or_else(garbled)?;
                 let (count, t): (u32, Vec<f64>) =
                     (r.take().ok_or_else(garbled)?, r.take().ok_or_else(garbled)?);
                 let n = step.step().n as usize;
-                let width = if hold == Hold::Ramp { 2 * n } else { n };
-                if t.len() != width * count as usize {
+                if t.len() != n * count as usize {
                     return Err(garbled());
                 }
                 let [mut x, mut v, mut a] = [(); 3].map(|()| vec![f64::NAN; n * count as usize]);
                 let reached = step.step().t + step.step().h;
                 let mut all = Batch { x: &mut x, v: &mut v, a: &mut a, t: &mut vec![f64::NAN; n], reached };
-                unit.advance_batch(&step.step(), &t, hold, &mut all)?;
+                unit.advance_batch(&step.step(), &t, &mut all)?;
                 let reached = all.reached;
                 out.write(|w| {
                     [&x, &v, &a].into_iter().for_each(|values| w.put(values.as_slice()));

@@ -3,7 +3,7 @@
 use super::{Buffers, compile, port, services, step_of};
 use crate::{Instance, LoadedModule};
 use std::sync::Arc;
-use terraglue_subsystem::{Config, Hold, Input, Law, Level, Motion, Port, Terrain, TerrainTile};
+use terraglue_subsystem::{Config, Input, Law, Level, Motion, Port, Terrain, TerrainTile};
 
 const SOURCE: &str = include_str!("../../../../tests/modules/soil-elastic-c/soil_elastic.c");
 const K: f64 = 2e4;
@@ -75,8 +75,7 @@ fn presses_like_a_spring_and_slides_by_its_coefficient() {
     near(out.0[3][1], -MU * K * 3e-3);
     near(k[0], K);
     // A given force comes back with the surface below it.
-    let (out, g) =
-        advance(&mut soil, &ports, Input::Force { t: &[50.0, 1.0, 0.0], hold: Hold::End, motion: None });
+    let (out, g) = advance(&mut soil, &ports, Input::Force { t: &[50.0, 1.0, 0.0], motion: None });
     near(out.0[0][0], 2e-3 - 50.0 / K);
     near(g[0], 1.0 / K);
     // Above the ground the surface is below the body by the gap.
@@ -97,11 +96,7 @@ fn derivatives_are_those_of_its_answers() {
     for given in [false, true] {
         let mut answer = |x: &[f64], t: &[f64]| {
             let motion = Motion { x, v: &[0.0; 6] };
-            let input = if given {
-                Input::Force { t, hold: Hold::End, motion: Some(motion) }
-            } else {
-                Input::Motion(motion)
-            };
+            let input = if given { Input::Force { t, motion: Some(motion) } } else { Input::Motion(motion) };
             advance(&mut soil, &ports, input)
         };
         let (_, g) = answer(&x, &force);

@@ -7,7 +7,7 @@ mod c_soil;
 use super::*;
 use soil_column::SoilColumnModule;
 use std::path::{Path, PathBuf};
-use terraglue_subsystem::{Config, Hold, Input, Kind, Law, Level, Motion, Port, Response, Step, component};
+use terraglue_subsystem::{Config, Input, Kind, Law, Level, Motion, Port, Response, Step, component};
 
 fn port(key: u64, first: u32, z: f64) -> Port {
     Port {
@@ -29,7 +29,7 @@ fn port(key: u64, first: u32, z: f64) -> Port {
 
 /// A step of 1 ms at t = 1 s.
 fn step_of(ports: &[Port], n: u32) -> Step<'_> {
-    Step { epoch: 1, n, ports, ..Step::free(1.0, 1e-3, 0) }
+    Step { n, ports, ..Step::free(1.0, 1e-3, 0) }
 }
 
 /// Compiles a module in C into `folder`, as a user would.
@@ -80,8 +80,8 @@ fn drive(soil: &mut Instance) -> Vec<u64> {
         let motion = Motion { x: &x, v: &v };
         let t = [5.0 + k as f64, 1.0, 0.5, 3.0, 0.0, 0.1];
         for input in [
-            Input::Force { t: &t, hold: Hold::End, motion: None },
-            Input::Force { t: &t, hold: Hold::End, motion: Some(motion) },
+            Input::Force { t: &t, motion: None },
+            Input::Force { t: &t, motion: Some(motion) },
             Input::Motion(motion),
         ] {
             assert_eq!(

@@ -7,8 +7,8 @@ use std::path::{Path, PathBuf};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use terraglue_subsystem::{
-    Capabilities, Causality, Effect, Error, Hold, Input, LogLevel, Motion, Response, Step, Subsystem,
-    ValueType, Variable, flag,
+    Capabilities, Causality, Effect, Error, Input, LogLevel, Motion, Response, Step, Subsystem, ValueType,
+    Variable, flag,
 };
 
 /// What a new instance is told.
@@ -305,7 +305,7 @@ impl Component {
     /// One trial and its commit; the time reached and the flags.
     fn part(&mut self, h: f64) -> terraglue_subsystem::Result<(f64, u32)> {
         let step = Step::free(self.time, h, self.index);
-        let none = Input::Force { t: &[], hold: Hold::End, motion: None };
+        let none = Input::Force { t: &[], motion: None };
         let end = self.time + h;
         let mut out = Response { x: &mut [], v: &mut [], a: &mut [], t: &mut [], reached: end, flags: 0 };
         self.unit.advance(&step, &none, &mut out)?;

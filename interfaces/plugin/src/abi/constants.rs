@@ -1,9 +1,9 @@
 //! Numbers that cross the border: versions, statuses, kinds.
 
 /// Version of the ABI that breaks: host and module must agree.
-pub const TG_ABI_MAJOR: u32 = 2;
+pub const TG_ABI_MAJOR: u32 = 3;
 /// Version of the ABI that grows: new fields at the end of `tg_subsystem` and `tg_host`.
-pub const TG_ABI_MINOR: u32 = 1;
+pub const TG_ABI_MINOR: u32 = 0;
 
 /// What a call answers; anything else than the values below counts as `TG_FATAL`.
 pub type TgStatus = i32;
@@ -33,8 +33,6 @@ pub const TG_LAW: u32 = 4;
 pub const TG_CAN_FORCE: u32 = 1;
 /// Bit of `capabilities`: `advance` takes `TG_MOTION`.
 pub const TG_CAN_MOTION: u32 = 2;
-/// Bit of `capabilities`: `advance` takes `TG_IMPEDANCE`.
-pub const TG_CAN_IMPEDANCE: u32 = 4;
 /// Bit of `capabilities`: `estimate_forces`.
 pub const TG_CAN_ESTIMATE: u32 = 8;
 /// Bit of `capabilities`: `solve_compatibility`.
@@ -51,8 +49,6 @@ pub const TG_CAN_SERIALIZE: u32 = 256;
 pub const TG_CAN_SUBCYCLE: u32 = 512;
 /// Bit of `capabilities`: outputs depend directly on inputs of the same time.
 pub const TG_CAN_FEEDTHROUGH: u32 = 1024;
-/// Bit of `capabilities`: `advance` takes `TG_HOLD_RAMP`.
-pub const TG_CAN_RAMP: u32 = 2048;
 /// Bit of `capabilities`: makes communication steps of one length only.
 pub const TG_CAN_FIXED_STEP: u32 = 4096;
 
@@ -80,17 +76,6 @@ pub const TG_MT2: u32 = 32;
 pub const TG_FORCE: u32 = 0;
 /// `tg_input.kind`: the other side moves by `x`, `v`.
 pub const TG_MOTION: u32 = 1;
-/// `tg_input.kind`: a linearised partner, T = t - z X.
-pub const TG_IMPEDANCE: u32 = 2;
-
-/// `tg_input.hold`: only the end value of T matters.
-pub const TG_HOLD_END: u32 = 0;
-/// `tg_input.hold`: T is constant in the step.
-pub const TG_HOLD_CONSTANT: u32 = 1;
-/// `tg_input.hold`: T runs linearly from its committed value.
-pub const TG_HOLD_LINEAR: u32 = 2;
-/// `tg_input.hold`: T runs linearly in the step; `t` holds 2 n values, first T at t + h, then T at t.
-pub const TG_HOLD_RAMP: u32 = 3;
 
 /// Level of a derivative: X.
 pub const TG_POSITION: u32 = 0;

@@ -77,16 +77,12 @@ pub struct TgStep {
     pub index: u64,
     /// Number of the trial in this step.
     pub trial: u32,
-    /// Grows when a port appears, goes or changes its mask.
-    pub epoch: u32,
     /// Length of packed vectors.
     pub n: u32,
     /// Number of ports.
     pub n_ports: u32,
     /// Number of nodes.
     pub n_nodes: u32,
-    /// 0.
-    pub reserved: u32,
     /// All ports of this subsystem in ascending order of key.
     pub ports: *const TgPort,
     /// Ground nodes of all ports.
@@ -97,18 +93,16 @@ pub struct TgStep {
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct TgInput {
-    /// TG_FORCE, TG_MOTION or TG_IMPEDANCE.
+    /// TG_FORCE or TG_MOTION.
     pub kind: u32,
-    /// TG_HOLD_END, TG_HOLD_CONSTANT, TG_HOLD_LINEAR or TG_HOLD_RAMP (force only).
-    pub hold: u32,
-    /// Wrench on side 1 (force), or wrench at X = 0 (impedance).
+    /// 0.
+    pub reserved: u32,
+    /// Wrench on side 1 (force).
     pub t: *const f64,
     /// Motion of the other side at t + h: displacement from the origin. After TG_FORCE it may be null.
     pub x: *const f64,
     /// Motion of the other side at t + h: velocity. Null exactly when `x` is.
     pub v: *const f64,
-    /// Impedance only: n x n stiffness, column-major.
-    pub z: *const f64,
 }
 
 /// Motion of the other side; packed.

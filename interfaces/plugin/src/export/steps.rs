@@ -18,7 +18,6 @@ unsafe fn step_of<'a>(step: *const TgStep) -> Step<'a> {
             h: s.h,
             index: s.index,
             trial: s.trial,
-            epoch: s.epoch,
             n: s.n,
             ports: slice(s.ports.cast(), s.n_ports as usize),
             nodes: slice(s.nodes.cast(), s.n_nodes as usize),
@@ -41,14 +40,10 @@ unsafe fn input_of<'a>(input: *const TgInput, n: usize) -> Result<Input<'a>> {
         let i = &*input;
         let motion = || Motion { x: slice(i.x, n), v: slice(i.v, n) };
         match i.kind {
-            TG_FORCE => Ok(Input::Force {
-                t: slice(i.t, if i.hold == TG_HOLD_RAMP { 2 * n } else { n }),
-                hold: convert::hold(i.hold)
-                    .ok_or_else(|| Error::Failed(format!("unknown hold {}", i.hold)))?,
-                motion: (!i.x.is_null() && !i.v.is_null()).then(motion),
-            }),
+            TG_FORCE => {
+                Ok(Input::Force { t: slice(i.t, n), motion: (!i.x.is_null() && !i.v.is_null()).then(motion) })
+            }
             TG_MOTION => Ok(Input::Motion(motion())),
-            TG_IMPEDANCE => Ok(Input::Impedance { f0: slice(i.t, n), z: slice(i.z, n * n) }),
             _ => Err(Error::Unsupported),
         }
     }

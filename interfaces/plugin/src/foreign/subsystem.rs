@@ -8,7 +8,7 @@ use crate::text::{borrowed, c_string, slice};
 use std::cell::RefCell;
 use std::ffi::c_void;
 use terraglue_subsystem::{
-    Action, BodyState, Capabilities, Energy, Error, Estimate, FieldInfo, FieldTile, Hold, Input, Law, Level,
+    Action, BodyState, Capabilities, Energy, Error, Estimate, FieldInfo, FieldTile, Input, Law, Level,
     Motion, Response, Result, Scene, Step, Subsystem, TileValues, Values, ValuesMut, Variable,
 };
 
@@ -84,11 +84,9 @@ fn step_out(s: &Step) -> Result<TgStep> {
         h: s.h,
         index: s.index,
         trial: s.trial,
-        epoch: s.epoch,
         n: s.n,
         n_ports: s.ports.len() as u32,
         n_nodes: s.nodes.len() as u32,
-        reserved: 0,
         ports: s.ports.as_ptr().cast(),
         nodes: s.nodes.as_ptr().cast(),
     })
@@ -100,11 +98,11 @@ fn motion_out(m: &Motion) -> TgMotion {
 
 fn input_out(input: &Input, n: usize) -> Result<TgInput> {
     let null = std::ptr::null();
-    let mut out = TgInput { kind: TG_FORCE, hold: TG_HOLD_END, t: null, x: null, v: null, z: null };
+    let mut out = TgInput { kind: TG_FORCE, reserved: 0, t: null, x: null, v: null };
     match input {
-        Input::Force { t, hold, motion } => {
-            enough(&[(t.len(), if *hold == Hold::Ramp { 2 * n } else { n })])?;
-            (out.t, out.hold) = (t.as_ptr(), *hold as u32);
+        Input::Force { t, motion } => {
+            enough(&[(t.len(), n)])?;
+            out.t = t.as_ptr();
             if let Some(m) = motion {
                 enough(&[(m.x.len(), n), (m.v.len(), n)])?;
                 (out.x, out.v) = (m.x.as_ptr(), m.v.as_ptr());
@@ -113,10 +111,6 @@ fn input_out(input: &Input, n: usize) -> Result<TgInput> {
         Input::Motion(m) => {
             enough(&[(m.x.len(), n), (m.v.len(), n)])?;
             (out.kind, out.x, out.v) = (TG_MOTION, m.x.as_ptr(), m.v.as_ptr());
-        }
-        Input::Impedance { f0, z } => {
-            enough(&[(f0.len(), n), (z.len(), n * n)])?;
-            (out.kind, out.t, out.z) = (TG_IMPEDANCE, f0.as_ptr(), z.as_ptr());
         }
     }
     Ok(out)

@@ -153,12 +153,12 @@ fn digest(step: &Step) -> f64 {
         })
         .sum();
     let nodes: f64 = step.nodes.iter().map(|n| f64::from(n.i * 3 + n.j) + n.area + n.lower).sum();
-    ports + nodes + step.t + step.h + step.index as f64 + f64::from(step.trial * 2 + step.epoch * 3 + step.n)
+    ports + nodes + step.t + step.h + step.index as f64 + f64::from(step.trial * 2 + step.n)
 }
 
 impl Subsystem for Everything {
     fn capabilities(&self) -> Capabilities {
-        Capabilities(0x7ff)
+        Capabilities(0x7fb)
     }
 
     fn set_ports(&mut self, step: &Step, laws: &mut [Law], now: &mut Response) -> Result {
@@ -195,12 +195,11 @@ impl Subsystem for Everything {
     fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result {
         self.trouble()?;
         let sum: f64 = match input {
-            Input::Force { t, hold, motion } => {
+            Input::Force { t, motion } => {
                 let motion: f64 = motion.iter().flat_map(|m| m.x.iter().chain(m.v)).map(|v| 3.0 * v).sum();
-                t.iter().sum::<f64>() + f64::from(*hold as u32) + motion
+                t.iter().sum::<f64>() + motion
             }
             Input::Motion(m) => 7.0 * m.x.iter().chain(m.v).sum::<f64>(),
-            Input::Impedance { f0, z } => 11.0 * f0.iter().chain(*z).sum::<f64>(),
         };
         fill(out, digest(step) + sum + self.state);
         out.reached -= 0.5 * step.h;

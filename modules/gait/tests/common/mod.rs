@@ -4,7 +4,7 @@
 
 use terraglue_gait::Gait;
 use terraglue_subsystem::{
-    Config, Hold, Input, Motion, Response, Result, Step, Subsystem, ValueType, Values, ValuesMut,
+    Config, Input, Motion, Response, Result, Step, Subsystem, ValueType, Values, ValuesMut,
 };
 
 /// Step used by most tests, s.
@@ -18,7 +18,7 @@ pub fn gait(json: &str) -> Gait {
 /// A trial without a commit.
 pub fn trial(gait: &mut Gait, h: f64) -> Result {
     let mut out = Response { x: &mut [], v: &mut [], a: &mut [], t: &mut [], reached: f64::NAN, flags: 0 };
-    gait.advance(&Step::free(0.0, h, 0), &Input::Force { t: &[], hold: Hold::End, motion: None }, &mut out)
+    gait.advance(&Step::free(0.0, h, 0), &Input::Force { t: &[], motion: None }, &mut out)
 }
 
 /// One accepted step.

@@ -4,7 +4,7 @@
 use std::sync::Arc;
 use terraglue_rigid_body::RigidBody;
 use terraglue_subsystem::{
-    BodyState, Config, Estimate, Geometry, Hold, Input, Law, Module, Motion, Port, Response, Result, Scene,
+    BodyState, Config, Estimate, Geometry, Input, Law, Module, Motion, Port, Response, Result, Scene,
     Standalone, Step, Subsystem, Values, ValuesMut, component,
 };
 
@@ -166,7 +166,7 @@ impl Rig {
         let step = self.step(ports);
         let mut out =
             Response { x: &mut x, v: &mut v, a: &mut a, t: &mut t_out, reached: f64::NAN, flags: 0 };
-        self.robot.advance(&step, &Input::Force { t, hold: Hold::End, motion: None }, &mut out)?;
+        self.robot.advance(&step, &Input::Force { t, motion: None }, &mut out)?;
         assert!(out.reached == step.t + step.h);
         assert!(x.iter().chain(&v).chain(&a).chain(&t_out).all(|x| x.is_finite()));
         Ok(x)

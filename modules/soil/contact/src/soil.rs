@@ -364,7 +364,6 @@ impl<M: Material> Subsystem for FieldSoil<M> {
             Input::Force { t, motion, .. } => {
                 self.last.force(&mut self.patches, t, motion.as_ref(), out);
             }
-            Input::Impedance { .. } => return Err(Error::Unsupported),
         }
         out.a.fill(0.0);
         out.reached = step.t + step.h;

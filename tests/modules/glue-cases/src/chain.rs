@@ -7,9 +7,9 @@ use crate::dense::Dense;
 use crate::scheme::{Coordinate, Scheme};
 use std::sync::Arc;
 use terraglue_subsystem::{
-    BodyState, Capabilities, Causality, Config, Energy, Error, Hold, Host, Input, Kind, Law, Level, Module,
-    Motion, Parameter, ParameterType, Pose, Response, Result, Scene, SceneBody, Schema, Step, Subsystem,
-    ValuesMut, Variable,
+    BodyState, Capabilities, Causality, Config, Energy, Error, Host, Input, Kind, Law, Level, Module, Motion,
+    Parameter, ParameterType, Pose, Response, Result, Scene, SceneBody, Schema, Step, Subsystem, ValuesMut,
+    Variable,
 };
 
 /// The module.
@@ -21,12 +21,9 @@ pub struct MassChain {
     coupling: (f64, f64),
     now: Vec<Coordinate>,
     next: Vec<Coordinate>,
-    saved: Vec<(Vec<Coordinate>, Vec<f64>)>,
-    /// Force on itself by port at the last trial and at the last commit.
+    saved: Vec<Vec<Coordinate>>,
+    /// Force on itself by port at the last trial.
     force: Vec<f64>,
-    before: Vec<f64>,
-    /// Force on itself at t under a two-parameter hold.
-    ramp: Vec<f64>,
     load: Vec<f64>,
     work: Vec<f64>,
     free: Vec<f64>,
@@ -35,8 +32,6 @@ pub struct MassChain {
     g: Vec<f64>,
     square: Dense,
     under_motion: bool,
-    /// How the force ran inside the step of the last trial.
-    hold: Hold,
     port_work: f64,
     variables: Vec<Variable>,
 }
@@ -75,11 +70,9 @@ impl Module for MassChain {
             damper: list("damper_n_s_m")?,
             coupling: (config.number("coupling_n_m")?, config.number("coupling_n_s_m")?),
             next: now.clone(),
-            saved: vec![(now.clone(), Vec::new()); host.slots() as usize],
+            saved: vec![now.clone(); host.slots() as usize],
             now,
             force: Vec::new(),
-            before: Vec::new(),
-            ramp: Vec::new(),
             load: vec![0.0; n],
             work: Vec::new(),
             free: Vec::new(),
@@ -87,7 +80,6 @@ impl Module for MassChain {
             g: Vec::new(),
             square: Dense::default(),
             under_motion: false,
-            hold: Hold::End,
             port_work: 0.0,
             variables: variables(n),
             mass,
@@ -152,17 +144,15 @@ impl MassChain {
         self.work = x;
     }
 
-    /// A free mass under a force that is constant, or linear from the last one.
-    fn solve_exactly(&mut self, h: f64, hold: Hold, before: &[f64]) {
+    /// A free mass under a force that holds over the step.
+    fn solve_exactly(&mut self, h: f64) {
         for k in 0..self.mass.len() {
-            let (now, f1) = (self.now[k], self.load[k]);
-            let f0 = if matches!(hold, Hold::Linear | Hold::Ramp) { before[k] } else { f1 };
-            let m = self.mass[k];
+            let (now, m, f) = (self.now[k], self.mass[k], self.load[k]);
             self.next[k] = Coordinate {
-                q: now.q + h * now.v + h * h * (f0 / 3.0 + f1 / 6.0) / m,
-                v: now.v + 0.5 * h * (f0 + f1) / m,
-                a: f1 / m,
-                qdd: f1 / m,
+                q: now.q + h * now.v + 0.5 * h * h * f / m,
+                v: now.v + h * f / m,
+                a: f / m,
+                qdd: f / m,
             };
         }
     }
@@ -176,24 +166,14 @@ impl MassChain {
     }
 
     /// Applies `force` (on itself, packed) and moves.
-    fn advance_under(&mut self, step: &Step, hold: Hold) {
-        self.hold = hold;
+    fn advance_under(&mut self, step: &Step) {
         self.load.fill(0.0);
         for (i, k, d) in Self::components(step) {
             self.load[k] += d * self.force[i];
         }
-        if self.scheme.exact {
-            let mut before = std::mem::take(&mut self.work);
-            before.clear();
-            before.resize(self.mass.len(), 0.0);
-            for (i, k, d) in Self::components(step) {
-                let from = if hold == Hold::Ramp { &self.ramp } else { &self.before };
-                before[k] += d * from.get(i).copied().unwrap_or(0.0);
-            }
-            self.solve_exactly(step.h, hold, &before);
-            self.work = before;
-        } else {
-            self.solve(step.h);
+        match self.scheme.exact {
+            true => self.solve_exactly(step.h),
+            false => self.solve(step.h),
         }
     }
 
@@ -203,12 +183,8 @@ impl MassChain {
         self.g.clear();
         self.g.resize(n * n, 0.0);
         let factor = match level {
-            Level::Position if self.scheme.exact => {
-                step.h * step.h * if self.hold == Hold::Linear { 1.0 / 6.0 } else { 0.5 }
-            }
-            Level::Velocity if self.scheme.exact => {
-                step.h * if self.hold == Hold::Linear { 0.5 } else { 1.0 }
-            }
+            Level::Position if self.scheme.exact => 0.5 * step.h * step.h,
+            Level::Velocity if self.scheme.exact => step.h,
             Level::Position => self.scheme.q1(step.h),
             Level::Velocity => self.scheme.v1(step.h),
             Level::Acceleration => 1.0,
@@ -244,17 +220,12 @@ impl MassChain {
         out.reached = step.t + step.h;
     }
 
-    /// The force on itself that makes X what it is given (impedance z added), from the free motion.
-    fn solve_for_force(
-        &mut self,
-        step: &Step,
-        rhs: impl Fn(usize, &[f64]) -> f64,
-        z: Option<&[f64]>,
-    ) -> Result {
+    /// The force on itself that makes X what it is given, from the free motion.
+    fn solve_for_force(&mut self, step: &Step, x: &[f64]) -> Result {
         let n = step.n as usize;
         self.force.clear();
         self.force.resize(n, 0.0);
-        self.advance_under(step, Hold::End);
+        self.advance_under(step);
         let mut free = std::mem::take(&mut self.free);
         free.clear();
         free.resize(n, 0.0);
@@ -267,24 +238,16 @@ impl MassChain {
         self.square.reset(n);
         for r in 0..n {
             for c in 0..n {
-                match z {
-                    None => self.square.add(r, c, self.g[r * n + c]),
-                    // T = f0 − z·(X_free + G·s·T) with the force on itself s·T
-                    Some(z) => {
-                        let sum: f64 = (0..n).map(|k| z[k * n + r] * self.g[k * n + c]).sum();
-                        let side = f64::from(side_of(step, c));
-                        self.square.add(r, c, sum + if r == c { side } else { 0.0 });
-                    }
-                }
+                self.square.add(r, c, self.g[r * n + c]);
             }
         }
         if !self.square.factor() {
             return Err(Error::Failed("a component is not free to move along x".into()));
         }
-        (0..n).for_each(|i| self.force[i] = rhs(i, &free));
+        (0..n).for_each(|i| self.force[i] = x[i] - free[i]);
         self.square.solve(&mut self.force);
         self.free = free;
-        self.advance_under(step, Hold::End);
+        self.advance_under(step);
         Ok(())
     }
 }
@@ -297,9 +260,9 @@ impl Subsystem for MassChain {
     fn capabilities(&self) -> Capabilities {
         let all = Capabilities::FORCE | Capabilities::RETRY | Capabilities::DERIVATIVES | Capabilities::STATE;
         if self.scheme.exact {
-            return all | Capabilities::SUBCYCLES | Capabilities::RAMP;
+            return all | Capabilities::SUBCYCLES;
         }
-        all | Capabilities::MOTION | Capabilities::IMPEDANCE
+        all | Capabilities::MOTION
     }
 
     fn set_ports(&mut self, step: &Step, _: &mut [Law], now: &mut Response) -> Result {
@@ -314,23 +277,14 @@ impl Subsystem for MassChain {
         self.assemble(step.h);
         self.under_motion = false;
         match input {
-            Input::Force { t, hold, .. } => {
+            Input::Force { t, .. } => {
                 self.force.clear();
                 self.force.extend((0..step.n as usize).map(|i| f64::from(side_of(step, i)) * t[i]));
-                self.ramp.clear();
-                let start = t.get(step.n as usize..).unwrap_or_default();
-                self.ramp.extend(start.iter().enumerate().map(|(i, t)| f64::from(side_of(step, i)) * t));
-                self.advance_under(step, *hold);
+                self.advance_under(step);
             }
             Input::Motion(m) if !self.scheme.exact => {
-                self.solve_for_force(step, |i, free| m.x[i] - free[i], None)?;
+                self.solve_for_force(step, m.x)?;
                 self.under_motion = true;
-            }
-            Input::Impedance { f0, z } if !self.scheme.exact => {
-                let n = step.n as usize;
-                let right =
-                    |i: usize, free: &[f64]| f0[i] - (0..n).map(|k| z[k * n + i] * free[k]).sum::<f64>();
-                self.solve_for_force(step, right, Some(z))?;
             }
             _ => return Err(Error::Unsupported),
         }
@@ -362,21 +316,18 @@ impl Subsystem for MassChain {
             self.port_work += d * self.force[i] * (self.next[k].q - self.now[k].q);
         }
         self.now.clone_from(&self.next);
-        self.before.clone_from(&self.force);
         Ok(())
     }
 
     fn save_state(&mut self, slot: u32) -> Result {
         let room = self.saved.get_mut(slot as usize).ok_or(Error::Unsupported)?;
-        room.0.clone_from(&self.now);
-        room.1.clone_from(&self.before);
+        room.clone_from(&self.now);
         Ok(())
     }
 
     fn restore_state(&mut self, slot: u32) -> Result {
         let kept = self.saved.get(slot as usize).ok_or(Error::Unsupported)?;
-        self.now.clone_from(&kept.0);
-        self.before.clone_from(&kept.1);
+        self.now.clone_from(kept);
         Ok(())
     }
 

@@ -173,7 +173,6 @@ impl Subsystem for SoilColumns {
                 }
                 Input::Force { t, motion: None, .. } => self.under_force(port, p, t),
                 Input::Motion(m) => self.under_motion(port, p, m.x, None),
-                Input::Impedance { .. } => return Err(Error::Unsupported),
             };
             write(port, &answer, out);
             self.answers[p] = answer;

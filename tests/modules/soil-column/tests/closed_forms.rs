@@ -68,7 +68,7 @@ impl Foot {
     }
 
     fn force(&mut self, t: [f64; 3]) -> Answer {
-        self.advance(Input::Force { t: &t, hold: Hold::End, motion: None })
+        self.advance(Input::Force { t: &t, motion: None })
     }
 
     fn motion(&mut self, x: [f64; 3]) -> Answer {

@@ -17,8 +17,8 @@ use std::time::{Duration, Instant};
 use terraglue::Testbed;
 use terraglue::scenario::Scenario;
 use terraglue::subsystem::{
-    BodyState, Capabilities, Config, Energy, Estimate, Hold, Host, Input, Law, Level, Module, Motion,
-    Response, Result, Scene, Schema, Step, Subsystem, Values, ValuesMut, Variable,
+    BodyState, Capabilities, Config, Energy, Estimate, Host, Input, Law, Level, Module, Motion, Response,
+    Result, Scene, Schema, Step, Subsystem, Values, ValuesMut, Variable,
 };
 use terraglue::testbed::Options;
 
@@ -54,7 +54,7 @@ impl Subsystem for TimedSubsystem {
         let n = step.n as usize;
         let (zeros, mut v, mut a, mut t) = (vec![0.0; n], vec![0.0; n], vec![0.0; n], vec![0.0; n]);
         let mut free = Response { x: out.x_free, v: &mut v, a: &mut a, t: &mut t, reached: 0.0, flags: 0 };
-        let input = Input::Force { t: &zeros, hold: Hold::End, motion: None };
+        let input = Input::Force { t: &zeros, motion: None };
         self.0.advance(step, &input, &mut free)?;
         self.0.interface_jacobian(step, Level::Position, out.g)?;
         out.t_star.fill(1e12);

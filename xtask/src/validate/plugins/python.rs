@@ -5,7 +5,7 @@ use super::super::{Context, Figure, Limit};
 use crate::process::Outcome;
 use std::time::Instant;
 use terraglue::host::{HostServices, Isolation, LoadedModule};
-use terraglue::subsystem::{Config, Hold, Input, Response, Step};
+use terraglue::subsystem::{Config, Input, Response, Step};
 
 const NUMBERS: usize = 64;
 const CALLS: usize = 4000;
@@ -58,7 +58,7 @@ pub fn faults(context: &Context, out: &mut Vec<Figure>) -> Outcome {
         let isolation = Isolation { step_timeout_s: 1.0, ..Isolation::default() };
         let made = module.instantiate_isolated("mine", Config::default(), &services, isolation);
         let mut instance = made.map_err(|e| e.to_string())?;
-        let input = Input::Force { t: &[], hold: Hold::End, motion: None };
+        let input = Input::Force { t: &[], motion: None };
         let failure = (0..).find_map(|index| {
             let step = Step::free(0.1 * index as f64, 0.1, index);
             let [x, v, a, t] = &mut [[0.0; 0]; 4];
@@ -86,7 +86,7 @@ pub fn figures(context: &Context, out: &mut Vec<Figure>) -> Outcome {
     let mut times = Vec::with_capacity(CALLS);
     for index in 0..CALLS as u64 {
         let step = Step { n: NUMBERS as u32, ..Step::free(0.0, 1e-3, index) };
-        let input = Input::Force { t: &sent, hold: Hold::End, motion: None };
+        let input = Input::Force { t: &sent, motion: None };
         let [x, v, a, t] = &mut got;
         let mut answer = Response { x, v, a, t, reached: 0.0, flags: 0 };
         let start = Instant::now();

@@ -5,7 +5,7 @@ use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use std::sync::Arc;
 use terraglue_rigid_body::RigidBody;
 use terraglue_subsystem::{
-    BodyState, Config, Energy, Hold, Input, Module, Motion, Response, Standalone, Step, Subsystem, Values,
+    BodyState, Config, Energy, Input, Module, Motion, Response, Standalone, Step, Subsystem, Values,
     ValuesMut,
 };
 
@@ -39,7 +39,7 @@ impl Rig {
         let step = Step::free(self.t(), self.h, self.index);
         let mut out =
             Response { x: &mut [], v: &mut [], a: &mut [], t: &mut [], reached: f64::NAN, flags: 0 };
-        let input = Input::Force { t: &[], hold: Hold::End, motion: None };
+        let input = Input::Force { t: &[], motion: None };
         let failed = |e: terraglue_subsystem::Error| format!("t = {} s: {e}", step.t);
         self.robot.advance(&step, &input, &mut out).map_err(failed)?;
         self.robot.commit(&step, &[], &Motion { x: &[], v: &[] }).map_err(failed)?;

@@ -4,7 +4,7 @@
 use super::rig::Shown;
 use terraglue_ground::{Lattice, Placed, Surface, nodes_below};
 use terraglue_subsystem::{
-    Geometry, Hold, Input, Law, Motion, Node, Port, PortKind, Pose, Response, Step, Subsystem, component,
+    Geometry, Input, Law, Motion, Node, Port, PortKind, Pose, Response, Step, Subsystem, component,
 };
 
 /// Gap up to which ground below the body is looked at, m.
@@ -158,7 +158,6 @@ impl Drive {
             h: self.h,
             index: self.index,
             trial: 0,
-            epoch: 1,
             n: n as u32,
             ports: &ports,
             nodes: &nodes,
@@ -174,7 +173,7 @@ impl Drive {
         let input = |x: &[f64; 6], load: &[f64; 6]| match now.vertical {
             Vertical::Load(_) => {
                 let motion = Some(Motion { x: &x[..n], v: &[0.0; 6][..n] });
-                let given = Input::Force { t: &load[..n], hold: Hold::End, motion };
+                let given = Input::Force { t: &load[..n], motion };
                 soil_trial(&mut self.soil, &step, &given, n)
             }
             Vertical::Up(_) => {

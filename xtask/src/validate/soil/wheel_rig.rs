@@ -4,7 +4,7 @@ use super::rig::Shown;
 use std::borrow::BorrowMut;
 use terraglue_ground::{Placed, nodes_below};
 use terraglue_subsystem::{
-    Geometry, Hold, Input, Law, Motion, Node, Port, PortKind, Pose, Response, Step, Subsystem, component,
+    Geometry, Input, Law, Motion, Node, Port, PortKind, Pose, Response, Step, Subsystem, component,
 };
 
 /// Way of the rim per step, m.
@@ -70,7 +70,6 @@ impl<S: BorrowMut<dyn Subsystem>> Bench<S> {
             h,
             index: self.index,
             trial: 0,
-            epoch: 1,
             n: 6,
             ports: &ports,
             nodes: &nodes,
@@ -83,7 +82,7 @@ impl<S: BorrowMut<dyn Subsystem>> Bench<S> {
         let motion = Some(Motion { x: &x, v: &[0.0; 6] });
         self.soil
             .borrow_mut()
-            .advance(&step, &Input::Force { t: &t, hold: Hold::End, motion }, &mut answer.response())
+            .advance(&step, &Input::Force { t: &t, motion }, &mut answer.response())
             .expect("the soil carries the load");
         x[0] = answer.x[0];
         let wrench = answer.t;

@@ -114,7 +114,6 @@ impl Feet {
             h: H,
             index: self.index,
             trial: 0,
-            epoch: 1,
             n: self.x.len() as u32,
             ports: &self.ports,
             nodes: &self.nodes,

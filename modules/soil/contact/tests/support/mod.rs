@@ -4,7 +4,7 @@
 use std::sync::{Arc, Mutex};
 use terraglue_ground::{Lattice, Placed, Surface, nodes_below};
 use terraglue_subsystem::{
-    Config, Estimate, Geometry, Hold, Host, Input, Law, Level, LogLevel, Module, Motion, Node, NodeLaw, Port,
+    Config, Estimate, Geometry, Host, Input, Law, Level, LogLevel, Module, Motion, Node, NodeLaw, Port,
     PortKind, Pose, Response, Standalone, Step, Subsystem, Terrain, TerrainTile, ValuesMut, component,
 };
 
@@ -248,7 +248,7 @@ impl Rig {
         index: u64,
         n: usize,
     ) -> Step<'a> {
-        Step { t: time, h, index, trial: 0, epoch: 1, n: n as u32, ports, nodes }
+        Step { t: time, h, index, trial: 0, n: n as u32, ports, nodes }
     }
 
     /// (x2, law force) of `set_ports`.
@@ -295,7 +295,7 @@ impl Rig {
 
     pub fn under_force(&mut self, t: &[f64], x: &[f64]) -> (Vec<f64>, Vec<f64>) {
         let v = vec![0.0; x.len()];
-        self.trial(&Input::Force { t, hold: Hold::End, motion: Some(Motion { x, v: &v }) })
+        self.trial(&Input::Force { t, motion: Some(Motion { x, v: &v }) })
     }
 
     /// Displacement of the mass over the step without contact, world axes.

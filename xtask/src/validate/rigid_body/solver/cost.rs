@@ -6,8 +6,7 @@ use crate::validate::{Figure, Limit};
 use std::sync::Arc;
 use terraglue_rigid_body::RigidBody;
 use terraglue_subsystem::{
-    BodyState, Config, Geometry, Hold, Input, Law, Module, Port, Response, Standalone, Step, Subsystem,
-    component,
+    BodyState, Config, Geometry, Input, Law, Module, Port, Response, Standalone, Step, Subsystem, component,
 };
 
 /// Trials per measurement, and measurements.
@@ -60,7 +59,7 @@ pub fn resolve() -> Outcome<Figure> {
     let mut trial = |t: &[f64]| -> Outcome {
         let [x, v, a, taken] = &mut out;
         let mut response = Response { x, v, a, t: taken, reached: f64::NAN, flags: 0 };
-        let input = Input::Force { t, hold: Hold::End, motion: None };
+        let input = Input::Force { t, motion: None };
         robot.advance(&step, &input, &mut response).map_err(|e| e.to_string())
     };
     trial(&t)?;

@@ -39,9 +39,9 @@
 #include <stdint.h>
 
 /* Version of the ABI that breaks: host and module must agree. */
-#define TG_ABI_MAJOR 2
+#define TG_ABI_MAJOR 3
 /* Version of the ABI that grows: new fields at the end of `tg_subsystem` and `tg_host`. */
-#define TG_ABI_MINOR 1
+#define TG_ABI_MINOR 0
 /* Success. */
 #define TG_OK 0
 /* The step is too long: `reached` (s) says how far it could go. The host may repeat with a shorter step. */
@@ -66,8 +66,6 @@
 #define TG_CAN_FORCE 1
 /* Bit of `capabilities`: `advance` takes `TG_MOTION`. */
 #define TG_CAN_MOTION 2
-/* Bit of `capabilities`: `advance` takes `TG_IMPEDANCE`. */
-#define TG_CAN_IMPEDANCE 4
 /* Bit of `capabilities`: `estimate_forces`. */
 #define TG_CAN_ESTIMATE 8
 /* Bit of `capabilities`: `solve_compatibility`. */
@@ -84,8 +82,6 @@
 #define TG_CAN_SUBCYCLE 512
 /* Bit of `capabilities`: outputs depend directly on inputs of the same time. */
 #define TG_CAN_FEEDTHROUGH 1024
-/* Bit of `capabilities`: `advance` takes `TG_HOLD_RAMP`. */
-#define TG_CAN_RAMP 2048
 /* Bit of `capabilities`: makes communication steps of one length only. */
 #define TG_CAN_FIXED_STEP 4096
 /* `tg_port.kind`: one body shape on one ground, unilateral. */
@@ -110,16 +106,6 @@
 #define TG_FORCE 0
 /* `tg_input.kind`: the other side moves by `x`, `v`. */
 #define TG_MOTION 1
-/* `tg_input.kind`: a linearised partner, T = t - z X. */
-#define TG_IMPEDANCE 2
-/* `tg_input.hold`: only the end value of T matters. */
-#define TG_HOLD_END 0
-/* `tg_input.hold`: T is constant in the step. */
-#define TG_HOLD_CONSTANT 1
-/* `tg_input.hold`: T runs linearly from its committed value. */
-#define TG_HOLD_LINEAR 2
-/* `tg_input.hold`: T runs linearly in the step; `t` holds 2 n values, first T at t + h, then T at t. */
-#define TG_HOLD_RAMP 3
 /* Level of a derivative: X. */
 #define TG_POSITION 0
 /* Level of a derivative: V. */
@@ -273,16 +259,12 @@ typedef struct {
     uint64_t index;
     /* Number of the trial in this step. */
     uint32_t trial;
-    /* Grows when a port appears, goes or changes its mask. */
-    uint32_t epoch;
     /* Length of packed vectors. */
     uint32_t n;
     /* Number of ports. */
     uint32_t n_ports;
     /* Number of nodes. */
     uint32_t n_nodes;
-    /* 0. */
-    uint32_t reserved;
     /* All ports of this subsystem in ascending order of key. */
     const tg_port *ports;
     /* Ground nodes of all ports. */
@@ -291,18 +273,16 @@ typedef struct {
 
 /* What acts on the ports during a trial; packed. Pointers that the kind does not use are null. */
 typedef struct {
-    /* TG_FORCE, TG_MOTION or TG_IMPEDANCE. */
+    /* TG_FORCE or TG_MOTION. */
     uint32_t kind;
-    /* TG_HOLD_END, TG_HOLD_CONSTANT, TG_HOLD_LINEAR or TG_HOLD_RAMP (force only). */
-    uint32_t hold;
-    /* Wrench on side 1 (force), or wrench at X = 0 (impedance). */
+    /* 0. */
+    uint32_t reserved;
+    /* Wrench on side 1 (force). */
     const double *t;
     /* Motion of the other side at t + h: displacement from the origin. After TG_FORCE it may be null. */
     const double *x;
     /* Motion of the other side at t + h: velocity. Null exactly when `x` is. */
     const double *v;
-    /* Impedance only: n x n stiffness, column-major. */
-    const double *z;
 } tg_input;
 
 /* Motion of the other side; packed. */
@@ -840,8 +820,8 @@ typedef struct {
         "\nabi=" TG_VERSION_TEXT(TG_ABI_MAJOR, TG_ABI_MINOR) "\n" lines
 /* Kind: "soil", "robot", "controller" or "law". */
 #define TG_IS(kind) "kind=" kind "\n"
-/* The bits of `capabilities` as words: force motion impedance estimate solve derivatives retry state serialize
- * subcycles feedthrough ramp fixed-step. Of a law: its functions, pressure shear. */
+/* The bits of `capabilities` as words: force motion estimate solve derivatives retry state serialize
+ * subcycles feedthrough fixed-step. Of a law: its functions, pressure shear. */
 #define TG_CAN(words) "can=" words "\n"
 /* A variable: its role is parameter, input, output or local, its type f64, f32, i8 ... u64, bool, string, binary or
  * enumeration. A `*` in the name stands for what depends on parameters; units may have alternatives, "N m | N". */

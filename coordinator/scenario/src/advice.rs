@@ -137,7 +137,7 @@ fn replaced_law(config: &Config, whose: &str, gravity: f64) -> Option<Vec<String
         None => soil.pressure(),
     };
     let mut all: Vec<String> = law.softened(stiffness).map(|s| s.message(whose)).into_iter().collect();
-    let depth = law.curve(SMALL_CONTACT, stiffness).elastic_limit();
+    let depth = law.curve(SMALL_CONTACT, stiffness).ok()?.elastic_limit();
     if depth > UNNOTICED && !matches!(law, PressureLaw::Expression(_)) {
         let needed = stiffness * (depth / UNNOTICED).powf(1.0 - soil.n);
         all.push(format!(

@@ -4,7 +4,7 @@ use super::columns::{Columns, Names, SINKAGE, Wrong, unreadable};
 use std::path::Path;
 use terraglue_scenario::InputError;
 use terraglue_scenario::plausible::{PLATE_PRESSURE, PLATE_SINKAGE};
-use terraglue_soil_law::fit::Reading;
+use terraglue_soil_identification::Reading;
 
 /// The readings of a file.
 #[derive(Clone, Debug, PartialEq)]

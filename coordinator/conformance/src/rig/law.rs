@@ -4,7 +4,7 @@ use crate::finding::{Stop, Verdict};
 use crate::lab::Lab;
 use std::sync::Arc;
 use terraglue_host::law::open;
-use terraglue_soil_law::{PluginLaw, PressureCurve};
+use terraglue_soil_law::{PluginLaw, PressureLaw};
 use terraglue_subsystem::{
     Config, Error, NodeLaw, PressureAnswer, PressureNodes, Schema, ShearAnswer, ShearNodes,
 };
@@ -191,7 +191,7 @@ impl LawBench {
     }
 }
 
-fn answered(function: &'static str, given: &str, done: Result<(), Error>) -> Verdict {
+fn answered<T>(function: &'static str, given: &str, done: Result<T, Error>) -> Verdict<T> {
     done.map_err(|e| Stop::fail(function, given, e.to_string(), "TG_OK"))
 }
 
@@ -258,11 +258,9 @@ impl Node {
             let out = law.pressed(b, 1e-3, &[depth], &self.given())?;
             return Ok((out.pressure[0], out.slope[0]));
         }
-        let plugin = PluginLaw::new(law.law.clone());
-        let curve = PressureCurve::of_law(plugin.clone(), b, UNLOADING_PA_M);
-        let answer = curve.at(depth, self.z_max, self.p_max);
-        answered("pressure", &format!("z = {depth} m, b = {b} m"), plugin.check())?;
-        Ok(answer)
+        let soil = PressureLaw::Plugin(PluginLaw::new(law.law.clone()));
+        let answer = soil.curve(b, UNLOADING_PA_M).and_then(|curve| curve.at(depth, self.z_max, self.p_max));
+        answered("pressure", &format!("z = {depth} m, b = {b} m"), answer)
     }
 
     fn given(&self) -> Given {

@@ -1,7 +1,10 @@
 //! The numbers of one soil and the laws made from them.
 
+use crate::bearing_capacity::BearingCapacity;
+use crate::bekker::Bekker;
 use crate::expression::SoilExpressions;
-use crate::pressure::{PRESSURE_LAWS, PressureLaw};
+use crate::pressure_sinkage::{PRESSURE_LAWS, PressureLaw};
+use crate::reece::Reece;
 use crate::rolling::Rolling;
 use crate::shear::ShearLaw;
 use crate::strength::Strength;
@@ -107,16 +110,16 @@ impl Direction {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Family {
-    /// [`PressureLaw::Bekker`] with `k_c` and `k_phi`.
+    /// [`Bekker`] with `k_c` and `k_phi`.
     Bekker,
-    /// [`PressureLaw::Reece`] with the dimensionless k_c' and k_φ'.
+    /// [`Reece`] with the dimensionless k_c' and k_φ'.
     Reece {
         /// k_c'.
         k_c: f64,
         /// k_φ'.
         k_phi: f64,
     },
-    /// [`PressureLaw::Bearing`].
+    /// [`BearingCapacity`].
     Bearing {
         /// N_c at the reference depth.
         n_c: f64,
@@ -322,7 +325,7 @@ impl SoilParameters {
             let text = "`gravity_scaling` needs `measured_gravity_m_s2`: the gravity under which `k_phi` was measured";
             return Err(Error::Refused(text.into()));
         }
-        let modulus = self.pressure().curve(0.1, STIFF).virgin(0.01);
+        let modulus = self.pressure().curve(0.1, STIFF)?.virgin(0.01)?;
         if modulus.is_finite() && modulus > 0.0 {
             return Ok(());
         }
@@ -354,24 +357,23 @@ impl SoilParameters {
         match self.family {
             Family::Bekker => {
                 let k_phi = self.k_phi * self.gravity_factor();
-                PressureLaw::Bekker { k_c: self.k_c, k_phi, n: self.n }
+                PressureLaw::Bekker(Bekker { k_c: self.k_c, k_phi, n: self.n })
             }
             Family::Reece { k_c, k_phi } => {
-                PressureLaw::Reece { cohesive: self.c_pa * k_c, frictional: weight * k_phi, n: self.n }
+                let (cohesive, frictional) = (self.c_pa * k_c, weight * k_phi);
+                PressureLaw::Reece(Reece { cohesive, frictional, n: self.n })
             }
-            Family::Bearing { n_c, n_gamma, reference } => PressureLaw::Bearing {
-                cohesive: self.c_pa * n_c,
-                frictional: weight * n_gamma,
-                reference,
-                n: self.n,
-            },
+            Family::Bearing { n_c, n_gamma, reference } => {
+                let (cohesive, frictional) = (self.c_pa * n_c, weight * n_gamma);
+                PressureLaw::BearingCapacity(BearingCapacity { cohesive, frictional, reference, n: self.n })
+            }
         }
     }
 
     /// Stiffness of unloading and reloading, Pa/m.
     pub fn unloading(&self) -> f64 {
-        let own = || self.pressure().unloading();
-        // a law that the scenario writes as text may leave the built-in one without numbers
+        // built-in laws always answer; one that the scenario writes as text may leave them without numbers
+        let own = || self.pressure().unloading().unwrap_or(0.0);
         self.elastic_stiffness_pa_m.unwrap_or_else(own).max(1.0)
     }
 

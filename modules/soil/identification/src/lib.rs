@@ -1,4 +1,4 @@
-#![doc = include_str!("../README.md")]
+//! Fits of soil laws to plate and wheel tests, with confidence intervals.
 //!
 //! Numerics alone: files, names and units around the fits belong to whoever calls.
 //!
@@ -6,6 +6,11 @@
 //! * `law_numbers.rs`: the numbers of any law, e.g. of one that is a module, by `least_squares.rs`.
 //! * `wheel.rs`: a soil from the sinkage and pull of a driven wheel, by the integral in `rim.rs`.
 //! * `interval.rs`: confidence intervals by leaving whole curves out; `student.rs`: Student's distribution.
+
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 mod interval;
 mod law_numbers;

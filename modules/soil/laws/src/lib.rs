@@ -1,4 +1,4 @@
-#![doc = include_str!("../README.md")]
+//! Pressure and shear laws of soils with tangents and inverses, evaluated over batches of nodes.
 //!
 //! A node is a depth, a largest depth and a shear displacement; what lies around it is the business of whoever calls. SI
 //! units; depths and pressures grow into the soil, pressure is never negative.
@@ -10,6 +10,12 @@
 //!
 //! Laws answer by [`Result`](terraglue_subsystem::Result): only a module can fail.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
+mod advice;
 mod batch;
 mod bearing_capacity;
 mod bekker;
@@ -28,9 +34,9 @@ mod shear_strength;
 mod slip_sinkage;
 mod straight;
 pub mod strength;
-mod table;
 mod yielding;
 
+pub use advice::advice;
 pub use batch::first_loading;
 pub use bearing_capacity::BearingCapacity;
 pub use bekker::Bekker;
@@ -47,5 +53,4 @@ pub use shear_strength::{ShearStrength, StrengthLaw, YieldAnswer, YieldNodes};
 pub use slip_sinkage::SlipSinkage;
 pub use straight::{DEEPEST_TESTED, SMALL_CONTACT, Softened};
 pub use strength::Strength;
-pub use table::{COLUMNS, SoilRow, SoilTable, TableError};
 pub use yielding::Sheared;

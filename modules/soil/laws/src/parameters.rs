@@ -157,7 +157,8 @@ impl Default for SoilParameters {
 }
 
 impl SoilParameters {
-    /// What a module that uses these laws takes from its scenario table.
+    /// What a module that uses these laws takes from its scenario table. The usual spans are those of `models/soils.csv`,
+    /// widened by about three.
     pub fn schema() -> Vec<Parameter> {
         let number = |name, unit: &str, help| Parameter {
             unit: unit.into(),
@@ -167,8 +168,14 @@ impl SoilParameters {
         let mut parameters = vec![
             text("pressure_law", "pressure-sinkage law").or(PRESSURE_LAWS[0]).choices(&PRESSURE_LAWS),
             number("n", "", "exponent of the pressure-sinkage law").within(0.05, 3.0),
-            number("k_c", "", "bekker: cohesive modulus, N/m^(n+1)").within(0.0, 1e9).optional(),
-            number("k_phi", "", "bekker: frictional modulus, N/m^(n+2)").within(0.0, 1e12).optional(),
+            number("k_c", "", "bekker: cohesive modulus, N/m^(n+1)")
+                .within(0.0, 1e9)
+                .optional()
+                .usually("N/m^(n+1)", 20.0, 3e5),
+            number("k_phi", "", "bekker: frictional modulus, N/m^(n+2)")
+                .within(0.0, 1e12)
+                .optional()
+                .usually("N/m^(n+2)", 1.5e4, 2.5e7),
             number("k_c_prime", "", "reece: k_c' of (c k_c' + gamma b k_phi') (z/b)^n")
                 .within(0.0, 1e9)
                 .optional(),
@@ -177,8 +184,10 @@ impl SoilParameters {
                 .within(0.0, 1e9)
                 .optional(),
             number("N_gamma", "", "bearing: N_gamma").within(0.0, 1e9).optional(),
-            Parameter::number("reference_depth_m", "m", 0.1, "bearing: reference depth z_r").positive(),
-            number("c_pa", "Pa", "cohesion").within(0.0, 1e7),
+            Parameter::number("reference_depth_m", "m", 0.1, "bearing: reference depth z_r")
+                .positive()
+                .usually("m", 0.005, 2.0),
+            number("c_pa", "Pa", "cohesion").within(0.0, 1e7).usually("Pa", 100.0, 2e5),
             number(
                 "wall_cohesion_pa",
                 "Pa",
@@ -187,8 +196,13 @@ impl SoilParameters {
             .within(0.0, 1e7)
             .optional(),
             number("phi_rad", "rad", "angle of internal friction").within(0.01, 1.2),
-            number("K_m", "m", "shear deformation modulus of Janosi and Hanamoto").positive(),
-            number("density_kg_m3", "kg/m^3", "bulk density").positive().optional(),
+            number("K_m", "m", "shear deformation modulus of Janosi and Hanamoto")
+                .positive()
+                .usually("m", 0.002, 0.12),
+            number("density_kg_m3", "kg/m^3", "bulk density")
+                .positive()
+                .optional()
+                .usually("kg/m^3", 100.0, 3500.0),
             number(
                 "elastic_stiffness_pa_m",
                 "Pa/m",
@@ -222,14 +236,16 @@ impl SoilParameters {
                 "shear strength between feet and soil without pressure; c_pa where absent",
             )
             .within(0.0, 1e7)
-            .optional(),
+            .optional()
+            .usually("Pa", 10.0, 2e5),
             number(
                 "adhesion_pa",
                 "Pa",
                 "tension with which soil clings to a foot that lifts off, until it lets go; none where absent",
             )
             .within(0.0, 1e7)
-            .optional(),
+            .optional()
+            .usually("Pa", 10.0, 2e5),
             number(
                 "added_mass",
                 "",

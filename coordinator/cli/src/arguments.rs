@@ -405,7 +405,7 @@ pub struct FitSoilArguments {
     pub data: PathBuf,
     /// The data are those of a driven wheel instead: columns slip, sinkage_mm (or in m), DP_N and Fz_N. Fitted are Bekker's law,
     /// Ding's slip sinkage and the shear at the rim.
-    #[arg(long, value_name = "radius=M,width=M[,load=N]")]
+    #[arg(long, value_name = "radius=M,width=M[,load=N]", value_parser = terraglue_soil_fit::parse_wheel)]
     pub wheel: Option<terraglue_soil_fit::Wheel>,
     /// Pressure-sinkage law: bekker, reece, bearing, or a law that is a module, by its name or the path of its file.
     #[arg(long, default_value = "bearing")]

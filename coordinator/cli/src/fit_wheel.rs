@@ -44,7 +44,7 @@ pub fn wheel(a: &FitSoilArguments, wheel: Wheel, options: &Options, known: Known
         outln!("{} rows of a braked wheel left out: slip sinkage knows driven wheels only", tests.braked);
     }
     if let Some(file) = predicted {
-        let [sinkage, pull] = fit.errors(unseen);
+        let [sinkage, pull] = fit.fit.errors(unseen);
         outln!("{file}: largest errors: sinkage {:.1} %, drawbar pull {pull:.2} N", 100.0 * sinkage);
     }
     if let Some(out) = &a.out {
@@ -55,7 +55,7 @@ pub fn wheel(a: &FitSoilArguments, wheel: Wheel, options: &Options, known: Known
 
 fn print(fit: &WheelFit, seen: &[WheelPoint], unseen: &[WheelPoint]) {
     let mut table = show::table(&["parameter", "value", "95 % confidence", "help"]);
-    for n in &fit.numbers {
+    for n in &fit.fit.numbers {
         table.add_row([n.key.to_owned(), format!("{:.4}", n.value), shown(n.interval), n.help.to_owned()]);
     }
     outln!("{table}");
@@ -63,7 +63,7 @@ fn print(fit: &WheelFit, seen: &[WheelPoint], unseen: &[WheelPoint]) {
     let mut table = show::table(&heads);
     for (points, note) in [(seen, ""), (unseen, "not seen")] {
         for p in points {
-            let state = fit.state(p.slip, p.load);
+            let state = fit.fit.state(p.slip, p.load);
             table.add_row([
                 format!("{:.3}", p.slip),
                 format!("{:.1}", p.load),
@@ -76,8 +76,8 @@ fn print(fit: &WheelFit, seen: &[WheelPoint], unseen: &[WheelPoint]) {
         }
     }
     outln!("{table}");
-    let [sinkage, pull] = fit.errors(seen);
-    let groups = fit.groups;
+    let [sinkage, pull] = fit.fit.errors(seen);
+    let groups = fit.fit.groups;
     outln!(
         "largest errors over {groups} slips: sinkage {:.1} %, drawbar pull {pull:.2} N; intervals: each slip left out in turn",
         100.0 * sinkage

@@ -22,6 +22,7 @@ use terraglue_recording::{
 };
 use terraglue_reload::{ReloadOptions, Reloader};
 use terraglue_scenario::{InputError, Scenario};
+use terraglue_subsystem::Kind;
 
 /// What a run leaves behind beside its files.
 pub struct Outcome {
@@ -170,11 +171,11 @@ pub fn options(arguments: &RunArguments, cancel: &Arc<AtomicBool>) -> Options {
 /// Builds a testbed. Whatever stops it, a module that refuses its files among them, is wrong input.
 pub fn build(scenario: &Scenario, options: &Options) -> Result<Testbed> {
     let surroundings = Surroundings::now();
-    let built =
-        Testbed::build_with(scenario, options, &terraglue_fmu::library()).map_err(|error| match error {
-            Error::Input(_) | Error::Module { function: "instantiate", .. } => error,
-            other => Error::Input(InputError::plain(other.to_string(), None)),
-        });
+    let library = terraglue_fmu::library().with_adviser(Kind::Soil, terraglue_soil_law::advice);
+    let built = Testbed::build_with(scenario, options, &library).map_err(|error| match error {
+        Error::Input(_) | Error::Module { function: "instantiate", .. } => error,
+        other => Error::Input(InputError::plain(other.to_string(), None)),
+    });
     set_back(&surroundings);
     built
 }

@@ -4,8 +4,8 @@ use super::output::outln;
 use super::{Exit, show};
 use std::path::Path;
 use terraglue_diagnostics::Result;
+use terraglue_scenario::{COLUMNS, SoilRow, SoilTable};
 use terraglue_scenario::{InputError, did_you_mean, find_soil_table, read_soil_table};
-use terraglue_soil_law::{COLUMNS, SoilRow, SoilTable};
 
 /// Units of the columns.
 const UNITS: [&str; COLUMNS.len()] =

@@ -17,7 +17,7 @@ use std::sync::Arc;
 use terraglue_fmi::elf::{foreign_machine, is_elf, needed_length};
 use terraglue_plugin::ForeignModule;
 use terraglue_plugin::abi::{TG_ABI_MAJOR, TgEntry};
-use terraglue_subsystem::{Config, Error as Failure, Host, Module, Result, Schema, Subsystem};
+use terraglue_subsystem::{Advice, Config, Error as Failure, Host, Kind, Module, Result, Schema, Subsystem};
 
 type Instantiate = fn(&Config, Arc<dyn Host>) -> Result<Box<dyn Subsystem>>;
 
@@ -269,7 +269,11 @@ fn cause(error: &libloading::Error) -> String {
 pub struct Library {
     builtins: Vec<LoadedModule>,
     fmus: Option<FmuFactory>,
+    advisers: Vec<(Kind, Adviser)>,
 }
+
+/// What is unlikely to be meant of a module's parameters and of the regions of its mask, under a gravity (m/s²).
+pub type Adviser = fn(&Config, &[(String, Map<String, Value>)], f64) -> Vec<Advice>;
 
 /// Makes a subsystem of the FMU at a path with the keys of its table; errors at its end go into the last argument.
 pub type FmuFactory = fn(
@@ -289,6 +293,24 @@ impl Library {
     pub fn with_fmus(mut self, factory: FmuFactory) -> Self {
         self.fmus = Some(factory);
         self
+    }
+
+    /// The same with advice on the parameters of modules of a kind.
+    pub fn with_adviser(mut self, kind: Kind, adviser: Adviser) -> Self {
+        self.advisers.push((kind, adviser));
+        self
+    }
+
+    /// Advice on the parameters of a module of that kind.
+    pub fn advice(
+        &self,
+        kind: Kind,
+        config: &Config,
+        regions: &[(String, Map<String, Value>)],
+        gravity: f64,
+    ) -> Vec<Advice> {
+        let of_kind = self.advisers.iter().filter(|(of, _)| *of == kind);
+        of_kind.flat_map(|(_, adviser)| adviser(config, regions, gravity)).collect()
     }
 
     /// What makes subsystems of FMUs.

@@ -1,13 +1,12 @@
 //! What of a scenario has no effect although nothing is wrong with it: said in warnings, never an error.
 
 use super::choices::{FormChoice, JacobianChoice, LevelChoice, Relaxation, StartChoice, StrategyKind};
-use super::model::{GluingSpec, Scenario, SubsystemSpec, Trigger};
+use super::model::{GluingSpec, Region, Scenario, SubsystemSpec, Trigger};
 use super::parameters::check_own_table;
 use super::source::Source;
-use serde_json::Value;
+use serde_json::{Map, Value};
 use terraglue_diagnostics::InputError;
-use terraglue_soil_law::{Family, PressureLaw, SMALL_CONTACT, SoilExpressions, SoilParameters};
-use terraglue_subsystem::{Config, Schema};
+use terraglue_subsystem::{Advice, Schema};
 
 /// Events and faults after the end of the run.
 pub fn late_events(scenario: &Scenario) -> Vec<String> {
@@ -95,89 +94,20 @@ pub fn unchosen(schema: &Schema, spec: &SubsystemSpec, source: &Source) -> Optio
     Some(format!("{} (no effect now: `{}` has `module = \"{module}\"`)", line_of(&wrong), spec.name))
 }
 
-/// Depth up to which nobody minds that the elastic line stands for the law, m.
-const UNNOTICED: f64 = 1e-4;
-
-/// Soils of a subsystem whose law the elastic line of unloading changes at depths that matter: it stands for the start of a
-/// power law, and bounds the slope of any. Of laws that are modules the soil speaks itself. `gravity` in m/s².
-pub fn replaced_laws(
-    scenario: &Scenario,
-    spec: &SubsystemSpec,
-    config: &Config,
-    gravity: f64,
-) -> Vec<String> {
-    if config.get("law.plugin").is_some_and(|v| !v.is_null())
-        || config.get(STIFFNESS).is_none_or(Value::is_null)
-    {
-        return Vec::new();
-    }
-    let said = soils(spec, config).filter_map(|(whose, config)| replaced_law(&config, &whose, gravity));
-    said.flatten()
-        .map(|message| line_of(&scenario.source.error_at_value(&[&spec.name, STIFFNESS], message, None)))
-        .collect()
-}
-
-/// The tables of a subsystem's own soil and of those of its regions, and whose each is as messages say it.
-fn soils<'a>(spec: &'a SubsystemSpec, config: &'a Config) -> impl Iterator<Item = (String, Config)> + 'a {
-    let own = std::iter::once((String::new(), config.clone()));
-    let regions = spec.regions.iter().filter_map(|region| {
-        let merged = SoilParameters::of_region(config, &region.numbers).ok()?;
-        Some((format!(" of label {} ({})", region.label, region.soil), merged))
-    });
-    own.chain(regions)
-}
-
-/// What the elastic line does to one soil.
-fn replaced_law(config: &Config, whose: &str, gravity: f64) -> Option<Vec<String>> {
-    let soil = SoilParameters::from_config(config, gravity).ok()?;
-    let stiffness = soil.elastic_stiffness_pa_m?;
-    let text = SoilExpressions::from_config(config).ok()?;
-    let law = match text.and_then(|text| text.pressure(&soil).transpose()) {
-        Some(law) => PressureLaw::Expression(law.ok()?),
-        None => soil.pressure(),
+/// What a kind of module advises on its parameters, at the places of the keys.
+pub fn of_module(scenario: &Scenario, spec: &SubsystemSpec, advice: Vec<Advice>) -> Vec<String> {
+    let said = |Advice { key, message }: Advice| {
+        line_of(&scenario.source.error_at_value(&[&spec.name, key], message, None))
     };
-    let mut all: Vec<String> = law.softened(stiffness).map(|s| s.message(whose)).into_iter().collect();
-    let depth = law.curve(SMALL_CONTACT, stiffness).elastic_limit();
-    if depth > UNNOTICED && !matches!(law, PressureLaw::Expression(_)) {
-        let needed = stiffness * (depth / UNNOTICED).powf(1.0 - soil.n);
-        all.push(format!(
-            "`{STIFFNESS}` = {stiffness:e} takes the place of the soil's law{whose} down to {:.2} mm under a contact of b = {} \
-             mm; {needed:.1e} would down to {} mm",
-            1e3 * depth,
-            1e3 * SMALL_CONTACT,
-            1e3 * UNNOTICED
-        ));
-    }
-    Some(all)
+    advice.into_iter().map(said).collect()
 }
 
-const STIFFNESS: &str = "elastic_stiffness_pa_m";
-
-/// Soils whose moduli were measured under another gravity than that of the scenario (m/s²), and are not scaled.
-pub fn foreign_gravity(
-    scenario: &Scenario,
-    spec: &SubsystemSpec,
-    config: &Config,
-    gravity: f64,
-) -> Vec<String> {
-    let said = soils(spec, config).filter_map(|(whose, config)| {
-        let soil = SoilParameters::from_config(&config, gravity).ok()?;
-        let measured = soil.measured_gravity.filter(|g| (g - gravity).abs() > SAME_GRAVITY * gravity)?;
-        let own_law = spec.parameters.contains_key("law");
-        (soil.family == Family::Bekker && soil.k_phi > 0.0 && !soil.gravity_scaling && !own_law).then(|| {
-            format!(
-                "`k_phi`{whose} was measured under {measured} m/s², the scenario has {gravity:.4}: soil of this weight bears \
-                 {:.2} of it; `gravity_scaling = true` scales it (Reece 1965)",
-                gravity / measured
-            )
-        })
-    });
-    said.map(|message| line_of(&scenario.source.error_at_value(&[&spec.name, "parameters"], message, None)))
-        .collect()
+/// The regions of a subsystem's mask: whose soil each is as messages say it, and its numbers.
+pub fn regions(spec: &SubsystemSpec) -> Vec<(String, Map<String, Value>)> {
+    let of =
+        |region: &Region| (format!(" of label {} ({})", region.label, region.soil), region.numbers.clone());
+    spec.regions.iter().map(of).collect()
 }
-
-/// Relative difference of gravities from which on they are different ones.
-const SAME_GRAVITY: f64 = 0.01;
 
 /// Names of one's own in `[SOIL.law.parameters]` that no text of the law uses, or that stand for a number of the soil.
 pub fn law_parameters(schema: &Schema, spec: &SubsystemSpec, source: &Source) -> Vec<String> {

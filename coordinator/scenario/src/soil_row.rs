@@ -1,13 +1,13 @@
 //! `parameters = "row"` or `"soil.toml"`: a row of the soil table or a soil file, offered to the module.
 
 use super::node::{Node, Place};
+use super::soil_table::{COLUMNS, SoilTable, TableError};
 use super::source::Source;
 use super::subsystems::text;
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 use terraglue_diagnostics::InputError;
 use terraglue_diagnostics::did_you_mean;
-use terraglue_soil_law::{COLUMNS, SoilTable, TableError};
 
 /// The soil table beside a scenario: `models/soils.csv` or `../models/soils.csv` from its folder, the nearer first, that of the
 /// current folder, that of the installation, or that of the sources from whose `target` folder the program runs.

@@ -2,7 +2,7 @@
 
 use super::PlateTests;
 use std::fmt::Write as _;
-use terraglue_soil_law::fit::Reading;
+use terraglue_soil_identification::Reading;
 
 const WIDTH: f64 = 720.0;
 const HEIGHT: f64 = 460.0;

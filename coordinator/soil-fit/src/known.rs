@@ -4,10 +4,10 @@
 use super::{Known, WheelStart};
 use serde_json::Value;
 use std::path::Path;
-use terraglue_scenario::plausible;
-use terraglue_scenario::{InputError, check_value, find_soil_table, read_soil_table};
-use terraglue_soil_law::{SoilParameters, SoilRow, TableError};
-use terraglue_subsystem::Parameter;
+use terraglue_scenario::plausible::doubt;
+use terraglue_scenario::{InputError, SoilRow, TableError, check_value, find_soil_table, read_soil_table};
+use terraglue_soil_law::SoilParameters;
+use terraglue_subsystem::{Parameter, Usual};
 
 /// Numbers given as options; None: not given.
 #[derive(Clone, Copy, Debug, Default)]
@@ -35,12 +35,15 @@ impl Options {
 
     /// What is doubtful about the values, as of the keys of a scenario.
     pub fn doubts(&self) -> Vec<String> {
-        let doubt = |(option, key, value): (&str, &str, Option<f64>)| {
-            let usual =
-                if key == "phi_rad" { Some(plausible::FRICTION_DEGREES) } else { plausible::of_soil(key) };
-            usual?.doubt(&format!("`{option}`"), value?)
+        let schema = SoilParameters::schema();
+        let of = |(option, key, value): (&str, &str, Option<f64>)| {
+            let usual = match key {
+                "phi_rad" => Some(Usual::new("degrees", 3.0, 60.0)),
+                _ => schema.iter().find(|p| p.name == key)?.usual.clone(),
+            };
+            doubt(&usual?, &format!("`{option}`"), value?)
         };
-        self.all().into_iter().filter_map(doubt).collect()
+        self.all().into_iter().filter_map(of).collect()
     }
 
     fn check(&self) -> Result<(), Box<InputError>> {

@@ -1,13 +1,12 @@
 //! Plate tests, or a wheel's, from a file to the parameters of a soil: readings, fit, soil file, drawing.
 //!
-//! The fit itself is in `terraglue_soil_law::fit`; here are files, names and units.
+//! The fits themselves are in `terraglue_soil_identification`; here are files, names and units.
 
 mod columns;
 mod drawing;
 mod known;
 mod module_law;
 mod readings;
-mod rim;
 mod wheel;
 mod wheel_drawing;
 mod written;
@@ -17,14 +16,14 @@ pub use drawing::{Curve, svg};
 pub use known::{Options, known, wheel_start};
 pub use module_law::{LawFit, LawNumber, fit_module};
 pub use readings::{PlateTests, read};
-pub use rim::{Rim, Rolling};
-pub use wheel::{Wheel, WheelFit, WheelNumber, WheelPoint, WheelStart, WheelTests, fit_wheel, read_wheel};
+pub use terraglue_soil_identification::{Rim, Rolling, Wheel, WheelNumber, WheelPoint, WheelStart};
+pub use wheel::{WheelFit, WheelTests, fit_wheel, parse_wheel, read_wheel};
 pub use wheel_drawing::wheel_svg;
 pub use written::{Predicted, basis, json, law_json, law_toml, rests, shown, toml};
 pub use written_wheel::{wheel_json, wheel_toml};
 
 use terraglue_scenario::InputError;
-use terraglue_soil_law::fit::{Fit, FitError, FitLaw, Interval, fit};
+use terraglue_soil_identification::{Fit, FitError, FitLaw, Interval, fit};
 
 /// Acceleration of gravity under which laboratory plates are pressed, m/s².
 pub const LABORATORY_GRAVITY: f64 = 9.81;

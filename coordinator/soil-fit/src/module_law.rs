@@ -5,8 +5,10 @@ use std::path::Path;
 use std::sync::Arc;
 use terraglue_host::{HostServices, LoadError, LoadedModule, SearchPath, law};
 use terraglue_scenario::InputError;
-use terraglue_soil_law::fit::{Basis, FitError, FitLaw, Free, Interval, Reading, fit, fit_numbers};
-use terraglue_subsystem::{NodeLaw, Parameter, PressureAnswer, PressureNodes};
+use terraglue_soil_identification::{
+    Basis, FitError, FitLaw, Free, Interval, LawNumbers, Reading, fit, fit_numbers, range, start,
+};
+use terraglue_subsystem::{NodeLaw, Parameter};
 
 /// A number of the law.
 #[derive(Clone, Debug, PartialEq)]
@@ -35,9 +37,6 @@ pub struct LawFit {
     pub basis: Basis,
     law: Arc<dyn NodeLaw>,
 }
-
-/// Numbers to start from where a schema gives none: a loose soil.
-const TYPICAL: [(&str, f64); 3] = [("n", 1.0), ("k_c", 1400.0), ("k_phi", 820e3)];
 
 /// Fits the law that `plugin` names, as `[soil.law] plugin` of a scenario in this folder would.
 ///
@@ -75,7 +74,7 @@ pub fn fit_module(plugin: &str, tests: &PlateTests, known: Known) -> Result<LawF
     let mut pressures = |x: &[f64], readings: &[Reading], p: &mut [f64]| {
         let mut numbers = all.clone();
         sought.iter().zip(x).for_each(|(k, x)| numbers[*k] = *x);
-        bench.with(&numbers).is_ok_and(|law| press(law.as_ref(), readings, p))
+        bench.with(&numbers).is_ok_and(|law| LawNumbers(law.as_ref()).pressures(readings, p).is_ok())
     };
     let found = fit_numbers(&mut pressures, &free, &tests.readings).map_err(|e| {
         plain(format!("{e}, or the law has no pressure there with the numbers of its schema"))
@@ -97,65 +96,14 @@ pub fn fit_module(plugin: &str, tests: &PlateTests, known: Known) -> Result<LawF
     Ok(LawFit { name, plugin: plugin.into(), numbers, rms: found.rms, basis: found.basis, law })
 }
 
-/// Where the search for a number starts.
-fn start(p: &Parameter) -> f64 {
-    let typical = TYPICAL.iter().find(|(name, _)| *name == p.name).map(|(_, x)| *x);
-    let middle = match (p.min, p.max) {
-        (Some(a), Some(b)) => 0.5 * (a + b),
-        (Some(a), None) => a + 1.0,
-        (None, Some(b)) => b - 1.0,
-        (None, None) => 1.0,
-    };
-    p.default.as_f64().or(typical).unwrap_or(middle)
-}
-
-fn range(p: &Parameter, start: f64) -> Free {
-    let min = p.min.unwrap_or(f64::NEG_INFINITY);
-    // "above" is open: the smallest number that differs
-    let min = if p.above_min { min + 1e-9 * min.abs().max(1e-3) } else { min };
-    Free { start, min, max: p.max.unwrap_or(f64::INFINITY) }
-}
-
-/// Pressures of first loading at the readings, those of one size at once.
-fn press(law: &dyn NodeLaw, readings: &[Reading], out: &mut [f64]) -> bool {
-    let mut first = 0;
-    while first < readings.len() {
-        let b = readings[first].b;
-        let count = readings[first..].iter().take_while(|r| r.b == b).count();
-        let depth: Vec<f64> = readings[first..first + count].iter().map(|r| r.depth).collect();
-        let kept = if law.state_doubles() > 0 { count } else { 0 };
-        let states = vec![0.0; count * law.state_doubles()];
-        let (zero, mut slope) = (vec![0.0; kept], vec![0.0; count]);
-        let (mut permanent, mut state) = (zero.clone(), states.clone());
-        let nodes = PressureNodes { b, h: 1.0, depth: &depth, permanent: &zero, slip: &zero, state: &states };
-        let mut answer = PressureAnswer {
-            pressure: &mut out[first..first + count],
-            slope: &mut slope,
-            permanent: &mut permanent,
-            state: &mut state,
-            longest_s: f64::INFINITY,
-        };
-        if law.pressure(&nodes, &mut answer).is_err() {
-            return false;
-        }
-        first += count;
-    }
-    true
-}
-
 impl LawFit {
     /// Pressure (Pa) of first loading; NaN where the law has no answer.
     pub fn pressure(&self, b: f64, depth: f64) -> f64 {
-        let mut out = [f64::NAN];
-        press(self.law.as_ref(), &[Reading { curve: 0, b, depth, pressure: 1.0 }], &mut out);
-        out[0]
+        LawNumbers(self.law.as_ref()).pressure(b, depth)
     }
 
     /// Root of the mean square of ln(p/p_measured) over other tests.
     pub fn rms_of(&self, tests: &PlateTests) -> f64 {
-        let mut p = vec![f64::NAN; tests.readings.len()];
-        press(self.law.as_ref(), &tests.readings, &mut p);
-        let square = |(p, r): (&f64, &Reading)| (p / r.pressure).ln().powi(2);
-        (p.iter().zip(&tests.readings).map(square).sum::<f64>() / p.len() as f64).sqrt()
+        LawNumbers(self.law.as_ref()).rms(&tests.readings)
     }
 }

@@ -3,8 +3,9 @@
 use super::columns::{Columns, Names, SINKAGE, Wrong, unreadable};
 use std::path::Path;
 use terraglue_scenario::InputError;
-use terraglue_scenario::plausible::{PLATE_PRESSURE, PLATE_SINKAGE};
-use terraglue_soil_law::fit::Reading;
+use terraglue_scenario::plausible::doubt;
+use terraglue_soil_identification::Reading;
+use terraglue_subsystem::Usual;
 
 /// The readings of a file.
 #[derive(Clone, Debug, PartialEq)]
@@ -25,8 +26,9 @@ impl PlateTests {
         let largest = |of: fn(&Reading) -> f64| self.readings.iter().map(of).fold(0.0, f64::max);
         let [sinkages, pressures] = &self.columns;
         let of = |column: &str| format!("the largest of the column `{column}`");
-        let depth = PLATE_SINKAGE.doubt(&of(sinkages), largest(|r| r.depth));
-        depth.or_else(|| PLATE_PRESSURE.doubt(&of(pressures), largest(|r| r.pressure)))
+        let (sinkage, pressure) = (Usual::new("m", 1e-3, 1.0), Usual::new("Pa", 100.0, 1e8));
+        let depth = doubt(&sinkage, &of(sinkages), largest(|r| r.depth));
+        depth.or_else(|| doubt(&pressure, &of(pressures), largest(|r| r.pressure)))
     }
 }
 

@@ -1,8 +1,9 @@
 //! A wheel's sinkage and drawbar pull over its slip, measured and fitted, as a drawing in SVG.
 
 use super::drawing::{grid_lines, open_svg};
-use super::wheel::{WheelFit, WheelPoint};
+use super::wheel::WheelFit;
 use std::fmt::Write as _;
+use terraglue_soil_identification::WheelPoint;
 
 const WIDTH: f64 = 720.0;
 const HEIGHT: f64 = 560.0;
@@ -78,14 +79,14 @@ pub fn wheel_svg(fit: &WheelFit, seen: &[WheelPoint], unseen: &[WheelPoint]) -> 
     let load = seen.iter().map(|p| p.load).sum::<f64>() / seen.len().max(1) as f64;
     let curve: Vec<(f64, _)> = (0..=PLACES)
         .map(|k| 0.95 * f64::from(k) / f64::from(PLACES))
-        .map(|slip| (slip, fit.state(slip, load)))
+        .map(|slip| (slip, fit.fit.state(slip, load)))
         .collect();
     let mut text = open_svg([WIDTH, HEIGHT]);
     let _ = writeln!(
         text,
         r#"<text x="{LEFT}" y="18">wheel of {} mm radius, {} mm width under {load:.1} N; dots: fitted, circles: not seen</text>"#,
-        1e3 * fit.wheel.radius,
-        1e3 * fit.wheel.width
+        1e3 * fit.fit.wheel.radius,
+        1e3 * fit.fit.wheel.width
     );
     for slip in [0.0, 0.2, 0.4, 0.6, 0.8, 1.0] {
         let x = LEFT + (WIDTH - LEFT - RIGHT) * slip;

@@ -2,7 +2,7 @@
 
 use super::{Known, LawFit, PlateTests, SoilFit};
 use serde_json::{Value, json as value};
-use terraglue_soil_law::fit::{Basis, Interval};
+use terraglue_soil_identification::{Basis, Interval};
 
 /// Significant digits of what is written: more than any plate test knows.
 pub(super) fn digits(x: f64) -> String {
@@ -47,7 +47,7 @@ pub struct Predicted {
 impl Predicted {
     /// Of the tests `other`, after a fit to `fitted`.
     pub fn of(file: String, rms: f64, other: &PlateTests, fitted: &PlateTests) -> Self {
-        let same = |r: &&terraglue_soil_law::fit::Reading| {
+        let same = |r: &&terraglue_soil_identification::Reading| {
             fitted.readings.iter().any(|f| [f.b, f.depth, f.pressure] == [r.b, r.depth, r.pressure])
         };
         let seen = other.readings.iter().filter(same).count();

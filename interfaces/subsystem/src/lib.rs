@@ -22,6 +22,7 @@
 //!
 //! SI units everywhere; the world frame is right-handed with z up.
 
+mod advice;
 pub mod bytes;
 mod capability;
 mod config;
@@ -40,6 +41,7 @@ mod trial;
 pub mod unit;
 mod variable;
 
+pub use advice::Advice;
 pub use capability::Capabilities;
 pub use config::Config;
 pub use energy::Energy;
@@ -51,7 +53,7 @@ pub use node_law::{
 };
 pub use port::{Law, Node, Port, PortKind, component};
 pub use scene::{BodyState, Geometry, Pose, Scene, SceneBody, SceneShape};
-pub use schema::{Kind, Parameter, ParameterType, Schema};
+pub use schema::{Kind, Parameter, ParameterType, Schema, Usual};
 pub use subsystem::{Module, Subsystem};
 pub use trial::{Batch, Estimate, Input, Level, Motion, Response, Step, flag};
 pub use variable::{Action, Causality, Effect, ValueType, Values, ValuesMut, Variable, element_name};

@@ -61,6 +61,25 @@ pub struct Parameter {
     /// Texts accepted; empty: any.
     #[serde(default)]
     pub choices: Vec<String>,
+    /// Values that are usual; others are accepted with a warning.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub usual: Option<Usual>,
+}
+
+/// The usual span of a quantity: a value far from it is most often in another unit.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Usual {
+    /// Its unit, also where it depends on another parameter, e.g. `N/m^(n+1)`.
+    pub unit: String,
+    /// Smallest and largest usual value; 0 is always usual.
+    pub span: [f64; 2],
+}
+
+impl Usual {
+    /// Values from `low` to `high` of that unit.
+    pub fn new(unit: &str, low: f64, high: f64) -> Self {
+        Self { unit: unit.into(), span: [low, high] }
+    }
 }
 
 /// Type of a parameter.
@@ -108,6 +127,7 @@ impl Parameter {
             max: None,
             above_min: false,
             choices: Vec::new(),
+            usual: None,
         }
     }
 
@@ -132,6 +152,12 @@ impl Parameter {
     /// The same, larger than zero.
     pub fn positive(mut self) -> Self {
         (self.min, self.above_min) = (Some(0.0), true);
+        self
+    }
+
+    /// The same with the values that are usual, in that unit.
+    pub fn usually(mut self, unit: &str, low: f64, high: f64) -> Self {
+        self.usual = Some(Usual::new(unit, low, high));
         self
     }
 

@@ -4,7 +4,6 @@ use crate::finding::{Stop, Verdict};
 use crate::lab::Lab;
 use std::sync::Arc;
 use terraglue_host::law::open;
-use terraglue_soil_law::{PluginLaw, PressureCurve};
 use terraglue_subsystem::{
     Config, Error, NodeLaw, PressureAnswer, PressureNodes, Schema, ShearAnswer, ShearNodes,
 };
@@ -191,7 +190,7 @@ impl LawBench {
     }
 }
 
-fn answered(function: &'static str, given: &str, done: Result<(), Error>) -> Verdict {
+fn answered<T>(function: &'static str, given: &str, done: Result<T, Error>) -> Verdict<T> {
     done.map_err(|e| Stop::fail(function, given, e.to_string(), "TG_OK"))
 }
 
@@ -258,11 +257,14 @@ impl Node {
             let out = law.pressed(b, 1e-3, &[depth], &self.given())?;
             return Ok((out.pressure[0], out.slope[0]));
         }
-        let plugin = PluginLaw::new(law.law.clone());
-        let curve = PressureCurve::of_law(plugin.clone(), b, UNLOADING_PA_M);
-        let answer = curve.at(depth, self.z_max, self.p_max);
-        answered("pressure", &format!("z = {depth} m, b = {b} m"), plugin.check())?;
-        Ok(answer)
+        // as soils do: elastic below the largest depth, and nowhere stiffer in first loading than in unloading
+        let elastic = self.p_max + UNLOADING_PA_M * (depth - self.z_max);
+        if depth <= self.z_max {
+            return Ok(if elastic > 0.0 { (elastic, UNLOADING_PA_M) } else { (0.0, 0.0) });
+        }
+        let (p, slope) = law.press(b, 1e-3, &[depth])?;
+        let own = p.first().copied().zip(slope.first().copied()).filter(|(p, _)| *p < elastic);
+        Ok(own.unwrap_or((elastic, UNLOADING_PA_M)))
     }
 
     fn given(&self) -> Given {

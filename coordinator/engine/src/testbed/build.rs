@@ -216,10 +216,11 @@ fn instantiate(
             }
         }
         let gravity = terraglue_numerics::rotation::length(services.gravity);
-        let replaced = scenario::advice::replaced_laws(scenario, spec, &config, gravity);
-        let doubts = scenario::plausible::soil(scenario, spec, module.schema(), &config);
-        let foreign = scenario::advice::foreign_gravity(scenario, spec, &config, gravity);
-        replaced.iter().chain(&doubts).chain(&foreign).for_each(|advice| log::warn!("{advice}"));
+        let doubts = scenario::plausible::parameters(scenario, spec, module.schema(), &config);
+        let regions = scenario::advice::regions(spec);
+        let advice = library.advice(module.schema().kind, &config, &regions, gravity);
+        let advice = scenario::advice::of_module(scenario, spec, advice);
+        doubts.iter().chain(&advice).for_each(|advice| log::warn!("{advice}"));
         let advice = scenario::advice::law_parameters(module.schema(), spec, &scenario.source);
         advice.iter().for_each(|advice| log::warn!("{advice}"));
         let config = with_law(config, &search, scenario, spec)?;

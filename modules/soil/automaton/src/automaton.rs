@@ -2,7 +2,7 @@
 
 use crate::coarse::{as_found, settle};
 use crate::compaction::{Compaction, SavedCompaction};
-use crate::displace::Site;
+use crate::displacement::Site;
 use crate::feet::Foot;
 use crate::sweep::{Counts, ROUND, SavedAwake, Sweeper};
 use crate::values;

@@ -1,4 +1,7 @@
-//! Loose material on a height field: angle of repose, curvature, active nodes, force-equivalent height.
+//! Loose material on a height field as a cellular automaton: angle of repose, curvature, displacement, compaction.
+//!
+//! Each rule is in the file of its name: `repose.rs`, `curvature.rs`, `displacement.rs`, `compaction.rs`; which steep slopes stand
+//! by cohesion is in `standing.rs`, what a foot weighs in `feet.rs`, and `sweep.rs` applies the rules to the active nodes.
 //!
 //! A cellular automaton moves material between the nodes of the height field in whole units of fixed point, so that
 //! nothing is lost; the forces on a foot come from the pressure and shear laws that all soils share
@@ -22,14 +25,21 @@
 //! leaves it within the commit and goes to the nearest free nodes in eight directions, weighted with 1/distance².
 //! Nothing flows into a node that carries a foot, and into a node below a foot only what fits under it.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod active;
 mod automaton;
 mod coarse;
 mod compaction;
-mod displace;
+mod curvature;
+mod displacement;
 mod feet;
-mod kernel;
+mod lanes;
 mod regions;
+mod repose;
 mod span;
 mod standing;
 mod still;
@@ -53,7 +63,8 @@ pub fn schema(compacted: f64) -> Vec<Parameter> {
             automaton::DEFAULT_CURVATURE,
             "largest curvature of the surface, 1/m",
         )
-        .positive(),
+        .positive()
+        .usually("1/m", 2.0, 2000.0),
         Parameter {
             unit: "rad".into(),
             ..Parameter::of(

@@ -1,6 +1,6 @@
 //! Half-open ranges of columns, one per row of a window: where a rule has something to do.
 
-use crate::kernel::LANES;
+use crate::lanes::LANES;
 
 /// Columns lo … hi − 1; empty when lo ≥ hi.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

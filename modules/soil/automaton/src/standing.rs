@@ -7,9 +7,39 @@
 //! What lies loose has c' = ⅔·c and tan φ' = ⅔·tan φ (Terzaghi 1943, art. 46) once it has come to rest, and stands on runs up to the
 //! height H_c' of these; on higher ones, and while it moves, it slides down to the angle of repose.
 
-use crate::kernel::Face;
 use crate::span::Span;
 use terraglue_soil_contact::Ground;
+
+/// What may flow over a face.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
+pub enum Face {
+    /// Everything.
+    #[default]
+    Falls,
+    /// What lies loose; cohesion holds the rest.
+    Sheds,
+    /// What is moving: loose soil at rest has cohesion, too.
+    Stands,
+    /// Nothing: a node beside it is not visited.
+    Waits,
+}
+
+/// Cuts the fluxes to what may flow over the faces; `free` tells how much of both nodes beside a face is not held by cohesion
+/// there, units. A node has four faces, and each takes a quarter of it at most.
+#[inline(always)]
+pub fn hold(flux: &mut [i32], faces: &[Face], free: impl Fn(usize, Face) -> [i32; 2]) {
+    for (k, (q, face)) in flux.iter_mut().zip(faces).enumerate() {
+        match face {
+            Face::Falls => {}
+            Face::Waits => *q = 0,
+            Face::Sheds | Face::Stands if *q != 0 => {
+                let [from, to] = free(k, *face);
+                *q = (*q).max(-(to >> 2)).min(from >> 2);
+            }
+            Face::Sheds | Face::Stands => {}
+        }
+    }
+}
 
 /// How far a run is followed outside a window, nodes.
 const FARTHEST: i32 = 4096;

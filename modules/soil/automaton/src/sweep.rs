@@ -5,6 +5,7 @@ use crate::feet::Feet;
 use crate::regions::rectangles;
 use crate::still::Still;
 use crate::window::{Limits, Rectangle, Window};
+use crate::{curvature, repose};
 use std::sync::{Arc, Mutex, PoisonError};
 use terraglue_ground::{Lattice, TILE_EDGE, UNIT_M};
 use terraglue_soil_contact::Ground;
@@ -130,8 +131,6 @@ fn reach(sweeps: u32, parity: u32) -> usize {
     repose.max(curvature)
 }
 
-/// A limit of curvature beyond which the rule rests, units per triple: higher than any ground.
-const SHARPEST: f64 = 5e8;
 /// Windows that stand ready, and the side (nodes) up to which using one allocates nothing.
 const WINDOWS: usize = 16;
 const WINDOW_SIDE: usize = 128;
@@ -168,9 +167,8 @@ impl Sweeper {
     ) {
         // what no ground reaches, and infinity, becomes the largest number
         let critical = critical.map(|height| (height / UNIT_M) as i32);
-        let straight = (curvature_max * spacing * spacing / UNIT_M).max(f64::from(critical[0]));
-        let curvature = (straight < SHARPEST).then(|| [straight as i32, 2 * straight as i32]);
-        let threshold = |angle: f64| (spacing * libm::tan(angle) / UNIT_M) as f32;
+        let curvature = curvature::limits(curvature_max, critical[0], spacing);
+        let threshold = |angle: f64| repose::threshold(angle, spacing);
         self.by_soil.clear();
         if others.iter().any(|angle| *angle != repose) {
             self.by_soil.extend(std::iter::once(&repose).chain(others).map(|angle| threshold(*angle)));

@@ -5,10 +5,12 @@
 
 mod walls;
 
+use crate::curvature::{admit_triples, sum_triples, triples};
 use crate::feet::{Foot, OPEN_INLET, inlet};
-use crate::kernel::{LANES, admit, admit_triples, faces_across, faces_along, hold, triples};
+use crate::lanes::LANES;
+use crate::repose::{admit, faces_across, faces_along, sum_faces};
 use crate::span::Span;
-use crate::standing::Standing;
+use crate::standing::{Standing, hold};
 use terraglue_ground::{Lattice, TILE_EDGE};
 use terraglue_soil_contact::Ground;
 
@@ -607,54 +609,5 @@ impl Window {
     /// Whether nobody is awake.
     pub fn sleeps(&self) -> bool {
         self.repose.iter().chain(&self.curvature).all(|s| s.is_empty())
-    }
-}
-
-/// Change of each node of row y from the triples that hold it; fluxes of middles in row r lie in `fluxes[4·(r % 3)]` ….
-#[inline(always)]
-fn sum_triples(span: Span, y: usize, any: [bool; 3], fluxes: &[Vec<i32>], change: &mut [i32]) {
-    change[span.lo..span.hi].fill(0);
-    let rows = [y - 1, y, y + 1].map(|r| r % 3);
-    let [lower, here, upper] = rows.map(|r| &fluxes[4 * r..4 * r + 4]);
-    let n = span.len();
-    let change = &mut change[span.lo..span.hi];
-    if any[rows[1]] {
-        let [h, v, d, e] = here else { return };
-        let [v, d, e] = [v, d, e].map(|row| &row[span.lo..span.hi]);
-        let (left, own, right) =
-            (&h[span.lo - 1..span.hi - 1], &h[span.lo..span.hi], &h[span.lo + 1..=span.hi]);
-        for x in 0..n {
-            let all = own[x] + v[x] + d[x] + e[x];
-            change[x] += 2 * all - left[x] - right[x];
-        }
-    }
-    if any[rows[0]] {
-        take_ends(change, span, lower, [-1, 1]);
-    }
-    if any[rows[2]] {
-        take_ends(change, span, upper, [1, -1]);
-    }
-}
-
-/// Subtracts what the ends in a row give to middles in a row beside it; `shift` leads from an end to the middles of
-/// the two diagonals.
-#[inline(always)]
-fn take_ends(change: &mut [i32], span: Span, fluxes: &[Vec<i32>], shift: [isize; 2]) {
-    let [_, v, d, e] = fluxes else { return };
-    let n = change.len();
-    let from = |left: isize| span.lo.wrapping_add_signed(left);
-    let (v, d, e) = (&v[span.lo..][..n], &d[from(shift[0])..][..n], &e[from(shift[1])..][..n]);
-    for x in 0..n {
-        change[x] -= v[x] + d[x] + e[x];
-    }
-}
-
-/// Change of each node of `span` from the fluxes over its four faces.
-#[inline(always)]
-fn sum_faces(Span { lo, hi }: Span, along: &[i32], [lower, upper]: [&[i32]; 2], change: &mut [i32]) {
-    let (left, right) = (&along[lo - 1..hi - 1], &along[lo..hi]);
-    let (lower, upper, change) = (&lower[lo..hi], &upper[lo..hi], &mut change[lo..hi]);
-    for k in 0..change.len() {
-        change[k] = left[k].wrapping_sub(right[k]).wrapping_add(lower[k].wrapping_sub(upper[k]));
     }
 }

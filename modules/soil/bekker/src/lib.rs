@@ -5,6 +5,11 @@
 //! rules of the automaton (`terraglue-soil-material`); what is pressed still becomes denser in place, unless
 //! `compacted_fraction` says that a part of it goes to the rim.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 use std::sync::Arc;
 use terraglue_soil_contact::{Covered, FieldSoil, Ground, Material};
 use terraglue_soil_material::{Automaton, Settings};

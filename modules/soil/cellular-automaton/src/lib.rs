@@ -1,6 +1,13 @@
+//! Soil as a cellular automaton: angle of repose, curvature, active nodes, force-equivalent height.
+//!
 //! The module `soil-cellular-automaton`: the paper's automaton under the laws of pressure and shear that all soils share.
 //!
 //! Where the material goes is told in `terraglue-soil-material`, what a foot feels in `terraglue-soil-contact`.
+
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 pub use terraglue_soil_material::{Automaton, Compaction, Counts, Settings, Sweeper, settle};
 

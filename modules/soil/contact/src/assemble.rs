@@ -4,6 +4,7 @@ use crate::bound::Bound;
 use crate::patch::{Facing, Local, Patches};
 use crate::wall;
 use terraglue_soil_law::ShearResponse;
+use terraglue_subsystem::Result;
 
 /// A 6 × 6 stiffness, rows: components of the wrench on the soil, columns: components of X.
 pub type Stiffness = [[f64; 6]; 6];
@@ -40,37 +41,46 @@ impl Noted {
 
 impl Patches {
     /// Wrench of the laws on the body (n, t1, t2, mn, mt1, mt2) when the foot of patch `p` has moved by `x`.
-    pub fn law_wrench(&self, p: usize, x: &[f64; 6]) -> [f64; 6] {
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
+    pub fn law_wrench(&self, p: usize, x: &[f64; 6]) -> Result<[f64; 6]> {
         let mut sum = [0.0; 6];
         self.each_answer(p, x, |k, pressure, _, r| {
             add_force(&mut sum, self.nodes.arm[k], self.node_force(k, pressure, r.stress));
-        });
+        })?;
         self.add_beside(p, x, &mut sum);
-        sum
+        Ok(sum)
     }
 
     /// The same with the inertia of the soil that moves with the foot.
-    pub fn wrench(&self, p: usize, x: &[f64; 6]) -> [f64; 6] {
-        let mut sum = self.law_wrench(p, x);
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
+    pub fn wrench(&self, p: usize, x: &[f64; 6]) -> Result<[f64; 6]> {
+        let mut sum = self.law_wrench(p, x)?;
         if let Some(cone) = &self.ports[p].cone {
             cone.add_to(x, &mut sum);
         }
-        sum
+        Ok(sum)
     }
 
     /// [`Patches::wrench`] of the next patch `p`, with its answers added to `noted`.
-    pub fn noted_wrench(&self, p: usize, x: &[f64; 6], noted: &mut Noted) -> [f64; 6] {
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
+    pub fn noted_wrench(&self, p: usize, x: &[f64; 6], noted: &mut Noted) -> Result<[f64; 6]> {
         let mut sum = [0.0; 6];
         self.each_answer(p, x, |k, pressure, slope, r| {
             add_force(&mut sum, self.nodes.arm[k], self.node_force(k, pressure, r.stress));
             noted.nodes.push((k, slope, *r));
-        });
+        })?;
         self.add_beside(p, x, &mut sum);
         noted.patches.push((noted.nodes.len(), sum[0]));
         if let Some(cone) = &self.ports[p].cone {
             cone.add_to(x, &mut sum);
         }
-        sum
+        Ok(sum)
     }
 
     /// Adds the wrench of the soil beside patch `p` on the body.
@@ -89,11 +99,14 @@ impl Patches {
     }
 
     /// Wrench on the body as of the last commit, and the largest tangential force at rest, N.
-    pub fn at_rest(&self, p: usize) -> ([f64; 6], f64) {
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
+    pub fn at_rest(&self, p: usize) -> Result<([f64; 6], f64)> {
         let (mut sum, mut strength) = ([0.0; 6], 0.0);
         let n = &self.nodes;
         let mut bound = Bound::new(n.doubles);
-        self.each_answer(p, &[0.0; 6], |k, pressure, _, r| {
+        self.try_each_answer(p, &[0.0; 6], |k, pressure, _, r| {
             // what the shear and the way of the last step change in what the soil bears belongs to the step that begins
             let committed = n.stamp[k] != 0 && n.before[k] > 0.0 && pressure > 0.0;
             let now = if committed { n.before[k] } else { pressure };
@@ -103,16 +116,17 @@ impl Patches {
             // soil that clings under tension holds nothing along the underside
             let (pressed, slip) = (pressure.max(0.0), n.shear[k].slip);
             if shear.is_batched() {
-                strength += bound.add(&self.laws, n.law[k], inclined, [pressed, slip], n.kept(k));
+                strength += bound.add(&self.laws, n.law[k], inclined, [pressed, slip], n.kept(k))?;
             } else {
-                strength += inclined * shear.yield_stress_kept(pressed, slip, n.mobilised[k], n.kept(k));
+                strength += inclined * shear.yield_stress(pressed, slip, n.mobilised[k], n.kept(k))?;
             }
-        });
+            Ok(())
+        })?;
         self.add_beside(p, &[0.0; 6], &mut sum);
         // of the sides of a closed outline at most half look one way
         let sides = &self.sides[self.ports[p].wall.sides.clone()];
         strength += 0.5 * sides.iter().map(|side| side.force).sum::<f64>();
-        (sum, strength + bound.take(&self.laws))
+        Ok((sum, strength + bound.take(&self.laws)?))
     }
 
     /// Force of a node on the body along n, t1, t2 under a pressure and a shear stress.
@@ -129,12 +143,15 @@ impl Patches {
     }
 
     /// Force of patch `p` on the body along n at `x`, N, and by how much it falls with X_n, N/m.
-    pub fn normal_force(&self, p: usize, x: &[f64; 6]) -> [f64; 2] {
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
+    pub fn normal_force(&self, p: usize, x: &[f64; 6]) -> Result<[f64; 2]> {
         let (n, mut sum, mut stiffness) = (&self.nodes, [0.0; 6], 0.0);
         self.each_answer(p, x, |k, pressure, slope, r| {
             add_force(&mut sum, n.arm[k], self.node_force(k, pressure, r.stress));
             stiffness += node_slope(&n.facing[k], n.area[k], slope, r, [0, 0]);
-        });
+        })?;
         self.add_beside(p, x, &mut sum);
         if let Some(cone) = &self.ports[p].cone {
             let mut all = [[0.0; 6]; 6];
@@ -143,19 +160,22 @@ impl Patches {
             cone.add_to(x, &mut sum);
             stiffness = all[0][0];
         }
-        [sum[0], stiffness]
+        Ok([sum[0], stiffness])
     }
 
     /// d(wrench on the soil)/dX at `x`: consistent tangents of both laws, moved to the port's origin.
-    pub fn stiffness(&self, p: usize, x: &[f64; 6]) -> Stiffness {
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
+    pub fn stiffness(&self, p: usize, x: &[f64; 6]) -> Result<Stiffness> {
         let mut sum = [[0.0; 6]; 6];
         let moments = self.ports[p].carries_moments();
-        self.each_answer(p, x, |k, _, slope, r| self.stiffen(k, slope, r, moments, &mut sum));
+        self.each_answer(p, x, |k, _, slope, r| self.stiffen(k, slope, r, moments, &mut sum))?;
         self.stiffen_beside(p, x, &mut sum);
         if let Some(cone) = &self.ports[p].cone {
-            cone.stiffen(x, self.law_wrench(p, x)[0], &mut sum);
+            cone.stiffen(x, self.law_wrench(p, x)?[0], &mut sum);
         }
-        sum
+        Ok(sum)
     }
 
     /// The same where [`Patches::noted_wrench`] was asked at `x` before.
@@ -191,21 +211,39 @@ impl Patches {
     }
 
     /// Calls `visit(node, pressure, slope, answer of the shear law)` for the nodes with pressure or tension.
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
     #[inline]
     pub fn each_answer(
         &self,
         p: usize,
         x: &[f64; 6],
         mut visit: impl FnMut(usize, f64, f64, &ShearResponse),
-    ) {
+    ) -> Result {
+        self.try_each_answer(p, x, |k, pressure, slope, r| {
+            visit(k, pressure, slope, r);
+            Ok(())
+        })
+    }
+
+    /// The same where `visit`, too, asks the law.
+    #[inline]
+    fn try_each_answer(
+        &self,
+        p: usize,
+        x: &[f64; 6],
+        mut visit: impl FnMut(usize, f64, f64, &ShearResponse) -> Result,
+    ) -> Result {
         if let Some(law) = self.batched(p) {
             return self.each_answered(p, x, law, visit);
         }
         let n = &self.nodes;
         self.each_loaded(p, x, |k, pressure, slope, moved| {
             let shear = &self.law(k).shear;
-            visit(k, pressure, slope, &shear.respond_at(&n.shear[k], n.mobilised[k], pressure, moved));
-        });
+            let r = shear.respond_kept(&n.shear[k], &[], n.mobilised[k], pressure, moved)?;
+            visit(k, pressure, slope, &r)
+        })
     }
 
     /// The law of patch `p`, if it is a single one that answers many nodes better than one after the other.
@@ -219,17 +257,23 @@ impl Patches {
 
     /// Calls `visit(node, pressure, slope, displacement along the underside)` for the nodes with pressure or tension.
     #[inline]
-    fn each_loaded(&self, p: usize, x: &[f64; 6], mut visit: impl FnMut(usize, f64, f64, [f64; 2])) {
+    fn each_loaded(
+        &self,
+        p: usize,
+        x: &[f64; 6],
+        mut visit: impl FnMut(usize, f64, f64, [f64; 2]) -> Result,
+    ) -> Result {
         let patch = &self.ports[p];
         let n = &self.nodes;
         for k in patch.nodes.clone().filter(|k| n.area[*k] > 0.0) {
             let moved = displacement(n.arm[k], x);
             let deeper = -dot(n.facing[k].press, moved);
-            let (pressure, slope) = self.pressure(k, n.depth[k] + deeper);
+            let (pressure, slope) = self.pressure(k, n.depth[k] + deeper)?;
             if pressure != 0.0 {
-                visit(k, pressure, slope, n.facing[k].slide(moved));
+                visit(k, pressure, slope, n.facing[k].slide(moved))?;
             }
         }
+        Ok(())
     }
 }
 

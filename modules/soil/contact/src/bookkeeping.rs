@@ -8,7 +8,7 @@ use crate::nodes::NodeState;
 use crate::patch::{Patch, PatchNodes, Patches};
 use crate::wall;
 use terraglue_soil_law::{KeptNodes, PressureCurve, ShearResponse, ShearState};
-use terraglue_subsystem::{MOST_LAW_STATE, Port};
+use terraglue_subsystem::{MOST_LAW_STATE, Port, Result};
 
 /// Sums over the run and what the last commit found. Part of the committed state.
 ///
@@ -123,6 +123,9 @@ struct Kept {
 
 impl Scene<'_> {
     /// Takes the committed motion `x` of all feet, under the wrenches `t`, into the node states.
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
     pub fn commit(
         &self,
         ports: &[Port],
@@ -131,7 +134,7 @@ impl Scene<'_> {
         ground: &mut Ground,
         lists: &mut Lists,
         book: &mut Book,
-    ) {
+    ) -> Result {
         book.stamp += 1;
         (book.elastic, book.kinetic, book.loaded, book.fewest) = (0.0, 0.0, 0, 0);
         std::mem::swap(&mut lists.loaded, &mut lists.previous);
@@ -144,11 +147,11 @@ impl Scene<'_> {
         for (p, (patch, port)) in self.patches.ports.iter().zip(ports).enumerate() {
             let (x, wrench) = (patch.unpack(x), patch.unpack(t));
             let mut touch = Touch::default();
-            self.ask_together(p, &x, &mut lists.answers);
-            let loaded = self.commit_patch(patch, port, &x, ground, lists, book, &mut touch);
+            self.ask_together(p, &x, &mut lists.answers)?;
+            let loaded = self.commit_patch(patch, port, &x, ground, lists, book, &mut touch)?;
             lists.touching.push(loaded > 0);
             if loaded > 0 {
-                self.carry_cone(p, &x, ground, book);
+                self.carry_cone(p, &x, ground, book)?;
             }
             if loaded > 0 && ground.contacts.any() {
                 touch.under(patch, &wrench, &x, self.h);
@@ -165,18 +168,21 @@ impl Scene<'_> {
             |key| ports.iter().zip(&lists.touching).any(|(port, touches)| *touches && port.key == key);
         book.dissipated += contact_memory::release(&mut ground.pushes, touching);
         book.dissipated += contact_memory::release(&mut ground.cones, touching);
+        Ok(())
     }
 
     /// Pressures and shear of all nodes of patch `p` where its law answers many nodes at a time.
-    fn ask_together(&self, p: usize, x: &[f64; 6], answers: &mut Vec<(f64, ShearResponse)>) {
+    fn ask_together(&self, p: usize, x: &[f64; 6], answers: &mut Vec<(f64, ShearResponse)>) -> Result {
         answers.clear();
         if let Some(law) = self.patches.batched(p) {
             let nodes = &self.patches.ports[p].nodes;
             answers.resize(nodes.len(), (0.0, ShearResponse::default()));
             self.patches.each_answered(p, x, law, |k, pressure, _, shear| {
                 answers[k - nodes.start] = (pressure, *shear);
-            });
+                Ok(())
+            })?;
         }
+        Ok(())
     }
 
     #[allow(clippy::too_many_arguments)]
@@ -189,7 +195,7 @@ impl Scene<'_> {
         lists: &mut Lists,
         book: &mut Book,
         touch: &mut Touch,
-    ) -> u32 {
+    ) -> Result<u32> {
         let n = &self.patches.nodes;
         let first = lists.loaded.len();
         let mut loaded = 0;
@@ -201,9 +207,9 @@ impl Scene<'_> {
             let mut kept = Kept::default();
             let asked = lists.answers.get(k - patch.nodes.start).copied();
             let pressure = match (curve.keeper(), asked) {
-                (Some(_), _) => self.kept(k, depth, &mut kept),
+                (Some(_), _) => self.kept(k, depth, &mut kept)?,
                 (None, Some((pressure, _))) => pressure,
-                (None, None) => self.patches.pressure(k, depth).0,
+                (None, None) => self.patches.pressure(k, depth)?.0,
             };
             let [i, j] = n.index[k];
             let deep = (depth + relief(n, k)) / patch.slope;
@@ -215,7 +221,7 @@ impl Scene<'_> {
                 lists.slid_in.push(n.entered[k] && patch.wheel.is_none());
                 touch.add(n, k, pressure, deep);
                 let slip = facing.slide(moved);
-                let shear = asked.map_or_else(|| self.sheared(k, pressure, slip), |(_, shear)| shear);
+                let shear = asked.map_or_else(|| self.sheared(k, pressure, slip), |(_, shear)| Ok(shear))?;
                 let force = self.patches.node_force(k, pressure, shear.stress);
                 turnover.work -= dot(force, moved);
                 let node = Pressed { k, depth, pressure, slip, shear, kept: &kept };
@@ -225,7 +231,7 @@ impl Scene<'_> {
                 lists.loaded.push([i, j]);
                 covered.surface = surface;
                 covered.flow = flow_along(port, moved);
-                covered.virgin = if kept_by_law(curve) { pressure } else { self.patches.yields(k, depth).0 };
+                covered.virgin = if kept_by_law(curve) { pressure } else { self.patches.yields(k, depth)?.0 };
             }
             if n.stamp[k] != 0 && pressure <= 0.0 && self.patches.law(k).adhesion > 0.0 {
                 turnover.work -= dot(self.patches.node_force(k, pressure, [0.0; 2]), moved);
@@ -247,17 +253,18 @@ impl Scene<'_> {
             in_world(port, [0.0, a, b])
         });
         carry_slip(ground, lists, first, entry, book.stamp);
-        loaded
+        Ok(loaded)
     }
 
     /// The soil that moves with the foot of patch `p`: its work, heat and kinetic energy.
-    fn carry_cone(&self, p: usize, x: &[f64; 6], ground: &mut Ground, book: &mut Book) {
-        let Some(cone) = &self.patches.ports[p].cone else { return };
-        let (work, after) = cone.worked(x, self.patches.law_wrench(p, x)[0]);
+    fn carry_cone(&self, p: usize, x: &[f64; 6], ground: &mut Ground, book: &mut Book) -> Result {
+        let Some(cone) = &self.patches.ports[p].cone else { return Ok(()) };
+        let (work, after) = cone.worked(x, self.patches.law_wrench(p, x)?[0]);
         book.port_work += work;
         book.dissipated += work - (after.energy() - cone.before.energy());
         book.kinetic += after.energy();
         contact_memory::remember(&mut ground.cones, after);
+        Ok(())
     }
 
     /// The soil beside a foot: how far it was pushed, its work, heat and elastic energy.
@@ -317,20 +324,20 @@ impl Scene<'_> {
     }
 
     /// The pressure of a law with a state at node k, and what it keeps.
-    fn kept(&self, k: usize, depth: f64, out: &mut Kept) -> f64 {
-        let Some((law, b)) = self.patches.law(k).curve.keeper() else { return 0.0 };
+    fn kept(&self, k: usize, depth: f64, out: &mut Kept) -> Result<f64> {
+        let Some((law, b)) = self.patches.law(k).curve.keeper() else { return Ok(0.0) };
         let n = &self.patches.nodes;
         let (permanent, slip) = (&n.permanent[k..=k], &[n.shear[k].slip]);
         let nodes = KeptNodes { depth: &[depth], permanent, slip, state: n.kept(k) };
         let (mut p, mut slope, mut unloaded) = ([0.0], [0.0], [0.0]);
         let state = &mut out.state[..n.doubles];
-        law.kept(b, &nodes, [&mut p, &mut slope, &mut unloaded], state);
+        law.kept(b, &nodes, [&mut p, &mut slope, &mut unloaded], state)?;
         out.permanent = unloaded[0];
-        if p[0] > 0.0 { n.share[k] * p[0] } else { self.patches.clinging_at(k, depth).0 }
+        Ok(if p[0] > 0.0 { n.share[k] * p[0] } else { self.patches.clinging_at(k, depth).0 })
     }
 
     /// Shear of node k alone.
-    fn sheared(&self, k: usize, pressure: f64, slip: [f64; 2]) -> ShearResponse {
+    fn sheared(&self, k: usize, pressure: f64, slip: [f64; 2]) -> Result<ShearResponse> {
         let n = &self.patches.nodes;
         self.patches.law(k).shear.respond_kept(&n.shear[k], n.kept(k), n.mobilised[k], pressure, slip)
     }

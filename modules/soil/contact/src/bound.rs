@@ -1,7 +1,8 @@
 //! What nodes bear along the ground at most, asked of an expression or a module for many nodes at once.
 
 use crate::patch::Local;
-use terraglue_subsystem::MOST_LAW_STATE;
+use terraglue_soil_law::YieldNodes;
+use terraglue_subsystem::{MOST_LAW_STATE, Result};
 
 /// Nodes that are asked together.
 const CHUNK: usize = 32;
@@ -27,23 +28,37 @@ impl Bound {
 
     /// Adds a node: its law by number, its inclined area (m²), pressure (Pa) and slip (m), what the law keeps of it. Answers
     /// with the force (N) of those that had to make room.
-    pub fn add(&mut self, laws: &[Local], law: usize, area: f64, node: [f64; 2], kept: &[f64]) -> f64 {
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
+    pub fn add(
+        &mut self,
+        laws: &[Local],
+        law: usize,
+        area: f64,
+        node: [f64; 2],
+        kept: &[f64],
+    ) -> Result<f64> {
         let full = self.count == CHUNK || self.law != law;
-        let force = if full { self.take(laws) } else { 0.0 };
+        let force = if full { self.take(laws)? } else { 0.0 };
         let (at, d) = (self.count, self.doubles);
         self.law = law;
         (self.area[at], [self.pressure[at], self.slip[at]]) = (area, node);
         self.kept[at * d..(at + 1) * d].copy_from_slice(kept);
         self.count += 1;
-        force
+        Ok(force)
     }
 
     /// Largest tangential force of the nodes that wait, N.
-    pub fn take(&mut self, laws: &[Local]) -> f64 {
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
+    pub fn take(&mut self, laws: &[Local]) -> Result<f64> {
         let (n, mut stress) = (std::mem::take(&mut self.count), [0.0; CHUNK]);
-        let Some(law) = laws.get(self.law).filter(|_| n > 0) else { return 0.0 };
+        let Some(law) = laws.get(self.law).filter(|_| n > 0) else { return Ok(0.0) };
         let kept = &self.kept[..n * self.doubles];
-        law.shear.yield_stresses(&self.pressure[..n], &self.slip[..n], kept, &mut stress[..n]);
-        self.area[..n].iter().zip(&stress).map(|(area, stress)| area * stress).sum()
+        let nodes = YieldNodes { pressure: &self.pressure[..n], slip: &self.slip[..n], kept };
+        law.shear.yield_stresses(&nodes, &mut stress[..n])?;
+        Ok(self.area[..n].iter().zip(&stress).map(|(area, stress)| area * stress).sum())
     }
 }

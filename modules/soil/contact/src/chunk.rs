@@ -3,7 +3,7 @@
 use crate::assemble::{displacement, dot};
 use crate::patch::{Local, Patches};
 use terraglue_soil_law::{KeptNodes, ShearResponse, ShearState, Sheared, first_loading};
-use terraglue_subsystem::MOST_LAW_STATE;
+use terraglue_subsystem::{MOST_LAW_STATE, Result};
 
 /// Nodes that are evaluated together.
 const CHUNK: usize = 64;
@@ -22,7 +22,13 @@ pub struct Chunk {
 
 impl Patches {
     /// Calls `visit` for chunks of the nodes with pressure or tension when the foot of patch `p` has moved by `x`.
-    fn each_chunk(&self, p: usize, x: &[f64; 6], law: &Local, mut visit: impl FnMut(&Chunk)) {
+    fn each_chunk(
+        &self,
+        p: usize,
+        x: &[f64; 6],
+        law: &Local,
+        mut visit: impl FnMut(&Chunk) -> Result,
+    ) -> Result {
         let mut chunk = Chunk {
             count: 0,
             pressed: 0,
@@ -41,25 +47,26 @@ impl Patches {
             chunk.slide[at] = n.facing[k].slide(moved);
             chunk.count += 1;
             if chunk.count == CHUNK {
-                self.press_chunk(law, &mut chunk);
-                visit(&chunk);
+                self.press_chunk(law, &mut chunk)?;
+                visit(&chunk)?;
                 chunk.count = 0;
             }
         }
         if chunk.count > 0 {
-            self.press_chunk(law, &mut chunk);
-            visit(&chunk);
+            self.press_chunk(law, &mut chunk)?;
+            visit(&chunk)?;
         }
+        Ok(())
     }
 
     /// Pressures and slopes; nodes without are left out, those that cling stand at the end.
-    fn press_chunk(&self, law: &Local, chunk: &mut Chunk) {
+    fn press_chunk(&self, law: &Local, chunk: &mut Chunk) -> Result {
         let (curve, count) = (&law.curve, chunk.count);
         let (pressure, slope) = (&mut chunk.pressure[..count], &mut chunk.slope[..count]);
         if curve.keeper().is_some() {
-            self.kept_pressures(law, &chunk.node[..count], &chunk.depth[..count], pressure, slope);
+            self.kept_pressures(law, &chunk.node[..count], &chunk.depth[..count], pressure, slope)?;
         } else {
-            self.yielding(law, &chunk.node[..count], &chunk.depth[..count], pressure, slope);
+            self.yielding(law, &chunk.node[..count], &chunk.depth[..count], pressure, slope)?;
         }
         let (mut left, mut clings) = (0, 0);
         let mut clinging = [(0, 0.0, 0.0, [0.0; 2]); CHUNK];
@@ -84,10 +91,18 @@ impl Patches {
             left += 1;
         }
         chunk.count = left;
+        Ok(())
     }
 
     /// Pressures of nodes at depths: those that may yield are gathered for the law.
-    fn yielding(&self, law: &Local, nodes: &[usize], depth: &[f64], pressure: &mut [f64], slope: &mut [f64]) {
+    fn yielding(
+        &self,
+        law: &Local,
+        nodes: &[usize],
+        depth: &[f64],
+        pressure: &mut [f64],
+        slope: &mut [f64],
+    ) -> Result {
         let (n, k_u) = (&self.nodes, law.curve.unloading());
         let [mut bed, mut bed_slope, mut top, mut loose, mut loose_slope, mut z] = [[0.0; CHUNK]; 6];
         let (mut place, mut count, mut covered) = ([0; CHUNK], 0, false);
@@ -101,9 +116,9 @@ impl Patches {
                 count += 1;
             }
         }
-        first_loading(&law.curve, &z[..count], &mut bed[..count], &mut bed_slope[..count]);
+        first_loading(&law.curve, &z[..count], &mut bed[..count], &mut bed_slope[..count])?;
         if covered {
-            first_loading(&law.curve, &top[..count], &mut loose[..count], &mut loose_slope[..count]);
+            first_loading(&law.curve, &top[..count], &mut loose[..count], &mut loose_slope[..count])?;
         }
         for c in 0..count {
             let (at, k) = (place[c], nodes[place[c]]);
@@ -113,6 +128,7 @@ impl Patches {
                 (pressure[at], slope[at]) = yields;
             }
         }
+        Ok(())
     }
 
     /// Pressures of a law that keeps a state; what it would keep after the step is dropped.
@@ -123,8 +139,8 @@ impl Patches {
         depth: &[f64],
         pressure: &mut [f64],
         slope: &mut [f64],
-    ) {
-        let Some((law, b)) = law.curve.keeper() else { return };
+    ) -> Result {
+        let Some((law, b)) = law.curve.keeper() else { return Ok(()) };
         let (n, doubles) = (&self.nodes, law.state_doubles());
         let (mut permanent, mut slip) = ([0.0; CHUNK], [0.0; CHUNK]);
         let mut state = [0.0; CHUNK * MOST_LAW_STATE];
@@ -137,20 +153,24 @@ impl Patches {
         let (mut unloaded, mut new) = ([0.0; CHUNK], [0.0; CHUNK * MOST_LAW_STATE]);
         let given = KeptNodes { depth, permanent, slip, state: &state[..count * doubles] };
         let out = [&mut *pressure, &mut *slope, &mut unloaded[..count]];
-        law.kept(b, &given, out, &mut new[..count * doubles]);
+        law.kept(b, &given, out, &mut new[..count * doubles])?;
         for ((k, p), slope) in nodes.iter().zip(pressure).zip(slope) {
             (*p, *slope) = (n.share[*k] * *p, n.share[*k] * *slope);
         }
+        Ok(())
     }
 
     /// As [`Patches::each_answer`] for a patch on one soil, in chunks.
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
     pub fn each_answered(
         &self,
         p: usize,
         x: &[f64; 6],
         law: &Local,
-        mut visit: impl FnMut(usize, f64, f64, &ShearResponse),
-    ) {
+        mut visit: impl FnMut(usize, f64, f64, &ShearResponse) -> Result,
+    ) -> Result {
         let (n, shear) = (&self.nodes, &law.shear);
         self.each_chunk(p, x, law, |c| {
             let count = c.pressed;
@@ -169,16 +189,17 @@ impl Patches {
                     pressure: &c.pressure[..count],
                     slide: &c.slide[..count],
                 };
-                shear.respond_many(&sheared, &mut answers[..count]);
+                shear.respond_many(&sheared, &mut answers[..count])?;
             } else {
                 for (at, k) in c.node[..count].iter().enumerate() {
-                    answers[at] =
-                        shear.respond_at(&n.shear[*k], n.mobilised[*k], c.pressure[at], c.slide[at]);
+                    let (state, mobilised) = (&n.shear[*k], n.mobilised[*k]);
+                    answers[at] = shear.respond_kept(state, &[], mobilised, c.pressure[at], c.slide[at])?;
                 }
             }
             for (at, answer) in answers[..c.count].iter().enumerate() {
-                visit(c.node[at], c.pressure[at], c.slope[at], answer);
+                visit(c.node[at], c.pressure[at], c.slope[at], answer)?;
             }
-        });
+            Ok(())
+        })
     }
 }

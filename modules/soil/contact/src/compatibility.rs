@@ -7,7 +7,7 @@
 
 use crate::assemble::{Noted, Stiffness};
 use crate::patch::Patches;
-use terraglue_subsystem::Estimate;
+use terraglue_subsystem::{Estimate, Result};
 
 /// Newton steps at most.
 const STEPS: usize = 60;
@@ -39,7 +39,10 @@ impl Compatibility {
     }
 
     /// Solves for the wrench. `Some(|r|)`, N: it was not found.
-    pub fn solve(&mut self, patches: &Patches, n: usize, estimate: &Estimate) -> Option<f64> {
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
+    pub fn solve(&mut self, patches: &Patches, n: usize, estimate: &Estimate) -> Result<Option<f64>> {
         for buffer in [&mut self.t, &mut self.x, &mut self.residual, &mut self.d, &mut self.base] {
             buffer.clear();
             buffer.resize(n, 0.0);
@@ -47,22 +50,22 @@ impl Compatibility {
         for patch in &patches.ports {
             patch.pack(&patch.force, &mut self.t);
         }
-        let mut left = self.evaluate(patches, estimate);
+        let mut left = self.evaluate(patches, estimate)?;
         for _ in 0..STEPS {
             if left <= self.tolerated() {
-                return None;
+                return Ok(None);
             }
             if !self.newton(patches, n, &estimate.g) {
-                return Some(left);
+                return Ok(Some(left));
             }
             let before = left;
-            left = self.step(patches, estimate, before);
+            left = self.step(patches, estimate, before)?;
             if left >= before && left <= 1e3 * self.tolerated() {
                 // what rounding leaves
-                return None;
+                return Ok(None);
             }
         }
-        (left > 1e3 * self.tolerated()).then_some(left)
+        Ok((left > 1e3 * self.tolerated()).then_some(left))
     }
 
     fn tolerated(&self) -> f64 {
@@ -70,18 +73,19 @@ impl Compatibility {
     }
 
     /// X and r at the present T; |r|.
-    fn evaluate(&mut self, patches: &Patches, estimate: &Estimate) -> f64 {
+    fn evaluate(&mut self, patches: &Patches, estimate: &Estimate) -> Result<f64> {
         self.x.copy_from_slice(estimate.x_free);
         for (column, t) in estimate.g.chunks_exact(self.t.len().max(1)).zip(&self.t) {
             self.x.iter_mut().zip(column).for_each(|(x, g)| *x += g * t);
         }
         self.noted.clear();
         for (p, patch) in patches.ports.iter().enumerate() {
-            let wrench = patches.noted_wrench(p, &patch.unpack(&self.x), &mut self.noted);
+            let wrench = patches.noted_wrench(p, &patch.unpack(&self.x), &mut self.noted)?;
             patch.pack(&wrench, &mut self.residual);
         }
         self.residual.iter_mut().zip(&self.t).for_each(|(r, t)| *r = t - *r);
-        self.residual.iter().fold(0.0, |m: f64, r| if r.is_nan() { f64::INFINITY } else { m.max(r.abs()) })
+        let larger = |m: f64, r: &f64| if r.is_nan() { f64::INFINITY } else { m.max(r.abs()) };
+        Ok(self.residual.iter().fold(0.0, larger))
     }
 
     /// d = −(I + K·G)⁻¹·r at the motion of the last evaluation; whether there is one.
@@ -102,20 +106,20 @@ impl Compatibility {
     }
 
     /// Takes the step, halved until the residual falls; the new |r|.
-    fn step(&mut self, patches: &Patches, estimate: &Estimate, before: f64) -> f64 {
+    fn step(&mut self, patches: &Patches, estimate: &Estimate, before: f64) -> Result<f64> {
         self.base.copy_from_slice(&self.t);
         let mut share = 1.0;
         for halving in 0..=HALVINGS {
             for ((t, base), d) in self.t.iter_mut().zip(&self.base).zip(&self.d) {
                 *t = base + share * d;
             }
-            let left = self.evaluate(patches, estimate);
+            let left = self.evaluate(patches, estimate)?;
             if left < before || halving == HALVINGS {
-                return left;
+                return Ok(left);
             }
             share *= 0.5;
         }
-        before
+        Ok(before)
     }
 }
 

@@ -1,4 +1,4 @@
-//! What all soils on a height field share: contact patches, node states, fields, variables.
+//! What all soils on a height field share: contact patches, node states, fields, variables; a soil adds where material goes.
 //!
 //! A soil module brings a [`Material`], which says where the soil under a foot goes; [`FieldSoil`] makes a
 //! subsystem of it. The pressure and shear laws act node by node on floating-point depths; the fixed-point
@@ -9,6 +9,11 @@
 //! surface* at the depth z₀ below it, above it where loose soil lies on the bed. The depth under a foot is counted from the
 //! reference level along the port's normal n: z = (reference − underside)·n_z − X_n − (rotation). The soil is elastic above
 //! z₀ up to the pressure at which it yields; what yields moves z₀ down.
+
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 mod assemble;
 mod bookkeeping;

@@ -31,6 +31,7 @@ pub fn schema() -> Vec<Parameter> {
                 "distance of pixels of an image; where it is left out the image covers the ground",
             )
             .positive()
+            .usually("m", 1e-3, 5.0)
         },
         of(
             "mask.rows",

@@ -2,6 +2,7 @@
 
 use crate::assemble::{displacement, dot};
 use crate::patch::Patches;
+use terraglue_subsystem::Result;
 
 /// A node that clings to a foot: it lets go at the shift `end` (m); up to there its normal force is `stiffness`·shift −
 /// `at_zero`.
@@ -24,21 +25,24 @@ impl Patches {
     /// soon as it is touched, a force belongs to two depths close together; the one next to the foot is meant.
     /// Its upper end carries `force` by pressure alone; where shear on inclined undersides
     /// lifts the foot, it moves further down.
-    pub fn surface_under(&mut self, p: usize, force: f64, x: &[f64; 6]) -> f64 {
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
+    pub fn surface_under(&mut self, p: usize, force: f64, x: &[f64; 6]) -> Result<f64> {
         self.turn(p, x);
-        let (free, full) = match self.bracket(p, force) {
+        let (free, full) = match self.bracket(p, force)? {
             Some(bracket) => bracket,
-            None => return self.ports[p].surface,
+            None => return Ok(self.ports[p].surface),
         };
         if force <= 0.0 {
             self.list_clinging(p);
-            return -self.held(force).unwrap_or(free);
+            return Ok(-self.held(force).unwrap_or(free));
         }
         let mut at = *x;
         let (mut low, mut high) = (free, full);
         for _ in 0..60 {
             at[0] = -high;
-            if self.wrench(p, &at)[0] >= force {
+            if self.wrench(p, &at)?[0] >= force {
                 break;
             }
             (low, high) = (high, high + (high - free) + 1e-9);
@@ -49,7 +53,7 @@ impl Patches {
                 shift = 0.5 * (low + high);
             }
             at[0] = -shift;
-            let [now, stiffness] = self.normal_force(p, &at);
+            let [now, stiffness] = self.normal_force(p, &at)?;
             let residual = now - force;
             if residual.abs() <= TOLERANCE * force || high - low <= f64::EPSILON * shift.abs() {
                 break;
@@ -66,7 +70,7 @@ impl Patches {
             shift = next;
         }
         self.ports[p].warm = -shift;
-        -shift
+        Ok(-shift)
     }
 
     fn turn(&mut self, p: usize, x: &[f64; 6]) {
@@ -134,15 +138,17 @@ impl Patches {
 
     /// Shift at which the foot just touches, and one at which the pressure carries `force` for certain; `None`
     /// without nodes.
-    fn bracket(&self, p: usize, force: f64) -> Option<(f64, f64)> {
+    fn bracket(&self, p: usize, force: f64) -> Result<Option<(f64, f64)>> {
         let (patch, n) = (&self.ports[p], &self.nodes);
         let loaded = || patch.nodes.clone().filter(|k| n.area[*k] > 0.0);
         let area: f64 = loaded().map(|k| n.area[k] * n.facing[k].press[0]).sum();
         let pressure = force.max(0.0) / area;
         let curves = || self.laws[patch.laws.clone()].iter().map(|law| &law.curve);
         // of a law with a state nothing is known but where it begins
-        let first = curves().filter(|c| c.keeper().is_none());
-        let virgin = first.fold(0.0_f64, |m, c| m.max(c.virgin_depth(pressure)));
+        let mut virgin = 0.0_f64;
+        for curve in curves().filter(|c| c.keeper().is_none()) {
+            virgin = virgin.max(curve.virgin_depth(pressure)?);
+        }
         let elastic = curves().fold(0.0_f64, |m, c| m.max(pressure / c.unloading()));
         let (mut free, mut full) = (f64::INFINITY, f64::NEG_INFINITY);
         for k in loaded() {
@@ -151,6 +157,6 @@ impl Patches {
             full = full.max((virgin.max(n.permanent[k] + elastic) - n.turned[k]) / down);
         }
         let margin = 1e-12 * (1.0 + full.abs());
-        (area > 0.0).then_some((free, full + margin))
+        Ok((area > 0.0).then_some((free, full + margin)))
     }
 }

@@ -13,7 +13,7 @@ use crate::wall::{self, Beside, Rows, Side, Wall};
 use crate::wheel::{Shift, Wheel};
 use terraglue_soil_law::strength::{Inclination, slope_factor};
 use terraglue_soil_law::{Direction, PluginLaw, PressureCurve, PressureLaw, Rolling, ShearLaw, ShearState};
-use terraglue_subsystem::{Node, Port, Step};
+use terraglue_subsystem::{Node, Port, Result, Step};
 
 /// One port's share of the arrays and what is constant during the step.
 #[derive(Clone, Debug)]
@@ -328,11 +328,15 @@ impl Patches {
 
     /// Reads the committed state below all ports, unless that was done for this step already. `laws`: those of the
     /// scenario's own soil and of the soils of the mask.
-    pub fn build(&mut self, step: &Step, ground: &Ground, laws: &[Laws]) {
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
+    pub fn build(&mut self, step: &Step, ground: &Ground, laws: &[Laws]) -> Result {
         let key = (step.t.to_bits(), step.index, step.ports.len(), step.nodes.len());
         if self.built_for == Some(key) {
-            return;
+            return Ok(());
         }
+        self.built_for = None;
         if let Some(plugin) = &laws[0].plugin {
             plugin.forget();
         }
@@ -343,17 +347,18 @@ impl Patches {
         self.sides.clear();
         self.prints = false;
         for port in step.ports {
-            let patch = self.read_port(port, step, ground, laws);
+            let patch = self.read_port(port, step, ground, laws)?;
             self.ports.push(patch);
         }
         self.share_nodes(step);
         for p in 0..self.ports.len() {
-            self.evaluate_at_rest(p);
+            self.evaluate_at_rest(p)?;
         }
         self.built_for = Some(key);
+        Ok(())
     }
 
-    fn read_port(&mut self, port: &Port, step: &Step, ground: &Ground, laws: &[Laws]) -> Patch {
+    fn read_port(&mut self, port: &Port, step: &Step, ground: &Ground, laws: &[Laws]) -> Result<Patch> {
         let first = self.nodes.index.len();
         let n_z = port.frame[2];
         for node in port.nodes(step.nodes) {
@@ -365,10 +370,10 @@ impl Patches {
         let found = || Wheel::find(&self.nodes, range.clone(), spacing, recall(&ground.wheels, port.key));
         let wheel = (port.extent[0] > 0.0 && port.extent[1] > 0.0).then(found).flatten();
         let b = Size::of(&self.nodes, range.clone(), spacing).b(spacing);
-        let (local, friction) = self.local_laws(laws, wheel.as_ref(), b, range.clone());
+        let (local, friction) = self.local_laws(laws, wheel.as_ref(), b, range.clone())?;
         let mut wall = Wall::none(port, recall(&ground.pushes, port.key));
         self.bear(&laws[0].direction, &wall, b, range.clone());
-        self.start(range.clone());
+        self.start(range.clone())?;
         if laws[0].direction.passive_pressure {
             let law = &self.laws[local.start];
             let beside = Beside {
@@ -382,19 +387,29 @@ impl Patches {
             let pressed = |k: usize| {
                 if self.law(k).curve.keeper().is_some() {
                     // what a law with a state would yield at is its own affair
-                    return if self.nodes.before[k] > 0.0 { 1.0 } else { 0.0 };
+                    return Ok(if self.nodes.before[k] > 0.0 { 1.0 } else { 0.0 });
                 }
-                let (p, yields) = (self.pressure(k, self.nodes.depth[k]).0, self.nodes.bound[k]);
-                if p <= 0.0 {
+                let (p, yields) = (self.pressure(k, self.nodes.depth[k])?.0, self.nodes.bound[k]);
+                Ok(if p <= 0.0 {
                     0.0
                 } else if yields > p {
                     p / yields
                 } else {
                     1.0
-                }
+                })
             };
-            wall::gather(&self.nodes, range.clone(), n_z, &beside, pressed, &mut rows, &mut sides, &mut wall);
+            let gathered = wall::gather(
+                &self.nodes,
+                range.clone(),
+                n_z,
+                &beside,
+                pressed,
+                &mut rows,
+                &mut sides,
+                &mut wall,
+            );
             (self.rows, self.sides) = (rows, sides);
+            gathered?;
             if let Some(wheel) = &wheel {
                 // a rim pushes with its axle, however it turns
                 wall.arm = [wheel.radius, 0.0, 0.0];
@@ -402,7 +417,7 @@ impl Patches {
         }
         if let Some(wheel) = &wheel {
             if let Some(shift) = wheel.shift(&laws[0].rolling, &self.nodes, range.clone()) {
-                self.shift_peak(wheel, &shift, range.clone());
+                self.shift_peak(wheel, &shift, range.clone())?;
             }
         }
         // under a rim the soil flows by
@@ -412,7 +427,7 @@ impl Patches {
         });
         let mut place = [None; 6];
         port.components().for_each(|(i, c)| place[c] = Some(i));
-        Patch {
+        Ok(Patch {
             nodes: range,
             place,
             slope: n_z,
@@ -426,7 +441,7 @@ impl Patches {
             pull: 0.0,
             wall,
             cone: cone.flatten(),
-        }
+        })
     }
 
     /// What the nodes in `range` bear of the pressure of first loading, and beside it: less on inclined faces, less under
@@ -471,8 +486,8 @@ impl Patches {
     /// come over from the side bears at once what its depth asks for, as far as [`Patches::affordable`] goes, and what drives
     /// the foot pays for it; the rest bears what it is pressed down from there. A body that is inside the ground at the very
     /// start stands in its own print: it was pressed there before, and bears what it is pressed down from there.
-    fn start(&mut self, range: std::ops::Range<usize>) {
-        let share = self.affordable(range.clone());
+    fn start(&mut self, range: std::ops::Range<usize>) -> Result {
+        let share = self.affordable(range.clone())?;
         for k in range {
             let (n, law) = (&self.nodes, self.law(k));
             if law.curve.keeper().is_some() {
@@ -493,7 +508,7 @@ impl Patches {
             if depth <= permanent {
                 continue;
             }
-            let (elastic, yields) = (k_u * (depth - permanent), self.yields(k, depth).0);
+            let (elastic, yields) = (k_u * (depth - permanent), self.yields(k, depth)?.0);
             let begins = self.begins;
             let n = &mut self.nodes;
             n.bound[k] = if elastic <= yields { yields } else { f64::NEG_INFINITY };
@@ -509,14 +524,15 @@ impl Patches {
             n.entered[k] = true;
             n.permanent[k] = depth - share.sqrt() * elastic.min(yields) / k_u;
         }
+        Ok(())
     }
 
     /// Part of the elastic energy that nodes and areas in `range` bring which the foot has come over from the side: no more than
     /// this contact holds already, and nothing while the soil owes energy. (A face of a corner that turns through the
     /// vertical covers whole cells at once.)
-    fn affordable(&self, range: std::ops::Range<usize>) -> f64 {
+    fn affordable(&self, range: std::ops::Range<usize>) -> Result<f64> {
         if self.in_debt {
-            return 0.0;
+            return Ok(0.0);
         }
         let (mut held, mut brought) = (0.0, 0.0);
         for k in range {
@@ -531,10 +547,10 @@ impl Patches {
                 brought += (1.0 - n.loaded_part[k]) * now;
             } else if n.depth[k] > n.permanent[k] {
                 let elastic = curve.unloading() * (n.depth[k] - n.permanent[k]);
-                brought += energy(elastic.min(self.yields(k, n.depth[k]).0));
+                brought += energy(elastic.min(self.yields(k, n.depth[k])?.0));
             }
         }
-        if brought > held { held / brought } else { 1.0 }
+        Ok(if brought > held { held / brought } else { 1.0 })
     }
 
     /// Makes the laws of the soils under a contact of size `b` (m), and lets its nodes, which know the number of their soil,
@@ -545,7 +561,7 @@ impl Patches {
         wheel: Option<&Wheel>,
         b: f64,
         nodes: std::ops::Range<usize>,
-    ) -> (std::ops::Range<usize>, f64) {
+    ) -> Result<(std::ops::Range<usize>, f64)> {
         let present = match laws {
             [_] => 1,
             _ => nodes.clone().fold(0_u64, |set, k| set | 1 << self.nodes.law[k]),
@@ -554,33 +570,34 @@ impl Patches {
         for (_, of) in laws.iter().enumerate().filter(|(r, _)| present >> r & 1 == 1) {
             let (curve, shear) = match wheel {
                 Some(w) => (
-                    of.pressure.curve_in_slip(b, of.elastic, &of.rolling.sinkage, w.memory.slip),
+                    of.pressure.curve_in_slip(b, of.elastic, &of.rolling.sinkage, w.memory.slip)?,
                     of.shear.travelling(w.heading, of.rolling.across),
                 ),
-                None => (of.pressure.curve(b, of.elastic), of.shear.clone()),
+                None => (of.pressure.curve(b, of.elastic)?, of.shear.clone()),
             };
-            friction = friction.max(of.shear.friction);
+            friction = friction.max(of.shear.friction());
             let Laws { adhesion, passive, cohesive, inclination, loose, .. } = *of;
             self.laws.push(Local { curve, shear, adhesion, passive, cohesive, inclination, loose });
         }
         for number in &mut self.nodes.law[nodes] {
             *number = first + (present & ((1 << *number) - 1)).count_ones() as usize;
         }
-        (first..self.laws.len(), friction)
+        Ok((first..self.laws.len(), friction))
     }
 
     /// Takes the soil behind the peak of a wheel's stress as if it were less deep, and first loaded there.
-    fn shift_peak(&mut self, wheel: &Wheel, shift: &Shift, range: std::ops::Range<usize>) {
+    fn shift_peak(&mut self, wheel: &Wheel, shift: &Shift, range: std::ops::Range<usize>) -> Result {
         for k in range {
             let Some(relief) = wheel.relief(shift, self.nodes.arm[k]) else { continue };
             let depth = self.nodes.depth[k] - relief;
-            let (p, k_u) = (self.yields(k, depth).0, self.law(k).curve.unloading());
+            let (p, k_u) = (self.yields(k, depth)?.0, self.law(k).curve.unloading());
             let n = &mut self.nodes;
             n.relief[k] = relief;
             n.depth[k] = depth;
             n.permanent[k] = shift.before.max(depth - p / k_u);
             (n.bound[k], n.entered[k]) = (f64::NEG_INFINITY, false);
         }
+        Ok(())
     }
 
     fn read_node(&mut self, port: &Port, node: &Node, ground: &Ground, laws: &[Laws]) {
@@ -636,12 +653,13 @@ impl Patches {
         }
     }
 
-    fn evaluate_at_rest(&mut self, p: usize) {
-        let (force, strength) = self.at_rest(p);
+    fn evaluate_at_rest(&mut self, p: usize) -> Result {
+        let (force, strength) = self.at_rest(p)?;
         let pull = self.pull(p);
         let surface = if force[0] != 0.0 { 0.0 } else { self.highest(p).clamp(-FAR, 0.0) };
         let patch = &mut self.ports[p];
         (patch.force, patch.strength, patch.surface, patch.pull) = (force, strength, surface, pull);
+        Ok(())
     }
 
     /// How far the foot of patch `p` is below where it just touches, along n, m.

@@ -156,13 +156,12 @@ impl<M: Material> FieldSoil<M> {
         }
         self.patches.in_debt = self.book.owed > 0.0;
         self.patches.begins = self.book.stamp == 0;
-        self.patches.build(step, &self.ground, &self.laws);
-        self.plugin.as_ref().map_or(Ok(()), PluginLaw::check)
+        self.patches.build(step, &self.ground, &self.laws)
     }
 
-    /// The end of a trial: whether a module that is the law has answered for the whole step.
+    /// The end of a trial: whether a module that is the law can answer for the whole step.
     fn answered(&self, step: &Step) -> Result {
-        self.plugin.as_ref().map_or(Ok(()), |plugin| plugin.finish(step.t))
+        self.plugin.as_ref().map_or(Ok(()), |plugin| plugin.reaches(step.t))
     }
 
     /// Fills x, v, a with the committed surface: along n as `set_ports` says, at rest otherwise.
@@ -255,7 +254,7 @@ fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>, plugin: Option<&
                     "`slip_sinkage` acts on power laws, and `law.pressure` is none; it must be \"none\" here";
                 return Err(Error::Refused(text.into()));
             }
-            laws.take_pressure(PressureLaw::Expression(law), p);
+            laws.take_pressure(PressureLaw::Expression(law), p)?;
         }
         if let Some(law) = texts.shear(p)? {
             laws.shear = laws.shear.with_expression(law);
@@ -264,24 +263,24 @@ fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>, plugin: Option<&
     if let Some(law) = plugin {
         law.begin(0.0);
         if law.has_pressure() {
-            laws.take_pressure(PressureLaw::Plugin(law.clone()), p);
+            laws.take_pressure(PressureLaw::Plugin(law.clone()), p)?;
             // as the built-in laws are looked at: one that says nothing sensible here never will
-            laws.pressure.curve(TYPICAL_SIZE, laws.elastic);
+            laws.pressure.curve(TYPICAL_SIZE, laws.elastic)?;
         }
         if law.has_shear() {
-            laws.shear = laws.shear.with_plugin(law.clone());
+            laws.shear = laws.shear.with_plugin(law.clone())?;
         }
-        law.check()?;
     }
     Ok(laws)
 }
 
 impl Laws {
     /// A pressure law takes the place of the built-in one, and the soil springs back as it does where nobody says how.
-    fn take_pressure(&mut self, law: PressureLaw, p: &SoilParameters) {
-        self.elastic = p.elastic_stiffness_pa_m.unwrap_or_else(|| law.unloading());
+    fn take_pressure(&mut self, law: PressureLaw, p: &SoilParameters) -> Result {
+        self.elastic = p.elastic_stiffness_pa_m.map_or_else(|| law.unloading(), Ok)?;
         self.shear = self.shear.above(self.elastic);
         self.pressure = law.looked_at(self.elastic);
+        Ok(())
     }
 }
 
@@ -343,7 +342,7 @@ impl<M: Material> Subsystem for FieldSoil<M> {
 
     fn solve_compatibility(&mut self, step: &Step, estimate: &Estimate, out: &mut Response) -> Result {
         self.build(step)?;
-        let left = self.compatibility.solve(&self.patches, step.n as usize, estimate);
+        let left = self.compatibility.solve(&self.patches, step.n as usize, estimate)?;
         self.last.clear();
         out.t.copy_from_slice(&self.compatibility.t);
         out.x.copy_from_slice(&self.compatibility.x);
@@ -360,9 +359,9 @@ impl<M: Material> Subsystem for FieldSoil<M> {
     fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result {
         self.build(step)?;
         match input {
-            Input::Motion(motion) => self.last.motion(&mut self.patches, motion, out),
+            Input::Motion(motion) => self.last.motion(&mut self.patches, motion, out)?,
             Input::Force { t, motion, .. } => {
-                self.last.force(&mut self.patches, t, motion.as_ref(), out);
+                self.last.force(&mut self.patches, t, motion.as_ref(), out)?;
             }
         }
         out.a.fill(0.0);
@@ -372,8 +371,7 @@ impl<M: Material> Subsystem for FieldSoil<M> {
 
     fn interface_jacobian(&mut self, step: &Step, level: Level, out: &mut [f64]) -> Result {
         self.build(step)?;
-        self.last.jacobian(&mut self.patches, step.n as usize, level, out)?;
-        self.plugin.as_ref().map_or(Ok(()), PluginLaw::check)
+        self.last.jacobian(&mut self.patches, step.n as usize, level, out)
     }
 
     fn commit(&mut self, step: &Step, t: &[f64], partner: &Motion) -> Result {
@@ -384,17 +382,18 @@ impl<M: Material> Subsystem for FieldSoil<M> {
         let prints = self.patches.prints;
         let scene = bookkeeping::Scene { patches: &self.patches, h: step.h };
         let heat = self.book.dissipated;
-        scene.commit(step.ports, t, partner.x, &mut self.ground, &mut self.lists, &mut self.book);
+        let taken = scene.commit(step.ports, t, partner.x, &mut self.ground, &mut self.lists, &mut self.book);
+        self.patches.forget();
+        self.last.clear();
+        taken?;
         // the prints in which bodies stand at the start were made before
         let most = if prints { f64::INFINITY } else { self.book.dissipated - heat - self.book.owed };
         let lifted = self.material.settle(&mut self.ground, &self.lists.covered, most, step.h);
         let lifted = if prints { 0.0 } else { lifted };
         self.book.lifted += lifted;
         self.book.pay(lifted, heat);
-        self.patches.forget();
-        self.last.clear();
         self.watch_range();
-        self.plugin.as_ref().map_or(Ok(()), PluginLaw::check)
+        Ok(())
     }
 
     fn save_state(&mut self, slot: u32) -> Result {

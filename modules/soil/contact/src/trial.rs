@@ -35,43 +35,57 @@ impl Last {
     }
 
     /// The law's whole wrench at the foot's motion; the surface follows the foot where it is pressed.
-    pub fn motion(&mut self, patches: &mut Patches, motion: &Motion, out: &mut Response) {
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
+    pub fn motion(&mut self, patches: &mut Patches, motion: &Motion, out: &mut Response) -> Result {
         self.clear();
         self.kind = Kind::Motion;
         out.v.fill(0.0);
         for p in 0..patches.ports.len() {
             let x = patches.ports[p].unpack(motion.x);
-            let wrench = patches.wrench(p, &x);
+            let wrench = patches.wrench(p, &x)?;
             let mut surface = x;
             if wrench[0] != 0.0 {
                 patches.ports[p].pack(&patches.ports[p].unpack(motion.v), out.v);
             } else {
-                surface[0] = patches.surface_under(p, 0.0, &x);
+                surface[0] = patches.surface_under(p, 0.0, &x)?;
             }
             patches.ports[p].pack(&surface, out.x);
             patches.ports[p].pack(&wrench, out.t);
             self.x.push(x);
             self.normal.push(wrench[0]);
         }
+        Ok(())
     }
 
     /// The surface under the normal forces of `t`; the other components of the wrench follow from the motion of the
     /// foot where it is known, from a foot at rest otherwise.
-    pub fn force(&mut self, patches: &mut Patches, t: &[f64], motion: Option<&Motion>, out: &mut Response) {
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
+    pub fn force(
+        &mut self,
+        patches: &mut Patches,
+        t: &[f64],
+        motion: Option<&Motion>,
+        out: &mut Response,
+    ) -> Result {
         self.clear();
         self.kind = if motion.is_some() { Kind::Hybrid } else { Kind::Force };
         out.v.fill(0.0);
         for p in 0..patches.ports.len() {
             let force = patches.ports[p].unpack(t)[0].max(-patches.ports[p].pull);
             let mut x = motion.map_or([0.0; 6], |m| patches.ports[p].unpack(m.x));
-            x[0] = patches.surface_under(p, force, &x);
-            let mut wrench = patches.wrench(p, &x);
+            x[0] = patches.surface_under(p, force, &x)?;
+            let mut wrench = patches.wrench(p, &x)?;
             wrench[0] = force;
             patches.ports[p].pack(&x, out.x);
             patches.ports[p].pack(&wrench, out.t);
             self.x.push(x);
             self.normal.push(force);
         }
+        Ok(())
     }
 
     /// Derivatives at the last trial as [`terraglue_subsystem::Subsystem::interface_jacobian`] defines them. With
@@ -86,10 +100,10 @@ impl Last {
             _ => return Err(Error::Unsupported),
         }
         for p in 0..self.x.len() {
-            let k = patches.stiffness(p, &self.x[p]);
+            let k = patches.stiffness(p, &self.x[p])?;
             let block = match self.kind {
                 Kind::Motion => k,
-                kind => hybrid(&k, self.normal_stiffness(patches, p, &k), kind == Kind::Hybrid),
+                kind => hybrid(&k, self.normal_stiffness(patches, p, &k)?, kind == Kind::Hybrid),
             };
             scatter(&patches.ports[p], &block, n, out);
         }
@@ -97,13 +111,13 @@ impl Last {
     }
 
     /// dW_n/dX_n, that of a small force where the foot carries none.
-    fn normal_stiffness(&self, patches: &mut Patches, p: usize, k: &Stiffness) -> f64 {
+    fn normal_stiffness(&self, patches: &mut Patches, p: usize, k: &Stiffness) -> Result<f64> {
         if self.normal[p].abs() >= SMALLEST_FORCE_N && k[0][0] > 0.0 {
-            return k[0][0];
+            return Ok(k[0][0]);
         }
         let mut x = self.x[p];
-        x[0] = patches.surface_under(p, SMALLEST_FORCE_N, &x);
-        patches.normal_force(p, &x)[1]
+        x[0] = patches.surface_under(p, SMALLEST_FORCE_N, &x)?;
+        Ok(patches.normal_force(p, &x)?[1])
     }
 }
 

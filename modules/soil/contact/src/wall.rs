@@ -9,7 +9,7 @@ use crate::assemble::{displacement, dot};
 use crate::contact_memory::Remembered;
 use crate::patch::PatchNodes;
 use terraglue_ground::Lattice;
-use terraglue_subsystem::Port;
+use terraglue_subsystem::{Port, Result};
 
 /// How far a contact has pushed the soil beside it, elastically. Part of the committed state.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
@@ -203,11 +203,11 @@ pub fn gather(
     range: std::ops::Range<usize>,
     n_z: f64,
     beside: &Beside,
-    pressed: impl Fn(usize) -> f64,
+    pressed: impl Fn(usize) -> Result<f64>,
     rows: &mut Rows,
     sides: &mut Vec<Side>,
     wall: &mut Wall,
-) {
+) -> Result {
     let first = sides.len();
     let spacing = beside.lattice.spacing;
     rows.list(nodes, range.clone());
@@ -215,7 +215,7 @@ pub fn gather(
     let (mut arm, mut sum, mut face) = ([0.0; 3], 0.0, 0.0);
     let covered = |k: Option<usize>| k.map_or(0.0, |k| nodes.area[k] * n_z / (spacing * spacing));
     for k in range {
-        let part = pressed(k);
+        let part = pressed(k)?;
         if part <= 0.0 || nodes.area[k] <= 0.0 {
             continue;
         }
@@ -263,6 +263,7 @@ pub fn gather(
         wall.way = sum / face / beside.stiffness;
         wall.turn_about_middle(&mut sides[first..], &rows.places, sum);
     }
+    Ok(())
 }
 
 /// Where the rows of a patch begin; the storage is reused.

@@ -7,19 +7,22 @@
 //! bears s·κ·V of its own depth, with a modulus that is a part κ of the bed's (Terzaghi 1943, art. 46): the larger of both.
 
 use crate::patch::{Local, Patches};
+use terraglue_subsystem::Result;
 
 impl Patches {
     /// Pressure (Pa) at which node k yields at the depth z (m), and its slope (Pa/m).
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
     #[inline]
-    pub fn yields(&self, k: usize, z: f64) -> (f64, f64) {
+    pub fn yields(&self, k: usize, z: f64) -> Result<(f64, f64)> {
         let law = self.law(k);
-        let p = law.curve.virgin(z);
-        let bed = (p, law.curve.virgin_slope(z, p));
-        let loose = self.nodes.above_bed(k, z).map(|d| {
-            let p = law.curve.virgin(d);
-            (p, law.curve.virgin_slope(d, p))
-        });
-        self.yields_from(k, z, bed, loose, law)
+        let bed = law.curve.first_loading(z)?;
+        let loose = match self.nodes.above_bed(k, z) {
+            Some(d) => Some(law.curve.first_loading(d)?),
+            None => None,
+        };
+        Ok(self.yields_from(k, z, bed, loose, law))
     }
 
     /// The same where first loading of the bed, and of a bed in the place of the loose soil, are known.
@@ -54,18 +57,21 @@ impl Patches {
 
     /// Pressure at node k when the foot is at depth z there, and its slope. Soil that was in contact and clings follows the
     /// elastic line below zero down to the tension that it bears, then lets go.
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
     #[inline]
-    pub fn pressure(&self, k: usize, z: f64) -> (f64, f64) {
+    pub fn pressure(&self, k: usize, z: f64) -> Result<(f64, f64)> {
         let (n, k_u) = (&self.nodes, self.law(k).curve.unloading());
         let elastic = k_u * (z - n.permanent[k]);
         if elastic <= 0.0 {
-            return self.clinging_at(k, z);
+            return Ok(self.clinging_at(k, z));
         }
         if elastic <= n.bound[k] {
-            return (elastic, k_u);
+            return Ok((elastic, k_u));
         }
-        let yields = self.yields(k, z);
-        if elastic <= yields.0 { (elastic, k_u) } else { yields }
+        let yields = self.yields(k, z)?;
+        Ok(if elastic <= yields.0 { (elastic, k_u) } else { yields })
     }
 
     /// Tension at node k above the unloaded surface, Pa (< 0), and its slope.

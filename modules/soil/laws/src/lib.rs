@@ -1,31 +1,56 @@
 //! Pressure and shear laws of soils with tangents and inverses, evaluated over batches of nodes.
 //!
-//! No grid, no bodies: a node is a depth, a largest depth and a shear displacement. What lies around it is the
-//! business of whoever calls. SI units; depths and pressures grow into the soil, pressure is never negative.
+//! A node is a depth, a largest depth and a shear displacement; what lies around it is the business of whoever calls. SI
+//! units; depths and pressures grow into the soil, pressure is never negative.
+//!
+//! * Pressure and sinkage: the trait [`PressureSinkage`], one file per law (`bekker.rs`, `reece.rs`, `bearing_capacity.rs`);
+//!   [`PressureCurve`] adds elastic unloading, and slip sinkage is in `slip_sinkage.rs`.
+//! * Shear: the trait [`ShearStrength`], `janosi_hanamoto.rs`; [`ShearLaw`] makes it elastic–plastic.
+//! * Laws as text ([`expression`]) and laws as modules ([`PluginLaw`]) implement the same traits.
+//!
+//! Laws answer by [`Result`](terraglue_subsystem::Result): only a module can fail.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
+mod advice;
 mod batch;
+mod bearing_capacity;
+mod bekker;
+mod build_up;
 pub mod expression;
-pub mod fit;
+mod inverse;
+mod janosi_hanamoto;
 mod parameters;
 mod plugin;
-mod pressure;
+mod pressure_curve;
+mod pressure_sinkage;
+mod reece;
 mod rolling;
 mod shear;
+mod shear_strength;
 mod slip_sinkage;
 mod straight;
 pub mod strength;
-mod table;
 mod yielding;
 
+pub use advice::advice;
 pub use batch::first_loading;
+pub use bearing_capacity::BearingCapacity;
+pub use bekker::Bekker;
 pub use expression::{ExpressionError, PressureExpression, ShearExpression, SoilExpressions};
+pub use janosi_hanamoto::JanosiHanamoto;
 pub use parameters::{DEFAULT_DENSITY, Direction, Family, SoilParameters};
-pub use plugin::{KeptNodes, PluginLaw};
-pub use pressure::{PRESSURE_LAWS, PressureCurve, PressureLaw};
+pub use plugin::{KeptNodes, PluginLaw, PluginShear};
+pub use pressure_curve::PressureCurve;
+pub use pressure_sinkage::{FirstLoading, PRESSURE_LAWS, PressureLaw, PressureSinkage};
+pub use reece::Reece;
 pub use rolling::{Rolling, SLIP_SINKAGES};
 pub use shear::{ShearLaw, ShearResponse, ShearState, Travel};
+pub use shear_strength::{ShearStrength, StrengthLaw, YieldAnswer, YieldNodes};
 pub use slip_sinkage::SlipSinkage;
 pub use straight::{DEEPEST_TESTED, SMALL_CONTACT, Softened};
 pub use strength::Strength;
-pub use table::{COLUMNS, SoilRow, SoilTable, TableError};
 pub use yielding::Sheared;

@@ -1,7 +1,10 @@
 //! The numbers of one soil and the laws made from them.
 
+use crate::bearing_capacity::BearingCapacity;
+use crate::bekker::Bekker;
 use crate::expression::SoilExpressions;
-use crate::pressure::{PRESSURE_LAWS, PressureLaw};
+use crate::pressure_sinkage::{PRESSURE_LAWS, PressureLaw};
+use crate::reece::Reece;
 use crate::rolling::Rolling;
 use crate::shear::ShearLaw;
 use crate::strength::Strength;
@@ -107,16 +110,16 @@ impl Direction {
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum Family {
-    /// [`PressureLaw::Bekker`] with `k_c` and `k_phi`.
+    /// [`Bekker`] with `k_c` and `k_phi`.
     Bekker,
-    /// [`PressureLaw::Reece`] with the dimensionless k_c' and k_φ'.
+    /// [`Reece`] with the dimensionless k_c' and k_φ'.
     Reece {
         /// k_c'.
         k_c: f64,
         /// k_φ'.
         k_phi: f64,
     },
-    /// [`PressureLaw::Bearing`].
+    /// [`BearingCapacity`].
     Bearing {
         /// N_c at the reference depth.
         n_c: f64,
@@ -154,7 +157,8 @@ impl Default for SoilParameters {
 }
 
 impl SoilParameters {
-    /// What a module that uses these laws takes from its scenario table.
+    /// What a module that uses these laws takes from its scenario table. The usual spans are those of `models/soils.csv`,
+    /// widened by about three.
     pub fn schema() -> Vec<Parameter> {
         let number = |name, unit: &str, help| Parameter {
             unit: unit.into(),
@@ -164,8 +168,14 @@ impl SoilParameters {
         let mut parameters = vec![
             text("pressure_law", "pressure-sinkage law").or(PRESSURE_LAWS[0]).choices(&PRESSURE_LAWS),
             number("n", "", "exponent of the pressure-sinkage law").within(0.05, 3.0),
-            number("k_c", "", "bekker: cohesive modulus, N/m^(n+1)").within(0.0, 1e9).optional(),
-            number("k_phi", "", "bekker: frictional modulus, N/m^(n+2)").within(0.0, 1e12).optional(),
+            number("k_c", "", "bekker: cohesive modulus, N/m^(n+1)")
+                .within(0.0, 1e9)
+                .optional()
+                .usually("N/m^(n+1)", 20.0, 3e5),
+            number("k_phi", "", "bekker: frictional modulus, N/m^(n+2)")
+                .within(0.0, 1e12)
+                .optional()
+                .usually("N/m^(n+2)", 1.5e4, 2.5e7),
             number("k_c_prime", "", "reece: k_c' of (c k_c' + gamma b k_phi') (z/b)^n")
                 .within(0.0, 1e9)
                 .optional(),
@@ -174,8 +184,10 @@ impl SoilParameters {
                 .within(0.0, 1e9)
                 .optional(),
             number("N_gamma", "", "bearing: N_gamma").within(0.0, 1e9).optional(),
-            Parameter::number("reference_depth_m", "m", 0.1, "bearing: reference depth z_r").positive(),
-            number("c_pa", "Pa", "cohesion").within(0.0, 1e7),
+            Parameter::number("reference_depth_m", "m", 0.1, "bearing: reference depth z_r")
+                .positive()
+                .usually("m", 0.005, 2.0),
+            number("c_pa", "Pa", "cohesion").within(0.0, 1e7).usually("Pa", 100.0, 2e5),
             number(
                 "wall_cohesion_pa",
                 "Pa",
@@ -184,8 +196,13 @@ impl SoilParameters {
             .within(0.0, 1e7)
             .optional(),
             number("phi_rad", "rad", "angle of internal friction").within(0.01, 1.2),
-            number("K_m", "m", "shear deformation modulus of Janosi and Hanamoto").positive(),
-            number("density_kg_m3", "kg/m^3", "bulk density").positive().optional(),
+            number("K_m", "m", "shear deformation modulus of Janosi and Hanamoto")
+                .positive()
+                .usually("m", 0.002, 0.12),
+            number("density_kg_m3", "kg/m^3", "bulk density")
+                .positive()
+                .optional()
+                .usually("kg/m^3", 100.0, 3500.0),
             number(
                 "elastic_stiffness_pa_m",
                 "Pa/m",
@@ -219,14 +236,16 @@ impl SoilParameters {
                 "shear strength between feet and soil without pressure; c_pa where absent",
             )
             .within(0.0, 1e7)
-            .optional(),
+            .optional()
+            .usually("Pa", 10.0, 2e5),
             number(
                 "adhesion_pa",
                 "Pa",
                 "tension with which soil clings to a foot that lifts off, until it lets go; none where absent",
             )
             .within(0.0, 1e7)
-            .optional(),
+            .optional()
+            .usually("Pa", 10.0, 2e5),
             number(
                 "added_mass",
                 "",
@@ -322,7 +341,7 @@ impl SoilParameters {
             let text = "`gravity_scaling` needs `measured_gravity_m_s2`: the gravity under which `k_phi` was measured";
             return Err(Error::Refused(text.into()));
         }
-        let modulus = self.pressure().curve(0.1, STIFF).virgin(0.01);
+        let modulus = self.pressure().curve(0.1, STIFF)?.virgin(0.01)?;
         if modulus.is_finite() && modulus > 0.0 {
             return Ok(());
         }
@@ -354,24 +373,23 @@ impl SoilParameters {
         match self.family {
             Family::Bekker => {
                 let k_phi = self.k_phi * self.gravity_factor();
-                PressureLaw::Bekker { k_c: self.k_c, k_phi, n: self.n }
+                PressureLaw::Bekker(Bekker { k_c: self.k_c, k_phi, n: self.n })
             }
             Family::Reece { k_c, k_phi } => {
-                PressureLaw::Reece { cohesive: self.c_pa * k_c, frictional: weight * k_phi, n: self.n }
+                let (cohesive, frictional) = (self.c_pa * k_c, weight * k_phi);
+                PressureLaw::Reece(Reece { cohesive, frictional, n: self.n })
             }
-            Family::Bearing { n_c, n_gamma, reference } => PressureLaw::Bearing {
-                cohesive: self.c_pa * n_c,
-                frictional: weight * n_gamma,
-                reference,
-                n: self.n,
-            },
+            Family::Bearing { n_c, n_gamma, reference } => {
+                let (cohesive, frictional) = (self.c_pa * n_c, weight * n_gamma);
+                PressureLaw::BearingCapacity(BearingCapacity { cohesive, frictional, reference, n: self.n })
+            }
         }
     }
 
     /// Stiffness of unloading and reloading, Pa/m.
     pub fn unloading(&self) -> f64 {
-        let own = || self.pressure().unloading();
-        // a law that the scenario writes as text may leave the built-in one without numbers
+        // built-in laws always answer; one that the scenario writes as text may leave them without numbers
+        let own = || self.pressure().unloading().unwrap_or(0.0);
         self.elastic_stiffness_pa_m.unwrap_or_else(own).max(1.0)
     }
 

@@ -1,20 +1,24 @@
-//! A law that comes as a module of its own, in use by one soil: calls over nodes, and what went wrong in them.
+//! A law that comes as a module of its own, in use by one soil: calls over nodes, and checks of what comes back.
 //!
-//! The soil's own functions answer numbers, not results. A law that fails or answers what no soil does is remembered here
-//! with the first reason, its answer counts as zero, and the soil asks [`PluginLaw::finish`] at the end of its call.
+//! A law that fails, or answers what no soil does, is an error of the call in which it did. How long a step the law can answer
+//! for is no failure: the smallest of its answers is kept until the end of a trial, see [`PluginLaw::reaches`].
 
+use crate::build_up::{built_up, cohesion_and_friction};
+use crate::pressure_sinkage::{FirstLoading, PressureSinkage};
+use crate::shear_strength::{ShearStrength, YieldAnswer, YieldNodes, build_up};
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering::Relaxed};
-use std::sync::{Arc, Mutex, PoisonError};
-use terraglue_subsystem::{Error, NodeLaw, PressureAnswer, PressureNodes, Result, ShearAnswer, ShearNodes};
+use terraglue_subsystem::{
+    Error, MOST_LAW_STATE, NodeLaw, PressureAnswer, PressureNodes, Result, ShearAnswer, ShearNodes,
+};
 
 struct InUse {
     law: Arc<dyn NodeLaw>,
     h: AtomicU64,
     longest: AtomicU64,
-    trouble: Mutex<Option<Error>>,
 }
 
-/// A law module in the hands of a soil. Copies share what went wrong.
+/// A law module in the hands of a soil. Copies share the length of the step.
 #[derive(Clone)]
 pub struct PluginLaw {
     used: Arc<InUse>,
@@ -39,19 +43,13 @@ impl PluginLaw {
     /// Takes a law into use.
     pub fn new(law: Arc<dyn NodeLaw>) -> Self {
         let (h, longest) = (AtomicU64::new(0), AtomicU64::new(f64::INFINITY.to_bits()));
-        let used = Arc::new(InUse { law, h, longest, trouble: Mutex::new(None) });
+        let used = Arc::new(InUse { law, h, longest });
         Self { used, gentle_at: None }
     }
 
     /// The same law, whose slopes are known to stay below `k_u` (Pa/m) beyond the elastic limit.
     pub(crate) fn gentle_at(self, k_u: f64) -> Self {
         Self { gentle_at: Some(k_u), ..self }
-    }
-
-    /// Whether that is known.
-    #[inline]
-    pub(crate) fn is_gentle_at(&self, k_u: f64) -> bool {
-        self.gentle_at == Some(k_u)
     }
 
     /// Name, for messages.
@@ -85,20 +83,11 @@ impl PluginLaw {
         self.used.longest.store(f64::INFINITY.to_bits(), Relaxed);
     }
 
-    /// Whether the law has answered.
+    /// Whether the law can answer for the whole step, which starts at `t` (s).
     ///
     /// # Errors
-    /// Its first failure since this was asked last.
-    pub fn check(&self) -> Result {
-        self.used.trouble.lock().unwrap_or_else(PoisonError::into_inner).take().map_or(Ok(()), Err)
-    }
-
-    /// Whether the law has answered for the whole step, which starts at `t` (s).
-    ///
-    /// # Errors
-    /// Its failure, or [`Error::Discard`] with the time that it can reach.
-    pub fn finish(&self, t: f64) -> Result {
-        self.check()?;
+    /// [`Error::Discard`] with the time that it can reach.
+    pub fn reaches(&self, t: f64) -> Result {
         let (h, longest) = (self.h(), f64::from_bits(self.used.longest.load(Relaxed)));
         if longest < h { Err(Error::Discard { reached: t + longest.max(0.0) }) } else { Ok(()) }
     }
@@ -117,25 +106,19 @@ impl PluginLaw {
     }
 
     #[cold]
-    fn fail(&self, error: Error) {
-        self.used.trouble.lock().unwrap_or_else(PoisonError::into_inner).get_or_insert(error);
-    }
-
-    #[cold]
-    fn impossible(&self, what: String) {
-        self.fail(Error::Failed(format!("[TG15] the law `{}`: {what}", self.name())));
+    fn impossible<T>(&self, what: &str) -> Result<T> {
+        Err(Error::Failed(format!("[TG15] the law `{}`: {what}", self.name())))
     }
 
     /// First loading at one depth by a law without state: pressure, slope.
     #[inline]
-    pub(crate) fn at(&self, b: f64, z: f64) -> (f64, f64) {
+    pub(crate) fn at(&self, b: f64, z: f64) -> Result<(f64, f64)> {
         let (mut p, mut slope) = ([0.0], [0.0]);
-        self.first_loading(b, &[z], &mut p, &mut slope);
-        (p[0], slope[0])
+        self.first_loading(b, &[z], &mut p, &mut slope)?;
+        Ok((p[0], slope[0]))
     }
 
-    /// First loading of nodes by a law without state, to look at it: where it has no answer there is NaN, and nothing of it
-    /// is remembered.
+    /// First loading of nodes by a law without state, to look at it: where it has no answer there is NaN.
     pub(crate) fn look(&self, b: f64, depth: &[f64], p: &mut [f64], slope: &mut [f64]) {
         p.fill(f64::NAN);
         slope.fill(f64::NAN);
@@ -155,21 +138,31 @@ impl PluginLaw {
 
     /// First loading of nodes by a law without state.
     #[inline]
-    pub(crate) fn first_loading(&self, b: f64, depth: &[f64], p: &mut [f64], slope: &mut [f64]) {
+    pub(crate) fn first_loading(&self, b: f64, depth: &[f64], p: &mut [f64], slope: &mut [f64]) -> Result {
         let nodes = PressureNodes { b, h: self.h(), depth, ..PressureNodes::default() };
-        self.answer(&nodes, p, slope, &mut [], &mut []);
+        self.answer(&nodes, p, slope, &mut [], &mut [])
     }
 
     /// Pressures, slopes, unloaded surfaces and new states by a law with a state.
-    pub fn kept(&self, b: f64, nodes: &KeptNodes, [p, slope, permanent]: [&mut [f64]; 3], state: &mut [f64]) {
+    ///
+    /// # Errors
+    /// The law has failed, or answered what no soil does.
+    pub fn kept(
+        &self,
+        b: f64,
+        nodes: &KeptNodes,
+        [p, slope, permanent]: [&mut [f64]; 3],
+        state: &mut [f64],
+    ) -> Result {
         let KeptNodes { depth, permanent: unloaded, slip, state: committed } = *nodes;
         let nodes = PressureNodes { b, h: self.h(), depth, permanent: unloaded, slip, state: committed };
-        self.answer(&nodes, p, slope, permanent, state);
-        if let Some(k) = permanent.iter().chain(&*state).position(|x| !x.is_finite()) {
-            let what = if k < permanent.len() { "depth of the unloaded surface" } else { "state" };
-            self.impossible(format!("a {what} is not a finite number"));
-            permanent.copy_from_slice(unloaded);
-            state.copy_from_slice(committed);
+        self.answer(&nodes, p, slope, permanent, state)?;
+        match permanent.iter().chain(&*state).position(|x| !x.is_finite()) {
+            None => Ok(()),
+            Some(k) if k < permanent.len() => {
+                self.impossible("a depth of the unloaded surface is not a finite number")
+            }
+            Some(_) => self.impossible("a state is not a finite number"),
         }
     }
 
@@ -180,61 +173,108 @@ impl PluginLaw {
         slope: &mut [f64],
         permanent: &mut [f64],
         state: &mut [f64],
-    ) {
+    ) -> Result {
         for out in [&mut *p, &mut *slope, &mut *permanent, &mut *state] {
             out.fill(f64::NAN);
         }
         let mut out = PressureAnswer { pressure: p, slope, permanent, state, longest_s: f64::INFINITY };
-        if let Err(error) = self.used.law.pressure(nodes, &mut out) {
-            self.fail(error);
-        }
+        self.used.law.pressure(nodes, &mut out)?;
         self.limit(out.longest_s);
         let good = |(p, slope): (&f64, &f64)| *p >= 0.0 && p.is_finite() && slope.is_finite();
-        if !p.iter().zip(&*slope).fold(true, |all, one| all & good(one)) {
-            if let Some(k) = p.iter().zip(&*slope).position(|one| !good(one)) {
-                let (z, b) = (nodes.depth[k], nodes.b);
-                let what = format!("pressure {} Pa, slope {} Pa/m at z = {z} m, b = {b} m", p[k], slope[k]);
-                self.impossible(what);
-            }
-            p.fill(0.0);
-            slope.fill(0.0);
+        if p.iter().zip(&*slope).fold(true, |all, one| all & good(one)) {
+            return Ok(());
         }
-    }
-
-    /// Yield stress and its derivatives at one node; `state` as committed.
-    #[inline]
-    pub(crate) fn strength(&self, pressure: f64, slip: f64, state: &[f64]) -> (f64, [f64; 2]) {
-        let (mut stress, mut by_p, mut by_slip) = ([0.0], [0.0], [0.0]);
-        let out = [&mut stress[..], &mut by_p, &mut by_slip];
-        self.strengths(&[pressure], &[slip], state, out);
-        (stress[0], [by_p[0], by_slip[0]])
+        let k = p.iter().zip(&*slope).position(|one| !good(one)).unwrap_or(0);
+        let (z, b) = (nodes.depth[k], nodes.b);
+        self.impossible(&format!("pressure {} Pa, slope {} Pa/m at z = {z} m, b = {b} m", p[k], slope[k]))
     }
 
     /// Yield stresses of nodes with their derivatives by pressure and slip.
     #[inline]
-    pub(crate) fn strengths(&self, pressure: &[f64], slip: &[f64], state: &[f64], out: [&mut [f64]; 3]) {
-        let [stress, by_pressure, by_slip] = out;
+    fn strengths(&self, nodes: &YieldNodes, out: &mut YieldAnswer) -> Result {
+        let YieldNodes { pressure, slip, kept } = *nodes;
+        let YieldAnswer { stress, by_pressure, by_slip } = out;
         for out in [&mut *stress, &mut *by_pressure, &mut *by_slip] {
             out.fill(f64::NAN);
         }
-        let nodes = ShearNodes { h: self.h(), pressure, slip, state };
+        let nodes = ShearNodes { h: self.h(), pressure, slip, state: kept };
         let mut out = ShearAnswer { stress, by_pressure, by_slip, longest_s: f64::INFINITY };
-        if let Err(error) = self.used.law.shear(&nodes, &mut out) {
-            self.fail(error);
-        }
+        self.used.law.shear(&nodes, &mut out)?;
         self.limit(out.longest_s);
+        let ShearAnswer { stress, by_pressure, by_slip, .. } = out;
         let good = |k: usize| {
             stress[k] >= 0.0 && stress[k].is_finite() && by_pressure[k].is_finite() && by_slip[k].is_finite()
         };
-        if let Some(k) = (0..stress.len()).find(|k| !good(*k)) {
-            self.impossible(format!(
+        match (0..stress.len()).find(|k| !good(*k)) {
+            None => Ok(()),
+            Some(k) => self.impossible(&format!(
                 "shear stress {} Pa at sigma = {} Pa, j = {} m, derivatives {} and {} Pa/m",
                 stress[k], pressure[k], slip[k], by_pressure[k], by_slip[k]
-            ));
-            for out in [stress, by_pressure, by_slip] {
-                out.fill(0.0);
-            }
+            )),
         }
+    }
+
+    /// Yield stress and its derivatives by pressure and slip at one node; `kept` as committed.
+    #[inline]
+    fn strength(&self, pressure: f64, slip: f64, kept: &[f64]) -> Result<(f64, [f64; 2])> {
+        let (mut stress, mut by_p, mut by_slip) = ([0.0], [0.0], [0.0]);
+        let mut out = YieldAnswer { stress: &mut stress, by_pressure: &mut by_p, by_slip: &mut by_slip };
+        self.strengths(&YieldNodes { pressure: &[pressure], slip: &[slip], kept }, &mut out)?;
+        Ok((stress[0], [by_p[0], by_slip[0]]))
+    }
+}
+
+impl PressureSinkage for PluginLaw {
+    fn under(&self, b: f64) -> FirstLoading {
+        FirstLoading::Module(self.clone(), b)
+    }
+
+    fn state_doubles(&self) -> usize {
+        Self::state_doubles(self)
+    }
+
+    fn is_gentle_at(&self, k_u: f64) -> bool {
+        self.gentle_at == Some(k_u)
+    }
+}
+
+/// The shear law of a module.
+#[derive(Clone, Debug, PartialEq)]
+pub struct PluginShear {
+    law: PluginLaw,
+    cohesion: f64,
+    friction: f64,
+}
+
+impl PluginShear {
+    /// Takes the shear law of a module into use.
+    ///
+    /// # Errors
+    /// The law has failed, or answered what no soil does.
+    pub fn new(law: PluginLaw) -> Result<Self> {
+        let state = [0.0; MOST_LAW_STATE];
+        let state = &state[..law.state_doubles()];
+        let [cohesion, friction] = cohesion_and_friction(|p, j| law.strength(p, j, state))?;
+        Ok(Self { law, cohesion, friction })
+    }
+}
+
+impl ShearStrength for PluginShear {
+    fn cohesion(&self) -> f64 {
+        self.cohesion
+    }
+
+    fn friction(&self) -> f64 {
+        self.friction
+    }
+
+    fn yield_stress(&self, pressure: f64, slip: f64, kept: &[f64]) -> Result<(f64, [f64; 2])> {
+        built_up(self.cohesion, pressure, |p| self.law.strength(p, slip, kept))
+    }
+
+    fn yield_stresses(&self, nodes: &YieldNodes, out: &mut YieldAnswer) -> Result {
+        self.law.strengths(nodes, out)?;
+        build_up(self, nodes, out)
     }
 }
 

@@ -37,7 +37,7 @@ impl Rolling {
             number("wheel_peak_a0", "", "wheels: angle of the largest stress (a_0 + a_1 s) theta_f; at the bottom where absent")
                 .within(0.0, 0.95),
             number("wheel_peak_a1", "", "wheels: a_1").within(-0.95, 0.95),
-            number("K_across_m", "m", "wheels: shear deformation modulus across the travel; K_m where absent").positive(),
+            number("K_across_m", "m", "wheels: shear deformation modulus across the travel; K_m where absent").positive().usually("m", 0.002, 0.12),
         ]
     }
 

@@ -52,17 +52,23 @@ impl terraglue_subsystem::bytes::Persist for SlipSinkage {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::PressureLaw;
+    use crate::{Bekker, PressureLaw};
+
+    /// Under 8 kPa.
+    fn depth(law: &PressureLaw, sinkage: &SlipSinkage, slip: f64) -> f64 {
+        let curve = law.curve_in_slip(0.1, 4e8, sinkage, slip);
+        curve.and_then(|curve| curve.virgin_depth(8000.0)).expect("a power law always answers")
+    }
 
     #[test]
     fn a_slipping_contact_sinks_deeper() {
-        let law = PressureLaw::Bekker { k_c: 1400.0, k_phi: 820e3, n: 1.0 };
+        let law = PressureLaw::Bekker(Bekker { k_c: 1400.0, k_phi: 820e3, n: 1.0 });
         for sinkage in [SlipSinkage::Ding { n1: 0.3 }, SlipSinkage::Lyasko] {
-            let depth = |s| law.curve_in_slip(0.1, 4e8, &sinkage, s).virgin_depth(8000.0);
-            assert!((depth(0.0) - law.curve(0.1, 4e8).virgin_depth(8000.0)).abs() < 1e-15);
+            let depth = |s| depth(&law, &sinkage, s);
+            assert!((depth(0.0) - self::depth(&law, &SlipSinkage::None, 0.0)).abs() < 1e-15);
             assert!(depth(0.0) < depth(0.3) && depth(0.3) < depth(0.9));
         }
-        let depth = |s| law.curve_in_slip(0.1, 4e8, &SlipSinkage::Lyasko, s).virgin_depth(8000.0);
+        let depth = |s| depth(&law, &SlipSinkage::Lyasko, s);
         assert!((depth(0.4) / depth(0.0) - 1.4 / 0.8).abs() < 1e-6);
     }
 }

@@ -4,7 +4,8 @@
 //! is negative, so that pressing and releasing would yield energy. The pressure is therefore the largest one below the law
 //! whose slope stays below k_u: from where the law is too steep it goes on along a line, up to where the law comes back to it.
 
-use crate::pressure::PressureLaw;
+use crate::pressure_sinkage::PressureLaw;
+use terraglue_subsystem::Result;
 
 /// Largest slope of first loading over that of unloading.
 pub(crate) const STIFFEST: f64 = 0.99;
@@ -174,42 +175,36 @@ impl Softened {
 }
 
 impl PressureLaw {
-    /// Looks at the law where no foot may ever stand: that a module has no answer there is not remembered.
-    fn aside<T>(&self, look: impl FnOnce() -> T) -> T {
-        let seen = look();
-        if let Self::Plugin(law) = self {
-            let _ = law.check();
-        }
-        seen
-    }
-
-    /// Whether first loading is stiffer than unloading with `k_u` (Pa/m) at a depth that feet reach.
+    /// Whether first loading is stiffer than unloading with `k_u` (Pa/m) at a depth that feet reach; `None`, too, where a
+    /// module has no answer: no foot may ever stand there.
     pub fn softened(&self, k_u: f64) -> Option<Softened> {
-        self.aside(|| self.softening(k_u))
+        self.softening(k_u).ok().flatten()
     }
 
-    fn softening(&self, k_u: f64) -> Option<Softened> {
+    fn softening(&self, k_u: f64) -> Result<Option<Softened>> {
         let (b, down_to) = (SMALL_CONTACT, DEEPEST_TESTED);
-        let from = self.curve(b, k_u).straight_from();
+        let from = self.curve(b, k_u)?.straight_from();
         if from >= down_to {
-            return None;
+            return Ok(None);
         }
         // above an elastic line that is much stiffer the law stands alone
-        let own = self.curve(b, 1e6 * k_u);
+        let own = self.curve(b, 1e6 * k_u)?;
         let steps = 200;
         let z = |k: i32| from + (down_to - from) * f64::from(k) / f64::from(steps);
-        let slopes = (1..=steps).map(|k| (own.virgin(z(k)) - own.virgin(z(k - 1))) / (z(k) - z(k - 1)));
-        let steepest = slopes.fold(own.virgin_slope(down_to, own.virgin(down_to)), f64::max);
+        let mut steepest = own.first_loading(down_to)?.1;
+        for k in 1..=steps {
+            steepest = steepest.max((own.virgin(z(k))? - own.virgin(z(k - 1))?) / (z(k) - z(k - 1)));
+        }
         // rounded up to the two digits that are told
         let needed = 1.1 * steepest.max(STIFFEST * k_u) / STIFFEST;
-        Some(Softened { from, needed, stiffness: k_u })
+        Ok(Some(Softened { from, needed, stiffness: k_u }))
     }
 
     /// The same law, which remembers where it is gentle under contacts of all sizes: curves above unloading with `k_u` (Pa/m)
     /// are then not looked at again.
     pub fn looked_at(self, k_u: f64) -> Self {
-        let goes = |b: f64, k_u: f64| self.curve(b, k_u).straight_from() == f64::INFINITY;
-        let gentle = self.aside(|| SIZES.iter().all(|b| goes(*b, k_u) && goes(*b, k_u / STIFFEST * GENTLE)));
+        let goes = |b: f64, k_u: f64| self.curve(b, k_u).is_ok_and(|c| c.straight_from() == f64::INFINITY);
+        let gentle = SIZES.iter().all(|b| goes(*b, k_u) && goes(*b, k_u / STIFFEST * GENTLE));
         match self {
             Self::Expression(law) if gentle => Self::Expression(law.gentle_at(k_u)),
             Self::Plugin(law) if gentle => Self::Plugin(law.gentle_at(k_u)),

@@ -1,8 +1,8 @@
-//! The way back to a yield stress that an expression or a module gives, for one node or for many at once.
+//! The way back to the yield stress of any law, which an expression or a module gives, for one node or for many at once.
 
-use crate::expression::is_building_up;
 use crate::shear::{ON_YIELD, Plastic, ShearLaw, ShearResponse, ShearState};
-use terraglue_subsystem::MOST_LAW_STATE;
+use crate::shear_strength::{ShearStrength, StrengthLaw, YieldAnswer, YieldNodes};
+use terraglue_subsystem::{MOST_LAW_STATE, Result};
 
 /// Nodes whose yield stress is asked together.
 const CHUNK: usize = 64;
@@ -152,25 +152,26 @@ impl Slipping {
 }
 
 impl ShearLaw {
-    /// The same by an expression or a module, for one node.
-    pub(crate) fn respond_by(
+    /// Answer of one node by any law.
+    pub(crate) fn respond_by_any(
         &self,
+        law: &StrengthLaw,
         state: &ShearState,
         kept: &[f64],
         p: f64,
         slide: [f64; 2],
-    ) -> ShearResponse {
+    ) -> Result<ShearResponse> {
         let mut node = Slip::start(0, self, state, slide);
         let mut by = [0.0; 2];
         for _ in 0..STEPS {
             let y;
-            (y, by) = self.own(p, node.slip(), kept).unwrap_or_default();
+            (y, by) = law.yield_stress(p, node.slip(), kept)?;
             match node.newton(self.stiffness, y, by[1]) {
                 Stand::UnderWay => {}
-                stand => return self.ended(&node, stand, by),
+                stand => return Ok(self.ended(&node, stand, by)),
             }
         }
-        self.ended(&node, Stand::Arrived, by)
+        Ok(self.ended(&node, Stand::Arrived, by))
     }
 
     fn ended(&self, node: &Slip, stand: Stand, [by_p, by_j]: [f64; 2]) -> ShearResponse {
@@ -183,7 +184,10 @@ impl ShearLaw {
 
     /// Answers of nodes with pressure by an expression or a module: trial − k_t·Δj = Y(p, j + Δj), Newton inside a
     /// bracket, all nodes that slip at once.
-    pub fn respond_many(&self, nodes: &Sheared, out: &mut [ShearResponse]) {
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
+    pub fn respond_many(&self, nodes: &Sheared, out: &mut [ShearResponse]) -> Result {
         let doubles = nodes.kept.len() / nodes.pressure.len().max(1);
         let mut first = 0;
         while first < nodes.pressure.len() {
@@ -195,21 +199,24 @@ impl ShearLaw {
                 pressure: &nodes.pressure[range.clone()],
                 slide: &nodes.slide[range.clone()],
             };
-            self.respond_chunk(&part, &mut out[range]);
+            self.respond_chunk(&part, &mut out[range])?;
         }
+        Ok(())
     }
 
-    fn respond_chunk(&self, nodes: &Sheared, out: &mut [ShearResponse]) {
+    fn respond_chunk(&self, nodes: &Sheared, out: &mut [ShearResponse]) -> Result {
         let doubles = nodes.kept.len() / nodes.pressure.len().max(1);
         let mut slipping = Slipping::new(self, nodes);
         for _ in 0..=STEPS {
             let n = slipping.count;
             if n == 0 {
-                return;
+                return Ok(());
             }
             let Slipping { slip, pressure, y, by_p, by_j, kept, .. } = &mut slipping;
-            let answer = [&mut y[..n], &mut by_p[..n], &mut by_j[..n]];
-            self.strengths(&pressure[..n], &slip[..n], &kept[..n * doubles], answer);
+            let asked = YieldNodes { pressure: &pressure[..n], slip: &slip[..n], kept: &kept[..n * doubles] };
+            let mut answer =
+                YieldAnswer { stress: &mut y[..n], by_pressure: &mut by_p[..n], by_slip: &mut by_j[..n] };
+            self.law.yield_stresses(&asked, &mut answer)?;
             let mut take = |node: &Slip, stand, by| out[node.k] = self.ended(node, stand, by);
             slipping.newton(doubles, self.stiffness, &mut take);
         }
@@ -217,34 +224,25 @@ impl ShearLaw {
             let by = [slipping.by_p[at], slipping.by_j[at]];
             out[slipping.nodes[at].k] = self.ended(&slipping.nodes[at], Stand::Arrived, by);
         }
+        Ok(())
     }
 
-    /// [`ShearLaw::yield_stress_kept`] of nodes of an expression or a module, many at once.
-    pub fn yield_stresses(&self, pressure: &[f64], slip: &[f64], kept: &[f64], out: &mut [f64]) {
-        let doubles = kept.len() / pressure.len().max(1);
+    /// [`ShearLaw::yield_stress`] of nodes of an expression or a module, many at once, Pa.
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
+    pub fn yield_stresses(&self, nodes: &YieldNodes, out: &mut [f64]) -> Result {
+        let doubles = nodes.kept.len() / nodes.pressure.len().max(1);
         for (k, part) in out.chunks_mut(CHUNK).enumerate() {
             let at = k * CHUNK..k * CHUNK + part.len();
             let [mut by_p, mut by_j] = [[0.0; CHUNK]; 2];
-            let kept = &kept[at.start * doubles..at.end * doubles];
             let n = part.len();
-            self.strengths(&pressure[at.clone()], &slip[at], kept, [part, &mut by_p[..n], &mut by_j[..n]]);
+            let mut answer =
+                YieldAnswer { stress: part, by_pressure: &mut by_p[..n], by_slip: &mut by_j[..n] };
+            let kept = &nodes.kept[at.start * doubles..at.end * doubles];
+            let asked = YieldNodes { pressure: &nodes.pressure[at.clone()], slip: &nodes.slip[at], kept };
+            self.law.yield_stresses(&asked, &mut answer)?;
         }
-    }
-
-    /// Yield stresses of nodes and their derivatives by pressure and slip.
-    fn strengths(&self, pressure: &[f64], slip: &[f64], kept: &[f64], out: [&mut [f64]; 3]) {
-        let [y, by_p, by_j] = out;
-        match (&self.plugin, &self.expression) {
-            (Some(law), _) => law.strengths(pressure, slip, kept, [&mut *y, &mut *by_p, &mut *by_j]),
-            (None, Some(law)) => law.strengths(pressure, slip, [&mut *y, &mut *by_p, &mut *by_j]),
-            (None, None) => {}
-        }
-        let doubles = kept.len() / pressure.len().max(1);
-        for k in (0..pressure.len()).filter(|k| is_building_up(self.cohesion, pressure[*k])) {
-            let kept = &kept[k * doubles..(k + 1) * doubles];
-            if let Some((value, d)) = self.own(pressure[k], slip[k], kept) {
-                (y[k], [by_p[k], by_j[k]]) = (value, d);
-            }
-        }
+        Ok(())
     }
 }

@@ -14,7 +14,7 @@ fn lete() -> SoilParameters {
 }
 
 fn pressure(soil: SoilParameters, depth: f64) -> f64 {
-    soil.pressure().curve(0.05, 1e18).virgin(depth)
+    soil.pressure().curve(0.05, 1e18).and_then(|curve| curve.virgin(depth)).expect("a pressure")
 }
 
 #[test]

@@ -48,6 +48,7 @@ const ROUNDS: usize = 12;
 fn a_node_on_the_yield_stress_is_answered_in_a_few_rounds() {
     let counted = Arc::new(Counted(AtomicUsize::new(0)));
     let law = ShearLaw::new(COHESION, 0.61, K, 4e8).with_plugin(PluginLaw::new(counted.clone()));
+    let law = law.expect("it answers");
     for k in 1..2000 {
         let (slip, p) = (0.06 * f64::from(k) / 2000.0, 300.0 + 10.0 * f64::from(k));
         let strength = (COHESION + MU * p) * -libm::expm1(-slip / K);
@@ -56,7 +57,7 @@ fn a_node_on_the_yield_stress_is_answered_in_a_few_rounds() {
             let before = counted.0.load(Ordering::Relaxed);
             let mut out = [ShearResponse::default()];
             let nodes = Sheared { states: &[state], kept: &[], pressure: &[p], slide: &[[slide, 0.0]] };
-            law.respond_many(&nodes, &mut out);
+            law.respond_many(&nodes, &mut out).expect("it answers");
             let rounds = counted.0.load(Ordering::Relaxed) - before;
             assert!(rounds <= ROUNDS, "{rounds} rounds from the slip {slip} m, dragged by {slide} m");
             let now = (COHESION + MU * p) * -libm::expm1(-out[0].state.slip / K);

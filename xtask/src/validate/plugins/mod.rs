@@ -14,7 +14,7 @@ use std::time::Instant;
 use terraglue::conformance::{Area, Level, Options, Report, catalogue, check};
 use terraglue::scaffold::{Kind, Language, scaffold};
 use terraglue::scenario::read_soil_table;
-use terraglue_soil_law::{COLUMNS, SoilRow};
+use terraglue::scenario::{COLUMNS, SoilRow};
 
 /// The parts, in the order of the table.
 pub const PARTS: [Part; 9] = [

@@ -3,7 +3,7 @@
 use crate::process::{Outcome, root};
 use crate::validate::{Context, Figure, Limit};
 use terraglue::soil_fit::{Known, fit_law, read};
-use terraglue_soil_law::fit::{FitLaw, Reading, fit};
+use terraglue_soil_identification::{FitLaw, Reading, fit};
 
 const FILE: &str = "tests/reference/terramechanics/cmu_plate_pressure_sinkage_d60_d100.csv";
 /// Below this sinkage the plates are not seated, m.

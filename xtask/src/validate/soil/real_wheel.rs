@@ -20,7 +20,8 @@ const START: WheelStart = WheelStart { n: 1.46, k_phi: 8e6 };
 /// The numbers as a module's configuration: the sand of the plates, its rim smoother than the sand is rough; `keys`: more of
 /// them.
 fn config(fit: &WheelFit, keys: &str) -> String {
-    let numbers: Vec<String> = fit.numbers.iter().map(|n| format!(r#""{}":{},"#, n.key, n.value)).collect();
+    let numbers: Vec<String> =
+        fit.fit.numbers.iter().map(|n| format!(r#""{}":{},"#, n.key, n.value)).collect();
     format!(
         r#"{{{}"k_c":0.0,"c_pa":1000.0,"phi_rad":0.506145483078,"density_kg_m3":1330.0,"slip_sinkage":"ding",
             "slope_factor":false,"load_inclination":false,"passive_pressure":false{keys}}}"#,

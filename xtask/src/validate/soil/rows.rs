@@ -1,7 +1,7 @@
 //! The soils of the figures: rows of `models/soils.csv`, as a module's configuration and as numbers.
 
 use crate::process::{Outcome, read, root};
-use terraglue_soil_law::{COLUMNS, SoilTable};
+use terraglue::scenario::{COLUMNS, SoilTable};
 
 /// Stiffness of unloading of closed forms and integrals, Pa/m.
 pub const STIFF: f64 = 4e8;

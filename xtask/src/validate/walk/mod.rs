@@ -12,7 +12,7 @@ use super::{Context, Figure, Limit, columns};
 use crate::process::{Outcome, read, root, run_scenario};
 use serde_json::Value;
 use std::path::{Path, PathBuf};
-use terraglue_soil_law::SoilTable;
+use terraglue::scenario::SoilTable;
 
 const SCENARIO: &str = "scenarios/moon_walk.toml";
 const SOILS: [&str; 2] = ["soil-cellular-automaton", "soil-bekker"];

@@ -2,7 +2,7 @@
 
 use super::{LEFT, Limits, Window};
 use crate::active::Marks;
-use crate::kernel::Face;
+use crate::standing::Face;
 use crate::standing::Field;
 use terraglue_soil_contact::Ground;
 

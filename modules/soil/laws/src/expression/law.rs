@@ -1,14 +1,17 @@
 //! The laws of a soil as written in a scenario: read, checked, and turned into programs.
 
 use super::build::{Binding, Builder};
-use super::curve;
 use super::dimension::{self, PRESSURE};
 use super::error::ExpressionError;
 use super::parse::Tree;
 use super::program::Program;
 use super::range;
 use super::symbol::{Role, Symbol};
+use crate::build_up::{FULL_SLIP, built_up, cohesion_and_friction};
+use crate::inverse;
 use crate::parameters::SoilParameters;
+use crate::pressure_sinkage::{FirstLoading, PressureSinkage};
+use crate::shear_strength::{ShearStrength, YieldAnswer, YieldNodes, build_up};
 use terraglue_subsystem::{Config, Error, Parameter, ParameterType, Result};
 
 /// Depths for which a pressure law must make sense, m.
@@ -18,7 +21,7 @@ const SIZES: [f64; 2] = [1e-3, 2.0];
 /// Pressures for which a shear law must make sense, Pa.
 const PRESSURES: [f64; 2] = [0.0, 1e7];
 /// Shear displacements, m.
-const SLIPS: [f64; 2] = [0.0, 10.0];
+const SLIPS: [f64; 2] = [0.0, FULL_SLIP];
 
 /// A pressure law of the variables z (0) and b (1), before b is fixed.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -30,16 +33,25 @@ pub struct PressureExpression {
     gentle_at: Option<f64>,
 }
 
+impl PressureSinkage for PressureExpression {
+    /// Where the folded law is a power law, it is that one.
+    fn under(&self, b: f64) -> FirstLoading {
+        let program = self.at_size(b);
+        match program.power_law() {
+            Some((modulus, exponent)) => FirstLoading::Power { modulus, exponent },
+            None => FirstLoading::Program(program),
+        }
+    }
+
+    fn is_gentle_at(&self, k_u: f64) -> bool {
+        self.gentle_at == Some(k_u)
+    }
+}
+
 impl PressureExpression {
     /// The same law, whose slopes are known to stay below `k_u` (Pa/m) beyond the elastic limit.
     pub(crate) fn gentle_at(self, k_u: f64) -> Self {
         Self { gentle_at: Some(k_u), ..self }
-    }
-
-    /// Whether that is known.
-    #[inline]
-    pub(crate) fn is_gentle_at(&self, k_u: f64) -> bool {
-        self.gentle_at == Some(k_u)
     }
 
     /// The law under a contact of size `b` (m), a program of z.
@@ -56,63 +68,37 @@ impl PressureExpression {
 pub struct ShearExpression {
     program: Program,
     /// Largest stress without pressure, Pa.
-    pub cohesion: f64,
+    cohesion: f64,
     /// d(largest stress)/dσ of the fully mobilised soil.
-    pub friction: f64,
+    friction: f64,
 }
-
-/// Pressure at which the friction of a law is read, Pa.
-const TYPICAL_PRESSURE: f64 = 1e4;
 
 impl ShearExpression {
-    fn new(program: Program) -> Self {
-        let [cohesion, friction] = cohesion_and_friction(|sigma, j| program.eval([sigma, j]));
-        Self { program, cohesion, friction }
+    fn new(program: Program) -> Result<Self> {
+        let [cohesion, friction] = cohesion_and_friction(|sigma, j| Ok(program.eval([sigma, j])))?;
+        Ok(Self { program, cohesion, friction })
+    }
+}
+
+impl ShearStrength for ShearExpression {
+    fn cohesion(&self) -> f64 {
+        self.cohesion
     }
 
-    /// Largest stress at the pressure `sigma` (Pa) after the slip `j` (m), and its derivatives by both.
+    fn friction(&self) -> f64 {
+        self.friction
+    }
+
     #[inline]
-    pub fn strength(&self, sigma: f64, j: f64) -> (f64, [f64; 2]) {
-        built_up(self.cohesion, sigma, |sigma| self.program.eval([sigma, j]))
+    fn yield_stress(&self, sigma: f64, j: f64, _kept: &[f64]) -> Result<(f64, [f64; 2])> {
+        built_up(self.cohesion, sigma, |sigma| Ok(self.program.eval([sigma, j])))
     }
 
-    /// The same at many places, without what builds up.
-    #[inline]
-    pub(crate) fn strengths(&self, sigma: &[f64], j: &[f64], [y, by_sigma, by_j]: [&mut [f64]; 3]) {
-        self.program.eval_all([sigma, j], y, [by_sigma, by_j]);
+    fn yield_stresses(&self, nodes: &YieldNodes, out: &mut YieldAnswer) -> Result {
+        let slopes = [&mut *out.by_pressure, &mut *out.by_slip];
+        self.program.eval_all([nodes.pressure, nodes.slip], out.stress, slopes);
+        build_up(self, nodes, out)
     }
-}
-
-/// Share of the cohesion over which it builds up, inverse.
-const BUILD_UP: f64 = 10.0;
-
-/// Whether the pressure is so small that strength without pressure is still building up.
-#[inline]
-pub(crate) fn is_building_up(cohesion: f64, sigma: f64) -> bool {
-    BUILD_UP * sigma < cohesion
-}
-
-/// A stress with its derivatives by pressure and slip. What the soil holds without pressure, `cohesion` once it has
-/// slipped, builds up over the first tenth of it, as in the built-in law.
-#[inline]
-pub(crate) fn built_up(cohesion: f64, sigma: f64, at: impl Fn(f64) -> (f64, [f64; 2])) -> (f64, [f64; 2]) {
-    let (mut y, mut d) = at(sigma);
-    if is_building_up(cohesion, sigma) {
-        let (held, [_, by_j]) = at(0.0);
-        let missing = 1.0 - BUILD_UP * sigma / cohesion;
-        y -= held * missing;
-        d[0] += held * BUILD_UP / cohesion;
-        d[1] -= by_j * missing;
-    }
-    (y, d)
-}
-
-/// What a law that answers (stress, derivatives) at (pressure, slip) holds without pressure, Pa, and its friction
-/// once the soil has slipped far.
-pub(crate) fn cohesion_and_friction(at: impl Fn(f64, f64) -> (f64, [f64; 2])) -> [f64; 2] {
-    let full = |sigma| at(sigma, SLIPS[1]).0;
-    let cohesion = full(0.0);
-    [cohesion, (full(TYPICAL_PRESSURE) - cohesion) / TYPICAL_PRESSURE]
 }
 
 /// The texts of `[soil.law]`; the programs are made anew when a parameter changes.
@@ -192,7 +178,8 @@ impl SoilExpressions {
             Symbol::new("j", "m", Role::Variable, 0.01, SLIPS),
         ];
         let law = self.checked(text, &variables, p).and_then(|(tree, symbols)| {
-            let law = ShearExpression::new(compile(&tree, &symbols)?.program);
+            let law =
+                ShearExpression::new(compile(&tree, &symbols)?.program).map_err(|e| whole(&tree, &e))?;
             physical_shear(&tree, &law)?;
             Ok(law)
         });
@@ -304,7 +291,7 @@ fn physical_pressure(
             return Err(whole(format!("the pressure is 0 down to z = {} m at b = {b:.4} m", DEPTHS[1])));
         }
         let Some(k_u) = k_u else { continue };
-        let limit = curve::elastic_limit(&|z| at.depth(z), k_u);
+        let limit = inverse::elastic_limit(&|z| Ok(at.depth(z)), k_u).map_err(|e| self::whole(tree, &e))?;
         if limit > 0.1 {
             return Err(whole(format!(
                 "the law is stiffer than unloading ({k_u} Pa/m) down to z = {limit:.3} m at b = {b:.4} m"
@@ -315,11 +302,16 @@ fn physical_pressure(
     Ok(())
 }
 
+/// An error of the law as a whole.
+fn whole(tree: &Tree, error: &Error) -> Box<ExpressionError> {
+    tree.error(tree.root(), error.to_string())
+}
+
 /// Shear stress opposes the slip and does not fall with the pressure.
 fn physical_shear(tree: &Tree, law: &ShearExpression) -> std::result::Result<(), Box<ExpressionError>> {
     for sigma in points([0.0, 1e6], 20) {
         for j in points(SLIPS, 40) {
-            let (tau, [by_sigma, by_j]) = law.strength(sigma, j);
+            let (tau, [by_sigma, by_j]) = law.yield_stress(sigma, j, &[]).map_err(|e| whole(tree, &e))?;
             if !(tau >= -1e-9 && tau.is_finite() && by_sigma.is_finite() && by_j.is_finite()) {
                 let message = format!("the stress is {tau} Pa at sigma = {sigma:.1} Pa, j = {j:.4} m");
                 return Err(tree.error(tree.root(), message).help("it must be finite and not negative"));

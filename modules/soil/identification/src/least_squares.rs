@@ -1,8 +1,8 @@
 //! The numbers of any law fitted to plate tests: least squares of ln p within the range of each number, by the method of
 //! Levenberg (1944, Quart. Appl. Math. 2) and Marquardt (1963, J. SIAM 11) with differences for derivatives.
 
-use super::interval::jackknife;
-use super::{Basis, FitError, Interval, Reading};
+use crate::interval::{Basis, Interval, jackknife};
+use crate::plates::{FitError, Reading};
 
 /// A number that is to be found.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -4,13 +4,8 @@
 //! square of ln(p/p_measured), as Wong (1980, J. Terramechanics 17) weights his fits. All laws here have the form
 //! p = (A·u(b) + B·w(b))·x(z, b)ⁿ with A, B ≥ 0; see [`FitLaw`].
 
-mod interval;
-mod numbers;
-mod solve;
-mod student;
-
-pub use interval::{Basis, Interval, spread};
-pub use numbers::{Free, Least, NumbersFit, Pressures, Residuals, fit_numbers, least_squares};
+use crate::interval::{self, Basis, Interval};
+use crate::solve;
 
 /// One reading of a plate test.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -25,7 +20,7 @@ pub struct Reading {
     pub pressure: f64,
 }
 
-/// The laws that can be fitted; the factors A and B are found, see [`crate::PressureLaw`] for what they mean.
+/// The laws that can be fitted; the factors A and B are found, see [`terraglue_soil_law::PressureLaw`] for what they mean.
 #[derive(Clone, Copy, Debug, PartialEq)]
 #[non_exhaustive]
 pub enum FitLaw {
@@ -42,7 +37,7 @@ pub enum FitLaw {
 
 impl FitLaw {
     /// u, w and ln x of a reading.
-    fn terms(&self, b: f64, depth: f64) -> [f64; 3] {
+    pub(crate) fn terms(&self, b: f64, depth: f64) -> [f64; 3] {
         match *self {
             Self::Bekker => [1.0 / b, 1.0, libm::log(depth)],
             Self::Reece => [1.0, b, libm::log(depth / b)],

@@ -1,32 +1,16 @@
-//! The two rules over a row of nodes, sixteen at a time, in a form that compilers turn into vector instructions.
+//! The rule of repose: over a face steeper than the angle of repose φ_r flows a quarter of what is too steep.
 //!
-//! Every number is computed for itself with IEEE operations, so the width of the vectors cannot be seen. Single
-//! precision carries the differences of neighbours: exact to 4 m, and both sides of a face compute the same number.
+//! With g_n the difference of the heights of both nodes, g_t the slope along the face (the mean of the central differences of
+//! both) and g = √(g_n² + g_t²), the flux is q = ¼·(g − Δ·tan φ_r)₊·g_n/g rounded down to whole units (Rossmann, Jung and Rast
+//! 2010, section IV, made isotropic): a plane of slope tan φ_r is at rest at any azimuth.
 
-/// Nodes that are computed together.
-pub const LANES: usize = 16;
-/// Largest flux of a sweep, units (0.95 m).
-const LARGEST: f32 = 4e6;
-/// 2²³: adding it leaves the nearest whole number in the low bits.
-const WHOLE: f32 = 8_388_608.0;
+use crate::lanes::{LANES, Lanes, lanes, whole};
+use crate::span::Span;
+use terraglue_ground::UNIT_M;
 
-/// Numbers that are computed together.
-pub type Lanes<T> = [T; LANES];
-
-/// The numbers of a row from `at` on.
-#[inline(always)]
-pub fn lanes(row: &[i32], at: usize) -> Lanes<i32> {
-    let mut out = [0; LANES];
-    out.copy_from_slice(&row[at..at + LANES]);
-    out
-}
-
-/// A magnitude (≥ 0) rounded down to whole units, with the sign of `direction`.
-#[inline(always)]
-fn whole(magnitude: f32, direction: i32) -> i32 {
-    let bits = ((magnitude.min(LARGEST) - 0.5).max(0.0) + WHOLE).to_bits() as i32 - WHOLE.to_bits() as i32;
-    let sign = direction >> 31;
-    (bits ^ sign).wrapping_sub(sign)
+/// Δ·tan φ_r of an angle of repose (rad) between nodes `spacing` (m) apart, units of height.
+pub fn threshold(angle: f64, spacing: f64) -> f32 {
+    (spacing * libm::tan(angle) / UNIT_M) as f32
 }
 
 /// The thresholds Δ·tan φ_r of a row, in units of height.
@@ -161,79 +145,14 @@ pub fn admit(flux: &mut [i32], from: &[i32], to: &[i32]) {
     }
 }
 
-/// Cuts what the middles of triples receive to what every node of a triple admits: its middle and both its `ends`
-/// (inlets; slices of the same length).
+/// Change of each node of `span` from the fluxes over its four faces.
 #[inline(always)]
-pub fn admit_triples(flux: &mut [i32], middle: &[i32], ends: [&[i32]; 2]) {
-    for (((q, m), a), b) in flux.iter_mut().zip(middle).zip(ends[0]).zip(ends[1]) {
-        let least = (*a).min(*b).min(*m);
-        *q = (*q).max(-least).min(least);
+pub fn sum_faces(Span { lo, hi }: Span, along: &[i32], [lower, upper]: [&[i32]; 2], change: &mut [i32]) {
+    let (left, right) = (&along[lo - 1..hi - 1], &along[lo..hi]);
+    let (lower, upper, change) = (&lower[lo..hi], &upper[lo..hi], &mut change[lo..hi]);
+    for k in 0..change.len() {
+        change[k] = left[k].wrapping_sub(right[k]).wrapping_add(lower[k].wrapping_sub(upper[k]));
     }
-}
-
-/// What may flow over a face.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
-pub enum Face {
-    /// Everything.
-    #[default]
-    Falls,
-    /// What lies loose; cohesion holds the rest.
-    Sheds,
-    /// What is moving: loose soil at rest has cohesion, too.
-    Stands,
-    /// Nothing: a node beside it is not visited.
-    Waits,
-}
-
-/// Cuts the fluxes to what may flow over the faces; `free` tells how much of both nodes beside a face is not held by cohesion
-/// there, units. A node has four faces, and each takes a quarter of it at most.
-#[inline(always)]
-pub fn hold(flux: &mut [i32], faces: &[Face], free: impl Fn(usize, Face) -> [i32; 2]) {
-    for (k, (q, face)) in flux.iter_mut().zip(faces).enumerate() {
-        match face {
-            Face::Falls => {}
-            Face::Waits => *q = 0,
-            Face::Sheds | Face::Stands if *q != 0 => {
-                let [from, to] = free(k, *face);
-                *q = (*q).max(-(to >> 2)).min(from >> 2);
-            }
-            Face::Sheds | Face::Stands => {}
-        }
-    }
-}
-
-/// What the middles of the triples (a, middle, b) receive from each end, units, at `first` …; < 0: they give.
-/// Returns whether any is not 0. `shift` moves a to the left and b to the right.
-#[inline(always)]
-pub fn triples(
-    [a, middle, b]: [&[i32]; 3],
-    shift: [isize; 2],
-    [first, end]: [usize; 2],
-    limit: i32,
-    out: &mut [i32],
-) -> bool {
-    let mut any = false;
-    let mut x = first;
-    while x < end {
-        let m = lanes(middle, x);
-        let (l, r) = (lanes(a, x.wrapping_add_signed(shift[0])), lanes(b, x.wrapping_add_signed(shift[1])));
-        let (mut curvature, mut bent) = ([0; LANES], false);
-        for k in 0..LANES {
-            curvature[k] = l[k].wrapping_sub(m[k]).wrapping_add(r[k].wrapping_sub(m[k]));
-            bent |= curvature[k].wrapping_abs() > limit;
-        }
-        let mut flux = [0; LANES];
-        if bent {
-            any = true;
-            for k in 0..LANES {
-                let excess = curvature[k].wrapping_abs().wrapping_sub(limit).max(0);
-                flux[k] = whole(excess as f32 / 24.0, curvature[k]);
-            }
-        }
-        out[x..x + LANES].copy_from_slice(&flux);
-        x += LANES;
-    }
-    any
 }
 
 #[cfg(test)]
@@ -265,19 +184,6 @@ mod tests {
             };
             prop_assert_eq!(flux(1.0), 0);
             prop_assert!(flux(1.001) > 0);
-        }
-
-        #[test]
-        fn curvature_is_odd_and_a_twenty_fourth(a in -1_000_000..1_000_000i32, m in -1_000_000..1_000_000i32, limit in 1..500_000i32) {
-            let run = |a: i32, m: i32| {
-                let (ends, middle, mut out) = ([a; 48], [m; 48], [0; 48]);
-                triples([&ends, &middle, &ends], [-1, 1], [16, 32], limit, &mut out);
-                out[20]
-            };
-            prop_assert_eq!(run(a, m), -run(-a, -m));
-            let s = 2 * (i64::from(a) - i64::from(m));
-            let exact = (s.abs() - i64::from(limit)).max(0) / 24;
-            prop_assert!((i64::from(run(a, m)).abs() - exact).abs() <= 1, "{} {}", run(a, m), exact);
         }
     }
 }

@@ -2,7 +2,8 @@
 //! curves are left out in turn (jackknife over groups; Efron and Tibshirani 1993, An Introduction to the
 //! Bootstrap, ch. 11) and the spread of the answers tells how well the numbers are known.
 
-use super::{FitLaw, Numbers, Reading, solve::solve, student};
+use crate::plates::{FitLaw, Numbers, Reading};
+use crate::{solve::solve, student};
 
 /// Probability that the interval holds the number.
 const CONFIDENCE: f64 = 0.95;
@@ -42,7 +43,7 @@ pub fn intervals(law: &FitLaw, readings: &[Reading], both: bool, at: &Numbers) -
 }
 
 /// Intervals of the numbers `at` that `answer` finds: it is asked again with whole curves, or pieces of them, left out.
-pub(super) fn jackknife(
+pub(crate) fn jackknife(
     readings: &[Reading],
     answer: &mut dyn FnMut(&[Reading]) -> Option<Vec<f64>>,
     at: &[f64],

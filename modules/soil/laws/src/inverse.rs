@@ -1,5 +1,7 @@
-//! Where a pressure–sinkage curve, given by a function of the depth that answers pressure and slope, meets a line or a
+//! The inverse of a law: where a curve, given by a function of the depth that answers pressure and slope, meets a line or a
 //! pressure.
+
+use terraglue_subsystem::Result;
 
 /// Smallest depth at which a law is looked at, m.
 const SHALLOWEST: f64 = 1e-9;
@@ -16,27 +18,27 @@ fn halves(k: usize) -> bool {
 }
 
 /// Depth where the law meets the elastic line k_u·z from above, m; 0 where it starts below it.
-pub fn elastic_limit(law: &impl Fn(f64) -> (f64, f64), k_u: f64) -> f64 {
-    if law(SHALLOWEST).0 <= k_u * SHALLOWEST {
-        return 0.0;
+pub fn elastic_limit(law: &impl Fn(f64) -> Result<(f64, f64)>, k_u: f64) -> Result<f64> {
+    if law(SHALLOWEST)?.0 <= k_u * SHALLOWEST {
+        return Ok(0.0);
     }
     // ln(p/(k_u z)) over ln z is a straight line for a power law: one Newton step then hits
     root_in_logarithms([SHALLOWEST, DEEPEST], SHALLOWEST, false, |z| {
-        let (p, slope) = law(z);
-        (p / (k_u * z), slope * z / p - 1.0)
+        let (p, slope) = law(z)?;
+        Ok((p / (k_u * z), slope * z / p - 1.0))
     })
 }
 
 /// Depth at which the law gives the pressure `p` > 0, m, sought from `guess` on.
-pub fn depth(law: &impl Fn(f64) -> (f64, f64), p: f64, shallowest: f64, guess: f64) -> f64 {
+pub fn depth(law: &impl Fn(f64) -> Result<(f64, f64)>, p: f64, shallowest: f64, guess: f64) -> Result<f64> {
     let shallowest = shallowest.max(SHALLOWEST);
-    if law(shallowest).0 >= p {
-        return shallowest;
+    if law(shallowest)?.0 >= p {
+        return Ok(shallowest);
     }
     let start = if guess > shallowest && guess < DEEPEST { guess } else { shallowest.max(0.01) };
     root_in_logarithms([shallowest, DEEPEST], start, true, |z| {
-        let (value, slope) = law(z);
-        (value / p, slope * z / value)
+        let (value, slope) = law(z)?;
+        Ok((value / p, slope * z / value))
     })
 }
 
@@ -45,13 +47,13 @@ fn root_in_logarithms(
     [mut low, mut high]: [f64; 2],
     start: f64,
     rising: bool,
-    f: impl Fn(f64) -> (f64, f64),
-) -> f64 {
+    f: impl Fn(f64) -> Result<(f64, f64)>,
+) -> Result<f64> {
     let mut z = start;
     for k in 0..STEPS {
-        let (ratio, exponent) = f(z);
+        let (ratio, exponent) = f(z)?;
         if ratio == 1.0 {
-            return z;
+            return Ok(z);
         }
         if (ratio < 1.0) == rising {
             low = z
@@ -63,9 +65,9 @@ fn root_in_logarithms(
             next = (low * high).sqrt();
         }
         if (next - z).abs() <= 1e-15 * z {
-            return next;
+            return Ok(next);
         }
         z = next;
     }
-    z
+    Ok(z)
 }

@@ -1,9 +1,9 @@
 //! The shipped table of soils: every usable row makes laws, every other one is refused with its reason.
 
-use terraglue_soil_law::{COLUMNS, SoilTable, TableError};
+use terraglue_scenario::{COLUMNS, SoilTable, TableError};
 
-const TABLE: &str = include_str!("../../../../models/soils.csv");
-const PUBLISHED: &str = include_str!("../../../../tests/reference/terramechanics/soils.csv");
+const TABLE: &str = include_str!("../../../models/soils.csv");
+const PUBLISHED: &str = include_str!("../../../tests/reference/terramechanics/soils.csv");
 
 fn table() -> SoilTable {
     SoilTable::parse(TABLE).expect("the shipped table is readable")

@@ -1,0 +1,179 @@
+//! Laws of pressure and sinkage: the trait that each of them implements, and the choice among them.
+//!
+//! A law says how soil resists that is loaded for the first time; how it springs back is the same for all of them, see
+//! [`PressureCurve`]. To add a law: a file of its name with a type that implements [`PressureSinkage`], a variant of
+//! [`PressureLaw`], and its numbers in [`crate::SoilParameters`].
+
+use crate::bearing_capacity::BearingCapacity;
+use crate::bekker::Bekker;
+use crate::expression::{PressureExpression, Program};
+use crate::plugin::PluginLaw;
+use crate::pressure_curve::PressureCurve;
+use crate::reece::Reece;
+use crate::slip_sinkage::SlipSinkage;
+use terraglue_subsystem::Result;
+
+/// A law of pressure and sinkage: built in, text of a scenario or module.
+///
+/// It is asked once per contact and step for the curve under a contact of that size, which then answers for all nodes.
+pub trait PressureSinkage {
+    /// First loading under a contact of smaller dimension `b` (m; radius of a disc, short side of a rectangle).
+    fn under(&self, b: f64) -> FirstLoading;
+
+    /// Doubles that the law keeps per node; a law that keeps some answers for unloading itself.
+    fn state_doubles(&self) -> usize {
+        0
+    }
+
+    /// Whether the slopes of a law that is no power law are known to stay below `k_u` (Pa/m) beyond the elastic limit.
+    fn is_gentle_at(&self, _k_u: f64) -> bool {
+        false
+    }
+}
+
+/// First loading under a contact of one size: pressure over depth.
+#[derive(Clone, Debug, PartialEq)]
+#[allow(clippy::large_enum_variant)] // one per contact and step; a box would allocate
+pub enum FirstLoading {
+    /// modulus·z^exponent.
+    Power {
+        /// Pa/m^exponent.
+        modulus: f64,
+        /// Exponent.
+        exponent: f64,
+    },
+    /// Written in the scenario.
+    Program(Program),
+    /// A module of its own, under a contact of this size (m).
+    Module(PluginLaw, f64),
+}
+
+impl FirstLoading {
+    /// Pressure (Pa) and slope (Pa/m) of the law itself at one depth z > 0 (m).
+    ///
+    /// # Errors
+    /// The law has no answer there.
+    #[inline]
+    pub fn at(&self, z: f64) -> Result<(f64, f64)> {
+        match self {
+            Self::Power { modulus, exponent } if *exponent == 1.0 => Ok((modulus * z, *modulus)),
+            Self::Power { modulus, exponent } => {
+                let p = modulus * libm::pow(z, *exponent);
+                Ok((p, exponent * p / z))
+            }
+            Self::Program(program) => Ok(program.depth(z)),
+            Self::Module(law, b) => law.at(*b, z),
+        }
+    }
+
+    /// Pressures (Pa) and slopes (Pa/m) of the law itself at depths (m); all slices have one length.
+    ///
+    /// # Errors
+    /// The law has no answer at one of them.
+    #[inline]
+    pub fn at_all(&self, z: &[f64], p: &mut [f64], slope: &mut [f64]) -> Result {
+        match self {
+            Self::Power { .. } => {
+                for ((z, p), slope) in z.iter().zip(p).zip(slope) {
+                    (*p, *slope) = self.at(*z)?;
+                }
+            }
+            Self::Program(program) => program.eval_all([z], p, [slope]),
+            Self::Module(law, b) => law.first_loading(*b, z, p, slope)?,
+        }
+        Ok(())
+    }
+
+    /// The same only to look at the law: NaN where it has no answer.
+    pub(crate) fn look(&self, z: &[f64], p: &mut [f64], slope: &mut [f64]) {
+        match self {
+            Self::Module(law, b) => law.look(*b, z, p, slope),
+            _ if self.at_all(z, p, slope).is_ok() => {}
+            _ => p.fill(f64::NAN),
+        }
+    }
+}
+
+/// The law of a soil; [`PressureLaw::curve`] fixes it for the size of a contact.
+#[derive(Clone, Debug, PartialEq)]
+#[non_exhaustive]
+pub enum PressureLaw {
+    /// p = (k_c/b + k_φ)·zⁿ.
+    Bekker(Bekker),
+    /// p = (c·k_c' + γ·b·k_φ')·(z/b)ⁿ.
+    Reece(Reece),
+    /// p = (c·N_c + γ·b·N_γ)·(z/z_r)ⁿ.
+    BearingCapacity(BearingCapacity),
+    /// Written in the scenario, see [`crate::expression`].
+    Expression(PressureExpression),
+    /// A module of its own.
+    Plugin(PluginLaw),
+}
+
+/// Names of the built-in laws as a scenario writes them.
+pub const PRESSURE_LAWS: [&str; 3] = ["bekker", "reece", "bearing"];
+
+/// Depth and size at which [`PressureLaw::unloading`] looks at a law, m.
+const LOOK: [f64; 2] = [0.02, 0.05];
+/// Stiffness of unloading over the secant of first loading there: LETE sand, whose k_u = A_u·z_u with A_u = 503 MPa/m² (Wong
+/// 1984; Wong 2010, table 4.1) is 10.1 MPa/m at 2 cm, where k_c = 1.16 kN/m^1.611, k_φ = 475 kN/m^2.611 and n = 0.611 of the same
+/// tests give a secant of 2.28 MPa/m.
+const UNLOADING: f64 = 4.4;
+/// Stiffness of unloading under a law that answers for unloading itself, Pa/m; its shear springs back with it.
+const KEEPERS: f64 = 1e7;
+
+impl PressureLaw {
+    /// The law behind the choice.
+    pub fn law(&self) -> &dyn PressureSinkage {
+        match self {
+            Self::Bekker(law) => law,
+            Self::Reece(law) => law,
+            Self::BearingCapacity(law) => law,
+            Self::Expression(law) => law,
+            Self::Plugin(law) => law,
+        }
+    }
+
+    /// The curve under a contact of smaller dimension `b` (m; radius of a disc, short side of a rectangle) with
+    /// the unloading stiffness `k_u` (Pa/m).
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
+    pub fn curve(&self, b: f64, k_u: f64) -> Result<PressureCurve> {
+        self.curve_in_slip(b, k_u, &SlipSinkage::None, 0.0)
+    }
+
+    /// The same under a contact that slips by `slip` (0: rolls or stands, 1: spins on the spot), which sinks deeper
+    /// as `sinkage` says.
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
+    pub fn curve_in_slip(&self, b: f64, k_u: f64, sinkage: &SlipSinkage, slip: f64) -> Result<PressureCurve> {
+        let law = self.law();
+        match law.under(b) {
+            FirstLoading::Power { modulus, exponent } => {
+                let (modulus, exponent) = sinkage.apply(modulus, exponent, slip);
+                Ok(PressureCurve::new(modulus, exponent, k_u))
+            }
+            other => PressureCurve::of(other, k_u, law.is_gentle_at(k_u)),
+        }
+    }
+
+    /// Stiffness of unloading and reloading where nobody gives one, Pa/m: 4.4 times that of first loading down to 2 cm
+    /// under a contact of 5 cm, as Wong (1984) measured in sand.
+    ///
+    /// # Errors
+    /// The law, which is a module, has no answer.
+    pub fn unloading(&self) -> Result<f64> {
+        let [depth, size] = LOOK;
+        let law = self.law();
+        if law.state_doubles() > 0 {
+            return Ok(KEEPERS);
+        }
+        let pressure = match law.under(size) {
+            FirstLoading::Power { modulus, exponent } => modulus * libm::pow(depth, exponent),
+            other => other.at(depth)?.0,
+        };
+        Ok(UNLOADING * pressure / depth)
+    }
+}

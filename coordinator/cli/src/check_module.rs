@@ -115,7 +115,8 @@ fn in_process(arguments: &CheckModuleArguments, module: &Path) -> Result<Exit> {
 }
 
 fn write(file: &Path, text: &str) -> Result {
-    std::fs::write(file, text)
+    terraglue_subsystem::files::can_create(file)
+        .and_then(|()| std::fs::write(file, text))
         .map_err(|source| terraglue_diagnostics::Error::File { path: file.display().to_string(), source })
 }
 

@@ -31,7 +31,9 @@ pub fn convert(arguments: &ConvertArguments) -> Result<Exit> {
             made.and_then(|()| std::fs::copy(package.folder().join(unit), &to)).map_err(|e| at(&to, e))?;
         }
     }
-    std::fs::write(&out, &converted.text).map_err(|e| at(&out, e))?;
+    terraglue_subsystem::files::can_create(&out)
+        .and_then(|()| std::fs::write(&out, &converted.text))
+        .map_err(|e| at(&out, e))?;
     converted.notes.iter().for_each(|note| eprintln!("note: {note}"));
     let scenario = Scenario::load(&out, &[])?;
     let (units, connections) = (scenario.subsystems.len(), scenario.connections.len());

@@ -129,7 +129,9 @@ pub(super) fn drawing_of(out: &Path) -> PathBuf {
 }
 
 pub(super) fn write(path: &Path, text: &str) -> Result {
-    std::fs::write(path, text).map_err(|source| Error::File { path: path.display().to_string(), source })
+    terraglue_subsystem::files::can_create(path)
+        .and_then(|()| std::fs::write(path, text))
+        .map_err(|source| Error::File { path: path.display().to_string(), source })
 }
 
 fn print(a: &FitSoilArguments, tests: &PlateTests, fit: &SoilFit, all: &[SoilFit]) {

@@ -33,10 +33,14 @@ pub struct Energies {
     pub other_heat_j: Option<f64>,
     /// What is not accounted for, J: changes and heat − work; > 0 came from nowhere.
     pub drift_j: Option<f64>,
-    /// What the drift is held against, J: ∫|power|dt of motors and loads, or of the ports where nothing drives.
+    /// What the drift is held against, J: the largest of ∫|power|dt of motors and loads, ∫|power|dt through the ports, and the
+    /// changes of kinetic and potential energy. A robot that stands does next to no work with its motors.
     pub turnover_j: f64,
-    /// Whether it is held against the work through the ports, as nothing drives.
+    /// Whether that is the work through the ports.
     pub by_ports: bool,
+    /// Whether that is a change of kinetic or potential energy.
+    #[serde(default)]
+    pub by_changes: bool,
     /// Subsystems that keep no book, or not a whole one.
     pub without_book: Vec<String>,
 }
@@ -54,7 +58,11 @@ impl Energies {
 
     /// What the drift is held against, for people.
     pub fn measure(&self) -> &'static str {
-        if self.by_ports { "of the work at the ports" } else { "of the motors' work" }
+        match (self.by_ports, self.by_changes) {
+            (true, _) => "of the work at the ports",
+            (_, true) => "of the change of kinetic and potential energy",
+            _ => "of the motors' work",
+        }
     }
 
     /// Why the drift is unknown, for people; empty where it is known.
@@ -143,12 +151,11 @@ impl EnergyTrack {
     /// The figures so far, with the work of the motors of the same run.
     pub fn figures(&self, motors: &MotorWork) -> Energies {
         let driven = motors.both_j().max(self.work_path_j);
-        let by_ports = driven <= 0.0;
         let base = Energies {
             driving_j: motors.driving_j,
             braking_j: motors.braking_j,
-            turnover_j: if by_ports { self.port_path_j } else { driven },
-            by_ports,
+            turnover_j: driven.max(self.port_path_j),
+            by_ports: driven < self.port_path_j,
             without_book: self.without_book.clone(),
             ..Energies::default()
         };
@@ -159,7 +166,13 @@ impl EnergyTrack {
         let heat = now.heat - first.heat + self.glue_heat_j;
         let soil_heat = now.soil_heat - first.soil_heat;
         let work = now.work - first.work;
+        // f64::max leaves out what is not a number
+        let changed = kinetic.abs().max(potential.abs());
+        let by_changes = changed > base.turnover_j;
         Energies {
+            turnover_j: if by_changes { changed } else { base.turnover_j },
+            by_ports: base.by_ports && !by_changes,
+            by_changes,
             work_j: known(work),
             kinetic_change_j: known(kinetic),
             potential_change_j: known(potential),
@@ -184,6 +197,25 @@ mod tests {
         assert!(!drifting(Some(-0.9), 100.0).is_off() && drifting(Some(-1.1), 100.0).is_off());
         assert!(!drifting(Some(9e-10), 0.0).is_off() && drifting(Some(2e-9), 0.0).is_off());
         assert_eq!(drifting(Some(2.0), 0.0).drift_share(), None);
+    }
+
+    #[test]
+    fn the_drift_is_held_against_the_largest_of_what_was_turned_over() {
+        let at = |kinetic: f64, work: f64| Books { kinetic, potential: 1.0, soil_heat: 0.0, heat: 0.0, work };
+        let of = |track: EnergyTrack| track.figures(&MotorWork::default());
+        let ends = Some((at(0.0, 0.0), at(0.0, 2.0)));
+        let driven = of(EnergyTrack { ends, work_path_j: 2.0, port_path_j: 1.0, ..EnergyTrack::default() });
+        assert_eq!((driven.turnover_j, driven.measure()), (2.0, "of the motors' work"));
+        // a robot that stands: its soil heats, its motors hold
+        let ends = Some((at(0.0, 0.0), at(0.0, 1e-12)));
+        let stands =
+            of(EnergyTrack { ends, work_path_j: 1e-12, port_path_j: 7e-5, ..EnergyTrack::default() });
+        assert_eq!((stands.turnover_j, stands.measure()), (7e-5, "of the work at the ports"));
+        // one that falls
+        let ends = Some((at(0.0, 0.0), at(3.0, 0.0)));
+        let falls = of(EnergyTrack { ends, port_path_j: 1.0, ..EnergyTrack::default() });
+        assert_eq!(falls.turnover_j, 3.0);
+        assert!(falls.by_changes && !falls.by_ports);
     }
 
     #[test]

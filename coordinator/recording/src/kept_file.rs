@@ -24,6 +24,7 @@ impl KeptFile {
     /// Creates the file, or empties it, and locks it. Writers that gather what they write keep the look before each write cheap.
     pub fn create(path: &Path) -> Result<Self> {
         let path = std::path::absolute(path)?;
+        terraglue_subsystem::files::can_create(&path)?;
         let file = File::create(&path)?;
         Self::of(file, path, 0)
     }

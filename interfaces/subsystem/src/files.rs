@@ -1,4 +1,4 @@
-//! Reading input files whole, but never without end: devices and pipes are refused before a byte is read, and so is what is
+//! Reading input files whole, and creating output files, but never without end: devices and pipes are refused before a byte is read, and so is what is
 //! larger than any input can be.
 
 use std::fs::File;
@@ -26,6 +26,22 @@ pub fn open(path: &Path) -> Result<File> {
         () => "a device",
     };
     Err(Error::new(ErrorKind::InvalidInput, format!("it is {what}, not a regular file")))
+}
+
+/// Says before a file is created that nothing would come of it: a pipe that nobody reads holds up its writer for ever. Those of
+/// the shell and standard output, below `/dev` and `/proc`, have a reader.
+///
+/// # Errors
+/// It is a pipe, or a folder.
+pub fn can_create(path: &Path) -> Result<()> {
+    let Ok(kind) = std::fs::metadata(path).map(|m| m.file_type()) else { return Ok(()) };
+    let of_the_system = path.starts_with("/dev") || path.starts_with("/proc");
+    let what = match () {
+        () if kind.is_dir() => "a folder",
+        () if kind.is_fifo() && !of_the_system => "a pipe (FIFO), which may have no reader",
+        () => return Ok(()),
+    };
+    Err(Error::new(ErrorKind::InvalidInput, format!("it is {what}: name a file")))
 }
 
 /// All bytes of a data file.

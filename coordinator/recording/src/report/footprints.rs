@@ -95,8 +95,12 @@ impl Leg {
             let [x, y] = [0, 1].map(|k| outline.iter().map(|p| p[k]).sum::<f64>() / n - print.at[k]);
             x.hypot(y)
         };
-        let nearest = outlines.min_by(|a, b| off(a).total_cmp(&off(b)));
-        nearest.unwrap_or_else(|| circle(print.at, 0.01))
+        let mut outlines: Vec<_> = outlines.collect();
+        outlines.sort_by(|a, b| off(a).total_cmp(&off(b)));
+        // of merged links several shapes may lie in the print: the largest around its place made it
+        let around = outlines.iter().filter(|o| contains(o, print.at));
+        let largest = around.max_by(|a, b| area(a).total_cmp(&area(b)));
+        largest.or(outlines.first()).cloned().unwrap_or_else(|| circle(print.at, 0.01))
     }
 }
 
@@ -146,6 +150,21 @@ fn cut(lowest: f64, level_m: Option<f64>) -> Option<f64> {
 /// A shape whose lowest point is higher above the initial ground than this did not make the print, m; soil heaps up.
 const APART_ABOVE_M: f64 = 0.05;
 
+/// Whether a place lies within a convex outline that runs counter-clockwise.
+fn contains(outline: &[[f64; 2]], at: [f64; 2]) -> bool {
+    let next = outline.iter().cycle().skip(1);
+    let left = |(p, q): (&[f64; 2], &[f64; 2])| {
+        (q[0] - p[0]) * (at[1] - p[1]) - (q[1] - p[1]) * (at[0] - p[0]) >= 0.0
+    };
+    outline.len() > 2 && outline.iter().zip(next).all(left)
+}
+
+/// Area of an outline that runs counter-clockwise, m².
+fn area(outline: &[[f64; 2]]) -> f64 {
+    let next = outline.iter().cycle().skip(1);
+    0.5 * outline.iter().zip(next).map(|(p, q)| p[0] * q[1] - q[0] * p[1]).sum::<f64>()
+}
+
 fn circle(centre: [f64; 2], radius: f64) -> Vec<[f64; 2]> {
     let corner = |k: u32| {
         let angle = TAU * f64::from(k) / f64::from(ROUND);
@@ -189,6 +208,7 @@ mod tests {
     use crate::solids::solids;
     use foxglove::messages::{CubePrimitive, CylinderPrimitive, Pose as MessagePose};
     use foxglove::messages::{SceneEntity, SpherePrimitive};
+    use std::f64::consts::PI;
 
     /// A ball, a box turned by 0.5 rad, a wheel whose axle lies along y, each 4 mm in the ground; all move with `speed`.
     fn recorded(speed: f64) -> Recording {
@@ -238,11 +258,6 @@ mod tests {
         recording
     }
 
-    fn area(outline: &[[f64; 2]]) -> f64 {
-        let next = outline.iter().cycle().skip(1);
-        0.5 * outline.iter().zip(next).map(|(p, q)| p[0] * q[1] - q[0] * p[1]).sum::<f64>()
-    }
-
     #[test]
     fn a_print_has_the_shape_of_what_was_in_the_ground() {
         let recording = recorded(0.0);
@@ -262,6 +277,27 @@ mod tests {
         // as long as the chord of the wheel at the ground, up to the corners of the drawn circle
         let chord = 2.0 * f64::sqrt(0.004 * (0.3 - 0.004));
         assert!((area(&outline(2)) / (0.08 * chord) - 1.0).abs() < 0.05, "{}", area(&outline(2)));
+    }
+
+    #[test]
+    fn of_shapes_in_one_print_the_largest_around_its_place_made_it() {
+        let pose = |place| {
+            Some(MessagePose {
+                position: Some(vector(place)),
+                orientation: Some(quaternion([1.0, 0.0, 0.0, 0.0])),
+            })
+        };
+        let ball =
+            SpherePrimitive { pose: pose([0.002, 0.0, 0.0]), size: Some(vector([0.06; 3])), color: None };
+        let shin =
+            CubePrimitive { pose: pose([0.0; 3]), size: Some(vector([0.004, 0.004, 0.059])), color: None };
+        let mut recording = recorded(0.0);
+        let entity = SceneEntity { spheres: vec![ball], cubes: vec![shin], ..Default::default() };
+        recording.solids.insert("rig/ball".into(), solids(&entity));
+        let legs = legs(&recording);
+        let print = legs[0].single().next().expect("a print");
+        let radius = f64::sqrt(0.004 * (0.06 - 0.004));
+        assert!((area(&legs[0].footprint(&recording, print)) / (PI * radius * radius) - 1.0).abs() < 0.05);
     }
 
     #[test]

@@ -1,7 +1,7 @@
 //! Writes the archive of a unit.
 
 use std::fs::File;
-use std::io::{BufWriter, Write};
+use std::io::{BufWriter, Read, Write};
 use std::path::{Path, PathBuf};
 use zip::write::SimpleFileOptions;
 
@@ -29,7 +29,16 @@ pub fn pack(path: &Path, entries: &[(String, Content)]) -> Result<(), String> {
             path.display()
         ));
     }
+    // an earlier FMU is an archive, which begins with PK
+    let mut first = [b'P', b'K'];
+    let full = File::open(path).is_ok_and(|mut file| file.read_exact(&mut first).is_ok());
+    if full && &first != b"PK" {
+        return Err(format!("{}: is no FMU and would be lost; name another path", path.display()));
+    }
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    if !folder.is_dir() {
+        return Err(format!("{}: there is no folder {}", path.display(), folder.display()));
+    }
     // a name of its own until it is whole
     let part = tempfile::Builder::new().prefix(".unit").tempfile_in(folder);
     let part = part.map_err(|e| failed(path, &e))?;
@@ -76,6 +85,14 @@ mod tests {
         let message = pack(&socket, &entries).expect_err("no file");
         assert!(message.contains("is no file"), "{message}");
         assert!(std::fs::metadata(&socket).expect("stands").file_type().is_socket());
+        let notes = folder.path().join("notes.txt");
+        std::fs::write(&notes, "a week of work").expect("written");
+        assert!(pack(&notes, &entries).expect_err("kept").contains("would be lost"));
+        assert!(
+            pack(&folder.path().join("none/a.fmu"), &entries)
+                .expect_err("no folder")
+                .contains("there is no folder")
+        );
         let file = folder.path().join("unit.fmu");
         for _ in 0..2 {
             pack(&file, &entries).expect("new, and in the place of a file");

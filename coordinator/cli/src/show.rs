@@ -158,12 +158,18 @@ pub fn summary(s: &Summary) -> Table {
         format!("{:.2} mean, {} at most", s.evaluations_mean, s.evaluations_max),
     );
     row("steps not converged", s.steps_not_converged.map_or_else(not_applicable, |n| n.to_string()));
-    row("largest gap", s.max_gap_m.map_or_else(not_applicable, |gap| format!("{gap:.2e} m")));
+    row("largest gap", s.max_gap_m.map_or_else(not_applicable, |gap| format!("{} m", scientific(gap, 2))));
     let gap = s.max_action_reaction_gap_n;
-    row("largest action–reaction gap", gap.map_or_else(not_applicable, |gap| format!("{gap:.2e} N")));
+    row(
+        "largest action–reaction gap",
+        gap.map_or_else(not_applicable, |gap| format!("{} N", scientific(gap, 2))),
+    );
     let error = s.interface_work_error_j;
-    row("interface work error", error.map_or_else(|| "unknown".into(), |e| format!("{e:.2e} J")));
-    row("error of the soil's mass", s.soil_mass_error_relative.map_or_else(none, |e| format!("{e:.1e}")));
+    row(
+        "interface work error",
+        error.map_or_else(|| "unknown".into(), |e| format!("{} J", scientific(e, 2))),
+    );
+    row("error of the soil's mass", s.soil_mass_error_relative.map_or_else(none, |e| scientific(e, 1)));
     t
 }
 
@@ -190,6 +196,11 @@ fn both(electrical: Option<f64>, mechanical: Option<f64>, show: fn(f64) -> Strin
 
 fn work(e: &Energies) -> String {
     format!("{} J driving, {} J braking", fixed(e.driving_j, 1), fixed(e.braking_j, 1))
+}
+
+/// So many decimals and a power of ten; nothing is `0`.
+fn scientific(x: f64, decimals: usize) -> String {
+    if x == 0.0 { "0".into() } else { format!("{x:.decimals$e}") }
 }
 
 /// So many decimals, without the sign of what they round to 0.

@@ -260,8 +260,13 @@ def copy_of_the_repository(folder):
     return folder
 
 
-def xtask():
-    """The program behind `cargo xtask`."""
-    program = pathlib.Path(PROGRAM).resolve().parent / "xtask"
+def beside(name):
+    """A program of the workspace that is built beside `terraglue`."""
+    program = pathlib.Path(PROGRAM).resolve().parent / name
     assert program.is_file(), f"{program} is not there: `cargo build --workspace` makes it"
     return program
+
+
+def xtask(command=""):
+    """The program behind `cargo xtask COMMAND`."""
+    return beside("terraglue-validation" if command in ("validate", "faults", "pictures") else "xtask")

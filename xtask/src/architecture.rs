@@ -2,11 +2,11 @@
 //!
 //! A crate stands one floor above the highest of those that it uses, so every arrow of the drawing runs down.
 
-use crate::process::{Outcome, cargo, read, root, write};
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::Path;
+use xtask_start::process::{Outcome, between, cargo, read, root, write};
 
 /// Folders whose crates are drawn.
 const HOUSE: [&str; 3] = ["interfaces", "modules", "coordinator"];
@@ -188,11 +188,9 @@ fn reaches(rooms: &Rooms, from: &str, to: &str) -> bool {
 
 /// The page with the text between the marks of that name replaced.
 fn replaced(page: &str, name: &str, text: &str) -> Outcome<String> {
-    let (begin, end) = (format!("<!-- {name}: begin -->\n"), format!("<!-- {name}: end -->"));
-    let missing = || format!("docs/architecture.md has no marks `{name}`");
-    let (head, rest) = page.split_once(&begin).ok_or_else(missing)?;
-    let (_, tail) = rest.split_once(&end).ok_or_else(missing)?;
-    Ok(format!("{head}{begin}{text}{end}{tail}"))
+    let marks = (format!("<!-- {name}: begin -->\n"), format!("<!-- {name}: end -->"));
+    let fresh = between(page, (&marks.0, &marks.1), text);
+    fresh.ok_or_else(|| format!("docs/architecture.md has no marks `{name}`"))
 }
 
 #[cfg(test)]

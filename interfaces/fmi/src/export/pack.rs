@@ -24,7 +24,10 @@ pub fn pack(path: &Path, entries: &[(String, Content)]) -> Result<(), String> {
     let failed = |what: &Path, e: &dyn std::fmt::Display| format!("{}: {e}", what.display());
     // the archive is renamed into its place: what is no file there (`/dev/null`, a pipe) would be gone
     if std::fs::metadata(path).is_ok_and(|m| !m.is_file()) {
-        return Err(format!("{}: is no file: the archive cannot take its place; name another path", path.display()));
+        return Err(format!(
+            "{}: is no file: the archive cannot take its place; name another path",
+            path.display()
+        ));
     }
     let folder = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
     // a name of its own until it is whole

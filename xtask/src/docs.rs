@@ -12,7 +12,7 @@ pub fn write_all() -> Outcome {
     architecture::run(false)?;
     must(&mut validation(&["pictures"]))?;
     must(&mut validation(&["faults"]))?;
-    must(&mut validation(&["validate", "--quick", "--no-timing", "--write-docs"]))?;
+    must(&mut validation(&["validate", "--quick", "--write-docs"]))?;
     claims()
 }
 

@@ -11,7 +11,7 @@ pub fn test() -> Outcome {
     let python = virtual_environment()?;
     let tests = ["-m", "pytest", "-q", "tests/python"];
     must(command(python, &tests).env("TERRAGLUE_BIN", program("debug")).env("PYTHONDONTWRITEBYTECODE", "1"))?;
-    must(&mut validation(&["validate", "--quick", "--no-timing", "--check-docs"]))
+    must(&mut validation(&["validate", "--quick", "--check-docs"]))
 }
 
 /// The Python of `target/venv`, with what `tests/python/requirements.txt` asks for.

@@ -4,6 +4,7 @@
 
 use super::*;
 use crate::contact::{PortOwner, PortSet};
+use terraglue_numerics::extremes::larger;
 use terraglue_scenario::{FormChoice, GluingSpec, StartChoice, StrategyKind};
 use terraglue_subsystem::{
     Error, Input, Kind, Law, Level, Motion, Port, PortKind, Response, Result as CallResult, Step, Subsystem,
@@ -156,7 +157,7 @@ impl Subsystem for Columns {
     fn commit(&mut self, step: &Step, _: &[f64], partner: &Motion) -> CallResult {
         for i in 0..step.ports.len() {
             self.z[i] -= partner.x[i];
-            self.z_max[i] = self.z_max[i].max(self.z[i]);
+            self.z_max[i] = larger(self.z_max[i], self.z[i]);
         }
         Ok(())
     }
@@ -200,7 +201,7 @@ fn spec(strategy: &str, form: &str, start: &str) -> GluingSpec {
 
 /// Mean and largest number of evaluations of the soil, T of foot 0 and the heave at the end.
 fn run(spec: &GluingSpec, factor: f64, h: f64, rock: bool) -> (f64, u32, f64, f64) {
-    let duration = if h < 0.002 { 0.02 } else { 0.1 };
+    let duration = if h < 0.0012 { 0.02 } else { 0.1 };
     let found = ports();
     let table = Instance::new("table", "test", Kind::Robot, Box::new(Table::new((0.05, 0.02))));
     let columns = Instance::new("soil", "test", Kind::Soil, Box::new(Columns::new(factor, rock)));
@@ -221,7 +222,7 @@ fn run(spec: &GluingSpec, factor: f64, h: f64, rock: bool) -> (f64, u32, f64, f6
         assert!(strategy.name() == cooperative::NAME || report.evaluations_bodies <= 4, "{report:?}");
         let evaluations = report.evaluations_soil.max(1);
         sum += evaluations;
-        most = most.max(evaluations);
+        most = larger(most, evaluations);
     }
     (f64::from(sum) / steps as f64, most, exchange.t[0], heave)
 }
@@ -273,7 +274,14 @@ fn auto_changes_the_form_by_kappa_and_the_start_from_the_estimate_saves_evaluati
 
 #[test]
 fn the_single_pass_is_one_evaluation_and_first_order_in_h() {
-    let deep = |h| run(&spec(cooperative::NAME, "auto", "estimate"), 1.0, h, false);
-    let (mean, most, ..) = deep(0.01);
-    assert!(mean == 1.0 && most == 1, "{mean} {most}");
+    let heave = |h| {
+        let (mean, most, _, heave) = run(&spec(cooperative::NAME, "auto", "estimate"), 1.0, h, false);
+        assert!(mean == 1.0 && most == 1, "{mean} {most}");
+        heave
+    };
+    let heaves = [0.01, 0.005, 0.0025, 0.00125].map(heave);
+    let changes: Vec<f64> = heaves.windows(2).map(|pair| pair[0] - pair[1]).collect();
+    let orders: Vec<f64> = changes.windows(2).map(|pair| (pair[0] / pair[1]).log2()).collect();
+    println!("heaves {heaves:?}: orders {orders:?}");
+    assert!(orders.iter().all(|order| (0.8..1.25).contains(order)), "{orders:?} of {heaves:?}");
 }

@@ -47,7 +47,7 @@ pub fn check_area(area: &str, figures: &[Figure]) -> Outcome<Vec<String>> {
 fn differences(table: &str, figures: &[Figure]) -> Vec<String> {
     let cells = |line: &str| line.split(" | ").map(|c| c.trim_matches(['|', ' ', '`']).to_owned()).collect();
     let rows: Vec<Vec<String>> = table.lines().filter(|line| line.starts_with("| `")).map(cells).collect();
-    let cure = "run `cargo xtask docs` or `cargo xtask validate AREA --quick --no-timing --write-docs`";
+    let cure = "run `cargo xtask docs` or `cargo xtask validate AREA --quick --write-docs`";
     let mut wrong = Vec::new();
     for figure in figures {
         let shown = rows.iter().find(|row| row[0] == figure.id);

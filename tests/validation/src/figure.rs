@@ -50,17 +50,39 @@ pub struct Figure {
     pub pass: Option<bool>,
     /// What it is, with its unit.
     pub what: String,
+    /// Whether the machine and the moment change it by factors, as they do times and memory: it is not held against its stored value.
+    pub noisy: bool,
+    /// Whether a clock measures it: it is judged under `--timing` only.
+    pub timed: bool,
 }
 
 impl Figure {
     /// A measured figure.
     pub fn new(id: impl Into<String>, value: f64, limit: Limit, what: impl Into<String>) -> Self {
-        Self { id: id.into(), value: Some(value), limit, pass: Some(limit.holds(value)), what: what.into() }
+        let pass = Some(limit.holds(value));
+        let (id, what) = (id.into(), what.into());
+        Self { id, value: Some(value), limit, pass, what, noisy: false, timed: false }
+    }
+
+    /// The same, changed by factors by the machine and the moment.
+    pub fn noisy(self) -> Self {
+        Self { noisy: true, ..self }
+    }
+
+    /// The same, measured by a clock.
+    pub fn timed(self) -> Self {
+        Self { timed: true, ..self.noisy() }
+    }
+
+    /// The same, reported and not judged.
+    pub fn unjudged(self) -> Self {
+        Self { pass: None, ..self }
     }
 
     /// A figure that does not apply or cannot be measured here.
     pub fn skipped(id: impl Into<String>, why: impl Into<String>) -> Self {
-        Self { id: id.into(), value: None, limit: Limit::None, pass: None, what: why.into() }
+        let (id, what) = (id.into(), why.into());
+        Self { id, value: None, limit: Limit::None, pass: None, what, noisy: false, timed: false }
     }
 
     /// The value in words.
@@ -75,12 +97,13 @@ impl Figure {
         }
     }
 
-    /// `pass`, `fail`, `info` (nothing that it could fail) or `skip` (not measured).
+    /// `pass`, `fail`, `info` (not judged, or nothing that it could fail) or `skip` (not measured).
     pub fn verdict(&self) -> &'static str {
         match self.pass {
             Some(true) if self.limit == Limit::None => "info",
             Some(true) => "pass",
             Some(false) => "fail",
+            None if self.value.is_some() => "info",
             None => "skip",
         }
     }
@@ -103,6 +126,8 @@ mod tests {
         assert_eq!(Figure::new("a", 2.0, Limit::None, "share").line(), "a\t2\t-\tinfo\tshare");
         assert_eq!(Figure::new("a", 2.0, Limit::AtMost(2.0), "share").verdict(), "pass");
         assert_eq!(Figure::new("a", 1.5e-9, Limit::None, "").value_text(), "1.500e-9");
+        let slow = Figure::new("a", 2.0, Limit::AtMost(1.0), "s").timed();
+        assert_eq!((slow.verdict(), slow.clone().unjudged().verdict()), ("fail", "info"));
     }
 
     #[test]

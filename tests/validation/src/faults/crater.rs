@@ -2,6 +2,7 @@
 
 use super::walk::{Place, Walk};
 use crate::process::Outcome;
+use terraglue_numerics::extremes::larger;
 
 /// Largest torque of every motor, N m.
 const TORQUES: [f64; 4] = [60.0, 8.0, 4.0, 2.0];
@@ -23,7 +24,7 @@ pub fn table(place: &Place) -> Outcome<String> {
 fn row(torque: f64, walk: &Walk) -> String {
     let number = |key: &str| walk.summary[key].as_f64().unwrap_or(f64::NAN);
     let highest =
-        walk.z.iter().copied().fold(f64::NEG_INFINITY, f64::max) - walk.z.first().copied().unwrap_or(0.0);
+        walk.z.iter().copied().fold(f64::NEG_INFINITY, larger) - walk.z.first().copied().unwrap_or(0.0);
     let (distance, energy) = (number("distance_m"), number("energy_j"));
     let per_metre =
         if distance.abs() < 0.1 { "–".to_owned() } else { format!("{:.0} J/m", energy / distance.abs()) };

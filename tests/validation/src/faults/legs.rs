@@ -2,6 +2,7 @@
 
 use super::walk::{Place, Walk};
 use crate::process::Outcome;
+use terraglue_numerics::extremes::{larger, smaller};
 
 /// What is run: name in the table, name in the picture, scenario, options.
 const CASES: [(&str, &str, &str, &[&str]); 4] = [
@@ -62,8 +63,8 @@ impl Legs {
                     format!("{:.0} | {:.0}", path / half_path, heading / half_heading),
                 ],
             };
-            let lowest = walk.z.iter().copied().fold(f64::INFINITY, f64::min);
-            let tilt = walk.tilt.iter().copied().fold(0.0, f64::max).to_degrees();
+            let lowest = walk.z.iter().copied().fold(f64::INFINITY, smaller);
+            let tilt = walk.tilt.iter().copied().fold(0.0, larger).to_degrees();
             text += &format!(
                 "| {} | {effect} | {half_path:.1} mm | {half_heading:.2}° | {ratio} | {lowest:.2} m | {tilt:.1}° |\n",
                 CASES[k].0

@@ -3,6 +3,7 @@
 use crate::process::{Outcome, run_scenario};
 use serde_json::Value;
 use std::path::PathBuf;
+use terraglue_numerics::extremes::larger;
 
 /// Where the program is and where runs leave their files.
 pub struct Place {
@@ -79,8 +80,8 @@ impl Walk {
         let (mut path, mut heading) = (0.0_f64, 0.0_f64);
         for (k, t) in self.t.iter().enumerate() {
             let at = |values: &[f64]| other.between(*t, values);
-            path = path.max((self.x[k] - at(&other.x)).hypot(self.y[k] - at(&other.y)));
-            heading = heading.max((self.yaw[k] - at(&other.yaw)).abs().to_degrees());
+            path = larger(path, (self.x[k] - at(&other.x)).hypot(self.y[k] - at(&other.y)));
+            heading = larger(heading, (self.yaw[k] - at(&other.yaw)).abs().to_degrees());
         }
         Ok((1e3 * path, heading))
     }

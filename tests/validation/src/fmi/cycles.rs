@@ -45,7 +45,8 @@ pub fn figures(folder: &Path, quick: bool) -> Outcome<Vec<Figure>> {
             grown(now.memory, early.memory),
             Limit::AtMost(1.0),
             what("MiB of memory"),
-        ),
+        )
+        .noisy(),
     ])
 }
 

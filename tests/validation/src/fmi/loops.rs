@@ -4,6 +4,7 @@ use super::{built, testbed, units};
 use crate::process::Outcome;
 use crate::{Figure, Limit};
 use std::path::Path;
+use terraglue_numerics::extremes::{larger, smaller};
 
 const HEAD: &str = "[time]\nstep_s = 0.1\nduration_s = 0.1\n";
 
@@ -20,7 +21,7 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
     unit("square", "v[2] = 0.5 + 0.2 * v[0] * v[0];")?;
     unit("mixed", "v[2] = exp(-v[0]) + 0.3 * v[1];")?;
     let linear = solved(folder, &[("a", "gain"), ("b", "sum")], &[("b.y", "a.u"), ("a.y", "b.u")], |y| {
-        [(y[0] - (3.0 - 2.0 * y[1])).abs(), (y[1] - (1.0 + 0.5 * y[0])).abs()].into_iter().fold(0.0, f64::max)
+        [(y[0] - (3.0 - 2.0 * y[1])).abs(), (y[1] - (1.0 + 0.5 * y[0])).abs()].into_iter().fold(0.0, larger)
     })?;
     let three = solved(
         folder,
@@ -29,7 +30,7 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
         |v| {
             let [x, y, z] = [v[0], v[1], v[2]];
             let left = [x - y.cos(), y - 0.5 - 0.2 * z * z, z - (-x).exp() - 0.3 * y];
-            left.into_iter().map(f64::abs).fold(0.0, f64::max)
+            left.into_iter().map(f64::abs).fold(0.0, larger)
         },
     )?;
     // outputs in steps of 1e-4, which no difference of 1e-7 can see
@@ -42,7 +43,7 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
     let text = scenario(&[("a", "coarse"), ("b", "fine")], &[("b.y", "a.u"), ("a.y", "b.u")]);
     let solved_so = built(folder, &text)?;
     let asked =
-        solved_so.read("a.asked").unwrap_or(f64::NAN).min(solved_so.read("b.asked").unwrap_or(f64::NAN));
+        smaller(solved_so.read("a.asked").unwrap_or(f64::NAN), solved_so.read("b.asked").unwrap_or(f64::NAN));
     let text = scenario(&[("a", "one"), ("b", "same")], &[("b.y", "a.u"), ("a.y", "b.u")]);
     let said = testbed(folder, &text).err().map(|e| e.to_string()).unwrap_or_default();
     let named = ["a.y → b.u", "b.y → a.u", "no solution"].iter().all(|word| said.contains(word));

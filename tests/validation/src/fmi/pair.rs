@@ -6,6 +6,7 @@ use super::{built, units};
 use crate::process::{Outcome, command};
 use crate::{Figure, Limit};
 use std::path::Path;
+use terraglue_numerics::extremes::larger;
 
 const STEPS: u32 = 2000;
 const H: f64 = 1e-3;
@@ -59,7 +60,7 @@ fn off(found: &[f64], wanted: &[f64]) -> f64 {
         return f64::NAN;
     }
     let all = found.iter().zip(wanted).map(|(a, b)| (a - b).abs() / X0);
-    all.fold(0.0, |m: f64, e| if e.is_nan() { f64::INFINITY } else { m.max(e) })
+    all.fold(0.0, larger)
 }
 
 fn on_a_spring(folder: &Path, peers: bool) -> Outcome<Vec<Figure>> {
@@ -140,7 +141,7 @@ fn worst(folder: &Path, gluing: &str) -> Outcome<f64> {
         x += H * v;
         for name in ["left.x", "right.x"] {
             let found = testbed.read(name).unwrap_or(f64::NAN);
-            worst = if found.is_nan() { f64::NAN } else { worst.max((found - x).abs()) };
+            worst = larger(worst, (found - x).abs());
         }
     }
     Ok(worst / X0)

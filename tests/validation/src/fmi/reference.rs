@@ -8,6 +8,7 @@ use super::folder;
 use crate::process::{Outcome, command};
 use crate::{Context, Figure, Limit};
 use std::path::{Path, PathBuf};
+use terraglue_numerics::extremes::{larger, smaller};
 
 /// Largest difference of a real, as a share of its range.
 const SHARE: f64 = 1e-3;
@@ -49,8 +50,8 @@ fn roberts(context: &Context, unit: &Path) -> Outcome<f64> {
     let mut worst = 0.0_f64;
     for (row, y1, y3) in KNOWN {
         let cell = |k: usize| rows.get(row).and_then(|r| r.get(k)?.parse::<f64>().ok()).unwrap_or(f64::NAN);
-        let off = (cell(1) - y1).abs().max((cell(2) - y3).abs());
-        worst = if off.is_nan() { f64::INFINITY } else { worst.max(off) };
+        let off = larger((cell(1) - y1).abs(), (cell(2) - y3).abs());
+        worst = larger(worst, off);
     }
     Ok(worst)
 }
@@ -118,7 +119,7 @@ fn worst(context: &Context, unit: &Path, table: &Path) -> Outcome<f64> {
         let [a, b] = [(&rows, theirs), (&ours, column)].map(|(table, c)| {
             table.iter().map(|r| r.get(c).cloned().unwrap_or_default()).collect::<Vec<_>>()
         });
-        worst = worst.max(difference(name, &a, &b)?);
+        worst = larger(worst, difference(name, &a, &b)?);
     }
     Ok(worst)
 }
@@ -184,8 +185,8 @@ fn difference(name: &str, rows: &[String], ours: &[String]) -> Outcome<f64> {
             None => Ok(0.0),
         };
     };
-    let range = numbers.iter().fold(f64::NEG_INFINITY, |m, x| m.max(*x))
-        - numbers.iter().fold(f64::INFINITY, |m, x| m.min(*x));
+    let range = numbers.iter().fold(f64::NEG_INFINITY, |m, x| larger(m, *x))
+        - numbers.iter().fold(f64::INFINITY, |m, x| smaller(m, *x));
     let range = if range > 0.0 { range } else { 1.0 };
     // A jump: a change between neighbours that is far larger than usual.
     let jumps = |k: usize| k > 0 && (numbers[k] - numbers[k - 1]).abs() > 0.1 * range;

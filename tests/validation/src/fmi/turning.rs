@@ -8,6 +8,7 @@ use nalgebra::Vector3;
 use std::fmt::Write;
 use std::path::Path;
 use terraglue::Testbed;
+use terraglue_numerics::extremes::larger;
 
 const STEPS: u32 = 2000;
 const H: f64 = 1e-3;
@@ -77,11 +78,6 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
             format!("{what}: largest change of the angular momentum, relative"),
         ),
     ])
-}
-
-/// The larger; NaN where one is none.
-fn larger(a: f64, b: f64) -> f64 {
-    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }
 
 /// All that is told of a body whose centre of mass lies at `com` in it, for that centre.

@@ -1,6 +1,7 @@
 //! Richardson's extrapolation of runs with halved steps: what a strategy and an integrator tend to as h → 0.
 
 use crate::process::Outcome;
+use terraglue_numerics::extremes::larger;
 
 /// Limits of several quantities, and how far the last two estimates lie apart.
 pub struct Limits {
@@ -24,7 +25,7 @@ pub fn extrapolate(h: f64, powers: &[i32], run: impl Fn(f64) -> Outcome<Vec<f64>
             .map(|w| w[0].iter().zip(&w[1]).map(|(coarse, fine)| fine + share * (fine - coarse)).collect())
             .collect();
         if let [.., a, b] = rows.as_slice() {
-            apart = a.iter().zip(b).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+            apart = a.iter().zip(b).fold(0.0_f64, |m, (a, b)| larger(m, (a - b).abs()));
         }
     }
     Ok(Limits { values: rows.pop().unwrap_or_default(), apart })
@@ -35,7 +36,7 @@ const SAME_S: f64 = 1e-12;
 
 /// A step near `wanted` of which all times are multiples; times of one batch of [`batches`].
 pub fn common_step(times: &[f64], wanted: f64) -> f64 {
-    let unit = common_unit(times).unwrap_or_else(|| times.iter().copied().fold(wanted, f64::max));
+    let unit = common_unit(times).unwrap_or_else(|| times.iter().copied().fold(wanted, larger));
     unit / (unit / wanted).ceil().max(1.0)
 }
 

@@ -7,6 +7,7 @@ use super::six_feet::{Table, columns};
 use super::{Context, Figure, Limit};
 use crate::process::{Outcome, read as read_file, root};
 use terraglue::Testbed;
+use terraglue_numerics::extremes::{larger, smaller};
 
 const GRAVITY: [f64; 3] = [0.0, 0.0, -9.81];
 
@@ -63,9 +64,9 @@ fn apart(mut a: Testbed, mut b: Testbed, steps: u64) -> Outcome<(f64, usize)> {
     step(&mut a, steps, |a| {
         b.step().map_err(|e| e.to_string())?;
         for (p, q) in a.report().ports.iter().zip(&b.report().ports) {
-            worst = worst.max((p.wrench[0] - q.wrench[0]).abs() / p.wrench[0].abs().max(1.0));
+            worst = larger(worst, (p.wrench[0] - q.wrench[0]).abs() / p.wrench[0].abs().max(1.0));
         }
-        fewest = fewest.min(a.report().ports.iter().filter(|p| p.t_star_n > 0.0).count());
+        fewest = smaller(fewest, a.report().ports.iter().filter(|p| p.t_star_n > 0.0).count());
         Ok(())
     })?;
     Ok((worst, fewest))
@@ -120,7 +121,7 @@ fn clamped_pass() -> Outcome<Vec<Figure>> {
         let (mut up, mut count): (f64, u32) = (0.0, 0);
         while count < 40 || testbed.t_s() < 0.3 {
             testbed.step().map_err(|e| e.to_string())?;
-            up = up.max(-read(&testbed, "foot.heave_rate")?);
+            up = larger(up, -read(&testbed, "foot.heave_rate")?);
             count += 1;
         }
         let error = read(&testbed, "soil.max_sinkage")? / exact - 1.0;
@@ -169,7 +170,7 @@ fn falls() -> Outcome<Vec<Figure>> {
         let mut testbed = build(&lunar().text(&setting("cooperative", 0.001), "implicit-euler", further))?;
         let mut up: f64 = 0.0;
         step(&mut testbed, 300, |testbed| {
-            up = up.max(-read(testbed, "foot.heave_rate")?);
+            up = larger(up, -read(testbed, "foot.heave_rate")?);
             Ok(())
         })?;
         Ok::<_, String>((up, read(&testbed, "soil.max_sinkage")?))
@@ -189,7 +190,7 @@ fn count(text: &str, steps: u64) -> Outcome<(Testbed, f64, u32)> {
     step(&mut testbed, steps, |testbed| {
         let e = testbed.report().evaluations_soil.max(testbed.report().evaluations_bodies);
         sum += e;
-        most = most.max(e);
+        most = larger(most, e);
         Ok(())
     })?;
     Ok((testbed, f64::from(sum) / steps as f64, most))
@@ -296,7 +297,7 @@ fn indeterminate_estimate() -> Outcome<Vec<Figure>> {
         Ok((t_star, t))
     };
     let (forward, backward) = (order(false)?, order(true)?);
-    let largest = |a: &[f64], b: &[f64]| a.iter().zip(b).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+    let largest = |a: &[f64], b: &[f64]| a.iter().zip(b).fold(0.0_f64, |m, (a, b)| larger(m, (a - b).abs()));
     let figure = |name: &str, value: f64, limit: f64, what: &str| {
         Figure::new(format!("gluing.estimate.{name}"), value, Limit::AtMost(limit), what)
     };
@@ -335,7 +336,7 @@ fn sweeps() -> Vec<Figure> {
             for i in order {
                 let w = (0..6).map(|j| g(i, j) * t[j]).sum::<f64>() - h * h * 9.81;
                 let new = (t[i] - w / g(i, i)).max(0.0);
-                change = change.max((new - t[i]).abs());
+                change = larger(change, (new - t[i]).abs());
                 t[i] = new;
             }
             if change < 1e-12 {
@@ -346,8 +347,8 @@ fn sweeps() -> Vec<Figure> {
     };
     let (a, b) = (solve([0, 1, 2, 3, 4, 5]), solve([5, 4, 3, 2, 1, 0]));
     let moved = |t: &[f64; 6], i: usize| (0..6).map(|j| g(i, j) * t[j]).sum::<f64>();
-    let motion = (0..6).map(|i| (moved(&a, i) - moved(&b, i)).abs()).fold(0.0, f64::max);
-    let force = (0..6).map(|i| (a[i] - b[i]).abs()).fold(0.0, f64::max);
+    let motion = (0..6).map(|i| (moved(&a, i) - moved(&b, i)).abs()).fold(0.0, larger);
+    let force = (0..6).map(|i| (a[i] - b[i]).abs()).fold(0.0, larger);
     vec![
         Figure::new(
             "gluing.estimate.sweeps.force",

@@ -5,6 +5,7 @@ use super::rig::{Setting, build, list, read, subsystem, wrench};
 use super::table::Answers;
 use crate::process::Outcome;
 use terraglue::Testbed;
+use terraglue_numerics::extremes::larger;
 
 /// A foot and its soil.
 #[derive(Clone, Copy, Debug)]
@@ -108,12 +109,12 @@ fn fall(foot: &Foot, h: f64) -> Outcome<Fall> {
         let t = testbed.t_s();
         v = [v[1], read(&testbed, "foot.heave_rate")?];
         f = [f[1], f[2], wrench(&testbed, 0, 0)];
-        out.f_max = out.f_max.max(f[2]);
+        out.f_max = larger(out.f_max, f[2]);
         if out.t_z_max == 0.0 && v[1] <= 0.0 {
             out.t_z_max = t - h * crossing(v[0], v[1]);
         }
         if f[2] > 0.0 {
-            out.v_up = out.v_up.max(-v[1]);
+            out.v_up = larger(out.v_up, -v[1]);
         } else if out.t_z_max > 0.0 {
             // the force falls on a straight line to zero in the last step
             let share = (f[1] / (f[0] - f[1])).min(1.0);

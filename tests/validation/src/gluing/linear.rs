@@ -5,6 +5,7 @@ use super::oscillator::Oscillator;
 use super::rig::{Setting, Tally, build, read, step, wrench};
 use super::{Context, Figure, Limit};
 use crate::process::Outcome;
+use terraglue_numerics::extremes::larger;
 
 /// All figures of the part.
 pub fn figures(_: &Context) -> Outcome<Vec<Figure>> {
@@ -66,7 +67,7 @@ fn order_and_energy() -> Outcome<Vec<Figure>> {
     step(&mut testbed, 100, |testbed| {
         let e = testbed.energy();
         let t = wrench(testbed, 0, 0);
-        worst = worst.max((e.kinetic + e.potential + 0.5 * t * t / k - start).abs() / start);
+        worst = larger(worst, (e.kinetic + e.potential + 0.5 * t * t / k - start).abs() / start);
         Ok(())
     })?;
     let lowest = slow[0].min(slow[1]);
@@ -97,7 +98,7 @@ fn against_the_uncut() -> Outcome<Vec<Figure>> {
             step(&mut cut, 100, |cut| {
                 whole.step().map_err(|e| e.to_string())?;
                 for (a, b) in [("a.m0.x", "all.m0.x"), ("b.m0.x", "all.m1.x")] {
-                    worst = worst.max((read(cut, a)? - read(&whole, b)?).abs());
+                    worst = larger(worst, (read(cut, a)? - read(&whole, b)?).abs());
                 }
                 Ok(())
             })?;
@@ -202,7 +203,7 @@ fn other_strategies() -> Outcome<Vec<Figure>> {
         let mut worst: f64 = 0.0;
         step(&mut cut, 100, |cut| {
             whole.step().map_err(|e| e.to_string())?;
-            worst = worst.max((read(cut, "a.m0.x")? - read(&whole, "all.m0.x")?).abs());
+            worst = larger(worst, (read(cut, "a.m0.x")? - read(&whole, "all.m0.x")?).abs());
             Ok(())
         })?;
         let what = "largest difference of two masses glued rigidly from one mass over 1 s, m";
@@ -217,7 +218,7 @@ fn other_strategies() -> Outcome<Vec<Figure>> {
             step(&mut testbed, steps_to(1.0, h), |testbed| {
                 let t = testbed.t_s() * std::f64::consts::TAU;
                 let exact = 0.5 * (t.cos() + (3.0 * t).cos());
-                worst = worst.max((read(testbed, "a.m0.x")? - exact).abs());
+                worst = larger(worst, (read(testbed, "a.m0.x")? - exact).abs());
                 Ok(())
             })?;
             Ok::<_, String>(worst)

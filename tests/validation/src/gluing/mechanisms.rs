@@ -6,6 +6,7 @@ use super::rig::{Setting, Tally, build, read, step, wrench};
 use super::{Context, Figure, Limit};
 use crate::process::{Outcome, read as read_file, root};
 use std::f64::consts::FRAC_PI_2;
+use terraglue_numerics::extremes::{larger, smaller};
 
 /// A mechanism with its reference: a column of a table per angle.
 pub(super) struct Case {
@@ -153,7 +154,7 @@ fn parallelogram(until: f64) -> Vec<Vec<f64>> {
 /// Largest difference, `b` taken at every `stride`th row.
 pub(super) fn largest(a: &[Vec<f64>], b: &[Vec<f64>], stride: usize) -> f64 {
     let reference = b.iter().skip(stride - 1).step_by(stride);
-    a.iter().zip(reference).flat_map(|(a, b)| a.iter().zip(b)).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
+    a.iter().zip(reference).flat_map(|(a, b)| a.iter().zip(b)).fold(0.0, |m, (a, b)| larger(m, (a - b).abs()))
 }
 
 fn errors(case: &Case) -> Outcome<Vec<Figure>> {
@@ -168,7 +169,7 @@ fn errors(case: &Case) -> Outcome<Vec<Figure>> {
             let at = steps_to(numbers[0], 0.005) as usize;
             if let Some(row) = reference.get(at.wrapping_sub(1)) {
                 for (value, column) in row.iter().zip(case.columns) {
-                    apart = apart.max((value - numbers[*column]).abs());
+                    apart = larger(apart, (value - numbers[*column]).abs());
                 }
             }
         }
@@ -188,7 +189,7 @@ fn errors(case: &Case) -> Outcome<Vec<Figure>> {
     ));
     let coarse = largest(&run(case, 0.01, 0.01)?.0, &reference, 2);
     let fine = largest(&run(case, 0.0025, 0.005)?.0, &reference, 1);
-    let order = (coarse / error).log2().min((error / fine).log2());
+    let order = smaller((coarse / error).log2(), (error / fine).log2());
     all.push(Figure::new(id("order"), order, Limit::AtLeast(1.95), "observed order from 10, 5 and 2.5 ms"));
     Ok(all)
 }
@@ -207,7 +208,7 @@ fn against_the_uncut() -> Outcome<Vec<Figure>> {
             whole.step().map_err(|e| e.to_string())?;
             tally.add(cut);
             for (a, b) in [("first.b0.angle", "all.b0.angle"), ("second.b0.angle", "all.b1.angle")] {
-                worst = worst.max((read(cut, a)? - read(&whole, b)?).abs());
+                worst = larger(worst, (read(cut, a)? - read(&whole, b)?).abs());
             }
             Ok(())
         })?;
@@ -238,7 +239,7 @@ fn jacobians() -> Outcome<Vec<Figure>> {
     let mut all = Vec::new();
     for jacobian in ["directional", "finite-differences", "broyden"] {
         let (other, tally) = run(jacobian, 200)?;
-        let apart = (own[0] - other[0]).abs().max((own[1] - other[1]).abs());
+        let apart = larger((own[0] - other[0]).abs(), (own[1] - other[1]).abs());
         let id = |name: &str| format!("gluing.jacobian.{jacobian}.{name}");
         let what = "largest difference of an angle after 1 s from analytic Jacobians, rad";
         all.push(Figure::new(id("difference"), apart, Limit::AtMost(1e-8), what));
@@ -275,7 +276,7 @@ fn wrong_start() -> Outcome<Vec<Figure>> {
         let mut last: f64 = 0.0;
         step(&mut right, 100, |right| {
             wrong.step().map_err(|e| e.to_string())?;
-            last = (0..2).map(|c| (wrench(right, 0, c) - wrench(&wrong, 0, c)).abs()).fold(0.0, f64::max);
+            last = (0..2).map(|c| (wrench(right, 0, c) - wrench(&wrong, 0, c)).abs()).fold(0.0, larger);
             Ok(())
         })?;
         let what = "difference of T 100 steps after a start with T(t0) wrong by 1 %, N";

@@ -5,6 +5,7 @@ use super::parameters::Parameters;
 use super::rig::{Setting, build, list, read, step, subsystem, wrench};
 use super::table::Answers;
 use crate::process::Outcome;
+use terraglue_numerics::extremes::larger;
 
 /// Masses, springs and dampers to the ground, start, and the glue between the masses.
 #[derive(Clone, Debug)]
@@ -108,7 +109,7 @@ pub fn answer(p: Parameters, rows: &[(Option<f64>, String)]) -> Outcome<Answers>
     let limits = extrapolate(h, &[2, 4, 6], |h| {
         let mut testbed = build(&case.cut(&Setting::iterative(h, [0.0; 3])))?;
         let mut out = vec![f64::NAN; rows.len()];
-        let last = times.iter().fold(0.0_f64, |m, t| m.max(*t));
+        let last = times.iter().fold(0.0_f64, |m, t| larger(m, *t));
         let mut count = 0;
         step(&mut testbed, steps_to(last, h), |testbed| {
             count += 1;

@@ -154,7 +154,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     }
     let [exchange, whole, inside] = measure()?.map(|s| 1e6 * s);
     let figure = |name: &str, value: f64, limit: Limit, what: String| {
-        Figure::new(format!("gluing.overhead.{name}"), value, limit, what)
+        Figure::new(format!("gluing.overhead.{name}"), value, limit, what).timed()
     };
     Ok(vec![
         figure(

@@ -5,6 +5,7 @@ use super::parameters::Parameters;
 use super::rig::{Setting, build, list, read, step, subsystem, wrench};
 use super::table::Answers;
 use crate::process::Outcome;
+use terraglue_numerics::extremes::larger;
 
 /// Standard gravity of the reference cases along −y, m/s².
 pub const GRAVITY: [f64; 3] = [0.0, -9.81, 0.0];
@@ -159,7 +160,7 @@ fn mechanism(case: &str, p: Parameters) -> Outcome<Mechanism> {
 pub fn answer(case: &str, p: Parameters, rows: &[(Option<f64>, String)]) -> Outcome<Answers> {
     let mechanism = mechanism(case, p)?;
     let times: Vec<f64> = rows.iter().filter_map(|r| r.0).collect();
-    let last = times.iter().fold(0.0_f64, |m, t| m.max(*t));
+    let last = times.iter().fold(0.0_f64, |m, t| larger(m, *t));
     let h = common_step(&times, 0.0025);
     let limits = extrapolate(h, &[2, 3, 4, 5], |h| {
         // rounding of a place of 1 m is 1e-8 N at the shortest of these steps

@@ -6,6 +6,7 @@ use std::fmt::Write;
 use terraglue::Testbed;
 use terraglue::scenario::Scenario;
 use terraglue::testbed::Options;
+use terraglue_numerics::extremes::larger;
 
 /// `[time]`, `[world]` and `[gluing]` of a case.
 #[derive(Clone, Debug)]
@@ -105,9 +106,9 @@ impl Tally {
         let report = testbed.report();
         self.steps += 1;
         self.bodies += report.evaluations_bodies;
-        self.most = self.most.max(report.evaluations_bodies);
+        self.most = larger(self.most, report.evaluations_bodies);
         self.refreshes += report.jacobian_refreshes;
-        self.gap = self.gap.max(report.max_gap_m);
+        self.gap = larger(self.gap, report.max_gap_m);
     }
 
     /// Evaluations of the bodies per step.

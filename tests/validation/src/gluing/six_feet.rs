@@ -5,6 +5,7 @@ use super::parameters::Parameters;
 use super::rig::{Setting, build, list, read, step, subsystem, wrench};
 use super::table::Answers;
 use crate::process::Outcome;
+use terraglue_numerics::extremes::larger;
 
 /// Where the feet stand, m.
 pub const FEET: [[f64; 2]; 6] = [[0.4, 0.3], [0.0, 0.3], [-0.4, 0.3], [0.4, -0.3], [0.0, -0.3], [-0.4, -0.3]];
@@ -127,14 +128,14 @@ fn falling(table: &Table, p: Parameters, rows: &[(Option<f64>, String)]) -> Outc
     let k_u: Vec<f64> = k.iter().map(|k| ratio * k).collect();
     let soil = [("K", list(&k)), ("n", list(&[n])), ("k_u", list(&k_u))];
     let times: Vec<f64> = rows.iter().filter_map(|r| r.0).collect();
-    let last = times.iter().fold(0.0_f64, |m, t| m.max(*t));
+    let last = times.iter().fold(0.0_f64, |m, t| larger(m, *t));
     let stiffest = k_u.iter().sum::<f64>() / table.mass;
     let h = common_step(&times, 0.001 / stiffest.sqrt());
     let mut testbed = build(&table.text(&Setting::iterative(h, GRAVITY), &soil))?;
     let (mut values, mut peak, mut count) = (vec![f64::NAN; rows.len()], 0.0_f64, 0);
     step(&mut testbed, steps_to(last, h), |testbed| {
         count += 1;
-        peak = peak.max(read(testbed, "table.heave")?);
+        peak = larger(peak, read(testbed, "table.heave")?);
         for (value, (t, name)) in values.iter_mut().zip(rows) {
             if t.is_some_and(|t| steps_to(t, h) == count) {
                 *value = match (name.as_str(), foot_of(name)) {

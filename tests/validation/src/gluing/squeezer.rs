@@ -9,6 +9,7 @@ use super::planar::{ALPHA, Body, Pin, bodies};
 use super::rig::{Setting, Tally, build, list, read, step, wrench};
 use super::{Context, Figure, Limit};
 use crate::process::Outcome;
+use terraglue_numerics::extremes::{larger, smaller};
 
 /// Published multipliers at 0.03 s, N.
 const MULTIPLIERS: [f64; 6] = [
@@ -135,15 +136,15 @@ fn run(h: f64) -> Outcome<End> {
     let (mut tally, mut apart) = (Tally::default(), 0.0_f64);
     step(&mut glued, steps_to(UNTIL, h), |glued| {
         uncut.step().map_err(|e| e.to_string())?;
-        apart = apart.max((read(glued, "crank.b0.angle")? - read(&uncut, "all.b0.angle")?).abs());
+        apart = larger(apart, (read(glued, "crank.b0.angle")? - read(&uncut, "all.b0.angle")?).abs());
         tally.add(glued);
         Ok(())
     })?;
     let largest = MULTIPLIERS[0];
     let error = |k: usize| (wrench(&glued, k / 2, k % 2) - MULTIPLIERS[k]).abs();
     Ok(End {
-        multipliers: (0..6).map(|k| error(k) / largest).fold(0.0, f64::max),
-        each: (0..6).map(|k| error(k) / MULTIPLIERS[k].abs()).fold(0.0, f64::max),
+        multipliers: (0..6).map(|k| error(k) / largest).fold(0.0, larger),
+        each: (0..6).map(|k| error(k) / MULTIPLIERS[k].abs()).fold(0.0, larger),
         beta: (read(&glued, "crank.b0.angle")? - BETA).abs(),
         apart,
         tally,
@@ -157,7 +158,7 @@ pub fn figures(_: &Context) -> Outcome<Vec<Figure>> {
     };
     let (coarse, end) = (run(2.0 * STEP)?, run(STEP)?);
     let fine = run(FINE)?;
-    let order = (coarse.multipliers / end.multipliers).log2().min((coarse.beta / end.beta).log2());
+    let order = smaller((coarse.multipliers / end.multipliers).log2(), (coarse.beta / end.beta).log2());
     Ok(vec![
         figure(
             "multipliers",

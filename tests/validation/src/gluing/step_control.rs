@@ -5,6 +5,7 @@ use super::rig::{Setting, build, read, step, subsystem};
 use super::{Context, Figure, Limit};
 use crate::process::Outcome;
 use std::f64::consts::PI;
+use terraglue_numerics::extremes::larger;
 
 /// Longest step, s.
 const LONGEST: f64 = 0.02;
@@ -44,7 +45,7 @@ fn places(text: &str, h: f64) -> Outcome<(Vec<[f64; 2]>, f64)> {
 }
 
 fn apart(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
-    a.as_flattened().iter().zip(b.as_flattened()).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
+    a.as_flattened().iter().zip(b.as_flattened()).fold(0.0, |m, (a, b)| larger(m, (a - b).abs()))
 }
 
 /// A foot of 5 kg that meets soil with 0.5 m/s: deepest place and number of steps.

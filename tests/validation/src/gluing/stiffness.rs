@@ -4,6 +4,7 @@ use super::rig::{Setting, Tally, build, read};
 use super::six_feet::{Table, columns};
 use super::{Context, Figure, Limit};
 use crate::process::Outcome;
+use terraglue_numerics::extremes::larger;
 
 const STRATEGIES: [&str; 8] = [
     "cooperative",
@@ -54,10 +55,10 @@ fn run(strategy: &'static str, factor: f64) -> Outcome<Run> {
         }
         run.tally.add(&testbed);
         run.soil += testbed.report().evaluations_soil;
-        run.kappa = run.kappa.max(testbed.report().kappa_max);
+        run.kappa = larger(run.kappa, testbed.report().kappa_max);
         run.heave = read(&testbed, "table.heave")?;
-        run.deepest = run.deepest.max(run.heave);
-        run.rebound = run.rebound.max((before - run.heave) / 0.01);
+        run.deepest = larger(run.deepest, run.heave);
+        run.rebound = larger(run.rebound, (before - run.heave) / 0.01);
         if !(run.heave.abs() < 1.0) {
             run.failed = Some(format!("heave of {} m at t = {} s", run.heave, testbed.t_s()));
             break;

@@ -7,6 +7,7 @@ use std::fmt::Write;
 use terraglue::Testbed;
 use terraglue::scenario::Scenario;
 use terraglue::testbed::Options;
+use terraglue_numerics::extremes::smaller;
 
 /// A mass on a spring, as exact within a step as ½·h²·a: force, place, speed, how often it was asked, acceleration.
 const VARIABLES: [Variable; 5] =
@@ -60,7 +61,7 @@ fn run(context: &Context, rule: &str, jacobian: &str) -> Outcome<Run> {
         x: read("left.x")?,
         evaluations: f64::from(evaluations) / 100.0,
         differences,
-        asked: read("left.asked")?.min(read("right.asked")?),
+        asked: smaller(read("left.asked")?, read("right.asked")?),
     })
 }
 

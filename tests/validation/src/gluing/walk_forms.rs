@@ -5,6 +5,7 @@ use crate::process::{Outcome, root};
 use terraglue::Testbed;
 use terraglue::scenario::{FormChoice, GluingSpec, Scenario};
 use terraglue::testbed::Options;
+use terraglue_numerics::extremes::larger;
 
 const SOILS: [&str; 2] = ["soil-cellular-automaton", "soil-bekker"];
 
@@ -49,7 +50,7 @@ fn forms(soil: &str, context: &Context) -> Outcome<Figure> {
             }
         }
         if let [tt, xt] = forces.as_slice() {
-            worst = tt.iter().zip(xt).fold(worst, |m, (a, b)| m.max((a - b).abs()));
+            worst = tt.iter().zip(xt).fold(worst, |m, (a, b)| larger(m, (a - b).abs()));
         }
         testbed.restore(&here).map_err(|e| e.to_string())?;
         testbed.set_gluing(&form(FormChoice::Auto)).map_err(|e| e.to_string())?;

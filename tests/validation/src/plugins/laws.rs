@@ -6,6 +6,7 @@ use super::{Kind, Language, scaffold, speed};
 use crate::process::{Outcome, root};
 use terraglue::scenario::Scenario;
 use terraglue::testbed::{Options, Testbed};
+use terraglue_numerics::extremes::larger;
 
 /// A key of the scenario and its value.
 type Set = (String, String);
@@ -19,7 +20,7 @@ pub fn figures(context: &Context, out: &mut Vec<Figure>) -> Outcome {
         let base = vec![set("soil.module", soil), set("terrain.spacing_m", "0.01")];
         let built_in = plates(&base)?;
         for (_, sets) in &ways {
-            worst = worst.max(difference(&built_in, &plates(&[&base[..], sets].concat())?));
+            worst = larger(worst, difference(&built_in, &plates(&[&base[..], sets].concat())?));
         }
     }
     let what = "difference of the plate curve, a law as text and as modules against built in, both soils";
@@ -29,7 +30,7 @@ pub fn figures(context: &Context, out: &mut Vec<Figure>) -> Outcome {
         let mut worst = 0.0_f64;
         // A walk asks a law in Python too often.
         for (_, sets) in ways.iter().filter(|(way, _)| *way != "Python") {
-            worst = worst.max(difference(&built_in, &walk(sets)?));
+            worst = larger(worst, difference(&built_in, &walk(sets)?));
         }
         let what = "relative difference of the sinkage of `moon_walk`, the same ways without Python";
         out.push(Figure::new("plugins.laws.walk", worst, Limit::AtMost(1e-9), what));
@@ -94,8 +95,8 @@ fn walk(sets: &[Set]) -> Outcome<Vec<f64>> {
 
 /// Largest difference over the largest value.
 fn difference(a: &[f64], b: &[f64]) -> f64 {
-    let scale = a.iter().fold(0.0_f64, |m, x| m.max(x.abs()));
-    a.iter().zip(b).fold(0.0_f64, |worst, (a, b)| worst.max((a - b).abs() / scale))
+    let scale = a.iter().fold(0.0_f64, |m, x| larger(m, x.abs()));
+    a.iter().zip(b).fold(0.0_f64, |worst, (a, b)| larger(worst, (a - b).abs() / scale))
 }
 
 /// Lines of a new law, in a language and in a scenario.
@@ -104,7 +105,7 @@ fn lines(out: &mut Vec<Figure>) -> Outcome {
     let mut longest = 0;
     for language in [Language::Rust, Language::C, Language::Cpp, Language::Python] {
         let (_, source) = &made(language)?.files[0];
-        longest = longest.max(source.lines().count());
+        longest = larger(longest, source.lines().count());
     }
     let what = "lines of a new law, the longest of four languages";
     out.push(Figure::new("plugins.law.lines", longest as f64, Limit::AtMost(40.0), what));

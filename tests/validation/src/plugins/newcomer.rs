@@ -5,6 +5,7 @@ use crate::process::Outcome;
 use std::path::Path;
 use std::process::Command;
 use std::time::Instant;
+use terraglue_numerics::extremes::larger;
 
 /// Language, longest time, s, and its build command.
 const LANGUAGES: [(&str, f64, &[&str]); 4] = [
@@ -36,7 +37,7 @@ pub fn figures(context: &Context, out: &mut Vec<Figure>) -> Outcome {
                 _ => format!("./libmy_{kind}_plugin.so"),
             };
             typed(&place, &[&program, "check-module", &file])?;
-            longest = longest.max(start.elapsed().as_secs_f64());
+            longest = larger(longest, start.elapsed().as_secs_f64());
         }
         let what = format!("new, build, run and check of a module in {language}, the slowest kind, s");
         out.push(Figure::new(format!("plugins.newcomer.{language}"), longest, Limit::AtMost(limit), what));

@@ -10,6 +10,7 @@ use std::process::Command;
 use std::sync::Arc;
 use terraglue::host::{HostServices, Instance, LoadedModule, law};
 use terraglue::subsystem::{Terrain, TerrainTile, ValuesMut};
+use terraglue_numerics::extremes::larger;
 use terraglue_soil_bekker::SoilBekker;
 use terraglue_soil_law::{
     PluginLaw, PressureLaw, ShearLaw, ShearResponse, ShearState, Sheared, SoilExpressions, SoilParameters,
@@ -25,7 +26,15 @@ const SOIL: &str = r#"{"n": 1.1, "k_c": 1400.0, "k_phi": 820000.0, "c_pa": 170.0
 /// The same, stiffer with the depth: no power law any more.
 const STIFFENING: &str = "(k_c/b + k_phi)*z^n*(1 + z/K)";
 
-/// The ratios, the slopes, and the price of the table.
+/// The slopes of a law as text and as a module.
+pub fn slope(context: &Context, out: &mut Vec<Figure>) -> Outcome {
+    let config = Config::parse(SOIL).map_err(|e| e.to_string())?;
+    let soil = SoilParameters::from_config(&config, 1.62).map_err(|e| e.to_string())?;
+    let rust = context.program.with_file_name("deps").join("liblaw_bekker_plugin.so");
+    slopes(&soil, &plugin(&rust, &config)?, out)
+}
+
+/// The ratios, and the price of the table.
 pub fn figures(context: &Context, out: &mut Vec<Figure>) -> Outcome {
     let config = Config::parse(SOIL).map_err(|e| e.to_string())?;
     let soil = SoilParameters::from_config(&config, 1.62).map_err(|e| e.to_string())?;
@@ -51,7 +60,6 @@ pub fn figures(context: &Context, out: &mut Vec<Figure>) -> Outcome {
         let shear = soil.shear().with_plugin(law.clone());
         compare(name, what, 1.1, &PressureLaw::Plugin(law.clone()), &shear);
     }
-    slopes(&soil, &rust, out)?;
     table(context, &deps, out)
 }
 
@@ -84,12 +92,14 @@ fn slopes(soil: &SoilParameters, module: &PluginLaw, out: &mut Vec<Figure>) -> O
         let curve = law.curve(b, 4e8);
         let (mut p, mut slope) = (vec![0.0; depths.len()], vec![0.0; depths.len()]);
         first_loading(&curve, &depths, &mut p, &mut slope);
-        depths.iter().zip(&slope).fold(0.0_f64, |m, (z, s)| m.max((s / closed(*z) - 1.0).abs()))
+        depths.iter().zip(&slope).fold(0.0_f64, |m, (z, s)| larger(m, (s / closed(*z) - 1.0).abs()))
     };
     let bekker = |z: f64| k * n * libm::pow(z, n - 1.0);
     let stiffening = |z: f64| bekker(z) * (1.0 + z / z_1) + k * libm::pow(z, n) / z_1;
-    let found = worst(&PressureLaw::Expression(text), &stiffening)
-        .max(worst(&PressureLaw::Plugin(module.clone()), &bekker));
+    let found = larger(
+        worst(&PressureLaw::Expression(text), &stiffening),
+        worst(&PressureLaw::Plugin(module.clone()), &bekker),
+    );
     let what = "relative error of the slope of a text and of a module against the closed form, 200 depths";
     out.push(Figure::new("plugins.law.slope", found, Limit::AtMost(1e-12), what));
     Ok(())

@@ -3,6 +3,7 @@
 
 use super::rig::Shown;
 use terraglue_ground::{Lattice, Placed, Surface, nodes_below};
+use terraglue_numerics::extremes::larger;
 use terraglue_subsystem::{
     Geometry, Hold, Input, Law, Motion, Node, Port, PortKind, Pose, Response, Step, Subsystem, component,
 };
@@ -217,8 +218,8 @@ impl Drive {
         let b = &mut self.balance;
         b.work += work;
         b.path += work.abs();
-        b.error = b.error.max((e.dissipated + e.potential + e.kinetic - b.work).abs());
-        b.fall = b.fall.max(b.heat - e.dissipated);
+        b.error = larger(b.error, (e.dissipated + e.potential + e.kinetic - b.work).abs());
+        b.fall = larger(b.fall, b.heat - e.dissipated);
         b.heat = e.dissipated;
     }
 }

@@ -6,6 +6,7 @@ use crate::parallel::in_parallel;
 use crate::process::{Outcome, run_scenario, write};
 use crate::{Context, Figure, Limit};
 use serde_json::Value;
+use terraglue_numerics::extremes::larger;
 
 const SOILS: [&str; 2] = ["soil-bekker", "soil-cellular-automaton"];
 const STRATEGIES: [&str; 4] = ["cooperative", "cooperative-compliant", "iterative", "xt-newton"];
@@ -236,7 +237,7 @@ fn dragged(context: &Context) -> Outcome<Vec<Figure>> {
         let what = format!(
             "{name} in {row}: sinkage and heat of the soil by cooperative against iterative at 1 ms, %"
         );
-        let worst = apart(sinkage).max(apart(heat));
+        let worst = larger(apart(sinkage), apart(heat));
         all.push(Figure::new(format!("soil.{name}.{row}.strategies"), worst, Limit::AtMost(5.0), what));
         if !context.quick {
             let at = |quantity: fn(&Value) -> f64| {

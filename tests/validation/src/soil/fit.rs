@@ -3,6 +3,7 @@
 use crate::process::{Outcome, root};
 use crate::{Context, Figure, Limit};
 use terraglue::soil_fit::{Known, fit_law, read};
+use terraglue_numerics::extremes::larger;
 use terraglue_soil_law::fit::{FitLaw, Reading, fit};
 
 const FILE: &str = "tests/reference/terramechanics/cmu_plate_pressure_sinkage_d60_d100.csv";
@@ -63,7 +64,7 @@ fn unseen_presses(readings: &[Reading]) -> Outcome<Figure> {
     for press in 0..presses {
         let (unseen, seen): (Vec<Reading>, Vec<Reading>) = readings.iter().partition(|r| r.curve == press);
         let numbers = fit(BEARING, &seen, true).map_err(|e| e.to_string())?.numbers;
-        worst = worst.max(numbers.rms(&BEARING, &unseen));
+        worst = larger(worst, numbers.rms(&BEARING, &unseen));
     }
     let what = format!(
         "largest rms of ln(p/p_measured), %, on a press left out of the fit, {presses} presses; for information: it is the \

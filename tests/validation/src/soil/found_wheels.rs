@@ -5,6 +5,7 @@ use super::MODULES;
 use crate::parallel::in_parallel;
 use crate::process::{Outcome, run_scenario};
 use crate::{Context, Figure, Limit, columns};
+use terraglue_numerics::extremes::larger;
 
 /// Name, scenario, what is set beside the soil, duration (s) and the time until which its wheels stand, s. On the slope the
 /// rover rolls back before it is driven: its drives hold no angle.
@@ -86,6 +87,6 @@ impl Steps {
         self.steps += 1;
         self.lost += usize::from(torque == 0.0);
         self.standing += usize::from(slip.is_some());
-        self.slip = slip.map_or(self.slip, |s| self.slip.max(s.abs()));
+        self.slip = slip.map_or(self.slip, |s| larger(self.slip, s.abs()));
     }
 }

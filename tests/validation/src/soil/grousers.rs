@@ -7,6 +7,7 @@ use crate::process::{Outcome, read, root, run_scenario};
 use crate::{Context, Figure, Limit};
 use std::f64::consts::TAU;
 use std::path::{Path, PathBuf};
+use terraglue_numerics::extremes::smaller;
 
 const SCENARIO: &str = "scenarios/wheel_rig.toml";
 const SMOOTH: &str = "models/wheel_rig.urdf";
@@ -122,9 +123,4 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
         "largest drift of the energy book of the wheel with grousers, % of the work of the motors",
     ));
     Ok(all)
-}
-
-/// The smaller one; NaN where one is.
-fn smaller(a: f64, b: f64) -> f64 {
-    if a.is_nan() || b.is_nan() { f64::NAN } else { a.min(b) }
 }

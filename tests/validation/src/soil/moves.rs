@@ -11,6 +11,7 @@ use crate::process::Outcome;
 use crate::{Context, Figure, Limit};
 use std::f64::consts::{FRAC_PI_2, PI};
 use terraglue_ground::Surface;
+use terraglue_numerics::extremes::{larger, smaller};
 use terraglue_subsystem::Geometry;
 
 /// All figures.
@@ -126,7 +127,7 @@ fn yawed(context: &Context) -> Outcome<Vec<Figure>> {
     for angle in angles {
         let of_angle = || cases.iter().zip(&found).filter(|(c, _)| c.0 == *angle).map(|(_, f)| f);
         let sunk = || of_angle().map(|(z, _)| *z);
-        let (low, high) = (sunk().fold(f64::INFINITY, f64::min), sunk().fold(0.0, larger));
+        let (low, high) = (sunk().fold(f64::INFINITY, smaller), sunk().fold(0.0, larger));
         let what = format!(
             "largest sinkage of a wheel at slip 0.2 yawed by {angle}° over the smallest, %, both soils, {} grids; {:.1} mm",
             spacings.len(),
@@ -347,9 +348,4 @@ fn resistive_force(context: &Context) -> Outcome<Vec<Figure>> {
         all.push(Figure::new(format!("soil.{name}.sphere.rft"), worst, Limit::AtMost(15.0), what));
     }
     Ok(all)
-}
-
-/// The larger of both; what is no number stays.
-fn larger(a: f64, b: f64) -> f64 {
-    if a.is_nan() || b.is_nan() { f64::NAN } else { a.max(b) }
 }

@@ -6,6 +6,7 @@ use super::rows::{Row, eight};
 use crate::parallel::in_parallel;
 use crate::process::Outcome;
 use crate::{Context, Figure, Limit};
+use terraglue_numerics::extremes::larger;
 use terraglue_subsystem::{Geometry, Subsystem};
 
 /// Makes an instance of a soil: configuration, nodes along a side, spacing.
@@ -88,7 +89,7 @@ impl Case {
             let force = rig.prescribed_step(&[-stride, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
             let z = stride * f64::from(k);
             if k % every == 0 && z > 0.0099 {
-                worst = worst.max((force / area / self.row.pressure(z, b) - 1.0).abs());
+                worst = larger(worst, (force / area / self.row.pressure(z, b) - 1.0).abs());
             }
         }
         worst
@@ -112,44 +113,39 @@ impl Case {
                 }
                 let speed = rig.velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
                 let error = if speed < 1e-5 { (rig.sunk() / z - 1.0).abs() } else { f64::NAN };
-                worst = if error.is_nan() { f64::NAN } else { worst.max(error) };
+                worst = larger(worst, error);
             }
         }
         worst
     }
 }
 
-/// All figures.
+/// All figures, on one soil: both press by the same code.
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
+    let [(module, make), _] = MODULES;
     let mut all = Vec::new();
-    for (module, make) in MODULES {
-        let cases = cases(context, make)?;
-        let errors = in_parallel(&cases, Case::pressed);
-        for (shape, (name, ..)) in shapes().iter().enumerate() {
-            let worst = |from: f64, to: f64| {
-                let of_shape = cases.iter().zip(&errors).filter(|(c, _)| c.shape == shape);
-                let fitting =
-                    of_shape.filter(|(c, _)| c.resolution() >= from - 1e-9 && c.resolution() < to - 1e-9);
-                fitting.map(|(_, e)| *e).reduce(|a, b| if b.is_nan() || b > a { b } else { a })
-            };
-            for (part, from, to, limit) in
-                [("fine", 10.0, f64::INFINITY, 1.0), ("coarse", 3.0, 10.0, 3.0), ("few_cells", 0.0, 3.0, 3.0)]
-            {
-                let Some(error) = worst(from, to) else { continue };
-                let what = format!(
-                    "largest error of the pressure, %, {} soils, 10 to 50 mm, R/spacing {from} to {to}",
-                    if context.quick { 2 } else { 8 }
-                );
-                all.push(Figure::new(
-                    format!("soil.{module}.{name}.{part}"),
-                    100.0 * error,
-                    Limit::AtMost(limit),
-                    what,
-                ));
-            }
+    let cases = cases(context, make)?;
+    let errors = in_parallel(&cases, Case::pressed);
+    for (shape, (name, ..)) in shapes().iter().enumerate() {
+        let worst = |from: f64, to: f64| {
+            let of_shape = cases.iter().zip(&errors).filter(|(c, _)| c.shape == shape);
+            let fitting =
+                of_shape.filter(|(c, _)| c.resolution() >= from - 1e-9 && c.resolution() < to - 1e-9);
+            fitting.map(|(_, e)| *e).reduce(larger)
+        };
+        for (part, from, to, limit) in
+            [("fine", 10.0, f64::INFINITY, 1.0), ("coarse", 3.0, 10.0, 3.0), ("few_cells", 0.0, 3.0, 3.0)]
+        {
+            let Some(error) = worst(from, to) else { continue };
+            let soils = if context.quick { 2 } else { 8 };
+            let what = format!(
+                "largest error of the pressure, %, {soils} soils, 10 to 50 mm, R/spacing {from} to {to}"
+            );
+            let id = format!("soil.{module}.{name}.{part}");
+            all.push(Figure::new(id, 100.0 * error, Limit::AtMost(limit), what));
         }
-        all.push(load_control(context, module, make)?);
     }
+    all.push(load_control(context, module, make)?);
     Ok(all)
 }
 
@@ -177,7 +173,7 @@ fn load_control(context: &Context, module: &str, make: Maker) -> Outcome<Figure>
     let case = |row: &Row, shape| Case { make, row: row.clone(), shape, spacing: 0.01, quick: context.quick };
     let cases: Vec<Case> = rows.iter().flat_map(|row| shapes.iter().map(move |s| case(row, *s))).collect();
     let errors = in_parallel(&cases, Case::loaded);
-    let worst = errors.into_iter().reduce(|a, b| if b.is_nan() || b > a { b } else { a }).unwrap_or(f64::NAN);
+    let worst = errors.into_iter().reduce(larger).unwrap_or(f64::NAN);
     let what = "largest error of the sinkage under 5 to 200 N, %, 1 cm grid";
     Ok(Figure::new(format!("soil.{module}.load_control"), 100.0 * worst, Limit::AtMost(2.0), what))
 }

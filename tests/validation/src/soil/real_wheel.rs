@@ -8,6 +8,7 @@ use crate::parallel::in_parallel;
 use crate::process::{Outcome, root};
 use crate::{Context, Figure, Limit};
 use terraglue::soil_fit::{Known, Wheel, WheelFit, WheelPoint, WheelStart, fit_wheel, read_wheel};
+use terraglue_numerics::extremes::largest;
 
 const RADIUS: f64 = 0.058;
 const WIDTH: f64 = 0.05;
@@ -46,15 +47,13 @@ fn errors(p: &WheelPoint, found: &Reading) -> [f64; 2] {
     [100.0 * (found.sinkage / p.sinkage - 1.0).abs(), (found.pull - p.pull).abs()]
 }
 
-/// The figures of a soil: calibrated on every other slip and on the rest. Quickly only the first of both on the automaton, which
-/// presses soil that becomes denser by the code of the other soil.
+/// The figures of the automaton: calibrated on every other slip and on the rest.
 pub fn figures(context: &Context, name: &str, make: Maker) -> Outcome<Vec<Figure>> {
     let wheel = Wheel { radius: RADIUS, width: WIDTH, load: None };
     let points = read_wheel(&root().join(FILE), &wheel).map_err(|e| e.to_string())?.points;
     let spacing = if context.quick { 0.005 } else { 0.0025 };
-    let automaton = name == "automaton";
     let mut all = Vec::new();
-    for (part, seen, of) in &SEEN[..if context.quick && automaton { 1 } else { 2 }] {
+    for (part, seen, of) in &SEEN {
         let calibrated: Vec<WheelPoint> = seen.iter().map(|k| points[*k]).collect();
         let fit = fit_wheel(wheel, &calibrated, SAND, START).map_err(|e| e.to_string())?;
         let drive = |keys: &str| {
@@ -76,7 +75,7 @@ pub fn figures(context: &Context, name: &str, make: Maker) -> Outcome<Vec<Figure
         let falls = found.windows(2).filter(|w| w[1].sinkage <= w[0].sinkage).count();
         let what = format!("slips between 0 and 0.9 at which the sinkage does not rise; {of}");
         all.push(Figure::new(format!("{id}.falls"), falls as f64, Limit::Equal(0.0), what));
-        if automaton && !context.quick {
+        if !context.quick {
             all.extend(moving(&id, of, &points, &drive("")));
         }
     }
@@ -94,8 +93,4 @@ fn moving(id: &str, of: &str, points: &[WheelPoint], found: &[Reading]) -> [Figu
         Figure::new(format!("{id}.moving.{quantity}"), worst, Limit::None, what)
     };
     [figure(0, "sinkage", "%"), figure(1, "pull", "N")]
-}
-
-fn largest(values: impl Iterator<Item = f64>) -> f64 {
-    values.fold(0.0, |m: f64, v| if v.is_nan() || m.is_nan() { f64::NAN } else { m.max(v) })
 }

@@ -4,6 +4,7 @@ use super::rig::{LUNAR, Rig, flat, soil};
 use crate::parallel::in_parallel;
 use crate::process::Outcome;
 use crate::{Context, Figure, Limit};
+use terraglue_numerics::extremes::larger;
 use terraglue_soil_bekker::SoilBekker;
 use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
 use terraglue_subsystem::{Geometry, Subsystem};
@@ -57,7 +58,7 @@ fn held(make: Maker, sloped: bool, share: f64, seconds: f64) -> Held {
         let side = share * limit * ((time - 1.0) / 0.5).clamp(0.0, 1.0);
         rig.force = std::array::from_fn(|c| side * along[c] - load * normal[c]);
         rig.iterative_step();
-        tension = tension.max(-rig.t[0]);
+        tension = larger(tension, -rig.t[0]);
         if k + 1 == steps(3.0) {
             start = rig.position;
         }

@@ -5,6 +5,7 @@ mod picture;
 mod prints;
 
 pub use picture::write_picture;
+use terraglue_numerics::extremes::larger;
 
 use super::parallel::in_parallel;
 use super::timing::{calibration_s, median};
@@ -211,9 +212,9 @@ impl Feet {
         for step in 0..forces[0].1.len() {
             let of_step = || forces.iter().map(|(_, column)| column[step]);
             let sum: f64 = of_step().sum();
-            feet.peak = of_step().fold(feet.peak, f64::max);
+            feet.peak = of_step().fold(feet.peak, larger);
             feet.airborne += usize::from(sum <= 0.0);
-            feet.peak_sum = feet.peak_sum.max(sum);
+            feet.peak_sum = larger(feet.peak_sum, sum);
         }
         Ok(feet)
     }
@@ -256,8 +257,10 @@ fn speed(context: &Context, soil: &str, strategy: &str) -> Outcome<Vec<Figure>> 
             median(factors),
             Limit::AtLeast(1.0),
             "simulated time / CPU time",
-        ),
-        Figure::new(format!("{id}.cost"), ratio, Limit::None, "CPU time of a step / a million multiply-adds"),
+        )
+        .timed(),
+        Figure::new(format!("{id}.cost"), ratio, Limit::None, "CPU time of a step / a million multiply-adds")
+            .timed(),
     ])
 }
 

@@ -7,6 +7,7 @@ use crate::soil::{MODULES, press_sphere};
 use crate::{Context, columns};
 use serde_json::Value;
 use std::path::Path;
+use terraglue_numerics::extremes::larger;
 
 /// A gait so slow that nothing is left of the impact of feet, with strides of 9 cm, so that a foot seldom meets an old print.
 const SLOW: [&str; 3] = ["gait.speed_m_s=0.015", "gait.cycle_s=12.0", "soil.contacts_shown=6"];
@@ -60,7 +61,7 @@ fn stances(path: &Path) -> Outcome<Vec<Stance>> {
             if *force > 0.0 {
                 let stance = now.get_or_insert(Stance { begins: *t, ..Stance::default() });
                 stance.ends = *t;
-                (stance.force, stance.depth) = (stance.force.max(*force), stance.depth.max(*depth));
+                (stance.force, stance.depth) = (larger(stance.force, *force), larger(stance.depth, *depth));
             } else {
                 all.extend(now.take());
             }

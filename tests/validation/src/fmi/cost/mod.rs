@@ -20,7 +20,7 @@ pub fn figures(folder: &Path, context: &Context) -> Outcome<Vec<Figure>> {
         all.extend(peers::figures(folder));
         all.extend(steps::CASES.iter().filter_map(|case| beside(folder, case, "fmucontainer")));
     }
-    Ok(all)
+    Ok(all.into_iter().map(Figure::timed).collect())
 }
 
 /// Times that both are measured, one after the other; the least counts.

@@ -6,6 +6,7 @@ use crate::timing::cpu_s;
 use crate::{Figure, Limit};
 use std::path::Path;
 use terraglue::recording::Trace;
+use terraglue_numerics::extremes::smaller;
 
 const LOOP: &str = "tests/validation/src/fmi/cost/bare_loop.c";
 const ROUNDS: u32 = 15;
@@ -71,8 +72,8 @@ fn compared(
 ) -> Outcome<Vec<Figure>> {
     let (mut bare, mut ours) = (f64::INFINITY, f64::INFINITY);
     for _ in 0..TURNS {
-        bare = bare.min(bare_loop(folder, program, case, manner)?);
-        ours = ours.min(testbed(folder, case, manner)?);
+        bare = smaller(bare, bare_loop(folder, program, case, manner)?);
+        ours = smaller(ours, testbed(folder, case, manner)?);
     }
     let id = |which: &str| format!("fmi.cost.{prefix}{}.{which}", case.name);
     let with = match (manner.record, manner.save) {
@@ -135,7 +136,7 @@ fn testbed(folder: &Path, case: &Case, manner: Manner) -> Outcome<f64> {
                 trace.take(&testbed).map_err(|e| e.to_string())?;
             }
         }
-        best = best.min((cpu_s() - start) * 1e6 / (steps * case.units) as f64);
+        best = smaller(best, (cpu_s() - start) * 1e6 / (steps * case.units) as f64);
     }
     Ok(best)
 }

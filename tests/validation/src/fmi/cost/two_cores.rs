@@ -6,6 +6,7 @@ use crate::{Figure, Limit};
 use std::path::Path;
 use std::time::Instant;
 use terraglue::Testbed;
+use terraglue_numerics::extremes::smaller;
 
 const UNITS: usize = 10;
 const STEPS: u32 = 100;
@@ -25,8 +26,8 @@ pub fn figure(folder: &Path) -> Outcome<Figure> {
     // the first steps tell a testbed what its units cost
     (took(&mut one, 130)?, took(&mut two, 130)?);
     for _ in 0..TURNS {
-        best[0] = best[0].min(took(&mut one, STEPS)?);
-        best[1] = best[1].min(took(&mut two, STEPS)?);
+        best[0] = smaller(best[0], took(&mut one, STEPS)?);
+        best[1] = smaller(best[1], took(&mut two, STEPS)?);
     }
     let per_unit = best[0] * 1e6 / f64::from(STEPS) / UNITS as f64;
     let what = format!(

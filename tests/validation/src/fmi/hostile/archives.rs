@@ -134,7 +134,7 @@ fn many(folder: &Path, context: &Context, case: Option<&(Case, Code)>) -> Outcom
     let start = Instant::now();
     run(&place, context, &case.bytes)?;
     let what = format!("s to read, start, run and end a unit with {MANY} variables");
-    Ok(Figure::new(ID, start.elapsed().as_secs_f64(), Limit::AtMost(2.0), what))
+    Ok(Figure::new(ID, start.elapsed().as_secs_f64(), Limit::AtMost(2.0), what).timed())
 }
 
 /// Kept and fresh changes of good archives: read or refused with an error that names the file.

@@ -6,6 +6,7 @@ use super::scenes::{alone, several, sphere, throw};
 use crate::process::Outcome;
 use crate::rigid_body::rig::{G, Rig, pose};
 use crate::{Context, Figure, Limit};
+use terraglue_numerics::extremes::larger;
 
 const DOWN: [f64; 3] = [0.0, 0.0, -G];
 /// Steps, s; each half of the one before.
@@ -80,7 +81,7 @@ fn apexes(context: &Context, h: f64) -> Outcome<Vec<f64>> {
             tops.push(top - 0.1);
             top = 0.0;
         }
-        (top, before) = (top.max(state.world_from_body.position[2]), v);
+        (top, before) = (larger(top, state.world_from_body.position[2]), v);
         Ok(())
     })?;
     Ok(tops.into_iter().skip(1).collect())
@@ -91,7 +92,7 @@ fn bounce(context: &Context) -> Outcome<Vec<Figure>> {
         let tops = apexes(context, h)?;
         let errors = (0..4)
             .map(|k| (tops.get(k).copied().unwrap_or(f64::NAN) - libm::pow(0.64, k as f64 + 1.0)).abs());
-        Ok(errors.fold(0.0, |m: f64, e| if e.is_nan() { e } else { m.max(e) }))
+        Ok(errors.fold(0.0, larger))
     };
     let [a, b, c] = STEPS.map(error);
     let errors = [a?, b?, c?];
@@ -171,18 +172,18 @@ fn rod(context: &Context) -> Outcome<Vec<Figure>> {
             let (mut impulse, mut early) = (0.0_f64, 0.0_f64);
             rig.run(1.0, |rig| {
                 let now = rig.energy().mechanical();
-                gained = gained.max(now - before);
+                gained = larger(gained, now - before);
                 before = now;
-                impulse = impulse.max(1e-3 * rig.get(normal)?);
+                impulse = larger(impulse, 1e-3 * rig.get(normal)?);
                 if rig.t() < EARLY {
-                    early = early.max(1e-3 * rig.get(normal)?);
+                    early = larger(early, 1e-3 * rig.get(normal)?);
                 }
-                residual = residual.max(rig.get(told)?);
+                residual = larger(residual, rig.get(told)?);
                 let (place, q) = pose(&rig.states()?[0]);
                 let finite = place.iter().chain(q.coords.iter()).all(|x| x.is_finite());
                 if finite { Ok(()) } else { Err("Painlevé's rod: not a number".into()) }
             })?;
-            largest = largest.max(impulse);
+            largest = larger(largest, impulse);
             jams += f64::from(early > 0.1);
         }
     }

@@ -4,6 +4,7 @@ use crate::process::Outcome;
 use crate::rigid_body::rig::{G, Rig, model, pose};
 use crate::{Context, Figure, Limit};
 use std::fmt::Write;
+use terraglue_numerics::extremes::larger;
 
 const H: f64 = 1e-3;
 const BRICK: &str = r#"<mesh name="brick" vertex="-.1 -.1 -.05 .1 -.1 -.05 -.1 .1 -.05 .1 .1 -.05
@@ -30,7 +31,7 @@ fn apart(mut rigs: [Rig; 2], until: f64) -> Outcome<f64> {
             rig.step()?;
             *place = pose(&rig.states()?[0]).0;
         }
-        worst = worst.max((places[0] - places[1]).norm());
+        worst = larger(worst, (places[0] - places[1]).norm());
     }
     Ok(worst)
 }

@@ -6,6 +6,7 @@ use crate::rigid_body::rig::{G, pose};
 use crate::timing::cpu_s;
 use crate::{Context, Figure, Limit};
 use nalgebra::Vector3;
+use terraglue_numerics::extremes::{larger, smaller};
 
 const SIX: &str = "models/hexapod.urdf";
 const EIGHTEEN: &str = "tests/reference/multibody/hexapod_18.urdf";
@@ -27,8 +28,8 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     let mut all = quality("soft", Drive::Soft)?;
     all.extend(quality("stiff", Drive::Stiff)?);
     if context.timing {
-        all.extend(cost("six", SIX, 45.0)?);
-        all.extend(cost("eighteen", EIGHTEEN, 130.0)?);
+        all.extend(cost("six", SIX, 45.0)?.into_iter().map(Figure::timed));
+        all.extend(cost("eighteen", EIGHTEEN, 130.0)?.into_iter().map(Figure::timed));
     }
     Ok(all)
 }
@@ -63,7 +64,7 @@ fn quality(name: &str, drive: Drive) -> Outcome<Vec<Figure>> {
             let p = origin + q * Vector3::from(FOOT);
             let stands = p.z < RADIUS;
             if step >= WALKS {
-                seen.penetration = seen.penetration.max(RADIUS - p.z);
+                seen.penetration = larger(seen.penetration, RADIUS - p.z);
                 if let Some(last) = last.filter(|_| stands) {
                     let moved: Vector3<f64> = p - last;
                     seen.slip += moved.xy().norm() / H;
@@ -72,8 +73,8 @@ fn quality(name: &str, drive: Drive) -> Outcome<Vec<Figure>> {
             }
             *last = stands.then_some(p);
         }
-        seen.residual = seen.residual.max(walk.rig.get(told[0])?);
-        seen.yielding = seen.yielding.max(walk.rig.get(told[1])?);
+        seen.residual = larger(seen.residual, walk.rig.get(told[0])?);
+        seen.yielding = larger(seen.yielding, walk.rig.get(told[1])?);
         if step >= WALKS {
             seen.samples += 1.0;
             for normal in &normals {
@@ -137,7 +138,7 @@ fn cost(name: &str, model: &str, limit: f64) -> Outcome<Vec<Figure>> {
         for time in &mut times {
             let start = cpu_s();
             walk.step()?;
-            *time = time.min(1e6 * (cpu_s() - start));
+            *time = smaller(*time, 1e6 * (cpu_s() - start));
         }
     }
     times.sort_by(f64::total_cmp);

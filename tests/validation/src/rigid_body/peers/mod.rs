@@ -46,7 +46,7 @@ fn measure(command: &mut Command, id: &str, name: &str) -> Outcome<Vec<Figure>> 
 /// What is not a number is told as such and fails nothing: it is the peer's.
 fn peer_figure(id: String, value: f64, what: String) -> Figure {
     if value.is_finite() {
-        Figure::new(id, value, Limit::None, what)
+        Figure::new(id, value, Limit::None, what).noisy()
     } else {
         Figure::skipped(id, format!("{what}: {value}"))
     }

@@ -4,6 +4,7 @@ use crate::process::Outcome;
 use crate::rigid_body::rig::{G, Rig, pose};
 use crate::{Figure, Limit};
 use nalgebra::Vector3;
+use terraglue_numerics::extremes::larger;
 
 const SPATIAL: &str = r#"{"j2": 0.2, "j4": 0.2, "j6": 0.2, "j8": 0.2}"#;
 const HEAVY: &str = r#"{"j1": -1.0707963267948966}"#;
@@ -101,14 +102,14 @@ fn run(file: &str, joints: &str, tip: [f64; 3], integrator: &str, h: f64, until:
         let mut end = Vector3::zeros();
         for state in &states {
             let (p, q) = pose(state);
-            result.gap = result.gap.max((p - end).norm());
+            result.gap = larger(result.gap, (p - end).norm());
             end = p + q * LINK;
         }
         if (rig.t() / h).round() == second {
             result.tip = (end - Vector3::from(tip)).norm();
         }
         let change = rig.energy().mechanical() - start;
-        result.energy = [result.energy[0].max(change.abs()), change];
+        result.energy = [larger(result.energy[0], change.abs()), change];
         Ok(())
     })?;
     Ok(result)

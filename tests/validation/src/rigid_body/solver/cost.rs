@@ -75,5 +75,5 @@ pub fn resolve() -> Outcome<Figure> {
         times.push(1e6 * (cpu_s() - start) / TRIALS as f64);
     }
     let what = "hexapod on 18 force components: CPU time of a further trial of the step, median, µs";
-    Ok(Figure::new("rigid-body.gait.six.resolve", median(times), Limit::AtMost(5.0), what))
+    Ok(Figure::new("rigid-body.gait.six.resolve", median(times), Limit::AtMost(5.0), what).timed())
 }

@@ -4,6 +4,7 @@ use crate::process::Outcome;
 use crate::rigid_body::rig::{Rig, model, pose, table};
 use crate::{Context, Figure, Limit};
 use nalgebra::Vector3;
+use terraglue_numerics::extremes::larger;
 
 fn body(mass: f64, inertia: [f64; 3]) -> String {
     let [x, y, z] = inertia;
@@ -34,9 +35,9 @@ fn intermediate_axis(context: &Context) -> Outcome<Vec<Figure>> {
     let (e0, (l0, mut last)) = (rig.energy().kinetic, momentum(&rig)?);
     let (mut energy, mut turn, mut flips) = (0.0_f64, 0.0_f64, 0);
     rig.run(60.0, |rig| {
-        energy = energy.max((rig.energy().kinetic / e0 - 1.0).abs());
+        energy = larger(energy, (rig.energy().kinetic / e0 - 1.0).abs());
         let (l, rate) = momentum(rig)?;
-        turn = turn.max((l - l0).norm() / l0.norm());
+        turn = larger(turn, (l - l0).norm() / l0.norm());
         flips += usize::from(rate * last < 0.0);
         last = rate;
         Ok(())

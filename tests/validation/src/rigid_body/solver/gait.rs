@@ -4,6 +4,7 @@ use crate::process::{Outcome, root};
 use crate::rigid_body::rig::{G, Rig, pose, table};
 use crate::{Figure, Limit};
 use nalgebra::Vector3;
+use terraglue_numerics::extremes::larger;
 use terraglue_robot_import::{JointKind, Options, Robot, read_robot};
 
 const STAND: [f64; 4] = [0.0, 0.958_192_178_746_274_4, -1.379_634_180_263_838_4, -1.149_354_325_277_333_1];
@@ -58,10 +59,10 @@ impl Walker {
             let ((pp, pq), (cp, cq)) = (pose(&states[parent]), pose(&states[joint.child]));
             let there = pp + pq * joint.parent_from_joint.translation.vector;
             let here = cp + cq * joint.child_from_joint.translation.vector;
-            worst[0] = worst[0].max((here - there).norm());
+            worst[0] = larger(worst[0], (here - there).norm());
             let axes = (pq * (joint.parent_from_joint * *joint.axis))
                 .cross(&(cq * (joint.child_from_joint * *joint.axis)));
-            worst[1] = worst[1].max(axes.norm());
+            worst[1] = larger(worst[1], axes.norm());
         }
         Ok(worst)
     }
@@ -100,7 +101,7 @@ fn on_ground() -> Outcome<Vec<Figure>> {
     while walker.rig.t() < 10.0 - 1e-9 {
         walker.step()?;
         let now = walker.joints()?;
-        (0..2).for_each(|k| worst[k] = worst[k].max(now[k]));
+        (0..2).for_each(|k| worst[k] = larger(worst[k], now[k]));
     }
     let x = pose(&walker.rig.states()?[0]).0.x;
     let id = "rigid-body.gait";
@@ -127,7 +128,7 @@ fn in_space() -> Outcome<Vec<Figure>> {
     while walker.rig.t() < 10.0 - 1e-9 {
         walker.step()?;
         let now = walker.momentum()?;
-        (0..2).for_each(|k| worst[k] = worst[k].max(now[k]));
+        (0..2).for_each(|k| worst[k] = larger(worst[k], now[k]));
     }
     let id = "rigid-body.zero-gravity";
     Ok(vec![
@@ -157,7 +158,7 @@ fn blocked() -> Outcome<Figure> {
     let mut worst = 0.0_f64;
     while walker.rig.t() < 8.0 - 1e-9 {
         walker.step()?;
-        worst = worst.max((walker.rig.get(id)? - held).abs());
+        worst = larger(worst, (walker.rig.get(id)? - held).abs());
     }
     let what = "LF_j3 blocked at 3 s, gait to 8 s: largest deviation, mrad";
     Ok(Figure::new("rigid-body.blocked_joint", 1e3 * worst, Limit::AtMost(1e-6), what))
@@ -177,8 +178,8 @@ fn partly_blocked() -> Outcome<Vec<Figure>> {
         let mut worst = [0.0_f64; 2];
         while walker.rig.t() < 5.0 - 1e-9 {
             walker.step()?;
-            worst[0] = worst[0].max((walker.rig.get(angle)? - held).abs());
-            worst[1] = worst[1].max(walker.rig.get(stop)?.abs());
+            worst[0] = larger(worst[0], (walker.rig.get(angle)? - held).abs());
+            worst[1] = larger(worst[1], walker.rig.get(stop)?.abs());
         }
         Ok(worst)
     };

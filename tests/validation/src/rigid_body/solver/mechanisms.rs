@@ -6,6 +6,7 @@ use crate::rigid_body::rig::{G, Rig, Urdf, pose, table};
 use crate::{Context, Figure, Limit};
 use nalgebra::Vector3;
 use std::f64::consts::PI;
+use terraglue_numerics::extremes::larger;
 
 const X: [f64; 3] = [1.0, 0.0, 0.0];
 const Y: [f64; 3] = [0.0, 1.0, 0.0];
@@ -46,7 +47,7 @@ fn run(rig: &mut Rig, until: f64) -> Outcome<[f64; 2]> {
     let mut energy = [0.0_f64; 2];
     rig.run(until, |rig| {
         let change = rig.energy().mechanical() - start;
-        energy = [energy[0].max(change.abs()), change];
+        energy = [larger(energy[0], change.abs()), change];
         Ok(())
     })?;
     Ok(energy)
@@ -189,7 +190,7 @@ fn squeezer(context: &Context, scheme: &str) -> Outcome<Vec<Figure>> {
     let mut balance = 0.0_f64;
     let done = rig.run(0.03, |rig| {
         let work = 0.033 * (rig.get(angle)? - beta);
-        balance = balance.max((rig.energy().mechanical() - start - work).abs());
+        balance = larger(balance, (rig.energy().mechanical() - start - work).abs());
         Ok(())
     });
     if let Err(e) = done {

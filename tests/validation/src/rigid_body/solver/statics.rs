@@ -3,6 +3,7 @@
 use crate::process::Outcome;
 use crate::rigid_body::rig::{G, Rig};
 use crate::{Figure, Limit};
+use terraglue_numerics::extremes::larger;
 
 const CHAIN: &str = "tests/reference/multibody/chain8_planar.urdf";
 
@@ -27,7 +28,7 @@ fn error(more: &str, expected: impl Fn(f64) -> [f64; 2]) -> Outcome<f64> {
                 [("x", 0.0), ("y", 0.0), ("z", force), ("mx", 0.0), ("my", moment), ("mz", 0.0)]
             {
                 let id = rig.id(&format!("j{k}.reaction_{what}"))?;
-                worst = worst.max((rig.get(id)? - value).abs());
+                worst = larger(worst, (rig.get(id)? - value).abs());
             }
         }
     }

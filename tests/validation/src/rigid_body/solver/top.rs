@@ -4,6 +4,7 @@ use crate::process::Outcome;
 use crate::rigid_body::rig::{G, Rig, model, pose};
 use crate::{Context, Figure, Limit};
 use nalgebra::Vector3;
+use terraglue_numerics::extremes::larger;
 
 /// Moments about the tip across and along the axis, kg m².
 const ACROSS: f64 = 0.002;
@@ -61,7 +62,7 @@ fn run(file: &str, scheme: &str, h: f64, exact: &Vector3<f64>) -> Outcome<Run> {
     let before = rig.energy().mechanical();
     let mut energy = 0.0_f64;
     rig.run(DURATION, |rig| {
-        energy = energy.max((rig.energy().mechanical() - before).abs());
+        energy = larger(energy, (rig.energy().mechanical() - before).abs());
         Ok(())
     })?;
     let axis = pose(&rig.states()?[0]).1 * start;

@@ -4,6 +4,7 @@ use super::field::{Field, Function, MICROMETRE, PHI, UNLIMITED, largest_curvatur
 use crate::process::Outcome;
 use crate::{Context, Figure, Limit};
 use terraglue_ground::Surface;
+use terraglue_numerics::extremes::{larger, largest, smaller};
 
 /// (radius in cells, spacing in m, whether it takes long).
 const CASES: [(u32, f64, bool); 8] = [
@@ -78,8 +79,8 @@ pub fn cones(context: &Context) -> Outcome<Vec<Figure>> {
             let slopes: Vec<f64> = (0..360)
                 .map(|k| slope(&field.ground.heights, f64::from(k).to_radians(), f64::from(middle(radius))))
                 .collect();
-            let worst = slopes.iter().map(|s| (s - 35.0).abs()).fold(0.0, f64::max);
-            let (low, high) = slopes.iter().fold((90.0f64, 0.0f64), |(a, b), s| (a.min(*s), b.max(*s)));
+            let worst = largest(slopes.iter().map(|s| (s - 35.0).abs()));
+            let (low, high) = slopes.iter().fold((90.0, 0.0), |(a, b), s| (smaller(a, *s), larger(b, *s)));
             let lost = if field.total() == before { "" } else { ", MASS LOST" };
             let sweeps = if settled { format!("{coarse} coarse and {fine}") } else { fine.to_string() };
             let what = format!(

@@ -11,6 +11,7 @@ use crate::timing::median;
 use crate::{Context, Figure, Limit};
 use rustix::time::{ClockId, clock_gettime};
 use std::sync::Arc;
+use terraglue_numerics::extremes::smaller;
 use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
 use terraglue_subsystem::{Geometry, Pose};
 
@@ -153,7 +154,7 @@ fn collapses(context: &Context) -> Outcome<Vec<Figure>> {
             field.settle(200_000)?;
             times.push(1e3 * (cpu() - before));
         }
-        let best = times.into_iter().fold(f64::INFINITY, f64::min);
+        let best = times.into_iter().fold(f64::INFINITY, smaller);
         let what = format!("collapse of a column to a cone of {radius} cells by `settle`, ms of CPU time");
         figures.push(Figure::new(format!("soil.automaton.cost.collapse_r{radius}"), best, limit, what));
     }

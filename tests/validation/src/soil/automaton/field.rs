@@ -3,6 +3,7 @@
 use crate::process::Outcome;
 use std::sync::Arc;
 use terraglue_ground::{Surface, UNIT_M};
+use terraglue_numerics::extremes::larger;
 use terraglue_soil_cellular_automaton::{Sweeper, settle};
 use terraglue_soil_contact::Ground;
 use terraglue_subsystem::{Standalone, Terrain, TerrainTile};
@@ -105,7 +106,7 @@ pub fn largest_curvature(surface: &dyn Surface) -> f64 {
             for ([a, b], times) in [([1, 0], 1.0), ([0, 1], 1.0), ([1, 1], 2.0), ([1, -1], 2.0)] {
                 let bent =
                     surface.height(i - a, j - b) - 2.0 * surface.height(i, j) + surface.height(i + a, j + b);
-                worst = worst.max((bent.abs() - UNIT_M) / (times * straight));
+                worst = larger(worst, (bent.abs() - UNIT_M) / (times * straight));
             }
         }
     }

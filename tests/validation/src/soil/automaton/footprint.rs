@@ -8,6 +8,7 @@ use crate::soil::rig::{DRY_SAND, LETE, LUNAR};
 use crate::{Context, Figure, Limit};
 use std::sync::Arc;
 use terraglue_ground::UNIT_M;
+use terraglue_numerics::extremes::larger;
 use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
 use terraglue_subsystem::{Geometry, Pose};
 
@@ -114,9 +115,9 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
             let mut worst = Worst { standing: -90.0, lifted: -90.0, ..Worst::default() };
             for kind in 0..5 {
                 let one = print(config, *spacing, &shape(kind), phi);
-                worst.standing = worst.standing.max(one.standing);
-                worst.lifted = worst.lifted.max(one.lifted);
-                worst.curvature = worst.curvature.max(one.curvature);
+                worst.standing = larger(worst.standing, one.standing);
+                worst.lifted = larger(worst.lifted, one.lifted);
+                worst.curvature = larger(worst.curvature, one.curvature);
                 worst.lost += one.lost.abs();
             }
             let id = |what: &str| format!("soil.automaton.print.{name}_{}mm.{what}", spacing * 1e3);

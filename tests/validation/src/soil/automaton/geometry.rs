@@ -3,6 +3,7 @@
 use super::feet::{Dice, shape};
 use crate::{Context, Figure, Limit};
 use terraglue_ground::{Placed, Rotation};
+use terraglue_numerics::extremes::larger;
 use terraglue_subsystem::{Geometry, Pose};
 
 const NAMES: [&str; 5] = ["sphere", "box", "capsule", "cylinder", "convex_mesh"];
@@ -55,7 +56,7 @@ fn worst(kind: u32, orientations: u32) -> f64 {
         for _ in 0..40 {
             let at = [dice.roll(-0.05, 0.05), dice.roll(-0.05, 0.05)];
             worst = match (placed.lower(at[0], at[1]), found(&geometry, &rotation, at)) {
-                (Some(exact), Some(found)) => worst.max((exact - found).abs()),
+                (Some(exact), Some(found)) => larger(worst, (exact - found).abs()),
                 (None, Some(_)) => 1.0,
                 // a chord shorter than the scan's step
                 _ => worst,

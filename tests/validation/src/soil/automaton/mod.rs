@@ -35,7 +35,10 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
 
 /// What the automaton costs; nothing where no clock is to be read.
 pub fn cost(context: &Context) -> Outcome<Vec<Figure>> {
-    if context.timing { cost::figures(context) } else { Ok(Vec::new()) }
+    if !context.timing {
+        return Ok(Vec::new());
+    }
+    Ok(cost::figures(context)?.into_iter().map(Figure::timed).collect())
 }
 
 /// The automaton itself on level ground.

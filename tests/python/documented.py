@@ -28,6 +28,7 @@ HELPS = ["", "run", "compare", "report", "check", "check-module", "modules", "va
 # What is not run, by its beginning, and why. What stands here and in no page is an error, too.
 NOT_RUN = {
     "cargo xtask test": "is what runs this test",
+    "cargo xtask ci": "runs this test, too",
     "cargo xtask validate": "`cargo xtask test` ends with its quick form; the long one takes hours",
     "cargo xtask install": "builds the release profile; test_dist.py unpacks and runs what it lays out",
     "cargo xtask dist": "builds the release profile; test_dist.py packs the development profile",

@@ -1,7 +1,9 @@
 //! `cargo xtask architecture`: the table and the drawing of the crates in `docs/architecture.md`, from their manifests.
 //!
-//! A crate stands one floor above the highest of those that it uses, so every arrow of the drawing runs down.
+//! A crate stands one floor above the highest of those that it uses, so every arrow of the drawing runs down. The shape of the code
+//! (cycles of files, large types, long functions) is held beside.
 
+use crate::shape;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
@@ -33,6 +35,7 @@ pub fn run(check: bool) -> Outcome {
     let rooms = rooms()?;
     let floors = floors(&rooms)?;
     limits(&rooms, &floors)?;
+    shapes(&rooms)?;
     let path = root().join("docs/architecture.md");
     let page = read(&path)?;
     let fresh = replaced(&page, "crates", &table(&rooms, &floors))?;
@@ -139,6 +142,15 @@ fn limits(rooms: &Rooms, floors: &BTreeMap<&str, usize>) -> Outcome {
         }
     }
     Ok(())
+}
+
+/// Cycles of files, large types and long functions, of the crates of the house, of the validators and of these commands.
+fn shapes(rooms: &Rooms) -> Outcome {
+    let others = ["tests/validation", "xtask", "xtask/start"].map(str::to_owned);
+    let folders: Vec<String> = rooms.values().map(|room| room.folder.clone()).chain(others).collect();
+    let known = read(&root().join("tests/known-shapes.tsv"))?;
+    let complaints = shape::complaints(&root(), &folders, &known)?;
+    if complaints.is_empty() { Ok(()) } else { Err(complaints.join("\n       ")) }
 }
 
 fn table(rooms: &Rooms, floors: &BTreeMap<&str, usize>) -> String {

@@ -1,11 +1,13 @@
-//! The developer commands, the same as in CI: `cargo xtask test | docs | validate | architecture | freeze | faults | header | schema | install | dist`.
+//! The developer commands, the same as in CI: `cargo xtask test | ci | docs | validate | architecture | freeze | faults | header | schema | install | dist`.
 //! What measures is the program `terraglue-validation` (`tests/validation`), which the other commands do not compile.
 
 mod architecture;
+mod ci;
 mod docs;
 mod freeze;
 mod header;
 mod schema;
+mod shape;
 mod test;
 
 use clap::{Parser, Subcommand};
@@ -27,6 +29,8 @@ struct Arguments {
 enum Command {
     /// Run every test: Rust, Python, and the quick figures.
     Test,
+    /// Run what CI runs: the format, lints and documentation with warnings as errors, unused dependencies, and every test.
+    Ci(ci::Arguments),
     /// Make everything in docs/, README and scenarios again that is made from code or measured by it (ten minutes).
     Docs,
     /// Measure the figures that the areas promise and hold them against their limits.
@@ -67,6 +71,7 @@ enum Command {
 fn main() -> ExitCode {
     let done: Outcome = match Arguments::parse().command {
         Command::Test => test::test(),
+        Command::Ci(arguments) => ci::run(&arguments),
         Command::Validate { arguments } => handed_on("validate", &arguments),
         Command::Docs => docs::write_all(),
         Command::Architecture { check } => architecture::run(check),

@@ -5,7 +5,7 @@ use std::process::ExitCode;
 
 /// Measured figures, and the pictures and tables of docs/.
 #[derive(Parser, Debug)]
-#[command(name = "cargo xtask", disable_help_subcommand = true)]
+#[command(name = "cargo xtask", bin_name = "cargo xtask", disable_help_subcommand = true)]
 struct Arguments {
     #[command(subcommand)]
     command: Command,

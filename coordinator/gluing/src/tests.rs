@@ -201,7 +201,7 @@ fn spec(strategy: &str, form: &str, start: &str) -> GluingSpec {
 
 /// Mean and largest number of evaluations of the soil, T of foot 0 and the heave at the end.
 fn run(spec: &GluingSpec, factor: f64, h: f64, rock: bool) -> (f64, u32, f64, f64) {
-    let duration = if h < 0.0012 { 0.02 } else { 0.1 };
+    let duration = if h < 0.002 { 0.02 } else { 0.1 };
     let found = ports();
     let table = Instance::new("table", "test", Kind::Robot, Box::new(Table::new((0.05, 0.02))));
     let columns = Instance::new("soil", "test", Kind::Soil, Box::new(Columns::new(factor, rock)));
@@ -279,7 +279,7 @@ fn the_single_pass_is_one_evaluation_and_first_order_in_h() {
         assert!(mean == 1.0 && most == 1, "{mean} {most}");
         heave
     };
-    let heaves = [0.01, 0.005, 0.0025, 0.00125].map(heave);
+    let heaves = [1e-3, 5e-4, 2.5e-4, 1.25e-4].map(heave);
     let changes: Vec<f64> = heaves.windows(2).map(|pair| pair[0] - pair[1]).collect();
     let orders: Vec<f64> = changes.windows(2).map(|pair| (pair[0] / pair[1]).log2()).collect();
     println!("heaves {heaves:?}: orders {orders:?}");

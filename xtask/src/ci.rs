@@ -1,5 +1,4 @@
-//! `cargo xtask ci`: what CI runs. The format, documentation with warnings as errors and every test; on request lints, unused
-//! dependencies and licences.
+//! `cargo xtask ci`: what CI runs. The format and every test; on request lints, unused dependencies and licences.
 
 use crate::test;
 use std::path::PathBuf;
@@ -9,9 +8,9 @@ use xtask_start::process::{Outcome, cargo, command, must, target};
 /// What CI is asked for.
 #[derive(clap::Args, Debug)]
 pub struct Arguments {
-    /// Run clippy with warnings as errors, too: the code has some left.
+    /// Run clippy and rustdoc with warnings as errors, too: the code has some left.
     #[arg(long)]
-    clippy: bool,
+    lints: bool,
     /// Look for unused dependencies, too, by cargo-machete.
     #[arg(long)]
     machete: bool,
@@ -23,10 +22,10 @@ pub struct Arguments {
 /// Runs all of it; stops at the first that fails. `cargo test` runs the examples in the documentation.
 pub fn run(arguments: &Arguments) -> Outcome {
     must(&mut cargo(&["fmt", "--all", "--check"]))?;
-    if arguments.clippy {
+    if arguments.lints {
         must(&mut cargo(&["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))?;
+        must(cargo(&["doc", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))?;
     }
-    must(cargo(&["doc", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))?;
     if arguments.machete {
         with_tool("cargo-machete", |program| command(program, &["--with-metadata"]))?;
     }

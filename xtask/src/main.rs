@@ -29,7 +29,7 @@ struct Arguments {
 enum Command {
     /// Run every test: Rust, Python, and the quick figures.
     Test,
-    /// Run what CI runs: the format, documentation with warnings as errors, and every test; more on request.
+    /// Run what CI runs: the format and every test; lints, unused dependencies and licences on request.
     Ci(ci::Arguments),
     /// Make everything in docs/, README and scenarios again that is made from code or measured by it (ten minutes).
     Docs,

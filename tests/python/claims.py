@@ -1,7 +1,7 @@
 """Figures of our own simulations that stand in sentences: of README, docs/ and the headers of scenarios.
 
 Each claim names a file, its words with `{}` where a figure stands, and what measures it: a figure of the tables of
-docs/validation.md (which `cargo xtask validate --quick --no-timing` holds against a measurement), or a run. A block between two marks is
+docs/validation.md (which `cargo xtask validate --quick` holds against a measurement), or a run. A block between two marks is
 made whole. `test_claims.py` holds both; `python tests/python/claims.py --write` (a part of `cargo xtask docs`) writes figures that have changed. A sentence whose words
 do not hold any more, "it climbs", has to be changed by hand: say in words what a figure can show.
 """
@@ -153,8 +153,8 @@ CLAIMS = [
     Claim(SOIL, "largest curvature at rest over κ_max | {}", (figure("soil.automaton.cone.*.curvature"),)),
     Claim(SOIL, "where material stays where it is pressed, against the integral, four wheels, soils and slips | sinkage {} %, pull {} % of the load",
           (figure("soil.automaton.wheel.integral.sinkage"), figure("soil.automaton.wheel.integral.pull"))),
-    Claim(SOIL, "the same with the shifted peak, `soil-bekker` | sinkage {} %, pull {} % of the load",
-          (figure("soil.bekker.wheel.shifted.sinkage"), figure("soil.bekker.wheel.shifted.pull"))),
+    Claim(SOIL, "the same with the shifted peak | sinkage {} %, pull {} % of the load",
+          (figure("soil.automaton.wheel.shifted.sinkage"), figure("soil.automaton.wheel.shifted.pull"))),
     Claim(SOIL, "against the integral, which knows no heap ahead | sinkage {} %, pull {} %",
           (figure("soil.automaton.wheel.moving.sinkage"), figure("soil.automaton.wheel.moving.pull"))),
     Claim(SOIL, "dragged both ways, twisted, unloaded and lifted | {} % of the path of the work",
@@ -190,18 +190,18 @@ CLAIMS = [
         figure("rigid-body.chain8.energy-momentum.tip"), *(figure(f"rigid-body.chain8.generalized-alpha.{part}") for part in ("energy", "ratio", "tip")))),
 
     Claim(LAWS, "a disc under 5 to 200 N in two soils | {} %", (figure("soil.*.load_control"),)),
-    Claim(LAWS, "`soil-bekker`: sinkage {} %, pull {} % of the load; `soil-cellular-automaton` where material", (figure(WHEEL + "sinkage"), figure(WHEEL + "pull"))),
+    Claim(LAWS, "sinkage {} %, pull {} % of the load on `soil-cellular-automaton` where material", (figure(WHEEL + "sinkage"), figure(WHEEL + "pull"))),
     Claim(LAWS, "with material that moves | sinkage {} %, pull {} %",
           (figure("soil.automaton.wheel.moving.sinkage"), figure("soil.automaton.wheel.moving.pull"))),
-    Claim(LAWS, "`soil-bekker`: sinkage {} %, pull {} %, load {} %;", (figure(RIG + "sinkage"), figure(RIG + "pull"), figure(RIG + "load"))),
-    Claim(LAWS, "the shifted peak on `soil-bekker`, against the table | {} %, {} %",
-          (figure("soil.bekker.wheel.shifted.sinkage"), figure("soil.bekker.wheel.shifted.pull"))),
+    Claim(LAWS, "sinkage {} %, pull {} %, load {} % on `soil-cellular-automaton` with", (figure(RIG + "sinkage"), figure(RIG + "pull"), figure(RIG + "load"))),
+    Claim(LAWS, "the shifted peak, against the table | {} %, {} %",
+          (figure("soil.automaton.wheel.shifted.sinkage"), figure("soil.automaton.wheel.shifted.pull"))),
     Claim(LAWS, "`bearing` {} %, `bekker` {} %, `reece` {} % rms", (figure("soil.fit.bearing"), figure("soil.fit.bekker"), figure("soil.fit.reece"))),
     Claim(LAWS, "60 → 100 mm: {} %, 100 → 60 mm: {} %", (figure("soil.fit.unseen_diameter.100mm"), figure("soil.fit.unseen_diameter.60mm"))),
     Claim(LAWS, "left out of twelve, the worst | {} %: this press", (figure("soil.fit.unseen_press"),)),
     Claim(LAWS, "seen at 0.23, 0.75 | sinkage {} %, pull {} N",
-          (figure("soil.bekker.real_wheel.three.unseen.sinkage"), figure("soil.bekker.real_wheel.three.unseen.pull"))),
-    Claim(LAWS, "the reverse | {} %, {} N", (figure("soil.bekker.real_wheel.two.unseen.sinkage"), figure("soil.bekker.real_wheel.two.unseen.pull"))),
+          (figure("soil.automaton.real_wheel.three.unseen.sinkage"), figure("soil.automaton.real_wheel.three.unseen.pull"))),
+    Claim(LAWS, "the reverse | {} %, {} N", (figure("soil.automaton.real_wheel.two.unseen.sinkage"), figure("soil.automaton.real_wheel.two.unseen.pull"))),
     Claim(LAWS, "seen: sinkage {} %, pull {} N; unseen: {} %, {} N; rising", tuple(
         figure(f"soil.automaton.real_wheel.three.{part}") for part in ("seen.sinkage", "seen.pull", "unseen.sinkage", "unseen.pull"))),
 ]

@@ -28,6 +28,7 @@ HELPS = ["", "run", "compare", "report", "check", "check-module", "modules", "va
 # What is not run, by its beginning, and why. What stands here and in no page is an error, too.
 NOT_RUN = {
     "cargo xtask test": "is what runs this test",
+    "cargo xtask ci": "runs this test, too",
     "cargo xtask validate": "`cargo xtask test` ends with its quick form; the long one takes hours",
     "cargo xtask install": "builds the release profile; test_dist.py unpacks and runs what it lays out",
     "cargo xtask dist": "builds the release profile; test_dist.py packs the development profile",
@@ -260,8 +261,13 @@ def copy_of_the_repository(folder):
     return folder
 
 
-def xtask():
-    """The program behind `cargo xtask`."""
-    program = pathlib.Path(PROGRAM).resolve().parent / "xtask"
+def beside(name):
+    """A program of the workspace that is built beside `terraglue`."""
+    program = pathlib.Path(PROGRAM).resolve().parent / name
     assert program.is_file(), f"{program} is not there: `cargo build --workspace` makes it"
     return program
+
+
+def xtask(command=""):
+    """The program behind `cargo xtask COMMAND`."""
+    return beside("terraglue-validation" if command in ("validate", "faults", "pictures") else "xtask")

@@ -16,9 +16,16 @@ def asked(program, *arguments):
 
 @pytest.mark.parametrize("options", [[], ["--no-timing"], ["--quick"]])
 def test_a_wrong_part_is_told_before_anything_is_built(options):
-    done = asked(xtask(), "validate", "soil", "--part", "wrong", *options)
+    done = asked(xtask("validate"), "validate", "soil", "--part", "wrong", *options)
     assert done.returncode == 1 and done.stdout == "", done.stdout
     assert done.stderr.startswith("error: --part wrong: the parts are automaton, "), done.stderr
+
+
+def test_what_measures_is_compiled_only_when_it_is_asked_for():
+    for arguments in (["validate", "--help"], ["validate", "soil", "--part", "wrong"], ["faults"], ["pictures"]):
+        done = asked(xtask(), *arguments)
+        assert done.stdout.split() == ["run", "--package", "terraglue-validation", "--", *arguments], done.stdout
+    assert "terraglue-validation" not in (ROOT / "xtask/Cargo.toml").read_text()
 
 
 def test_what_cargo_xtask_starts_hands_on_all_but_installing(tmp_path):

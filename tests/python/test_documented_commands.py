@@ -16,7 +16,7 @@ from conftest import PROGRAM, ROOT, terraglue
 @functools.cache
 def helps(program, path):
     """What `--help` says of a subcommand; none: there is no such."""
-    command = [PROGRAM if program == "terraglue" else documented.xtask(), *path.split(), "--help"]
+    command = [PROGRAM if program == "terraglue" else documented.xtask(path), *path.split(), "--help"]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     return done.stdout if done.returncode == 0 else None
 

@@ -1,12 +1,14 @@
 //! `cargo xtask architecture`: the table and the drawing of the crates in `docs/architecture.md`, from their manifests.
 //!
-//! A crate stands one floor above the highest of those that it uses, so every arrow of the drawing runs down.
+//! A crate stands one floor above the highest of those that it uses, so every arrow of the drawing runs down. The shape of the code
+//! (cycles of files, large types, long functions) is held beside.
 
-use crate::process::{Outcome, cargo, read, root, write};
+use crate::shape;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write;
 use std::path::Path;
+use xtask_start::process::{Outcome, between, cargo, read, root, write};
 
 /// Folders whose crates are drawn.
 const HOUSE: [&str; 3] = ["interfaces", "modules", "coordinator"];
@@ -33,6 +35,7 @@ pub fn run(check: bool) -> Outcome {
     let rooms = rooms()?;
     let floors = floors(&rooms)?;
     limits(&rooms, &floors)?;
+    shapes(&rooms)?;
     let path = root().join("docs/architecture.md");
     let page = read(&path)?;
     let fresh = replaced(&page, "crates", &table(&rooms, &floors))?;
@@ -141,6 +144,15 @@ fn limits(rooms: &Rooms, floors: &BTreeMap<&str, usize>) -> Outcome {
     Ok(())
 }
 
+/// Cycles of files, large types and long functions, of the crates of the house, of the validators and of these commands.
+fn shapes(rooms: &Rooms) -> Outcome {
+    let others = ["tests/validation", "xtask", "xtask/start"].map(str::to_owned);
+    let folders: Vec<String> = rooms.values().map(|room| room.folder.clone()).chain(others).collect();
+    let known = read(&root().join("tests/known-shapes.tsv"))?;
+    let complaints = shape::complaints(&root(), &folders, &known)?;
+    if complaints.is_empty() { Ok(()) } else { Err(complaints.join("\n       ")) }
+}
+
 fn table(rooms: &Rooms, floors: &BTreeMap<&str, usize>) -> String {
     let mut order: Vec<(&String, &Room)> = rooms.iter().collect();
     order.sort_by_key(|(name, room)| (std::cmp::Reverse(floors[name.as_str()]), room.folder.clone()));
@@ -188,11 +200,9 @@ fn reaches(rooms: &Rooms, from: &str, to: &str) -> bool {
 
 /// The page with the text between the marks of that name replaced.
 fn replaced(page: &str, name: &str, text: &str) -> Outcome<String> {
-    let (begin, end) = (format!("<!-- {name}: begin -->\n"), format!("<!-- {name}: end -->"));
-    let missing = || format!("docs/architecture.md has no marks `{name}`");
-    let (head, rest) = page.split_once(&begin).ok_or_else(missing)?;
-    let (_, tail) = rest.split_once(&end).ok_or_else(missing)?;
-    Ok(format!("{head}{begin}{text}{end}{tail}"))
+    let marks = (format!("<!-- {name}: begin -->\n"), format!("<!-- {name}: end -->"));
+    let fresh = between(page, (&marks.0, &marks.1), text);
+    fresh.ok_or_else(|| format!("docs/architecture.md has no marks `{name}`"))
 }
 
 #[cfg(test)]

@@ -1,8 +1,8 @@
 //! `cargo xtask docs`: everything in docs/, README and headers of scenarios that is made from code or measured by it, made again. The
 //! tests hold the same against the code.
 
-use crate::process::{Outcome, cargo, command, must, program};
-use crate::{architecture, faults, header, schema, test, validate};
+use crate::{architecture, header, schema, test, validation};
+use xtask_start::process::{Outcome, cargo, command, must, program};
 
 /// Makes all of it; about ten minutes.
 pub fn write_all() -> Outcome {
@@ -10,17 +10,10 @@ pub fn write_all() -> Outcome {
     schema::write_files(false)?;
     header::run(false)?;
     architecture::run(false)?;
-    pictures()?;
-    faults::write_page()?;
-    validate::validate(&validate::Arguments::quick_for_docs())?;
+    must(&mut validation(&["pictures"]))?;
+    must(&mut validation(&["faults"]))?;
+    must(&mut validation(&["validate", "--quick", "--write-docs"]))?;
     claims()
-}
-
-/// The pictures that are computed.
-pub fn pictures() -> Outcome {
-    must(&mut cargo(&["build", "--package", "terraglue"]))?;
-    validate::write_soil_pictures()?;
-    validate::write_walk_picture(&program("debug"))
 }
 
 /// The figures that stand in sentences.

@@ -8,10 +8,11 @@ mod digest;
 mod exported;
 mod runs;
 
-use crate::process::{Outcome, cargo, must, program, read, root, target, write};
-use crate::validate;
+use crate::validation;
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
+use std::process::Stdio;
+use xtask_start::process::{Outcome, cargo, must, program, read, root, target, write};
 
 /// What `cargo xtask freeze` is asked for.
 #[derive(clap::Args, Debug)]
@@ -51,10 +52,16 @@ pub fn freeze(arguments: &Arguments) -> Outcome {
     if arguments.check { compare(&found, no_figures) } else { store(&found, no_figures) }
 }
 
+/// Bits of the quick figures, as the validators print them.
 fn figures() -> Outcome<Hashes> {
-    let figures = validate::quick_figures()?;
-    let bits = |value: Option<f64>| value.map_or("-".to_owned(), |x| format!("{:016x}", x.to_bits()));
-    Ok(figures.into_iter().map(|f| (format!("figure.{}", f.id), bits(f.value))).collect())
+    let output = validation(&["bits"]).stderr(Stdio::inherit()).output();
+    let output = output.map_err(|e| format!("cannot start cargo: {e}"))?;
+    if !output.status.success() {
+        return Err("the quick figures could not be measured".into());
+    }
+    let text = String::from_utf8_lossy(&output.stdout);
+    let rows = text.lines().filter_map(|line| line.split_once('\t'));
+    Ok(rows.map(|(id, bits)| (format!("figure.{id}"), bits.to_owned())).collect())
 }
 
 fn stored(path: &Path) -> Outcome<Hashes> {

@@ -1,19 +1,21 @@
-//! The developer commands, the same as in CI: `cargo xtask test | docs | validate | architecture | freeze | faults | header | schema | install | dist`.
+//! The developer commands, the same as in CI: `cargo xtask test | ci | docs | validate | architecture | freeze | faults | header | schema | install | dist`.
+//! What measures is the program `terraglue-validation` (`tests/validation`), which the other commands do not compile.
 
 mod architecture;
+mod ci;
 mod docs;
-mod faults;
 mod freeze;
 mod header;
-mod process;
 mod schema;
+mod shape;
 mod test;
-mod validate;
 
 use clap::{Parser, Subcommand};
-use process::Outcome;
+use std::ffi::OsString;
+use std::os::unix::process::CommandExt;
 use std::process::ExitCode;
 use xtask_start::Install;
+use xtask_start::process::{Outcome, cargo};
 
 /// Developer commands.
 #[derive(Parser, Debug)]
@@ -27,10 +29,17 @@ struct Arguments {
 enum Command {
     /// Run every test: Rust, Python, and the quick figures.
     Test,
+    /// Run what CI runs: the format and every test; lints, unused dependencies and licences on request.
+    Ci(ci::Arguments),
     /// Make everything in docs/, README and scenarios again that is made from code or measured by it (ten minutes).
     Docs,
     /// Measure the figures that the areas promise and hold them against their limits.
-    Validate(validate::Arguments),
+    #[command(disable_help_flag = true)]
+    Validate {
+        /// See `cargo xtask validate --help`.
+        #[arg(trailing_var_arg = true, allow_hyphen_values = true)]
+        arguments: Vec<OsString>,
+    },
     /// Write the table and the drawing of the crates in docs/architecture.md from their manifests.
     Architecture {
         /// Change nothing; fail when the page is out of date.
@@ -49,13 +58,6 @@ enum Command {
     },
     /// Draw the pictures of docs/ that are computed: docs/images/moon_walk.svg, automaton_crater.svg, …
     Pictures,
-    /// Print a hash of the automaton's state after a fixed run: `validate soil` runs this in another environment.
-    #[command(hide = true)]
-    SoilHash {
-        /// A shorter run.
-        #[arg(long)]
-        quick: bool,
-    },
     /// Write docs/scenario.schema.json and the key tables of docs/scenario.md.
     Schema {
         /// Change nothing; fail when a file is out of date.
@@ -69,17 +71,14 @@ enum Command {
 fn main() -> ExitCode {
     let done: Outcome = match Arguments::parse().command {
         Command::Test => test::test(),
-        Command::Validate(arguments) => validate::validate(&arguments),
+        Command::Ci(arguments) => ci::run(&arguments),
+        Command::Validate { arguments } => handed_on("validate", &arguments),
         Command::Docs => docs::write_all(),
         Command::Architecture { check } => architecture::run(check),
         Command::Freeze(arguments) => freeze::freeze(&arguments),
-        Command::Faults => faults::write_page(),
+        Command::Faults => handed_on("faults", &[]),
         Command::Header { check } => header::run(check),
-        Command::Pictures => docs::pictures(),
-        Command::SoilHash { quick } => {
-            validate::print_soil_hash(quick);
-            Ok(())
-        }
+        Command::Pictures => handed_on("pictures", &[]),
         Command::Schema { check } => schema::write_files(check),
         Command::Install(install) => install.done(),
     };
@@ -90,4 +89,18 @@ fn main() -> ExitCode {
             ExitCode::FAILURE
         }
     }
+}
+
+/// The program that measures, in the root of the workspace; cargo brings it up to date first.
+fn validation(arguments: &[&str]) -> std::process::Command {
+    let mut command = cargo(&["run", "--package", "terraglue-validation", "--"]);
+    command.args(arguments);
+    command
+}
+
+/// Becomes the program that measures, in the folder of the caller, whose paths the arguments may hold.
+fn handed_on(name: &str, arguments: &[OsString]) -> Outcome {
+    let mut command = validation(&[name]);
+    let here = std::env::current_dir().map_err(|e| format!("current folder: {e}"))?;
+    Err(format!("cannot start cargo: {}", command.args(arguments).current_dir(here).exec()))
 }

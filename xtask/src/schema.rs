@@ -1,7 +1,7 @@
 //! Files of `docs/` that are made from the table of scenario keys.
 
-use crate::process::{Outcome, read, root, write};
 use terraglue::scenario::{docs, schema};
+use xtask_start::process::{Outcome, between, read, root, write};
 
 /// Begin and end of the generated part of `docs/scenario.md`.
 const MARKS: (&str, &str) = ("<!-- keys: begin -->\n", "<!-- keys: end -->");
@@ -30,11 +30,4 @@ pub fn write_files(check: bool) -> Outcome {
         }
     }
     Ok(())
-}
-
-/// Replaces what stands between two marks.
-pub fn between(text: &str, (begin, end): (&str, &str), new: &str) -> Option<String> {
-    let start = text.find(begin)? + begin.len();
-    let stop = start + text[start..].find(end)?;
-    Some(format!("{}{new}{}", &text[..start], &text[stop..]))
 }

@@ -1,8 +1,8 @@
 //! `cargo xtask test`: every test, the Python ones in a virtual environment of their own.
 
-use crate::process::{Outcome, cargo, command, must, program, read, root, target, write};
-use crate::validate;
+use crate::validation;
 use std::path::PathBuf;
+use xtask_start::process::{Outcome, cargo, command, must, program, read, root, target, write};
 
 /// Builds once, then runs Rust tests, Python tests and the quick figures.
 pub fn test() -> Outcome {
@@ -11,7 +11,7 @@ pub fn test() -> Outcome {
     let python = virtual_environment()?;
     let tests = ["-m", "pytest", "-q", "tests/python"];
     must(command(python, &tests).env("TERRAGLUE_BIN", program("debug")).env("PYTHONDONTWRITEBYTECODE", "1"))?;
-    validate::validate(&validate::Arguments::quick_without_timing())
+    must(&mut validation(&["validate", "--quick", "--check-docs"]))
 }
 
 /// The Python of `target/venv`, with what `tests/python/requirements.txt` asks for.

@@ -4,6 +4,7 @@
 
 use super::*;
 use crate::contact::{PortOwner, PortSet};
+use terraglue_numerics::extremes::larger;
 use terraglue_scenario::{FormChoice, GluingSpec, StartChoice, StrategyKind};
 use terraglue_subsystem::{
     Error, Input, Kind, Law, Level, Motion, Port, PortKind, Response, Result as CallResult, Step, Subsystem,
@@ -155,7 +156,7 @@ impl Subsystem for Columns {
     fn commit(&mut self, step: &Step, _: &[f64], partner: &Motion) -> CallResult {
         for i in 0..step.ports.len() {
             self.z[i] -= partner.x[i];
-            self.z_max[i] = self.z_max[i].max(self.z[i]);
+            self.z_max[i] = larger(self.z_max[i], self.z[i]);
         }
         Ok(())
     }
@@ -220,7 +221,7 @@ fn run(spec: &GluingSpec, factor: f64, h: f64, rock: bool) -> (f64, u32, f64, f6
         assert!(strategy.name() == cooperative::NAME || report.evaluations_bodies <= 4, "{report:?}");
         let evaluations = report.evaluations_soil.max(1);
         sum += evaluations;
-        most = most.max(evaluations);
+        most = larger(most, evaluations);
     }
     (f64::from(sum) / steps as f64, most, exchange.t[0], heave)
 }
@@ -272,7 +273,14 @@ fn auto_changes_the_form_by_kappa_and_the_start_from_the_estimate_saves_evaluati
 
 #[test]
 fn the_single_pass_is_one_evaluation_and_first_order_in_h() {
-    let deep = |h| run(&spec(cooperative::NAME, "auto", "estimate"), 1.0, h, false);
-    let (mean, most, ..) = deep(0.01);
-    assert!(mean == 1.0 && most == 1, "{mean} {most}");
+    let heave = |h| {
+        let (mean, most, _, heave) = run(&spec(cooperative::NAME, "auto", "estimate"), 1.0, h, false);
+        assert!(mean == 1.0 && most == 1, "{mean} {most}");
+        heave
+    };
+    let heaves = [1e-3, 5e-4, 2.5e-4, 1.25e-4].map(heave);
+    let changes: Vec<f64> = heaves.windows(2).map(|pair| pair[0] - pair[1]).collect();
+    let orders: Vec<f64> = changes.windows(2).map(|pair| (pair[0] / pair[1]).log2()).collect();
+    println!("heaves {heaves:?}: orders {orders:?}");
+    assert!(orders.iter().all(|order| (0.8..1.25).contains(order)), "{orders:?} of {heaves:?}");
 }

@@ -11,7 +11,7 @@
 //! | `exchange.json` | how values went round: order, connections with their delays, loops |
 //! | `viewer_layout.json` | a layout of this run for Foxglove and Lichtblick |
 //! | `final_ground.asc` | the ground at the end as ESRI ASCII grid |
-//! | `checkpoint.bin` | on request, while a run goes on: what [`Checkpoint`](terraglue_checkpoint::Checkpoint) goes on from |
+//! | `checkpoint.bin` | on request, while a run goes on: what `terraglue_checkpoint::Checkpoint` goes on from |
 //!
 //! Topics, message types and what each viewer makes of them stand in `docs/recording.md`.
 //!

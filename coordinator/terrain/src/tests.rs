@@ -3,6 +3,7 @@
 use super::*;
 use std::path::{Path, PathBuf};
 use terraglue_ground::HeightField;
+use terraglue_numerics::extremes::larger;
 use terraglue_scenario::Greys;
 
 fn spec(kind: TerrainKind) -> TerrainSpec {
@@ -62,7 +63,7 @@ fn undulating_ground_has_its_rms_seed_and_wavelengths() {
     assert_ne!(h, undulating(6, 0.0));
     // Waves of at least 0.3 m bound the curvature: |h''| ≤ Σ a·k², far below that of a wave of two cells.
     let bend = |i: usize| (h[i + 1] - 2.0 * h[i] + h[i - 1]).abs();
-    let largest = (1..300).map(|i| bend(100 * 301 + i)).fold(0.0, f64::max);
+    let largest = (1..300).map(|i| bend(100 * 301 + i)).fold(0.0, larger);
     assert!(largest > 1e-6 && largest < 0.06 * (TAU_OVER_SHORTEST * 0.02) * (TAU_OVER_SHORTEST * 0.02));
 }
 const TAU_OVER_SHORTEST: f64 = std::f64::consts::TAU / 0.3;
@@ -90,7 +91,7 @@ fn a_crater_keeps_depth_rim_and_slope() {
     assert_eq!(profile.height(10.0), 0.0);
     let slope =
         |k: i32| (profile.height(f64::from(k + 1) * 1e-3) - profile.height(f64::from(k) * 1e-3)) / 1e-3;
-    let steepest = (0..3000).map(|k| slope(k).abs()).fold(0.0, f64::max);
+    let steepest = (0..3000).map(|k| slope(k).abs()).fold(0.0, larger);
     assert!(steepest <= max_slope_rad.tan() + 1e-9 && steepest > 0.26);
     assert!((profile.steepest() - steepest).abs() < 1e-6);
     let message = failure(Profile::new(3.0, 0.5, 0.1, max_slope_rad));

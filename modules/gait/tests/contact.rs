@@ -6,6 +6,7 @@ use proptest::prelude::*;
 use terraglue_gait::Gait;
 use terraglue_gait::geometry::{LEG_NAMES, LEGS};
 use terraglue_gait::plane::Plane;
+use terraglue_numerics::extremes::larger;
 use terraglue_subsystem::Subsystem;
 
 const STEADY: &str = r#""posture_feedback": false, "heading_feedback": false"#;
@@ -27,7 +28,7 @@ fn walk(gait: &mut Gait, ground: [f64; LEGS], time: f64, mut noise: impl FnMut()
         }
         let before = targets(gait);
         step(gait, H);
-        worst = before.iter().zip(targets(gait)).map(|(a, b)| (a - b).abs()).fold(worst, f64::max);
+        worst = before.iter().zip(targets(gait)).map(|(a, b)| (a - b).abs()).fold(worst, larger);
     }
     worst
 }
@@ -142,7 +143,7 @@ fn a_touch_makes_no_jump_whatever_the_step() {
             }
             let before = targets(&gait);
             step(&mut gait, h);
-            worst = before.iter().zip(targets(&gait)).map(|(a, b)| (a - b).abs()).fold(worst, f64::max);
+            worst = before.iter().zip(targets(&gait)).map(|(a, b)| (a - b).abs()).fold(worst, larger);
         }
         assert!(worst < 15.0 * h, "h = {h}: {worst} rad in a step");
     }

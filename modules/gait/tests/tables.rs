@@ -2,6 +2,7 @@
 
 mod common;
 use common::{gait, step, targets};
+use terraglue_numerics::extremes::larger;
 
 /// Largest difference of the 24 angles to the table over one cycle, after some cycles at full speed.
 fn worst(table: &str, pattern: &str, period: f64, duty: f64) -> f64 {
@@ -20,7 +21,7 @@ fn worst(table: &str, pattern: &str, period: f64, duty: f64) -> f64 {
     let mut worst = 0.0_f64;
     for row in &rows {
         for (angle, known) in targets(&gait).iter().zip(&row[1..]) {
-            worst = worst.max((angle - known).abs());
+            worst = larger(worst, (angle - known).abs());
         }
         step(&mut gait, h);
     }

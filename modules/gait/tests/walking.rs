@@ -5,6 +5,7 @@ use common::{H, gait, read, run, set, standing, step, targets};
 use terraglue_gait::Gait;
 use terraglue_gait::geometry::LEG_NAMES;
 use terraglue_gait::walker::Mode;
+use terraglue_numerics::extremes::larger;
 
 const STEADY: &str = r#""posture_feedback": false, "heading_feedback": false"#;
 
@@ -15,7 +16,7 @@ fn largest_jump(gait: &mut Gait, time: f64) -> f64 {
         let before = targets(gait);
         step(gait, H);
         let after = targets(gait);
-        worst = before.iter().zip(after).map(|(a, b)| (a - b).abs()).fold(worst, f64::max);
+        worst = before.iter().zip(after).map(|(a, b)| (a - b).abs()).fold(worst, larger);
     }
     worst
 }
@@ -97,7 +98,7 @@ fn drag(swing: &str) -> f64 {
         step(&mut gait, H);
         for (a, b) in before.iter().zip(gait.walker().feet).filter(|(a, b)| a.height.max(b.height) < 2e-3) {
             let rest = gait.walker().twist.pass_below(a.position, H);
-            worst = worst.max((b.position[0] - rest[0]).hypot(b.position[1] - rest[1]) / H);
+            worst = larger(worst, (b.position[0] - rest[0]).hypot(b.position[1] - rest[1]) / H);
         }
     }
     worst
@@ -119,7 +120,7 @@ fn speed_beyond_reach_is_cut_and_said() {
     let mut out = 0.0_f64;
     for _ in 0..2400 {
         step(&mut gait, H);
-        out = out.max(read(&gait, "out_of_reach"));
+        out = larger(out, read(&gait, "out_of_reach"));
     }
     assert_eq!(out, 0.0);
 }
@@ -145,7 +146,7 @@ fn targets_do_not_jump_at_changes_of_command() {
         set(&mut gait, name, value).expect("accepted");
         let jump = largest_jump(&mut gait, 0.77);
         println!("{name} = {value}: {jump} rad");
-        worst = worst.max(jump);
+        worst = larger(worst, jump);
     }
     assert!(worst < bound, "{worst} rad in a step");
     assert!(worst > 1e-3, "nothing moved");

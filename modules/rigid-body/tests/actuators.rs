@@ -3,6 +3,7 @@
 
 mod common;
 use common::{Rig, temporary_urdf};
+use terraglue_numerics::extremes::larger;
 use terraglue_subsystem::Values;
 
 const INERTIA: f64 = 0.02;
@@ -105,7 +106,7 @@ fn current_and_voltage_are_limited() {
     let mut largest = 0.0_f64;
     for _ in 0..2000 {
         rig.free_step();
-        largest = largest.max(rig.get("j.current"));
+        largest = larger(largest, rig.get("j.current"));
         assert!(rig.get("j.voltage").abs() <= 24.0 && rig.get("j.current").abs() <= 5.0 + 1e-12);
     }
     close(largest, 5.0, 1e-12);

@@ -5,6 +5,7 @@
 mod common;
 use common::Rig;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use terraglue_numerics::extremes::larger;
 
 const FAST: &str = r#"{"j2": 0.2, "j4": 0.2, "j6": 0.2, "j8": 0.2}"#;
 
@@ -26,7 +27,7 @@ fn largest(file: &str, joints: &str, h: f64, steps: usize) -> f64 {
             let [w, x, y, z] = state.world_from_body.orientation;
             let q = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
             let p = Vector3::from(state.world_from_body.position);
-            worst = worst.max((p - end).norm());
+            worst = larger(worst, (p - end).norm());
             end = p + q * Vector3::new(0.25, 0.0, 0.0);
         }
     }

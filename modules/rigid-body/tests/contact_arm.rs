@@ -7,6 +7,7 @@
 
 mod common;
 use common::{Rig, temporary_urdf};
+use terraglue_numerics::extremes::larger;
 use terraglue_subsystem::{Input, Law, Motion, Port, PortKind, Response, Step, component};
 
 /// Centre of the foot from that of mass in body axes, x and z, and how far below it the sole is, m.
@@ -116,7 +117,7 @@ fn step(rig: &mut Rig, foot: Foot, h: f64, middle: bool) {
         let turn = x.get(5).map_or(0.0, |turn| share * turn);
         let [along, up, moment] = foot.law(ports[0].origin[2] + share * x[0], rate, pitch + turn);
         let wanted = [up, along, 0.0, 0.0, 0.0, moment];
-        let change = t.iter().zip(wanted).fold(0.0_f64, |m, (t, w)| m.max((t - w).abs()));
+        let change = t.iter().zip(wanted).fold(0.0_f64, |m, (t, w)| larger(m, (t - w).abs()));
         t.copy_from_slice(&wanted[..n]);
         let mut out = Response { x: &mut x, v: &mut v, a: &mut a, t: &mut out_t, reached: 0.0, flags: 0 };
         rig.robot.advance(&step, &Input::Force { t: &t, motion: None }, &mut out).unwrap();
@@ -158,7 +159,7 @@ fn error(foot: Foot, integrator: &str, h: f64) -> f64 {
         step(&mut rig, foot, 0.0, false);
     }
     (0..(1.0 / h).round() as usize).for_each(|_| step(&mut rig, foot, h, middle));
-    pose(&rig).iter().zip(reference(foot)).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()))
+    pose(&rig).iter().zip(reference(foot)).fold(0.0_f64, |m, (a, b)| larger(m, (a - b).abs()))
 }
 
 /// Order between the two shortest of three steps and the error at the shortest.

@@ -3,6 +3,7 @@
 
 mod common;
 use common::{Rig, temporary_urdf};
+use terraglue_numerics::extremes::larger;
 
 const SPHERE: &str = r#"<robot name="r"><link name="s"><inertial><mass value="2"/>
     <inertia ixx="0.008" iyy="0.008" izz="0.008" ixy="0" ixz="0" iyz="0"/></inertial>
@@ -27,7 +28,7 @@ fn balance(restitution: f64) -> (f64, f64) {
     let mut worst = 0.0_f64;
     for _ in 0..1500 {
         rig.free_step();
-        worst = worst.max((sum(&rig) - start).abs());
+        worst = larger(worst, (sum(&rig) - start).abs());
     }
     (worst, rig.get("contact.lost"))
 }

@@ -4,6 +4,7 @@
 mod common;
 use common::{Rig, STAND, temporary_urdf};
 use proptest::prelude::*;
+use terraglue_numerics::extremes::larger;
 
 const G: f64 = 9.81;
 
@@ -71,7 +72,7 @@ fn rebound(name: &str, more: &str) -> f64 {
     for step in 0..1000 {
         rig.free_step();
         if step > 500 {
-            apex = apex.max(rig.states()[0].world_from_body.position[2] - 0.1);
+            apex = larger(apex, rig.states()[0].world_from_body.position[2] - 0.1);
         }
     }
     apex

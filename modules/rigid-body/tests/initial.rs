@@ -3,6 +3,7 @@
 
 mod common;
 use common::Rig;
+use terraglue_numerics::extremes::larger;
 use terraglue_subsystem::{Effect, Values};
 
 const G: f64 = 9.81;
@@ -14,15 +15,15 @@ fn hexapod(more: &str) -> Rig {
 fn farthest(a: &Rig, b: &Rig) -> f64 {
     let apart = |(a, b): (&terraglue_subsystem::BodyState, &terraglue_subsystem::BodyState)| {
         let (p, q) = (a.world_from_body, b.world_from_body);
-        let place = (0..3).map(|k| (p.position[k] - q.position[k]).abs()).fold(0.0, f64::max);
+        let place = (0..3).map(|k| (p.position[k] - q.position[k]).abs()).fold(0.0, larger);
         let speed = |k: usize| {
             let spin = (a.angular_velocity[k] - b.angular_velocity[k]).abs();
-            spin.max((a.linear_velocity[k] - b.linear_velocity[k]).abs())
+            larger(spin, (a.linear_velocity[k] - b.linear_velocity[k]).abs())
         };
-        let turn = (0..4).map(|k| (p.orientation[k] - q.orientation[k]).abs()).fold(0.0, f64::max);
-        (0..3).map(speed).fold(place.max(turn), f64::max)
+        let turn = (0..4).map(|k| (p.orientation[k] - q.orientation[k]).abs()).fold(0.0, larger);
+        (0..3).map(speed).fold(larger(place, turn), larger)
     };
-    a.states().iter().zip(&b.states()).map(apart).fold(0.0, f64::max)
+    a.states().iter().zip(&b.states()).map(apart).fold(0.0, larger)
 }
 
 #[test]

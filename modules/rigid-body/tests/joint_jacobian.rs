@@ -3,6 +3,7 @@
 
 mod common;
 use common::Rig;
+use terraglue_numerics::extremes::larger;
 use terraglue_subsystem::{Input, Law, Level, Port, PortKind, Response, Step, component};
 
 const INTEGRATORS: [&str; 3] = ["symplectic-euler", "generalized-alpha", "energy-momentum"];
@@ -62,7 +63,7 @@ fn error(rig: &mut Rig, kind: PortKind, h: f64) -> [f64; 3] {
     }
     assert_eq!(trial(rig, &step, &base), before, "the trial is another one after the derivatives");
     for c in 0..12 {
-        let largest = g[0][12 * c..][..12].iter().fold(0.0_f64, |m, g| m.max(g.abs()));
+        let largest = g[0][12 * c..][..12].iter().fold(0.0_f64, |m, g| larger(m, g.abs()));
         let delta = 1e-4 / largest;
         let moved = |rig: &mut Rig, way: f64| {
             let mut t = base.clone();
@@ -71,10 +72,10 @@ fn error(rig: &mut Rig, kind: PortKind, h: f64) -> [f64; 3] {
         };
         let (plus, minus) = (moved(rig, 1.0), moved(rig, -1.0));
         for k in 0..3 {
-            let all = g[k].iter().fold(0.0_f64, |m, g| m.max(g.abs()));
+            let all = g[k].iter().fold(0.0_f64, |m, g| larger(m, g.abs()));
             for r in 0..12 {
                 let difference = (plus[k][r] - minus[k][r]) / (2.0 * delta);
-                errors[k] = errors[k].max((difference - g[k][12 * c + r]).abs() / all);
+                errors[k] = larger(errors[k], (difference - g[k][12 * c + r]).abs() / all);
             }
         }
     }

@@ -6,6 +6,7 @@
 
 mod common;
 use common::{Rig, temporary_urdf};
+use terraglue_numerics::extremes::larger;
 use terraglue_subsystem::{Input, Law, Motion, Port, PortKind, Response, Step, component};
 
 /// Arm of the force, m; force, N; inertia, kg m².
@@ -87,7 +88,7 @@ fn errors(integrator: &str, h: f64) -> (f64, f64) {
     let (mut work, mut worst) = (0.0, 0.0_f64);
     for _ in 0..(1.0 / h).round() as usize {
         work += FORCE[0] * step(&mut rig, h);
-        worst = worst.max((rig.robot.energy().mechanical() - start - work).abs());
+        worst = larger(worst, (rig.robot.energy().mechanical() - start - work).abs());
     }
     let [w, _, _, z] = rig.states()[0].world_from_body.orientation;
     let angle = 2.0 * libm::atan2(z, w);

@@ -3,6 +3,7 @@
 
 mod common;
 use common::{Rig, STAND};
+use terraglue_numerics::extremes::larger;
 
 const G: f64 = 9.81;
 const CHAIN: &str = "tests/reference/multibody/chain8_planar.urdf";
@@ -13,7 +14,7 @@ fn reaction(rig: &Rig, joint: &str) -> [f64; 6] {
 }
 
 fn near(found: [f64; 6], expected: [f64; 6], within: f64, what: &str) {
-    let off = found.iter().zip(expected).fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+    let off = found.iter().zip(expected).fold(0.0_f64, |m, (a, b)| larger(m, (a - b).abs()));
     assert!(off <= within, "{what}: {found:?} is not {expected:?}");
 }
 

@@ -5,6 +5,7 @@
 mod common;
 use common::Rig;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
+use terraglue_numerics::extremes::larger;
 use terraglue_subsystem::{Estimate, Input, Law, Motion, Port, Response, Step, component};
 
 const G: f64 = 9.81;
@@ -69,7 +70,7 @@ fn step(rig: &mut Rig) -> f64 {
     let mut out =
         Estimate { t_star: &mut t, x_free: &mut x_free, g: &mut g, active: &mut active, unique: false };
     rig.robot.estimate_forces(&step, &Motion { x: &x2, v: &still }, &mut out).unwrap();
-    let largest = t.iter().fold(0.0_f64, |m, t| m.max(t.abs()));
+    let largest = t.iter().fold(0.0_f64, |m, t| larger(m, t.abs()));
     assert!(largest.is_finite());
     for (port, t) in ports.iter().zip(t.chunks_exact_mut(6)) {
         let spring = STIFFNESS * (-port.origin[2]).max(0.0);
@@ -97,7 +98,7 @@ fn drive(rig: &mut Rig, rates: [f64; 6]) {
 fn run(max_torque: f64, z: f64, rates: [f64; 6], steps: usize) -> (f64, f64, f64) {
     let mut rig = rover(max_torque, z);
     drive(&mut rig, rates);
-    let largest = (0..steps).fold(0.0_f64, |m, _| m.max(step(&mut rig)));
+    let largest = (0..steps).fold(0.0_f64, |m, _| larger(m, step(&mut rig)));
     (largest, rig.get("body.x"), rig.get("body.z"))
 }
 

@@ -3,6 +3,7 @@
 
 mod common;
 use common::{Rig, STAND, temporary_urdf};
+use terraglue_numerics::extremes::larger;
 use terraglue_subsystem::{Level, Port, Step, component};
 
 const G: f64 = 9.81;
@@ -33,7 +34,7 @@ fn watch(mut rig: Rig, h: f64, end: f64, expected: [f64; 3]) -> (f64, f64) {
     let (mut worst, mut error) = (0.0_f64, f64::NAN);
     for i in 1..=(end / h).round() as usize {
         rig.free_step();
-        worst = worst.max((rig.robot.energy().mechanical() - start).abs());
+        worst = larger(worst, (rig.robot.energy().mechanical() - start).abs());
         if i == (1.0 / h).round() as usize {
             error = (tip(&rig) - nalgebra::Vector3::from(expected)).norm();
         }
@@ -138,7 +139,7 @@ fn the_compliance_is_the_derivative_of_the_step() {
     for (k, level) in [Level::Position, Level::Velocity, Level::Acceleration].into_iter().enumerate() {
         let mut g = [f64::NAN; 36];
         rig.robot.interface_jacobian(&step, level, &mut g).unwrap();
-        let largest = g.iter().fold(0.0_f64, |m, g| m.max(g.abs()));
+        let largest = g.iter().fold(0.0_f64, |m, g| larger(m, g.abs()));
         for c in 0..6 {
             for r in 0..6 {
                 let difference = (columns[c][k][r] - zero[k][r]) / 1e-2;

@@ -5,6 +5,7 @@ mod common;
 use common::{Rig, temporary_urdf};
 use std::fmt::Write;
 use std::sync::Arc;
+use terraglue_numerics::extremes::larger;
 use terraglue_rigid_body::RigidBody;
 use terraglue_subsystem::{BodyState, Config, Geometry, Module, Standalone, Terrain, TerrainTile};
 
@@ -39,9 +40,9 @@ fn sheet(half: f64, cells: usize) -> String {
 fn farthest(a: &[BodyState], b: &[BodyState]) -> f64 {
     let apart = |(a, b): (&BodyState, &BodyState)| {
         let (p, q) = (a.world_from_body.position, b.world_from_body.position);
-        (0..3).map(|k| (p[k] - q[k]).abs()).fold(0.0, f64::max)
+        (0..3).map(|k| (p[k] - q[k]).abs()).fold(0.0, larger)
     };
-    a.iter().zip(b).map(apart).fold(0.0, f64::max)
+    a.iter().zip(b).map(apart).fold(0.0, larger)
 }
 
 #[test]
@@ -108,7 +109,7 @@ fn a_mesh_of_a_plane_is_the_plane() {
     for _ in 0..600 {
         plane.free_step();
         mesh.free_step();
-        worst = worst.max(farthest(&plane.states(), &mesh.states()));
+        worst = larger(worst, farthest(&plane.states(), &mesh.states()));
     }
     println!("apart by {worst:e}, box at {}", mesh.get("box.x"));
     assert!(worst < 1e-6, "{worst:e}");

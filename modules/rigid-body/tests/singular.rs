@@ -4,6 +4,7 @@
 mod common;
 use common::{Rig, temporary_urdf};
 use std::fmt::Write;
+use terraglue_numerics::extremes::larger;
 
 const G: f64 = 9.81;
 
@@ -71,7 +72,7 @@ fn run(n: usize, scheme: &str, until: f64) -> [f64; 2] {
     (0..(until / rig.h).round() as usize).for_each(|_| rig.free_step());
     let phi = exact(n, until) - std::f64::consts::FRAC_PI_2;
     let off = |k: usize| (rig.get(&format!("j_post{k}.angle")) - phi).abs();
-    let worst = (0..=n).map(off).fold(0.0_f64, f64::max);
+    let worst = (0..=n).map(off).fold(0.0_f64, larger);
     [worst, (rig.robot.energy().mechanical() - start).abs()]
 }
 

@@ -3,6 +3,7 @@
 use terraglue::testbed::Options;
 use terraglue::{Testbed, scenario::Scenario};
 use terraglue_gait::Gait;
+use terraglue_numerics::extremes::larger;
 use terraglue_rigid_body::RigidBody;
 use terraglue_soil_bekker::SoilBekker;
 use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
@@ -38,10 +39,10 @@ fn compare(whole: &str, cut: &str, steps: u32, pairs: &[(&str, &str)]) -> (f64, 
         whole.step().unwrap_or_else(|e| panic!("whole: {e}"));
         cut.step().unwrap_or_else(|e| panic!("cut: {e}"));
         evaluations += cut.report().evaluations_bodies;
-        gap = gap.max(cut.report().max_gap_m);
+        gap = larger(gap, cut.report().max_gap_m);
         for (a, b) in pairs {
             let read = |t: &Testbed, name: &str| t.read(name).unwrap_or_else(|| panic!("no variable {name}"));
-            worst = worst.max((read(&whole, a) - read(&cut, b)).abs());
+            worst = larger(worst, (read(&whole, a) - read(&cut, b)).abs());
         }
     }
     (worst, f64::from(evaluations) / f64::from(steps), gap)
@@ -90,7 +91,7 @@ fn one_unchecked_newton_step_holds_the_elbow_for_ten_seconds() {
         let (mut gap, mut early) = (0.0_f64, 0.0_f64);
         for step in 0..5000 {
             cut.step().unwrap_or_else(|e| panic!("{integrator} at step {step}: {e}"));
-            gap = gap.max(cut.report().max_gap_m);
+            gap = larger(gap, cut.report().max_gap_m);
             early = if step < 500 { gap } else { early };
         }
         println!("{integrator}: gap {early:e} m in 1 s, {gap:e} m in 10 s");

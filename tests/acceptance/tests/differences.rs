@@ -8,6 +8,7 @@ use std::sync::Arc;
 use terraglue::host::Library;
 use terraglue::testbed::Options;
 use terraglue::{Testbed, scenario::Scenario};
+use terraglue_numerics::extremes::larger;
 use terraglue_subsystem::{
     Batch, BodyState, Capabilities, Config, Energy, Host, Input, Law, Level, Module, Motion, Response,
     Result, Scene, Schema, Step, Subsystem, Values, ValuesMut, Variable,
@@ -111,7 +112,7 @@ fn read(testbed: &Testbed, names: &[&str]) -> Vec<f64> {
 }
 
 fn apart(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).fold(0.0, |m, (a, b)| m.max((a - b).abs()))
+    a.iter().zip(b).fold(0.0, |m, (a, b)| larger(m, (a - b).abs()))
 }
 
 /// Four masses in a row, each a subsystem, held together by three joints.

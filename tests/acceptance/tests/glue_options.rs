@@ -4,6 +4,7 @@
 
 use terraglue::{Result, Testbed};
 use terraglue_acceptance::{glued, read};
+use terraglue_numerics::extremes::larger;
 
 fn build(text: &str) -> Testbed {
     glued(text).unwrap_or_else(|e| panic!("{e}"))
@@ -26,7 +27,7 @@ fn run(testbed: &mut Testbed, until: f64) -> Result<Did> {
         did.steps += 1.0;
         did.evaluations += f64::from(report.evaluations_bodies);
         did.refreshes += report.jacobian_refreshes;
-        did.gap = did.gap.max(report.max_gap_m);
+        did.gap = larger(did.gap, report.max_gap_m);
     }
     did.evaluations /= did.steps;
     Ok(did)

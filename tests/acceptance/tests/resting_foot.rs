@@ -4,6 +4,7 @@ use std::sync::Arc;
 use terraglue::Testbed;
 use terraglue::testbed::Options;
 use terraglue_acceptance::{SOILS, build, foot, scenario, steps};
+use terraglue_numerics::extremes::larger;
 use terraglue_soil_bekker::SoilBekker;
 use terraglue_subsystem::{
     Capabilities, Config, Estimate, Host, Input, Law, Module, Motion, Response, Result, Schema, Step,
@@ -21,8 +22,8 @@ fn rest(text: &str, settle_steps: usize) -> (f64, f64, f64) {
     for _ in 0..1000 {
         steps(&mut testbed, 1);
         let t1: f64 = testbed.report().ports.iter().map(|p| p.wrench[0]).sum();
-        error = error.max((t1 / WEIGHT - 1.0).abs());
-        drift = drift.max((testbed.read("foot.ball.z").expect("height") - start).abs());
+        error = larger(error, (t1 / WEIGHT - 1.0).abs());
+        drift = larger(drift, (testbed.read("foot.ball.z").expect("height") - start).abs());
     }
     (error, drift, 0.03 - start)
 }

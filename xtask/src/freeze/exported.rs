@@ -2,8 +2,8 @@
 
 use super::Hashes;
 use super::digest::Digest;
-use crate::process::{Outcome, command, must, write};
 use std::path::Path;
+use xtask_start::process::{Outcome, command, must, write};
 
 /// Soil of the exported soils.
 const ROW: &str = "soil.parameters=lunar_nominal_Apollo";

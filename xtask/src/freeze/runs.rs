@@ -2,9 +2,9 @@
 
 use super::Hashes;
 use super::digest::Digest;
-use crate::process::{Outcome, command, root};
 use std::path::Path;
 use terraglue::recording::{GluingRecord, GroundRecord, PortRecord, Recording, Table};
+use xtask_start::process::{Outcome, command, root};
 
 const SOILS: [&str; 2] = ["soil-cellular-automaton", "soil-bekker"];
 const STRATEGIES: [&str; 3] = ["cooperative", "cooperative-compliant", "iterative"];

@@ -1,4 +1,4 @@
-//! Folders of the workspace and child processes that must succeed.
+//! Folders and files of the workspace, and child processes that must succeed.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -53,4 +53,11 @@ pub fn read(path: &Path) -> Outcome<String> {
 pub fn write(path: &Path, text: &str) -> Outcome {
     let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
     made.and_then(|()| std::fs::write(path, text)).map_err(|e| format!("{}: {e}", path.display()))
+}
+
+/// Replaces what stands between two marks.
+pub fn between(text: &str, (begin, end): (&str, &str), new: &str) -> Option<String> {
+    let start = text.find(begin)? + begin.len();
+    let stop = start + text[start..].find(end)?;
+    Some(format!("{}{new}{}", &text[..start], &text[stop..]))
 }

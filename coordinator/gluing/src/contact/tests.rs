@@ -3,6 +3,7 @@
 use super::*;
 use terraglue_diagnostics::error::Error;
 use terraglue_ground::HeightField;
+use terraglue_numerics::extremes::larger;
 use terraglue_scenario::{TerrainKind, TerrainSpec};
 use terraglue_subsystem::{
     BodyState, Capabilities, FieldInfo, FieldTile, Geometry, Input, Pose, Response, Result as CallResult,
@@ -266,7 +267,7 @@ fn the_frame_moves_smoothly_over_rolling_ground() {
         let set = bench.detect(&[at(p, [0.0; 3])]).expect("fine");
         let frame = set.ports[0].frame;
         if let Some(old) = before {
-            let turn = (0..3).map(|k| (frame[k] - old[k]).abs()).fold(0.0, f64::max);
+            let turn = (0..3).map(|k| (frame[k] - old[k]).abs()).fold(0.0, larger);
             assert!(turn < 4e-3, "the normal jumped by {turn} over 1 mm");
         }
         before = Some(frame);

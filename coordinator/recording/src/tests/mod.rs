@@ -6,6 +6,7 @@ mod rig;
 use super::*;
 use rig::*;
 use std::path::Path;
+use terraglue_numerics::extremes::larger;
 
 fn record(folder: &Path, strategy: &str, steps: u64) -> Summary {
     let mut rig = Rig::new(strategy);
@@ -105,7 +106,7 @@ fn patches_of_ground_add_up_to_the_whole() {
     let (initial, end) = (whole.initial_ground.expect("there"), whole.final_ground.expect("there"));
     assert_eq!(initial.size, [150, 100]);
     assert!(initial.sinkage.iter().all(|s| *s == 0.0));
-    let deepest = end.sinkage.iter().fold(0.0_f32, |a, b| a.max(*b));
+    let deepest = end.sinkage.iter().fold(0.0_f32, |a, b| larger(a, *b));
     assert!((0.8 * DEPTH as f32..=DEPTH as f32).contains(&deepest), "{deepest}");
     for ((h0, h1), s) in initial.height.iter().zip(&end.height).zip(&end.sinkage) {
         assert!((h0 - h1 - s).abs() < 1e-6);
@@ -348,7 +349,7 @@ fn the_summary_holds_the_figures_of_the_closed_form() {
     assert!((s.max_roll_rad.expect("known") - ROLL).abs() < 1e-6);
     near(s.max_pitch_rad, 0.0);
     let ground = Recording::open(f.path()).expect("readable").final_ground.expect("there");
-    let deepest = ground.sinkage.iter().fold(0.0_f32, |a, b| a.max(*b));
+    let deepest = ground.sinkage.iter().fold(0.0_f32, |a, b| larger(a, *b));
     assert_eq!(s.max_sinkage_m.map(|s| s as f32), Some(deepest));
     // 4 N m times the mean of |cos|: 4·0.3·2π·2/π J in one second.
     assert!((s.energy_j - 4.8).abs() < 1e-4, "{}", s.energy_j);

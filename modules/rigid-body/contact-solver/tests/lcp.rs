@@ -3,6 +3,7 @@
 
 use proptest::prelude::*;
 use terraglue_contact_solver::lcp::{Lemke, Outcome};
+use terraglue_numerics::extremes::{larger, smaller};
 
 fn solve(m: &[f64], q: &[f64]) -> (Outcome, Vec<f64>) {
     let mut z = vec![f64::NAN; q.len()];
@@ -14,8 +15,10 @@ fn solve(m: &[f64], q: &[f64]) -> (Outcome, Vec<f64>) {
 fn violation(m: &[f64], q: &[f64], z: &[f64]) -> f64 {
     let n = q.len();
     let w = |i: usize| q[i] + (0..n).map(|j| m[j * n + i] * z[j]).sum::<f64>();
-    let scale = q.iter().fold(0.0_f64, |s, q| s.max(q.abs()));
-    (0..n).fold(0.0_f64, |v, i| v.max(-z[i]).max(-w(i) / scale).max(z[i].min(w(i).abs() / scale)))
+    let scale = q.iter().fold(0.0_f64, |s, q| larger(s, q.abs()));
+    (0..n).fold(0.0_f64, |v, i| {
+        [-z[i], -w(i) / scale, smaller(z[i], w(i).abs() / scale)].into_iter().fold(v, larger)
+    })
 }
 
 fn assert_solved(m: &[f64], q: &[f64]) -> Vec<f64> {
@@ -116,7 +119,7 @@ proptest! {
         let q: Vec<f64> = (0..n).map(|i| (0..k).map(|l| a[i * k + l] * q[l]).sum()).collect();
         let (outcome, z) = solve(&m, &q);
         prop_assert!(matches!(outcome, Outcome::Solved(_)), "{outcome:?}");
-        let size = z.iter().fold(1.0_f64, |s, z| s.max(z.abs()));
+        let size = z.iter().fold(1.0_f64, |s, z| larger(s, z.abs()));
         prop_assert!(violation(&m, &q, &z) < 1e-7 * size, "{z:?}");
     }
 
@@ -134,7 +137,7 @@ proptest! {
         let reversed: Vec<f64> = m.iter().rev().copied().collect();
         let back: Vec<f64> = q.iter().rev().copied().collect();
         let other = solve(&reversed, &back).1;
-        let size = z.iter().fold(1.0_f64, |s, z| s.max(z.abs()));
+        let size = z.iter().fold(1.0_f64, |s, z| larger(s, z.abs()));
         for (a, b) in z.iter().zip(other.iter().rev()) {
             prop_assert!((a - b).abs() < 1e-8 * size, "{z:?} {other:?}");
         }

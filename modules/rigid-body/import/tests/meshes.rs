@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 use std::path::{Path, PathBuf};
+use terraglue_numerics::extremes::larger;
 use terraglue_robot_import::{Mesh, Options, Robot, ShapeGeometry, read_robot};
 
 /// A tetrahedron with its corner at the origin and edges of 1, 2 and 3 m along the axes.
@@ -78,7 +79,7 @@ fn every_format_gives_the_same_hull() {
         let robot = read(&robot(&folder, &format!("filename=\"{file}\" scale=\"0.1 0.1 0.2\""))).unwrap();
         let mesh = hull(&robot);
         assert_eq!((mesh.points.len(), mesh.triangles.len()), (4, 4), "{file}");
-        let size = |k: usize| mesh.points.iter().map(|p| p[k]).fold(0.0, f64::max);
+        let size = |k: usize| mesh.points.iter().map(|p| p[k]).fold(0.0, larger);
         for (k, exact) in [0.1, 0.2, 0.6].into_iter().enumerate() {
             assert!((size(k) - exact).abs() < 1e-7, "{file} {}", size(k));
         }

@@ -5,6 +5,7 @@ mod support;
 
 use support::{Rig, Shown, flat, read, soil};
 use terraglue_ground::Surface;
+use terraglue_numerics::extremes::larger;
 use terraglue_soil_bekker::SoilBekker as Soil;
 use terraglue_subsystem::Geometry;
 
@@ -35,7 +36,8 @@ fn shape(rig: &Rig) -> (f64, f64) {
     let (mut step, mut sum) = (0.0_f64, 0.0);
     for (i, j) in (0..SIZE - 1).flat_map(|j| (0..SIZE - 1).map(move |i| (i, j))) {
         let here = heights.height(i, j);
-        step = step.max((heights.height(i + 1, j) - here).abs()).max((heights.height(i, j + 1) - here).abs());
+        let beside = [heights.height(i + 1, j), heights.height(i, j + 1)];
+        step = beside.iter().map(|h| (h - here).abs()).fold(step, larger);
         sum += sunk.height(i, j);
     }
     (step, sum)

@@ -12,6 +12,7 @@ use proptest::test_runner::RngSeed;
 use std::sync::Arc;
 use support::{DRY_SAND, LETE, LUNAR, Shaped, flat};
 use terraglue_ground::{Placed, compose};
+use terraglue_numerics::extremes::larger;
 use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
 use terraglue_subsystem::{Energy, Host, Pose, Standalone, Subsystem};
 
@@ -76,7 +77,8 @@ fn go(seed: u64, kind: u32, row: usize, grid: usize, [share, held]: [f64; 2]) ->
             let Energy { potential, dissipated, port_work, .. } = now;
             path += (port_work - before.port_work).abs();
             prop_assert!(dissipated >= before.dissipated, "heat falls to {dissipated} J");
-            worst = worst.max((dissipated + potential - port_work).abs() - share * path - held * potential);
+            worst =
+                larger(worst, (dissipated + potential - port_work).abs() - share * path - held * potential);
             before = now;
         }
     }
@@ -194,7 +196,7 @@ fn largest_jump(rig: &mut Feet, from: Pose, way: [f64; 3]) -> f64 {
         rig.ask(|_| Pose { position, ..from });
         rig.force(0)
     };
-    let apart = |a: [f64; 3], b: [f64; 3]| (0..3).map(|c| (a[c] - b[c]).abs()).fold(0.0, f64::max);
+    let apart = |a: [f64; 3], b: [f64; 3]| (0..3).map(|c| (a[c] - b[c]).abs()).fold(0.0, larger);
     let places: Vec<_> = (0..=64).map(|k| f64::from(k) / 64.0).map(|part| (part, force(part))).collect();
     let widest = |pairs: [[(f64, [f64; 3]); 2]; 2]| {
         let [first, second] = pairs;

@@ -5,6 +5,7 @@ mod support;
 
 use support::{Shown, read, soil};
 use terraglue_ground::{Surface, UNIT_M};
+use terraglue_numerics::extremes::{larger, smaller};
 use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
 use terraglue_subsystem::{Motion, Step, Subsystem};
 
@@ -80,7 +81,7 @@ fn a_column_collapses_to_a_cone_at_the_angle_of_repose() {
     let slopes: Vec<f64> =
         (0..360).map(|k| slope(&shown, f64::from(k).to_radians()).atan().to_degrees()).collect();
     let mean = slopes.iter().sum::<f64>() / 360.0;
-    let (low, high) = slopes.iter().fold((90.0_f64, 0.0_f64), |(a, b), s| (a.min(*s), b.max(*s)));
+    let (low, high) = slopes.iter().fold((90.0, 0.0), |(a, b), s| (smaller(a, *s), larger(b, *s)));
     println!("at rest after {rest} steps, slope {mean:.2}°, {low:.2} … {high:.2}");
     assert!((mean - 35.0).abs() < 1.0, "{mean}");
     assert_eq!(read(&*soil, "active_nodes"), 0.0);
@@ -136,7 +137,7 @@ fn no_triple_is_more_curved_than_allowed() {
         for i in 1..64 {
             for ([a, b], d2) in [([1, 0], 1e-4), ([0, 1], 1e-4), ([1, 1], 2e-4), ([1, -1], 2e-4)] {
                 let c = s.height(i - a, j - b) - 2.0 * s.height(i, j) + s.height(i + a, j + b);
-                worst = worst.max((c.abs() - 96.0 * UNIT_M) / d2);
+                worst = larger(worst, (c.abs() - 96.0 * UNIT_M) / d2);
             }
         }
     }

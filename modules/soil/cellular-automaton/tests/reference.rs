@@ -7,6 +7,7 @@ use plain::Plain;
 use proptest::prelude::*;
 use std::sync::Arc;
 use terraglue_ground::{Lattice, UNIT_M, lower_surface};
+use terraglue_numerics::extremes::larger;
 use terraglue_soil_cellular_automaton::Sweeper;
 use terraglue_soil_contact::{Covered, Ground, Mask};
 use terraglue_subsystem::{Config, Geometry, Host, LogLevel, Pose, Terrain, TerrainTile};
@@ -298,7 +299,7 @@ fn one_sweep_moves_what_the_formula_says() {
             let [n, s] = [flux(i, j, [0, 1]), flux(i, j - 1, [0, 1])];
             let change = f64::from(ground.heights.units(i, j) - before.heights.units(i, j));
             // four fluxes, each in single precision and rounded down to a unit
-            let size = [e, w, n, s].iter().fold(0.0f64, |m, q| m.max(q.abs()));
+            let size = [e, w, n, s].iter().fold(0.0f64, |m, q| larger(m, q.abs()));
             assert!(
                 (change - (w - e + s - n)).abs() <= 4.0 * (1.0 + 1e-5 * size),
                 "({i}, {j}): {change}, {}",

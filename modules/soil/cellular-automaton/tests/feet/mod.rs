@@ -6,6 +6,7 @@ pub mod walk;
 
 use std::sync::Arc;
 use terraglue_ground::{Placed, Rotation, UNIT_M, nodes_below};
+use terraglue_numerics::extremes::larger;
 use terraglue_soil_cellular_automaton::{Automaton, Settings};
 use terraglue_soil_contact::FieldSoil;
 use terraglue_subsystem::{
@@ -376,7 +377,7 @@ pub fn steepest(soil: &Soil) -> f64 {
                 }
                 let along = h(i, j) - h(i + a, j + b);
                 let across = |i: i32, j: i32| 0.5 * (h(i + b, j + a) - h(i - b, j - a));
-                worst = worst.max(along.hypot(0.5 * (across(i, j) + across(i + a, j + b))));
+                worst = larger(worst, along.hypot(0.5 * (across(i, j) + across(i + a, j + b))));
             }
         }
     }

@@ -3,6 +3,7 @@
 
 use super::support::*;
 use std::sync::Arc;
+use terraglue_numerics::extremes::larger;
 use terraglue_subsystem::{
     Error, Geometry, Module, NodeLaw, PressureAnswer, PressureNodes, Result, ShearAnswer, ShearNodes,
 };
@@ -124,7 +125,7 @@ pub fn ball_rests<M: Module>(config: &str, iterative: bool) {
         step(&mut rig);
         assert!((rig.t[0] - weight).abs() < 1e-8 * weight, "T1 = {} at {}", rig.t[0], rig.index);
     }
-    let drift = (0..3).map(|k| (rig.position[k] - start[k]).abs()).fold(0.0, f64::max);
+    let drift = (0..3).map(|k| (rig.position[k] - start[k]).abs()).fold(0.0, larger);
     assert!(drift <= 1e-9, "drift {drift}");
     // the depth is the law's own: it carries the weight there, hardly more, and nothing a millimetre higher
     rig.set_ports();
@@ -358,7 +359,7 @@ fn hybrid_derivatives_are_exact(rig: &mut Rig, x: &[f64; 6]) {
         for r in 0..n {
             let numeric = if r == 0 { (xp[0] - xm[0]) / (2.0 * d) } else { -(tp[r] - tm[r]) / (2.0 * d) };
             let exact = block[c * n + r];
-            let column = (0..n).map(|r| block[c * n + r].abs()).fold(0.0, f64::max);
+            let column = (0..n).map(|r| block[c * n + r].abs()).fold(0.0, larger);
             let scale = if r == 0 { exact.abs() + 1e-6 * column } else { column };
             assert!((numeric - exact).abs() < 1e-3 * scale, "G[{r},{c}] {exact} {numeric}");
         }

@@ -3,6 +3,7 @@
 
 use std::sync::{Arc, Mutex};
 use terraglue_ground::{Lattice, Placed, Surface, nodes_below};
+use terraglue_numerics::extremes::larger;
 use terraglue_subsystem::{
     Config, Estimate, Geometry, Host, Input, Law, Level, LogLevel, Module, Motion, Node, NodeLaw, Port,
     PortKind, Pose, Response, Standalone, Step, Subsystem, Terrain, TerrainTile, ValuesMut, component,
@@ -363,7 +364,7 @@ impl Rig {
         for round in 0..60 {
             t = self.under_motion(&x);
             let r: [f64; 3] = std::array::from_fn(|k| x[k] - x_free[k] - g * t[k]);
-            let size = r.iter().fold(0.0_f64, |m, v| m.max(v.abs()));
+            let size = r.iter().fold(0.0_f64, |m, v| larger(m, v.abs()));
             if size < 1e-9 * g * self.mass * 9.81 {
                 break;
             }

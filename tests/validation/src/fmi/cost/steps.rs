@@ -1,0 +1,142 @@
+//! CPU time per unit and step of a testbed, and of the bare loop in C in the same run.
+
+use super::super::{built, units};
+use crate::process::{Outcome, command, must, read, root};
+use crate::timing::cpu_s;
+use crate::{Figure, Limit};
+use std::path::Path;
+use terraglue::recording::Trace;
+use terraglue_numerics::extremes::smaller;
+
+const LOOP: &str = "tests/validation/src/fmi/cost/bare_loop.c";
+const ROUNDS: u32 = 15;
+/// Times that both are measured, one after the other; the least counts, because others use the machine too.
+const TURNS: u32 = 3;
+/// µs that a testbed may cost beyond the loop in C.
+const ALLOWED: f64 = 0.1;
+
+/// How many units, and how they are joined.
+pub struct Case {
+    pub name: &'static str,
+    pub units: usize,
+    pub pair: bool,
+}
+
+/// What is measured, here and with other masters.
+pub const CASES: [Case; 4] = [
+    Case { name: "one", units: 1, pair: false },
+    Case { name: "pair", units: 2, pair: true },
+    Case { name: "chain_10", units: 10, pair: false },
+    Case { name: "chain_50", units: 50, pair: false },
+];
+
+/// A manner of running a case.
+#[derive(Clone, Copy)]
+struct Manner {
+    record: bool,
+    save: bool,
+}
+
+/// Nothing recorded, no step taken back.
+const BLIND: Manner = Manner { record: false, save: false };
+
+/// What a step of a case costs in a testbed, µs of CPU per unit.
+pub fn blind(folder: &Path, case: &Case) -> Outcome<f64> {
+    testbed(folder, case, BLIND)
+}
+
+pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
+    units::build(folder, "cheap", &[("u", 'i', 1.0), ("y", 'o', 0.0)], "", "v[1] += h * v[0];")?;
+    // the outputs of a chain depend on the inputs of the same time
+    units::build(folder, "through", &[("u", 'i', 1.0), ("y", 'o', 0.0)], "v[1] = 0.5 * v[0];", "")?;
+    let program = folder.join("bare_loop");
+    read(&root().join(LOOP))?;
+    must(&mut command("cc", &["-O2", "-w", LOOP, "-ldl", "-o"]).arg(&program))?;
+    let mut all = Vec::new();
+    for case in &CASES {
+        all.extend(compared(folder, &program, case, "", BLIND)?);
+    }
+    for case in &CASES {
+        all.extend(compared(folder, &program, case, "recorded.", Manner { record: true, ..BLIND })?);
+    }
+    all.extend(compared(folder, &program, &CASES[0], "rollback.", Manner { save: true, ..BLIND })?);
+    Ok(all)
+}
+
+fn compared(
+    folder: &Path,
+    program: &Path,
+    case: &Case,
+    prefix: &str,
+    manner: Manner,
+) -> Outcome<Vec<Figure>> {
+    let (mut bare, mut ours) = (f64::INFINITY, f64::INFINITY);
+    for _ in 0..TURNS {
+        bare = smaller(bare, bare_loop(folder, program, case, manner)?);
+        ours = smaller(ours, testbed(folder, case, manner)?);
+    }
+    let id = |which: &str| format!("fmi.cost.{prefix}{}.{which}", case.name);
+    let with = match (manner.record, manner.save) {
+        (true, _) => "one output of each recorded in memory",
+        (_, true) => "each step can be taken back",
+        _ => "nothing recorded",
+    };
+    let what = |who: &str| format!("µs of CPU per unit and step, {with}: {who}");
+    Ok(vec![
+        Figure::new(id("bare_loop"), bare, Limit::None, what("a loop in C")),
+        Figure::new(id("step"), ours, Limit::None, what("a testbed")),
+        Figure::new(id("above"), ours - bare, Limit::AtMost(ALLOWED), what("a testbed beyond the loop in C")),
+    ])
+}
+
+/// The unit of a case.
+pub fn unit(case: &Case) -> &'static str {
+    if case.units > 2 { "through" } else { "cheap" }
+}
+
+fn bare_loop(folder: &Path, program: &Path, case: &Case, manner: Manner) -> Outcome<f64> {
+    let word = |on: bool, words: [&'static str; 2]| if on { words[0] } else { words[1] };
+    let mut child = command(program, &[]);
+    child.arg(folder.join(format!("{}.so", unit(case)))).arg(case.units.to_string());
+    child.arg(word(case.pair, ["pair", "chain"]));
+    child.args([word(manner.record, ["record", "blind"]), word(manner.save, ["save", "go"])]);
+    let output = child.output().map_err(|e| format!("the loop in C: {e}"))?;
+    let text = String::from_utf8_lossy(&output.stdout).into_owned();
+    let first = text.split_whitespace().next().and_then(|t| t.parse().ok());
+    first.ok_or_else(|| format!("the loop in C ended with {}: {text}", output.status))
+}
+
+/// The same units and connections as a scenario.
+pub fn scenario(case: &Case, rollback: bool) -> String {
+    let unit = unit(case);
+    let tables = (0..case.units).map(|k| format!("[u{k:02}]\nfmu = \"{unit}.fmu\"\nrollback = {rollback}\n"));
+    let joined = if case.pair { case.units } else { case.units - 1 };
+    let join = (0..joined).map(|k| {
+        let next = (k + 1) % case.units;
+        format!("[[connect]]\nfrom = \"u{k:02}.y\"\nto = \"u{next:02}.u\"\n")
+    });
+    let head = "[time]\nstep_s = 0.001\nduration_s = 10000.0\n".to_owned();
+    head + &tables.chain(join).collect::<String>()
+}
+
+fn testbed(folder: &Path, case: &Case, manner: Manner) -> Outcome<f64> {
+    let mut testbed = built(folder, &scenario(case, manner.save))?;
+    let names: Vec<String> = (0..case.units).map(|k| format!("u{k:02}.y")).collect();
+    let names: Vec<&str> = names.iter().map(String::as_str).collect();
+    let mut trace = Trace::new(&testbed, &names).map_err(|e| e.to_string())?;
+    let steps = 40_000 / case.units;
+    trace.reserve(steps);
+    let mut best = f64::INFINITY;
+    for _ in 0..ROUNDS {
+        trace.clear();
+        let start = cpu_s();
+        for _ in 0..steps {
+            testbed.step().map_err(|e| e.to_string())?;
+            if manner.record {
+                trace.take(&testbed).map_err(|e| e.to_string())?;
+            }
+        }
+        best = smaller(best, (cpu_s() - start) * 1e6 / (steps * case.units) as f64);
+    }
+    Ok(best)
+}

@@ -46,7 +46,7 @@ unsafe impl Sync for Table {}
 #[macro_export]
 macro_rules! abi_version {
     () => {
-        "2.1"
+        "3.0"
     };
 }
 

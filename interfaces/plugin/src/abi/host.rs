@@ -74,7 +74,7 @@ pub struct TgHost {
     pub max_nodes: u32,
     /// 0.
     pub reserved: u32,
-    /// Since ABI 2.1. The law that the scenario names in the parameter `law.plugin` of this subsystem, valid until
+    /// The law that the scenario names in the parameter `law.plugin` of this subsystem, valid until
     /// `free`; null: none.
     pub law: *const TgOpenLaw,
 }

@@ -1,4 +1,4 @@
-//! Pressure and shear laws as modules of their own. Since ABI 2.1.
+//! Pressure and shear laws as modules of their own.
 use super::constants::TgStatus;
 use std::ffi::c_char;
 

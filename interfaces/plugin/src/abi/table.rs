@@ -208,7 +208,7 @@ pub struct TgSubsystem {
     pub law_state_doubles: u32,
     /// 0.
     pub reserved: u32,
-    /// Since ABI 2.1. Modules of kind TG_LAW: their functions; required, while `instantiate`, `free`,
+    /// Modules of kind TG_LAW: their functions; required, while `instantiate`, `free`,
     /// `capabilities`, `advance` and `last_error` are not. Null for the other kinds.
     pub law: *const TgNodeLaw,
 }

@@ -41,10 +41,6 @@ pub(super) struct Around<'a> {
     pub still: bool,
 }
 
-/// Types of geoms that MJCF has.
-const TYPES: [&str; 9] =
-    ["plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf"];
-
 /// Reads a geom.
 pub(super) fn geom(d: &Defaults, e: &Element, around: Around) -> Result<Geom, Error> {
     let kind = d.text(e, "type").unwrap_or("sphere").to_owned();
@@ -108,10 +104,6 @@ pub(super) fn geom(d: &Defaults, e: &Element, around: Around) -> Result<Geom, Er
         "capsule" => ShapeGeometry::Capsule { radius: at(0)?, half_length: half(1)? },
         "cylinder" => ShapeGeometry::Cylinder { radius: at(0)?, half_length: half(1)? },
         "box" if length.is_none() => ShapeGeometry::Box { half_extents: [at(0)?, at(1)?, at(2)?] },
-        _ if !TYPES.contains(&kind.as_str()) => {
-            let message = format!("type = \"{kind}\" is no type of a geom; types are {}", TYPES.join(", "));
-            return Err(d.wrong(e, message));
-        }
         _ => return Ok(Geom::Unused(format!("of type `{kind}` is not supported and is left out"))),
     };
     let solid = match &geometry {

@@ -46,11 +46,14 @@ fn segment(x: f64) -> f64 {
     x * (1.0 - x * x).max(0.0).sqrt() + asin(x)
 }
 
-/// Area of a convex polygon (counter-clockwise, at most 16 corners) inside the rectangle low … high, m².
+/// Corners that a polygon has at most.
+pub const MOST_CORNERS: usize = 34;
+
+/// Area of a convex polygon (counter-clockwise, at most [`MOST_CORNERS`]) inside the rectangle low … high, m².
 ///
 /// Sutherland and Hodgman (1974): clip at the four sides, then the shoelace formula.
 pub fn polygon_in_rectangle(corners: &[[f64; 2]], low: [f64; 2], high: [f64; 2]) -> f64 {
-    let mut polygon = Corners::default();
+    let mut polygon = Corners::none();
     corners.iter().for_each(|c| polygon.push(*c));
     for (axis, bound, sign) in [(0, low[0], 1.0), (0, high[0], -1.0), (1, low[1], 1.0), (1, high[1], -1.0)] {
         polygon = polygon.clipped(axis, bound, sign);
@@ -59,13 +62,17 @@ pub fn polygon_in_rectangle(corners: &[[f64; 2]], low: [f64; 2], high: [f64; 2])
 }
 
 /// Corners in place: a clip at a line adds at most one.
-#[derive(Clone, Copy, Default)]
+#[derive(Clone, Copy)]
 struct Corners {
     count: usize,
-    points: [[f64; 2]; 24],
+    points: [[f64; 2]; MOST_CORNERS + 4],
 }
 
 impl Corners {
+    fn none() -> Self {
+        Self { count: 0, points: [[0.0; 2]; MOST_CORNERS + 4] }
+    }
+
     fn push(&mut self, p: [f64; 2]) {
         if self.count < self.points.len() {
             self.points[self.count] = p;
@@ -75,7 +82,7 @@ impl Corners {
 
     /// The part where sign·(p[axis] − bound) ≥ 0.
     fn clipped(&self, axis: usize, bound: f64, sign: f64) -> Self {
-        let mut out = Self::default();
+        let mut out = Self::none();
         for k in 0..self.count {
             let (a, b) = (self.points[k], self.points[(k + 1) % self.count]);
             let (da, db) = (sign * (a[axis] - bound), sign * (b[axis] - bound));

@@ -1,7 +1,7 @@
 //! The lattice nodes below a shape, each with the part of its cell that the shape covers.
 
 use crate::Surface;
-use crate::coverage::{disc_in_rectangle, polygon_in_rectangle};
+use crate::coverage::{MOST_CORNERS, disc_in_rectangle, polygon_in_rectangle};
 use crate::joined::{Part, nodes_below_parts};
 use crate::math::point;
 use crate::shape::{Aabb, Placed};
@@ -17,8 +17,8 @@ const CHUNK: usize = 64;
 pub(crate) enum Outline {
     /// Centre and radius.
     Disc([f64; 2], f64),
-    /// Corners, counter-clockwise, and their number.
-    Polygon([[f64; 2]; 8], usize),
+    /// Corners, counter-clockwise.
+    Polygon(Polygon),
     /// By asking the shape point by point.
     Sampled,
 }
@@ -26,8 +26,8 @@ pub(crate) enum Outline {
 /// Appends the nodes whose cells the shape covers and whose surface lies less than `margin` (m, vertical) below
 /// the shape's underside, row by row.
 ///
-/// `area` is the covered part of the cell: exact for spheres, boxes and upright cylinders and capsules, from
-/// 8 × 8 points otherwise. `lower` is the exact underside at the node; where the vertical line through the node
+/// `area` is the covered part of the cell: exact for spheres, boxes and upright cylinders and capsules, of polygons with 34
+/// corners for other cylinders and capsules, and from 8 × 8 points for meshes. `lower` is the exact underside at the node; where the vertical line through the node
 /// misses the shape, that of the nearest covered point. A mesh that is not convex: see [`nodes_below_parts`].
 pub fn nodes_below<S: Surface + ?Sized>(shape: &Placed, surface: &S, margin: f64, out: &mut Vec<Node>) {
     let lattice = surface.lattice();
@@ -114,13 +114,21 @@ impl Cell {
             let (x, y) = (self.at[0] + dx, self.at[1] + dy);
             if let Some(z) = shape.lower(x, y) {
                 count += 1;
-                if dx * dx + dy * dy < nearest {
-                    (nearest, point) = (dx * dx + dy * dy, [x, y, z]);
+                let distance = dx * dx + dy * dy;
+                if closer([distance, z], [nearest, point[2]]) {
+                    (nearest, point) = (distance, [x, y, z]);
                 }
             }
         }
         (f64::from(count) / f64::from(SAMPLES * SAMPLES), point)
     }
+}
+
+/// Whether a sample point, by its squared distance from the node and its height, stands for the cell before another: of four that
+/// are equally near, that which lies lowest, whichever of them comes first.
+pub(crate) fn closer([distance, z]: [f64; 2], [nearest, lowest]: [f64; 2]) -> bool {
+    let tie = 1e-9 * distance;
+    distance < nearest - tie || distance < nearest + tie && z < lowest
 }
 
 impl Outline {
@@ -132,6 +140,8 @@ impl Outline {
             Geometry::Cylinder { radius, .. } | Geometry::Capsule { radius, .. } if upright => {
                 Self::Disc(centre, *radius)
             }
+            Geometry::Cylinder { half_length, radius } => rounded_outline(shape, *half_length, *radius, true),
+            Geometry::Capsule { half_length, radius } => rounded_outline(shape, *half_length, *radius, false),
             Geometry::Box { half_extents } => box_outline(shape, *half_extents),
             _ => Self::Sampled,
         }
@@ -148,8 +158,8 @@ impl Outline {
             (Some(lower), _) => ([cell.at[0], cell.at[1], lower], None),
             // A node on the edge itself, by rounding.
             (None, Self::Disc(centre, radius)) => (below_rim(shape, cell, *centre, *radius), None),
-            (None, Self::Polygon(corners, count)) => {
-                let [x, y] = nearest_on(&corners[..*count], cell.at);
+            (None, Self::Polygon(polygon)) => {
+                let [x, y] = polygon.nearest(cell.at);
                 ([x, y, shape.lower(x, y)?], None)
             }
             (None, Self::Sampled) => {
@@ -176,8 +186,8 @@ impl Outline {
                 disc_in_rectangle(*centre, *radius, cell.low(), cell.high()) / cell.area()
             }
             _ if cell.inside(shape) => 1.0,
-            Self::Polygon(corners, count) => {
-                polygon_in_rectangle(&corners[..*count], cell.low(), cell.high()) / cell.area()
+            Self::Polygon(polygon) => {
+                polygon_in_rectangle(polygon.corners(), cell.low(), cell.high()) / cell.area()
             }
             Self::Sampled => cell.sample(shape).0,
         }
@@ -210,25 +220,79 @@ fn at_rim(shape: &Placed, cell: &Cell, centre: [f64; 2], radius: f64) -> bool {
     dx * dx + dy * dy > rim * rim
 }
 
-/// The point of a polygon's edge nearest to p, drawn a little towards the middle.
-fn nearest_on(corners: &[[f64; 2]], p: [f64; 2]) -> [f64; 2] {
-    let (mut best, mut distance, mut middle) = (p, f64::INFINITY, [0.0; 2]);
-    for (k, a) in corners.iter().enumerate() {
-        let b = corners[(k + 1) % corners.len()];
-        let (ex, ey) = (b[0] - a[0], b[1] - a[1]);
-        let length2 = ex * ex + ey * ey;
-        let along = (p[0] - a[0]) * ex + (p[1] - a[1]) * ey;
-        let s = if length2 > 0.0 { (along / length2).clamp(0.0, 1.0) } else { 0.0 };
-        let q = [a[0] + s * ex, a[1] + s * ey];
-        let d2 = (q[0] - p[0]) * (q[0] - p[0]) + (q[1] - p[1]) * (q[1] - p[1]);
-        if d2 < distance {
-            (best, distance) = (q, d2);
-        }
-        middle = [middle[0] + a[0], middle[1] + a[1]];
-    }
-    let n = corners.len().max(1) as f64;
-    std::array::from_fn(|k| best[k] + 1e-9 * (middle[k] / n - best[k]))
+/// Corners of an outline, counter-clockwise.
+pub(crate) struct Polygon {
+    points: [[f64; 2]; MOST_CORNERS],
+    count: usize,
+    /// How far, as a part of the way to the middle, points of the edge are drawn inwards to lie below the shape.
+    inwards: f64,
 }
+
+/// Points of half an ellipse, both ends counted.
+const HALF: usize = 17;
+
+impl Polygon {
+    fn corners(&self) -> &[[f64; 2]] {
+        &self.points[..self.count]
+    }
+
+    /// The point of the edge nearest to p, drawn a little towards the middle.
+    fn nearest(&self, p: [f64; 2]) -> [f64; 2] {
+        let (mut best, mut distance, mut middle) = (p, f64::INFINITY, [0.0; 2]);
+        let corners = self.corners();
+        for (k, a) in corners.iter().enumerate() {
+            let b = corners[(k + 1) % corners.len()];
+            let (ex, ey) = (b[0] - a[0], b[1] - a[1]);
+            let length2 = ex * ex + ey * ey;
+            let along = (p[0] - a[0]) * ex + (p[1] - a[1]) * ey;
+            let s = if length2 > 0.0 { (along / length2).clamp(0.0, 1.0) } else { 0.0 };
+            let q = [a[0] + s * ex, a[1] + s * ey];
+            let d2 = (q[0] - p[0]) * (q[0] - p[0]) + (q[1] - p[1]) * (q[1] - p[1]);
+            if d2 < distance {
+                (best, distance) = (q, d2);
+            }
+            middle = [middle[0] + a[0], middle[1] + a[1]];
+        }
+        let n = corners.len().max(1) as f64;
+        std::array::from_fn(|k| best[k] + self.inwards * (middle[k] / n - best[k]))
+    }
+}
+
+/// Outline of a cylinder or capsule that does not stand: two ellipses, the discs at its ends seen from above, and what lies
+/// between them. The polygon has their area.
+fn rounded_outline(shape: &Placed, half_length: f64, radius: f64, flat: bool) -> Outline {
+    let (centre, axis) = (shape.pose().position, shape.rotation().0[2]);
+    let level = libm::hypot(axis[0], axis[1]);
+    let e = [axis[0] / level, axis[1] / level];
+    // semi-axes of the ends along the axis and across it
+    let along = if flat { radius * axis[2].abs() } else { radius };
+    let mut polygon = Polygon { points: [[0.0; 2]; MOST_CORNERS], count: 0, inwards: RIM };
+    let mut add = |a: f64, c: f64| {
+        polygon.points[polygon.count] = [centre[0] + a * e[0] - c * e[1], centre[1] + a * e[1] + c * e[0]];
+        polygon.count += 1;
+    };
+    let end = half_length * level;
+    if along < LEAST * radius {
+        for (a, c) in [(1.0, -1.0), (1.0, 1.0), (-1.0, 1.0), (-1.0, -1.0)] {
+            add(a * end, c * radius);
+        }
+        return Outline::Polygon(polygon);
+    }
+    let step = std::f64::consts::PI / (HALF - 1) as f64;
+    let wider = (step / libm::sin(step)).sqrt();
+    for side in [1.0, -1.0] {
+        for k in 0..HALF {
+            let (s, c) = libm::sincos(step * k as f64);
+            add(side * (end + wider * along * s), -side * wider * radius * c);
+        }
+    }
+    // its corners lie outside of the shape by so much
+    polygon.inwards = 1.2 * (wider - 1.0);
+    Outline::Polygon(polygon)
+}
+
+/// Smaller ends of a lying cylinder, in radii, are straight.
+const LEAST: f64 = 1e-9;
 
 /// Hull of the eight corners seen from above (Andrew's monotone chain, 1979), in place.
 fn box_outline(shape: &Placed, half: [f64; 3]) -> Outline {
@@ -256,7 +320,7 @@ fn box_outline(shape: &Placed, half: [f64; 3]) -> Outline {
         count -= 1;
     }
     let count = count.min(8);
-    let mut out = [[0.0; 2]; 8];
-    out[..count].copy_from_slice(&hull[..count]);
-    Outline::Polygon(out, count)
+    let mut points = [[0.0; 2]; MOST_CORNERS];
+    points[..count].copy_from_slice(&hull[..count]);
+    Outline::Polygon(Polygon { points, count, inwards: 1e-9 })
 }

@@ -1,7 +1,7 @@
 //! The nodes below several shapes that are one piece, and below meshes that are not convex.
 
 use crate::Surface;
-use crate::footprint::{Cell, Outline, SAMPLES};
+use crate::footprint::{Cell, Outline, SAMPLES, closer};
 use crate::shape::{Aabb, Placed};
 use terraglue_subsystem::Node;
 
@@ -95,8 +95,10 @@ fn below_any<'a>(
     for [dx, dy] in cell.samples() {
         let Some(hit) = lowest([cell.at[0] + dx, cell.at[1] + dy]) else { continue };
         count += 1;
-        if dx * dx + dy * dy < nearest {
-            (nearest, there) = (dx * dx + dy * dy, Some(hit));
+        let distance = dx * dx + dy * dy;
+        let best = there.map_or(f64::INFINITY, |(point, _): ([f64; 3], _)| point[2]);
+        if closer([distance, hit.0[2]], [nearest, best]) {
+            (nearest, there) = (distance, Some(hit));
         }
     }
     // A node on the very edge may lie below something that no sample lies below.

@@ -1,5 +1,6 @@
 //! Nodes of a contact patch: covered areas, depths, and the plane below it.
 
+use proptest::prelude::*;
 use terraglue_ground::{HeightField, Lattice, Placed, Surface, disc_in_rectangle, fit_plane, nodes_below};
 use terraglue_subsystem::{Geometry, Node, Pose};
 
@@ -33,6 +34,96 @@ fn areas_of_standing_shapes_are_exact_wherever_they_stand() {
         let turned = Pose { orientation: [turn.cos(), 0.0, 0.0, turn.sin()], ..at(x, y, 0.005) };
         let covered = area(&nodes(&plate, &turned, 0.0));
         assert!((covered / (4.0 * 0.051 * 0.033) - 1.0).abs() < 1e-9, "{covered}");
+    }
+}
+
+/// Nodes as (i, j) from the middle of the lattice after so many turns by 90° back, sorted, with area and underside.
+fn turned_back(found: &[Node], turns: i32) -> Vec<([i32; 2], [f64; 2])> {
+    let back = |mut p: [i32; 2]| {
+        (0..turns).for_each(|_| p = [p[1], -p[0]]);
+        p
+    };
+    let mut all: Vec<_> = found.iter().map(|n| (back([n.i - 100, n.j - 100]), [n.area, n.lower])).collect();
+    all.sort_by_key(|(at, _)| *at);
+    all
+}
+
+fn product(a: [f64; 4], b: [f64; 4]) -> [f64; 4] {
+    [
+        a[0] * b[0] - a[1] * b[1] - a[2] * b[2] - a[3] * b[3],
+        a[0] * b[1] + a[1] * b[0] + a[2] * b[3] - a[3] * b[2],
+        a[0] * b[2] - a[1] * b[3] + a[2] * b[0] + a[3] * b[1],
+        a[0] * b[3] + a[1] * b[2] - a[2] * b[1] + a[3] * b[0],
+    ]
+}
+
+/// A hexagonal prism, lying on a side.
+fn prism() -> Geometry {
+    let corner = |k: usize| {
+        let angle = std::f64::consts::FRAC_PI_3 * (k % 6) as f64;
+        [0.06 * angle.cos(), 0.06 * angle.sin(), if k < 6 { -0.05 } else { 0.05 }]
+    };
+    let mut triangles = Vec::new();
+    for k in 1..5 {
+        triangles.extend([[0, k + 1, k], [6, k + 6, k + 7]]);
+    }
+    for k in 0..6 {
+        let next = (k + 1) % 6;
+        triangles.extend([[k, next, k + 6], [next, next + 6, k + 6]]);
+    }
+    let triangles = triangles.into_iter().map(|t| t.map(|c: usize| c as u32)).collect();
+    Geometry::ConvexMesh { points: (0..12).map(corner).collect(), triangles }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(96))]
+
+    #[test]
+    fn a_shape_that_is_turned_with_the_lattice_covers_the_same_cells(
+        x in -0.02..0.02f64, y in -0.02..0.02f64, tilt in -0.3..0.3f64, turn in 0.0..3.0f64, shape in 0..5usize,
+    ) {
+        let shapes = [
+            Geometry::Cylinder { half_length: 0.0535, radius: 0.092 },
+            Geometry::Capsule { half_length: 0.05, radius: 0.05 },
+            Geometry::Box { half_extents: [0.06, 0.05, 0.07] },
+            Geometry::Sphere { radius: 0.08 },
+            prism(),
+        ];
+        // about the vertical, on its rim with a lean
+        let (s, c) = (0.5 * turn).sin_cos();
+        let (sl, cl) = (0.5 * (std::f64::consts::FRAC_PI_2 + tilt)).sin_cos();
+        let lies = product([c, 0.0, 0.0, s], [cl, sl, 0.0, 0.0]);
+        let pose = Pose { position: [x, y, 0.04], orientation: lies };
+        let first = turned_back(&nodes(&shapes[shape], &pose, 0.0), 0);
+        let half = std::f64::consts::FRAC_1_SQRT_2;
+        let (mut p, mut q) = ([x, y], lies);
+        for turns in 1..4 {
+            (p, q) = ([-p[1], p[0]], product([half, 0.0, 0.0, half], q));
+            let pose = Pose { position: [p[0], p[1], 0.04], orientation: q };
+            let same = turned_back(&nodes(&shapes[shape], &pose, 0.0), turns);
+            prop_assert_eq!(first.len(), same.len());
+            for (a, b) in first.iter().zip(&same) {
+                prop_assert_eq!(a.0, b.0);
+                for k in 0..2 {
+                    prop_assert!((a.1[k] - b.1[k]).abs() < 1e-9, "{:?} {:?}", a, b);
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn lying_cylinders_and_capsules_cover_their_area(
+        x in -0.02..0.02f64, y in -0.02..0.02f64, tilt in -0.4..0.4f64, turn in 0.0..3.0f64, flat: bool,
+    ) {
+        let (half_length, radius) = (0.0535, 0.092);
+        let shape = if flat { Geometry::Cylinder { half_length, radius } } else { Geometry::Capsule { half_length, radius } };
+        let (s, c) = (0.5 * turn).sin_cos();
+        let (sl, cl) = (0.5 * (std::f64::consts::FRAC_PI_2 + tilt)).sin_cos();
+        let pose = Pose { position: [x, y, 0.0], orientation: product([c, 0.0, 0.0, s], [cl, sl, 0.0, 0.0]) };
+        let covered = area(&nodes(&shape, &pose, 1.0));
+        let ends = std::f64::consts::PI * radius * radius * if flat { tilt.sin().abs() } else { 1.0 };
+        let exact = ends + 4.0 * half_length * tilt.cos() * radius;
+        prop_assert!((covered / exact - 1.0).abs() < 2e-3, "{} {}", covered, exact);
     }
 }
 

@@ -63,6 +63,8 @@ pub struct Local {
     pub inclination: Inclination,
     /// Modulus of loose soil over that of the bed.
     pub loose: f64,
+    /// Length over height of the wedge that a wall pushes up.
+    pub wedge: f64,
 }
 
 impl Patch {
@@ -381,6 +383,7 @@ impl Patches {
                 levels: &|i, j| ground.levels(i, j),
                 passive: law.passive,
                 stiffness: law.curve.unloading(),
+                wedge: law.wedge,
             };
             let mut rows = std::mem::take(&mut self.rows);
             let mut sides = std::mem::take(&mut self.sides);
@@ -576,8 +579,9 @@ impl Patches {
                 None => (of.pressure.curve(b, of.elastic)?, of.shear.clone()),
             };
             friction = friction.max(of.shear.friction());
-            let Laws { adhesion, passive, cohesive, inclination, loose, .. } = *of;
-            self.laws.push(Local { curve, shear, adhesion, passive, cohesive, inclination, loose });
+            let Laws { adhesion, passive, cohesive, inclination, loose, cone, .. } = *of;
+            let wedge = cone.slope;
+            self.laws.push(Local { curve, shear, adhesion, passive, cohesive, inclination, loose, wedge });
         }
         for number in &mut self.nodes.law[nodes] {
             *number = first + (present & ((1 << *number) - 1)).count_ones() as usize;

@@ -190,6 +190,27 @@ pub struct Beside<'a> {
     pub passive: [f64; 2],
     /// Stiffness of the soil, Pa/m.
     pub stiffness: f64,
+    /// Length over height of the wedge that a wall pushes up, √K_p = tan(45° + φ/2) (Rankine 1857).
+    pub wedge: f64,
+}
+
+/// Cells over which the loose soil on a wedge is looked at, at most.
+const MOST_CELLS: i32 = 32;
+
+impl Beside<'_> {
+    /// Mean height (m) of the loose soil on the wedge beside node `at` that a wall pushes up, towards the neighbour `way`;
+    /// `height` of the wall in the bed, m. What lies on the wedge weighs on it, wherever that is.
+    fn loose(&self, at: [i32; 2], way: (i32, i32), height: f64) -> f64 {
+        let cells = (self.wedge * height / self.lattice.spacing).clamp(1.0, f64::from(MOST_CELLS));
+        let (mut sum, mut left, mut k) = (0.0, cells, 0);
+        while left > 0.0 {
+            k += 1;
+            let [_, loose] = (self.levels)(at[0] + k * way.0, at[1] + k * way.1);
+            sum += left.min(1.0) * loose;
+            left -= 1.0;
+        }
+        sum / cells
+    }
 }
 
 const NEIGHBOURS: [(i32, i32); 4] = [(1, 0), (-1, 0), (0, 1), (0, -1)];
@@ -228,11 +249,10 @@ pub fn gather(
             let next = rows.find(nodes, [i + di, j + dj]);
             let outside = own - covered(next);
             // soil in a cell that is covered in part stands as high as it did before it was pressed
-            let [bed, on_bed] =
-                next.map_or_else(|| (beside.levels)(i + di, j + dj), |k| [nodes.reference[k], 0.0]);
+            let bed = next.map_or_else(|| (beside.levels)(i + di, j + dj)[0], |k| nodes.reference[k]);
             let above = bed - lower;
             if outside > 0.0 && above > 0.0 {
-                let width = outside * spacing;
+                let (width, on_bed) = (outside * spacing, beside.loose([i, j], (di, dj), above));
                 *face = [width, width * above, width * on_bed];
             }
         }

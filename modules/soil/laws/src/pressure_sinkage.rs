@@ -113,8 +113,9 @@ pub enum PressureLaw {
 /// Names of the built-in laws as a scenario writes them.
 pub const PRESSURE_LAWS: [&str; 3] = ["bekker", "reece", "bearing"];
 
-/// Depth and size at which [`PressureLaw::unloading`] looks at a law, m.
-const LOOK: [f64; 2] = [0.02, 0.05];
+/// Depths and sizes at which [`PressureLaw::unloading`] looks at a law, m: those of the measurement, and those of a light foot or
+/// wheel, where first loading is stiffer (n < 1, k_c/b) and would stay elastic otherwise.
+const LOOKS: [[f64; 2]; 2] = [[0.02, 0.05], [0.002, 0.02]];
 /// Stiffness of unloading over the secant of first loading there: LETE sand, whose k_u = A_u·z_u with A_u = 503 MPa/m² (Wong
 /// 1984; Wong 2010, table 4.1) is 10.1 MPa/m at 2 cm, where k_c = 1.16 kN/m^1.611, k_φ = 475 kN/m^2.611 and n = 0.611 of the same
 /// tests give a secant of 2.28 MPa/m.
@@ -165,15 +166,18 @@ impl PressureLaw {
     /// # Errors
     /// The law, which is a module, has no answer.
     pub fn unloading(&self) -> Result<f64> {
-        let [depth, size] = LOOK;
         let law = self.law();
         if law.state_doubles() > 0 {
             return Ok(KEEPERS);
         }
-        let pressure = match law.under(size) {
-            FirstLoading::Power { modulus, exponent } => modulus * libm::pow(depth, exponent),
-            other => other.at(depth)?.0,
-        };
-        Ok(UNLOADING * pressure / depth)
+        let mut stiffest: f64 = 0.0;
+        for [depth, size] in LOOKS {
+            let pressure = match law.under(size) {
+                FirstLoading::Power { modulus, exponent } => modulus * libm::pow(depth, exponent),
+                other => other.at(depth)?.0,
+            };
+            stiffest = f64::max(stiffest, pressure / depth);
+        }
+        Ok(UNLOADING * stiffest)
     }
 }

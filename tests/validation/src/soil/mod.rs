@@ -1,6 +1,7 @@
 //! Area `soil`: what both soils promise, part by part.
 
 mod automaton;
+mod drags;
 mod drive;
 mod energy;
 mod fit;
@@ -34,13 +35,14 @@ use terraglue_soil_bekker::SoilBekker;
 use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
 
 /// The parts, in the order of the table.
-pub const PARTS: [Part; 13] = [
+pub const PARTS: [Part; 14] = [
     ("automaton", automaton::figures),
     ("cost", automaton::cost),
     ("plates", plates::figures),
     ("fit", fit::figures),
     ("plate-wheel", plate_wheel::figures),
     ("moves", moves::figures),
+    ("drags", drags::figures),
     ("energy", energy::figures),
     ("wheels", wheels::figures),
     ("rig-scenario", rig_scenario::figures),

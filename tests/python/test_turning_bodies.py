@@ -1,4 +1,4 @@
-"""Bodies of units that turn: forces beside their reference point and moments, by terminals of exported robots and by maps of names."""
+"""Bodies of FMUs that turn: forces beside their reference point and moments, by terminals of exported robots and by maps of names."""
 
 import csv
 import json
@@ -52,7 +52,7 @@ FREE = {"hull": keys(HULL_AT, [0.0] * 3, SPIN), "arm": keys(ARM_AT, ARM_SPEED, S
 
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory):
-    """Robots of one link and of two, and the first as units with and without gravity."""
+    """Robots of one link and of two, and the first as FMUs with and without gravity."""
     folder = tmp_path_factory.mktemp("turning")
     (folder / "hull.urdf").write_text(robot(link("hull", HULL)))
     (folder / "arm.urdf").write_text(robot(link("arm", ARM)))
@@ -134,7 +134,7 @@ def momenta(row, prefix, of):
     return push, np.cross(place + arm, push) + r @ np.diag(of["inertia"]) @ r.T @ w
 
 
-def test_a_unit_that_hangs_beside_its_centre_of_mass_swings_like_the_module_on_a_ball_joint(folder, tmp_path):
+def test_a_fmu_that_hangs_beside_its_centre_of_mass_swings_like_the_module_on_a_ball_joint(folder, tmp_path):
     hung = run(folder, tmp_path / "unit", plug("a", "hull_heavy", "hull") + glue("a.hull", "world"))
     ball = 'joint_kind = { ball = "spherical" }\n'
     whole = run(folder, tmp_path / "module", table("a", "hung.urdf", {"motor": "off"}) + ball, gravity=GRAVITY)
@@ -142,7 +142,7 @@ def test_a_unit_that_hangs_beside_its_centre_of_mass_swings_like_the_module_on_a
     assert abs(hung[-1]["a.hull.qw"]) < 0.95, "it has swung"
 
 
-def test_two_units_on_a_ball_joint_move_like_one_robot_and_keep_their_momenta(folder, tmp_path):
+def test_two_fmus_on_a_ball_joint_move_like_one_robot_and_keep_their_momenta(folder, tmp_path):
     text = plug("a", "hull", "hull") + plug("b", "arm", "arm") + glue("a.hull", "b.arm")
     units = run(folder, tmp_path / "units", text)
     whole = run(folder, tmp_path / "whole", table("a", "pair.urdf", FREE["hull"]) + 'joint_kind = { ball = "spherical" }\n')
@@ -284,7 +284,7 @@ def test_a_quaternion_that_is_none_stops_the_run_by_the_name_of_the_body(shafts,
     assert "`shaft`" in text and says in text, text
 
 
-# A ball of 2 kg and 0.3 kg m² that falls, a unit with derivatives: place, velocity and rate, quaternion, accelerations a and b, inputs.
+# A ball of 2 kg and 0.3 kg m² that falls, an FMU with derivatives: place, velocity and rate, quaternion, accelerations a and b, inputs.
 BALL = [("p", "output", "", (3,)), ("v", "output", "", (6,)), ("q", "output", "", (4,))]
 BALL += [(f"{kind}{k}", "output", "", ()) for kind in ("a", "b") for k in "xyz"]
 BALL += [(f"{kind}{k}", "input", "0", ()) for kind in ("f", "m") for k in "xyz"]
@@ -299,9 +299,9 @@ BALL_STEP = BALL_CALC + (
 )
 BALL_SLOPES = r"""
 static double slope(unsigned z, unsigned k) { return z - 4 == k - 10 ? (z < 7 ? 0.5 : 1 / 0.3) : 0; }
-int fmi3GetDirectionalDerivative(Unit *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s, size_t p, double *x, size_t q) {
+int fmi3GetDirectionalDerivative(Fmu *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s, size_t p, double *x, size_t q) {
     for (size_t i = 0; i < n; i++) { x[i] = 0; for (size_t j = 0; j < m; j++) x[i] += slope(z[i], k[j]) * s[j]; } return 0; }
-int fmi3GetAdjointDerivative(Unit *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s, size_t p, double *x, size_t q) {
+int fmi3GetAdjointDerivative(Fmu *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s, size_t p, double *x, size_t q) {
     for (size_t j = 0; j < m; j++) { x[j] = 0; for (size_t i = 0; i < n; i++) x[j] += slope(z[i], k[j]) * s[i]; } return 0; }"""
 KINDS = {"none": "", "directional": 'providesDirectionalDerivatives="true"', "adjoint": 'providesAdjointDerivatives="true"'}
 

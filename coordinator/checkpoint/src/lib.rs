@@ -233,7 +233,7 @@ pub fn require_states(testbed: &Testbed) -> Result {
         _ => "their states",
     };
     let message = format!("--checkpoint-every: {} cannot save {their} as bytes", names.join(", "));
-    let help = "leave the option out; a unit needs `canSerializeFMUState`, a module in Python `self.state`, another one \
+    let help = "leave the option out; an FMU needs `canSerializeFMUState`, a module in Python `self.state`, another one \
                 `serialize` and `deserialize`";
     Err(InputError::plain(message, Some(help.into())).into())
 }

@@ -6,28 +6,28 @@
 //! on: when one of those fails it is blocked, so that one mistake is one finding.
 //!
 //! * [`catalogue`]: all tests, by area.
-//! * [`Lab`]: what a test works with: the module, its parameters, a source of randomness.
-//! * `rig`: steps a soil below moving feet, a robot, a controller, without the rest of the coordinator.
+//! * [`TestContext`]: what a test works with: the module, its parameters, a source of randomness.
+//! * `fixture`: steps a soil below moving feet, a robot, a controller, without the rest of the coordinator.
 
 mod areas;
 mod catalogue;
 mod check_file;
 mod derivative;
-mod elsewhere;
+mod other_process;
 mod finding;
-mod lab;
+mod test_context;
 mod last;
 mod report;
-mod rig;
+mod fixture;
 mod sanitize;
 mod supervisor;
 
 pub use catalogue::{Area, Level, Test, catalogue};
-pub use elsewhere::{Errand, run_errand};
+pub use other_process::{RemoteRun, run_remote};
 pub use finding::{Finding, Outcome, Stop, Verdict};
-pub use lab::Lab;
+pub use test_context::TestContext;
 pub use last::{LastCheck, last_check, remember};
-pub use report::{Report, Row};
+pub use report::{Report, TestResult};
 pub use sanitize::{Fault, Sanitized, sanitize, sources_of};
 pub use supervisor::{Options, Told, check};
 
@@ -38,10 +38,10 @@ use terraglue_host::{SearchPath, is_path};
 ///
 /// # Errors
 /// There is no test of this name; the nearest one is named.
-pub fn run_here(name: &str, lab: &Lab) -> Result<Outcome, String> {
+pub fn run_here(name: &str, context: &TestContext) -> Result<Outcome, String> {
     let tests = catalogue();
     match tests.iter().find(|t| t.name == name) {
-        Some(test) => Ok(Outcome::of((test.run)(lab))),
+        Some(test) => Ok(Outcome::of((test.run)(context))),
         None => Err(unknown(name, tests)),
     }
 }

@@ -1,13 +1,13 @@
 //! Functional mock-up units as subsystems of a scenario, on their own, and made from scenarios and modules.
 //!
-//! A table `[x] fmu = "path.fmu"` makes a [`FmuSubsystem`]; [`simulate`] runs one unit alone; [`export`] writes
+//! A table `[x] fmu = "path.fmu"` makes a [`FmuSubsystem`]; [`simulate`] runs one FMU alone; [`export`] writes
 //! one. System structures (SSP) become scenarios in `terraglue_scenario::ssp`.
 
 mod adapter;
 mod bodies;
 mod clocks;
 pub mod export;
-mod feet;
+mod driven_bodies;
 mod inputs;
 mod map;
 mod rollback;
@@ -16,7 +16,7 @@ pub mod simulate;
 mod table;
 
 pub use adapter::FmuSubsystem;
-pub use feet::Feet;
+pub use driven_bodies::Feet;
 pub use settings::OnNan;
 
 use terraglue_host::Library;

@@ -1,19 +1,19 @@
 //! Trials of one side at a time: what strategies need that treat the two sides of a glue unlike.
 //!
-//! Side 2 of a group are its soils and the bodies that are side 2 of all their glue; all other bodies are side 1.
+//! Participant 2 of a group are its soils and the bodies that are side 2 of all their glue; all other bodies are side 1.
 
 use super::derivatives::Derivatives;
-use super::exchange::Exchange;
-use super::glue::Row;
+use super::interface_problem::InterfaceProblem;
+use super::glue::ConstraintKind;
 use super::linear::max_norm;
-use super::side::Answer;
+use super::participant::Answer;
 use crate::timing::Part;
 use std::time::Instant as Clock;
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
 use terraglue_subsystem::Level;
 
-impl Exchange {
+impl InterfaceProblem {
     /// What is known at t without any trial: T = −(x1 − x2)/compliance of springs, the soil's own force at contacts.
     pub fn explicit_forces(&mut self) {
         let mut t = std::mem::take(&mut self.t);
@@ -27,8 +27,8 @@ impl Exchange {
         let n = self.rows.len();
         out.clear();
         out.extend((0..n).map(|i| match self.rows[i] {
-            Row::Joint if self.compliance[i] == 0.0 => 0.0,
-            Row::Joint => -self.gap[i] / self.compliance[i] - self.damping[i] * (self.v1[i] - self.v2[i]),
+            ConstraintKind::Joint if self.compliance[i] == 0.0 => 0.0,
+            ConstraintKind::Joint => -self.gap[i] / self.compliance[i] - self.damping[i] * (self.v1[i] - self.v2[i]),
             _ => self.f_law[i],
         }));
     }
@@ -45,7 +45,7 @@ impl Exchange {
 
     /// The springs' force where side 2 has moved and side 1 has not.
     pub fn spring_forces(&mut self) {
-        for i in (0..self.n()).filter(|i| self.rows[*i] == Row::Joint) {
+        for i in (0..self.n()).filter(|i| self.rows[*i] == ConstraintKind::Joint) {
             let damper = self.damping[i] * (self.v1[i] - self.v2[i]);
             self.t[i] = (self.x2[i] - self.gap[i]) / self.compliance[i] - damper;
         }
@@ -53,7 +53,7 @@ impl Exchange {
 
     /// Soils follow the bodies' motion: their surface is where the body is.
     pub fn follow_bodies(&mut self) {
-        for i in (0..self.n()).filter(|i| self.rows[*i] != Row::Joint) {
+        for i in (0..self.n()).filter(|i| self.rows[*i] != ConstraintKind::Joint) {
             self.x2[i] = self.x1[i];
         }
     }

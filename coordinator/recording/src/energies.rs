@@ -78,7 +78,7 @@ impl Energies {
 
 /// The state of all books at once, J; not a number where unknown.
 #[derive(Clone, Copy)]
-struct Books {
+struct EnergySums {
     kinetic: f64,
     potential: f64,
     soil_heat: f64,
@@ -86,7 +86,7 @@ struct Books {
     work: f64,
 }
 
-impl Books {
+impl EnergySums {
     fn of(view: &View) -> Self {
         let soils = view.subsystems.iter().filter(|s| s.kind == Kind::Soil);
         Self {
@@ -102,7 +102,7 @@ impl Books {
 /// Follows the books of a run.
 #[derive(Default)]
 pub(crate) struct EnergyTrack {
-    ends: Option<(Books, Books)>,
+    ends: Option<(EnergySums, EnergySums)>,
     has_soil: bool,
     glue_stored_j: f64,
     glue_heat_j: f64,
@@ -111,7 +111,7 @@ pub(crate) struct EnergyTrack {
     without_book: Vec<String>,
 }
 
-terraglue_subsystem::persist!(Books { kinetic, potential, soil_heat, heat, work });
+terraglue_subsystem::persist!(EnergySums { kinetic, potential, soil_heat, heat, work });
 terraglue_subsystem::persist!(EnergyTrack {
     ends,
     has_soil,
@@ -128,13 +128,13 @@ impl EnergyTrack {
         self.has_soil = view.subsystems.iter().any(|s| s.kind == Kind::Soil);
         let silent = view.subsystems.iter().filter(|s| !book_of(s.kind, &s.instance.energy()).is_known());
         self.without_book = silent.map(|s| s.name.to_owned()).collect();
-        let books = Books::of(view);
+        let books = EnergySums::of(view);
         self.ends = Some((books, books));
     }
 
     /// After a step.
     pub fn follow(&mut self, view: &View) {
-        let now = Books::of(view);
+        let now = EnergySums::of(view);
         let (first, before) = self.ends.unwrap_or((now, now));
         let step = (now.work - before.work).abs();
         self.work_path_j += if step.is_nan() { 0.0 } else { step };
@@ -201,7 +201,7 @@ mod tests {
 
     #[test]
     fn the_drift_is_held_against_the_largest_of_what_was_turned_over() {
-        let at = |kinetic: f64, work: f64| Books { kinetic, potential: 1.0, soil_heat: 0.0, heat: 0.0, work };
+        let at = |kinetic: f64, work: f64| EnergySums { kinetic, potential: 1.0, soil_heat: 0.0, heat: 0.0, work };
         let of = |track: EnergyTrack| track.figures(&MotorWork::default());
         let ends = Some((at(0.0, 0.0), at(0.0, 2.0)));
         let driven = of(EnergyTrack { ends, work_path_j: 2.0, port_path_j: 1.0, ..EnergyTrack::default() });

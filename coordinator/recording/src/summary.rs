@@ -5,7 +5,7 @@ use crate::layout::{SUMMARY, at, other_at};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use terraglue_diagnostics::error::{Error, Result};
-use terraglue_engine::observer::Happening;
+use terraglue_engine::observer::Event;
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -59,7 +59,7 @@ pub struct Summary {
     /// What stopped it; null unless `failed`.
     pub error: Option<FailureRecord>,
     /// Events, changes and warnings in order of time.
-    pub events: Vec<Happening>,
+    pub events: Vec<Event>,
     /// Name of the scenario.
     pub scenario: String,
     /// Gluing strategy.

@@ -14,7 +14,7 @@ use crate::model::{Kind, Model};
 use crate::objects;
 use crate::placement::{StartRates, at_rest, base_pose, clearance, coordinates, joint_rates, set_moving};
 use crate::robot::Robot;
-use crate::state::{ClosureState, ContactBook, JointState, Load, Motion, State};
+use crate::state::{ClosureState, ContactLedger, JointState, Load, Motion, State};
 use nalgebra::Isometry3;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -79,7 +79,7 @@ impl Module for RigidBody {
             closures: vec![ClosureState::default(); model.closures.len()],
             redundant_rows: 0,
             energy: Energy::default(),
-            contact: ContactBook::default(),
+            contact: ContactLedger::default(),
             pressed: Vec::new(),
             supply: configure::supply(&config)?,
             start: None,

@@ -2,7 +2,7 @@
 
 use crate::actuator::Item;
 use crate::actuator::battery::Draw;
-use crate::actuator::book::Outcome;
+use crate::actuator::energy_ledger::Outcome;
 use crate::balance;
 use crate::contact::estimate::{Estimator, Problem};
 use crate::contact::ports::{Ports, committed, displacement, response, standing};
@@ -45,7 +45,7 @@ pub(crate) struct Robot {
     revision: u64,
     /// Whether the last trial was an `advance` that can be committed.
     trial: bool,
-    scratch: Scratch,
+    scratch: EstimateScratch,
 }
 
 /// What a preparation depends on besides the ports.
@@ -57,7 +57,7 @@ struct Prepared {
 
 /// Packed vectors of the estimate.
 #[derive(Default)]
-struct Scratch {
+struct EstimateScratch {
     g: Vec<f64>,
     gap: Vec<f64>,
     free: Vec<f64>,
@@ -90,7 +90,7 @@ impl Robot {
             step_ports: Vec::new(),
             revision: 0,
             trial: false,
-            scratch: Scratch::default(),
+            scratch: EstimateScratch::default(),
         })
     }
 
@@ -231,7 +231,7 @@ impl Robot {
             // implicit spring loses what it does not store.
             let passive = shares.stop + shares.friction + shares.damper + shares.spring;
             e.dissipated -= passive * axis.mean_rate + s.actuator.stored(s.angle).0 - spring;
-            e.electrical += s.actuator.book.electrical_power * h;
+            e.electrical += s.actuator.ledger.electrical_power * h;
         }
         state.supply.advance(&draw, h);
         for (b, load) in state.loads.iter().enumerate() {

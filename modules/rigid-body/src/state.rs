@@ -75,7 +75,7 @@ pub(crate) struct ClosureState {
 
 /// What the last step says about contacts among the bodies and with rigid ground.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub(crate) struct ContactBook {
+pub(crate) struct ContactLedger {
     /// Points that pressed.
     pub points: usize,
     /// Residual of the contact problem.
@@ -101,7 +101,7 @@ pub(crate) struct State {
     /// Normal force of all ports of a body, N.
     pub contact_normal: Vec<f64>,
     pub energy: Energy,
-    pub contact: ContactBook,
+    pub contact: ContactLedger,
     /// Contact forces of the last step.
     pub pressed: Vec<Pressed>,
     pub supply: Supply,

@@ -2,11 +2,11 @@
 
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::lab::Lab;
-use crate::rig::{Flat, Foot, SoilBench};
+use crate::test_context::TestContext;
+use crate::fixture::{Flat, Foot, SoilFixture};
 use terraglue_subsystem::{Energy, Kind};
 
-const fn test(name: &'static str, promise: &'static str, run: fn(&Lab) -> Verdict) -> Test {
+const fn test(name: &'static str, promise: &'static str, run: fn(&TestContext) -> Verdict) -> Test {
     let (area, level, after) = (Area::Physics, Level::Quick, &["steps"]);
     Test { name, area, level, kinds: &[Kind::Soil], after, promise, run }
 }
@@ -84,37 +84,37 @@ struct Shown {
 }
 
 /// Goes all ways on all grids and shows every step.
-fn each_step(lab: &Lab, mut look: impl FnMut(Shown) -> Verdict) -> Verdict {
-    let module = lab.module()?;
+fn each_step(context: &TestContext, mut look: impl FnMut(Shown) -> Verdict) -> Verdict {
+    let module = context.module()?;
     for spacing in GRIDS {
         let ground = Flat { spacing, ..Flat::LEVEL };
         for way in &WAYS {
-            go(SoilBench::on(lab, &module, ground, &[(way.foot)()])?, way, spacing, &mut look)?;
+            go(SoilFixture::on(context, &module, ground, &[(way.foot)()])?, way, spacing, &mut look)?;
         }
     }
     Ok(())
 }
 
-fn go(mut bench: SoilBench, way: &Way, spacing: f64, look: &mut impl FnMut(Shown) -> Verdict) -> Verdict {
-    let start = bench.soil.energy()?;
+fn go(mut fixture: SoilFixture, way: &Way, spacing: f64, look: &mut impl FnMut(Shown) -> Verdict) -> Verdict {
+    let start = fixture.soil.energy()?;
     if !start.is_known() {
         return Err(Stop::Skip("it keeps no book: reports show its energy as unknown".into()));
     }
     let (mut work, mut path, mut first) = (0.0, 0.0, true);
     for (what, steps, velocity, turn) in way.phases {
-        bench.turning = *turn;
+        fixture.turning = *turn;
         for _ in 0..*steps {
-            bench.go(&[*velocity], H)?;
-            work += bench.work();
-            path += bench.work().abs();
-            let now = bench.soil.energy()?;
+            fixture.go(&[*velocity], H)?;
+            work += fixture.work();
+            path += fixture.work().abs();
+            let now = fixture.soil.energy()?;
             let book = Energy {
                 potential: now.potential - start.potential,
                 dissipated: now.dissipated - start.dissipated,
                 port_work: now.port_work - start.port_work,
                 ..now
             };
-            let given = format!("{what}, nodes {} mm apart, t = {:.3} s", 1e3 * spacing, bench.t);
+            let given = format!("{what}, nodes {} mm apart, t = {:.3} s", 1e3 * spacing, fixture.t);
             look(Shown { given, first, work, path, book })?;
             first = false;
         }
@@ -127,8 +127,8 @@ fn within(difference: f64, tolerated: f64) -> bool {
     difference.abs() <= tolerated
 }
 
-fn balance(lab: &Lab) -> Verdict {
-    each_step(lab, |Shown { given, work, path, book, .. }| {
+fn balance(context: &TestContext) -> Verdict {
+    each_step(context, |Shown { given, work, path, book, .. }| {
         let tolerated = (SHARE * path).max(ROUNDING_J);
         let held = book.dissipated + book.potential;
         let of = format!("by 1 % of the {path:.4e} J that went to and fro");
@@ -151,9 +151,9 @@ fn balance(lab: &Lab) -> Verdict {
     })
 }
 
-fn heat_stays(lab: &Lab) -> Verdict {
+fn heat_stays(context: &TestContext) -> Verdict {
     let mut before = 0.0;
-    each_step(lab, |Shown { given, first, book, .. }| {
+    each_step(context, |Shown { given, first, book, .. }| {
         let fell = if first { -book.dissipated } else { before - book.dissipated };
         before = book.dissipated;
         if fell > ROUNDING_J {

@@ -7,13 +7,13 @@ use terraglue_gluing::contact::PortSet;
 use terraglue_gluing::memory::{Recall, Remember};
 use terraglue_gluing::step_control::Passage;
 use terraglue_gluing::timing::{Part, Timings};
-use terraglue_gluing::{Exchange, Instant, PortReport, Row, Strategy};
+use terraglue_gluing::{InterfaceProblem, StepContext, PortReport, ConstraintKind, Strategy};
 use terraglue_host::Instance;
 use terraglue_scenario::{GluingSpec, StrategyKind};
 
 /// Subsystems that share ports, with their strategy.
 pub(super) struct Group {
-    pub exchange: Exchange,
+    pub exchange: InterfaceProblem,
     pub strategy: Box<dyn Strategy>,
     /// Its own strategy, where the scenario's glue names one.
     pub own: Option<StrategyKind>,
@@ -42,7 +42,7 @@ impl Group {
     /// Paper, step 1: the ports of the step are made known to all members.
     pub fn begin(
         &mut self,
-        at: Instant,
+        at: StepContext,
         found: &PortSet,
         members: &[Member],
         instances: &mut [Instance],
@@ -58,7 +58,7 @@ impl Group {
     /// The energy residual of the step before, J.
     pub fn residual(
         &mut self,
-        at: Instant,
+        at: StepContext,
         found: &PortSet,
         members: &[Member],
         instances: &mut [Instance],
@@ -75,7 +75,7 @@ impl Group {
             return; // its surface is where the body went, by definition
         }
         for port in &exchange.ports {
-            if exchange.rows[port.first as usize] == Row::Joint {
+            if exchange.rows[port.first as usize] == ConstraintKind::Joint {
                 continue; // the strategy itself measures the gap of joints
             }
             if self.closed.binary_search(&port.key).is_ok() {
@@ -107,7 +107,7 @@ impl Group {
                 report.glue_stored_j += passed.stored;
                 report.glue_heat_j += passed.heat;
             }
-            if wrench[0] > 0.0 && exchange.rows[n] != Row::Joint {
+            if wrench[0] > 0.0 && exchange.rows[n] != ConstraintKind::Joint {
                 self.closed.push(port.key);
             }
             let t_star_n = exchange.estimate.t_star[n];

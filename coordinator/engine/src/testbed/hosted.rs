@@ -40,7 +40,7 @@ impl Testbed {
 
     /// Whether all subsystems make every step, so that its length may change.
     pub fn takes_any_step(&self) -> bool {
-        self.turns.iter().all(|turn| turn.step_multiple == 1)
+        self.schedules.iter().all(|turn| turn.step_multiple == 1)
     }
 
     /// An instance by its number, to set its values.
@@ -65,7 +65,7 @@ impl Testbed {
 
     /// Reads the motion of all bodies again after values were set from outside.
     pub fn refresh(&mut self) -> Result {
-        self.happenings.clear();
+        self.events.clear();
         self.read_states()
     }
 

@@ -46,13 +46,13 @@ impl Testbed {
         let holds: Vec<bool> = self
             .instances
             .iter()
-            .zip(&self.turns)
+            .zip(&self.schedules)
             .map(|(i, turn)| i.kind() == Kind::Controller || turn.step_multiple > 1)
             .collect();
-        self.turns.iter_mut().zip(&holds).for_each(|(turn, holds)| turn.holds = *holds);
+        self.schedules.iter_mut().zip(&holds).for_each(|(turn, holds)| turn.holds = *holds);
         let stood = (1..=count).rev().try_for_each(|left| self.stand_step(left));
         self.standing.store(0, Ordering::Relaxed);
-        self.turns.iter_mut().for_each(|turn| turn.holds = false);
+        self.schedules.iter_mut().for_each(|turn| turn.holds = false);
         stood?;
         (self.t, self.index, self.halvings) = (0.0, 0, 0);
         self.restart_counts()

@@ -2,7 +2,7 @@
 
 use crate::instance::{Log, Logger, call, create, free, put, resources, room, slice, text};
 use std::ffi::{CString, c_char, c_int, c_uint, c_void};
-use terraglue_fmi::export::{Answer, Component as Unit, Handle, wrong};
+use terraglue_fmi::export::{Answer, ExportedInstance, Handle, wrong};
 use terraglue_subsystem::ValueType;
 
 type Component = *mut c_void;
@@ -51,8 +51,8 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
     unsafe {
         let log = log(name, environment, logger, logging);
         let refused = match (event_mode, n_intermediate) {
-            (true, _) => Some("this unit has no event mode (hasEventMode is false)"),
-            (_, 1..) => Some("this unit has no intermediate update"),
+            (true, _) => Some("this FMU has no event mode (hasEventMode is false)"),
+            (_, 1..) => Some("this FMU has no intermediate update"),
             _ => None,
         };
         create(token, resources(text(resource_path)), refused, log)
@@ -85,7 +85,7 @@ pub unsafe extern "C" fn fmi3InstantiateModelExchange(
     // SAFETY: as above.
     unsafe {
         let log = log(name, environment, logger, logging);
-        create(token, resources(text(resource_path)), Some("this unit is for co-simulation only"), log)
+        create(token, resources(text(resource_path)), Some("this FMU is for co-simulation only"), log)
     }
 }
 
@@ -105,7 +105,7 @@ pub unsafe extern "C" fn fmi3InstantiateScheduledExecution(
     // SAFETY: as above.
     unsafe {
         let log = log(name, environment, logger, logging);
-        create(token, resources(text(resource_path)), Some("this unit is for co-simulation only"), log)
+        create(token, resources(text(resource_path)), Some("this FMU is for co-simulation only"), log)
     }
 }
 
@@ -211,18 +211,18 @@ pub unsafe extern "C" fn fmi3GetFloat64(c: Component, vr: Refs, n: usize, out: *
 }
 
 /// Value reference 0 is the time.
-fn get_with_time(unit: &Unit, mut references: &[u32], mut out: &mut [f64]) -> Answer {
+fn get_with_time(fmu: &ExportedInstance, mut references: &[u32], mut out: &mut [f64]) -> Answer {
     while let Some(k) = references.iter().position(|r| *r == 0) {
-        let before: usize = references[..k].iter().map(|r| unit.len(*r).unwrap_or(1)).sum();
+        let before: usize = references[..k].iter().map(|r| fmu.len(*r).unwrap_or(1)).sum();
         if out.len() <= before {
             return wrong("too few values for the time");
         }
         let (head, rest) = std::mem::take(&mut out).split_at_mut(before);
-        unit.get(&references[..k], &[ValueType::F64], head)?;
-        rest[0] = unit.time();
+        fmu.get(&references[..k], &[ValueType::F64], head)?;
+        rest[0] = fmu.time();
         (references, out) = (&references[k + 1..], &mut rest[1..]);
     }
-    unit.get(references, &[ValueType::F64], out)
+    fmu.get(references, &[ValueType::F64], out)
 }
 
 #[unsafe(no_mangle)]
@@ -389,8 +389,8 @@ pub unsafe extern "C" fn fmi3DeserializeFMUState(
     unsafe { crate::instance::deserialise(c, bytes, size, state) }
 }
 
-/// Functions of what this unit does not have. Arguments after the first are left unread: the caller owns them in the
-/// C calling conventions of all platforms that the units are made for.
+/// Functions of what this FMU does not have. Arguments after the first are left unread: the caller owns them in the
+/// C calling conventions of all platforms that the FMUs are made for.
 macro_rules! refusals {
     ($($name:ident: $why:literal;)*) => {$(
         #[unsafe(no_mangle)]
@@ -402,36 +402,36 @@ macro_rules! refusals {
 }
 
 refusals! {
-    fmi3EnterEventMode: "this unit has no event mode";
-    fmi3EnterStepMode: "this unit has no event mode";
-    fmi3UpdateDiscreteStates: "this unit has no event mode";
-    fmi3EvaluateDiscreteStates: "this unit has no event mode";
-    fmi3EnterConfigurationMode: "this unit has no structural parameters";
-    fmi3ExitConfigurationMode: "this unit has no structural parameters";
-    fmi3GetDirectionalDerivative: "this unit has no directional derivatives";
-    fmi3GetAdjointDerivative: "this unit has no adjoint derivatives";
-    fmi3GetNumberOfVariableDependencies: "this unit does not tell dependencies at run time";
-    fmi3GetVariableDependencies: "this unit does not tell dependencies at run time";
-    fmi3GetOutputDerivatives: "this unit has no derivatives of its outputs";
-    fmi3GetClock: "this unit has no clocks";
-    fmi3SetClock: "this unit has no clocks";
-    fmi3GetIntervalDecimal: "this unit has no clocks";
-    fmi3GetIntervalFraction: "this unit has no clocks";
-    fmi3GetShiftDecimal: "this unit has no clocks";
-    fmi3GetShiftFraction: "this unit has no clocks";
-    fmi3SetIntervalDecimal: "this unit has no clocks";
-    fmi3SetIntervalFraction: "this unit has no clocks";
-    fmi3SetShiftDecimal: "this unit has no clocks";
-    fmi3SetShiftFraction: "this unit has no clocks";
-    fmi3ActivateModelPartition: "this unit is for co-simulation only";
-    fmi3EnterContinuousTimeMode: "this unit is for co-simulation only";
-    fmi3CompletedIntegratorStep: "this unit is for co-simulation only";
-    fmi3SetTime: "this unit is for co-simulation only";
-    fmi3SetContinuousStates: "this unit is for co-simulation only";
-    fmi3GetContinuousStateDerivatives: "this unit is for co-simulation only";
-    fmi3GetEventIndicators: "this unit is for co-simulation only";
-    fmi3GetContinuousStates: "this unit is for co-simulation only";
-    fmi3GetNominalsOfContinuousStates: "this unit is for co-simulation only";
-    fmi3GetNumberOfEventIndicators: "this unit is for co-simulation only";
-    fmi3GetNumberOfContinuousStates: "this unit is for co-simulation only";
+    fmi3EnterEventMode: "this FMU has no event mode";
+    fmi3EnterStepMode: "this FMU has no event mode";
+    fmi3UpdateDiscreteStates: "this FMU has no event mode";
+    fmi3EvaluateDiscreteStates: "this FMU has no event mode";
+    fmi3EnterConfigurationMode: "this FMU has no structural parameters";
+    fmi3ExitConfigurationMode: "this FMU has no structural parameters";
+    fmi3GetDirectionalDerivative: "this FMU has no directional derivatives";
+    fmi3GetAdjointDerivative: "this FMU has no adjoint derivatives";
+    fmi3GetNumberOfVariableDependencies: "this FMU does not tell dependencies at run time";
+    fmi3GetVariableDependencies: "this FMU does not tell dependencies at run time";
+    fmi3GetOutputDerivatives: "this FMU has no derivatives of its outputs";
+    fmi3GetClock: "this FMU has no clocks";
+    fmi3SetClock: "this FMU has no clocks";
+    fmi3GetIntervalDecimal: "this FMU has no clocks";
+    fmi3GetIntervalFraction: "this FMU has no clocks";
+    fmi3GetShiftDecimal: "this FMU has no clocks";
+    fmi3GetShiftFraction: "this FMU has no clocks";
+    fmi3SetIntervalDecimal: "this FMU has no clocks";
+    fmi3SetIntervalFraction: "this FMU has no clocks";
+    fmi3SetShiftDecimal: "this FMU has no clocks";
+    fmi3SetShiftFraction: "this FMU has no clocks";
+    fmi3ActivateModelPartition: "this FMU is for co-simulation only";
+    fmi3EnterContinuousTimeMode: "this FMU is for co-simulation only";
+    fmi3CompletedIntegratorStep: "this FMU is for co-simulation only";
+    fmi3SetTime: "this FMU is for co-simulation only";
+    fmi3SetContinuousStates: "this FMU is for co-simulation only";
+    fmi3GetContinuousStateDerivatives: "this FMU is for co-simulation only";
+    fmi3GetEventIndicators: "this FMU is for co-simulation only";
+    fmi3GetContinuousStates: "this FMU is for co-simulation only";
+    fmi3GetNominalsOfContinuousStates: "this FMU is for co-simulation only";
+    fmi3GetNumberOfEventIndicators: "this FMU is for co-simulation only";
+    fmi3GetNumberOfContinuousStates: "this FMU is for co-simulation only";
 }

@@ -72,7 +72,7 @@ pub unsafe extern "C" fn fmi2Instantiate(
             name: CString::new(text(name).unwrap_or_default()).unwrap_or_default(),
             verbose: logging != 0,
         };
-        let refused = (kind != CO_SIMULATION).then_some("this unit is for co-simulation only");
+        let refused = (kind != CO_SIMULATION).then_some("this FMU is for co-simulation only");
         create(guid, resources(text(location)), refused, log)
     }
 }
@@ -218,7 +218,7 @@ pub unsafe extern "C" fn fmi2DoStep(c: Component, t: f64, h: f64, _no_going_back
             if reached.complete && !reached.terminate {
                 return Ok(());
             }
-            let text = format!("the unit asks for the end of the run at t = {} s", reached.time);
+            let text = format!("the FMU asks for the end of the run at t = {} s", reached.time);
             Err(Wrong { status: Status::Discard, text })
         })
     }
@@ -342,7 +342,7 @@ pub unsafe extern "C" fn fmi2GetDirectionalDerivative(
     _out: *mut f64,
 ) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |_| wrong("this unit has no directional derivatives")) }
+    unsafe { call(c, |_| wrong("this FMU has no directional derivatives")) }
 }
 
 #[unsafe(no_mangle)]
@@ -354,7 +354,7 @@ pub unsafe extern "C" fn fmi2SetRealInputDerivatives(
     _values: *const f64,
 ) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |_| wrong("this unit does not interpolate its inputs")) }
+    unsafe { call(c, |_| wrong("this FMU does not interpolate its inputs")) }
 }
 
 #[unsafe(no_mangle)]
@@ -366,5 +366,5 @@ pub unsafe extern "C" fn fmi2GetRealOutputDerivatives(
     _out: *mut f64,
 ) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |_| wrong("this unit has no derivatives of its outputs")) }
+    unsafe { call(c, |_| wrong("this FMU has no derivatives of its outputs")) }
 }

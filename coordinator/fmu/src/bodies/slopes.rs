@@ -1,19 +1,19 @@
-//! The interface Jacobian of glued bodies from directional or adjoint derivatives of their unit.
+//! The interface Jacobian of glued bodies from directional or adjoint derivatives of their FMU.
 //!
 //! Those speak of outputs at one time, so they give dA/d(wrench). A wrench that stays over the step makes dV = h·dA and
-//! dX = c·h²·dA of it, with c = ½ until two trials of the step say what the unit's own integration makes of it.
+//! dX = c·h²·dA of it, with c = ½ until two trials of the step say what the FMU's own integration makes of it.
 
 use super::axis::Axis;
 use super::motion::Motion;
 use super::names::Body;
 use super::{Bodies, Fail};
-use terraglue_fmi::Slave;
+use terraglue_fmi::FmuInstance;
 use terraglue_numerics::rotation::{
     IDENTITY, Quaternion, Vector, conjugate, cross, minus, product, quaternion, rotation_vector, turned,
 };
 use terraglue_subsystem::{Level, Port, Result, Step};
 
-/// dX = ½·h²·dA where a force stays over the step and the unit integrates well.
+/// dX = ½·h²·dA where a force stays over the step and the FMU integrates well.
 const SHARE: f64 = 0.5;
 
 /// Force and moment, or acceleration and angular acceleration.
@@ -79,12 +79,12 @@ impl Bodies {
         self.all.iter().flat_map(inputs).any(|axis| axis.is_some()) && self.all.iter().all(own)
     }
 
-    /// dX, dV or dA/d(wrench on itself), n × n, column-major, from the unit's derivatives.
-    pub fn slopes(&self, slave: &Slave, step: &Step, level: Level, out: &mut [f64], fail: Fail) -> Result {
-        let components = self.components(slave, step, level, fail)?;
-        match slave.description().capabilities.directional_derivatives {
-            true => self.columns(slave, &components, out, fail)?,
-            false => self.rows(slave, &components, out, fail)?,
+    /// dX, dV or dA/d(wrench on itself), n × n, column-major, from the FMU's derivatives.
+    pub fn slopes(&self, instance: &FmuInstance, step: &Step, level: Level, out: &mut [f64], fail: Fail) -> Result {
+        let components = self.components(instance, step, level, fail)?;
+        match instance.description().capabilities.directional_derivatives {
+            true => self.columns(instance, &components, out, fail)?,
+            false => self.rows(instance, &components, out, fail)?,
         }
         let scale = match level {
             Level::Acceleration => 1.0,
@@ -96,12 +96,12 @@ impl Bodies {
     }
 
     /// All packed components: pushed with the arms of the start of the step, answered as the last trial of it has turned.
-    fn components(&self, slave: &Slave, step: &Step, level: Level, fail: Fail) -> Result<Vec<Component>> {
+    fn components(&self, instance: &FmuInstance, step: &Step, level: Level, fail: Fail) -> Result<Vec<Component>> {
         let mut out = Vec::new();
         for port in step.ports {
             let b = port.body as usize;
             let (start, turn) = match self.trials.is_empty() {
-                true => (Motion::read(slave, &self.all[b], fail)?, IDENTITY),
+                true => (Motion::read(instance, &self.all[b], fail)?, IDENTITY),
                 false => {
                     let (before, after) = (self.before[b], self.after[b]);
                     (before, product(after.orientation, conjugate(before.orientation)))
@@ -114,12 +114,12 @@ impl Bodies {
     }
 
     /// dA/d(wrench on itself) by directional derivatives: one call for each component of the wrench.
-    fn columns(&self, slave: &Slave, components: &[Component], out: &mut [f64], fail: Fail) -> Result {
+    fn columns(&self, instance: &FmuInstance, components: &[Component], out: &mut [f64], fail: Fail) -> Result {
         let (unknowns, first) = all(&self.all, outputs);
         let mut change = vec![f64::NAN; unknowns.len()];
         for column in components {
             let (knowns, seed) = weighed(&inputs(&self.all[column.body]), &column.push);
-            slave.directional_derivative(&unknowns, &knowns, &seed, &mut change).map_err(fail)?;
+            instance.directional_derivative(&unknowns, &knowns, &seed, &mut change).map_err(fail)?;
             for row in components {
                 let own = outputs(&self.all[row.body]);
                 out[column.place * components.len() + row.place] =
@@ -130,12 +130,12 @@ impl Bodies {
     }
 
     /// The same by adjoint derivatives: one call for each component of the acceleration.
-    fn rows(&self, slave: &Slave, components: &[Component], out: &mut [f64], fail: Fail) -> Result {
+    fn rows(&self, instance: &FmuInstance, components: &[Component], out: &mut [f64], fail: Fail) -> Result {
         let (knowns, first) = all(&self.all, inputs);
         let mut change = vec![f64::NAN; knowns.len()];
         for row in components {
             let (unknowns, seed) = weighed(&outputs(&self.all[row.body]), &row.row);
-            slave.adjoint_derivative(&unknowns, &knowns, &seed, &mut change).map_err(fail)?;
+            instance.adjoint_derivative(&unknowns, &knowns, &seed, &mut change).map_err(fail)?;
             for column in components {
                 let own = inputs(&self.all[column.body]);
                 out[column.place * components.len() + row.place] =

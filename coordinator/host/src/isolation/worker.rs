@@ -2,11 +2,11 @@
 
 use super::calls::{self, Call, OwnedStep};
 use super::channel::{self, Segment};
-use super::proxy::About;
+use super::proxy::ModuleInfo;
 use super::tiles::Tiles;
 use super::wire::{Reader, Writer};
 use super::{Line, Start, What};
-use crate::{HostServices, Library, LoadedModule, Partings, Workers};
+use crate::{HostServices, Library, LoadedModule, TeardownErrors, Workers};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::process::ExitCode;
@@ -84,7 +84,7 @@ struct Worker {
     unit: Option<Box<dyn Subsystem>>,
     is_module: bool,
     tiles: Tiles,
-    partings: Partings,
+    teardown_errors: TeardownErrors,
 }
 
 fn garbled() -> Error {
@@ -102,7 +102,7 @@ impl Worker {
             Some(Call::Start) => self.start(&mut r),
             Some(Call::Quit) => {
                 self.unit = None;
-                match self.partings.take() {
+                match self.teardown_errors.take() {
                     all if all.is_empty() => Ok(()),
                     all => Err(Error::Failed(all.join("; "))),
                 }
@@ -128,7 +128,7 @@ impl Worker {
         let Some(unit) = &self.unit else { return };
         match call {
             Some(Call::Start) => {
-                let about = About {
+                let about = ModuleInfo {
                     capabilities: unit.capabilities(),
                     variables: unit.variables().to_vec(),
                     actions: unit.actions().to_vec(),
@@ -163,8 +163,8 @@ impl Worker {
             start: start.clone(),
         });
         self.unit = Some(match start.what {
-            What::Unit { path, parameters } => {
-                (self.library.fmus()?)(&path, &parameters, host, self.partings.clone())?
+            What::Fmu { path, parameters } => {
+                (self.library.fmus()?)(&path, &parameters, host, self.teardown_errors.clone())?
             }
             What::Module { path, config } => {
                 let module = LoadedModule::load(&path).map_err(|e| Error::Refused(e.to_string()))?;
@@ -184,7 +184,7 @@ impl Worker {
         HostServices {
             cancel: self.log.cancel.clone(),
             log: Some(Arc::new(move |_, level, text| log.put(level, text))),
-            partings: self.partings.clone(),
+            teardown_errors: self.teardown_errors.clone(),
             ..HostServices::new(0, Path::new(folder))
         }
     }

@@ -5,7 +5,7 @@ use crate::compare::table::{varied, varied_keys};
 use crate::compare::{CompareRow, columns, grounds, overview, relative};
 use crate::reader::Recording;
 use crate::report::energy_card;
-use crate::report::figure::{Curve, Figure, Panel};
+use crate::report::figure::{Curve, Cell, Panel};
 use crate::report::footprints::{self, Leg};
 use crate::report::html::escape;
 use crate::report::page::Page;
@@ -138,7 +138,7 @@ fn glance(folder: &Path, rows: &[CompareRow]) -> String {
 }
 
 fn html_table(folder: &Path, rows: &[CompareRow]) -> String {
-    let shown: Vec<&columns::Column> = columns::ALL.iter().filter(|c| c.is_shown(rows)).collect();
+    let shown: Vec<&columns::FigureColumn> = columns::ALL.iter().filter(|c| c.is_shown(rows)).collect();
     let marks: Vec<Vec<bool>> = shown.iter().map(|c| columns::best(c, rows)).collect();
     let mut out = String::from("<div class=\"wide\"><table class=\"rows\"><thead><tr>");
     let keys = varied_keys(rows);
@@ -178,7 +178,7 @@ fn html_table(folder: &Path, rows: &[CompareRow]) -> String {
 }
 
 /// Two lines of heads: groups over their columns, single columns over both lines.
-fn head(out: &mut String, keys: &[&str], shown: &[&columns::Column]) {
+fn head(out: &mut String, keys: &[&str], shown: &[&columns::FigureColumn]) {
     for name in ["strategy", "soil"].iter().chain(keys).chain(&["form"]) {
         let _ = write!(out, "<th class=\"name\" rowspan=\"2\">{}</th>", escape(name));
     }
@@ -205,7 +205,7 @@ fn panel(runs: &[Run], quantity: &str, unit: &str, steps: bool, f: fn(&WindowRec
     Panel::new(quantity, unit, runs.iter().map(curve).collect())
 }
 
-fn gluing(runs: &[Run]) -> Option<Figure> {
+fn gluing(runs: &[Run]) -> Option<Cell> {
     if runs.iter().all(|r| r.recording.gluing.len() < 2) {
         return None;
     }
@@ -216,11 +216,11 @@ fn gluing(runs: &[Run]) -> Option<Figure> {
         panel(runs, "action–reaction gap", "N", false, |w| w.max_action_reaction_gap_n).log(true),
     ];
     let note = "Per step; the largest of all steps since the record before.".into();
-    Some(Figure { id: "gluing", title: "Gluing".into(), note, panels, ..Figure::default() })
+    Some(Cell { id: "gluing", title: "Gluing".into(), note, panels, ..Cell::default() })
 }
 
 /// One picture per foot, all runs in it.
-fn forces(runs: &[Run]) -> Option<Figure> {
+fn forces(runs: &[Run]) -> Option<Cell> {
     let mut feet: Vec<String> = runs.iter().flat_map(|r| r.legs.iter().map(|l| l.body.clone())).collect();
     feet.sort();
     feet.dedup();
@@ -239,10 +239,10 @@ fn forces(runs: &[Run]) -> Option<Figure> {
     };
     let panels = feet.iter().enumerate().map(panel).collect();
     let note = "Force that the ground exerts along its normal on one foot, in every run.".into();
-    Some(Figure { id: "forces", title: "Foot force".into(), note, choices: feet, chosen: 0, panels })
+    Some(Cell { id: "forces", title: "Foot force".into(), note, choices: feet, chosen: 0, panels })
 }
 
-fn body(runs: &[Run]) -> Option<Figure> {
+fn body(runs: &[Run]) -> Option<Cell> {
     let along = |axis: usize| {
         let curve = |run: &Run| {
             let (_, poses) = run.recording.reported_body()?;
@@ -257,6 +257,6 @@ fn body(runs: &[Run]) -> Option<Figure> {
         Panel::new("position y", "m", along(1)),
     ];
     let note = "Origin of the reported body in the world.".into();
-    let figure = Figure { id: "body", title: "Body".into(), note, panels, ..Figure::default() };
+    let figure = Cell { id: "body", title: "Body".into(), note, panels, ..Cell::default() };
     (!figure.panels[0].curves.is_empty()).then_some(figure)
 }

@@ -21,7 +21,7 @@ impl ModelDescription {
         all.filter_map(|v| Some((v.reference, value(v)?))).collect()
     }
 
-    /// The same unit after structural parameters (number in calls, value) were set: arrays have other sizes. Start values of
+    /// The same FMU after structural parameters (number in calls, value) were set: arrays have other sizes. Start values of
     /// arrays whose shape changed belong to the old shape and are gone.
     ///
     /// # Errors

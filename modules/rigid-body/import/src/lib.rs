@@ -30,7 +30,7 @@ pub use model::{
     AxisData, Base, Body, Coupling, Drive, DriveKind, Heights, Joint, JointKind, Loop, Plane, Robot, Shape,
     ShapeGeometry,
 };
-pub use pose::Whole;
+pub use pose::TotalMass;
 pub use urdf::read_urdf_text;
 
 use error::Source;

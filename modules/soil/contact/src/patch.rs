@@ -297,7 +297,7 @@ pub struct Patches {
     pub sides: Vec<Side>,
     /// Clinging nodes; scratch of [`Patches::pull`].
     pub(crate) clinging: Vec<Clinging>,
-    /// Whether the soil owes energy for what its feet have come over, see [`crate::bookkeeping::Book::pay`].
+    /// Whether the soil owes energy for what its feet have come over, see [`crate::bookkeeping::EnergyLedger::pay`].
     pub in_debt: bool,
     /// Whether this is the first step of all: what is inside the ground then stands in its own print.
     pub begins: bool,

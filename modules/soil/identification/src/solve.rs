@@ -10,7 +10,7 @@ const GOLDEN_STEPS: u32 = 80;
 const SPREAD: f64 = 1e-9;
 
 /// One reading as the fit sees it: u/u_0, w/w_0, ln x and ln p.
-type Row = [f64; 4];
+type Sample = [f64; 4];
 
 /// The best numbers; `both`: A may differ from 0.
 pub fn solve(law: &FitLaw, readings: &[Reading], both: bool) -> Result<Numbers, FitError> {
@@ -21,7 +21,7 @@ pub fn solve(law: &FitLaw, readings: &[Reading], both: bool) -> Result<Numbers, 
         readings.iter().map(|r| pick(law.terms(r.b, r.depth))).sum::<f64>() / readings.len() as f64
     };
     let scale = [mean(|t| t[0]), mean(|t| t[1])];
-    let rows: Vec<Row> = readings
+    let rows: Vec<Sample> = readings
         .iter()
         .map(|r| {
             let [u, w, x] = law.terms(r.b, r.depth);
@@ -39,7 +39,7 @@ pub fn solve(law: &FitLaw, readings: &[Reading], both: bool) -> Result<Numbers, 
 }
 
 /// λ with the least squares, by a coarse search and golden sections around its best point.
-fn best_share(rows: &[Row]) -> f64 {
+fn best_share(rows: &[Sample]) -> f64 {
     let error = |share: f64| Line::through(rows, share).map_or(f64::INFINITY, |l| l.squares);
     let at = |k: u32| f64::from(k) / f64::from(COARSE);
     let best = (0..=COARSE).min_by(|a, b| error(at(*a)).total_cmp(&error(at(*b)))).unwrap_or(0);
@@ -61,8 +61,8 @@ struct Line {
 }
 
 impl Line {
-    fn through(rows: &[Row], share: f64) -> Option<Self> {
-        let y = |r: &Row| r[3] - libm::log(share * r[0] + (1.0 - share) * r[1]);
+    fn through(rows: &[Sample], share: f64) -> Option<Self> {
+        let y = |r: &Sample| r[3] - libm::log(share * r[0] + (1.0 - share) * r[1]);
         let count = rows.len() as f64;
         let (x_0, y_0) = rows.iter().fold((0.0, 0.0), |(a, b), r| (a + r[2] / count, b + y(r) / count));
         let (xx, xy) = rows.iter().fold((0.0, 0.0), |(xx, xy), r| {

@@ -5,7 +5,7 @@
 //! `tests/reference/gluing/README.md`.
 
 mod extrapolate;
-mod feet;
+mod driven_bodies;
 mod foot;
 mod holds;
 mod linear;
@@ -20,7 +20,7 @@ mod squeezer;
 mod step_control;
 mod stiffness;
 mod table;
-mod units;
+mod fmus;
 mod walk_forms;
 
 use super::{Context, Figure, Limit, Part};
@@ -34,8 +34,8 @@ pub const PARTS: [Part; 11] = [
     ("holds", holds::figures),
     ("squeezer", squeezer::figures),
     ("step-control", step_control::figures),
-    ("units", units::figures),
-    ("feet", feet::figures),
+    ("units", fmus::figures),
+    ("feet", driven_bodies::figures),
     ("stiffness", stiffness::figures),
     ("overhead", overhead::figures),
     ("walk-forms", walk_forms::figures),

@@ -2,7 +2,7 @@
 
 use super::MODULES;
 use super::rig::{Rig, flat, soil};
-use super::rows::{Row, eight};
+use super::rows::{SoilRow, eight};
 use crate::parallel::in_parallel;
 use crate::process::Outcome;
 use crate::{Context, Figure, Limit};
@@ -51,15 +51,15 @@ const SPEED: f64 = 0.01;
 
 /// One plate on one soil and grid.
 #[derive(Clone)]
-struct Case {
+struct PlateCase {
     make: Maker,
-    row: Row,
+    row: SoilRow,
     shape: usize,
     spacing: f64,
     quick: bool,
 }
 
-impl Case {
+impl PlateCase {
     fn rig(&self, mass: f64) -> Rig {
         let size = (GROUND / self.spacing).round() as u32 + 1;
         let (_, geometry, ..) = shapes()[self.shape].clone();
@@ -125,7 +125,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     let [(module, make), _] = MODULES;
     let mut all = Vec::new();
     let cases = cases(context, make)?;
-    let errors = in_parallel(&cases, Case::pressed);
+    let errors = in_parallel(&cases, PlateCase::pressed);
     for (shape, (name, ..)) in shapes().iter().enumerate() {
         let worst = |from: f64, to: f64| {
             let of_shape = cases.iter().zip(&errors).filter(|(c, _)| c.shape == shape);
@@ -150,12 +150,12 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
 }
 
 /// Every soil, shape and grid; quickly two soils and the two grids that show most.
-fn cases(context: &Context, make: Maker) -> Outcome<Vec<Case>> {
+fn cases(context: &Context, make: Maker) -> Outcome<Vec<PlateCase>> {
     let mut cases = Vec::new();
     for (number, row) in eight()?.into_iter().enumerate() {
         for shape in 0..shapes().len() {
             for spacing in SPACINGS {
-                let case = Case { make, row: row.clone(), shape, spacing, quick: context.quick };
+                let case = PlateCase { make, row: row.clone(), shape, spacing, quick: context.quick };
                 let small = shapes()[shape].3 < 0.02;
                 if !context.quick || (number == 1 || number == 7) && (spacing > 0.009 || small) {
                     cases.push(case);
@@ -170,9 +170,9 @@ fn load_control(context: &Context, module: &str, make: Maker) -> Outcome<Figure>
     let rows = eight()?;
     let rows = if context.quick { vec![rows[2].clone(), rows[7].clone()] } else { rows };
     let shapes: &[usize] = if context.quick { &[1] } else { &[0, 1, 2, 3, 4, 5] };
-    let case = |row: &Row, shape| Case { make, row: row.clone(), shape, spacing: 0.01, quick: context.quick };
-    let cases: Vec<Case> = rows.iter().flat_map(|row| shapes.iter().map(move |s| case(row, *s))).collect();
-    let errors = in_parallel(&cases, Case::loaded);
+    let case = |row: &SoilRow, shape| PlateCase { make, row: row.clone(), shape, spacing: 0.01, quick: context.quick };
+    let cases: Vec<PlateCase> = rows.iter().flat_map(|row| shapes.iter().map(move |s| case(row, *s))).collect();
+    let errors = in_parallel(&cases, PlateCase::loaded);
     let worst = errors.into_iter().reduce(larger).unwrap_or(f64::NAN);
     let what = "largest error of the sinkage under 5 to 200 N, %, 1 cm grid";
     Ok(Figure::new(format!("soil.{module}.load_control"), 100.0 * worst, Limit::AtMost(2.0), what))

@@ -1,4 +1,4 @@
-//! What units cost: per communication step beside a bare loop in C and other masters, over two cores, and in isolation.
+//! What FMUs cost: per communication step beside a bare loop in C and other masters, over two cores, and in isolation.
 
 mod exchange;
 pub mod peers;

@@ -14,7 +14,7 @@ const STAND: [f64; 4] = [0.0, 0.9581921787462744, -1.3796341802638374, -1.149354
 
 /// How the joints are driven.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Drive {
+pub enum GaitDrive {
     /// Implicit PD: 600 N m/rad, 10 N m s/rad.
     Soft,
     /// Constraint motor: the error is taken back within ten steps of 1 ms, at 20 rad/s at most.
@@ -22,7 +22,7 @@ pub enum Drive {
 }
 
 /// A walking hexapod.
-pub struct Walk {
+pub struct GaitWalk {
     pub rig: Rig,
     table: Vec<[f64; 24]>,
     ids: Vec<u32>,
@@ -30,12 +30,12 @@ pub struct Walk {
     targets: [f64; 24],
 }
 
-impl Walk {
+impl GaitWalk {
     /// On flat ground with μ = 0.8 under full gravity; `model` relative to the repository.
-    pub fn new(model: &str, drive: Drive, h: f64) -> Outcome<Self> {
+    pub fn new(model: &str, drive: GaitDrive, h: f64) -> Outcome<Self> {
         let motor = match drive {
-            Drive::Soft => "position",
-            Drive::Stiff => "rigid-position",
+            GaitDrive::Soft => "position",
+            GaitDrive::Stiff => "rigid-position",
         };
         let [_, a, b, c] = STAND;
         let parameters = format!(

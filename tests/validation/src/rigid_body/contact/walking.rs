@@ -36,7 +36,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
 
 /// What is looked at during a walk.
 #[derive(Default)]
-struct Seen {
+struct SeenWalk {
     penetration: f64,
     slip: f64,
     slips: f64,
@@ -55,7 +55,7 @@ fn quality(name: &str, drive: Drive) -> Outcome<Vec<Figure>> {
     let normals = normals.into_iter().collect::<Outcome<Vec<_>>>()?;
     let told = [walk.rig.id("contact.residual")?, walk.rig.id("contact.yielding")?];
     let mut before = vec![None; feet.len()];
-    let mut seen = Seen::default();
+    let mut seen = SeenWalk::default();
     for step in 0..STEPS {
         walk.step()?;
         let states = walk.rig.states()?;

@@ -19,7 +19,7 @@ const EXACT: f64 = 1e-6;
 const LINK: Vector3<f64> = Vector3::new(0.25, 0.0, 0.0);
 
 /// What a run leaves.
-struct Run {
+struct ChainRun {
     /// Distance of the tip from the reference at 1 s, m.
     tip: f64,
     /// Largest |ΔE| and ΔE at the end, J.
@@ -88,14 +88,14 @@ pub fn figures() -> Outcome<Vec<Figure>> {
     Ok(all)
 }
 
-fn run(file: &str, joints: &str, tip: [f64; 3], integrator: &str, h: f64, until: f64) -> Outcome<Run> {
+fn run(file: &str, joints: &str, tip: [f64; 3], integrator: &str, h: f64, until: f64) -> Outcome<ChainRun> {
     let parameters = format!(
         r#"{{"model": "tests/reference/multibody/{file}.urdf", "motor": "off", "joints": {joints},
         "integrator": "{integrator}"}}"#
     );
     let mut rig = Rig::new(&parameters, [0.0, 0.0, -G], h)?;
     let start = rig.energy().mechanical();
-    let mut result = Run { tip: f64::NAN, energy: [0.0; 2], gap: 0.0 };
+    let mut result = ChainRun { tip: f64::NAN, energy: [0.0; 2], gap: 0.0 };
     let second = (1.0 / h).round();
     rig.run(until, |rig| {
         let states = rig.states()?;

@@ -43,14 +43,14 @@ fn exact(t: f64) -> [f64; 2] {
 }
 
 /// What a run leaves.
-struct Run {
+struct TopRun {
     /// Angle between the axis and the exact one at the end, rad.
     axis: f64,
     /// Largest |ΔE|, J.
     energy: f64,
 }
 
-fn run(file: &str, scheme: &str, h: f64, exact: &Vector3<f64>) -> Outcome<Run> {
+fn run(file: &str, scheme: &str, h: f64, exact: &Vector3<f64>) -> Outcome<TopRun> {
     let start = Vector3::new(TILT.sin(), 0.0, TILT.cos());
     let rate = SPIN * start;
     let text = format!(
@@ -66,7 +66,7 @@ fn run(file: &str, scheme: &str, h: f64, exact: &Vector3<f64>) -> Outcome<Run> {
         Ok(())
     })?;
     let axis = pose(&rig.states()?[0]).1 * start;
-    Ok(Run { axis: axis.angle(exact), energy })
+    Ok(TopRun { axis: axis.angle(exact), energy })
 }
 
 /// All of them.
@@ -85,7 +85,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     for scheme in ["symplectic-euler", "generalized-alpha", "energy-momentum"] {
         let first = scheme == "symplectic-euler";
         let steps = [1e-3, 5e-4, 2.5e-4];
-        let runs: Vec<Run> = steps.iter().map(|h| run(&file, scheme, *h, &exact)).collect::<Outcome<_>>()?;
+        let runs: Vec<TopRun> = steps.iter().map(|h| run(&file, scheme, *h, &exact)).collect::<Outcome<_>>()?;
         let [a, b, c] = [0, 1, 2].map(|k| runs[k].axis);
         let id = format!("rigid-body.heavy_top.{scheme}");
         let what = format!(

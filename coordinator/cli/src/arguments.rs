@@ -49,7 +49,7 @@ pub enum Command {
         #[arg(value_name = "PATTERN")]
         name: Option<String>,
         /// Search this folder first; may be repeated.
-        #[arg(long, value_name = "DIR")]
+        #[arg(long, value_name = "DIR", value_parser = parse_folder)]
         module_path: Vec<PathBuf>,
         /// Print JSON instead of a table.
         #[arg(long)]
@@ -99,7 +99,7 @@ pub struct ScenarioArguments {
     #[arg(long = "set", value_name = "KEY.PATH=VALUE", value_parser = parse_set)]
     pub sets: Vec<(String, String)>,
     /// Search this folder for modules first; may be repeated.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     pub module_path: Vec<PathBuf>,
 }
 
@@ -244,7 +244,7 @@ pub struct ExportArguments {
     #[arg(long = "set", value_name = "KEY.PATH=VALUE", value_parser = parse_set)]
     pub sets: Vec<(String, String)>,
     /// Search this folder for modules first; may be repeated.
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", value_parser = parse_folder)]
     pub module_path: Vec<PathBuf>,
 }
 
@@ -322,7 +322,7 @@ pub struct RobotArguments {
     #[arg(long)]
     pub fixed_base: bool,
     /// Folder of a package that the file names by `package://`. May be repeated.
-    #[arg(long = "package", value_name = "NAME=DIR", value_parser = parse_set)]
+    #[arg(long = "package", value_name = "NAME=DIR", value_parser = parse_package)]
     pub packages: Vec<(String, String)>,
     /// Refuse a file that has a warning.
     #[arg(long)]
@@ -516,6 +516,24 @@ fn process_count(text: &str) -> Result<std::num::NonZeroUsize, String> {
 
 fn parse_set(text: &str) -> Result<(String, String), String> {
     terraglue_scenario::split_set(text).ok_or_else(|| "there is no `=`: write KEY.PATH=VALUE".into())
+}
+
+fn parse_package(text: &str) -> Result<(String, String), String> {
+    let (name, folder) =
+        terraglue_scenario::split_set(text).ok_or_else(|| "there is no `=`: write NAME=DIR".to_owned())?;
+    match std::path::Path::new(&folder).is_dir() {
+        true => Ok((name, folder)),
+        false => Err(format!("there is no folder `{folder}`: name the folder of the package `{name}`")),
+    }
+}
+
+/// A folder that is there; one with a wrong name would hold no modules without a word.
+fn parse_folder(text: &str) -> Result<PathBuf, String> {
+    let path = PathBuf::from(text);
+    match path.is_dir() {
+        true => Ok(path),
+        false => Err(format!("there is no folder `{text}`; modules are looked for in folders")),
+    }
 }
 
 /// A key path and its values; a comma within brackets or quotes parts none.

@@ -28,15 +28,21 @@ pub fn check(arguments: &CheckArguments) -> Result<Exit> {
     });
     outln!("{table}");
     outln!(
-        "{} is good: {} connections, {} events, {} s in steps of {} s, gluing `{}`",
+        "{} is good: {}, {}, {} s in steps of {} s, gluing `{}`",
         arguments.scenario.display(),
-        testbed.connections(),
-        scenario.events.len(),
+        counted(testbed.connections(), "connection"),
+        counted(scenario.events.len(), "event"),
         scenario.time.duration_s,
         scenario.time.step_s,
         scenario.gluing.strategy
     );
     Ok(Exit::Done)
+}
+
+/// `1 event`, `2 events`.
+fn counted(number: usize, what: &str) -> String {
+    let plural = if number == 1 { "" } else { "s" };
+    format!("{number} {what}{plural}")
 }
 
 /// Numbers of the soil row that the module does not take.

@@ -55,6 +55,15 @@ fn way_out(error: &InputError) -> String {
     }
     match () {
         () if message.contains("(os error ") => PATH,
+        () if message.contains("exists already") => {
+            "name another folder with -o, or take that one away first"
+        }
+        () if message.contains("holds no module") => {
+            "build it first (README.md in its folder says how), or name the file itself"
+        }
+        () if message.contains("which module `") => {
+            "give it with --set, as --set soil.parameters=LETE_sand gives all numbers of a soil"
+        }
         () if names(message, &FMUS) => "docs/fmi.md tells what is read of FMUs and system structures",
         () => "`terraglue COMMAND --help` tells what the command takes",
     }

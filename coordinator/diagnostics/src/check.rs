@@ -131,9 +131,17 @@ fn last_part(name: &str) -> &str {
     name.strip_suffix(".*").unwrap_or(name).rsplit('.').next().unwrap_or(name)
 }
 
+/// Numbers of TOML that no parameter takes.
+const NOT_FINITE: &str = "nan or inf";
+
 fn describe(value: &Value) -> String {
     match value {
-        Value::Null => "nan or inf".into(),
+        Value::Null => NOT_FINITE.into(),
+        // as which nan and inf of a list or table arrive
+        Value::Array(items) if items.contains(&Value::Null) => format!("a list with {NOT_FINITE} in it"),
+        Value::Object(table) if table.values().any(Value::is_null) => {
+            format!("a table with {NOT_FINITE} in it")
+        }
         Value::Bool(b) => format!("{b}"),
         Value::Number(n) => format!("{n}"),
         Value::String(t) => format!("the text \"{t}\""),

@@ -71,7 +71,7 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         exact.floor()
     };
     if !(step > 0.0 && steps >= 1.0 && steps <= STEPS) {
-        return Err(Error::Refused(format!("from {start} s to {stop} s in steps of {step} s cannot be run")));
+        return Err(Error::Refused(no_steps(start, stop, step)));
     }
     let intermediate = match &tables.intermediate {
         Some(_) => shown_between(fmu.description(), &settings.outputs)?,
@@ -325,5 +325,26 @@ fn read(instance: &FmuInstance, v: &Variable) -> Result<Vec<String>> {
             x.iter().map(|b| format!("{b:02x}")).collect::<String>()
         }),
         ValueType::Clock => Ok(vec![u8::from(instance.ticks(v.reference)).to_string()]),
+    }
+}
+
+/// Why a run from `start` to `stop` in steps of `step`, all in s, is none.
+fn no_steps(start: f64, stop: f64, step: f64) -> String {
+    match () {
+        () if !(step.is_finite() && step > 0.0) => {
+            format!("a step of {step} s is none: --step takes a number above 0")
+        }
+        () if !(stop.is_finite() && stop > start) => {
+            format!("the run would end at {stop} s, and begins at {start} s: give a later --stop")
+        }
+        () if stop - start < step => {
+            format!(
+                "the step of {step} s is longer than the run from {start} s to {stop} s: give a shorter --step"
+            )
+        }
+        () => format!(
+            "from {start} s to {stop} s there are {:.3e} steps of {step} s, at most {STEPS:.0e} are run: give a longer --step",
+            (stop - start) / step
+        ),
     }
 }

@@ -3,7 +3,7 @@
 
 use crate::ground_grid::{GroundGrid, Rectangle};
 use crate::point_cloud::Points;
-use crate::report::colour_map;
+use crate::report::colour_map::Palette;
 use foxglove::messages::PointCloud;
 use terraglue_diagnostics::error::Result;
 use terraglue_engine::observer::SubsystemView;
@@ -46,7 +46,8 @@ impl GroundPoints {
             (1..).find(|n: &u32| nodes / (u64::from(*n) * u64::from(*n)) <= MOST_POINTS).unwrap_or(1);
         let step = libm::exp2(libm::floor(libm::log2(info.spacing / 64.0)));
         let share = |k: usize| (k as f64 / (SHADES - 1) as f64) * 2.0 - 1.0;
-        let colours = (0..SHADES).map(|k| colour_map::to_rgb(colour_map::colour(share(k)))).collect();
+        let palette = Palette::new();
+        let colours = (0..SHADES).map(|k| palette.to_rgb(palette.colour(share(k)))).collect();
         Self { info: info.clone(), edge, stride, columns: tiles(edge)[0], step, colours }
     }
 

@@ -42,7 +42,10 @@ impl KeptFile {
         let mut kept = Self::repeat(path, 0)?;
         if let Some(file) = &mut kept.file {
             if file.metadata()?.len() < length {
-                return Err(Error::new(ErrorKind::UnexpectedEof, "it is shorter than it was"));
+                return Err(Error::new(
+                    ErrorKind::UnexpectedEof,
+                    "it is shorter than it was when the checkpoint was written",
+                ));
             }
             file.set_len(length)?;
             file.seek(SeekFrom::End(0))?;

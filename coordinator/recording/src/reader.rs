@@ -66,17 +66,34 @@ struct Source {
 struct VariableRow {
     names: Vec<String>,
     values: Vec<f64>,
+    /// Columns of the subsystem's table; empty until a row is written after a channel was announced.
+    columns: Vec<Option<usize>>,
 }
 
 impl VariableRow {
-    fn take(&mut self, source: &Source) {
+    /// Takes the columns of a channel in.
+    fn announce(&mut self, source: &Source) {
         let end = source.places.iter().max().map_or(0, |k| k + 1).max(self.names.len());
         self.names.resize(end, String::new());
         self.values.resize(end, f64::NAN);
-        for ((place, name), value) in source.places.iter().zip(&source.names).zip(&source.values) {
+        for (place, name) in source.places.iter().zip(&source.names) {
             self.names[*place].clone_from(name);
+        }
+        self.columns.clear();
+    }
+
+    fn take(&mut self, source: &Source) {
+        for (place, value) in source.places.iter().zip(&source.values) {
             self.values[*place] = *value;
         }
+    }
+
+    /// Appends the values to the table of the subsystem.
+    fn write(&mut self, t_s: f64, table: &mut Table) {
+        if self.columns.is_empty() {
+            self.columns = table.places(&self.names);
+        }
+        table.push_at(t_s, &self.columns, &self.values);
     }
 }
 
@@ -231,6 +248,9 @@ impl Recording {
             std::collections::btree_map::Entry::Occupied(known) => known.into_mut(),
             std::collections::btree_map::Entry::Vacant(new) => {
                 let Some(source) = self.announced(channel) else { return };
+                if channel.topic != "/energy" {
+                    state.rows.entry(source.subsystem.clone()).or_default().announce(&source);
+                }
                 new.insert(source)
             }
         };
@@ -240,10 +260,10 @@ impl Recording {
         if channel.topic == "/energy" {
             return self.energy.push(t_s, &source.names, &source.values);
         }
-        let row = state.rows.entry(source.subsystem.clone()).or_default();
+        let Some(row) = state.rows.get_mut(&source.subsystem) else { return };
         row.take(source);
         if source.row {
-            self.variables.entry(source.subsystem.clone()).or_default().push(t_s, &row.names, &row.values);
+            row.write(t_s, self.variables.entry(source.subsystem.clone()).or_default());
         }
     }
 

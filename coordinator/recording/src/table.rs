@@ -19,21 +19,36 @@ impl Table {
 
     /// Appends a row of numbers by name.
     pub(crate) fn push(&mut self, t_s: f64, names: &[String], values: &[f64]) {
+        let places = self.places(names);
+        self.push_at(t_s, &places, values);
+    }
+
+    /// The columns of some names, made where they are missing. A name that is empty has none: it is a variable that is not
+    /// recorded.
+    pub(crate) fn places(&mut self, names: &[String]) -> Vec<Option<usize>> {
+        let mut guess = 0;
+        let mut place = |name: &String| {
+            let k = self.place(name, guess);
+            guess = k + 1;
+            k
+        };
+        names.iter().map(|name| (!name.is_empty()).then(|| place(name))).collect()
+    }
+
+    /// Appends a row of numbers by the columns that [`Table::places`] has found.
+    pub(crate) fn push_at(&mut self, t_s: f64, places: &[Option<usize>], values: &[f64]) {
         let rows = self.t_s.len();
         self.t_s.push(t_s);
-        let mut guess = 0;
-        // A place without a name is a variable that is not recorded.
-        for (name, value) in names.iter().zip(values).filter(|(name, _)| !name.is_empty()) {
-            let k = self.place(name, guess, rows);
-            guess = k + 1;
-            self.columns[k].resize(rows, f64::NAN);
-            // What has no bound is infinite; nothing that is drawn or compared is.
-            self.columns[k].push(if value.is_finite() { *value } else { f64::NAN });
+        for (place, value) in places.iter().zip(values) {
+            if let Some(k) = place {
+                // What has no bound is infinite; nothing that is drawn or compared is.
+                self.columns[*k].push(if value.is_finite() { *value } else { f64::NAN });
+            }
         }
         self.columns.iter_mut().for_each(|c| c.resize(rows + 1, f64::NAN));
     }
 
-    fn place(&mut self, name: &str, guess: usize, rows: usize) -> usize {
+    fn place(&mut self, name: &str, guess: usize) -> usize {
         if self.names.get(guess).is_some_and(|n| n == name) {
             return guess;
         }
@@ -41,7 +56,7 @@ impl Table {
             return k;
         }
         self.names.push(name.to_owned());
-        self.columns.push(vec![f64::NAN; rows]);
+        self.columns.push(vec![f64::NAN; self.t_s.len()]);
         self.names.len() - 1
     }
 }

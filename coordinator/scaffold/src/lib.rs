@@ -85,10 +85,17 @@ pub fn scaffold(
     template::fill(kind, language, name, program)
 }
 
+/// Longest name of a module; files and crates are called by it.
+const LONGEST_NAME: usize = 64;
+
 fn check_name(name: &str) -> Result<(), ScaffoldError> {
     let parts_good = name.split('-').all(|part| !part.is_empty());
     let letters_good = name.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'-');
-    if !(parts_good && letters_good && name.starts_with(|c: char| c.is_ascii_lowercase())) {
+    if !(parts_good
+        && letters_good
+        && name.len() <= LONGEST_NAME
+        && name.starts_with(|c: char| c.is_ascii_lowercase()))
+    {
         return Err(ScaffoldError::Name(name.into()));
     }
     if terraglue_scenario::SHIPPED_MODULES.contains(&name) {

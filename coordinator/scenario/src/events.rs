@@ -168,6 +168,14 @@ pub fn faults(source: &Source, names: &[&str]) -> Checked<Vec<FaultSpec>> {
             let help = "give an `until_s` after `at_s`, or `for_s`, how long it lasts".to_owned();
             return Err(s.error("until_s", message, Some(help)));
         }
+        if let FaultEnd::After(0.0) = end {
+            let message = "the fault lasts for 0 s: it would never act".to_owned();
+            return Err(s.error(
+                "for_s",
+                message,
+                Some("give how long it lasts, or leave `for_s` out".into()),
+            ));
+        }
         Ok(FaultSpec { variable, kind, start, end, seed: s.optional_count("seed"), entry })
     })
 }
@@ -187,7 +195,14 @@ fn each<T>(
 
 fn not_repeated(source: &Source, table: &Table, node: &Node) -> Box<InputError> {
     let message = format!("`{0}` is written `[[{0}]]`, with two brackets", table.name);
-    source.error(&node.at, message, Some(table.help.into()))
+    let help = match node.at.set {
+        Some(_) => format!(
+            "`--set {0}.0.KEY=VALUE` changes the first `[[{0}]]` that the scenario has, `--set {0}=[{{…}}]` gives it others",
+            table.name
+        ),
+        None => table.help.into(),
+    };
+    source.error(&node.at, message, Some(help))
 }
 
 fn trigger(s: &Section, names: &[&str]) -> Checked<Trigger> {

@@ -141,7 +141,14 @@ pub fn text(node: &Node, key: &str) -> Option<String> {
 pub fn check_reference(reference: &str, names: &[&str]) -> Result<(), Complaint> {
     let Some((subsystem, rest)) = reference.split_once('.').filter(|(_, rest)| !rest.is_empty()) else {
         let message = format!("`{reference}` is not of the form `subsystem.name`");
-        return Err(Complaint { message, help: did_you_mean(reference, names.iter().copied()) });
+        let subsystem = reference.trim_end_matches('.');
+        let help = match names.contains(&subsystem) {
+            true => Some(format!(
+                "`{subsystem}` is a subsystem: say what of it; `terraglue variables SCENARIO {subsystem}` lists its variables"
+            )),
+            false => did_you_mean(reference, names.iter().copied()),
+        };
+        return Err(Complaint { message, help });
     };
     debug_assert!(!rest.is_empty());
     if subsystem.contains('*') || names.contains(&subsystem) {

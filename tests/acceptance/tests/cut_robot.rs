@@ -283,13 +283,3 @@ fn parts_that_do_not_make_the_robot_whole_are_refused() {
         assert!(error.contains(said), "{error}");
     }
 }
-
-#[test]
-fn a_hold_that_nobody_reads_is_refused() {
-    let (_, cut) = pendulums("symplectic-euler", 0.002);
-    for (hold, level) in [("constant", "position"), ("linear", "velocity")] {
-        let keys = format!("strategy = \"iterative\"\nhold = \"{hold}\"\nlevel = \"{level}\"\n");
-        let error = build(&cut.replace("strategy = \"iterative\"\n", &keys)).err().expect("refused");
-        assert!(error.contains("none of the glued subsystems sub-cycles"), "{error}");
-    }
-}

@@ -139,7 +139,6 @@ fn a_run_goes_on_from_a_snapshot_to_the_bit_whatever_its_strategy_remembers() {
     let (masses, rods, feet) =
         (["a.m0.x", "b.m0.v"], ["upper.b0.angle", "lower.b0.omega"], ["foot.heave", "soil.max_sinkage"]);
     for (text, names) in [
-        (oscillator("strategy = \"tlm\""), &masses),
         (oscillator("strategy = \"gauss-seidel\"\nenergy_residual_j = 1e-4"), &masses),
         (pendulum("strategy = \"iterative\"\njacobian = \"broyden\""), &rods),
         (pendulum("strategy = \"semi-implicit\""), &rods),

@@ -235,7 +235,7 @@ static tg_status advance(void *self, const tg_step *st, const tg_input *in, tg_r
     if (BROKEN(PRINTS) && s->commits == 5) puts("five steps");
     if (BROKEN(PRINTS_ERRORS) && s->commits == 5) fputs("five steps\n", stderr);
     if (BROKEN(ALLOCATES)) { double *volatile room = malloc(64); room[0] = 0.0; s->scratch[1] = room[0]; free(room); }
-    if (BROKEN(LEAKS_STEPS)) { double *lost = malloc(48); lost[0] = st->t; s->scratch[1] = lost[0]; }
+    if (BROKEN(LEAKS_STEPS)) { double *volatile lost = malloc(48); lost[0] = st->t; s->scratch[1] = lost[0]; }
     (void)count_jobs;
     for (uint32_t p = 0; p < st->n_ports; p++) {
         const tg_port *port = &st->ports[p];

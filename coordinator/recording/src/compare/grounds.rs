@@ -2,8 +2,9 @@
 
 use crate::REPORT;
 use crate::reader::{GroundRecord, Recording};
+use crate::report::colour_map::Palette;
 use crate::report::html::{escape, number, with_prefix};
-use crate::report::{colour_map, picture};
+use crate::report::picture;
 use base64::Engine;
 use std::fmt::Write;
 
@@ -45,6 +46,7 @@ pub(crate) fn pictures(runs: &[(&str, String, &Recording)]) -> Option<String> {
 /// The scale of colours in words and patches.
 fn legend([low, high]: [f64; 2], scale: f64, is_part: bool) -> String {
     let mut out = String::from("The ground at the end from above, coloured by sinkage, in one scale:");
+    let palette = Palette::new();
     for share in [low / scale.max(1e-12), 0.0, 0.25, 0.5, 0.75, 1.0].into_iter().filter(|s| s * scale <= high)
     {
         let (value, unit) = with_prefix(share * scale, "m", 2);
@@ -52,7 +54,7 @@ fn legend([low, high]: [f64; 2], scale: f64, is_part: bool) -> String {
         let _ = write!(
             out,
             " <span style=\"background:{};padding:0 .7em\"></span>\u{a0}{text}",
-            colour_map::hex(share)
+            palette.hex(share)
         );
     }
     if is_part {

@@ -127,13 +127,17 @@ impl McapWriter {
     }
 }
 
+fn shorter() -> std::io::Error {
+    std::io::Error::new(ErrorKind::UnexpectedEof, "it is shorter than it was when the checkpoint was written")
+}
+
 /// Gives a sink everything behind the head of a recording, chunk by chunk as it stands there.
 fn repeat(mut from: impl Read, sink: &mut Sink) -> std::io::Result<()> {
     let other = |e: McapError| match e {
         McapError::Io(source) => source,
         other => std::io::Error::new(ErrorKind::InvalidData, other),
     };
-    from.read_exact(&mut [0; mcap::MAGIC.len()])?;
+    from.read_exact(&mut [0; mcap::MAGIC.len()]).map_err(|_| shorter())?;
     let mut record = Vec::new();
     loop {
         record.clear();
@@ -143,7 +147,7 @@ fn repeat(mut from: impl Read, sink: &mut Sink) -> std::io::Result<()> {
         let length = record.get(1..HEAD).and_then(|l| l.try_into().ok()).map(u64::from_le_bytes);
         let read = from.by_ref().take(length.unwrap_or(0)).read_to_end(&mut record)?;
         if length != Some(read as u64) {
-            return Err(std::io::Error::new(ErrorKind::UnexpectedEof, "it is shorter than it was"));
+            return Err(shorter());
         }
         if record[0] == op::CHUNK {
             chunk(&record).and_then(|records| repeat_chunk(records, sink)).map_err(other)?;

@@ -17,10 +17,10 @@ fn linear(c: u8) -> f64 {
     if c <= 0.040_45 { c / 12.92 } else { libm::pow((c + 0.055) / 1.055, 2.4) }
 }
 
-fn encoded(c: f64) -> u8 {
-    let c = c.clamp(0.0, 1.0);
-    let s = if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * libm::pow(c, 1.0 / 2.4) - 0.055 };
-    (255.0 * s).round() as u8
+/// The linear value from which on a channel of sRGB is rounded up to k + 1.
+fn threshold(k: u8) -> f64 {
+    let c = (f64::from(k) + 0.5) / 255.0;
+    if c <= 0.040_45 { c / 12.92 } else { libm::pow((c + 0.055) / 1.055, 2.4) }
 }
 
 /// From sRGB.
@@ -36,35 +36,56 @@ pub(crate) fn to_oklab(rgb: [u8; 3]) -> Oklab {
     ]
 }
 
-/// To sRGB, clamped to what screens show.
-pub(crate) fn to_rgb(lab: Oklab) -> [u8; 3] {
-    let [lightness, a, b] = lab;
-    let cube = |x: f64| x * x * x;
-    let l = cube(lightness + 0.396_337_777_4 * a + 0.215_803_757_3 * b);
-    let m = cube(lightness - 0.105_561_345_8 * a - 0.063_854_172_8 * b);
-    let s = cube(lightness - 0.089_484_177_5 * a - 1.291_485_548_0 * b);
-    [
-        encoded(4.076_741_662_1 * l - 3.307_711_591_3 * m + 0.230_969_929_2 * s),
-        encoded(-1.268_438_004_6 * l + 2.609_757_401_1 * m - 0.341_319_396_5 * s),
-        encoded(-0.004_196_086_3 * l - 0.703_418_614_7 * m + 1.707_614_701_0 * s),
-    ]
+/// The colours of the map, and the way from Oklab to sRGB. Made once for a picture: a pixel costs no power and no root.
+pub(crate) struct Palette {
+    sunk: [Oklab; 5],
+    heaved: [Oklab; 3],
+    thresholds: [f64; 255],
 }
 
-/// Colour of a share of the scale: −1 most heave, 0 undisturbed, 1 deepest.
-pub(crate) fn colour(share: f64) -> Oklab {
-    let side: &[[u8; 3]] = if share < 0.0 { &HEAVED } else { &SUNK };
-    let place = share.abs().clamp(0.0, 1.0) * side.len() as f64;
-    let k = (place as usize).min(side.len() - 1);
-    let from = to_oklab(if k == 0 { REST } else { side[k - 1] });
-    let to = to_oklab(side[k]);
-    let f = place - k as f64;
-    std::array::from_fn(|i| from[i] + f * (to[i] - from[i]))
-}
+impl Palette {
+    /// The palette.
+    pub(crate) fn new() -> Self {
+        let of = |k: usize, colours: &[[u8; 3]]| to_oklab(if k == 0 { REST } else { colours[k - 1] });
+        Self {
+            sunk: std::array::from_fn(|k| of(k, &SUNK)),
+            heaved: std::array::from_fn(|k| of(k, &HEAVED)),
+            thresholds: std::array::from_fn(|k| threshold(k as u8)),
+        }
+    }
 
-/// The same as `#rrggbb`.
-pub(crate) fn hex(share: f64) -> String {
-    let [r, g, b] = to_rgb(colour(share));
-    format!("#{r:02x}{g:02x}{b:02x}")
+    fn encoded(&self, c: f64) -> u8 {
+        self.thresholds.partition_point(|threshold| *threshold <= c) as u8
+    }
+
+    /// To sRGB, clamped to what screens show.
+    pub(crate) fn to_rgb(&self, lab: Oklab) -> [u8; 3] {
+        let [lightness, a, b] = lab;
+        let cube = |x: f64| x * x * x;
+        let l = cube(lightness + 0.396_337_777_4 * a + 0.215_803_757_3 * b);
+        let m = cube(lightness - 0.105_561_345_8 * a - 0.063_854_172_8 * b);
+        let s = cube(lightness - 0.089_484_177_5 * a - 1.291_485_548_0 * b);
+        [
+            self.encoded(4.076_741_662_1 * l - 3.307_711_591_3 * m + 0.230_969_929_2 * s),
+            self.encoded(-1.268_438_004_6 * l + 2.609_757_401_1 * m - 0.341_319_396_5 * s),
+            self.encoded(-0.004_196_086_3 * l - 0.703_418_614_7 * m + 1.707_614_701_0 * s),
+        ]
+    }
+
+    /// Colour of a share of the scale: −1 most heave, 0 undisturbed, 1 deepest.
+    pub(crate) fn colour(&self, share: f64) -> Oklab {
+        let stops: &[Oklab] = if share < 0.0 { &self.heaved } else { &self.sunk };
+        let place = share.abs().clamp(0.0, 1.0) * (stops.len() - 1) as f64;
+        let k = (place as usize).min(stops.len() - 2);
+        let f = place - k as f64;
+        std::array::from_fn(|i| stops[k][i] + f * (stops[k + 1][i] - stops[k][i]))
+    }
+
+    /// The same as `#rrggbb`.
+    pub(crate) fn hex(&self, share: f64) -> String {
+        let [r, g, b] = self.to_rgb(self.colour(share));
+        format!("#{r:02x}{g:02x}{b:02x}")
+    }
 }
 
 #[cfg(test)]
@@ -72,17 +93,29 @@ mod tests {
     use super::*;
 
     #[test]
+    fn channels_are_rounded_as_srgb_says() {
+        let palette = Palette::new();
+        let srgb =
+            |c: f64| if c <= 0.003_130_8 { 12.92 * c } else { 1.055 * libm::pow(c, 1.0 / 2.4) - 0.055 };
+        for k in -100..=10_100 {
+            let c = f64::from(k) / 10_000.0;
+            assert_eq!(palette.encoded(c), (255.0 * srgb(c.clamp(0.0, 1.0))).round() as u8, "{c}");
+        }
+    }
+
+    #[test]
     fn oklab_goes_there_and_back() {
         for rgb in [[0, 0, 0], [255, 255, 255], [12, 200, 77], [255, 0, 128]] {
-            assert_eq!(to_rgb(to_oklab(rgb)), rgb);
+            assert_eq!(Palette::new().to_rgb(to_oklab(rgb)), rgb);
         }
         assert!((to_oklab([255; 3])[0] - 1.0).abs() < 1e-6);
     }
 
     #[test]
     fn lightness_falls_steadily_with_sinkage() {
-        let lightness: Vec<f64> = (0..=100).map(|k| colour(f64::from(k) / 100.0)[0]).collect();
+        let palette = Palette::new();
+        let lightness: Vec<f64> = (0..=100).map(|k| palette.colour(f64::from(k) / 100.0)[0]).collect();
         assert!(lightness.windows(2).all(|w| w[1] < w[0]));
-        assert_eq!(hex(0.0), "#bdb8ae");
+        assert_eq!(palette.hex(0.0), "#bdb8ae");
     }
 }

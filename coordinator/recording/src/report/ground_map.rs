@@ -3,10 +3,11 @@
 
 use crate::prints::Print;
 use crate::reader::{GroundRecord, Recording};
+use crate::report::colour_map::Palette;
 use crate::report::figure::packed;
 use crate::report::footprints::Leg;
 use crate::report::outlines::{self, Outline};
-use crate::report::{colour_map, node_values, picture};
+use crate::report::{node_values, picture};
 use base64::Engine;
 use serde_json::{Value, json};
 use terraglue_diagnostics::error::{Error, Result};
@@ -135,10 +136,11 @@ fn scale_bar(low: f64, high: f64, scale: f64) -> Value {
     if scale <= 0.0 {
         return Value::Null;
     }
+    let palette = Palette::new();
     let stops: Vec<Value> = (0..=24)
         .map(|k| {
             let share = f64::from(k) / 24.0;
-            json!([share, colour_map::hex((low + share * (high - low)) / scale)])
+            json!([share, palette.hex((low + share * (high - low)) / scale)])
         })
         .collect();
     json!({ "low": low, "high": high, "stops": stops })

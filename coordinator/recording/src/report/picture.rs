@@ -1,7 +1,7 @@
 //! The ground as a PNG: colour by sinkage, hill shading by height.
 
 use crate::reader::GroundRecord;
-use crate::report::colour_map;
+use crate::report::colour_map::Palette;
 
 /// Longest side of the picture, pixels.
 const LONGEST_SIDE: usize = 1600;
@@ -30,15 +30,15 @@ pub(crate) fn draw_within(
     let [nx, ny] = ground.size;
     let stride = nx.max(ny).div_ceil(longest).max(1);
     let (width, height) = (nx.div_ceil(stride), ny.div_ceil(stride));
-    let relief = Relief::new(ground, stride);
+    let (relief, palette) = (Relief::new(ground, stride), Palette::new());
     let mut rgb = Vec::with_capacity(width * height * 3);
     for row in (0..height).rev() {
         for column in 0..width {
             let (i, j) = (column * stride, row * stride);
             let share = strongest(ground, i, j, stride) / scale_m.max(1e-12);
-            let mut lab = colour_map::colour(share);
+            let mut lab = palette.colour(share);
             lab[0] *= 0.68 + 0.32 * relief.light(i, j) / LIGHT[2];
-            rgb.extend_from_slice(&colour_map::to_rgb(lab));
+            rgb.extend_from_slice(&palette.to_rgb(lab));
         }
     }
     encode(&rgb, width as u32, height as u32)
@@ -107,7 +107,7 @@ fn encode(rgb: &[u8], width: u32, height: u32) -> Result<Vec<u8>, png::EncodingE
     let mut encoder = png::Encoder::new(&mut out, width, height);
     encoder.set_color(png::ColorType::Rgb);
     encoder.set_depth(png::BitDepth::Eight);
-    encoder.set_compression(png::Compression::High);
+    encoder.set_compression(png::Compression::Fast);
     encoder.write_header()?.write_image_data(rgb)?;
     Ok(out)
 }

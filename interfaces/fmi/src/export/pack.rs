@@ -55,7 +55,7 @@ pub fn pack(path: &Path, entries: &[(String, Content)]) -> Result<(), String> {
             Content::Bytes(bytes) => archive.write_all(bytes).map_err(|e| failed(path, &e))?,
             Content::File(source) => {
                 let mut file = File::open(source).map_err(|e| failed(source, &e))?;
-                std::io::copy(&mut file, &mut archive).map_err(|e| failed(source, &e))?;
+                std::io::copy(&mut file, &mut archive).map_err(|e| failed(path, &e))?;
             }
         }
     }

@@ -102,6 +102,10 @@ impl Source<'_> {
     }
 
     pub(crate) fn syntax(&self, line: usize, reason: String) -> Error {
+        let reason = match reason.contains("DTD") {
+            true => "it has a <!DOCTYPE …>, which is not read; delete it, and write its entities out".into(),
+            false => reason,
+        };
         Error::Syntax { file: self.file.into(), line, reason }
     }
 

@@ -54,7 +54,7 @@ pub(crate) enum Failure {
     Gap { joint: String, gap: f64 },
     #[error(
         "joint `{joint}` stays open by {gap:.1e} (m or rad): its forces of up to {force:.2e} N swing link `{link}` of \
-         {mass} kg faster than steps of {h} s follow; take steps below {longest:.1e} s, or integrator = \
+         {mass} kg faster than steps of {h:.3e} s follow; take steps below {longest:.1e} s, or integrator = \
          \"energy-momentum\" where nothing hits"
     )]
     Swinging { joint: String, gap: f64, force: f64, link: String, mass: f64, h: f64, longest: f64 },

@@ -66,8 +66,9 @@ fn foreign_gravity(config: &Config, whose: &str, gravity: f64) -> Option<String>
     let soil = SoilParameters::from_config(config, gravity).ok()?;
     let measured = soil.measured_gravity.filter(|g| (g - gravity).abs() > SAME_GRAVITY * gravity)?;
     (soil.family == Family::Bekker && soil.k_phi > 0.0 && !soil.gravity_scaling).then(|| {
+        let here = (gravity * 1e4).round() / 1e4;
         format!(
-            "`k_phi`{whose} was measured under {measured} m/s², the scenario has {gravity:.4}: soil of this weight bears \
+            "`k_phi`{whose} was measured under {measured} m/s², the scenario has {here}: soil of this weight bears \
              {:.2} of it; `gravity_scaling = true` scales it (Reece 1965)",
             gravity / measured
         )

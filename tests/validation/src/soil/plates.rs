@@ -105,7 +105,7 @@ impl PlateCase {
                 // a light plate, its load laid on smoothly: a heavy one would plunge deeper than it rests
                 let mut rig = self.rig(0.1);
                 rig.gravity = 0.0;
-                let ramp = if self.quick { 300.0 } else { 1000.0 };
+                let ramp = if self.quick { 300.0 } else { 4000.0 };
                 for k in 0..ramp as u32 + 100 {
                     let share = (f64::from(k) / ramp).min(1.0);
                     rig.force[2] = -0.5 * load * (1.0 - (std::f64::consts::PI * share).cos());

@@ -5,8 +5,8 @@ use super::arguments::CheckModuleArguments;
 use super::output::outln;
 use std::path::Path;
 use terraglue_conformance::{
-    RemoteRun, TestContext, Level, Options, Outcome, Told, catalogue, check, module_file, remember, run_remote,
-    run_here, sanitize, sources_of,
+    Level, Options, Outcome, RemoteRun, TestContext, Told, catalogue, check, module_file, remember, run_here,
+    run_remote, sanitize, sources_of,
 };
 use terraglue_diagnostics::Result;
 use terraglue_scenario::InputError;
@@ -81,13 +81,15 @@ fn sanitized(arguments: &CheckModuleArguments, path: &Path) -> Result<Exit> {
 /// One test, or a remote run of one, in this process.
 fn in_process(arguments: &CheckModuleArguments, module: &Path) -> Result<Exit> {
     let wrong = |text: String| InputError::plain(text, None);
-    let mut context =
-        TestContext::new(module.to_owned(), arguments.level, arguments.seed, &arguments.sets).map_err(wrong)?;
+    let mut context = TestContext::new(module.to_owned(), arguments.level, arguments.seed, &arguments.sets)
+        .map_err(wrong)?;
     context.program = std::env::current_exe().ok();
     if let Some(word) = &arguments.remote_run {
         let remote_run = RemoteRun::parse(word, arguments.state.as_deref());
-        let remote_run = remote_run.ok_or_else(|| wrong(format!("`{word}` is no remote run: write FROM,TO,VARIANT")))?;
-        let bits = run_remote(&context, &remote_run).map_err(|stop| wrong(Outcome::of(Err(stop)).detail()))?;
+        let remote_run =
+            remote_run.ok_or_else(|| wrong(format!("`{word}` is no remote run: write FROM,TO,VARIANT")))?;
+        let bits =
+            run_remote(&context, &remote_run).map_err(|stop| wrong(Outcome::of(Err(stop)).detail()))?;
         if let Some(file) = &arguments.result {
             write(file, &serde_json::to_string(&bits).unwrap_or_default())?;
         }

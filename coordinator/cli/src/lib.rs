@@ -35,7 +35,7 @@ use arguments::{Arguments, Command};
 use clap::Parser;
 use std::process::ExitCode;
 use terraglue_diagnostics::Error;
-use terraglue_host::{crash, exit_guard, descendants};
+use terraglue_host::{crash, descendants, exit_guard};
 
 /// How a command ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]

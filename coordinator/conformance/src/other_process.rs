@@ -1,8 +1,8 @@
 //! The same run in another process, with another environment.
 
 use super::finding::{Stop, Verdict};
-use super::test_context::TestContext;
 use super::fixture::Runner;
+use super::test_context::TestContext;
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -61,7 +61,11 @@ pub fn run_remote(context: &TestContext, remote_run: &RemoteRun) -> Verdict<Vec<
 ///
 /// # Errors
 /// There is no program to start (a skip), or that process found the module broken.
-pub fn in_other_process(context: &TestContext, remote_run: &RemoteRun, environment: &[(&str, &str)]) -> Verdict<Vec<u64>> {
+pub fn in_other_process(
+    context: &TestContext,
+    remote_run: &RemoteRun,
+    environment: &[(&str, &str)],
+) -> Verdict<Vec<u64>> {
     let lost = |why: String| Stop::Skip(format!("another process cannot be asked: {why}"));
     let program = context.program.as_ref().ok_or_else(|| lost("the program is not known".into()))?;
     let folder = tempfile::tempdir().map_err(|e| lost(e.to_string()))?;

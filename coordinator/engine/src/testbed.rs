@@ -17,8 +17,8 @@ use terraglue_gluing::contact::{ContactDetector, Now, PortSet};
 use terraglue_gluing::memory::Recall;
 use terraglue_gluing::step_control::StepControl;
 use terraglue_gluing::timing::{Part, Timings};
-use terraglue_gluing::{StepContext, Outcome, StepReport};
-use terraglue_host::{Instance, TeardownErrors, Reply};
+use terraglue_gluing::{Outcome, StepContext, StepReport};
+use terraglue_host::{Instance, Reply, TeardownErrors};
 use terraglue_subsystem::{BodyState, Energy};
 use uncoupled::{StepSchedule, Uncoupled};
 
@@ -276,7 +276,7 @@ impl Testbed {
     /// (2) Outputs of t become inputs of the step.
     fn transfer_signals(&mut self) -> Result {
         if self.index == 0 && self.t == 0.0 {
-            self.settle()?;
+            self.initialize_signals()?;
         }
         self.read_signals()?;
         if !self.faults.is_empty() {

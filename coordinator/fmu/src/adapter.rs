@@ -11,7 +11,7 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use terraglue_fmi::description::Start;
-use terraglue_fmi::{Advance, Error as FmiError, Fmu, FmuInstance, InstanceOptions, FmuState, Stepped};
+use terraglue_fmi::{Advance, Error as FmiError, Fmu, FmuInstance, FmuState, InstanceOptions, Stepped};
 use terraglue_host::TeardownErrors;
 use terraglue_scenario::did_you_mean;
 use terraglue_subsystem::{
@@ -110,8 +110,11 @@ impl FmuSubsystem {
         }
         subsystem.start_arrays()?;
         let places = &subsystem.places;
-        let axis =
-            |p: &ValueLocation| Axis { reference: p.reference, element: p.element as usize, count: p.count as usize };
+        let axis = |p: &ValueLocation| Axis {
+            reference: p.reference,
+            element: p.element as usize,
+            count: p.count as usize,
+        };
         let place = |id: u32| places.get(id as usize).map(axis);
         let terminals = terminals(&description);
         subsystem.bodies = Bodies::read(&options.bodies, &subsystem.variables, &terminals, place)?;
@@ -410,10 +413,11 @@ impl Subsystem for FmuSubsystem {
         let force = if self.bodies.is_empty() { Capabilities::default() } else { Capabilities::FORCE };
         let through = if self.feeds_through { Capabilities::FEEDTHROUGH } else { Capabilities::default() };
         let fixed = if c.variable_step { Capabilities::default() } else { Capabilities::FIXED_STEP };
-        let slopes = match self.instance.tells_derivatives() && self.can_go_back && self.bodies.tell_slopes() {
-            true => Capabilities::DERIVATIVES,
-            false => Capabilities::default(),
-        };
+        let derivatives =
+            match self.instance.tells_derivatives() && self.can_go_back && self.bodies.tell_derivatives() {
+                true => Capabilities::DERIVATIVES,
+                false => Capabilities::default(),
+            };
         retry | bytes | force | through | fixed | slopes
     }
 
@@ -421,7 +425,7 @@ impl Subsystem for FmuSubsystem {
         if !self.capabilities().has(Capabilities::DERIVATIVES) {
             return Err(Error::Unsupported);
         }
-        self.bodies.slopes(&self.instance, step, level, out, error)
+        self.bodies.jacobian(&self.instance, step, level, out, error)
     }
 
     fn set_ports(&mut self, step: &Step, _: &mut [Law], now: &mut Response) -> Result {
@@ -621,8 +625,7 @@ impl FmuSubsystem {
             let place = self.place(*id)?;
             if !self.takes(place) {
                 let name = &self.variables[*id as usize].name;
-                let when =
-                    if place.structural { "in the table of its FMU" } else { "before the first step" };
+                let when = if place.structural { "in the table of its FMU" } else { "before the first step" };
                 return Err(Error::Refused(format!("`{name}` can only be set {when}")));
             }
         }

@@ -2,7 +2,7 @@
 //! ticks when the next step begins; inputs of a clock take their values then.
 
 use super::map::ValueLocation;
-use terraglue_fmi::{Error as FmiError, Result as FmiResult, FmuInstance};
+use terraglue_fmi::{Error as FmiError, FmuInstance, Result as FmiResult};
 use terraglue_subsystem::{Error, Result, Values, ValuesMut};
 
 /// How an error of an FMU becomes one of the subsystem.
@@ -14,7 +14,12 @@ pub fn concerned(places: &[ValueLocation]) -> bool {
 }
 
 /// Truth values of which some are clocks; answers whether there are such.
-pub fn get(instance: &FmuInstance, places: &[&ValueLocation], out: &mut ValuesMut, fail: Fail) -> Result<bool> {
+pub fn get(
+    instance: &FmuInstance,
+    places: &[&ValueLocation],
+    out: &mut ValuesMut,
+    fail: Fail,
+) -> Result<bool> {
     let ValuesMut::Bool(out) = out else { return Ok(false) };
     if !places.iter().any(|p| p.clock) {
         return Ok(false);
@@ -32,7 +37,12 @@ pub fn get(instance: &FmuInstance, places: &[&ValueLocation], out: &mut ValuesMu
 }
 
 /// Sets clocks, and keeps inputs of clocks for their next tick; answers whether all of them were such.
-pub fn set(instance: &mut FmuInstance, places: &[&ValueLocation], values: &Values, fail: Fail) -> Result<bool> {
+pub fn set(
+    instance: &mut FmuInstance,
+    places: &[&ValueLocation],
+    values: &Values,
+    fail: Fail,
+) -> Result<bool> {
     if let (Values::Bool(values), true) = (values, places.iter().all(|p| p.clock)) {
         for (place, on) in places.iter().zip(*values) {
             let clock = instance.description().variables[place.variable as usize].clone();

@@ -6,7 +6,7 @@ use super::simulate::find;
 use super::table::Table;
 use std::sync::Arc;
 use terraglue_fmi::description::Variable;
-use terraglue_fmi::{Error, ModelDescription, Result, FmuInstance, Version};
+use terraglue_fmi::{Error, FmuInstance, ModelDescription, Result, Version};
 use terraglue_subsystem::{ValueType, Values};
 
 /// All that a table feeds.

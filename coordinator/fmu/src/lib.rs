@@ -6,8 +6,8 @@
 mod adapter;
 mod bodies;
 mod clocks;
-pub mod export;
 mod driven_bodies;
+pub mod export;
 mod inputs;
 mod map;
 mod rollback;

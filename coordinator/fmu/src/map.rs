@@ -55,7 +55,16 @@ pub fn variables(description: &ModelDescription, event_mode: bool) -> (Vec<Varia
             let (variable, element, count) = (k as u32, element as u32, v.len() as u32);
             let reference = v.reference;
             let clocked = event_mode && v.causality == fmi::Causality::Input && !v.clocks.is_empty();
-            places.push(ValueLocation { variable, element, count, reference, live, structural, clock, clocked });
+            places.push(ValueLocation {
+                variable,
+                element,
+                count,
+                reference,
+                live,
+                structural,
+                clock,
+                clocked,
+            });
         }
     }
     (all, places)

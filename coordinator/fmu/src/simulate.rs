@@ -5,7 +5,7 @@ use super::map::element_name;
 use std::sync::Arc;
 use terraglue_fmi::description::{Causality, Variable};
 use terraglue_fmi::instance::Sink;
-use terraglue_fmi::{Advance, Error, Fmu, ModelDescription, Result, FmuInstance, InstanceOptions, FmuState};
+use terraglue_fmi::{Advance, Error, Fmu, FmuInstance, FmuState, InstanceOptions, ModelDescription, Result};
 use terraglue_scenario::did_you_mean;
 use terraglue_subsystem::{ValueType, ValuesMut};
 
@@ -82,8 +82,14 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         true => Vec::new(),
         false => inputs::followed(fmu.description(), &settings.input),
     };
-    let options =
-        InstanceOptions { name, verbose: false, event_mode, intermediate: intermediate.clone(), followed, sink };
+    let options = InstanceOptions {
+        name,
+        verbose: false,
+        event_mode,
+        intermediate: intermediate.clone(),
+        followed,
+        sink,
+    };
     let mut instance = FmuInstance::instantiate(fmu, options)?;
     configure(&mut instance, &settings.start)?;
     let description = instance.description().clone();

@@ -9,8 +9,8 @@
 //! motion as its own at commit, and action equals reaction as far as the bodies are linear within the step. They are not where
 //! a motor is at its limit under T* and not under T1: then the estimate is taken again about T1.
 
-use super::interface_problem::InterfaceProblem;
 use super::follow::{PASSES, can_repeat, followed};
+use super::interface_problem::InterfaceProblem;
 use super::{Needs, Outcome, Strategy};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;

@@ -5,8 +5,8 @@
 //! Where they are not, as a motor is at its limit under T* and not under T1, the estimate is taken again about T1.
 //! For one contact on a linear branch T = (f_n + κ·T*)/(1 + κ), κ = K·G1. The iteration is that of [`super::iterative`].
 
-use super::interface_problem::InterfaceProblem;
 use super::follow::{PASSES, can_repeat, followed};
+use super::interface_problem::InterfaceProblem;
 use super::iterative::{Form, Limits, TtForm, XtForm};
 use super::memory::{Recall, Remember};
 use super::{Needs, Outcome, Strategy};

@@ -49,7 +49,7 @@ impl InterfaceProblem {
     /// Differences for the members that do not know their derivatives, or for all where `source` says so. Members hang
     /// together in the wrenches only, so each makes its own trials, all columns in one problem, and all of them do it side
     /// by side: that counts as many evaluations as the member with the most components needs. Their last trial is then
-    /// another one: see [`InterfaceProblem::settle_bodies`].
+    /// another one: see [`InterfaceProblem::repeat_bodies_trial`].
     pub(super) fn take_slopes(
         &mut self,
         source: Derivatives,

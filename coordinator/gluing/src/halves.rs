@@ -3,8 +3,8 @@
 //! Participant 2 of a group are its soils and the bodies that are side 2 of all their glue; all other bodies are side 1.
 
 use super::derivatives::Derivatives;
-use super::interface_problem::InterfaceProblem;
 use super::glue::ConstraintKind;
+use super::interface_problem::InterfaceProblem;
 use super::linear::max_norm;
 use super::participant::Answer;
 use crate::timing::Part;
@@ -28,7 +28,9 @@ impl InterfaceProblem {
         out.clear();
         out.extend((0..n).map(|i| match self.rows[i] {
             ConstraintKind::Joint if self.compliance[i] == 0.0 => 0.0,
-            ConstraintKind::Joint => -self.gap[i] / self.compliance[i] - self.damping[i] * (self.v1[i] - self.v2[i]),
+            ConstraintKind::Joint => {
+                -self.gap[i] / self.compliance[i] - self.damping[i] * (self.v1[i] - self.v2[i])
+            }
             _ => self.f_law[i],
         }));
     }

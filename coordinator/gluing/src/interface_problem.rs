@@ -1,10 +1,10 @@
 //! The group's side of the problem: packed vectors over all ports and the paper's calls on all members.
 
 use super::estimate::RigidContact;
-use super::glue::{Glue, ConstraintKind};
+use super::glue::{ConstraintKind, Glue};
 use super::group_estimate::GroupEstimate;
+use super::participant::{Answer, End, Participant, StepContext};
 use super::report::StepReport;
-use super::participant::{Answer, End, StepContext, Participant};
 use crate::contact::PortSet;
 use crate::timing::{Part, Timings};
 use std::time::Instant as Clock;
@@ -194,7 +194,11 @@ impl InterfaceProblem {
         for (p, port) in self.ports.iter().enumerate() {
             let glued = p.checked_sub(found_ports).and_then(|k| glue.joint(k));
             for (_, c) in port.components() {
-                self.rows.push(glued.map_or(if c == 0 { ConstraintKind::Normal } else { ConstraintKind::Law }, |j| j.row(c)));
+                self.rows.push(
+                    glued.map_or(if c == 0 { ConstraintKind::Normal } else { ConstraintKind::Law }, |j| {
+                        j.row(c)
+                    }),
+                );
                 self.of_soil.push(glued.is_none_or(|j| j.is_on_soil()));
                 self.gap.push(glued.map_or(0.0, |j| j.gap(port, c)));
                 self.compliance.push(port.law.compliance);
@@ -269,7 +273,7 @@ impl InterfaceProblem {
             // exact for bodies that are linear within the step
             let how = (false, self.t_ref.max(1.0));
             let trials = side.take_slopes(instance, &self.nodes, &self.at, &self.zeros, how)?;
-            side.slopes(&mut self.estimate.g);
+            side.differences(&mut self.estimate.g);
             self.at.trial += trials;
             self.report.evaluations_jacobian += trials;
         }
@@ -373,7 +377,11 @@ impl InterfaceProblem {
     }
 
     fn surface_part(&self, i: usize) -> f64 {
-        if self.has_grounds() && self.rows[i] != ConstraintKind::Joint && self.at.h > 0.0 { -self.x2[i] } else { 0.0 }
+        if self.has_grounds() && self.rows[i] != ConstraintKind::Joint && self.at.h > 0.0 {
+            -self.x2[i]
+        } else {
+            0.0
+        }
     }
 
     /// Whether the condition of a row speaks of rates or accelerations: a constraint at such a level. Springs and
@@ -435,7 +443,8 @@ impl InterfaceProblem {
     /// Whether the bodies' Jacobian comes from their trials: no member estimates contact forces where joints or
     /// contacts other than with a soil are glued.
     pub fn needs_linearisation(&self) -> bool {
-        self.rows.iter().any(|r| matches!(r, ConstraintKind::Joint | ConstraintKind::Coulomb)) || self.grounds.is_empty()
+        self.rows.iter().any(|r| matches!(r, ConstraintKind::Joint | ConstraintKind::Coulomb))
+            || self.grounds.is_empty()
     }
 
     /// Whether a soil is among the members.
@@ -448,7 +457,8 @@ impl InterfaceProblem {
     pub fn start_from_last(&mut self) {
         for port in &self.ports {
             for (i, _) in port.components() {
-                let joint = matches!(self.rows[i], ConstraintKind::Joint | ConstraintKind::Coulomb) || self.grounds.is_empty();
+                let joint = matches!(self.rows[i], ConstraintKind::Joint | ConstraintKind::Coulomb)
+                    || self.grounds.is_empty();
                 self.t[i] = if joint {
                     self.last
                         .iter()
@@ -467,7 +477,7 @@ impl InterfaceProblem {
     }
 
     /// Repeats the bodies' trial under T where differences have left them in another one: before a commit.
-    pub fn settle_bodies(&mut self, instances: &mut [Instance]) -> Result {
+    pub fn repeat_bodies_trial(&mut self, instances: &mut [Instance]) -> Result {
         if self.displaced {
             self.advance_bodies(instances)?;
             self.report.evaluations_bodies -= 1;

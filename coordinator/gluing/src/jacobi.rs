@@ -5,7 +5,7 @@
 
 use super::interface_problem::InterfaceProblem;
 use super::memory::{Recall, Remember};
-use super::{Needs, Outcome, ConstraintKind, Strategy};
+use super::{ConstraintKind, Needs, Outcome, Strategy};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
 use terraglue_subsystem::Capabilities;

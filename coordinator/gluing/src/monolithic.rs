@@ -10,7 +10,7 @@
 
 use super::interface_problem::InterfaceProblem;
 use super::linear::{Lu, max_norm};
-use super::{Needs, Outcome, ConstraintKind, Strategy};
+use super::{ConstraintKind, Needs, Outcome, Strategy};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
 use terraglue_scenario::GluingSpec;
@@ -135,11 +135,8 @@ fn rows(port: &Port, problem: &InterfaceProblem, motion: bool, scale: &[f64], ou
         out[i] = match problem.rows[i] {
             ConstraintKind::Joint => {
                 let (k, rate) = (port.law.compliance, problem.v1[i] - problem.v2[i]);
-                let apart = if k > 0.0 {
-                    problem.x1[i] - problem.x2[i] + problem.gap[i]
-                } else {
-                    gap(problem, i)
-                };
+                let apart =
+                    if k > 0.0 { problem.x1[i] - problem.x2[i] + problem.gap[i] } else { gap(problem, i) };
                 (apart + k * (t + problem.damping[i] * rate)) / (scale[i] + k)
             }
             ConstraintKind::Normal if !motion => {
@@ -172,8 +169,9 @@ impl Strategy for Monolithic {
     }
 
     fn solve(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<Outcome> {
-        let every =
-            |problem: &InterfaceProblem, can| problem.ground_slots().all(|s| instances[s].capabilities().has(can));
+        let every = |problem: &InterfaceProblem, can| {
+            problem.ground_slots().all(|s| instances[s].capabilities().has(can))
+        };
         let [force, motion] = [Capabilities::FORCE, Capabilities::MOTION].map(|can| every(problem, can));
         self.motion = !force;
         let found = self.solve_form(problem, instances)?;

@@ -64,7 +64,7 @@ pub struct Participant {
     matrix: Vec<f64>,
     active: Vec<u8>,
     /// dX, dV and dA/d(wrench on itself) by differences of trials, own n × n, column-major; in use until the next ones.
-    slopes: [Vec<f64>; 3],
+    differences: [Vec<f64>; 3],
     by_differences: bool,
     /// Wrenches of a batch of trials, one after the other, and its answers.
     batch_t: Vec<f64>,
@@ -374,7 +374,7 @@ impl Participant {
             let step = Self::step(&self.ports, n, nodes, at);
             instance.interface_jacobian(&step, level, &mut self.matrix)?;
         }
-        let own = if self.by_differences { &self.slopes[level as usize] } else { &self.matrix };
+        let own = if self.by_differences { &self.differences[level as usize] } else { &self.matrix };
         for (c, column) in own.chunks_exact(n.max(1)).enumerate() {
             for (r, value) in column.iter().enumerate() {
                 out[self.index[c] * n_group + self.index[r]] += self.signs[r] * self.signs[c] * value;
@@ -424,13 +424,13 @@ impl Participant {
         let progress = instance.advance_batch(&step, &self.batch_t, &mut batch)?;
         complete(instance, "advance_batch", progress)?;
         let here = [&self.x, &self.v, &self.a];
-        for ((slopes, answers), here) in self.slopes.iter_mut().zip(&self.batch).zip(here) {
-            slopes.clear();
+        for ((differences, answers), here) in self.differences.iter_mut().zip(&self.batch).zip(here) {
+            differences.clear();
             for column in 0..width {
                 let of = |k: usize| &answers[(column * ways.len() + k) * n..][..n];
                 let (before, after) = if central { (of(0), of(1)) } else { (here.as_slice(), of(0)) };
                 let change = ways.len() as f64 * delta(self.given_t[column]) * self.signs[column % n];
-                slopes.extend(after.iter().zip(before).map(|(new, old)| (new - old) / change));
+                differences.extend(after.iter().zip(before).map(|(new, old)| (new - old) / change));
             }
         }
         self.by_differences = true;
@@ -438,8 +438,8 @@ impl Participant {
     }
 
     /// dX/d(wrench on itself) of [`Participant::take_slopes`] into the group's matrix.
-    pub fn slopes(&mut self, out: &mut [f64]) {
-        self.matrix.clone_from(&self.slopes[Level::Position as usize]);
+    pub fn differences(&mut self, out: &mut [f64]) {
+        self.matrix.clone_from(&self.differences[Level::Position as usize]);
         self.scatter_matrix(out);
     }
 

@@ -63,7 +63,9 @@ impl Passage {
             for (k, i) in port.range().enumerate() {
                 let (t1, x1) = (problem.t[i], problem.x1[i]);
                 passed.values[k] = match problem.rows[i] {
-                    ConstraintKind::Normal | ConstraintKind::Law if problem.has_grounds() => [self.law[i], t1, 0.0, x1, 0.0],
+                    ConstraintKind::Normal | ConstraintKind::Law if problem.has_grounds() => {
+                        [self.law[i], t1, 0.0, x1, 0.0]
+                    }
                     ConstraintKind::Joint if problem.compliance[i] > 0.0 => {
                         let t2 = problem.t_second.get(i).copied().unwrap_or(t1);
                         [self.law[i], t1, t2, x1, problem.x2[i]]

@@ -1,4 +1,4 @@
-//! How long a thread waits awake before it sleeps.
+//! How long a thread spins before it sleeps.
 
 use std::time::{Duration, Instant};
 
@@ -9,7 +9,7 @@ const SHORTEST: Duration = Duration::from_micros(3);
 /// Looks between two readings of the clock.
 const LOOKS: u32 = 16;
 
-/// The time that a thread waits awake: as long as waking costs where that was worth it the last time, half as long after
+/// The time that a thread spins: as long as waking costs where that was worth it the last time, half as long after
 /// every time that it was not, so a thread without work, or on a busy machine, soon waits no more.
 #[derive(Debug)]
 pub struct AdaptiveSpin {

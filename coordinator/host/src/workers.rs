@@ -18,7 +18,7 @@ pub struct Workers {
     shared: Arc<Shared>,
     threads: Vec<JoinHandle<()>>,
     /// Held during a loop: a loop inside a loop, or from another thread meanwhile, runs on its caller alone. How long the
-    /// caller waits awake for the others to leave one.
+    /// caller spins for the others to leave one.
     busy: Mutex<AdaptiveSpin>,
 }
 

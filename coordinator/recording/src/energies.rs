@@ -201,7 +201,8 @@ mod tests {
 
     #[test]
     fn the_drift_is_held_against_the_largest_of_what_was_turned_over() {
-        let at = |kinetic: f64, work: f64| EnergySums { kinetic, potential: 1.0, soil_heat: 0.0, heat: 0.0, work };
+        let at =
+            |kinetic: f64, work: f64| EnergySums { kinetic, potential: 1.0, soil_heat: 0.0, heat: 0.0, work };
         let of = |track: EnergyTrack| track.figures(&MotorWork::default());
         let ends = Some((at(0.0, 0.0), at(0.0, 2.0)));
         let driven = of(EnergyTrack { ends, work_path_j: 2.0, port_path_j: 1.0, ..EnergyTrack::default() });

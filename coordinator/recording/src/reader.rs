@@ -233,9 +233,7 @@ impl Recording {
             "/tf" => self.take_transforms(data, t_s),
             "/ground" => self.take_ground(data, t_s),
             "/gluing" => self.gluing.extend(StepMessage::decode(data).ok().map(GluingRecord::from)),
-            "/events" => {
-                self.events.extend(Log::decode(data).ok().map(|e| Event { t_s, what: e.message }))
-            }
+            "/events" => self.events.extend(Log::decode(data).ok().map(|e| Event { t_s, what: e.message })),
             "/scene" => self.take_scene(data),
             topic if topic.starts_with("/ground/") => self.take_tile(data, t_s),
             _ => self.take_numbers(message, t_s, state),

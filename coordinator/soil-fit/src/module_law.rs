@@ -61,8 +61,8 @@ pub fn fit_module(plugin: &str, tests: &PlateTests, known: Known) -> Result<LawF
     };
     let mut values: Vec<f64> = parameters.iter().map(|p| given(p).unwrap_or_else(|| start(p))).collect();
     let services = HostServices::new(1, Path::new("."));
-    let bench =
-        law::LawTrial::open(&module, &values, &services).map_err(|e| plain(format!("--law {plugin}: {e}")))?;
+    let bench = law::LawTrial::open(&module, &values, &services)
+        .map_err(|e| plain(format!("--law {plugin}: {e}")))?;
     if !bench.law().has_pressure() {
         return Err(plain(format!(
             "--law {plugin}: it has no pressure function, so plates tell nothing of it"

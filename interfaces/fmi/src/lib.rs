@@ -26,4 +26,4 @@ pub use binary::{library_entry, platforms};
 pub use description::{ModelDescription, Version};
 pub use error::{Error, Result};
 pub use fmu::{Fmu, Folder, remove_folders};
-pub use instance::{Advance, IntermediateRow, LogLine, FmuInstance, InstanceOptions, FmuState, Stepped};
+pub use instance::{Advance, FmuInstance, FmuState, InstanceOptions, IntermediateRow, LogLine, Stepped};

@@ -4,7 +4,7 @@
 
 use hostile_archives::{MANY, refused, unloadable, usable};
 use std::path::{Path, PathBuf};
-use terraglue_fmi::{Error, Fmu, Limits, FmuInstance, InstanceOptions};
+use terraglue_fmi::{Error, Fmu, FmuInstance, InstanceOptions, Limits};
 
 /// Stands for a library; nobody loads it here.
 const LIBRARY: &[u8] = b"library";

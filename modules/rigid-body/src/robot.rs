@@ -5,8 +5,8 @@ use crate::actuator::battery::Draw;
 use crate::actuator::energy_ledger::Outcome;
 use crate::balance;
 use crate::contact::estimate::{Estimator, Problem};
+use crate::contact::port_jacobian::PortJacobian;
 use crate::contact::ports::{Ports, committed, displacement, response, standing};
-use crate::contact::slopes::Slopes;
 use crate::drive::{FULL_BLOCK, Motor};
 use crate::dynamics::joint_rows::coordinate;
 use crate::dynamics::{Dynamics, Failure};
@@ -36,7 +36,7 @@ pub(crate) struct Robot {
     variables: Vec<Variable>,
     actions: Vec<Action>,
     ports: Ports,
-    slopes: Slopes,
+    port_jacobian: PortJacobian,
     estimator: Estimator,
     /// Step for which `dynamics` and `ports` are prepared.
     prepared: Option<Prepared>,
@@ -84,7 +84,7 @@ impl Robot {
             state,
             slots,
             backup: State::default(),
-            slopes: Slopes::default(),
+            port_jacobian: PortJacobian::default(),
             estimator: Estimator::default(),
             prepared: None,
             step_ports: Vec::new(),
@@ -125,7 +125,7 @@ impl Robot {
     }
 
     fn assign(&mut self, step: &Step) -> Result {
-        self.slopes.forget();
+        self.port_jacobian.forget();
         self.step_ports.clear();
         self.step_ports.extend_from_slice(step.ports);
         if !self.ports.assign(step.ports, step.n as usize, &self.state.bodies) {
@@ -394,8 +394,8 @@ impl Subsystem for Robot {
             self.dynamics.ensure_factor().map_err(failed)?;
             let joint = |p: &Port| p.kind == PortKind::Joint as u32;
             if step.ports.iter().any(joint) && self.dynamics.contacts.pressing() == 0 {
-                let slopes = self.slopes.at(level, step.ports, &self.ports, &mut self.dynamics);
-                out.copy_from_slice(slopes);
+                let jacobian = self.port_jacobian.at(level, step.ports, &self.ports, &mut self.dynamics);
+                out.copy_from_slice(jacobian);
                 return Ok(());
             }
         }

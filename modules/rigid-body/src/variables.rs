@@ -111,7 +111,9 @@ const ACTUATOR_ITEMS: [ActuatorItem; 14] = [
     }),
     ("electrical_energy", "J", Group::All, "Energy drawn since the start", |j| j.actuator.ledger.electrical),
     ("friction_torque", "N m", Group::Friction, "Friction in the last step", |j| j.actuator.ledger.friction),
-    ("stop_torque", "N m", Group::Friction, "End stop and brake in the last step", |j| j.actuator.ledger.stop),
+    ("stop_torque", "N m", Group::Friction, "End stop and brake in the last step", |j| {
+        j.actuator.ledger.stop
+    }),
     ("friction_heat", "J", Group::Friction, "Lost in the joint's friction since the start", |j| {
         j.actuator.ledger.friction_heat
     }),
@@ -120,7 +122,9 @@ const ACTUATOR_ITEMS: [ActuatorItem; 14] = [
     ("motor_heat", "J", Group::Formula, "Drawn energy that is neither work nor stored", |j| {
         j.actuator.ledger.heat
     }),
-    ("winding_heat", "J", Group::Dc, "Heat of the winding since the start", |j| j.actuator.ledger.winding_heat),
+    ("winding_heat", "J", Group::Dc, "Heat of the winding since the start", |j| {
+        j.actuator.ledger.winding_heat
+    }),
     ("gear_heat", "J", Group::Dc, "Heat of the gear since the start", |j| j.actuator.ledger.gear_heat),
     ("winding_temperature", "K", Group::Thermal, "Temperature of the winding", |j| j.actuator.winding_k),
     ("housing_temperature", "K", Group::Thermal, "Temperature of the housing", |j| j.actuator.housing_k),

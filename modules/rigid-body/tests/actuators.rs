@@ -132,7 +132,11 @@ fn electrical_energy_is_work_and_heat_and_what_is_stored() {
             fixture.free_step();
         }
         let kinetic = 0.5 * INERTIA * libm::pow(fixture.get("j.velocity"), 2.0);
-        assert!((fixture.get("j.work") - kinetic).abs() < 1e-5 * kinetic, "{} {kinetic}", fixture.get("j.work"));
+        assert!(
+            (fixture.get("j.work") - kinetic).abs() < 1e-5 * kinetic,
+            "{} {kinetic}",
+            fixture.get("j.work")
+        );
         let heat = fixture.get("j.winding_heat") + fixture.get("j.gear_heat");
         assert!(heat > 0.0 && fixture.robot.energy().electrical == fixture.get("j.electrical_energy"));
         // All heat that is not winding or gear is the scheme's.

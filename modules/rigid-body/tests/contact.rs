@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
-use common::{MOON, Fixture, ball};
+use common::{Fixture, MOON, ball};
 use terraglue_numerics::extremes::larger;
 
 #[test]

@@ -2,14 +2,15 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
-use common::{MOON, Fixture, temporary_urdf};
+use common::{Fixture, MOON, temporary_urdf};
 use terraglue_subsystem::{Values, ValuesMut};
 
 fn walk_in_place(fixture: &mut Fixture, steps: usize) -> Vec<f64> {
     let mut changes = Vec::new();
     for _ in 0..steps {
         for (k, leg) in ["LF", "LM", "LR", "RF", "RM", "RR"].iter().enumerate() {
-            let lift = 0.1 * libm::sin(8.0 * fixture.t + k as f64 * std::f64::consts::PI) * fixture.t.min(1.0);
+            let lift =
+                0.1 * libm::sin(8.0 * fixture.t + k as f64 * std::f64::consts::PI) * fixture.t.min(1.0);
             fixture.set(&format!("{leg}_j2.angle_target"), 0.958192179 + lift);
         }
         let before = fixture.balance();
@@ -129,7 +130,9 @@ fn limits_hold_and_turn_the_impact_into_heat() {
         fixture.free_step();
         assert!(fixture.get("hinge.angle") < 0.6 + 1e-6 && fixture.get("rail.angle") < 0.1 + 1e-6);
     }
-    assert!((fixture.get("hinge.angle") - 0.6).abs() < 1e-6 && (fixture.get("rail.angle") - 0.1).abs() < 1e-6);
+    assert!(
+        (fixture.get("hinge.angle") - 0.6).abs() < 1e-6 && (fixture.get("rail.angle") - 0.1).abs() < 1e-6
+    );
     assert!(fixture.robot.energy().dissipated > 0.5);
     assert_eq!(fixture.get("hinge.torque"), 0.0);
 }
@@ -142,7 +145,11 @@ fn a_velocity_motor_keeps_its_rate_and_a_torque_motor_its_torque() {
     (0..100).for_each(|_| fixture.free_step());
     let angle = fixture.get("hinge.angle");
     (0..500).for_each(|_| fixture.free_step());
-    assert!((fixture.get("hinge.angle") - angle + 0.2).abs() < 1e-6, "{}", fixture.get("hinge.angle") - angle);
+    assert!(
+        (fixture.get("hinge.angle") - angle + 0.2).abs() < 1e-6,
+        "{}",
+        fixture.get("hinge.angle") - angle
+    );
     assert!(fixture.get("rail.angle").abs() < 1e-6);
     fixture.motor("hinge", 3);
     fixture.set("hinge.torque_target", -3.0);

@@ -155,7 +155,8 @@ fn the_hexapod_stands_on_rigid_ground_without_a_soil() {
     );
     let mut fixture = Fixture::new(&parameters, G, 1e-3);
     (0..500).for_each(|_| fixture.free_step());
-    let feet: f64 = fixture.scene.bodies.iter().map(|b| fixture.get(&format!("{}.contact_normal", b.name))).sum();
+    let feet: f64 =
+        fixture.scene.bodies.iter().map(|b| fixture.get(&format!("{}.contact_normal", b.name))).sum();
     assert!((feet / (fixture.mass() * G) - 1.0).abs() < 1e-3, "{feet}");
 }
 

@@ -81,8 +81,9 @@ fn what_follows_from_joints_and_what_comes_late_is_refused_and_changes_nothing()
     refused(&mut fixture, "body.pitch", 2.0, "beyond");
     refused(&mut fixture, "LF_j2.angle", 9.0, "limits");
     refused(&mut fixture, "body.contact_normal", 1.0, "read only");
-    let effect =
-        |fixture: &Fixture, name: &str| fixture.robot.variables().iter().find(|v| v.name == name).unwrap().effect;
+    let effect = |fixture: &Fixture, name: &str| {
+        fixture.robot.variables().iter().find(|v| v.name == name).unwrap().effect
+    };
     assert_eq!(effect(&fixture, "body.z"), Effect::NeedsReset);
     assert_eq!(effect(&fixture, "LF_j2.velocity"), Effect::NeedsReset);
     assert_eq!(effect(&fixture, "LF4.z"), Effect::ReadOnly);

@@ -142,7 +142,10 @@ fn a_rod_keeps_its_length() {
             fixture.free_step();
             assert!((point(&fixture, 0, Vector3::zeros()).norm() - 1.0).abs() < 1e-10, "{rule}");
         }
-        assert!(fixture.robot.energy().mechanical().abs() < if rule == RULES[0] { 0.3 } else { 1e-3 }, "{rule}");
+        assert!(
+            fixture.robot.energy().mechanical().abs() < if rule == RULES[0] { 0.3 } else { 1e-3 },
+            "{rule}"
+        );
     }
 }
 

@@ -82,11 +82,15 @@ fn the_file_speaks_where_the_scenario_is_silent() {
     );
     // Actuators may come before the world.
     let fixture = Fixture::new(&format!(r#"{{"model": "{model}"}}"#), 9.81, 1e-3);
-    let shown =
-        ["j.stiffness", "j.damping", "j.max_torque", "j.viscous_friction", "j.armature"].map(|n| fixture.get(n));
+    let shown = ["j.stiffness", "j.damping", "j.max_torque", "j.viscous_friction", "j.armature"]
+        .map(|n| fixture.get(n));
     assert_eq!(shown, [50.0, 2.0, 3.0, 0.5, 0.1]);
-    let fixture = Fixture::new(&format!(r#"{{"model": "{model}", "max_torque": 9, "stiffness": 70}}"#), 9.81, 1e-3);
-    assert_eq!([fixture.get("j.stiffness"), fixture.get("j.max_torque"), fixture.get("j.damping")], [70.0, 9.0, 2.0]);
+    let fixture =
+        Fixture::new(&format!(r#"{{"model": "{model}", "max_torque": 9, "stiffness": 70}}"#), 9.81, 1e-3);
+    assert_eq!(
+        [fixture.get("j.stiffness"), fixture.get("j.max_torque"), fixture.get("j.damping")],
+        [70.0, 9.0, 2.0]
+    );
 }
 
 #[test]
@@ -156,7 +160,11 @@ fn connected_and_welded_bodies_stay_together() {
     let (slider, load) = (fixture.get("slider.x"), fixture.get("load.x"));
     assert!((load - slider - 1.0).abs() < 1e-9, "{slider} {load}");
     // The pin binds the end of the crank to the slider's height 0: the crank stays level.
-    assert!(fixture.get("jc.angle").abs() < 1e-9 && fixture.get("jr.angle") > 1.0, "{}", fixture.get("jr.angle"));
+    assert!(
+        fixture.get("jc.angle").abs() < 1e-9 && fixture.get("jr.angle") > 1.0,
+        "{}",
+        fixture.get("jr.angle")
+    );
     assert!(fixture.get("hold.force") > 19.0);
 }
 
@@ -174,7 +182,8 @@ fn a_body_on_two_hinges_swings_as_on_a_universal_joint() {
     );
     let kind = r#", "joint_kind": {"j": "universal"}"#;
     let places = [(two, ""), (one, kind)].map(|(model, more)| {
-        let mut fixture = Fixture::new(&format!(r#"{{"model": "{model}", "motor": "off"{more}}}"#), 9.81, 1e-3);
+        let mut fixture =
+            Fixture::new(&format!(r#"{{"model": "{model}", "motor": "off"{more}}}"#), 9.81, 1e-3);
         (0..1000).for_each(|_| fixture.free_step());
         ["a.roll", "a.pitch", "a.yaw"].map(|name| fixture.get(name))
     });

@@ -87,7 +87,8 @@ fn friction_bounds_the_tangential_estimate() {
 fn a_plate_holds_by_one_patch_with_moments() {
     let shape = "<collision><geometry><box size=\"0.4 0.2 0.1\"/></geometry></collision>";
     let file = temporary_urdf("plate", &format!("<robot name=\"p\">{}</robot>", solid("plate", 10.0, shape)));
-    let mut fixture = Fixture::new(&format!(r#"{{"model": "{file}", "position_m": [0, 0, 0.05]}}"#), 9.81, 1e-3);
+    let mut fixture =
+        Fixture::new(&format!(r#"{{"model": "{file}", "position_m": [0, 0, 0.05]}}"#), 9.81, 1e-3);
     fixture.set("plate.force_x", 20.0);
     let port = Port {
         key: 1,
@@ -160,8 +161,8 @@ fn own_bodies_do_not_pass_through_each_other() {
     };
     let mobility = |fixture: &mut Fixture| {
         let ports = [port(fixture)];
-        let x =
-            fixture.advance(&ports, &[0.0, 1.0, 0.0]).unwrap()[1] - fixture.advance(&ports, &[0.0; 3]).unwrap()[1];
+        let x = fixture.advance(&ports, &[0.0, 1.0, 0.0]).unwrap()[1]
+            - fixture.advance(&ports, &[0.0; 3]).unwrap()[1];
         let mut g = [f64::NAN; 9];
         let step = fixture.step(&ports);
         fixture.robot.interface_jacobian(&step, terraglue_subsystem::Level::Position, &mut g).unwrap();

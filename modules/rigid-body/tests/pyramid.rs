@@ -45,7 +45,8 @@ fn the_hexapod_stands_by_the_pyramid_too() {
         );
         let mut fixture = Fixture::new(&parameters, 9.81, 1e-3);
         (0..300).for_each(|_| fixture.free_step());
-        let feet: f64 = fixture.scene.bodies.iter().map(|b| fixture.get(&format!("{}.contact_normal", b.name))).sum();
+        let feet: f64 =
+            fixture.scene.bodies.iter().map(|b| fixture.get(&format!("{}.contact_normal", b.name))).sum();
         assert!((feet / (fixture.mass() * 9.81) - 1.0).abs() < 1e-3, "{feet}");
     }
 }

@@ -81,7 +81,8 @@ fn the_scheme_that_conserves_energy_does_so_and_converges() {
 #[test]
 fn a_free_body_falls_exactly() {
     let file = common::ball("alpha_fall");
-    let mut fixture = Fixture::new(&format!(r#"{{"model": "{file}", "position_m": [0, 0, 10], {ALPHA}}}"#), G, 1e-2);
+    let mut fixture =
+        Fixture::new(&format!(r#"{{"model": "{file}", "position_m": [0, 0, 10], {ALPHA}}}"#), G, 1e-2);
     (0..100).for_each(|_| fixture.free_step());
     assert!((fixture.get("ball.z") - (10.0 - 0.5 * G)).abs() < 1e-11, "{}", fixture.get("ball.z"));
     assert!((fixture.get("ball.vz") + G).abs() < 1e-11);

@@ -199,7 +199,8 @@ fn the_terrain_can_be_turned_to_stone() {
     };
     let robot = instantiate(Some(Box::new(Slope))).unwrap();
     let scene = robot.scene();
-    let mut fixture = Fixture { robot, scene, t: 0.0, h: 1e-3, index: 0, reversed: false, margin: 1e-3, mu: 0.8 };
+    let mut fixture =
+        Fixture { robot, scene, t: 0.0, h: 1e-3, index: 0, reversed: false, margin: 1e-3, mu: 0.8 };
     (0..500).for_each(|_| fixture.free_step());
     let v = fixture.states()[0].linear_velocity;
     let exact = 5.0 / 7.0 * G * 0.1_f64.atan().sin() * fixture.t;

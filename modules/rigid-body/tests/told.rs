@@ -42,7 +42,11 @@ fn energies_are_those_of_a_falling_pendulum() {
     let [kinetic, potential, heat] =
         ["kinetic", "potential", "dissipated"].map(|e| fixture.get(&format!("energy.{e}")));
     assert!(kinetic > 1.0 && heat > 0.1 && (kinetic + potential + heat).abs() < 0.02 * kinetic);
-    assert!(fixture.get("joints.gap") > 0.0 && fixture.get("joints.gap") < 1e-10, "{}", fixture.get("joints.gap"));
+    assert!(
+        fixture.get("joints.gap") > 0.0 && fixture.get("joints.gap") < 1e-10,
+        "{}",
+        fixture.get("joints.gap")
+    );
 }
 
 #[test]

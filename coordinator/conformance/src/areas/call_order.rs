@@ -3,8 +3,8 @@
 use super::life_cycle::same;
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::test_context::TestContext;
 use crate::fixture::{Flat, Runner, Vectors};
+use crate::test_context::TestContext;
 use terraglue_host::Instance;
 use terraglue_subsystem::{
     Capabilities, Estimate, Input, Law, Level as Derivative, Motion, Node, Port, Step,

@@ -2,8 +2,8 @@
 
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::test_context::TestContext;
 use crate::fixture::script;
+use crate::test_context::TestContext;
 use terraglue_host::Process;
 
 /// The test whose output the watching process looks at.
@@ -27,7 +27,9 @@ pub fn tests() -> Vec<Test> {
         test("host-signals", "no signal handler is set", |context| {
             untouched(context, "signal handlers", |p| p.signals.clone())
         }),
-        test("host-locale", "the locale stays", |context| untouched(context, "the locale", |p| p.locale.clone())),
+        test("host-locale", "the locale stays", |context| {
+            untouched(context, "the locale", |p| p.locale.clone())
+        }),
         test("host-directory", "the working directory stays", |context| {
             untouched(context, "the working directory", |p| p.directory.clone())
         }),
@@ -37,7 +39,9 @@ pub fn tests() -> Vec<Test> {
         test("host-threads", "no thread is left behind", |context| {
             untouched(context, "threads", |p| p.threads.clone())
         }),
-        test("host-files", "no file is left open", |context| untouched(context, "open files", |p| p.files.clone())),
+        test("host-files", "no file is left open", |context| {
+            untouched(context, "open files", |p| p.files.clone())
+        }),
         test(OUTPUT, "nothing is printed: lines go through the host's log", output),
     ]
 }

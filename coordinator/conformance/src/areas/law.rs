@@ -4,8 +4,8 @@
 use super::values::not_told;
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::test_context::TestContext;
 use crate::fixture::LawFixture;
+use crate::test_context::TestContext;
 use std::time::Instant;
 use terraglue_host::described;
 use terraglue_subsystem::Kind;

@@ -115,8 +115,8 @@ fn description(context: &TestContext) -> Verdict {
         let got = format!("the section names `{}`, the schema `{own}`", section.name);
         return Err(Stop::fail("schema", "the section .terraglue", got, "the same name in both"));
     }
-    let table =
-        table_of(&context.path).map_err(|e| Stop::fail("terraglue_subsystem", "", e.to_string(), "a table"))?;
+    let table = table_of(&context.path)
+        .map_err(|e| Stop::fail("terraglue_subsystem", "", e.to_string(), "a table"))?;
     match table.description {
         Some(text) if terraglue_host::Description::parse(&text).as_ref() == Some(&section) => Ok(()),
         Some(_) => {

@@ -2,8 +2,8 @@
 
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::test_context::TestContext;
 use crate::fixture::{Flat, Foot, SoilFixture, script};
+use crate::test_context::TestContext;
 use terraglue_host::probe_odd_calls;
 use terraglue_subsystem::{Config, Kind};
 
@@ -107,7 +107,8 @@ fn steps(context: &TestContext) -> Verdict {
 fn many(context: &TestContext) -> Verdict {
     let module = context.module()?;
     // Each in Python is a process.
-    let count = if module.is_python() { 40 } else { 1000 } * if context.level == Level::Thorough { 5 } else { 1 };
+    let count =
+        if module.is_python() { 40 } else { 1000 } * if context.level == Level::Thorough { 5 } else { 1 };
     for _ in 0..count {
         context.instance_on(&module, Flat::LEVEL)?;
     }
@@ -118,7 +119,8 @@ fn two(context: &TestContext) -> Verdict {
     let module = context.module()?;
     let (alone, _) = script(context.instance_on(&module, Flat::LEVEL)?, 40, 1)?;
     // The same run while others live, are made and end.
-    let (first, second) = (context.instance_on(&module, Flat::LEVEL)?, context.instance_on(&module, Flat::LEVEL)?);
+    let (first, second) =
+        (context.instance_on(&module, Flat::LEVEL)?, context.instance_on(&module, Flat::LEVEL)?);
     let (_, _second) = script(second, 25, 4)?;
     let (beside, _) = script(first, 40, 1)?;
     same("a run beside another instance", &alone, &beside)
@@ -189,8 +191,10 @@ fn no_contact(context: &TestContext) -> Verdict {
 }
 
 fn come_and_go(context: &TestContext) -> Verdict {
-    let mut fixture =
-        SoilFixture::new(context, &[Foot::sphere(-0.1, 0.0).lifted(-1e-3), Foot::sphere(0.1, 0.0).lifted(7e-3)])?;
+    let mut fixture = SoilFixture::new(
+        context,
+        &[Foot::sphere(-0.1, 0.0).lifted(-1e-3), Foot::sphere(0.1, 0.0).lifted(7e-3)],
+    )?;
     for k in 0..120 {
         let up = if (k / 20) % 2 == 0 { 0.4 } else { -0.4 };
         fixture.go(&[[0.0, 0.0, up], [0.0, 0.0, -up]], 1e-3)?;

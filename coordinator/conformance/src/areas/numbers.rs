@@ -3,10 +3,10 @@
 use super::life_cycle::same;
 use crate::catalogue::{Area, Level, Test};
 use crate::derivative::{Columns, compare};
-use crate::other_process::{RemoteRun, in_other_process};
 use crate::finding::{ANSWER, Stop, Verdict};
-use crate::test_context::TestContext;
 use crate::fixture::{BodyFixture, Foot, Runner, SoilFixture, committed, script};
+use crate::other_process::{RemoteRun, in_other_process};
+use crate::test_context::TestContext;
 use terraglue_host::Workers;
 use terraglue_subsystem::{Capabilities, Kind, Level as Derivative};
 
@@ -144,7 +144,11 @@ fn workers(context: &TestContext) -> Verdict {
 
 fn locale(context: &TestContext) -> Verdict {
     let (here, _) = script(context.instance()?, 60, 0)?;
-    let there = in_other_process(context, &RemoteRun::fresh(60), &[("LC_ALL", "de_DE.UTF-8"), ("TZ", "Asia/Kolkata")])?;
+    let there = in_other_process(
+        context,
+        &RemoteRun::fresh(60),
+        &[("LC_ALL", "de_DE.UTF-8"), ("TZ", "Asia/Kolkata")],
+    )?;
     same("the run in a German locale and Indian time", &here, &there)?;
     match terraglue_host::has_locale("de_DE.UTF-8") {
         true => Ok(()),

@@ -2,8 +2,8 @@
 
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::test_context::TestContext;
 use crate::fixture::{numbers, outputs, set_numbers};
+use crate::test_context::TestContext;
 use terraglue_host::Instance;
 use terraglue_subsystem::{Causality, Input, Kind, Motion, Response, Step};
 

@@ -2,8 +2,8 @@
 
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::test_context::TestContext;
 use crate::fixture::{BodyFixture, dot};
+use crate::test_context::TestContext;
 use terraglue_subsystem::{Capabilities, Kind};
 
 const fn test(name: &'static str, promise: &'static str, run: fn(&TestContext) -> Verdict) -> Test {

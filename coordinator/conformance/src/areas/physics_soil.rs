@@ -2,11 +2,16 @@
 
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::test_context::TestContext;
 use crate::fixture::{Flat, Foot, Moved, SoilFixture, dot};
+use crate::test_context::TestContext;
 use terraglue_subsystem::Kind;
 
-const fn test(name: &'static str, level: Level, promise: &'static str, run: fn(&TestContext) -> Verdict) -> Test {
+const fn test(
+    name: &'static str,
+    level: Level,
+    promise: &'static str,
+    run: fn(&TestContext) -> Verdict,
+) -> Test {
     Test { name, area: Area::Physics, level, kinds: &[Kind::Soil], after: &["steps"], promise, run }
 }
 

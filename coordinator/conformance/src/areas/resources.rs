@@ -3,8 +3,8 @@
 use super::life_cycle::same;
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::test_context::TestContext;
 use crate::fixture::{Flat, Runner, script};
+use crate::test_context::TestContext;
 use rustix::time::{ClockId, clock_gettime};
 use terraglue_host::{AllocationCounter, heap_in_use};
 

@@ -3,8 +3,8 @@
 use super::physics_soil::dragged;
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::test_context::TestContext;
 use crate::fixture::{Flat, Foot, Moved, SoilFixture, dot};
+use crate::test_context::TestContext;
 use terraglue_subsystem::Kind;
 
 const fn test(name: &'static str, promise: &'static str, run: fn(&TestContext) -> Verdict) -> Test {

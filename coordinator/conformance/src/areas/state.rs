@@ -2,10 +2,10 @@
 
 use super::life_cycle::same;
 use crate::catalogue::{Area, Level, Test};
-use crate::other_process::{RemoteRun, in_other_process};
 use crate::finding::{Stop, Verdict};
-use crate::test_context::TestContext;
 use crate::fixture::{Runner, committed};
+use crate::other_process::{RemoteRun, in_other_process};
+use crate::test_context::TestContext;
 use terraglue_subsystem::Capabilities;
 
 const fn test(

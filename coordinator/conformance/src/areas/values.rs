@@ -3,8 +3,8 @@
 use super::life_cycle::same;
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::test_context::TestContext;
 use crate::fixture::{committed, numbers, script};
+use crate::test_context::TestContext;
 use terraglue_host::{Instance, Reply, described};
 use terraglue_plugin::describe::{variable_line, words};
 use terraglue_subsystem::{Effect, ValueType, Values, ValuesMut, Variable, unit::Unit};

@@ -20,7 +20,7 @@ const DIFFERENCE: f64 = 1e-7;
 ///
 /// # Errors
 /// A loop without a solution, with its members and the residual that was left.
-pub fn settle(links: &mut [Link], instances: &mut [Instance]) -> Result {
+pub fn initialize(links: &mut [Link], instances: &mut [Instance]) -> Result {
     let mut u = read(links, instances)?;
     let start = u.clone();
     for _ in 0..=u.len() {

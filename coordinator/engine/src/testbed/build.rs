@@ -105,7 +105,7 @@ impl Testbed {
         };
         let glued = testbed.instances.iter_mut().zip(&testbed.schedules).filter(|(_, turn)| turn.glued);
         glued.for_each(|(instance, _)| instance.watch());
-        testbed.settle()?;
+        testbed.initialize_signals()?;
         testbed.read_states()?;
         if let Err(Error::Simulation { message, .. }) = testbed.detect_contacts(scenario.time.step_s) {
             let help = "docs/scenario.md has the keys of `[terrain]`, `terraglue modules NAME` those that set a body down";
@@ -278,9 +278,9 @@ fn fmu(
     let once = || terraglue_fmi::Fmu::inspect(&path).is_ok_and(|(d, _)| d.capabilities.once_per_process);
     let made: terraglue_subsystem::Result<Box<dyn Subsystem>> = match spec.isolate {
         // One instance per process is all that such an FMU stands.
-        false if !once() => {
-            library.fmus().and_then(|make| make(&path, &spec.parameters, host, services.teardown_errors.clone()))
-        }
+        false if !once() => library
+            .fmus()
+            .and_then(|make| make(&path, &spec.parameters, host, services.teardown_errors.clone())),
         _ => {
             let what = What::Fmu {
                 path: std::path::absolute(&path).unwrap_or_else(|_| path.clone()),

@@ -70,8 +70,8 @@ impl Testbed {
         }
         order.push("events and faults of the communication point".into());
         if !ends.is_empty() {
-            let [mut from, mut to] =
-                [|e: &ConnectionEnds| e.from.0, |e: &ConnectionEnds| e.to.0].map(|f| ends.iter().map(f).collect::<Vec<_>>());
+            let [mut from, mut to] = [|e: &ConnectionEnds| e.from.0, |e: &ConnectionEnds| e.to.0]
+                .map(|f| ends.iter().map(f).collect::<Vec<_>>());
             for slots in [&mut from, &mut to] {
                 slots.sort_unstable();
                 slots.dedup();

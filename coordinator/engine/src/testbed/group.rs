@@ -7,7 +7,7 @@ use terraglue_gluing::contact::PortSet;
 use terraglue_gluing::memory::{Recall, Remember};
 use terraglue_gluing::step_control::Passage;
 use terraglue_gluing::timing::{Part, Timings};
-use terraglue_gluing::{InterfaceProblem, StepContext, PortReport, ConstraintKind, Strategy};
+use terraglue_gluing::{ConstraintKind, InterfaceProblem, PortReport, StepContext, Strategy};
 use terraglue_host::Instance;
 use terraglue_scenario::{GluingSpec, StrategyKind};
 

@@ -55,10 +55,10 @@ impl Testbed {
     }
 
     /// Connected values at the start where outputs depend on inputs of the same time: in their order, loops solved.
-    pub(super) fn settle(&mut self) -> Result {
+    pub(super) fn initialize_signals(&mut self) -> Result {
         let through = |k: usize| self.instances[k].capabilities().has(Capabilities::FEEDTHROUGH);
         if self.links.numbers.iter().any(|l| l.leaves(through)) {
-            crate::signals::settle(&mut self.links.numbers, &mut self.instances)?;
+            crate::signals::initialize(&mut self.links.numbers, &mut self.instances)?;
         }
         Ok(())
     }

@@ -32,7 +32,7 @@ impl Testbed {
         // 0.0 −, and not −: 0 s has no sign
         self.t = 0.0 - count * self.step_s;
         if count > 0.0 {
-            self.settle()?;
+            self.initialize_signals()?;
         }
         self.start_joints()?;
         if count > 0.0 {

@@ -84,8 +84,9 @@ impl Testbed {
         if self.is_sampled() {
             self.sample(&span);
         } else if self.uncoupled.pays() {
-            let job =
-                |instance: &mut Instance, turn: &mut StepSchedule| turn.try_alone(instance, &span, &mut nothing());
+            let job = |instance: &mut Instance, turn: &mut StepSchedule| {
+                turn.try_alone(instance, &span, &mut nothing())
+            };
             self.uncoupled.workers.for_each_pair(&mut self.instances, &mut self.schedules, &job);
         } else {
             let mut out = nothing();

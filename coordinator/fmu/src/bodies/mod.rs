@@ -3,12 +3,12 @@
 //! `[x.bodies.NAME]` has lists of names along world x, y and z (`""` for none): `position`, `velocity`, `acceleration` and
 //! `force`. With `orientation`, a quaternion, the body turns, and has `angular_velocity`, `angular_acceleration` and
 //! `moment`. `terminal` is the name of a terminal of FMI 3 whose members are these. The body can then be named by
-//! `[[glue]]`. [`names`] reads the table, [`motion`] tells what a port of the body does, [`slopes`] the Jacobian.
+//! `[[glue]]`. [`names`] reads the table, [`motion`] tells what a port of the body does, [`jacobian`] the Jacobian.
 
 mod axis;
+mod jacobian;
 mod motion;
 mod names;
-mod slopes;
 
 pub use axis::Axis;
 pub use names::{Terminals, terminals};
@@ -135,7 +135,14 @@ impl Bodies {
     }
 
     /// After a trial: the motion at all ports.
-    pub fn pull(&mut self, instance: &FmuInstance, step: &Step, t: &[f64], out: &mut Response, fail: Fail) -> Result {
+    pub fn pull(
+        &mut self,
+        instance: &FmuInstance,
+        step: &Step,
+        t: &[f64],
+        out: &mut Response,
+        fail: Fail,
+    ) -> Result {
         let mut after = std::mem::take(&mut self.after);
         let read = self.motions(instance, &mut after, fail);
         self.after = after;

@@ -179,8 +179,12 @@ mod tests {
 
     #[test]
     fn a_state_survives_as_bytes() {
-        let state =
-            State { feet: vec![swinging(), DrivenBody::at([0.0; 3])], duration_s: 0.25, jump: true, work_j: 1.5 };
+        let state = State {
+            feet: vec![swinging(), DrivenBody::at([0.0; 3])],
+            duration_s: 0.25,
+            jump: true,
+            work_j: 1.5,
+        };
         let back = State::from_bytes(&state.to_bytes(), 2).expect("the same feet");
         assert_eq!(
             (back.feet, back.duration_s, back.jump, back.work_j),

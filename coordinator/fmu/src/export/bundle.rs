@@ -1,6 +1,6 @@
 //! Collects everything that a scenario needs, lays it out as an FMU and packs it.
 
-use super::{Request, SCENARIO, SETTINGS, ExportSettings, open, page, place, wrap};
+use super::{ExportSettings, Request, SCENARIO, SETTINGS, open, page, place, wrap};
 use std::path::{Path, PathBuf};
 use terraglue_diagnostics::{Error, Result};
 use terraglue_fmi::Version;

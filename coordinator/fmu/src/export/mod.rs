@@ -71,10 +71,12 @@ pub fn open(opening: &Opening) -> Result<Opened, String> {
     let path = opening.resources.join(SETTINGS);
     let text =
         terraglue_subsystem::files::read_text(&path).map_err(|e| format!("{}: {e}", path.display()))?;
-    let settings: ExportSettings = serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))?;
+    let settings: ExportSettings =
+        serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))?;
     let whole = instance(opening, &settings).map_err(|e| e.to_string())?;
     let subsystem = whole.map_err(|e| e.to_string())?;
-    let layout = Layout::new(settings.fmi(), settings.scalars, terraglue_subsystem::Subsystem::variables(&subsystem));
+    let layout =
+        Layout::new(settings.fmi(), settings.scalars, terraglue_subsystem::Subsystem::variables(&subsystem));
     Ok(Opened { layout, token: settings.token, slots: SLOTS, settles: true, subsystem: Box::new(subsystem) })
 }
 

@@ -89,8 +89,9 @@ fn tell(testbed: &mut Testbed, slot: usize, id: u32, values: Values) -> Result {
 fn variables(testbed: &Testbed, bare: Option<&str>, feet: &[usize]) -> (Vec<Variable>, Vec<VariableSlot>) {
     let (mut all, mut places) = (Vec::new(), Vec::new());
     for (slot, instance) in testbed.instances().iter().enumerate() {
-        let own =
-            |v: &&Variable| feet.contains(&slot) && [driven_bodies::id::DURATION, driven_bodies::id::JUMP].contains(&v.id);
+        let own = |v: &&Variable| {
+            feet.contains(&slot) && [driven_bodies::id::DURATION, driven_bodies::id::JUMP].contains(&v.id)
+        };
         for v in instance.subsystem().variables().iter().filter(|v| !own(v)) {
             let mut shown = Variable { id: all.len() as u32, ..v.clone() };
             if bare != Some(instance.name()) {

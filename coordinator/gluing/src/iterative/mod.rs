@@ -21,8 +21,8 @@ mod xt;
 pub(super) use tt::TtForm;
 pub(super) use xt::XtForm;
 
-use super::interface_problem::InterfaceProblem;
 use super::glue::ConstraintKind;
+use super::interface_problem::InterfaceProblem;
 use super::memory::{Recall, Remember};
 use super::{Needs, Outcome, Strategy, linear};
 use terraglue_diagnostics::Result;
@@ -74,7 +74,12 @@ impl Form {
 
     /// The form for the soils of a group: as asked, else by what they offer, what the ports carry and κ of the step before
     /// (0: none was formed).
-    pub fn choose(form: Option<Self>, kappa: f64, problem: &InterfaceProblem, instances: &[Instance]) -> Self {
+    pub fn choose(
+        form: Option<Self>,
+        kappa: f64,
+        problem: &InterfaceProblem,
+        instances: &[Instance],
+    ) -> Self {
         let takes = |c| problem.ground_slots().all(|s| instances[s].capabilities().has(c));
         match form {
             _ if problem.needs_linearisation() => Self::Tt,
@@ -142,7 +147,12 @@ impl Iterative {
         }
     }
 
-    fn run(&mut self, form: Form, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<Outcome> {
+    fn run(
+        &mut self,
+        form: Form,
+        problem: &mut InterfaceProblem,
+        instances: &mut [Instance],
+    ) -> Result<Outcome> {
         problem.t.copy_from_slice(&self.start);
         problem.report.xt_form = form == Form::Xt;
         let outcome = match form {

@@ -7,8 +7,8 @@
 
 use super::super::Outcome;
 use super::super::complementarity::{BoundedProblem, BoundedSolver};
-use super::super::interface_problem::InterfaceProblem;
 use super::super::glue::ConstraintKind;
+use super::super::interface_problem::InterfaceProblem;
 use super::super::linear::max_norm;
 use super::super::memory::Recall;
 use super::super::refresh::Refresh;
@@ -103,7 +103,7 @@ impl TtForm {
             // where Λ is nearly singular, rounding of the places is all that is left in e, and Λ·e never ends
             let rounding = !soils && size > 0.5 * last && left <= ROUNDING_M;
             if size <= limits.threshold(problem) || rounding {
-                problem.settle_bodies(instances)?;
+                problem.repeat_bodies_trial(instances)?;
                 return Ok(self.converged(problem, size));
             }
             if !solved {
@@ -135,7 +135,11 @@ impl TtForm {
     }
 
     /// One Newton step from `problem.t` and no check: two evaluations of the bodies.
-    pub fn one_step(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<Outcome> {
+    pub fn one_step(
+        &mut self,
+        problem: &mut InterfaceProblem,
+        instances: &mut [Instance],
+    ) -> Result<Outcome> {
         problem.advance_bodies(instances)?;
         self.evaluate_grounds(problem, instances)?;
         if problem.needs_linearisation() {
@@ -203,7 +207,9 @@ impl TtForm {
             for (i, _) in port.components() {
                 let (lower, upper) = match problem.rows[i] {
                     ConstraintKind::Normal => (port.law.t_min, port.law.t_max),
-                    ConstraintKind::Law | ConstraintKind::Joint | ConstraintKind::Coulomb => (f64::NEG_INFINITY, f64::INFINITY),
+                    ConstraintKind::Law | ConstraintKind::Joint | ConstraintKind::Coulomb => {
+                        (f64::NEG_INFINITY, f64::INFINITY)
+                    }
                 };
                 self.lower.push(lower);
                 self.upper.push(upper);

@@ -119,7 +119,11 @@ impl XtForm {
         self.evaluate_grounds(problem, instances)
     }
 
-    fn evaluate_grounds(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<f64> {
+    fn evaluate_grounds(
+        &mut self,
+        problem: &mut InterfaceProblem,
+        instances: &mut [Instance],
+    ) -> Result<f64> {
         problem.advance_grounds_under_motion(instances)?;
         self.residual.clear();
         self.residual.extend(problem.t.iter().zip(&problem.f).map(|(t, f)| t - f));

@@ -8,8 +8,8 @@
 mod answers;
 mod calls;
 mod channel;
-mod law;
 mod fork_server;
+mod law;
 mod proxy;
 mod python;
 mod tiles;
@@ -17,8 +17,8 @@ mod wire;
 mod worker;
 
 pub use channel::{confine, end_group};
-pub(super) use law::IsolatedLaw;
 pub use fork_server::{FORK_SERVER, ForkServer};
+pub(super) use law::IsolatedLaw;
 pub use python::SDK;
 pub use worker::serve;
 

@@ -80,7 +80,14 @@ fn iterated(row: &CompareRow) -> bool {
 
 macro_rules! column {
     ($key:literal, $group:literal, $title:literal, $unit:literal, $best:ident, $value:expr) => {
-        FigureColumn { key: $key, group: $group, title: $title, unit: $unit, best: Best::$best, value: $value }
+        FigureColumn {
+            key: $key,
+            group: $group,
+            title: $title,
+            unit: $unit,
+            best: Best::$best,
+            value: $value,
+        }
     };
 }
 

@@ -5,7 +5,7 @@ use crate::compare::table::{varied, varied_keys};
 use crate::compare::{CompareRow, columns, grounds, overview, relative};
 use crate::reader::Recording;
 use crate::report::energy_card;
-use crate::report::figure::{Curve, Cell, Panel};
+use crate::report::figure::{Cell, Curve, Panel};
 use crate::report::footprints::{self, Leg};
 use crate::report::html::escape;
 use crate::report::page::Page;

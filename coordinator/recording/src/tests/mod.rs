@@ -46,18 +46,20 @@ fn a_recorder_goes_on_in_another_process_to_the_same_bytes() {
         let f = folder();
         let mut fixture = Fixture::new("iterative");
         let mut recorder = Recorder::create(f.path(), &fixture.scenario, options).expect("created");
-        fixture.view(0, &mut |view| terraglue_engine::observer::Observer::started(&mut recorder, view))
+        fixture
+            .view(0, &mut |view| terraglue_engine::observer::Observer::started(&mut recorder, view))
             .expect("started");
         fixture.steps(&mut recorder, 0, at).expect("stepped");
         let (mut state, mut again) = (Vec::new(), None);
         fixture.view(at, &mut |view| recorder.state(view).map(|s| s.write(&mut state))).expect("a state");
         // its end is written, and has to be cut off
         drop(recorder);
-        fixture.view(at, &mut |view| {
-            let state = RecorderState::read(&mut state.as_slice()).expect("the same");
-            Recorder::resume(f.path(), &fixture.scenario, options, view, state).map(|r| again = Some(r))
-        })
-        .expect("resumed");
+        fixture
+            .view(at, &mut |view| {
+                let state = RecorderState::read(&mut state.as_slice()).expect("the same");
+                Recorder::resume(f.path(), &fixture.scenario, options, view, state).map(|r| again = Some(r))
+            })
+            .expect("resumed");
         let mut recorder = again.expect("a recorder");
         fixture.go_on(&mut recorder, at, 1203).expect("ran");
         recorder.finish(2.0, 1.5, None, Status::Done).expect("finished");
@@ -212,10 +214,13 @@ fn what_was_flushed_is_on_disk_before_the_end() {
     let mut fixture = Fixture::new("cooperative");
     let mut recorder =
         Recorder::create(f.path(), &fixture.scenario, RecorderOptions::default()).expect("created");
-    fixture.view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut recorder, v)).expect("started");
+    fixture
+        .view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut recorder, v))
+        .expect("started");
     for k in 1..=250 {
         fixture.parts.iter_mut().for_each(|p| p.1.t = k as f64 * H);
-        fixture.view(k, &mut |v| terraglue_engine::observer::Observer::stepped(&mut recorder, v))
+        fixture
+            .view(k, &mut |v| terraglue_engine::observer::Observer::stepped(&mut recorder, v))
             .expect("stepped");
     }
     let r = Recording::open(f.path()).expect("readable");
@@ -275,10 +280,13 @@ fn a_parameter_is_written_when_it_changes_and_read_at_every_row() {
     let mut fixture = Fixture::new("cooperative");
     let mut recorder =
         Recorder::create(f.path(), &fixture.scenario, RecorderOptions::default()).expect("created");
-    fixture.view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut recorder, v)).expect("started");
+    fixture
+        .view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut recorder, v))
+        .expect("started");
     for step in [5, 10, 15, 20] {
         fixture.parts[0].1.speed = if step < 15 { 0.15 } else { 0.2 };
-        fixture.view(step, &mut |v| terraglue_engine::observer::Observer::stepped(&mut recorder, v))
+        fixture
+            .view(step, &mut |v| terraglue_engine::observer::Observer::stepped(&mut recorder, v))
             .expect("stepped");
     }
     recorder.finish(1.0, 1.0, None, Status::Done).expect("finished");
@@ -381,7 +389,8 @@ fn record_unknown(folder: &Path) -> Summary {
     let mut fixture = Fixture::new("cooperative");
     fixture.single_pass = true;
     fixture.parts[2].1.silent = true;
-    let mut recorder = Recorder::create(folder, &fixture.scenario, RecorderOptions::default()).expect("created");
+    let mut recorder =
+        Recorder::create(folder, &fixture.scenario, RecorderOptions::default()).expect("created");
     fixture.run(&mut recorder, 100).expect("ran");
     recorder.finish(2.0, 1.5, None, Status::Done).expect("finished")
 }
@@ -435,7 +444,9 @@ fn a_nan_is_refused_by_name_and_the_recording_stays_complete() {
     fixture.run(&mut recorder, 0).expect("started");
     let mut recorder =
         Recorder::create(f.path(), &fixture.scenario, RecorderOptions::default()).expect("created");
-    fixture.view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut recorder, v)).expect("started");
+    fixture
+        .view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut recorder, v))
+        .expect("started");
     fixture.parts[1].1.nan = true;
     let error = fixture
         .view(5, &mut |v| terraglue_engine::observer::Observer::stepped(&mut recorder, v))
@@ -443,7 +454,8 @@ fn a_nan_is_refused_by_name_and_the_recording_stays_complete() {
     let text = error.to_string();
     assert!(text.contains("robot") && text.contains("body.x") && text.contains("NaN"), "{text}");
     let error = Some(&error);
-    fixture.view(5, &mut |v| terraglue_engine::observer::Observer::finished(&mut recorder, v, error))
+    fixture
+        .view(5, &mut |v| terraglue_engine::observer::Observer::finished(&mut recorder, v, error))
         .expect("closed");
     let summary = recorder.finish(1.0, 1.0, error, Status::Failed).expect("finished");
     assert_eq!(summary.error.and_then(|e| e.module).as_deref(), Some("rigid-body"));
@@ -582,17 +594,20 @@ fn cost_of_recording() {
     fixture.parts[1].1.widen(700);
     let mut recorder =
         Recorder::create(f.path(), &fixture.scenario, RecorderOptions::default()).expect("created");
-    fixture.view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut recorder, v)).expect("started");
+    fixture
+        .view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut recorder, v))
+        .expect("started");
     let (mut in_recorder, n) = (std::time::Duration::ZERO, 5000);
     for index in 1..=n {
         fixture.parts.iter_mut().for_each(|p| p.1.t = index as f64 * H);
-        fixture.view(index, &mut |v| {
-            let start = std::time::Instant::now();
-            let r = terraglue_engine::observer::Observer::stepped(&mut recorder, v);
-            in_recorder += start.elapsed();
-            r
-        })
-        .expect("stepped");
+        fixture
+            .view(index, &mut |v| {
+                let start = std::time::Instant::now();
+                let r = terraglue_engine::observer::Observer::stepped(&mut recorder, v);
+                in_recorder += start.elapsed();
+                r
+            })
+            .expect("stepped");
     }
     recorder.finish(1.0, 1.0, None, Status::Done).expect("finished");
     let size = std::fs::metadata(f.path().join(RECORDING)).expect("written").len();

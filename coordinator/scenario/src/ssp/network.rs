@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use terraglue_fmi::description::{ModelDescription, Variable};
 use terraglue_fmi::ssp::{
-    Component, Connector, Dictionary, SystemElement, End, Package, System, Table, Transformation,
+    Component, Connector, Dictionary, End, Package, System, SystemElement, Table, Transformation,
 };
 use terraglue_fmi::{Error, Fmu, Result};
 use terraglue_subsystem::unit::Unit;
@@ -250,7 +250,12 @@ impl<'a> Network<'a> {
     }
 
     /// Where an edge comes from in the end, and the value at its end.
-    fn traced(&self, package: &Package, edge: &Edge, left: usize) -> Result<Option<(ConnectorPath, Carried)>> {
+    fn traced(
+        &self,
+        package: &Package,
+        edge: &Edge,
+        left: usize,
+    ) -> Result<Option<(ConnectorPath, Carried)>> {
         if self.part(&edge.start.0).is_some() {
             let value = self.along(package, edge, &Carried::new(self.unit(&edge.start)))?;
             return Ok(Some((edge.start.clone(), value)));
@@ -277,7 +282,12 @@ impl<'a> Network<'a> {
     ///
     /// # Errors
     /// As of [`Network::ways`].
-    pub fn leads_to(&self, package: &Package, key: &ConnectorPath, value: Carried) -> Result<Vec<(ConnectorPath, Carried)>> {
+    pub fn leads_to(
+        &self,
+        package: &Package,
+        key: &ConnectorPath,
+        value: Carried,
+    ) -> Result<Vec<(ConnectorPath, Carried)>> {
         let mut found = Vec::new();
         let mut open = vec![(key.clone(), value, self.edges.len())];
         while let Some((key, value, left)) = open.pop() {

@@ -6,7 +6,7 @@
 use super::network::{Carried, ConnectorPath, Network, below, refused, shown};
 use std::collections::BTreeMap;
 use terraglue_fmi::Result;
-use terraglue_fmi::ssp::{Binding, SystemElement, Package, Parameter, System, Transformation, Value};
+use terraglue_fmi::ssp::{Binding, Package, Parameter, System, SystemElement, Transformation, Value};
 use terraglue_subsystem::{ValueType, unit::Unit};
 
 /// Start values by the path of the FMU and the name of the variable.
@@ -96,7 +96,8 @@ fn to_system(
     if system.connectors.iter().any(|c| c.name == given.target) {
         return along(package, network, (path.to_owned(), given.target.clone()), &given, values);
     }
-    let inside = |e: &&SystemElement| given.target.strip_prefix(e.name()).is_some_and(|rest| rest.starts_with('.'));
+    let inside =
+        |e: &&SystemElement| given.target.strip_prefix(e.name()).is_some_and(|rest| rest.starts_with('.'));
     let Some(element) = system.elements.iter().filter(inside).max_by_key(|e| e.name().len()) else {
         values.notes.push(format!("the parameter {} fits nothing", shown(&(path.to_owned(), given.target))));
         return Ok(());
@@ -116,7 +117,13 @@ fn to_system(
 }
 
 /// Gives a parameter to all FMUs that a connector of a system leads to.
-fn along(package: &Package, network: &Network, key: ConnectorPath, given: &Given, values: &mut Values) -> Result {
+fn along(
+    package: &Package,
+    network: &Network,
+    key: ConnectorPath,
+    given: &Given,
+    values: &mut Values,
+) -> Result {
     let unit = network.unit(&key);
     let mut value = start(package, &key, given, unit)?;
     value.unit = unit.or(given.parameter.unit);
@@ -138,7 +145,13 @@ fn start(package: &Package, key: &ConnectorPath, given: &Given, unit: Option<Uni
 }
 
 /// Gives a parameter to a variable of an FMU.
-fn set(package: &Package, network: &Network, key: ConnectorPath, given: &Given, values: &mut Values) -> Result {
+fn set(
+    package: &Package,
+    network: &Network,
+    key: ConnectorPath,
+    given: &Given,
+    values: &mut Values,
+) -> Result {
     let carried = start(package, &key, given, network.unit(&key))?;
     keep(package, network, key, &given.parameter.value, &carried, values)
 }

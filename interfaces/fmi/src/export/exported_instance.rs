@@ -256,10 +256,7 @@ impl ExportedInstance {
         self.expect("a step", &[Phase::Running])?;
         let slack = 1e-9 * h.abs().max(self.time.abs());
         if !((t - self.time).abs() <= slack) {
-            return wrong(format!(
-                "the step begins at t = {t} s, but the FMU stands at t = {} s",
-                self.time
-            ));
+            return wrong(format!("the step begins at t = {t} s, but the FMU stands at t = {} s", self.time));
         }
         if !(h.is_finite() && h > 0.0) {
             return wrong(format!("a step of {h} s cannot be made"));
@@ -330,7 +327,11 @@ impl ExportedInstance {
     }
 
     fn can(&self, what: Capabilities, name: &str) -> Answer {
-        if self.subsystem.capabilities().has(what) { Ok(()) } else { wrong(format!("this FMU cannot {name}")) }
+        if self.subsystem.capabilities().has(what) {
+            Ok(())
+        } else {
+            wrong(format!("this FMU cannot {name}"))
+        }
     }
 
     fn saving(&self) -> Answer {

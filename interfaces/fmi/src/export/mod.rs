@@ -5,8 +5,8 @@
 //! [`pack`] the archive. The functions of the C interfaces, which wrap a [`ExportedInstance`], stand in the library that goes
 //! into the archive.
 
-mod exported_instance;
 mod describe;
+mod exported_instance;
 mod layout;
 mod pack;
 mod states;
@@ -14,8 +14,8 @@ mod terminals;
 mod values;
 mod xml;
 
-pub use exported_instance::{ExportedInstance, Mailbox, Open, Opened, Opening, Phase, Reached};
 pub use describe::{About, describe, identifier};
+pub use exported_instance::{ExportedInstance, Mailbox, Open, Opened, Opening, Phase, Reached};
 pub use layout::{Entry, Layout};
 pub use pack::{Content, pack};
 pub use states::Handle;

@@ -146,7 +146,9 @@ impl FmuInstance {
                 let text = "answered the status pending, although nothing was to be done in the background";
                 (Health::Dead, text.to_owned())
             }
-            CallStatus::Unknown(n) => (Health::Dead, format!("answered {n}, which is no status of the standard")),
+            CallStatus::Unknown(n) => {
+                (Health::Dead, format!("answered {n}, which is no status of the standard"))
+            }
             CallStatus::Ok | CallStatus::Warning => (Health::Good, "succeeded".to_owned()),
         };
         self.health.set(health);

@@ -4,7 +4,7 @@
 use super::functions::Api;
 use super::intervals::ToldClock;
 use super::log::InstanceLog;
-use super::{InstancePhase, FmuInstance};
+use super::{FmuInstance, InstancePhase};
 use crate::description::{Causality, Ticks, Variable};
 use crate::error::{Error, Result};
 use terraglue_subsystem::ValueType;
@@ -159,7 +159,7 @@ impl FmuInstance {
         self.call("fmi3EnterEventMode", three.enter_event_mode, |f, c| unsafe { f(c) })?;
         // a periodic clock that ticks at t did so when the step before ended there
         self.tick_without_periodic(t, true)?;
-        let end = self.settle_events(t)?;
+        let end = self.update_discrete_states(t)?;
         self.call("fmi3EnterStepMode", three.enter_step_mode, |f, c| unsafe { f(c) })?;
         Ok(end)
     }

@@ -1,7 +1,7 @@
 //! Structural parameters: set in configuration mode, before the initialisation; they give arrays their sizes (FMI 3.0, 2.3.5).
 
 use super::functions::Api;
-use super::{InstancePhase, FmuInstance};
+use super::{FmuInstance, InstancePhase};
 use crate::description::{Causality, Variable};
 use crate::error::{Error, Result};
 use std::sync::Arc;

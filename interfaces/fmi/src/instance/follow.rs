@@ -122,7 +122,12 @@ impl FmuInstance {
 
     /// The error of a step in which an intermediate update went wrong.
     #[cold]
-    pub(super) fn stopped_between(&self, function: &'static str, wrong: StepFault, status: CallStatus) -> Error {
+    pub(super) fn stopped_between(
+        &self,
+        function: &'static str,
+        wrong: StepFault,
+        status: CallStatus,
+    ) -> Error {
         let dead = wrong.fatal || !goes_on(status) && status != CallStatus::Error;
         let error = self.lied(function, wrong.text);
         if dead {

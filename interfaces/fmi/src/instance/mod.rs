@@ -26,7 +26,7 @@ use crate::description::ModelDescription;
 use crate::error::{Error, Result};
 use crate::floating_point::Keep;
 use crate::fmu::Fmu;
-use call::{Health, CallStatus};
+use call::{CallStatus, Health};
 use clocks::Clocks;
 use functions::{Api, Callbacks2, InstanceHandle};
 use log::InstanceLog;
@@ -276,7 +276,7 @@ impl FmuInstance {
                     self.clocks.told.iter().for_each(|clock| clock.begin(self.start));
                     self.tick(self.start, true)?;
                     self.forget_triggers();
-                    self.settle_events(self.start)?;
+                    self.update_discrete_states(self.start)?;
                     self.call("fmi3EnterStepMode", three.enter_step_mode, |f, c| unsafe { f(c) })?;
                 }
             }

@@ -2,7 +2,7 @@
 
 use super::call::CallStatus;
 use super::functions::{Api, Three};
-use super::{InstancePhase, FmuInstance, goes_on};
+use super::{FmuInstance, InstancePhase, goes_on};
 use crate::error::{Error, Result};
 use crate::floating_point::Mode;
 use std::ffi::c_int;
@@ -189,7 +189,7 @@ impl FmuInstance {
                 if at_stop {
                     self.tick(stop, false)?;
                 }
-                if self.settle_events(now)? {
+                if self.update_discrete_states(now)? {
                     return Ok(Stepped { reached: last, terminate: true, events });
                 }
                 self.call("fmi3EnterStepMode", enter_step_mode, |f, c| unsafe { f(c) })?;
@@ -225,7 +225,7 @@ impl FmuInstance {
     }
 
     /// Updates discrete states at t until nothing changes and no clock ticks; whether the FMU asks for the end.
-    pub(super) fn settle_events(&mut self, t: f64) -> Result<bool> {
+    pub(super) fn update_discrete_states(&mut self, t: f64) -> Result<bool> {
         const NAME: &str = "fmi3UpdateDiscreteStates";
         let Api::Three(three) = self.api else { return Ok(false) };
         for _ in 0..ROUNDS {

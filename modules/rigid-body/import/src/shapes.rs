@@ -43,14 +43,16 @@ impl<'a> Shapes<'a> {
             if self.is_nothing(link, &c.geometry) {
                 continue;
             }
-            let place = ShapePlace { link, name: c.name.as_deref(), origin: &c.origin, collides: true, still };
+            let place =
+                ShapePlace { link, name: c.name.as_deref(), origin: &c.origin, collides: true, still };
             shapes.push(self.shape(place, &c.geometry)?);
         }
         for v in &link.visual {
             if self.is_nothing(link, &v.geometry) {
                 continue;
             }
-            let place = ShapePlace { link, name: v.name.as_deref(), origin: &v.origin, collides: false, still };
+            let place =
+                ShapePlace { link, name: v.name.as_deref(), origin: &v.origin, collides: false, still };
             let seen = match self.shape(place, &v.geometry) {
                 Ok(seen) => seen,
                 // A picture that cannot be drawn does no harm to the simulation.

@@ -55,7 +55,8 @@ impl Actuator {
     pub fn restart_book(&mut self) {
         let EnergyLedger { power, electrical_power, friction, stop, .. } = self.ledger;
         let electrical = 0.5 * self[Item::Inductance] * self.current * self.current;
-        self.ledger = EnergyLedger { power, electrical_power, friction, stop, electrical, ..EnergyLedger::default() };
+        self.ledger =
+            EnergyLedger { power, electrical_power, friction, stop, electrical, ..EnergyLedger::default() };
     }
 
     /// Advances the actuator by a step of length h at the voltage of the supply; adds to what is drawn from it.

@@ -14,9 +14,9 @@
 //! The one knob is `max_torque`: it bounds the torque at the joint whatever drives it.
 
 pub(crate) mod battery;
-pub(crate) mod energy_ledger;
 pub(crate) mod configure;
 pub(crate) mod curve;
+pub(crate) mod energy_ledger;
 pub(crate) mod friction;
 pub(crate) mod settings;
 mod thermal;

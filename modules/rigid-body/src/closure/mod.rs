@@ -139,7 +139,9 @@ impl Closure {
                     cut.parts = [Some((joint.child, rows.on_child(r))), parent, None, None];
                 }
             }
-            ClosureLaw::Rod(points, length) => out[0].parts = points.row(poses, &(points.mean(poses).0 / *length)),
+            ClosureLaw::Rod(points, length) => {
+                out[0].parts = points.row(poses, &(points.mean(poses).0 / *length))
+            }
             ClosureLaw::Spring(points, _) => {
                 let (apart, length) = points.mean(poses);
                 let direction = if length > 0.0 { apart / length } else { V3::x() };

@@ -91,13 +91,21 @@ impl PairPattern<'_> {
 }
 
 /// The number of all pairs, and those of some.
-fn read<'a>(config: &'a Config, (key, default, ..): SurfaceParameter, names: &[&str]) -> Result<(f64, Vec<PairPattern<'a>>)> {
+fn read<'a>(
+    config: &'a Config,
+    (key, default, ..): SurfaceParameter,
+    names: &[&str],
+) -> Result<(f64, Vec<PairPattern<'a>>)> {
     let Some(Value::Object(table)) = config.get(key) else { return Ok((config.number(key)?, Vec::new())) };
     let everywhere = table.get(ALL).and_then(Value::as_f64).unwrap_or(default);
     Ok((everywhere, rows(key, table, names)?))
 }
 
-fn rows<'a>(key: &str, table: &'a serde_json::Map<String, Value>, names: &[&str]) -> Result<Vec<PairPattern<'a>>> {
+fn rows<'a>(
+    key: &str,
+    table: &'a serde_json::Map<String, Value>,
+    names: &[&str],
+) -> Result<Vec<PairPattern<'a>>> {
     let row = |(pattern, value): (&'a String, &Value)| {
         let wrong = |text: &str| Error::Refused(format!("parameter `{key}`: `{pattern}` {text}"));
         let (a, b) = pattern

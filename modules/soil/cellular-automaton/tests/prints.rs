@@ -37,7 +37,7 @@ fn stands(config: &str, kind: u32, spacing: f64, depth: f64, yaw: f64) -> Feet {
         rig.step(|_| at(low - depth));
         rig.soil.material().active_nodes() == 0
     });
-    assert!(rests, "{} nodes are awake", rig.soil.material().active_nodes());
+    assert!(rests, "{} nodes are active", rig.soil.material().active_nodes());
     rig
 }
 

@@ -55,7 +55,7 @@ pub trait Material: Send {
     /// After the laws have taken a step of h seconds: puts the material where it belongs. `covered` are the nodes
     /// below feet. `most` (J): the gravitational energy that the step can pay for; what would gain more waits. Returns the
     /// gravitational energy that the material has gained, J; what it loses becomes heat.
-    fn settle(&mut self, ground: &mut Ground, covered: &[Covered], most: f64, h: f64) -> f64;
+    fn redistribute(&mut self, ground: &mut Ground, covered: &[Covered], most: f64, h: f64) -> f64;
     /// Copies the state into `out`.
     fn save(&self, _out: &mut Self::Saved) {}
     /// Whether a saved state speaks of nodes of this ground only.
@@ -382,13 +382,14 @@ impl<M: Material> Subsystem for FieldSoil<M> {
         let prints = self.patches.prints;
         let scene = bookkeeping::Scene { patches: &self.patches, h: step.h };
         let heat = self.ledger.dissipated;
-        let taken = scene.commit(step.ports, t, partner.x, &mut self.ground, &mut self.lists, &mut self.ledger);
+        let taken =
+            scene.commit(step.ports, t, partner.x, &mut self.ground, &mut self.lists, &mut self.ledger);
         self.patches.forget();
         self.last.clear();
         taken?;
         // the prints in which bodies stand at the start were made before
         let most = if prints { f64::INFINITY } else { self.ledger.dissipated - heat - self.ledger.owed };
-        let lifted = self.material.settle(&mut self.ground, &self.lists.covered, most, step.h);
+        let lifted = self.material.redistribute(&mut self.ground, &self.lists.covered, most, step.h);
         let lifted = if prints { 0.0 } else { lifted };
         self.ledger.lifted += lifted;
         self.ledger.pay(lifted, heat);

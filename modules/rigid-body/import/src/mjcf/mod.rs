@@ -47,8 +47,13 @@ pub fn read_mjcf_text(file: &str, text: &str, options: &Options) -> Result<Robot
     survey(&defaults, root)?;
     let assets = Assets::read(&defaults, root, &options.folders(file))?;
     let robot = empty(root.attribute("model").unwrap_or("robot"));
-    let mut reader =
-        MjcfReader { d: &defaults, robot, assets: &assets, frames: BTreeMap::new(), ignored: Ignored::default() };
+    let mut reader = MjcfReader {
+        d: &defaults,
+        robot,
+        assets: &assets,
+        frames: BTreeMap::new(),
+        ignored: Ignored::default(),
+    };
     reader.sections(root)?;
     let mut robot = reader.robot;
     robot.warnings.extend(reader.ignored.warnings());
@@ -130,8 +135,11 @@ impl<'d, 's> MjcfReader<'d, 's> {
                 .filter(Node::is_element)
         };
         for node in root.children().filter(|n| n.has_tag_name("worldbody")) {
-            let world =
-                ElementPlace { body: None, frame: Isometry3::identity(), class: node.attribute("childclass") };
+            let world = ElementPlace {
+                body: None,
+                frame: Isometry3::identity(),
+                class: node.attribute("childclass"),
+            };
             self.contents(node, world, "world")?;
         }
         for node in section("contact") {
@@ -174,7 +182,12 @@ impl<'d, 's> MjcfReader<'d, 's> {
     }
 
     /// Geoms and bodies of a body or the world, which are at `place`.
-    fn contents<'a>(&mut self, node: Node<'a, '_>, place: ElementPlace<'a>, owner: &str) -> Result<(), Error> {
+    fn contents<'a>(
+        &mut self,
+        node: Node<'a, '_>,
+        place: ElementPlace<'a>,
+        owner: &str,
+    ) -> Result<(), Error> {
         for child in node.children().filter(Node::is_element) {
             match child.tag_name().name() {
                 "geom" => self.shape(child, place, owner)?,

@@ -68,7 +68,7 @@ fn all(bodies: &[Body], of: fn(&Body) -> Six) -> (Vec<u32>, Vec<usize>) {
 
 impl Bodies {
     /// Whether derivatives can tell dA/d(wrench): every force and moment has its acceleration, none in an array.
-    pub fn tell_slopes(&self) -> bool {
+    pub fn tell_derivatives(&self) -> bool {
         let own = |body: &Body| {
             inputs(body).iter().zip(outputs(body)).all(|(input, output)| match (input, output) {
                 (None, _) => true,
@@ -80,7 +80,14 @@ impl Bodies {
     }
 
     /// dX, dV or dA/d(wrench on itself), n × n, column-major, from the FMU's derivatives.
-    pub fn slopes(&self, instance: &FmuInstance, step: &Step, level: Level, out: &mut [f64], fail: Fail) -> Result {
+    pub fn jacobian(
+        &self,
+        instance: &FmuInstance,
+        step: &Step,
+        level: Level,
+        out: &mut [f64],
+        fail: Fail,
+    ) -> Result {
         let components = self.components(instance, step, level, fail)?;
         match instance.description().capabilities.directional_derivatives {
             true => self.columns(instance, &components, out, fail)?,
@@ -96,7 +103,13 @@ impl Bodies {
     }
 
     /// All packed components: pushed with the arms of the start of the step, answered as the last trial of it has turned.
-    fn components(&self, instance: &FmuInstance, step: &Step, level: Level, fail: Fail) -> Result<Vec<Component>> {
+    fn components(
+        &self,
+        instance: &FmuInstance,
+        step: &Step,
+        level: Level,
+        fail: Fail,
+    ) -> Result<Vec<Component>> {
         let mut out = Vec::new();
         for port in step.ports {
             let b = port.body as usize;
@@ -114,7 +127,13 @@ impl Bodies {
     }
 
     /// dA/d(wrench on itself) by directional derivatives: one call for each component of the wrench.
-    fn columns(&self, instance: &FmuInstance, components: &[Component], out: &mut [f64], fail: Fail) -> Result {
+    fn columns(
+        &self,
+        instance: &FmuInstance,
+        components: &[Component],
+        out: &mut [f64],
+        fail: Fail,
+    ) -> Result {
         let (unknowns, first) = all(&self.all, outputs);
         let mut change = vec![f64::NAN; unknowns.len()];
         for column in components {

@@ -12,7 +12,7 @@ const NEAR: f64 = 1e-5;
 
 /// The derivatives and what they belong to.
 #[derive(Default)]
-pub(crate) struct Slopes {
+pub(crate) struct PortJacobian {
     matrices: [Vec<f64>; 3],
     /// Factorisation they belong to; 0: none.
     of: u64,
@@ -22,7 +22,7 @@ pub(crate) struct Slopes {
     sensitivity: Sensitivity,
 }
 
-impl Slopes {
+impl PortJacobian {
     /// The derivatives at a level, n × n, column-major, at the last trial.
     pub fn at(&mut self, level: Level, list: &[Port], ports: &Ports, dynamics: &mut Dynamics) -> &[f64] {
         let n = ports.len();

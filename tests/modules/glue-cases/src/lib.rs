@@ -10,13 +10,13 @@
 mod chain;
 mod columns;
 mod dense;
-mod driven_bodies;
+mod feet;
 mod mechanism;
 mod planar;
 mod scheme;
 
 pub use chain::MassChain;
 pub use columns::PowerColumns;
-pub use driven_bodies::TableOnFeet;
+pub use feet::TableOnFeet;
 pub use planar::PlanarBodies;
 pub use scheme::Scheme;

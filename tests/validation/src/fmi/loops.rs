@@ -1,6 +1,6 @@
 //! Loops of connections at the start: solved to 1e-10, or refused by name.
 
-use super::{built, testbed, fmus};
+use super::{built, fmus, testbed};
 use crate::process::Outcome;
 use crate::{Figure, Limit};
 use std::path::Path;

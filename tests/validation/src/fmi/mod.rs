@@ -3,6 +3,7 @@
 
 mod cost;
 mod cycles;
+pub(super) mod fmus;
 mod folder;
 mod hostile;
 mod loops;
@@ -10,7 +11,6 @@ mod pair;
 mod reference;
 mod third_party;
 mod turning;
-pub(super) mod fmus;
 mod watched;
 
 use super::{Context, Part};

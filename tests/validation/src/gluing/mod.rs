@@ -5,7 +5,8 @@
 //! `tests/reference/gluing/README.md`.
 
 mod extrapolate;
-mod driven_bodies;
+mod feet;
+mod fmus;
 mod foot;
 mod holds;
 mod linear;
@@ -20,7 +21,6 @@ mod squeezer;
 mod step_control;
 mod stiffness;
 mod table;
-mod fmus;
 mod walk_forms;
 
 use super::{Context, Figure, Limit, Part};
@@ -35,7 +35,7 @@ pub const PARTS: [Part; 11] = [
     ("squeezer", squeezer::figures),
     ("step-control", step_control::figures),
     ("units", fmus::figures),
-    ("feet", driven_bodies::figures),
+    ("feet", feet::figures),
     ("stiffness", stiffness::figures),
     ("overhead", overhead::figures),
     ("walk-forms", walk_forms::figures),

@@ -162,7 +162,13 @@ fn cases(quick: bool) -> Vec<EnergyCase> {
 }
 
 fn of([way, soil, strategy, row, grid]: [usize; 5]) -> EnergyCase {
-    EnergyCase { way, soil: SOILS[soil], strategy: STRATEGIES[strategy], row: ROWS[row], spacing: SPACINGS[grid] }
+    EnergyCase {
+        way,
+        soil: SOILS[soil],
+        strategy: STRATEGIES[strategy],
+        row: ROWS[row],
+        spacing: SPACINGS[grid],
+    }
 }
 
 /// The largest drift of each way over its soils, strategies, rows and grids.

@@ -170,8 +170,15 @@ fn load_control(context: &Context, module: &str, make: Maker) -> Outcome<Figure>
     let rows = eight()?;
     let rows = if context.quick { vec![rows[2].clone(), rows[7].clone()] } else { rows };
     let shapes: &[usize] = if context.quick { &[1] } else { &[0, 1, 2, 3, 4, 5] };
-    let case = |row: &SoilRow, shape| PlateCase { make, row: row.clone(), shape, spacing: 0.01, quick: context.quick };
-    let cases: Vec<PlateCase> = rows.iter().flat_map(|row| shapes.iter().map(move |s| case(row, *s))).collect();
+    let case = |row: &SoilRow, shape| PlateCase {
+        make,
+        row: row.clone(),
+        shape,
+        spacing: 0.01,
+        quick: context.quick,
+    };
+    let cases: Vec<PlateCase> =
+        rows.iter().flat_map(|row| shapes.iter().map(move |s| case(row, *s))).collect();
     let errors = in_parallel(&cases, PlateCase::loaded);
     let worst = errors.into_iter().reduce(larger).unwrap_or(f64::NAN);
     let what = "largest error of the sinkage under 5 to 200 N, %, 1 cm grid";

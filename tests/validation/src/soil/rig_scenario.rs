@@ -1,6 +1,6 @@
 //! `scenarios/wheel_rig.toml` as a user runs it, against the integral of the stresses: sinkage and drawbar pull by slip.
 
-use super::rows::{EIGHT, SoilRow, STIFF, eight};
+use super::rows::{EIGHT, STIFF, SoilRow, eight};
 use super::wong_reece::wheel_on;
 use crate::parallel::in_parallel;
 use crate::process::{Outcome, read, run_scenario};

@@ -1,7 +1,7 @@
 //! Wheels: the soils against the integral of Wong and Reece over the same stresses, and against its shifted peak.
 
 use super::plates::Maker;
-use super::rows::{SoilRow, STIFF, eight};
+use super::rows::{STIFF, SoilRow, eight};
 use super::wheel_rig::{Bench, Reading};
 use super::wong_reece::{wheel_of, wheel_on};
 use super::{MODULES, STILL, real_wheel};
@@ -116,7 +116,16 @@ fn cases(context: &Context, make: Maker, peak: [f64; 2], still: bool) -> Outcome
                 if !context.quick || shown && (slip == 0.2 || slip == 0.6) {
                     let spacing = SPACINGS[usize::from(!context.quick)];
                     let (name, wheel) = (wheel, wheel_of(wheel).ok_or("no such wheel")?);
-                    cases.push(WheelCase { name, make, soil: soil.clone(), wheel, slip, peak, spacing, still });
+                    cases.push(WheelCase {
+                        name,
+                        make,
+                        soil: soil.clone(),
+                        wheel,
+                        slip,
+                        peak,
+                        spacing,
+                        still,
+                    });
                 }
             }
         }

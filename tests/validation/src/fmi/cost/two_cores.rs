@@ -1,6 +1,6 @@
 //! What a second core brings to FMUs that cost more than 20 µs a step.
 
-use super::super::{testbed_on, fmus};
+use super::super::{fmus, testbed_on};
 use crate::process::Outcome;
 use crate::{Figure, Limit};
 use std::path::Path;

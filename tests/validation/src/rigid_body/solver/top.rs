@@ -85,7 +85,8 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     for scheme in ["symplectic-euler", "generalized-alpha", "energy-momentum"] {
         let first = scheme == "symplectic-euler";
         let steps = [1e-3, 5e-4, 2.5e-4];
-        let runs: Vec<TopRun> = steps.iter().map(|h| run(&file, scheme, *h, &exact)).collect::<Outcome<_>>()?;
+        let runs: Vec<TopRun> =
+            steps.iter().map(|h| run(&file, scheme, *h, &exact)).collect::<Outcome<_>>()?;
         let [a, b, c] = [0, 1, 2].map(|k| runs[k].axis);
         let id = format!("rigid-body.heavy_top.{scheme}");
         let what = format!(

@@ -3,7 +3,7 @@
 mod cone;
 mod cost;
 #[path = "../../../../../modules/soil/cellular-automaton/tests/feet/mod.rs"]
-mod driven_bodies;
+mod feet;
 mod field;
 mod footprint;
 mod geometry;
@@ -12,7 +12,7 @@ mod machine;
 mod mass;
 mod picture;
 
-pub use driven_bodies::Soil;
+pub use feet::Soil;
 pub use hash::print as print_hash;
 pub use picture::write_picture;
 
@@ -45,5 +45,5 @@ pub fn cost(context: &Context) -> Outcome<Vec<Figure>> {
 pub fn automaton_on(config: &str, size: u32, spacing: f64) -> Soil {
     let terrain = field::Function { size: [size; 2], spacing, height: |_, _| 0.0 };
     let machine = std::sync::Arc::new(machine::Machine::new(Box::new(terrain), 1));
-    driven_bodies::instance::<terraglue_soil_cellular_automaton::SoilCellularAutomaton>(config, machine)
+    feet::instance::<terraglue_soil_cellular_automaton::SoilCellularAutomaton>(config, machine)
 }

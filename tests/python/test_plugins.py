@@ -233,7 +233,7 @@ def test_modules_are_listed_without_running_them(tmp_path):
     assert "my-soil" in told and "soil" in told and "hidden by" in told and "cut off after 900 bytes" in told.replace("- ", "-")
     process = terraglue("modules", "my-soil", "--module-path", place)
     assert process.returncode == 0, process.stderr
-    assert "my-soil (soil)" in process.stdout and "ABI: 2." in process.stdout
+    assert "my-soil (soil)" in process.stdout and "ABI: 3." in process.stdout
     assert "can: force, motion, derivatives, retry, state, serialize" in process.stdout
     assert "its parameters cannot be asked for: it was ended by signal 6" in process.stdout
     process = terraglue("modules", "soil-bekkr")

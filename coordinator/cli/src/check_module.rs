@@ -29,7 +29,8 @@ pub fn check_module(arguments: &CheckModuleArguments) -> Result<Exit> {
         return in_process(arguments, &module);
     }
     for file in [&arguments.json, &arguments.junit].into_iter().flatten() {
-        let opened = std::fs::OpenOptions::new().append(true).create(true).open(file);
+        let opened = terraglue_subsystem::files::can_create(file)
+            .and_then(|()| std::fs::OpenOptions::new().append(true).create(true).open(file));
         opened.map_err(|e| wrong(format!("{} cannot be written: {e}", file.display())))?;
     }
     let report = check(&module, &options(arguments)?).map_err(wrong)?;

@@ -277,7 +277,7 @@ pub struct Laws {
     /// What an inclined load leaves of its capacity.
     pub inclination: Inclination,
     /// The soil that moves with a foot.
-    pub cone: cone::Material,
+    pub cone: cone::ConeMaterial,
     /// Modulus of loose soil over that of the bed.
     pub loose: f64,
     /// The module behind one or both of them.

@@ -238,7 +238,7 @@ fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>, plugin: Option<&
         rolling: p.rolling,
         direction: p.direction,
         passive: p.strength().passive(),
-        cone: cone::Material {
+        cone: cone::ConeMaterial {
             density: p.added_mass * p.density_kg_m3.unwrap_or(DEFAULT_DENSITY),
             slope: p.strength().passive_coefficient().sqrt(),
         },

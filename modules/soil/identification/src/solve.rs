@@ -1,7 +1,7 @@
 //! Least squares of ln p = ln m + ln(λ·u/u_0 + (1 − λ)·w/w_0) + n·ln x: for a share λ of the cohesive factor the rest
 //! is a straight line, so only λ in 0 … 1 is searched.
 
-use crate::plates::{FitError, FitLaw, Numbers, Reading};
+use crate::plates::{FitError, FitLaw, PlateNumbers, Reading};
 
 /// Points of the coarse search for λ, and halvings of the interval around the best one.
 const COARSE: u32 = 64;
@@ -13,7 +13,7 @@ const SPREAD: f64 = 1e-9;
 type Sample = [f64; 4];
 
 /// The best numbers; `both`: A may differ from 0.
-pub fn solve(law: &FitLaw, readings: &[Reading], both: bool) -> Result<Numbers, FitError> {
+pub fn solve(law: &FitLaw, readings: &[Reading], both: bool) -> Result<PlateNumbers, FitError> {
     if readings.len() < 4 {
         return Err(FitError::TooFew);
     }
@@ -31,7 +31,7 @@ pub fn solve(law: &FitLaw, readings: &[Reading], both: bool) -> Result<Numbers, 
     let share = if both { best_share(&rows) } else { 0.0 };
     let line = Line::through(&rows, share).ok_or(FitError::OneDepth)?;
     let modulus = libm::exp(line.offset);
-    Ok(Numbers {
+    Ok(PlateNumbers {
         cohesive: modulus * share / scale[0],
         frictional: modulus * (1.0 - share) / scale[1],
         n: line.slope,

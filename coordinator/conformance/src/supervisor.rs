@@ -3,7 +3,7 @@
 use super::catalogue::{Area, Test, catalogue};
 use super::check_file::CheckFile;
 use super::finding::{Finding, Outcome};
-use super::report::{Report, Row};
+use super::report::{Report, TestResult};
 use super::{Level, unknown};
 use serde::{Deserialize, Serialize};
 use std::os::unix::process::ExitStatusExt;
@@ -92,7 +92,7 @@ pub fn check(module: &Path, options: &Options) -> Result<Report, String> {
     waiting.retain(|test| match beside.off.iter().find(|(name, _)| name == test.name) {
         None => true,
         Some((_, reason)) => {
-            report.rows.push(Row::new(test, Outcome::Off { reason: reason.clone() }, 0.0));
+            report.rows.push(TestResult::new(test, Outcome::Off { reason: reason.clone() }, 0.0));
             false
         }
     });
@@ -182,7 +182,7 @@ impl Supervisor<'_> {
         let mut running = self.start(test)?;
         loop {
             if let Some((outcome, kind)) = self.ended(&mut running)? {
-                report.rows.push(Row::new(test, outcome, running.since.elapsed().as_secs_f64()));
+                report.rows.push(TestResult::new(test, outcome, running.since.elapsed().as_secs_f64()));
                 return Ok(kind);
             }
             std::thread::sleep(Duration::from_millis(2));
@@ -198,7 +198,7 @@ impl Supervisor<'_> {
                     None => k += 1,
                     Some((outcome, _)) => {
                         let done = running.swap_remove(k);
-                        report.rows.push(Row::new(done.test, outcome, done.since.elapsed().as_secs_f64()));
+                        report.rows.push(TestResult::new(done.test, outcome, done.since.elapsed().as_secs_f64()));
                     }
                 }
             }
@@ -212,7 +212,7 @@ impl Supervisor<'_> {
                 if test.after.iter().any(|name| pending(name)) {
                     k += 1;
                 } else if let Some(by) = report.blocker(test) {
-                    report.rows.push(Row::new(test, Outcome::Blocked { by }, 0.0));
+                    report.rows.push(TestResult::new(test, Outcome::Blocked { by }, 0.0));
                     waiting.remove(k);
                 } else if running.len() < self.options.jobs.max(1) {
                     running.push(self.start(test)?);

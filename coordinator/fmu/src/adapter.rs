@@ -418,7 +418,7 @@ impl Subsystem for FmuSubsystem {
                 true => Capabilities::DERIVATIVES,
                 false => Capabilities::default(),
             };
-        retry | bytes | force | through | fixed | slopes
+        retry | bytes | force | through | fixed | derivatives
     }
 
     fn interface_jacobian(&mut self, step: &Step, level: Level, out: &mut [f64]) -> Result {

@@ -16,12 +16,12 @@ pub mod simulate;
 mod table;
 
 pub use adapter::FmuSubsystem;
-pub use driven_bodies::Feet;
+pub use driven_bodies::DrivenBodiesModule;
 pub use settings::OnNan;
 
 use terraglue_host::Library;
 
 /// What the program brings with it: driven `feet`, and what makes subsystems of FMUs.
 pub fn library() -> Library {
-    Library::new().with::<Feet>().with_fmus(FmuSubsystem::make)
+    Library::new().with::<DrivenBodiesModule>().with_fmus(FmuSubsystem::make)
 }

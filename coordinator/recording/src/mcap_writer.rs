@@ -303,14 +303,14 @@ impl McapWriter {
 
     /// Writes an event.
     pub fn event(&mut self, event: &Event) -> Result {
-        let event = Log {
+        let entry = Log {
             timestamp: Some(timestamp(event.t_s)),
             level: log::Level::Info.into(),
             message: event.what.clone(),
             name: "terraglue".into(),
             ..Log::default()
         };
-        self.put(self.channels.events, event.t_s, &event)
+        self.put(self.channels.events, event.t_s, &entry)
     }
 
     /// Writes the tiles of ground that have changed since they were last written.

@@ -104,7 +104,7 @@ pub(crate) struct Shares {
 impl Axis {
     /// Nothing acts.
     pub fn idle() -> Self {
-        let nothing = Curve::line(Line::ZERO, Tag::MotorLaw);
+        let nothing = Curve::line(Line::ZERO, Tag::Law);
         Self {
             total: nothing,
             motor: nothing,
@@ -125,7 +125,7 @@ impl Axis {
         let a = &j.actuator;
         let bound = h * j.max_torque;
         match law(j, step).yielding(step.yielding, bound) {
-            _ if bound <= 0.0 => self.motor.assign_line(Line::ZERO, Tag::MotorLaw),
+            _ if bound <= 0.0 => self.motor.assign_line(Line::ZERO, Tag::Law),
             law if winding::is_ideal(j) => law.bound_into(bound, &mut self.motor),
             law => self.motor = through_winding(law, j, step),
         }
@@ -225,8 +225,8 @@ impl MotorLaw {
 
     fn curve(self) -> Curve {
         match self {
-            Self::Line(line) => Curve::line(line, Tag::MotorLaw),
-            Self::Rate(rate) => Curve::rigid(rate, Tag::MotorLaw),
+            Self::Line(line) => Curve::line(line, Tag::Law),
+            Self::Rate(rate) => Curve::rigid(rate, Tag::Law),
         }
     }
 
@@ -236,7 +236,7 @@ impl MotorLaw {
             Self::Line(line) => out.assign_bounded(line, bound),
             Self::Rate(rate) => {
                 out.assign_line(Line::level(bound), Tag::High);
-                out.push((rate, Tag::MotorLaw), Line::level(-bound), Tag::Low);
+                out.push((rate, Tag::Law), Line::level(-bound), Tag::Low);
             }
         }
     }

@@ -2,7 +2,7 @@
 
 use crate::actuator::{Actuator, Item, configure};
 use crate::closure::configure::closures;
-use crate::contact::bodies::Law;
+use crate::contact::bodies::ContactLaw;
 use crate::contact::plane::Plane;
 use crate::contact::surfaces::Surfaces;
 use crate::cut;
@@ -103,22 +103,22 @@ impl Module for RigidBody {
             without_rebound(&dynamics.model, &state)?;
         }
         let name = config.text("contact_solver")?;
-        let law = Law::from_name(name).ok_or_else(|| {
-            Error::Refused(format!("parameter `contact_solver` = `{name}` is none of {:?}", Law::NAMES))
+        let law = ContactLaw::from_name(name).ok_or_else(|| {
+            Error::Refused(format!("parameter `contact_solver` = `{name}` is none of {:?}", ContactLaw::NAMES))
         })?;
         let surfaces = Surfaces::from_config(&config, &dynamics.model)?;
         dynamics.contacts.set_surroundings(law, surfaces, ground);
-        settle_loops(&*host, &mut dynamics, &mut state)?;
+        close_loops(&*host, &mut dynamics, &mut state)?;
         Ok(Box::new(Robot::new(host, dynamics, state)?))
     }
 }
 
 /// Counts the rows that loops promise in vain, and takes from the initial rates what loops do not allow.
-fn settle_loops(host: &dyn Host, dynamics: &mut Dynamics, state: &mut State) -> Result<()> {
+fn close_loops(host: &dyn Host, dynamics: &mut Dynamics, state: &mut State) -> Result<()> {
     if dynamics.model.closures.is_empty() {
         return Ok(());
     }
-    let changed = dynamics.settle_closures(state).map_err(|e| Error::Failed(e.to_string()))?;
+    let changed = dynamics.project_rates(state).map_err(|e| Error::Failed(e.to_string()))?;
     if state.redundant_rows > 0 {
         let text = format!(
             "loops: {} of their rows follow from the others; forces there are one of many choices",

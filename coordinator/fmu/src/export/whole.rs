@@ -1,6 +1,6 @@
 //! A whole scenario as one subsystem: what an exported FMU steps.
 
-use super::super::feet;
+use super::super::driven_bodies;
 use terraglue_engine::Testbed;
 use terraglue_engine::testbed::Snapshot;
 use terraglue_host::Reply;

@@ -5,7 +5,7 @@ use crate::compare::table::{varied, varied_keys};
 use crate::compare::{CompareRow, columns, grounds, overview, relative};
 use crate::reader::Recording;
 use crate::report::energy_card;
-use crate::report::figure::{Cell, Curve, Panel};
+use crate::report::figure::{Curve, Figure, Panel};
 use crate::report::footprints::{self, Leg};
 use crate::report::html::escape;
 use crate::report::page::Page;
@@ -205,7 +205,7 @@ fn panel(runs: &[Run], quantity: &str, unit: &str, steps: bool, f: fn(&WindowRec
     Panel::new(quantity, unit, runs.iter().map(curve).collect())
 }
 
-fn gluing(runs: &[Run]) -> Option<Cell> {
+fn gluing(runs: &[Run]) -> Option<Figure> {
     if runs.iter().all(|r| r.recording.gluing.len() < 2) {
         return None;
     }
@@ -216,11 +216,11 @@ fn gluing(runs: &[Run]) -> Option<Cell> {
         panel(runs, "action–reaction gap", "N", false, |w| w.max_action_reaction_gap_n).log(true),
     ];
     let note = "Per step; the largest of all steps since the record before.".into();
-    Some(Cell { id: "gluing", title: "Gluing".into(), note, panels, ..Cell::default() })
+    Some(Figure { id: "gluing", title: "Gluing".into(), note, panels, ..Figure::default() })
 }
 
 /// One picture per foot, all runs in it.
-fn forces(runs: &[Run]) -> Option<Cell> {
+fn forces(runs: &[Run]) -> Option<Figure> {
     let mut feet: Vec<String> = runs.iter().flat_map(|r| r.legs.iter().map(|l| l.body.clone())).collect();
     feet.sort();
     feet.dedup();
@@ -239,10 +239,10 @@ fn forces(runs: &[Run]) -> Option<Cell> {
     };
     let panels = feet.iter().enumerate().map(panel).collect();
     let note = "Force that the ground exerts along its normal on one foot, in every run.".into();
-    Some(Cell { id: "forces", title: "Foot force".into(), note, choices: feet, chosen: 0, panels })
+    Some(Figure { id: "forces", title: "Foot force".into(), note, choices: feet, chosen: 0, panels })
 }
 
-fn body(runs: &[Run]) -> Option<Cell> {
+fn body(runs: &[Run]) -> Option<Figure> {
     let along = |axis: usize| {
         let curve = |run: &Run| {
             let (_, poses) = run.recording.reported_body()?;
@@ -257,6 +257,6 @@ fn body(runs: &[Run]) -> Option<Cell> {
         Panel::new("position y", "m", along(1)),
     ];
     let note = "Origin of the reported body in the world.".into();
-    let figure = Cell { id: "body", title: "Body".into(), note, panels, ..Cell::default() };
+    let figure = Figure { id: "body", title: "Body".into(), note, panels, ..Figure::default() };
     (!figure.panels[0].curves.is_empty()).then_some(figure)
 }

@@ -37,7 +37,7 @@ pub(crate) struct Surfaces {
 }
 
 /// The parameters of the scenario.
-pub(crate) fn parameters() -> impl Iterator<SurfaceParameter = Parameter> {
+pub(crate) fn parameters() -> impl Iterator<Item = Parameter> {
     [FRICTION, RESTITUTION].into_iter().map(|(name, default, most, help)| {
         let help = format!(
             "{help}, for all or by pairs of bodies: `{{ \"{ALL}\" = {default:?}, \"*_foot & {GROUND}\" = … }}`, where `{GROUND}` \

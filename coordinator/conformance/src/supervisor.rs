@@ -198,7 +198,11 @@ impl Supervisor<'_> {
                     None => k += 1,
                     Some((outcome, _)) => {
                         let done = running.swap_remove(k);
-                        report.rows.push(TestResult::new(done.test, outcome, done.since.elapsed().as_secs_f64()));
+                        report.rows.push(TestResult::new(
+                            done.test,
+                            outcome,
+                            done.since.elapsed().as_secs_f64(),
+                        ));
                     }
                 }
             }

@@ -104,7 +104,10 @@ impl Module for RigidBody {
         }
         let name = config.text("contact_solver")?;
         let law = ContactLaw::from_name(name).ok_or_else(|| {
-            Error::Refused(format!("parameter `contact_solver` = `{name}` is none of {:?}", ContactLaw::NAMES))
+            Error::Refused(format!(
+                "parameter `contact_solver` = `{name}` is none of {:?}",
+                ContactLaw::NAMES
+            ))
         })?;
         let surfaces = Surfaces::from_config(&config, &dynamics.model)?;
         dynamics.contacts.set_surroundings(law, surfaces, ground);

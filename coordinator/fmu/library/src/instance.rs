@@ -57,7 +57,7 @@ impl Log {
 
 /// What a handle of the master points at.
 pub struct Instance {
-    pub exported_instance: ExportedInstance,
+    pub fmu: ExportedInstance,
     pub log: Log,
     /// Texts handed out by the last call; valid until the next.
     pub texts: Vec<CString>,
@@ -69,7 +69,7 @@ pub struct Instance {
 
 impl Instance {
     fn say(&self, outcome: &Answer) {
-        for (level, text) in self.exported_instance.mailbox().take() {
+        for (level, text) in self.fmu.mailbox().take() {
             let status = match level {
                 LogLevel::Error => Status::Error,
                 LogLevel::Warning => Status::Warning,
@@ -95,7 +95,7 @@ pub unsafe fn call(handle: *mut c_void, body: impl FnOnce(&mut Instance) -> Answ
         return Status::Error as c_int;
     };
     let done = catch_unwind(AssertUnwindSafe(|| {
-        let outcome = match instance.exported_instance.phase() {
+        let outcome = match instance.fmu.phase() {
             terraglue_fmi::export::Phase::Dead => Err(Wrong {
                 status: Status::Fatal,
                 text: "not called: the FMU failed for good before".into(),
@@ -106,7 +106,7 @@ pub unsafe fn call(handle: *mut c_void, body: impl FnOnce(&mut Instance) -> Answ
         outcome.map_or_else(|wrong| wrong.status as c_int, |()| Status::Ok as c_int)
     }));
     done.unwrap_or_else(|panic| {
-        instance.exported_instance.kill();
+        instance.fmu.kill();
         let text = panic.downcast_ref::<String>().map(String::as_str);
         let text = text.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no reason given");
         instance.log.line(Status::Fatal, &format!("a defect of the FMU: {text}"));
@@ -135,9 +135,8 @@ pub unsafe fn create(
         ExportedInstance::new(terraglue_fmu::export::open, &name, &resources?, Some(&token))
     }));
     match made.unwrap_or_else(|_| Err("a defect of the FMU while it was made".into())) {
-        Ok(exported_instance) => {
-            let instance =
-                Instance { exported_instance, log, texts: Vec::new(), bytes: Vec::new(), serialised: None };
+        Ok(fmu) => {
+            let instance = Instance { fmu, log, texts: Vec::new(), bytes: Vec::new(), serialised: None };
             instance.say(&Ok(()));
             Box::into_raw(Box::new(instance)).cast()
         }
@@ -249,7 +248,7 @@ pub unsafe fn save(handle: *mut c_void, state: *mut *mut c_void) -> c_int {
             let place = &mut room(state, 1)?[0];
             let over = (!place.is_null()).then_some(Handle(*place as usize));
             i.serialised = None;
-            *place = i.exported_instance.save(over)?.0 as *mut c_void;
+            *place = i.fmu.save(over)?.0 as *mut c_void;
             Ok(())
         })
     }
@@ -267,7 +266,7 @@ pub unsafe fn release(handle: *mut c_void, state: *mut *mut c_void) -> c_int {
                 return Ok(());
             }
             i.serialised = None;
-            i.exported_instance.release(Handle(*state as usize))?;
+            i.fmu.release(Handle(*state as usize))?;
             *state = std::ptr::null_mut();
             Ok(())
         })
@@ -277,7 +276,7 @@ pub unsafe fn release(handle: *mut c_void, state: *mut *mut c_void) -> c_int {
 fn bytes_of(i: &mut Instance, state: *mut c_void) -> Answer<&[u8]> {
     let wanted = state as usize;
     if i.serialised.as_ref().is_none_or(|(of, _)| *of != wanted) {
-        i.serialised = Some((wanted, i.exported_instance.serialize(Handle(wanted))?));
+        i.serialised = Some((wanted, i.fmu.serialize(Handle(wanted))?));
     }
     Ok(i.serialised.as_ref().map_or(&[], |(_, bytes)| bytes))
 }
@@ -330,7 +329,7 @@ pub unsafe fn deserialise(
     unsafe {
         call(handle, |i| {
             let place = &mut room(state, 1)?[0];
-            *place = i.exported_instance.deserialize(slice(bytes, size)?)?.0 as *mut c_void;
+            *place = i.fmu.deserialize(slice(bytes, size)?)?.0 as *mut c_void;
             Ok(())
         })
     }

@@ -127,8 +127,8 @@ pub unsafe extern "C" fn fmi3EnterInitializationMode(
     // SAFETY: as above.
     unsafe {
         call(c, |i| {
-            i.component.set_experiment(start, stop_defined.then_some(stop))?;
-            i.component.enter_initialization()
+            i.fmu.set_experiment(start, stop_defined.then_some(stop))?;
+            i.fmu.enter_initialization()
         })
     }
 }
@@ -136,19 +136,19 @@ pub unsafe extern "C" fn fmi3EnterInitializationMode(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3ExitInitializationMode(c: Component) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |i| i.component.exit_initialization()) }
+    unsafe { call(c, |i| i.fmu.exit_initialization()) }
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3Terminate(c: Component) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |i| i.component.terminate()) }
+    unsafe { call(c, |i| i.fmu.terminate()) }
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3Reset(c: Component) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |i| i.component.reset()) }
+    unsafe { call(c, |i| i.fmu.reset()) }
 }
 
 #[unsafe(no_mangle)]
@@ -168,8 +168,8 @@ pub unsafe extern "C" fn fmi3DoStep(
         put(terminate, false);
         put(early_return, false);
         call(c, |i| {
-            let done = i.component.step(t, h);
-            let reached = i.component.reached();
+            let done = i.fmu.step(t, h);
+            let reached = i.fmu.reached();
             put(last_time, reached.time);
             put(terminate, reached.terminate);
             done.map(drop)
@@ -182,12 +182,12 @@ macro_rules! numbers {
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $get(c: Component, vr: Refs, n: usize, out: *mut $t, m: usize) -> c_int {
             // SAFETY: as above.
-            unsafe { call(c, |i| i.component.get::<$t>(slice(vr, n)?, &[$(ValueType::$variant),*], room(out, m)?)) }
+            unsafe { call(c, |i| i.fmu.get::<$t>(slice(vr, n)?, &[$(ValueType::$variant),*], room(out, m)?)) }
         }
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $set(c: Component, vr: Refs, n: usize, values: *const $t, m: usize) -> c_int {
             // SAFETY: as above.
-            unsafe { call(c, |i| i.component.set::<$t>(slice(vr, n)?, &[$(ValueType::$variant),*], slice(values, m)?)) }
+            unsafe { call(c, |i| i.fmu.set::<$t>(slice(vr, n)?, &[$(ValueType::$variant),*], slice(values, m)?)) }
         }
     )*};
 }
@@ -207,7 +207,7 @@ numbers! {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3GetFloat64(c: Component, vr: Refs, n: usize, out: *mut f64, m: usize) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |i| get_with_time(&i.component, slice(vr, n)?, room(out, m)?)) }
+    unsafe { call(c, |i| get_with_time(&i.fmu, slice(vr, n)?, room(out, m)?)) }
 }
 
 /// Value reference 0 is the time.
@@ -234,7 +234,7 @@ pub unsafe extern "C" fn fmi3SetFloat64(
     m: usize,
 ) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |i| i.component.set(slice(vr, n)?, &[ValueType::F64], slice(values, m)?)) }
+    unsafe { call(c, |i| i.fmu.set(slice(vr, n)?, &[ValueType::F64], slice(values, m)?)) }
 }
 
 #[unsafe(no_mangle)]
@@ -243,7 +243,7 @@ pub unsafe extern "C" fn fmi3GetBoolean(c: Component, vr: Refs, n: usize, out: *
     unsafe {
         call(c, |i| {
             let mut values = vec![false; m];
-            i.component.get(slice(vr, n)?, &[ValueType::Bool], &mut values)?;
+            i.fmu.get(slice(vr, n)?, &[ValueType::Bool], &mut values)?;
             room(out, m)?.copy_from_slice(&values);
             Ok(())
         })
@@ -262,7 +262,7 @@ pub unsafe extern "C" fn fmi3SetBoolean(
     unsafe {
         call(c, |i| {
             let values: Vec<bool> = slice(values, m)?.iter().map(|v| *v != 0).collect();
-            i.component.set(slice(vr, n)?, &[ValueType::Bool], &values)
+            i.fmu.set(slice(vr, n)?, &[ValueType::Bool], &values)
         })
     }
 }
@@ -273,7 +273,7 @@ pub unsafe extern "C" fn fmi3GetString(c: Component, vr: Refs, n: usize, out: *m
     unsafe {
         call(c, |i| {
             let mut values = vec![String::new(); m];
-            i.component.get(slice(vr, n)?, &[ValueType::String], &mut values)?;
+            i.fmu.get(slice(vr, n)?, &[ValueType::String], &mut values)?;
             i.texts = values.into_iter().map(|v| CString::new(v).unwrap_or_default()).collect();
             room(out, m)?.iter_mut().zip(&i.texts).for_each(|(o, v)| *o = v.as_ptr());
             Ok(())
@@ -294,7 +294,7 @@ pub unsafe extern "C" fn fmi3SetString(
         call(c, |i| {
             let values: Vec<String> =
                 slice(values, m)?.iter().map(|v| text(*v).unwrap_or_default()).collect();
-            i.component.set(slice(vr, n)?, &[ValueType::String], &values)
+            i.fmu.set(slice(vr, n)?, &[ValueType::String], &values)
         })
     }
 }
@@ -312,7 +312,7 @@ pub unsafe extern "C" fn fmi3GetBinary(
     unsafe {
         call(c, |i| {
             let mut values = vec![Vec::new(); m];
-            i.component.get::<Vec<u8>>(slice(vr, n)?, &[ValueType::Binary], &mut values)?;
+            i.fmu.get::<Vec<u8>>(slice(vr, n)?, &[ValueType::Binary], &mut values)?;
             i.bytes = values;
             let (sizes, out) = (room(sizes, m)?, room(out, m)?);
             for ((value, size), place) in i.bytes.iter().zip(sizes).zip(out) {
@@ -338,7 +338,7 @@ pub unsafe extern "C" fn fmi3SetBinary(
             let (sizes, values) = (slice(sizes, m)?, slice(values, m)?);
             let values: Answer<Vec<Vec<u8>>> =
                 sizes.iter().zip(values).map(|(size, v)| Ok(slice(*v, *size)?.to_vec())).collect();
-            i.component.set(slice(vr, n)?, &[ValueType::Binary], &values?)
+            i.fmu.set(slice(vr, n)?, &[ValueType::Binary], &values?)
         })
     }
 }
@@ -352,7 +352,7 @@ pub unsafe extern "C" fn fmi3GetFMUState(c: Component, state: *mut State) -> c_i
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3SetFMUState(c: Component, state: State) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |i| i.component.restore(Handle(state as usize))) }
+    unsafe { call(c, |i| i.fmu.restore(Handle(state as usize))) }
 }
 
 #[unsafe(no_mangle)]

@@ -1,8 +1,8 @@
 //! Reads `SystemStructure.ssd`.
 
 use super::{
-    Component, Connection, Connector, Dictionary, DictionaryReference, SystemElement, End, Files,
-    Structure, System, Table, Transformation, Value, parameters,
+    Component, Connection, Connector, Dictionary, DictionaryReference, End, Files, Structure, System,
+    SystemElement, Table, Transformation, Value, parameters,
 };
 use crate::description::element::{Element, Reader};
 use crate::description::{parse, types};

@@ -30,7 +30,12 @@ pub enum Basis {
 }
 
 /// Intervals of A, B and n.
-pub fn intervals(law: &FitLaw, readings: &[Reading], both: bool, at: &PlateNumbers) -> ([Interval; 3], Basis) {
+pub fn intervals(
+    law: &FitLaw,
+    readings: &[Reading],
+    both: bool,
+    at: &PlateNumbers,
+) -> ([Interval; 3], Basis) {
     let of = |n: PlateNumbers| vec![n.cohesive, n.frictional, n.n];
     let mut answer = |rest: &[Reading]| solve(law, rest, both).ok().map(of);
     let (found, basis) = jackknife(readings, &mut answer, &of(*at));

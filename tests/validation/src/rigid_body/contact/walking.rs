@@ -1,6 +1,6 @@
 //! The hexapod with its tripod gait on rigid ground: cost of a step, penetration, slip, forces, residual.
 
-use super::gait::{Drive, LEGS, Walk};
+use super::gait::{GaitDrive, GaitWalk, LEGS};
 use crate::process::Outcome;
 use crate::rigid_body::rig::{G, pose};
 use crate::timing::cpu_s;
@@ -25,8 +25,8 @@ const RUNS: usize = 5;
 
 /// All figures of the walk.
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
-    let mut all = quality("soft", Drive::Soft)?;
-    all.extend(quality("stiff", Drive::Stiff)?);
+    let mut all = quality("soft", GaitDrive::Soft)?;
+    all.extend(quality("stiff", GaitDrive::Stiff)?);
     if context.timing {
         all.extend(cost("six", SIX, 45.0)?.into_iter().map(Figure::timed));
         all.extend(cost("eighteen", EIGHTEEN, 130.0)?.into_iter().map(Figure::timed));
@@ -47,8 +47,8 @@ struct SeenWalk {
     tracking: f64,
 }
 
-fn quality(name: &str, drive: Drive) -> Outcome<Vec<Figure>> {
-    let mut walk = Walk::new(SIX, drive, H)?;
+fn quality(name: &str, drive: GaitDrive) -> Outcome<Vec<Figure>> {
+    let mut walk = GaitWalk::new(SIX, drive, H)?;
     // Bodies stand in the order of the legs' joints, four to a leg, after the trunk.
     let feet: Vec<usize> = (1..=LEGS.len()).map(|leg| 4 * leg).collect();
     let normals = LEGS.map(|leg| walk.rig.id(&format!("{leg}4.contact_normal")));
@@ -86,7 +86,7 @@ fn quality(name: &str, drive: Drive) -> Outcome<Vec<Figure>> {
     let end = pose(&walk.rig.states()?[0]).0;
     let weight = MASS * G;
     let id = |what: &str| format!("rigid-body.gait.{name}.{what}");
-    let bar = |limit: f64| if drive == Drive::Stiff { Limit::AtMost(limit) } else { Limit::None };
+    let bar = |limit: f64| if drive == GaitDrive::Stiff { Limit::AtMost(limit) } else { Limit::None };
     Ok(vec![
         Figure::new(
             id("penetration"),
@@ -134,7 +134,7 @@ fn quality(name: &str, drive: Drive) -> Outcome<Vec<Figure>> {
 fn cost(name: &str, model: &str, limit: f64) -> Outcome<Vec<Figure>> {
     let mut times = vec![f64::INFINITY; STEPS];
     for _ in 0..RUNS {
-        let mut walk = Walk::new(model, Drive::Soft, H)?;
+        let mut walk = GaitWalk::new(model, GaitDrive::Soft, H)?;
         for time in &mut times {
             let start = cpu_s();
             walk.step()?;

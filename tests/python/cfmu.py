@@ -33,7 +33,7 @@ int fmi2DoStep(Fmu *u, double t, double h, int p) { double *r = u->r; int *i = u
 
 
 def build(folder, name, reals, step, others="", units="", variable_step=True, types="", more="", flags=""):
-    """The FMU `name`.fmu; `reals` are (name, causality, start, FMU), `step` is C over r, i and b at t, of length h; `more` are functions
+    """The FMU `name`.fmu; `reals` are (name, causality, start, unit), `step` is C over r, i and b at t, of length h; `more` are functions
     of its own, `flags` attributes of <CoSimulation>."""
     starts = ", ".join(repr(float(start)) for _, _, start, _ in reals)
     (folder / f"{name}.c").write_text(FRAME % {"start": starts, "step": step, "more": more})

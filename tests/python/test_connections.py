@@ -1,4 +1,4 @@
-"""Connections of units: whole arrays, other types than f64, units with factor and offset."""
+"""Connections of FMUs: whole arrays, other types than f64, units with factor and offset."""
 
 import csv
 import subprocess

@@ -83,7 +83,7 @@ def left_behind():
         (5, "77, which is no status"),
     ],
 )
-def test_a_fmu_that_fails_stops_the_run_and_is_named(decay, tmp_path, mode, says):
+def test_an_fmu_that_fails_stops_the_run_and_is_named(decay, tmp_path, mode, says):
     path = tmp_path / "decay.toml"
     path.write_text(
         f'[time]\nstep_s = 0.125\nduration_s = 1.0\n[recording]\nevery_steps = 1\n'
@@ -174,7 +174,7 @@ def test_a_step_counts_as_made_where_the_fmu_does_not_say_how_far_it_came(tmp_pa
         assert done.stderr.count("does not say how far it came (lastSuccessfulTime)") == 1, done.stderr
 
 
-def test_a_fmu_that_saves_nothing_runs_without_its_state(tmp_path):
+def test_an_fmu_that_saves_nothing_runs_without_its_state(tmp_path):
     fmu = cfmu.build_3(tmp_path, "forgetful", [("x", "output", "", ())], "v[1][0] += h;", macros=["SAVES_NOTHING"])
     alone, inside, last, _ = both_ways(fmu, tmp_path)
     assert (alone.returncode, last) == (0, "1,1"), alone.stderr
@@ -204,7 +204,7 @@ def test_steps_are_for_good_unless_a_state_is_kept(tmp_path):
     assert float(rows[-1]["wary.x"]) == 1.0
 
 
-def test_a_fmu_runs_alone(decay, tmp_path):
+def test_an_fmu_runs_alone(decay, tmp_path):
     out = tmp_path / "out.csv"
     done = terraglue("fmu", "run", decay, "--stop", "1", "--step", "0.125", "--start", "k=2", "--csv", out)
     assert done.returncode == 0, done.stderr
@@ -223,7 +223,7 @@ def test_nothing_is_left_behind(decay):
     assert left_behind() <= before
 
 
-def test_a_fmu_is_a_subsystem(decay, tmp_path):
+def test_an_fmu_is_a_subsystem(decay, tmp_path):
     path = tmp_path / "decay.toml"
     path.write_text(f"""
 [time]

@@ -232,7 +232,7 @@ def test_a_function_that_is_promised_and_missing_is_named(tmp_path):
 
 @pytest.mark.parametrize("isolate", [(), ("--isolate",)])
 @pytest.mark.parametrize("status", [2, 3, 4, 77])
-def test_a_fmu_that_does_not_take_an_input_is_named_with_time_and_function(tmp_path, status, isolate):
+def test_an_fmu_that_does_not_take_an_input_is_named_with_time_and_function(tmp_path, status, isolate):
     rows = table(tmp_path, (0, 0), (2, 2))
     refuses = TOLD.replace("for (size_t k", f"if (u->r[0] >= 0.5) return {status}; for (size_t k")
     done, found = run(two(tmp_path, more=refuses), rows, *isolate)

@@ -147,7 +147,7 @@ def library_of_python():
 def test_a_mass_of_another_maker_comes_to_rest_on_the_soil(tmp_path, soil, maker):
     library = library_of_python()
     if library is None:
-        pytest.skip("this Python has no shared library, which units of pythonfmu need")
+        pytest.skip("this Python has no shared library, which FMUs of pythonfmu need")
     (tmp_path / "mass.py").write_text(MASS.format(**MAKERS[maker]))
     subprocess.run([sys.executable, "-m", maker, "build", "-f", "mass.py"], cwd=tmp_path, check=True, capture_output=True)
     if maker == "pythonfmu3":

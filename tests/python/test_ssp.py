@@ -125,7 +125,7 @@ def test_a_structure_runs_and_its_scenario_gives_the_same(files, tmp_path):
     assert last["a.y"] == 3.0
     assert last["inner_b.u"] == pytest.approx(7.0, rel=1e-15), "3000 mm are 3 m, doubled plus 1"
     assert last["inner_b.y"] == pytest.approx(35.0, rel=1e-15) and last["inner_b.n_seen"] == 4.5
-    assert last["d.u"] == pytest.approx(35_000.0, rel=1e-15), "the FMU of the structure goes before that of the FMU"
+    assert last["d.u"] == pytest.approx(35_000.0, rel=1e-15), "the unit of the structure goes before that of the FMU"
     assert last["d.y"] == pytest.approx(20.5 * 35_000.0 + 0.25, rel=1e-15)
     ssd = files / "plant.ssd"
     ssd.write_text(SYSTEM)

@@ -12,7 +12,7 @@ from fmus import Fmu, export
 
 H = 1e-3
 SOIL = ["--set", "soil.parameters=LETE_sand", "--set", "terrain.size_m=[0.6,0.4]"]
-UNITS = {
+FMUS = {
     "bekker": ("soil-bekker", "--fmi", "3", *SOIL),
     "automaton": ("soil-cellular-automaton", "--fmi", "2", *SOIL),
     "robot": ("rigid-body", "--fmi", "2", "--set", f"robot.model={ROOT}/models/hexapod.urdf"),
@@ -20,9 +20,9 @@ UNITS = {
 }
 
 
-@pytest.fixture(scope="session", params=UNITS)
+@pytest.fixture(scope="session", params=FMUS)
 def fmu(request, tmp_path_factory):
-    target, *rest = UNITS[request.param]
+    target, *rest = FMUS[request.param]
     fmu = Fmu(export(target, tmp_path_factory.mktemp("bytes") / f"{request.param}.fmu", *rest))
     yield fmu
     fmu.remove()

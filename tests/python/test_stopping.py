@@ -42,7 +42,7 @@ def test_the_last_step_ends_where_the_run_does(slow, tmp_path, step):
     assert done.returncode == 0 and times[-1] == 1.0 and times[1] == float(step), done.stderr
 
 
-def test_a_fmu_with_steps_of_one_length_ends_before(tmp_path):
+def test_an_fmu_with_steps_of_one_length_ends_before(tmp_path):
     fmu = cfmu.build(tmp_path, "fixed", [("y", "output", 0, "")], "r[0] = t + h;", variable_step=False)
     done = terraglue("fmu", "run", fmu, "--stop", "1", "--step", "0.3", "--csv", tmp_path / "out.csv")
     assert done.returncode == 0 and "before 1 s" in done.stderr, done.stderr

@@ -42,7 +42,7 @@ def scenario(space, path, keys):
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 5])
-def test_a_fmu_runs_alone_in_another_size(space, n):
+def test_an_fmu_runs_alone_in_another_size(space, n):
     done = terraglue("fmu", "run", space / "space.fmu", "--stop", "1", "--step", "0.125", "--start", f"n={n}")
     assert done.returncode == 0, done.stderr
     rows = list(csv.DictReader(done.stdout.splitlines()))

@@ -155,7 +155,7 @@ def test_a_terminal_that_does_not_fit_is_refused(folder, tmp_path, terminal, say
     assert done.returncode == 2 and says in done.stderr, done.stderr
 
 
-def test_a_fmu_that_does_not_come_back_to_its_saved_state_is_refused(tmp_path):
+def test_an_fmu_that_does_not_come_back_to_its_saved_state_is_refused(tmp_path):
     reals = [("x", "output", 0, ""), ("v", "output", 0, ""), ("f", "input", 0, "")]
     honest = "r[1] += h * r[2]; r[0] += h * r[1];"
     build(tmp_path, "honest", reals, honest)

@@ -75,8 +75,8 @@ def table(name, model, own):
     return f'[{name}]\nmodule = "rigid-body"\nmodel = "{model}"\n{rest}'
 
 
-def plug(name, unit, body):
-    return f'[{name}]\nfmu = "{unit}.fmu"\n[{name}.bodies.{body}]\nterminal = "{body}"\n'
+def plug(name, fmu, body):
+    return f'[{name}]\nfmu = "{fmu}.fmu"\n[{name}.bodies.{body}]\nterminal = "{body}"\n'
 
 
 def glue(side_1, side_2, at=JOINT, components='["x", "y", "z"]', more=""):
@@ -134,8 +134,8 @@ def momenta(row, prefix, of):
     return push, np.cross(place + arm, push) + r @ np.diag(of["inertia"]) @ r.T @ w
 
 
-def test_a_fmu_that_hangs_beside_its_centre_of_mass_swings_like_the_module_on_a_ball_joint(folder, tmp_path):
-    hung = run(folder, tmp_path / "unit", plug("a", "hull_heavy", "hull") + glue("a.hull", "world"))
+def test_an_fmu_that_hangs_beside_its_centre_of_mass_swings_like_the_module_on_a_ball_joint(folder, tmp_path):
+    hung = run(folder, tmp_path / "fmu", plug("a", "hull_heavy", "hull") + glue("a.hull", "world"))
     ball = 'joint_kind = { ball = "spherical" }\n'
     whole = run(folder, tmp_path / "module", table("a", "hung.urdf", {"motor": "off"}) + ball, gravity=GRAVITY)
     same(hung, whole, [(f"a.hull.{n}", f"a.hull.{n}") for n in ("qw", "qx", "qy", "qz", "wx", "wy", "wz")])
@@ -144,28 +144,28 @@ def test_a_fmu_that_hangs_beside_its_centre_of_mass_swings_like_the_module_on_a_
 
 def test_two_fmus_on_a_ball_joint_move_like_one_robot_and_keep_their_momenta(folder, tmp_path):
     text = plug("a", "hull", "hull") + plug("b", "arm", "arm") + glue("a.hull", "b.arm")
-    units = run(folder, tmp_path / "units", text)
+    fmus = run(folder, tmp_path / "fmus", text)
     whole = run(folder, tmp_path / "whole", table("a", "pair.urdf", FREE["hull"]) + 'joint_kind = { ball = "spherical" }\n')
     # poses: rates of the robot know the gap of its joint, 1e-12 m, over the step
     names = [(f"{sub}.{body}.{n}", f"a.{body}.{n}") for sub, body in (("a", "hull"), ("b", "arm")) for n in MOTION[:7]]
-    same(units, whole, names)
+    same(fmus, whole, names)
     total = [
-        np.concatenate(momenta(row, "a.hull", HULL)) + np.concatenate(momenta(row, "b.arm", ARM)) for row in units
+        np.concatenate(momenta(row, "a.hull", HULL)) + np.concatenate(momenta(row, "b.arm", ARM)) for row in fmus
     ]
     assert np.abs(np.array(total) - total[0]).max() < 1e-10 * np.abs(total[0]).max()
-    apart = np.subtract([units[-1][f"a.hull.w{k}"] for k in "xyz"], [units[-1][f"b.arm.w{k}"] for k in "xyz"])
+    apart = np.subtract([fmus[-1][f"a.hull.w{k}"] for k in "xyz"], [fmus[-1][f"b.arm.w{k}"] for k in "xyz"])
     assert np.abs(apart).max() > 0.1, "they turn against each other"
 
 
 @pytest.mark.parametrize("components", ['["x", "y", "z"]', '["x", "y", "z", "rx", "ry", "rz"]'])
 def test_exported_robots_that_are_plugged_together_turn_like_the_modules(folder, tmp_path, components):
     modules = "".join(table(n, f"{body}.urdf", FREE[body]) for n, body in (("a", "hull"), ("b", "arm")))
-    units = plug("a", "hull", "hull") + plug("b", "arm", "arm")
+    fmus = plug("a", "hull", "hull") + plug("b", "arm", "arm")
     mixed = plug("a", "hull", "hull") + table("b", "arm.urdf", FREE["arm"])
     joined = glue("a.hull", "b.arm", components=components)
     wanted = run(folder, tmp_path / "modules", modules + joined)
     names = [(f"{body}.{n}",) * 2 for body in ("a.hull", "b.arm") for n in MOTION]
-    for name, text in (("units", units), ("mixed", mixed)):
+    for name, text in (("fmus", fmus), ("mixed", mixed)):
         same(run(folder, tmp_path / name, text + joined), wanted, names)
     assert abs(wanted[-1]["a.hull.qw"]) < 0.95
 
@@ -205,7 +205,7 @@ def rotor(folder, name, inertia, stiffness, damping, odd="", **others):
 
 
 def rotors(folder, body=ROTOR_BODY, left="left", components='["rz"]'):
-    sides = "".join(f'[{n}]\nfmu = "{unit}.fmu"\n[{n}.bodies.shaft]\n{body}' for n, unit in (("left", left), ("right", "right")))
+    sides = "".join(f'[{n}]\nfmu = "{fmu}.fmu"\n[{n}.bodies.shaft]\n{body}' for n, fmu in (("left", left), ("right", "right")))
     return f'{sides}[[glue]]\nside_1 = "left.shaft"\nside_2 = "right.shaft"\ncomponents = {components}\n'
 
 
@@ -278,9 +278,9 @@ def test_what_makes_no_body_is_refused_with_the_reason(shafts, tmp_path, body, c
     assert all(word in " ".join(text.split()) for word in says), text
 
 
-@pytest.mark.parametrize(("unit", "says"), [("long", "of length 1.1"), ("nan", "is NaN (`orientation`)")])
-def test_a_quaternion_that_is_none_stops_the_run_by_the_name_of_the_body(shafts, tmp_path, unit, says):
-    text = " ".join(refused(shafts, tmp_path, rotors(shafts, left=unit)).split())
+@pytest.mark.parametrize(("fmu", "says"), [("long", "of length 1.1"), ("nan", "is NaN (`orientation`)")])
+def test_a_quaternion_that_is_none_stops_the_run_by_the_name_of_the_body(shafts, tmp_path, fmu, says):
+    text = " ".join(refused(shafts, tmp_path, rotors(shafts, left=fmu)).split())
     assert "`shaft`" in text and says in text, text
 
 

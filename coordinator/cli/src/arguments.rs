@@ -573,7 +573,7 @@ pub enum FmuCommand {
         /// The FMU.
         fmu: PathBuf,
     },
-    /// List what is wrong with a unit; none of its code runs.
+    /// List what is wrong with an FMU; none of its code runs.
     Check {
         /// The FMU.
         fmu: PathBuf,

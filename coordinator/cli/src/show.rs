@@ -309,6 +309,6 @@ mod tests {
         assert!(line(&summary).contains("-1.25 % of the motors' work: more than 1 %"));
         summary.energies.drift_j = None;
         summary.energies.without_book = vec!["soil".into()];
-        assert!(line(&summary).contains("unknown: soil keeps no book"));
+        assert!(line(&summary).contains("unknown: soil keeps no energy ledger"));
     }
 }

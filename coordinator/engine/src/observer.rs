@@ -22,7 +22,7 @@ pub struct SubsystemView<'a> {
 
 /// The energies of a subsystem as they enter the sum of all: what carries signals only has none, unless it says so, and a
 /// soil has no motors.
-pub fn book_of(kind: Kind, energy: &Energy) -> Energy {
+pub fn ledger_of(kind: Kind, energy: &Energy) -> Energy {
     let or_none = |value: f64| if value.is_nan() { 0.0 } else { value };
     match kind {
         Kind::Robot => *energy,

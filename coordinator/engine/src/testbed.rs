@@ -4,7 +4,7 @@
 //! (3) a trial of every subsystem without glue; (4) the group of glued subsystems by its strategy;
 //! (5) commit of all, in the order of their names. Reads see committed values only.
 
-use crate::observer::{Event, Observer, SubsystemView, View, book_of};
+use crate::observer::{Event, Observer, SubsystemView, View, ledger_of};
 use crate::signals::{Directory, Faults, Link, Links, TimeLine};
 use serde_json::Value;
 use std::path::PathBuf;
@@ -457,10 +457,10 @@ impl Testbed {
         })
     }
 
-    /// Sum over all subsystems, work and heat since t = 0; unknown where one that has energy keeps no book.
+    /// Sum over all subsystems, work and heat since t = 0; unknown where one that has energy keeps no ledger.
     pub fn energy(&self) -> Energy {
-        let books = self.instances.iter().map(|i| book_of(i.kind(), &i.subsystem().energy()));
-        standing::since(&self.before, books.fold(Energy::default(), |sum, book| sum.plus(&book)))
+        let ledgers = self.instances.iter().map(|i| ledger_of(i.kind(), &i.subsystem().energy()));
+        standing::since(&self.before, ledgers.fold(Energy::default(), |sum, ledger| sum.plus(&ledger)))
     }
 
     /// Committed value of a scalar number by full name; `None` where there is no such variable.

@@ -15,7 +15,7 @@ pub enum Derivatives {
     Analytic,
     /// Directional derivatives of FMUs that have them; else central differences along every component.
     Central,
-    /// Forward differences, all columns in one problem.
+    /// Forward differences, all columns in one exchange.
     Forward,
 }
 
@@ -24,7 +24,7 @@ impl InterfaceProblem {
     pub fn linearise_bodies(&mut self, source: Derivatives, instances: &mut [Instance]) -> Result {
         let start = Clock::now();
         let level = if self.at.h == 0.0 { Level::Acceleration } else { Level::Position };
-        self.take_slopes(source, |_| true, instances)?;
+        self.take_differences(source, |_| true, instances)?;
         self.estimate.g.fill(0.0);
         for side in &mut self.bodies {
             let (instance, g) = (&mut instances[side.slot], &mut self.estimate.g);
@@ -47,10 +47,10 @@ impl InterfaceProblem {
     }
 
     /// Differences for the members that do not know their derivatives, or for all where `source` says so. Members hang
-    /// together in the wrenches only, so each makes its own trials, all columns in one problem, and all of them do it side
+    /// together in the wrenches only, so each makes its own trials, all columns in one exchange, and all of them do it side
     /// by side: that counts as many evaluations as the member with the most components needs. Their last trial is then
     /// another one: see [`InterfaceProblem::repeat_bodies_trial`].
-    pub(super) fn take_slopes(
+    pub(super) fn take_differences(
         &mut self,
         source: Derivatives,
         who: impl Fn(&Participant) -> bool,
@@ -59,7 +59,7 @@ impl InterfaceProblem {
         let mut most = 0;
         for side in self.bodies.iter_mut().filter(|s| who(s)) {
             let instance = &mut instances[side.slot];
-            side.forget_slopes();
+            side.forget_differences();
             let knows = instance.capabilities().has(Capabilities::DERIVATIVES);
             let told = match source {
                 Derivatives::Analytic => knows,
@@ -70,7 +70,7 @@ impl InterfaceProblem {
                 continue;
             }
             let how = (source == Derivatives::Central, 1.0);
-            most = most.max(side.take_slopes(instance, &self.nodes, &self.at, &self.t, how)?);
+            most = most.max(side.take_differences(instance, &self.nodes, &self.at, &self.t, how)?);
             self.displaced |= side.n() > 0;
         }
         self.at.trial += most;

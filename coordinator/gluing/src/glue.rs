@@ -76,7 +76,7 @@ pub struct Recipe {
     pub damping: f64,
     /// Unilateral.
     pub contact: bool,
-    /// Participant 2 is a soil, whose law answers all but the normal force.
+    /// Side 2 is a soil, whose law answers all but the normal force.
     pub soil: bool,
 }
 

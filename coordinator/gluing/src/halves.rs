@@ -1,6 +1,6 @@
 //! Trials of one side at a time: what strategies need that treat the two sides of a glue unlike.
 //!
-//! Participant 2 of a group are its soils and the bodies that are side 2 of all their glue; all other bodies are side 1.
+//! Side 2 of a group are its soils and the bodies that are side 2 of all their glue; all other bodies are side 1.
 
 use super::derivatives::Derivatives;
 use super::glue::ConstraintKind;
@@ -142,7 +142,7 @@ impl InterfaceProblem {
 
     /// G1 = dX1/dT of side 1 at its last trial into `estimate.g`, by forward differences where a module has none.
     pub fn linearise_first(&mut self, instances: &mut [Instance]) -> Result {
-        self.take_slopes(Derivatives::Analytic, |side| !side.is_second(), instances)?;
+        self.take_differences(Derivatives::Analytic, |side| !side.is_second(), instances)?;
         self.estimate.g.fill(0.0);
         for side in self.bodies.iter_mut().filter(|s| !s.is_second()) {
             let (instance, g) = (&mut instances[side.slot], &mut self.estimate.g);

@@ -1,4 +1,4 @@
-//! The group's side of the problem: packed vectors over all ports and the paper's calls on all members.
+//! The interface problem of a group: packed vectors over all ports and the paper's calls on all participants.
 
 use super::estimate::RigidContact;
 use super::glue::{ConstraintKind, Glue};
@@ -272,7 +272,7 @@ impl InterfaceProblem {
         if !side.jacobian(instance, &self.nodes, &self.at, &mut self.estimate.g)? {
             // exact for bodies that are linear within the step
             let how = (false, self.t_ref.max(1.0));
-            let trials = side.take_slopes(instance, &self.nodes, &self.at, &self.zeros, how)?;
+            let trials = side.take_differences(instance, &self.nodes, &self.at, &self.zeros, how)?;
             side.differences(&mut self.estimate.g);
             self.at.trial += trials;
             self.report.evaluations_jacobian += trials;
@@ -514,7 +514,7 @@ impl InterfaceProblem {
         Ok(())
     }
 
-    /// Work at the ports of all grounds since the start by their own books, J; not a number where one keeps none.
+    /// Work at the ports of all grounds since the start by their own ledgers, J; not a number where one keeps none.
     fn work_on_grounds(&self, instances: &[Instance]) -> f64 {
         self.grounds.iter().map(|side| instances[side.slot].subsystem().energy().port_work).sum()
     }

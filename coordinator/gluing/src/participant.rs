@@ -358,7 +358,7 @@ impl Participant {
     }
 
     /// Adds the Jacobian at the last trial to d(x1 − x2)/dT of the group: the module's own, or that of
-    /// [`Participant::take_slopes`].
+    /// [`Participant::take_differences`].
     pub fn add_compliance(
         &mut self,
         instance: &mut Instance,
@@ -384,13 +384,13 @@ impl Participant {
     }
 
     /// From now on the module's own Jacobian counts.
-    pub fn forget_slopes(&mut self) {
+    pub fn forget_differences(&mut self) {
         self.by_differences = false;
     }
 
-    /// The Jacobian by differences of trials about T, forward from the last trial or central: all columns in one problem.
+    /// The Jacobian by differences of trials about T, forward from the last trial or central: all columns in one exchange.
     /// The number of trials, each of which is then the instance's last one.
-    pub fn take_slopes(
+    pub fn take_differences(
         &mut self,
         instance: &mut Instance,
         nodes: &[Node],
@@ -437,7 +437,7 @@ impl Participant {
         Ok(count as u32)
     }
 
-    /// dX/d(wrench on itself) of [`Participant::take_slopes`] into the group's matrix.
+    /// dX/d(wrench on itself) of [`Participant::take_differences`] into the group's matrix.
     pub fn differences(&mut self, out: &mut [f64]) {
         self.matrix.clone_from(&self.differences[Level::Position as usize]);
         self.scatter_matrix(out);

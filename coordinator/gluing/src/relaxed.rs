@@ -1,6 +1,6 @@
 //! The X-T fixed point T ← F(X1(T)), relaxed: for black boxes without derivatives.
 //!
-//! Participant 1 steps under T, side 2 follows its motion and answers F; r = F − T. `gluing.relaxation`:
+//! Side 1 steps under T, side 2 follows its motion and answers F; r = F − T. `gluing.relaxation`:
 //! - `none`: T ← T + r; contracts by κ = K·G1 and diverges for κ > 1;
 //! - `aitken`: T ← T + ω·r with Aitken's dynamic ω (Irons and Tuck 1969; Küttler and Wall 2008);
 //! - `anderson`: the combination of the last six iterates that leaves the least residual (Anderson 1965), by a QR

@@ -1,6 +1,6 @@
 //! Force in on side 1, motion in on side 2: r(T) = T − F(X1(T)), Newton with J = I + K·G1, K = −dF/dX1.
 //!
-//! Participant 2 is a soil, or a body that takes motion; unilateral and yielding laws are inside F. Unlike the X-T form of
+//! Side 2 is a soil, or a body that takes motion; unilateral and yielding laws are inside F. Unlike the X-T form of
 //! [`super::iterative`] every iteration evaluates both sides, as it is written in the literature.
 
 use super::interface_problem::InterfaceProblem;

@@ -10,7 +10,7 @@ use terraglue_fmi::floating_point::Mode;
 /// Signals whose handling matters here: Ctrl-C and its like, closed pipes, ended children.
 const SIGNALS: [libc::c_int; 5] = [libc::SIGINT, libc::SIGTERM, libc::SIGHUP, libc::SIGPIPE, libc::SIGCHLD];
 
-/// The process_state as they were.
+/// The state of the process as it was.
 pub struct ProcessState {
     folder: Option<PathBuf>,
     mask: libc::mode_t,

@@ -2,7 +2,7 @@
 
 use crate::motor_work::MotorWork;
 use serde::{Deserialize, Serialize};
-use terraglue_engine::observer::{View, book_of};
+use terraglue_engine::observer::{View, ledger_of};
 use terraglue_gluing::StepReport;
 use terraglue_subsystem::Kind;
 
@@ -11,7 +11,7 @@ const TOLERATED: f64 = 0.01;
 /// Below this the drift is rounding, J.
 const ROUNDING_J: f64 = 1e-9;
 
-/// Where the energy of a run came from and went. Null is unknown: a subsystem keeps no book of it.
+/// Where the energy of a run came from and went. Null is unknown: a subsystem keeps no energy ledger.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Energies {
     /// Net mechanical work of the motors and of loads from outside, J.
@@ -41,7 +41,7 @@ pub struct Energies {
     /// Whether that is a change of kinetic or potential energy.
     #[serde(default)]
     pub by_changes: bool,
-    /// Subsystems that keep no book, or not a whole one.
+    /// Subsystems that keep no energy ledger, or not a whole one.
     pub without_book: Vec<String>,
 }
 
@@ -70,13 +70,13 @@ impl Energies {
         match self.without_book.as_slice() {
             _ if self.drift_j.is_some() => String::new(),
             [] => "no step was made".into(),
-            [one] => format!("{one} keeps no book"),
-            many => format!("{} keep no book", many.join(", ")),
+            [one] => format!("{one} keeps no energy ledger"),
+            many => format!("{} keep no energy ledger", many.join(", ")),
         }
     }
 }
 
-/// The state of all books at once, J; not a number where unknown.
+/// The state of all ledgers at once, J; not a number where unknown.
 #[derive(Clone, Copy)]
 struct EnergySums {
     kinetic: f64,
@@ -99,7 +99,7 @@ impl EnergySums {
     }
 }
 
-/// Follows the books of a run.
+/// Follows the ledgers of a run.
 #[derive(Default)]
 pub(crate) struct EnergyTrack {
     ends: Option<(EnergySums, EnergySums)>,
@@ -126,10 +126,10 @@ impl EnergyTrack {
     /// At the start.
     pub fn start(&mut self, view: &View) {
         self.has_soil = view.subsystems.iter().any(|s| s.kind == Kind::Soil);
-        let silent = view.subsystems.iter().filter(|s| !book_of(s.kind, &s.instance.energy()).is_known());
+        let silent = view.subsystems.iter().filter(|s| !ledger_of(s.kind, &s.instance.energy()).is_known());
         self.without_book = silent.map(|s| s.name.to_owned()).collect();
-        let books = EnergySums::of(view);
-        self.ends = Some((books, books));
+        let ledgers = EnergySums::of(view);
+        self.ends = Some((ledgers, ledgers));
     }
 
     /// After a step.
@@ -224,8 +224,8 @@ mod tests {
         let mut unknown = drifting(None, 100.0);
         assert!(!unknown.is_off() && unknown.drift_share().is_none());
         unknown.without_book = vec!["soil".into()];
-        assert_eq!(unknown.why_unknown(), "soil keeps no book");
+        assert_eq!(unknown.why_unknown(), "soil keeps no energy ledger");
         unknown.without_book.push("robot".into());
-        assert_eq!(unknown.why_unknown(), "soil, robot keep no book");
+        assert_eq!(unknown.why_unknown(), "soil, robot keep no energy ledger");
     }
 }

@@ -503,7 +503,7 @@ impl Subsystem for Robot {
     fn act(&mut self, action: &str, _arguments: &str) -> Result {
         let unknown = || Error::Refused(format!("there is no action `{action}`"));
         if action == variables::RESTART {
-            self.state.restart_books();
+            self.state.restart_ledger();
             self.changed();
             return Ok(());
         }

@@ -1,4 +1,4 @@
-//! The committed state: motion of the bodies, settings and memory of the joints, energy book.
+//! The committed state: motion of the bodies, settings and memory of the joints, energy ledger.
 
 use crate::actuator::Actuator;
 use crate::actuator::battery::Supply;
@@ -117,12 +117,12 @@ pub(crate) struct State {
 
 impl State {
     /// Counts work, heat, drawn energy and distance from here on. What batteries and windings hold stays.
-    pub fn restart_books(&mut self) {
+    pub fn restart_ledger(&mut self) {
         let Energy { kinetic, potential, .. } = self.energy;
         self.energy = Energy { kinetic, potential, ..Energy::default() };
         (self.contact.lost, self.start) = (0.0, None);
         (self.supply.delivered, self.supply.lost, self.supply.missing) = (0.0, 0.0, 0.0);
-        self.joints.iter_mut().for_each(|j| j.actuator.restart_book());
+        self.joints.iter_mut().for_each(|j| j.actuator.restart_ledger());
     }
 
     /// Takes over another state without allocating once the sizes are equal.

@@ -215,11 +215,11 @@ fn coulomb_friction_sticks_exactly_and_breaks_away_at_its_torque() {
         // Coordinates of a joint that turns by 0.03 rad per step are those of the Cayley map: 1e-3 here.
         close(fixture.get("j.velocity") - before, 0.1 * 0.6 / INERTIA, 1e-3);
         close(fixture.get("j.friction_torque"), -1.0, 1e-9);
-        let book = fixture.balance();
+        let ledger = fixture.balance();
         fixture.set("j.torque_target", 0.0);
         steps(&mut fixture, 3000);
         assert!(fixture.get("j.velocity").abs() < 1e-9, "{name} {before}: {}", fixture.get("j.velocity"));
-        assert!((fixture.balance() - book).abs() < 1e-6 * fixture.robot.energy().dissipated);
+        assert!((fixture.balance() - ledger).abs() < 1e-6 * fixture.robot.energy().dissipated);
     }
 }
 
@@ -229,11 +229,11 @@ fn armature_spring_and_damper_make_the_oscillator_they_should() {
     let mut fixture = rotor("oscillator", parts, r#", "motor": "off""#);
     fixture.h = 1e-4;
     let omega = (5.0_f64 / (INERTIA + 0.03)).sqrt();
-    let book = fixture.balance();
+    let ledger = fixture.balance();
     steps(&mut fixture, 1000);
     let exact = 0.2 * (1.0 - libm::cos(omega * 0.1));
     close(fixture.get("j.angle"), exact, 5e-3);
-    assert!((fixture.balance() - book).abs() < 1e-9);
+    assert!((fixture.balance() - ledger).abs() < 1e-9);
 }
 
 #[test]
@@ -261,7 +261,7 @@ fn a_rigid_position_motor_takes_its_error_back_in_its_time() {
 }
 
 #[test]
-fn the_current_formula_of_the_preset_feeds_the_energy_book() {
+fn the_current_formula_of_the_preset_feeds_the_energy_ledger() {
     let mut fixture = rotor(
         "formula",
         r#""preset": "mars-space-climber""#,

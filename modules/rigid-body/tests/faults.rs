@@ -65,7 +65,7 @@ fn a_fault_puts_no_energy_in() {
         let before = fixture.balance();
         walk_in_place(&mut fixture, 1);
         let gain = fixture.balance() - before;
-        // beside what a step changes in the book as a rule, rounding of the energies, about 10 J
+        // beside what a step changes in the ledger as a rule, rounding of the energies, about 10 J
         assert!(gain <= 3.0 * usual && gain.abs() <= 3.0 * usual + 1e-8, "{fault}: {gain} {usual}");
     }
 }

@@ -139,7 +139,7 @@ fn fall_energy(context: &TestContext) -> Verdict {
     fixture.fall(H)?;
     let start = fixture.robot.energy()?;
     if (start.mechanical() + start.actuator_work).is_nan() {
-        return Err(Stop::Skip("it keeps no book: reports show its energy as unknown".into()));
+        return Err(Stop::Skip("it keeps no energy ledger: reports show its energy as unknown".into()));
     }
     for _ in 0..100 {
         fixture.fall(H)?;

@@ -1,4 +1,4 @@
-//! What gluing relies on: force and motion answer each other, the estimate is respected, the books are true.
+//! What gluing relies on: force and motion answer each other, the estimate is respected, the ledgers are true.
 
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
@@ -26,7 +26,7 @@ pub fn tests() -> Vec<Test> {
             "T1 is the law's at the motion that follows, or at most T* and the law",
             estimate,
         ),
-        test("energy-book", "the work in its energy book is the work that feet did", energy_book),
+        test("energy-book", "the work in its energy ledger is the work that feet did", energy_ledger),
         test("no-ground-from-nothing", "pressing and dragging never raise the volume of the ground", volume),
         test("ground-follows-foot", "where a foot has been, no ground stands in its way", follows),
     ]
@@ -159,28 +159,28 @@ fn estimate(context: &TestContext) -> Verdict {
     Ok(())
 }
 
-fn energy_book(context: &TestContext) -> Verdict {
+fn energy_ledger(context: &TestContext) -> Verdict {
     let mut fixture = SoilFixture::new(context, &[Foot::sphere(0.0, 0.0)])?;
     if !fixture.soil.energy()?.is_known() {
-        return Err(Stop::Skip("it keeps no book: reports show its energy as unknown".into()));
+        return Err(Stop::Skip("it keeps no energy ledger: reports show its energy as unknown".into()));
     }
     let (mut work, mut dissipated) = (0.0, 0.0);
     for step in 0..90 {
         let v = [[0.0, 0.0, -0.2], [0.1, 0.0, 0.0], [0.0, 0.0, 0.05]][step / 30];
         fixture.go(&[v], 1e-3)?;
         work -= 1e-3 * dot(fixture.moved[0].force, v);
-        let book = fixture.soil.energy()?;
-        if book.dissipated < dissipated - 1e-9 {
-            let got = format!("{:e} J after {dissipated:e} J", book.dissipated);
+        let ledger = fixture.soil.energy()?;
+        if ledger.dissipated < dissipated - 1e-9 {
+            let got = format!("{:e} J after {dissipated:e} J", ledger.dissipated);
             return Err(Stop::fail("energy", format!("step {step}"), got, "`dissipated` never falls"));
         }
-        dissipated = book.dissipated;
+        dissipated = ledger.dissipated;
     }
-    let book = fixture.soil.energy()?;
-    let difference = (book.port_work - work).abs();
-    // a book that has stopped being a number fails too
+    let ledger = fixture.soil.energy()?;
+    let difference = (ledger.port_work - work).abs();
+    // a ledger that has stopped being a number fails too
     if difference.is_nan() || difference > 0.1 * work.abs() + 1e-6 {
-        let got = format!("port_work = {:.5} J", book.port_work);
+        let got = format!("port_work = {:.5} J", ledger.port_work);
         let expected = format!("{work:.5} J, the forces times the motions, by 10 %");
         return Err(Stop::fail("energy", "down, along and up with a sphere", got, expected));
     }

@@ -106,7 +106,7 @@ impl Testbed {
     }
 }
 
-/// What has come in and gone out since a state whose book says `before`.
+/// What has come in and gone out since a state whose ledger says `before`.
 pub(super) fn since(before: &Energy, now: Energy) -> Energy {
     Energy {
         dissipated: now.dissipated - before.dissipated,

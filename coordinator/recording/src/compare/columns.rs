@@ -161,7 +161,7 @@ pub(crate) const ALL: &[FigureColumn] = &[
     column!("mean_sinkage_m", "", "mean sinkage", "m", Neither, |r| r.summary.as_ref()?.mean_sinkage_m),
     column!("path_m", "", "path", "m", Neither, |r| r.summary.as_ref()?.path_m),
     column!("soil_heat_j", "", "heat of the soil", "J", Neither, |r| energies(r)?.soil_heat_j),
-    column!("energy_balance_j", "", "drift of the energy book", "J", Neither, |r| energies(r)?.drift_j),
+    column!("energy_balance_j", "", "drift of the energy ledger", "J", Neither, |r| energies(r)?.drift_j),
     column!("energy_drift_share", "", "drift over the motors' work", "", Neither, |r| {
         energies(r)?.drift_share()
     }),

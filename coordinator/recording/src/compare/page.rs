@@ -34,8 +34,8 @@ pub(crate) fn render(folder: &Path, rows: &[CompareRow], runs: &[Run]) -> String
         escape(scenario)
     ));
     page.section("At a glance", "figures", &glance(folder, rows));
-    let books = rows.iter().filter_map(|r| Some((r.name(), &r.summary.as_ref()?.energies)));
-    page.section("Where the energy went", "energies", &energy_card::table(books));
+    let ledgers = rows.iter().filter_map(|r| Some((r.name(), &r.summary.as_ref()?.energies)));
+    page.section("Where the energy went", "energies", &energy_card::table(ledgers));
     let shown: Vec<_> = runs
         .iter()
         .filter_map(|run| Some((run.name.as_str(), relative(folder, &rows[run.row])?, &run.recording)))

@@ -2,7 +2,7 @@
 //! tiles that take footprints. Every figure that a recording derives from it is known beforehand.
 
 use terraglue_diagnostics::error::Result;
-use terraglue_engine::observer::{Event, Observer, SubsystemView, View, book_of};
+use terraglue_engine::observer::{Event, Observer, SubsystemView, View, ledger_of};
 use terraglue_gluing::{PortReport, StepReport};
 use terraglue_scenario::*;
 use terraglue_subsystem::*;
@@ -19,7 +19,7 @@ pub struct Synthetic {
     pub kind: Kind,
     pub t: f64,
     pub nan: bool,
-    /// Whether it keeps no book of its energy.
+    /// Whether it keeps no energy ledger.
     pub silent: bool,
     /// Commanded speed, m/s.
     pub speed: f64,
@@ -382,8 +382,8 @@ impl Fixture {
             })
             .collect();
         let gluing = if index == 0 { StepReport::default() } else { self.report(t) };
-        let books = self.parts.iter().map(|(_, part)| book_of(part.kind, &part.energy()));
-        let energy = books.fold(Energy::default(), |sum, book| sum.plus(&book));
+        let ledgers = self.parts.iter().map(|(_, part)| ledger_of(part.kind, &part.energy()));
+        let energy = ledgers.fold(Energy::default(), |sum, ledger| sum.plus(&ledger));
         let h_s = if index == 0 { 0.0 } else { H };
         look(&View { t_s: t, step_index: index, h_s, subsystems: &views, gluing: &gluing, energy })
     }

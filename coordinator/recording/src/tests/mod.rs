@@ -365,7 +365,7 @@ fn the_summary_holds_the_figures_of_the_closed_form() {
     assert_eq!((s.evaluations_max, s.evaluations_p95, s.steps_not_converged), (4, 4, Some(0)));
     assert_eq!(s.form, "T-T");
     near(s.interface_work_error_j, 1e-3);
-    // The robot's book: 1.1 + changes − 2.0 a second, the soil's 0.7.
+    // The robot's ledger: 1.1 + changes − 2.0 a second, the soil's 0.7.
     let e = &s.energies;
     assert_eq!((e.work_j, e.soil_heat_j, e.drift_j), (Some(2.0), Some(0.7), s.energy_balance_j));
     near(e.other_heat_j, 1.1);
@@ -384,7 +384,7 @@ fn the_summary_holds_the_figures_of_the_closed_form() {
     assert!(places.is_sorted());
 }
 
-/// A run of single passes on a soil without a book.
+/// A run of single passes on a soil without a ledger.
 fn record_unknown(folder: &Path) -> Summary {
     let mut fixture = Fixture::new("cooperative");
     fixture.single_pass = true;
@@ -423,14 +423,14 @@ fn what_is_unknown_or_does_not_apply_is_said_and_never_a_number() {
     let html = std::fs::read_to_string(report::write(f.path()).expect("written")).expect("readable");
     let shown = &html[html.find("<section").expect("sections")..];
     let shown = shown.split("<script").next().expect("text");
-    assert!(shown.contains("unknown") && shown.contains("soil keeps no book") && !shown.contains("NaN"));
+    assert!(shown.contains("unknown") && shown.contains("soil keeps no energy ledger") && !shown.contains("NaN"));
     assert!(shown.contains("not applicable") && html.contains("Gap and convergence: not applicable"));
     let row = compare::CompareRow { summary: Some(s), ..Default::default() };
     let table = compare::terminal_table(&[row], true);
     let gap = table.lines().find(|l| l.contains("largest gap")).expect("line");
     assert!(gap.contains("not applicable"), "{gap}");
     assert!(
-        table.contains("unknown") && table.contains("soil keeps no book") && !table.contains("NaN"),
+        table.contains("unknown") && table.contains("soil keeps no energy ledger") && !table.contains("NaN"),
         "{table}"
     );
 }

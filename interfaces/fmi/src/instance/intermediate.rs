@@ -190,12 +190,12 @@ pub unsafe extern "C" fn update(
 ) {
     // A panic must not cross; nothing here is left half done.
     let answer = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-        let book = meant(environment as usize, "")?;
-        match book.updates.take(t, [set_requested, get_allowed, finished, can_return]) {
+        let instance_log = meant(environment as usize, "")?;
+        match instance_log.updates.take(t, [set_requested, get_allowed, finished, can_return]) {
             Ok(end) => end,
             Err(why) => {
-                if !book.updates.said.swap(true, Ordering::Relaxed) {
-                    book.note(&format!("called its intermediate update {why}"));
+                if !instance_log.updates.said.swap(true, Ordering::Relaxed) {
+                    instance_log.note(&format!("called its intermediate update {why}"));
                 }
                 None
             }

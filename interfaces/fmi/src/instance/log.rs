@@ -48,40 +48,40 @@ struct LogState {
 
 /// All logs of living instances by address, with the name of the instance. An FMU may hand anything to its logger, or
 /// call it after its end; only what stands here is taken for a log.
-static BOOKS: Mutex<BTreeMap<usize, (String, Weak<InstanceLog>)>> = Mutex::new(BTreeMap::new());
+static LOGS: Mutex<BTreeMap<usize, (String, Weak<InstanceLog>)>> = Mutex::new(BTreeMap::new());
 
-fn books() -> MutexGuard<'static, BTreeMap<usize, (String, Weak<InstanceLog>)>> {
-    BOOKS.lock().unwrap_or_else(PoisonError::into_inner)
+fn logs() -> MutexGuard<'static, BTreeMap<usize, (String, Weak<InstanceLog>)>> {
+    LOGS.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// The book that a call of the logger means: that of the environment, or else of the instance's name, or the only one.
+/// The log that a call of the logger means: that of the environment, or else of the instance's name, or the only one.
 pub(super) fn meant(environment: usize, name: &str) -> Option<Arc<InstanceLog>> {
-    let books = books();
+    let known = logs();
     let named = || {
-        let mut found = books.values().filter(|(n, _)| n == name);
+        let mut found = known.values().filter(|(n, _)| n == name);
         found.next().filter(|_| found.next().is_none())
     };
-    let only = || books.values().next().filter(|_| books.len() == 1);
-    books.get(&environment).or_else(named).or_else(only)?.1.upgrade()
+    let only = || known.values().next().filter(|_| known.len() == 1);
+    known.get(&environment).or_else(named).or_else(only)?.1.upgrade()
 }
 
 impl Drop for InstanceLog {
     fn drop(&mut self) {
-        books().remove(&(&raw const *self as usize));
+        logs().remove(&(&raw const *self as usize));
     }
 }
 
 impl InstanceLog {
-    /// A book of the instance `name`.
+    /// A log of the instance `name`.
     pub fn new(sink: Sink, name: &str) -> Arc<Self> {
-        let book = Arc::new(Self {
+        let instance_log = Arc::new(Self {
             sink,
             lines: Mutex::default(),
             said: AtomicBool::new(false),
             updates: Updates::default(),
         });
-        books().insert(Arc::as_ptr(&book) as usize, (name.to_owned(), Arc::downgrade(&book)));
-        book
+        logs().insert(Arc::as_ptr(&instance_log) as usize, (name.to_owned(), Arc::downgrade(&instance_log)));
+        instance_log
     }
 
     /// A call begins: its lines count anew.
@@ -196,8 +196,8 @@ pub unsafe extern "C" fn terraglue_fmi_log(
     let done = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
         // SAFETY: by the caller.
         let (instance, category, text) = unsafe { (foreign(instance), foreign(category), foreign(text)) };
-        if let Some(book) = meant(environment as usize, &instance) {
-            book.take(status, &category, &text);
+        if let Some(instance_log) = meant(environment as usize, &instance) {
+            instance_log.take(status, &category, &text);
         }
     }));
     drop(done);
@@ -216,30 +216,30 @@ mod tests {
         let sink = Box::new(move |_: &LogLine| {
             seen.fetch_add(1, Ordering::Relaxed);
         });
-        let book = InstanceLog::new(sink, "flood");
+        let instance_log = InstanceLog::new(sink, "flood");
         for call in 0..100 {
-            book.begin();
+            instance_log.begin();
             for k in 0..1000 {
-                book.take(3, "x", &format!("line {k} of {call}"));
+                instance_log.take(3, "x", &format!("line {k} of {call}"));
             }
         }
         assert_eq!(u64::from(count.load(Ordering::Relaxed)), PER_RUN);
-        assert_eq!(book.last().last().map(String::as_str), Some("[x] line 999 of 99"));
-        assert_eq!(book.held_back(), 100_000 - PER_RUN);
+        assert_eq!(instance_log.last().last().map(String::as_str), Some("[x] line 999 of 99"));
+        assert_eq!(instance_log.held_back(), 100_000 - PER_RUN);
     }
 
     #[test]
     fn what_is_no_book_is_found_by_name_or_not_at_all() {
-        let book = InstanceLog::new(Box::new(|_| {}), "an instance of this test");
+        let instance_log = InstanceLog::new(Box::new(|_| {}), "an instance of this test");
         let log = |environment: usize, name: &CStr| {
             // SAFETY: texts with a zero.
             unsafe {
                 terraglue_fmi_log(environment as *mut c_void, name.as_ptr(), 0, c"c".as_ptr(), c"t".as_ptr())
             };
-            book.last().len()
+            instance_log.last().len()
         };
         assert_eq!(log(1, c"an instance of this test"), 1);
-        assert_eq!(log(Arc::as_ptr(&book) as usize, c"another"), 2);
+        assert_eq!(log(Arc::as_ptr(&instance_log) as usize, c"another"), 2);
         let other = InstanceLog::new(Box::new(|_| {}), "another instance of this test");
         let gone = Arc::as_ptr(&other) as usize;
         drop(other);

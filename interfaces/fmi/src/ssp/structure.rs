@@ -144,11 +144,11 @@ fn named(system: System, element: &Element) -> Result<System> {
 }
 
 fn component(context: Context, element: &Element) -> Result<SystemElement> {
-    const UNIT: &str = "application/x-fmu-sharedlibrary";
+    const FMU: &str = "application/x-fmu-sharedlibrary";
     const STRUCTURE: &str = "application/x-ssp-definition";
     let name = element.required("name")?.to_owned();
     let source = element.required("source")?;
-    let kind = element.attribute("type").unwrap_or(UNIT);
+    let kind = element.attribute("type").unwrap_or(FMU);
     if kind == STRUCTURE {
         let bytes = context.files.bytes(source)?;
         let inner = read_at(context.files, &bytes, "a nested .ssd", context.depth + 1)?;
@@ -156,8 +156,8 @@ fn component(context: Context, element: &Element) -> Result<SystemElement> {
         bindings.extend(parameters::bindings(context, element)?);
         return Ok(SystemElement::System(System { name, bindings, ..inner.system }));
     }
-    if kind != UNIT {
-        return Err(element.error(format!("type = \"{kind}\": {UNIT} and {STRUCTURE} are read here")));
+    if kind != FMU {
+        return Err(element.error(format!("type = \"{kind}\": {FMU} and {STRUCTURE} are read here")));
     }
     if element.text("implementation") == "ModelExchange" {
         return Err(

@@ -52,7 +52,7 @@ pub(crate) struct Outcome {
 
 impl Actuator {
     /// Energies count from here on. What the winding holds counts as drawn, so that giving it back is no gain.
-    pub fn restart_book(&mut self) {
+    pub fn restart_ledger(&mut self) {
         let EnergyLedger { power, electrical_power, friction, stop, .. } = self.ledger;
         let electrical = 0.5 * self[Item::Inductance] * self.current * self.current;
         self.ledger =

@@ -1,4 +1,4 @@
-//! The book of energies of random bodies at random angles that are pressed, dragged, turned about any axis and lifted: heat
+//! The energy ledger of random bodies at random angles that are pressed, dragged, turned about any axis and lifted: heat
 //! and stored energy are the work at the ports, and heat never falls.
 #![allow(clippy::unwrap_used)]
 
@@ -43,7 +43,7 @@ fn low(kind: u32, orientation: [f64; 4]) -> f64 {
     -body.patch_origin([0.0, 0.0, 1.0])[2].min(0.0)
 }
 
-/// Presses, drags, turns and lifts a body. Returns by how much the book errs at worst beyond `share` of the work to and fro and
+/// Presses, drags, turns and lifts a body. Returns by how much the ledger errs at worst beyond `share` of the work to and fro and
 /// `held` of what the soil holds at the moment, J.
 fn go(seed: u64, kind: u32, row: usize, grid: usize, [share, held]: [f64; 2]) -> Result<f64, TestCaseError> {
     let spacing = [0.02, 0.01, 0.005][grid];
@@ -106,7 +106,7 @@ proptest! {
         prop_assert!(error <= 1e-3, "{error:e} J beyond 1 % of the work");
     }
 
-    /// A sharp corner of a wedge, or a blade as thin as a cell, that is turned in the soil at a speed of its own loads whole nodes at once: the book owes no
+    /// A sharp corner of a wedge, or a blade as thin as a cell, that is turned in the soil at a speed of its own loads whole nodes at once: the ledger owes no
     /// more than they hold, and when they are let go it is even.
     #[test]
     fn a_corner_owes_no_more_than_its_nodes_hold(
@@ -213,7 +213,7 @@ fn largest_jump(rig: &mut Feet, from: Pose, way: [f64; 3]) -> f64 {
 }
 
 /// It bears what it is pressed down from there, up to what a body bears that was pressed to its depth (a curved one less by what
-/// its flanks shear), and the book starts there: nothing is thrown out. (39 % of its energy came from nowhere.)
+/// its flanks shear), and the ledger starts there: nothing is thrown out. (39 % of its energy came from nowhere.)
 #[test]
 fn a_body_that_starts_inside_the_ground_stands_in_its_print() {
     for (kind, config) in [(0, LUNAR), (1, LETE), (2, LETE), (3, LUNAR)] {

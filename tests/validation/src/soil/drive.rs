@@ -1,5 +1,5 @@
 //! A bench for one body of any shape on level soil: its horizontal motion and rotation are given, vertically it carries a load
-//! or moves as told. It keeps the balance of energies beside the soil's own book.
+//! or moves as told. It keeps the balance of energies beside the soil's own ledger.
 
 use super::rig::Shown;
 use terraglue_ground::{Lattice, Placed, Surface, nodes_below};

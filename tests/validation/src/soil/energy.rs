@@ -193,7 +193,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
         let worst = of_way.clone().max_by(|a, b| drift(a.1).total_cmp(&drift(b.1)));
         let Some((case, run)) = worst else { continue };
         let what = format!(
-            "largest drift of the book of energies, % of the work of the motors, {} runs; {}{}",
+            "largest drift of the energy ledger, % of the work of the motors, {} runs; {}{}",
             of_way.count(),
             case.id(),
             run["error"].as_str().map(|e| format!(": {e}")).unwrap_or_default()

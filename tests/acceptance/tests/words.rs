@@ -7,6 +7,7 @@ use std::process::Command;
 
 /// Types, functions and modules that have another name now. Nothing may be declared by one of these.
 const GONE: &[&str] = &[
+    "Book",
     "Errand",
     "Exchange",
     "Happening",
@@ -15,6 +16,7 @@ const GONE: &[&str] = &[
     "Nursery",
     "Partings",
     "Patience",
+    "Rig",
     "Slave",
     "SlaveOptions",
     "SlaveState",

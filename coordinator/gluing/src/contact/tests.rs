@@ -274,7 +274,7 @@ fn the_frame_moves_smoothly_over_rolling_ground() {
     }
 }
 
-/// A bench on level ground with one body that carries all the shapes.
+/// A fixture on level ground with one body that carries all the shapes.
 fn one_body(parts: &[(Geometry, [f64; 3])]) -> Fixture {
     let geometries: Vec<Geometry> = parts.iter().map(|(g, _)| g.clone()).collect();
     let mut scene = scene(&geometries);

@@ -423,7 +423,9 @@ fn what_is_unknown_or_does_not_apply_is_said_and_never_a_number() {
     let html = std::fs::read_to_string(report::write(f.path()).expect("written")).expect("readable");
     let shown = &html[html.find("<section").expect("sections")..];
     let shown = shown.split("<script").next().expect("text");
-    assert!(shown.contains("unknown") && shown.contains("soil keeps no energy ledger") && !shown.contains("NaN"));
+    assert!(
+        shown.contains("unknown") && shown.contains("soil keeps no energy ledger") && !shown.contains("NaN")
+    );
     assert!(shown.contains("not applicable") && html.contains("Gap and convergence: not applicable"));
     let row = compare::CompareRow { summary: Some(s), ..Default::default() };
     let table = compare::terminal_table(&[row], true);

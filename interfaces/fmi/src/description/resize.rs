@@ -115,7 +115,7 @@ mod tests {
     #[test]
     fn arrays_follow_their_parameters_and_lose_the_start_of_another_shape() {
         let same = sized().resized(&[(1, 2)]).unwrap();
-        assert_eq!(same.variables, unit().variables);
+        assert_eq!(same.variables, sized().variables);
         let other = sized().resized(&[(1, 5)]).unwrap();
         let a = &other.variables[1];
         assert_eq!((a.sizes.as_slice(), &a.start, a.resized), ([5, 3].as_slice(), &Start::None, true));

@@ -1,9 +1,9 @@
 //! Levels of the condition, holds of the wrench, and stabilisation: what each leaves of gap, order and growth.
 
 use super::extrapolate::steps_to;
+use super::fixture::{Setting, Tally, build, read, step, subsystem, wrench};
 use super::mechanisms::{MechanismCase, cases, largest, reference};
 use super::planar::{ALPHA, GRAVITY};
-use super::rig::{Setting, Tally, build, read, step, subsystem, wrench};
 use super::{Context, Figure, Limit};
 use crate::process::Outcome;
 

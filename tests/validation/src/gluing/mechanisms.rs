@@ -1,8 +1,8 @@
 //! Cut mechanisms with generalized-α: errors, order, evaluations, Jacobians, a wrong start; a block with friction.
 
 use super::extrapolate::steps_to;
+use super::fixture::{Setting, Tally, build, read, step, wrench};
 use super::planar::{ALPHA, Body, GRAVITY, Mechanism};
-use super::rig::{Setting, Tally, build, read, step, wrench};
 use super::{Context, Figure, Limit};
 use crate::process::{Outcome, read as read_file, root};
 use std::f64::consts::FRAC_PI_2;

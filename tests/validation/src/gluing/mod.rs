@@ -6,6 +6,7 @@
 
 mod extrapolate;
 mod feet;
+mod fixture;
 mod fmus;
 mod foot;
 mod holds;
@@ -15,7 +16,6 @@ mod oscillator;
 mod overhead;
 mod parameters;
 mod planar;
-mod rig;
 mod six_feet;
 mod squeezer;
 mod step_control;

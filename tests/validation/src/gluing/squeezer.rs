@@ -5,8 +5,8 @@
 //! on K3, K4 and K6 and as −T on K2.
 
 use super::extrapolate::steps_to;
+use super::fixture::{Setting, Tally, build, list, read, step, wrench};
 use super::planar::{ALPHA, Body, Pin, bodies};
-use super::rig::{Setting, Tally, build, list, read, step, wrench};
 use super::{Context, Figure, Limit};
 use crate::process::Outcome;
 use terraglue_numerics::extremes::{larger, smaller};

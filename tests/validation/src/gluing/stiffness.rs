@@ -1,6 +1,6 @@
 //! Which strategies hold how stiff a ground under six feet of one body, and which of them rebound.
 
-use super::rig::{Setting, Tally, build, read};
+use super::fixture::{Setting, Tally, build, read};
 use super::six_feet::{Table, columns};
 use super::{Context, Figure, Limit};
 use crate::process::Outcome;

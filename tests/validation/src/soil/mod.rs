@@ -4,6 +4,8 @@ mod automaton;
 mod drive;
 mod energy;
 mod fit;
+#[path = "../../../../modules/soil/contact/tests/support/mod.rs"]
+mod fixture;
 mod found_wheels;
 mod grousers;
 mod moves;
@@ -12,8 +14,6 @@ mod panel;
 mod plate_wheel;
 mod plates;
 mod real_wheel;
-#[path = "../../../../modules/soil/contact/tests/support/mod.rs"]
-mod rig;
 mod rig_scenario;
 mod rows;
 mod stick;

@@ -3,8 +3,8 @@
 
 use super::MODULES;
 use super::drive::{Balance, Drive, Move, Vertical, on_rim};
+use super::fixture::Shown;
 use super::plates::Maker;
-use super::rig::Shown;
 use super::rows::{SoilRow, eight};
 use crate::parallel::in_parallel;
 use crate::process::Outcome;

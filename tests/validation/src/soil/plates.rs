@@ -1,7 +1,7 @@
 //! Plates pressed into level ground: the soils give the pressure that their law promises, whatever the grid.
 
 use super::MODULES;
-use super::rig::{Rig, flat, soil};
+use super::fixture::{Fixture, flat, soil};
 use super::rows::{SoilRow, eight};
 use crate::parallel::in_parallel;
 use crate::process::Outcome;
@@ -60,12 +60,13 @@ struct PlateCase {
 }
 
 impl PlateCase {
-    fn rig(&self, mass: f64) -> Rig {
+    fn fixture(&self, mass: f64) -> Fixture {
         let size = (GROUND / self.spacing).round() as u32 + 1;
         let (_, geometry, ..) = shapes()[self.shape].clone();
-        let mut rig = Rig::new((self.make)(&self.row.config, size, self.spacing), geometry, mass, 0.1);
-        (rig.position[0], rig.position[1]) = (OFFSET[0], OFFSET[1]);
-        rig
+        let mut fixture =
+            Fixture::new((self.make)(&self.row.config, size, self.spacing), geometry, mass, 0.1);
+        (fixture.position[0], fixture.position[1]) = (OFFSET[0], OFFSET[1]);
+        fixture
     }
 
     /// Half the width of the plate over the spacing.
@@ -81,12 +82,12 @@ impl PlateCase {
         // the law knows no rate: a quick run takes longer strides
         let h = if self.quick { 1e-2 } else { 1e-3 };
         let stride = SPEED * h;
-        let mut rig = self.rig(1.0);
-        rig.h = h;
+        let mut fixture = self.fixture(1.0);
+        fixture.h = h;
         let (every, last) = ((0.005 / stride).round() as u32, (0.05 / stride).round() as u32);
         let mut worst = 0.0_f64;
         for k in 1..=last {
-            let force = rig.prescribed_step(&[-stride, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
+            let force = fixture.prescribed_step(&[-stride, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
             let z = stride * f64::from(k);
             if k % every == 0 && z > 0.0099 {
                 worst = larger(worst, (force / area / self.row.pressure(z, b) - 1.0).abs());
@@ -103,16 +104,16 @@ impl PlateCase {
             let z = self.row.depth(load / area, b);
             if z < 0.1 {
                 // a light plate, its load laid on smoothly: a heavy one would plunge deeper than it rests
-                let mut rig = self.rig(0.1);
-                rig.gravity = 0.0;
+                let mut fixture = self.fixture(0.1);
+                fixture.gravity = 0.0;
                 let ramp = if self.quick { 300.0 } else { 4000.0 };
                 for k in 0..ramp as u32 + 100 {
                     let share = (f64::from(k) / ramp).min(1.0);
-                    rig.force[2] = -0.5 * load * (1.0 - (std::f64::consts::PI * share).cos());
-                    rig.iterative_step();
+                    fixture.force[2] = -0.5 * load * (1.0 - (std::f64::consts::PI * share).cos());
+                    fixture.iterative_step();
                 }
-                let speed = rig.velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
-                let error = if speed < 1e-5 { (rig.sunk() / z - 1.0).abs() } else { f64::NAN };
+                let speed = fixture.velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
+                let error = if speed < 1e-5 { (fixture.sunk() / z - 1.0).abs() } else { f64::NAN };
                 worst = larger(worst, error);
             }
         }

@@ -1,7 +1,7 @@
 //! The hexapod with its tripod gait on flat rigid ground: targets, drives, one step.
 
 use crate::process::Outcome;
-use crate::rigid_body::rig::{G, Rig, table};
+use crate::rigid_body::fixture::{Fixture, G, table};
 
 /// Rows of the gait table less one: the last repeats the first.
 const INTERVALS: usize = 240;
@@ -23,7 +23,7 @@ pub enum GaitDrive {
 
 /// A walking hexapod.
 pub struct GaitWalk {
-    pub rig: Rig,
+    pub fixture: Fixture,
     table: Vec<[f64; 24]>,
     ids: Vec<u32>,
     angles: Vec<u32>,
@@ -42,13 +42,13 @@ impl GaitWalk {
             r#"{{"model": "{model}", "position_m": [0, 0, 0.33], "ground": "half-space", "friction": 0.8,
             "motor": "{motor}", "joints": {{"*_j2": {a}, "*_j3": {b}, "*_j4": {c}}}}}"#
         );
-        let rig = Rig::new(&parameters, [0.0, 0.0, -G], h)?;
+        let fixture = Fixture::new(&parameters, [0.0, 0.0, -G], h)?;
         let joints: Vec<String> =
             LEGS.iter().flat_map(|leg| (1..=4).map(move |j| format!("{leg}_j{j}"))).collect();
         let number =
-            |what: &str| joints.iter().map(|j| rig.id(&format!("{j}.{what}"))).collect::<Outcome<_>>();
+            |what: &str| joints.iter().map(|j| fixture.id(&format!("{j}.{what}"))).collect::<Outcome<_>>();
         let (ids, angles) = (number("angle_target")?, number("angle")?);
-        Ok(Self { rig, table: rows()?, ids, angles, targets: [0.0; 24] })
+        Ok(Self { fixture, table: rows()?, ids, angles, targets: [0.0; 24] })
     }
 
     /// The targets of the time t.
@@ -65,16 +65,16 @@ impl GaitWalk {
 
     /// Sets the 24 targets and steps.
     pub fn step(&mut self) -> Outcome {
-        self.aim(self.rig.t());
-        self.rig.set(&self.ids, &self.targets)?;
-        self.rig.step()
+        self.aim(self.fixture.t());
+        self.fixture.set(&self.ids, &self.targets)?;
+        self.fixture.step()
     }
 
     /// Mean square of angle − target at the end of the last step, rad².
     pub fn tracking_error(&self) -> Outcome<f64> {
         let mut sum = 0.0;
         for (angle, target) in self.angles.iter().zip(&self.targets) {
-            let error = self.rig.get(*angle)? - target;
+            let error = self.fixture.get(*angle)? - target;
             sum += error * error;
         }
         Ok(sum / self.targets.len() as f64)

@@ -2,7 +2,7 @@
 
 use super::gait::{GaitDrive, GaitWalk, LEGS};
 use crate::process::Outcome;
-use crate::rigid_body::rig::{G, pose};
+use crate::rigid_body::fixture::{G, pose};
 use crate::timing::cpu_s;
 use crate::{Context, Figure, Limit};
 use nalgebra::Vector3;
@@ -51,14 +51,14 @@ fn quality(name: &str, drive: GaitDrive) -> Outcome<Vec<Figure>> {
     let mut walk = GaitWalk::new(SIX, drive, H)?;
     // Bodies stand in the order of the legs' joints, four to a leg, after the trunk.
     let feet: Vec<usize> = (1..=LEGS.len()).map(|leg| 4 * leg).collect();
-    let normals = LEGS.map(|leg| walk.rig.id(&format!("{leg}4.contact_normal")));
+    let normals = LEGS.map(|leg| walk.fixture.id(&format!("{leg}4.contact_normal")));
     let normals = normals.into_iter().collect::<Outcome<Vec<_>>>()?;
-    let told = [walk.rig.id("contact.residual")?, walk.rig.id("contact.yielding")?];
+    let told = [walk.fixture.id("contact.residual")?, walk.fixture.id("contact.yielding")?];
     let mut before = vec![None; feet.len()];
     let mut seen = SeenWalk::default();
     for step in 0..STEPS {
         walk.step()?;
-        let states = walk.rig.states()?;
+        let states = walk.fixture.states()?;
         for (foot, last) in feet.iter().zip(&mut before) {
             let (origin, q) = pose(&states[*foot]);
             let p = origin + q * Vector3::from(FOOT);
@@ -73,17 +73,17 @@ fn quality(name: &str, drive: GaitDrive) -> Outcome<Vec<Figure>> {
             }
             *last = stands.then_some(p);
         }
-        seen.residual = larger(seen.residual, walk.rig.get(told[0])?);
-        seen.yielding = larger(seen.yielding, walk.rig.get(told[1])?);
+        seen.residual = larger(seen.residual, walk.fixture.get(told[0])?);
+        seen.yielding = larger(seen.yielding, walk.fixture.get(told[1])?);
         if step >= WALKS {
             seen.samples += 1.0;
             for normal in &normals {
-                seen.normal += walk.rig.get(*normal)?;
+                seen.normal += walk.fixture.get(*normal)?;
             }
             seen.tracking += walk.tracking_error()?;
         }
     }
-    let end = pose(&walk.rig.states()?[0]).0;
+    let end = pose(&walk.fixture.states()?[0]).0;
     let weight = MASS * G;
     let id = |what: &str| format!("rigid-body.gait.{name}.{what}");
     let bar = |limit: f64| if drive == GaitDrive::Stiff { Limit::AtMost(limit) } else { Limit::None };

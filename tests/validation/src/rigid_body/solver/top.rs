@@ -1,7 +1,7 @@
 //! A heavy top on a fixed tip against its equations in Euler angles: order of convergence.
 
 use crate::process::Outcome;
-use crate::rigid_body::rig::{G, Rig, model, pose};
+use crate::rigid_body::fixture::{Fixture, G, model, pose};
 use crate::{Context, Figure, Limit};
 use nalgebra::Vector3;
 use terraglue_numerics::extremes::larger;
@@ -58,14 +58,14 @@ fn run(file: &str, scheme: &str, h: f64, exact: &Vector3<f64>) -> Outcome<TopRun
         "loop": [{{"name": "tip", "kind": "spherical", "links": ["top", "world"], "origin": [0, 0, 0]}}]}}"#,
         rate.x, rate.z
     );
-    let mut rig = Rig::new(&text, [0.0, 0.0, -G], h)?;
-    let before = rig.energy().mechanical();
+    let mut fixture = Fixture::new(&text, [0.0, 0.0, -G], h)?;
+    let before = fixture.energy().mechanical();
     let mut energy = 0.0_f64;
-    rig.run(DURATION, |rig| {
-        energy = larger(energy, (rig.energy().mechanical() - before).abs());
+    fixture.run(DURATION, |fixture| {
+        energy = larger(energy, (fixture.energy().mechanical() - before).abs());
         Ok(())
     })?;
-    let axis = pose(&rig.states()?[0]).1 * start;
+    let axis = pose(&fixture.states()?[0]).1 * start;
     Ok(TopRun { axis: axis.angle(exact), energy })
 }
 

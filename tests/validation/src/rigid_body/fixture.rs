@@ -13,14 +13,14 @@ use terraglue_subsystem::{
 pub const G: f64 = 9.81;
 
 /// A robot with a clock.
-pub struct Rig {
+pub struct Fixture {
     robot: Box<dyn Subsystem>,
     bodies: usize,
     index: u64,
     h: f64,
 }
 
-impl Rig {
+impl Fixture {
     /// From parameters in JSON, gravity in the world (m/s²) and the step (s).
     pub fn new(parameters: &str, gravity: [f64; 3], h: f64) -> Outcome<Self> {
         let host = Standalone { gravity, terrain: None, folder: root().display().to_string() };

@@ -4,6 +4,11 @@
 //! takes it up again in another process: the same scenario, the same files and modules, and then the same bytes as those of
 //! a run that nothing has ended.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod origin;
 
 use origin::Origin;

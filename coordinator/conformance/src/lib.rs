@@ -9,6 +9,11 @@
 //! * [`TestContext`]: what a test works with: the module, its parameters, a source of randomness.
 //! * `fixture`: steps a soil below moving feet, a robot, a controller, without the rest of the coordinator.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod areas;
 mod catalogue;
 mod check_file;

@@ -184,7 +184,7 @@ impl Testbed {
                     return Err(self.gave_up(why));
                 }
                 Outcome::NotConverged(_) => {
-                    self.groups.iter().for_each(|g| self.report.add_cost(&g.exchange.report));
+                    self.groups.iter().for_each(|g| self.report.add_cost(&g.problem.report));
                     self.halvings += 1;
                     longest = 0.5 * h_now;
                 }
@@ -230,7 +230,7 @@ impl Testbed {
         let at = StepContext { t: self.t, h, index: self.index, ..StepContext::default() };
         let mut sum = 0.0;
         for group in &mut self.groups {
-            let found = if group.exchange.has_grounds() { self.detector.ports() } else { &self.no_ports };
+            let found = if group.problem.has_grounds() { self.detector.ports() } else { &self.no_ports };
             sum += group.residual(at, found, &self.members, &mut self.instances)?;
         }
         Ok(Some(sum))
@@ -240,7 +240,7 @@ impl Testbed {
     fn account(&mut self) {
         self.report.ports.clear();
         self.report.parts += 1;
-        self.groups.iter().for_each(|g| self.report.add(&g.exchange.report));
+        self.groups.iter().for_each(|g| self.report.add(&g.problem.report));
     }
 
     /// The forces of joints and the accelerations at the start: a step of h = 0.
@@ -344,14 +344,14 @@ impl Testbed {
         self.timings.charge(Part::Contact, start);
         let watched = self.control.is_some();
         for group in self.groups.iter_mut().filter(|g| h > 0.0 || g.start.is_some()) {
-            let found = if group.exchange.has_grounds() { self.detector.ports() } else { &self.no_ports };
+            let found = if group.problem.has_grounds() { self.detector.ports() } else { &self.no_ports };
             group.begin(at, found, &self.members, &mut self.instances, &mut self.timings)?;
             group.measure_gap();
             if watched {
-                group.passage.look(&mut group.exchange);
+                group.passage.look(&mut group.problem);
             }
             // steps 2 to 4: estimate, compatibility, the bodies under the soil's force
-            let outcome = match group.strategy.solve(&mut group.exchange, &mut self.instances) {
+            let outcome = match group.strategy.solve(&mut group.problem, &mut self.instances) {
                 Err(early @ Error::Early { .. }) => Outcome::NotConverged(early.to_string()),
                 outcome => outcome?,
             };
@@ -362,12 +362,12 @@ impl Testbed {
         }
         // step 5: integrate, once all groups agree
         for group in self.groups.iter_mut().filter(|g| h > 0.0 || g.start.is_some()) {
-            let found = if group.exchange.has_grounds() { self.detector.ports() } else { &self.no_ports };
+            let found = if group.problem.has_grounds() { self.detector.ports() } else { &self.no_ports };
             group.describe(found, self.halvings);
             if watched {
-                group.passage.take(&group.exchange);
+                group.passage.take(&group.problem);
             }
-            group.exchange.commit(&mut self.instances)?;
+            group.problem.commit(&mut self.instances)?;
         }
         Ok(Outcome::Converged)
     }
@@ -423,7 +423,7 @@ impl Testbed {
     /// Where the time of all steps went.
     pub fn timings(&self) -> Timings {
         let mut sum = self.timings.clone();
-        self.groups.iter().for_each(|g| sum.add(&g.exchange.timings));
+        self.groups.iter().for_each(|g| sum.add(&g.problem.timings));
         sum
     }
 
@@ -521,7 +521,7 @@ impl Testbed {
     pub fn set_gluing(&mut self, spec: &terraglue_scenario::GluingSpec) -> Result {
         let specs: Vec<_> = self.groups.iter().map(|g| g.spec(spec)).collect();
         for (group, spec) in self.groups.iter().zip(&specs) {
-            if let Some(refusal) = gluing::refusal(spec, &group.exchange, &self.instances) {
+            if let Some(refusal) = gluing::refusal(spec, &group.problem, &self.instances) {
                 return Err(Error::Simulation { time_s: self.t, message: refusal.reason });
             }
         }

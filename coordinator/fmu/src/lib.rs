@@ -3,6 +3,11 @@
 //! A table `[x] fmu = "path.fmu"` makes a [`FmuSubsystem`]; [`simulate`] runs one FMU alone; [`export`] writes
 //! one. System structures (SSP) become scenarios in `terraglue_scenario::ssp`.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod adapter;
 mod bodies;
 mod clocks;

@@ -10,6 +10,11 @@
 //!
 //! All work on an [`InterfaceProblem`], where the paper's calls stand by name, and fill one [`StepReport`].
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod complementarity;
 pub mod contact;
 pub mod cooperative;
@@ -84,7 +89,7 @@ pub trait Strategy: Send {
     fn needs(&self) -> Needs;
 
     /// Why it cannot glue this group, whatever its members can do.
-    fn refuses(&self, _exchange: &InterfaceProblem) -> Option<String> {
+    fn refuses(&self, _problem: &InterfaceProblem) -> Option<String> {
         None
     }
 

@@ -4,6 +4,11 @@
 //! [`SearchPath`]; [`LoadedModule::instantiate`] makes an [`Instance`], which checks every answer of the
 //! subsystem and gives every failure its name, function and time. Loaded libraries are never unloaded.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod adaptive_spin;
 mod allocations;
 mod check;

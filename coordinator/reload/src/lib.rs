@@ -8,6 +8,11 @@
 //! Files are polled, not subscribed to: an exchange happens between two steps anyway, where a look at a few files costs
 //! microseconds, and polling also sees network folders, containers, and libraries that a linker puts in place by renaming.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod candidate;
 mod sources;
 

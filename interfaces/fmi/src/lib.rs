@@ -10,6 +10,11 @@
 //! Every status of every call is looked at. What is not success becomes an [`Error`] that names the file, the
 //! function, the time and what the FMU logged last; after `fatal` nothing of the instance is called again.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod archive;
 mod binary;
 pub mod description;

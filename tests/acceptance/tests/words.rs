@@ -3,7 +3,6 @@
 
 use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 /// Types, functions and modules that have another name now. Nothing may be declared by one of these.
 const GONE: &[&str] = &[
@@ -73,19 +72,25 @@ fn root() -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join("../..").canonicalize().expect("the workspace")
 }
 
-/// All files that git knows, and where it knows none all that are there, with one of the extensions.
+/// Texts of the workspace with one of the extensions, by their path in it. Built and hidden folders are left out.
 fn texts() -> Vec<(String, String)> {
-    let output = Command::new("git").args(["ls-files"]).current_dir(root()).output().expect("git");
-    let names = String::from_utf8_lossy(&output.stdout).into_owned();
-    let wanted = |name: &&str| {
-        let exempt = *name == "CHANGELOG.md"
-            || name.starts_with("docs/decisions/")
-            || name.ends_with("tests/words.rs");
-        !exempt && [".rs", ".py", ".md", ".toml"].iter().any(|end| name.ends_with(end))
-    };
-    let read =
-        |name: &str| std::fs::read_to_string(root().join(name)).ok().map(|text| (name.to_owned(), text));
-    names.lines().filter(wanted).filter_map(read).collect()
+    let (mut all, mut folders) = (Vec::new(), vec![root()]);
+    while let Some(folder) = folders.pop() {
+        for entry in std::fs::read_dir(&folder).expect("a folder").flatten() {
+            let (path, name) = (entry.path(), entry.file_name().to_string_lossy().into_owned());
+            if path.is_dir() && name != "target" && !name.starts_with('.') {
+                folders.push(path);
+            } else if [".rs", ".py", ".md", ".toml"].iter().any(|end| name.ends_with(end)) {
+                let inside = path.strip_prefix(root()).expect("inside").display().to_string();
+                all.extend(std::fs::read_to_string(&path).ok().map(|text| (inside, text)));
+            }
+        }
+    }
+    all.retain(|(name, _)| {
+        name != "CHANGELOG.md" && !name.starts_with("docs/decisions/") && !name.ends_with("tests/words.rs")
+    });
+    assert!(all.len() > 500, "{} files are not the workspace", all.len());
+    all
 }
 
 /// Whole words: what stands between anything that is neither a letter, a digit nor an underscore.

@@ -66,7 +66,7 @@ impl Testbed {
         check_report(scenario, &directory, &instances)?;
         let groups = groups(scenario, &instances)?;
         check_settling(scenario, &groups, &instances)?;
-        let ground = groups.iter().find(|g| g.exchange.has_grounds());
+        let ground = groups.iter().find(|g| g.problem.has_grounds());
         let detector = detector(ground, &instances, terrain.as_deref())?;
         let mut testbed = Self {
             schedules: schedules(scenario, &instances, &groups),
@@ -118,7 +118,7 @@ impl Testbed {
 /// FMUs know no time before their start, so none can be among what comes to rest before t = 0.
 fn check_settling(scenario: &Scenario, groups: &[Group], instances: &[Instance]) -> Result {
     let settle_s = scenario.time.settle_s;
-    let glued = |slot: usize| groups.iter().any(|g| g.exchange.members().any(|m| m == slot));
+    let glued = |slot: usize| groups.iter().any(|g| g.problem.members().any(|m| m == slot));
     let mut fmus = instances.iter().enumerate().filter(|(slot, i)| {
         terraglue_scenario::ModuleKind::is_fmu(i.module()) && (glued(*slot) || !i.scene().bodies.is_empty())
     });
@@ -333,7 +333,7 @@ fn member(instance: &Instance) -> Member {
 }
 
 fn schedules(scenario: &Scenario, instances: &[Instance], groups: &[Group]) -> Vec<StepSchedule> {
-    let glued = |slot| groups.iter().any(|g| g.exchange.members().any(|m| m == slot));
+    let glued = |slot| groups.iter().any(|g| g.problem.members().any(|m| m == slot));
     let turn = |(slot, (spec, instance)): (usize, (&SubsystemSpec, &Instance))| StepSchedule {
         step_multiple: spec.step_multiple.max(1),
         glued: glued(slot),
@@ -410,21 +410,21 @@ fn group(
     let gravity = terraglue_numerics::rotation::length(scenario.world.gravity_m_s2);
     let mass: f64 = bodies.iter().flat_map(|b| &instances[*b].scene().bodies).map(|b| b.mass).sum();
     let weight = mass * gravity;
-    let mut exchange = InterfaceProblem::new(bodies, grounds, if weight > 0.0 { weight } else { 1.0 });
+    let mut problem = InterfaceProblem::new(bodies, grounds, if weight > 0.0 { weight } else { 1.0 });
     let states = body_states(instances)?;
     let own = |r: &&Recipe| r.ends.iter().flatten().any(|(slot, _)| bodies.contains(slot));
     for recipe in glue.iter().filter(own) {
-        exchange.glue.add(recipe, |slot, body| states[slot][body as usize]);
+        problem.glue.add(recipe, |slot, body| states[slot][body as usize]);
     }
-    exchange.stabilisation = scenario.gluing.stabilisation;
-    exchange.level = match scenario.gluing.level {
+    problem.stabilisation = scenario.gluing.stabilisation;
+    problem.level = match scenario.gluing.level {
         LevelChoice::Position => Level::Position,
         LevelChoice::Velocity => Level::Velocity,
         LevelChoice::Acceleration => Level::Acceleration,
     };
     let (own, at) = own_strategy(scenario, glue.iter().filter(own).map(|r| r.number))?;
     let spec = &GluingSpec { strategy: own.unwrap_or(scenario.gluing.strategy), ..scenario.gluing.clone() };
-    if let Some(refusal) = gluing::refusal(spec, &exchange, instances) {
+    if let Some(refusal) = gluing::refusal(spec, &problem, instances) {
         let help = match refusal.would_work.as_slice() {
             [] => "no strategy of this version can glue these subsystems".into(),
             names => format!("these would work: {}", names.join(", ")),
@@ -438,9 +438,9 @@ fn group(
     }
     let can_start = |s: usize| instances[s].capabilities().has(Capabilities::FORCE | Capabilities::RETRY);
     let start =
-        (exchange.glue.has_joints() && exchange.body_slots().all(can_start)).then(|| gluing::start(spec));
+        (problem.glue.has_joints() && problem.body_slots().all(can_start)).then(|| gluing::start(spec));
     let strategy = gluing::strategy(spec);
-    Ok(Group { exchange, strategy, own, start, closed: Vec::new(), passage: Passage::default() })
+    Ok(Group { problem, strategy, own, start, closed: Vec::new(), passage: Passage::default() })
 }
 
 /// The strategy that the glue of a group names, and where; all that name one must agree.
@@ -474,7 +474,7 @@ fn control(scenario: &Scenario, groups: &[Group], instances: &[Instance]) -> Res
         let message = format!("`{}` ({}) makes steps of one length only", fixed.name(), fixed.module());
         return refused(message, "leave the key out: all steps are then time.step_s long");
     }
-    if !groups.iter().any(|g| g.exchange.has_grounds() || g.exchange.glue.spring().is_some()) {
+    if !groups.iter().any(|g| g.problem.has_grounds() || g.problem.glue.spring().is_some()) {
         let message = "no soil and no spring is glued: a constraint passes as much energy as it takes, so there is \
                        no residual to set the steps by";
         return refused(message.into(), "give the glue a compliance_m_n, or leave the key out");
@@ -583,10 +583,10 @@ fn detector(
     let shown = |slot: &usize| {
         terrain.is_some()
             || instances[*slot].fields().iter().any(|f| f.name == "height")
-            || group.exchange.glue.is_empty()
+            || group.problem.glue.is_empty()
     };
-    let bodies: Vec<_> = group.exchange.body_slots().map(body).collect();
-    let grounds: Vec<_> = group.exchange.ground_slots().filter(shown).map(ground).collect();
+    let bodies: Vec<_> = group.problem.body_slots().map(body).collect();
+    let grounds: Vec<_> = group.problem.ground_slots().filter(shown).map(ground).collect();
     ContactDetector::new(&bodies, &grounds, terrain)
 }
 

@@ -94,7 +94,7 @@ impl Testbed {
             order.push(format!("a step of each subsystem without glue, in any order: {}", alone.join(", ")));
         }
         for group in &self.groups {
-            let members: Vec<&str> = group.exchange.members().map(name).collect();
+            let members: Vec<&str> = group.problem.members().map(name).collect();
             order.push(format!(
                 "glued together by `{}`, without delay: {}",
                 group.strategy.name(),

@@ -92,7 +92,7 @@ impl Testbed {
     fn restart_counts(&mut self) -> Result {
         self.report = StepReport { converged: true, ..StepReport::default() };
         self.timings = Timings::default();
-        self.groups.iter_mut().for_each(|g| g.exchange.timings = Timings::default());
+        self.groups.iter_mut().for_each(|g| g.problem.timings = Timings::default());
         self.members.iter_mut().for_each(|m| m.cost = Duration::ZERO);
         for instance in &mut self.instances {
             instance.forget_cost();

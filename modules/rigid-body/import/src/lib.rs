@@ -5,6 +5,11 @@
 //! that says which value is used instead; what it cannot is refused with file, line, link or joint, the offending value
 //! and a way out.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod attach;
 mod check;
 mod error;

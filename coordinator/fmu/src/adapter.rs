@@ -11,7 +11,9 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use terraglue_fmi::description::Start;
-use terraglue_fmi::{Advance, Error as FmiError, Fmu, FmuInstance, FmuState, InstanceOptions, Stepped};
+use terraglue_fmi::{
+    Advance, Error as FmiError, Fmu, FmuInstance, FmuState, InstanceOptions, LogLine, Stepped,
+};
 use terraglue_host::TeardownErrors;
 use terraglue_scenario::did_you_mean;
 use terraglue_subsystem::{
@@ -65,18 +67,10 @@ impl FmuSubsystem {
             host.log(LogLevel::Warning, problem);
         }
         let sink = host.clone();
-        let instance = FmuInstance::instantiate(
-            &fmu,
-            InstanceOptions {
-                name: host.name().to_owned(),
-                verbose: false,
-                event_mode: options.event_mode,
-                intermediate: Vec::new(),
-                followed: Vec::new(),
-                sink: Box::new(move |line| sink.log(line.level, &line.text)),
-            },
-        );
-        let mut instance = instance.map_err(error)?;
+        let log = Box::new(move |line: &LogLine| sink.log(line.level, &line.text));
+        let plain = InstanceOptions::new(host.name(), log);
+        let made = InstanceOptions { event_mode: options.event_mode, ..plain };
+        let mut instance = FmuInstance::instantiate(&fmu, made).map_err(error)?;
         let (structure, start) = structure(instance.description(), start)?;
         let structure: Vec<(&str, i128)> = structure.iter().map(|(name, n)| (name.as_str(), *n)).collect();
         instance.configure(&structure).map_err(error)?;

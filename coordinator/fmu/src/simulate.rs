@@ -77,19 +77,12 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         Some(_) => shown_between(fmu.description(), &settings.outputs)?,
         None => Vec::new(),
     };
-    let (event_mode, name) = (settings.event_mode, "unit".into());
+    let (event_mode, plain) = (settings.event_mode, InstanceOptions::new("unit", sink));
     let followed = match settings.hold_inputs {
         true => Vec::new(),
         false => inputs::followed(fmu.description(), &settings.input),
     };
-    let options = InstanceOptions {
-        name,
-        verbose: false,
-        event_mode,
-        intermediate: intermediate.clone(),
-        followed,
-        sink,
-    };
+    let options = InstanceOptions { event_mode, intermediate: intermediate.clone(), followed, ..plain };
     let mut instance = FmuInstance::instantiate(fmu, options)?;
     configure(&mut instance, &settings.start)?;
     let description = instance.description().clone();

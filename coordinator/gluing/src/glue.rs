@@ -21,6 +21,13 @@ pub enum ConstraintKind {
     Coulomb,
 }
 
+impl ConstraintKind {
+    /// Of component c of a contact.
+    pub(crate) fn of_contact(c: usize) -> Self {
+        if c == 0 { Self::Normal } else { Self::Law }
+    }
+}
+
 /// One end in its subsystem; `slot` none: the world.
 #[derive(Clone, Copy, Debug)]
 struct Terminal {

@@ -194,11 +194,7 @@ impl InterfaceProblem {
         for (p, port) in self.ports.iter().enumerate() {
             let glued = p.checked_sub(found_ports).and_then(|k| glue.joint(k));
             for (_, c) in port.components() {
-                self.rows.push(
-                    glued.map_or(if c == 0 { ConstraintKind::Normal } else { ConstraintKind::Law }, |j| {
-                        j.row(c)
-                    }),
-                );
+                self.rows.push(glued.map_or(ConstraintKind::of_contact(c), |j| j.row(c)));
                 self.of_soil.push(glued.is_none_or(|j| j.is_on_soil()));
                 self.gap.push(glued.map_or(0.0, |j| j.gap(port, c)));
                 self.compliance.push(port.law.compliance);

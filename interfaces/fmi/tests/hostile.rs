@@ -95,14 +95,7 @@ fn loading(bytes: &[u8]) -> String {
     let place = Place::new();
     let fmu = Fmu::open(&place.write(bytes)).expect("a good archive");
     let folder = fmu.folder().to_owned();
-    let options = InstanceOptions {
-        name: "x".into(),
-        verbose: false,
-        event_mode: false,
-        intermediate: Vec::new(),
-        followed: Vec::new(),
-        sink: Box::new(|_| {}),
-    };
+    let options = InstanceOptions::new("x", Box::new(|_| {}));
     let error = FmuInstance::instantiate(&fmu, options).expect_err("no library");
     drop(fmu);
     assert!(!folder.exists(), "the folder goes");

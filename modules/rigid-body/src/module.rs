@@ -102,13 +102,7 @@ impl Module for RigidBody {
             without_impacts(&*host, planes, dynamics.contacts.watches())?;
             without_rebound(&dynamics.model, &state)?;
         }
-        let name = config.text("contact_solver")?;
-        let law = ContactLaw::from_name(name).ok_or_else(|| {
-            Error::Refused(format!(
-                "parameter `contact_solver` = `{name}` is none of {:?}",
-                ContactLaw::NAMES
-            ))
-        })?;
+        let law = ContactLaw::from_config(&config)?;
         let surfaces = Surfaces::from_config(&config, &dynamics.model)?;
         dynamics.contacts.set_surroundings(law, surfaces, ground);
         close_loops(&*host, &mut dynamics, &mut state)?;

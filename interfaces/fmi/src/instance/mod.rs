@@ -62,6 +62,14 @@ pub struct InstanceOptions {
     pub sink: Sink,
 }
 
+impl InstanceOptions {
+    /// Without details in the log, event mode or intermediate times.
+    pub fn new(name: impl Into<String>, sink: Sink) -> Self {
+        let (intermediate, followed) = (Vec::new(), Vec::new());
+        Self { name: name.into(), verbose: false, event_mode: false, intermediate, followed, sink }
+    }
+}
+
 /// Where an instance is in its life.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum InstancePhase {

@@ -15,6 +15,7 @@ use crate::state::Motion;
 use terraglue_contact_solver::lcp::{Facets, Method, Outcome, Pyramid};
 use terraglue_contact_solver::{Options, Problem, Solver};
 use terraglue_linear_solver::{Path, Tree};
+use terraglue_subsystem::{Config, Error};
 
 /// Overlap up to which it is taken out within one step, m.
 const FULL_RECOVERY: f64 = 1e-5;
@@ -42,9 +43,13 @@ pub(crate) enum ContactLaw {
 impl ContactLaw {
     pub const NAMES: [&'static str; 3] = ["ncp", "lcp-4", "lcp-8"];
 
-    pub fn from_name(name: &str) -> Option<Self> {
-        let i = Self::NAMES.iter().position(|n| *n == name)?;
-        Some([Self::Cone, Self::Pyramid(Facets::Four), Self::Pyramid(Facets::Eight)][i])
+    /// The one that the parameter `contact_solver` names.
+    pub fn from_config(config: &Config) -> terraglue_subsystem::Result<Self> {
+        let (name, names) = (config.text("contact_solver")?, Self::NAMES);
+        let i = names.iter().position(|n| *n == name).ok_or_else(|| {
+            Error::Refused(format!("parameter `contact_solver` = `{name}` is none of {names:?}"))
+        })?;
+        Ok([Self::Cone, Self::Pyramid(Facets::Four), Self::Pyramid(Facets::Eight)][i])
     }
 }
 

@@ -155,7 +155,7 @@ fn collapses(context: &Context) -> Outcome<Vec<Figure>> {
             times.push(1e3 * (cpu() - before));
         }
         let best = times.into_iter().fold(f64::INFINITY, smaller);
-        let what = format!("collapse of a column to a cone of {radius} cells by `settle`, ms of CPU time");
+        let what = format!("collapse of a column to a cone of {radius} cells by `relax`, ms of CPU time");
         figures.push(Figure::new(format!("soil.automaton.cost.collapse_r{radius}"), best, limit, what));
     }
     Ok(figures)

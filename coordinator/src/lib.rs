@@ -6,6 +6,11 @@
 //! Each part is a crate of its own below `coordinator/`; this one gives them one name. Without the feature `program`
 //! neither the command line nor recordings nor the checker are compiled.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 pub use terraglue_diagnostics::{Error, Result};
 pub use terraglue_engine::Testbed;
 pub use terraglue_fmu::library;

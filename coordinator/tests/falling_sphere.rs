@@ -110,7 +110,7 @@ fn the_work_of_the_interface_is_that_of_both_sides() {
     };
     let (error, path, energy) = fallen("iterative");
     assert!(path > 1.0 && error < 1e-6 * path, "{error:e} of {path} J");
-    // The work on the sphere is that on the columns, and the column's book is whole.
+    // The work on the sphere is that on the columns, and the column's ledger is whole.
     assert!(energy.is_known() && energy.port_work.abs() < 1e-6 * path, "{energy:?}");
     let (error, path, energy) = fallen("cooperative");
     assert!(error > 1e-4 * path, "{error:e} of {path} J: the column is told T1 and carries its law's force");

@@ -32,30 +32,30 @@ MODEL = f"""
 
 
 class Soil:
-    """The unit: poses in, forces and moments out."""
+    """The FMU: poses in, forces and moments out."""
 
     def __init__(self, path, positions):
         description = read_model_description(path)
         self.reference = {v.name: v.valueReference for v in description.modelVariables}
-        self.unit = FMU3Slave(
+        self.fmu = FMU3Slave(
             guid=description.instantiationToken,
             unzipDirectory=extract(path),
             modelIdentifier=description.coSimulation.modelIdentifier,
             instanceName="soil",
         )
-        self.unit.instantiate()
-        self.unit.enterInitializationMode()
+        self.fmu.instantiate()
+        self.fmu.enterInitializationMode()
         self.place(positions, np.tile([1.0, 0, 0, 0], (FEET, 1)))
-        self.unit.exitInitializationMode()
+        self.fmu.exitInitializationMode()
 
     def place(self, positions, orientations):
-        self.unit.setFloat64([self.reference["foot.position"]], np.ravel(positions).tolist())
-        self.unit.setFloat64([self.reference["foot.orientation"]], np.ravel(orientations).tolist())
+        self.fmu.setFloat64([self.reference["foot.position"]], np.ravel(positions).tolist())
+        self.fmu.setFloat64([self.reference["foot.orientation"]], np.ravel(orientations).tolist())
 
     def step(self, t, positions, orientations):
         self.place(positions, orientations)
-        self.unit.doStep(currentCommunicationPoint=t, communicationStepSize=STEP_S)
-        get = lambda name: np.reshape(self.unit.getFloat64([self.reference[name]], nValues=3 * FEET), (FEET, 3))
+        self.fmu.doStep(currentCommunicationPoint=t, communicationStepSize=STEP_S)
+        get = lambda name: np.reshape(self.fmu.getFloat64([self.reference[name]], nValues=3 * FEET), (FEET, 3))
         return get("foot.force"), get("foot.moment")
 
 
@@ -91,7 +91,7 @@ def draw(rows, data, path):
     lines.plot(rows[:, 0], -1000.0 * rows[:, 2:6])
     lines.set(xlabel="t, s", ylabel="sinkage of the feet, mm", title="soil-bekker, LETE sand")
     forces.plot(rows[:, 0], rows[:, 6:10])
-    forces.set(xlabel="t, s", ylabel="normal force on each foot, N", title="from the unit")
+    forces.set(xlabel="t, s", ylabel="normal force on each foot, N", title="from the FMU")
     forces.axhline(12.8 * 9.81 / FEET, color="k", lw=0.5)
     figure.tight_layout()
     figure.savefig(path, dpi=80)

@@ -1,6 +1,6 @@
 //! Compiles the one function that Rust cannot define: the variadic logger of FMI 2.0.
 
 fn main() {
-    println!("cargo::rerun-if-changed=src/slave/logger.c");
-    cc::Build::new().file("src/slave/logger.c").warnings(true).compile("terraglue_fmi_logger");
+    println!("cargo::rerun-if-changed=src/instance/logger.c");
+    cc::Build::new().file("src/instance/logger.c").warnings(true).compile("terraglue_fmi_logger");
 }

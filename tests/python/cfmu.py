@@ -1,4 +1,4 @@
-"""Small units in C, made while the tests run."""
+"""Small FMUs in C, made while the tests run."""
 
 import subprocess
 import zipfile
@@ -7,33 +7,33 @@ FRAME = r"""
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-typedef struct { double r[32], slope[32]; int i[8], b[8]; char text[64]; } Unit;
+typedef struct { double r[32], slope[32]; int i[8], b[8]; char text[64]; } Fmu;
 static const double start[32] = {%(start)s};
 void *fmi2Instantiate(const char *n, int t, const char *g, const char *r, const void *b, int v, int l) {
-    Unit *u = calloc(1, sizeof *u); memcpy(u->r, start, sizeof start); return u; }
-void fmi2FreeInstance(Unit *u) { free(u); }
-int fmi2SetupExperiment(Unit *u, int a, double b, double c, int d, double e) { return 0; }
-int fmi2EnterInitializationMode(Unit *u) { return 0; }
-int fmi2ExitInitializationMode(Unit *u) { return 0; }
-int fmi2Terminate(Unit *u) { return 0; }
-int fmi2GetReal(Unit *u, const unsigned *r, size_t n, double *x) { while (n--) x[n] = u->r[r[n]]; return 0; }
-int fmi2SetReal(Unit *u, const unsigned *r, size_t n, const double *x) { while (n--) u->r[r[n]] = x[n]; return 0; }
-int fmi2GetInteger(Unit *u, const unsigned *r, size_t n, int *x) { while (n--) x[n] = u->i[r[n]]; return 0; }
-int fmi2SetInteger(Unit *u, const unsigned *r, size_t n, const int *x) { while (n--) u->i[r[n]] = x[n]; return 0; }
-int fmi2GetBoolean(Unit *u, const unsigned *r, size_t n, int *x) { while (n--) x[n] = u->b[r[n]]; return 0; }
-int fmi2SetBoolean(Unit *u, const unsigned *r, size_t n, const int *x) { while (n--) u->b[r[n]] = x[n]; return 0; }
-int fmi2GetString(Unit *u, const unsigned *r, size_t n, const char **x) { while (n--) x[n] = u->text; return 0; }
-int fmi2SetString(Unit *u, const unsigned *r, size_t n, const char *const *x) { strncpy(u->text, *x, 63); return 0; }
-int fmi2GetFMUstate(Unit *u, void **s) { if (!*s) *s = malloc(sizeof *u); memcpy(*s, u, sizeof *u); return 0; }
-int fmi2SetFMUstate(Unit *u, void *s) { memcpy(u, s, sizeof *u); return 0; }
-int fmi2FreeFMUstate(Unit *u, void **s) { free(*s); *s = 0; return 0; }
+    Fmu *u = calloc(1, sizeof *u); memcpy(u->r, start, sizeof start); return u; }
+void fmi2FreeInstance(Fmu *u) { free(u); }
+int fmi2SetupExperiment(Fmu *u, int a, double b, double c, int d, double e) { return 0; }
+int fmi2EnterInitializationMode(Fmu *u) { return 0; }
+int fmi2ExitInitializationMode(Fmu *u) { return 0; }
+int fmi2Terminate(Fmu *u) { return 0; }
+int fmi2GetReal(Fmu *u, const unsigned *r, size_t n, double *x) { while (n--) x[n] = u->r[r[n]]; return 0; }
+int fmi2SetReal(Fmu *u, const unsigned *r, size_t n, const double *x) { while (n--) u->r[r[n]] = x[n]; return 0; }
+int fmi2GetInteger(Fmu *u, const unsigned *r, size_t n, int *x) { while (n--) x[n] = u->i[r[n]]; return 0; }
+int fmi2SetInteger(Fmu *u, const unsigned *r, size_t n, const int *x) { while (n--) u->i[r[n]] = x[n]; return 0; }
+int fmi2GetBoolean(Fmu *u, const unsigned *r, size_t n, int *x) { while (n--) x[n] = u->b[r[n]]; return 0; }
+int fmi2SetBoolean(Fmu *u, const unsigned *r, size_t n, const int *x) { while (n--) u->b[r[n]] = x[n]; return 0; }
+int fmi2GetString(Fmu *u, const unsigned *r, size_t n, const char **x) { while (n--) x[n] = u->text; return 0; }
+int fmi2SetString(Fmu *u, const unsigned *r, size_t n, const char *const *x) { strncpy(u->text, *x, 63); return 0; }
+int fmi2GetFMUstate(Fmu *u, void **s) { if (!*s) *s = malloc(sizeof *u); memcpy(*s, u, sizeof *u); return 0; }
+int fmi2SetFMUstate(Fmu *u, void *s) { memcpy(u, s, sizeof *u); return 0; }
+int fmi2FreeFMUstate(Fmu *u, void **s) { free(*s); *s = 0; return 0; }
 %(more)s
-int fmi2DoStep(Unit *u, double t, double h, int p) { double *r = u->r; int *i = u->i, *b = u->b; %(step)s return 0; }
+int fmi2DoStep(Fmu *u, double t, double h, int p) { double *r = u->r; int *i = u->i, *b = u->b; %(step)s return 0; }
 """
 
 
 def build(folder, name, reals, step, others="", units="", variable_step=True, types="", more="", flags=""):
-    """The unit `name`.fmu; `reals` are (name, causality, start, unit), `step` is C over r, i and b at t, of length h; `more` are functions
+    """The FMU `name`.fmu; `reals` are (name, causality, start, unit), `step` is C over r, i and b at t, of length h; `more` are functions
     of its own, `flags` attributes of <CoSimulation>."""
     starts = ", ".join(repr(float(start)) for _, _, start, _ in reals)
     (folder / f"{name}.c").write_text(FRAME % {"start": starts, "step": step, "more": more})
@@ -71,49 +71,49 @@ FRAME_3 = r"""
 typedef void Log(void *, int, const char *, const char *);
 typedef void Update(void *, double, bool, bool, bool, bool, bool *, double *);
 typedef struct { double v[16][64]; unsigned long n; int mode; void *env; Log *log; Update *update; bool early;
-    unsigned announced[8]; size_t count; } Unit;
-static size_t size(Unit *u, unsigned r) { size_t n = u->n; switch (r) { %(sizes)s } return 1; }
-static void calc(Unit *u, double (*v)[64]) { %(calc)s }
-static int odd(Unit *u) { %(odd)s return 0; }
-static int no(Unit *u, const char *text) { u->log(u->env, 3, "logStatusError", text); return 3; }
-static void start(Unit *u) { double (*v)[64] = u->v; %(start)s }
+    unsigned announced[8]; size_t count; } Fmu;
+static size_t size(Fmu *u, unsigned r) { size_t n = u->n; switch (r) { %(sizes)s } return 1; }
+static void calc(Fmu *u, double (*v)[64]) { %(calc)s }
+static int odd(Fmu *u) { %(odd)s return 0; }
+static int no(Fmu *u, const char *text) { u->log(u->env, 3, "logStatusError", text); return 3; }
+static void start(Fmu *u) { double (*v)[64] = u->v; %(start)s }
 void *fmi3InstantiateCoSimulation(const char *n, const char *t, const char *r, bool v, bool l, bool e, bool a,
     const unsigned *q, size_t k, void *env, Log *log, Update *update) {
-    Unit *u = calloc(1, sizeof *u);
+    Fmu *u = calloc(1, sizeof *u);
     u->env = env; u->log = log; u->update = update; u->early = a; u->n = %(n)d;
     for (u->count = k; k-- > 0;) if (k < 8) u->announced[k] = q[k];
     start(u); odd(u); return u; }
-void fmi3FreeInstance(Unit *u) { odd(u); free(u); }
+void fmi3FreeInstance(Fmu *u) { odd(u); free(u); }
 #ifndef PLAIN
-int fmi3EnterConfigurationMode(Unit *u) { if (u->mode) return no(u, "too late"); u->mode = 1; return 0; }
-int fmi3ExitConfigurationMode(Unit *u) { if (u->mode != 1) return 3; u->mode = 0; start(u); return 0; }
-int fmi3SetUInt64(Unit *u, const unsigned *r, size_t k, const unsigned long *x, size_t m) {
+int fmi3EnterConfigurationMode(Fmu *u) { if (u->mode) return no(u, "too late"); u->mode = 1; return 0; }
+int fmi3ExitConfigurationMode(Fmu *u) { if (u->mode != 1) return 3; u->mode = 0; start(u); return 0; }
+int fmi3SetUInt64(Fmu *u, const unsigned *r, size_t k, const unsigned long *x, size_t m) {
     if (u->mode != 1 || *r != 1) return no(u, "n is set in configuration mode only");
     if (*x == 4) return no(u, "four is not for me");
     u->n = *x; return 0; }
 #endif
-int fmi3GetUInt64(Unit *u, const unsigned *r, size_t k, unsigned long *x, size_t m) { *x = u->n; return 0; }
-int fmi3EnterInitializationMode(Unit *u, bool a, double b, double c, bool d, double e) { u->mode = 2; return 0; }
-int fmi3ExitInitializationMode(Unit *u) { u->mode = 3; return odd(u); }
-int fmi3Terminate(Unit *u) { return odd(u); }
-int fmi3GetFloat64(Unit *u, const unsigned *r, size_t k, double *x, size_t m) {
+int fmi3GetUInt64(Fmu *u, const unsigned *r, size_t k, unsigned long *x, size_t m) { *x = u->n; return 0; }
+int fmi3EnterInitializationMode(Fmu *u, bool a, double b, double c, bool d, double e) { u->mode = 2; return 0; }
+int fmi3ExitInitializationMode(Fmu *u) { u->mode = 3; return odd(u); }
+int fmi3Terminate(Fmu *u) { return odd(u); }
+int fmi3GetFloat64(Fmu *u, const unsigned *r, size_t k, double *x, size_t m) {
     if (u->mode < 2) return no(u, "nothing to be read yet");
     odd(u); calc(u, u->v);
     for (size_t i = 0; i < k; i++) { size_t s = size(u, r[i]); memcpy(x, u->v[r[i]], 8 * s); x += s; m -= s; }
     return m ? no(u, "wrong number of values") : 0; }
-int fmi3SetFloat64(Unit *u, const unsigned *r, size_t k, const double *x, size_t m) {
+int fmi3SetFloat64(Fmu *u, const unsigned *r, size_t k, const double *x, size_t m) {
     %(sets)s
     for (size_t i = 0; i < k; i++) { size_t s = size(u, r[i]); memcpy(u->v[r[i]], x, 8 * s); x += s; m -= s; }
     return m ? no(u, "wrong number of values") : 0; }
-int fmi3GetFMUState(Unit *u, void **s) {
+int fmi3GetFMUState(Fmu *u, void **s) {
 #ifdef SAVES_NOTHING
     return 0;
 #endif
     if (!*s) *s = malloc(sizeof *u); memcpy(*s, u, sizeof *u); return 0; }
-int fmi3SetFMUState(Unit *u, void *s) { memcpy(u, s, sizeof *u); return 0; }
-int fmi3FreeFMUState(Unit *u, void **s) { free(*s); *s = 0; return 0; }
+int fmi3SetFMUState(Fmu *u, void *s) { memcpy(u, s, sizeof *u); return 0; }
+int fmi3FreeFMUState(Fmu *u, void **s) { free(*s); *s = 0; return 0; }
 %(more)s
-int fmi3DoStep(Unit *u, double t, double h, bool g, bool *event, bool *end, bool *early, double *last) {
+int fmi3DoStep(Fmu *u, double t, double h, bool g, bool *event, bool *end, bool *early, double *last) {
     size_t n = u->n; double (*v)[64] = u->v; *event = *end = *early = false;
 #ifndef SILENT
     *last = t + h;
@@ -123,7 +123,7 @@ int fmi3DoStep(Unit *u, double t, double h, bool g, bool *event, bool *end, bool
 
 
 def build_3(folder, name, variables, step, start="", more="", flags="", n=0, macros=(), calc="", odd="", others="", sets=""):
-    """The unit `name`.fmu of FMI 3.0; `variables` are (name, causality, start, sides), a side being a number or "n"; the first has the
+    """The FMU `name`.fmu of FMI 3.0; `variables` are (name, causality, start, sides), a side being a number or "n"; the first has the
     reference 2 where there is an `n` (not 0), else 1; `others` are more variables as XML, `sets` is what setting numbers begins
     with."""
     first = 2 if n else 1

@@ -170,7 +170,7 @@ CLAIMS = [
     Claim(SOIL, "the same braked, sinkage and force | {} %, {} %", (figure(PLATE_WHEEL + "braked.sinkage"), figure(PLATE_WHEEL + "braked.force"))),
     Claim(SOIL, "side slip, sinkage and side force | {} %, {} %", (figure(PLATE_WHEEL + "aside.sinkage"), figure(PLATE_WHEEL + "aside.force"))),
 
-    Claim("docs/fmi.md", "--part behaviour` has {} runs of units that misbehave",
+    Claim("docs/fmi.md", "--part behaviour` has {} runs of FMUs that misbehave",
           (cases(*(f"fmi.behaviour.{where}" for where in ("isolated", "same_process", "alone.isolated", "alone.same_process"))),)),
 
     Claim(LAWS, "sinkage, mm | {} | {} | {} |", tuple(figure(f"soil.grousers.{wheel}.slip_0.3.sinkage") for wheel in ("smooth", "grousers", "outer"))),

@@ -1,4 +1,4 @@
-"""Drives a unit through FMPy as a master would, with both versions of the standard under one set of names."""
+"""Drives an FMU through FMPy as a master would, with both versions of the standard under one set of names."""
 
 import shutil
 
@@ -11,14 +11,14 @@ from conftest import terraglue
 
 
 def export(target, path, *arguments):
-    """The unit that the program writes."""
+    """The FMU that the program writes."""
     done = terraglue("export", target, "-o", path, *arguments)
     assert done.returncode == 0, done.stderr
     return path
 
 
-class Unit:
-    """An extracted unit: description and instances."""
+class Fmu:
+    """An extracted FMU: description and instances."""
 
     def __init__(self, path):
         self.path = str(path)
@@ -37,13 +37,13 @@ class Unit:
 class Instance:
     """One instance, ready to step unless `running` is false."""
 
-    def __init__(self, unit, name, start, stop, running, values):
-        self.unit = unit
-        kind = FMU2Slave if unit.two else FMU3Slave
+    def __init__(self, fmu, name, start, stop, running, values):
+        self.fmu = fmu
+        kind = FMU2Slave if fmu.two else FMU3Slave
         self.raw = kind(
-            guid=unit.description.guid if unit.two else unit.description.instantiationToken,
-            unzipDirectory=unit.folder,
-            modelIdentifier=unit.description.coSimulation.modelIdentifier,
+            guid=fmu.description.guid if fmu.two else fmu.description.instantiationToken,
+            unzipDirectory=fmu.folder,
+            modelIdentifier=fmu.description.coSimulation.modelIdentifier,
             instanceName=name,
         )
         self.raw.instantiate()
@@ -52,7 +52,7 @@ class Instance:
             self.initialize(values, stop)
 
     def initialize(self, values, stop=None):
-        if self.unit.two:
+        if self.fmu.two:
             self.raw.setupExperiment(startTime=self.t, stopTime=stop)
             self.raw.enterInitializationMode()
         else:
@@ -62,10 +62,10 @@ class Instance:
 
     def names(self, name):
         """The value references of a variable, or of all its elements."""
-        found = self.unit.variables.get(name)
+        found = self.fmu.variables.get(name)
         if found is not None:
             return [found.valueReference]
-        return [v.valueReference for n, v in self.unit.variables.items() if n.startswith(name + "[")]
+        return [v.valueReference for n, v in self.fmu.variables.items() if n.startswith(name + "[")]
 
     def set(self, **values):
         for name, value in values.items():
@@ -74,15 +74,15 @@ class Instance:
     def __setitem__(self, name, value):
         references, value = self.names(name), np.ravel(value).tolist()
         assert references, name
-        (self.raw.setReal if self.unit.two else self.raw.setFloat64)(references, value)
+        (self.raw.setReal if self.fmu.two else self.raw.setFloat64)(references, value)
 
     def __getitem__(self, name):
         references = self.names(name)
         assert references, name
-        found = self.unit.variables.get(name)
+        found = self.fmu.variables.get(name)
         shape = found.shape if found is not None and found.dimensions else ()
         count = int(np.prod(shape)) if shape else len(references)
-        values = self.raw.getReal(references) if self.unit.two else self.raw.getFloat64(references, nValues=count)
+        values = self.raw.getReal(references) if self.fmu.two else self.raw.getFloat64(references, nValues=count)
         if shape:
             return np.reshape(values, shape)
         return np.reshape(values, (-1, 3)) if name in ("foot.force", "foot.moment") else np.array(values)
@@ -92,13 +92,13 @@ class Instance:
         self.t += h
 
     def save(self):
-        return self.raw.getFMUState() if not self.unit.two else self.raw.getFMUstate()
+        return self.raw.getFMUState() if not self.fmu.two else self.raw.getFMUstate()
 
     def restore(self, state):
-        (self.raw.setFMUstate if self.unit.two else self.raw.setFMUState)(state)
+        (self.raw.setFMUstate if self.fmu.two else self.raw.setFMUState)(state)
 
     def release(self, state):
-        (self.raw.freeFMUstate if self.unit.two else self.raw.freeFMUState)(state)
+        (self.raw.freeFMUstate if self.fmu.two else self.raw.freeFMUState)(state)
 
     def end(self):
         self.raw.terminate()

@@ -1,4 +1,4 @@
-"""Adjoint derivatives of FMI 3 stand for directional ones: in the interface Jacobian of glued units and in loops at the start."""
+"""Adjoint derivatives of FMI 3 stand for directional ones: in the interface Jacobian of glued FMUs and in loops at the start."""
 
 import csv
 import json
@@ -14,10 +14,10 @@ VARIABLES = [("x", "output", "", (2,)), ("v", "output", "", (2,)), ("a1", "outpu
 VARIABLES += [("f1", "input", "0", ()), ("f2", "input", "0", ()), ("asked", "output", "", ()), ("pull", "parameter", "0", ())]
 MORE = r"""static const double W[2][2] = {{1, 0.6}, {0.1, 0.5}};
 static int asked;
-int fmi3GetDirectionalDerivative(Unit *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s, size_t p, double *x, size_t q) {
+int fmi3GetDirectionalDerivative(Fmu *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s, size_t p, double *x, size_t q) {
     if (p != m || q != n) return 3; asked++;
     for (size_t i = 0; i < n; i++) { x[i] = 0; for (size_t j = 0; j < m; j++) x[i] += W[z[i] - 3][k[j] - 5] * s[j]; } return 0; }
-int fmi3GetAdjointDerivative(Unit *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s, size_t p, double *x, size_t q) {
+int fmi3GetAdjointDerivative(Fmu *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s, size_t p, double *x, size_t q) {
     if (p != n || q != m) return 3; asked++;
     for (size_t j = 0; j < m; j++) { x[j] = 0; for (size_t i = 0; i < n; i++) x[j] += W[z[i] - 3][k[j] - 5] * s[i]; } return 0; }"""
 CALC = r"""static const double w[2][2] = {{1, 0.6}, {0.1, 0.5}}; extern int times_asked(void); v[7][0] = times_asked();
@@ -50,7 +50,7 @@ def glued(folder, kind, out):
     return list(csv.DictReader((out / "variables.csv").open())), summary
 
 
-def test_two_units_are_glued_by_adjoint_derivatives(folder, tmp_path):
+def test_two_fmus_are_glued_by_adjoint_derivatives(folder, tmp_path):
     told = {kind: glued(folder, kind, tmp_path / kind) for kind in KINDS}
     rows, summary = told["directional"]
     assert max(abs(float(row["a.x[1]"])) for row in rows) > 0.3
@@ -66,7 +66,7 @@ def test_two_units_are_glued_by_adjoint_derivatives(folder, tmp_path):
 # y = k·u + 1; the loop y1 → u2, y2 → u1
 LOOP = [("u", "input", "0", ()), ("y", "output", "", ()), ("k", "parameter", "1", ()), ("asked", "output", "", ())]
 SLOPE = r"""static int asked; int times_asked(void) { return asked; }
-int fmi3GetAdjointDerivative(Unit *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s, size_t p, double *x, size_t q) {
+int fmi3GetAdjointDerivative(Fmu *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s, size_t p, double *x, size_t q) {
     asked++; *x = n == 1 && z[0] == 2 && k[0] == 1 ? u->v[3][0] * s[0] : 0; return 0; }"""
 
 

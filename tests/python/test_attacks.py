@@ -200,8 +200,8 @@ def place(tmp_path_factory):
     for name in ["text.txt", "text.ssp", "text.fmu"]:
         (folder / name).write_text("some words\n")
     (folder / "empty.fmu").write_bytes(b"")
-    with zipfile.ZipFile(folder / "bad.fmu", "w") as unit:
-        unit.writestr("modelDescription.xml", "<fmiModelDescription fmiVersion='9.0'/>")
+    with zipfile.ZipFile(folder / "bad.fmu", "w") as fmu:
+        fmu.writestr("modelDescription.xml", "<fmiModelDescription fmiVersion='9.0'/>")
     for name, data in [("cut", b""), ("noise", bytes(range(256)) * 40)]:
         (folder / name).mkdir()
         (folder / name / "recording.mcap").write_bytes(data)

@@ -36,7 +36,7 @@ def test_moon_walk_runs_on_the_soil_in_c_by_changing_one_word(tmp_path, strategy
     assert process.returncode == 0, process.stderr
     summary = json.loads(process.stdout)
     assert summary["soil_module"] == "soil-elastic"
-    # A single pass has nothing to converge to, and this soil keeps no book.
+    # A single pass has nothing to converge to, and this soil keeps no energy ledger.
     assert summary["steps_not_converged"] == (None if strategy == "cooperative" else 0)
     assert summary["energy_balance_j"] is None and summary["interface_work_error_j"] is None
     assert summary["energies"]["without_book"] == ["soil"] and summary["energies"]["soil_heat_j"] is None

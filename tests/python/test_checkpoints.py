@@ -98,8 +98,8 @@ def test_a_run_that_is_ended_goes_on_to_the_same_bytes(walk, tmp_path, soil, str
 
 
 def test_units_and_modules_in_other_processes_go_on_too(tmp_path):
-    """A soil as a unit, and a controller in Python that keeps a state."""
-    unit = export("soil-bekker", tmp_path / "soil.fmu", "--set", "soil.parameters=LETE_sand",
+    """A soil as an FMU, and a controller in Python that keeps a state."""
+    fmu = export("soil-bekker", tmp_path / "soil.fmu", "--set", "soil.parameters=LETE_sand",
                   "--set", "terrain.size_m=[0.6,0.4]")
     (tmp_path / "foot.py").write_text(
         '"""A controller.\n\n[module]\nname = "foot"\nkind = "controller"\n"""\n'
@@ -109,7 +109,7 @@ def test_units_and_modules_in_other_processes_go_on_too(tmp_path):
         "    def advance(self, step, input, out):\n        pass\n\n"
         "    def commit(self, step, t, partner):\n        self.state['z'] -= 1e-4 * step.h / 1e-3\n")
     scenario = tmp_path / "s.toml"
-    scenario.write_text(f'[time]\nstep_s = 0.002\nduration_s = 0.4\n[soil]\nfmu = "{unit}"\n'
+    scenario.write_text(f'[time]\nstep_s = 0.002\nduration_s = 0.4\n[soil]\nfmu = "{fmu}"\n'
                         '[foot]\nmodule = "./foot.py"\n[[connect]]\nfrom = "foot.z"\nto = "soil.foot.position[1,3]"\n')
     whole = terraglue("run", scenario, "--csv", "--quiet", "--out", tmp_path / "whole")
     assert whole.returncode == 0, whole.stderr

@@ -10,43 +10,43 @@ import pytest
 from cfmu import build_3
 from conftest import terraglue
 
-# `x` is the time; every tick samples it and counts; at t = 0.62 the unit asks for event mode by itself, counts that, and its output
+# `x` is the time; every tick samples it and counts; at t = 0.62 the FMU asks for event mode by itself, counts that, and its output
 # clock `beat` ticks. The triggered clock `hit` counts and keeps the input `in`, which can only be set while it ticks.
 CODE = r"""
 #include <stdbool.h>
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-typedef struct { double v[32], t; bool due, events, asked, hit, inside, down, next, share; int grown; } Unit;
+typedef struct { double v[32], t; bool due, events, asked, hit, inside, down, next, share; int grown; } Fmu;
 enum { X = 1, SAMPLE, COUNT, EVENTS, HITS, KEPT, IN, DOWN = 12, GROWN };
 void *fmi3InstantiateCoSimulation(const char *n, const char *t, const char *r, bool v, bool l, bool e, bool a,
     const unsigned *q, size_t k, void *env, void *log, void *up) {
-    Unit *u = calloc(1, sizeof(Unit)); u->events = e; return u; }
-void fmi3FreeInstance(Unit *u) { free(u); }
-int fmi3EnterInitializationMode(Unit *u, bool a, double b, double c, bool d, double e) { return 0; }
-int fmi3ExitInitializationMode(Unit *u) { u->inside = u->events; return 0; }
-int fmi3EnterEventMode(Unit *u) { u->inside = true; return 0; }
-int fmi3EnterStepMode(Unit *u) { u->inside = false; return 0; }
-int fmi3Terminate(Unit *u) { return 0; }
-int fmi3GetFloat64(Unit *u, const unsigned *r, size_t n, double *x, size_t m) { while (n--) x[n] = u->v[r[n]]; return 0; }
-int fmi3SetFloat64(Unit *u, const unsigned *r, size_t n, const double *x, size_t m) {
+    Fmu *u = calloc(1, sizeof(Fmu)); u->events = e; return u; }
+void fmi3FreeInstance(Fmu *u) { free(u); }
+int fmi3EnterInitializationMode(Fmu *u, bool a, double b, double c, bool d, double e) { return 0; }
+int fmi3ExitInitializationMode(Fmu *u) { u->inside = u->events; return 0; }
+int fmi3EnterEventMode(Fmu *u) { u->inside = true; return 0; }
+int fmi3EnterStepMode(Fmu *u) { u->inside = false; return 0; }
+int fmi3Terminate(Fmu *u) { return 0; }
+int fmi3GetFloat64(Fmu *u, const unsigned *r, size_t n, double *x, size_t m) { while (n--) x[n] = u->v[r[n]]; return 0; }
+int fmi3SetFloat64(Fmu *u, const unsigned *r, size_t n, const double *x, size_t m) {
     if (n != 1 || r[0] != IN || u->events && !u->hit) return 3; u->v[IN] = x[0]; return 0; }
-int fmi3SetClock(Unit *u, const unsigned *r, size_t n, const bool *on) {
+int fmi3SetClock(Fmu *u, const unsigned *r, size_t n, const bool *on) {
     if (!u->inside) return 3;
     for (size_t k = 0; k < n; k++) { if (r[k] == 9) u->due = on[k]; else if (r[k] == 10) u->hit = on[k]; else if (r[k] == 14) u->down = on[k];
         else if (r[k] == 15) u->next = on[k]; else if (r[k] == 16) u->share = on[k]; else return 3; }
     return 0; }
-int fmi3GetIntervalDecimal(Unit *u, const unsigned *r, size_t n, double *x, int *q) {
+int fmi3GetIntervalDecimal(Fmu *u, const unsigned *r, size_t n, double *x, int *q) {
     if (!u->inside || n != 2 || r[0] != 14 || r[1] != 15) return 3;
     // 0.13 s after the event at 0.62, and at once after that; the other one ticks at 0, 0.1, 0.3, 0.6, 1
     q[0] = u->v[DOWN] == 1 ? 2 : u->v[EVENTS] == 1 && u->v[DOWN] == 0 && u->v[8] == 0 ? 2 : 1;
     x[0] = u->v[DOWN] == 1 ? 0 : %INTERVAL%; u->v[8] = u->v[EVENTS];
     q[1] = 2; x[1] = 0.1 * u->grown; return 0; }
-int fmi3GetIntervalFraction(Unit *u, const unsigned *r, size_t n, unsigned long *x, unsigned long *d, int *q) {
+int fmi3GetIntervalFraction(Fmu *u, const unsigned *r, size_t n, unsigned long *x, unsigned long *d, int *q) {
     if (!u->inside || n != 1 || r[0] != 16) return 3; *x = 1; *d = %RESOLUTION%; *q = 2; return 0; }
-int fmi3GetClock(Unit *u, const unsigned *r, size_t n, bool *on) {
+int fmi3GetClock(Fmu *u, const unsigned *r, size_t n, bool *on) {
     if (!u->inside || n != 1 || r[0] != 11) return 3; *on = u->asked; return 0; }
-int fmi3UpdateDiscreteStates(Unit *u, bool *again, bool *end, bool *nominals, bool *values, bool *defined, double *next) {
+int fmi3UpdateDiscreteStates(Fmu *u, bool *again, bool *end, bool *nominals, bool *values, bool *defined, double *next) {
     *again = *end = *nominals = *values = *defined = false;
     if (u->due) { u->v[SAMPLE] = u->t; u->v[COUNT] += 1; u->due = false; }
     if (!u->inside) return 3;
@@ -56,10 +56,10 @@ int fmi3UpdateDiscreteStates(Unit *u, bool *again, bool *end, bool *nominals, bo
     if (u->hit) { u->v[HITS] += 1; u->v[KEPT] = u->v[IN]; u->hit = false; }
     if (u->asked) { u->v[EVENTS] += 1; u->asked = false; }
     return 0; }
-int fmi3GetFMUState(Unit *u, void **s) { if (!*s) *s = malloc(sizeof *u); memcpy(*s, u, sizeof *u); return 0; }
-int fmi3SetFMUState(Unit *u, void *s) { memcpy(u, s, sizeof *u); return 0; }
-int fmi3FreeFMUState(Unit *u, void **s) { free(*s); *s = 0; return 0; }
-int fmi3DoStep(Unit *u, double t, double h, bool g, bool *e, bool *d, bool *early, double *last) {
+int fmi3GetFMUState(Fmu *u, void **s) { if (!*s) *s = malloc(sizeof *u); memcpy(*s, u, sizeof *u); return 0; }
+int fmi3SetFMUState(Fmu *u, void *s) { memcpy(u, s, sizeof *u); return 0; }
+int fmi3FreeFMUState(Fmu *u, void **s) { free(*s); *s = 0; return 0; }
+int fmi3DoStep(Fmu *u, double t, double h, bool g, bool *e, bool *d, bool *early, double *last) {
     *e = *d = *early = false;
 #ifdef SHORT
     *last = t;
@@ -154,10 +154,10 @@ def test_an_output_clock_is_seen_and_a_triggered_one_ticks_by_input(clocked, tmp
 
 def test_clocks_are_connected_and_set_by_events(clocked, tmp_path):
     path = tmp_path / "clocked.toml"
-    unit = f'fmu = "{clocked}"\nevent_mode = true\n'
+    fmu = f'fmu = "{clocked}"\nevent_mode = true\n'
     path.write_text(
         "[time]\nstep_s = 0.1\nduration_s = 1.0\n[recording]\nevery_steps = 1\n"
-        f'[a]\n{unit}[b]\n{unit}[c]\n{unit}[[connect]]\nfrom = "a.beat"\nto = "b.hit"\n[[connect]]\nfrom = "a.x"\nto = "b.in"\n'
+        f'[a]\n{fmu}[b]\n{fmu}[c]\n{fmu}[[connect]]\nfrom = "a.beat"\nto = "b.hit"\n[[connect]]\nfrom = "a.x"\nto = "b.in"\n'
         '[[event]]\nat_s = 0.3\nset = { "c.hit" = true }\n[[event]]\nat_s = 0.3\nset = { "c.in" = 4.5 }\n'
     )
     for isolate in ("", "isolate = true\n"):
@@ -198,11 +198,11 @@ TOLD = (
 
 
 def told(tmp_path, interval="0.13", options=()):
-    unit = made(tmp_path, TOLD, interval, options)
-    return terraglue("fmu", "run", unit, "--stop", "1", "--step", "0.25", "--event-mode", "on", "--output", "x,down,grown_at,count")
+    fmu = made(tmp_path, TOLD, interval, options)
+    return terraglue("fmu", "run", fmu, "--stop", "1", "--step", "0.25", "--event-mode", "on", "--output", "x,down,grown_at,count")
 
 
-def test_clocks_tick_when_the_unit_told(tmp_path):
+def test_clocks_tick_when_the_fmu_told(tmp_path):
     done = told(tmp_path)
     assert done.returncode == 0, done.stderr
     rows = list(csv.DictReader(done.stdout.splitlines()))
@@ -212,7 +212,7 @@ def test_clocks_tick_when_the_unit_told(tmp_path):
     assert [float(row["count"]) for row in rows] == [1, 2, 3, 4, 5], "the periodic one ticks as before"
 
 
-def test_what_the_unit_told_goes_back_with_its_state(tmp_path):
+def test_what_the_fmu_told_goes_back_with_its_state(tmp_path):
     # steps over 0.11 s are discarded, also behind a tick: the step is halved from the saved state, in which that tick is to come
     done = told(tmp_path, options=["-DSHORT"])
     assert done.returncode == 0, done.stderr
@@ -230,18 +230,18 @@ FRACTIONS = (
 
 @pytest.mark.parametrize("options", [(), ("-DSHORT",)])
 def test_fractions_of_a_second_do_not_drift(tmp_path, options):
-    unit = made(tmp_path, FRACTIONS, options=options)
+    fmu = made(tmp_path, FRACTIONS, options=options)
     arguments = ["--stop", "20", "--step", "0.25", "--event-mode", "on", "--output", "shares,off"]
-    done = terraglue("fmu", "run", unit, *arguments)
+    done = terraglue("fmu", "run", fmu, *arguments)
     assert done.returncode == 0, done.stderr
     last = list(csv.DictReader(done.stdout.splitlines()))[-1]
-    # the unit adds its own t + h, which is off by a rounding; six hundred intervals of 1/30 s added up are off by 2e-13
+    # the FMU adds its own t + h, which is off by a rounding; six hundred intervals of 1/30 s added up are off by 2e-13
     assert float(last["shares"]) == 601 and float(last["off"]) <= 4e-15
 
 
 def test_a_fraction_of_nothing_is_refused(tmp_path):
-    unit = made(tmp_path, FRACTIONS, resolution="0")
-    done = terraglue("fmu", "run", unit, "--stop", "1", "--event-mode", "on")
+    fmu = made(tmp_path, FRACTIONS, resolution="0")
+    done = terraglue("fmu", "run", fmu, "--stop", "1", "--event-mode", "on")
     assert done.returncode == 1 and "told the interval 1/0 s" in done.stderr and "fmi3GetIntervalFraction" in done.stderr, done.stderr
 
 

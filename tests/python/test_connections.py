@@ -1,4 +1,4 @@
-"""Connections of units: whole arrays, other types than f64, units with factor and offset."""
+"""Connections of FMUs: whole arrays, other types than f64, units with factor and offset."""
 
 import csv
 import subprocess
@@ -12,25 +12,25 @@ from conftest import terraglue
 # All values of a type lie in one array, by reference; `twice` hands on what it gets, doubled or as it is.
 CODE = r"""
 #include <stdlib.h>
-typedef struct { double r[16]; int i[4], b[4]; const char *s[4]; char text[64]; } Unit;
+typedef struct { double r[16]; int i[4], b[4]; const char *s[4]; char text[64]; } Fmu;
 #include <string.h>
 void *fmi2Instantiate(const char *n, int t, const char *g, const char *r, const void *b, int v, int l) {
-    Unit *u = calloc(1, sizeof *u); u->s[0] = u->s[1] = "start"; return u; }
-void fmi2FreeInstance(Unit *u) { free(u); }
-int fmi2SetupExperiment(Unit *u, int a, double b, double c, int d, double e) { return 0; }
-int fmi2EnterInitializationMode(Unit *u) { return 0; }
-int fmi2ExitInitializationMode(Unit *u) { return 0; }
-int fmi2Terminate(Unit *u) { return 0; }
-int fmi2GetReal(Unit *u, const unsigned *r, size_t n, double *x) { while (n--) x[n] = u->r[r[n]]; return 0; }
-int fmi2SetReal(Unit *u, const unsigned *r, size_t n, const double *x) { while (n--) u->r[r[n]] = x[n]; return 0; }
-int fmi2GetInteger(Unit *u, const unsigned *r, size_t n, int *x) { while (n--) x[n] = u->i[r[n]]; return 0; }
-int fmi2SetInteger(Unit *u, const unsigned *r, size_t n, const int *x) { while (n--) u->i[r[n]] = x[n]; return 0; }
-int fmi2GetBoolean(Unit *u, const unsigned *r, size_t n, int *x) { while (n--) x[n] = u->b[r[n]]; return 0; }
-int fmi2SetBoolean(Unit *u, const unsigned *r, size_t n, const int *x) { while (n--) u->b[r[n]] = x[n]; return 0; }
-int fmi2GetString(Unit *u, const unsigned *r, size_t n, const char **x) { while (n--) x[n] = u->s[r[n]]; return 0; }
-int fmi2SetString(Unit *u, const unsigned *r, size_t n, const char *const *x) {
+    Fmu *u = calloc(1, sizeof *u); u->s[0] = u->s[1] = "start"; return u; }
+void fmi2FreeInstance(Fmu *u) { free(u); }
+int fmi2SetupExperiment(Fmu *u, int a, double b, double c, int d, double e) { return 0; }
+int fmi2EnterInitializationMode(Fmu *u) { return 0; }
+int fmi2ExitInitializationMode(Fmu *u) { return 0; }
+int fmi2Terminate(Fmu *u) { return 0; }
+int fmi2GetReal(Fmu *u, const unsigned *r, size_t n, double *x) { while (n--) x[n] = u->r[r[n]]; return 0; }
+int fmi2SetReal(Fmu *u, const unsigned *r, size_t n, const double *x) { while (n--) u->r[r[n]] = x[n]; return 0; }
+int fmi2GetInteger(Fmu *u, const unsigned *r, size_t n, int *x) { while (n--) x[n] = u->i[r[n]]; return 0; }
+int fmi2SetInteger(Fmu *u, const unsigned *r, size_t n, const int *x) { while (n--) u->i[r[n]] = x[n]; return 0; }
+int fmi2GetBoolean(Fmu *u, const unsigned *r, size_t n, int *x) { while (n--) x[n] = u->b[r[n]]; return 0; }
+int fmi2SetBoolean(Fmu *u, const unsigned *r, size_t n, const int *x) { while (n--) u->b[r[n]] = x[n]; return 0; }
+int fmi2GetString(Fmu *u, const unsigned *r, size_t n, const char **x) { while (n--) x[n] = u->s[r[n]]; return 0; }
+int fmi2SetString(Fmu *u, const unsigned *r, size_t n, const char *const *x) {
     strncpy(u->text, x[0], 63); u->s[0] = u->s[1] = u->text; return 0; }
-int fmi2DoStep(Unit *u, double t, double h, int p) {
+int fmi2DoStep(Fmu *u, double t, double h, int p) {
     for (int k = 0; k < 4; k++) u->r[8 + k] = u->r[k];
     u->i[1] = 2 * u->i[0]; u->b[1] = u->b[0]; return 0; }
 """
@@ -114,7 +114,7 @@ def test_whole_arrays_and_other_types_are_connected(made, tmp_path):
     assert float(row["b.i_out"]) == 28.0 and row["b.b_out"] in ("true", "1", "1.0")
 
 
-def test_what_two_units_swap_is_never_lost(tmp_path):
+def test_what_two_fmus_swap_is_never_lost(tmp_path):
     """Outputs that follow inputs at once: all values are read before any is set, so each step swaps them."""
     kinds = (("i", "Integer", "0"), ("b", "Boolean", "false"), ("s", "String", ""))
     others = ""

@@ -1,4 +1,4 @@
-"""Exported units, driven by FMPy: valid, equal to `terraglue run`, and right about states, resets, threads, errors."""
+"""Exported FMUs, driven by FMPy: valid, equal to `terraglue run`, and right about states, resets, threads, errors."""
 
 import csv
 import shutil
@@ -12,7 +12,7 @@ from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 
 from conftest import ROOT, terraglue
-from fmus import Unit, export
+from fmus import Fmu, export
 from test_plugins import made
 
 GROUND = ("terrain.size_m=[1.0,0.6]", "terrain.spacing_m=0.005")
@@ -27,7 +27,7 @@ def sets(*edits):
 
 
 @pytest.fixture(scope="session")
-def units(tmp_path_factory):
+def fmus(tmp_path_factory):
     """All that can be exported, in both versions."""
     folder = tmp_path_factory.mktemp("units")
     soil = sets("soil.parameters=LETE_sand", *GROUND, *PLATE)
@@ -38,10 +38,10 @@ def units(tmp_path_factory):
         "robot2": ("rigid-body", "--fmi", "2", *press),
         "whole3": (SCENARIO, "--fmi", "3", "--scalars", *EXACT),
     }
-    made = {name: Unit(export(target, folder / f"{name}.fmu", *rest)) for name, (target, *rest) in wanted.items()}
+    made = {name: Fmu(export(target, folder / f"{name}.fmu", *rest)) for name, (target, *rest) in wanted.items()}
     yield made
-    for unit in made.values():
-        unit.remove()
+    for fmu in made.values():
+        fmu.remove()
 
 
 @pytest.fixture(scope="session")
@@ -72,12 +72,12 @@ DEPTHS = [0.0] + [1e-4 * k for k in range(1, 40)] + [2e-3, 3e-3]
 
 
 @pytest.mark.parametrize("name", ["soil3", "soil2", "robot2", "whole3"])
-def test_fmpy_finds_no_fault(units, name):
-    assert validate_fmu(units[name].path) == []
+def test_fmpy_finds_no_fault(fmus, name):
+    assert validate_fmu(fmus[name].path) == []
 
 
-def test_a_soil_gives_the_forces_of_the_run(units, pressed):
-    instance = units["soil3"].instance(foot__position=place(pressed[0]))
+def test_a_soil_gives_the_forces_of_the_run(fmus, pressed):
+    instance = fmus["soil3"].instance(foot__position=place(pressed[0]))
     forces, wanted = [], np.array([float(row["bevameter.small_plate.contact_normal"]) for row in pressed[1:]])
     for row in pressed[1:]:
         instance["foot.position"] = place(row)
@@ -87,18 +87,18 @@ def test_a_soil_gives_the_forces_of_the_run(units, pressed):
     instance.end()
 
 
-def test_a_whole_scenario_gives_the_run(units, pressed):
-    instance = units["whole3"].instance()
+def test_a_whole_scenario_gives_the_run(fmus, pressed):
+    instance = fmus["whole3"].instance()
     for row in pressed[1:]:
         instance.step(1e-3)
-    outputs = [n for n, v in units["whole3"].variables.items() if v.causality == "output" and n in row]
+    outputs = [n for n, v in fmus["whole3"].variables.items() if v.causality == "output" and n in row]
     assert len(outputs) > 50
     for name in outputs:
         assert abs(instance[name][0] - float(row[name])) <= 1e-12 * max(1.0, abs(float(row[name]))), name
     instance.end()
 
 
-def test_a_robot_gives_the_run(units, tmp_path):
+def test_a_robot_gives_the_run(fmus, tmp_path):
     path = tmp_path / "presses.toml"
     path.write_text(f"""
 [time]
@@ -120,10 +120,10 @@ set = {{ "{PRESSES[0]}" = 0.01, "{PRESSES[1]}" = 0.02 }}
     done = terraglue("run", path, "--csv", "--quiet", "--out", tmp_path / "out")
     assert done.returncode == 0, done.stderr
     row = list(csv.DictReader((tmp_path / "out" / "variables.csv").open()))[-1]
-    instance = units["robot2"].instance(small_press__velocity_target=0.01, large_press__velocity_target=0.02)
+    instance = fmus["robot2"].instance(small_press__velocity_target=0.01, large_press__velocity_target=0.02)
     for _ in range(200):
         instance.step(1e-3)
-    outputs = [n for n, v in units["robot2"].variables.items() if v.causality == "output" and f"robot.{n}" in row]
+    outputs = [n for n, v in fmus["robot2"].variables.items() if v.causality == "output" and f"robot.{n}" in row]
     assert len(outputs) > 30
     for name in outputs:
         wanted = float(row[f"robot.{name}"])
@@ -165,15 +165,15 @@ set = {{ {values} }}
     row = list(csv.DictReader((tmp_path / "out" / "variables.csv").open()))[-1]
 
     edits = sets(f"robot.model={tmp_path}/swing.urdf", "robot.motor=off")
-    unit = Unit(export("rigid-body", tmp_path / "swing.fmu", "--fmi", version, *edits))
-    assert validate_fmu(unit.path) == []
+    fmu = Fmu(export("rigid-body", tmp_path / "swing.fmu", "--fmi", version, *edits))
+    assert validate_fmu(fmu.path) == []
     for name, what in {"base.z": "m", "base.yaw": "rad", "hinge.angle": "rad", "hinge.velocity": "rad/s"}.items():
-        found = unit.variables[name]
+        found = fmu.variables[name]
         assert (found.causality, found.initial, found.unit, float(found.start)) == ("output", "exact", what, 0.0), name
-    unknown = {v.variable.name for v in unit.description.initialUnknowns}
-    assert "arm.z" in unknown and not unknown & wanted.keys() and unit.variables["arm.z"].start is None
+    unknown = {v.variable.name for v in fmu.description.initialUnknowns}
+    assert "arm.z" in unknown and not unknown & wanted.keys() and fmu.variables["arm.z"].start is None
 
-    instance = unit.instance(running=False)
+    instance = fmu.instance(running=False)
     instance["hinge.angle"] = 0.1  # before the initialisation, too; the later value counts
     with pytest.raises(FMICallException):
         instance["hinge.angle"] = 1.5  # beyond its limit
@@ -185,34 +185,34 @@ set = {{ {values} }}
         instance["base.z"] = 1.0
     for _ in range(100):
         instance.step(1e-3)
-    outputs = [n for n, v in unit.variables.items() if v.causality == "output" and f"robot.{n}" in row]
+    outputs = [n for n, v in fmu.variables.items() if v.causality == "output" and f"robot.{n}" in row]
     assert len(outputs) > 30
     for name in outputs:
         assert abs(instance[name][0] - float(row[f"robot.{name}"])) <= 1e-12 * max(1.0, abs(float(row[f"robot.{name}"]))), name
     instance.end()
 
     # A master that knows nothing but the description.
-    result = simulate_fmu(unit.path, start_values=wanted, stop_time=0.1, step_size=1e-3, output=["base.x", "hinge.angle"])
+    result = simulate_fmu(fmu.path, start_values=wanted, stop_time=0.1, step_size=1e-3, output=["base.x", "hinge.angle"])
     for name in ("base.x", "hinge.angle"):
         assert abs(result[name][-1] - float(row[f"robot.{name}"])) < 1e-12, name
-    unit.remove()
+    fmu.remove()
 
 
 @pytest.mark.parametrize(("name", "feet"), [("soil3", 1), ("soil2", 2)])
-def test_a_state_is_saved_restored_and_replayed(units, name, feet):
-    unit = units[name]
-    instance = unit.instance(foot__position=[[0.2 * k, 0, 0.05] for k in range(feet)])
+def test_a_state_is_saved_restored_and_replayed(fmus, name, feet):
+    fmu = fmus[name]
+    instance = fmu.instance(foot__position=[[0.2 * k, 0, 0.05] for k in range(feet)])
     press(instance, DEPTHS[:20], feet)
     state = instance.save()
     first, t = press(instance, DEPTHS[20:], feet), instance.t
     instance.restore(state)
     instance.t = t - 1e-3 * len(first)
     assert (press(instance, DEPTHS[20:], feet) == first).all() and first.max() > 10.0
-    if unit.description.coSimulation.canSerializeFMUstate:
+    if fmu.description.coSimulation.canSerializeFMUstate:
         raw = instance.raw
-        data = (raw.serializeFMUstate if unit.two else raw.serializeFMUState)(state)
-        other = unit.instance("other", start=t - 1e-3 * len(first))
-        loaded = (other.raw.deSerializeFMUstate if unit.two else other.raw.deserializeFMUState)(data)
+        data = (raw.serializeFMUstate if fmu.two else raw.serializeFMUState)(state)
+        other = fmu.instance("other", start=t - 1e-3 * len(first))
+        loaded = (other.raw.deSerializeFMUstate if fmu.two else other.raw.deserializeFMUState)(data)
         other.restore(loaded)
         assert (press(other, DEPTHS[20:], feet) == first).all()
         other.end()
@@ -220,8 +220,8 @@ def test_a_state_is_saved_restored_and_replayed(units, name, feet):
     instance.end()
 
 
-def test_reset_forgets_everything(units):
-    instance = units["soil3"].instance(foot__position=[0, 0, 0.05])
+def test_reset_forgets_everything(fmus):
+    instance = fmus["soil3"].instance(foot__position=[0, 0, 0.05])
     first = press(instance, DEPTHS)
     instance.raw.reset()
     instance.t = 0.0
@@ -230,11 +230,11 @@ def test_reset_forgets_everything(units):
     instance.end()
 
 
-def test_ten_instances_in_threads(units):
+def test_ten_instances_in_threads(fmus):
     results = {}
 
     def run(k):
-        instance = units["soil2"].instance(f"soil{k}", foot__position=[[0, 0, 0.05], [0.2, 0, 0.05]])
+        instance = fmus["soil2"].instance(f"soil{k}", foot__position=[[0, 0, 0.05], [0.2, 0, 0.05]])
         results[k] = press(instance, DEPTHS, 2)
         instance.end()
 
@@ -244,11 +244,11 @@ def test_ten_instances_in_threads(units):
     assert len(results) == 10 and all((results[k] == results[0]).all() for k in results)
 
 
-def test_steps_of_any_length(units):
+def test_steps_of_any_length(fmus):
     """The same way in steps of 1 ms and of 2.5 ms: the law depends on the way, not on the steps."""
     ends = []
     for h in (1e-3, 2.5e-3):
-        instance = units["soil3"].instance(foot__position=[0, 0, 0.01])
+        instance = fmus["soil3"].instance(foot__position=[0, 0, 0.01])
         for k in range(1, round(0.05 / h) + 1):
             instance["foot.position"] = [0, 0, 0.01 - 0.1 * k * h]
             instance.step(h)
@@ -258,10 +258,10 @@ def test_steps_of_any_length(units):
 
 
 @pytest.mark.parametrize("name", ["soil3", "soil2"])
-def test_what_must_not_be_done_is_an_error(units, name):
-    unit = units[name]
-    instance = unit.instance(running=False)
-    feet = 2 if unit.two else 1
+def test_what_must_not_be_done_is_an_error(fmus, name):
+    fmu = fmus[name]
+    instance = fmu.instance(running=False)
+    feet = 2 if fmu.two else 1
 
     def refused(call, *arguments, **named):
         with pytest.raises(FMICallException) as error:
@@ -272,8 +272,8 @@ def test_what_must_not_be_done_is_an_error(units, name):
     refused(instance.step, 1e-3)
     refused(instance.raw.terminate)
     instance.initialize({"foot.position": [[0.2 * k, 0, 0.05] for k in range(feet)]})
-    refused((instance.raw.getReal if unit.two else instance.raw.getFloat64), [99999])
-    refused((instance.raw.getBoolean), [unit.variables["max_sinkage"].valueReference])
+    refused((instance.raw.getReal if fmu.two else instance.raw.getFloat64), [99999])
+    refused((instance.raw.getBoolean), [fmu.variables["max_sinkage"].valueReference])
     refused(instance.__setitem__, "max_sinkage", 1.0)
     refused(instance.__setitem__, "foot.position", [np.nan] * 3 * feet)
     refused(instance.raw.enterInitializationMode)
@@ -283,11 +283,11 @@ def test_what_must_not_be_done_is_an_error(units, name):
     instance.end()
 
 
-def test_our_own_import_gives_the_same(units, pressed, tmp_path):
+def test_our_own_import_gives_the_same(fmus, pressed, tmp_path):
     out = tmp_path / "out.csv"
     names = ["bevameter.small_plate.z", "bevameter.small_plate.contact_normal"]
     done = terraglue(
-        "fmu", "run", units["whole3"].path, "--stop", "0.7", "--step", "0.001", "--output", ",".join(names), "--csv", out
+        "fmu", "run", fmus["whole3"].path, "--stop", "0.7", "--step", "0.001", "--output", ",".join(names), "--csv", out
     )
     assert done.returncode == 0, done.stderr
     row = list(csv.DictReader(out.open()))[-1]
@@ -305,14 +305,14 @@ def test_a_soil_with_a_law_of_its_own_gives_the_run(tmp_path, language):
     done = terraglue("run", place / "scenario.toml", *EXACT, *every)
     assert done.returncode == 0, done.stderr
     rows = list(csv.DictReader((tmp_path / "out" / "variables.csv").open()))
-    # the law that the unit calls is its own
+    # the law that the FMU calls is its own
     shutil.rmtree(place)
-    unit = Unit(path)
-    instance = unit.instance()
+    fmu = Fmu(path)
+    instance = fmu.instance()
     for _ in rows[1:]:
         instance.step(1e-3)
     assert float(rows[-1]["soil.max_sinkage"]) > 1e-3
     for name in ["soil.max_sinkage", "robot.ball.z", "robot.ball.contact_normal"]:
         assert abs(instance[name][0] - float(rows[-1][name])) <= 1e-12 * max(1.0, abs(float(rows[-1][name]))), name
     instance.end()
-    unit.remove()
+    fmu.remove()

@@ -16,7 +16,7 @@ H = 0.1
 
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory):
-    """A unit whose output is the time, and one that keeps and integrates what it is told."""
+    """An FMU whose output is the time, and one that keeps and integrates what it is told."""
     folder = tmp_path_factory.mktemp("faults")
     build(folder, "time", [("y", "output", 0, "")], "r[0] = t + h;")
     sink = [("u", "input", 0, ""), ("seen", "output", 0, ""), ("sum", "output", 0, ""), ("free", "input", 2, "")]
@@ -91,7 +91,7 @@ def test_begin_and_end_are_met_exactly_between_communication_points(folder, tmp_
     assert rows["sink.sum"][-1] == pytest.approx(wanted, rel=1e-12)
 
 
-def test_an_event_is_met_exactly_too_unless_a_unit_makes_steps_of_one_length_only(folder, tmp_path):
+def test_an_event_is_met_exactly_too_unless_an_fmu_makes_steps_of_one_length_only(folder, tmp_path):
     event = '[[event]]\nat_s = 0.537\nset = { "sink.free" = 7.0 }\n'
     more = '[watch]\nfmu = "sink.fmu"\n[[connect]]\nfrom = "sink.free_seen"\nto = "watch.u"\n'
     exact = run(folder, tmp_path / "a", event, more)

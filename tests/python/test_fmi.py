@@ -1,4 +1,4 @@
-"""Functional mock-up units made here in C, and archives that are no units."""
+"""Functional mock-up units made here in C, and archives that are no FMUs."""
 
 import csv
 import pathlib
@@ -28,22 +28,22 @@ CODE = r"""
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
-typedef struct { double v[3]; int dead; } Unit;
+typedef struct { double v[3]; int dead; } Fmu;
 typedef struct { void (*log)(void *, const char *, int, const char *, const char *, ...); void *a, *f, *s, *e; } Back;
 static Back back;
 void *fmi2Instantiate(const char *n, int t, const char *g, const char *r, const Back *b, int v, int l) {
-    Unit *u = calloc(1, sizeof *u); back = *b; u->v[0] = u->v[1] = 1; return u; }
-void fmi2FreeInstance(Unit *u) { if (u->dead) abort(); free(u); }
-int fmi2SetupExperiment(Unit *u, int a, double b, double c, int d, double e) { return 0; }
-int fmi2EnterInitializationMode(Unit *u) { return 0; }
-int fmi2ExitInitializationMode(Unit *u) { return 0; }
-int fmi2Terminate(Unit *u) { if (u->dead) abort(); return 0; }
-int fmi2GetReal(Unit *u, const unsigned *r, size_t n, double *x) { while (n--) x[n] = u->v[r[n]]; return 0; }
-int fmi2SetReal(Unit *u, const unsigned *r, size_t n, const double *x) { while (n--) u->v[r[n]] = x[n]; return 0; }
-int fmi2GetFMUstate(Unit *u, void **s) { if (!*s) *s = malloc(sizeof *u); memcpy(*s, u, sizeof *u); return 0; }
-int fmi2SetFMUstate(Unit *u, void *s) { memcpy(u, s, sizeof *u); return 0; }
-int fmi2FreeFMUstate(Unit *u, void **s) { free(*s); *s = 0; return 0; }
-int fmi2DoStep(Unit *u, double t, double h, int p) {
+    Fmu *u = calloc(1, sizeof *u); back = *b; u->v[0] = u->v[1] = 1; return u; }
+void fmi2FreeInstance(Fmu *u) { if (u->dead) abort(); free(u); }
+int fmi2SetupExperiment(Fmu *u, int a, double b, double c, int d, double e) { return 0; }
+int fmi2EnterInitializationMode(Fmu *u) { return 0; }
+int fmi2ExitInitializationMode(Fmu *u) { return 0; }
+int fmi2Terminate(Fmu *u) { if (u->dead) abort(); return 0; }
+int fmi2GetReal(Fmu *u, const unsigned *r, size_t n, double *x) { while (n--) x[n] = u->v[r[n]]; return 0; }
+int fmi2SetReal(Fmu *u, const unsigned *r, size_t n, const double *x) { while (n--) u->v[r[n]] = x[n]; return 0; }
+int fmi2GetFMUstate(Fmu *u, void **s) { if (!*s) *s = malloc(sizeof *u); memcpy(*s, u, sizeof *u); return 0; }
+int fmi2SetFMUstate(Fmu *u, void *s) { memcpy(u, s, sizeof *u); return 0; }
+int fmi2FreeFMUstate(Fmu *u, void **s) { free(*s); *s = 0; return 0; }
+int fmi2DoStep(Fmu *u, double t, double h, int p) {
     int m = t > 0.25 ? (int)u->v[2] : 0;
     if (m == 4 && h > 0.1) return 2;
     u->v[1] -= h * u->v[0] * u->v[1];
@@ -83,7 +83,7 @@ def left_behind():
         (5, "77, which is no status"),
     ],
 )
-def test_a_unit_that_fails_stops_the_run_and_is_named(decay, tmp_path, mode, says):
+def test_an_fmu_that_fails_stops_the_run_and_is_named(decay, tmp_path, mode, says):
     path = tmp_path / "decay.toml"
     path.write_text(
         f'[time]\nstep_s = 0.125\nduration_s = 1.0\n[recording]\nevery_steps = 1\n'
@@ -103,23 +103,23 @@ def test_a_unit_that_fails_stops_the_run_and_is_named(decay, tmp_path, mode, say
 
 @pytest.mark.parametrize("value", ["NAN", "-INFINITY"])
 def test_a_single_precision_output_that_is_no_number_stops_the_run(tmp_path, value):
-    get = """int fmi3GetFloat32(Unit *u, const unsigned *r, size_t k, float *x, size_t m) {
+    get = """int fmi3GetFloat32(Fmu *u, const unsigned *r, size_t k, float *x, size_t m) {
         for (size_t i = 0; i < m; i++) x[i] = u->v[1][0] > 0.3 ? %s : 1.5f; return 0; }""" % value
-    unit = cfmu.build_3(tmp_path, "single", [("x", "output", "", ())], "v[1][0] += h;", more=get)
-    with zipfile.ZipFile(unit) as archive:
+    fmu = cfmu.build_3(tmp_path, "single", [("x", "output", "", ())], "v[1][0] += h;", more=get)
+    with zipfile.ZipFile(fmu) as archive:
         entries = {name: archive.read(name) for name in archive.namelist()}
     entries["modelDescription.xml"] = entries["modelDescription.xml"].replace(
         b'<Float64 name="x" valueReference="1" causality="output"></Float64>',
         b'<Float32 name="x" valueReference="1" causality="output"/>',
     )
     assert b"Float32" in entries["modelDescription.xml"]
-    with zipfile.ZipFile(unit, "w") as archive:
+    with zipfile.ZipFile(fmu, "w") as archive:
         for name, content in entries.items():
             archive.writestr(name, content)
     scenario = tmp_path / "single.toml"
     scenario.write_text('[time]\nstep_s = 0.125\nduration_s = 1.0\n[recording]\nevery_steps = 1\n[single]\nfmu = "single.fmu"\n')
     for done in (
-        terraglue("fmu", "run", unit, "--stop", "1", "--step", "0.125"),
+        terraglue("fmu", "run", fmu, "--stop", "1", "--step", "0.125"),
         terraglue("run", scenario, "--out", tmp_path / "out", "--quiet"),
     ):
         assert done.returncode == 1, done.stderr
@@ -127,43 +127,43 @@ def test_a_single_precision_output_that_is_no_number_stops_the_run(tmp_path, val
 
 
 def test_a_library_whose_name_is_no_identifier_of_c_runs_with_a_warning(tmp_path):
-    unit = cfmu.build(tmp_path, "tank", [("x", "output", 0, "")], "r[0] += h;")
-    with zipfile.ZipFile(unit) as archive:
+    fmu = cfmu.build(tmp_path, "tank", [("x", "output", 0, "")], "r[0] += h;")
+    with zipfile.ZipFile(fmu) as archive:
         text = archive.read("modelDescription.xml").decode()
         library = archive.read("binaries/linux64/m.so")
-    with zipfile.ZipFile(unit, "w") as archive:
+    with zipfile.ZipFile(fmu, "w") as archive:
         archive.writestr("modelDescription.xml", text.replace('modelIdentifier="m"', 'modelIdentifier="tank-c"'))
         archive.writestr("binaries/linux64/tank-c.so", library)
     scenario = tmp_path / "tank.toml"
     scenario.write_text('[time]\nstep_s = 0.25\nduration_s = 1.0\n[tank]\nfmu = "tank.fmu"\n')
     runs = [
-        terraglue("fmu", "run", unit, "--stop", "1", "--step", "0.25"),
+        terraglue("fmu", "run", fmu, "--stop", "1", "--step", "0.25"),
         terraglue("run", scenario, "--out", tmp_path / "out", "--quiet"),
     ]
     for done in runs:
         assert done.returncode == 0, done.stderr
         assert 'modelIdentifier = "tank-c" is no identifier of C' in done.stderr
     assert runs[0].stdout.splitlines()[-1] == "1,1"
-    assert "is no identifier of C" in terraglue("fmu", "check", unit).stdout
+    assert "is no identifier of C" in terraglue("fmu", "check", fmu).stdout
 
 
-def both_ways(unit, tmp_path, more=""):
-    """A unit of FMI 3.0 run alone and as a subsystem, 1 s in steps of 0.25 s; the end of x of each where it got there."""
+def both_ways(fmu, tmp_path, more=""):
+    """An FMU of FMI 3.0 run alone and as a subsystem, 1 s in steps of 0.25 s; the end of x of each where it got there."""
     scenario = tmp_path / "both.toml"
     scenario.write_text(
-        f'[time]\nstep_s = 0.25\nduration_s = 1.0\n[recording]\nevery_steps = 1\n[unit]\nfmu = "{unit}"\n{more}\n'
+        f'[time]\nstep_s = 0.25\nduration_s = 1.0\n[recording]\nevery_steps = 1\n[unit]\nfmu = "{fmu}"\n{more}\n'
     )
-    alone = terraglue("fmu", "run", unit, "--stop", "1", "--step", "0.25")
+    alone = terraglue("fmu", "run", fmu, "--stop", "1", "--step", "0.25")
     inside = terraglue("run", scenario, "--out", tmp_path / "out", "--csv", "--quiet")
     rows = list(csv.DictReader((tmp_path / "out" / "variables.csv").open()))
     return alone, inside, (alone.stdout.splitlines() or [""])[-1], float(rows[-1]["unit.x"])
 
 
 @pytest.mark.parametrize(("macros", "step"), [(["SILENT"], ""), ([], "*last = NAN;"), (["SILENT"], "*early = true;")])
-def test_a_step_counts_as_made_where_the_unit_does_not_say_how_far_it_came(tmp_path, macros, step):
+def test_a_step_counts_as_made_where_the_fmu_does_not_say_how_far_it_came(tmp_path, macros, step):
     """A value that it does write is looked at, and a step that it leaves early needs one."""
-    unit = cfmu.build_3(tmp_path, "silent", [("x", "output", "", ())], f"v[1][0] += h; {step}", macros=macros)
-    alone, inside, last, end = both_ways(unit, tmp_path)
+    fmu = cfmu.build_3(tmp_path, "silent", [("x", "output", "", ())], f"v[1][0] += h; {step}", macros=macros)
+    alone, inside, last, end = both_ways(fmu, tmp_path)
     if step:
         assert (alone.returncode, inside.returncode) == (1, 1)
         assert "came to t = NaN s" in alone.stderr and "came to t = NaN s" in inside.stderr
@@ -174,13 +174,13 @@ def test_a_step_counts_as_made_where_the_unit_does_not_say_how_far_it_came(tmp_p
         assert done.stderr.count("does not say how far it came (lastSuccessfulTime)") == 1, done.stderr
 
 
-def test_a_unit_that_saves_nothing_runs_without_its_state(tmp_path):
-    unit = cfmu.build_3(tmp_path, "forgetful", [("x", "output", "", ())], "v[1][0] += h;", macros=["SAVES_NOTHING"])
-    alone, inside, last, _ = both_ways(unit, tmp_path)
+def test_an_fmu_that_saves_nothing_runs_without_its_state(tmp_path):
+    fmu = cfmu.build_3(tmp_path, "forgetful", [("x", "output", "", ())], "v[1][0] += h;", macros=["SAVES_NOTHING"])
+    alone, inside, last, _ = both_ways(fmu, tmp_path)
     assert (alone.returncode, last) == (0, "1,1"), alone.stderr
     assert alone.stderr.count("saved nothing") == 1
     assert inside.returncode == 1 and "`rollback = false`" in inside.stderr, inside.stderr
-    _, inside, _, end = both_ways(unit, tmp_path, "rollback = false")
+    _, inside, _, end = both_ways(fmu, tmp_path, "rollback = false")
     assert (inside.returncode, end) == (0, 1.0), inside.stderr
 
 
@@ -192,9 +192,9 @@ def test_a_discarded_step_is_halved(decay):
 
 
 def test_steps_are_for_good_unless_a_state_is_kept(tmp_path):
-    """Some units stay where they are in a step after which an earlier state might be set again."""
-    unit = cfmu.build(tmp_path, "wary", [("x", "output", 0, "")], "if (p) r[0] += h;")
-    done = terraglue("fmu", "run", unit, "--stop", "1", "--step", "0.25")
+    """Some FMUs stay where they are in a step after which an earlier state might be set again."""
+    fmu = cfmu.build(tmp_path, "wary", [("x", "output", 0, "")], "if (p) r[0] += h;")
+    done = terraglue("fmu", "run", fmu, "--stop", "1", "--step", "0.25")
     assert [line.split(",")[1] for line in done.stdout.splitlines()[1:]] == ["0", "0.25", "0.5", "0.75", "1"]
     scenario = tmp_path / "wary.toml"
     scenario.write_text('[time]\nstep_s = 0.25\nduration_s = 1.0\n[recording]\nevery_steps = 1\n[wary]\nfmu = "wary.fmu"\n')
@@ -204,7 +204,7 @@ def test_steps_are_for_good_unless_a_state_is_kept(tmp_path):
     assert float(rows[-1]["wary.x"]) == 1.0
 
 
-def test_a_unit_runs_alone(decay, tmp_path):
+def test_an_fmu_runs_alone(decay, tmp_path):
     out = tmp_path / "out.csv"
     done = terraglue("fmu", "run", decay, "--stop", "1", "--step", "0.125", "--start", "k=2", "--csv", out)
     assert done.returncode == 0, done.stderr
@@ -223,7 +223,7 @@ def test_nothing_is_left_behind(decay):
     assert left_behind() <= before
 
 
-def test_a_unit_is_a_subsystem(decay, tmp_path):
+def test_an_fmu_is_a_subsystem(decay, tmp_path):
     path = tmp_path / "decay.toml"
     path.write_text(f"""
 [time]
@@ -256,7 +256,7 @@ k = 2.0
         ({"modelDescription.xml": '<!DOCTYPE a [<!ENTITY b "c">]><a>&b;</a>'}, "DTD"),
     ],
 )
-def test_an_archive_that_is_no_unit_is_refused(tmp_path, entries, says):
+def test_an_archive_that_is_no_fmu_is_refused(tmp_path, entries, says):
     path = tmp_path / "x.fmu"
     with zipfile.ZipFile(path, "w") as archive:
         for name, text in entries.items():

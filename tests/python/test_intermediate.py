@@ -25,17 +25,17 @@ for (int k = 1; k <= 4; k++) {
     if (stop) { *early = true; *last = when; return 0; }
     if (m == 3 && k == 2) { if (!u->early) return 3; *early = true; *last = own; return 0; }
 }"""
-MORE = r"""typedef struct { Unit *u; double t; } Call;
+MORE = r"""typedef struct { Fmu *u; double t; } Call;
 static void *apart(void *p) { Call *c = p; bool stop; double when; c->u->update(c->u->env, c->t, 0, 1, 1, 1, &stop, &when); return 0; }"""
 ODD = r"""bool stop = true; double when; static int deep;
 if (deep || !u->update) return 0; deep = 1;
 u->update(u->env, 0.1, true, true, true, true, &stop, &when); u->update((void *)8, NAN, false, true, false, true, 0, 0); deep = 0;
 if (stop) abort();"""
-# event mode of a unit without events of its own
-EVENTS = r"""int fmi3EnterEventMode(Unit *u) { return 0; }
-int fmi3EnterStepMode(Unit *u) { return 0; }
-int fmi3UpdateDiscreteStates(Unit *u, bool *a, bool *b, bool *c, bool *d, bool *e, double *t) { flip(u); return *a = *b = *c = *d = *e = false, 0; }"""
-MORE += "\nstatic void flip(Unit *u) {}\n" + EVENTS
+# event mode of an FMU without events of its own
+EVENTS = r"""int fmi3EnterEventMode(Fmu *u) { return 0; }
+int fmi3EnterStepMode(Fmu *u) { return 0; }
+int fmi3UpdateDiscreteStates(Fmu *u, bool *a, bool *b, bool *c, bool *d, bool *e, double *t) { flip(u); return *a = *b = *c = *d = *e = false, 0; }"""
+MORE += "\nstatic void flip(Fmu *u) {}\n" + EVENTS
 START = "v[1][0] = v[2][0] = 1; v[2][1] = -1;"
 FLAGS = 'providesIntermediateUpdate="true" canReturnEarlyAfterIntermediateUpdate="true" mightReturnEarlyFromDoStep="true" hasEventMode="true"'
 
@@ -49,8 +49,8 @@ def folder(tmp_path_factory):
     return folder
 
 
-def run(folder, mode, *more, unit="inner"):
-    return terraglue("fmu", "run", folder / f"{unit}.fmu", "--stop", "1", "--step", "0.25", "--start", f"mode={mode}", *more)
+def run(folder, mode, *more, fmu="inner"):
+    return terraglue("fmu", "run", folder / f"{fmu}.fmu", "--stop", "1", "--step", "0.25", "--start", f"mode={mode}", *more)
 
 
 def inner(count):
@@ -92,18 +92,18 @@ def test_early_returns_are_gone_on_from(folder, tmp_path):
 
 
 def test_an_event_is_never_left_to_nobody(tmp_path):
-    """x' = 1 up to the event at 0.55 s, then -1. A unit that may return early leaves the event to event mode; else it handles it itself."""
+    """x' = 1 up to the event at 0.55 s, then -1. An FMU that may return early leaves the event to event mode; else it handles it itself."""
     step = """if (t < 0.55 - 1e-12 && t + h >= 0.55) {
     v[1][0] += 0.55 - t;
     if (u->early) { *early = *event = true; *last = 0.55; return 0; }
     v[2][0] = -1; v[1][0] -= t + h - 0.55; return 0; }
 v[1][0] += h * v[2][0];"""
-    more = "static void flip(Unit *u) { if (u->v[1][0] > 0.5) u->v[2][0] = -1; }\n" + EVENTS
+    more = "static void flip(Fmu *u) { if (u->v[1][0] > 0.5) u->v[2][0] = -1; }\n" + EVENTS
     flags = 'hasEventMode="true" mightReturnEarlyFromDoStep="true"'
     variables = [("x", "output", "", ()), ("slope", "output", "", ())]
-    unit = build_3(tmp_path, "turns", variables, step, start="v[2][0] = 1;", more=more, flags=flags)
+    fmu = build_3(tmp_path, "turns", variables, step, start="v[2][0] = 1;", more=more, flags=flags)
     for mode in ("off", "on"):
-        done = terraglue("fmu", "run", unit, "--stop", "1", "--step", "0.1", "--event-mode", mode)
+        done = terraglue("fmu", "run", fmu, "--stop", "1", "--step", "0.1", "--event-mode", mode)
         last = list(csv.DictReader(done.stdout.splitlines()))[-1]
         assert float(last["x"]) == pytest.approx(0.1, abs=1e-12), mode
 
@@ -131,7 +131,7 @@ def test_odd_returns_and_calls_do_no_harm(folder, monkeypatch, mode, says):
 
 def test_calls_outside_a_step_are_not_followed(folder, monkeypatch, tmp_path):
     monkeypatch.setenv("TERRAGLUE_LOG", "warn")
-    done = run(folder, 0, "--intermediate", tmp_path / "i.csv", unit="odd")
+    done = run(folder, 0, "--intermediate", tmp_path / "i.csv", fmu="odd")
     assert done.returncode == 0 and done.stderr.count("that is not followed") == 1, done.stderr
     assert [float(row["x"]) for row in rows(tmp_path / "i.csv")] == inner(16)[1:]
     path = tmp_path / "odd.toml"
@@ -141,7 +141,7 @@ def test_calls_outside_a_step_are_not_followed(folder, monkeypatch, tmp_path):
 
 
 def test_what_is_not_offered_is_refused(folder, tmp_path):
-    done = run(folder, 0, "--intermediate", tmp_path / "i.csv", unit="plain")
+    done = run(folder, 0, "--intermediate", tmp_path / "i.csv", fmu="plain")
     assert done.returncode == 1 and "intermediate" in done.stderr, done.stderr
     done = run(folder, 0, "--intermediate", tmp_path / "i.csv", "--output", "mode")
     assert done.returncode == 1 and "intermediateUpdate" in done.stderr, done.stderr

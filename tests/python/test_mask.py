@@ -110,15 +110,15 @@ def test_a_law_stiffer_than_unloading_is_warned_of_with_the_way_out(tmp_path, la
     assert "is softer than the law from" not in terraglue("check", path).stderr
 
 
-def test_an_exported_unit_carries_the_mask(tmp_path):
+def test_an_exported_fmu_carries_the_mask(tmp_path):
     path = scenario(tmp_path, [[1, 0, 7]])
     plain = forces(tmp_path / "plain", path)
-    unit = tmp_path / "unit.fmu"
-    process = terraglue("export", path, "-o", unit)
+    fmu = tmp_path / "unit.fmu"
+    process = terraglue("export", path, "-o", fmu)
     assert process.returncode == 0, process.stderr
     (tmp_path / "regions.png").unlink()
     out = tmp_path / "unit.csv"
-    process = terraglue("fmu", "run", unit, "--stop", "1.5", "--step", "0.001", "--csv", out)
+    process = terraglue("fmu", "run", fmu, "--stop", "1.5", "--step", "0.001", "--csv", out)
     assert process.returncode == 0, process.stderr
     last = list(csv.DictReader(out.open()))[-1]
     assert float(last["bevameter.small_plate.contact_normal"]) == pytest.approx(plain[0][1], rel=1e-6)

@@ -1,4 +1,4 @@
-"""Exported units in other masters, and units of other makers in a loop with an exported soil here."""
+"""Exported FMUs in other masters, and FMUs of other makers in a loop with an exported soil here."""
 
 import csv
 import ctypes.util
@@ -25,16 +25,16 @@ def soil(tmp_path_factory):
 @pytest.fixture(scope="session")
 def wanted(soil):
     """Forces that FMPy gets."""
-    from fmus import Unit
+    from fmus import Fmu
 
-    unit = Unit(soil)
-    instance, forces = unit.instance(foot__position=[0, 0, HEIGHTS[0]]), []
+    fmu = Fmu(soil)
+    instance, forces = fmu.instance(foot__position=[0, 0, HEIGHTS[0]]), []
     for z in HEIGHTS:
         instance["foot.position"] = [0, 0, z]
         instance.step(1e-3)
         forces.append(instance["foot.force"][0, 2])
     instance.end()
-    unit.remove()
+    fmu.remove()
     assert forces[0] == 0.0 and forces[-1] > 50.0
     return forces
 
@@ -147,7 +147,7 @@ def library_of_python():
 def test_a_mass_of_another_maker_comes_to_rest_on_the_soil(tmp_path, soil, maker):
     library = library_of_python()
     if library is None:
-        pytest.skip("this Python has no shared library, which units of pythonfmu need")
+        pytest.skip("this Python has no shared library, which FMUs of pythonfmu need")
     (tmp_path / "mass.py").write_text(MASS.format(**MAKERS[maker]))
     subprocess.run([sys.executable, "-m", maker, "build", "-f", "mass.py"], cwd=tmp_path, check=True, capture_output=True)
     if maker == "pythonfmu3":

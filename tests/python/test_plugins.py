@@ -439,8 +439,8 @@ def test_a_soil_with_a_law_runs_isolated_and_is_exported(tmp_path):
         assert process.returncode == 0, process.stderr
     process = terraglue("export", "scenario.toml", "-o", tmp_path / "unit.fmu", cwd=place)
     assert process.returncode == 0, process.stderr
-    with zipfile.ZipFile(tmp_path / "unit.fmu") as unit:
-        assert any(name.endswith("law/libmy_law_plugin.so") for name in unit.namelist())
+    with zipfile.ZipFile(tmp_path / "unit.fmu") as fmu:
+        assert any(name.endswith("law/libmy_law_plugin.so") for name in fmu.namelist())
 
 
 def test_a_module_that_would_abort_does_not_compile(tmp_path, rust_target):

@@ -196,7 +196,7 @@ def test_workers_of_the_checker_are_copies_that_behave_as_if_they_were_started(t
     process = terraglue("check-module", source, "--only", test)
     assert process.returncode == (0 if told is None else 1), process.stdout
     assert told is None or told in flat(process.stdout), process.stdout
-    assert left_behind() == before and not list(pathlib.Path(tempfile.gettempdir()).glob("terraglue-nursery-*"))
+    assert left_behind() == before and not list(pathlib.Path(tempfile.gettempdir()).glob("terraglue-fork-server-*"))
 
 
 def test_the_controller_of_the_page_runs(tmp_path):

@@ -134,16 +134,16 @@ def test_a_structure_runs_and_its_scenario_gives_the_same(files, tmp_path):
         made = tmp_path / source.suffix[1:] / "scenario.toml"
         made.parent.mkdir()
         done = terraglue("convert", source, "-o", made)
-        assert done.returncode == 0 and "3 units, 2 connections" in done.stdout, done.stderr
+        assert done.returncode == 0 and "3 FMUs, 2 connections" in done.stdout, done.stderr
         assert run(made, tmp_path / f"out-{source.suffix[1:]}") == rows
     done = terraglue("run", ssd, "--set", "d.start.k=1.0", "--set", "time.step_s=0.5", "--quiet", "--out", tmp_path / "x")
     assert done.returncode == 0, done.stderr
 
 
-def test_a_structure_of_exported_units_runs(tmp_path):
+def test_a_structure_of_exported_fmus_runs(tmp_path):
     press = f"robot.model={ROOT}/models/bevameter.urdf"
     sets = ("robot.fixed_base=true", "robot.motor=velocity", press)
-    unit = export("rigid-body", tmp_path / "press.fmu", *(word for edit in sets for word in ("--set", edit)))
+    fmu = export("rigid-body", tmp_path / "press.fmu", *(word for edit in sets for word in ("--set", edit)))
     text = f"""<ssd:SystemStructureDescription {NAMES} name="press"><ssd:System name="press"><ssd:Elements>
 <ssd:Component name="one" source="press.fmu"><ssd:ParameterBindings><ssd:ParameterBinding><ssd:ParameterValues>
 <ssv:ParameterSet version="1.0" name="p"><ssv:Parameters><ssv:Parameter name="small_press.velocity_target">
@@ -154,7 +154,7 @@ endConnector="small_press.velocity_target"/></ssd:Connections></ssd:System>
 <ssd:DefaultExperiment stopTime="0.1"/></ssd:SystemStructureDescription>"""
     with zipfile.ZipFile(tmp_path / "press.ssp", "w") as archive:
         archive.writestr("SystemStructure.ssd", text)
-        archive.write(unit, "press.fmu")
+        archive.write(fmu, "press.fmu")
     rows = run(tmp_path / "press.ssp", tmp_path / "out")
     moved = [float(rows[-1][f"{name}.small_press.angle"]) for name in ("one", "two")]
     assert moved[0] == pytest.approx(0.002, rel=0.05) and moved[1] == pytest.approx(moved[0], rel=0.1)

@@ -20,7 +20,7 @@ def rows(path):
 
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
 @pytest.mark.parametrize("isolate", [[], ["--isolate"]])
-def test_a_signal_ends_a_unit_with_its_table_and_all_its_processes(slow, tmp_path, how, isolate):
+def test_a_signal_ends_an_fmu_with_its_table_and_all_its_processes(slow, tmp_path, how, isolate):
     table = tmp_path / "out.csv"
     command = [PROGRAM, "fmu", "run", slow, "--stop", "1000", "--step", "0.01", "--csv", table, *isolate]
     run = subprocess.Popen([*map(str, command)], stderr=subprocess.PIPE, text=True)
@@ -42,9 +42,9 @@ def test_the_last_step_ends_where_the_run_does(slow, tmp_path, step):
     assert done.returncode == 0 and times[-1] == 1.0 and times[1] == float(step), done.stderr
 
 
-def test_a_unit_with_steps_of_one_length_ends_before(tmp_path):
-    unit = cfmu.build(tmp_path, "fixed", [("y", "output", 0, "")], "r[0] = t + h;", variable_step=False)
-    done = terraglue("fmu", "run", unit, "--stop", "1", "--step", "0.3", "--csv", tmp_path / "out.csv")
+def test_an_fmu_with_steps_of_one_length_ends_before(tmp_path):
+    fmu = cfmu.build(tmp_path, "fixed", [("y", "output", 0, "")], "r[0] = t + h;", variable_step=False)
+    done = terraglue("fmu", "run", fmu, "--stop", "1", "--step", "0.3", "--csv", tmp_path / "out.csv")
     assert done.returncode == 0 and "before 1 s" in done.stderr, done.stderr
     assert rows(tmp_path / "out.csv")[-1][0] == pytest.approx(0.9)
 

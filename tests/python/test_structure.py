@@ -42,7 +42,7 @@ def scenario(space, path, keys):
 
 
 @pytest.mark.parametrize("n", [1, 2, 3, 5])
-def test_a_unit_runs_alone_in_another_size(space, n):
+def test_an_fmu_runs_alone_in_another_size(space, n):
     done = terraglue("fmu", "run", space / "space.fmu", "--stop", "1", "--step", "0.125", "--start", f"n={n}")
     assert done.returncode == 0, done.stderr
     rows = list(csv.DictReader(done.stdout.splitlines()))
@@ -91,7 +91,7 @@ def test_what_is_not_there_or_too_late_is_refused(space, tmp_path):
     done = terraglue("fmu", "run", space / "plain.fmu", "--stop", "1", "--step", "0.125", "--start", "n=2")
     assert done.returncode == 1 and "fmi3EnterConfigurationMode" in done.stderr and "n = 2" in done.stderr, done.stderr
     done = terraglue("fmu", "run", space / "plain.fmu", "--stop", "1", "--step", "0.125")
-    assert done.returncode == 0, "a unit whose size nobody changes needs no configuration mode"
+    assert done.returncode == 0, "an FMU whose size nobody changes needs no configuration mode"
     done = scenario(space, tmp_path / "a.toml", "n = 2\nx0 = [1.0]\n")
     flat = " ".join(done.stderr.replace("│", " ").split())
     assert done.returncode == 2 and "`x0[2]` lacks a value" in flat and "give all 2" in flat, done.stderr
@@ -99,7 +99,7 @@ def test_what_is_not_there_or_too_late_is_refused(space, tmp_path):
     assert done.returncode == 2 and "x0[3]" in done.stderr, done.stderr
     event = '[[event]]\nat_s = 0.0\nset = { "s.n" = 2 }\n'
     done = scenario(space, tmp_path / "a.toml", event)
-    assert done.returncode != 0 and "in the table of its unit" in " ".join(done.stderr.replace("│", " ").split()), done.stderr
+    assert done.returncode != 0 and "in the table of its FMU" in " ".join(done.stderr.replace("│", " ").split()), done.stderr
 
 
 def test_arrays_are_fed_over_time_whole_or_by_elements(space, tmp_path):

@@ -1,4 +1,4 @@
-"""Bodies of units that are glued by a terminal of FMI 3: of exported units, and of one made here with arrays."""
+"""Bodies of FMUs that are glued by a terminal of FMI 3: of exported FMUs, and of one made here with arrays."""
 
 import csv
 import subprocess
@@ -10,7 +10,7 @@ from fmpy.validation import validate_fmu
 
 from cfmu import build
 from conftest import terraglue
-from fmus import Unit, export
+from fmus import Fmu, export
 
 H, STEPS = 0.001, 200
 GRAVITY = -9.81
@@ -44,31 +44,31 @@ CODE = r"""
 #include <stdbool.h>
 #include <stdlib.h>
 #include <string.h>
-typedef struct { double x[3][3]; } Unit;
+typedef struct { double x[3][3]; } Fmu;
 void *fmi3InstantiateCoSimulation(const char *n, const char *t, const char *r, bool v, bool l, bool e, bool a,
-    const unsigned *q, size_t k, void *env, void *log, void *up) { return calloc(1, sizeof(Unit)); }
-void fmi3FreeInstance(Unit *u) { free(u); }
-int fmi3EnterInitializationMode(Unit *u, bool a, double b, double c, bool d, double e) { return 0; }
-int fmi3ExitInitializationMode(Unit *u) { return 0; }
-int fmi3Terminate(Unit *u) { return 0; }
-int fmi3GetFloat64(Unit *u, const unsigned *r, size_t n, double *x, size_t m) {
+    const unsigned *q, size_t k, void *env, void *log, void *up) { return calloc(1, sizeof(Fmu)); }
+void fmi3FreeInstance(Fmu *u) { free(u); }
+int fmi3EnterInitializationMode(Fmu *u, bool a, double b, double c, bool d, double e) { return 0; }
+int fmi3ExitInitializationMode(Fmu *u) { return 0; }
+int fmi3Terminate(Fmu *u) { return 0; }
+int fmi3GetFloat64(Fmu *u, const unsigned *r, size_t n, double *x, size_t m) {
     for (size_t i = 0; i < n; i++) memcpy(x + 3 * i, u->x[r[i] - 1], 24);
     return m == 3 * n ? 0 : 3; }
-int fmi3SetFloat64(Unit *u, const unsigned *r, size_t n, const double *x, size_t m) {
+int fmi3SetFloat64(Fmu *u, const unsigned *r, size_t n, const double *x, size_t m) {
     for (size_t i = 0; i < n; i++) memcpy(u->x[r[i] - 1], x + 3 * i, 24);
     return m == 3 * n ? 0 : 3; }
-int fmi3DoStep(Unit *u, double t, double h, bool g, bool *e, bool *d, bool *early, double *last) {
+int fmi3DoStep(Fmu *u, double t, double h, bool g, bool *e, bool *d, bool *early, double *last) {
     for (int k = 0; k < 3; k++) { u->x[1][k] += h * u->x[2][k]; u->x[0][k] += h * u->x[1][k]; }
     *e = *d = *early = false; *last = t + h; return 0; }
-int fmi3GetFMUState(Unit *u, void **s) { if (!*s) *s = malloc(sizeof *u); memcpy(*s, u, sizeof *u); return 0; }
-int fmi3SetFMUState(Unit *u, void *s) { memcpy(u, s, sizeof *u); return 0; }
-int fmi3FreeFMUState(Unit *u, void **s) { free(*s); *s = 0; return 0; }
+int fmi3GetFMUState(Fmu *u, void **s) { if (!*s) *s = malloc(sizeof *u); memcpy(*s, u, sizeof *u); return 0; }
+int fmi3SetFMUState(Fmu *u, void *s) { memcpy(u, s, sizeof *u); return 0; }
+int fmi3FreeFMUState(Fmu *u, void **s) { free(*s); *s = 0; return 0; }
 """
 
 
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory):
-    """Two robots of one body as modules and as units, and a mass with arrays."""
+    """Two robots of one body as modules and as FMUs, and a mass with arrays."""
     folder = tmp_path_factory.mktemp("terminals")
     for name, mass, gravity in (("heavy", HEAVY, GRAVITY), ("light", LIGHT, 0.0)):
         model = folder / f"{name}.urdf"
@@ -117,7 +117,7 @@ components = ["x", "y", "z"]
         ('[b]\nfmu = "arrays.fmu"\n[b.bodies.hull]\nterminal = "flange"', "b.p[3]"),
     ],
 )
-def test_two_units_that_are_plugged_together_fall_as_one(folder, tmp_path, side_2, height):
+def test_two_fmus_that_are_plugged_together_fall_as_one(folder, tmp_path, side_2, height):
     rows = glued(folder, tmp_path / "out", side_2)
     assert len(rows) == STEPS + 1
     share = GRAVITY * HEAVY / (HEAVY + LIGHT)
@@ -129,17 +129,17 @@ def test_two_units_that_are_plugged_together_fall_as_one(folder, tmp_path, side_
         assert fallen == pytest.approx([z, z], rel=1e-8, abs=1e-12)
 
 
-def test_an_exported_unit_has_a_terminal_for_each_body_and_stays_valid(folder):
-    unit = Unit(folder / "heavy.fmu")
-    assert validate_fmu(unit.path) == []
-    with zipfile.ZipFile(unit.path) as archive:
+def test_an_exported_fmu_has_a_terminal_for_each_body_and_stays_valid(folder):
+    fmu = Fmu(folder / "heavy.fmu")
+    assert validate_fmu(fmu.path) == []
+    with zipfile.ZipFile(fmu.path) as archive:
         root = ET.fromstring(archive.read("terminalsAndIcons/terminalsAndIcons.xml"))
     (hull,) = root.findall("Terminals/Terminal")
     assert hull.get("name") == "hull"
     for member in hull.findall("TerminalMemberVariable"):
-        variable = unit.variables[member.get("variableName")]
+        variable = fmu.variables[member.get("variableName")]
         assert variable.name == f"hull.{member.get('memberName')}"
-    unit.remove()
+    fmu.remove()
 
 
 @pytest.mark.parametrize(
@@ -155,7 +155,7 @@ def test_a_terminal_that_does_not_fit_is_refused(folder, tmp_path, terminal, say
     assert done.returncode == 2 and says in done.stderr, done.stderr
 
 
-def test_a_unit_that_does_not_come_back_to_its_saved_state_is_refused(tmp_path):
+def test_an_fmu_that_does_not_come_back_to_its_saved_state_is_refused(tmp_path):
     reals = [("x", "output", 0, ""), ("v", "output", 0, ""), ("f", "input", 0, "")]
     honest = "r[1] += h * r[2]; r[0] += h * r[1];"
     build(tmp_path, "honest", reals, honest)

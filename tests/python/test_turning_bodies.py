@@ -1,4 +1,4 @@
-"""Bodies of units that turn: forces beside their reference point and moments, by terminals of exported robots and by maps of names."""
+"""Bodies of FMUs that turn: forces beside their reference point and moments, by terminals of exported robots and by maps of names."""
 
 import csv
 import json
@@ -52,7 +52,7 @@ FREE = {"hull": keys(HULL_AT, [0.0] * 3, SPIN), "arm": keys(ARM_AT, ARM_SPEED, S
 
 @pytest.fixture(scope="session")
 def folder(tmp_path_factory):
-    """Robots of one link and of two, and the first as units with and without gravity."""
+    """Robots of one link and of two, and the first as FMUs with and without gravity."""
     folder = tmp_path_factory.mktemp("turning")
     (folder / "hull.urdf").write_text(robot(link("hull", HULL)))
     (folder / "arm.urdf").write_text(robot(link("arm", ARM)))
@@ -75,8 +75,8 @@ def table(name, model, own):
     return f'[{name}]\nmodule = "rigid-body"\nmodel = "{model}"\n{rest}'
 
 
-def plug(name, unit, body):
-    return f'[{name}]\nfmu = "{unit}.fmu"\n[{name}.bodies.{body}]\nterminal = "{body}"\n'
+def plug(name, fmu, body):
+    return f'[{name}]\nfmu = "{fmu}.fmu"\n[{name}.bodies.{body}]\nterminal = "{body}"\n'
 
 
 def glue(side_1, side_2, at=JOINT, components='["x", "y", "z"]', more=""):
@@ -134,38 +134,38 @@ def momenta(row, prefix, of):
     return push, np.cross(place + arm, push) + r @ np.diag(of["inertia"]) @ r.T @ w
 
 
-def test_a_unit_that_hangs_beside_its_centre_of_mass_swings_like_the_module_on_a_ball_joint(folder, tmp_path):
-    hung = run(folder, tmp_path / "unit", plug("a", "hull_heavy", "hull") + glue("a.hull", "world"))
+def test_an_fmu_that_hangs_beside_its_centre_of_mass_swings_like_the_module_on_a_ball_joint(folder, tmp_path):
+    hung = run(folder, tmp_path / "fmu", plug("a", "hull_heavy", "hull") + glue("a.hull", "world"))
     ball = 'joint_kind = { ball = "spherical" }\n'
     whole = run(folder, tmp_path / "module", table("a", "hung.urdf", {"motor": "off"}) + ball, gravity=GRAVITY)
     same(hung, whole, [(f"a.hull.{n}", f"a.hull.{n}") for n in ("qw", "qx", "qy", "qz", "wx", "wy", "wz")])
     assert abs(hung[-1]["a.hull.qw"]) < 0.95, "it has swung"
 
 
-def test_two_units_on_a_ball_joint_move_like_one_robot_and_keep_their_momenta(folder, tmp_path):
+def test_two_fmus_on_a_ball_joint_move_like_one_robot_and_keep_their_momenta(folder, tmp_path):
     text = plug("a", "hull", "hull") + plug("b", "arm", "arm") + glue("a.hull", "b.arm")
-    units = run(folder, tmp_path / "units", text)
+    fmus = run(folder, tmp_path / "fmus", text)
     whole = run(folder, tmp_path / "whole", table("a", "pair.urdf", FREE["hull"]) + 'joint_kind = { ball = "spherical" }\n')
     # poses: rates of the robot know the gap of its joint, 1e-12 m, over the step
     names = [(f"{sub}.{body}.{n}", f"a.{body}.{n}") for sub, body in (("a", "hull"), ("b", "arm")) for n in MOTION[:7]]
-    same(units, whole, names)
+    same(fmus, whole, names)
     total = [
-        np.concatenate(momenta(row, "a.hull", HULL)) + np.concatenate(momenta(row, "b.arm", ARM)) for row in units
+        np.concatenate(momenta(row, "a.hull", HULL)) + np.concatenate(momenta(row, "b.arm", ARM)) for row in fmus
     ]
     assert np.abs(np.array(total) - total[0]).max() < 1e-10 * np.abs(total[0]).max()
-    apart = np.subtract([units[-1][f"a.hull.w{k}"] for k in "xyz"], [units[-1][f"b.arm.w{k}"] for k in "xyz"])
+    apart = np.subtract([fmus[-1][f"a.hull.w{k}"] for k in "xyz"], [fmus[-1][f"b.arm.w{k}"] for k in "xyz"])
     assert np.abs(apart).max() > 0.1, "they turn against each other"
 
 
 @pytest.mark.parametrize("components", ['["x", "y", "z"]', '["x", "y", "z", "rx", "ry", "rz"]'])
 def test_exported_robots_that_are_plugged_together_turn_like_the_modules(folder, tmp_path, components):
     modules = "".join(table(n, f"{body}.urdf", FREE[body]) for n, body in (("a", "hull"), ("b", "arm")))
-    units = plug("a", "hull", "hull") + plug("b", "arm", "arm")
+    fmus = plug("a", "hull", "hull") + plug("b", "arm", "arm")
     mixed = plug("a", "hull", "hull") + table("b", "arm.urdf", FREE["arm"])
     joined = glue("a.hull", "b.arm", components=components)
     wanted = run(folder, tmp_path / "modules", modules + joined)
     names = [(f"{body}.{n}",) * 2 for body in ("a.hull", "b.arm") for n in MOTION]
-    for name, text in (("units", units), ("mixed", mixed)):
+    for name, text in (("fmus", fmus), ("mixed", mixed)):
         same(run(folder, tmp_path / name, text + joined), wanted, names)
     assert abs(wanted[-1]["a.hull.qw"]) < 0.95
 
@@ -205,7 +205,7 @@ def rotor(folder, name, inertia, stiffness, damping, odd="", **others):
 
 
 def rotors(folder, body=ROTOR_BODY, left="left", components='["rz"]'):
-    sides = "".join(f'[{n}]\nfmu = "{unit}.fmu"\n[{n}.bodies.shaft]\n{body}' for n, unit in (("left", left), ("right", "right")))
+    sides = "".join(f'[{n}]\nfmu = "{fmu}.fmu"\n[{n}.bodies.shaft]\n{body}' for n, fmu in (("left", left), ("right", "right")))
     return f'{sides}[[glue]]\nside_1 = "left.shaft"\nside_2 = "right.shaft"\ncomponents = {components}\n'
 
 
@@ -278,13 +278,13 @@ def test_what_makes_no_body_is_refused_with_the_reason(shafts, tmp_path, body, c
     assert all(word in " ".join(text.split()) for word in says), text
 
 
-@pytest.mark.parametrize(("unit", "says"), [("long", "of length 1.1"), ("nan", "is NaN (`orientation`)")])
-def test_a_quaternion_that_is_none_stops_the_run_by_the_name_of_the_body(shafts, tmp_path, unit, says):
-    text = " ".join(refused(shafts, tmp_path, rotors(shafts, left=unit)).split())
+@pytest.mark.parametrize(("fmu", "says"), [("long", "of length 1.1"), ("nan", "is NaN (`orientation`)")])
+def test_a_quaternion_that_is_none_stops_the_run_by_the_name_of_the_body(shafts, tmp_path, fmu, says):
+    text = " ".join(refused(shafts, tmp_path, rotors(shafts, left=fmu)).split())
     assert "`shaft`" in text and says in text, text
 
 
-# A ball of 2 kg and 0.3 kg m² that falls, a unit with derivatives: place, velocity and rate, quaternion, accelerations a and b, inputs.
+# A ball of 2 kg and 0.3 kg m² that falls, an FMU with derivatives: place, velocity and rate, quaternion, accelerations a and b, inputs.
 BALL = [("p", "output", "", (3,)), ("v", "output", "", (6,)), ("q", "output", "", (4,))]
 BALL += [(f"{kind}{k}", "output", "", ()) for kind in ("a", "b") for k in "xyz"]
 BALL += [(f"{kind}{k}", "input", "0", ()) for kind in ("f", "m") for k in "xyz"]
@@ -299,9 +299,9 @@ BALL_STEP = BALL_CALC + (
 )
 BALL_SLOPES = r"""
 static double slope(unsigned z, unsigned k) { return z - 4 == k - 10 ? (z < 7 ? 0.5 : 1 / 0.3) : 0; }
-int fmi3GetDirectionalDerivative(Unit *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s, size_t p, double *x, size_t q) {
+int fmi3GetDirectionalDerivative(Fmu *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s, size_t p, double *x, size_t q) {
     for (size_t i = 0; i < n; i++) { x[i] = 0; for (size_t j = 0; j < m; j++) x[i] += slope(z[i], k[j]) * s[j]; } return 0; }
-int fmi3GetAdjointDerivative(Unit *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s, size_t p, double *x, size_t q) {
+int fmi3GetAdjointDerivative(Fmu *u, const unsigned *z, size_t n, const unsigned *k, size_t m, const double *s, size_t p, double *x, size_t q) {
     for (size_t j = 0; j < m; j++) { x[j] = 0; for (size_t i = 0; i < n; i++) x[j] += slope(z[i], k[j]) * s[i]; } return 0; }"""
 KINDS = {"none": "", "directional": 'providesDirectionalDerivatives="true"', "adjoint": 'providesAdjointDerivatives="true"'}
 

@@ -1,4 +1,4 @@
-"""Inputs of a unit from a table: whole numbers of 64 bits and texts arrive as they are written."""
+"""Inputs of an FMU from a table: whole numbers of 64 bits and texts arrive as they are written."""
 
 import csv
 import subprocess
@@ -11,22 +11,22 @@ CODE = r"""
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
-typedef struct { int64_t i; uint64_t u; double x; char s[64]; } Unit;
+typedef struct { int64_t i; uint64_t u; double x; char s[64]; } Fmu;
 void *fmi3InstantiateCoSimulation(const char *n, const char *t, const char *r, bool v, bool l, bool e, bool a,
-    const unsigned *q, size_t k, void *env, void *log, void *up) { return calloc(1, sizeof(Unit)); }
-void fmi3FreeInstance(Unit *u) { free(u); }
-int fmi3EnterInitializationMode(Unit *u, bool a, double b, double c, bool d, double e) { return 0; }
-int fmi3ExitInitializationMode(Unit *u) { return 0; }
-int fmi3Terminate(Unit *u) { return 0; }
-int fmi3GetFloat64(Unit *u, const unsigned *r, size_t n, double *x, size_t m) { *x = u->x; return 0; }
-int fmi3SetFloat64(Unit *u, const unsigned *r, size_t n, const double *x, size_t m) { u->x = *x; return 0; }
-int fmi3GetInt64(Unit *u, const unsigned *r, size_t n, int64_t *x, size_t m) { *x = u->i; return 0; }
-int fmi3SetInt64(Unit *u, const unsigned *r, size_t n, const int64_t *x, size_t m) { u->i = *x; return 0; }
-int fmi3GetUInt64(Unit *u, const unsigned *r, size_t n, uint64_t *x, size_t m) { *x = u->u; return 0; }
-int fmi3SetUInt64(Unit *u, const unsigned *r, size_t n, const uint64_t *x, size_t m) { u->u = *x; return 0; }
-int fmi3GetString(Unit *u, const unsigned *r, size_t n, const char **x, size_t m) { *x = u->s; return 0; }
-int fmi3SetString(Unit *u, const unsigned *r, size_t n, const char *const *x, size_t m) { strncpy(u->s, *x, 63); return 0; }
-int fmi3DoStep(Unit *u, double t, double h, bool g, bool *e, bool *d, bool *early, double *last) {
+    const unsigned *q, size_t k, void *env, void *log, void *up) { return calloc(1, sizeof(Fmu)); }
+void fmi3FreeInstance(Fmu *u) { free(u); }
+int fmi3EnterInitializationMode(Fmu *u, bool a, double b, double c, bool d, double e) { return 0; }
+int fmi3ExitInitializationMode(Fmu *u) { return 0; }
+int fmi3Terminate(Fmu *u) { return 0; }
+int fmi3GetFloat64(Fmu *u, const unsigned *r, size_t n, double *x, size_t m) { *x = u->x; return 0; }
+int fmi3SetFloat64(Fmu *u, const unsigned *r, size_t n, const double *x, size_t m) { u->x = *x; return 0; }
+int fmi3GetInt64(Fmu *u, const unsigned *r, size_t n, int64_t *x, size_t m) { *x = u->i; return 0; }
+int fmi3SetInt64(Fmu *u, const unsigned *r, size_t n, const int64_t *x, size_t m) { u->i = *x; return 0; }
+int fmi3GetUInt64(Fmu *u, const unsigned *r, size_t n, uint64_t *x, size_t m) { *x = u->u; return 0; }
+int fmi3SetUInt64(Fmu *u, const unsigned *r, size_t n, const uint64_t *x, size_t m) { u->u = *x; return 0; }
+int fmi3GetString(Fmu *u, const unsigned *r, size_t n, const char **x, size_t m) { *x = u->s; return 0; }
+int fmi3SetString(Fmu *u, const unsigned *r, size_t n, const char *const *x, size_t m) { strncpy(u->s, *x, 63); return 0; }
+int fmi3DoStep(Fmu *u, double t, double h, bool g, bool *e, bool *d, bool *early, double *last) {
     *e = *d = *early = false; *last = t + h; return 0; }
 """
 

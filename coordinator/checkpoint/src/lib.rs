@@ -4,6 +4,11 @@
 //! takes it up again in another process: the same scenario, the same files and modules, and then the same bytes as those of
 //! a run that nothing has ended.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod origin;
 
 use origin::Origin;
@@ -233,7 +238,7 @@ pub fn require_states(testbed: &Testbed) -> Result {
         _ => "their states",
     };
     let message = format!("--checkpoint-every: {} cannot save {their} as bytes", names.join(", "));
-    let help = "leave the option out; a unit needs `canSerializeFMUState`, a module in Python `self.state`, another one \
+    let help = "leave the option out; an FMU needs `canSerializeFMUState`, a module in Python `self.state`, another one \
                 `serialize` and `deserialize`";
     Err(InputError::plain(message, Some(help.into())).into())
 }

@@ -115,7 +115,7 @@ impl Part {
     }
 }
 
-/// All modules, units and laws of a scenario.
+/// All modules, FMUs and laws of a scenario.
 fn parts(scenario: &Scenario, options: &Options) -> Result<Vec<Part>> {
     let library = terraglue_fmu::library();
     let search = SearchPath::standard(&options.module_paths, &scenario.folder);

@@ -87,7 +87,7 @@ pub fn run(arguments: &FmuRunArguments) -> Result<Exit> {
         let reached = std::fs::read_to_string(folder.path().join(REACHED));
         let reached = reached.ok().filter(|t| !t.is_empty());
         let when = reached.map_or_else(|| "before its first row".to_owned(), |t| format!("after t = {t} s"));
-        eprintln!("error: {}: its process was lost {when}: {why}", arguments.unit.display());
+        eprintln!("error: {}: its process was lost {when}: {why}", arguments.fmu.display());
         Exit::Failed
     };
     let Some(status) = status else {

@@ -38,7 +38,7 @@ pub enum Command {
         #[arg(value_name = "DIR")]
         folder: PathBuf,
     },
-    /// Check a scenario and everything that it refers to, without a step of it; modules and units are made.
+    /// Check a scenario and everything that it refers to, without a step of it; modules and FMUs are made.
     Check(CheckArguments),
     /// Put a module to the test: named tests of what it promises, each in a process of its own.
     CheckModule(CheckModuleArguments),
@@ -218,7 +218,7 @@ pub struct ConvertArguments {
     /// The structure.
     #[arg(value_name = "SYSTEM.ssp|.ssd")]
     pub structure: PathBuf,
-    /// The scenario to write [default: the structure's name with .toml, beside it]; the units of an archive go into a
+    /// The scenario to write [default: the structure's name with .toml, beside it]; the FMUs of an archive go into a
     /// folder of the same name.
     #[arg(short, long, value_name = "FILE.toml")]
     pub output: Option<PathBuf>,
@@ -231,7 +231,7 @@ pub struct ExportArguments {
     /// A scenario file (TOML) or the name of a module.
     #[arg(value_name = "MODULE|SCENARIO")]
     pub target: String,
-    /// The unit to write.
+    /// The FMU to write.
     #[arg(short, long, value_name = "FILE.fmu")]
     pub output: PathBuf,
     /// Version of the standard.
@@ -306,8 +306,8 @@ pub struct CheckModuleArguments {
     pub result: Option<PathBuf>,
     /// A run whose bits are wanted: FROM,TO,VARIANT.
     #[arg(long, hide = true)]
-    pub errand: Option<String>,
-    /// File with the state that an errand starts from.
+    pub remote_run: Option<String>,
+    /// File with the state that a remote run starts from.
     #[arg(long, hide = true)]
     pub state: Option<PathBuf>,
 }
@@ -566,48 +566,48 @@ fn parse_vary(text: &str) -> Result<(String, Vec<String>), String> {
 /// What can be done with a functional mock-up unit.
 #[derive(Subcommand, Debug)]
 pub enum FmuCommand {
-    /// Run a unit alone and write its outputs as a table.
+    /// Run an FMU alone and write its outputs as a table.
     Run(FmuRunArguments),
-    /// Show what is inside a unit; none of its code runs.
+    /// Show what is inside an FMU; none of its code runs.
     Info {
-        /// The unit.
-        unit: PathBuf,
+        /// The FMU.
+        fmu: PathBuf,
     },
-    /// List what is wrong with a unit; none of its code runs.
+    /// List what is wrong with an FMU; none of its code runs.
     Check {
-        /// The unit.
-        unit: PathBuf,
+        /// The FMU.
+        fmu: PathBuf,
     },
 }
 
 /// What `fmu run` takes.
 #[derive(Args, Debug, Clone)]
 pub struct FmuRunArguments {
-    /// The unit.
-    pub unit: PathBuf,
+    /// The FMU.
+    pub fmu: PathBuf,
     /// Write the table here [default: standard output].
     #[arg(long, value_name = "FILE")]
     pub csv: Option<PathBuf>,
     /// Inputs over time: a header with `time` and names, straight lines between the rows. Elements of arrays of Float64 may have
-    /// columns of their own (`u[2]`); whole arrays are written with spaces between their values. Units that can follow inputs within steps do so.
+    /// columns of their own (`u[2]`); whole arrays are written with spaces between their values. FMUs that can follow inputs within steps do so.
     #[arg(long, value_name = "FILE")]
     pub input: Option<PathBuf>,
-    /// Hold inputs over each step, also of units that can follow them within (FMI 3: intermediate update; FMI 2: canInterpolateInputs).
+    /// Hold inputs over each step, also of FMUs that can follow them within (FMI 3: intermediate update; FMI 2: canInterpolateInputs).
     #[arg(long)]
     pub hold_inputs: bool,
-    /// Write what the unit shows at its inner steps here (FMI 3, intermediate update).
+    /// Write what the FMU shows at its inner steps here (FMI 3, intermediate update).
     #[arg(long, value_name = "FILE")]
     pub intermediate: Option<PathBuf>,
     /// A start value. May be repeated.
     #[arg(long = "start", value_name = "NAME=VALUE", value_parser = parse_set)]
     pub start: Vec<(String, String)>,
-    /// Time at the start, s [default: what the unit wants, else 0].
+    /// Time at the start, s [default: what the FMU wants, else 0].
     #[arg(long, value_name = "S")]
     pub start_time: Option<f64>,
-    /// Time at the end, s [default: what the unit wants, else 1].
+    /// Time at the end, s [default: what the FMU wants, else 1].
     #[arg(long, value_name = "S")]
     pub stop: Option<f64>,
-    /// Communication step, s [default: what the unit wants, else a 500th of the run].
+    /// Communication step, s [default: what the FMU wants, else a 500th of the run].
     #[arg(long, value_name = "S")]
     pub step: Option<f64>,
     /// Relative tolerance.

@@ -5,8 +5,8 @@ use super::arguments::CheckModuleArguments;
 use super::output::outln;
 use std::path::Path;
 use terraglue_conformance::{
-    Errand, Lab, Level, Options, Outcome, Told, catalogue, check, module_file, remember, run_errand,
-    run_here, sanitize, sources_of,
+    Level, Options, Outcome, RemoteRun, TestContext, Told, catalogue, check, module_file, remember, run_here,
+    run_remote, sanitize, sources_of,
 };
 use terraglue_diagnostics::Result;
 use terraglue_scenario::InputError;
@@ -79,16 +79,18 @@ fn sanitized(arguments: &CheckModuleArguments, path: &Path) -> Result<Exit> {
     Ok(if told.faults.is_empty() { Exit::Done } else { Exit::Failed })
 }
 
-/// One test, or an errand of one, in this process.
+/// One test, or a remote run of one, in this process.
 fn in_process(arguments: &CheckModuleArguments, module: &Path) -> Result<Exit> {
     let wrong = |text: String| InputError::plain(text, None);
-    let mut lab =
-        Lab::new(module.to_owned(), arguments.level, arguments.seed, &arguments.sets).map_err(wrong)?;
-    lab.program = std::env::current_exe().ok();
-    if let Some(word) = &arguments.errand {
-        let errand = Errand::parse(word, arguments.state.as_deref());
-        let errand = errand.ok_or_else(|| wrong(format!("`{word}` is no errand: write FROM,TO,VARIANT")))?;
-        let bits = run_errand(&lab, &errand).map_err(|stop| wrong(Outcome::of(Err(stop)).detail()))?;
+    let mut context = TestContext::new(module.to_owned(), arguments.level, arguments.seed, &arguments.sets)
+        .map_err(wrong)?;
+    context.program = std::env::current_exe().ok();
+    if let Some(word) = &arguments.remote_run {
+        let remote_run = RemoteRun::parse(word, arguments.state.as_deref());
+        let remote_run =
+            remote_run.ok_or_else(|| wrong(format!("`{word}` is no remote run: write FROM,TO,VARIANT")))?;
+        let bits =
+            run_remote(&context, &remote_run).map_err(|stop| wrong(Outcome::of(Err(stop)).detail()))?;
         if let Some(file) = &arguments.result {
             write(file, &serde_json::to_string(&bits).unwrap_or_default())?;
         }
@@ -100,13 +102,13 @@ fn in_process(arguments: &CheckModuleArguments, module: &Path) -> Result<Exit> {
         some => some.to_vec(),
     };
     for name in names {
-        let outcome = run_here(&name, &lab).map_err(wrong)?;
+        let outcome = run_here(&name, &context).map_err(wrong)?;
         good &= !outcome.is_broken();
         match &arguments.result {
             None => outln!("{name}: {} {}", outcome.word(), outcome.detail()),
             Some(file) => {
-                let kind = (name == catalogue()[0].name).then(|| lab.kind()).flatten();
-                let wrong_set = kind.and_then(|_| lab.wrong_set());
+                let kind = (name == catalogue()[0].name).then(|| context.kind()).flatten();
+                let wrong_set = kind.and_then(|_| context.wrong_set());
                 let told = Told { outcome, kind, wrong_set };
                 write(file, &serde_json::to_string(&told).unwrap_or_default())?;
             }

@@ -9,7 +9,7 @@ use terraglue_fmi::ssp::Package;
 use terraglue_scenario::ssp;
 use terraglue_scenario::{InputError, Scenario};
 
-/// Writes the scenario, and the units of an archive beside it.
+/// Writes the scenario, and the FMUs of an archive beside it.
 pub fn convert(arguments: &ConvertArguments) -> Result<Exit> {
     let path = &arguments.structure;
     let out = arguments.output.clone().unwrap_or_else(|| path.with_extension("toml"));
@@ -25,10 +25,10 @@ pub fn convert(arguments: &ConvertArguments) -> Result<Exit> {
     let converted = ssp::convert(&package, &prefix).map_err(wrong)?;
     let folder = folder_of(&out);
     if package.is_archive() {
-        for unit in &converted.units {
-            let to = folder.join(format!("{prefix}{unit}"));
+        for fmu in &converted.fmus {
+            let to = folder.join(format!("{prefix}{fmu}"));
             let made = std::fs::create_dir_all(folder_of(&to));
-            made.and_then(|()| std::fs::copy(package.folder().join(unit), &to)).map_err(|e| at(&to, e))?;
+            made.and_then(|()| std::fs::copy(package.folder().join(fmu), &to)).map_err(|e| at(&to, e))?;
         }
     }
     terraglue_subsystem::files::can_create(&out)
@@ -36,12 +36,12 @@ pub fn convert(arguments: &ConvertArguments) -> Result<Exit> {
         .map_err(|e| at(&out, e))?;
     converted.notes.iter().for_each(|note| eprintln!("note: {note}"));
     let scenario = Scenario::load(&out, &[])?;
-    let (units, connections) = (scenario.subsystems.len(), scenario.connections.len());
-    outln!("{}: {units} units, {connections} connections", out.display());
+    let (fmus, connections) = (scenario.subsystems.len(), scenario.connections.len());
+    outln!("{}: {fmus} FMUs, {connections} connections", out.display());
     Ok(Exit::Done)
 }
 
-/// What goes before the files of units, seen from the scenario: a folder for those of an archive.
+/// What goes before the files of FMUs, seen from the scenario: a folder for those of an archive.
 fn prefix(package: &Package, out: &Path) -> Result<String> {
     if package.is_archive() {
         let stem = out.file_stem().unwrap_or_default().to_string_lossy();

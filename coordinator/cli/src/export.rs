@@ -7,7 +7,7 @@ use terraglue_diagnostics::Result;
 use terraglue_fmi::Version;
 use terraglue_fmu::export::{Request, write};
 
-/// Writes the unit and says what it can do.
+/// Writes the FMU and says what it can do.
 pub fn export(arguments: &ExportArguments) -> Result<Exit> {
     let exported = write(&Request {
         target: arguments.target.clone(),

@@ -11,7 +11,7 @@ use std::sync::atomic::Ordering;
 use terraglue_diagnostics::{Error, Result};
 use terraglue_fmi::description::ModelDescription;
 use terraglue_fmi::{Error as FmiError, Fmu};
-use terraglue_fmu::simulate::{self, Row, Settings, Table, Tables};
+use terraglue_fmu::simulate::{self, InputRow, Settings, Table, Tables};
 use terraglue_host::isolation::confine;
 use terraglue_scenario::InputError;
 
@@ -20,8 +20,8 @@ pub fn fmu(command: &FmuCommand) -> Result<Exit> {
     match command {
         FmuCommand::Run(arguments) if arguments.isolate => apart::run(arguments),
         FmuCommand::Run(arguments) => run(arguments),
-        FmuCommand::Info { unit } => info(unit),
-        FmuCommand::Check { unit } => check(unit),
+        FmuCommand::Info { fmu } => info(fmu),
+        FmuCommand::Check { fmu } => check(fmu),
     }
 }
 
@@ -36,7 +36,7 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
         apart::end_with_parent();
         confine(arguments.memory_mb.saturating_mul(1 << 20));
     }
-    let fmu = Fmu::open(&arguments.unit).map_err(input)?;
+    let fmu = Fmu::open(&arguments.fmu).map_err(input)?;
     for problem in &fmu.description().problems {
         log::warn!(target: "terraglue_fmu", "{problem}");
     }
@@ -55,7 +55,7 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
     let file = arguments.csv.as_deref().map(TableFile::create).transpose()?;
     let between = arguments.intermediate.as_deref().map(TableFile::create).transpose()?;
     let tables: Vec<TableFile> = [&file, &between].into_iter().flatten().cloned().collect();
-    let _will = table_file::will(&arguments.unit, tables.clone());
+    let _exit_hook = table_file::exit_hook(&arguments.fmu, tables.clone());
     let sink = Box::new(|line: &terraglue_fmi::LogLine| {
         log::log!(target: "terraglue_fmu", level(line), "{}", line.text);
     });
@@ -83,17 +83,17 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
         Ok(ended) => {
             if let Some(t) = ended {
                 eprintln!(
-                    "note: {}: the unit asked for the end of the run at t = {t} s",
-                    arguments.unit.display()
+                    "note: {}: the FMU asked for the end of the run at t = {t} s",
+                    arguments.fmu.display()
                 );
             }
             Ok(Exit::Done)
         }
         Err(_) if stopped.load(Ordering::Relaxed) => Ok(Exit::Interrupted),
         Err(error) => {
-            eprintln!("error: {}: {error}", arguments.unit.display());
+            eprintln!("error: {}: {error}", arguments.fmu.display());
             eprintln!(
-                "  help: `terraglue fmu check` lists what is wrong with a unit, `--isolate` keeps it apart"
+                "  help: `terraglue fmu check` lists what is wrong with an FMU, `--isolate` keeps it apart"
             );
             Ok(Exit::Failed)
         }
@@ -122,7 +122,7 @@ fn table(path: &Path) -> Result<Table> {
     if header.get(0) != Some("time") {
         return Err(wrong(&"the first column is not `time`"));
     }
-    let mut rows: Vec<Row> = Vec::new();
+    let mut rows: Vec<InputRow> = Vec::new();
     for record in reader.records() {
         let record = record.map_err(|e| wrong(&e))?;
         let line = rows.len() + 2;
@@ -134,15 +134,15 @@ fn table(path: &Path) -> Result<Table> {
         }
         let cells: Vec<String> = cells.collect();
         let numbers = cells.iter().map(|t| t.parse().unwrap_or(f64::NAN)).collect();
-        rows.push(Row { time, cells, numbers });
+        rows.push(InputRow { time, cells, numbers });
     }
     Ok(Table { names: header.iter().skip(1).map(str::to_owned).collect(), rows })
 }
 
-fn info(unit: &Path) -> Result<Exit> {
-    let (d, entries) = Fmu::inspect(unit).map_err(input)?;
+fn info(fmu: &Path) -> Result<Exit> {
+    let (d, entries) = Fmu::inspect(fmu).map_err(input)?;
     let platforms = terraglue_fmi::platforms(entries.iter().map(String::as_str));
-    outln!("{}: `{}`, {}", unit.display(), d.model_name, words(&d.version));
+    outln!("{}: `{}`, {}", fmu.display(), d.model_name, words(&d.version));
     let facts = [("made by", &d.generation_tool), ("about", &d.description), ("author", &d.author)];
     for (name, text) in facts.iter().filter(|(_, text)| !text.is_empty()) {
         outln!("{name}: {text}");
@@ -183,13 +183,13 @@ fn words(value: &impl Debug) -> String {
     format!("{value:?}")
 }
 
-fn check(unit: &Path) -> Result<Exit> {
-    let (d, entries) = Fmu::inspect(unit).map_err(input)?;
+fn check(fmu: &Path) -> Result<Exit> {
+    let (d, entries) = Fmu::inspect(fmu).map_err(input)?;
     let problems = problems(&d, &entries);
     for problem in &problems {
         outln!("{problem}");
     }
-    let name = unit.display();
+    let name = fmu.display();
     if problems.is_empty() {
         outln!("{name}: no problem found");
         return Ok(Exit::Done);

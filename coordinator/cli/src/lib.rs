@@ -35,7 +35,7 @@ use arguments::{Arguments, Command};
 use clap::Parser;
 use std::process::ExitCode;
 use terraglue_diagnostics::Error;
-use terraglue_host::{crash, exit_guard, orphans};
+use terraglue_host::{crash, descendants, exit_guard};
 
 /// How a command ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -69,7 +69,7 @@ pub fn main() -> ExitCode {
         return terraglue_host::isolation::serve(segment, &terraglue_fmu::library());
     }
     logger::install();
-    orphans::adopt();
+    descendants::adopt();
     // what the checker makes of modules that end the program is its own affair
     let armed = !matches!(arguments.command, Command::CheckModule(_) | Command::Modules { .. });
     if armed {
@@ -79,9 +79,9 @@ pub fn main() -> ExitCode {
     let exit = command(arguments.command);
     apart::done(exit.code());
     drop(armed);
-    let left = orphans::end_all();
+    let left = descendants::end_all();
     if left > 0 {
-        log::warn!("modules or units left {left} processes behind; they were ended");
+        log::warn!("modules or FMUs left {left} processes behind; they were ended");
     }
     exit.code().into()
 }

@@ -15,7 +15,7 @@ impl Log for Logger {
 
     fn log(&self, record: &Record) {
         if self.enabled(record.metadata()) {
-            // an error that a module or unit speaks of is not yet one of the program
+            // an error that a module or FMU speaks of is not yet one of the program
             let said = ["terraglue::module", "terraglue_fmu"].contains(&record.target());
             let by = if said && record.level() == Level::Error { "logged " } else { "" };
             let level = match record.level() {

@@ -4,7 +4,7 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 use terraglue_diagnostics::Result;
-use terraglue_engine::observer::{Happening, Observer, View};
+use terraglue_engine::observer::{Event, Observer, View};
 
 /// Longest sleep before a signal is looked for.
 const LOOK: Duration = Duration::from_millis(50);
@@ -37,7 +37,7 @@ impl Observer for Pace<'_> {
         self.then.stepped(view)
     }
 
-    fn happened(&mut self, happening: &Happening) -> Result {
-        self.then.happened(happening)
+    fn event(&mut self, event: &Event) -> Result {
+        self.then.event(event)
     }
 }

@@ -7,7 +7,7 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::thread::JoinHandle;
 use std::time::{Duration, Instant};
 use terraglue_diagnostics::Result;
-use terraglue_engine::observer::{Happening, Observer, View};
+use terraglue_engine::observer::{Event, Observer, View};
 
 /// A bar over `simulated_s` seconds of `steps` steps; hidden where nobody looks.
 pub fn bar(steps: u64, quiet: bool) -> ProgressBar {
@@ -19,10 +19,10 @@ pub fn bar(steps: u64, quiet: bool) -> ProgressBar {
 }
 
 /// How long nothing is said of what takes time, how often it is said again where no terminal is, and how often on one.
-const PATIENCE: Duration = Duration::from_secs(2);
-/// See [`PATIENCE`].
+const FIRST_LINE: Duration = Duration::from_secs(2);
+/// See [`FIRST_LINE`].
 const SAY_EVERY: Duration = Duration::from_secs(60);
-/// See [`PATIENCE`].
+/// See [`FIRST_LINE`].
 const DRAW_EVERY: Duration = Duration::from_millis(200);
 
 /// While this lives, what takes longer than two seconds is said: on a terminal in the bar, else in lines.
@@ -38,7 +38,7 @@ impl Waiting {
         let ended = Arc::clone(&done);
         let wait = move || {
             let start = Instant::now();
-            let mut next = PATIENCE;
+            let mut next = FIRST_LINE;
             while !ended.load(Ordering::Relaxed) {
                 let waited = start.elapsed();
                 if waited < next {
@@ -129,8 +129,8 @@ impl Observer for Progress {
         Ok(())
     }
 
-    fn happened(&mut self, happening: &Happening) -> Result {
-        self.bar.println(format!("{}t = {:.3} s: {}", self.label, happening.t_s, happening.what));
+    fn event(&mut self, event: &Event) -> Result {
+        self.bar.println(format!("{}t = {:.3} s: {}", self.label, event.t_s, event.what));
         Ok(())
     }
 }

@@ -4,8 +4,8 @@ use super::show;
 use std::path::Path;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use terraglue_diagnostics::{Error, Result};
-use terraglue_engine::observer::{Happening, Observer, View};
-use terraglue_host::exit_guard::{Will, leave_will};
+use terraglue_engine::observer::{Event, Observer, View};
+use terraglue_host::exit_guard::{ExitHook, add_exit_hook};
 use terraglue_recording as recording;
 use terraglue_recording::{Recorder, Status};
 use terraglue_scenario::Scenario;
@@ -24,13 +24,13 @@ impl SharedRecorder {
         self.0.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Closes the recording with an error and writes the report in `folder` when a module or unit ends the process.
+    /// Closes the recording with an error and writes the report in `folder` when a module or FMU ends the process.
     #[must_use]
-    pub fn will(&self, scenario: &Scenario, folder: &Path) -> Will {
+    pub fn exit_hook(&self, scenario: &Scenario, folder: &Path) -> ExitHook {
         let recorder = Arc::clone(&self.0);
         let suspects = suspects(scenario);
         let folder = std::path::absolute(folder).unwrap_or_else(|_| folder.to_owned());
-        leave_will(move || close(&recorder, suspects, &folder))
+        add_exit_hook(move || close(&recorder, suspects, &folder))
     }
 }
 
@@ -69,8 +69,8 @@ impl Observer for SharedRecorder {
         self.lock().stepped(view)
     }
 
-    fn happened(&mut self, happening: &Happening) -> Result {
-        self.lock().happened(happening)
+    fn event(&mut self, event: &Event) -> Result {
+        self.lock().event(event)
     }
 
     fn finished(&mut self, view: &View, error: Option<&Error>) -> Result {

@@ -6,7 +6,7 @@ use super::{Exit, show};
 use nalgebra::{Matrix3, Vector3};
 use serde_json::{Value, json};
 use terraglue_diagnostics::Result;
-use terraglue_robot_import::{Base, Joint, JointKind, Options, Robot, Whole, read_robot};
+use terraglue_robot_import::{Base, Joint, JointKind, Options, Robot, TotalMass, read_robot};
 use terraglue_scenario::InputError;
 
 /// Prints bodies, joints and what they are together with all joints at 0.
@@ -72,7 +72,7 @@ fn joints(robot: &Robot) -> comfy_table::Table {
     table
 }
 
-fn together(robot: &Robot, whole: &Whole) -> comfy_table::Table {
+fn together(robot: &Robot, whole: &TotalMass) -> comfy_table::Table {
     let mut table = show::table(&["all joints at 0", "value"]);
     let vector = |v: &Vector3<f64>| {
         v.as_slice().iter().map(|x| show::fixed(*x, 4)).collect::<Vec<_>>().join(", ") + " m"
@@ -119,7 +119,7 @@ fn rows(m: &Matrix3<f64>) -> Value {
     json!([0, 1, 2].map(|r| [0, 1, 2].map(|c| m[(r, c)])))
 }
 
-fn as_json(robot: &Robot, whole: &Whole) -> Value {
+fn as_json(robot: &Robot, whole: &TotalMass) -> Value {
     let bodies = robot.bodies.iter().map(|b| {
         json!({
             "name": b.name,

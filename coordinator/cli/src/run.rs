@@ -16,7 +16,7 @@ use terraglue_checkpoint::{Checkpoint, Keeper, Resumed, require_states};
 use terraglue_diagnostics::{Error, Result};
 use terraglue_engine::observer::Observer;
 use terraglue_engine::testbed::{Options, Testbed};
-use terraglue_host::Surroundings;
+use terraglue_host::ProcessState;
 use terraglue_recording::{
     self, Recorder, RecorderOptions, Status, Summary, TimingRow, write_exchange, write_timing,
 };
@@ -170,23 +170,23 @@ pub fn options(arguments: &RunArguments, cancel: &Arc<AtomicBool>) -> Options {
 
 /// Builds a testbed. Whatever stops it, a module that refuses its files among them, is wrong input.
 pub fn build(scenario: &Scenario, options: &Options) -> Result<Testbed> {
-    let surroundings = Surroundings::now();
+    let process_state = ProcessState::now();
     let library = terraglue_fmu::library().with_adviser(Kind::Soil, terraglue_soil_law::advice);
     let built = Testbed::build_with(scenario, options, &library).map_err(|error| match error {
         Error::Input(_) | Error::Module { function: "instantiate", .. } => error,
         other => Error::Input(InputError::plain(other.to_string(), None)),
     });
-    set_back(&surroundings);
+    set_back(&process_state);
     built
 }
 
 /// Tells what had to be set back.
-fn set_back(surroundings: &Surroundings) {
-    let changed = surroundings.restore();
+fn set_back(process_state: &ProcessState) {
+    let changed = process_state.restore();
     if !changed.is_empty() {
         let changed = changed.join(", ");
         log::warn!(
-            "a module or unit changed what all share, {changed}: it is set back; `isolate = true` keeps such a one apart"
+            "a module or FMU changed what all share, {changed}: it is set back; `isolate = true` keeps such a one apart"
         );
     }
 }
@@ -226,10 +226,10 @@ pub fn run_testbed(
         }
     };
     let mut recorder = SharedRecorder::new(recorder);
-    let will = recorder.will(scenario, folder);
-    // an error below drops the testbed, and with it what modules do at their end, before the will
+    let exit_hook = recorder.exit_hook(scenario, folder);
+    // an error below drops the testbed, and with it what modules do at their end, before the exit hook
     let mut testbed = testbed;
-    let surroundings = Surroundings::now();
+    let process_state = ProcessState::now();
     let begun = testbed.begin();
     let begun = match goes_on {
         true => begun,
@@ -249,7 +249,7 @@ pub fn run_testbed(
     let timing = clock.rows(&testbed);
     let (wall_s, cpu_s) = whole(&timing);
     let error = ran.err();
-    set_back(&surroundings);
+    set_back(&process_state);
     let finished = testbed.view(|view| recorder.finished(view, error.as_ref()));
     let timed = write_timing(folder, &timing);
     let error = error.or(finished.err()).or(timed.err());
@@ -257,14 +257,14 @@ pub fn run_testbed(
     let costs = testbed.costs().map(|(name, s)| (name.to_owned(), s)).collect();
     let cancelled = testbed.cancelled();
     let closed = testbed.close();
-    set_back(&surroundings);
+    set_back(&process_state);
     let error = error.or(closed.err());
     let status = match &error {
         Some(_) => Status::Failed,
         None if cancelled => Status::Stopped,
         None => Status::Done,
     };
-    drop(will);
+    drop(exit_hook);
     let summary = recorder.lock().finish(wall_s, cpu_s, error.as_ref(), status)?;
     if summary.status == Status::Done {
         keeper.iter().for_each(Keeper::remove);

@@ -34,9 +34,9 @@ pub const ROBOT_FILES: &str = "`terraglue robot FILE` shows what is read of it; 
 /// Where to look for a file that the system does not give.
 pub const PATH: &str = "look whether the path is right, and at the permissions of the file";
 
-/// How files of robots end, and those of units and their structures.
+/// How files of robots end, and those of FMUs and their structures.
 const ROBOTS: [&str; 4] = [".urdf", ".xacro", ".xml", ".mjcf"];
-const UNITS: [&str; 3] = [".fmu", ".ssp", ".ssd"];
+const FMUS: [&str; 3] = [".fmu", ".ssp", ".ssd"];
 
 /// Where to read on, for an error that has no cure of its own.
 fn way_out(error: &InputError) -> String {
@@ -64,7 +64,7 @@ fn way_out(error: &InputError) -> String {
         () if message.contains("which module `") => {
             "give it with --set, as --set soil.parameters=LETE_sand gives all numbers of a soil"
         }
-        () if names(message, &UNITS) => "docs/fmi.md tells what is read of units and system structures",
+        () if names(message, &FMUS) => "docs/fmi.md tells what is read of FMUs and system structures",
         () => "`terraglue COMMAND --help` tells what the command takes",
     }
     .into()
@@ -309,6 +309,6 @@ mod tests {
         assert!(line(&summary).contains("-1.25 % of the motors' work: more than 1 %"));
         summary.energies.drift_j = None;
         summary.energies.without_book = vec!["soil".into()];
-        assert!(line(&summary).contains("unknown: soil keeps no book"));
+        assert!(line(&summary).contains("unknown: soil keeps no energy ledger"));
     }
 }

@@ -1,11 +1,11 @@
-//! A table of `terraglue fmu run` on disk: what was written is there, however the unit ends the program.
+//! A table of `terraglue fmu run` on disk: what was written is there, however the FMU ends the program.
 
 use super::apart;
 use std::io::{BufWriter, Write};
 use std::path::Path;
 use std::sync::{Arc, Mutex, PoisonError};
 use terraglue_diagnostics::{Error, Result};
-use terraglue_host::exit_guard::{Will, leave_will};
+use terraglue_host::exit_guard::{ExitHook, add_exit_hook};
 use terraglue_recording::KeptFile;
 
 /// A table that is written line by line.
@@ -46,18 +46,18 @@ impl TableFile {
     }
 }
 
-/// Writes what is left of the tables when the unit ends the program, and says so.
+/// Writes what is left of the tables when the FMU ends the program, and says so.
 #[must_use]
-pub fn will(unit: &Path, tables: Vec<TableFile>) -> Will {
-    let name = unit.display().to_string();
-    leave_will(move || {
+pub fn exit_hook(fmu: &Path, tables: Vec<TableFile>) -> ExitHook {
+    let name = fmu.display().to_string();
+    add_exit_hook(move || {
         for table in tables {
             if let Ok(mut file) = table.file.try_lock() {
                 // there is nobody left to tell
                 drop(file.flush());
             }
         }
-        eprintln!("error: {name}: the unit ended the program by exit()");
+        eprintln!("error: {name}: the FMU ended the program by exit()");
         apart::done(1);
     })
 }

@@ -2,7 +2,7 @@
 
 use super::areas;
 use super::finding::Verdict;
-use super::lab::Lab;
+use super::test_context::TestContext;
 use terraglue_subsystem::Kind;
 
 /// What a test is about.
@@ -73,7 +73,7 @@ pub struct Test {
     /// The promise, in one line.
     pub promise: &'static str,
     /// Does it.
-    pub run: fn(&Lab) -> Verdict,
+    pub run: fn(&TestContext) -> Verdict,
 }
 
 /// All tests in an order in which every test comes after those that it builds on.

@@ -6,30 +6,35 @@
 //! on: when one of those fails it is blocked, so that one mistake is one finding.
 //!
 //! * [`catalogue`]: all tests, by area.
-//! * [`Lab`]: what a test works with: the module, its parameters, a source of randomness.
-//! * `rig`: steps a soil below moving feet, a robot, a controller, without the rest of the coordinator.
+//! * [`TestContext`]: what a test works with: the module, its parameters, a source of randomness.
+//! * `fixture`: steps a soil below moving feet, a robot, a controller, without the rest of the coordinator.
+
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 mod areas;
 mod catalogue;
 mod check_file;
 mod derivative;
-mod elsewhere;
 mod finding;
-mod lab;
+mod fixture;
 mod last;
+mod other_process;
 mod report;
-mod rig;
 mod sanitize;
 mod supervisor;
+mod test_context;
 
 pub use catalogue::{Area, Level, Test, catalogue};
-pub use elsewhere::{Errand, run_errand};
 pub use finding::{Finding, Outcome, Stop, Verdict};
-pub use lab::Lab;
 pub use last::{LastCheck, last_check, remember};
-pub use report::{Report, Row};
+pub use other_process::{RemoteRun, run_remote};
+pub use report::{Report, TestResult};
 pub use sanitize::{Fault, Sanitized, sanitize, sources_of};
 pub use supervisor::{Options, Told, check};
+pub use test_context::TestContext;
 
 use std::path::Path;
 use terraglue_host::{SearchPath, is_path};
@@ -38,10 +43,10 @@ use terraglue_host::{SearchPath, is_path};
 ///
 /// # Errors
 /// There is no test of this name; the nearest one is named.
-pub fn run_here(name: &str, lab: &Lab) -> Result<Outcome, String> {
+pub fn run_here(name: &str, context: &TestContext) -> Result<Outcome, String> {
     let tests = catalogue();
     match tests.iter().find(|t| t.name == name) {
-        Some(test) => Ok(Outcome::of((test.run)(lab))),
+        Some(test) => Ok(Outcome::of((test.run)(context))),
         None => Err(unknown(name, tests)),
     }
 }

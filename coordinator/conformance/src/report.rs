@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 
 /// Result of one test.
 #[derive(Clone, Debug, serde::Serialize)]
-pub struct Row {
+pub struct TestResult {
     /// Name of the test.
     pub test: &'static str,
     /// Its area.
@@ -25,7 +25,7 @@ pub struct Row {
     pub repeat: Option<String>,
 }
 
-impl Row {
+impl TestResult {
     /// Of a test.
     pub fn new(test: &Test, outcome: Outcome, time_s: f64) -> Self {
         Self {
@@ -49,7 +49,7 @@ pub struct Report {
     /// Seed.
     pub seed: u64,
     /// Results in the order of the catalogue.
-    pub rows: Vec<Row>,
+    pub rows: Vec<TestResult>,
     #[serde(skip)]
     program: PathBuf,
     #[serde(skip)]
@@ -186,7 +186,7 @@ impl Report {
     }
 }
 
-fn details(row: &Row, out: &mut String) {
+fn details(row: &TestResult, out: &mut String) {
     let mut line = |what: &str, text: &str| {
         let _ = writeln!(out, "           {what:<9} {text}");
     };

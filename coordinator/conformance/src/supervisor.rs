@@ -3,14 +3,14 @@
 use super::catalogue::{Area, Test, catalogue};
 use super::check_file::CheckFile;
 use super::finding::{Finding, Outcome};
-use super::report::{Report, Row};
+use super::report::{Report, TestResult};
 use super::{Level, unknown};
 use serde::{Deserialize, Serialize};
 use std::os::unix::process::ExitStatusExt;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, ExitStatus};
 use std::time::{Duration, Instant};
-use terraglue_host::isolation::Nursery;
+use terraglue_host::isolation::ForkServer;
 use terraglue_subsystem::Kind;
 
 /// How the tests are run.
@@ -75,13 +75,13 @@ pub fn check(module: &Path, options: &Options) -> Result<Report, String> {
     let folder = tempfile::tempdir().map_err(|e| format!("no folder for results: {e}"))?;
     let python = terraglue_host::is_python(module).then(|| terraglue_host::interpreter(None, Path::new(".")));
     // Without it the workers are started one by one, and say what is wrong with the interpreter.
-    let nursery = python.and_then(|python| Nursery::open(&python).ok());
-    let bench = Bench { module, options, folder: folder.path(), nursery };
+    let fork_server = python.and_then(|python| ForkServer::open(&python).ok());
+    let fixture = Supervisor { module, options, folder: folder.path(), fork_server };
     let mut report = Report::new(module, options);
     // Which tests are for it is known only when it has been loaded, and that may end a process.
     let first = &catalogue()[0];
-    let kind = bench.alone(first, &mut report)?;
-    let told = std::fs::read_to_string(bench.file(first, "json")).unwrap_or_default();
+    let kind = fixture.alone(first, &mut report)?;
+    let told = std::fs::read_to_string(fixture.file(first, "json")).unwrap_or_default();
     if let Some(wrong) = serde_json::from_str::<Told>(&told).ok().and_then(|told| told.wrong_set) {
         return Err(wrong);
     }
@@ -92,11 +92,11 @@ pub fn check(module: &Path, options: &Options) -> Result<Report, String> {
     waiting.retain(|test| match beside.off.iter().find(|(name, _)| name == test.name) {
         None => true,
         Some((_, reason)) => {
-            report.rows.push(Row::new(test, Outcome::Off { reason: reason.clone() }, 0.0));
+            report.rows.push(TestResult::new(test, Outcome::Off { reason: reason.clone() }, 0.0));
             false
         }
     });
-    bench.all(waiting, &mut report)?;
+    fixture.all(waiting, &mut report)?;
     report.sort();
     Ok(report)
 }
@@ -138,12 +138,12 @@ fn for_law(test: &Test) -> bool {
     test.kinds.contains(&Kind::Law) || any || physics || IN_A_SOIL.contains(&test.name)
 }
 
-struct Bench<'a> {
+struct Supervisor<'a> {
     module: &'a Path,
     options: &'a Options,
     folder: &'a Path,
     /// Where the workers of a module in Python come from.
-    nursery: Option<Nursery>,
+    fork_server: Option<ForkServer>,
 }
 
 /// A test that runs.
@@ -177,12 +177,12 @@ impl Running<'_> {
     }
 }
 
-impl Bench<'_> {
+impl Supervisor<'_> {
     fn alone(&self, test: &Test, report: &mut Report) -> Result<Option<Kind>, String> {
         let mut running = self.start(test)?;
         loop {
             if let Some((outcome, kind)) = self.ended(&mut running)? {
-                report.rows.push(Row::new(test, outcome, running.since.elapsed().as_secs_f64()));
+                report.rows.push(TestResult::new(test, outcome, running.since.elapsed().as_secs_f64()));
                 return Ok(kind);
             }
             std::thread::sleep(Duration::from_millis(2));
@@ -198,7 +198,11 @@ impl Bench<'_> {
                     None => k += 1,
                     Some((outcome, _)) => {
                         let done = running.swap_remove(k);
-                        report.rows.push(Row::new(done.test, outcome, done.since.elapsed().as_secs_f64()));
+                        report.rows.push(TestResult::new(
+                            done.test,
+                            outcome,
+                            done.since.elapsed().as_secs_f64(),
+                        ));
                     }
                 }
             }
@@ -212,7 +216,7 @@ impl Bench<'_> {
                 if test.after.iter().any(|name| pending(name)) {
                     k += 1;
                 } else if let Some(by) = report.blocker(test) {
-                    report.rows.push(Row::new(test, Outcome::Blocked { by }, 0.0));
+                    report.rows.push(TestResult::new(test, Outcome::Blocked { by }, 0.0));
                     waiting.remove(k);
                 } else if running.len() < self.options.jobs.max(1) {
                     running.push(self.start(test)?);
@@ -245,7 +249,7 @@ impl Bench<'_> {
         command.arg("--result").arg(self.file(test, "json")).env_remove("TERRAGLUE_LOG");
         // Without the allocator's caches per thread, what is freed counts as free.
         command.env("GLIBC_TUNABLES", "glibc.malloc.tcache_count=0");
-        command.envs(self.nursery.as_ref().map(Nursery::variable));
+        command.envs(self.fork_server.as_ref().map(ForkServer::variable));
         for (key, value) in &options.environment {
             command.env(key, value.replace("{test}", test.name));
         }

@@ -1,5 +1,10 @@
 //! Errors with file, line and key, checks of single values, and the nearest name to a wrong one.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod check;
 pub mod error;
 mod fingerprint;

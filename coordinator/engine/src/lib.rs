@@ -3,6 +3,11 @@
 //! [`Testbed`] is the entry: `build` a [`terraglue_scenario::Scenario`], `step` it, look at it through an
 //! [`observer::Observer`]. Several live side by side in one process; there are no globals.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 pub mod observer;
 pub mod signals;
 pub mod testbed;

@@ -22,7 +22,7 @@ pub struct SubsystemView<'a> {
 
 /// The energies of a subsystem as they enter the sum of all: what carries signals only has none, unless it says so, and a
 /// soil has no motors.
-pub fn book_of(kind: Kind, energy: &Energy) -> Energy {
+pub fn ledger_of(kind: Kind, energy: &Energy) -> Energy {
     let or_none = |value: f64| if value.is_nan() { 0.0 } else { value };
     match kind {
         Kind::Robot => *energy,
@@ -60,14 +60,14 @@ pub struct View<'a> {
 
 /// Something that happened or was changed, written so that it can go back into a scenario.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
-pub struct Happening {
+pub struct Event {
     /// Simulated time, s.
     pub t_s: f64,
     /// E.g. `set robot.LF_j2.max_torque = 0 (was 60)`.
     pub what: String,
 }
 
-terraglue_subsystem::persist!(Happening { t_s, what });
+terraglue_subsystem::persist!(Event { t_s, what });
 
 /// Follows a run. All methods are called from the stepping thread.
 pub trait Observer {
@@ -80,7 +80,7 @@ pub trait Observer {
         Ok(())
     }
     /// An event, a `set`, an action, a warning of the run.
-    fn happened(&mut self, _happening: &Happening) -> Result {
+    fn event(&mut self, _event: &Event) -> Result {
         Ok(())
     }
     /// After the last step, also of a run that failed or was stopped.

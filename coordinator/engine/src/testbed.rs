@@ -4,7 +4,7 @@
 //! (3) a trial of every subsystem without glue; (4) the group of glued subsystems by its strategy;
 //! (5) commit of all, in the order of their names. Reads see committed values only.
 
-use crate::observer::{Happening, Observer, SubsystemView, View, book_of};
+use crate::observer::{Event, Observer, SubsystemView, View, ledger_of};
 use crate::signals::{Directory, Faults, Link, Links, TimeLine};
 use serde_json::Value;
 use std::path::PathBuf;
@@ -17,10 +17,10 @@ use terraglue_gluing::contact::{ContactDetector, Now, PortSet};
 use terraglue_gluing::memory::Recall;
 use terraglue_gluing::step_control::StepControl;
 use terraglue_gluing::timing::{Part, Timings};
-use terraglue_gluing::{Instant, Outcome, StepReport};
-use terraglue_host::{Instance, Partings, Reply};
+use terraglue_gluing::{Outcome, StepContext, StepReport};
+use terraglue_host::{Instance, Reply, TeardownErrors};
 use terraglue_subsystem::{BodyState, Energy};
-use unglued::{Turn, Unglued};
+use uncoupled::{StepSchedule, Uncoupled};
 
 mod build;
 mod explain;
@@ -29,7 +29,7 @@ mod hosted;
 mod pieces;
 mod reload;
 mod standing;
-mod unglued;
+mod uncoupled;
 
 pub use build::{find, make, services, with_law};
 pub use explain::{ConnectionNote, Explanation};
@@ -60,7 +60,7 @@ struct Member {
 pub struct Testbed {
     instances: Vec<Instance>,
     /// When each makes a step by itself.
-    turns: Vec<Turn>,
+    schedules: Vec<StepSchedule>,
     members: Vec<Member>,
     /// Subsystems that are glued to each other, in the order of their first member.
     groups: Vec<Group>,
@@ -71,7 +71,7 @@ pub struct Testbed {
     /// Whether steps may be cut so that one ends at the time of an event.
     exact: bool,
     directory: Directory,
-    happenings: Vec<Happening>,
+    events: Vec<Event>,
     /// How the last nominal step was glued, all groups and parts.
     report: StepReport,
     /// Ports of groups without ground.
@@ -81,12 +81,12 @@ pub struct Testbed {
     /// The strategy that did not converge last.
     failed: &'static str,
     timings: Timings,
-    unglued: Unglued,
+    uncoupled: Uncoupled,
     gravity: [f64; 3],
     contact_margin_m: f64,
     cancel: Arc<AtomicBool>,
     standing: Arc<AtomicU64>,
-    partings: Partings,
+    teardown_errors: TeardownErrors,
     step_s: f64,
     /// Time of nominal step 0, s: 0 unless the length of the steps has been changed on the way.
     origin_s: f64,
@@ -184,7 +184,7 @@ impl Testbed {
                     return Err(self.gave_up(why));
                 }
                 Outcome::NotConverged(_) => {
-                    self.groups.iter().for_each(|g| self.report.add_cost(&g.exchange.report));
+                    self.groups.iter().for_each(|g| self.report.add_cost(&g.problem.report));
                     self.halvings += 1;
                     longest = 0.5 * h_now;
                 }
@@ -227,10 +227,10 @@ impl Testbed {
             return Ok(None);
         }
         self.detect_contacts(h)?;
-        let at = Instant { t: self.t, h, index: self.index, ..Instant::default() };
+        let at = StepContext { t: self.t, h, index: self.index, ..StepContext::default() };
         let mut sum = 0.0;
         for group in &mut self.groups {
-            let found = if group.exchange.has_grounds() { self.detector.ports() } else { &self.no_ports };
+            let found = if group.problem.has_grounds() { self.detector.ports() } else { &self.no_ports };
             sum += group.residual(at, found, &self.members, &mut self.instances)?;
         }
         Ok(Some(sum))
@@ -240,7 +240,7 @@ impl Testbed {
     fn account(&mut self) {
         self.report.ports.clear();
         self.report.parts += 1;
-        self.groups.iter().for_each(|g| self.report.add(&g.exchange.report));
+        self.groups.iter().for_each(|g| self.report.add(&g.problem.report));
     }
 
     /// The forces of joints and the accelerations at the start: a step of h = 0.
@@ -276,7 +276,7 @@ impl Testbed {
     /// (2) Outputs of t become inputs of the step.
     fn transfer_signals(&mut self) -> Result {
         if self.index == 0 && self.t == 0.0 {
-            self.settle()?;
+            self.initialize_signals()?;
         }
         self.read_signals()?;
         if !self.faults.is_empty() {
@@ -292,7 +292,7 @@ impl Testbed {
     }
 
     fn read_signals(&mut self) -> Result {
-        // all are read before any is set: a unit whose outputs follow its inputs at once shows nobody the inputs of t
+        // all are read before any is set: an FMU whose outputs follow its inputs at once shows nobody the inputs of t
         for link in &mut self.links.numbers {
             link.read(&self.instances)?;
         }
@@ -308,11 +308,11 @@ impl Testbed {
 
     /// What is wrong with the values on their way.
     fn apply_faults(&mut self) -> Result {
-        let (t_s, happenings) = (self.t, &mut self.happenings);
+        let (t_s, events) = (self.t, &mut self.events);
         let links = &mut self.links.numbers;
         self.faults.apply((t_s, self.step_s), links, &mut self.instances, |(label, begins)| {
             let what = format!("fault {}: {label}", if begins { "begins" } else { "ends" });
-            happenings.push(Happening { t_s, what });
+            events.push(Event { t_s, what });
         })
     }
 
@@ -323,7 +323,7 @@ impl Testbed {
         if let Some(why) = early {
             return Ok(Outcome::NotConverged(why));
         }
-        self.timings.charge_sample(Part::Unglued, start, times);
+        self.timings.charge_sample(Part::Uncoupled, start, times);
         let outcome = self.glue(h)?;
         if outcome == Outcome::Converged {
             self.commit_unglued(h, end)?;
@@ -337,21 +337,21 @@ impl Testbed {
         if self.groups.is_empty() {
             return Ok(Outcome::Converged);
         }
-        let at = Instant { t: self.t, h, index: self.index, ..Instant::default() };
+        let at = StepContext { t: self.t, h, index: self.index, ..StepContext::default() };
         let start = Clock::now();
         // step 1: collision detection and the constraints of rigid contact
         self.detect_contacts(h)?;
         self.timings.charge(Part::Contact, start);
         let watched = self.control.is_some();
         for group in self.groups.iter_mut().filter(|g| h > 0.0 || g.start.is_some()) {
-            let found = if group.exchange.has_grounds() { self.detector.ports() } else { &self.no_ports };
+            let found = if group.problem.has_grounds() { self.detector.ports() } else { &self.no_ports };
             group.begin(at, found, &self.members, &mut self.instances, &mut self.timings)?;
             group.measure_gap();
             if watched {
-                group.passage.look(&mut group.exchange);
+                group.passage.look(&mut group.problem);
             }
             // steps 2 to 4: estimate, compatibility, the bodies under the soil's force
-            let outcome = match group.strategy.solve(&mut group.exchange, &mut self.instances) {
+            let outcome = match group.strategy.solve(&mut group.problem, &mut self.instances) {
                 Err(early @ Error::Early { .. }) => Outcome::NotConverged(early.to_string()),
                 outcome => outcome?,
             };
@@ -362,12 +362,12 @@ impl Testbed {
         }
         // step 5: integrate, once all groups agree
         for group in self.groups.iter_mut().filter(|g| h > 0.0 || g.start.is_some()) {
-            let found = if group.exchange.has_grounds() { self.detector.ports() } else { &self.no_ports };
+            let found = if group.problem.has_grounds() { self.detector.ports() } else { &self.no_ports };
             group.describe(found, self.halvings);
             if watched {
-                group.passage.take(&group.exchange);
+                group.passage.take(&group.problem);
             }
-            group.exchange.commit(&mut self.instances)?;
+            group.problem.commit(&mut self.instances)?;
         }
         Ok(Outcome::Converged)
     }
@@ -385,7 +385,7 @@ impl Testbed {
     }
 
     fn read_states(&mut self) -> Result {
-        for (slot, _) in self.turns.iter().enumerate().filter(|(_, turn)| turn.has_bodies) {
+        for (slot, _) in self.schedules.iter().enumerate().filter(|(_, turn)| turn.has_bodies) {
             self.instances[slot].body_states(&mut self.members[slot].states)?;
         }
         Ok(())
@@ -409,9 +409,9 @@ impl Testbed {
     pub fn run_until(&mut self, until_s: f64, observers: &mut [&mut dyn Observer]) -> Result {
         while until_s - self.t > 1e-6 * self.step_s && !self.cancelled() {
             let stepped = self.step();
-            for happening in self.happenings.drain(..) {
+            for event in self.events.drain(..) {
                 for observer in observers.iter_mut() {
-                    observer.happened(&happening)?;
+                    observer.event(&event)?;
                 }
             }
             stepped?;
@@ -423,7 +423,7 @@ impl Testbed {
     /// Where the time of all steps went.
     pub fn timings(&self) -> Timings {
         let mut sum = self.timings.clone();
-        self.groups.iter().for_each(|g| sum.add(&g.exchange.timings));
+        self.groups.iter().for_each(|g| sum.add(&g.problem.timings));
         sum
     }
 
@@ -457,10 +457,10 @@ impl Testbed {
         })
     }
 
-    /// Sum over all subsystems, work and heat since t = 0; unknown where one that has energy keeps no book.
+    /// Sum over all subsystems, work and heat since t = 0; unknown where one that has energy keeps no ledger.
     pub fn energy(&self) -> Energy {
-        let books = self.instances.iter().map(|i| book_of(i.kind(), &i.subsystem().energy()));
-        standing::since(&self.before, books.fold(Energy::default(), |sum, book| sum.plus(&book)))
+        let ledgers = self.instances.iter().map(|i| ledger_of(i.kind(), &i.subsystem().energy()));
+        standing::since(&self.before, ledgers.fold(Energy::default(), |sum, ledger| sum.plus(&ledger)))
     }
 
     /// Committed value of a scalar number by full name; `None` where there is no such variable.
@@ -482,7 +482,7 @@ impl Testbed {
         if let Reply::Refused(reason) = variable.set(&mut self.instances, self.index > 0, value)? {
             return Err(refused(reason));
         }
-        self.happenings.push(Happening { t_s: self.t, what: format!("set {name} = {value}{was}") });
+        self.events.push(Event { t_s: self.t, what: format!("set {name} = {value}{was}") });
         Ok(())
     }
 
@@ -497,18 +497,18 @@ impl Testbed {
         if let Reply::Refused(reason) = instance.act(name, arguments)? {
             return Err(instance.error("act", format!("`{action}` was refused: {reason}")));
         }
-        self.happenings.push(Happening { t_s: self.t, what: format!("act {action}") });
+        self.events.push(Event { t_s: self.t, what: format!("act {action}") });
         Ok(())
     }
 
-    /// Ends all subsystems. Units are told to terminate and are freed; what goes wrong there is an error too.
+    /// Ends all subsystems. FMUs are told to terminate and are freed; what goes wrong there is an error too.
     ///
     /// # Errors
     /// What a subsystem did instead of ending.
     pub fn close(self) -> Result {
-        let (time_s, partings) = (self.t, self.partings.clone());
+        let (time_s, teardown_errors) = (self.t, self.teardown_errors.clone());
         drop(self);
-        match partings.take() {
+        match teardown_errors.take() {
             all if all.is_empty() => Ok(()),
             all => Err(Error::Simulation { time_s, message: all.join("; ") }),
         }
@@ -521,7 +521,7 @@ impl Testbed {
     pub fn set_gluing(&mut self, spec: &terraglue_scenario::GluingSpec) -> Result {
         let specs: Vec<_> = self.groups.iter().map(|g| g.spec(spec)).collect();
         for (group, spec) in self.groups.iter().zip(&specs) {
-            if let Some(refusal) = gluing::refusal(spec, &group.exchange, &self.instances) {
+            if let Some(refusal) = gluing::refusal(spec, &group.problem, &self.instances) {
                 return Err(Error::Simulation { time_s: self.t, message: refusal.reason });
             }
         }

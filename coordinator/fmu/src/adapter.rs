@@ -1,8 +1,8 @@
-//! A unit as a subsystem: trials by its saved states, values by name, every error with what the unit said.
+//! An FMU as a subsystem: trials by its saved states, values by name, every error with what the FMU said.
 
 use super::bodies::{Axis, Bodies, terminals};
 use super::clocks;
-use super::map::{self, Place};
+use super::map::{self, ValueLocation};
 use super::rollback;
 use super::settings::{OnNan, options, structure};
 use serde_json::{Map, Value};
@@ -11,19 +11,21 @@ use std::collections::BTreeMap;
 use std::path::Path;
 use std::sync::Arc;
 use terraglue_fmi::description::Start;
-use terraglue_fmi::{Advance, Error as FmiError, Fmu, Slave, SlaveOptions, SlaveState, Stepped};
-use terraglue_host::Partings;
+use terraglue_fmi::{
+    Advance, Error as FmiError, Fmu, FmuInstance, FmuState, InstanceOptions, LogLine, Stepped,
+};
+use terraglue_host::TeardownErrors;
 use terraglue_scenario::did_you_mean;
 use terraglue_subsystem::{
     BodyState, Capabilities, Error, Host, Input, Law, Level, LogLevel, Motion, Response, Result, Scene, Step,
     Subsystem, ValueType, Values, ValuesMut, Variable,
 };
 
-/// An instance of a unit as a subsystem. What every step looks at stands first and in this order, on two lines of the
+/// An instance of an FMU as a subsystem. What every step looks at stands first and in this order, on two lines of the
 /// cache with the beginning of the instance.
 #[repr(C, align(64))]
 pub struct FmuSubsystem {
-    places: Box<[Place]>,
+    places: Box<[ValueLocation]>,
     /// Whether a trial was made that is not committed.
     open: bool,
     /// Whether the initialisation is over.
@@ -34,14 +36,14 @@ pub struct FmuSubsystem {
     has_bodies: bool,
     /// Whether a state was saved to which a run may go back over more than the last step.
     kept: Cell<bool>,
-    slave: Slave,
+    instance: FmuInstance,
     host: Arc<dyn Host>,
     variables: Vec<Variable>,
-    /// State at the start of the step, where the unit can save it.
-    before: SlaveState,
-    /// Whether it was seen that the unit comes back to a saved state.
+    /// State at the start of the step, where the FMU can save it.
+    before: FmuState,
+    /// Whether it was seen that the FMU comes back to a saved state.
     proved: bool,
-    slots: Vec<SlaveState>,
+    slots: Vec<FmuState>,
     on_nan: OnNan,
     warned: Cell<bool>,
     references: RefCell<Vec<u32>>,
@@ -49,15 +51,15 @@ pub struct FmuSubsystem {
     /// Arrays by reference that are being set element by element before the initialisation.
     starts: BTreeMap<u32, Vec<Option<f64>>>,
     feeds_through: bool,
-    partings: Partings,
+    teardown_errors: TeardownErrors,
 }
 
 impl FmuSubsystem {
-    /// Opens a unit, sets `start` and enters initialisation mode; the first step ends it, so that values which are
-    /// connected at the start are set while the unit initialises. Host keys: `on_nan`, `event_mode`, `rollback`.
+    /// Opens an FMU, sets `start` and enters initialisation mode; the first step ends it, so that values which are
+    /// connected at the start are set while the FMU initialises. Host keys: `on_nan`, `event_mode`, `rollback`.
     ///
     /// # Errors
-    /// What is wrong with the unit, or a start value that it does not take.
+    /// What is wrong with the FMU, or a start value that it does not take.
     pub fn new(path: &Path, parameters: &Map<String, Value>, host: Arc<dyn Host>) -> Result<Self> {
         let fmu = Fmu::open(path).map_err(error)?;
         let (options, start) = options(parameters)?;
@@ -65,36 +67,28 @@ impl FmuSubsystem {
             host.log(LogLevel::Warning, problem);
         }
         let sink = host.clone();
-        let slave = Slave::instantiate(
-            &fmu,
-            SlaveOptions {
-                name: host.name().to_owned(),
-                verbose: false,
-                event_mode: options.event_mode,
-                intermediate: Vec::new(),
-                followed: Vec::new(),
-                sink: Box::new(move |line| sink.log(line.level, &line.text)),
-            },
-        );
-        let mut slave = slave.map_err(error)?;
-        let (structure, start) = structure(slave.description(), start)?;
+        let log = Box::new(move |line: &LogLine| sink.log(line.level, &line.text));
+        let plain = InstanceOptions::new(host.name(), log);
+        let made = InstanceOptions { event_mode: options.event_mode, ..plain };
+        let mut instance = FmuInstance::instantiate(&fmu, made).map_err(error)?;
+        let (structure, start) = structure(instance.description(), start)?;
         let structure: Vec<(&str, i128)> = structure.iter().map(|(name, n)| (name.as_str(), *n)).collect();
-        slave.configure(&structure).map_err(error)?;
-        let description = slave.description().clone();
+        instance.configure(&structure).map_err(error)?;
+        let description = instance.description().clone();
         let capabilities = description.capabilities;
         let (variables, places) = map::variables(&description, options.event_mode && capabilities.event_mode);
         let mut subsystem = Self {
-            slave,
+            instance,
             variables,
             clocks: clocks::concerned(&places),
             places: places.into(),
             has_bodies: false,
-            before: SlaveState::default(),
+            before: FmuState::default(),
             can_go_back: capabilities.state && options.rollback,
             open: false,
             running: false,
             proved: false,
-            slots: (0..host.slots()).map(|_| SlaveState::default()).collect(),
+            slots: (0..host.slots()).map(|_| FmuState::default()).collect(),
             kept: Cell::new(false),
             on_nan: options.on_nan,
             warned: Cell::new(false),
@@ -102,7 +96,7 @@ impl FmuSubsystem {
             bodies: Bodies::default(),
             starts: BTreeMap::new(),
             feeds_through: feeds_through(&description),
-            partings: Partings::default(),
+            teardown_errors: TeardownErrors::default(),
             host,
         };
         for (name, value) in start {
@@ -110,17 +104,20 @@ impl FmuSubsystem {
         }
         subsystem.start_arrays()?;
         let places = &subsystem.places;
-        let axis =
-            |p: &Place| Axis { reference: p.reference, element: p.element as usize, count: p.count as usize };
+        let axis = |p: &ValueLocation| Axis {
+            reference: p.reference,
+            element: p.element as usize,
+            count: p.count as usize,
+        };
         let place = |id: u32| places.get(id as usize).map(axis);
         let terminals = terminals(&description);
         subsystem.bodies = Bodies::read(&options.bodies, &subsystem.variables, &terminals, place)?;
         subsystem.has_bodies = !subsystem.bodies.is_empty();
         if subsystem.has_bodies && !subsystem.can_go_back {
-            let text = "glued bodies need a unit that can save its state, to repeat a step";
+            let text = "glued bodies need an FMU that can save its state, to repeat a step";
             return Err(Error::Refused(text.into()));
         }
-        subsystem.slave.enter_initialization(0.0, None, None).map_err(error)?;
+        subsystem.instance.enter_initialization(0.0, None, None).map_err(error)?;
         Ok(subsystem)
     }
 
@@ -132,14 +129,14 @@ impl FmuSubsystem {
         path: &Path,
         parameters: &Map<String, Value>,
         host: Arc<dyn Host>,
-        partings: Partings,
+        teardown_errors: TeardownErrors,
     ) -> Result<Box<dyn Subsystem>> {
-        Ok(Box::new(Self::new(path, parameters, host)?.with_partings(partings)))
+        Ok(Box::new(Self::new(path, parameters, host)?.with_teardown_errors(teardown_errors)))
     }
 
     /// Where an error at the end of its life goes.
-    pub fn with_partings(mut self, partings: Partings) -> Self {
-        self.partings = partings;
+    pub fn with_teardown_errors(mut self, teardown_errors: TeardownErrors) -> Self {
+        self.teardown_errors = teardown_errors;
         self
     }
 
@@ -147,13 +144,13 @@ impl FmuSubsystem {
         let Some(k) = self.variables.iter().position(|v| v.name == name) else {
             let hint = did_you_mean(name, self.variables.iter().map(|v| v.name.as_str()));
             let hint = hint.map(|h| format!("; {h}")).unwrap_or_default();
-            return Err(Error::Refused(format!("the unit has no variable `{name}`{hint}")));
+            return Err(Error::Refused(format!("the FMU has no variable `{name}`{hint}")));
         };
         if self.variables[k].effect == terraglue_subsystem::Effect::ReadOnly {
-            return Err(Error::Refused(format!("`{name}` of the unit cannot be set")));
+            return Err(Error::Refused(format!("`{name}` of the FMU cannot be set")));
         }
         let v = &self.variables[k];
-        let wrong = || Error::Refused(format!("`{name}` of the unit does not take {value}"));
+        let wrong = || Error::Refused(format!("`{name}` of the FMU does not take {value}"));
         let (number, whole, id) = (value.as_f64(), value.as_i64(), [v.id]);
         macro_rules! narrow {
             ($variant:ident) => {
@@ -194,14 +191,14 @@ impl FmuSubsystem {
 
     /// Sets arrays of which elements were given; the others have the start values of the description.
     fn start_arrays(&mut self) -> Result {
-        let description = self.slave.description().clone();
+        let description = self.instance.description().clone();
         for (reference, given) in std::mem::take(&mut self.starts) {
             let found = description.variables.iter().find(|v| v.reference == reference && !v.alias);
             let Some(v) = found else { continue };
             if let Some(k) = given.iter().position(Option::is_none).filter(|_| v.resized) {
                 return Err(Error::Refused(format!(
                     "`{}` lacks a value: structural parameters changed the shape of `{}` and with it the start values \
-                     of the unit, so give all {} or none",
+                     of the FMU, so give all {} or none",
                     map::element_name(v, k),
                     v.name,
                     given.len()
@@ -213,19 +210,19 @@ impl FmuSubsystem {
             };
             let known = |k: usize| own.get(k).or(own.first()).copied().unwrap_or(0.0);
             let whole: Vec<f64> = given.iter().enumerate().map(|(k, x)| x.unwrap_or(known(k))).collect();
-            self.slave.set_f64(&[reference], &whole).map_err(error)?;
+            self.instance.set_f64(&[reference], &whole).map_err(error)?;
         }
         Ok(())
     }
 
-    /// Once: does the unit come back to the state before this step?
+    /// Once: does the FMU come back to the state before this step?
     fn prove(&mut self, step: &Step, wrench: &[f64]) -> Result {
         if std::mem::replace(&mut self.proved, true) {
             return Ok(());
         }
         let for_good = !self.kept.get();
-        let Self { slave, bodies, variables, places, before, .. } = self;
-        let number = |(v, place): &(&Variable, &Place)| {
+        let Self { instance, bodies, variables, places, before, .. } = self;
+        let number = |(v, place): &(&Variable, &ValueLocation)| {
             let output = v.causality == terraglue_subsystem::Causality::Output;
             output && v.value_type == ValueType::F64 && place.count == 1
         };
@@ -233,11 +230,11 @@ impl FmuSubsystem {
         let outputs: Vec<(&str, u32)> = outputs.map(|(v, p)| (v.name.as_str(), p.reference)).collect();
         let short = Advance { t: step.t, h: step.h, for_good };
         rollback::prove(
-            slave,
+            instance,
             before,
             &outputs,
             short,
-            |slave| bodies.push(slave, step, wrench, error),
+            |instance| bodies.push(instance, step, wrench, error),
             error,
         )
     }
@@ -248,33 +245,33 @@ impl FmuSubsystem {
     fn prepare(&mut self, step: &Step, wrench: &[f64], out: &mut Response) -> Result<bool> {
         let begins = !self.running;
         if begins {
-            self.slave.exit_initialization().map_err(error)?;
+            self.instance.exit_initialization().map_err(error)?;
             self.running = true;
         }
         if step.h == 0.0 && self.has_bodies {
-            self.bodies.still(&mut self.slave, step, wrench, out, error)?;
+            self.bodies.still(&mut self.instance, step, wrench, out, error)?;
             return Ok(false);
         }
         if self.open && !self.can_go_back {
             let text =
-                "a step had to be repeated, but the unit cannot save its state; make time.step_s shorter";
+                "a step had to be repeated, but the FMU cannot save its state; make time.step_s shorter";
             return Err(Error::Failed(text.into()));
         }
         if self.open {
-            self.slave.restore(&self.before).map_err(error)?;
+            self.instance.restore(&self.before).map_err(error)?;
         } else {
             self.bodies.forget_trials();
             if self.can_go_back {
-                self.slave.save(&mut self.before).map_err(unsaved)?;
+                self.instance.save(&mut self.before).map_err(unsaved)?;
             }
         }
         self.open = true;
         if self.clocks && !begins {
-            self.slave.forget_ticks();
+            self.instance.forget_ticks();
         }
         if self.has_bodies {
             self.prove(step, wrench)?;
-            self.bodies.push(&mut self.slave, step, wrench, error)?;
+            self.bodies.push(&mut self.instance, step, wrench, error)?;
         }
         Ok(true)
     }
@@ -284,10 +281,10 @@ impl FmuSubsystem {
     fn stopped(&self, step: &Step, done: terraglue_fmi::Result<Stepped>) -> Error {
         match done {
             Ok(Stepped { reached, .. }) => {
-                Error::Failed(format!("the unit asks for the end of the simulation at t = {reached} s"))
+                Error::Failed(format!("the FMU asks for the end of the simulation at t = {reached} s"))
             }
             Err(discard @ FmiError::Discard { .. }) => {
-                let variable = self.slave.description().capabilities.variable_step;
+                let variable = self.instance.description().capabilities.variable_step;
                 if !self.can_go_back || !variable {
                     let lack = if variable { "save its state" } else { "make steps of another length" };
                     return Error::Failed(format!("{discard}; the step cannot be halved: it cannot {lack}"));
@@ -301,24 +298,24 @@ impl FmuSubsystem {
 
     /// Where one variable lies that is asked for and is no element of an array.
     #[inline]
-    fn single(&self, ids: &[u32]) -> Option<&Place> {
+    fn single(&self, ids: &[u32]) -> Option<&ValueLocation> {
         let [id] = ids else { return None };
         self.places.get(*id as usize).filter(|p| p.count == 1)
     }
 
     /// Whether a variable may be set now.
     #[inline]
-    fn takes(&self, place: &Place) -> bool {
+    fn takes(&self, place: &ValueLocation) -> bool {
         !place.structural && (place.live || !self.running)
     }
 
-    fn place(&self, id: u32) -> Result<&Place> {
+    fn place(&self, id: u32) -> Result<&ValueLocation> {
         self.places.get(id as usize).ok_or_else(|| Error::Refused(format!("no variable has the number {id}")))
     }
 
     /// Item values of an enumeration where they are not simply 0, 1, 2, …
-    fn items(&self, place: &Place) -> &[(String, i64)] {
-        &self.slave.description().variables[place.variable as usize].items
+    fn items(&self, place: &ValueLocation) -> &[(String, i64)] {
+        &self.instance.description().variables[place.variable as usize].items
     }
 
     #[inline]
@@ -376,7 +373,7 @@ fn feeds_through(description: &terraglue_fmi::ModelDescription) -> bool {
     inputs && all.any(|depends| depends)
 }
 
-/// An error of a unit as an error of a subsystem.
+/// An error of an FMU as an error of a subsystem.
 #[cold]
 fn error(error: FmiError) -> Error {
     match error {
@@ -399,7 +396,7 @@ fn unsaved(why: FmiError) -> Error {
 
 impl Subsystem for FmuSubsystem {
     fn capabilities(&self) -> Capabilities {
-        let c = self.slave.description().capabilities;
+        let c = self.instance.description().capabilities;
         let retry = if self.can_go_back {
             Capabilities::RETRY | Capabilities::STATE
         } else {
@@ -410,18 +407,19 @@ impl Subsystem for FmuSubsystem {
         let force = if self.bodies.is_empty() { Capabilities::default() } else { Capabilities::FORCE };
         let through = if self.feeds_through { Capabilities::FEEDTHROUGH } else { Capabilities::default() };
         let fixed = if c.variable_step { Capabilities::default() } else { Capabilities::FIXED_STEP };
-        let slopes = match self.slave.tells_derivatives() && self.can_go_back && self.bodies.tell_slopes() {
-            true => Capabilities::DERIVATIVES,
-            false => Capabilities::default(),
-        };
-        retry | bytes | force | through | fixed | slopes
+        let derivatives =
+            match self.instance.tells_derivatives() && self.can_go_back && self.bodies.tell_derivatives() {
+                true => Capabilities::DERIVATIVES,
+                false => Capabilities::default(),
+            };
+        retry | bytes | force | through | fixed | derivatives
     }
 
     fn interface_jacobian(&mut self, step: &Step, level: Level, out: &mut [f64]) -> Result {
         if !self.capabilities().has(Capabilities::DERIVATIVES) {
             return Err(Error::Unsupported);
         }
-        self.bodies.slopes(&self.slave, step, level, out, error)
+        self.bodies.jacobian(&self.instance, step, level, out, error)
     }
 
     fn set_ports(&mut self, step: &Step, _: &mut [Law], now: &mut Response) -> Result {
@@ -437,7 +435,7 @@ impl Subsystem for FmuSubsystem {
     }
 
     fn body_states(&self, out: &mut [BodyState]) -> Result {
-        self.bodies.states(&self.slave, out, error)
+        self.bodies.states(&self.instance, out, error)
     }
 
     fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result {
@@ -448,13 +446,13 @@ impl Subsystem for FmuSubsystem {
             }
         }
         self.open = true;
-        match self.slave.do_step(Advance { t: step.t, h: step.h, for_good: !self.kept.get() }) {
+        match self.instance.do_step(Advance { t: step.t, h: step.h, for_good: !self.kept.get() }) {
             Ok(Stepped { terminate: false, .. }) => {}
             other => return Err(self.stopped(step, other)),
         }
         out.reached = step.t + step.h;
         match self.has_bodies {
-            true => self.bodies.pull(&self.slave, step, wrench, out, error),
+            true => self.bodies.pull(&self.instance, step, wrench, out, error),
             false => Ok(()),
         }
     }
@@ -462,7 +460,7 @@ impl Subsystem for FmuSubsystem {
     fn commit(&mut self, _: &Step, _: &[f64], _: &Motion) -> Result {
         self.open = false;
         if self.clocks {
-            self.slave.forget_triggers();
+            self.instance.forget_triggers();
         }
         Ok(())
     }
@@ -470,35 +468,35 @@ impl Subsystem for FmuSubsystem {
     fn save_state(&mut self, slot: u32) -> Result {
         let state = self.slots.get_mut(slot as usize).ok_or(Error::Unsupported)?;
         self.kept.set(true);
-        self.slave.save(state).map_err(error)
+        self.instance.save(state).map_err(error)
     }
 
     fn restore_state(&mut self, slot: u32) -> Result {
         let state = self.slots.get(slot as usize).ok_or(Error::Unsupported)?;
         self.open = false;
-        self.slave.restore(state).map_err(error)
+        self.instance.restore(state).map_err(error)
     }
 
     fn serialize(&self) -> Result<Vec<u8>> {
         self.kept.set(true);
-        let mut state = SlaveState::default();
-        self.slave.save(&mut state).map_err(error)?;
-        let bytes = self.slave.serialize(&state).map_err(error);
-        self.slave.release(&mut state).map_err(error)?;
+        let mut state = FmuState::default();
+        self.instance.save(&mut state).map_err(error)?;
+        let bytes = self.instance.serialize(&state).map_err(error);
+        self.instance.release(&mut state).map_err(error)?;
         // whether it is initialised is the host's to know
         Ok([&[u8::from(self.running)], bytes?.as_slice()].concat())
     }
 
     fn deserialize(&mut self, bytes: &[u8]) -> Result {
-        let wrong = || Error::Refused("these bytes are no state of a unit".into());
+        let wrong = || Error::Refused("these bytes are no state of an FMU".into());
         let (running, bytes) = bytes.split_first().filter(|(running, _)| **running <= 1).ok_or_else(wrong)?;
-        let mut state = SlaveState::default();
-        self.slave.deserialize(bytes, &mut state).map_err(error)?;
+        let mut state = FmuState::default();
+        self.instance.deserialize(bytes, &mut state).map_err(error)?;
         if *running == 1 && !self.running {
-            self.slave.exit_initialization().map_err(error)?;
+            self.instance.exit_initialization().map_err(error)?;
         }
-        let done = self.slave.restore(&state).map_err(error);
-        self.slave.release(&mut state).map_err(error)?;
+        let done = self.instance.restore(&state).map_err(error);
+        self.instance.release(&mut state).map_err(error)?;
         (self.running, self.open) = (*running == 1, false);
         done
     }
@@ -511,13 +509,13 @@ impl Subsystem for FmuSubsystem {
         out: &mut [f64],
     ) -> Result {
         let (mut z, mut v) = (Vec::new(), Vec::new());
-        if !self.slave.tells_derivatives()
+        if !self.instance.tells_derivatives()
             || !self.collect(unknowns, &mut z)?
             || !self.collect(knowns, &mut v)?
         {
             return Err(Error::Unsupported);
         }
-        self.slave.directional_derivative(&z, &v, seed, out).map_err(error)
+        self.instance.directional_derivative(&z, &v, seed, out).map_err(error)
     }
 
     fn variables(&self) -> &[Variable] {
@@ -527,7 +525,7 @@ impl Subsystem for FmuSubsystem {
     fn get(&self, ids: &[u32], out: ValuesMut) -> Result {
         match (out, self.single(ids)) {
             (ValuesMut::F64(out), Some(place)) => {
-                if let Err(failure) = self.slave.get_f64(&[place.reference], out) {
+                if let Err(failure) = self.instance.get_f64(&[place.reference], out) {
                     return Err(error(failure));
                 }
                 self.check_numbers(ids, out)
@@ -539,7 +537,7 @@ impl Subsystem for FmuSubsystem {
     fn set(&mut self, ids: &[u32], values: Values) -> Result {
         match (values, self.single(ids)) {
             (Values::F64(values), Some(place)) if self.takes(place) && !place.clocked => {
-                self.slave.set_f64(&[place.reference], values).map_err(error)
+                self.instance.set_f64(&[place.reference], values).map_err(error)
             }
             (values, _) => self.set_all(ids, values),
         }
@@ -552,7 +550,7 @@ impl FmuSubsystem {
     fn get_all(&self, ids: &[u32], mut out: ValuesMut) -> Result {
         if self.clocks {
             let places = ids.iter().map(|id| self.place(*id)).collect::<Result<Vec<_>>>()?;
-            if clocks::get(&self.slave, &places, &mut out, error)? {
+            if clocks::get(&self.instance, &places, &mut out, error)? {
                 return Ok(());
             }
         }
@@ -560,22 +558,22 @@ impl FmuSubsystem {
         if self.collect(ids, &mut references)? {
             return match out {
                 ValuesMut::F64(out) => {
-                    self.slave.get_f64(&references, out).map_err(error)?;
+                    self.instance.get_f64(&references, out).map_err(error)?;
                     self.check_numbers(ids, out)
                 }
                 ValuesMut::F32(out) => {
-                    self.slave.get(&references, ValuesMut::F32(&mut *out)).map_err(error)?;
+                    self.instance.get(&references, ValuesMut::F32(&mut *out)).map_err(error)?;
                     self.check_numbers(ids, out)
                 }
                 ValuesMut::Enumeration(out) => {
-                    self.slave.get(&references, ValuesMut::Enumeration(out)).map_err(error)?;
+                    self.instance.get(&references, ValuesMut::Enumeration(out)).map_err(error)?;
                     for (id, value) in ids.iter().zip(out) {
                         let items = self.items(self.place(*id)?);
                         *value = items.iter().position(|(_, v)| v == value).map_or(*value, |k| k as i64);
                     }
                     Ok(())
                 }
-                other => self.slave.get(&references, other).map_err(error),
+                other => self.instance.get(&references, other).map_err(error),
             };
         }
         drop(references);
@@ -584,7 +582,7 @@ impl FmuSubsystem {
                 for (id, out) in ids.iter().zip($out.iter_mut()) {
                     let place = *self.place(*id)?;
                     let mut whole = vec![$zero; place.count as usize];
-                    self.slave.get(&[place.reference], ValuesMut::$variant(&mut whole)).map_err(error)?;
+                    self.instance.get(&[place.reference], ValuesMut::$variant(&mut whole)).map_err(error)?;
                     *out = whole.swap_remove(place.element as usize);
                 }
                 Ok(())
@@ -621,18 +619,17 @@ impl FmuSubsystem {
             let place = self.place(*id)?;
             if !self.takes(place) {
                 let name = &self.variables[*id as usize].name;
-                let when =
-                    if place.structural { "in the table of its unit" } else { "before the first step" };
+                let when = if place.structural { "in the table of its FMU" } else { "before the first step" };
                 return Err(Error::Refused(format!("`{name}` can only be set {when}")));
             }
         }
         if self.clocks {
             let place = |id: &u32| self.places.get(*id as usize);
-            let places: Vec<&Place> = ids.iter().filter_map(place).collect();
+            let places: Vec<&ValueLocation> = ids.iter().filter_map(place).collect();
             if places.iter().any(|p| p.clock || p.clocked) && ids.len() > 1 {
                 return self.set_one_by_one(ids, values);
             }
-            if clocks::set(&mut self.slave, &places, &values, error)? {
+            if clocks::set(&mut self.instance, &places, &values, error)? {
                 return Ok(());
             }
         }
@@ -644,9 +641,9 @@ impl FmuSubsystem {
                     Ok(usize::try_from(*k).ok().and_then(|k| items.get(k)).map_or(*k, |(_, v)| *v))
                 };
                 let own = ids.iter().zip(indices).map(item).collect::<Result<Vec<i64>>>()?;
-                return self.slave.set(&references, Values::Enumeration(&own)).map_err(error);
+                return self.instance.set(&references, Values::Enumeration(&own)).map_err(error);
             }
-            return self.slave.set(&references, values).map_err(error);
+            return self.instance.set(&references, values).map_err(error);
         }
         drop(references);
         macro_rules! elements {
@@ -654,15 +651,15 @@ impl FmuSubsystem {
                 for (id, value) in ids.iter().zip($values) {
                     let place = *self.place(*id)?;
                     let mut whole = vec![$zero; place.count as usize];
-                    self.slave.get(&[place.reference], ValuesMut::$variant(&mut whole)).map_err(error)?;
+                    self.instance.get(&[place.reference], ValuesMut::$variant(&mut whole)).map_err(error)?;
                     whole[place.element as usize] = value.clone();
-                    self.slave.set(&[place.reference], Values::$variant(&whole)).map_err(error)?;
+                    self.instance.set(&[place.reference], Values::$variant(&whole)).map_err(error)?;
                 }
                 Ok(())
             }};
         }
         match values {
-            Values::F64(v) if self.slave.is_instantiated() => {
+            Values::F64(v) if self.instance.is_instantiated() => {
                 ids.iter().zip(v).try_for_each(|(id, value)| self.start_element(*id, *value))
             }
             Values::F64(v) => elements!(F64, v, 0.0),
@@ -687,12 +684,12 @@ impl Drop for FmuSubsystem {
     fn drop(&mut self) {
         for state in self.slots.iter_mut().chain([&mut self.before]) {
             // The instance goes next; what it says to this is in its log.
-            drop(self.slave.release(state));
+            drop(self.instance.release(state));
         }
-        if self.slave.is_good()
-            && let Err(error) = self.slave.terminate()
+        if self.instance.is_good()
+            && let Err(error) = self.instance.terminate()
         {
-            self.partings.put(format!("`{}` at its end: {error}", self.host.name()));
+            self.teardown_errors.put(format!("`{}` at its end: {error}", self.host.name()));
         }
     }
 }

@@ -1,30 +1,35 @@
-//! Clocks of units in a scenario: truth values. An output clock is true where it ticked in the last step, a triggered input clock
+//! Clocks of FMUs in a scenario: truth values. An output clock is true where it ticked in the last step, a triggered input clock
 //! ticks when the next step begins; inputs of a clock take their values then.
 
-use super::map::Place;
-use terraglue_fmi::{Error as FmiError, Result as FmiResult, Slave};
+use super::map::ValueLocation;
+use terraglue_fmi::{Error as FmiError, FmuInstance, Result as FmiResult};
 use terraglue_subsystem::{Error, Result, Values, ValuesMut};
 
-/// How an error of a unit becomes one of the subsystem.
+/// How an error of an FMU becomes one of the subsystem.
 type Fail = fn(FmiError) -> Error;
 
 /// Whether any of the variables needs this module.
-pub fn concerned(places: &[Place]) -> bool {
+pub fn concerned(places: &[ValueLocation]) -> bool {
     places.iter().any(|p| p.clock || p.clocked)
 }
 
 /// Truth values of which some are clocks; answers whether there are such.
-pub fn get(slave: &Slave, places: &[&Place], out: &mut ValuesMut, fail: Fail) -> Result<bool> {
+pub fn get(
+    instance: &FmuInstance,
+    places: &[&ValueLocation],
+    out: &mut ValuesMut,
+    fail: Fail,
+) -> Result<bool> {
     let ValuesMut::Bool(out) = out else { return Ok(false) };
     if !places.iter().any(|p| p.clock) {
         return Ok(false);
     }
     for (place, out) in places.iter().zip(out.iter_mut()) {
         *out = if place.clock {
-            slave.ticks(place.reference)
+            instance.ticks(place.reference)
         } else {
             let mut whole = vec![false; place.count as usize];
-            slave.get(&[place.reference], ValuesMut::Bool(&mut whole)).map_err(fail)?;
+            instance.get(&[place.reference], ValuesMut::Bool(&mut whole)).map_err(fail)?;
             whole[place.element as usize]
         };
     }
@@ -32,12 +37,17 @@ pub fn get(slave: &Slave, places: &[&Place], out: &mut ValuesMut, fail: Fail) ->
 }
 
 /// Sets clocks, and keeps inputs of clocks for their next tick; answers whether all of them were such.
-pub fn set(slave: &mut Slave, places: &[&Place], values: &Values, fail: Fail) -> Result<bool> {
+pub fn set(
+    instance: &mut FmuInstance,
+    places: &[&ValueLocation],
+    values: &Values,
+    fail: Fail,
+) -> Result<bool> {
     if let (Values::Bool(values), true) = (values, places.iter().all(|p| p.clock)) {
         for (place, on) in places.iter().zip(*values) {
-            let clock = slave.description().variables[place.variable as usize].clone();
-            slave.can_trigger(&clock).map_err(fail)?;
-            slave.trigger(place.reference, *on);
+            let clock = instance.description().variables[place.variable as usize].clone();
+            instance.can_trigger(&clock).map_err(fail)?;
+            instance.trigger(place.reference, *on);
         }
         return Ok(true);
     }
@@ -48,8 +58,8 @@ pub fn set(slave: &mut Slave, places: &[&Place], values: &Values, fail: Fail) ->
         ($variant:ident, $all:expr) => {
             for (place, value) in places.iter().zip($all.iter().cloned()) {
                 let reference = place.reference;
-                slave.hold(reference, move |slave: &Slave| -> FmiResult {
-                    slave.set(&[reference], Values::$variant(&[value.clone()]))
+                instance.hold(reference, move |instance: &FmuInstance| -> FmiResult {
+                    instance.set(&[reference], Values::$variant(&[value.clone()]))
                 });
             }
         };
@@ -69,8 +79,8 @@ pub fn set(slave: &mut Slave, places: &[&Place], values: &Values, fail: Fail) ->
         Values::String(all) => held!(String, all),
         Values::Binary(all) => held!(Binary, all),
         Values::Enumeration(all) => {
-            let items = |place: &Place, k: i64| {
-                let items = &slave.description().variables[place.variable as usize].items;
+            let items = |place: &ValueLocation, k: i64| {
+                let items = &instance.description().variables[place.variable as usize].items;
                 usize::try_from(k).ok().and_then(|k| items.get(k)).map_or(k, |(_, own)| *own)
             };
             let own: Vec<i64> = places.iter().zip(*all).map(|(place, k)| items(place, *k)).collect();
@@ -81,7 +91,7 @@ pub fn set(slave: &mut Slave, places: &[&Place], values: &Values, fail: Fail) ->
 }
 
 /// What is no single input of a clock: none of this module's, or something that is not done.
-fn mixed(places: &[&Place]) -> Result<bool> {
+fn mixed(places: &[&ValueLocation]) -> Result<bool> {
     match places.iter().any(|p| p.clocked && p.count > 1) {
         true => {
             Err(Error::Refused("an array that belongs to a clock cannot be set element by element".into()))

@@ -1,12 +1,12 @@
-//! What the columns of a table of inputs feed in a unit that is run alone: numbers, arrays, texts and clocks, at communication
-//! points and – numbers of units that follow their inputs – within steps.
+//! What the columns of a table of inputs feed in an FMU that is run alone: numbers, arrays, texts and clocks, at communication
+//! points and – numbers of FMUs that follow their inputs – within steps.
 
 use super::map::element_name;
 use super::simulate::find;
 use super::table::Table;
 use std::sync::Arc;
 use terraglue_fmi::description::Variable;
-use terraglue_fmi::{Error, ModelDescription, Result, Slave, Version};
+use terraglue_fmi::{Error, FmuInstance, ModelDescription, Result, Version};
 use terraglue_subsystem::{ValueType, Values};
 
 /// All that a table feeds.
@@ -25,11 +25,11 @@ struct Input {
     columns: Vec<(usize, Option<usize>)>,
     /// Elements, of which those stay so that have no column.
     rest: Vec<f64>,
-    /// Whether the unit follows it within steps.
+    /// Whether the FMU follows it within steps.
     followed: bool,
 }
 
-/// Inputs with columns that a unit of FMI 3 sets at intermediate times, as far as that is known before arrays have their
+/// Inputs with columns that an FMU of FMI 3 sets at intermediate times, as far as that is known before arrays have their
 /// sizes.
 pub fn followed(description: &ModelDescription, table: &Table) -> Vec<String> {
     let fed = |v: &Variable| {
@@ -44,13 +44,13 @@ pub fn followed(description: &ModelDescription, table: &Table) -> Vec<String> {
 }
 
 impl Inputs {
-    /// Finds what the columns of a table feed: variables, whole arrays or elements of arrays of f64. The unit is in
+    /// Finds what the columns of a table feed: variables, whole arrays or elements of arrays of f64. The FMU is in
     /// initialisation mode; `hold`: it follows nothing within steps.
     ///
     /// # Errors
-    /// A column that is no variable of the unit.
-    pub fn find(slave: &Slave, table: &Arc<Table>, hold: bool) -> Result<Self> {
-        let description = slave.description();
+    /// A column that is no variable of the FMU.
+    pub fn find(instance: &FmuInstance, table: &Arc<Table>, hold: bool) -> Result<Self> {
+        let description = instance.description();
         let mut all: Vec<Input> = Vec::new();
         for (column, name) in table.names.iter().enumerate() {
             let (v, element) = place(description, name)?;
@@ -68,7 +68,7 @@ impl Inputs {
         }
         for input in &mut all {
             if input.columns.iter().any(|(_, element)| element.is_some()) {
-                slave.get_f64(&[input.variable.reference], &mut input.rest)?;
+                instance.get_f64(&[input.variable.reference], &mut input.rest)?;
             }
         }
         let told = all.iter().filter(|i| i.followed && description.version == Version::V2);
@@ -76,14 +76,14 @@ impl Inputs {
         Ok(Self { table: table.clone(), all, slopes, columns })
     }
 
-    /// Lets a unit of FMI 3 ask for its inputs within steps.
-    pub fn follow(&self, slave: &mut Slave) -> Result {
-        if slave.description().version != Version::V3 {
+    /// Lets an FMU of FMI 3 ask for its inputs within steps.
+    pub fn follow(&self, instance: &mut FmuInstance) -> Result {
+        if instance.description().version != Version::V3 {
             return Ok(());
         }
         for input in self.all.iter().filter(|i| i.followed) {
             let (table, columns, rest) = (self.table.clone(), input.columns.clone(), input.rest.clone());
-            slave.follow(&input.variable, move |t, out| {
+            instance.follow(&input.variable, move |t, out| {
                 out.copy_from_slice(&rest);
                 columns.iter().for_each(|(column, element)| table.write(t, *column, *element, out));
             })?;
@@ -94,9 +94,9 @@ impl Inputs {
     /// Sets all inputs to what they are at t.
     ///
     /// # Errors
-    /// What is no value of its variable, or what the unit does not take.
-    pub fn set(&self, slave: &mut Slave, t: f64) -> Result {
-        self.all.iter().try_for_each(|input| input.set(slave, &self.table, t))
+    /// What is no value of its variable, or what the FMU does not take.
+    pub fn set(&self, instance: &mut FmuInstance, t: f64) -> Result {
+        self.all.iter().try_for_each(|input| input.set(instance, &self.table, t))
     }
 
     /// The error of a step with what may be tried.
@@ -109,12 +109,12 @@ impl Inputs {
         }
     }
 
-    /// A part of a step begins, from t to `end`: what the unit follows is set where the part is not the first, and slopes
+    /// A part of a step begins, from t to `end`: what the FMU follows is set where the part is not the first, and slopes
     /// are told.
-    pub fn begin_part(&self, slave: &mut Slave, (t, end): (f64, f64), first: bool) -> Result {
+    pub fn begin_part(&self, instance: &mut FmuInstance, (t, end): (f64, f64), first: bool) -> Result {
         if !first {
             let mut followed = self.all.iter().filter(|i| i.followed);
-            followed.try_for_each(|input| input.set(slave, &self.table, t))?;
+            followed.try_for_each(|input| input.set(instance, &self.table, t))?;
         }
         if self.slopes.is_empty() {
             return Ok(());
@@ -124,11 +124,11 @@ impl Inputs {
             if slope.is_finite() { Ok(slope) } else { Err(self.table.none(*column, end)) }
         };
         let slopes = self.columns.iter().map(slope).collect::<Result<Vec<f64>>>()?;
-        slave.set_slopes(&self.slopes, &slopes)
+        instance.set_slopes(&self.slopes, &slopes)
     }
 }
 
-/// What to try where a unit fails that follows its inputs.
+/// What to try where an FMU fails that follows its inputs.
 const WAY_OUT: &str = "it follows its inputs within steps; --hold-inputs holds them over each step instead";
 
 /// The variable that a column feeds, and the element of it.
@@ -151,25 +151,25 @@ impl Input {
         self.columns.last().map_or(0, |(column, _)| *column)
     }
 
-    fn set(&self, slave: &mut Slave, table: &Table, t: f64) -> Result {
+    fn set(&self, instance: &mut FmuInstance, table: &Table, t: f64) -> Result {
         let (v, column, reference) = (&self.variable, self.last(), [self.variable.reference]);
         if v.value_type == ValueType::Clock {
-            slave.can_trigger(v)?;
-            slave.trigger(v.reference, matches!(table.cell(t, column), "1" | "true"));
+            instance.can_trigger(v)?;
+            instance.trigger(v.reference, matches!(table.cell(t, column), "1" | "true"));
             return Ok(());
         }
-        if slave.waits_for_clock(v.reference) {
+        if instance.waits_for_clock(v.reference) {
             let (v, cell) = (v.clone(), table.cell(t, column).to_owned());
-            slave.hold(v.reference, move |slave| set_text(slave, &v, &cell));
+            instance.hold(v.reference, move |instance| set_text(instance, &v, &cell));
             return Ok(());
         }
         match v.value_type {
-            ValueType::F64 => slave.set_f64(&reference, &self.numbers(table, t)?),
+            ValueType::F64 => instance.set_f64(&reference, &self.numbers(table, t)?),
             ValueType::F32 => {
                 let narrow: Vec<f32> = self.numbers(table, t)?.into_iter().map(|x| x as f32).collect();
-                slave.set(&reference, Values::F32(&narrow))
+                instance.set(&reference, Values::F32(&narrow))
             }
-            _ => set_text(slave, v, table.cell(t, column)),
+            _ => set_text(instance, v, table.cell(t, column)),
         }
     }
 
@@ -193,7 +193,7 @@ impl Input {
 }
 
 /// Sets a variable from text; arrays take their elements separated by spaces.
-pub fn set_text(slave: &Slave, v: &Variable, text: &str) -> Result {
+pub fn set_text(instance: &FmuInstance, v: &Variable, text: &str) -> Result {
     let wrong =
         || Error::Refused(format!("`{}` = {text}: it takes {} values of another kind", v.name, v.len()));
     let words: Vec<&str> = text.split_whitespace().collect();
@@ -201,7 +201,7 @@ pub fn set_text(slave: &Slave, v: &Variable, text: &str) -> Result {
         ($variant:ident, $t:ty) => {{
             let values: Option<Vec<$t>> = words.iter().map(|w| w.parse().ok()).collect();
             let values = values.filter(|x| x.len() == v.len()).ok_or_else(wrong)?;
-            slave.set(&[v.reference], Values::$variant(&values))
+            instance.set(&[v.reference], Values::$variant(&values))
         }};
     }
     match v.value_type {
@@ -222,9 +222,9 @@ pub fn set_text(slave: &Slave, v: &Variable, text: &str) -> Result {
                 "false" | "0" => false,
                 _ => return Err(wrong()),
             };
-            slave.set(&[v.reference], Values::Bool(&[value]))
+            instance.set(&[v.reference], Values::Bool(&[value]))
         }
-        ValueType::String => slave.set(&[v.reference], Values::String(&[text.to_owned()])),
+        ValueType::String => instance.set(&[v.reference], Values::String(&[text.to_owned()])),
         ValueType::Binary | ValueType::Clock => Err(wrong()),
     }
 }

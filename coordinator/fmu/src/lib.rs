@@ -1,13 +1,18 @@
 //! Functional mock-up units as subsystems of a scenario, on their own, and made from scenarios and modules.
 //!
-//! A table `[x] fmu = "path.fmu"` makes a [`FmuSubsystem`]; [`simulate`] runs one unit alone; [`export`] writes
+//! A table `[x] fmu = "path.fmu"` makes a [`FmuSubsystem`]; [`simulate`] runs one FMU alone; [`export`] writes
 //! one. System structures (SSP) become scenarios in `terraglue_scenario::ssp`.
+
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 mod adapter;
 mod bodies;
 mod clocks;
+mod driven_bodies;
 pub mod export;
-mod feet;
 mod inputs;
 mod map;
 mod rollback;
@@ -16,12 +21,12 @@ pub mod simulate;
 mod table;
 
 pub use adapter::FmuSubsystem;
-pub use feet::Feet;
+pub use driven_bodies::DrivenBodiesModule;
 pub use settings::OnNan;
 
 use terraglue_host::Library;
 
 /// What the program brings with it: driven `feet`, and what makes subsystems of FMUs.
 pub fn library() -> Library {
-    Library::new().with::<Feet>().with_fmus(FmuSubsystem::make)
+    Library::new().with::<DrivenBodiesModule>().with_fmus(FmuSubsystem::make)
 }

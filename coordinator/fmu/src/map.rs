@@ -3,9 +3,9 @@
 use terraglue_fmi::description::{self as fmi, ModelDescription, Variability};
 use terraglue_subsystem::{Effect, ValueType, Variable};
 
-/// Where the value of a variable of the scenario lies in the unit.
+/// Where the value of a variable of the scenario lies in the FMU.
 #[derive(Clone, Copy, Debug)]
-pub struct Place {
+pub struct ValueLocation {
     /// Position in the description.
     pub variable: u32,
     /// Element, row by row.
@@ -26,7 +26,7 @@ pub struct Place {
 
 /// All variables that a scenario can see, and where they lie; clocks that others make tick are among them in event mode,
 /// as truth values.
-pub fn variables(description: &ModelDescription, event_mode: bool) -> (Vec<Variable>, Vec<Place>) {
+pub fn variables(description: &ModelDescription, event_mode: bool) -> (Vec<Variable>, Vec<ValueLocation>) {
     let (mut all, mut places) = (Vec::new(), Vec::new());
     for (k, v) in description.variables.iter().enumerate() {
         let clock = v.value_type == ValueType::Clock;
@@ -55,7 +55,16 @@ pub fn variables(description: &ModelDescription, event_mode: bool) -> (Vec<Varia
             let (variable, element, count) = (k as u32, element as u32, v.len() as u32);
             let reference = v.reference;
             let clocked = event_mode && v.causality == fmi::Causality::Input && !v.clocks.is_empty();
-            places.push(Place { variable, element, count, reference, live, structural, clock, clocked });
+            places.push(ValueLocation {
+                variable,
+                element,
+                count,
+                reference,
+                live,
+                structural,
+                clock,
+                clocked,
+            });
         }
     }
     (all, places)

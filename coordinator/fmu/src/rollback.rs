@@ -1,33 +1,33 @@
-//! Proves that a unit comes back to the state that it saved, before a strategy relies on it.
+//! Proves that an FMU comes back to the state that it saved, before a strategy relies on it.
 
-use terraglue_fmi::{Advance, Error as FmiError, Slave, SlaveState};
+use terraglue_fmi::{Advance, Error as FmiError, FmuInstance, FmuState};
 use terraglue_subsystem::{Error, Result};
 
 /// What two equal steps from one state may differ by, relative.
 const SAME: f64 = 1e-12;
 
 /// Makes a step twice from the state `before`, each with the inputs that `push` sets, compares `outputs` (names and numbers
-/// in calls), and goes back. A step that the unit does not make proves nothing.
+/// in calls), and goes back. A step that the FMU does not make proves nothing.
 ///
 /// # Errors
 /// An output that differs, with its name and by how much.
 pub fn prove(
-    slave: &mut Slave,
-    before: &SlaveState,
+    instance: &mut FmuInstance,
+    before: &FmuState,
     outputs: &[(&str, u32)],
     step: Advance,
-    mut push: impl FnMut(&mut Slave) -> Result,
+    mut push: impl FnMut(&mut FmuInstance) -> Result,
     fail: fn(FmiError) -> Error,
 ) -> Result {
     let references: Vec<u32> = outputs.iter().map(|(_, reference)| *reference).collect();
     let mut ends = [vec![f64::NAN; references.len()], vec![f64::NAN; references.len()]];
     for end in &mut ends {
-        push(slave)?;
-        let made = slave.do_step(step).is_ok_and(|done| !done.terminate);
+        push(instance)?;
+        let made = instance.do_step(step).is_ok_and(|done| !done.terminate);
         if made && !references.is_empty() {
-            slave.get_f64(&references, end).map_err(fail)?;
+            instance.get_f64(&references, end).map_err(fail)?;
         }
-        slave.restore(before).map_err(fail)?;
+        instance.restore(before).map_err(fail)?;
         if !made {
             return Ok(());
         }
@@ -45,7 +45,7 @@ pub fn prove(
     }
     let (k, deviation) = worst;
     Err(Error::Failed(format!(
-        "the unit does not come back to the state that it saved: after the same step `{}` is {} and then {} (relative \
+        "the FMU does not come back to the state that it saved: after the same step `{}` is {} and then {} (relative \
          deviation {deviation:.1e}); it cannot be glued, as a strategy repeats steps",
         outputs[k].0, first[k], second[k]
     )))

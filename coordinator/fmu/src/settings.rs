@@ -1,4 +1,4 @@
-//! The table of a unit in a scenario: keys of the host, structural parameters and start values.
+//! The table of an FMU in a scenario: keys of the host, structural parameters and start values.
 
 use serde_json::{Map, Value};
 use terraglue_subsystem::{Error, Result};
@@ -12,13 +12,13 @@ pub enum OnNan {
     Warn,
 }
 
-/// Keys of the host in the table of a unit.
+/// Keys of the host in the table of an FMU.
 pub struct Options {
     /// What a value that is no number does.
     pub on_nan: OnNan,
     /// Whether events are handled in event mode.
     pub event_mode: bool,
-    /// Whether the unit's state may be saved before a step.
+    /// Whether the FMU's state may be saved before a step.
     pub rollback: bool,
     /// Glued bodies by name.
     pub bodies: Map<String, Value>,
@@ -70,7 +70,7 @@ pub fn structure(
         match number {
             Some(number) => Ok((name, number)),
             None => Err(Error::Refused(format!(
-                "`{name}` of the unit is a structural parameter and takes a whole number, not {value}"
+                "`{name}` of the FMU is a structural parameter and takes a whole number, not {value}"
             ))),
         }
     };

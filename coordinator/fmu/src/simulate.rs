@@ -1,21 +1,21 @@
-//! One unit alone: from its start to its end in equal steps, its outputs as rows of a table.
+//! One FMU alone: from its start to its end in equal steps, its outputs as rows of a table.
 
 use super::inputs::{self, Inputs, set_text};
 use super::map::element_name;
 use std::sync::Arc;
 use terraglue_fmi::description::{Causality, Variable};
-use terraglue_fmi::slave::Sink;
-use terraglue_fmi::{Advance, Error, Fmu, ModelDescription, Result, Slave, SlaveOptions, SlaveState};
+use terraglue_fmi::instance::Sink;
+use terraglue_fmi::{Advance, Error, Fmu, FmuInstance, FmuState, InstanceOptions, ModelDescription, Result};
 use terraglue_scenario::did_you_mean;
 use terraglue_subsystem::{ValueType, ValuesMut};
 
-pub use super::table::{Row, Table};
+pub use super::table::{InputRow, Table};
 
-/// How a unit is run.
+/// How an FMU is run.
 pub struct Settings {
     /// Start values by name, as text.
     pub start: Vec<(String, String)>,
-    /// s; none: what the unit wants.
+    /// s; none: what the FMU wants.
     pub start_time: Option<f64>,
     /// s.
     pub stop: Option<f64>,
@@ -29,7 +29,7 @@ pub struct Settings {
     pub event_mode: bool,
     /// Inputs over time.
     pub input: Arc<Table>,
-    /// Whether inputs are held over each step, also of units that follow them within.
+    /// Whether inputs are held over each step, also of FMUs that follow them within.
     pub hold_inputs: bool,
 }
 
@@ -40,7 +40,7 @@ pub type Line<'a> = &'a mut dyn FnMut(&str) -> Result;
 pub struct Tables<'a> {
     /// Outputs at communication points.
     pub rows: Line<'a>,
-    /// Outputs that the unit shows at intermediate times, of the steps that stand.
+    /// Outputs that the FMU shows at intermediate times, of the steps that stand.
     pub intermediate: Option<Line<'a>>,
 }
 
@@ -49,10 +49,10 @@ const NEARLY_WHOLE: f64 = 1e-5;
 /// Longest run, in steps.
 const STEPS: f64 = 1e9;
 
-/// Runs a unit and writes its tables. Answers when the unit itself asked for the end of the run before its time, s.
+/// Runs an FMU and writes its tables. Answers when the FMU itself asked for the end of the run before its time, s.
 ///
 /// # Errors
-/// What the unit or its input does wrong, with the time.
+/// What the FMU or its input does wrong, with the time.
 pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables) -> Result<Option<f64>> {
     let row = &mut *tables.rows;
     let experiment = fmu.description().experiment;
@@ -77,28 +77,27 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         Some(_) => shown_between(fmu.description(), &settings.outputs)?,
         None => Vec::new(),
     };
-    let (event_mode, name) = (settings.event_mode, "unit".into());
+    let (event_mode, plain) = (settings.event_mode, InstanceOptions::new("unit", sink));
     let followed = match settings.hold_inputs {
         true => Vec::new(),
         false => inputs::followed(fmu.description(), &settings.input),
     };
-    let options =
-        SlaveOptions { name, verbose: false, event_mode, intermediate: intermediate.clone(), followed, sink };
-    let mut slave = Slave::instantiate(fmu, options)?;
-    configure(&mut slave, &settings.start)?;
-    let description = slave.description().clone();
+    let options = InstanceOptions { event_mode, intermediate: intermediate.clone(), followed, ..plain };
+    let mut instance = FmuInstance::instantiate(fmu, options)?;
+    configure(&mut instance, &settings.start)?;
+    let description = instance.description().clone();
     let columns = columns(&description, &settings.outputs, event_mode)?;
     for (name, text) in &settings.start {
         let v = find(&description, name)?;
         if v.causality != Causality::StructuralParameter {
-            set_text(&slave, v, text)?;
+            set_text(&instance, v, text)?;
         }
     }
-    slave.enter_initialization(start, Some(stop), settings.tolerance.or(experiment.tolerance))?;
-    let inputs = Inputs::find(&slave, &settings.input, settings.hold_inputs)?;
-    inputs.set(&mut slave, start)?;
-    slave.exit_initialization()?;
-    inputs.follow(&mut slave)?;
+    instance.enter_initialization(start, Some(stop), settings.tolerance.or(experiment.tolerance))?;
+    let inputs = Inputs::find(&instance, &settings.input, settings.hold_inputs)?;
+    inputs.set(&mut instance, start)?;
+    instance.exit_initialization()?;
+    inputs.follow(&mut instance)?;
     // with event mode a last column says how many events were handled since the row before
     let marked = |text: String, events: u32| match settings.event_mode {
         true if text.starts_with("time") => text + ",events",
@@ -111,13 +110,13 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
     }
     if !whole && !variable {
         let end = start + steps * step;
-        slave.note(&format!(
-            "the run ends at t = {end} s, before {stop} s: the unit takes steps of one length only"
+        instance.note(&format!(
+            "the run ends at t = {end} s, before {stop} s: the FMU takes steps of one length only"
         ));
     }
     row(&marked(header(&columns), 0))?;
-    row(&marked(line(&slave, start, &columns)?, 0))?;
-    let mut before = Before { state: SlaveState::default(), saves: description.capabilities.state };
+    row(&marked(line(&instance, start, &columns)?, 0))?;
+    let mut before = Before { state: FmuState::default(), saves: description.capabilities.state };
     let mut ended = None;
     let outcome = (0..steps as u64).try_for_each(|k| {
         if ended.is_some() {
@@ -126,33 +125,33 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         let (t, end) = (start + k as f64 * step, start + (k + 1) as f64 * step);
         let end = if whole { end } else { end.min(stop) };
         let at = |e: Error| named(e, t);
-        inputs.set(&mut slave, t).map_err(at)?;
-        slave.forget_ticks();
+        inputs.set(&mut instance, t).map_err(at)?;
+        instance.forget_ticks();
         let events;
-        let step = halving(&mut slave, &inputs, &mut before, (t, end), &mut tables.intermediate);
+        let step = halving(&mut instance, &inputs, &mut before, (t, end), &mut tables.intermediate);
         (ended, events) = step.map_err(|e| at(inputs.way_out(e)))?;
         let now = ended.unwrap_or(end);
-        row(&marked(line(&slave, now, &columns).map_err(|e| named(e, now))?, events))
+        row(&marked(line(&instance, now, &columns).map_err(|e| named(e, now))?, events))
     });
-    drop(slave.release(&mut before.state));
+    drop(instance.release(&mut before.state));
     outcome?;
-    slave.terminate()?;
+    instance.terminate()?;
     Ok(ended)
 }
 
 /// The state before a step.
 struct Before {
-    state: SlaveState,
-    /// Whether the unit can save it.
+    state: FmuState,
+    /// Whether the FMU can save it.
     saves: bool,
 }
 
 impl Before {
-    /// Saves it, where that is possible: it is needed for steps that the unit discards only.
-    fn save(&mut self, slave: &Slave) -> Result {
-        match slave.save(&mut self.state) {
+    /// Saves it, where that is possible: it is needed for steps that the FMU discards only.
+    fn save(&mut self, instance: &FmuInstance) -> Result {
+        match instance.save(&mut self.state) {
             Err(Error::Refused(why)) => {
-                slave.note(&format!("{why}; a step that it discards cannot be halved"));
+                instance.note(&format!("{why}; a step that it discards cannot be halved"));
                 self.saves = false;
                 Ok(())
             }
@@ -161,32 +160,32 @@ impl Before {
     }
 }
 
-/// A step, in halves where the unit discards it and can go back. Answers when the unit asked for the end, and how many
+/// A step, in halves where the FMU discards it and can go back. Answers when the FMU asked for the end, and how many
 /// events there were.
 fn halving(
-    slave: &mut Slave,
+    instance: &mut FmuInstance,
     inputs: &Inputs,
     before: &mut Before,
     (start, end): (f64, f64),
     between: &mut Option<Line>,
 ) -> Result<(Option<f64>, u32)> {
-    let variable_step = slave.description().capabilities.variable_step;
+    let variable_step = instance.description().capabilities.variable_step;
     let (mut t, mut h, mut halvings, mut events) = (start, end - start, 0, 0);
     while end - t > 1e-9 * (end - start) {
         if before.saves {
-            before.save(slave)?;
+            before.save(instance)?;
         }
         let part = (t, if h >= end - t { end } else { t + h });
-        inputs.begin_part(slave, part, t == start && halvings == 0)?;
-        let made = slave.do_step(Advance { t, h: h.min(end - t), for_good: true });
+        inputs.begin_part(instance, part, t == start && halvings == 0)?;
+        let made = instance.do_step(Advance { t, h: h.min(end - t), for_good: true });
         if let (Ok(_), Some(write)) = (&made, &mut *between) {
-            for row in slave.take_intermediate() {
+            for row in instance.take_intermediate() {
                 let values: String = row.values.iter().map(|x| format!(",{x}")).collect();
                 write(&format!("{}{values},{}", row.t, u8::from(row.finished)))?;
             }
         }
         if made.is_ok() {
-            slave.forget_triggers();
+            instance.forget_triggers();
         }
         match made {
             Ok(done) if done.terminate => return Ok((Some(done.reached), events + done.events)),
@@ -195,7 +194,7 @@ fn halving(
                 t = if h >= end - t { end } else { t + h };
             }
             Err(Error::Discard { .. }) if before.saves && variable_step && halvings < 10 => {
-                slave.restore(&before.state)?;
+                instance.restore(&before.state)?;
                 (h, halvings) = (0.5 * h, halvings + 1);
             }
             Err(error) => return Err(error),
@@ -209,17 +208,17 @@ fn named(error: Error, t: f64) -> Error {
 }
 
 /// Sets the structural parameters among the start values.
-fn configure(slave: &mut Slave, start: &[(String, String)]) -> Result {
+fn configure(instance: &mut FmuInstance, start: &[(String, String)]) -> Result {
     let mut values: Vec<(&str, i128)> = Vec::new();
     for (name, text) in start {
-        if find(slave.description(), name)?.causality != Causality::StructuralParameter {
+        if find(instance.description(), name)?.causality != Causality::StructuralParameter {
             continue;
         }
         let wrong =
             || Error::Refused(format!("`{name}` = {text}: a structural parameter takes a whole number"));
         values.push((name, text.trim().parse().map_err(|_| wrong())?));
     }
-    slave.configure(&values)
+    instance.configure(&values)
 }
 
 /// A variable by its name.
@@ -278,10 +277,10 @@ fn quoted(text: &str) -> String {
 }
 
 /// One line of the table; numbers are written so that reading them gives the same bits.
-fn line(slave: &Slave, t: f64, columns: &[&Variable]) -> Result<String> {
+fn line(instance: &FmuInstance, t: f64, columns: &[&Variable]) -> Result<String> {
     let mut text = t.to_string();
     for v in columns {
-        for value in read(slave, v)? {
+        for value in read(instance, v)? {
             text.push(',');
             text.push_str(&quoted(&value));
         }
@@ -289,18 +288,18 @@ fn line(slave: &Slave, t: f64, columns: &[&Variable]) -> Result<String> {
     Ok(text)
 }
 
-fn read(slave: &Slave, v: &Variable) -> Result<Vec<String>> {
+fn read(instance: &FmuInstance, v: &Variable) -> Result<Vec<String>> {
     macro_rules! values {
         ($variant:ident, $zero:expr, $show:expr) => {{
             let mut out = vec![$zero; v.len()];
-            slave.get(&[v.reference], ValuesMut::$variant(&mut out))?;
+            instance.get(&[v.reference], ValuesMut::$variant(&mut out))?;
             Ok(out.iter().map($show).collect())
         }};
     }
     macro_rules! numbers {
         ($variant:ident, $zero:expr) => {{
             let mut out = vec![$zero; v.len()];
-            slave.get(&[v.reference], ValuesMut::$variant(&mut out))?;
+            instance.get(&[v.reference], ValuesMut::$variant(&mut out))?;
             if let Some(wrong) = out.iter().find(|x| !x.is_finite()) {
                 return Err(Error::Refused(format!("the variable `{}` is {wrong}", v.name)));
             }
@@ -324,7 +323,7 @@ fn read(slave: &Slave, v: &Variable) -> Result<Vec<String>> {
         ValueType::Binary => values!(Binary, Vec::new(), |x: &Vec<u8>| {
             x.iter().map(|b| format!("{b:02x}")).collect::<String>()
         }),
-        ValueType::Clock => Ok(vec![u8::from(slave.ticks(v.reference)).to_string()]),
+        ValueType::Clock => Ok(vec![u8::from(instance.ticks(v.reference)).to_string()]),
     }
 }
 

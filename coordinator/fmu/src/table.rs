@@ -8,12 +8,12 @@ pub struct Table {
     /// Names after `time`.
     pub names: Vec<String>,
     /// Rows, ascending in time.
-    pub rows: Vec<Row>,
+    pub rows: Vec<InputRow>,
 }
 
 /// Inputs at a time.
 #[derive(Clone, Debug, Default, PartialEq)]
-pub struct Row {
+pub struct InputRow {
     /// s.
     pub time: f64,
     /// A cell for each name.
@@ -24,7 +24,7 @@ pub struct Row {
 
 impl Table {
     /// The last row at or before t, or the first of all, and the row after it.
-    fn around(&self, t: f64) -> Option<(&Row, Option<&Row>)> {
+    fn around(&self, t: f64) -> Option<(&InputRow, Option<&InputRow>)> {
         let next = self.rows.partition_point(|r| r.time <= t);
         match next.checked_sub(1) {
             Some(k) => Some((&self.rows[k], self.rows.get(next))),
@@ -69,7 +69,7 @@ impl Table {
 
     /// Numbers of an array at t, written with spaces between them; nothing where a cell has not so many.
     fn numbers(&self, t: f64, column: usize, count: usize) -> Option<Vec<f64>> {
-        let read = |row: &Row| {
+        let read = |row: &InputRow| {
             let words = row.cells[column].split_whitespace();
             let all: Option<Vec<f64>> =
                 words.map(|w| w.parse().ok().filter(|x: &f64| x.is_finite())).collect();
@@ -97,7 +97,7 @@ mod tests {
     use super::*;
 
     fn table(rows: &[(f64, &str)]) -> Table {
-        let row = |(time, cell): &(f64, &str)| Row {
+        let row = |(time, cell): &(f64, &str)| InputRow {
             time: *time,
             cells: vec![(*cell).to_owned()],
             numbers: vec![cell.parse().unwrap_or(f64::NAN)],

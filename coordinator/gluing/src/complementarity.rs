@@ -59,12 +59,13 @@ impl BoundedSolver {
         let n = p.e.len();
         self.states.clear();
         self.states.resize(n, State::Free);
-        (0..20).any(|_| self.settle(p, d, true)) || (0..200 + 20 * n).any(|_| self.settle(p, d, false))
+        (0..20).any(|_| self.update_states(p, d, true))
+            || (0..200 + 20 * n).any(|_| self.update_states(p, d, false))
     }
 
     /// One linear solve for the present states and their update; whether nothing changed. All components
     /// change at once (`together`) or only the first.
-    fn settle<A: Fn(usize, usize) -> f64>(
+    fn update_states<A: Fn(usize, usize) -> f64>(
         &mut self,
         p: &BoundedProblem<A>,
         d: &mut [f64],
@@ -72,18 +73,18 @@ impl BoundedSolver {
     ) -> bool {
         self.solve_states(p, d);
         let n = p.e.len();
-        let mut settled = true;
+        let mut unchanged = true;
         for i in 0..n {
             let new = self.next_state(p, d, i);
             if new != self.states[i] {
                 self.states[i] = new;
-                settled = false;
+                unchanged = false;
                 if !together {
                     break;
                 }
             }
         }
-        settled
+        unchanged
     }
 
     fn next_state<A: Fn(usize, usize) -> f64>(&self, p: &BoundedProblem<A>, d: &[f64], i: usize) -> State {

@@ -9,8 +9,8 @@
 //! motion as its own at commit, and action equals reaction as far as the bodies are linear within the step. They are not where
 //! a motor is at its limit under T* and not under T1: then the estimate is taken again about T1.
 
-use super::exchange::Exchange;
 use super::follow::{PASSES, can_repeat, followed};
+use super::interface_problem::InterfaceProblem;
 use super::{Needs, Outcome, Strategy};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
@@ -36,26 +36,26 @@ impl Strategy for Cooperative {
         Needs { first: Capabilities::FORCE, second: Capabilities::FORCE, grounds: Capabilities::default() }
     }
 
-    fn refuses(&self, exchange: &Exchange) -> Option<String> {
-        super::joints_refused(NAME, exchange).or_else(|| super::body_contacts_refused(NAME, exchange))
+    fn refuses(&self, problem: &InterfaceProblem) -> Option<String> {
+        super::joints_refused(NAME, problem).or_else(|| super::body_contacts_refused(NAME, problem))
     }
 
-    fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
-        exchange.estimate_forces(instances)?;
+    fn solve(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<Outcome> {
+        problem.estimate_forces(instances)?;
         for pass in 1..=PASSES {
-            exchange.solve_compatibility(false, instances)?;
-            exchange.advance_bodies(instances)?;
+            problem.solve_compatibility(false, instances)?;
+            problem.advance_bodies(instances)?;
             if pass == PASSES
-                || exchange.report.evaluations_soil == 0
-                || followed(exchange, &exchange.x2)
-                || !can_repeat(exchange, instances)
+                || problem.report.evaluations_soil == 0
+                || followed(problem, &problem.x2)
+                || !can_repeat(problem, instances)
             {
                 break;
             }
-            exchange.estimate_again(instances)?;
+            problem.estimate_again(instances)?;
         }
-        exchange.x2.copy_from_slice(&exchange.x1);
-        exchange.report.converged = true;
+        problem.x2.copy_from_slice(&problem.x1);
+        problem.report.converged = true;
         Ok(Outcome::Converged)
     }
 }

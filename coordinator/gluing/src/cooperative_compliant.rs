@@ -5,8 +5,8 @@
 //! Where they are not, as a motor is at its limit under T* and not under T1, the estimate is taken again about T1.
 //! For one contact on a linear branch T = (f_n + κ·T*)/(1 + κ), κ = K·G1. The iteration is that of [`super::iterative`].
 
-use super::exchange::Exchange;
 use super::follow::{PASSES, can_repeat, followed};
+use super::interface_problem::InterfaceProblem;
 use super::iterative::{Form, Limits, TtForm, XtForm};
 use super::memory::{Recall, Remember};
 use super::{Needs, Outcome, Strategy};
@@ -54,8 +54,8 @@ impl Strategy for CooperativeCompliant {
         Needs { first: Capabilities::FORCE, second: Capabilities::FORCE, grounds: soil }
     }
 
-    fn refuses(&self, exchange: &Exchange) -> Option<String> {
-        super::joints_refused(NAME, exchange).or_else(|| super::body_contacts_refused(NAME, exchange))
+    fn refuses(&self, problem: &InterfaceProblem) -> Option<String> {
+        super::joints_refused(NAME, problem).or_else(|| super::body_contacts_refused(NAME, problem))
     }
 
     fn remember(&self, out: &mut Vec<u64>) {
@@ -66,34 +66,34 @@ impl Strategy for CooperativeCompliant {
         self.kappa = kept.number();
     }
 
-    fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
-        exchange.estimate_forces(instances)?;
-        exchange.solve_compatibility(true, instances)?;
-        exchange.report.evaluations_soil = 0; // the start is not an evaluation of the iteration
-        let form = Form::choose(self.form, self.kappa, exchange, instances);
+    fn solve(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<Outcome> {
+        problem.estimate_forces(instances)?;
+        problem.solve_compatibility(true, instances)?;
+        problem.report.evaluations_soil = 0; // the start is not an evaluation of the iteration
+        let form = Form::choose(self.form, self.kappa, problem, instances);
         let mut left = 0.0;
         for pass in 1..=PASSES {
-            exchange.predict_from_estimate();
-            exchange.report.xt_form = form == Form::Xt;
+            problem.predict_from_estimate();
+            problem.report.xt_form = form == Form::Xt;
             left = match form {
-                Form::Tt => self.tt.solve_predicted(&self.limits, exchange, instances)?,
-                Form::Xt => self.xt.solve_predicted(&self.limits, exchange, instances)?,
+                Form::Tt => self.tt.solve_predicted(&self.limits, problem, instances)?,
+                Form::Xt => self.xt.solve_predicted(&self.limits, problem, instances)?,
             };
-            self.kappa = exchange.report.kappa_max;
+            self.kappa = problem.report.kappa_max;
             // a residual that is no number does not pass
-            if !(left <= self.limits.threshold(exchange)) {
-                return Ok(self.limits.give_up(exchange, "the soil against the estimate: |Λ·e|", left));
+            if !(left <= self.limits.threshold(problem)) {
+                return Ok(self.limits.give_up(problem, "the soil against the estimate: |Λ·e|", left));
             }
-            self.said.clone_from(&exchange.x1);
-            exchange.advance_bodies(instances)?;
-            if pass == PASSES || followed(exchange, &self.said) || !can_repeat(exchange, instances) {
+            self.said.clone_from(&problem.x1);
+            problem.advance_bodies(instances)?;
+            if pass == PASSES || followed(problem, &self.said) || !can_repeat(problem, instances) {
                 break;
             }
-            exchange.estimate_again(instances)?;
+            problem.estimate_again(instances)?;
         }
         Ok(match form {
-            Form::Tt => self.tt.conclude(left, exchange),
-            Form::Xt => self.xt.conclude(left, exchange),
+            Form::Tt => self.tt.conclude(left, problem),
+            Form::Xt => self.xt.conclude(left, problem),
         })
     }
 }

@@ -1,7 +1,7 @@
 //! Interface Jacobians of the members: from the modules' own derivatives, or by finite differences over their trials.
 
-use super::exchange::Exchange;
-use super::side::Side;
+use super::interface_problem::InterfaceProblem;
+use super::participant::Participant;
 use crate::timing::Part;
 use std::time::Instant as Clock;
 use terraglue_diagnostics::Result;
@@ -13,18 +13,18 @@ use terraglue_subsystem::{Capabilities, Level, Port};
 pub enum Derivatives {
     /// The modules' own, by forward differences where one has none.
     Analytic,
-    /// Directional derivatives of units that have them; else central differences along every component.
+    /// Directional derivatives of FMUs that have them; else central differences along every component.
     Central,
     /// Forward differences, all columns in one exchange.
     Forward,
 }
 
-impl Exchange {
+impl InterfaceProblem {
     /// d(x1 − x2)/dT of all bodies at their last trial into `estimate.g`.
     pub fn linearise_bodies(&mut self, source: Derivatives, instances: &mut [Instance]) -> Result {
         let start = Clock::now();
         let level = if self.at.h == 0.0 { Level::Acceleration } else { Level::Position };
-        self.take_slopes(source, |_| true, instances)?;
+        self.take_differences(source, |_| true, instances)?;
         self.estimate.g.fill(0.0);
         for side in &mut self.bodies {
             let (instance, g) = (&mut instances[side.slot], &mut self.estimate.g);
@@ -49,17 +49,17 @@ impl Exchange {
     /// Differences for the members that do not know their derivatives, or for all where `source` says so. Members hang
     /// together in the wrenches only, so each makes its own trials, all columns in one exchange, and all of them do it side
     /// by side: that counts as many evaluations as the member with the most components needs. Their last trial is then
-    /// another one: see [`Exchange::settle_bodies`].
-    pub(super) fn take_slopes(
+    /// another one: see [`InterfaceProblem::repeat_bodies_trial`].
+    pub(super) fn take_differences(
         &mut self,
         source: Derivatives,
-        who: impl Fn(&Side) -> bool,
+        who: impl Fn(&Participant) -> bool,
         instances: &mut [Instance],
     ) -> Result {
         let mut most = 0;
         for side in self.bodies.iter_mut().filter(|s| who(s)) {
             let instance = &mut instances[side.slot];
-            side.forget_slopes();
+            side.forget_differences();
             let knows = instance.capabilities().has(Capabilities::DERIVATIVES);
             let told = match source {
                 Derivatives::Analytic => knows,
@@ -70,7 +70,7 @@ impl Exchange {
                 continue;
             }
             let how = (source == Derivatives::Central, 1.0);
-            most = most.max(side.take_slopes(instance, &self.nodes, &self.at, &self.t, how)?);
+            most = most.max(side.take_differences(instance, &self.nodes, &self.at, &self.t, how)?);
             self.displaced |= side.n() > 0;
         }
         self.at.trial += most;
@@ -147,7 +147,7 @@ impl Exchange {
     }
 
     /// K = −dF/dX1 of the grounds, or of all of side 2, by forward differences of 1 nm towards it: one trial for a component
-    /// of all ports that lie apart (see [`Side::colours`]).
+    /// of all ports that lie apart (see [`Participant::colours`]).
     pub(super) fn difference_motion(
         &mut self,
         second: bool,

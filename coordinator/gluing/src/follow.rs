@@ -1,7 +1,7 @@
 //! Whether bodies move as their estimate says, x1 = x_free + G1·T. They do not where a motor is at its limit under T* and
 //! not under T1: the strategies of one evaluation then take the estimate again about T1.
 
-use super::exchange::Exchange;
+use super::interface_problem::InterfaceProblem;
 use terraglue_host::Instance;
 use terraglue_subsystem::Capabilities;
 
@@ -11,14 +11,14 @@ pub(super) const PASSES: usize = 4;
 const MISS: [f64; 2] = [1e-3, 1e-8];
 
 /// Whether the bodies have moved as `said` (packed; m, rad).
-pub(super) fn followed(exchange: &Exchange, said: &[f64]) -> bool {
-    let most = exchange.x1.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-    let miss = exchange.x1.iter().zip(said).fold(0.0, |m: f64, (x, said)| m.max((x - said).abs()));
+pub(super) fn followed(problem: &InterfaceProblem, said: &[f64]) -> bool {
+    let most = problem.x1.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let miss = problem.x1.iter().zip(said).fold(0.0, |m: f64, (x, said)| m.max((x - said).abs()));
     miss <= MISS[0] * most + MISS[1]
 }
 
 /// Whether all bodies can take the estimate again.
-pub(super) fn can_repeat(exchange: &Exchange, instances: &[Instance]) -> bool {
+pub(super) fn can_repeat(problem: &InterfaceProblem, instances: &[Instance]) -> bool {
     let needed = Capabilities::RETRY | Capabilities::DERIVATIVES;
-    exchange.bodies.iter().all(|side| instances[side.slot].capabilities().has(needed))
+    problem.bodies.iter().all(|side| instances[side.slot].capabilities().has(needed))
 }

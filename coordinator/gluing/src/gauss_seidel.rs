@@ -4,7 +4,7 @@
 //! under the soil's force of t, then the soil follows their motion; stable while κ + 2·c·h/m < 4. Never asks for
 //! a derivative and never repeats a step.
 
-use super::exchange::Exchange;
+use super::interface_problem::InterfaceProblem;
 use super::{Needs, Outcome, Strategy};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
@@ -30,21 +30,21 @@ impl Strategy for GaussSeidel {
         Needs { first: Capabilities::FORCE, second: Capabilities::FORCE, grounds: Capabilities::default() }
     }
 
-    fn refuses(&self, exchange: &Exchange) -> Option<String> {
-        super::rigid_refused(NAME, exchange)
+    fn refuses(&self, problem: &InterfaceProblem) -> Option<String> {
+        super::rigid_refused(NAME, problem)
     }
 
-    fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
-        exchange.explicit_forces();
-        if exchange.has_joints() {
-            exchange.advance_half(true, instances)?;
-            exchange.t_second.clone_from(&exchange.t);
-            exchange.spring_forces();
-            exchange.advance_half(false, instances)?;
+    fn solve(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<Outcome> {
+        problem.explicit_forces();
+        if problem.has_joints() {
+            problem.advance_half(true, instances)?;
+            problem.t_second.clone_from(&problem.t);
+            problem.spring_forces();
+            problem.advance_half(false, instances)?;
         } else {
-            exchange.advance_bodies(instances)?;
+            problem.advance_bodies(instances)?;
         }
-        exchange.follow_bodies();
-        Ok(super::single_pass(exchange))
+        problem.follow_bodies();
+        Ok(super::single_pass(problem))
     }
 }

@@ -3,14 +3,14 @@
 //! Each side keeps its own material point. At t the points of a joint may lie apart by what earlier steps left;
 //! the condition at t + h closes that gap too, so nothing drifts.
 
-use super::side::End;
+use super::participant::End;
 use crate::contact::PortOwner;
 use terraglue_numerics::rotation::{IDENTITY, conjugate, minus, plus, product, turned};
 use terraglue_subsystem::{BodyState, Law, Port, PortKind};
 
 /// What one packed component is.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Row {
+pub enum ConstraintKind {
     /// Normal force of a contact: complementary to the gap within the bounds of the law.
     Normal,
     /// Shear or moment that a soil's law answers.
@@ -19,6 +19,13 @@ pub enum Row {
     Joint,
     /// Tangential force bounded by Coulomb's law on the normal force of its port.
     Coulomb,
+}
+
+impl ConstraintKind {
+    /// Of component c of a contact.
+    pub(crate) fn of_contact(c: usize) -> Self {
+        if c == 0 { Self::Normal } else { Self::Law }
+    }
 }
 
 /// One end in its subsystem; `slot` none: the world.
@@ -239,12 +246,12 @@ impl Joint {
     }
 
     /// What a component is.
-    pub fn row(&self, component: usize) -> Row {
+    pub fn row(&self, component: usize) -> ConstraintKind {
         match (self.is_contact(), component, self.soil) {
-            (false, ..) => Row::Joint,
-            (true, 0, _) => Row::Normal,
-            (true, _, true) => Row::Law,
-            (true, _, false) => Row::Coulomb,
+            (false, ..) => ConstraintKind::Joint,
+            (true, 0, _) => ConstraintKind::Normal,
+            (true, _, true) => ConstraintKind::Law,
+            (true, _, false) => ConstraintKind::Coulomb,
         }
     }
 

@@ -3,17 +3,17 @@
 //! Side 2 of a group are its soils and the bodies that are side 2 of all their glue; all other bodies are side 1.
 
 use super::derivatives::Derivatives;
-use super::exchange::Exchange;
-use super::glue::Row;
+use super::glue::ConstraintKind;
+use super::interface_problem::InterfaceProblem;
 use super::linear::max_norm;
-use super::side::Answer;
+use super::participant::Answer;
 use crate::timing::Part;
 use std::time::Instant as Clock;
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
 use terraglue_subsystem::Level;
 
-impl Exchange {
+impl InterfaceProblem {
     /// What is known at t without any trial: T = −(x1 − x2)/compliance of springs, the soil's own force at contacts.
     pub fn explicit_forces(&mut self) {
         let mut t = std::mem::take(&mut self.t);
@@ -27,8 +27,10 @@ impl Exchange {
         let n = self.rows.len();
         out.clear();
         out.extend((0..n).map(|i| match self.rows[i] {
-            Row::Joint if self.compliance[i] == 0.0 => 0.0,
-            Row::Joint => -self.gap[i] / self.compliance[i] - self.damping[i] * (self.v1[i] - self.v2[i]),
+            ConstraintKind::Joint if self.compliance[i] == 0.0 => 0.0,
+            ConstraintKind::Joint => {
+                -self.gap[i] / self.compliance[i] - self.damping[i] * (self.v1[i] - self.v2[i])
+            }
             _ => self.f_law[i],
         }));
     }
@@ -45,7 +47,7 @@ impl Exchange {
 
     /// The springs' force where side 2 has moved and side 1 has not.
     pub fn spring_forces(&mut self) {
-        for i in (0..self.n()).filter(|i| self.rows[*i] == Row::Joint) {
+        for i in (0..self.n()).filter(|i| self.rows[*i] == ConstraintKind::Joint) {
             let damper = self.damping[i] * (self.v1[i] - self.v2[i]);
             self.t[i] = (self.x2[i] - self.gap[i]) / self.compliance[i] - damper;
         }
@@ -53,7 +55,7 @@ impl Exchange {
 
     /// Soils follow the bodies' motion: their surface is where the body is.
     pub fn follow_bodies(&mut self) {
-        for i in (0..self.n()).filter(|i| self.rows[*i] != Row::Joint) {
+        for i in (0..self.n()).filter(|i| self.rows[*i] != ConstraintKind::Joint) {
             self.x2[i] = self.x1[i];
         }
     }
@@ -140,7 +142,7 @@ impl Exchange {
 
     /// G1 = dX1/dT of side 1 at its last trial into `estimate.g`, by forward differences where a module has none.
     pub fn linearise_first(&mut self, instances: &mut [Instance]) -> Result {
-        self.take_slopes(Derivatives::Analytic, |side| !side.is_second(), instances)?;
+        self.take_differences(Derivatives::Analytic, |side| !side.is_second(), instances)?;
         self.estimate.g.fill(0.0);
         for side in self.bodies.iter_mut().filter(|s| !s.is_second()) {
             let (instance, g) = (&mut instances[side.slot], &mut self.estimate.g);

@@ -3,9 +3,9 @@
 //! Springs: both sides step under T = k_c·(x2 − x1) of t. Contacts: the bodies step under the force that the soil
 //! gave at the motion known one step earlier, F(x1 of t − h), because the soil steps at the same time.
 
-use super::exchange::Exchange;
+use super::interface_problem::InterfaceProblem;
 use super::memory::{Recall, Remember};
-use super::{Needs, Outcome, Row, Strategy};
+use super::{ConstraintKind, Needs, Outcome, Strategy};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
 use terraglue_subsystem::Capabilities;
@@ -33,8 +33,8 @@ impl Strategy for Jacobi {
         Needs { first: Capabilities::FORCE, second: Capabilities::FORCE, grounds: Capabilities::default() }
     }
 
-    fn refuses(&self, exchange: &Exchange) -> Option<String> {
-        super::rigid_refused(NAME, exchange)
+    fn refuses(&self, problem: &InterfaceProblem) -> Option<String> {
+        super::rigid_refused(NAME, problem)
     }
 
     fn remember(&self, out: &mut Vec<u64>) {
@@ -45,23 +45,23 @@ impl Strategy for Jacobi {
         kept.wrenches(&mut self.delayed);
     }
 
-    fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
-        exchange.explicit_forces();
+    fn solve(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<Outcome> {
+        problem.explicit_forces();
         self.next.clear();
-        for k in 0..exchange.ports.len() {
-            let port = exchange.ports[k];
-            if exchange.rows[port.first as usize] == Row::Joint {
+        for k in 0..problem.ports.len() {
+            let port = problem.ports[k];
+            if problem.rows[port.first as usize] == ConstraintKind::Joint {
                 continue;
             }
             let mut now = [0.0; 6];
-            now[..port.len()].copy_from_slice(&exchange.t[port.range()]);
+            now[..port.len()].copy_from_slice(&problem.t[port.range()]);
             self.next.push((port.key, now));
             let before = self.delayed.iter().find(|(key, _)| *key == port.key).map_or([0.0; 6], |d| d.1);
-            exchange.t[port.range()].copy_from_slice(&before[..port.len()]);
+            problem.t[port.range()].copy_from_slice(&before[..port.len()]);
         }
         std::mem::swap(&mut self.delayed, &mut self.next);
-        exchange.advance_bodies(instances)?;
-        exchange.follow_bodies();
-        Ok(super::single_pass(exchange))
+        problem.advance_bodies(instances)?;
+        problem.follow_bodies();
+        Ok(super::single_pass(problem))
     }
 }

@@ -8,7 +8,12 @@
 //! - [`jacobi`], [`gauss_seidel`]: explicit, the baseline.
 //! - [`monolithic`]: the reference.
 //!
-//! All work on an [`Exchange`], where the paper's calls stand by name, and fill one [`StepReport`].
+//! All work on an [`InterfaceProblem`], where the paper's calls stand by name, and fill one [`StepReport`].
+
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 mod complementarity;
 pub mod contact;
@@ -17,23 +22,23 @@ pub mod cooperative_compliant;
 mod derivatives;
 mod eigen;
 mod estimate;
-mod exchange;
 mod follow;
 pub mod gauss_seidel;
 pub mod glue;
 mod group_estimate;
 mod halves;
+mod interface_problem;
 pub mod iterative;
 pub mod jacobi;
 mod linear;
 pub mod memory;
 pub mod monolithic;
+mod participant;
 mod refresh;
 mod refusal;
 pub mod relaxed;
 mod report;
 pub mod semi_implicit;
-mod side;
 mod start;
 pub mod step_control;
 #[cfg(test)]
@@ -42,13 +47,13 @@ pub mod timing;
 pub mod xt_newton;
 
 pub use derivatives::Derivatives;
-pub use exchange::Exchange;
-pub use glue::{Glue, Row};
+pub use glue::{ConstraintKind, Glue};
 pub use group_estimate::GroupEstimate;
+pub use interface_problem::InterfaceProblem;
+pub use participant::StepContext;
 pub use refusal::{Refusal, refusal};
 use refusal::{body_contacts_refused, joints_refused, rigid_refused, second_refused};
 pub use report::{PortReport, StepReport};
-pub use side::Instant;
 
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
@@ -58,7 +63,7 @@ use terraglue_subsystem::Capabilities;
 /// How a strategy ended a step. Nothing is committed before it says `Converged`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
-    /// `Exchange::t`, `x1` and `x2` hold what is to be committed.
+    /// `InterfaceProblem::t`, `x1` and `x2` hold what is to be committed.
     Converged,
     /// The step may be repeated with half the length.
     NotConverged(String),
@@ -84,7 +89,7 @@ pub trait Strategy: Send {
     fn needs(&self) -> Needs;
 
     /// Why it cannot glue this group, whatever its members can do.
-    fn refuses(&self, _exchange: &Exchange) -> Option<String> {
+    fn refuses(&self, _problem: &InterfaceProblem) -> Option<String> {
         None
     }
 
@@ -100,7 +105,7 @@ pub trait Strategy: Send {
     fn recall(&mut self, _kept: &mut memory::Recall) {}
 
     /// Finds the wrenches of the step.
-    fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome>;
+    fn solve(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<Outcome>;
 }
 
 /// The strategy of a scenario.
@@ -126,10 +131,10 @@ pub fn start(spec: &GluingSpec) -> Box<dyn Strategy> {
 }
 
 /// The end of a pass that does not ask whether it converged.
-fn single_pass(exchange: &mut Exchange) -> Outcome {
-    exchange.report.converged = true;
-    for i in (0..exchange.n()).filter(|i| exchange.rows[*i] == Row::Joint) {
-        exchange.report.max_gap_m = exchange.report.max_gap_m.max(exchange.joint_gap(i));
+fn single_pass(problem: &mut InterfaceProblem) -> Outcome {
+    problem.report.converged = true;
+    for i in (0..problem.n()).filter(|i| problem.rows[*i] == ConstraintKind::Joint) {
+        problem.report.max_gap_m = problem.report.max_gap_m.max(problem.joint_gap(i));
     }
     Outcome::Converged
 }

@@ -8,9 +8,9 @@
 //! scale; tangents the projection on Coulomb's disc; a soil's other rows T − F. Semi-smooth Newton, halved until
 //! the residual falls (Qi and Sun 1993).
 
-use super::exchange::Exchange;
+use super::interface_problem::InterfaceProblem;
 use super::linear::{Lu, max_norm};
-use super::{Needs, Outcome, Row, Strategy};
+use super::{ConstraintKind, Needs, Outcome, Strategy};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
 use terraglue_scenario::GluingSpec;
@@ -57,106 +57,103 @@ impl Monolithic {
         }
     }
 
-    /// Trials of all sides under `exchange.t`.
-    fn evaluate(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<f64> {
-        exchange.advance_bodies(instances)?;
+    /// Trials of all sides under `problem.t`.
+    fn evaluate(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<f64> {
+        problem.advance_bodies(instances)?;
         let motion = self.motion;
         if motion {
-            exchange.advance_grounds_under_motion(instances)?;
-        } else if exchange.has_grounds() {
-            exchange.advance_grounds_under_force(instances)?;
+            problem.advance_grounds_under_motion(instances)?;
+        } else if problem.has_grounds() {
+            problem.advance_grounds_under_force(instances)?;
         }
         self.residual.clear();
-        self.residual.resize(exchange.n(), 0.0);
-        for port in &exchange.ports {
-            rows(port, exchange, motion, &self.scale, &mut self.residual);
+        self.residual.resize(problem.n(), 0.0);
+        for port in &problem.ports {
+            rows(port, problem, motion, &self.scale, &mut self.residual);
         }
         Ok(max_norm(&self.residual))
     }
 
     /// How far each component moves under its own force: makes all rows forces.
-    fn measure_scale(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result {
-        let n = exchange.n();
+    fn measure_scale(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result {
+        let n = problem.n();
         self.scale.clear();
         self.scale.resize(n, 1.0);
-        self.base.clone_from(&exchange.t);
-        exchange.advance_bodies(instances)?;
+        self.base.clone_from(&problem.t);
+        problem.advance_bodies(instances)?;
         for i in 0..n {
-            let before = gap(exchange, i);
-            let delta = 1e-4 * exchange.t_ref;
-            exchange.t[i] += delta;
-            exchange.advance_bodies(instances)?;
-            exchange.t[i] = self.base[i];
-            let moved = ((gap(exchange, i) - before) / delta).abs();
-            exchange.advance_bodies(instances)?;
+            let before = gap(problem, i);
+            let delta = 1e-4 * problem.t_ref;
+            problem.t[i] += delta;
+            problem.advance_bodies(instances)?;
+            problem.t[i] = self.base[i];
+            let moved = ((gap(problem, i) - before) / delta).abs();
+            problem.advance_bodies(instances)?;
             self.scale[i] = if moved > 0.0 { moved } else { 1.0 };
         }
         Ok(())
     }
 
     /// dr/dT, column by column.
-    fn differentiate(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result {
-        let n = exchange.n();
-        self.base.clone_from(&exchange.t);
+    fn differentiate(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result {
+        let n = problem.n();
+        self.base.clone_from(&problem.t);
         self.jacobian.clear();
         self.jacobian.resize(n * n, 0.0);
         for column in 0..n {
-            let delta = 1e-6 * self.base[column].abs().max(1e-2 * exchange.t_ref);
-            exchange.t[column] = self.base[column] + delta;
-            self.evaluate(exchange, instances)?;
+            let delta = 1e-6 * self.base[column].abs().max(1e-2 * problem.t_ref);
+            problem.t[column] = self.base[column] + delta;
+            self.evaluate(problem, instances)?;
             self.plus.clone_from(&self.residual);
-            exchange.t[column] = self.base[column] - delta;
-            self.evaluate(exchange, instances)?;
-            exchange.t[column] = self.base[column];
+            problem.t[column] = self.base[column] - delta;
+            self.evaluate(problem, instances)?;
+            problem.t[column] = self.base[column];
             for row in 0..n {
                 self.jacobian[column * n + row] = (self.plus[row] - self.residual[row]) / (2.0 * delta);
             }
         }
-        exchange.report.jacobian_refreshes += 1;
+        problem.report.jacobian_refreshes += 1;
         Ok(())
     }
 }
 
 /// Distance at t + h, m; at h = 0 the difference of the accelerations.
-fn gap(exchange: &Exchange, i: usize) -> f64 {
-    if exchange.at.h == 0.0 {
-        exchange.a1[i] - exchange.a2[i]
+fn gap(problem: &InterfaceProblem, i: usize) -> f64 {
+    if problem.at.h == 0.0 {
+        problem.a1[i] - problem.a2[i]
     } else {
-        exchange.x1[i] - exchange.x2[i] + exchange.gap[i]
+        problem.x1[i] - problem.x2[i] + problem.gap[i]
     }
 }
 
 /// The residual of a port's components, N.
-fn rows(port: &Port, exchange: &Exchange, motion: bool, scale: &[f64], out: &mut [f64]) {
+fn rows(port: &Port, problem: &InterfaceProblem, motion: bool, scale: &[f64], out: &mut [f64]) {
     let normal = port.first as usize;
     let mut slip = [0.0; 2];
     for (i, c) in port.components() {
-        let t = exchange.t[i];
-        out[i] = match exchange.rows[i] {
-            Row::Joint => {
-                let (k, rate) = (port.law.compliance, exchange.v1[i] - exchange.v2[i]);
-                let apart = if k > 0.0 {
-                    exchange.x1[i] - exchange.x2[i] + exchange.gap[i]
-                } else {
-                    gap(exchange, i)
-                };
-                (apart + k * (t + exchange.damping[i] * rate)) / (scale[i] + k)
+        let t = problem.t[i];
+        out[i] = match problem.rows[i] {
+            ConstraintKind::Joint => {
+                let (k, rate) = (port.law.compliance, problem.v1[i] - problem.v2[i]);
+                let apart =
+                    if k > 0.0 { problem.x1[i] - problem.x2[i] + problem.gap[i] } else { gap(problem, i) };
+                (apart + k * (t + problem.damping[i] * rate)) / (scale[i] + k)
             }
-            Row::Normal if !motion => {
-                let w = gap(exchange, i) / scale[i];
+            ConstraintKind::Normal if !motion => {
+                let w = gap(problem, i) / scale[i];
                 t - (t - w).max(port.law.t_min).min(port.law.t_max)
             }
-            Row::Coulomb => {
-                slip[c - 1] = t - gap(exchange, i) / scale[i];
+            ConstraintKind::Coulomb => {
+                slip[c - 1] = t - gap(problem, i) / scale[i];
                 t
             }
-            Row::Normal | Row::Law => t - exchange.f[i],
+            ConstraintKind::Normal | ConstraintKind::Law => t - problem.f[i],
         };
     }
     // Coulomb: T_t − projection of T_t − e_t/s on the disc of radius μ·T_n
-    let (size, radius) = (slip[0].hypot(slip[1]), port.law.mu * exchange.t[normal].max(0.0));
+    let (size, radius) = (slip[0].hypot(slip[1]), port.law.mu * problem.t[normal].max(0.0));
     let share = if size > radius { radius / size } else { 1.0 };
-    for (i, c) in port.components().filter(|(i, _)| exchange.rows[*i] == Row::Coulomb) {
+    for (i, c) in port.components().filter(|(i, _)| problem.rows[*i] == ConstraintKind::Coulomb) {
         out[i] -= share * slip[c - 1];
     }
 }
@@ -171,37 +168,38 @@ impl Strategy for Monolithic {
         Needs { first: bodies, second: bodies, grounds: Capabilities::RETRY }
     }
 
-    fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
-        let every =
-            |exchange: &Exchange, can| exchange.ground_slots().all(|s| instances[s].capabilities().has(can));
-        let [force, motion] = [Capabilities::FORCE, Capabilities::MOTION].map(|can| every(exchange, can));
+    fn solve(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<Outcome> {
+        let every = |problem: &InterfaceProblem, can| {
+            problem.ground_slots().all(|s| instances[s].capabilities().has(can))
+        };
+        let [force, motion] = [Capabilities::FORCE, Capabilities::MOTION].map(|can| every(problem, can));
         self.motion = !force;
-        let found = self.solve_form(exchange, instances)?;
-        if matches!(found, Outcome::Converged) || !exchange.has_grounds() || !(force && motion) {
+        let found = self.solve_form(problem, instances)?;
+        if matches!(found, Outcome::Converged) || !problem.has_grounds() || !(force && motion) {
             return Ok(found);
         }
         // at a kink of the law the depth under a force may jump where the wrench of a motion does not
         self.motion = true;
-        self.solve_form(exchange, instances)
+        self.solve_form(problem, instances)
     }
 }
 
 impl Monolithic {
     /// Newton in the present form of the soils.
-    fn solve_form(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
-        exchange.start_from_last();
-        self.measure_scale(exchange, instances)?;
-        let n = exchange.n();
-        let mut size = self.evaluate(exchange, instances)?;
+    fn solve_form(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<Outcome> {
+        problem.start_from_last();
+        self.measure_scale(problem, instances)?;
+        let n = problem.n();
+        let mut size = self.evaluate(problem, instances)?;
         for _ in 0..self.max_iterations {
-            if size <= ROUNDING * exchange.t_ref.max(max_norm(&exchange.t)) {
+            if size <= ROUNDING * problem.t_ref.max(max_norm(&problem.t)) {
                 break;
             }
             self.kept.clone_from(&self.residual);
-            self.differentiate(exchange, instances)?;
+            self.differentiate(problem, instances)?;
             let jacobian = &self.jacobian;
             let rank = self.lu.factor(n, |r, c| jacobian[c * n + r]);
-            exchange.report.rank = (rank as u32, n as u32);
+            problem.report.rank = (rank as u32, n as u32);
             self.d.clear();
             self.d.extend(self.kept.iter().map(|r| -r));
             self.lu.solve(&mut self.d);
@@ -209,11 +207,11 @@ impl Monolithic {
             let mut share = 1.0;
             let mut refused = None;
             for _ in 0..=MAX_HALVINGS {
-                for ((t, base), d) in exchange.t.iter_mut().zip(&self.base).zip(&self.d) {
+                for ((t, base), d) in problem.t.iter_mut().zip(&self.base).zip(&self.d) {
                     *t = base + share * d;
                 }
                 // A body may refuse forces as wild as those of a long step: a shorter one is tried.
-                let trial = self.evaluate(exchange, instances);
+                let trial = self.evaluate(problem, instances);
                 size = *trial.as_ref().unwrap_or(&f64::INFINITY);
                 refused = trial.err();
                 if size < before {
@@ -226,28 +224,28 @@ impl Monolithic {
             }
             if !(size < before) {
                 // rounding: go back to the better one
-                exchange.t.clone_from(&self.base);
-                size = self.evaluate(exchange, instances)?;
+                problem.t.clone_from(&self.base);
+                size = self.evaluate(problem, instances)?;
                 break;
             }
         }
-        exchange.report.residual = size / exchange.t_ref;
-        if !(size <= 1e-7 * exchange.t_ref.max(max_norm(&exchange.t))) {
+        problem.report.residual = size / problem.t_ref;
+        if !(size <= 1e-7 * problem.t_ref.max(max_norm(&problem.t))) {
             return Ok(Outcome::NotConverged(format!("monolithic: residual {size:.3e} N")));
         }
-        for port in &exchange.ports {
+        for port in &problem.ports {
             let i = port.first as usize;
-            let apart = exchange.joint_gap(i);
-            let left = match exchange.rows[i] {
-                Row::Joint => apart,
+            let apart = problem.joint_gap(i);
+            let left = match problem.rows[i] {
+                ConstraintKind::Joint => apart,
                 // the soil's surface follows the foot
                 _ if self.motion => 0.0,
                 // an open contact under a force of rounding misses its condition by what that force moves, not by its distance
-                _ => apart.min(self.scale[i] * exchange.t[i].max(0.0)),
+                _ => apart.min(self.scale[i] * problem.t[i].max(0.0)),
             };
-            exchange.report.max_gap_m = exchange.report.max_gap_m.max(left);
+            problem.report.max_gap_m = problem.report.max_gap_m.max(left);
         }
-        exchange.report.converged = true;
+        problem.report.converged = true;
         Ok(Outcome::Converged)
     }
 }

@@ -1,7 +1,7 @@
 //! When the bodies' interface Jacobian is computed again, and from where.
 
 use super::derivatives::Derivatives;
-use super::exchange::Exchange;
+use super::interface_problem::InterfaceProblem;
 use super::memory::{Recall, Remember};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
@@ -56,25 +56,25 @@ impl Refresh {
         Self { way, ..Self::default() }
     }
 
-    /// Puts G for the last trial into `exchange.estimate`. `left` is the present residual, `before` that of the
+    /// Puts G for the last trial into `problem.estimate`. `left` is the present residual, `before` that of the
     /// iteration before (NaN: this is the first).
     pub fn provide(
         &mut self,
         left: f64,
         before: f64,
-        exchange: &mut Exchange,
+        problem: &mut InterfaceProblem,
         instances: &mut [Instance],
     ) -> Result {
-        if self.is_stale(left, before, exchange) {
-            exchange.linearise_bodies(self.source(), instances)?;
+        if self.is_stale(left, before, problem) {
+            problem.linearise_bodies(self.source(), instances)?;
         } else {
-            self.put_back(before, exchange);
+            self.put_back(before, problem);
         }
-        self.of = Some((exchange.n(), exchange.at.epoch, exchange.at.h));
-        self.g.clone_from(&exchange.estimate.g);
-        self.t.clone_from(&exchange.t);
+        self.of = Some((problem.n(), problem.at.epoch, problem.at.h));
+        self.g.clone_from(&problem.estimate.g);
+        self.t.clone_from(&problem.t);
         self.motion.clear();
-        self.motion.extend((0..exchange.n()).map(|i| exchange.bodies_part(i)));
+        self.motion.extend((0..problem.n()).map(|i| problem.bodies_part(i)));
         Ok(())
     }
 
@@ -101,38 +101,38 @@ impl Refresh {
         }
     }
 
-    fn is_stale(&self, left: f64, before: f64, exchange: &Exchange) -> bool {
+    fn is_stale(&self, left: f64, before: f64, problem: &InterfaceProblem) -> bool {
         let Some((n, epoch, h)) = self.of else { return true };
-        let same = n == exchange.n() && (h == 0.0) == (exchange.at.h == 0.0);
+        let same = n == problem.n() && (h == 0.0) == (problem.at.h == 0.0);
         match self.way {
             Way::Analytic => true,
             Way::Frozen => !same,
             Way::Central | Way::Forward if before.is_nan() => true,
-            _ => !same || epoch != exchange.at.epoch || h != exchange.at.h || left > RATIO * before,
+            _ => !same || epoch != problem.at.epoch || h != problem.at.h || left > RATIO * before,
         }
     }
 
     /// The kept one; brought up to date by the last two trials where they belong to one step.
-    fn put_back(&mut self, before: f64, exchange: &mut Exchange) {
-        let n = exchange.n();
+    fn put_back(&mut self, before: f64, problem: &mut InterfaceProblem) {
+        let n = problem.n();
         if self.way == Way::Frozen {
             // G grows with h² at position level: what is frozen is the mechanism's position
-            let of = self.of.map_or(exchange.at.h, |of| of.2);
-            let scale = if of > 0.0 { exchange.at.h / of } else { 1.0 };
+            let of = self.of.map_or(problem.at.h, |of| of.2);
+            let scale = if of > 0.0 { problem.at.h / of } else { 1.0 };
             self.g.iter_mut().for_each(|g| *g *= scale * scale);
         } else if !before.is_nan() {
             self.change.clear();
-            self.change.extend(exchange.t.iter().zip(&self.t).map(|(new, old)| new - old));
+            self.change.extend(problem.t.iter().zip(&self.t).map(|(new, old)| new - old));
             let size: f64 = self.change.iter().map(|d| d * d).sum();
             for row in 0..n {
                 let predicted: f64 = (0..n).map(|c| self.g[c * n + row] * self.change[c]).sum();
-                let missing = exchange.bodies_part(row) - self.motion[row] - predicted;
+                let missing = problem.bodies_part(row) - self.motion[row] - predicted;
                 for c in (0..n).filter(|_| size > 0.0) {
                     self.g[c * n + row] += missing * self.change[c] / size;
                 }
             }
         }
-        exchange.estimate.g.copy_from_slice(&self.g);
+        problem.estimate.g.copy_from_slice(&self.g);
     }
 }
 
@@ -141,30 +141,30 @@ mod tests {
     use super::*;
 
     /// A kept Jacobian of no component, so that only the ratio of the residuals decides.
-    fn kept(jacobian: JacobianChoice, exchange: &Exchange) -> Refresh {
-        let of = Some((0, exchange.at.epoch, exchange.at.h));
+    fn kept(jacobian: JacobianChoice, problem: &InterfaceProblem) -> Refresh {
+        let of = Some((0, problem.at.epoch, problem.at.h));
         Refresh { of, ..Refresh::new(jacobian) }
     }
 
     #[test]
     fn it_is_taken_again_when_more_than_three_tenths_are_left() {
-        let exchange = Exchange::new(&[], &[], 1.0);
+        let problem = InterfaceProblem::new(&[], &[], 1.0);
         for way in [JacobianChoice::Directional, JacobianChoice::FiniteDifferences, JacobianChoice::Broyden] {
-            let refresh = kept(way, &exchange);
-            assert!(refresh.is_stale(0.31, 1.0, &exchange), "{way}");
-            assert!(!refresh.is_stale(0.29, 1.0, &exchange), "{way}");
+            let refresh = kept(way, &problem);
+            assert!(refresh.is_stale(0.31, 1.0, &problem), "{way}");
+            assert!(!refresh.is_stale(0.29, 1.0, &problem), "{way}");
         }
-        assert!(kept(JacobianChoice::Analytic, &exchange).is_stale(1e-9, 1.0, &exchange));
-        assert!(!kept(JacobianChoice::Frozen, &exchange).is_stale(2.0, 1.0, &exchange));
+        assert!(kept(JacobianChoice::Analytic, &problem).is_stale(1e-9, 1.0, &problem));
+        assert!(!kept(JacobianChoice::Frozen, &problem).is_stale(2.0, 1.0, &problem));
         // differences start each step afresh, Broyden's update goes on
-        assert!(kept(JacobianChoice::FiniteDifferences, &exchange).is_stale(1.0, f64::NAN, &exchange));
-        assert!(!kept(JacobianChoice::Broyden, &exchange).is_stale(1.0, f64::NAN, &exchange));
+        assert!(kept(JacobianChoice::FiniteDifferences, &problem).is_stale(1.0, f64::NAN, &problem));
+        assert!(!kept(JacobianChoice::Broyden, &problem).is_stale(1.0, f64::NAN, &problem));
     }
 
     #[test]
     fn a_snapshot_holds_the_kept_jacobian() {
-        let exchange = Exchange::new(&[], &[], 1.0);
-        let mut refresh = kept(JacobianChoice::Broyden, &exchange);
+        let problem = InterfaceProblem::new(&[], &[], 1.0);
+        let mut refresh = kept(JacobianChoice::Broyden, &problem);
         (refresh.g, refresh.t, refresh.motion) = (vec![1.0], vec![2.0], vec![3.0]);
         let mut words = Vec::new();
         refresh.remember(&mut words);

@@ -1,6 +1,6 @@
 //! Why a strategy cannot glue a group, said when the scenario is loaded, with the strategies that could.
 
-use super::{Exchange, Strategy, strategy};
+use super::{InterfaceProblem, Strategy, strategy};
 use terraglue_host::Instance;
 use terraglue_scenario::{GluingSpec, StrategyKind};
 use terraglue_subsystem::Capabilities;
@@ -15,10 +15,10 @@ pub struct Refusal {
 }
 
 /// Why the scenario's strategy cannot glue these members; `None`: it can.
-pub fn refusal(spec: &GluingSpec, exchange: &Exchange, instances: &[Instance]) -> Option<Refusal> {
+pub fn refusal(spec: &GluingSpec, problem: &InterfaceProblem, instances: &[Instance]) -> Option<Refusal> {
     let of = |kind: StrategyKind| {
         let spec = GluingSpec { strategy: kind, ..spec.clone() };
-        why(strategy(&spec).as_ref(), exchange, instances)
+        why(strategy(&spec).as_ref(), problem, instances)
     };
     let reason = of(spec.strategy)?;
     let would_work =
@@ -26,7 +26,7 @@ pub fn refusal(spec: &GluingSpec, exchange: &Exchange, instances: &[Instance]) -
     Some(Refusal { reason, would_work })
 }
 
-fn why(strategy: &dyn Strategy, exchange: &Exchange, instances: &[Instance]) -> Option<String> {
+fn why(strategy: &dyn Strategy, problem: &InterfaceProblem, instances: &[Instance]) -> Option<String> {
     let needs = strategy.needs();
     let lacks = |slot: usize, needs: Capabilities| {
         let have = instances[slot].capabilities();
@@ -43,50 +43,50 @@ fn why(strategy: &dyn Strategy, exchange: &Exchange, instances: &[Instance]) -> 
         })
     };
     let body =
-        |slot: usize| lacks(slot, if exchange.glue.is_second(slot) { needs.second } else { needs.first });
+        |slot: usize| lacks(slot, if problem.glue.is_second(slot) { needs.second } else { needs.first });
     strategy
-        .refuses(exchange)
-        .or_else(|| exchange.body_slots().find_map(body))
-        .or_else(|| exchange.ground_slots().find_map(|s| lacks(s, needs.grounds)))
+        .refuses(problem)
+        .or_else(|| problem.body_slots().find_map(body))
+        .or_else(|| problem.ground_slots().find_map(|s| lacks(s, needs.grounds)))
 }
 
 /// A pass of contacts meets a joint.
-pub fn joints_refused(name: &str, exchange: &Exchange) -> Option<String> {
-    exchange.glue.has_joints().then(|| {
+pub fn joints_refused(name: &str, problem: &InterfaceProblem) -> Option<String> {
+    problem.glue.has_joints().then(|| {
         format!("`{name}` co-operates at contacts: the soil cannot say how a joint between bodies pulls")
     })
 }
 
 /// A strategy that asks soils meets a contact between bodies.
-pub fn body_contacts_refused(name: &str, exchange: &Exchange) -> Option<String> {
-    let k = exchange.glue.body_contact()?;
+pub fn body_contacts_refused(name: &str, problem: &InterfaceProblem) -> Option<String> {
+    let k = problem.glue.body_contact()?;
     Some(format!("`{name}` asks a soil for the force of a contact, but side 2 of glue {} is a body", k + 1))
 }
 
 /// An explicit strategy meets a constraint.
-pub fn rigid_refused(name: &str, exchange: &Exchange) -> Option<String> {
-    let joint = exchange.glue.rigid_joint().map(|k| {
+pub fn rigid_refused(name: &str, problem: &InterfaceProblem) -> Option<String> {
+    let joint = problem.glue.rigid_joint().map(|k| {
         format!(
             "`{name}` is explicit and knows the force of a spring only: glue {} has no compliance_m_n",
             k + 1
         )
     });
-    joint.or_else(|| body_contacts_refused(name, exchange))
+    joint.or_else(|| body_contacts_refused(name, problem))
 }
 
 /// A strategy that drives side 2 by motion meets a glue where that cannot be.
-pub fn second_refused(name: &str, exchange: &Exchange) -> Option<String> {
-    let spring = exchange.glue.spring().map(|k| {
+pub fn second_refused(name: &str, problem: &InterfaceProblem) -> Option<String> {
+    let spring = problem.glue.spring().map(|k| {
         format!(
             "`{name}` makes side 2 follow side 1: the compliance of glue {} would have to be inside side 2",
             k + 1
         )
     });
-    let nobody = exchange.glue.joint_without_second().map(|k| {
+    let nobody = problem.glue.joint_without_second().map(|k| {
         format!(
             "`{name}` makes side 2 follow side 1: side 2 of glue {} is the world, or side 1 of another glue",
             k + 1
         )
     });
-    spring.or_else(|| body_contacts_refused(name, exchange)).or(nobody)
+    spring.or_else(|| body_contacts_refused(name, problem)).or(nobody)
 }

@@ -7,7 +7,7 @@
 //!   factorisation that drops columns which say nothing new (Haelterman et al. 2016);
 //! - `broyden`: Broyden's good rank-one update of the inverse Jacobian (Broyden 1965).
 
-use super::exchange::Exchange;
+use super::interface_problem::InterfaceProblem;
 use super::iterative::Limits;
 use super::{Needs, Outcome, Strategy};
 use terraglue_diagnostics::Result;
@@ -232,23 +232,23 @@ impl Strategy for Relaxed {
         Needs { first: Capabilities::FORCE | Capabilities::RETRY, second: motion, grounds: motion }
     }
 
-    fn refuses(&self, exchange: &Exchange) -> Option<String> {
-        super::second_refused(NAME, exchange)
+    fn refuses(&self, problem: &InterfaceProblem) -> Option<String> {
+        super::second_refused(NAME, problem)
     }
 
-    fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
-        exchange.start_from_last();
-        exchange.report.xt_form = true;
+    fn solve(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<Outcome> {
+        problem.start_from_last();
+        problem.report.xt_form = true;
         let (mut size, mut at_start) = (f64::INFINITY, f64::INFINITY);
         for iteration in 0..self.limits.max_iterations {
-            exchange.advance_half(false, instances)?;
-            exchange.advance_second_under_motion(instances)?;
-            size = exchange.force_residual(&mut self.r, size);
+            problem.advance_half(false, instances)?;
+            problem.advance_second_under_motion(instances)?;
+            size = problem.force_residual(&mut self.r, size);
             if iteration == 0 {
                 at_start = size;
             }
-            if size <= self.limits.threshold(exchange) {
-                exchange.report.converged = true;
+            if size <= self.limits.threshold(problem) {
+                problem.report.converged = true;
                 return Ok(Outcome::Converged);
             }
             if !(size <= GROWTH * at_start) {
@@ -257,12 +257,12 @@ impl Strategy for Relaxed {
                     self.kind
                 )));
             }
-            self.accelerate(iteration == 0, &exchange.t);
-            exchange.t.iter_mut().zip(&self.step).for_each(|(t, d)| *t += d);
+            self.accelerate(iteration == 0, &problem.t);
+            problem.t.iter_mut().zip(&self.step).for_each(|(t, d)| *t += d);
         }
         Ok(Outcome::NotConverged(format!(
             "X-T fixed point ({:?}): not converged within {} iterations, |F - T| = {size:.3e} N, last contraction {:.4}",
-            self.kind, self.limits.max_iterations, exchange.report.contraction
+            self.kind, self.limits.max_iterations, problem.report.contraction
         )))
     }
 }

@@ -4,7 +4,7 @@
 //! Contacts are refused: they open, close and bend within a step, and one unchecked Newton step left gaps of 5 cm
 //! between walking feet and soil.
 
-use super::exchange::Exchange;
+use super::interface_problem::InterfaceProblem;
 use super::iterative::TtForm;
 use super::memory::Recall;
 use super::{Needs, Outcome, Strategy};
@@ -43,8 +43,8 @@ impl Strategy for SemiImplicit {
         Needs { first: both, second: both, grounds: both }
     }
 
-    fn refuses(&self, exchange: &Exchange) -> Option<String> {
-        (exchange.has_grounds() || exchange.glue.contact().is_some()).then(|| {
+    fn refuses(&self, problem: &InterfaceProblem) -> Option<String> {
+        (problem.has_grounds() || problem.glue.contact().is_some()).then(|| {
             format!(
                 "`{NAME}` takes one Newton step and does not check it: a contact opens, closes and yields within the step"
             )
@@ -59,8 +59,8 @@ impl Strategy for SemiImplicit {
         self.tt.recall(kept);
     }
 
-    fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
-        exchange.start_from_last();
-        self.tt.one_step(exchange, instances)
+    fn solve(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<Outcome> {
+        problem.start_from_last();
+        self.tt.one_step(problem, instances)
     }
 }

@@ -2,7 +2,7 @@
 //!
 //! The force of a soil follows from places and rates, so at t it is what `set_ports` answered, and soils are not asked.
 
-use super::exchange::Exchange;
+use super::interface_problem::InterfaceProblem;
 use super::iterative::Iterative;
 use super::{Needs, Outcome, Strategy};
 use terraglue_diagnostics::Result;
@@ -33,11 +33,11 @@ impl Strategy for Start {
         self.solver.needs()
     }
 
-    fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
-        let outcome = self.solver.solve(exchange, instances)?;
+    fn solve(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<Outcome> {
+        let outcome = self.solver.solve(problem, instances)?;
         if outcome == Outcome::Converged && self.scale != 1.0 {
-            exchange.t.iter_mut().for_each(|t| *t *= self.scale);
-            exchange.advance_bodies(instances)?;
+            problem.t.iter_mut().for_each(|t| *t *= self.scale);
+            problem.advance_bodies(instances)?;
         }
         Ok(outcome)
     }

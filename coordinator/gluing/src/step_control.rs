@@ -5,8 +5,8 @@
 //! δE = T1·X1 − T2·X2 − ½·(F(t) + F(t + h))·(X1 − X2). It needs no repeated step: the forces of the law at t + h are
 //! known at the next communication point, and a PI controller (Gustafsson 1991) sets the length of the step after it.
 
-use super::Exchange;
-use super::glue::Row;
+use super::InterfaceProblem;
+use super::glue::ConstraintKind;
 use super::memory::{Recall, Remember};
 
 /// Exponents for an error per step of second order.
@@ -19,7 +19,7 @@ const GROW: f64 = 1.5;
 
 /// What passed one port in the last step: per component F(t), T on side 1, T on side 2, X1, X2.
 #[derive(Clone, Copy, Debug)]
-struct Passed {
+struct PortPassage {
     key: u64,
     count: usize,
     values: [[f64; 5]; 6],
@@ -28,22 +28,22 @@ struct Passed {
 /// What passed the interface of a group in its last step.
 #[derive(Clone, Debug, Default)]
 pub struct Passage {
-    ports: Vec<Passed>,
+    ports: Vec<PortPassage>,
     law: Vec<f64>,
 }
 
 impl Passage {
     /// The forces of the law at t: before the strategy solves.
-    pub fn look(&mut self, exchange: &mut Exchange) {
-        exchange.law_forces(&mut self.law);
+    pub fn look(&mut self, problem: &mut InterfaceProblem) {
+        problem.law_forces(&mut self.law);
     }
 
     /// |δE| of the last step over all ports, J, with the forces of the law at its end.
-    pub fn residual(&self, exchange: &Exchange) -> f64 {
+    pub fn residual(&self, problem: &InterfaceProblem) -> f64 {
         let mut sum = 0.0;
         for passed in &self.ports {
             // a port that is gone carries nothing
-            let first = exchange.ports.iter().find(|p| p.key == passed.key).map(|p| p.first as usize);
+            let first = problem.ports.iter().find(|p| p.key == passed.key).map(|p| p.first as usize);
             let port: f64 = (passed.values[..passed.count].iter().enumerate())
                 .map(|(k, [before, t1, t2, x1, x2])| {
                     let after = first.map_or(0.0, |i| self.law[i + k]);
@@ -56,17 +56,19 @@ impl Passage {
     }
 
     /// Takes what the strategy let pass; `look` has been called at the start of the step.
-    pub fn take(&mut self, exchange: &Exchange) {
+    pub fn take(&mut self, problem: &InterfaceProblem) {
         self.ports.clear();
-        for port in &exchange.ports {
-            let mut passed = Passed { key: port.key, count: port.len(), values: [[0.0; 5]; 6] };
+        for port in &problem.ports {
+            let mut passed = PortPassage { key: port.key, count: port.len(), values: [[0.0; 5]; 6] };
             for (k, i) in port.range().enumerate() {
-                let (t1, x1) = (exchange.t[i], exchange.x1[i]);
-                passed.values[k] = match exchange.rows[i] {
-                    Row::Normal | Row::Law if exchange.has_grounds() => [self.law[i], t1, 0.0, x1, 0.0],
-                    Row::Joint if exchange.compliance[i] > 0.0 => {
-                        let t2 = exchange.t_second.get(i).copied().unwrap_or(t1);
-                        [self.law[i], t1, t2, x1, exchange.x2[i]]
+                let (t1, x1) = (problem.t[i], problem.x1[i]);
+                passed.values[k] = match problem.rows[i] {
+                    ConstraintKind::Normal | ConstraintKind::Law if problem.has_grounds() => {
+                        [self.law[i], t1, 0.0, x1, 0.0]
+                    }
+                    ConstraintKind::Joint if problem.compliance[i] > 0.0 => {
+                        let t2 = problem.t_second.get(i).copied().unwrap_or(t1);
+                        [self.law[i], t1, t2, x1, problem.x2[i]]
                     }
                     // a constraint has no law of its own: what it lets pass is equal on both sides
                     _ => [0.0; 5],
@@ -97,7 +99,7 @@ impl Passage {
             for (own, five) in values.iter_mut().zip(list.chunks_exact(5)) {
                 own.copy_from_slice(five);
             }
-            self.ports.push(Passed { key, count: (list.len() / 5).min(6), values });
+            self.ports.push(PortPassage { key, count: (list.len() / 5).min(6), values });
         }
     }
 }

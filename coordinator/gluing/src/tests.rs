@@ -205,25 +205,25 @@ fn run(spec: &GluingSpec, factor: f64, h: f64, rock: bool) -> (f64, u32, f64, f6
     let table = Instance::new("table", "test", Kind::Robot, Box::new(Table::new((0.05, 0.02))));
     let columns = Instance::new("soil", "test", Kind::Soil, Box::new(Columns::new(factor, rock)));
     let mut instances = vec![table, columns];
-    let mut exchange = Exchange::new(&[0], &[1], WEIGHT);
+    let mut problem = InterfaceProblem::new(&[0], &[1], WEIGHT);
     let mut strategy = strategy(spec);
     let steps = (duration / h).round() as u64;
     let (mut sum, mut most, mut heave) = (0, 0, 0.0);
     for index in 0..steps {
-        exchange.begin(Instant { t: index as f64 * h, h, index, ..Instant::default() }, &found);
-        exchange.set_ports(&mut instances).expect("ports");
-        let outcome = strategy.solve(&mut exchange, &mut instances).expect("no module error");
-        assert_eq!(outcome, Outcome::Converged, "step {index} {:?}", exchange.report);
-        exchange.commit(&mut instances).expect("commit");
+        problem.begin(StepContext { t: index as f64 * h, h, index, ..StepContext::default() }, &found);
+        problem.set_ports(&mut instances).expect("ports");
+        let outcome = strategy.solve(&mut problem, &mut instances).expect("no module error");
+        assert_eq!(outcome, Outcome::Converged, "step {index} {:?}", problem.report);
+        problem.commit(&mut instances).expect("commit");
         // the mean of the feet without offset is the heave at the table's centre
-        heave -= (0..6).map(|i| exchange.x1[i]).sum::<f64>() / 6.0;
-        let report = &exchange.report;
+        heave -= (0..6).map(|i| problem.x1[i]).sum::<f64>() / 6.0;
+        let report = &problem.report;
         assert!(strategy.name() == cooperative::NAME || report.evaluations_bodies <= 4, "{report:?}");
         let evaluations = report.evaluations_soil.max(1);
         sum += evaluations;
         most = larger(most, evaluations);
     }
-    (f64::from(sum) / steps as f64, most, exchange.t[0], heave)
+    (f64::from(sum) / steps as f64, most, problem.t[0], heave)
 }
 
 /// Rows `tt_full` of `tests/reference/gluing/table6_iterations.csv`: factor, h, rock, T0 at the end.

@@ -9,7 +9,7 @@ pub enum Part {
     /// Events and connections.
     Signals,
     /// Subsystems without glue.
-    Unglued,
+    Uncoupled,
     /// Contact detection (paper, step 1).
     Contact,
     /// `set_ports` of all members (step 1).
@@ -32,7 +32,7 @@ impl Part {
     /// All parts with their names in tables.
     pub const ALL: [(Self, &'static str); 10] = [
         (Self::Signals, "signals"),
-        (Self::Unglued, "unglued"),
+        (Self::Uncoupled, "unglued"),
         (Self::Contact, "contact"),
         (Self::Ports, "set_ports"),
         (Self::Estimate, "estimate_forces"),

@@ -3,7 +3,7 @@
 //! Side 2 is a soil, or a body that takes motion; unilateral and yielding laws are inside F. Unlike the X-T form of
 //! [`super::iterative`] every iteration evaluates both sides, as it is written in the literature.
 
-use super::exchange::Exchange;
+use super::interface_problem::InterfaceProblem;
 use super::iterative::Limits;
 use super::linear::{Lu, multiply_add};
 use super::{Needs, Outcome, Strategy};
@@ -33,20 +33,20 @@ impl XtNewton {
     }
 
     /// d = −(I + K·G1)⁻¹·r at the last trials.
-    fn newton_step(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result {
-        let n = exchange.n();
-        exchange.linearise_first(instances)?;
-        exchange.second_stiffness(instances, &mut self.k)?;
+    fn newton_step(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result {
+        let n = problem.n();
+        problem.linearise_first(instances)?;
+        problem.second_stiffness(instances, &mut self.k)?;
         self.kg.clear();
         self.kg.resize(n * n, 0.0);
         for column in 0..n {
             let out = &mut self.kg[column * n..][..n];
-            multiply_add(&self.k, &exchange.estimate.g[column * n..][..n], out);
+            multiply_add(&self.k, &problem.estimate.g[column * n..][..n], out);
         }
         let kg = &self.kg;
         let rank = self.lu.factor(n, |r, c| kg[c * n + r] + if r == c { 1.0 } else { 0.0 });
-        exchange.report.rank = (rank as u32, n as u32);
-        exchange.report.condition = exchange.report.condition.max(1.0 / self.lu.weakest());
+        problem.report.rank = (rank as u32, n as u32);
+        problem.report.condition = problem.report.condition.max(1.0 / self.lu.weakest());
         self.lu.solve(&mut self.d);
         Ok(())
     }
@@ -62,28 +62,28 @@ impl Strategy for XtNewton {
         Needs { first: Capabilities::FORCE | Capabilities::RETRY, second: motion, grounds: motion }
     }
 
-    fn refuses(&self, exchange: &Exchange) -> Option<String> {
-        super::second_refused(NAME, exchange)
+    fn refuses(&self, problem: &InterfaceProblem) -> Option<String> {
+        super::second_refused(NAME, problem)
     }
 
-    fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
-        exchange.start_from_last();
-        exchange.report.xt_form = true;
+    fn solve(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<Outcome> {
+        problem.start_from_last();
+        problem.report.xt_form = true;
         let mut size = f64::INFINITY;
         for _ in 0..=self.limits.max_iterations {
-            exchange.advance_half(false, instances)?;
-            exchange.advance_second_under_motion(instances)?;
-            size = exchange.force_residual(&mut self.d, size);
-            if size <= self.limits.threshold(exchange) {
-                exchange.report.converged = true;
+            problem.advance_half(false, instances)?;
+            problem.advance_second_under_motion(instances)?;
+            size = problem.force_residual(&mut self.d, size);
+            if size <= self.limits.threshold(problem) {
+                problem.report.converged = true;
                 return Ok(Outcome::Converged);
             }
             if !size.is_finite() {
                 break;
             }
-            self.newton_step(exchange, instances)?;
-            exchange.t.iter_mut().zip(&self.d).for_each(|(t, d)| *t += d);
+            self.newton_step(problem, instances)?;
+            problem.t.iter_mut().zip(&self.d).for_each(|(t, d)| *t += d);
         }
-        Ok(self.limits.give_up(exchange, "X-T Newton: |T - F|", size))
+        Ok(self.limits.give_up(problem, "X-T Newton: |T - F|", size))
     }
 }

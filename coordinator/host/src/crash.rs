@@ -26,33 +26,33 @@ pub(super) struct Names {
 
 /// The last call of a thread; its time is not a number before there is one.
 #[derive(Clone, Copy)]
-struct Call {
+struct LastCall {
     names: *const Names,
     function: &'static str,
     time_s: f64,
 }
 
-const NONE: Call = Call { names: ptr::null(), function: "", time_s: 0.0 };
+const NONE: LastCall = LastCall { names: ptr::null(), function: "", time_s: 0.0 };
 
 thread_local! {
-    static LAST: Cell<Call> = const { Cell::new(NONE) };
+    static LAST: Cell<LastCall> = const { Cell::new(NONE) };
 }
 
 /// Notes that a function of an instance is called at a time, s.
 #[inline]
 pub(super) fn note(names: &Names, function: &'static str, time_s: f64) {
-    LAST.set(Call { names, function, time_s });
+    LAST.set(LastCall { names, function, time_s });
 }
 
 /// What a thread does before there is an instance, until it ends; what was noted before comes back then.
 pub struct Beginning {
-    before: Call,
+    before: LastCall,
     // in a place of its own: the note stays where this value moves
     names: Box<Names>,
 }
 
 impl Beginning {
-    /// A module or unit is made an instance, so named in the scenario.
+    /// A module or FMU is made an instance, so named in the scenario.
     pub fn of_instance(name: &str, file: &Path) -> Self {
         Self::new(name, file, "instantiate")
     }
@@ -136,10 +136,10 @@ extern "C" fn crashed(signal: libc::c_int, info: *mut libc::siginfo_t, _: *mut l
     }
 }
 
-fn report(index: usize, names: &Names, call: &Call) {
+fn report(index: usize, names: &Names, call: &LastCall) {
     let (signal, words) = CRASHES[index];
     let mut room = [0; 24];
-    put("\nerror: a module or unit crashed: signal ");
+    put("\nerror: a module or FMU crashed: signal ");
     put(decimal(signal.unsigned_abs().into(), 1, &mut room));
     put(" (");
     put(words);

@@ -1,8 +1,8 @@
-//! No foreign code ends the program with success: `exit(0)` inside a module or unit is a failure of the run, and its
+//! No foreign code ends the program with success: `exit(0)` inside a module or FMU is a failure of the run, and its
 //! recording is closed first.
 #![allow(unsafe_code)] // Registers a function that the C library calls at `exit`.
 
-use super::orphans;
+use super::descendants;
 use std::collections::BTreeMap;
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
@@ -10,7 +10,7 @@ use std::sync::{Mutex, Once, PoisonError};
 
 static ARMED: AtomicBool = AtomicBool::new(false);
 static REGISTERED: Once = Once::new();
-static WILLS: Mutex<BTreeMap<u64, Work>> = Mutex::new(BTreeMap::new());
+static EXIT_HOOKS: Mutex<BTreeMap<u64, Work>> = Mutex::new(BTreeMap::new());
 static NEXT: AtomicU64 = AtomicU64::new(0);
 
 unsafe extern "C" {
@@ -33,11 +33,11 @@ impl Drop for Armed {
 
 /// While this lives, its work is done before foreign code ends the process.
 #[derive(Debug)]
-pub struct Will(u64);
+pub struct ExitHook(u64);
 
-impl Drop for Will {
+impl Drop for ExitHook {
     fn drop(&mut self) {
-        WILLS.lock().unwrap_or_else(PoisonError::into_inner).remove(&self.0);
+        EXIT_HOOKS.lock().unwrap_or_else(PoisonError::into_inner).remove(&self.0);
     }
 }
 
@@ -59,17 +59,17 @@ pub fn arm() -> Armed {
 /// Leaves `work` to be done when foreign code ends the process. It tells the error; it must not wait for anything that a
 /// thread may hold.
 #[must_use]
-pub fn leave_will(work: impl FnOnce() + Send + 'static) -> Will {
+pub fn add_exit_hook(work: impl FnOnce() + Send + 'static) -> ExitHook {
     let id = NEXT.fetch_add(1, Ordering::Relaxed);
-    WILLS.lock().unwrap_or_else(PoisonError::into_inner).insert(id, Box::new(work));
-    Will(id)
+    EXIT_HOOKS.lock().unwrap_or_else(PoisonError::into_inner).insert(id, Box::new(work));
+    ExitHook(id)
 }
 
-/// Ends the program by its own will, at once: what libraries do at `exit` would wait for one that is being loaded.
+/// Ends the program by its own choice, at once: what libraries do at `exit` would wait for one that is being loaded.
 pub fn leave(code: i32) -> ! {
     ARMED.store(false, Ordering::SeqCst);
     terraglue_fmi::remove_folders();
-    orphans::end_all();
+    descendants::end_all();
     // SAFETY: a plain system call; the process ends here.
     unsafe { libc::_exit(code) }
 }
@@ -78,18 +78,18 @@ extern "C" fn at_exit() {
     if !ARMED.swap(false, Ordering::SeqCst) {
         return;
     }
-    // the thread that calls this may hold the wills, but only between two of them
-    let wills = WILLS.try_lock().map(|mut all| std::mem::take(&mut *all)).unwrap_or_default();
-    let told = !wills.is_empty();
-    for (_, work) in wills {
+    // the thread that calls this may hold the hooks, but only between two of them
+    let hooks = EXIT_HOOKS.try_lock().map(|mut all| std::mem::take(&mut *all)).unwrap_or_default();
+    let told = !hooks.is_empty();
+    for (_, work) in hooks {
         // what cannot be done any more is left
         drop(catch_unwind(AssertUnwindSafe(work)));
     }
     let _ = catch_unwind(|| {
         terraglue_fmi::remove_folders();
-        orphans::end_all();
+        descendants::end_all();
     });
-    let text = b"error: a module or unit ended the program; `isolate = true` names it\n";
+    let text = b"error: a module or FMU ended the program; `isolate = true` names it\n";
     // SAFETY: plain system calls; the process ends here.
     unsafe {
         if !told {

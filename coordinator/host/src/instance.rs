@@ -43,11 +43,11 @@ pub struct Instance {
     kind: Kind,
     /// Whether variables are arrays.
     arrays: bool,
-    about: Box<About>,
+    about: Box<InstanceInfo>,
 }
 
 /// What an instance is.
-struct About {
+struct InstanceInfo {
     names: Names,
     capabilities: Capabilities,
     scene: Scene,
@@ -57,7 +57,7 @@ struct About {
 impl Instance {
     /// Takes a subsystem under supervision; `name` is that of the scenario.
     pub fn new(name: &str, module: &str, kind: Kind, subsystem: Box<dyn Subsystem>) -> Self {
-        let about = About {
+        let about = InstanceInfo {
             names: Names { instance: name.to_owned(), module: module.to_owned() },
             capabilities: subsystem.capabilities(),
             scene: subsystem.scene(),
@@ -563,7 +563,7 @@ impl Instance {
     }
 }
 
-impl Drop for About {
+impl Drop for InstanceInfo {
     fn drop(&mut self) {
         crash::forget(&self.names);
     }

@@ -110,13 +110,13 @@ fn by_name(schema: &Schema, numbers: &[f64]) -> serde_json::Map<String, serde_js
 }
 
 /// A law whose numbers are tried out, one set after the other.
-pub struct Bench<'a> {
+pub struct LawTrial<'a> {
     module: &'a LoadedModule,
     services: &'a HostServices,
     law: Arc<dyn NodeLaw>,
 }
 
-impl<'a> Bench<'a> {
+impl<'a> LawTrial<'a> {
     /// A law with these numbers to begin with, in the order of its schema.
     ///
     /// # Errors

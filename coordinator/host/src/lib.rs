@@ -4,9 +4,16 @@
 //! [`SearchPath`]; [`LoadedModule::instantiate`] makes an [`Instance`], which checks every answer of the
 //! subsystem and gives every failure its name, function and time. Loaded libraries are never unloaded.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
+mod adaptive_spin;
 mod allocations;
 mod check;
 pub mod crash;
+pub mod descendants;
 mod description;
 mod elements;
 mod error;
@@ -15,14 +22,12 @@ mod instance;
 pub mod isolation;
 pub mod law;
 mod library;
-pub mod orphans;
-mod patience;
 mod probe;
 mod process;
+mod process_state;
 mod python;
 mod search;
 mod services;
-mod surroundings;
 #[cfg(test)]
 mod tests;
 mod workers;
@@ -38,8 +43,8 @@ pub use library::{
 };
 pub use probe::{TableFacts, probe_odd_calls, table_of};
 pub use process::{Process, adopt_locale, has_locale, heap_in_use};
+pub use process_state::ProcessState;
 pub use python::{describes_module, interpreter, is_python, value_of};
 pub use search::{SearchPath, is_path};
-pub use services::{HostServices, LogSink, Partings, instance_seed};
-pub use surroundings::Surroundings;
+pub use services::{HostServices, LogSink, TeardownErrors, instance_seed};
 pub use workers::Workers;

@@ -8,7 +8,7 @@ use super::isolation::{self, Isolation, What};
 use super::law::{self, LawHost};
 use super::python::{self, PythonFile};
 use super::search::{SearchPath, below, file_name, is_path, module_name, python_name};
-use super::{HostServices, Instance, Partings};
+use super::{HostServices, Instance, TeardownErrors};
 use libloading::os::unix::{Library as Handle, RTLD_LOCAL, RTLD_NOW, Symbol};
 use serde_json::{Map, Value};
 use std::error::Error as _;
@@ -280,7 +280,7 @@ pub type FmuFactory = fn(
     &Path,
     &Map<String, Value>,
     Arc<dyn Host>,
-    Partings,
+    TeardownErrors,
 ) -> terraglue_subsystem::Result<Box<dyn Subsystem>>;
 
 impl Library {

@@ -11,9 +11,9 @@ pub type LogSink = Arc<dyn Fn(&str, LogLevel, &str) + Send + Sync>;
 
 /// Errors of instances at their end, when nobody waits for an answer any more.
 #[derive(Clone, Debug, Default)]
-pub struct Partings(Arc<Mutex<Vec<String>>>);
+pub struct TeardownErrors(Arc<Mutex<Vec<String>>>);
 
-impl Partings {
+impl TeardownErrors {
     /// Remembers one.
     pub fn put(&self, text: String) {
         self.0.lock().unwrap_or_else(PoisonError::into_inner).push(text);
@@ -43,7 +43,7 @@ pub struct HostServices {
     /// Where log lines go; None: to the crate `log` with target `terraglue::module`.
     pub log: Option<LogSink>,
     /// What went wrong while instances were ended, after the last step.
-    pub partings: Partings,
+    pub teardown_errors: TeardownErrors,
     /// Numbered states that `save_state` must keep.
     pub slots: u32,
     /// Largest number of ground nodes that a step may show; a hint.
@@ -63,7 +63,7 @@ impl HostServices {
             workers: Arc::new(Workers::new(1)),
             cancel: Arc::new(AtomicBool::new(false)),
             log: None,
-            partings: Partings::default(),
+            teardown_errors: TeardownErrors::default(),
             slots: 8,
             max_nodes: 1 << 14,
             isolation: Isolation::default(),

@@ -3,10 +3,10 @@
 //! A pool of our own, because the step loop must not allocate: queues of general pools take memory block by
 //! block. A thread that wakes late delays nobody: the caller takes the pieces itself until none is left. Waking one
 //! takes longer than many a loop, so threads look for the next loop for some microseconds before they sleep
-//! ([`Patience`]); looking for ever would cost the more the busier the machine is.
+//! ([`AdaptiveSpin`]); looking for ever would cost the more the busier the machine is.
 #![allow(unsafe_code)] // The pieces of a loop borrow from the caller, who waits for all threads.
 
-use super::patience::Patience;
+use super::adaptive_spin::AdaptiveSpin;
 use std::any::Any;
 use std::panic::{AssertUnwindSafe, catch_unwind, resume_unwind};
 use std::sync::atomic::{AtomicBool, AtomicU64, AtomicUsize, Ordering};
@@ -18,8 +18,8 @@ pub struct Workers {
     shared: Arc<Shared>,
     threads: Vec<JoinHandle<()>>,
     /// Held during a loop: a loop inside a loop, or from another thread meanwhile, runs on its caller alone. How long the
-    /// caller waits awake for the others to leave one.
-    busy: Mutex<Patience>,
+    /// caller spins for the others to leave one.
+    busy: Mutex<AdaptiveSpin>,
 }
 
 struct Shared {
@@ -98,8 +98,8 @@ impl Workers {
             std::thread::Builder::new().name(format!("terraglue {k}")).spawn(move || shared.work()).ok()
         };
         let threads = (1..threads).filter_map(spawn).collect();
-        let patience = Patience::new(shared.roomy);
-        Self { shared, threads, busy: Mutex::new(patience) }
+        let spin = AdaptiveSpin::new(shared.roomy);
+        Self { shared, threads, busy: Mutex::new(spin) }
     }
 
     /// Number of threads, the caller's included.
@@ -110,7 +110,7 @@ impl Workers {
     /// Runs job(0) … job(n − 1) in any order; returns when all are done. A panic of a job goes on in the caller.
     pub fn parallel_for(&self, n: usize, job: &(dyn Fn(usize) + Sync)) {
         let alone = self.threads.is_empty() || n < 2;
-        let Some(mut patience) = (!alone).then(|| self.enter()).flatten() else {
+        let Some(mut spin) = (!alone).then(|| self.enter()).flatten() else {
             return (0..n).for_each(job);
         };
         // SAFETY: only the lifetime is erased; `finish` does not return before every thread has left the loop.
@@ -128,7 +128,7 @@ impl Workers {
             self.shared.begun.notify_all();
         }
         self.shared.take_pieces(this);
-        self.shared.finish(&mut patience);
+        self.shared.finish(&mut spin);
     }
 }
 
@@ -150,7 +150,7 @@ impl Workers {
     }
 
     /// The right to run a loop on all threads; None: one is running.
-    fn enter(&self) -> Option<MutexGuard<'_, Patience>> {
+    fn enter(&self) -> Option<MutexGuard<'_, AdaptiveSpin>> {
         match self.busy.try_lock() {
             Ok(guard) => Some(guard),
             // A job panicked; its loop was finished before the panic went on.
@@ -179,7 +179,7 @@ impl Shared {
 
     /// Life of a thread.
     fn work(&self) {
-        let (mut last, mut patience) = (0, Patience::new(self.roomy));
+        let (mut last, mut spin) = (0, AdaptiveSpin::new(self.roomy));
         let mut state = self.lock();
         while !state.stop {
             let fresh = state.number != last;
@@ -197,7 +197,7 @@ impl Shared {
             if fresh {
                 drop(state);
                 let begun = || self.announced.load(Ordering::Acquire) != last;
-                patience.wait(|| begun() || self.stopping.load(Ordering::Acquire));
+                spin.wait(|| begun() || self.stopping.load(Ordering::Acquire));
                 state = self.lock();
             } else {
                 state.asleep += 1;
@@ -232,12 +232,12 @@ impl Shared {
     }
 
     /// Closes the loop to threads that wake late, waits for those inside, and passes a panic on.
-    fn finish(&self, patience: &mut Patience) {
+    fn finish(&self, spin: &mut AdaptiveSpin) {
         let mut state = self.lock();
         state.current = None;
         if state.inside > 0 {
             drop(state);
-            patience.wait(|| self.inside.load(Ordering::Acquire) == 0);
+            spin.wait(|| self.inside.load(Ordering::Acquire) == 0);
             state = self.lock();
         }
         state.awaited = true;

@@ -2,7 +2,7 @@
 
 use crate::motor_work::MotorWork;
 use serde::{Deserialize, Serialize};
-use terraglue_engine::observer::{View, book_of};
+use terraglue_engine::observer::{View, ledger_of};
 use terraglue_gluing::StepReport;
 use terraglue_subsystem::Kind;
 
@@ -11,7 +11,7 @@ const TOLERATED: f64 = 0.01;
 /// Below this the drift is rounding, J.
 const ROUNDING_J: f64 = 1e-9;
 
-/// Where the energy of a run came from and went. Null is unknown: a subsystem keeps no book of it.
+/// Where the energy of a run came from and went. Null is unknown: a subsystem keeps no energy ledger.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Energies {
     /// Net mechanical work of the motors and of loads from outside, J.
@@ -41,7 +41,7 @@ pub struct Energies {
     /// Whether that is a change of kinetic or potential energy.
     #[serde(default)]
     pub by_changes: bool,
-    /// Subsystems that keep no book, or not a whole one.
+    /// Subsystems that keep no energy ledger, or not a whole one.
     pub without_book: Vec<String>,
 }
 
@@ -70,15 +70,15 @@ impl Energies {
         match self.without_book.as_slice() {
             _ if self.drift_j.is_some() => String::new(),
             [] => "no step was made".into(),
-            [one] => format!("{one} keeps no book"),
-            many => format!("{} keep no book", many.join(", ")),
+            [one] => format!("{one} keeps no energy ledger"),
+            many => format!("{} keep no energy ledger", many.join(", ")),
         }
     }
 }
 
-/// The state of all books at once, J; not a number where unknown.
+/// The state of all ledgers at once, J; not a number where unknown.
 #[derive(Clone, Copy)]
-struct Books {
+struct EnergySums {
     kinetic: f64,
     potential: f64,
     soil_heat: f64,
@@ -86,7 +86,7 @@ struct Books {
     work: f64,
 }
 
-impl Books {
+impl EnergySums {
     fn of(view: &View) -> Self {
         let soils = view.subsystems.iter().filter(|s| s.kind == Kind::Soil);
         Self {
@@ -99,10 +99,10 @@ impl Books {
     }
 }
 
-/// Follows the books of a run.
+/// Follows the ledgers of a run.
 #[derive(Default)]
 pub(crate) struct EnergyTrack {
-    ends: Option<(Books, Books)>,
+    ends: Option<(EnergySums, EnergySums)>,
     has_soil: bool,
     glue_stored_j: f64,
     glue_heat_j: f64,
@@ -111,7 +111,7 @@ pub(crate) struct EnergyTrack {
     without_book: Vec<String>,
 }
 
-terraglue_subsystem::persist!(Books { kinetic, potential, soil_heat, heat, work });
+terraglue_subsystem::persist!(EnergySums { kinetic, potential, soil_heat, heat, work });
 terraglue_subsystem::persist!(EnergyTrack {
     ends,
     has_soil,
@@ -126,15 +126,15 @@ impl EnergyTrack {
     /// At the start.
     pub fn start(&mut self, view: &View) {
         self.has_soil = view.subsystems.iter().any(|s| s.kind == Kind::Soil);
-        let silent = view.subsystems.iter().filter(|s| !book_of(s.kind, &s.instance.energy()).is_known());
+        let silent = view.subsystems.iter().filter(|s| !ledger_of(s.kind, &s.instance.energy()).is_known());
         self.without_book = silent.map(|s| s.name.to_owned()).collect();
-        let books = Books::of(view);
-        self.ends = Some((books, books));
+        let ledgers = EnergySums::of(view);
+        self.ends = Some((ledgers, ledgers));
     }
 
     /// After a step.
     pub fn follow(&mut self, view: &View) {
-        let now = Books::of(view);
+        let now = EnergySums::of(view);
         let (first, before) = self.ends.unwrap_or((now, now));
         let step = (now.work - before.work).abs();
         self.work_path_j += if step.is_nan() { 0.0 } else { step };
@@ -201,7 +201,8 @@ mod tests {
 
     #[test]
     fn the_drift_is_held_against_the_largest_of_what_was_turned_over() {
-        let at = |kinetic: f64, work: f64| Books { kinetic, potential: 1.0, soil_heat: 0.0, heat: 0.0, work };
+        let at =
+            |kinetic: f64, work: f64| EnergySums { kinetic, potential: 1.0, soil_heat: 0.0, heat: 0.0, work };
         let of = |track: EnergyTrack| track.figures(&MotorWork::default());
         let ends = Some((at(0.0, 0.0), at(0.0, 2.0)));
         let driven = of(EnergyTrack { ends, work_path_j: 2.0, port_path_j: 1.0, ..EnergyTrack::default() });
@@ -223,8 +224,8 @@ mod tests {
         let mut unknown = drifting(None, 100.0);
         assert!(!unknown.is_off() && unknown.drift_share().is_none());
         unknown.without_book = vec!["soil".into()];
-        assert_eq!(unknown.why_unknown(), "soil keeps no book");
+        assert_eq!(unknown.why_unknown(), "soil keeps no energy ledger");
         unknown.without_book.push("robot".into());
-        assert_eq!(unknown.why_unknown(), "soil, robot keep no book");
+        assert_eq!(unknown.why_unknown(), "soil, robot keep no energy ledger");
     }
 }

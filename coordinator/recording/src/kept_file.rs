@@ -91,7 +91,7 @@ impl KeptFile {
             if !std::mem::replace(&mut self.told, true) {
                 let name = self.path.display();
                 log::warn!(
-                    "`{name}` was closed by a module or unit and is opened again; `isolate = true` keeps such a one apart"
+                    "`{name}` was closed by a module or FMU and is opened again; `isolate = true` keeps such a one apart"
                 );
             }
             self.file = Some(again);

@@ -21,6 +21,11 @@
 //! [`Recording`] reads any recording, also one that was cut off ([`mend`] gives such a file its footer);
 //! [`report::write`] makes the report from it, [`compare::write`] puts several runs side by side.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod body_track;
 mod columns;
 mod csv;

@@ -26,7 +26,7 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use terraglue_diagnostics::error::{Error, Result};
-use terraglue_engine::observer::{Happening, View};
+use terraglue_engine::observer::{Event, View};
 use terraglue_gluing::StepReport;
 use terraglue_numerics::rotation;
 use terraglue_scenario::Scenario;
@@ -302,15 +302,15 @@ impl McapWriter {
     }
 
     /// Writes an event.
-    pub fn happened(&mut self, happening: &Happening) -> Result {
-        let event = Log {
-            timestamp: Some(timestamp(happening.t_s)),
+    pub fn event(&mut self, event: &Event) -> Result {
+        let entry = Log {
+            timestamp: Some(timestamp(event.t_s)),
             level: log::Level::Info.into(),
-            message: happening.what.clone(),
+            message: event.what.clone(),
             name: "terraglue".into(),
             ..Log::default()
         };
-        self.put(self.channels.events, happening.t_s, &event)
+        self.put(self.channels.events, event.t_s, &entry)
     }
 
     /// Writes the tiles of ground that have changed since they were last written.

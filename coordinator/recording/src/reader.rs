@@ -14,7 +14,7 @@ use prost::Message;
 use std::collections::BTreeMap;
 use std::path::Path;
 use terraglue_diagnostics::error::{Error, Result};
-use terraglue_engine::observer::Happening;
+use terraglue_engine::observer::Event;
 
 /// Everything in a recording.
 #[derive(Clone, Debug, Default)]
@@ -36,7 +36,7 @@ pub struct Recording {
     /// Energies, J: `kinetic`, …, and `<subsystem>.kinetic`, ….
     pub energy: Table,
     /// What happened.
-    pub events: Vec<Happening>,
+    pub events: Vec<Event>,
     /// The ground at the start.
     pub initial_ground: Option<GroundRecord>,
     /// The ground at the end, or where the recording ends.
@@ -63,14 +63,14 @@ struct Source {
 
 /// Names and last values of all columns of a subsystem.
 #[derive(Default)]
-struct Row {
+struct VariableRow {
     names: Vec<String>,
     values: Vec<f64>,
     /// Columns of the subsystem's table; empty until a row is written after a channel was announced.
     columns: Vec<Option<usize>>,
 }
 
-impl Row {
+impl VariableRow {
     /// Takes the columns of a channel in.
     fn announce(&mut self, source: &Source) {
         let end = source.places.iter().max().map_or(0, |k| k + 1).max(self.names.len());
@@ -101,7 +101,7 @@ impl Row {
 #[derive(Default)]
 struct State {
     sources: BTreeMap<u16, Source>,
-    rows: BTreeMap<String, Row>,
+    rows: BTreeMap<String, VariableRow>,
 }
 
 /// What was simulated; all texts as in the scenario.
@@ -233,9 +233,7 @@ impl Recording {
             "/tf" => self.take_transforms(data, t_s),
             "/ground" => self.take_ground(data, t_s),
             "/gluing" => self.gluing.extend(StepMessage::decode(data).ok().map(GluingRecord::from)),
-            "/events" => {
-                self.events.extend(Log::decode(data).ok().map(|e| Happening { t_s, what: e.message }))
-            }
+            "/events" => self.events.extend(Log::decode(data).ok().map(|e| Event { t_s, what: e.message })),
             "/scene" => self.take_scene(data),
             topic if topic.starts_with("/ground/") => self.take_tile(data, t_s),
             _ => self.take_numbers(message, t_s, state),

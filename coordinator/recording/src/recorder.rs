@@ -12,7 +12,7 @@ use crate::{selection, viewer_layout};
 use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use terraglue_diagnostics::error::{Error, Result};
-use terraglue_engine::observer::{Happening, Observer, View};
+use terraglue_engine::observer::{Event, Observer, View};
 use terraglue_scenario::{Connection, RecordingSpec, ReportSpec, Scenario, Source};
 use terraglue_terrain::write_esri_ascii;
 
@@ -234,9 +234,9 @@ impl Observer for Recorder {
         self.step(view).map_err(|e| self.explained(e))
     }
 
-    fn happened(&mut self, happening: &Happening) -> Result {
-        self.summary.happened(happening)?;
-        self.mcap.happened(happening).map_err(|e| self.explained(e))
+    fn event(&mut self, event: &Event) -> Result {
+        self.summary.event(event)?;
+        self.mcap.event(event).map_err(|e| self.explained(e))
     }
 
     fn finished(&mut self, view: &View, error: Option<&Error>) -> Result {

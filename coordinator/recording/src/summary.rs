@@ -5,7 +5,7 @@ use crate::layout::{SUMMARY, at, other_at};
 use serde::{Deserialize, Serialize};
 use std::path::Path;
 use terraglue_diagnostics::error::{Error, Result};
-use terraglue_engine::observer::Happening;
+use terraglue_engine::observer::Event;
 
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -59,7 +59,7 @@ pub struct Summary {
     /// What stopped it; null unless `failed`.
     pub error: Option<FailureRecord>,
     /// Events, changes and warnings in order of time.
-    pub events: Vec<Happening>,
+    pub events: Vec<Event>,
     /// Name of the scenario.
     pub scenario: String,
     /// Gluing strategy.
@@ -122,9 +122,9 @@ pub struct Summary {
     /// Largest |T* − T1| along n, N.
     pub max_estimate_gap_n: f64,
     /// Sum over the steps of the magnitude of the work that the interface gains, J: work on both sides by each side's own
-    /// wrench; null where a soil keeps no book.
+    /// wrench; null where a soil keeps no energy ledger.
     pub interface_work_error_j: Option<f64>,
-    /// Drift of the energy book: change of (kinetic + potential + dissipated − actuator work) of all
+    /// Drift of the energy ledger: change of (kinetic + potential + dissipated − actuator work) of all
     /// subsystems and of the glue since the start, J; null: unknown. The same as `energies.drift_j`.
     pub energy_balance_j: Option<f64>,
     /// CPU time per step, s.

@@ -9,7 +9,7 @@ use crate::prints::PrintTrack;
 use crate::snapshot::{real, real_id};
 use crate::summary::{FailureRecord, Status, Summary};
 use terraglue_diagnostics::error::{Error, Result};
-use terraglue_engine::observer::{Happening, Observer, SubsystemView, View};
+use terraglue_engine::observer::{Event, Observer, SubsystemView, View};
 use terraglue_gluing::StepReport;
 use terraglue_numerics::rotation;
 use terraglue_scenario::Scenario;
@@ -28,7 +28,7 @@ pub struct SummaryObserver {
     speed_name: Option<String>,
     gravity_m_s2: [f64; 3],
     soil_module: Option<String>,
-    events: Vec<Happening>,
+    events: Vec<Event>,
     steps: u64,
     t_s: f64,
     body: Option<BodyTrack>,
@@ -356,8 +356,8 @@ impl Observer for SummaryObserver {
         self.motors.follow(view)
     }
 
-    fn happened(&mut self, happening: &Happening) -> Result {
-        self.events.push(happening.clone());
+    fn event(&mut self, event: &Event) -> Result {
+        self.events.push(event.clone());
         Ok(())
     }
 }

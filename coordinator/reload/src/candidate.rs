@@ -44,7 +44,7 @@ pub struct Preparation {
 /// How long a file must stay as it is to count as written.
 const SETTLED: Duration = Duration::from_millis(20);
 /// How long it may take to settle.
-const PATIENCE: Duration = Duration::from_secs(10);
+const LONGEST: Duration = Duration::from_secs(10);
 
 impl Preparation {
     /// Builds, copies and tests. None: the same code as before.
@@ -121,7 +121,7 @@ impl Preparation {
 
 /// The bytes of a file that nobody writes to any more.
 fn settled(file: &Path) -> Result<Vec<u8>, String> {
-    let end = Instant::now() + PATIENCE;
+    let end = Instant::now() + LONGEST;
     loop {
         let before = Stamp::of(file);
         std::thread::sleep(SETTLED);

@@ -8,6 +8,11 @@
 //! Files are polled, not subscribed to: an exchange happens between two steps anyway, where a look at a few files costs
 //! microseconds, and polling also sees network folders, containers, and libraries that a linker puts in place by renaming.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod candidate;
 mod sources;
 
@@ -328,7 +333,7 @@ impl Reloader {
         let ground = module.schema().kind == Kind::Soil;
         let services = terraglue_engine::testbed::services(&self.scenario, &self.run, ground);
         let services = services.map_err(|e| e.to_string())?;
-        let services = HostServices { partings: testbed.partings(), ..services };
+        let services = HostServices { teardown_errors: testbed.teardown_errors(), ..services };
         let made = terraglue_engine::testbed::make(&self.scenario, &w.spec, module, config, &services);
         let made = made.map_err(|e| e.to_string())?;
         let earlier: u64 = self.watched.iter().filter(|o| o.spec.name == w.spec.name).map(|o| o.count).sum();

@@ -3,6 +3,11 @@
 //! The texts below `templates/` are whole programs in which the name `my-module` (`my_module` in file names) and the
 //! words between at signs are replaced.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod program;
 mod reserved;
 mod standing;

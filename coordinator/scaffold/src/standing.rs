@@ -5,7 +5,7 @@
 
 use nalgebra::{Isometry3, Vector3};
 use std::fmt::Write;
-use terraglue_robot_import::{Base, Joint, JointKind, Robot, Whole};
+use terraglue_robot_import::{Base, Joint, JointKind, Robot, TotalMass};
 
 /// On the Moon, m/s².
 const GRAVITY: f64 = 1.62;
@@ -26,7 +26,7 @@ pub struct Standing<'a> {
     fixed: bool,
     coordinates: Vec<f64>,
     poses: Vec<Isometry3<f64>>,
-    whole: Whole,
+    whole: TotalMass,
     /// Smallest and largest corner of what can touch, in the frame of the file, m.
     corners: [Vector3<f64>; 2],
     /// Bodies that reach lowest.

@@ -419,12 +419,12 @@ pub fn subsystem_keys() -> Vec<Key> {
     let build = "command that builds the module, run by `run --watch` in the scenario's folder on a change of its sources";
     let sources =
         "files and folders that `build` depends on; where absent, the sources below the scenario's folder";
-    let unit = "a functional mock-up unit instead of a module; other keys are its start values, `on_nan`, `event_mode`, `rollback`, and \
+    let fmu = "a functional mock-up unit instead of a module; other keys are its start values, `on_nan`, `event_mode`, `rollback`, and \
                 `bodies`, what of it can be glued (docs/fmi.md)";
     let row = "a row of the soil table, or a soil file (.toml), whose numbers are offered to the module";
     vec![
         Parameter::of("module", ParameterType::Text, module).into(),
-        Parameter::of("fmu", ParameterType::Path, unit).optional().into(),
+        Parameter::of("fmu", ParameterType::Path, fmu).optional().into(),
         Parameter::of("step_multiple", ParameterType::Integer, multiple).or(1).within(1.0, 1e6).into(),
         Parameter::of(
             "isolate",

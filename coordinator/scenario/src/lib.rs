@@ -3,6 +3,11 @@
 //! The keys of the reserved tables stand once, in [`keys`]; the parser, the JSON Schema and the documentation
 //! are made from there. Parameters of modules are checked by [`check_parameters`] once their schemas are known.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 pub mod advice;
 mod choices;
 mod difference;

@@ -46,10 +46,10 @@ fn one(source: &Source, name: &str, node: &Node) -> Result<SubsystemSpec, Box<In
         }
     }
     let module = match (node.get("module"), node.get("fmu")) {
-        (None, Some(unit)) => unit_path(source, unit)?,
-        (Some(_), Some(unit)) => {
+        (None, Some(fmu)) => fmu_path(source, fmu)?,
+        (Some(_), Some(fmu)) => {
             let message = format!("`[{name}]` is either a `module` or an `fmu`");
-            return Err(source.error(&unit.key, message, Some("delete one of the two".into())));
+            return Err(source.error(&fmu.key, message, Some("delete one of the two".into())));
         }
         _ => text(node, "module").unwrap_or_default(),
     };
@@ -98,8 +98,8 @@ pub(super) fn texts(node: &Node) -> Vec<String> {
     }
 }
 
-/// The path of a unit as it was written; the file must exist and be named `….fmu`.
-fn unit_path(source: &Source, node: &Node) -> Result<String, Box<InputError>> {
+/// The path of an FMU as it was written; the file must exist and be named `….fmu`.
+fn fmu_path(source: &Source, node: &Node) -> Result<String, Box<InputError>> {
     let path = match &node.value {
         Raw::Text(path) if ModuleKind::is_fmu(path) => path.clone(),
         _ => return Err(source.error(&node.at, "`fmu` takes the path of a file `….fmu` in quotes", None)),

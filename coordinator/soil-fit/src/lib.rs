@@ -2,6 +2,11 @@
 //!
 //! The fits themselves are in `terraglue_soil_identification`; here are files, names and units.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod columns;
 mod drawing;
 mod known;

@@ -61,9 +61,9 @@ pub fn fit_module(plugin: &str, tests: &PlateTests, known: Known) -> Result<LawF
     };
     let mut values: Vec<f64> = parameters.iter().map(|p| given(p).unwrap_or_else(|| start(p))).collect();
     let services = HostServices::new(1, Path::new("."));
-    let bench =
-        law::Bench::open(&module, &values, &services).map_err(|e| plain(format!("--law {plugin}: {e}")))?;
-    if !bench.law().has_pressure() {
+    let trial = law::LawTrial::open(&module, &values, &services)
+        .map_err(|e| plain(format!("--law {plugin}: {e}")))?;
+    if !trial.law().has_pressure() {
         return Err(plain(format!(
             "--law {plugin}: it has no pressure function, so plates tell nothing of it"
         )));
@@ -74,13 +74,13 @@ pub fn fit_module(plugin: &str, tests: &PlateTests, known: Known) -> Result<LawF
     let mut pressures = |x: &[f64], readings: &[Reading], p: &mut [f64]| {
         let mut numbers = all.clone();
         sought.iter().zip(x).for_each(|(k, x)| numbers[*k] = *x);
-        bench.with(&numbers).is_ok_and(|law| LawNumbers(law.as_ref()).pressures(readings, p).is_ok())
+        trial.with(&numbers).is_ok_and(|law| LawNumbers(law.as_ref()).pressures(readings, p).is_ok())
     };
     let found = fit_numbers(&mut pressures, &free, &tests.readings).map_err(|e| {
         plain(format!("{e}, or the law has no pressure there with the numbers of its schema"))
     })?;
     sought.iter().zip(&found.numbers).for_each(|(k, x)| values[*k] = *x);
-    let law = bench.with(&values).map_err(plain)?;
+    let law = trial.with(&values).map_err(plain)?;
     let interval = |k: usize| {
         let at = sought.iter().position(|s| *s == k)?;
         Some(found.intervals[at]).filter(|i| !i.low.is_nan() || values[k] != all[k])

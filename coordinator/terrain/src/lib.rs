@@ -4,6 +4,11 @@
 //! Every terrain is centred on the world's origin and has size/spacing + 1 nodes. Files keep their own lattice
 //! unless a spacing is asked for; their coordinates are dropped, their heights kept.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod analytic;
 mod crater;
 mod esri_ascii;

@@ -1,4 +1,4 @@
-//! Checks the archive of a unit before anything of it is written, and extracts it.
+//! Checks the archive of an FMU before anything of it is written, and extracts it.
 //!
 //! An FMU is foreign: names that lead out of the folder, links, devices, bombs and lies about sizes are refused
 //! with the name of the entry. Sizes are counted while reading, whatever the archive says of itself.
@@ -44,7 +44,7 @@ pub struct Archive {
 }
 
 impl Archive {
-    /// Opens the archive of a unit and checks the names, kinds and stated sizes of all entries.
+    /// Opens the archive of an FMU and checks the names, kinds and stated sizes of all entries.
     pub fn open(path: &Path, limits: Limits) -> Result<Self> {
         Self::open_with(path, limits, ["modelDescription.xml", "FMU"])
     }
@@ -278,9 +278,9 @@ fn safe_parts(name: &str) -> std::result::Result<Vec<String>, String> {
     }
     let parts: Vec<&str> = name.split(['/', '\\']).filter(|p| !p.is_empty() && *p != ".").collect();
     if parts.contains(&"..") {
-        return Err("leads out of the folder of the unit".into());
+        return Err("leads out of the folder of the FMU".into());
     }
-    // `./` names the folder of the unit itself
+    // `./` names the folder of the FMU itself
     if parts.is_empty() && !name.ends_with('/') || parts.iter().any(|p| p.len() > 255) || parts.len() > 64 {
         return Err("has no usable name".into());
     }

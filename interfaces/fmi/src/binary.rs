@@ -1,4 +1,4 @@
-//! Finds and loads the shared library of a unit.
+//! Finds and loads the shared library of an FMU.
 #![allow(unsafe_code)] // Loading a library runs its constructors.
 
 use crate::description::Version;
@@ -11,7 +11,7 @@ use std::error::Error as _;
 use std::mem::ManuallyDrop;
 use std::path::Path;
 
-/// Library of a unit in this process; unloaded when dropped, unless threads may still run in it.
+/// Library of an FMU in this process; unloaded when dropped, unless threads may still run in it.
 #[derive(Debug)]
 pub struct Loaded {
     pub library: ManuallyDrop<Library>,
@@ -22,7 +22,7 @@ pub struct Loaded {
 impl Drop for Loaded {
     fn drop(&mut self) {
         if threads() <= self.threads {
-            // SAFETY: dropped once, here; no instance of the unit is left.
+            // SAFETY: dropped once, here; no instance of the FMU is left.
             unsafe { ManuallyDrop::drop(&mut self.library) };
         }
     }
@@ -59,7 +59,7 @@ pub fn platforms<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
     all
 }
 
-/// Loads the library of an extracted unit.
+/// Loads the library of an extracted FMU.
 pub fn load(fmu: &Fmu) -> Result<Loaded> {
     let fail = |message: String| Error::Library { path: fmu.path().into(), message };
     let description = fmu.description();
@@ -116,9 +116,9 @@ fn inspect(path: &Path) -> std::result::Result<(), String> {
     }
 }
 
-/// Opens a library. Some units forget to link the mathematics library: they get a second try with it.
+/// Opens a library. Some FMUs forget to link the mathematics library: they get a second try with it.
 fn open(path: &Path) -> std::result::Result<Library, String> {
-    // SAFETY: the user asked for this unit; its constructors run.
+    // SAFETY: the user asked for this FMU; its constructors run.
     let once = || unsafe { Library::open(Some(path), RTLD_NOW | RTLD_LOCAL) };
     let first = match once() {
         Ok(library) => return Ok(library),

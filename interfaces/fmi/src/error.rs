@@ -1,8 +1,8 @@
-//! What can be wrong with a unit, split by what has to be mended: archive, description, library, behaviour.
+//! What can be wrong with an FMU, split by what has to be mended: archive, description, library, behaviour.
 
 use std::path::PathBuf;
 
-/// Why a unit cannot be used or does not go on.
+/// Why an FMU cannot be used or does not go on.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
@@ -30,7 +30,7 @@ pub enum Error {
         /// What is wrong.
         message: String,
     },
-    /// It is a good unit, but of a kind that is not run here.
+    /// It is a good FMU, but of a kind that is not run here.
     #[error("{}: {message}", path.display())]
     Unsupported {
         /// File.
@@ -53,7 +53,7 @@ pub enum Error {
         function: &'static str,
         /// Status or what else was wrong with its answer.
         outcome: String,
-        /// Last lines that the unit logged.
+        /// Last lines that the FMU logged.
         log: Vec<String>,
         /// Whether nothing of the instance may be called any more.
         fatal: bool,
@@ -65,10 +65,10 @@ pub enum Error {
         function: &'static str,
         /// Last successful time, s.
         reached: f64,
-        /// Last lines that the unit logged.
+        /// Last lines that the FMU logged.
         log: Vec<String>,
     },
-    /// The unit does not offer what was asked for.
+    /// The FMU does not offer what was asked for.
     #[error("{0}")]
     Refused(String),
 }

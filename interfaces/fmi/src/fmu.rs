@@ -1,4 +1,4 @@
-//! A unit on disk: its archive extracted into a folder of its own, its description read.
+//! An FMU on disk: its archive extracted into a folder of its own, its description read.
 
 use crate::archive::{Archive, Limits};
 use crate::binary::{self, Loaded};
@@ -17,7 +17,7 @@ const PREFIX: &str = "terraglue-";
 /// File in such a folder that its process holds locked.
 const LOCK: &str = ".terraglue-lock";
 
-/// A checked and extracted unit. Its folder goes when the last instance and this handle are gone.
+/// A checked and extracted FMU. Its folder goes when the last instance and this handle are gone.
 #[derive(Debug)]
 pub struct Fmu {
     path: PathBuf,
@@ -28,7 +28,7 @@ pub struct Fmu {
 }
 
 impl Fmu {
-    /// Checks, reads and extracts a unit. None of its code runs.
+    /// Checks, reads and extracts an FMU. None of its code runs.
     ///
     /// # Errors
     /// What is wrong with archive or description, with entry or line.
@@ -142,7 +142,7 @@ impl Drop for Folder {
         let own = std::fs::metadata(self.folder.path().join(LOCK)).ok().map(identity);
         let now = self.lock.as_ref().and_then(|lock| lock.metadata().ok()).map(identity);
         if own.is_none() || own != now {
-            // The unit closed a descriptor that is not its own; the number may be another file's by now.
+            // The FMU closed a descriptor that is not its own; the number may be another file's by now.
             let _ = self.lock.take().map(IntoRawFd::into_raw_fd);
         }
     }

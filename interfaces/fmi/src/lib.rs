@@ -1,14 +1,19 @@
 //! Functional mock-up units (FMUs) of FMI 2.0 and 3.0, co-simulation.
 //!
 //! [`Fmu::open`] checks an archive, extracts it into a folder that is gone afterwards, and reads its description;
-//! none of its code runs. [`Slave`] is an instance of it, driven through the C interface of its version. The types
+//! none of its code runs. [`FmuInstance`] is an instance of it, driven through the C interface of its version. The types
 //! and functions of the C interfaces are declared here from the text of the standards (Modelica Association, FMI
 //! 2.0.4 and 3.0.2).
 //!
-//! [`ssp::Package`] reads a system structure, several units with their connections and parameters.
+//! [`ssp::Package`] reads a system structure, several FMUs with their connections and parameters.
 //!
 //! Every status of every call is looked at. What is not success becomes an [`Error`] that names the file, the
-//! function, the time and what the unit logged last; after `fatal` nothing of the instance is called again.
+//! function, the time and what the FMU logged last; after `fatal` nothing of the instance is called again.
+
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
 
 mod archive;
 mod binary;
@@ -18,7 +23,7 @@ mod error;
 pub mod export;
 pub mod floating_point;
 mod fmu;
-pub mod slave;
+pub mod instance;
 pub mod ssp;
 
 pub use archive::Limits;
@@ -26,4 +31,4 @@ pub use binary::{library_entry, platforms};
 pub use description::{ModelDescription, Version};
 pub use error::{Error, Result};
 pub use fmu::{Fmu, Folder, remove_folders};
-pub use slave::{Advance, IntermediateRow, LogLine, Slave, SlaveOptions, SlaveState, Stepped};
+pub use instance::{Advance, FmuInstance, FmuState, InstanceOptions, IntermediateRow, LogLine, Stepped};

@@ -4,7 +4,7 @@
 
 use hostile_archives::{MANY, refused, unloadable, usable};
 use std::path::{Path, PathBuf};
-use terraglue_fmi::{Error, Fmu, Limits, Slave, SlaveOptions};
+use terraglue_fmi::{Error, Fmu, FmuInstance, InstanceOptions, Limits};
 
 /// Stands for a library; nobody loads it here.
 const LIBRARY: &[u8] = b"library";
@@ -90,20 +90,13 @@ fn archives_that_were_cut_are_refused() {
     }
 }
 
-/// What happens to a unit whose archive is good but whose library is not.
+/// What happens to an FMU whose archive is good but whose library is not.
 fn loading(bytes: &[u8]) -> String {
     let place = Place::new();
     let fmu = Fmu::open(&place.write(bytes)).expect("a good archive");
     let folder = fmu.folder().to_owned();
-    let options = SlaveOptions {
-        name: "x".into(),
-        verbose: false,
-        event_mode: false,
-        intermediate: Vec::new(),
-        followed: Vec::new(),
-        sink: Box::new(|_| {}),
-    };
-    let error = Slave::instantiate(&fmu, options).expect_err("no library");
+    let options = InstanceOptions::new("x", Box::new(|_| {}));
+    let error = FmuInstance::instantiate(&fmu, options).expect_err("no library");
     drop(fmu);
     assert!(!folder.exists(), "the folder goes");
     error.to_string()
@@ -118,7 +111,7 @@ fn libraries_that_are_none_are_refused() {
 }
 
 #[test]
-fn odd_but_legal_units_are_read() {
+fn odd_but_legal_fmus_are_read() {
     for case in usable(LIBRARY) {
         let place = Place::new();
         let fmu = Fmu::open(&place.write(&case.bytes)).unwrap_or_else(|e| panic!("{}: {e}", case.name));
@@ -138,7 +131,7 @@ fn odd_but_legal_units_are_read() {
     }
 }
 
-/// Good units, changed at every few places: an error or a unit, never a panic.
+/// Good FMUs, changed at every few places: an error or an FMU, never a panic.
 #[test]
 fn damaged_bytes_never_do_harm() {
     for case in usable(LIBRARY).into_iter().take(2) {

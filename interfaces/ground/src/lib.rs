@@ -10,6 +10,11 @@
 //!
 //! Nothing here knows what soil is; contact detection, soils and later sensors share it.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod coverage;
 mod footprint;
 mod height_field;

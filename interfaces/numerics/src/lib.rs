@@ -2,5 +2,10 @@
 //!
 //! The only interface crate with algorithms. It touches no clock, no file and no thread.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 pub mod extremes;
 pub mod rotation;

@@ -1,4 +1,4 @@
-//! Vectors and unit quaternions (w, x, y, z) of what the coordinator itself turns: glue, feet and bodies of units.
+//! Vectors and unit quaternions (w, x, y, z) of what the coordinator itself turns: glue, feet and bodies of FMUs.
 
 /// Vector, m or whatever the value says.
 pub type Vector = [f64; 3];

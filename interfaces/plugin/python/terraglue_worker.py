@@ -54,27 +54,27 @@ def _rich(x):
     return numpy.frombuffer(bytes.fromhex(x["bytes"]), x["numpy"]).reshape(x["shape"]).copy()
 
 
-def _packed_state(unit):
-    text = json.dumps([_plain(unit.state), [[f.name, f.values.tobytes().hex()] for f in unit.fields]]).encode()
+def _packed_state(subsystem):
+    text = json.dumps([_plain(subsystem.state), [[f.name, f.values.tobytes().hex()] for f in subsystem.fields]]).encode()
     return _HEAD + struct.pack("<I", zlib.crc32(text)) + text
 
 
-def _unpacked_state(unit, data):
+def _unpacked_state(subsystem, data):
     text = data[len(_HEAD) + 4:]
     if data[:len(_HEAD)] != _HEAD or data[len(_HEAD):len(_HEAD) + 4] != struct.pack("<I", zlib.crc32(text)):
         raise Refused("these bytes are no state of a module in Python, or they were changed")
     state, fields = json.loads(text)
     fields = [array.array("d", bytes.fromhex(values)) for _, values in fields]
-    if [len(f) for f in fields] != [len(f.values) for f in unit.fields]:
+    if [len(f) for f in fields] != [len(f.values) for f in subsystem.fields]:
         raise Refused("the state has other fields")
     state = _rich(state)
-    keys = [_names(state), unit._names]
+    keys = [_names(state), subsystem._names]
     if keys[0] != keys[1]:
         try:
-            state = unit.migrate(state)
+            state = subsystem.migrate(state)
         except Refused as e:
             raise Refused(f"the state holds {keys[0]}; that of this code holds {keys[1]}, and {e}") from None
-    _put_back(unit, (state, fields))
+    _put_back(subsystem, (state, fields))
 
 
 def _names(state):
@@ -84,16 +84,16 @@ def _names(state):
     return ", ".join(sorted(k for k in state if isinstance(k, str))) or "no names"
 
 
-def _kept(unit):
-    return copy.deepcopy(unit.state), [f.values[:] for f in unit.fields]
+def _kept(subsystem):
+    return copy.deepcopy(subsystem.state), [f.values[:] for f in subsystem.fields]
 
 
-def _put_back(unit, kept):
-    unit.state = copy.deepcopy(kept[0])
-    for field, values in zip(unit.fields, kept[1]):
+def _put_back(subsystem, kept):
+    subsystem.state = copy.deepcopy(kept[0])
+    for field, values in zip(subsystem.fields, kept[1]):
         field.values[:] = values
         field.changed()
-    unit.restored()
+    subsystem.restored()
 
 
 class Worker:
@@ -103,7 +103,7 @@ class Worker:
              "deserialize", "get", "set", "act", "next_event", "body_states", "energy", "pressure", "shear", "quit")
 
     def __init__(self):
-        self.unit, self.law, self.lines, self.slots, self.begun = None, None, [], {}, False
+        self.subsystem, self.law, self.lines, self.slots, self.begun = None, None, [], {}, False
         self.ports_seen, self.ports, self.nodes = None, [], []
         self.generation = 0
         self.file = ""
@@ -176,11 +176,11 @@ class Worker:
         what = start["what"]["Python"]
         cls = _subsystem(what["path"])
         self.host = Host(start, terrain, self.lines)
-        unit = cls(self.host, what["config"])
-        self.unit, self.fields = unit, list(unit.fields)
-        unit._names = _names(unit.state)
-        self.variables = list(unit.variables)
-        can = unit.can | (_STATE | _SERIALIZE if unit.state is not None else 0)
+        subsystem = cls(self.host, what["config"])
+        self.subsystem, self.fields = subsystem, list(subsystem.fields)
+        subsystem._names = _names(subsystem.state)
+        self.variables = list(subsystem.variables)
+        can = subsystem.can | (_STATE | _SERIALIZE if subsystem.state is not None else 0)
         reply.u32(can)
         self._describe(reply)
 
@@ -215,7 +215,7 @@ class Worker:
         reply.put(ONE, out.longest)
 
     def _describe(self, reply):
-        unit = self.unit
+        subsystem = self.subsystem
         reply.u32(len(self.variables))
         for k, v in enumerate(self.variables):
             reply.u32(k)
@@ -227,19 +227,19 @@ class Worker:
             reply.numbers(v.low, v.high)
             reply.values(U32, v.dims)
             reply.values(STRING, v.enumeration)
-        reply.u32(len(unit.actions))
-        for name, help in unit.actions:
+        reply.u32(len(subsystem.actions))
+        for name, help in subsystem.actions:
             reply.text(name)
             reply.text(help)
-        reply.u32(len(unit.bodies))
-        for name, mass in unit.bodies:
+        reply.u32(len(subsystem.bodies))
+        for name, mass in subsystem.bodies:
             reply.text(name)
             reply.numbers(mass)
-        reply.u32(len(unit.shapes))
-        for k, s in enumerate(unit.shapes):
+        reply.u32(len(subsystem.shapes))
+        for k, s in enumerate(subsystem.shapes):
             reply.u32(k)
             reply.u32(s.body)
-            reply.text(s.name or unit.bodies[s.body][0])
+            reply.text(s.name or subsystem.bodies[s.body][0])
             reply.u8(s.kind)
             if s.kind == 4:
                 points, triangles = s.size
@@ -304,7 +304,7 @@ class Worker:
         laws = [Law(*call.take(LAW)) for _ in range(call.u32())]
         at = reply.at
         reply.at += 4 + LAW.size * len(laws)
-        self._responded(step, reply, lambda out: self.unit.set_ports(step, laws, out))
+        self._responded(step, reply, lambda out: self.subsystem.set_ports(step, laws, out))
         end, reply.at = reply.at, at
         reply.u32(len(laws))
         for law in laws:
@@ -316,7 +316,7 @@ class Worker:
         partner, out = Motion(call.doubles(), call.doubles()), Estimate()
         out.t_star, out.x_free, out.g = reply.doubles(step.n), reply.doubles(step.n), reply.doubles(step.n * step.n)
         out.active, out.unique = [0] * len(step.ports), False
-        self.unit.estimate_forces(step, partner, out)
+        self.subsystem.estimate_forces(step, partner, out)
         reply.text(bytes(map(bool, out.active)))
         reply.u8(bool(out.unique))
 
@@ -324,7 +324,7 @@ class Worker:
         step, estimate = self._step(call), Estimate()
         estimate.t_star, estimate.x_free, estimate.g = call.doubles(), call.doubles(), call.doubles()
         estimate.active, estimate.unique = list(call.bytes()), bool(call.u8())
-        self._responded(step, reply, lambda out: self.unit.solve_compatibility(step, estimate, out))
+        self._responded(step, reply, lambda out: self.subsystem.solve_compatibility(step, estimate, out))
 
     def _advance(self, call, reply):
         step, kind = self._step(call), call.u8()
@@ -334,45 +334,45 @@ class Worker:
             given.motion = Motion(call.doubles(), call.doubles()) if kind else None
         else:
             given = Motion(call.doubles(), call.doubles())
-        self._responded(step, reply, lambda out: self.unit.advance(step, given, out))
+        self._responded(step, reply, lambda out: self.subsystem.advance(step, given, out))
 
     def _jacobian(self, call, reply):
         step, level = self._step(call), call.u32()
-        self.unit.interface_jacobian(step, level, reply.doubles(step.n * step.n))
+        self.subsystem.interface_jacobian(step, level, reply.doubles(step.n * step.n))
 
     def _commit(self, call, reply):
         step = self._step(call)
-        self.unit.commit(step, call.doubles(), Motion(call.doubles(), call.doubles()))
+        self.subsystem.commit(step, call.doubles(), Motion(call.doubles(), call.doubles()))
         self.begun = True
         self._tiles(reply)
 
     def _slot(self, call):
         slot = call.u32()
-        if self.unit.state is None:
+        if self.subsystem.state is None:
             raise Unsupported
         if slot >= self.host.slots:
             raise Refused(f"there is no slot {slot}")
         return slot
 
     def _save(self, call, reply):
-        self.slots[self._slot(call)] = _kept(self.unit)
+        self.slots[self._slot(call)] = _kept(self.subsystem)
 
     def _restore(self, call, reply):
         slot = self._slot(call)
         if slot not in self.slots:
             raise Refused(f"nothing was saved in slot {slot}")
-        _put_back(self.unit, self.slots[slot])
+        _put_back(self.subsystem, self.slots[slot])
         self._tiles(reply)
 
     def _serialize(self, call, reply):
-        if self.unit.state is None:
+        if self.subsystem.state is None:
             raise Unsupported
-        reply.text(_packed_state(self.unit))
+        reply.text(_packed_state(self.subsystem))
 
     def _deserialize(self, call, reply):
-        if self.unit.state is None:
+        if self.subsystem.state is None:
             raise Unsupported
-        _unpacked_state(self.unit, call.bytes())
+        _unpacked_state(self.subsystem, call.bytes())
         self._tiles(reply)
 
     def _variable(self, number, kind):
@@ -389,7 +389,7 @@ class Worker:
         values = []
         for number in ids:
             variable = self._variable(number, kind)
-            value = self.unit.get_value(variable)
+            value = self.subsystem.get_value(variable)
             values.extend(value) if variable.dims else values.append(value)
         if len(values) != count:
             raise Refused(f"{len(values)} values, but room for {count}")
@@ -406,7 +406,7 @@ class Worker:
             self._acceptable(variable, part)
             todo.append((variable, list(part) if variable.dims else part[0]))
         for variable, value in todo:
-            self.unit.set_value(variable, value)
+            self.subsystem.set_value(variable, value)
 
     def _acceptable(self, variable, values):
         if variable.effect == READ_ONLY:
@@ -422,27 +422,27 @@ class Worker:
 
     def _act(self, call, reply):
         action, arguments = call.text(), call.text()
-        if action not in [name for name, _ in self.unit.actions]:
+        if action not in [name for name, _ in self.subsystem.actions]:
             raise Refused(f"there is no action `{action}`")
-        self.unit.act(action, json.loads(arguments or "{}"))
+        self.subsystem.act(action, json.loads(arguments or "{}"))
         self._tiles(reply)
 
     def _next_event(self, call, reply):
-        reply.numbers(self.unit.next_event_time())
+        reply.numbers(self.subsystem.next_event_time())
 
     def _body_states(self, call, reply):
-        states = self.unit.body_states()
+        states = self.subsystem.body_states()
         reply.u32(len(states))
         for position, orientation, velocity, turning in states:
             reply.put(BODY, *position, *orientation, *velocity, *turning)
 
     def _energy(self, call, reply):
-        reply.numbers(*self.unit.energy())
+        reply.numbers(*self.subsystem.energy())
 
     def _quit(self, call, reply):
-        unit, self.unit = self.unit, None
-        if unit is not None:
-            unit.close()
+        subsystem, self.subsystem = self.subsystem, None
+        if subsystem is not None:
+            subsystem.close()
 
 
 class _Print:

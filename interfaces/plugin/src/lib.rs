@@ -12,6 +12,11 @@
 //! Unsafe code stands here because pointers of foreign code are read and written; every block says why it holds.
 #![allow(unsafe_code)]
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 pub mod abi;
 mod convert;
 pub mod describe;

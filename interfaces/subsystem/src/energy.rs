@@ -1,11 +1,11 @@
-//! Energy book of a subsystem, J.
+//! Energy ledger of a subsystem, J.
 
 /// Energies of the committed state and work done since the start, J.
 ///
-/// A field that is not a number is *unknown*: the subsystem keeps no book of it. It is shown as "unknown" and makes every
-/// sum that needs it unknown, which 0 would not. [`Energy::UNKNOWN`] knows nothing, [`Energy::default`] is an empty book.
+/// A field that is not a number is *unknown*: the subsystem keeps no energy ledger. It is shown as "unknown" and makes every
+/// sum that needs it unknown, which 0 would not. [`Energy::UNKNOWN`] knows nothing, [`Energy::default`] is an empty ledger.
 ///
-/// For a subsystem whose book is whole, the change of kinetic + potential + dissipated since the start is
+/// For a subsystem whose ledger is whole, the change of kinetic + potential + dissipated since the start is
 /// port_work + actuator_work. For a soil that reads: heat + elastic energy + gravitational energy of the material = work
 /// at its ports.
 ///
@@ -39,7 +39,7 @@ pub struct Energy {
 }
 
 impl Energy {
-    /// The book of a subsystem that keeps none.
+    /// The ledger of a subsystem that keeps none.
     pub const UNKNOWN: Self = Self {
         kinetic: f64::NAN,
         potential: f64::NAN,
@@ -54,18 +54,18 @@ impl Energy {
         self.kinetic + self.potential
     }
 
-    /// Kinetic + potential + dissipated − port_work − actuator_work, J: stays as it was at the start where the book is
+    /// Kinetic + potential + dissipated − port_work − actuator_work, J: stays as it was at the start where the ledger is
     /// true; not a number where one of them is unknown.
     pub fn balance(&self) -> f64 {
         self.mechanical() + self.dissipated - self.port_work - self.actuator_work
     }
 
-    /// Whether the mechanical book is whole; the electrical energy may be unknown.
+    /// Whether the mechanical ledger is whole; the electrical energy may be unknown.
     pub fn is_known(&self) -> bool {
         !self.balance().is_nan()
     }
 
-    /// The sum of two books; unknown where one is.
+    /// The sum of two ledgers; unknown where one is.
     #[must_use]
     pub fn plus(&self, other: &Self) -> Self {
         Self {

@@ -22,6 +22,11 @@
 //!
 //! SI units everywhere; the world frame is right-handed with z up.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod advice;
 pub mod bytes;
 mod capability;

@@ -156,7 +156,7 @@ pub trait Subsystem: Send {
         Err(Error::Unsupported)
     }
 
-    /// Energies of the committed state; unknown for a subsystem that keeps no book.
+    /// Energies of the committed state; unknown for a subsystem that keeps no energy ledger.
     fn energy(&self) -> Energy {
         Energy::UNKNOWN
     }

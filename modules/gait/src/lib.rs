@@ -17,6 +17,11 @@
 
 #![warn(clippy::unwrap_used)]
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 pub mod foot;
 mod gait;
 pub mod geometry;

@@ -14,7 +14,7 @@ pub(crate) fn energy(model: &Model, state: &State) -> Energy {
     for (body, m) in model.bodies.iter().zip(&state.bodies) {
         let w = m.q.inverse_transform_vector(&m.w);
         kinetic += 0.5 * (body.mass * m.v.norm_squared() + w.dot(&(body.inertia * w)));
-        // Rates and positions of the scheme are half a step apart; the book is kept at the time of the rates.
+        // Rates and positions of the scheme are half a step apart; the ledger is kept at the time of the rates.
         potential -= body.mass * model.gravity.dot(&(m.c - state.stagger * m.v));
     }
     for (s, joint) in state.joints.iter().zip(&model.joints).filter(|(s, _)| !s.broken) {

@@ -204,14 +204,14 @@ impl Axis {
 
 /// What a motor is asked for, without any bound.
 #[derive(Clone, Copy, Debug, PartialEq)]
-enum Law {
+enum MotorLaw {
     /// Impulse against rate.
     Line(Line),
     /// A rate, whatever it takes.
     Rate(f64),
 }
 
-impl Law {
+impl MotorLaw {
     /// A rate becomes a steep line that gives the bound at ± `by`.
     fn yielding(self, by: f64, bound: f64) -> Self {
         match self {
@@ -242,30 +242,30 @@ impl Law {
     }
 }
 
-fn law(j: &JointState, step: &Span) -> Law {
+fn law(j: &JointState, step: &Span) -> MotorLaw {
     let Span { h, when, .. } = *step;
     match j.motor {
-        Motor::Off | Motor::Voltage => Law::Line(Line::ZERO),
-        Motor::Torque => Law::Line(Line::level(h * j.torque_target)),
+        Motor::Off | Motor::Voltage => MotorLaw::Line(Line::ZERO),
+        Motor::Torque => MotorLaw::Line(Line::level(h * j.torque_target)),
         Motor::ExplicitPosition => {
             let (p, d) = (j.angle_target - j.angle, j.velocity_target - j.velocity);
-            Law::Line(Line::level(h * (j.stiffness * p + j.damping * d)))
+            MotorLaw::Line(Line::level(h * (j.stiffness * p + j.damping * d)))
         }
-        Motor::Velocity => Law::Rate(j.velocity_target),
+        Motor::Velocity => MotorLaw::Rate(j.velocity_target),
         Motor::RigidPosition => {
             let most = j.actuator[Item::ApproachRate];
             let wanted = (j.angle_target - j.angle) / j.actuator[Item::ApproachTime].max(h);
-            Law::Rate(wanted.clamp(-most, most))
+            MotorLaw::Rate(wanted.clamp(-most, most))
         }
         Motor::Position => {
             let wanted = j.stiffness * (j.angle_target - j.angle) + j.damping * j.velocity_target;
-            Law::Line(Line { at_zero: h * wanted, slope: h * j.damping + when * h * h * j.stiffness })
+            MotorLaw::Line(Line { at_zero: h * wanted, slope: h * j.damping + when * h * h * j.stiffness })
         }
     }
 }
 
 /// Law, supply, gear, bound.
-fn through_winding(law: Law, j: &JointState, step: &Span) -> Curve {
+fn through_winding(law: MotorLaw, j: &JointState, step: &Span) -> Curve {
     let bound = step.h * j.max_torque;
     winding::through_winding(law.curve(), j, step.supply_v, step.h)
         .at_most(Line::level(bound), Tag::High)
@@ -331,9 +331,9 @@ mod tests {
 
     #[test]
     fn bounded_at_once_is_bounded_step_by_step() {
-        let laws = [0.0, 1.0, 30.0, -70.0].map(|at_zero| Law::Line(Line { at_zero, slope: 2.5 }));
-        let level = [0.0, 0.5, 7.0, -7.0].map(|at_zero| Law::Line(Line::level(at_zero)));
-        for law in laws.into_iter().chain(level).chain([Law::Rate(0.3)]) {
+        let laws = [0.0, 1.0, 30.0, -70.0].map(|at_zero| MotorLaw::Line(Line { at_zero, slope: 2.5 }));
+        let level = [0.0, 0.5, 7.0, -7.0].map(|at_zero| MotorLaw::Line(Line::level(at_zero)));
+        for law in laws.into_iter().chain(level).chain([MotorLaw::Rate(0.3)]) {
             let slow = law.curve().at_most(Line::level(4.0), Tag::High).at_least(Line::level(-4.0), Tag::Low);
             let mut fast = Curve::line(Line { at_zero: 9.0, slope: 9.0 }, Tag::Brake);
             law.bound_into(4.0, &mut fast);

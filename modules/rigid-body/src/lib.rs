@@ -19,6 +19,11 @@
 //!
 //! Deliberately absent: ground and soil. The robot knows its ports, never what lies behind them.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod actuator;
 mod balance;
 mod closure;

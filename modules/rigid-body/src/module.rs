@@ -2,7 +2,7 @@
 
 use crate::actuator::{Actuator, Item, configure};
 use crate::closure::configure::closures;
-use crate::contact::bodies::Law;
+use crate::contact::bodies::ContactLaw;
 use crate::contact::plane::Plane;
 use crate::contact::surfaces::Surfaces;
 use crate::cut;
@@ -14,7 +14,7 @@ use crate::model::{Kind, Model};
 use crate::objects;
 use crate::placement::{StartRates, at_rest, base_pose, clearance, coordinates, joint_rates, set_moving};
 use crate::robot::Robot;
-use crate::state::{ClosureState, ContactBook, JointState, Load, Motion, State};
+use crate::state::{ClosureState, ContactLedger, JointState, Load, Motion, State};
 use nalgebra::Isometry3;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -79,7 +79,7 @@ impl Module for RigidBody {
             closures: vec![ClosureState::default(); model.closures.len()],
             redundant_rows: 0,
             energy: Energy::default(),
-            contact: ContactBook::default(),
+            contact: ContactLedger::default(),
             pressed: Vec::new(),
             supply: configure::supply(&config)?,
             start: None,
@@ -102,23 +102,20 @@ impl Module for RigidBody {
             without_impacts(&*host, planes, dynamics.contacts.watches())?;
             without_rebound(&dynamics.model, &state)?;
         }
-        let name = config.text("contact_solver")?;
-        let law = Law::from_name(name).ok_or_else(|| {
-            Error::Refused(format!("parameter `contact_solver` = `{name}` is none of {:?}", Law::NAMES))
-        })?;
+        let law = ContactLaw::from_config(&config)?;
         let surfaces = Surfaces::from_config(&config, &dynamics.model)?;
         dynamics.contacts.set_surroundings(law, surfaces, ground);
-        settle_loops(&*host, &mut dynamics, &mut state)?;
+        close_loops(&*host, &mut dynamics, &mut state)?;
         Ok(Box::new(Robot::new(host, dynamics, state)?))
     }
 }
 
 /// Counts the rows that loops promise in vain, and takes from the initial rates what loops do not allow.
-fn settle_loops(host: &dyn Host, dynamics: &mut Dynamics, state: &mut State) -> Result<()> {
+fn close_loops(host: &dyn Host, dynamics: &mut Dynamics, state: &mut State) -> Result<()> {
     if dynamics.model.closures.is_empty() {
         return Ok(());
     }
-    let changed = dynamics.settle_closures(state).map_err(|e| Error::Failed(e.to_string()))?;
+    let changed = dynamics.project_rates(state).map_err(|e| Error::Failed(e.to_string()))?;
     if state.redundant_rows > 0 {
         let text = format!(
             "loops: {} of their rows follow from the others; forces there are one of many choices",

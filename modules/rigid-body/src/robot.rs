@@ -2,11 +2,11 @@
 
 use crate::actuator::Item;
 use crate::actuator::battery::Draw;
-use crate::actuator::book::Outcome;
+use crate::actuator::energy_ledger::Outcome;
 use crate::balance;
 use crate::contact::estimate::{Estimator, Problem};
+use crate::contact::port_jacobian::PortJacobian;
 use crate::contact::ports::{Ports, committed, displacement, response, standing};
-use crate::contact::slopes::Slopes;
 use crate::drive::{FULL_BLOCK, Motor};
 use crate::dynamics::joint_rows::coordinate;
 use crate::dynamics::{Dynamics, Failure};
@@ -36,7 +36,7 @@ pub(crate) struct Robot {
     variables: Vec<Variable>,
     actions: Vec<Action>,
     ports: Ports,
-    slopes: Slopes,
+    port_jacobian: PortJacobian,
     estimator: Estimator,
     /// Step for which `dynamics` and `ports` are prepared.
     prepared: Option<Prepared>,
@@ -45,7 +45,7 @@ pub(crate) struct Robot {
     revision: u64,
     /// Whether the last trial was an `advance` that can be committed.
     trial: bool,
-    scratch: Scratch,
+    scratch: EstimateScratch,
 }
 
 /// What a preparation depends on besides the ports.
@@ -57,7 +57,7 @@ struct Prepared {
 
 /// Packed vectors of the estimate.
 #[derive(Default)]
-struct Scratch {
+struct EstimateScratch {
     g: Vec<f64>,
     gap: Vec<f64>,
     free: Vec<f64>,
@@ -84,13 +84,13 @@ impl Robot {
             state,
             slots,
             backup: State::default(),
-            slopes: Slopes::default(),
+            port_jacobian: PortJacobian::default(),
             estimator: Estimator::default(),
             prepared: None,
             step_ports: Vec::new(),
             revision: 0,
             trial: false,
-            scratch: Scratch::default(),
+            scratch: EstimateScratch::default(),
         })
     }
 
@@ -125,7 +125,7 @@ impl Robot {
     }
 
     fn assign(&mut self, step: &Step) -> Result {
-        self.slopes.forget();
+        self.port_jacobian.forget();
         self.step_ports.clear();
         self.step_ports.extend_from_slice(step.ports);
         if !self.ports.assign(step.ports, step.n as usize, &self.state.bodies) {
@@ -231,7 +231,7 @@ impl Robot {
             // implicit spring loses what it does not store.
             let passive = shares.stop + shares.friction + shares.damper + shares.spring;
             e.dissipated -= passive * axis.mean_rate + s.actuator.stored(s.angle).0 - spring;
-            e.electrical += s.actuator.book.electrical_power * h;
+            e.electrical += s.actuator.ledger.electrical_power * h;
         }
         state.supply.advance(&draw, h);
         for (b, load) in state.loads.iter().enumerate() {
@@ -394,8 +394,8 @@ impl Subsystem for Robot {
             self.dynamics.ensure_factor().map_err(failed)?;
             let joint = |p: &Port| p.kind == PortKind::Joint as u32;
             if step.ports.iter().any(joint) && self.dynamics.contacts.pressing() == 0 {
-                let slopes = self.slopes.at(level, step.ports, &self.ports, &mut self.dynamics);
-                out.copy_from_slice(slopes);
+                let jacobian = self.port_jacobian.at(level, step.ports, &self.ports, &mut self.dynamics);
+                out.copy_from_slice(jacobian);
                 return Ok(());
             }
         }
@@ -503,7 +503,7 @@ impl Subsystem for Robot {
     fn act(&mut self, action: &str, _arguments: &str) -> Result {
         let unknown = || Error::Refused(format!("there is no action `{action}`"));
         if action == variables::RESTART {
-            self.state.restart_books();
+            self.state.restart_ledger();
             self.changed();
             return Ok(());
         }

@@ -116,7 +116,7 @@ pub(crate) fn schema() -> Schema {
                 "How contacts are solved: `ncp` (Coulomb's cone) or a friction pyramid of 4 or 8 facets by Lemke",
             )
             .or("ncp")
-            .choices(&crate::contact::bodies::Law::NAMES),
+            .choices(&crate::contact::bodies::ContactLaw::NAMES),
         ]
         .into_iter()
         .chain(crate::contact::surfaces::parameters())

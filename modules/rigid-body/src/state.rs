@@ -1,4 +1,4 @@
-//! The committed state: motion of the bodies, settings and memory of the joints, energy book.
+//! The committed state: motion of the bodies, settings and memory of the joints, energy ledger.
 
 use crate::actuator::Actuator;
 use crate::actuator::battery::Supply;
@@ -75,7 +75,7 @@ pub(crate) struct ClosureState {
 
 /// What the last step says about contacts among the bodies and with rigid ground.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub(crate) struct ContactBook {
+pub(crate) struct ContactLedger {
     /// Points that pressed.
     pub points: usize,
     /// Residual of the contact problem.
@@ -101,7 +101,7 @@ pub(crate) struct State {
     /// Normal force of all ports of a body, N.
     pub contact_normal: Vec<f64>,
     pub energy: Energy,
-    pub contact: ContactBook,
+    pub contact: ContactLedger,
     /// Contact forces of the last step.
     pub pressed: Vec<Pressed>,
     pub supply: Supply,
@@ -117,12 +117,12 @@ pub(crate) struct State {
 
 impl State {
     /// Counts work, heat, drawn energy and distance from here on. What batteries and windings hold stays.
-    pub fn restart_books(&mut self) {
+    pub fn restart_ledger(&mut self) {
         let Energy { kinetic, potential, .. } = self.energy;
         self.energy = Energy { kinetic, potential, ..Energy::default() };
         (self.contact.lost, self.start) = (0.0, None);
         (self.supply.delivered, self.supply.lost, self.supply.missing) = (0.0, 0.0, 0.0);
-        self.joints.iter_mut().for_each(|j| j.actuator.restart_book());
+        self.joints.iter_mut().for_each(|j| j.actuator.restart_ledger());
     }
 
     /// Takes over another state without allocating once the sizes are equal.

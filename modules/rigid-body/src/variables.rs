@@ -102,26 +102,30 @@ const REACTION_ITEMS: [(&str, &str, &str); 6] = [
 type ActuatorItem = (&'static str, &'static str, Group, &'static str, fn(&JointState) -> f64);
 
 const ACTUATOR_ITEMS: [ActuatorItem; 14] = [
-    ("power", "W", Group::All, "Mechanical power of the motor in the last step", |j| j.actuator.book.power),
+    ("power", "W", Group::All, "Mechanical power of the motor in the last step", |j| j.actuator.ledger.power),
     ("work", "J", Group::All, "Mechanical work of the motor since the start, signed", |j| {
-        j.actuator.book.work
+        j.actuator.ledger.work
     }),
     ("electrical_power", "W", Group::All, "Power drawn in the last step", |j| {
-        j.actuator.book.electrical_power
+        j.actuator.ledger.electrical_power
     }),
-    ("electrical_energy", "J", Group::All, "Energy drawn since the start", |j| j.actuator.book.electrical),
-    ("friction_torque", "N m", Group::Friction, "Friction in the last step", |j| j.actuator.book.friction),
-    ("stop_torque", "N m", Group::Friction, "End stop and brake in the last step", |j| j.actuator.book.stop),
+    ("electrical_energy", "J", Group::All, "Energy drawn since the start", |j| j.actuator.ledger.electrical),
+    ("friction_torque", "N m", Group::Friction, "Friction in the last step", |j| j.actuator.ledger.friction),
+    ("stop_torque", "N m", Group::Friction, "End stop and brake in the last step", |j| {
+        j.actuator.ledger.stop
+    }),
     ("friction_heat", "J", Group::Friction, "Lost in the joint's friction since the start", |j| {
-        j.actuator.book.friction_heat
+        j.actuator.ledger.friction_heat
     }),
     ("current", "A", Group::Formula, "Current of the motor", |j| j.actuator.current),
     ("voltage", "V", Group::Formula, "Voltage at the motor", |j| j.actuator.voltage),
     ("motor_heat", "J", Group::Formula, "Drawn energy that is neither work nor stored", |j| {
-        j.actuator.book.heat
+        j.actuator.ledger.heat
     }),
-    ("winding_heat", "J", Group::Dc, "Heat of the winding since the start", |j| j.actuator.book.winding_heat),
-    ("gear_heat", "J", Group::Dc, "Heat of the gear since the start", |j| j.actuator.book.gear_heat),
+    ("winding_heat", "J", Group::Dc, "Heat of the winding since the start", |j| {
+        j.actuator.ledger.winding_heat
+    }),
+    ("gear_heat", "J", Group::Dc, "Heat of the gear since the start", |j| j.actuator.ledger.gear_heat),
     ("winding_temperature", "K", Group::Thermal, "Temperature of the winding", |j| j.actuator.winding_k),
     ("housing_temperature", "K", Group::Thermal, "Temperature of the housing", |j| j.actuator.housing_k),
 ];
@@ -423,7 +427,7 @@ fn robot_number(model: &Model, state: &State, item: usize) -> f64 {
         _ => 0.0,
     };
     match item {
-        0 => state.joints.iter().map(|j| j.actuator.book.work).sum(),
+        0 => state.joints.iter().map(|j| j.actuator.ledger.work).sum(),
         1 => state.energy.electrical,
         2 => distance(),
         3 if distance() < SHORTEST => 0.0,

@@ -3,27 +3,27 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
-use common::Rig;
+use common::Fixture;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use terraglue_numerics::extremes::larger;
 
 const FAST: &str = r#"{"j2": 0.2, "j4": 0.2, "j6": 0.2, "j8": 0.2}"#;
 
-fn chain(file: &str, joints: &str, h: f64) -> Rig {
+fn chain(file: &str, joints: &str, h: f64) -> Fixture {
     let parameters = format!(
         r#"{{"model": "tests/reference/multibody/{file}.urdf", "motor": "off", "joints": {joints}}}"#
     );
-    Rig::new(&parameters, 9.81, h)
+    Fixture::new(&parameters, 9.81, h)
 }
 
 /// Largest gap of the joints of a chain of eight links of 0.25 m over so many steps, m.
 fn largest(file: &str, joints: &str, h: f64, steps: usize) -> f64 {
-    let mut rig = chain(file, joints, h);
+    let mut fixture = chain(file, joints, h);
     let mut worst = 0.0_f64;
     for _ in 0..steps {
-        rig.free_step();
+        fixture.free_step();
         let mut end = Vector3::zeros();
-        for state in rig.states() {
+        for state in fixture.states() {
             let [w, x, y, z] = state.world_from_body.orientation;
             let q = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
             let p = Vector3::from(state.world_from_body.position);
@@ -60,17 +60,17 @@ fn corrections_that_diverge_are_brought_back() {
 /// Beyond the limit of stability there is no step; the message tells the link and a step that passes.
 #[test]
 fn a_step_that_cannot_follow_a_taut_chain_says_which_one_does() {
-    let mut rig = chain("chain8_m1000", FAST, 4e-3);
-    let step = |rig: &mut Rig| rig.advance(&[], &[]).map(|_| rig.commit(&[], &[]).unwrap());
-    let refusal = (0..500).find_map(|_| step(&mut rig).err()).unwrap().to_string();
-    println!("{} s: {refusal}", rig.t);
+    let mut fixture = chain("chain8_m1000", FAST, 4e-3);
+    let step = |fixture: &mut Fixture| fixture.advance(&[], &[]).map(|_| fixture.commit(&[], &[]).unwrap());
+    let refusal = (0..500).find_map(|_| step(&mut fixture).err()).unwrap().to_string();
+    println!("{} s: {refusal}", fixture.t);
     let said = refusal.split("take steps below ").nth(1).and_then(|s| s.split(' ').next()).unwrap();
     let shorter: f64 = said.parse().unwrap();
     assert!(refusal.contains("link `") && refusal.contains("energy-momentum"), "{refusal}");
     assert!((2e-4..4e-3).contains(&shorter), "{refusal}");
-    rig.h = shorter;
-    let end = rig.t + 0.04;
-    while rig.t < end {
-        step(&mut rig).unwrap();
+    fixture.h = shorter;
+    let end = fixture.t + 0.04;
+    while fixture.t < end {
+        step(&mut fixture).unwrap();
     }
 }

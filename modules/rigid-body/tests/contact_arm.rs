@@ -6,7 +6,7 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
-use common::{Rig, temporary_urdf};
+use common::{Fixture, temporary_urdf};
 use terraglue_numerics::extremes::larger;
 use terraglue_subsystem::{Input, Law, Motion, Port, PortKind, Response, Step, component};
 
@@ -57,7 +57,7 @@ fn turned([x, z]: [f64; 2], pitch: f64) -> [f64; 2] {
     [x * cos + z * sin, z * cos - x * sin]
 }
 
-fn body(foot: Foot, integrator: &str, h: f64) -> Rig {
+fn body(foot: Foot, integrator: &str, h: f64) -> Fixture {
     let (shape, [x, z]) = (foot.shape(), FOOT);
     let file = temporary_urdf(
         &format!("contact_arm_{foot:?}_{integrator}"),
@@ -72,18 +72,18 @@ fn body(foot: Foot, integrator: &str, h: f64) -> Rig {
         r#"{{"model": "{file}", "integrator": "{integrator}", "velocity_m_s": [{vx}, 0, 0],
         "rotation_rate_rad_s": [0, {wy}, 0], "position_m": [0, 0, 0.3]}}"#
     );
-    Rig::new(&parameters, GRAVITY, h)
+    Fixture::new(&parameters, GRAVITY, h)
 }
 
 /// Pitch and position of the body.
-fn pose(rig: &Rig) -> [f64; 3] {
-    let pose = rig.states()[0].world_from_body;
+fn pose(fixture: &Fixture) -> [f64; 3] {
+    let pose = fixture.states()[0].world_from_body;
     let [w, _, y, _] = pose.orientation;
     [pose.position[0], pose.position[2], 2.0 * libm::atan2(y, w)]
 }
 
-fn port(rig: &Rig, foot: Foot) -> Port {
-    let [x, z, pitch] = pose(rig);
+fn port(fixture: &Fixture, foot: Foot) -> Port {
+    let [x, z, pitch] = pose(fixture);
     let [rx, rz] = foot.arm(pitch);
     Port {
         key: 1,
@@ -92,7 +92,7 @@ fn port(rig: &Rig, foot: Foot) -> Port {
         mask: foot.mask(),
         first: 0,
         body: 0,
-        shape: rig.scene.shapes[0].id,
+        shape: fixture.scene.shapes[0].id,
         first_node: 0,
         node_count: 0,
         origin: [x + rx, 0.0, z + rz],
@@ -103,14 +103,14 @@ fn port(rig: &Rig, foot: Foot) -> Port {
 }
 
 /// A step of length h with the ground's law where the rule takes forces: at the end, or in the middle of the step.
-fn step(rig: &mut Rig, foot: Foot, h: f64, middle: bool) {
-    let (ports, pitch) = ([port(rig, foot)], pose(rig)[2]);
+fn step(fixture: &mut Fixture, foot: Foot, h: f64, middle: bool) {
+    let (ports, pitch) = ([port(fixture, foot)], pose(fixture)[2]);
     let n = foot.mask().count_ones() as usize;
-    let step = Step { ports: &ports, n: n as u32, ..Step::free(rig.t, h, rig.index) };
+    let step = Step { ports: &ports, n: n as u32, ..Step::free(fixture.t, h, fixture.index) };
     let [mut x, mut v, mut a, mut out_t] = [0; 4].map(|_| vec![0.0; n]);
     let mut t = vec![0.0; n];
     let mut now = Response { x: &mut x, v: &mut v, a: &mut a, t: &mut out_t, reached: 0.0, flags: 0 };
-    rig.robot.set_ports(&step, &mut [Law::BILATERAL], &mut now).unwrap();
+    fixture.robot.set_ports(&step, &mut [Law::BILATERAL], &mut now).unwrap();
     for _ in 0..60 {
         let share = if middle { 0.5 } else { 1.0 };
         let rate = if middle && h > 0.0 { x[1] / h } else { v[1] };
@@ -120,11 +120,11 @@ fn step(rig: &mut Rig, foot: Foot, h: f64, middle: bool) {
         let change = t.iter().zip(wanted).fold(0.0_f64, |m, (t, w)| larger(m, (t - w).abs()));
         t.copy_from_slice(&wanted[..n]);
         let mut out = Response { x: &mut x, v: &mut v, a: &mut a, t: &mut out_t, reached: 0.0, flags: 0 };
-        rig.robot.advance(&step, &Input::Force { t: &t, motion: None }, &mut out).unwrap();
+        fixture.robot.advance(&step, &Input::Force { t: &t, motion: None }, &mut out).unwrap();
         if change < 1e-12 {
-            rig.robot.commit(&step, &t, &Motion { x: &x, v: &v }).unwrap();
-            rig.t += h;
-            rig.index += u64::from(h > 0.0);
+            fixture.robot.commit(&step, &t, &Motion { x: &x, v: &v }).unwrap();
+            fixture.t += h;
+            fixture.index += u64::from(h > 0.0);
             return;
         }
     }
@@ -153,13 +153,13 @@ fn reference(foot: Foot) -> [f64; 3] {
 
 /// Largest error after a second, m or rad.
 fn error(foot: Foot, integrator: &str, h: f64) -> f64 {
-    let mut rig = body(foot, integrator, h);
+    let mut fixture = body(foot, integrator, h);
     let middle = integrator == "energy-momentum";
     if integrator == "generalized-alpha" {
-        step(&mut rig, foot, 0.0, false);
+        step(&mut fixture, foot, 0.0, false);
     }
-    (0..(1.0 / h).round() as usize).for_each(|_| step(&mut rig, foot, h, middle));
-    pose(&rig).iter().zip(reference(foot)).fold(0.0_f64, |m, (a, b)| larger(m, (a - b).abs()))
+    (0..(1.0 / h).round() as usize).for_each(|_| step(&mut fixture, foot, h, middle));
+    pose(&fixture).iter().zip(reference(foot)).fold(0.0_f64, |m, (a, b)| larger(m, (a - b).abs()))
 }
 
 /// Order between the two shortest of three steps and the error at the shortest.

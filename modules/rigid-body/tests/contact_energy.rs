@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
-use common::{Rig, temporary_urdf};
+use common::{Fixture, temporary_urdf};
 use terraglue_numerics::extremes::larger;
 
 const SPHERE: &str = r#"<robot name="r"><link name="s"><inertial><mass value="2"/>
@@ -16,21 +16,21 @@ fn balance(restitution: f64) -> (f64, f64) {
         r#"{{"model": "{model}", "position_m": [0, 0, 0.3], "ground": "half-space", "friction": 0.3,
         "restitution": {restitution}}}"#
     );
-    let mut rig = Rig::new(&parameters, 9.81, 1e-3);
-    rig.push("s", [4.0 / rig.h, 0.0, 0.0]);
-    rig.free_step();
-    rig.push("s", [0.0; 3]);
-    let sum = |rig: &Rig| {
-        let e = rig.robot.energy();
+    let mut fixture = Fixture::new(&parameters, 9.81, 1e-3);
+    fixture.push("s", [4.0 / fixture.h, 0.0, 0.0]);
+    fixture.free_step();
+    fixture.push("s", [0.0; 3]);
+    let sum = |fixture: &Fixture| {
+        let e = fixture.robot.energy();
         e.mechanical() + e.dissipated
     };
-    let start = sum(&rig);
+    let start = sum(&fixture);
     let mut worst = 0.0_f64;
     for _ in 0..1500 {
-        rig.free_step();
-        worst = larger(worst, (sum(&rig) - start).abs());
+        fixture.free_step();
+        worst = larger(worst, (sum(&fixture) - start).abs());
     }
-    (worst, rig.get("contact.lost"))
+    (worst, fixture.get("contact.lost"))
 }
 
 #[test]

@@ -2,19 +2,20 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
-use common::{MOON, Rig, temporary_urdf};
+use common::{Fixture, MOON, temporary_urdf};
 use terraglue_subsystem::{Values, ValuesMut};
 
-fn walk_in_place(rig: &mut Rig, steps: usize) -> Vec<f64> {
+fn walk_in_place(fixture: &mut Fixture, steps: usize) -> Vec<f64> {
     let mut changes = Vec::new();
     for _ in 0..steps {
         for (k, leg) in ["LF", "LM", "LR", "RF", "RM", "RR"].iter().enumerate() {
-            let lift = 0.1 * libm::sin(8.0 * rig.t + k as f64 * std::f64::consts::PI) * rig.t.min(1.0);
-            rig.set(&format!("{leg}_j2.angle_target"), 0.958192179 + lift);
+            let lift =
+                0.1 * libm::sin(8.0 * fixture.t + k as f64 * std::f64::consts::PI) * fixture.t.min(1.0);
+            fixture.set(&format!("{leg}_j2.angle_target"), 0.958192179 + lift);
         }
-        let before = rig.balance();
-        rig.ground_step();
-        changes.push((rig.balance() - before).abs());
+        let before = fixture.balance();
+        fixture.ground_step();
+        changes.push((fixture.balance() - before).abs());
     }
     changes
 }
@@ -26,87 +27,87 @@ fn median(mut v: Vec<f64>) -> f64 {
 
 #[test]
 fn torque_is_bounded_exactly_and_zero_means_zero() {
-    let mut rig = Rig::hexapod(0.33, 9.81, 1e-3);
-    for joint in rig.joints() {
-        rig.set(&format!("{joint}.max_torque"), 5.0);
+    let mut fixture = Fixture::hexapod(0.33, 9.81, 1e-3);
+    for joint in fixture.joints() {
+        fixture.set(&format!("{joint}.max_torque"), 5.0);
     }
     let mut saturated = 0;
     for _ in 0..200 {
-        rig.ground_step();
-        for joint in rig.joints() {
-            let torque = rig.get(&format!("{joint}.torque")).abs();
+        fixture.ground_step();
+        for joint in fixture.joints() {
+            let torque = fixture.get(&format!("{joint}.torque")).abs();
             assert!(torque <= 5.0);
             saturated += usize::from(torque == 5.0);
         }
     }
     assert!(saturated > 100, "{saturated}");
-    rig.set("LF_j2.max_torque", 0.0);
+    fixture.set("LF_j2.max_torque", 0.0);
     for _ in 0..20 {
-        rig.ground_step();
-        assert_eq!(rig.get("LF_j2.torque"), 0.0);
+        fixture.ground_step();
+        assert_eq!(fixture.get("LF_j2.torque"), 0.0);
     }
 }
 
 #[test]
 fn a_fault_puts_no_energy_in() {
     for fault in ["torque", "break", "block"] {
-        let mut rig = Rig::hexapod(0.33, MOON, 1e-3);
-        let changes = walk_in_place(&mut rig, 500);
+        let mut fixture = Fixture::hexapod(0.33, MOON, 1e-3);
+        let changes = walk_in_place(&mut fixture, 500);
         let usual = median(changes[400..].to_vec());
         match fault {
             "torque" => {
-                rig.set("LF_j2.max_torque", 0.0);
-                rig.set("LF_j3.max_torque", 0.0);
+                fixture.set("LF_j2.max_torque", 0.0);
+                fixture.set("LF_j3.max_torque", 0.0);
             }
-            "break" => rig.robot.act("LF_j2.break", "{}").unwrap(),
-            _ => rig.robot.act("LF_j3.block", "{}").unwrap(),
+            "break" => fixture.robot.act("LF_j2.break", "{}").unwrap(),
+            _ => fixture.robot.act("LF_j3.block", "{}").unwrap(),
         }
-        let before = rig.balance();
-        walk_in_place(&mut rig, 1);
-        let gain = rig.balance() - before;
-        // beside what a step changes in the book as a rule, rounding of the energies, about 10 J
+        let before = fixture.balance();
+        walk_in_place(&mut fixture, 1);
+        let gain = fixture.balance() - before;
+        // beside what a step changes in the ledger as a rule, rounding of the energies, about 10 J
         assert!(gain <= 3.0 * usual && gain.abs() <= 3.0 * usual + 1e-8, "{fault}: {gain} {usual}");
     }
 }
 
 #[test]
 fn a_broken_leg_falls_away_and_the_body_stays_up() {
-    let mut rig = Rig::hexapod(0.33, 9.81, 1e-3);
-    walk_in_place(&mut rig, 200);
-    rig.robot.act("LF_j2.break", "{}").unwrap();
+    let mut fixture = Fixture::hexapod(0.33, 9.81, 1e-3);
+    walk_in_place(&mut fixture, 200);
+    fixture.robot.act("LF_j2.break", "{}").unwrap();
     let mut broken = [false];
-    rig.robot.get(&[rig.id("LF_j2.broken")], ValuesMut::Bool(&mut broken)).unwrap();
+    fixture.robot.get(&[fixture.id("LF_j2.broken")], ValuesMut::Bool(&mut broken)).unwrap();
     assert!(broken[0]);
-    walk_in_place(&mut rig, 1000);
+    walk_in_place(&mut fixture, 1000);
     assert!(
-        rig.get("body.z") > 0.25 && rig.get("LF2.z") < 0.33,
+        fixture.get("body.z") > 0.25 && fixture.get("LF2.z") < 0.33,
         "{} {}",
-        rig.get("body.z"),
-        rig.get("LF2.z")
+        fixture.get("body.z"),
+        fixture.get("LF2.z")
     );
-    assert!(rig.get("body.roll").abs() < 0.3);
+    assert!(fixture.get("body.roll").abs() < 0.3);
     // The leg lies with its foot on the ground, which still is a contact of it.
-    assert!(rig.get("LF4.contact_normal") >= 0.0 && rig.get("LF4.z").is_finite());
-    assert_eq!(rig.get("LF_j2.torque"), 0.0);
+    assert!(fixture.get("LF4.contact_normal") >= 0.0 && fixture.get("LF4.z").is_finite());
+    assert_eq!(fixture.get("LF_j2.torque"), 0.0);
 }
 
 #[test]
 fn a_blocked_joint_stays_where_it_is_until_released() {
-    let mut rig = Rig::hexapod(0.33, MOON, 1e-3);
-    walk_in_place(&mut rig, 300);
-    let id = rig.id("LF_j2.blocked");
-    rig.robot.set(&[id], Values::Bool(&[true])).unwrap();
-    let held = rig.get("LF_j2.angle");
+    let mut fixture = Fixture::hexapod(0.33, MOON, 1e-3);
+    walk_in_place(&mut fixture, 300);
+    let id = fixture.id("LF_j2.blocked");
+    fixture.robot.set(&[id], Values::Bool(&[true])).unwrap();
+    let held = fixture.get("LF_j2.angle");
     for _ in 0..10 {
-        walk_in_place(&mut rig, 20);
-        assert!((rig.get("LF_j2.angle") - held).abs() < 1e-6, "{}", rig.get("LF_j2.angle") - held);
+        walk_in_place(&mut fixture, 20);
+        assert!((fixture.get("LF_j2.angle") - held).abs() < 1e-6, "{}", fixture.get("LF_j2.angle") - held);
     }
-    rig.robot.act("LF_j2.release", "{}").unwrap();
-    walk_in_place(&mut rig, 100);
-    assert!((rig.get("LF_j2.angle") - held).abs() > 1e-4);
+    fixture.robot.act("LF_j2.release", "{}").unwrap();
+    walk_in_place(&mut fixture, 100);
+    assert!((fixture.get("LF_j2.angle") - held).abs() > 1e-4);
 }
 
-fn arm(name: &str, parameters: &str) -> Rig {
+fn arm(name: &str, parameters: &str) -> Fixture {
     let file = temporary_urdf(
         name,
         r#"<robot name="arm"><link name="world"/><link name="arm">
@@ -119,88 +120,94 @@ fn arm(name: &str, parameters: &str) -> Rig {
         <joint name="rail" type="prismatic"><origin xyz="1 0 0"/><parent link="arm"/><child link="slide"/>
         <axis xyz="1 0 0"/><limit lower="-0.2" upper="0.1" effort="1" velocity="1"/></joint></robot>"#,
     );
-    Rig::new(&format!(r#"{{"model": "{file}"{parameters}}}"#), 9.81, 1e-3)
+    Fixture::new(&format!(r#"{{"model": "{file}"{parameters}}}"#), 9.81, 1e-3)
 }
 
 #[test]
 fn limits_hold_and_turn_the_impact_into_heat() {
-    let mut rig = arm("limits", r#", "motor": "off""#);
+    let mut fixture = arm("limits", r#", "motor": "off""#);
     for _ in 0..2000 {
-        rig.free_step();
-        assert!(rig.get("hinge.angle") < 0.6 + 1e-6 && rig.get("rail.angle") < 0.1 + 1e-6);
+        fixture.free_step();
+        assert!(fixture.get("hinge.angle") < 0.6 + 1e-6 && fixture.get("rail.angle") < 0.1 + 1e-6);
     }
-    assert!((rig.get("hinge.angle") - 0.6).abs() < 1e-6 && (rig.get("rail.angle") - 0.1).abs() < 1e-6);
-    assert!(rig.robot.energy().dissipated > 0.5);
-    assert_eq!(rig.get("hinge.torque"), 0.0);
+    assert!(
+        (fixture.get("hinge.angle") - 0.6).abs() < 1e-6 && (fixture.get("rail.angle") - 0.1).abs() < 1e-6
+    );
+    assert!(fixture.robot.energy().dissipated > 0.5);
+    assert_eq!(fixture.get("hinge.torque"), 0.0);
 }
 
 #[test]
 fn a_velocity_motor_keeps_its_rate_and_a_torque_motor_its_torque() {
-    let mut rig = arm("motors", r#", "motor": "velocity", "max_torque": 50"#);
-    rig.set("hinge.velocity_target", -0.4);
+    let mut fixture = arm("motors", r#", "motor": "velocity", "max_torque": 50"#);
+    fixture.set("hinge.velocity_target", -0.4);
     // Under its bound the motor takes a few steps to come up to speed.
-    (0..100).for_each(|_| rig.free_step());
-    let angle = rig.get("hinge.angle");
-    (0..500).for_each(|_| rig.free_step());
-    assert!((rig.get("hinge.angle") - angle + 0.2).abs() < 1e-6, "{}", rig.get("hinge.angle") - angle);
-    assert!(rig.get("rail.angle").abs() < 1e-6);
-    rig.motor("hinge", 3);
-    rig.set("hinge.torque_target", -3.0);
-    rig.free_step();
-    assert_eq!(rig.get("hinge.torque"), -3.0);
-    rig.motor("hinge", 0);
-    rig.free_step();
-    assert_eq!(rig.get("hinge.torque"), 0.0);
+    (0..100).for_each(|_| fixture.free_step());
+    let angle = fixture.get("hinge.angle");
+    (0..500).for_each(|_| fixture.free_step());
+    assert!(
+        (fixture.get("hinge.angle") - angle + 0.2).abs() < 1e-6,
+        "{}",
+        fixture.get("hinge.angle") - angle
+    );
+    assert!(fixture.get("rail.angle").abs() < 1e-6);
+    fixture.motor("hinge", 3);
+    fixture.set("hinge.torque_target", -3.0);
+    fixture.free_step();
+    assert_eq!(fixture.get("hinge.torque"), -3.0);
+    fixture.motor("hinge", 0);
+    fixture.free_step();
+    assert_eq!(fixture.get("hinge.torque"), 0.0);
 }
 
 #[test]
 fn a_position_motor_holds_by_its_law() {
-    let mut rig = arm("position", r#", "max_torque": 100"#);
-    (0..3000).for_each(|_| rig.free_step());
-    let law = 600.0 * (0.0 - rig.get("hinge.angle")) - 10.0 * rig.get("hinge.velocity");
-    assert!((rig.get("hinge.torque") - law).abs() < 1e-6, "{} {law}", rig.get("hinge.torque"));
+    let mut fixture = arm("position", r#", "max_torque": 100"#);
+    (0..3000).for_each(|_| fixture.free_step());
+    let law = 600.0 * (0.0 - fixture.get("hinge.angle")) - 10.0 * fixture.get("hinge.velocity");
+    assert!((fixture.get("hinge.torque") - law).abs() < 1e-6, "{} {law}", fixture.get("hinge.torque"));
     // At rest the motor carries the arm and the slide: about (1·0.5 + 0.5·1)·g.
-    assert!((rig.get("hinge.torque") + 9.81).abs() < 0.1);
+    assert!((fixture.get("hinge.torque") + 9.81).abs() < 0.1);
 }
 
 #[test]
 fn a_restored_state_repeats_the_run_bit_by_bit() {
-    let mut rig = Rig::hexapod(0.33, MOON, 1e-3);
-    walk_in_place(&mut rig, 50);
-    rig.robot.save_state(1).unwrap();
-    let t = rig.t;
-    walk_in_place(&mut rig, 50);
+    let mut fixture = Fixture::hexapod(0.33, MOON, 1e-3);
+    walk_in_place(&mut fixture, 50);
+    fixture.robot.save_state(1).unwrap();
+    let t = fixture.t;
+    walk_in_place(&mut fixture, 50);
     // as text, where what is unknown is the same as itself
-    let energy = |rig: &Rig| format!("{:?}", rig.robot.energy());
-    let first = (rig.states(), energy(&rig));
-    rig.robot.restore_state(1).unwrap();
-    rig.t = t;
-    walk_in_place(&mut rig, 50);
-    assert_eq!((rig.states(), energy(&rig)), first);
-    assert!(rig.robot.restore_state(3).is_err());
+    let energy = |fixture: &Fixture| format!("{:?}", fixture.robot.energy());
+    let first = (fixture.states(), energy(&fixture));
+    fixture.robot.restore_state(1).unwrap();
+    fixture.t = t;
+    walk_in_place(&mut fixture, 50);
+    assert_eq!((fixture.states(), energy(&fixture)), first);
+    assert!(fixture.robot.restore_state(3).is_err());
 }
 
 #[test]
 fn what_cannot_be_set_is_refused() {
-    let mut rig = Rig::hexapod(0.33, MOON, 1e-3);
+    let mut fixture = Fixture::hexapod(0.33, MOON, 1e-3);
     let (x, bound, motor) =
-        (rig.id("body.contact_normal"), rig.id("LF_j1.max_torque"), rig.id("LF_j1.motor"));
-    assert!(rig.robot.set(&[x], Values::F64(&[1.0])).is_err());
-    assert!(rig.robot.set(&[bound], Values::F64(&[-1.0])).is_err());
-    assert!(rig.robot.set(&[bound], Values::F64(&[f64::NAN])).is_err());
-    assert!(rig.robot.set(&[motor], Values::Enumeration(&[7])).is_err());
-    assert!(rig.robot.act("LF_j9.break", "{}").is_err());
-    assert!(rig.commit(&[], &[]).is_err());
+        (fixture.id("body.contact_normal"), fixture.id("LF_j1.max_torque"), fixture.id("LF_j1.motor"));
+    assert!(fixture.robot.set(&[x], Values::F64(&[1.0])).is_err());
+    assert!(fixture.robot.set(&[bound], Values::F64(&[-1.0])).is_err());
+    assert!(fixture.robot.set(&[bound], Values::F64(&[f64::NAN])).is_err());
+    assert!(fixture.robot.set(&[motor], Values::Enumeration(&[7])).is_err());
+    assert!(fixture.robot.act("LF_j9.break", "{}").is_err());
+    assert!(fixture.commit(&[], &[]).is_err());
     // All or nothing, and nothing on what is gone.
-    let before = rig.get("LF_j1.max_torque");
-    assert!(rig.robot.set(&[bound, x], Values::F64(&[1.0, 1.0])).is_err());
-    assert_eq!(rig.get("LF_j1.max_torque"), before);
-    rig.robot.act("LF_j1.break", "{}").unwrap();
-    assert!(rig.robot.act("LF_j1.block", "{}").is_err());
+    let before = fixture.get("LF_j1.max_torque");
+    assert!(fixture.robot.set(&[bound, x], Values::F64(&[1.0, 1.0])).is_err());
+    assert_eq!(fixture.get("LF_j1.max_torque"), before);
+    fixture.robot.act("LF_j1.break", "{}").unwrap();
+    assert!(fixture.robot.act("LF_j1.block", "{}").is_err());
 }
 
 /// A body of 1 kg on a vertical rail above its lower limit.
-fn drop_on_a_stop(name: &str, upper: f64, parameters: &str) -> Rig {
+fn drop_on_a_stop(name: &str, upper: f64, parameters: &str) -> Fixture {
     let file = temporary_urdf(
         name,
         &format!(
@@ -210,17 +217,17 @@ fn drop_on_a_stop(name: &str, upper: f64, parameters: &str) -> Rig {
             <limit lower="0" upper="{upper}" effort="1" velocity="1"/></joint></robot>"#
         ),
     );
-    Rig::new(&format!(r#"{{"model": "{file}", "motor": "off"{parameters}}}"#), 9.81, 1e-3)
+    Fixture::new(&format!(r#"{{"model": "{file}", "motor": "off"{parameters}}}"#), 9.81, 1e-3)
 }
 
 #[test]
 fn a_joint_bounces_off_its_limit_and_comes_to_rest() {
     let bouncy = r#", "joints": {"rail": 1.0}, "actuator": {"limit_restitution": 0.8}"#;
-    let mut rig = drop_on_a_stop("bounce", 5.0, bouncy);
+    let mut fixture = drop_on_a_stop("bounce", 5.0, bouncy);
     let (mut apexes, mut last, mut rising) = (Vec::new(), 1.0, false);
     for _ in 0..2500 {
-        rig.free_step();
-        let height = rig.get("rail.angle");
+        fixture.free_step();
+        let height = fixture.get("rail.angle");
         assert!(height > -1e-12, "{height}");
         if rising && height < last {
             apexes.push(last);
@@ -233,19 +240,19 @@ fn a_joint_bounces_off_its_limit_and_comes_to_rest() {
         assert!((apex - exact).abs() < 0.009, "{n}: {apex} {exact}");
     }
     // All bounces take 4.06 s.
-    (0..3000).for_each(|_| rig.free_step());
-    assert!(rig.get("rail.angle").abs() < 1e-9 && rig.get("rail.velocity").abs() < 1e-9);
-    let lost = rig.robot.energy().dissipated;
+    (0..3000).for_each(|_| fixture.free_step());
+    assert!(fixture.get("rail.angle").abs() < 1e-9 && fixture.get("rail.velocity").abs() < 1e-9);
+    let lost = fixture.robot.energy().dissipated;
     assert!((lost - 9.81).abs() < 0.03 * 9.81, "{lost}");
 }
 
 #[test]
 fn play_narrower_than_a_step_stays_within_its_limits() {
     let elastic = r#", "joint_rates": {"rail": 1.0}, "actuator": {"limit_restitution": 1.0}"#;
-    let mut rig = drop_on_a_stop("play", 1e-4, elastic);
+    let mut fixture = drop_on_a_stop("play", 1e-4, elastic);
     for _ in 0..2000 {
-        rig.free_step();
-        let (x, v) = (rig.get("rail.angle"), rig.get("rail.velocity"));
+        fixture.free_step();
+        let (x, v) = (fixture.get("rail.angle"), fixture.get("rail.velocity"));
         assert!((-1e-12..1e-4 + 1e-12).contains(&x) && v.abs() < 1.0 + 1e-9, "{x} {v}");
     }
 }

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
-use common::{Rig, STAND, temporary_urdf};
+use common::{Fixture, STAND, temporary_urdf};
 use proptest::prelude::*;
 use terraglue_numerics::extremes::larger;
 
@@ -29,50 +29,50 @@ fn sphere_link(name: &str, mass: f64, r: f64) -> String {
 }
 
 /// One free body at a height on ground whose normal stands at an angle to gravity.
-fn on_incline(name: &str, body: &str, z: f64, degrees: f64, more: &str) -> Rig {
+fn on_incline(name: &str, body: &str, z: f64, degrees: f64, more: &str) -> Fixture {
     let model = temporary_urdf(name, &format!(r#"<robot name="r">{body}</robot>"#));
     let (sin, cos) = (degrees.to_radians().sin(), degrees.to_radians().cos());
-    // Gravity stays vertical in the rig: the ground and the body are turned instead, downhill along +x.
+    // Gravity stays vertical in the fixture: the ground and the body are turned instead, downhill along +x.
     let parameters = format!(
         r#"{{"model": "{model}", "position_m": [{}, 0, {}], "ground": "half-space",
         "ground_normal": [{sin}, 0, {cos}], "heading_rad": 0 {more}}}"#,
         z * sin,
         z * cos
     );
-    Rig::new(&parameters, G, 1e-3)
+    Fixture::new(&parameters, G, 1e-3)
 }
 
 #[test]
 fn a_sphere_thrown_along_the_ground_slides_and_then_rolls() {
     // Friction turns a throw at v0 into rolling at 5/7·v0.
-    let mut rig = on_incline("slide", &sphere_link("s", 1.0, 0.1), 0.1, 0.0, r#", "friction": 0.3"#);
-    rig.push("s", [2.0 / rig.h, 0.0, 0.0]);
-    rig.free_step();
-    rig.push("s", [0.0; 3]);
-    (0..600).for_each(|_| rig.free_step());
-    let v = rig.states()[0].linear_velocity[0];
+    let mut fixture = on_incline("slide", &sphere_link("s", 1.0, 0.1), 0.1, 0.0, r#", "friction": 0.3"#);
+    fixture.push("s", [2.0 / fixture.h, 0.0, 0.0]);
+    fixture.free_step();
+    fixture.push("s", [0.0; 3]);
+    (0..600).for_each(|_| fixture.free_step());
+    let v = fixture.states()[0].linear_velocity[0];
     assert!((v - 2.0 * 5.0 / 7.0).abs() < 5e-3, "{v}");
-    assert!((rig.states()[0].world_from_body.position[2] - 0.1).abs() < 1e-9);
+    assert!((fixture.states()[0].world_from_body.position[2] - 0.1).abs() < 1e-9);
 }
 
 #[test]
 fn a_sphere_rolls_down_the_incline() {
-    let mut rig = on_incline("roll", &sphere_link("s", 1.0, 0.1), 0.1, 20.0, r#", "friction": 0.5"#);
-    (0..1000).for_each(|_| rig.free_step());
-    let v = rig.states()[0].linear_velocity;
-    let a = (v[0] * v[0] + v[2] * v[2]).sqrt() / rig.t;
+    let mut fixture = on_incline("roll", &sphere_link("s", 1.0, 0.1), 0.1, 20.0, r#", "friction": 0.5"#);
+    (0..1000).for_each(|_| fixture.free_step());
+    let v = fixture.states()[0].linear_velocity;
+    let a = (v[0] * v[0] + v[2] * v[2]).sqrt() / fixture.t;
     let exact = 5.0 / 7.0 * G * 20.0_f64.to_radians().sin();
     assert!((a / exact - 1.0).abs() < 1e-3, "{a} {exact}");
 }
 
 /// How high a ball comes back that is dropped from 1 m.
 fn rebound(name: &str, more: &str) -> f64 {
-    let mut rig = on_incline(name, &sphere_link("s", 1.0, 0.1), 1.1, 0.0, more);
+    let mut fixture = on_incline(name, &sphere_link("s", 1.0, 0.1), 1.1, 0.0, more);
     let mut apex: f64 = 0.0;
     for step in 0..1000 {
-        rig.free_step();
+        fixture.free_step();
         if step > 500 {
-            apex = larger(apex, rig.states()[0].world_from_body.position[2] - 0.1);
+            apex = larger(apex, fixture.states()[0].world_from_body.position[2] - 0.1);
         }
     }
     apex
@@ -85,7 +85,7 @@ fn a_ball_rebounds_with_the_coefficient_of_restitution() {
 }
 
 /// Free bodies: hung from a far root by joints that are broken at once.
-fn loose(name: &str, bodies: &[(String, f64)], more: &str) -> Rig {
+fn loose(name: &str, bodies: &[(String, f64)], more: &str) -> Fixture {
     let mut text = format!(r#"<robot name="r">{}"#, box_link("root", 1.0, [0.1; 3]));
     for (k, (link, z)) in bodies.iter().enumerate() {
         text += link;
@@ -98,20 +98,20 @@ fn loose(name: &str, bodies: &[(String, f64)], more: &str) -> Rig {
     let parameters = format!(
         r#"{{"model": "{model}", "position_m": [0, 0, 0.05], "ground": "half-space", "motor": "off" {more}}}"#
     );
-    let mut rig = Rig::new(&parameters, G, 1e-3);
-    (0..bodies.len()).for_each(|k| rig.robot.act(&format!("j{k}.break"), "").unwrap());
-    rig
+    let mut fixture = Fixture::new(&parameters, G, 1e-3);
+    (0..bodies.len()).for_each(|k| fixture.robot.act(&format!("j{k}.break"), "").unwrap());
+    fixture
 }
 
 #[test]
 fn a_stack_of_ten_boxes_stands() {
     let bodies: Vec<_> =
         (0..10).map(|k| (box_link(&format!("b{k}"), 1.0, [0.2; 3]), 0.05 + 0.2 * f64::from(k))).collect();
-    let mut rig = loose("stack", &bodies, r#", "friction": 0.6"#);
-    let top = |rig: &Rig| rig.states()[10].world_from_body.position;
-    let start = top(&rig);
-    (0..500).for_each(|_| rig.free_step());
-    let end = top(&rig);
+    let mut fixture = loose("stack", &bodies, r#", "friction": 0.6"#);
+    let top = |fixture: &Fixture| fixture.states()[10].world_from_body.position;
+    let start = top(&fixture);
+    (0..500).for_each(|_| fixture.free_step());
+    let end = top(&fixture);
     println!("sink {:e} drift {:e}", start[2] - end[2], (end[0] - start[0]).hypot(end[1] - start[1]));
     assert!((end[2] - start[2]).abs() < 1e-5, "{}", start[2] - end[2]);
     assert!((end[0] - start[0]).hypot(end[1] - start[1]) < 1e-6);
@@ -120,11 +120,11 @@ fn a_stack_of_ten_boxes_stands() {
 #[test]
 fn a_tonne_stands_on_a_kilogram() {
     let bodies = [(box_link("b0", 1.0, [0.2; 3]), 0.05), (box_link("b1", 1000.0, [0.2; 3]), 0.25)];
-    let mut rig = loose("heavy", &bodies, "");
-    (0..500).for_each(|_| rig.free_step());
-    let z = rig.states()[2].world_from_body.position[2];
+    let mut fixture = loose("heavy", &bodies, "");
+    (0..500).for_each(|_| fixture.free_step());
+    let z = fixture.states()[2].world_from_body.position[2];
     assert!((z - 0.3).abs() < 1e-5, "{z}");
-    let normal = rig.get("b0.contact_normal");
+    let normal = fixture.get("b0.contact_normal");
     assert!((normal / (G * 2001.0) - 1.0).abs() < 1e-3, "{normal}");
 }
 
@@ -134,15 +134,15 @@ fn boxes_on_an_incline_stick_or_slide_as_coulomb_says() {
         let name = format!("incline{degrees}");
         // A sphere that cannot turn is a block: its inertia is huge.
         let body = link("s", 1.0, [1e6; 3], r#"<box size="0.2 0.2 0.1"/>"#);
-        let mut rig = on_incline(&name, &body, 0.05, 0.0, r#", "friction": 0.5"#);
+        let mut fixture = on_incline(&name, &body, 0.05, 0.0, r#", "friction": 0.5"#);
         let angle = degrees.to_radians();
         let pull = [G * angle.sin(), 0.0, G * (1.0 - angle.cos())];
         for _ in 0..1000 {
-            rig.push("s", pull);
-            rig.free_step();
+            fixture.push("s", pull);
+            fixture.free_step();
         }
-        let x = rig.states()[0].world_from_body.position[0];
-        let v = rig.states()[0].linear_velocity[0];
+        let x = fixture.states()[0].world_from_body.position[0];
+        let v = fixture.states()[0].linear_velocity[0];
         assert!((v - exact).abs() < 1e-9 + 1e-4 * exact, "{degrees} {v} {exact}");
         assert!(degrees > 30.0 || x.abs() < 1e-12, "{x}");
     }
@@ -153,10 +153,11 @@ fn the_hexapod_stands_on_rigid_ground_without_a_soil() {
     let parameters = format!(
         r#"{{"model": "models/hexapod.urdf", "position_m": [0, 0, 0.33], "ground": "half-space", {STAND}}}"#
     );
-    let mut rig = Rig::new(&parameters, G, 1e-3);
-    (0..500).for_each(|_| rig.free_step());
-    let feet: f64 = rig.scene.bodies.iter().map(|b| rig.get(&format!("{}.contact_normal", b.name))).sum();
-    assert!((feet / (rig.mass() * G) - 1.0).abs() < 1e-3, "{feet}");
+    let mut fixture = Fixture::new(&parameters, G, 1e-3);
+    (0..500).for_each(|_| fixture.free_step());
+    let feet: f64 =
+        fixture.scene.bodies.iter().map(|b| fixture.get(&format!("{}.contact_normal", b.name))).sum();
+    assert!((feet / (fixture.mass() * G) - 1.0).abs() < 1e-3, "{feet}");
 }
 
 #[test]
@@ -185,18 +186,18 @@ proptest! {
             z += 0.3;
             (if *ball { sphere_link(&name, *mass, *size) } else { box_link(&name, *mass, [*size, 0.1, 0.15]) }, z)
         }).collect();
-        let mut rig = loose("dropped", &bodies, "");
-        rig.push("b0", [spin, 0.5 * spin, 0.0]);
-        rig.free_step();
-        rig.push("b0", [0.0; 3]);
-        let mut before = rig.robot.energy().mechanical();
+        let mut fixture = loose("dropped", &bodies, "");
+        fixture.push("b0", [spin, 0.5 * spin, 0.0]);
+        fixture.free_step();
+        fixture.push("b0", [0.0; 3]);
+        let mut before = fixture.robot.energy().mechanical();
         for _ in 0..500 {
-            rig.free_step();
-            let after = rig.robot.energy().mechanical();
+            fixture.free_step();
+            let after = fixture.robot.energy().mechanical();
             prop_assert!(after.is_finite() && after - before < 1e-3 * (1.0 + before.abs()), "{before} {after}");
             before = after;
         }
-        prop_assert!(rig.states().iter().skip(1).all(|b| b.world_from_body.position[2] > -1e-2));
+        prop_assert!(fixture.states().iter().skip(1).all(|b| b.world_from_body.position[2] > -1e-2));
     }
 }
 
@@ -216,13 +217,13 @@ fn a_pair_has_a_friction_of_its_own() {
     let bodies =
         [(box_link("b0", 1.0, [4.0, 4.0, 0.2]), 0.05), (box_link("b1", 1.0, [0.2, 0.2, 0.02]), 0.16)];
     let speeds = |friction: &str| {
-        let mut rig =
+        let mut fixture =
             loose(&format!("pairs{}", friction.len()), &bodies, &format!(r#", "friction": {friction}"#));
         for _ in 0..200 {
-            rig.push("b1", [0.5 * G, 0.0, 0.0]);
-            rig.free_step();
+            fixture.push("b1", [0.5 * G, 0.0, 0.0]);
+            fixture.free_step();
         }
-        [1, 2].map(|k| rig.states()[k].linear_velocity[0])
+        [1, 2].map(|k| fixture.states()[k].linear_velocity[0])
     };
     let [low, high] = speeds(r#"{"*": 0.8, "b0 & b1": 0.1}"#);
     assert!(low.abs() < 1e-9 && (high / (0.4 * G * 0.2) - 1.0).abs() < 1e-6, "{low} {high}");

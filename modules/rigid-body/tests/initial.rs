@@ -2,17 +2,17 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
-use common::Rig;
+use common::Fixture;
 use terraglue_numerics::extremes::larger;
 use terraglue_subsystem::{Effect, Values};
 
 const G: f64 = 9.81;
 
-fn hexapod(more: &str) -> Rig {
-    Rig::new(&format!(r#"{{"model": "models/hexapod.urdf" {more}}}"#), G, 1e-3)
+fn hexapod(more: &str) -> Fixture {
+    Fixture::new(&format!(r#"{{"model": "models/hexapod.urdf" {more}}}"#), G, 1e-3)
 }
 
-fn farthest(a: &Rig, b: &Rig) -> f64 {
+fn farthest(a: &Fixture, b: &Fixture) -> f64 {
     let apart = |(a, b): (&terraglue_subsystem::BodyState, &terraglue_subsystem::BodyState)| {
         let (p, q) = (a.world_from_body, b.world_from_body);
         let place = (0..3).map(|k| (p.position[k] - q.position[k]).abs()).fold(0.0, larger);
@@ -32,7 +32,7 @@ fn what_is_set_before_the_start_is_what_parameters_give() {
         r#", "position_m": [0.4, -0.2, 1.5], "heading_rad": 0.7, "velocity_m_s": [0.3, 0.1, -0.2],
         "rotation_rate_rad_s": [0, 0, 0.5], "joints": {"LF_j2": 0.6}, "joint_rates": {"LF_j3": 1.5}"#,
     );
-    let mut rig = hexapod("");
+    let mut fixture = hexapod("");
     for (name, value) in [
         ("body.x", 0.4),
         ("body.y", -0.2),
@@ -45,48 +45,49 @@ fn what_is_set_before_the_start_is_what_parameters_give() {
         ("LF_j2.angle", 0.6),
         ("LF_j3.velocity", 1.5),
     ] {
-        rig.set(name, value);
-        assert!((rig.get(name) - value).abs() < 1e-12, "{name} reads {}", rig.get(name));
+        fixture.set(name, value);
+        assert!((fixture.get(name) - value).abs() < 1e-12, "{name} reads {}", fixture.get(name));
     }
-    assert!(farthest(&rig, &wanted) < 1e-12, "{:e}", farthest(&rig, &wanted));
-    assert_eq!(rig.get("LF_j2.angle_target"), 0.6);
+    assert!(farthest(&fixture, &wanted) < 1e-12, "{:e}", farthest(&fixture, &wanted));
+    assert_eq!(fixture.get("LF_j2.angle_target"), 0.6);
     for _ in 0..100 {
-        rig.free_step();
+        fixture.free_step();
         wanted.free_step();
     }
-    assert!(farthest(&rig, &wanted) < 1e-9, "{:e}", farthest(&rig, &wanted));
+    assert!(farthest(&fixture, &wanted) < 1e-9, "{:e}", farthest(&fixture, &wanted));
 }
 
 #[test]
 fn any_orientation_can_be_given_by_its_angles() {
-    let mut rig = hexapod("");
+    let mut fixture = hexapod("");
     for (name, value) in [("body.yaw", -2.5), ("body.pitch", 1.1), ("body.roll", 2.9)] {
-        rig.set(name, value);
+        fixture.set(name, value);
     }
     for (name, value) in [("body.yaw", -2.5), ("body.pitch", 1.1), ("body.roll", 2.9)] {
-        assert!((rig.get(name) - value).abs() < 1e-12, "{name} reads {}", rig.get(name));
+        assert!((fixture.get(name) - value).abs() < 1e-12, "{name} reads {}", fixture.get(name));
     }
 }
 
 #[test]
 fn what_follows_from_joints_and_what_comes_late_is_refused_and_changes_nothing() {
-    let mut rig = hexapod("");
-    let refused = |rig: &mut Rig, name: &str, value: f64, why: &str| {
-        let (id, before) = (rig.id(name), rig.get(name));
-        let said = rig.robot.set(&[id], Values::F64(&[value])).expect_err("refused").to_string();
+    let mut fixture = hexapod("");
+    let refused = |fixture: &mut Fixture, name: &str, value: f64, why: &str| {
+        let (id, before) = (fixture.id(name), fixture.get(name));
+        let said = fixture.robot.set(&[id], Values::F64(&[value])).expect_err("refused").to_string();
         assert!(said.contains(why), "{name}: {said}");
-        assert_eq!(rig.get(name).to_bits(), before.to_bits());
+        assert_eq!(fixture.get(name).to_bits(), before.to_bits());
     };
-    refused(&mut rig, "LF4.z", 1.0, "its joints");
-    refused(&mut rig, "body.pitch", 2.0, "beyond");
-    refused(&mut rig, "LF_j2.angle", 9.0, "limits");
-    refused(&mut rig, "body.contact_normal", 1.0, "read only");
-    let effect =
-        |rig: &Rig, name: &str| rig.robot.variables().iter().find(|v| v.name == name).unwrap().effect;
-    assert_eq!(effect(&rig, "body.z"), Effect::NeedsReset);
-    assert_eq!(effect(&rig, "LF_j2.velocity"), Effect::NeedsReset);
-    assert_eq!(effect(&rig, "LF4.z"), Effect::ReadOnly);
-    rig.free_step();
-    refused(&mut rig, "body.z", 1.0, "before the first step");
-    refused(&mut rig, "LF_j2.angle", 0.1, "before the first step");
+    refused(&mut fixture, "LF4.z", 1.0, "its joints");
+    refused(&mut fixture, "body.pitch", 2.0, "beyond");
+    refused(&mut fixture, "LF_j2.angle", 9.0, "limits");
+    refused(&mut fixture, "body.contact_normal", 1.0, "read only");
+    let effect = |fixture: &Fixture, name: &str| {
+        fixture.robot.variables().iter().find(|v| v.name == name).unwrap().effect
+    };
+    assert_eq!(effect(&fixture, "body.z"), Effect::NeedsReset);
+    assert_eq!(effect(&fixture, "LF_j2.velocity"), Effect::NeedsReset);
+    assert_eq!(effect(&fixture, "LF4.z"), Effect::ReadOnly);
+    fixture.free_step();
+    refused(&mut fixture, "body.z", 1.0, "before the first step");
+    refused(&mut fixture, "LF_j2.angle", 0.1, "before the first step");
 }

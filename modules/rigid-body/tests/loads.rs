@@ -2,14 +2,14 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
-use common::{Rig, temporary_urdf};
+use common::{Fixture, temporary_urdf};
 use terraglue_subsystem::{Input, Law, Motion, Port, PortKind, Response, Step, Values, ValuesMut, component};
 
 const INTEGRATORS: [&str; 3] = ["symplectic-euler", "generalized-alpha", "energy-momentum"];
 const COM: [f64; 3] = [0.1, -0.2, 0.05];
 
 /// A free body of 2 kg with its centre of mass beside its frame, tumbling at `spin` rad/s.
-fn body(name: &str, integrator: &str, spin: [f64; 3], h: f64) -> Rig {
+fn body(name: &str, integrator: &str, spin: [f64; 3], h: f64) -> Fixture {
     let file = temporary_urdf(
         name,
         r#"<robot name="slab"><link name="slab"><inertial><origin xyz="0.1 -0.2 0.05"/><mass value="2"/>
@@ -17,21 +17,21 @@ fn body(name: &str, integrator: &str, spin: [f64; 3], h: f64) -> Rig {
     );
     let parameters =
         format!(r#"{{"model": "{file}", "integrator": "{integrator}", "rotation_rate_rad_s": {spin:?}}}"#);
-    Rig::new(&parameters, 0.0, h)
+    Fixture::new(&parameters, 0.0, h)
 }
 
 #[test]
 fn a_moment_about_a_principal_axis_spins_the_body_up_and_its_work_is_the_energy() {
     for integrator in INTEGRATORS {
-        let mut rig = body(&format!("spun_{integrator}"), integrator, [0.0; 3], 1e-3);
-        rig.set("slab.moment_z", 0.6);
-        (0..1000).for_each(|_| rig.free_step());
-        assert!((rig.get("slab.wz") - 1.5).abs() < 1e-11, "{integrator}: {}", rig.get("slab.wz"));
+        let mut fixture = body(&format!("spun_{integrator}"), integrator, [0.0; 3], 1e-3);
+        fixture.set("slab.moment_z", 0.6);
+        (0..1000).for_each(|_| fixture.free_step());
+        assert!((fixture.get("slab.wz") - 1.5).abs() < 1e-11, "{integrator}: {}", fixture.get("slab.wz"));
         // half of 1.5 rad/s² over 1 s; symplectic Euler is half a step ahead
         let half = 0.5 * (0.75 + if integrator == INTEGRATORS[0] { 0.75e-3 } else { 0.0 });
-        let found = libm::atan2(rig.get("slab.qz"), rig.get("slab.qw"));
+        let found = libm::atan2(fixture.get("slab.qz"), fixture.get("slab.qw"));
         assert!((found - half).abs() < 1e-6, "{integrator}: {found} {half}");
-        let energy = rig.robot.energy();
+        let energy = fixture.robot.energy();
         assert!((energy.kinetic - 0.45).abs() < 1e-10, "{integrator}: {energy:?}");
         assert!((energy.actuator_work - 0.45).abs() < 1e-10, "{integrator}: {energy:?}");
     }
@@ -39,13 +39,13 @@ fn a_moment_about_a_principal_axis_spins_the_body_up_and_its_work_is_the_energy(
 
 /// What the energy of a tumbling body misses of the work of force and moment after a second, J; and that work.
 fn missed(integrator: &str, h: f64) -> [f64; 2] {
-    let mut rig = body(&format!("driven_{integrator}"), integrator, [1.0, 2.0, -1.5], h);
+    let mut fixture = body(&format!("driven_{integrator}"), integrator, [1.0, 2.0, -1.5], h);
     for (name, value) in [("force_x", 3.0), ("moment_x", 0.3), ("moment_y", -0.4), ("moment_z", 0.2)] {
-        rig.set(&format!("slab.{name}"), value);
+        fixture.set(&format!("slab.{name}"), value);
     }
-    let start = rig.balance();
-    (0..(1.0 / h).round() as usize).for_each(|_| rig.free_step());
-    [rig.balance() - start, rig.robot.energy().actuator_work]
+    let start = fixture.balance();
+    (0..(1.0 / h).round() as usize).for_each(|_| fixture.free_step());
+    [fixture.balance() - start, fixture.robot.energy().actuator_work]
 }
 
 #[test]
@@ -58,7 +58,7 @@ fn a_tumbling_body_gains_what_force_and_moment_do() {
 }
 
 /// A step under a force at a port beside the centre of mass.
-fn step_by_port(rig: &mut Rig, origin: [f64; 3], force: [f64; 3]) {
+fn step_by_port(fixture: &mut Fixture, origin: [f64; 3], force: [f64; 3]) {
     let port = Port {
         key: 1,
         kind: PortKind::Joint as u32,
@@ -74,12 +74,12 @@ fn step_by_port(rig: &mut Rig, origin: [f64; 3], force: [f64; 3]) {
         extent: [0.0; 2],
         law: Law::BILATERAL,
     };
-    let step = Step { ports: &[port], n: 3, ..Step::free(rig.t, rig.h, rig.index) };
+    let step = Step { ports: &[port], n: 3, ..Step::free(fixture.t, fixture.h, fixture.index) };
     let [mut x, mut v, mut a, mut t] = [[f64::NAN; 3]; 4];
     let mut out = Response { x: &mut x, v: &mut v, a: &mut a, t: &mut t, reached: 0.0, flags: 0 };
-    rig.robot.advance(&step, &Input::Force { t: &force, motion: None }, &mut out).unwrap();
-    rig.robot.commit(&step, &force, &Motion { x: &x, v: &v }).unwrap();
-    (rig.t, rig.index) = (rig.t + rig.h, rig.index + 1);
+    fixture.robot.advance(&step, &Input::Force { t: &force, motion: None }, &mut out).unwrap();
+    fixture.robot.commit(&step, &force, &Motion { x: &x, v: &v }).unwrap();
+    (fixture.t, fixture.index) = (fixture.t + fixture.h, fixture.index + 1);
 }
 
 #[test]
@@ -112,16 +112,16 @@ fn force_and_moment_at_the_told_point_are_a_force_at_a_port() {
 
 #[test]
 fn loads_are_saved_with_the_state_and_what_is_told_only_is_refused() {
-    let mut rig = body("saved_loads", INTEGRATORS[0], [0.0; 3], 1e-3);
-    rig.set("slab.moment_y", 0.7);
-    let bytes = rig.robot.serialize().unwrap();
-    rig.set("slab.moment_y", 0.0);
-    rig.robot.deserialize(&bytes).unwrap();
-    assert_eq!(rig.get("slab.moment_y"), 0.7);
+    let mut fixture = body("saved_loads", INTEGRATORS[0], [0.0; 3], 1e-3);
+    fixture.set("slab.moment_y", 0.7);
+    let bytes = fixture.robot.serialize().unwrap();
+    fixture.set("slab.moment_y", 0.0);
+    fixture.robot.deserialize(&bytes).unwrap();
+    assert_eq!(fixture.get("slab.moment_y"), 0.7);
     for name in ["slab.qx", "slab.force_at_z"] {
-        let error = rig.robot.set(&[rig.id(name)], Values::F64(&[0.0])).unwrap_err();
+        let error = fixture.robot.set(&[fixture.id(name)], Values::F64(&[0.0])).unwrap_err();
         assert!(error.to_string().contains("read only"), "{error}");
     }
-    let gap = rig.id("slab.qz") + 1;
-    assert!(rig.robot.get(&[gap], ValuesMut::F64(&mut [0.0])).is_err());
+    let gap = fixture.id("slab.qz") + 1;
+    assert!(fixture.robot.get(&[gap], ValuesMut::F64(&mut [0.0])).is_err());
 }

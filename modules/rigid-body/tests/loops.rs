@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
-use common::{Rig, instantiate, temporary_urdf};
+use common::{Fixture, instantiate, temporary_urdf};
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 
 const G: f64 = 9.81;
@@ -41,13 +41,13 @@ fn four_bar(name: &str) -> String {
 const CLOSE: &str = r#""loop": [{"name": "close", "kind": "revolute", "links": ["right", "bar"],
     "origin": [0, 0, 1], "axis": [0, 1, 0]}]"#;
 
-fn new(file: &str, rule: &str, more: &str) -> Rig {
+fn new(file: &str, rule: &str, more: &str) -> Fixture {
     let text = format!(r#"{{"model": "{file}", "motor": "off", "integrator": "{rule}", {more}}}"#);
-    Rig::new(&text, G, 1e-3)
+    Fixture::new(&text, G, 1e-3)
 }
 
-fn point(rig: &Rig, body: usize, at: Vector3<f64>) -> Vector3<f64> {
-    let pose = rig.states()[body].world_from_body;
+fn point(fixture: &Fixture, body: usize, at: Vector3<f64>) -> Vector3<f64> {
+    let pose = fixture.states()[body].world_from_body;
     let [w, x, y, z] = pose.orientation;
     Vector3::from(pose.position) + UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z)) * at
 }
@@ -65,17 +65,17 @@ fn a_four_bar_swings_as_its_reduced_equation_says() {
     }
     for (rule, tolerance) in RULES.into_iter().zip([5e-3, 1e-5, 1e-5]) {
         let more = format!(r#""joints": {{"j_left": 0.3, "j_right": 0.3, "j_bar": -0.3}}, {CLOSE}"#);
-        let mut rig = new(&four_bar("four_bar"), rule, &more);
-        assert_eq!(rig.get("loops.redundant_rows"), 3.0);
-        let start = rig.robot.energy().mechanical();
+        let mut fixture = new(&four_bar("four_bar"), rule, &more);
+        assert_eq!(fixture.get("loops.redundant_rows"), 3.0);
+        let start = fixture.robot.energy().mechanical();
         for _ in 0..500 {
-            rig.free_step();
-            let open = point(&rig, 2, Vector3::z()) - point(&rig, 1, Vector3::x());
+            fixture.free_step();
+            let open = point(&fixture, 2, Vector3::z()) - point(&fixture, 1, Vector3::x());
             assert!(open.norm() < 1e-9, "{rule}: {open}");
         }
-        let error = (rig.get("j_right.angle") - a).abs();
+        let error = (fixture.get("j_right.angle") - a).abs();
         assert!(error < tolerance, "{rule}: {error}");
-        let change = (rig.robot.energy().mechanical() - start).abs();
+        let change = (fixture.robot.energy().mechanical() - start).abs();
         assert!(
             change < [0.2, 1e-3, 1e-9][RULES.iter().position(|r| *r == rule).unwrap()],
             "{rule}: {change}"
@@ -85,13 +85,13 @@ fn a_four_bar_swings_as_its_reduced_equation_says() {
 
 #[test]
 fn a_broken_loop_lets_go() {
-    let mut rig = new(&four_bar("broken_loop"), RULES[0], CLOSE);
-    (0..10).for_each(|_| rig.free_step());
-    assert!(rig.get("close.force") > 1.0);
-    rig.robot.act("close.break", "{}").unwrap();
-    (0..300).for_each(|_| rig.free_step());
-    assert_eq!((rig.get("close.force"), rig.get("loops.redundant_rows")), (0.0, 0.0));
-    assert!((point(&rig, 2, Vector3::x()) - point(&rig, 1, Vector3::z())).norm() > 0.1);
+    let mut fixture = new(&four_bar("broken_loop"), RULES[0], CLOSE);
+    (0..10).for_each(|_| fixture.free_step());
+    assert!(fixture.get("close.force") > 1.0);
+    fixture.robot.act("close.break", "{}").unwrap();
+    (0..300).for_each(|_| fixture.free_step());
+    assert_eq!((fixture.get("close.force"), fixture.get("loops.redundant_rows")), (0.0, 0.0));
+    assert!((point(&fixture, 2, Vector3::x()) - point(&fixture, 1, Vector3::z())).norm() > 0.1);
 }
 
 #[test]
@@ -101,17 +101,17 @@ fn a_stiff_spring_swings_with_its_period_and_loses_what_its_damper_takes() {
     for (rule, tolerance) in RULES.into_iter().zip([2e-4, 2e-6, 2e-6]) {
         let more = r#""position_m": [0, 0, -1], "spring": [{"name": "s", "links": ["world", "bob"],
             "origin": [0, 0, 0], "origin_2": [0, 0, 0], "stiffness": 800, "rest_length": 1.0}]"#;
-        let mut rig = new(&file, rule, more);
-        (0..1000).for_each(|_| rig.free_step());
+        let mut fixture = new(&file, rule, more);
+        (0..1000).for_each(|_| fixture.free_step());
         let expected = -1.0 - 2.0 * G / 800.0 * (1.0 - libm::cos(20.0));
-        let error = (rig.get("bob.z") - expected).abs();
+        let error = (fixture.get("bob.z") - expected).abs();
         assert!(error < tolerance * 10.0, "{rule}: {error}");
         // Far stiffer than the step resolves: it hangs.
         let more = more.replace("800", "8e9").replace(", \"rest", ", \"damping\": 1e6, \"rest");
-        let mut rig = new(&file, rule, &more);
-        (0..2000).for_each(|_| rig.free_step());
-        assert!((rig.get("bob.z") + 1.0).abs() < 1e-4 && rig.get("bob.vz").abs() < 1e-3, "{rule}");
-        assert!((rig.get("s.force") - 2.0 * G).abs() < 1e-2, "{rule}: {}", rig.get("s.force"));
+        let mut fixture = new(&file, rule, &more);
+        (0..2000).for_each(|_| fixture.free_step());
+        assert!((fixture.get("bob.z") + 1.0).abs() < 1e-4 && fixture.get("bob.vz").abs() < 1e-3, "{rule}");
+        assert!((fixture.get("s.force") - 2.0 * G).abs() < 1e-2, "{rule}: {}", fixture.get("s.force"));
     }
 }
 
@@ -120,13 +120,13 @@ fn coupled_joints_keep_their_ratio() {
     for rule in RULES {
         let more = r#""coupling": [{"name": "gear", "joints": ["j_right", "j_left"], "ratio": -2.0, "offset": 0.1}],
             "joints": {"j_left": 0.2, "j_right": -0.3}"#;
-        let mut rig = new(&four_bar("gear"), rule, more);
+        let mut fixture = new(&four_bar("gear"), rule, more);
         for _ in 0..500 {
-            rig.free_step();
-            let left = rig.get("j_right.angle") + 2.0 * rig.get("j_left.angle") - 0.1;
+            fixture.free_step();
+            let left = fixture.get("j_right.angle") + 2.0 * fixture.get("j_left.angle") - 0.1;
             assert!(left.abs() < 1e-9, "{rule}: {left}");
         }
-        assert!((rig.get("j_left.angle") - 0.2).abs() > 0.05);
+        assert!((fixture.get("j_left.angle") - 0.2).abs() > 0.05);
     }
 }
 
@@ -137,12 +137,15 @@ fn a_rod_keeps_its_length() {
     for rule in RULES {
         let more = r#""position_m": [1, 0, 0], "loop": [{"name": "rod", "kind": "rod", "links": ["world", "bob"],
             "origin": [0, 0, 0], "origin_2": [0, 0, 0]}]"#;
-        let mut rig = new(&file, rule, more);
+        let mut fixture = new(&file, rule, more);
         for _ in 0..1000 {
-            rig.free_step();
-            assert!((point(&rig, 0, Vector3::zeros()).norm() - 1.0).abs() < 1e-10, "{rule}");
+            fixture.free_step();
+            assert!((point(&fixture, 0, Vector3::zeros()).norm() - 1.0).abs() < 1e-10, "{rule}");
         }
-        assert!(rig.robot.energy().mechanical().abs() < if rule == RULES[0] { 0.3 } else { 1e-3 }, "{rule}");
+        assert!(
+            fixture.robot.energy().mechanical().abs() < if rule == RULES[0] { 0.3 } else { 1e-3 },
+            "{rule}"
+        );
     }
 }
 
@@ -177,9 +180,9 @@ fn rarer_joints_leave_what_they_promise() {
                 "rest_length": 0}}]"#
             );
             let text = format!(r#"{{"model": "{file}", "motor": "off", "integrator": "{rule}", {more}}}"#);
-            let mut rig = Rig::new(&text, 0.0, 1e-3);
-            (0..100).for_each(|_| rig.free_step());
-            let p = rig.states()[0].world_from_body;
+            let mut fixture = Fixture::new(&text, 0.0, 1e-3);
+            (0..100).for_each(|_| fixture.free_step());
+            let p = fixture.states()[0].world_from_body;
             let [w, x, y, z] = p.orientation;
             let q = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
             let first: [bool; 3] = std::array::from_fn(|k| p.position[k].abs() > 1e-3);

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
-use common::{Rig, STAND};
+use common::{Fixture, STAND};
 
 /// Writes a model next to the temporary ones of this test.
 fn scene(name: &str, worldbody: &str, more: &str) -> String {
@@ -16,15 +16,15 @@ fn the_hexapod_stands_and_moves_as_its_urdf_twin() {
         r#""model": "tests/reference/multibody/hexapod.xml""#,
         r#""model": "models/hexapod.urdf", "position_m": [0, 0, 0.33], "ground": "half-space""#,
     ]
-    .map(|model| Rig::new(&format!(r#"{{{model}, {STAND}}}"#), 9.81, 1e-3));
-    for rig in &mut twins {
+    .map(|model| Fixture::new(&format!(r#"{{{model}, {STAND}}}"#), 9.81, 1e-3));
+    for fixture in &mut twins {
         for step in 0..400 {
-            let target = rig.get("LF_j2.angle_target") - 5e-4 * f64::from(u8::from(step > 100));
-            rig.set("LF_j2.angle_target", target);
-            rig.free_step();
+            let target = fixture.get("LF_j2.angle_target") - 5e-4 * f64::from(u8::from(step > 100));
+            fixture.set("LF_j2.angle_target", target);
+            fixture.free_step();
         }
     }
-    let [ours, twin] = twins.map(|rig| rig.states());
+    let [ours, twin] = twins.map(|fixture| fixture.states());
     for (a, b) in ours.iter().zip(&twin) {
         let (a, b) = (a.world_from_body, b.world_from_body);
         for k in 0..3 {
@@ -42,11 +42,11 @@ fn bodies_of_one_file_fall_on_what_stands_in_it() {
            <body name="b" pos="2 0 0.3"><freejoint/><geom size="0.1" mass="2"/></body>"#,
         "",
     );
-    let mut rig = Rig::new(&format!(r#"{{"model": "{model}"}}"#), 9.81, 1e-3);
-    (0..1000).for_each(|_| rig.free_step());
-    assert!((rig.get("a.z") - 1.1).abs() < 1e-5, "{}", rig.get("a.z"));
-    assert!((rig.get("b.z") - 0.1).abs() < 1e-5, "{}", rig.get("b.z"));
-    assert!((rig.get("a.contact_normal") - 9.81).abs() < 1e-3);
+    let mut fixture = Fixture::new(&format!(r#"{{"model": "{model}"}}"#), 9.81, 1e-3);
+    (0..1000).for_each(|_| fixture.free_step());
+    assert!((fixture.get("a.z") - 1.1).abs() < 1e-5, "{}", fixture.get("a.z"));
+    assert!((fixture.get("b.z") - 0.1).abs() < 1e-5, "{}", fixture.get("b.z"));
+    assert!((fixture.get("a.contact_normal") - 9.81).abs() < 1e-3);
 }
 
 #[test]
@@ -60,17 +60,17 @@ fn friction_is_that_of_the_pair_and_bits_filter() {
              <geom type="box" size="0.1 0.1 0.1" contype="0" conaffinity="0"/></body>"#,
         "",
     );
-    let mut rig = Rig::new(&format!(r#"{{"model": "{model}"}}"#), 9.81, 1e-3);
+    let mut fixture = Fixture::new(&format!(r#"{{"model": "{model}"}}"#), 9.81, 1e-3);
     let mass = 8.0;
     for body in ["rough", "smooth"] {
-        rig.push(body, [0.3 * mass * 9.81, 0.0, 0.0]);
+        fixture.push(body, [0.3 * mass * 9.81, 0.0, 0.0]);
     }
-    (0..500).for_each(|_| rig.free_step());
-    assert!(rig.get("rough.x").abs() < 1e-9);
+    (0..500).for_each(|_| fixture.free_step());
+    assert!(fixture.get("rough.x").abs() < 1e-9);
     // 0.3·g of push less 0.1·g of friction: the larger one of the pair.
     let exact = 0.2 * 9.81 * 0.5;
-    assert!((rig.get("smooth.vx") / exact - 1.0).abs() < 1e-6, "{}", rig.get("smooth.vx"));
-    assert!(rig.get("ghost.z") < -0.5);
+    assert!((fixture.get("smooth.vx") / exact - 1.0).abs() < 1e-6, "{}", fixture.get("smooth.vx"));
+    assert!(fixture.get("ghost.z") < -0.5);
 }
 
 #[test]
@@ -81,12 +81,16 @@ fn the_file_speaks_where_the_scenario_is_silent() {
         "<actuator><position joint=\"j\" kp=\"50\" kv=\"2\" forcerange=\"-3 3\"/></actuator>",
     );
     // Actuators may come before the world.
-    let rig = Rig::new(&format!(r#"{{"model": "{model}"}}"#), 9.81, 1e-3);
-    let shown =
-        ["j.stiffness", "j.damping", "j.max_torque", "j.viscous_friction", "j.armature"].map(|n| rig.get(n));
+    let fixture = Fixture::new(&format!(r#"{{"model": "{model}"}}"#), 9.81, 1e-3);
+    let shown = ["j.stiffness", "j.damping", "j.max_torque", "j.viscous_friction", "j.armature"]
+        .map(|n| fixture.get(n));
     assert_eq!(shown, [50.0, 2.0, 3.0, 0.5, 0.1]);
-    let rig = Rig::new(&format!(r#"{{"model": "{model}", "max_torque": 9, "stiffness": 70}}"#), 9.81, 1e-3);
-    assert_eq!([rig.get("j.stiffness"), rig.get("j.max_torque"), rig.get("j.damping")], [70.0, 9.0, 2.0]);
+    let fixture =
+        Fixture::new(&format!(r#"{{"model": "{model}", "max_torque": 9, "stiffness": 70}}"#), 9.81, 1e-3);
+    assert_eq!(
+        [fixture.get("j.stiffness"), fixture.get("j.max_torque"), fixture.get("j.damping")],
+        [70.0, 9.0, 2.0]
+    );
 }
 
 #[test]
@@ -113,15 +117,15 @@ fn a_joint_that_mimics_follows_with_its_own_ratio() {
         "</robot>".into(),
     ];
     let model = common::temporary_urdf("mimic", &text.concat());
-    let mut rig = Rig::new(
+    let mut fixture = Fixture::new(
         &format!(r#"{{"model": "{model}", "fixed_base": true, "joints": {{"leader": 0.4}}}}"#),
         9.81,
         1e-3,
     );
-    assert!((rig.get("follower.angle") - 0.1).abs() < 1e-15);
-    rig.set("leader.angle_target", 1.2);
-    (0..2000).for_each(|_| rig.free_step());
-    let (leader, follower) = (rig.get("leader.angle"), rig.get("follower.angle"));
+    assert!((fixture.get("follower.angle") - 0.1).abs() < 1e-15);
+    fixture.set("leader.angle_target", 1.2);
+    (0..2000).for_each(|_| fixture.free_step());
+    let (leader, follower) = (fixture.get("leader.angle"), fixture.get("follower.angle"));
     assert!((leader - 1.2).abs() < 1e-3, "{leader}");
     assert!((follower - (0.3 - 0.5 * leader)).abs() < 1e-9, "{follower}");
     // A load on the follower is felt by the leader: it gives way by half the torque over its stiffness.
@@ -151,13 +155,17 @@ fn connected_and_welded_bodies_stay_together() {
            <connect name="pin" body1="crank" body2="slider" anchor=".3 0 0"/></equality>"#,
     );
     // The slider is held where the crank ends: the crank cannot turn without pulling it.
-    let mut rig = Rig::new(&format!(r#"{{"model": "{model}", "motor": "off"}}"#), 9.81, 1e-3);
-    (0..500).for_each(|_| rig.free_step());
-    let (slider, load) = (rig.get("slider.x"), rig.get("load.x"));
+    let mut fixture = Fixture::new(&format!(r#"{{"model": "{model}", "motor": "off"}}"#), 9.81, 1e-3);
+    (0..500).for_each(|_| fixture.free_step());
+    let (slider, load) = (fixture.get("slider.x"), fixture.get("load.x"));
     assert!((load - slider - 1.0).abs() < 1e-9, "{slider} {load}");
     // The pin binds the end of the crank to the slider's height 0: the crank stays level.
-    assert!(rig.get("jc.angle").abs() < 1e-9 && rig.get("jr.angle") > 1.0, "{}", rig.get("jr.angle"));
-    assert!(rig.get("hold.force") > 19.0);
+    assert!(
+        fixture.get("jc.angle").abs() < 1e-9 && fixture.get("jr.angle") > 1.0,
+        "{}",
+        fixture.get("jr.angle")
+    );
+    assert!(fixture.get("hold.force") > 19.0);
 }
 
 #[test]
@@ -174,9 +182,10 @@ fn a_body_on_two_hinges_swings_as_on_a_universal_joint() {
     );
     let kind = r#", "joint_kind": {"j": "universal"}"#;
     let places = [(two, ""), (one, kind)].map(|(model, more)| {
-        let mut rig = Rig::new(&format!(r#"{{"model": "{model}", "motor": "off"{more}}}"#), 9.81, 1e-3);
-        (0..1000).for_each(|_| rig.free_step());
-        ["a.roll", "a.pitch", "a.yaw"].map(|name| rig.get(name))
+        let mut fixture =
+            Fixture::new(&format!(r#"{{"model": "{model}", "motor": "off"{more}}}"#), 9.81, 1e-3);
+        (0..1000).for_each(|_| fixture.free_step());
+        ["a.roll", "a.pitch", "a.yaw"].map(|name| fixture.get(name))
     });
     // It swings far, and the body between the hinges weighs a millionth.
     assert!(places[1][0].abs() > 0.2 && places[1][2].abs() > 0.2, "{places:?}");

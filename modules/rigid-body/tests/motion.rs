@@ -2,21 +2,21 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
-use common::{Rig, STAND, ball, temporary_urdf};
+use common::{Fixture, STAND, ball, temporary_urdf};
 
 const G: f64 = 9.81;
 
 #[test]
 fn free_fall_follows_the_closed_form_of_its_scheme() {
     let parameters = format!(r#"{{"model": "{}", "position_m": [0, 0, 10]}}"#, ball("free_fall"));
-    let mut rig = Rig::new(&parameters, G, 1e-3);
-    (0..1000).for_each(|_| rig.free_step());
+    let mut fixture = Fixture::new(&parameters, G, 1e-3);
+    (0..1000).for_each(|_| fixture.free_step());
     // Semi-implicit Euler: z = z0 − ½·g·t·(t + h).
-    assert!((rig.get("ball.z") - (10.0 - 0.5 * G * 1.001)).abs() < 1e-12);
-    assert!((rig.get("ball.vz") + G).abs() < 1e-12);
+    assert!((fixture.get("ball.z") - (10.0 - 0.5 * G * 1.001)).abs() < 1e-12);
+    assert!((fixture.get("ball.vz") + G).abs() < 1e-12);
 }
 
-fn pendulum(name: &str, angle: f64, h: f64) -> Rig {
+fn pendulum(name: &str, angle: f64, h: f64) -> Fixture {
     let file = temporary_urdf(
         name,
         r#"<robot name="pendulum"><link name="world"/><link name="bob">
@@ -26,17 +26,17 @@ fn pendulum(name: &str, angle: f64, h: f64) -> Rig {
         </robot>"#,
     );
     let parameters = format!(r#"{{"model": "{file}", "motor": "off", "joints": {{"pivot": {angle}}}}}"#);
-    Rig::new(&parameters, G, h)
+    Fixture::new(&parameters, G, h)
 }
 
 /// Time between the first and the third zero crossing of the rate, by linear interpolation.
-fn period(rig: &mut Rig) -> f64 {
+fn period(fixture: &mut Fixture) -> f64 {
     let (mut crossings, mut last) = (Vec::new(), 0.0);
     while crossings.len() < 3 {
-        rig.free_step();
-        let rate = rig.get("pivot.velocity");
+        fixture.free_step();
+        let rate = fixture.get("pivot.velocity");
         if last != 0.0 && rate * last < 0.0 {
-            crossings.push(rig.t - rig.h * rate / (rate - last));
+            crossings.push(fixture.t - fixture.h * rate / (rate - last));
         }
         last = rate;
     }
@@ -61,13 +61,13 @@ fn the_period_of_a_pendulum_is_the_elliptic_integral() {
 
 #[test]
 fn a_pendulum_neither_gains_nor_loses_energy() {
-    let mut rig = pendulum("energy", 0.0, 1e-3);
-    let start = rig.robot.energy().mechanical();
+    let mut fixture = pendulum("energy", 0.0, 1e-3);
+    let start = fixture.robot.energy().mechanical();
     let mut early = [f64::INFINITY, f64::NEG_INFINITY];
     let mut late = early;
     for i in 0..20_000 {
-        rig.free_step();
-        let e = rig.robot.energy().mechanical() - start;
+        fixture.free_step();
+        let e = fixture.robot.energy().mechanical() - start;
         let range = if i < 5_000 { &mut early } else { &mut late };
         *range = [range[0].min(e), range[1].max(e)];
     }
@@ -87,22 +87,22 @@ fn a_tumbling_body_keeps_energy_and_momentum() {
         <joint name="spinner" type="continuous"><parent link="racket"/><child link="ring"/><axis xyz="0 1 0"/></joint>
         </robot>"#,
     );
-    let mut rig = Rig::new(&format!(r#"{{"model": "{file}", "motor": "torque"}}"#), 0.0, 1e-3);
+    let mut fixture = Fixture::new(&format!(r#"{{"model": "{file}", "motor": "torque"}}"#), 0.0, 1e-3);
     // A motor spins the ring up against the body; then the joint breaks and both fly freely.
-    rig.set("spinner.torque_target", 0.5);
-    (0..200).for_each(|_| rig.free_step());
-    rig.robot.act("spinner.break", "{}").unwrap();
-    let start = rig.robot.energy().mechanical();
+    fixture.set("spinner.torque_target", 0.5);
+    (0..200).for_each(|_| fixture.free_step());
+    fixture.robot.act("spinner.break", "{}").unwrap();
+    let start = fixture.robot.energy().mechanical();
     assert!(start > 0.1);
     for _ in 0..5_000 {
-        rig.free_step();
-        let change = rig.robot.energy().mechanical() / start - 1.0;
-        assert!(change.abs() < 1e-8, "{} {change:e}", rig.t);
+        fixture.free_step();
+        let change = fixture.robot.energy().mechanical() / start - 1.0;
+        assert!(change.abs() < 1e-8, "{} {change:e}", fixture.t);
     }
 }
 
-fn tip(rig: &Rig) -> [f64; 3] {
-    let state = rig.states()[7];
+fn tip(fixture: &Fixture) -> [f64; 3] {
+    let state = fixture.states()[7];
     let q = state.world_from_body.orientation;
     let q = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(q[0], q[1], q[2], q[3]));
     (nalgebra::Vector3::from(state.world_from_body.position) + q * nalgebra::Vector3::new(0.25, 0.0, 0.0))
@@ -113,9 +113,9 @@ fn chain_error(file: &str, joints: &str, h: f64, expected: [f64; 3]) -> f64 {
     let parameters = format!(
         r#"{{"model": "tests/reference/multibody/{file}.urdf", "motor": "off", "joints": {joints}}}"#
     );
-    let mut rig = Rig::new(&parameters, G, h);
-    (0..(1.0 / h).round() as usize).for_each(|_| rig.free_step());
-    let tip = tip(&rig);
+    let mut fixture = Fixture::new(&parameters, G, h);
+    (0..(1.0 / h).round() as usize).for_each(|_| fixture.free_step());
+    let tip = tip(&fixture);
     (0..3).map(|k| (tip[k] - expected[k]).powi(2)).sum::<f64>().sqrt()
 }
 
@@ -138,15 +138,15 @@ fn chains_approach_the_reference_with_first_order() {
 #[test]
 fn a_swinging_chain_stays_together_and_finite() {
     let parameters = r#"{"model": "tests/reference/multibody/chain8.urdf", "motor": "off", "joints": {"j2": 0.2, "j4": 0.2}}"#;
-    let mut rig = Rig::new(parameters, G, 1e-3);
-    let start = rig.robot.energy().mechanical();
+    let mut fixture = Fixture::new(parameters, G, 1e-3);
+    let start = fixture.robot.energy().mechanical();
     for _ in 0..5_000 {
-        rig.free_step();
-        let change = rig.robot.energy().mechanical() - start;
+        fixture.free_step();
+        let change = fixture.robot.energy().mechanical() - start;
         assert!(change.abs() < 3.0, "{change}");
     }
     // Each link starts where the one before ends.
-    let states = rig.states();
+    let states = fixture.states();
     for pair in states.windows(2) {
         let q = pair[0].world_from_body.orientation;
         let q = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(q[0], q[1], q[2], q[3]));
@@ -158,25 +158,25 @@ fn a_swinging_chain_stays_together_and_finite() {
 
 #[test]
 fn a_gait_without_gravity_moves_no_momentum() {
-    let mut rig = Rig::new(
+    let mut fixture = Fixture::new(
         &format!(r#"{{"model": "models/hexapod.urdf", "position_m": [0, 0, 5], {STAND}}}"#),
         0.0,
         1e-3,
     );
-    let joints = rig.joints();
-    let start: Vec<f64> = joints.iter().map(|j| rig.get(&format!("{j}.angle"))).collect();
-    let masses: Vec<f64> = rig.scene.bodies.iter().map(|b| b.mass).collect();
+    let joints = fixture.joints();
+    let start: Vec<f64> = joints.iter().map(|j| fixture.get(&format!("{j}.angle"))).collect();
+    let masses: Vec<f64> = fixture.scene.bodies.iter().map(|b| b.mass).collect();
     assert_eq!((masses.len(), joints.len()), (25, 24));
-    assert!((rig.mass() - 25.02).abs() < 1e-9);
+    assert!((fixture.mass() - 25.02).abs() < 1e-9);
     let coms: Vec<[f64; 3]> = (0..25).map(com).collect();
     for _ in 0..1000 {
         for (k, (joint, q)) in joints.iter().zip(&start).enumerate() {
-            let target = q + 0.3 * libm::sin(6.0 * rig.t + k as f64) - 0.3 * libm::sin(k as f64);
-            rig.set(&format!("{joint}.angle_target"), target);
+            let target = q + 0.3 * libm::sin(6.0 * fixture.t + k as f64) - 0.3 * libm::sin(k as f64);
+            fixture.set(&format!("{joint}.angle_target"), target);
         }
-        rig.free_step();
+        fixture.free_step();
         let mut momentum = nalgebra::Vector3::zeros();
-        for ((s, m), c) in rig.states().iter().zip(&masses).zip(&coms) {
+        for ((s, m), c) in fixture.states().iter().zip(&masses).zip(&coms) {
             let q = s.world_from_body.orientation;
             let q =
                 nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(q[0], q[1], q[2], q[3]));

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
-use common::{Rig, STAND, instantiate, temporary_urdf};
+use common::{Fixture, STAND, instantiate, temporary_urdf};
 
 const G: f64 = 9.81;
 
@@ -16,7 +16,7 @@ fn brick(name: &str) -> String {
 #[test]
 fn a_ball_comes_to_rest_on_a_brick_that_stands_on_the_ground() {
     let (ball, brick) = (common::ball("on-brick"), brick("below"));
-    let mut rig = Rig::new(
+    let mut fixture = Fixture::new(
         &format!(
             r#"{{"model": "{ball}", "position_m": [0, 0, 0.3], "velocity_m_s": [0, 0, -0.5], "ground": "half-space",
             "object": [{{"name": "stone", "model": "{brick}", "position_m": [0, 0, 0.1], "heading_rad": 0.7}},
@@ -25,21 +25,21 @@ fn a_ball_comes_to_rest_on_a_brick_that_stands_on_the_ground() {
         G,
         1e-3,
     );
-    let names: Vec<&str> = rig.scene.bodies.iter().map(|b| b.name.as_str()).collect();
+    let names: Vec<&str> = fixture.scene.bodies.iter().map(|b| b.name.as_str()).collect();
     assert_eq!(names, ["ball", "stone/brick", "post/brick"]);
-    assert_eq!(rig.states()[1].linear_velocity, [0.0; 3]);
-    (0..1000).for_each(|_| rig.free_step());
-    assert!((rig.get("ball.z") - 0.23).abs() < 1e-5, "{}", rig.get("ball.z"));
-    assert!((rig.get("stone/brick.yaw") - 0.7).abs() < 1e-6);
+    assert_eq!(fixture.states()[1].linear_velocity, [0.0; 3]);
+    (0..1000).for_each(|_| fixture.free_step());
+    assert!((fixture.get("ball.z") - 0.23).abs() < 1e-5, "{}", fixture.get("ball.z"));
+    assert!((fixture.get("stone/brick.yaw") - 0.7).abs() < 1e-6);
     // The brick carries the ball and itself: 5 kg above, 5 + 2 kg below.
-    assert!((rig.get("stone/brick.contact_normal") / (12.0 * G) - 1.0).abs() < 1e-3);
-    assert!((rig.get("post/brick.z") - 2.0).abs() < 1e-12);
+    assert!((fixture.get("stone/brick.contact_normal") / (12.0 * G) - 1.0).abs() < 1e-3);
+    assert!((fixture.get("post/brick.z") - 2.0).abs() < 1e-12);
 }
 
 #[test]
 fn two_robots_meet() {
     let hexapod = r#""model": "models/hexapod.urdf", "position_m": [0, 0, 0.33], "ground": "half-space""#;
-    let mut rig = Rig::new(
+    let mut fixture = Fixture::new(
         &format!(
             r#"{{{hexapod}, {STAND}, "object": [{{"name": "second", "model": "models/hexapod.urdf",
             "position_m": [0, 0, 1.2], "heading_rad": 1}}]}}"#
@@ -47,13 +47,13 @@ fn two_robots_meet() {
         G,
         1e-3,
     );
-    assert_eq!(rig.scene.bodies.len(), 50);
-    rig.get("second/LF_j2.angle");
+    assert_eq!(fixture.scene.bodies.len(), 50);
+    fixture.get("second/LF_j2.angle");
     // The second one falls on the first: nothing of it comes to the ground before half a second.
-    (0..450).for_each(|_| rig.free_step());
-    let (first, second) = (rig.get("body.z"), rig.get("second/body.z"));
+    (0..450).for_each(|_| fixture.free_step());
+    let (first, second) = (fixture.get("body.z"), fixture.get("second/body.z"));
     assert!(second > first && second < 1.0, "{first} {second}");
-    assert!(rig.get("body.contact_normal") > 0.0 || rig.get("contact.points") > 6.0);
+    assert!(fixture.get("body.contact_normal") > 0.0 || fixture.get("contact.points") > 6.0);
 }
 
 #[test]

@@ -2,10 +2,10 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
-use common::{Rig, temporary_urdf};
+use common::{Fixture, temporary_urdf};
 
 /// A slender rod of 2 m and 1 kg, its lower end on the ground.
-fn rod(name: &str, degrees: f64, friction: f64, v: f64) -> Rig {
+fn rod(name: &str, degrees: f64, friction: f64, v: f64) -> Fixture {
     let (sin, cos) = degrees.to_radians().sin_cos();
     let ends = [1.0, -1.0].map(|e| {
         format!(
@@ -27,27 +27,27 @@ fn rod(name: &str, degrees: f64, friction: f64, v: f64) -> Rig {
         "ground": "half-space", "friction": {friction}}}"#,
         sin + 1e-6
     );
-    Rig::new(&parameters, 9.81, 1e-3)
+    Fixture::new(&parameters, 9.81, 1e-3)
 }
 
 #[test]
 fn a_jamming_rod_gets_a_finite_impulse() {
     for (k, (friction, degrees)) in [(1.5, 60.0), (2.0, 40.0), (2.0, 60.0), (2.0, 78.0)].iter().enumerate() {
         // Sliding against its lean it jams at once: p(θ) < 0.
-        let mut rig = rod(&format!("rod{k}"), *degrees, *friction, -1.0);
-        rig.free_step();
-        let impulse = rig.h * rig.get("rod.contact_normal");
-        let tip = rig.states()[0].linear_velocity[0];
+        let mut fixture = rod(&format!("rod{k}"), *degrees, *friction, -1.0);
+        fixture.free_step();
+        let impulse = fixture.h * fixture.get("rod.contact_normal");
+        let tip = fixture.states()[0].linear_velocity[0];
         println!("{friction} {degrees}: {impulse} {tip}");
         assert!(impulse > 0.1 && impulse < 2.0, "{friction} {degrees}: {impulse}");
         for _ in 0..1000 {
-            rig.free_step();
-            assert!(rig.states()[0].world_from_body.position.iter().all(|x| x.is_finite()));
+            fixture.free_step();
+            assert!(fixture.states()[0].world_from_body.position.iter().all(|x| x.is_finite()));
         }
         // The other way it slides on with less than its weight would ask for.
-        let mut rig = rod(&format!("free{k}"), *degrees, *friction, 1.0);
-        rig.free_step();
-        let impulse = rig.h * rig.get("rod.contact_normal");
+        let mut fixture = rod(&format!("free{k}"), *degrees, *friction, 1.0);
+        fixture.free_step();
+        let impulse = fixture.h * fixture.get("rod.contact_normal");
         assert!(impulse < 0.02, "{friction} {degrees}: {impulse}");
     }
 }

@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
-use common::{Rig, root, temporary_urdf};
+use common::{Fixture, root, temporary_urdf};
 use std::sync::Arc;
 use terraglue_rigid_body::RigidBody;
 use terraglue_subsystem::{
@@ -22,20 +22,20 @@ fn sphere(x: f64, y: f64, z: f64, r: f64) -> String {
     )
 }
 
-fn table(name: &str, com_shift: f64) -> Rig {
+fn table(name: &str, com_shift: f64) -> Fixture {
     let feet: String = [(0.35, 0.5), (0.0, 0.5), (-0.35, 0.5), (0.35, -0.5), (0.0, -0.5), (-0.35, -0.5)]
         .iter()
         .map(|(x, y)| sphere(x - com_shift, *y, -0.3, 0.03))
         .collect();
     let file = temporary_urdf(name, &format!("<robot name=\"t\">{}</robot>", solid("table", 20.0, &feet)));
-    Rig::new(&format!(r#"{{"model": "{file}", "position_m": [0, 0, 0.33]}}"#), 9.81, 1e-3)
+    Fixture::new(&format!(r#"{{"model": "{file}", "position_m": [0, 0, 0.33]}}"#), 9.81, 1e-3)
 }
 
 #[test]
 fn six_feet_on_one_body_share_the_weight_with_the_smallest_norm() {
-    let mut rig = table("table", 0.0);
-    let ports = rig.ports();
-    let e = rig.estimate(&ports).unwrap();
+    let mut fixture = table("table", 0.0);
+    let ports = fixture.ports();
+    let e = fixture.estimate(&ports).unwrap();
     assert!(!e.unique);
     for n in e.t_star.iter().step_by(3) {
         assert!((n / (20.0 * 9.81 / 6.0) - 1.0).abs() < 1e-8, "{:?}", e.t_star);
@@ -46,10 +46,10 @@ fn six_feet_on_one_body_share_the_weight_with_the_smallest_norm() {
 #[test]
 fn a_shifted_load_is_shared_linearly_and_in_any_order() {
     let shares = |reversed: bool| {
-        let mut rig = table("shifted", 0.1);
-        rig.reversed = reversed;
-        let ports = rig.ports();
-        let mut t: Vec<f64> = rig.estimate(&ports).unwrap().t_star.iter().copied().step_by(3).collect();
+        let mut fixture = table("shifted", 0.1);
+        fixture.reversed = reversed;
+        let ports = fixture.ports();
+        let mut t: Vec<f64> = fixture.estimate(&ports).unwrap().t_star.iter().copied().step_by(3).collect();
         if reversed {
             t.reverse();
         }
@@ -64,21 +64,21 @@ fn a_shifted_load_is_shared_linearly_and_in_any_order() {
 
 #[test]
 fn friction_bounds_the_tangential_estimate() {
-    let mut rig = table("sliding", 0.0);
-    rig.mu = 0.1;
-    rig.set("table.force_x", 300.0);
-    let ports = rig.ports();
-    let e = rig.estimate(&ports).unwrap();
+    let mut fixture = table("sliding", 0.0);
+    fixture.mu = 0.1;
+    fixture.set("table.force_x", 300.0);
+    let ports = fixture.ports();
+    let e = fixture.estimate(&ports).unwrap();
     let mut slip = 0.0;
     for t in e.t_star.chunks(3) {
         assert!(libm::hypot(t[1], t[2]) <= 0.1 * t[0] * (1.0 + 1e-9) + 1e-12, "{t:?}");
         slip += t[1];
     }
     assert!((slip + 0.1 * 20.0 * 9.81).abs() < 1.0, "{slip}");
-    rig.mu = 0.8;
-    rig.set("table.force_x", 30.0);
-    let ports = rig.ports();
-    let e = rig.estimate(&ports).unwrap();
+    fixture.mu = 0.8;
+    fixture.set("table.force_x", 30.0);
+    let ports = fixture.ports();
+    let e = fixture.estimate(&ports).unwrap();
     let held: f64 = e.t_star.iter().skip(1).step_by(3).sum();
     assert!((held + 30.0).abs() < 1e-6, "{held}");
 }
@@ -87,8 +87,9 @@ fn friction_bounds_the_tangential_estimate() {
 fn a_plate_holds_by_one_patch_with_moments() {
     let shape = "<collision><geometry><box size=\"0.4 0.2 0.1\"/></geometry></collision>";
     let file = temporary_urdf("plate", &format!("<robot name=\"p\">{}</robot>", solid("plate", 10.0, shape)));
-    let mut rig = Rig::new(&format!(r#"{{"model": "{file}", "position_m": [0, 0, 0.05]}}"#), 9.81, 1e-3);
-    rig.set("plate.force_x", 20.0);
+    let mut fixture =
+        Fixture::new(&format!(r#"{{"model": "{file}", "position_m": [0, 0, 0.05]}}"#), 9.81, 1e-3);
+    fixture.set("plate.force_x", 20.0);
     let port = Port {
         key: 1,
         kind: 0,
@@ -107,15 +108,15 @@ fn a_plate_holds_by_one_patch_with_moments() {
     let step = Step { ports: &[port], n: 6, ..Step::free(0.0, 1e-3, 0) };
     let (mut t, mut x, mut g, mut active) = ([f64::NAN; 6], [f64::NAN; 6], [f64::NAN; 36], [9]);
     let mut out = Estimate { t_star: &mut t, x_free: &mut x, g: &mut g, active: &mut active, unique: false };
-    rig.robot.estimate_forces(&step, &Motion { x: &[0.0; 6], v: &[0.0; 6] }, &mut out).unwrap();
+    fixture.robot.estimate_forces(&step, &Motion { x: &[0.0; 6], v: &[0.0; 6] }, &mut out).unwrap();
     // Equilibrium about the patch: force at the centre of mass, 0.05 m above it, along x: a moment about y.
     for (t, expected) in t.iter().zip([98.1, -20.0, 0.0, 0.0, 0.0, -1.0]) {
         assert!((t - expected).abs() < 1e-6, "{t} {expected}");
     }
     // The centre of pressure stays within the plate.
-    rig.set("plate.force_x", 600.0);
+    fixture.set("plate.force_x", 600.0);
     let mut out = Estimate { t_star: &mut t, x_free: &mut x, g: &mut g, active: &mut active, unique: false };
-    rig.robot.estimate_forces(&step, &Motion { x: &[0.0; 6], v: &[0.0; 6] }, &mut out).unwrap();
+    fixture.robot.estimate_forces(&step, &Motion { x: &[0.0; 6], v: &[0.0; 6] }, &mut out).unwrap();
     assert!(t[5].abs() <= 0.2 * t[0] + 1e-9 && libm::hypot(t[1], t[2]) <= 0.8 * t[0] + 1e-9, "{t:?}");
 }
 
@@ -137,11 +138,11 @@ fn own_bodies_do_not_pass_through_each_other() {
         hinge("r", "right", 0.3)
     );
     let file = temporary_urdf("arms", &text);
-    let mut rig =
-        Rig::new(&format!(r#"{{"model": "{file}", "motor": "torque", "friction": 0.0}}"#), 0.0, 1e-3);
+    let mut fixture =
+        Fixture::new(&format!(r#"{{"model": "{file}", "motor": "torque", "friction": 0.0}}"#), 0.0, 1e-3);
     // Without friction: with 0.8 the two arms, 24 degrees off the vertical, lock (tan 24 degrees = 0.44). A wrench at a port on the left arm, later felt by the right arm too.
-    let port = |rig: &Rig| {
-        let p = rig.states()[0].world_from_body.position;
+    let port = |fixture: &Fixture| {
+        let p = fixture.states()[0].world_from_body.position;
         Port {
             key: 1,
             kind: 0,
@@ -158,38 +159,38 @@ fn own_bodies_do_not_pass_through_each_other() {
             law: Law::UNILATERAL,
         }
     };
-    let mobility = |rig: &mut Rig| {
-        let ports = [port(rig)];
-        let x =
-            rig.advance(&ports, &[0.0, 1.0, 0.0]).unwrap()[1] - rig.advance(&ports, &[0.0; 3]).unwrap()[1];
+    let mobility = |fixture: &mut Fixture| {
+        let ports = [port(fixture)];
+        let x = fixture.advance(&ports, &[0.0, 1.0, 0.0]).unwrap()[1]
+            - fixture.advance(&ports, &[0.0; 3]).unwrap()[1];
         let mut g = [f64::NAN; 9];
-        let step = rig.step(&ports);
-        rig.robot.interface_jacobian(&step, terraglue_subsystem::Level::Position, &mut g).unwrap();
+        let step = fixture.step(&ports);
+        fixture.robot.interface_jacobian(&step, terraglue_subsystem::Level::Position, &mut g).unwrap();
         assert!((x / g[4] - 1.0).abs() < 1e-3, "{x} {}", g[4]);
         x
     };
-    let alone = mobility(&mut rig);
-    rig.set("l.torque_target", -2.0);
-    rig.set("r.torque_target", 2.0);
+    let alone = mobility(&mut fixture);
+    fixture.set("l.torque_target", -2.0);
+    fixture.set("r.torque_target", 2.0);
     let mut met = false;
-    let before = rig.balance();
+    let before = fixture.balance();
     for _ in 0..1500 {
-        rig.free_step();
+        fixture.free_step();
         let centre = |s: &BodyState| {
             let q = s.world_from_body.orientation;
             let q =
                 nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(q[0], q[1], q[2], q[3]));
             nalgebra::Vector3::from(s.world_from_body.position) + q * nalgebra::Vector3::new(0.0, 0.0, -0.5)
         };
-        let states = rig.states();
+        let states = fixture.states();
         let apart = (centre(&states[0]) - centre(&states[1])).norm();
         assert!(apart > 0.2 - 1e-4, "{apart}");
         met |= apart < 0.2 + 1e-4;
     }
-    assert!(met && rig.get("l.velocity").abs() < 1e-2, "{}", rig.get("l.velocity"));
-    assert!(rig.balance() <= before + 1e-6);
+    assert!(met && fixture.get("l.velocity").abs() < 1e-2, "{}", fixture.get("l.velocity"));
+    assert!(fixture.balance() <= before + 1e-6);
     // Pressed together the arms move as one.
-    assert!((mobility(&mut rig) / alone - 0.5).abs() < 0.05);
+    assert!((mobility(&mut fixture) / alone - 0.5).abs() < 0.05);
 }
 
 struct Ramp;
@@ -236,15 +237,15 @@ fn the_robot_is_set_down_on_the_terrain() {
 #[test]
 fn a_fixed_base_stays_under_load() {
     let file = common::ball("fixed");
-    let mut rig = Rig::new(
+    let mut fixture = Fixture::new(
         &format!(r#"{{"model": "{file}", "position_m": [1, 2, 3], "fixed_base": true}}"#),
         9.81,
         1e-3,
     );
-    rig.set("ball.force_x", 1e3);
-    (0..100).for_each(|_| rig.free_step());
+    fixture.set("ball.force_x", 1e3);
+    (0..100).for_each(|_| fixture.free_step());
     for (name, expected) in [("ball.x", 1.0), ("ball.y", 2.0), ("ball.z", 3.0)] {
-        assert!((rig.get(name) - expected).abs() < 1e-10);
+        assert!((fixture.get(name) - expected).abs() < 1e-10);
     }
 }
 
@@ -263,12 +264,12 @@ fn wrong_parameters_are_refused() {
 
 #[test]
 fn a_changing_step_length_keeps_joints_closed_and_energy_booked() {
-    let mut rig = Rig::hexapod(0.33, 9.81, 1e-3);
-    let before = rig.balance();
+    let mut fixture = Fixture::hexapod(0.33, 9.81, 1e-3);
+    let before = fixture.balance();
     for k in 0..200 {
-        rig.h = [1e-3, 5e-4, 2.5e-4, 2e-3][k % 4];
-        rig.ground_step();
+        fixture.h = [1e-3, 5e-4, 2.5e-4, 2e-3][k % 4];
+        fixture.ground_step();
     }
-    assert!((rig.balance() - before).abs() < 1e-2, "{}", rig.balance() - before);
-    assert!(rig.get("body.z") > 0.3);
+    assert!((fixture.balance() - before).abs() < 1e-2, "{}", fixture.balance() - before);
+    assert!(fixture.get("body.z") > 0.3);
 }

@@ -5,7 +5,7 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
-use common::{Rig, temporary_urdf};
+use common::{Fixture, temporary_urdf};
 use terraglue_numerics::extremes::larger;
 use terraglue_subsystem::{Input, Law, Motion, Port, PortKind, Response, Step, component};
 
@@ -14,7 +14,7 @@ const ARM: [f64; 3] = [0.3, 0.4, 0.0];
 const FORCE: [f64; 6] = [4.0, 0.0, 0.0, 0.0, 0.0, 0.0];
 const INERTIA: f64 = 0.5;
 
-fn body(integrator: &str, h: f64) -> Rig {
+fn body(integrator: &str, h: f64) -> Fixture {
     let file = temporary_urdf(
         &format!("port_arm_{integrator}"),
         r#"<robot name="bar"><link name="bar"><inertial><mass value="2"/>
@@ -22,12 +22,12 @@ fn body(integrator: &str, h: f64) -> Rig {
     );
     let parameters =
         format!(r#"{{"model": "{file}", "integrator": "{integrator}", "rotation_rate_rad_s": [0, 0, 1.5]}}"#);
-    Rig::new(&parameters, 0.0, h)
+    Fixture::new(&parameters, 0.0, h)
 }
 
 /// The port where the material point is at t, with world axes.
-fn port(rig: &Rig) -> Port {
-    let pose = rig.states()[0].world_from_body;
+fn port(fixture: &Fixture) -> Port {
+    let pose = fixture.states()[0].world_from_body;
     let [w, x, y, z] = pose.orientation;
     let q = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(w, x, y, z));
     let origin = nalgebra::Vector3::from(pose.position) + q * nalgebra::Vector3::from(ARM);
@@ -49,15 +49,15 @@ fn port(rig: &Rig) -> Port {
 }
 
 /// A step of length h under the force; the displacement of the port.
-fn step(rig: &mut Rig, h: f64) -> f64 {
-    let ports = [port(rig)];
-    let step = Step { ports: &ports, n: 6, ..Step::free(rig.t, h, rig.index) };
+fn step(fixture: &mut Fixture, h: f64) -> f64 {
+    let ports = [port(fixture)];
+    let step = Step { ports: &ports, n: 6, ..Step::free(fixture.t, h, fixture.index) };
     let [mut x, mut v, mut a, mut t] = [[f64::NAN; 6]; 4];
     let mut out = Response { x: &mut x, v: &mut v, a: &mut a, t: &mut t, reached: 0.0, flags: 0 };
-    rig.robot.advance(&step, &Input::Force { t: &FORCE, motion: None }, &mut out).unwrap();
-    rig.robot.commit(&step, &FORCE, &Motion { x: &x, v: &v }).unwrap();
-    rig.t += h;
-    rig.index += u64::from(h > 0.0);
+    fixture.robot.advance(&step, &Input::Force { t: &FORCE, motion: None }, &mut out).unwrap();
+    fixture.robot.commit(&step, &FORCE, &Motion { x: &x, v: &v }).unwrap();
+    fixture.t += h;
+    fixture.index += u64::from(h > 0.0);
     x[0]
 }
 
@@ -82,15 +82,15 @@ fn reference() -> f64 {
 
 /// Error of the angle after a second, rad, and the largest error of the energy, J.
 fn errors(integrator: &str, h: f64) -> (f64, f64) {
-    let mut rig = body(integrator, h);
-    let start = rig.robot.energy().mechanical();
-    step(&mut rig, 0.0);
+    let mut fixture = body(integrator, h);
+    let start = fixture.robot.energy().mechanical();
+    step(&mut fixture, 0.0);
     let (mut work, mut worst) = (0.0, 0.0_f64);
     for _ in 0..(1.0 / h).round() as usize {
-        work += FORCE[0] * step(&mut rig, h);
-        worst = larger(worst, (rig.robot.energy().mechanical() - start - work).abs());
+        work += FORCE[0] * step(&mut fixture, h);
+        worst = larger(worst, (fixture.robot.energy().mechanical() - start - work).abs());
     }
-    let [w, _, _, z] = rig.states()[0].world_from_body.orientation;
+    let [w, _, _, z] = fixture.states()[0].world_from_body.orientation;
     let angle = 2.0 * libm::atan2(z, w);
     let off = angle - reference();
     (off - std::f64::consts::TAU * (off / std::f64::consts::TAU).round(), worst)

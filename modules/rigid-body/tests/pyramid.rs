@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
-use common::{Rig, STAND, temporary_urdf};
+use common::{Fixture, STAND, temporary_urdf};
 
 const BOX: &str = r#"<robot name="r"><link name="s"><inertial><mass value="1"/>
     <inertia ixx="1e6" iyy="1e6" izz="1e6" ixy="0" ixz="0" iyz="0"/></inertial>
@@ -18,10 +18,10 @@ fn braking(law: &str, degrees: f64) -> f64 {
         3.0 * cos,
         3.0 * sin
     );
-    let mut rig = Rig::new(&parameters, 9.81, 1e-3);
-    rig.free_step();
-    let [x, y, _] = rig.states()[0].linear_velocity;
-    (3.0 - x * cos - y * sin) / (0.5 * 9.81 * rig.h)
+    let mut fixture = Fixture::new(&parameters, 9.81, 1e-3);
+    fixture.free_step();
+    let [x, y, _] = fixture.states()[0].linear_velocity;
+    (3.0 - x * cos - y * sin) / (0.5 * 9.81 * fixture.h)
 }
 
 #[test]
@@ -43,10 +43,11 @@ fn the_hexapod_stands_by_the_pyramid_too() {
             r#"{{"model": "models/hexapod.urdf", "position_m": [0, 0, 0.33], "ground": "half-space",
             "contact_solver": "{law}", {STAND}}}"#
         );
-        let mut rig = Rig::new(&parameters, 9.81, 1e-3);
-        (0..300).for_each(|_| rig.free_step());
-        let feet: f64 = rig.scene.bodies.iter().map(|b| rig.get(&format!("{}.contact_normal", b.name))).sum();
-        assert!((feet / (rig.mass() * 9.81) - 1.0).abs() < 1e-3, "{feet}");
+        let mut fixture = Fixture::new(&parameters, 9.81, 1e-3);
+        (0..300).for_each(|_| fixture.free_step());
+        let feet: f64 =
+            fixture.scene.bodies.iter().map(|b| fixture.get(&format!("{}.contact_normal", b.name))).sum();
+        assert!((feet / (fixture.mass() * 9.81) - 1.0).abs() < 1e-3, "{feet}");
     }
 }
 

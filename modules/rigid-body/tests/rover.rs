@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
-use common::Rig;
+use common::Fixture;
 use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use terraglue_numerics::extremes::larger;
 use terraglue_subsystem::{Estimate, Input, Law, Motion, Port, Response, Step, component};
@@ -15,18 +15,18 @@ const MASS: f64 = 39.2;
 /// Stiffness of the ground below a wheel, N/m.
 const STIFFNESS: f64 = 2e4;
 
-fn rover(max_torque: f64, z: f64) -> Rig {
+fn rover(max_torque: f64, z: f64) -> Fixture {
     let text = format!(
         r#"{{"model": "models/rover.urdf", "position_m": [0, 0, {z}], "max_torque": {max_torque},
         "motor": {{"*_drive": "velocity", "*_pivot": "off"}}}}"#
     );
-    Rig::new(&text, G, 1e-3)
+    Fixture::new(&text, G, 1e-3)
 }
 
 /// A patch with all six components below every wheel that can touch within the step.
-fn patches(rig: &Rig) -> Vec<Port> {
+fn patches(fixture: &Fixture) -> Vec<Port> {
     let mut ports: Vec<Port> = Vec::new();
-    for (number, (state, body)) in rig.states().iter().zip(&rig.scene.bodies).enumerate() {
+    for (number, (state, body)) in fixture.states().iter().zip(&fixture.scene.bodies).enumerate() {
         let [w, x, y, z] = state.world_from_body.orientation;
         let q = UnitQuaternion::from_quaternion(Quaternion::new(w, x, y, z));
         let axle = q * Vector3::y();
@@ -57,19 +57,19 @@ fn patches(rig: &Rig) -> Vec<Port> {
 
 /// A step of the plain pass: every wheel gets its share of T* that a spring of the ground allows. The largest component
 /// of T*.
-fn step(rig: &mut Rig) -> f64 {
-    let ports = patches(rig);
+fn step(fixture: &mut Fixture) -> f64 {
+    let ports = patches(fixture);
     let n = 6 * ports.len();
     let still = vec![0.0; n];
     // Below the level of the ground the surface is where the wheel has pressed it.
     let x2: Vec<f64> =
         ports.iter().flat_map(|p| [(-p.origin[2]).min(0.0), 0.0, 0.0, 0.0, 0.0, 0.0]).collect();
-    let step = Step { ports: &ports, n: n as u32, ..Step::free(rig.t, rig.h, rig.index) };
+    let step = Step { ports: &ports, n: n as u32, ..Step::free(fixture.t, fixture.h, fixture.index) };
     let (mut t, mut x_free, mut g, mut active) =
         (vec![f64::NAN; n], vec![f64::NAN; n], vec![f64::NAN; n * n], vec![9; ports.len()]);
     let mut out =
         Estimate { t_star: &mut t, x_free: &mut x_free, g: &mut g, active: &mut active, unique: false };
-    rig.robot.estimate_forces(&step, &Motion { x: &x2, v: &still }, &mut out).unwrap();
+    fixture.robot.estimate_forces(&step, &Motion { x: &x2, v: &still }, &mut out).unwrap();
     let largest = t.iter().fold(0.0_f64, |m, t| larger(m, t.abs()));
     assert!(largest.is_finite());
     for (port, t) in ports.iter().zip(t.chunks_exact_mut(6)) {
@@ -81,25 +81,25 @@ fn step(rig: &mut Rig) -> f64 {
     let [x, v, a] = &mut free;
     let mut taken = vec![0.0; n];
     let mut out = Response { x, v, a, t: &mut taken, reached: f64::NAN, flags: 0 };
-    rig.robot.advance(&step, &Input::Force { t: &t, motion: None }, &mut out).unwrap();
-    rig.robot.commit(&step, &t, &Motion { x: &x2, v: &still }).unwrap();
-    rig.t += rig.h;
-    rig.index += 1;
+    fixture.robot.advance(&step, &Input::Force { t: &t, motion: None }, &mut out).unwrap();
+    fixture.robot.commit(&step, &t, &Motion { x: &x2, v: &still }).unwrap();
+    fixture.t += fixture.h;
+    fixture.index += 1;
     largest
 }
 
-fn drive(rig: &mut Rig, rates: [f64; 6]) {
+fn drive(fixture: &mut Fixture, rates: [f64; 6]) {
     for (wheel, rate) in WHEELS.iter().zip(rates) {
-        rig.set(&format!("{wheel}_wheel_drive.velocity_target"), rate);
+        fixture.set(&format!("{wheel}_wheel_drive.velocity_target"), rate);
     }
 }
 
 /// The largest component of T* over the run, and where it ends.
 fn run(max_torque: f64, z: f64, rates: [f64; 6], steps: usize) -> (f64, f64, f64) {
-    let mut rig = rover(max_torque, z);
-    drive(&mut rig, rates);
-    let largest = (0..steps).fold(0.0_f64, |m, _| larger(m, step(&mut rig)));
-    (largest, rig.get("body.x"), rig.get("body.z"))
+    let mut fixture = rover(max_torque, z);
+    drive(&mut fixture, rates);
+    let largest = (0..steps).fold(0.0_f64, |m, _| larger(m, step(&mut fixture)));
+    (largest, fixture.get("body.x"), fixture.get("body.z"))
 }
 
 /// Twice the force that stops the whole rover within a step after a fall to the ground from z.

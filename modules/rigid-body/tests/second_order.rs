@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
-use common::{Rig, STAND, temporary_urdf};
+use common::{Fixture, STAND, temporary_urdf};
 use terraglue_numerics::extremes::larger;
 use terraglue_subsystem::{Level, Port, Step, component};
 
@@ -10,15 +10,15 @@ const G: f64 = 9.81;
 const ALPHA: &str = r#""integrator": "generalized-alpha""#;
 const SPATIAL: &str = r#"{"j2": 0.2, "j4": 0.2, "j6": 0.2, "j8": 0.2}"#;
 
-fn chain(file: &str, joints: &str, h: f64) -> Rig {
+fn chain(file: &str, joints: &str, h: f64) -> Fixture {
     let parameters = format!(
         r#"{{"model": "tests/reference/multibody/{file}.urdf", "motor": "off", "joints": {joints}, {ALPHA}}}"#
     );
-    Rig::new(&parameters, G, h)
+    Fixture::new(&parameters, G, h)
 }
 
-fn tip(rig: &Rig) -> nalgebra::Vector3<f64> {
-    let state = rig.states()[7];
+fn tip(fixture: &Fixture) -> nalgebra::Vector3<f64> {
+    let state = fixture.states()[7];
     let q = state.world_from_body.orientation;
     let q = nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(q[0], q[1], q[2], q[3]));
     nalgebra::Vector3::from(state.world_from_body.position) + q * nalgebra::Vector3::new(0.25, 0.0, 0.0)
@@ -29,14 +29,14 @@ fn run(file: &str, joints: &str, h: f64, end: f64, expected: [f64; 3]) -> (f64, 
     watch(chain(file, joints, h), h, end, expected)
 }
 
-fn watch(mut rig: Rig, h: f64, end: f64, expected: [f64; 3]) -> (f64, f64) {
-    let start = rig.robot.energy().mechanical();
+fn watch(mut fixture: Fixture, h: f64, end: f64, expected: [f64; 3]) -> (f64, f64) {
+    let start = fixture.robot.energy().mechanical();
     let (mut worst, mut error) = (0.0_f64, f64::NAN);
     for i in 1..=(end / h).round() as usize {
-        rig.free_step();
-        worst = larger(worst, (rig.robot.energy().mechanical() - start).abs());
+        fixture.free_step();
+        worst = larger(worst, (fixture.robot.energy().mechanical() - start).abs());
         if i == (1.0 / h).round() as usize {
-            error = (tip(&rig) - nalgebra::Vector3::from(expected)).norm();
+            error = (tip(&fixture) - nalgebra::Vector3::from(expected)).norm();
         }
     }
     (error, worst)
@@ -72,7 +72,7 @@ fn the_scheme_that_conserves_energy_does_so_and_converges() {
             r#"{{"model": "tests/reference/multibody/chain8.urdf", "motor": "off", "joints": {SPATIAL},
             "integrator": "energy-momentum"}}"#
         );
-        watch(Rig::new(&parameters, G, h), h, 2.0, expected)
+        watch(Fixture::new(&parameters, G, h), h, 2.0, expected)
     });
     assert!(coarse.1 < 1e-8 && fine.1 < 1e-8, "{coarse:?} {fine:?}");
     assert!(coarse.0 < 2e-5 && coarse.0 / fine.0 > 3.0, "{coarse:?} {fine:?}");
@@ -81,14 +81,15 @@ fn the_scheme_that_conserves_energy_does_so_and_converges() {
 #[test]
 fn a_free_body_falls_exactly() {
     let file = common::ball("alpha_fall");
-    let mut rig = Rig::new(&format!(r#"{{"model": "{file}", "position_m": [0, 0, 10], {ALPHA}}}"#), G, 1e-2);
-    (0..100).for_each(|_| rig.free_step());
-    assert!((rig.get("ball.z") - (10.0 - 0.5 * G)).abs() < 1e-11, "{}", rig.get("ball.z"));
-    assert!((rig.get("ball.vz") + G).abs() < 1e-11);
+    let mut fixture =
+        Fixture::new(&format!(r#"{{"model": "{file}", "position_m": [0, 0, 10], {ALPHA}}}"#), G, 1e-2);
+    (0..100).for_each(|_| fixture.free_step());
+    assert!((fixture.get("ball.z") - (10.0 - 0.5 * G)).abs() < 1e-11, "{}", fixture.get("ball.z"));
+    assert!((fixture.get("ball.vz") + G).abs() < 1e-11);
 }
 
-fn port(rig: &Rig, body: u32) -> Port {
-    let p = rig.states()[body as usize].world_from_body.position;
+fn port(fixture: &Fixture, body: u32) -> Port {
+    let p = fixture.states()[body as usize].world_from_body.position;
     Port {
         key: 1,
         kind: 1,
@@ -110,10 +111,10 @@ fn port(rig: &Rig, body: u32) -> Port {
 fn the_compliance_is_the_derivative_of_the_step() {
     let parameters =
         format!(r#"{{"model": "models/hexapod.urdf", "position_m": [0, 0, 1], {STAND}, {ALPHA}}}"#);
-    let mut rig = Rig::new(&parameters, G, 1e-3);
-    (0..20).for_each(|_| rig.free_step());
-    let ports = [port(&rig, 4)];
-    let step = Step { ports: &ports, n: 6, ..Step::free(rig.t, rig.h, rig.index) };
+    let mut fixture = Fixture::new(&parameters, G, 1e-3);
+    (0..20).for_each(|_| fixture.free_step());
+    let ports = [port(&fixture, 4)];
+    let step = Step { ports: &ports, n: 6, ..Step::free(fixture.t, fixture.h, fixture.index) };
     let mut trial = |t: &[f64; 6]| {
         let (mut x, mut v, mut a, mut out_t) = ([f64::NAN; 6], [f64::NAN; 6], [f64::NAN; 6], [f64::NAN; 6]);
         let mut out = terraglue_subsystem::Response {
@@ -125,7 +126,7 @@ fn the_compliance_is_the_derivative_of_the_step() {
             flags: 0,
         };
         let input = terraglue_subsystem::Input::Force { t, motion: None };
-        rig.robot.advance(&step, &input, &mut out).unwrap();
+        fixture.robot.advance(&step, &input, &mut out).unwrap();
         [x, v, a]
     };
     let zero = trial(&[0.0; 6]);
@@ -138,7 +139,7 @@ fn the_compliance_is_the_derivative_of_the_step() {
         .collect();
     for (k, level) in [Level::Position, Level::Velocity, Level::Acceleration].into_iter().enumerate() {
         let mut g = [f64::NAN; 36];
-        rig.robot.interface_jacobian(&step, level, &mut g).unwrap();
+        fixture.robot.interface_jacobian(&step, level, &mut g).unwrap();
         let largest = g.iter().fold(0.0_f64, |m, g| larger(m, g.abs()));
         for c in 0..6 {
             for r in 0..6 {
@@ -155,14 +156,14 @@ fn the_compliance_is_the_derivative_of_the_step() {
 
 #[test]
 fn a_restored_state_repeats_accelerations_too() {
-    let mut rig = chain("chain8", SPATIAL, 1e-3);
-    (0..50).for_each(|_| rig.free_step());
-    rig.robot.save_state(1).unwrap();
-    (0..50).for_each(|_| rig.free_step());
-    let first = rig.states();
-    rig.robot.restore_state(1).unwrap();
-    (0..50).for_each(|_| rig.free_step());
-    assert_eq!(rig.states(), first);
+    let mut fixture = chain("chain8", SPATIAL, 1e-3);
+    (0..50).for_each(|_| fixture.free_step());
+    fixture.robot.save_state(1).unwrap();
+    (0..50).for_each(|_| fixture.free_step());
+    let first = fixture.states();
+    fixture.robot.restore_state(1).unwrap();
+    (0..50).for_each(|_| fixture.free_step());
+    assert_eq!(fixture.states(), first);
 }
 
 #[test]
@@ -179,10 +180,10 @@ fn a_driven_pendulum_converges_with_second_order() {
         let parameters = format!(
             r#"{{"model": "{file}", "stiffness": 100, "damping": 0, "joints": {{"pivot": 0.5}}, {ALPHA}}}"#
         );
-        let mut rig = Rig::new(&parameters, G, h);
-        rig.set("pivot.angle_target", 0.0);
-        (0..(1.0 / h).round() as usize).for_each(|_| rig.free_step());
-        rig.get("pivot.angle")
+        let mut fixture = Fixture::new(&parameters, G, h);
+        fixture.set("pivot.angle_target", 0.0);
+        (0..(1.0 / h).round() as usize).for_each(|_| fixture.free_step());
+        fixture.get("pivot.angle")
     };
     let [a, b, c] = [4e-3, 2e-3, 1e-3].map(angle);
     let order = libm::log2((a - b) / (b - c));

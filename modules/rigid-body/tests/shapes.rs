@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
-use common::{Rig, temporary_urdf};
+use common::{Fixture, temporary_urdf};
 use std::fmt::Write;
 use std::sync::Arc;
 use terraglue_numerics::extremes::larger;
@@ -13,10 +13,10 @@ const G: f64 = 9.81;
 const BRICK: &str = r#"<mesh name="brick" vertex="-.1 -.15 -.2 .1 -.15 -.2 -.1 .15 -.2 .1 .15 -.2
     -.1 -.15 .2 .1 -.15 .2 -.1 .15 .2 .1 .15 .2 0 0 0"/>"#;
 
-fn scene(name: &str, asset: &str, world: &str, more: &str) -> Rig {
+fn scene(name: &str, asset: &str, world: &str, more: &str) -> Fixture {
     let text = format!("<mujoco><asset>{asset}</asset><worldbody>{world}</worldbody></mujoco>");
     let model = temporary_urdf(&format!("shapes-{name}"), &text);
-    Rig::new(&format!(r#"{{"model": "{model}" {more}}}"#), G, 1e-3)
+    Fixture::new(&format!(r#"{{"model": "{model}" {more}}}"#), G, 1e-3)
 }
 
 /// A square of triangles in the plane z = 0, its half length and number of cells along an edge.
@@ -69,7 +69,7 @@ fn the_hull_of_a_box_tumbles_as_the_box() {
 #[test]
 fn hulls_rest_on_boxes_and_on_each_other_without_creeping() {
     // Without friction any error of the normal would make them slide.
-    let mut rig = scene(
+    let mut fixture = scene(
         "stack",
         BRICK,
         r#"<geom type="box" size="1 1 .1" pos="0 0 -.1"/>
@@ -77,15 +77,15 @@ fn hulls_rest_on_boxes_and_on_each_other_without_creeping() {
         <body name="b" pos=".02 .01 .6" euler="0 0 30"><freejoint/><geom type="mesh" mesh="brick" mass="3"/></body>"#,
         r#", "friction": 0"#,
     );
-    (0..1000).for_each(|_| rig.free_step());
+    (0..1000).for_each(|_| fixture.free_step());
     for (body, z) in [("a", 0.2), ("b", 0.6)] {
-        let p = rig.states()[usize::from(body == "b")].world_from_body.position;
+        let p = fixture.states()[usize::from(body == "b")].world_from_body.position;
         println!("{body} {p:?}");
         assert!((p[2] - z).abs() < 1e-5, "{body} {p:?}");
         let x = if body == "b" { [0.02, 0.01] } else { [0.0; 2] };
         assert!((p[0] - x[0]).hypot(p[1] - x[1]) < 1e-6, "{body} {p:?}");
     }
-    assert!((rig.get("a.contact_normal") / (7.0 * G) - 1.0).abs() < 1e-3);
+    assert!((fixture.get("a.contact_normal") / (7.0 * G) - 1.0).abs() < 1e-3);
 }
 
 #[test]
@@ -99,11 +99,11 @@ fn a_mesh_of_a_plane_is_the_plane() {
         scene("plane", "", &world(r#"<geom type="plane" size="1 1 1"/>"#), r#", "friction": 0.4"#);
     let mesh = world(r#"<geom type="mesh" mesh="sheet"/>"#);
     let mut mesh = scene("sheet", &sheet(1.0, 16), &mesh, r#", "friction": 0.4"#);
-    for rig in [&mut plane, &mut mesh] {
-        rig.push("ball", [900.0, 300.0, 0.0]);
-        rig.push("box", [1500.0, 0.0, 0.0]);
-        rig.free_step();
-        ["ball", "box"].iter().for_each(|b| rig.push(b, [0.0; 3]));
+    for fixture in [&mut plane, &mut mesh] {
+        fixture.push("ball", [900.0, 300.0, 0.0]);
+        fixture.push("box", [1500.0, 0.0, 0.0]);
+        fixture.free_step();
+        ["ball", "box"].iter().for_each(|b| fixture.push(b, [0.0; 3]));
     }
     let mut worst = 0.0_f64;
     for _ in 0..600 {
@@ -128,11 +128,11 @@ fn a_sphere_rolls_down_the_slope_of_a_height_field() {
         r#"<geom type="hfield" hfield="f"/>
         <body name="s" pos="{x} .07 {z}"><freejoint/><geom size=".1" mass="1"/></body>"#
     );
-    let mut rig = scene("hfield", &asset, &world, r#", "friction": 0.5"#);
-    (0..800).for_each(|_| rig.free_step());
-    let state = rig.states()[0];
+    let mut fixture = scene("hfield", &asset, &world, r#", "friction": 0.5"#);
+    (0..800).for_each(|_| fixture.free_step());
+    let state = fixture.states()[0];
     let (p, v) = (state.world_from_body.position, state.linear_velocity);
-    let exact = 5.0 / 7.0 * G * angle.sin() * rig.t;
+    let exact = 5.0 / 7.0 * G * angle.sin() * fixture.t;
     println!("{p:?} {v:?} {exact}");
     assert!((v[0].hypot(v[2]) / exact - 1.0).abs() < 1e-6, "{v:?} {exact}");
     // It stays on the slope.
@@ -145,26 +145,26 @@ fn the_first_row_of_the_text_is_the_far_one() {
     let asset = r#"<hfield name="f" nrow="2" ncol="2" size="1 1 .5 1" elevation="1 1 0 0"/>"#;
     let world = r#"<geom type="hfield" hfield="f"/>
         <body name="s" pos="0 .8 .8"><freejoint/><geom size=".1" mass="1"/></body>"#;
-    let mut rig = scene("rows", asset, world, "");
-    (0..300).for_each(|_| rig.free_step());
-    assert!(rig.get("s.vy") < -0.1 && rig.get("s.z") > 0.4, "{}", rig.get("s.vy"));
+    let mut fixture = scene("rows", asset, world, "");
+    (0..300).for_each(|_| fixture.free_step());
+    assert!(fixture.get("s.vy") < -0.1 && fixture.get("s.z") > 0.4, "{}", fixture.get("s.vy"));
 }
 
 #[test]
 fn a_hull_lies_on_a_mesh_and_a_closed_mesh_keeps_what_is_above_it() {
-    let mut rig = scene(
+    let mut fixture = scene(
         "hull-on-mesh",
         &(sheet(1.0, 40) + BRICK),
         r#"<geom type="mesh" mesh="sheet"/>
         <body name="b" pos=".013 .007 .1" euler="0 90 0"><freejoint/><geom type="mesh" mesh="brick" mass="2"/></body>"#,
         r#", "friction": 0"#,
     );
-    (0..500).for_each(|_| rig.free_step());
-    let p = rig.states()[0].world_from_body.position;
-    println!("{p:?} {} points", rig.get("contact.points"));
+    (0..500).for_each(|_| fixture.free_step());
+    let p = fixture.states()[0].world_from_body.position;
+    println!("{p:?} {} points", fixture.get("contact.points"));
     assert!((p[2] - 0.1).abs() < 1e-5 && (p[0] - 0.013).hypot(p[1] - 0.007) < 1e-6, "{p:?}");
-    assert!((rig.get("b.contact_normal") / (2.0 * G) - 1.0).abs() < 1e-3);
-    assert!(rig.get("contact.points") <= 9.0);
+    assert!((fixture.get("b.contact_normal") / (2.0 * G) - 1.0).abs() < 1e-3);
+    assert!(fixture.get("contact.points") <= 9.0);
 }
 
 /// A slope of 10 % along y.
@@ -199,10 +199,11 @@ fn the_terrain_can_be_turned_to_stone() {
     };
     let robot = instantiate(Some(Box::new(Slope))).unwrap();
     let scene = robot.scene();
-    let mut rig = Rig { robot, scene, t: 0.0, h: 1e-3, index: 0, reversed: false, margin: 1e-3, mu: 0.8 };
-    (0..500).for_each(|_| rig.free_step());
-    let v = rig.states()[0].linear_velocity;
-    let exact = 5.0 / 7.0 * G * 0.1_f64.atan().sin() * rig.t;
+    let mut fixture =
+        Fixture { robot, scene, t: 0.0, h: 1e-3, index: 0, reversed: false, margin: 1e-3, mu: 0.8 };
+    (0..500).for_each(|_| fixture.free_step());
+    let v = fixture.states()[0].linear_velocity;
+    let exact = 5.0 / 7.0 * G * 0.1_f64.atan().sin() * fixture.t;
     println!("{v:?} {exact}");
     // It is placed over the nodes below it, a hair above the slope itself.
     assert!((-v[1] - exact * 0.1_f64.atan().cos()).abs() < 0.01 * exact, "{v:?} {exact}");
@@ -243,10 +244,10 @@ fn what_stands_still_is_seen_and_does_not_count_as_a_body() {
     let world = r#"<geom type="mesh" mesh="wall" pos="3 0 0"/><geom type="hfield" hfield="hill"/>
         <geom type="box" size=".1 .2 .3" pos="0 5 0" contype="0" conaffinity="0"/>
         <body name="b" pos="0 0 4"><freejoint/><geom type="sphere" size="0.1" mass="2"/></body>"#;
-    let mut rig = scene("still", &wall.replace("HEIGHTS", &heights), world, "");
-    let bodies: Vec<(&str, f64)> = rig.scene.bodies.iter().map(|b| (b.name.as_str(), b.mass)).collect();
+    let mut fixture = scene("still", &wall.replace("HEIGHTS", &heights), world, "");
+    let bodies: Vec<(&str, f64)> = fixture.scene.bodies.iter().map(|b| (b.name.as_str(), b.mass)).collect();
     assert_eq!(bodies, [("b", 2.0), ("world", 0.0)]);
-    let seen: Vec<_> = rig.scene.shapes.iter().filter(|s| s.body == 1).collect();
+    let seen: Vec<_> = fixture.scene.shapes.iter().filter(|s| s.body == 1).collect();
     assert!(seen.len() == 3 && seen.iter().all(|s| !s.collides), "{seen:?}");
     let Geometry::ConvexMesh { triangles, .. } = &seen[0].geometry else { panic!("the wall") };
     assert_eq!((triangles.len(), seen[0].body_from_shape.position), (2, [3.0, 0.0, 0.0]));
@@ -259,6 +260,6 @@ fn what_stands_still_is_seen_and_does_not_count_as_a_body() {
         let [a, b, c] = t.map(|k| points[k as usize]);
         (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0]) > 0.0
     }));
-    rig.free_step();
-    assert_eq!(rig.states()[1], BodyState::REST);
+    fixture.free_step();
+    assert_eq!(fixture.states()[1], BodyState::REST);
 }

@@ -2,14 +2,14 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
-use common::{Rig, temporary_urdf};
+use common::{Fixture, temporary_urdf};
 use std::fmt::Write;
 use terraglue_numerics::extremes::larger;
 
 const G: f64 = 9.81;
 
 /// n windows of rods of 1 m and 1 kg: posts on the world, bars between their tops; gravity along −z, upright in z.
-fn windows(n: usize, scheme: &str) -> Rig {
+fn windows(n: usize, scheme: &str) -> Fixture {
     let mut text = String::from(r#"<robot name="windows"><link name="world"/>"#);
     let mut loops = Vec::new();
     let mut rod = |parent: &str, name: &str, at: [f64; 2], along: [f64; 2], i: [f64; 2]| {
@@ -44,7 +44,7 @@ fn windows(n: usize, scheme: &str) -> Rig {
         "joint_rates": {{"j_post*": -1.0, "j_bar*": 1.0}}, "loop": [{}]}}"#,
         loops.join(",")
     );
-    Rig::new(&parameters, G, 1e-3)
+    Fixture::new(&parameters, G, 1e-3)
 }
 
 /// Angle of the posts after a time: a·φ¨ = −b·g·cos φ from φ = π/2 with φ˙ = −1.
@@ -67,13 +67,13 @@ fn exact(n: usize, t: f64) -> f64 {
 
 /// Largest difference of the posts' angles from the exact one at a time, and |ΔE|.
 fn run(n: usize, scheme: &str, until: f64) -> [f64; 2] {
-    let mut rig = windows(n, scheme);
-    let start = rig.robot.energy().mechanical();
-    (0..(until / rig.h).round() as usize).for_each(|_| rig.free_step());
+    let mut fixture = windows(n, scheme);
+    let start = fixture.robot.energy().mechanical();
+    (0..(until / fixture.h).round() as usize).for_each(|_| fixture.free_step());
     let phi = exact(n, until) - std::f64::consts::FRAC_PI_2;
-    let off = |k: usize| (rig.get(&format!("j_post{k}.angle")) - phi).abs();
+    let off = |k: usize| (fixture.get(&format!("j_post{k}.angle")) - phi).abs();
     let worst = (0..=n).map(off).fold(0.0_f64, larger);
-    [worst, (rig.robot.energy().mechanical() - start).abs()]
+    [worst, (fixture.robot.energy().mechanical() - start).abs()]
 }
 
 #[test]

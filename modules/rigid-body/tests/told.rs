@@ -2,7 +2,7 @@
 #![allow(clippy::unwrap_used, missing_docs)]
 
 mod common;
-use common::{Rig, instantiate, temporary_urdf};
+use common::{Fixture, instantiate, temporary_urdf};
 use terraglue_subsystem::Values;
 
 fn link(name: &str) -> String {
@@ -30,19 +30,23 @@ fn energies_are_those_of_a_falling_pendulum() {
         r#"{{"model": "{}", "motor": "off", "actuator": {{"viscous_friction": 0.2}}}}"#,
         file("told", "j", "k")
     );
-    let mut rig = Rig::new(&text, 9.81, 1e-3);
+    let mut fixture = Fixture::new(&text, 9.81, 1e-3);
     for _ in 0..700 {
-        rig.free_step();
-        let e = rig.robot.energy();
-        assert_eq!(rig.get("energy.kinetic"), e.kinetic);
-        assert_eq!(rig.get("energy.potential"), e.potential);
-        assert_eq!(rig.get("energy.dissipated"), e.dissipated);
+        fixture.free_step();
+        let e = fixture.robot.energy();
+        assert_eq!(fixture.get("energy.kinetic"), e.kinetic);
+        assert_eq!(fixture.get("energy.potential"), e.potential);
+        assert_eq!(fixture.get("energy.dissipated"), e.dissipated);
     }
     // What has fallen moves or is heat: all of the energy was 0 at the start.
     let [kinetic, potential, heat] =
-        ["kinetic", "potential", "dissipated"].map(|e| rig.get(&format!("energy.{e}")));
+        ["kinetic", "potential", "dissipated"].map(|e| fixture.get(&format!("energy.{e}")));
     assert!(kinetic > 1.0 && heat > 0.1 && (kinetic + potential + heat).abs() < 0.02 * kinetic);
-    assert!(rig.get("joints.gap") > 0.0 && rig.get("joints.gap") < 1e-10, "{}", rig.get("joints.gap"));
+    assert!(
+        fixture.get("joints.gap") > 0.0 && fixture.get("joints.gap") < 1e-10,
+        "{}",
+        fixture.get("joints.gap")
+    );
 }
 
 #[test]
@@ -51,25 +55,25 @@ fn the_gap_is_that_of_joints_and_loops_that_hold() {
         r#"{{"model": "{}", "motor": "off", "coupling": [{{"name": "gear", "joints": ["k", "j"], "ratio": 1.0}}]}}"#,
         file("gaps", "j", "k")
     );
-    let mut rig = Rig::new(&text, 9.81, 1e-3);
-    (0..100).for_each(|_| rig.free_step());
-    assert!(rig.get("joints.gap") < 1e-10, "{}", rig.get("joints.gap"));
+    let mut fixture = Fixture::new(&text, 9.81, 1e-3);
+    (0..100).for_each(|_| fixture.free_step());
+    assert!(fixture.get("joints.gap") < 1e-10, "{}", fixture.get("joints.gap"));
     // What is broken may be anywhere.
-    rig.robot.act("gear.break", "{}").unwrap();
-    rig.robot.act("k.break", "{}").unwrap();
-    (0..100).for_each(|_| rig.free_step());
-    assert!(rig.get("joints.gap") < 1e-10, "{}", rig.get("joints.gap"));
+    fixture.robot.act("gear.break", "{}").unwrap();
+    fixture.robot.act("k.break", "{}").unwrap();
+    (0..100).for_each(|_| fixture.free_step());
+    assert!(fixture.get("joints.gap") < 1e-10, "{}", fixture.get("joints.gap"));
 }
 
 #[test]
 fn a_broken_joint_is_released_in_vain_and_cannot_be_blocked() {
     let text = format!(r#"{{"model": "{}", "motor": "off"}}"#, file("released", "j", "k"));
-    let mut rig = Rig::new(&text, 9.81, 1e-3);
-    rig.robot.act("k.break", "{}").unwrap();
-    let blocked = rig.id("k.blocked");
+    let mut fixture = Fixture::new(&text, 9.81, 1e-3);
+    fixture.robot.act("k.break", "{}").unwrap();
+    let blocked = fixture.id("k.blocked");
     // A connection tells it every step.
-    rig.robot.set(&[blocked], Values::Bool(&[false])).unwrap();
-    let refused = rig.robot.set(&[blocked], Values::Bool(&[true])).unwrap_err().to_string();
+    fixture.robot.set(&[blocked], Values::Bool(&[false])).unwrap();
+    let refused = fixture.robot.set(&[blocked], Values::Bool(&[true])).unwrap_err().to_string();
     assert!(refused.contains("broken"), "{refused}");
 }
 

@@ -60,6 +60,19 @@ fn crates() -> BTreeMap<String, (PathBuf, Vec<String>)> {
 }
 
 #[test]
+fn every_readme_of_a_crate_begins_with_its_sentence() {
+    for path in ["interfaces", "coordinator", "modules"].iter().flat_map(|folder| files(folder, "toml")) {
+        let Ok(manifest) = read(&path).parse::<toml::Table>() else { continue };
+        let Some(package) = manifest.get("package").filter(|_| path.ends_with("Cargo.toml")) else {
+            continue;
+        };
+        let [name, sentence] = ["name", "description"].map(|key| package[key].as_str().expect("a text"));
+        let page = read(&path.with_file_name("README.md"));
+        assert!(page.starts_with(&format!("# {name}\n\n{sentence}\n")), "{}", path.display());
+    }
+}
+
+#[test]
 fn what_cargo_xtask_starts_builds_nothing_of_ours() {
     let aliases: toml::Table = read(Path::new(".cargo/config.toml")).parse().expect("TOML");
     let started = aliases["alias"]["xtask"].as_str().expect("an alias").split_whitespace().nth(2);

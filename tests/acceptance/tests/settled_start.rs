@@ -1,4 +1,4 @@
-//! `time.settle_s`: the robot stands on its soil at t = 0, the gait has not moved, and all books begin there.
+//! `time.settle_s`: the robot stands on its soil at t = 0, the gait has not moved, and all ledgers begin there.
 
 use terraglue::Testbed;
 use terraglue::scenario::Scenario;

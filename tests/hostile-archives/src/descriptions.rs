@@ -3,7 +3,7 @@
 use crate::zip::{Entry, archive};
 use crate::{DESCRIPTION, LIBRARIES};
 
-/// A unit of FMI 2.0.
+/// An FMU of FMI 2.0.
 pub const TWO: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="m" guid="g">
 <CoSimulation modelIdentifier="m" canHandleVariableCommunicationStepSize="true"/>
@@ -13,7 +13,7 @@ pub const TWO: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <ModelStructure><Outputs><Unknown index="1"/></Outputs></ModelStructure>
 </fmiModelDescription>"#;
 
-/// A unit of FMI 3.0.
+/// An FMU of FMI 3.0.
 pub const THREE: &str = r#"<fmiModelDescription fmiVersion="3.0" modelName="m" instantiationToken="g">
 <CoSimulation modelIdentifier="m" canHandleVariableCommunicationStepSize="true"/>
 <ModelVariables>
@@ -24,7 +24,7 @@ pub const THREE: &str = r#"<fmiModelDescription fmiVersion="3.0" modelName="m" i
 </fmiModelDescription>"#;
 
 /// An archive of description and library.
-pub fn unit(description: &[u8], library: &[u8]) -> Vec<u8> {
+pub fn fmu(description: &[u8], library: &[u8]) -> Vec<u8> {
     archive(&entries(description, library))
 }
 
@@ -35,7 +35,7 @@ pub fn entries(description: &[u8], library: &[u8]) -> Vec<Entry> {
     all
 }
 
-/// A good unit with more entries.
+/// A good FMU with more entries.
 pub fn with(library: &[u8], more: impl IntoIterator<Item = Entry>) -> Vec<u8> {
     let mut all = entries(TWO.as_bytes(), library);
     all.extend(more);

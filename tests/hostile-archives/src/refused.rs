@@ -1,6 +1,6 @@
 //! Archives and descriptions that must be refused before anything of them is written or runs.
 
-use crate::descriptions::{THREE, TWO, entries, unit, with};
+use crate::descriptions::{THREE, TWO, entries, fmu, with};
 use crate::zip::{Entry, archive};
 use crate::{Case, DESCRIPTION};
 
@@ -13,7 +13,7 @@ pub fn refused(library: &[u8]) -> Vec<Case> {
     all.extend(sizes(library));
     all.extend(broken(library));
     let described = descriptions();
-    all.extend(described.map(|(name, text, says)| Case::new(name, unit(text.as_bytes(), library), says)));
+    all.extend(described.map(|(name, text, says)| Case::new(name, fmu(text.as_bytes(), library), says)));
     all.extend(encodings(library));
     all
 }
@@ -102,7 +102,7 @@ fn sizes(library: &[u8]) -> Vec<Case> {
 }
 
 fn broken(library: &[u8]) -> Vec<Case> {
-    let good = unit(TWO.as_bytes(), library);
+    let good = fmu(TWO.as_bytes(), library);
     let changed = |change: fn(&mut Entry)| {
         archive(&entries(TWO.as_bytes(), library).into_iter().map(|e| e.with(change)).collect::<Vec<_>>())
     };
@@ -221,5 +221,5 @@ fn encodings(library: &[u8]) -> Vec<Case> {
         ("UTF-16 by its mark", b"\xff\xfe<\0".to_vec()),
         ("no UTF-8", b"<a b=\"\xc3\x28\"/>".to_vec()),
     ];
-    all.map(|(name, bytes)| Case::new(name, unit(&bytes, library), "UTF-")).to_vec()
+    all.map(|(name, bytes)| Case::new(name, fmu(&bytes, library), "UTF-")).to_vec()
 }

@@ -1,6 +1,6 @@
 //! Good archives whose library cannot be loaded.
 
-use crate::descriptions::{THREE, TWO, unit};
+use crate::descriptions::{THREE, TWO, fmu};
 use crate::zip::{Entry, archive};
 use crate::{Case, DESCRIPTION, LIBRARIES};
 
@@ -38,9 +38,9 @@ pub fn unloadable(library: &[u8]) -> Vec<Case> {
     all
 }
 
-/// A unit whose description has another token than its library knows, which only the library can tell.
+/// An FMU whose description has another token than its library knows, which only the library can tell.
 #[must_use]
 pub fn another_token(library: &[u8]) -> Case {
     let text = TWO.replacen(r#" guid="g""#, r#" guid="another""#, 1);
-    Case::new("another token", unit(text.as_bytes(), library), "is not mine")
+    Case::new("another token", fmu(text.as_bytes(), library), "is not mine")
 }

@@ -1,6 +1,6 @@
-//! Odd but legal units: they run.
+//! Odd but legal FMUs: they run.
 
-use crate::descriptions::{THREE, TWO, entries, unit, with};
+use crate::descriptions::{THREE, TWO, entries, fmu, with};
 use crate::zip::{Entry, archive, stored};
 use crate::{Case, LIBRARIES};
 
@@ -26,7 +26,7 @@ pub fn usable(library: &[u8]) -> Vec<Case> {
     ];
     let mut all: Vec<Case> = described
         .into_iter()
-        .map(|(name, text)| Case::new(name, unit(text.as_bytes(), library), ""))
+        .map(|(name, text)| Case::new(name, fmu(text.as_bytes(), library), ""))
         .collect();
     let folders =
         ["./", "resources/", "binaries/"].map(|name| stored(name, b"").with(|e| e.mode = 0o040_755));
@@ -34,7 +34,7 @@ pub fn usable(library: &[u8]) -> Vec<Case> {
     let twice = [Entry::file("resources/a", b"x"), Entry::file("resources/a", b"x")];
     all.push(Case::new("a file listed twice", with(library, twice), ""));
     all.extend(["tank-c", "2tank", "tank.v1"].map(|name| identified(name, library)));
-    all.push(Case::new("20 000 variables", unit(many().as_bytes(), library), ""));
+    all.push(Case::new("20 000 variables", fmu(many().as_bytes(), library), ""));
     all
 }
 

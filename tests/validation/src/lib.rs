@@ -131,7 +131,7 @@ pub fn validate(arguments: &Arguments) -> Outcome {
     let profile = if no_timing { "debug" } else { "release" };
     let build: &[&str] = if no_timing { &["build"] } else { &["build", "--release"] };
     if arguments.table.is_none() {
-        must(cargo(build).args(["--package", "terraglue", "--package", "terraglue-unit"]))?;
+        must(cargo(build).args(["--package", "terraglue", "--package", "terraglue-fmu-library"]))?;
     }
     let part = arguments.table.as_ref().map(|_| "values".to_owned()).or_else(|| arguments.part.clone());
     let table = arguments.table.clone();

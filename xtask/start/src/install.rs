@@ -4,8 +4,8 @@
 use crate::process::{Outcome, cargo, command, must, read, root, target};
 use std::path::Path;
 
-/// The library inside exported units.
-const UNIT: &str = "libterraglue_unit.so";
+/// The library inside exported FMUs.
+const FMU_LIBRARY: &str = "libterraglue_fmu_library.so";
 
 /// Builds in the release profile and copies what a user needs.
 pub fn install(prefix: &Path) -> Outcome {
@@ -50,7 +50,7 @@ pub fn dist(built: Option<&str>) -> Outcome {
 }
 
 fn build() -> Outcome {
-    must(&mut cargo(&["build", "--release", "--package", "terraglue", "--package", "terraglue-unit"]))
+    must(&mut cargo(&["build", "--release", "--package", "terraglue", "--package", "terraglue-fmu-library"]))
 }
 
 /// Copies what was built in a profile and what belongs to it.
@@ -64,7 +64,7 @@ fn lay_out(prefix: &Path, profile: &str) -> Outcome {
         let built = built.iter().find(|f| f.is_file()).ok_or_else(|| format!("{file} was not built"))?;
         copy(built, &prefix.join("lib/terraglue").join(&file))?;
     }
-    copy(&release.join(UNIT), &prefix.join("lib/terraglue").join(UNIT))?;
+    copy(&release.join(FMU_LIBRARY), &prefix.join("lib/terraglue").join(FMU_LIBRARY))?;
     copy_files(&root().join("interfaces/plugin/include"), &prefix.join("include"))?;
     copy_files(&root().join("models"), &prefix.join("share/terraglue/models"))?;
     copy_files(&root().join("scenarios"), &prefix.join("share/terraglue/scenarios"))

@@ -3,8 +3,8 @@
 use super::life_cycle::same;
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::lab::Lab;
-use crate::rig::{Flat, Runner, Vectors};
+use crate::fixture::{Flat, Runner, Vectors};
+use crate::test_context::TestContext;
 use terraglue_host::Instance;
 use terraglue_subsystem::{
     Capabilities, Estimate, Input, Law, Level as Derivative, Motion, Node, Port, Step,
@@ -27,22 +27,22 @@ pub fn tests() -> Vec<Test> {
 /// Calls of a round.
 const CALLS: usize = 80;
 
-fn any_order(lab: &Lab) -> Verdict {
-    let module = lab.module()?;
-    let mut random = lab.random("any-order");
-    let mut reference = Runner::new(lab.instance_on(&module, Flat::LEVEL)?)?;
+fn any_order(context: &TestContext) -> Verdict {
+    let module = context.module()?;
+    let mut random = context.random("any-order");
+    let mut reference = Runner::new(context.instance_on(&module, Flat::LEVEL)?)?;
     let mut expected = [reference.run(0..10, 0)?, reference.run(10..30, 0)?];
     let frames = [Frame::default(), Frame::of(&mut reference)?];
-    for round in 0..lab.count(6) {
+    for round in 0..context.count(6) {
         // Every other instance meets the disorder at its first call.
         let start = if round % 2 == 0 { 0 } else { 10 };
-        let mut runner = Runner::new(lab.instance_on(&module, Flat::LEVEL)?)?;
+        let mut runner = Runner::new(context.instance_on(&module, Flat::LEVEL)?)?;
         runner.run(0..start, 0)?;
         let (place, keeps) = (runner.place(), runner.instance().capabilities().has(Capabilities::STATE));
         if keeps {
             runner.instance_mut().save_state(0)?;
         }
-        disorder(runner.instance_mut(), &frames, lab.services().slots, &mut random)?;
+        disorder(runner.instance_mut(), &frames, context.services().slots, &mut random)?;
         if runner.instance().has_failed() || !keeps {
             continue;
         }
@@ -92,16 +92,16 @@ struct Frame {
 }
 
 impl Frame {
-    /// Ports as the bench meets them.
+    /// Ports as the fixture meets them.
     fn of(runner: &mut Runner) -> Verdict<Self> {
         match runner {
-            Runner::Soil(bench) => {
-                let down = vec![[0.0, 0.0, -0.2]; bench.states.len()];
-                bench.meet(&down, 1e-3)?;
-                Ok(Self { ports: bench.ports.clone(), nodes: bench.nodes.clone() })
+            Runner::Soil(fixture) => {
+                let down = vec![[0.0, 0.0, -0.2]; fixture.states.len()];
+                fixture.meet(&down, 1e-3)?;
+                Ok(Self { ports: fixture.ports.clone(), nodes: fixture.nodes.clone() })
             }
-            Runner::Robot(bench) => match bench.place_port() {
-                Ok(()) => Ok(Self { ports: bench.ports.clone(), nodes: Vec::new() }),
+            Runner::Robot(fixture) => match fixture.place_port() {
+                Ok(()) => Ok(Self { ports: fixture.ports.clone(), nodes: Vec::new() }),
                 Err(Stop::Skip(_)) => Ok(Self::default()),
                 Err(other) => Err(other),
             },

@@ -2,14 +2,14 @@
 
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::lab::Lab;
-use crate::rig::script;
+use crate::fixture::script;
+use crate::test_context::TestContext;
 use terraglue_host::Process;
 
 /// The test whose output the watching process looks at.
 pub const OUTPUT: &str = "host-output";
 
-const fn test(name: &'static str, promise: &'static str, run: fn(&Lab) -> Verdict) -> Test {
+const fn test(name: &'static str, promise: &'static str, run: fn(&TestContext) -> Verdict) -> Test {
     let after = &["steps"];
     Test { name, area: Area::Library, level: Level::Quick, kinds: &[], after, promise, run }
 }
@@ -24,28 +24,32 @@ pub fn at_loading() -> Vec<Test> {
 pub fn tests() -> Vec<Test> {
     vec![
         test("host-floating-point", "rounding, denormal numbers and traps stay as they were", floating_point),
-        test("host-signals", "no signal handler is set", |lab| {
-            untouched(lab, "signal handlers", |p| p.signals.clone())
+        test("host-signals", "no signal handler is set", |context| {
+            untouched(context, "signal handlers", |p| p.signals.clone())
         }),
-        test("host-locale", "the locale stays", |lab| untouched(lab, "the locale", |p| p.locale.clone())),
-        test("host-directory", "the working directory stays", |lab| {
-            untouched(lab, "the working directory", |p| p.directory.clone())
+        test("host-locale", "the locale stays", |context| {
+            untouched(context, "the locale", |p| p.locale.clone())
         }),
-        test("host-environment", "environment variables and umask stay", |lab| {
-            untouched(lab, "the environment", |p| p.environment.clone())
+        test("host-directory", "the working directory stays", |context| {
+            untouched(context, "the working directory", |p| p.directory.clone())
         }),
-        test("host-threads", "no thread is left behind", |lab| {
-            untouched(lab, "threads", |p| p.threads.clone())
+        test("host-environment", "environment variables and umask stay", |context| {
+            untouched(context, "the environment", |p| p.environment.clone())
         }),
-        test("host-files", "no file is left open", |lab| untouched(lab, "open files", |p| p.files.clone())),
+        test("host-threads", "no thread is left behind", |context| {
+            untouched(context, "threads", |p| p.threads.clone())
+        }),
+        test("host-files", "no file is left open", |context| {
+            untouched(context, "open files", |p| p.files.clone())
+        }),
         test(OUTPUT, "nothing is printed: lines go through the host's log", output),
     ]
 }
 
-fn untouched(lab: &Lab, what: &str, look: fn(&Process) -> String) -> Verdict {
-    lab.needs_a_library("it cannot touch that of the host, nothing is lost")?;
+fn untouched(context: &TestContext, what: &str, look: fn(&Process) -> String) -> Verdict {
+    context.needs_a_library("it cannot touch that of the host, nothing is lost")?;
     let before = look(&Process::now());
-    let module = lab.module()?;
+    let module = context.module()?;
     let then = |call: &str| {
         let now = look(&Process::now());
         if now == before {
@@ -55,7 +59,7 @@ fn untouched(lab: &Lab, what: &str, look: fn(&Process) -> String) -> Verdict {
         Err(Stop::fail(call, "the process of the host", got, "no change"))
     };
     then("loading")?;
-    let instance = lab.instance_on(&module, crate::rig::Flat::LEVEL)?;
+    let instance = context.instance_on(&module, crate::fixture::Flat::LEVEL)?;
     then("instantiate")?;
     let (_, instance) = script(instance, 60, 0)?;
     then("a run of 60 steps")?;
@@ -64,10 +68,10 @@ fn untouched(lab: &Lab, what: &str, look: fn(&Process) -> String) -> Verdict {
 }
 
 /// Alone, since after it every answer can be another: a library built with -ffast-math is one finding.
-fn floating_point_loading(lab: &Lab) -> Verdict {
-    lab.needs_a_library("it cannot touch that of the host, nothing is lost")?;
+fn floating_point_loading(context: &TestContext) -> Verdict {
+    context.needs_a_library("it cannot touch that of the host, nothing is lost")?;
     let before = Process::now().floating_point;
-    lab.own_module()?;
+    context.own_module()?;
     let now = Process::now().floating_point;
     if now == before {
         return Ok(());
@@ -79,13 +83,13 @@ fn floating_point_loading(lab: &Lab) -> Verdict {
 }
 
 /// On this thread, in which the library is loaded and called.
-fn floating_point(lab: &Lab) -> Verdict {
-    untouched(lab, "the floating-point mode", |p| p.floating_point.clone())
+fn floating_point(context: &TestContext) -> Verdict {
+    untouched(context, "the floating-point mode", |p| p.floating_point.clone())
 }
 
 /// What was printed is seen by the process that watches this one.
-fn output(lab: &Lab) -> Verdict {
-    let (_, instance) = script(lab.instance()?, 60, 0)?;
+fn output(context: &TestContext) -> Verdict {
+    let (_, instance) = script(context.instance()?, 60, 0)?;
     drop(instance);
     Ok(())
 }

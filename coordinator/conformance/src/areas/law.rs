@@ -4,8 +4,8 @@
 use super::values::not_told;
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::lab::Lab;
-use crate::rig::LawBench;
+use crate::fixture::LawFixture;
+use crate::test_context::TestContext;
 use std::time::Instant;
 use terraglue_host::described;
 use terraglue_subsystem::Kind;
@@ -15,7 +15,7 @@ fn test(
     area: Area,
     level: Level,
     promise: &'static str,
-    run: fn(&Lab) -> Verdict,
+    run: fn(&TestContext) -> Verdict,
 ) -> Test {
     Test { name, area, level, kinds: &[Kind::Law], after: builds_on(name), promise, run }
 }
@@ -137,15 +137,15 @@ fn agrees(slope: f64, near: [f64; 2], tolerance: f64) -> bool {
     slope >= near[0].min(near[1]) - tolerance && slope <= near[0].max(near[1]) + tolerance
 }
 
-fn opens(lab: &Lab) -> Verdict {
-    LawBench::open(lab).map(|_| ())
+fn opens(context: &TestContext) -> Verdict {
+    LawFixture::open(context).map(|_| ())
 }
 
-fn described_functions(lab: &Lab) -> Verdict {
-    let law = LawBench::open(lab)?;
+fn described_functions(context: &TestContext) -> Verdict {
+    let law = LawFixture::open(context)?;
     let has = [("pressure", law.has_pressure()), ("shear", law.has_shear())];
     let words: Vec<&str> = has.iter().filter(|(_, has)| *has).map(|(word, _)| *word).collect();
-    let section = described(&lab.path).unwrap_or_default();
+    let section = described(&context.path).unwrap_or_default();
     if !section.is_whole() {
         return Err(not_told(&["kind=law".into(), format!("can={}", words.join(" "))]));
     }
@@ -155,8 +155,8 @@ fn described_functions(lab: &Lab) -> Verdict {
     }
 }
 
-fn answers(lab: &Lab) -> Verdict {
-    let mut law = LawBench::open(lab)?;
+fn answers(context: &TestContext) -> Verdict {
+    let mut law = LawFixture::open(context)?;
     for b in SIZES {
         law.press(b, 1e-3, &depths())?;
     }
@@ -166,8 +166,8 @@ fn answers(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn arrays(lab: &Lab) -> Verdict {
-    let mut law = LawBench::open(lab)?;
+fn arrays(context: &TestContext) -> Verdict {
+    let mut law = LawFixture::open(context)?;
     for n in [0, 1, 7, 1000] {
         let depths: Vec<f64> = (0..n).map(|k| 1e-3 + 1e-5 * k as f64).collect();
         law.press(0.05, 1e-3, &depths)?;
@@ -177,8 +177,8 @@ fn arrays(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn node_by_node(lab: &Lab) -> Verdict {
-    let mut law = LawBench::open(lab)?;
+fn node_by_node(context: &TestContext) -> Verdict {
+    let mut law = LawFixture::open(context)?;
     let close = |a: f64, b: f64| (a - b).abs() <= 1e-13 * a.abs().max(b.abs());
     let depths = depths();
     let (p, slope) = law.press(0.05, 1e-3, &depths)?;
@@ -207,19 +207,19 @@ fn node_by_node(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn same_again(lab: &Lab) -> Verdict {
+fn same_again(context: &TestContext) -> Verdict {
     // more nodes than those of which the host keeps what a module in Python answered
     let (many_depths, many_loads) = (depths().repeat(2), loads().repeat(3));
-    let run = |law: &mut LawBench| -> Verdict<Vec<u64>> {
+    let run = |law: &mut LawFixture| -> Verdict<Vec<u64>> {
         let (p, slope) = law.press(0.05, 1e-3, &many_depths)?;
         let [a, b, c] = law.drag(&many_loads, 0.02)?;
         Ok([p, slope, a, b, c].iter().flatten().map(|x| x.to_bits()).collect())
     };
-    let mut law = LawBench::open(lab)?;
+    let mut law = LawFixture::open(context)?;
     let first = run(&mut law)?;
     let again = run(&mut law)?;
     let elsewhere = std::thread::scope(|scope| {
-        let threads: Vec<_> = (0..4).map(|_| scope.spawn(|| run(&mut LawBench::open(lab)?))).collect();
+        let threads: Vec<_> = (0..4).map(|_| scope.spawn(|| run(&mut LawFixture::open(context)?))).collect();
         threads.into_iter().map(|t| t.join()).collect::<Vec<_>>()
     });
     let differs = |where_: &str| {
@@ -237,8 +237,8 @@ fn same_again(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn slope(lab: &Lab) -> Verdict {
-    let mut law = LawBench::open(lab)?;
+fn slope(context: &TestContext) -> Verdict {
+    let mut law = LawFixture::open(context)?;
     for b in [0.02, 0.3] {
         for z in depths() {
             let d = 1e-6 * z;
@@ -259,8 +259,8 @@ fn slope(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn shear_slopes(lab: &Lab) -> Verdict {
-    let mut law = LawBench::open(lab)?;
+fn shear_slopes(context: &TestContext) -> Verdict {
+    let mut law = LawFixture::open(context)?;
     for slip in [1e-4, 3e-3, 0.02, 0.2] {
         for load in loads() {
             let (d, e) = (1e-5 * load, 1e-5 * slip);
@@ -289,8 +289,8 @@ fn shear_slopes(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn no_tension(lab: &Lab) -> Verdict {
-    let mut law = LawBench::open(lab)?;
+fn no_tension(context: &TestContext) -> Verdict {
+    let mut law = LawFixture::open(context)?;
     for b in SIZES {
         let depths = depths();
         let (p, _) = law.press(b, 1e-3, &depths)?;
@@ -302,8 +302,8 @@ fn no_tension(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn rises(lab: &Lab) -> Verdict {
-    let mut law = LawBench::open(lab)?;
+fn rises(context: &TestContext) -> Verdict {
+    let mut law = LawFixture::open(context)?;
     for b in SIZES {
         let depths = depths();
         let (p, _) = law.press(b, 1e-3, &depths)?;
@@ -316,8 +316,8 @@ fn rises(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn carries(lab: &Lab) -> Verdict {
-    let mut law = LawBench::open(lab)?;
+fn carries(context: &TestContext) -> Verdict {
+    let mut law = LawFixture::open(context)?;
     for b in SIZES {
         let (p, _) = law.press(b, 1e-3, &[0.5])?;
         if p.first().is_some_and(|p| *p <= 0.0) {
@@ -328,8 +328,8 @@ fn carries(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn starts_at_zero(lab: &Lab) -> Verdict {
-    let mut law = LawBench::open(lab)?;
+fn starts_at_zero(context: &TestContext) -> Verdict {
+    let mut law = LawFixture::open(context)?;
     let (p, _) = law.press(0.05, 1e-3, &[1e-9, 1e-2])?;
     if p.len() == 2 && p[0] > 0.5 * p[1] {
         let got = format!("{:.4e} Pa; {:.4e} Pa at 1 cm", p[0], p[1]);
@@ -343,8 +343,8 @@ fn starts_at_zero(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn shear_rises(lab: &Lab) -> Verdict {
-    let mut law = LawBench::open(lab)?;
+fn shear_rises(context: &TestContext) -> Verdict {
+    let mut law = LawFixture::open(context)?;
     let mut before = Vec::new();
     for slip in SLIPS {
         let loads = loads();
@@ -369,8 +369,8 @@ fn shear_rises(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn shear_bound(lab: &Lab) -> Verdict {
-    let mut law = LawBench::open(lab)?;
+fn shear_bound(context: &TestContext) -> Verdict {
+    let mut law = LawFixture::open(context)?;
     for load in [100.0, 1e4] {
         let [near, ..] = law.drag(&[load], 10.0)?;
         let [far, ..] = law.drag(&[load], 100.0)?;
@@ -387,8 +387,8 @@ fn shear_bound(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn friction_reached(lab: &Lab) -> Verdict {
-    let mut law = LawBench::open(lab)?;
+fn friction_reached(context: &TestContext) -> Verdict {
+    let mut law = LawFixture::open(context)?;
     let (Some(c), Some(phi)) = (law.number("c_pa"), law.number("phi_rad")) else {
         return Err(Stop::Skip(
             "it has no numbers `c_pa` and `phi_rad`: the friction it reaches is not compared".into(),
@@ -408,12 +408,12 @@ fn friction_reached(lab: &Lab) -> Verdict {
 
 const NO_STATE: &str = "it keeps no state: unloading is elastic, by the soil";
 
-fn state_apart(lab: &Lab) -> Verdict {
-    let mut law = LawBench::open(lab)?;
+fn state_apart(context: &TestContext) -> Verdict {
+    let mut law = LawFixture::open(context)?;
     if law.doubles() == 0 {
         return Err(Stop::Skip(NO_STATE.into()));
     }
-    // the bench compares what it handed out with what it has afterwards
+    // the fixture compares what it handed out with what it has afterwards
     let mut node = law.node();
     for depth in [0.01, 0.02, 0.015, 0.03] {
         node.commit(&mut law, 0.05, depth)?;
@@ -421,8 +421,8 @@ fn state_apart(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn state_fresh(lab: &Lab) -> Verdict {
-    let mut law = LawBench::open(lab)?;
+fn state_fresh(context: &TestContext) -> Verdict {
+    let mut law = LawFixture::open(context)?;
     if law.doubles() == 0 {
         return Err(Stop::Skip(NO_STATE.into()));
     }
@@ -434,8 +434,8 @@ fn state_fresh(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn unloads(lab: &Lab) -> Verdict {
-    let mut law = LawBench::open(lab)?;
+fn unloads(context: &TestContext) -> Verdict {
+    let mut law = LawFixture::open(context)?;
     if law.doubles() == 0 {
         return Err(Stop::Skip(NO_STATE.into()));
     }
@@ -461,18 +461,18 @@ fn unloads(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn law_scale(law: &mut LawBench, depth: f64) -> Verdict<f64> {
+fn law_scale(law: &mut LawFixture, depth: f64) -> Verdict<f64> {
     law.node().at(law, 0.05, depth).map(|(p, _)| p.max(1.0))
 }
 
 /// Random ways of a node from untouched ground; work is the integral of the pressure.
-fn cycles(lab: &Lab) -> Verdict {
-    let mut law = LawBench::open(lab)?;
+fn cycles(context: &TestContext) -> Verdict {
+    let mut law = LawFixture::open(context)?;
     if !law.has_pressure() {
         return Err(Stop::Skip("it has no pressure function: that of the soil acts".into()));
     }
-    let mut random = lab.random("law-cycles");
-    for _ in 0..lab.count(10) {
+    let mut random = context.random("law-cycles");
+    for _ in 0..context.count(10) {
         let mut node = law.node();
         let (mut depth, mut p, mut work, mut turned) = (0.0, 0.0, 0.0, 0.0);
         for turn in 0..12 {
@@ -496,8 +496,8 @@ fn cycles(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn pause(lab: &Lab) -> Verdict {
-    let mut law = LawBench::open(lab)?;
+fn pause(context: &TestContext) -> Verdict {
+    let mut law = LawFixture::open(context)?;
     if law.doubles() == 0 {
         let (a, _) = law.press(0.05, 0.0, &depths())?;
         let (b, _) = law.press(0.05, 1e-3, &depths())?;
@@ -522,8 +522,8 @@ fn pause(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn time_per_node(lab: &Lab) -> Verdict {
-    let mut law = LawBench::open(lab)?;
+fn time_per_node(context: &TestContext) -> Verdict {
+    let mut law = LawFixture::open(context)?;
     let depths: Vec<f64> = (0..1000).map(|k| 1e-3 + 1e-5 * f64::from(k)).collect();
     let mut best = f64::INFINITY;
     for _ in 0..20 {

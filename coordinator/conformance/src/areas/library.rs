@@ -2,7 +2,7 @@
 
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::lab::Lab;
+use crate::test_context::TestContext;
 use terraglue_fmi::elf::exported_symbols;
 use terraglue_host::{LoadedModule, described, table_of};
 use terraglue_plugin::abi::{TG_ABI_MAJOR, TG_ABI_MINOR, TgSubsystem};
@@ -12,7 +12,7 @@ const fn test(
     name: &'static str,
     after: &'static [&'static str],
     promise: &'static str,
-    run: fn(&Lab) -> Verdict,
+    run: fn(&TestContext) -> Verdict,
 ) -> Test {
     Test { name, area: Area::Library, level: Level::Quick, kinds: &[], after, promise, run }
 }
@@ -34,11 +34,11 @@ pub fn tests() -> Vec<Test> {
     ]
 }
 
-fn loads(lab: &Lab) -> Verdict {
-    let module = LoadedModule::load(&lab.path).map_err(|e| {
-        Stop::fail("loading", lab.path.display().to_string(), e.to_string(), "a module that can be used")
+fn loads(context: &TestContext) -> Verdict {
+    let module = LoadedModule::load(&context.path).map_err(|e| {
+        Stop::fail("loading", context.path.display().to_string(), e.to_string(), "a module that can be used")
     })?;
-    match lab.missing_path(module.schema()) {
+    match context.missing_path(module.schema()) {
         Some(name) => Err(Stop::Warning(format!(
             "the parameter `{name}` is the path of a file: give one with --set {name}=FILE or in the file beside the module"
         ))),
@@ -46,9 +46,9 @@ fn loads(lab: &Lab) -> Verdict {
     }
 }
 
-fn exports(lab: &Lab) -> Verdict {
-    lab.needs_a_library("it has no symbols that could clash, nothing is lost")?;
-    let bytes = std::fs::read(&lab.path).unwrap_or_default();
+fn exports(context: &TestContext) -> Verdict {
+    context.needs_a_library("it has no symbols that could clash, nothing is lost")?;
+    let bytes = std::fs::read(&context.path).unwrap_or_default();
     let Some(names) = exported_symbols(&bytes) else {
         return Err(Stop::Skip("its symbol table cannot be read: names that clash are not found".into()));
     };
@@ -65,9 +65,9 @@ fn exports(lab: &Lab) -> Verdict {
     ))
 }
 
-fn handshake(lab: &Lab) -> Verdict {
-    lab.needs_a_library("the program brings its side of the table, nothing is lost")?;
-    let table = table_of(&lab.path)
+fn handshake(context: &TestContext) -> Verdict {
+    context.needs_a_library("the program brings its side of the table, nothing is lost")?;
+    let table = table_of(&context.path)
         .map_err(|e| Stop::fail("terraglue_subsystem", "no arguments", e.to_string(), "a table"))?;
     let whole = size_of::<TgSubsystem>() as u32;
     let given = "the table";
@@ -92,8 +92,8 @@ fn handshake(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn description(lab: &Lab) -> Verdict {
-    let Some(section) = described(&lab.path) else {
+fn description(context: &TestContext) -> Verdict {
+    let Some(section) = described(&context.path) else {
         return Err(Stop::fail(
             "loading",
             "the section .terraglue",
@@ -101,9 +101,9 @@ fn description(lab: &Lab) -> Verdict {
             "a description: TG_DESCRIBE(name, version) in C, export_subsystem! in Rust",
         ));
     };
-    let module = lab.own_module()?;
+    let module = context.own_module()?;
     if module.is_python() {
-        return named_as_its_file(lab, &section.name);
+        return named_as_its_file(context, &section.name);
     }
     let kind = format!("{:?}", module.schema().kind).to_lowercase();
     if !section.kind.is_empty() && section.kind != kind {
@@ -115,8 +115,8 @@ fn description(lab: &Lab) -> Verdict {
         let got = format!("the section names `{}`, the schema `{own}`", section.name);
         return Err(Stop::fail("schema", "the section .terraglue", got, "the same name in both"));
     }
-    let table =
-        table_of(&lab.path).map_err(|e| Stop::fail("terraglue_subsystem", "", e.to_string(), "a table"))?;
+    let table = table_of(&context.path)
+        .map_err(|e| Stop::fail("terraglue_subsystem", "", e.to_string(), "a table"))?;
     match table.description {
         Some(text) if terraglue_host::Description::parse(&text).as_ref() == Some(&section) => Ok(()),
         Some(_) => {
@@ -136,8 +136,8 @@ fn description(lab: &Lab) -> Verdict {
 }
 
 /// A scenario that names a module in Python finds it by its file.
-fn named_as_its_file(lab: &Lab, name: &str) -> Verdict {
-    let stem = lab.path.file_stem().and_then(|s| s.to_str()).unwrap_or_default();
+fn named_as_its_file(context: &TestContext, name: &str) -> Verdict {
+    let stem = context.path.file_stem().and_then(|s| s.to_str()).unwrap_or_default();
     if name.replace('-', "_") == stem {
         return Ok(());
     }
@@ -145,8 +145,8 @@ fn named_as_its_file(lab: &Lab, name: &str) -> Verdict {
     Err(Stop::fail("loading", "the docstring", got, "the same name, with `_` for `-` in that of the file"))
 }
 
-fn schema(lab: &Lab) -> Verdict {
-    let module = lab.own_module()?;
+fn schema(context: &TestContext) -> Verdict {
+    let module = context.own_module()?;
     let schema = module.schema();
     let wrong = |p: &Parameter, got: String, expected: &str| {
         Err(Stop::fail("schema", format!("parameter `{}`", p.name), got, expected))
@@ -214,11 +214,11 @@ fn default_fits(p: &Parameter) -> Verdict {
     }
 }
 
-fn schema_again(lab: &Lab) -> Verdict {
-    let first = lab.own_module()?;
-    drop(lab.instance());
+fn schema_again(context: &TestContext) -> Verdict {
+    let first = context.own_module()?;
+    drop(context.instance());
     for _ in 0..3 {
-        let again = lab.own_module()?;
+        let again = context.own_module()?;
         if again.schema() != first.schema() {
             return Err(Stop::fail("schema", "asked again", "another text", "the same text as at first"));
         }

@@ -2,8 +2,8 @@
 
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::lab::Lab;
-use crate::rig::{Flat, Foot, SoilBench, script};
+use crate::fixture::{Flat, Foot, SoilFixture, script};
+use crate::test_context::TestContext;
 use terraglue_host::probe_odd_calls;
 use terraglue_subsystem::{Config, Kind};
 
@@ -13,7 +13,7 @@ const fn test(
     kinds: &'static [Kind],
     after: &'static [&'static str],
     promise: &'static str,
-    run: fn(&Lab) -> Verdict,
+    run: fn(&TestContext) -> Verdict,
 ) -> Test {
     Test { name, area: Area::LifeCycle, level, kinds, after, promise, run }
 }
@@ -96,41 +96,43 @@ pub fn tests() -> Vec<Test> {
     ]
 }
 
-fn instantiates(lab: &Lab) -> Verdict {
-    lab.instance().map(drop)
+fn instantiates(context: &TestContext) -> Verdict {
+    context.instance().map(drop)
 }
 
-fn steps(lab: &Lab) -> Verdict {
-    script(lab.instance()?, 100, 0).map(drop)
+fn steps(context: &TestContext) -> Verdict {
+    script(context.instance()?, 100, 0).map(drop)
 }
 
-fn many(lab: &Lab) -> Verdict {
-    let module = lab.module()?;
+fn many(context: &TestContext) -> Verdict {
+    let module = context.module()?;
     // Each in Python is a process.
-    let count = if module.is_python() { 40 } else { 1000 } * if lab.level == Level::Thorough { 5 } else { 1 };
+    let count =
+        if module.is_python() { 40 } else { 1000 } * if context.level == Level::Thorough { 5 } else { 1 };
     for _ in 0..count {
-        lab.instance_on(&module, Flat::LEVEL)?;
+        context.instance_on(&module, Flat::LEVEL)?;
     }
     Ok(())
 }
 
-fn two(lab: &Lab) -> Verdict {
-    let module = lab.module()?;
-    let (alone, _) = script(lab.instance_on(&module, Flat::LEVEL)?, 40, 1)?;
+fn two(context: &TestContext) -> Verdict {
+    let module = context.module()?;
+    let (alone, _) = script(context.instance_on(&module, Flat::LEVEL)?, 40, 1)?;
     // The same run while others live, are made and end.
-    let (first, second) = (lab.instance_on(&module, Flat::LEVEL)?, lab.instance_on(&module, Flat::LEVEL)?);
+    let (first, second) =
+        (context.instance_on(&module, Flat::LEVEL)?, context.instance_on(&module, Flat::LEVEL)?);
     let (_, _second) = script(second, 25, 4)?;
     let (beside, _) = script(first, 40, 1)?;
     same("a run beside another instance", &alone, &beside)
 }
 
-fn fresh(lab: &Lab) -> Verdict {
-    let module = lab.module()?;
-    let (first, _) = script(lab.instance_on(&module, Flat::LEVEL)?, 30, 2)?;
+fn fresh(context: &TestContext) -> Verdict {
+    let module = context.module()?;
+    let (first, _) = script(context.instance_on(&module, Flat::LEVEL)?, 30, 2)?;
     for variant in 3..6 {
-        script(lab.instance_on(&module, Flat::LEVEL)?, 20, variant)?;
+        script(context.instance_on(&module, Flat::LEVEL)?, 20, variant)?;
     }
-    let (again, _) = script(lab.instance_on(&module, Flat::LEVEL)?, 30, 2)?;
+    let (again, _) = script(context.instance_on(&module, Flat::LEVEL)?, 30, 2)?;
     same("the same run by an instance made later", &first, &again)
 }
 
@@ -143,17 +145,17 @@ pub fn same(given: &str, a: &[u64], b: &[u64]) -> Verdict {
     Err(Stop::fail("a run", given, got, "the same bytes"))
 }
 
-fn odd_calls(lab: &Lab) -> Verdict {
-    lab.needs_a_library("no null pointer can reach it, nothing is lost")?;
-    let module = lab.module()?;
-    let config = lab.config(module.schema()).with_defaults(module.schema());
-    probe_odd_calls(&lab.path, &config, &lab.services()).map_err(|(call, got)| {
+fn odd_calls(context: &TestContext) -> Verdict {
+    context.needs_a_library("no null pointer can reach it, nothing is lost")?;
+    let module = context.module()?;
+    let config = context.config(module.schema()).with_defaults(module.schema());
+    probe_odd_calls(&context.path, &config, &context.services()).map_err(|(call, got)| {
         Stop::fail(call, "null or wrong arguments", got, "TG_REFUSED, TG_ERROR or TG_UNSUPPORTED")
     })
 }
 
-fn wrong_config(lab: &Lab) -> Verdict {
-    let module = lab.module()?;
+fn wrong_config(context: &TestContext) -> Verdict {
+    let module = context.module()?;
     let needs_any = module.schema().parameters.iter().any(|p| p.default.is_null() && !p.optional);
     let mut odd = vec![];
     for p in module.schema().parameters.iter().filter(|p| !p.name.contains(['.', '*'])) {
@@ -165,7 +167,7 @@ fn wrong_config(lab: &Lab) -> Verdict {
     }
     for text in odd {
         let config = Config::parse(&text).unwrap_or_default();
-        if let Err(error) = module.instantiate("checked", config, &lab.services())
+        if let Err(error) = module.instantiate("checked", config, &context.services())
             && error.to_string().ends_with("no reason given")
         {
             return Err(Stop::fail(
@@ -177,33 +179,35 @@ fn wrong_config(lab: &Lab) -> Verdict {
         }
     }
     // The module is usable afterwards.
-    lab.instance().map(drop)
+    context.instance().map(drop)
 }
 
-fn no_contact(lab: &Lab) -> Verdict {
-    let mut bench = SoilBench::new(lab, &[Foot::sphere(0.0, 0.0).lifted(0.3)])?;
+fn no_contact(context: &TestContext) -> Verdict {
+    let mut fixture = SoilFixture::new(context, &[Foot::sphere(0.0, 0.0).lifted(0.3)])?;
     for _ in 0..5 {
-        bench.go(&[[0.1, 0.0, 0.0]], 1e-3)?;
+        fixture.go(&[[0.1, 0.0, 0.0]], 1e-3)?;
     }
     Ok(())
 }
 
-fn come_and_go(lab: &Lab) -> Verdict {
-    let mut bench =
-        SoilBench::new(lab, &[Foot::sphere(-0.1, 0.0).lifted(-1e-3), Foot::sphere(0.1, 0.0).lifted(7e-3)])?;
+fn come_and_go(context: &TestContext) -> Verdict {
+    let mut fixture = SoilFixture::new(
+        context,
+        &[Foot::sphere(-0.1, 0.0).lifted(-1e-3), Foot::sphere(0.1, 0.0).lifted(7e-3)],
+    )?;
     for k in 0..120 {
         let up = if (k / 20) % 2 == 0 { 0.4 } else { -0.4 };
-        bench.go(&[[0.0, 0.0, up], [0.0, 0.0, -up]], 1e-3)?;
+        fixture.go(&[[0.0, 0.0, up], [0.0, 0.0, -up]], 1e-3)?;
     }
     Ok(())
 }
 
-fn thousand(lab: &Lab) -> Verdict {
+fn thousand(context: &TestContext) -> Verdict {
     let place = |k: usize| Foot::sphere(-0.4 + 0.025 * (k % 32) as f64, -0.4 + 0.025 * (k / 32) as f64);
     let feet: Vec<_> = (0..1000).map(place).collect();
-    let mut bench = SoilBench::new(lab, &feet)?;
+    let mut fixture = SoilFixture::new(context, &feet)?;
     let down = vec![[0.0, 0.0, -0.1]; feet.len()];
-    match (0..3).try_for_each(|_| bench.go(&down, 1e-3).map(drop)) {
+    match (0..3).try_for_each(|_| fixture.go(&down, 1e-3).map(drop)) {
         // A status is an answer: the soil says how many it carries.
         Err(Stop::Fail(finding)) if finding.call == "set_ports" && finding.got != "no reason given" => {
             Err(Stop::Warning(format!("it refuses a thousand feet: {}", finding.got)))

@@ -2,12 +2,12 @@
 
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::lab::Lab;
-use crate::rig::{numbers, outputs, set_numbers};
+use crate::fixture::{numbers, outputs, set_numbers};
+use crate::test_context::TestContext;
 use terraglue_host::Instance;
 use terraglue_subsystem::{Causality, Input, Kind, Motion, Response, Step};
 
-const fn test(name: &'static str, promise: &'static str, run: fn(&Lab) -> Verdict) -> Test {
+const fn test(name: &'static str, promise: &'static str, run: fn(&TestContext) -> Verdict) -> Test {
     let (area, level, after) = (Area::Physics, Level::Quick, &["steps"]);
     Test { name, area, level, kinds: &[Kind::Controller], after, promise, run }
 }
@@ -36,8 +36,8 @@ fn step(instance: &mut Instance, t: f64, h: f64, index: u64) -> Verdict {
 }
 
 /// Outputs every 10 ms over two seconds.
-fn run(lab: &Lab, h: f64, start: f64) -> Verdict<Vec<Vec<f64>>> {
-    let mut instance = lab.instance()?;
+fn run(context: &TestContext, h: f64, start: f64) -> Verdict<Vec<Vec<f64>>> {
+    let mut instance = context.instance()?;
     set_numbers(&mut instance, |k| 0.3 + 0.1 * k as f64)?;
     let per_sample = (0.01 / h).round() as u64;
     let mut all = Vec::new();
@@ -50,9 +50,9 @@ fn run(lab: &Lab, h: f64, start: f64) -> Verdict<Vec<Vec<f64>>> {
     Ok(all)
 }
 
-fn time_not_calls(lab: &Lab) -> Verdict {
-    let (coarse, fine) = (run(lab, 2e-3, 0.0)?, run(lab, 1e-3, 0.0)?);
-    let names = numbers(&lab.instance()?);
+fn time_not_calls(context: &TestContext) -> Verdict {
+    let (coarse, fine) = (run(context, 2e-3, 0.0)?, run(context, 1e-3, 0.0)?);
+    let names = numbers(&context.instance()?);
     let mut k = 0;
     for v in names.iter() {
         for _ in 0..v.len() {
@@ -80,8 +80,8 @@ fn time_not_calls(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn bounded(lab: &Lab) -> Verdict {
-    let mut instance = lab.instance()?;
+fn bounded(context: &TestContext) -> Verdict {
+    let mut instance = context.instance()?;
     for (round, way) in [1e6, -1e6, 0.0, 1e6].into_iter().enumerate() {
         // Kept inside the range of each input.
         set_numbers(&mut instance, |_| way)?;
@@ -108,8 +108,8 @@ fn bounded(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn bounded_power(lab: &Lab) -> Verdict {
-    let instance = lab.instance()?;
+fn bounded_power(context: &TestContext) -> Verdict {
+    let instance = context.instance()?;
     let powerful = ["N", "N m", "W", "V", "A"];
     let open: Vec<String> = numbers(&instance)
         .into_iter()
@@ -127,8 +127,8 @@ fn bounded_power(lab: &Lab) -> Verdict {
 }
 
 /// Time is counted from the start of the instance, or read from the step: a shift of an hour must not throw it off.
-fn reads_time(lab: &Lab) -> Verdict {
-    let late = run(lab, 2e-3, 3600.0)?;
+fn reads_time(context: &TestContext) -> Verdict {
+    let late = run(context, 2e-3, 3600.0)?;
     match late.iter().flatten().all(|x| x.is_finite()) {
         true => Ok(()),
         false => Err(Stop::fail(

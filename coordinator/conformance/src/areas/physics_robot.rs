@@ -2,11 +2,11 @@
 
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::lab::Lab;
-use crate::rig::{BodyBench, dot};
+use crate::fixture::{BodyFixture, dot};
+use crate::test_context::TestContext;
 use terraglue_subsystem::{Capabilities, Kind};
 
-const fn test(name: &'static str, promise: &'static str, run: fn(&Lab) -> Verdict) -> Test {
+const fn test(name: &'static str, promise: &'static str, run: fn(&TestContext) -> Verdict) -> Test {
     let (area, level, after) = (Area::Physics, Level::Quick, &["steps"]);
     Test { name, area, level, kinds: &[Kind::Robot], after, promise, run }
 }
@@ -33,14 +33,14 @@ pub fn tests() -> Vec<Test> {
 const G: [f64; 3] = [0.0, 0.0, -9.81];
 const H: f64 = 1e-3;
 
-fn mass(bench: &BodyBench) -> f64 {
-    bench.robot.scene().bodies.iter().map(|b| b.mass).sum()
+fn mass(fixture: &BodyFixture) -> f64 {
+    fixture.robot.scene().bodies.iter().map(|b| b.mass).sum()
 }
 
 /// Several bodies carry momentum of their frames' origins only: those tests are for a single body.
-fn single(bench: &BodyBench) -> Verdict {
-    match bench.robot.scene().bodies.len() {
-        1 if mass(bench) > 0.0 => Ok(()),
+fn single(fixture: &BodyFixture) -> Verdict {
+    match fixture.robot.scene().bodies.len() {
+        1 if mass(fixture) > 0.0 => Ok(()),
         1 => Err(Stop::Skip("its body has no mass in the scene: momentum cannot be told".into())),
         _ => Err(Stop::Skip("several bodies: the scene does not tell where their masses lie".into())),
     }
@@ -55,51 +55,51 @@ fn grew(call: &str, given: &str, got: [f64; 3], expected: [f64; 3], scale: f64) 
     Err(Stop::fail(call, given, got, expected))
 }
 
-fn after(bench: &mut BodyBench, steps: usize) -> Verdict<[f64; 3]> {
-    let before = bench.momentum()?;
+fn after(fixture: &mut BodyFixture, steps: usize) -> Verdict<[f64; 3]> {
+    let before = fixture.momentum()?;
     for _ in 0..steps {
-        bench.fall(H)?;
+        fixture.fall(H)?;
     }
-    let now = bench.momentum()?;
+    let now = fixture.momentum()?;
     Ok(std::array::from_fn(|k| now[k] - before[k]))
 }
 
-fn falls(lab: &Lab) -> Verdict {
-    let mut bench = BodyBench::new(lab.instance()?);
-    single(&bench)?;
-    let m = mass(&bench);
-    let got = after(&mut bench, 50)?;
+fn falls(context: &TestContext) -> Verdict {
+    let mut fixture = BodyFixture::new(context.instance()?);
+    single(&fixture)?;
+    let m = mass(&fixture);
+    let got = after(&mut fixture, 50)?;
     grew("advance", "50 free steps of 1 ms", got, G.map(|g| m * g * 50.0 * H), m * 9.81 * 50.0 * H)
 }
 
-fn no_gravity(lab: &Lab) -> Verdict {
-    let module = lab.module()?;
-    let mut services = lab.services();
+fn no_gravity(context: &TestContext) -> Verdict {
+    let module = context.module()?;
+    let mut services = context.services();
     services.gravity = [0.0; 3];
-    let made = module.instantiate("checked", lab.config(module.schema()), &services);
+    let made = module.instantiate("checked", context.config(module.schema()), &services);
     let made = made.map_err(|e| Stop::fail("instantiate", "no gravity", e.to_string(), "an instance"))?;
-    let mut bench = BodyBench::new(made);
-    single(&bench)?;
-    let scale = mass(&bench) * 9.81 * 50.0 * H;
-    let got = after(&mut bench, 50)?;
+    let mut fixture = BodyFixture::new(made);
+    single(&fixture)?;
+    let scale = mass(&fixture) * 9.81 * 50.0 * H;
+    let got = after(&mut fixture, 50)?;
     grew("advance", "50 free steps of 1 ms without gravity", got, [0.0; 3], scale)
 }
 
-fn force_moves(lab: &Lab) -> Verdict {
-    let mut bench = BodyBench::new(lab.instance()?);
-    single(&bench)?;
-    let m = mass(&bench);
-    let before = bench.momentum()?;
-    bench.place_port()?;
+fn force_moves(context: &TestContext) -> Verdict {
+    let mut fixture = BodyFixture::new(context.instance()?);
+    single(&fixture)?;
+    let m = mass(&fixture);
+    let before = fixture.momentum()?;
+    fixture.place_port()?;
     let t = [3.0 * m, 2.0 * m, -m];
-    bench.try_force(&t, H)?;
-    bench.commit(&t, H)?;
-    let now = bench.momentum()?;
-    let port = &bench.ports_before[0];
+    fixture.try_force(&t, H)?;
+    fixture.commit(&t, H)?;
+    let now = fixture.momentum()?;
+    let port = &fixture.ports_before[0];
     let (force, _) = port.wrench_in_world(&t);
     let expected = std::array::from_fn(|k| (force[k] + m * G[k]) * H);
     // A body that turns under the force moves its frame's origin too, where that is not its centre of mass.
-    let states = bench.states()?;
+    let states = fixture.states()?;
     let turns = dot(states[0].angular_velocity, states[0].angular_velocity) > 0.0;
     let scale = m * 9.81 * H * if turns { 1e4 } else { 1.0 };
     grew(
@@ -111,14 +111,14 @@ fn force_moves(lab: &Lab) -> Verdict {
     )
 }
 
-fn velocity(lab: &Lab) -> Verdict {
-    let mut bench = BodyBench::new(lab.instance()?);
+fn velocity(context: &TestContext) -> Verdict {
+    let mut fixture = BodyFixture::new(context.instance()?);
     for _ in 0..20 {
-        bench.fall(H)?;
+        fixture.fall(H)?;
     }
-    let before = bench.states()?;
-    bench.fall(H)?;
-    let now = bench.states()?;
+    let before = fixture.states()?;
+    fixture.fall(H)?;
+    let now = fixture.states()?;
     for (k, (a, b)) in before.iter().zip(&now).enumerate() {
         for axis in 0..3 {
             let moved = (b.world_from_body.position[axis] - a.world_from_body.position[axis]) / H;
@@ -134,17 +134,17 @@ fn velocity(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn fall_energy(lab: &Lab) -> Verdict {
-    let mut bench = BodyBench::new(lab.instance()?);
-    bench.fall(H)?;
-    let start = bench.robot.energy()?;
+fn fall_energy(context: &TestContext) -> Verdict {
+    let mut fixture = BodyFixture::new(context.instance()?);
+    fixture.fall(H)?;
+    let start = fixture.robot.energy()?;
     if (start.mechanical() + start.actuator_work).is_nan() {
-        return Err(Stop::Skip("it keeps no book: reports show its energy as unknown".into()));
+        return Err(Stop::Skip("it keeps no energy ledger: reports show its energy as unknown".into()));
     }
     for _ in 0..100 {
-        bench.fall(H)?;
+        fixture.fall(H)?;
     }
-    let end = bench.robot.energy()?;
+    let end = fixture.robot.energy()?;
     let gained = end.mechanical() - start.mechanical() - (end.actuator_work - start.actuator_work);
     if gained > 0.02 * (end.kinetic - start.kinetic).abs() + 1e-9 {
         let got = format!("{gained:.5} J more than its motors put in");
@@ -153,16 +153,16 @@ fn fall_energy(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn passive_jacobian(lab: &Lab) -> Verdict {
-    let mut bench = BodyBench::new(lab.instance()?);
-    if !bench.robot.capabilities().has(Capabilities::DERIVATIVES) {
+fn passive_jacobian(context: &TestContext) -> Verdict {
+    let mut fixture = BodyFixture::new(context.instance()?);
+    if !fixture.robot.capabilities().has(Capabilities::DERIVATIVES) {
         return Err(Stop::Skip(
             "no interface_jacobian: the coordinator takes finite differences, at more trials".into(),
         ));
     }
-    bench.place_port()?;
-    bench.try_force(&[20.0, 1.0, 2.0], H)?;
-    let g = bench.jacobian(H)?;
+    fixture.place_port()?;
+    fixture.try_force(&[20.0, 1.0, 2.0], H)?;
+    let g = fixture.jacobian(H)?;
     let size = g.iter().fold(0.0f64, |m, v| m.max(v.abs()));
     for (i, j) in (0..3).flat_map(|i| (0..3).map(move |j| (i, j))) {
         let (a, b) = (g[3 * j + i], g[3 * i + j]);
@@ -185,11 +185,11 @@ fn passive_jacobian(lab: &Lab) -> Verdict {
 }
 
 /// A body that stands on a rigid plane at its lowest point.
-fn estimate_holds(lab: &Lab) -> Verdict {
-    let mut bench = BodyBench::new(lab.instance()?);
-    needs_estimate(&bench)?;
-    bench.place_port()?;
-    let estimate = bench.estimate(&[0.0; 3], H)?;
+fn estimate_holds(context: &TestContext) -> Verdict {
+    let mut fixture = BodyFixture::new(context.instance()?);
+    needs_estimate(&fixture)?;
+    fixture.place_port()?;
+    let estimate = fixture.estimate(&[0.0; 3], H)?;
     let t_n = estimate.t_star[0];
     if t_n < -1e-9 {
         return Err(Stop::fail(
@@ -199,8 +199,8 @@ fn estimate_holds(lab: &Lab) -> Verdict {
             ">= 0",
         ));
     }
-    bench.try_force(&estimate.t_star, H)?;
-    let gap = bench.out.x[0];
+    fixture.try_force(&estimate.t_star, H)?;
+    let gap = fixture.out.x[0];
     let free = estimate.x_free[0];
     if gap < -1e-3 * free.abs() - 1e-9 {
         let got = format!("it sinks by {:e} m under T*_n = {t_n:.5} N, freely by {:e} m", -gap, -free);
@@ -214,11 +214,11 @@ fn estimate_holds(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn estimate_apart(lab: &Lab) -> Verdict {
-    let mut bench = BodyBench::new(lab.instance()?);
-    needs_estimate(&bench)?;
-    bench.place_port()?;
-    let estimate = bench.estimate(&[-0.1, 0.0, 0.0], H)?;
+fn estimate_apart(context: &TestContext) -> Verdict {
+    let mut fixture = BodyFixture::new(context.instance()?);
+    needs_estimate(&fixture)?;
+    fixture.place_port()?;
+    let estimate = fixture.estimate(&[-0.1, 0.0, 0.0], H)?;
     if estimate.t_star.iter().any(|t| t.abs() > 1e-9) || estimate.active[0] != 0 {
         let got = format!("T* = {:?} N, active {}", estimate.t_star, estimate.active[0]);
         return Err(Stop::fail("estimate_forces", "ground 10 cm below it", got, "zero"));
@@ -226,25 +226,25 @@ fn estimate_apart(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn needs_estimate(bench: &BodyBench) -> Verdict {
-    if bench.robot.capabilities().has(Capabilities::ESTIMATE) {
+fn needs_estimate(fixture: &BodyFixture) -> Verdict {
+    if fixture.robot.capabilities().has(Capabilities::ESTIMATE) {
         return Ok(());
     }
     Err(Stop::Skip("no estimate_forces: the coordinator solves for T* by itself".into()))
 }
 
-fn quaternions(lab: &Lab) -> Verdict {
-    let mut bench = BodyBench::new(lab.instance()?);
+fn quaternions(context: &TestContext) -> Verdict {
+    let mut fixture = BodyFixture::new(context.instance()?);
     for step in 0..200 {
-        if step % 3 == 0 && bench.robot.scene().shapes.iter().any(|s| s.collides) {
-            bench.place_port()?;
+        if step % 3 == 0 && fixture.robot.scene().shapes.iter().any(|s| s.collides) {
+            fixture.place_port()?;
             let t = [5.0, 20.0, -20.0];
-            bench.try_force(&t, H)?;
-            bench.commit(&t, H)?;
+            fixture.try_force(&t, H)?;
+            fixture.commit(&t, H)?;
         } else {
-            bench.fall(H)?;
+            fixture.fall(H)?;
         }
-        for (k, state) in bench.states()?.iter().enumerate() {
+        for (k, state) in fixture.states()?.iter().enumerate() {
             let length = state.world_from_body.orientation.iter().map(|q| q * q).sum::<f64>().sqrt();
             if (length - 1.0).abs() > 1e-6 {
                 let got = format!("the quaternion of body {k} has the length {length}");

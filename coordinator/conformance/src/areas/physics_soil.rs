@@ -2,11 +2,16 @@
 
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::lab::Lab;
-use crate::rig::{Flat, Foot, Moved, SoilBench, dot};
+use crate::fixture::{Flat, Foot, Moved, SoilFixture, dot};
+use crate::test_context::TestContext;
 use terraglue_subsystem::Kind;
 
-const fn test(name: &'static str, level: Level, promise: &'static str, run: fn(&Lab) -> Verdict) -> Test {
+const fn test(
+    name: &'static str,
+    level: Level,
+    promise: &'static str,
+    run: fn(&TestContext) -> Verdict,
+) -> Test {
     Test { name, area: Area::Physics, level, kinds: &[Kind::Soil], after: &["steps"], promise, run }
 }
 
@@ -61,9 +66,9 @@ impl Work {
         Self { before: vec![Moved::default(); feet], sum: 0.0, turned: 0.0 }
     }
 
-    fn step(&mut self, bench: &mut SoilBench, velocities: &[[f64; 3]], h: f64) -> Verdict {
-        bench.go(velocities, h)?;
-        for ((before, after), v) in self.before.iter().zip(&bench.moved).zip(velocities) {
+    fn step(&mut self, fixture: &mut SoilFixture, velocities: &[[f64; 3]], h: f64) -> Verdict {
+        fixture.go(velocities, h)?;
+        for ((before, after), v) in self.before.iter().zip(&fixture.moved).zip(velocities) {
             let work = -0.5 * h * (dot(before.force, *v) + dot(after.force, *v));
             // Where a foot lifts off within the step, it gives out between nothing and this much: a straight line through
             // the corner says too much, of a spring up to an eighth of its stiffness times the step squared.
@@ -71,7 +76,7 @@ impl Work {
             self.sum += if lifts { 0.0 } else { work };
             self.turned += work.abs();
         }
-        self.before.clone_from(&bench.moved);
+        self.before.clone_from(&fixture.moved);
         Ok(())
     }
 }
@@ -85,12 +90,12 @@ fn gained(given: String, work: f64, turned: f64) -> Verdict {
     Err(Stop::fail("advance", given, got, "work on the soil >= 0"))
 }
 
-fn pushes_back(lab: &Lab) -> Verdict {
-    let mut bench = SoilBench::new(lab, &[Foot::sphere(0.0, 0.0)])?;
+fn pushes_back(context: &TestContext) -> Verdict {
+    let mut fixture = SoilFixture::new(context, &[Foot::sphere(0.0, 0.0)])?;
     let mut before = 0.0;
     for step in 1..=40 {
-        bench.go(&[[0.0, 0.0, -0.5]], 1e-3)?;
-        let now = bench.moved[0];
+        fixture.go(&[[0.0, 0.0, -0.5]], 1e-3)?;
+        let now = fixture.moved[0];
         if step >= 10 && !(now.force[2] > 0.0 && now.normal > 0.0) {
             let (given, got) = (depth(step, 0.5), format!("a force of {:.3e} N upwards", now.force[2]));
             return Err(Stop::fail("advance", given, got, "a force upwards"));
@@ -108,18 +113,18 @@ fn depth(step: usize, speed: f64) -> String {
     format!("a sphere of 4 cm radius, {:.1} mm below the ground", speed * step as f64)
 }
 
-fn no_force_apart(lab: &Lab) -> Verdict {
-    let mut bench = SoilBench::new(lab, &[Foot::sphere(0.0, 0.0).lifted(8e-4)])?;
-    slide_above(&mut bench, "a foot 0.7 mm above untouched ground")?;
-    bench.drag([0.0, 0.0, -0.01], 20)?;
-    bench.drag([0.0, 0.0, 0.03], 30)?;
-    slide_above(&mut bench, "a foot lifted 2 cm above the ground it had pressed 1 cm deep")
+fn no_force_apart(context: &TestContext) -> Verdict {
+    let mut fixture = SoilFixture::new(context, &[Foot::sphere(0.0, 0.0).lifted(8e-4)])?;
+    slide_above(&mut fixture, "a foot 0.7 mm above untouched ground")?;
+    fixture.drag([0.0, 0.0, -0.01], 20)?;
+    fixture.drag([0.0, 0.0, 0.03], 30)?;
+    slide_above(&mut fixture, "a foot lifted 2 cm above the ground it had pressed 1 cm deep")
 }
 
-fn slide_above(bench: &mut SoilBench, given: &str) -> Verdict {
+fn slide_above(fixture: &mut SoilFixture, given: &str) -> Verdict {
     for _ in 0..10 {
-        bench.go(&[[0.05, 0.02, -0.01]], 1e-3)?;
-        let force = bench.moved[0].force;
+        fixture.go(&[[0.05, 0.02, -0.01]], 1e-3)?;
+        let force = fixture.moved[0].force;
         if dot(force, force).sqrt() > 1e-9 {
             return Err(Stop::fail("advance", given, format!("a force of {force:?} N"), "none"));
         }
@@ -127,13 +132,13 @@ fn slide_above(bench: &mut SoilBench, given: &str) -> Verdict {
     Ok(())
 }
 
-fn no_tension(lab: &Lab) -> Verdict {
-    let mut bench = SoilBench::new(lab, &[Foot::sphere(-0.1, 0.0), Foot::plate(0.1, 0.0)])?;
+fn no_tension(context: &TestContext) -> Verdict {
+    let mut fixture = SoilFixture::new(context, &[Foot::sphere(-0.1, 0.0), Foot::plate(0.1, 0.0)])?;
     for step in 0..160 {
         let vz = if (step / 40) % 2 == 0 { -0.2 } else { 0.22 };
-        bench.go(&[[0.02, 0.0, vz], [0.0, 0.02, vz]], 1e-3)?;
-        if let Some(foot) = bench.moved.iter().find(|m| m.normal < -1e-9) {
-            let given = format!("a foot that moves with {vz} m/s at t = {:.3} s", bench.t);
+        fixture.go(&[[0.02, 0.0, vz], [0.0, 0.02, vz]], 1e-3)?;
+        if let Some(foot) = fixture.moved.iter().find(|m| m.normal < -1e-9) {
+            let given = format!("a foot that moves with {vz} m/s at t = {:.3} s", fixture.t);
             let got = format!("a normal force of {:.3e} N", foot.normal);
             return Err(Stop::fail("advance", given, got, ">= 0: no adhesion is declared (t_min = 0)"));
         }
@@ -142,14 +147,14 @@ fn no_tension(lab: &Lab) -> Verdict {
 }
 
 /// Random ways of a foot that stays near the surface.
-fn passive(lab: &Lab) -> Verdict {
-    let mut random = lab.random("passive");
-    for walk in 0..lab.count(4) {
-        let mut bench = SoilBench::new(lab, &[Foot::sphere(0.0, 0.0)])?;
+fn passive(context: &TestContext) -> Verdict {
+    let mut random = context.random("passive");
+    for walk in 0..context.count(4) {
+        let mut fixture = SoilFixture::new(context, &[Foot::sphere(0.0, 0.0)])?;
         let mut work = Work::new(1);
         let mut signed = || 2.0 * random.unit() - 1.0;
         for _ in 0..25 {
-            let z = bench.states[0].world_from_body.position[2] - 0.04;
+            let z = fixture.states[0].world_from_body.position[2] - 0.04;
             // Back to a depth between 1 and 8 mm now and then, so that it does not drift away.
             let vz = if z > 0.003 {
                 -0.3
@@ -160,9 +165,9 @@ fn passive(lab: &Lab) -> Verdict {
             };
             let v = [0.1 * signed(), 0.1 * signed(), vz];
             for _ in 0..10 {
-                work.step(&mut bench, &[v], 1e-3)?;
+                work.step(&mut fixture, &[v], 1e-3)?;
                 gained(
-                    format!("random walk {walk} of a sphere, at t = {:.3} s", bench.t),
+                    format!("random walk {walk} of a sphere, at t = {:.3} s", fixture.t),
                     work.sum,
                     work.turned,
                 )?;
@@ -172,14 +177,14 @@ fn passive(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn vertical_cycles(lab: &Lab) -> Verdict {
-    let mut bench = SoilBench::new(lab, &[Foot::plate(0.0, 0.0)])?;
+fn vertical_cycles(context: &TestContext) -> Verdict {
+    let mut fixture = SoilFixture::new(context, &[Foot::plate(0.0, 0.0)])?;
     let mut before = 0.0;
     let mut work = Work::new(1);
     for cycle in 0..5 {
         for (steps, v) in [(25, -0.2), (25, 0.2)] {
             for _ in 0..steps {
-                work.step(&mut bench, &[[0.0, 0.0, v]], 1e-3)?;
+                work.step(&mut fixture, &[[0.0, 0.0, v]], 1e-3)?;
             }
         }
         let given = format!("cycle {} of a plate, 5 mm down and up", cycle + 1);
@@ -189,15 +194,15 @@ fn vertical_cycles(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn shear_cycles(lab: &Lab) -> Verdict {
-    let mut bench = SoilBench::new(lab, &[Foot::plate(0.0, 0.0)])?;
-    bench.drag([0.0, 0.0, -0.005], 25)?;
+fn shear_cycles(context: &TestContext) -> Verdict {
+    let mut fixture = SoilFixture::new(context, &[Foot::plate(0.0, 0.0)])?;
+    fixture.drag([0.0, 0.0, -0.005], 25)?;
     let mut work = Work::new(1);
     let mut before = 0.0;
-    for cycle in 0..lab.count(5).clamp(2, 5) {
+    for cycle in 0..context.count(5).clamp(2, 5) {
         for direction in [1.0, -1.0] {
             for _ in 0..75 {
-                work.step(&mut bench, &[[0.4 * direction, 0.0, 0.0]], 1e-3)?;
+                work.step(&mut fixture, &[[0.4 * direction, 0.0, 0.0]], 1e-3)?;
             }
         }
         let given = format!("cycle {} of a plate, 3 cm to and fro at constant depth", cycle + 1);
@@ -209,14 +214,14 @@ fn shear_cycles(lab: &Lab) -> Verdict {
 
 /// What a foot meets on the mean that is pressed 8 mm deep and dragged by 6 cm along the unit vector `d`, the ground
 /// without cohesion.
-pub fn dragged(lab: &Lab, foot: Foot, ground: Flat, d: [f64; 2]) -> Verdict<Moved> {
-    let module = lab.module()?;
-    let soil = lab.instance_with(&module, ground, &[("c_pa", 0.0), ("cohesion_pa", 0.0)])?;
-    let mut bench = SoilBench::around(soil, &ground, &[foot])?;
-    bench.drag([0.0, 0.0, -0.008], 40)?;
+pub fn dragged(context: &TestContext, foot: Foot, ground: Flat, d: [f64; 2]) -> Verdict<Moved> {
+    let module = context.module()?;
+    let soil = context.instance_with(&module, ground, &[("c_pa", 0.0), ("cohesion_pa", 0.0)])?;
+    let mut fixture = SoilFixture::around(soil, &ground, &[foot])?;
+    fixture.drag([0.0, 0.0, -0.008], 40)?;
     let mut sum = Moved::default();
     for step in 0..60 {
-        let now = bench.drag([1e-3 * d[0], 1e-3 * d[1], 0.0], 1)?;
+        let now = fixture.drag([1e-3 * d[0], 1e-3 * d[1], 0.0], 1)?;
         // The mean over 3 cm: the lattice passes below the foot node by node.
         if step >= 30 {
             (0..3).for_each(|k| sum.force[k] += now.force[k] / 30.0);
@@ -228,9 +233,9 @@ pub fn dragged(lab: &Lab, foot: Foot, ground: Flat, d: [f64; 2]) -> Verdict<Move
     Ok(sum)
 }
 
-fn opposes(lab: &Lab) -> Verdict {
+fn opposes(context: &TestContext) -> Verdict {
     for d in [[1.0, 0.0], [-0.6, 0.8]] {
-        let m = dragged(lab, Foot::sphere(0.0, 0.0), Flat::LEVEL, d)?;
+        let m = dragged(context, Foot::sphere(0.0, 0.0), Flat::LEVEL, d)?;
         let power = m.force[0] * d[0] + m.force[1] * d[1];
         if power > 1e-6 * m.normal.max(1.0) {
             let got = format!("a force of {power:.3e} N along the motion");
@@ -245,10 +250,10 @@ fn opposes(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn friction_bound(lab: &Lab) -> Verdict {
+fn friction_bound(context: &TestContext) -> Verdict {
     // A plate: what stands in the way of a round foot is pushed aside, and that is no friction.
     for d in [[1.0, 0.0], [0.0, -1.0]] {
-        let m = dragged(lab, Foot::plate(0.0, 0.0), Flat::LEVEL, d)?;
+        let m = dragged(context, Foot::plate(0.0, 0.0), Flat::LEVEL, d)?;
         if m.mu.is_finite() && m.tangential > 1.01 * m.mu * m.normal + 1e-9 {
             let got =
                 format!("{:.4} N along the ground, {:.4} N on it, mu = {:.4}", m.tangential, m.normal, m.mu);
@@ -258,8 +263,8 @@ fn friction_bound(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn friction_reached(lab: &Lab) -> Verdict {
-    let m = dragged(lab, Foot::plate(0.0, 0.0), Flat::LEVEL, [1.0, 0.0])?;
+fn friction_reached(context: &TestContext) -> Verdict {
+    let m = dragged(context, Foot::plate(0.0, 0.0), Flat::LEVEL, [1.0, 0.0])?;
     if !m.mu.is_finite() {
         return Err(Stop::Warning(
             "it declares no friction (laws[p].mu): strategies bound sticking by nothing".into(),
@@ -278,13 +283,13 @@ fn friction_reached(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn shear_forgotten(lab: &Lab) -> Verdict {
-    let mut bench = SoilBench::new(lab, &[Foot::sphere(0.0, 0.0)])?;
-    bench.drag([0.0, 0.0, -0.006], 30)?;
-    let dragged = bench.drag([0.02, 0.0, 0.0], 40)?;
-    bench.drag([0.0, 0.0, 0.05], 50)?;
-    bench.drag([0.1, 0.0, 0.0], 20)?;
-    let fresh = bench.drag([0.0, 0.0, -0.056], 60)?;
+fn shear_forgotten(context: &TestContext) -> Verdict {
+    let mut fixture = SoilFixture::new(context, &[Foot::sphere(0.0, 0.0)])?;
+    fixture.drag([0.0, 0.0, -0.006], 30)?;
+    let dragged = fixture.drag([0.02, 0.0, 0.0], 40)?;
+    fixture.drag([0.0, 0.0, 0.05], 50)?;
+    fixture.drag([0.1, 0.0, 0.0], 20)?;
+    let fresh = fixture.drag([0.0, 0.0, -0.056], 60)?;
     if fresh.tangential > 0.02 * fresh.normal + 1e-9 {
         let got = format!("{:.3e} N along the ground with {:.3e} N on it", fresh.tangential, fresh.normal);
         let given = format!("straight down, 10 cm away, after a drag with {:.3e} N", dragged.tangential);
@@ -294,9 +299,9 @@ fn shear_forgotten(lab: &Lab) -> Verdict {
 }
 
 /// The centre of pressure follows from the moments about the centre of the plate.
-fn moment_arm(lab: &Lab) -> Verdict {
-    let mut bench = SoilBench::new(lab, &[Foot::plate(0.0, 0.0)])?;
-    let m = bench.drag([0.0, 0.0, -0.008], 40)?;
+fn moment_arm(context: &TestContext) -> Verdict {
+    let mut fixture = SoilFixture::new(context, &[Foot::plate(0.0, 0.0)])?;
+    let m = fixture.drag([0.0, 0.0, -0.008], 40)?;
     let arm = [-m.moment[1] / m.force[2], m.moment[0] / m.force[2]];
     // Level ground, level plate: below its centre, up to the lattice below its edges.
     if !(arm[0].abs() <= 0.1 * 0.05 && arm[1].abs() <= 0.1 * 0.03) {
@@ -308,15 +313,15 @@ fn moment_arm(lab: &Lab) -> Verdict {
 }
 
 /// Loading, dragging and unloading with steps of 1 and of 0.5 ms.
-fn step_size(lab: &Lab) -> Verdict {
+fn step_size(context: &TestContext) -> Verdict {
     let run = |h: f64| {
-        let mut bench = SoilBench::new(lab, &[Foot::sphere(0.0, 0.0)])?;
+        let mut fixture = SoilFixture::new(context, &[Foot::sphere(0.0, 0.0)])?;
         let mut ends = Vec::new();
         for (v, time) in [([0.0, 0.0, -0.2], 0.04), ([0.1, 0.0, -0.02], 0.04), ([0.0, 0.0, -0.1], 0.02)] {
             for _ in 0..(time / h).round() as usize {
-                bench.go(&[v], h)?;
+                fixture.go(&[v], h)?;
             }
-            ends.push(bench.moved[0]);
+            ends.push(fixture.moved[0]);
         }
         Ok::<_, Stop>(ends)
     };

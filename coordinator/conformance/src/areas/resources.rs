@@ -3,8 +3,8 @@
 use super::life_cycle::same;
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::lab::Lab;
-use crate::rig::{Flat, Runner, script};
+use crate::fixture::{Flat, Runner, script};
+use crate::test_context::TestContext;
 use rustix::time::{ClockId, clock_gettime};
 use terraglue_host::{AllocationCounter, heap_in_use};
 
@@ -13,7 +13,7 @@ const fn test(
     level: Level,
     after: &'static [&'static str],
     promise: &'static str,
-    run: fn(&Lab) -> Verdict,
+    run: fn(&TestContext) -> Verdict,
 ) -> Test {
     Test { name, area: Area::Resources, level, kinds: &[], after, promise, run }
 }
@@ -52,13 +52,13 @@ pub fn tests() -> Vec<Test> {
 const MEMORY: &str = "its memory is not watched";
 
 /// The same way again and again: nothing new appears after the first two rounds.
-fn no_allocation(lab: &Lab) -> Verdict {
-    lab.needs_a_library(MEMORY)?;
-    let module = lab.module()?;
-    let Some(counter) = AllocationCounter::new(&lab.path) else {
+fn no_allocation(context: &TestContext) -> Verdict {
+    context.needs_a_library(MEMORY)?;
+    let module = context.module()?;
+    let Some(counter) = AllocationCounter::new(&context.path) else {
         return Err(Stop::Skip("its calls of malloc cannot be counted on this platform".into()));
     };
-    let mut runner = Runner::new(lab.instance_on(&module, Flat::LEVEL)?)?;
+    let mut runner = Runner::new(context.instance_on(&module, Flat::LEVEL)?)?;
     let start = runner.place();
     for _ in 0..2 {
         runner.run(0..80, 0)?;
@@ -77,9 +77,9 @@ fn no_allocation(lab: &Lab) -> Verdict {
     }
 }
 
-fn leak_steps(lab: &Lab) -> Verdict {
-    lab.needs_a_library(MEMORY)?;
-    let mut runner = Runner::new(lab.instance()?)?;
+fn leak_steps(context: &TestContext) -> Verdict {
+    context.needs_a_library(MEMORY)?;
+    let mut runner = Runner::new(context.instance()?)?;
     let start = runner.place();
     let round = || {
         for _ in 0..5 {
@@ -99,12 +99,12 @@ fn leak_steps(lab: &Lab) -> Verdict {
     }
 }
 
-fn leak_instances(lab: &Lab) -> Verdict {
-    lab.needs_a_library(MEMORY)?;
-    let module = lab.module()?;
+fn leak_instances(context: &TestContext) -> Verdict {
+    context.needs_a_library(MEMORY)?;
+    let module = context.module()?;
     let round = || {
         for _ in 0..40 {
-            script(lab.instance_on(&module, Flat::LEVEL)?, 3, 0)?;
+            script(context.instance_on(&module, Flat::LEVEL)?, 3, 0)?;
         }
         Ok::<_, Stop>(heap_in_use())
     };
@@ -130,12 +130,12 @@ fn growth(mut round: impl FnMut() -> Verdict<Option<usize>>) -> Verdict<usize> {
     Ok(sizes.windows(2).skip(1).map(|w| w[1].saturating_sub(w[0])).min().unwrap_or(0))
 }
 
-fn four_threads(lab: &Lab) -> Verdict {
-    let module = lab.module()?;
-    let (alone, _) = script(lab.instance_on(&module, Flat::LEVEL)?, 60, 0)?;
-    for round in 0..lab.count(4) {
+fn four_threads(context: &TestContext) -> Verdict {
+    let module = context.module()?;
+    let (alone, _) = script(context.instance_on(&module, Flat::LEVEL)?, 60, 0)?;
+    for round in 0..context.count(4) {
         let together: Vec<Verdict<Vec<u64>>> = std::thread::scope(|scope| {
-            let run = || script(lab.instance_on(&module, Flat::LEVEL)?, 60, 0).map(|(bits, _)| bits);
+            let run = || script(context.instance_on(&module, Flat::LEVEL)?, 60, 0).map(|(bits, _)| bits);
             let jobs: Vec<_> = (0..4).map(|_| scope.spawn(run)).collect();
             let panicked = || Stop::fail("a run", "on one of four threads", "a panic", "an answer");
             jobs.into_iter().map(|job| job.join().map_err(|_| panicked())?).collect()
@@ -147,8 +147,8 @@ fn four_threads(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn time_per_step(lab: &Lab) -> Verdict {
-    let mut runner = Runner::new(lab.instance()?)?;
+fn time_per_step(context: &TestContext) -> Verdict {
+    let mut runner = Runner::new(context.instance()?)?;
     runner.run(0..20, 0)?;
     let now = || {
         let t = clock_gettime(ClockId::ThreadCPUTime);

@@ -1,12 +1,12 @@
-//! The book of a soil: heat and stored energy are the work at its ports, whatever its contacts do, and heat stays heat.
+//! The ledger of a soil: heat and stored energy are the work at its ports, whatever its contacts do, and heat stays heat.
 
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::lab::Lab;
-use crate::rig::{Flat, Foot, SoilBench};
+use crate::fixture::{Flat, Foot, SoilFixture};
+use crate::test_context::TestContext;
 use terraglue_subsystem::{Energy, Kind};
 
-const fn test(name: &'static str, promise: &'static str, run: fn(&Lab) -> Verdict) -> Test {
+const fn test(name: &'static str, promise: &'static str, run: fn(&TestContext) -> Verdict) -> Test {
     let (area, level, after) = (Area::Physics, Level::Quick, &["steps"]);
     Test { name, area, level, kinds: &[Kind::Soil], after, promise, run }
 }
@@ -23,7 +23,7 @@ pub fn tests() -> Vec<Test> {
 const GRIDS: [f64; 3] = [0.02, 0.01, 0.005];
 /// Length of a step, s.
 const H: f64 = 1e-3;
-/// Error of the book that passes: a share of the work that was done to and fro, or rounding, J.
+/// Error of the ledger that passes: a share of the work that was done to and fro, or rounding, J.
 const SHARE: f64 = 0.01;
 const ROUNDING_J: f64 = 1e-9;
 
@@ -79,43 +79,43 @@ struct Shown {
     work: f64,
     /// Its sum to and fro, J.
     path: f64,
-    /// The book since the start.
-    book: Energy,
+    /// The ledger since the start.
+    ledger: Energy,
 }
 
 /// Goes all ways on all grids and shows every step.
-fn each_step(lab: &Lab, mut look: impl FnMut(Shown) -> Verdict) -> Verdict {
-    let module = lab.module()?;
+fn each_step(context: &TestContext, mut look: impl FnMut(Shown) -> Verdict) -> Verdict {
+    let module = context.module()?;
     for spacing in GRIDS {
         let ground = Flat { spacing, ..Flat::LEVEL };
         for way in &WAYS {
-            go(SoilBench::on(lab, &module, ground, &[(way.foot)()])?, way, spacing, &mut look)?;
+            go(SoilFixture::on(context, &module, ground, &[(way.foot)()])?, way, spacing, &mut look)?;
         }
     }
     Ok(())
 }
 
-fn go(mut bench: SoilBench, way: &Way, spacing: f64, look: &mut impl FnMut(Shown) -> Verdict) -> Verdict {
-    let start = bench.soil.energy()?;
+fn go(mut fixture: SoilFixture, way: &Way, spacing: f64, look: &mut impl FnMut(Shown) -> Verdict) -> Verdict {
+    let start = fixture.soil.energy()?;
     if !start.is_known() {
-        return Err(Stop::Skip("it keeps no book: reports show its energy as unknown".into()));
+        return Err(Stop::Skip("it keeps no energy ledger: reports show its energy as unknown".into()));
     }
     let (mut work, mut path, mut first) = (0.0, 0.0, true);
     for (what, steps, velocity, turn) in way.phases {
-        bench.turning = *turn;
+        fixture.turning = *turn;
         for _ in 0..*steps {
-            bench.go(&[*velocity], H)?;
-            work += bench.work();
-            path += bench.work().abs();
-            let now = bench.soil.energy()?;
-            let book = Energy {
+            fixture.go(&[*velocity], H)?;
+            work += fixture.work();
+            path += fixture.work().abs();
+            let now = fixture.soil.energy()?;
+            let ledger = Energy {
                 potential: now.potential - start.potential,
                 dissipated: now.dissipated - start.dissipated,
                 port_work: now.port_work - start.port_work,
                 ..now
             };
-            let given = format!("{what}, nodes {} mm apart, t = {:.3} s", 1e3 * spacing, bench.t);
-            look(Shown { given, first, work, path, book })?;
+            let given = format!("{what}, nodes {} mm apart, t = {:.3} s", 1e3 * spacing, fixture.t);
+            look(Shown { given, first, work, path, ledger })?;
             first = false;
         }
     }
@@ -127,23 +127,23 @@ fn within(difference: f64, tolerated: f64) -> bool {
     difference.abs() <= tolerated
 }
 
-fn balance(lab: &Lab) -> Verdict {
-    each_step(lab, |Shown { given, work, path, book, .. }| {
+fn balance(context: &TestContext) -> Verdict {
+    each_step(context, |Shown { given, work, path, ledger, .. }| {
         let tolerated = (SHARE * path).max(ROUNDING_J);
-        let held = book.dissipated + book.potential;
+        let held = ledger.dissipated + ledger.potential;
         let of = format!("by 1 % of the {path:.4e} J that went to and fro");
-        if !within(held - book.port_work, tolerated) {
+        if !within(held - ledger.port_work, tolerated) {
             let got = format!(
                 "heat {:.4e} J and stored {:.4e} J, {:+.3e} J beside `port_work`",
-                book.dissipated,
-                book.potential,
-                held - book.port_work
+                ledger.dissipated,
+                ledger.potential,
+                held - ledger.port_work
             );
-            let expected = format!("`port_work` = {:.4e} J, {of}", book.port_work);
+            let expected = format!("`port_work` = {:.4e} J, {of}", ledger.port_work);
             return Err(Stop::fail("energy", given, got, expected));
         }
-        if !within(book.port_work - work, tolerated) {
-            let got = format!("`port_work` = {:.4e} J", book.port_work);
+        if !within(ledger.port_work - work, tolerated) {
+            let got = format!("`port_work` = {:.4e} J", ledger.port_work);
             let expected = format!("{work:.4e} J, its answers times the motions, {of}");
             return Err(Stop::fail("energy", given, got, expected));
         }
@@ -151,11 +151,11 @@ fn balance(lab: &Lab) -> Verdict {
     })
 }
 
-fn heat_stays(lab: &Lab) -> Verdict {
+fn heat_stays(context: &TestContext) -> Verdict {
     let mut before = 0.0;
-    each_step(lab, |Shown { given, first, book, .. }| {
-        let fell = if first { -book.dissipated } else { before - book.dissipated };
-        before = book.dissipated;
+    each_step(context, |Shown { given, first, ledger, .. }| {
+        let fell = if first { -ledger.dissipated } else { before - ledger.dissipated };
+        before = ledger.dissipated;
         if fell > ROUNDING_J {
             let got = format!("`dissipated` fell by {fell:.4e} J in a step");
             return Err(Stop::fail("energy", given, got, "heat never falls"));

@@ -3,11 +3,11 @@
 use super::physics_soil::dragged;
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::lab::Lab;
-use crate::rig::{Flat, Foot, Moved, SoilBench, dot};
+use crate::fixture::{Flat, Foot, Moved, SoilFixture, dot};
+use crate::test_context::TestContext;
 use terraglue_subsystem::Kind;
 
-const fn test(name: &'static str, promise: &'static str, run: fn(&Lab) -> Verdict) -> Test {
+const fn test(name: &'static str, promise: &'static str, run: fn(&TestContext) -> Verdict) -> Test {
     let (area, level, after) = (Area::Physics, Level::Quick, &["steps"]);
     Test { name, area, level, kinds: &[Kind::Soil], after, promise, run }
 }
@@ -33,24 +33,24 @@ fn agree(given: &str, a: [f64; 3], b: [f64; 3], share: f64) -> Verdict {
     Err(Stop::fail("advance", given, format!("{b:.6?} N"), format!("{a:.6?} N within {share:e}")))
 }
 
-fn translation(lab: &Lab) -> Verdict {
-    let here = dragged(lab, Foot::sphere(0.0, 0.0), Flat::LEVEL, [1.0, 0.0])?;
-    let there = dragged(lab, Foot::sphere(-0.17, 0.12), Flat::LEVEL, [1.0, 0.0])?;
+fn translation(context: &TestContext) -> Verdict {
+    let here = dragged(context, Foot::sphere(0.0, 0.0), Flat::LEVEL, [1.0, 0.0])?;
+    let there = dragged(context, Foot::sphere(-0.17, 0.12), Flat::LEVEL, [1.0, 0.0])?;
     agree("a sphere dragged along x, 17 and 12 cells away", here.force, there.force, 1e-5)?;
     let moved = Flat { middle: [3.0, -2.0], ..Flat::LEVEL };
-    let with_it = dragged(lab, Foot::sphere(3.0, -2.0), moved, [1.0, 0.0])?;
+    let with_it = dragged(context, Foot::sphere(3.0, -2.0), moved, [1.0, 0.0])?;
     agree("the same with the ground around (3, -2)", here.force, with_it.force, 1e-5)
 }
 
-fn height(lab: &Lab) -> Verdict {
-    let here = dragged(lab, Foot::sphere(0.0, 0.0), Flat::LEVEL, [1.0, 0.0])?;
+fn height(context: &TestContext) -> Verdict {
+    let here = dragged(context, Foot::sphere(0.0, 0.0), Flat::LEVEL, [1.0, 0.0])?;
     let high = Flat { height: 1.25, ..Flat::LEVEL };
-    let there = dragged(lab, Foot::sphere(0.0, 0.0).lifted(1.25), high, [1.0, 0.0])?;
+    let there = dragged(context, Foot::sphere(0.0, 0.0).lifted(1.25), high, [1.0, 0.0])?;
     agree("a sphere dragged along x with everything 1.25 m higher", here.force, there.force, 1e-5)
 }
 
-fn quarter_turn(lab: &Lab) -> Verdict {
-    let along = |d| dragged(lab, Foot::sphere(0.0, 0.0), Flat::LEVEL, d).map(|m: Moved| m.force);
+fn quarter_turn(context: &TestContext) -> Verdict {
+    let along = |d| dragged(context, Foot::sphere(0.0, 0.0), Flat::LEVEL, d).map(|m: Moved| m.force);
     let x = along([1.0, 0.0])?;
     let y = along([0.0, 1.0])?;
     agree("a drag along y, turned back by 90 degrees", x, [y[1], -y[0], y[2]], 1e-2)?;
@@ -58,8 +58,8 @@ fn quarter_turn(lab: &Lab) -> Verdict {
     agree("a drag along -x, turned back by 180 degrees", x, [-back[0], -back[1], back[2]], 1e-2)
 }
 
-fn any_turn(lab: &Lab) -> Verdict {
-    let along = |d| dragged(lab, Foot::sphere(0.0, 0.0), Flat::LEVEL, d).map(|m: Moved| m.force);
+fn any_turn(context: &TestContext) -> Verdict {
+    let along = |d| dragged(context, Foot::sphere(0.0, 0.0), Flat::LEVEL, d).map(|m: Moved| m.force);
     let x = along([1.0, 0.0])?;
     let (s, c) = (0.5, 0.75f64.sqrt());
     let f = along([c, s])?;
@@ -68,12 +68,12 @@ fn any_turn(lab: &Lab) -> Verdict {
 }
 
 /// The tangents of a port are a matter of bookkeeping.
-fn port_frame(lab: &Lab) -> Verdict {
+fn port_frame(context: &TestContext) -> Verdict {
     let run = |foot: Foot, angle: f64| {
-        let mut bench = SoilBench::new(lab, &[foot])?;
-        bench.turn = angle;
-        bench.drag([0.0, 0.0, -0.006], 30)?;
-        bench.drag([0.003, 0.002, 0.0], 10)
+        let mut fixture = SoilFixture::new(context, &[foot])?;
+        fixture.turn = angle;
+        fixture.drag([0.0, 0.0, -0.006], 30)?;
+        fixture.drag([0.003, 0.002, 0.0], 10)
     };
     let sphere = || Foot::sphere(0.0, 0.0);
     let given = "a dragged sphere with the port's tangents turned by 0.7 rad";
@@ -92,15 +92,15 @@ fn port_frame(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn far_feet(lab: &Lab) -> Verdict {
+fn far_feet(context: &TestContext) -> Verdict {
     let feet = [Foot::sphere(-0.3, -0.2), Foot::plate(0.3, 0.2)];
     let velocities = [[0.05, 0.0, -0.2], [0.0, -0.05, -0.15]];
     let run = |which: &[usize]| {
         let feet: Vec<_> = which.iter().map(|k| feet[*k].clone()).collect();
         let v: Vec<_> = which.iter().map(|k| velocities[*k]).collect();
-        let mut bench = SoilBench::new(lab, &feet)?;
-        (0..30).try_for_each(|_| bench.go(&v, 1e-3).map(drop))?;
-        Ok::<_, Stop>(bench.moved.clone())
+        let mut fixture = SoilFixture::new(context, &feet)?;
+        (0..30).try_for_each(|_| fixture.go(&v, 1e-3).map(drop))?;
+        Ok::<_, Stop>(fixture.moved.clone())
     };
     let both = run(&[0, 1])?;
     for (k, together) in both.iter().enumerate() {

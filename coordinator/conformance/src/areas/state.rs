@@ -2,10 +2,10 @@
 
 use super::life_cycle::same;
 use crate::catalogue::{Area, Level, Test};
-use crate::elsewhere::{Errand, elsewhere};
 use crate::finding::{Stop, Verdict};
-use crate::lab::Lab;
-use crate::rig::{Runner, committed};
+use crate::fixture::{Runner, committed};
+use crate::other_process::{RemoteRun, in_other_process};
+use crate::test_context::TestContext;
 use terraglue_subsystem::Capabilities;
 
 const fn test(
@@ -13,7 +13,7 @@ const fn test(
     level: Level,
     after: &'static [&'static str],
     promise: &'static str,
-    run: fn(&Lab) -> Verdict,
+    run: fn(&TestContext) -> Verdict,
 ) -> Test {
     Test { name, area: Area::State, level, kinds: &[], after, promise, run }
 }
@@ -58,8 +58,8 @@ pub fn tests() -> Vec<Test> {
     ]
 }
 
-fn runner(lab: &Lab) -> Verdict<Runner> {
-    Runner::new(lab.instance()?)
+fn runner(context: &TestContext) -> Verdict<Runner> {
+    Runner::new(context.instance()?)
 }
 
 fn needs(runner: &Runner, what: Capabilities, cost: &str) -> Verdict {
@@ -70,8 +70,8 @@ const NO_RETRY: &str = "no repeatable trials: only single-pass strategies can us
 const NO_STATE: &str = "no save and restore: no snapshots, no going back";
 const NO_BYTES: &str = "no serialize: a run cannot go on another day or in another process";
 
-fn trials_invisible(lab: &Lab) -> Verdict {
-    let mut tried = runner(lab)?;
+fn trials_invisible(context: &TestContext) -> Verdict {
+    let mut tried = runner(context)?;
     needs(&tried, Capabilities::RETRY, NO_RETRY)?;
     for k in 0..40 {
         let before = committed(tried.instance())?;
@@ -82,8 +82,8 @@ fn trials_invisible(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn trials_repeat(lab: &Lab) -> Verdict {
-    let (mut plain, mut tried) = (runner(lab)?, runner(lab)?);
+fn trials_repeat(context: &TestContext) -> Verdict {
+    let (mut plain, mut tried) = (runner(context)?, runner(context)?);
     needs(&tried, Capabilities::RETRY, NO_RETRY)?;
     for k in 0..60 {
         let (mut a, mut b) = (Vec::new(), Vec::new());
@@ -98,8 +98,8 @@ fn trials_repeat(lab: &Lab) -> Verdict {
     )
 }
 
-fn save_restore(lab: &Lab) -> Verdict {
-    let mut runner = runner(lab)?;
+fn save_restore(context: &TestContext) -> Verdict {
+    let mut runner = runner(context)?;
     needs(&runner, Capabilities::STATE, NO_STATE)?;
     for (from, to) in [(10, 50), (50, 90)] {
         runner.run(from - 10..from, 0)?;
@@ -121,17 +121,17 @@ fn save_restore(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn slots(lab: &Lab) -> Verdict {
-    let mut runner = runner(lab)?;
+fn slots(context: &TestContext) -> Verdict {
+    let mut runner = runner(context)?;
     needs(&runner, Capabilities::STATE, NO_STATE)?;
-    let slots = lab.services().slots;
+    let slots = context.services().slots;
     let mut kept = Vec::new();
     for slot in 0..slots {
         runner.run(10 * slot as usize..10 * (slot as usize + 1), 0)?;
         runner.instance_mut().save_state(slot)?;
         kept.push(committed(runner.instance())?);
     }
-    let mut random = lab.random("slots");
+    let mut random = context.random("slots");
     for _ in 0..3 * slots {
         let slot = (random.unit() * f64::from(slots)) as u32 % slots;
         runner.instance_mut().restore_state(slot)?;
@@ -144,8 +144,8 @@ fn slots(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn save_invisible(lab: &Lab) -> Verdict {
-    let (mut plain, mut saved) = (runner(lab)?, runner(lab)?);
+fn save_invisible(context: &TestContext) -> Verdict {
+    let (mut plain, mut saved) = (runner(context)?, runner(context)?);
     needs(&saved, Capabilities::STATE, NO_STATE)?;
     for k in 0..50 {
         let (mut a, mut b) = (Vec::new(), Vec::new());
@@ -157,12 +157,12 @@ fn save_invisible(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn serialize(lab: &Lab) -> Verdict {
-    let mut first = runner(lab)?;
+fn serialize(context: &TestContext) -> Verdict {
+    let mut first = runner(context)?;
     needs(&first, Capabilities::SERIALIZE, NO_BYTES)?;
     first.run(0..45, 0)?;
     let (bytes, place) = (first.instance().serialize()?, first.place());
-    let mut other = runner(lab)?;
+    let mut other = runner(context)?;
     other.run(0..7, 2)?;
     other.instance_mut().deserialize(&bytes)?;
     other.put_back(&place);
@@ -179,8 +179,8 @@ fn serialize(lab: &Lab) -> Verdict {
     same("steps 45 to 85 of another instance", &first.run(45..85, 0)?, &other.run(45..85, 0)?)
 }
 
-fn serialize_process(lab: &Lab) -> Verdict {
-    let mut here = runner(lab)?;
+fn serialize_process(context: &TestContext) -> Verdict {
+    let mut here = runner(context)?;
     needs(&here, Capabilities::SERIALIZE, NO_BYTES)?;
     here.run(0..45, 0)?;
     let folder = tempfile::tempdir().map_err(|e| Stop::Skip(format!("no folder: {e}")))?;
@@ -188,17 +188,17 @@ fn serialize_process(lab: &Lab) -> Verdict {
     std::fs::write(&file, here.instance().serialize()?).map_err(|e| Stop::Skip(format!("no file: {e}")))?;
     let mut bits = here.run(45..85, 0)?;
     bits.extend(committed(here.instance())?);
-    let there = elsewhere(lab, &Errand { steps: 45..85, variant: 0, state: Some(file) }, &[])?;
+    let there = in_other_process(context, &RemoteRun { steps: 45..85, variant: 0, state: Some(file) }, &[])?;
     same("steps 45 to 85 in another process", &bits, &there)
 }
 
-fn garbage(lab: &Lab) -> Verdict {
-    let mut runner = runner(lab)?;
+fn garbage(context: &TestContext) -> Verdict {
+    let mut runner = runner(context)?;
     needs(&runner, Capabilities::SERIALIZE, NO_BYTES)?;
     runner.run(0..30, 0)?;
     let bytes = runner.instance().serialize()?;
     let before = committed(runner.instance())?;
-    let mut random = lab.random("serialize-garbage");
+    let mut random = context.random("serialize-garbage");
     let mut bad: Vec<(String, Vec<u8>)> = Vec::new();
     for share in [0.0, 0.1, 0.5, 0.9] {
         let length = (share * bytes.len() as f64) as usize;
@@ -220,8 +220,8 @@ fn garbage(lab: &Lab) -> Verdict {
     runner.run(30..40, 0).map(drop)
 }
 
-fn poisoned(lab: &Lab) -> Verdict {
-    let run = |pattern| elsewhere(lab, &Errand::fresh(90), &[("MALLOC_PERTURB_", pattern)]);
+fn poisoned(context: &TestContext) -> Verdict {
+    let run = |pattern| in_other_process(context, &RemoteRun::fresh(90), &[("MALLOC_PERTURB_", pattern)]);
     let (zero, poison) = (run("0")?, run("165")?);
     same("the run with fresh memory filled with 0x5a instead of zeros", &zero, &poison)?;
     same("the run with fresh memory filled with 0xe7", &zero, &run("24")?)

@@ -3,8 +3,8 @@
 use super::life_cycle::same;
 use crate::catalogue::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
-use crate::lab::Lab;
-use crate::rig::{committed, numbers, script};
+use crate::fixture::{committed, numbers, script};
+use crate::test_context::TestContext;
 use terraglue_host::{Instance, Reply, described};
 use terraglue_plugin::describe::{variable_line, words};
 use terraglue_subsystem::{Effect, ValueType, Values, ValuesMut, Variable, unit::Unit};
@@ -13,7 +13,7 @@ const fn test(
     name: &'static str,
     after: &'static [&'static str],
     promise: &'static str,
-    run: fn(&Lab) -> Verdict,
+    run: fn(&TestContext) -> Verdict,
 ) -> Test {
     Test { name, area: Area::Values, level: Level::Quick, kinds: &[], after, promise, run }
 }
@@ -55,8 +55,8 @@ pub fn tests() -> Vec<Test> {
     ]
 }
 
-fn variables(lab: &Lab) -> Verdict {
-    let instance = lab.instance()?;
+fn variables(context: &TestContext) -> Verdict {
+    let instance = context.instance()?;
     let mut names: Vec<&str> = Vec::new();
     let mut last = None;
     for v in instance.subsystem().variables() {
@@ -87,11 +87,11 @@ fn variables(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn described_truly(lab: &Lab) -> Verdict {
-    let instance = lab.instance()?;
-    let section = described(&lab.path).unwrap_or_default();
+fn described_truly(context: &TestContext) -> Verdict {
+    let instance = context.instance()?;
+    let section = described(&context.path).unwrap_or_default();
     if !section.is_whole() {
-        let kind = lab.kind().map_or_else(String::new, |k| format!("kind={k:?}").to_lowercase());
+        let kind = context.kind().map_or_else(String::new, |k| format!("kind={k:?}").to_lowercase());
         let can = format!("can={}", words(instance.capabilities()).join(" "));
         let variables =
             instance.subsystem().variables().iter().map(|v| format!("variable={}", variable_line(v)));
@@ -115,8 +115,8 @@ pub fn not_told(lines: &[String]) -> Stop {
     ))
 }
 
-fn readable(lab: &Lab) -> Verdict {
-    let (_, instance) = script(lab.instance()?, 50, 0)?;
+fn readable(context: &TestContext) -> Verdict {
+    let (_, instance) = script(context.instance()?, 50, 0)?;
     for v in numbers(&instance) {
         let mut values = vec![0.0; v.len()];
         instance.get(&[v.id], ValuesMut::F64(&mut values))?;
@@ -129,8 +129,8 @@ fn readable(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn wrong_reference(lab: &Lab) -> Verdict {
-    let mut instance = lab.instance()?;
+fn wrong_reference(context: &TestContext) -> Verdict {
+    let mut instance = context.instance()?;
     let unknown = instance.subsystem().variables().iter().map(|v| v.id).max().map_or(0, |id| id + 1000);
     let mut room = [0.0];
     let read = instance.get(&[unknown], ValuesMut::F64(&mut room));
@@ -152,8 +152,8 @@ fn wrong_reference(lab: &Lab) -> Verdict {
     committed(&instance).map(drop)
 }
 
-fn read_only(lab: &Lab) -> Verdict {
-    let mut instance = lab.instance()?;
+fn read_only(context: &TestContext) -> Verdict {
+    let mut instance = context.instance()?;
     for v in numbers(&instance).into_iter().filter(|v| v.effect == Effect::ReadOnly) {
         let before = read(&instance, &v)?;
         if let Ok(Reply::Accepted) = instance.set(&[v.id], Values::F64(&vec![inside(&v); v.len()])) {
@@ -168,8 +168,8 @@ fn read_only(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn range(lab: &Lab) -> Verdict {
-    let mut instance = lab.instance()?;
+fn range(context: &TestContext) -> Verdict {
+    let mut instance = context.instance()?;
     for v in settable(&instance) {
         let before = read(&instance, &v)?;
         let beyond = |bound: f64, way: f64| (bound.is_finite()).then(|| bound + way * bound.abs().max(1.0));
@@ -189,8 +189,8 @@ fn range(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn set_and_get(lab: &Lab) -> Verdict {
-    let mut instance = lab.instance()?;
+fn set_and_get(context: &TestContext) -> Verdict {
+    let mut instance = context.instance()?;
     for v in settable(&instance) {
         let x = inside(&v);
         if let Reply::Refused(reason) = instance.set(&[v.id], Values::F64(&vec![x; v.len()]))? {
@@ -205,8 +205,8 @@ fn set_and_get(lab: &Lab) -> Verdict {
     Ok(())
 }
 
-fn unknown_action(lab: &Lab) -> Verdict {
-    let mut instance = lab.instance()?;
+fn unknown_action(context: &TestContext) -> Verdict {
+    let mut instance = context.instance()?;
     let before = committed(&instance)?;
     if let Ok(Reply::Accepted) = instance.act("no.such.action", "{}") {
         return Err(Stop::fail(

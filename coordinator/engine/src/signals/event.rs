@@ -7,7 +7,7 @@ use terraglue_scenario::{Comparison, EventSpec, InputError, Source, Trigger};
 
 /// An event with its names resolved.
 #[derive(Debug)]
-struct Event {
+struct ScheduledEvent {
     trigger: Resolved,
     due: Due,
     fired: bool,
@@ -34,7 +34,7 @@ pub struct Due {
 /// All events of a scenario.
 #[derive(Debug, Default)]
 pub struct TimeLine {
-    events: Vec<Event>,
+    events: Vec<ScheduledEvent>,
 }
 
 impl TimeLine {
@@ -65,7 +65,7 @@ impl TimeLine {
             }
             let trigger = Resolved::new(&spec.trigger, |name| variable(name, spec))?;
             let due = Due { set: spec.set.clone(), act: spec.act.clone() };
-            events.push(Event { trigger, due, fired: false });
+            events.push(ScheduledEvent { trigger, due, fired: false });
         }
         Ok(Self { events })
     }

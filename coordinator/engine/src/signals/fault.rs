@@ -39,7 +39,7 @@ struct Own {
 struct Fault {
     label: String,
     begin: Resolved,
-    end: End,
+    end: EndCondition,
     entries: Vec<Entry>,
     own: Option<Own>,
     /// Since when it is there, s.
@@ -48,7 +48,7 @@ struct Fault {
 }
 
 #[derive(Debug)]
-enum End {
+enum EndCondition {
     Never,
     Trigger(Resolved),
     After(f64),
@@ -93,9 +93,9 @@ impl Faults {
                 label: format!("{} of {}", spec.kind.name(), spec.variable),
                 begin: Resolved::new(&spec.start, find)?,
                 end: match &spec.end {
-                    FaultEnd::Never => End::Never,
-                    FaultEnd::At(trigger) => End::Trigger(Resolved::new(trigger, find)?),
-                    FaultEnd::After(duration) => End::After(*duration),
+                    FaultEnd::Never => EndCondition::Never,
+                    FaultEnd::At(trigger) => EndCondition::Trigger(Resolved::new(trigger, find)?),
+                    FaultEnd::After(duration) => EndCondition::After(*duration),
                 },
                 entries,
                 own,
@@ -115,9 +115,9 @@ impl Faults {
     pub fn next_time(&self, t: f64) -> f64 {
         let times = self.all.iter().filter(|f| !f.over).map(|fault| match (fault.since, &fault.end) {
             (None, _) => fault.begin.time(),
-            (Some(_), End::Trigger(end)) => end.time(),
-            (Some(since), End::After(duration)) => since + duration,
-            (Some(_), End::Never) => f64::INFINITY,
+            (Some(_), EndCondition::Trigger(end)) => end.time(),
+            (Some(since), EndCondition::After(duration)) => since + duration,
+            (Some(_), EndCondition::Never) => f64::INFINITY,
         });
         times.filter(|time| *time > t).fold(f64::INFINITY, f64::min)
     }
@@ -244,9 +244,9 @@ impl Fault {
 
     fn ends(&self, since: f64, t: f64, h: f64, instances: &[Instance]) -> bool {
         match &self.end {
-            End::Never => false,
-            End::Trigger(end) => end.holds(t, h, instances),
-            End::After(duration) => t >= since + duration - 1e-9 * h,
+            EndCondition::Never => false,
+            EndCondition::Trigger(end) => end.holds(t, h, instances),
+            EndCondition::After(duration) => t >= since + duration - 1e-9 * h,
         }
     }
 

@@ -1,6 +1,6 @@
 //! Values that are connected at the start: passed on in the order in which they depend on each other, loops by Newton.
 //!
-//! Units of FMI answer with outputs that depend on inputs of the same time while they initialise. A chain is settled by
+//! FMUs answer with outputs that depend on inputs of the same time while they initialise. A chain is settled by
 //! passing values on until nothing changes. What still changes then is a loop: r(u) = y(u) − u = 0 over all connected
 //! inputs, Newton with the Jacobian by directional derivatives where all subsystems of a column know them, else by
 //! differences.
@@ -20,7 +20,7 @@ const DIFFERENCE: f64 = 1e-7;
 ///
 /// # Errors
 /// A loop without a solution, with its members and the residual that was left.
-pub fn settle(links: &mut [Link], instances: &mut [Instance]) -> Result {
+pub fn initialize(links: &mut [Link], instances: &mut [Instance]) -> Result {
     let mut u = read(links, instances)?;
     let start = u.clone();
     for _ in 0..=u.len() {

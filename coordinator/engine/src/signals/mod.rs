@@ -17,4 +17,4 @@ pub use connection::{Link, Links, connect};
 pub use discrete::Discrete;
 pub use event::{Due, TimeLine};
 pub use fault::Faults;
-pub use initial::settle;
+pub use initial::initialize;

@@ -1,7 +1,7 @@
 //! From a checked scenario to a testbed: terrain, modules, instances, the group of glued subsystems, signals.
 
 use super::pieces;
-use super::unglued::{Turn, Unglued};
+use super::uncoupled::{StepSchedule, Uncoupled};
 use super::{Group, Member, Options, Testbed};
 use crate::signals::{self, Directory, Faults, TimeLine};
 use std::sync::Arc;
@@ -12,7 +12,7 @@ use terraglue_gluing::contact::{BodySide, ContactDetector, GroundSide, PortSet};
 use terraglue_gluing::glue::Recipe;
 use terraglue_gluing::step_control::{Passage, StepControl};
 use terraglue_gluing::timing::Timings;
-use terraglue_gluing::{Exchange, StepReport};
+use terraglue_gluing::{InterfaceProblem, StepReport};
 use terraglue_host::crash::Beginning;
 use terraglue_host::isolation::What;
 use terraglue_host::law;
@@ -66,10 +66,10 @@ impl Testbed {
         check_report(scenario, &directory, &instances)?;
         let groups = groups(scenario, &instances)?;
         check_settling(scenario, &groups, &instances)?;
-        let ground = groups.iter().find(|g| g.exchange.has_grounds());
+        let ground = groups.iter().find(|g| g.problem.has_grounds());
         let detector = detector(ground, &instances, terrain.as_deref())?;
         let mut testbed = Self {
-            turns: turns(scenario, &instances, &groups),
+            schedules: schedules(scenario, &instances, &groups),
             members: instances.iter().map(member).collect(),
             detector,
             gravity: services.gravity,
@@ -84,13 +84,13 @@ impl Testbed {
             exact: takes_parts(scenario, &instances),
             directory,
             instances,
-            happenings: Vec::new(),
+            events: Vec::new(),
             report: StepReport { converged: true, ..StepReport::default() },
             timings: Timings::default(),
-            unglued: Unglued::new(services.workers.clone()),
+            uncoupled: Uncoupled::new(services.workers.clone()),
             cancel: options.cancel.clone(),
             standing: options.standing.clone(),
-            partings: services.partings.clone(),
+            teardown_errors: services.teardown_errors.clone(),
             step_s: scenario.time.step_s,
             origin_s: 0.0,
             nominal: 0,
@@ -103,9 +103,9 @@ impl Testbed {
             max_halvings: scenario.gluing.max_halvings,
             started: false,
         };
-        let glued = testbed.instances.iter_mut().zip(&testbed.turns).filter(|(_, turn)| turn.glued);
+        let glued = testbed.instances.iter_mut().zip(&testbed.schedules).filter(|(_, turn)| turn.glued);
         glued.for_each(|(instance, _)| instance.watch());
-        testbed.settle()?;
+        testbed.initialize_signals()?;
         testbed.read_states()?;
         if let Err(Error::Simulation { message, .. }) = testbed.detect_contacts(scenario.time.step_s) {
             let help = "docs/scenario.md has the keys of `[terrain]`, `terraglue modules NAME` those that set a body down";
@@ -115,17 +115,17 @@ impl Testbed {
     }
 }
 
-/// Units know no time before their start, so none can be among what comes to rest before t = 0.
+/// FMUs know no time before their start, so none can be among what comes to rest before t = 0.
 fn check_settling(scenario: &Scenario, groups: &[Group], instances: &[Instance]) -> Result {
     let settle_s = scenario.time.settle_s;
-    let glued = |slot: usize| groups.iter().any(|g| g.exchange.members().any(|m| m == slot));
-    let mut units = instances.iter().enumerate().filter(|(slot, i)| {
+    let glued = |slot: usize| groups.iter().any(|g| g.problem.members().any(|m| m == slot));
+    let mut fmus = instances.iter().enumerate().filter(|(slot, i)| {
         terraglue_scenario::ModuleKind::is_fmu(i.module()) && (glued(*slot) || !i.scene().bodies.is_empty())
     });
-    let Some((_, unit)) = units.next().filter(|_| settle_s > 0.0) else { return Ok(()) };
+    let Some((_, fmu)) = fmus.next().filter(|_| settle_s > 0.0) else { return Ok(()) };
     let message = format!(
         "`settle_s` = {settle_s} s: `{}` is a functional mock-up unit, whose time begins at 0",
-        unit.name()
+        fmu.name()
     );
     let help = Some("leave `settle_s` out, or give the body a module".to_owned());
     Err(scenario.source.error_at_value(&["time", "settle_s"], message, help).into())
@@ -201,7 +201,7 @@ fn instantiate(
     for spec in &scenario.subsystems {
         if terraglue_scenario::ModuleKind::is_fmu(&spec.module) {
             let folder = std::env::current_dir();
-            instances.push(unit(scenario, spec, library, services)?);
+            instances.push(fmu(scenario, spec, library, services)?);
             stay_in(folder, &spec.name);
             continue;
         }
@@ -266,7 +266,7 @@ pub fn with_law(
 }
 
 /// A functional mock-up unit as an instance.
-fn unit(
+fn fmu(
     scenario: &Scenario,
     spec: &SubsystemSpec,
     library: &Library,
@@ -277,12 +277,12 @@ fn unit(
     let _begun = Beginning::of_instance(&spec.name, &path);
     let once = || terraglue_fmi::Fmu::inspect(&path).is_ok_and(|(d, _)| d.capabilities.once_per_process);
     let made: terraglue_subsystem::Result<Box<dyn Subsystem>> = match spec.isolate {
-        // One instance per process is all that such a unit stands.
-        false if !once() => {
-            library.fmus().and_then(|make| make(&path, &spec.parameters, host, services.partings.clone()))
-        }
+        // One instance per process is all that such an FMU stands.
+        false if !once() => library
+            .fmus()
+            .and_then(|make| make(&path, &spec.parameters, host, services.teardown_errors.clone())),
         _ => {
-            let what = What::Unit {
+            let what = What::Fmu {
                 path: std::path::absolute(&path).unwrap_or_else(|_| path.clone()),
                 parameters: spec.parameters.clone(),
             };
@@ -332,9 +332,9 @@ fn member(instance: &Instance) -> Member {
     Member { states: vec![BodyState::REST; instance.scene().bodies.len()], cost: Duration::ZERO }
 }
 
-fn turns(scenario: &Scenario, instances: &[Instance], groups: &[Group]) -> Vec<Turn> {
-    let glued = |slot| groups.iter().any(|g| g.exchange.members().any(|m| m == slot));
-    let turn = |(slot, (spec, instance)): (usize, (&SubsystemSpec, &Instance))| Turn {
+fn schedules(scenario: &Scenario, instances: &[Instance], groups: &[Group]) -> Vec<StepSchedule> {
+    let glued = |slot| groups.iter().any(|g| g.problem.members().any(|m| m == slot));
+    let turn = |(slot, (spec, instance)): (usize, (&SubsystemSpec, &Instance))| StepSchedule {
         step_multiple: spec.step_multiple.max(1),
         glued: glued(slot),
         holds: false,
@@ -410,21 +410,21 @@ fn group(
     let gravity = terraglue_numerics::rotation::length(scenario.world.gravity_m_s2);
     let mass: f64 = bodies.iter().flat_map(|b| &instances[*b].scene().bodies).map(|b| b.mass).sum();
     let weight = mass * gravity;
-    let mut exchange = Exchange::new(bodies, grounds, if weight > 0.0 { weight } else { 1.0 });
+    let mut problem = InterfaceProblem::new(bodies, grounds, if weight > 0.0 { weight } else { 1.0 });
     let states = body_states(instances)?;
     let own = |r: &&Recipe| r.ends.iter().flatten().any(|(slot, _)| bodies.contains(slot));
     for recipe in glue.iter().filter(own) {
-        exchange.glue.add(recipe, |slot, body| states[slot][body as usize]);
+        problem.glue.add(recipe, |slot, body| states[slot][body as usize]);
     }
-    exchange.stabilisation = scenario.gluing.stabilisation;
-    exchange.level = match scenario.gluing.level {
+    problem.stabilisation = scenario.gluing.stabilisation;
+    problem.level = match scenario.gluing.level {
         LevelChoice::Position => Level::Position,
         LevelChoice::Velocity => Level::Velocity,
         LevelChoice::Acceleration => Level::Acceleration,
     };
     let (own, at) = own_strategy(scenario, glue.iter().filter(own).map(|r| r.number))?;
     let spec = &GluingSpec { strategy: own.unwrap_or(scenario.gluing.strategy), ..scenario.gluing.clone() };
-    if let Some(refusal) = gluing::refusal(spec, &exchange, instances) {
+    if let Some(refusal) = gluing::refusal(spec, &problem, instances) {
         let help = match refusal.would_work.as_slice() {
             [] => "no strategy of this version can glue these subsystems".into(),
             names => format!("these would work: {}", names.join(", ")),
@@ -438,9 +438,9 @@ fn group(
     }
     let can_start = |s: usize| instances[s].capabilities().has(Capabilities::FORCE | Capabilities::RETRY);
     let start =
-        (exchange.glue.has_joints() && exchange.body_slots().all(can_start)).then(|| gluing::start(spec));
+        (problem.glue.has_joints() && problem.body_slots().all(can_start)).then(|| gluing::start(spec));
     let strategy = gluing::strategy(spec);
-    Ok(Group { exchange, strategy, own, start, closed: Vec::new(), passage: Passage::default() })
+    Ok(Group { problem, strategy, own, start, closed: Vec::new(), passage: Passage::default() })
 }
 
 /// The strategy that the glue of a group names, and where; all that name one must agree.
@@ -474,7 +474,7 @@ fn control(scenario: &Scenario, groups: &[Group], instances: &[Instance]) -> Res
         let message = format!("`{}` ({}) makes steps of one length only", fixed.name(), fixed.module());
         return refused(message, "leave the key out: all steps are then time.step_s long");
     }
-    if !groups.iter().any(|g| g.exchange.has_grounds() || g.exchange.glue.spring().is_some()) {
+    if !groups.iter().any(|g| g.problem.has_grounds() || g.problem.glue.spring().is_some()) {
         let message = "no soil and no spring is glued: a constraint passes as much energy as it takes, so there is \
                        no residual to set the steps by";
         return refused(message.into(), "give the glue a compliance_m_n, or leave the key out");
@@ -583,10 +583,10 @@ fn detector(
     let shown = |slot: &usize| {
         terrain.is_some()
             || instances[*slot].fields().iter().any(|f| f.name == "height")
-            || group.exchange.glue.is_empty()
+            || group.problem.glue.is_empty()
     };
-    let bodies: Vec<_> = group.exchange.body_slots().map(body).collect();
-    let grounds: Vec<_> = group.exchange.ground_slots().filter(shown).map(ground).collect();
+    let bodies: Vec<_> = group.problem.body_slots().map(body).collect();
+    let grounds: Vec<_> = group.problem.ground_slots().filter(shown).map(ground).collect();
     ContactDetector::new(&bodies, &grounds, terrain)
 }
 

@@ -42,9 +42,9 @@ impl Testbed {
         }
     }
 
-    fn ends(&self) -> Vec<End> {
+    fn ends(&self) -> Vec<ConnectionEnds> {
         let numbers = self.links.numbers.iter().flat_map(|link| {
-            link.ends().map(|([from, to], conversion)| End {
+            link.ends().map(|([from, to], conversion)| ConnectionEnds {
                 from,
                 to,
                 conversion: Some(conversion),
@@ -54,12 +54,12 @@ impl Testbed {
         let variable = |at: crate::signals::VariableRef| (at.slot, at.describe(&self.instances).id);
         let discrete = self.links.discrete.iter().map(|d| {
             let [from, to] = d.ends().map(variable);
-            End { from, to, conversion: d.conversion(), by_table: d.has_table() }
+            ConnectionEnds { from, to, conversion: d.conversion(), by_table: d.has_table() }
         });
         numbers.chain(discrete).collect()
     }
 
-    fn order(&self, ends: &[End]) -> Vec<String> {
+    fn order(&self, ends: &[ConnectionEnds]) -> Vec<String> {
         let name = |slot: usize| self.instances[slot].name();
         let mut order = Vec::new();
         let through = |k: usize| self.instances[k].capabilities().has(Capabilities::FEEDTHROUGH);
@@ -70,8 +70,8 @@ impl Testbed {
         }
         order.push("events and faults of the communication point".into());
         if !ends.is_empty() {
-            let [mut from, mut to] =
-                [|e: &End| e.from.0, |e: &End| e.to.0].map(|f| ends.iter().map(f).collect::<Vec<_>>());
+            let [mut from, mut to] = [|e: &ConnectionEnds| e.from.0, |e: &ConnectionEnds| e.to.0]
+                .map(|f| ends.iter().map(f).collect::<Vec<_>>());
             for slots in [&mut from, &mut to] {
                 slots.sort_unstable();
                 slots.dedup();
@@ -83,7 +83,7 @@ impl Testbed {
                 list(&to)
             ));
         }
-        let alone = self.instances.iter().zip(&self.turns).filter(|(_, turn)| !turn.glued);
+        let alone = self.instances.iter().zip(&self.schedules).filter(|(_, turn)| !turn.glued);
         let alone: Vec<String> = alone
             .map(|(instance, turn)| match turn.step_multiple {
                 1 => instance.name().to_owned(),
@@ -94,7 +94,7 @@ impl Testbed {
             order.push(format!("a step of each subsystem without glue, in any order: {}", alone.join(", ")));
         }
         for group in &self.groups {
-            let members: Vec<&str> = group.exchange.members().map(name).collect();
+            let members: Vec<&str> = group.problem.members().map(name).collect();
             order.push(format!(
                 "glued together by `{}`, without delay: {}",
                 group.strategy.name(),
@@ -106,7 +106,7 @@ impl Testbed {
         order
     }
 
-    fn connection_note(&self, end: &End) -> ConnectionNote {
+    fn connection_note(&self, end: &ConnectionEnds) -> ConnectionNote {
         let full = |(slot, id): (usize, u32)| {
             let variable = self.instances[slot].variables().iter().find(|v| v.id == id);
             let name = format!("{}.{}", self.instances[slot].name(), variable.map_or("?", |v| &v.name));
@@ -124,7 +124,7 @@ impl Testbed {
             Some((a, 0.0)) => format!("{a}·x"),
             Some((a, b)) => format!("{a}·x + {b}"),
         };
-        let (delay, why) = match self.turns[end.from.0].step_multiple {
+        let (delay, why) = match self.schedules[end.from.0].step_multiple {
             1 => ("1".to_owned(), "read at the start of a step and held to its end".to_owned()),
             n => (
                 format!("1 to {n}"),
@@ -135,7 +135,7 @@ impl Testbed {
     }
 
     /// Each set of subsystems that reach each other over connections.
-    fn loops(&self, ends: &[End]) -> Vec<String> {
+    fn loops(&self, ends: &[ConnectionEnds]) -> Vec<String> {
         let count = self.instances.len();
         let mut next: Vec<Vec<usize>> = vec![Vec::new(); count];
         ends.iter().for_each(|e| next[e.from.0].push(e.to.0));
@@ -162,7 +162,7 @@ impl Testbed {
 }
 
 /// Slot and variable on either side.
-struct End {
+struct ConnectionEnds {
     from: (usize, u32),
     to: (usize, u32),
     conversion: Option<(f64, f64)>,

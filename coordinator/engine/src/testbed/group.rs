@@ -7,13 +7,13 @@ use terraglue_gluing::contact::PortSet;
 use terraglue_gluing::memory::{Recall, Remember};
 use terraglue_gluing::step_control::Passage;
 use terraglue_gluing::timing::{Part, Timings};
-use terraglue_gluing::{Exchange, Instant, PortReport, Row, Strategy};
+use terraglue_gluing::{ConstraintKind, InterfaceProblem, PortReport, StepContext, Strategy};
 use terraglue_host::Instance;
 use terraglue_scenario::{GluingSpec, StrategyKind};
 
 /// Subsystems that share ports, with their strategy.
 pub(super) struct Group {
-    pub exchange: Exchange,
+    pub problem: InterfaceProblem,
     pub strategy: Box<dyn Strategy>,
     /// Its own strategy, where the scenario's glue names one.
     pub own: Option<StrategyKind>,
@@ -42,76 +42,76 @@ impl Group {
     /// Paper, step 1: the ports of the step are made known to all members.
     pub fn begin(
         &mut self,
-        at: Instant,
+        at: StepContext,
         found: &PortSet,
         members: &[Member],
         instances: &mut [Instance],
         timings: &mut Timings,
     ) -> Result {
         let start = Clock::now();
-        self.exchange.glue.place(|slot, body| members[slot].states[body as usize]);
-        self.exchange.begin(at, found);
+        self.problem.glue.place(|slot, body| members[slot].states[body as usize]);
+        self.problem.begin(at, found);
         timings.charge(Part::Contact, start);
-        self.exchange.set_ports(instances)
+        self.problem.set_ports(instances)
     }
 
     /// The energy residual of the step before, J.
     pub fn residual(
         &mut self,
-        at: Instant,
+        at: StepContext,
         found: &PortSet,
         members: &[Member],
         instances: &mut [Instance],
     ) -> Result<f64> {
         self.begin(at, found, members, instances, &mut Timings::default())?;
-        self.passage.look(&mut self.exchange);
-        Ok(self.passage.residual(&self.exchange))
+        self.passage.look(&mut self.problem);
+        Ok(self.passage.residual(&self.problem))
     }
 
     /// The gap that the last commit left, told by the soil itself in its answer to `set_ports`.
     pub fn measure_gap(&mut self) {
-        let exchange = &mut self.exchange;
+        let problem = &mut self.problem;
         if self.strategy.is_single_pass() {
             return; // its surface is where the body went, by definition
         }
-        for port in &exchange.ports {
-            if exchange.rows[port.first as usize] == Row::Joint {
+        for port in &problem.ports {
+            if problem.rows[port.first as usize] == ConstraintKind::Joint {
                 continue; // the strategy itself measures the gap of joints
             }
             if self.closed.binary_search(&port.key).is_ok() {
-                let gap = exchange.x2[port.first as usize].abs();
-                exchange.report.max_gap_m = exchange.report.max_gap_m.max(gap);
+                let gap = problem.x2[port.first as usize].abs();
+                problem.report.max_gap_m = problem.report.max_gap_m.max(gap);
             }
         }
     }
 
     /// Fills the report of what is about to be committed. The work of soils comes with their commit.
     pub fn describe(&mut self, found: &PortSet, halvings: u32) {
-        let exchange = &mut self.exchange;
-        exchange.report.halvings = halvings;
+        let problem = &mut self.problem;
+        problem.report.halvings = halvings;
         self.closed.clear();
-        exchange.report.single_pass = self.strategy.is_single_pass();
-        exchange.report.joints = exchange.has_joints();
-        for (p, port) in exchange.ports.iter().enumerate() {
+        problem.report.single_pass = self.strategy.is_single_pass();
+        problem.report.joints = problem.has_joints();
+        for (p, port) in problem.ports.iter().enumerate() {
             let owner =
-                found.owners.get(p).copied().unwrap_or_else(|| exchange.glue.owner(p - found.owners.len()));
+                found.owners.get(p).copied().unwrap_or_else(|| problem.glue.owner(p - found.owners.len()));
             let n = port.first as usize;
             let mut wrench = [0.0; 6];
-            let before = exchange.last.iter().find(|(key, _)| *key == port.key);
+            let before = problem.last.iter().find(|(key, _)| *key == port.key);
             for (k, (i, c)) in port.components().enumerate() {
-                wrench[c] = exchange.t[i];
-                let passed = exchange.passed(i, before.map(|b| b.1[k]));
-                let report = &mut exchange.report;
+                wrench[c] = problem.t[i];
+                let passed = problem.passed(i, before.map(|b| b.1[k]));
+                let report = &mut problem.report;
                 report.interface_work_error_j += passed.gained;
                 report.port_work_path_j += passed.through;
                 report.glue_stored_j += passed.stored;
                 report.glue_heat_j += passed.heat;
             }
-            if wrench[0] > 0.0 && exchange.rows[n] != Row::Joint {
+            if wrench[0] > 0.0 && problem.rows[n] != ConstraintKind::Joint {
                 self.closed.push(port.key);
             }
-            let t_star_n = exchange.estimate.t_star[n];
-            let report = &mut exchange.report;
+            let t_star_n = problem.estimate.t_star[n];
+            let report = &mut problem.report;
             report.estimate_gap_n = report.estimate_gap_n.max((t_star_n - wrench[0]).abs());
             report.ports.push(PortReport {
                 key: port.key,
@@ -122,7 +122,7 @@ impl Group {
                 frame: port.frame,
                 wrench,
                 t_star_n,
-                gap_m: exchange.x1[n] - exchange.x2[n] + exchange.gap[n],
+                gap_m: problem.x1[n] - problem.x2[n] + problem.gap[n],
             });
         }
     }
@@ -131,7 +131,7 @@ impl Group {
     pub fn memory(&self) -> Vec<u64> {
         let mut out = vec![self.closed.len() as u64];
         out.extend(&self.closed);
-        out.put_wrenches(&self.exchange.last);
+        out.put_wrenches(&self.problem.last);
         self.passage.remember(&mut out);
         self.strategy.remember(&mut out);
         out
@@ -142,7 +142,7 @@ impl Group {
         let mut kept = Recall(kept);
         let closed = kept.word().min(kept.0.len() as u64);
         self.closed = (0..closed).map(|_| kept.word()).collect();
-        kept.wrenches(&mut self.exchange.last);
+        kept.wrenches(&mut self.problem.last);
         self.passage.recall(&mut kept);
         self.strategy.recall(&mut kept);
     }

@@ -40,7 +40,7 @@ impl Testbed {
 
     /// Whether all subsystems make every step, so that its length may change.
     pub fn takes_any_step(&self) -> bool {
-        self.turns.iter().all(|turn| turn.step_multiple == 1)
+        self.schedules.iter().all(|turn| turn.step_multiple == 1)
     }
 
     /// An instance by its number, to set its values.
@@ -55,17 +55,17 @@ impl Testbed {
     }
 
     /// Connected values at the start where outputs depend on inputs of the same time: in their order, loops solved.
-    pub(super) fn settle(&mut self) -> Result {
+    pub(super) fn initialize_signals(&mut self) -> Result {
         let through = |k: usize| self.instances[k].capabilities().has(Capabilities::FEEDTHROUGH);
         if self.links.numbers.iter().any(|l| l.leaves(through)) {
-            crate::signals::settle(&mut self.links.numbers, &mut self.instances)?;
+            crate::signals::initialize(&mut self.links.numbers, &mut self.instances)?;
         }
         Ok(())
     }
 
     /// Reads the motion of all bodies again after values were set from outside.
     pub fn refresh(&mut self) -> Result {
-        self.happenings.clear();
+        self.events.clear();
         self.read_states()
     }
 
@@ -111,7 +111,7 @@ impl Testbed {
     }
 }
 
-/// What is counted of an energy book, bit by bit.
+/// What is counted of an energy ledger, bit by bit.
 fn before_bits(e: &Energy) -> [u64; 4] {
     [e.dissipated, e.port_work, e.actuator_work, e.electrical].map(f64::to_bits)
 }

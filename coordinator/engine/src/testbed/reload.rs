@@ -1,10 +1,10 @@
 //! Another instance in the place of one that runs: the same to everything around it, with other code.
 
 use super::Testbed;
-use crate::observer::Happening;
+use crate::observer::Event;
 use crate::signals::Directory;
 use terraglue_diagnostics::Error;
-use terraglue_host::{Instance, Partings};
+use terraglue_host::{Instance, TeardownErrors};
 use terraglue_subsystem::{
     Action, Batch, BodyState, Capabilities, Energy, Estimate, FieldInfo, FieldTile, Input, Kind, Law, Level,
     Motion, Response, Scene, Step, Subsystem, Values, ValuesMut, Variable,
@@ -13,12 +13,12 @@ use terraglue_subsystem::{
 impl Testbed {
     /// Writes a line into the recording at this communication point.
     pub fn note(&mut self, what: String) {
-        self.happenings.push(Happening { t_s: self.t, what });
+        self.events.push(Event { t_s: self.t, what });
     }
 
     /// Where errors of instances at their end are kept.
-    pub fn partings(&self) -> Partings {
-        self.partings.clone()
+    pub fn teardown_errors(&self) -> TeardownErrors {
+        self.teardown_errors.clone()
     }
 
     /// Puts an instance in the place of the one of its name: with its state, or as it is (`afresh`). `count` says the
@@ -58,12 +58,12 @@ impl Testbed {
         }
         let mut states = vec![BodyState::REST; new.scene().bodies.len()];
         new.body_states(&mut states).map_err(told)?;
-        self.turns[slot].has_bodies = !states.is_empty();
+        self.schedules[slot].has_bodies = !states.is_empty();
         self.members[slot].states = states;
         self.instances[slot] = new;
         // New variables can be read and set from now on.
         self.directory = Directory::new(&self.instances);
-        if self.turns[slot].glued {
+        if self.schedules[slot].glued {
             self.instances[slot].watch();
         }
         Ok(carried)

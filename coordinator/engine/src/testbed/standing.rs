@@ -32,7 +32,7 @@ impl Testbed {
         // 0.0 −, and not −: 0 s has no sign
         self.t = 0.0 - count * self.step_s;
         if count > 0.0 {
-            self.settle()?;
+            self.initialize_signals()?;
         }
         self.start_joints()?;
         if count > 0.0 {
@@ -46,13 +46,13 @@ impl Testbed {
         let holds: Vec<bool> = self
             .instances
             .iter()
-            .zip(&self.turns)
+            .zip(&self.schedules)
             .map(|(i, turn)| i.kind() == Kind::Controller || turn.step_multiple > 1)
             .collect();
-        self.turns.iter_mut().zip(&holds).for_each(|(turn, holds)| turn.holds = *holds);
+        self.schedules.iter_mut().zip(&holds).for_each(|(turn, holds)| turn.holds = *holds);
         let stood = (1..=count).rev().try_for_each(|left| self.stand_step(left));
         self.standing.store(0, Ordering::Relaxed);
-        self.turns.iter_mut().for_each(|turn| turn.holds = false);
+        self.schedules.iter_mut().for_each(|turn| turn.holds = false);
         stood?;
         (self.t, self.index, self.halvings) = (0.0, 0, 0);
         self.restart_counts()
@@ -92,7 +92,7 @@ impl Testbed {
     fn restart_counts(&mut self) -> Result {
         self.report = StepReport { converged: true, ..StepReport::default() };
         self.timings = Timings::default();
-        self.groups.iter_mut().for_each(|g| g.exchange.timings = Timings::default());
+        self.groups.iter_mut().for_each(|g| g.problem.timings = Timings::default());
         self.members.iter_mut().for_each(|m| m.cost = Duration::ZERO);
         for instance in &mut self.instances {
             instance.forget_cost();
@@ -106,7 +106,7 @@ impl Testbed {
     }
 }
 
-/// What has come in and gone out since a state whose book says `before`.
+/// What has come in and gone out since a state whose ledger says `before`.
 pub(super) fn since(before: &Energy, now: Energy) -> Energy {
     Energy {
         dissipated: now.dissipated - before.dissipated,

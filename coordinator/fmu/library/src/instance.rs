@@ -3,7 +3,7 @@
 use std::ffi::{CStr, CString, c_char, c_int, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::PathBuf;
-use terraglue_fmi::export::{Answer, Component, Handle, Status, Wrong};
+use terraglue_fmi::export::{Answer, ExportedInstance, Handle, Status, Wrong};
 use terraglue_subsystem::LogLevel;
 
 /// Logger of a master.
@@ -57,7 +57,7 @@ impl Log {
 
 /// What a handle of the master points at.
 pub struct Instance {
-    pub component: Component,
+    pub fmu: ExportedInstance,
     pub log: Log,
     /// Texts handed out by the last call; valid until the next.
     pub texts: Vec<CString>,
@@ -69,7 +69,7 @@ pub struct Instance {
 
 impl Instance {
     fn say(&self, outcome: &Answer) {
-        for (level, text) in self.component.mailbox().take() {
+        for (level, text) in self.fmu.mailbox().take() {
             let status = match level {
                 LogLevel::Error => Status::Error,
                 LogLevel::Warning => Status::Warning,
@@ -95,10 +95,10 @@ pub unsafe fn call(handle: *mut c_void, body: impl FnOnce(&mut Instance) -> Answ
         return Status::Error as c_int;
     };
     let done = catch_unwind(AssertUnwindSafe(|| {
-        let outcome = match instance.component.phase() {
+        let outcome = match instance.fmu.phase() {
             terraglue_fmi::export::Phase::Dead => Err(Wrong {
                 status: Status::Fatal,
-                text: "not called: the unit failed for good before".into(),
+                text: "not called: the FMU failed for good before".into(),
             }),
             _ => body(instance),
         };
@@ -106,10 +106,10 @@ pub unsafe fn call(handle: *mut c_void, body: impl FnOnce(&mut Instance) -> Answ
         outcome.map_or_else(|wrong| wrong.status as c_int, |()| Status::Ok as c_int)
     }));
     done.unwrap_or_else(|panic| {
-        instance.component.kill();
+        instance.fmu.kill();
         let text = panic.downcast_ref::<String>().map(String::as_str);
         let text = text.or(panic.downcast_ref::<&str>().copied()).unwrap_or("no reason given");
-        instance.log.line(Status::Fatal, &format!("a defect of the unit: {text}"));
+        instance.log.line(Status::Fatal, &format!("a defect of the FMU: {text}"));
         Status::Fatal as c_int
     })
 }
@@ -132,12 +132,11 @@ pub unsafe fn create(
             return Err(why.to_owned());
         }
         let token = token.ok_or("no token was given")?;
-        Component::new(terraglue_fmu::export::open, &name, &resources?, Some(&token))
+        ExportedInstance::new(terraglue_fmu::export::open, &name, &resources?, Some(&token))
     }));
-    match made.unwrap_or_else(|_| Err("a defect of the unit while it was made".into())) {
-        Ok(component) => {
-            let instance =
-                Instance { component, log, texts: Vec::new(), bytes: Vec::new(), serialised: None };
+    match made.unwrap_or_else(|_| Err("a defect of the FMU while it was made".into())) {
+        Ok(fmu) => {
+            let instance = Instance { fmu, log, texts: Vec::new(), bytes: Vec::new(), serialised: None };
             instance.say(&Ok(()));
             Box::into_raw(Box::new(instance)).cast()
         }
@@ -249,7 +248,7 @@ pub unsafe fn save(handle: *mut c_void, state: *mut *mut c_void) -> c_int {
             let place = &mut room(state, 1)?[0];
             let over = (!place.is_null()).then_some(Handle(*place as usize));
             i.serialised = None;
-            *place = i.component.save(over)?.0 as *mut c_void;
+            *place = i.fmu.save(over)?.0 as *mut c_void;
             Ok(())
         })
     }
@@ -267,7 +266,7 @@ pub unsafe fn release(handle: *mut c_void, state: *mut *mut c_void) -> c_int {
                 return Ok(());
             }
             i.serialised = None;
-            i.component.release(Handle(*state as usize))?;
+            i.fmu.release(Handle(*state as usize))?;
             *state = std::ptr::null_mut();
             Ok(())
         })
@@ -277,7 +276,7 @@ pub unsafe fn release(handle: *mut c_void, state: *mut *mut c_void) -> c_int {
 fn bytes_of(i: &mut Instance, state: *mut c_void) -> Answer<&[u8]> {
     let wanted = state as usize;
     if i.serialised.as_ref().is_none_or(|(of, _)| *of != wanted) {
-        i.serialised = Some((wanted, i.component.serialize(Handle(wanted))?));
+        i.serialised = Some((wanted, i.fmu.serialize(Handle(wanted))?));
     }
     Ok(i.serialised.as_ref().map_or(&[], |(_, bytes)| bytes))
 }
@@ -330,7 +329,7 @@ pub unsafe fn deserialise(
     unsafe {
         call(handle, |i| {
             let place = &mut room(state, 1)?[0];
-            *place = i.component.deserialize(slice(bytes, size)?)?.0 as *mut c_void;
+            *place = i.fmu.deserialize(slice(bytes, size)?)?.0 as *mut c_void;
             Ok(())
         })
     }

@@ -2,7 +2,7 @@
 
 use crate::instance::{Log, Logger, call, create, free, put, resources, room, slice, text};
 use std::ffi::{CString, c_char, c_int, c_uint, c_void};
-use terraglue_fmi::export::{Answer, Component as Unit, Handle, wrong};
+use terraglue_fmi::export::{Answer, ExportedInstance, Handle, wrong};
 use terraglue_subsystem::ValueType;
 
 type Component = *mut c_void;
@@ -51,8 +51,8 @@ pub unsafe extern "C" fn fmi3InstantiateCoSimulation(
     unsafe {
         let log = log(name, environment, logger, logging);
         let refused = match (event_mode, n_intermediate) {
-            (true, _) => Some("this unit has no event mode (hasEventMode is false)"),
-            (_, 1..) => Some("this unit has no intermediate update"),
+            (true, _) => Some("this FMU has no event mode (hasEventMode is false)"),
+            (_, 1..) => Some("this FMU has no intermediate update"),
             _ => None,
         };
         create(token, resources(text(resource_path)), refused, log)
@@ -85,7 +85,7 @@ pub unsafe extern "C" fn fmi3InstantiateModelExchange(
     // SAFETY: as above.
     unsafe {
         let log = log(name, environment, logger, logging);
-        create(token, resources(text(resource_path)), Some("this unit is for co-simulation only"), log)
+        create(token, resources(text(resource_path)), Some("this FMU is for co-simulation only"), log)
     }
 }
 
@@ -105,7 +105,7 @@ pub unsafe extern "C" fn fmi3InstantiateScheduledExecution(
     // SAFETY: as above.
     unsafe {
         let log = log(name, environment, logger, logging);
-        create(token, resources(text(resource_path)), Some("this unit is for co-simulation only"), log)
+        create(token, resources(text(resource_path)), Some("this FMU is for co-simulation only"), log)
     }
 }
 
@@ -127,8 +127,8 @@ pub unsafe extern "C" fn fmi3EnterInitializationMode(
     // SAFETY: as above.
     unsafe {
         call(c, |i| {
-            i.component.set_experiment(start, stop_defined.then_some(stop))?;
-            i.component.enter_initialization()
+            i.fmu.set_experiment(start, stop_defined.then_some(stop))?;
+            i.fmu.enter_initialization()
         })
     }
 }
@@ -136,19 +136,19 @@ pub unsafe extern "C" fn fmi3EnterInitializationMode(
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3ExitInitializationMode(c: Component) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |i| i.component.exit_initialization()) }
+    unsafe { call(c, |i| i.fmu.exit_initialization()) }
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3Terminate(c: Component) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |i| i.component.terminate()) }
+    unsafe { call(c, |i| i.fmu.terminate()) }
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3Reset(c: Component) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |i| i.component.reset()) }
+    unsafe { call(c, |i| i.fmu.reset()) }
 }
 
 #[unsafe(no_mangle)]
@@ -168,8 +168,8 @@ pub unsafe extern "C" fn fmi3DoStep(
         put(terminate, false);
         put(early_return, false);
         call(c, |i| {
-            let done = i.component.step(t, h);
-            let reached = i.component.reached();
+            let done = i.fmu.step(t, h);
+            let reached = i.fmu.reached();
             put(last_time, reached.time);
             put(terminate, reached.terminate);
             done.map(drop)
@@ -182,12 +182,12 @@ macro_rules! numbers {
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $get(c: Component, vr: Refs, n: usize, out: *mut $t, m: usize) -> c_int {
             // SAFETY: as above.
-            unsafe { call(c, |i| i.component.get::<$t>(slice(vr, n)?, &[$(ValueType::$variant),*], room(out, m)?)) }
+            unsafe { call(c, |i| i.fmu.get::<$t>(slice(vr, n)?, &[$(ValueType::$variant),*], room(out, m)?)) }
         }
         #[unsafe(no_mangle)]
         pub unsafe extern "C" fn $set(c: Component, vr: Refs, n: usize, values: *const $t, m: usize) -> c_int {
             // SAFETY: as above.
-            unsafe { call(c, |i| i.component.set::<$t>(slice(vr, n)?, &[$(ValueType::$variant),*], slice(values, m)?)) }
+            unsafe { call(c, |i| i.fmu.set::<$t>(slice(vr, n)?, &[$(ValueType::$variant),*], slice(values, m)?)) }
         }
     )*};
 }
@@ -207,22 +207,22 @@ numbers! {
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3GetFloat64(c: Component, vr: Refs, n: usize, out: *mut f64, m: usize) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |i| get_with_time(&i.component, slice(vr, n)?, room(out, m)?)) }
+    unsafe { call(c, |i| get_with_time(&i.fmu, slice(vr, n)?, room(out, m)?)) }
 }
 
 /// Value reference 0 is the time.
-fn get_with_time(unit: &Unit, mut references: &[u32], mut out: &mut [f64]) -> Answer {
+fn get_with_time(fmu: &ExportedInstance, mut references: &[u32], mut out: &mut [f64]) -> Answer {
     while let Some(k) = references.iter().position(|r| *r == 0) {
-        let before: usize = references[..k].iter().map(|r| unit.len(*r).unwrap_or(1)).sum();
+        let before: usize = references[..k].iter().map(|r| fmu.len(*r).unwrap_or(1)).sum();
         if out.len() <= before {
             return wrong("too few values for the time");
         }
         let (head, rest) = std::mem::take(&mut out).split_at_mut(before);
-        unit.get(&references[..k], &[ValueType::F64], head)?;
-        rest[0] = unit.time();
+        fmu.get(&references[..k], &[ValueType::F64], head)?;
+        rest[0] = fmu.time();
         (references, out) = (&references[k + 1..], &mut rest[1..]);
     }
-    unit.get(references, &[ValueType::F64], out)
+    fmu.get(references, &[ValueType::F64], out)
 }
 
 #[unsafe(no_mangle)]
@@ -234,7 +234,7 @@ pub unsafe extern "C" fn fmi3SetFloat64(
     m: usize,
 ) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |i| i.component.set(slice(vr, n)?, &[ValueType::F64], slice(values, m)?)) }
+    unsafe { call(c, |i| i.fmu.set(slice(vr, n)?, &[ValueType::F64], slice(values, m)?)) }
 }
 
 #[unsafe(no_mangle)]
@@ -243,7 +243,7 @@ pub unsafe extern "C" fn fmi3GetBoolean(c: Component, vr: Refs, n: usize, out: *
     unsafe {
         call(c, |i| {
             let mut values = vec![false; m];
-            i.component.get(slice(vr, n)?, &[ValueType::Bool], &mut values)?;
+            i.fmu.get(slice(vr, n)?, &[ValueType::Bool], &mut values)?;
             room(out, m)?.copy_from_slice(&values);
             Ok(())
         })
@@ -262,7 +262,7 @@ pub unsafe extern "C" fn fmi3SetBoolean(
     unsafe {
         call(c, |i| {
             let values: Vec<bool> = slice(values, m)?.iter().map(|v| *v != 0).collect();
-            i.component.set(slice(vr, n)?, &[ValueType::Bool], &values)
+            i.fmu.set(slice(vr, n)?, &[ValueType::Bool], &values)
         })
     }
 }
@@ -273,7 +273,7 @@ pub unsafe extern "C" fn fmi3GetString(c: Component, vr: Refs, n: usize, out: *m
     unsafe {
         call(c, |i| {
             let mut values = vec![String::new(); m];
-            i.component.get(slice(vr, n)?, &[ValueType::String], &mut values)?;
+            i.fmu.get(slice(vr, n)?, &[ValueType::String], &mut values)?;
             i.texts = values.into_iter().map(|v| CString::new(v).unwrap_or_default()).collect();
             room(out, m)?.iter_mut().zip(&i.texts).for_each(|(o, v)| *o = v.as_ptr());
             Ok(())
@@ -294,7 +294,7 @@ pub unsafe extern "C" fn fmi3SetString(
         call(c, |i| {
             let values: Vec<String> =
                 slice(values, m)?.iter().map(|v| text(*v).unwrap_or_default()).collect();
-            i.component.set(slice(vr, n)?, &[ValueType::String], &values)
+            i.fmu.set(slice(vr, n)?, &[ValueType::String], &values)
         })
     }
 }
@@ -312,7 +312,7 @@ pub unsafe extern "C" fn fmi3GetBinary(
     unsafe {
         call(c, |i| {
             let mut values = vec![Vec::new(); m];
-            i.component.get::<Vec<u8>>(slice(vr, n)?, &[ValueType::Binary], &mut values)?;
+            i.fmu.get::<Vec<u8>>(slice(vr, n)?, &[ValueType::Binary], &mut values)?;
             i.bytes = values;
             let (sizes, out) = (room(sizes, m)?, room(out, m)?);
             for ((value, size), place) in i.bytes.iter().zip(sizes).zip(out) {
@@ -338,7 +338,7 @@ pub unsafe extern "C" fn fmi3SetBinary(
             let (sizes, values) = (slice(sizes, m)?, slice(values, m)?);
             let values: Answer<Vec<Vec<u8>>> =
                 sizes.iter().zip(values).map(|(size, v)| Ok(slice(*v, *size)?.to_vec())).collect();
-            i.component.set(slice(vr, n)?, &[ValueType::Binary], &values?)
+            i.fmu.set(slice(vr, n)?, &[ValueType::Binary], &values?)
         })
     }
 }
@@ -352,7 +352,7 @@ pub unsafe extern "C" fn fmi3GetFMUState(c: Component, state: *mut State) -> c_i
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi3SetFMUState(c: Component, state: State) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |i| i.component.restore(Handle(state as usize))) }
+    unsafe { call(c, |i| i.fmu.restore(Handle(state as usize))) }
 }
 
 #[unsafe(no_mangle)]
@@ -389,8 +389,8 @@ pub unsafe extern "C" fn fmi3DeserializeFMUState(
     unsafe { crate::instance::deserialise(c, bytes, size, state) }
 }
 
-/// Functions of what this unit does not have. Arguments after the first are left unread: the caller owns them in the
-/// C calling conventions of all platforms that the units are made for.
+/// Functions of what this FMU does not have. Arguments after the first are left unread: the caller owns them in the
+/// C calling conventions of all platforms that the FMUs are made for.
 macro_rules! refusals {
     ($($name:ident: $why:literal;)*) => {$(
         #[unsafe(no_mangle)]
@@ -402,36 +402,36 @@ macro_rules! refusals {
 }
 
 refusals! {
-    fmi3EnterEventMode: "this unit has no event mode";
-    fmi3EnterStepMode: "this unit has no event mode";
-    fmi3UpdateDiscreteStates: "this unit has no event mode";
-    fmi3EvaluateDiscreteStates: "this unit has no event mode";
-    fmi3EnterConfigurationMode: "this unit has no structural parameters";
-    fmi3ExitConfigurationMode: "this unit has no structural parameters";
-    fmi3GetDirectionalDerivative: "this unit has no directional derivatives";
-    fmi3GetAdjointDerivative: "this unit has no adjoint derivatives";
-    fmi3GetNumberOfVariableDependencies: "this unit does not tell dependencies at run time";
-    fmi3GetVariableDependencies: "this unit does not tell dependencies at run time";
-    fmi3GetOutputDerivatives: "this unit has no derivatives of its outputs";
-    fmi3GetClock: "this unit has no clocks";
-    fmi3SetClock: "this unit has no clocks";
-    fmi3GetIntervalDecimal: "this unit has no clocks";
-    fmi3GetIntervalFraction: "this unit has no clocks";
-    fmi3GetShiftDecimal: "this unit has no clocks";
-    fmi3GetShiftFraction: "this unit has no clocks";
-    fmi3SetIntervalDecimal: "this unit has no clocks";
-    fmi3SetIntervalFraction: "this unit has no clocks";
-    fmi3SetShiftDecimal: "this unit has no clocks";
-    fmi3SetShiftFraction: "this unit has no clocks";
-    fmi3ActivateModelPartition: "this unit is for co-simulation only";
-    fmi3EnterContinuousTimeMode: "this unit is for co-simulation only";
-    fmi3CompletedIntegratorStep: "this unit is for co-simulation only";
-    fmi3SetTime: "this unit is for co-simulation only";
-    fmi3SetContinuousStates: "this unit is for co-simulation only";
-    fmi3GetContinuousStateDerivatives: "this unit is for co-simulation only";
-    fmi3GetEventIndicators: "this unit is for co-simulation only";
-    fmi3GetContinuousStates: "this unit is for co-simulation only";
-    fmi3GetNominalsOfContinuousStates: "this unit is for co-simulation only";
-    fmi3GetNumberOfEventIndicators: "this unit is for co-simulation only";
-    fmi3GetNumberOfContinuousStates: "this unit is for co-simulation only";
+    fmi3EnterEventMode: "this FMU has no event mode";
+    fmi3EnterStepMode: "this FMU has no event mode";
+    fmi3UpdateDiscreteStates: "this FMU has no event mode";
+    fmi3EvaluateDiscreteStates: "this FMU has no event mode";
+    fmi3EnterConfigurationMode: "this FMU has no structural parameters";
+    fmi3ExitConfigurationMode: "this FMU has no structural parameters";
+    fmi3GetDirectionalDerivative: "this FMU has no directional derivatives";
+    fmi3GetAdjointDerivative: "this FMU has no adjoint derivatives";
+    fmi3GetNumberOfVariableDependencies: "this FMU does not tell dependencies at run time";
+    fmi3GetVariableDependencies: "this FMU does not tell dependencies at run time";
+    fmi3GetOutputDerivatives: "this FMU has no derivatives of its outputs";
+    fmi3GetClock: "this FMU has no clocks";
+    fmi3SetClock: "this FMU has no clocks";
+    fmi3GetIntervalDecimal: "this FMU has no clocks";
+    fmi3GetIntervalFraction: "this FMU has no clocks";
+    fmi3GetShiftDecimal: "this FMU has no clocks";
+    fmi3GetShiftFraction: "this FMU has no clocks";
+    fmi3SetIntervalDecimal: "this FMU has no clocks";
+    fmi3SetIntervalFraction: "this FMU has no clocks";
+    fmi3SetShiftDecimal: "this FMU has no clocks";
+    fmi3SetShiftFraction: "this FMU has no clocks";
+    fmi3ActivateModelPartition: "this FMU is for co-simulation only";
+    fmi3EnterContinuousTimeMode: "this FMU is for co-simulation only";
+    fmi3CompletedIntegratorStep: "this FMU is for co-simulation only";
+    fmi3SetTime: "this FMU is for co-simulation only";
+    fmi3SetContinuousStates: "this FMU is for co-simulation only";
+    fmi3GetContinuousStateDerivatives: "this FMU is for co-simulation only";
+    fmi3GetEventIndicators: "this FMU is for co-simulation only";
+    fmi3GetContinuousStates: "this FMU is for co-simulation only";
+    fmi3GetNominalsOfContinuousStates: "this FMU is for co-simulation only";
+    fmi3GetNumberOfEventIndicators: "this FMU is for co-simulation only";
+    fmi3GetNumberOfContinuousStates: "this FMU is for co-simulation only";
 }

@@ -72,7 +72,7 @@ pub unsafe extern "C" fn fmi2Instantiate(
             name: CString::new(text(name).unwrap_or_default()).unwrap_or_default(),
             verbose: logging != 0,
         };
-        let refused = (kind != CO_SIMULATION).then_some("this unit is for co-simulation only");
+        let refused = (kind != CO_SIMULATION).then_some("this FMU is for co-simulation only");
         create(guid, resources(text(location)), refused, log)
     }
 }
@@ -93,43 +93,43 @@ pub unsafe extern "C" fn fmi2SetupExperiment(
     stop: f64,
 ) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |i| i.component.set_experiment(start, (stop_defined != 0).then_some(stop))) }
+    unsafe { call(c, |i| i.fmu.set_experiment(start, (stop_defined != 0).then_some(stop))) }
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2EnterInitializationMode(c: Component) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |i| i.component.enter_initialization()) }
+    unsafe { call(c, |i| i.fmu.enter_initialization()) }
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2ExitInitializationMode(c: Component) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |i| i.component.exit_initialization()) }
+    unsafe { call(c, |i| i.fmu.exit_initialization()) }
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2Terminate(c: Component) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |i| i.component.terminate()) }
+    unsafe { call(c, |i| i.fmu.terminate()) }
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2Reset(c: Component) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |i| i.component.reset()) }
+    unsafe { call(c, |i| i.fmu.reset()) }
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2GetReal(c: Component, vr: *const c_uint, n: usize, out: *mut f64) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |i| i.component.get(slice(vr, n)?, REAL, room(out, n)?)) }
+    unsafe { call(c, |i| i.fmu.get(slice(vr, n)?, REAL, room(out, n)?)) }
 }
 
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2GetInteger(c: Component, vr: *const c_uint, n: usize, out: *mut c_int) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |i| i.component.get::<i32>(slice(vr, n)?, INTEGER, room(out, n)?)) }
+    unsafe { call(c, |i| i.fmu.get::<i32>(slice(vr, n)?, INTEGER, room(out, n)?)) }
 }
 
 #[unsafe(no_mangle)]
@@ -138,7 +138,7 @@ pub unsafe extern "C" fn fmi2GetBoolean(c: Component, vr: *const c_uint, n: usiz
     unsafe {
         call(c, |i| {
             let mut values = vec![false; n];
-            i.component.get(slice(vr, n)?, BOOLEAN, &mut values)?;
+            i.fmu.get(slice(vr, n)?, BOOLEAN, &mut values)?;
             room(out, n)?.iter_mut().zip(values).for_each(|(o, v)| *o = v.into());
             Ok(())
         })
@@ -151,7 +151,7 @@ pub unsafe extern "C" fn fmi2GetString(c: Component, vr: *const c_uint, n: usize
     unsafe {
         call(c, |i| {
             let mut values = vec![String::new(); n];
-            i.component.get(slice(vr, n)?, STRING, &mut values)?;
+            i.fmu.get(slice(vr, n)?, STRING, &mut values)?;
             i.texts = values.into_iter().map(|v| CString::new(v).unwrap_or_default()).collect();
             room(out, n)?.iter_mut().zip(&i.texts).for_each(|(o, v)| *o = v.as_ptr());
             Ok(())
@@ -162,7 +162,7 @@ pub unsafe extern "C" fn fmi2GetString(c: Component, vr: *const c_uint, n: usize
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2SetReal(c: Component, vr: *const c_uint, n: usize, values: *const f64) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |i| i.component.set(slice(vr, n)?, REAL, slice(values, n)?)) }
+    unsafe { call(c, |i| i.fmu.set(slice(vr, n)?, REAL, slice(values, n)?)) }
 }
 
 #[unsafe(no_mangle)]
@@ -173,7 +173,7 @@ pub unsafe extern "C" fn fmi2SetInteger(
     values: *const c_int,
 ) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |i| i.component.set::<i32>(slice(vr, n)?, INTEGER, slice(values, n)?)) }
+    unsafe { call(c, |i| i.fmu.set::<i32>(slice(vr, n)?, INTEGER, slice(values, n)?)) }
 }
 
 #[unsafe(no_mangle)]
@@ -187,7 +187,7 @@ pub unsafe extern "C" fn fmi2SetBoolean(
     unsafe {
         call(c, |i| {
             let values: Vec<bool> = slice(values, n)?.iter().map(|v| *v != 0).collect();
-            i.component.set(slice(vr, n)?, BOOLEAN, &values)
+            i.fmu.set(slice(vr, n)?, BOOLEAN, &values)
         })
     }
 }
@@ -204,7 +204,7 @@ pub unsafe extern "C" fn fmi2SetString(
         call(c, |i| {
             let values: Vec<String> =
                 slice(values, n)?.iter().map(|v| text(*v).unwrap_or_default()).collect();
-            i.component.set(slice(vr, n)?, STRING, &values)
+            i.fmu.set(slice(vr, n)?, STRING, &values)
         })
     }
 }
@@ -214,11 +214,11 @@ pub unsafe extern "C" fn fmi2DoStep(c: Component, t: f64, h: f64, _no_going_back
     // SAFETY: as above.
     unsafe {
         call(c, |i| {
-            let reached = i.component.step(t, h)?;
+            let reached = i.fmu.step(t, h)?;
             if reached.complete && !reached.terminate {
                 return Ok(());
             }
-            let text = format!("the unit asks for the end of the run at t = {} s", reached.time);
+            let text = format!("the FMU asks for the end of the run at t = {} s", reached.time);
             Err(Wrong { status: Status::Discard, text })
         })
     }
@@ -249,7 +249,7 @@ pub unsafe extern "C" fn fmi2GetRealStatus(c: Component, kind: c_int, out: *mut 
             if kind != LAST_SUCCESSFUL_TIME {
                 return discarded("of the real statuses only fmi2LastSuccessfulTime is known");
             }
-            put(out, i.component.reached().time);
+            put(out, i.fmu.reached().time);
             Ok(())
         })
     }
@@ -269,7 +269,7 @@ pub unsafe extern "C" fn fmi2GetBooleanStatus(c: Component, kind: c_int, out: *m
             if kind != TERMINATED {
                 return discarded("of the boolean statuses only fmi2Terminated is known");
             }
-            put(out, i.component.reached().terminate.into());
+            put(out, i.fmu.reached().terminate.into());
             Ok(())
         })
     }
@@ -294,7 +294,7 @@ pub unsafe extern "C" fn fmi2GetFMUstate(c: Component, state: *mut State) -> c_i
 #[unsafe(no_mangle)]
 pub unsafe extern "C" fn fmi2SetFMUstate(c: Component, state: State) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |i| i.component.restore(Handle(state as usize))) }
+    unsafe { call(c, |i| i.fmu.restore(Handle(state as usize))) }
 }
 
 #[unsafe(no_mangle)]
@@ -342,7 +342,7 @@ pub unsafe extern "C" fn fmi2GetDirectionalDerivative(
     _out: *mut f64,
 ) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |_| wrong("this unit has no directional derivatives")) }
+    unsafe { call(c, |_| wrong("this FMU has no directional derivatives")) }
 }
 
 #[unsafe(no_mangle)]
@@ -354,7 +354,7 @@ pub unsafe extern "C" fn fmi2SetRealInputDerivatives(
     _values: *const f64,
 ) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |_| wrong("this unit does not interpolate its inputs")) }
+    unsafe { call(c, |_| wrong("this FMU does not interpolate its inputs")) }
 }
 
 #[unsafe(no_mangle)]
@@ -366,5 +366,5 @@ pub unsafe extern "C" fn fmi2GetRealOutputDerivatives(
     _out: *mut f64,
 ) -> c_int {
     // SAFETY: as above.
-    unsafe { call(c, |_| wrong("this unit has no derivatives of its outputs")) }
+    unsafe { call(c, |_| wrong("this FMU has no derivatives of its outputs")) }
 }

@@ -1,10 +1,10 @@
-//! One number of a unit: a variable, or an element of an array.
+//! One number of an FMU: a variable, or an element of an array.
 
 use super::Fail;
-use terraglue_fmi::Slave;
+use terraglue_fmi::FmuInstance;
 use terraglue_subsystem::Result;
 
-/// Where a component lies in the unit.
+/// Where a component lies in the FMU.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axis {
     /// Number in calls.
@@ -20,7 +20,7 @@ const SMALL: usize = 48;
 
 impl Axis {
     /// Runs `look` on all elements, as they are now.
-    fn whole<R>(self, slave: &Slave, fail: Fail, look: impl FnOnce(&mut [f64]) -> R) -> Result<R> {
+    fn whole<R>(self, instance: &FmuInstance, fail: Fail, look: impl FnOnce(&mut [f64]) -> R) -> Result<R> {
         let (mut few, mut many) = ([f64::NAN; SMALL], Vec::new());
         let all = match few.get_mut(..self.count) {
             Some(few) => few,
@@ -29,23 +29,23 @@ impl Axis {
                 &mut many[..]
             }
         };
-        slave.get_f64(&[self.reference], all).map_err(fail)?;
+        instance.get_f64(&[self.reference], all).map_err(fail)?;
         Ok(look(all))
     }
 
     /// Its value.
-    pub fn get(self, slave: &Slave, fail: Fail) -> Result<f64> {
-        self.whole(slave, fail, |all| all[self.element])
+    pub fn get(self, instance: &FmuInstance, fail: Fail) -> Result<f64> {
+        self.whole(instance, fail, |all| all[self.element])
     }
 
     /// A new value.
-    pub fn set(self, slave: &Slave, value: f64, fail: Fail) -> Result {
+    pub fn set(self, instance: &FmuInstance, value: f64, fail: Fail) -> Result {
         if self.count == 1 {
-            return slave.set_f64(&[self.reference], &[value]).map_err(fail);
+            return instance.set_f64(&[self.reference], &[value]).map_err(fail);
         }
-        self.whole(slave, fail, |all| {
+        self.whole(instance, fail, |all| {
             all[self.element] = value;
-            slave.set_f64(&[self.reference], all).map_err(fail)
+            instance.set_f64(&[self.reference], all).map_err(fail)
         })?
     }
 }

@@ -1,14 +1,14 @@
-//! Glue by a map of names: variables of a unit that are the motion of a body, and the force and moment on it.
+//! Glue by a map of names: variables of an FMU that are the motion of a body, and the force and moment on it.
 //!
 //! `[x.bodies.NAME]` has lists of names along world x, y and z (`""` for none): `position`, `velocity`, `acceleration` and
 //! `force`. With `orientation`, a quaternion, the body turns, and has `angular_velocity`, `angular_acceleration` and
 //! `moment`. `terminal` is the name of a terminal of FMI 3 whose members are these. The body can then be named by
-//! `[[glue]]`. [`names`] reads the table, [`motion`] tells what a port of the body does, [`slopes`] the Jacobian.
+//! `[[glue]]`. [`names`] reads the table, [`motion`] tells what a port of the body does, [`jacobian`] the Jacobian.
 
 mod axis;
+mod jacobian;
 mod motion;
 mod names;
-mod slopes;
 
 pub use axis::Axis;
 pub use names::{Terminals, terminals};
@@ -16,7 +16,7 @@ pub use names::{Terminals, terminals};
 use motion::{AtPort, Motion, vector};
 use names::{Body, Lookup, wrong};
 use serde_json::{Map, Value};
-use terraglue_fmi::{Slave, SlaveState};
+use terraglue_fmi::{FmuInstance, FmuState};
 use terraglue_numerics::rotation::{cross, dot, minus, plus};
 use terraglue_subsystem::{
     BodyState, Error, Pose, Response, Result, Scene, SceneBody, Step, Variable, component,
@@ -25,7 +25,7 @@ use terraglue_subsystem::{
 /// How a state that is read becomes an error of the subsystem.
 type Fail = fn(terraglue_fmi::Error) -> Error;
 
-/// All bodies that a scenario maps onto variables of a unit.
+/// All bodies that a scenario maps onto variables of an FMU.
 #[derive(Clone, Debug, Default)]
 pub struct Bodies {
     all: Vec<Body>,
@@ -38,10 +38,10 @@ pub struct Bodies {
 }
 
 impl Bodies {
-    /// Reads the table `bodies` of a unit with these terminals; `place` finds where a variable lies.
+    /// Reads the table `bodies` of an FMU with these terminals; `place` finds where a variable lies.
     ///
     /// # Errors
-    /// A name that the unit does not have, or that is no f64, or that cannot be set where it must be.
+    /// A name that the FMU does not have, or that is no f64, or that cannot be set where it must be.
     pub fn read(
         table: &Map<String, Value>,
         variables: &[Variable],
@@ -93,28 +93,28 @@ impl Bodies {
     }
 
     /// States of all bodies.
-    pub fn states(&self, slave: &Slave, out: &mut [BodyState], fail: Fail) -> Result {
+    pub fn states(&self, instance: &FmuInstance, out: &mut [BodyState], fail: Fail) -> Result {
         for (out, body) in out.iter_mut().zip(&self.all) {
             let Motion { position, orientation, velocity, angular_velocity, .. } =
-                Motion::read(slave, body, fail)?;
+                Motion::read(instance, body, fail)?;
             let world_from_body = Pose { position, orientation };
             *out = BodyState { world_from_body, linear_velocity: velocity, angular_velocity };
         }
         Ok(())
     }
 
-    fn motions(&self, slave: &Slave, out: &mut Vec<Motion>, fail: Fail) -> Result {
+    fn motions(&self, instance: &FmuInstance, out: &mut Vec<Motion>, fail: Fail) -> Result {
         out.clear();
         for body in &self.all {
-            out.push(Motion::read(slave, body, fail)?);
+            out.push(Motion::read(instance, body, fail)?);
         }
         Ok(())
     }
 
     /// Before a trial: remembers where the bodies are and hands the wrench over.
-    pub fn push(&mut self, slave: &mut Slave, step: &Step, t: &[f64], fail: Fail) -> Result {
+    pub fn push(&mut self, instance: &mut FmuInstance, step: &Step, t: &[f64], fail: Fail) -> Result {
         let mut before = std::mem::take(&mut self.before);
-        let read = self.motions(slave, &mut before, fail);
+        let read = self.motions(instance, &mut before, fail);
         self.before = before;
         read?;
         for (b, body) in self.all.iter().enumerate() {
@@ -128,22 +128,29 @@ impl Bodies {
             }
             let axes = body.force.iter().chain(&body.moment);
             for (axis, value) in axes.zip(force.into_iter().chain(moment)) {
-                axis.map_or(Ok(()), |axis| axis.set(slave, value, fail))?;
+                axis.map_or(Ok(()), |axis| axis.set(instance, value, fail))?;
             }
         }
         Ok(())
     }
 
     /// After a trial: the motion at all ports.
-    pub fn pull(&mut self, slave: &Slave, step: &Step, t: &[f64], out: &mut Response, fail: Fail) -> Result {
+    pub fn pull(
+        &mut self,
+        instance: &FmuInstance,
+        step: &Step,
+        t: &[f64],
+        out: &mut Response,
+        fail: Fail,
+    ) -> Result {
         let mut after = std::mem::take(&mut self.after);
-        let read = self.motions(slave, &mut after, fail);
+        let read = self.motions(instance, &mut after, fail);
         self.after = after;
         read?;
         for port in step.ports {
             let b = port.body as usize;
             let mut at = AtPort::new(&self.all[b], port, &self.before[b], &self.after[b], step.h);
-            self.accelerate(slave, b, &mut at, fail)?;
+            self.accelerate(instance, b, &mut at, fail)?;
             for (i, c) in port.components() {
                 let (d, kind) = (port.direction(c), c / 3);
                 out.x[i] = dot(d, at.way[kind]);
@@ -160,14 +167,14 @@ impl Bodies {
     }
 
     /// Accelerations where the body tells them, in the place of means: of a body that turns both kinds are needed.
-    fn accelerate(&self, slave: &Slave, b: usize, at: &mut AtPort, fail: Fail) -> Result {
+    fn accelerate(&self, instance: &FmuInstance, b: usize, at: &mut AtPort, fail: Fail) -> Result {
         let body = &self.all[b];
         let told = [&body.acceleration, &body.angular_acceleration].map(|a| a.iter().any(Option::is_some));
         if told[1] {
-            at.change[1] = vector(slave, body, "angular_acceleration", &body.angular_acceleration, fail)?;
+            at.change[1] = vector(instance, body, "angular_acceleration", &body.angular_acceleration, fail)?;
         }
         if told[0] && (told[1] || body.orientation.is_none()) {
-            let own = vector(slave, body, "acceleration", &body.acceleration, fail)?;
+            let own = vector(instance, body, "acceleration", &body.acceleration, fail)?;
             let rate = at.rate[1];
             let inward = cross(rate, cross(rate, at.arm));
             at.change[0] = plus(own, plus(cross(at.change[1], at.arm), inward));
@@ -183,21 +190,21 @@ impl Bodies {
     /// A step of h = 0: place and velocity stay, the acceleration comes from a very short step that is taken back.
     pub fn still(
         &mut self,
-        slave: &mut Slave,
+        instance: &mut FmuInstance,
         step: &Step,
         t: &[f64],
         out: &mut Response,
         fail: Fail,
     ) -> Result {
         const SHORT_S: f64 = 1e-6;
-        let mut here = SlaveState::default();
-        slave.save(&mut here).map_err(fail)?;
-        self.push(slave, step, t, fail)?;
-        let done = slave.do_step(terraglue_fmi::Advance { t: step.t, h: SHORT_S, for_good: true });
+        let mut here = FmuState::default();
+        instance.save(&mut here).map_err(fail)?;
+        self.push(instance, step, t, fail)?;
+        let done = instance.do_step(terraglue_fmi::Advance { t: step.t, h: SHORT_S, for_good: true });
         let short = Step { h: SHORT_S, ..*step };
-        let told = done.map_err(fail).and_then(|_| self.pull(slave, &short, t, out, fail));
-        slave.restore(&here).map_err(fail)?;
-        slave.release(&mut here).map_err(fail)?;
+        let told = done.map_err(fail).and_then(|_| self.pull(instance, &short, t, out, fail));
+        instance.restore(&here).map_err(fail)?;
+        instance.release(&mut here).map_err(fail)?;
         told?;
         out.x.fill(0.0);
         Ok(())

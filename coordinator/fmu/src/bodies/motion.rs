@@ -1,8 +1,8 @@
-//! Where a body of a unit is and how it moves, and what that is at a port.
+//! Where a body of an FMU is and how it moves, and what that is at a port.
 
 use super::Fail;
 use super::names::{Axes, Body, Point};
-use terraglue_fmi::Slave;
+use terraglue_fmi::FmuInstance;
 use terraglue_numerics::rotation::{
     IDENTITY, Quaternion, Vector, conjugate, cross, minus, plus, product, rotation_vector, swing, turned,
 };
@@ -11,7 +11,7 @@ use terraglue_subsystem::{Error, Port, Result};
 /// By how much the length of a quaternion may differ from 1.
 const UNIT: f64 = 1e-6;
 
-/// Motion of a body at one time, as the unit tells it.
+/// Motion of a body at one time, as the FMU tells it.
 #[derive(Clone, Copy, Debug)]
 pub struct Motion {
     /// Place, m.
@@ -27,22 +27,22 @@ pub struct Motion {
 }
 
 impl Motion {
-    /// As the unit tells it now.
+    /// As the FMU tells it now.
     ///
     /// # Errors
     /// A number that is not finite, or a quaternion that is not of unit length.
-    pub fn read(slave: &Slave, body: &Body, fail: Fail) -> Result<Self> {
-        let position = vector(slave, body, "position", &body.position, fail)?;
-        let orientation = orientation(slave, body, fail)?;
+    pub fn read(instance: &FmuInstance, body: &Body, fail: Fail) -> Result<Self> {
+        let position = vector(instance, body, "position", &body.position, fail)?;
+        let orientation = orientation(instance, body, fail)?;
         let point = match &body.force_at {
             Point::Given(point) => *point,
-            Point::Told(axes) => vector(slave, body, "force_at", axes, fail)?,
+            Point::Told(axes) => vector(instance, body, "force_at", axes, fail)?,
         };
         Ok(Self {
             position,
             orientation,
-            velocity: vector(slave, body, "velocity", &body.velocity, fail)?,
-            angular_velocity: vector(slave, body, "angular_velocity", &body.angular_velocity, fail)?,
+            velocity: vector(instance, body, "velocity", &body.velocity, fail)?,
+            angular_velocity: vector(instance, body, "angular_velocity", &body.angular_velocity, fail)?,
             loaded: plus(position, turned(orientation, point)),
         })
     }
@@ -54,11 +54,11 @@ impl Motion {
 }
 
 /// Three numbers of a body, 0 where there is no name.
-pub fn vector(slave: &Slave, body: &Body, key: &str, axes: &Axes, fail: Fail) -> Result<Vector> {
+pub fn vector(instance: &FmuInstance, body: &Body, key: &str, axes: &Axes, fail: Fail) -> Result<Vector> {
     let mut out = [0.0; 3];
     for (out, axis) in out.iter_mut().zip(axes) {
         if let Some(axis) = axis {
-            *out = finite(body, key, axis.get(slave, fail)?)?;
+            *out = finite(body, key, axis.get(instance, fail)?)?;
         }
     }
     Ok(out)
@@ -71,11 +71,11 @@ fn finite(body: &Body, key: &str, value: f64) -> Result<f64> {
     }
 }
 
-fn orientation(slave: &Slave, body: &Body, fail: Fail) -> Result<Quaternion> {
+fn orientation(instance: &FmuInstance, body: &Body, fail: Fail) -> Result<Quaternion> {
     let Some(axes) = &body.orientation else { return Ok(IDENTITY) };
     let mut q = IDENTITY;
     for (q, axis) in q.iter_mut().zip(axes) {
-        *q = finite(body, "orientation", axis.get(slave, fail)?)?;
+        *q = finite(body, "orientation", axis.get(instance, fail)?)?;
     }
     let length = q.iter().map(|x| x * x).sum::<f64>().sqrt();
     match (length - 1.0).abs() <= UNIT {
@@ -100,7 +100,7 @@ pub struct AtPort {
 }
 
 impl AtPort {
-    /// From the motions at both ends of a step of length h. Rates that the unit does not tell are means of the step.
+    /// From the motions at both ends of a step of length h. Rates that the FMU does not tell are means of the step.
     pub fn new(body: &Body, port: &Port, before: &Motion, after: &Motion, h: f64) -> Self {
         let arm = minus(port.origin, before.position);
         let turn = product(after.orientation, conjugate(before.orientation));

@@ -28,7 +28,7 @@ pub type Axes = [Option<Axis>; 3];
 pub enum Point {
     /// As the scenario says.
     Given(Vector),
-    /// As the unit tells.
+    /// As the FMU tells.
     Told(Axes),
 }
 
@@ -60,7 +60,7 @@ pub struct Body {
 /// Terminals with the names of their members and of the variables behind them.
 pub type Terminals = Vec<(String, Vec<(String, String)>)>;
 
-/// Those of a unit.
+/// Those of an FMU.
 pub fn terminals(description: &terraglue_fmi::ModelDescription) -> Terminals {
     let names = |t: &terraglue_fmi::description::Terminal| {
         t.members.iter().map(|(name, k)| (name.clone(), description.variables[*k].name.clone())).collect()
@@ -70,20 +70,20 @@ pub fn terminals(description: &terraglue_fmi::ModelDescription) -> Terminals {
 
 /// What is wrong with a body of a scenario.
 pub fn wrong(body: &str, text: &str) -> Error {
-    Error::Refused(format!("body `{body}` of the unit: {text}"))
+    Error::Refused(format!("body `{body}` of the FMU: {text}"))
 }
 
-/// The unit in which names are looked up.
-pub struct Lookup<'a, Place> {
+/// The FMU in which names are looked up.
+pub struct Lookup<'a, ValueLocation> {
     /// Its variables.
     pub variables: &'a [Variable],
     /// Its terminals.
     pub terminals: &'a Terminals,
     /// Where a variable lies, by its id.
-    pub place: Place,
+    pub place: ValueLocation,
 }
 
-impl<Place: Fn(u32) -> Option<Axis>> Lookup<'_, Place> {
+impl<ValueLocation: Fn(u32) -> Option<Axis>> Lookup<'_, ValueLocation> {
     /// Reads the table of one body.
     ///
     /// # Errors
@@ -125,7 +125,7 @@ impl<Place: Fn(u32) -> Option<Axis>> Lookup<'_, Place> {
         let name = terminal.as_str().ok_or_else(|| wrong(body, "`terminal` takes a name in quotes"))?;
         let Some((_, members)) = self.terminals.iter().find(|(n, _)| n == name) else {
             let near = hint(name, self.terminals.iter().map(|(n, _)| n.as_str()));
-            return Err(wrong(body, &format!("the unit has no terminal `{name}`{near}")));
+            return Err(wrong(body, &format!("the FMU has no terminal `{name}`{near}")));
         };
         let of = |member: &str| members.iter().find(|(m, _)| m == member).map(|(_, v)| v.as_str());
         let mut out = Map::new();

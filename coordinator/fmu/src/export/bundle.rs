@@ -1,6 +1,6 @@
-//! Collects everything that a scenario needs, lays it out as a unit and packs it.
+//! Collects everything that a scenario needs, lays it out as an FMU and packs it.
 
-use super::{Request, SCENARIO, UNIT, Unit, open, page, place, wrap};
+use super::{ExportSettings, Request, SCENARIO, SETTINGS, open, page, place, wrap};
 use std::path::{Path, PathBuf};
 use terraglue_diagnostics::{Error, Result};
 use terraglue_fmi::Version;
@@ -13,7 +13,7 @@ use toml_edit::{DocumentMut, Item, value};
 /// What was written.
 #[derive(Clone, Debug)]
 pub struct Exported {
-    /// The unit.
+    /// The FMU.
     pub path: PathBuf,
     /// Variables in its description.
     pub variables: usize,
@@ -23,8 +23,8 @@ pub struct Exported {
     pub left_out: Vec<String>,
 }
 
-/// File of the library inside every unit.
-const LIBRARY: &str = "libterraglue_unit.so";
+/// File of the library inside every FMU.
+const LIBRARY: &str = "libterraglue_fmu_library.so";
 
 /// Exports a scenario or a module.
 ///
@@ -45,18 +45,18 @@ pub fn write(request: &Request) -> Result<Exported> {
     bundle.terrain()?;
     let text = bundle.document.to_string();
     place(&resources, SCENARIO, text.as_bytes()).map_err(plain)?;
-    let unit = Unit {
+    let settings = ExportSettings {
         version: if request.version == Version::V2 { 2 } else { 3 },
         scalars: request.scalars,
         token: token(&resources, request)?,
         bare: bare.map(str::to_owned),
     };
-    let json = serde_json::to_vec_pretty(&unit).map_err(|e| plain(e.to_string()))?;
-    place(&resources, UNIT, &json).map_err(plain)?;
-    // What is described is what the unit itself will open.
+    let json = serde_json::to_vec_pretty(&settings).map_err(|e| plain(e.to_string()))?;
+    place(&resources, SETTINGS, &json).map_err(plain)?;
+    // What is described is what the FMU itself will open.
     let opening = Opening { name: "export".into(), resources: resources.clone(), log: Mailbox::default() };
     let opened = open(&opening).map_err(plain)?;
-    let about = about(request, &scenario, &unit);
+    let about = about(request, &scenario, &settings);
     let entries = entries(request, &search, &resources, &opened, &about)?;
     pack(&request.out, &entries).map_err(plain)?;
     let can = opened.subsystem.capabilities();
@@ -116,7 +116,7 @@ impl Bundle<'_> {
         for spec in &self.scenario.subsystems {
             if terraglue_scenario::ModuleKind::is_fmu(&spec.module) {
                 let to =
-                    self.take(&self.scenario.folder.join(&spec.module), format!("units/{}.fmu", spec.name))?;
+                    self.take(&self.scenario.folder.join(&spec.module), format!("fmus/{}.fmu", spec.name))?;
                 self.set(&spec.name, "fmu", &to);
                 continue;
             }
@@ -271,8 +271,8 @@ fn collect(folder: &Path, files: &mut Vec<PathBuf>) -> std::io::Result<()> {
     Ok(())
 }
 
-fn about(request: &Request, scenario: &Scenario, unit: &Unit) -> About {
-    let help = match unit.bare {
+fn about(request: &Request, scenario: &Scenario, settings: &ExportSettings) -> About {
+    let help = match settings.bare {
         Some(_) => format!("The module {} of Terraglue", request.target),
         None => format!("The scenario {} of Terraglue", scenario.name),
     };
@@ -280,7 +280,7 @@ fn about(request: &Request, scenario: &Scenario, unit: &Unit) -> About {
         name: scenario.name.clone(),
         identifier: identifier(&scenario.name),
         description: help,
-        token: unit.token.clone(),
+        token: settings.token.clone(),
         tool: format!("Terraglue {}", env!("CARGO_PKG_VERSION")),
         license: "The library: MIT OR Apache-2.0. The model: that of its files.".into(),
         stop_s: scenario.time.duration_s,
@@ -300,9 +300,9 @@ fn entries(
     let library = search.folders().iter().map(|f| f.join(LIBRARY)).find(|p| p.is_file());
     let library = library.ok_or_else(|| {
         let help =
-            "build it with `cargo build --package terraglue-unit`, or give its folder by --module-path";
+            "build it with `cargo build --package terraglue-fmu-library`, or give its folder by --module-path";
         InputError::plain(
-            format!("the library of exported units, {LIBRARY}, was not found"),
+            format!("the library of exported FMUs, {LIBRARY}, was not found"),
             Some(help.into()),
         )
     })?;

@@ -1,6 +1,6 @@
 //! A scenario as a functional mock-up unit.
 //!
-//! [`write`] packs a scenario, its modules and its files; [`open`] makes an instance from them inside the unit.
+//! [`write`] packs a scenario, its modules and its files; [`open`] makes an instance from them inside the FMU.
 //! A single module is exported as a small scenario around it: a soil gets ground and `feet` that another program
 //! moves.
 
@@ -21,12 +21,12 @@ use whole::Whole;
 pub use bundle::{Exported, write};
 pub use wrap::wrap;
 
-/// States that a master can keep at a time, one for the unit's own use among them.
+/// States that a master can keep at a time, one for the FMU's own use among them.
 const SLOTS: u32 = 33;
 
-/// Names in the resources of a unit.
+/// Names in the resources of an FMU.
 const SCENARIO: &str = "scenario.toml";
-const UNIT: &str = "unit.json";
+const SETTINGS: &str = "settings.json";
 
 /// What to export, and how.
 #[derive(Clone, Debug)]
@@ -41,14 +41,14 @@ pub struct Request {
     pub version: Version,
     /// Arrays element by element also in FMI 3.0.
     pub scalars: bool,
-    /// Where the unit goes.
+    /// Where the FMU goes.
     pub out: PathBuf,
 }
 
-/// What the unit's own library must know beside the scenario.
+/// What the FMU's own library must know beside the scenario.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-struct Unit {
+struct ExportSettings {
     /// 2 or 3.
     version: u32,
     scalars: bool,
@@ -57,33 +57,35 @@ struct Unit {
     bare: Option<String>,
 }
 
-impl Unit {
+impl ExportSettings {
     fn fmi(&self) -> Version {
         if self.version == 2 { Version::V2 } else { Version::V3 }
     }
 }
 
-/// Makes an instance from the resources of a unit.
+/// Makes an instance from the resources of an FMU.
 ///
 /// # Errors
 /// What is missing or wrong in the resources, in words.
 pub fn open(opening: &Opening) -> Result<Opened, String> {
-    let path = opening.resources.join(UNIT);
+    let path = opening.resources.join(SETTINGS);
     let text =
         terraglue_subsystem::files::read_text(&path).map_err(|e| format!("{}: {e}", path.display()))?;
-    let unit: Unit = serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))?;
-    let whole = instance(opening, &unit).map_err(|e| e.to_string())?;
+    let settings: ExportSettings =
+        serde_json::from_str(&text).map_err(|e| format!("{}: {e}", path.display()))?;
+    let whole = instance(opening, &settings).map_err(|e| e.to_string())?;
     let subsystem = whole.map_err(|e| e.to_string())?;
-    let layout = Layout::new(unit.fmi(), unit.scalars, terraglue_subsystem::Subsystem::variables(&subsystem));
-    Ok(Opened { layout, token: unit.token, slots: SLOTS, settles: true, subsystem: Box::new(subsystem) })
+    let layout =
+        Layout::new(settings.fmi(), settings.scalars, terraglue_subsystem::Subsystem::variables(&subsystem));
+    Ok(Opened { layout, token: settings.token, slots: SLOTS, settles: true, subsystem: Box::new(subsystem) })
 }
 
 fn instance(
     opening: &Opening,
-    unit: &Unit,
+    settings: &ExportSettings,
 ) -> terraglue_diagnostics::Result<terraglue_subsystem::Result<Whole>> {
     let scenario = Scenario::load(&opening.resources.join(SCENARIO), &[])?;
-    // Nothing but the unit's own modules: not what the program that runs it happens to have beside it.
+    // Nothing but the FMU's own modules: not what the program that runs it happens to have beside it.
     let options = Options { threads: 1, ..Options::default() };
     let log = opening.log.clone();
     let testbed = Testbed::build_hosted(&scenario, &options, &crate::library(), |services| {
@@ -93,7 +95,7 @@ fn instance(
             ..services
         }
     })?;
-    Ok(Whole::new(testbed, unit.bare.as_deref(), SLOTS))
+    Ok(Whole::new(testbed, settings.bare.as_deref(), SLOTS))
 }
 
 /// Writes a file below a folder, with the folders on the way.

@@ -1,10 +1,10 @@
-//! What a unit tells people: a page, a licence, an icon.
+//! What an FMU tells people: a page, a licence, an icon.
 
 use std::fmt::Write;
 use terraglue_fmi::export::{About, Opened};
 use terraglue_subsystem::Causality;
 
-/// Licence of the library in a unit.
+/// Licence of the library in an FMU.
 pub const LICENSE: &str = include_str!("../../../../LICENSE-MIT");
 
 /// A page that lists the variables.
@@ -32,7 +32,7 @@ pub fn page(opened: &Opened, about: &About) -> String {
          </style></head><body>\n<h1>{name}</h1>\n<p>{what}. Made by {tool}.</p>\n\
          <p>SI units; the world has z up. A pose that is set before a step is where the foot is at its end, and the \
          foot goes there on a straight line; a pose set during the initialisation is where it is at the start. Outputs \
-         are those of the last step. A step may have any length: the unit divides it into steps of {step} s or \
+         are those of the last step. A step may have any length: the FMU divides it into steps of {step} s or \
          less.</p>\n<table>\n<tr><th>name<th>type<th>unit<th>role<th>what</tr>\n{rows}</table>\n</body></html>\n",
         name = escaped(&about.name),
         what = escaped(&about.description),

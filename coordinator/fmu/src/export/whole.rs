@@ -1,6 +1,6 @@
-//! A whole scenario as one subsystem: what an exported unit steps.
+//! A whole scenario as one subsystem: what an exported FMU steps.
 
-use super::super::feet;
+use super::super::driven_bodies;
 use terraglue_engine::Testbed;
 use terraglue_engine::testbed::Snapshot;
 use terraglue_host::Reply;
@@ -11,7 +11,7 @@ use terraglue_subsystem::{
 
 /// Where a variable lives.
 #[derive(Clone, Copy, Debug)]
-struct Place {
+struct VariableSlot {
     slot: usize,
     id: u32,
 }
@@ -20,7 +20,7 @@ struct Place {
 pub(super) struct Whole {
     testbed: Testbed,
     variables: Vec<Variable>,
-    places: Vec<Place>,
+    places: Vec<VariableSlot>,
     /// Instances of `feet`, which are told how long a step is.
     feet: Vec<usize>,
     capabilities: Capabilities,
@@ -32,11 +32,11 @@ pub(super) struct Whole {
 impl Whole {
     /// `bare` names the subsystem whose variables are shown without its name in front.
     pub fn new(mut testbed: Testbed, bare: Option<&str>, slots: u32) -> Result<Self> {
-        let is_feet = |i: &terraglue_host::Instance| i.module() == feet::NAME;
+        let is_feet = |i: &terraglue_host::Instance| i.module() == driven_bodies::NAME;
         let feet: Vec<usize> =
             (0..testbed.instances().len()).filter(|k| is_feet(&testbed.instances()[*k])).collect();
         for slot in &feet {
-            tell(&mut testbed, *slot, feet::id::JUMP, Values::Bool(&[true]))?;
+            tell(&mut testbed, *slot, driven_bodies::id::JUMP, Values::Bool(&[true]))?;
         }
         let (variables, places) = variables(&testbed, bare, &feet);
         let capabilities = capabilities(&testbed);
@@ -45,7 +45,7 @@ impl Whole {
         Ok(Self { testbed, variables, places, feet, capabilities, snapshots, step_s })
     }
 
-    fn place(&self, id: u32) -> Result<Place> {
+    fn place(&self, id: u32) -> Result<VariableSlot> {
         let place = self.places.get(id as usize).copied();
         place.ok_or_else(|| Error::Refused(format!("no variable has the number {id}")))
     }
@@ -63,7 +63,7 @@ impl Whole {
         let (count, step_s) = if fits { (whole, self.step_s) } else { (ratio.ceil(), h / ratio.ceil()) };
         self.testbed.set_step_s(step_s);
         for slot in &self.feet {
-            tell(&mut self.testbed, *slot, feet::id::DURATION, Values::F64(&[h]))?;
+            tell(&mut self.testbed, *slot, driven_bodies::id::DURATION, Values::F64(&[h]))?;
         }
         self.testbed.refresh().map_err(failed)?;
         for _ in 0..count as u64 {
@@ -86,11 +86,12 @@ fn tell(testbed: &mut Testbed, slot: usize, id: u32, values: Values) -> Result {
 }
 
 /// The variables of all subsystems under new numbers; inputs that a connection feeds can only be read.
-fn variables(testbed: &Testbed, bare: Option<&str>, feet: &[usize]) -> (Vec<Variable>, Vec<Place>) {
+fn variables(testbed: &Testbed, bare: Option<&str>, feet: &[usize]) -> (Vec<Variable>, Vec<VariableSlot>) {
     let (mut all, mut places) = (Vec::new(), Vec::new());
     for (slot, instance) in testbed.instances().iter().enumerate() {
-        let own =
-            |v: &&Variable| feet.contains(&slot) && [feet::id::DURATION, feet::id::JUMP].contains(&v.id);
+        let own = |v: &&Variable| {
+            feet.contains(&slot) && [driven_bodies::id::DURATION, driven_bodies::id::JUMP].contains(&v.id)
+        };
         for v in instance.subsystem().variables().iter().filter(|v| !own(v)) {
             let mut shown = Variable { id: all.len() as u32, ..v.clone() };
             if bare != Some(instance.name()) {
@@ -100,7 +101,7 @@ fn variables(testbed: &Testbed, bare: Option<&str>, feet: &[usize]) -> (Vec<Vari
                 (shown.causality, shown.effect) = (Causality::Local, Effect::ReadOnly);
             }
             all.push(shown);
-            places.push(Place { slot, id: v.id });
+            places.push(VariableSlot { slot, id: v.id });
         }
     }
     (all, places)
@@ -128,7 +129,7 @@ impl Subsystem for Whole {
     fn advance(&mut self, step: &Step, _: &Input, out: &mut Response) -> Result {
         if step.h == 0.0 {
             for slot in &self.feet {
-                tell(&mut self.testbed, *slot, feet::id::JUMP, Values::Bool(&[false]))?;
+                tell(&mut self.testbed, *slot, driven_bodies::id::JUMP, Values::Bool(&[false]))?;
             }
         } else {
             self.go(step.h)?;

@@ -89,12 +89,12 @@ fn now() -> Now {
     Now { t: 0.0, h: H, gravity: MOON, margin: 1e-3 }
 }
 
-struct Bench {
+struct Fixture {
     soil: Box<dyn Subsystem>,
     detector: ContactDetector,
 }
 
-impl Bench {
+impl Fixture {
     fn new(soil: Box<dyn Subsystem>, geometries: &[Geometry], terrain: Option<&dyn Terrain>) -> Self {
         let scene = scene(geometries);
         let bodies = [BodySide { subsystem: 2, name: "robot", scene: &scene }];
@@ -114,12 +114,12 @@ const SPHERE: Geometry = Geometry::Sphere { radius: 0.03 };
 #[test]
 fn a_sphere_on_a_slope_gets_its_normal_and_lowest_point() {
     for angle in [0.0, 0.1, 0.3f64] {
-        let mut bench = Bench::new(Box::new(slope(angle)), &[SPHERE], None);
+        let mut fixture = Fixture::new(Box::new(slope(angle)), &[SPHERE], None);
         // Centre so that the sphere touches the plane z = x·tan(angle) beside the origin, 0.2 mm deep.
         let n = [-angle.sin(), 0.0, angle.cos()];
         let d = 0.0298;
         let state = at([0.1 + n[0] * d, 0.05, 0.1 * angle.tan() + n[2] * d], [0.0; 3]);
-        let set = bench.detect(&[state]).expect("on the ground");
+        let set = fixture.detect(&[state]).expect("on the ground");
         assert_eq!((set.ports.len(), set.n, set.epoch), (1, 3, 1));
         let port = &set.ports[0];
         assert_eq!((port.mask, port.side, port.body, port.shape), (component::FORCE, 1, 0, 10));
@@ -139,8 +139,8 @@ fn a_sphere_on_a_slope_gets_its_normal_and_lowest_point() {
 
 #[test]
 fn frames_are_right_handed_with_t1_along_world_x() {
-    let mut bench = Bench::new(Box::new(slope(0.25)), &[SPHERE], None);
-    let set = bench.detect(&[at([0.0, 0.0, 0.03], [0.0; 3])]).expect("on the ground");
+    let mut fixture = Fixture::new(Box::new(slope(0.25)), &[SPHERE], None);
+    let set = fixture.detect(&[at([0.0, 0.0, 0.03], [0.0; 3])]).expect("on the ground");
     let f = set.ports[0].frame;
     assert!(f[3] > 0.0 && f[4].abs() < 1e-9);
     let cross = [f[1] * f[5] - f[2] * f[4], f[2] * f[3] - f[0] * f[5], f[0] * f[4] - f[1] * f[3]];
@@ -151,36 +151,36 @@ fn frames_are_right_handed_with_t1_along_world_x() {
 
 #[test]
 fn a_hovering_foot_makes_no_port_and_a_falling_one_makes_it_a_step_ahead() {
-    let mut bench = Bench::new(Box::new(slope(0.0)), &[SPHERE], None);
+    let mut fixture = Fixture::new(Box::new(slope(0.0)), &[SPHERE], None);
     let hovering = at([0.0, 0.0, 0.03 + 5e-3], [0.0; 3]);
-    assert!(bench.detect(&[hovering]).expect("fine").ports.is_empty());
+    assert!(fixture.detect(&[hovering]).expect("fine").ports.is_empty());
     // 9 mm above, 10 m/s: touches within the millisecond.
     let falling = at([0.0, 0.0, 0.03 + 9e-3], [0.0, 0.0, -10.0]);
-    assert_eq!(bench.detect(&[falling]).expect("fine").ports.len(), 1);
+    assert_eq!(fixture.detect(&[falling]).expect("fine").ports.len(), 1);
     // 12 mm above it does not, margin included.
     let too_high = at([0.0, 0.0, 0.03 + 12e-3], [0.0, 0.0, -10.0]);
-    assert!(bench.detect(&[too_high]).expect("fine").ports.is_empty());
+    assert!(fixture.detect(&[too_high]).expect("fine").ports.is_empty());
     // The tip of a spinning body moves though its centre rests.
     let mut spinning = at([0.0, 0.0, 0.03 + 5e-3], [0.0; 3]);
     spinning.angular_velocity = [0.0, 200.0, 0.0];
-    assert_eq!(bench.detect(&[spinning]).expect("fine").ports.len(), 1);
+    assert_eq!(fixture.detect(&[spinning]).expect("fine").ports.len(), 1);
 }
 
 #[test]
 fn keys_stay_and_the_epoch_counts_changes_of_the_set() {
-    let mut bench = Bench::new(Box::new(slope(0.0)), &[SPHERE, SPHERE, SPHERE], None);
+    let mut fixture = Fixture::new(Box::new(slope(0.0)), &[SPHERE, SPHERE, SPHERE], None);
     let z = [0.03, 0.03, 0.03];
     let states = |z: [f64; 3]| -> Vec<BodyState> {
         (0..3).map(|k| at([0.3 * k as f64 - 0.3, 0.0, z[k]], [0.0; 3])).collect()
     };
     let keys = |set: &PortSet| set.ports.iter().map(|p| p.key & 0xffff).collect::<Vec<_>>();
-    let set = bench.detect(&states(z)).expect("fine");
+    let set = fixture.detect(&states(z)).expect("fine");
     assert_eq!((keys(set), set.epoch, set.n), (vec![10, 11, 12], 1, 9));
-    assert_eq!(bench.detect(&states(z)).expect("fine").epoch, 1);
-    let set = bench.detect(&states([0.03, 0.2, 0.03])).expect("fine");
+    assert_eq!(fixture.detect(&states(z)).expect("fine").epoch, 1);
+    let set = fixture.detect(&states([0.03, 0.2, 0.03])).expect("fine");
     assert_eq!((keys(set), set.epoch), (vec![10, 12], 2));
     assert_eq!(set.ports[1].first, 3);
-    let set = bench.detect(&states(z)).expect("fine");
+    let set = fixture.detect(&states(z)).expect("fine");
     assert_eq!((keys(set), set.epoch), (vec![10, 11, 12], 3));
     assert_eq!(set.ports[1].first_node as usize, set.ports[0].nodes(&set.nodes).len());
 }
@@ -188,8 +188,8 @@ fn keys_stay_and_the_epoch_counts_changes_of_the_set() {
 #[test]
 fn a_plate_carries_moments_over_its_half_lengths() {
     let plate = Geometry::Box { half_extents: [0.15, 0.1, 0.01] };
-    let mut bench = Bench::new(Box::new(slope(0.0)), &[plate], None);
-    let set = bench.detect(&[at([0.003, 0.002, 0.0099], [0.0; 3])]).expect("fine");
+    let mut fixture = Fixture::new(Box::new(slope(0.0)), &[plate], None);
+    let set = fixture.detect(&[at([0.003, 0.002, 0.0099], [0.0; 3])]).expect("fine");
     let port = &set.ports[0];
     assert_eq!((port.mask, set.n), (component::WRENCH, 6));
     assert!((port.extent[0] - 0.15).abs() < 1e-9 && (port.extent[1] - 0.1).abs() < 1e-9, "{:?}", port.extent);
@@ -200,8 +200,8 @@ fn a_plate_carries_moments_over_its_half_lengths() {
 
 #[test]
 fn a_sphere_smaller_than_a_cell_does_not_fall_between_the_nodes() {
-    let mut bench = Bench::new(Box::new(slope(0.0)), &[Geometry::Sphere { radius: 0.003 }], None);
-    let set = bench.detect(&[at([0.005, 0.005, 0.0029], [0.0; 3])]).expect("fine");
+    let mut fixture = Fixture::new(Box::new(slope(0.0)), &[Geometry::Sphere { radius: 0.003 }], None);
+    let set = fixture.detect(&[at([0.005, 0.005, 0.0029], [0.0; 3])]).expect("fine");
     assert_eq!((set.ports.len(), set.nodes.len()), (1, 1));
     assert!((set.nodes[0].lower + 1e-4).abs() < 1e-9);
 }
@@ -214,18 +214,18 @@ fn a_ground_that_changes_is_seen_at_once() {
             soil.field.set_units(i, j, -100_000);
         }
     }
-    let mut bench = Bench::new(Box::new(soil), &[SPHERE], None);
+    let mut fixture = Fixture::new(Box::new(soil), &[SPHERE], None);
     let deep = at([0.0, 0.0, 0.03], [0.0; 3]);
-    assert!(bench.detect(&[deep]).expect("fine").ports.is_empty(), "hangs over a hole of 24 mm");
+    assert!(fixture.detect(&[deep]).expect("fine").ports.is_empty(), "hangs over a hole of 24 mm");
     let beside = at([0.3, 0.0, 0.03], [0.0; 3]);
-    assert_eq!(bench.detect(&[beside]).expect("fine").ports.len(), 1);
+    assert_eq!(fixture.detect(&[beside]).expect("fine").ports.len(), 1);
 }
 
 #[test]
 fn a_shape_beyond_the_ground_is_an_error_only_when_it_is_low() {
-    let mut bench = Bench::new(Box::new(slope(0.0)), &[SPHERE], None);
-    assert!(bench.detect(&[at([1.5, 0.0, 0.5], [0.0; 3])]).expect("high above").ports.is_empty());
-    match bench.detect(&[at([1.5, 0.25, 0.03], [0.0; 3])]) {
+    let mut fixture = Fixture::new(Box::new(slope(0.0)), &[SPHERE], None);
+    assert!(fixture.detect(&[at([1.5, 0.0, 0.5], [0.0; 3])]).expect("high above").ports.is_empty());
+    match fixture.detect(&[at([1.5, 0.25, 0.03], [0.0; 3])]) {
         Err(Error::Simulation { message, .. }) => {
             for part in ["`foot0` of robot", "x = 1.500 m, y = 0.250 m", "x = -1 … 1 m"] {
                 assert!(message.contains(part), "{message}");
@@ -234,14 +234,14 @@ fn a_shape_beyond_the_ground_is_an_error_only_when_it_is_low() {
         other => panic!("no error: {other:?}"),
     }
     let nowhere = at([f64::NAN, 0.0, 0.0], [0.0; 3]);
-    assert!(matches!(bench.detect(&[nowhere]), Err(Error::Simulation { .. })));
+    assert!(matches!(fixture.detect(&[nowhere]), Err(Error::Simulation { .. })));
 }
 
 #[test]
 fn a_soil_without_heights_is_read_as_the_terrain() {
     let terrain = ground(TerrainKind::Flat { height_m: 0.2 });
-    let mut bench = Bench::new(Box::new(Mute), &[SPHERE], Some(&*terrain));
-    assert_eq!(bench.detect(&[at([0.0, 0.0, 0.23], [0.0; 3])]).expect("fine").ports.len(), 1);
+    let mut fixture = Fixture::new(Box::new(Mute), &[SPHERE], Some(&*terrain));
+    assert_eq!(fixture.detect(&[at([0.0, 0.0, 0.23], [0.0; 3])]).expect("fine").ports.len(), 1);
     let scene = scene(&[SPHERE]);
     let bodies = [BodySide { subsystem: 0, name: "robot", scene: &scene }];
     let grounds = [GroundSide { subsystem: 1, instance: &Mute }];
@@ -261,10 +261,10 @@ fn the_frame_moves_smoothly_over_rolling_ground() {
     let height = |x: f64| soil.field.height(((x + 1.0) / 0.01).round() as i32, 100);
     let positions: Vec<[f64; 3]> =
         (0..200).map(|k| f64::from(k) * 1e-3).map(|x| [x, 0.0, height(x) + 0.028]).collect();
-    let mut bench = Bench::new(Box::new(Shown::of(&*terrain)), &[SPHERE], None);
+    let mut fixture = Fixture::new(Box::new(Shown::of(&*terrain)), &[SPHERE], None);
     let mut before: Option<[f64; 9]> = None;
     for p in positions {
-        let set = bench.detect(&[at(p, [0.0; 3])]).expect("fine");
+        let set = fixture.detect(&[at(p, [0.0; 3])]).expect("fine");
         let frame = set.ports[0].frame;
         if let Some(old) = before {
             let turn = (0..3).map(|k| (frame[k] - old[k]).abs()).fold(0.0, larger);
@@ -274,8 +274,8 @@ fn the_frame_moves_smoothly_over_rolling_ground() {
     }
 }
 
-/// A bench on level ground with one body that carries all the shapes.
-fn one_body(parts: &[(Geometry, [f64; 3])]) -> Bench {
+/// A fixture on level ground with one body that carries all the shapes.
+fn one_body(parts: &[(Geometry, [f64; 3])]) -> Fixture {
     let geometries: Vec<Geometry> = parts.iter().map(|(g, _)| g.clone()).collect();
     let mut scene = scene(&geometries);
     scene.bodies.truncate(1);
@@ -287,7 +287,7 @@ fn one_body(parts: &[(Geometry, [f64; 3])]) -> Bench {
     let bodies = [BodySide { subsystem: 2, name: "robot", scene: &scene }];
     let grounds = [GroundSide { subsystem: 3, instance: &*soil }];
     let detector = ContactDetector::new(&bodies, &grounds, None).expect("has ground");
-    Bench { soil, detector }
+    Fixture { soil, detector }
 }
 
 /// A plate, a foot under each end of it, and a ball beside all.
@@ -303,8 +303,8 @@ fn bridge() -> Vec<(Geometry, [f64; 3])> {
 
 #[test]
 fn shapes_that_hang_together_are_one_contact() {
-    let mut bench = one_body(&bridge());
-    let set = bench.detect(&[at([0.002, 0.001, -1e-3], [0.0; 3])]).expect("on the ground");
+    let mut fixture = one_body(&bridge());
+    let set = fixture.detect(&[at([0.002, 0.001, -1e-3], [0.0; 3])]).expect("on the ground");
     let keys: Vec<u64> = set.ports.iter().map(|p| p.key & 0xffff).collect();
     assert_eq!(keys, [10, 11]);
     let [piece, ball] = &set.ports[..] else { panic!("two ports") };
@@ -343,10 +343,10 @@ fn a_small_part_is_buried_only_with_all_of_its_piece() {
         (Geometry::Box { half_extents: [0.05, 0.05, 0.05] }, [0.0, 0.0, 0.05]),
         (Geometry::Box { half_extents: [0.002, 0.05, 0.0025] }, [0.0, 0.0, -0.0024]),
     ];
-    let mut bench = one_body(&parts);
-    let set = bench.detect(&[at([0.0, 0.0, -0.02], [0.0; 3])]).expect("fine");
+    let mut fixture = one_body(&parts);
+    let set = fixture.detect(&[at([0.0, 0.0, -0.02], [0.0; 3])]).expect("fine");
     assert_eq!(set.ports.len(), 1);
-    assert_eq!(bench.detector.buried(), None);
-    bench.detect(&[at([0.0, 0.0, -0.25], [0.0; 3])]).expect("fine");
-    assert!(bench.detector.buried().is_some_and(|why| why.contains("`foot0` of robot")));
+    assert_eq!(fixture.detector.buried(), None);
+    fixture.detect(&[at([0.0, 0.0, -0.25], [0.0; 3])]).expect("fine");
+    assert!(fixture.detector.buried().is_some_and(|why| why.contains("`foot0` of robot")));
 }

@@ -21,8 +21,8 @@ mod xt;
 pub(super) use tt::TtForm;
 pub(super) use xt::XtForm;
 
-use super::exchange::Exchange;
-use super::glue::Row;
+use super::glue::ConstraintKind;
+use super::interface_problem::InterfaceProblem;
 use super::memory::{Recall, Remember};
 use super::{Needs, Outcome, Strategy, linear};
 use terraglue_diagnostics::Result;
@@ -74,14 +74,19 @@ impl Form {
 
     /// The form for the soils of a group: as asked, else by what they offer, what the ports carry and κ of the step before
     /// (0: none was formed).
-    pub fn choose(form: Option<Self>, kappa: f64, exchange: &Exchange, instances: &[Instance]) -> Self {
-        let takes = |c| exchange.ground_slots().all(|s| instances[s].capabilities().has(c));
+    pub fn choose(
+        form: Option<Self>,
+        kappa: f64,
+        problem: &InterfaceProblem,
+        instances: &[Instance],
+    ) -> Self {
+        let takes = |c| problem.ground_slots().all(|s| instances[s].capabilities().has(c));
         match form {
-            _ if exchange.needs_linearisation() => Self::Tt,
+            _ if problem.needs_linearisation() => Self::Tt,
             Some(form) => form,
             None if !takes(Capabilities::FORCE) => Self::Xt,
             None if !takes(Capabilities::MOTION) => Self::Tt,
-            None if exchange.rows.contains(&Row::Law) => {
+            None if problem.rows.contains(&ConstraintKind::Law) => {
                 if kappa > KAPPA_XT {
                     Self::Tt
                 } else {
@@ -101,17 +106,17 @@ impl Limits {
     }
 
     /// τ·max(T_ref, |T|∞), N.
-    pub fn threshold(&self, exchange: &Exchange) -> f64 {
-        self.tolerance * exchange.t_ref.max(linear::max_norm(&exchange.t))
+    pub fn threshold(&self, problem: &InterfaceProblem) -> f64 {
+        self.tolerance * problem.t_ref.max(linear::max_norm(&problem.t))
     }
 
     /// The end of an iteration that did not reach its threshold; `measure` (N) is what was left.
-    pub fn give_up(&self, exchange: &mut Exchange, what: &str, measure: f64) -> Outcome {
-        exchange.report.residual = measure / exchange.t_ref;
+    pub fn give_up(&self, problem: &mut InterfaceProblem, what: &str, measure: f64) -> Outcome {
+        problem.report.residual = measure / problem.t_ref;
         Outcome::NotConverged(format!(
             "{what} = {measure:.3e} N after {} iterations, tolerance {:.3e} N",
             self.max_iterations,
-            self.threshold(exchange)
+            self.threshold(problem)
         ))
     }
 }
@@ -142,14 +147,19 @@ impl Iterative {
         }
     }
 
-    fn run(&mut self, form: Form, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
-        exchange.t.copy_from_slice(&self.start);
-        exchange.report.xt_form = form == Form::Xt;
+    fn run(
+        &mut self,
+        form: Form,
+        problem: &mut InterfaceProblem,
+        instances: &mut [Instance],
+    ) -> Result<Outcome> {
+        problem.t.copy_from_slice(&self.start);
+        problem.report.xt_form = form == Form::Xt;
         let outcome = match form {
-            Form::Tt => self.tt.solve(&self.limits, exchange, instances)?,
-            Form::Xt => self.xt.solve(&self.limits, exchange, instances)?,
+            Form::Tt => self.tt.solve(&self.limits, problem, instances)?,
+            Form::Xt => self.xt.solve(&self.limits, problem, instances)?,
         };
-        self.kappa = exchange.report.kappa_max;
+        self.kappa = problem.report.kappa_max;
         Ok(outcome)
     }
 }
@@ -174,34 +184,34 @@ impl Strategy for Iterative {
         self.tt.recall(kept);
     }
 
-    fn solve(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
-        if exchange.needs_linearisation() {
+    fn solve(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<Outcome> {
+        if problem.needs_linearisation() {
             // joints start from the force of the step before, contacts from the soil's own
-            exchange.start_from_last();
+            problem.start_from_last();
             self.start.clear();
-            self.start.extend_from_slice(&exchange.t);
-            return self.run(Form::Tt, exchange, instances);
+            self.start.extend_from_slice(&problem.t);
+            return self.run(Form::Tt, problem, instances);
         }
-        exchange.estimate_forces(instances)?;
+        problem.estimate_forces(instances)?;
         if self.from_estimate {
-            exchange.solve_compatibility(true, instances)?;
-            exchange.report.evaluations_soil = 0; // the start is not an evaluation of the iteration
+            problem.solve_compatibility(true, instances)?;
+            problem.report.evaluations_soil = 0; // the start is not an evaluation of the iteration
         } else {
-            exchange.t.fill(0.0);
+            problem.t.fill(0.0);
         }
         self.start.clear();
-        self.start.extend_from_slice(&exchange.t);
-        let first = Form::choose(self.form, self.kappa, exchange, instances);
-        let outcome = self.run(first, exchange, instances)?;
+        self.start.extend_from_slice(&problem.t);
+        let first = Form::choose(self.form, self.kappa, problem, instances);
+        let outcome = self.run(first, problem, instances)?;
         if outcome == Outcome::Converged || self.form.is_some() {
             return Ok(outcome);
         }
         let other = if first == Form::Tt { Form::Xt } else { Form::Tt };
         let needed = if other == Form::Tt { Capabilities::FORCE } else { Capabilities::MOTION };
-        if exchange.ground_slots().any(|s| !instances[s].capabilities().has(needed)) {
+        if problem.ground_slots().any(|s| !instances[s].capabilities().has(needed)) {
             return Ok(outcome);
         }
-        self.run(other, exchange, instances)
+        self.run(other, problem, instances)
     }
 }
 

@@ -7,8 +7,8 @@
 
 use super::super::Outcome;
 use super::super::complementarity::{BoundedProblem, BoundedSolver};
-use super::super::exchange::Exchange;
-use super::super::glue::Row;
+use super::super::glue::ConstraintKind;
+use super::super::interface_problem::InterfaceProblem;
 use super::super::linear::max_norm;
 use super::super::memory::Recall;
 use super::super::refresh::Refresh;
@@ -73,122 +73,126 @@ impl TtForm {
         self.jacobian.recall(kept);
     }
 
-    /// Iterates from `exchange.t`.
+    /// Iterates from `problem.t`.
     pub fn solve(
         &mut self,
         limits: &Limits,
-        exchange: &mut Exchange,
+        problem: &mut InterfaceProblem,
         instances: &mut [Instance],
     ) -> Result<Outcome> {
         let (mut size, mut before) = (f64::INFINITY, f64::NAN);
-        let own_start = exchange.needs_linearisation();
-        let soils = exchange.has_grounds() && exchange.at.h > 0.0;
+        let own_start = problem.needs_linearisation();
+        let soils = problem.has_grounds() && problem.at.h > 0.0;
         for iteration in 0..=limits.max_iterations {
             self.predicted.clear();
-            self.predicted.extend((0..exchange.n()).map(|i| exchange.bodies_part(i)));
-            exchange.advance_bodies(instances)?;
-            if iteration == 0 || !self.as_predicted(limits, exchange) {
-                self.evaluate_grounds(exchange, instances)?;
+            self.predicted.extend((0..problem.n()).map(|i| problem.bodies_part(i)));
+            problem.advance_bodies(instances)?;
+            if iteration == 0 || !self.as_predicted(limits, problem) {
+                self.evaluate_grounds(problem, instances)?;
             } else {
-                self.residuals(exchange);
+                self.residuals(problem);
             }
             let left = max_norm(&self.e);
             if own_start {
-                self.jacobian.provide(left, before, exchange, instances)?;
+                self.jacobian.provide(left, before, problem, instances)?;
             }
             before = left;
-            self.bounds(exchange);
-            let solved = self.newton_step(exchange, instances)?;
+            self.bounds(problem);
+            let solved = self.newton_step(problem, instances)?;
             let last = std::mem::replace(&mut size, max_norm(&self.d));
             // where Λ is nearly singular, rounding of the places is all that is left in e, and Λ·e never ends
             let rounding = !soils && size > 0.5 * last && left <= ROUNDING_M;
-            if size <= limits.threshold(exchange) || rounding {
-                exchange.settle_bodies(instances)?;
-                return Ok(self.converged(exchange, size));
+            if size <= limits.threshold(problem) || rounding {
+                problem.repeat_bodies_trial(instances)?;
+                return Ok(self.converged(problem, size));
             }
             if !solved {
                 break;
             }
             if soils && !self.diagonal {
-                self.solve_linearised(limits, exchange, instances)?;
+                self.solve_linearised(limits, problem, instances)?;
             } else {
-                exchange.t.iter_mut().zip(&self.d).for_each(|(t, d)| *t += d);
+                problem.t.iter_mut().zip(&self.d).for_each(|(t, d)| *t += d);
             }
         }
-        Ok(limits.give_up(exchange, "T-T form: |Λ·e|", size))
+        Ok(limits.give_up(problem, "T-T form: |Λ·e|", size))
     }
 
     /// Whether the bodies moved as their linearisation said, so that the soil's last trial, under the same T, still
     /// counts: the difference changes no force by a tenth of what is tolerated.
-    fn as_predicted(&self, limits: &Limits, exchange: &Exchange) -> bool {
-        let (n, allowed) = (exchange.n(), 0.1 * limits.threshold(exchange));
-        exchange.has_grounds()
+    fn as_predicted(&self, limits: &Limits, problem: &InterfaceProblem) -> bool {
+        let (n, allowed) = (problem.n(), 0.1 * limits.threshold(problem));
+        problem.has_grounds()
             && !self.diagonal
             && (0..n).all(|i| {
-                let off = (exchange.bodies_part(i) - self.predicted[i]).abs();
-                let stiffness = match exchange.rows[i] {
-                    Row::Law => self.k[i * n + i],
+                let off = (problem.bodies_part(i) - self.predicted[i]).abs();
+                let stiffness = match problem.rows[i] {
+                    ConstraintKind::Law => self.k[i * n + i],
                     _ => 1.0 / self.matrix[i * n + i],
                 };
                 off * stiffness <= allowed
             })
     }
 
-    /// One Newton step from `exchange.t` and no check: two evaluations of the bodies.
-    pub fn one_step(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<Outcome> {
-        exchange.advance_bodies(instances)?;
-        self.evaluate_grounds(exchange, instances)?;
-        if exchange.needs_linearisation() {
-            self.jacobian.provide(max_norm(&self.e), f64::NAN, exchange, instances)?;
+    /// One Newton step from `problem.t` and no check: two evaluations of the bodies.
+    pub fn one_step(
+        &mut self,
+        problem: &mut InterfaceProblem,
+        instances: &mut [Instance],
+    ) -> Result<Outcome> {
+        problem.advance_bodies(instances)?;
+        self.evaluate_grounds(problem, instances)?;
+        if problem.needs_linearisation() {
+            self.jacobian.provide(max_norm(&self.e), f64::NAN, problem, instances)?;
         }
-        self.bounds(exchange);
-        self.newton_step(exchange, instances)?;
-        exchange.t.iter_mut().zip(&self.d).for_each(|(t, d)| *t += d);
-        exchange.advance_bodies(instances)?;
-        self.evaluate_grounds(exchange, instances)?;
+        self.bounds(problem);
+        self.newton_step(problem, instances)?;
+        problem.t.iter_mut().zip(&self.d).for_each(|(t, d)| *t += d);
+        problem.advance_bodies(instances)?;
+        self.evaluate_grounds(problem, instances)?;
         let size = max_norm(&self.d);
-        Ok(self.converged(exchange, size))
+        Ok(self.converged(problem, size))
     }
 
-    /// Iterates the soil alone against the bodies as `exchange.predict_bodies` knows them; what is left of |Λ·e|, N.
+    /// Iterates the soil alone against the bodies as `problem.predict_bodies` knows them; what is left of |Λ·e|, N.
     pub fn solve_predicted(
         &mut self,
         limits: &Limits,
-        exchange: &mut Exchange,
+        problem: &mut InterfaceProblem,
         instances: &mut [Instance],
     ) -> Result<f64> {
-        exchange.predict_bodies();
-        self.evaluate_grounds(exchange, instances)?;
-        self.bounds(exchange);
+        problem.predict_bodies();
+        self.evaluate_grounds(problem, instances)?;
+        self.bounds(problem);
         self.filter.clear();
         for iteration in 0..limits.max_iterations {
-            let solved = self.newton_step(exchange, instances)?;
-            if !solved || max_norm(&self.d) <= limits.threshold(exchange) {
+            let solved = self.newton_step(problem, instances)?;
+            if !solved || max_norm(&self.d) <= limits.threshold(problem) {
                 break;
             }
-            self.step(iteration, exchange, instances)?;
+            self.step(iteration, problem, instances)?;
         }
         Ok(max_norm(&self.d))
     }
 
     /// Figures of the last trials of both sides; `size` is what is left, N.
-    pub fn conclude(&mut self, size: f64, exchange: &mut Exchange) -> Outcome {
-        self.residuals(exchange);
-        self.converged(exchange, size)
+    pub fn conclude(&mut self, size: f64, problem: &mut InterfaceProblem) -> Outcome {
+        self.residuals(problem);
+        self.converged(problem, size)
     }
 
     /// Newton with X1 linear in T, from the step d: evaluations of the soil only.
     fn solve_linearised(
         &mut self,
         limits: &Limits,
-        exchange: &mut Exchange,
+        problem: &mut InterfaceProblem,
         instances: &mut [Instance],
     ) -> Result {
         self.filter.clear();
         for iteration in 0..limits.max_iterations {
-            self.step(iteration, exchange, instances)?;
-            let solved = self.newton_step(exchange, instances)?;
-            if !solved || max_norm(&self.d) <= 0.1 * limits.threshold(exchange) {
+            self.step(iteration, problem, instances)?;
+            let solved = self.newton_step(problem, instances)?;
+            if !solved || max_norm(&self.d) <= 0.1 * limits.threshold(problem) {
                 break;
             }
         }
@@ -196,14 +200,16 @@ impl TtForm {
     }
 
     /// Bounds of every component; Coulomb's cone is inside its rows instead.
-    fn bounds(&mut self, exchange: &Exchange) {
+    fn bounds(&mut self, problem: &InterfaceProblem) {
         self.lower.clear();
         self.upper.clear();
-        for port in &exchange.ports {
+        for port in &problem.ports {
             for (i, _) in port.components() {
-                let (lower, upper) = match exchange.rows[i] {
-                    Row::Normal => (port.law.t_min, port.law.t_max),
-                    Row::Law | Row::Joint | Row::Coulomb => (f64::NEG_INFINITY, f64::INFINITY),
+                let (lower, upper) = match problem.rows[i] {
+                    ConstraintKind::Normal => (port.law.t_min, port.law.t_max),
+                    ConstraintKind::Law | ConstraintKind::Joint | ConstraintKind::Coulomb => {
+                        (f64::NEG_INFINITY, f64::INFINITY)
+                    }
                 };
                 self.lower.push(lower);
                 self.upper.push(upper);
@@ -212,81 +218,81 @@ impl TtForm {
     }
 
     /// One evaluation of the soils at the bodies' present motion and the residual of every row.
-    fn evaluate_grounds(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result {
-        if exchange.has_grounds() && exchange.at.h > 0.0 {
-            exchange.advance_grounds_under_force(instances)?;
+    fn evaluate_grounds(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result {
+        if problem.has_grounds() && problem.at.h > 0.0 {
+            problem.advance_grounds_under_force(instances)?;
         }
-        self.residuals(exchange);
+        self.residuals(problem);
         Ok(())
     }
 
-    fn residuals(&mut self, exchange: &Exchange) {
+    fn residuals(&mut self, problem: &InterfaceProblem) {
         self.e.clear();
-        for port in &exchange.ports {
+        for port in &problem.ports {
             for (i, _) in port.components() {
-                self.e.push(match exchange.rows[i] {
-                    _ if exchange.is_given(i) => 0.0,
-                    Row::Law => exchange.t[i] - exchange.f[i],
-                    _ => exchange.mismatch(i),
+                self.e.push(match problem.rows[i] {
+                    _ if problem.is_given(i) => 0.0,
+                    ConstraintKind::Law => problem.t[i] - problem.f[i],
+                    _ => problem.mismatch(i),
                 });
             }
         }
     }
 
     /// The solution of the linearised problem at the last trial; `false` if none was found.
-    fn newton_step(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<bool> {
-        let n = exchange.n();
-        if exchange.at.h > 0.0 {
-            exchange.ground_jacobian(instances, false, &mut self.mixed)?;
+    fn newton_step(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<bool> {
+        let n = problem.n();
+        if problem.at.h > 0.0 {
+            problem.ground_jacobian(instances, false, &mut self.mixed)?;
         }
-        self.assemble(exchange);
-        for port in exchange.ports.iter().filter(|p| p.len() > 1) {
-            if exchange.rows[port.first as usize + 1] == Row::Coulomb {
-                friction::project(port, &exchange.t, &mut self.e, &mut self.matrix);
+        self.assemble(problem);
+        for port in problem.ports.iter().filter(|p| p.len() > 1) {
+            if problem.rows[port.first as usize + 1] == ConstraintKind::Coulomb {
+                friction::project(port, &problem.t, &mut self.e, &mut self.matrix);
             }
         }
         if self.diagonal {
             (0..n * n).filter(|k| k / n != k % n).for_each(|k| self.matrix[k] = 0.0);
         }
         let matrix = &self.matrix;
-        let problem = BoundedProblem {
+        let bounded = BoundedProblem {
             a: |r: usize, c: usize| matrix[r * n + c],
             e: &self.e,
-            t: &exchange.t,
+            t: &problem.t,
             lower: &self.lower,
             upper: &self.upper,
         };
         self.d.clear();
         self.d.resize(n, 0.0);
-        let solved = self.solver.solve(&problem, &mut self.d);
-        exchange.report.rank = (self.solver.rank() as u32, n as u32);
-        exchange.report.condition = exchange.report.condition.max(self.solver.condition());
-        let kappa = largest_eigenvalue(&self.k, &exchange.estimate.g, &mut self.base, &mut self.work, n);
-        exchange.report.kappa_max = exchange.report.kappa_max.max(kappa);
+        let solved = self.solver.solve(&bounded, &mut self.d);
+        problem.report.rank = (self.solver.rank() as u32, n as u32);
+        problem.report.condition = problem.report.condition.max(self.solver.condition());
+        let kappa = largest_eigenvalue(&self.k, &problem.estimate.g, &mut self.base, &mut self.work, n);
+        problem.report.kappa_max = problem.report.kappa_max.max(kappa);
         Ok(solved)
     }
 
     /// d(e)/dT: normal rows G1 + G2 + compliance; the others I + K·G1 with the soil's own coupling to T_n.
-    fn assemble(&mut self, exchange: &Exchange) {
-        let n = exchange.n();
-        let g = &exchange.estimate.g;
+    fn assemble(&mut self, problem: &InterfaceProblem) {
+        let n = problem.n();
+        let g = &problem.estimate.g;
         self.matrix.clear();
         self.matrix.resize(n * n, 0.0);
         self.k.clear();
         self.k.resize(n * n, 0.0);
-        for port in &exchange.ports {
+        for port in &problem.ports {
             for (row, r) in port.components() {
                 let out = &mut self.matrix[row * n..][..n];
-                if exchange.is_given(row) {
+                if problem.is_given(row) {
                     out[row] = 1.0;
                     continue;
                 }
-                let law = exchange.rows[row] == Row::Law;
-                out[row] += if law { 1.0 } else { exchange.compliance_now(row) };
+                let law = problem.rows[row] == ConstraintKind::Law;
+                out[row] += if law { 1.0 } else { problem.compliance_now(row) };
                 if !law {
                     (0..n).for_each(|column| out[column] += g[column * n + row]);
                 }
-                if !exchange.of_soil[row] {
+                if !problem.of_soil[row] {
                     continue;
                 }
                 for (other, c) in port.components() {
@@ -314,26 +320,26 @@ impl TtForm {
     /// Shear laws bend where slip turns back, and Newton can jump to and fro across the bend for ever. Where an
     /// iteration lasts, a step must also pass a filter (Fletcher and Leyffer 2002): no earlier iterate had less left
     /// open in the laws and at the normals.
-    fn step(&mut self, iteration: u32, exchange: &mut Exchange, instances: &mut [Instance]) -> Result {
-        let filtered = iteration >= FREE_ITERATIONS && exchange.rows.contains(&Row::Law);
+    fn step(&mut self, iteration: u32, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result {
+        let filtered = iteration >= FREE_ITERATIONS && problem.rows.contains(&ConstraintKind::Law);
         if filtered {
-            self.filter.push(self.left_open(exchange));
+            self.filter.push(self.left_open(problem));
         }
         self.base.clear();
-        self.base.extend_from_slice(&exchange.t);
-        let start = self.slope(exchange);
+        self.base.extend_from_slice(&problem.t);
+        let start = self.slope(problem);
         let (mut low, mut g_low, mut high, mut g_high) = (0.0, start, 1.0, 0.0);
         let mut share = 1.0;
         for trial in 0..MAX_TRIALS {
-            for ((t, base), d) in exchange.t.iter_mut().zip(&self.base).zip(&self.d) {
+            for ((t, base), d) in problem.t.iter_mut().zip(&self.base).zip(&self.d) {
                 *t = base + share * d;
             }
-            exchange.predict_bodies();
-            self.evaluate_grounds(exchange, instances)?;
-            exchange.report.evaluations_line_search += u32::from(trial > 0);
-            let g = self.slope(exchange);
+            problem.predict_bodies();
+            self.evaluate_grounds(problem, instances)?;
+            problem.report.evaluations_line_search += u32::from(trial > 0);
+            let g = self.slope(problem);
             if start >= 0.0 || (trial == 0 && g <= 0.0) || g.abs() <= 0.5 * start.abs() {
-                if !filtered || self.passes(exchange) {
+                if !filtered || self.passes(problem) {
                     return Ok(());
                 }
                 (high, g_high) = (share, g);
@@ -356,12 +362,12 @@ impl TtForm {
     }
 
     /// Largest residual of a law and largest distance of a normal force from its complementary solution, N.
-    fn left_open(&self, exchange: &Exchange) -> [f64; 2] {
-        let n = exchange.n();
+    fn left_open(&self, problem: &InterfaceProblem) -> [f64; 2] {
+        let n = problem.n();
         let mut open = [0.0_f64; 2];
-        for (i, t) in exchange.t.iter().enumerate() {
-            match exchange.rows[i] {
-                Row::Law => open[0] = open[0].max(self.e[i].abs()),
+        for (i, t) in problem.t.iter().enumerate() {
+            match problem.rows[i] {
+                ConstraintKind::Law => open[0] = open[0].max(self.e[i].abs()),
                 _ => {
                     let wanted = t - self.e[i] / self.matrix[i * n + i];
                     open[1] = open[1].max((t - wanted.max(self.lower[i]).min(self.upper[i])).abs());
@@ -371,38 +377,38 @@ impl TtForm {
         open
     }
 
-    fn passes(&self, exchange: &Exchange) -> bool {
-        let now = self.left_open(exchange);
+    fn passes(&self, problem: &InterfaceProblem) -> bool {
+        let now = self.left_open(problem);
         self.filter.iter().all(|f| now[0] < SMALLER * f[0] || now[1] < SMALLER * f[1])
     }
 
-    fn slope(&self, exchange: &Exchange) -> f64 {
-        let of = |(row, de): (&Row, (&f64, &f64))| match row {
-            Row::Normal | Row::Joint => de.0 * de.1,
-            Row::Law | Row::Coulomb => 0.0,
+    fn slope(&self, problem: &InterfaceProblem) -> f64 {
+        let of = |(row, de): (&ConstraintKind, (&f64, &f64))| match row {
+            ConstraintKind::Normal | ConstraintKind::Joint => de.0 * de.1,
+            ConstraintKind::Law | ConstraintKind::Coulomb => 0.0,
         };
-        exchange.rows.iter().zip(self.d.iter().zip(&self.e)).map(of).sum()
+        problem.rows.iter().zip(self.d.iter().zip(&self.e)).map(of).sum()
     }
 
-    fn converged(&self, exchange: &mut Exchange, size: f64) -> Outcome {
+    fn converged(&self, problem: &mut InterfaceProblem, size: f64) -> Outcome {
         let mut largest: f64 = 0.0;
         let mut complementarity: f64 = 0.0;
-        for port in &exchange.ports {
+        for port in &problem.ports {
             let i = port.first as usize;
-            if exchange.rows[i] == Row::Joint {
+            if problem.rows[i] == ConstraintKind::Joint {
                 for k in port.range() {
-                    largest = largest.max(exchange.joint_gap(k));
+                    largest = largest.max(problem.joint_gap(k));
                 }
                 continue;
             }
-            if exchange.t[i] > 0.0 {
+            if problem.t[i] > 0.0 {
                 largest = largest.max(self.e[i].abs());
             }
-            let diagonal = self.matrix[i * exchange.t.len() + i];
-            complementarity = complementarity.max(exchange.t[i].min(self.e[i] / diagonal).abs());
+            let diagonal = self.matrix[i * problem.t.len() + i];
+            complementarity = complementarity.max(problem.t[i].min(self.e[i] / diagonal).abs());
         }
-        let report = &mut exchange.report;
-        report.residual = size / exchange.t_ref;
+        let report = &mut problem.report;
+        report.residual = size / problem.t_ref;
         report.max_gap_m = report.max_gap_m.max(largest);
         report.complementarity_n = report.complementarity_n.max(complementarity);
         report.converged = true;

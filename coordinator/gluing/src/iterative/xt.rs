@@ -8,7 +8,7 @@
 //! against X1 + G1·ΔT and asks the bodies only to confirm: two evaluations of the bodies at any κ.
 
 use super::super::Outcome;
-use super::super::exchange::Exchange;
+use super::super::interface_problem::InterfaceProblem;
 use super::super::linear::{Lu, max_norm};
 use super::{Limits, largest_eigenvalue};
 use terraglue_diagnostics::Result;
@@ -32,49 +32,49 @@ pub struct XtForm {
 }
 
 impl XtForm {
-    /// Iterates from `exchange.t`: inside against the linearised bodies, outside against the bodies themselves.
+    /// Iterates from `problem.t`: inside against the linearised bodies, outside against the bodies themselves.
     pub fn solve(
         &mut self,
         limits: &Limits,
-        exchange: &mut Exchange,
+        problem: &mut InterfaceProblem,
         instances: &mut [Instance],
     ) -> Result<Outcome> {
-        let mut norm = self.evaluate(exchange, instances)?;
+        let mut norm = self.evaluate(problem, instances)?;
         for _ in 0..limits.max_iterations {
-            if norm <= limits.threshold(exchange) {
-                return Ok(self.converged(exchange, norm));
+            if norm <= limits.threshold(problem) {
+                return Ok(self.converged(problem, norm));
             }
-            let inner = self.solve_linearised(limits, norm, exchange, instances)?;
-            norm = self.confirm(inner, limits, exchange, instances)?;
+            let inner = self.solve_linearised(limits, norm, problem, instances)?;
+            norm = self.confirm(inner, limits, problem, instances)?;
         }
-        if norm <= limits.threshold(exchange) {
-            return Ok(self.converged(exchange, norm));
+        if norm <= limits.threshold(problem) {
+            return Ok(self.converged(problem, norm));
         }
-        Ok(limits.give_up(exchange, "X-T form: |T - F|", norm))
+        Ok(limits.give_up(problem, "X-T form: |T - F|", norm))
     }
 
-    /// Iterates the soil alone against the bodies as `exchange.predict_bodies` knows them; what is left of |T − F|, N.
+    /// Iterates the soil alone against the bodies as `problem.predict_bodies` knows them; what is left of |T − F|, N.
     pub fn solve_predicted(
         &mut self,
         limits: &Limits,
-        exchange: &mut Exchange,
+        problem: &mut InterfaceProblem,
         instances: &mut [Instance],
     ) -> Result<f64> {
-        exchange.predict_bodies();
-        let mut norm = self.evaluate_grounds(exchange, instances)?;
+        problem.predict_bodies();
+        let mut norm = self.evaluate_grounds(problem, instances)?;
         for _ in 0..limits.max_iterations {
-            if norm <= limits.threshold(exchange) {
+            if norm <= limits.threshold(problem) {
                 break;
             }
-            self.newton_step(exchange, instances)?;
-            norm = self.step(norm, exchange, instances)?;
+            self.newton_step(problem, instances)?;
+            norm = self.step(norm, problem, instances)?;
         }
         Ok(norm)
     }
 
     /// Figures of the last trials of both sides; `norm` is what is left, N.
-    pub fn conclude(&self, norm: f64, exchange: &mut Exchange) -> Outcome {
-        self.converged(exchange, norm)
+    pub fn conclude(&self, norm: f64, problem: &mut InterfaceProblem) -> Outcome {
+        self.converged(problem, norm)
     }
 
     /// Newton on T − F(X1(T)) = 0 with X1 linear in T: evaluations of the soil only.
@@ -82,13 +82,13 @@ impl XtForm {
         &mut self,
         limits: &Limits,
         mut norm: f64,
-        exchange: &mut Exchange,
+        problem: &mut InterfaceProblem,
         instances: &mut [Instance],
     ) -> Result<f64> {
         for _ in 0..limits.max_iterations {
-            self.newton_step(exchange, instances)?;
-            norm = self.step(norm, exchange, instances)?;
-            if norm <= 0.1 * limits.threshold(exchange) {
+            self.newton_step(problem, instances)?;
+            norm = self.step(norm, problem, instances)?;
+            if norm <= 0.1 * limits.threshold(problem) {
                 break;
             }
         }
@@ -101,36 +101,40 @@ impl XtForm {
         &mut self,
         inner: f64,
         limits: &Limits,
-        exchange: &mut Exchange,
+        problem: &mut InterfaceProblem,
         instances: &mut [Instance],
     ) -> Result<f64> {
-        self.predicted.clone_from(&exchange.x1);
-        exchange.advance_bodies(instances)?;
-        let (n, allowed) = (exchange.n(), 0.1 * limits.threshold(exchange));
-        let off = |c: usize| (exchange.x1[c] - self.predicted[c]).abs();
+        self.predicted.clone_from(&problem.x1);
+        problem.advance_bodies(instances)?;
+        let (n, allowed) = (problem.n(), 0.1 * limits.threshold(problem));
+        let off = |c: usize| (problem.x1[c] - self.predicted[c]).abs();
         let as_predicted =
             (0..n).all(|r| (0..n).map(|c| self.k[c * n + r].abs() * off(c)).sum::<f64>() <= allowed);
-        if as_predicted { Ok(inner) } else { self.evaluate_grounds(exchange, instances) }
+        if as_predicted { Ok(inner) } else { self.evaluate_grounds(problem, instances) }
     }
 
     /// One evaluation of both sides; |r|∞.
-    fn evaluate(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<f64> {
-        exchange.advance_bodies(instances)?;
-        self.evaluate_grounds(exchange, instances)
+    fn evaluate(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<f64> {
+        problem.advance_bodies(instances)?;
+        self.evaluate_grounds(problem, instances)
     }
 
-    fn evaluate_grounds(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<f64> {
-        exchange.advance_grounds_under_motion(instances)?;
+    fn evaluate_grounds(
+        &mut self,
+        problem: &mut InterfaceProblem,
+        instances: &mut [Instance],
+    ) -> Result<f64> {
+        problem.advance_grounds_under_motion(instances)?;
         self.residual.clear();
-        self.residual.extend(exchange.t.iter().zip(&exchange.f).map(|(t, f)| t - f));
+        self.residual.extend(problem.t.iter().zip(&problem.f).map(|(t, f)| t - f));
         Ok(max_norm(&self.residual))
     }
 
     /// d = −(I + K·G1)⁻¹·r at the last trial.
-    fn newton_step(&mut self, exchange: &mut Exchange, instances: &mut [Instance]) -> Result {
-        let n = exchange.n();
-        exchange.ground_jacobian(instances, true, &mut self.k)?;
-        let (k, g) = (&self.k, &exchange.estimate.g);
+    fn newton_step(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result {
+        let n = problem.n();
+        problem.ground_jacobian(instances, true, &mut self.k)?;
+        let (k, g) = (&self.k, &problem.estimate.g);
         self.kg.clear();
         self.kg.resize(n * n, 0.0);
         for column in 0..n {
@@ -143,24 +147,24 @@ impl XtForm {
         self.d.extend(self.residual.iter().map(|r| -r));
         self.lu.solve(&mut self.d);
         let kappa = largest_eigenvalue(k, g, &mut self.base, &mut self.work, n);
-        exchange.report.kappa_max = exchange.report.kappa_max.max(kappa);
-        exchange.report.rank = (rank as u32, n as u32);
-        exchange.report.condition = exchange.report.condition.max(1.0 / self.lu.weakest());
+        problem.report.kappa_max = problem.report.kappa_max.max(kappa);
+        problem.report.rank = (rank as u32, n as u32);
+        problem.report.condition = problem.report.condition.max(1.0 / self.lu.weakest());
         Ok(())
     }
 
     /// Takes the Newton step, halved until the residual falls; the new |r|∞.
-    fn step(&mut self, norm: f64, exchange: &mut Exchange, instances: &mut [Instance]) -> Result<f64> {
+    fn step(&mut self, norm: f64, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<f64> {
         self.base.clear();
-        self.base.extend_from_slice(&exchange.t);
+        self.base.extend_from_slice(&problem.t);
         let mut share = 1.0;
         for halving in 0..=MAX_HALVINGS {
-            for ((t, base), d) in exchange.t.iter_mut().zip(&self.base).zip(&self.d) {
+            for ((t, base), d) in problem.t.iter_mut().zip(&self.base).zip(&self.d) {
                 *t = base + share * d;
             }
-            exchange.predict_bodies();
-            let new = self.evaluate_grounds(exchange, instances)?;
-            exchange.report.evaluations_line_search += u32::from(halving > 0);
+            problem.predict_bodies();
+            let new = self.evaluate_grounds(problem, instances)?;
+            problem.report.evaluations_line_search += u32::from(halving > 0);
             if new < norm || halving == MAX_HALVINGS {
                 return Ok(new);
             }
@@ -169,16 +173,16 @@ impl XtForm {
         Ok(norm)
     }
 
-    fn converged(&self, exchange: &mut Exchange, norm: f64) -> Outcome {
-        let report = &mut exchange.report;
-        report.residual = norm / exchange.t_ref;
-        for port in &exchange.ports {
+    fn converged(&self, problem: &mut InterfaceProblem, norm: f64) -> Outcome {
+        let report = &mut problem.report;
+        report.residual = norm / problem.t_ref;
+        for port in &problem.ports {
             let r = self.residual[port.first as usize].abs();
             report.max_action_reaction_gap_n = report.max_action_reaction_gap_n.max(r);
         }
         report.converged = true;
         // motion was imposed on the soil: its surface is where the body is
-        exchange.x2.copy_from_slice(&exchange.x1);
+        problem.x2.copy_from_slice(&problem.x1);
         Outcome::Converged
     }
 }

@@ -116,13 +116,13 @@ impl Segment {
         self.luck.set(i32::MIN);
     }
 
-    /// Waits for the answer to the last call; its length, or nothing when that took longer than `patience`.
-    pub fn answer(&self, patience: Duration) -> Option<usize> {
+    /// Waits for the answer to the last call; its length, or nothing when that took longer than `timeout`.
+    pub fn answer(&self, timeout: Duration) -> Option<usize> {
         let wanted = self.head().call.load(Ordering::Relaxed);
         self.look_for(wanted);
         let found = self.head().answer.load(Ordering::Acquire);
         if found != wanted {
-            wait(&self.head().answer, found, Some(patience));
+            wait(&self.head().answer, found, Some(timeout));
         }
         let done = self.head().answer.load(Ordering::Acquire) == wanted;
         done.then(|| (self.head().answer_length.load(Ordering::Relaxed) as usize).min(AREA))
@@ -170,9 +170,9 @@ impl Drop for Segment {
     }
 }
 
-/// Sleeps while `word` is `value`, at most for `patience`; may wake early.
-fn wait(word: &AtomicU32, value: u32, patience: Option<Duration>) {
-    let time = patience.map(|p| libc::timespec {
+/// Sleeps while `word` is `value`, at most for `timeout`; may wake early.
+fn wait(word: &AtomicU32, value: u32, timeout: Option<Duration>) {
+    let time = timeout.map(|p| libc::timespec {
         tv_sec: p.as_secs() as libc::time_t,
         tv_nsec: libc::c_long::from(p.subsec_nanos() as i32),
     });

@@ -8,8 +8,8 @@
 mod answers;
 mod calls;
 mod channel;
+mod fork_server;
 mod law;
-mod nursery;
 mod proxy;
 mod python;
 mod tiles;
@@ -17,14 +17,14 @@ mod wire;
 mod worker;
 
 pub use channel::{confine, end_group};
+pub use fork_server::{FORK_SERVER, ForkServer};
 pub(super) use law::IsolatedLaw;
-pub use nursery::{NURSERY, Nursery};
 pub use python::SDK;
 pub use worker::serve;
 
-use super::{HostServices, Partings};
+use super::{HostServices, TeardownErrors};
 use channel::Segment;
-use nursery::{Nursed, Process};
+use fork_server::{Forked, WorkerProcess};
 use proxy::Isolated;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -56,7 +56,7 @@ impl Default for Isolation {
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub enum What {
     /// A functional mock-up unit with the keys of its table.
-    Unit {
+    Fmu {
         /// File.
         path: PathBuf,
         /// Start values and keys of the host.
@@ -158,11 +158,11 @@ const PARTING: Duration = Duration::from_secs(2);
 /// A worker and the way to it.
 struct Link {
     segment: Segment,
-    child: Process,
+    child: WorkerProcess,
     isolation: Isolation,
     host: Arc<dyn Host>,
     cancel: Arc<AtomicBool>,
-    partings: Partings,
+    teardown_errors: TeardownErrors,
     /// Why nothing can be asked any more.
     gone: Option<String>,
     is_python: bool,
@@ -175,7 +175,7 @@ fn failed(what: &str, error: &dyn std::fmt::Display) -> Error {
 }
 
 /// Starts a worker of its own; whether it is one of Python.
-fn spawn(what: &What, folder: &Path, segment: &str) -> Result<(Process, bool)> {
+fn spawn(what: &What, folder: &Path, segment: &str) -> Result<(WorkerProcess, bool)> {
     use std::os::unix::process::CommandExt;
     let python = python::command(what, folder, segment).map_err(|e| failed("no files for a worker", &e))?;
     let is_python = python.is_some();
@@ -194,7 +194,7 @@ fn spawn(what: &What, folder: &Path, segment: &str) -> Result<(Process, bool)> {
         }
         _ => failed(&command.get_program().to_string_lossy(), &e),
     })?;
-    Ok((Process::Own(child), is_python))
+    Ok((WorkerProcess::Own(child), is_python))
 }
 
 impl Link {
@@ -202,15 +202,15 @@ impl Link {
         let segment = Segment::new().map_err(|e| failed("no shared memory", &e))?;
         let folder = terraglue_fmi::Folder::new("worker");
         let folder = folder.map_err(|e| failed("no temporary folder", &e))?;
-        let (cancel, partings) = (services.cancel.clone(), services.partings.clone());
-        let (child, is_python) = match Nursed::take(what, folder.path(), &segment.path()) {
-            Some(nursed) => {
+        let (cancel, teardown_errors) = (services.cancel.clone(), services.teardown_errors.clone());
+        let (child, is_python) = match Forked::take(what, folder.path(), &segment.path()) {
+            Some(forked) => {
                 segment.never_look();
-                (Process::Nursed(nursed), true)
+                (WorkerProcess::Forked(forked), true)
             }
             None => spawn(what, folder.path(), &segment.path())?,
         };
-        Ok(Self { segment, child, isolation, host, cancel, partings, gone: None, is_python, folder })
+        Ok(Self { segment, child, isolation, host, cancel, teardown_errors, gone: None, is_python, folder })
     }
 
     /// One call: `write` fills the request after its number, `read` takes the answer after its status.
@@ -288,7 +288,7 @@ impl Drop for Link {
         if self.gone.is_none() {
             self.isolation.step_timeout_s = self.isolation.step_timeout_s.min(PARTING.as_secs_f64());
             if let Err(error) = self.call(calls::Call::Quit, |_| {}, |_| Some(())) {
-                self.partings.put(format!("`{}` at its end: {error}", self.host.name()));
+                self.teardown_errors.put(format!("`{}` at its end: {error}", self.host.name()));
             }
         }
         self.child.end();

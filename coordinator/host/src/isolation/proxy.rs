@@ -13,12 +13,12 @@ use terraglue_subsystem::{
 /// An instance in a worker.
 pub struct Isolated {
     link: RefCell<Link>,
-    about: About,
+    about: ModuleInfo,
     tiles: Tiles,
 }
 
 /// What never changes over its life.
-pub struct About {
+pub struct ModuleInfo {
     pub capabilities: Capabilities,
     pub variables: Vec<Variable>,
     pub actions: Vec<Action>,
@@ -28,7 +28,7 @@ pub struct About {
     pub is_module: bool,
 }
 
-impl About {
+impl ModuleInfo {
     pub fn put(&self, w: &mut Writer) {
         w.put(&self.capabilities.0);
         w.put(&self.variables);
@@ -63,7 +63,7 @@ impl Isolated {
                 }
             },
             |r| {
-                let about = About::take(r)?;
+                let about = ModuleInfo::take(r)?;
                 let mut tiles = Tiles::new(&about.fields);
                 tiles.receive(r)?;
                 Some((about, tiles))

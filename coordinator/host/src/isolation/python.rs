@@ -13,7 +13,10 @@ pub(super) const FILES: [(&str, &str); 4] = [
     ("terraglue.py", SDK),
     ("terraglue_wire.py", include_str!("../../../../interfaces/plugin/python/terraglue_wire.py")),
     ("terraglue_worker.py", include_str!("../../../../interfaces/plugin/python/terraglue_worker.py")),
-    ("terraglue_nursery.py", include_str!("../../../../interfaces/plugin/python/terraglue_nursery.py")),
+    (
+        "terraglue_fork_server.py",
+        include_str!("../../../../interfaces/plugin/python/terraglue_fork_server.py"),
+    ),
 ];
 
 /// What a module in Python derives from.

@@ -2,11 +2,11 @@
 
 use super::calls::{self, Call, OwnedStep};
 use super::channel::{self, Segment};
-use super::proxy::About;
+use super::proxy::ModuleInfo;
 use super::tiles::Tiles;
 use super::wire::{Reader, Writer};
 use super::{Line, Start, What};
-use crate::{HostServices, Library, LoadedModule, Partings, Workers};
+use crate::{HostServices, Library, LoadedModule, TeardownErrors, Workers};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::process::ExitCode;
@@ -81,10 +81,10 @@ impl Log {
 struct Worker {
     library: Library,
     log: Arc<Log>,
-    unit: Option<Box<dyn Subsystem>>,
+    subsystem: Option<Box<dyn Subsystem>>,
     is_module: bool,
     tiles: Tiles,
-    partings: Partings,
+    teardown_errors: TeardownErrors,
 }
 
 fn garbled() -> Error {
@@ -101,8 +101,8 @@ impl Worker {
             None => Err(garbled()),
             Some(Call::Start) => self.start(&mut r),
             Some(Call::Quit) => {
-                self.unit = None;
-                match self.partings.take() {
+                self.subsystem = None;
+                match self.teardown_errors.take() {
                     all if all.is_empty() => Ok(()),
                     all => Err(Error::Failed(all.join("; "))),
                 }
@@ -125,23 +125,23 @@ impl Worker {
 
     /// What follows an outcome that is good.
     fn append(&mut self, call: Option<Call>, w: &mut Writer, body: &[u8]) {
-        let Some(unit) = &self.unit else { return };
+        let Some(subsystem) = &self.subsystem else { return };
         match call {
             Some(Call::Start) => {
-                let about = About {
-                    capabilities: unit.capabilities(),
-                    variables: unit.variables().to_vec(),
-                    actions: unit.actions().to_vec(),
-                    scene: unit.scene(),
-                    fields: unit.fields().to_vec(),
+                let about = ModuleInfo {
+                    capabilities: subsystem.capabilities(),
+                    variables: subsystem.variables().to_vec(),
+                    actions: subsystem.actions().to_vec(),
+                    scene: subsystem.scene(),
+                    fields: subsystem.fields().to_vec(),
                     is_module: self.is_module,
                 };
                 about.put(w);
                 self.tiles = Tiles::new(&about.fields);
-                self.tiles.send(unit.as_ref(), w);
+                self.tiles.send(subsystem.as_ref(), w);
             }
             Some(Call::Commit | Call::Restore | Call::Deserialize | Call::Act) => {
-                self.tiles.send(unit.as_ref(), w);
+                self.tiles.send(subsystem.as_ref(), w);
             }
             _ => w.bytes(body),
         }
@@ -162,9 +162,9 @@ impl Worker {
             terrain,
             start: start.clone(),
         });
-        self.unit = Some(match start.what {
-            What::Unit { path, parameters } => {
-                (self.library.fmus()?)(&path, &parameters, host, self.partings.clone())?
+        self.subsystem = Some(match start.what {
+            What::Fmu { path, parameters } => {
+                (self.library.fmus()?)(&path, &parameters, host, self.teardown_errors.clone())?
             }
             What::Module { path, config } => {
                 let module = LoadedModule::load(&path).map_err(|e| Error::Refused(e.to_string()))?;
@@ -184,34 +184,34 @@ impl Worker {
         HostServices {
             cancel: self.log.cancel.clone(),
             log: Some(Arc::new(move |_, level, text| log.put(level, text))),
-            partings: self.partings.clone(),
+            teardown_errors: self.teardown_errors.clone(),
             ..HostServices::new(0, Path::new(folder))
         }
     }
 
     /// Does a call on the instance; what it answers goes into `body`.
     fn call(&mut self, call: Call, r: &mut Reader, body: &mut Vec<u8>) -> Result {
-        let unit = self.unit.as_mut().ok_or_else(garbled)?.as_mut();
+        let subsystem = self.subsystem.as_mut().ok_or_else(garbled)?.as_mut();
         let mut out = Answer { body };
         match call {
             Call::SetPorts => {
                 let step = OwnedStep::take(r).ok_or_else(garbled)?;
                 let mut laws: Vec<_> = r.take().ok_or_else(garbled)?;
                 calls::with_response(&step.step(), |now| {
-                    unit.set_ports(&step.step(), &mut laws, now)?;
+                    subsystem.set_ports(&step.step(), &mut laws, now)?;
                     out.write(|w| {
                         w.put(&laws);
                         calls::put_response(w, now);
                     })
                 })
             }
-            Call::Estimate => estimate(unit, r, &mut out),
-            Call::Solve => solve(unit, r, &mut out),
+            Call::Estimate => estimate(subsystem, r, &mut out),
+            Call::Solve => solve(subsystem, r, &mut out),
             Call::Advance => {
                 let step = OwnedStep::take(r).ok_or_else(garbled)?;
                 let done = calls::with_input(r, |input| {
                     calls::with_response(&step.step(), |now| {
-                        unit.advance(&step.step(), input, now)?;
+                        subsystem.advance(&step.step(), input, now)?;
                         out.write(|w| calls::put_response(w, now))
                     })
                 });
@@ -228,7 +228,7 @@ impl Worker {
                 let [mut x, mut v, mut a] = [(); 3].map(|()| vec![f64::NAN; n * count as usize]);
                 let reached = step.step().t + step.step().h;
                 let mut all = Batch { x: &mut x, v: &mut v, a: &mut a, t: &mut vec![f64::NAN; n], reached };
-                unit.advance_batch(&step.step(), &t, &mut all)?;
+                subsystem.advance_batch(&step.step(), &t, &mut all)?;
                 let reached = all.reached;
                 out.write(|w| {
                     [&x, &v, &a].into_iter().for_each(|values| w.put(values.as_slice()));
@@ -240,21 +240,21 @@ impl Worker {
                 let level = r.take().and_then(calls::level_of).ok_or_else(garbled)?;
                 let n = step.step().n as usize;
                 let mut matrix = vec![f64::NAN; n * n];
-                unit.interface_jacobian(&step.step(), level, &mut matrix)?;
+                subsystem.interface_jacobian(&step.step(), level, &mut matrix)?;
                 out.write(|w| w.put(&matrix))
             }
             Call::Commit => {
                 let step = OwnedStep::take(r).ok_or_else(garbled)?;
                 let [t, x, v]: [Vec<f64>; 3] = three(r)?;
-                unit.commit(&step.step(), &t, &Motion { x: &x, v: &v })
+                subsystem.commit(&step.step(), &t, &Motion { x: &x, v: &v })
             }
-            Call::Save => unit.save_state(r.take().ok_or_else(garbled)?),
-            Call::Restore => unit.restore_state(r.take().ok_or_else(garbled)?),
+            Call::Save => subsystem.save_state(r.take().ok_or_else(garbled)?),
+            Call::Restore => subsystem.restore_state(r.take().ok_or_else(garbled)?),
             Call::Serialize => {
-                let bytes = unit.serialize()?;
+                let bytes = subsystem.serialize()?;
                 out.write(|w| w.put(&bytes))
             }
-            Call::Deserialize => unit.deserialize(&r.take::<Vec<u8>>().ok_or_else(garbled)?),
+            Call::Deserialize => subsystem.deserialize(&r.take::<Vec<u8>>().ok_or_else(garbled)?),
             Call::Get => {
                 let ids: Vec<u32> = r.take().ok_or_else(garbled)?;
                 let (kind, count) = (r.take().ok_or_else(garbled)?, r.take::<u32>().ok_or_else(garbled)?);
@@ -262,7 +262,7 @@ impl Worker {
                 calls::fill_room(
                     kind,
                     count as usize,
-                    |room| unit.get(&ids, room),
+                    |room| subsystem.get(&ids, room),
                     |got, write| {
                         done = got.clone();
                         if done.is_ok() {
@@ -274,20 +274,20 @@ impl Worker {
             }
             Call::Set => {
                 let ids: Vec<u32> = r.take().ok_or_else(garbled)?;
-                calls::with_values(r, |values| unit.set(&ids, values)).ok_or_else(garbled)?
+                calls::with_values(r, |values| subsystem.set(&ids, values)).ok_or_else(garbled)?
             }
             Call::Act => {
                 let (action, arguments): (String, String) =
                     (r.take().ok_or_else(garbled)?, r.take().ok_or_else(garbled)?);
-                unit.act(&action, &arguments)
+                subsystem.act(&action, &arguments)
             }
-            Call::NextEvent => out.write(|w| w.put(&unit.next_event_time())),
+            Call::NextEvent => out.write(|w| w.put(&subsystem.next_event_time())),
             Call::BodyStates => {
-                let mut states = vec![BodyState::REST; unit.scene().bodies.len()];
-                unit.body_states(&mut states)?;
+                let mut states = vec![BodyState::REST; subsystem.scene().bodies.len()];
+                subsystem.body_states(&mut states)?;
                 out.write(|w| w.put(&states))
             }
-            Call::Energy => out.write(|w| w.put(&unit.energy())),
+            Call::Energy => out.write(|w| w.put(&subsystem.energy())),
             Call::Start | Call::Quit | Call::Pressure | Call::Shear => Err(garbled()),
         }
     }
@@ -298,7 +298,7 @@ fn three(r: &mut Reader) -> Result<[Vec<f64>; 3]> {
     Ok([next()?, next()?, next()?])
 }
 
-fn estimate(unit: &mut dyn Subsystem, r: &mut Reader, out: &mut Answer) -> Result {
+fn estimate(subsystem: &mut dyn Subsystem, r: &mut Reader, out: &mut Answer) -> Result {
     let step = OwnedStep::take(r).ok_or_else(garbled)?;
     let (x, v): (Vec<f64>, Vec<f64>) = (r.take().ok_or_else(garbled)?, r.take().ok_or_else(garbled)?);
     let n = step.step().n as usize;
@@ -306,7 +306,7 @@ fn estimate(unit: &mut dyn Subsystem, r: &mut Reader, out: &mut Answer) -> Resul
     let mut active = vec![0; step.step().ports.len()];
     let mut e =
         Estimate { t_star: &mut t_star, x_free: &mut x_free, g: &mut g, active: &mut active, unique: false };
-    unit.estimate_forces(&step.step(), &Motion { x: &x, v: &v }, &mut e)?;
+    subsystem.estimate_forces(&step.step(), &Motion { x: &x, v: &v }, &mut e)?;
     let unique = e.unique;
     out.write(|w| {
         w.put(&t_star);
@@ -317,14 +317,14 @@ fn estimate(unit: &mut dyn Subsystem, r: &mut Reader, out: &mut Answer) -> Resul
     })
 }
 
-fn solve(unit: &mut dyn Subsystem, r: &mut Reader, out: &mut Answer) -> Result {
+fn solve(subsystem: &mut dyn Subsystem, r: &mut Reader, out: &mut Answer) -> Result {
     let step = OwnedStep::take(r).ok_or_else(garbled)?;
     let [mut t_star, mut x_free, mut g] = three(r)?;
     let mut active: Vec<u8> = r.take().ok_or_else(garbled)?;
     let unique = r.take().ok_or_else(garbled)?;
     let e = Estimate { t_star: &mut t_star, x_free: &mut x_free, g: &mut g, active: &mut active, unique };
     calls::with_response(&step.step(), |now| {
-        unit.solve_compatibility(&step.step(), &e, now)?;
+        subsystem.solve_compatibility(&step.step(), &e, now)?;
         out.write(|w| calls::put_response(w, now))
     })
 }

@@ -16,7 +16,7 @@ pub(crate) enum Best {
 }
 
 /// One figure.
-pub(crate) struct Column {
+pub(crate) struct FigureColumn {
     /// Name in the files.
     pub key: &'static str,
     /// Head over neighbouring columns; empty: none.
@@ -29,14 +29,14 @@ pub(crate) struct Column {
     pub value: fn(&CompareRow) -> Option<f64>,
 }
 
-impl Column {
+impl FigureColumn {
     /// Group and title in one line.
     pub fn name(&self) -> String {
         if self.group.is_empty() { self.title.into() } else { format!("{}, {}", self.group, self.title) }
     }
 }
 
-impl Column {
+impl FigureColumn {
     /// What stands in the cell of a row: the figure, that it is unknown or does not apply, or a dash.
     pub fn text(&self, row: &CompareRow) -> String {
         let value = (self.value)(row);
@@ -80,12 +80,19 @@ fn iterated(row: &CompareRow) -> bool {
 
 macro_rules! column {
     ($key:literal, $group:literal, $title:literal, $unit:literal, $best:ident, $value:expr) => {
-        Column { key: $key, group: $group, title: $title, unit: $unit, best: Best::$best, value: $value }
+        FigureColumn {
+            key: $key,
+            group: $group,
+            title: $title,
+            unit: $unit,
+            best: Best::$best,
+            value: $value,
+        }
     };
 }
 
 /// All figures in the order of the table.
-pub(crate) const ALL: &[Column] = &[
+pub(crate) const ALL: &[FigureColumn] = &[
     column!("step_s", "", "step", "s", Neither, |r| Some(r.step_s)),
     column!("reference_error_m", "", "error against the reference", "m", Smallest, |r| r.reference_error_m),
     column!("order", "", "observed order", "", Neither, |r| r.order),
@@ -154,7 +161,7 @@ pub(crate) const ALL: &[Column] = &[
     column!("mean_sinkage_m", "", "mean sinkage", "m", Neither, |r| r.summary.as_ref()?.mean_sinkage_m),
     column!("path_m", "", "path", "m", Neither, |r| r.summary.as_ref()?.path_m),
     column!("soil_heat_j", "", "heat of the soil", "J", Neither, |r| energies(r)?.soil_heat_j),
-    column!("energy_balance_j", "", "drift of the energy book", "J", Neither, |r| energies(r)?.drift_j),
+    column!("energy_balance_j", "", "drift of the energy ledger", "J", Neither, |r| energies(r)?.drift_j),
     column!("energy_drift_share", "", "drift over the motors' work", "", Neither, |r| {
         energies(r)?.drift_share()
     }),
@@ -173,7 +180,7 @@ pub(crate) const ALL: &[Column] = &[
 
 /// For every row whether it holds the best figure of a column. Runs that did not reach their end do not
 /// compete; where all are equal, none is marked.
-pub(crate) fn best(column: &Column, rows: &[CompareRow]) -> Vec<bool> {
+pub(crate) fn best(column: &FigureColumn, rows: &[CompareRow]) -> Vec<bool> {
     let values: Vec<Option<f64>> =
         rows.iter().map(|r| r.failure().is_none().then(|| (column.value)(r)).flatten()).collect();
     let known = || values.iter().flatten().copied();

@@ -63,7 +63,7 @@ fn parts(row: &CompareRow) -> Vec<String> {
 }
 
 /// What stands in a cell, and how it is marked.
-pub(crate) struct Figure {
+pub(crate) struct CellText {
     pub text: String,
     /// The best of its column.
     pub best: bool,
@@ -72,8 +72,8 @@ pub(crate) struct Figure {
 }
 
 /// The figure of a run, by its key in the files.
-pub(crate) fn figure(key: &str, k: usize, rows: &[CompareRow]) -> Figure {
-    let plain = |text| Figure { text, best: false, off: false };
+pub(crate) fn figure(key: &str, k: usize, rows: &[CompareRow]) -> CellText {
+    let plain = |text| CellText { text, best: false, off: false };
     let Some(column) = columns::ALL.iter().find(|c| c.key == key) else { return plain(String::new()) };
     let row = &rows[k];
     let energies = row.summary.as_ref().map(|s| &s.energies);
@@ -86,17 +86,17 @@ pub(crate) fn figure(key: &str, k: usize, rows: &[CompareRow]) -> Figure {
                 None => column.text(row),
             },
         };
-        return Figure { off: energies.is_some_and(|e| e.is_off()), ..plain(text) };
+        return CellText { off: energies.is_some_and(|e| e.is_off()), ..plain(text) };
     }
     let best = columns::best(column, rows).get(k).copied().unwrap_or(false);
-    Figure { best, ..plain(column.text(row)) }
+    CellText { best, ..plain(column.text(row)) }
 }
 
-fn in_terminal(figure: Figure) -> Cell {
+fn in_terminal(figure: CellText) -> Cell {
     match figure {
-        Figure { off: true, text, .. } => Cell::new(format!("! {text}")).fg(Color::Red),
-        Figure { best: true, text, .. } => Cell::new(format!("* {text}")),
-        Figure { text, .. } => Cell::new(text),
+        CellText { off: true, text, .. } => Cell::new(format!("! {text}")).fg(Color::Red),
+        CellText { best: true, text, .. } => Cell::new(format!("* {text}")),
+        CellText { text, .. } => Cell::new(text),
     }
 }
 

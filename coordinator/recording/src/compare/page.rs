@@ -34,8 +34,8 @@ pub(crate) fn render(folder: &Path, rows: &[CompareRow], runs: &[Run]) -> String
         escape(scenario)
     ));
     page.section("At a glance", "figures", &glance(folder, rows));
-    let books = rows.iter().filter_map(|r| Some((r.name(), &r.summary.as_ref()?.energies)));
-    page.section("Where the energy went", "energies", &energy_card::table(books));
+    let ledgers = rows.iter().filter_map(|r| Some((r.name(), &r.summary.as_ref()?.energies)));
+    page.section("Where the energy went", "energies", &energy_card::table(ledgers));
     let shown: Vec<_> = runs
         .iter()
         .filter_map(|run| Some((run.name.as_str(), relative(folder, &rows[run.row])?, &run.recording)))
@@ -138,7 +138,7 @@ fn glance(folder: &Path, rows: &[CompareRow]) -> String {
 }
 
 fn html_table(folder: &Path, rows: &[CompareRow]) -> String {
-    let shown: Vec<&columns::Column> = columns::ALL.iter().filter(|c| c.is_shown(rows)).collect();
+    let shown: Vec<&columns::FigureColumn> = columns::ALL.iter().filter(|c| c.is_shown(rows)).collect();
     let marks: Vec<Vec<bool>> = shown.iter().map(|c| columns::best(c, rows)).collect();
     let mut out = String::from("<div class=\"wide\"><table class=\"rows\"><thead><tr>");
     let keys = varied_keys(rows);
@@ -178,7 +178,7 @@ fn html_table(folder: &Path, rows: &[CompareRow]) -> String {
 }
 
 /// Two lines of heads: groups over their columns, single columns over both lines.
-fn head(out: &mut String, keys: &[&str], shown: &[&columns::Column]) {
+fn head(out: &mut String, keys: &[&str], shown: &[&columns::FigureColumn]) {
     for name in ["strategy", "soil"].iter().chain(keys).chain(&["form"]) {
         let _ = write!(out, "<th class=\"name\" rowspan=\"2\">{}</th>", escape(name));
     }

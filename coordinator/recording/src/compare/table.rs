@@ -39,7 +39,7 @@ pub(crate) fn terminal(rows: &[CompareRow]) -> String {
     let mut table = Table::new();
     table.load_preset(presets::UTF8_FULL_CONDENSED);
     let many = rows.len() > SIDE_BY_SIDE;
-    let shown: Vec<&columns::Column> = columns::ALL
+    let shown: Vec<&columns::FigureColumn> = columns::ALL
         .iter()
         .filter(|c| !many || SHORT.contains(&c.key))
         .filter(|c| c.is_shown(rows))

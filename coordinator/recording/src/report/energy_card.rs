@@ -132,7 +132,7 @@ mod tests {
         };
         let html = render(&e);
         assert!(
-            html.contains("unknown") && html.contains("soil keeps no book") && !html.contains("NaN"),
+            html.contains("unknown") && html.contains("soil keeps no energy ledger") && !html.contains("NaN"),
             "{html}"
         );
         assert!(!html.contains("card off"));

@@ -233,7 +233,7 @@ mod tests {
         let mut recording = Recording::default();
         let times: Vec<f64> = (0..200).map(|k| 0.005 * f64::from(k)).collect();
         for (name, entity, z) in &parts {
-            let frame = format!("rig/{name}");
+            let frame = format!("fixture/{name}");
             recording.solids.insert(frame.clone(), solids(entity));
             let series = PoseSeries {
                 t_s: times.clone(),
@@ -243,7 +243,7 @@ mod tests {
             recording.poses.insert(frame, series);
         }
         let port = |name: &str, t: f64| PortRecord {
-            subsystem: "rig".into(),
+            subsystem: "fixture".into(),
             body: name.into(),
             origin: Point { x: speed * t, y: 0.0, z: -0.004 },
             wrench: vec![10.0],
@@ -293,7 +293,7 @@ mod tests {
             CubePrimitive { pose: pose([0.0; 3]), size: Some(vector([0.004, 0.004, 0.059])), color: None };
         let mut recording = recorded(0.0);
         let entity = SceneEntity { spheres: vec![ball], cubes: vec![shin], ..Default::default() };
-        recording.solids.insert("rig/ball".into(), solids(&entity));
+        recording.solids.insert("fixture/ball".into(), solids(&entity));
         let legs = legs(&recording);
         let print = legs[0].single().next().expect("a print");
         let radius = f64::sqrt(0.004 * (0.06 - 0.004));

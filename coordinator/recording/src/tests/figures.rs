@@ -1,21 +1,21 @@
 //! The figures that a run is judged by, in closed form: work, distance asked for, prints, peak force, height.
 
-use super::rig::*;
+use super::fixture::*;
 use super::*;
 use terraglue_subsystem::{Causality, Variable};
 
 /// A second of the synthetic walk, recorded.
-fn summary_of(rig: &mut Rig) -> Summary {
+fn summary_of(fixture: &mut Fixture) -> Summary {
     let f = tempfile::tempdir().expect("temporary folder");
     let mut recorder =
-        Recorder::create(f.path(), &rig.scenario, RecorderOptions::default()).expect("created");
-    rig.run(&mut recorder, 1000).expect("ran");
+        Recorder::create(f.path(), &fixture.scenario, RecorderOptions::default()).expect("created");
+    fixture.run(&mut recorder, 1000).expect("ran");
     recorder.finish(2.0, 1.5, None, Status::Done).expect("finished")
 }
 
 #[test]
 fn motors_drive_and_brake_and_a_metre_costs_both() {
-    let s = summary_of(&mut Rig::new("iterative"));
+    let s = summary_of(&mut Fixture::new("iterative"));
     // 4 N m against 0.3·2π·cos(2πt) rad/s: as much forwards as back, 2.4 J in half a second each.
     let e = &s.energies;
     assert!((e.driving_j - 2.4).abs() < 4e-3 && (e.braking_j - 2.4).abs() < 4e-3, "{e:?}");
@@ -30,14 +30,16 @@ fn motors_drive_and_brake_and_a_metre_costs_both() {
 #[test]
 fn what_a_controller_tells_is_of_the_step_before_and_what_it_is_told_of_the_next() {
     let asked = |causality: Causality| {
-        let mut rig = Rig::new("iterative");
-        rig.parts[0].1.tell(Variable::real(0, "speed", "m/s", causality, "speed"));
-        let mut observer = SummaryObserver::new(&rig.scenario);
-        rig.parts[0].1.speed = 0.0;
-        rig.view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut observer, v))
+        let mut fixture = Fixture::new("iterative");
+        fixture.parts[0].1.tell(Variable::real(0, "speed", "m/s", causality, "speed"));
+        let mut observer = SummaryObserver::new(&fixture.scenario);
+        fixture.parts[0].1.speed = 0.0;
+        fixture
+            .view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut observer, v))
             .expect("started");
-        rig.parts[0].1.speed = 0.2;
-        rig.view(1, &mut |v| terraglue_engine::observer::Observer::stepped(&mut observer, v))
+        fixture.parts[0].1.speed = 0.2;
+        fixture
+            .view(1, &mut |v| terraglue_engine::observer::Observer::stepped(&mut observer, v))
             .expect("stepped");
         observer.summary(1.0, 1.0, None, Status::Done).commanded_distance_m
     };
@@ -47,7 +49,7 @@ fn what_a_controller_tells_is_of_the_step_before_and_what_it_is_told_of_the_next
 
 #[test]
 fn a_print_counts_once_and_the_weight_is_that_of_the_robot() {
-    let s = summary_of(&mut Rig::new("iterative"));
+    let s = summary_of(&mut Fixture::new("iterative"));
     let p = s.print_depth.expect("prints");
     // three feet stand for the first half of the second, the others for the rest; all press to the same depth
     assert_eq!(p.count, 6);
@@ -60,9 +62,9 @@ fn a_print_counts_once_and_the_weight_is_that_of_the_robot() {
 #[test]
 fn height_is_against_gravity_and_none_without_it() {
     let gained = |gravity: [f64; 3]| {
-        let mut rig = Rig::new("iterative");
-        rig.scenario.world.gravity_m_s2 = gravity;
-        summary_of(&mut rig).height_gained_m
+        let mut fixture = Fixture::new("iterative");
+        fixture.scenario.world.gravity_m_s2 = gravity;
+        summary_of(&mut fixture).height_gained_m
     };
     let risen = 0.01 * (libm::cos(12.0) - 1.0);
     let level = gained([0.0, 0.0, -9.81]).expect("known");

@@ -1,19 +1,19 @@
 //! Tests of recording, reading, mending and summing up on a synthetic testbed in closed form.
 
 mod figures;
-mod rig;
+mod fixture;
 
 use super::*;
-use rig::*;
+use fixture::*;
 use std::path::Path;
 use terraglue_numerics::extremes::larger;
 
 fn record(folder: &Path, strategy: &str, steps: u64) -> Summary {
-    let mut rig = Rig::new(strategy);
+    let mut fixture = Fixture::new(strategy);
     let mut recorder =
-        Recorder::create(folder, &rig.scenario, RecorderOptions { csv: true, ..Default::default() })
+        Recorder::create(folder, &fixture.scenario, RecorderOptions { csv: true, ..Default::default() })
             .expect("created");
-    rig.run(&mut recorder, steps).expect("ran");
+    fixture.run(&mut recorder, steps).expect("ran");
     recorder.finish(2.0, 1.5, None, Status::Done).expect("finished")
 }
 
@@ -44,22 +44,24 @@ fn a_recorder_goes_on_in_another_process_to_the_same_bytes() {
     // at, between and across the ends of chunks, records of the ground and the event
     for at in [1, 37, 251, 699, 1000] {
         let f = folder();
-        let mut rig = Rig::new("iterative");
-        let mut recorder = Recorder::create(f.path(), &rig.scenario, options).expect("created");
-        rig.view(0, &mut |view| terraglue_engine::observer::Observer::started(&mut recorder, view))
+        let mut fixture = Fixture::new("iterative");
+        let mut recorder = Recorder::create(f.path(), &fixture.scenario, options).expect("created");
+        fixture
+            .view(0, &mut |view| terraglue_engine::observer::Observer::started(&mut recorder, view))
             .expect("started");
-        rig.steps(&mut recorder, 0, at).expect("stepped");
+        fixture.steps(&mut recorder, 0, at).expect("stepped");
         let (mut state, mut again) = (Vec::new(), None);
-        rig.view(at, &mut |view| recorder.state(view).map(|s| s.write(&mut state))).expect("a state");
+        fixture.view(at, &mut |view| recorder.state(view).map(|s| s.write(&mut state))).expect("a state");
         // its end is written, and has to be cut off
         drop(recorder);
-        rig.view(at, &mut |view| {
-            let state = RecorderState::read(&mut state.as_slice()).expect("the same");
-            Recorder::resume(f.path(), &rig.scenario, options, view, state).map(|r| again = Some(r))
-        })
-        .expect("resumed");
+        fixture
+            .view(at, &mut |view| {
+                let state = RecorderState::read(&mut state.as_slice()).expect("the same");
+                Recorder::resume(f.path(), &fixture.scenario, options, view, state).map(|r| again = Some(r))
+            })
+            .expect("resumed");
         let mut recorder = again.expect("a recorder");
-        rig.go_on(&mut recorder, at, 1203).expect("ran");
+        fixture.go_on(&mut recorder, at, 1203).expect("ran");
         recorder.finish(2.0, 1.5, None, Status::Done).expect("finished");
         for file in [RECORDING, VARIABLES, FINAL_GROUND, SUMMARY] {
             let read = |f: &Path| std::fs::read(f.join(file)).expect("written");
@@ -186,15 +188,15 @@ fn no_file_of_an_earlier_run_stays() {
         std::fs::write(f.path().join(name), "earlier").expect("written");
     }
     std::fs::write(f.path().join("notes.txt"), "mine").expect("written");
-    let rig = Rig::new("cooperative");
-    Recorder::create(f.path(), &rig.scenario, RecorderOptions::default()).expect("created");
+    let fixture = Fixture::new("cooperative");
+    Recorder::create(f.path(), &fixture.scenario, RecorderOptions::default()).expect("created");
     for name in [VARIABLES, REPORT, SUMMARY, TIMING, FINAL_GROUND] {
         assert!(!f.path().join(name).exists(), "{name} stays");
     }
     assert!(f.path().join("notes.txt").exists() && f.path().join(RECORDING).exists());
     let other = folder();
     std::fs::write(other.path().join(VARIABLES), "mine").expect("written");
-    Recorder::create(other.path(), &rig.scenario, RecorderOptions::default()).expect("created");
+    Recorder::create(other.path(), &fixture.scenario, RecorderOptions::default()).expect("created");
     assert!(other.path().join(VARIABLES).exists());
 }
 
@@ -209,13 +211,16 @@ fn a_way_too_short_has_no_cost_of_transport() {
 #[test]
 fn what_was_flushed_is_on_disk_before_the_end() {
     let f = folder();
-    let mut rig = Rig::new("cooperative");
+    let mut fixture = Fixture::new("cooperative");
     let mut recorder =
-        Recorder::create(f.path(), &rig.scenario, RecorderOptions::default()).expect("created");
-    rig.view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut recorder, v)).expect("started");
+        Recorder::create(f.path(), &fixture.scenario, RecorderOptions::default()).expect("created");
+    fixture
+        .view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut recorder, v))
+        .expect("started");
     for k in 1..=250 {
-        rig.parts.iter_mut().for_each(|p| p.1.t = k as f64 * H);
-        rig.view(k, &mut |v| terraglue_engine::observer::Observer::stepped(&mut recorder, v))
+        fixture.parts.iter_mut().for_each(|p| p.1.t = k as f64 * H);
+        fixture
+            .view(k, &mut |v| terraglue_engine::observer::Observer::stepped(&mut recorder, v))
             .expect("stepped");
     }
     let r = Recording::open(f.path()).expect("readable");
@@ -272,13 +277,16 @@ fn every_message_is_protobuf_of_the_type_that_its_channel_names() {
 #[test]
 fn a_parameter_is_written_when_it_changes_and_read_at_every_row() {
     let f = folder();
-    let mut rig = Rig::new("cooperative");
+    let mut fixture = Fixture::new("cooperative");
     let mut recorder =
-        Recorder::create(f.path(), &rig.scenario, RecorderOptions::default()).expect("created");
-    rig.view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut recorder, v)).expect("started");
+        Recorder::create(f.path(), &fixture.scenario, RecorderOptions::default()).expect("created");
+    fixture
+        .view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut recorder, v))
+        .expect("started");
     for step in [5, 10, 15, 20] {
-        rig.parts[0].1.speed = if step < 15 { 0.15 } else { 0.2 };
-        rig.view(step, &mut |v| terraglue_engine::observer::Observer::stepped(&mut recorder, v))
+        fixture.parts[0].1.speed = if step < 15 { 0.15 } else { 0.2 };
+        fixture
+            .view(step, &mut |v| terraglue_engine::observer::Observer::stepped(&mut recorder, v))
             .expect("stepped");
     }
     recorder.finish(1.0, 1.0, None, Status::Done).expect("finished");
@@ -294,14 +302,14 @@ fn a_parameter_is_written_when_it_changes_and_read_at_every_row() {
 #[test]
 fn what_is_left_out_and_how_many_digits_are_kept_is_a_choice() {
     let f = folder();
-    let mut rig = Rig::new("cooperative");
+    let mut fixture = Fixture::new("cooperative");
     let list = |patterns: &[&str]| patterns.iter().map(|p| (*p).to_owned()).collect();
-    rig.scenario.recording.include = list(&["robot", "gait.speed"]);
-    rig.scenario.recording.exclude = list(&["robot.*.velocity", "robot.LF_j2.max_torque"]);
-    rig.scenario.recording.digits = 6;
+    fixture.scenario.recording.include = list(&["robot", "gait.speed"]);
+    fixture.scenario.recording.exclude = list(&["robot.*.velocity", "robot.LF_j2.max_torque"]);
+    fixture.scenario.recording.digits = 6;
     let options = RecorderOptions { csv: true, ..Default::default() };
-    let mut recorder = Recorder::create(f.path(), &rig.scenario, options).expect("created");
-    rig.run(&mut recorder, 10).expect("ran");
+    let mut recorder = Recorder::create(f.path(), &fixture.scenario, options).expect("created");
+    fixture.run(&mut recorder, 10).expect("ran");
     recorder.finish(1.0, 1.0, None, Status::Done).expect("finished");
     let r = Recording::open(f.path()).expect("readable");
     let names = ["body.x", "LF_j2.angle", "LF_j2.torque", "LF_j2.motor", "LF_j2.broken"];
@@ -313,9 +321,9 @@ fn what_is_left_out_and_how_many_digits_are_kept_is_a_choice() {
     let head = std::fs::read_to_string(f.path().join(VARIABLES)).expect("written");
     let head = head.lines().next().expect("a head");
     assert_eq!(head.split(',').count(), 7, "{head}");
-    rig.scenario.recording.exclude = list(&["robot.*.velocty"]);
-    let mut recorder = Recorder::create(f.path(), &rig.scenario, options).expect("created");
-    let error = rig.run(&mut recorder, 10).expect_err("refused").to_string();
+    fixture.scenario.recording.exclude = list(&["robot.*.velocty"]);
+    let mut recorder = Recorder::create(f.path(), &fixture.scenario, options).expect("created");
+    let error = fixture.run(&mut recorder, 10).expect_err("refused").to_string();
     assert!(error.contains("exclude") && error.contains("robot.*.velocty"), "{error}");
 }
 
@@ -357,7 +365,7 @@ fn the_summary_holds_the_figures_of_the_closed_form() {
     assert_eq!((s.evaluations_max, s.evaluations_p95, s.steps_not_converged), (4, 4, Some(0)));
     assert_eq!(s.form, "T-T");
     near(s.interface_work_error_j, 1e-3);
-    // The robot's book: 1.1 + changes − 2.0 a second, the soil's 0.7.
+    // The robot's ledger: 1.1 + changes − 2.0 a second, the soil's 0.7.
     let e = &s.energies;
     assert_eq!((e.work_j, e.soil_heat_j, e.drift_j), (Some(2.0), Some(0.7), s.energy_balance_j));
     near(e.other_heat_j, 1.1);
@@ -376,13 +384,14 @@ fn the_summary_holds_the_figures_of_the_closed_form() {
     assert!(places.is_sorted());
 }
 
-/// A run of single passes on a soil without a book.
+/// A run of single passes on a soil without a ledger.
 fn record_unknown(folder: &Path) -> Summary {
-    let mut rig = Rig::new("cooperative");
-    rig.single_pass = true;
-    rig.parts[2].1.silent = true;
-    let mut recorder = Recorder::create(folder, &rig.scenario, RecorderOptions::default()).expect("created");
-    rig.run(&mut recorder, 100).expect("ran");
+    let mut fixture = Fixture::new("cooperative");
+    fixture.single_pass = true;
+    fixture.parts[2].1.silent = true;
+    let mut recorder =
+        Recorder::create(folder, &fixture.scenario, RecorderOptions::default()).expect("created");
+    fixture.run(&mut recorder, 100).expect("ran");
     recorder.finish(2.0, 1.5, None, Status::Done).expect("finished")
 }
 
@@ -414,14 +423,16 @@ fn what_is_unknown_or_does_not_apply_is_said_and_never_a_number() {
     let html = std::fs::read_to_string(report::write(f.path()).expect("written")).expect("readable");
     let shown = &html[html.find("<section").expect("sections")..];
     let shown = shown.split("<script").next().expect("text");
-    assert!(shown.contains("unknown") && shown.contains("soil keeps no book") && !shown.contains("NaN"));
+    assert!(
+        shown.contains("unknown") && shown.contains("soil keeps no energy ledger") && !shown.contains("NaN")
+    );
     assert!(shown.contains("not applicable") && html.contains("Gap and convergence: not applicable"));
     let row = compare::CompareRow { summary: Some(s), ..Default::default() };
     let table = compare::terminal_table(&[row], true);
     let gap = table.lines().find(|l| l.contains("largest gap")).expect("line");
     assert!(gap.contains("not applicable"), "{gap}");
     assert!(
-        table.contains("unknown") && table.contains("soil keeps no book") && !table.contains("NaN"),
+        table.contains("unknown") && table.contains("soil keeps no energy ledger") && !table.contains("NaN"),
         "{table}"
     );
 }
@@ -429,21 +440,24 @@ fn what_is_unknown_or_does_not_apply_is_said_and_never_a_number() {
 #[test]
 fn a_nan_is_refused_by_name_and_the_recording_stays_complete() {
     let f = folder();
-    let mut rig = Rig::new("cooperative");
+    let mut fixture = Fixture::new("cooperative");
     let mut recorder =
-        Recorder::create(f.path(), &rig.scenario, RecorderOptions::default()).expect("created");
-    rig.run(&mut recorder, 0).expect("started");
+        Recorder::create(f.path(), &fixture.scenario, RecorderOptions::default()).expect("created");
+    fixture.run(&mut recorder, 0).expect("started");
     let mut recorder =
-        Recorder::create(f.path(), &rig.scenario, RecorderOptions::default()).expect("created");
-    rig.view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut recorder, v)).expect("started");
-    rig.parts[1].1.nan = true;
-    let error = rig
+        Recorder::create(f.path(), &fixture.scenario, RecorderOptions::default()).expect("created");
+    fixture
+        .view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut recorder, v))
+        .expect("started");
+    fixture.parts[1].1.nan = true;
+    let error = fixture
         .view(5, &mut |v| terraglue_engine::observer::Observer::stepped(&mut recorder, v))
         .expect_err("refused");
     let text = error.to_string();
     assert!(text.contains("robot") && text.contains("body.x") && text.contains("NaN"), "{text}");
     let error = Some(&error);
-    rig.view(5, &mut |v| terraglue_engine::observer::Observer::finished(&mut recorder, v, error))
+    fixture
+        .view(5, &mut |v| terraglue_engine::observer::Observer::finished(&mut recorder, v, error))
         .expect("closed");
     let summary = recorder.finish(1.0, 1.0, error, Status::Failed).expect("finished");
     assert_eq!(summary.error.and_then(|e| e.module).as_deref(), Some("rigid-body"));
@@ -495,12 +509,12 @@ fn the_report_is_one_file_that_asks_nothing_of_a_network() {
 #[test]
 fn a_report_leaves_out_what_was_not_simulated() {
     let f = folder();
-    let mut rig = Rig::new("cooperative");
-    rig.parts.truncate(1);
-    (rig.scenario.report, rig.feet) = (Default::default(), 0);
+    let mut fixture = Fixture::new("cooperative");
+    fixture.parts.truncate(1);
+    (fixture.scenario.report, fixture.feet) = (Default::default(), 0);
     let mut recorder =
-        Recorder::create(f.path(), &rig.scenario, RecorderOptions::default()).expect("created");
-    rig.run(&mut recorder, 50).expect("ran");
+        Recorder::create(f.path(), &fixture.scenario, RecorderOptions::default()).expect("created");
+    fixture.run(&mut recorder, 50).expect("ran");
     let summary = recorder.finish(1.0, 1.0, None, Status::Done).expect("finished");
     assert_eq!((summary.distance_m, summary.max_sinkage_m, summary.soil_module), (None, None, None));
     let html = std::fs::read_to_string(report::write(f.path()).expect("written")).expect("written");
@@ -578,21 +592,24 @@ fn a_comparison_marks_the_best_and_says_what_diverged_and_when() {
 #[ignore = "a measurement"]
 fn cost_of_recording() {
     let f = folder();
-    let mut rig = Rig::new("cooperative");
-    rig.parts[1].1.widen(700);
+    let mut fixture = Fixture::new("cooperative");
+    fixture.parts[1].1.widen(700);
     let mut recorder =
-        Recorder::create(f.path(), &rig.scenario, RecorderOptions::default()).expect("created");
-    rig.view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut recorder, v)).expect("started");
+        Recorder::create(f.path(), &fixture.scenario, RecorderOptions::default()).expect("created");
+    fixture
+        .view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut recorder, v))
+        .expect("started");
     let (mut in_recorder, n) = (std::time::Duration::ZERO, 5000);
     for index in 1..=n {
-        rig.parts.iter_mut().for_each(|p| p.1.t = index as f64 * H);
-        rig.view(index, &mut |v| {
-            let start = std::time::Instant::now();
-            let r = terraglue_engine::observer::Observer::stepped(&mut recorder, v);
-            in_recorder += start.elapsed();
-            r
-        })
-        .expect("stepped");
+        fixture.parts.iter_mut().for_each(|p| p.1.t = index as f64 * H);
+        fixture
+            .view(index, &mut |v| {
+                let start = std::time::Instant::now();
+                let r = terraglue_engine::observer::Observer::stepped(&mut recorder, v);
+                in_recorder += start.elapsed();
+                r
+            })
+            .expect("stepped");
     }
     recorder.finish(1.0, 1.0, None, Status::Done).expect("finished");
     let size = std::fs::metadata(f.path().join(RECORDING)).expect("written").len();

@@ -1,4 +1,4 @@
-//! System structures (SSP) as scenarios: every unit becomes a subsystem, every way between two a connection.
+//! System structures (SSP) as scenarios: every FMU becomes a subsystem, every way between two a connection.
 //!
 //! The scenario says the same as the structure in our words, so that it can be kept, read and edited.
 
@@ -16,17 +16,17 @@ pub struct Converted {
     pub text: String,
     /// What was left out, and what was assumed.
     pub notes: Vec<String>,
-    /// Files of all units, relative to the structure.
-    pub units: Vec<String>,
+    /// Files of all FMUs, relative to the structure.
+    pub fmus: Vec<String>,
 }
 
 /// Steps of a run that nobody asks for a step.
 const STEPS: f64 = 1000.0;
 
-/// Says a structure as a scenario; `prefix` goes before the files of its units.
+/// Says a structure as a scenario; `prefix` goes before the files of its FMUs.
 ///
 /// # Errors
-/// What in the structure, its units or its parameters does not fit.
+/// What in the structure, its FMUs or its parameters does not fit.
 pub fn convert(package: &Package, prefix: &str) -> Result<Converted> {
     let network = Network::new(package)?;
     let mut values = values::values(package, &network)?;
@@ -63,10 +63,10 @@ pub fn convert(package: &Package, prefix: &str) -> Result<Converted> {
             let _ = write!(text, "factor = {a:?}\noffset = {b:?}\nconvert = false\n");
         }
     }
-    let mut units: Vec<String> = network.parts.iter().map(|p| p.component.source.clone()).collect();
-    units.sort();
-    units.dedup();
-    Ok(Converted { text, notes: values.notes, units })
+    let mut fmus: Vec<String> = network.parts.iter().map(|p| p.component.source.clone()).collect();
+    fmus.sort();
+    fmus.dedup();
+    Ok(Converted { text, notes: values.notes, fmus })
 }
 
 /// What a connection does by itself, by the units of the FMUs.
@@ -97,7 +97,7 @@ fn times(package: &Package, network: &Network, notes: &mut Vec<String>) -> Resul
         .iter()
         .filter_map(|p| p.description.experiment.step.or(p.description.capabilities.fixed_step));
     let wanted = own.filter(|s| *s > 0.0).reduce(f64::min).unwrap_or_else(|| {
-        notes.push("no unit names a step: time.step_s is a thousandth of the duration".into());
+        notes.push("no FMU names a step: time.step_s is a thousandth of the duration".into());
         duration / STEPS
     });
     if !(duration > 0.0 && duration.is_finite() && wanted.is_finite()) {

@@ -1,20 +1,20 @@
-//! A system structure without its systems: units by path, and every way from one unit to another.
+//! A system structure without its systems: FMUs by path, and every way from one FMU to another.
 
 use std::collections::BTreeMap;
 use terraglue_fmi::description::{ModelDescription, Variable};
 use terraglue_fmi::ssp::{
-    Component, Connector, Dictionary, Element, End, Package, System, Table, Transformation,
+    Component, Connector, Dictionary, End, Package, System, SystemElement, Table, Transformation,
 };
 use terraglue_fmi::{Error, Fmu, Result};
 use terraglue_subsystem::unit::Unit;
 
 /// Path of an element (`outer/inner`, empty: the outermost system) and one of its connectors.
-pub type Key = (String, String);
+pub type ConnectorPath = (String, String);
 
 /// target = a · value + b.
 pub type Affine = (f64, f64);
 
-/// A unit of the structure.
+/// An FMU of the structure.
 pub struct Part<'a> {
     /// Name of its table in the scenario.
     pub name: String,
@@ -41,12 +41,12 @@ impl Part<'_> {
     }
 }
 
-/// A way from one unit to another.
+/// A way from one FMU to another.
 pub struct Way {
     /// Output.
-    pub from: Key,
+    pub from: ConnectorPath,
     /// Input.
-    pub to: Key,
+    pub to: ConnectorPath,
     /// How the value changes on the way: a number by this,
     pub affine: Affine,
     /// anything else by a table.
@@ -98,18 +98,18 @@ impl Carried {
 }
 
 struct Edge {
-    start: Key,
-    end: Key,
+    start: ConnectorPath,
+    end: ConnectorPath,
     transformation: Transformation,
 }
 
-/// Units and connections of all systems.
+/// FMUs and connections of all systems.
 pub struct Network<'a> {
     /// In the order of the structure.
     pub parts: Vec<Part<'a>>,
     edges: Vec<Edge>,
     /// Units that the structure gives connectors.
-    units: BTreeMap<Key, Unit>,
+    units: BTreeMap<ConnectorPath, Unit>,
     /// Dictionaries of the systems around the one that is read, the outermost first, with the path of their signals.
     dictionaries: Vec<(String, &'a Dictionary)>,
 }
@@ -120,10 +120,10 @@ pub fn below(path: &str, element: &str) -> String {
 }
 
 impl<'a> Network<'a> {
-    /// Reads the descriptions of all units and resolves the connections.
+    /// Reads the descriptions of all FMUs and resolves the connections.
     ///
     /// # Errors
-    /// A unit that cannot be read, a connection to what does not exist.
+    /// An FMU that cannot be read, a connection to what does not exist.
     pub fn new(package: &'a Package) -> Result<Self> {
         let (units, dictionaries) = (BTreeMap::new(), Vec::new());
         let mut network = Self { parts: Vec::new(), edges: Vec::new(), units, dictionaries };
@@ -143,14 +143,14 @@ impl<'a> Network<'a> {
         for element in &system.elements {
             let inner = below(path, element.name());
             match element {
-                Element::System(nested) => self.system(package, &inner, nested)?,
-                Element::Dictionary(reference) => {
+                SystemElement::System(nested) => self.system(package, &inner, nested)?,
+                SystemElement::Dictionary(reference) => {
                     self.dictionary(&reference.dictionary).ok_or_else(|| {
                         let message = format!("there is no signal dictionary `{}`", reference.dictionary);
                         refused(package, message)
                     })?;
                 }
-                Element::Component(component) => {
+                SystemElement::Component(component) => {
                     let (description, _) = Fmu::inspect(&package.folder().join(&component.source))?;
                     self.connectors(&inner, &component.connectors);
                     let name = self.free_name(&inner);
@@ -183,7 +183,7 @@ impl<'a> Network<'a> {
         self.units.extend(known);
     }
 
-    fn end(&self, package: &Package, path: &str, system: &System, end: &End) -> Result<Key> {
+    fn end(&self, package: &Package, path: &str, system: &System, end: &End) -> Result<ConnectorPath> {
         let Some(name) = &end.element else {
             return match system.connectors.iter().any(|c| c.name == end.connector) {
                 true => Ok((path.to_owned(), end.connector.clone())),
@@ -195,7 +195,7 @@ impl<'a> Network<'a> {
         let element = system.elements.iter().find(|e| e.name() == name);
         let mut key = (below(path, name), end.connector.clone());
         let known = match element {
-            Some(Element::Dictionary(reference)) => match self.dictionary(&reference.dictionary) {
+            Some(SystemElement::Dictionary(reference)) => match self.dictionary(&reference.dictionary) {
                 Some((own, dictionary)) => {
                     key.0.clone_from(own);
                     dictionary.entries.iter().any(|e| e.name == end.connector)
@@ -203,26 +203,26 @@ impl<'a> Network<'a> {
                 None => false,
             },
             None => return Err(refused(package, format!("there is no element `{}`", key.0))),
-            Some(Element::System(inner)) => inner.connectors.iter().any(|c| c.name == end.connector),
-            Some(Element::Component(_)) => {
+            Some(SystemElement::System(inner)) => inner.connectors.iter().any(|c| c.name == end.connector),
+            Some(SystemElement::Component(_)) => {
                 self.part(&key.0).is_some_and(|p| p.variable(&end.connector).is_some())
             }
         };
         if known { Ok(key) } else { Err(refused(package, format!("there is no connector {}", shown(&key)))) }
     }
 
-    /// The unit at a path.
+    /// The FMU at a path.
     pub fn part(&self, path: &str) -> Option<&Part<'a>> {
         self.parts.iter().find(|p| p.path == path)
     }
 
     /// The physical unit of a connector: the structure's before the FMU's.
-    pub fn unit(&self, key: &Key) -> Option<Unit> {
+    pub fn unit(&self, key: &ConnectorPath) -> Option<Unit> {
         let given = self.units.get(key).copied();
         given.or_else(|| self.part(&key.0).and_then(|part| part.own_unit(&key.1)))
     }
 
-    /// A name for a table that no other unit and no table of a scenario has.
+    /// A name for a table that no other FMU and no table of a scenario has.
     fn free_name(&self, path: &str) -> String {
         let usual = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c } else { '_' };
         let plain: String = path.chars().map(usual).collect();
@@ -233,7 +233,7 @@ impl<'a> Network<'a> {
         std::iter::once(plain.clone()).chain(numbered).find(|name| !taken(name)).unwrap_or(plain)
     }
 
-    /// Every way from an output of a unit to an input of a unit.
+    /// Every way from an output of an FMU to an input of an FMU.
     ///
     /// # Errors
     /// Units of different dimensions on the way, or a table of what is no number and a linear transformation.
@@ -250,7 +250,12 @@ impl<'a> Network<'a> {
     }
 
     /// Where an edge comes from in the end, and the value at its end.
-    fn traced(&self, package: &Package, edge: &Edge, left: usize) -> Result<Option<(Key, Carried)>> {
+    fn traced(
+        &self,
+        package: &Package,
+        edge: &Edge,
+        left: usize,
+    ) -> Result<Option<(ConnectorPath, Carried)>> {
         if self.part(&edge.start.0).is_some() {
             let value = self.along(package, edge, &Carried::new(self.unit(&edge.start)))?;
             return Ok(Some((edge.start.clone(), value)));
@@ -273,11 +278,16 @@ impl<'a> Network<'a> {
             .map_err(|why| refused(package, format!("{} → {}: {why}", shown(&edge.start), shown(&edge.end))))
     }
 
-    /// The inputs and parameters of units that a connector of a system leads to, with what becomes of a value there.
+    /// The inputs and parameters of FMUs that a connector of a system leads to, with what becomes of a value there.
     ///
     /// # Errors
     /// As of [`Network::ways`].
-    pub fn leads_to(&self, package: &Package, key: &Key, value: Carried) -> Result<Vec<(Key, Carried)>> {
+    pub fn leads_to(
+        &self,
+        package: &Package,
+        key: &ConnectorPath,
+        value: Carried,
+    ) -> Result<Vec<(ConnectorPath, Carried)>> {
         let mut found = Vec::new();
         let mut open = vec![(key.clone(), value, self.edges.len())];
         while let Some((key, value, left)) = open.pop() {
@@ -314,7 +324,7 @@ fn changed(
 }
 
 /// A connector for people.
-pub fn shown(key: &Key) -> String {
+pub fn shown(key: &ConnectorPath) -> String {
     let path = key.0.replace('\u{0}', "");
     if path.is_empty() { format!("`{}`", key.1) } else { format!("`{path}.{}`", key.1) }
 }

@@ -1,19 +1,19 @@
-//! Parameter sets of a system structure as start values of its units.
+//! Parameter sets of a system structure as start values of its FMUs.
 //!
 //! Outer bindings go before inner ones, later ones before earlier ones of the same element. A binding with a mapping
 //! gives what is mapped and nothing else.
 
-use super::network::{Carried, Key, Network, below, refused, shown};
+use super::network::{Carried, ConnectorPath, Network, below, refused, shown};
 use std::collections::BTreeMap;
 use terraglue_fmi::Result;
-use terraglue_fmi::ssp::{Binding, Element, Package, Parameter, System, Transformation, Value};
+use terraglue_fmi::ssp::{Binding, Package, Parameter, System, SystemElement, Transformation, Value};
 use terraglue_subsystem::{ValueType, unit::Unit};
 
-/// Start values by the path of the unit and the name of the variable.
+/// Start values by the path of the FMU and the name of the variable.
 #[derive(Default)]
 pub struct Values {
     /// What a variable starts with.
-    pub start: BTreeMap<Key, Value>,
+    pub start: BTreeMap<ConnectorPath, Value>,
     /// Parameters that fit nothing.
     pub notes: Vec<String>,
 }
@@ -25,7 +25,7 @@ struct Given<'a> {
     transformation: Transformation,
 }
 
-/// Start values of all units.
+/// Start values of all FMUs.
 ///
 /// # Errors
 /// A value that cannot be converted.
@@ -45,9 +45,9 @@ fn of_system(
     for element in &system.elements {
         let inner = below(path, element.name());
         match element {
-            Element::System(nested) => of_system(package, network, &inner, nested, values)?,
-            Element::Dictionary(_) => {}
-            Element::Component(component) => {
+            SystemElement::System(nested) => of_system(package, network, &inner, nested, values)?,
+            SystemElement::Dictionary(_) => {}
+            SystemElement::Component(component) => {
                 for given in component.bindings.iter().flat_map(|b| given(b, values)).collect::<Vec<_>>() {
                     set(package, network, (inner.clone(), given.target.clone()), &given, values)?;
                 }
@@ -96,7 +96,8 @@ fn to_system(
     if system.connectors.iter().any(|c| c.name == given.target) {
         return along(package, network, (path.to_owned(), given.target.clone()), &given, values);
     }
-    let inside = |e: &&Element| given.target.strip_prefix(e.name()).is_some_and(|rest| rest.starts_with('.'));
+    let inside =
+        |e: &&SystemElement| given.target.strip_prefix(e.name()).is_some_and(|rest| rest.starts_with('.'));
     let Some(element) = system.elements.iter().filter(inside).max_by_key(|e| e.name().len()) else {
         values.notes.push(format!("the parameter {} fits nothing", shown(&(path.to_owned(), given.target))));
         return Ok(());
@@ -104,25 +105,31 @@ fn to_system(
     let target = given.target[element.name().len() + 1..].to_owned();
     let inner = below(path, element.name());
     match element {
-        Element::System(nested) => {
+        SystemElement::System(nested) => {
             to_system(package, network, &inner, nested, Given { target, ..given }, values)
         }
-        Element::Component(_) => set(package, network, (inner, target), &given, values),
-        Element::Dictionary(_) => {
-            values.notes.push(format!("the parameter {} fits no unit", shown(&(inner, target))));
+        SystemElement::Component(_) => set(package, network, (inner, target), &given, values),
+        SystemElement::Dictionary(_) => {
+            values.notes.push(format!("the parameter {} fits no FMU", shown(&(inner, target))));
             Ok(())
         }
     }
 }
 
-/// Gives a parameter to all units that a connector of a system leads to.
-fn along(package: &Package, network: &Network, key: Key, given: &Given, values: &mut Values) -> Result {
+/// Gives a parameter to all FMUs that a connector of a system leads to.
+fn along(
+    package: &Package,
+    network: &Network,
+    key: ConnectorPath,
+    given: &Given,
+    values: &mut Values,
+) -> Result {
     let unit = network.unit(&key);
     let mut value = start(package, &key, given, unit)?;
     value.unit = unit.or(given.parameter.unit);
     let ends = network.leads_to(package, &key, value)?;
     if ends.is_empty() {
-        values.notes.push(format!("the parameter {} leads to no unit", shown(&key)));
+        values.notes.push(format!("the parameter {} leads to no FMU", shown(&key)));
     }
     for (end, carried) in ends {
         keep(package, network, end, &given.parameter.value, &carried, values)?;
@@ -131,14 +138,20 @@ fn along(package: &Package, network: &Network, key: Key, given: &Given, values: 
 }
 
 /// A parameter after its mapping, in the unit of where it goes.
-fn start(package: &Package, key: &Key, given: &Given, unit: Option<Unit>) -> Result<Carried> {
+fn start(package: &Package, key: &ConnectorPath, given: &Given, unit: Option<Unit>) -> Result<Carried> {
     let own = Carried::new(given.parameter.unit);
     own.changed(unit, &given.transformation)
         .map_err(|why| refused(package, format!("the parameter {}: {why}", shown(key))))
 }
 
-/// Gives a parameter to a variable of a unit.
-fn set(package: &Package, network: &Network, key: Key, given: &Given, values: &mut Values) -> Result {
+/// Gives a parameter to a variable of an FMU.
+fn set(
+    package: &Package,
+    network: &Network,
+    key: ConnectorPath,
+    given: &Given,
+    values: &mut Values,
+) -> Result {
     let carried = start(package, &key, given, network.unit(&key))?;
     keep(package, network, key, &given.parameter.value, &carried, values)
 }
@@ -146,7 +159,7 @@ fn set(package: &Package, network: &Network, key: Key, given: &Given, values: &m
 fn keep(
     package: &Package,
     network: &Network,
-    key: Key,
+    key: ConnectorPath,
     value: &Value,
     carried: &Carried,
     values: &mut Values,

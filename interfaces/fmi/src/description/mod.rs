@@ -1,4 +1,4 @@
-//! What a unit says of itself: `modelDescription.xml` of FMI 2.0 and 3.0 as one plain structure.
+//! What an FMU says of itself: `modelDescription.xml` of FMI 2.0 and 3.0 as one plain structure.
 
 pub(crate) mod element;
 mod model;
@@ -21,7 +21,7 @@ const NODES: u32 = 20_000_000;
 /// Reads and checks a description.
 ///
 /// # Errors
-/// The first thing that makes the unit unusable, with line and element. What is odd but harmless is listed in
+/// The first thing that makes the FMU unusable, with line and element. What is odd but harmless is listed in
 /// [`ModelDescription::problems`].
 pub fn read(path: &Path, bytes: &[u8], terminals: Option<&[u8]>) -> Result<ModelDescription> {
     let reader = Reader { path, file: "modelDescription.xml" };

@@ -13,7 +13,7 @@ pub enum Version {
     V3,
 }
 
-/// All that a unit says of itself.
+/// All that an FMU says of itself.
 #[derive(Clone, Debug, Default)]
 pub struct ModelDescription {
     /// Version of the standard.
@@ -26,7 +26,7 @@ pub struct ModelDescription {
     pub description: String,
     /// Who made the model.
     pub author: String,
-    /// What made the unit.
+    /// What made the FMU.
     pub generation_tool: String,
     /// Name of its library.
     pub identifier: String,
@@ -70,7 +70,7 @@ impl ModelDescription {
     }
 }
 
-/// What a unit can do.
+/// What an FMU can do.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Capabilities {
     /// Its state can be saved and restored.
@@ -101,7 +101,7 @@ pub struct Capabilities {
     pub interpolates_inputs: bool,
 }
 
-/// What a unit wants to be run with.
+/// What an FMU wants to be run with.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Experiment {
     /// s.
@@ -236,7 +236,7 @@ pub struct Variable {
     pub alias: bool,
     /// When it ticks, of an input clock whose times are known beforehand.
     pub ticks: Option<Ticks>,
-    /// When it first ticks and how it goes on, of an input clock whose intervals the unit tells while it runs.
+    /// When it first ticks and how it goes on, of an input clock whose intervals the FMU tells while it runs.
     pub told: Option<Told>,
     /// Whether it tells them as fractions too, of an input clock.
     pub fraction: bool,
@@ -250,7 +250,7 @@ pub struct Variable {
     pub intermediate: bool,
 }
 
-/// A clock whose intervals the unit tells.
+/// A clock whose intervals the FMU tells.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Told {
     /// It first ticks here, s; each tick tells the time to the next.
@@ -337,7 +337,7 @@ impl ModelDescription {
         self.variables.iter().position(|v| v.name == name)
     }
 
-    /// Whether the unit follows this input within its steps: by its slope in FMI 2, in its intermediate update in FMI 3.
+    /// Whether the FMU follows this input within its steps: by its slope in FMI 2, in its intermediate update in FMI 3.
     pub fn follows(&self, v: &Variable) -> bool {
         let able = match self.version {
             Version::V2 => self.capabilities.interpolates_inputs && v.value_type == ValueType::F64,

@@ -21,7 +21,7 @@ impl ModelDescription {
         all.filter_map(|v| Some((v.reference, value(v)?))).collect()
     }
 
-    /// The same unit after structural parameters (number in calls, value) were set: arrays have other sizes. Start values of
+    /// The same FMU after structural parameters (number in calls, value) were set: arrays have other sizes. Start values of
     /// arrays whose shape changed belong to the old shape and are gone.
     ///
     /// # Errors
@@ -73,7 +73,7 @@ mod tests {
     use super::*;
     use terraglue_subsystem::ValueType;
 
-    fn unit() -> ModelDescription {
+    fn sized() -> ModelDescription {
         let plain = Variable {
             name: "n".into(),
             reference: 1,
@@ -114,19 +114,19 @@ mod tests {
 
     #[test]
     fn arrays_follow_their_parameters_and_lose_the_start_of_another_shape() {
-        let same = unit().resized(&[(1, 2)]).unwrap();
-        assert_eq!(same.variables, unit().variables);
-        let other = unit().resized(&[(1, 5)]).unwrap();
+        let same = sized().resized(&[(1, 2)]).unwrap();
+        assert_eq!(same.variables, sized().variables);
+        let other = sized().resized(&[(1, 5)]).unwrap();
         let a = &other.variables[1];
         assert_eq!((a.sizes.as_slice(), &a.start, a.resized), ([5, 3].as_slice(), &Start::None, true));
         assert_eq!(other.variables[0].start, Start::Integers(vec![5]));
-        assert!(unit().resized(&[(1, 0)]).unwrap().variables[1].is_empty());
+        assert!(sized().resized(&[(1, 0)]).unwrap().variables[1].is_empty());
     }
 
     #[test]
     fn what_no_memory_holds_is_refused() {
         for size in [1 << 28, 1 << 62, u64::MAX] {
-            assert!(unit().resized(&[(1, size)]).unwrap_err().contains("`a` has more than"), "{size}");
+            assert!(sized().resized(&[(1, size)]).unwrap_err().contains("`a` has more than"), "{size}");
         }
     }
 }

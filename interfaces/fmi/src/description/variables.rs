@@ -14,7 +14,7 @@ pub fn read(root: &Element, description: &mut ModelDescription) -> Result {
     let mut references: BTreeMap<(u32, bool), String> = BTreeMap::new();
     let types: BTreeMap<String, DeclaredType> =
         description.types.iter().map(|t| (t.name.clone(), t.clone())).collect();
-    let mut lines = Lines { text: list.document.input_text(), at: 0, line: 1 };
+    let mut lines = LineCounter { text: list.document.input_text(), at: 0, line: 1 };
     for element in list.children() {
         let line = lines.line(element.node.range().start);
         let variable = match description.version {
@@ -55,13 +55,13 @@ pub fn read(root: &Element, description: &mut ModelDescription) -> Result {
 }
 
 /// Counts lines in one pass over the file.
-struct Lines<'a> {
+struct LineCounter<'a> {
     text: &'a str,
     at: usize,
     line: u32,
 }
 
-impl Lines<'_> {
+impl LineCounter<'_> {
     fn line(&mut self, position: usize) -> u32 {
         let between = self.text.as_bytes().get(self.at..position).unwrap_or_default();
         self.line += between.iter().filter(|b| **b == b'\n').count() as u32;
@@ -198,7 +198,7 @@ fn clocks(element: &Element) -> Result<Vec<u32>> {
     text.split_whitespace().map(one).collect()
 }
 
-/// How an input clock ticks whose intervals are known while the unit runs.
+/// How an input clock ticks whose intervals are known while the FMU runs.
 fn told(element: &Element, causality: Causality) -> Result<Option<Told>> {
     let decimal = |name: &str| element.optional_number(name);
     let counted = decimal("shiftCounter")?

@@ -1,7 +1,7 @@
 //! Writes `modelDescription.xml` from the variables of a subsystem.
 
 use super::xml::Xml;
-use super::{Entry, Layout, values::Value};
+use super::{Entry, Layout, values::FmiType};
 use crate::description::Version;
 use std::fmt::Display;
 use terraglue_subsystem::unit::Unit;
@@ -20,7 +20,7 @@ pub struct About {
     pub token: String,
     /// Program that made it, with its version.
     pub tool: String,
-    /// Licence of the unit.
+    /// Licence of the FMU.
     pub license: String,
     /// Usual end of a run, s.
     pub stop_s: f64,
@@ -39,7 +39,7 @@ pub fn identifier(name: &str) -> String {
     out
 }
 
-/// The description of a unit that shows `subsystem`.
+/// The description of an FMU that shows `subsystem`.
 ///
 /// # Errors
 /// A start value that cannot be read.
@@ -367,7 +367,7 @@ impl Writer<'_> {
     }
 }
 
-fn list<T: Value>(s: &dyn Subsystem, v: &Variable, show: impl Fn(&T) -> String) -> Result<Vec<String>> {
+fn list<T: FmiType>(s: &dyn Subsystem, v: &Variable, show: impl Fn(&T) -> String) -> Result<Vec<String>> {
     let mut out = vec![T::default(); v.len()];
     T::read(s, v, &mut out)?;
     Ok(out.iter().map(show).collect())

@@ -14,7 +14,7 @@ pub struct Entry {
     pub element: Option<usize>,
 }
 
-/// All value references of a unit: entry k has the reference k + 1; 0 is the time (FMI 3.0).
+/// All value references of an FMU: entry k has the reference k + 1; 0 is the time (FMI 3.0).
 #[derive(Clone, Debug, PartialEq)]
 pub struct Layout {
     /// Version of the standard.

@@ -1,12 +1,12 @@
 //! A subsystem as a functional mock-up unit: its variables as those of FMI 2.0 or 3.0, its description, its life.
 //!
-//! Everything here is safe Rust and knows no pointer. [`Component`] is an instance as the standards see it: phases,
+//! Everything here is safe Rust and knows no pointer. [`ExportedInstance`] is an instance as the standards see it: phases,
 //! value references, saved states, the log. [`describe`] writes `modelDescription.xml` from the variables, and
-//! [`pack`] the archive. The functions of the C interfaces, which wrap a [`Component`], stand in the library that goes
+//! [`pack`] the archive. The functions of the C interfaces, which wrap a [`ExportedInstance`], stand in the library that goes
 //! into the archive.
 
-mod component;
 mod describe;
+mod exported_instance;
 mod layout;
 mod pack;
 mod states;
@@ -14,15 +14,15 @@ mod terminals;
 mod values;
 mod xml;
 
-pub use component::{Component, Mailbox, Open, Opened, Opening, Phase, Reached};
 pub use describe::{About, describe, identifier};
+pub use exported_instance::{ExportedInstance, Mailbox, Open, Opened, Opening, Phase, Reached};
 pub use layout::{Entry, Layout};
 pub use pack::{Content, pack};
 pub use states::Handle;
 pub use terminals::terminals;
-pub use values::Value;
+pub use values::FmiType;
 
-/// What a call of a unit did not do, with the status that the standards give it.
+/// What a call of an FMU did not do, with the status that the standards give it.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Wrong {
     /// Status.

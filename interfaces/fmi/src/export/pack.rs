@@ -1,4 +1,4 @@
-//! Writes the archive of a unit.
+//! Writes the archive of an FMU.
 
 use std::fs::File;
 use std::io::{BufWriter, Read, Write};
@@ -65,7 +65,7 @@ pub fn pack(path: &Path, entries: &[(String, Content)]) -> Result<(), String> {
     readable(&kept).map_err(|e| failed(path, &e))
 }
 
-/// Temporary files are the owner's alone; a unit is for everybody.
+/// Temporary files are the owner's alone; an FMU is for everybody.
 fn readable(file: &File) -> std::io::Result<()> {
     use std::os::unix::fs::PermissionsExt;
     file.set_permissions(std::fs::Permissions::from_mode(0o644))

@@ -1,4 +1,4 @@
-//! States that a master has saved: numbers of slots in the subsystem, with what the unit itself remembers.
+//! States that a master has saved: numbers of slots in the subsystem, with what the FMU itself remembers.
 
 use super::{Answer, Phase, wrong};
 
@@ -6,7 +6,7 @@ use super::{Answer, Phase, wrong};
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Handle(pub usize);
 
-/// What the unit remembers beside the subsystem's own state.
+/// What the FMU remembers beside the subsystem's own state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Moment {
     pub time: f64,
@@ -26,7 +26,7 @@ pub(super) struct States {
 const SLOT_BITS: u32 = 16;
 
 impl States {
-    /// `slots` are those of the subsystem; the last one is kept for the unit itself.
+    /// `slots` are those of the subsystem; the last one is kept for the FMU itself.
     pub fn new(instance: usize, slots: u32) -> Self {
         Self { instance, moments: vec![None; slots.saturating_sub(1) as usize] }
     }

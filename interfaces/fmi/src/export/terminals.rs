@@ -1,4 +1,4 @@
-//! Terminals of FMI 3.0: the variables of a body, and those of driven feet, named as what plugs into another unit.
+//! Terminals of FMI 3.0: the variables of a body, and those of driven feet, named as what plugs into another FMU.
 //!
 //! A group `NAME.x`, `NAME.y`, `NAME.z` is a body (`org.terraglue.body`), a group `NAME.position`, `NAME.force` are feet
 //! (`org.terraglue.feet`, a row per foot). Members are matched by their names.

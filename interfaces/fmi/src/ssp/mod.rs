@@ -1,7 +1,7 @@
-//! System structures (SSP 1.0, Modelica Association): units, how they are connected, and their parameters.
+//! System structures (SSP 1.0, Modelica Association): FMUs, how they are connected, and their parameters.
 //!
-//! [`Package::open`] reads an archive (`.ssp`) through the same checks as one of a unit, or a description beside its
-//! files (`.ssd`). None of the code of its units runs. What this reader does not know it refuses by name, such as
+//! [`Package::open`] reads an archive (`.ssp`) through the same checks as one of an FMU, or a description beside its
+//! files (`.ssd`). None of the code of its FMUs runs. What this reader does not know it refuses by name, such as
 //! packages inside packages.
 
 mod model;

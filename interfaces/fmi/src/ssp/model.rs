@@ -25,7 +25,7 @@ pub struct System {
     /// Parameters for all that is inside.
     pub bindings: Vec<Binding>,
     /// Components and systems.
-    pub elements: Vec<Element>,
+    pub elements: Vec<SystemElement>,
     /// Between connectors of elements and its own.
     pub connections: Vec<Connection>,
     /// Signals that it and all systems inside may share.
@@ -34,8 +34,8 @@ pub struct System {
 
 /// What a system consists of.
 #[derive(Clone, Debug, PartialEq)]
-pub enum Element {
-    /// A unit.
+pub enum SystemElement {
+    /// An FMU.
     Component(Component),
     /// A nested system.
     System(System),
@@ -43,7 +43,7 @@ pub enum Element {
     Dictionary(DictionaryReference),
 }
 
-impl Element {
+impl SystemElement {
     /// Name.
     pub fn name(&self) -> &str {
         match self {
@@ -88,7 +88,7 @@ pub struct Component {
 /// A connector.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Connector {
-    /// Name: that of a variable of the unit.
+    /// Name: that of a variable of the FMU.
     pub name: String,
     /// Unit where the structure gives one that has a meaning; it goes before that of the FMU.
     pub unit: Option<Unit>,

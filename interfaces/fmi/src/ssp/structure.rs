@@ -1,8 +1,8 @@
 //! Reads `SystemStructure.ssd`.
 
 use super::{
-    Component, Connection, Connector, Dictionary, DictionaryReference, Element as Inner, End, Files,
-    Structure, System, Table, Transformation, Value, parameters,
+    Component, Connection, Connector, Dictionary, DictionaryReference, End, Files, Structure, System,
+    SystemElement, Table, Transformation, Value, parameters,
 };
 use crate::description::element::{Element, Reader};
 use crate::description::{parse, types};
@@ -65,15 +65,15 @@ fn system(context: Context, element: &Element) -> Result<System> {
         return Err(element.error(format!("systems are nested deeper than {DEPTH} levels")));
     }
     let name = element.text("name").to_owned();
-    let mut elements: Vec<Inner> = Vec::new();
+    let mut elements: Vec<SystemElement> = Vec::new();
     for inner in element.child("Elements").iter().flat_map(Element::children) {
         let read = match inner.name() {
             "Component" => component(context, &inner)?,
-            "System" => Inner::System(named(
+            "System" => SystemElement::System(named(
                 system(Context { depth: context.depth + 1, ..context }, &inner)?,
                 &inner,
             )?),
-            "SignalDictionaryReference" => Inner::Dictionary(DictionaryReference {
+            "SignalDictionaryReference" => SystemElement::Dictionary(DictionaryReference {
                 name: inner.required("name")?.to_owned(),
                 dictionary: inner.required("dictionary")?.to_owned(),
             }),
@@ -143,21 +143,21 @@ fn named(system: System, element: &Element) -> Result<System> {
     element.required("name").map(|_| system)
 }
 
-fn component(context: Context, element: &Element) -> Result<Inner> {
-    const UNIT: &str = "application/x-fmu-sharedlibrary";
+fn component(context: Context, element: &Element) -> Result<SystemElement> {
+    const FMU: &str = "application/x-fmu-sharedlibrary";
     const STRUCTURE: &str = "application/x-ssp-definition";
     let name = element.required("name")?.to_owned();
     let source = element.required("source")?;
-    let kind = element.attribute("type").unwrap_or(UNIT);
+    let kind = element.attribute("type").unwrap_or(FMU);
     if kind == STRUCTURE {
         let bytes = context.files.bytes(source)?;
         let inner = read_at(context.files, &bytes, "a nested .ssd", context.depth + 1)?;
         let mut bindings = inner.system.bindings;
         bindings.extend(parameters::bindings(context, element)?);
-        return Ok(Inner::System(System { name, bindings, ..inner.system }));
+        return Ok(SystemElement::System(System { name, bindings, ..inner.system }));
     }
-    if kind != UNIT {
-        return Err(element.error(format!("type = \"{kind}\": {UNIT} and {STRUCTURE} are read here")));
+    if kind != FMU {
+        return Err(element.error(format!("type = \"{kind}\": {FMU} and {STRUCTURE} are read here")));
     }
     if element.text("implementation") == "ModelExchange" {
         return Err(
@@ -166,7 +166,7 @@ fn component(context: Context, element: &Element) -> Result<Inner> {
     }
     let path =
         super::relative(source).map_err(|why| element.error(format!("source = \"{source}\" {why}")))?;
-    Ok(Inner::Component(Component {
+    Ok(SystemElement::Component(Component {
         name,
         source: path.display().to_string(),
         connectors: connectors(context, element)?,

@@ -6,7 +6,7 @@ use std::ffi::{CString, c_char};
 use terraglue_subsystem::{FieldInfo, Geometry, SceneShape, Subsystem, Variable};
 
 /// Arrays handed out by `variables`, `actions`, `scene` and `fields`.
-pub(super) struct Descriptions {
+pub(super) struct ExportedDescriptions {
     pub(super) variables: Vec<TgVariable>,
     pub(super) actions: Vec<TgAction>,
     pub(super) bodies: Vec<TgBody>,
@@ -40,7 +40,7 @@ impl Keep {
     }
 }
 
-impl Descriptions {
+impl ExportedDescriptions {
     pub(super) fn of(subsystem: &dyn Subsystem) -> Self {
         let mut keep = Keep::default();
         let scene = subsystem.scene();

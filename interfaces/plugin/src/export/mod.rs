@@ -11,7 +11,7 @@ mod values;
 
 use crate::abi::*;
 use crate::text::{borrowed, c_string, panic_text};
-use descriptions::Descriptions;
+use descriptions::ExportedDescriptions;
 use services::ForeignHost;
 use std::cell::{Cell, RefCell};
 use std::collections::BTreeSet;
@@ -29,7 +29,7 @@ thread_local! {
 struct Exported {
     subsystem: Box<dyn Subsystem>,
     host: Arc<ForeignHost>,
-    descriptions: Descriptions,
+    descriptions: ExportedDescriptions,
     failure: RefCell<CString>,
     dead: Cell<bool>,
     scratch: RefCell<Scratch>,
@@ -221,7 +221,7 @@ unsafe extern "C" fn instantiate<M: Module>(
         let subsystem = M::instantiate(&Config::parse(config)?, host.clone());
         host.close_terrain();
         let subsystem = subsystem?;
-        let descriptions = Descriptions::of(subsystem.as_ref());
+        let descriptions = ExportedDescriptions::of(subsystem.as_ref());
         Ok(Box::new(Exported {
             subsystem,
             host,

@@ -11,14 +11,14 @@ use terraglue_subsystem::{
 
 /// Everything about an instance that never changes.
 #[derive(Default)]
-pub(super) struct Descriptions {
+pub(super) struct ForeignDescriptions {
     pub(super) variables: Vec<Variable>,
     pub(super) actions: Vec<Action>,
     pub(super) scene: Scene,
     pub(super) fields: Vec<FieldInfo>,
 }
 
-impl Descriptions {
+impl ForeignDescriptions {
     pub(super) fn of(raw: &Raw) -> Result<Self> {
         let (i, t) = (raw.instance, &raw.table);
         let mut out = Self::default();

@@ -1,6 +1,6 @@
 //! A foreign instance as a [`Subsystem`]: every call goes through the table, nothing is allocated on success.
 
-use super::descriptions::{Descriptions, check_capabilities};
+use super::descriptions::{ForeignDescriptions, check_capabilities};
 use super::services::Services;
 use crate::abi::*;
 use crate::convert;
@@ -16,7 +16,7 @@ use terraglue_subsystem::{
 pub struct ForeignSubsystem {
     pub(super) raw: Raw,
     capabilities: Capabilities,
-    descriptions: Descriptions,
+    descriptions: ForeignDescriptions,
     pub(super) scratch: RefCell<Vec<TgBytes>>,
 }
 
@@ -125,7 +125,7 @@ impl ForeignSubsystem {
 
     pub(super) fn new(table: TgSubsystem, instance: *mut c_void, services: Box<Services>) -> Result<Self> {
         let raw = Raw { table, instance, services };
-        let descriptions = Descriptions::of(&raw)?;
+        let descriptions = ForeignDescriptions::of(&raw)?;
         // SAFETY: a required function with the live instance.
         let bits = table.capabilities.map_or(0, |f| unsafe { f(instance) });
         let capabilities = Capabilities(bits);

@@ -12,6 +12,11 @@
 //!
 //! Deliberately absent: shapes, bodies, time.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod cone;
 mod dense;
 mod gauss_seidel;

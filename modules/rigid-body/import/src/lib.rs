@@ -5,6 +5,11 @@
 //! that says which value is used instead; what it cannot is refused with file, line, link or joint, the offending value
 //! and a way out.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod attach;
 mod check;
 mod error;
@@ -30,7 +35,7 @@ pub use model::{
     AxisData, Base, Body, Coupling, Drive, DriveKind, Heights, Joint, JointKind, Loop, Plane, Robot, Shape,
     ShapeGeometry,
 };
-pub use pose::Whole;
+pub use pose::TotalMass;
 pub use urdf::read_urdf_text;
 
 use error::Source;

@@ -4,7 +4,7 @@
 use crate::check::isometry;
 use crate::error::Source;
 use crate::inertia::{Inertial, flaw, shown};
-use crate::tree::Place;
+use crate::tree::LinkPlace;
 use nalgebra::{Isometry3, Point3};
 use urdf_rs::{JointType, Robot};
 
@@ -23,7 +23,7 @@ pub(crate) struct Merged {
 }
 
 /// Groups the links; `order` has parents first. What is fixed to a massless root called `world` belongs to it.
-pub(crate) fn merge(robot: &Robot, order: &[Place], inertials: &[Option<Inertial>]) -> Merged {
+pub(crate) fn merge(robot: &Robot, order: &[LinkPlace], inertials: &[Option<Inertial>]) -> Merged {
     let n = robot.links.len();
     let mut m = Merged {
         group: vec![0; n],

@@ -6,7 +6,7 @@ use nalgebra::{Isometry3, Matrix3, Point3, Translation3, UnitQuaternion, Vector3
 
 /// What all bodies are together, in the frame of the file.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Whole {
+pub struct TotalMass {
     /// kg.
     pub mass: f64,
     /// Centre of mass, m.
@@ -56,15 +56,15 @@ impl Robot {
     }
 
     /// Mass, centre of mass and inertia of all bodies in these poses.
-    pub fn whole(&self, poses: &[Isometry3<f64>]) -> Whole {
+    pub fn whole(&self, poses: &[Isometry3<f64>]) -> TotalMass {
         let placed = self.bodies.iter().zip(poses).map(|(body, pose)| {
             let r = pose.rotation.to_rotation_matrix();
             let com = (pose * Point3::from(body.com)).coords;
             Inertial { mass: body.mass, com, tensor: r * body.inertia * r.transpose() }
         });
         let all = placed.reduce(|a, b| a.with(&b));
-        let nothing = Whole { mass: 0.0, com: Vector3::zeros(), inertia: Matrix3::zeros() };
-        all.map_or(nothing, |i| Whole { mass: i.mass, com: i.com, inertia: i.tensor })
+        let nothing = TotalMass { mass: 0.0, com: Vector3::zeros(), inertia: Matrix3::zeros() };
+        all.map_or(nothing, |i| TotalMass { mass: i.mass, com: i.com, inertia: i.tensor })
     }
 
     /// Degrees of freedom: of the free bodies, and of the joints that follow no other one.

@@ -22,7 +22,7 @@ pub(crate) struct Shapes<'a> {
 
 /// Where a shape stands in the file.
 #[derive(Clone, Copy)]
-struct Place<'a> {
+struct ShapePlace<'a> {
     link: &'a Link,
     name: Option<&'a str>,
     origin: &'a Pose,
@@ -43,14 +43,16 @@ impl<'a> Shapes<'a> {
             if self.is_nothing(link, &c.geometry) {
                 continue;
             }
-            let place = Place { link, name: c.name.as_deref(), origin: &c.origin, collides: true, still };
+            let place =
+                ShapePlace { link, name: c.name.as_deref(), origin: &c.origin, collides: true, still };
             shapes.push(self.shape(place, &c.geometry)?);
         }
         for v in &link.visual {
             if self.is_nothing(link, &v.geometry) {
                 continue;
             }
-            let place = Place { link, name: v.name.as_deref(), origin: &v.origin, collides: false, still };
+            let place =
+                ShapePlace { link, name: v.name.as_deref(), origin: &v.origin, collides: false, still };
             let seen = match self.shape(place, &v.geometry) {
                 Ok(seen) => seen,
                 // A picture that cannot be drawn does no harm to the simulation.
@@ -97,7 +99,7 @@ impl<'a> Shapes<'a> {
         nothing
     }
 
-    fn shape(&mut self, place: Place, geometry: &Geometry) -> Result<Shape, Error> {
+    fn shape(&mut self, place: ShapePlace, geometry: &Geometry) -> Result<Shape, Error> {
         let link = place.link;
         let (geometry, sizes) = match geometry {
             Geometry::Sphere { radius } => (ShapeGeometry::Sphere { radius: *radius }, vec![*radius]),
@@ -126,7 +128,7 @@ impl<'a> Shapes<'a> {
         Ok(Shape { name, geometry, body_from_shape, collides, friction: None, group: 1, mask: 1 })
     }
 
-    fn mesh(&mut self, place: Place, file: &str, scale: [f64; 3]) -> Result<ShapeGeometry, Error> {
+    fn mesh(&mut self, place: ShapePlace, file: &str, scale: [f64; 3]) -> Result<ShapeGeometry, Error> {
         let link = place.link.name.as_str();
         let wrong = |problem: String| self.source.link(link, format!("the mesh `{file}`: {problem}"));
         if scale.contains(&0.0) {

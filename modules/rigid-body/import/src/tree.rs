@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 use urdf_rs::Robot;
 
 /// A link and the joint above it, as indices into the file.
-pub(crate) struct Place {
+pub(crate) struct LinkPlace {
     pub(crate) link: usize,
     pub(crate) joint: Option<usize>,
 }
 
 /// Links from the root downwards, each after its parent, children in the order of the file.
-pub(crate) fn order(source: &Source, robot: &Robot) -> Result<Vec<Place>, Error> {
+pub(crate) fn order(source: &Source, robot: &Robot) -> Result<Vec<LinkPlace>, Error> {
     let links = names(source, robot)?;
     let above = joints_above(source, robot, &links)?;
     let root = root(source, robot, &above)?;
@@ -20,7 +20,7 @@ pub(crate) fn order(source: &Source, robot: &Robot) -> Result<Vec<Place>, Error>
         below[links[joint.parent.link.as_str()]].push(j);
     }
     let mut order = Vec::with_capacity(robot.links.len());
-    let mut open = vec![Place { link: root, joint: None }];
+    let mut open = vec![LinkPlace { link: root, joint: None }];
     while let Some(place) = open.pop() {
         let children = &below[place.link];
         order.push(place);
@@ -28,7 +28,7 @@ pub(crate) fn order(source: &Source, robot: &Robot) -> Result<Vec<Place>, Error>
             children
                 .iter()
                 .rev()
-                .map(|j| Place { link: links[robot.joints[*j].child.link.as_str()], joint: Some(*j) }),
+                .map(|j| LinkPlace { link: links[robot.joints[*j].child.link.as_str()], joint: Some(*j) }),
         );
     }
     if order.len() < robot.links.len() {
@@ -98,7 +98,7 @@ fn root(source: &Source, robot: &Robot, above: &[Option<usize>]) -> Result<usize
     }
 }
 
-fn unreached(source: &Source, robot: &Robot, order: &[Place]) -> Error {
+fn unreached(source: &Source, robot: &Robot, order: &[LinkPlace]) -> Error {
     let lost = (0..robot.links.len()).find(|l| order.iter().all(|p| p.link != *l)).unwrap_or(0);
     let problem = "cannot be reached from the root: the joints around it form a loop; remove one of them";
     source.link(&robot.links[lost].name, problem)

@@ -7,7 +7,7 @@ use crate::inertia::{Inertial, repair};
 use crate::merge::{Merged, merge};
 use crate::model::{AxisData, Base, Body, Coupling, Joint, JointKind, Robot, Shape};
 use crate::shapes::Shapes;
-use crate::tree::{Place, order};
+use crate::tree::{LinkPlace, order};
 use crate::unread;
 use nalgebra::{Unit, Vector3};
 use urdf_rs::JointType;
@@ -28,7 +28,7 @@ pub fn read_urdf_text(file: &str, text: &str, options: &Options) -> Result<Robot
 fn build(
     source: &Source,
     robot: &urdf_rs::Robot,
-    order: &[Place],
+    order: &[LinkPlace],
     inertials: &[Option<Inertial>],
     merged: &Merged,
     options: &Options,

@@ -11,6 +11,11 @@
 //! one for each row that closes a loop. Nothing here knows
 //! time, motors or contacts.
 
+/// The examples of the README, which the tests compile.
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct Readme;
+
 mod dense;
 mod loops;
 mod path;

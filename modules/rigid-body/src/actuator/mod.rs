@@ -8,15 +8,15 @@
 //! | `friction` | Coulomb friction that sticks exactly, LuGre friction |
 //! | `thermal` | winding, housing, ambient |
 //! | `battery` | what feeds all motors of a robot |
-//! | `book` | power and energy of an actuator |
+//! | `ledger` | power and energy of an actuator |
 //! | `configure` | from the scenario: presets and patterns |
 //!
 //! The one knob is `max_torque`: it bounds the torque at the joint whatever drives it.
 
 pub(crate) mod battery;
-pub(crate) mod book;
 pub(crate) mod configure;
 pub(crate) mod curve;
+pub(crate) mod energy_ledger;
 pub(crate) mod friction;
 pub(crate) mod settings;
 mod thermal;
@@ -64,7 +64,7 @@ pub(crate) struct Actuator {
     pub rate: f64,
     /// Whether friction held the joint in the last step.
     pub stuck: bool,
-    pub book: book::Book,
+    pub ledger: energy_ledger::EnergyLedger,
 }
 
 impl Default for Actuator {
@@ -80,7 +80,7 @@ impl Default for Actuator {
             bristle: 0.0,
             rate: 0.0,
             stuck: true,
-            book: book::Book::default(),
+            ledger: energy_ledger::EnergyLedger::default(),
         }
     }
 }
@@ -110,7 +110,7 @@ impl Actuator {
     /// Everything stops: the joint is broken.
     pub fn stop(&mut self) {
         (self.current, self.voltage, self.bristle, self.rate, self.stuck) = (0.0, 0.0, 0.0, 0.0, false);
-        self.book.rest();
+        self.ledger.rest();
     }
 }
 
@@ -132,5 +132,5 @@ terraglue_subsystem::persist!(Actuator {
     bristle,
     rate,
     stuck,
-    book,
+    ledger,
 });

@@ -1,6 +1,6 @@
 //! Connections from the scenario: `[[robot.loop]]`, `[[robot.spring]]`, `[[robot.coupling]]`.
 
-use super::{Closure, Law, Points, Spring};
+use super::{Closure, ClosureLaw, Points, Spring};
 use crate::math::{Q, V3, frame_along};
 use crate::model::{Joint, Kind, Model};
 use crate::state::Motion;
@@ -60,7 +60,7 @@ pub(crate) fn closures(
     if let Some(twice) = names.windows(2).find(|n| n[0] == n[1]) {
         return Err(Error::Refused(format!("the robot file gives two connections the name `{}`", twice[0])));
     }
-    type Read = fn(&Entry, &Model, &[Motion], &[f64]) -> Result<Law>;
+    type Read = fn(&Entry, &Model, &[Motion], &[f64]) -> Result<ClosureLaw>;
     let tables: [(&str, &[&str], Read); 3] =
         [("loop", &LOOP, closing), ("spring", &SPRING, spring), ("coupling", &COUPLING, coupling)];
     for (table, keys, read) in tables {
@@ -87,7 +87,7 @@ fn from_coupling(c: &import::Coupling, model: &Model) -> Closure {
     let (follower, leader) = (model.from_file(c.follower), model.from_file(c.leader));
     Closure {
         name: c.name.clone(),
-        law: Law::Coupling { follower, leader, ratio: c.ratio, offset: c.offset },
+        law: ClosureLaw::Coupling { follower, leader, ratio: c.ratio, offset: c.offset },
     }
 }
 
@@ -101,7 +101,7 @@ fn from_loop(l: &import::Loop, model: &Model, bodies: &[Motion]) -> Closure {
         [child, None] => (None, child.unwrap_or(0)),
     };
     let inverse = |body: Option<usize>| body.map_or_else(Q::identity, |b| bodies[b].q.inverse());
-    let law = Law::Joint(Joint {
+    let law = ClosureLaw::Joint(Joint {
         name: l.name.clone(),
         kind: if l.rigid { Kind::Fixed } else { Kind::Spherical },
         parent,
@@ -235,7 +235,7 @@ fn points(entry: &Entry, model: &Model, bodies: &[Motion], follow: bool) -> Resu
     })
 }
 
-fn closing(entry: &Entry, model: &Model, bodies: &[Motion], _: &[f64]) -> Result<Law> {
+fn closing(entry: &Entry, model: &Model, bodies: &[Motion], _: &[f64]) -> Result<ClosureLaw> {
     let name = entry.text("kind")?;
     if name == "rod" {
         let points = points(entry, model, bodies, false)?;
@@ -243,7 +243,7 @@ fn closing(entry: &Entry, model: &Model, bodies: &[Motion], _: &[f64]) -> Result
         if length < 1e-9 {
             return Err(entry.refuse("length", "a rod has a length; two points in one place are `spherical`"));
         }
-        return Ok(Law::Rod(points, length));
+        return Ok(ClosureLaw::Rod(points, length));
     }
     let Some((_, kind)) = KINDS.iter().find(|(n, _)| *n == name) else {
         let names: Vec<&str> = KINDS.iter().map(|(n, _)| *n).collect();
@@ -260,7 +260,7 @@ fn closing(entry: &Entry, model: &Model, bodies: &[Motion], _: &[f64]) -> Result
     };
     let (parent_axis, child_axis) = if links[1].is_some() { (first, second) } else { (second, first) };
     let inverse = |body: Option<usize>| body.map_or_else(Q::identity, |b| bodies[b].q.inverse());
-    Ok(Law::Joint(Joint {
+    Ok(ClosureLaw::Joint(Joint {
         name: entry.text("name")?.to_owned(),
         kind: *kind,
         parent: points.parent,
@@ -285,7 +285,7 @@ fn with_second(axis: &V3, second: &V3) -> Q {
     Q::from_rotation_matrix(&nalgebra::Rotation3::from_matrix_unchecked(m))
 }
 
-fn spring(entry: &Entry, model: &Model, bodies: &[Motion], _: &[f64]) -> Result<Law> {
+fn spring(entry: &Entry, model: &Model, bodies: &[Motion], _: &[f64]) -> Result<ClosureLaw> {
     let points = points(entry, model, bodies, false)?;
     let positive = |key: &str| match entry.number(key)? {
         Some(x) if x < 0.0 => Err(entry.refuse(key, &format!("{x} is negative"))),
@@ -296,10 +296,10 @@ fn spring(entry: &Entry, model: &Model, bodies: &[Motion], _: &[f64]) -> Result<
         return Err(entry.refuse("stiffness", "neither stiffness nor damping is given"));
     }
     let rest_length = positive("rest_length")?.unwrap_or_else(|| points.length(bodies));
-    Ok(Law::Spring(points, Spring { stiffness, damping, rest_length }))
+    Ok(ClosureLaw::Spring(points, Spring { stiffness, damping, rest_length }))
 }
 
-fn coupling(entry: &Entry, model: &Model, _: &[Motion], angles: &[f64]) -> Result<Law> {
+fn coupling(entry: &Entry, model: &Model, _: &[Motion], angles: &[f64]) -> Result<ClosureLaw> {
     let joint = |name: &str| {
         let found = model.joints.iter().position(|j| j.moves() && j.name == name);
         found.ok_or_else(|| entry.refuse("joints", &format!("no moving joint is called `{name}`")))
@@ -311,7 +311,7 @@ fn coupling(entry: &Entry, model: &Model, _: &[Motion], angles: &[f64]) -> Resul
     }
     let ratio = entry.number("ratio")?.unwrap_or(1.0);
     let offset = entry.number("offset")?.unwrap_or(angles[follower] - ratio * angles[leader]);
-    Ok(Law::Coupling { follower, leader, ratio, offset })
+    Ok(ClosureLaw::Coupling { follower, leader, ratio, offset })
 }
 
 fn check_closed(

@@ -18,12 +18,12 @@ use terraglue_linear_solver::{Cut, MOST_PARTS, Rows};
 #[derive(Clone, Debug)]
 pub(crate) struct Closure {
     pub name: String,
-    pub law: Law,
+    pub law: ClosureLaw,
 }
 
 /// What it asks for.
 #[derive(Clone, Debug)]
-pub(crate) enum Law {
+pub(crate) enum ClosureLaw {
     /// The rigid rows of a joint.
     Joint(Joint),
     /// A rod without mass between two points, of a length in m.
@@ -118,20 +118,20 @@ impl Closure {
     /// How many rows it has.
     pub fn len(&self) -> usize {
         match &self.law {
-            Law::Joint(joint) => joint.rigid().iter().filter(|r| **r).count(),
+            ClosureLaw::Joint(joint) => joint.rigid().iter().filter(|r| **r).count(),
             _ => 1,
         }
     }
 
     /// The spring, if it is one.
     pub fn spring(&self) -> Option<(&Points, &Spring)> {
-        if let Law::Spring(points, spring) = &self.law { Some((points, spring)) } else { None }
+        if let ClosureLaw::Spring(points, spring) = &self.law { Some((points, spring)) } else { None }
     }
 
     /// Jacobians of all rows; compliance is left alone.
     pub fn fill(&self, poses: &Poses, out: &mut [Cut]) {
         match &self.law {
-            Law::Joint(joint) => {
+            ClosureLaw::Joint(joint) => {
                 let rows = poses.rows(joint);
                 let rigid = (0..6).filter(|r| joint.rigid()[*r]);
                 for (r, cut) in rigid.zip(out) {
@@ -139,13 +139,15 @@ impl Closure {
                     cut.parts = [Some((joint.child, rows.on_child(r))), parent, None, None];
                 }
             }
-            Law::Rod(points, length) => out[0].parts = points.row(poses, &(points.mean(poses).0 / *length)),
-            Law::Spring(points, _) => {
+            ClosureLaw::Rod(points, length) => {
+                out[0].parts = points.row(poses, &(points.mean(poses).0 / *length))
+            }
+            ClosureLaw::Spring(points, _) => {
                 let (apart, length) = points.mean(poses);
                 let direction = if length > 0.0 { apart / length } else { V3::x() };
                 out[0].parts = points.row(poses, &direction);
             }
-            Law::Coupling { follower, leader, ratio, .. } => {
+            ClosureLaw::Coupling { follower, leader, ratio, .. } => {
                 out[0].parts = [None; MOST_PARTS];
                 for (k, (j, factor)) in [(*follower, 1.0), (*leader, -ratio)].into_iter().enumerate() {
                     let joint = &poses.joints[j];
@@ -162,17 +164,17 @@ impl Closure {
     /// Values of all rows: how far they are open, or the length of a spring.
     pub fn values(&self, poses: &Poses, out: &mut [f64]) {
         match &self.law {
-            Law::Joint(joint) => {
+            ClosureLaw::Joint(joint) => {
                 let open = gap(joint, poses.bodies);
                 let rigid = (0..6).filter(|r| joint.rigid()[*r]);
                 rigid.zip(out).for_each(|(r, out)| *out = open[r]);
             }
-            Law::Rod(points, length) => {
+            ClosureLaw::Rod(points, length) => {
                 let apart = points.apart(poses.bodies);
                 out[0] = 0.5 * (apart.norm_squared() - length * length) / length;
             }
-            Law::Spring(points, _) => out[0] = points.length(poses.bodies),
-            Law::Coupling { follower, leader, ratio, offset } => {
+            ClosureLaw::Spring(points, _) => out[0] = points.length(poses.bodies),
+            ClosureLaw::Coupling { follower, leader, ratio, offset } => {
                 let at = |j: usize| coordinate(&poses.joints[j], poses.bodies, poses.near[j]);
                 out[0] = at(*follower) - ratio * at(*leader) - offset;
             }

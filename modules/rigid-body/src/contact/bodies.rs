@@ -15,6 +15,7 @@ use crate::state::Motion;
 use terraglue_contact_solver::lcp::{Facets, Method, Outcome, Pyramid};
 use terraglue_contact_solver::{Options, Problem, Solver};
 use terraglue_linear_solver::{Path, Tree};
+use terraglue_subsystem::{Config, Error};
 
 /// Overlap up to which it is taken out within one step, m.
 const FULL_RECOVERY: f64 = 1e-5;
@@ -32,19 +33,23 @@ const OPTIONS: Options =
 
 /// How the contact problem of a step is put and solved.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(crate) enum Law {
+pub(crate) enum ContactLaw {
     /// Coulomb's cone, to rounding.
     Cone,
     /// A friction pyramid, by Lemke's algorithm.
     Pyramid(Facets),
 }
 
-impl Law {
+impl ContactLaw {
     pub const NAMES: [&'static str; 3] = ["ncp", "lcp-4", "lcp-8"];
 
-    pub fn from_name(name: &str) -> Option<Self> {
-        let i = Self::NAMES.iter().position(|n| *n == name)?;
-        Some([Self::Cone, Self::Pyramid(Facets::Four), Self::Pyramid(Facets::Eight)][i])
+    /// The one that the parameter `contact_solver` names.
+    pub fn from_config(config: &Config) -> terraglue_subsystem::Result<Self> {
+        let (name, names) = (config.text("contact_solver")?, Self::NAMES);
+        let i = names.iter().position(|n| *n == name).ok_or_else(|| {
+            Error::Refused(format!("parameter `contact_solver` = `{name}` is none of {names:?}"))
+        })?;
+        Ok([Self::Cone, Self::Pyramid(Facets::Four), Self::Pyramid(Facets::Eight)][i])
     }
 }
 
@@ -79,7 +84,7 @@ pub(crate) struct BodyContacts {
     answers: Vec<f64>,
     stride: usize,
     push: Vec<f64>,
-    law: Law,
+    law: ContactLaw,
     solver: Solver,
     pyramid: Pyramid,
     /// Velocities at the solution of the pyramid.
@@ -108,7 +113,7 @@ impl BodyContacts {
             answers: Vec::new(),
             stride: 0,
             push: Vec::new(),
-            law: Law::Cone,
+            law: ContactLaw::Cone,
             solver: Solver::with_room(room),
             pyramid: Pyramid::default(),
             u: numbers(3),
@@ -127,7 +132,7 @@ impl BodyContacts {
     }
 
     /// Law, friction, restitution and the rigid ground.
-    pub fn set_surroundings(&mut self, law: Law, surfaces: Surfaces, ground: Option<Plane>) {
+    pub fn set_surroundings(&mut self, law: ContactLaw, surfaces: Surfaces, ground: Option<Plane>) {
         (self.law, self.surfaces) = (law, surfaces);
         self.detector.planes.extend(ground);
     }
@@ -216,12 +221,12 @@ impl BodyContacts {
     fn find_impulses(&mut self) -> Result<(), Unsolved> {
         let problem = Problem::new(&self.w, &self.q, &self.mu).map_err(|_| Unsolved::NotFinite)?;
         let facets = match self.law {
-            Law::Cone => {
+            ContactLaw::Cone => {
                 self.residual = self.solver.solve(&problem, &OPTIONS, &mut self.impulses).residual;
                 let good = self.residual <= REFUSE;
                 return if good { Ok(()) } else { Err(Unsolved::Residual(self.residual)) };
             }
-            Law::Pyramid(facets) => facets,
+            ContactLaw::Pyramid(facets) => facets,
         };
         match self.pyramid.solve(&problem, facets, Method::Lemke, &mut self.impulses) {
             Outcome::Solved(_) => {}

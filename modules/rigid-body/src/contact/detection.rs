@@ -65,12 +65,12 @@ pub(crate) struct Detector {
     /// Shapes that may meet.
     pairs: Vec<[usize; 2]>,
     pub planes: Vec<Plane>,
-    scratch: Scratch,
+    scratch: PairScratch,
 }
 
 /// What is filled anew for every pair.
 #[derive(Default)]
-struct Scratch {
+struct PairScratch {
     manifold: Manifold,
     found: Vec<Found>,
 }
@@ -98,7 +98,7 @@ impl Detector {
 
     /// Chooses the pairs at the initial pose.
     pub fn new(model: &Model, bodies: &[Motion]) -> Self {
-        let (planes, scratch) = (model.planes.clone(), Scratch::default());
+        let (planes, scratch) = (model.planes.clone(), PairScratch::default());
         let mut me = Self { colliders: Vec::new(), pairs: Vec::new(), planes, scratch };
         let of_bodies = model.bodies.iter().enumerate().map(|(b, body)| (Some(b), body.com, &body.shapes));
         for (body, com, shapes) in of_bodies.chain([(None, V3::zeros(), &model.world_shapes)]) {
@@ -200,7 +200,7 @@ fn on_ground(
     (pair, c): (usize, &Collider),
     bodies: &[Motion],
     h: f64,
-    scratch: &mut Scratch,
+    scratch: &mut PairScratch,
     out: &mut Vec<ContactPoint>,
 ) {
     if c.body.is_none() {
@@ -234,7 +234,7 @@ fn between(
     (pair, a, b): (usize, &Collider, &Collider),
     bodies: &[Motion],
     h: f64,
-    scratch: &mut Scratch,
+    scratch: &mut PairScratch,
     out: &mut Vec<ContactPoint>,
 ) {
     let (ma, mb) = (a.motion(bodies), b.motion(bodies));
@@ -244,7 +244,7 @@ fn between(
     }
     let friction = larger(a.given.friction, b.given.friction);
     let (pose_a, pose_b) = (a.parry_pose(bodies), b.parry_pose(bodies));
-    let Scratch { manifold, found } = scratch;
+    let PairScratch { manifold, found } = scratch;
     found.clear();
     // Bodies come before what stands still, so ground is b.
     if is_ground(&*b.shape) {

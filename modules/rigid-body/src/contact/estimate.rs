@@ -97,9 +97,9 @@ impl Estimator {
             self.status[port.range()].fill(if open { Status::Open } else { Status::Held });
         }
         for _ in 0..MAX_ROUNDS {
-            let settled = self.solve_held(p, t)?;
+            let converged = self.solve_held(p, t)?;
             if !self.change_status(p, t) {
-                if settled {
+                if converged {
                     return Ok(unique);
                 }
                 break;
@@ -194,9 +194,9 @@ impl Estimator {
             self.before.extend_from_slice(t);
             self.fill_matrix(p);
             if lu(m, &mut self.matrix, &mut self.order) {
-                let (settled, arrived) = self.approach(p, t);
+                let (converged, arrived) = self.approach(p, t);
                 if arrived {
-                    return Ok(settled);
+                    return Ok(converged);
                 }
             }
             t.copy_from_slice(&self.before);
@@ -241,7 +241,7 @@ impl Estimator {
     /// Proximal steps with the factor at hand; whether T stays bounded, and whether it has arrived.
     fn approach(&mut self, p: &Problem, t: &mut [f64]) -> (bool, bool) {
         let m = self.unknowns.len();
-        let (mut settled, mut change, mut size) = (true, f64::INFINITY, 0.0);
+        let (mut converged, mut change, mut size) = (true, f64::INFINITY, 0.0);
         for step in 0..PROXIMAL_MAX {
             // In increments: (G + ε)·dT = −(x_free + G·T − x2), exact to rounding at any size of T.
             residuals(p, t, &mut self.open);
@@ -260,12 +260,12 @@ impl Estimator {
             // what rigid motors hold alone grows until their bounds decide in the next round
             let mobile = |(k, _): &(usize, &f64)| self.epsilon[self.unknowns[*k]] != IMMOBILE_REGULARISATION;
             let growth = largest(&mut self.rhs.iter().enumerate().filter(mobile).map(|(_, x)| *x));
-            settled = growth <= GROWS * size;
+            converged = growth <= GROWS * size;
             if step >= PROXIMAL_MIN && change <= PROXIMAL_CHANGE * size {
                 break;
             }
         }
-        (settled, change <= ARRIVED * size && size.is_finite())
+        (converged, change <= ARRIVED * size && size.is_finite())
     }
 
     /// Opens, closes, clips; true when something changed noticeably.
@@ -334,7 +334,7 @@ fn sweep(p: &Problem, t: &mut [f64]) {
     for _ in 0..SWEEPS {
         let (mut change, mut size) = (0.0_f64, 0.0_f64);
         for port in p.ports {
-            let before = settle(p, port, t);
+            let before = relax_port(p, port, t);
             for (i, c) in port.components() {
                 change = change.max((t[i] - before[c]).abs());
                 size = size.max(t[i].abs());
@@ -350,7 +350,7 @@ fn sweep(p: &Problem, t: &mut [f64]) {
 fn defect(p: &Problem, t: &mut [f64]) -> f64 {
     let mut sum = 0.0;
     for port in p.ports {
-        let before = settle(p, port, t);
+        let before = relax_port(p, port, t);
         for (i, c) in port.components() {
             sum += compliance(p, i) * (t[i] - before[c]).abs();
             t[i] = before[c];
@@ -361,7 +361,7 @@ fn defect(p: &Problem, t: &mut [f64]) -> f64 {
 
 /// One port settles while all others keep their wrenches: the normal, both tangential forces at once, each moment. Its
 /// wrench before.
-fn settle(p: &Problem, port: &Port, t: &mut [f64]) -> [f64; 6] {
+fn relax_port(p: &Problem, port: &Port, t: &mut [f64]) -> [f64; 6] {
     let mut before = [0.0; 6];
     port.components().for_each(|(i, c)| before[c] = t[i]);
     for mask in [0b000001, 0b000110, 0b001000, 0b010000, 0b100000] {

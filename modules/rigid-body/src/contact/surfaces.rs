@@ -11,11 +11,11 @@ const GROUND: &str = "ground";
 /// Pattern of all pairs.
 const ALL: &str = "*";
 /// A parameter: name, value where a scenario is silent, largest value, help.
-type Item = (&'static str, f64, f64, &'static str);
+type SurfaceParameter = (&'static str, f64, f64, &'static str);
 
-const FRICTION: Item =
+const FRICTION: SurfaceParameter =
     ("friction", 0.8, f64::INFINITY, "Coulomb friction among bodies and with rigid ground");
-const RESTITUTION: Item =
+const RESTITUTION: SurfaceParameter =
     ("restitution", 0.0, 1.0, "Newton's coefficient of restitution among bodies and with rigid ground");
 
 /// What holds where two bodies touch; none: what holds everywhere.
@@ -72,12 +72,12 @@ impl Surfaces {
 }
 
 /// A pattern of two names and its number.
-struct Row<'a> {
+struct PairPattern<'a> {
     names: [&'a str; 2],
     value: f64,
 }
 
-impl Row<'_> {
+impl PairPattern<'_> {
     fn fits(&self, [a, b]: [&str; 2]) -> bool {
         let [p, q] = self.names;
         matches(p, a) && matches(q, b) || matches(p, b) && matches(q, a)
@@ -91,20 +91,28 @@ impl Row<'_> {
 }
 
 /// The number of all pairs, and those of some.
-fn read<'a>(config: &'a Config, (key, default, ..): Item, names: &[&str]) -> Result<(f64, Vec<Row<'a>>)> {
+fn read<'a>(
+    config: &'a Config,
+    (key, default, ..): SurfaceParameter,
+    names: &[&str],
+) -> Result<(f64, Vec<PairPattern<'a>>)> {
     let Some(Value::Object(table)) = config.get(key) else { return Ok((config.number(key)?, Vec::new())) };
     let everywhere = table.get(ALL).and_then(Value::as_f64).unwrap_or(default);
     Ok((everywhere, rows(key, table, names)?))
 }
 
-fn rows<'a>(key: &str, table: &'a serde_json::Map<String, Value>, names: &[&str]) -> Result<Vec<Row<'a>>> {
+fn rows<'a>(
+    key: &str,
+    table: &'a serde_json::Map<String, Value>,
+    names: &[&str],
+) -> Result<Vec<PairPattern<'a>>> {
     let row = |(pattern, value): (&'a String, &Value)| {
         let wrong = |text: &str| Error::Refused(format!("parameter `{key}`: `{pattern}` {text}"));
         let (a, b) = pattern
             .split_once('&')
             .ok_or_else(|| wrong(&format!("is no pair; write `A & B`, or `{ALL}` for all pairs")))?;
         let value = value.as_f64().ok_or_else(|| wrong(&format!("= {value} is not a number")))?;
-        let row = Row { names: [a.trim(), b.trim()], value };
+        let row = PairPattern { names: [a.trim(), b.trim()], value };
         let met = names.iter().enumerate().any(|(k, a)| names[..k].iter().any(|b| row.fits([a, b])));
         met.then_some(row).ok_or_else(|| {
             wrong(&format!(
@@ -123,6 +131,6 @@ fn some(names: &[&str]) -> String {
     if names.len() > SHOWN + 1 { format!("{shown}, …") } else { shown }
 }
 
-fn best(rows: &[Row], pair: [&str; 2]) -> Option<f64> {
+fn best(rows: &[PairPattern], pair: [&str; 2]) -> Option<f64> {
     rows.iter().filter(|row| row.fits(pair)).max_by_key(|row| row.rank()).map(|row| row.value)
 }

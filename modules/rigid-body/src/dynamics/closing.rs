@@ -236,7 +236,7 @@ impl Dynamics {
 
     /// Makes the rates of a state fit the joints and loops with the least change in the sense of the masses; stored
     /// energies and dependent rows. The largest change, m/s or rad/s.
-    pub fn settle_closures(&mut self, state: &mut State) -> Result<f64, Failure> {
+    pub fn project_rates(&mut self, state: &mut State) -> Result<f64, Failure> {
         self.starts.clone_from(&state.bodies);
         self.angles.clear();
         self.angles.extend(state.joints.iter().map(|j| j.angle));

@@ -16,7 +16,7 @@ const CLOSES: f64 = 0.9;
 /// … and so many do not suffice; then earlier ones help (see [`super::anderson`]).
 const PLAIN: usize = 8;
 /// With their help the gap need not shrink every time, but once in so many.
-const PATIENCE: usize = 6;
+const STEPS_WITHOUT_PROGRESS: usize = 6;
 
 impl Dynamics {
     /// Takes out what is left of the joints' gaps at the end of the step.
@@ -31,7 +31,7 @@ impl Dynamics {
             let shrinks = open < CLOSES * least;
             since = if shrinks { 0 } else { since + 1 };
             // To rounding, or not at all; a NaN ends it too.
-            if !shrinks && (open <= GAP_REFUSED || open.is_nan() || since > PATIENCE) {
+            if !shrinks && (open <= GAP_REFUSED || open.is_nan() || since > STEPS_WITHOUT_PROGRESS) {
                 break;
             }
             if mixed.is_none() && (!shrinks || round >= PLAIN) {

@@ -1,6 +1,6 @@
 //! The state as bytes, taken back by a robot of the same model only.
 
-use super::{ClosureState, ContactBook, JointState, Load, Motion, State};
+use super::{ClosureState, ContactLedger, JointState, Load, Motion, State};
 use crate::math::{Q, V3};
 use crate::model::Model;
 use nalgebra::{Quaternion, Unit};
@@ -50,7 +50,7 @@ persist!(JointState {
     actuator,
 });
 persist!(ClosureState { broken, force, moment, stored });
-persist!(ContactBook { points, residual, lost, yielding });
+persist!(ContactLedger { points, residual, lost, yielding });
 
 impl Persist for State {
     fn write(&self, out: &mut Vec<u8>) {

@@ -23,7 +23,7 @@ pub fn instantiate(parameters: &str, g: f64) -> Result<Box<dyn Subsystem>> {
 }
 
 /// A robot with a clock.
-pub struct Rig {
+pub struct Fixture {
     pub robot: Box<dyn Subsystem>,
     pub scene: Scene,
     pub t: f64,
@@ -44,7 +44,7 @@ pub struct Estimated {
     pub unique: bool,
 }
 
-impl Rig {
+impl Fixture {
     pub fn new(parameters: &str, g: f64, h: f64) -> Self {
         let robot = instantiate(parameters, g).expect("a good robot");
         let scene = robot.scene();

@@ -1,8 +1,8 @@
-//! The nodes that are awake, as one bit per node in the tiles of the ground: nothing else is visited.
+//! The nodes that are active, as one bit per node in the tiles of the ground: nothing else is visited.
 //!
 //! A node's next change is a function of the heights around it: the eight neighbours for the rule of repose, the
 //! ends of triples two nodes away as well for the rule of curvature. A node sleeps for a rule when nothing there has
-//! changed since the rule visited it; sweeping the awake nodes gives what sweeping the whole field would give.
+//! changed since the rule visited it; sweeping the active nodes gives what sweeping the whole field would give.
 
 use terraglue_ground::{Lattice, TILE_EDGE};
 

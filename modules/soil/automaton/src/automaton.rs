@@ -1,10 +1,10 @@
 //! The automaton as the material rule of a soil: load, displacement, a bounded number of sweeps a step.
 
-use crate::coarse::{as_found, settle};
+use crate::coarse::{as_found, relax};
 use crate::compaction::{Compaction, SavedCompaction};
 use crate::displacement::Site;
 use crate::feet::Foot;
-use crate::sweep::{Counts, ROUND, SavedAwake, Sweeper};
+use crate::sweep::{Counts, ROUND, SavedActiveSet, Sweeper};
 use crate::values;
 use std::sync::Arc;
 use terraglue_ground::{Lattice, UNIT_M};
@@ -131,7 +131,7 @@ impl Automaton {
 
     /// Nodes that the next sweep will visit.
     pub fn active_nodes(&self) -> usize {
-        self.sweeper.awake()
+        self.sweeper.active()
     }
 
     fn limit(&mut self) {
@@ -243,7 +243,7 @@ pub struct Saved {
     friction_angle: f64,
     critical_height: f64,
     loose_share: f64,
-    awake: SavedAwake,
+    active: SavedActiveSet,
     feet: Vec<Foot>,
     compaction: SavedCompaction,
     credit: f64,
@@ -266,7 +266,7 @@ impl Material for Automaton {
         self.limit();
         self.sweeper.scan(ground);
         if self.settings.settle_at_start {
-            settle(&mut self.sweeper, ground, MOST_SWEEPS)?;
+            relax(&mut self.sweeper, ground, MOST_SWEEPS)?;
             as_found(ground)?;
             self.sweeper.counts = Counts { parity: self.sweeper.counts.parity, ..Counts::default() };
         }
@@ -300,7 +300,7 @@ impl Material for Automaton {
         self.rescan |= before != (self.friction_angle, self.critical_height, self.loose_share);
     }
 
-    fn settle(&mut self, ground: &mut Ground, covered: &[Covered], most: f64, h: f64) -> f64 {
+    fn redistribute(&mut self, ground: &mut Ground, covered: &[Covered], most: f64, h: f64) -> f64 {
         self.commits = self.commits.wrapping_add(1);
         (self.sweeper.counts.visited, self.sweeper.counts.sweeps) = (0, 0);
         if std::mem::take(&mut self.rescan) {
@@ -319,7 +319,7 @@ impl Material for Automaton {
         out.settings = Some(self.settings);
         (out.friction_angle, out.critical_height) = (self.friction_angle, self.critical_height);
         out.loose_share = self.loose_share;
-        self.sweeper.save(&mut out.awake);
+        self.sweeper.save(&mut out.active);
         self.sweeper.feet.save(&mut out.feet);
         self.compaction.save(&mut out.compaction);
         (out.credit, out.commits, out.rescan) = (self.credit, self.commits, self.rescan);
@@ -327,14 +327,14 @@ impl Material for Automaton {
 
     fn fits(&self, saved: &Saved, ground: &Ground) -> bool {
         let lattice = ground.heights.lattice();
-        self.sweeper.fits(&saved.awake) && saved.feet.iter().all(|f| lattice.has(f.node[0], f.node[1]))
+        self.sweeper.fits(&saved.active) && saved.feet.iter().all(|f| lattice.has(f.node[0], f.node[1]))
     }
 
     fn restore(&mut self, saved: &Saved) {
         self.settings = saved.settings.unwrap_or(self.settings);
         (self.friction_angle, self.critical_height) = (saved.friction_angle, saved.critical_height);
         self.loose_share = saved.loose_share;
-        self.sweeper.restore(&saved.awake);
+        self.sweeper.restore(&saved.active);
         self.sweeper.feet.restore(&saved.feet);
         self.compaction.restore(&saved.compaction);
         (self.credit, self.commits, self.rescan) = (saved.credit, saved.commits, saved.rescan);
@@ -355,7 +355,7 @@ terraglue_subsystem::persist!(Saved {
     friction_angle,
     critical_height,
     loose_share,
-    awake,
+    active,
     feet,
     compaction,
     credit,

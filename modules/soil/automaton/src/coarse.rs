@@ -107,10 +107,10 @@ fn spread(change: i32, lattice: &Lattice, [a, b]: [i32; 2], mut add: impl FnMut(
 ///
 /// # Errors
 /// The ground leaves the range of heights.
-pub fn settle(sweeper: &mut Sweeper, ground: &mut Ground, most: u32) -> Result<[u32; 2]> {
+pub fn relax(sweeper: &mut Sweeper, ground: &mut Ground, most: u32) -> Result<[u32; 2]> {
     let mut coarse = 0;
     if ground.heights.lattice().size.iter().all(|n| *n >= LEAST_SIDE) && !sweeper.sleeps() {
-        coarse = settle_blocks(sweeper, ground, most)?;
+        coarse = relax_blocks(sweeper, ground, most)?;
     }
     Ok([coarse, rest(sweeper, ground, AT_REST, most)])
 }
@@ -126,7 +126,7 @@ pub(crate) fn as_found(ground: &mut Ground) -> Result {
     Ok(())
 }
 
-fn settle_blocks(sweeper: &mut Sweeper, ground: &mut Ground, most: u32) -> Result<u32> {
+fn relax_blocks(sweeper: &mut Sweeper, ground: &mut Ground, most: u32) -> Result<u32> {
     let lattice = *ground.heights.lattice();
     let before = Heights::of_blocks(ground);
     let mut blocks = Ground::new(&before)?;

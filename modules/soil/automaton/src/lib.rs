@@ -48,7 +48,7 @@ mod values;
 mod window;
 
 pub use automaton::{Automaton, DEFAULT_COMPACTION, Settings};
-pub use coarse::settle;
+pub use coarse::relax;
 pub use compaction::Compaction;
 pub use sweep::{Counts, Sweeper};
 

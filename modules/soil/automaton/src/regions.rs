@@ -1,4 +1,4 @@
-//! Which awake nodes are swept together: rectangles that do not come near each other within a round.
+//! Which active nodes are swept together: rectangles that do not come near each other within a round.
 
 use crate::active::Marks;
 use crate::window::Rectangle;

@@ -163,9 +163,9 @@ impl Standing {
     }
 
     /// Marks the faces that stand; `thr`: Δ·tan φ_r at a place, units; `critical`: H_c and H_c', units. A run is longer than what its
-    /// nodes see of each other: over a face with a node that is not visited (`awake`: columns by row) nothing flows yet, and
+    /// nodes see of each other: over a face with a node that is not visited (`active`: columns by row) nothing flows yet, and
     /// the node is woken.
-    pub fn find(&mut self, field: &Field, awake: &[Span], thr: impl Fn(usize) -> f32, critical: [i32; 2]) {
+    pub fn find(&mut self, field: &Field, active: &[Span], thr: impl Fn(usize) -> f32, critical: [i32; 2]) {
         self.along.clear();
         self.along.resize(field.levels.len(), Face::Falls);
         self.across.clear();
@@ -183,21 +183,21 @@ impl Standing {
             let ends = [outside(2, column - left), outside(3, column - left)];
             mark(field, run, 1, &thr, ends, critical, &mut self.across);
         }
-        self.wait_for_sleepers(field, awake);
+        self.wait_for_sleepers(field, active);
     }
 
-    fn wait_for_sleepers(&mut self, field: &Field, awake: &[Span]) {
+    fn wait_for_sleepers(&mut self, field: &Field, active: &[Span]) {
         let Field { stride, columns, rows, .. } = *field;
-        let is_awake = |x: usize, y: usize| awake[y].lo <= x && x < awake[y].hi;
+        let is_active = |x: usize, y: usize| active[y].lo <= x && x < active[y].hi;
         self.wake.clear();
-        self.wake.resize(awake.len(), Span::NONE);
+        self.wake.resize(active.len(), Span::NONE);
         for y in rows.lo..rows.hi {
             for x in columns.lo..columns.hi {
                 let at = y * stride + x;
                 for (stands, beside, aside) in
                     [(&mut self.along[at], [x + 1, y], stride), (&mut self.across[at], [x, y + 1], 1)]
                 {
-                    let [here, there] = [is_awake(x, y), is_awake(beside[0], beside[1])];
+                    let [here, there] = [is_active(x, y), is_active(beside[0], beside[1])];
                     if here && there {
                         continue;
                     }

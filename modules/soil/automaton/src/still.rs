@@ -93,7 +93,7 @@ impl Still {
     }
 
     /// The smallest rectangle with all nodes of tiles `first` … `end` − 1 that may move.
-    pub fn restless(&self, first: [u32; 2], end: [u32; 2], limits: &Limits) -> Option<Rectangle> {
+    pub fn unstable(&self, first: [u32; 2], end: [u32; 2], limits: &Limits) -> Option<Rectangle> {
         let mut found: Option<Rectangle> = None;
         for (b, a) in (first[1]..end[1]).flat_map(|b| (first[0]..end[0]).map(move |a| (b, a))) {
             for s in (0..STRIPS).filter(|s| !self.rests([a, b], *s, limits)) {

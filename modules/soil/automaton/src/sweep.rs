@@ -1,4 +1,4 @@
-//! Sweeps: the two rules on the awake nodes, in rounds of a few sweeps over windows of the ground.
+//! Sweeps: the two rules on the active nodes, in rounds of a few sweeps over windows of the ground.
 
 use crate::active::{Marks, TileBits};
 use crate::feet::Feet;
@@ -33,7 +33,7 @@ pub struct Counts {
     pub parity: u32,
     /// By how much the sum of the squares of the heights (units) has grown in the last step.
     pub lifted: f64,
-    /// Difference of the heights around the nodes that were awake last, units: how high what slides is.
+    /// Difference of the heights around the nodes that were active last, units: how high what slides is.
     pub tallest: i32,
     /// Lowest and highest level that was ever seen where something slid, units.
     pub range: [i32; 2],
@@ -46,7 +46,7 @@ impl Default for Counts {
     }
 }
 
-/// Feet and awake nodes of a ground, and the rules that act on them.
+/// Feet and active nodes of a ground, and the rules that act on them.
 pub struct Sweeper {
     /// Nodes below feet.
     pub feet: Feet,
@@ -54,9 +54,9 @@ pub struct Sweeper {
     pub changed: Marks,
     /// Nodes whose loose soil moves: material came to them since the last sweep, or they changed in the last round of sweeps.
     pub moving: Marks,
-    /// Awake nodes for the rule of repose.
+    /// Active nodes for the rule of repose.
     pub repose: Marks,
-    /// Awake nodes for the rule of curvature.
+    /// Active nodes for the rule of curvature.
     pub curvature: Marks,
     /// What was done.
     pub counts: Counts,
@@ -68,9 +68,9 @@ pub struct Sweeper {
     windows: Vec<Mutex<Window>>,
 }
 
-/// Exact copy of who is awake.
+/// Exact copy of the active set.
 #[derive(Clone, Debug, Default)]
-pub struct SavedAwake {
+pub struct SavedActiveSet {
     moving: Vec<(u32, TileBits)>,
     repose: Vec<(u32, TileBits)>,
     curvature: Vec<(u32, TileBits)>,
@@ -118,7 +118,7 @@ impl pulp::NullaryFnOnce for Look<'_> {
     }
 }
 
-/// How far beyond the awake nodes sweeps wake others: a change wakes nodes one away for repose and two away for
+/// How far beyond the active nodes sweeps wake others: a change wakes nodes one away for repose and two away for
 /// curvature, which acts in every second sweep.
 fn reach(sweeps: u32, parity: u32) -> usize {
     let (mut repose, mut curvature) = (0, 0);
@@ -193,7 +193,7 @@ impl Sweeper {
     }
 
     /// Number of nodes that the next sweep visits, one that both rules visit counted twice.
-    pub fn awake(&self) -> usize {
+    pub fn active(&self) -> usize {
         self.repose.len() + self.curvature.len()
     }
 
@@ -216,13 +216,13 @@ impl Sweeper {
         for b in (0..ny).step_by(BLOCK_TILES as usize) {
             for a in (0..nx).step_by(BLOCK_TILES as usize) {
                 let end = [(a + BLOCK_TILES).min(nx), (b + BLOCK_TILES).min(ny)];
-                let Some(area) = still.restless([a, b], end, &self.limits) else { continue };
+                let Some(area) = still.unstable([a, b], end, &self.limits) else { continue };
                 window.fill(ground, &self.by_soil, &self.feet.list, area, 2);
                 window.look_for_standing(ground, &self.limits, &self.moving, self.counts.range);
                 window.wake_all();
                 pulp::Arch::new().dispatch(Look { window: &mut window, limits: &self.limits });
                 let (repose, curvature) = (&mut self.repose, &mut self.curvature);
-                window.awake(|bent, [i, j], end| {
+                window.active(|bent, [i, j], end| {
                     if bent { &mut *curvature } else { &mut *repose }.mark_row(i, end, j);
                 });
             }
@@ -325,14 +325,14 @@ impl Sweeper {
             counts.lifted += lifted as f64;
         });
         let (repose, curvature) = (&mut self.repose, &mut self.curvature);
-        window.awake(|bent, [i, j], end| {
+        window.active(|bent, [i, j], end| {
             if bent { &mut *curvature } else { &mut *repose }.mark_row(i, end, j);
         });
         window.largest
     }
 
-    /// Copies who is awake.
-    pub fn save(&self, out: &mut SavedAwake) {
+    /// Copies the active set.
+    pub fn save(&self, out: &mut SavedActiveSet) {
         self.moving.save(&mut out.moving);
         self.repose.save(&mut out.repose);
         self.curvature.save(&mut out.curvature);
@@ -340,14 +340,14 @@ impl Sweeper {
     }
 
     /// Whether a saved state lies in this ground.
-    pub fn fits(&self, saved: &SavedAwake) -> bool {
+    pub fn fits(&self, saved: &SavedActiveSet) -> bool {
         self.moving.fits(&saved.moving)
             && self.repose.fits(&saved.repose)
             && self.curvature.fits(&saved.curvature)
     }
 
     /// Back to a saved state.
-    pub fn restore(&mut self, saved: &SavedAwake) {
+    pub fn restore(&mut self, saved: &SavedActiveSet) {
         self.changed.clear();
         self.moving.restore(&saved.moving);
         self.repose.restore(&saved.repose);
@@ -364,4 +364,4 @@ fn inside(bits: u32, first: i32, area: &Rectangle) -> u32 {
 }
 
 terraglue_subsystem::persist!(Counts { visited, sweeps, moved, gained, parity, lifted, tallest, range });
-terraglue_subsystem::persist!(SavedAwake { moving, repose, curvature, counts });
+terraglue_subsystem::persist!(SavedActiveSet { moving, repose, curvature, counts });

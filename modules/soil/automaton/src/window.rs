@@ -1,6 +1,6 @@
 //! A rectangle of the ground in one piece of memory, in which sweeps run without looking anywhere else.
 //!
-//! It holds the awake nodes and as many around them as the sweeps of a round can reach, so that windows of one round
+//! It holds the active nodes and as many around them as the sweeps of a round can reach, so that windows of one round
 //! neither see nor disturb each other and their number and shape cannot be seen in the result.
 
 mod walls;
@@ -518,7 +518,7 @@ impl Window {
         self.curvature.resize(visit.len(), Span::NONE);
         self.curvature.fill(Span::NONE);
         self.changed.fill(Span::NONE);
-        // what was awake for the rule of repose stays so
+        // what was active for the rule of repose stays so
         self.next = std::mem::take(&mut self.repose);
         let mut largest = 0;
         let mut any = [false; 3];
@@ -596,8 +596,8 @@ impl Window {
         }
     }
 
-    /// Calls `span(for curvature, first node, end)` for every row that is awake.
-    pub fn awake(&self, mut span: impl FnMut(bool, [i32; 2], i32)) {
+    /// Calls `span(for curvature, first node, end)` for every row that is active.
+    pub fn active(&self, mut span: impl FnMut(bool, [i32; 2], i32)) {
         for (curvature, rows) in [(false, &self.repose), (true, &self.curvature)] {
             for (y, s) in rows.iter().enumerate().filter(|(_, s)| !s.is_empty()) {
                 let column = |x: usize| self.origin[0] + x as i32 - LEFT as i32;
@@ -606,7 +606,7 @@ impl Window {
         }
     }
 
-    /// Whether nobody is awake.
+    /// Whether no node is active.
     pub fn sleeps(&self) -> bool {
         self.repose.iter().chain(&self.curvature).all(|s| s.is_empty())
     }

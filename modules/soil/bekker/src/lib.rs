@@ -57,7 +57,7 @@ pub struct Compaction;
 impl Material for Compaction {
     type Saved = ();
 
-    fn settle(&mut self, ground: &mut Ground, covered: &[Covered], _: f64, _: f64) -> f64 {
+    fn redistribute(&mut self, ground: &mut Ground, covered: &[Covered], _: f64, _: f64) -> f64 {
         for node in covered.iter().filter(|node| node.pressure > 0.0) {
             let units = ground.surface_units(node.i, node.j);
             ground.heights.set_units(node.i, node.j, units);

@@ -3,7 +3,7 @@
 #[path = "../../contact/tests/support/mod.rs"]
 mod support;
 
-use support::{Rig, Shown, flat, read, soil};
+use support::{Fixture, Shown, flat, read, soil};
 use terraglue_ground::Surface;
 use terraglue_numerics::extremes::larger;
 use terraglue_soil_bekker::SoilBekker as Soil;
@@ -17,22 +17,22 @@ const SPACING: f64 = 0.01;
 const SIZE: i32 = 65;
 
 /// A disc of 5 cm pressed 3 cm deep and taken away, then three seconds of rest.
-fn print(more: &str) -> Rig {
+fn print(more: &str) -> Fixture {
     let config = LUNAR.replacen('{', &format!("{{{more}"), 1);
     let disc = Geometry::Cylinder { half_length: 0.1, radius: 0.05 };
-    let mut rig = Rig::new(soil::<Soil>(&config, SIZE as u32, SPACING, flat), disc, 1.0, 0.1);
+    let mut fixture = Fixture::new(soil::<Soil>(&config, SIZE as u32, SPACING, flat), disc, 1.0, 0.1);
     let mut go = |by: f64, steps: u32| {
-        (0..steps).for_each(|_| drop(rig.prescribed_step(&[by, 0.0, 0.0, 0.0, 0.0, 0.0])));
+        (0..steps).for_each(|_| drop(fixture.prescribed_step(&[by, 0.0, 0.0, 0.0, 0.0, 0.0])));
     };
     go(-1e-4, (DEPTH / 1e-4) as u32);
     go(0.01, 5);
     go(0.0, 3000);
-    rig
+    fixture
 }
 
 /// Largest step between neighbours along x and y, m, and what lies below the initial surface in all, m.
-fn shape(rig: &Rig) -> (f64, f64) {
-    let (heights, sunk) = (Shown::new(&*rig.soil), Shown::field(&*rig.soil, "sinkage"));
+fn shape(fixture: &Fixture) -> (f64, f64) {
+    let (heights, sunk) = (Shown::new(&*fixture.soil), Shown::field(&*fixture.soil, "sinkage"));
     let (mut step, mut sum) = (0.0_f64, 0.0);
     for (i, j) in (0..SIZE - 1).flat_map(|j| (0..SIZE - 1).map(move |i| (i, j))) {
         let here = heights.height(i, j);
@@ -56,12 +56,12 @@ fn with_it_they_fall_in_and_crater_is_rim_and_compaction() {
     let (_, pressed) = shape(&print(""));
     let slope = SPACING * libm::tan(0.610865238198);
     for (compacted, dense) in [("", 1.0), (r#""compacted_fraction":0.4,"#, 0.4)] {
-        let rig = print(&format!(r#""material_transport":true,"sweeps_per_step":2,{compacted}"#));
-        let (step, sum) = shape(&rig);
+        let fixture = print(&format!(r#""material_transport":true,"sweeps_per_step":2,{compacted}"#));
+        let (step, sum) = shape(&fixture);
         assert!(step < 1.01 * slope, "{step} of {slope}");
-        assert_eq!(read(&*rig.soil, "mass_error_units"), 0.0);
-        assert_eq!(read(&*rig.soil, "active_nodes"), 0.0);
-        let booked = read(&*rig.soil, "compacted_volume") / (SPACING * SPACING);
+        assert_eq!(read(&*fixture.soil, "mass_error_units"), 0.0);
+        assert_eq!(read(&*fixture.soil, "active_nodes"), 0.0);
+        let booked = read(&*fixture.soil, "compacted_volume") / (SPACING * SPACING);
         assert!((sum - booked).abs() < 1e-9, "sunk {sum} m, booked {booked} m");
         assert!((booked / (dense * pressed) - 1.0).abs() < 0.05, "{booked} m of {pressed} m");
     }

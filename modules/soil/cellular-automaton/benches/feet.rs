@@ -30,5 +30,5 @@ fn six_feet(bencher: Bencher, spacing: u32) {
         let host = Standalone { terrain: Some(Box::new(level)), ..Standalone::default() };
         Feet::new(instance::<SoilCellularAutomaton>(LUNAR, Arc::new(host)))
     };
-    bencher.with_inputs(ground).bench_local_refs(|rig| walk(rig, 6, 1.0, || 0.0));
+    bencher.with_inputs(ground).bench_local_refs(|fixture| walk(fixture, 6, 1.0, || 0.0));
 }

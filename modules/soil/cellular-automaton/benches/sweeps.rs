@@ -6,7 +6,7 @@
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
 use std::sync::Arc;
-use terraglue_soil_cellular_automaton::{Sweeper, settle};
+use terraglue_soil_cellular_automaton::{Sweeper, relax};
 use terraglue_soil_contact::Ground;
 use terraglue_subsystem::{Standalone, Terrain, TerrainTile};
 
@@ -80,7 +80,7 @@ fn collapse(bencher: Bencher, radius: u32) {
 /// The same by way of a coarse lattice.
 #[divan::bench(args = [32, 64], sample_count = 20)]
 fn collapse_settled(bencher: Bencher, radius: u32) {
-    bencher.with_inputs(|| released(radius)).bench_local_refs(|(g, s)| settle(s, g, 100_000));
+    bencher.with_inputs(|| released(radius)).bench_local_refs(|(g, s)| relax(s, g, 100_000));
 }
 
 fn released(radius: u32) -> (Ground, Sweeper) {

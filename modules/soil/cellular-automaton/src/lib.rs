@@ -9,7 +9,7 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
-pub use terraglue_soil_material::{Automaton, Compaction, Counts, Settings, Sweeper, settle};
+pub use terraglue_soil_material::{Automaton, Compaction, Counts, Settings, Sweeper, relax};
 
 use std::sync::Arc;
 use terraglue_soil_contact::FieldSoil;

@@ -1,4 +1,4 @@
-//! The book of energies of random bodies at random angles that are pressed, dragged, turned about any axis and lifted: heat
+//! The energy ledger of random bodies at random angles that are pressed, dragged, turned about any axis and lifted: heat
 //! and stored energy are the work at the ports, and heat never falls.
 #![allow(clippy::unwrap_used)]
 
@@ -43,12 +43,12 @@ fn low(kind: u32, orientation: [f64; 4]) -> f64 {
     -body.patch_origin([0.0, 0.0, 1.0])[2].min(0.0)
 }
 
-/// Presses, drags, turns and lifts a body. Returns by how much the book errs at worst beyond `share` of the work to and fro and
+/// Presses, drags, turns and lifts a body. Returns by how much the ledger errs at worst beyond `share` of the work to and fro and
 /// `held` of what the soil holds at the moment, J.
 fn go(seed: u64, kind: u32, row: usize, grid: usize, [share, held]: [f64; 2]) -> Result<f64, TestCaseError> {
     let spacing = [0.02, 0.01, 0.005][grid];
     let config = [LUNAR, LETE, DRY_SAND, SNOW][row];
-    let mut rig = Feet::new(instance::<SoilCellularAutomaton>(config, ground(spacing)));
+    let mut fixture = Feet::new(instance::<SoilCellularAutomaton>(config, ground(spacing)));
     let mut dice = Dice(seed);
     (0..8).for_each(|_| {
         dice.roll(0.0, 1.0);
@@ -56,8 +56,8 @@ fn go(seed: u64, kind: u32, row: usize, grid: usize, [share, held]: [f64; 2]) ->
     let orientation = dice.turn();
     let position = [dice.roll(-0.05, 0.05), dice.roll(-0.05, 0.05), low(kind, orientation)];
     let mut pose = Pose { position, orientation };
-    rig.add(&shape(kind), pose);
-    let mut before = rig.soil.energy();
+    fixture.add(&shape(kind), pose);
+    let mut before = fixture.soil.energy();
     let (mut path, mut worst) = (0.0, 0.0_f64);
     for phase in 0..6 {
         let speed: [f64; 3] = match phase {
@@ -72,8 +72,8 @@ fn go(seed: u64, kind: u32, row: usize, grid: usize, [share, held]: [f64; 2]) ->
                 *p += H * v;
             }
             pose.orientation = turned(rate.map(|w| H * w), pose.orientation);
-            rig.step(|_| pose);
-            let now = rig.soil.energy();
+            fixture.step(|_| pose);
+            let now = fixture.soil.energy();
             let Energy { potential, dissipated, port_work, .. } = now;
             path += (port_work - before.port_work).abs();
             prop_assert!(dissipated >= before.dissipated, "heat falls to {dissipated} J");
@@ -106,7 +106,7 @@ proptest! {
         prop_assert!(error <= 1e-3, "{error:e} J beyond 1 % of the work");
     }
 
-    /// A sharp corner of a wedge, or a blade as thin as a cell, that is turned in the soil at a speed of its own loads whole nodes at once: the book owes no
+    /// A sharp corner of a wedge, or a blade as thin as a cell, that is turned in the soil at a speed of its own loads whole nodes at once: the ledger owes no
     /// more than they hold, and when they are let go it is even.
     #[test]
     fn a_corner_owes_no_more_than_its_nodes_hold(
@@ -126,20 +126,20 @@ fn a_contact_that_hardly_covers_its_neighbours_is_not_thrown_sideways() {
 
 /// A body at 10 mm below the surface that is dragged by 8 cm, in steps of so many mm: its mean force along the path and up, N.
 fn dragged(kind: u32, step_mm: f64) -> [f64; 2] {
-    let mut rig = Feet::new(instance::<SoilCellularAutomaton>(LETE, ground(0.01)));
+    let mut fixture = Feet::new(instance::<SoilCellularAutomaton>(LETE, ground(0.01)));
     let upright = [1.0, 0.0, 0.0, 0.0];
     let mut pose = Pose { position: [-0.03, 0.0013, low(kind, upright)], orientation: upright };
-    rig.add(&shape(kind), pose);
+    fixture.add(&shape(kind), pose);
     let mut sums = [0.0; 2];
     let parts = (1.0 / step_mm).round() as u32;
     for _ in 0..10 * parts {
         pose.position[2] -= 1e-3 * step_mm;
-        rig.step(|_| pose);
+        fixture.step(|_| pose);
     }
     for _ in 0..80 * parts {
         pose.position[0] += 1e-3 * step_mm;
-        rig.step(|_| pose);
-        let force = rig.force(0);
+        fixture.step(|_| pose);
+        let force = fixture.force(0);
         sums[0] -= force[0] / f64::from(80 * parts);
         sums[1] += force[2] / f64::from(80 * parts);
     }
@@ -164,10 +164,10 @@ fn forces_converge_in_shorter_steps() {
 #[test]
 fn the_force_does_not_jump() {
     for (kind, config) in [(0, LUNAR), (0, LETE), (1, LETE), (2, LUNAR), (3, DRY_SAND)] {
-        let mut rig = Feet::new(instance::<SoilCellularAutomaton>(config, ground(0.01)));
+        let mut fixture = Feet::new(instance::<SoilCellularAutomaton>(config, ground(0.01)));
         let upright = [1.0, 0.0, 0.0, 0.0];
         let mut pose = Pose { position: [-0.05, 0.0013, low(kind, upright)], orientation: upright };
-        rig.add(&shape(kind), pose);
+        fixture.add(&shape(kind), pose);
         // a rut with rims, up, and back over the rim
         for [dx, dz, steps] in
             [[0.0, -1.5e-4, 100.0], [6e-4, 0.0, 100.0], [0.0, 3e-4, 60.0], [1e-3, 0.0, 40.0]]
@@ -175,14 +175,14 @@ fn the_force_does_not_jump() {
             for _ in 0..steps as u32 {
                 pose.position[0] += dx;
                 pose.position[2] += dz;
-                rig.step(|_| pose);
+                fixture.step(|_| pose);
             }
         }
         for _ in 0..120 {
             pose.position[0] -= 2e-4;
             pose.position[2] -= 1.5e-4;
-            rig.step(|_| pose);
-            let jump = largest_jump(&mut rig, pose, [-1e-3, 0.0, -3e-3]);
+            fixture.step(|_| pose);
+            let jump = largest_jump(&mut fixture, pose, [-1e-3, 0.0, -3e-3]);
             assert!(jump <= 1e-3, "shape {kind}: {jump} N at {:?}", pose.position);
         }
     }
@@ -190,11 +190,11 @@ fn the_force_does_not_jump() {
 
 /// By how much the force on a body jumps if it went by a part of `way` in the next step, N: the largest difference between
 /// neighbours among 64 places, halved until no more than rounding lies between them.
-fn largest_jump(rig: &mut Feet, from: Pose, way: [f64; 3]) -> f64 {
+fn largest_jump(fixture: &mut Feet, from: Pose, way: [f64; 3]) -> f64 {
     let mut force = |part: f64| {
         let position = std::array::from_fn(|c| from.position[c] + part * way[c]);
-        rig.ask(|_| Pose { position, ..from });
-        rig.force(0)
+        fixture.ask(|_| Pose { position, ..from });
+        fixture.force(0)
     };
     let apart = |a: [f64; 3], b: [f64; 3]| (0..3).map(|c| (a[c] - b[c]).abs()).fold(0.0, larger);
     let places: Vec<_> = (0..=64).map(|k| f64::from(k) / 64.0).map(|part| (part, force(part))).collect();
@@ -213,21 +213,21 @@ fn largest_jump(rig: &mut Feet, from: Pose, way: [f64; 3]) -> f64 {
 }
 
 /// It bears what it is pressed down from there, up to what a body bears that was pressed to its depth (a curved one less by what
-/// its flanks shear), and the book starts there: nothing is thrown out. (39 % of its energy came from nowhere.)
+/// its flanks shear), and the ledger starts there: nothing is thrown out. (39 % of its energy came from nowhere.)
 #[test]
 fn a_body_that_starts_inside_the_ground_stands_in_its_print() {
     for (kind, config) in [(0, LUNAR), (1, LETE), (2, LETE), (3, LUNAR)] {
         let upright = [1.0, 0.0, 0.0, 0.0];
         let start = |depth: f64| {
-            let mut rig = Feet::new(instance::<SoilCellularAutomaton>(config, ground(0.005)));
+            let mut fixture = Feet::new(instance::<SoilCellularAutomaton>(config, ground(0.005)));
             let pose = Pose { position: [0.0, 0.0, low(kind, upright) - depth], orientation: upright };
-            rig.add(&shape(kind), pose);
-            (rig, pose)
+            fixture.add(&shape(kind), pose);
+            (fixture, pose)
         };
-        let press = |rig: &mut Feet, pose: &mut Pose, way: f64| {
+        let press = |fixture: &mut Feet, pose: &mut Pose, way: f64| {
             for _ in 0..(way / 1e-4).round() as u32 {
                 pose.position[2] -= 1e-4;
-                rig.step(|_| *pose);
+                fixture.step(|_| *pose);
             }
         };
         let (mut inside, mut pose) = start(0.02);
@@ -239,7 +239,7 @@ fn a_body_that_starts_inside_the_ground_stands_in_its_print() {
             press(&mut inside, &mut pose, way);
             let (mut pressed, mut other) = start(0.0);
             press(&mut pressed, &mut other, low(kind, upright) - pose.position[2]);
-            last = [&inside, &pressed].map(|rig| rig.force(0)[2]);
+            last = [&inside, &pressed].map(|fixture| fixture.force(0)[2]);
             assert!(last[0] <= last[1] * (1.0 + 1e-9), "shape {kind}: {last:?} N");
         }
         let flanks = if kind % 2 == 1 { 1e-9 } else { 0.05 };
@@ -254,18 +254,18 @@ fn a_body_that_starts_inside_the_ground_stands_in_its_print() {
 /// more than it has heat to pay for. (The balance missed by up to 2 % of the work for some steps.)
 #[test]
 fn what_is_pressed_out_at_once_is_lifted_as_the_work_allows() {
-    let mut rig = Feet::new(instance::<SoilCellularAutomaton>(SNOW, ground(0.02)));
+    let mut fixture = Feet::new(instance::<SoilCellularAutomaton>(SNOW, ground(0.02)));
     let upright = [1.0, 0.0, 0.0, 0.0];
     let mut pose = Pose { position: [-0.05, 0.0017, low(1, upright)], orientation: upright };
-    rig.add(&shape(1), pose);
+    fixture.add(&shape(1), pose);
     let (mut path, mut before) = (0.0, 0.0);
     for k in 0..360 {
         match k {
             0..60 => pose.position[2] -= 5e-4,
             _ => pose.position[0] += 3e-4,
         }
-        rig.step(|_| pose);
-        let Energy { potential, dissipated, port_work, .. } = rig.soil.energy();
+        fixture.step(|_| pose);
+        let Energy { potential, dissipated, port_work, .. } = fixture.soil.energy();
         path += f64::abs(port_work - before);
         before = port_work;
         let error = (dissipated + potential - port_work).abs();

@@ -21,15 +21,15 @@ fn force(config: &str, half_extents: [f64; 3], place: [f64; 2], yaw: f64, spacin
         terrain: Some(Box::new(terrain)),
         folder: String::new(),
     });
-    let mut rig = Feet::new(instance::<SoilCellularAutomaton>(config, host));
+    let mut fixture = Feet::new(instance::<SoilCellularAutomaton>(config, host));
     let orientation = [libm::cos(0.5 * yaw), 0.0, 0.0, libm::sin(0.5 * yaw)];
     let mut pose = Pose { position: [place[0], place[1], half_extents[2]], orientation };
-    rig.add(&Geometry::Box { half_extents }, pose);
+    fixture.add(&Geometry::Box { half_extents }, pose);
     for _ in 0..20 {
         pose.position[2] -= 5e-4;
-        rig.step(|_| pose);
+        fixture.step(|_| pose);
     }
-    rig.force(0)[2]
+    fixture.force(0)[2]
 }
 
 proptest! {

@@ -38,36 +38,36 @@ proptest! {
     ) {
         let config = [LUNAR, LETE, DRY_SAND, SMOOTH][row].replacen('{', r#"{"critical_height_m":0.0,"#, 1);
         let phi = [35.0, 31.1, 28.0, 35.0][row];
-        let mut rig = Feet::new(instance::<SoilCellularAutomaton>(&config, ground(61, if level { flat } else { bumpy })));
+        let mut fixture = Feet::new(instance::<SoilCellularAutomaton>(&config, ground(61, if level { flat } else { bumpy })));
         let mut wanderers = Vec::new();
         for (k, kind) in kinds.iter().enumerate() {
             let wanderer = Wanderer::new(seed ^ k as u64, 0.27, 0.02);
-            rig.add(&shape(*kind), wanderer.pose);
+            fixture.add(&shape(*kind), wanderer.pose);
             wanderers.push(wanderer);
         }
-        let before = rig.mass();
+        let before = fixture.mass();
         let mut dice = Dice(seed | 1);
         for _ in 0..400 {
             let mut goals = Vec::new();
             for (k, wanderer) in wanderers.iter_mut().enumerate() {
-                if dice.roll(0.0, 1.0) < 0.005 && rig.force(k) == [0.0; 3] {
+                if dice.roll(0.0, 1.0) < 0.005 && fixture.force(k) == [0.0; 3] {
                     wanderer.turn_in_the_air();
-                    rig.bodies[k].move_to(&wanderer.pose);
+                    fixture.bodies[k].move_to(&wanderer.pose);
                 }
                 goals.push(wanderer.next());
             }
-            rig.step(|k| goals[k]);
+            fixture.step(|k| goals[k]);
             for k in 0..kinds.len() {
-                let [_, _, up] = rig.force(k);
+                let [_, _, up] = fixture.force(k);
                 prop_assert!(up >= 0.0 || row < 3, "a soil without adhesion pulls with {up} N");
             }
-            prop_assert!(rig.nodes.iter().all(|n| rig.soil.ground().nodes.get(n.i, n.j).pressure >= 0.0));
-            prop_assert_eq!(rig.mass(), before);
+            prop_assert!(fixture.nodes.iter().all(|n| fixture.soil.ground().nodes.get(n.i, n.j).pressure >= 0.0));
+            prop_assert_eq!(fixture.mass(), before);
         }
-        rig.lift_and_rest(60_000);
-        prop_assert_eq!(rig.mass(), before);
-        prop_assert_eq!(rig.soil.material().counts().gained, 0);
-        let steep = steepest(&rig.soil).atan().to_degrees();
+        fixture.lift_and_rest(60_000);
+        prop_assert_eq!(fixture.mass(), before);
+        prop_assert_eq!(fixture.soil.material().counts().gained, 0);
+        let steep = steepest(&fixture.soil).atan().to_degrees();
         prop_assert!(steep <= phi + 0.5, "{steep}° instead of {phi}° at rest");
     }
 }
@@ -75,26 +75,26 @@ proptest! {
 /// Ground with walls around: what a body at the edge of it presses out has to go inwards.
 fn pressed(places: &[[f64; 2]], compacted: f64) -> (Feet, i64, i64) {
     let config = format!("{}, \"compacted_fraction\": {compacted}}}", LUNAR.trim_end_matches('}'));
-    let mut rig = Feet::new(instance::<SoilCellularAutomaton>(&config, ground(41, flat)));
+    let mut fixture = Feet::new(instance::<SoilCellularAutomaton>(&config, ground(41, flat)));
     let at = |[x, y]: [f64; 2], z: f64| Pose { position: [x, y, z], ..Pose::IDENTITY };
     for place in places {
-        rig.add(&Geometry::Cylinder { half_length: 0.05, radius: 0.035 }, at(*place, 0.051));
+        fixture.add(&Geometry::Cylinder { half_length: 0.05, radius: 0.035 }, at(*place, 0.051));
     }
-    let before = rig.mass();
+    let before = fixture.mass();
     for step in 1..=400 {
         let depth = 1e-4 * f64::from(step);
-        rig.step(|k| at(places[k], 0.051 - depth));
-        assert_eq!(rig.mass(), before, "after {depth} m");
+        fixture.step(|k| at(places[k], 0.051 - depth));
+        assert_eq!(fixture.mass(), before, "after {depth} m");
     }
-    rig.lift_and_rest(60_000);
-    let heights = &rig.soil.ground().heights;
+    fixture.lift_and_rest(60_000);
+    let heights = &fixture.soil.ground().heights;
     let (mut crater, mut rim) = (0, 0);
     for (i, j) in (0..41).flat_map(|j| (0..41).map(move |i| (i, j))) {
         let sunk = i64::from(heights.sinkage_units(i, j));
         crater += sunk.max(0);
         rim -= sunk.min(0);
     }
-    (rig, crater, rim)
+    (fixture, crater, rim)
 }
 
 #[test]
@@ -109,8 +109,8 @@ fn crater_is_rim_and_compaction_wherever_the_foot_stands() {
             &[[-0.035, 0.0], [0.035, 0.0]],
             &[[0.13, 0.13], [0.13, 0.2], [0.2, 0.13], [0.2, 0.2]],
         ] {
-            let (rig, crater, rim) = pressed(places, compacted);
-            let dense = rig.soil.material().compaction().total();
+            let (fixture, crater, rim) = pressed(places, compacted);
+            let dense = fixture.soil.material().compaction().total();
             assert_eq!(crater, rim + dense, "{places:?}, {compacted}");
             assert!(
                 crater > 0 && (compacted == 0.0) == (dense == 0),
@@ -121,30 +121,30 @@ fn crater_is_rim_and_compaction_wherever_the_foot_stands() {
 }
 
 /// 300 steps of three bodies over crumbling heaps.
-fn run(rig: &mut Feet, wanderers: &mut [Wanderer], steps: u32) -> u64 {
+fn run(fixture: &mut Feet, wanderers: &mut [Wanderer], steps: u32) -> u64 {
     for _ in 0..steps {
         let goals: Vec<Pose> = wanderers.iter_mut().map(Wanderer::next).collect();
-        rig.step(|k| goals[k]);
+        fixture.step(|k| goals[k]);
     }
-    rig.hash()
+    fixture.hash()
 }
 
 #[test]
 fn what_was_saved_comes_back_bit_by_bit() {
-    let mut rig = Feet::new(instance::<SoilCellularAutomaton>(LUNAR, ground(61, bumpy)));
+    let mut fixture = Feet::new(instance::<SoilCellularAutomaton>(LUNAR, ground(61, bumpy)));
     let mut wanderers: Vec<Wanderer> = (0..3).map(|k| Wanderer::new(77 + k, 0.27, 0.02)).collect();
-    wanderers.iter().zip(0..).for_each(|(w, kind)| rig.add(&shape(kind), w.pose));
-    run(&mut rig, &mut wanderers, 150);
-    rig.soil.save_state(1).expect("a slot");
-    let (poses, index) = (wanderers.clone(), rig.index);
-    let expected = run(&mut rig, &mut wanderers, 150);
+    wanderers.iter().zip(0..).for_each(|(w, kind)| fixture.add(&shape(kind), w.pose));
+    run(&mut fixture, &mut wanderers, 150);
+    fixture.soil.save_state(1).expect("a slot");
+    let (poses, index) = (wanderers.clone(), fixture.index);
+    let expected = run(&mut fixture, &mut wanderers, 150);
     for more in [0, 1, 40] {
-        run(&mut rig, &mut wanderers, more);
-        rig.soil.restore_state(1).expect("saved before");
-        (wanderers, rig.index) = (poses.clone(), index);
-        rig.bodies.iter_mut().zip(&wanderers).for_each(|(body, w)| body.move_to(&w.pose));
+        run(&mut fixture, &mut wanderers, more);
+        fixture.soil.restore_state(1).expect("saved before");
+        (wanderers, fixture.index) = (poses.clone(), index);
+        fixture.bodies.iter_mut().zip(&wanderers).for_each(|(body, w)| body.move_to(&w.pose));
         assert_eq!(
-            run(&mut rig, &mut wanderers, 150),
+            run(&mut fixture, &mut wanderers, 150),
             expected,
             "{more} steps later, at {} s",
             H * index as f64

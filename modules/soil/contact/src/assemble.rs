@@ -93,7 +93,7 @@ impl Patches {
     }
 
     /// What the soil beside patch `p` answers when its foot has moved by `x`.
-    pub fn beside(&self, p: usize, x: &[f64; 6]) -> wall::Answer {
+    pub fn beside(&self, p: usize, x: &[f64; 6]) -> wall::WallAnswer {
         let wall = &self.ports[p].wall;
         wall.answer(&self.sides, wall.way_of(x))
     }

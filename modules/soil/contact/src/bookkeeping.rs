@@ -15,7 +15,7 @@ use terraglue_subsystem::{MOST_LAW_STATE, Port, Result};
 /// Heat + elastic energy + gravitational energy of the material = work of the feet: what plastic flow and friction turn into
 /// heat is summed up node by node and not taken from the difference, so that the sum can be held against the work.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Book {
+pub struct EnergyLedger {
     /// Number of commits.
     pub stamp: u64,
     /// Elastic energy of the loaded nodes and of the soil beside the feet, J.
@@ -26,7 +26,7 @@ pub struct Book {
     pub lifted: f64,
     /// Heat since the start, J.
     pub dissipated: f64,
-    /// Energy that the soil has taken up and that heat has not paid for yet, J; see [`Book::pay`].
+    /// Energy that the soil has taken up and that heat has not paid for yet, J; see [`EnergyLedger::pay`].
     pub owed: f64,
     /// Work of the feet on the soil since the start under the forces of its own laws, J.
     pub port_work: f64,
@@ -38,7 +38,7 @@ pub struct Book {
     pub fewest: u32,
 }
 
-impl Book {
+impl EnergyLedger {
     /// Takes `due` (J) of energy that the soil has taken up beside the flow of its nodes out of the heat that was made since it
     /// was `before` (J), or of later heat; < 0: it becomes heat. Two things are due: what the material is lifted by, and the
     /// elastic energy of soil that a foot slides onto, which is loaded a node at a time, while what drives the foot works
@@ -111,12 +111,12 @@ struct Pressed<'a> {
     pressure: f64,
     slip: [f64; 2],
     shear: ShearResponse,
-    kept: &'a Kept,
+    kept: &'a KeptContact,
 }
 
 /// What a law with a state answers for a node beside the pressure.
 #[derive(Default)]
-struct Kept {
+struct KeptContact {
     permanent: f64,
     state: [f64; MOST_LAW_STATE],
 }
@@ -133,10 +133,10 @@ impl Scene<'_> {
         x: &[f64],
         ground: &mut Ground,
         lists: &mut Lists,
-        book: &mut Book,
+        ledger: &mut EnergyLedger,
     ) -> Result {
-        book.stamp += 1;
-        (book.elastic, book.kinetic, book.loaded, book.fewest) = (0.0, 0.0, 0, 0);
+        ledger.stamp += 1;
+        (ledger.elastic, ledger.kinetic, ledger.loaded, ledger.fewest) = (0.0, 0.0, 0, 0);
         std::mem::swap(&mut lists.loaded, &mut lists.previous);
         lists.loaded.clear();
         lists.slid_in.clear();
@@ -148,26 +148,26 @@ impl Scene<'_> {
             let (x, wrench) = (patch.unpack(x), patch.unpack(t));
             let mut touch = Touch::default();
             self.ask_together(p, &x, &mut lists.answers)?;
-            let loaded = self.commit_patch(patch, port, &x, ground, lists, book, &mut touch)?;
+            let loaded = self.commit_patch(patch, port, &x, ground, lists, ledger, &mut touch)?;
             lists.touching.push(loaded > 0);
             if loaded > 0 {
-                self.carry_cone(p, &x, ground, book)?;
+                self.carry_cone(p, &x, ground, ledger)?;
             }
             if loaded > 0 && ground.contacts.any() {
                 touch.under(patch, &wrench, &x, self.h);
                 ground.contacts.tell(port.key, &touch);
             }
             if loaded > 0 {
-                book.fewest = if book.fewest == 0 { loaded } else { book.fewest.min(loaded) };
+                ledger.fewest = if ledger.fewest == 0 { loaded } else { ledger.fewest.min(loaded) };
             }
-            book.loaded += loaded;
+            ledger.loaded += loaded;
         }
-        let stamp = book.stamp;
-        book.dissipated += release(ground, lists, stamp);
+        let stamp = ledger.stamp;
+        ledger.dissipated += release(ground, lists, stamp);
         let touching =
             |key| ports.iter().zip(&lists.touching).any(|(port, touches)| *touches && port.key == key);
-        book.dissipated += contact_memory::release(&mut ground.pushes, touching);
-        book.dissipated += contact_memory::release(&mut ground.cones, touching);
+        ledger.dissipated += contact_memory::release(&mut ground.pushes, touching);
+        ledger.dissipated += contact_memory::release(&mut ground.cones, touching);
         Ok(())
     }
 
@@ -193,7 +193,7 @@ impl Scene<'_> {
         x: &[f64; 6],
         ground: &mut Ground,
         lists: &mut Lists,
-        book: &mut Book,
+        ledger: &mut EnergyLedger,
         touch: &mut Touch,
     ) -> Result<u32> {
         let n = &self.patches.nodes;
@@ -204,7 +204,7 @@ impl Scene<'_> {
             let (moved, facing) = (displacement(n.arm[k], x), &n.facing[k]);
             let depth = n.depth[k] - dot(facing.press, moved);
             let curve = &self.patches.law(k).curve;
-            let mut kept = Kept::default();
+            let mut kept = KeptContact::default();
             let asked = lists.answers.get(k - patch.nodes.start).copied();
             let pressure = match (curve.keeper(), asked) {
                 (Some(_), _) => self.kept(k, depth, &mut kept)?,
@@ -225,7 +225,7 @@ impl Scene<'_> {
                 let force = self.patches.node_force(k, pressure, shear.stress);
                 turnover.work -= dot(force, moved);
                 let node = Pressed { k, depth, pressure, slip, shear, kept: &kept };
-                let (slid, surface) = self.press(patch, &node, ground, book, &mut turnover);
+                let (slid, surface) = self.press(patch, &node, ground, ledger, &mut turnover);
                 let carried = if patch.wheel.is_some() { moved } else { slid };
                 lists.slid.push(in_world(port, carried));
                 lists.loaded.push([i, j]);
@@ -235,16 +235,16 @@ impl Scene<'_> {
             }
             if n.stamp[k] != 0 && pressure <= 0.0 && self.patches.law(k).adhesion > 0.0 {
                 turnover.work -= dot(self.patches.node_force(k, pressure, [0.0; 2]), moved);
-                self.cling(k, pressure, ground, lists, book, &mut turnover);
+                self.cling(k, pressure, ground, lists, ledger, &mut turnover);
             }
             lists.covered.push(covered);
         }
         if loaded > 0 {
-            self.push_aside(patch, port, x, ground, book, &mut turnover);
+            self.push_aside(patch, port, x, ground, ledger, &mut turnover);
         }
-        book.port_work += turnover.work;
-        book.dissipated += turnover.heat;
-        book.owed += turnover.entered;
+        ledger.port_work += turnover.work;
+        ledger.dissipated += turnover.heat;
+        ledger.owed += turnover.entered;
         if let Some(wheel) = patch.wheel.as_ref().filter(|_| loaded > 0) {
             contact_memory::remember(&mut ground.wheels, wheel.rolled(x));
         }
@@ -252,17 +252,17 @@ impl Scene<'_> {
             let [a, b] = wheel.heading.map(|c| if wheel.rolled(x).forward { c } else { -c });
             in_world(port, [0.0, a, b])
         });
-        carry_slip(ground, lists, first, entry, book.stamp);
+        carry_slip(ground, lists, first, entry, ledger.stamp);
         Ok(loaded)
     }
 
     /// The soil that moves with the foot of patch `p`: its work, heat and kinetic energy.
-    fn carry_cone(&self, p: usize, x: &[f64; 6], ground: &mut Ground, book: &mut Book) -> Result {
+    fn carry_cone(&self, p: usize, x: &[f64; 6], ground: &mut Ground, ledger: &mut EnergyLedger) -> Result {
         let Some(cone) = &self.patches.ports[p].cone else { return Ok(()) };
         let (work, after) = cone.worked(x, self.patches.law_wrench(p, x)?[0]);
-        book.port_work += work;
-        book.dissipated += work - (after.energy() - cone.before.energy());
-        book.kinetic += after.energy();
+        ledger.port_work += work;
+        ledger.dissipated += work - (after.energy() - cone.before.energy());
+        ledger.kinetic += after.energy();
         contact_memory::remember(&mut ground.cones, after);
         Ok(())
     }
@@ -274,7 +274,7 @@ impl Scene<'_> {
         port: &Port,
         x: &[f64; 6],
         ground: &mut Ground,
-        book: &mut Book,
+        ledger: &mut EnergyLedger,
         turnover: &mut Turnover,
     ) {
         let (wall, sides) = (&patch.wall, &self.patches.sides);
@@ -289,7 +289,7 @@ impl Scene<'_> {
         turnover.heat += of([0, 1, 2].map(|k| u[k] - elastic[k])) + (of(elastic) - to + from).max(0.0);
         turnover.heat += (wall.before.energy - from).max(0.0);
         turnover.entered += (from - wall.before.energy).max(0.0);
-        book.elastic += to;
+        ledger.elastic += to;
         let new = wall::Push { key: port.key, mobilised: answer.mobilised, energy: to };
         contact_memory::remember(&mut ground.pushes, new);
     }
@@ -302,7 +302,7 @@ impl Scene<'_> {
         pressure: f64,
         ground: &mut Ground,
         lists: &mut Lists,
-        book: &mut Book,
+        ledger: &mut EnergyLedger,
         turnover: &mut Turnover,
     ) {
         let [i, j] = self.patches.nodes.index[k];
@@ -316,15 +316,15 @@ impl Scene<'_> {
         turnover.heat += self.held(k, pressure - self.pressure_at_start(k)) + self.sheared_before(k);
         state.area = self.patches.nodes.area[k];
         (state.pressure, state.shear, state.stamp, state.energy) =
-            (pressure, ShearState::default(), book.stamp, held);
+            (pressure, ShearState::default(), ledger.stamp, held);
         lists.loaded.push([i, j]);
         lists.slid_in.push(false);
         lists.slid.push([0.0; 2]);
-        book.elastic += held;
+        ledger.elastic += held;
     }
 
     /// The pressure of a law with a state at node k, and what it keeps.
-    fn kept(&self, k: usize, depth: f64, out: &mut Kept) -> Result<f64> {
+    fn kept(&self, k: usize, depth: f64, out: &mut KeptContact) -> Result<f64> {
         let Some((law, b)) = self.patches.law(k).curve.keeper() else { return Ok(0.0) };
         let n = &self.patches.nodes;
         let (permanent, slip) = (&n.permanent[k..=k], &[n.shear[k].slip]);
@@ -349,7 +349,7 @@ impl Scene<'_> {
         patch: &Patch,
         node: &Pressed,
         ground: &mut Ground,
-        book: &mut Book,
+        ledger: &mut EnergyLedger,
         turnover: &mut Turnover,
     ) -> ([f64; 3], f64) {
         let Pressed { k, depth, pressure, slip, shear, .. } = *node;
@@ -363,7 +363,7 @@ impl Scene<'_> {
             None => self.squeeze(node, turnover),
         };
         let energy = energy + self.shear_off(node, turnover);
-        book.elastic += energy;
+        ledger.elastic += energy;
         state.area = n.area[k];
         state.permanent = permanent / patch.slope;
         (state.pressure, state.shear, state.energy) = (pressure, shear.state, energy);
@@ -371,9 +371,9 @@ impl Scene<'_> {
             // loose soil slides along with the foot: the bed below has not been sheared
             state.shear.slip = 0.0;
         }
-        state.stamp = book.stamp;
-        book.max_sinkage =
-            book.max_sinkage.max((depth + relief(n, k)) / patch.slope - (state.reference - initial));
+        state.stamp = ledger.stamp;
+        ledger.max_sinkage =
+            ledger.max_sinkage.max((depth + relief(n, k)) / patch.slope - (state.reference - initial));
         let surface = state.reference - state.permanent;
         if kept_by_law(&self.patches.law(k).curve) {
             ground.law_memory.write([i, j], &node.kept.state);
@@ -568,7 +568,7 @@ fn release(ground: &mut Ground, lists: &mut Lists, stamp: u64) -> f64 {
     heat
 }
 
-terraglue_subsystem::persist!(Book {
+terraglue_subsystem::persist!(EnergyLedger {
     stamp,
     elastic,
     kinetic,

@@ -37,7 +37,7 @@ impl Remembered for Carried {
 
 /// What of a soil its cones are made of.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Material {
+pub struct ConeMaterial {
     /// Mass of the cone per volume, the part that is counted times the density, kg/m³; 0: soil has no inertia.
     pub density: f64,
     /// tan ψ.
@@ -61,7 +61,7 @@ pub struct Cone {
 
 /// What a cone answers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Answer {
+pub struct ConeAnswer {
     /// Force on the foot along n, N; < 0 where the cone is slowed down.
     pub force: f64,
     /// −d(force)/d(motion along n), N/m.
@@ -73,7 +73,7 @@ pub struct Answer {
 impl Cone {
     /// Under the nodes of `range`; `None` where soil has no inertia.
     pub fn under(
-        material: &Material,
+        material: &ConeMaterial,
         nodes: &PatchNodes,
         range: std::ops::Range<usize>,
         before: Carried,
@@ -116,17 +116,17 @@ impl Cone {
     }
 
     /// What it answers when the foot has moved by `x`.
-    pub fn answer(&self, x: &[f64; 6]) -> Answer {
+    pub fn answer(&self, x: &[f64; 6]) -> ConeAnswer {
         let up = self.up(x);
         let momentum = self.before.mass * self.before.speed;
         let (key, h) = (self.before.key, self.h);
         if up >= 0.0 {
             let after = Carried { key, mass: self.before.mass, speed: 0.0 };
-            return Answer { force: -momentum / h, stiffness: 0.0, after };
+            return ConeAnswer { force: -momentum / h, stiffness: 0.0, after };
         }
         let [mass, slope] = self.mass(self.depth - up);
         let speed = -up / h;
-        Answer {
+        ConeAnswer {
             force: (mass * speed - momentum) / h,
             stiffness: (mass / h + slope * speed) / h,
             after: Carried { key, mass, speed },

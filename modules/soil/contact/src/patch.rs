@@ -279,7 +279,7 @@ pub struct Laws {
     /// What an inclined load leaves of its capacity.
     pub inclination: Inclination,
     /// The soil that moves with a foot.
-    pub cone: cone::Material,
+    pub cone: cone::ConeMaterial,
     /// Modulus of loose soil over that of the bed.
     pub loose: f64,
     /// The module behind one or both of them.
@@ -299,7 +299,7 @@ pub struct Patches {
     pub sides: Vec<Side>,
     /// Clinging nodes; scratch of [`Patches::pull`].
     pub(crate) clinging: Vec<Clinging>,
-    /// Whether the soil owes energy for what its feet have come over, see [`crate::bookkeeping::Book::pay`].
+    /// Whether the soil owes energy for what its feet have come over, see [`crate::bookkeeping::EnergyLedger::pay`].
     pub in_debt: bool,
     /// Whether this is the first step of all: what is inside the ground then stands in its own print.
     pub begins: bool,

@@ -1,6 +1,6 @@
 //! A subsystem from the shared contact machinery and a soil's own rule for its material.
 
-use crate::bookkeeping::{self, Book, Lists};
+use crate::bookkeeping::{self, EnergyLedger, Lists};
 use crate::compatibility::Compatibility;
 use crate::cone;
 use crate::contacts::Contacts;
@@ -55,7 +55,7 @@ pub trait Material: Send {
     /// After the laws have taken a step of h seconds: puts the material where it belongs. `covered` are the nodes
     /// below feet. `most` (J): the gravitational energy that the step can pay for; what would gain more waits. Returns the
     /// gravitational energy that the material has gained, J; what it loses becomes heat.
-    fn settle(&mut self, ground: &mut Ground, covered: &[Covered], most: f64, h: f64) -> f64;
+    fn redistribute(&mut self, ground: &mut Ground, covered: &[Covered], most: f64, h: f64) -> f64;
     /// Copies the state into `out`.
     fn save(&self, _out: &mut Self::Saved) {}
     /// Whether a saved state speaks of nodes of this ground only.
@@ -78,7 +78,7 @@ pub struct FieldSoil<M: Material> {
     material: M,
     patches: Patches,
     lists: Lists,
-    book: Book,
+    ledger: EnergyLedger,
     last: Last,
     compatibility: Compatibility,
     fields: [FieldInfo; 2],
@@ -124,7 +124,7 @@ impl<M: Material> FieldSoil<M> {
             plugin,
             fields: [ground.heights.height_info(), ground.heights.sinkage_info()],
             slots: Slots::new(host.slots()),
-            book: Book::default(),
+            ledger: EnergyLedger::default(),
             last: Last::default(),
             compatibility,
             few_nodes: 0,
@@ -154,8 +154,8 @@ impl<M: Material> FieldSoil<M> {
         if let Some(plugin) = &self.plugin {
             plugin.begin(step.h);
         }
-        self.patches.in_debt = self.book.owed > 0.0;
-        self.patches.begins = self.book.stamp == 0;
+        self.patches.in_debt = self.ledger.owed > 0.0;
+        self.patches.begins = self.ledger.stamp == 0;
         self.patches.build(step, &self.ground, &self.laws)
     }
 
@@ -176,8 +176,8 @@ impl<M: Material> FieldSoil<M> {
 
     /// Makes a saved state the committed one.
     fn go_back(&mut self, slot: &Slot<M::Saved>) -> Result {
-        let Self { ground, lists, book, parameters, .. } = self;
-        slot.put_back(&mut Target { ground, loaded: &mut lists.loaded, book, parameters })?;
+        let Self { ground, lists, ledger, parameters, .. } = self;
+        slot.put_back(&mut Target { ground, loaded: &mut lists.loaded, ledger, parameters })?;
         self.material.restore(&slot.material);
         self.laws[0] = laws_of(&self.parameters, self.expressions.as_ref(), self.plugin.as_ref())?;
         self.patches.forget();
@@ -192,12 +192,12 @@ impl<M: Material> FieldSoil<M> {
     }
 
     fn watch_range(&mut self) {
-        let few = self.book.fewest > 0 && self.book.fewest < FEW_NODES;
+        let few = self.ledger.fewest > 0 && self.ledger.fewest < FEW_NODES;
         self.few_nodes = if few { self.few_nodes + 1 } else { 0 };
         if self.few_nodes >= FEW_NODES_COMMITS {
             self.warn(0, "a contact spans fewer than three cells; a finer spacing resolves it better");
         }
-        if self.book.max_sinkage > DEEPEST_TESTED {
+        if self.ledger.max_sinkage > DEEPEST_TESTED {
             self.warn(1, "a foot sinks deeper than 0.3 m, beyond the range of the pressure law");
         }
     }
@@ -238,7 +238,7 @@ fn laws_of(p: &SoilParameters, texts: Option<&SoilExpressions>, plugin: Option<&
         rolling: p.rolling,
         direction: p.direction,
         passive: p.strength().passive(),
-        cone: cone::Material {
+        cone: cone::ConeMaterial {
             density: p.added_mass * p.density_kg_m3.unwrap_or(DEFAULT_DENSITY),
             slope: p.strength().passive_coefficient().sqrt(),
         },
@@ -381,33 +381,34 @@ impl<M: Material> Subsystem for FieldSoil<M> {
         self.build(step)?;
         let prints = self.patches.prints;
         let scene = bookkeeping::Scene { patches: &self.patches, h: step.h };
-        let heat = self.book.dissipated;
-        let taken = scene.commit(step.ports, t, partner.x, &mut self.ground, &mut self.lists, &mut self.book);
+        let heat = self.ledger.dissipated;
+        let taken =
+            scene.commit(step.ports, t, partner.x, &mut self.ground, &mut self.lists, &mut self.ledger);
         self.patches.forget();
         self.last.clear();
         taken?;
         // the prints in which bodies stand at the start were made before
-        let most = if prints { f64::INFINITY } else { self.book.dissipated - heat - self.book.owed };
-        let lifted = self.material.settle(&mut self.ground, &self.lists.covered, most, step.h);
+        let most = if prints { f64::INFINITY } else { self.ledger.dissipated - heat - self.ledger.owed };
+        let lifted = self.material.redistribute(&mut self.ground, &self.lists.covered, most, step.h);
         let lifted = if prints { 0.0 } else { lifted };
-        self.book.lifted += lifted;
-        self.book.pay(lifted, heat);
+        self.ledger.lifted += lifted;
+        self.ledger.pay(lifted, heat);
         self.watch_range();
         Ok(())
     }
 
     fn save_state(&mut self, slot: u32) -> Result {
-        let Self { ground, lists, book, parameters, .. } = self;
+        let Self { ground, lists, ledger, parameters, .. } = self;
         let slot = self.slots.get_mut(slot)?;
-        slot.fill(&Committed { ground, loaded: &lists.loaded, book, parameters });
+        slot.fill(&Committed { ground, loaded: &lists.loaded, ledger, parameters });
         self.material.save(&mut slot.material);
         Ok(())
     }
 
     fn serialize(&self) -> Result<Vec<u8>> {
-        let Self { ground, lists, book, parameters, .. } = self;
+        let Self { ground, lists, ledger, parameters, .. } = self;
         let mut slot = Slot::<M::Saved>::default();
-        slot.fill(&Committed { ground, loaded: &lists.loaded, book, parameters });
+        slot.fill(&Committed { ground, loaded: &lists.loaded, ledger, parameters });
         self.material.save(&mut slot.material);
         Ok(slot.to_bytes(ground))
     }
@@ -443,7 +444,7 @@ impl<M: Material> Subsystem for FieldSoil<M> {
                 *out = self.ground.contacts.value(k as usize);
                 continue;
             }
-            *out = values::get(*id, &self.book, &self.parameters)
+            *out = values::get(*id, &self.ledger, &self.parameters)
                 .unwrap_or_else(|| self.material.value(*id - values::SHARED, &self.ground));
         }
         Ok(())
@@ -494,10 +495,10 @@ impl<M: Material> Subsystem for FieldSoil<M> {
 
     fn energy(&self) -> Energy {
         Energy {
-            kinetic: self.book.kinetic,
-            potential: self.book.elastic + self.book.lifted,
-            dissipated: self.book.dissipated,
-            port_work: self.book.port_work,
+            kinetic: self.ledger.kinetic,
+            potential: self.ledger.elastic + self.ledger.lifted,
+            dissipated: self.ledger.dissipated,
+            port_work: self.ledger.port_work,
             ..Energy::default()
         }
     }

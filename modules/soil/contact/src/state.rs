@@ -1,6 +1,6 @@
 //! Exact copies of the committed state: in numbered slots, and as bytes.
 
-use crate::bookkeeping::Book;
+use crate::bookkeeping::EnergyLedger;
 use crate::cone::Carried;
 use crate::contacts::Contacts;
 use crate::ground::Ground;
@@ -27,7 +27,7 @@ pub struct Slot<S> {
     contacts: Contacts,
     law_memory: LawMemorySnapshot,
     loaded: Vec<[i32; 2]>,
-    book: Book,
+    ledger: EnergyLedger,
     parameters: Option<SoilParameters>,
     /// The material's own state.
     pub material: S,
@@ -38,9 +38,9 @@ impl<S: Persist> Persist for Slot<S> {
         let Self { heights, nodes, wheels, pushes, cones, contacts, law_memory, .. } = self;
         (heights.write(out), nodes.write(out), wheels.write(out), pushes.write(out));
         (cones.write(out), contacts.write(out));
-        let Self { loaded, book, parameters, material, .. } = self;
+        let Self { loaded, ledger, parameters, material, .. } = self;
         law_memory.write(out);
-        (loaded.write(out), book.write(out), parameters.write(out), material.write(out));
+        (loaded.write(out), ledger.write(out), parameters.write(out), material.write(out));
     }
     fn read(from: &mut &[u8]) -> Result<Self> {
         Ok(Self {
@@ -52,7 +52,7 @@ impl<S: Persist> Persist for Slot<S> {
             contacts: Persist::read(from)?,
             law_memory: Persist::read(from)?,
             loaded: Persist::read(from)?,
-            book: Persist::read(from)?,
+            ledger: Persist::read(from)?,
             parameters: Persist::read(from)?,
             material: Persist::read(from)?,
         })
@@ -66,7 +66,7 @@ pub struct Committed<'a> {
     /// Loaded nodes.
     pub loaded: &'a Vec<[i32; 2]>,
     /// Sums over the run.
-    pub book: &'a Book,
+    pub ledger: &'a EnergyLedger,
     /// The laws' numbers, which may be changed during a run.
     pub parameters: &'a SoilParameters,
 }
@@ -78,7 +78,7 @@ pub struct Target<'a> {
     /// Loaded nodes.
     pub loaded: &'a mut Vec<[i32; 2]>,
     /// Sums over the run.
-    pub book: &'a mut Book,
+    pub ledger: &'a mut EnergyLedger,
     /// The laws' numbers.
     pub parameters: &'a mut SoilParameters,
 }
@@ -94,7 +94,7 @@ impl<S> Slot<S> {
         self.cones.clone_from(&state.ground.cones);
         self.contacts.clone_from(&state.ground.contacts);
         self.loaded.clone_from(state.loaded);
-        self.book = *state.book;
+        self.ledger = *state.ledger;
         self.parameters = Some(*state.parameters);
     }
 
@@ -113,7 +113,7 @@ impl<S> Slot<S> {
         state.ground.cones.clone_from(&self.cones);
         state.ground.contacts.clone_from(&self.contacts);
         state.loaded.clone_from(&self.loaded);
-        *state.book = self.book;
+        *state.ledger = self.ledger;
         Ok(())
     }
 }

@@ -1,6 +1,6 @@
 //! The variables that every soil has: how deep it was pressed, and the parameters of its laws.
 
-use crate::bookkeeping::Book;
+use crate::bookkeeping::EnergyLedger;
 use terraglue_soil_law::SoilParameters;
 use terraglue_subsystem::{Causality, Error, Result, Variable};
 
@@ -33,10 +33,10 @@ pub fn shared() -> Vec<Variable> {
 }
 
 /// Value of a shared variable.
-pub fn get(id: u32, book: &Book, p: &SoilParameters) -> Option<f64> {
+pub fn get(id: u32, ledger: &EnergyLedger, p: &SoilParameters) -> Option<f64> {
     Some(match id {
-        0 => book.max_sinkage,
-        1 => f64::from(book.loaded),
+        0 => ledger.max_sinkage,
+        1 => f64::from(ledger.loaded),
         2 => p.n,
         3 => p.k_c,
         4 => p.k_phi,
@@ -44,9 +44,9 @@ pub fn get(id: u32, book: &Book, p: &SoilParameters) -> Option<f64> {
         6 => p.phi_rad,
         7 => p.K_m,
         8 => p.unloading(),
-        9 => book.dissipated,
-        10 => book.elastic,
-        11 => book.lifted,
+        9 => ledger.dissipated,
+        10 => ledger.elastic,
+        11 => ledger.lifted,
         _ => return None,
     })
 }

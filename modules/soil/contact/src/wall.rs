@@ -53,7 +53,7 @@ pub struct Wall {
 
 /// What the soil beside a contact answers.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Answer {
+pub struct WallAnswer {
     /// Force on the body, world x and y, N, and moment about the vertical over the radius of gyration.
     pub force: [f64; 3],
     /// d(force on the soil)/d(way), N/m.
@@ -93,13 +93,13 @@ impl Wall {
     }
 
     /// The answer to a way `u` (see [`Wall::way_of`]) since the last commit.
-    pub fn answer(&self, sides: &[Side], u: [f64; 3]) -> Answer {
+    pub fn answer(&self, sides: &[Side], u: [f64; 3]) -> WallAnswer {
         let trial = [0, 1, 2].map(|k| self.before.mobilised[k] + u[k] / self.way);
         let length = trial.iter().map(|t| t * t).sum::<f64>().sqrt();
         let yields = length > 1.0;
         let scale = if yields { 1.0 / length } else { 1.0 };
         let e = trial.map(|t| scale * t);
-        let mut out = Answer { mobilised: e, ..Answer::default() };
+        let mut out = WallAnswer { mobilised: e, ..WallAnswer::default() };
         let mut by_e = [[0.0; 3]; 3];
         for side in &sides[self.sides.clone()] {
             let n = side.normal;
@@ -125,13 +125,13 @@ impl Wall {
     }
 
     /// Wrench on the body of a force of the sides, along n, t1, t2 and about them.
-    pub fn wrench(&self, answer: &Answer) -> [f64; 6] {
+    pub fn wrench(&self, answer: &WallAnswer) -> [f64; 6] {
         let gradient = self.gradient();
         std::array::from_fn(|c| (0..3).map(|r| gradient[r][c] * answer.force[r]).sum())
     }
 
     /// d(wrench on the soil)/d(motion of the port).
-    pub fn stiffness(&self, answer: &Answer) -> [[f64; 6]; 6] {
+    pub fn stiffness(&self, answer: &WallAnswer) -> [[f64; 6]; 6] {
         let (g, k) = (self.gradient(), &answer.stiffness);
         std::array::from_fn(|r| {
             std::array::from_fn(|c| {

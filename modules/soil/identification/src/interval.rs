@@ -2,7 +2,7 @@
 //! curves are left out in turn (jackknife over groups; Efron and Tibshirani 1993, An Introduction to the
 //! Bootstrap, ch. 11) and the spread of the answers tells how well the numbers are known.
 
-use crate::plates::{FitLaw, Numbers, Reading};
+use crate::plates::{FitLaw, PlateNumbers, Reading};
 use crate::{solve::solve, student};
 
 /// Probability that the interval holds the number.
@@ -30,8 +30,13 @@ pub enum Basis {
 }
 
 /// Intervals of A, B and n.
-pub fn intervals(law: &FitLaw, readings: &[Reading], both: bool, at: &Numbers) -> ([Interval; 3], Basis) {
-    let of = |n: Numbers| vec![n.cohesive, n.frictional, n.n];
+pub fn intervals(
+    law: &FitLaw,
+    readings: &[Reading],
+    both: bool,
+    at: &PlateNumbers,
+) -> ([Interval; 3], Basis) {
+    let of = |n: PlateNumbers| vec![n.cohesive, n.frictional, n.n];
     let mut answer = |rest: &[Reading]| solve(law, rest, both).ok().map(of);
     let (found, basis) = jackknife(readings, &mut answer, &of(*at));
     let unknown = Interval { low: f64::NAN, high: f64::NAN };

@@ -24,6 +24,6 @@ mod wheel;
 pub use interval::{Basis, Interval, spread};
 pub use law_numbers::{LawNumbers, range, start};
 pub use least_squares::{Free, Least, NumbersFit, Pressures, Residuals, fit_numbers, least_squares};
-pub use plates::{Fit, FitError, FitLaw, Numbers, Reading, fit};
+pub use plates::{Fit, FitError, FitLaw, PlateNumbers, Reading, fit};
 pub use rim::{Rim, Rolling};
 pub use wheel::{SoilBounds, Wheel, WheelError, WheelFit, WheelNumber, WheelPoint, WheelStart, fit_wheel};

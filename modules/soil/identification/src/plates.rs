@@ -48,7 +48,7 @@ impl FitLaw {
 
 /// The numbers of a law.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
-pub struct Numbers {
+pub struct PlateNumbers {
     /// A, the cohesive factor.
     pub cohesive: f64,
     /// B, the frictional factor.
@@ -57,7 +57,7 @@ pub struct Numbers {
     pub n: f64,
 }
 
-impl Numbers {
+impl PlateNumbers {
     /// ln p of the law at a size and a depth.
     pub fn ln_pressure(&self, law: &FitLaw, b: f64, depth: f64) -> f64 {
         let [u, w, x] = law.terms(b, depth);
@@ -80,7 +80,7 @@ pub struct Fit {
     /// The law.
     pub law: FitLaw,
     /// Its numbers.
-    pub numbers: Numbers,
+    pub numbers: PlateNumbers,
     /// 95 % confidence intervals of A, B and n.
     pub intervals: [Interval; 3],
     /// What the intervals rest on.
@@ -133,7 +133,7 @@ mod tests {
     use super::*;
 
     /// Curves of a law, each scaled by its own factor, as trials scatter.
-    fn curves(law: FitLaw, numbers: Numbers, factors: &[f64]) -> Vec<Reading> {
+    fn curves(law: FitLaw, numbers: PlateNumbers, factors: &[f64]) -> Vec<Reading> {
         let mut all = Vec::new();
         for (curve, factor) in factors.iter().enumerate() {
             let b = [0.03, 0.05][curve % 2];
@@ -151,7 +151,7 @@ mod tests {
     #[test]
     fn what_a_law_has_drawn_is_found_again() {
         for law in LAWS {
-            let numbers = Numbers { cohesive: 4.2e4, frictional: 1.3e6, n: 0.87 };
+            let numbers = PlateNumbers { cohesive: 4.2e4, frictional: 1.3e6, n: 0.87 };
             let found = fit(law, &curves(law, numbers, &[1.0; 4]), true).unwrap();
             let relative = |a: f64, b: f64| (a / b - 1.0).abs();
             assert!(relative(found.numbers.cohesive, numbers.cohesive) < 1e-6, "{law:?} {found:?}");
@@ -163,7 +163,7 @@ mod tests {
     #[test]
     fn trials_that_scatter_widen_the_intervals_and_they_hold_the_truth() {
         let law = FitLaw::Bearing { reference: 0.1 };
-        let numbers = Numbers { cohesive: 3e4, frictional: 6e6, n: 1.3 };
+        let numbers = PlateNumbers { cohesive: 3e4, frictional: 6e6, n: 1.3 };
         let narrow = fit(law, &curves(law, numbers, &[1.01, 0.99, 0.99, 1.01, 1.0, 1.0]), true).unwrap();
         let wide = fit(law, &curves(law, numbers, &[1.1, 0.92, 0.9, 1.08, 1.0, 0.97]), true).unwrap();
         let width = |f: &Fit| f.intervals[1].high - f.intervals[1].low;
@@ -178,7 +178,7 @@ mod tests {
     fn factors_are_never_negative_and_one_size_cannot_tell_them_apart() {
         // pressure falls faster with 1/size than the cohesive term alone can follow
         let law = FitLaw::Bekker;
-        let mut readings = curves(law, Numbers { cohesive: 0.0, frictional: 1e6, n: 1.0 }, &[1.0, 2.0]);
+        let mut readings = curves(law, PlateNumbers { cohesive: 0.0, frictional: 1e6, n: 1.0 }, &[1.0, 2.0]);
         let found = fit(law, &readings, true).unwrap();
         assert_eq!(found.numbers.cohesive, 0.0);
         assert!(found.rms > 0.3);

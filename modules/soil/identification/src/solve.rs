@@ -1,7 +1,7 @@
 //! Least squares of ln p = ln m + ln(λ·u/u_0 + (1 − λ)·w/w_0) + n·ln x: for a share λ of the cohesive factor the rest
 //! is a straight line, so only λ in 0 … 1 is searched.
 
-use crate::plates::{FitError, FitLaw, Numbers, Reading};
+use crate::plates::{FitError, FitLaw, PlateNumbers, Reading};
 
 /// Points of the coarse search for λ, and halvings of the interval around the best one.
 const COARSE: u32 = 64;
@@ -10,10 +10,10 @@ const GOLDEN_STEPS: u32 = 80;
 const SPREAD: f64 = 1e-9;
 
 /// One reading as the fit sees it: u/u_0, w/w_0, ln x and ln p.
-type Row = [f64; 4];
+type Sample = [f64; 4];
 
 /// The best numbers; `both`: A may differ from 0.
-pub fn solve(law: &FitLaw, readings: &[Reading], both: bool) -> Result<Numbers, FitError> {
+pub fn solve(law: &FitLaw, readings: &[Reading], both: bool) -> Result<PlateNumbers, FitError> {
     if readings.len() < 4 {
         return Err(FitError::TooFew);
     }
@@ -21,7 +21,7 @@ pub fn solve(law: &FitLaw, readings: &[Reading], both: bool) -> Result<Numbers, 
         readings.iter().map(|r| pick(law.terms(r.b, r.depth))).sum::<f64>() / readings.len() as f64
     };
     let scale = [mean(|t| t[0]), mean(|t| t[1])];
-    let rows: Vec<Row> = readings
+    let rows: Vec<Sample> = readings
         .iter()
         .map(|r| {
             let [u, w, x] = law.terms(r.b, r.depth);
@@ -31,7 +31,7 @@ pub fn solve(law: &FitLaw, readings: &[Reading], both: bool) -> Result<Numbers, 
     let share = if both { best_share(&rows) } else { 0.0 };
     let line = Line::through(&rows, share).ok_or(FitError::OneDepth)?;
     let modulus = libm::exp(line.offset);
-    Ok(Numbers {
+    Ok(PlateNumbers {
         cohesive: modulus * share / scale[0],
         frictional: modulus * (1.0 - share) / scale[1],
         n: line.slope,
@@ -39,7 +39,7 @@ pub fn solve(law: &FitLaw, readings: &[Reading], both: bool) -> Result<Numbers, 
 }
 
 /// λ with the least squares, by a coarse search and golden sections around its best point.
-fn best_share(rows: &[Row]) -> f64 {
+fn best_share(rows: &[Sample]) -> f64 {
     let error = |share: f64| Line::through(rows, share).map_or(f64::INFINITY, |l| l.squares);
     let at = |k: u32| f64::from(k) / f64::from(COARSE);
     let best = (0..=COARSE).min_by(|a, b| error(at(*a)).total_cmp(&error(at(*b)))).unwrap_or(0);
@@ -61,8 +61,8 @@ struct Line {
 }
 
 impl Line {
-    fn through(rows: &[Row], share: f64) -> Option<Self> {
-        let y = |r: &Row| r[3] - libm::log(share * r[0] + (1.0 - share) * r[1]);
+    fn through(rows: &[Sample], share: f64) -> Option<Self> {
+        let y = |r: &Sample| r[3] - libm::log(share * r[0] + (1.0 - share) * r[1]);
         let count = rows.len() as f64;
         let (x_0, y_0) = rows.iter().fold((0.0, 0.0), |(a, b), r| (a + r[2] / count, b + y(r) / count));
         let (xx, xy) = rows.iter().fold((0.0, 0.0), |(xx, xy), r| {

@@ -69,9 +69,9 @@ const POINTS: usize = 100;
 const SCATTER: [f64; 2] = [0.05, 0.028];
 /// ln k_φ, n_0, n_1 of Ding's slip sinkage, shear strength between rim and soil without pressure (Pa), tan of their angle of
 /// friction, ln K.
-type Numbers = [f64; 6];
+type WheelNumbers = [f64; 6];
 /// How far the answer is held to the start.
-const PRIOR: Numbers = [3.0, 0.5, 0.6, 800.0, 0.3, 1.0];
+const PRIOR: WheelNumbers = [3.0, 0.5, 0.6, 800.0, 0.3, 1.0];
 
 /// Keys of a scenario, and what they are.
 const KEYS: [(&str, &str); 6] = [
@@ -105,7 +105,7 @@ pub struct WheelFit {
     pub numbers: Vec<WheelNumber>,
     /// Slips that were left out in turn for the intervals.
     pub groups: usize,
-    at: Numbers,
+    at: WheelNumbers,
 }
 
 /// Where the search begins, beside what is known of the soil: exponent and modulus k_φ of its row.
@@ -137,10 +137,10 @@ pub fn fit_wheel(
     if points.len() < 2 {
         return Err(WheelError::TooFew(points.len()));
     }
-    let begin: Numbers = [start.k_phi.ln(), start.n, 0.3, 200.0, 0.4, 0.01f64.ln()];
-    let low: Numbers = [8.0, 0.1, 0.0, 0.0, 0.05, -6.9];
+    let begin: WheelNumbers = [start.k_phi.ln(), start.n, 0.3, 200.0, 0.4, 0.01f64.ln()];
+    let low: WheelNumbers = [8.0, 0.1, 0.0, 0.0, 0.05, -6.9];
     let most = [known.c_pa.unwrap_or(1000.0).max(1.0), known.phi_rad.unwrap_or(0.7).tan().max(0.1)];
-    let high: Numbers = [20.0, 2.0, 1.5, most[0], most[1], -2.3];
+    let high: WheelNumbers = [20.0, 2.0, 1.5, most[0], most[1], -2.3];
     let free: Vec<Free> = (0..6).map(|k| Free { start: begin[k], min: low[k], max: high[k] }).collect();
     let solve = |points: &[WheelPoint], from: &[f64]| {
         let mut residuals = |x: &[f64]| Some(residuals(&wheel, &begin, x, points));
@@ -154,7 +154,7 @@ pub fn fit_wheel(
             solve(&rest, &found)
         })
         .collect();
-    let at: Numbers = std::array::from_fn(|k| found[k]);
+    let at: WheelNumbers = std::array::from_fn(|k| found[k]);
     let numbers = spread(&answers, &at).into_iter().enumerate().map(|(k, interval)| {
         let (key, help) = KEYS[k];
         let ends = [interval.low.max(low[k]), interval.high.min(high[k])].map(|x| in_scenario(k, x));
@@ -197,7 +197,7 @@ fn unloading(k_phi: f64, n: f64) -> f64 {
 }
 
 /// Errors of the integral over their scatter, and how far the numbers are from the start.
-fn residuals(wheel: &Wheel, begin: &Numbers, x: &[f64], points: &[WheelPoint]) -> Vec<f64> {
+fn residuals(wheel: &Wheel, begin: &WheelNumbers, x: &[f64], points: &[WheelPoint]) -> Vec<f64> {
     let mut all = Vec::with_capacity(2 * points.len() + 6);
     for p in points {
         let state = rim(wheel, x, p.slip).under(p.load, p.slip);

@@ -42,14 +42,14 @@ pub(crate) struct Straight {
 }
 
 /// A law at a row of depths.
-struct Row {
+struct DepthSamples {
     count: usize,
     z: [f64; DEPTHS + 1],
     p: [f64; DEPTHS + 1],
     slope: [f64; DEPTHS + 1],
 }
 
-impl Row {
+impl DepthSamples {
     fn of(law: &Look, elastic_limit: f64) -> Self {
         let mut row = Self { count: 1, z: [0.0; _], p: [0.0; _], slope: [0.0; _] };
         row.z[0] = elastic_limit.max(SHALLOWEST);
@@ -83,7 +83,7 @@ impl Straight {
     /// The lines of a law beyond its elastic limit (m) above unloading with `k_u` (Pa/m).
     pub(crate) fn find(law: &Look, elastic_limit: f64, k_u: f64) -> Self {
         let mut out = Self { slope: STIFFEST * k_u, ..Self::NONE };
-        let row = Row::of(law, elastic_limit);
+        let row = DepthSamples::of(law, elastic_limit);
         let mut next = 1;
         for number in 0..LINES {
             let Some(k) = row.steep(out.slope, next) else { break };
@@ -135,7 +135,7 @@ fn halve(mut low: f64, mut high: f64, holds: impl Fn(f64) -> bool) -> f64 {
 }
 
 /// Where before depth number k the law becomes steeper than `slope`.
-fn onset(law: &Look, slope: f64, row: &Row, k: usize) -> f64 {
+fn onset(law: &Look, slope: f64, row: &DepthSamples, k: usize) -> f64 {
     let (before, after) = (row.z[k - 1], row.z[k]);
     if row.slope[k - 1] > slope || row.slope[k] <= slope {
         return before;

@@ -10,15 +10,15 @@ const COLOURS: [RGBColor; 4] =
     [RGBColor(90, 90, 90), RGBColor(31, 119, 180), RGBColor(214, 39, 40), RGBColor(44, 160, 44)];
 
 /// The quantities of one panel: names of the axes, and the curve of a walk.
-struct Panel {
+struct FaultPanel {
     x: &'static str,
     y: &'static str,
     curve: fn(&Walk) -> Vec<(f64, f64)>,
 }
 
-const PANELS: [Panel; 2] = [
-    Panel { x: "x of the body (m)", y: "y of the body (mm)", curve: path },
-    Panel { x: "time (s)", y: "heading (degrees)", curve: heading },
+const PANELS: [FaultPanel; 2] = [
+    FaultPanel { x: "x of the body (m)", y: "y of the body (mm)", curve: path },
+    FaultPanel { x: "time (s)", y: "heading (degrees)", curve: heading },
 ];
 
 fn path(walk: &Walk) -> Vec<(f64, f64)> {
@@ -43,7 +43,7 @@ pub fn draw(legs: &Legs, file: &Path) -> Outcome {
 
 fn draw_panel<B: DrawingBackend>(
     part: &DrawingArea<B, plotters::coord::Shift>,
-    panel: &Panel,
+    panel: &FaultPanel,
     curves: &[(&str, Vec<(f64, f64)>)],
 ) -> Result<(), DrawingAreaErrorKind<B::ErrorType>> {
     let range = |of: fn(&(f64, f64)) -> f64| {

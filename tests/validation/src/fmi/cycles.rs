@@ -1,12 +1,12 @@
-//! Thousands of lives of a unit in one process: nothing grows.
+//! Thousands of lives of an FMU in one process: nothing grows.
 
-use super::{built, units};
+use super::{built, fmus};
 use crate::process::Outcome;
 use crate::{Figure, Limit};
 use std::path::Path;
 
 pub fn figures(folder: &Path, quick: bool) -> Outcome<Vec<Figure>> {
-    units::build(folder, "life", &[("u", 'i', 1.0), ("y", 'o', 0.0)], "", "v[1] += h * v[0];")?;
+    fmus::build(folder, "life", &[("u", 'i', 1.0), ("y", 'o', 0.0)], "", "v[1] += h * v[0];")?;
     let cycles = if quick { 300 } else { 2000 };
     let text = "[time]\nstep_s = 0.1\nduration_s = 1.0\n[life]\nfmu = \"life.fmu\"\n";
     let mut early = None;
@@ -20,7 +20,7 @@ pub fn figures(folder: &Path, quick: bool) -> Outcome<Vec<Figure>> {
     }
     let (now, early) = (Holdings::now(), early.unwrap_or_default());
     let grown = |a: f64, b: f64| (a - b).max(0.0);
-    let what = |name: &str| format!("{name} gained over the last three quarters of {cycles} lives of a unit");
+    let what = |name: &str| format!("{name} gained over the last three quarters of {cycles} lives of an FMU");
     Ok(vec![
         Figure::new(
             "fmi.cycles.descriptors",
@@ -62,7 +62,7 @@ struct Holdings {
 impl Holdings {
     fn now() -> Self {
         let count = |path: &str| std::fs::read_dir(path).map_or(0, Iterator::count) as f64;
-        // Folders of units that nobody holds: those in use are locked, by this or by another process.
+        // Folders of FMUs that nobody holds: those in use are locked, by this or by another process.
         let left = |e: &std::fs::DirEntry| {
             let named = e.file_name().to_string_lossy().starts_with("terraglue-fmu-");
             let lock = std::fs::File::open(e.path().join(".terraglue-lock"));

@@ -1,4 +1,4 @@
-//! The units in `TERRAGLUE_FMU_DIR`, in any subfolder: the Modelica Reference FMUs with their tables `NAME_out.csv`, and those of
+//! The FMUs in `TERRAGLUE_FMU_DIR`, in any subfolder: the Modelica Reference FMUs with their tables `NAME_out.csv`, and those of
 //! other tools.
 
 use std::collections::BTreeMap;
@@ -7,25 +7,25 @@ use std::path::{Path, PathBuf};
 /// Why there is no figure.
 pub const NOT_SET: &str = "TERRAGLUE_FMU_DIR is not set";
 
-/// Reference units that have no table of their own.
+/// Reference FMUs that have no table of their own.
 const WITHOUT_TABLE: [&str; 2] = ["Clocks", "Roberts"];
 
 /// What lies in the folder, in the order of the paths.
-pub struct Units {
-    /// Reference units.
+pub struct Fmus {
+    /// Reference FMUs.
     pub reference: Vec<PathBuf>,
-    /// Tables of the reference units by name.
+    /// Tables of the reference FMUs by name.
     pub tables: BTreeMap<String, PathBuf>,
-    /// All other units.
+    /// All other FMUs.
     pub third_party: Vec<PathBuf>,
 }
 
-/// The units of the folder, where it is set.
-pub fn units() -> Option<Units> {
+/// The FMUs of the folder, where it is set.
+pub fn fmus() -> Option<Fmus> {
     std::env::var_os("TERRAGLUE_FMU_DIR").map(|folder| below(Path::new(&folder)))
 }
 
-fn below(folder: &Path) -> Units {
+fn below(folder: &Path) -> Fmus {
     let mut files = Vec::new();
     collect(folder, &mut files);
     files.sort();
@@ -38,7 +38,7 @@ fn below(folder: &Path) -> Units {
     let known = |p: &PathBuf| tables.contains_key(&stem(p)) || WITHOUT_TABLE.contains(&stem(p).as_str());
     let all = files.into_iter().filter(|p| is(p, "fmu"));
     let (reference, third_party) = all.partition(known);
-    Units { reference, tables, third_party }
+    Fmus { reference, tables, third_party }
 }
 
 /// Name of a file without its extension.
@@ -58,18 +58,18 @@ mod tests {
     use super::*;
 
     #[test]
-    fn units_with_a_table_are_reference_units() {
+    fn fmus_with_a_table_are_reference_fmus() {
         let folder = tempfile::tempdir().expect("a folder");
         let names = ["a/Stair.fmu", "tables/Stair_out.csv", "Clocks.fmu", "b/pump.fmu", "b/readme.md"];
         for name in names {
             crate::process::write(&folder.path().join(name), "").expect("a file");
         }
-        let units = below(folder.path());
+        let fmus = below(folder.path());
         let stems = |all: &[PathBuf]| all.iter().map(|p| stem(p)).collect::<Vec<_>>();
         assert_eq!(
-            (stems(&units.reference), stems(&units.third_party)),
+            (stems(&fmus.reference), stems(&fmus.third_party)),
             (vec!["Clocks".into(), "Stair".into()], vec!["pump".into()])
         );
-        assert!(units.tables["Stair"].ends_with("tables/Stair_out.csv"));
+        assert!(fmus.tables["Stair"].ends_with("tables/Stair_out.csv"));
     }
 }

@@ -1,6 +1,6 @@
 //! Loops of connections at the start: solved to 1e-10, or refused by name.
 
-use super::{built, testbed, units};
+use super::{built, fmus, testbed};
 use crate::process::Outcome;
 use crate::{Figure, Limit};
 use std::path::Path;
@@ -9,17 +9,17 @@ use terraglue_numerics::extremes::{larger, smaller};
 const HEAD: &str = "[time]\nstep_s = 0.1\nduration_s = 0.1\n";
 
 pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
-    let unit = |name: &str, calc: &str| {
-        units::build(folder, name, &[("u", 'i', 0.5), ("w", 'i', 0.5), ("y", 'o', 0.0)], calc, "")
+    let fmu = |name: &str, calc: &str| {
+        fmus::build(folder, name, &[("u", 'i', 0.5), ("w", 'i', 0.5), ("y", 'o', 0.0)], calc, "")
     };
-    unit("gain", "v[2] = 3 - 2 * v[0];")?;
-    unit("sum", "v[2] = 1 + 0.5 * v[0];")?;
-    unit("one", "v[2] = 1 + v[0];")?;
-    unit("same", "v[2] = v[0];")?;
+    fmu("gain", "v[2] = 3 - 2 * v[0];")?;
+    fmu("sum", "v[2] = 1 + 0.5 * v[0];")?;
+    fmu("one", "v[2] = 1 + v[0];")?;
+    fmu("same", "v[2] = v[0];")?;
     // x = cos(y), y = 0.5 + 0.2·z², z = exp(−x) + 0.3·y
-    unit("cosine", "v[2] = cos(v[0]);")?;
-    unit("square", "v[2] = 0.5 + 0.2 * v[0] * v[0];")?;
-    unit("mixed", "v[2] = exp(-v[0]) + 0.3 * v[1];")?;
+    fmu("cosine", "v[2] = cos(v[0]);")?;
+    fmu("square", "v[2] = 0.5 + 0.2 * v[0] * v[0];")?;
+    fmu("mixed", "v[2] = exp(-v[0]) + 0.3 * v[1];")?;
     let linear = solved(folder, &[("a", "gain"), ("b", "sum")], &[("b.y", "a.u"), ("a.y", "b.u")], |y| {
         [(y[0] - (3.0 - 2.0 * y[1])).abs(), (y[1] - (1.0 + 0.5 * y[0])).abs()].into_iter().fold(0.0, larger)
     })?;
@@ -36,7 +36,7 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
     // outputs in steps of 1e-4, which no difference of 1e-7 can see
     let coarse = |name: &str, calc: &str, slope: &str| {
         let all = [("u", 'i', 0.5), ("asked", 'o', 0.0), ("y", 'o', 0.0)];
-        units::build_with_slope(folder, name, &all, (calc, ""), slope)
+        fmus::build_with_slope(folder, name, &all, (calc, ""), slope)
     };
     coarse("coarse", "v[2] = floor(1e4 * (3 - 2 * v[0])) / 1e4;", "-2.0")?;
     coarse("fine", "v[2] = 1 + 0.5 * v[0];", "0.5")?;
@@ -52,7 +52,7 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
             "fmi.loop.linear",
             linear,
             Limit::AtMost(1e-10),
-            "loop of two units at the start: residual",
+            "loop of two FMUs at the start: residual",
         ),
         Figure::new(
             "fmi.loop.three",
@@ -64,7 +64,7 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
             "fmi.loop.derivatives",
             asked,
             Limit::AtLeast(1.0),
-            "a loop that only directional derivatives can solve: times that each unit was asked for them",
+            "a loop that only directional derivatives can solve: times that each FMU was asked for them",
         ),
         Figure::new(
             "fmi.loop.refused",
@@ -76,13 +76,13 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
 }
 
 fn scenario(all: &[(&str, &str)], connections: &[(&str, &str)]) -> String {
-    let units: String = all.iter().map(|(name, unit)| format!("[{name}]\nfmu = \"{unit}.fmu\"\n")).collect();
+    let fmus: String = all.iter().map(|(name, fmu)| format!("[{name}]\nfmu = \"{fmu}.fmu\"\n")).collect();
     let connect =
         connections.iter().map(|(from, to)| format!("[[connect]]\nfrom = \"{from}\"\nto = \"{to}\"\n"));
-    format!("{HEAD}{units}{}", connect.collect::<String>())
+    format!("{HEAD}{fmus}{}", connect.collect::<String>())
 }
 
-/// What is left of the equations for the outputs `y` of all units.
+/// What is left of the equations for the outputs `y` of all FMUs.
 fn solved(
     folder: &Path,
     all: &[(&str, &str)],

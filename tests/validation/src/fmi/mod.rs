@@ -1,8 +1,9 @@
 //! Figures of functional mock-up units: glued pairs, bodies that turn, loops at the start, cycles of life, cost, the reference
-//! units, those of other tools.
+//! FMUs, those of other tools.
 
 mod cost;
 mod cycles;
+pub(super) mod fmus;
 mod folder;
 mod hostile;
 mod loops;
@@ -10,7 +11,6 @@ mod pair;
 mod reference;
 mod third_party;
 mod turning;
-pub(super) mod units;
 mod watched;
 
 use super::{Context, Part};
@@ -33,7 +33,7 @@ pub const PARTS: [Part; 9] = [
     ("cost", |context| cost::figures(&workplace(context)?, context)),
 ];
 
-/// Where the units are made.
+/// Where the FMUs are made.
 fn workplace(context: &Context) -> Outcome<PathBuf> {
     let folder = context.scratch.join("fmi");
     std::fs::create_dir_all(&folder).map_err(|e| format!("{}: {e}", folder.display()))?;

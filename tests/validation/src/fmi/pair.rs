@@ -1,8 +1,8 @@
-//! Two oscillators in two units, glued: the same as one oscillator with the sums of masses, springs and dampers, or, on a
+//! Two oscillators in two FMUs, glued: the same as one oscillator with the sums of masses, springs and dampers, or, on a
 //! spring between them, as both solved at once. Beside it the error of explicit masters at the same step.
 
 use super::cost::peers;
-use super::{built, units};
+use super::{built, fmus};
 use crate::process::{Outcome, command};
 use crate::{Figure, Limit};
 use std::path::Path;
@@ -14,7 +14,7 @@ const H: f64 = 1e-3;
 const SIDES: [[f64; 3]; 2] = [[1.0, 40.0, 0.3], [10.0, 1000.0, 0.1]];
 const X0: f64 = 0.1;
 
-/// Backward Euler: what the units do, and one unit with the sums.
+/// Backward Euler: what the FMUs do, and one FMU with the sums.
 const STEP: &str =
     "v[4] = (v[0] * v[4] + h * (v[5] - v[1] * v[3])) / (v[0] + h * v[2] + h * h * v[1]); v[3] += h * v[4];";
 
@@ -23,13 +23,13 @@ pub fn figures(folder: &Path, peers: bool) -> Outcome<Vec<Figure>> {
     for (name, [m, k, d]) in ["left", "right"].iter().zip(SIDES) {
         let variables =
             [("m", 'p', m), ("k", 'p', k), ("d", 'p', d), ("x", 'o', X0), ("v", 'o', 0.0), ("f", 'i', 0.0)];
-        units::build(folder, name, &variables, "", STEP)?;
+        fmus::build(folder, name, &variables, "", STEP)?;
     }
     let glued = |form: &str| {
         worst(folder, &format!("[gluing]\nstrategy = \"iterative\"\nform = \"{form}\"\ntolerance = 1e-8\n"))
     };
     let mut all = on_a_spring(folder, peers)?;
-    let what = "two oscillators as units, glued T-T, against one oscillator: largest difference of x over its largest value";
+    let what = "two oscillators as FMUs, glued T-T, against one oscillator: largest difference of x over its largest value";
     all.insert(0, Figure::new("fmi.pair.tt", glued("tt")?, Limit::AtMost(1e-10), what));
     Ok(all)
 }
@@ -77,7 +77,7 @@ fn on_a_spring(folder: &Path, peers: bool) -> Outcome<Vec<Figure>> {
         found.push(testbed.read("left.x").unwrap_or(f64::NAN));
     }
     let what = |who: &str| {
-        format!("two masses on a spring as units against both solved at once, largest error of x: {who}")
+        format!("two masses on a spring as FMUs against both solved at once, largest error of x: {who}")
     };
     let ours =
         Figure::new("fmi.pair.spring", off(&found, &wanted), Limit::AtMost(1e-10), what("iterative T-T"));
@@ -85,7 +85,7 @@ fn on_a_spring(folder: &Path, peers: bool) -> Outcome<Vec<Figure>> {
     if !peers {
         return Ok(all);
     }
-    // the spring belongs to the right unit, as explicit masters need it
+    // the spring belongs to the right FMU, as explicit masters need it
     let [m, own_k, own_d] = SIDES[1];
     let variables = [
         ("m", 'p', m),
@@ -102,7 +102,7 @@ fn on_a_spring(folder: &Path, peers: bool) -> Outcome<Vec<Figure>> {
          / (v[0] + h * v[2] + h * h * v[1] + h * dc + h * h * kc); v[3] += h * v[4]; \
          v[7] = -(kc * (v[5] - v[3]) + dc * (v[6] - v[4]));"
     );
-    units::build(folder, "sprung", &variables, "", &step)?;
+    fmus::build(folder, "sprung", &variables, "", &step)?;
     for peer in ["ecos", "fmpy", "pyfmi"] {
         let id = format!("fmi.pair.spring.{peer}");
         let run = || -> Outcome<f64> {
@@ -130,7 +130,7 @@ fn scenario(gluing: &str, glue: &str) -> String {
     )
 }
 
-/// Largest difference of either unit from the whole, relative to the largest excursion.
+/// Largest difference of either FMU from the whole, relative to the largest excursion.
 fn worst(folder: &Path, gluing: &str) -> Outcome<f64> {
     let mut testbed = built(folder, &scenario(gluing, ""))?;
     let [m, k, d] = [0, 1, 2].map(|i| SIDES[0][i] + SIDES[1][i]);

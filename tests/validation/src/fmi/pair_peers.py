@@ -1,7 +1,7 @@
-"""Two masses on a spring between two units, in another master, step by step; prints the place of the first after each step.
+"""Two masses on a spring between two FMUs, in another master, step by step; prints the place of the first after each step.
 
 Usage: pair_peers.py ecos|fmpy|pyfmi LEFT.fmu RIGHT.fmu STEPS H
-The left unit takes a force f and gives x and v; the right one takes those as x1 and v1 and gives f.
+The left FMU takes a force f and gives x and v; the right one takes those as x1 and v1 and gives f.
 """
 
 import sys
@@ -26,33 +26,33 @@ def ecos():
 
 
 def fmpy():
-    """The explicit master that a user writes: all outputs are read, then all inputs set, then both units step."""
+    """The explicit master that a user writes: all outputs are read, then all inputs set, then both FMUs step."""
     from fmpy import extract, read_model_description
     from fmpy.fmi2 import FMU2Slave
 
-    units = []
+    fmus = []
     for path in (left, right):
         description = read_model_description(path)
         name = description.coSimulation.modelIdentifier
-        unit = FMU2Slave(guid=description.guid, unzipDirectory=extract(path), modelIdentifier=name, instanceName=path)
-        unit.instantiate()
-        unit.setupExperiment()
-        unit.enterInitializationMode()
-        unit.exitInitializationMode()
-        units.append((unit, {v.name: v.valueReference for v in description.modelVariables}))
-    (a, names_a), (b, names_b) = units
+        fmu = FMU2Slave(guid=description.guid, unzipDirectory=extract(path), modelIdentifier=name, instanceName=path)
+        fmu.instantiate()
+        fmu.setupExperiment()
+        fmu.enterInitializationMode()
+        fmu.exitInitializationMode()
+        fmus.append((fmu, {v.name: v.valueReference for v in description.modelVariables}))
+    (a, names_a), (b, names_b) = fmus
     for k in range(steps):
         x, v = a.getReal([names_a["x"], names_a["v"]])
         (f,) = b.getReal([names_b["f"]])
         b.setReal([names_b["x1"], names_b["v1"]], [x, v])
         a.setReal([names_a["f"]], [f])
-        for unit in (a, b):
-            unit.doStep(currentCommunicationPoint=k * h, communicationStepSize=h)
+        for fmu in (a, b):
+            fmu.doStep(currentCommunicationPoint=k * h, communicationStepSize=h)
         yield a.getReal([names_a["x"]])[0]
 
 
 def pyfmi():
-    """Its master with linear correction, where the units give directional derivatives."""
+    """Its master with linear correction, where the FMUs give directional derivatives."""
     from pyfmi import Master, load_fmu
 
     a, b = load_fmu(left), load_fmu(right)

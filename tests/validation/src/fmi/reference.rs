@@ -14,22 +14,22 @@ use terraglue_numerics::extremes::{larger, smaller};
 const SHARE: f64 = 1e-3;
 
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
-    let Some(units) = folder::units() else {
+    let Some(fmus) = folder::fmus() else {
         return Ok(vec![Figure::skipped("fmi.reference", folder::NOT_SET)]);
     };
-    if units.reference.is_empty() {
-        return Ok(vec![Figure::skipped("fmi.reference", "TERRAGLUE_FMU_DIR holds no reference units")]);
+    if fmus.reference.is_empty() {
+        return Ok(vec![Figure::skipped("fmi.reference", "TERRAGLUE_FMU_DIR holds no reference FMUs")]);
     }
-    let figure = |(number, unit): (usize, &PathBuf)| {
-        let name = folder::stem(unit);
+    let figure = |(number, fmu): (usize, &PathBuf)| {
+        let name = folder::stem(fmu);
         let id = format!("fmi.reference.{number}.{name}");
-        match units.tables.get(&name) {
-            None if name == "Clocks" => refused(id, unit),
-            Some(table) if name != "Roberts" => judged(id, worst(context, unit, table)),
-            _ => judged(id, roberts(context, unit)),
+        match fmus.tables.get(&name) {
+            None if name == "Clocks" => refused(id, fmu),
+            Some(table) if name != "Roberts" => judged(id, worst(context, fmu, table)),
+            _ => judged(id, roberts(context, fmu)),
         }
     };
-    Ok(units.reference.iter().enumerate().map(figure).collect())
+    Ok(fmus.reference.iter().enumerate().map(figure).collect())
 }
 
 fn judged(id: String, share: Outcome<f64>) -> Figure {
@@ -41,11 +41,11 @@ fn judged(id: String, share: Outcome<f64>) -> Figure {
 }
 
 /// Robertson's reaction from 0 s to 40 s in steps of 0.4 s, against y1 and y3 at 0.4, 4 and 40 s (Hindmarsh 1980, ODEPACK).
-fn roberts(context: &Context, unit: &Path) -> Outcome<f64> {
+fn roberts(context: &Context, fmu: &Path) -> Outcome<f64> {
     const KNOWN: [(usize, f64, f64); 3] =
         [(1, 9.8517e-1, 1.4794e-2), (10, 9.0551e-1, 9.4462e-2), (100, 7.1583e-1, 2.8416e-1)];
     let mut run = command(&context.program, &["fmu", "run"]);
-    run.arg(unit).args(["--start-time", "0", "--stop", "40", "--step", "0.4", "--output", "y1,y3"]);
+    run.arg(fmu).args(["--start-time", "0", "--stop", "40", "--step", "0.4", "--output", "y1,y3"]);
     let (_, rows) = read(&output(&mut run)?);
     let mut worst = 0.0_f64;
     for (row, y1, y3) in KNOWN {
@@ -65,24 +65,24 @@ fn output(run: &mut std::process::Command) -> Outcome<String> {
     Ok(String::from_utf8_lossy(&done.stdout).into_owned())
 }
 
-/// Whether a unit made for scheduled execution is refused by its name.
-fn refused(id: String, unit: &Path) -> Figure {
-    let said = terraglue_fmi::Fmu::inspect(unit).err().map(|e| e.to_string()).unwrap_or_default();
+/// Whether an FMU made for scheduled execution is refused by its name.
+fn refused(id: String, fmu: &Path) -> Figure {
+    let said = terraglue_fmi::Fmu::inspect(fmu).err().map(|e| e.to_string()).unwrap_or_default();
     let named = said.contains("`Clocks` is made for scheduled execution");
     let what = "refused by name as made for scheduled execution (1: yes)";
     Figure::new(id, f64::from(u8::from(named)), Limit::Equal(1.0), what)
 }
 
-type Table = (Vec<String>, Vec<Vec<String>>);
+type ReferenceTable = (Vec<String>, Vec<Vec<String>>);
 
-fn read(text: &str) -> Table {
+fn read(text: &str) -> ReferenceTable {
     let mut lines =
         text.lines().map(|l| l.split(',').map(|w| w.trim().trim_matches('"').to_owned()).collect());
     (lines.next().unwrap_or_default(), lines.collect())
 }
 
-/// Runs a unit on the times of its table. Rows beside a jump are left out; texts and whole numbers must be equal.
-fn worst(context: &Context, unit: &Path, table: &Path) -> Outcome<f64> {
+/// Runs an FMU on the times of its table. Rows beside a jump are left out; texts and whole numbers must be equal.
+fn worst(context: &Context, fmu: &Path, table: &Path) -> Outcome<f64> {
     let (names, rows) = expanded(read(&std::fs::read_to_string(table).map_err(|e| e.to_string())?));
     let time = |row: &[String]| row.first().and_then(|t| t.parse::<f64>().ok()).unwrap_or(f64::NAN);
     let (Some(first), Some(last)) = (rows.first(), rows.last()) else {
@@ -90,9 +90,9 @@ fn worst(context: &Context, unit: &Path, table: &Path) -> Outcome<f64> {
     };
     let step = (time(last) - time(first)) / (rows.len() - 1) as f64;
     let mut run = command(&context.program, &["fmu", "run"]);
-    run.arg(unit).args(["--stop", &time(last).to_string(), "--step", &step.to_string()]);
-    // Tables are written for both versions; a unit of FMI 2 has some of their columns only.
-    let (description, _) = terraglue_fmi::Fmu::inspect(unit).map_err(|e| e.to_string())?;
+    run.arg(fmu).args(["--stop", &time(last).to_string(), "--step", &step.to_string()]);
+    // Tables are written for both versions; an FMU of FMI 2 has some of their columns only.
+    let (description, _) = terraglue_fmi::Fmu::inspect(fmu).map_err(|e| e.to_string())?;
     let mut wanted: Vec<&str> = names[1..].iter().map(|n| n.split('[').next().unwrap_or(n)).collect();
     wanted.retain(|name| description.position(name).is_some());
     wanted.dedup();
@@ -104,7 +104,7 @@ fn worst(context: &Context, unit: &Path, table: &Path) -> Outcome<f64> {
     if let Ok(text) = std::fs::read_to_string(&input) {
         let kept = kept(context, &text, |name| description.position(name).is_some())?;
         let mut fed = command(&context.program, &["fmu", "run"]);
-        fed.arg(unit).args(["--stop", &time(last).to_string(), "--step", &step.to_string()]);
+        fed.arg(fmu).args(["--stop", &time(last).to_string(), "--step", &step.to_string()]);
         fed.arg("--input").arg(&kept).args(&outputs);
         let inputs = read(&std::fs::read_to_string(&kept).map_err(|e| e.to_string())?);
         fed_through(&inputs, &read(&output(&mut fed)?))?;
@@ -125,7 +125,7 @@ fn worst(context: &Context, unit: &Path, table: &Path) -> Outcome<f64> {
 }
 
 /// Splits columns whose cells are arrays of numbers into one for each element.
-fn expanded((names, rows): Table) -> Table {
+fn expanded((names, rows): ReferenceTable) -> ReferenceTable {
     let split = |cell: &str| -> Option<Vec<String>> {
         let words: Vec<String> = cell.split_whitespace().map(str::to_owned).collect();
         (words.len() > 1 && words.iter().all(|w| w.parse::<f64>().is_ok())).then_some(words)
@@ -147,7 +147,7 @@ fn expanded((names, rows): Table) -> Table {
 }
 
 /// Whether every whole number comes out of `NAME_output` as it went into `NAME_input` a step before.
-fn fed_through((names, inputs): &Table, (outputs, rows): &Table) -> Outcome {
+fn fed_through((names, inputs): &ReferenceTable, (outputs, rows): &ReferenceTable) -> Outcome {
     let time = |row: &[String]| row.first().and_then(|t| t.parse::<f64>().ok()).unwrap_or(f64::NAN);
     for (column, name) in names.iter().enumerate().skip(1) {
         let output = name.replace("_input", "_output");
@@ -164,7 +164,7 @@ fn fed_through((names, inputs): &Table, (outputs, rows): &Table) -> Outcome {
     Ok(())
 }
 
-/// A copy of a table of inputs with the columns that a unit has.
+/// A copy of a table of inputs with the columns that an FMU has.
 fn kept(context: &Context, text: &str, has: impl Fn(&str) -> bool) -> Outcome<PathBuf> {
     let (names, rows) = read(text);
     let columns: Vec<usize> = (0..names.len()).filter(|k| *k == 0 || has(&names[*k])).collect();

@@ -1,11 +1,11 @@
-"""A unit in FMPy, from its start to its end, all outputs. It says, line by line:
+"""An FMU in FMPy, from its start to its end, all outputs. It says, line by line:
 
-NONE reason              it is no unit for co-simulation on this machine, and nothing was run
-EXPERIMENT start stop step on|off        the last word: with event mode, where a unit with clocks offers it
+NONE reason              it is no FMU for co-simulation on this machine, and nothing was run
+EXPERIMENT start stop step on|off        the last word: with event mode, where an FMU with clocks offers it
 RESULT json              time, values of the outputs in the last row, names of those that were no finite number in any row
 FAILED reason
 
-Usage: third_party.py UNIT.fmu MOST_STEPS
+Usage: third_party.py FMU MOST_STEPS
 Descriptions are read without FMPy's own check and functions that are missing are not asked for: what FMPy makes of it at best.
 """
 
@@ -19,20 +19,20 @@ from xml.etree import ElementTree
 
 
 def say(*words):
-    # a unit may have left its own line open
+    # an FMU may have left its own line open
     print("\n" + " ".join(words), flush=True)
 
 
 def experiment(path, most):
-    """Start, stop and step that the unit wants, s, with at most so many steps, and whether events are handled; none where it is
+    """Start, stop and step that the FMU wants, s, with at most so many steps, and whether events are handled; none where it is
     not of our kind."""
     with zipfile.ZipFile(path) as archive:
         names = [name.replace("\\", "/") for name in archive.namelist()]
         root = ElementTree.fromstring(archive.read("modelDescription.xml"))
     version = root.get("fmiVersion", "")
-    slave = root.find("CoSimulation")
+    co_simulation = root.find("CoSimulation")
     folder = {"2": "binaries/linux64/", "3": "binaries/x86_64-linux/"}.get(version[:1])
-    if folder is None or slave is None or not any(n.startswith(folder) and n.endswith(".so") for n in names):
+    if folder is None or co_simulation is None or not any(n.startswith(folder) and n.endswith(".so") for n in names):
         return None
     wanted = root.find("DefaultExperiment")
     wanted = {} if wanted is None else wanted.attrib
@@ -40,16 +40,16 @@ def experiment(path, most):
     stop = float(wanted.get("stopTime", start + 1))
     if not start < stop < math.inf:
         stop = start + 1
-    step = float(wanted.get("stepSize") or slave.get("fixedInternalStepSize") or 0)
+    step = float(wanted.get("stepSize") or co_simulation.get("fixedInternalStepSize") or 0)
     if not 0 < step < math.inf:
         step = (stop - start) / 500
     steps = min(max(1, round((stop - start) / step)), most)
-    clocks = root.find("ModelVariables/Clock") is not None and slave.get("hasEventMode") in ("true", "1")
+    clocks = root.find("ModelVariables/Clock") is not None and co_simulation.get("hasEventMode") in ("true", "1")
     return start, start + steps * step, step, "on" if clocks else "off"
 
 
 def ticked_by_master(description):
-    """Clocks that tick by themselves in a master's hand, which FMPy never does: it shows such a unit standing still."""
+    """Clocks that tick by themselves in a master's hand, which FMPy never does: it shows such an FMU standing still."""
     clocks = [v for v in description.modelVariables if v.type == "Clock" and v.causality == "input"]
     return [v.name for v in clocks if v.intervalVariability != "triggered"]
 
@@ -112,14 +112,14 @@ def main():
     path, most = sys.argv[1], int(sys.argv[2])
     wanted = experiment(path, most)
     if wanted is None:
-        say("NONE no unit of FMI 2.0 or 3.0 for co-simulation with a library for this platform")
+        say("NONE no FMU of FMI 2.0 or 3.0 for co-simulation with a library for this platform")
         return
     say("EXPERIMENT", *map(str, wanted))
     try:
         say("RESULT", json.dumps(run(path, *wanted)))
     except BaseException as error:
         say("FAILED", re.sub(r"\s+", " ", f"{type(error).__name__}: {error}")[:300])
-    # a unit that does not let go would hold the process
+    # an FMU that does not let go would hold the process
     os._exit(0)
 
 

@@ -1,4 +1,4 @@
-//! Units of other tools in `TERRAGLUE_FMU_DIR`, each run here and by FMPy at the same times: every unit that FMPy simulates runs
+//! FMUs of other tools in `TERRAGLUE_FMU_DIR`, each run here and by FMPy at the same times: every FMU that FMPy simulates runs
 //! here with the same last row, or is refused with what in it breaks the standard.
 //!
 //! Each run has a process of its own. A refusal counts as one where this project's reader refuses archive or description, or the
@@ -20,17 +20,17 @@ use terraglue_fmi::description::Causality;
 use terraglue_fmi::{Error, Fmu};
 
 const SCRIPT: &str = "tests/validation/src/fmi/third_party.py";
-/// Longest run of a unit, s.
-const PATIENCE: u64 = 300;
+/// Longest run of an FMU, s.
+const TIMEOUT_S: u64 = 300;
 /// The same for what watches it: the program's own limit comes first.
-const LONGEST: Duration = Duration::from_secs(PATIENCE + 30);
+const LONGEST: Duration = Duration::from_secs(TIMEOUT_S + 30);
 /// Largest difference of two numbers, relative to the larger of 1 and their size.
 const ACCURACY: f64 = 1e-9;
 
-/// What became of a unit.
+/// What became of an FMU.
 #[derive(Debug, PartialEq)]
 enum Fate {
-    /// It is no unit for co-simulation on this machine.
+    /// It is no FMU for co-simulation on this machine.
     Other,
     Equal,
     Different(String),
@@ -43,24 +43,24 @@ enum Fate {
     Failed(String),
 }
 
-/// What FMPy said of a unit.
+/// What FMPy said of an FMU.
 #[derive(Debug, Default)]
 struct Told {
-    /// Start, stop and step, s, and whether with event mode; none: it is no unit for co-simulation on this machine.
+    /// Start, stop and step, s, and whether with event mode; none: it is no FMU for co-simulation on this machine.
     times: Option<Vec<String>>,
     /// Its last row; none: FMPy does not simulate it.
     row: Option<Value>,
 }
 
 pub fn figures(place: &Path, context: &Context) -> Outcome<Vec<Figure>> {
-    let Some(units) = folder::units() else {
+    let Some(fmus) = folder::fmus() else {
         return Ok(vec![Figure::skipped("fmi.third_party", folder::NOT_SET)]);
     };
-    let units = without_copies(units.third_party)?;
-    if units.is_empty() {
+    let fmus = without_copies(fmus.third_party)?;
+    if fmus.is_empty() {
         return Ok(vec![Figure::skipped(
             "fmi.third_party",
-            "TERRAGLUE_FMU_DIR holds no units of other tools",
+            "TERRAGLUE_FMU_DIR holds no FMUs of other tools",
         )]);
     }
     let python = peers::python()?;
@@ -68,15 +68,15 @@ pub fn figures(place: &Path, context: &Context) -> Outcome<Vec<Figure>> {
         return Ok(vec![Figure::skipped("fmi.third_party", "FMPy is not there and could not be installed")]);
     }
     let steps = if context.quick { 200 } else { 2000 };
-    let numbered: Vec<(usize, PathBuf)> = units.into_iter().enumerate().collect();
-    let judge = |(number, unit): &(usize, PathBuf)| {
+    let numbered: Vec<(usize, PathBuf)> = fmus.into_iter().enumerate().collect();
+    let judge = |(number, fmu): &(usize, PathBuf)| {
         let own = place.join(format!("third-party-{number}"));
         let fate = std::fs::create_dir_all(&own)
             .map_err(|e| e.to_string())
-            .and_then(|()| fate(&own, (context, &python), unit, steps))
+            .and_then(|()| fate(&own, (context, &python), fmu, steps))
             .unwrap_or_else(Fate::Failed);
         drop(std::fs::remove_dir_all(&own));
-        (folder::stem(unit), fate)
+        (folder::stem(fmu), fate)
     };
     let mut fates = in_parallel(&numbered, judge);
     fates.retain(|(_, fate)| *fate != Fate::Other);
@@ -84,21 +84,21 @@ pub fn figures(place: &Path, context: &Context) -> Outcome<Vec<Figure>> {
 }
 
 /// The paths of files that differ in at least a byte; of equal ones the first.
-fn without_copies(units: Vec<PathBuf>) -> Outcome<Vec<PathBuf>> {
+fn without_copies(fmus: Vec<PathBuf>) -> Outcome<Vec<PathBuf>> {
     let mut kept: Vec<(PathBuf, u64)> = Vec::new();
-    for unit in units {
-        let wrong = |e: std::io::Error| format!("{}: {e}", unit.display());
-        let size = std::fs::metadata(&unit).map_err(wrong)?.len();
+    for fmu in fmus {
+        let wrong = |e: std::io::Error| format!("{}: {e}", fmu.display());
+        let size = std::fs::metadata(&fmu).map_err(wrong)?.len();
         let mut bytes = None;
         let mut copy = false;
         for (other, _) in kept.iter().filter(|(_, n)| *n == size) {
             if bytes.is_none() {
-                bytes = Some(std::fs::read(&unit).map_err(wrong)?);
+                bytes = Some(std::fs::read(&fmu).map_err(wrong)?);
             }
             copy |= std::fs::read(other).map_err(wrong)? == *bytes.as_ref().unwrap_or(&Vec::new());
         }
         if !copy {
-            kept.push((unit, size));
+            kept.push((fmu, size));
         }
     }
     Ok(kept.into_iter().map(|(path, _)| path).collect())
@@ -107,11 +107,11 @@ fn without_copies(units: Vec<PathBuf>) -> Outcome<Vec<PathBuf>> {
 fn counted(fates: &[(String, Fate)]) -> Vec<Figure> {
     let figure = |name: &str, limit, what: &str, of: fn(&Fate) -> Option<&str>| {
         let found: Vec<(&str, &str)> =
-            fates.iter().filter_map(|(unit, fate)| Some((unit.as_str(), of(fate)?))).collect();
+            fates.iter().filter_map(|(fmu, fate)| Some((fmu.as_str(), of(fate)?))).collect();
         let told: Vec<String> = found
             .iter()
             .filter(|(_, why)| !why.is_empty())
-            .map(|(unit, why)| format!("{unit}: {why}"))
+            .map(|(fmu, why)| format!("{fmu}: {why}"))
             .collect();
         let told = if told.is_empty() { String::new() } else { format!(": {}", told.join("; ")) };
         let text = format!("{what}{told}").replace(['\n', '\t'], " ");
@@ -119,7 +119,7 @@ fn counted(fates: &[(String, Fate)]) -> Vec<Figure> {
     };
     let zero = Limit::Equal(0.0);
     vec![
-        figure("units", Limit::None, "different units of other tools for co-simulation on Linux", |_| {
+        figure("units", Limit::None, "different FMUs of other tools for co-simulation on Linux", |_| {
             Some("")
         }),
         figure("equal", Limit::None, "of them with the same last row here and in FMPy, to 1e-9", |f| {
@@ -153,14 +153,14 @@ fn counted(fates: &[(String, Fate)]) -> Vec<Figure> {
     ]
 }
 
-fn fate(place: &Path, (context, python): (&Context, &Path), unit: &Path, steps: u32) -> Outcome<Fate> {
-    let unit = &unit.canonicalize().map_err(|e| format!("{}: {e}", unit.display()))?;
+fn fate(place: &Path, (context, python): (&Context, &Path), fmu: &Path, steps: u32) -> Outcome<Fate> {
+    let fmu = &fmu.canonicalize().map_err(|e| format!("{}: {e}", fmu.display()))?;
     let mut script = Command::new(python);
-    script.arg(root().join(SCRIPT)).arg(unit).arg(steps.to_string());
+    script.arg(root().join(SCRIPT)).arg(fmu).arg(steps.to_string());
     let told = told(&watched(&mut script, place, LONGEST)?.output);
     let Some(times) = &told.times else { return Ok(Fate::Other) };
     let mut own = Command::new(&context.program);
-    own.args(["fmu", "run", "--isolate", "--timeout", &PATIENCE.to_string()]).arg(unit);
+    own.args(["fmu", "run", "--isolate", "--timeout", &TIMEOUT_S.to_string()]).arg(fmu);
     own.args(
         ["--start-time", "--stop", "--step", "--event-mode"]
             .iter()
@@ -169,15 +169,15 @@ fn fate(place: &Path, (context, python): (&Context, &Path), unit: &Path, steps: 
     );
     let table = place.join("table.csv");
     let ended = watched(own.arg("--csv").arg(&table), place, LONGEST)?;
-    let complaint = ended.error().replace(&format!("{}: ", unit.display()), "");
+    let complaint = ended.error().replace(&format!("{}: ", fmu.display()), "");
     Ok(match (ended.code == Some(0), &told.row) {
-        (true, Some(row)) => match difference(unit, &table, row, times.last().is_some_and(|t| t == "on"))? {
+        (true, Some(row)) => match difference(fmu, &table, row, times.last().is_some_and(|t| t == "on"))? {
             None => Fate::Equal,
             Some(why) => Fate::Different(why),
         },
         (true, None) => Fate::OnlyHere,
         (false, None) => Fate::Neither(complaint),
-        (false, Some(row)) => match breach(unit, &complaint, row) {
+        (false, Some(row)) => match breach(fmu, &complaint, row) {
             Some(why) => Fate::Refused(why),
             None => Fate::Failed(complaint),
         },
@@ -192,10 +192,10 @@ fn told(text: &str) -> Told {
     }
 }
 
-/// What in a unit breaks the standard, where the refusal says so.
-fn breach(unit: &Path, complaint: &str, row: &Value) -> Option<String> {
-    if let Err(why @ (Error::Archive { .. } | Error::Description { .. })) = Fmu::inspect(unit) {
-        return Some(why.to_string().replace(&format!("{}: ", unit.display()), ""));
+/// What in an FMU breaks the standard, where the refusal says so.
+fn breach(fmu: &Path, complaint: &str, row: &Value) -> Option<String> {
+    if let Err(why @ (Error::Archive { .. } | Error::Description { .. })) = Fmu::inspect(fmu) {
+        return Some(why.to_string().replace(&format!("{}: ", fmu.display()), ""));
     }
     let odd = row["odd"].as_array().is_some_and(|names| {
         names
@@ -208,8 +208,8 @@ fn breach(unit: &Path, complaint: &str, row: &Value) -> Option<String> {
 }
 
 /// How the last row here differs from FMPy's; none: not at all.
-fn difference(unit: &Path, table: &Path, row: &Value, events: bool) -> Outcome<Option<String>> {
-    let (description, _) = Fmu::inspect(unit).map_err(|e| e.to_string())?;
+fn difference(fmu: &Path, table: &Path, row: &Value, events: bool) -> Outcome<Option<String>> {
+    let (description, _) = Fmu::inspect(fmu).map_err(|e| e.to_string())?;
     let mut reader = csv::Reader::from_path(table).map_err(|e| e.to_string())?;
     let last = reader.records().last().ok_or("the table has no row")?.map_err(|e| e.to_string())?;
     let mut cells = last.iter();
@@ -275,7 +275,7 @@ mod tests {
         let row = serde_json::json!({ "odd": ["x"] });
         let folder = tempfile::tempdir().expect("a folder");
         let good =
-            crate::fmi::units::build(folder.path(), "good", &[("x", 'o', 0.0)], "", "").expect("a unit");
+            crate::fmi::fmus::build(folder.path(), "good", &[("x", 'o', 0.0)], "", "").expect("an FMU");
         let judged = |said: &str| breach(&good, said, &row);
         assert!(judged("at t = 1 s: the variable `x` is NaN").is_some());
         assert!(judged("at t = 1 s: the variable `y` is NaN").is_none(), "FMPy has no such number for y");
@@ -300,12 +300,12 @@ mod tests {
     }
 
     #[test]
-    fn the_words_of_the_script_are_found_among_those_of_the_unit() {
+    fn the_words_of_the_script_are_found_among_those_of_the_fmu() {
         let found = told("hello\n\nEXPERIMENT 0.0 1.0 0.5 off\nnoise\nRESULT {\"time\":\"1.0\"}\n");
         assert_eq!(found.times.as_deref(), Some(&["0.0", "1.0", "0.5", "off"].map(str::to_owned)[..]));
         assert_eq!(found.row.expect("a row")["time"], "1.0");
         assert!(
-            told("NONE no unit\n").times.is_none() && told("EXPERIMENT 0 1 1 off\nFAILED x").row.is_none()
+            told("NONE no FMU\n").times.is_none() && told("EXPERIMENT 0 1 1 off\nFAILED x").row.is_none()
         );
     }
 

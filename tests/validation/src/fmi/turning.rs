@@ -1,7 +1,7 @@
-//! Two free bodies as two units, glued beside their centres: the same as one robot of both on a ball joint, and their
+//! Two free bodies as two FMUs, glued beside their centres: the same as one robot of both on a ball joint, and their
 //! angular momentum stays.
 
-use super::{built, units};
+use super::{built, fmus};
 use crate::process::{Outcome, write};
 use crate::{Figure, Limit};
 use nalgebra::Vector3;
@@ -20,7 +20,7 @@ const JOINT: [f64; 3] = [0.4, 0.1, 0.9];
 const SPIN: [f64; 3] = [1.0, 2.0, -1.5];
 /// Frames of the links of the robot: that of the second is the joint.
 const FRAMES: [[f64; 3]; 2] = [SIDES[0].3, JOINT];
-/// Values that a unit tells, in the order of its variables; then come force, moment, mass and inertia.
+/// Values that an FMU tells, in the order of its variables; then come force, moment, mass and inertia.
 const TOLD: [&str; 13] = ["x", "y", "z", "qw", "qx", "qy", "qz", "vx", "vy", "vz", "wx", "wy", "wz"];
 
 /// Semi-implicit Euler; the orientation by the Cayley transform.
@@ -42,7 +42,7 @@ fn minus(a: Vector, b: Vector) -> Vector {
 /// Largest distance from the robot, and largest change of the angular momentum.
 pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
     for (name, mass, inertia, place) in SIDES {
-        unit(folder, name, mass, inertia, place)?;
+        fmu(folder, name, mass, inertia, place)?;
     }
     let (mut glued, mut whole) = (built(folder, &pair())?, built(folder, &robot(folder)?)?);
     let (mut off, mut first, mut drift) = (0.0_f64, None, 0.0_f64);
@@ -63,7 +63,7 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
         let change = minus(total, start).iter().fold(0.0, |m, x| larger(m, x.abs()));
         drift = larger(drift, change / start.iter().fold(0.0, |m, x| larger(m, x.abs())));
     }
-    let what = "two bodies as units, glued beside their centres, against one robot on a ball joint";
+    let what = "two bodies as FMUs, glued beside their centres, against one robot on a ball joint";
     Ok(vec![
         Figure::new(
             "fmi.turning.robot",
@@ -101,15 +101,15 @@ fn momentum(told: &[f64; 13], mass: f64, inertia: f64) -> Vector {
     std::array::from_fn(|k| mass * about[k] + inertia * spin[k])
 }
 
-fn unit(folder: &Path, name: &str, mass: f64, inertia: f64, place: Vector) -> Outcome<()> {
+fn fmu(folder: &Path, name: &str, mass: f64, inertia: f64, place: Vector) -> Outcome<()> {
     let speed = cross(SPIN, minus(place, SIDES[0].3));
     let turn = [1.0, 0.0, 0.0, 0.0];
     let starts = place.into_iter().chain(turn).chain(speed).chain(SPIN);
-    let mut variables: Vec<units::Variable> =
+    let mut variables: Vec<fmus::Variable> =
         TOLD.iter().zip(starts).map(|(name, x)| (*name, 'o', x)).collect();
     variables.extend(["fx", "fy", "fz", "mx", "my", "mz"].map(|name| (name, 'i', 0.0)));
     variables.extend([("mass", 'p', mass), ("inertia", 'p', inertia)]);
-    units::build(folder, name, &variables, "", STEP).map(drop)
+    fmus::build(folder, name, &variables, "", STEP).map(drop)
 }
 
 fn time() -> String {

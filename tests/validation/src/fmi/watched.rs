@@ -37,7 +37,7 @@ impl Ended {
 }
 
 /// Runs a command in `place`, which must exist; its temporary folder is `tmp` there. It is ended with all that it started.
-pub fn watched(run: &mut Command, place: &Path, patience: Duration) -> Outcome<Ended> {
+pub fn watched(run: &mut Command, place: &Path, timeout: Duration) -> Outcome<Ended> {
     let wrong = |e: std::io::Error| format!("{}: {e}", place.display());
     let [output, errors, temporary] = ["output", "errors", "tmp"].map(|name| place.join(name));
     std::fs::create_dir_all(&temporary).map_err(wrong)?;
@@ -45,7 +45,7 @@ pub fn watched(run: &mut Command, place: &Path, patience: Duration) -> Outcome<E
     run.stdout(File::create(&output).map_err(wrong)?).stderr(File::create(&errors).map_err(wrong)?);
     run.current_dir(place).env("TMPDIR", &temporary).process_group(0);
     let mut child = run.spawn().map_err(|e| e.to_string())?;
-    let end = Instant::now() + patience;
+    let end = Instant::now() + timeout;
     let status = loop {
         match child.try_wait().map_err(wrong)? {
             Some(status) => break Some(status),
@@ -100,9 +100,9 @@ fn processes(place: &Path) -> Vec<String> {
 mod tests {
     use super::*;
 
-    fn shell(text: &str, patience: Duration) -> Ended {
+    fn shell(text: &str, timeout: Duration) -> Ended {
         let folder = tempfile::tempdir().expect("a folder");
-        watched(Command::new("sh").args(["-c", text]), folder.path(), patience).expect("it ran")
+        watched(Command::new("sh").args(["-c", text]), folder.path(), timeout).expect("it ran")
     }
 
     #[test]

@@ -1,8 +1,8 @@
 //! Feet on soil columns: the single pass made exact, falls, and six feet that share one body.
 
 use super::extrapolate::steps_to;
+use super::fixture::{Setting, build, list, read, step, wrench};
 use super::foot::{Foot, until_up};
-use super::rig::{Setting, build, list, read, step, wrench};
 use super::six_feet::{Table, columns};
 use super::{Context, Figure, Limit};
 use crate::process::{Outcome, read as read_file, root};

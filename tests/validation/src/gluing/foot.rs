@@ -1,7 +1,7 @@
 //! FOOT: one foot falls on power-law soil, goes down, and comes off.
 
+use super::fixture::{Setting, build, list, read, subsystem, wrench};
 use super::parameters::Parameters;
-use super::rig::{Setting, build, list, read, subsystem, wrench};
 use super::table::Answers;
 use crate::process::Outcome;
 use terraglue::Testbed;

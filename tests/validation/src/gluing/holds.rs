@@ -1,9 +1,9 @@
 //! Levels of the condition, holds of the wrench, and stabilisation: what each leaves of gap, order and growth.
 
 use super::extrapolate::steps_to;
-use super::mechanisms::{Case, cases, largest, reference};
+use super::fixture::{Setting, Tally, build, read, step, subsystem, wrench};
+use super::mechanisms::{MechanismCase, cases, largest, reference};
 use super::planar::{ALPHA, GRAVITY};
-use super::rig::{Setting, Tally, build, read, step, subsystem, wrench};
 use super::{Context, Figure, Limit};
 use crate::process::Outcome;
 
@@ -50,7 +50,7 @@ fn levels() -> Outcome<Vec<Figure>> {
 }
 
 /// The angles at every 5 ms and what the run took.
-fn run(case: &Case, h: f64, gluing: &str) -> Outcome<(Vec<Vec<f64>>, Tally)> {
+fn run(case: &MechanismCase, h: f64, gluing: &str) -> Outcome<(Vec<Vec<f64>>, Tally)> {
     let setting = Setting { gluing: gluing.into(), ..Setting::iterative(h, GRAVITY) };
     let mut testbed = build(&case.mechanism.cut(&setting, ALPHA))?;
     let (mut samples, mut tally, mut count) = (Vec::new(), Tally::default(), 0);

@@ -1,8 +1,8 @@
 //! Two masses: where everything about gluing can be said in closed form.
 
 use super::extrapolate::steps_to;
+use super::fixture::{Setting, Tally, build, read, step, wrench};
 use super::oscillator::Oscillator;
-use super::rig::{Setting, Tally, build, read, step, wrench};
 use super::{Context, Figure, Limit};
 use crate::process::Outcome;
 use terraglue_numerics::extremes::larger;

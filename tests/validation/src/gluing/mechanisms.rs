@@ -1,15 +1,15 @@
 //! Cut mechanisms with generalized-α: errors, order, evaluations, Jacobians, a wrong start; a block with friction.
 
 use super::extrapolate::steps_to;
+use super::fixture::{Setting, Tally, build, read, step, wrench};
 use super::planar::{ALPHA, Body, GRAVITY, Mechanism};
-use super::rig::{Setting, Tally, build, read, step, wrench};
 use super::{Context, Figure, Limit};
 use crate::process::{Outcome, read as read_file, root};
 use std::f64::consts::FRAC_PI_2;
 use terraglue_numerics::extremes::{larger, smaller};
 
 /// A mechanism with its reference: a column of a table per angle.
-pub(super) struct Case {
+pub(super) struct MechanismCase {
     name: &'static str,
     /// The two parts.
     pub mechanism: Mechanism,
@@ -23,10 +23,10 @@ pub(super) struct Case {
 }
 
 /// The mechanisms of the figures.
-pub(super) fn cases() -> [Case; 4] {
+pub(super) fn cases() -> [MechanismCase; 4] {
     let corners = [[0.0, 0.0], [0.0, 1.0], [2.0, 2.0], [3.0, 0.0]];
     [
-        Case {
+        MechanismCase {
             name: "pendulum",
             mechanism: Mechanism::pendulum(1.0, 1.0, FRAC_PI_2, 0.5),
             angles: &["first.b0.angle"],
@@ -36,7 +36,7 @@ pub(super) fn cases() -> [Case; 4] {
             error: 4.0e-4,
             evaluations: 3.3,
         },
-        Case {
+        MechanismCase {
             name: "double_pendulum",
             mechanism: Mechanism::double_pendulum([1.0; 2], [1.0; 2], [0.0; 2]),
             angles: &["first.b0.angle", "second.b0.angle"],
@@ -46,7 +46,7 @@ pub(super) fn cases() -> [Case; 4] {
             error: 9e-4,
             evaluations: 3.3,
         },
-        Case {
+        MechanismCase {
             name: "four_bar",
             mechanism: Mechanism::four_bar(corners, 1.0),
             angles: &["first.b0.angle", "first.b1.angle", "second.b0.angle"],
@@ -56,7 +56,7 @@ pub(super) fn cases() -> [Case; 4] {
             error: 1.5e-3,
             evaluations: 3.3,
         },
-        Case {
+        MechanismCase {
             name: "n_four_bar",
             mechanism: n_four_bar(),
             angles: &["first.b0.angle"],
@@ -103,7 +103,7 @@ fn setting(h: f64) -> Setting {
 }
 
 /// The angles at multiples of `every` and what the run took.
-fn run(case: &Case, h: f64, every: f64) -> Outcome<(Vec<Vec<f64>>, Tally)> {
+fn run(case: &MechanismCase, h: f64, every: f64) -> Outcome<(Vec<Vec<f64>>, Tally)> {
     let mut testbed = build(&case.mechanism.cut(&setting(h), ALPHA))?;
     let (mut samples, mut tally, mut count) = (Vec::new(), Tally::default(), 0);
     let stride = steps_to(every, h);
@@ -119,7 +119,7 @@ fn run(case: &Case, h: f64, every: f64) -> Outcome<(Vec<Vec<f64>>, Tally)> {
 }
 
 /// At every step of 5 ms: the limit of runs with short steps, or the equation of motion in one angle.
-pub(super) fn reference(case: &Case) -> Outcome<Vec<Vec<f64>>> {
+pub(super) fn reference(case: &MechanismCase) -> Outcome<Vec<Vec<f64>>> {
     if case.table.is_empty() {
         return Ok(parallelogram(case.until));
     }
@@ -157,7 +157,7 @@ pub(super) fn largest(a: &[Vec<f64>], b: &[Vec<f64>], stride: usize) -> f64 {
     a.iter().zip(reference).flat_map(|(a, b)| a.iter().zip(b)).fold(0.0, |m, (a, b)| larger(m, (a - b).abs()))
 }
 
-fn errors(case: &Case) -> Outcome<Vec<Figure>> {
+fn errors(case: &MechanismCase) -> Outcome<Vec<Figure>> {
     let id = |name: &str| format!("gluing.{}.{name}", case.name);
     let reference = reference(case)?;
     let mut all = Vec::new();

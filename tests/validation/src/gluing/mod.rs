@@ -6,6 +6,8 @@
 
 mod extrapolate;
 mod feet;
+mod fixture;
+mod fmus;
 mod foot;
 mod holds;
 mod linear;
@@ -14,13 +16,11 @@ mod oscillator;
 mod overhead;
 mod parameters;
 mod planar;
-mod rig;
 mod six_feet;
 mod squeezer;
 mod step_control;
 mod stiffness;
 mod table;
-mod units;
 mod walk_forms;
 
 use super::{Context, Figure, Limit, Part};
@@ -34,7 +34,7 @@ pub const PARTS: [Part; 11] = [
     ("holds", holds::figures),
     ("squeezer", squeezer::figures),
     ("step-control", step_control::figures),
-    ("units", units::figures),
+    ("units", fmus::figures),
     ("feet", feet::figures),
     ("stiffness", stiffness::figures),
     ("overhead", overhead::figures),

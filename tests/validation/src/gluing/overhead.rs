@@ -5,7 +5,7 @@
 //! read and the quickest of many blocks taken: the machine may be busy.
 
 use super::super::timing::median;
-use super::rig::Setting;
+use super::fixture::Setting;
 use super::six_feet::{Table, columns};
 use super::{Context, Figure, Limit};
 use crate::process::Outcome;

@@ -5,8 +5,8 @@
 //! on K3, K4 and K6 and as −T on K2.
 
 use super::extrapolate::steps_to;
+use super::fixture::{Setting, Tally, build, list, read, step, wrench};
 use super::planar::{ALPHA, Body, Pin, bodies};
-use super::rig::{Setting, Tally, build, list, read, step, wrench};
 use super::{Context, Figure, Limit};
 use crate::process::Outcome;
 use terraglue_numerics::extremes::{larger, smaller};
@@ -28,7 +28,7 @@ const STEP: f64 = 2.5e-5;
 const FINE: f64 = 7.5e-6;
 
 /// A part of the mechanism: its links with the pins that stay, and further lines of its table.
-struct Part {
+struct SqueezerPart {
     name: &'static str,
     links: Vec<Body>,
     pins: Vec<Pin>,
@@ -36,7 +36,7 @@ struct Part {
 }
 
 /// The parts, the first with the crank, and the point E where they meet.
-fn parts() -> (Vec<Part>, [f64; 2]) {
+fn parts() -> (Vec<SqueezerPart>, [f64; 2]) {
     let [beta, theta, gamma, phi, delta, omega, epsilon]: [f64; 7] = [
         -0.0617138900142764,
         0.0,
@@ -73,7 +73,7 @@ fn parts() -> (Vec<Part>, [f64; 2]) {
     let pinned = |place: [f64; 2]| [0.0, 1.0, place[0], place[1]];
     let d = at(b, gamma, 0.02, -0.018);
     let spring = list(&[0.0, d[0], d[1], 0.014, 0.072, 4530.0, 0.07785]);
-    let part = |name, links, pins, loads| Part { name, links, pins, loads };
+    let part = |name, links, pins, loads| SqueezerPart { name, links, pins, loads };
     let all = vec![
         part("crank", vec![k1, k2], vec![fixed([0.0; 2]), pinned(f)], "torque = [0, 0.033]\n".into()),
         part("spring", vec![k3], vec![fixed(b)], format!("spring = {spring}\n")),

@@ -1,7 +1,7 @@
 //! Steps set by the energy residual of the interface against steps of one length at the same cost.
 
 use super::extrapolate::steps_to;
-use super::rig::{Setting, build, read, step, subsystem};
+use super::fixture::{Setting, build, read, step, subsystem};
 use super::{Context, Figure, Limit};
 use crate::process::Outcome;
 use std::f64::consts::PI;

@@ -1,6 +1,6 @@
 //! Which strategies hold how stiff a ground under six feet of one body, and which of them rebound.
 
-use super::rig::{Setting, Tally, build, read};
+use super::fixture::{Setting, Tally, build, read};
 use super::six_feet::{Table, columns};
 use super::{Context, Figure, Limit};
 use crate::process::Outcome;
@@ -18,7 +18,7 @@ const STRATEGIES: [&str; 8] = [
 ];
 
 /// What a run of 0.1 s with h = 10 ms did.
-struct Run {
+struct StiffnessRun {
     /// When and why it ended early.
     failed: Option<String>,
     tally: Tally,
@@ -32,12 +32,12 @@ struct Run {
     kappa: f64,
 }
 
-fn run(strategy: &'static str, factor: f64) -> Outcome<Run> {
+fn run(strategy: &'static str, factor: f64) -> Outcome<StiffnessRun> {
     let gluing = "max_halvings = 0\nmax_iterations = 200".into();
     let setting = Setting { strategy, gluing, ..Setting::iterative(0.01, [0.0; 3]) };
     let text = Table::standard("implicit-euler", 0.3).text(&setting, &columns(factor, false));
     let mut testbed = build(&text)?;
-    let mut run = Run {
+    let mut run = StiffnessRun {
         failed: None,
         tally: Tally::default(),
         soil: 0,

@@ -33,7 +33,7 @@ impl Answers {
 const COLUMNS: &str = "its columns are case, parameters, t, quantity, value, source, with one row per value";
 
 /// One row.
-struct Row {
+struct ReferenceRow {
     case: String,
     parameters: String,
     t: Option<f64>,
@@ -52,11 +52,11 @@ pub fn figures(file: &Path) -> Outcome<Vec<Figure>> {
 }
 
 /// All rows of a case; those whose times have a step in common share one set of runs.
-fn judge(group: &[Row]) -> Vec<Figure> {
+fn judge(group: &[ReferenceRow]) -> Vec<Figure> {
     let times: Vec<Option<f64>> = group.iter().map(|r| r.t).collect();
     let mut all: Vec<(usize, Figure)> = Vec::new();
     for batch in batches(&times) {
-        let rows: Vec<&Row> = batch.iter().map(|k| &group[*k]).collect();
+        let rows: Vec<&ReferenceRow> = batch.iter().map(|k| &group[*k]).collect();
         all.extend(batch.into_iter().zip(judge_together(&rows)));
     }
     all.sort_by_key(|(k, _)| *k);
@@ -64,7 +64,7 @@ fn judge(group: &[Row]) -> Vec<Figure> {
 }
 
 /// Rows of one set of runs. Where they cannot be answered each is tried alone; one that cannot is a row that fails.
-fn judge_together(rows: &[&Row]) -> Vec<Figure> {
+fn judge_together(rows: &[&ReferenceRow]) -> Vec<Figure> {
     match (answer(rows), rows) {
         (Ok(answers), _) => rows.iter().enumerate().map(|(k, row)| figure(row, &answers, k)).collect(),
         (Err(why), [row]) => {
@@ -76,7 +76,7 @@ fn judge_together(rows: &[&Row]) -> Vec<Figure> {
     }
 }
 
-fn answer(rows: &[&Row]) -> Outcome<Answers> {
+fn answer(rows: &[&ReferenceRow]) -> Outcome<Answers> {
     let Some(first) = rows.first() else { return Err("no row".into()) };
     let wanted: Vec<(Option<f64>, String)> = rows.iter().map(|r| (r.t, r.quantity.clone())).collect();
     let p = Parameters(&first.parameters);
@@ -90,7 +90,7 @@ fn answer(rows: &[&Row]) -> Outcome<Answers> {
     }
 }
 
-fn figure(row: &Row, answers: &Answers, k: usize) -> Figure {
+fn figure(row: &ReferenceRow, answers: &Answers, k: usize) -> Figure {
     // a difference from nothing is no share of it
     let relative = answers.relative && row.value != 0.0;
     let scale = if relative { row.value.abs() } else { row.value.abs().max(1.0) };
@@ -101,13 +101,13 @@ fn figure(row: &Row, answers: &Answers, k: usize) -> Figure {
     Figure::new(id, difference, Limit::AtMost(answers.tolerance[k]), what)
 }
 
-fn rows(text: &str) -> Outcome<Vec<Row>> {
+fn rows(text: &str) -> Outcome<Vec<ReferenceRow>> {
     let mut lines = text.lines().filter(|l| !l.trim().is_empty()).enumerate();
     let head = lines.next().map(|(_, l)| fields(l)).unwrap_or_default();
     if head.len() < 5 || head[..5] != ["case", "parameters", "t", "quantity", "value"] {
         return Err("the header is another".into());
     }
-    let rows: Vec<Row> = lines
+    let rows: Vec<ReferenceRow> = lines
         .map(|(k, line)| {
             let f = fields(line);
             let wrong = |what: &str| format!("line {}: {what}", k + 1);
@@ -122,7 +122,7 @@ fn rows(text: &str) -> Outcome<Vec<Row>> {
                 return Err(wrong("t is no time after the start, s"));
             }
             let value = value.parse().map_err(|_| wrong("the value is no number"))?;
-            Ok(Row {
+            Ok(ReferenceRow {
                 case: case.clone(),
                 parameters: parameters.clone(),
                 t,

@@ -5,7 +5,7 @@ use crate::process::Outcome;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
-use terraglue::observer::{Happening, Observer};
+use terraglue::observer::{Event, Observer};
 use terraglue::reload::{ReloadOptions, Reloader};
 use terraglue::scaffold::{Kind, Language, scaffold};
 use terraglue::scenario::Scenario;
@@ -68,9 +68,9 @@ fn made(context: &Context, language: Language) -> Outcome<PathBuf> {
 struct Heard(Option<(Instant, String)>);
 
 impl Observer for Heard {
-    fn happened(&mut self, happening: &Happening) -> terraglue::Result {
-        if happening.what.starts_with("reload ") {
-            self.0 = Some((Instant::now(), happening.what.clone()));
+    fn event(&mut self, event: &Event) -> terraglue::Result {
+        if event.what.starts_with("reload ") {
+            self.0 = Some((Instant::now(), event.what.clone()));
         }
         Ok(())
     }

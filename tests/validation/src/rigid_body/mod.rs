@@ -1,8 +1,8 @@
 //! Area `rigid-body`, part by part.
 
 mod contact;
+mod fixture;
 mod peers;
-mod rig;
 mod solver;
 
 pub use peers::comparison;

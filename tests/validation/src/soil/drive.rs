@@ -1,7 +1,7 @@
 //! A bench for one body of any shape on level soil: its horizontal motion and rotation are given, vertically it carries a load
-//! or moves as told. It keeps the balance of energies beside the soil's own book.
+//! or moves as told. It keeps the balance of energies beside the soil's own ledger.
 
-use super::rig::Shown;
+use super::fixture::Shown;
 use terraglue_ground::{Lattice, Placed, Surface, nodes_below};
 use terraglue_numerics::extremes::larger;
 use terraglue_subsystem::{

@@ -53,7 +53,7 @@ const WAYS: [Way; 12] = [
     wheel("yaw_30", 0.1 / 0.8 / 0.092, 30.0),
 ];
 
-struct Case {
+struct EnergyCase {
     way: usize,
     soil: &'static str,
     strategy: &'static str,
@@ -61,7 +61,7 @@ struct Case {
     spacing: f64,
 }
 
-impl Case {
+impl EnergyCase {
     fn id(&self) -> String {
         let millimetres = (1e3 * self.spacing).round();
         format!("{}.{}.{}.{}.{millimetres}mm", WAYS[self.way].name, self.soil, self.strategy, self.row)
@@ -140,7 +140,7 @@ impl Way {
 }
 
 /// Every case; quickly 24 that have each way, soil, strategy and row, on the coarser grids.
-fn cases(quick: bool) -> Vec<Case> {
+fn cases(quick: bool) -> Vec<EnergyCase> {
     let mut all = Vec::new();
     if quick {
         for k in 0..24_usize {
@@ -161,8 +161,14 @@ fn cases(quick: bool) -> Vec<Case> {
     all
 }
 
-fn of([way, soil, strategy, row, grid]: [usize; 5]) -> Case {
-    Case { way, soil: SOILS[soil], strategy: STRATEGIES[strategy], row: ROWS[row], spacing: SPACINGS[grid] }
+fn of([way, soil, strategy, row, grid]: [usize; 5]) -> EnergyCase {
+    EnergyCase {
+        way,
+        soil: SOILS[soil],
+        strategy: STRATEGIES[strategy],
+        row: ROWS[row],
+        spacing: SPACINGS[grid],
+    }
 }
 
 /// The largest drift of each way over its soils, strategies, rows and grids.
@@ -187,7 +193,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
         let worst = of_way.clone().max_by(|a, b| drift(a.1).total_cmp(&drift(b.1)));
         let Some((case, run)) = worst else { continue };
         let what = format!(
-            "largest drift of the book of energies, % of the work of the motors, {} runs; {}{}",
+            "largest drift of the energy ledger, % of the work of the motors, {} runs; {}{}",
             of_way.count(),
             case.id(),
             run["error"].as_str().map(|e| format!(": {e}")).unwrap_or_default()
@@ -213,7 +219,7 @@ fn dragged(context: &Context) -> Outcome<Vec<Figure>> {
         let Some(way) = WAYS.iter().position(|w| w.name == name) else { continue };
         for row in rows {
             for strategy in ["cooperative", "iterative"] {
-                let case = || Case { way, soil: SOILS[0], strategy, row, spacing: 0.01 };
+                let case = || EnergyCase { way, soil: SOILS[0], strategy, row, spacing: 0.01 };
                 cases.extend(steps.iter().map(|h| (case(), *h)));
             }
         }
@@ -224,7 +230,7 @@ fn dragged(context: &Context) -> Outcome<Vec<Figure>> {
     let mut all = Vec::new();
     for (name, row) in ways.iter().flat_map(|w| rows.map(|r| (*w, r))) {
         let of = |strategy: &str, h: f64| {
-            let is = |(c, step): &&(Case, f64)| {
+            let is = |(c, step): &&(EnergyCase, f64)| {
                 WAYS[c.way].name == name && c.row == row && c.strategy == strategy && *step == h
             };
             cases.iter().position(|c| is(&c)).map_or(&Value::Null, |k| &runs[k])

@@ -9,8 +9,8 @@ use terraglue_numerics::extremes::larger;
 
 /// Name, scenario, what is set beside the soil, duration (s) and the time until which its wheels stand, s. On the slope the
 /// rover rolls back before it is driven: its drives hold no angle.
-type Driven = (&'static str, &'static str, &'static [&'static str], &'static str, f64);
-const RUNS: [Driven; 3] = [
+type DrivenRover = (&'static str, &'static str, &'static [&'static str], &'static str, f64);
+const RUNS: [DrivenRover; 3] = [
     ("rover_slope", "rover_slope", &[], "8", 0.0),
     ("rover_level", "rover_slope", &["world.gravity_m_s2=[0.0,0.0,-9.81]", "time.settle_s=3.0"], "1", 1.0),
     ("wheel_rig", "wheel_rig", &["soil.contacts_shown=1"], "2", 0.0),
@@ -50,7 +50,7 @@ struct Steps {
 }
 
 impl Steps {
-    fn of(context: &Context, run: &Driven, module: &str) -> Outcome<Self> {
+    fn of(context: &Context, run: &DrivenRover, module: &str) -> Outcome<Self> {
         let (name, scenario, sets, duration, stands) = *run;
         let id = format!("wheels.{name}.{module}");
         let folder = context.scratch.join(&id);

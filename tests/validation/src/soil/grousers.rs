@@ -36,7 +36,7 @@ struct Driven {
     sinkage: f64,
     /// Drawbar pull, N.
     pull: f64,
-    /// Drift of the energy book over the work of the motors, %.
+    /// Drift of the energy ledger over the work of the motors, %.
     drift: f64,
 }
 
@@ -120,7 +120,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
         all_slips("energy"),
         most(&mut each().map(|w| w[1].drift)),
         Limit::AtMost(1.0),
-        "largest drift of the energy book of the wheel with grousers, % of the work of the motors",
+        "largest drift of the energy ledger of the wheel with grousers, % of the work of the motors",
     ));
     Ok(all)
 }

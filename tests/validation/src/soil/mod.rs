@@ -5,6 +5,8 @@ mod drags;
 mod drive;
 mod energy;
 mod fit;
+#[path = "../../../../modules/soil/contact/tests/support/mod.rs"]
+mod fixture;
 mod found_wheels;
 mod grousers;
 mod moves;
@@ -13,8 +15,6 @@ mod panel;
 mod plate_wheel;
 mod plates;
 mod real_wheel;
-#[path = "../../../../modules/soil/contact/tests/support/mod.rs"]
-mod rig;
 mod rig_scenario;
 mod rows;
 mod stick;

@@ -3,9 +3,9 @@
 
 use super::MODULES;
 use super::drive::{Balance, Drive, Move, Vertical, on_rim};
+use super::fixture::Shown;
 use super::plates::Maker;
-use super::rig::Shown;
-use super::rows::{Row, eight};
+use super::rows::{SoilRow, eight};
 use crate::parallel::in_parallel;
 use crate::process::Outcome;
 use crate::{Context, Figure, Limit};
@@ -24,7 +24,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     Ok(all)
 }
 
-fn row(name: &str) -> Outcome<Row> {
+fn row(name: &str) -> Outcome<SoilRow> {
     eight()?.into_iter().find(|r| r.name == name).ok_or_else(|| format!("no soil {name}"))
 }
 

@@ -2,9 +2,9 @@
 //! prints whose walls stand or slide, as an SVG file for docs/soil.md.
 
 use super::drive::{Drive, Move, Vertical, on_rim};
+use super::fixture::{LUNAR, Shown};
 use super::panel::Panel;
 use super::plates::level;
-use super::rig::{LUNAR, Shown};
 use crate::process::{Outcome, root, write};
 use std::fmt::Write;
 use terraglue_ground::Surface;

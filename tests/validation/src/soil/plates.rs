@@ -1,8 +1,8 @@
 //! Plates pressed into level ground: the soils give the pressure that their law promises, whatever the grid.
 
 use super::MODULES;
-use super::rig::{Rig, flat, soil};
-use super::rows::{Row, eight};
+use super::fixture::{Fixture, flat, soil};
+use super::rows::{SoilRow, eight};
 use crate::parallel::in_parallel;
 use crate::process::Outcome;
 use crate::{Context, Figure, Limit};
@@ -51,21 +51,22 @@ const SPEED: f64 = 0.01;
 
 /// One plate on one soil and grid.
 #[derive(Clone)]
-struct Case {
+struct PlateCase {
     make: Maker,
-    row: Row,
+    row: SoilRow,
     shape: usize,
     spacing: f64,
     quick: bool,
 }
 
-impl Case {
-    fn rig(&self, mass: f64) -> Rig {
+impl PlateCase {
+    fn fixture(&self, mass: f64) -> Fixture {
         let size = (GROUND / self.spacing).round() as u32 + 1;
         let (_, geometry, ..) = shapes()[self.shape].clone();
-        let mut rig = Rig::new((self.make)(&self.row.config, size, self.spacing), geometry, mass, 0.1);
-        (rig.position[0], rig.position[1]) = (OFFSET[0], OFFSET[1]);
-        rig
+        let mut fixture =
+            Fixture::new((self.make)(&self.row.config, size, self.spacing), geometry, mass, 0.1);
+        (fixture.position[0], fixture.position[1]) = (OFFSET[0], OFFSET[1]);
+        fixture
     }
 
     /// Half the width of the plate over the spacing.
@@ -81,12 +82,12 @@ impl Case {
         // the law knows no rate: a quick run takes longer strides
         let h = if self.quick { 1e-2 } else { 1e-3 };
         let stride = SPEED * h;
-        let mut rig = self.rig(1.0);
-        rig.h = h;
+        let mut fixture = self.fixture(1.0);
+        fixture.h = h;
         let (every, last) = ((0.005 / stride).round() as u32, (0.05 / stride).round() as u32);
         let mut worst = 0.0_f64;
         for k in 1..=last {
-            let force = rig.prescribed_step(&[-stride, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
+            let force = fixture.prescribed_step(&[-stride, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
             let z = stride * f64::from(k);
             if k % every == 0 && z > 0.0099 {
                 worst = larger(worst, (force / area / self.row.pressure(z, b) - 1.0).abs());
@@ -103,16 +104,16 @@ impl Case {
             let z = self.row.depth(load / area, b);
             if z < 0.1 {
                 // a light plate, its load laid on smoothly: a heavy one would plunge deeper than it rests
-                let mut rig = self.rig(0.1);
-                rig.gravity = 0.0;
+                let mut fixture = self.fixture(0.1);
+                fixture.gravity = 0.0;
                 let ramp = if self.quick { 300.0 } else { 4000.0 };
                 for k in 0..ramp as u32 + 100 {
                     let share = (f64::from(k) / ramp).min(1.0);
-                    rig.force[2] = -0.5 * load * (1.0 - (std::f64::consts::PI * share).cos());
-                    rig.iterative_step();
+                    fixture.force[2] = -0.5 * load * (1.0 - (std::f64::consts::PI * share).cos());
+                    fixture.iterative_step();
                 }
-                let speed = rig.velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
-                let error = if speed < 1e-5 { (rig.sunk() / z - 1.0).abs() } else { f64::NAN };
+                let speed = fixture.velocity.iter().map(|v| v * v).sum::<f64>().sqrt();
+                let error = if speed < 1e-5 { (fixture.sunk() / z - 1.0).abs() } else { f64::NAN };
                 worst = larger(worst, error);
             }
         }
@@ -125,7 +126,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     let [(module, make), _] = MODULES;
     let mut all = Vec::new();
     let cases = cases(context, make)?;
-    let errors = in_parallel(&cases, Case::pressed);
+    let errors = in_parallel(&cases, PlateCase::pressed);
     for (shape, (name, ..)) in shapes().iter().enumerate() {
         let worst = |from: f64, to: f64| {
             let of_shape = cases.iter().zip(&errors).filter(|(c, _)| c.shape == shape);
@@ -150,12 +151,12 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
 }
 
 /// Every soil, shape and grid; quickly two soils and the two grids that show most.
-fn cases(context: &Context, make: Maker) -> Outcome<Vec<Case>> {
+fn cases(context: &Context, make: Maker) -> Outcome<Vec<PlateCase>> {
     let mut cases = Vec::new();
     for (number, row) in eight()?.into_iter().enumerate() {
         for shape in 0..shapes().len() {
             for spacing in SPACINGS {
-                let case = Case { make, row: row.clone(), shape, spacing, quick: context.quick };
+                let case = PlateCase { make, row: row.clone(), shape, spacing, quick: context.quick };
                 let small = shapes()[shape].3 < 0.02;
                 if !context.quick || (number == 1 || number == 7) && (spacing > 0.009 || small) {
                     cases.push(case);
@@ -170,9 +171,16 @@ fn load_control(context: &Context, module: &str, make: Maker) -> Outcome<Figure>
     let rows = eight()?;
     let rows = if context.quick { vec![rows[2].clone(), rows[7].clone()] } else { rows };
     let shapes: &[usize] = if context.quick { &[1] } else { &[0, 1, 2, 3, 4, 5] };
-    let case = |row: &Row, shape| Case { make, row: row.clone(), shape, spacing: 0.01, quick: context.quick };
-    let cases: Vec<Case> = rows.iter().flat_map(|row| shapes.iter().map(move |s| case(row, *s))).collect();
-    let errors = in_parallel(&cases, Case::loaded);
+    let case = |row: &SoilRow, shape| PlateCase {
+        make,
+        row: row.clone(),
+        shape,
+        spacing: 0.01,
+        quick: context.quick,
+    };
+    let cases: Vec<PlateCase> =
+        rows.iter().flat_map(|row| shapes.iter().map(move |s| case(row, *s))).collect();
+    let errors = in_parallel(&cases, PlateCase::loaded);
     let worst = errors.into_iter().reduce(larger).unwrap_or(f64::NAN);
     let what = "largest error of the sinkage under 5 to 200 N, %, 1 cm grid";
     Ok(Figure::new(format!("soil.{module}.load_control"), 100.0 * worst, Limit::AtMost(2.0), what))

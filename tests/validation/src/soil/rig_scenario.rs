@@ -1,6 +1,6 @@
 //! `scenarios/wheel_rig.toml` as a user runs it, against the integral of the stresses: sinkage and drawbar pull by slip.
 
-use super::rows::{EIGHT, Row, STIFF, eight};
+use super::rows::{EIGHT, STIFF, SoilRow, eight};
 use super::wong_reece::wheel_on;
 use crate::parallel::in_parallel;
 use crate::process::{Outcome, read, run_scenario};
@@ -21,14 +21,14 @@ const RIM: f64 = 0.2;
 const WAY: f64 = 0.30;
 const MEASURED: f64 = 0.06;
 
-struct Case {
+struct RigCase {
     /// Name in `models/soils.csv`.
     name: &'static str,
-    soil: Row,
+    soil: SoilRow,
     slip: f64,
 }
 
-impl Case {
+impl RigCase {
     /// Means of the variables of the run over the last way.
     fn driven(&self, context: &Context) -> Outcome<BTreeMap<String, f64>> {
         let id = format!("rig.{}.{}", self.name, self.slip);
@@ -105,7 +105,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     let names = if context.quick { &[2][..] } else { &[0, 1, 2, 3] };
     let mut cases = Vec::new();
     for k in names {
-        let case = |slip| Case { name: EIGHT[*k].0, soil: soils[*k].clone(), slip };
+        let case = |slip| RigCase { name: EIGHT[*k].0, soil: soils[*k].clone(), slip };
         cases.extend(slips.iter().copied().map(case));
     }
     let errors = in_parallel(&cases, |case| case.errors(context)).into_iter().collect::<Outcome<Vec<_>>>()?;

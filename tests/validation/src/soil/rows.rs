@@ -24,7 +24,7 @@ pub const EIGHT: [(&str, &str); 8] = [
 
 /// The numbers of a row.
 #[derive(Clone, Debug)]
-pub struct Row {
+pub struct SoilRow {
     /// Short name.
     pub name: &'static str,
     /// As a module's parameters, JSON: pressure by the depth alone, as closed forms and integrals have it.
@@ -34,7 +34,7 @@ pub struct Row {
     values: [f64; COLUMNS.len()],
 }
 
-impl Row {
+impl SoilRow {
     /// A number by the name of its column.
     pub fn value(&self, column: &str) -> f64 {
         COLUMNS.iter().position(|c| *c == column).map_or(f64::NAN, |k| self.values[k])
@@ -78,15 +78,15 @@ impl Row {
 }
 
 /// The eight soils.
-pub fn eight() -> Outcome<Vec<Row>> {
+pub fn eight() -> Outcome<Vec<SoilRow>> {
     let table = SoilTable::parse(&read(&root().join("models/soils.csv"))?).map_err(|e| e.to_string())?;
     EIGHT.iter().map(|(row, name)| of(&table, row, name)).collect()
 }
 
-fn of(table: &SoilTable, row: &str, name: &'static str) -> Outcome<Row> {
+fn of(table: &SoilTable, row: &str, name: &'static str) -> Outcome<SoilRow> {
     let offered = table.row(row).and_then(|r| r.offered(&[])).map_err(|e| e.to_string())?;
     let values = COLUMNS.map(|c| offered.iter().find(|(k, _)| *k == c).map_or(f64::NAN, |(_, v)| *v));
     let config: serde_json::Map<_, _> = offered.into_iter().map(|(k, v)| (k.to_owned(), v.into())).collect();
     let own = serde_json::Value::Object(config).to_string();
-    Ok(Row { name, config: own.replacen('{', &format!("{{{BY_DEPTH},"), 1), own, values })
+    Ok(SoilRow { name, config: own.replacen('{', &format!("{{{BY_DEPTH},"), 1), own, values })
 }

@@ -1,6 +1,6 @@
 //! A loaded disc under a lateral force below the friction limit stays where it is, on the level and on a slope.
 
-use super::rig::{LUNAR, Rig, flat, soil};
+use super::fixture::{Fixture, LUNAR, flat, soil};
 use crate::parallel::in_parallel;
 use crate::process::Outcome;
 use crate::{Context, Figure, Limit};
@@ -40,33 +40,33 @@ struct Held {
 fn held(make: Maker, sloped: bool, share: f64, seconds: f64) -> Held {
     let geometry = Geometry::Cylinder { half_length: 0.02, radius: RADIUS };
     let ground = if sloped { slope } else { flat as fn(f64, f64) -> f64 };
-    let mut rig = Rig::new(make(ground), geometry, LOAD / 9.81, 0.02);
+    let mut fixture = Fixture::new(make(ground), geometry, LOAD / 9.81, 0.02);
     let tilt = if sloped { SLOPE_DEG.to_radians() } else { 0.0 };
     if sloped {
-        rig.tilt(tilt);
+        fixture.tilt(tilt);
     }
     // the load presses along the normal, so that the limit is the same on the slope
     let limit = COHESION * std::f64::consts::PI * RADIUS * RADIUS + LOAD * PHI.tan();
     let along = [tilt.cos(), 0.0, -tilt.sin()];
     let normal = [tilt.sin(), 0.0, tilt.cos()];
-    rig.gravity = 0.0;
+    fixture.gravity = 0.0;
     let steps = |s: f64| (s / rig_step()).round() as u32;
-    let (mut start, mut forces, mut tension) = (rig.position, Vec::new(), 0.0_f64);
+    let (mut start, mut forces, mut tension) = (fixture.position, Vec::new(), 0.0_f64);
     for k in 0..steps(1.0 + seconds) {
         let time = f64::from(k) * rig_step();
         let load = LOAD * (time / 0.5).min(1.0);
         let side = share * limit * ((time - 1.0) / 0.5).clamp(0.0, 1.0);
-        rig.force = std::array::from_fn(|c| side * along[c] - load * normal[c]);
-        rig.iterative_step();
-        tension = larger(tension, -rig.t[0]);
+        fixture.force = std::array::from_fn(|c| side * along[c] - load * normal[c]);
+        fixture.iterative_step();
+        tension = larger(tension, -fixture.t[0]);
         if k + 1 == steps(3.0) {
-            start = rig.position;
+            start = fixture.position;
         }
         if k >= steps(3.0) {
-            forces.push(rig.t[1]);
+            forces.push(fixture.t[1]);
         }
     }
-    let drift = (0..3).map(|c| (rig.position[c] - start[c]).powi(2)).sum::<f64>().sqrt();
+    let drift = (0..3).map(|c| (fixture.position[c] - start[c]).powi(2)).sum::<f64>().sqrt();
     let mean = forces.iter().sum::<f64>() / forces.len() as f64;
     let variance = forces.iter().map(|f| (f - mean).powi(2)).sum::<f64>() / forces.len() as f64;
     Held { drift, chatter: variance.sqrt() / LOAD, tension }

@@ -1,6 +1,6 @@
 //! A single-wheel test bench: a rigid wheel with prescribed slip, free to sink under its load, on level soil.
 
-use super::rig::Shown;
+use super::fixture::Shown;
 use std::borrow::BorrowMut;
 use terraglue_ground::{Placed, nodes_below};
 use terraglue_subsystem::{

@@ -1,7 +1,7 @@
 //! Wheels: the soils against the integral of Wong and Reece over the same stresses, and against its shifted peak.
 
 use super::plates::Maker;
-use super::rows::{Row, STIFF, eight};
+use super::rows::{STIFF, SoilRow, eight};
 use super::wheel_rig::{Bench, Reading};
 use super::wong_reece::{wheel_of, wheel_on};
 use super::{MODULES, STILL, real_wheel};
@@ -22,10 +22,10 @@ const MEASURED: f64 = 0.06;
 const SHIFTED: [f64; 2] = [0.4, 0.15];
 
 /// One wheel on one soil at one slip.
-struct Case {
+struct WheelCase {
     name: &'static str,
     make: Maker,
-    soil: Row,
+    soil: SoilRow,
     wheel: [f64; 3],
     slip: f64,
     peak: [f64; 2],
@@ -34,13 +34,13 @@ struct Case {
     still: bool,
 }
 
-impl fmt::Display for Case {
+impl fmt::Display for WheelCase {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{}, {}, slip {}", self.name, self.soil.name, self.slip)
     }
 }
 
-impl Case {
+impl WheelCase {
     fn expected(&self) -> Rolling {
         let [radius, width, load] = self.wheel;
         let wheel = wheel_on(&self.soil, [radius, width], self.peak);
@@ -89,8 +89,8 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
 }
 
 /// The largest errors of sinkage and drawbar pull, and where they are.
-fn errors(id: &str, of: &str, cases: &[Case]) -> [Figure; 2] {
-    let errors = in_parallel(cases, Case::errors);
+fn errors(id: &str, of: &str, cases: &[WheelCase]) -> [Figure; 2] {
+    let errors = in_parallel(cases, WheelCase::errors);
     let figure = |k: usize, quantity: &str, unit: &str| {
         // a NaN is larger than any number here
         let worst = errors.iter().zip(cases).max_by(|(a, _), (b, _)| a[k].total_cmp(&b[k]));
@@ -105,7 +105,7 @@ fn errors(id: &str, of: &str, cases: &[Case]) -> [Figure; 2] {
 }
 
 /// The lines of the reference table; quickly two of them.
-fn cases(context: &Context, make: Maker, peak: [f64; 2], still: bool) -> Outcome<Vec<Case>> {
+fn cases(context: &Context, make: Maker, peak: [f64; 2], still: bool) -> Outcome<Vec<WheelCase>> {
     let rows = eight()?;
     let mut cases = Vec::new();
     for wheel in WHEELS {
@@ -116,7 +116,16 @@ fn cases(context: &Context, make: Maker, peak: [f64; 2], still: bool) -> Outcome
                 if !context.quick || shown && (slip == 0.2 || slip == 0.6) {
                     let spacing = SPACINGS[usize::from(!context.quick)];
                     let (name, wheel) = (wheel, wheel_of(wheel).ok_or("no such wheel")?);
-                    cases.push(Case { name, make, soil: soil.clone(), wheel, slip, peak, spacing, still });
+                    cases.push(WheelCase {
+                        name,
+                        make,
+                        soil: soil.clone(),
+                        wheel,
+                        slip,
+                        peak,
+                        spacing,
+                        still,
+                    });
                 }
             }
         }

@@ -1,6 +1,6 @@
 //! The integral of the stresses below a rim (`terraglue::soil_fit::Rim`) on the soils of the figures, and against a table.
 
-use super::rows::{Row, eight};
+use super::rows::{SoilRow, eight};
 use crate::process::{Outcome, read, root};
 use crate::{Context, Figure, Limit};
 use terraglue::soil_fit::Rim;
@@ -19,7 +19,7 @@ pub fn wheel_of(name: &str) -> Option<[f64; 3]> {
 }
 
 /// The wheel on a soil of the table with the peak `[a0, a1]`.
-pub fn wheel_on(soil: &Row, [radius, width]: [f64; 2], peak: [f64; 2]) -> Rim {
+pub fn wheel_on(soil: &SoilRow, [radius, width]: [f64; 2], peak: [f64; 2]) -> Rim {
     Rim {
         radius,
         width,
@@ -47,7 +47,7 @@ pub fn figures(_: &Context) -> Outcome<Vec<Figure>> {
     Ok(vec![Figure::new("soil.wong_reece.different_lines", f64::from(different), Limit::Equal(0.0), what)])
 }
 
-fn is_met(rows: &[Row], line: &str) -> Option<bool> {
+fn is_met(rows: &[SoilRow], line: &str) -> Option<bool> {
     let cells: Vec<&str> = line.split(',').collect();
     let number = |k: usize| cells.get(k)?.parse::<f64>().ok();
     let [radius, width, load] = wheel_of(cells[0])?;

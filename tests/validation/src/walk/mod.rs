@@ -59,7 +59,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     Ok(all)
 }
 
-/// Drift of the book of energies, % of the work of the motors.
+/// Drift of the energy ledger, % of the work of the motors.
 fn drift(s: &Value) -> f64 {
     let number = |key: &str| s[key].as_f64().unwrap_or(f64::NAN);
     100.0 * number("energy_balance_j").abs() / number("energy_j")
@@ -117,7 +117,7 @@ fn rows(context: &Context) -> Outcome<Vec<Figure>> {
             }
         }
         let what = format!(
-            "largest drift of the book of energies in 3 s of moon_walk, % of the work of the motors, {} soils; {at}; too weak for the \
+            "largest drift of the energy ledger in 3 s of moon_walk, % of the work of the motors, {} soils; {at}; too weak for the \
              robot, as the run says: {}",
             of_soil().count(),
             if weak.is_empty() { "none".to_owned() } else { weak.join(", ") }
@@ -149,7 +149,7 @@ fn quality(id: &str, s: &Value) -> Vec<Figure> {
             "drift",
             drift(s),
             Limit::AtMost(1.0),
-            "drift of the book of energies, % of the work of the motors",
+            "drift of the energy ledger, % of the work of the motors",
         ),
         figure("roll", degrees("max_roll_rad"), Limit::AtMost(15.0), "largest roll, degrees"),
         figure("pitch", degrees("max_pitch_rad"), Limit::AtMost(15.0), "largest pitch, degrees"),

@@ -1,6 +1,6 @@
 //! Actuators: how the joints of the file are driven.
 
-use super::Reader;
+use super::MjcfReader;
 use super::defaults::Element;
 use crate::error::Error;
 use crate::model::{Drive, DriveKind};
@@ -16,7 +16,7 @@ struct Law {
     gain: f64,
 }
 
-impl Reader<'_, '_> {
+impl MjcfReader<'_, '_> {
     /// Reads a `<position>`, `<velocity>`, `<motor>` or a `<general>` that is one of them, which acts on a joint.
     pub(super) fn actuator(&mut self, node: Node) -> Result<(), Error> {
         let d = self.d;

@@ -1,6 +1,6 @@
 //! Attributes of an element: its own, else those of its default class.
 
-use super::include::Whole;
+use super::include::MergedFile;
 use crate::error::Error;
 use nalgebra::{Isometry3, Matrix3, Rotation3, Translation3, Unit, UnitQuaternion, Vector3};
 use roxmltree::Node;
@@ -11,7 +11,7 @@ type Class = BTreeMap<(String, String), String>;
 
 /// The default classes of a file and how it writes angles.
 pub(crate) struct Defaults<'a> {
-    whole: &'a Whole,
+    whole: &'a MergedFile,
     classes: BTreeMap<String, Class>,
     /// rad per unit of angle.
     pub angle: f64,
@@ -42,7 +42,7 @@ impl<'a, 'i> Element<'a, 'i> {
 }
 
 impl<'a> Defaults<'a> {
-    pub fn new(whole: &'a Whole, root: Node) -> Result<Self, Error> {
+    pub fn new(whole: &'a MergedFile, root: Node) -> Result<Self, Error> {
         // of several the last one counts
         let compilers = || root.children().filter(|n| n.has_tag_name("compiler"));
         let text = |name: &str| compilers().filter_map(|c| c.attribute(name).map(str::to_owned)).next_back();

@@ -1,6 +1,6 @@
 //! Equality: what is held together beyond the tree.
 
-use super::Reader;
+use super::MjcfReader;
 use crate::error::Error;
 use crate::model::{Coupling, JointKind, Loop};
 use nalgebra::{Isometry3, Point3, Quaternion, Translation3, UnitQuaternion};
@@ -9,7 +9,7 @@ use roxmltree::Node;
 /// A weld may start open by this, m or rad.
 const OPEN: f64 = 1e-6;
 
-impl Reader<'_, '_> {
+impl MjcfReader<'_, '_> {
     /// Reads `<connect>`, `<weld>` and `<joint>`; others are named in a warning.
     pub(super) fn equality(&mut self, node: Node) -> Result<(), Error> {
         let e = self.d.element(node, None);

@@ -1,6 +1,6 @@
 //! Joints: how a body hangs from the one above it.
 
-use super::Reader;
+use super::MjcfReader;
 use super::defaults::Element;
 use crate::error::Error;
 use crate::model::{AxisData, Joint, JointKind};
@@ -13,7 +13,7 @@ fn is_at_the_top(joint: Node) -> bool {
     around.is_some_and(|n| n.has_tag_name("worldbody"))
 }
 
-impl Reader<'_, '_> {
+impl MjcfReader<'_, '_> {
     /// Hangs a body on its parent; `frame`: its pose there or in the world.
     pub(super) fn hang(
         &mut self,

@@ -1,6 +1,6 @@
 //! Attributes that are neither read nor without effect: each is named, none is dropped silently.
 
-use super::Reader;
+use super::MjcfReader;
 use roxmltree::Node;
 use std::collections::BTreeMap;
 
@@ -177,7 +177,7 @@ impl Ignored {
     }
 }
 
-impl Reader<'_, '_> {
+impl MjcfReader<'_, '_> {
     /// Notes what an element says in vain, itself or by its default class.
     pub(super) fn warn_ignored(&mut self, node: Node, class: Option<&str>) {
         let tag = node.tag_name().name();

@@ -6,7 +6,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 /// A file with all that it includes.
-pub(super) struct Whole {
+pub(super) struct MergedFile {
     /// One text.
     pub text: String,
     pieces: Vec<Piece>,
@@ -21,7 +21,7 @@ struct Piece {
     line: usize,
 }
 
-impl Whole {
+impl MergedFile {
     /// Puts the files in place of their elements; they are named from the folder of the first one.
     pub fn read(file: &str, text: &str) -> Result<Self, Error> {
         let mut whole = Self { text: String::with_capacity(text.len()), pieces: Vec::new() };

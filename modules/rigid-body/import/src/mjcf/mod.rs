@@ -25,7 +25,7 @@ use assets::Assets;
 use defaults::Defaults;
 use geom::{Around, Geom, compound, geom};
 use ignored::Ignored;
-use include::Whole;
+use include::MergedFile;
 use nalgebra::{Isometry3, Matrix3};
 use roxmltree::{Document, Node};
 use std::collections::BTreeMap;
@@ -37,7 +37,7 @@ const SEEN_ONLY: [&str; 9] =
 
 /// Reads the text of a file; `file` appears in messages and tells the folder of meshes.
 pub fn read_mjcf_text(file: &str, text: &str, options: &Options) -> Result<Robot, Error> {
-    let whole = Whole::read(file, text)?;
+    let whole = MergedFile::read(file, text)?;
     let source = Source { file, text: &whole.text };
     crate::syntax::check_depth(&source)?;
     let document = Document::parse(&whole.text);
@@ -47,8 +47,13 @@ pub fn read_mjcf_text(file: &str, text: &str, options: &Options) -> Result<Robot
     survey(&defaults, root)?;
     let assets = Assets::read(&defaults, root, &options.folders(file))?;
     let robot = empty(root.attribute("model").unwrap_or("robot"));
-    let mut reader =
-        Reader { d: &defaults, robot, assets: &assets, frames: BTreeMap::new(), ignored: Ignored::default() };
+    let mut reader = MjcfReader {
+        d: &defaults,
+        robot,
+        assets: &assets,
+        frames: BTreeMap::new(),
+        ignored: Ignored::default(),
+    };
     reader.sections(root)?;
     let mut robot = reader.robot;
     robot.warnings.extend(reader.ignored.warnings());
@@ -100,7 +105,7 @@ fn empty(name: &str) -> Robot {
 
 /// Where an element of the tree is.
 #[derive(Clone, Copy)]
-struct Place<'a> {
+struct ElementPlace<'a> {
     /// Body that it belongs to; none: the world.
     body: Option<usize>,
     /// Its frame in that of the body, or in the world.
@@ -109,7 +114,7 @@ struct Place<'a> {
     class: Option<&'a str>,
 }
 
-struct Reader<'d, 's> {
+struct MjcfReader<'d, 's> {
     d: &'d Defaults<'s>,
     robot: Robot,
     assets: &'d Assets,
@@ -118,7 +123,7 @@ struct Reader<'d, 's> {
     ignored: Ignored,
 }
 
-impl<'d, 's> Reader<'d, 's> {
+impl<'d, 's> MjcfReader<'d, 's> {
     fn sections(&mut self, root: Node) -> Result<(), Error> {
         if !root.has_tag_name("mujoco") {
             return Err(self.d.wrong(&self.d.element(root, None), "the root of MJCF is <mujoco>".into()));
@@ -130,8 +135,11 @@ impl<'d, 's> Reader<'d, 's> {
                 .filter(Node::is_element)
         };
         for node in root.children().filter(|n| n.has_tag_name("worldbody")) {
-            let world =
-                Place { body: None, frame: Isometry3::identity(), class: node.attribute("childclass") };
+            let world = ElementPlace {
+                body: None,
+                frame: Isometry3::identity(),
+                class: node.attribute("childclass"),
+            };
             self.contents(node, world, "world")?;
         }
         for node in section("contact") {
@@ -174,7 +182,12 @@ impl<'d, 's> Reader<'d, 's> {
     }
 
     /// Geoms and bodies of a body or the world, which are at `place`.
-    fn contents<'a>(&mut self, node: Node<'a, '_>, place: Place<'a>, owner: &str) -> Result<(), Error> {
+    fn contents<'a>(
+        &mut self,
+        node: Node<'a, '_>,
+        place: ElementPlace<'a>,
+        owner: &str,
+    ) -> Result<(), Error> {
         for child in node.children().filter(Node::is_element) {
             match child.tag_name().name() {
                 "geom" => self.shape(child, place, owner)?,
@@ -188,7 +201,7 @@ impl<'d, 's> Reader<'d, 's> {
         Ok(())
     }
 
-    fn shape<'a>(&mut self, node: Node<'a, '_>, place: Place<'a>, owner: &str) -> Result<(), Error> {
+    fn shape<'a>(&mut self, node: Node<'a, '_>, place: ElementPlace<'a>, owner: &str) -> Result<(), Error> {
         self.warn_ignored(node, place.class);
         let e = self.d.element(node, place.class);
         if let Some(condim @ ("4" | "6")) = self.d.text(&e, "condim") {
@@ -221,7 +234,7 @@ impl<'d, 's> Reader<'d, 's> {
         Ok(())
     }
 
-    fn body<'a>(&mut self, node: Node<'a, '_>, above: Place<'a>) -> Result<(), Error> {
+    fn body<'a>(&mut self, node: Node<'a, '_>, above: ElementPlace<'a>) -> Result<(), Error> {
         let class = node.attribute("childclass").or(above.class);
         let e = self.d.element(node, None);
         self.warn_ignored(node, class);
@@ -233,9 +246,9 @@ impl<'d, 's> Reader<'d, 's> {
         let inertial = self.inertial(node, class, &name)?;
         let place = match (joints.first(), inertial) {
             // It moves with what is above it and weighs nothing.
-            (None, None) => Place { frame, class, ..above },
+            (None, None) => ElementPlace { frame, class, ..above },
             // Of the world.
-            (None, Some(_)) if above.body.is_none() => Place { frame, class, ..above },
+            (None, Some(_)) if above.body.is_none() => ElementPlace { frame, class, ..above },
             (_, None) => {
                 let problem = "moves but has no mass; give it an <inertial> or a geom with mass";
                 return Err(self.d.wrong(&e, problem.into()));
@@ -245,9 +258,9 @@ impl<'d, 's> Reader<'d, 's> {
                 in_range(inertial.mass, &inertial.tensor)
                     .and_then(|()| flaw(&inertial.tensor).map_or(Ok(()), Err))
                     .map_err(|problem| self.d.wrong(&e, problem))?;
-                let hangs = Place { class, ..above };
+                let hangs = ElementPlace { class, ..above };
                 let child = self.hang_by(&joints, hangs, (&name, frame), inertial)?;
-                Place { body: Some(child), frame: Isometry3::identity(), class }
+                ElementPlace { body: Some(child), frame: Isometry3::identity(), class }
             }
         };
         self.frames.insert(name.clone(), (place.body, place.frame));

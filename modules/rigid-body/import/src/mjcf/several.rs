@@ -4,7 +4,7 @@
 //! between them that carry a millionth of mass and inertia each, taken from the last one: the sum is that of the file, and
 //! where the joints stand at 0 so is every moment.
 
-use super::{Place, Reader};
+use super::{ElementPlace, MjcfReader};
 use crate::error::Error;
 use crate::inertia::Inertial;
 use crate::model::Body;
@@ -14,12 +14,12 @@ use roxmltree::Node;
 /// What a body between two joints carries of the whole.
 const SHARE: f64 = 1e-6;
 
-impl Reader<'_, '_> {
+impl MjcfReader<'_, '_> {
     /// Hangs `name` below `above` by its joints, none or more, and says which body it is.
     pub(super) fn hang_by<'a>(
         &mut self,
         joints: &[Node<'a, '_>],
-        above: Place<'a>,
+        above: ElementPlace<'a>,
         (name, frame): (&str, Isometry3<f64>),
         whole: Inertial,
     ) -> Result<usize, Error> {

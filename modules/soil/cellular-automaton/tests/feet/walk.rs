@@ -34,29 +34,29 @@ fn pose(k: usize, t: f64) -> Pose {
 }
 
 /// Walks with `feet` feet for `seconds`; `clock` (s) is read before and after every step. Seconds per step.
-pub fn walk(rig: &mut Feet, feet: usize, seconds: f64, clock: impl FnMut() -> f64) -> Vec<f64> {
-    walk_with(rig, feet, seconds, clock, |_| ())
+pub fn walk(fixture: &mut Feet, feet: usize, seconds: f64, clock: impl FnMut() -> f64) -> Vec<f64> {
+    walk_with(fixture, feet, seconds, clock, |_| ())
 }
 
 /// The same; `look` is called after every step.
 pub fn walk_with(
-    rig: &mut Feet,
+    fixture: &mut Feet,
     feet: usize,
     seconds: f64,
     mut clock: impl FnMut() -> f64,
     mut look: impl FnMut(&Feet),
 ) -> Vec<f64> {
     for k in 0..feet {
-        rig.add(&Geometry::Sphere { radius: RADIUS }, pose(k, 0.0));
+        fixture.add(&Geometry::Sphere { radius: RADIUS }, pose(k, 0.0));
     }
     let steps = (seconds / super::H).round() as u32;
     (1..=steps)
         .map(|step| {
             let t = f64::from(step) * super::H;
             let before = clock();
-            rig.step(|k| pose(k, t));
+            fixture.step(|k| pose(k, t));
             let spent = clock() - before;
-            look(rig);
+            look(fixture);
             spent
         })
         .collect()

@@ -113,27 +113,28 @@ const FOOT: Geometry = Geometry::Sphere { radius: 0.03 };
 
 /// A ball of 5 kg comes to rest: T1 = m·g, no drift, at a depth where the law carries it.
 pub fn ball_rests<M: Module>(config: &str, iterative: bool) {
-    let mut rig = Rig::new(soil::<M>(&stiff(config), 65, 0.01, flat), FOOT, 5.0, 0.031);
-    let step = |rig: &mut Rig| if iterative { rig.iterative_step() } else { rig.cooperative_step() };
+    let mut fixture = Fixture::new(soil::<M>(&stiff(config), 65, 0.01, flat), FOOT, 5.0, 0.031);
+    let step =
+        |fixture: &mut Fixture| if iterative { fixture.iterative_step() } else { fixture.cooperative_step() };
     // gravity grows slowly: released at once, the ball would sink twice as deep
     for k in 0..2000 {
-        rig.gravity = 9.81 * (f64::from(k) / 1500.0).min(1.0);
-        step(&mut rig);
+        fixture.gravity = 9.81 * (f64::from(k) / 1500.0).min(1.0);
+        step(&mut fixture);
     }
-    let (start, weight) = (rig.position, 5.0 * 9.81);
+    let (start, weight) = (fixture.position, 5.0 * 9.81);
     for _ in 0..1000 {
-        step(&mut rig);
-        assert!((rig.t[0] - weight).abs() < 1e-8 * weight, "T1 = {} at {}", rig.t[0], rig.index);
+        step(&mut fixture);
+        assert!((fixture.t[0] - weight).abs() < 1e-8 * weight, "T1 = {} at {}", fixture.t[0], fixture.index);
     }
-    let drift = (0..3).map(|k| (rig.position[k] - start[k]).abs()).fold(0.0, larger);
+    let drift = (0..3).map(|k| (fixture.position[k] - start[k]).abs()).fold(0.0, larger);
     assert!(drift <= 1e-9, "drift {drift}");
     // the depth is the law's own: it carries the weight there, hardly more, and nothing a millimetre higher
-    rig.set_ports();
-    let here = rig.under_motion(&[0.0; 3])[0];
-    let higher = rig.under_motion(&[1e-3, 0.0, 0.0])[0];
+    fixture.set_ports();
+    let here = fixture.under_motion(&[0.0; 3])[0];
+    let higher = fixture.under_motion(&[1e-3, 0.0, 0.0])[0];
     assert!(here >= weight * (1.0 - 1e-8) && here < 1.1 * weight && higher == 0.0, "{here} {higher}");
-    assert!((read(&*rig.soil, "max_sinkage") - rig.sunk()).abs() < 2e-4, "sunk {}", rig.sunk());
-    println!("sunk {:.3} mm, F {here:.2} N, evaluations {}", 1e3 * rig.sunk(), rig.evaluations);
+    assert!((read(&*fixture.soil, "max_sinkage") - fixture.sunk()).abs() < 2e-4, "sunk {}", fixture.sunk());
+    println!("sunk {:.3} mm, F {here:.2} N, evaluations {}", 1e3 * fixture.sunk(), fixture.evaluations);
 }
 
 /// Soil that clings holds a disc back with adhesion times area, once; without a contact before it never pulls. Where material
@@ -143,41 +144,45 @@ pub fn adhesion_holds_until_it_lets_go<M: Module>(stays: bool) {
     let area = std::f64::consts::PI * radius * radius;
     let config = stiff(LUNAR).replacen('{', &format!("{{\"adhesion_pa\":{adhesion},"), 1);
     let geometry = Geometry::Cylinder { half_length: 0.1, radius };
-    let mut rig = Rig::new(soil::<M>(&config, 65, 0.01, flat), geometry, 1.0, 0.1);
-    rig.position[0] = 0.0031;
+    let mut fixture = Fixture::new(soil::<M>(&config, 65, 0.01, flat), geometry, 1.0, 0.1);
+    fixture.position[0] = 0.0031;
     let still = [0.0; 6];
     let up = |by: f64| [by, 0.0, 0.0, 0.0, 0.0, 0.0];
     let (mut work, mut turned) = (0.0, 0.0);
     for cycle in 0..if stays { 3 } else { 1 } {
         let mut least = 0.0_f64;
-        let mut lift = |rig: &mut Rig, by: f64, steps: u32, least: &mut f64| {
+        let mut lift = |fixture: &mut Fixture, by: f64, steps: u32, least: &mut f64| {
             for _ in 0..steps {
-                rig.set_ports();
-                let before = rig.under_motion(&still)[0];
-                let after = rig.prescribed_step(&up(by))[0];
+                fixture.set_ports();
+                let before = fixture.under_motion(&still)[0];
+                let after = fixture.prescribed_step(&up(by))[0];
                 *least = least.min(after);
                 work -= 0.5 * by * (before + after);
                 turned += (by * after).abs();
             }
         };
-        rig.set_ports();
-        assert_eq!(rig.ports[0].law.t_min, 0.0, "nothing clings before the touch");
+        fixture.set_ports();
+        assert_eq!(fixture.ports[0].law.t_min, 0.0, "nothing clings before the touch");
         // down by a centimetre from a little above, then up by less than 4e8 Pa/m give per 800 Pa
-        lift(&mut rig, -1e-4, if cycle == 0 { 100 } else { 110 }, &mut least);
+        lift(&mut fixture, -1e-4, if cycle == 0 { 100 } else { 110 }, &mut least);
         assert!(least >= 0.0, "it pulled on the way down: {least} N");
-        rig.set_ports();
-        assert!((rig.ports[0].law.t_min / (-adhesion * area) - 1.0).abs() < 1e-3, "{:?}", rig.ports[0].law);
+        fixture.set_ports();
+        assert!(
+            (fixture.ports[0].law.t_min / (-adhesion * area) - 1.0).abs() < 1e-3,
+            "{:?}",
+            fixture.ports[0].law
+        );
         // the inverse of the law where it pulls
-        let (x, t) = rig.under_force(&[-0.5 * adhesion * area, 0.0, 0.0, 0.0, 0.0, 0.0], &still);
-        assert!((rig.under_motion(&x)[0] / t[0] - 1.0).abs() < 1e-6 && t[0] < 0.0, "{x:?} {t:?}");
-        lift(&mut rig, 1e-7, 700, &mut least);
+        let (x, t) = fixture.under_force(&[-0.5 * adhesion * area, 0.0, 0.0, 0.0, 0.0, 0.0], &still);
+        assert!((fixture.under_motion(&x)[0] / t[0] - 1.0).abs() < 1e-6 && t[0] < 0.0, "{x:?} {t:?}");
+        lift(&mut fixture, 1e-7, 700, &mut least);
         assert!(
             (least / (-adhesion * area) - 1.0).abs() < 0.06,
             "cycle {cycle}: {least} N of {}",
             adhesion * area
         );
         let mut gone = 0.0;
-        lift(&mut rig, 1e-4, 10, &mut gone);
+        lift(&mut fixture, 1e-4, 10, &mut gone);
         assert_eq!(gone, 0.0, "cycle {cycle}");
     }
     assert!(work > -1e-6 * turned, "the soil gave out {:e} J of {turned:e} J", -work);
@@ -197,10 +202,10 @@ pub fn regions_have_their_laws<M: Module>() {
     let (moon, lete) = ([1.0, 1400.0, 820e3], [0.793, 102e3, 5301e3]);
     for (x, share) in [(-0.15, 1.0), (0.15, 0.0), (-0.005, 0.5), (-0.015, 2.0 / 3.0)] {
         let geometry = Geometry::Box { half_extents: [0.03, 0.05, 0.1] };
-        let mut rig = Rig::new(soil::<M>(&stiff(&two_soils()), 65, 0.01, flat), geometry, 1.0, 0.1);
-        rig.position[0] = x;
+        let mut fixture = Fixture::new(soil::<M>(&stiff(&two_soils()), 65, 0.01, flat), geometry, 1.0, 0.1);
+        fixture.position[0] = x;
         for k in 1..=200 {
-            let force = rig.prescribed_step(&[-1e-4, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
+            let force = fixture.prescribed_step(&[-1e-4, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
             let z = 1e-4 * f64::from(k);
             let expected = area * (share * law(moon, z) + (1.0 - share) * law(lete, z));
             assert!(
@@ -215,11 +220,11 @@ pub fn regions_have_their_laws<M: Module>() {
             * (share * strength(170.0, 0.610865238198, moon)
                 + (1.0 - share) * strength(1300.0, 0.542797397, lete));
         let mut x = [0.0, 0.3, 0.0, 0.0, 0.0, 0.0];
-        rig.set_ports();
-        let dragged = -rig.under_motion(&x)[1];
+        fixture.set_ports();
+        let dragged = -fixture.under_motion(&x)[1];
         assert!((dragged / limit - 1.0).abs() < 1e-3, "{dragged} N, {limit} N");
         x[1] = -0.3;
-        assert!((rig.under_motion(&x)[1] / limit - 1.0).abs() < 1e-3);
+        assert!((fixture.under_motion(&x)[1] / limit - 1.0).abs() < 1e-3);
     }
 }
 
@@ -234,10 +239,10 @@ pub fn plates_follow_bekker<M: Module>(config: &str, [n, k_c, k_phi]: [f64; 3], 
         ),
         (Geometry::Box { half_extents: [0.03, 0.05, 0.1] }, size(0.06 * 0.1), 0.06 * 0.1),
     ] {
-        let mut rig = Rig::new(soil::<M>(&stiff(config), 65, 0.01, flat), geometry, 1.0, 0.1);
-        rig.position[0] = 0.0031;
+        let mut fixture = Fixture::new(soil::<M>(&stiff(config), 65, 0.01, flat), geometry, 1.0, 0.1);
+        fixture.position[0] = 0.0031;
         for k in 1..=500 {
-            let force = rig.prescribed_step(&[-1e-4, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
+            let force = fixture.prescribed_step(&[-1e-4, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
             let z = 1e-4 * f64::from(k);
             if k >= 50 {
                 let expected = (k_c / b + k_phi) * z.powf(n) * area;
@@ -245,13 +250,13 @@ pub fn plates_follow_bekker<M: Module>(config: &str, [n, k_c, k_phi]: [f64; 3], 
             }
         }
         // unloading is elastic: 4e8 Pa/m, then nothing
-        rig.set_ports();
-        let (top, back) = (rig.under_motion(&[0.0; 6])[0], 1e-6);
-        let less = rig.prescribed_step(&[back, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
+        fixture.set_ports();
+        let (top, back) = (fixture.under_motion(&[0.0; 6])[0], 1e-6);
+        let less = fixture.prescribed_step(&[back, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
         assert!((less - (top - 4e8 * area * back)).abs() < 1e-6 * top, "{top} {less}");
-        assert_eq!(rig.prescribed_step(&[0.002, 0.0, 0.0, 0.0, 0.0, 0.0])[0], 0.0);
+        assert_eq!(fixture.prescribed_step(&[0.002, 0.0, 0.0, 0.0, 0.0, 0.0])[0], 0.0);
         // reloading comes back to the same force at the same depth, to what a node remembers without a foot
-        let again = rig.prescribed_step(&[-0.002 - back, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
+        let again = fixture.prescribed_step(&[-0.002 - back, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
         assert!(!stays || (again / top - 1.0).abs() < 1e-6, "{again} {top}");
     }
 }
@@ -260,45 +265,45 @@ pub fn plates_follow_bekker<M: Module>(config: &str, [n, k_c, k_phi]: [f64; 3], 
 pub fn disc_sticks<M: Module>(share: f64) {
     let geometry = Geometry::Cylinder { half_length: 0.02, radius: 0.05 };
     let mass = 50.0 / 9.81;
-    let mut rig = Rig::new(soil::<M>(&stiff(LUNAR), 65, 0.01, flat), geometry, mass, 0.02);
+    let mut fixture = Fixture::new(soil::<M>(&stiff(LUNAR), 65, 0.01, flat), geometry, mass, 0.02);
     let limit = 170.0 * std::f64::consts::PI * 0.0025 + 50.0 * 0.610865238198f64.tan();
     for k in 0..1000 {
-        rig.gravity = 9.81 * (f64::from(k) / 500.0).min(1.0);
-        rig.iterative_step();
+        fixture.gravity = 9.81 * (f64::from(k) / 500.0).min(1.0);
+        fixture.iterative_step();
     }
     for k in 0..1500 {
-        rig.force[0] = share * limit * (f64::from(k) / 500.0).min(1.0);
-        rig.iterative_step();
+        fixture.force[0] = share * limit * (f64::from(k) / 500.0).min(1.0);
+        fixture.iterative_step();
     }
-    let start = rig.position;
+    let start = fixture.position;
     for _ in 0..1000 {
-        rig.iterative_step();
+        fixture.iterative_step();
     }
-    let drift = (rig.position[0] - start[0]).hypot(rig.position[1] - start[1]);
+    let drift = (fixture.position[0] - start[0]).hypot(fixture.position[1] - start[1]);
     assert!(drift < 1e-9, "drift {drift} at {share}");
-    assert!((rig.t[1] + share * limit).abs() < 1e-6 * limit, "{} {}", rig.t[1], share * limit);
+    assert!((fixture.t[1] + share * limit).abs() < 1e-6 * limit, "{} {}", fixture.t[1], share * limit);
     // pushed beyond the limit it slides, and dissipates
-    let before = rig.soil.energy().dissipated;
-    rig.force[0] = 1.2 * limit;
+    let before = fixture.soil.energy().dissipated;
+    fixture.force[0] = 1.2 * limit;
     for _ in 0..200 {
-        rig.iterative_step();
+        fixture.iterative_step();
     }
-    assert!(rig.position[0] - start[0] > 1e-3 && rig.soil.energy().dissipated > before + 0.01);
+    assert!(fixture.position[0] - start[0] > 1e-3 && fixture.soil.energy().dissipated > before + 0.01);
 }
 
 /// Shear of a plate at constant depth: Janosi and Hanamoto.
 pub fn plate_shears<M: Module>() {
     let geometry = Geometry::Box { half_extents: [0.05, 0.05, 0.1] };
-    let mut rig = Rig::new(soil::<M>(&stiff(LUNAR), 65, 0.01, flat), geometry, 1.0, 0.1);
+    let mut fixture = Fixture::new(soil::<M>(&stiff(LUNAR), 65, 0.01, flat), geometry, 1.0, 0.1);
     for _ in 0..100 {
-        rig.prescribed_step(&[-1e-4, 0.0, 0.0, 0.0, 0.0, 0.0]);
+        fixture.prescribed_step(&[-1e-4, 0.0, 0.0, 0.0, 0.0, 0.0]);
     }
     let (mut last, mut j) = (0.0, 0.0);
     for _ in 0..40 {
         // one trial, not committed: the plate's edge does not travel over fresh ground
         j += 1e-3;
-        rig.set_ports();
-        let t = rig.under_motion(&[0.0, j, 0.0, 0.0, 0.0, 0.0]);
+        fixture.set_ports();
+        let t = fixture.under_motion(&[0.0, j, 0.0, 0.0, 0.0, 0.0]);
         let strength = 170.0 * 0.01 + t[0] * 0.610865238198f64.tan();
         let expected = strength * (1.0 - (-j / 0.018f64).exp());
         assert!((-t[1] / expected - 1.0).abs() < 2e-3, "{j}: {} {expected}", t[1]);
@@ -310,52 +315,52 @@ pub fn plate_shears<M: Module>() {
 /// Derivatives after motion and after force against finite differences, for a tilted, sliding, turning box.
 pub fn derivatives_are_exact<M: Module>(config: &str) {
     let geometry = Geometry::Box { half_extents: [0.04, 0.03, 0.02] };
-    let mut rig = Rig::new(soil::<M>(config, 65, 0.01, hump), geometry, 1.0, 0.012);
-    rig.normal = [0.1, -0.05, (1.0f64 - 0.0125).sqrt()];
+    let mut fixture = Fixture::new(soil::<M>(config, 65, 0.01, hump), geometry, 1.0, 0.012);
+    fixture.normal = [0.1, -0.05, (1.0f64 - 0.0125).sqrt()];
     for _ in 0..20 {
-        rig.prescribed_step(&[-1e-4, 2e-5, 1e-5, 0.0, 0.0, 0.0]);
+        fixture.prescribed_step(&[-1e-4, 2e-5, 1e-5, 0.0, 0.0, 0.0]);
     }
-    rig.set_ports();
+    fixture.set_ports();
     let x = [-3e-4, 4e-4, -2e-4, 0.002, -0.001, 0.0015];
     let n = x.len();
-    rig.under_motion(&x);
-    let k = rig.jacobian();
+    fixture.under_motion(&x);
+    let k = fixture.jacobian();
     let d = 1e-8;
     for c in 0..n {
-        let at = |rig: &mut Rig, s: f64| {
+        let at = |fixture: &mut Fixture, s: f64| {
             let mut y = x;
             y[c] += s;
-            rig.under_motion(&y)
+            fixture.under_motion(&y)
         };
-        let (plus, minus) = (at(&mut rig, d), at(&mut rig, -d));
+        let (plus, minus) = (at(&mut fixture, d), at(&mut fixture, -d));
         for r in 0..n {
             let numeric = -(plus[r] - minus[r]) / (2.0 * d);
             let scale = (k[r * n + r].abs() * k[c * n + c].abs()).sqrt();
             assert!((numeric - k[c * n + r]).abs() < 1e-4 * scale, "K[{r},{c}] {} {numeric}", k[c * n + r]);
         }
     }
-    hybrid_derivatives_are_exact(&mut rig, &x);
+    hybrid_derivatives_are_exact(&mut fixture, &x);
 }
 
-fn hybrid_derivatives_are_exact(rig: &mut Rig, x: &[f64; 6]) {
+fn hybrid_derivatives_are_exact(fixture: &mut Fixture, x: &[f64; 6]) {
     let n = x.len();
-    let force = rig.under_motion(x);
-    let (surface, wrench) = rig.under_force(&force, x);
+    let force = fixture.under_motion(x);
+    let (surface, wrench) = fixture.under_force(&force, x);
     assert!((surface[0] - x[0]).abs() < 1e-12, "{} {}", surface[0], x[0]);
     assert!((0..n).all(|c| (wrench[c] - force[c]).abs() < 1e-6 * force[0]));
-    let block = rig.jacobian();
+    let block = fixture.jacobian();
     for c in 0..n {
         let d = if c == 0 { 1e-3 } else { 1e-8 };
-        let at = |rig: &mut Rig, s: f64| {
+        let at = |fixture: &mut Fixture, s: f64| {
             let (mut t, mut y) = (force.clone(), *x);
             if c == 0 {
                 t[0] -= s
             } else {
                 y[c] += s
             }
-            rig.under_force(&t, &y)
+            fixture.under_force(&t, &y)
         };
-        let ((xp, tp), (xm, tm)) = (at(rig, d), at(rig, -d));
+        let ((xp, tp), (xm, tm)) = (at(fixture, d), at(fixture, -d));
         for r in 0..n {
             let numeric = if r == 0 { (xp[0] - xm[0]) / (2.0 * d) } else { -(tp[r] - tm[r]) / (2.0 * d) };
             let exact = block[c * n + r];
@@ -372,62 +377,65 @@ fn hump(x: f64, y: f64) -> f64 {
 
 /// The inverse of the normal law is exact, and without force the surface is where the foot leaves the soil.
 pub fn normal_inverse_is_exact<M: Module>(config: &str) {
-    let mut rig = Rig::new(soil::<M>(config, 65, 0.01, flat), FOOT, 5.0, 0.03);
+    let mut fixture = Fixture::new(soil::<M>(config, 65, 0.01, flat), FOOT, 5.0, 0.03);
     for _ in 0..50 {
-        rig.prescribed_step(&[-1e-4, 0.0, 0.0]);
+        fixture.prescribed_step(&[-1e-4, 0.0, 0.0]);
     }
-    rig.set_ports();
+    fixture.set_ports();
     for force in [1e-6, 1e-3, 0.1, 1.0, 5.0, 20.0, 200.0, 3000.0] {
-        let (x, _) = rig.under_force(&[force, 0.0, 0.0], &[0.0; 3]);
-        let back = rig.under_motion(&x)[0];
+        let (x, _) = fixture.under_force(&[force, 0.0, 0.0], &[0.0; 3]);
+        let back = fixture.under_motion(&x)[0];
         assert!((back - force).abs() <= 1e-12 * force + 1e-9, "{force}: {back}");
     }
-    let (free, _) = rig.under_force(&[0.0; 3], &[0.0; 3]);
-    assert_eq!(rig.under_motion(&[free[0] + 1e-12, 0.0, 0.0])[0], 0.0);
-    assert!(rig.under_motion(&[free[0] - 1e-9, 0.0, 0.0])[0] > 0.0);
+    let (free, _) = fixture.under_force(&[0.0; 3], &[0.0; 3]);
+    assert_eq!(fixture.under_motion(&[free[0] + 1e-12, 0.0, 0.0])[0], 0.0);
+    assert!(fixture.under_motion(&[free[0] - 1e-9, 0.0, 0.0])[0] > 0.0);
 }
 
 /// Above the ground the answer is the gap along n, and no force.
 pub fn gap_is_reported<M: Module>() {
-    let mut rig = Rig::new(soil::<M>(LUNAR, 65, 0.01, flat), FOOT, 5.0, 0.0345);
-    let (x, t) = rig.set_ports();
+    let mut fixture = Fixture::new(soil::<M>(LUNAR, 65, 0.01, flat), FOOT, 5.0, 0.0345);
+    let (x, t) = fixture.set_ports();
     assert!((x[0] + 0.0045).abs() < 1e-15 && t.iter().all(|t| *t == 0.0), "{x:?} {t:?}");
-    assert!((rig.ports[0].law.mu - 0.610865238198f64.tan()).abs() < 1e-15);
+    assert!((fixture.ports[0].law.mu - 0.610865238198f64.tan()).abs() < 1e-15);
 }
 
 /// Saved in the middle, restored after something else happened: the same bytes again.
 pub fn states_are_exact<M: Module>() {
-    let mut rig = Rig::new(soil::<M>(LUNAR, 65, 0.01, flat), FOOT, 5.0, 0.031);
-    let run = |rig: &mut Rig, steps: u32| {
+    let mut fixture = Fixture::new(soil::<M>(LUNAR, 65, 0.01, flat), FOOT, 5.0, 0.031);
+    let run = |fixture: &mut Fixture, steps: u32| {
         (0..steps)
             .map(|_| {
-                rig.force[0] = 3.0;
-                rig.cooperative_step();
-                (rig.position.map(f64::to_bits), rig.t.iter().map(|t| t.to_bits()).collect::<Vec<_>>())
+                fixture.force[0] = 3.0;
+                fixture.cooperative_step();
+                (
+                    fixture.position.map(f64::to_bits),
+                    fixture.t.iter().map(|t| t.to_bits()).collect::<Vec<_>>(),
+                )
             })
             .collect::<Vec<_>>()
     };
-    run(&mut rig, 120);
-    rig.soil.save_state(1).unwrap();
-    let body = (rig.position, rig.velocity, rig.time, rig.index);
-    let first = run(&mut rig, 200);
-    let energy = rig.soil.energy();
-    run(&mut rig, 100);
-    rig.soil.restore_state(1).unwrap();
-    (rig.position, rig.velocity, rig.time, rig.index) = body;
-    assert!(run(&mut rig, 200) == first);
-    assert_eq!(rig.soil.energy(), energy);
-    assert!(rig.soil.restore_state(2).is_err() && rig.soil.save_state(99).is_err());
+    run(&mut fixture, 120);
+    fixture.soil.save_state(1).unwrap();
+    let body = (fixture.position, fixture.velocity, fixture.time, fixture.index);
+    let first = run(&mut fixture, 200);
+    let energy = fixture.soil.energy();
+    run(&mut fixture, 100);
+    fixture.soil.restore_state(1).unwrap();
+    (fixture.position, fixture.velocity, fixture.time, fixture.index) = body;
+    assert!(run(&mut fixture, 200) == first);
+    assert_eq!(fixture.soil.energy(), energy);
+    assert!(fixture.soil.restore_state(2).is_err() && fixture.soil.save_state(99).is_err());
 }
 
 /// What the foot puts in is stored or dissipated, but for what the soil still owes.
 pub fn energy_balances<M: Module>(config: &str) {
-    let mut rig = Rig::new(soil::<M>(config, 65, 0.01, flat), FOOT, 5.0, 0.03);
+    let mut fixture = Fixture::new(soil::<M>(config, 65, 0.01, flat), FOOT, 5.0, 0.03);
     for k in 0..1000 {
         let slide = if k > 500 { 1e-6 } else { 0.0 };
-        rig.prescribed_step(&[if k < 500 { -2e-5 } else { 0.0 }, slide, 0.0]);
+        fixture.prescribed_step(&[if k < 500 { -2e-5 } else { 0.0 }, slide, 0.0]);
     }
-    let e = rig.soil.energy();
+    let e = fixture.soil.energy();
     let stored = e.potential + e.dissipated;
     assert!((stored / e.port_work - 1.0).abs() < 1e-5, "{e:?}");
     assert!(e.potential > 0.0 && e.dissipated > 0.0);
@@ -494,7 +502,7 @@ pub fn cycles_yield_no_energy<M: Module>(stays: bool) {
                 "{said}"
             );
             let geometry = Geometry::Cylinder { half_length: 0.1, radius: 0.0537 };
-            forces.push(cycle(Rig::new(soil, geometry, 1.0, 0.1), stays));
+            forces.push(cycle(Fixture::new(soil, geometry, 1.0, 0.1), stays));
         }
         // text and module are the same law
         let [text, module] = [&forces[0], &forces[1]];
@@ -508,24 +516,24 @@ pub fn cycles_yield_no_energy<M: Module>(stays: bool) {
 }
 
 /// Forces at the deepest points of cycles between the surface and 2, 4 and 5 cm.
-fn cycle(mut rig: Rig, stays: bool) -> Vec<f64> {
+fn cycle(mut fixture: Fixture, stays: bool) -> Vec<f64> {
     let (still, step) = ([0.0; 6], 1e-4);
     let (mut work, mut turned, mut deepest) = (0.0, 0.0, Vec::new());
     for end in [200, 400, 500] {
         for (by, down) in [(-step, true), (step, false)] {
             for _ in 0..end {
-                rig.set_ports();
-                let before = rig.under_motion(&still)[0];
-                let after = rig.prescribed_step(&[by, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
+                fixture.set_ports();
+                let before = fixture.under_motion(&still)[0];
+                let after = fixture.prescribed_step(&[by, 0.0, 0.0, 0.0, 0.0, 0.0])[0];
                 assert!(after >= 0.0 && after.is_finite());
                 work -= 0.5 * by * (before + after);
                 turned += 0.5 * step * (before + after);
-                if down && rig.sunk() > step * (f64::from(end) - 0.5) {
+                if down && fixture.sunk() > step * (f64::from(end) - 0.5) {
                     deepest.push(after);
                 }
             }
         }
-        let energy = rig.soil.energy();
+        let energy = fixture.soil.energy();
         assert!(work > -1e-6 * turned, "cycle to {end}: the soil gave out {:e} J of {turned:e} J", -work);
         assert!(energy.dissipated >= 0.0 && energy.potential.abs() < 1e-9 * turned, "{energy:?}");
         assert!(!stays || (energy.dissipated - work).abs() < 0.02 * turned, "{work:e} J in, {energy:?}");

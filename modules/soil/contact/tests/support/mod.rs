@@ -147,7 +147,7 @@ pub fn read(soil: &dyn Subsystem, name: &str) -> f64 {
 }
 
 /// A point mass without rotation, its foot on the soil.
-pub struct Rig {
+pub struct Fixture {
     pub soil: Box<dyn Subsystem>,
     pub geometry: Geometry,
     pub mass: f64,
@@ -168,7 +168,7 @@ pub struct Rig {
     pub evaluations: u32,
 }
 
-impl Rig {
+impl Fixture {
     pub fn new(soil: Box<dyn Subsystem>, geometry: Geometry, mass: f64, height: f64) -> Self {
         Self {
             soil,

@@ -1,7 +1,7 @@
 /* What a master in C without any service costs: usage
-   LIBRARY UNITS pair|chain record|blind save|go [GUID RESOURCES].
-   Outputs of t become inputs, then every unit steps; each output is kept in memory where it is recorded.
-   Prints the least CPU time in µs per unit and step. */
+   LIBRARY FMUS pair|chain record|blind save|go [GUID RESOURCES].
+   Outputs of t become inputs, then every FMU steps; each output is kept in memory where it is recorded.
+   Prints the least CPU time in µs per FMU and step. */
 #include <dlfcn.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -32,13 +32,13 @@ int main(int argc, char **a) {
     int (*get)(void *, const unsigned *, size_t, double *) = dlsym(l, "fmi2GetReal");
     int (*set)(void *, const unsigned *, size_t, const double *) = dlsym(l, "fmi2SetReal");
     int (*keep)(void *, void **) = dlsym(l, "fmi2GetFMUstate");
-    int units = atoi(a[2]), pair = !strcmp(a[3], "pair"), record = !strcmp(a[4], "record"), save = !strcmp(a[5], "save");
-    int steps = 40000 / units, joined = pair ? units : units - 1;
-    void **u = calloc(units, sizeof *u), **state = calloc(units, sizeof *state);
-    double *y = calloc(units, sizeof *y), *rows = malloc(sizeof *rows * (units + 1) * (size_t)steps);
+    int fmus = atoi(a[2]), pair = !strcmp(a[3], "pair"), record = !strcmp(a[4], "record"), save = !strcmp(a[5], "save");
+    int steps = 40000 / fmus, joined = pair ? fmus : fmus - 1;
+    void **u = calloc(fmus, sizeof *u), **state = calloc(fmus, sizeof *state);
+    double *y = calloc(fmus, sizeof *y), *rows = malloc(sizeof *rows * (fmus + 1) * (size_t)steps);
     int (*setup)(void *, int, double, double, int, double) = dlsym(l, "fmi2SetupExperiment");
     int (*enter)(void *) = dlsym(l, "fmi2EnterInitializationMode"), (*leave)(void *) = dlsym(l, "fmi2ExitInitializationMode");
-    for (int k = 0; k < units; k++) {
+    for (int k = 0; k < fmus; k++) {
         if (!(u[k] = make("x", 1, guid, resources, &callbacks, 0, 0))) return 5;
         if (setup(u[k], 0, 0, 0, 0, 0) || enter(u[k]) || leave(u[k])) return 6;
     }
@@ -49,18 +49,18 @@ int main(int argc, char **a) {
         double start = now(), *row = rows;
         for (int i = 0; i < steps; i++) {
             for (int k = 0; k < joined; k++) if (get(u[k], &out, 1, &y[k])) return 4;
-            for (int k = 0; k < joined; k++) if (set(u[(k + 1) % units], &in, 1, &y[k])) return 4;
-            for (int k = 0; k < units; k++) {
+            for (int k = 0; k < joined; k++) if (set(u[(k + 1) % fmus], &in, 1, &y[k])) return 4;
+            for (int k = 0; k < fmus; k++) {
                 if (save && keep(u[k], &state[k])) return 4;
                 if (step(u[k], now_at * 1e-3, 1e-3, !save)) return 4;
             }
             now_at++;
             if (record) {
                 *row++ = now_at * 1e-3;
-                for (int k = 0; k < units; k++) if (get(u[k], &out, 1, row++)) return 4;
+                for (int k = 0; k < fmus; k++) if (get(u[k], &out, 1, row++)) return 4;
             }
         }
-        double took = (now() - start) / steps / units;
+        double took = (now() - start) / steps / fmus;
         if (took < best) best = took;
         sum += y[0];
     }

@@ -1,4 +1,4 @@
-//! What units cost: per communication step beside a bare loop in C and other masters, over two cores, and in isolation.
+//! What FMUs cost: per communication step beside a bare loop in C and other masters, over two cores, and in isolation.
 
 mod exchange;
 pub mod peers;
@@ -27,7 +27,7 @@ pub fn figures(folder: &Path, context: &Context) -> Outcome<Vec<Figure>> {
 const TURNS: u32 = 5;
 
 /// What a testbed costs over what another master costs, measured in turns; no line where that one cannot be measured.
-fn beside(folder: &Path, case: &steps::Case, peer: &str) -> Option<Figure> {
+fn beside(folder: &Path, case: &steps::FmuCase, peer: &str) -> Option<Figure> {
     let (mut ours, mut theirs) = (f64::INFINITY, f64::INFINITY);
     for _ in 0..TURNS {
         ours = ours.min(steps::blind(folder, case).ok()?);

@@ -1,7 +1,7 @@
-"""Steps units in another master and prints the CPU time per unit and step, µs.
+"""Steps FMUs in another master and prints the CPU time per FMU and step, µs.
 
-Usage: peers.py ecos|libcosim|fmpy|fmucontainer UNIT.fmu COUNT pair|chain BARE_LOOP
-Units have an input `u` and an output `y`; in a chain y of one is u of the next, in a pair both ways.
+Usage: peers.py ecos|libcosim|fmpy|fmucontainer FMU COUNT pair|chain BARE_LOOP
+FMUs have an input `u` and an output `y`; in a chain y of one is u of the next, in a pair both ways.
 """
 
 import json
@@ -49,9 +49,9 @@ def libcosim():
     from libcosimpy.CosimSlave import CosimLocalSlave
 
     execution = CosimExecution.from_step_size(int(H * 1e9))
-    units = [execution.add_local_slave(CosimLocalSlave(fmu_path=path, instance_name=f"u{k}")) for k in range(count)]
+    fmus = [execution.add_local_slave(CosimLocalSlave(fmu_path=path, instance_name=f"u{k}")) for k in range(count)]
     for a, b in links:
-        execution.connect_real_variables(units[a], 1, units[b], 0)
+        execution.connect_real_variables(fmus[a], 1, fmus[b], 0)
     return least(lambda: execution.step(steps))
 
 
@@ -60,24 +60,24 @@ def fmpy():
     from fmpy.fmi2 import FMU2Slave
 
     description, folder = read_model_description(path), extract(path)
-    units = []
+    fmus = []
     for k in range(count):
         name = description.coSimulation.modelIdentifier
-        unit = FMU2Slave(guid=description.guid, unzipDirectory=folder, modelIdentifier=name, instanceName=f"u{k}")
-        unit.instantiate()
-        unit.setupExperiment()
-        unit.enterInitializationMode()
-        unit.exitInitializationMode()
-        units.append(unit)
+        fmu = FMU2Slave(guid=description.guid, unzipDirectory=folder, modelIdentifier=name, instanceName=f"u{k}")
+        fmu.instantiate()
+        fmu.setupExperiment()
+        fmu.enterInitializationMode()
+        fmu.exitInitializationMode()
+        fmus.append(fmu)
     now = [0.0]
 
     def run():
         for _ in range(steps):
-            values = [units[a].getReal([1]) for a, _ in links]
+            values = [fmus[a].getReal([1]) for a, _ in links]
             for (_, b), value in zip(links, values):
-                units[b].setReal([0], value)
-            for unit in units:
-                unit.doStep(currentCommunicationPoint=now[0], communicationStepSize=H)
+                fmus[b].setReal([0], value)
+            for fmu in fmus:
+                fmu.doStep(currentCommunicationPoint=now[0], communicationStepSize=H)
             now[0] += H
 
     cost = least(run)
@@ -86,7 +86,7 @@ def fmpy():
 
 
 def fmucontainer():
-    """The container is a unit itself: it is stepped by the bare loop in C."""
+    """The container is an FMU itself: it is stepped by the bare loop in C."""
     from fmpy import extract, read_model_description
 
     folder = pathlib.Path(tempfile.mkdtemp())
@@ -105,8 +105,8 @@ def fmucontainer():
     (folder / "all.json").write_text(json.dumps(assembly))
     tool = pathlib.Path(sys.executable).parent / "fmucontainer"
     subprocess.run([tool, "-fmu-directory", folder, "-container", "all.json"], check=True, stdout=sys.stderr)
-    unit = str(folder / "all.fmu")
-    description, place = read_model_description(unit), extract(unit)
+    fmu = str(folder / "all.fmu")
+    description, place = read_model_description(fmu), extract(fmu)
     library = next(pathlib.Path(place).glob("binaries/linux64/*.so"))
     arguments = [library, "1", "chain", "blind", "go", description.guid, f"file://{place}/resources"]
     done = subprocess.run([bare_loop, *map(str, arguments)], capture_output=True, text=True)

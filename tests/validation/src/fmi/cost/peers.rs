@@ -1,6 +1,6 @@
-//! The same units in other masters, measured in the same run: installed by name into a virtual environment of its own.
+//! The same FMUs in other masters, measured in the same run: installed by name into a virtual environment of its own.
 
-use super::steps::{CASES, Case, unit};
+use super::steps::{CASES, FmuCase, fmu};
 use crate::process::{Outcome, command, target};
 use crate::{Figure, Limit};
 use std::path::{Path, PathBuf};
@@ -21,7 +21,7 @@ fn measured(folder: &Path) -> Outcome<Vec<Figure>> {
     for peer in ["ecos", "libcosim", "fmpy", "fmucontainer"] {
         for case in &CASES {
             let id = format!("fmi.cost.peer.{peer}.{}", case.name);
-            let what = format!("µs of CPU per unit and step, nothing recorded: {peer}");
+            let what = format!("µs of CPU per FMU and step, nothing recorded: {peer}");
             all.push(match cost(folder, case, peer) {
                 Ok(value) => Figure::new(id, value, Limit::None, what),
                 Err(why) => Figure::skipped(id, why),
@@ -31,11 +31,11 @@ fn measured(folder: &Path) -> Outcome<Vec<Figure>> {
     Ok(all)
 }
 
-/// What a step of a case costs with another master, µs of CPU per unit.
-pub fn cost(folder: &Path, case: &Case, peer: &str) -> Outcome<f64> {
-    let file = folder.join(format!("{}.fmu", unit(case)));
+/// What a step of a case costs with another master, µs of CPU per FMU.
+pub fn cost(folder: &Path, case: &FmuCase, peer: &str) -> Outcome<f64> {
+    let file = folder.join(format!("{}.fmu", fmu(case)));
     let mut child = command(&python()?, &[SCRIPT, peer]);
-    child.arg(&file).arg(case.units.to_string()).arg(if case.pair { "pair" } else { "chain" });
+    child.arg(&file).arg(case.fmus.to_string()).arg(if case.pair { "pair" } else { "chain" });
     child.arg(folder.join("bare_loop"));
     result(child).and_then(|t| t.trim().parse().map_err(|_| format!("it said {t}")))
 }

@@ -1,6 +1,6 @@
-//! CPU time per unit and step of a testbed, and of the bare loop in C in the same run.
+//! CPU time per FMU and step of a testbed, and of the bare loop in C in the same run.
 
-use super::super::{built, units};
+use super::super::{built, fmus};
 use crate::process::{Outcome, command, must, read, root};
 use crate::timing::cpu_s;
 use crate::{Figure, Limit};
@@ -15,19 +15,19 @@ const TURNS: u32 = 3;
 /// µs that a testbed may cost beyond the loop in C.
 const ALLOWED: f64 = 0.1;
 
-/// How many units, and how they are joined.
-pub struct Case {
+/// How many FMUs, and how they are joined.
+pub struct FmuCase {
     pub name: &'static str,
-    pub units: usize,
+    pub fmus: usize,
     pub pair: bool,
 }
 
 /// What is measured, here and with other masters.
-pub const CASES: [Case; 4] = [
-    Case { name: "one", units: 1, pair: false },
-    Case { name: "pair", units: 2, pair: true },
-    Case { name: "chain_10", units: 10, pair: false },
-    Case { name: "chain_50", units: 50, pair: false },
+pub const CASES: [FmuCase; 4] = [
+    FmuCase { name: "one", fmus: 1, pair: false },
+    FmuCase { name: "pair", fmus: 2, pair: true },
+    FmuCase { name: "chain_10", fmus: 10, pair: false },
+    FmuCase { name: "chain_50", fmus: 50, pair: false },
 ];
 
 /// A manner of running a case.
@@ -40,15 +40,15 @@ struct Manner {
 /// Nothing recorded, no step taken back.
 const BLIND: Manner = Manner { record: false, save: false };
 
-/// What a step of a case costs in a testbed, µs of CPU per unit.
-pub fn blind(folder: &Path, case: &Case) -> Outcome<f64> {
+/// What a step of a case costs in a testbed, µs of CPU per FMU.
+pub fn blind(folder: &Path, case: &FmuCase) -> Outcome<f64> {
     testbed(folder, case, BLIND)
 }
 
 pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
-    units::build(folder, "cheap", &[("u", 'i', 1.0), ("y", 'o', 0.0)], "", "v[1] += h * v[0];")?;
+    fmus::build(folder, "cheap", &[("u", 'i', 1.0), ("y", 'o', 0.0)], "", "v[1] += h * v[0];")?;
     // the outputs of a chain depend on the inputs of the same time
-    units::build(folder, "through", &[("u", 'i', 1.0), ("y", 'o', 0.0)], "v[1] = 0.5 * v[0];", "")?;
+    fmus::build(folder, "through", &[("u", 'i', 1.0), ("y", 'o', 0.0)], "v[1] = 0.5 * v[0];", "")?;
     let program = folder.join("bare_loop");
     read(&root().join(LOOP))?;
     must(&mut command("cc", &["-O2", "-w", LOOP, "-ldl", "-o"]).arg(&program))?;
@@ -66,7 +66,7 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
 fn compared(
     folder: &Path,
     program: &Path,
-    case: &Case,
+    case: &FmuCase,
     prefix: &str,
     manner: Manner,
 ) -> Outcome<Vec<Figure>> {
@@ -81,7 +81,7 @@ fn compared(
         (_, true) => "each step can be taken back",
         _ => "nothing recorded",
     };
-    let what = |who: &str| format!("µs of CPU per unit and step, {with}: {who}");
+    let what = |who: &str| format!("µs of CPU per FMU and step, {with}: {who}");
     Ok(vec![
         Figure::new(id("bare_loop"), bare, Limit::None, what("a loop in C")),
         Figure::new(id("step"), ours, Limit::None, what("a testbed")),
@@ -89,15 +89,15 @@ fn compared(
     ])
 }
 
-/// The unit of a case.
-pub fn unit(case: &Case) -> &'static str {
-    if case.units > 2 { "through" } else { "cheap" }
+/// The FMU of a case.
+pub fn fmu(case: &FmuCase) -> &'static str {
+    if case.fmus > 2 { "through" } else { "cheap" }
 }
 
-fn bare_loop(folder: &Path, program: &Path, case: &Case, manner: Manner) -> Outcome<f64> {
+fn bare_loop(folder: &Path, program: &Path, case: &FmuCase, manner: Manner) -> Outcome<f64> {
     let word = |on: bool, words: [&'static str; 2]| if on { words[0] } else { words[1] };
     let mut child = command(program, &[]);
-    child.arg(folder.join(format!("{}.so", unit(case)))).arg(case.units.to_string());
+    child.arg(folder.join(format!("{}.so", fmu(case)))).arg(case.fmus.to_string());
     child.arg(word(case.pair, ["pair", "chain"]));
     child.args([word(manner.record, ["record", "blind"]), word(manner.save, ["save", "go"])]);
     let output = child.output().map_err(|e| format!("the loop in C: {e}"))?;
@@ -106,25 +106,25 @@ fn bare_loop(folder: &Path, program: &Path, case: &Case, manner: Manner) -> Outc
     first.ok_or_else(|| format!("the loop in C ended with {}: {text}", output.status))
 }
 
-/// The same units and connections as a scenario.
-pub fn scenario(case: &Case, rollback: bool) -> String {
-    let unit = unit(case);
-    let tables = (0..case.units).map(|k| format!("[u{k:02}]\nfmu = \"{unit}.fmu\"\nrollback = {rollback}\n"));
-    let joined = if case.pair { case.units } else { case.units - 1 };
+/// The same FMUs and connections as a scenario.
+pub fn scenario(case: &FmuCase, rollback: bool) -> String {
+    let fmu = fmu(case);
+    let tables = (0..case.fmus).map(|k| format!("[u{k:02}]\nfmu = \"{fmu}.fmu\"\nrollback = {rollback}\n"));
+    let joined = if case.pair { case.fmus } else { case.fmus - 1 };
     let join = (0..joined).map(|k| {
-        let next = (k + 1) % case.units;
+        let next = (k + 1) % case.fmus;
         format!("[[connect]]\nfrom = \"u{k:02}.y\"\nto = \"u{next:02}.u\"\n")
     });
     let head = "[time]\nstep_s = 0.001\nduration_s = 10000.0\n".to_owned();
     head + &tables.chain(join).collect::<String>()
 }
 
-fn testbed(folder: &Path, case: &Case, manner: Manner) -> Outcome<f64> {
+fn testbed(folder: &Path, case: &FmuCase, manner: Manner) -> Outcome<f64> {
     let mut testbed = built(folder, &scenario(case, manner.save))?;
-    let names: Vec<String> = (0..case.units).map(|k| format!("u{k:02}.y")).collect();
+    let names: Vec<String> = (0..case.fmus).map(|k| format!("u{k:02}.y")).collect();
     let names: Vec<&str> = names.iter().map(String::as_str).collect();
     let mut trace = Trace::new(&testbed, &names).map_err(|e| e.to_string())?;
-    let steps = 40_000 / case.units;
+    let steps = 40_000 / case.fmus;
     trace.reserve(steps);
     let mut best = f64::INFINITY;
     for _ in 0..ROUNDS {
@@ -136,7 +136,7 @@ fn testbed(folder: &Path, case: &Case, manner: Manner) -> Outcome<f64> {
                 trace.take(&testbed).map_err(|e| e.to_string())?;
             }
         }
-        best = smaller(best, (cpu_s() - start) * 1e6 / (steps * case.units) as f64);
+        best = smaller(best, (cpu_s() - start) * 1e6 / (steps * case.fmus) as f64);
     }
     Ok(best)
 }

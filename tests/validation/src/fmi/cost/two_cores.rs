@@ -1,6 +1,6 @@
-//! What a second core brings to units that cost more than 20 µs a step.
+//! What a second core brings to FMUs that cost more than 20 µs a step.
 
-use super::super::{testbed_on, units};
+use super::super::{fmus, testbed_on};
 use crate::process::Outcome;
 use crate::{Figure, Limit};
 use std::path::Path;
@@ -8,7 +8,7 @@ use std::time::Instant;
 use terraglue::Testbed;
 use terraglue_numerics::extremes::smaller;
 
-const UNITS: usize = 10;
+const FMUS: usize = 10;
 const STEPS: u32 = 100;
 /// Pairs of measurements; the best of each counts, because others use the machine too.
 const TURNS: u32 = 25;
@@ -16,22 +16,22 @@ const TURNS: u32 = 25;
 pub fn figure(folder: &Path) -> Outcome<Figure> {
     // a few thousand dependent operations: 20 to 40 µs
     let work = "double x = v[1]; for (int i = 0; i < 16000; i++) x = x * 0.999 + h * v[0]; v[1] = x;";
-    units::build(folder, "heavy", &[("u", 'i', 1.0), ("y", 'o', 0.0)], "", work)?;
+    fmus::build(folder, "heavy", &[("u", 'i', 1.0), ("y", 'o', 0.0)], "", work)?;
     let tables: String =
-        (0..UNITS).map(|k| format!("[u{k}]\nfmu = \"heavy.fmu\"\nrollback = false\n")).collect();
+        (0..FMUS).map(|k| format!("[u{k}]\nfmu = \"heavy.fmu\"\nrollback = false\n")).collect();
     let text = format!("[time]\nstep_s = 0.001\nduration_s = 10000.0\n{tables}");
     let on = |threads: usize| testbed_on(folder, &text, threads).map_err(|e| e.to_string());
     let (mut one, mut two) = (on(1)?, on(2)?);
     let mut best = [f64::INFINITY; 2];
-    // the first steps tell a testbed what its units cost
+    // the first steps tell a testbed what its FMUs cost
     (took(&mut one, 130)?, took(&mut two, 130)?);
     for _ in 0..TURNS {
         best[0] = smaller(best[0], took(&mut one, STEPS)?);
         best[1] = smaller(best[1], took(&mut two, STEPS)?);
     }
-    let per_unit = best[0] * 1e6 / f64::from(STEPS) / UNITS as f64;
+    let per_fmu = best[0] * 1e6 / f64::from(STEPS) / FMUS as f64;
     let what = format!(
-        "{UNITS} units of {per_unit:.0} µs a step: wall time of one thread over that of two, least of {TURNS}"
+        "{FMUS} FMUs of {per_fmu:.0} µs a step: wall time of one thread over that of two, least of {TURNS}"
     );
     Ok(Figure::new("fmi.cost.two_cores", best[0] / best[1], Limit::AtLeast(1.7), what))
 }

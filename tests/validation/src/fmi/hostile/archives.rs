@@ -23,7 +23,7 @@ const MARK: &str = "mark";
 /// What lies beside an archive: itself, and what was said of it.
 const OWN: [&str; 4] = ["x.fmu", "output", "errors", "tmp"];
 
-/// Whether code of the unit may run, must, or must not.
+/// Whether code of the FMU may run, must, or must not.
 #[derive(Clone, Copy, PartialEq)]
 enum Code {
     Never,
@@ -46,7 +46,7 @@ pub fn figures(folder: &Path, context: &Context) -> Outcome<Vec<Figure>> {
             "archives, descriptions and libraries that are answered otherwise than by one clear error before any of their code \
              runs, write elsewhere or leave something behind",
         ),
-        counted((folder, context), "usable", &odd, "odd but legal units that do not run"),
+        counted((folder, context), "usable", &odd, "odd but legal FMUs that do not run"),
     ];
     figures.push(many(folder, context, odd.last())?);
     figures.extend(reader(folder, context)?);
@@ -124,7 +124,7 @@ fn in_one_line(text: &str) -> String {
     lines.collect::<Vec<_>>().join(" ")
 }
 
-/// Time to read, start and run a unit with many variables.
+/// Time to read, start and run an FMU with many variables.
 fn many(folder: &Path, context: &Context, case: Option<&(Case, Code)>) -> Outcome<Figure> {
     const ID: &str = "fmi.archives.many_variables";
     let (true, Some((case, _))) = (context.timing, case) else {
@@ -133,7 +133,7 @@ fn many(folder: &Path, context: &Context, case: Option<&(Case, Code)>) -> Outcom
     let place = folder.join("many");
     let start = Instant::now();
     run(&place, context, &case.bytes)?;
-    let what = format!("s to read, start, run and end a unit with {MANY} variables");
+    let what = format!("s to read, start, run and end an FMU with {MANY} variables");
     Ok(Figure::new(ID, start.elapsed().as_secs_f64(), Limit::AtMost(2.0), what).timed())
 }
 

@@ -1,4 +1,4 @@
-//! Units that misbehave at each stage of their life, in a scenario and alone, without and with isolation: the run tells it,
+//! FMUs that misbehave at each stage of their life, in a scenario and alone, without and with isolation: the run tells it,
 //! or goes on unharmed; what it recorded is read, and nothing is left behind.
 
 use super::super::watched::{Ended, watched};
@@ -12,7 +12,7 @@ use std::time::Duration;
 use terraglue::recording::Recording;
 use terraglue_fmi::export::{Content, pack};
 
-const CODE: &str = include_str!("unit.c");
+const CODE: &str = include_str!("fmu.c");
 const DESCRIPTION: &str = r#"<?xml version="1.0" encoding="UTF-8"?>
 <fmiModelDescription fmiVersion="2.0" modelName="m" guid="g"><CoSimulation modelIdentifier="m"/><ModelVariables>
 <ScalarVariable name="x" valueReference="0" causality="output" initial="calculated"><Real/></ScalarVariable>
@@ -34,17 +34,17 @@ const WRONG: [(&str, &[&str]); 5] = [
 const LOGS: [&str; 4] = ["flood", "null", "utf", "huge"];
 /// Changes of the process, and what is left in it.
 const CHANGES: [&str; 8] = ["close", "folder", "locale", "mask", "signal", "round", "thread", "child"];
-/// Table of a unit that is run alone.
+/// Table of an FMU that is run alone.
 const TABLE: &str = "table.csv";
 /// Longest run, s: the program's own limits come first.
 const LONGEST: Duration = Duration::from_secs(60);
-/// Samples of a complete recording, and of one whose unit misbehaves in its first step after 0.25 s.
+/// Samples of a complete recording, and of one whose FMU misbehaves in its first step after 0.25 s.
 const ALL: usize = 11;
 const SOME: usize = 4;
 
 /// One run.
 #[derive(Clone, Copy)]
-struct Case {
+struct Misbehaviour {
     what: &'static str,
     stage: &'static str,
     isolated: bool,
@@ -55,13 +55,13 @@ struct Case {
 /// How it must end.
 #[derive(Clone, Copy, PartialEq)]
 enum Promise {
-    /// With an error of the unit, exit code 1.
+    /// With an error of the FMU, exit code 1.
     Error,
     /// As if nothing had been.
     Complete,
 }
 
-impl Case {
+impl Misbehaviour {
     fn all() -> Vec<Self> {
         let mut all = Vec::new();
         for (isolated, alone) in [(true, false), (false, false), (true, true), (false, true)] {
@@ -99,7 +99,7 @@ impl Case {
     }
 
     /// Longest time of a call of it, s.
-    fn patience(self) -> f64 {
+    fn timeout(self) -> f64 {
         if ["hang", "stop"].contains(&self.what) { 1.0 } else { 60.0 }
     }
 
@@ -112,28 +112,28 @@ impl Case {
         }
     }
 
-    fn scenario(self, unit: &Path) -> String {
-        let (name, unit, isolated) = (self.name(), unit.display(), self.isolated);
-        let patience = self.patience();
+    fn scenario(self, fmu: &Path) -> String {
+        let (name, fmu, isolated) = (self.name(), fmu.display(), self.isolated);
+        let timeout = self.timeout();
         format!(
-            "[time]\nstep_s = 0.1\nduration_s = 1.0\n[recording]\nevery_steps = 1\n[{name}]\nfmu = \"{unit}\"\nisolate = \
-             {isolated}\nstep_timeout_s = {patience}\nload_timeout_s = {patience}\nmemory_mb = 500\n"
+            "[time]\nstep_s = 0.1\nduration_s = 1.0\n[recording]\nevery_steps = 1\n[{name}]\nfmu = \"{fmu}\"\nisolate = \
+             {isolated}\nstep_timeout_s = {timeout}\nload_timeout_s = {timeout}\nmemory_mb = 500\n"
         )
     }
 }
 
 pub fn figures(folder: &Path, context: &Context) -> Outcome<Vec<Figure>> {
     let folder = &folder.canonicalize().map_err(|e| format!("{}: {e}", folder.display()))?;
-    let unit = &unit(folder)?;
-    let cases = Case::all();
+    let fmu = &fmu(folder)?;
+    let cases = Misbehaviour::all();
     let broken = in_parallel(&cases, |case| {
-        let wrong = judge(folder, context, unit, *case).unwrap_or_else(|e| vec![e]);
+        let wrong = judge(folder, context, fmu, *case).unwrap_or_else(|e| vec![e]);
         (!wrong.is_empty()).then(|| format!("{}: {}", case.name(), wrong.join(", ")))
     });
     let figure = |(isolated, alone), id: &str, what: &str| {
         let of = || cases.iter().zip(&broken).filter(|(c, _)| (c.isolated, c.alone) == (isolated, alone));
         let told: Vec<&str> = of().filter_map(|(_, broken)| broken.as_deref()).collect();
-        let text = format!("units {what} that end otherwise than promised, of {}", of().count());
+        let text = format!("FMUs {what} that end otherwise than promised, of {}", of().count());
         let text = if told.is_empty() { text } else { format!("{text}: {}", told.join("; ")) };
         let text = text.replace(['\n', '\t'], " ");
         Figure::new(format!("fmi.behaviour.{id}"), told.len() as f64, Limit::Equal(0.0), text)
@@ -146,8 +146,8 @@ pub fn figures(folder: &Path, context: &Context) -> Outcome<Vec<Figure>> {
     ])
 }
 
-fn unit(folder: &Path) -> Outcome<std::path::PathBuf> {
-    let [source, library, unit] = ["hostile.c", "hostile.so", "hostile.fmu"].map(|name| folder.join(name));
+fn fmu(folder: &Path) -> Outcome<std::path::PathBuf> {
+    let [source, library, fmu] = ["hostile.c", "hostile.so", "hostile.fmu"].map(|name| folder.join(name));
     write(&source, CODE)?;
     must(
         command("cc", &["-shared", "-fPIC", "-w", "-o"])
@@ -159,23 +159,23 @@ fn unit(folder: &Path) -> Outcome<std::path::PathBuf> {
         ("modelDescription.xml".to_owned(), Content::Text(DESCRIPTION.into())),
         ("binaries/linux64/m.so".to_owned(), Content::File(library)),
     ];
-    pack(&unit, &entries)?;
-    Ok(unit)
+    pack(&fmu, &entries)?;
+    Ok(fmu)
 }
 
 /// What is otherwise than promised.
-fn judge(folder: &Path, context: &Context, unit: &Path, case: Case) -> Outcome<Vec<String>> {
+fn judge(folder: &Path, context: &Context, fmu: &Path, case: Misbehaviour) -> Outcome<Vec<String>> {
     let place = folder.join(case.folder());
     let mut run = Command::new(&context.program);
     if case.alone {
         std::fs::create_dir_all(&place).map_err(|e| format!("{}: {e}", place.display()))?;
-        run.args(["fmu", "run", "--stop", "1", "--step", "0.1", "--csv", TABLE]).arg(unit);
+        run.args(["fmu", "run", "--stop", "1", "--step", "0.1", "--csv", TABLE]).arg(fmu);
         if case.isolated {
-            run.args(["--isolate", "--memory-mb", "500", "--timeout", &case.patience().to_string()]);
+            run.args(["--isolate", "--memory-mb", "500", "--timeout", &case.timeout().to_string()]);
         }
         run.env("HOSTILE_NAME", case.name());
     } else {
-        write(&place.join("x.toml"), &case.scenario(unit))?;
+        write(&place.join("x.toml"), &case.scenario(fmu))?;
         run.args(["run", "x.toml", "--csv", "--quiet", "--out", "out"]);
     }
     if case.stage == "load" {
@@ -196,7 +196,7 @@ fn judge(folder: &Path, context: &Context, unit: &Path, case: Case) -> Outcome<V
     Ok(wrong)
 }
 
-fn about_end(case: Case, ended: &Ended) -> Vec<String> {
+fn about_end(case: Misbehaviour, ended: &Ended) -> Vec<String> {
     let mut wrong = Vec::new();
     let (code, errors) = (ended.code, &ended.errors);
     let wanted = if case.promise() == Promise::Error { 1 } else { 0 };

@@ -4,7 +4,7 @@
 
 use super::scenes::{alone, several, sphere, throw};
 use crate::process::Outcome;
-use crate::rigid_body::rig::{G, Rig, pose};
+use crate::rigid_body::fixture::{Fixture, G, pose};
 use crate::{Context, Figure, Limit};
 use terraglue_numerics::extremes::larger;
 
@@ -37,10 +37,10 @@ fn slide_to_roll(context: &Context) -> Outcome<Vec<Figure>> {
     let exact = 12.0 * v0 * v0 / (49.0 * mu * G) + 5.0 / 7.0 * v0 * (t - rolls);
     let run = |h: f64| -> Outcome<[f64; 2]> {
         let body = sphere("s", 1.0, 0.1);
-        let mut rig = alone(context, "slide", &body, [0.0, 0.0, 0.1], r#", "friction": 0.3"#, (DOWN, h))?;
-        throw(&mut rig, "s", [v0, 0.0, 0.0], h)?;
-        rig.run(t, |_| Ok(()))?;
-        let state = rig.states()?[0];
+        let mut fixture = alone(context, "slide", &body, [0.0, 0.0, 0.1], r#", "friction": 0.3"#, (DOWN, h))?;
+        throw(&mut fixture, "s", [v0, 0.0, 0.0], h)?;
+        fixture.run(t, |_| Ok(()))?;
+        let state = fixture.states()?[0];
         Ok([state.world_from_body.position[0] - exact, state.linear_velocity[0] - 5.0 / 7.0 * v0])
     };
     let [a, b, c] = STEPS.map(run);
@@ -60,9 +60,10 @@ fn roll(context: &Context) -> Outcome<Figure> {
     let angle = 20.0_f64.to_radians();
     let gravity = [G * libm::sin(angle), 0.0, -G * libm::cos(angle)];
     let body = sphere("s", 1.0, 0.1);
-    let mut rig = alone(context, "roll", &body, [0.0, 0.0, 0.1], r#", "friction": 0.5"#, (gravity, 1e-3))?;
-    rig.run(2.0, |_| Ok(()))?;
-    let a = rig.states()?[0].linear_velocity[0] / 2.0;
+    let mut fixture =
+        alone(context, "roll", &body, [0.0, 0.0, 0.1], r#", "friction": 0.5"#, (gravity, 1e-3))?;
+    fixture.run(2.0, |_| Ok(()))?;
+    let a = fixture.states()?[0].linear_velocity[0] / 2.0;
     let error = (a / (5.0 / 7.0 * G * libm::sin(angle)) - 1.0).abs();
     let what = "sphere rolling down 20°, 2 s: relative error of the acceleration";
     Ok(Figure::new("rigid-body.roll", error, Limit::AtMost(1e-9), what))
@@ -71,11 +72,11 @@ fn roll(context: &Context) -> Outcome<Figure> {
 /// Heights of the first four apexes of a ball dropped from 1 m.
 fn apexes(context: &Context, h: f64) -> Outcome<Vec<f64>> {
     let body = sphere("s", 1.0, 0.1);
-    let mut rig = alone(context, "bounce", &body, [0.0, 0.0, 1.1], r#", "restitution": 0.8"#, (DOWN, h))?;
+    let mut fixture = alone(context, "bounce", &body, [0.0, 0.0, 1.1], r#", "restitution": 0.8"#, (DOWN, h))?;
     // The highest place between two impacts.
     let (mut tops, mut top, mut before) = (Vec::new(), 0.0_f64, 0.0);
-    rig.run(3.5, |rig| {
-        let state = rig.states()?[0];
+    fixture.run(3.5, |fixture| {
+        let state = fixture.states()?[0];
         let v = state.linear_velocity[2];
         if v > 0.0 && before < 0.0 {
             tops.push(top - 0.1);
@@ -117,10 +118,10 @@ fn cradle(context: &Context) -> Outcome<Vec<Figure>> {
         })
         .collect();
     let more = r#", "friction": 0.0, "restitution": 1.0"#;
-    let mut rig = several(context, "cradle", &bodies, more, ([0.0; 3], h))?;
-    throw(&mut rig, "b0", [1.0, 0.0, 0.0], h)?;
-    rig.run(0.1, |_| Ok(()))?;
-    let v: Vec<f64> = rig.states()?[1..].iter().map(|s| s.linear_velocity[0]).collect();
+    let mut fixture = several(context, "cradle", &bodies, more, ([0.0; 3], h))?;
+    throw(&mut fixture, "b0", [1.0, 0.0, 0.0], h)?;
+    fixture.run(0.1, |_| Ok(()))?;
+    let v: Vec<f64> = fixture.states()?[1..].iter().map(|s| s.linear_velocity[0]).collect();
     let momentum = (v.iter().sum::<f64>() - 1.0).abs();
     let energy = v.iter().map(|v| v * v).sum::<f64>();
     let shown = v.iter().map(|v| format!("{v:.4}")).collect::<Vec<_>>().join(", ");
@@ -140,7 +141,7 @@ fn cradle(context: &Context) -> Outcome<Vec<Figure>> {
 }
 
 /// A slender rod of 2 m and 1 kg whose lower end slides at 1 m/s against its lean.
-fn rod_rig(context: &Context, degrees: f64, mu: f64, v: f64) -> Outcome<Rig> {
+fn rod_rig(context: &Context, degrees: f64, mu: f64, v: f64) -> Outcome<Fixture> {
     let (l, r) = (1.0, 1e-6);
     let (c, s) = (libm::cos(degrees.to_radians()), libm::sin(degrees.to_radians()));
     let i = l * l / 3.0;
@@ -166,20 +167,20 @@ fn rod(context: &Context) -> Outcome<Vec<Figure>> {
     let (mut largest, mut gained, mut residual, mut jams) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0);
     for (mu, degrees) in [(1.2, 60.0), (1.5, 60.0), (2.0, 40.0), (2.0, 60.0), (2.0, 78.0)] {
         for v in [-1.0, 1.0] {
-            let mut rig = rod_rig(context, degrees, mu, v)?;
-            let [normal, told] = [rig.id("rod.contact_normal")?, rig.id("contact.residual")?];
-            let mut before = rig.energy().mechanical();
+            let mut fixture = rod_rig(context, degrees, mu, v)?;
+            let [normal, told] = [fixture.id("rod.contact_normal")?, fixture.id("contact.residual")?];
+            let mut before = fixture.energy().mechanical();
             let (mut impulse, mut early) = (0.0_f64, 0.0_f64);
-            rig.run(1.0, |rig| {
-                let now = rig.energy().mechanical();
+            fixture.run(1.0, |fixture| {
+                let now = fixture.energy().mechanical();
                 gained = larger(gained, now - before);
                 before = now;
-                impulse = larger(impulse, 1e-3 * rig.get(normal)?);
-                if rig.t() < EARLY {
-                    early = larger(early, 1e-3 * rig.get(normal)?);
+                impulse = larger(impulse, 1e-3 * fixture.get(normal)?);
+                if fixture.t() < EARLY {
+                    early = larger(early, 1e-3 * fixture.get(normal)?);
                 }
-                residual = larger(residual, rig.get(told)?);
-                let (place, q) = pose(&rig.states()?[0]);
+                residual = larger(residual, fixture.get(told)?);
+                let (place, q) = pose(&fixture.states()?[0]);
                 let finite = place.iter().chain(q.coords.iter()).all(|x| x.is_finite());
                 if finite { Ok(()) } else { Err("Painlevé's rod: not a number".into()) }
             })?;

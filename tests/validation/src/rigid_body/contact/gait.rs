@@ -1,7 +1,7 @@
 //! The hexapod with its tripod gait on flat rigid ground: targets, drives, one step.
 
 use crate::process::Outcome;
-use crate::rigid_body::rig::{G, Rig, table};
+use crate::rigid_body::fixture::{Fixture, G, table};
 
 /// Rows of the gait table less one: the last repeats the first.
 const INTERVALS: usize = 240;
@@ -14,7 +14,7 @@ const STAND: [f64; 4] = [0.0, 0.9581921787462744, -1.3796341802638374, -1.149354
 
 /// How the joints are driven.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub enum Drive {
+pub enum GaitDrive {
     /// Implicit PD: 600 N m/rad, 10 N m s/rad.
     Soft,
     /// Constraint motor: the error is taken back within ten steps of 1 ms, at 20 rad/s at most.
@@ -22,33 +22,33 @@ pub enum Drive {
 }
 
 /// A walking hexapod.
-pub struct Walk {
-    pub rig: Rig,
+pub struct GaitWalk {
+    pub fixture: Fixture,
     table: Vec<[f64; 24]>,
     ids: Vec<u32>,
     angles: Vec<u32>,
     targets: [f64; 24],
 }
 
-impl Walk {
+impl GaitWalk {
     /// On flat ground with μ = 0.8 under full gravity; `model` relative to the repository.
-    pub fn new(model: &str, drive: Drive, h: f64) -> Outcome<Self> {
+    pub fn new(model: &str, drive: GaitDrive, h: f64) -> Outcome<Self> {
         let motor = match drive {
-            Drive::Soft => "position",
-            Drive::Stiff => "rigid-position",
+            GaitDrive::Soft => "position",
+            GaitDrive::Stiff => "rigid-position",
         };
         let [_, a, b, c] = STAND;
         let parameters = format!(
             r#"{{"model": "{model}", "position_m": [0, 0, 0.33], "ground": "half-space", "friction": 0.8,
             "motor": "{motor}", "joints": {{"*_j2": {a}, "*_j3": {b}, "*_j4": {c}}}}}"#
         );
-        let rig = Rig::new(&parameters, [0.0, 0.0, -G], h)?;
+        let fixture = Fixture::new(&parameters, [0.0, 0.0, -G], h)?;
         let joints: Vec<String> =
             LEGS.iter().flat_map(|leg| (1..=4).map(move |j| format!("{leg}_j{j}"))).collect();
         let number =
-            |what: &str| joints.iter().map(|j| rig.id(&format!("{j}.{what}"))).collect::<Outcome<_>>();
+            |what: &str| joints.iter().map(|j| fixture.id(&format!("{j}.{what}"))).collect::<Outcome<_>>();
         let (ids, angles) = (number("angle_target")?, number("angle")?);
-        Ok(Self { rig, table: rows()?, ids, angles, targets: [0.0; 24] })
+        Ok(Self { fixture, table: rows()?, ids, angles, targets: [0.0; 24] })
     }
 
     /// The targets of the time t.
@@ -65,16 +65,16 @@ impl Walk {
 
     /// Sets the 24 targets and steps.
     pub fn step(&mut self) -> Outcome {
-        self.aim(self.rig.t());
-        self.rig.set(&self.ids, &self.targets)?;
-        self.rig.step()
+        self.aim(self.fixture.t());
+        self.fixture.set(&self.ids, &self.targets)?;
+        self.fixture.step()
     }
 
     /// Mean square of angle − target at the end of the last step, rad².
     pub fn tracking_error(&self) -> Outcome<f64> {
         let mut sum = 0.0;
         for (angle, target) in self.angles.iter().zip(&self.targets) {
-            let error = self.rig.get(*angle)? - target;
+            let error = self.fixture.get(*angle)? - target;
             sum += error * error;
         }
         Ok(sum / self.targets.len() as f64)

@@ -2,7 +2,7 @@
 
 use crate::Context;
 use crate::process::Outcome;
-use crate::rigid_body::rig::{Rig, model};
+use crate::rigid_body::fixture::{Fixture, model};
 
 /// A link with a diagonal inertia (kg m²) and one shape.
 pub fn link(name: &str, mass: f64, inertia: [f64; 3], geometry: &str) -> String {
@@ -34,13 +34,13 @@ pub fn alone(
     at: [f64; 3],
     more: &str,
     (gravity, h): ([f64; 3], f64),
-) -> Outcome<Rig> {
+) -> Outcome<Fixture> {
     let text = format!(r#"<robot name="{name}">{body}</robot>"#);
     let path = model(&context.scratch, &format!("{name}.urdf"), &text)?;
     let parameters = format!(
         r#"{{"model": "{path}", "position_m": {at:?}, "ground": "half-space", "motor": "off" {more}}}"#
     );
-    Rig::new(&parameters, gravity, h)
+    Fixture::new(&parameters, gravity, h)
 }
 
 /// Several free bodies on the plane z = 0: they hang from a far root by joints that break at once. Their indices
@@ -51,7 +51,7 @@ pub fn several(
     bodies: &[(String, [f64; 3])],
     more: &str,
     (gravity, h): ([f64; 3], f64),
-) -> Outcome<Rig> {
+) -> Outcome<Fixture> {
     let mut text = format!(r#"<robot name="{name}">{}"#, cuboid("root", 1.0, [0.1; 3]));
     for (k, (body, [x, y, z])) in bodies.iter().enumerate() {
         text += body;
@@ -66,16 +66,16 @@ pub fn several(
     let parameters = format!(
         r#"{{"model": "{path}", "position_m": [-100, 0, 0.05], "ground": "half-space", "motor": "off" {more}}}"#
     );
-    let mut rig = Rig::new(&parameters, gravity, h)?;
-    (0..bodies.len()).try_for_each(|k| rig.act(&format!("j{k}.break")))?;
-    Ok(rig)
+    let mut fixture = Fixture::new(&parameters, gravity, h)?;
+    (0..bodies.len()).try_for_each(|k| fixture.act(&format!("j{k}.break")))?;
+    Ok(fixture)
 }
 
 /// Throws a body: an impulse (N s) at its centre of mass within the first step of length h, as if it had moved before.
-pub fn throw(rig: &mut Rig, body: &str, impulse: [f64; 3], h: f64) -> Outcome {
-    let ids = ["x", "y", "z"].map(|axis| rig.id(&format!("{body}.force_{axis}")));
+pub fn throw(fixture: &mut Fixture, body: &str, impulse: [f64; 3], h: f64) -> Outcome {
+    let ids = ["x", "y", "z"].map(|axis| fixture.id(&format!("{body}.force_{axis}")));
     let ids = ids.into_iter().collect::<Outcome<Vec<_>>>()?;
-    rig.set(&ids, &impulse.map(|p| p / h))?;
-    rig.step()?;
-    rig.set(&ids, &[0.0; 3])
+    fixture.set(&ids, &impulse.map(|p| p / h))?;
+    fixture.step()?;
+    fixture.set(&ids, &[0.0; 3])
 }

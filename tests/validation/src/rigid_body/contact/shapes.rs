@@ -1,7 +1,7 @@
 //! Hulls, triangle meshes and height fields against the simple shapes that they equal.
 
 use crate::process::Outcome;
-use crate::rigid_body::rig::{G, Rig, model, pose};
+use crate::rigid_body::fixture::{Fixture, G, model, pose};
 use crate::{Context, Figure, Limit};
 use std::fmt::Write;
 use terraglue_numerics::extremes::larger;
@@ -16,20 +16,20 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     Ok(vec![hull(context)?, mesh(context)?, field(context)?])
 }
 
-fn scene(context: &Context, name: &str, asset: &str, world: &str, gravity: [f64; 3]) -> Outcome<Rig> {
+fn scene(context: &Context, name: &str, asset: &str, world: &str, gravity: [f64; 3]) -> Outcome<Fixture> {
     let text = format!("<mujoco><asset>{asset}</asset><worldbody>{world}</worldbody></mujoco>");
     let path = model(&context.scratch, &format!("{name}.xml"), &text)?;
-    Rig::new(&format!(r#"{{"model": "{path}", "friction": 0.5}}"#), gravity, H)
+    Fixture::new(&format!(r#"{{"model": "{path}", "friction": 0.5}}"#), gravity, H)
 }
 
 /// Largest distance of the first bodies of two scenes over a run, m.
-fn apart(mut rigs: [Rig; 2], until: f64) -> Outcome<f64> {
+fn apart(mut rigs: [Fixture; 2], until: f64) -> Outcome<f64> {
     let mut worst = 0.0_f64;
     while rigs[0].t() < until - 0.5 * H {
         let mut places = [nalgebra::Vector3::zeros(); 2];
-        for (rig, place) in rigs.iter_mut().zip(&mut places) {
-            rig.step()?;
-            *place = pose(&rig.states()?[0]).0;
+        for (fixture, place) in rigs.iter_mut().zip(&mut places) {
+            fixture.step()?;
+            *place = pose(&fixture.states()?[0]).0;
         }
         worst = larger(worst, (places[0] - places[1]).norm());
     }
@@ -82,8 +82,8 @@ fn mesh(context: &Context) -> Outcome<Figure> {
             gravity,
         )?,
     ];
-    for rig in &mut rigs {
-        super::scenes::throw(rig, "s", [1.5, 0.4, 0.0], H)?;
+    for fixture in &mut rigs {
+        super::scenes::throw(fixture, "s", [1.5, 0.4, 0.0], H)?;
     }
     let what = "sphere thrown over a plane of triangles, 1 s (1 m): distance from that on the half-space, m";
     Ok(Figure::new("rigid-body.shapes.mesh", apart(rigs, 1.0)?, Limit::AtMost(1e-9), what))
@@ -100,10 +100,10 @@ fn field(context: &Context) -> Outcome<Figure> {
         r#"<geom type="hfield" hfield="f"/>
         <body name="s" pos="{x} .07 {z}"><freejoint/><geom size=".1" mass="1"/></body>"#
     );
-    let mut rig = scene(context, "field", &asset, &world, [0.0, 0.0, -G])?;
-    rig.run(0.8, |_| Ok(()))?;
-    let v = rig.states()?[0].linear_velocity;
-    let exact = 5.0 / 7.0 * G * sin * rig.t();
+    let mut fixture = scene(context, "field", &asset, &world, [0.0, 0.0, -G])?;
+    fixture.run(0.8, |_| Ok(()))?;
+    let v = fixture.states()?[0].linear_velocity;
+    let exact = 5.0 / 7.0 * G * sin * fixture.t();
     let error = (v[0].hypot(v[2]) / exact - 1.0).abs();
     let what = "sphere rolling down a height field, 0.8 s: relative error of its speed";
     Ok(Figure::new("rigid-body.shapes.field", error, Limit::AtMost(1e-6), what))

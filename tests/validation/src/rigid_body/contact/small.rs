@@ -2,7 +2,7 @@
 
 use super::scenes::{alone, cuboid, several};
 use crate::process::Outcome;
-use crate::rigid_body::rig::{G, Rig, pose};
+use crate::rigid_body::fixture::{Fixture, G, pose};
 use crate::{Context, Figure, Limit};
 use nalgebra::Vector3;
 
@@ -19,7 +19,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     Ok(all)
 }
 
-fn on_incline(context: &Context, degrees: f64) -> Outcome<Rig> {
+fn on_incline(context: &Context, degrees: f64) -> Outcome<Fixture> {
     let angle = degrees.to_radians();
     let gravity = [G * libm::sin(angle), 0.0, -G * libm::cos(angle)];
     let body = cuboid("b", 1.0, [0.2, 0.2, 0.1]);
@@ -33,30 +33,30 @@ fn on_incline(context: &Context, degrees: f64) -> Outcome<Rig> {
     )
 }
 
-fn place(rig: &Rig, body: usize) -> Outcome<Vector3<f64>> {
-    Ok(pose(&rig.states()?[body]).0)
+fn place(fixture: &Fixture, body: usize) -> Outcome<Vector3<f64>> {
+    Ok(pose(&fixture.states()?[body]).0)
 }
 
-fn go(rig: &mut Rig, until: f64) -> Outcome {
-    rig.run(until, |_| Ok(()))
+fn go(fixture: &mut Fixture, until: f64) -> Outcome {
+    fixture.run(until, |_| Ok(()))
 }
 
 fn sticks(context: &Context) -> Outcome<Vec<Figure>> {
-    let mut rig = on_incline(context, 20.0)?;
-    go(&mut rig, 5.0)?;
-    let before = place(&rig, 0)?.x;
-    go(&mut rig, 10.0)?;
-    let creep = (place(&rig, 0)?.x - before).abs() / 5.0;
+    let mut fixture = on_incline(context, 20.0)?;
+    go(&mut fixture, 5.0)?;
+    let before = place(&fixture, 0)?.x;
+    go(&mut fixture, 10.0)?;
+    let creep = (place(&fixture, 0)?.x - before).abs() / 5.0;
     let what = "box on 20° with μ = 0.5, 5 s to 10 s: creep, mm/s";
     Ok(vec![Figure::new("rigid-body.incline.creep", 1e3 * creep, Limit::AtMost(1e-9), what)])
 }
 
 /// Positions of the scheme are half a step ahead of its rates: both are given.
 fn slides(context: &Context) -> Outcome<Vec<Figure>> {
-    let mut rig = on_incline(context, 35.0)?;
-    go(&mut rig, 2.0)?;
-    let x = place(&rig, 0)?.x;
-    let v = rig.states()?[0].linear_velocity[0];
+    let mut fixture = on_incline(context, 35.0)?;
+    go(&mut fixture, 2.0)?;
+    let x = place(&fixture, 0)?.x;
+    let v = fixture.states()?[0].linear_velocity[0];
     let error = |x: f64| (x / 2.0 / SLIDES - 1.0).abs();
     let id = "rigid-body.incline.acceleration";
     Ok(vec![
@@ -79,12 +79,12 @@ fn stack(context: &Context) -> Outcome<Vec<Figure>> {
     let bodies: Vec<_> = (0..10)
         .map(|k| (cuboid(&format!("b{k}"), 1.0, [0.2; 3]), [0.0, 0.0, 0.1 + 0.2 * f64::from(k)]))
         .collect();
-    let mut rig = several(context, "stack", &bodies, r#", "friction": 0.6"#, ([0.0, 0.0, -G], H))?;
-    let start = place(&rig, 10)?;
-    go(&mut rig, 2.5)?;
-    let middle = place(&rig, 10)?;
-    go(&mut rig, 5.0)?;
-    let end = place(&rig, 10)?;
+    let mut fixture = several(context, "stack", &bodies, r#", "friction": 0.6"#, ([0.0, 0.0, -G], H))?;
+    let start = place(&fixture, 10)?;
+    go(&mut fixture, 2.5)?;
+    let middle = place(&fixture, 10)?;
+    go(&mut fixture, 5.0)?;
+    let end = place(&fixture, 10)?;
     let id = "rigid-body.stack";
     Ok(vec![
         Figure::new(
@@ -111,9 +111,9 @@ fn stack(context: &Context) -> Outcome<Vec<Figure>> {
 fn heavy(context: &Context) -> Outcome<Figure> {
     let bodies =
         [(cuboid("b0", 1.0, [0.2; 3]), [0.0, 0.0, 0.1]), (cuboid("b1", 1000.0, [0.2; 3]), [0.0, 0.0, 0.3])];
-    let mut rig = several(context, "heavy", &bodies, r#", "friction": 0.6"#, ([0.0, 0.0, -G], H))?;
-    go(&mut rig, 5.0)?;
-    let sink = (place(&rig, 2)?.z - 0.3).abs();
+    let mut fixture = several(context, "heavy", &bodies, r#", "friction": 0.6"#, ([0.0, 0.0, -G], H))?;
+    go(&mut fixture, 5.0)?;
+    let sink = (place(&fixture, 2)?.z - 0.3).abs();
     let what = "1000 kg on 1 kg, 5 s: sink, mm";
     Ok(Figure::new("rigid-body.heavy.sink", 1e3 * sink, Limit::AtMost(0.01), what))
 }

@@ -1,8 +1,8 @@
 //! The hexapod with its tripod gait on rigid ground: cost of a step, penetration, slip, forces, residual.
 
-use super::gait::{Drive, LEGS, Walk};
+use super::gait::{GaitDrive, GaitWalk, LEGS};
 use crate::process::Outcome;
-use crate::rigid_body::rig::{G, pose};
+use crate::rigid_body::fixture::{G, pose};
 use crate::timing::cpu_s;
 use crate::{Context, Figure, Limit};
 use nalgebra::Vector3;
@@ -25,8 +25,8 @@ const RUNS: usize = 5;
 
 /// All figures of the walk.
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
-    let mut all = quality("soft", Drive::Soft)?;
-    all.extend(quality("stiff", Drive::Stiff)?);
+    let mut all = quality("soft", GaitDrive::Soft)?;
+    all.extend(quality("stiff", GaitDrive::Stiff)?);
     if context.timing {
         all.extend(cost("six", SIX, 45.0)?.into_iter().map(Figure::timed));
         all.extend(cost("eighteen", EIGHTEEN, 130.0)?.into_iter().map(Figure::timed));
@@ -36,7 +36,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
 
 /// What is looked at during a walk.
 #[derive(Default)]
-struct Seen {
+struct SeenWalk {
     penetration: f64,
     slip: f64,
     slips: f64,
@@ -47,18 +47,18 @@ struct Seen {
     tracking: f64,
 }
 
-fn quality(name: &str, drive: Drive) -> Outcome<Vec<Figure>> {
-    let mut walk = Walk::new(SIX, drive, H)?;
+fn quality(name: &str, drive: GaitDrive) -> Outcome<Vec<Figure>> {
+    let mut walk = GaitWalk::new(SIX, drive, H)?;
     // Bodies stand in the order of the legs' joints, four to a leg, after the trunk.
     let feet: Vec<usize> = (1..=LEGS.len()).map(|leg| 4 * leg).collect();
-    let normals = LEGS.map(|leg| walk.rig.id(&format!("{leg}4.contact_normal")));
+    let normals = LEGS.map(|leg| walk.fixture.id(&format!("{leg}4.contact_normal")));
     let normals = normals.into_iter().collect::<Outcome<Vec<_>>>()?;
-    let told = [walk.rig.id("contact.residual")?, walk.rig.id("contact.yielding")?];
+    let told = [walk.fixture.id("contact.residual")?, walk.fixture.id("contact.yielding")?];
     let mut before = vec![None; feet.len()];
-    let mut seen = Seen::default();
+    let mut seen = SeenWalk::default();
     for step in 0..STEPS {
         walk.step()?;
-        let states = walk.rig.states()?;
+        let states = walk.fixture.states()?;
         for (foot, last) in feet.iter().zip(&mut before) {
             let (origin, q) = pose(&states[*foot]);
             let p = origin + q * Vector3::from(FOOT);
@@ -73,20 +73,20 @@ fn quality(name: &str, drive: Drive) -> Outcome<Vec<Figure>> {
             }
             *last = stands.then_some(p);
         }
-        seen.residual = larger(seen.residual, walk.rig.get(told[0])?);
-        seen.yielding = larger(seen.yielding, walk.rig.get(told[1])?);
+        seen.residual = larger(seen.residual, walk.fixture.get(told[0])?);
+        seen.yielding = larger(seen.yielding, walk.fixture.get(told[1])?);
         if step >= WALKS {
             seen.samples += 1.0;
             for normal in &normals {
-                seen.normal += walk.rig.get(*normal)?;
+                seen.normal += walk.fixture.get(*normal)?;
             }
             seen.tracking += walk.tracking_error()?;
         }
     }
-    let end = pose(&walk.rig.states()?[0]).0;
+    let end = pose(&walk.fixture.states()?[0]).0;
     let weight = MASS * G;
     let id = |what: &str| format!("rigid-body.gait.{name}.{what}");
-    let bar = |limit: f64| if drive == Drive::Stiff { Limit::AtMost(limit) } else { Limit::None };
+    let bar = |limit: f64| if drive == GaitDrive::Stiff { Limit::AtMost(limit) } else { Limit::None };
     Ok(vec![
         Figure::new(
             id("penetration"),
@@ -134,7 +134,7 @@ fn quality(name: &str, drive: Drive) -> Outcome<Vec<Figure>> {
 fn cost(name: &str, model: &str, limit: f64) -> Outcome<Vec<Figure>> {
     let mut times = vec![f64::INFINITY; STEPS];
     for _ in 0..RUNS {
-        let mut walk = Walk::new(model, Drive::Soft, H)?;
+        let mut walk = GaitWalk::new(model, GaitDrive::Soft, H)?;
         for time in &mut times {
             let start = cpu_s();
             walk.step()?;

@@ -3,39 +3,39 @@
 use crate::Figure;
 
 /// Quantity; our figures, MuJoCo's and Rapier's by the end of their names.
-struct Row(&'static str, &'static [&'static str], &'static [&'static str], &'static [&'static str]);
+struct PeerRow(&'static str, &'static [&'static str], &'static [&'static str], &'static [&'static str]);
 
-const ROWS: [Row; 20] = [
-    Row(
+const ROWS: [PeerRow; 20] = [
+    PeerRow(
         "gait, drive A: CPU time of a step, µs (MuJoCo: soft, stiff contacts)",
         &["gait.six.step"],
         &["gait.soft.step", "gait.stiff_contacts.step"],
         &["gait.soft.step"],
     ),
-    Row(
+    PeerRow(
         "the same: 99th percentile / median (each step the least of five runs)",
         &["gait.six.tail"],
         &["gait.soft.tail", "gait.stiff_contacts.tail"],
         &["gait.soft.tail"],
     ),
-    Row(
+    PeerRow(
         "the same: deepest foot, mm",
         &["gait.soft.penetration"],
         &["gait.soft.penetration", "gait.stiff_contacts.penetration"],
         &["gait.soft.penetration"],
     ),
-    Row(
+    PeerRow(
         "the same: slip in stance, mm/s",
         &["gait.soft.slip"],
         &["gait.soft.slip", "gait.stiff_contacts.slip"],
         &["gait.soft.slip"],
     ),
-    Row("the same: joint gap, mm", &["gait.joint_gap"], &[], &["gait.soft.joint_gap"]),
-    Row("the same: axis error, mrad", &["gait.axis_error"], &[], &["gait.soft.axis_error"]),
-    Row("gait, drive B: deepest foot, mm", &["gait.stiff.penetration"], &[], &["gait.stiff.penetration"]),
-    Row("the same: slip in stance, mm/s", &["gait.stiff.slip"], &[], &["gait.stiff.slip"]),
+    PeerRow("the same: joint gap, mm", &["gait.joint_gap"], &[], &["gait.soft.joint_gap"]),
+    PeerRow("the same: axis error, mrad", &["gait.axis_error"], &[], &["gait.soft.axis_error"]),
+    PeerRow("gait, drive B: deepest foot, mm", &["gait.stiff.penetration"], &[], &["gait.stiff.penetration"]),
+    PeerRow("the same: slip in stance, mm/s", &["gait.stiff.slip"], &[], &["gait.stiff.slip"]),
     same("20° incline, μ = 0.5: creep, mm/s", &["incline.creep"]),
-    Row(
+    PeerRow(
         "35° incline: error of 2x/t² (ours: x at the time of the rates, at the end of the step)",
         &["incline.acceleration", "incline.acceleration_at_end"],
         &["incline.acceleration"],
@@ -43,49 +43,49 @@ const ROWS: [Row; 20] = [
     ),
     same("stack of ten boxes, 5 s: sink, mm", &["stack.sink"]),
     same("1000 kg on 1 kg, 5 s: sink, mm", &["heavy.sink"]),
-    Row(
+    PeerRow(
         "intermediate axis, 60 s: ΔE/E (MuJoCo: Euler, RK4)",
         &["dzhanibekov.energy"],
         &["dzhanibekov.euler.energy", "dzhanibekov.rk4.energy"],
         &["dzhanibekov.energy"],
     ),
-    Row(
+    PeerRow(
         "the same: ΔL/L",
         &["dzhanibekov.momentum"],
         &["dzhanibekov.euler.momentum", "dzhanibekov.rk4.momentum"],
         &["dzhanibekov.momentum"],
     ),
-    Row(
+    PeerRow(
         "the same: flips (22)",
         &["dzhanibekov.flips"],
         &["dzhanibekov.euler.flips", "dzhanibekov.rk4.flips"],
         &["dzhanibekov.flips"],
     ),
-    Row(
+    PeerRow(
         "spatial chain, 10 s: largest ΔE, J (ours: first order, energy-momentum; MuJoCo: Euler, RK4)",
         &["chain8.first-order.energy", "chain8.energy-momentum.energy"],
         &["chain8.euler.energy", "chain8.rk4.energy"],
         &["chain8.energy"],
     ),
-    Row(
+    PeerRow(
         "the same: ΔE at the end, J",
         &["chain8.first-order.energy_end", "chain8.energy-momentum.energy_end"],
         &["chain8.euler.energy_end", "chain8.rk4.energy_end"],
         &["chain8.energy_end"],
     ),
-    Row(
+    PeerRow(
         "the same: tip at 1 s, mm",
         &["chain8.first-order.tip", "chain8.energy-momentum.tip"],
         &["chain8.euler.tip", "chain8.rk4.tip"],
         &["chain8.tip"],
     ),
-    Row(
+    PeerRow(
         "1000 kg on a chain of 1 kg links, 10 s: gap, mm (ours: energy-momentum)",
         &["chain8_m1000.energy-momentum.gap"],
         &[],
         &["chain8_m1000.gap"],
     ),
-    Row(
+    PeerRow(
         "the same: largest ΔE, J (MuJoCo: Euler, RK4)",
         &["chain8_m1000.energy-momentum.energy"],
         &["chain8_m1000.euler.energy", "chain8_m1000.rk4.energy"],
@@ -93,8 +93,8 @@ const ROWS: [Row; 20] = [
     ),
 ];
 
-const fn same(what: &'static str, id: &'static [&'static str]) -> Row {
-    Row(what, id, id, id)
+const fn same(what: &'static str, id: &'static [&'static str]) -> PeerRow {
+    PeerRow(what, id, id, id)
 }
 
 /// The table as text; none where no peer was measured.
@@ -109,7 +109,7 @@ pub fn comparison(figures: &[Figure]) -> Option<String> {
     }
     let [mujoco, rapier] = versions.map(|v| v.unwrap_or_else(|| "not measured".into()));
     let head = format!("| quantity | Terraglue | MuJoCo {mujoco} | Rapier {rapier} |\n|---|---|---|---|\n");
-    let row = |Row(what, ours, mujoco, rapier): &Row| {
+    let row = |PeerRow(what, ours, mujoco, rapier): &PeerRow| {
         let cells = [("", ours), ("peer.mujoco.", mujoco), ("peer.rapier.", rapier)];
         let [a, b, c] = cells.map(|(whose, ids)| cell(figures, whose, ids));
         format!("| {what} | {a} | {b} | {c} |\n")

@@ -1,7 +1,7 @@
 //! Passive chains of eight links against references in reduced coordinates.
 
 use crate::process::Outcome;
-use crate::rigid_body::rig::{G, Rig, pose};
+use crate::rigid_body::fixture::{Fixture, G, pose};
 use crate::{Figure, Limit};
 use nalgebra::Vector3;
 use terraglue_numerics::extremes::larger;
@@ -19,7 +19,7 @@ const EXACT: f64 = 1e-6;
 const LINK: Vector3<f64> = Vector3::new(0.25, 0.0, 0.0);
 
 /// What a run leaves.
-struct Run {
+struct ChainRun {
     /// Distance of the tip from the reference at 1 s, m.
     tip: f64,
     /// Largest |ΔE| and ΔE at the end, J.
@@ -88,27 +88,27 @@ pub fn figures() -> Outcome<Vec<Figure>> {
     Ok(all)
 }
 
-fn run(file: &str, joints: &str, tip: [f64; 3], integrator: &str, h: f64, until: f64) -> Outcome<Run> {
+fn run(file: &str, joints: &str, tip: [f64; 3], integrator: &str, h: f64, until: f64) -> Outcome<ChainRun> {
     let parameters = format!(
         r#"{{"model": "tests/reference/multibody/{file}.urdf", "motor": "off", "joints": {joints},
         "integrator": "{integrator}"}}"#
     );
-    let mut rig = Rig::new(&parameters, [0.0, 0.0, -G], h)?;
-    let start = rig.energy().mechanical();
-    let mut result = Run { tip: f64::NAN, energy: [0.0; 2], gap: 0.0 };
+    let mut fixture = Fixture::new(&parameters, [0.0, 0.0, -G], h)?;
+    let start = fixture.energy().mechanical();
+    let mut result = ChainRun { tip: f64::NAN, energy: [0.0; 2], gap: 0.0 };
     let second = (1.0 / h).round();
-    rig.run(until, |rig| {
-        let states = rig.states()?;
+    fixture.run(until, |fixture| {
+        let states = fixture.states()?;
         let mut end = Vector3::zeros();
         for state in &states {
             let (p, q) = pose(state);
             result.gap = larger(result.gap, (p - end).norm());
             end = p + q * LINK;
         }
-        if (rig.t() / h).round() == second {
+        if (fixture.t() / h).round() == second {
             result.tip = (end - Vector3::from(tip)).norm();
         }
-        let change = rig.energy().mechanical() - start;
+        let change = fixture.energy().mechanical() - start;
         result.energy = [larger(result.energy[0], change.abs()), change];
         Ok(())
     })?;

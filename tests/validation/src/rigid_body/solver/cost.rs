@@ -22,7 +22,7 @@ fn feet(robot: &dyn Subsystem) -> Outcome<Vec<Port>> {
     let mut ports = Vec::new();
     for shape in scene.shapes.iter().filter(|s| s.collides) {
         let Geometry::Sphere { radius } = shape.geometry else { continue };
-        let (place, q) = crate::rigid_body::rig::pose(&states[shape.body as usize]);
+        let (place, q) = crate::rigid_body::fixture::pose(&states[shape.body as usize]);
         let centre = place + q * nalgebra::Vector3::from(shape.body_from_shape.position);
         ports.push(Port {
             key: u64::from(shape.id),

@@ -1,7 +1,7 @@
 //! Free bodies: the intermediate axis over a minute, and a box that tumbles through the air.
 
 use crate::process::Outcome;
-use crate::rigid_body::rig::{Rig, model, pose, table};
+use crate::rigid_body::fixture::{Fixture, model, pose, table};
 use crate::{Context, Figure, Limit};
 use nalgebra::Vector3;
 use terraglue_numerics::extremes::larger;
@@ -25,18 +25,18 @@ fn intermediate_axis(context: &Context) -> Outcome<Vec<Figure>> {
     let inertia = [0.1, 0.2, 0.3];
     let file = model(&context.scratch, "racket.urdf", &body(1.0, inertia))?;
     let parameters = format!(r#"{{"model": "{file}", "rotation_rate_rad_s": [0.01, 10.0, 0.01]}}"#);
-    let mut rig = Rig::new(&parameters, [0.0; 3], 1e-3)?;
-    let momentum = |rig: &Rig| -> Outcome<(Vector3<f64>, f64)> {
-        let state = rig.states()?[0];
+    let mut fixture = Fixture::new(&parameters, [0.0; 3], 1e-3)?;
+    let momentum = |fixture: &Fixture| -> Outcome<(Vector3<f64>, f64)> {
+        let state = fixture.states()?[0];
         let q = pose(&state).1;
         let local = q.inverse_transform_vector(&Vector3::from(state.angular_velocity));
         Ok((q * Vector3::from(inertia).component_mul(&local), local.y))
     };
-    let (e0, (l0, mut last)) = (rig.energy().kinetic, momentum(&rig)?);
+    let (e0, (l0, mut last)) = (fixture.energy().kinetic, momentum(&fixture)?);
     let (mut energy, mut turn, mut flips) = (0.0_f64, 0.0_f64, 0);
-    rig.run(60.0, |rig| {
-        energy = larger(energy, (rig.energy().kinetic / e0 - 1.0).abs());
-        let (l, rate) = momentum(rig)?;
+    fixture.run(60.0, |fixture| {
+        energy = larger(energy, (fixture.energy().kinetic / e0 - 1.0).abs());
+        let (l, rate) = momentum(fixture)?;
         turn = larger(turn, (l - l0).norm() / l0.norm());
         flips += usize::from(rate * last < 0.0);
         last = rate;
@@ -61,16 +61,16 @@ fn tumble(file: &str, integrator: &str, h: f64) -> Outcome<[f64; 3]> {
         r#"{{"model": "{file}", "integrator": "{integrator}", "velocity_m_s": [-2, 2, 8],
         "rotation_rate_rad_s": [0.1, 5, 0.1]}}"#
     );
-    let mut rig = Rig::new(&parameters, [0.0, 0.0, -9.8], h)?;
-    let e0 = rig.energy().mechanical();
-    rig.run(10.0, |_| Ok(()))?;
+    let mut fixture = Fixture::new(&parameters, [0.0, 0.0, -9.8], h)?;
+    let e0 = fixture.energy().mechanical();
+    fixture.run(10.0, |_| Ok(()))?;
     let rows = table("ref_boxes_complex.csv")?;
     let row = rows.last().filter(|r| r.len() == 8).ok_or("the table of the box is cut")?;
     let expected =
         nalgebra::UnitQuaternion::from_quaternion(nalgebra::Quaternion::new(row[1], row[2], row[3], row[4]));
-    let (position, q) = pose(&rig.states()?[0]);
+    let (position, q) = pose(&fixture.states()?[0]);
     let exact = Vector3::new(-20.0, 20.0, 80.0 - 490.0);
-    Ok([q.angle_to(&expected), (position - exact).norm(), (rig.energy().mechanical() / e0 - 1.0).abs()])
+    Ok([q.angle_to(&expected), (position - exact).norm(), (fixture.energy().mechanical() / e0 - 1.0).abs()])
 }
 
 fn boxes(context: &Context) -> Outcome<Vec<Figure>> {

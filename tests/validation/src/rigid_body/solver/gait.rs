@@ -1,7 +1,7 @@
 //! The hexapod with its tripod gait: joints, momentum in zero gravity, a blocked joint.
 
 use crate::process::{Outcome, root};
-use crate::rigid_body::rig::{G, Rig, pose, table};
+use crate::rigid_body::fixture::{Fixture, G, pose, table};
 use crate::{Figure, Limit};
 use nalgebra::Vector3;
 use terraglue_numerics::extremes::larger;
@@ -12,7 +12,7 @@ const CYCLE: f64 = 1.2;
 
 /// The robot with its drive (PD of 600 N m/rad and 10 N m s/rad, 60 N m) and the gait's targets.
 struct Walker {
-    rig: Rig,
+    fixture: Fixture,
     robot: Robot,
     targets: Vec<u32>,
     rows: Vec<Vec<f64>>,
@@ -25,17 +25,18 @@ impl Walker {
             "joints": {{"*_j2": {}, "*_j3": {}, "*_j4": {}}}}}"#,
             STAND[1], STAND[2], STAND[3]
         );
-        let rig = Rig::new(&parameters, [0.0, 0.0, -gravity], 1e-3)?;
+        let fixture = Fixture::new(&parameters, [0.0, 0.0, -gravity], 1e-3)?;
         let robot = read_robot(&root().join("models/hexapod.urdf"), &Options::default())
             .map_err(|e| e.to_string())?;
         let moving = robot.joints.iter().filter(|j| j.kind == JointKind::Revolute);
-        let targets = moving.map(|j| rig.id(&format!("{}.angle_target", j.name))).collect::<Outcome<_>>()?;
-        Ok(Self { rig, robot, targets, rows: table("gait_tripod.csv")? })
+        let targets =
+            moving.map(|j| fixture.id(&format!("{}.angle_target", j.name))).collect::<Outcome<_>>()?;
+        Ok(Self { fixture, robot, targets, rows: table("gait_tripod.csv")? })
     }
 
     /// Targets at the start of the step, the step.
     fn step(&mut self) -> Outcome {
-        let t = self.rig.t();
+        let t = self.fixture.t();
         let blend = (t - 0.5).clamp(0.0, 1.0);
         let place = ((t - 0.5).max(0.0) % CYCLE) / CYCLE * (self.rows.len() - 1) as f64;
         let k = (place as usize).min(self.rows.len() - 2);
@@ -46,13 +47,13 @@ impl Walker {
                 STAND[j % 4] + blend * (gait - STAND[j % 4])
             })
             .collect();
-        self.rig.set(&self.targets, &values)?;
-        self.rig.step()
+        self.fixture.set(&self.targets, &values)?;
+        self.fixture.step()
     }
 
     /// Largest distance of two anchors (m) and sine between two axes.
     fn joints(&self) -> Outcome<[f64; 2]> {
-        let states = self.rig.states()?;
+        let states = self.fixture.states()?;
         let mut worst = [0.0_f64; 2];
         for joint in &self.robot.joints {
             let Some(parent) = joint.parent else { continue };
@@ -69,7 +70,7 @@ impl Walker {
 
     /// Momentum and angular momentum about the centre of mass.
     fn momentum(&self) -> Outcome<[f64; 2]> {
-        let states = self.rig.states()?;
+        let states = self.fixture.states()?;
         let (mut p, mut l, mut centre, mut mass) =
             (Vector3::zeros(), Vector3::zeros(), Vector3::zeros(), 0.0);
         for (body, state) in self.robot.bodies.iter().zip(&states) {
@@ -98,12 +99,12 @@ pub fn figures() -> Outcome<Vec<Figure>> {
 fn on_ground() -> Outcome<Vec<Figure>> {
     let mut walker = Walker::new(0.33, G, "half-space")?;
     let mut worst = [0.0_f64; 2];
-    while walker.rig.t() < 10.0 - 1e-9 {
+    while walker.fixture.t() < 10.0 - 1e-9 {
         walker.step()?;
         let now = walker.joints()?;
         (0..2).for_each(|k| worst[k] = larger(worst[k], now[k]));
     }
-    let x = pose(&walker.rig.states()?[0]).0.x;
+    let x = pose(&walker.fixture.states()?[0]).0.x;
     let id = "rigid-body.gait";
     Ok(vec![
         Figure::new(
@@ -125,7 +126,7 @@ fn on_ground() -> Outcome<Vec<Figure>> {
 fn in_space() -> Outcome<Vec<Figure>> {
     let mut walker = Walker::new(5.0, 0.0, "none")?;
     let mut worst = [0.0_f64; 2];
-    while walker.rig.t() < 10.0 - 1e-9 {
+    while walker.fixture.t() < 10.0 - 1e-9 {
         walker.step()?;
         let now = walker.momentum()?;
         (0..2).for_each(|k| worst[k] = larger(worst[k], now[k]));
@@ -149,16 +150,16 @@ fn in_space() -> Outcome<Vec<Figure>> {
 
 fn blocked() -> Outcome<Figure> {
     let mut walker = Walker::new(0.33, G, "half-space")?;
-    while walker.rig.t() < 3.0 - 1e-9 {
+    while walker.fixture.t() < 3.0 - 1e-9 {
         walker.step()?;
     }
-    let id = walker.rig.id("LF_j3.angle")?;
-    let held = walker.rig.get(id)?;
-    walker.rig.act("LF_j3.block")?;
+    let id = walker.fixture.id("LF_j3.angle")?;
+    let held = walker.fixture.get(id)?;
+    walker.fixture.act("LF_j3.block")?;
     let mut worst = 0.0_f64;
-    while walker.rig.t() < 8.0 - 1e-9 {
+    while walker.fixture.t() < 8.0 - 1e-9 {
         walker.step()?;
-        worst = larger(worst, (walker.rig.get(id)? - held).abs());
+        worst = larger(worst, (walker.fixture.get(id)? - held).abs());
     }
     let what = "LF_j3 blocked at 3 s, gait to 8 s: largest deviation, mrad";
     Ok(Figure::new("rigid-body.blocked_joint", 1e3 * worst, Limit::AtMost(1e-6), what))
@@ -168,18 +169,18 @@ fn blocked() -> Outcome<Figure> {
 fn partly_blocked() -> Outcome<Vec<Figure>> {
     let slip = |torque: f64| -> Outcome<[f64; 2]> {
         let mut walker = Walker::new(0.33, G, "half-space")?;
-        while walker.rig.t() < 3.0 - 1e-9 {
+        while walker.fixture.t() < 3.0 - 1e-9 {
             walker.step()?;
         }
-        let [angle, stop] = [walker.rig.id("LF_j3.angle")?, walker.rig.id("LF_j3.stop_torque")?];
-        let (held, limit) = (walker.rig.get(angle)?, walker.rig.id("LF_j3.block_torque")?);
-        walker.rig.set(&[limit], &[torque])?;
-        walker.rig.act("LF_j3.block")?;
+        let [angle, stop] = [walker.fixture.id("LF_j3.angle")?, walker.fixture.id("LF_j3.stop_torque")?];
+        let (held, limit) = (walker.fixture.get(angle)?, walker.fixture.id("LF_j3.block_torque")?);
+        walker.fixture.set(&[limit], &[torque])?;
+        walker.fixture.act("LF_j3.block")?;
         let mut worst = [0.0_f64; 2];
-        while walker.rig.t() < 5.0 - 1e-9 {
+        while walker.fixture.t() < 5.0 - 1e-9 {
             walker.step()?;
-            worst[0] = larger(worst[0], (walker.rig.get(angle)? - held).abs());
-            worst[1] = larger(worst[1], walker.rig.get(stop)?.abs());
+            worst[0] = larger(worst[0], (walker.fixture.get(angle)? - held).abs());
+            worst[1] = larger(worst[1], walker.fixture.get(stop)?.abs());
         }
         Ok(worst)
     };
@@ -200,9 +201,9 @@ fn repeated() -> Outcome<Figure> {
     let run = || -> Outcome<Vec<u64>> {
         let mut walker = Walker::new(0.33, G, "half-space")?;
         let mut bits = Vec::new();
-        while walker.rig.t() < 2.0 - 1e-9 {
+        while walker.fixture.t() < 2.0 - 1e-9 {
             walker.step()?;
-            for s in walker.rig.states()? {
+            for s in walker.fixture.states()? {
                 let pose = s.world_from_body;
                 bits.extend(pose.position.iter().chain(&pose.orientation).map(|x| x.to_bits()));
                 bits.extend(s.linear_velocity.iter().chain(&s.angular_velocity).map(|x| x.to_bits()));

@@ -2,7 +2,7 @@
 //! A03 Andrews' squeezer, A04 Bricard, A05 flyball governor.
 
 use crate::process::Outcome;
-use crate::rigid_body::rig::{G, Rig, Urdf, pose, table};
+use crate::rigid_body::fixture::{Fixture, G, Urdf, pose, table};
 use crate::{Context, Figure, Limit};
 use nalgebra::Vector3;
 use std::f64::consts::PI;
@@ -42,11 +42,11 @@ fn row_at(rows: &[Vec<f64>], t: f64) -> Outcome<&Vec<f64>> {
 }
 
 /// Largest |ΔE| over a run and ΔE at its end, J.
-fn run(rig: &mut Rig, until: f64) -> Outcome<[f64; 2]> {
-    let start = rig.energy().mechanical();
+fn run(fixture: &mut Fixture, until: f64) -> Outcome<[f64; 2]> {
+    let start = fixture.energy().mechanical();
     let mut energy = [0.0_f64; 2];
-    rig.run(until, |rig| {
-        let change = rig.energy().mechanical() - start;
+    fixture.run(until, |fixture| {
+        let change = fixture.energy().mechanical() - start;
         energy = [larger(energy[0], change.abs()), change];
         Ok(())
     })?;
@@ -59,11 +59,11 @@ fn pendulum(context: &Context, scheme: &str) -> Outcome<Vec<Figure>> {
         .body("bob", 1.0, [-1.0, 0.0, 0.0], [1e-9; 3])
         .joint("continuous", ["world", "bob"], ORIGIN, Z)
         .write(&context.scratch, "pendulum.urdf")?;
-    let mut rig = Rig::new(&parameters(&file, scheme, ""), [0.0, -G, 0.0], 1e-3)?;
-    let energy = run(&mut rig, 10.0)?[0] / G;
+    let mut fixture = Fixture::new(&parameters(&file, scheme, ""), [0.0, -G, 0.0], 1e-3)?;
+    let energy = run(&mut fixture, 10.0)?[0] / G;
     let rows = table("ref_A01.csv")?;
     let row = row_at(&rows, 10.0)?;
-    let (p, q) = pose(&rig.states()?[0]);
+    let (p, q) = pose(&fixture.states()?[0]);
     let place = p + q * -Vector3::x() - Vector3::new(row[1], row[2], 0.0);
     let id = format!("rigid-body.a01.{scheme}");
     let limit = if scheme == "energy-momentum" { Limit::AtMost(1e-9) } else { Limit::None };
@@ -100,10 +100,10 @@ fn windows(context: &Context, scheme: &str, n: usize) -> Outcome<Vec<Figure>> {
     let more =
         format!(r#", "joint_rates": {{"j_post*": -1.0, "j_bar*": 1.0}}, "loop": [{}]"#, loops.join(","));
     let h = 1e-3;
-    let mut rig = Rig::new(&parameters(&file, scheme, &more), [0.0, -G, 0.0], h)?;
-    let redundant = rig.get(rig.id("loops.redundant_rows")?)?;
+    let mut fixture = Fixture::new(&parameters(&file, scheme, &more), [0.0, -G, 0.0], h)?;
+    let redundant = fixture.get(fixture.id("loops.redundant_rows")?)?;
     let id = format!("rigid-body.a02_n{n}.{scheme}");
-    let energy = match run(&mut rig, 10.0) {
+    let energy = match run(&mut fixture, 10.0) {
         Ok(energy) => energy,
         // The long row of windows is told, not judged.
         Err(e) if n != 2 => return Ok(vec![Figure::skipped(format!("{id}.place"), e)]),
@@ -111,7 +111,7 @@ fn windows(context: &Context, scheme: &str, n: usize) -> Outcome<Vec<Figure>> {
     };
     let rows = table(&format!("ref_A02_N{n}.csv"))?;
     let row = row_at(&rows, 10.0)?;
-    let (p, q) = pose(&rig.states()?[0]);
+    let (p, q) = pose(&fixture.states()?[0]);
     let place = (p + q * Vector3::y() - Vector3::new(row[1], row[2], 0.0)).norm();
     let limit = if n == 2 { Limit::AtMost(1e-4) } else { Limit::None };
     let what = format!("{n} four-bar windows through their singular pose, 10 s, 1 ms: error of B0, m");
@@ -181,23 +181,23 @@ fn squeezer(context: &Context, scheme: &str) -> Outcome<Vec<Figure>> {
     let text = format!(r#"{{"model": "{file}", "fixed_base": true, "integrator": "{scheme}"{more}}}"#);
     // The step is free here: rates reach 1140 rad/s.
     let h = if scheme == "energy-momentum" { 1e-5 } else { 5e-6 };
-    let mut rig = Rig::new(&text, ORIGIN, h)?;
+    let mut fixture = Fixture::new(&text, ORIGIN, h)?;
     let id = format!("rigid-body.a03.{scheme}");
-    let target = rig.id("j_k1.torque_target")?;
-    rig.set(&[target], &[0.033])?;
-    let angle = rig.id("j_k1.angle")?;
-    let start = rig.energy().mechanical();
+    let target = fixture.id("j_k1.torque_target")?;
+    fixture.set(&[target], &[0.033])?;
+    let angle = fixture.id("j_k1.angle")?;
+    let start = fixture.energy().mechanical();
     let mut balance = 0.0_f64;
-    let done = rig.run(0.03, |rig| {
-        let work = 0.033 * (rig.get(angle)? - beta);
-        balance = larger(balance, (rig.energy().mechanical() - start - work).abs());
+    let done = fixture.run(0.03, |fixture| {
+        let work = 0.033 * (fixture.get(angle)? - beta);
+        balance = larger(balance, (fixture.energy().mechanical() - start - work).abs());
         Ok(())
     });
     if let Err(e) = done {
         return Ok(vec![Figure::new(format!("{id}.beta"), f64::NAN, Limit::AtMost(1e-4), e)]);
     }
     let rows = table("ref_A03.csv")?;
-    let error = (rig.get(angle)? - row_at(&rows, 0.03)?[1]).abs();
+    let error = (fixture.get(angle)? - row_at(&rows, 0.03)?[1]).abs();
     let what = format!("Andrews' squeezer at {} us: error of the driven angle at 0.03 s, rad", 1e6 * h);
     Ok(vec![
         Figure::new(format!("{id}.beta"), error, Limit::AtMost(1e-4), what),
@@ -227,16 +227,16 @@ fn bricard(context: &Context, scheme: &str) -> Outcome<Vec<Figure>> {
     let file = file.write(&context.scratch, "bricard.urdf")?;
     let more = r#", "loop": [{"name": "close", "kind": "revolute", "links": ["world", "rod4"], "origin": [0, 0, 1],
         "axis": [1, 0, 0]}]"#;
-    let mut rig = Rig::new(&parameters(&file, scheme, more), [0.0, -G, 0.0], 1e-3)?;
-    let redundant = rig.get(rig.id("loops.redundant_rows")?)?;
+    let mut fixture = Fixture::new(&parameters(&file, scheme, more), [0.0, -G, 0.0], 1e-3)?;
+    let redundant = fixture.get(fixture.id("loops.redundant_rows")?)?;
     let id = format!("rigid-body.a04.{scheme}");
-    let energy = match run(&mut rig, 10.0) {
+    let energy = match run(&mut fixture, 10.0) {
         Ok(energy) => energy,
         Err(e) => return Ok(vec![Figure::new(format!("{id}.place"), f64::NAN, Limit::AtMost(1e-3), e)]),
     };
     let rows = table("ref_A04.csv")?;
     let row = row_at(&rows, 10.0)?;
-    let (p, q) = pose(&rig.states()?[2]);
+    let (p, q) = pose(&fixture.states()?[2]);
     let place = (p + q * Vector3::z() - Vector3::new(row[2], row[3], row[4])).norm();
     Ok(vec![
         Figure::new(
@@ -284,16 +284,16 @@ fn governor(context: &Context, scheme: &str) -> Outcome<Vec<Figure>> {
         spring("right", 1.0),
         spring("left", -1.0)
     );
-    let mut rig = Rig::new(&parameters(&file, scheme, &more), [0.0, 0.0, -G], 1e-3)?;
+    let mut fixture = Fixture::new(&parameters(&file, scheme, &more), [0.0, 0.0, -G], 1e-3)?;
     let id = format!("rigid-body.a05.{scheme}");
-    if let Err(e) = run(&mut rig, 10.0) {
+    if let Err(e) = run(&mut fixture, 10.0) {
         return Ok(vec![Figure::new(format!("{id}.slider"), f64::NAN, Limit::AtMost(1e-4), e)]);
     }
     let rows = table("ref_A05.csv")?;
     let row = row_at(&rows, 10.0)?;
-    let error = (rig.get(rig.id("j_slider.angle")?)? - row[2]).abs();
+    let error = (fixture.get(fixture.id("j_slider.angle")?)? - row[2]).abs();
     let what = "flyball governor, 10 s, 1 ms: error of the slider's height, m";
-    let angle = (rig.get(rig.id("j_right.angle")?)? - row[1]).abs();
+    let angle = (fixture.get(fixture.id("j_right.angle")?)? - row[1]).abs();
     Ok(vec![
         Figure::new(format!("{id}.slider"), error, Limit::AtMost(1e-4), what),
         Figure::new(format!("{id}.alpha"), angle, Limit::None, "the same: error of the arm's angle, rad"),

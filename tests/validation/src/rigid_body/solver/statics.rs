@@ -1,7 +1,7 @@
 //! What joints carry at rest, against sums of weights.
 
 use crate::process::Outcome;
-use crate::rigid_body::rig::{G, Rig};
+use crate::rigid_body::fixture::{Fixture, G};
 use crate::{Figure, Limit};
 use terraglue_numerics::extremes::larger;
 
@@ -16,19 +16,19 @@ pub fn figures() -> Outcome<Vec<Figure>> {
 fn error(more: &str, expected: impl Fn(f64) -> [f64; 2]) -> Outcome<f64> {
     let mut worst = 0.0_f64;
     for scheme in ["symplectic-euler", "generalized-alpha", "energy-momentum"] {
-        let mut rig = Rig::new(
+        let mut fixture = Fixture::new(
             &format!(r#"{{"model": "{CHAIN}", "integrator": "{scheme}", {more}}}"#),
             [0.0, 0.0, -G],
             1e-3,
         )?;
-        rig.run(0.02, |_| Ok(()))?;
+        fixture.run(0.02, |_| Ok(()))?;
         for k in 1..=8 {
             let [force, moment] = expected(f64::from(9 - k));
             for (what, value) in
                 [("x", 0.0), ("y", 0.0), ("z", force), ("mx", 0.0), ("my", moment), ("mz", 0.0)]
             {
-                let id = rig.id(&format!("j{k}.reaction_{what}"))?;
-                worst = larger(worst, (rig.get(id)? - value).abs());
+                let id = fixture.id(&format!("j{k}.reaction_{what}"))?;
+                worst = larger(worst, (fixture.get(id)? - value).abs());
             }
         }
     }

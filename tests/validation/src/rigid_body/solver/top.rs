@@ -1,7 +1,7 @@
 //! A heavy top on a fixed tip against its equations in Euler angles: order of convergence.
 
 use crate::process::Outcome;
-use crate::rigid_body::rig::{G, Rig, model, pose};
+use crate::rigid_body::fixture::{Fixture, G, model, pose};
 use crate::{Context, Figure, Limit};
 use nalgebra::Vector3;
 use terraglue_numerics::extremes::larger;
@@ -43,14 +43,14 @@ fn exact(t: f64) -> [f64; 2] {
 }
 
 /// What a run leaves.
-struct Run {
+struct TopRun {
     /// Angle between the axis and the exact one at the end, rad.
     axis: f64,
     /// Largest |ΔE|, J.
     energy: f64,
 }
 
-fn run(file: &str, scheme: &str, h: f64, exact: &Vector3<f64>) -> Outcome<Run> {
+fn run(file: &str, scheme: &str, h: f64, exact: &Vector3<f64>) -> Outcome<TopRun> {
     let start = Vector3::new(TILT.sin(), 0.0, TILT.cos());
     let rate = SPIN * start;
     let text = format!(
@@ -58,15 +58,15 @@ fn run(file: &str, scheme: &str, h: f64, exact: &Vector3<f64>) -> Outcome<Run> {
         "loop": [{{"name": "tip", "kind": "spherical", "links": ["top", "world"], "origin": [0, 0, 0]}}]}}"#,
         rate.x, rate.z
     );
-    let mut rig = Rig::new(&text, [0.0, 0.0, -G], h)?;
-    let before = rig.energy().mechanical();
+    let mut fixture = Fixture::new(&text, [0.0, 0.0, -G], h)?;
+    let before = fixture.energy().mechanical();
     let mut energy = 0.0_f64;
-    rig.run(DURATION, |rig| {
-        energy = larger(energy, (rig.energy().mechanical() - before).abs());
+    fixture.run(DURATION, |fixture| {
+        energy = larger(energy, (fixture.energy().mechanical() - before).abs());
         Ok(())
     })?;
-    let axis = pose(&rig.states()?[0]).1 * start;
-    Ok(Run { axis: axis.angle(exact), energy })
+    let axis = pose(&fixture.states()?[0]).1 * start;
+    Ok(TopRun { axis: axis.angle(exact), energy })
 }
 
 /// All of them.
@@ -85,7 +85,8 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     for scheme in ["symplectic-euler", "generalized-alpha", "energy-momentum"] {
         let first = scheme == "symplectic-euler";
         let steps = [1e-3, 5e-4, 2.5e-4];
-        let runs: Vec<Run> = steps.iter().map(|h| run(&file, scheme, *h, &exact)).collect::<Outcome<_>>()?;
+        let runs: Vec<TopRun> =
+            steps.iter().map(|h| run(&file, scheme, *h, &exact)).collect::<Outcome<_>>()?;
         let [a, b, c] = [0, 1, 2].map(|k| runs[k].axis);
         let id = format!("rigid-body.heavy_top.{scheme}");
         let what = format!(

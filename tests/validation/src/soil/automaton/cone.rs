@@ -75,7 +75,7 @@ pub fn cones(context: &Context) -> Outcome<Vec<Figure>> {
             let mut field = released(radius, spacing, curvature)?;
             let before = field.total();
             let [coarse, fine] =
-                if settled { field.settle(200_000)? } else { [0, field.rest(MICROMETRE, 200_000)?] };
+                if settled { field.relax(200_000)? } else { [0, field.rest(MICROMETRE, 200_000)?] };
             let slopes: Vec<f64> = (0..360)
                 .map(|k| slope(&field.ground.heights, f64::from(k).to_radians(), f64::from(middle(radius))))
                 .collect();

@@ -6,7 +6,7 @@ use super::feet::{Feet, instance, walk::walk};
 use super::field::{Field, Function, PHI, UNLIMITED};
 use super::machine::Machine;
 use crate::process::Outcome;
-use crate::soil::rig::LUNAR;
+use crate::soil::fixture::LUNAR;
 use crate::timing::median;
 use crate::{Context, Figure, Limit};
 use rustix::time::{ClockId, clock_gettime};
@@ -88,7 +88,7 @@ fn two_threads(context: &Context) -> Vec<Figure> {
 }
 
 /// Presses square plates of 25 cm everywhere but into the strip where the feet will walk; cells that were touched.
-fn wear(rig: &mut Feet) -> f64 {
+fn wear(fixture: &mut Feet) -> f64 {
     const EDGE: f64 = 0.25;
     let plate = Geometry::Box { half_extents: [0.5 * EDGE, 0.5 * EDGE, 0.05] };
     for (a, b) in (-42..=42).flat_map(|b| (-42..=42).map(move |a| (a, b))) {
@@ -97,14 +97,14 @@ fn wear(rig: &mut Feet) -> f64 {
             continue;
         }
         let at = |z: f64| Pose { position: [x, y, 0.05 + z], ..Pose::IDENTITY };
-        rig.bodies.clear();
-        rig.add(&plate, at(0.0));
+        fixture.bodies.clear();
+        fixture.add(&plate, at(0.0));
         for z in [-0.001, -0.002, 0.01] {
-            rig.step(|_| at(z));
+            fixture.step(|_| at(z));
         }
     }
-    rig.lift_and_rest(60_000);
-    let touched = rig.soil.ground().heights.touched().len() * terraglue_ground::TILE_NODES;
+    fixture.lift_and_rest(60_000);
+    let touched = fixture.soil.ground().heights.touched().len() * terraglue_ground::TILE_NODES;
     touched as f64
 }
 
@@ -151,11 +151,11 @@ fn collapses(context: &Context) -> Outcome<Vec<Figure>> {
         for _ in 0..3 {
             let mut field = released(radius, 0.01, UNLIMITED)?;
             let before = cpu();
-            field.settle(200_000)?;
+            field.relax(200_000)?;
             times.push(1e3 * (cpu() - before));
         }
         let best = times.into_iter().fold(f64::INFINITY, smaller);
-        let what = format!("collapse of a column to a cone of {radius} cells by `settle`, ms of CPU time");
+        let what = format!("collapse of a column to a cone of {radius} cells by `relax`, ms of CPU time");
         figures.push(Figure::new(format!("soil.automaton.cost.collapse_r{radius}"), best, limit, what));
     }
     Ok(figures)

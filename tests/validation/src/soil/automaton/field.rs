@@ -4,7 +4,7 @@ use crate::process::Outcome;
 use std::sync::Arc;
 use terraglue_ground::{Surface, UNIT_M};
 use terraglue_numerics::extremes::larger;
-use terraglue_soil_cellular_automaton::{Sweeper, settle};
+use terraglue_soil_cellular_automaton::{Sweeper, relax};
 use terraglue_soil_contact::Ground;
 use terraglue_subsystem::{Standalone, Terrain, TerrainTile};
 
@@ -81,8 +81,8 @@ impl Field {
     }
 
     /// The same by way of a coarse lattice; sweeps on the coarse and on the fine one. An error after `most`.
-    pub fn settle(&mut self, most: u32) -> Outcome<[u32; 2]> {
-        let sweeps = settle(&mut self.sweeper, &mut self.ground, most).map_err(|e| e.to_string())?;
+    pub fn relax(&mut self, most: u32) -> Outcome<[u32; 2]> {
+        let sweeps = relax(&mut self.sweeper, &mut self.ground, most).map_err(|e| e.to_string())?;
         if sweeps.iter().any(|s| *s >= most) {
             return Err(format!("not at rest after {most} sweeps"));
         }

@@ -4,7 +4,7 @@ use super::feet::{Feet, Soil, instance, shape};
 use super::field::{Function, largest_curvature};
 use super::machine::Machine;
 use crate::process::Outcome;
-use crate::soil::rig::{DRY_SAND, LETE, LUNAR};
+use crate::soil::fixture::{DRY_SAND, LETE, LUNAR};
 use crate::{Context, Figure, Limit};
 use std::sync::Arc;
 use terraglue_ground::UNIT_M;
@@ -32,33 +32,33 @@ fn print(config: &str, spacing: f64, geometry: &Geometry, phi: f64) -> Worst {
     let size = [(0.5 / spacing) as u32 | 1; 2];
     let terrain = Function { size, spacing, height: |_, _| 0.0 };
     let machine = Arc::new(Machine::new(Box::new(terrain), 1));
-    let mut rig = Feet::new(instance::<SoilCellularAutomaton>(config, machine));
+    let mut fixture = Feet::new(instance::<SoilCellularAutomaton>(config, machine));
     let above = Pose { position: [0.003, -0.002, 0.06], ..Pose::IDENTITY };
-    rig.add(geometry, above);
-    let touch = rig.bodies[0].aabb().min[2];
+    fixture.add(geometry, above);
+    let touch = fixture.bodies[0].aabb().min[2];
     let at = |side: f64, depth: f64| Pose {
         position: [0.003 + side, -0.002, 0.06 - touch - depth],
         ..Pose::IDENTITY
     };
-    rig.bodies[0].move_to(&at(0.0, 0.0));
+    fixture.bodies[0].move_to(&at(0.0, 0.0));
     let strides = (DEPTH / STRIDE).round() as u32;
-    (1..=strides).for_each(|k| rig.step(|_| at(0.0, STRIDE * f64::from(k))));
-    (1..=100).for_each(|k| rig.step(|_| at(STRIDE * f64::from(k), DEPTH)));
+    (1..=strides).for_each(|k| fixture.step(|_| at(0.0, STRIDE * f64::from(k))));
+    (1..=100).for_each(|k| fixture.step(|_| at(STRIDE * f64::from(k), DEPTH)));
     for _ in 0..4000 {
-        rig.step(|_| at(100.0 * STRIDE, DEPTH));
-        if rig.soil.material().active_nodes() == 0 {
+        fixture.step(|_| at(100.0 * STRIDE, DEPTH));
+        if fixture.soil.material().active_nodes() == 0 {
             break;
         }
     }
-    let standing = steepest_deg(&rig.soil, Some(&covered(&rig))) - phi;
-    rig.lift_and_rest(60_000);
-    let lifted = steepest_deg(&rig.soil, None) - phi;
-    let curvature = largest_curvature(&rig.soil.ground().heights) / super::CURVATURE;
-    Worst { standing, lifted, curvature, lost: lost(&rig.soil) }
+    let standing = steepest_deg(&fixture.soil, Some(&covered(&fixture))) - phi;
+    fixture.lift_and_rest(60_000);
+    let lifted = steepest_deg(&fixture.soil, None) - phi;
+    let curvature = largest_curvature(&fixture.soil.ground().heights) / super::CURVATURE;
+    Worst { standing, lifted, curvature, lost: lost(&fixture.soil) }
 }
 
-fn covered(rig: &Feet) -> Vec<[i32; 2]> {
-    rig.nodes.iter().map(|n| [n.i, n.j]).collect()
+fn covered(fixture: &Feet) -> Vec<[i32; 2]> {
+    fixture.nodes.iter().map(|n| [n.i, n.j]).collect()
 }
 
 /// Largest angle of √(g_n² + g_t²) over all faces; those with a covered node among their six are held by the body.

@@ -5,7 +5,7 @@ use super::feet::{Feet, Wanderer, instance};
 use super::machine::Machine;
 use super::mass::{crowd, hills, wander};
 use crate::process::Outcome;
-use crate::soil::rig::LUNAR;
+use crate::soil::fixture::LUNAR;
 use crate::{Context, Figure, Limit};
 use std::sync::Arc;
 use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
@@ -27,46 +27,46 @@ fn begin(threads: usize) -> (Feet, Vec<Wanderer>) {
     };
     let terrain = super::field::Function { size: terrain.size, spacing: terrain.spacing, height };
     let machine = Arc::new(Machine::new(Box::new(terrain), threads));
-    let mut rig = Feet::new(instance::<SoilCellularAutomaton>(LUNAR, machine));
-    let wanderers = crowd(&mut rig, 0.9);
-    (rig, wanderers)
+    let mut fixture = Feet::new(instance::<SoilCellularAutomaton>(LUNAR, machine));
+    let wanderers = crowd(&mut fixture, 0.9);
+    (fixture, wanderers)
 }
 
-fn go(rig: &mut Feet, wanderers: &mut [Wanderer], steps: u32) -> u64 {
-    (0..steps).for_each(|_| wander(rig, wanderers));
-    rig.hash()
+fn go(fixture: &mut Feet, wanderers: &mut [Wanderer], steps: u32) -> u64 {
+    (0..steps).for_each(|_| wander(fixture, wanderers));
+    fixture.hash()
 }
 
 fn plain(threads: usize, steps: u32) -> u64 {
-    let (mut rig, mut wanderers) = begin(threads);
-    go(&mut rig, &mut wanderers, steps)
+    let (mut fixture, mut wanderers) = begin(threads);
+    go(&mut fixture, &mut wanderers, steps)
 }
 
 /// Restores the middle twice: once after a few steps, once from the end.
 fn rolled_back(steps: u32) -> Outcome<[u64; 2]> {
-    let (mut rig, mut wanderers) = begin(1);
-    go(&mut rig, &mut wanderers, steps / 2);
-    rig.soil.save_state(0).map_err(|e| e.to_string())?;
-    let (middle, moment) = (wanderers.clone(), rig.moment());
+    let (mut fixture, mut wanderers) = begin(1);
+    go(&mut fixture, &mut wanderers, steps / 2);
+    fixture.soil.save_state(0).map_err(|e| e.to_string())?;
+    let (middle, moment) = (wanderers.clone(), fixture.moment());
     let mut ends = [0; 2];
     for (end, more) in ends.iter_mut().zip([7, steps]) {
-        go(&mut rig, &mut wanderers, more);
-        rig.soil.restore_state(0).map_err(|e| e.to_string())?;
+        go(&mut fixture, &mut wanderers, more);
+        fixture.soil.restore_state(0).map_err(|e| e.to_string())?;
         wanderers.clone_from(&middle);
-        rig.return_to(&moment);
-        *end = go(&mut rig, &mut wanderers, steps - steps / 2);
+        fixture.return_to(&moment);
+        *end = go(&mut fixture, &mut wanderers, steps - steps / 2);
     }
     Ok(ends)
 }
 
 /// Goes on in a new instance from the state that another one wrote as bytes.
 fn restarted(steps: u32) -> Outcome<u64> {
-    let (mut rig, mut wanderers) = begin(1);
-    go(&mut rig, &mut wanderers, steps / 2);
-    let bytes = rig.soil.serialize().map_err(|e| e.to_string())?;
+    let (mut fixture, mut wanderers) = begin(1);
+    go(&mut fixture, &mut wanderers, steps / 2);
+    let bytes = fixture.soil.serialize().map_err(|e| e.to_string())?;
     let (mut other, _) = begin(1);
     other.soil.deserialize(&bytes).map_err(|e| e.to_string())?;
-    other.return_to(&rig.moment());
+    other.return_to(&fixture.moment());
     Ok(go(&mut other, &mut wanderers, steps - steps / 2))
 }
 

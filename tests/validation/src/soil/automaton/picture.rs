@@ -4,8 +4,8 @@ use super::feet::{Feet, instance};
 use super::field::Function;
 use super::machine::Machine;
 use crate::process::{Outcome, root, write};
+use crate::soil::fixture::LUNAR;
 use crate::soil::panel::Panel;
-use crate::soil::rig::LUNAR;
 use std::fmt::Write;
 use std::sync::Arc;
 use terraglue_soil_cellular_automaton::SoilCellularAutomaton;
@@ -28,25 +28,25 @@ struct Print {
 fn press() -> Print {
     let terrain = Function { size: [121; 2], spacing: SPACING, height: |_, _| 0.0 };
     let machine = Arc::new(Machine::new(Box::new(terrain), 1));
-    let mut rig = Feet::new(instance::<SoilCellularAutomaton>(LUNAR, machine));
+    let mut fixture = Feet::new(instance::<SoilCellularAutomaton>(LUNAR, machine));
     let at = |depth: f64| Pose { position: [0.0, 0.0, 0.1 - depth], ..Pose::IDENTITY };
-    rig.add(&Geometry::Cylinder { half_length: 0.1, radius: RADIUS }, at(0.0));
+    fixture.add(&Geometry::Cylinder { half_length: 0.1, radius: RADIUS }, at(0.0));
     let area = std::f64::consts::PI * RADIUS * RADIUS;
     let curve = (1..=(DEPTH / STRIDE).round() as u32)
         .map(|k| {
             let depth = STRIDE * f64::from(k);
-            rig.step(|_| at(depth));
-            [depth, rig.force(0)[2] / area]
+            fixture.step(|_| at(depth));
+            [depth, fixture.force(0)[2] / area]
         })
         .collect();
-    (0..3000).for_each(|_| rig.step(|_| at(DEPTH)));
-    let section = |rig: &Feet| {
-        let heights = &rig.soil.ground().heights;
+    (0..3000).for_each(|_| fixture.step(|_| at(DEPTH)));
+    let section = |fixture: &Feet| {
+        let heights = &fixture.soil.ground().heights;
         (20..=100).map(|i| [heights.lattice().position(i, 60)[0], heights.height(i, 60)]).collect()
     };
-    let standing = section(&rig);
-    rig.lift_and_rest(60_000);
-    Print { curve, standing, left: section(&rig) }
+    let standing = section(&fixture);
+    fixture.lift_and_rest(60_000);
+    Print { curve, standing, left: section(&fixture) }
 }
 
 /// The picture as SVG text.

@@ -41,19 +41,19 @@ pub(super) fn read(text: &str) -> Result<Scene, String> {
     };
     let up =
         asset.and_then(|a| child(a, "up_axis")).and_then(|u| u.text()).unwrap_or("Y_UP").trim().to_owned();
-    let mut reader = Reader { ids, known: HashMap::new(), triangles: Vec::new() };
+    let mut reader = ColladaReader { ids, known: HashMap::new(), triangles: Vec::new() };
     reader.scene(root, &Matrix4::new_scaling(unit))?;
     Ok(Scene { triangles: reader.triangles, up })
 }
 
 /// Elements by id, geometries that were read, and what was found.
-struct Reader<'a> {
+struct ColladaReader<'a> {
     ids: HashMap<&'a str, Node<'a, 'a>>,
     known: HashMap<&'a str, Vec<Triangle>>,
     triangles: Vec<Triangle>,
 }
 
-impl<'a> Reader<'a> {
+impl<'a> ColladaReader<'a> {
     fn scene(&mut self, root: Node<'a, 'a>, unit: &Matrix4<f64>) -> Result<(), String> {
         let wanted = child(root, "scene").and_then(|s| child(s, "instance_visual_scene"));
         let scene = match wanted {

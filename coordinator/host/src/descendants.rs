@@ -1,0 +1,65 @@
+//! Processes that modules and FMUs leave behind end with the program.
+
+use rustix::process::{
+    Pid, Signal, WaitId, WaitIdOptions, WaitOptions, getpid, kill_process, set_child_subreaper, waitid,
+    waitpid,
+};
+use std::time::{Duration, Instant};
+
+/// How long a child that is ending already may take.
+const GRACE: Duration = Duration::from_millis(100);
+const LOOK: Duration = Duration::from_millis(2);
+/// Children of children come to light when those end.
+const GENERATIONS: usize = 100;
+
+/// From here on processes whose parents end become children of this one, sessions and groups of their own included.
+pub fn adopt() {
+    // Where the system does not know it, such processes go to its own first one.
+    let _ = set_child_subreaper(Some(getpid()));
+}
+
+/// Ends all children of this process; how many had to be ended.
+pub fn end_all() -> usize {
+    let end = Instant::now() + GRACE;
+    while has_children() && Instant::now() < end {
+        reap();
+        std::thread::sleep(LOOK);
+    }
+    let mut ended = 0;
+    for _ in 0..GENERATIONS {
+        if !has_children() {
+            break;
+        }
+        for child in children() {
+            ended += usize::from(kill_process(child, Signal::KILL).is_ok());
+            // It may be gone already.
+            let _ = waitpid(Some(child), WaitOptions::empty());
+        }
+    }
+    ended
+}
+
+fn has_children() -> bool {
+    // nothing is taken from whom else waits for a child
+    let look = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
+    waitid(WaitId::All, look).is_ok()
+}
+
+/// Buries children that have ended.
+fn reap() {
+    while let Ok(Some(_)) = waitpid(None, WaitOptions::NOHANG) {}
+}
+
+/// By the list of processes: the kernel's own list of children is optional.
+fn children() -> Vec<Pid> {
+    let own = getpid().as_raw_nonzero().to_string();
+    let all = std::fs::read_dir("/proc").into_iter().flatten().flatten();
+    let child = |entry: std::fs::DirEntry| {
+        let id: i32 = entry.file_name().to_str()?.parse().ok()?;
+        let stat = std::fs::read_to_string(entry.path().join("stat")).ok()?;
+        // behind the name in brackets, which may hold anything: state, parent
+        let parent = stat.rsplit_once(')')?.1.split_whitespace().nth(1)? == own;
+        parent.then(|| Pid::from_raw(id))?
+    };
+    all.filter_map(child).collect()
+}

@@ -1,0 +1,175 @@
+//! One call of the C interface: looked at before, and its status after.
+
+use super::functions::InstanceHandle;
+use super::{FmuInstance, goes_on};
+use crate::error::{Error, Result};
+use std::ffi::c_int;
+
+/// Whether an instance may be called.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Health {
+    /// Yes.
+    Good,
+    /// It answered `error`: only reset, state and free are allowed.
+    Erroneous,
+    /// It answered `fatal`: nothing is allowed.
+    Dead,
+}
+
+/// Status of a call.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum CallStatus {
+    /// Done.
+    Ok,
+    /// Done, with something to say.
+    Warning,
+    /// Not done, and nothing has changed.
+    Discard,
+    /// Failed.
+    Error,
+    /// Failed for good.
+    Fatal,
+    /// Still at work (FMI 2.0 only).
+    Pending,
+    /// None of the standard.
+    Unknown(c_int),
+}
+
+impl From<c_int> for CallStatus {
+    fn from(status: c_int) -> Self {
+        match status {
+            0 => Self::Ok,
+            1 => Self::Warning,
+            2 => Self::Discard,
+            3 => Self::Error,
+            4 => Self::Fatal,
+            5 => Self::Pending,
+            other => Self::Unknown(other),
+        }
+    }
+}
+
+impl FmuInstance {
+    /// Calls a function that must succeed.
+    #[inline(always)]
+    pub(super) fn call<F>(
+        &self,
+        function: &'static str,
+        f: Option<F>,
+        run: impl FnOnce(F, InstanceHandle) -> c_int,
+    ) -> Result {
+        let (Health::Good, Some(f)) = (self.health.get(), f) else {
+            return Err(self.not_called(function));
+        };
+        self.log.begin();
+        match run(f, self.component) {
+            0 => Ok(()),
+            other => self.no_plain_success(function, other),
+        }
+    }
+
+    #[cold]
+    fn no_plain_success(&self, function: &'static str, status: c_int) -> Result {
+        match self.unlike_ok(status) {
+            status if goes_on(status) => Ok(()),
+            status => Err(self.failed(function, status)),
+        }
+    }
+
+    /// The same where the standard lets an instance be called that answered `error`.
+    pub(super) fn call_after_error<F>(
+        &self,
+        function: &'static str,
+        f: Option<F>,
+        run: impl FnOnce(F, InstanceHandle) -> c_int,
+    ) -> Result {
+        let before = self.health.get();
+        if before == Health::Erroneous {
+            self.health.set(Health::Good);
+        }
+        let done = self.call(function, f, run);
+        if done.is_err() && self.health.get() == Health::Good {
+            self.health.set(before);
+        }
+        done
+    }
+
+    /// Calls a function and answers its status; what may not be called is an error.
+    #[inline(always)]
+    pub(super) fn status<F>(
+        &self,
+        function: &'static str,
+        f: Option<F>,
+        run: impl FnOnce(F, InstanceHandle) -> c_int,
+    ) -> Result<CallStatus> {
+        let (Health::Good, Some(f)) = (self.health.get(), f) else {
+            return Err(self.not_called(function));
+        };
+        self.log.begin();
+        match run(f, self.component) {
+            0 => Ok(CallStatus::Ok),
+            other => Ok(self.unlike_ok(other)),
+        }
+    }
+
+    /// Why a function was not called: the instance may not be, or there is no such function.
+    #[cold]
+    fn not_called(&self, function: &'static str) -> Error {
+        if self.health.get() == Health::Good {
+            return Error::Refused(format!("its library has no function `{function}`"));
+        }
+        let outcome = "was not called: the instance failed before".into();
+        Error::Call { function, outcome, log: Vec::new(), fatal: true }
+    }
+
+    #[cold]
+    fn unlike_ok(&self, status: c_int) -> CallStatus {
+        let status = CallStatus::from(status);
+        if status == CallStatus::Warning {
+            self.warnings.set(self.warnings.get() + 1);
+        }
+        status
+    }
+
+    /// The error of a status that is no success, remembered where the standard asks for it.
+    #[cold]
+    pub(super) fn failed(&self, function: &'static str, status: CallStatus) -> Error {
+        let (health, outcome) = match status {
+            CallStatus::Error => (Health::Erroneous, "answered the status error".to_owned()),
+            CallStatus::Fatal => (Health::Dead, "answered the status fatal".to_owned()),
+            CallStatus::Discard if changes_mode(function) => {
+                let text = "answered the status discard, which only steps and values may be answered with";
+                (Health::Erroneous, text.to_owned())
+            }
+            CallStatus::Discard => (Health::Good, "answered the status discard".to_owned()),
+            CallStatus::Pending => {
+                let text = "answered the status pending, although nothing was to be done in the background";
+                (Health::Dead, text.to_owned())
+            }
+            CallStatus::Unknown(n) => {
+                (Health::Dead, format!("answered {n}, which is no status of the standard"))
+            }
+            CallStatus::Ok | CallStatus::Warning => (Health::Good, "succeeded".to_owned()),
+        };
+        self.health.set(health);
+        Error::Call { function, outcome, log: self.log.last(), fatal: health != Health::Good }
+    }
+
+    /// Nothing of the instance is called any more.
+    #[cold]
+    pub(super) fn die(&self) {
+        self.health.set(Health::Dead);
+    }
+
+    /// An error in what a function answered.
+    #[cold]
+    pub(super) fn lied(&self, function: &'static str, outcome: String) -> Error {
+        self.health.set(Health::Erroneous);
+        Error::Call { function, outcome, log: self.log.last(), fatal: true }
+    }
+}
+
+/// Whether a function takes the instance from one mode to another.
+fn changes_mode(function: &str) -> bool {
+    ["Setup", "Enter", "Exit", "Terminate"].iter().any(|verb| function["fmi2".len()..].starts_with(verb))
+}

@@ -1,0 +1,270 @@
+//! Intermediate update (FMI 3.0, 4.2.2): an FMU shows values at its own inner steps, takes inputs there and may be asked to
+//! stop there.
+//!
+//! An FMU calls from inside its `doStep`. What it calls at another time, from another thread, from inside another call of
+//! its own or without places for an answer is not followed and said once.
+
+use super::FmuInstance;
+use super::follow::Followed;
+use super::functions::Vr;
+use super::log::meant;
+use crate::error::{Error, Result};
+use std::ffi::{c_int, c_void};
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
+use std::thread::ThreadId;
+use terraglue_subsystem::ValueType;
+
+type Read = unsafe extern "C" fn(*mut c_void, *const Vr, usize, *mut f64, usize) -> c_int;
+
+/// A row of values at an intermediate time.
+#[derive(Clone, Debug, PartialEq)]
+pub struct IntermediateRow {
+    /// s.
+    pub t: f64,
+    /// Whether the FMU has finished an inner step there; else it is a trial of its solver.
+    pub finished: bool,
+    /// Of the variables that were asked for, arrays one after the other.
+    pub values: Vec<f64>,
+}
+
+/// What happens to calls at a wrong time.
+const UNHEARD: &str = "; that is not followed";
+
+/// What an instance's intermediate updates are answered with.
+#[derive(Default)]
+pub struct Updates {
+    inner: Mutex<Inner>,
+    /// Whether it was said that a call is odd.
+    said: AtomicBool,
+}
+
+#[derive(Default)]
+pub(super) struct Inner {
+    window: Option<Window>,
+    /// What is read.
+    references: Vec<Vr>,
+    names: Vec<String>,
+    /// Numbers behind all references.
+    count: usize,
+    rows: Vec<IntermediateRow>,
+    /// What is set.
+    pub followed: Vec<Followed>,
+    /// Why the step cannot stand.
+    wrong: Option<StepFault>,
+}
+
+/// Why a step cannot stand.
+pub(super) struct StepFault {
+    pub text: String,
+    /// Whether nothing of the instance may be called any more.
+    pub fatal: bool,
+}
+
+impl From<String> for StepFault {
+    fn from(text: String) -> Self {
+        Self { text, fatal: false }
+    }
+}
+
+impl StepFault {
+    /// What a status of a call inside the call-back means; `call` says which one.
+    pub fn of(status: c_int, call: impl Fn() -> String) -> std::result::Result<(), Self> {
+        match status {
+            0 | 1 => Ok(()),
+            _ => Err(Self {
+                text: format!("answered {status} to {}", call()),
+                fatal: !matches!(status, 2 | 3),
+            }),
+        }
+    }
+}
+
+/// The step inside which the FMU may call.
+#[derive(Clone, Copy)]
+struct Window {
+    thread: ThreadId,
+    start: f64,
+    end: f64,
+    component: usize,
+    read: Option<Read>,
+}
+
+impl Updates {
+    pub(super) fn inner(&self) -> MutexGuard<'_, Inner> {
+        self.inner.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Takes the call of an FMU; answers where the step shall end early, if so, or what is odd about the call.
+    fn take(
+        &self,
+        t: f64,
+        [requested, allowed, finished, early]: [bool; 4],
+    ) -> std::result::Result<Option<f64>, String> {
+        let mut inner = match self.inner.try_lock() {
+            Ok(inner) => inner,
+            Err(TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
+            Err(TryLockError::WouldBlock) => return Err("from inside another call".to_owned() + UNHEARD),
+        };
+        let Some(window) = inner.window else { return Err("outside doStep".to_owned() + UNHEARD) };
+        if window.thread != std::thread::current().id() {
+            return Err("from another thread".to_owned() + UNHEARD);
+        }
+        if inner.wrong.is_some() {
+            return Ok(early.then_some(t));
+        }
+        let slack = 1e-9 * (window.end - window.start) + 4.0 * f64::EPSILON * window.end.abs();
+        if !(t >= window.start - slack && t <= window.end + slack) {
+            inner.outside(window, t, requested)?;
+        } else {
+            inner.inside(window, t, [requested, allowed, finished]);
+        }
+        Ok(inner.wrong.as_ref().filter(|_| early).map(|_| t))
+    }
+}
+
+impl Inner {
+    fn inside(&mut self, window: Window, t: f64, [requested, allowed, finished]: [bool; 3]) {
+        // the standard wants all that is read to be read before anything is set
+        let read = allowed && !self.references.is_empty();
+        let mut done = if read { self.read(window, t, finished) } else { Ok(()) };
+        if requested && done.is_ok() {
+            done = self.set(window, t);
+        }
+        self.wrong = done.err();
+    }
+
+    /// A call for a time that is none of the step; what is odd about it where the step stands all the same.
+    fn outside(&mut self, window: Window, t: f64, requested: bool) -> std::result::Result<(), String> {
+        let text = format!("for t = {t} s in the step from {} s to {} s", window.start, window.end);
+        let (reads, sets) = (!self.references.is_empty(), requested && !self.followed.is_empty());
+        // solvers step over the end and come back; inputs are known there, what the FMU shows is none of this step
+        if sets && !reads && t > window.end && t.is_finite() {
+            self.wrong = self.set(window, t).err();
+            let given = "; the standard wants times within the step, it was given the inputs of that time";
+            return if self.wrong.is_none() { Err(text + given) } else { Ok(()) };
+        }
+        if !reads && !sets {
+            return Err(text + UNHEARD);
+        }
+        self.wrong = Some(format!("called its intermediate update {text}").into());
+        Ok(())
+    }
+
+    fn set(&mut self, window: Window, t: f64) -> std::result::Result<(), StepFault> {
+        self.followed.iter_mut().try_for_each(|input| input.set(window.component, t))
+    }
+
+    fn read(&mut self, window: Window, t: f64, finished: bool) -> std::result::Result<(), StepFault> {
+        let mut values = vec![f64::NAN; self.count];
+        let read = window.read.ok_or_else(|| "has no function fmi3GetFloat64".to_owned())?;
+        let (r, n) = (self.references.as_ptr(), self.references.len());
+        // SAFETY: a live instance inside its own call-back, so many references and values.
+        let status =
+            unsafe { read(window.component as *mut c_void, r, n, values.as_mut_ptr(), values.len()) };
+        StepFault::of(status, || format!("fmi3GetFloat64 in its intermediate update at t = {t} s"))?;
+        if let Some(wrong) = values.iter().find(|x| !x.is_finite()) {
+            let names = self.names.join("`, `");
+            return Err(
+                format!("showed {wrong} in its intermediate update at t = {t} s, among `{names}`").into()
+            );
+        }
+        self.rows.push(IntermediateRow { t, finished, values });
+        Ok(())
+    }
+}
+
+/// `fmi3IntermediateUpdateCallback`.
+///
+/// # Safety
+/// Both places are null or may be written.
+pub unsafe extern "C" fn update(
+    environment: *mut c_void,
+    t: f64,
+    set_requested: bool,
+    get_allowed: bool,
+    finished: bool,
+    can_return: bool,
+    early: *mut bool,
+    early_time: *mut f64,
+) {
+    // A panic must not cross; nothing here is left half done.
+    let answer = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
+        let instance_log = meant(environment as usize, "")?;
+        match instance_log.updates.take(t, [set_requested, get_allowed, finished, can_return]) {
+            Ok(end) => end,
+            Err(why) => {
+                if !instance_log.updates.said.swap(true, Ordering::Relaxed) {
+                    instance_log.note(&format!("called its intermediate update {why}"));
+                }
+                None
+            }
+        }
+    }));
+    let end = answer.unwrap_or(None);
+    // SAFETY: by the caller.
+    unsafe {
+        if !early.is_null() {
+            *early = end.is_some();
+        }
+        if let Some(end) = end.filter(|_| !early_time.is_null()) {
+            *early_time = end;
+        }
+    }
+}
+
+impl FmuInstance {
+    /// The numbers in calls of variables that are shown at intermediate times.
+    pub(super) fn shown_between(description: &crate::ModelDescription, names: &[String]) -> Result<Vec<Vr>> {
+        if !names.is_empty() && !description.capabilities.intermediate_update {
+            return Err(Error::Refused("the FMU does not offer intermediate update".into()));
+        }
+        let one = |name: &String| {
+            let v = description.position(name).map(|k| &description.variables[k]);
+            let v = v.ok_or_else(|| Error::Refused(format!("there is no variable `{name}`")))?;
+            match v.intermediate && v.value_type == ValueType::F64 {
+                true => Ok(v.reference),
+                false => Err(Error::Refused(format!(
+                    "`{name}` is no Float64 with intermediateUpdate = \"true\": it cannot be read at intermediate times"
+                ))),
+            }
+        };
+        names.iter().map(one).collect()
+    }
+
+    /// Fixes which numbers are read, once arrays have their sizes.
+    pub(super) fn watch_between(&self) {
+        let mut inner = self.log.updates.inner();
+        inner.references.clone_from(&self.shown);
+        let shown = |reference: &Vr| {
+            self.description.variables.iter().find(|v| v.reference == *reference && !v.alias)
+        };
+        let shown: Vec<_> = self.shown.iter().filter_map(shown).collect();
+        inner.count = shown.iter().map(|v| v.len()).sum();
+        inner.names = shown.iter().map(|v| v.name.clone()).collect();
+    }
+
+    /// A step begins inside which the FMU may call.
+    pub(super) fn open_between(&self, start: f64, end: f64, read: Option<Read>) {
+        let thread = std::thread::current().id();
+        let component = self.component as usize;
+        self.log.updates.inner().window = Some(Window { thread, start, end, component, read });
+    }
+
+    /// The step has ended; why it cannot stand, if so.
+    pub(super) fn close_between(&self) -> Option<StepFault> {
+        let mut inner = self.log.updates.inner();
+        inner.window = None;
+        inner.wrong.take()
+    }
+
+    /// Forgets the rows of a step that is made again.
+    pub(super) fn forget_between(&self) {
+        self.log.updates.inner().rows.clear();
+    }
+
+    /// Rows of intermediate times since the last step began.
+    pub fn take_intermediate(&self) -> Vec<IntermediateRow> {
+        std::mem::take(&mut self.log.updates.inner().rows)
+    }
+}

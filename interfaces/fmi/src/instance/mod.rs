@@ -1,0 +1,398 @@
+//! An instance of an FMU, driven through its C interface.
+//!
+//! The order of calls is the standard's: instantiate, start values, initialisation, steps, terminate, free. An
+//! instance that answered `error` is only freed, one that answered `fatal` is not called at all any more.
+#![allow(unsafe_code)] // Functions of foreign libraries are called.
+
+mod call;
+mod clocks;
+mod configure;
+mod follow;
+mod functions;
+mod intermediate;
+mod intervals;
+mod log;
+mod state;
+mod step;
+mod values;
+
+pub use intermediate::IntermediateRow;
+pub use log::{LogLine, Sink};
+pub use state::FmuState;
+pub use step::{Advance, Stepped};
+
+use crate::binary::Loaded;
+use crate::description::ModelDescription;
+use crate::error::{Error, Result};
+use crate::floating_point::Keep;
+use crate::fmu::Fmu;
+use call::{CallStatus, Health};
+use clocks::Clocks;
+use functions::{Api, Callbacks2, InstanceHandle};
+use log::InstanceLog;
+use std::cell::Cell;
+use std::ffi::{CString, c_char, c_int, c_void};
+use std::sync::Arc;
+
+// SAFETY: the variadic logger of logger.c, linked with this crate.
+unsafe extern "C" {
+    fn terraglue_fmi2_logger(
+        environment: *mut c_void,
+        instance: *const c_char,
+        status: c_int,
+        category: *const c_char,
+        message: *const c_char,
+        ...
+    );
+}
+
+/// What an instance is made with.
+pub struct InstanceOptions {
+    /// Name of the instance.
+    pub name: String,
+    /// Whether the FMU shall log details.
+    pub verbose: bool,
+    /// Whether events are handled in event mode (FMI 3, where the FMU has it).
+    pub event_mode: bool,
+    /// Variables that are read at intermediate times (FMI 3).
+    pub intermediate: Vec<String>,
+    /// Inputs that are set at intermediate times (FMI 3), by [`FmuInstance::follow`].
+    pub followed: Vec<String>,
+    /// Where its log goes.
+    pub sink: Sink,
+}
+
+impl InstanceOptions {
+    /// Without details in the log, event mode or intermediate times.
+    pub fn new(name: impl Into<String>, sink: Sink) -> Self {
+        let (intermediate, followed) = (Vec::new(), Vec::new());
+        Self { name: name.into(), verbose: false, event_mode: false, intermediate, followed, sink }
+    }
+}
+
+/// Where an instance is in its life.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum InstancePhase {
+    Instantiated,
+    Initializing,
+    Stepping,
+    Terminated,
+}
+
+/// An instance of an FMU. What every step looks at stands first and in this order, on one line of the cache: the cost of
+/// many cheap FMUs is that of their memory.
+#[repr(C)]
+pub struct FmuInstance {
+    component: InstanceHandle,
+    // The order matters: call-backs and log outlive the instance, the library both, the folder all.
+    log: Arc<InstanceLog>,
+    health: Cell<Health>,
+    phase: InstancePhase,
+    event_mode: bool,
+    /// Whether the FMU may call for an intermediate update.
+    updates: bool,
+    /// Begins with the functions of a step.
+    api: Api,
+    /// What the FMU says of itself, with the array sizes of this instance.
+    description: Arc<ModelDescription>,
+    clocks: Clocks,
+    start: f64,
+    /// What is read in intermediate updates.
+    shown: Vec<u32>,
+    /// What may be read or set in intermediate updates.
+    announced: Vec<u32>,
+    warnings: Cell<u64>,
+    /// Whether it was said that its clock runs ahead.
+    ran_past: Cell<bool>,
+    /// Whether it was said that it does not tell how far it came.
+    untold: Cell<bool>,
+    /// Whether it was said that it changes the floating-point mode.
+    mode_told: Cell<bool>,
+    _callbacks: Option<Box<Callbacks2>>,
+    loaded: Arc<Loaded>,
+    fmu: Arc<Fmu>,
+}
+
+// SAFETY: the standard lets an instance be used from any thread, one at a time.
+unsafe impl Send for FmuInstance {}
+
+impl FmuInstance {
+    /// Loads the library where that was not done yet, and makes an instance.
+    pub fn instantiate(fmu: &Arc<Fmu>, options: InstanceOptions) -> Result<Self> {
+        let _mode = Keep::new();
+        let description = fmu.description();
+        if description.capabilities.needs_tool {
+            log_needs_tool(&options.sink, description);
+        }
+        let shown = Self::shown_between(description, &options.intermediate)?;
+        let mut announced = Self::followed_between(description, &options.followed)?;
+        announced.extend(&shown);
+        announced.sort_unstable();
+        announced.dedup();
+        let updates = description.capabilities.intermediate_update;
+        let loaded = fmu.library()?;
+        let api = functions::find(fmu, &loaded.library)?;
+        let log = InstanceLog::new(options.sink, &options.name);
+        let event_mode = options.event_mode && description.capabilities.event_mode;
+        let environment = Arc::as_ptr(&log).cast_mut().cast::<c_void>();
+        let text =
+            |text: &str| CString::new(text).map_err(|_| Error::Refused(format!("`{text}` has a zero in it")));
+        let (name, token) = (text(&options.name)?, text(&description.token)?);
+        let resources = fmu.folder().join("resources");
+        if let Err(e) = std::fs::create_dir_all(&resources) {
+            return Err(Error::Refused(format!("{}: {e}", resources.display())));
+        }
+        let path = resources.display().to_string();
+        let mut callbacks = None;
+        let component = match &api {
+            Api::Two(two) => {
+                let place = callbacks.insert(Box::new(Callbacks2 {
+                    logger: terraglue_fmi2_logger,
+                    allocate: libc::calloc,
+                    free: libc::free,
+                    step_finished: None,
+                    environment,
+                }));
+                let resources = text(&file_uri(&path))?;
+                let (make, verbose) = (two.instantiate, c_int::from(options.verbose));
+                // SAFETY: the arguments are those of the standard and live long enough.
+                make.map(|f| unsafe {
+                    f(name.as_ptr(), 1, token.as_ptr(), resources.as_ptr(), &raw const **place, 0, verbose)
+                })
+            }
+            Api::Three(three) => {
+                let resources = text(&format!("{path}/"))?;
+                let verbose = options.verbose;
+                let update: Option<functions::Update3> = updates.then_some(intermediate::update);
+                // Only where the event is handled then, and the rest of the step can be made in a step of another length. Without
+                // event mode an FMU handles its events inside the step, unless it may leave it at one.
+                let c = description.capabilities;
+                let early = event_mode && c.variable_step && (c.may_return_early || c.return_early);
+                // SAFETY: the arguments are those of the standard and live long enough.
+                three.instantiate.map(|f| unsafe {
+                    f(
+                        name.as_ptr(),
+                        token.as_ptr(),
+                        resources.as_ptr(),
+                        false,
+                        verbose,
+                        event_mode,
+                        early,
+                        announced.as_ptr(),
+                        announced.len(),
+                        environment,
+                        log::log_3,
+                        update,
+                    )
+                })
+            }
+        };
+        let component = component.unwrap_or(std::ptr::null_mut());
+        if component.is_null() {
+            let function =
+                if matches!(api, Api::Two(..)) { "fmi2Instantiate" } else { "fmi3InstantiateCoSimulation" };
+            let outcome = "made no instance (it returned NULL)".into();
+            return Err(Error::Call { function, outcome, log: log.last(), fatal: true });
+        }
+        Ok(Self {
+            api,
+            component,
+            description: description.clone(),
+            health: Cell::new(Health::Good),
+            phase: InstancePhase::Instantiated,
+            event_mode,
+            clocks: Clocks::new(&description.variables, event_mode, &log),
+            start: 0.0,
+            updates,
+            shown,
+            announced,
+            warnings: Cell::new(0),
+            ran_past: Cell::new(false),
+            untold: Cell::new(false),
+            mode_told: Cell::new(false),
+            log,
+            _callbacks: callbacks,
+            loaded,
+            fmu: fmu.clone(),
+        })
+    }
+
+    /// The FMU.
+    pub fn fmu(&self) -> &Arc<Fmu> {
+        &self.fmu
+    }
+
+    /// A warning of the host's about the FMU, among the lines that it logs.
+    pub fn note(&self, text: &str) {
+        self.log.note(text);
+    }
+
+    /// What the FMU says of itself, with the array sizes of this instance.
+    #[inline]
+    pub fn description(&self) -> &Arc<ModelDescription> {
+        &self.description
+    }
+
+    /// Calls that ended with a warning.
+    pub fn warnings(&self) -> u64 {
+        self.warnings.get()
+    }
+
+    /// Whether nothing of the instance may be called any more.
+    #[inline]
+    pub fn is_dead(&self) -> bool {
+        self.health.get() == Health::Dead
+    }
+
+    /// Enters initialisation mode, after start values were set.
+    pub fn enter_initialization(&mut self, start: f64, stop: Option<f64>, tolerance: Option<f64>) -> Result {
+        let _mode = Keep::new();
+        self.start = start;
+        if self.updates {
+            self.watch_between();
+        }
+        let (has_tolerance, tolerance) = (tolerance.is_some(), tolerance.unwrap_or(0.0));
+        let (has_stop, stop) = (stop.is_some(), stop.unwrap_or(0.0));
+        match self.api {
+            Api::Two(two) => {
+                let (tolerant, stops) = (c_int::from(has_tolerance), c_int::from(has_stop));
+                self.call("fmi2SetupExperiment", two.setup, |f, c| unsafe {
+                    f(c, tolerant, tolerance, start, stops, stop)
+                })?;
+                self.call("fmi2EnterInitializationMode", two.enter_initialization, |f, c| unsafe { f(c) })?;
+            }
+            Api::Three(three) => {
+                self.call("fmi3EnterInitializationMode", three.enter_initialization, |f, c| unsafe {
+                    f(c, has_tolerance, tolerance, start, has_stop, stop)
+                })?;
+            }
+        }
+        self.phase = InstancePhase::Initializing;
+        Ok(())
+    }
+
+    /// Leaves initialisation mode; the FMU can be stepped.
+    pub fn exit_initialization(&mut self) -> Result {
+        let _mode = Keep::new();
+        match self.api {
+            Api::Two(two) => {
+                self.call("fmi2ExitInitializationMode", two.exit_initialization, |f, c| unsafe { f(c) })?;
+            }
+            Api::Three(three) => {
+                self.call("fmi3ExitInitializationMode", three.exit_initialization, |f, c| unsafe { f(c) })?;
+                if self.event_mode {
+                    self.clocks.told.iter().for_each(|clock| clock.begin(self.start));
+                    self.tick(self.start, true)?;
+                    self.forget_triggers();
+                    self.update_discrete_states(self.start)?;
+                    self.call("fmi3EnterStepMode", three.enter_step_mode, |f, c| unsafe { f(c) })?;
+                }
+            }
+        }
+        self.phase = InstancePhase::Stepping;
+        Ok(())
+    }
+
+    /// Whether every function may be called that its phase allows.
+    #[inline]
+    pub fn is_good(&self) -> bool {
+        self.health.get() == Health::Good
+    }
+
+    /// Whether the initialisation has not begun: values can be set, not read.
+    #[inline]
+    pub fn is_instantiated(&self) -> bool {
+        self.phase == InstancePhase::Instantiated
+    }
+
+    /// Whether it is in initialisation mode.
+    #[inline]
+    pub fn is_initializing(&self) -> bool {
+        self.phase == InstancePhase::Initializing
+    }
+
+    /// Ends the simulation; values can still be read.
+    pub fn terminate(&mut self) -> Result {
+        if self.phase != InstancePhase::Stepping {
+            return Ok(());
+        }
+        self.phase = InstancePhase::Terminated;
+        let _mode = Keep::new();
+        match self.api {
+            Api::Two(two) => self.call("fmi2Terminate", two.terminate, |f, c| unsafe { f(c) }),
+            Api::Three(three) => self.call("fmi3Terminate", three.terminate, |f, c| unsafe { f(c) }),
+        }
+    }
+
+    /// Back to the state after instantiation.
+    pub fn reset(&mut self) -> Result {
+        match self.api {
+            Api::Two(two) => self.call_after_error("fmi2Reset", two.reset, |f, c| unsafe { f(c) })?,
+            Api::Three(three) => self.call_after_error("fmi3Reset", three.reset, |f, c| unsafe { f(c) })?,
+        }
+        self.phase = InstancePhase::Instantiated;
+        self.forget_followed();
+        self.description = self.fmu.description().clone();
+        self.clocks = Clocks::new(&self.description.variables, self.event_mode, &self.log);
+        self.health.set(Health::Good);
+        Ok(())
+    }
+}
+
+impl Drop for FmuInstance {
+    fn drop(&mut self) {
+        let _mode = Keep::new();
+        if self.health.get() == Health::Dead {
+            // Nothing of it may be called, so what it still holds must stay loaded.
+            std::mem::forget(self.loaded.clone());
+            return;
+        }
+        if self.health.get() == Health::Good {
+            // The run is over; what it says to this is in its log.
+            drop(self.terminate());
+        }
+        if self.health.get() == Health::Dead {
+            std::mem::forget(self.loaded.clone());
+            return;
+        }
+        let free = match &self.api {
+            Api::Two(two) => two.free,
+            Api::Three(three) => three.free,
+        };
+        if let Some(free) = free {
+            // SAFETY: a live instance, freed once.
+            unsafe { free(self.component) };
+        }
+    }
+}
+
+impl std::fmt::Debug for FmuInstance {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        f.debug_struct("FmuInstance").field("fmu", &self.fmu.path()).field("phase", &self.phase).finish()
+    }
+}
+
+fn log_needs_tool(sink: &Sink, description: &crate::ModelDescription) {
+    let text = format!("needs the tool that made it ({}) to be installed", description.generation_tool);
+    sink(&LogLine { level: terraglue_subsystem::LogLevel::Warning, text });
+}
+
+/// A path as the URI that FMI 2.0 asks for.
+fn file_uri(path: &str) -> String {
+    let mut uri = String::from("file://");
+    for byte in path.bytes() {
+        match byte {
+            b'a'..=b'z' | b'A'..=b'Z' | b'0'..=b'9' | b'/' | b'-' | b'_' | b'.' | b'~' => {
+                uri.push(char::from(byte))
+            }
+            other => uri.push_str(&format!("%{other:02X}")),
+        }
+    }
+    uri
+}
+
+/// Whether a status lets the caller go on.
+#[inline]
+pub(crate) fn goes_on(status: CallStatus) -> bool {
+    matches!(status, CallStatus::Ok | CallStatus::Warning)
+}

@@ -4,7 +4,7 @@
 use super::MODULES;
 use super::drive::{Drive, Move, Vertical, on_rim};
 use super::plates::Maker;
-use super::rows::{Row, eight};
+use super::rows::{SoilRow, eight};
 use crate::parallel::in_parallel;
 use crate::process::Outcome;
 use crate::{Context, Figure, Limit};
@@ -61,7 +61,7 @@ fn turned(q: [f64; 4], angle: f64) -> [f64; 4] {
 
 /// Drags a body in the direction `angle` (rad from x): mean of the force that it takes (N) and of the sinkage (m) over the
 /// last fifth of the way.
-fn drag(make: Maker, soil: &Row, body: &Dragged, spacing: f64, angle: f64) -> [f64; 2] {
+fn drag(make: Maker, soil: &SoilRow, body: &Dragged, spacing: f64, angle: f64) -> [f64; 2] {
     let (s, c) = angle.sin_cos();
     let load = body.load[usize::from(soil.name != SOILS[0])];
     let ground = make(&soil.own, ((2.0 * WAY + 0.4) / spacing) as u32 / 2 * 2 + 1, spacing);
@@ -107,7 +107,7 @@ fn spread(values: impl Iterator<Item = f64> + Clone) -> f64 {
 }
 
 /// The force on both soils, grid by grid, and on the finest grid beside the one before.
-fn by_grid(context: &Context, soil: &Row) -> Vec<Figure> {
+fn by_grid(context: &Context, soil: &SoilRow) -> Vec<Figure> {
     let spacings: &[f64] = if context.quick { &[0.01] } else { &[0.01, 0.005, 0.0025] };
     let bodies = bodies();
     let mut cases = Vec::new();
@@ -147,7 +147,7 @@ fn by_grid(context: &Context, soil: &Row) -> Vec<Figure> {
 }
 
 /// The force in directions along the axes of the lattice and across.
-fn by_direction(context: &Context, soil: &Row) -> Vec<Figure> {
+fn by_direction(context: &Context, soil: &SoilRow) -> Vec<Figure> {
     let angles: &[f64] =
         if context.quick { &[0.0, 90.0, 45.0] } else { &[0.0, 90.0, 180.0, 270.0, 15.0, 30.0, 45.0] };
     let bodies = bodies();

@@ -283,3 +283,12 @@ def test_the_page_begins_with_what_is_asked_first(tmp_path):
     assert re.findall(r"<th[^>]*>([^<]*)</th>", first) == ["run", "distance", "median print", "energy drift", "CPU per step"]
     assert first.count("report.html") == 2 and first.count("<tr>") == 3
     assert "<details><summary>" in page.split('<section id="all">')[1]
+
+
+def test_a_run_that_fails_before_its_first_step_tells_its_own_reason(tmp_path):
+    done = terraglue("compare", MOON_WALK, "--vary", "robot.stiffness=600,1e300", "--duration", "0.02", "--strategies", "cooperative",
+                     "--quiet", "--out", tmp_path / "out")
+    assert done.returncode == 0, done.stderr
+    good, failed = json.loads((tmp_path / "out/compare.json").read_text())["rows"]
+    assert not good.get("error") and "no consistent state" in failed["error"], failed["error"]
+    assert "MCAP" not in failed["error"]

@@ -23,9 +23,24 @@ pub fn error(error: &Error) {
         }
         other => {
             eprintln!("error: {}", shorten::text(&other.to_string()));
-            other.help().iter().for_each(|help| eprintln!("  help: {help}"));
+            let help = other.help().or_else(|| on_the_ground(&other));
+            help.iter().for_each(|help| eprintln!("  help: {help}"));
         }
     }
+}
+
+/// The way out where a body and the ground do not fit.
+fn on_the_ground(error: &Error) -> Option<&'static str> {
+    let Error::Simulation { message, .. } = error else { return None };
+    if message.contains(" is buried: ") {
+        return Some(
+            "`terraglue soils` lists other soils, `terraglue robot FILE` shows mass and feet; `position_m` sets it down higher",
+        );
+    }
+    let left = message.contains(" has left the ground: ");
+    left.then_some(
+        "terrain.size_m is the size of the ground; a shorter run, --duration, ends before its edge",
+    )
 }
 
 /// Where to read on about a robot file.
@@ -54,6 +69,7 @@ fn way_out(error: &InputError) -> String {
         return keys_of(error);
     }
     match () {
+        () if message.contains("are free there") => "free some room, or name a path on another disk with -o",
         () if message.contains("(os error ") => PATH,
         () if message.contains("exists already") => {
             "name another folder with -o, or take that one away first"

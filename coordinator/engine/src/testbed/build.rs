@@ -201,12 +201,15 @@ fn instantiate(
     for spec in &scenario.subsystems {
         if terraglue_scenario::ModuleKind::is_fmu(&spec.module) {
             let folder = std::env::current_dir();
+            scenario::advice::idle_limits(scenario, spec, false).iter().for_each(|a| log::warn!("{a}"));
             instances.push(unit(scenario, spec, library, services)?);
             stay_in(folder, &spec.name);
             continue;
         }
         let module = find(scenario, spec, options, library)?;
         let config = scenario::check_parameters(module.schema(), spec, &scenario.source)?;
+        let idle = scenario::advice::idle_limits(scenario, spec, module.is_python());
+        idle.iter().for_each(|advice| log::warn!("{advice}"));
         for name in scenario::SHIPPED_MODULES.iter().filter(|name| spec.parameters.contains_key(**name)) {
             let Ok(other) = library.find(name, &search, &scenario.folder) else { continue };
             if other.schema().name != module.schema().name

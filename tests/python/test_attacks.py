@@ -423,6 +423,9 @@ THIRD_SETS = [
     ("gluing.energy_residual_j=0", 2, "energy_residual_j"),
     ("gait.step_multiple=1000001", 2, "step_multiple"),
     ("gait.load_timeout_s=0", 2, "load_timeout_s"),
+    ("gait.step_timeout_s=1e-9", 2, "out of range"),
+    ("gait.memory_mb=1", 2, "out of range"),
+    ('glue=[{side_1="robot.body",side_2="world",components=["x","x"]}]', 2, "`x` is named twice"),
     ('glue=[{side_1="robot.body",side_2="robot.body"}]', 2, "two different subsystems"),
     ('glue=[{side_1="robot.body",side_2="world",components=["q"]}]', 2, "components are x, y, z"),
     ('glue=[{side_1="robot.body",side_2="world",normal=[0,0,0],kind="contact"}]', 2, "no length"),
@@ -443,6 +446,7 @@ GEOM = "<mujoco><worldbody><body name='a'><freejoint/><geom type='{}' size='0.1'
 THIRD_ROBOTS = [
     ("urdf", "<!DOCTYPE r [<!ENTITY a 'b'>]>" + BALL.replace("MORE", ""), "delete it"),
     ("xml", GEOM.format("banana"), "no type of a geom"),
+    ("urdf", BALL.replace("MORE", "").replace("<sphere radius='0.1'/>", "<mesh filename='pipe'/>"), "a pipe (FIFO)"),
     ("urdf", BALL.replace("MORE", "<link name='a'/>"), "used twice"),
     ("urdf", BALL.replace("MORE", SECOND_LINK), "not connected"),
     ("urdf", BALL.replace("MORE", SECOND_LINK + JOINT + JOINT.replace("'j'", "'k'").replace("'a'", "'c'").replace("'b'", "'a'").replace("'c'", "'b'")), "form a loop"),
@@ -450,10 +454,10 @@ THIRD_ROBOTS = [
     ("urdf", BALL.replace("MORE", SECOND_LINK + JOINT.replace("0 1 0", "0 nan 0")), "not finite"),
     ("urdf", BALL.replace("MORE", SECOND_LINK + JOINT.replace("<axis", "<mimic joint='j'/><axis")), "not itself"),
     ("urdf", BALL.replace("MORE", "").replace("0.1", "-0.1"), "sizes are positive"),
-    ("urdf", BALL.replace("MORE", "").replace("<mass value='1'", "<mass value='0'"), "no mass"),
+    ("urdf", BALL.replace("MORE", "").replace("<mass value='1'", "<mass value='0'"), "mass 0 kg is not positive"),
     ("urdf", BALL.replace("MORE", "").replace("<sphere radius='0.1'/>", "<mesh filename='.'/>"), "a folder"),
     ("urdf", BALL.replace("MORE", "").replace("<sphere radius='0.1'/>", "<mesh filename='http://a.b/c.stl'/>"), "package://"),
-    ("xml", "<mujoco><include file='robot3.12.xml'/></mujoco>", "included twice"),
+    ("xml", "<mujoco><include file='robot3.13.xml'/></mujoco>", "included twice"),
 ]
 
 
@@ -523,10 +527,43 @@ def test_a_unit_for_which_there_is_no_room(place):
         pytest.skip("no file system may be mounted here")
     try:
         done = terraglue("export", "soil-bekker", "-o", disk / "a.fmu", "--set", "soil.parameters=LETE_sand")
-        assert done.returncode in (1, 2) and "a.fmu: No space left" in done.stderr and "ZipWriter" not in done.stderr, done.stderr
-        assert not list(disk.iterdir())
+        for words in ("a.fmu: No space left", "it has ", "MiB are free there", "help: free some room"):
+            assert words in done.stderr and done.returncode in (1, 2), done.stderr
+        assert "ZipWriter" not in done.stderr and not list(disk.iterdir())
     finally:
         subprocess.run(["umount", disk])
+
+
+def test_a_unit_that_may_not_become_so_large(place):
+    import shlex
+    import subprocess
+    unit = place / "limited" / "a.fmu"
+    unit.parent.mkdir()
+    command = shlex.join([PROGRAM, "export", "soil-bekker", "-o", str(unit), "--set", "soil.parameters=LETE_sand"])
+    done = subprocess.run(["bash", "-c", f"ulimit -f 100; exec {command}"], capture_output=True, text=True, timeout=LIMIT_S)
+    for words in ("File too large (os error 27)", "help: free some room"):
+        assert words in done.stderr and done.returncode in (1, 2), done.stderr
+    assert not list(unit.parent.iterdir())
+
+
+def test_limits_of_a_process_that_there_is_not_are_told(place):
+    told = terraglue("check", place / "walk.toml", "--set", "gait.step_timeout_s=5", "--set", "gait.memory_mb=512").stderr
+    for key in ("step_timeout_s", "memory_mb"):
+        assert f"`{key}` has no effect: `gait` has no process of its own" in told, told
+    apart = terraglue("check", place / "walk.toml", "--set", "gait.step_timeout_s=5", "--set", "gait.isolate=true")
+    assert apart.returncode == 0 and "no effect" not in apart.stderr, apart.stderr
+
+
+def test_a_module_without_the_memory_to_be_loaded_is_still_a_library(place):
+    sets = ["--set", "robot.isolate=true", "--set", "robot.memory_mb=16"]
+    faults = attack([("16 MiB", ["run", place / "walk.toml", "--duration", "0.01", "--quiet", "--out", place / "narrow", *sets], 2, "`memory_mb`", place)])
+    assert not faults, "\n\n".join(faults)
+
+
+def test_what_is_buried_has_a_cure(place):
+    arguments = ["run", place / "walk.toml", "--quiet", "--out", place / "weak", "--duration", "0.1", "--set", "soil.module=soil-bekker", "--set", "soil.k_phi=1528"]
+    faults = attack([("weak", arguments, 1, "`terraglue soils` lists other soils", place)])
+    assert not faults, "\n\n".join(faults)
 
 
 def test_check_counts_one_event_as_one(place):

@@ -179,7 +179,7 @@ def test_warnings_are_told_once_with_their_runs(tmp_path):
     process = terraglue("compare", MOON_WALK, "--duration", "0.02", "--quiet", "--strategies", "cooperative,iterative",
                         "--soils", "soil-bekker", "--vary", "soil.k_phi=1528,9e5", cwd=tmp_path)
     assert process.returncode in (0, 1, 2), process.stderr
-    doubted = [line for line in process.stderr.splitlines() if "k_phi" in line]
+    doubted = [line for line in process.stderr.splitlines() if line.startswith("warning: ") and "k_phi" in line]
     assert len(doubted) == 1, process.stderr
     assert "--vary soil.k_phi=1528: " in doubted[0] and "(2 of 4 runs: cooperative" in doubted[0], doubted
     assert "--set:" not in process.stderr
@@ -285,10 +285,22 @@ def test_the_page_begins_with_what_is_asked_first(tmp_path):
     assert "<details><summary>" in page.split('<section id="all">')[1]
 
 
-def test_a_run_that_fails_before_its_first_step_tells_its_own_reason(tmp_path):
+def test_one_run_that_fails_fails_the_comparison_and_tells_its_own_reason(tmp_path):
     done = terraglue("compare", MOON_WALK, "--vary", "robot.stiffness=600,1e300", "--duration", "0.02", "--strategies", "cooperative",
                      "--quiet", "--out", tmp_path / "out")
-    assert done.returncode == 0, done.stderr
+    assert done.returncode == 1, done.stderr
     good, failed = json.loads((tmp_path / "out/compare.json").read_text())["rows"]
     assert not good.get("error") and "no consistent state" in failed["error"], failed["error"]
     assert "MCAP" not in failed["error"]
+    assert "error: 1 of 2 runs did not reach the end" in done.stderr and failed["error"] in done.stderr, done.stderr
+
+
+def test_it_says_at_the_start_what_will_run(pendulum, tmp_path):
+    arguments = ["compare", pendulum, "--out", tmp_path / "out", "--strategies", "cooperative,iterative", "--steps", "4e-3,8e-3"]
+    done = terraglue(*arguments, "--reference", "iterative")
+    assert done.returncode == 0, done.stderr
+    steps = sum(json.loads(row.read_text())["steps"] for row in (tmp_path / "out").glob("*/summary.json"))
+    said = re.search(r"note: 3 runs \(1 of them for reference\), (\d+) steps in all; 2 more cannot be glued so", done.stderr)
+    # runs that are counted once more start their iteration from zero
+    assert said and steps <= int(said[1]) <= 2 * steps, done.stderr
+    assert "steps in all" not in terraglue(*arguments, "--quiet").stderr

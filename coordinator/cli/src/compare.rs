@@ -51,15 +51,20 @@ pub fn compare(arguments: &CompareArguments) -> Result<Exit> {
     judge(&mut rows, arguments)?;
     compare::write(&folder, &rows)?;
     print(arguments, &folder, &rows)?;
-    Ok(if cancel.load(Ordering::Relaxed) { Exit::Interrupted } else { exit(&rows) })
+    Ok(if cancel.load(Ordering::Relaxed) {
+        Exit::Interrupted
+    } else {
+        exit(&rows, !(arguments.run.quiet || arguments.run.json))
+    })
 }
 
 /// Every run that was started must reach its end; a strategy that cannot glue the scenario is a row that says so.
-fn exit(rows: &[CompareRow]) -> Exit {
+fn exit(rows: &[CompareRow], is_shown: bool) -> Exit {
     let started = |row: &&CompareRow| row.error.as_ref().is_none_or(|e| !e.starts_with(plan::REFUSED));
     let failed = rows.iter().filter(started).filter_map(|row| Some((row.name(), row.failure()?)));
     let failed: Vec<(String, String)> = failed.collect();
-    for (name, why) in &failed {
+    // the table tells it, too
+    for (name, why) in failed.iter().filter(|_| !is_shown) {
         eprintln!("error: {name}: {why}");
     }
     for lost in rows.iter().filter(|r| r.is_reference && r.failure().is_some()) {

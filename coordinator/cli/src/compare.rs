@@ -190,8 +190,8 @@ fn recorded(
 ) -> Result<run::Outcome> {
     let options = run::options(arguments, cancel);
     let testbed = run::build(&plan.scenario, &options)?;
-    let label = format!("{} on {}: ", plan.row.strategy, file_name(&plan.row.soil));
-    let waiting = Waiting::standing(arguments.quiet, bar, options.standing);
+    let label = format!("{}: ", plan.name);
+    let waiting = Waiting::standing(arguments.quiet, bar, options.standing, &label);
     let mut progress = Progress::new(bar.clone(), plan.scenario.time.duration_s, &label).after(waiting);
     let records = run::Records {
         scenario: &plan.scenario,

@@ -574,3 +574,20 @@ def test_check_counts_one_event_as_one(place):
 def test_gravity_is_told_as_it_stands(place):
     told = terraglue("check", place / "walk.toml", "--set", "world.gravity_m_s2=[0,0,-9.81]").stderr
     assert "the scenario has 9.81: " in told, told
+
+
+def test_numbers_are_told_without_what_arithmetic_leaves(place):
+    event = 'event=[{at_s=0.0,set={"robot.body.force_z"=0.30000000000000004}},{at_s=0.01,set={"robot.body.force_z"=-1.9979999999999998}},'
+    event += '{at_s=0.02,set={"robot.body.force_z"=0.0}}]'
+    done = terraglue("run", place / "walk.toml", "--duration", "0.03", "--out", place / "told", "--json", "--set", "time.settle_s=0", "--set", event)
+    assert done.returncode == 0, done.stderr
+    assert "(was 0.3)" in done.stdout and "(was -1.998)" in done.stdout, done.stdout
+    many = terraglue("check", place / "walk.toml", "--set", "time.step_s=1e-12").stderr
+    assert "in steps of 1e-12 s" in many, many
+
+
+def test_an_event_at_the_start_sets_what_needs_the_start(place):
+    """Later it is refused: a row above."""
+    event = 'event=[{at_s=0.0,set={"robot.body.z"=0.5}}]'
+    done = terraglue("check", place / "walk.toml", "--set", event)
+    assert done.returncode == 0, done.stderr

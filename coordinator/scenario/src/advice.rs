@@ -36,7 +36,7 @@ pub fn many_steps(scenario: &Scenario) -> Option<String> {
     let steps = time.duration_s / time.step_s;
     let message = || {
         format!(
-            "the run has {steps:.3e} steps of {} s; at 10 µs of wall time each it takes {:.1} hours",
+            "the run has {steps:.3e} steps of {:?} s; at 10 µs of wall time each it takes {:.1} hours",
             time.step_s,
             steps * 1e-5 / 3600.0
         )

@@ -251,6 +251,14 @@ def test_listings_can_be_narrowed():
     lunar = terraglue("soils", "lunar")
     assert "│" not in lunar.stdout
     assert lunar.returncode == 0 and "lunar_nominal_Apollo" in lunar.stdout and "LETE_sand" not in lunar.stdout
+    # every column has its head: numbers stood below `source`
+    head, row = lunar.stdout.splitlines()[:2]
+    place = head.index("measured at, m/s²")
+    assert row[place:].split()[0] == "1.62" and row[head.index("source"):].startswith("Lunar Sourcebook"), lunar.stdout
+    (told,) = json.loads(terraglue("soils", "lunar_nominal_Apollo", "--json").stdout)
+    assert (told["name"], told["measured_gravity_m_s2"], told["refused"]) == ("lunar_nominal_Apollo", 1.62, None)
+    sands = json.loads(terraglue("soils", "SAND", "--json").stdout)
+    assert len(sands) > 3 and all("sand" in row["name"].lower() and row["source"] for row in sands)
     wrong = terraglue("soils", "lunar_nominl_Apollo")
     assert wrong.returncode == 2 and "`lunar_nominal_Apollo`" in wrong.stderr
 

@@ -8,6 +8,7 @@ import zipfile
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
+from cfmu import build
 from conftest import MOON_WALK, PROGRAM, ROOT, terraglue
 
 WALK = MOON_WALK.read_text().replace("../models", str(ROOT / "models"))
@@ -591,3 +592,15 @@ def test_an_event_at_the_start_sets_what_needs_the_start(place):
     event = 'event=[{at_s=0.0,set={"robot.body.z"=0.5}}]'
     done = terraglue("check", place / "walk.toml", "--set", event)
     assert done.returncode == 0, done.stderr
+
+
+def test_limits_of_a_unit_are_told_idle_only_where_it_has_no_process(place):
+    folder = place / "units"
+    folder.mkdir()
+    build(folder, "many", [("y", "output", 0, "")], "r[0] = 1;")
+    for isolate, told in (("false", True), ("true", False)):
+        path = folder / f"{isolate}.toml"
+        path.write_text(f'[time]\nduration_s = 0.1\nstep_s = 0.1\n[a]\nfmu = "many.fmu"\nisolate = {isolate}\nmemory_mb = 512\n')
+        checked = terraglue("check", path)
+        assert checked.returncode == 0, checked.stderr
+        assert ("`memory_mb` has no effect: `a`" in checked.stderr) == told, checked.stderr

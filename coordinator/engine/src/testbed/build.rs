@@ -201,7 +201,6 @@ fn instantiate(
     for spec in &scenario.subsystems {
         if terraglue_scenario::ModuleKind::is_fmu(&spec.module) {
             let folder = std::env::current_dir();
-            scenario::advice::idle_limits(scenario, spec, false).iter().for_each(|a| log::warn!("{a}"));
             instances.push(unit(scenario, spec, library, services)?);
             stay_in(folder, &spec.name);
             continue;
@@ -282,6 +281,7 @@ fn unit(
     let made: terraglue_subsystem::Result<Box<dyn Subsystem>> = match spec.isolate {
         // One instance per process is all that such a unit stands.
         false if !once() => {
+            scenario::advice::idle_limits(scenario, spec, false).iter().for_each(|a| log::warn!("{a}"));
             library.fmus().and_then(|make| make(&path, &spec.parameters, host, services.partings.clone()))
         }
         _ => {

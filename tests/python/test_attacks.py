@@ -8,6 +8,7 @@ import zipfile
 from concurrent.futures import ThreadPoolExecutor
 
 import pytest
+from cfmu import build
 from conftest import MOON_WALK, PROGRAM, ROOT, terraglue
 
 WALK = MOON_WALK.read_text().replace("../models", str(ROOT / "models"))
@@ -371,3 +372,235 @@ def test_a_standard_output_without_room(place):
     with open("/dev/full", "w") as full:
         done = subprocess.run([PROGRAM, "soils"], stdout=full, stderr=subprocess.PIPE, text=True, timeout=LIMIT_S)
     assert done.returncode == 1 and "help: look for room" in done.stderr, done.stderr
+
+
+# ---------------------------------------------------------------------------------------------------------------------
+# A third look: the first rows of each table passed in silence, failed in the middle of a run, or named another cause.
+
+FREEZE = 'fault=[{variable="robot.LF_j1.angle_target",kind="freeze",at_s=0.0,'
+THIRD_SETS = [
+    ("robot.position_m=[nan,0,0]", 2, "a list with nan or inf in it"),
+    ("robot.joints={LF_j1=nan}", 2, "a table with nan or inf in it"),
+    ("report.commanded_speed=robot", 2, "lists its variables"),
+    ('event=[{at_s=1.0,set={"robot"=1}}]', 2, "lists its variables"),
+    ('event=[{at_s=1.0,set={"robot.body.z"=1}}]', 2, "before the first step"),
+    ("event.0.at_s=3", 2, "--set event=[{"),
+    ("connect.99.to=x", 2, "--set connect.0.KEY"),
+    (FREEZE + "for_s=0}]", 2, "never act"),
+    ("world.gravity_m_s2=[1e308,0,0]", 2, "out of range"),
+    ("world.gravity_m_s2={z=-1.62}", 2, "a list of 3 numbers"),
+    ("time.duration_s=-0.0", 2, "out of range"),
+    ("time.duration_s='1'", 2, "the text \"1\""),
+    ("time.duration_s=1979-05-27", 2, "the text \"1979-05-27\""),
+    ("time.step_s.x=1", 2, "not a table"),
+    ("time={}", 2, "lacks `duration_s`"),
+    ("terrain={}", 2, "lacks `kind`"),
+    ("terrain.size_m=[1e-9,1e-9]", 2, "fewer than two cells"),
+    ("terrain.size_m=6", 2, "a list of 2 numbers"),
+    ("terrain.size_m=[\"6\",\"4\"]", 2, "size_m"),
+    ("terrain.spacing_m=100", 2, "make the spacing smaller"),
+    ("terrain.rms_m=1e6", 2, "outside ±511 m"),
+    ("terrain.seed=-3", 2, "out of range"),
+    ("soil.k_phi=9.0e5 Pa", 2, "the text \"9.0e5 Pa\""),
+    ("soil.k_phi=9,0", 2, "the text \"9,0\""),
+    ("soil.k_phi=1e300", 2, "out of range"),
+    ("soil.phi_rad=1.5707963", 2, "angles are in radians"),
+    ("soil.K_m=0", 2, "K_m"),
+    ("soil.parameters=../../etc/passwd", 2, "there is no soil"),
+    ("soil.parameters=true", 2, "text in quotes"),
+    ("soil.🦀=1", 2, "no key path"),
+    ("soil={}", 2, "needs `module` or `fmu`"),
+    ("soil=[]", 2, "unknown key `soil`"),
+    ("robot.model=/dev/stdin", 2, "not a regular file"),
+    ("robot.joints={LF_j1=1e9}", 2, "outside the limits"),
+    ('robot.motor={"zz*"="velocity"}', 2, "no moving joint is called `zz*`"),
+    ('robot.actuator={preset="x"}', 2, "mars-space-climber"),
+    ("robot.strict=1", 2, "true or false"),
+    ("recording.digits=2", 2, "from 3 to 17"),
+    ("recording.include=[3]", 2, "a list of texts"),
+    ("report.commanded_speed=gait.*", 2, "does not exist"),
+    ("report.body=", 2, "subsystem.name"),
+    ("gluing.contact_margin_m=-1", 2, "contact_margin_m"),
+    ("gluing.energy_residual_j=0", 2, "energy_residual_j"),
+    ("gait.step_multiple=1000001", 2, "step_multiple"),
+    ("gait.load_timeout_s=0", 2, "load_timeout_s"),
+    ("gait.step_timeout_s=1e-9", 2, "out of range"),
+    ("gait.memory_mb=1", 2, "out of range"),
+    ('glue=[{side_1="robot.body",side_2="world",components=["x","x"]}]', 2, "`x` is named twice"),
+    ('glue=[{side_1="robot.body",side_2="robot.body"}]', 2, "two different subsystems"),
+    ('glue=[{side_1="robot.body",side_2="world",components=["q"]}]', 2, "components are x, y, z"),
+    ('glue=[{side_1="robot.body",side_2="world",normal=[0,0,0],kind="contact"}]', 2, "no length"),
+    ('event=[{at_s=-1,act="robot.LF_j2.break"}]', 2, "out of range"),
+    ('event=[{at_s=1,act=[]}]', 2, "does nothing"),
+    ('event=[{when="1 < 2",act="robot.LF_j2.break"}]', 2, "subsystem.name"),
+    ('event=[{at_s=1.0,set={"gait.speed"="fast"}}]', 2, "between -2 and 2"),
+    ('fault=[{variable="robot.*.angle_target",kind="freeze",at_s=1.0}]', 2, "does not exist"),
+]
+
+BALL = ("<robot name='r'><link name='a'><inertial><mass value='1'/><inertia ixx='1' iyy='1' izz='1' ixy='0' ixz='0' iyz='0'/></inertial>"
+        "<collision><geometry><sphere radius='0.1'/></geometry></collision></link>MORE</robot>")
+SECOND_LINK = BALL[BALL.index("<link"): BALL.index("MORE")].replace("'a'", "'b'")
+JOINT = ("<joint name='j' type='revolute'><parent link='a'/><child link='b'/><axis xyz='0 1 0'/>"
+         "<limit lower='-1' upper='1' effort='1' velocity='1'/></joint>")
+GEOM = "<mujoco><worldbody><body name='a'><freejoint/><geom type='{}' size='0.1' mass='1'/></body></worldbody></mujoco>"
+# Ending, text, words.
+THIRD_ROBOTS = [
+    ("urdf", "<!DOCTYPE r [<!ENTITY a 'b'>]>" + BALL.replace("MORE", ""), "delete it"),
+    ("xml", GEOM.format("banana"), "no type of a geom"),
+    ("urdf", BALL.replace("MORE", "").replace("<sphere radius='0.1'/>", "<mesh filename='pipe'/>"), "a pipe (FIFO)"),
+    ("urdf", BALL.replace("MORE", "<link name='a'/>"), "used twice"),
+    ("urdf", BALL.replace("MORE", SECOND_LINK), "not connected"),
+    ("urdf", BALL.replace("MORE", SECOND_LINK + JOINT + JOINT.replace("'j'", "'k'").replace("'a'", "'c'").replace("'b'", "'a'").replace("'c'", "'b'")), "form a loop"),
+    ("urdf", BALL.replace("MORE", SECOND_LINK + JOINT.replace("0 1 0", "0 0 0")), "has no direction"),
+    ("urdf", BALL.replace("MORE", SECOND_LINK + JOINT.replace("0 1 0", "0 nan 0")), "not finite"),
+    ("urdf", BALL.replace("MORE", SECOND_LINK + JOINT.replace("<axis", "<mimic joint='j'/><axis")), "not itself"),
+    ("urdf", BALL.replace("MORE", "").replace("0.1", "-0.1"), "sizes are positive"),
+    ("urdf", BALL.replace("MORE", "").replace("<mass value='1'", "<mass value='0'"), "mass 0 kg is not positive"),
+    ("urdf", BALL.replace("MORE", "").replace("<sphere radius='0.1'/>", "<mesh filename='.'/>"), "a folder"),
+    ("urdf", BALL.replace("MORE", "").replace("<sphere radius='0.1'/>", "<mesh filename='http://a.b/c.stl'/>"), "package://"),
+    ("xml", "<mujoco><include file='robot3.13.xml'/></mujoco>", "included twice"),
+]
+
+
+def test_edits_of_a_third_look(place):
+    rows = [(text, ["check", place / "walk.toml", "--set", text], code, words, place) for text, code, words in THIRD_SETS]
+    faults = attack(rows)
+    assert not faults, "\n\n".join(faults)
+
+
+def test_robots_of_a_third_look(place):
+    rows = []
+    for k, (ending, text, words) in enumerate(THIRD_ROBOTS):
+        path = place / f"robot3.{k}.{ending}"
+        path.write_text(text)
+        rows.append((text, ["robot", path], 2, words, place))
+    faults = attack(rows)
+    assert not faults, "\n\n".join(faults)
+
+
+def test_commands_of_a_third_look(place):
+    walk, unit, taken = place / "walk.toml", place / "small.fmu", place / "taken"
+    taken.mkdir()
+    made = terraglue("export", "soil-bekker", "-o", unit, "--set", "soil.parameters=LETE_sand")
+    assert made.returncode == 0, made.stderr
+    rows = [("no folder of modules", ["check", walk, "--module-path", place / "nowhere"], 2, "there is no folder", place),
+            ("a file of modules", ["check", walk, "--module-path", walk], 2, "there is no folder", place),
+            ("no folder of a package", ["robot", ROOT / "models/hexapod.urdf", "--package", "x=/no"], 2, "there is no folder `/no`", place),
+            ("no package", ["robot", ROOT / "models/hexapod.urdf", "--package", "x"], 2, "write NAME=DIR", place),
+            ("taken", ["new", "soil", "taken"], 2, "name another folder", place),
+            ("taken by a robot", ["new", "scenario", "--robot", ROOT / "models/hexapod.urdf", "-o", taken], 2, "name another folder", place),
+            ("nothing built", ["check-module", taken], 2, "build it first", place),
+            ("long", ["new", "soil", "x" * 300], 2, "up to 64", place),
+            ("no numbers", ["export", "soil-bekker", "-o", place / "none.fmu"], 2, "--set soil.parameters=LETE_sand", place),
+            ("no time", ["fmu", "run", unit, "--stop", "0"], None, "later --stop", place),
+            ("no step", ["fmu", "run", unit, "--step", "nan"], None, "above 0", place),
+            ("too many steps", ["fmu", "run", unit, "--stop", "1e9", "--step", "1e-9"], None, "a longer --step", place),
+            ("resumed nothing", ["run", "--resume", place / "nowhere"], 2, "--checkpoint-every", place),
+            ("two scenarios", ["run", walk, "--resume", taken], 2, "cannot be used", place)]
+    faults = attack(rows)
+    assert not faults, "\n\n".join(faults)
+
+
+def test_a_recording_that_is_too_short_to_go_on(place):
+    import signal
+    import subprocess
+    import time
+    folder = place / "cut_short"
+    process = subprocess.Popen([PROGRAM, "run", str(place / "walk.toml"), "--checkpoint-every", "0.05", "--quiet", "--out", str(folder)])
+    until = time.monotonic() + 120
+    while not (folder / "checkpoint.bin").exists():
+        assert process.poll() is None and time.monotonic() < until
+        time.sleep(0.02)
+    process.send_signal(signal.SIGKILL)
+    process.wait()
+    (folder / "recording.mcap").write_bytes(b"x")
+    faults = attack([("cut short", ["run", "--resume", folder, "--quiet"], 1, "shorter than it was", place)])
+    assert not faults, "\n\n".join(faults)
+
+
+def test_a_unit_for_which_there_is_no_room(place):
+    import shutil
+    import subprocess
+    disk = place / "disk"
+    disk.mkdir()
+    mounted = shutil.which("mount") and subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "none", disk], capture_output=True)
+    if not mounted or mounted.returncode:
+        pytest.skip("no file system may be mounted here")
+    try:
+        done = terraglue("export", "soil-bekker", "-o", disk / "a.fmu", "--set", "soil.parameters=LETE_sand")
+        for words in ("a.fmu: No space left", "it has ", "MiB are free there", "help: free some room"):
+            assert words in done.stderr and done.returncode in (1, 2), done.stderr
+        assert "ZipWriter" not in done.stderr and not list(disk.iterdir())
+    finally:
+        subprocess.run(["umount", disk])
+
+
+def test_a_unit_that_may_not_become_so_large(place):
+    import shlex
+    import subprocess
+    unit = place / "limited" / "a.fmu"
+    unit.parent.mkdir()
+    command = shlex.join([PROGRAM, "export", "soil-bekker", "-o", str(unit), "--set", "soil.parameters=LETE_sand"])
+    done = subprocess.run(["bash", "-c", f"ulimit -f 100; exec {command}"], capture_output=True, text=True, timeout=LIMIT_S)
+    for words in ("File too large (os error 27)", "help: free some room"):
+        assert words in done.stderr and done.returncode in (1, 2), done.stderr
+    assert not list(unit.parent.iterdir())
+
+
+def test_limits_of_a_process_that_there_is_not_are_told(place):
+    told = terraglue("check", place / "walk.toml", "--set", "gait.step_timeout_s=5", "--set", "gait.memory_mb=512").stderr
+    for key in ("step_timeout_s", "memory_mb"):
+        assert f"`{key}` has no effect: `gait` has no process of its own" in told, told
+    apart = terraglue("check", place / "walk.toml", "--set", "gait.step_timeout_s=5", "--set", "gait.isolate=true")
+    assert apart.returncode == 0 and "no effect" not in apart.stderr, apart.stderr
+
+
+def test_a_module_without_the_memory_to_be_loaded_is_still_a_library(place):
+    sets = ["--set", "robot.isolate=true", "--set", "robot.memory_mb=16"]
+    faults = attack([("16 MiB", ["run", place / "walk.toml", "--duration", "0.01", "--quiet", "--out", place / "narrow", *sets], 2, "`memory_mb`", place)])
+    assert not faults, "\n\n".join(faults)
+
+
+def test_what_is_buried_has_a_cure(place):
+    arguments = ["run", place / "walk.toml", "--quiet", "--out", place / "weak", "--duration", "0.1", "--set", "soil.module=soil-bekker", "--set", "soil.k_phi=1528"]
+    faults = attack([("weak", arguments, 1, "`terraglue soils` lists other soils", place)])
+    assert not faults, "\n\n".join(faults)
+
+
+def test_check_counts_one_event_as_one(place):
+    told = terraglue("check", place / "walk.toml", "--set", 'event=[{at_s=1.0,act="robot.LF_j2.break"}]')
+    assert "33 connections, 1 event, " in told.stdout, told.stdout + told.stderr
+
+
+def test_gravity_is_told_as_it_stands(place):
+    told = terraglue("check", place / "walk.toml", "--set", "world.gravity_m_s2=[0,0,-9.81]").stderr
+    assert "the scenario has 9.81: " in told, told
+
+
+def test_numbers_are_told_without_what_arithmetic_leaves(place):
+    event = 'event=[{at_s=0.0,set={"robot.body.force_z"=0.30000000000000004}},{at_s=0.01,set={"robot.body.force_z"=-1.9979999999999998}},'
+    event += '{at_s=0.02,set={"robot.body.force_z"=0.0}}]'
+    done = terraglue("run", place / "walk.toml", "--duration", "0.03", "--out", place / "told", "--json", "--set", "time.settle_s=0", "--set", event)
+    assert done.returncode == 0, done.stderr
+    assert "(was 0.3)" in done.stdout and "(was -1.998)" in done.stdout, done.stdout
+    many = terraglue("check", place / "walk.toml", "--set", "time.step_s=1e-12").stderr
+    assert "in steps of 1e-12 s" in many, many
+
+
+def test_an_event_at_the_start_sets_what_needs_the_start(place):
+    """Later it is refused: a row above."""
+    event = 'event=[{at_s=0.0,set={"robot.body.z"=0.5}}]'
+    done = terraglue("check", place / "walk.toml", "--set", event)
+    assert done.returncode == 0, done.stderr
+
+
+def test_limits_of_a_unit_are_told_idle_only_where_it_has_no_process(place):
+    folder = place / "units"
+    folder.mkdir()
+    build(folder, "many", [("y", "output", 0, "")], "r[0] = 1;")
+    for isolate, told in (("false", True), ("true", False)):
+        path = folder / f"{isolate}.toml"
+        path.write_text(f'[time]\nduration_s = 0.1\nstep_s = 0.1\n[a]\nfmu = "many.fmu"\nisolate = {isolate}\nmemory_mb = 512\n')
+        checked = terraglue("check", path)
+        assert checked.returncode == 0, checked.stderr
+        assert ("`memory_mb` has no effect: `a`" in checked.stderr) == told, checked.stderr

@@ -179,7 +179,7 @@ def test_warnings_are_told_once_with_their_runs(tmp_path):
     process = terraglue("compare", MOON_WALK, "--duration", "0.02", "--quiet", "--strategies", "cooperative,iterative",
                         "--soils", "soil-bekker", "--vary", "soil.k_phi=1528,9e5", cwd=tmp_path)
     assert process.returncode in (0, 1, 2), process.stderr
-    doubted = [line for line in process.stderr.splitlines() if "k_phi" in line]
+    doubted = [line for line in process.stderr.splitlines() if line.startswith("warning: ") and "k_phi" in line]
     assert len(doubted) == 1, process.stderr
     assert "--vary soil.k_phi=1528: " in doubted[0] and "(2 of 4 runs: cooperative" in doubted[0], doubted
     assert "--set:" not in process.stderr
@@ -251,6 +251,14 @@ def test_listings_can_be_narrowed():
     lunar = terraglue("soils", "lunar")
     assert "│" not in lunar.stdout
     assert lunar.returncode == 0 and "lunar_nominal_Apollo" in lunar.stdout and "LETE_sand" not in lunar.stdout
+    # every column has its head: numbers stood below `source`
+    head, row = lunar.stdout.splitlines()[:2]
+    place = head.index("measured at, m/s²")
+    assert row[place:].split()[0] == "1.62" and row[head.index("source"):].startswith("Lunar Sourcebook"), lunar.stdout
+    (told,) = json.loads(terraglue("soils", "lunar_nominal_Apollo", "--json").stdout)
+    assert (told["name"], told["measured_gravity_m_s2"], told["refused"]) == ("lunar_nominal_Apollo", 1.62, None)
+    sands = json.loads(terraglue("soils", "SAND", "--json").stdout)
+    assert len(sands) > 3 and all("sand" in row["name"].lower() and row["source"] for row in sands)
     wrong = terraglue("soils", "lunar_nominl_Apollo")
     assert wrong.returncode == 2 and "`lunar_nominal_Apollo`" in wrong.stderr
 
@@ -283,3 +291,24 @@ def test_the_page_begins_with_what_is_asked_first(tmp_path):
     assert re.findall(r"<th[^>]*>([^<]*)</th>", first) == ["run", "distance", "median print", "energy drift", "CPU per step"]
     assert first.count("report.html") == 2 and first.count("<tr>") == 3
     assert "<details><summary>" in page.split('<section id="all">')[1]
+
+
+def test_one_run_that_fails_fails_the_comparison_and_tells_its_own_reason(tmp_path):
+    done = terraglue("compare", MOON_WALK, "--vary", "robot.stiffness=600,1e300", "--duration", "0.02", "--strategies", "cooperative",
+                     "--quiet", "--out", tmp_path / "out")
+    assert done.returncode == 1, done.stderr
+    good, failed = json.loads((tmp_path / "out/compare.json").read_text())["rows"]
+    assert not good.get("error") and "no consistent state" in failed["error"], failed["error"]
+    assert "MCAP" not in failed["error"]
+    assert "error: 1 of 2 runs did not reach the end" in done.stderr and failed["error"] in done.stderr, done.stderr
+
+
+def test_it_says_at_the_start_what_will_run(pendulum, tmp_path):
+    arguments = ["compare", pendulum, "--out", tmp_path / "out", "--strategies", "cooperative,iterative", "--steps", "4e-3,8e-3"]
+    done = terraglue(*arguments, "--reference", "iterative")
+    assert done.returncode == 0, done.stderr
+    steps = sum(json.loads(row.read_text())["steps"] for row in (tmp_path / "out").glob("*/summary.json"))
+    said = re.search(r"note: 3 runs \(1 of them for reference\), (\d+) steps in all; 2 more cannot be glued so", done.stderr)
+    # runs that are counted once more start their iteration from zero
+    assert said and steps <= int(said[1]) <= 2 * steps, done.stderr
+    assert "steps in all" not in terraglue(*arguments, "--quiet").stderr

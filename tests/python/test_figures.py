@@ -99,6 +99,24 @@ def test_a_plate_test_shows_pressure_over_sinkage(plates):
         assert exponent == pytest.approx(0.79, abs=0.02)
 
 
+def test_curves_of_contacts_have_the_names_and_colours_of_the_map(plates):
+    data = data_of(plates[1])
+    legs = list(data["map"]["legs"])
+    assert sorted(legs) == ["large_plate", "small_plate"]
+    figures = {figure["id"]: figure for figure in data["figures"]}
+    for panel in figures["pressure"]["panels"] + figures["contacts"]["panels"] + figures["forces"]["panels"][:1]:
+        assert {curve["name"]: curve["colour"] for curve in panel["curves"]} == {name: k for k, name in enumerate(legs)}
+    # which is which: the smaller plate bears more pressure on this soil
+    last = {curve["name"]: floats(curve["y"])[-1] for curve in figures["pressure"]["panels"][0]["curves"]}
+    assert last["small_plate"] > last["large_plate"]
+
+
+def test_what_the_world_holds_has_no_force_over_its_weight(plates):
+    summary, page, printed = plates
+    assert summary["peak_force_over_weight"] is None
+    assert "Peak force" not in page and "× the weight" not in printed
+
+
 def test_plates_are_round_on_the_map_and_wheels_leave_bands(plates, tmp_path):
     marks = {mark["leg"]: mark for mark in data_of(plates[1])["map"]["marks"]}
     assert data_of(plates[1])["map"]["tracks"] == []

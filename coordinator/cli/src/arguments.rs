@@ -87,6 +87,9 @@ pub enum Command {
         /// Another soil table.
         #[arg(long, value_name = "CSV")]
         file: Option<PathBuf>,
+        /// Print JSON instead of a table.
+        #[arg(long)]
+        json: bool,
     },
 }
 

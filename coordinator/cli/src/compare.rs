@@ -41,6 +41,9 @@ pub fn compare(arguments: &CompareArguments) -> Result<Exit> {
         let free = std::iter::once(name.clone()).chain(numbered).find(|name| !taken(name));
         plans[k].folder = folder.join(free.unwrap_or(name));
     }
+    if !arguments.run.quiet {
+        eprintln!("note: {}", announced(&plans));
+    }
     let bar = progress::bar(plans.iter().map(Plan::steps).sum(), arguments.run.quiet);
     let mut rows = run_all(&plans, &arguments.run, &cancel, &bar);
     bar.finish_and_clear();
@@ -48,21 +51,49 @@ pub fn compare(arguments: &CompareArguments) -> Result<Exit> {
     judge(&mut rows, arguments)?;
     compare::write(&folder, &rows)?;
     print(arguments, &folder, &rows)?;
-    Ok(if cancel.load(Ordering::Relaxed) { Exit::Interrupted } else { exit(&rows) })
+    Ok(if cancel.load(Ordering::Relaxed) {
+        Exit::Interrupted
+    } else {
+        exit(&rows, !(arguments.run.quiet || arguments.run.json))
+    })
 }
 
-/// Rows that failed are data, as long as one reached its end and every reference did.
-fn exit(rows: &[CompareRow]) -> Exit {
-    let lost = rows.iter().filter(|r| r.is_reference && r.failure().is_some());
-    let lost: Vec<String> = lost.map(CompareRow::name).collect();
-    for name in &lost {
+/// Every run that was started must reach its end; a strategy that cannot glue the scenario is a row that says so.
+fn exit(rows: &[CompareRow], is_shown: bool) -> Exit {
+    let started = |row: &&CompareRow| row.error.as_ref().is_none_or(|e| !e.starts_with(plan::REFUSED));
+    let failed = rows.iter().filter(started).filter_map(|row| Some((row.name(), row.failure()?)));
+    let failed: Vec<(String, String)> = failed.collect();
+    // the table tells it, too
+    for (name, why) in failed.iter().filter(|_| !is_shown) {
+        eprintln!("error: {name}: {why}");
+    }
+    for lost in rows.iter().filter(|r| r.is_reference && r.failure().is_some()) {
+        let name = lost.name();
         eprintln!("error: {name} did not reach its end: the rows of its soil have no error against it");
     }
-    let reached = rows.iter().any(|r| !r.is_reference && r.failure().is_none());
-    if !reached {
-        eprintln!("error: no run reached its end; each row says why");
+    match (failed.len(), rows.iter().filter(started).count()) {
+        (0, _) => return Exit::Done,
+        (n, all) if n == all => eprintln!("error: no run reached its end"),
+        (n, all) => eprintln!("error: {n} of {all} runs did not reach the end; the others can be compared"),
     }
-    if reached && lost.is_empty() { Exit::Done } else { Exit::Failed }
+    eprintln!(
+        "  help: `terraglue run` with the --set of a row runs it alone; a smaller time.step_s may help"
+    );
+    Exit::Failed
+}
+
+/// What is about to run, in words.
+fn announced(plans: &[Plan]) -> String {
+    let runs = plans.iter().filter(|p| p.refused.is_none()).count();
+    let references = plans.iter().filter(|p| p.row.is_reference).count();
+    let steps: u64 = plans.iter().map(Plan::steps).sum();
+    let of_them =
+        if references > 0 { format!(" ({references} of them for reference)") } else { String::new() };
+    let refused = match plans.len() - runs {
+        0 => String::new(),
+        n => format!("; {n} more cannot be glued so"),
+    };
+    format!("{runs} run{}{of_them}, {steps} steps in all{refused}", if runs == 1 { "" } else { "s" })
 }
 
 /// The errors of all rows against the reference, where there is one.
@@ -159,8 +190,8 @@ fn recorded(
 ) -> Result<run::Outcome> {
     let options = run::options(arguments, cancel);
     let testbed = run::build(&plan.scenario, &options)?;
-    let label = format!("{} on {}: ", plan.row.strategy, file_name(&plan.row.soil));
-    let waiting = Waiting::standing(arguments.quiet, bar, options.standing);
+    let label = format!("{}: ", plan.name);
+    let waiting = Waiting::standing(arguments.quiet, bar, options.standing, &label);
     let mut progress = Progress::new(bar.clone(), plan.scenario.time.duration_s, &label).after(waiting);
     let records = run::Records {
         scenario: &plan.scenario,

@@ -103,7 +103,7 @@ fn command(command: Command) -> Exit {
         Command::Worker { .. } => Ok(Exit::Failed),
         Command::New(arguments) => new::new(&arguments),
         Command::Robot(arguments) => robot::robot(&arguments),
-        Command::Soils { name, file } => soils::soils(name.as_deref(), file.as_deref()),
+        Command::Soils { name, file, json } => soils::soils(name.as_deref(), file.as_deref(), json),
         Command::FitSoil(arguments) => fit_soil::fit_soil(&arguments),
     };
     done.unwrap_or_else(|error| {

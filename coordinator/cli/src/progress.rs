@@ -69,11 +69,13 @@ impl Waiting {
         Self::new(quiet, bar, || "loading robots, soils and modules".into())
     }
 
-    /// From what was loaded to the end of the first step; `standing`: see [`terraglue_engine::testbed::Options`].
-    pub fn standing(quiet: bool, bar: &ProgressBar, standing: Arc<AtomicU64>) -> Self {
+    /// From what was loaded to the end of the first step; `standing`: see [`terraglue_engine::testbed::Options`]; `label`
+    /// stands before it.
+    pub fn standing(quiet: bool, bar: &ProgressBar, standing: Arc<AtomicU64>, label: &str) -> Self {
+        let label = label.to_owned();
         Self::new(quiet, bar.clone(), move || match f64::from_bits(standing.load(Ordering::Relaxed)) {
-            0.0 => "the first step".into(),
-            t => format!("before the start the robot comes to rest on the ground: t = {t:.3} s"),
+            0.0 => format!("{label}the first step"),
+            t => format!("{label}before the start the robot comes to rest on the ground: t = {t:.3} s"),
         })
     }
 }

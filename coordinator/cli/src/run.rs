@@ -89,7 +89,7 @@ pub fn run(command: &RunCommand) -> Result<Exit> {
     let steps = (scenario.time.duration_s / scenario.time.step_s).round() as u64;
     let bar = progress::bar(steps, arguments.quiet);
     bar.inc(testbed.step_index());
-    let waiting = Waiting::standing(arguments.quiet, &bar, options.standing.clone());
+    let waiting = Waiting::standing(arguments.quiet, &bar, options.standing.clone(), "");
     let mut progress = Progress::new(bar.clone(), scenario.time.duration_s, "").after(waiting);
     let mut paced;
     let mut observer: &mut dyn Observer = &mut progress;

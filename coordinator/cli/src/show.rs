@@ -23,9 +23,24 @@ pub fn error(error: &Error) {
         }
         other => {
             eprintln!("error: {}", shorten::text(&other.to_string()));
-            other.help().iter().for_each(|help| eprintln!("  help: {help}"));
+            let help = other.help().or_else(|| on_the_ground(&other));
+            help.iter().for_each(|help| eprintln!("  help: {help}"));
         }
     }
+}
+
+/// The way out where a body and the ground do not fit.
+fn on_the_ground(error: &Error) -> Option<&'static str> {
+    let Error::Simulation { message, .. } = error else { return None };
+    if message.contains(" is buried: ") {
+        return Some(
+            "`terraglue soils` lists other soils, `terraglue robot FILE` shows the mass and the shapes of its feet",
+        );
+    }
+    let left = message.contains(" has left the ground: ");
+    left.then_some(
+        "terrain.size_m is the size of the ground; a shorter run, --duration, ends before its edge",
+    )
 }
 
 /// Where to read on about a robot file.
@@ -33,6 +48,9 @@ pub const ROBOT_FILES: &str = "`terraglue robot FILE` shows what is read of it; 
 
 /// Where to look for a file that the system does not give.
 pub const PATH: &str = "look whether the path is right, and at the permissions of the file";
+
+/// Numbers of Linux for a lack of room: EFBIG (`ulimit -f`), ENOSPC, EDQUOT.
+const FULL: [i32; 3] = [27, 28, 122];
 
 /// How files of robots end, and those of FMUs and their structures.
 const ROBOTS: [&str; 4] = [".urdf", ".xacro", ".xml", ".mjcf"];
@@ -54,6 +72,10 @@ fn way_out(error: &InputError) -> String {
         return keys_of(error);
     }
     match () {
+        () if message.contains("are free there") => "free some room, or name a path on another disk with -o",
+        () if FULL.iter().any(|number| message.contains(&format!("(os error {number})"))) => {
+            "free some room there; TMPDIR names another folder for files that are needed for a while"
+        }
         () if message.contains("(os error ") => PATH,
         () if message.contains("exists already") => {
             "name another folder with -o, or take that one away first"

@@ -2,6 +2,7 @@
 
 use super::output::outln;
 use super::{Exit, show};
+use serde_json::{Map, Value, json};
 use std::path::Path;
 use terraglue_diagnostics::Result;
 use terraglue_scenario::{COLUMNS, SoilRow, SoilTable};
@@ -11,8 +12,25 @@ use terraglue_scenario::{InputError, did_you_mean, find_soil_table, read_soil_ta
 const UNITS: [&str; COLUMNS.len()] =
     ["", "N/m^(n+1)", "N/m^(n+2)", "Pa", "rad", "m", "kg/m³", "Pa/m", "m/s²", "Pa"];
 
+/// What stands above the columns, of which the numbers are those of [`COLUMNS`].
+const HEADS: [&str; COLUMNS.len() + 3] = [
+    "soil",
+    "n",
+    "k_c",
+    "k_phi",
+    "c, Pa",
+    "phi, rad",
+    "K, m",
+    "density, kg/m³",
+    "elastic, Pa/m",
+    "measured at, m/s²",
+    "wall c, Pa",
+    "source",
+    "confidence",
+];
+
 /// All soils, or everything about one.
-pub fn soils(name: Option<&str>, file: Option<&Path>) -> Result<Exit> {
+pub fn soils(name: Option<&str>, file: Option<&Path>, as_json: bool) -> Result<Exit> {
     let path = file.map(Path::to_owned).or_else(|| find_soil_table(Path::new(".")));
     let path = path.ok_or_else(|| {
         let help = Some("name a table with --file".into());
@@ -23,38 +41,47 @@ pub fn soils(name: Option<&str>, file: Option<&Path>) -> Result<Exit> {
         InputError::plain(message, Some(help.into()))
     })?;
     match name {
-        Some(name) if soils.rows.iter().any(|r| r.name == name) => {
+        Some(name) if !as_json && soils.rows.iter().any(|r| r.name == name) => {
             one(soils.row(name).map_err(|e| InputError::plain(e.to_string(), None))?)
         }
         Some(part) => {
             let names: Vec<String> = soils.rows.iter().map(|r| r.name.clone()).collect();
-            soils.rows.retain(|r| r.name.to_lowercase().contains(&part.to_lowercase()));
+            match names.iter().any(|name| name == part) {
+                true => soils.rows.retain(|r| r.name == part),
+                false => soils.rows.retain(|r| r.name.to_lowercase().contains(&part.to_lowercase())),
+            }
             if soils.rows.is_empty() {
                 let help = did_you_mean(part, names.iter().map(String::as_str));
                 let message = format!("there is no soil `{part}` in {}", path.display());
                 return Err(InputError::plain(message, help).into());
             }
-            all(&soils);
+            list(&soils, as_json);
         }
-        None => all(&soils),
+        None => list(&soils, as_json),
     }
-    outln!("from {}", path.display());
+    if !as_json {
+        outln!("from {}", path.display());
+    }
     Ok(Exit::Done)
 }
 
+fn list(soils: &SoilTable, as_json: bool) {
+    match as_json {
+        true => outln!("{}", Value::from_iter(soils.rows.iter().map(json_of))),
+        false => all(soils),
+    }
+}
+
+/// The names of the columns are those of the table.
+fn json_of(row: &SoilRow) -> Value {
+    let words = [("name", &row.name), ("source", &row.source), ("confidence", &row.confidence)];
+    let words = words.into_iter().map(|(key, word)| (key.to_owned(), json!(word)));
+    let numbers = COLUMNS.iter().zip(&row.values).map(|(column, value)| ((*column).to_owned(), json!(value)));
+    words.chain(numbers).chain([("refused".to_owned(), json!(row.refused))]).collect::<Map<_, _>>().into()
+}
+
 fn all(soils: &SoilTable) {
-    let mut table = show::listing(&[
-        "soil",
-        "n",
-        "k_c",
-        "k_phi",
-        "c, Pa",
-        "phi, rad",
-        "K, m",
-        "density, kg/m³",
-        "source",
-        "confidence",
-    ]);
+    let mut table = show::listing(&HEADS);
     let mut refused = show::listing(&["refused", "reason"]);
     for row in &soils.rows {
         if let Some(reason) = &row.refused {

@@ -478,7 +478,10 @@ impl Testbed {
             let hint = self.directory.hint(name).map(|h| format!("; {h}"));
             return Err(refused(format!("there is no such variable{}", hint.unwrap_or_default())));
         };
-        let was = variable.number(&self.instances).map(|x| format!(" (was {x})")).unwrap_or_default();
+        let was = variable
+            .number(&self.instances)
+            .map(|x| format!(" (was {})", twelve_digits(x)))
+            .unwrap_or_default();
         if let Reply::Refused(reason) = variable.set(&mut self.instances, self.index > 0, value)? {
             return Err(refused(reason));
         }
@@ -569,4 +572,9 @@ impl Testbed {
         all.push(last);
         all
     }
+}
+
+/// Without the digits that arithmetic leaves: 0.3 and not 0.30000000000000004.
+fn twelve_digits(x: f64) -> f64 {
+    format!("{x:.11e}").parse().unwrap_or(x)
 }

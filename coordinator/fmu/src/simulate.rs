@@ -342,7 +342,7 @@ fn no_steps(start: f64, stop: f64, step: f64) -> String {
             )
         }
         () => format!(
-            "from {start} s to {stop} s there are {:.3e} steps of {step} s, at most {STEPS:.0e} are run: give a longer --step",
+            "from {start} s to {stop} s there are {:.3e} steps of {step:?} s, at most {STEPS:.0e} are run: give a longer --step",
             (stop - start) / step
         ),
     }

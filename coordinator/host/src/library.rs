@@ -218,8 +218,13 @@ fn inspect(path: &Path) -> std::result::Result<(), LoadError> {
     if python::is_python(path) {
         return PythonFile::read(path).map(drop);
     }
-    let bytes = terraglue_subsystem::files::read(path)
-        .map_err(|e| LoadError::NotALibrary { path: path_buf(), reason: e.to_string() })?;
+    let bytes = terraglue_subsystem::files::read(path).map_err(|e| match e.kind() {
+        std::io::ErrorKind::OutOfMemory => {
+            let reason = format!("{e}; `memory_mb` of the subsystem is the most that an isolated one has");
+            LoadError::CannotLoad { path: path_buf(), reason }
+        }
+        _ => LoadError::NotALibrary { path: path_buf(), reason: e.to_string() },
+    })?;
     if !is_elf(&bytes) {
         let reason = if bytes.is_empty() { "the file is empty" } else { "it has no ELF header" };
         return Err(LoadError::NotALibrary { path: path_buf(), reason: reason.into() });

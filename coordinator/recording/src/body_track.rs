@@ -1,10 +1,10 @@
 //! Displacement, attitude and progress of the reported body.
 
 use crate::summary::Stall;
-use terraglue_engine::observer::View;
+use terraglue_engine::observer::{SubsystemView, View};
 use terraglue_gluing::PortReport;
 use terraglue_numerics::rotation;
-use terraglue_subsystem::{Kind, Pose};
+use terraglue_subsystem::{Effect, Kind, Pose, SceneBody, Variable};
 
 /// Time between the samples by which a stall is found, s.
 const SAMPLE_S: f64 = 0.5;
@@ -25,6 +25,8 @@ pub(crate) struct BodyTrack {
     up: Option<[f64; 3]>,
     now_at: [f64; 3],
     peak_n: f64,
+    /// Whether the world holds its subsystem: the ground does not bear its weight alone.
+    held: bool,
     /// Length of the way of its origin, m.
     pub path_m: f64,
     /// Mass of its whole subsystem, kg.
@@ -56,6 +58,7 @@ terraglue_subsystem::persist!(BodyTrack {
     up,
     now_at,
     peak_n,
+    held,
     path_m,
     mass_kg,
     distance_m,
@@ -80,6 +83,7 @@ impl BodyTrack {
             up: up(gravity_m_s2),
             now_at: pose.position,
             peak_n: 0.0,
+            held: is_held(s),
             path_m: 0.0,
             mass_kg: s.scene.bodies.iter().map(|b| b.mass).sum(),
             distance_m: 0.0,
@@ -130,9 +134,10 @@ impl BodyTrack {
         }
     }
 
-    /// Largest normal force of the ground on its whole subsystem, N; none where nothing ever pressed.
+    /// Largest normal force of the ground on its whole subsystem, N; none where nothing ever pressed, or where the world
+    /// holds it: a press or a rig loads the ground with more than its weight.
     pub fn peak_n(&self) -> Option<f64> {
-        (self.peak_n > 0.0).then_some(self.peak_n)
+        (self.peak_n > 0.0 && !self.held).then_some(self.peak_n)
     }
 
     /// Since when and where the body has not come on, at the end of the run.
@@ -147,6 +152,19 @@ impl BodyTrack {
         let since = self.samples.iter().find(stands)?;
         Some(Stall { t_s: since.t_s, x_m: since.position[0], y_m: since.position[1] })
     }
+}
+
+/// Whether a robot tells the poses of its bodies and none of them can be chosen: its root is fixed to the world.
+fn is_held(robot: &SubsystemView) -> bool {
+    let variables = robot.instance.variables();
+    let of = |body: &str, part: &str| {
+        let name =
+            |v: &&Variable| v.name.strip_prefix(body).and_then(|rest| rest.strip_prefix('.')) == Some(part);
+        variables.iter().find(name)
+    };
+    let mut tells = robot.scene.bodies.iter().filter(|b| of(&b.name, "qw").is_some()).peekable();
+    let chosen = |b: &SceneBody| of(&b.name, "z").is_none_or(|v| v.effect == Effect::NeedsReset);
+    tells.peek().is_some() && !tells.any(chosen)
 }
 
 /// Against gravity, of length 1.

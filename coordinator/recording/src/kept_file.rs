@@ -20,6 +20,11 @@ pub struct KeptFile {
     ahead: u64,
 }
 
+/// Of a file that has lost what a checkpoint counts on.
+pub(crate) fn shorter() -> Error {
+    Error::new(ErrorKind::UnexpectedEof, "it is shorter than it was when the checkpoint was written")
+}
+
 impl KeptFile {
     /// Creates the file, or empties it, and locks it. Writers that gather what they write keep the look before each write cheap.
     pub fn create(path: &Path) -> Result<Self> {
@@ -42,10 +47,7 @@ impl KeptFile {
         let mut kept = Self::repeat(path, 0)?;
         if let Some(file) = &mut kept.file {
             if file.metadata()?.len() < length {
-                return Err(Error::new(
-                    ErrorKind::UnexpectedEof,
-                    "it is shorter than it was when the checkpoint was written",
-                ));
+                return Err(shorter());
             }
             file.set_len(length)?;
             file.seek(SeekFrom::End(0))?;

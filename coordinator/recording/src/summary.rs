@@ -182,7 +182,8 @@ pub struct Summary {
     /// Depth of the prints below the initial surface; null where nothing pressed or the soil shows no height.
     #[serde(default)]
     pub print_depth: Option<PrintDepth>,
-    /// Largest normal force of the ground on the reported robot, all its feet or wheels together, over its weight.
+    /// Largest normal force of the ground on the reported robot, all its feet or wheels together, over its weight; null where
+    /// the world holds it.
     #[serde(default)]
     pub peak_force_over_weight: Option<f64>,
 }

@@ -36,7 +36,7 @@ pub struct Scaffold {
 pub enum ScaffoldError {
     /// The name is not one that files, crates and scenarios can all carry.
     #[error(
-        "`{0}` is no name for a module: use lower-case letters, digits and single hyphens, a letter first, e.g. my-soil"
+        "`{0}` is no name for a module: use up to 64 lower-case letters, digits and single hyphens, a letter first, e.g. my-soil"
     )]
     Name(String),
     /// A module of the program has the name.

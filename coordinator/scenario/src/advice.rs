@@ -1,6 +1,7 @@
 //! What of a scenario has no effect although nothing is wrong with it: said in warnings, never an error.
 
 use super::choices::{FormChoice, JacobianChoice, LevelChoice, Relaxation, StartChoice, StrategyKind};
+use super::isolation::IsolationSpec;
 use super::model::{GluingSpec, Region, Scenario, SubsystemSpec, Trigger};
 use super::parameters::check_own_table;
 use super::source::Source;
@@ -35,7 +36,7 @@ pub fn many_steps(scenario: &Scenario) -> Option<String> {
     let steps = time.duration_s / time.step_s;
     let message = || {
         format!(
-            "the run has {steps:.3e} steps of {} s; at 10 µs of wall time each it takes {:.1} hours",
+            "the run has {steps:.3e} steps of {:?} s; at 10 µs of wall time each it takes {:.1} hours",
             time.step_s,
             steps * 1e-5 / 3600.0
         )
@@ -85,6 +86,27 @@ pub fn unread_keys(scenario: &Scenario) -> Vec<String> {
         all.push(warn("step_min_s", "all steps are `time.step_s` long without `energy_residual_j`".into()));
     }
     all
+}
+
+/// Limits of a process that a subsystem does not have: it runs in that of the program.
+pub fn idle_limits(scenario: &Scenario, spec: &SubsystemSpec, in_python: bool) -> Vec<String> {
+    let (given, usual) = (spec.isolation, IsolationSpec::default());
+    // a law in Python has a process within the soil
+    if spec.isolate || in_python || spec.parameters.contains_key("law") {
+        return Vec::new();
+    }
+    let keys = [
+        ("load_timeout_s", given.load_timeout_s != usual.load_timeout_s),
+        ("step_timeout_s", given.step_timeout_s != usual.step_timeout_s),
+        ("memory_mb", given.memory_bytes != usual.memory_bytes),
+    ];
+    let said = |(key, is_given): (&str, bool)| {
+        let name = spec.name.as_str();
+        let message =
+            format!("`{key}` has no effect: `{name}` has no process of its own without `isolate = true`");
+        is_given.then(|| line_of(&scenario.source.error_at_value(&[name, key], message, None)))
+    };
+    keys.into_iter().filter_map(said).collect()
 }
 
 /// Keys of a module that is not chosen, in its own table `[NAME.MODULE]`: what is wrong with them shows when it is.

@@ -111,6 +111,10 @@ fn mask(s: &Section) -> Checked<u32> {
             let help = Some(format!("components are {}", COMPONENTS.join(", ")));
             return Err(s.error("components", format!("unknown component `{name}`"), help));
         };
+        if mask & 1 << k != 0 {
+            let help = Some("leave one of the two out".to_owned());
+            return Err(s.error("components", format!("component `{name}` is named twice"), help));
+        }
         mask |= 1 << k;
     }
     if mask == 0 { Err(s.error("components", "glue that carries nothing".into(), None)) } else { Ok(mask) }

@@ -118,7 +118,7 @@ fn world() -> Table {
         Parameter { unit: "m/s^2".into(), ..list("gravity_m_s2", "gravity in the world frame, z up") };
     let seed = Parameter::of("seed", ParameterType::Integer, "seed of everything random");
     let keys = vec![
-        Key::from(gravity.or(vec![0.0, 0.0, -9.81])).form(Form::Count(3)),
+        Key::from(gravity.or(vec![0.0, 0.0, -9.81]).within(-1e4, 1e4)).form(Form::Count(3)),
         seed.or(1).within(0.0, f64::INFINITY).into(),
     ];
     of("world", "What holds everywhere.", keys)
@@ -434,13 +434,13 @@ pub fn subsystem_keys() -> Vec<Key> {
         .or(false)
         .into(),
         number("load_timeout_s", "s", 60.0, "longest time to load it, where isolated or in Python")
-            .positive()
+            .within(1e-3, 1e7)
             .into(),
         number("step_timeout_s", "s", 30.0, "longest time of one call, where isolated or in Python")
-            .positive()
+            .within(1e-3, 1e7)
             .into(),
         number("memory_mb", "", 8192.0, "most memory of its process in MiB, where isolated or in Python")
-            .positive()
+            .within(16.0, 1e9)
             .into(),
         Parameter::of("python", ParameterType::Text, python).optional().into(),
         Parameter::of("build", ParameterType::Text, build).optional().into(),

@@ -215,7 +215,7 @@ fn read_time(s: &Section) -> Checked<Time> {
     let steps = time.duration_s / time.step_s;
     if steps > MOST_STEPS {
         let message = format!(
-            "`duration_s` = {} s in steps of {} s are {steps:.3e} steps; a run has at most {MOST_STEPS:e}",
+            "`duration_s` = {} s in steps of {:?} s are {steps:.3e} steps; a run has at most {MOST_STEPS:e}",
             time.duration_s, time.step_s
         );
         let help = format!(

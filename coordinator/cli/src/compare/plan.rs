@@ -15,6 +15,9 @@ use terraglue_subsystem::Kind;
 /// order of 2 look like 2.32, at an eighth like 2.02.
 const REFERENCE_PART: f64 = 0.125;
 
+/// Begins the reason of a row that cannot run.
+pub const REFUSED: &str = "refused: ";
+
 /// One row before it ran.
 pub struct Plan {
     /// What is known of it.
@@ -260,10 +263,10 @@ pub fn refuse(plans: &mut [Plan], arguments: &RunArguments, cancel: &Arc<AtomicB
         }
         plan.refused = Some(match &error {
             Error::Input(input) => match &input.help {
-                Some(help) => format!("refused: {input}; {help}"),
-                None => format!("refused: {input}"),
+                Some(help) => format!("{REFUSED}{input}; {help}"),
+                None => format!("{REFUSED}{input}"),
             },
-            other => format!("refused: {other}"),
+            other => format!("{REFUSED}{other}"),
         });
         first = first.or(Some(error));
     }

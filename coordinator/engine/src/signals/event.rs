@@ -4,6 +4,7 @@ use super::access::{Directory, VariableRef};
 use serde_json::Value;
 use terraglue_host::Instance;
 use terraglue_scenario::{Comparison, EventSpec, InputError, Source, Trigger};
+use terraglue_subsystem::Effect;
 
 /// An event with its names resolved.
 #[derive(Debug)]
@@ -54,7 +55,14 @@ impl TimeLine {
         let mut events = Vec::new();
         for spec in specs {
             for (name, value) in &spec.set {
-                if let Some(reason) = variable(name, spec)?.objection(instances, value) {
+                let found = variable(name, spec)?;
+                let late = matches!(spec.trigger, Trigger::At(t) if t > 0.0);
+                if late && found.describe(instances).effect == Effect::NeedsReset {
+                    let reason = format!("`{name}` can only be set before the first step, not by an event");
+                    let help = "give it in the table of its subsystem, where there is a key for it, or take `at_s = 0.0`";
+                    return Err(source.error_in(spec.entry, &[name], reason, Some(help.into())));
+                }
+                if let Some(reason) = found.objection(instances, value) {
                     let help = format!("`terraglue variables SCENARIO {name}` shows what it takes");
                     return Err(source.error_in(spec.entry, &[name], reason, Some(help)));
                 }

@@ -207,6 +207,8 @@ fn instantiate(
         }
         let module = find(scenario, spec, options, library)?;
         let config = scenario::check_parameters(module.schema(), spec, &scenario.source)?;
+        let idle = scenario::advice::idle_limits(scenario, spec, module.is_python());
+        idle.iter().for_each(|advice| log::warn!("{advice}"));
         for name in scenario::SHIPPED_MODULES.iter().filter(|name| spec.parameters.contains_key(**name)) {
             let Ok(other) = library.find(name, &search, &scenario.folder) else { continue };
             if other.schema().name != module.schema().name
@@ -278,9 +280,12 @@ fn fmu(
     let once = || terraglue_fmi::Fmu::inspect(&path).is_ok_and(|(d, _)| d.capabilities.once_per_process);
     let made: terraglue_subsystem::Result<Box<dyn Subsystem>> = match spec.isolate {
         // One instance per process is all that such an FMU stands.
-        false if !once() => library
-            .fmus()
-            .and_then(|make| make(&path, &spec.parameters, host, services.teardown_errors.clone())),
+        false if !once() => {
+            scenario::advice::idle_limits(scenario, spec, false).iter().for_each(|a| log::warn!("{a}"));
+            library
+                .fmus()
+                .and_then(|make| make(&path, &spec.parameters, host, services.teardown_errors.clone()))
+        }
         _ => {
             let what = What::Fmu {
                 path: std::path::absolute(&path).unwrap_or_else(|_| path.clone()),

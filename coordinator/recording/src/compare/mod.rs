@@ -102,14 +102,16 @@ impl CompareRow {
         if self.is_reference { name + " (reference)" } else { name }
     }
 
-    /// `diverged at t = … s: …`; `None` where the run reached its end.
+    /// `failed at t = … s: …`, unless the reason says the time itself; `None` where the run reached its end.
     pub fn failure(&self) -> Option<String> {
         let recorded = self.summary.as_ref().and_then(|s| s.error.as_ref());
         let message = self.error.as_deref().or(recorded.map(|e| e.message.as_str()));
         match (&self.summary, message) {
             (Some(s), message) if s.status == Status::Failed => {
                 let t_s = recorded.and_then(|e| e.time_s).unwrap_or(s.simulated_s);
-                Some(format!("diverged at t = {t_s:.4} s: {}", message.unwrap_or("no message")))
+                let message = message.unwrap_or("no message");
+                let is_timed = message.contains(" at t = ");
+                Some(if is_timed { message.into() } else { format!("failed at t = {t_s:.4} s: {message}") })
             }
             (Some(s), None) if s.status == Status::Stopped => {
                 Some(format!("stopped at t = {:.4} s", s.simulated_s))

@@ -5,7 +5,7 @@
 
 use super::{McapWriter, Sink};
 use crate::keep::Keep;
-use crate::kept_file::KeptFile;
+use crate::kept_file::{KeptFile, shorter};
 use crate::layout::{RECORDING, at, other_at};
 use crate::messages::WindowRecord;
 use crate::records::{HEAD, chunk};
@@ -125,10 +125,6 @@ impl McapWriter {
         self.window = state.window;
         Ok(())
     }
-}
-
-fn shorter() -> std::io::Error {
-    std::io::Error::new(ErrorKind::UnexpectedEof, "it is shorter than it was when the checkpoint was written")
 }
 
 /// Gives a sink everything behind the head of a recording, chunk by chunk as it stands there.

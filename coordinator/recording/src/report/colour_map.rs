@@ -12,20 +12,14 @@ const SUNK: [[u8; 3]; 4] = [[0xd8, 0x9b, 0x4c], [0xc4, 0x57, 0x40], [0x8b, 0x29,
 /// Heave 1/2 and all of the scale.
 const HEAVED: [[u8; 3]; 2] = [[0x6f, 0xa3, 0xa8], [0x1d, 0x6f, 0x86]];
 
-fn linear(c: u8) -> f64 {
-    let c = f64::from(c) / 255.0;
-    if c <= 0.040_45 { c / 12.92 } else { libm::pow((c + 0.055) / 1.055, 2.4) }
-}
-
-/// The linear value from which on a channel of sRGB is rounded up to k + 1.
-fn threshold(k: u8) -> f64 {
-    let c = (f64::from(k) + 0.5) / 255.0;
+/// Of a channel of sRGB, from 0 to 1.
+fn linear(c: f64) -> f64 {
     if c <= 0.040_45 { c / 12.92 } else { libm::pow((c + 0.055) / 1.055, 2.4) }
 }
 
 /// From sRGB.
 pub(crate) fn to_oklab(rgb: [u8; 3]) -> Oklab {
-    let [r, g, b] = rgb.map(linear);
+    let [r, g, b] = rgb.map(|c| linear(f64::from(c) / 255.0));
     let l = libm::cbrt(0.412_221_470_8 * r + 0.536_332_536_3 * g + 0.051_445_992_9 * b);
     let m = libm::cbrt(0.211_903_498_2 * r + 0.680_699_545_1 * g + 0.107_396_956_6 * b);
     let s = libm::cbrt(0.088_302_461_9 * r + 0.281_718_837_6 * g + 0.629_978_700_5 * b);
@@ -50,7 +44,8 @@ impl Palette {
         Self {
             sunk: std::array::from_fn(|k| of(k, &SUNK)),
             heaved: std::array::from_fn(|k| of(k, &HEAVED)),
-            thresholds: std::array::from_fn(|k| threshold(k as u8)),
+            // from here on a channel is rounded up to k + 1
+            thresholds: std::array::from_fn(|k| linear((k as f64 + 0.5) / 255.0)),
         }
     }
 

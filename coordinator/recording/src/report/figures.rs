@@ -2,6 +2,7 @@
 
 use crate::body_track::roll_pitch_yaw;
 use crate::reader::Recording;
+use crate::report::contact_owners::Owners;
 use crate::report::figure::{Curve, Figure, MOST_POINTS, Panel};
 use crate::report::footprints::Leg;
 
@@ -11,13 +12,13 @@ const SLIPS: f64 = 1e-6;
 /// All figures that the recording has data for.
 pub(crate) fn all(recording: &Recording, legs: &[Leg]) -> Vec<Figure> {
     let figures = [
-        pressure(recording),
+        pressure(recording, legs),
         body(recording),
         forces(recording, legs),
         joints(recording),
         gluing(recording),
         energy(recording),
-        contacts(recording),
+        contacts(recording, legs),
         soil(recording),
     ];
     figures.into_iter().flatten().collect()
@@ -179,8 +180,8 @@ fn energy(recording: &Recording) -> Option<Figure> {
 }
 
 /// Pressure over sinkage of what is pressed in without slipping, as a bevameter shows it: one curve a contact.
-fn pressure(recording: &Recording) -> Option<Figure> {
-    let mut curves = Vec::new();
+fn pressure(recording: &Recording, legs: &[Leg]) -> Option<Figure> {
+    let (mut curves, owners) = (Vec::new(), Owners::new(recording, legs));
     for (_, table) in &recording.variables {
         for name in table.names.iter().filter_map(|n| n.strip_suffix(".mean_pressure")) {
             let of = |part: &str| table.column(&format!("{name}.{part}"));
@@ -191,7 +192,8 @@ fn pressure(recording: &Recording) -> Option<Figure> {
             let (x, y): (Vec<f64>, Vec<f64>) = loaded.map(|(z, p)| (*z, *p)).unzip();
             if !slips && x.len() > 1 {
                 let (x, y) = (spread_out(&x), spread_out(&y));
-                curves.push(Curve::new(name, curves.len(), &x, y));
+                let (label, colour) = owners.of(name, curves.len());
+                curves.push(Curve::new(label, colour, &x, y));
             }
         }
     }
@@ -212,7 +214,8 @@ fn spread_out(values: &[f64]) -> Vec<f64> {
 }
 
 /// What a soil tells of wheels and feet: one panel a quantity, one curve a contact.
-fn contacts(recording: &Recording) -> Option<Figure> {
+fn contacts(recording: &Recording, legs: &[Leg]) -> Option<Figure> {
+    let owners = Owners::new(recording, legs);
     let shown = [("slip", ""), ("sinkage", "m"), ("mean_pressure", "Pa"), ("largest_pressure", "Pa")];
     let shown = shown.into_iter().chain([("area", "m²"), ("pull", "N"), ("torque", "N m"), ("power", "W")]);
     let panel = |(quantity, unit): (&'static str, &'static str)| {
@@ -221,7 +224,8 @@ fn contacts(recording: &Recording) -> Option<Figure> {
             for (name, y) in table.names.iter().zip(&table.columns) {
                 let contact = name.strip_suffix(quantity).and_then(|n| n.strip_suffix('.'));
                 if let Some(contact) = contact.filter(|c| c.starts_with("contact")) {
-                    curves.push(Curve::new(contact, curves.len(), &table.t_s, y.clone()));
+                    let (label, colour) = owners.of(contact, curves.len());
+                    curves.push(Curve::new(label, colour, &table.t_s, y.clone()));
                 }
             }
         }

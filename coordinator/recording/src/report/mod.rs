@@ -4,6 +4,7 @@
 
 mod cards;
 pub(crate) mod colour_map;
+mod contact_owners;
 pub(crate) mod energy_card;
 mod exchange;
 pub(crate) mod figure;

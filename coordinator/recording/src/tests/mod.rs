@@ -573,12 +573,12 @@ fn a_comparison_marks_the_best_and_says_what_diverged_and_when() {
     assert_eq!(json["rows"][0]["error"], serde_json::Value::Null);
     assert_eq!(json["rows"][0]["folder"], "cooperative");
     let csv = read(compare::COMPARE_TABLE);
-    assert!(csv.lines().count() == 4 && csv.contains("diverged at t = 1.2500 s"));
+    assert!(csv.lines().count() == 4 && csv.contains("failed at t = 1.2500 s"));
     let terminal = compare::terminal_table(&rows, true);
     let gap = terminal.lines().find(|l| l.contains("largest gap")).expect("line");
     // 3e-11·2.2 m; the diverged run with gap 0 does not compete.
     assert!(gap.contains("* 66.0") && !gap.contains("* 0"), "{gap}");
-    assert!(terminal.contains("relaxed · soil-bekker: diverged at t = 1.2500 s"), "{terminal}");
+    assert!(terminal.contains("relaxed · soil-bekker: failed at t = 1.2500 s"), "{terminal}");
     let html = read(compare::COMPARE_PAGE);
     assert!(html.contains("class=\"best\">66.0") && html.contains("href=\"iterative/report.html\""));
     assert!(!html.replace("http://www.w3.org/2000/svg", "").contains("http"));

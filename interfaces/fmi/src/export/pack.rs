@@ -1,7 +1,7 @@
 //! Writes the archive of an FMU.
 
 use std::fs::File;
-use std::io::{BufWriter, Read, Write};
+use std::io::{Cursor, ErrorKind, Read, Write};
 use std::path::{Path, PathBuf};
 use zip::write::SimpleFileOptions;
 
@@ -42,8 +42,8 @@ pub fn pack(path: &Path, entries: &[(String, Content)]) -> Result<(), String> {
     // a name of its own until it is whole
     let part = tempfile::Builder::new().prefix(".unit").tempfile_in(folder);
     let part = part.map_err(|e| failed(path, &e))?;
-    let file = part.as_file().try_clone().map_err(|e| failed(path, &e))?;
-    let mut archive = zip::ZipWriter::new(BufWriter::new(file));
+    // whole in memory: a writer of archives that meets a full disk complains a second time when it is dropped
+    let mut archive = zip::ZipWriter::new(Cursor::new(Vec::new()));
     for (name, content) in entries {
         let library = name.starts_with("binaries/") || name.ends_with(".so");
         let options = SimpleFileOptions::default()
@@ -59,10 +59,22 @@ pub fn pack(path: &Path, entries: &[(String, Content)]) -> Result<(), String> {
             }
         }
     }
-    let mut file = archive.finish().map_err(|e| failed(path, &e))?;
-    file.flush().map_err(|e| failed(path, &e))?;
+    let bytes = archive.finish().map_err(|e| failed(path, &e))?.into_inner();
+    part.as_file().write_all(&bytes).map_err(|e| match e.kind() {
+        ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::FileTooLarge => {
+            let room =
+                rustix::fs::fstatvfs(part.as_file()).map(|disk| disk.f_bavail.saturating_mul(disk.f_frsize));
+            let room = room.map_or_else(|_| "an unknown number of MiB".into(), |room| mib(room as f64));
+            failed(path, &format!("{e}; it has {}, {room} are free there", mib(bytes.len() as f64)))
+        }
+        _ => failed(path, &e),
+    })?;
     let kept = part.persist(path).map_err(|e| failed(path, &e))?;
     readable(&kept).map_err(|e| failed(path, &e))
+}
+
+fn mib(bytes: f64) -> String {
+    format!("{:.1} MiB", bytes / f64::from(1 << 20))
 }
 
 /// Temporary files are the owner's alone; an FMU is for everybody.

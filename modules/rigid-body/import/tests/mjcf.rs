@@ -105,6 +105,15 @@ fn what_is_not_supported_is_named_with_its_line() {
 }
 
 #[test]
+fn a_type_of_a_geom_that_mjcf_does_not_have_is_refused() {
+    let world = "<body name=\"a\"><freejoint/><geom name=\"egg\" type=\"elipsoid\" size=\"1 1 2\" mass=\"1\"/></body>";
+    let text = read(world, "").expect_err("refused").to_string();
+    for expected in ["m.xml:4: ", "geom `egg`", "type = \"elipsoid\"", "sphere, capsule, ellipsoid"] {
+        assert!(text.contains(expected), "`{expected}` is not in: {text}");
+    }
+}
+
+#[test]
 fn attributes_that_act_and_are_not_supported_are_named() {
     let cases = [
         (

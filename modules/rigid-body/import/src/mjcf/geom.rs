@@ -104,7 +104,7 @@ pub(super) fn geom(d: &Defaults, e: &Element, around: Around) -> Result<Geom, Er
         "capsule" => ShapeGeometry::Capsule { radius: at(0)?, half_length: half(1)? },
         "cylinder" => ShapeGeometry::Cylinder { radius: at(0)?, half_length: half(1)? },
         "box" if length.is_none() => ShapeGeometry::Box { half_extents: [at(0)?, at(1)?, at(2)?] },
-        _ => return Ok(Geom::Unused(format!("of type `{kind}` is not supported and is left out"))),
+        _ => return unsupported(d, e, &kind),
     };
     let solid = match &geometry {
         ShapeGeometry::Hull(_) | ShapeGeometry::Concave { .. } | ShapeGeometry::Triangles(_) => {
@@ -118,6 +118,21 @@ pub(super) fn geom(d: &Defaults, e: &Element, around: Around) -> Result<Geom, Er
     let mass = weighs("mass")?.unwrap_or(density * solid.volume);
     let shape = Shape { name, geometry, body_from_shape: pose, collides, friction, group, mask };
     Ok(Geom::Shape(Box::new(Weighed { shape, mass, solid, notice })))
+}
+
+/// Types of geoms that MJCF has.
+const TYPES: [&str; 9] =
+    ["plane", "hfield", "sphere", "capsule", "ellipsoid", "cylinder", "box", "mesh", "sdf"];
+
+/// A type of MJCF that is not read is left out with a warning; one that MJCF does not have is a mistake.
+fn unsupported(d: &Defaults, e: &Element, kind: &str) -> Result<Geom, Error> {
+    match TYPES.contains(&kind) {
+        true => Ok(Geom::Unused(format!("of type `{kind}` is not supported and is left out"))),
+        false => {
+            let types = TYPES.join(", ");
+            Err(d.wrong(e, format!("type = \"{kind}\" is no type of a geom; types are {types}")))
+        }
+    }
 }
 
 /// A mesh by its name: triangles where it stands still, else its hull, beside its own form where it is not convex.

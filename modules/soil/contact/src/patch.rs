@@ -361,8 +361,7 @@ impl Patches {
     }
 
     fn read_port(&mut self, port: &Port, step: &Step, ground: &Ground, laws: &[Laws]) -> Result<Patch> {
-        let first = self.nodes.index.len();
-        let n_z = port.frame[2];
+        let (first, n_z) = (self.nodes.index.len(), port.frame[2]);
         for node in port.nodes(step.nodes) {
             self.read_node(port, node, ground, laws);
         }

@@ -29,6 +29,7 @@ HELPS = ["", "run", "compare", "report", "check", "check-module", "modules", "va
 NOT_RUN = {
     "cargo xtask test": "is what runs this test",
     "cargo xtask ci": "runs this test, too",
+    "cargo xtask lint": "is the first part of `cargo xtask ci`",
     "cargo xtask validate": "`cargo xtask test` ends with its quick form; the long one takes hours",
     "cargo xtask install": "builds the release profile; test_dist.py unpacks and runs what it lays out",
     "cargo xtask dist": "builds the release profile; test_dist.py packs the development profile",

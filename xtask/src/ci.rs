@@ -1,51 +1,48 @@
-//! `cargo xtask ci`: what CI runs. The format and every test; on request lints, unused dependencies and licences.
+//! `cargo xtask lint`: what can be checked without a test. `cargo xtask ci`: the same and every test, which is what CI runs.
 
 use crate::test;
 use std::path::PathBuf;
-use std::process::Command;
 use xtask_start::process::{Outcome, cargo, command, must, target};
 
-/// What CI is asked for.
-#[derive(clap::Args, Debug)]
-pub struct Arguments {
-    /// Run clippy and rustdoc with warnings as errors, too: the code has some left.
-    #[arg(long)]
-    lints: bool,
-    /// Look for unused dependencies, too, by cargo-machete.
-    #[arg(long)]
-    machete: bool,
-    /// Check licences, bans and sources of all dependencies, too; the checker compiles for minutes the first time.
-    #[arg(long)]
-    deny: bool,
-}
-
 /// Runs all of it; stops at the first that fails. `cargo test` runs the examples in the documentation.
-pub fn run(arguments: &Arguments) -> Outcome {
-    must(&mut cargo(&["fmt", "--all", "--check"]))?;
-    if arguments.lints {
-        must(&mut cargo(&["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))?;
-        must(cargo(&["doc", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))?;
-    }
-    if arguments.machete {
-        with_tool("cargo-machete", |program| command(program, &["--with-metadata"]))?;
-    }
-    if arguments.deny {
-        with_tool("cargo-deny", |program| command(program, &["check", "licenses", "bans", "sources"]))?;
-    }
+pub fn run() -> Outcome {
+    lint()?;
     test::test()
 }
 
-/// Runs a tool that cargo installs by its name into the target folder; says `skip` where it cannot be installed.
-fn with_tool(name: &str, check: impl Fn(&PathBuf) -> Command) -> Outcome {
-    let place = target().join("tools");
-    let program = place.join("bin").join(name);
-    if !program.is_file() {
-        let root = place.display().to_string();
-        let installed = must(&mut cargo(&["install", "--locked", "--quiet", "--root", &root, name]));
-        if let Err(why) = installed {
-            println!("skip\t{name}\tit cannot be installed here: {why}");
-            return Ok(());
+/// The format, unused dependencies, licences and sources, clippy and rustdoc with warnings as errors.
+pub fn lint() -> Outcome {
+    must(&mut cargo(&["fmt", "--all", "--check"]))?;
+    with_tool("cargo-machete", &[], None)?;
+    // it reads the manifests of all dependencies, those of other platforms, too
+    let licences = ["check", "licenses", "bans", "sources"];
+    with_tool("cargo-deny", &licences, Some(&["fetch", "--quiet", "--locked"]))?;
+    must(&mut cargo(&["clippy", "--workspace", "--all-targets", "--", "-D", "warnings"]))?;
+    must(cargo(&["doc", "--workspace", "--no-deps"]).env("RUSTDOCFLAGS", "-D warnings"))
+}
+
+/// Runs a tool, after a preparation by cargo; says `skip` where one of them needs the network and has none.
+fn with_tool(name: &str, arguments: &[&str], prepared: Option<&[&str]>) -> Outcome {
+    let ready = prepared.map_or(Ok(()), |arguments| must(&mut cargo(arguments)));
+    match ready.and_then(|()| tool(name)) {
+        Ok(program) => must(&mut command(program, arguments)),
+        Err(why) => {
+            println!("skip\t{name}\t{why}");
+            Ok(())
         }
     }
-    must(&mut check(&program))
+}
+
+/// A tool as it is found on the path, or as cargo installs it by its name into the target folder: in the profile that compiles quickly.
+fn tool(name: &str) -> Outcome<PathBuf> {
+    let place = target().join("tools");
+    let own = place.join("bin").join(name);
+    let path = std::env::var_os("PATH").unwrap_or_default();
+    let mut places = std::env::split_paths(&path).map(|folder| folder.join(name)).chain([own.clone()]);
+    if let Some(found) = places.find(|program| program.is_file()) {
+        return Ok(found);
+    }
+    let root = place.display().to_string();
+    must(&mut cargo(&["install", "--locked", "--quiet", "--debug", "--root", &root, name]))?;
+    Ok(own)
 }

@@ -1,4 +1,4 @@
-//! The developer commands, the same as in CI: `cargo xtask test | ci | docs | validate | architecture | freeze | faults | header | schema | install | dist`.
+//! The developer commands, the same as in CI: `cargo xtask test | lint | ci | docs | validate | architecture | freeze | faults | header | schema | install | dist`.
 //! What measures is the program `terraglue-validation` (`tests/validation`), which the other commands do not compile.
 
 mod architecture;
@@ -29,8 +29,10 @@ struct Arguments {
 enum Command {
     /// Run every test: Rust, Python, and the quick figures.
     Test,
-    /// Run what CI runs: the format and every test; lints, unused dependencies and licences on request.
-    Ci(ci::Arguments),
+    /// Check the format, unused dependencies, licences and sources, and run clippy and rustdoc with warnings as errors.
+    Lint,
+    /// Run what CI runs: `lint` and `test`.
+    Ci,
     /// Make everything in docs/, README and scenarios again that is made from code or measured by it (ten minutes).
     Docs,
     /// Measure the figures that the areas promise and hold them against their limits.
@@ -71,7 +73,8 @@ enum Command {
 fn main() -> ExitCode {
     let done: Outcome = match Arguments::parse().command {
         Command::Test => test::test(),
-        Command::Ci(arguments) => ci::run(&arguments),
+        Command::Lint => ci::lint(),
+        Command::Ci => ci::run(),
         Command::Validate { arguments } => handed_on("validate", &arguments),
         Command::Docs => docs::write_all(),
         Command::Architecture { check } => architecture::run(check),

@@ -200,7 +200,7 @@ fn check(fmu: &Path) -> Result<Exit> {
 fn problems(d: &ModelDescription, entries: &[String]) -> Vec<String> {
     let mut all = d.problems.clone();
     let library = terraglue_fmi::library_entry(d);
-    if !entries.iter().any(|e| *e == library) {
+    if !entries.contains(&library) {
         let found = terraglue_fmi::platforms(entries.iter().map(String::as_str));
         all.push(format!("there is no library `{library}`; platforms: {}", found.join(", ")));
     }

@@ -213,7 +213,7 @@ impl Supervisor<'_> {
                 let pending = |name: &&str| {
                     waiting.iter().any(|t| t.name == *name) || running.iter().any(|r| r.test.name == *name)
                 };
-                if test.after.iter().any(|name| pending(name)) {
+                if test.after.iter().any(pending) {
                     k += 1;
                 } else if let Some(by) = report.blocker(test) {
                     report.rows.push(TestResult::new(test, Outcome::Blocked { by }, 0.0));

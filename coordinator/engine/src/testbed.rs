@@ -151,7 +151,7 @@ impl Testbed {
 
     /// Number of variables that are fed by another one.
     pub fn connections(&self) -> usize {
-        self.links.numbers.iter().map(Link::len).sum::<usize>() + self.links.discrete.len()
+        self.links.numbers.iter().map(Link::count).sum::<usize>() + self.links.discrete.len()
     }
 
     /// How the last step was glued.

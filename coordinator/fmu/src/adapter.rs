@@ -440,10 +440,10 @@ impl Subsystem for FmuSubsystem {
 
     fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result {
         let Input::Force { t: wrench, .. } = *input else { return Err(Error::Unsupported) };
-        if self.open || !self.running || self.clocks || self.can_go_back || self.has_bodies {
-            if !self.prepare(step, wrench, out)? {
-                return Ok(());
-            }
+        if (self.open || !self.running || self.clocks || self.can_go_back || self.has_bodies)
+            && !self.prepare(step, wrench, out)?
+        {
+            return Ok(());
         }
         self.open = true;
         match self.instance.do_step(Advance { t: step.t, h: step.h, for_good: !self.kept.get() }) {

@@ -59,7 +59,7 @@ pub fn set(
             for (place, value) in places.iter().zip($all.iter().cloned()) {
                 let reference = place.reference;
                 instance.hold(reference, move |instance: &FmuInstance| -> FmiResult {
-                    instance.set(&[reference], Values::$variant(&[value.clone()]))
+                    instance.set(&[reference], Values::$variant(std::slice::from_ref(&value)))
                 });
             }
         };

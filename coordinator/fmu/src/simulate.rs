@@ -70,7 +70,7 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
     } else {
         exact.floor()
     };
-    if !(step > 0.0 && steps >= 1.0 && steps <= STEPS) {
+    if !(step > 0.0 && (1.0..=STEPS).contains(&steps)) {
         return Err(Error::Refused(no_steps(start, stop, step)));
     }
     let intermediate = match &tables.intermediate {

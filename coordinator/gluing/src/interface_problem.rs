@@ -400,7 +400,7 @@ impl InterfaceProblem {
         (self.x1[i] - self.x2[i] + self.gap[i] + self.compliance[i] * force).abs()
     }
 
-    /// What passes a row in the step: see [`PassedEnergy`].
+    /// What passes a row in the step: see `PassedEnergy`.
     pub fn passed(&self, i: usize, t_before: Option<f64>) -> PassedEnergy {
         let t = self.t[i];
         let through = (t * self.x1[i]).abs();

@@ -95,6 +95,7 @@ fn parse(text: &str, from: f64) -> Result<PlateTests, Wrong> {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

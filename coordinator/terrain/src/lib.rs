@@ -1,5 +1,5 @@
 //! Where ground comes from: procedural shapes and elevation files, handed to the soil as a
-//! [`Terrain`](terraglue_subsystem::Terrain).
+//! [`Terrain`].
 //!
 //! Every terrain is centred on the world's origin and has size/spacing + 1 nodes. Files keep their own lattice
 //! unless a spacing is asked for; their coordinates are dropped, their heights kept.

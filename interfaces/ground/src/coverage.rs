@@ -49,7 +49,7 @@ fn segment(x: f64) -> f64 {
 /// Corners that a polygon has at most.
 pub const MOST_CORNERS: usize = 34;
 
-/// Area of a convex polygon (counter-clockwise, at most [`MOST_CORNERS`]) inside the rectangle low … high, m².
+/// Area of a convex polygon (counter-clockwise, at most `MOST_CORNERS`) inside the rectangle low … high, m².
 ///
 /// Sutherland and Hodgman (1974): clip at the four sides, then the shoelace formula.
 pub fn polygon_in_rectangle(corners: &[[f64; 2]], low: [f64; 2], high: [f64; 2]) -> f64 {

@@ -7,7 +7,7 @@ pub const TILE_EDGE: u32 = 32;
 /// Nodes of a tile.
 pub const TILE_NODES: usize = (TILE_EDGE * TILE_EDGE) as usize;
 
-/// Nodes (i, j), 0 ≤ i < size[0], 0 ≤ j < size[1], at `origin + (i, j)·spacing`.
+/// Nodes (i, j), `0 ≤ i < size[0]`, `0 ≤ j < size[1]`, at `origin + (i, j)·spacing`.
 ///
 /// Each node stands for the cell of side `spacing` around it. Tiles hold 32 × 32 nodes, x fastest; tile
 /// (a, b) starts at node (32·a, 32·b) and has number `b·tiles[0] + a`.

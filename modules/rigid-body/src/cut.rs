@@ -181,7 +181,7 @@ fn follow(
         )))
     };
     let welded = usize::from(model.welded && of_joint.first().is_some_and(Option::is_some));
-    let joint = |k: usize| of_joint[model.from_file(k)].map(|k| k - welded);
+    let joint = |k: usize| of_joint[model.joint_of_file(k)].map(|k| k - welded);
     let mut couplings = Vec::new();
     for c in std::mem::take(&mut file.couplings) {
         match [joint(c.follower), joint(c.leader)] {

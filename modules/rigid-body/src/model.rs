@@ -157,7 +157,7 @@ impl Model {
     }
 
     /// Index of the joint with that index in the robot file: a weld of the root comes before them.
-    pub fn from_file(&self, joint: usize) -> usize {
+    pub fn joint_of_file(&self, joint: usize) -> usize {
         joint + usize::from(self.welded)
     }
 

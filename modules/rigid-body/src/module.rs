@@ -206,21 +206,22 @@ fn follow(model: &Model, couplings: &[Coupling], angles: &mut [f64]) -> Result<(
     // A chain of followers is as long as there are couplings at most.
     for _ in couplings {
         couplings.iter().for_each(|c| {
-            angles[model.from_file(c.follower)] = c.ratio * angles[model.from_file(c.leader)] + c.offset
+            angles[model.joint_of_file(c.follower)] =
+                c.ratio * angles[model.joint_of_file(c.leader)] + c.offset
         });
     }
     let outside = |c: &&Coupling| {
         let (joint, angle) =
-            (&model.joints[model.from_file(c.follower)], angles[model.from_file(c.follower)]);
+            (&model.joints[model.joint_of_file(c.follower)], angles[model.joint_of_file(c.follower)]);
         joint.limits.is_some_and(|[low, high]| angle < low || angle > high)
     };
     match couplings.iter().find(outside) {
         None => Ok(()),
         Some(c) => Err(Error::Refused(format!(
             "parameter `joints`: joint `{}` follows `{}` to {} at the start, outside its limits",
-            model.joints[model.from_file(c.follower)].name,
-            model.joints[model.from_file(c.leader)].name,
-            angles[model.from_file(c.follower)]
+            model.joints[model.joint_of_file(c.follower)].name,
+            model.joints[model.joint_of_file(c.leader)].name,
+            angles[model.joint_of_file(c.follower)]
         ))),
     }
 }
@@ -229,7 +230,8 @@ fn follow(model: &Model, couplings: &[Coupling], angles: &mut [f64]) -> Result<(
 fn without_own_motor(said: &Config, model: &Model, couplings: &[Coupling], joints: &mut [JointState]) {
     let named =
         |name: &str| said.get("motor").and_then(|v| v.as_object()).is_some_and(|t| t.contains_key(name));
-    for c in couplings.iter().map(|c| model.from_file(c.follower)).filter(|j| !named(&model.joints[*j].name))
+    for c in
+        couplings.iter().map(|c| model.joint_of_file(c.follower)).filter(|j| !named(&model.joints[*j].name))
     {
         joints[c].motor = Motor::Off;
     }

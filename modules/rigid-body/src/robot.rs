@@ -451,7 +451,7 @@ impl Subsystem for Robot {
     }
 
     fn deserialize(&mut self, from: &[u8]) -> Result {
-        let state = self.state.from_bytes(self.model(), from)?;
+        let state = self.state.restored(self.model(), from)?;
         self.state.copy_from(&state);
         self.changed();
         Ok(())

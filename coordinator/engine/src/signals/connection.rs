@@ -27,24 +27,24 @@ pub struct Link {
 
 impl Link {
     #[inline]
-    fn from_ids(&self) -> &[u32] {
-        &self.ids[..self.len()]
+    fn output_ids(&self) -> &[u32] {
+        &self.ids[..self.count()]
     }
 
     #[inline]
-    fn to_ids(&self) -> &[u32] {
-        &self.ids[self.len()..]
+    fn input_ids(&self) -> &[u32] {
+        &self.ids[self.count()..]
     }
 
     /// Whether it feeds a variable of a subsystem.
     pub fn feeds(&self, slot: usize, id: u32) -> bool {
-        self.to == slot && self.to_ids().contains(&id)
+        self.to == slot && self.input_ids().contains(&id)
     }
 
     /// Sets the inputs to the values that were read last.
     #[inline]
     pub fn pass_on(&self, instances: &mut [Instance]) -> Result {
-        self.write(instances, &self.numbers[..self.len()])
+        self.write(instances, &self.numbers[..self.count()])
     }
 
     /// Values of the outputs, in the units of the inputs.
@@ -65,9 +65,9 @@ impl Link {
 
     /// Derivatives of its values by entry `k` of the inputs that `other` feeds, where the subsystem between knows them.
     pub fn derivatives(&self, instances: &[Instance], other: &Self, k: usize) -> Result<Option<Vec<f64>>> {
-        let mut out = vec![0.0; self.len()];
+        let mut out = vec![0.0; self.count()];
         if self.from == other.to {
-            if !instances[self.from].derivative(self.from_ids(), other.to_ids()[k], &mut out)? {
+            if !instances[self.from].derivative(self.output_ids(), other.input_ids()[k], &mut out)? {
                 return Ok(None);
             }
             out.iter_mut().enumerate().for_each(|(k, x)| *x *= self.conversion(k).0);
@@ -78,7 +78,7 @@ impl Link {
     /// Sets the inputs.
     pub fn write(&self, instances: &mut [Instance], values: &[f64]) -> Result {
         let target = &mut instances[self.to];
-        match target.set(self.to_ids(), Values::F64(values))? {
+        match target.set(self.input_ids(), Values::F64(values))? {
             Reply::Accepted => Ok(()),
             Reply::Refused(reason) => Err(target.error("set", reason)),
         }
@@ -86,19 +86,19 @@ impl Link {
 
     /// Places of the values of a variable: those that come from it, or, with `fed`, those that it is given.
     pub fn numbers_of(&self, slot: usize, id: u32, fed: bool) -> impl Iterator<Item = usize> + '_ {
-        let (own, ids) = if fed { (self.to, self.to_ids()) } else { (self.from, self.from_ids()) };
+        let (own, ids) = if fed { (self.to, self.input_ids()) } else { (self.from, self.output_ids()) };
         (0..ids.len()).filter(move |k| own == slot && ids[*k] == id)
     }
 
     /// Subsystem and variable on either side of every value, and how it is converted.
     pub fn ends(&self) -> impl Iterator<Item = Ends> + '_ {
-        let pairs = self.from_ids().iter().zip(self.to_ids()).enumerate();
+        let pairs = self.output_ids().iter().zip(self.input_ids()).enumerate();
         pairs.map(|(k, (from, to))| ([(self.from, *from), (self.to, *to)], self.conversion(k)))
     }
 
     /// value_to = a·value_from + b of one value.
     pub fn conversion(&self, k: usize) -> (f64, f64) {
-        let n = self.len();
+        let n = self.count();
         (self.numbers[n + k], self.numbers[2 * n + k])
     }
 
@@ -119,7 +119,7 @@ impl Link {
 
     /// Number of values.
     #[inline]
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.ids.len() / 2
     }
 
@@ -129,7 +129,7 @@ impl Link {
             let variable = instances[slot].variables().iter().find(|v| v.id == *id);
             format!("{}.{}", instances[slot].name(), variable.map_or("?", |v| &v.name))
         };
-        let pairs = self.from_ids().iter().zip(self.to_ids());
+        let pairs = self.output_ids().iter().zip(self.input_ids());
         pairs.map(|(from, to)| format!("{} → {}", name(self.from, from), name(self.to, to))).collect()
     }
 }
@@ -282,7 +282,7 @@ fn add(
         links.len() - 1
     });
     let link = &mut links[k];
-    let n = link.len();
+    let n = link.count();
     link.ids.insert(n, from.describe(instances).id);
     link.ids.push(to.describe(instances).id);
     // from the last place on, as each moves what is behind it

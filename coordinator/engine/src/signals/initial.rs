@@ -82,7 +82,7 @@ fn differences(
     let mut columns = Vec::with_capacity(u.len());
     let mut at = u.to_vec();
     let places: Vec<[usize; 2]> =
-        links.iter().enumerate().flat_map(|(l, link)| (0..link.len()).map(move |e| [l, e])).collect();
+        links.iter().enumerate().flat_map(|(l, link)| (0..link.count()).map(move |e| [l, e])).collect();
     for (k, [l, e]) in places.into_iter().enumerate() {
         if let Some(mut column) = known(links, instances, l, e)? {
             column[k] -= 1.0;
@@ -171,7 +171,7 @@ fn read(links: &mut [Link], instances: &mut [Instance]) -> Result<Vec<f64>> {
 
 fn write(links: &mut [Link], instances: &mut [Instance], mut values: &[f64]) -> Result {
     for link in links {
-        let (own, rest) = values.split_at(link.len());
+        let (own, rest) = values.split_at(link.count());
         link.write(instances, own)?;
         values = rest;
     }

@@ -1,6 +1,6 @@
 //! A scenario as a functional mock-up unit.
 //!
-//! [`write`] packs a scenario, its modules and its files; [`open`] makes an instance from them inside the FMU.
+//! [`write()`] packs a scenario, its modules and its files; [`open`] makes an instance from them inside the FMU.
 //! A single module is exported as a small scenario around it: a soil gets ground and `feet` that another program
 //! moves.
 

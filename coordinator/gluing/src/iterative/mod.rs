@@ -2,9 +2,9 @@
 //!
 //! Every trial starts from the committed state. Two forms of one iteration, at position level with an
 //! end-of-step hold:
-//! - [`tt`]: wrenches in, motions out on both sides; T ← T − Λ·e with e = x1 − x2 along the normals, where
+//! - `tt`: wrenches in, motions out on both sides; T ← T − Λ·e with e = x1 − x2 along the normals, where
 //!   Λ = (G1 + G2)⁻¹ is full and unilateral contact is an active set on the linearised problem;
-//! - [`xt`]: the soil takes the motion and answers the wrench; r = T − F(X1(T)), J = I + K·G1.
+//! - `xt`: the soil takes the motion and answers the wrench; r = T − F(X1(T)), J = I + K·G1.
 //!
 //! `auto` takes X-T where the soil takes motion only, or where κ = λmax(K·G1) of the step before is ≤ 10 with shear or
 //! moments at the ports and ≤ 0.3 without; T-T otherwise, and the other one on failure. With normal forces alone Λ is

@@ -54,7 +54,11 @@ fn power_of_ten(k: i32) -> String {
 /// Line, fill of the points and sign in the legend: beyond the palette lines are dashed and points hollow.
 fn style(colour: usize) -> (&'static str, &'static str, &'static str, char) {
     let own = PALETTE[colour % PALETTE.len()];
-    if colour / PALETTE.len() % 2 == 0 { (own, own, "none", '●') } else { (own, "none", "5 3", '○') }
+    if (colour / PALETTE.len()).is_multiple_of(2) {
+        (own, own, "none", '●')
+    } else {
+        (own, "none", "5 3", '○')
+    }
 }
 
 /// The diagram; none where no series has a point that a logarithm knows.

@@ -182,7 +182,7 @@ fn energy(recording: &Recording) -> Option<Figure> {
 /// Pressure over sinkage of what is pressed in without slipping, as a bevameter shows it: one curve a contact.
 fn pressure(recording: &Recording, legs: &[Leg]) -> Option<Figure> {
     let (mut curves, owners) = (Vec::new(), Owners::new(recording, legs));
-    for (_, table) in &recording.variables {
+    for table in recording.variables.values() {
         for name in table.names.iter().filter_map(|n| n.strip_suffix(".mean_pressure")) {
             let of = |part: &str| table.column(&format!("{name}.{part}"));
             let (Some(sinkage), Some(pressure)) = (of("sinkage"), of("mean_pressure")) else { continue };
@@ -220,7 +220,7 @@ fn contacts(recording: &Recording, legs: &[Leg]) -> Option<Figure> {
     let shown = shown.into_iter().chain([("area", "m²"), ("pull", "N"), ("torque", "N m"), ("power", "W")]);
     let panel = |(quantity, unit): (&'static str, &'static str)| {
         let mut curves = Vec::new();
-        for (_, table) in &recording.variables {
+        for table in recording.variables.values() {
             for (name, y) in table.names.iter().zip(&table.columns) {
                 let contact = name.strip_suffix(quantity).and_then(|n| n.strip_suffix('.'));
                 if let Some(contact) = contact.filter(|c| c.starts_with("contact")) {

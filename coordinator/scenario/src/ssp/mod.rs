@@ -44,7 +44,7 @@ pub fn convert(package: &Package, prefix: &str) -> Result<Converted> {
         let _ = write!(text, "\n[{}]\nfmu = {}\n", part.name, quoted(&file));
         let own: Vec<_> = values.start.iter().filter(|(key, _)| key.0 == part.path).collect();
         if !own.is_empty() {
-            let _ = write!(text, "[{}.start]\n", part.name);
+            let _ = writeln!(text, "[{}.start]", part.name);
         }
         for (key, value) in own {
             let _ = writeln!(text, "{} = {}", quoted(&key.1), shown(value));

@@ -69,6 +69,7 @@ impl Variable {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
     use terraglue_subsystem::ValueType;

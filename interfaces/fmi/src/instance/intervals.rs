@@ -221,6 +221,7 @@ impl FmuInstance {
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

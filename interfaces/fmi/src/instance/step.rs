@@ -197,7 +197,7 @@ impl FmuInstance {
             if at_stop && stop >= end {
                 return Ok(Stepped { reached: end, terminate: false, events });
             }
-            if !(event && self.event_mode) && !at_stop && last <= t {
+            if !(at_stop || event && self.event_mode) && last <= t {
                 let outcome = format!("came no further than t = {last} s in the step to {end} s");
                 return Err(self.lied(NAME, outcome));
             }

@@ -84,7 +84,7 @@ pub(crate) fn closures(
 
 /// A joint that follows another, as the robot file says.
 fn from_coupling(c: &import::Coupling, model: &Model) -> Closure {
-    let (follower, leader) = (model.from_file(c.follower), model.from_file(c.leader));
+    let (follower, leader) = (model.joint_of_file(c.follower), model.joint_of_file(c.leader));
     Closure {
         name: c.name.clone(),
         law: ClosureLaw::Coupling { follower, leader, ratio: c.ratio, offset: c.offset },

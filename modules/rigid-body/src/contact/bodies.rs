@@ -321,7 +321,7 @@ impl BodyContacts {
     fn holds(&self, i: usize) -> bool {
         let r = &self.impulses[3 * (i / 3)..][..3];
         let tangential = (r[1] * r[1] + r[2] * r[2]).sqrt();
-        r[0] > 0.0 && (i % 3 == 0 || tangential < self.mu[i / 3] * r[0] * (1.0 - 1e-9))
+        r[0] > 0.0 && (i.is_multiple_of(3) || tangential < self.mu[i / 3] * r[0] * (1.0 - 1e-9))
     }
 
     /// Takes the pressing contacts into account in a compliance matrix g = P·K⁻¹·Pᵀ (n × n): they hold within

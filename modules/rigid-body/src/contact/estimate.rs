@@ -407,5 +407,5 @@ fn residuals(p: &Problem, t: &[f64], out: &mut Vec<f64>) {
     for (column, t) in p.g.chunks_exact(p.gap.len().max(1)).zip(t) {
         out.iter_mut().zip(column).for_each(|(o, g)| *o += g * t);
     }
-    out.iter_mut().zip(p.gap).for_each(|(o, gap)| *o = gap + *o);
+    out.iter_mut().zip(p.gap).for_each(|(o, gap)| *o += gap);
 }

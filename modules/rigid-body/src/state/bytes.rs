@@ -57,11 +57,21 @@ impl Persist for State {
         let Self { bodies, joints, closures, redundant_rows, loads, contact_normal, energy, contact, .. } =
             self;
         let Self { pressed, supply, start, stagger, reactions, accelerations, accelerated, .. } = self;
-        (bodies.write(out), joints.write(out), closures.write(out), redundant_rows.write(out));
+        bodies.write(out);
+        joints.write(out);
+        closures.write(out);
+        redundant_rows.write(out);
         loads.write(out);
-        (contact_normal.write(out), energy.write(out), contact.write(out), pressed.write(out));
-        (supply.write(out), start.map(<[f64; 3]>::from).write(out), stagger.write(out));
-        (reactions.write(out), accelerations.write(out), accelerated.write(out));
+        contact_normal.write(out);
+        energy.write(out);
+        contact.write(out);
+        pressed.write(out);
+        supply.write(out);
+        start.map(<[f64; 3]>::from).write(out);
+        stagger.write(out);
+        reactions.write(out);
+        accelerations.write(out);
+        accelerated.write(out);
     }
     fn read(from: &mut &[u8]) -> Result<Self> {
         Ok(Self {
@@ -94,7 +104,7 @@ impl State {
     ///
     /// # Errors
     /// `Refused`, with the reason.
-    pub fn from_bytes(&self, model: &Model, from: &[u8]) -> Result<Self> {
+    pub fn restored(&self, model: &Model, from: &[u8]) -> Result<Self> {
         let state: Self = bytes::open(VERSION, mark(model), from)?;
         let same = [
             (state.bodies.len(), self.bodies.len()),

@@ -112,7 +112,8 @@ impl Feet {
                     if a.seen() != b.seen() {
                         changed.mark(b.node);
                     }
-                    (old.next(), new.next());
+                    old.next();
+                    new.next();
                 }
                 (Some(a), b) if b.is_none_or(|b| a.key() < b.key()) => {
                     changed.mark(a.node);

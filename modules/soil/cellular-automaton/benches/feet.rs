@@ -6,7 +6,7 @@
 #[path = "../tests/feet/mod.rs"]
 mod feet;
 #[path = "../../contact/tests/support/mod.rs"]
-#[allow(dead_code, unused_imports)]
+#[allow(unused_imports)]
 mod support;
 
 use divan::Bencher;

@@ -55,7 +55,7 @@ impl Compatibility {
             if left <= self.tolerated() {
                 return Ok(None);
             }
-            if !self.newton(patches, n, &estimate.g) {
+            if !self.newton(patches, n, estimate.g) {
                 return Ok(Some(left));
             }
             let before = left;

@@ -46,7 +46,7 @@ impl Contacts {
         let numbers = (first..).zip((0..self.shown).flat_map(|c| QUANTITIES.iter().map(move |q| (c, q))));
         numbers
             .map(|(id, (c, (name, unit, help)))| {
-                Variable::real(id, format!("contact{}.{name}", c + 1), *unit, Causality::Output, *help)
+                Variable::real(id, format!("contact{}.{name}", c + 1), unit, Causality::Output, help)
             })
             .collect()
     }

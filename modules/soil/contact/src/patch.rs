@@ -382,6 +382,7 @@ impl Patches {
                 levels: &|i, j| ground.levels(i, j),
                 passive: law.passive,
                 stiffness: law.curve.unloading(),
+                n_z,
                 wedge: law.wedge,
             };
             let mut rows = std::mem::take(&mut self.rows);
@@ -400,16 +401,8 @@ impl Patches {
                     1.0
                 })
             };
-            let gathered = wall::gather(
-                &self.nodes,
-                range.clone(),
-                n_z,
-                &beside,
-                pressed,
-                &mut rows,
-                &mut sides,
-                &mut wall,
-            );
+            let gathered =
+                wall::gather(&self.nodes, range.clone(), &beside, pressed, &mut rows, &mut sides, &mut wall);
             (self.rows, self.sides) = (rows, sides);
             gathered?;
             if let Some(wheel) = &wheel {
@@ -417,10 +410,10 @@ impl Patches {
                 wall.arm = [wheel.radius, 0.0, 0.0];
             }
         }
-        if let Some(wheel) = &wheel {
-            if let Some(shift) = wheel.shift(&laws[0].rolling, &self.nodes, range.clone()) {
-                self.shift_peak(wheel, &shift, range.clone())?;
-            }
+        if let Some(wheel) = &wheel
+            && let Some(shift) = wheel.shift(&laws[0].rolling, &self.nodes, range.clone())
+        {
+            self.shift_peak(wheel, &shift, range.clone())?;
         }
         // under a rim the soil flows by
         let cone = wheel.is_none().then(|| {

@@ -36,11 +36,18 @@ pub struct Slot<S> {
 impl<S: Persist> Persist for Slot<S> {
     fn write(&self, out: &mut Vec<u8>) {
         let Self { heights, nodes, wheels, pushes, cones, contacts, law_memory, .. } = self;
-        (heights.write(out), nodes.write(out), wheels.write(out), pushes.write(out));
-        (cones.write(out), contacts.write(out));
+        heights.write(out);
+        nodes.write(out);
+        wheels.write(out);
+        pushes.write(out);
+        cones.write(out);
+        contacts.write(out);
         let Self { loaded, ledger, parameters, material, .. } = self;
         law_memory.write(out);
-        (loaded.write(out), ledger.write(out), parameters.write(out), material.write(out));
+        loaded.write(out);
+        ledger.write(out);
+        parameters.write(out);
+        material.write(out);
     }
     fn read(from: &mut &[u8]) -> Result<Self> {
         Ok(Self {

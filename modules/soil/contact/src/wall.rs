@@ -190,6 +190,8 @@ pub struct Beside<'a> {
     pub passive: [f64; 2],
     /// Stiffness of the soil, Pa/m.
     pub stiffness: f64,
+    /// z of the port's normal.
+    pub n_z: f64,
     /// Length over height of the wedge that a wall pushes up, √K_p = tan(45° + φ/2) (Rankine 1857).
     pub wedge: f64,
 }
@@ -217,12 +219,11 @@ const NEIGHBOURS: [(i32, i32); 4] = [(1, 0), (-1, 0), (0, 1), (0, -1)];
 
 /// Gathers the sides of the contact whose nodes are `range`: where the covered part of the cells falls from a node to its
 /// neighbour and soil stands above the underside. The parts of a node make one side, so that the normal follows the
-/// outline and not the lattice. `n_z`: of the port's normal; `pressed`: pressure at a node over that at which it yields: where
+/// outline and not the lattice. `pressed`: pressure at a node over that at which it yields: where
 /// the underside rises again, as behind the lowest line of a wheel, it leaves the soil that the sides have pushed away.
 pub fn gather(
     nodes: &PatchNodes,
     range: std::ops::Range<usize>,
-    n_z: f64,
     beside: &Beside,
     pressed: impl Fn(usize) -> Result<f64>,
     rows: &mut Rows,
@@ -230,7 +231,7 @@ pub fn gather(
     wall: &mut Wall,
 ) -> Result {
     let first = sides.len();
-    let spacing = beside.lattice.spacing;
+    let (spacing, n_z) = (beside.lattice.spacing, beside.n_z);
     rows.list(nodes, range.clone());
     rows.places.clear();
     let (mut arm, mut sum, mut face) = ([0.0; 3], 0.0, 0.0);

@@ -129,6 +129,7 @@ pub fn fit(law: FitLaw, readings: &[Reading], cohesion: bool) -> Result<Fit, Fit
 }
 
 #[cfg(test)]
+#[allow(clippy::unwrap_used)]
 mod tests {
     use super::*;
 

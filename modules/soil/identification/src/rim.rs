@@ -78,7 +78,7 @@ impl Rim {
         // squares of the variable take the kinks at both ends out
         let law =
             |theta: f64| self.modulus * (self.radius * (theta.cos() - front.cos()).max(0.0)).powf(self.n);
-        self.add(&mut sum, [front, middle], &law, [front, slip]);
+        self.add(&mut sum, [front, middle], law, [front, slip]);
         let share = (front - middle) / middle.max(f64::MIN_POSITIVE);
         self.add(&mut sum, [0.0, middle], |theta| law(front - theta * share), [front, slip]);
         // the soil springs back behind the lowest point, where the stress is largest without a shifted peak

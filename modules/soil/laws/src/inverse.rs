@@ -14,7 +14,7 @@ const QUICK: usize = 20;
 
 /// Whether step number `k` halves the bracket, whatever Newton says.
 fn halves(k: usize) -> bool {
-    k >= QUICK && k % 2 == 0
+    k >= QUICK && k.is_multiple_of(2)
 }
 
 /// Depth where the law meets the elastic line k_u·z from above, m; 0 where it starts below it.

@@ -172,7 +172,7 @@ impl Module for PowerColumns {
             variables: OUTPUTS
                 .iter()
                 .enumerate()
-                .map(|(id, (name, help))| Variable::real(id as u32, *name, "m", Causality::Output, *help))
+                .map(|(id, (name, help))| Variable::real(id as u32, *name, "m", Causality::Output, help))
                 .collect(),
             echo: config.flag("echo_estimate")?,
         }))

@@ -99,7 +99,7 @@ fn compile(
     let (source, library) = (folder.join(format!("{name}.c")), folder.join(format!("{name}.so")));
     write(&source, &code)?;
     let flags = ["-O2", "-ffp-contract=off", "-shared", "-fPIC", "-w", "-o"];
-    must(&mut command("cc", &flags).arg(&library).arg(&source).arg("-lm"))?;
+    must(command("cc", &flags).arg(&library).arg(&source).arg("-lm"))?;
     let fmu = folder.join(format!("{name}.fmu"));
     let entries = [
         ("modelDescription.xml".to_owned(), Content::Text(describe(variables, capabilities))),

@@ -76,7 +76,8 @@ impl Oscillator {
         let both = |v: [f64; 2], join: fn(f64, f64) -> f64| {
             if self.coupling.is_some() { list(&v) } else { list(&[join(v[0], v[1])]) }
         };
-        let (sum, first): (fn(f64, f64) -> f64, fn(f64, f64) -> f64) = (|a, b| a + b, |a, _| a);
+        let sum = |a: f64, b: f64| a + b;
+        let first = |a: f64, _: f64| a;
         let (kc, cc) = self.coupling.unwrap_or_default();
         let keys = [
             ("mass_kg", both(self.m, sum)),

@@ -13,7 +13,7 @@ use terraglue_numerics::extremes::{larger, smaller};
 
 /// Published multipliers at 0.03 s, N.
 const MULTIPLIERS: [f64; 6] = [
-    199.1753333731910,
+    199.175_333_373_191,
     -29.75531228015052,
     23.06654119098399,
     31.45271365475927,

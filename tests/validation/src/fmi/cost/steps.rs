@@ -51,7 +51,7 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
     fmus::build(folder, "through", &[("u", 'i', 1.0), ("y", 'o', 0.0)], "v[1] = 0.5 * v[0];", "")?;
     let program = folder.join("bare_loop");
     read(&root().join(LOOP))?;
-    must(&mut command("cc", &["-O2", "-w", LOOP, "-ldl", "-o"]).arg(&program))?;
+    must(command("cc", &["-O2", "-w", LOOP, "-ldl", "-o"]).arg(&program))?;
     let mut all = Vec::new();
     for case in &CASES {
         all.extend(compared(folder, &program, case, "", BLIND)?);

@@ -24,7 +24,8 @@ pub fn figure(folder: &Path) -> Outcome<Figure> {
     let (mut one, mut two) = (on(1)?, on(2)?);
     let mut best = [f64::INFINITY; 2];
     // the first steps tell a testbed what its FMUs cost
-    (took(&mut one, 130)?, took(&mut two, 130)?);
+    took(&mut one, 130)?;
+    took(&mut two, 130)?;
     for _ in 0..TURNS {
         best[0] = smaller(best[0], took(&mut one, STEPS)?);
         best[1] = smaller(best[1], took(&mut two, STEPS)?);

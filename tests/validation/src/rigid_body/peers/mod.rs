@@ -13,14 +13,17 @@ use crate::{Context, Figure, Limit};
 use std::path::PathBuf;
 use std::process::Command;
 
+/// Makes the program of a peer, ready to be started.
+type Make = fn() -> Outcome<Command>;
+
 /// All figures of the peers; none of them is judged.
 pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     if !context.timing || context.quick {
         return Ok(Vec::new());
     }
-    let engines: [(&str, &str, fn() -> Outcome<Command>); 2] =
+    let engines: [(&str, &str, Make); 2] =
         [("mujoco", "MuJoCo", mujoco::command), ("rapier", "Rapier", rapier::command)];
-    let measured = |(id, name, command): (&str, &str, fn() -> Outcome<Command>)| {
+    let measured = |(id, name, command): (&str, &str, Make)| {
         let id = format!("rigid-body.peer.{id}");
         let figures = command().and_then(|mut c| measure(&mut c, &id, name));
         figures.unwrap_or_else(|why| vec![Figure::skipped(id, why)])

@@ -7,7 +7,7 @@ use nalgebra::Vector3;
 use terraglue_numerics::extremes::larger;
 use terraglue_robot_import::{JointKind, Options, Robot, read_robot};
 
-const STAND: [f64; 4] = [0.0, 0.958_192_178_746_274_4, -1.379_634_180_263_838_4, -1.149_354_325_277_333_1];
+const STAND: [f64; 4] = [0.0, 0.958_192_178_746_274_4, -1.379_634_180_263_838_4, -1.149_354_325_277_333];
 const CYCLE: f64 = 1.2;
 
 /// The robot with its drive (PD of 600 N m/rad and 10 N m s/rad, 60 N m) and the gait's targets.

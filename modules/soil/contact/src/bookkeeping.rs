@@ -248,9 +248,9 @@ impl Scene<'_> {
         if let Some(wheel) = patch.wheel.as_ref().filter(|_| loaded > 0) {
             contact_memory::remember(&mut ground.wheels, wheel.rolled(x));
         }
-        let entry = patch.wheel.as_ref().map(|wheel| {
-            let [a, b] = wheel.heading.map(|c| if wheel.rolled(x).forward { c } else { -c });
-            in_world(port, [0.0, a, b])
+        let entry = patch.wheel.as_ref().and_then(|wheel| {
+            let [a, b] = wheel.entry(x)?;
+            Some(in_world(port, [0.0, a, b]))
         });
         carry_slip(ground, lists, first, entry, ledger.stamp);
         Ok(loaded)

@@ -109,6 +109,13 @@ impl Wheel {
         self.heading.map(|c| if back { -c } else { c })
     }
 
+    /// Where points of the rim come down, along t1 and t2, unit length: ahead where it turns forward, whichever way the axle goes;
+    /// `None` where it is locked.
+    pub fn entry(&self, x: &[f64; 6]) -> Option<[f64; 2]> {
+        let [rim, _] = self.ways(x);
+        (rim != 0.0).then(|| self.heading.map(|c| rim.signum() * c))
+    }
+
     /// The memory after the foot has moved by `x` (n, t1, t2 and rotations).
     pub fn rolled(&self, x: &[f64; 6]) -> Memory {
         let [rim, axle] = self.ways(x);
@@ -329,6 +336,17 @@ mod tests {
         assert_eq!(shift.before, 0.0);
         let entry = libm::acos(1.0 - 0.01 / RADIUS);
         assert!((shift.entry - entry).abs() < 0.01 * entry, "{shift:?}");
+    }
+
+    #[test]
+    fn points_of_a_rim_come_down_where_it_turns_to() {
+        let w = find(&wheel(0.0, 0.0)).expect("a wheel");
+        let entry = |rim: f64, axle: f64| w.entry(&[0.0, axle - rim, 0.0, 0.0, 0.0, rim / w.radius]);
+        for (rim, axle) in [(1e-3, 1e-3), (1e-3, 0.0), (1e-3, -1e-6), (-1e-3, 0.0), (-1e-3, 1e-6)] {
+            let [along, _] = entry(rim, axle).expect("it turns");
+            assert!((along - rim.signum()).abs() < 1e-3, "{rim} {axle}: {along}");
+        }
+        assert_eq!(entry(0.0, 1e-3), None);
     }
 
     #[test]

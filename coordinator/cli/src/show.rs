@@ -23,7 +23,7 @@ pub fn error(error: &Error) {
         }
         other => {
             eprintln!("error: {}", shorten::text(&other.to_string()));
-            let help = other.help().or_else(|| on_the_ground(&other));
+            let help = other.help().or_else(|| on_the_ground(other));
             help.iter().for_each(|help| eprintln!("  help: {help}"));
         }
     }

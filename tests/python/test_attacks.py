@@ -245,10 +245,14 @@ def test_there_are_enough_of_them():
     assert len(SETS) + len(TEXTS) + len(ROBOTS) + len(GROUNDS) + len(COMMANDS) >= 136
 
 
-def test_edits(place):
-    rows = [(text, ["check", place / "walk.toml", "--set", text], code, words, place) for text, code, words in SETS]
+def attack_edits(place, sets):
+    rows = [(text, ["check", place / "walk.toml", "--set", text], code, words, place) for text, code, words in sets]
     faults = attack(rows)
     assert not faults, "\n\n".join(faults)
+
+
+def test_edits(place):
+    attack_edits(place, SETS)
 
 
 def test_texts(place):
@@ -314,9 +318,7 @@ SECOND_SETS = [
 
 
 def test_edits_of_a_second_look(place):
-    rows = [(text, ["check", place / "walk.toml", "--set", text], code, words, place) for text, code, words in SECOND_SETS]
-    faults = attack(rows)
-    assert not faults, "\n\n".join(faults)
+    attack_edits(place, SECOND_SETS)
 
 
 def test_texts_of_a_second_look(place):
@@ -463,9 +465,7 @@ THIRD_ROBOTS = [
 
 
 def test_edits_of_a_third_look(place):
-    rows = [(text, ["check", place / "walk.toml", "--set", text], code, words, place) for text, code, words in THIRD_SETS]
-    faults = attack(rows)
-    assert not faults, "\n\n".join(faults)
+    attack_edits(place, THIRD_SETS)
 
 
 def test_robots_of_a_third_look(place):

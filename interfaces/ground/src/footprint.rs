@@ -27,8 +27,9 @@ pub(crate) enum Outline {
 /// the shape's underside, row by row.
 ///
 /// `area` is the covered part of the cell: exact for spheres, boxes and upright cylinders and capsules, of polygons with 34
-/// corners for other cylinders and capsules, and from 8 × 8 points for meshes. `lower` is the exact underside at the node; where the vertical line through the node
-/// misses the shape, that of the nearest covered point. A mesh that is not convex: see [`nodes_below_parts`].
+/// corners for other cylinders and capsules, and from 8 × 8 points for meshes. `lower` is the exact underside at the node;
+/// where the vertical line through the node misses the shape, that of the nearest covered point. A mesh that is not convex:
+/// see [`nodes_below_parts`].
 pub fn nodes_below<S: Surface + ?Sized>(shape: &Placed, surface: &S, margin: f64, out: &mut Vec<Node>) {
     let lattice = surface.lattice();
     let bounds = shape.aabb();
@@ -229,7 +230,7 @@ pub(crate) struct Polygon {
 }
 
 /// Points of half an ellipse, both ends counted.
-const HALF: usize = 17;
+const HALF: usize = MOST_CORNERS / 2;
 
 impl Polygon {
     fn corners(&self) -> &[[f64; 2]] {

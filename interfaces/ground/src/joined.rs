@@ -40,6 +40,8 @@ pub fn nodes_below_parts<'a, S: Surface + ?Sized>(
     let lattice = surface.lattice();
     let (i0, i1) = lattice.cell_range(0, bounds.min[0], bounds.max[0]);
     let (j0, j1) = lattice.cell_range(1, bounds.min[1], bounds.max[1]);
+    // neighbours mostly lie below the same part
+    let mut last = None;
     for j in j0..=j1 {
         for i in i0..=i1 {
             let cell = Cell { at: lattice.position(i, j), half: 0.5 * lattice.spacing };
@@ -49,7 +51,7 @@ pub fn nodes_below_parts<'a, S: Surface + ?Sized>(
             let mut few = near.clone();
             let Some(first) = few.next() else { continue };
             let below = if few.next().is_none() && first.1.placed.is_convex() {
-                alone(first, &cell, reach)
+                alone(first, &mut last, &cell, reach)
             } else {
                 below_any(near, &cell, reach)
             };
@@ -70,9 +72,17 @@ struct Below<'a> {
     part: (usize, Part<'a>),
 }
 
-fn alone<'a>(part: (usize, Part<'a>), cell: &Cell, reach: f64) -> Option<Below<'a>> {
+/// Below one convex part; `last` keeps the outline of the part that was asked for last, and its number.
+fn alone<'a>(
+    part: (usize, Part<'a>),
+    last: &mut Option<(usize, Outline)>,
+    cell: &Cell,
+    reach: f64,
+) -> Option<Below<'a>> {
     let shape = part.1.placed;
-    let (area, point) = Outline::of(shape).node(shape, cell, reach)?;
+    last.take_if(|(number, _)| *number != part.0);
+    let (_, outline) = last.get_or_insert_with(|| (part.0, Outline::of(shape)));
+    let (area, point) = outline.node(shape, cell, reach)?;
     Some(Below { area, point, part })
 }
 

@@ -2,7 +2,7 @@
 //! builds up, on every grid, and in every direction.
 
 use super::MODULES;
-use super::drive::{Drive, Move, Vertical, on_rim};
+use super::drive::{Drive, Move, Vertical, on_rim, turned};
 use super::plates::Maker;
 use super::rows::{SoilRow, eight};
 use crate::parallel::in_parallel;
@@ -52,13 +52,6 @@ fn bodies() -> [Dragged; 3] {
     ]
 }
 
-/// Orientation (w, x, y, z) after a rotation about the vertical by `angle`, rad.
-fn turned(q: [f64; 4], angle: f64) -> [f64; 4] {
-    let (s, c) = (0.5 * angle).sin_cos();
-    let [w, x, y, z] = q;
-    [c * w - s * z, c * x - s * y, c * y + s * x, c * z + s * w]
-}
-
 /// Drags a body in the direction `angle` (rad from x): mean of the force that it takes (N) and of the sinkage (m) over the
 /// last fifth of the way.
 fn drag(make: Maker, soil: &SoilRow, body: &Dragged, spacing: f64, angle: f64) -> [f64; 2] {
@@ -67,7 +60,7 @@ fn drag(make: Maker, soil: &SoilRow, body: &Dragged, spacing: f64, angle: f64) -
     let ground = make(&soil.own, ((2.0 * WAY + 0.4) / spacing) as u32 / 2 * 2 + 1, spacing);
     let [x, y] = START.map(|start| start - 0.5 * WAY);
     let from = [c * x - s * y, s * x + c * y];
-    let mut bench = Drive::new(ground, body.geometry.clone(), turned(body.lies, angle), from);
+    let mut bench = Drive::new(ground, body.geometry.clone(), turned(body.lies, [0.0, 0.0, angle]), from);
     let ahead = STEP * spacing;
     let steps = (WAY / ahead).round() as u32;
     let mut sum = [0.0; 2];

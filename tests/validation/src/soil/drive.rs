@@ -239,7 +239,7 @@ fn cross(a: [f64; 3], b: [f64; 3]) -> [f64; 3] {
 }
 
 /// The orientation (w, x, y, z) after a rotation vector in the world.
-fn turned(q: [f64; 4], turn: [f64; 3]) -> [f64; 4] {
+pub fn turned(q: [f64; 4], turn: [f64; 3]) -> [f64; 4] {
     let angle = (turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]).sqrt();
     if angle == 0.0 {
         return q;

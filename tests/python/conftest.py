@@ -6,6 +6,7 @@ import pathlib
 import shutil
 import subprocess
 import tempfile
+from contextlib import contextmanager
 
 import pytest
 
@@ -24,6 +25,19 @@ MOON_WALK = ROOT / "scenarios" / "moon_walk.toml"
 def pytest_sessionfinish(exitstatus):
     if exitstatus == 0:
         shutil.rmtree(TEMPORARY, ignore_errors=True)
+
+
+@contextmanager
+def small_disk(folder, size):
+    """A file system of its own of `size` ("4m"), mounted at the new folder; the test is skipped where none may be mounted."""
+    folder.mkdir()
+    mounted = shutil.which("mount") and subprocess.run(["mount", "-t", "tmpfs", "-o", f"size={size}", "none", folder], capture_output=True)
+    if not mounted or mounted.returncode:
+        pytest.skip("no file system may be mounted here")
+    try:
+        yield folder
+    finally:
+        subprocess.run(["umount", folder])
 
 
 def terraglue(*arguments, cwd=ROOT, timeout=300):

@@ -9,7 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import pytest
 from cfmu import build
-from conftest import MOON_WALK, PROGRAM, ROOT, terraglue
+from conftest import MOON_WALK, PROGRAM, ROOT, small_disk, terraglue
 
 WALK = MOON_WALK.read_text().replace("../models", str(ROOT / "models"))
 ROBOT = (ROOT / "models" / "hexapod.urdf").read_text()
@@ -519,20 +519,11 @@ def test_a_recording_that_is_too_short_to_go_on(place):
 
 
 def test_a_unit_for_which_there_is_no_room(place):
-    import shutil
-    import subprocess
-    disk = place / "disk"
-    disk.mkdir()
-    mounted = shutil.which("mount") and subprocess.run(["mount", "-t", "tmpfs", "-o", "size=1m", "none", disk], capture_output=True)
-    if not mounted or mounted.returncode:
-        pytest.skip("no file system may be mounted here")
-    try:
+    with small_disk(place / "disk", "1m") as disk:
         done = terraglue("export", "soil-bekker", "-o", disk / "a.fmu", "--set", "soil.parameters=LETE_sand")
         for words in ("a.fmu: No space left", "it has ", "MiB are free there", "help: free some room"):
             assert words in done.stderr and done.returncode in (1, 2), done.stderr
         assert "ZipWriter" not in done.stderr and not list(disk.iterdir())
-    finally:
-        subprocess.run(["umount", disk])
 
 
 def test_a_unit_that_may_not_become_so_large(place):

@@ -3,13 +3,12 @@
 import json
 import os
 import re
-import shutil
 import signal
 import subprocess
 import time
 
 import pytest
-from conftest import MOON_WALK, PROGRAM, ROOT, terraglue
+from conftest import MOON_WALK, PROGRAM, ROOT, small_disk, terraglue
 from test_bad_input import refused
 
 # a signal wakes `sleep`, which then goes on
@@ -183,18 +182,11 @@ def test_a_file_that_may_not_grow_leaves_the_run_up_to_then(tmp_path):
 
 
 def test_a_full_disk_leaves_the_run_up_to_then(tmp_path):
-    disk = tmp_path / "disk"
-    disk.mkdir()
-    mounted = shutil.which("mount") and subprocess.run(["mount", "-t", "tmpfs", "-o", "size=4m", "none", disk], capture_output=True)
-    if not mounted or mounted.returncode:
-        pytest.skip("no file system may be mounted here")
-    try:
+    with small_disk(tmp_path / "disk", "4m") as disk:
         process = terraglue("run", MOON_WALK, "--out", disk / "out", "--duration", "3", "--csv")
         assert process.returncode == 1 and "kept up to t = " in process.stderr, process.stderr
         assert "No space left" in process.stderr and "0.0 MiB are free" in process.stderr
         assert 0 < kept(disk / "out") < 3
-    finally:
-        subprocess.run(["umount", disk])
 
 
 def test_readings_that_fall_with_the_depth_are_no_soil(tmp_path):

@@ -24,7 +24,8 @@ pub(crate) enum Outline {
 }
 
 /// Appends the nodes whose cells the shape covers and whose surface lies less than `margin` (m, vertical) below
-/// the shape's underside, row by row.
+/// the shape's underside, and those on the inclined underside next to them, row by row: the soil can reach into their cells, and they
+/// tell how the underside goes on.
 ///
 /// `area` is the covered part of the cell: exact for spheres, boxes and upright cylinders and capsules, of polygons with 34
 /// corners for other cylinders and capsules, and from 8 × 8 points for meshes. `lower` is the exact underside at the node;
@@ -51,13 +52,38 @@ pub fn nodes_below<S: Surface + ?Sized>(shape: &Placed, surface: &S, margin: f64
                     continue;
                 }
                 let cell = Cell { at: lattice.position(i, j), half: 0.5 * lattice.spacing };
-                if let Some((area, [x, y, lower])) = outline.node(shape, &cell, reach) {
+                let beside = |point| reaches_beside(shape, surface, margin, [i, j], point);
+                if let Some((area, [x, y, lower])) = outline.node(shape, &cell, reach, beside) {
                     let slope = shape.underside_slope([x, y, lower]);
                     out.push(Node { i, j, area, lower, slope });
                 }
             }
         }
     }
+}
+
+/// Whether the underside, which is at `point` above node (i, j), comes nearer to the surface than `margin` above one of the next nodes
+/// on its way down.
+pub(crate) fn reaches_beside<S: Surface + ?Sized>(
+    shape: &Placed,
+    surface: &S,
+    margin: f64,
+    [i, j]: [i32; 2],
+    point: [f64; 3],
+) -> bool {
+    let lattice = surface.lattice();
+    let slope = shape.underside_slope(point);
+    let [a, b] = slope.map(|s| if s > 0.0 { -1 } else { i32::from(s < 0.0) });
+    [[a, 0], [0, b], [a, b]].iter().any(|[di, dj]| {
+        if (*di, *dj) == (0, 0) || !lattice.has(i + di, j + dj) {
+            return false;
+        }
+        let [x, y] = lattice.position(i + di, j + dj);
+        let reach = surface.height(i + di, j + dj) + margin;
+        // a convex body lies above its tangent plane
+        let tangent = point[2] + slope[0] * (x - point[0]) + slope[1] * (y - point[1]);
+        tangent < reach && shape.lower(x, y).is_some_and(|lower| lower < reach)
+    })
 }
 
 /// A square of side 2·half around a node.
@@ -148,9 +174,15 @@ impl Outline {
         }
     }
 
-    /// Covered area and point of the lower surface of a node that is covered and lower than `reach`. The area,
-    /// which costs most, is asked for last.
-    pub fn node(&self, shape: &Placed, cell: &Cell, reach: f64) -> Option<(f64, [f64; 3])> {
+    /// Covered area and point of the lower surface of a node that is covered, and lower than `reach` or `beside` one that is.
+    /// The area, which costs most, is asked for last.
+    pub fn node(
+        &self,
+        shape: &Placed,
+        cell: &Cell,
+        reach: f64,
+        beside: impl FnOnce([f64; 3]) -> bool,
+    ) -> Option<(f64, [f64; 3])> {
         let hit = shape.lower(cell.at[0], cell.at[1]);
         let (point, sampled) = match (hit, self) {
             (_, Self::Disc(centre, radius)) if at_rim(shape, cell, *centre, *radius) => {
@@ -168,7 +200,7 @@ impl Outline {
                 (nearest, Some(share))
             }
         };
-        if point[2] >= reach {
+        if point[2] >= reach && !beside(point) {
             return None;
         }
         let share = match sampled {

@@ -1,7 +1,7 @@
 //! The nodes below several shapes that are one piece, and below meshes that are not convex.
 
 use crate::Surface;
-use crate::footprint::{Cell, Outline, SAMPLES, closer};
+use crate::footprint::{Cell, Outline, SAMPLES, closer, reaches_beside};
 use crate::shape::{Aabb, Placed};
 use terraglue_subsystem::Node;
 
@@ -51,7 +51,9 @@ pub fn nodes_below_parts<'a, S: Surface + ?Sized>(
             let mut few = near.clone();
             let Some(first) = few.next() else { continue };
             let below = if few.next().is_none() && first.1.placed.is_convex() {
-                alone(first, &mut last, &cell, reach)
+                alone(first, &mut last, &cell, reach, |point| {
+                    reaches_beside(first.1.placed, surface, margin, [i, j], point)
+                })
             } else {
                 below_any(near, &cell, reach)
             };
@@ -78,11 +80,12 @@ fn alone<'a>(
     last: &mut Option<(usize, Outline)>,
     cell: &Cell,
     reach: f64,
+    beside: impl FnOnce([f64; 3]) -> bool,
 ) -> Option<Below<'a>> {
     let shape = part.1.placed;
     last.take_if(|(number, _)| *number != part.0);
     let (_, outline) = last.get_or_insert_with(|| (part.0, Outline::of(shape)));
-    let (area, point) = outline.node(shape, cell, reach)?;
+    let (area, point) = outline.node(shape, cell, reach, beside)?;
     Some(Below { area, point, part })
 }
 

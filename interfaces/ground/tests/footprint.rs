@@ -149,19 +149,22 @@ fn disc_area_splits_over_cells_without_remainder() {
 }
 
 #[test]
-fn a_sphere_lists_the_nodes_of_its_contact_circle_only() {
+fn a_sphere_lists_the_nodes_of_its_contact_circle_and_those_next_to_them() {
     let sphere = Geometry::Sphere { radius: 0.03 };
     let found = nodes(&sphere, &at(0.002, 0.001, 0.027), 0.0);
     // Contact circle of 3 mm depth: √(0.03² − 0.027²) = 13 mm.
+    let touching = |n: &Node| n.lower < 0.0;
     for n in &found {
         let p = flat().lattice().position(n.i, n.j);
         let d2 = (p[0] - 0.002).powi(2) + (p[1] - 0.001).powi(2);
         assert!((n.lower - (0.027 - (0.0009 - d2).sqrt())).abs() < 1e-12);
-        assert!(n.lower < 0.0 && d2 < 0.0133 * 0.0133);
-        assert!((n.area - 1e-4).abs() < 1e-15, "inner cells are covered");
+        assert_eq!(touching(n), d2 < 0.0009 - 0.027 * 0.027);
+        assert!(!touching(n) || (n.area - 1e-4).abs() < 1e-15, "inner cells are covered");
+        let next = |other: &Node| touching(other) && (other.i - n.i).abs() <= 1 && (other.j - n.j).abs() <= 1;
+        assert!(found.iter().any(next));
     }
     // The centre, its four neighbours and the node at (10, 10) mm, 12.04 mm away.
-    assert_eq!(found.len(), 6);
+    assert_eq!(found.iter().filter(|n| touching(n)).count(), 6);
     assert!(nodes(&sphere, &at(0.0, 0.0, 0.031), 0.0).is_empty());
     assert!(!nodes(&sphere, &at(0.0, 0.0, 0.031), 0.002).is_empty());
 }

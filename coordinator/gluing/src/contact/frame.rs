@@ -63,11 +63,12 @@ pub fn mask(geometry: &Geometry) -> u32 {
     }
 }
 
-/// Half lengths of the patch along t1 and t2: how far its nodes reach from the origin, at most half the shape's
-/// width, at least half a cell. Zero for a sphere.
+/// Half lengths of the patch along t1 and t2: how far those of its nodes reach from the origin whose surface lies less than
+/// `margin` (m) below the underside, at most half the shape's width, at least half a cell. Zero for a sphere.
 pub fn extent<S: Surface + ?Sized>(
     shape: &Touching,
     surface: &S,
+    margin: f64,
     patch: &Patch,
     frame: &[f64; 9],
     nodes: &[Node],
@@ -84,7 +85,8 @@ pub fn extent<S: Surface + ?Sized>(
             let d = [p[0] - patch.origin[0], p[1] - patch.origin[1], n.lower - patch.origin[2]];
             (d[0] * t[0] + d[1] * t[1] + d[2] * t[2]).abs()
         };
-        let reach = nodes.iter().map(along).fold(0.0, f64::max) + half;
+        let near = |n: &&Node| n.lower < surface.height(n.i, n.j) + margin;
+        let reach = nodes.iter().filter(near).map(along).fold(0.0, f64::max) + half;
         reach.min(shape.half_width(t)).max(half.min(shape.half_width(t)))
     })
 }

@@ -109,7 +109,7 @@ impl<'a> Touching<'a> {
             node_count: 0,
             origin: patch.origin,
             frame,
-            extent: extent(self, reader, &patch, &frame, &nodes[first..]),
+            extent: extent(self, &Cut(reader), vertical, &patch, &frame, &nodes[first..]),
             law: Law::UNILATERAL,
         })
     }

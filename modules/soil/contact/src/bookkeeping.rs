@@ -36,6 +36,8 @@ pub struct EnergyLedger {
     pub loaded: u32,
     /// Smallest number of loaded nodes of a patch with any; 0: none is loaded.
     pub fewest: u32,
+    /// Whether a loaded patch is narrower than a cell.
+    pub narrow: bool,
 }
 
 impl EnergyLedger {
@@ -137,6 +139,7 @@ impl Scene<'_> {
     ) -> Result {
         ledger.stamp += 1;
         (ledger.elastic, ledger.kinetic, ledger.loaded, ledger.fewest) = (0.0, 0.0, 0, 0);
+        ledger.narrow = false;
         std::mem::swap(&mut lists.loaded, &mut lists.previous);
         lists.loaded.clear();
         lists.slid_in.clear();
@@ -159,6 +162,7 @@ impl Scene<'_> {
             }
             if loaded > 0 {
                 ledger.fewest = if ledger.fewest == 0 { loaded } else { ledger.fewest.min(loaded) };
+                ledger.narrow |= patch.breadth < ground.heights.lattice().spacing;
             }
             ledger.loaded += loaded;
         }
@@ -212,10 +216,11 @@ impl Scene<'_> {
                 (None, None) => self.patches.pressure(k, depth)?.0,
             };
             let [i, j] = n.index[k];
-            let deep = (depth + relief(n, k)) / patch.slope;
-            let lower = n.reference[k] - deep;
+            let mean = (depth + relief(n, k)) / patch.slope;
+            let lower = n.reference[k] - mean;
+            let deep = mean + n.spread[k].below / patch.slope;
             let (virgin, surface, flow) = (0.0, f64::NAN, [0.0; 2]);
-            let mut covered = Covered { i, j, lower, depth: deep, pressure, virgin, surface, flow };
+            let mut covered = Covered { i, j, lower, depth: deep.max(0.0), pressure, virgin, surface, flow };
             if pressure > 0.0 {
                 loaded += 1;
                 lists.slid_in.push(n.entered[k] && patch.wheel.is_none());
@@ -365,15 +370,18 @@ impl Scene<'_> {
         let energy = energy + self.shear_off(node, turnover);
         ledger.elastic += energy;
         state.area = n.area[k];
-        state.permanent = permanent / patch.slope;
+        let above = n.spread[k].above(depth, n.top(k));
+        (state.permanent, state.above) = ((permanent + above) / patch.slope, above / patch.slope);
+        state.half = n.spread[k].whole;
         (state.pressure, state.shear, state.energy) = (pressure, shear.state, energy);
         if depth <= n.bed[k] {
             // loose soil slides along with the foot: the bed below has not been sheared
             state.shear.slip = 0.0;
         }
         state.stamp = ledger.stamp;
-        ledger.max_sinkage =
-            ledger.max_sinkage.max((depth + relief(n, k)) / patch.slope - (state.reference - initial));
+        ledger.max_sinkage = ledger
+            .max_sinkage
+            .max((depth + relief(n, k) + n.spread[k].below) / patch.slope - (state.reference - initial));
         let surface = state.reference - state.permanent;
         if kept_by_law(&self.patches.law(k).curve) {
             ground.law_memory.write([i, j], &node.kept.state);
@@ -579,4 +587,5 @@ terraglue_subsystem::persist!(EnergyLedger {
     max_sinkage,
     loaded,
     fewest,
+    narrow,
 });

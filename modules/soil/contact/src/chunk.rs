@@ -2,6 +2,7 @@
 
 use crate::assemble::{displacement, dot};
 use crate::patch::{Local, Patches};
+use crate::spread::Look;
 use terraglue_soil_law::{KeptNodes, ShearResponse, ShearState, Sheared, first_loading};
 use terraglue_subsystem::{MOST_LAW_STATE, Result};
 
@@ -104,31 +105,62 @@ impl Patches {
         slope: &mut [f64],
     ) -> Result {
         let (n, k_u) = (&self.nodes, law.curve.unloading());
-        let [mut bed, mut bed_slope, mut top, mut loose, mut loose_slope, mut z] = [[0.0; CHUNK]; 6];
-        let (mut place, mut count, mut covered) = ([0; CHUNK], 0, false);
+        let mut looks = [(0, Look::default()); CHUNK];
+        let mut count = 0;
         for (at, (k, depth)) in nodes.iter().zip(depth).enumerate() {
             let elastic = k_u * (depth - n.permanent[*k]);
             (pressure[at], slope[at]) = if elastic > 0.0 { (elastic, k_u) } else { (0.0, 0.0) };
             if elastic > n.bound[*k].max(0.0) {
-                (place[count], z[count]) = (at, *depth);
-                top[count] = n.above_bed(*k, *depth).unwrap_or(0.0);
-                covered |= n.loose[*k] > 0.0;
-                count += 1;
+                match n.spread[*k].look(*depth, n.top(*k)) {
+                    Some(look) => {
+                        looks[count] = (at, look);
+                        count += 1;
+                    }
+                    None => (pressure[at], slope[at]) = (0.0, 0.0),
+                }
             }
+        }
+        let looks = &looks[..count];
+        let first = self.yields_together(law, nodes, looks, 0)?;
+        let spread = looks.iter().any(|(_, look)| look.depth[0] != look.depth[1]);
+        let second = if spread { self.yields_together(law, nodes, looks, 1)? } else { first };
+        for (c, (at, look)) in looks.iter().enumerate() {
+            let yields = look.mean([first[c], second[c]]);
+            if yields.0 < pressure[*at] {
+                (pressure[*at], slope[*at]) = yields;
+            }
+        }
+        Ok(())
+    }
+
+    /// Pressures and slopes at which nodes yield at the depth number `which` of their looks.
+    fn yields_together(
+        &self,
+        law: &Local,
+        nodes: &[usize],
+        looks: &[(usize, Look)],
+        which: usize,
+    ) -> Result<[(f64, f64); CHUNK]> {
+        let (n, count) = (&self.nodes, looks.len());
+        let [mut bed, mut bed_slope, mut top, mut loose, mut loose_slope, mut z] = [[0.0; CHUNK]; 6];
+        let mut covered = false;
+        for (c, (at, look)) in looks.iter().enumerate() {
+            let k = nodes[*at];
+            z[c] = look.depth[which];
+            top[c] = n.above_bed(k, z[c]).unwrap_or(0.0);
+            covered |= n.loose[k] > 0.0;
         }
         first_loading(&law.curve, &z[..count], &mut bed[..count], &mut bed_slope[..count])?;
         if covered {
             first_loading(&law.curve, &top[..count], &mut loose[..count], &mut loose_slope[..count])?;
         }
-        for c in 0..count {
-            let (at, k) = (place[c], nodes[place[c]]);
+        let mut out = [(0.0, 0.0); CHUNK];
+        for (c, (at, _)) in looks.iter().enumerate() {
+            let k = nodes[*at];
             let on_bed = (n.loose[k] > 0.0).then_some((loose[c], loose_slope[c]));
-            let yields = self.yields_from(k, z[c], (bed[c], bed_slope[c]), on_bed, law);
-            if yields.0 < pressure[at] {
-                (pressure[at], slope[at]) = yields;
-            }
+            out[c] = self.yields_from(k, z[c], (bed[c], bed_slope[c]), on_bed, law);
         }
-        Ok(())
+        Ok(out)
     }
 
     /// Pressures of a law that keeps a state; what it would keep after the step is dropped.

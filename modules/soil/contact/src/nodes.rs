@@ -23,6 +23,13 @@ pub struct NodeState {
     pub remainder: f64,
     /// Depth of the unloaded surface below the reference level, m, vertical; below zero where loose soil lies higher.
     pub permanent: f64,
+    /// By how much `permanent` exceeds the depth up to which the foot carries nothing, m, vertical, see
+    /// [`crate::spread::Spread::above`]; 0 where no foot stands.
+    pub above: f64,
+    /// Half the range of the depths of the underside in the cell at the last commit, m, vertical; 0 where no foot stands.
+    pub half: f64,
+    /// The same of the print that lies here, or lay here when the present contact began.
+    pub print: f64,
     /// Depth of the bed's surface below the reference level when the present contact began, m, vertical.
     pub bed: f64,
     /// Height of loose soil on the bed: where no foot stands now, else when the present contact began, m.
@@ -52,14 +59,15 @@ impl NodeState {
     }
 }
 
-/// What is kept of a node that no foot stands on, in 64 bits: the permanent depth of the bed in sixteenths of a unit of
-/// height (26 bits, to 1 m), the remainder of the surface in 1/16384 of a unit (14 bits), and the height of the loose soil on
-/// the bed in units (24 bits, to 4 m), exactly: it comes a few units at a time where steps are short. A foot that comes back finds its
-/// pressure to 1e-6 from a depth of a centimetre on.
+/// What is kept of a node that no foot stands on, in 80 bits: the permanent depth of the bed in sixteenths of a unit of
+/// height (26 bits, to 1 m), the remainder of the surface in 1/16384 of a unit (14 bits), the height of the loose soil on
+/// the bed in units (24 bits, to 4 m), exactly: it comes a few units at a time where steps are short, and half the range of depths of
+/// the print in sixteen units (16 bits, to 25 cm). A foot that comes back finds its pressure to 1e-6 from a depth of a centimetre on.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Default)]
 struct Kept {
     bed: [u8; 5],
     loose: [u8; 3],
+    print: [u8; 2],
 }
 
 impl Kept {
@@ -72,12 +80,17 @@ impl Kept {
     /// Units (3.8 µm).
     const TRICKLE: i32 = 16;
 
-    fn new(permanent: f64, remainder: f64, loose: f64) -> Self {
+    /// Step of the range of a print, m.
+    const PRINT: f64 = 16.0 * UNIT_M;
+
+    fn new(permanent: f64, remainder: f64, loose: f64, print: f64) -> Self {
         let steps = (permanent / Self::STEP).round().clamp(0.0, Self::DEEPEST) as u64;
         let half = Self::HALF as f64;
         let fine = (remainder / Self::FINE).round().clamp(-half, half - 1.0) as i64 + Self::HALF;
         let loose = (loose / UNIT_M).round().clamp(0.0, f64::from(Self::MOST_LOOSE)) as i32;
-        Self { bed: Self::pack(steps, fine as u64), loose: [0; 3] }.with_loose(loose)
+        // numbers beyond the range of the type become its ends
+        let print = ((print / Self::PRINT).round() as u16).to_le_bytes();
+        Self { bed: Self::pack(steps, fine as u64), loose: [0; 3], print }.with_loose(loose)
     }
 
     #[inline]
@@ -116,6 +129,10 @@ impl Kept {
             (0, _) => 0.0,
             (_, fine) => (fine as i64 - Self::HALF) as f64 * Self::FINE,
         }
+    }
+
+    fn print(self) -> f64 {
+        f64::from(u16::from_le_bytes(self.print)) * Self::PRINT
     }
 
     fn loose(self) -> f64 {
@@ -204,8 +221,9 @@ impl NodeStates {
             return self.contacts[place as usize];
         }
         let kept = self.kept.tile(tile).map_or(Kept::default(), |tile| tile[k]);
-        let (bed, loose) = (kept.permanent(), kept.loose());
-        NodeState { permanent: bed - loose, bed, loose, remainder: kept.remainder(), ..NodeState::default() }
+        let (bed, loose, print) = (kept.permanent(), kept.loose(), kept.print());
+        let remainder = kept.remainder();
+        NodeState { permanent: bed - loose, bed, loose, remainder, print, ..NodeState::default() }
     }
 
     /// The state of a node where a foot stands, for writing; made when it is not there.
@@ -258,7 +276,7 @@ impl NodeStates {
         self.unlist(tile, k);
         let remainder = state.reference - state.permanent - height;
         let loose = state.loose_left();
-        self.keep(tile, k, Kept::new(state.permanent + loose, remainder, loose));
+        self.keep(tile, k, Kept::new(state.permanent + loose, remainder, loose, state.half));
     }
 
     fn keep(&mut self, tile: usize, k: usize, kept: Kept) {
@@ -332,6 +350,9 @@ terraglue_subsystem::persist!(NodeState {
     reference,
     remainder,
     permanent,
+    above,
+    half,
+    print,
     bed,
     loose,
     energy,
@@ -345,10 +366,11 @@ impl Persist for Kept {
     fn write(&self, out: &mut Vec<u8>) {
         let ([a, b, c, d, e], [f, g, h]) = (self.bed, self.loose);
         u64::from_le_bytes([a, b, c, d, e, f, g, h]).write(out);
+        u16::from_le_bytes(self.print).write(out);
     }
     fn read(from: &mut &[u8]) -> Result<Self> {
         let [a, b, c, d, e, f, g, h] = u64::read(from)?.to_le_bytes();
-        Ok(Self { bed: [a, b, c, d, e], loose: [f, g, h] })
+        Ok(Self { bed: [a, b, c, d, e], loose: [f, g, h], print: u16::read(from)?.to_le_bytes() })
     }
 }
 
@@ -377,7 +399,7 @@ mod tests {
         fn loose_soil_is_kept_to_the_unit(
             depth in 0.0..0.1f64, changes in prop::collection::vec(prop_oneof![1 => -100..0i32, 4 => 0..40i32], 1..200),
         ) {
-            let mut kept = Kept::new(depth, 0.0, 0.0);
+            let mut kept = Kept::new(depth, 0.0, 0.0, 0.0);
             let mut units = 0_i32;
             for change in changes {
                 kept = kept.changed(change);
@@ -385,8 +407,8 @@ mod tests {
                 units = (units + gone + change.max(0)).max(0);
             }
             prop_assert_eq!(kept.loose(), f64::from(units) * UNIT_M);
-            prop_assert_eq!(kept.permanent(), Kept::new(depth, 0.0, 0.0).permanent());
-            prop_assert_eq!(Kept::new(depth, 0.0, kept.loose()).loose_units(), units);
+            prop_assert_eq!(kept.permanent(), Kept::new(depth, 0.0, 0.0, 0.0).permanent());
+            prop_assert_eq!(Kept::new(depth, 0.0, kept.loose(), 0.0).loose_units(), units);
         }
 
         #[test]
@@ -408,7 +430,7 @@ mod tests {
                     }
                     2 => {
                         states.leave(i, j, 0.0);
-                        *entry = (false, Kept::new(entry.1, 0.0, 0.0).permanent());
+                        *entry = (false, Kept::new(entry.1, 0.0, 0.0, 0.0).permanent());
                     }
                     _ if depth < 0.01 => {
                         states.restore(&saved.0);

@@ -9,6 +9,7 @@ use crate::contact_memory::recall;
 use crate::ground::Ground;
 use crate::normal::Clinging;
 use crate::size::Size;
+use crate::spread::Spread;
 use crate::wall::{self, Beside, Rows, Side, Wall};
 use crate::wheel::{Shift, Wheel};
 use terraglue_soil_law::strength::{Inclination, slope_factor};
@@ -40,6 +41,8 @@ pub struct Patch {
     pub friction: f64,
     /// Largest force with which the soil holds the foot back, N.
     pub pull: f64,
+    /// Breadth of the contact, m.
+    pub breadth: f64,
     /// Its sides in the soil.
     pub wall: Wall,
     /// The soil that moves with it.
@@ -96,7 +99,7 @@ pub struct Facing {
     pub press: [f64; 3],
     /// Unit vectors in the underside: t1 and t2 turned with n onto ν.
     pub along: [[f64; 3]; 2],
-    /// Area of the underside over that in the tangent plane, |press|.
+    /// Area of the underside over that in the tangent plane: |press|, or more where faces meet in the cell.
     pub stretch: f64,
 }
 
@@ -104,7 +107,8 @@ pub struct Facing {
 const EDGEWISE: f64 = 0.05;
 
 impl Facing {
-    fn new(port: &Port, slope: [f64; 2]) -> Self {
+    /// Of an underside with the slopes ∂z/∂x and ∂z/∂y.
+    pub fn new(port: &Port, slope: [f64; 2]) -> Self {
         let n_z = port.frame[2];
         let inward = [-slope[0] * n_z, -slope[1] * n_z, n_z];
         let mut press: [f64; 3] = std::array::from_fn(|c| dot(port.direction(c), inward));
@@ -123,7 +127,8 @@ impl Facing {
     /// Inward unit normal along n, t1, t2.
     #[inline]
     pub fn inward(&self) -> [f64; 3] {
-        self.press.map(|c| c / self.stretch)
+        let length = dot(self.press, self.press).sqrt();
+        self.press.map(|c| c / length)
     }
 
     /// Displacement along the underside.
@@ -138,14 +143,23 @@ impl Facing {
 pub struct PatchNodes {
     /// Lattice indices.
     pub index: Vec<[i32; 2]>,
-    /// Depth below the reference level of the bed along n at X = 0, m.
+    /// World height of the underside at the node at X = 0, m.
+    pub lower: Vec<f64>,
+    /// Its slopes there.
+    pub slope: Vec<[f64; 2]>,
+    /// Mean depth of the underside in the cell below the reference level of the bed along n at X = 0, m.
     pub depth: Vec<f64>,
-    /// Depth of the unloaded surface along n, m.
+    /// How the depths in the cell lie about it.
+    pub spread: Vec<Spread>,
+    /// Mean depth of the underside along n up to which the node carries nothing, m: of the unloaded surface where the cell is in the
+    /// soil as a whole.
     pub permanent: Vec<f64>,
     /// Depth of the bed's surface along n when the contact began, m.
     pub bed: Vec<f64>,
     /// Height of the loose soil on it then, along n, m.
     pub loose: Vec<f64>,
+    /// Half the range of depths of the print that lay there then, along n, m.
+    pub print: Vec<f64>,
     /// Part of the pressure of first loading that the soil bears here.
     pub share: Vec<f64>,
     /// Passive pressure that it bears beside, a + b·z: Pa and Pa/m.
@@ -198,10 +212,14 @@ impl PatchNodes {
 
     fn clear(&mut self) {
         self.index.clear();
+        self.lower.clear();
+        self.slope.clear();
         self.depth.clear();
+        self.spread.clear();
         self.permanent.clear();
         self.bed.clear();
         self.loose.clear();
+        self.print.clear();
         self.share.clear();
         self.passive.clear();
         self.bound.clear();
@@ -237,13 +255,17 @@ impl PatchNodes {
         self.entered.reserve(count);
         self.stamp.reserve(count);
         self.facing.reserve(count);
+        self.slope.reserve(count);
+        self.spread.reserve(count);
         for v in [
             &mut self.mobilised,
             &mut self.reference,
+            &mut self.lower,
             &mut self.depth,
             &mut self.permanent,
             &mut self.bed,
             &mut self.loose,
+            &mut self.print,
             &mut self.share,
             &mut self.bound,
             &mut self.before,
@@ -370,7 +392,11 @@ impl Patches {
         // a sphere has no extent and does not roll
         let found = || Wheel::find(&self.nodes, range.clone(), spacing, recall(&ground.wheels, port.key));
         let wheel = (port.extent[0] > 0.0 && port.extent[1] > 0.0).then(found).flatten();
-        let b = Size::of(&self.nodes, range.clone(), spacing).b(spacing);
+        if !laws.iter().any(|law| law.pressure.keeps()) {
+            self.nodes.fill_cells(port, range.clone(), spacing, &mut self.rows);
+        }
+        let size = Size::of(&self.nodes, range.clone(), spacing);
+        let b = size.b(spacing);
         let (local, friction) = self.local_laws(laws, wheel.as_ref(), b, range.clone())?;
         let mut wall = Wall::none(port, recall(&ground.pushes, port.key));
         self.bear(&laws[0].direction, &wall, b, range.clone());
@@ -434,6 +460,7 @@ impl Patches {
             wheel,
             friction,
             pull: 0.0,
+            breadth: size.breadth(),
             wall,
             cone: cone.flatten(),
         })
@@ -609,10 +636,14 @@ impl Patches {
         nodes.index.push([node.i, node.j]);
         nodes.reference.push(reference);
         nodes.stamp.push(state.stamp);
+        nodes.lower.push(node.lower);
+        nodes.slope.push(node.slope);
         nodes.depth.push((reference - node.lower) * n_z);
-        nodes.permanent.push(state.permanent * n_z);
+        nodes.spread.push(Spread::default());
+        nodes.permanent.push((state.permanent - state.above) * n_z);
         nodes.bed.push(state.bed * n_z);
         nodes.loose.push(state.loose * n_z);
+        nodes.print.push(state.print * n_z);
         nodes.share.push(1.0);
         nodes.passive.push([0.0; 2]);
         nodes.bound.push(f64::NEG_INFINITY);

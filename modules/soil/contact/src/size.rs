@@ -16,12 +16,11 @@ pub struct Size {
 const STRIP: f64 = 5.0 / 6.0;
 
 impl Size {
-    /// Of the nodes in `range` on a lattice of `spacing` (m). A cell that the reference level cuts counts with its part
-    /// below, as the slope of the underside has it.
+    /// Of the nodes in `range`. A cell that the reference level cuts counts with its part below.
     pub fn of(nodes: &PatchNodes, range: std::ops::Range<usize>, spacing: f64) -> Self {
         let (mut area, mut mean, mut square) = (0.0, [0.0; 2], [0.0; 3]);
         for k in range {
-            let weight = nodes.area[k] * below(nodes, k, spacing);
+            let weight = nodes.area[k] * nodes.spread[k].part_below(nodes.depth[k], 0.0);
             let [_, x, y] = nodes.arm[k];
             area += weight;
             mean = [mean[0] + weight * x, mean[1] + weight * y];
@@ -47,17 +46,9 @@ impl Size {
     /// Breadth of the rectangle of this area and of this larger principal moment, m, no longer than broad at least. The lattice
     /// knows the area exactly and the length well, but not the smaller moment: a blade as broad as a cell covers one row of
     /// nodes or two.
-    fn breadth(&self) -> f64 {
+    pub fn breadth(&self) -> f64 {
         let [xx, yy, xy] = self.square;
         let largest = 0.5 * (xx + yy) + (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt();
         self.area / (12.0 * largest).max(self.area).sqrt()
     }
-}
-
-/// Part of the cell of node k that lies below the reference level.
-fn below(nodes: &PatchNodes, k: usize, spacing: f64) -> f64 {
-    let [_, a, b] = nodes.facing[k].press;
-    let falls = a.hypot(b) * spacing;
-    let depth = nodes.depth[k];
-    if 2.0 * depth.abs() >= falls { f64::from(u8::from(depth > 0.0)) } else { 0.5 + depth / falls }
 }

@@ -193,9 +193,10 @@ impl<M: Material> FieldSoil<M> {
 
     fn watch_range(&mut self) {
         let few = self.ledger.fewest > 0 && self.ledger.fewest < FEW_NODES;
-        self.few_nodes = if few { self.few_nodes + 1 } else { 0 };
+        self.few_nodes = if few || self.ledger.narrow { self.few_nodes + 1 } else { 0 };
         if self.few_nodes >= FEW_NODES_COMMITS {
-            self.warn(0, "a contact spans fewer than three cells; a finer spacing resolves it better");
+            let which = if few { "spans fewer than three cells" } else { "is narrower than a cell" };
+            self.warn(0, &format!("a contact {which}; a finer spacing resolves it better"));
         }
         if self.ledger.max_sinkage > DEEPEST_TESTED {
             self.warn(1, "a foot sinks deeper than 0.3 m, beyond the range of the pressure law");

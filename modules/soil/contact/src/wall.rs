@@ -305,7 +305,8 @@ impl Rows {
         self.places.reserve(nodes);
     }
 
-    fn list(&mut self, nodes: &PatchNodes, range: std::ops::Range<usize>) {
+    /// Lists the rows of the nodes in `range`, which lie row by row.
+    pub fn list(&mut self, nodes: &PatchNodes, range: std::ops::Range<usize>) {
         self.begins.clear();
         self.first = nodes.index.get(range.start).map_or(0, |at| at[1]);
         for k in range.clone() {
@@ -318,7 +319,7 @@ impl Rows {
     }
 
     /// The node at an index.
-    fn find(&self, nodes: &PatchNodes, at: [i32; 2]) -> Option<usize> {
+    pub fn find(&self, nodes: &PatchNodes, at: [i32; 2]) -> Option<usize> {
         let row = usize::try_from(at[1] - self.first).ok()?;
         let range = *self.begins.get(row)?..*self.begins.get(row + 1)?;
         let begin = nodes.index.get(range.start)?[0];

@@ -10,12 +10,27 @@ use crate::patch::{Local, Patches};
 use terraglue_subsystem::Result;
 
 impl Patches {
-    /// Pressure (Pa) at which node k yields at the depth z (m), and its slope (Pa/m).
+    /// Mean pressure (Pa) over the cell at which node k yields at the mean depth z (m), and its slope (Pa/m).
     ///
     /// # Errors
     /// The law, which is a module, has no answer.
     #[inline]
     pub fn yields(&self, k: usize, z: f64) -> Result<(f64, f64)> {
+        let spread = &self.nodes.spread[k];
+        if spread.range <= 0.0 {
+            return self.yields_at(k, z);
+        }
+        match spread.look(z, self.nodes.top(k)) {
+            Some(look) => {
+                Ok(look.mean([self.yields_at(k, look.depth[0])?, self.yields_at(k, look.depth[1])?]))
+            }
+            None => Ok((0.0, 0.0)),
+        }
+    }
+
+    /// The same at a point at the depth z.
+    #[inline]
+    fn yields_at(&self, k: usize, z: f64) -> Result<(f64, f64)> {
         let law = self.law(k);
         let bed = law.curve.first_loading(z)?;
         let loose = match self.nodes.above_bed(k, z) {

@@ -124,6 +124,11 @@ const UNLOADING: f64 = 4.4;
 const KEEPERS: f64 = 1e7;
 
 impl PressureLaw {
+    /// Whether it answers for unloading itself, from a state that it keeps at each node.
+    pub fn keeps(&self) -> bool {
+        matches!(self, Self::Plugin(law) if law.state_doubles() > 0)
+    }
+
     /// The law behind the choice.
     pub fn law(&self) -> &dyn PressureSinkage {
         match self {

@@ -161,6 +161,8 @@ pub struct Fixture {
     pub normal: [f64; 3],
     /// Quaternion of the foot, w x y z.
     pub orientation: [f64; 4],
+    /// Whether the foot does not stand upright on the ground.
+    pub turned: bool,
     pub nodes: Vec<Node>,
     pub ports: Vec<Port>,
     pub t: Vec<f64>,
@@ -183,6 +185,7 @@ impl Fixture {
             index: 0,
             normal: [0.0, 0.0, 1.0],
             orientation: [1.0, 0.0, 0.0, 0.0],
+            turned: false,
             nodes: Vec::new(),
             ports: Vec::new(),
             t: vec![0.0; 6],
@@ -213,6 +216,9 @@ impl Fixture {
             Geometry::Sphere { radius } => (component::FORCE, radius, [0.0; 2]),
             Geometry::Box { half_extents: e } => (component::WRENCH, e[2], [e[0], e[1]]),
             Geometry::Cylinder { half_length, radius } => (component::WRENCH, half_length, [radius; 2]),
+            Geometry::Capsule { half_length, radius } => {
+                (component::WRENCH, radius, [half_length + radius, radius])
+            }
             _ => panic!("not used"),
         };
         let n = self.normal;
@@ -234,7 +240,11 @@ impl Fixture {
             shape: 0,
             first_node: 0,
             node_count: self.nodes.len() as u32,
-            origin: [p[0] - below * n[0], p[1] - below * n[1], p[2] - below * n[2]],
+            origin: if self.turned {
+                placed.patch_origin(n)
+            } else {
+                std::array::from_fn(|k| p[k] - below * n[k])
+            },
             frame: [n[0], n[1], n[2], t1[0], t1[1], t1[2], t2[0], t2[1], t2[2]],
             extent,
             law: Law::UNILATERAL,

@@ -608,11 +608,13 @@ impl Patches {
         Ok((first..self.laws.len(), friction))
     }
 
-    /// Takes the soil behind the peak of a wheel's stress as if it were less deep, and first loaded there.
+    /// Takes the soil behind the peak of a wheel's stress as if it were less deep, and first loaded there. How its stress changes over a
+    /// cell is not told by the underside.
     fn shift_peak(&mut self, wheel: &Wheel, shift: &Shift, range: std::ops::Range<usize>) -> Result {
         for k in range {
             let Some(relief) = wheel.relief(shift, self.nodes.arm[k]) else { continue };
             let depth = self.nodes.depth[k] - relief;
+            self.nodes.spread[k].range = 0.0;
             let (p, k_u) = (self.yields(k, depth)?.0, self.law(k).curve.unloading());
             let n = &mut self.nodes;
             n.relief[k] = relief;

@@ -86,7 +86,7 @@ impl Form {
             Some(form) => form,
             None if !takes(Capabilities::FORCE) => Self::Xt,
             None if !takes(Capabilities::MOTION) => Self::Tt,
-            None if problem.rows.contains(&ConstraintKind::Law) => {
+            None if problem.conditions.kinds.contains(&ConstraintKind::Law) => {
                 if kappa > KAPPA_XT {
                     Self::Tt
                 } else {

@@ -7,7 +7,7 @@ use super::error::LoadError;
 use super::isolation::{self, Isolation, What};
 use super::law::{self, LawHost};
 use super::python::{self, PythonFile};
-use super::search::{SearchPath, below, file_name, is_path, module_name, python_name};
+use super::search::{self, SearchPath, below, file_name, is_path, module_name, python_name};
 use super::{HostServices, Instance, TeardownErrors};
 use libloading::os::unix::{Library as Handle, RTLD_LOCAL, RTLD_NOW, Symbol};
 use serde_json::{Map, Value};
@@ -362,18 +362,9 @@ impl Library {
             name: name.into(),
             file: format!("{} or {}", file_name(name), python_name(name)),
             looked: search.folders().to_vec(),
-            nearest: nearest(name, names),
+            nearest: search::nearest(name, names),
         }
     }
-}
-
-/// The name that is most like one that was not found.
-pub(super) fn nearest(name: &str, names: impl Iterator<Item = String>) -> Option<String> {
-    let near = names
-        .map(|n| (strsim::normalized_damerau_levenshtein(&n, name), n))
-        .filter(|(likeness, _)| *likeness > 0.4)
-        .max_by(|a, b| a.0.total_cmp(&b.0));
-    near.map(|(_, n)| n)
 }
 
 /// A module on the search path.

@@ -577,6 +577,11 @@ impl FmuSubsystem {
             };
         }
         drop(references);
+        self.get_elements(ids, out)
+    }
+
+    /// Values of elements, each out of its whole array.
+    fn get_elements(&self, ids: &[u32], out: ValuesMut) -> Result {
         macro_rules! elements {
             ($variant:ident, $out:expr, $zero:expr) => {{
                 for (id, out) in ids.iter().zip($out.iter_mut()) {
@@ -646,6 +651,11 @@ impl FmuSubsystem {
             return self.instance.set(&references, values).map_err(error);
         }
         drop(references);
+        self.set_elements(ids, values)
+    }
+
+    /// New values of elements; the others of their arrays stay.
+    fn set_elements(&mut self, ids: &[u32], values: Values) -> Result {
         macro_rules! elements {
             ($variant:ident, $values:expr, $zero:expr) => {{
                 for (id, value) in ids.iter().zip($values) {

@@ -191,7 +191,7 @@ fn gluing() -> Table {
         Parameter::of("start", ParameterType::Text, "what the iteration starts from (iterative only)");
     let most =
         Parameter::of("max_iterations", ParameterType::Integer, "iterations before the step is halved");
-    let keys = vec![
+    let mut keys = vec![
         strategy.or("cooperative").choices(STRATEGIES).into(),
         form.or("auto").choices(FormChoice::NAMES).into(),
         number("tolerance", "", 1e-8, "residual relative to the largest of weight and force")
@@ -212,6 +212,14 @@ fn gluing() -> Table {
             .or("analytic")
             .choices(JacobianChoice::NAMES)
             .into(),
+    ];
+    keys.extend(gluing_of_steps());
+    of("gluing", "How subsystems are glued together.", keys)
+}
+
+/// Keys of `[gluing]` on the level of joints, the length of steps and contacts.
+fn gluing_of_steps() -> Vec<Key> {
+    vec![
         Parameter::of("level", ParameterType::Text, "level of the condition at joints")
             .or("position")
             .choices(LevelChoice::NAMES)
@@ -252,8 +260,7 @@ fn gluing() -> Table {
         )
         .within(0.0, f64::INFINITY)
         .into(),
-    ];
-    of("gluing", "How subsystems are glued together.", keys)
+    ]
 }
 
 fn recording() -> Table {

@@ -119,6 +119,9 @@ fn area_names() -> Vec<&'static str> {
 }
 
 /// Measures, prints and judges.
+///
+/// # Errors
+/// All figures that fail, or a measurement that cannot be made.
 pub fn validate(arguments: &Arguments) -> Outcome {
     if arguments.table.is_some() && arguments.area.as_deref() != Some("gluing") {
         return Err("--table is for the area gluing: cargo xtask validate gluing --table FILE".into());
@@ -202,6 +205,9 @@ fn measured(
 
 /// Prints the bits of all figures of `--quick`, one `id<TAB>bits` a line, with the program of the development profile,
 /// which is built already: `cargo xtask freeze` holds them.
+///
+/// # Errors
+/// A measurement that cannot be made.
 pub fn print_bits() -> Outcome {
     let context = Context { quick: true, ..Context::new("debug") };
     for (area, parts) in AREAS {
@@ -214,6 +220,9 @@ pub fn print_bits() -> Outcome {
 }
 
 /// Draws the pictures of docs/images that are computed.
+///
+/// # Errors
+/// A run that fails, or a picture that cannot be written.
 pub fn write_pictures() -> Outcome {
     must(&mut cargo(&["build", "--package", "terraglue"]))?;
     soil::write_pictures()?;

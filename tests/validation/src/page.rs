@@ -12,6 +12,9 @@ const PAGE: &str = "docs/validation.md";
 const SHOWN: usize = 60;
 
 /// Writes the page anew.
+///
+/// # Errors
+/// A table that cannot be read, or a page that cannot be written.
 pub fn write_page() -> Outcome {
     replace(PAGE, &blocks()?)
 }

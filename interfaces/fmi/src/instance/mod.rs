@@ -14,6 +14,8 @@ mod intervals;
 mod log;
 mod state;
 mod step;
+mod step_fault;
+mod update_callback;
 mod values;
 
 pub use intermediate::IntermediateRow;
@@ -47,6 +49,13 @@ unsafe extern "C" {
 }
 
 /// What an instance is made with.
+///
+/// ```
+/// use terraglue_fmi::InstanceOptions;
+///
+/// let options = InstanceOptions { event_mode: true, ..InstanceOptions::new("tank", Box::new(|_| ())) };
+/// assert!(options.name == "tank" && !options.verbose && options.followed.is_empty());
+/// ```
 pub struct InstanceOptions {
     /// Name of the instance.
     pub name: String,
@@ -118,6 +127,10 @@ unsafe impl Send for FmuInstance {}
 
 impl FmuInstance {
     /// Loads the library where that was not done yet, and makes an instance.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: options that the FMU does not offer. [`Error::Library`]: the library cannot be loaded.
+    /// [`Error::Call`]: it made no instance.
     pub fn instantiate(fmu: &Arc<Fmu>, options: InstanceOptions) -> Result<Self> {
         let _mode = Keep::new();
         let description = fmu.description();
@@ -207,6 +220,9 @@ impl FmuInstance {
     }
 
     /// Enters initialisation mode, after start values were set.
+    ///
+    /// # Errors
+    /// [`Error::Call`]: the FMU failed.
     pub fn enter_initialization(&mut self, start: f64, stop: Option<f64>, tolerance: Option<f64>) -> Result {
         let _mode = Keep::new();
         self.start = start;
@@ -234,6 +250,9 @@ impl FmuInstance {
     }
 
     /// Leaves initialisation mode; the FMU can be stepped.
+    ///
+    /// # Errors
+    /// [`Error::Call`]: the FMU failed.
     pub fn exit_initialization(&mut self) -> Result {
         let _mode = Keep::new();
         match self.api {
@@ -274,6 +293,9 @@ impl FmuInstance {
     }
 
     /// Ends the simulation; values can still be read.
+    ///
+    /// # Errors
+    /// [`Error::Call`]: the FMU failed.
     pub fn terminate(&mut self) -> Result {
         if self.phase != InstancePhase::Stepping {
             return Ok(());
@@ -287,6 +309,9 @@ impl FmuInstance {
     }
 
     /// Back to the state after instantiation.
+    ///
+    /// # Errors
+    /// [`Error::Call`]: the FMU failed.
     pub fn reset(&mut self) -> Result {
         match self.api {
             Api::Two(two) => self.call_after_error("fmi2Reset", two.reset, |f, c| unsafe { f(c) })?,
@@ -380,7 +405,7 @@ fn make_3(
     environment: *mut c_void,
 ) -> Option<InstanceHandle> {
     let c = description.capabilities;
-    let update: Option<functions::Update3> = c.intermediate_update.then_some(intermediate::update);
+    let update: Option<functions::Update3> = c.intermediate_update.then_some(update_callback::update);
     // Only where the event is handled then, and the rest of the step can be made in a step of another length. Without
     // event mode an FMU handles its events inside the step, unless it may leave it at one.
     let early = event_mode && c.variable_step && (c.may_return_early || c.return_early);

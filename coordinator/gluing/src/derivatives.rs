@@ -21,6 +21,9 @@ pub enum Derivatives {
 
 impl InterfaceProblem {
     /// d(x1 − x2)/dT of all bodies at their last trial into `estimate.g`.
+    ///
+    /// # Errors
+    /// A member that fails, or ends a trial early.
     pub fn linearise_bodies(&mut self, source: Derivatives, instances: &mut [Instance]) -> Result {
         let start = Clock::now();
         let level = if self.at.h == 0.0 { Level::Acceleration } else { Level::Position };
@@ -124,6 +127,9 @@ impl InterfaceProblem {
 
     /// The grounds' Jacobian at their last trial into `out` (n × n, column-major); by finite differences where
     /// a module has none.
+    ///
+    /// # Errors
+    /// A soil that fails, or ends a trial early.
     pub fn ground_jacobian(&mut self, instances: &mut [Instance], xt: bool, out: &mut Vec<f64>) -> Result {
         let start = Clock::now();
         let n = self.n();

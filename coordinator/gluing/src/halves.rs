@@ -5,12 +5,12 @@
 use super::derivatives::Derivatives;
 use super::glue::ConstraintKind;
 use super::interface_problem::InterfaceProblem;
-use super::linear::max_norm;
 use super::participant::Answer;
 use crate::timing::Part;
 use std::time::Instant as Clock;
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
+use terraglue_numerics::dense::max_norm;
 use terraglue_subsystem::Level;
 
 impl InterfaceProblem {
@@ -61,6 +61,9 @@ impl InterfaceProblem {
     }
 
     /// x_free and G1 as the bodies are under the present T: x1 − G1·T.
+    ///
+    /// # Errors
+    /// A member that fails, or ends a trial early.
     pub fn estimate_again(&mut self, instances: &mut [Instance]) -> Result {
         self.linearise_bodies(Derivatives::Analytic, instances)?;
         let estimate = &mut self.estimate;
@@ -84,6 +87,9 @@ impl InterfaceProblem {
     }
 
     /// A trial of side 1, or of the bodies on side 2, under T.
+    ///
+    /// # Errors
+    /// A member that fails, or ends a trial early.
     pub fn advance_half(&mut self, second: bool, instances: &mut [Instance]) -> Result {
         let start = Clock::now();
         self.at.trial += 1;
@@ -102,6 +108,9 @@ impl InterfaceProblem {
     }
 
     /// A trial of all of side 2 under the motion X1: the wrench that it takes goes to `f`.
+    ///
+    /// # Errors
+    /// A member that fails, or ends a trial early.
     pub fn advance_second_under_motion(&mut self, instances: &mut [Instance]) -> Result {
         let start = Clock::now();
         // side 2 of a joint counts its motion from its own point
@@ -130,6 +139,9 @@ impl InterfaceProblem {
     }
 
     /// G1 = dX1/dT of side 1 at its last trial into `estimate.g`, by forward differences where a module has none.
+    ///
+    /// # Errors
+    /// A member that fails, or ends a trial early.
     pub fn linearise_first(&mut self, instances: &mut [Instance]) -> Result {
         self.take_differences(Derivatives::Analytic, |side| !side.is_second(), instances)?;
         self.estimate.g.fill(0.0);
@@ -143,6 +155,9 @@ impl InterfaceProblem {
 
     /// K = dF/dX of side 2 after a trial under motion, n × n, column-major, signed so that it grows with the force
     /// that resists: dT/dX1 = −K. By forward differences where a module has none.
+    ///
+    /// # Errors
+    /// A member that fails, or ends a trial early.
     pub fn second_stiffness(&mut self, instances: &mut [Instance], out: &mut Vec<f64>) -> Result {
         let n = self.n();
         out.clear();

@@ -168,6 +168,9 @@ impl InterfaceProblem {
     }
 
     /// Paper, step 1: the constraints of rigid contact. Grounds answer first and narrow the laws.
+    ///
+    /// # Errors
+    /// A member that fails.
     pub fn set_ports(&mut self, instances: &mut [Instance]) -> Result {
         let start = Clock::now();
         for side in &mut self.grounds {
@@ -182,6 +185,9 @@ impl InterfaceProblem {
     }
 
     /// Paper, step 2: solve for T*, do not animate.
+    ///
+    /// # Errors
+    /// A body that fails, or ends a trial early.
     pub fn estimate_forces(&mut self, instances: &mut [Instance]) -> Result {
         let start = Clock::now();
         for k in 0..self.bodies.len() {
@@ -218,6 +224,9 @@ impl InterfaceProblem {
 
     /// Paper, step 3: the soil solves with the estimate. T1 goes to `t`, its surface to `x2`. `start_only`: an iteration
     /// begins there, so a soil that finds no answer in this step is no failure.
+    ///
+    /// # Errors
+    /// A soil that fails, or ends a trial early where the answer does not only start an iteration.
     pub fn solve_compatibility(&mut self, start_only: bool, instances: &mut [Instance]) -> Result {
         let start = Clock::now();
         for port in &self.ports {
@@ -243,6 +252,9 @@ impl InterfaceProblem {
     }
 
     /// Paper, step 4: the bodies re-solved without the contact constraints, under T as external force.
+    ///
+    /// # Errors
+    /// A body that fails, or ends its trial early.
     pub fn advance_bodies(&mut self, instances: &mut [Instance]) -> Result {
         let start = Clock::now();
         self.at.trial += 1;
@@ -310,6 +322,9 @@ impl InterfaceProblem {
     }
 
     /// Repeats the bodies' trial under T where differences have left them in another one: before a commit.
+    ///
+    /// # Errors
+    /// A body that fails, or ends its trial early.
     pub fn repeat_bodies_trial(&mut self, instances: &mut [Instance]) -> Result {
         if self.differences.displaced {
             self.advance_bodies(instances)?;
@@ -320,6 +335,9 @@ impl InterfaceProblem {
     }
 
     /// A trial of the grounds under the motion X1: the wrench of their law goes to `f`.
+    ///
+    /// # Errors
+    /// A soil that fails, or ends its trial early.
     pub fn advance_grounds_under_motion(&mut self, instances: &mut [Instance]) -> Result {
         let start = Clock::now();
         let partner = (self.first.x.as_slice(), self.first.v.as_slice());
@@ -334,6 +352,9 @@ impl InterfaceProblem {
 
     /// A trial of the grounds under the normal forces in `t` and the motion X1: their surface goes to `x2`,
     /// the wrench of their law to `f`.
+    ///
+    /// # Errors
+    /// A soil that fails, or ends its trial early.
     pub fn advance_grounds_under_force(&mut self, instances: &mut [Instance]) -> Result {
         let start = Clock::now();
         let partner = (self.first.x.as_slice(), self.first.v.as_slice());
@@ -348,6 +369,9 @@ impl InterfaceProblem {
     }
 
     /// Paper, step 5: every member takes its last trial as the state at t + h.
+    ///
+    /// # Errors
+    /// A member that fails.
     pub fn commit(&mut self, instances: &mut [Instance]) -> Result {
         let start = Clock::now();
         for side in &mut self.bodies {

@@ -23,7 +23,6 @@ pub mod cooperative;
 pub mod cooperative_compliant;
 mod derivatives;
 mod differences;
-mod eigen;
 mod estimate;
 mod follow;
 pub mod gauss_seidel;
@@ -33,7 +32,6 @@ mod halves;
 mod interface_problem;
 pub mod iterative;
 pub mod jacobi;
-mod linear;
 pub mod memory;
 pub mod monolithic;
 mod participant;
@@ -112,6 +110,10 @@ pub trait Strategy: Send {
     fn recall(&mut self, _kept: &mut memory::Recall) {}
 
     /// Finds the wrenches of the step.
+    ///
+    /// # Errors
+    /// A member that fails. [`Error::Early`](terraglue_diagnostics::Error::Early): a member ended its step early; the testbed
+    /// repeats a shorter one.
     fn solve(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<Outcome>;
 }
 

@@ -9,10 +9,10 @@
 //! the residual falls (Qi and Sun 1993).
 
 use super::interface_problem::InterfaceProblem;
-use super::linear::{Lu, max_norm};
 use super::{ConstraintKind, Needs, Outcome, Strategy};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
+use terraglue_numerics::dense::{Lu, max_norm};
 use terraglue_scenario::GluingSpec;
 use terraglue_subsystem::{Capabilities, Port};
 

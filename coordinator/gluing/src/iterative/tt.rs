@@ -9,12 +9,12 @@ use super::super::Outcome;
 use super::super::complementarity::{BoundedProblem, BoundedSolver};
 use super::super::glue::ConstraintKind;
 use super::super::interface_problem::InterfaceProblem;
-use super::super::linear::max_norm;
 use super::super::memory::Recall;
 use super::super::refresh::Refresh;
 use super::{Limits, friction, largest_eigenvalue};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
+use terraglue_numerics::dense::max_norm;
 use terraglue_scenario::JacobianChoice;
 
 /// Trials of one line search.

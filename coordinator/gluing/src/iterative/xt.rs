@@ -9,10 +9,10 @@
 
 use super::super::Outcome;
 use super::super::interface_problem::InterfaceProblem;
-use super::super::linear::{Lu, max_norm};
 use super::{Limits, largest_eigenvalue};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
+use terraglue_numerics::dense::{Lu, max_norm, multiply_add};
 
 /// Halvings of one Newton step before it is taken as it is.
 const MAX_HALVINGS: u32 = 8;
@@ -139,7 +139,7 @@ impl XtForm {
         self.kg.resize(n * n, 0.0);
         for column in 0..n {
             let out = &mut self.kg[column * n..][..n];
-            super::super::linear::multiply_add(k, &g[column * n..][..n], out);
+            multiply_add(k, &g[column * n..][..n], out);
         }
         let kg = &self.kg;
         let rank = self.lu.factor(n, |r, c| kg[c * n + r] + if r == c { 1.0 } else { 0.0 });

@@ -37,6 +37,16 @@ use subsystems::Subsystems;
 use uncoupled::Uncoupled;
 
 /// What a run needs beside its scenario.
+///
+/// ```
+/// use std::sync::atomic::Ordering;
+/// use terraglue_engine::Options;
+///
+/// let options = Options { threads: 2, ..Options::default() };
+/// let from_outside = options.cancel.clone();
+/// from_outside.store(true, Ordering::Relaxed);
+/// assert!(options.cancel.load(Ordering::Relaxed));
+/// ```
 #[derive(Clone, Debug, Default)]
 pub struct Options {
     /// Threads for `parallel_for`; 0: as many as there are cores. Results do not depend on it.
@@ -50,6 +60,58 @@ pub struct Options {
 }
 
 /// A simulation of a whole mission. Several live side by side; there are no globals.
+///
+/// ```
+/// use terraglue_engine::{Options, Testbed};
+/// use terraglue_host::Library;
+/// use terraglue_scenario::Scenario;
+/// # use std::sync::Arc;
+/// # use terraglue_subsystem::*;
+/// # struct Heater { watts: f64, joules: f64, trial: f64, variables: Vec<Variable> }
+/// # impl Module for Heater {
+/// #     fn schema() -> Schema {
+/// #         Schema { name: "heater".into(), kind: Kind::Controller, help: "Heats".into(), parameters: Vec::new() }
+/// #     }
+/// #     fn instantiate(_: &Config, _: Arc<dyn Host>) -> Result<Box<dyn Subsystem>> {
+/// #         let power = Variable::real(0, "power", "W", Causality::Input, "Power");
+/// #         let energy = Variable::real(1, "energy", "J", Causality::Output, "Energy so far");
+/// #         Ok(Box::new(Self { watts: 0.0, joules: 0.0, trial: 0.0, variables: vec![power, energy] }))
+/// #     }
+/// # }
+/// # impl Subsystem for Heater {
+/// #     fn capabilities(&self) -> Capabilities { Capabilities::RETRY }
+/// #     fn variables(&self) -> &[Variable] { &self.variables }
+/// #     fn get(&self, ids: &[u32], out: ValuesMut) -> Result {
+/// #         let ValuesMut::F64(out) = out else { return Err(Error::Unsupported) };
+/// #         for (id, out) in ids.iter().zip(out) { *out = [self.watts, self.joules][*id as usize]; }
+/// #         Ok(())
+/// #     }
+/// #     fn set(&mut self, _: &[u32], values: Values) -> Result {
+/// #         let Values::F64(values) = values else { return Err(Error::Unsupported) };
+/// #         self.watts = values[0];
+/// #         Ok(())
+/// #     }
+/// #     fn advance(&mut self, step: &Step, _: &Input, _: &mut Response) -> Result {
+/// #         self.trial = self.joules + step.h * self.watts;
+/// #         Ok(())
+/// #     }
+/// #     fn commit(&mut self, _: &Step, _: &[f64], _: &Motion) -> Result {
+/// #         self.joules = self.trial;
+/// #         Ok(())
+/// #     }
+/// # }
+///
+/// // a scenario with one subsystem, whose module `Heater` is linked into the program
+/// let text = "[time]\nstep_s = 0.1\nduration_s = 1.0\n[plate]\nmodule = \"heater\"\n";
+/// let scenario = Scenario::parse(text, "plate.toml", &[])?;
+/// let library = Library::new().with::<Heater>();
+/// let mut testbed = Testbed::build_with(&scenario, &Options::default(), &library)?;
+/// testbed.set("plate.power", &50.0.into())?;
+/// testbed.run_until(1.0, &mut [])?;
+/// assert!(testbed.read("plate.energy").is_some_and(|e| (e - 50.0).abs() < 1e-9));
+/// assert_eq!((testbed.step_index(), testbed.read("plate.colour")), (10, None));
+/// # Ok::<(), terraglue_diagnostics::Error>(())
+/// ```
 pub struct Testbed {
     subsystems: Subsystems,
     glued: GluedGroups,
@@ -196,6 +258,9 @@ impl Testbed {
 
     /// Steps until `until_s`, an error, or the cancel flag; tells the observers. The observers' `finished` is
     /// left to the caller, who knows whether the run goes on.
+    ///
+    /// # Errors
+    /// What [`Testbed::step`] or an observer runs into.
     pub fn run_until(&mut self, until_s: f64, observers: &mut [&mut dyn Observer]) -> Result {
         while self.clock.is_before(until_s) && !self.cancelled() {
             let stepped = self.step();
@@ -266,6 +331,9 @@ impl Testbed {
     }
 
     /// Sets a variable by full name: effective in the next step, logged as an event. Refuses with the reason.
+    ///
+    /// # Errors
+    /// [`Error::Simulation`]: there is no such variable, or the value is not accepted. [`Error::Module`]: the module failed.
     pub fn set(&mut self, name: &str, value: &Value) -> Result {
         let (time_s, started) = (self.clock.t, self.clock.index > 0);
         let refused = |reason: String| Error::Simulation {
@@ -288,6 +356,9 @@ impl Testbed {
     }
 
     /// Calls an action `subsystem.action`; logged as an event.
+    ///
+    /// # Errors
+    /// [`Error::Simulation`]: there is no such subsystem. [`Error::Module`]: the action is refused or failed.
     pub fn act(&mut self, action: &str, arguments: &str) -> Result {
         let (subsystem, name) = action.split_once('.').unwrap_or((action, ""));
         let time_s = self.clock.t;

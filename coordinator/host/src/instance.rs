@@ -151,6 +151,9 @@ impl Instance {
     }
 
     /// Paper, step 1. X and V must be answered, by a soil T too.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or an answer or law is not finite.
     pub fn set_ports(&mut self, step: &Step, laws: &mut [Law], now: &mut Response) -> Result {
         const NAME: &str = "set_ports";
         self.supervision.time_s.set(step.t);
@@ -173,6 +176,9 @@ impl Instance {
     }
 
     /// Paper, step 2.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or an answer is not finite.
     pub fn estimate_forces(&mut self, step: &Step, partner: &Motion, out: &mut Estimate) -> Result<Progress> {
         const NAME: &str = "estimate_forces";
         self.supervision.time_s.set(step.t);
@@ -195,6 +201,9 @@ impl Instance {
     }
 
     /// Paper, step 3.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or an answer is not finite.
     pub fn solve_compatibility(
         &mut self,
         step: &Step,
@@ -205,12 +214,18 @@ impl Instance {
     }
 
     /// Paper, steps 3 and 4.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or an answer is not finite.
     #[inline]
     pub fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result<Progress> {
         self.trial("advance", step, out, |s, out| s.advance(step, input, out))
     }
 
     /// Trials under several wrenches in one exchange.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or an answer is not finite.
     pub fn advance_batch(&mut self, step: &Step, t: &[f64], out: &mut Batch) -> Result<Progress> {
         const NAME: &str = "advance_batch";
         self.supervision.time_s.set(step.t);
@@ -288,6 +303,9 @@ impl Instance {
     }
 
     /// Derivatives at the last trial.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or a derivative is not finite.
     pub fn interface_jacobian(&mut self, step: &Step, level: Level, out: &mut [f64]) -> Result {
         const NAME: &str = "interface_jacobian";
         self.supervision.alive(NAME)?;
@@ -300,6 +318,9 @@ impl Instance {
     }
 
     /// Paper, step 5.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before.
     #[inline]
     pub fn commit(&mut self, step: &Step, t: &[f64], partner: &Motion) -> Result {
         self.supervision.alive("commit")?;
@@ -314,6 +335,9 @@ impl Instance {
     }
 
     /// The committed state into a numbered slot.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or it cannot keep its state.
     pub fn save_state(&mut self, slot: u32) -> Result {
         self.supervision.alive("save_state")?;
         let result = self.subsystem.save_state(slot);
@@ -321,6 +345,9 @@ impl Instance {
     }
 
     /// Back to the state of a slot.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or nothing was kept in the slot.
     pub fn restore_state(&mut self, slot: u32) -> Result {
         self.supervision.alive("restore_state")?;
         let result = self.subsystem.restore_state(slot);
@@ -328,12 +355,18 @@ impl Instance {
     }
 
     /// The committed state as bytes.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or it cannot give its state as bytes.
     pub fn serialize(&self) -> Result<Vec<u8>> {
         self.supervision.alive("serialize")?;
         self.supervision.outcome("serialize", self.subsystem.serialize())
     }
 
     /// Back to a state made by `serialize`.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or the bytes are no state of it.
     pub fn deserialize(&mut self, bytes: &[u8]) -> Result {
         self.supervision.alive("deserialize")?;
         let result = self.subsystem.deserialize(bytes);
@@ -357,6 +390,9 @@ impl Instance {
     }
 
     /// Committed values as they are.
+    ///
+    /// # Errors
+    /// What the subsystem answers: an unknown variable, another type.
     #[inline]
     pub fn peek(&self, ids: &[u32], out: ValuesMut) -> terraglue_subsystem::Result {
         match self.elements() {
@@ -366,6 +402,9 @@ impl Instance {
     }
 
     /// Committed values. Numbers that are not finite are an error.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or a value is NaN.
     #[inline]
     pub fn get(&self, ids: &[u32], out: ValuesMut) -> Result {
         self.supervision.alive("get")?;
@@ -384,6 +423,10 @@ impl Instance {
     }
 
     /// New values, or why not.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before; values that it does not accept are
+    /// [`Reply::Refused`].
     #[inline]
     pub fn set(&mut self, ids: &[u32], values: Values) -> Result<Reply> {
         self.supervision.alive("set")?;
@@ -398,6 +441,9 @@ impl Instance {
     }
 
     /// d(unknowns)/d(known) of f64 variables where the subsystem knows it; false where it must be tried.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before.
     pub fn derivative(&self, unknowns: &[u32], known: u32, out: &mut [f64]) -> Result<bool> {
         const NAME: &str = "directional_derivative";
         self.supervision.alive(NAME)?;
@@ -421,6 +467,10 @@ impl Instance {
     }
 
     /// Does an action; `arguments` is a JSON object.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before; an action that it does not accept is
+    /// [`Reply::Refused`].
     pub fn act(&mut self, action: &str, arguments: &str) -> Result<Reply> {
         self.supervision.alive("act")?;
         let result = self.subsystem.act(action, arguments);
@@ -428,6 +478,9 @@ impl Instance {
     }
 
     /// Time of the next event known beforehand, s; ∞: none.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or the time is NaN.
     pub fn next_event_time(&self) -> Result<f64> {
         self.supervision.alive("next_event_time")?;
         let t = self.subsystem.next_event_time();
@@ -435,6 +488,9 @@ impl Instance {
     }
 
     /// Committed states of the bodies; all must be finite.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or a state is not finite.
     pub fn body_states(&self, out: &mut [BodyState]) -> Result {
         self.supervision.alive("body_states")?;
         let result = self.subsystem.body_states(out);
@@ -459,12 +515,18 @@ impl Instance {
     }
 
     /// A tile of a field.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or there is no such tile.
     pub fn field_tile(&self, field: usize, a: u32, b: u32) -> Result<FieldTile<'_>> {
         self.supervision.alive("field_tile")?;
         self.supervision.outcome("field_tile", self.subsystem.field_tile(field, a, b))
     }
 
     /// Energies of the committed state; what is unknown is not a number.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or an energy is infinite.
     pub fn energy(&self) -> Result<Energy> {
         self.supervision.alive("energy")?;
         let e = self.subsystem.energy();

@@ -43,11 +43,17 @@ impl Testbed {
     }
 
     /// The same; modules linked into the program come first.
+    ///
+    /// # Errors
+    /// As [`Testbed::build`].
     pub fn build_with(scenario: &Scenario, options: &Options, library: &Library) -> Result<Self> {
         Self::build_hosted(scenario, options, library, |services| services)
     }
 
     /// The same with services that the caller changes: the log, the number of states that can be kept.
+    ///
+    /// # Errors
+    /// As [`Testbed::build`].
     pub fn build_hosted(
         scenario: &Scenario,
         options: &Options,
@@ -164,6 +170,9 @@ fn takes_parts(scenario: &Scenario, instances: &[Instance]) -> bool {
 }
 
 /// What instances of a scenario are offered; `ground`: with the terrain, where it has one.
+///
+/// # Errors
+/// [`Error::Input`]: the terrain of the scenario cannot be made.
 pub fn services(scenario: &Scenario, options: &Options, ground: bool) -> Result<HostServices> {
     let terrain: Option<Arc<dyn Terrain>> = match scenario.terrain.as_ref().filter(|_| ground) {
         Some(spec) => Some(Arc::from(terrain::build(spec, scenario.world.seed)?)),
@@ -179,6 +188,9 @@ pub fn services(scenario: &Scenario, options: &Options, ground: bool) -> Result<
 }
 
 /// The module of a subsystem.
+///
+/// # Errors
+/// [`Error::Input`]: there is no such module, or it cannot be loaded.
 pub fn find(
     scenario: &Scenario,
     spec: &SubsystemSpec,
@@ -197,6 +209,9 @@ fn isolation(spec: &IsolationSpec) -> Isolation {
 }
 
 /// An instance of a module, in this process or in one of its own.
+///
+/// # Errors
+/// [`Error::Input`]: the module refuses its parameters or cannot make an instance.
 pub fn make(
     scenario: &Scenario,
     spec: &SubsystemSpec,
@@ -271,6 +286,9 @@ fn stay_in(folder: std::io::Result<std::path::PathBuf>, name: &str) {
 }
 
 /// The same parameters with the file of the law that they name.
+///
+/// # Errors
+/// [`Error::Input`]: the file of the law is not found.
 pub fn with_law(
     config: Config,
     search: &SearchPath,

@@ -29,12 +29,18 @@ impl Testbed {
     }
 
     /// Reads the motion of all bodies again after values were set from outside.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: a module that cannot give the states of its bodies.
     pub fn refresh(&mut self) -> Result {
         self.events.clear();
         self.subsystems.read_states()
     }
 
     /// The committed state of everything as bytes: a line of JSON, those of every instance, a hash.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: a module that cannot give its state as bytes.
     pub fn serialize(&self) -> Result<Vec<u8>> {
         let parts = self.instances().iter().map(Instance::serialize).collect::<Result<Vec<_>>>()?;
         let kept = self.clock;
@@ -57,6 +63,9 @@ impl Testbed {
     }
 
     /// Back to a state made by [`Testbed::serialize`] of the same scenario. After an error everything is as before.
+    ///
+    /// # Errors
+    /// [`Error::Simulation`]: the bytes are no state of this scenario. [`Error::Module`]: a module that does not take its part.
     pub fn deserialize(&mut self, bytes: &[u8]) -> Result {
         let time_s = self.clock.t;
         let wrong = || Error::Simulation { time_s, message: "these bytes are no state of this run".into() };

@@ -1,4 +1,4 @@
-//! The step loop; the paper's five steps can be read here and in [`terraglue_gluing`] by name.
+//! The step loop. The paper's five steps can be read by name in `testbed/glued.rs` and in [`terraglue_gluing`].
 //!
 //! Order of a communication step, all subsystems: (1) events and `set`; (2) outputs of t become inputs;
 //! (3) a trial of every subsystem without glue; (4) the group of glued subsystems by its strategy;

@@ -64,7 +64,7 @@ fn height_is_against_gravity_and_none_without_it() {
     let gained = |gravity: [f64; 3]| {
         let mut fixture = Fixture::new("iterative");
         fixture.scenario.world.gravity_m_s2 = gravity;
-        summary_of(&mut fixture).height_gained_m
+        summary_of(&mut fixture).motion.height_gained_m
     };
     let risen = 0.01 * (libm::cos(12.0) - 1.0);
     let level = gained([0.0, 0.0, -9.81]).expect("known");

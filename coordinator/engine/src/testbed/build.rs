@@ -65,7 +65,7 @@ impl Testbed {
         let services = change(services);
         advise(scenario);
         let instances = instantiate(scenario, options, library, &services)?;
-        let signals = signals(scenario, &instances)?;
+        let mut signals = signals(scenario, &instances)?;
         check_report(scenario, &signals.directory, &instances)?;
         let groups = groups(scenario, &instances)?;
         check_settling(scenario, &groups, &instances)?;
@@ -78,7 +78,6 @@ impl Testbed {
         let Subsystems { instances, schedules, .. } = &mut subsystems;
         let with_glue = instances.iter_mut().zip(schedules).filter(|(_, turn)| turn.glued);
         with_glue.for_each(|(instance, _)| instance.watch());
-        let mut signals = signals;
         signals.initialize(&mut subsystems.instances)?;
         subsystems.read_states()?;
         if let Err(Error::Simulation { message, .. }) =

@@ -1,7 +1,7 @@
 """Figures of our own simulations that stand in sentences: of README, docs/ and the headers of scenarios.
 
-Each claim names a file, its words with `{}` where a figure stands, and what measures it: a figure of the tables of
-docs/validation.md (which `cargo xtask validate --quick` holds against a measurement), or a run. A block between two marks is
+Each claim names a file, its words with `{}` where a figure stands, and what measures it: a figure of tests/figures.tsv
+(which `cargo xtask validate --quick --check-docs` holds against a measurement), or a run. A block between two marks is
 made whole. `test_claims.py` holds both; `python tests/python/claims.py --write` (a part of `cargo xtask docs`) writes figures that have changed. A sentence whose words
 do not hold any more, "it climbs", has to be changed by hand: say in words what a figure can show.
 """
@@ -65,18 +65,19 @@ def printed(shown, measured):
 
 @functools.cache
 def rows():
-    """Names of the figures of docs/validation.md, their values and what they are."""
-    found = re.findall(r"^\| `([^`]+)` \| ([^ |]+) \|(?:[^|]*\|){2} (.*) \|$", (ROOT / "docs/validation.md").read_text(), re.M)
-    return {name: (float(value), what) for name, value, what in found if value != "-"}
+    """Names of the figures of tests/figures.tsv, their values and what they are."""
+    with (ROOT / "tests/figures.tsv").open() as table:
+        found = csv.DictReader(table, delimiter="\t", quoting=csv.QUOTE_NONE)
+        return {row["id"]: (float(row["value"]), row["what"]) for row in found if row["value"] != "-"}
 
 
 def figure(*names, scale=1.0):
-    """The largest of these figures of docs/validation.md; a `*` stands for a part of a name."""
+    """The largest of these figures of tests/figures.tsv; a `*` stands for a part of a name."""
 
     def measure():
         patterns = [re.compile(re.escape(name).replace(r"\*", r"[^.]+") + "$") for name in names]
         values = [value for own, (value, _) in rows().items() if any(p.match(own) for p in patterns)]
-        assert values, f"docs/validation.md has no figure {names}"
+        assert values, f"tests/figures.tsv has no figure {names}"
         return scale * max(values)
 
     return measure

@@ -269,7 +269,7 @@ pub struct CheckModuleArguments {
     #[arg(required_unless_present = "list")]
     pub path: Option<PathBuf>,
     /// How much is tried: quick, standard or thorough.
-    #[arg(long, default_value = "standard", value_parser = super::check_module::level)]
+    #[arg(long, default_value = "standard", value_parser = super::words::level)]
     pub level: terraglue_conformance::Level,
     /// Run this test only. May be repeated.
     #[arg(long, value_name = "NAME")]
@@ -290,7 +290,7 @@ pub struct CheckModuleArguments {
     #[arg(long, value_name = "N", value_parser = process_count, allow_negative_numbers = true)]
     pub jobs: Option<std::num::NonZeroUsize>,
     /// Time that a test may take, s.
-    #[arg(long, value_name = "S", default_value_t = 30.0, value_parser = super::check_module::seconds)]
+    #[arg(long, value_name = "S", default_value_t = 30.0, value_parser = super::words::seconds)]
     pub time_limit: f64,
     /// Run in this process, for a debugger.
     #[arg(long)]

@@ -30,7 +30,7 @@ pub fn check(arguments: &CheckArguments) -> Result<Exit> {
     outln!(
         "{} is good: {}, {}, {} s in steps of {} s, gluing `{}`",
         arguments.scenario.display(),
-        counted(testbed.connections(), "connection"),
+        counted(testbed.signals().connections(), "connection"),
         counted(scenario.events.len(), "event"),
         scenario.time.duration_s,
         scenario.time.step_s,

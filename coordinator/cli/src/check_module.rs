@@ -5,7 +5,7 @@ use super::arguments::CheckModuleArguments;
 use super::output::outln;
 use std::path::Path;
 use terraglue_conformance::{
-    Level, Options, Outcome, RemoteRun, TestContext, Told, catalogue, check, module_file, remember, run_here,
+    Options, Outcome, RemoteRun, TestContext, Told, catalogue, check, module_file, remember, run_here,
     run_remote, sanitize, sources_of,
 };
 use terraglue_diagnostics::Result;
@@ -121,15 +121,4 @@ fn write(file: &Path, text: &str) -> Result {
     terraglue_subsystem::files::can_create(file)
         .and_then(|()| std::fs::write(file, text))
         .map_err(|source| terraglue_diagnostics::Error::File { path: file.display().to_string(), source })
-}
-
-/// The levels as words of the command line.
-pub fn level(word: &str) -> std::result::Result<Level, String> {
-    Level::ALL.into_iter().find(|l| l.word() == word).ok_or_else(|| "quick, standard or thorough".into())
-}
-
-/// A time limit of the command line, s.
-pub fn seconds(word: &str) -> std::result::Result<f64, String> {
-    let above_zero = word.parse::<f64>().ok().filter(|s| s.is_finite() && *s > 0.0);
-    above_zero.ok_or_else(|| "a number of seconds above 0".into())
 }

@@ -225,7 +225,7 @@ fn cold_start_mean(
     testbed.view(|view| figures.started(view)).ok()?;
     testbed.run_until(scenario.time.duration_s, &mut [&mut figures, &mut progress]).ok()?;
     testbed.view(|view| figures.finished(view, None)).ok()?;
-    (!testbed.cancelled()).then(|| figures.summary(0.0, 0.0, None, Status::Done).evaluations_soil_mean)
+    (!testbed.cancelled()).then(|| figures.summary(0.0, 0.0, None, Status::Done).gluing.evaluations_soil_mean)
 }
 
 fn print(arguments: &CompareArguments, folder: &Path, rows: &[CompareRow]) -> Result {

@@ -1,11 +1,12 @@
 //! `terraglue fit-soil`: a soil from plate tests.
 
 use super::arguments::FitSoilArguments;
+use super::fit_files::{drawing_of, name, write};
 use super::fit_wheel::wheel;
 use super::output::outln;
 use super::{Exit, show};
-use std::path::{Path, PathBuf};
-use terraglue_diagnostics::{Error, Result};
+use std::path::Path;
+use terraglue_diagnostics::Result;
 use terraglue_scenario::InputError;
 use terraglue_soil_fit::{
     Curve, Known, LawFit, Options, PlateTests, Predicted, SoilFit, fit_law, fit_module, json, known,
@@ -63,10 +64,6 @@ fn told(a: &FitSoilArguments, predicted: Option<&Predicted>) {
     }
 }
 
-pub(super) fn name(path: &Path) -> String {
-    path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned())
-}
-
 /// The same for a law that is a module.
 fn module(a: &FitSoilArguments, tests: &PlateTests, known: Known) -> Result<Exit> {
     let from = 1e-3 * a.from_mm;
@@ -122,16 +119,6 @@ fn read_plausible(path: &Path, from: f64) -> Result<PlateTests> {
         eprintln!("warning: {}: {doubt}", path.display());
     }
     Ok(tests)
-}
-
-pub(super) fn drawing_of(out: &Path) -> PathBuf {
-    out.with_extension("svg")
-}
-
-pub(super) fn write(path: &Path, text: &str) -> Result {
-    terraglue_subsystem::files::can_create(path)
-        .and_then(|()| std::fs::write(path, text))
-        .map_err(|source| Error::File { path: path.display().to_string(), source })
 }
 
 fn print(a: &FitSoilArguments, tests: &PlateTests, fit: &SoilFit, all: &[SoilFit]) {

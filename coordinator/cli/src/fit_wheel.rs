@@ -1,7 +1,7 @@
 //! `terraglue fit-soil --wheel`: a soil from a driven wheel.
 
 use super::arguments::FitSoilArguments;
-use super::fit_soil::{drawing_of, name, write};
+use super::fit_files::{drawing_of, name, write};
 use super::output::outln;
 use super::{Exit, show};
 use terraglue_diagnostics::Result;

@@ -9,6 +9,7 @@ mod check_module;
 mod compare;
 mod convert;
 mod export;
+mod fit_files;
 mod fit_soil;
 mod fit_wheel;
 mod fmu;
@@ -30,6 +31,7 @@ mod soil_module;
 mod soils;
 mod strict;
 mod table_file;
+mod words;
 
 use arguments::{Arguments, Command};
 use clap::Parser;

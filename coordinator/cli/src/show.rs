@@ -155,53 +155,70 @@ pub fn summary(s: &Summary) -> Table {
         t.add_row([name.to_owned(), value]);
     };
     row("scenario", s.scenario.clone());
-    row("gluing", format!("{} ({})", s.strategy, s.form));
+    row("gluing", format!("{} ({})", s.strategy, s.gluing.form));
     row("soil", s.soil_module.clone().unwrap_or_else(|| "none".into()));
     row("simulated", format!("{:.3} s in {} steps", s.simulated_s, s.steps));
     row("distance", distance(s));
-    row("energy per metre", both(s.electrical_energy_j_per_m, s.energy_j_per_m, |e| format!("{e:.1} J/m")));
+    row(
+        "energy per metre",
+        both(s.energy.electrical_energy_j_per_m, s.energy.energy_j_per_m, |e| format!("{e:.1} J/m")),
+    );
     row(
         "cost of transport",
-        both(s.electrical_cost_of_transport, s.cost_of_transport, |c| format!("{c:.2}")),
+        both(s.energy.electrical_cost_of_transport, s.energy.cost_of_transport, |c| format!("{c:.2}")),
     );
-    let balance = Cell::new(drift(&s.energies));
+    let balance = Cell::new(drift(&s.energy.energies));
     t.add_row([
         Cell::new("energy balance"),
-        if s.energies.is_off() { balance.fg(Color::Red) } else { balance },
+        if s.energy.energies.is_off() { balance.fg(Color::Red) } else { balance },
     ]);
     let mut row = |name: &str, value: String| {
         t.add_row([name.to_owned(), value]);
     };
     row("depth of the prints", s.print_depth.as_ref().map_or_else(none, prints));
-    row("peak force", s.peak_force_over_weight.map_or_else(none, |f| format!("{f:.2} × the weight")));
+    row("peak force", s.motion.peak_force_over_weight.map_or_else(none, |f| format!("{f:.2} × the weight")));
     row("real-time factor", format!("{:.2} ({:.2} s of wall time)", s.real_time_factor, s.wall_s));
     row(
         "height gained",
-        s.height_gained_m.map_or_else(none, |h| format!("{} mm{}", signed(1e3 * h, 1), stall(s))),
+        s.motion.height_gained_m.map_or_else(none, |h| format!("{} mm{}", signed(1e3 * h, 1), stall(s))),
     );
-    row("largest roll, pitch", format!("{}, {}", degrees(s.max_roll_rad), degrees(s.max_pitch_rad)));
-    row("work of the motors", work(&s.energies));
-    if let Some(electrical_j) = s.electrical_energy_j.filter(|e| *e > 0.0) {
+    row(
+        "largest roll, pitch",
+        format!("{}, {}", degrees(s.motion.max_roll_rad), degrees(s.motion.max_pitch_rad)),
+    );
+    row("work of the motors", work(&s.energy.energies));
+    if let Some(electrical_j) = s.energy.electrical_energy_j.filter(|e| *e > 0.0) {
         row("electrical energy", format!("{electrical_j:.1} J"));
     }
+    gluing(&mut t, s);
+    t
+}
+
+/// How the subsystems were glued, and the error of the soil's mass.
+fn gluing(t: &mut Table, s: &Summary) {
+    let mut row = |name: &str, value: String| {
+        t.add_row([name.to_owned(), value]);
+    };
     row(
         "evaluations of the bodies",
-        format!("{:.2} mean, {} at most", s.evaluations_mean, s.evaluations_max),
+        format!("{:.2} mean, {} at most", s.gluing.evaluations_mean, s.gluing.evaluations_max),
     );
-    row("steps not converged", s.steps_not_converged.map_or_else(not_applicable, |n| n.to_string()));
-    row("largest gap", s.max_gap_m.map_or_else(not_applicable, |gap| format!("{} m", scientific(gap, 2))));
-    let gap = s.max_action_reaction_gap_n;
+    row("steps not converged", s.gluing.steps_not_converged.map_or_else(not_applicable, |n| n.to_string()));
+    row(
+        "largest gap",
+        s.gluing.max_gap_m.map_or_else(not_applicable, |gap| format!("{} m", scientific(gap, 2))),
+    );
+    let gap = s.gluing.max_action_reaction_gap_n;
     row(
         "largest action–reaction gap",
         gap.map_or_else(not_applicable, |gap| format!("{} N", scientific(gap, 2))),
     );
-    let error = s.interface_work_error_j;
+    let error = s.gluing.interface_work_error_j;
     row(
         "interface work error",
         error.map_or_else(|| "unknown".into(), |e| format!("{} J", scientific(e, 2))),
     );
     row("error of the soil's mass", s.soil_mass_error_relative.map_or_else(none, |e| scientific(e, 1)));
-    t
 }
 
 fn not_applicable() -> String {
@@ -265,7 +282,7 @@ fn prints(p: &PrintDepth) -> String {
 }
 
 fn stall(s: &Summary) -> String {
-    s.stalled.map_or_else(String::new, |p| {
+    s.motion.stalled.map_or_else(String::new, |p| {
         format!("; stalled since {:.1} s at x = {} m, y = {} m", p.t_s, fixed(p.x_m, 2), fixed(p.y_m, 2))
     })
 }
@@ -279,7 +296,7 @@ fn degrees(angle: Option<f64>) -> String {
 }
 
 fn distance(s: &Summary) -> String {
-    match (s.distance_m, s.commanded_distance_m) {
+    match (s.motion.distance_m, s.motion.commanded_distance_m) {
         (Some(d), Some(c)) if c.abs() > 1e-9 => {
             let share = fixed(100.0 * d / c, 0);
             format!("{} m of {c:.3} m asked for ({share} %)", fixed(d, 3))
@@ -316,8 +333,8 @@ mod tests {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/plate_sinkage.toml");
         let scenario = Scenario::load(path.as_ref(), &[]).expect("good");
         let mut summary = SummaryObserver::new(&scenario).summary(1.0, 1.0, None, Status::Done);
-        (summary.energies.drift_j, summary.energies.turnover_j) = (Some(-0.0125), 5.0);
-        summary.energies.by_ports = false;
+        (summary.energy.energies.drift_j, summary.energy.energies.turnover_j) = (Some(-0.0125), 5.0);
+        summary.energy.energies.by_ports = false;
         let line = |s: &Summary| {
             let table = super::summary(s).to_string();
             table.lines().filter(|l| l.contains("energy balance")).map(str::to_owned).collect::<String>()
@@ -327,10 +344,10 @@ mod tests {
             text.contains("-1.25e-2 J, -0.25 % of the motors' work") && !text.contains("more than"),
             "{text}"
         );
-        summary.energies.turnover_j = 1.0;
+        summary.energy.energies.turnover_j = 1.0;
         assert!(line(&summary).contains("-1.25 % of the motors' work: more than 1 %"));
-        summary.energies.drift_j = None;
-        summary.energies.without_book = vec!["soil".into()];
+        summary.energy.energies.drift_j = None;
+        summary.energy.energies.without_book = vec!["soil".into()];
         assert!(line(&summary).contains("unknown: soil keeps no energy ledger"));
     }
 }

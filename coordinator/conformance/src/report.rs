@@ -1,8 +1,9 @@
 //! The results of a check: for people, as JSON and as JUnit's XML.
 
-use super::catalogue::{Test, catalogue};
+use super::catalogue::catalogue;
+use super::definition::Test;
 use super::finding::Outcome;
-use super::supervisor::Options;
+use super::options::Options;
 use std::fmt::Write;
 use std::path::{Path, PathBuf};
 

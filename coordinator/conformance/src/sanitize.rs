@@ -4,7 +4,8 @@
 //! The program itself is not built with them: the runtime is loaded ahead of it (`LD_PRELOAD`), so only the module is
 //! watched. What the tests themselves say does not matter here.
 
-use super::supervisor::{Options, check};
+use super::options::Options;
+use super::supervisor::check;
 use super::{Level, Outcome};
 use std::path::{Path, PathBuf};
 use std::process::Command;

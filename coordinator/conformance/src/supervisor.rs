@@ -1,8 +1,10 @@
 //! Runs the tests, each in a process of its own, several at a time, each with a time limit.
 
-use super::catalogue::{Area, Test, catalogue};
+use super::catalogue::catalogue;
 use super::check_file::CheckFile;
+use super::definition::{Area, Test};
 use super::finding::{Finding, Outcome};
+use super::options::Options;
 use super::report::{Report, TestResult};
 use super::{Level, unknown};
 use serde::{Deserialize, Serialize};
@@ -12,43 +14,6 @@ use std::process::{Child, Command, ExitStatus};
 use std::time::{Duration, Instant};
 use terraglue_host::isolation::ForkServer;
 use terraglue_subsystem::Kind;
-
-/// How the tests are run.
-#[derive(Clone, Debug)]
-pub struct Options {
-    /// The program `terraglue`, which is started once per test.
-    pub program: PathBuf,
-    /// How much is tried.
-    pub level: Level,
-    /// Seed of everything random.
-    pub seed: u64,
-    /// Only these tests; empty: all of the level.
-    pub only: Vec<String>,
-    /// Parameters of the module, as `--set`.
-    pub sets: Vec<(String, String)>,
-    /// Processes at a time.
-    pub jobs: usize,
-    /// Time that a test may take, s.
-    pub limit_s: f64,
-    /// Variables of the environment of every test; `{test}` stands for its name.
-    pub environment: Vec<(String, String)>,
-}
-
-impl Options {
-    /// Everything once, seed 1, two processes at a time, 30 s for each test.
-    pub fn new(program: PathBuf) -> Self {
-        Self {
-            program,
-            level: Level::Standard,
-            seed: 1,
-            only: Vec::new(),
-            sets: Vec::new(),
-            jobs: std::thread::available_parallelism().map_or(2, usize::from),
-            limit_s: 30.0,
-            environment: Vec::new(),
-        }
-    }
-}
 
 /// What the process of a test writes into its result file.
 #[derive(Serialize, Deserialize)]

@@ -3,7 +3,7 @@
 use super::check_file::CheckFile;
 use super::finding::{Stop, Verdict};
 use super::fixture::Flat;
-use super::{Level, catalogue::Area};
+use super::{Level, definition::Area};
 use serde_json::{Map, Value};
 use std::path::PathBuf;
 use std::sync::Arc;

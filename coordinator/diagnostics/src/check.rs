@@ -26,6 +26,9 @@ fn three_digits(x: f64) -> f64 {
 }
 
 /// Checks a value; `count` demands a list of that length.
+///
+/// # Errors
+/// The first [`Complaint`]: a wrong type, a number out of range, a wrong choice or a list of another length.
 pub fn check_value(parameter: &Parameter, count: Option<usize>, value: &Value) -> Result<(), Complaint> {
     match parameter.parameter_type {
         ParameterType::Number => check_number(parameter, count, value.as_f64(), value),

@@ -72,18 +72,30 @@ terraglue_subsystem::persist!(Event { t_s, what });
 /// Follows a run. All methods are called from the stepping thread.
 pub trait Observer {
     /// Before the first step.
+    ///
+    /// # Errors
+    /// What the observer cannot do, such as writing a file; it ends the run.
     fn started(&mut self, _view: &View) -> Result {
         Ok(())
     }
     /// After every commit.
+    ///
+    /// # Errors
+    /// What the observer cannot do, such as writing a file; it ends the run.
     fn stepped(&mut self, _view: &View) -> Result {
         Ok(())
     }
     /// An event, a `set`, an action, a warning of the run.
+    ///
+    /// # Errors
+    /// What the observer cannot do, such as writing a file; it ends the run.
     fn event(&mut self, _event: &Event) -> Result {
         Ok(())
     }
     /// After the last step, also of a run that failed or was stopped.
+    ///
+    /// # Errors
+    /// What the observer cannot do, such as writing a file; it ends the run.
     fn finished(&mut self, _view: &View, _error: Option<&Error>) -> Result {
         Ok(())
     }

@@ -1,8 +1,7 @@
 //! What the columns of a table of inputs feed in an FMU that is run alone: numbers, arrays, texts and clocks, at communication
 //! points and – numbers of FMUs that follow their inputs – within steps.
 
-use super::map::element_name;
-use super::simulate::find;
+use super::map::{element_name, find};
 use super::table::Table;
 use std::sync::Arc;
 use terraglue_fmi::description::Variable;

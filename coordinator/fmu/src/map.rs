@@ -1,6 +1,7 @@
 //! FMI variables as variables of a scenario: array elements get names of their own, `foot.position[2,1]`.
 
 use terraglue_fmi::description::{self as fmi, ModelDescription, Variability};
+use terraglue_scenario::did_you_mean;
 use terraglue_subsystem::{Effect, ValueType, Variable};
 
 /// Where the value of a variable of the scenario lies in the FMU.
@@ -84,4 +85,22 @@ fn effect(v: &fmi::Variable) -> Effect {
         }
         _ => Effect::ReadOnly,
     }
+}
+
+/// A variable by its name.
+///
+/// # Errors
+/// The name, with the one that looks most like it.
+pub(super) fn find<'a>(
+    description: &'a ModelDescription,
+    name: &str,
+) -> terraglue_fmi::Result<&'a fmi::Variable> {
+    let all = &description.variables;
+    all.iter().find(|v| v.name == name).ok_or_else(|| {
+        let hint = did_you_mean(name, all.iter().map(|v| v.name.as_str()));
+        terraglue_fmi::Error::Refused(format!(
+            "there is no variable `{name}`{}",
+            hint.map(|h| format!("; {h}")).unwrap_or_default()
+        ))
+    })
 }

@@ -1,12 +1,11 @@
 //! One FMU alone: from its start to its end in equal steps, its outputs as rows of a table.
 
 use super::inputs::{self, Inputs, set_text};
-use super::map::element_name;
+use super::map::{element_name, find};
 use std::sync::Arc;
 use terraglue_fmi::description::{Causality, Variable};
 use terraglue_fmi::instance::Sink;
 use terraglue_fmi::{Advance, Error, Fmu, FmuInstance, FmuState, InstanceOptions, ModelDescription, Result};
-use terraglue_scenario::did_you_mean;
 use terraglue_subsystem::{ValueType, ValuesMut};
 
 pub use super::table::{InputRow, Table};
@@ -55,24 +54,7 @@ const STEPS: f64 = 1e9;
 /// What the FMU or its input does wrong, with the time.
 pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables) -> Result<Option<f64>> {
     let row = &mut *tables.rows;
-    let experiment = fmu.description().experiment;
-    let start = settings.start_time.or(experiment.start).unwrap_or(0.0);
-    let stop = settings.stop.or(experiment.stop).unwrap_or(start + 1.0);
-    let step = settings.step.or(experiment.step).or(fmu.description().capabilities.fixed_step);
-    let step = step.unwrap_or((stop - start) / 500.0);
-    let exact = (stop - start) / step;
-    let whole = (exact - exact.round()).abs() <= NEARLY_WHOLE;
-    let variable = fmu.description().capabilities.variable_step;
-    let steps = if whole {
-        exact.round()
-    } else if variable {
-        exact.ceil()
-    } else {
-        exact.floor()
-    };
-    if !(step > 0.0 && (1.0..=STEPS).contains(&steps)) {
-        return Err(Error::Refused(no_steps(start, stop, step)));
-    }
+    let Plan { start, stop, step, steps, whole } = plan(fmu, settings)?;
     let intermediate = match &tables.intermediate {
         Some(_) => shown_between(fmu.description(), &settings.outputs)?,
         None => Vec::new(),
@@ -87,17 +69,7 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
     configure(&mut instance, &settings.start)?;
     let description = instance.description().clone();
     let columns = columns(&description, &settings.outputs, event_mode)?;
-    for (name, text) in &settings.start {
-        let v = find(&description, name)?;
-        if v.causality != Causality::StructuralParameter {
-            set_text(&instance, v, text)?;
-        }
-    }
-    instance.enter_initialization(start, Some(stop), settings.tolerance.or(experiment.tolerance))?;
-    let inputs = Inputs::find(&instance, &settings.input, settings.hold_inputs)?;
-    inputs.set(&mut instance, start)?;
-    instance.exit_initialization()?;
-    inputs.follow(&mut instance)?;
+    let inputs = initialize(&mut instance, settings, (start, stop))?;
     // with event mode a last column says how many events were handled since the row before
     let marked = |text: String, events: u32| match settings.event_mode {
         true if text.starts_with("time") => text + ",events",
@@ -108,7 +80,7 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         let all = self::columns(&description, &intermediate, false)?;
         write(&(header(&all) + ",step_finished"))?;
     }
-    if !whole && !variable {
+    if !whole && !description.capabilities.variable_step {
         let end = start + steps * step;
         instance.note(&format!(
             "the run ends at t = {end} s, before {stop} s: the FMU takes steps of one length only"
@@ -137,6 +109,57 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
     outcome?;
     instance.terminate()?;
     Ok(ended)
+}
+
+/// The steps of a run.
+struct Plan {
+    start: f64,
+    stop: f64,
+    step: f64,
+    steps: f64,
+    /// Whether the step divides the run.
+    whole: bool,
+}
+
+/// From when to when, and in how many steps: as the settings say, else the FMU.
+fn plan(fmu: &Fmu, settings: &Settings) -> Result<Plan> {
+    let experiment = fmu.description().experiment;
+    let start = settings.start_time.or(experiment.start).unwrap_or(0.0);
+    let stop = settings.stop.or(experiment.stop).unwrap_or(start + 1.0);
+    let step = settings.step.or(experiment.step).or(fmu.description().capabilities.fixed_step);
+    let step = step.unwrap_or((stop - start) / 500.0);
+    let exact = (stop - start) / step;
+    let whole = (exact - exact.round()).abs() <= NEARLY_WHOLE;
+    let variable = fmu.description().capabilities.variable_step;
+    let steps = if whole {
+        exact.round()
+    } else if variable {
+        exact.ceil()
+    } else {
+        exact.floor()
+    };
+    if !(step > 0.0 && (1.0..=STEPS).contains(&steps)) {
+        return Err(Error::Refused(no_steps(start, stop, step)));
+    }
+    Ok(Plan { start, stop, step, steps, whole })
+}
+
+/// Start values and the initialisation from a start to a stop; the inputs over time, which are set.
+fn initialize(instance: &mut FmuInstance, settings: &Settings, (start, stop): (f64, f64)) -> Result<Inputs> {
+    let description = instance.description().clone();
+    for (name, text) in &settings.start {
+        let v = find(&description, name)?;
+        if v.causality != Causality::StructuralParameter {
+            set_text(instance, v, text)?;
+        }
+    }
+    let tolerance = settings.tolerance.or(description.experiment.tolerance);
+    instance.enter_initialization(start, Some(stop), tolerance)?;
+    let inputs = Inputs::find(instance, &settings.input, settings.hold_inputs)?;
+    inputs.set(instance, start)?;
+    instance.exit_initialization()?;
+    inputs.follow(instance)?;
+    Ok(inputs)
 }
 
 /// The state before a step.
@@ -219,21 +242,6 @@ fn configure(instance: &mut FmuInstance, start: &[(String, String)]) -> Result {
         values.push((name, text.trim().parse().map_err(|_| wrong())?));
     }
     instance.configure(&values)
-}
-
-/// A variable by its name.
-///
-/// # Errors
-/// The name, with the one that looks most like it.
-pub(super) fn find<'a>(description: &'a ModelDescription, name: &str) -> Result<&'a Variable> {
-    let all = &description.variables;
-    all.iter().find(|v| v.name == name).ok_or_else(|| {
-        let hint = did_you_mean(name, all.iter().map(|v| v.name.as_str()));
-        Error::Refused(format!(
-            "there is no variable `{name}`{}",
-            hint.map(|h| format!("; {h}")).unwrap_or_default()
-        ))
-    })
 }
 
 fn columns<'a>(

@@ -5,8 +5,8 @@
 //! (Hintermüller, Ito, Kunisch 2002); if it cycles, by principal pivoting with the least index (Murty 1974),
 //! which ends for every P-matrix.
 
-use super::eigen::TruncatedSolver;
-use super::linear::Lu;
+use terraglue_numerics::dense::Lu;
+use terraglue_numerics::least_norm::TruncatedSolver;
 
 /// Pivots weaker than this make the system one for the truncated solver.
 const WEAK: f64 = 1e-10;

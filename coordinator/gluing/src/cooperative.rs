@@ -47,14 +47,14 @@ impl Strategy for Cooperative {
             problem.advance_bodies(instances)?;
             if pass == PASSES
                 || problem.report.evaluations_soil == 0
-                || followed(problem, &problem.x2)
+                || followed(problem, &problem.second.x)
                 || !can_repeat(problem, instances)
             {
                 break;
             }
             problem.estimate_again(instances)?;
         }
-        problem.x2.copy_from_slice(&problem.x1);
+        problem.second.x.copy_from_slice(&problem.first.x);
         problem.report.converged = true;
         Ok(Outcome::Converged)
     }

@@ -84,7 +84,7 @@ impl Strategy for CooperativeCompliant {
             if !(left <= self.limits.threshold(problem)) {
                 return Ok(self.limits.give_up(problem, "the soil against the estimate: |Λ·e|", left));
             }
-            self.said.clone_from(&problem.x1);
+            self.said.clone_from(&problem.first.x);
             problem.advance_bodies(instances)?;
             if pass == PASSES || followed(problem, &self.said) || !can_repeat(problem, instances) {
                 break;

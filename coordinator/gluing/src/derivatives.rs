@@ -21,6 +21,9 @@ pub enum Derivatives {
 
 impl InterfaceProblem {
     /// d(x1 − x2)/dT of all bodies at their last trial into `estimate.g`.
+    ///
+    /// # Errors
+    /// A member that fails, or ends a trial early.
     pub fn linearise_bodies(&mut self, source: Derivatives, instances: &mut [Instance]) -> Result {
         let start = Clock::now();
         let level = if self.at.h == 0.0 { Level::Acceleration } else { Level::Position };
@@ -30,13 +33,13 @@ impl InterfaceProblem {
             let (instance, g) = (&mut instances[side.slot], &mut self.estimate.g);
             side.add_compliance(instance, &self.nodes, &self.at, level, g)?;
         }
-        if self.at.h > 0.0 && self.damping.iter().any(|d| *d > 0.0) {
+        if self.at.h > 0.0 && self.conditions.damping.iter().any(|d| *d > 0.0) {
             self.add_dampers(instances)?;
         }
-        if (0..self.n()).any(|i| self.is_above_position(i)) {
+        if (0..self.n()).any(|i| self.conditions.is_above_position(i, self.at.h)) {
             self.raise_levels(instances)?;
         }
-        for i in (0..self.n()).filter(|i| self.at.h == 0.0 && self.compliance[*i] > 0.0) {
+        for i in (0..self.n()).filter(|i| self.at.h == 0.0 && self.conditions.compliance[*i] > 0.0) {
             // a spring's force at t is given by positions and velocities alone
             let n = self.n();
             (0..n).for_each(|c| self.estimate.g[c * n + i] = 0.0);
@@ -71,7 +74,7 @@ impl InterfaceProblem {
             }
             let how = (source == Derivatives::Central, 1.0);
             most = most.max(side.take_differences(instance, &self.nodes, &self.at, &self.t, how)?);
-            self.displaced |= side.n() > 0;
+            self.differences.displaced |= side.n() > 0;
         }
         self.at.trial += most;
         self.report.evaluations_jacobian += most;
@@ -81,13 +84,13 @@ impl InterfaceProblem {
     /// Rows of constraints at velocity or acceleration level: the Jacobian of their own condition.
     fn raise_levels(&mut self, instances: &mut [Instance]) -> Result {
         let n = self.n();
-        let mut rates = std::mem::take(&mut self.rates);
+        let mut rates = std::mem::take(&mut self.differences.rates);
         for k in 0..n * n {
-            if self.is_above_position(k % n) {
+            if self.conditions.is_above_position(k % n, self.at.h) {
                 self.estimate.g[k] = 0.0;
             }
         }
-        for (level, weight) in self.weights().into_iter().filter(|w| w.1 != 0.0) {
+        for (level, weight) in self.conditions.weights(self.at.h).into_iter().filter(|w| w.1 != 0.0) {
             rates.clear();
             rates.resize(n * n, 0.0);
             for side in &mut self.bodies {
@@ -95,35 +98,38 @@ impl InterfaceProblem {
                 side.add_compliance(instance, &self.nodes, &self.at, level, &mut rates)?;
             }
             for (k, rate) in rates.iter().enumerate() {
-                if self.is_above_position(k % n) {
+                if self.conditions.is_above_position(k % n, self.at.h) {
                     self.estimate.g[k] += weight * rate;
                 }
             }
         }
-        self.rates = rates;
+        self.differences.rates = rates;
         Ok(())
     }
 
     /// What dampers of the glue add to the Jacobian: compliance·damping·d(v1 − v2)/dT.
     fn add_dampers(&mut self, instances: &mut [Instance]) -> Result {
         let n = self.n();
-        let mut rates = std::mem::take(&mut self.rates);
+        let mut rates = std::mem::take(&mut self.differences.rates);
         rates.clear();
         rates.resize(n * n, 0.0);
         for side in &mut self.bodies {
             let instance = &mut instances[side.slot];
             side.add_compliance(instance, &self.nodes, &self.at, Level::Velocity, &mut rates)?;
         }
-        for row in (0..n).filter(|i| self.damping[*i] > 0.0) {
-            let factor = self.compliance_now(row) * self.damping[row];
+        for row in (0..n).filter(|i| self.conditions.damping[*i] > 0.0) {
+            let factor = self.conditions.compliance[row] * self.conditions.damping[row];
             (0..n).for_each(|c| self.estimate.g[c * n + row] += factor * rates[c * n + row]);
         }
-        self.rates = rates;
+        self.differences.rates = rates;
         Ok(())
     }
 
     /// The grounds' Jacobian at their last trial into `out` (n × n, column-major); by finite differences where
     /// a module has none.
+    ///
+    /// # Errors
+    /// A soil that fails, or ends a trial early.
     pub fn ground_jacobian(&mut self, instances: &mut [Instance], xt: bool, out: &mut Vec<f64>) -> Result {
         let start = Clock::now();
         let n = self.n();
@@ -155,19 +161,21 @@ impl InterfaceProblem {
         out: &mut [f64],
     ) -> Result {
         let delta = -1e-9;
-        let mut kept = std::mem::take(&mut self.kept);
-        kept[0].clone_from(&self.f);
-        kept[2].clone_from(&self.x2);
-        let (colours, count) = self.colour_ports(second);
+        let mut kept = std::mem::take(&mut self.differences.kept);
+        kept[0].clone_from(&self.law.last);
+        kept[2].clone_from(&self.second.x);
+        let driven = self.bodies.iter().filter(|s| second && s.is_second());
+        let count = self.differences.colour_ports(driven, &self.grounds, &self.nodes, self.ports.len());
+        let colours = std::mem::take(&mut self.differences.colours);
         for (colour, c) in (0..count).flat_map(|k| (0..6).map(move |c| (k, c))) {
             let columns = |e: &Self, p: usize| column(&e.ports[p], &colours[p], colour, c);
             if !(0..self.ports.len()).any(|p| columns(self, p).is_some()) {
                 continue;
             }
-            kept[1].clone_from(&self.x1);
+            kept[1].clone_from(&self.first.x);
             for p in 0..self.ports.len() {
                 if let Some(i) = columns(self, p) {
-                    self.x1[i] += delta;
+                    self.first.x[i] += delta;
                 }
             }
             if second {
@@ -175,20 +183,20 @@ impl InterfaceProblem {
             } else {
                 self.advance_grounds_under_motion(instances)?;
             }
-            self.x1.copy_from_slice(&kept[1]);
-            self.count_difference();
+            self.first.x.copy_from_slice(&kept[1]);
+            self.report.count_soil_difference();
             let (m, n) = (self.ports.len(), self.n());
             for (p, column) in (0..m).filter_map(|p| Some((p, columns(self, p)?))) {
-                for q in (0..m).filter(|q| self.meets[p * m + q]) {
+                for q in (0..m).filter(|q| self.differences.meets[p * m + q]) {
                     for row in self.ports[q].range() {
-                        out[column * n + row] = -(self.f[row] - kept[0][row]) / delta;
+                        out[column * n + row] = -(self.law.last[row] - kept[0][row]) / delta;
                     }
                 }
             }
         }
-        self.f.copy_from_slice(&kept[0]);
-        self.x2.copy_from_slice(&kept[2]);
-        (self.kept, self.colours) = (kept, colours);
+        self.law.last.copy_from_slice(&kept[0]);
+        self.second.x.copy_from_slice(&kept[2]);
+        (self.differences.kept, self.differences.colours) = (kept, colours);
         Ok(())
     }
 
@@ -196,12 +204,14 @@ impl InterfaceProblem {
     /// lie apart.
     fn difference_force(&mut self, instances: &mut [Instance], out: &mut [f64]) -> Result {
         let n = self.n();
-        let mut kept = std::mem::take(&mut self.kept);
-        for (kept, value) in kept.iter_mut().zip([&self.f, &self.x2, &self.t, &self.x1]) {
+        let mut kept = std::mem::take(&mut self.differences.kept);
+        for (kept, value) in kept.iter_mut().zip([&self.law.last, &self.second.x, &self.t, &self.first.x]) {
             kept.clone_from(value);
         }
         let [f, x2, t, x1, ..] = &kept;
-        let (colours, count) = self.colour_ports(false);
+        let nobody = std::iter::empty();
+        let count = self.differences.colour_ports(nobody, &self.grounds, &self.nodes, self.ports.len());
+        let colours = std::mem::take(&mut self.differences.colours);
         for (colour, c) in (0..count).flat_map(|k| (0..6).map(move |c| (k, c))) {
             let delta = |i: usize| if c == 0 { 1e-6 * t[i].abs().max(1.0) } else { -1e-9 };
             let columns = |e: &Self, p: usize| column(&e.ports[p], &colours[p], colour, c);
@@ -210,53 +220,29 @@ impl InterfaceProblem {
             }
             for p in 0..self.ports.len() {
                 if let Some(i) = columns(self, p) {
-                    if c == 0 { self.t[i] += delta(i) } else { self.x1[i] += delta(i) }
+                    if c == 0 { self.t[i] += delta(i) } else { self.first.x[i] += delta(i) }
                 }
             }
             self.advance_grounds_under_force(instances)?;
             self.t.copy_from_slice(t);
-            self.x1.copy_from_slice(x1);
-            self.count_difference();
+            self.first.x.copy_from_slice(x1);
+            self.report.count_soil_difference();
             for (p, column) in (0..self.ports.len()).filter_map(|p| Some((p, columns(self, p)?))) {
                 let delta = delta(column);
                 for (row, r) in self.ports[p].components() {
                     out[column * n + row] = match (r, c) {
-                        (0, 0) => -(self.x2[row] - x2[row]) / delta,
+                        (0, 0) => -(self.second.x[row] - x2[row]) / delta,
                         (0, _) => 0.0,
-                        (_, 0) => (self.f[row] - f[row]) / delta,
-                        _ => -(self.f[row] - f[row]) / delta,
+                        (_, 0) => (self.law.last[row] - f[row]) / delta,
+                        _ => -(self.law.last[row] - f[row]) / delta,
                     };
                 }
             }
         }
-        self.f.copy_from_slice(f);
-        self.x2.copy_from_slice(x2);
-        (self.kept, self.colours) = (kept, colours);
+        self.law.last.copy_from_slice(f);
+        self.second.x.copy_from_slice(x2);
+        (self.differences.kept, self.differences.colours) = (kept, colours);
         Ok(())
-    }
-
-    /// Numbers of the ports of the grounds, or of all of side 2, by which they may be perturbed together, and how many
-    /// numbers there are.
-    fn colour_ports(&mut self, second: bool) -> (Vec<u32>, u32) {
-        let mut colours = std::mem::take(&mut self.colours);
-        let m = self.ports.len();
-        self.meets.clear();
-        self.meets.resize(m * m, false);
-        colours.clear();
-        colours.resize(m, u32::MAX);
-        for side in self.bodies.iter().filter(|s| second && s.is_second()) {
-            side.colours(None, m, &mut self.meets, &mut colours);
-        }
-        for side in &self.grounds {
-            side.colours(Some(&self.nodes), m, &mut self.meets, &mut colours);
-        }
-        let count = colours.iter().filter(|c| **c != u32::MAX).max().map_or(0, |c| c + 1);
-        (colours, count)
-    }
-
-    fn count_difference(&mut self) {
-        self.report.evaluations_soil -= 1;
-        self.report.evaluations_jacobian += 1;
     }
 }
 

@@ -2,7 +2,7 @@
 
 use super::complementarity::{BoundedProblem, BoundedSolver};
 use super::group_estimate::GroupEstimate;
-use super::linear::Lu;
+use terraglue_numerics::dense::Lu;
 use terraglue_subsystem::Port;
 
 /// The rigid-contact problem 0 ≤ T*_n ⟂ x_free + G·T* − x2 ≥ 0 with its buffers.

@@ -12,8 +12,8 @@ const MISS: [f64; 2] = [1e-3, 1e-8];
 
 /// Whether the bodies have moved as `said` (packed; m, rad).
 pub(super) fn followed(problem: &InterfaceProblem, said: &[f64]) -> bool {
-    let most = problem.x1.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
-    let miss = problem.x1.iter().zip(said).fold(0.0, |m: f64, (x, said)| m.max((x - said).abs()));
+    let most = problem.first.x.iter().fold(0.0, |m: f64, x| m.max(x.abs()));
+    let miss = problem.first.x.iter().zip(said).fold(0.0, |m: f64, (x, said)| m.max((x - said).abs()));
     miss <= MISS[0] * most + MISS[1]
 }
 

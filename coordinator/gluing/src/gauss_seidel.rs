@@ -36,7 +36,7 @@ impl Strategy for GaussSeidel {
 
     fn solve(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<Outcome> {
         problem.explicit_forces();
-        if problem.has_joints() {
+        if problem.conditions.has_joints() {
             problem.advance_half(true, instances)?;
             problem.t_second.clone_from(&problem.t);
             problem.spring_forces();
@@ -44,7 +44,7 @@ impl Strategy for GaussSeidel {
         } else {
             problem.advance_bodies(instances)?;
         }
-        problem.follow_bodies();
+        problem.second.follow(&problem.first, &problem.conditions.kinds);
         Ok(super::single_pass(problem))
     }
 }

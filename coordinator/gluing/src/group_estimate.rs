@@ -14,3 +14,16 @@ pub struct GroupEstimate {
     /// Whether T* is the only solution.
     pub unique: bool,
 }
+
+impl GroupEstimate {
+    /// Nothing estimated yet of n components of that many ports.
+    pub(super) fn reset(&mut self, n: usize, ports: usize) {
+        for (buffer, size) in [(&mut self.t_star, n), (&mut self.x_free, n), (&mut self.g, n * n)] {
+            buffer.clear();
+            buffer.resize(size, 0.0);
+        }
+        self.active.clear();
+        self.active.resize(ports, 0);
+        self.unique = true;
+    }
+}

@@ -5,12 +5,12 @@
 use super::derivatives::Derivatives;
 use super::glue::ConstraintKind;
 use super::interface_problem::InterfaceProblem;
-use super::linear::max_norm;
 use super::participant::Answer;
 use crate::timing::Part;
 use std::time::Instant as Clock;
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
+use terraglue_numerics::dense::max_norm;
 use terraglue_subsystem::Level;
 
 impl InterfaceProblem {
@@ -24,39 +24,31 @@ impl InterfaceProblem {
     /// The forces of all laws at t into `out`: of soils at contacts, of springs at joints; zero at constraints.
     pub fn law_forces(&mut self, out: &mut Vec<f64>) {
         self.read_velocities();
-        let n = self.rows.len();
+        let n = self.conditions.kinds.len();
         out.clear();
-        out.extend((0..n).map(|i| match self.rows[i] {
-            ConstraintKind::Joint if self.compliance[i] == 0.0 => 0.0,
+        let c = &self.conditions;
+        out.extend((0..n).map(|i| match c.kinds[i] {
+            ConstraintKind::Joint if c.compliance[i] == 0.0 => 0.0,
             ConstraintKind::Joint => {
-                -self.gap[i] / self.compliance[i] - self.damping[i] * (self.v1[i] - self.v2[i])
+                -c.gap[i] / c.compliance[i] - c.damping[i] * (self.first.v[i] - self.second.v[i])
             }
-            _ => self.f_law[i],
+            _ => self.law.at_start[i],
         }));
     }
 
     /// V1 and V2 of t, as `set_ports` answered them.
     fn read_velocities(&mut self) {
         for side in &self.bodies {
-            side.motion_by_side(
-                [&mut self.x1, &mut self.v1, &mut self.a1],
-                [&mut self.x2, &mut self.v2, &mut self.a2],
-            );
+            side.motion_by_side(self.first.parts(), self.second.parts());
         }
     }
 
     /// The springs' force where side 2 has moved and side 1 has not.
     pub fn spring_forces(&mut self) {
-        for i in (0..self.n()).filter(|i| self.rows[*i] == ConstraintKind::Joint) {
-            let damper = self.damping[i] * (self.v1[i] - self.v2[i]);
-            self.t[i] = (self.x2[i] - self.gap[i]) / self.compliance[i] - damper;
-        }
-    }
-
-    /// Soils follow the bodies' motion: their surface is where the body is.
-    pub fn follow_bodies(&mut self) {
-        for i in (0..self.n()).filter(|i| self.rows[*i] != ConstraintKind::Joint) {
-            self.x2[i] = self.x1[i];
+        for i in (0..self.n()).filter(|i| self.conditions.kinds[*i] == ConstraintKind::Joint) {
+            let c = &self.conditions;
+            let damper = c.damping[i] * (self.first.v[i] - self.second.v[i]);
+            self.t[i] = (self.second.x[i] - c.gap[i]) / c.compliance[i] - damper;
         }
     }
 
@@ -64,15 +56,18 @@ impl InterfaceProblem {
     pub fn start_at_constant_velocity(&mut self) {
         self.read_velocities();
         let h = self.at.h;
-        self.x1.iter_mut().zip(&self.v1).for_each(|(x, v)| *x = h * v);
-        self.x2.iter_mut().zip(&self.v2).for_each(|(x, v)| *x = h * v);
+        self.first.x.iter_mut().zip(&self.first.v).for_each(|(x, v)| *x = h * v);
+        self.second.x.iter_mut().zip(&self.second.v).for_each(|(x, v)| *x = h * v);
     }
 
     /// x_free and G1 as the bodies are under the present T: x1 − G1·T.
+    ///
+    /// # Errors
+    /// A member that fails, or ends a trial early.
     pub fn estimate_again(&mut self, instances: &mut [Instance]) -> Result {
         self.linearise_bodies(Derivatives::Analytic, instances)?;
         let estimate = &mut self.estimate;
-        estimate.x_free.copy_from_slice(&self.x1);
+        estimate.x_free.copy_from_slice(&self.first.x);
         for (column, t) in estimate.g.chunks_exact(self.t.len().max(1)).zip(&self.t) {
             estimate.x_free.iter_mut().zip(column).for_each(|(x, g)| *x -= g * t);
         }
@@ -92,16 +87,16 @@ impl InterfaceProblem {
     }
 
     /// A trial of side 1, or of the bodies on side 2, under T.
+    ///
+    /// # Errors
+    /// A member that fails, or ends a trial early.
     pub fn advance_half(&mut self, second: bool, instances: &mut [Instance]) -> Result {
         let start = Clock::now();
         self.at.trial += 1;
         for side in self.bodies.iter_mut().filter(|s| s.is_second() == second) {
             let instance = &mut instances[side.slot];
             side.advance_under_force(instance, &self.nodes, &self.at, &self.t, None, Answer::default())?;
-            side.motion_by_side(
-                [&mut self.x1, &mut self.v1, &mut self.a1],
-                [&mut self.x2, &mut self.v2, &mut self.a2],
-            );
+            side.motion_by_side(self.first.parts(), self.second.parts());
         }
         if second {
             self.report.evaluations_soil += 1;
@@ -113,17 +108,20 @@ impl InterfaceProblem {
     }
 
     /// A trial of all of side 2 under the motion X1: the wrench that it takes goes to `f`.
+    ///
+    /// # Errors
+    /// A member that fails, or ends a trial early.
     pub fn advance_second_under_motion(&mut self, instances: &mut [Instance]) -> Result {
         let start = Clock::now();
         // side 2 of a joint counts its motion from its own point
         self.work.clear();
-        self.work.extend(self.x1.iter().zip(&self.gap).map(|(x, gap)| x + gap));
-        let partner = (self.work.as_slice(), self.v1.as_slice());
+        self.work.extend(self.first.x.iter().zip(&self.conditions.gap).map(|(x, gap)| x + gap));
+        let partner = (self.work.as_slice(), self.first.v.as_slice());
         for side in self.bodies.iter_mut().filter(|s| s.is_second()).chain(&mut self.grounds) {
-            let out = Answer { t: Some(&mut self.f), ..Answer::default() };
+            let out = Answer { t: Some(&mut self.law.last), ..Answer::default() };
             side.advance_under_motion(&mut instances[side.slot], &self.nodes, &self.at, partner, out)?;
         }
-        self.x2.copy_from_slice(&self.work);
+        self.second.x.copy_from_slice(&self.work);
         self.report.evaluations_soil += 1;
         self.timings.charge(Part::Grounds, start);
         Ok(())
@@ -133,7 +131,7 @@ impl InterfaceProblem {
     /// report takes its ratio to the one `before` and its part of T_ref.
     pub fn force_residual(&mut self, miss: &mut Vec<f64>, before: f64) -> f64 {
         miss.clear();
-        miss.extend(self.f.iter().zip(&self.t).map(|(f, t)| f - t));
+        miss.extend(self.law.last.iter().zip(&self.t).map(|(f, t)| f - t));
         let size = max_norm(miss);
         self.report.contraction = size / before;
         self.report.residual = size / self.t_ref;
@@ -141,6 +139,9 @@ impl InterfaceProblem {
     }
 
     /// G1 = dX1/dT of side 1 at its last trial into `estimate.g`, by forward differences where a module has none.
+    ///
+    /// # Errors
+    /// A member that fails, or ends a trial early.
     pub fn linearise_first(&mut self, instances: &mut [Instance]) -> Result {
         self.take_differences(Derivatives::Analytic, |side| !side.is_second(), instances)?;
         self.estimate.g.fill(0.0);
@@ -154,6 +155,9 @@ impl InterfaceProblem {
 
     /// K = dF/dX of side 2 after a trial under motion, n × n, column-major, signed so that it grows with the force
     /// that resists: dT/dX1 = −K. By forward differences where a module has none.
+    ///
+    /// # Errors
+    /// A member that fails, or ends a trial early.
     pub fn second_stiffness(&mut self, instances: &mut [Instance], out: &mut Vec<f64>) -> Result {
         let n = self.n();
         out.clear();

@@ -50,7 +50,7 @@ impl Strategy for Jacobi {
         self.next.clear();
         for k in 0..problem.ports.len() {
             let port = problem.ports[k];
-            if problem.rows[port.first as usize] == ConstraintKind::Joint {
+            if problem.conditions.kinds[port.first as usize] == ConstraintKind::Joint {
                 continue;
             }
             let mut now = [0.0; 6];
@@ -61,7 +61,7 @@ impl Strategy for Jacobi {
         }
         std::mem::swap(&mut self.delayed, &mut self.next);
         problem.advance_bodies(instances)?;
-        problem.follow_bodies();
+        problem.second.follow(&problem.first, &problem.conditions.kinds);
         Ok(super::single_pass(problem))
     }
 }

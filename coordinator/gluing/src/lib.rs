@@ -16,11 +16,13 @@
 struct Readme;
 
 mod complementarity;
+mod component;
+mod conditions;
 pub mod contact;
 pub mod cooperative;
 pub mod cooperative_compliant;
 mod derivatives;
-mod eigen;
+mod differences;
 mod estimate;
 mod follow;
 pub mod gauss_seidel;
@@ -30,7 +32,6 @@ mod halves;
 mod interface_problem;
 pub mod iterative;
 pub mod jacobi;
-mod linear;
 pub mod memory;
 pub mod monolithic;
 mod participant;
@@ -44,8 +45,11 @@ pub mod step_control;
 #[cfg(test)]
 mod tests;
 pub mod timing;
+mod trials;
 pub mod xt_newton;
 
+pub use component::{Component, PassedEnergy};
+pub use conditions::Conditions;
 pub use derivatives::Derivatives;
 pub use glue::{ConstraintKind, Glue};
 pub use group_estimate::GroupEstimate;
@@ -54,6 +58,7 @@ pub use participant::StepContext;
 pub use refusal::{Refusal, refusal};
 use refusal::{body_contacts_refused, joints_refused, rigid_refused, second_refused};
 pub use report::{PortReport, StepReport};
+pub use trials::{LawWrenches, SideMotion};
 
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
@@ -63,7 +68,7 @@ use terraglue_subsystem::Capabilities;
 /// How a strategy ended a step. Nothing is committed before it says `Converged`.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
-    /// `InterfaceProblem::t`, `x1` and `x2` hold what is to be committed.
+    /// `t`, `first` and `second` of the [`InterfaceProblem`] are to be committed.
     Converged,
     /// The step may be repeated with half the length.
     NotConverged(String),
@@ -105,6 +110,10 @@ pub trait Strategy: Send {
     fn recall(&mut self, _kept: &mut memory::Recall) {}
 
     /// Finds the wrenches of the step.
+    ///
+    /// # Errors
+    /// A member that fails. [`Error::Early`](terraglue_diagnostics::Error::Early): a member ended its step early; the testbed
+    /// repeats a shorter one.
     fn solve(&mut self, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result<Outcome>;
 }
 
@@ -133,8 +142,8 @@ pub fn start(spec: &GluingSpec) -> Box<dyn Strategy> {
 /// The end of a pass that does not ask whether it converged.
 fn single_pass(problem: &mut InterfaceProblem) -> Outcome {
     problem.report.converged = true;
-    for i in (0..problem.n()).filter(|i| problem.rows[*i] == ConstraintKind::Joint) {
-        problem.report.max_gap_m = problem.report.max_gap_m.max(problem.joint_gap(i));
+    for i in (0..problem.n()).filter(|i| problem.conditions.kinds[*i] == ConstraintKind::Joint) {
+        problem.report.max_gap_m = problem.report.max_gap_m.max(problem.component(i).joint_gap());
     }
     Outcome::Converged
 }

@@ -9,10 +9,10 @@
 //! the residual falls (Qi and Sun 1993).
 
 use super::interface_problem::InterfaceProblem;
-use super::linear::{Lu, max_norm};
 use super::{ConstraintKind, Needs, Outcome, Strategy};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
+use terraglue_numerics::dense::{Lu, max_norm};
 use terraglue_scenario::GluingSpec;
 use terraglue_subsystem::{Capabilities, Port};
 
@@ -120,9 +120,9 @@ impl Monolithic {
 /// Distance at t + h, m; at h = 0 the difference of the accelerations.
 fn gap(problem: &InterfaceProblem, i: usize) -> f64 {
     if problem.at.h == 0.0 {
-        problem.a1[i] - problem.a2[i]
+        problem.first.a[i] - problem.second.a[i]
     } else {
-        problem.x1[i] - problem.x2[i] + problem.gap[i]
+        problem.first.x[i] - problem.second.x[i] + problem.conditions.gap[i]
     }
 }
 
@@ -132,12 +132,15 @@ fn rows(port: &Port, problem: &InterfaceProblem, motion: bool, scale: &[f64], ou
     let mut slip = [0.0; 2];
     for (i, c) in port.components() {
         let t = problem.t[i];
-        out[i] = match problem.rows[i] {
+        out[i] = match problem.conditions.kinds[i] {
             ConstraintKind::Joint => {
-                let (k, rate) = (port.law.compliance, problem.v1[i] - problem.v2[i]);
-                let apart =
-                    if k > 0.0 { problem.x1[i] - problem.x2[i] + problem.gap[i] } else { gap(problem, i) };
-                (apart + k * (t + problem.damping[i] * rate)) / (scale[i] + k)
+                let (k, rate) = (port.law.compliance, problem.first.v[i] - problem.second.v[i]);
+                let apart = if k > 0.0 {
+                    problem.first.x[i] - problem.second.x[i] + problem.conditions.gap[i]
+                } else {
+                    gap(problem, i)
+                };
+                (apart + k * (t + problem.conditions.damping[i] * rate)) / (scale[i] + k)
             }
             ConstraintKind::Normal if !motion => {
                 let w = gap(problem, i) / scale[i];
@@ -147,13 +150,13 @@ fn rows(port: &Port, problem: &InterfaceProblem, motion: bool, scale: &[f64], ou
                 slip[c - 1] = t - gap(problem, i) / scale[i];
                 t
             }
-            ConstraintKind::Normal | ConstraintKind::Law => t - problem.f[i],
+            ConstraintKind::Normal | ConstraintKind::Law => t - problem.law.last[i],
         };
     }
     // Coulomb: T_t − projection of T_t − e_t/s on the disc of radius μ·T_n
     let (size, radius) = (slip[0].hypot(slip[1]), port.law.mu * problem.t[normal].max(0.0));
     let share = if size > radius { radius / size } else { 1.0 };
-    for (i, c) in port.components().filter(|(i, _)| problem.rows[*i] == ConstraintKind::Coulomb) {
+    for (i, c) in port.components().filter(|(i, _)| problem.conditions.kinds[*i] == ConstraintKind::Coulomb) {
         out[i] -= share * slip[c - 1];
     }
 }
@@ -204,24 +207,7 @@ impl Monolithic {
             self.d.extend(self.kept.iter().map(|r| -r));
             self.lu.solve(&mut self.d);
             let before = size;
-            let mut share = 1.0;
-            let mut refused = None;
-            for _ in 0..=MAX_HALVINGS {
-                for ((t, base), d) in problem.t.iter_mut().zip(&self.base).zip(&self.d) {
-                    *t = base + share * d;
-                }
-                // A body may refuse forces as wild as those of a long step: a shorter one is tried.
-                let trial = self.evaluate(problem, instances);
-                size = *trial.as_ref().unwrap_or(&f64::INFINITY);
-                refused = trial.err();
-                if size < before {
-                    break;
-                }
-                share *= 0.5;
-            }
-            if let Some(error) = refused {
-                return Err(error);
-            }
+            size = self.halve_until_better(before, problem, instances)?;
             if !(size < before) {
                 // rounding: go back to the better one
                 problem.t.clone_from(&self.base);
@@ -233,10 +219,40 @@ impl Monolithic {
         if !(size <= 1e-7 * problem.t_ref.max(max_norm(&problem.t))) {
             return Ok(Outcome::NotConverged(format!("monolithic: residual {size:.3e} N")));
         }
+        self.measure_gap(problem);
+        problem.report.converged = true;
+        Ok(Outcome::Converged)
+    }
+
+    /// Takes the step in `d` from `base`, halved until less than `before` is left; what is left.
+    fn halve_until_better(
+        &mut self,
+        before: f64,
+        problem: &mut InterfaceProblem,
+        instances: &mut [Instance],
+    ) -> Result<f64> {
+        let mut share = 1.0;
+        let mut last = Ok(before);
+        for _ in 0..=MAX_HALVINGS {
+            for ((t, base), d) in problem.t.iter_mut().zip(&self.base).zip(&self.d) {
+                *t = base + share * d;
+            }
+            // a body may refuse forces as wild as those of a long step: a shorter one is tried
+            last = self.evaluate(problem, instances);
+            if last.as_ref().is_ok_and(|size| *size < before) {
+                break;
+            }
+            share *= 0.5;
+        }
+        last
+    }
+
+    /// The largest gap that is left goes to the report.
+    fn measure_gap(&self, problem: &mut InterfaceProblem) {
         for port in &problem.ports {
             let i = port.first as usize;
-            let apart = problem.joint_gap(i);
-            let left = match problem.rows[i] {
+            let apart = problem.component(i).joint_gap();
+            let left = match problem.conditions.kinds[i] {
                 ConstraintKind::Joint => apart,
                 // the soil's surface follows the foot
                 _ if self.motion => 0.0,
@@ -245,7 +261,5 @@ impl Monolithic {
             };
             problem.report.max_gap_m = problem.report.max_gap_m.max(left);
         }
-        problem.report.converged = true;
-        Ok(Outcome::Converged)
     }
 }

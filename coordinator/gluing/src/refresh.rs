@@ -74,7 +74,7 @@ impl Refresh {
         self.g.clone_from(&problem.estimate.g);
         self.t.clone_from(&problem.t);
         self.motion.clear();
-        self.motion.extend((0..problem.n()).map(|i| problem.bodies_part(i)));
+        self.motion.extend((0..problem.n()).map(|i| problem.component(i).bodies_part()));
         Ok(())
     }
 
@@ -126,7 +126,7 @@ impl Refresh {
             let size: f64 = self.change.iter().map(|d| d * d).sum();
             for row in 0..n {
                 let predicted: f64 = (0..n).map(|c| self.g[c * n + row] * self.change[c]).sum();
-                let missing = problem.bodies_part(row) - self.motion[row] - predicted;
+                let missing = problem.component(row).bodies_part() - self.motion[row] - predicted;
                 for c in (0..n).filter(|_| size > 0.0) {
                     self.g[c * n + row] += missing * self.change[c] / size;
                 }

@@ -128,6 +128,12 @@ impl StepReport {
         self.jacobian_refreshes += other.jacobian_refreshes;
     }
 
+    /// A trial of side 2 that was counted as an evaluation served a difference.
+    pub(super) fn count_soil_difference(&mut self) {
+        self.evaluations_soil -= 1;
+        self.evaluations_jacobian += 1;
+    }
+
     /// Back to zero; the storage for ports stays.
     pub fn clear(&mut self) {
         let mut ports = std::mem::take(&mut self.ports);

@@ -61,14 +61,14 @@ impl Passage {
         for port in &problem.ports {
             let mut passed = PortPassage { key: port.key, count: port.len(), values: [[0.0; 5]; 6] };
             for (k, i) in port.range().enumerate() {
-                let (t1, x1) = (problem.t[i], problem.x1[i]);
-                passed.values[k] = match problem.rows[i] {
+                let (t1, x1) = (problem.t[i], problem.first.x[i]);
+                passed.values[k] = match problem.conditions.kinds[i] {
                     ConstraintKind::Normal | ConstraintKind::Law if problem.has_grounds() => {
                         [self.law[i], t1, 0.0, x1, 0.0]
                     }
-                    ConstraintKind::Joint if problem.compliance[i] > 0.0 => {
+                    ConstraintKind::Joint if problem.conditions.compliance[i] > 0.0 => {
                         let t2 = problem.t_second.get(i).copied().unwrap_or(t1);
-                        [self.law[i], t1, t2, x1, problem.x2[i]]
+                        [self.law[i], t1, t2, x1, problem.second.x[i]]
                     }
                     // a constraint has no law of its own: what it lets pass is equal on both sides
                     _ => [0.0; 5],

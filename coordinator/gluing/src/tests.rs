@@ -216,7 +216,7 @@ fn run(spec: &GluingSpec, factor: f64, h: f64, rock: bool) -> (f64, u32, f64, f6
         assert_eq!(outcome, Outcome::Converged, "step {index} {:?}", problem.report);
         problem.commit(&mut instances).expect("commit");
         // the mean of the feet without offset is the heave at the table's centre
-        heave -= (0..6).map(|i| problem.x1[i]).sum::<f64>() / 6.0;
+        heave -= (0..6).map(|i| problem.first.x[i]).sum::<f64>() / 6.0;
         let report = &problem.report;
         assert!(strategy.name() == cooperative::NAME || report.evaluations_bodies <= 4, "{report:?}");
         let evaluations = report.evaluations_soil.max(1);

@@ -5,10 +5,10 @@
 
 use super::interface_problem::InterfaceProblem;
 use super::iterative::Limits;
-use super::linear::{Lu, multiply_add};
 use super::{Needs, Outcome, Strategy};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
+use terraglue_numerics::dense::{Lu, multiply_add};
 use terraglue_scenario::GluingSpec;
 use terraglue_subsystem::Capabilities;
 

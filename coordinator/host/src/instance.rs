@@ -1,9 +1,8 @@
 //! An instance under supervision: answers are checked, failures get name, function and time.
 
 use super::check;
-use super::crash::{self, Names};
 use super::elements::Elements;
-use std::cell::Cell;
+use super::supervision::Supervision;
 use std::time::{Duration, Instant as Clock};
 use terraglue_diagnostics::error::{Error, Result};
 use terraglue_subsystem::{
@@ -35,11 +34,8 @@ pub enum Reply {
 /// A subsystem of a run. What no step asks for lies apart: the cost of many cheap subsystems is that of their memory.
 pub struct Instance {
     subsystem: Box<dyn Subsystem>,
-    time_s: Cell<f64>,
-    dead: Cell<bool>,
-    /// Whether its calls are timed, and what they took.
-    watched: bool,
-    cost: Duration,
+    supervision: Supervision,
+    watch: CallWatch,
     kind: Kind,
     /// Whether variables are arrays.
     arrays: bool,
@@ -48,17 +44,36 @@ pub struct Instance {
 
 /// What an instance is.
 struct InstanceInfo {
-    names: Names,
     capabilities: Capabilities,
     scene: Scene,
     elements: Option<Elements>,
+}
+
+/// Times calls once it was started.
+#[derive(Default)]
+struct CallWatch {
+    runs: bool,
+    cost: Duration,
+}
+
+impl CallWatch {
+    #[inline]
+    fn begin(&self) -> Option<Clock> {
+        self.runs.then(Clock::now)
+    }
+
+    #[inline]
+    fn charge(&mut self, start: Option<Clock>) {
+        if let Some(start) = start {
+            self.cost += start.elapsed();
+        }
+    }
 }
 
 impl Instance {
     /// Takes a subsystem under supervision; `name` is that of the scenario.
     pub fn new(name: &str, module: &str, kind: Kind, subsystem: Box<dyn Subsystem>) -> Self {
         let about = InstanceInfo {
-            names: Names { instance: name.to_owned(), module: module.to_owned() },
             capabilities: subsystem.capabilities(),
             scene: subsystem.scene(),
             elements: Elements::of(subsystem.variables()),
@@ -68,38 +83,24 @@ impl Instance {
             about: Box::new(about),
             kind,
             subsystem,
-            time_s: Cell::new(0.0),
-            dead: Cell::new(false),
-            watched: false,
-            cost: Duration::ZERO,
+            supervision: Supervision::new(name, module),
+            watch: CallWatch::default(),
         }
     }
 
     /// Times its calls from now on.
     pub fn watch(&mut self) {
-        self.watched = true;
+        self.watch.runs = true;
     }
 
     /// Counts what its calls take from here on.
     pub fn forget_cost(&mut self) {
-        self.cost = Duration::ZERO;
+        self.watch.cost = Duration::ZERO;
     }
 
     /// What its calls in steps took while it was watched.
     pub fn cost(&self) -> Duration {
-        self.cost
-    }
-
-    #[inline]
-    fn begin(&self) -> Option<Clock> {
-        self.watched.then(Clock::now)
-    }
-
-    #[inline]
-    fn charge(&mut self, start: Option<Clock>) {
-        if let Some(start) = start {
-            self.cost += start.elapsed();
-        }
+        self.watch.cost
     }
 
     /// The same around the subsystem that `wrap` makes of it.
@@ -110,12 +111,12 @@ impl Instance {
 
     /// Name in the scenario.
     pub fn name(&self) -> &str {
-        &self.about.names.instance
+        &self.supervision.names().instance
     }
 
     /// Module name.
     pub fn module(&self) -> &str {
-        &self.about.names.module
+        &self.supervision.names().module
     }
 
     /// Kind.
@@ -141,74 +142,32 @@ impl Instance {
     /// An error of this instance in a function of the interface at the last time it was called with, s.
     #[cold]
     pub fn error(&self, function: &'static str, message: impl Into<String>) -> Error {
-        Error::Module {
-            subsystem: self.about.names.instance.clone(),
-            module: self.about.names.module.clone(),
-            function,
-            time_s: self.time_s.get(),
-            message: message.into(),
-        }
-    }
-
-    #[cold]
-    fn failed(&self, function: &'static str, failure: Failure) -> Error {
-        let text = match failure {
-            Failure::Fatal(text) => {
-                self.dead.set(true);
-                text
-            }
-            other => other.to_string(),
-        };
-        self.error(function, text)
+        self.supervision.error(function, message)
     }
 
     /// Whether it failed for good.
     pub fn has_failed(&self) -> bool {
-        self.dead.get()
-    }
-
-    /// Whether it may still be called.
-    #[inline]
-    fn alive(&self, function: &'static str) -> Result {
-        match self.dead.get() {
-            true => Err(self.is_dead(function)),
-            false => {
-                crash::note(&self.about.names, function, self.time_s.get());
-                Ok(())
-            }
-        }
-    }
-
-    #[cold]
-    fn is_dead(&self, function: &'static str) -> Error {
-        self.error(function, "not called: it failed for good before")
-    }
-
-    #[inline]
-    fn outcome<T>(&self, function: &'static str, result: terraglue_subsystem::Result<T>) -> Result<T> {
-        result.map_err(|failure| self.failed(function, failure))
-    }
-
-    #[inline]
-    fn all_finite(&self, function: &'static str, wrong: Option<String>) -> Result {
-        wrong.map_or(Ok(()), |text| Err(self.error(function, text)))
+        self.supervision.has_failed()
     }
 
     /// Paper, step 1. X and V must be answered, by a soil T too.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or an answer or law is not finite.
     pub fn set_ports(&mut self, step: &Step, laws: &mut [Law], now: &mut Response) -> Result {
         const NAME: &str = "set_ports";
-        self.time_s.set(step.t);
-        self.alive(NAME)?;
+        self.supervision.time_s.set(step.t);
+        self.supervision.alive(NAME)?;
         prepare(now);
         (now.reached, now.flags) = (step.t + step.h, 0);
-        let start = self.begin();
+        let start = self.watch.begin();
         let result = self.subsystem.set_ports(step, laws, now);
-        self.charge(start);
-        self.outcome(NAME, result)?;
-        self.all_finite(NAME, check::packed(step, "x", now.x))?;
-        self.all_finite(NAME, check::packed(step, "v", now.v))?;
+        self.watch.charge(start);
+        self.supervision.outcome(NAME, result)?;
+        self.supervision.all_finite(NAME, check::packed(step, "x", now.x))?;
+        self.supervision.all_finite(NAME, check::packed(step, "v", now.v))?;
         if self.kind == Kind::Soil {
-            self.all_finite(NAME, check::packed(step, "t", now.t))?;
+            self.supervision.all_finite(NAME, check::packed(step, "t", now.t))?;
         }
         match laws.iter().position(|l| l.mu.is_nan() || l.t_min.is_nan() || l.t_max.is_nan()) {
             Some(p) => Err(self.error(NAME, format!("the law of port {p} is NaN"))),
@@ -217,28 +176,34 @@ impl Instance {
     }
 
     /// Paper, step 2.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or an answer is not finite.
     pub fn estimate_forces(&mut self, step: &Step, partner: &Motion, out: &mut Estimate) -> Result<Progress> {
         const NAME: &str = "estimate_forces";
-        self.time_s.set(step.t);
-        self.alive(NAME)?;
+        self.supervision.time_s.set(step.t);
+        self.supervision.alive(NAME)?;
         for vector in [&mut *out.t_star, &mut *out.x_free, &mut *out.g] {
             vector.fill(f64::NAN);
         }
         out.active.fill(0);
-        let start = self.begin();
+        let start = self.watch.begin();
         let result = self.subsystem.estimate_forces(step, partner, out);
-        self.charge(start);
+        self.watch.charge(start);
         match result {
-            Err(Failure::Discard { reached }) => return self.early(NAME, step, reached),
-            result => self.outcome(NAME, result)?,
+            Err(Failure::Discard { reached }) => return early(&self.supervision, NAME, step, reached),
+            result => self.supervision.outcome(NAME, result)?,
         }
-        self.all_finite(NAME, check::packed(step, "t_star", out.t_star))?;
-        self.all_finite(NAME, check::packed(step, "x_free", out.x_free))?;
-        self.all_finite(NAME, check::matrix(step.n as usize, "g", out.g))?;
+        self.supervision.all_finite(NAME, check::packed(step, "t_star", out.t_star))?;
+        self.supervision.all_finite(NAME, check::packed(step, "x_free", out.x_free))?;
+        self.supervision.all_finite(NAME, check::matrix(step.n as usize, "g", out.g))?;
         Ok(Progress::Complete)
     }
 
     /// Paper, step 3.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or an answer is not finite.
     pub fn solve_compatibility(
         &mut self,
         step: &Step,
@@ -249,35 +214,41 @@ impl Instance {
     }
 
     /// Paper, steps 3 and 4.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or an answer is not finite.
     #[inline]
     pub fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result<Progress> {
         self.trial("advance", step, out, |s, out| s.advance(step, input, out))
     }
 
     /// Trials under several wrenches in one exchange.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or an answer is not finite.
     pub fn advance_batch(&mut self, step: &Step, t: &[f64], out: &mut Batch) -> Result<Progress> {
         const NAME: &str = "advance_batch";
-        self.time_s.set(step.t);
-        self.alive(NAME)?;
+        self.supervision.time_s.set(step.t);
+        self.supervision.alive(NAME)?;
         for vector in [&mut *out.x, &mut *out.v, &mut *out.a, &mut *out.t] {
             vector.fill(f64::NAN);
         }
         out.reached = step.t + step.h;
-        let start = self.begin();
+        let start = self.watch.begin();
         let result = self.subsystem.advance_batch(step, t, out);
-        self.charge(start);
+        self.watch.charge(start);
         match result {
-            Err(Failure::Discard { reached }) => return self.early(NAME, step, reached),
-            result => self.outcome(NAME, result)?,
+            Err(Failure::Discard { reached }) => return early(&self.supervision, NAME, step, reached),
+            result => self.supervision.outcome(NAME, result)?,
         }
         for (vector, values) in [("x", &*out.x), ("v", &*out.v), ("a", &*out.a)] {
             for values in values.chunks_exact((step.n as usize).max(1)) {
-                self.all_finite(NAME, check::packed(step, vector, values))?;
+                self.supervision.all_finite(NAME, check::packed(step, vector, values))?;
             }
         }
         let end = step.t + step.h;
         if out.reached < end - 1e-9 * step.h || out.reached.is_nan() {
-            return self.early(NAME, step, out.reached);
+            return early(&self.supervision, NAME, step, out.reached);
         }
         Ok(Progress::Complete)
     }
@@ -291,16 +262,16 @@ impl Instance {
         out: &mut Response,
         call: impl FnOnce(&mut dyn Subsystem, &mut Response) -> terraglue_subsystem::Result,
     ) -> Result<Progress> {
-        self.time_s.set(step.t);
-        self.alive(name)?;
+        self.supervision.time_s.set(step.t);
+        self.supervision.alive(name)?;
         let end = step.t + step.h;
         (out.reached, out.flags) = (end, 0);
         if step.n != 0 {
             prepare(out);
         }
-        let start = self.begin();
+        let start = self.watch.begin();
         let result = call(self.subsystem.as_mut(), out);
-        self.charge(start);
+        self.watch.charge(start);
         if result.is_err() || step.n != 0 || out.reached.is_nan() || out.reached < end - 1e-9 * step.h {
             return self.look_at(name, step, result, out);
         }
@@ -318,79 +289,88 @@ impl Instance {
     ) -> Result<Progress> {
         if let Err(Failure::Discard { reached }) = result {
             out.reached = reached;
-            return self.early(name, step, reached);
+            return early(&self.supervision, name, step, reached);
         }
-        self.outcome(name, result)?;
+        self.supervision.outcome(name, result)?;
         let answers = [("x", &*out.x), ("v", &*out.v), ("a", &*out.a), ("t", &*out.t)];
         for (vector, values) in answers.into_iter().filter(|_| step.n != 0) {
-            self.all_finite(name, check::packed(step, vector, values))?;
+            self.supervision.all_finite(name, check::packed(step, vector, values))?;
         }
         match out.reached >= step.t + step.h - 1e-9 * step.h {
             true => Ok(Progress::Complete),
-            false => self.early(name, step, out.reached),
+            false => early(&self.supervision, name, step, out.reached),
         }
-    }
-
-    #[cold]
-    fn early(&self, name: &'static str, step: &Step, reached: f64) -> Result<Progress> {
-        if reached > step.t && reached < step.t + step.h {
-            return Ok(Progress::Early { reached_s: reached });
-        }
-        let message = format!("ended early at t = {reached} s, outside the step of h = {} s", step.h);
-        Err(self.error(name, message))
     }
 
     /// Derivatives at the last trial.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or a derivative is not finite.
     pub fn interface_jacobian(&mut self, step: &Step, level: Level, out: &mut [f64]) -> Result {
         const NAME: &str = "interface_jacobian";
-        self.alive(NAME)?;
+        self.supervision.alive(NAME)?;
         out.fill(f64::NAN);
-        let start = self.begin();
+        let start = self.watch.begin();
         let result = self.subsystem.interface_jacobian(step, level, out);
-        self.charge(start);
-        self.outcome(NAME, result)?;
-        self.all_finite(NAME, check::matrix(step.n as usize, "the derivative", out))
+        self.watch.charge(start);
+        self.supervision.outcome(NAME, result)?;
+        self.supervision.all_finite(NAME, check::matrix(step.n as usize, "the derivative", out))
     }
 
     /// Paper, step 5.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before.
     #[inline]
     pub fn commit(&mut self, step: &Step, t: &[f64], partner: &Motion) -> Result {
-        self.alive("commit")?;
-        let start = self.begin();
+        self.supervision.alive("commit")?;
+        let start = self.watch.begin();
         let result = self.subsystem.commit(step, t, partner);
-        self.charge(start);
+        self.watch.charge(start);
         if let Err(failure) = result {
-            return Err(self.failed("commit", failure));
+            return Err(self.supervision.failed("commit", failure));
         }
-        self.time_s.set(step.t + step.h);
+        self.supervision.time_s.set(step.t + step.h);
         Ok(())
     }
 
     /// The committed state into a numbered slot.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or it cannot keep its state.
     pub fn save_state(&mut self, slot: u32) -> Result {
-        self.alive("save_state")?;
+        self.supervision.alive("save_state")?;
         let result = self.subsystem.save_state(slot);
-        self.outcome("save_state", result)
+        self.supervision.outcome("save_state", result)
     }
 
     /// Back to the state of a slot.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or nothing was kept in the slot.
     pub fn restore_state(&mut self, slot: u32) -> Result {
-        self.alive("restore_state")?;
+        self.supervision.alive("restore_state")?;
         let result = self.subsystem.restore_state(slot);
-        self.outcome("restore_state", result)
+        self.supervision.outcome("restore_state", result)
     }
 
     /// The committed state as bytes.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or it cannot give its state as bytes.
     pub fn serialize(&self) -> Result<Vec<u8>> {
-        self.alive("serialize")?;
-        self.outcome("serialize", self.subsystem.serialize())
+        self.supervision.alive("serialize")?;
+        self.supervision.outcome("serialize", self.subsystem.serialize())
     }
 
     /// Back to a state made by `serialize`.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or the bytes are no state of it.
     pub fn deserialize(&mut self, bytes: &[u8]) -> Result {
-        self.alive("deserialize")?;
+        self.supervision.alive("deserialize")?;
         let result = self.subsystem.deserialize(bytes);
-        self.outcome("deserialize", result)
+        self.supervision.outcome("deserialize", result)
     }
 
     /// All variables; an array is shown as its elements.
@@ -410,6 +390,9 @@ impl Instance {
     }
 
     /// Committed values as they are.
+    ///
+    /// # Errors
+    /// What the subsystem answers: an unknown variable, another type.
     #[inline]
     pub fn peek(&self, ids: &[u32], out: ValuesMut) -> terraglue_subsystem::Result {
         match self.elements() {
@@ -419,45 +402,34 @@ impl Instance {
     }
 
     /// Committed values. Numbers that are not finite are an error.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or a value is NaN.
     #[inline]
     pub fn get(&self, ids: &[u32], out: ValuesMut) -> Result {
-        self.alive("get")?;
-        let ValuesMut::F64(values) = out else { return self.outcome("get", self.peek(ids, out)) };
+        self.supervision.alive("get")?;
+        let ValuesMut::F64(values) = out else { return self.supervision.outcome("get", self.peek(ids, out)) };
         match &mut *values {
             [value] => *value = f64::NAN,
             all => all.fill(f64::NAN),
         }
         if let Err(failure) = self.peek(ids, ValuesMut::F64(values)) {
-            return Err(self.failed("get", failure));
+            return Err(self.supervision.failed("get", failure));
         }
         match values.iter().position(|v| v.is_nan()) {
-            Some(k) => Err(self.is_nan(ids, k)),
+            Some(k) => Err(self.error("get", nan_variable(self, ids, k))),
             None => Ok(()),
         }
     }
 
-    #[cold]
-    fn is_nan(&self, ids: &[u32], element: usize) -> Error {
-        self.error("get", self.nan_variable(ids, element))
-    }
-
-    fn nan_variable(&self, ids: &[u32], element: usize) -> String {
-        let mut first = 0;
-        for id in ids {
-            let mut all = self.variables().iter().chain(self.subsystem.variables());
-            let Some(variable) = all.find(|v| v.id == *id) else { break };
-            first += variable.len();
-            if element < first {
-                return format!("the variable `{}` is NaN", variable.name);
-            }
-        }
-        format!("value {element} is NaN")
-    }
-
     /// New values, or why not.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before; values that it does not accept are
+    /// [`Reply::Refused`].
     #[inline]
     pub fn set(&mut self, ids: &[u32], values: Values) -> Result<Reply> {
-        self.alive("set")?;
+        self.supervision.alive("set")?;
         let result = if self.arrays
             && let Some(elements) = &self.about.elements
         {
@@ -465,13 +437,16 @@ impl Instance {
         } else {
             self.subsystem.set(ids, values)
         };
-        self.reply("set", result)
+        reply(&self.supervision, "set", result)
     }
 
     /// d(unknowns)/d(known) of f64 variables where the subsystem knows it; false where it must be tried.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before.
     pub fn derivative(&self, unknowns: &[u32], known: u32, out: &mut [f64]) -> Result<bool> {
         const NAME: &str = "directional_derivative";
-        self.alive(NAME)?;
+        self.supervision.alive(NAME)?;
         let mut of_element = unknowns.iter().chain([&known]);
         if self.elements().is_some_and(|e| of_element.any(|id| e.has(*id))) {
             return Ok(false);
@@ -480,7 +455,7 @@ impl Instance {
         match self.subsystem.directional_derivative(unknowns, &[known], &[1.0], out) {
             Err(Failure::Unsupported) => Ok(false),
             result => {
-                self.outcome(NAME, result)?;
+                self.supervision.outcome(NAME, result)?;
                 Ok(out.iter().all(|x| x.is_finite()))
             }
         }
@@ -492,40 +467,34 @@ impl Instance {
     }
 
     /// Does an action; `arguments` is a JSON object.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before; an action that it does not accept is
+    /// [`Reply::Refused`].
     pub fn act(&mut self, action: &str, arguments: &str) -> Result<Reply> {
-        self.alive("act")?;
+        self.supervision.alive("act")?;
         let result = self.subsystem.act(action, arguments);
-        self.reply("act", result)
-    }
-
-    #[inline]
-    fn reply(&self, function: &'static str, result: terraglue_subsystem::Result) -> Result<Reply> {
-        match result {
-            Ok(()) => Ok(Reply::Accepted),
-            Err(failure) => self.not_accepted(function, failure),
-        }
-    }
-
-    #[cold]
-    fn not_accepted(&self, function: &'static str, failure: Failure) -> Result<Reply> {
-        match failure {
-            Failure::Refused(reason) => Ok(Reply::Refused(reason)),
-            failure => Err(self.failed(function, failure)),
-        }
+        reply(&self.supervision, "act", result)
     }
 
     /// Time of the next event known beforehand, s; ∞: none.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or the time is NaN.
     pub fn next_event_time(&self) -> Result<f64> {
-        self.alive("next_event_time")?;
+        self.supervision.alive("next_event_time")?;
         let t = self.subsystem.next_event_time();
         if t.is_nan() { Err(self.error("next_event_time", "answered NaN")) } else { Ok(t) }
     }
 
     /// Committed states of the bodies; all must be finite.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or a state is not finite.
     pub fn body_states(&self, out: &mut [BodyState]) -> Result {
-        self.alive("body_states")?;
+        self.supervision.alive("body_states")?;
         let result = self.subsystem.body_states(out);
-        self.outcome("body_states", result)?;
+        self.supervision.outcome("body_states", result)?;
         let numbers = |s: &BodyState| {
             let pose = s.world_from_body;
             let all = pose.position.into_iter().chain(pose.orientation).chain(s.linear_velocity);
@@ -546,14 +515,20 @@ impl Instance {
     }
 
     /// A tile of a field.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or there is no such tile.
     pub fn field_tile(&self, field: usize, a: u32, b: u32) -> Result<FieldTile<'_>> {
-        self.alive("field_tile")?;
-        self.outcome("field_tile", self.subsystem.field_tile(field, a, b))
+        self.supervision.alive("field_tile")?;
+        self.supervision.outcome("field_tile", self.subsystem.field_tile(field, a, b))
     }
 
     /// Energies of the committed state; what is unknown is not a number.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: the subsystem failed, or failed for good before, or an energy is infinite.
     pub fn energy(&self) -> Result<Energy> {
-        self.alive("energy")?;
+        self.supervision.alive("energy")?;
         let e = self.subsystem.energy();
         let all = [e.kinetic, e.potential, e.dissipated, e.port_work, e.actuator_work, e.electrical];
         if all.iter().all(|v| !v.is_infinite()) {
@@ -563,10 +538,49 @@ impl Instance {
     }
 }
 
-impl Drop for InstanceInfo {
-    fn drop(&mut self) {
-        crash::forget(&self.names);
+/// A trial that ended before the end of its step.
+#[cold]
+fn early(supervision: &Supervision, name: &'static str, step: &Step, reached: f64) -> Result<Progress> {
+    if reached > step.t && reached < step.t + step.h {
+        return Ok(Progress::Early { reached_s: reached });
     }
+    let message = format!("ended early at t = {reached} s, outside the step of h = {} s", step.h);
+    Err(supervision.error(name, message))
+}
+
+#[inline]
+fn reply(
+    supervision: &Supervision,
+    function: &'static str,
+    result: terraglue_subsystem::Result,
+) -> Result<Reply> {
+    match result {
+        Ok(()) => Ok(Reply::Accepted),
+        Err(failure) => not_accepted(supervision, function, failure),
+    }
+}
+
+#[cold]
+fn not_accepted(supervision: &Supervision, function: &'static str, failure: Failure) -> Result<Reply> {
+    match failure {
+        Failure::Refused(reason) => Ok(Reply::Refused(reason)),
+        failure => Err(supervision.failed(function, failure)),
+    }
+}
+
+/// Which of the variables asked for answered NaN at an element.
+#[cold]
+fn nan_variable(instance: &Instance, ids: &[u32], element: usize) -> String {
+    let mut first = 0;
+    for id in ids {
+        let mut all = instance.variables().iter().chain(instance.subsystem.variables());
+        let Some(variable) = all.find(|v| v.id == *id) else { break };
+        first += variable.len();
+        if element < first {
+            return format!("the variable `{}` is NaN", variable.name);
+        }
+    }
+    format!("value {element} is NaN")
 }
 
 /// Fills a response with NaN, to find what a subsystem does not answer.

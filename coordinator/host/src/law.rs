@@ -32,7 +32,7 @@ pub fn locate(
         name: name.into(),
         file: super::search::file_name(name),
         looked: search.folders().to_vec(),
-        nearest: super::library::nearest(name, search.all().into_iter().map(|(n, _)| n)),
+        nearest: super::search::nearest(name, search.all().into_iter().map(|(n, _)| n)),
     })
 }
 

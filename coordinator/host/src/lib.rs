@@ -28,6 +28,7 @@ mod process_state;
 mod python;
 mod search;
 mod services;
+mod supervision;
 #[cfg(test)]
 mod tests;
 mod workers;

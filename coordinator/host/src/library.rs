@@ -7,7 +7,7 @@ use super::error::LoadError;
 use super::isolation::{self, Isolation, What};
 use super::law::{self, LawHost};
 use super::python::{self, PythonFile};
-use super::search::{SearchPath, below, file_name, is_path, module_name, python_name};
+use super::search::{self, SearchPath, below, file_name, is_path, module_name, python_name};
 use super::{HostServices, Instance, TeardownErrors};
 use libloading::os::unix::{Library as Handle, RTLD_LOCAL, RTLD_NOW, Symbol};
 use serde_json::{Map, Value};
@@ -51,6 +51,9 @@ impl LoadedModule {
     /// Loads a library. Checked in this order: it is a library; its section, where it has one, names our ABI; the
     /// system loads it; it has the entry; its table can be used; it describes itself. Of a file in Python only the
     /// description is read.
+    ///
+    /// # Errors
+    /// [`LoadError`] of the first check that fails.
     pub fn load(path: &Path) -> std::result::Result<Self, LoadError> {
         let path = path.to_path_buf();
         inspect(&path)?;
@@ -118,6 +121,9 @@ impl LoadedModule {
     }
 
     /// Makes an instance; what the configuration leaves out gets the default of the schema.
+    ///
+    /// # Errors
+    /// [`LoadError::Instantiate`]: the module refuses the configuration or fails.
     pub fn instantiate(
         &self,
         instance_name: &str,
@@ -135,6 +141,9 @@ impl LoadedModule {
     }
 
     /// The subsystem alone, without supervision.
+    ///
+    /// # Errors
+    /// What the module or its law answers; a module in Python runs in a process of its own only.
     pub fn make(
         &self,
         config: &Config,
@@ -336,6 +345,9 @@ impl Library {
 
     /// The module that a scenario names. A value with `/` or ending in `.so` or `.py` is a path relative to `folder`, the
     /// scenario's; any other is a name: soil-bekker is the file libsoil_bekker_plugin.so on the search path.
+    ///
+    /// # Errors
+    /// [`LoadError`]: no module of this name on the search path, or a file that cannot be loaded.
     pub fn find(
         &self,
         name: &str,
@@ -362,18 +374,9 @@ impl Library {
             name: name.into(),
             file: format!("{} or {}", file_name(name), python_name(name)),
             looked: search.folders().to_vec(),
-            nearest: nearest(name, names),
+            nearest: search::nearest(name, names),
         }
     }
-}
-
-/// The name that is most like one that was not found.
-pub(super) fn nearest(name: &str, names: impl Iterator<Item = String>) -> Option<String> {
-    let near = names
-        .map(|n| (strsim::normalized_damerau_levenshtein(&n, name), n))
-        .filter(|(likeness, _)| *likeness > 0.4)
-        .max_by(|a, b| a.0.total_cmp(&b.0));
-    near.map(|(_, n)| n)
 }
 
 /// A module on the search path.

@@ -119,6 +119,15 @@ fn user_folder() -> Option<PathBuf> {
     Some(data.join("terraglue/modules"))
 }
 
+/// The name that is most like one that was not found.
+pub(super) fn nearest(name: &str, names: impl Iterator<Item = String>) -> Option<String> {
+    let near = names
+        .map(|n| (strsim::normalized_damerau_levenshtein(&n, name), n))
+        .filter(|(likeness, _)| *likeness > 0.4)
+        .max_by(|a, b| a.0.total_cmp(&b.0));
+    near.map(|(_, n)| n)
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -97,6 +97,9 @@ pub struct TimingRow {
 terraglue_subsystem::persist!(TimingRow { section, wall_s, cpu_s, steps });
 
 /// Writes `timing.csv`. Nothing that a clock measured stands in any other file but `summary.json`.
+///
+/// # Errors
+/// [`Error::File`](terraglue_diagnostics::Error::File): the file cannot be written.
 pub fn write_timing(folder: &Path, rows: &[TimingRow]) -> Result {
     let path = folder.join(TIMING);
     let mut table = csv::Writer::from_writer(File::create(&path).map_err(at(&path))?);

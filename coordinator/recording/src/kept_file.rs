@@ -27,6 +27,9 @@ pub(crate) fn shorter() -> Error {
 
 impl KeptFile {
     /// Creates the file, or empties it, and locks it. Writers that gather what they write keep the look before each write cheap.
+    ///
+    /// # Errors
+    /// The file cannot be created.
     pub fn create(path: &Path) -> Result<Self> {
         let path = std::path::absolute(path)?;
         terraglue_subsystem::files::can_create(&path)?;
@@ -36,6 +39,9 @@ impl KeptFile {
 
     /// Opens a file of an earlier process to write its first `length` bytes once more, which must be the same; what comes
     /// behind them is cut off then.
+    ///
+    /// # Errors
+    /// The file cannot be opened.
     pub fn repeat(path: &Path, length: u64) -> Result<Self> {
         let path = std::path::absolute(path)?;
         let file = File::options().read(true).write(true).open(&path)?;
@@ -43,6 +49,9 @@ impl KeptFile {
     }
 
     /// Opens a file of an earlier process to go on behind its first `length` bytes.
+    ///
+    /// # Errors
+    /// The file cannot be opened, or is shorter than that.
     pub fn go_on(path: &Path, length: u64) -> Result<Self> {
         let mut kept = Self::repeat(path, 0)?;
         if let Some(file) = &mut kept.file {

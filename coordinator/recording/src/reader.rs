@@ -188,6 +188,9 @@ impl Recording {
     }
 
     /// Reads `recording.mcap` of a results folder.
+    ///
+    /// # Errors
+    /// [`Error::File`]: there is no recording, or it cannot be read.
     pub fn open(folder: &Path) -> Result<Self> {
         let path = folder.join(RECORDING);
         let bytes = terraglue_subsystem::files::read(&path).map_err(at(&path))?;

@@ -76,6 +76,9 @@ fn about(scenario: &Scenario) -> BTreeMap<String, String> {
 
 impl Recorder {
     /// Makes the folder where it is missing, removes the files of an earlier run and opens the recording.
+    ///
+    /// # Errors
+    /// [`Error::File`]: a file cannot be created, or belongs to a run that still goes on.
     pub fn create(folder: &Path, scenario: &Scenario, options: RecorderOptions) -> Result<Self> {
         std::fs::create_dir_all(folder).map_err(at(folder))?;
         remove_earlier_run(folder)?;
@@ -141,6 +144,9 @@ impl Recorder {
     }
 
     /// Closes all files and writes `summary.json`. `wall_s` and `cpu_s` are the times of the step loop, s.
+    ///
+    /// # Errors
+    /// [`Error::File`] or [`Error::Full`]: a file cannot be written to its end.
     pub fn finish(
         &mut self,
         wall_s: f64,

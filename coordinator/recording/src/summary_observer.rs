@@ -7,7 +7,7 @@ use crate::layout::{RECORDING, REPORT};
 use crate::motor_work::MotorWork;
 use crate::prints::PrintTrack;
 use crate::snapshot::{real, real_id};
-use crate::summary::{FailureRecord, Status, Summary};
+use crate::summary::{EnergySummary, FailureRecord, GluingSummary, MotionSummary, Status, Summary};
 use terraglue_diagnostics::error::{Error, Result};
 use terraglue_engine::observer::{Event, Observer, SubsystemView, View};
 use terraglue_gluing::StepReport;
@@ -39,7 +39,7 @@ pub struct SummaryObserver {
     motors: MotorWork,
     electrical_j: f64,
     energies: EnergyTrack,
-    gluing: GluingFigures,
+    gluing: GluingSums,
 }
 
 /// Integral of a variable over time. What is set holds over the step that follows, what is told is of the step before.
@@ -59,7 +59,7 @@ enum Deepest {
 
 /// Figures of the gluing over all steps.
 #[derive(Default)]
-struct GluingFigures {
+struct GluingSums {
     steps: u64,
     histogram: Vec<u64>,
     soil_histogram: Vec<u64>,
@@ -132,7 +132,7 @@ fn count(histogram: &mut Vec<u64>, evaluations: u32) {
     histogram[n] += 1;
 }
 
-impl GluingFigures {
+impl GluingSums {
     fn add(&mut self, g: &StepReport) {
         if g.evaluations_bodies == 0 && g.evaluations_soil == 0 {
             return;
@@ -188,6 +188,37 @@ impl GluingFigures {
     fn mean(&self, sum: u64) -> f64 {
         if self.steps == 0 { 0.0 } else { sum as f64 / self.steps as f64 }
     }
+
+    fn summary(&self) -> GluingSummary {
+        // what no step could say does not apply; before the first step nothing is known to be amiss
+        let applies = |steps: u64| self.steps == 0 || steps > 0;
+        GluingSummary {
+            form: self.form().into(),
+            evaluations_mean: self.mean(self.bodies),
+            evaluations_max: self.histogram.len().saturating_sub(1) as u32,
+            evaluations_p95: self.percentile(&self.histogram, 0.95),
+            evaluations_soil_mean: self.mean(self.soil),
+            evaluations_soil_max: self.soil_max,
+            evaluations_soil_p95: self.percentile(&self.soil_histogram, 0.95),
+            evaluations_jacobian_mean: self.mean(self.differences),
+            jacobian_refreshes_mean: self.mean(self.refreshes),
+            steps_not_converged: applies(self.checked).then_some(self.not_converged),
+            steps_halved: self.halved,
+            max_gap_m: applies(self.with_gap).then_some(self.max_gap_m),
+            max_action_reaction_gap_n: applies(self.with_gap).then_some(self.max_action_reaction_gap_n),
+            max_estimate_gap_n: self.max_estimate_gap_n,
+            interface_work_error_j: known(self.interface_work_error_j),
+            max_residual: self.residual,
+            max_complementarity_n: self.complementarity_n,
+            kappa_max: self.kappa_max,
+            rank_missing_max: self.rank_missing,
+            condition_max: self.condition,
+        }
+    }
+}
+
+fn known(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
 }
 
 fn soils<'a>(view: &'a View) -> impl Iterator<Item = (usize, &'a SubsystemView<'a>)> {
@@ -220,7 +251,7 @@ impl SummaryObserver {
             motors: MotorWork::default(),
             electrical_j: 0.0,
             energies: EnergyTrack::default(),
-            gluing: GluingFigures::default(),
+            gluing: GluingSums::default(),
         }
     }
 
@@ -242,17 +273,7 @@ impl SummaryObserver {
     pub fn summary(&self, wall_s: f64, cpu_s: f64, error: Option<&Error>, status: Status) -> Summary {
         let per = |total: f64, n: f64| if n > 0.0 { total / n } else { 0.0 };
         let body = self.body.as_ref();
-        let gravity_m_s2 = rotation::length(self.gravity_m_s2);
-        let weight_n = body.map(|b| b.mass_kg * gravity_m_s2).filter(|w| *w > 0.0);
-        let way_m = body.map(|b| b.distance_m.abs()).filter(|way| *way >= SMALLEST_DISTANCE_M);
-        let transport = |energy_j: f64| Some(energy_j / (weight_n? * way_m?));
-        let g = &self.gluing;
-        let energy_j = self.motors.both_j();
-        let energies = self.energies.figures(&self.motors);
-        // what no step could say does not apply; before the first step nothing is known to be amiss
-        let applies = |steps: u64| g.steps == 0 || steps > 0;
-        let known = |value: f64| value.is_finite().then_some(value);
-        let electrical_j = known(self.electrical_j);
+        let weight_n = body.map(|b| b.mass_kg * rotation::length(self.gravity_m_s2)).filter(|w| *w > 0.0);
         Summary {
             status,
             error: error.map(FailureRecord::from),
@@ -264,50 +285,52 @@ impl SummaryObserver {
             simulated_s: self.t_s,
             wall_s,
             cpu_s,
+            cpu_per_step_s: per(cpu_s, self.steps as f64),
             real_time_factor: per(self.t_s, wall_s),
+            motion: self.motion(weight_n),
+            max_sinkage_m: self.sinkage.as_ref().map(Deepest::largest),
+            mean_sinkage_m: self.prints.as_ref().and_then(PrintTrack::mean_m),
+            print_depth: self.prints.as_ref().and_then(PrintTrack::depth),
+            soil_mass_error_relative: self.mass_error.map(|m| m.2),
+            energy: self.energy(weight_n),
+            gluing: self.gluing.summary(),
+            recording: RECORDING.into(),
+            report: REPORT.into(),
+        }
+    }
+
+    /// The motion of the reported body of this weight.
+    fn motion(&self, weight_n: Option<f64>) -> MotionSummary {
+        let body = self.body.as_ref();
+        MotionSummary {
             distance_m: body.map(|b| b.distance_m),
             commanded_distance_m: self.speed.as_ref().map(|s| s.sum),
             max_roll_rad: body.map(|b| b.max_roll_rad),
             max_pitch_rad: body.map(|b| b.max_pitch_rad),
-            max_sinkage_m: self.sinkage.as_ref().map(Deepest::largest),
-            energy_j,
-            cost_of_transport: transport(energy_j),
-            evaluations_mean: g.mean(g.bodies),
-            evaluations_max: g.histogram.len().saturating_sub(1) as u32,
-            steps_not_converged: applies(g.checked).then_some(g.not_converged),
-            max_gap_m: applies(g.with_gap).then_some(g.max_gap_m),
-            max_action_reaction_gap_n: applies(g.with_gap).then_some(g.max_action_reaction_gap_n),
-            soil_mass_error_relative: self.mass_error.map(|m| m.2),
-            recording: RECORDING.into(),
-            report: REPORT.into(),
-            form: g.form().into(),
-            evaluations_p95: g.percentile(&g.histogram, 0.95),
-            evaluations_soil_mean: g.mean(g.soil),
-            evaluations_soil_max: g.soil_max,
-            evaluations_soil_p95: g.percentile(&g.soil_histogram, 0.95),
-            max_estimate_gap_n: g.max_estimate_gap_n,
-            interface_work_error_j: known(g.interface_work_error_j),
-            energy_balance_j: energies.drift_j,
-            cpu_per_step_s: per(cpu_s, self.steps as f64),
             height_gained_m: body.and_then(BodyTrack::height_gained_m),
             stalled: body.and_then(BodyTrack::stall),
+            path_m: body.map(|b| b.path_m),
+            peak_force_over_weight: body.and_then(|b| Some(b.peak_n()? / weight_n?)),
+        }
+    }
+
+    /// Energies, and what a reported body of this weight takes over its distance.
+    fn energy(&self, weight_n: Option<f64>) -> EnergySummary {
+        let distance_m = self.body.as_ref().map(|b| b.distance_m.abs());
+        let way_m = distance_m.filter(|way| *way >= SMALLEST_DISTANCE_M);
+        let transport = |energy_j: f64| Some(energy_j / (weight_n? * way_m?));
+        let energy_j = self.motors.both_j();
+        let energies = self.energies.figures(&self.motors);
+        let electrical_j = known(self.electrical_j);
+        EnergySummary {
+            energy_j,
+            energy_j_per_m: way_m.map(|way| energy_j / way),
+            cost_of_transport: transport(energy_j),
             electrical_energy_j: electrical_j,
             electrical_energy_j_per_m: electrical_j.and_then(|e| Some(e / way_m?)),
-            kappa_max: g.kappa_max,
-            jacobian_refreshes_mean: g.mean(g.refreshes),
-            evaluations_jacobian_mean: g.mean(g.differences),
-            max_residual: g.residual,
-            max_complementarity_n: g.complementarity_n,
-            rank_missing_max: g.rank_missing,
-            condition_max: g.condition,
-            steps_halved: g.halved,
-            mean_sinkage_m: self.prints.as_ref().and_then(PrintTrack::mean_m),
-            path_m: body.map(|b| b.path_m),
-            energies,
-            energy_j_per_m: way_m.map(|way| energy_j / way),
             electrical_cost_of_transport: electrical_j.and_then(transport),
-            print_depth: self.prints.as_ref().and_then(PrintTrack::depth),
-            peak_force_over_weight: body.and_then(|b| Some(b.peak_n()? / weight_n?)),
+            energy_balance_j: energies.drift_j,
+            energies,
         }
     }
 }

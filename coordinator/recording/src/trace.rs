@@ -48,8 +48,9 @@ impl Trace {
         let wrong = |message: String| Error::Simulation { time_s: testbed.t_s(), message };
         let mut reads: Vec<Read> = Vec::new();
         for name in names {
-            let Some(found) = testbed.directory().find(name) else {
-                let hint = testbed.directory().hint(name).map(|h| format!("; {h}")).unwrap_or_default();
+            let Some(found) = testbed.signals().directory.find(name) else {
+                let hint =
+                    testbed.signals().directory.hint(name).map(|h| format!("; {h}")).unwrap_or_default();
                 return Err(wrong(format!("cannot record `{name}`: there is no such variable{hint}")));
             };
             let variable = found.describe(testbed.instances());

@@ -192,6 +192,50 @@ fn scenario(kind: Kind, language: Language) -> &'static [File] {
     }
 }
 
+/// Files that a module in a language has beside its source.
+fn beside_source(kind: Kind, language: Language) -> Vec<File> {
+    match language {
+        Language::Rust => RUST.to_vec(),
+        Language::C => vec![HEADER, MAKEFILE],
+        Language::Cpp if kind == Kind::Law => vec![HEADER, MAKEFILE],
+        Language::Cpp => vec![HEADER, CLASS, MAKEFILE],
+        Language::Python => PYTHON.to_vec(),
+        Language::Scenario => Vec::new(),
+    }
+}
+
+/// The command that builds a module, and the file that it makes.
+fn build_of(language: Language, snake: &str) -> (&'static str, String) {
+    let library = format!("lib{snake}_plugin.so");
+    match language {
+        Language::Rust => ("cargo build", format!("./target/debug/{library}")),
+        Language::C | Language::Cpp => ("make", format!("./{library}")),
+        Language::Python => ("@terraglue@ check scenario.toml", format!("./{snake}.py")),
+        Language::Scenario => ("@terraglue@ check scenario.toml", String::new()),
+    }
+}
+
+/// Variables of a Makefile, and the command that compiles.
+fn compiler_of(language: Language) -> (&'static str, &'static str) {
+    match language {
+        Language::Cpp => (
+            "CXXFLAGS ?= -std=c++17 -O2 -Wall -Wextra",
+            "$(CXX) $(CXXFLAGS) -fvisibility=hidden -fPIC -shared $< -o $@",
+        ),
+        _ => ("CFLAGS ?= -std=c11 -O2 -Wall -Wextra", "$(CC) $(CFLAGS) -fPIC -shared $< -o $@ -lm"),
+    }
+}
+
+/// The page that explains a folder.
+fn page(kind: Kind, language: Language) -> File {
+    match kind {
+        Kind::Law if language == Language::Scenario => {
+            ("README.md", "this page", include_str!("templates/README-law.md.in"))
+        }
+        _ => ("README.md", "this page", include_str!("templates/README.md.in")),
+    }
+}
+
 /// Fills the templates.
 pub(super) fn fill(
     kind: Kind,
@@ -209,23 +253,10 @@ pub(super) fn fill(
         });
     };
     let mut files = vec![source];
-    match language {
-        Language::Rust => files.extend(RUST),
-        Language::C => files.extend([HEADER, MAKEFILE]),
-        Language::Cpp if kind == Kind::Law => files.extend([HEADER, MAKEFILE]),
-        Language::Cpp => files.extend([HEADER, CLASS, MAKEFILE]),
-        Language::Python => files.extend(PYTHON),
-        Language::Scenario => {}
-    }
+    files.extend(beside_source(kind, language));
     files.extend(scenario(kind, language));
     let snake = name.replace('-', "_");
-    let library = format!("lib{snake}_plugin.so");
-    let (build, module) = match language {
-        Language::Rust => ("cargo build", format!("./target/debug/{library}")),
-        Language::C | Language::Cpp => ("make", format!("./{library}")),
-        Language::Python => ("@terraglue@ check scenario.toml", format!("./{snake}.py")),
-        Language::Scenario => ("@terraglue@ check scenario.toml", String::new()),
-    };
+    let (build, module) = build_of(language, &snake);
     let rebuild = match language {
         Language::Python | Language::Scenario => String::new(),
         _ => format!(
@@ -233,13 +264,7 @@ pub(super) fn fill(
         ),
     };
     let listing: Vec<_> = files.iter().map(|(path, what, _)| format!("* `{path}`: {what}")).collect();
-    let (flags, compile) = match language {
-        Language::Cpp => (
-            "CXXFLAGS ?= -std=c++17 -O2 -Wall -Wextra",
-            "$(CXX) $(CXXFLAGS) -fvisibility=hidden -fPIC -shared $< -o $@",
-        ),
-        _ => ("CFLAGS ?= -std=c11 -O2 -Wall -Wextra", "$(CC) $(CFLAGS) -fPIC -shared $< -o $@ -lm"),
-    };
+    let (flags, compile) = compiler_of(language);
     let words = [
         ("@files@", listing.join("\n")),
         ("@variables@", flags.into()),
@@ -261,12 +286,7 @@ pub(super) fn fill(
         ("my-module", name.into()),
         ("my_module", snake),
     ];
-    files.push(match kind {
-        Kind::Law if language == Language::Scenario => {
-            ("README.md", "this page", include_str!("templates/README-law.md.in"))
-        }
-        _ => ("README.md", "this page", include_str!("templates/README.md.in")),
-    });
+    files.push(page(kind, language));
     let replaced = |text: &str| words.iter().fold(text.to_owned(), |text, (word, by)| text.replace(word, by));
     let files = files.iter().map(|(path, _, text)| (replaced(path), replaced(text))).collect();
     let crates = if language == Language::Rust { CRATES } else { &[] };

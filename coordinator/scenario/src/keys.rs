@@ -110,7 +110,7 @@ fn time() -> Table {
             .within(0.0, 1e3)
             .into(),
     ];
-    Table { required: true, ..of("time", "How long and in which steps.", keys) }
+    Table { required: true, ..of("time", "Duration and steps.", keys) }
 }
 
 fn world() -> Table {
@@ -121,7 +121,7 @@ fn world() -> Table {
         Key::from(gravity.or(vec![0.0, 0.0, -9.81]).within(-1e9, 1e9)).form(Form::Count(3)),
         seed.or(1).within(0.0, f64::INFINITY).into(),
     ];
-    of("world", "What holds everywhere.", keys)
+    of("world", "Properties of the world.", keys)
 }
 
 fn terrain() -> Table {
@@ -191,7 +191,7 @@ fn gluing() -> Table {
         Parameter::of("start", ParameterType::Text, "what the iteration starts from (iterative only)");
     let most =
         Parameter::of("max_iterations", ParameterType::Integer, "iterations before the step is halved");
-    let keys = vec![
+    let mut keys = vec![
         strategy.or("cooperative").choices(STRATEGIES).into(),
         form.or("auto").choices(FormChoice::NAMES).into(),
         number("tolerance", "", 1e-8, "residual relative to the largest of weight and force")
@@ -212,6 +212,14 @@ fn gluing() -> Table {
             .or("analytic")
             .choices(JacobianChoice::NAMES)
             .into(),
+    ];
+    keys.extend(gluing_of_steps());
+    of("gluing", "How subsystems are glued together.", keys)
+}
+
+/// Keys of `[gluing]` on the level of joints, the length of steps and contacts.
+fn gluing_of_steps() -> Vec<Key> {
+    vec![
         Parameter::of("level", ParameterType::Text, "level of the condition at joints")
             .or("position")
             .choices(LevelChoice::NAMES)
@@ -252,8 +260,7 @@ fn gluing() -> Table {
         )
         .within(0.0, f64::INFINITY)
         .into(),
-    ];
-    of("gluing", "How subsystems are glued together.", keys)
+    ]
 }
 
 fn recording() -> Table {
@@ -277,7 +284,7 @@ fn recording() -> Table {
         ),
         patterns("exclude", "variables or groups that are not"),
     ];
-    of("recording", "What is written to `recording.mcap`.", keys)
+    of("recording", "Contents of `recording.mcap`.", keys)
 }
 
 fn report() -> Table {
@@ -288,7 +295,7 @@ fn report() -> Table {
         text("commanded_speed", "`subsystem.variable` with the speed that is asked for, m/s; `gait.speed_reached` leaves out standing and ramp").into(),
         text("joint", "`subsystem.joint` whose torque, velocity and angle are plotted").into(),
     ];
-    of("report", "What the summary and the report speak of.", keys)
+    of("report", "Body and speed of the summary and the report.", keys)
 }
 
 fn connect() -> Table {
@@ -375,7 +382,7 @@ fn event() -> Table {
     ];
     Table {
         repeated: true,
-        ..of("event", "Something that happens once: something breaks, an operator's change.", keys)
+        ..of("event", "An event that occurs once: a failure, an operator's change.", keys)
     }
 }
 
@@ -408,7 +415,7 @@ fn fault() -> Table {
             .within(0.0, f64::INFINITY)
             .into(),
     ];
-    Table { repeated: true, ..of("fault", "A number that goes wrong on its way, once, for a while.", keys) }
+    Table { repeated: true, ..of("fault", "A signal fault, once, for a limited time.", keys) }
 }
 
 /// Keys of the host in the table of a subsystem; everything else there is a parameter of the module.

@@ -53,6 +53,9 @@ impl Scenario {
     }
 
     /// The scenario of an earlier run, whose text after all edits was kept; `path` is that of its file.
+    ///
+    /// # Errors
+    /// As [`Scenario::load`].
     pub fn again(path: &Path, text: &str) -> Checked<Self> {
         let mut source = read_source(text, &path.display().to_string(), &[], &[])?;
         if Package::is_one(path) {
@@ -63,6 +66,9 @@ impl Scenario {
     }
 
     /// The same for a text; `path` gives its name and folder.
+    ///
+    /// # Errors
+    /// As [`Scenario::load`].
     pub fn parse(text: &str, path: &str, sets: &[(String, String)]) -> Checked<Self> {
         Self::checked(read_source(text, path, sets, &[])?)
     }

@@ -6,6 +6,16 @@ use serde_json::{Map, Value};
 use std::path::PathBuf;
 
 /// Everything a run needs.
+///
+/// ```
+/// use terraglue_scenario::{Scenario, StrategyKind};
+///
+/// let text = "[time]\nduration_s = 2.0\n[gluing]\nstrategy = \"iterative\"\n[arm]\nmodule = \"arm.py\"\n";
+/// let scenario = Scenario::parse(text, "my.toml", &[])?;
+/// assert_eq!((scenario.name.as_str(), scenario.gluing.strategy), ("my", StrategyKind::Iterative));
+/// assert_eq!(scenario.subsystems[0].name, "arm");
+/// # Ok::<(), Box<terraglue_scenario::InputError>>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct Scenario {
     /// File stem, e.g. `moon_walk`.

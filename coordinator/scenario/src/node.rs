@@ -177,3 +177,11 @@ fn of_value(value: &Value, key: Range<usize>) -> Node {
 fn node(key: Range<usize>, at: Range<usize>, value: Raw) -> Node {
     Node { key: Place { set: None, range: key }, at: Place { set: None, range: at }, value }
 }
+
+/// Text of an entry.
+pub fn text(node: &Node, key: &str) -> Option<String> {
+    match &node.get(key)?.value {
+        Raw::Text(text) => Some(text.clone()),
+        _ => None,
+    }
+}

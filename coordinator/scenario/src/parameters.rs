@@ -26,6 +26,9 @@ pub fn check_parameters(
 }
 
 /// The same with the names of all modules that were found.
+///
+/// # Errors
+/// The first wrong parameter, at its place in the scenario.
 pub fn check_parameters_among(
     schema: &Schema,
     spec: &SubsystemSpec,

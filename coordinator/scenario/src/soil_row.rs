@@ -1,9 +1,8 @@
 //! `parameters = "row"` or `"soil.toml"`: a row of the soil table or a soil file, offered to the module.
 
-use super::node::{Node, Place};
+use super::node::{Node, Place, text};
 use super::soil_table::{COLUMNS, SoilTable, TableError};
 use super::source::Source;
-use super::subsystems::text;
 use serde_json::{Map, Value};
 use std::path::{Path, PathBuf};
 use terraglue_diagnostics::InputError;

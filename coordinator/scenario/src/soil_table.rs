@@ -82,6 +82,9 @@ impl SoilRow {
 
     /// The numbers that the row offers as (key, value). Refused while a needed number is missing from the row
     /// that `overridden` does not name.
+    ///
+    /// # Errors
+    /// [`TableError::Refused`]: a needed number is missing.
     pub fn offered(&self, overridden: &[&str]) -> Result<Vec<(&'static str, f64)>, TableError> {
         let lacking =
             |(c, v): (&&str, &Option<f64>)| v.is_none() && !OPTIONAL.contains(c) && !overridden.contains(c);
@@ -102,6 +105,9 @@ pub struct SoilTable {
 
 impl SoilTable {
     /// Reads comma-separated text with a header line. Cells hold no commas.
+    ///
+    /// # Errors
+    /// [`TableError::Malformed`], with the line: no header, a column that is missing, or a cell that is no number.
     pub fn parse(text: &str) -> Result<Self, TableError> {
         let mut lines = text.lines().enumerate().filter(|(_, l)| !l.trim().is_empty());
         let header: Vec<&str> = match lines.next() {
@@ -114,6 +120,9 @@ impl SoilTable {
     }
 
     /// The row of a name, usable or not.
+    ///
+    /// # Errors
+    /// [`TableError::Unknown`], with the names of all rows.
     pub fn row(&self, name: &str) -> Result<&SoilRow, TableError> {
         self.rows.iter().find(|r| r.name == name).ok_or_else(|| TableError::Unknown {
             name: name.into(),

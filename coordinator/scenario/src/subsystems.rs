@@ -5,7 +5,7 @@ use super::keys::subsystem_keys;
 use super::mask;
 use super::model::SubsystemSpec;
 use super::module_kind::ModuleKind;
-use super::node::{Node, Raw};
+use super::node::{Node, Raw, text};
 use super::section::check_entry;
 use super::soil_row;
 use super::source::Source;
@@ -126,14 +126,6 @@ fn merge(all: &mut Map<String, Value>, own: &Node) {
             (Some(Value::Object(below)), true) => merge(below, node),
             _ => drop(all.insert(key.clone(), node.to_json())),
         }
-    }
-}
-
-/// Text of an entry.
-pub fn text(node: &Node, key: &str) -> Option<String> {
-    match &node.get(key)?.value {
-        Raw::Text(text) => Some(text.clone()),
-        _ => None,
     }
 }
 

@@ -4,7 +4,7 @@
 //! with the name of the entry. Sizes are counted while reading, whatever the archive says of itself.
 
 use crate::error::{Error, Result};
-use crate::fmu::Folder;
+use crate::folder::Folder;
 use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom, Write};

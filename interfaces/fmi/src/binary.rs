@@ -1,11 +1,10 @@
 //! Finds and loads the shared library of an FMU.
 #![allow(unsafe_code)] // Loading a library runs its constructors.
 
-use crate::description::Version;
+use crate::description::{ModelDescription, Version};
 use crate::elf;
 use crate::error::{Error, Result};
 use crate::floating_point::Keep;
-use crate::fmu::Fmu;
 use libloading::os::unix::{Library, RTLD_GLOBAL, RTLD_LOCAL, RTLD_NOW};
 use std::error::Error as _;
 use std::mem::ManuallyDrop;
@@ -43,7 +42,7 @@ pub fn platform(version: Version) -> &'static str {
 }
 
 /// Entry of the archive that holds the library for this platform.
-pub fn library_entry(description: &crate::ModelDescription) -> String {
+pub fn library_entry(description: &ModelDescription) -> String {
     format!("binaries/{}/{}.so", platform(description.version), description.identifier)
 }
 
@@ -59,15 +58,14 @@ pub fn platforms<'a>(names: impl Iterator<Item = &'a str>) -> Vec<String> {
     all
 }
 
-/// Loads the library of an extracted FMU.
-pub fn load(fmu: &Fmu) -> Result<Loaded> {
-    let fail = |message: String| Error::Library { path: fmu.path().into(), message };
-    let description = fmu.description();
-    let folder = fmu.folder().join("binaries").join(platform(description.version));
+/// Loads the library of the FMU of file `fmu`, extracted into `extracted`.
+pub fn load(fmu: &Path, description: &ModelDescription, extracted: &Path) -> Result<Loaded> {
+    let fail = |message: String| Error::Library { path: fmu.into(), message };
+    let folder = extracted.join("binaries").join(platform(description.version));
     let name = format!("{}.so", description.identifier);
     let path = folder.join(&name);
     if !path.is_file() {
-        return Err(fail(missing(fmu, &name)));
+        return Err(fail(missing(description, extracted, &name)));
     }
     inspect(&path).map_err(|why| fail(format!("`{name}` cannot be loaded: {why}")))?;
     let threads = threads();
@@ -77,13 +75,12 @@ pub fn load(fmu: &Fmu) -> Result<Loaded> {
         .map_err(|why| fail(format!("`{name}` cannot be loaded: {why}")))
 }
 
-fn missing(fmu: &Fmu, name: &str) -> String {
-    let entries = std::fs::read_dir(fmu.folder().join("binaries")).into_iter().flatten().flatten();
+fn missing(description: &ModelDescription, extracted: &Path, name: &str) -> String {
+    let entries = std::fs::read_dir(extracted.join("binaries")).into_iter().flatten().flatten();
     let mut found: Vec<String> = entries.map(|e| e.file_name().to_string_lossy().into_owned()).collect();
     found.sort();
-    let wanted = platform(fmu.description().version);
-    let beside =
-        std::fs::read_dir(fmu.folder().join("binaries").join(wanted)).into_iter().flatten().flatten();
+    let wanted = platform(description.version);
+    let beside = std::fs::read_dir(extracted.join("binaries").join(wanted)).into_iter().flatten().flatten();
     let mut beside: Vec<String> = beside.map(|e| format!("`{}`", e.file_name().to_string_lossy())).collect();
     beside.sort();
     if !beside.is_empty() {
@@ -92,7 +89,7 @@ fn missing(fmu: &Fmu, name: &str) -> String {
             "has no library `binaries/{wanted}/{name}`, which its modelIdentifier asks for; beside it is {beside}"
         );
     }
-    let has = match (found.is_empty(), fmu.folder().join("sources").is_dir()) {
+    let has = match (found.is_empty(), extracted.join("sources").is_dir()) {
         (true, true) => "it holds source code only".to_owned(),
         (true, false) => "it holds no library at all".to_owned(),
         (false, _) => format!("it holds libraries for {}", found.join(", ")),

@@ -23,6 +23,7 @@ mod error;
 pub mod export;
 pub mod floating_point;
 mod fmu;
+mod folder;
 pub mod instance;
 pub mod ssp;
 
@@ -30,5 +31,6 @@ pub use archive::Limits;
 pub use binary::{library_entry, platforms};
 pub use description::{ModelDescription, Version};
 pub use error::{Error, Result};
-pub use fmu::{Fmu, Folder, remove_folders};
+pub use fmu::Fmu;
+pub use folder::{Folder, remove_folders};
 pub use instance::{Advance, FmuInstance, FmuState, InstanceOptions, IntermediateRow, LogLine, Stepped};

@@ -1,9 +1,9 @@
 //! Heights of the ground's material in fixed point: what moves from node to node is an integer, so none is lost.
 
 use crate::Surface;
+use crate::identity::Identity;
 use crate::lattice::{Lattice, TILE_EDGE, TILE_NODES};
 use crate::pool::Pool;
-use crate::snapshot::Identity;
 use terraglue_subsystem::{FieldInfo, FieldTile, Terrain, TerrainTile, TileValues};
 
 /// Height of one unit, m: 2⁻²² m (0.24 µm), so an i32 spans ±512 m.
@@ -67,6 +67,18 @@ pub(crate) struct Tile {
 ///
 /// A tile is either one number or 32 × 32 stored ones; the sinkage is stored from the first write on, so the
 /// initial height is always current + sinkage and never kept twice.
+///
+/// ```
+/// use terraglue_ground::{HeightField, Lattice, UNIT_M};
+///
+/// let lattice = Lattice { origin: [0.0, 0.0], spacing: 0.01, size: [64, 64] };
+/// let mut field = HeightField::flat(lattice, 0.25)?;
+/// let start = field.units(3, 4);
+/// field.add_units(3, 4, -100);
+/// assert_eq!((field.sinkage_units(3, 4), field.initial_units(3, 4)), (100, start));
+/// assert!((field.height(3, 4) - (0.25 - 100.0 * UNIT_M)).abs() < UNIT_M);
+/// # Ok::<(), terraglue_ground::HeightError>(())
+/// ```
 #[derive(Clone, Debug)]
 pub struct HeightField {
     lattice: Lattice,
@@ -80,6 +92,9 @@ pub struct HeightField {
 
 impl HeightField {
     /// Flat ground, `height` rounded to a unit.
+    ///
+    /// # Errors
+    /// [`HeightError`]: the lattice cannot be used, or the height is out of range.
     pub fn flat(lattice: Lattice, height: f64) -> Result<Self, HeightError> {
         check(&lattice)?;
         let heights = Heights::Uniform(to_units(height, [0, 0])?);
@@ -92,6 +107,9 @@ impl HeightField {
     }
 
     /// The ground of a scenario, each node rounded to the nearest unit.
+    ///
+    /// # Errors
+    /// [`HeightError`]: the lattice cannot be used, or a height is out of range.
     pub fn from_terrain(terrain: &dyn Terrain) -> Result<Self, HeightError> {
         let mut field = Self::flat(Lattice::of_terrain(terrain), 0.0)?;
         let mut metres = vec![0.0; TILE_NODES];
@@ -237,6 +255,9 @@ impl HeightField {
     }
 
     /// The 32 × 32 heights of a tile in units, x fastest; `Err` with the height that all nodes share.
+    ///
+    /// # Errors
+    /// The height that all nodes share: nothing is stored for such a tile.
     #[inline]
     pub fn tile(&self, tile: usize) -> Result<&[i32], i32> {
         match self.tiles[tile].heights {

@@ -1,7 +1,7 @@
 //! The nodes below several shapes that are one piece, and below meshes that are not convex.
 
 use crate::Surface;
-use crate::footprint::{Cell, Outline, SAMPLES, closer, reaches_beside};
+use crate::outline::{Cell, Outline, SAMPLES, closer, reaches_beside};
 use crate::shape::{Aabb, Placed};
 use terraglue_subsystem::Node;
 

@@ -11,6 +11,15 @@ pub const TILE_NODES: usize = (TILE_EDGE * TILE_EDGE) as usize;
 ///
 /// Each node stands for the cell of side `spacing` around it. Tiles hold 32 × 32 nodes, x fastest; tile
 /// (a, b) starts at node (32·a, 32·b) and has number `b·tiles[0] + a`.
+///
+/// ```
+/// use terraglue_ground::Lattice;
+///
+/// let lattice = Lattice { origin: [-1.0, 0.0], spacing: 0.5, size: [5, 40] };
+/// assert_eq!((lattice.node_count(), lattice.tiles()), (200, [1, 2]));
+/// assert_eq!(lattice.position(2, 1), [0.0, 0.5]);
+/// assert!(lattice.contains(0.9, 19.0) && !lattice.contains(1.6, 0.0));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lattice {
     /// World x, y of node (0, 0), m.

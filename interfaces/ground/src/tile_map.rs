@@ -1,8 +1,9 @@
 //! State per node in tiles: what soils remember (sinkage, shear, yield) without paying for untouched ground.
 
+use crate::identity::{Identity, Origin};
 use crate::lattice::{Lattice, TILE_NODES};
 use crate::pool::Pool;
-use crate::snapshot::{Identity, Origin, common};
+use crate::snapshot::common;
 use terraglue_subsystem::{FieldTile, TileValues};
 
 const ABSENT: u32 = u32::MAX;

@@ -1,4 +1,4 @@
-//! Numerics that modules and coordinator share: rotations, and extremes that keep NaN.
+//! Numerics that modules and coordinator share: rotations, dense linear systems, and extremes that keep NaN.
 //!
 //! The only interface crate with algorithms. It touches no clock, no file and no thread.
 
@@ -7,5 +7,7 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+pub mod dense;
 pub mod extremes;
+pub mod least_norm;
 pub mod rotation;

@@ -143,6 +143,9 @@ pub struct TableLaw {
 impl TableLaw {
     /// Checks size and functions without calling anything.
     ///
+    /// # Errors
+    /// Why it is none: no table, no function, or a state that a soil cannot keep.
+    ///
     /// # Safety
     /// `law` is null or points at functions that state their size truly, live as long as the process and keep to the
     /// contract of `terraglue.h`.

@@ -5,6 +5,16 @@ use crate::schema::Schema;
 use serde_json::Value;
 
 /// Parameter values by dotted name.
+///
+/// ```
+/// use terraglue_subsystem::Config;
+///
+/// let config = Config::parse(r#"{"gear": {"ratio": 0.25}, "axes": [1.0, 2.0]}"#)?;
+/// assert_eq!((config.number("gear.ratio")?, config.numbers("axes")?), (0.25, vec![1.0, 2.0]));
+/// let missing = config.number("gear.backlash").expect_err("it is not given");
+/// assert!(missing.to_string().contains("gear.backlash"));
+/// # Ok::<(), terraglue_subsystem::Error>(())
+/// ```
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Config {
     values: serde_json::Map<String, Value>,
@@ -12,6 +22,9 @@ pub struct Config {
 
 impl Config {
     /// From a JSON object; nested objects are reached by dotted names.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: the text is no JSON object.
     pub fn parse(json: &str) -> Result<Self> {
         match serde_json::from_str(json) {
             Ok(Value::Object(values)) => Ok(Self { values }),
@@ -47,11 +60,17 @@ impl Config {
     }
 
     /// A number.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: it is missing or no number.
     pub fn number(&self, name: &str) -> Result<f64> {
         self.optional_number(name)?.ok_or_else(|| missing(name))
     }
 
     /// A number that may be absent.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: it is no number.
     pub fn optional_number(&self, name: &str) -> Result<Option<f64>> {
         match self.get(name) {
             None | Some(Value::Null) => Ok(None),
@@ -60,12 +79,18 @@ impl Config {
     }
 
     /// Text.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: it is missing or no text.
     pub fn text(&self, name: &str) -> Result<&str> {
         let v = self.get(name).ok_or_else(|| missing(name))?;
         v.as_str().ok_or_else(|| wrong(name, v, "text"))
     }
 
     /// true or false; false when absent.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: it is neither true nor false.
     pub fn flag(&self, name: &str) -> Result<bool> {
         match self.get(name) {
             None | Some(Value::Null) => Ok(false),
@@ -74,6 +99,9 @@ impl Config {
     }
 
     /// A list of numbers; empty when absent.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: it is no list of numbers.
     pub fn numbers(&self, name: &str) -> Result<Vec<f64>> {
         match self.get(name) {
             None | Some(Value::Null) => Ok(Vec::new()),
@@ -85,6 +113,9 @@ impl Config {
     }
 
     /// The table below a name as (key, number), in the order of the keys; empty when absent.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: it is no table of numbers.
     pub fn number_table(&self, name: &str) -> Result<Vec<(String, f64)>> {
         match self.get(name) {
             None | Some(Value::Null) => Ok(Vec::new()),

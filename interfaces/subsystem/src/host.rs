@@ -108,6 +108,9 @@ impl Host for Standalone {
 
 impl dyn Host + '_ {
     /// The terrain, or an error that says that this module needs one.
+    ///
+    /// # Errors
+    /// [`Error::Failed`]: the scenario has no terrain.
     pub fn required_terrain(&self) -> Result<&dyn Terrain> {
         self.terrain().ok_or_else(|| {
             Error::Failed(

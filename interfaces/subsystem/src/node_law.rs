@@ -87,8 +87,14 @@ pub trait NodeLaw: Send + Sync {
     /// Whether it has a shear law; where not, that of the soil acts.
     fn has_shear(&self) -> bool;
     /// Pressures of the nodes.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`]: it has no pressure law. Any other: the law failed.
     fn pressure(&self, nodes: &PressureNodes, out: &mut PressureAnswer) -> Result;
     /// Yield stresses of the nodes.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`]: it has no shear law. Any other: the law failed.
     fn shear(&self, nodes: &ShearNodes, out: &mut ShearAnswer) -> Result;
     /// Lets the border to foreign code find its own table again.
     fn as_any(&self) -> &dyn std::any::Any;
@@ -105,10 +111,16 @@ pub trait LawModule: 'static {
     /// Name, kind (law) and parameters; all of them are numbers.
     fn schema() -> Schema;
     /// Pressures of the nodes; `parameters` in the order of the schema.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`]: it has no pressure law. Any other: the law failed.
     fn pressure(_parameters: &[f64], _nodes: &PressureNodes, _out: &mut PressureAnswer) -> Result {
         Err(Error::Unsupported)
     }
     /// Yield stresses of the nodes.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`]: it has no shear law. Any other: the law failed.
     fn shear(_parameters: &[f64], _nodes: &ShearNodes, _out: &mut ShearAnswer) -> Result {
         Err(Error::Unsupported)
     }

@@ -4,6 +4,30 @@
 ///
 /// For a contact patch the origin is the body's lowest point along −n at t, `n` points from the soil into the
 /// body, and X1 is the motion of the body within the step, measured from the origin.
+///
+/// ```
+/// use terraglue_subsystem::{Law, Port, PortKind, component};
+///
+/// let port = Port {
+///     key: 1,
+///     kind: PortKind::Contact as u32,
+///     side: 1,
+///     mask: component::N | component::T1,
+///     first: 2,
+///     body: 0,
+///     shape: 0,
+///     first_node: 0,
+///     node_count: 0,
+///     origin: [0.0; 3],
+///     frame: [0.0, 0.0, 1.0, 1.0, 0.0, 0.0, 0.0, 1.0, 0.0],
+///     extent: [0.0; 2],
+///     law: Law::UNILATERAL,
+/// };
+/// // the normal force is component 2 of the packed vector, the force along x component 3
+/// assert_eq!(port.range(), 2..4);
+/// let (force, moment) = port.wrench_in_world(&[0.0, 0.0, 20.0, 5.0]);
+/// assert_eq!((force, moment), ([5.0, 0.0, 20.0], [0.0; 3]));
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Port {
@@ -50,6 +74,14 @@ pub enum PortKind {
 /// t_min ≤ T_n ≤ t_max, |T_t| ≤ mu·T_n, residual x1 − x2 + compliance·T.
 ///
 /// Bilateral −∞, ∞; unilateral 0, ∞; yielding 0, cap.
+///
+/// ```
+/// use terraglue_subsystem::Law;
+///
+/// // ground that pushes with 50 N at most and has a friction coefficient of 0.6
+/// let soft = Law { t_max: 50.0, mu: 0.6, ..Law::UNILATERAL };
+/// assert_eq!((soft.t_min, soft.compliance), (0.0, 0.0));
+/// ```
 #[repr(C)]
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Law {

@@ -19,6 +19,10 @@ pub trait Module {
     fn schema() -> Schema;
     /// Makes an instance. May allocate and read files below `host.folder()`. The terrain of the host may be
     /// read during this call only.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: parameters without sense. [`Error::Failed`]: a file that cannot be read, or whatever else is
+    /// missing.
     fn instantiate(config: &Config, host: Arc<dyn Host>) -> Result<Box<dyn Subsystem>>;
 }
 
@@ -33,6 +37,9 @@ pub trait Subsystem: Send {
     /// for a soil, t = the wrench of its law at that X. A ground may narrow `laws` (mu = tan φ, t_max), one
     /// per port; a ground's `x` along n is its own continuous surface x2 below the body, from its unrounded state.
     /// The default suits a body: its origin lies on itself, and it has no force of its own.
+    ///
+    /// # Errors
+    /// [`Error::Failed`]: the subsystem cannot answer for these ports.
     fn set_ports(&mut self, _step: &Step, _laws: &mut [Law], now: &mut Response) -> Result {
         for values in [&mut *now.x, &mut *now.v, &mut *now.a, &mut *now.t] {
             values.fill(0.0);
@@ -42,21 +49,34 @@ pub trait Subsystem: Send {
 
     /// Paper, step 2. If the other side of every contact were rigid and stood at `partner` at t + h: which
     /// wrenches? Solved, not applied.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`]: not offered. [`Error::Discard`]: the step is too long. [`Error::Failed`]: no solution was found.
     fn estimate_forces(&mut self, _step: &Step, _partner: &Motion, _out: &mut Estimate) -> Result {
         Err(Error::Unsupported)
     }
 
     /// Paper, step 3. Given the estimate: `out.t` = T1, `out.x` = own surface under it. A trial.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`]: not offered. [`Error::Discard`]: the step is too long. [`Error::Failed`]: no solution was found.
     fn solve_compatibility(&mut self, _step: &Step, _estimate: &Estimate, _out: &mut Response) -> Result {
         Err(Error::Unsupported)
     }
 
     /// Paper, steps 3 and 4. A trial from the committed state; without ports, a plain step.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`]: an input that is not offered. [`Error::Discard`]: the step is too long. [`Error::Failed`]: no
+    /// solution was found.
     fn advance(&mut self, step: &Step, input: &Input, out: &mut Response) -> Result;
 
     /// Trials of one step under several wrenches (packed one after the other in `t`), each from the committed state: all
     /// columns of a difference in one exchange. The last one counts as the last trial. Worth an implementation of its own
     /// where every call has a price.
+    ///
+    /// # Errors
+    /// As [`Subsystem::advance`].
     fn advance_batch(&mut self, step: &Step, t: &[f64], out: &mut Batch) -> Result {
         out.one_by_one(step, t, |step, input, out| self.advance(step, input, out))
     }
@@ -65,31 +85,49 @@ pub trait Subsystem: Send {
     /// After `Motion`: K = d(wrench on itself)/dX (position) or /dV (velocity), sign as for a spring: the
     /// wrench on a soil grows with the motion that presses it, K is positive semi-definite. After `Force` with
     /// motion: column n of a port is dX_n/dT_n and dT_t/dT_n, columns t and m are dT/dX as after `Motion`.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`]: not offered, or not at this level.
     fn interface_jacobian(&mut self, _step: &Step, _level: Level, _out: &mut [f64]) -> Result {
         Err(Error::Unsupported)
     }
 
     /// Paper, step 5. The last trial is accepted under T; the other side has moved to `partner`.
+    ///
+    /// # Errors
+    /// [`Error::Failed`]: the state at t + h cannot be formed.
     fn commit(&mut self, _step: &Step, _t: &[f64], _partner: &Motion) -> Result {
         Ok(())
     }
 
     /// The committed state, exactly, into one of `host.slots()` numbered slots.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`]: not offered. [`Error::Refused`]: there is no such slot.
     fn save_state(&mut self, _slot: u32) -> Result {
         Err(Error::Unsupported)
     }
 
     /// Back to the state of a slot.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`]: not offered. [`Error::Refused`]: nothing was saved in the slot.
     fn restore_state(&mut self, _slot: u32) -> Result {
         Err(Error::Unsupported)
     }
 
     /// The committed state as bytes with a version, for another process or day.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`]: not offered.
     fn serialize(&self) -> Result<Vec<u8>> {
         Err(Error::Unsupported)
     }
 
     /// Back to a state made by `serialize`.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`]: not offered. [`Error::Refused`]: the bytes are no state of this instance, which is unchanged.
     fn deserialize(&mut self, _bytes: &[u8]) -> Result {
         Err(Error::Unsupported)
     }
@@ -100,17 +138,27 @@ pub trait Subsystem: Send {
     }
 
     /// Committed values of the variables `ids`, all of the type of `out`.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: an unknown id or another type. [`Error::Unsupported`]: there are no variables.
     fn get(&self, _ids: &[u32], _out: ValuesMut) -> Result {
         Err(Error::Unsupported)
     }
 
     /// New values for the variables `ids`; effective from the next step on.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: an unknown id, another type, or a value that is not acceptable. [`Error::Unsupported`]: there are no
+    /// variables.
     fn set(&mut self, _ids: &[u32], _values: Values) -> Result {
         Err(Error::Unsupported)
     }
 
     /// d(unknowns)/d(knowns)·seed of f64 variables at the committed time, where it is known without trying. Loops of
     /// connected values at the start are solved with it; without it they are solved with differences.
+    ///
+    /// # Errors
+    /// [`Error::Unsupported`]: it is not known without trying.
     fn directional_derivative(
         &self,
         _unknowns: &[u32],
@@ -127,6 +175,9 @@ pub trait Subsystem: Send {
     }
 
     /// Does an action; `arguments` is a JSON object.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: an unknown action, or one that cannot be done now. [`Error::Unsupported`]: there are no actions.
     fn act(&mut self, _action: &str, _arguments: &str) -> Result {
         Err(Error::Unsupported)
     }
@@ -142,6 +193,9 @@ pub trait Subsystem: Send {
     }
 
     /// Committed states of the scene's bodies, in its order.
+    ///
+    /// # Errors
+    /// [`Error::Failed`]: the states cannot be told.
     fn body_states(&self, _out: &mut [BodyState]) -> Result {
         Ok(())
     }
@@ -152,6 +206,9 @@ pub trait Subsystem: Send {
     }
 
     /// Tile (a, b) of field number `field`.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: there is no such field or tile. [`Error::Unsupported`]: there are no fields.
     fn field_tile(&self, _field: usize, _a: u32, _b: u32) -> Result<FieldTile<'_>> {
         Err(Error::Unsupported)
     }

@@ -3,6 +3,14 @@
 use crate::port::{Node, Port};
 
 /// One communication step as this subsystem sees it. Borrowed: nothing in it outlives the call.
+///
+/// ```
+/// use terraglue_subsystem::Step;
+///
+/// // the third step of 1 ms of a subsystem without ports
+/// let step = Step::free(0.002, 0.001, 2);
+/// assert!(step.ports.is_empty() && step.n == 0 && (step.t + step.h - 0.003).abs() < 1e-15);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Step<'a> {
     /// Time at the start of the step, s.

@@ -58,6 +58,9 @@ impl Unit {
 
     /// Reads `N m`, `kg m^2`, `rad/s`, `m/s^2`, `N m s/rad`, `A/(N m)`. What follows a `/` is divided, up to the end,
     /// with or without parentheses. `× 0.3048` and `+ 273.15` at the end are a factor and an offset to SI.
+    ///
+    /// # Errors
+    /// [`UnknownUnit`] with the symbol that is not known.
     pub fn parse(text: &str) -> Result<Self, UnknownUnit> {
         if let Some((symbols, rest)) = text.split_once('×') {
             let (factor, offset) = rest.split_once(" + ").unwrap_or((rest, "0"));

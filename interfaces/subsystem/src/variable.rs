@@ -1,6 +1,15 @@
 //! The standardised I/O model: everything worth reading or changing is a named, typed variable with a unit.
 
 /// A variable of an instance. A name has dotted parts, e.g. `LF_j2.max_torque`.
+///
+/// ```
+/// use terraglue_subsystem::{Causality, Effect, Variable};
+///
+/// let torque = Variable::real(7, "LF_j2.max_torque", "N m", Causality::Parameter, "Largest torque of the motor");
+/// assert_eq!((torque.effect, torque.len()), (Effect::Live, 1));
+/// let gains = Variable { dims: vec![2, 3], ..torque };
+/// assert_eq!((gains.len(), gains.element_name(5)), (6, "LF_j2.max_torque[2,3]".to_owned()));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Variable {
     /// Number used by `get` and `set`; unique in the instance.

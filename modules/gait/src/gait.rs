@@ -1,8 +1,9 @@
 //! The subsystem: trials, commits, snapshots and variables around the walker.
 
+use crate::command::Command;
 use crate::parameters::{Settings, schema, settings};
 use crate::variables;
-use crate::walker::{Command, Walker};
+use crate::walker::Walker;
 use std::sync::Arc;
 use terraglue_subsystem::bytes;
 use terraglue_subsystem::{

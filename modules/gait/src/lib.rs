@@ -22,6 +22,7 @@
 #[doc = include_str!("../README.md")]
 struct Readme;
 
+pub mod command;
 pub mod foot;
 mod gait;
 pub mod geometry;

@@ -1,10 +1,10 @@
 //! Parameters of the module: the schema that the host checks a scenario against, and the checked values.
 
+use crate::command::Command;
 use crate::foot::{Search, Swing, TouchDown};
 use crate::geometry::{LEGS, Leg};
 use crate::pattern::{NAMES, Pattern};
 use crate::posture::Gains;
-use crate::walker::Command;
 use std::f64::consts::FRAC_PI_2;
 use terraglue_subsystem::{Config, Error, Kind, Parameter, ParameterType, Result, Schema};
 

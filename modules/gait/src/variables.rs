@@ -1,8 +1,9 @@
 //! The variables of the module: one table of names, and what each one reads and writes.
 
+use crate::command::Command;
 use crate::geometry::{JOINTS, LEG_NAMES, LEGS};
 use crate::pattern::{NAMES, Pattern};
-use crate::walker::{Command, Walker};
+use crate::walker::Walker;
 use terraglue_subsystem::{Causality, Error, Result, ValueType, Variable};
 
 /// Number of joint targets, the first variables.

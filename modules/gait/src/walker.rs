@@ -1,5 +1,6 @@
 //! The walking machine: command in, joint angles out; standing, walking and stopping.
 
+use crate::command::Command;
 use crate::foot::{Cycle, Foot, Search, Sensed, TouchDown, Twist};
 use crate::geometry::{JOINTS, LEGS};
 use crate::load::Load;
@@ -9,29 +10,6 @@ use crate::plane::Plane;
 use crate::posture::{Posture, wrap};
 use terraglue_subsystem::Result;
 use terraglue_subsystem::bytes::{self, Persist};
-
-/// What is asked of the walker and what it measures; may change before every step.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Command {
-    /// Forward speed, m/s.
-    pub speed: f64,
-    /// Turn rate, rad/s; the heading to be held turns with it.
-    pub turn_rate: f64,
-    /// Heading in the world at the start, rad.
-    pub heading: f64,
-    /// Height of the swing, m.
-    pub lift: f64,
-    /// Pattern; a change stops the robot first.
-    pub pattern: Pattern,
-    /// Whether the tilt corrects the feet.
-    pub posture_feedback: bool,
-    /// Whether the heading error turns the robot.
-    pub heading_feedback: bool,
-    /// Measured roll, pitch and yaw of the body, rad.
-    pub attitude: [f64; 3],
-    /// Measured normal force on each foot, N; none where nobody has ever told it.
-    pub contact: [Option<f64>; LEGS],
-}
 
 /// What the machine is doing.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -262,17 +240,6 @@ fn moves(command: &Command) -> bool {
     command.speed != 0.0 || command.turn_rate != 0.0
 }
 
-terraglue_subsystem::persist!(Command {
-    speed,
-    turn_rate,
-    heading,
-    lift,
-    pattern,
-    posture_feedback,
-    heading_feedback,
-    attitude,
-    contact,
-});
 terraglue_subsystem::persist!(Walker {
     mode,
     pattern,

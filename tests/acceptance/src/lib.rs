@@ -22,11 +22,17 @@ pub fn shipped(name: &str, sets: &[(&str, &str)]) -> Scenario {
 }
 
 /// Builds with one thread.
+///
+/// # Errors
+/// As [`Testbed::build`].
 pub fn build(scenario: &Scenario) -> Result<Testbed> {
     Testbed::build_with(scenario, &Options { threads: 1, ..Options::default() }, &terraglue::library())
 }
 
 /// Builds a scenario of the modules of the glue cases from its text, with one thread.
+///
+/// # Errors
+/// As [`Testbed::build`], or a text that is no scenario.
 pub fn glued(text: &str) -> Result<Testbed> {
     let scenario = Scenario::parse(text, "test.toml", &[])?;
     let library = terraglue::library()

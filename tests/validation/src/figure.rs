@@ -1,6 +1,7 @@
 //! One measured figure and its limit.
 
 use std::fmt;
+use std::str::FromStr;
 
 /// What a figure is held against.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -16,7 +17,8 @@ pub enum Limit {
 }
 
 impl Limit {
-    fn holds(self, value: f64) -> bool {
+    /// Whether a value is within the limit; what is not a number never is.
+    pub fn holds(self, value: f64) -> bool {
         match self {
             Self::AtMost(limit) => value <= limit,
             Self::AtLeast(limit) => value >= limit,
@@ -33,6 +35,22 @@ impl fmt::Display for Limit {
             Self::AtLeast(x) => write!(f, ">= {x}"),
             Self::Equal(x) => write!(f, "= {x}"),
             Self::None => write!(f, "-"),
+        }
+    }
+}
+
+impl FromStr for Limit {
+    type Err = String;
+
+    /// Reads what is displayed.
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number = |x: &str| x.parse().map_err(|e| format!("limit `{text}`: {e}"));
+        match text.split_once(' ') {
+            Some(("<=", x)) => number(x).map(Self::AtMost),
+            Some((">=", x)) => number(x).map(Self::AtLeast),
+            Some(("=", x)) => number(x).map(Self::Equal),
+            None if text == "-" => Ok(Self::None),
+            _ => Err(format!("limit `{text}`: `<= x`, `>= x`, `= x` or `-` is needed")),
         }
     }
 }
@@ -128,6 +146,16 @@ mod tests {
         assert_eq!(Figure::new("a", 1.5e-9, Limit::None, "").value_text(), "1.500e-9");
         let slow = Figure::new("a", 2.0, Limit::AtMost(1.0), "s").timed();
         assert_eq!((slow.verdict(), slow.clone().unjudged().verdict()), ("fail", "info"));
+    }
+
+    #[test]
+    fn a_limit_reads_as_it_is_displayed() {
+        for limit in [Limit::AtMost(1e-12), Limit::AtLeast(-4.5), Limit::Equal(0.0), Limit::None] {
+            assert_eq!(limit.to_string().parse(), Ok(limit));
+        }
+        for text in ["< 1", "<= one", "", "1"] {
+            assert!(text.parse::<Limit>().is_err(), "{text}");
+        }
     }
 
     #[test]

@@ -1,9 +1,9 @@
 //! `cargo xtask validate`: the figures that each area promises, measured and held against their limits.
 //!
 //! One line per figure, tab-separated: `id value limit pass|fail|info|skip what`; `info` has no limit or is not judged. A failure that
-//! `tests/known-failures.tsv` (id, figure reached, bound, reason) lists is tolerated up to its bound; a listed one that passes is not.
-//! What has become thirty times worse than `tests/figures.tsv` fails within its limit. Figures that a clock measures are judged
-//! under `--timing` only.
+//! `tests/known-failures.tsv` (id, figure reached, limit, bound, reason) lists is tolerated up to its bound; a listed one that passes is
+//! not. What has become thirty times worse than `tests/figures.tsv` fails within its limit. Figures that a clock measures are judged
+//! under `--timing` only. The full table of a run is in `target/validation.md`.
 
 mod documents;
 mod faults;
@@ -11,6 +11,7 @@ mod figure;
 mod fmi;
 mod gluing;
 mod known;
+mod page;
 mod parallel;
 mod plugins;
 mod process;
@@ -23,11 +24,12 @@ mod walk;
 
 pub use faults::write_page as write_faults_page;
 pub use figure::{Figure, Limit};
+pub use page::write_page as write_summary_page;
 pub use soil::print_hash as print_soil_hash;
 use table::columns;
 
 use known::KnownFailures;
-use process::{Outcome, cargo, must, program, root};
+use process::{Outcome, cargo, must, program};
 use std::io::IsTerminal;
 use std::path::PathBuf;
 use stored::StoredFigures;
@@ -53,10 +55,10 @@ pub struct Arguments {
     /// One part of the area only, for a look; a wrong name lists the parts.
     #[arg(long, value_name = "NAME", requires = "area")]
     part: Option<String>,
-    /// Write the tables of docs/, and with --quick the values of tests/figures.tsv.
+    /// Write the tables of docs/, and with --quick tests/figures.tsv.
     #[arg(long)]
     write_docs: bool,
-    /// Fail where the tables of docs/ show other figures; they are those of `--quick`.
+    /// Fail where tests/figures.tsv has other figures; they are those of `--quick`.
     #[arg(long, requires = "quick", conflicts_with_all = ["part", "write_docs", "timing"])]
     check_docs: bool,
 }
@@ -117,6 +119,9 @@ fn area_names() -> Vec<&'static str> {
 }
 
 /// Measures, prints and judges.
+///
+/// # Errors
+/// All figures that fail, or a measurement that cannot be made.
 pub fn validate(arguments: &Arguments) -> Outcome {
     if arguments.table.is_some() && arguments.area.as_deref() != Some("gluing") {
         return Err("--table is for the area gluing: cargo xtask validate gluing --table FILE".into());
@@ -136,18 +141,30 @@ pub fn validate(arguments: &Arguments) -> Outcome {
     let part = arguments.table.as_ref().map(|_| "values".to_owned()).or_else(|| arguments.part.clone());
     let table = arguments.table.clone();
     let context = Context { quick: arguments.quick, table, part, ..Context::new(profile) };
-    let complaints = areas().map(|(area, parts)| judged(area, parts, arguments, &context));
-    let complaints = complaints.collect::<Outcome<Vec<_>>>()?.concat();
+    let mut complaints = Vec::new();
+    let measured = areas()
+        .map(|(area, parts)| Ok((*area, judged(area, parts, arguments, &context, &mut complaints)?)))
+        .collect::<Outcome<Vec<_>>>()?;
+    if context.part.is_none() {
+        documents::write_table(&measured)?;
+    }
+    if arguments.write_docs && arguments.is_quick_form() && context.part.is_none() {
+        page::write_page()?;
+    }
     if complaints.is_empty() { Ok(()) } else { Err(complaints.join("\n       ")) }
 }
 
-/// Measures and prints the figures of an area; writes or checks what is kept of them. What is wrong with them.
-fn judged(area: &str, parts: &[Part], arguments: &Arguments, context: &Context) -> Outcome<Vec<String>> {
-    let known = KnownFailures::read(&root().join("tests/known-failures.tsv"))?;
-    let stored = StoredFigures::read()?;
+/// Measures and prints the figures of an area; writes or checks what is kept of them. `complaints` takes what is wrong with them.
+fn judged(
+    area: &str,
+    parts: &[Part],
+    arguments: &Arguments,
+    context: &Context,
+    complaints: &mut Vec<String>,
+) -> Outcome<Vec<Figure>> {
+    let (known, stored) = (KnownFailures::read()?, StoredFigures::read()?);
     let writes = arguments.write_docs && context.table.is_none() && context.part.is_none();
     let compares = arguments.is_quick_form() && !writes;
-    let mut complaints = Vec::new();
     let figures = measured(area, parts, context, |figure| {
         let judged =
             if figure.timed && !arguments.timing { figure.clone().unjudged() } else { figure.clone() };
@@ -156,15 +173,15 @@ fn judged(area: &str, parts: &[Part], arguments: &Arguments, context: &Context) 
         complaints.extend(compares.then(|| stored.judge(&judged)).flatten());
     })?;
     if writes {
-        documents::write_area(area, &figures)?;
+        documents::write_peers(&figures)?;
+    }
+    if arguments.check_docs && context.table.is_none() {
+        complaints.extend(stored.differences(area, &figures));
     }
     if writes && arguments.is_quick_form() {
         stored.write_area(area, &figures)?;
     }
-    if arguments.check_docs && context.table.is_none() {
-        complaints.extend(documents::check_area(area, &figures)?);
-    }
-    Ok(complaints)
+    Ok(figures)
 }
 
 /// The figures of the parts of an area that were asked for; each is shown as soon as it is there.
@@ -188,6 +205,9 @@ fn measured(
 
 /// Prints the bits of all figures of `--quick`, one `id<TAB>bits` a line, with the program of the development profile,
 /// which is built already: `cargo xtask freeze` holds them.
+///
+/// # Errors
+/// A measurement that cannot be made.
 pub fn print_bits() -> Outcome {
     let context = Context { quick: true, ..Context::new("debug") };
     for (area, parts) in AREAS {
@@ -200,6 +220,9 @@ pub fn print_bits() -> Outcome {
 }
 
 /// Draws the pictures of docs/images that are computed.
+///
+/// # Errors
+/// A run that fails, or a picture that cannot be written.
 pub fn write_pictures() -> Outcome {
     must(&mut cargo(&["build", "--package", "terraglue"]))?;
     soil::write_pictures()?;

@@ -19,6 +19,9 @@ enum Command {
     Faults,
     /// Draw the pictures of docs/ that are computed: docs/images/moon_walk.svg, automaton_crater.svg, …
     Pictures,
+    /// Write docs/validation.md from the stored figures, without measuring.
+    #[command(hide = true)]
+    Page,
     /// Print the bits of the quick figures, for `cargo xtask freeze`.
     #[command(hide = true)]
     Bits,
@@ -36,6 +39,7 @@ fn main() -> ExitCode {
         Command::Validate(arguments) => terraglue_validation::validate(&arguments),
         Command::Faults => terraglue_validation::write_faults_page(),
         Command::Pictures => terraglue_validation::write_pictures(),
+        Command::Page => terraglue_validation::write_summary_page(),
         Command::Bits => terraglue_validation::print_bits(),
         Command::SoilHash { quick } => {
             terraglue_validation::print_soil_hash(quick);

@@ -26,6 +26,9 @@ pub enum Install {
 
 impl Install {
     /// Does the command.
+    ///
+    /// # Errors
+    /// The step of the installation that failed.
     pub fn done(&self) -> Outcome {
         match self {
             Self::Dist { built } => install::dist(built.as_deref()),

@@ -35,6 +35,9 @@ pub fn cargo(arguments: &[&str]) -> Command {
 }
 
 /// Runs a command that must succeed, after saying what it is.
+///
+/// # Errors
+/// The command cannot be started, or ends with another status than success.
 pub fn must(command: &mut Command) -> Outcome {
     let words: Vec<_> = command.get_args().map(|a| a.to_string_lossy().into_owned()).collect();
     let name =
@@ -45,11 +48,17 @@ pub fn must(command: &mut Command) -> Outcome {
 }
 
 /// Reads a file of the workspace.
+///
+/// # Errors
+/// The file cannot be read.
 pub fn read(path: &Path) -> Outcome<String> {
     std::fs::read_to_string(path).map_err(|e| format!("{}: {e}", path.display()))
 }
 
 /// Writes a file and the folders above it.
+///
+/// # Errors
+/// The file cannot be written.
 pub fn write(path: &Path, text: &str) -> Outcome {
     let made = path.parent().map_or(Ok(()), std::fs::create_dir_all);
     made.and_then(|()| std::fs::write(path, text)).map_err(|e| format!("{}: {e}", path.display()))

@@ -1,7 +1,7 @@
 //! Calls in any order, as no coordinator makes them.
 
 use super::life_cycle::same;
-use crate::catalogue::{Area, Level, Test};
+use crate::definition::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
 use crate::fixture::{Flat, Runner, Vectors};
 use crate::test_context::TestContext;

@@ -1,6 +1,6 @@
 //! The process of the host is the same before and after: loading and every call leave it alone.
 
-use crate::catalogue::{Area, Level, Test};
+use crate::definition::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
 use crate::fixture::script;
 use crate::test_context::TestContext;

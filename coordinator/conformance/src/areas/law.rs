@@ -2,7 +2,7 @@
 //! top of these, with the law in the soil that comes with the program.
 
 use super::values::not_told;
-use crate::catalogue::{Area, Level, Test};
+use crate::definition::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
 use crate::fixture::LawFixture;
 use crate::test_context::TestContext;

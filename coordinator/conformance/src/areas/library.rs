@@ -1,6 +1,6 @@
 //! What the file is: symbols, table, description, schema.
 
-use crate::catalogue::{Area, Level, Test};
+use crate::definition::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
 use crate::test_context::TestContext;
 use terraglue_fmi::elf::exported_symbols;

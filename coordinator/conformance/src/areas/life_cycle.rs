@@ -1,6 +1,6 @@
 //! Making, using, mixing up and ending instances.
 
-use crate::catalogue::{Area, Level, Test};
+use crate::definition::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
 use crate::fixture::{Flat, Foot, SoilFixture, script};
 use crate::test_context::TestContext;

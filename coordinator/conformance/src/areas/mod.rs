@@ -16,7 +16,7 @@ mod soil_symmetry;
 mod state;
 mod values;
 
-use super::catalogue::Test;
+use super::definition::Test;
 pub use host_untouched::OUTPUT;
 
 /// The lists of all areas, in the order in which they build on each other.

@@ -1,7 +1,7 @@
 //! The same numbers every time, finite ones, and derivatives that are those of the answers.
 
 use super::life_cycle::same;
-use crate::catalogue::{Area, Level, Test};
+use crate::definition::{Area, Level, Test};
 use crate::derivative::{Columns, compare};
 use crate::finding::{ANSWER, Stop, Verdict};
 use crate::fixture::{BodyFixture, Foot, Runner, SoilFixture, committed, script};

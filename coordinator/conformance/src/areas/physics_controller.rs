@@ -1,6 +1,6 @@
 //! What a controller obeys: it is a function of time and inputs, not of how often it is called.
 
-use crate::catalogue::{Area, Level, Test};
+use crate::definition::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
 use crate::fixture::{numbers, outputs, set_numbers};
 use crate::test_context::TestContext;

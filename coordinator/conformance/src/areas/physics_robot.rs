@@ -1,6 +1,6 @@
 //! What bodies obey: momentum, gravity, action and reaction, the rigid estimate.
 
-use crate::catalogue::{Area, Level, Test};
+use crate::definition::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
 use crate::fixture::{BodyFixture, dot};
 use crate::test_context::TestContext;

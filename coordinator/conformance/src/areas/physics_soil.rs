@@ -1,6 +1,6 @@
 //! What every ground obeys, whatever its law: energy is not made, it pushes and never pulls, friction opposes.
 
-use crate::catalogue::{Area, Level, Test};
+use crate::definition::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
 use crate::fixture::{Flat, Foot, Moved, SoilFixture, dot};
 use crate::test_context::TestContext;

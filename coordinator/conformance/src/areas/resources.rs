@@ -1,7 +1,7 @@
 //! Memory, threads and time.
 
 use super::life_cycle::same;
-use crate::catalogue::{Area, Level, Test};
+use crate::definition::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
 use crate::fixture::{Flat, Runner, script};
 use crate::test_context::TestContext;

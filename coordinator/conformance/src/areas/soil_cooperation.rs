@@ -1,6 +1,6 @@
 //! What gluing relies on: force and motion answer each other, the estimate is respected, the ledgers are true.
 
-use crate::catalogue::{Area, Level, Test};
+use crate::definition::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
 use crate::fixture::{Foot, SoilFixture, dot};
 use crate::test_context::TestContext;

@@ -1,6 +1,6 @@
 //! The ledger of a soil: heat and stored energy are the work at its ports, whatever its contacts do, and heat stays heat.
 
-use crate::catalogue::{Area, Level, Test};
+use crate::definition::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
 use crate::fixture::{Flat, Foot, SoilFixture};
 use crate::test_context::TestContext;

@@ -1,7 +1,7 @@
 //! Nothing depends on where the world's origin lies, how a frame is turned, or in which order feet come.
 
 use super::physics_soil::dragged;
-use crate::catalogue::{Area, Level, Test};
+use crate::definition::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
 use crate::fixture::{Flat, Foot, Moved, SoilFixture, dot};
 use crate::test_context::TestContext;

@@ -1,7 +1,7 @@
 //! Saving, going back, trying without leaving a trace.
 
 use super::life_cycle::same;
-use crate::catalogue::{Area, Level, Test};
+use crate::definition::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
 use crate::fixture::{Runner, committed};
 use crate::other_process::{RemoteRun, in_other_process};

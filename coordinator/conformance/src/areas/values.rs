@@ -1,7 +1,7 @@
 //! Variables and actions.
 
 use super::life_cycle::same;
-use crate::catalogue::{Area, Level, Test};
+use crate::definition::{Area, Level, Test};
 use crate::finding::{Stop, Verdict};
 use crate::fixture::{committed, numbers, script};
 use crate::test_context::TestContext;

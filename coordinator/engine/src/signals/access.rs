@@ -67,6 +67,9 @@ impl VariableRef {
     }
 
     /// Committed value of a scalar number, boolean or enumeration as f64.
+    ///
+    /// # Errors
+    /// A variable that is an array, a text or bytes, or a module that cannot give the value.
     pub fn number(self, instances: &[Instance]) -> Result<f64> {
         let instance = &instances[self.slot];
         let v = &instance.variables()[self.variable];
@@ -128,6 +131,9 @@ impl VariableRef {
 
     /// Sets a value from a scenario, an operator or a script. Refuses with the reason: read-only, out of range,
     /// wrong type, or too late.
+    ///
+    /// # Errors
+    /// A module that fails; a value that is not accepted is [`Reply::Refused`].
     pub fn set(
         self,
         instances: &mut [Instance],

@@ -42,12 +42,18 @@ impl Link {
     }
 
     /// Sets the inputs to the values that were read last.
+    ///
+    /// # Errors
+    /// [`Error::Module`](terraglue_diagnostics::Error::Module): the subsystem refuses the values or fails.
     #[inline]
     pub fn pass_on(&self, instances: &mut [Instance]) -> Result {
         self.write(instances, &self.numbers[..self.count()])
     }
 
     /// Values of the outputs, in the units of the inputs.
+    ///
+    /// # Errors
+    /// [`Error::Module`](terraglue_diagnostics::Error::Module): a value is NaN, or the subsystem fails.
     pub fn read(&mut self, instances: &[Instance]) -> Result<&[f64]> {
         let n = self.ids.len() / 2;
         let (values, conversion) = self.numbers.split_at_mut(n);
@@ -64,6 +70,9 @@ impl Link {
     }
 
     /// Derivatives of its values by entry `k` of the inputs that `other` feeds, where the subsystem between knows them.
+    ///
+    /// # Errors
+    /// [`Error::Module`](terraglue_diagnostics::Error::Module): the subsystem fails.
     pub fn derivatives(&self, instances: &[Instance], other: &Self, k: usize) -> Result<Option<Vec<f64>>> {
         let mut out = vec![0.0; self.count()];
         if self.from == other.to {
@@ -76,6 +85,9 @@ impl Link {
     }
 
     /// Sets the inputs.
+    ///
+    /// # Errors
+    /// [`Error::Module`](terraglue_diagnostics::Error::Module): the subsystem refuses the values or fails.
     pub fn write(&self, instances: &mut [Instance], values: &[f64]) -> Result {
         let target = &mut instances[self.to];
         match target.set(self.input_ids(), Values::F64(values))? {
@@ -175,6 +187,9 @@ fn shapes_differ(directory: &Directory, name: &str, target: &str) -> Option<Stri
 }
 
 /// Resolves all connections of a scenario into links, in the order of the file.
+///
+/// # Errors
+/// A connection that matches no variable, names one that does not exist, joins values that do not fit, or feeds an input twice.
 pub fn connect(
     connections: &[Connection],
     directory: &Directory,

@@ -78,6 +78,9 @@ impl Discrete {
     }
 
     /// Takes the committed value.
+    ///
+    /// # Errors
+    /// A value without an entry in the table, a result that is no whole number, or NaN; a subsystem that fails.
     pub fn read(&mut self, instances: &[Instance]) -> Result {
         self.take(instances)?;
         if let (Value::Whole(w), Some(table)) = (&self.value, &self.table) {
@@ -119,6 +122,9 @@ impl Discrete {
     }
 
     /// Sets the input to the value that was taken last.
+    ///
+    /// # Errors
+    /// A value that does not fit the type of the input, or that the subsystem refuses.
     pub fn pass_on(&self, instances: &mut [Instance]) -> Result {
         let v = self.to.describe(instances);
         let (id, kind) = ([v.id], v.value_type);

@@ -40,6 +40,9 @@ pub struct TimeLine {
 
 impl TimeLine {
     /// Resolves names and checks what the events would set.
+    ///
+    /// # Errors
+    /// An event that names a variable or action that does not exist, or sets a value that is not accepted or comes too late.
     pub fn new(
         specs: &[EventSpec],
         directory: &Directory,

@@ -8,11 +8,14 @@
 use super::connection::Link;
 use terraglue_diagnostics::{Error, Result};
 use terraglue_host::Instance;
+use terraglue_numerics::dense::Lu;
 
 /// Iterations of Newton before a loop counts as without a solution.
 const ITERATIONS: u32 = 50;
 /// Relative size of a residual at which it counts as solved.
 const SOLVED: f64 = 1e-12;
+/// A loop whose smallest pivot is below this share of the largest has no solution of its own.
+const SINGULAR: f64 = 1e-9;
 /// Relative step of a difference.
 const DIFFERENCE: f64 = 1e-7;
 
@@ -45,7 +48,7 @@ fn newton(links: &mut [Link], instances: &mut [Instance], mut u: Vec<f64>) -> Re
             return write(links, instances, &u);
         }
         let jacobian = differences(links, instances, &u, &residual)?;
-        let Some(step) = solve(jacobian, &residual) else { break };
+        let Some(step) = solve(&jacobian, &residual) else { break };
         let mut share = 1.0;
         let (mut best, there) = (None, size(&residual));
         // The full step, halved while it makes things worse.
@@ -110,30 +113,14 @@ fn known(links: &[Link], instances: &[Instance], l: usize, e: usize) -> Result<O
     Ok(Some(column))
 }
 
-/// Gauss with pivoting; none where the matrix is singular.
-fn solve(columns: Vec<Vec<f64>>, right: &[f64]) -> Option<Vec<f64>> {
-    let n = right.len();
-    let mut rows: Vec<Vec<f64>> =
-        (0..n).map(|r| columns.iter().map(|c| c[r]).chain([right[r]]).collect()).collect();
-    for k in 0..n {
-        let pivot = (k..n).max_by(|a, b| rows[*a][k].abs().total_cmp(&rows[*b][k].abs()))?;
-        rows.swap(k, pivot);
-        if rows[k][k].abs() < 1e-9 {
-            return None;
-        }
-        for r in k + 1..n {
-            let factor = rows[r][k] / rows[k][k];
-            for c in k..=n {
-                rows[r][c] -= factor * rows[k][c];
-            }
-        }
-    }
-    let mut x = vec![0.0; n];
-    for k in (0..n).rev() {
-        let sum: f64 = (k + 1..n).map(|c| rows[k][c] * x[c]).sum();
-        x[k] = (rows[k][n] - sum) / rows[k][k];
-    }
-    Some(x)
+/// The step of Newton; none where the Jacobian is singular.
+fn solve(columns: &[Vec<f64>], right: &[f64]) -> Option<Vec<f64>> {
+    let (n, mut lu, mut x) = (right.len(), Lu::default(), right.to_vec());
+    let full = lu.factor(n, |r, c| columns[c][r]) == n && lu.weakest() >= SINGULAR;
+    full.then(|| {
+        lu.solve(&mut x);
+        x
+    })
 }
 
 #[cold]

@@ -11,6 +11,7 @@ mod initial;
 mod modifier;
 pub mod pattern;
 mod table;
+mod traffic;
 
 pub use access::{Directory, VariableRef};
 pub use connection::{Link, Links, connect};
@@ -18,3 +19,4 @@ pub use discrete::Discrete;
 pub use event::{Due, TimeLine};
 pub use fault::Faults;
 pub use initial::initialize;
+pub use traffic::Signals;

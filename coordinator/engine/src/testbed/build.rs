@@ -1,9 +1,14 @@
 //! From a checked scenario to a testbed: terrain, modules, instances, the group of glued subsystems, signals.
 
+use super::glued::GluedGroups;
+use super::group::Group;
 use super::pieces;
-use super::uncoupled::{StepSchedule, Uncoupled};
-use super::{Group, Member, Options, Testbed};
-use crate::signals::{self, Directory, Faults, TimeLine};
+use super::run_clock::RunClock;
+use super::schedule::StepSchedule;
+use super::subsystems::{Member, Subsystems};
+use super::uncoupled::Uncoupled;
+use super::{Options, Testbed};
+use crate::signals::{self, Directory, Faults, Signals, TimeLine};
 use std::sync::Arc;
 use std::time::Duration;
 use terraglue_diagnostics::{Error, Result};
@@ -25,7 +30,7 @@ use terraglue_scenario::{
     Entry, GlueSpec, GluingSpec, InputError, IsolationSpec, LevelChoice, Scenario, StrategyKind,
     SubsystemSpec,
 };
-use terraglue_subsystem::{BodyState, Capabilities, Config, Energy, Kind, Law, Level, Subsystem, Terrain};
+use terraglue_subsystem::{BodyState, Capabilities, Config, Kind, Law, Level, Subsystem, Terrain};
 use terraglue_terrain as terrain;
 
 impl Testbed {
@@ -38,11 +43,17 @@ impl Testbed {
     }
 
     /// The same; modules linked into the program come first.
+    ///
+    /// # Errors
+    /// As [`Testbed::build`].
     pub fn build_with(scenario: &Scenario, options: &Options, library: &Library) -> Result<Self> {
         Self::build_hosted(scenario, options, library, |services| services)
     }
 
     /// The same with services that the caller changes: the log, the number of states that can be kept.
+    ///
+    /// # Errors
+    /// As [`Testbed::build`].
     pub fn build_hosted(
         scenario: &Scenario,
         options: &Options,
@@ -52,67 +63,87 @@ impl Testbed {
         let services = services(scenario, options, true)?;
         let terrain = services.terrain.clone();
         let services = change(services);
-        let advice = [scenario::advice::late_events(scenario), scenario::advice::unread_keys(scenario)];
-        let doubt = scenario::plausible::terrain(scenario);
-        let long = scenario::advice::many_steps(scenario);
-        advice.iter().flatten().chain(&doubt).chain(&long).for_each(|advice| log::warn!("{advice}"));
+        advise(scenario);
         let instances = instantiate(scenario, options, library, &services)?;
-        let directory = Directory::new(&instances);
-        let links = signals::connect(&scenario.connections, &directory, &instances, &scenario.source)?;
-        let time_line = TimeLine::new(&scenario.events, &directory, &instances, &scenario.source)?;
-        let random = (scenario.world.seed, scenario.time.step_s);
-        let source = &scenario.source;
-        let faults = Faults::new(&scenario.faults, &links.numbers, &directory, &instances, source, random)?;
-        check_report(scenario, &directory, &instances)?;
+        let mut signals = signals(scenario, &instances)?;
+        check_report(scenario, &signals.directory, &instances)?;
         let groups = groups(scenario, &instances)?;
         check_settling(scenario, &groups, &instances)?;
-        let ground = groups.iter().find(|g| g.problem.has_grounds());
-        let detector = detector(ground, &instances, terrain.as_deref())?;
-        let mut testbed = Self {
+        let mut subsystems = Subsystems {
             schedules: schedules(scenario, &instances, &groups),
             members: instances.iter().map(member).collect(),
-            detector,
-            gravity: services.gravity,
-            contact_margin_m: scenario.gluing.contact_margin_m,
-            control: control(scenario, &groups, &instances)?,
-            groups,
-            no_ports: PortSet::default(),
-            failed: "none",
-            links,
-            time_line,
-            faults,
-            exact: takes_parts(scenario, &instances),
-            directory,
             instances,
-            events: Vec::new(),
-            report: StepReport { converged: true, ..StepReport::default() },
-            timings: Timings::default(),
-            uncoupled: Uncoupled::new(services.workers.clone()),
-            cancel: options.cancel.clone(),
-            standing: options.standing.clone(),
-            teardown_errors: services.teardown_errors.clone(),
-            step_s: scenario.time.step_s,
-            origin_s: 0.0,
-            nominal: 0,
-            index: 0,
-            t: 0.0,
-            last_h: 0.0,
-            settle_s: scenario.time.settle_s,
-            before: Energy::default(),
-            halvings: 0,
-            max_halvings: scenario.gluing.max_halvings,
-            started: false,
         };
-        let glued = testbed.instances.iter_mut().zip(&testbed.schedules).filter(|(_, turn)| turn.glued);
-        glued.for_each(|(instance, _)| instance.watch());
-        testbed.initialize_signals()?;
-        testbed.read_states()?;
-        if let Err(Error::Simulation { message, .. }) = testbed.detect_contacts(scenario.time.step_s) {
+        let mut glued = glued(scenario, groups, &subsystems.instances, terrain.as_deref(), services.gravity)?;
+        let Subsystems { instances, schedules, .. } = &mut subsystems;
+        let with_glue = instances.iter_mut().zip(schedules).filter(|(_, turn)| turn.glued);
+        with_glue.for_each(|(instance, _)| instance.watch());
+        signals.initialize(&mut subsystems.instances)?;
+        subsystems.read_states()?;
+        if let Err(Error::Simulation { message, .. }) =
+            glued.detect_contacts(0.0, scenario.time.step_s, &subsystems)
+        {
             let help = "docs/scenario.md has the keys of `[terrain]`, `terraglue modules NAME` those that set a body down";
             return Err(InputError::plain(format!("at the start: {message}"), Some(help.into())).into());
         }
-        Ok(testbed)
+        Ok(Self {
+            exact: takes_parts(scenario, &subsystems.instances),
+            subsystems,
+            glued,
+            uncoupled: Uncoupled::new(services.workers.clone()),
+            signals,
+            clock: RunClock::new(scenario.time.step_s),
+            events: Vec::new(),
+            report: StepReport { converged: true, ..StepReport::default() },
+            timings: Timings::default(),
+            cancel: options.cancel.clone(),
+            standing: options.standing.clone(),
+            teardown_errors: services.teardown_errors.clone(),
+            last_h: 0.0,
+            settle_s: scenario.time.settle_s,
+            halvings: 0,
+            max_halvings: scenario.gluing.max_halvings,
+        })
     }
+}
+
+/// Warns of what a scenario says in vain or hardly means.
+fn advise(scenario: &Scenario) {
+    let advice = [scenario::advice::late_events(scenario), scenario::advice::unread_keys(scenario)];
+    let doubt = scenario::plausible::terrain(scenario);
+    let long = scenario::advice::many_steps(scenario);
+    advice.iter().flatten().chain(&doubt).chain(&long).for_each(|advice| log::warn!("{advice}"));
+}
+
+/// Connections, events and faults.
+fn signals(scenario: &Scenario, instances: &[Instance]) -> Result<Signals> {
+    let source = &scenario.source;
+    let directory = Directory::new(instances);
+    let links = signals::connect(&scenario.connections, &directory, instances, source)?;
+    let time_line = TimeLine::new(&scenario.events, &directory, instances, source)?;
+    let random = (scenario.world.seed, scenario.time.step_s);
+    let faults = Faults::new(&scenario.faults, &links.numbers, &directory, instances, source, random)?;
+    Ok(Signals { links, directory, time_line, faults })
+}
+
+/// Groups with the detection of their contacts.
+fn glued(
+    scenario: &Scenario,
+    groups: Vec<Group>,
+    instances: &[Instance],
+    terrain: Option<&dyn Terrain>,
+    gravity: [f64; 3],
+) -> Result<GluedGroups> {
+    let ground = groups.iter().find(|g| g.problem.has_grounds());
+    Ok(GluedGroups {
+        detector: detector(ground, instances, terrain)?,
+        control: control(scenario, &groups, instances)?,
+        groups,
+        no_ports: PortSet::default(),
+        failed: "none",
+        gravity,
+        contact_margin_m: scenario.gluing.contact_margin_m,
+    })
 }
 
 /// FMUs know no time before their start, so none can be among what comes to rest before t = 0.
@@ -138,6 +169,9 @@ fn takes_parts(scenario: &Scenario, instances: &[Instance]) -> bool {
 }
 
 /// What instances of a scenario are offered; `ground`: with the terrain, where it has one.
+///
+/// # Errors
+/// [`Error::Input`]: the terrain of the scenario cannot be made.
 pub fn services(scenario: &Scenario, options: &Options, ground: bool) -> Result<HostServices> {
     let terrain: Option<Arc<dyn Terrain>> = match scenario.terrain.as_ref().filter(|_| ground) {
         Some(spec) => Some(Arc::from(terrain::build(spec, scenario.world.seed)?)),
@@ -153,6 +187,9 @@ pub fn services(scenario: &Scenario, options: &Options, ground: bool) -> Result<
 }
 
 /// The module of a subsystem.
+///
+/// # Errors
+/// [`Error::Input`]: there is no such module, or it cannot be loaded.
 pub fn find(
     scenario: &Scenario,
     spec: &SubsystemSpec,
@@ -171,6 +208,9 @@ fn isolation(spec: &IsolationSpec) -> Isolation {
 }
 
 /// An instance of a module, in this process or in one of its own.
+///
+/// # Errors
+/// [`Error::Input`]: the module refuses its parameters or cannot make an instance.
 pub fn make(
     scenario: &Scenario,
     spec: &SubsystemSpec,
@@ -245,6 +285,9 @@ fn stay_in(folder: std::io::Result<std::path::PathBuf>, name: &str) {
 }
 
 /// The same parameters with the file of the law that they name.
+///
+/// # Errors
+/// [`Error::Input`]: the file of the law is not found.
 pub fn with_law(
     config: Config,
     search: &SearchPath,
@@ -421,8 +464,8 @@ fn group(
     for recipe in glue.iter().filter(own) {
         problem.glue.add(recipe, |slot, body| states[slot][body as usize]);
     }
-    problem.stabilisation = scenario.gluing.stabilisation;
-    problem.level = match scenario.gluing.level {
+    problem.conditions.stabilisation = scenario.gluing.stabilisation;
+    problem.conditions.level = match scenario.gluing.level {
         LevelChoice::Position => Level::Position,
         LevelChoice::Velocity => Level::Velocity,
         LevelChoice::Acceleration => Level::Acceleration,

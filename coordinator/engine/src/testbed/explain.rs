@@ -1,7 +1,11 @@
 //! How values go round in a run: the order of the exchange, what every connection does and how late it is, loops.
 
 use super::Testbed;
+use super::group::Group;
+use super::schedule::StepSchedule;
+use crate::signals::Links;
 use serde::{Deserialize, Serialize};
+use terraglue_host::Instance;
 use terraglue_scenario::Scenario;
 use terraglue_subsystem::Capabilities;
 
@@ -34,14 +38,30 @@ pub struct ConnectionNote {
 impl Testbed {
     /// Explains the exchange of a run.
     pub fn explain(&self) -> Explanation {
-        let ends = self.ends();
+        let sight = Sight {
+            instances: self.instances(),
+            links: &self.signals.links,
+            schedules: &self.subsystems.schedules,
+            groups: &self.glued.groups,
+        };
+        let ends = sight.ends();
         Explanation {
-            order: self.order(&ends),
-            connections: ends.iter().map(|end| self.connection_note(end)).collect(),
-            loops: self.loops(&ends),
+            order: sight.order(&ends),
+            connections: ends.iter().map(|end| sight.connection_note(end)).collect(),
+            loops: sight.loops(&ends),
         }
     }
+}
 
+/// What an explanation is made of.
+struct Sight<'a> {
+    instances: &'a [Instance],
+    links: &'a Links,
+    schedules: &'a [StepSchedule],
+    groups: &'a [Group],
+}
+
+impl Sight<'_> {
     fn ends(&self) -> Vec<ConnectionEnds> {
         let numbers = self.links.numbers.iter().flat_map(|link| {
             link.ends().map(|([from, to], conversion)| ConnectionEnds {
@@ -51,7 +71,7 @@ impl Testbed {
                 by_table: false,
             })
         });
-        let variable = |at: crate::signals::VariableRef| (at.slot, at.describe(&self.instances).id);
+        let variable = |at: crate::signals::VariableRef| (at.slot, at.describe(self.instances).id);
         let discrete = self.links.discrete.iter().map(|d| {
             let [from, to] = d.ends().map(variable);
             ConnectionEnds { from, to, conversion: d.conversion(), by_table: d.has_table() }
@@ -83,7 +103,7 @@ impl Testbed {
                 list(&to)
             ));
         }
-        let alone = self.instances.iter().zip(&self.schedules).filter(|(_, turn)| !turn.glued);
+        let alone = self.instances.iter().zip(self.schedules).filter(|(_, turn)| !turn.glued);
         let alone: Vec<String> = alone
             .map(|(instance, turn)| match turn.step_multiple {
                 1 => instance.name().to_owned(),
@@ -93,7 +113,7 @@ impl Testbed {
         if !alone.is_empty() {
             order.push(format!("a step of each subsystem without glue, in any order: {}", alone.join(", ")));
         }
-        for group in &self.groups {
+        for group in self.groups {
             let members: Vec<&str> = group.problem.members().map(name).collect();
             order.push(format!(
                 "glued together by `{}`, without delay: {}",
@@ -101,7 +121,7 @@ impl Testbed {
                 members.join(", ")
             ));
         }
-        let all: Vec<&str> = self.instances.iter().map(terraglue_host::Instance::name).collect();
+        let all: Vec<&str> = self.instances.iter().map(Instance::name).collect();
         order.push(format!("the step is accepted by all: {}", all.join(", ")));
         order
     }

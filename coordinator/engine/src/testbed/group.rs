@@ -1,6 +1,6 @@
 //! A group: subsystems that are glued to each other, with their strategy and what it keeps from step to step.
 
-use super::Member;
+use super::subsystems::Member;
 use std::time::Instant as Clock;
 use terraglue_diagnostics::Result;
 use terraglue_gluing::contact::PortSet;
@@ -75,11 +75,11 @@ impl Group {
             return; // its surface is where the body went, by definition
         }
         for port in &problem.ports {
-            if problem.rows[port.first as usize] == ConstraintKind::Joint {
+            if problem.conditions.kinds[port.first as usize] == ConstraintKind::Joint {
                 continue; // the strategy itself measures the gap of joints
             }
             if self.closed.binary_search(&port.key).is_ok() {
-                let gap = problem.x2[port.first as usize].abs();
+                let gap = problem.second.x[port.first as usize].abs();
                 problem.report.max_gap_m = problem.report.max_gap_m.max(gap);
             }
         }
@@ -91,7 +91,7 @@ impl Group {
         problem.report.halvings = halvings;
         self.closed.clear();
         problem.report.single_pass = self.strategy.is_single_pass();
-        problem.report.joints = problem.has_joints();
+        problem.report.joints = problem.conditions.has_joints();
         for (p, port) in problem.ports.iter().enumerate() {
             let owner =
                 found.owners.get(p).copied().unwrap_or_else(|| problem.glue.owner(p - found.owners.len()));
@@ -100,14 +100,14 @@ impl Group {
             let before = problem.last.iter().find(|(key, _)| *key == port.key);
             for (k, (i, c)) in port.components().enumerate() {
                 wrench[c] = problem.t[i];
-                let passed = problem.passed(i, before.map(|b| b.1[k]));
+                let passed = problem.component(i).passed(before.map(|b| b.1[k]));
                 let report = &mut problem.report;
                 report.interface_work_error_j += passed.gained;
                 report.port_work_path_j += passed.through;
                 report.glue_stored_j += passed.stored;
                 report.glue_heat_j += passed.heat;
             }
-            if wrench[0] > 0.0 && problem.rows[n] != ConstraintKind::Joint {
+            if wrench[0] > 0.0 && problem.conditions.kinds[n] != ConstraintKind::Joint {
                 self.closed.push(port.key);
             }
             let t_star_n = problem.estimate.t_star[n];
@@ -122,7 +122,7 @@ impl Group {
                 frame: port.frame,
                 wrench,
                 t_star_n,
-                gap_m: problem.x1[n] - problem.x2[n] + problem.gap[n],
+                gap_m: problem.first.x[n] - problem.second.x[n] + problem.conditions.gap[n],
             });
         }
     }

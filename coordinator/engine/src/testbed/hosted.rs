@@ -1,86 +1,57 @@
 //! A testbed inside another program: its time, its state as bytes, its instances by number.
 
-use super::{Snapshot, Testbed, TimeKept};
+use super::run_clock::RunClock;
+use super::{Snapshot, Testbed};
 use serde_json::{Value, json};
 use terraglue_diagnostics::{Error, Result};
 use terraglue_host::Instance;
-use terraglue_subsystem::{Capabilities, Energy, bytes};
+use terraglue_subsystem::{Energy, bytes};
 
 impl Testbed {
-    pub(super) fn time_kept(&self) -> TimeKept {
-        TimeKept {
-            step_s: self.step_s,
-            origin_s: self.origin_s,
-            nominal: self.nominal,
-            index: self.index,
-            t: self.t,
-            started: self.started,
-            before: self.before,
-        }
-    }
-
-    pub(super) fn set_time(&mut self, kept: TimeKept) {
-        (self.step_s, self.origin_s) = (kept.step_s, kept.origin_s);
-        (self.nominal, self.index, self.t) = (kept.nominal, kept.index, kept.t);
-        (self.started, self.before) = (kept.started, kept.before);
-    }
-
     /// Length of a nominal step, s.
     pub fn step_s(&self) -> f64 {
-        self.step_s
+        self.clock.step_s
     }
 
     /// Steps have this length from now on, s. Steps of the scenario's own length stay on its grid of times.
     pub fn set_step_s(&mut self, step_s: f64) {
-        let on_grid = self.nominal as f64 * step_s;
-        let off = (self.t - on_grid).abs() > 1e-12 * self.t.abs().max(step_s);
-        self.origin_s = if off { self.t - on_grid } else { 0.0 };
-        self.step_s = step_s;
+        self.clock.set_step_s(step_s);
     }
 
     /// Whether all subsystems make every step, so that its length may change.
     pub fn takes_any_step(&self) -> bool {
-        self.schedules.iter().all(|turn| turn.step_multiple == 1)
+        self.subsystems.schedules.iter().all(|turn| turn.step_multiple == 1)
     }
 
     /// An instance by its number, to set its values.
     pub fn instance_mut(&mut self, slot: usize) -> &mut Instance {
-        &mut self.instances[slot]
-    }
-
-    /// Whether a connection feeds a variable.
-    pub fn is_fed(&self, slot: usize, id: u32) -> bool {
-        self.links.numbers.iter().any(|l| l.feeds(slot, id))
-            || self.links.discrete.iter().any(|l| l.feeds(&self.instances, slot, id))
-    }
-
-    /// Connected values at the start where outputs depend on inputs of the same time: in their order, loops solved.
-    pub(super) fn initialize_signals(&mut self) -> Result {
-        let through = |k: usize| self.instances[k].capabilities().has(Capabilities::FEEDTHROUGH);
-        if self.links.numbers.iter().any(|l| l.leaves(through)) {
-            crate::signals::initialize(&mut self.links.numbers, &mut self.instances)?;
-        }
-        Ok(())
+        &mut self.subsystems.instances[slot]
     }
 
     /// Reads the motion of all bodies again after values were set from outside.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: a module that cannot give the states of its bodies.
     pub fn refresh(&mut self) -> Result {
         self.events.clear();
-        self.read_states()
+        self.subsystems.read_states()
     }
 
     /// The committed state of everything as bytes: a line of JSON, those of every instance, a hash.
+    ///
+    /// # Errors
+    /// [`Error::Module`]: a module that cannot give its state as bytes.
     pub fn serialize(&self) -> Result<Vec<u8>> {
-        let parts = self.instances.iter().map(Instance::serialize).collect::<Result<Vec<_>>>()?;
-        let kept = self.time_kept();
+        let parts = self.instances().iter().map(Instance::serialize).collect::<Result<Vec<_>>>()?;
+        let kept = self.clock;
         let bits = [kept.step_s, kept.origin_s, kept.t].map(f64::to_bits);
         let head = json!({
             "bits": bits,
             "counts": [kept.nominal, kept.index],
             "started": kept.started,
             "before": before_bits(&kept.before),
-            "fired": self.time_line.fired(),
-            "memory": self.memory(),
+            "fired": self.signals.time_line.fired(),
+            "memory": self.glued.memory(self.signals.faults.remember()),
             "lengths": parts.iter().map(Vec::len).collect::<Vec<_>>(),
         });
         let mut out = head.to_string().into_bytes();
@@ -92,17 +63,21 @@ impl Testbed {
     }
 
     /// Back to a state made by [`Testbed::serialize`] of the same scenario. After an error everything is as before.
+    ///
+    /// # Errors
+    /// [`Error::Simulation`]: the bytes are no state of this scenario. [`Error::Module`]: a module that does not take its part.
     pub fn deserialize(&mut self, bytes: &[u8]) -> Result {
-        let wrong =
-            || Error::Simulation { time_s: self.t, message: "these bytes are no state of this run".into() };
+        let time_s = self.clock.t;
+        let wrong = || Error::Simulation { time_s, message: "these bytes are no state of this run".into() };
         let content = unsealed(bytes).ok_or_else(wrong)?;
-        let (head, lengths, mut rest) = split(content, self.instances.len()).ok_or_else(wrong)?;
+        let (head, lengths, mut rest) = split(content, self.instances().len()).ok_or_else(wrong)?;
         let (kept, fired, memory) = read_head(&head).ok_or_else(wrong)?;
-        let before = self.instances.iter().map(Instance::serialize).collect::<Result<Vec<_>>>()?;
+        let before = self.instances().iter().map(Instance::serialize).collect::<Result<Vec<_>>>()?;
         for (k, length) in lengths.into_iter().enumerate() {
             let (part, after) = rest.split_at(length);
-            if let Err(refused) = self.instances[k].deserialize(part) {
-                self.instances.iter_mut().zip(&before).take(k).try_for_each(|(i, b)| i.deserialize(b))?;
+            let instances = &mut self.subsystems.instances;
+            if let Err(refused) = instances[k].deserialize(part) {
+                instances.iter_mut().zip(&before).take(k).try_for_each(|(i, b)| i.deserialize(b))?;
                 return Err(refused);
             }
             rest = after;
@@ -133,7 +108,7 @@ fn split(bytes: &[u8], count: usize) -> Option<(Value, Vec<usize>, &[u8])> {
     (lengths.len() == count && sum == rest.len()).then_some((head, lengths, rest))
 }
 
-type Head = (TimeKept, Vec<bool>, Vec<Vec<u64>>);
+type Head = (RunClock, Vec<bool>, Vec<Vec<u64>>);
 
 fn read_head(head: &Value) -> Option<Head> {
     let numbers =
@@ -152,6 +127,6 @@ fn read_head(head: &Value) -> Option<Head> {
     let [step_s, origin_s, t] = [step, origin, t].map(f64::from_bits);
     let good = [step_s, origin_s, t].iter().all(|x| x.is_finite()) && step_s > 0.0;
     let started = head["started"].as_bool()?;
-    let kept = TimeKept { step_s, origin_s, nominal, index, t, started, before };
+    let kept = RunClock { step_s, origin_s, nominal, index, t, started, before };
     good.then_some((kept, fired?, memory?))
 }

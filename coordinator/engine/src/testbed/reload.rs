@@ -1,6 +1,7 @@
 //! Another instance in the place of one that runs: the same to everything around it, with other code.
 
 use super::Testbed;
+use super::subsystems::Subsystems;
 use crate::observer::Event;
 use crate::signals::Directory;
 use terraglue_diagnostics::Error;
@@ -13,7 +14,7 @@ use terraglue_subsystem::{
 impl Testbed {
     /// Writes a line into the recording at this communication point.
     pub fn note(&mut self, what: String) {
-        self.events.push(Event { t_s: self.t, what });
+        self.events.push(Event { t_s: self.clock.t, what });
     }
 
     /// Where errors of instances at their end are kept.
@@ -36,11 +37,11 @@ impl Testbed {
             Error::Module { function, message, .. } => format!("{function}: {message}"),
             other => other.to_string(),
         };
-        let slot = self.instances.iter().position(|i| i.name() == new.name());
+        let slot = self.instances().iter().position(|i| i.name() == new.name());
         let slot = slot.ok_or_else(|| format!("there is no subsystem `{}`", new.name()))?;
         let kind = new.kind();
         let mut new = new.wrapped(|inner| Renumbered::of(inner, kind, count));
-        let old = &self.instances[slot];
+        let old = &self.subsystems.instances[slot];
         if let Some(why) = misfit(old, &new) {
             return Err(why);
         }
@@ -58,13 +59,14 @@ impl Testbed {
         }
         let mut states = vec![BodyState::REST; new.scene().bodies.len()];
         new.body_states(&mut states).map_err(told)?;
-        self.schedules[slot].has_bodies = !states.is_empty();
-        self.members[slot].states = states;
-        self.instances[slot] = new;
-        // New variables can be read and set from now on.
-        self.directory = Directory::new(&self.instances);
-        if self.schedules[slot].glued {
-            self.instances[slot].watch();
+        let Subsystems { instances, schedules, members } = &mut self.subsystems;
+        schedules[slot].has_bodies = !states.is_empty();
+        members[slot].states = states;
+        instances[slot] = new;
+        // new variables can be read and set from now on
+        self.signals.directory = Directory::new(instances);
+        if schedules[slot].glued {
+            instances[slot].watch();
         }
         Ok(carried)
     }

@@ -2,18 +2,15 @@
 //!
 //! Glued subsystems and bodies without glue make steps from −`time.settle_s` to 0. Controllers make none: they stay at
 //! t = 0 and hold what they ask for there. Events and faults of signals wait as well. Prints in the ground stay; what is
-//! counted since the start, by the testbed and by modules that offer [`RESTART`], counts from t = 0 on.
+//! counted since the start, by the testbed and by modules that offer the action `energy.restart`, counts from t = 0 on.
 
 use super::Testbed;
+use super::subsystems::Subsystems;
 use std::sync::atomic::Ordering;
-use std::time::Duration;
 use terraglue_diagnostics::Result;
 use terraglue_gluing::timing::Timings;
 use terraglue_gluing::{Outcome, StepReport};
 use terraglue_subsystem::{Energy, Kind};
-
-/// Action of a module that begins to count work and heat afresh.
-const RESTART: &str = "energy.restart";
 
 impl Testbed {
     /// Makes the steps before t = 0 that `time.settle_s` asks for. Once; the first step does it at the latest.
@@ -21,20 +18,20 @@ impl Testbed {
     /// # Errors
     /// What a step before the start runs into; its time is negative.
     pub fn begin(&mut self) -> Result {
-        if self.started || self.index > 0 || self.t != 0.0 {
+        if self.clock.started || self.clock.index > 0 || self.clock.t != 0.0 {
             return Ok(());
         }
-        self.started = true;
-        let exact = self.settle_s / self.step_s;
+        self.clock.started = true;
+        let exact = self.settle_s / self.clock.step_s;
         // 1.1 s in steps of 1 ms are 1100, whatever the division leaves
         let whole = (exact - exact.round()).abs() <= 1e-6;
         let count = if whole { exact.round() } else { exact.ceil() };
         // 0.0 −, and not −: 0 s has no sign
-        self.t = 0.0 - count * self.step_s;
+        self.clock.t = 0.0 - count * self.clock.step_s;
         if count > 0.0 {
-            self.initialize_signals()?;
+            self.signals.initialize(&mut self.subsystems.instances)?;
         }
-        self.start_joints()?;
+        self.glued.start_joints(&self.clock, &mut self.subsystems, &mut self.timings)?;
         if count > 0.0 {
             self.stand(count as u64)?;
         }
@@ -43,19 +40,22 @@ impl Testbed {
 
     /// Steps up to t = 0 in which controllers wait; then all counts begin.
     fn stand(&mut self, count: u64) -> Result {
-        let holds: Vec<bool> = self
-            .instances
-            .iter()
-            .zip(&self.schedules)
-            .map(|(i, turn)| i.kind() == Kind::Controller || turn.step_multiple > 1)
-            .collect();
-        self.schedules.iter_mut().zip(&holds).for_each(|(turn, holds)| turn.holds = *holds);
+        let Subsystems { instances, schedules, .. } = &mut self.subsystems;
+        for (turn, instance) in schedules.iter_mut().zip(instances) {
+            turn.holds = instance.kind() == Kind::Controller || turn.step_multiple > 1;
+        }
         let stood = (1..=count).rev().try_for_each(|left| self.stand_step(left));
         self.standing.store(0, Ordering::Relaxed);
-        self.schedules.iter_mut().for_each(|turn| turn.holds = false);
+        self.subsystems.schedules.iter_mut().for_each(|turn| turn.holds = false);
         stood?;
-        (self.t, self.index, self.halvings) = (0.0, 0, 0);
-        self.restart_counts()
+        (self.clock.t, self.clock.index, self.halvings) = (0.0, 0, 0);
+        self.report = StepReport { converged: true, ..StepReport::default() };
+        self.timings = Timings::default();
+        self.glued.groups.iter_mut().for_each(|g| g.problem.timings = Timings::default());
+        self.subsystems.restart_counts()?;
+        self.clock.before = Energy::default();
+        self.clock.before = self.energy();
+        Ok(())
     }
 
     /// The step from which on `left` − 1 are left.
@@ -63,20 +63,18 @@ impl Testbed {
         if self.cancelled() {
             return Ok(());
         }
-        self.standing.store(self.t.to_bits(), Ordering::Relaxed);
-        let end = -((left - 1) as f64) * self.step_s;
-        let mut longest = self.step_s;
+        self.standing.store(self.clock.t.to_bits(), Ordering::Relaxed);
+        let end = -((left - 1) as f64) * self.clock.step_s;
+        let mut longest = self.clock.step_s;
         self.halvings = 0;
-        while end - self.t > 1e-6 * self.step_s {
-            self.pass_signals()?;
-            let h = longest.min(end - self.t);
+        while self.clock.is_before(end) {
+            self.signals.read(&self.subsystems.instances)?;
+            self.signals.write(&mut self.subsystems.instances)?;
+            let h = longest.min(end - self.clock.t);
             match self.communication_step(h, end)? {
-                Outcome::Converged => {
-                    self.index += 1;
-                    self.t += h;
-                }
+                Outcome::Converged => self.clock.advance(h),
                 Outcome::NotConverged(why) if self.halvings == self.max_halvings => {
-                    return Err(self.gave_up(why));
+                    return Err(self.glued.gave_up(self.clock.t, self.max_halvings, &why));
                 }
                 Outcome::NotConverged(_) => {
                     self.halvings += 1;
@@ -84,24 +82,7 @@ impl Testbed {
                 }
             }
         }
-        self.t = end;
-        Ok(())
-    }
-
-    /// Work, heat and costs count from here on.
-    fn restart_counts(&mut self) -> Result {
-        self.report = StepReport { converged: true, ..StepReport::default() };
-        self.timings = Timings::default();
-        self.groups.iter_mut().for_each(|g| g.problem.timings = Timings::default());
-        self.members.iter_mut().for_each(|m| m.cost = Duration::ZERO);
-        for instance in &mut self.instances {
-            instance.forget_cost();
-            if instance.actions().iter().any(|a| a.name == RESTART) {
-                instance.act(RESTART, "{}")?;
-            }
-        }
-        self.before = Energy::default();
-        self.before = self.energy();
+        self.clock.t = end;
         Ok(())
     }
 }

@@ -97,7 +97,11 @@ fn variables(testbed: &Testbed, bare: Option<&str>, feet: &[usize]) -> (Vec<Vari
             if bare != Some(instance.name()) {
                 shown.name = format!("{}.{}", instance.name(), v.name);
             }
-            if instance.elements_of(v.id).iter().any(|id| testbed.is_fed(slot, *id)) {
+            if instance
+                .elements_of(v.id)
+                .iter()
+                .any(|id| testbed.signals().is_fed(testbed.instances(), slot, *id))
+            {
                 (shown.causality, shown.effect) = (Causality::Local, Effect::ReadOnly);
             }
             all.push(shown);

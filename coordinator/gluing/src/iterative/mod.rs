@@ -24,9 +24,10 @@ pub(super) use xt::XtForm;
 use super::glue::ConstraintKind;
 use super::interface_problem::InterfaceProblem;
 use super::memory::{Recall, Remember};
-use super::{Needs, Outcome, Strategy, linear};
+use super::{Needs, Outcome, Strategy};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
+use terraglue_numerics::dense;
 use terraglue_scenario::{FormChoice, GluingSpec, StartChoice};
 use terraglue_subsystem::Capabilities;
 
@@ -86,7 +87,7 @@ impl Form {
             Some(form) => form,
             None if !takes(Capabilities::FORCE) => Self::Xt,
             None if !takes(Capabilities::MOTION) => Self::Tt,
-            None if problem.rows.contains(&ConstraintKind::Law) => {
+            None if problem.conditions.kinds.contains(&ConstraintKind::Law) => {
                 if kappa > KAPPA_XT {
                     Self::Tt
                 } else {
@@ -107,7 +108,7 @@ impl Limits {
 
     /// τ·max(T_ref, |T|∞), N.
     pub fn threshold(&self, problem: &InterfaceProblem) -> f64 {
-        self.tolerance * problem.t_ref.max(linear::max_norm(&problem.t))
+        self.tolerance * problem.t_ref.max(dense::max_norm(&problem.t))
     }
 
     /// The end of an iteration that did not reach its threshold; `measure` (N) is what was left.
@@ -221,17 +222,17 @@ fn largest_eigenvalue(k: &[f64], g: &[f64], x: &mut Vec<f64>, y: &mut Vec<f64>, 
     x.resize(n, 1.0);
     let mut value = 0.0;
     for _ in 0..3 {
-        let norm = linear::max_norm(x);
+        let norm = dense::max_norm(x);
         if norm == 0.0 {
             return 0.0;
         }
         x.iter_mut().for_each(|v| *v /= norm);
         y.clear();
         y.resize(n, 0.0);
-        linear::multiply_add(g, x, y);
+        dense::multiply_add(g, x, y);
         x.fill(0.0);
-        linear::multiply_add(k, y, x);
-        value = linear::max_norm(x);
+        dense::multiply_add(k, y, x);
+        value = dense::max_norm(x);
     }
     value
 }

@@ -9,12 +9,12 @@ use super::super::Outcome;
 use super::super::complementarity::{BoundedProblem, BoundedSolver};
 use super::super::glue::ConstraintKind;
 use super::super::interface_problem::InterfaceProblem;
-use super::super::linear::max_norm;
 use super::super::memory::Recall;
 use super::super::refresh::Refresh;
 use super::{Limits, friction, largest_eigenvalue};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
+use terraglue_numerics::dense::max_norm;
 use terraglue_scenario::JacobianChoice;
 
 /// Trials of one line search.
@@ -85,7 +85,7 @@ impl TtForm {
         let soils = problem.has_grounds() && problem.at.h > 0.0;
         for iteration in 0..=limits.max_iterations {
             self.predicted.clear();
-            self.predicted.extend((0..problem.n()).map(|i| problem.bodies_part(i)));
+            self.predicted.extend((0..problem.n()).map(|i| problem.component(i).bodies_part()));
             problem.advance_bodies(instances)?;
             if iteration == 0 || !self.as_predicted(limits, problem) {
                 self.evaluate_grounds(problem, instances)?;
@@ -125,8 +125,8 @@ impl TtForm {
         problem.has_grounds()
             && !self.diagonal
             && (0..n).all(|i| {
-                let off = (problem.bodies_part(i) - self.predicted[i]).abs();
-                let stiffness = match problem.rows[i] {
+                let off = (problem.component(i).bodies_part() - self.predicted[i]).abs();
+                let stiffness = match problem.conditions.kinds[i] {
                     ConstraintKind::Law => self.k[i * n + i],
                     _ => 1.0 / self.matrix[i * n + i],
                 };
@@ -205,7 +205,7 @@ impl TtForm {
         self.upper.clear();
         for port in &problem.ports {
             for (i, _) in port.components() {
-                let (lower, upper) = match problem.rows[i] {
+                let (lower, upper) = match problem.conditions.kinds[i] {
                     ConstraintKind::Normal => (port.law.t_min, port.law.t_max),
                     ConstraintKind::Law | ConstraintKind::Joint | ConstraintKind::Coulomb => {
                         (f64::NEG_INFINITY, f64::INFINITY)
@@ -230,10 +230,10 @@ impl TtForm {
         self.e.clear();
         for port in &problem.ports {
             for (i, _) in port.components() {
-                self.e.push(match problem.rows[i] {
-                    _ if problem.is_given(i) => 0.0,
-                    ConstraintKind::Law => problem.t[i] - problem.f[i],
-                    _ => problem.mismatch(i),
+                self.e.push(match problem.conditions.kinds[i] {
+                    _ if problem.component(i).is_given() => 0.0,
+                    ConstraintKind::Law => problem.t[i] - problem.law.last[i],
+                    _ => problem.component(i).mismatch(),
                 });
             }
         }
@@ -247,7 +247,7 @@ impl TtForm {
         }
         self.assemble(problem);
         for port in problem.ports.iter().filter(|p| p.len() > 1) {
-            if problem.rows[port.first as usize + 1] == ConstraintKind::Coulomb {
+            if problem.conditions.kinds[port.first as usize + 1] == ConstraintKind::Coulomb {
                 friction::project(port, &problem.t, &mut self.e, &mut self.matrix);
             }
         }
@@ -283,16 +283,16 @@ impl TtForm {
         for port in &problem.ports {
             for (row, r) in port.components() {
                 let out = &mut self.matrix[row * n..][..n];
-                if problem.is_given(row) {
+                if problem.component(row).is_given() {
                     out[row] = 1.0;
                     continue;
                 }
-                let law = problem.rows[row] == ConstraintKind::Law;
-                out[row] += if law { 1.0 } else { problem.compliance_now(row) };
+                let law = problem.conditions.kinds[row] == ConstraintKind::Law;
+                out[row] += if law { 1.0 } else { problem.conditions.compliance[row] };
                 if !law {
                     (0..n).for_each(|column| out[column] += g[column * n + row]);
                 }
-                if !problem.of_soil[row] {
+                if !problem.conditions.of_soil[row] {
                     continue;
                 }
                 for (other, c) in port.components() {
@@ -321,7 +321,8 @@ impl TtForm {
     /// iteration lasts, a step must also pass a filter (Fletcher and Leyffer 2002): no earlier iterate had less left
     /// open in the laws and at the normals.
     fn step(&mut self, iteration: u32, problem: &mut InterfaceProblem, instances: &mut [Instance]) -> Result {
-        let filtered = iteration >= FREE_ITERATIONS && problem.rows.contains(&ConstraintKind::Law);
+        let filtered =
+            iteration >= FREE_ITERATIONS && problem.conditions.kinds.contains(&ConstraintKind::Law);
         if filtered {
             self.filter.push(self.left_open(problem));
         }
@@ -366,7 +367,7 @@ impl TtForm {
         let n = problem.n();
         let mut open = [0.0_f64; 2];
         for (i, t) in problem.t.iter().enumerate() {
-            match problem.rows[i] {
+            match problem.conditions.kinds[i] {
                 ConstraintKind::Law => open[0] = open[0].max(self.e[i].abs()),
                 _ => {
                     let wanted = t - self.e[i] / self.matrix[i * n + i];
@@ -387,7 +388,7 @@ impl TtForm {
             ConstraintKind::Normal | ConstraintKind::Joint => de.0 * de.1,
             ConstraintKind::Law | ConstraintKind::Coulomb => 0.0,
         };
-        problem.rows.iter().zip(self.d.iter().zip(&self.e)).map(of).sum()
+        problem.conditions.kinds.iter().zip(self.d.iter().zip(&self.e)).map(of).sum()
     }
 
     fn converged(&self, problem: &mut InterfaceProblem, size: f64) -> Outcome {
@@ -395,9 +396,9 @@ impl TtForm {
         let mut complementarity: f64 = 0.0;
         for port in &problem.ports {
             let i = port.first as usize;
-            if problem.rows[i] == ConstraintKind::Joint {
+            if problem.conditions.kinds[i] == ConstraintKind::Joint {
                 for k in port.range() {
-                    largest = largest.max(problem.joint_gap(k));
+                    largest = largest.max(problem.component(k).joint_gap());
                 }
                 continue;
             }

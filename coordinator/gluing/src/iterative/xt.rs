@@ -9,10 +9,10 @@
 
 use super::super::Outcome;
 use super::super::interface_problem::InterfaceProblem;
-use super::super::linear::{Lu, max_norm};
 use super::{Limits, largest_eigenvalue};
 use terraglue_diagnostics::Result;
 use terraglue_host::Instance;
+use terraglue_numerics::dense::{Lu, max_norm, multiply_add};
 
 /// Halvings of one Newton step before it is taken as it is.
 const MAX_HALVINGS: u32 = 8;
@@ -104,10 +104,10 @@ impl XtForm {
         problem: &mut InterfaceProblem,
         instances: &mut [Instance],
     ) -> Result<f64> {
-        self.predicted.clone_from(&problem.x1);
+        self.predicted.clone_from(&problem.first.x);
         problem.advance_bodies(instances)?;
         let (n, allowed) = (problem.n(), 0.1 * limits.threshold(problem));
-        let off = |c: usize| (problem.x1[c] - self.predicted[c]).abs();
+        let off = |c: usize| (problem.first.x[c] - self.predicted[c]).abs();
         let as_predicted =
             (0..n).all(|r| (0..n).map(|c| self.k[c * n + r].abs() * off(c)).sum::<f64>() <= allowed);
         if as_predicted { Ok(inner) } else { self.evaluate_grounds(problem, instances) }
@@ -126,7 +126,7 @@ impl XtForm {
     ) -> Result<f64> {
         problem.advance_grounds_under_motion(instances)?;
         self.residual.clear();
-        self.residual.extend(problem.t.iter().zip(&problem.f).map(|(t, f)| t - f));
+        self.residual.extend(problem.t.iter().zip(&problem.law.last).map(|(t, f)| t - f));
         Ok(max_norm(&self.residual))
     }
 
@@ -139,7 +139,7 @@ impl XtForm {
         self.kg.resize(n * n, 0.0);
         for column in 0..n {
             let out = &mut self.kg[column * n..][..n];
-            super::super::linear::multiply_add(k, &g[column * n..][..n], out);
+            multiply_add(k, &g[column * n..][..n], out);
         }
         let kg = &self.kg;
         let rank = self.lu.factor(n, |r, c| kg[c * n + r] + if r == c { 1.0 } else { 0.0 });
@@ -182,7 +182,7 @@ impl XtForm {
         }
         report.converged = true;
         // motion was imposed on the soil: its surface is where the body is
-        problem.x2.copy_from_slice(&problem.x1);
+        problem.second.x.copy_from_slice(&problem.first.x);
         Outcome::Converged
     }
 }

@@ -194,55 +194,12 @@ impl Worker {
         let subsystem = self.subsystem.as_mut().ok_or_else(garbled)?.as_mut();
         let mut out = Answer { body };
         match call {
-            Call::SetPorts => {
-                let step = OwnedStep::take(r).ok_or_else(garbled)?;
-                let mut laws: Vec<_> = r.take().ok_or_else(garbled)?;
-                calls::with_response(&step.step(), |now| {
-                    subsystem.set_ports(&step.step(), &mut laws, now)?;
-                    out.write(|w| {
-                        w.put(&laws);
-                        calls::put_response(w, now);
-                    })
-                })
-            }
+            Call::SetPorts => set_ports(subsystem, r, &mut out),
             Call::Estimate => estimate(subsystem, r, &mut out),
             Call::Solve => solve(subsystem, r, &mut out),
-            Call::Advance => {
-                let step = OwnedStep::take(r).ok_or_else(garbled)?;
-                let done = calls::with_input(r, |input| {
-                    calls::with_response(&step.step(), |now| {
-                        subsystem.advance(&step.step(), input, now)?;
-                        out.write(|w| calls::put_response(w, now))
-                    })
-                });
-                done.ok_or_else(garbled)?
-            }
-            Call::AdvanceBatch => {
-                let step = OwnedStep::take(r).ok_or_else(garbled)?;
-                let (count, t): (u32, Vec<f64>) =
-                    (r.take().ok_or_else(garbled)?, r.take().ok_or_else(garbled)?);
-                let n = step.step().n as usize;
-                if t.len() != n * count as usize {
-                    return Err(garbled());
-                }
-                let [mut x, mut v, mut a] = [(); 3].map(|()| vec![f64::NAN; n * count as usize]);
-                let reached = step.step().t + step.step().h;
-                let mut all = Batch { x: &mut x, v: &mut v, a: &mut a, t: &mut vec![f64::NAN; n], reached };
-                subsystem.advance_batch(&step.step(), &t, &mut all)?;
-                let reached = all.reached;
-                out.write(|w| {
-                    [&x, &v, &a].into_iter().for_each(|values| w.put(values.as_slice()));
-                    w.put(&reached);
-                })
-            }
-            Call::Jacobian => {
-                let step = OwnedStep::take(r).ok_or_else(garbled)?;
-                let level = r.take().and_then(calls::level_of).ok_or_else(garbled)?;
-                let n = step.step().n as usize;
-                let mut matrix = vec![f64::NAN; n * n];
-                subsystem.interface_jacobian(&step.step(), level, &mut matrix)?;
-                out.write(|w| w.put(&matrix))
-            }
+            Call::Advance => advance(subsystem, r, &mut out),
+            Call::AdvanceBatch => advance_batch(subsystem, r, &mut out),
+            Call::Jacobian => jacobian(subsystem, r, &mut out),
             Call::Commit => {
                 let step = OwnedStep::take(r).ok_or_else(garbled)?;
                 let [t, x, v]: [Vec<f64>; 3] = three(r)?;
@@ -255,23 +212,7 @@ impl Worker {
                 out.write(|w| w.put(&bytes))
             }
             Call::Deserialize => subsystem.deserialize(&r.take::<Vec<u8>>().ok_or_else(garbled)?),
-            Call::Get => {
-                let ids: Vec<u32> = r.take().ok_or_else(garbled)?;
-                let (kind, count) = (r.take().ok_or_else(garbled)?, r.take::<u32>().ok_or_else(garbled)?);
-                let mut done = Ok(());
-                calls::fill_room(
-                    kind,
-                    count as usize,
-                    |room| subsystem.get(&ids, room),
-                    |got, write| {
-                        done = got.clone();
-                        if done.is_ok() {
-                            done = out.write(write);
-                        }
-                    },
-                );
-                done
-            }
+            Call::Get => get(subsystem, r, &mut out),
             Call::Set => {
                 let ids: Vec<u32> = r.take().ok_or_else(garbled)?;
                 calls::with_values(r, |values| subsystem.set(&ids, values)).ok_or_else(garbled)?
@@ -291,6 +232,74 @@ impl Worker {
             Call::Start | Call::Quit | Call::Pressure | Call::Shear => Err(garbled()),
         }
     }
+}
+
+fn set_ports(subsystem: &mut dyn Subsystem, r: &mut Reader, out: &mut Answer) -> Result {
+    let step = OwnedStep::take(r).ok_or_else(garbled)?;
+    let mut laws: Vec<_> = r.take().ok_or_else(garbled)?;
+    calls::with_response(&step.step(), |now| {
+        subsystem.set_ports(&step.step(), &mut laws, now)?;
+        out.write(|w| {
+            w.put(&laws);
+            calls::put_response(w, now);
+        })
+    })
+}
+
+fn advance(subsystem: &mut dyn Subsystem, r: &mut Reader, out: &mut Answer) -> Result {
+    let step = OwnedStep::take(r).ok_or_else(garbled)?;
+    let done = calls::with_input(r, |input| {
+        calls::with_response(&step.step(), |now| {
+            subsystem.advance(&step.step(), input, now)?;
+            out.write(|w| calls::put_response(w, now))
+        })
+    });
+    done.ok_or_else(garbled)?
+}
+
+fn advance_batch(subsystem: &mut dyn Subsystem, r: &mut Reader, out: &mut Answer) -> Result {
+    let step = OwnedStep::take(r).ok_or_else(garbled)?;
+    let (count, t): (u32, Vec<f64>) = (r.take().ok_or_else(garbled)?, r.take().ok_or_else(garbled)?);
+    let n = step.step().n as usize;
+    if t.len() != n * count as usize {
+        return Err(garbled());
+    }
+    let [mut x, mut v, mut a] = [(); 3].map(|()| vec![f64::NAN; n * count as usize]);
+    let reached = step.step().t + step.step().h;
+    let mut all = Batch { x: &mut x, v: &mut v, a: &mut a, t: &mut vec![f64::NAN; n], reached };
+    subsystem.advance_batch(&step.step(), &t, &mut all)?;
+    let reached = all.reached;
+    out.write(|w| {
+        [&x, &v, &a].into_iter().for_each(|values| w.put(values.as_slice()));
+        w.put(&reached);
+    })
+}
+
+fn jacobian(subsystem: &mut dyn Subsystem, r: &mut Reader, out: &mut Answer) -> Result {
+    let step = OwnedStep::take(r).ok_or_else(garbled)?;
+    let level = r.take().and_then(calls::level_of).ok_or_else(garbled)?;
+    let n = step.step().n as usize;
+    let mut matrix = vec![f64::NAN; n * n];
+    subsystem.interface_jacobian(&step.step(), level, &mut matrix)?;
+    out.write(|w| w.put(&matrix))
+}
+
+fn get(subsystem: &mut dyn Subsystem, r: &mut Reader, out: &mut Answer) -> Result {
+    let ids: Vec<u32> = r.take().ok_or_else(garbled)?;
+    let (kind, count) = (r.take().ok_or_else(garbled)?, r.take::<u32>().ok_or_else(garbled)?);
+    let mut done = Ok(());
+    calls::fill_room(
+        kind,
+        count as usize,
+        |room| subsystem.get(&ids, room),
+        |got, write| {
+            done = got.clone();
+            if done.is_ok() {
+                done = out.write(write);
+            }
+        },
+    );
+    done
 }
 
 fn three(r: &mut Reader) -> Result<[Vec<f64>; 3]> {

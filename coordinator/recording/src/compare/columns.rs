@@ -46,7 +46,7 @@ impl FigureColumn {
         match self.key {
             "max_gap_m" | "steps_not_converged" | "max_action_reaction_gap_n" => "not applicable".into(),
             "energy_balance_j" | "energy_drift_share" | "soil_heat_j" | "interface_work_error_j"
-                if summary.energies.drift_j.is_none() =>
+                if summary.energy.energies.drift_j.is_none() =>
             {
                 "unknown".into()
             }
@@ -65,17 +65,17 @@ fn of(row: &CompareRow, f: impl Fn(&Summary) -> f64) -> Option<f64> {
 }
 
 fn energies(row: &CompareRow) -> Option<&Energies> {
-    row.summary.as_ref().map(|s| &s.energies)
+    row.summary.as_ref().map(|s| &s.energy.energies)
 }
 
 /// Whether the strategy formed Λ.
 fn formed(row: &CompareRow) -> bool {
-    row.summary.as_ref().is_some_and(|s| s.condition_max > 0.0)
+    row.summary.as_ref().is_some_and(|s| s.gluing.condition_max > 0.0)
 }
 
 /// Whether it asks when to stop.
 fn iterated(row: &CompareRow) -> bool {
-    row.summary.as_ref().is_some_and(|s| s.form != "single pass")
+    row.summary.as_ref().is_some_and(|s| s.gluing.form != "single pass")
 }
 
 macro_rules! column {
@@ -100,15 +100,16 @@ pub(crate) const ALL: &[FigureColumn] = &[
     column!("order_heat", "observed order of", "heat of the soil", "", Neither, |r| r.orders.heat),
     column!("order_path", "observed order of", "path", "", Neither, |r| r.orders.path),
     column!("evaluations_mean", "evaluations of bodies", "mean", "", Smallest, |r| of(r, |s| s
+        .gluing
         .evaluations_mean)),
     column!("evaluations_p95", "evaluations of bodies", "95 %", "", Smallest, |r| {
-        of(r, |s| f64::from(s.evaluations_p95))
+        of(r, |s| f64::from(s.gluing.evaluations_p95))
     }),
     column!("evaluations_max", "evaluations of bodies", "max", "", Smallest, |r| {
-        of(r, |s| f64::from(s.evaluations_max))
+        of(r, |s| f64::from(s.gluing.evaluations_max))
     }),
     column!("evaluations_soil_mean", "evaluations of soil or side 2", "mean", "", Smallest, |r| {
-        of(r, |s| s.evaluations_soil_mean)
+        of(r, |s| s.gluing.evaluations_soil_mean)
     }),
     column!(
         "cold_start_mean",
@@ -119,54 +120,56 @@ pub(crate) const ALL: &[FigureColumn] = &[
         |r| r.cold_start_mean
     ),
     column!("evaluations_soil_p95", "evaluations of soil or side 2", "95 %", "", Smallest, |r| {
-        of(r, |s| f64::from(s.evaluations_soil_p95))
+        of(r, |s| f64::from(s.gluing.evaluations_soil_p95))
     }),
     column!("evaluations_soil_max", "evaluations of soil or side 2", "max", "", Smallest, |r| {
-        of(r, |s| f64::from(s.evaluations_soil_max))
+        of(r, |s| f64::from(s.gluing.evaluations_soil_max))
     }),
     column!("evaluations_jacobian_mean", "", "evaluations for differences", "", Smallest, |r| {
-        of(r, |s| s.evaluations_jacobian_mean)
+        of(r, |s| s.gluing.evaluations_jacobian_mean)
     }),
     column!("jacobian_refreshes_mean", "", "Jacobians per step", "", Smallest, |r| {
-        of(r, |s| s.jacobian_refreshes_mean)
+        of(r, |s| s.gluing.jacobian_refreshes_mean)
     }),
-    column!("kappa_max", "", "largest κ", "", Neither, |r| of(r, |s| s.kappa_max).filter(|k| *k > 0.0)),
+    column!("kappa_max", "", "largest κ", "", Neither, |r| of(r, |s| s.gluing.kappa_max)
+        .filter(|k| *k > 0.0)),
     column!("rank_missing_max", "Λ", "short of full rank by", "", Neither, |r| {
-        of(r, |s| f64::from(s.rank_missing_max)).filter(|_| formed(r))
+        of(r, |s| f64::from(s.gluing.rank_missing_max)).filter(|_| formed(r))
     }),
     column!("condition_max", "Λ", "largest condition", "", Neither, |r| {
-        of(r, |s| s.condition_max).filter(|_| formed(r))
+        of(r, |s| s.gluing.condition_max).filter(|_| formed(r))
     }),
     column!("max_residual", "", "largest |Λ·e|/T_ref", "", Smallest, |r| {
-        of(r, |s| s.max_residual).filter(|_| iterated(r))
+        of(r, |s| s.gluing.max_residual).filter(|_| iterated(r))
     }),
     column!("max_complementarity_n", "", "complementarity residual", "N", Smallest, |r| {
-        of(r, |s| s.max_complementarity_n).filter(|_| formed(r))
+        of(r, |s| s.gluing.max_complementarity_n).filter(|_| formed(r))
     }),
-    column!("steps_halved", "", "steps halved", "", Smallest, |r| of(r, |s| s.steps_halved as f64)),
+    column!("steps_halved", "", "steps halved", "", Smallest, |r| of(r, |s| s.gluing.steps_halved as f64)),
     column!("steps_not_converged", "", "steps not converged", "", Smallest, |r| {
-        r.summary.as_ref()?.steps_not_converged.map(|n| n as f64)
+        r.summary.as_ref()?.gluing.steps_not_converged.map(|n| n as f64)
     }),
-    column!("max_gap_m", "", "largest gap", "m", Smallest, |r| r.summary.as_ref()?.max_gap_m),
+    column!("max_gap_m", "", "largest gap", "m", Smallest, |r| r.summary.as_ref()?.gluing.max_gap_m),
     column!("max_action_reaction_gap_n", "", "action–reaction gap", "N", Smallest, |r| {
-        r.summary.as_ref()?.max_action_reaction_gap_n
+        r.summary.as_ref()?.gluing.max_action_reaction_gap_n
     }),
     column!("max_estimate_gap_n", "", "largest |T* − T1|", "N", Neither, |r| of(r, |s| s
+        .gluing
         .max_estimate_gap_n)),
     column!("max_sinkage_m", "", "deepest print", "m", Neither, |r| r.summary.as_ref()?.max_sinkage_m),
     column!("print_depth_m", "", "median print", "m", Neither, |r| {
         Some(r.summary.as_ref()?.print_depth?.median_m)
     }),
-    column!("distance_m", "", "distance", "m", Largest, |r| r.summary.as_ref()?.distance_m),
+    column!("distance_m", "", "distance", "m", Largest, |r| r.summary.as_ref()?.motion.distance_m),
     column!("mean_sinkage_m", "", "mean sinkage", "m", Neither, |r| r.summary.as_ref()?.mean_sinkage_m),
-    column!("path_m", "", "path", "m", Neither, |r| r.summary.as_ref()?.path_m),
+    column!("path_m", "", "path", "m", Neither, |r| r.summary.as_ref()?.motion.path_m),
     column!("soil_heat_j", "", "heat of the soil", "J", Neither, |r| energies(r)?.soil_heat_j),
     column!("energy_balance_j", "", "drift of the energy ledger", "J", Neither, |r| energies(r)?.drift_j),
     column!("energy_drift_share", "", "drift over the motors' work", "", Neither, |r| {
         energies(r)?.drift_share()
     }),
     column!("interface_work_error_j", "", "interface work error", "J", Smallest, |r| {
-        r.summary.as_ref()?.interface_work_error_j
+        r.summary.as_ref()?.gluing.interface_work_error_j
     }),
     column!("exchange_per_step_s", "wall time per step", "exchange", "s", Smallest, |r| r
         .parts_s

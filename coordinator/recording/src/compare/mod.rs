@@ -124,6 +124,9 @@ impl CompareRow {
 }
 
 /// Reads the recordings of all rows and writes `compare.html`, `compare.csv` and `compare.json` into a folder.
+///
+/// # Errors
+/// [`Error::File`](terraglue_diagnostics::Error::File): a file cannot be written.
 pub fn write(folder: &Path, rows: &[CompareRow]) -> Result {
     std::fs::create_dir_all(folder).map_err(at(folder))?;
     let runs = page::open(rows);

@@ -76,7 +76,7 @@ pub(crate) fn figure(key: &str, k: usize, rows: &[CompareRow]) -> CellText {
     let plain = |text| CellText { text, best: false, off: false };
     let Some(column) = columns::ALL.iter().find(|c| c.key == key) else { return plain(String::new()) };
     let row = &rows[k];
-    let energies = row.summary.as_ref().map(|s| &s.energies);
+    let energies = row.summary.as_ref().map(|s| &s.energy.energies);
     if key == "energy_drift_share" {
         let text = match (column.value)(row) {
             Some(share) => format!("{}\u{a0}%", number(100.0 * share, 3)),
@@ -111,10 +111,10 @@ mod tests {
         let path = concat!(env!("CARGO_MANIFEST_DIR"), "/../../scenarios/plate_sinkage.toml");
         let scenario = Scenario::load(path.as_ref(), &[]).expect("good");
         let mut summary = SummaryObserver::new(&scenario).summary(1.0, 1.0, None, Status::Done);
-        summary.distance_m = Some(1.234_567_89);
+        summary.motion.distance_m = Some(1.234_567_89);
         summary.print_depth = Some(PrintDepth { count: 3, median_m: 0.012_345, p10_m: 0.01, p90_m: 0.02 });
         summary.cpu_per_step_s = 1.234e-4;
-        (summary.energies.drift_j, summary.energies.turnover_j) = (Some(-0.5), 10.0);
+        (summary.energy.energies.drift_j, summary.energy.energies.turnover_j) = (Some(-0.5), 10.0);
         let row = |soil: &str, value: &str| CompareRow {
             strategy: "cooperative-compliant".into(),
             soil: soil.into(),

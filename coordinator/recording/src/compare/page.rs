@@ -34,7 +34,7 @@ pub(crate) fn render(folder: &Path, rows: &[CompareRow], runs: &[Run]) -> String
         escape(scenario)
     ));
     page.section("At a glance", "figures", &glance(folder, rows));
-    let ledgers = rows.iter().filter_map(|r| Some((r.name(), &r.summary.as_ref()?.energies)));
+    let ledgers = rows.iter().filter_map(|r| Some((r.name(), &r.summary.as_ref()?.energy.energies)));
     page.section("Where the energy went", "energies", &energy_card::table(ledgers));
     let shown: Vec<_> = runs
         .iter()
@@ -75,7 +75,7 @@ fn diagrams(rows: &[CompareRow]) -> Vec<(&'static str, &'static str, String)> {
     };
     let work = |r: &CompareRow| {
         let s = r.summary.as_ref()?;
-        Some((s.evaluations_mean + s.evaluations_soil_mean) * s.steps as f64)
+        Some((s.gluing.evaluations_mean + s.gluing.evaluations_soil_mean) * s.steps as f64)
     };
     [
         ("Error against the step", "error-step", "step, s", series(|r| Some(r.step_s))),
@@ -154,7 +154,7 @@ fn html_table(folder: &Path, rows: &[CompareRow]) -> String {
         if row.is_reference {
             strategy.push_str(" (reference)");
         }
-        let form = row.summary.as_ref().map_or("–", |s| &s.form);
+        let form = row.summary.as_ref().map_or("–", |s| &s.gluing.form);
         let others = keys.iter().map(|key| escape(varied(row, key)));
         for text in [strategy, escape(&row.soil)].into_iter().chain(others).chain([escape(form)]) {
             let _ = write!(out, "<td class=\"name\">{text}</td>");

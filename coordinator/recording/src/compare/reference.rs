@@ -34,8 +34,8 @@ fn figure_orders(rows: &mut [CompareRow], like: Option<&CompareRow>, truth: &Sum
     type Place = fn(&mut Orders) -> &mut Option<f64>;
     let all: [(Figure, Place); 3] = [
         (|s| s.mean_sinkage_m, |o| &mut o.sinkage),
-        (|s| s.energies.soil_heat_j, |o| &mut o.heat),
-        (|s| s.path_m, |o| &mut o.path),
+        (|s| s.energy.energies.soil_heat_j, |o| &mut o.heat),
+        (|s| s.motion.path_m, |o| &mut o.path),
     ];
     for (figure, place) in all {
         let Some(known) = figure(truth) else { continue };
@@ -134,7 +134,8 @@ mod tests {
         let blank = crate::SummaryObserver::new(&scenario);
         let summary = |sinkage: f64, heat: Option<f64>| {
             let mut s = blank.summary(1.0, 1.0, None, crate::Status::Done);
-            (s.mean_sinkage_m, s.energies.soil_heat_j, s.path_m) = (Some(sinkage), heat, Some(1.0));
+            (s.mean_sinkage_m, s.energy.energies.soil_heat_j, s.motion.path_m) =
+                (Some(sinkage), heat, Some(1.0));
             s
         };
         let row = |step_s: f64, s: Summary| CompareRow { step_s, summary: Some(s), ..CompareRow::default() };

@@ -93,21 +93,8 @@ pub(super) fn diagram(x_name: &str, y_name: &str, series: &[Series]) -> Option<S
         );
     }
     for s in series {
-        let (colour, fill, dash, _) = style(s.colour);
         let places: Vec<(f64, f64)> = s.points.iter().filter(good).map(place).collect();
-        let line: Vec<String> = places.iter().map(|(a, b)| format!("{a:.1},{b:.1}")).collect();
-        let _ = write!(
-            out,
-            "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.5\" stroke-dasharray=\"{dash}\"/>",
-            line.join(" ")
-        );
-        for (a, b) in places {
-            let _ = write!(
-                out,
-                "<circle cx=\"{a:.1}\" cy=\"{b:.1}\" r=\"4\" fill=\"{fill}\" stroke=\"{colour}\"><title>{}</title></circle>",
-                escape(&s.name)
-            );
-        }
+        draw(&mut out, s, &places);
     }
     let _ = write!(
         out,
@@ -126,6 +113,24 @@ pub(super) fn diagram(x_name: &str, y_name: &str, series: &[Series]) -> Option<S
     }
     out.push_str("</p>");
     Some(out)
+}
+
+/// Line and points of a series at these places.
+fn draw(out: &mut String, s: &Series, places: &[(f64, f64)]) {
+    let (colour, fill, dash, _) = style(s.colour);
+    let line: Vec<String> = places.iter().map(|(a, b)| format!("{a:.1},{b:.1}")).collect();
+    let _ = write!(
+        out,
+        "<polyline points=\"{}\" fill=\"none\" stroke=\"{colour}\" stroke-width=\"1.5\" stroke-dasharray=\"{dash}\"/>",
+        line.join(" ")
+    );
+    for (a, b) in places {
+        let _ = write!(
+            out,
+            "<circle cx=\"{a:.1}\" cy=\"{b:.1}\" r=\"4\" fill=\"{fill}\" stroke=\"{colour}\"><title>{}</title></circle>",
+            escape(&s.name)
+        );
+    }
 }
 
 #[cfg(test)]

@@ -54,7 +54,7 @@ pub(crate) fn terminal(rows: &[CompareRow]) -> String {
             rows.iter().zip(columns::best(column, rows)).map(mark).collect()
         })
         .collect();
-    let form = |r: &CompareRow| r.summary.as_ref().map_or_else(|| "–".to_owned(), |s| s.form.clone());
+    let form = |r: &CompareRow| r.summary.as_ref().map_or_else(|| "–".to_owned(), |s| s.gluing.form.clone());
     let strategy = |r: &CompareRow| match r.is_reference {
         true => format!("{} (reference)", r.strategy),
         false => r.strategy.clone(),
@@ -117,7 +117,7 @@ fn energies(rows: &[CompareRow]) -> Table {
     let heads = energy_card::LINES.iter().map(|l| l.0);
     table.set_header(std::iter::once("energy of").chain(heads).chain(["drift against"]));
     for row in rows {
-        let Some(e) = row.summary.as_ref().map(|s| &s.energies) else { continue };
+        let Some(e) = row.summary.as_ref().map(|s| &s.energy.energies) else { continue };
         let last = energy_card::LINES.len() - 1;
         let mut cells = vec![Cell::new(row.name())];
         cells.extend(energy_card::LINES.iter().enumerate().map(|(k, (_, value))| {
@@ -143,7 +143,7 @@ pub(crate) fn write_csv(path: &Path, rows: &[CompareRow]) -> csv::Result<()> {
     let heads = ["strategy", "soil", "form"].into_iter().chain(keys).chain(["error"]);
     out.write_record(heads.chain(more.iter().copied()))?;
     for row in rows {
-        let form = row.summary.as_ref().map_or("", |s| &s.form);
+        let form = row.summary.as_ref().map_or("", |s| &s.gluing.form);
         let words = [row.strategy.as_str(), &row.soil, form].map(str::to_owned);
         let figures = columns::ALL.iter().map(|c| (c.value)(row).map_or_else(String::new, |v| v.to_string()));
         let failure = row.failure().unwrap_or_default();

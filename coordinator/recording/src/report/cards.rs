@@ -81,7 +81,7 @@ fn first(s: &Summary) -> impl Iterator<Item = Card> {
         energy_per_metre(s),
         Some(balance(s)),
         print_depth(s),
-        s.peak_force_over_weight.map(|f| {
+        s.motion.peak_force_over_weight.map(|f| {
             Card::new(
                 "Peak force",
                 (number(f, 3), "× weight".into()),
@@ -95,8 +95,8 @@ fn first(s: &Summary) -> impl Iterator<Item = Card> {
 }
 
 fn distance(s: &Summary) -> Option<Card> {
-    let d = s.distance_m?;
-    let more = match s.commanded_distance_m {
+    let d = s.motion.distance_m?;
+    let more = match s.motion.commanded_distance_m {
         Some(c) if c > 0.0 => format!("{} % of the {} m asked for", number(100.0 * d / c, 3), number(c, 4)),
         _ => "along the initial heading".into(),
     };
@@ -107,17 +107,17 @@ fn distance(s: &Summary) -> Option<Card> {
 fn energy_per_metre(s: &Summary) -> Option<Card> {
     let cost =
         |c: Option<f64>| c.map_or_else(String::new, |c| format!("; cost of transport {}", number(c, 3)));
-    let mechanical = s.energy_j_per_m.filter(|e| *e > 0.0)?;
-    let (label, electrical) = ("Energy per metre", s.electrical_energy_j_per_m.filter(|e| *e > 0.0));
+    let mechanical = s.energy.energy_j_per_m.filter(|e| *e > 0.0)?;
+    let (label, electrical) = ("Energy per metre", s.energy.electrical_energy_j_per_m.filter(|e| *e > 0.0));
     let Some(electrical) = electrical else {
-        let more = format!("work of the motors, driving and braking{}", cost(s.cost_of_transport));
+        let more = format!("work of the motors, driving and braking{}", cost(s.energy.cost_of_transport));
         return Some(Card::new(label, per_metre(mechanical), more));
     };
-    let work = match s.cost_of_transport {
+    let work = match s.energy.cost_of_transport {
         Some(c) => format!(" ({} by the work of the motors alone)", number(c, 3)),
         None => String::new(),
     };
-    let more = format!("electrical{}{work}", cost(s.electrical_cost_of_transport));
+    let more = format!("electrical{}{work}", cost(s.energy.electrical_cost_of_transport));
     Some(Card::new(label, per_metre(electrical), more))
 }
 
@@ -127,7 +127,7 @@ fn per_metre(energy_j_per_m: f64) -> (String, String) {
 }
 
 fn balance(s: &Summary) -> Card {
-    let e = &s.energies;
+    let e = &s.energy.energies;
     let drift = |drift_j: f64| text(with_prefix(drift_j, "J", 2));
     let (value, more) = match (e.drift_share(), e.drift_j) {
         (Some(share), _) if share.abs() < SMALLEST_SHARE => {
@@ -152,12 +152,12 @@ fn print_depth(s: &Summary) -> Option<Card> {
 
 fn rest(s: &Summary) -> Vec<Card> {
     let mut cards = Vec::new();
-    if let (Some(roll), Some(pitch)) = (s.max_roll_rad, s.max_pitch_rad) {
+    if let (Some(roll), Some(pitch)) = (s.motion.max_roll_rad, s.motion.max_pitch_rad) {
         let tilt = roll.max(pitch);
         let more = format!("roll {}, pitch {}", text(degrees(roll)), text(degrees(pitch)));
         cards.push(Card::new("Largest tilt", degrees(tilt), more));
     }
-    if let Some(h) = s.height_gained_m {
+    if let Some(h) = s.motion.height_gained_m {
         // below a micrometre it is rounding
         let h = 1e-6 * (1e6 * h).round();
         cards.push(Card::new(
@@ -166,28 +166,32 @@ fn rest(s: &Summary) -> Vec<Card> {
             "of the reported body, against gravity",
         ));
     }
-    if s.energy_j > 0.0 {
-        let braking = text(with_prefix(s.energies.braking_j, "J", 3));
+    if s.energy.energy_j > 0.0 {
+        let braking = text(with_prefix(s.energy.energies.braking_j, "J", 3));
         let more = format!("mechanical, driving; braking takes {braking} out");
-        cards.push(Card::new("Work of the motors", with_prefix(s.energies.driving_j, "J", 3), more));
+        cards.push(Card::new("Work of the motors", with_prefix(s.energy.energies.driving_j, "J", 3), more));
     }
-    if let Some(electrical_j) = s.electrical_energy_j.filter(|e| *e > 0.0) {
+    if let Some(electrical_j) = s.energy.electrical_energy_j.filter(|e| *e > 0.0) {
         let more = "drawn by the motors, with the losses of their drives";
         cards.push(Card::new("Electrical energy", with_prefix(electrical_j, "J", 3), more));
     }
-    let more = format!("bodies, at most {}; soil {}", s.evaluations_max, number(s.evaluations_soil_mean, 3));
-    cards.push(Card::new("Evaluations a step", pure(s.evaluations_mean, 3), more));
-    let not = match s.steps_not_converged {
+    let more = format!(
+        "bodies, at most {}; soil {}",
+        s.gluing.evaluations_max,
+        number(s.gluing.evaluations_soil_mean, 3)
+    );
+    cards.push(Card::new("Evaluations a step", pure(s.gluing.evaluations_mean, 3), more));
+    let not = match s.gluing.steps_not_converged {
         None => "convergence: not applicable, a single pass".into(),
         Some(0) => "every step converged".into(),
         Some(n) => format!("<em>{n} steps not converged</em>"),
     };
-    let gap = s.max_gap_m.map_or_else(not_applicable, |gap| with_prefix(gap, "m", 3));
+    let gap = s.gluing.max_gap_m.map_or_else(not_applicable, |gap| with_prefix(gap, "m", 3));
     cards.push(Card::new("Largest gap", gap, not));
-    let more = format!("|T* − T1| up to {}", text(with_prefix(s.max_estimate_gap_n, "N", 3)));
-    let gap = s.max_action_reaction_gap_n.map_or_else(not_applicable, |gap| with_prefix(gap, "N", 3));
+    let more = format!("|T* − T1| up to {}", text(with_prefix(s.gluing.max_estimate_gap_n, "N", 3)));
+    let gap = s.gluing.max_action_reaction_gap_n.map_or_else(not_applicable, |gap| with_prefix(gap, "N", 3));
     cards.push(Card::new("Action–reaction gap", gap, more));
-    let error = s.interface_work_error_j.map_or_else(unknown, |e| with_prefix(e, "J", 3));
+    let error = s.gluing.interface_work_error_j.map_or_else(unknown, |e| with_prefix(e, "J", 3));
     cards.push(Card::new("Interface work error", error, "by the wrenches of both sides"));
     if let Some(e) = s.soil_mass_error_relative {
         cards.push(Card::new("Soil mass error", pure(e, 2), "relative to the soil moved"));

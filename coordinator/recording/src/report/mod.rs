@@ -26,6 +26,9 @@ use terraglue_diagnostics::error::Result;
 
 /// Makes the report of a results folder from its recording and, where it is there, `summary.json`. The
 /// recording may be cut off ([`crate::mend`] gives it its footer). Returns the path of the page.
+///
+/// # Errors
+/// [`Error::File`](terraglue_diagnostics::Error::File): the recording cannot be read, or the report not be written.
 pub fn write(folder: &Path) -> Result<PathBuf> {
     let recording = Recording::open(folder)?;
     let summary = Summary::read(folder).ok();
@@ -36,6 +39,9 @@ pub fn write(folder: &Path) -> Result<PathBuf> {
 }
 
 /// The page as text, of the recording alone.
+///
+/// # Errors
+/// [`Error::File`](terraglue_diagnostics::Error::File): a part of the recording cannot be read.
 pub fn render(recording: &Recording, summary: Option<&Summary>) -> Result<String> {
     page(recording, summary, None)
 }
@@ -46,7 +52,7 @@ fn page(recording: &Recording, summary: Option<&Summary>, exchange: Option<&str>
     page.header(&setup::headline(recording, summary));
     page.section("At a glance", "figures", &cards::render(recording, summary));
     if let Some(summary) = summary {
-        page.section("Where the energy went", "energies", &energy_card::render(&summary.energies));
+        page.section("Where the energy went", "energies", &energy_card::render(&summary.energy.energies));
     }
     page.section("What was simulated", "setup", &setup::render(recording));
     if let Some(map) = ground_map::data(recording, &legs)? {

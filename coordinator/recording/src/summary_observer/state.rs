@@ -1,12 +1,12 @@
 //! The figures of the steps before, for a run that goes on in another process.
 
-use super::{Deepest, GluingFigures, Integral, SummaryObserver};
+use super::{Deepest, GluingSums, Integral, SummaryObserver};
 use crate::keep::{Keep, keep};
 use terraglue_subsystem::bytes::Persist;
 use terraglue_subsystem::persist;
 
 persist!(Integral { subsystem, id, told, before, sum });
-persist!(GluingFigures {
+persist!(GluingSums {
     steps,
     histogram,
     soil_histogram,

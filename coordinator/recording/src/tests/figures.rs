@@ -17,14 +17,14 @@ fn summary_of(fixture: &mut Fixture) -> Summary {
 fn motors_drive_and_brake_and_a_metre_costs_both() {
     let s = summary_of(&mut Fixture::new("iterative"));
     // 4 N m against 0.3·2π·cos(2πt) rad/s: as much forwards as back, 2.4 J in half a second each.
-    let e = &s.energies;
+    let e = &s.energy.energies;
     assert!((e.driving_j - 2.4).abs() < 4e-3 && (e.braking_j - 2.4).abs() < 4e-3, "{e:?}");
-    assert!((e.driving_j + e.braking_j - s.energy_j).abs() < 1e-12);
+    assert!((e.driving_j + e.braking_j - s.energy.energy_j).abs() < 1e-12);
     let near = |a: Option<f64>, b: f64| assert!((a.expect("known") / b - 1.0).abs() < 1e-9, "{a:?} {b}");
-    near(s.energy_j_per_m, s.energy_j / SPEED);
-    near(s.electrical_energy_j, 3.0);
-    near(s.electrical_energy_j_per_m, 3.0 / SPEED);
-    near(s.electrical_cost_of_transport, 3.0 / (25.0 * 1.62 * SPEED));
+    near(s.energy.energy_j_per_m, s.energy.energy_j / SPEED);
+    near(s.energy.electrical_energy_j, 3.0);
+    near(s.energy.electrical_energy_j_per_m, 3.0 / SPEED);
+    near(s.energy.electrical_cost_of_transport, 3.0 / (25.0 * 1.62 * SPEED));
 }
 
 #[test]
@@ -41,7 +41,7 @@ fn what_a_controller_tells_is_of_the_step_before_and_what_it_is_told_of_the_next
         fixture
             .view(1, &mut |v| terraglue_engine::observer::Observer::stepped(&mut observer, v))
             .expect("stepped");
-        observer.summary(1.0, 1.0, None, Status::Done).commanded_distance_m
+        observer.summary(1.0, 1.0, None, Status::Done).motion.commanded_distance_m
     };
     assert_eq!(asked(Causality::Parameter), Some(0.0));
     assert_eq!(asked(Causality::Output), Some(0.2 * H));
@@ -56,7 +56,7 @@ fn a_print_counts_once_and_the_weight_is_that_of_the_robot() {
     assert!(p.p10_m <= p.median_m && p.median_m <= p.p90_m && p.p90_m <= s.max_sinkage_m.expect("known"));
     assert!((p.median_m / DEPTH - 1.0).abs() < 0.2, "{p:?}");
     let peak = 3.0 * 13.5 / (25.0 * 1.62);
-    assert!((s.peak_force_over_weight.expect("known") / peak - 1.0).abs() < 1e-3, "{s:?}");
+    assert!((s.motion.peak_force_over_weight.expect("known") / peak - 1.0).abs() < 1e-3, "{s:?}");
 }
 
 #[test]
@@ -64,7 +64,7 @@ fn height_is_against_gravity_and_none_without_it() {
     let gained = |gravity: [f64; 3]| {
         let mut fixture = Fixture::new("iterative");
         fixture.scenario.world.gravity_m_s2 = gravity;
-        summary_of(&mut fixture).height_gained_m
+        summary_of(&mut fixture).motion.height_gained_m
     };
     let risen = 0.01 * (libm::cos(12.0) - 1.0);
     let level = gained([0.0, 0.0, -9.81]).expect("known");
@@ -95,8 +95,8 @@ fn the_report_begins_with_what_is_asked_first_and_tells_no_electrical_energy_of_
     let places = labels.map(|label| at(&page, label).unwrap_or_else(|| panic!("{label} is missing")));
     assert!(places.is_sorted() && at(&page, "Largest tilt") > Some(places[5]), "{places:?}");
     assert!(at(&page, "Electrical energy").is_some() && page.contains("electrical; cost of transport"));
-    summary.electrical_energy_j = None;
-    summary.electrical_energy_j_per_m = None;
+    summary.energy.electrical_energy_j = None;
+    summary.energy.electrical_energy_j_per_m = None;
     let page = report::render(&recording, Some(&summary)).expect("made");
     assert!(
         at(&page, "Electrical energy").is_none() && page.contains("work of the motors, driving and braking")

@@ -204,8 +204,8 @@ fn no_file_of_an_earlier_run_stays() {
 fn a_way_too_short_has_no_cost_of_transport() {
     let f = folder();
     // 0.15 m/s: 0.9 mm after 6 steps, 1.05 mm after 7.
-    assert_eq!(record(f.path(), "cooperative", 6).cost_of_transport, None);
-    assert!(record(f.path(), "cooperative", 7).cost_of_transport.is_some());
+    assert_eq!(record(f.path(), "cooperative", 6).energy.cost_of_transport, None);
+    assert!(record(f.path(), "cooperative", 7).energy.cost_of_transport.is_some());
 }
 
 #[test]
@@ -352,25 +352,28 @@ fn the_summary_holds_the_figures_of_the_closed_form() {
     let s = record(f.path(), "iterative", 1000);
     let near = |a: Option<f64>, b: f64| assert!((a.expect("known") - b).abs() < 1e-9, "{a:?} {b}");
     assert_eq!((s.steps, s.simulated_s, s.real_time_factor), (1000, 1.0, 0.5));
-    near(s.distance_m, SPEED);
-    near(s.commanded_distance_m, SPEED);
-    assert!((s.max_roll_rad.expect("known") - ROLL).abs() < 1e-6);
-    near(s.max_pitch_rad, 0.0);
+    near(s.motion.distance_m, SPEED);
+    near(s.motion.commanded_distance_m, SPEED);
+    assert!((s.motion.max_roll_rad.expect("known") - ROLL).abs() < 1e-6);
+    near(s.motion.max_pitch_rad, 0.0);
     let ground = Recording::open(f.path()).expect("readable").final_ground.expect("there");
     let deepest = ground.sinkage.iter().fold(0.0_f32, |a, b| larger(a, *b));
     assert_eq!(s.max_sinkage_m.map(|s| s as f32), Some(deepest));
     // 4 N m times the mean of |cos|: 4·0.3·2π·2/π J in one second.
-    assert!((s.energy_j - 4.8).abs() < 1e-4, "{}", s.energy_j);
-    near(s.cost_of_transport, s.energy_j / (25.0 * 1.62 * SPEED));
-    assert_eq!((s.evaluations_max, s.evaluations_p95, s.steps_not_converged), (4, 4, Some(0)));
-    assert_eq!(s.form, "T-T");
-    near(s.interface_work_error_j, 1e-3);
+    assert!((s.energy.energy_j - 4.8).abs() < 1e-4, "{}", s.energy.energy_j);
+    near(s.energy.cost_of_transport, s.energy.energy_j / (25.0 * 1.62 * SPEED));
+    assert_eq!(
+        (s.gluing.evaluations_max, s.gluing.evaluations_p95, s.gluing.steps_not_converged),
+        (4, 4, Some(0))
+    );
+    assert_eq!(s.gluing.form, "T-T");
+    near(s.gluing.interface_work_error_j, 1e-3);
     // The robot's ledger: 1.1 + changes − 2.0 a second, the soil's 0.7.
-    let e = &s.energies;
-    assert_eq!((e.work_j, e.soil_heat_j, e.drift_j), (Some(2.0), Some(0.7), s.energy_balance_j));
+    let e = &s.energy.energies;
+    assert_eq!((e.work_j, e.soil_heat_j, e.drift_j), (Some(2.0), Some(0.7), s.energy.energy_balance_j));
     near(e.other_heat_j, 1.1);
     near(e.drift_j, e.kinetic_change_j.expect("known") + e.potential_change_j.expect("known") + 1.8 - 2.0);
-    assert!(e.is_off() && !e.by_ports && (e.turnover_j - s.energy_j).abs() < 1e-12);
+    assert!(e.is_off() && !e.by_ports && (e.turnover_j - s.energy.energy_j).abs() < 1e-12);
     // The synthetic ground has a slope of its own below the prints.
     let mean = s.mean_sinkage_m.expect("known");
     assert!(mean <= f64::from(deepest) && mean > 0.9 * f64::from(deepest), "{mean} {deepest}");
@@ -399,9 +402,15 @@ fn record_unknown(folder: &Path) -> Summary {
 fn what_is_unknown_or_does_not_apply_is_said_and_never_a_number() {
     let f = folder();
     let s = record_unknown(f.path());
-    assert_eq!((s.max_gap_m, s.steps_not_converged, s.max_action_reaction_gap_n), (None, None, None));
-    assert_eq!((s.energy_balance_j, s.interface_work_error_j, s.energies.soil_heat_j), (None, None, None));
-    assert_eq!(s.energies.without_book, ["soil"]);
+    assert_eq!(
+        (s.gluing.max_gap_m, s.gluing.steps_not_converged, s.gluing.max_action_reaction_gap_n),
+        (None, None, None)
+    );
+    assert_eq!(
+        (s.energy.energy_balance_j, s.gluing.interface_work_error_j, s.energy.energies.soil_heat_j),
+        (None, None, None)
+    );
+    assert_eq!(s.energy.energies.without_book, ["soil"]);
     let text = std::fs::read_to_string(f.path().join(SUMMARY)).expect("written");
     assert!(
         text.contains("\"energy_balance_j\": null")
@@ -409,9 +418,12 @@ fn what_is_unknown_or_does_not_apply_is_said_and_never_a_number() {
             && !text.contains("NaN")
     );
     let again = Summary::read(f.path()).expect("readable");
-    assert_eq!((again.energies.drift_j, &again.energies.without_book), (None, &s.energies.without_book));
     assert_eq!(
-        (again.max_gap_m, again.steps_not_converged, again.interface_work_error_j),
+        (again.energy.energies.drift_j, &again.energy.energies.without_book),
+        (None, &s.energy.energies.without_book)
+    );
+    assert_eq!(
+        (again.gluing.max_gap_m, again.gluing.steps_not_converged, again.gluing.interface_work_error_j),
         (None, None, None)
     );
     let r = Recording::open(f.path()).expect("readable");
@@ -516,7 +528,7 @@ fn a_report_leaves_out_what_was_not_simulated() {
         Recorder::create(f.path(), &fixture.scenario, RecorderOptions::default()).expect("created");
     fixture.run(&mut recorder, 50).expect("ran");
     let summary = recorder.finish(1.0, 1.0, None, Status::Done).expect("finished");
-    assert_eq!((summary.distance_m, summary.max_sinkage_m, summary.soil_module), (None, None, None));
+    assert_eq!((summary.motion.distance_m, summary.max_sinkage_m, summary.soil_module), (None, None, None));
     let html = std::fs::read_to_string(report::write(f.path()).expect("written")).expect("written");
     for id in ["ground", "body", "forces", "joint", "soil", "events"] {
         assert!(!html.contains(&format!("<section id=\"{id}\">")), "{id} is there");
@@ -555,7 +567,7 @@ fn compared(f: &Path) -> Vec<compare::CompareRow> {
     failed.folder = None;
     if let Some(s) = &mut failed.summary {
         let message = "gluing by `relaxed` did not converge: residual 3".to_owned();
-        (s.status, s.max_gap_m) = (Status::Failed, Some(0.0));
+        (s.status, s.gluing.max_gap_m) = (Status::Failed, Some(0.0));
         s.error = Some(FailureRecord { module: None, function: None, time_s: Some(1.25), message });
     }
     rows.push(failed);

@@ -275,16 +275,8 @@ impl Writer<'_> {
             }
             common.extend(typed);
             let dims: &[u32] = if entry.element.is_none() { &v.dims } else { &[] };
-            let name = type_name_3(v.value_type);
-            match (dims, start.as_ref().filter(|_| texts)) {
-                ([], None) => xml.leaf(name, &common),
-                (dims, text) => {
-                    xml.open(name, &common);
-                    dims.iter().for_each(|d| xml.leaf("Dimension", &[("start", d)]));
-                    text.iter().for_each(|t| xml.leaf("Start", &[("value", t)]));
-                    xml.close(name);
-                }
-            }
+            let text = start.as_deref().filter(|_| texts);
+            element_3(xml, type_name_3(v.value_type), &common, dims, text);
         }
         Ok(())
     }
@@ -432,4 +424,15 @@ fn type_name_3(value_type: ValueType) -> &'static str {
         ValueType::Binary | ValueType::Clock => "Binary",
         ValueType::Enumeration => "Enumeration",
     }
+}
+
+/// A variable of FMI 3.0 with the sizes of an array and the start value of a text below it.
+fn element_3(xml: &mut Xml, name: &str, common: &[(&str, &dyn Display)], dims: &[u32], text: Option<&str>) {
+    if dims.is_empty() && text.is_none() {
+        return xml.leaf(name, common);
+    }
+    xml.open(name, common);
+    dims.iter().for_each(|d| xml.leaf("Dimension", &[("start", d)]));
+    text.iter().for_each(|t| xml.leaf("Start", &[("value", t)]));
+    xml.close(name);
 }

@@ -166,6 +166,9 @@ impl ExportedInstance {
     }
 
     /// Whether a function may be called now.
+    ///
+    /// # Errors
+    /// [`Wrong`]: the function may not be called in this phase.
     pub fn expect(&self, function: &str, phases: &[Phase]) -> Answer {
         if phases.contains(&self.phase) {
             return Ok(());
@@ -182,6 +185,9 @@ impl ExportedInstance {
     }
 
     /// Says when the run begins and ends, s.
+    ///
+    /// # Errors
+    /// [`Wrong`]: the run has begun, or its times make no sense.
     pub fn set_experiment(&mut self, start: f64, stop: Option<f64>) -> Answer {
         self.expect("setting up the experiment", &[Phase::Instantiated])?;
         if !start.is_finite() || stop.is_some_and(|s| s.is_nan() || s < start) {
@@ -193,6 +199,9 @@ impl ExportedInstance {
     }
 
     /// Begins the initialisation.
+    ///
+    /// # Errors
+    /// [`Wrong`]: it was entered before.
     pub fn enter_initialization(&mut self) -> Answer {
         self.expect("entering the initialisation", &[Phase::Instantiated])?;
         self.phase = Phase::Initialization;
@@ -200,6 +209,9 @@ impl ExportedInstance {
     }
 
     /// Ends the initialisation; outputs are those of the start.
+    ///
+    /// # Errors
+    /// [`Wrong`]: the initialisation has not begun, or the subsystem failed.
     pub fn exit_initialization(&mut self) -> Answer {
         self.expect("leaving the initialisation", &[Phase::Initialization])?;
         if self.settles {
@@ -210,6 +222,9 @@ impl ExportedInstance {
     }
 
     /// Ends the run.
+    ///
+    /// # Errors
+    /// [`Wrong`]: there is no run to end.
     pub fn terminate(&mut self) -> Answer {
         self.expect("terminating", &[Phase::Running, Phase::Failed])?;
         self.phase = Phase::Terminated;
@@ -217,6 +232,9 @@ impl ExportedInstance {
     }
 
     /// Back to where it was made: all values, states and the time are forgotten.
+    ///
+    /// # Errors
+    /// [`Wrong`]: the instance is dead, or the subsystem cannot be made again.
     pub fn reset(&mut self) -> Answer {
         self.expect(
             "resetting",
@@ -231,6 +249,9 @@ impl ExportedInstance {
     }
 
     /// Reads the values of variables of one of these types.
+    ///
+    /// # Errors
+    /// [`Wrong`]: an unknown reference, a variable of another type, or a call in the wrong phase.
     pub fn get<T: FmiType>(&self, references: &[u32], types: &[ValueType], out: &mut [T]) -> Answer {
         let readable = [Phase::Initialization, Phase::Running, Phase::Failed, Phase::Terminated];
         self.expect("getting values", &readable)?;
@@ -238,6 +259,9 @@ impl ExportedInstance {
     }
 
     /// Sets the values of variables of one of these types.
+    ///
+    /// # Errors
+    /// [`Wrong`]: an unknown reference, a variable of another type or that cannot be set now, or a value that is refused.
     pub fn set<T: FmiType>(&mut self, references: &[u32], types: &[ValueType], values: &[T]) -> Answer {
         self.expect("setting values", &[Phase::Instantiated, Phase::Initialization, Phase::Running])?;
         let running = self.phase == Phase::Running;
@@ -252,6 +276,9 @@ impl ExportedInstance {
     }
 
     /// Steps from `t` by `h` (s). A subsystem that cannot do all of it at once does it in parts.
+    ///
+    /// # Errors
+    /// [`Wrong`]: the step does not begin where the FMU is, has no length, passes the end of the run, or the subsystem failed.
     pub fn step(&mut self, t: f64, h: f64) -> Answer<Reached> {
         self.expect("a step", &[Phase::Running])?;
         let slack = 1e-9 * h.abs().max(self.time.abs());
@@ -351,6 +378,9 @@ impl ExportedInstance {
     }
 
     /// Saves the state; over an earlier one where `over` is given.
+    ///
+    /// # Errors
+    /// [`Wrong`]: the subsystem cannot save its state, or no slot is free.
     pub fn save(&mut self, over: Option<Handle>) -> Answer<Handle> {
         self.saving()?;
         let slot = match over {
@@ -362,6 +392,9 @@ impl ExportedInstance {
     }
 
     /// Back to a saved state, exactly.
+    ///
+    /// # Errors
+    /// [`Wrong`]: the handle is no state of this instance.
     pub fn restore(&mut self, handle: Handle) -> Answer {
         self.saving()?;
         let (slot, moment) = self.states.find(handle)?;
@@ -371,11 +404,17 @@ impl ExportedInstance {
     }
 
     /// Forgets a saved state.
+    ///
+    /// # Errors
+    /// [`Wrong`]: the handle is no state of this instance.
     pub fn release(&mut self, handle: Handle) -> Answer {
         self.states.release(handle)
     }
 
     /// A saved state as bytes for another instance of the same FMU.
+    ///
+    /// # Errors
+    /// [`Wrong`]: the subsystem cannot give its state as bytes, or the handle is no state of this instance.
     pub fn serialize(&mut self, handle: Handle) -> Answer<Vec<u8>> {
         self.saving()?;
         self.can(Capabilities::SERIALIZE, "serialise its state")?;
@@ -389,6 +428,9 @@ impl ExportedInstance {
     }
 
     /// A saved state from bytes that [`ExportedInstance::serialize`] made.
+    ///
+    /// # Errors
+    /// [`Wrong`]: the bytes are no state of this FMU, or no slot is free.
     pub fn deserialize(&mut self, bytes: &[u8]) -> Answer<Handle> {
         self.saving()?;
         self.can(Capabilities::SERIALIZE, "serialise its state")?;

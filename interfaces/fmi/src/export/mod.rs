@@ -51,6 +51,9 @@ pub enum Status {
 pub type Answer<T = ()> = std::result::Result<T, Wrong>;
 
 /// A call that was not done, for this reason.
+///
+/// # Errors
+/// Always: [`Wrong`] with the status `error`.
 pub fn wrong<T>(text: impl Into<String>) -> Answer<T> {
     Err(Wrong { status: Status::Error, text: text.into() })
 }

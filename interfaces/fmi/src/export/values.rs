@@ -6,8 +6,14 @@ use terraglue_subsystem::{Error, Result, Subsystem, ValueType, Values, ValuesMut
 /// A type in which values cross the C interfaces.
 pub trait FmiType: Clone + Default {
     /// Reads a whole variable.
+    ///
+    /// # Errors
+    /// A variable of another type, or what the subsystem answers.
     fn read(subsystem: &dyn Subsystem, v: &Variable, out: &mut [Self]) -> Result;
     /// Writes a whole variable.
+    ///
+    /// # Errors
+    /// A variable of another type, or what the subsystem answers.
     fn write(subsystem: &mut dyn Subsystem, v: &Variable, values: &[Self]) -> Result;
     /// Why a value is not acceptable for any variable.
     fn objection(&self) -> Option<String> {

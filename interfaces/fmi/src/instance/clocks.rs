@@ -179,6 +179,9 @@ impl FmuInstance {
     }
 
     /// A trigger of what is no triggered input clock, or outside event mode.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: it is none, or the FMU is not in event mode.
     pub fn can_trigger(&self, clock: &Variable) -> Result {
         let good = clock.triggered && clock.causality == Causality::Input && self.event_mode;
         match good && self.phase != InstancePhase::Terminated {

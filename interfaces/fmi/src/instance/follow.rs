@@ -5,7 +5,7 @@ use super::FmuInstance;
 use super::call::CallStatus;
 use super::functions::{Api, Vr};
 use super::goes_on;
-use super::intermediate::StepFault;
+use super::step_fault::StepFault;
 use crate::description::{ModelDescription, Variable};
 use crate::error::{Error, Result};
 use std::ffi::{c_int, c_void};
@@ -137,6 +137,9 @@ impl FmuInstance {
     }
 
     /// Slopes of inputs over the coming step, in their units per s (FMI 2.0); values are set before.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: FMI 3.0, or not as many slopes as references. [`Error::Call`]: the FMU refuses them.
     pub fn set_slopes(&self, references: &[u32], slopes: &[f64]) -> Result {
         const NAME: &str = "fmi2SetRealInputDerivatives";
         let Api::Two(two) = &self.api else {

@@ -7,10 +7,10 @@
 use super::FmuInstance;
 use super::follow::Followed;
 use super::functions::Vr;
-use super::log::meant;
+use super::step_fault::StepFault;
 use crate::error::{Error, Result};
 use std::ffi::{c_int, c_void};
-use std::sync::atomic::{AtomicBool, Ordering};
+use std::sync::atomic::AtomicBool;
 use std::sync::{Mutex, MutexGuard, PoisonError, TryLockError};
 use std::thread::ThreadId;
 use terraglue_subsystem::ValueType;
@@ -36,7 +36,7 @@ const UNHEARD: &str = "; that is not followed";
 pub struct Updates {
     inner: Mutex<Inner>,
     /// Whether it was said that a call is odd.
-    said: AtomicBool,
+    pub(super) said: AtomicBool,
 }
 
 #[derive(Default)]
@@ -52,32 +52,6 @@ pub(super) struct Inner {
     pub followed: Vec<Followed>,
     /// Why the step cannot stand.
     wrong: Option<StepFault>,
-}
-
-/// Why a step cannot stand.
-pub(super) struct StepFault {
-    pub text: String,
-    /// Whether nothing of the instance may be called any more.
-    pub fatal: bool,
-}
-
-impl From<String> for StepFault {
-    fn from(text: String) -> Self {
-        Self { text, fatal: false }
-    }
-}
-
-impl StepFault {
-    /// What a status of a call inside the call-back means; `call` says which one.
-    pub fn of(status: c_int, call: impl Fn() -> String) -> std::result::Result<(), Self> {
-        match status {
-            0 | 1 => Ok(()),
-            _ => Err(Self {
-                text: format!("answered {status} to {}", call()),
-                fatal: !matches!(status, 2 | 3),
-            }),
-        }
-    }
 }
 
 /// The step inside which the FMU may call.
@@ -96,7 +70,7 @@ impl Updates {
     }
 
     /// Takes the call of an FMU; answers where the step shall end early, if so, or what is odd about the call.
-    fn take(
+    pub(super) fn take(
         &self,
         t: f64,
         [requested, allowed, finished, early]: [bool; 4],
@@ -171,45 +145,6 @@ impl Inner {
         }
         self.rows.push(IntermediateRow { t, finished, values });
         Ok(())
-    }
-}
-
-/// `fmi3IntermediateUpdateCallback`.
-///
-/// # Safety
-/// Both places are null or may be written.
-pub unsafe extern "C" fn update(
-    environment: *mut c_void,
-    t: f64,
-    set_requested: bool,
-    get_allowed: bool,
-    finished: bool,
-    can_return: bool,
-    early: *mut bool,
-    early_time: *mut f64,
-) {
-    // A panic must not cross; nothing here is left half done.
-    let answer = std::panic::catch_unwind(std::panic::AssertUnwindSafe(|| {
-        let instance_log = meant(environment as usize, "")?;
-        match instance_log.updates.take(t, [set_requested, get_allowed, finished, can_return]) {
-            Ok(end) => end,
-            Err(why) => {
-                if !instance_log.updates.said.swap(true, Ordering::Relaxed) {
-                    instance_log.note(&format!("called its intermediate update {why}"));
-                }
-                None
-            }
-        }
-    }));
-    let end = answer.unwrap_or(None);
-    // SAFETY: by the caller.
-    unsafe {
-        if !early.is_null() {
-            *early = end.is_some();
-        }
-        if let Some(end) = end.filter(|_| !early_time.is_null()) {
-            *early_time = end;
-        }
     }
 }
 

@@ -14,6 +14,8 @@ mod intervals;
 mod log;
 mod state;
 mod step;
+mod step_fault;
+mod update_callback;
 mod values;
 
 pub use intermediate::IntermediateRow;
@@ -47,6 +49,13 @@ unsafe extern "C" {
 }
 
 /// What an instance is made with.
+///
+/// ```
+/// use terraglue_fmi::InstanceOptions;
+///
+/// let options = InstanceOptions { event_mode: true, ..InstanceOptions::new("tank", Box::new(|_| ())) };
+/// assert!(options.name == "tank" && !options.verbose && options.followed.is_empty());
+/// ```
 pub struct InstanceOptions {
     /// Name of the instance.
     pub name: String,
@@ -118,6 +127,10 @@ unsafe impl Send for FmuInstance {}
 
 impl FmuInstance {
     /// Loads the library where that was not done yet, and makes an instance.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: options that the FMU does not offer. [`Error::Library`]: the library cannot be loaded.
+    /// [`Error::Call`]: it made no instance.
     pub fn instantiate(fmu: &Arc<Fmu>, options: InstanceOptions) -> Result<Self> {
         let _mode = Keep::new();
         let description = fmu.description();
@@ -138,53 +151,15 @@ impl FmuInstance {
         let text =
             |text: &str| CString::new(text).map_err(|_| Error::Refused(format!("`{text}` has a zero in it")));
         let (name, token) = (text(&options.name)?, text(&description.token)?);
-        let resources = fmu.folder().join("resources");
-        if let Err(e) = std::fs::create_dir_all(&resources) {
-            return Err(Error::Refused(format!("{}: {e}", resources.display())));
-        }
-        let path = resources.display().to_string();
-        let mut callbacks = None;
-        let component = match &api {
+        let path = resources(fmu)?;
+        let modes = (options.verbose, event_mode);
+        let (component, callbacks) = match &api {
             Api::Two(two) => {
-                let place = callbacks.insert(Box::new(Callbacks2 {
-                    logger: terraglue_fmi2_logger,
-                    allocate: libc::calloc,
-                    free: libc::free,
-                    step_finished: None,
-                    environment,
-                }));
-                let resources = text(&file_uri(&path))?;
-                let (make, verbose) = (two.instantiate, c_int::from(options.verbose));
-                // SAFETY: the arguments are those of the standard and live long enough.
-                make.map(|f| unsafe {
-                    f(name.as_ptr(), 1, token.as_ptr(), resources.as_ptr(), &raw const **place, 0, verbose)
-                })
+                make_2(two, [&name, &token, &text(&file_uri(&path))?], options.verbose, environment)
             }
             Api::Three(three) => {
-                let resources = text(&format!("{path}/"))?;
-                let verbose = options.verbose;
-                let update: Option<functions::Update3> = updates.then_some(intermediate::update);
-                // Only where the event is handled then, and the rest of the step can be made in a step of another length. Without
-                // event mode an FMU handles its events inside the step, unless it may leave it at one.
-                let c = description.capabilities;
-                let early = event_mode && c.variable_step && (c.may_return_early || c.return_early);
-                // SAFETY: the arguments are those of the standard and live long enough.
-                three.instantiate.map(|f| unsafe {
-                    f(
-                        name.as_ptr(),
-                        token.as_ptr(),
-                        resources.as_ptr(),
-                        false,
-                        verbose,
-                        event_mode,
-                        early,
-                        announced.as_ptr(),
-                        announced.len(),
-                        environment,
-                        log::log_3,
-                        update,
-                    )
-                })
+                let texts = [&name, &token, &text(&format!("{path}/"))?];
+                (make_3(three, description, texts, modes, &announced, environment), None)
             }
         };
         let component = component.unwrap_or(std::ptr::null_mut());
@@ -245,6 +220,9 @@ impl FmuInstance {
     }
 
     /// Enters initialisation mode, after start values were set.
+    ///
+    /// # Errors
+    /// [`Error::Call`]: the FMU failed.
     pub fn enter_initialization(&mut self, start: f64, stop: Option<f64>, tolerance: Option<f64>) -> Result {
         let _mode = Keep::new();
         self.start = start;
@@ -272,6 +250,9 @@ impl FmuInstance {
     }
 
     /// Leaves initialisation mode; the FMU can be stepped.
+    ///
+    /// # Errors
+    /// [`Error::Call`]: the FMU failed.
     pub fn exit_initialization(&mut self) -> Result {
         let _mode = Keep::new();
         match self.api {
@@ -312,6 +293,9 @@ impl FmuInstance {
     }
 
     /// Ends the simulation; values can still be read.
+    ///
+    /// # Errors
+    /// [`Error::Call`]: the FMU failed.
     pub fn terminate(&mut self) -> Result {
         if self.phase != InstancePhase::Stepping {
             return Ok(());
@@ -325,6 +309,9 @@ impl FmuInstance {
     }
 
     /// Back to the state after instantiation.
+    ///
+    /// # Errors
+    /// [`Error::Call`]: the FMU failed.
     pub fn reset(&mut self) -> Result {
         match self.api {
             Api::Two(two) => self.call_after_error("fmi2Reset", two.reset, |f, c| unsafe { f(c) })?,
@@ -375,6 +362,70 @@ impl std::fmt::Debug for FmuInstance {
 fn log_needs_tool(sink: &Sink, description: &crate::ModelDescription) {
     let text = format!("needs the tool that made it ({}) to be installed", description.generation_tool);
     sink(&LogLine { level: terraglue_subsystem::LogLevel::Warning, text });
+}
+
+/// The folder of resources, which is made where the archive has none.
+fn resources(fmu: &Fmu) -> Result<String> {
+    let folder = fmu.folder().join("resources");
+    match std::fs::create_dir_all(&folder) {
+        Ok(()) => Ok(folder.display().to_string()),
+        Err(e) => Err(Error::Refused(format!("{}: {e}", folder.display()))),
+    }
+}
+
+/// An instance of FMI 2 with that name, token and folder of resources, and the call-backs that it keeps.
+fn make_2(
+    two: &functions::Two,
+    [name, token, resources]: [&CString; 3],
+    verbose: bool,
+    environment: *mut c_void,
+) -> (Option<InstanceHandle>, Option<Box<Callbacks2>>) {
+    let callbacks = Box::new(Callbacks2 {
+        logger: terraglue_fmi2_logger,
+        allocate: libc::calloc,
+        free: libc::free,
+        step_finished: None,
+        environment,
+    });
+    let (place, verbose) = (&raw const *callbacks, c_int::from(verbose));
+    // SAFETY: the arguments are those of the standard and live long enough.
+    let made = two
+        .instantiate
+        .map(|f| unsafe { f(name.as_ptr(), 1, token.as_ptr(), resources.as_ptr(), place, 0, verbose) });
+    (made, Some(callbacks))
+}
+
+/// An instance of FMI 3 with that name, token and folder of resources; `modes`: it logs details, it has event mode.
+fn make_3(
+    three: &functions::Three,
+    description: &ModelDescription,
+    [name, token, resources]: [&CString; 3],
+    (verbose, event_mode): (bool, bool),
+    announced: &[u32],
+    environment: *mut c_void,
+) -> Option<InstanceHandle> {
+    let c = description.capabilities;
+    let update: Option<functions::Update3> = c.intermediate_update.then_some(update_callback::update);
+    // Only where the event is handled then, and the rest of the step can be made in a step of another length. Without
+    // event mode an FMU handles its events inside the step, unless it may leave it at one.
+    let early = event_mode && c.variable_step && (c.may_return_early || c.return_early);
+    // SAFETY: the arguments are those of the standard and live long enough.
+    three.instantiate.map(|f| unsafe {
+        f(
+            name.as_ptr(),
+            token.as_ptr(),
+            resources.as_ptr(),
+            false,
+            verbose,
+            event_mode,
+            early,
+            announced.as_ptr(),
+            announced.len(),
+            environment,
+            log::log_3,
+            update,
+        )
+    })
 }
 
 /// A path as the URI that FMI 2.0 asks for.

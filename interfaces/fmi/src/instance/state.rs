@@ -61,6 +61,9 @@ impl FmuInstance {
     }
 
     /// Back to a saved state.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: nothing was saved. [`Error::Call`]: the FMU failed.
     pub fn restore(&self, state: &FmuState) -> Result {
         if state.is_empty() {
             return Err(Error::Refused("no state was saved".into()));
@@ -78,6 +81,9 @@ impl FmuInstance {
     }
 
     /// Gives a saved state back.
+    ///
+    /// # Errors
+    /// [`Error::Call`]: the FMU failed.
     pub fn release(&self, state: &mut FmuState) -> Result {
         if state.is_empty() || self.is_dead() {
             return Ok(());
@@ -96,6 +102,9 @@ impl FmuInstance {
     }
 
     /// A saved state as bytes.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: the FMU cannot. [`Error::Call`]: it failed.
     pub fn serialize(&self, state: &FmuState) -> Result<Vec<u8>> {
         self.can(self.description.capabilities.serialize, "to serialise its state")?;
         let (state, schedule) = (state.handle, &state.schedule);
@@ -131,6 +140,9 @@ impl FmuInstance {
     }
 
     /// A state from bytes.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: the FMU cannot, or the bytes are too few. [`Error::Call`]: it failed.
     pub fn deserialize(&self, bytes: &[u8], state: &mut FmuState) -> Result {
         self.can(self.description.capabilities.serialize, "to serialise its state")?;
         let schedule = 8 * self.schedule_len();
@@ -157,6 +169,9 @@ impl FmuInstance {
 
     /// d(unknowns)/d(knowns)·seed, all of type f64 and no arrays; from adjoint derivatives row by row where the FMU
     /// offers no directional ones.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: the FMU does not offer them. [`Error::Call`]: it failed.
     pub fn directional_derivative(
         &self,
         unknowns: &[u32],
@@ -189,6 +204,9 @@ impl FmuInstance {
     }
 
     /// seedᵀ·d(unknowns)/d(knowns): a number for each known (FMI 3.0, 2.2.11).
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: the FMU does not offer them. [`Error::Call`]: it failed.
     pub fn adjoint_derivative(
         &self,
         unknowns: &[u32],

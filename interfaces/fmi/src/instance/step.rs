@@ -8,6 +8,7 @@ use crate::floating_point::Mode;
 use std::ffi::c_int;
 
 const DO_STEP_2: &str = "fmi2DoStep";
+const DO_STEP_3: &str = "fmi3DoStep";
 /// `fmi2LastSuccessfulTime` of `fmi2StatusKind`.
 const LAST_SUCCESSFUL_TIME: c_int = 2;
 /// `fmi2Terminated` of `fmi2StatusKind`.
@@ -43,6 +44,16 @@ pub struct Stepped {
     pub events: u32,
 }
 
+/// How a part of a step ended (FMI 3).
+struct StepPart {
+    event: bool,
+    terminate: bool,
+    /// Time reached by its own account, s.
+    last: f64,
+    /// Whether that is the end of the part.
+    at_stop: bool,
+}
+
 #[cold]
 fn too_soon() -> Error {
     Error::Refused("doStep before the end of the initialisation".into())
@@ -65,23 +76,13 @@ impl FmuInstance {
         // SAFETY: the arguments are those of the standard.
         let status = self.status(DO_STEP_2, two.do_step, |f, c| unsafe { f(c, step.t, step.h, for_good) });
         if mode.restore() {
-            self.mode_changed(DO_STEP_2);
+            mode_changed(self, DO_STEP_2);
         }
         match status? {
             status if goes_on(status) => {
                 Ok(Stepped { reached: step.t + step.h, terminate: false, events: 0 })
             }
             status => self.stopped_2(step, status),
-        }
-    }
-
-    /// Says once that all others would round otherwise.
-    #[cold]
-    fn mode_changed(&self, function: &str) {
-        if !self.mode_told.replace(true) {
-            self.log.note(&format!(
-                "{function} changed how this thread rounds or treats tiny numbers; it is set back after each step"
-            ));
         }
     }
 
@@ -114,11 +115,8 @@ impl FmuInstance {
         Err(Error::Discard { function: NAME, reached, log })
     }
 
+    /// Goes from t to t + h (FMI 3), part by part: clocks tick and events are handled between the parts.
     fn do_step_3(&mut self, step: Advance) -> Result<Stepped> {
-        const NAME: &str = "fmi3DoStep";
-        let Api::Three(Three { do_step, get_f64, enter_event_mode, enter_step_mode, .. }) = self.api else {
-            return Err(Error::Refused(NAME.into()));
-        };
         let end = step.t + step.h;
         let (mut t, mut events, mut returns) = (step.t, 0, 0);
         if self.updates {
@@ -134,46 +132,7 @@ impl FmuInstance {
         loop {
             let tick = self.clocks.next(t, end);
             let stop = if end - tick > tolerance { tick } else { end };
-            let (mut event, mut terminate, mut early, mut last) = (false, false, false, UNTOLD);
-            // a step that is repeated goes back to where its first part began
-            let for_good = step.for_good && (t <= step.t || !self.description.capabilities.state);
-            if self.updates {
-                self.open_between(t, stop, get_f64);
-            }
-            let mode = Mode::now();
-            let status = self.status(NAME, do_step, |f, c| unsafe {
-                f(c, t, stop - t, for_good, &raw mut event, &raw mut terminate, &raw mut early, &raw mut last)
-            });
-            if mode.restore() {
-                self.mode_changed(NAME);
-            }
-            let wrong = if self.updates { self.close_between() } else { None };
-            let status = status?;
-            if status == CallStatus::Discard && !wrong.as_ref().is_some_and(|w| w.fatal) {
-                let reached = if last >= step.t && last <= end { last } else { step.t };
-                return Err(Error::Discard { function: NAME, reached, log: self.log.last() });
-            }
-            if let Some(wrong) = wrong {
-                return Err(self.stopped_between(NAME, wrong, status));
-            }
-            if !goes_on(status) {
-                return Err(self.failed(NAME, status));
-            }
-            if last.to_bits() == UNTOLD.to_bits() && !early && !terminate {
-                last = self.untold(stop);
-            }
-            let past = last > stop + tolerance && last - stop <= PAST * step.h;
-            if past && !self.ran_past.replace(true) {
-                let text =
-                    format!("says that it came to t = {last} s in a step to {stop} s; taken as {stop} s");
-                self.log.note(&text);
-            }
-            let at_stop = past || (last - stop).abs() <= tolerance;
-            if !at_stop && !early || last.is_nan() || last < t - tolerance || last > stop + tolerance && !past
-            {
-                let outcome = format!("says that it came to t = {last} s in the step from {t} s to {stop} s");
-                return Err(self.lied(NAME, outcome));
-            }
+            let StepPart { event, terminate, last, at_stop } = self.do_part(step, (t, stop), tolerance)?;
             if terminate {
                 return Ok(Stepped { reached: last, terminate, events });
             }
@@ -182,31 +141,20 @@ impl FmuInstance {
             let settles = event && self.event_mode || ticks;
             if settles {
                 events += 1;
-                self.call("fmi3EnterEventMode", enter_event_mode, |f, c| unsafe { f(c) })?;
-                if self.updates {
-                    self.set_followed(now)?;
-                }
-                if at_stop {
-                    self.tick(stop, false)?;
-                }
-                if self.update_discrete_states(now)? {
+                if self.handle_event(now, at_stop)? {
                     return Ok(Stepped { reached: last, terminate: true, events });
                 }
-                self.call("fmi3EnterStepMode", enter_step_mode, |f, c| unsafe { f(c) })?;
             }
             if at_stop && stop >= end {
                 return Ok(Stepped { reached: end, terminate: false, events });
             }
             if !(at_stop || event && self.event_mode) && last <= t {
                 let outcome = format!("came no further than t = {last} s in the step to {end} s");
-                return Err(self.lied(NAME, outcome));
-            }
-            if events > ROUNDS {
-                return Err(self.lied(NAME, format!("found more than {ROUNDS} events in one step")));
+                return Err(self.lied(DO_STEP_3, outcome));
             }
             returns += u32::from(!at_stop);
-            if returns > RETURNS {
-                return Err(self.lied(NAME, format!("returned early more than {RETURNS} times in one step")));
+            if let Some(outcome) = endless(events, returns) {
+                return Err(self.lied(DO_STEP_3, outcome));
             }
             t = now;
             if self.updates && !settles {
@@ -215,13 +163,68 @@ impl FmuInstance {
         }
     }
 
-    /// Where an FMU is that said its step is made and not how far it came.
-    #[cold]
-    fn untold(&self, stop: f64) -> f64 {
-        if !self.untold.replace(true) {
-            self.log.note("fmi3DoStep does not say how far it came (lastSuccessfulTime), which breaks the standard; its steps count as made");
+    /// One call of `fmi3DoStep`, from t to `stop`, and a look at what it answered.
+    #[inline]
+    fn do_part(&mut self, step: Advance, (t, stop): (f64, f64), tolerance: f64) -> Result<StepPart> {
+        const NAME: &str = DO_STEP_3;
+        let Api::Three(Three { do_step, get_f64, .. }) = self.api else {
+            return Err(Error::Refused(NAME.into()));
+        };
+        let (mut event, mut terminate, mut early, mut last) = (false, false, false, UNTOLD);
+        // a step that is repeated goes back to where its first part began
+        let for_good = step.for_good && (t <= step.t || !self.description.capabilities.state);
+        if self.updates {
+            self.open_between(t, stop, get_f64);
         }
-        stop
+        let mode = Mode::now();
+        let status = self.status(NAME, do_step, |f, c| unsafe {
+            f(c, t, stop - t, for_good, &raw mut event, &raw mut terminate, &raw mut early, &raw mut last)
+        });
+        if mode.restore() {
+            mode_changed(self, NAME);
+        }
+        let wrong = if self.updates { self.close_between() } else { None };
+        let status = status?;
+        if status == CallStatus::Discard && !wrong.as_ref().is_some_and(|w| w.fatal) {
+            let reached = if last >= step.t && last <= step.t + step.h { last } else { step.t };
+            return Err(Error::Discard { function: NAME, reached, log: self.log.last() });
+        }
+        if let Some(wrong) = wrong {
+            return Err(self.stopped_between(NAME, wrong, status));
+        }
+        if !goes_on(status) {
+            return Err(self.failed(NAME, status));
+        }
+        if last.to_bits() == UNTOLD.to_bits() && !early && !terminate {
+            last = untold(self, stop);
+        }
+        let past = last > stop + tolerance && last - stop <= PAST * step.h;
+        if past {
+            runs_ahead(self, last, stop);
+        }
+        let at_stop = past || (last - stop).abs() <= tolerance;
+        if !at_stop && !early || last.is_nan() || last < t - tolerance || last > stop + tolerance && !past {
+            let outcome = format!("says that it came to t = {last} s in the step from {t} s to {stop} s");
+            return Err(self.lied(NAME, outcome));
+        }
+        Ok(StepPart { event, terminate, last, at_stop })
+    }
+
+    /// Event mode at `now`, with the clocks that tick there at the end of a part; whether the FMU asks for the end.
+    fn handle_event(&mut self, now: f64, at_stop: bool) -> Result<bool> {
+        let Api::Three(Three { enter_event_mode, enter_step_mode, .. }) = self.api else { return Ok(false) };
+        self.call("fmi3EnterEventMode", enter_event_mode, |f, c| unsafe { f(c) })?;
+        if self.updates {
+            self.set_followed(now)?;
+        }
+        if at_stop {
+            self.tick(now, false)?;
+        }
+        if self.update_discrete_states(now)? {
+            return Ok(true);
+        }
+        self.call("fmi3EnterStepMode", enter_step_mode, |f, c| unsafe { f(c) })?;
+        Ok(false)
     }
 
     /// Updates discrete states at t until nothing changes and no clock ticks; whether the FMU asks for the end.
@@ -257,4 +260,40 @@ impl FmuInstance {
         }
         Err(self.lied(NAME, format!("asks for more than {ROUNDS} rounds at one time")))
     }
+}
+
+/// What is wrong with a step that has more parts than any can need.
+fn endless(events: u32, returns: u32) -> Option<String> {
+    if events > ROUNDS {
+        return Some(format!("found more than {ROUNDS} events in one step"));
+    }
+    (returns > RETURNS).then(|| format!("returned early more than {RETURNS} times in one step"))
+}
+
+/// Notes once that all others would round otherwise.
+#[cold]
+fn mode_changed(instance: &FmuInstance, function: &str) {
+    if !instance.mode_told.replace(true) {
+        instance.log.note(&format!(
+            "{function} changed how this thread rounds or treats tiny numbers; it is set back after each step"
+        ));
+    }
+}
+
+/// Notes once that the clock of the FMU is ahead of the step.
+#[cold]
+fn runs_ahead(instance: &FmuInstance, last: f64, stop: f64) {
+    if !instance.ran_past.replace(true) {
+        let text = format!("says that it came to t = {last} s in a step to {stop} s; taken as {stop} s");
+        instance.log.note(&text);
+    }
+}
+
+/// Where an FMU is that said its step is made and not how far it came.
+#[cold]
+fn untold(instance: &FmuInstance, stop: f64) -> f64 {
+    if !instance.untold.replace(true) {
+        instance.log.note("fmi3DoStep does not say how far it came (lastSuccessfulTime), which breaks the standard; its steps count as made");
+    }
+    stop
 }

@@ -17,6 +17,9 @@ macro_rules! plain {
 
 impl FmuInstance {
     /// Values of f64 variables.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: fewer values than references. [`Error::Call`]: the FMU failed.
     #[inline(always)]
     pub fn get_f64(&self, references: &[u32], out: &mut [f64]) -> Result {
         match &self.api {
@@ -33,6 +36,9 @@ impl FmuInstance {
     }
 
     /// New values of f64 variables.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: fewer values than references. [`Error::Call`]: the FMU refuses a value or failed.
     #[inline(always)]
     pub fn set_f64(&self, references: &[u32], values: &[f64]) -> Result {
         match &self.api {
@@ -49,6 +55,9 @@ impl FmuInstance {
     }
 
     /// Values of variables of the type of `out`, arrays one after the other.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: a type that this version of FMI does not have. [`Error::Call`]: the FMU failed.
     pub fn get(&self, references: &[u32], out: ValuesMut) -> Result {
         if let ValuesMut::F64(out) = out {
             return self.get_f64(references, out);
@@ -60,6 +69,10 @@ impl FmuInstance {
     }
 
     /// New values.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: a type that this version of FMI does not have, or a value that its type cannot hold.
+    /// [`Error::Call`]: the FMU refuses a value or failed.
     pub fn set(&self, references: &[u32], values: Values) -> Result {
         if let Values::F64(values) = values {
             return self.set_f64(references, values);

@@ -12,7 +12,7 @@ pub use model::*;
 
 use crate::archive::{Archive, Limits};
 use crate::error::{Error, Result};
-use crate::fmu::Folder;
+use crate::folder::Folder;
 use std::path::{Component as Part, Path, PathBuf};
 
 /// Name of the description in an archive.

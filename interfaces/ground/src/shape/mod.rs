@@ -44,6 +44,16 @@ impl Aabb {
 /// [`Placed::move_to`] it.
 ///
 /// A mesh whose triangles are not the faces of a convex body counts by these triangles.
+///
+/// ```
+/// use terraglue_ground::Placed;
+/// use terraglue_subsystem::{Geometry, Pose};
+///
+/// let at = |z: f64| Pose { position: [1.0, 0.0, z], ..Pose::IDENTITY };
+/// let mut foot = Placed::new(&Geometry::Sphere { radius: 0.05 }, &at(0.5));
+/// foot.move_to(&at(0.2));
+/// assert!((foot.aabb().min[2] - 0.15).abs() < 1e-15 && foot.is_convex());
+/// ```
 #[derive(Clone, Debug)]
 pub struct Placed {
     geometry: Geometry,

@@ -1,6 +1,6 @@
 //! Copies what a foreign instance says about itself; checked once, so that nothing foreign is read later.
 
-use super::subsystem::Raw;
+use super::raw::Raw;
 use crate::abi::*;
 use crate::convert;
 use crate::text::{borrowed, slice};

@@ -1,6 +1,7 @@
 //! The host's side of the border: a foreign table as a module that makes [`Subsystem`]s.
 
 mod descriptions;
+mod raw;
 mod services;
 mod subsystem;
 mod values;
@@ -80,6 +81,9 @@ unsafe impl Sync for ForeignModule {}
 impl ForeignModule {
     /// Checks size, version, required functions and kind, in this order, without calling anything.
     ///
+    /// # Errors
+    /// [`TableError`]: the first check that fails.
+    ///
     /// # Safety
     /// `table` is null or points at a table that states its size truly and lives as long as the process, and
     /// its functions keep to the contract of `terraglue.h`.
@@ -130,6 +134,9 @@ impl ForeignModule {
     }
 
     /// Asks the module for its schema.
+    ///
+    /// # Errors
+    /// [`Error::Failed`]: the module gives none, it cannot be read, or it names another kind than the table.
     pub fn schema(&self) -> Result<Schema> {
         let schema = self.table.schema.ok_or(Error::Unsupported)?;
         // SAFETY: a required function, checked in `new`; the text is constant.
@@ -151,6 +158,9 @@ impl ForeignModule {
     }
 
     /// A law with these numbers, in the order of its schema.
+    ///
+    /// # Errors
+    /// [`Error::Failed`]: the table has no law that can be used.
     pub fn law(&self, name: &str, numbers: Vec<f64>) -> Result<Arc<dyn NodeLaw>> {
         // SAFETY: the table was checked in `new` and lives as long as the process.
         let law = unsafe { TableLaw::new(name, self.table.law, numbers) };
@@ -158,6 +168,9 @@ impl ForeignModule {
     }
 
     /// Makes an instance; `config` is complete (`Config::with_defaults`).
+    ///
+    /// # Errors
+    /// What the module answers. [`Error::Refused`]: it is a law. [`Error::Fatal`]: it reports success and made no instance.
     pub fn instantiate(&self, config: &Config, host: Arc<dyn Host>) -> Result<ForeignSubsystem> {
         let Some(instantiate) = self.table.instantiate else {
             let text = "it is a law, not a subsystem: name it in `[soil.law] plugin` of a soil";

@@ -1,10 +1,10 @@
 //! A foreign instance as a [`Subsystem`]: every call goes through the table, nothing is allocated on success.
 
 use super::descriptions::{ForeignDescriptions, check_capabilities};
+use super::raw::Raw;
 use super::services::Services;
 use crate::abi::*;
-use crate::convert;
-use crate::text::{borrowed, c_string, slice};
+use crate::text::{c_string, slice};
 use std::cell::RefCell;
 use std::ffi::c_void;
 use terraglue_subsystem::{
@@ -23,43 +23,6 @@ pub struct ForeignSubsystem {
 // SAFETY: the ABI asks for calls from one thread at a time, not always the same; `&self` is not shared
 // between threads (no Sync).
 unsafe impl Send for ForeignSubsystem {}
-
-/// Table and opaque pointer; frees the instance.
-pub(super) struct Raw {
-    pub(super) table: TgSubsystem,
-    pub(super) instance: *mut c_void,
-    // Outlives the instance, which may call its services until it is freed.
-    services: Box<Services>,
-}
-
-impl Drop for Raw {
-    fn drop(&mut self) {
-        if let Some(free) = self.table.free {
-            // SAFETY: the last call of this instance.
-            unsafe { free(self.instance) }
-        }
-    }
-}
-
-impl Raw {
-    /// Turns a status into a result.
-    #[inline]
-    pub(super) fn check(&self, status: TgStatus, reached: f64) -> Result {
-        if status == TG_OK { Ok(()) } else { Err(self.error(status, reached)) }
-    }
-
-    #[cold]
-    fn error(&self, status: TgStatus, reached: f64) -> Error {
-        // SAFETY: a required function with the live instance; the text is copied at once.
-        let text = self.table.last_error.map(|f| unsafe { borrowed(f(self.instance)) });
-        let text = match text {
-            Some(Ok(text)) if !text.is_empty() => text.to_owned(),
-            Some(Err(error)) => error.to_string(),
-            _ => "no reason given".to_owned(),
-        };
-        convert::error(status, self.services.said(text), reached)
-    }
-}
 
 /// Refuses a call whose vectors are too short: the module would write beyond them.
 #[inline]

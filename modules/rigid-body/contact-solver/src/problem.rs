@@ -52,6 +52,10 @@ pub struct Problem<'a> {
 
 impl<'a> Problem<'a> {
     /// Checks sizes and numbers.
+    ///
+    /// # Errors
+    /// [`Error::Size`], [`Error::Value`] or [`Error::Immobile`]: sizes that do not fit, a number that is not finite or negative
+    /// where it may not be, a contact that no impulse moves.
     pub fn new(w: &'a [f64], q: &'a [f64], mu: &'a [f64]) -> Result<Self, Error> {
         let n = mu.len();
         if q.len() != 3 * n || w.len() != 9 * n * n {

@@ -70,6 +70,9 @@ impl Options {
 }
 
 /// Reads a file of either format, which the root of its text tells; xacro is expanded first.
+///
+/// # Errors
+/// [`Error`] with file, line and element: the file cannot be read, or says what cannot be simulated.
 pub fn read_robot(path: &Path, options: &Options) -> Result<Robot, Error> {
     let file = path.display().to_string();
     let mut text = terraglue_subsystem::files::read_text(path)

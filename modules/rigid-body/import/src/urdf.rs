@@ -13,6 +13,9 @@ use nalgebra::{Unit, Vector3};
 use urdf_rs::JointType;
 
 /// Reads the text of a file; `file` appears in messages and tells the folder of meshes.
+///
+/// # Errors
+/// [`Error`] with line and element: what cannot be read or simulated.
 pub fn read_urdf_text(file: &str, text: &str, options: &Options) -> Result<Robot, Error> {
     let text = crate::syntax::declared(text);
     let source = &Source { file, text: &text };

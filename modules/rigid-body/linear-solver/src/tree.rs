@@ -100,6 +100,9 @@ pub struct Tree {
 
 impl Tree {
     /// From the links of all bodies, parents first, the number of joints and that of rows that close loops.
+    ///
+    /// # Errors
+    /// [`Error`]: links that form no tree, or numbers that are out of range.
     pub fn new(links: &[Link], joints: usize, cuts: usize) -> Result<Self, Error> {
         let late = links.iter().enumerate().find(|(b, l)| l.parent.is_some_and(|p| p >= *b));
         if let Some((body, _)) = late {
@@ -151,6 +154,9 @@ impl Tree {
     /// Factorises. Per body its mass (kg) and inertia about the centre of mass (kg m², world axes); per joint its
     /// rows and their compliance: `Some(0)` rigid, `Some(c)` compliant, `None` no row at all; the rows that close
     /// loops.
+    ///
+    /// # Errors
+    /// [`Error::Pivot`]: a body without enough inertia.
     pub fn factor(
         &mut self,
         masses: &[f64],
@@ -302,6 +308,9 @@ impl Tree {
     }
 
     /// [`Tree::substitute`] for a right-hand side that is kept; says so when the solution is not finite.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`].
     pub fn solve(&self, rhs: &[f64], x: &mut [f64]) -> Result<(), Error> {
         x.copy_from_slice(rhs);
         self.substitute(x);
@@ -309,6 +318,9 @@ impl Tree {
     }
 
     /// [`Tree::substitute_rates`] likewise.
+    ///
+    /// # Errors
+    /// [`Error::NotFinite`].
     pub fn solve_rates(&self, rhs: &[f64], x: &mut [f64]) -> Result<(), Error> {
         x.copy_from_slice(rhs);
         self.substitute_rates(x);

@@ -43,6 +43,9 @@ pub struct Settings {
 
 impl Settings {
     /// From a scenario's table. Refused: numbers without sense.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: a number without sense.
     pub fn from_config(config: &Config) -> Result<Self> {
         let settings = Self {
             curvature_max: config.optional_number("curvature_max_per_m")?.unwrap_or(DEFAULT_CURVATURE),

@@ -57,6 +57,9 @@ pub struct Ground {
 
 impl Ground {
     /// The ground of a scenario, untouched.
+    ///
+    /// # Errors
+    /// A terrain whose heights or sizes are out of range.
     pub fn new(terrain: &dyn Terrain) -> Result<Self> {
         let heights = HeightField::from_terrain(terrain)?;
         let nodes = NodeStates::new(*heights.lattice());

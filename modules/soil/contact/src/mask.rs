@@ -65,6 +65,9 @@ pub struct Mask {
 
 impl Mask {
     /// From a scenario's table. Refused: numbers of soils that are not there, runs that do not end with the ground.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: a mask that does not fit the ground or names a soil that is not there.
     pub fn from_config(config: &Config, gravity: f64, lattice: &Lattice) -> Result<Self> {
         let Some(soils) = config.get("mask.soils").and_then(Value::as_array) else {
             return match config.get("mask.file") {

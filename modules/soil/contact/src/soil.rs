@@ -47,6 +47,9 @@ pub trait Material: Send {
         f64::NAN
     }
     /// New value, within its bounds, for its variable number k.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: it can only be read, or the value is not acceptable.
     fn set_value(&mut self, _k: u32, _value: f64) -> Result {
         Err(Error::Refused("this value can only be read".into()))
     }
@@ -92,6 +95,9 @@ pub struct FieldSoil<M: Material> {
 
 impl<M: Material> FieldSoil<M> {
     /// A soil on the host's terrain. Refused: parameters without sense, a scenario without ground.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: parameters without sense. [`Error::Failed`]: a scenario without ground.
     pub fn new(config: &Config, host: Arc<dyn Host>, mut material: M) -> Result<Self> {
         let parameters = SoilParameters::from_config(config, length(host.gravity()))?;
         let expressions = SoilExpressions::from_config(config)?;

@@ -154,7 +154,7 @@ impl Wheel {
                 bottom = bottom.max(nodes.depth[k] + self.radius * (1.0 - libm::cos(angle)));
             }
             if nodes.stamp[k] == 0 && angle > front {
-                sum += nodes.permanent[k];
+                sum += nodes.top(k);
                 count += 1.0;
             }
         }
@@ -273,6 +273,8 @@ mod tests {
         nodes.arm.push(arm);
         nodes.depth.push(0.01 - arm[0]);
         nodes.permanent.push(0.0);
+        nodes.bed.push(0.0);
+        nodes.loose.push(0.0);
         nodes.area.push(1e-4);
         nodes.stamp.push(0);
         let press = [1.0, -slope[0], -slope[1]];

@@ -116,6 +116,9 @@ impl std::fmt::Display for FitError {
 impl std::error::Error for FitError {}
 
 /// Fits `law` to the readings. With `cohesion` false, or where all readings have one size, A = 0.
+///
+/// # Errors
+/// [`FitError`]: readings from which the parameters cannot be found.
 pub fn fit(law: FitLaw, readings: &[Reading], cohesion: bool) -> Result<Fit, FitError> {
     let first = readings.first().ok_or(FitError::TooFew)?;
     let one_size = readings.iter().all(|r| (r.b / first.b - 1.0).abs() < 1e-6);

@@ -289,6 +289,9 @@ impl SoilParameters {
 
     /// Reads the parameters of an instance under `gravity` (m/s²). Refused: a missing or non-positive number where
     /// one is needed.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: a number that is missing or without sense.
     pub fn from_config(config: &Config, gravity: f64) -> Result<Self> {
         let number = |name| config.optional_number(name);
         let parameters = Self {
@@ -315,6 +318,9 @@ impl SoilParameters {
     }
 
     /// Refuses numbers with which the laws make no sense.
+    ///
+    /// # Errors
+    /// [`Error::Refused`], with the name and value of the first such number.
     pub fn check(&self) -> Result {
         for (name, value) in [
             ("n", self.n),

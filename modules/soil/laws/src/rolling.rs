@@ -42,6 +42,9 @@ impl Rolling {
     }
 
     /// Reads the options. Refused: an option without the number that it needs.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: an option without the number that it needs, or a number without its option.
     pub fn from_config(config: &Config) -> Result<Self> {
         let name = config.get("slip_sinkage").and_then(|v| v.as_str()).unwrap_or(SLIP_SINKAGES[0]);
         let n1 = config.optional_number("slip_sinkage_n1")?;

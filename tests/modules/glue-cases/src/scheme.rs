@@ -65,6 +65,9 @@ impl Scheme {
     }
 
     /// From the parameters.
+    ///
+    /// # Errors
+    /// A key that is missing or has no sense.
     pub fn read(config: &Config) -> Result<Self> {
         Ok(match config.text("integrator")? {
             "newmark" => Self::NEWMARK,

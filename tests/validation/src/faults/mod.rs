@@ -12,6 +12,9 @@ use crate::process::between;
 use crate::process::{Outcome, cargo, must, program, read, root, write};
 
 /// Runs everything and writes the page; fails where a fault does not show against the length of the step.
+///
+/// # Errors
+/// A run that fails, or a page that cannot be written.
 pub fn write_page() -> Outcome {
     must(&mut cargo(&["build", "--package", "terraglue"]))?;
     let scratch = tempfile::tempdir().map_err(|e| format!("temporary folder: {e}"))?;

@@ -33,20 +33,7 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
             left.into_iter().map(f64::abs).fold(0.0, larger)
         },
     )?;
-    // outputs in steps of 1e-4, which no difference of 1e-7 can see
-    let coarse = |name: &str, calc: &str, slope: &str| {
-        let all = [("u", 'i', 0.5), ("asked", 'o', 0.0), ("y", 'o', 0.0)];
-        fmus::build_with_slope(folder, name, &all, (calc, ""), slope)
-    };
-    coarse("coarse", "v[2] = floor(1e4 * (3 - 2 * v[0])) / 1e4;", "-2.0")?;
-    coarse("fine", "v[2] = 1 + 0.5 * v[0];", "0.5")?;
-    let text = scenario(&[("a", "coarse"), ("b", "fine")], &[("b.y", "a.u"), ("a.y", "b.u")]);
-    let solved_so = built(folder, &text)?;
-    let asked =
-        smaller(solved_so.read("a.asked").unwrap_or(f64::NAN), solved_so.read("b.asked").unwrap_or(f64::NAN));
-    let text = scenario(&[("a", "one"), ("b", "same")], &[("b.y", "a.u"), ("a.y", "b.u")]);
-    let said = testbed(folder, &text).err().map(|e| e.to_string()).unwrap_or_default();
-    let named = ["a.y → b.u", "b.y → a.u", "no solution"].iter().all(|word| said.contains(word));
+    let (asked, named) = (asked(folder)?, is_refused(folder));
     Ok(vec![
         Figure::new(
             "fmi.loop.linear",
@@ -73,6 +60,27 @@ pub fn figures(folder: &Path) -> Outcome<Vec<Figure>> {
             "a loop without solution is refused with the names of its connections (1: yes)",
         ),
     ])
+}
+
+/// How often each of two FMUs was asked for its directional derivatives by a loop that needs them.
+fn asked(folder: &Path) -> Outcome<f64> {
+    // outputs in steps of 1e-4, which no difference of 1e-7 can see
+    let coarse = |name: &str, calc: &str, slope: &str| {
+        let all = [("u", 'i', 0.5), ("asked", 'o', 0.0), ("y", 'o', 0.0)];
+        fmus::build_with_slope(folder, name, &all, (calc, ""), slope)
+    };
+    coarse("coarse", "v[2] = floor(1e4 * (3 - 2 * v[0])) / 1e4;", "-2.0")?;
+    coarse("fine", "v[2] = 1 + 0.5 * v[0];", "0.5")?;
+    let text = scenario(&[("a", "coarse"), ("b", "fine")], &[("b.y", "a.u"), ("a.y", "b.u")]);
+    let solved_so = built(folder, &text)?;
+    Ok(smaller(solved_so.read("a.asked").unwrap_or(f64::NAN), solved_so.read("b.asked").unwrap_or(f64::NAN)))
+}
+
+/// Whether a loop without solution is refused with the names of its connections.
+fn is_refused(folder: &Path) -> bool {
+    let text = scenario(&[("a", "one"), ("b", "same")], &[("b.y", "a.u"), ("a.y", "b.u")]);
+    let said = testbed(folder, &text).err().map(|e| e.to_string()).unwrap_or_default();
+    ["a.y → b.u", "b.y → a.u", "no solution"].iter().all(|word| said.contains(word))
 }
 
 fn scenario(all: &[(&str, &str)], connections: &[(&str, &str)]) -> String {

@@ -36,6 +36,9 @@ const SEEN_ONLY: [&str; 9] =
     ["site", "camera", "light", "visual", "statistic", "asset", "size", "compiler", "default"];
 
 /// Reads the text of a file; `file` appears in messages and tells the folder of meshes.
+///
+/// # Errors
+/// [`Error`] with line and element: what cannot be read or simulated.
 pub fn read_mjcf_text(file: &str, text: &str, options: &Options) -> Result<Robot, Error> {
     let whole = MergedFile::read(file, text)?;
     let source = Source { file, text: &whole.text };

@@ -131,6 +131,9 @@ impl SoilExpressions {
     }
 
     /// Reads `[soil.law]`; `None`: the scenario has none.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: a parameter that cannot be read, or one that no law uses.
     pub fn from_config(config: &Config) -> Result<Option<Self>> {
         let text = |name| match config.get(name) {
             None | Some(serde_json::Value::Null) => Ok(None),
@@ -156,6 +159,9 @@ impl SoilExpressions {
     }
 
     /// The pressure law with these parameters; `None`: the scenario leaves it to the soil.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: a text that is no law of pressure, with its place.
     pub fn pressure(&self, p: &SoilParameters) -> Result<Option<PressureExpression>> {
         let Some(text) = &self.pressure else { return Ok(None) };
         let variables = [
@@ -171,6 +177,9 @@ impl SoilExpressions {
     }
 
     /// The shear law with these parameters; `None`: the scenario leaves it to the soil.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: a text that is no law of shear, with its place.
     pub fn shear(&self, p: &SoilParameters) -> Result<Option<ShearExpression>> {
         let Some(text) = &self.shear else { return Ok(None) };
         let variables = [

@@ -94,6 +94,9 @@ const LONGEST: usize = 2000;
 
 impl Tree {
     /// Reads a text; `names` are the symbols that it may use.
+    ///
+    /// # Errors
+    /// [`ExpressionError`] with the place in the text.
     pub fn parse(text: &str, names: &[&str]) -> Result<Self> {
         if text.len() > LONGEST {
             let message = format!("the text has {} characters, at most {LONGEST} are read", text.len());

@@ -41,6 +41,9 @@ impl Symbol {
     }
 
     /// Reads `VALUE [UNIT] [[MIN, MAX]]`, e.g. `820e3 N/m^(n+2) [1e5, 1e7]` or `0.5`.
+    ///
+    /// # Errors
+    /// [`ExpressionError`] with the place in the text.
     pub fn parse(name: &str, text: &str) -> Result<Self, Box<ExpressionError>> {
         let wrong = |span, message: String| {
             let error = ExpressionError::new(text, span, message);

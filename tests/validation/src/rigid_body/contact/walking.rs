@@ -49,40 +49,7 @@ struct SeenWalk {
 
 fn quality(name: &str, drive: GaitDrive) -> Outcome<Vec<Figure>> {
     let mut walk = GaitWalk::new(SIX, drive, H)?;
-    // Bodies stand in the order of the legs' joints, four to a leg, after the trunk.
-    let feet: Vec<usize> = (1..=LEGS.len()).map(|leg| 4 * leg).collect();
-    let normals = LEGS.map(|leg| walk.fixture.id(&format!("{leg}4.contact_normal")));
-    let normals = normals.into_iter().collect::<Outcome<Vec<_>>>()?;
-    let told = [walk.fixture.id("contact.residual")?, walk.fixture.id("contact.yielding")?];
-    let mut before = vec![None; feet.len()];
-    let mut seen = SeenWalk::default();
-    for step in 0..STEPS {
-        walk.step()?;
-        let states = walk.fixture.states()?;
-        for (foot, last) in feet.iter().zip(&mut before) {
-            let (origin, q) = pose(&states[*foot]);
-            let p = origin + q * Vector3::from(FOOT);
-            let stands = p.z < RADIUS;
-            if step >= WALKS {
-                seen.penetration = larger(seen.penetration, RADIUS - p.z);
-                if let Some(last) = last.filter(|_| stands) {
-                    let moved: Vector3<f64> = p - last;
-                    seen.slip += moved.xy().norm() / H;
-                    seen.slips += 1.0;
-                }
-            }
-            *last = stands.then_some(p);
-        }
-        seen.residual = larger(seen.residual, walk.fixture.get(told[0])?);
-        seen.yielding = larger(seen.yielding, walk.fixture.get(told[1])?);
-        if step >= WALKS {
-            seen.samples += 1.0;
-            for normal in &normals {
-                seen.normal += walk.fixture.get(*normal)?;
-            }
-            seen.tracking += walk.tracking_error()?;
-        }
-    }
+    let seen = walked(&mut walk)?;
     let end = pose(&walk.fixture.states()?[0]).0;
     let weight = MASS * G;
     let id = |what: &str| format!("rigid-body.gait.{name}.{what}");
@@ -127,6 +94,45 @@ fn quality(name: &str, drive: GaitDrive) -> Outcome<Vec<Figure>> {
             "most that rigid motors gave way at their largest torque, rad/s",
         ),
     ])
+}
+
+/// What the feet and forces of a walk were.
+fn walked(walk: &mut GaitWalk) -> Outcome<SeenWalk> {
+    // Bodies stand in the order of the legs' joints, four to a leg, after the trunk.
+    let feet: Vec<usize> = (1..=LEGS.len()).map(|leg| 4 * leg).collect();
+    let normals = LEGS.map(|leg| walk.fixture.id(&format!("{leg}4.contact_normal")));
+    let normals = normals.into_iter().collect::<Outcome<Vec<_>>>()?;
+    let told = [walk.fixture.id("contact.residual")?, walk.fixture.id("contact.yielding")?];
+    let mut before = vec![None; feet.len()];
+    let mut seen = SeenWalk::default();
+    for step in 0..STEPS {
+        walk.step()?;
+        let states = walk.fixture.states()?;
+        for (foot, last) in feet.iter().zip(&mut before) {
+            let (origin, q) = pose(&states[*foot]);
+            let p = origin + q * Vector3::from(FOOT);
+            let stands = p.z < RADIUS;
+            if step >= WALKS {
+                seen.penetration = larger(seen.penetration, RADIUS - p.z);
+                if let Some(last) = last.filter(|_| stands) {
+                    let moved: Vector3<f64> = p - last;
+                    seen.slip += moved.xy().norm() / H;
+                    seen.slips += 1.0;
+                }
+            }
+            *last = stands.then_some(p);
+        }
+        seen.residual = larger(seen.residual, walk.fixture.get(told[0])?);
+        seen.yielding = larger(seen.yielding, walk.fixture.get(told[1])?);
+        if step >= WALKS {
+            seen.samples += 1.0;
+            for normal in &normals {
+                seen.normal += walk.fixture.get(*normal)?;
+            }
+            seen.tracking += walk.tracking_error()?;
+        }
+    }
+    Ok(seen)
 }
 
 /// Median of a step and its 99th percentile over the median. Every run does the same steps, and what else the machine does

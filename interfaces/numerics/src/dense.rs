@@ -1,6 +1,18 @@
-//! Dense linear systems of the size of an interface (n ≲ 100), solved in place without allocation.
+//! Dense linear systems of moderate size (n ≲ 100), solved in place. Storage is reused from system to system, so a step allocates nothing;
+//! the factorisations of libraries take new memory for every matrix.
 
 /// LU factors with partial pivoting of a row-major n × n matrix; the storage is reused.
+///
+/// ```
+/// use terraglue_numerics::dense::Lu;
+///
+/// let matrix = [[0.0, 2.0], [3.0, 1.0]];
+/// let mut lu = Lu::default();
+/// assert_eq!(lu.factor(2, |row, column| matrix[row][column]), 2);
+/// let mut b = [4.0, 11.0];
+/// lu.solve(&mut b);
+/// assert_eq!(b, [3.0, 2.0]);
+/// ```
 #[derive(Debug, Default)]
 pub struct Lu {
     factors: Vec<f64>,

@@ -1,7 +1,7 @@
 //! Symmetric systems that are singular or nearly so: the solution of least norm by a truncated eigen-decomposition.
 //!
-//! Redundant glue (two joints that say the same, a mechanism stretched flat) leaves forces undetermined; directions
-//! whose eigenvalue is below 1e-10 of the largest are left alone.
+//! Redundant constraints (two equal joints, a mechanism stretched flat) leave forces undetermined; directions whose eigenvalue is below
+//! 1e-10 of the largest are left alone.
 
 /// Eigenvalues below this share of the largest count as zero.
 const TRUNCATION: f64 = 1e-10;
@@ -9,6 +9,15 @@ const TRUNCATION: f64 = 1e-10;
 const MAX_SWEEPS: usize = 40;
 
 /// Jacobi's method (1846) with its buffers.
+///
+/// ```
+/// use terraglue_numerics::least_norm::TruncatedSolver;
+///
+/// // two equal equations: the solution of least norm shares the load
+/// let mut b = [2.0, 2.0];
+/// assert_eq!(TruncatedSolver::default().solve(2, |_, _| 1.0, &mut b), 1);
+/// assert!(b.iter().all(|x| (x - 1.0).abs() < 1e-14));
+/// ```
 #[derive(Debug, Default)]
 pub struct TruncatedSolver {
     a: Vec<f64>,

@@ -1,0 +1,91 @@
+//! All that flows between the subsystems of a run besides glue: connections, the time line of events, faults, and the names by which
+//! variables are found.
+
+use super::fault::Change;
+use super::{Directory, Faults, Link, Links, TimeLine, initialize};
+use terraglue_diagnostics::Result;
+use terraglue_host::Instance;
+use terraglue_subsystem::Capabilities;
+
+/// Signals of a run.
+#[derive(Debug)]
+pub struct Signals {
+    /// Connections between variables.
+    pub links: Links,
+    /// Variables by their full names.
+    pub directory: Directory,
+    /// Events.
+    pub time_line: TimeLine,
+    /// Faults of values on their way.
+    pub faults: Faults,
+}
+
+impl Signals {
+    /// Number of variables that are fed by another one.
+    pub fn connections(&self) -> usize {
+        self.links.numbers.iter().map(Link::count).sum::<usize>() + self.links.discrete.len()
+    }
+
+    /// Whether a connection feeds a variable.
+    pub fn is_fed(&self, instances: &[Instance], slot: usize, id: u32) -> bool {
+        self.links.numbers.iter().any(|l| l.feeds(slot, id))
+            || self.links.discrete.iter().any(|l| l.feeds(instances, slot, id))
+    }
+
+    /// The time of the next event or fault after t, s.
+    pub fn next_time(&self, t: f64) -> f64 {
+        self.time_line.next_time(t).min(self.faults.next_time(t))
+    }
+
+    /// Connected values at the start where outputs depend on inputs of the same time: in their order, loops solved.
+    ///
+    /// # Errors
+    /// A loop without a solution, or what a module refuses.
+    pub fn initialize(&mut self, instances: &mut [Instance]) -> Result {
+        let through = |k: usize| instances[k].capabilities().has(Capabilities::FEEDTHROUGH);
+        if self.links.numbers.iter().any(|l| l.leaves(through)) {
+            initialize(&mut self.links.numbers, instances)?;
+        }
+        Ok(())
+    }
+
+    /// Outputs of t become inputs of the step of length h, with what is wrong with them on their way; `tell` hears of faults that begin
+    /// or end.
+    ///
+    /// # Errors
+    /// As of [`Signals::read`] and [`Signals::write`], or an input that does not take what a fault makes of it.
+    pub fn transfer(
+        &mut self,
+        (t, h): (f64, f64),
+        instances: &mut [Instance],
+        tell: impl FnMut(Change),
+    ) -> Result {
+        self.read(instances)?;
+        if !self.faults.is_empty() {
+            self.faults.apply((t, h), &mut self.links.numbers, instances, tell)?;
+        }
+        self.write(instances)
+    }
+
+    /// Reads all outputs. None is passed on before all are read, so that direct feed-through cannot leak values of the same step.
+    ///
+    /// # Errors
+    /// A value that is no number, has no entry in the `map` of its connection, or that a module cannot give.
+    pub fn read(&mut self, instances: &[Instance]) -> Result {
+        for link in &mut self.links.numbers {
+            link.read(instances)?;
+        }
+        self.links.discrete.iter_mut().try_for_each(|l| l.read(instances))
+    }
+
+    /// Sets all inputs to what was read.
+    ///
+    /// # Errors
+    /// A value that a module refuses.
+    pub fn write(&self, instances: &mut [Instance]) -> Result {
+        for link in &self.links.numbers {
+            link.pass_on(instances)?;
+        }
+        self.links.discrete.iter().try_for_each(|l| l.pass_on(instances))
+    }
+}

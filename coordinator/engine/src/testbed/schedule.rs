@@ -1,0 +1,73 @@
+//! When a subsystem without glue makes a step by itself, and how it ended.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+use terraglue_diagnostics::Result;
+use terraglue_host::{Instance, Progress};
+use terraglue_subsystem::{Input, Response, Step};
+
+/// A step of the testbed as subsystems see it.
+pub(super) struct Span {
+    pub step: Step<'static>,
+    pub end: f64,
+    pub nominal: u64,
+    pub step_s: f64,
+    /// Whether a trial ended otherwise than at t + h.
+    pub broken: AtomicBool,
+}
+
+/// When a subsystem makes a step by itself, and how it ended. Apart from all else of a subsystem, as every step asks for it.
+pub(super) struct StepSchedule {
+    /// Steps of the testbed per step of this subsystem.
+    pub step_multiple: u32,
+    /// Whether it is glued: it makes none by itself.
+    pub glued: bool,
+    /// Whether it makes no step now, as controllers do before the start.
+    pub holds: bool,
+    /// Whether it has bodies, whose states are read after every step.
+    pub has_bodies: bool,
+    /// How its last trial ended where that was not at t + h.
+    pub trial: Option<Box<Result<Progress>>>,
+}
+
+impl StepSchedule {
+    /// Its trial of this step, if it makes one.
+    #[inline]
+    pub fn try_alone(&mut self, instance: &mut Instance, span: &Span, out: &mut Response) {
+        let none = Input::Force { t: &[], motion: None };
+        let broken = self.own_step(span, |step| match instance.advance(step, &none, out) {
+            Ok(Progress::Complete) => None,
+            other => Some(Box::new(other)),
+        });
+        if let Some(Some(trial)) = broken {
+            self.trial = Some(trial);
+            span.broken.store(true, Ordering::Relaxed);
+        }
+    }
+
+    /// Does something with the step that the subsystem makes by itself now, if any.
+    #[inline]
+    pub fn own_step<R>(&self, span: &Span, make: impl FnOnce(&Step) -> R) -> Option<R> {
+        let long;
+        let step = match (self.glued, self.step_multiple) {
+            (true, _) => return None,
+            _ if self.holds => return None,
+            (false, 1) => &span.step,
+            (false, _) => {
+                long = self.long_step(span)?;
+                &long
+            }
+        };
+        Some(make(step))
+    }
+
+    /// One of `step_multiple` nominal steps is made when its last part is reached, so its outputs never run ahead.
+    #[inline(never)]
+    fn long_step(&self, span: &Span) -> Option<Step<'static>> {
+        let Span { step, end, nominal, step_s, .. } = span;
+        let multiple = u64::from(self.step_multiple);
+        let at_end = end - (step.t + step.h) <= 1e-6 * step_s;
+        let whole = (nominal + 1).is_multiple_of(multiple);
+        let length = multiple as f64 * step_s;
+        (at_end && whole).then(|| Step::free(end - length, length, (nominal + 1) / multiple - 1))
+    }
+}

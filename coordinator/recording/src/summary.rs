@@ -89,7 +89,8 @@ pub struct Summary {
     /// Mechanical work of the motors, driving and braking together, Σ |power|·h, J: `energies.driving_j` +
     /// `energies.braking_j`.
     pub energy_j: f64,
-    /// energy_j / (m·g·|distance|), dimensionless; null below 1 mm. Mechanical; see `electrical_cost_of_transport`.
+    /// energy_j / (m·g·|distance|), dimensionless; null below 1 mm and where no motor worked. Mechanical; see
+    /// `electrical_cost_of_transport`.
     pub cost_of_transport: Option<f64>,
     /// Evaluations of the bodies per step, mean; 1 for a single pass, which makes no iterations.
     pub evaluations_mean: f64,
@@ -173,7 +174,7 @@ pub struct Summary {
     /// Where the energy came from and went.
     #[serde(default)]
     pub energies: Energies,
-    /// energy_j / |distance|, J/m; null below 1 mm.
+    /// energy_j / |distance|, J/m; null below 1 mm and where no motor worked.
     #[serde(default)]
     pub energy_j_per_m: Option<f64>,
     /// electrical_energy_j / (m·g·|distance|), dimensionless; null below 1 mm and where the electrical energy is.
@@ -188,8 +189,8 @@ pub struct Summary {
     pub peak_force_over_weight: Option<f64>,
 }
 
-/// Depth of prints: each counts once, with the largest depth under it while it was pressed. A wheel leaves a print every
-/// 3 cm.
+/// Depth of prints: each counts once, with the largest depth under it while it was pressed, however often that was. A wheel
+/// leaves a print every 3 cm.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PrintDepth {
     /// Number of prints.

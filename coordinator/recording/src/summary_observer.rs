@@ -247,7 +247,7 @@ impl SummaryObserver {
         let way_m = body.map(|b| b.distance_m.abs()).filter(|way| *way >= SMALLEST_DISTANCE_M);
         let transport = |energy_j: f64| Some(energy_j / (weight_n? * way_m?));
         let g = &self.gluing;
-        let energy_j = self.motors.both_j();
+        let by_motors = Some(self.motors.both_j()).filter(|e| *e > 0.0);
         let energies = self.energies.figures(&self.motors);
         // what no step could say does not apply; before the first step nothing is known to be amiss
         let applies = |steps: u64| g.steps == 0 || steps > 0;
@@ -270,8 +270,8 @@ impl SummaryObserver {
             max_roll_rad: body.map(|b| b.max_roll_rad),
             max_pitch_rad: body.map(|b| b.max_pitch_rad),
             max_sinkage_m: self.sinkage.as_ref().map(Deepest::largest),
-            energy_j,
-            cost_of_transport: transport(energy_j),
+            energy_j: self.motors.both_j(),
+            cost_of_transport: by_motors.and_then(transport),
             evaluations_mean: g.mean(g.bodies),
             evaluations_max: g.histogram.len().saturating_sub(1) as u32,
             steps_not_converged: applies(g.checked).then_some(g.not_converged),
@@ -304,7 +304,7 @@ impl SummaryObserver {
             mean_sinkage_m: self.prints.as_ref().and_then(PrintTrack::mean_m),
             path_m: body.map(|b| b.path_m),
             energies,
-            energy_j_per_m: way_m.map(|way| energy_j / way),
+            energy_j_per_m: by_motors.and_then(|e| Some(e / way_m?)),
             electrical_cost_of_transport: electrical_j.and_then(transport),
             print_depth: self.prints.as_ref().and_then(PrintTrack::depth),
             peak_force_over_weight: body.and_then(|b| Some(b.peak_n()? / weight_n?)),

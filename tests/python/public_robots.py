@@ -195,13 +195,18 @@ def kinds(warnings):
     return ", ".join(found + (["others"] if known < len(warnings) else []))
 
 
+def unwrapped(message):
+    """A message in one line: where it is wrapped depends on the length of the path in it."""
+    return " ".join(re.sub(r"[│┃|]", " ", message).split())
+
+
 def tried(path, kind):
     """Verdict (agrees, refused, WRONG or no oracle), what to say, and the robot."""
     done = terraglue(path)
-    if done.returncode == 2 and "no mass and cannot move" in done.stderr:
+    if done.returncode == 2 and "no mass and cannot move" in unwrapped(done.stderr):
         done = terraglue(path, "--fixed-base")
     if done.returncode != 0:
-        said = " ".join(re.sub(r"[│┃|]", " ", done.stderr).split())
+        said = unwrapped(done.stderr)
         reason = next((short for long, short in REASONS.items() if re.search(long, said)), None)
         return ("refused", reason, None) if reason else ("WRONG", f"refused: {said[-300:]}", None)
     ours = json.loads(done.stdout)

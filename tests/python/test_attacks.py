@@ -1,5 +1,6 @@
 """Inputs that are wrong in every way that was thought of. None may panic, hang, or leave the user without place and cure."""
 
+import json
 import os
 import pathlib
 import re
@@ -464,6 +465,142 @@ THIRD_ROBOTS = [
 ]
 
 
+# ---------------------------------------------------------------------------------------------------------------------
+# A fourth look: what modules and the terrain say of a value stands where the value does.
+
+CRATER = 'terrain={kind="crater",size_m=[6,4],spacing_m=0.02,diameter_m=1.0,depth_m='
+FOURTH_SETS = [
+    ("robot.joints={LF_j1=1e9}", "outside the limits"),
+    ('robot.motor={"zz*"="velocity"}', "no moving joint is called `zz*`"),
+    ('robot.actuator={preset="x"}', "mars-space-climber"),
+    ("robot.position_m=[1.0]", "position_m"),
+    ("robot.integrator=euler", "`generalized-alpha`"),
+    ("robot.integrator=rk4", "`energy-momentum`"),
+    ("robot.contact_solver=lcp", "valid:"),
+    ("robot.step_multiple=2", "`robot` is glued to `soil`"),
+    ("soil.step_multiple=5", "connected by signals only"),
+    ("soil.slip_sinkage=ding", "slip_sinkage_n1"),
+    ("soil.slip_sinkage_n1=0.5", "slip_sinkage"),
+    ("soil.curvature_max_per_m=0.0", "curvature_max_per_m"),
+    ("soil.module=gait", "modules of kind soil"),
+    ("gait.parameters=LETE_sand", "it takes no number of them"),
+    ("gait.links_m=[1,2]", "links_m"),
+    ("gait.body_height_m=1.5", "out of reach"),
+    ("terrain.rms_m=1e6", "outside ±511 m"),
+    ("terrain.rms_m=1e300", "outside ±511 m"),
+    ("terrain.wavelengths_m=[0.001,3.0]", "cannot be shown"),
+    ("terrain.flat_radius_m=9.0", "flattens the whole ground"),
+    ('terrain={kind="slope",size_m=[6,4],spacing_m=0.02,angle_rad=1.55}', "is a wall"),
+    ('terrain={kind="flat",size_m=[6,4],spacing_m=0.02,height_m=1e300}', "outside ±511 m"),
+    (CRATER + "0.1,rim_height_m=0.5}", "is no bowl"),
+    (CRATER + "2.0,max_slope_rad=0.1}", "steeper than"),
+    ("time.duration_s=1e300", "1e300 s"),
+    ("time.step_s=1e-300", "1e-300"),
+    ("terrain.spacing_m=1e-300", "1e-300"),
+    ("world.gravity_m_s2=[0,0,-1e300]", "out of range"),
+]
+
+
+def test_edits_of_a_fourth_look(place):
+    attack_edits(place, [(text, 2, words) for text, words in FOURTH_SETS])
+    lost = []
+    for text, _ in FOURTH_SETS:
+        told = terraglue("check", place / "walk.toml", "--set", text, timeout=LIMIT_S).stderr
+        if "[--set:1:" not in told or re.search(r"\d{30}", told):
+            lost.append(f"{text}: {told[:1000]}")
+    assert not lost, "\n\n".join(lost)
+
+
+def test_a_duration_of_the_command_line_is_the_place(place):
+    faults = attack([("1e300", ["run", place / "walk.toml", "--duration", "1e300"], 2, "[--duration:1:", place)])
+    assert not faults, "\n\n".join(faults)
+
+
+def test_tables_of_other_forms(place):
+    header = PLATE.strip()
+    tables = {"semicolons": header.replace(",", ";") + "\n1;2;50\n", "tabulators": header.replace(",", "\t") + "\n1\t2\t50\n",
+              "with a point": header + "\n1,5,2,5,50\n", "0 of 2 readings": header + "\n1,2,50\n2,-3,50\n"}
+    rows = []
+    for k, (words, text) in enumerate(tables.items()):
+        (place / f"form{k}.csv").write_text(text)
+        rows.append((words, ["fit-soil", place / f"form{k}.csv", "--law", "bekker"], 2, words, place))
+    rows.append(("above the ground", ["fit-soil", place / "form0.csv", "--from-mm", "-1"], 2, "out of range", place))
+    faults = attack(rows)
+    assert not faults, "\n\n".join(faults)
+
+
+def test_commands_of_a_fourth_look(place):
+    soil = ["export", "soil-bekker", "-o", place / "fourth.fmu", "--set", "soil.parameters=LETE_sand", "--set"]
+    robot = ["export", "rigid-body", "-o", place / "fourth.fmu", "--set", f"robot.model={ROOT}/models/hexapod.urdf", "--set"]
+    rows = [("no module", ["modules", place / "text.txt"], 2, "is not a shared library", place),
+            ("no archive", ["fmu", "run", place / "text.txt"], 2, "is no zip archive", place),
+            ("no feet", [*soil, "foot.count=0"], 2, "[--set:1:", place),
+            ("no shape", [*soil, "foot.shape=cube"], 2, "`capsule`", place),
+            ("no integrator", [*robot, "robot.integrator=euler"], 2, "`generalized-alpha`", place),
+            ("no solver", [*robot, "robot.contact_solver=x"], 2, "`lcp-4`", place),
+            ("no joint", [*robot, "robot.joints={zz=1.0}"], 2, "[--set:1:", place)]
+    faults = attack(rows)
+    assert not faults, "\n\n".join(faults)
+    assert not (place / "fourth.fmu").exists()
+
+
+# Text of a robot, words.
+ABSURD = [
+    (BALL.replace("<mass value='1'", "<mass value='1e30'"), "weighs 1e30 kg"),
+    (BALL.replace("<mass value='1'", "<mass value='1e-12'"), "weighs 1e-12 kg"),
+    (BALL.replace("radius='0.1'", "radius='1e6'"), "a shape of 2.000e6 m"),
+    (BALL.replace("radius='0.1'", "radius='1e-9'"), "a shape of 2.000e-9 m"),
+    (BALL.replace("ixx='1' iyy='1' izz='1'", "ixx='1e9' iyy='1e9' izz='1e9'"), "the inertia of a body 5.477e4 m large"),
+    (BALL.replace("<inertial>", "<inertial><origin xyz='1e5 0 0'/>"), "its centre of mass 1.000e5 m from its origin"),
+    (GEOM.format("sphere").replace("mass='1'", "mass='1e30'"), "weighs 1e30 kg"),
+    (GEOM.format("sphere").replace("size='0.1'", "size='1e6'"), "a shape of 2.000e6 m"),
+]
+
+
+@pytest.mark.parametrize("k", range(len(ABSURD)))
+def test_absurd_robots_are_told_with_their_line(place, k):
+    text, words = ABSURD[k]
+    path = place / f"absurd{k}.{'xml' if 'mujoco' in text else 'urdf'}"
+    path.write_text("\n\n" + text.replace("MORE", ""))
+    said = terraglue("robot", path)
+    assert said.returncode == 0, said.stderr
+    assert f"{path.name}:3: " in said.stdout + said.stderr and words in said.stdout + said.stderr, said.stdout + said.stderr
+    faults = attack([(words, ["robot", path, "--strict"], 2, "refused because of `strict`", place)])
+    assert not faults, "\n\n".join(faults)
+
+
+def test_what_bounces_leaves_one_print_and_costs_nothing(place):
+    (place / "ball.urdf").write_text(BALL.replace("MORE", "").replace("='1' iyy='1' izz='1'", "='0.004' iyy='0.004' izz='0.004'"))
+    path = place / "ball.toml"
+    path.write_text(f"""[time]
+duration_s = 1.5
+[terrain]
+kind = "flat"
+size_m = [1, 1]
+spacing_m = 0.01
+[robot]
+module = "rigid-body"
+model = "ball.urdf"
+position_m = [0, 0, 0.5]
+place_on_ground = false
+[soil]
+module = "soil-bekker"
+parameters_file = "{ROOT}/models/soils.csv"
+parameters = "LETE_sand"
+k_phi = 1e8
+""")
+    done = terraglue("run", path, "--out", place / "bounced", "--json")
+    assert done.returncode == 0, done.stderr
+    figures = json.loads(done.stdout)
+    assert figures["print_depth"]["count"] == 1, figures["print_depth"]
+    assert figures["cost_of_transport"] is None and figures["energy_j_per_m"] is None
+    page = (place / "bounced" / "report.html").read_text()
+    cards = page[page.index('<dl class="cards'): page.rindex("</dl>")]
+    for name in ("Distance", "Largest tilt"):
+        value = re.search(f"<dt>{name}</dt><dd><b>([^<]*)</b>", cards)
+        assert value and value[1] == "0", (name, cards)
+
+
 def test_edits_of_a_third_look(place):
     attack_edits(place, THIRD_SETS)
 
@@ -514,7 +651,7 @@ def test_a_recording_that_is_too_short_to_go_on(place):
     process.send_signal(signal.SIGKILL)
     process.wait()
     (folder / "recording.mcap").write_bytes(b"x")
-    faults = attack([("cut short", ["run", "--resume", folder, "--quiet"], 1, "shorter than it was", place)])
+    faults = attack([("cut short", ["run", "--resume", folder, "--quiet"], 2, "shorter than it was", place)])
     assert not faults, "\n\n".join(faults)
 
 

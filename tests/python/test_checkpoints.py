@@ -172,3 +172,38 @@ def test_a_module_that_cannot_save_its_state_is_named_before_the_run(tmp_path):
 def test_a_time_between_checkpoints_is_above_zero(time):
     process = terraglue("run", MOON_WALK, "--checkpoint-every", time)
     assert process.returncode == 2 and "5s" in process.stderr
+
+
+def test_a_report_of_a_killed_run_takes_nothing_from_it(walk, tmp_path):
+    end_after_a_checkpoint(tmp_path / "run", signal.SIGKILL, walk, *SMALL)
+    kept = (tmp_path / "run" / "recording.mcap").read_bytes()
+    told = terraglue("report", tmp_path / "run")
+    assert told.returncode == 0 and "is left as it is" in told.stderr, told.stderr
+    assert (tmp_path / "run" / "recording.mcap").read_bytes() == kept
+    done = terraglue("run", "--resume", tmp_path / "run", "--quiet")
+    assert done.returncode == 0, done.stderr
+
+
+def test_a_report_while_the_run_goes_on_takes_nothing_from_it(walk, tmp_path):
+    once = terraglue("run", walk, *SMALL, "--out", tmp_path / "alone")
+    assert once.returncode == 0, once.stderr
+    out = tmp_path / "run"
+    process = subprocess.Popen([PROGRAM, "run", str(walk), *SMALL, "--out", str(out), "--realtime"], cwd=ROOT)
+    while not (out / "recording.mcap").exists() or not (out / "recording.mcap").stat().st_size:
+        assert process.poll() is None
+        time.sleep(0.002)
+    while process.poll() is None:
+        terraglue("report", out)
+    assert process.returncode == 0
+    assert_same(tmp_path / "alone", out)
+
+
+@pytest.mark.parametrize("damage, words", [("gone", "No such file"), ("changed", "recording.mcap: ")])
+def test_a_recording_that_was_changed_is_told_with_the_way_out(walk, tmp_path, damage, words):
+    end_after_a_checkpoint(tmp_path / "run", signal.SIGKILL, walk, *SMALL)
+    path = tmp_path / "run" / "recording.mcap"
+    bytes_ = bytearray(path.read_bytes())
+    bytes_[len(bytes_) // 3] ^= 0xFF
+    path.unlink() if damage == "gone" else path.write_bytes(bytes_)
+    told = terraglue("run", "--resume", tmp_path / "run", "--quiet")
+    assert told.returncode == 2 and words in told.stderr and "start the run anew" in told.stderr, told.stderr

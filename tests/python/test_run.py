@@ -230,7 +230,8 @@ def test_a_run_at_the_pace_of_the_clock_takes_its_time_and_has_the_same_bytes(tm
         assert done.returncode == 0, done.stderr
         recordings.append((tmp_path / name / "recording.mcap").read_bytes())
     assert recordings[0] == recordings[1]
-    assert times[1] > 1.9 and times[0] < times[1], times
+    # how long the other one takes is up to the machine
+    assert times[1] > 1.9, times
 
 
 @pytest.mark.parametrize("strategy", ["cooperative", "cooperative-compliant", "iterative"])

@@ -420,7 +420,7 @@ pub struct FitSoilArguments {
     #[arg(long, value_name = "CSV")]
     pub predict: Option<PathBuf>,
     /// Leave out what lies above this sinkage, mm: the plate is not seated yet.
-    #[arg(long, value_name = "MM", default_value_t = 3.0)]
+    #[arg(long, value_name = "MM", default_value_t = 3.0, allow_negative_numbers = true)]
     pub from_mm: f64,
     /// Row of the soil table that gives cohesion, friction, shear modulus and density.
     #[arg(long, value_name = "NAME")]

@@ -14,6 +14,9 @@ use terraglue_soil_fit::{
 };
 use terraglue_soil_law::PRESSURE_LAWS;
 
+/// A fit to fewer readings tells nothing.
+const FEWEST: usize = 4;
+
 /// Fits, writes what was asked for and prints.
 pub fn fit_soil(a: &FitSoilArguments) -> Result<Exit> {
     if !(a.from_mm.is_finite() && a.from_mm >= 0.0) {
@@ -34,6 +37,7 @@ pub fn fit_soil(a: &FitSoilArguments) -> Result<Exit> {
     let Some(built_in) = PRESSURE_LAWS.into_iter().find(|law| *law == a.law) else {
         return module(a, &tests, known);
     };
+    enough(a, &tests)?;
     let fit = fit_law(built_in, &tests, known)?;
     let all: Vec<SoilFit> = PRESSURE_LAWS.iter().filter_map(|law| fit_law(law, &tests, known).ok()).collect();
     let rms = |tests: &PlateTests| fit.fit.numbers.rms(&fit.fit.law, &tests.readings);
@@ -52,6 +56,21 @@ pub fn fit_soil(a: &FitSoilArguments) -> Result<Exit> {
         }
     }
     Ok(Exit::Done)
+}
+
+/// Refuses a fit to too few readings.
+fn enough(a: &FitSoilArguments, tests: &PlateTests) -> Result {
+    let (count, rows) = (tests.readings.len(), tests.rows);
+    if count >= FEWEST {
+        return Ok(());
+    }
+    let message = format!(
+        "{}: {count} of {rows} readings can be used, those from {} mm of sinkage on with a pressure above 0: at least four \
+         readings are needed",
+        a.data.display(),
+        a.from_mm
+    );
+    Err(InputError::plain(message, Some("give more readings, or lower --from-mm".into())).into())
 }
 
 /// How the fit does on unseen tests, and what was written.

@@ -212,6 +212,10 @@ fn shown(name: &str, search: &SearchPath, module_path: &[PathBuf]) -> Result<Exi
         outln!("{table}");
     }
     if let Some(why) = &m.refused {
+        // a file that was named is to be one; of a module that is found it is a fact like others
+        if is_path(name) {
+            return Err(InputError::plain(why.to_string(), None).into());
+        }
         outln!("cannot be used: {why}");
         return Ok(Exit::Done);
     }

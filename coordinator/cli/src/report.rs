@@ -1,14 +1,15 @@
 //! `terraglue report`: the report of any recording, also of one that was cut off.
 
 use super::Exit;
+use super::folder::free;
 use super::output::outln;
 use std::path::Path;
 use terraglue_diagnostics::Result;
 use terraglue_recording as recording;
-use terraglue_recording::{RECORDING, Recording};
+use terraglue_recording::{CHECKPOINT, RECORDING, Recording};
 use terraglue_scenario::InputError;
 
-/// Mends the recording of a folder where its end is missing, then writes the report.
+/// Mends the recording of a folder where its end is missing and nothing goes on with it, then writes the report.
 pub fn report(folder: &Path) -> Result<Exit> {
     let path = folder.join(RECORDING);
     if !path.is_file() {
@@ -16,8 +17,16 @@ pub fn report(folder: &Path) -> Result<Exit> {
         let help = Some("give the folder of a run, e.g. runs/moon_walk".into());
         return Err(InputError::plain(message, help).into());
     }
-    let mended = recording::mend(folder)?;
+    // what writes it, now or after --resume, counts on the file as it is
+    let goes_on = folder.join(CHECKPOINT).is_file() || free(folder).is_err();
+    let mended = !goes_on && recording::mend(folder)?;
     let recorded = Recording::open(folder)?;
+    if goes_on && !recording::has_end(folder)? {
+        let (path, t_s) = (path.display(), recorded.end_s());
+        eprintln!(
+            "note: `{path}` has no end yet and is left as it is: the report shows what arrived whole, up to t = {t_s:.3} s"
+        );
+    }
     if mended {
         eprintln!(
             "warning: `{}` had no end: it keeps what arrived whole, up to t = {:.3} s, and ends there now",

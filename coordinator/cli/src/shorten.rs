@@ -13,13 +13,38 @@ const BEFORE: usize = 60;
 /// Most lines of a file that are marked.
 const MOST_LINES: usize = 8;
 
-/// A text without its middle where it is too long.
+/// Longest number that stays as it is written, in characters: no sixteen digits of a usual size are longer.
+const LONGEST_NUMBER: usize = 24;
+
+/// A text with short numbers, and without its middle where it is too long.
 pub fn text(text: &str) -> String {
+    let text = numbers(text);
     if text.len() <= LONGEST_TEXT {
-        return text.to_owned();
+        return text;
     }
     let (head, tail) = (text.floor_char_boundary(HEAD), text.ceil_char_boundary(text.len() - TAIL));
     format!("{} … ({} characters) … {}", &text[..head], text[head..tail].chars().count(), &text[tail..])
+}
+
+/// The text with a power of ten in long numbers: 1e-300 has 300 digits.
+fn numbers(text: &str) -> String {
+    let (mut out, mut rest, mut before) = (String::with_capacity(text.len()), text, None);
+    while let Some(at) = rest.find(|c: char| c.is_ascii_digit()) {
+        out.push_str(&rest[..at]);
+        before = rest[..at].chars().next_back().or(before);
+        let end = rest[at..].find(|c: char| !(c.is_ascii_digit() || c == '.')).map_or(rest.len(), |n| at + n);
+        let word = rest[at..end].trim_end_matches('.');
+        let after = rest[at + word.len()..].chars().next();
+        let is_part = |c: Option<char>| c.is_some_and(|c| c.is_alphanumeric() || "_/".contains(c));
+        let number = word.parse::<f64>().ok().filter(|x| x.is_finite() && word.len() > LONGEST_NUMBER);
+        match number.filter(|_| !is_part(before) && !is_part(after)) {
+            Some(number) => out.push_str(&format!("{number:e}")),
+            None => out.push_str(word),
+        }
+        before = word.chars().next_back();
+        rest = &rest[at + word.len()..];
+    }
+    out + rest
 }
 
 /// An error whose texts and lines are short.
@@ -80,6 +105,21 @@ mod tests {
             assert_eq!(lines(source, marked.clone()), (source.to_owned(), marked));
         }
         assert_eq!(text("short"), "short");
+    }
+
+    #[test]
+    fn long_numbers_have_a_power_of_ten() {
+        let of = |x: f64| text(&format!("`h` = {x} m, more."));
+        assert_eq!(of(1e-300), "`h` = 1e-300 m, more.");
+        assert_eq!(of(-1.5e300), "`h` = -1.5e300 m, more.");
+        for short in
+            ["a.b.3.0000", "0.30000000000000004", "5.", "1_000", "é1 2.5 ende 3", "0.000012345678901234567"]
+        {
+            assert_eq!(text(short), short);
+        }
+        let hash = format!("{}a, /{}/x", "1".repeat(40), "2".repeat(40));
+        assert_eq!(text(&hash), hash);
+        assert_eq!(text(&format!("at most {:?} or {}.", 1e22, 1e25)), "at most 1e22 or 1e25.");
     }
 
     #[test]

@@ -2,9 +2,10 @@
 
 use super::arguments::ScenarioArguments;
 use std::path::Path;
-use terraglue_diagnostics::Result;
+use terraglue_diagnostics::{Error, Result};
 use terraglue_host::{SearchPath, available_modules};
-use terraglue_scenario::{InputError, Scenario, nearest};
+use terraglue_scenario::advice::line_of;
+use terraglue_scenario::{InputError, Scenario, SubsystemSpec, nearest};
 use terraglue_subsystem::Kind;
 
 /// Refuses edits that put another kind of module in the place of a soil; warns of a terrain without any soil.
@@ -19,15 +20,26 @@ pub fn check(scenario: &Scenario, arguments: &ScenarioArguments) -> Result {
                 let was_soil = kind(&old.module, &search, &scenario.folder) == Some(Kind::Soil);
                 let found = |module: &str| kind(module, &search, &scenario.folder).is_some();
                 if let Some(new) = new.filter(|new| was_soil && found(&new.module)) {
-                    require_soil(&new.module, scenario, arguments)?;
+                    require_soil(&new.module, scenario, arguments).map_err(|error| match error {
+                        Error::Input(no) => {
+                            let InputError { message, help, .. } = *no;
+                            scenario.source.error_at_value(&[&new.name, "module"], message, help).into()
+                        }
+                        other => other,
+                    })?;
                 }
             }
         }
     }
     let mut kinds = scenario.subsystems.iter().map(|s| kind(&s.module, &search, &scenario.folder));
     // A module that is not found is an error of its own.
-    if scenario.terrain.is_some() && kinds.all(|k| k.is_some_and(|k| k != Kind::Soil)) {
-        eprintln!("warning: terrain is not used: no subsystem of kind soil");
+    let as_stone = |s: &SubsystemSpec| s.parameters.get("ground").is_some_and(|ground| ground == "terrain");
+    if scenario.terrain.is_some()
+        && kinds.all(|k| k.is_some_and(|k| k != Kind::Soil))
+        && !scenario.subsystems.iter().any(as_stone)
+    {
+        let message = "the terrain is not used: no subsystem of kind soil";
+        log::warn!("{}", line_of(&scenario.source.error_at_value(&["terrain"], message, None)));
     }
     Ok(())
 }

@@ -7,7 +7,10 @@ use terraglue_scenario::Scenario;
 
 /// Loads the scenario with its edits, and with `strict = true` where that is wanted and known.
 pub fn load(arguments: &ScenarioArguments, sets: &[(String, String)], strict: bool) -> Result<Scenario> {
-    let scenario = Scenario::load(&arguments.scenario, sets)?;
+    // edits beyond those of --set are that of --duration, then those that are made here
+    let mut options = vec!["--set"; arguments.sets.len()];
+    options.resize(sets.len(), "--duration");
+    let scenario = Scenario::load_by(&arguments.scenario, sets, &options)?;
     if !strict {
         return Ok(scenario);
     }
@@ -19,5 +22,7 @@ pub fn load(arguments: &ScenarioArguments, sets: &[(String, String)], strict: bo
     };
     let strict = scenario.subsystems.iter().filter(|s| knows(&s.module));
     let strict = strict.map(|s| (format!("{}.strict", s.name), "true".to_owned()));
-    Ok(Scenario::load(&arguments.scenario, &sets.iter().cloned().chain(strict).collect::<Vec<_>>())?)
+    let sets: Vec<_> = sets.iter().cloned().chain(strict).collect();
+    options.resize(sets.len(), "--strict");
+    Ok(Scenario::load_by(&arguments.scenario, &sets, &options)?)
 }

@@ -31,7 +31,8 @@ pub fn end_all() -> usize {
             break;
         }
         for child in children() {
-            ended += usize::from(kill_process(child, Signal::KILL).is_ok());
+            let leaves = is_ending(child);
+            ended += usize::from(kill_process(child, Signal::KILL).is_ok() && !leaves);
             // It may be gone already.
             let _ = waitpid(Some(child), WaitOptions::empty());
         }
@@ -43,6 +44,17 @@ fn has_children() -> bool {
     // nothing is taken from whom else waits for a child
     let look = WaitIdOptions::EXITED | WaitIdOptions::NOHANG | WaitIdOptions::NOWAIT;
     waitid(WaitId::All, look).is_ok()
+}
+
+/// Whether a process has ended, or was ended and has not been given the processor since: on a busy machine that takes its time.
+fn is_ending(process: Pid) -> bool {
+    let path = format!("/proc/{}/status", process.as_raw_nonzero());
+    let Ok(status) = std::fs::read_to_string(path) else { return true };
+    let of = |key: &str| status.lines().find_map(|line| line.strip_prefix(key)).map(str::trim);
+    let gone = of("State:").is_some_and(|state| state.starts_with(['Z', 'X']));
+    let told = |key: &str| of(key).and_then(|mask| u64::from_str_radix(mask, 16).ok()).unwrap_or(0);
+    let kill = 1 << (Signal::KILL.as_raw() - 1);
+    gone || (told("ShdPnd:") | told("SigPnd:")) & kill != 0
 }
 
 /// Buries children that have ended.
@@ -62,4 +74,26 @@ fn children() -> Vec<Pid> {
         parent.then(|| Pid::from_raw(id))?
     };
     all.filter_map(child).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::process::{Command, Stdio};
+
+    #[test]
+    fn what_was_ended_already_is_not_left_behind() {
+        let mut child = Command::new("sleep").arg("100").stdin(Stdio::null()).spawn().expect("sleep");
+        let id = Pid::from_child(&child);
+        assert!(!is_ending(id));
+        child.kill().expect("ended");
+        // it stays until somebody asks how it ended
+        while std::fs::read_to_string(format!("/proc/{}/stat", child.id())).is_ok_and(|s| !s.contains(") Z "))
+        {
+            assert!(is_ending(id), "the signal is on its way");
+        }
+        assert!(is_ending(id));
+        child.wait().expect("its end");
+        assert!(is_ending(id));
+    }
 }

@@ -75,7 +75,7 @@ pub use inputs::fingerprints;
 pub use kept_file::KeptFile;
 pub use layout::at;
 pub use layout::{CHECKPOINT, FINAL_GROUND, RECORDING, REPORT, SUMMARY, TIMING, VARIABLES, VIEWER_LAYOUT};
-pub use mend::mend;
+pub use mend::{has_end, mend};
 pub use messages::{GluingRecord, PortRecord, WindowRecord};
 pub use reader::{GroundRecord, Header, PoseSeries, Recording};
 pub use recorder::{Recorder, RecorderOptions, RecorderState};

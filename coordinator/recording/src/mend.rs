@@ -12,6 +12,16 @@ use std::path::Path;
 use terraglue_diagnostics::error::Result;
 use terraglue_scenario::InputError;
 
+/// Whether the recording of a results folder has its end.
+///
+/// # Errors
+/// It cannot be read.
+pub fn has_end(folder: &Path) -> Result<bool> {
+    let path = folder.join(RECORDING);
+    let bytes = terraglue_subsystem::files::read(&path).map_err(at(&path))?;
+    Ok(mcap::read::footer(&bytes).is_ok())
+}
+
 /// Rewrites `recording.mcap` of a results folder with all messages that arrived whole and a footer. Does
 /// nothing to a complete recording, nor to one that is damaged before its end: rewritten, it would lose what
 /// another program may still read. Returns whether anything was mended.

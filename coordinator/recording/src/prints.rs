@@ -7,7 +7,7 @@ use terraglue_diagnostics::error::Result;
 use terraglue_engine::observer::View;
 use terraglue_subsystem::bytes::Persist;
 
-/// Shorter breaks of contact than this do not end a print, s.
+/// After a longer break of contact than this the next print does not belong to the same track, s.
 const BREAK_S: f64 = 0.05;
 /// What has moved further than this leaves a new print, m.
 pub(crate) const APART_M: f64 = 0.03;
@@ -44,7 +44,8 @@ pub(crate) fn press(prints: &mut Vec<Print>, touch: &Touch) {
     if let Some(last) = prints.last_mut() {
         joined = t_s - last.to_s <= BREAK_S;
         let moved = (at[0] - last.at[0]).hypot(at[1] - last.at[1]);
-        if joined && moved <= APART_M {
+        // what bounces, or steps on the spot, presses its own print once more
+        if moved <= APART_M {
             last.to_s = t_s;
             if depth_m > last.depth_m {
                 (last.depth_m, last.deepest_s) = (depth_m, t_s);
@@ -179,5 +180,7 @@ mod tests {
         assert!((foot[0].deepest_s - 0.399).abs() < 1e-9 && foot[0].at == [0.0; 2], "{foot:?}");
         let shaken = walked(|t| (t % 0.1 < 0.06).then_some(0.0));
         assert_eq!(shaken.len(), 1, "short breaks do not end a print");
+        let bounces = walked(|t| (t % 0.3 < 0.1).then_some(1e-3 * t));
+        assert!(bounces.len() == 1 && bounces[0].to_s > 0.9, "one place, one print: {bounces:?}");
     }
 }

@@ -153,10 +153,11 @@ pub struct EnergySummary {
     /// Mechanical work of the motors, driving and braking together, Σ |power|·h, J: `energies.driving_j` +
     /// `energies.braking_j`.
     pub energy_j: f64,
-    /// energy_j / |distance|, J/m; null below 1 mm.
+    /// energy_j / |distance|, J/m; null below 1 mm and where no motor worked.
     #[serde(default)]
     pub energy_j_per_m: Option<f64>,
-    /// energy_j / (m·g·|distance|), dimensionless; null below 1 mm. Mechanical; see `electrical_cost_of_transport`.
+    /// energy_j / (m·g·|distance|), dimensionless; null below 1 mm and where no motor worked. Mechanical; see
+    /// `electrical_cost_of_transport`.
     pub cost_of_transport: Option<f64>,
     /// Electrical energy that the motors drew, J; null where no motor has a drive with losses.
     #[serde(default)]
@@ -231,8 +232,8 @@ pub struct GluingSummary {
     pub condition_max: f64,
 }
 
-/// Depth of prints: each counts once, with the largest depth under it while it was pressed. A wheel leaves a print every
-/// 3 cm.
+/// Depth of prints: each counts once, with the largest depth under it while it was pressed, however often that was. A wheel
+/// leaves a print every 3 cm.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PrintDepth {
     /// Number of prints.

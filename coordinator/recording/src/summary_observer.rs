@@ -320,12 +320,13 @@ impl SummaryObserver {
         let way_m = distance_m.filter(|way| *way >= SMALLEST_DISTANCE_M);
         let transport = |energy_j: f64| Some(energy_j / (weight_n? * way_m?));
         let energy_j = self.motors.both_j();
+        let by_motors = Some(energy_j).filter(|e| *e > 0.0);
         let energies = self.energies.figures(&self.motors);
         let electrical_j = known(self.electrical_j);
         EnergySummary {
             energy_j,
-            energy_j_per_m: way_m.map(|way| energy_j / way),
-            cost_of_transport: transport(energy_j),
+            energy_j_per_m: by_motors.and_then(|e| Some(e / way_m?)),
+            cost_of_transport: by_motors.and_then(transport),
             electrical_energy_j: electrical_j,
             electrical_energy_j_per_m: electrical_j.and_then(|e| Some(e / way_m?)),
             electrical_cost_of_transport: electrical_j.and_then(transport),

@@ -420,7 +420,7 @@ fn fault() -> Table {
 
 /// Keys of the host in the table of a subsystem; everything else there is a parameter of the module.
 pub fn subsystem_keys() -> Vec<Key> {
-    let multiple = "steps of the testbed per step of this subsystem";
+    let multiple = "steps of the testbed per step of this subsystem; 1 for what is glued";
     let module = "a module's name, or the path of a library or of a file in Python relative to the scenario";
     let python = "interpreter of a module in Python; by default $VIRTUAL_ENV/bin/python, else python3";
     let build = "command that builds the module, run by `run --watch` in the scenario's folder on a change of its sources";

@@ -9,6 +9,7 @@
 struct Readme;
 
 pub mod advice;
+mod blame;
 mod choices;
 mod difference;
 pub mod docs;

@@ -228,7 +228,10 @@ fn read_time(s: &Section) -> Checked<Time> {
             "lengthen `step_s` (0.001 s is usual) or shorten `duration_s`, to at most {:.3e} s at this step",
             MOST_STEPS * time.step_s
         );
-        return Err(s.error("step_s", message, Some(help)));
+        // a duration that was asked for on the command line is the newer one
+        let edited = |key: &str| s.entry(key).is_some_and(|entry| entry.at.set.is_some());
+        let shorter = edited("duration_s") && !edited("step_s") || s.entry("step_s").is_none();
+        return Err(s.error(if shorter { "duration_s" } else { "step_s" }, message, Some(help)));
     }
     if (steps - steps.round()).abs() > 1e-6 * steps.max(1.0) || steps.round() < 1.0 {
         let below = (steps.floor() * time.step_s).max(time.step_s);

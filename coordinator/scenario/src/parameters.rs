@@ -7,7 +7,7 @@ use serde_json::{Map, Value};
 use terraglue_diagnostics::InputError;
 use terraglue_diagnostics::did_you_mean;
 use terraglue_diagnostics::{Complaint, check_value};
-use terraglue_subsystem::{Config, Parameter, ParameterType, Schema};
+use terraglue_subsystem::{Config, Kind, Parameter, ParameterType, Schema};
 
 /// Modules that come with the program.
 pub const SHIPPED_MODULES: &[&str] = &["rigid-body", "soil-cellular-automaton", "soil-bekker", "gait"];
@@ -140,6 +140,18 @@ impl Check<'_> {
     }
 
     fn take_offered(&self, values: &mut Map<String, Value>) -> Result<(), Box<InputError>> {
+        let takes_any = self.spec.offered.keys().any(|name| self.parameter(name).is_some());
+        if !self.spec.offered.is_empty() && !takes_any && !matches!(self.schema.kind, Kind::Soil | Kind::Law)
+        {
+            let (module, subsystem) = (&self.schema.name, &self.spec.name);
+            let message = format!(
+                "`parameters` are those of a soil, and `{module}` is none: it takes no number of them"
+            );
+            let help = format!(
+                "take `parameters` out, or name a soil as `module` of `[{subsystem}]`: `terraglue modules soil` lists them"
+            );
+            return Err(self.source.error_at_value(&[subsystem, "parameters"], message, Some(help)));
+        }
         for (name, value) in &self.spec.offered {
             if let Some(parameter) = self.parameter(name).filter(|_| !values.contains_key(name)) {
                 check_value(parameter, None, value).map_err(|c| self.complain("parameters", c))?;

@@ -10,6 +10,9 @@ pub fn unreadable(path: &Path, error: &std::io::Error) -> Box<InputError> {
     InputError::plain(format!("cannot read {}: {error}", path.display()), help)
 }
 
+/// How numbers are written.
+const NUMBERS: &str = "a comma ends a cell: write numbers with a point, as 1.5 or 2e5";
+
 const HEADED: &str =
     "measurements are text with commas between the cells and the names of the columns in the first line";
 
@@ -43,11 +46,10 @@ impl<'a> Columns<'a> {
         };
         let row = |(k, line): (usize, &'a str)| {
             let cells = cells(line);
+            let message = || format!("line {}: {} cells instead of {}", k + 1, cells.len(), header.len());
             match cells.len() == header.len() {
                 true => Ok((k + 1, cells)),
-                false => {
-                    Err((format!("line {}: {} cells instead of {}", k + 1, cells.len(), header.len()), None))
-                }
+                false => Err((message(), Some(NUMBERS.into()))),
             }
         };
         let rows = lines.map(row).collect::<Result<_, _>>()?;
@@ -59,7 +61,14 @@ impl<'a> Columns<'a> {
         self.seek(names).ok_or_else(|| {
             let known: Vec<&str> = names.iter().map(|n| n.0).collect();
             let message = format!("no column is called {}", known.join(" or "));
-            (message, Some(format!("the columns are {}", self.header.join(", "))))
+            let columns = format!("the columns are {}", self.header.join(", "));
+            let other = [(';', "semicolons"), ('\t', "tabulators")]
+                .into_iter()
+                .find(|(c, _)| self.header.len() == 1 && self.header[0].contains(*c));
+            let help = other.map(|(_, what)| {
+                format!("there are {what} between the cells: write commas, and points in numbers")
+            });
+            (message, Some(help.unwrap_or(columns)))
         })
     }
 
@@ -74,6 +83,6 @@ impl<'a> Columns<'a> {
         let value = cells[place].parse::<f64>().ok().filter(|v| v.is_finite());
         let message =
             || format!("line {line}: `{}` in `{}` is not a number", cells[place], self.header[place]);
-        value.map(|v| v * scale).ok_or_else(|| (message(), None))
+        value.map(|v| v * scale).ok_or_else(|| (message(), Some(NUMBERS.into())))
     }
 }

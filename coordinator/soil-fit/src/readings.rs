@@ -135,7 +135,11 @@ mod tests {
         let (message, help) = wrong("a,b_m,pressure_Pa\n");
         assert!(message.contains("sinkage_mm") && help.unwrap().contains("a, b_m"));
         assert!(wrong("sinkage_m,b_m,pressure_Pa\n1,2,x\n").0.contains("line 2: `x` in `pressure_Pa`"));
-        assert!(wrong("sinkage_m,b_m,pressure_Pa\n1,2\n").0.contains("2 cells instead of 3"));
+        let (message, help) = wrong("sinkage_m,b_m,pressure_Pa\n1,2\n");
+        assert!(message.contains("2 cells instead of 3") && help.unwrap().contains("with a point"));
+        let help = |text: &str| wrong(text).1.unwrap();
+        assert!(help("sinkage_m;b_m;pressure_Pa\n1;2;3\n").contains("semicolons between the cells"));
+        assert!(help("sinkage_m\tb_m\tpressure_Pa\n").contains("tabulators between the cells"));
         assert!(wrong("sinkage_m,b_m,pressure_Pa\n1,0,4\n").0.contains("larger than zero"));
     }
 }

@@ -40,7 +40,7 @@ impl Profile {
         let sizes_fit = diameter > 0.0 && depth > 0.0 && rim_height >= 0.0 && max_slope > 0.0;
         if !sizes_fit || rim_height > depth {
             let message = format!(
-                "a crater of diameter {diameter} m, depth {depth} m and rim height {rim_height} m is no bowl"
+                "a crater of `diameter_m` = {diameter}, `depth_m` = {depth} and `rim_height_m` = {rim_height} is no bowl"
             );
             let help = "positive numbers, the rim no higher than the crater is deep";
             return Err(InputError::plain(message, Some(help.into())).into());
@@ -99,8 +99,9 @@ impl Wall {
 }
 
 fn too_steep(diameter: f64, depth: f64, max_slope: f64) -> Box<InputError> {
-    let message =
-        format!("a crater {diameter} m wide and {depth} m deep is steeper than max_slope_rad = {max_slope}");
+    let message = format!(
+        "a crater of `diameter_m` = {diameter} and `depth_m` = {depth} is steeper than `max_slope_rad` = {max_slope}"
+    );
     let slope = libm::tan(max_slope);
     let help = format!(
         "max_slope_rad above {:.4}, or depth_m below {:.4}, or diameter_m above {:.4}",

@@ -53,8 +53,8 @@ pub fn build(spec: &TerrainSpec, seed: u64) -> Result<Box<dyn Terrain>> {
         }
         TerrainKind::Slope { angle_rad, heading_rad } => {
             if angle_rad.abs() >= 1.5 {
-                let message = format!("a slope of {angle_rad} rad is a wall");
-                return Err(InputError::plain(message, Some("angle_rad below 1.5".into())).into());
+                let message = format!("`angle_rad` = {angle_rad} rad is a wall");
+                return Err(InputError::plain(message, Some("slopes go up to 1.5 rad".into())).into());
             }
             let rise = libm::tan(*angle_rad);
             let (gx, gy) = (rise * libm::cos(*heading_rad), rise * libm::sin(*heading_rad));

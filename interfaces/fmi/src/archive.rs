@@ -11,6 +11,7 @@ use std::io::{Read, Seek, SeekFrom, Write};
 use std::path::{Path, PathBuf};
 use zip::ZipArchive;
 use zip::read::ZipFile;
+use zip::result::ZipError;
 
 /// How much an archive may hold.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -63,7 +64,12 @@ impl Archive {
             return Err(fail(format!("has {n} entries; {} are accepted", limits.entries)));
         }
         let twins = twins_are_equal(&mut file).map_err(|e| fail(format!("cannot be read: {e}")))?;
-        let zip = ZipArchive::new(file).map_err(|e| fail(format!("is no readable zip archive: {e}")))?;
+        let zip = ZipArchive::new(file).map_err(|e| {
+            fail(match e {
+                ZipError::InvalidArchive(_) => "is no zip archive, as FMUs are, or was cut off".into(),
+                other => format!("is no readable zip archive: {other}"),
+            })
+        })?;
         if let Some(n) = stated.filter(|n| *n != zip.len() as u64 && !twins) {
             let found = zip.len();
             return Err(fail(format!(

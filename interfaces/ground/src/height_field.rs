@@ -33,9 +33,9 @@ impl std::fmt::Display for HeightError {
     fn fmt(&self, f: &mut std::fmt::Formatter) -> std::fmt::Result {
         match self {
             Self::OutOfRange { node: [i, j], height } => {
-                write!(f, "height {height} m at node ({i}, {j}) is outside ±{LIMIT_M} m")
+                write!(f, "terrain: height {height} m at node ({i}, {j}) is outside ±{LIMIT_M} m")
             }
-            Self::Empty => write!(f, "the terrain has no nodes or no positive spacing"),
+            Self::Empty => write!(f, "terrain: it has no nodes or no positive spacing"),
         }
     }
 }

@@ -68,7 +68,7 @@ impl Testbed {
         let mut signals = signals(scenario, &instances)?;
         check_report(scenario, &signals.directory, &instances)?;
         let groups = groups(scenario, &instances)?;
-        check_settling(scenario, &groups, &instances)?;
+        check_groups(scenario, &groups, &instances)?;
         let mut subsystems = Subsystems {
             schedules: schedules(scenario, &instances, &groups),
             members: instances.iter().map(member).collect(),
@@ -146,6 +146,12 @@ fn glued(
     })
 }
 
+/// What the members of groups cannot do.
+fn check_groups(scenario: &Scenario, groups: &[Group], instances: &[Instance]) -> Result {
+    check_multiples(scenario, groups)?;
+    check_settling(scenario, groups, instances)
+}
+
 /// FMUs know no time before their start, so none can be among what comes to rest before t = 0.
 fn check_settling(scenario: &Scenario, groups: &[Group], instances: &[Instance]) -> Result {
     let settle_s = scenario.time.settle_s;
@@ -162,6 +168,26 @@ fn check_settling(scenario: &Scenario, groups: &[Group], instances: &[Instance])
     Err(scenario.source.error_at_value(&["time", "settle_s"], message, help).into())
 }
 
+/// What is glued makes every step together: a wrench at a port holds for one step of both sides.
+fn check_multiples(scenario: &Scenario, groups: &[Group]) -> Result {
+    let glued = |slot: usize| groups.iter().any(|g| g.problem.members().any(|m| m == slot));
+    let mut slower = scenario.subsystems.iter().enumerate().filter(|(_, spec)| spec.step_multiple > 1);
+    let Some((slot, spec)) = slower.find(|(slot, _)| glued(*slot)) else { return Ok(()) };
+    let (name, multiple) = (&spec.name, spec.step_multiple);
+    let group = groups.iter().find(|g| g.problem.members().any(|m| m == slot));
+    let others = group.into_iter().flat_map(|g| g.problem.members()).filter(|m| *m != slot);
+    let others: Vec<String> = others.map(|m| format!("`{}`", scenario.subsystems[m].name)).collect();
+    let with = if others.is_empty() { "the world".into() } else { others.join(", ") };
+    let message = format!(
+        "`step_multiple` = {multiple}: `{name}` is glued to {with}, and what is glued makes every step together"
+    );
+    let help = format!(
+        "leave it out, or make `time.step_s` {multiple} times as long; `step_multiple` is for subsystems that are connected by \
+         signals only"
+    );
+    Err(scenario.source.error_at_value(&[name, "step_multiple"], message, Some(help)).into())
+}
+
 /// Whether a step of the run may end at any time: all subsystems make every step, and of any length.
 fn takes_parts(scenario: &Scenario, instances: &[Instance]) -> bool {
     let any = |i: &Instance| !i.capabilities().has(Capabilities::FIXED_STEP);
@@ -174,7 +200,10 @@ fn takes_parts(scenario: &Scenario, instances: &[Instance]) -> bool {
 /// [`Error::Input`]: the terrain of the scenario cannot be made.
 pub fn services(scenario: &Scenario, options: &Options, ground: bool) -> Result<HostServices> {
     let terrain: Option<Arc<dyn Terrain>> = match scenario.terrain.as_ref().filter(|_| ground) {
-        Some(spec) => Some(Arc::from(terrain::build(spec, scenario.world.seed)?)),
+        Some(spec) => {
+            let built = terrain::build(spec, scenario.world.seed);
+            Some(Arc::from(built.map_err(|error| of_terrain(scenario, error))?))
+        }
         None => None,
     };
     Ok(HostServices {
@@ -184,6 +213,17 @@ pub fn services(scenario: &Scenario, options: &Options, ground: bool) -> Result<
         cancel: options.cancel.clone(),
         ..HostServices::new(scenario.world.seed, &scenario.folder)
     })
+}
+
+/// What is wrong with the ground, at the key that it is about. An elevation file has places of its own.
+fn of_terrain(scenario: &Scenario, error: Error) -> Error {
+    match error {
+        Error::Input(wrong) if wrong.span.is_none() => {
+            let InputError { message, help, .. } = *wrong;
+            scenario.source.error_about("terrain", &["terrain", "file"], message, help).into()
+        }
+        other => other,
+    }
 }
 
 /// The module of a subsystem.
@@ -349,7 +389,7 @@ fn fmu(
             },
             other => {
                 let message = format!("{} ({}): {other}", spec.name, spec.module);
-                scenario.source.error_at_value(&[&spec.name, "fmu"], message, None).into()
+                scenario.source.error_about(&spec.name, &[&spec.name, "fmu"], message, None).into()
             }
         }
     })?;
@@ -369,11 +409,19 @@ fn module_error(scenario: &Scenario, spec: &SubsystemSpec, error: &LoadError) ->
     }
     let near = error.nearest().map(|n| format!("did you mean `{n}`?"));
     let help = near.or_else(|| error.is_unknown().then(|| NO_MODULE.to_owned()));
-    let key = match error {
-        LoadError::Refused { .. } | LoadError::Instantiate { .. } => vec![spec.name.as_str()],
-        _ => vec![spec.name.as_str(), "module"],
-    };
-    scenario.source.error_at_value(&key, error.to_string(), help)
+    let (source, name) = (&scenario.source, spec.name.as_str());
+    match error {
+        // what a soil says of the ground that it gets is about another table
+        LoadError::Refused { message, .. } | LoadError::Instantiate { message, .. }
+            if message.starts_with("terrain: ") =>
+        {
+            source.error_of_table("terrain", error.to_string(), help)
+        }
+        LoadError::Refused { .. } | LoadError::Instantiate { .. } => {
+            source.error_about(name, &[name], error.to_string(), help)
+        }
+        _ => source.error_at_value(&[name, "module"], error.to_string(), help),
+    }
 }
 
 fn member(instance: &Instance) -> Member {

@@ -3,6 +3,7 @@
 use super::{ExportSettings, Request, SCENARIO, SETTINGS, open, page, place, wrap};
 use std::path::{Path, PathBuf};
 use terraglue_diagnostics::{Error, Result};
+use terraglue_engine::testbed::{Options, Testbed};
 use terraglue_fmi::Version;
 use terraglue_fmi::export::{About, Content, Mailbox, Opened, Opening, describe, identifier, pack};
 use terraglue_host::SearchPath;
@@ -55,7 +56,7 @@ pub fn write(request: &Request) -> Result<Exported> {
     place(&resources, SETTINGS, &json).map_err(plain)?;
     // What is described is what the FMU itself will open.
     let opening = Opening { name: "export".into(), resources: resources.clone(), log: Mailbox::default() };
-    let opened = open(&opening).map_err(plain)?;
+    let opened = open(&opening).map_err(|message| at_home(&scenario, request, bare, message))?;
     let about = about(request, &scenario, &settings);
     let entries = entries(request, &search, &resources, &opened, &about)?;
     pack(&request.out, &entries).map_err(plain)?;
@@ -67,6 +68,19 @@ pub fn write(request: &Request) -> Result<Exported> {
         states: [state, state && can.has(Capabilities::SERIALIZE)],
         left_out: opened.layout.left_out(opened.subsystem.variables()).map(str::to_owned).collect(),
     })
+}
+
+/// What is wrong with a scenario, at its place where it was written and not in the copy. The scenario around a single module is no
+/// file: only edits of it have a place.
+fn at_home(scenario: &Scenario, request: &Request, bare: Option<&str>, message: String) -> Error {
+    let options = Options { module_paths: request.module_paths.clone(), ..Options::default() };
+    match Testbed::build_with(scenario, &options, &crate::library()) {
+        Err(Error::Input(wrong)) if bare.is_none() || wrong.source_code.name().starts_with("--") => {
+            wrong.into()
+        }
+        Err(other) if bare.is_none() => other,
+        _ => plain(message),
+    }
 }
 
 fn plain(message: impl Into<String>) -> Error {

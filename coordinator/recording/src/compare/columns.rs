@@ -2,7 +2,11 @@
 
 use crate::Energies;
 use crate::compare::{CompareRow, table};
+use crate::report::cards::heard;
 use crate::summary::Summary;
+
+/// Ways, which rounding makes longer than 0.
+const WAYS: [&str; 2] = ["distance_m", "path_m"];
 
 /// Which end of a column is the best.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -40,6 +44,7 @@ impl FigureColumn {
     /// What stands in the cell of a row: the figure, that it is unknown or does not apply, or a dash.
     pub fn text(&self, row: &CompareRow) -> String {
         let value = (self.value)(row);
+        let value = if WAYS.contains(&self.key) { value.map(heard) } else { value };
         let Some(summary) = row.summary.as_ref().filter(|_| value.is_none()) else {
             return table::cell(value, self.unit);
         };

@@ -6,8 +6,10 @@ use crate::keep::Keep;
 use crate::layout::other_at;
 use crate::mcap_writer::{McapState, McapWriter};
 use crate::space::Reserve;
+use std::io::ErrorKind::{InvalidData, NotFound, Other, UnexpectedEof};
 use std::path::Path;
-use terraglue_diagnostics::error::Result;
+use terraglue_diagnostics::InputError;
+use terraglue_diagnostics::error::{Error, Result};
 use terraglue_engine::observer::{Observer, View};
 use terraglue_scenario::Scenario;
 use terraglue_subsystem::bytes::Block;
@@ -22,6 +24,20 @@ pub struct RecorderState {
     recorded_step: Option<u64>,
 }
 persist!(RecorderState { mcap, csv, summary, recorded_step });
+
+/// A file that is gone or not as the checkpoint counts on is wrong input.
+fn changed(error: Error) -> Error {
+    match error {
+        Error::File { path, source }
+            if matches!(source.kind(), InvalidData | NotFound | Other | UnexpectedEof) =>
+        {
+            let help =
+                "a checkpoint goes on with the files as they were: put them back, or start the run anew";
+            InputError::plain(format!("{path}: {source}"), Some(help.into())).into()
+        }
+        other => other,
+    }
+}
 
 impl Recorder {
     /// What another process needs to go on from here: everything up to now is with the operating system or in the state.
@@ -53,10 +69,11 @@ impl Recorder {
     ) -> Result<Self> {
         let snapshot = selected(view, (&scenario.recording, &scenario.source), &scenario.connections)?;
         let at = (view, &snapshot);
-        let mcap = McapWriter::resume(folder, about(scenario), scenario, at, state.mcap)?;
+        let mcap = McapWriter::resume(folder, about(scenario), scenario, at, state.mcap).map_err(changed)?;
         let mut recorder = Self::with(folder, scenario, options, mcap, Reserve::take(folder));
         recorder.snapshot = snapshot;
-        recorder.csv = state.csv.map(|length| VariablesCsv::go_on(folder, length)).transpose()?;
+        recorder.csv =
+            state.csv.map(|length| VariablesCsv::go_on(folder, length)).transpose().map_err(changed)?;
         recorder.recorded_step = state.recorded_step;
         recorder.summary.started(view)?;
         recorder.summary.recall(&mut state.summary.0.as_slice()).map_err(other_at(folder))?;

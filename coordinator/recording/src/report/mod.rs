@@ -2,7 +2,7 @@
 //!
 //! Nothing is loaded from anywhere: style, scripts, curves and the picture of the ground are inside the file.
 
-mod cards;
+pub(crate) mod cards;
 pub(crate) mod colour_map;
 mod contact_owners;
 pub(crate) mod energy_card;

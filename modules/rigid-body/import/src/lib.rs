@@ -18,6 +18,7 @@ mod merge;
 mod mesh;
 mod mjcf;
 mod model;
+mod plausible;
 mod pose;
 mod shapes;
 mod solid;

@@ -4,6 +4,7 @@ use crate::check::isometry;
 use crate::error::{Error, Source};
 use crate::mesh::{Folders, Mesh, load};
 use crate::model::{Shape, ShapeGeometry};
+use crate::plausible;
 use std::sync::Arc;
 use urdf_rs::{Geometry, Link, Pose};
 
@@ -18,6 +19,8 @@ pub(crate) struct Shapes<'a> {
     pub notices: Vec<String>,
     /// Pictures that cannot be shown, and the first reason.
     unseen: (usize, String),
+    /// Shapes of sizes that no part of a robot has.
+    odd: Vec<String>,
 }
 
 /// Where a shape stands in the file.
@@ -33,7 +36,14 @@ struct ShapePlace<'a> {
 
 impl<'a> Shapes<'a> {
     pub fn new(source: &'a Source<'a>, folders: &'a Folders) -> Self {
-        Self { source, folders, warnings: Vec::new(), notices: Vec::new(), unseen: (0, String::new()) }
+        Self {
+            source,
+            folders,
+            warnings: Vec::new(),
+            notices: Vec::new(),
+            unseen: (0, String::new()),
+            odd: Vec::new(),
+        }
     }
 
     /// All shapes of a link in its own frame; what is seen and hit appears once. `still`: the link is the world.
@@ -75,6 +85,7 @@ impl<'a> Shapes<'a> {
 
     /// Warnings and notices, in this order.
     pub fn said(mut self) -> (Vec<String>, Vec<String>) {
+        self.warnings.extend(plausible::first(std::mem::take(&mut self.odd)));
         if self.unseen.0 > 0 {
             let (count, first) = self.unseen;
             self.notices.push(format!("{count} <visual> meshes are not shown; the first: {first}"));
@@ -122,6 +133,9 @@ impl<'a> Shapes<'a> {
         if let Some(bad) = sizes.iter().find(|s| **s <= 0.0) {
             let problem = format!("a shape has the size {bad} m; sizes are positive");
             return Err(self.source.link(&link.name, problem));
+        }
+        if let Some(odd) = plausible::shape(&geometry).filter(|_| place.collides && !place.still) {
+            self.odd.push(self.source.link(&link.name, odd).to_string());
         }
         let name = place.name.filter(|n| !n.is_empty()).unwrap_or(&link.name).into();
         let (body_from_shape, collides) = (isometry(place.origin), place.collides);

@@ -6,6 +6,7 @@ use crate::error::{Error, Source};
 use crate::inertia::{Inertial, repair};
 use crate::merge::{Merged, merge};
 use crate::model::{AxisData, Base, Body, Coupling, Joint, JointKind, Robot, Shape};
+use crate::plausible;
 use crate::shapes::Shapes;
 use crate::tree::{LinkPlace, order};
 use crate::unread;
@@ -85,7 +86,7 @@ fn build(
     notices.extend(unused);
     warnings.extend(without_limits(source, robot));
     warnings.extend(fixed_followers(source, robot));
-    warnings.extend(mass_spread(source.file, &bodies));
+    warnings.extend(doubtful(source, &bodies));
     let couplings = couplings(source, robot, &joints)?;
     let excluded = next_to_each_other(bodies.len(), &joints);
     Ok(Robot {
@@ -167,6 +168,15 @@ fn couplings(source: &Source, robot: &urdf_rs::Robot, joints: &[Joint]) -> Resul
         }
     }
     Ok(all)
+}
+
+/// What is doubtful about the masses of the bodies, together and one by one.
+fn doubtful(source: &Source, bodies: &[Body]) -> impl Iterator<Item = String> {
+    let odd = bodies.iter().filter_map(|Body { name, mass, com, inertia, .. }| {
+        let odd = plausible::body(&Inertial { mass: *mass, com: *com, tensor: *inertia })?;
+        Some(source.link(name, odd).to_string())
+    });
+    mass_spread(source.file, bodies).into_iter().chain(plausible::first(odd.collect()))
 }
 
 fn check_world(

@@ -21,6 +21,7 @@ use crate::check::{mass_spread, unique};
 use crate::error::{Error, Source};
 use crate::inertia::{Inertial, flaw, in_range};
 use crate::model::{Base, Robot, Shape};
+use crate::plausible;
 use assets::Assets;
 use defaults::Defaults;
 use geom::{Around, Geom, compound, geom};
@@ -218,6 +219,9 @@ impl<'d, 's> MjcfReader<'d, 's> {
                     self.robot.notices.push(said);
                 }
                 let shape = weighed.shape;
+                let odd =
+                    plausible::shape(&shape.geometry).filter(|_| place.body.is_some() && shape.collides);
+                odd.iter().for_each(|odd| self.warn(node, odd));
                 let shape = Shape { body_from_shape: place.frame * shape.body_from_shape, ..shape };
                 match place.body {
                     Some(body) => self.robot.bodies[body].shapes.push(shape),
@@ -261,6 +265,9 @@ impl<'d, 's> MjcfReader<'d, 's> {
                 in_range(inertial.mass, &inertial.tensor)
                     .and_then(|()| flaw(&inertial.tensor).map_or(Ok(()), Err))
                     .map_err(|problem| self.d.wrong(&e, problem))?;
+                if let Some(odd) = plausible::body(&inertial) {
+                    self.warn(node, &odd);
+                }
                 let hangs = ElementPlace { class, ..above };
                 let child = self.hang_by(&joints, hangs, (&name, frame), inertial)?;
                 ElementPlace { body: Some(child), frame: Isometry3::identity(), class }

@@ -182,6 +182,9 @@ pub struct Summary {
     /// Depth of the prints below the initial surface; null where nothing pressed or the soil shows no height.
     #[serde(default)]
     pub print_depth: Option<PrintDepth>,
+    /// simulated_s / cpu_s: how fast a core would be that has nothing else to do.
+    #[serde(default)]
+    pub cpu_real_time_factor: f64,
     /// Largest normal force of the ground on the reported robot, all its feet or wheels together, over its weight; null where
     /// the world holds it.
     #[serde(default)]

@@ -307,6 +307,7 @@ impl SummaryObserver {
             energy_j_per_m: way_m.map(|way| energy_j / way),
             electrical_cost_of_transport: electrical_j.and_then(transport),
             print_depth: self.prints.as_ref().and_then(PrintTrack::depth),
+            cpu_real_time_factor: per(self.t_s, cpu_s),
             peak_force_over_weight: body.and_then(|b| Some(b.peak_n()? / weight_n?)),
         }
     }

@@ -80,7 +80,7 @@ pub use messages::{GluingRecord, PortRecord, WindowRecord};
 pub use reader::{GroundRecord, Header, PoseSeries, Recording};
 pub use recorder::{Recorder, RecorderOptions, RecorderState};
 pub use solids::Solid;
-pub use summary::{FailureRecord, PrintDepth, Stall, Status, Summary};
+pub use summary::{FailureRecord, PrintDepth, RunTimes, Stall, Status, Summary};
 pub use summary_observer::SummaryObserver;
 pub use table::Table;
 pub use trace::Trace;

@@ -70,12 +70,9 @@ pub struct Summary {
     pub steps: u64,
     /// Simulated time, s.
     pub simulated_s: f64,
-    /// Wall time of the step loop, s.
-    pub wall_s: f64,
-    /// CPU time of the step loop, s.
-    pub cpu_s: f64,
-    /// simulated_s / wall_s.
-    pub real_time_factor: f64,
+    /// How long it took.
+    #[serde(flatten)]
+    pub times: RunTimes,
     /// Horizontal displacement of the reported body along its initial heading, m.
     pub distance_m: Option<f64>,
     /// Integral of the variable `report.commanded_speed` over time, m: the distance that was asked for.
@@ -182,13 +179,32 @@ pub struct Summary {
     /// Depth of the prints below the initial surface; null where nothing pressed or the soil shows no height.
     #[serde(default)]
     pub print_depth: Option<PrintDepth>,
-    /// simulated_s / cpu_s: how fast a core would be that has nothing else to do.
-    #[serde(default)]
-    pub cpu_real_time_factor: f64,
     /// Largest normal force of the ground on the reported robot, all its feet or wheels together, over its weight; null where
     /// the world holds it.
     #[serde(default)]
     pub peak_force_over_weight: Option<f64>,
+}
+
+/// How long a run took.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunTimes {
+    /// Wall time of the step loop, s.
+    pub wall_s: f64,
+    /// CPU time of the step loop, s.
+    pub cpu_s: f64,
+    /// simulated_s / wall_s.
+    pub real_time_factor: f64,
+    /// simulated_s / cpu_s: how fast a core would be that has nothing else to do.
+    #[serde(default)]
+    pub cpu_real_time_factor: f64,
+}
+
+impl RunTimes {
+    /// Of so much simulated time, s.
+    pub(crate) fn new(simulated_s: f64, wall_s: f64, cpu_s: f64) -> Self {
+        let per = |s: f64| if s > 0.0 { simulated_s / s } else { 0.0 };
+        Self { wall_s, cpu_s, real_time_factor: per(wall_s), cpu_real_time_factor: per(cpu_s) }
+    }
 }
 
 /// Depth of prints: each counts once, with the largest depth under it while it was pressed. A wheel leaves a print every

@@ -7,7 +7,7 @@ use crate::layout::{RECORDING, REPORT};
 use crate::motor_work::MotorWork;
 use crate::prints::PrintTrack;
 use crate::snapshot::{real, real_id};
-use crate::summary::{FailureRecord, Status, Summary};
+use crate::summary::{FailureRecord, RunTimes, Status, Summary};
 use terraglue_diagnostics::error::{Error, Result};
 use terraglue_engine::observer::{Event, Observer, SubsystemView, View};
 use terraglue_gluing::StepReport;
@@ -262,9 +262,7 @@ impl SummaryObserver {
             soil_module: self.soil_module.clone(),
             steps: self.steps,
             simulated_s: self.t_s,
-            wall_s,
-            cpu_s,
-            real_time_factor: per(self.t_s, wall_s),
+            times: RunTimes::new(self.t_s, wall_s, cpu_s),
             distance_m: body.map(|b| b.distance_m),
             commanded_distance_m: self.speed.as_ref().map(|s| s.sum),
             max_roll_rad: body.map(|b| b.max_roll_rad),
@@ -307,7 +305,6 @@ impl SummaryObserver {
             energy_j_per_m: way_m.map(|way| energy_j / way),
             electrical_cost_of_transport: electrical_j.and_then(transport),
             print_depth: self.prints.as_ref().and_then(PrintTrack::depth),
-            cpu_real_time_factor: per(self.t_s, cpu_s),
             peak_force_over_weight: body.and_then(|b| Some(b.peak_n()? / weight_n?)),
         }
     }

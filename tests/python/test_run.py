@@ -14,7 +14,7 @@ from mcap.stream_reader import StreamReader
 from mcap_protobuf.decoder import DecoderFactory
 from mcap.records import Channel, Message, Schema
 
-SUMMARY_KEYS = """status error events scenario strategy soil_module steps simulated_s wall_s cpu_s real_time_factor
+SUMMARY_KEYS = """status error events scenario strategy soil_module steps simulated_s wall_s cpu_s cpu_real_time_factor real_time_factor
 distance_m commanded_distance_m max_roll_rad max_pitch_rad max_sinkage_m energy_j cost_of_transport evaluations_mean
 evaluations_max steps_not_converged max_gap_m max_action_reaction_gap_n soil_mass_error_relative recording
 report""".split()

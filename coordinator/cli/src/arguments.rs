@@ -176,6 +176,9 @@ pub struct RunCommand {
     /// Go no faster than the clock; results do not depend on it.
     #[arg(long)]
     pub realtime: bool,
+    /// Write recording and summary only; `terraglue report DIR` makes the report later.
+    #[arg(long)]
+    pub no_report: bool,
     /// Refuse robot files that have a warning: `strict = true` in the table of every robot.
     #[arg(long)]
     pub strict: bool,

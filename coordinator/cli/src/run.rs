@@ -101,11 +101,14 @@ pub fn run(command: &RunCommand) -> Result<Exit> {
     let outcome = run_testbed(testbed, reloader.as_mut(), records, observer)?;
     drop(progress);
     bar.finish_and_clear();
-    let report = terraglue_recording::report::write(&folder);
+    let report = match command.no_report {
+        true => Ok(None),
+        false => terraglue_recording::report::write(&folder).map(Some),
+    };
     if command.explain {
         say(arguments, &show::costs(&outcome.costs, outcome.summary.steps).to_string());
     }
-    print(arguments, &outcome, report.as_deref().ok())?;
+    print(arguments, &outcome, report.as_ref().ok().and_then(Option::as_deref))?;
     if every_s.is_some() && outcome.summary.status == Status::Stopped && !arguments.quiet {
         eprintln!("`terraglue run --resume {}` goes on from here", folder.display());
     }

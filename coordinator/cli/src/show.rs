@@ -177,7 +177,10 @@ pub fn summary(s: &Summary) -> Table {
     };
     row("depth of the prints", s.print_depth.as_ref().map_or_else(none, prints));
     row("peak force", s.motion.peak_force_over_weight.map_or_else(none, |f| format!("{f:.2} × the weight")));
-    row("real-time factor", format!("{:.2} ({:.2} s of wall time)", s.real_time_factor, s.wall_s));
+    row(
+        "real-time factor",
+        format!("{:.2} ({:.2} s of wall time)", s.times.real_time_factor, s.times.wall_s),
+    );
     row(
         "height gained",
         s.motion.height_gained_m.map_or_else(none, |h| format!("{} mm{}", signed(1e3 * h, 1), stall(s))),

@@ -100,6 +100,45 @@ struct Field {
     number: u32,
     name: String,
     what: What,
+    /// What stands before it in a message.
+    key: Key,
+    /// Length of its body with every number there.
+    guess: usize,
+}
+
+/// Number and type of a field as they are written.
+#[derive(Clone, Copy, Debug, Default)]
+struct Key {
+    bytes: [u8; 5],
+    length: u8,
+}
+
+impl Key {
+    fn new(number: u32, wire: WireType) -> Self {
+        let mut key = Self::default();
+        let mut rest = key.bytes.as_mut_slice();
+        encoding::encode_key(number, wire, &mut rest);
+        key.length = 5 - rest.len() as u8;
+        key
+    }
+
+    fn bytes(&self) -> &[u8] {
+        &self.bytes[..usize::from(self.length)]
+    }
+
+    fn len(&self) -> usize {
+        usize::from(self.length)
+    }
+}
+
+impl Field {
+    fn new(number: u32, name: String, what: What) -> Self {
+        let wire = match &what {
+            What::Group(_) => WireType::LengthDelimited,
+            What::Values { kind, .. } => kind.wire(),
+        };
+        Self { number, name, what, key: Key::new(number, wire), guess: 0 }
+    }
 }
 
 #[derive(Clone, Debug)]
@@ -154,6 +193,7 @@ impl Columns {
             let (name, unit, help) = (column.name.clone(), column.unit.clone(), column.help.clone());
             about.push(About { name, index, unit, help, kind, values, field });
         }
+        guess_lengths(&mut all.fields);
         (all, about)
     }
 
@@ -213,14 +253,14 @@ fn next_number(fields: &[Field]) -> u32 {
 fn insert(fields: &mut Vec<Field>, name: &str, what: &What) -> Vec<u32> {
     let Some((group, rest)) = name.split_once('.') else {
         let number = next_number(fields);
-        fields.push(Field { number, name: identifier(name, fields), what: what.clone() });
+        fields.push(Field::new(number, identifier(name, fields), what.clone()));
         return vec![number];
     };
     let wanted = descriptor::identifier(group);
     let known = fields.iter().position(|f| f.name == wanted && matches!(f.what, What::Group(_)));
     let place = known.unwrap_or_else(|| {
         let (number, name) = (next_number(fields), identifier(group, fields));
-        fields.push(Field { number, name, what: What::Group(Vec::new()) });
+        fields.push(Field::new(number, name, What::Group(Vec::new())));
         fields.len() - 1
     });
     let field = &mut fields[place];
@@ -236,7 +276,7 @@ fn place(fields: &mut Vec<Field>, numbers: &[u32], what: &What) {
     let Some((number, rest)) = numbers.split_first() else { return };
     let new = || if rest.is_empty() { what.clone() } else { What::Group(Vec::new()) };
     let place = fields.iter().position(|f| f.number == *number).unwrap_or_else(|| {
-        fields.push(Field { number: *number, name: String::new(), what: new() });
+        fields.push(Field::new(*number, String::new(), new()));
         fields.len() - 1
     });
     if let What::Group(inner) = &mut fields[place].what {
@@ -279,14 +319,6 @@ fn described(field: &Field, kind: Kind) -> FieldDescriptorProto {
     }
 }
 
-fn scalar_length(kind: Kind, value: f64) -> usize {
-    match kind {
-        Kind::Double => 8,
-        Kind::Bool => 1,
-        _ => encoding::encoded_len_varint(value as i64 as u64),
-    }
-}
-
 fn put_scalar(kind: Kind, value: f64, out: &mut Vec<u8>) {
     match kind {
         Kind::Double => out.put_f64_le(value),
@@ -300,48 +332,70 @@ fn is_zero(value: f64) -> bool {
     value.to_bits() == 0
 }
 
-fn body_length(what: &What, values: &[f64]) -> usize {
-    match what {
-        What::Group(inner) => inner.iter().map(|f| length(f, values)).sum(),
-        What::Values { kind, first, count } => {
-            values[*first..first + count].iter().map(|v| scalar_length(kind.element(), *v)).sum()
+/// Appends what `body` writes with its length before it; `guess` is the length that it has as a rule.
+fn write_part(guess: usize, out: &mut Vec<u8>, body: impl FnOnce(&mut Vec<u8>)) {
+    let start = out.len();
+    let room = encoding::encoded_len_varint(guess as u64);
+    out.resize(start + room, 0);
+    body(out);
+    let length = out.len() - start - room;
+    let mut head = [0_u8; 10];
+    let mut rest = head.as_mut_slice();
+    encoding::encode_varint(length as u64, &mut rest);
+    let width = 10 - rest.len();
+    if width != room {
+        let end = out.len();
+        out.resize(end.max(end + width - room), 0);
+        out.copy_within(start + room..end, start + width);
+        out.truncate(start + width + length);
+    }
+    out[start..start + width].copy_from_slice(&head[..width]);
+}
+
+/// Notes how long groups and arrays are as a rule.
+fn guess_lengths(fields: &mut [Field]) {
+    for field in fields {
+        if let What::Group(inner) = &mut field.what {
+            guess_lengths(inner);
         }
+        field.guess = longest(field) - field.key.len();
     }
 }
 
-fn length(field: &Field, values: &[f64]) -> usize {
-    let body = body_length(&field.what, values);
-    let key = encoding::key_len(field.number);
-    match &field.what {
-        What::Values { kind, first, .. } if !kind.repeated() => {
-            if is_zero(values[*first]) {
-                0
-            } else {
-                key + body
-            }
-        }
-        _ => key + encoding::encoded_len_varint(body as u64) + body,
-    }
+/// Length of a field in which every number is there.
+fn longest(field: &Field) -> usize {
+    let body = match &field.what {
+        What::Group(inner) => inner.iter().map(longest).sum(),
+        What::Values { kind, count, .. } => count * if kind.is_real() { 8 } else { 1 },
+    };
+    field.key.len() + body
 }
 
 fn write_all(fields: &[Field], values: &[f64], out: &mut Vec<u8>) {
     for field in fields {
         match &field.what {
             What::Group(inner) => {
-                encoding::encode_key(field.number, WireType::LengthDelimited, out);
-                encoding::encode_varint(body_length(&field.what, values) as u64, out);
-                write_all(inner, values, out);
+                out.extend_from_slice(field.key.bytes());
+                write_part(field.guess, out, |out| write_all(inner, values, out));
+            }
+            What::Values { kind: Kind::Double, first, .. } => {
+                let value = values[*first];
+                if !is_zero(value) {
+                    out.extend_from_slice(field.key.bytes());
+                    out.extend_from_slice(&value.to_le_bytes());
+                }
             }
             What::Values { kind, first, .. } if !kind.repeated() => {
                 if !is_zero(values[*first]) {
-                    encoding::encode_key(field.number, kind.wire(), out);
+                    out.extend_from_slice(field.key.bytes());
                     put_scalar(*kind, values[*first], out);
                 }
             }
             What::Values { kind, first, count } => {
-                encoding::encode_key(field.number, WireType::LengthDelimited, out);
-                encoding::encode_varint(body_length(&field.what, values) as u64, out);
-                values[*first..first + count].iter().for_each(|v| put_scalar(kind.element(), *v, out));
+                out.extend_from_slice(field.key.bytes());
+                write_part(field.guess, out, |out| {
+                    values[*first..first + count].iter().for_each(|v| put_scalar(kind.element(), *v, out));
+                });
             }
         }
     }
@@ -423,6 +477,15 @@ mod tests {
         assert_eq!(bits(&back), bits(&values));
         for cut in 0..bytes.len() {
             let _ = read.decode(&bytes[..cut], &mut back);
+        }
+        // groups that are shorter or longer than as a rule: lengths of one and of two bytes
+        for empty in 0..=list.len() {
+            let few: Vec<f64> = (0..list.len()).map(|k| if k < empty { 0.0 } else { 3.0 }).collect();
+            bytes.clear();
+            written.encode(&few, &mut bytes);
+            read.decode(&bytes, &mut back).expect("whole");
+            let flag = |k: usize, v: f64| if k == 8 && v != 0.0 { 1.0 } else { v };
+            assert_eq!(back, few.iter().enumerate().map(|(k, v)| flag(k, *v)).collect::<Vec<_>>());
         }
     }
 

@@ -80,37 +80,80 @@ impl GroundPoints {
 
     fn colour(&self, sinkage: f32) -> [u8; 3] {
         let share = (f64::from(sinkage) / (DEEPEST * self.info.spacing)).clamp(-1.0, 1.0);
-        self.colours[(0.5 * (share + 1.0) * (SHADES - 1) as f64).round() as usize]
+        self.colours[nearest(0.5 * (share + 1.0) * (SHADES - 1) as f64) as usize]
     }
 
     fn rounded(&self, z: f32) -> f32 {
-        ((f64::from(z) / self.step).round() * self.step) as f32
+        (nearest(f64::from(z) / self.step) * self.step) as f32
     }
 
-    /// The cloud of a tile; `packed` is room for its heights.
+    /// The cloud of a tile; none where all points are as they were when `drawn` was made, which says what was drawn
+    /// last. `packed` is room for the heights.
     pub fn cloud(
         &self,
         grid: &GroundGrid,
         soil: &SubsystemView,
-        tile: usize,
+        (tile, drawn): (usize, &mut u64),
         t_s: f64,
         packed: &mut Vec<u8>,
-    ) -> Result<PointCloud> {
+    ) -> Result<Option<PointCloud>> {
         let r = self.rectangle(tile);
         packed.clear();
         grid.pack(soil, r, t_s, packed)?;
-        let number = |node: &[u8], k: usize| node[k..k + 4].try_into().map_or(f32::NAN, f32::from_le_bytes);
-        let mut points = Points::new("sinkage");
-        for (k, node) in packed.chunks_exact(8).enumerate() {
-            let (i, j) = (k as u32 % (r.i1 - r.i0), k as u32 / (r.i1 - r.i0));
-            if i.is_multiple_of(self.stride) && j.is_multiple_of(self.stride) {
-                let (z, sinkage) = (self.rounded(number(node, 0)), self.rounded(number(node, 4)));
-                let at = [f64::from(i) * self.info.spacing, f64::from(j) * self.info.spacing, f64::from(z)];
+        let sum = self.round(packed);
+        if std::mem::replace(drawn, sum) == sum {
+            return Ok(None);
+        }
+        let width = (r.i1 - r.i0) as usize;
+        let mut points = Points::with_room("sinkage", packed.len() / 8);
+        for (j, row) in (0_u32..).zip(packed.chunks_exact(8 * width)).step_by(self.stride as usize) {
+            let y = f64::from(j) * self.info.spacing;
+            for (i, node) in (0_u32..).zip(row.chunks_exact(8)).step_by(self.stride as usize) {
+                let [z, sinkage] = numbers(node);
+                let at = [f64::from(i) * self.info.spacing, y, f64::from(z)];
                 points.push(at, self.colour(sinkage), sinkage);
             }
         }
         let corner = |axis: usize, n: u32| self.info.origin[axis] + f64::from(n) * self.info.spacing;
         let pose = Pose { position: [corner(0, r.i0), corner(1, r.j0), 0.0], ..Pose::IDENTITY };
-        Ok(points.message(t_s, "world", &pose))
+        Ok(Some(points.message(t_s, "world", &pose)))
+    }
+
+    /// Rounds heights and sinkages as they are drawn; a number that differs where any of them does.
+    fn round(&self, packed: &mut [u8]) -> u64 {
+        let mut sum = 0xcbf2_9ce4_8422_2325_u64;
+        for node in packed.chunks_exact_mut(8) {
+            let [z, sinkage] = numbers(node).map(|x| self.rounded(x).to_le_bytes());
+            node[..4].copy_from_slice(&z);
+            node[4..].copy_from_slice(&sinkage);
+            let bits = u64::from(u32::from_le_bytes(z)) << 32 | u64::from(u32::from_le_bytes(sinkage));
+            sum = (sum.rotate_left(23) ^ bits).wrapping_mul(0x9e37_79b9_7f4a_7c15);
+        }
+        // 0 stands for what was never drawn
+        sum.max(1)
+    }
+}
+
+/// The nearest whole number, the farther from 0 of two; a call of `round` takes a tenth of the time of a tile.
+fn nearest(x: f64) -> f64 {
+    (x + 0.5_f64.copysign(x)) as i64 as f64
+}
+
+/// Height and sinkage of a packed node.
+fn numbers(node: &[u8]) -> [f32; 2] {
+    [0, 4].map(|k| node[k..k + 4].try_into().map_or(f32::NAN, f32::from_le_bytes))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearest_whole_number_is_that_of_round() {
+        for k in -4000..4000_i32 {
+            let x = f64::from(k as f32 * 0.137_5);
+            assert_eq!(nearest(x), x.round(), "{x}");
+            assert_eq!(nearest(0.5 * f64::from(k)), (0.5 * f64::from(k)).round());
+        }
     }
 }

@@ -81,7 +81,7 @@ pub use reader::{GroundRecord, Header, PoseSeries, Recording};
 pub use recorder::{Recorder, RecorderOptions, RecorderState};
 pub use solids::Solid;
 pub use summary::{
-    EnergySummary, FailureRecord, GluingSummary, MotionSummary, PrintDepth, Stall, Status, Summary,
+    EnergySummary, FailureRecord, GluingSummary, MotionSummary, PrintDepth, RunTimes, Stall, Status, Summary,
 };
 pub use summary_observer::SummaryObserver;
 pub use table::Table;

@@ -97,11 +97,15 @@ pub(crate) struct McapWriter {
     channels: Channels,
     sequence: u32,
     message: Vec<u8>,
+    /// The message of the poses, of which numbers change from record to record.
+    poses: FrameTransforms,
     /// Of each subsystem: what is written when it changes, and what is written always.
     variables: Vec<[Option<Variables>; 2]>,
     energy: Columns,
     ground: Option<GroundGrid>,
     points: Option<GroundPoints>,
+    /// Of each tile of those: what was drawn last.
+    drawn: Vec<u64>,
     forces: Forces,
     forces_next_s: f64,
     gravity_m_s2: f64,
@@ -140,10 +144,12 @@ impl McapWriter {
             channels: Channels::default(),
             sequence: 0,
             message: Vec::new(),
+            poses: FrameTransforms::default(),
             variables: Vec::new(),
             energy: Columns::default(),
             ground: None,
             points: None,
+            drawn: Vec::new(),
             forces: Forces::default(),
             forces_next_s: f64::NEG_INFINITY,
             gravity_m_s2: rotation::length(scenario.world.gravity_m_s2),
@@ -181,6 +187,7 @@ impl McapWriter {
     fn find(&mut self, view: &View) -> Result {
         self.ground = GroundGrid::find(view)?;
         self.points = self.ground.as_ref().map(|g| GroundPoints::new(&g.info));
+        self.drawn = vec![0; self.points.as_ref().map_or(0, GroundPoints::count)];
         self.forces = Forces::new(view, self.gravity_m_s2);
         Ok(())
     }
@@ -281,7 +288,15 @@ impl McapWriter {
     }
 
     fn transforms(&mut self, view: &View) -> Result {
-        let mut all = FrameTransforms::default();
+        let mut poses = std::mem::take(&mut self.poses);
+        let written = self.fill(&mut poses, view).and_then(|()| self.put(self.channels.tf, view.t_s, &poses));
+        self.poses = poses;
+        written
+    }
+
+    /// Poses of all bodies as they are now; frames keep the names that they got first.
+    fn fill(&self, poses: &mut FrameTransforms, view: &View) -> Result {
+        let mut count = 0;
         for s in view.subsystems {
             for (body, state) in s.scene.bodies.iter().zip(s.body_states) {
                 let Pose { position, orientation } = state.world_from_body;
@@ -289,16 +304,21 @@ impl McapWriter {
                     let message = format!("pose of body `{}` is not a number (NaN)", body.name);
                     return Err(failed(s, view.t_s, "body_states", message));
                 }
-                all.transforms.push(FrameTransform {
-                    timestamp: Some(timestamp(view.t_s)),
-                    parent_frame_id: "world".into(),
-                    child_frame_id: frame_id(s.name, &body.name),
-                    translation: Some(vector(position.map(|x| self.precision.of(x)))),
-                    rotation: Some(quaternion(orientation.map(|x| self.precision.of(x)))),
-                });
+                if count == poses.transforms.len() {
+                    poses.transforms.push(FrameTransform {
+                        parent_frame_id: "world".into(),
+                        child_frame_id: frame_id(s.name, &body.name),
+                        ..FrameTransform::default()
+                    });
+                }
+                let transform = &mut poses.transforms[count];
+                transform.timestamp = Some(timestamp(view.t_s));
+                transform.translation = Some(vector(position.map(|x| self.precision.of(x))));
+                transform.rotation = Some(quaternion(orientation.map(|x| self.precision.of(x))));
+                count += 1;
             }
         }
-        self.put(self.channels.tf, view.t_s, &all)
+        Ok(())
     }
 
     /// Writes an event.
@@ -328,8 +348,11 @@ impl McapWriter {
         let soil = &view.subsystems[ground.subsystem];
         let mut packed = std::mem::take(&mut self.packed);
         let written = tiles.into_iter().try_for_each(|tile| {
-            let cloud = points.cloud(&ground, soil, tile, view.t_s, &mut packed)?;
-            self.put(self.channels.tiles[tile], view.t_s, &cloud)
+            let drawn = (tile, &mut self.drawn[tile]);
+            match points.cloud(&ground, soil, drawn, view.t_s, &mut packed)? {
+                Some(cloud) => self.put(self.channels.tiles[tile], view.t_s, &cloud),
+                None => Ok(()),
+            }
         });
         (self.ground, self.points, self.packed) = (Some(ground), Some(points), packed);
         written

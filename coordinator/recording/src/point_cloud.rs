@@ -23,15 +23,21 @@ pub(crate) struct Points {
 impl Points {
     /// None yet; `number` names what each carries.
     pub fn new(number: &'static str) -> Self {
-        Self { data: Vec::new(), number }
+        Self::with_room(number, 0)
+    }
+
+    /// None yet, for so many.
+    pub fn with_room(number: &'static str, count: usize) -> Self {
+        Self { data: Vec::with_capacity(STRIDE * count), number }
     }
 
     /// Adds a point.
     pub fn push(&mut self, at: [f64; 3], rgb: [u8; 3], number: f32) {
-        at.iter().for_each(|x| self.data.extend_from_slice(&(*x as f32).to_le_bytes()));
-        self.data.extend_from_slice(&rgb);
-        self.data.push(255);
-        self.data.extend_from_slice(&number.to_le_bytes());
+        let [x, y, z] = at.map(|x| (x as f32).to_le_bytes());
+        let mut point = [0; STRIDE];
+        let parts = [x, y, z, [rgb[0], rgb[1], rgb[2], 255], number.to_le_bytes()];
+        point.chunks_exact_mut(4).zip(parts).for_each(|(to, part)| to.copy_from_slice(&part));
+        self.data.extend_from_slice(&point);
     }
 
     /// The message, in a frame and at a place in it.

@@ -57,27 +57,31 @@ pub(crate) fn hold(snapshot: &mut Snapshot, connections: &[Connection]) {
 /// takes no room when compressed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Precision {
-    /// Places of the 52 behind the point that are cleared.
-    cleared: u32,
+    /// Half of the last place that is kept, in places of all bits.
+    half: u64,
+    /// The bits that are kept.
+    kept: u64,
 }
+
+/// Bits of the exponent: all are set in what is not finite.
+const EXPONENT: u64 = 0x7ff << 52;
 
 impl Precision {
     /// That holds this many decimal digits; from 16 on it holds all bits.
     pub fn digits(digits: u64) -> Self {
         // 2^(places + 1) ≥ 10^digits.
         let places = libm::ceil(digits as f64 * std::f64::consts::LOG2_10) as u32;
-        Self { cleared: 53_u32.saturating_sub(places) }
+        let cleared = 53_u32.saturating_sub(places);
+        Self { half: (1 << cleared) >> 1, kept: u64::MAX << cleared }
     }
 
     /// The nearest number that is held.
     pub fn of(self, value: f64) -> f64 {
-        if self.cleared == 0 || !value.is_finite() {
-            return value;
-        }
         let bits = value.to_bits();
         // A carry out of the fraction counts the exponent up, as it should.
-        let rounded = f64::from_bits(((bits + (1 << (self.cleared - 1))) >> self.cleared) << self.cleared);
-        if rounded.is_finite() { rounded } else { value }
+        let rounded = bits.wrapping_add(self.half) & self.kept;
+        let infinite = bits & EXPONENT == EXPONENT || rounded & EXPONENT == EXPONENT;
+        if infinite { value } else { f64::from_bits(rounded) }
     }
 }
 

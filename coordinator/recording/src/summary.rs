@@ -89,14 +89,11 @@ pub struct Summary {
     pub steps: u64,
     /// Simulated time, s.
     pub simulated_s: f64,
-    /// Wall time of the step loop, s.
-    pub wall_s: f64,
-    /// CPU time of the step loop, s.
-    pub cpu_s: f64,
+    /// How long it took.
+    #[serde(flatten)]
+    pub times: RunTimes,
     /// CPU time per step, s.
     pub cpu_per_step_s: f64,
-    /// simulated_s / wall_s.
-    pub real_time_factor: f64,
     /// Where the reported body went.
     #[serde(flatten)]
     pub motion: MotionSummary,
@@ -230,6 +227,28 @@ pub struct GluingSummary {
     /// Largest condition of Λ; 0 where no strategy formed it.
     #[serde(default)]
     pub condition_max: f64,
+}
+
+/// How long a run took.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RunTimes {
+    /// Wall time of the step loop, s.
+    pub wall_s: f64,
+    /// CPU time of the step loop, s.
+    pub cpu_s: f64,
+    /// simulated_s / wall_s.
+    pub real_time_factor: f64,
+    /// simulated_s / cpu_s: how fast a core would be that has nothing else to do.
+    #[serde(default)]
+    pub cpu_real_time_factor: f64,
+}
+
+impl RunTimes {
+    /// Of so much simulated time, s.
+    pub(crate) fn new(simulated_s: f64, wall_s: f64, cpu_s: f64) -> Self {
+        let per = |s: f64| if s > 0.0 { simulated_s / s } else { 0.0 };
+        Self { wall_s, cpu_s, real_time_factor: per(wall_s), cpu_real_time_factor: per(cpu_s) }
+    }
 }
 
 /// Depth of prints: each counts once, with the largest depth under it while it was pressed, however often that was. A wheel

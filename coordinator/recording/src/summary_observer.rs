@@ -7,7 +7,7 @@ use crate::layout::{RECORDING, REPORT};
 use crate::motor_work::MotorWork;
 use crate::prints::PrintTrack;
 use crate::snapshot::{real, real_id};
-use crate::summary::{EnergySummary, FailureRecord, GluingSummary, MotionSummary, Status, Summary};
+use crate::summary::{EnergySummary, FailureRecord, GluingSummary, MotionSummary, RunTimes, Status, Summary};
 use terraglue_diagnostics::error::{Error, Result};
 use terraglue_engine::observer::{Event, Observer, SubsystemView, View};
 use terraglue_gluing::StepReport;
@@ -283,10 +283,8 @@ impl SummaryObserver {
             soil_module: self.soil_module.clone(),
             steps: self.steps,
             simulated_s: self.t_s,
-            wall_s,
-            cpu_s,
+            times: RunTimes::new(self.t_s, wall_s, cpu_s),
             cpu_per_step_s: per(cpu_s, self.steps as f64),
-            real_time_factor: per(self.t_s, wall_s),
             motion: self.motion(weight_n),
             max_sinkage_m: self.sinkage.as_ref().map(Deepest::largest),
             mean_sinkage_m: self.prints.as_ref().and_then(PrintTrack::mean_m),

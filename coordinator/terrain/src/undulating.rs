@@ -7,7 +7,7 @@ use terraglue_diagnostics::error::Result;
 use terraglue_ground::Lattice;
 use terraglue_scenario::InputError;
 
-/// Number of waves.
+/// Number of waves; a multiple of those that are added side by side.
 const WAVES: u32 = 64;
 
 /// Exponent of the amplitude over the wavelength: the Hurst exponent of a self-affine surface, about 0.95 for
@@ -26,9 +26,8 @@ struct Wave {
 pub fn build(lattice: Lattice, rms: f64, wavelengths: [f64; 2], seed: u64, flat_radius: f64) -> Result<Grid> {
     check(&lattice, wavelengths)?;
     let mut heights = vec![0.0; lattice.node_count()];
-    for wave in waves(wavelengths, seed) {
-        add_wave(&mut heights, &lattice, &wave);
-    }
+    let waves: Vec<Wave> = waves(wavelengths, seed).collect();
+    waves.as_chunks().0.iter().for_each(|some| add_waves(&mut heights, &lattice, some));
     let mean = heights.iter().sum::<f64>() / heights.len() as f64;
     heights.iter_mut().for_each(|h| *h -= mean);
     if flat_radius > 0.0 {
@@ -73,17 +72,34 @@ fn waves([shortest, longest]: [f64; 2], seed: u64) -> impl Iterator<Item = Wave>
     })
 }
 
-/// Adds a wave row by row; along a row its phasor turns by a constant angle, so that a node costs a product.
-fn add_wave(heights: &mut [f64], lattice: &Lattice, wave: &Wave) {
-    let turn = wave.kx * lattice.spacing;
-    let (c, s) = (libm::cos(turn), libm::sin(turn));
+/// Waves that are added side by side: each waits for its own product only.
+const ABREAST: usize = 8;
+
+/// A wave on its way along a row.
+#[derive(Clone, Copy, Default)]
+struct Phasor {
+    re: f64,
+    im: f64,
+    c: f64,
+    s: f64,
+}
+
+/// Adds some waves row by row; along a row the phasor of each turns by a constant angle, so that a node costs a product.
+fn add_waves(heights: &mut [f64], lattice: &Lattice, waves: &[Wave; ABREAST]) {
+    let turn = |wave: &Wave| wave.kx * lattice.spacing;
+    let turns = waves.each_ref().map(|wave| [libm::cos(turn(wave)), libm::sin(turn(wave))]);
     for (j, row) in heights.chunks_exact_mut(lattice.size[0] as usize).enumerate() {
         let [x, y] = lattice.position(0, j as i32);
-        let start = wave.kx * x + wave.ky * y + wave.phase;
-        let (mut re, mut im) = (wave.amplitude * libm::cos(start), wave.amplitude * libm::sin(start));
+        let mut phasors: [Phasor; ABREAST] = std::array::from_fn(|k| {
+            let (wave, [c, s]) = (&waves[k], turns[k]);
+            let start = wave.kx * x + wave.ky * y + wave.phase;
+            Phasor { re: wave.amplitude * libm::cos(start), im: wave.amplitude * libm::sin(start), c, s }
+        });
         for h in row {
-            *h += im;
-            (re, im) = (re * c - im * s, re * s + im * c);
+            for Phasor { re, im, c, s } in &mut phasors {
+                *h += *im;
+                (*re, *im) = (*re * *c - *im * *s, *re * *s + *im * *c);
+            }
         }
     }
 }

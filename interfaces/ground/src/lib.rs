@@ -35,7 +35,7 @@ pub use height_field::{HeightError, HeightField, UNIT_M};
 pub use joined::{Part, bounds_of, nodes_below_parts};
 pub use lattice::{Lattice, TILE_EDGE, TILE_NODES};
 pub use math::{Rotation, compose};
-pub use plane::{Plane, fit_plane};
+pub use plane::{Plane, PlaneFit, fit_plane};
 pub use shape::{Aabb, Placed, STEEPEST_SLOPE, aabb, lower_surface};
 pub use snapshot::HeightSnapshot;
 pub use tile_map::{TileMap, TileMapSnapshot};

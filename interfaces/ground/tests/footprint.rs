@@ -1,7 +1,9 @@
 //! Nodes of a contact patch: covered areas, depths, and the plane below it.
 
 use proptest::prelude::*;
-use terraglue_ground::{HeightField, Lattice, Placed, Surface, disc_in_rectangle, fit_plane, nodes_below};
+use terraglue_ground::{
+    HeightField, Lattice, Placed, PlaneFit, Surface, UNIT_M, disc_in_rectangle, fit_plane, nodes_below,
+};
 use terraglue_subsystem::{Geometry, Node, Pose};
 
 fn flat() -> HeightField {
@@ -219,6 +221,22 @@ fn a_rim_beside_its_nodes_moves_with_the_shape_and_not_by_rounding() {
             for (a, b) in here.iter().zip(&shifted).filter(|(a, _)| outside(a)) {
                 assert!((a.lower - b.lower).abs() < 1e-15, "{a:?} {b:?}");
             }
+        }
+    }
+}
+
+#[test]
+fn fits_that_share_what_was_read_are_those_that_read_anew() {
+    let mut ground = flat();
+    let waves = |i: i32, j: i32| 0.003 * (f64::from(i) * 0.7).sin() + 0.002 * (f64::from(j) * 0.4).cos();
+    for (i, j) in (40..160).flat_map(|i| (40..160).map(move |j| (i, j))) {
+        ground.set_units(i, j, (waves(i, j) / UNIT_M) as i32);
+    }
+    for radius in [0.0, 0.03, 0.2] {
+        let mut fit = PlaneFit::new(&ground, radius);
+        for k in 0..300 {
+            let (x, y) = (-0.3 + 1.7e-3 * f64::from(k), 0.2 - 0.9e-3 * f64::from(k));
+            assert_eq!(fit.at(x, y), fit_plane(&ground, x, y, radius));
         }
     }
 }

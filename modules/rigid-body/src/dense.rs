@@ -2,7 +2,14 @@
 
 /// Overwrites the lower triangle of the positive definite `a` (n × n) with L of A = L·Lᵀ. False: not definite.
 pub(crate) fn cholesky(n: usize, a: &mut [f64]) -> bool {
+    cholesky_above(n, a, 0.0)
+}
+
+/// The same where each pivot has to be larger than a share of its entry on the diagonal: what else determines an unknown
+/// leaves so much of it.
+pub(crate) fn cholesky_above(n: usize, a: &mut [f64], share: f64) -> bool {
     for j in 0..n {
+        let least = share * a[j * n + j];
         let (left, right) = a.split_at_mut(j * n);
         let column = &mut right[j..n];
         for other in left.chunks_exact(n) {
@@ -10,7 +17,7 @@ pub(crate) fn cholesky(n: usize, a: &mut [f64]) -> bool {
             column.iter_mut().zip(other).for_each(|(v, o)| *v -= factor * o);
         }
         let pivot = a[j * n + j];
-        if pivot <= 0.0 || pivot.is_nan() {
+        if pivot <= least.max(0.0) || pivot.is_nan() {
             return false;
         }
         let inverse = 1.0 / pivot.sqrt();
@@ -103,6 +110,10 @@ mod tests {
         cholesky_solve(3, &a, &mut x);
         x.iter().for_each(|x| assert!((x - 1.0).abs() < 1e-15));
         assert!(!cholesky(2, &mut [1.0, 2.0, 2.0, 1.0]));
+        let nearly_singular = [1.0, 1.0, 1.0, 1.0 + 1e-6];
+        assert!(cholesky(2, &mut nearly_singular.clone()));
+        assert!(!cholesky_above(2, &mut nearly_singular.clone(), 1e-5));
+        assert!(cholesky_above(2, &mut nearly_singular.clone(), 1e-7));
     }
 
     #[test]

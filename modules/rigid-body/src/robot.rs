@@ -464,10 +464,7 @@ impl Subsystem for Robot {
     fn get(&self, ids: &[u32], out: ValuesMut) -> Result {
         let (model, state) = (self.model(), &self.state);
         match out {
-            ValuesMut::F64(out) => out
-                .iter_mut()
-                .zip(ids)
-                .try_for_each(|(o, id)| variables::number(model, state, *id).map(|v| *o = v)),
+            ValuesMut::F64(out) => variables::numbers(model, state, ids, out),
             ValuesMut::Bool(out) => out
                 .iter_mut()
                 .zip(ids)

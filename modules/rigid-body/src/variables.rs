@@ -450,18 +450,49 @@ fn robot_number(model: &Model, state: &State, item: usize) -> f64 {
 
 fn body_number(model: &Model, state: &State, body: usize, item: u32) -> f64 {
     let m = &state.bodies[body];
-    let k = item as usize % 3;
-    match item {
-        0..3 => m.point(&-model.bodies[body].com)[k],
-        3..6 => euler(&m.q)[k],
-        6..9 => (m.v - m.w.cross(&(m.q * model.bodies[body].com)))[k],
-        9..12 => m.w[k],
+    match item as usize {
+        item @ 0..12 => motion_part(model, state, body, item / 3)[item % 3],
         12 => state.contact_normal[body],
-        13..16 => state.loads[body].force[item as usize - 13],
-        16..19 => state.loads[body].moment[item as usize - 16],
-        19..22 => model.bodies[body].com[item as usize - 19],
-        _ => [m.q.w, m.q.i, m.q.j, m.q.k][item as usize - 22],
+        item @ 13..16 => state.loads[body].force[item - 13],
+        item @ 16..19 => state.loads[body].moment[item - 16],
+        item @ 19..22 => model.bodies[body].com[item - 19],
+        item => [m.q.w, m.q.i, m.q.j, m.q.k][item - 22],
     }
+}
+
+/// Position, Euler angles, velocity or angular velocity of a body.
+fn motion_part(model: &Model, state: &State, body: usize, part: usize) -> [f64; 3] {
+    let (m, com) = (&state.bodies[body], &model.bodies[body].com);
+    match part {
+        0 => m.point(&-com).into(),
+        1 => euler(&m.q),
+        2 => (m.v - m.w.cross(&(m.q * com))).into(),
+        _ => m.w.into(),
+    }
+}
+
+/// Reads numbers. Bodies that are asked for whole are read whole: a recording asks for all.
+pub(crate) fn numbers(model: &Model, state: &State, mut ids: &[u32], mut out: &mut [f64]) -> Result {
+    let all = BODY_ITEMS.len();
+    while let (Some(id), false) = (ids.first(), out.is_empty()) {
+        let body = (id / BODY_STRIDE) as usize;
+        let whole = id % BODY_STRIDE == 0
+            && body < model.bodies.len()
+            && ids.len().min(out.len()) >= all
+            && ids[..all].iter().zip(*id..).all(|(k, wanted)| *k == wanted);
+        let count = if whole { all } else { 1 };
+        let (now, later) = std::mem::take(&mut out).split_at_mut(count);
+        if whole {
+            for part in 0..4 {
+                now[3 * part..3 * part + 3].copy_from_slice(&motion_part(model, state, body, part));
+            }
+            (12..all).for_each(|item| now[item] = body_number(model, state, body, item as u32));
+        } else {
+            now[0] = number(model, state, *id)?;
+        }
+        (ids, out) = (&ids[count..], later);
+    }
+    Ok(())
 }
 
 /// Writes a number.

@@ -1,5 +1,7 @@
 //! Helpers for tests of whole runs.
 
+pub mod step_times;
+
 use glue_cases::{MassChain, PlanarBodies, PowerColumns, TableOnFeet};
 use terraglue::scenario::Scenario;
 use terraglue::testbed::Options;

@@ -106,7 +106,7 @@ type Part = (&'static str, fn(&Context) -> Outcome<Vec<Figure>>);
 
 /// Areas with their parts, in the order of the tables.
 const AREAS: [(&str, &[Part]); 6] = [
-    ("walk", &[("walk", walk::figures)]),
+    ("walk", &[("walk", walk::figures), ("speed", walk::speed::figures)]),
     ("rigid-body", &rigid_body::PARTS),
     ("soil", &soil::PARTS),
     ("gluing", &gluing::PARTS),

@@ -1,7 +1,7 @@
 //! Frame, origin and extent of a contact patch.
 
 use super::touching::Touching;
-use terraglue_ground::{Surface, fit_plane};
+use terraglue_ground::{PlaneFit, Surface};
 use terraglue_subsystem::{Geometry, Node, component};
 
 /// Smallest upward part of a normal that is reckoned with; steeper ground is no height field any more.
@@ -29,10 +29,10 @@ impl Patch {
         // Twice the half width: enough ground beyond the foot itself.
         let bounds = &shape.bounds;
         let radius = (bounds.max[0] - bounds.min[0]).min(bounds.max[1] - bounds.min[1]);
-        let mut normal = [0.0, 0.0, 1.0];
+        let (mut fit, mut normal) = (PlaneFit::new(undisturbed, radius), [0.0, 0.0, 1.0]);
         for _ in 0..2 {
             let origin = shape.patch_origin(normal);
-            normal = fit_plane(undisturbed, origin[0], origin[1], radius).normal;
+            normal = fit.at(origin[0], origin[1]).normal;
         }
         let origin = shape.patch_origin(normal);
         let [u, v] = surface.lattice().coordinates(origin[0], origin[1]).map(|c| c.round() as i32);

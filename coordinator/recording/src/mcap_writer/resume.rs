@@ -52,10 +52,11 @@ pub(crate) struct McapState {
     written: Vec<Option<Vec<f64>>>,
     ground: Block,
     unseen: Vec<bool>,
+    drawn: Vec<u64>,
     forces_next_s: f64,
     window: WindowRecord,
 }
-persist!(McapState { kept, sequence, pending, written, ground, unseen, forces_next_s, window });
+persist!(McapState { kept, sequence, pending, written, ground, unseen, drawn, forces_next_s, window });
 
 impl McapWriter {
     /// From now on [`McapWriter::state`] can be asked for.
@@ -79,6 +80,7 @@ impl McapWriter {
             written: parts.map(|part| part.written.clone()).collect(),
             ground,
             unseen,
+            drawn: self.drawn.clone(),
             forces_next_s: self.forces_next_s,
             window: self.window,
         })
@@ -120,6 +122,9 @@ impl McapWriter {
         if let Some(grid) = &mut self.ground {
             grid.recall(&mut state.ground.0.as_slice())?;
             grid.forget(&state.unseen);
+        }
+        if state.drawn.len() == self.drawn.len() {
+            self.drawn = state.drawn;
         }
         self.forces_next_s = state.forces_next_s;
         self.window = state.window;

@@ -81,8 +81,12 @@ fn text(value: (String, String)) -> String {
 
 /// What a roboticist asks first, in this order.
 fn first(s: &Summary) -> impl Iterator<Item = Card> {
-    let real_time =
-        format!("{} s wall, {} s CPU, {} steps", number(s.wall_s, 3), number(s.cpu_s, 3), s.steps);
+    let real_time = format!(
+        "{} s wall, {} s CPU, {} steps",
+        number(s.times.wall_s, 3),
+        number(s.times.cpu_s, 3),
+        s.steps
+    );
     [
         distance(s),
         energy_per_metre(s),
@@ -95,7 +99,7 @@ fn first(s: &Summary) -> impl Iterator<Item = Card> {
                 "of the ground on all feet or wheels together",
             )
         }),
-        Some(Card::new("Real-time factor", pure(s.real_time_factor, 3), real_time)),
+        Some(Card::new("Real-time factor", pure(s.times.real_time_factor, 3), real_time)),
     ]
     .into_iter()
     .flatten()

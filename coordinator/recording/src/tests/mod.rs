@@ -351,7 +351,8 @@ fn the_summary_holds_the_figures_of_the_closed_form() {
     let f = folder();
     let s = record(f.path(), "iterative", 1000);
     let near = |a: Option<f64>, b: f64| assert!((a.expect("known") - b).abs() < 1e-9, "{a:?} {b}");
-    assert_eq!((s.steps, s.simulated_s, s.real_time_factor), (1000, 1.0, 0.5));
+    assert_eq!((s.steps, s.simulated_s, s.times.real_time_factor), (1000, 1.0, 0.5));
+    assert_eq!(s.times.cpu_real_time_factor, s.simulated_s / s.times.cpu_s);
     near(s.motion.distance_m, SPEED);
     near(s.motion.commanded_distance_m, SPEED);
     assert!((s.motion.max_roll_rad.expect("known") - ROLL).abs() < 1e-6);

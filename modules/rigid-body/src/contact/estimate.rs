@@ -4,13 +4,17 @@
 //! the problem is solved with G + ε·1 and then by proximal steps (gap − ε·T_previous), which lead to the normals of
 //! smallest norm whatever the order of the feet (Rockafellar 1976). Then normals and sticking components
 //! together, starting from there, each port within its friction |T_t| ≤ μ·T_n and, for patches, its moments
-//! within the footprint; what would exceed a bound is put on it.
+//! within the footprint; what would exceed a bound is put on it. A port that opens because it cannot both stick and
+//! press, and then has to close again, slips.
+//!
+//! Where the block of G in hand is far from singular, the proximal point is its only solution and comes from one
+//! factorisation of G itself; the active normals then come from a few guesses, and Lemke is left for what those miss.
 //!
 //! Wheels that rigid motors hold against each other cannot all keep their place: then the joint solution has no bound
 //! or its rounds no end. Sweeps over the ports (projected Gauss–Seidel) that stay within friction and footprint then
 //! give another answer, and the one with the smaller defect counts.
 
-use crate::dense::{cholesky, cholesky_solve, lu, lu_solve, rank};
+use crate::dense::{cholesky, cholesky_above, cholesky_solve, lu, lu_solve, rank};
 use crate::lcp::{Lemke, Outcome};
 use terraglue_subsystem::Port;
 
@@ -29,8 +33,16 @@ const PROXIMAL_CHANGE: f64 = 1e-12;
 const GROWS: f64 = 1e-2;
 /// Relative change at which what slips with its normal force has arrived.
 const ARRIVED: f64 = 1e-9;
+/// Pivots of G above this share of its diagonal: the block is solved as it is. Proximal steps lead to the same then.
+const REGULAR: f64 = REGULARISATION;
+/// Guesses of the active normals before Lemke.
+const GUESSES: usize = 6;
 /// Rounds in which ports change between open, sticking and slipping.
 const MAX_ROUNDS: usize = 24;
+/// Motion that counts as closing, as a share of what the largest wrench does.
+const NOTICED: f64 = 1e-9;
+/// A port that closes again so often within a step goes round in a circle.
+const MOST_CLOSINGS: u32 = 4;
 /// Sweeps where rounds have no end, and the relative change that ends them.
 const SWEEPS: usize = 200;
 const SWEEP_CHANGE: f64 = 1e-9;
@@ -79,6 +91,14 @@ pub(crate) struct Estimator {
     before: Vec<f64>,
     /// Where the rounds ended without a result.
     rounds: Vec<f64>,
+    /// Per port: how often it has closed since it opened first.
+    closings: Vec<u32>,
+    /// Which normals press, as guessed.
+    pressing: Vec<usize>,
+}
+
+fn largest(numbers: impl Iterator<Item = f64>) -> f64 {
+    numbers.fold(0.0_f64, |a, x| a.max(x.abs()))
 }
 
 fn unilateral(port: &Port) -> bool {
@@ -90,18 +110,28 @@ impl Estimator {
     pub fn solve(&mut self, p: &Problem, t: &mut [f64]) -> Result<bool, &'static str> {
         t.fill(0.0);
         self.classify(p);
-        self.solve_normals(p, t)?;
-        let unique = self.normals_unique(p, t);
+        let unique = match self.guess_normals(p, t) {
+            true => true,
+            false => {
+                self.solve_normals(p, t)?;
+                self.normals_unique(p, t)
+            }
+        };
         for port in p.ports {
             let open = unilateral(port) && t[port.first as usize] <= 0.0;
             self.status[port.range()].fill(if open { Status::Open } else { Status::Held });
         }
+        self.closings.clear();
+        self.closings.resize(p.ports.len(), 0);
         for _ in 0..MAX_ROUNDS {
             let converged = self.solve_held(p, t)?;
             if !self.change_status(p, t) {
                 if converged {
                     return Ok(unique);
                 }
+                break;
+            }
+            if self.closings.iter().any(|n| *n > MOST_CLOSINGS) {
                 break;
             }
         }
@@ -136,6 +166,44 @@ impl Estimator {
             let mean = sum[class(c)] / count[class(c)];
             self.epsilon[i] = if mean > IMMOBILE { REGULARISATION * mean } else { IMMOBILE_REGULARISATION };
         }
+    }
+
+    /// The normals alone where a few guesses at which of them press find them and they are unique; false: Lemke has to.
+    fn guess_normals(&mut self, p: &Problem, t: &mut [f64]) -> bool {
+        let n = p.gap.len();
+        if self.normals.iter().any(|i| self.epsilon[*i] == IMMOBILE_REGULARISATION) {
+            return false;
+        }
+        let Self { normals, pressing, unknowns, matrix, rhs, .. } = self;
+        pressing.clear();
+        pressing.extend(normals.iter().copied().filter(|i| p.gap[*i] < 0.0));
+        for _ in 0..GUESSES {
+            let m = pressing.len();
+            matrix.clear();
+            pressing.iter().for_each(|c| matrix.extend(pressing.iter().map(|r| p.g[c * n + r])));
+            if !cholesky_above(m, matrix, REGULAR) {
+                break;
+            }
+            rhs.clear();
+            rhs.extend(pressing.iter().map(|i| -p.gap[*i]));
+            cholesky_solve(m, matrix, rhs);
+            pressing.iter().zip(&*rhs).for_each(|(i, s)| t[*i] = *s);
+            let size = largest(rhs.iter().copied());
+            unknowns.clear();
+            unknowns.extend(normals.iter().copied().filter(|i| match pressing.binary_search(i) {
+                Ok(_) => t[*i] >= 0.0,
+                Err(_) => residual(p, t, *i) < -NOTICED * p.g[i * n + i] * size,
+            }));
+            if unknowns == pressing {
+                self.solution.clear();
+                self.solution.extend(normals.iter().map(|i| t[*i]));
+                return true;
+            }
+            pressing.iter().for_each(|i| t[*i] = 0.0);
+            std::mem::swap(unknowns, pressing);
+        }
+        t.fill(0.0);
+        false
     }
 
     /// The normals alone, of minimum norm.
@@ -192,9 +260,8 @@ impl Estimator {
         if !self.slipping.is_empty() {
             self.before.clear();
             self.before.extend_from_slice(t);
-            self.fill_matrix(p);
-            if lu(m, &mut self.matrix, &mut self.order) {
-                let (converged, arrived) = self.approach(p, t);
+            if let Some(regular) = self.factor_slipping(p) {
+                let (converged, arrived) = self.approach(p, t, regular);
                 if arrived {
                     return Ok(converged);
                 }
@@ -202,11 +269,36 @@ impl Estimator {
             t.copy_from_slice(&self.before);
             self.slipping.clear();
         }
-        self.fill_matrix(p);
-        if !cholesky(m, &mut self.matrix) {
-            return Err("the compliance of the contacts is not positive definite");
+        self.fill_matrix(p, false);
+        let regular = self.mobile() && cholesky_above(m, &mut self.matrix, REGULAR);
+        if !regular {
+            self.fill_matrix(p, true);
+            if !cholesky(m, &mut self.matrix) {
+                return Err("the compliance of the contacts is not positive definite");
+            }
         }
-        Ok(self.approach(p, t).0)
+        Ok(self.approach(p, t, regular).0)
+    }
+
+    /// Whether forces move all unknowns.
+    fn mobile(&self) -> bool {
+        !self.unknowns.iter().any(|i| self.epsilon[*i] == IMMOBILE_REGULARISATION)
+    }
+
+    /// Factorises what slips with its normal force: as it is (true), or with ε; none where it is singular.
+    fn factor_slipping(&mut self, p: &Problem) -> Option<bool> {
+        let (n, m) = (p.gap.len(), self.unknowns.len());
+        if self.mobile() {
+            self.fill_matrix(p, false);
+            let factored = lu(m, &mut self.matrix, &mut self.order);
+            let pivots = (0..m).map(|j| self.matrix[j * m + j].abs());
+            let mut pairs = pivots.zip(&self.unknowns);
+            if factored && pairs.all(|(pivot, i)| pivot > REGULAR * p.g[i * n + i]) {
+                return Some(true);
+            }
+        }
+        self.fill_matrix(p, true);
+        lu(m, &mut self.matrix, &mut self.order).then_some(false)
     }
 
     /// Lists what slips in proportion to a normal force that is unknown: component, unknown, ratio.
@@ -223,14 +315,15 @@ impl Estimator {
         }
     }
 
-    /// G + ε of the unknowns, with what slips along.
-    fn fill_matrix(&mut self, p: &Problem) {
+    /// G of the unknowns, or G + ε, with what slips along.
+    fn fill_matrix(&mut self, p: &Problem, regularised: bool) {
         let (n, m) = (p.gap.len(), self.unknowns.len());
         self.matrix.clear();
-        for c in &self.unknowns {
-            let column =
-                self.unknowns.iter().map(|r| p.g[c * n + r] + if r == c { self.epsilon[*c] } else { 0.0 });
-            self.matrix.extend(column);
+        for (k, c) in self.unknowns.iter().enumerate() {
+            self.matrix.extend(self.unknowns.iter().map(|r| p.g[c * n + r]));
+            if regularised {
+                self.matrix[k * m + k] += self.epsilon[*c];
+            }
         }
         for (i, normal, ratio) in &self.slipping {
             let column = &mut self.matrix[normal * m..(normal + 1) * m];
@@ -238,9 +331,11 @@ impl Estimator {
         }
     }
 
-    /// Proximal steps with the factor at hand; whether T stays bounded, and whether it has arrived.
-    fn approach(&mut self, p: &Problem, t: &mut [f64]) -> (bool, bool) {
+    /// Proximal steps with the factor at hand, or the solution and a step that refines it where the factor is that of G
+    /// itself; whether T stays bounded, and whether it has arrived.
+    fn approach(&mut self, p: &Problem, t: &mut [f64], regular: bool) -> (bool, bool) {
         let m = self.unknowns.len();
+        let least = if regular { 1 } else { PROXIMAL_MIN };
         let (mut converged, mut change, mut size) = (true, f64::INFINITY, 0.0);
         for step in 0..PROXIMAL_MAX {
             // In increments: (G + ε)·dT = −(x_free + G·T − x2), exact to rounding at any size of T.
@@ -254,14 +349,13 @@ impl Estimator {
             }
             self.unknowns.iter().zip(&self.rhs).for_each(|(i, d)| t[*i] += d);
             self.slipping.iter().for_each(|(i, normal, ratio)| t[*i] = ratio * t[self.unknowns[*normal]]);
-            let largest = |v: &mut dyn Iterator<Item = f64>| v.fold(0.0_f64, |a, x| a.max(x.abs()));
-            change = largest(&mut self.rhs.iter().copied());
-            size = largest(&mut t.iter().copied());
+            change = largest(self.rhs.iter().copied());
+            size = largest(t.iter().copied());
             // what rigid motors hold alone grows until their bounds decide in the next round
             let mobile = |(k, _): &(usize, &f64)| self.epsilon[self.unknowns[*k]] != IMMOBILE_REGULARISATION;
-            let growth = largest(&mut self.rhs.iter().enumerate().filter(mobile).map(|(_, x)| *x));
+            let growth = largest(self.rhs.iter().enumerate().filter(mobile).map(|(_, x)| *x));
             converged = growth <= GROWS * size;
-            if step >= PROXIMAL_MIN && change <= PROXIMAL_CHANGE * size {
+            if step >= least && change <= PROXIMAL_CHANGE * size {
                 break;
             }
         }
@@ -270,22 +364,23 @@ impl Estimator {
 
     /// Opens, closes, clips; true when something changed noticeably.
     fn change_status(&mut self, p: &Problem, t: &mut [f64]) -> bool {
-        let size = t.iter().fold(0.0_f64, |a, x| a.max(x.abs()));
+        let size = largest(t.iter().copied());
         let mut changed = false;
-        for port in p.ports {
+        for (k, port) in p.ports.iter().enumerate() {
             let first = port.first as usize;
             if unilateral(port) {
                 let open = self.status[first] == Status::Open;
                 if !open && t[first] < 0.0 {
                     self.status[port.range()].fill(Status::Open);
                     t[port.range()].fill(0.0);
+                    self.closings[k] = self.closings[k].max(1);
                     changed = true;
                     continue;
                 }
                 if open {
                     let diagonal = p.g[first * p.gap.len() + first];
-                    if residual(p, t, first) < -1e-9 * diagonal * size {
-                        self.status[port.range()].fill(Status::Held);
+                    if residual(p, t, first) < -NOTICED * diagonal * size {
+                        self.close(p, k, t);
                         changed = true;
                     }
                     continue;
@@ -294,6 +389,27 @@ impl Estimator {
             }
         }
         changed
+    }
+
+    /// Closes a port: it sticks, but where it has opened within this step, because it cannot stick and press, it slips.
+    fn close(&mut self, p: &Problem, k: usize, t: &mut [f64]) {
+        let port = &p.ports[k];
+        self.status[port.range()].fill(Status::Held);
+        if self.closings[k] == 0 {
+            return;
+        }
+        self.closings[k] += 1;
+        relax_port(p, port, t);
+        for (mask, bound) in bounds(port, t) {
+            let of = move |c: &(usize, usize)| mask & (1 << c.1) != 0;
+            let size = port.components().filter(of).map(|(i, _)| t[i] * t[i]).sum::<f64>().sqrt();
+            if size > 0.0 && bound.is_finite() {
+                for (i, _) in port.components().filter(of) {
+                    t[i] *= bound / size;
+                    self.status[i] = Status::Slipping;
+                }
+            }
+        }
     }
 
     /// Puts the tangential force and the moments of a closed port within their bounds.
@@ -405,7 +521,89 @@ fn residuals(p: &Problem, t: &[f64], out: &mut Vec<f64>) {
     out.clear();
     out.resize(p.gap.len(), -0.0);
     for (column, t) in p.g.chunks_exact(p.gap.len().max(1)).zip(t) {
-        out.iter_mut().zip(column).for_each(|(o, g)| *o += g * t);
+        if *t != 0.0 {
+            out.iter_mut().zip(column).for_each(|(o, g)| *o += g * t);
+        }
     }
     out.iter_mut().zip(p.gap).for_each(|(o, gap)| *o += gap);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use terraglue_subsystem::{Law, component};
+
+    /// Ports of three forces each, one after the other.
+    fn ports(count: u32, mu: f64) -> Vec<Port> {
+        let law = Law { mu, ..Law::UNILATERAL };
+        let port = |k: u32| Port {
+            key: u64::from(k),
+            kind: 0,
+            side: 1,
+            mask: component::FORCE,
+            first: 3 * k,
+            body: k,
+            shape: k,
+            first_node: 0,
+            node_count: 0,
+            origin: [0.0; 3],
+            frame: [1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0],
+            extent: [0.0; 2],
+            law,
+        };
+        (0..count).map(port).collect()
+    }
+
+    fn solved(ports: &[Port], g: &[f64], gap: &[f64]) -> (bool, Vec<f64>) {
+        let mut t = vec![0.0; gap.len()];
+        let unique = Estimator::default().solve(&Problem { ports, g, gap }, &mut t).expect("solvable");
+        (unique, t)
+    }
+
+    /// To stick, the foot would have to pull at the ground; left open, it would enter it.
+    #[test]
+    fn a_foot_that_cannot_stick_and_press_slips() {
+        let g = [1.0, 0.9, 0.0, 0.9, 1.0, 0.0, 0.0, 0.0, 1.0];
+        let (unique, t) = solved(&ports(1, 0.5), &g, &[-0.1, -1.0, 0.0]);
+        assert!(unique, "the rounds have an end");
+        let normal = 0.1 / 1.45;
+        for (t, right) in t.iter().zip([normal, 0.5 * normal, 0.0]) {
+            assert!((t - right).abs() < 1e-14, "{t} {right}");
+        }
+    }
+
+    /// Numbers from 0 to 1, the same in every run.
+    fn numbers() -> impl FnMut() -> f64 {
+        let mut state = 1_u64;
+        move || {
+            state = state.wrapping_mul(6_364_136_223_846_793_005).wrapping_add(1_442_695_040_888_963_407);
+            (state >> 11) as f64 / (1_u64 << 53) as f64
+        }
+    }
+
+    #[test]
+    fn feet_press_or_stay_open_and_stay_within_friction() {
+        let (mut next, mut ended) = (numbers(), 0);
+        for _ in 0..400 {
+            let n = 12;
+            let a: Vec<f64> = (0..n * n).map(|_| next() - 0.5).collect();
+            let mut g = vec![0.0; n * n];
+            for (i, j) in (0..n).flat_map(|i| (0..n).map(move |j| (i, j))) {
+                let product: f64 = (0..n).map(|k| a[k * n + i] * a[k * n + j]).sum();
+                g[j * n + i] = 0.2 * product + if i == j { 1.0 } else { 0.0 };
+            }
+            let gap: Vec<f64> = (0..n).map(|i| next() - if i % 3 == 0 { 0.7 } else { 0.5 }).collect();
+            let list = ports(4, 0.6);
+            let (unique, t) = solved(&list, &g, &gap);
+            ended += u32::from(unique);
+            let p = Problem { ports: &list, g: &g, gap: &gap };
+            for first in (0..n).step_by(3) {
+                let sideways = (t[first + 1].powi(2) + t[first + 2].powi(2)).sqrt();
+                assert!(t[first] >= 0.0 && sideways <= 0.6 * t[first] * (1.0 + 1e-12) + 1e-15);
+                let open = residual(&p, &t, first);
+                assert!(open > -1e-8 && (t[first] == 0.0 || open.abs() < 1e-8), "{open} {}", t[first]);
+            }
+        }
+        assert!(ended >= 399, "{ended} of 400 without sweeps");
+    }
 }

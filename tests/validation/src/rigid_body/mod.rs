@@ -5,7 +5,7 @@ mod fixture;
 mod peers;
 mod solver;
 
-pub use peers::comparison;
+pub use peers::{comparison, mujoco_gait};
 
 use super::Part;
 

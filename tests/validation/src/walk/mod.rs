@@ -3,6 +3,7 @@
 
 mod picture;
 mod prints;
+pub mod speed;
 
 pub use picture::write_picture;
 use terraglue_numerics::extremes::larger;

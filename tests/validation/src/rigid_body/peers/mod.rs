@@ -22,13 +22,18 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
         return Ok(Vec::new());
     }
     let engines: [(&str, &str, Make); 2] =
-        [("mujoco", "MuJoCo", mujoco::command), ("rapier", "Rapier", rapier::command)];
+        [("mujoco", "MuJoCo", || mujoco::command(&[])), ("rapier", "Rapier", rapier::command)];
     let measured = |(id, name, command): (&str, &str, Make)| {
         let id = format!("rigid-body.peer.{id}");
         let figures = command().and_then(|mut c| measure(&mut c, &id, name));
         figures.unwrap_or_else(|why| vec![Figure::skipped(id, why)])
     };
     Ok(engines.into_iter().flat_map(measured).collect())
+}
+
+/// What MuJoCo's steps of the walking hexapod on rigid ground cost.
+pub fn mujoco_gait() -> Outcome<Vec<Figure>> {
+    measure(&mut mujoco::command(&["gait"])?, "rigid-body.peer.mujoco", "MuJoCo")
 }
 
 /// Runs a peer that prints lines `name<TAB>value<TAB>what`.

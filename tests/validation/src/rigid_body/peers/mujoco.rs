@@ -7,10 +7,11 @@ use std::process::{Command, Stdio};
 
 const SCRIPT: &str = "tests/validation/src/rigid_body/peers/peer_mujoco.py";
 
-/// What measures it.
-pub fn command() -> Outcome<Command> {
+/// What measures it; `parts`: none but these.
+pub fn command(parts: &[&str]) -> Outcome<Command> {
     let folder = reference("").display().to_string();
     let mut command = start(python()?, &[&root().join(SCRIPT).display().to_string(), &folder]);
+    command.args(parts);
     // it leaves a log where it runs
     command.current_dir(target().join("peers"));
     Ok(command)

@@ -1,6 +1,6 @@
 """MuJoCo on the cases of `cargo xtask validate rigid-body`: one line per figure, `name<TAB>value<TAB>what`.
 
-Usage: peer_mujoco.py REFERENCE_FOLDER. Step 1 ms, default (soft) contacts, and contacts as stiff as the step admits.
+Usage: peer_mujoco.py REFERENCE_FOLDER [gait]; `gait`: the walking hexapod alone. Step 1 ms, default (soft) contacts, and contacts as stiff as the step admits.
 Passive motion with both of its integrators, Euler and RK4.
 """
 
@@ -170,6 +170,8 @@ def main():
     figure("version", int("".join(f"{int(part):03d}" for part in mujoco.__version__.split(".")[:3])), mujoco.__version__)
     walk(xml, rows, "soft")
     walk(xml.replace("<worldbody>", STIFF + "<worldbody>", 1), rows, "stiff_contacts")
+    if "gait" in sys.argv[2:]:
+        return
     model, data = incline(20)
     run(model, data, 5.0)
     before = data.qpos[0]

@@ -17,6 +17,7 @@ use terraglue_host::{Instance, Reply, TeardownErrors};
 use terraglue_subsystem::Energy;
 
 mod build;
+mod checks;
 mod explain;
 mod glued;
 mod group;

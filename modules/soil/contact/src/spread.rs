@@ -79,7 +79,7 @@ impl Spread {
     pub fn look(&self, depth: f64, top: f64) -> Option<Look> {
         let deepest = depth + self.low;
         let inside = deepest - top;
-        if inside >= self.range {
+        if inside >= self.range || self.range <= 0.0 {
             let at = GAUSS.map(|g| deepest - self.height(g).0);
             return Some(Look { depth: at, part: [1.0, 0.0], change: [1.0; 2] });
         }

@@ -19,6 +19,9 @@ pub(crate) enum Outline {
     Sampled,
 }
 
+/// Slopes below are level: which way rounding inclines them must not be seen.
+const LEVEL: f64 = 1e-9;
+
 /// Whether the underside, which is at `point` above node (i, j), comes nearer to the surface than `margin` above one of the next nodes
 /// on its way down.
 pub(crate) fn reaches_beside<S: Surface + ?Sized>(
@@ -30,7 +33,7 @@ pub(crate) fn reaches_beside<S: Surface + ?Sized>(
 ) -> bool {
     let lattice = surface.lattice();
     let slope = shape.underside_slope(point);
-    let [a, b] = slope.map(|s| if s > 0.0 { -1 } else { i32::from(s < 0.0) });
+    let [a, b] = slope.map(|s| if s > LEVEL { -1 } else { i32::from(s < -LEVEL) });
     [[a, 0], [0, b], [a, b]].iter().any(|[di, dj]| {
         if (*di, *dj) == (0, 0) || !lattice.has(i + di, j + dj) {
             return false;

@@ -1,7 +1,8 @@
 //! Wrench and stiffness of a patch at a motion of its foot.
 
 use crate::bound::Bound;
-use crate::patch::{Facing, Local, Patches};
+use crate::patch::{Local, Patches};
+use crate::patch_nodes::Facing;
 use crate::wall;
 use terraglue_soil_law::ShearResponse;
 use terraglue_subsystem::Result;

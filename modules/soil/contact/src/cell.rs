@@ -6,7 +6,7 @@
 //! envelope it is where the body is convex: exactly for flat faces that meet in an edge; and bent by the change of the slopes where
 //! it is round.
 
-use crate::patch::{Facing, PatchNodes};
+use crate::patch_nodes::{Facing, PatchNodes};
 use crate::spread::Spread;
 use crate::wall::Rows;
 use terraglue_ground::STEEPEST_SLOPE;

@@ -8,7 +8,7 @@
 
 use crate::assemble::Stiffness;
 use crate::contact_memory::Remembered;
-use crate::patch::PatchNodes;
+use crate::patch_nodes::PatchNodes;
 use std::f64::consts::{FRAC_PI_3, PI};
 
 /// The cone under one contact as of the last commit. Part of the committed state.

@@ -1,6 +1,7 @@
 //! What is told of each wheel and foot: numbers of the last commit, one set per contact.
 
-use crate::patch::{Patch, PatchNodes};
+use crate::patch::Patch;
+use crate::patch_nodes::PatchNodes;
 use crate::wheel::Wheel;
 use terraglue_subsystem::{Causality, Variable};
 

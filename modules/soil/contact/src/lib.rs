@@ -30,6 +30,7 @@ mod mask;
 mod nodes;
 mod normal;
 mod patch;
+mod patch_nodes;
 mod size;
 mod soil;
 mod spread;

@@ -1,6 +1,6 @@
 //! The size of a contact: b of the pressure law.
 
-use crate::patch::PatchNodes;
+use crate::patch_nodes::PatchNodes;
 
 /// Area of a contact and its second moments.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

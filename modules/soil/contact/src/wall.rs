@@ -7,7 +7,7 @@
 
 use crate::assemble::{displacement, dot};
 use crate::contact_memory::Remembered;
-use crate::patch::PatchNodes;
+use crate::patch_nodes::PatchNodes;
 use terraglue_ground::Lattice;
 use terraglue_subsystem::{Port, Result};
 

@@ -5,7 +5,7 @@
 //! a sphere, which is round in both directions, do not roll.
 
 use crate::contact_memory::Remembered;
-use crate::patch::PatchNodes;
+use crate::patch_nodes::PatchNodes;
 use terraglue_soil_law::Rolling;
 
 /// Largest squared distance of nodes from the circle over their squared distance from the lowest line.
@@ -248,7 +248,7 @@ terraglue_subsystem::persist!(Memory { key, slip, forward, radius, heading });
 mod tests {
     use super::*;
     use crate::contact_memory::recall;
-    use crate::patch::Facing;
+    use crate::patch_nodes::Facing;
 
     const RADIUS: f64 = 0.15;
 

@@ -102,7 +102,7 @@ impl Patches {
     }
 }
 
-impl crate::patch::PatchNodes {
+impl crate::patch_nodes::PatchNodes {
     /// Depth z (m) of the foot at node k below the top of the loose soil that lay on the bed; `None`: there was none.
     #[inline]
     pub fn above_bed(&self, k: usize, z: f64) -> Option<f64> {

@@ -1,0 +1,195 @@
+//! The nodes below contacts: per node depth, area, history, how the underside faces the soil; one array per quantity.
+
+use crate::assemble::dot;
+use crate::spread::Spread;
+use terraglue_soil_law::ShearState;
+use terraglue_subsystem::Port;
+
+/// How the underside faces the soil at a node; vectors along n, t1, t2.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Facing {
+    /// ν·n_z/ν_z with the body's inward normal ν: pressure·area acts along it on the body, and a displacement d of
+    /// the body changes the depth by −press·d, so that the force does the work that the soil takes up.
+    pub press: [f64; 3],
+    /// Unit vectors in the underside: t1 and t2 turned with n onto ν.
+    pub along: [[f64; 3]; 2],
+    /// Area of the underside over that in the tangent plane: |press|, or more where faces meet in the cell.
+    pub stretch: f64,
+}
+
+/// Smallest part of `press` along n: an underside that looks away from the soil is met edgewise.
+const EDGEWISE: f64 = 0.05;
+
+impl Facing {
+    /// Of an underside with the slopes ∂z/∂x and ∂z/∂y.
+    pub fn new(port: &Port, slope: [f64; 2]) -> Self {
+        let n_z = port.frame[2];
+        let inward = [-slope[0] * n_z, -slope[1] * n_z, n_z];
+        let mut press: [f64; 3] = std::array::from_fn(|c| dot(port.direction(c), inward));
+        press[0] = press[0].max(EDGEWISE);
+        let stretch = dot(press, press).sqrt();
+        let nu = press.map(|c| c / stretch);
+        let turned = |c: usize| {
+            let s = nu[c] / (1.0 + nu[0]);
+            let mut e = [-s * (1.0 + nu[0]), -s * nu[1], -s * nu[2]];
+            e[c] += 1.0;
+            e
+        };
+        Self { press, along: [turned(1), turned(2)], stretch }
+    }
+
+    /// Inward unit normal along n, t1, t2.
+    #[inline]
+    pub fn inward(&self) -> [f64; 3] {
+        let length = dot(self.press, self.press).sqrt();
+        self.press.map(|c| c / length)
+    }
+
+    /// Displacement along the underside.
+    #[inline]
+    pub fn slide(&self, moved: [f64; 3]) -> [f64; 2] {
+        self.along.map(|e| dot(e, moved))
+    }
+}
+
+/// The nodes of all patches, one array per quantity.
+#[derive(Clone, Debug, Default)]
+pub struct PatchNodes {
+    /// Lattice indices.
+    pub index: Vec<[i32; 2]>,
+    /// World height of the underside at the node at X = 0, m.
+    pub lower: Vec<f64>,
+    /// Its slopes there.
+    pub slope: Vec<[f64; 2]>,
+    /// Mean depth of the underside in the cell below the reference level of the bed along n at X = 0, m.
+    pub depth: Vec<f64>,
+    /// How the depths in the cell lie about it.
+    pub spread: Vec<Spread>,
+    /// Mean depth of the underside along n up to which the node carries nothing, m: of the unloaded surface where the cell is in the
+    /// soil as a whole.
+    pub permanent: Vec<f64>,
+    /// Depth of the bed's surface along n when the contact began, m.
+    pub bed: Vec<f64>,
+    /// Height of the loose soil on it then, along n, m.
+    pub loose: Vec<f64>,
+    /// Half the range of depths of the print that lay there then, along n, m.
+    pub print: Vec<f64>,
+    /// Part of the pressure of first loading that the soil bears here.
+    pub share: Vec<f64>,
+    /// Passive pressure that it bears beside, a + b·z: Pa and Pa/m.
+    pub passive: Vec<[f64; 2]>,
+    /// Pressure up to which the node is elastic wherever it is, Pa; −∞: it yields at X = 0.
+    pub bound: Vec<f64>,
+    /// Pressure at the last commit, Pa.
+    pub before: Vec<f64>,
+    /// Whether the foot has come over the node from the side, deeper than its surface.
+    pub entered: Vec<bool>,
+    /// How much deeper than `depth` the underside lies, m: behind the peak of a wheel's stress; NaN elsewhere.
+    pub relief: Vec<f64>,
+    /// Area in the tangent plane, m²; 0 where another port presses deeper.
+    pub area: Vec<f64>,
+    /// Part of the area that was loaded at the last commit.
+    pub loaded_part: Vec<f64>,
+    /// From the port's origin to the underside at the node along n, t1, t2, m.
+    pub arm: Vec<[f64; 3]>,
+    /// How the underside faces the soil.
+    pub facing: Vec<Facing>,
+    /// Which of [`Patches::laws`] holds at the node.
+    pub law: Vec<usize>,
+    /// Shear history.
+    pub shear: Vec<ShearState>,
+    /// Doubles per node that a law keeps, and their values, node after node.
+    pub doubles: usize,
+    /// See `doubles`.
+    pub memory: Vec<f64>,
+    /// Share of the shear strength that the slip so far has mobilised.
+    pub mobilised: Vec<f64>,
+    /// Reference level, world, m.
+    pub reference: Vec<f64>,
+    /// Number of the commit at which the node was last loaded; 0: no foot stood here.
+    pub stamp: Vec<u64>,
+    /// Depth with the rotation of a trial; scratch.
+    pub turned: Vec<f64>,
+}
+
+impl PatchNodes {
+    /// Shear stress on the soil at node k at the last commit, Pa, turned from the underside into the plane of t1 and t2;
+    /// `stiffness`: of the shear law, Pa/m.
+    #[inline]
+    pub fn shear_stress(&self, k: usize, stiffness: f64) -> [f64; 2] {
+        let (e, along) = (self.shear[k].elastic, &self.facing[k].along);
+        let flat = [1, 2].map(|c| e[0] * along[0][c] + e[1] * along[1][c]);
+        let (all, in_plane) = (e[0] * e[0] + e[1] * e[1], flat[0] * flat[0] + flat[1] * flat[1]);
+        let scale = if in_plane > 0.0 { stiffness * (all / in_plane).sqrt() } else { 0.0 };
+        flat.map(|c| scale * c)
+    }
+
+    /// Forgets all nodes; keeps the room.
+    pub fn clear(&mut self) {
+        self.index.clear();
+        self.lower.clear();
+        self.slope.clear();
+        self.depth.clear();
+        self.spread.clear();
+        self.permanent.clear();
+        self.bed.clear();
+        self.loose.clear();
+        self.print.clear();
+        self.share.clear();
+        self.passive.clear();
+        self.bound.clear();
+        self.before.clear();
+        self.entered.clear();
+        self.relief.clear();
+        self.area.clear();
+        self.loaded_part.clear();
+        self.arm.clear();
+        self.law.clear();
+        self.shear.clear();
+        self.memory.clear();
+        self.mobilised.clear();
+        self.reference.clear();
+        self.stamp.clear();
+        self.facing.clear();
+    }
+
+    /// What a law keeps of node k.
+    #[inline]
+    pub fn kept(&self, k: usize) -> &[f64] {
+        &self.memory[k * self.doubles..(k + 1) * self.doubles]
+    }
+
+    /// Room for `count` nodes, so that later steps do not allocate.
+    pub fn reserve(&mut self, count: usize) {
+        self.memory.reserve(count * self.doubles);
+        self.index.reserve(count);
+        self.arm.reserve(count);
+        self.law.reserve(count);
+        self.shear.reserve(count);
+        self.passive.reserve(count);
+        self.entered.reserve(count);
+        self.stamp.reserve(count);
+        self.facing.reserve(count);
+        self.slope.reserve(count);
+        self.spread.reserve(count);
+        for v in [
+            &mut self.mobilised,
+            &mut self.reference,
+            &mut self.lower,
+            &mut self.depth,
+            &mut self.permanent,
+            &mut self.bed,
+            &mut self.loose,
+            &mut self.print,
+            &mut self.share,
+            &mut self.bound,
+            &mut self.before,
+            &mut self.relief,
+            &mut self.area,
+            &mut self.loaded_part,
+            &mut self.turned,
+        ] {
+            v.reserve(count);
+        }
+    }
+}

@@ -20,7 +20,7 @@ impl Size {
     pub fn of(nodes: &PatchNodes, range: std::ops::Range<usize>, spacing: f64) -> Self {
         let (mut area, mut mean, mut square) = (0.0, [0.0; 2], [0.0; 3]);
         for k in range {
-            let weight = nodes.area[k] * nodes.spread[k].part_below(nodes.depth[k], 0.0);
+            let weight = nodes.area[k] * below(nodes, k, spacing);
             let [_, x, y] = nodes.arm[k];
             area += weight;
             mean = [mean[0] + weight * x, mean[1] + weight * y];
@@ -51,4 +51,16 @@ impl Size {
         let largest = 0.5 * (xx + yy) + (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt();
         self.area / (12.0 * largest).max(self.area).sqrt()
     }
+}
+
+/// Part of the cell of node k that lies below the reference level. Where nothing is known of how its depths spread, as the slope of the
+/// underside has it: a cell must not come in all at once.
+fn below(nodes: &PatchNodes, k: usize, spacing: f64) -> f64 {
+    let (spread, depth) = (&nodes.spread[k], nodes.depth[k]);
+    if spread.range > 0.0 {
+        return spread.part_below(depth, 0.0);
+    }
+    let [_, a, b] = nodes.facing[k].press;
+    let falls = a.hypot(b) * spacing;
+    if 2.0 * depth.abs() >= falls { f64::from(u8::from(depth > 0.0)) } else { 0.5 + depth / falls }
 }

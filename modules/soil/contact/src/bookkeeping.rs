@@ -243,6 +243,10 @@ impl Scene<'_> {
                 turnover.work -= dot(self.patches.node_force(k, pressure, [0.0; 2]), moved);
                 self.cling(k, pressure, ground, lists, ledger, &mut turnover);
             }
+            if n.stamp[k] != 0 && pressure == 0.0 && n.spread[k].reaches(depth, n.top(k)) {
+                hold(ground.enter(i, j), lists, ledger.stamp, &mut turnover);
+                lists.loaded.push([i, j]);
+            }
             lists.covered.push(covered);
         }
         if loaded > 0 {
@@ -373,7 +377,9 @@ impl Scene<'_> {
         state.area = n.area[k];
         let above = n.spread[k].above(depth, n.top(k));
         (state.permanent, state.above) = ((permanent + above) / patch.slope, above / patch.slope);
-        state.half = n.spread[k].whole;
+        let printed = n.spread[k].printed(depth, n.top(k));
+        let before = if n.stamp[k] != 0 { state.half } else { 0.0 };
+        state.half = printed.max(before).min(n.spread[k].whole);
         (state.pressure, state.shear, state.energy) = (pressure, shear.state, energy);
         if depth <= n.bed[k] {
             // loose soil slides along with the foot: the bed below has not been sheared
@@ -483,6 +489,15 @@ impl Scene<'_> {
         turnover.heat += area * (shear.dissipated + damped);
         area * law.elastic_energy(&shear.state)
     }
+}
+
+/// A node that carries nothing any more, of which the underside still reaches below the surface that it met: it stays in its print, where
+/// it will carry again as deep as before. What the soil held becomes heat.
+fn hold(state: &mut NodeState, lists: &mut Lists, stamp: u64, turnover: &mut Turnover) {
+    turnover.heat += state.energy;
+    (state.pressure, state.shear, state.energy, state.stamp) = (0.0, ShearState::default(), 0.0, stamp);
+    lists.slid_in.push(false);
+    lists.slid.push([0.0; 2]);
 }
 
 /// Whether a law answers for unloading itself.

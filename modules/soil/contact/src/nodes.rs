@@ -26,7 +26,7 @@ pub struct NodeState {
     /// By how much `permanent` exceeds the depth up to which the foot carries nothing, m, vertical, see
     /// [`crate::spread::Spread::above`]; 0 where no foot stands.
     pub above: f64,
-    /// Half the range of the depths of the underside in the cell at the last commit, m, vertical; 0 where no foot stands.
+    /// Half the range of the depths that the foot has printed into the cell so far, m, vertical; 0 where no foot stands.
     pub half: f64,
     /// The same of the print that lies here, or lay here when the present contact began.
     pub print: f64,
@@ -274,9 +274,11 @@ impl NodeStates {
             self.list(tile, k, place);
         }
         self.unlist(tile, k);
-        let remainder = state.reference - state.permanent - height;
-        let loose = state.loose_left();
-        self.keep(tile, k, Kept::new(state.permanent + loose, remainder, loose, state.half));
+        let (above, left) = (height - (state.reference - state.permanent), state.loose_left());
+        // what has flowed into a print under a foot that carried nothing lies loose
+        let flowed = if state.pressure > 0.0 { 0.0 } else { ((above / UNIT_M).round() * UNIT_M).max(0.0) };
+        let kept = Kept::new(state.permanent + left, flowed - above, left + flowed, state.half);
+        self.keep(tile, k, kept);
     }
 
     fn keep(&mut self, tile: usize, k: usize, kept: Kept) {

@@ -336,7 +336,8 @@ impl Patches {
             }
             let n = &self.nodes;
             let (depth, before) = (n.depth[k], n.before[k]);
-            let follows = before > 0.0 && depth - n.permanent[k] > 0.5 * before / k_u;
+            let touched = n.stamp[k] != 0 && before >= 0.0;
+            let follows = touched && depth - n.permanent[k] > 0.5 * before / k_u;
             let permanent = if follows { depth - before / k_u } else { n.permanent[k] };
             self.nodes.permanent[k] = permanent;
             if depth <= permanent {

@@ -73,6 +73,19 @@ impl Spread {
         s * inside.max(0.0) - lifted - inside.max(0.0) + self.low
     }
 
+    /// Whether some of an underside that spreads, at the mean depth `depth`, lies deeper than `top` (m).
+    pub fn reaches(&self, depth: f64, top: f64) -> bool {
+        self.range > 0.0 && depth + self.low > top
+    }
+
+    /// Half the range of the depths that an underside at the mean depth `depth` leaves in soil whose surface was at `top` (m), vertical, m:
+    /// of a cell that only a corner of it has touched, that corner's.
+    pub fn printed(&self, depth: f64, top: f64) -> f64 {
+        let share =
+            if self.range > 0.0 { ((depth - top + self.low) / self.range).clamp(0.0, 1.0) } else { 1.0 };
+        share * self.whole
+    }
+
     /// Where to look for the mean of a pressure over what lies deeper than `top` (m) of a cell at the mean depth `depth`; `None`: nothing
     /// does.
     #[inline]

@@ -17,7 +17,7 @@ const MOST_FLOORS: usize = 8;
 /// Most lines of source of a crate, tests included.
 const MOST_LINES: usize = 10_000;
 /// Crates above [`MOST_LINES`], with the most that they may have.
-const LARGER: [(&str, usize); 1] = [("terraglue-recording", 11_000)];
+const LARGER: [(&str, usize); 1] = [("terraglue-recording", 10_200)];
 
 /// A crate of the workspace.
 struct Room {

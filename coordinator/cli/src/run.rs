@@ -8,7 +8,7 @@ use super::pace::Pace;
 use super::progress::{self, Progress, Waiting};
 use super::recorder::SharedRecorder;
 use super::{Exit, exit_of, show, soil_module, strict};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 use std::time::Instant;
@@ -112,6 +112,11 @@ pub fn run(command: &RunCommand) -> Result<Exit> {
     if every_s.is_some() && outcome.summary.status == Status::Stopped && !arguments.quiet {
         eprintln!("`terraglue run --resume {}` goes on from here", folder.display());
     }
+    ended(report, &outcome, &folder)
+}
+
+/// How the program ends where the report was made, or not, or not wanted.
+fn ended(report: Result<Option<PathBuf>>, outcome: &Outcome, folder: &Path) -> Result<Exit> {
     match (report, &outcome.error) {
         (Err(missing), None) => Err(missing),
         (Err(_), Some(_)) if outcome.summary.steps == 0 => {

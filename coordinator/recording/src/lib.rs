@@ -66,6 +66,7 @@ pub mod compare;
 pub mod report;
 
 #[cfg(test)]
+#[path = "../tests/unit/mod.rs"]
 mod tests;
 
 pub use csv::{TimingRow, write_timing};

@@ -1,12 +1,12 @@
 //! Commit: the foot's motion becomes depths, slip and heat; the nodes that it left forget their contact.
 
-use crate::assemble::{displacement, dot};
 use crate::contact_memory::{self, Remembered};
 use crate::contacts::Touch;
 use crate::ground::{Covered, Ground};
 use crate::nodes::NodeState;
 use crate::patch::{Patch, Patches};
 use crate::patch_nodes::PatchNodes;
+use crate::vectors::{displacement, dot};
 use crate::wall;
 use terraglue_soil_law::{KeptNodes, PressureCurve, ShearResponse, ShearState};
 use terraglue_subsystem::{MOST_LAW_STATE, Port, Result};
@@ -217,11 +217,7 @@ impl Scene<'_> {
                 (None, None) => self.patches.pressure(k, depth)?.0,
             };
             let [i, j] = n.index[k];
-            let mean = (depth + relief(n, k)) / patch.slope;
-            let lower = n.reference[k] - mean;
-            let deep = mean + n.spread[k].below / patch.slope;
-            let (virgin, surface, flow) = (0.0, f64::NAN, [0.0; 2]);
-            let mut covered = Covered { i, j, lower, depth: deep.max(0.0), pressure, virgin, surface, flow };
+            let (mut covered, deep) = covered(n, k, [depth, pressure], patch.slope);
             if pressure > 0.0 {
                 loaded += 1;
                 lists.slid_in.push(n.entered[k] && patch.wheel.is_none());
@@ -244,8 +240,7 @@ impl Scene<'_> {
                 self.cling(k, pressure, ground, lists, ledger, &mut turnover);
             }
             if n.stamp[k] != 0 && pressure == 0.0 && n.spread[k].reaches(depth, n.top(k)) {
-                hold(ground.enter(i, j), lists, ledger.stamp, &mut turnover);
-                lists.loaded.push([i, j]);
+                hold([i, j], ground, lists, ledger.stamp, &mut turnover);
             }
             lists.covered.push(covered);
         }
@@ -493,9 +488,11 @@ impl Scene<'_> {
 
 /// A node that carries nothing any more, of which the underside still reaches below the surface that it met: it stays in its print, where
 /// it will carry again as deep as before. What the soil held becomes heat.
-fn hold(state: &mut NodeState, lists: &mut Lists, stamp: u64, turnover: &mut Turnover) {
+fn hold([i, j]: [i32; 2], ground: &mut Ground, lists: &mut Lists, stamp: u64, turnover: &mut Turnover) {
+    let state = ground.enter(i, j);
     turnover.heat += state.energy;
     (state.pressure, state.shear, state.energy, state.stamp) = (0.0, ShearState::default(), 0.0, stamp);
+    lists.loaded.push([i, j]);
     lists.slid_in.push(false);
     lists.slid.push([0.0; 2]);
 }
@@ -503,6 +500,15 @@ fn hold(state: &mut NodeState, lists: &mut Lists, stamp: u64, turnover: &mut Tur
 /// Whether a law answers for unloading itself.
 fn kept_by_law(curve: &PressureCurve) -> bool {
     curve.keeper().is_some()
+}
+
+/// Node k at the mean depth `depth` (m) under a pressure (Pa), of whose soil nothing is said yet, and the depth of the underside at the node, m, vertical.
+fn covered(n: &PatchNodes, k: usize, [depth, pressure]: [f64; 2], n_z: f64) -> (Covered, f64) {
+    let mean = (depth + relief(n, k)) / n_z;
+    let deep = mean + n.spread[k].below / n_z;
+    let (lower, [i, j]) = (n.reference[k] - mean, n.index[k]);
+    let (virgin, surface, flow) = (0.0, f64::NAN, [0.0; 2]);
+    (Covered { i, j, lower, depth: deep.max(0.0), pressure, virgin, surface, flow }, deep)
 }
 
 /// How much deeper than it counts node k lies, m.

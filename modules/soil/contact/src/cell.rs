@@ -6,9 +6,9 @@
 //! envelope it is where the body is convex: exactly for flat faces that meet in an edge; and bent by the change of the slopes where
 //! it is round.
 
-use crate::patch_nodes::{Facing, PatchNodes};
+use crate::patch_nodes::{Facing, PatchNodes, Plane};
+use crate::rows::Rows;
 use crate::spread::Spread;
-use crate::wall::Rows;
 use terraglue_ground::STEEPEST_SLOPE;
 use terraglue_subsystem::Port;
 
@@ -30,13 +30,6 @@ const BENT: f64 = 0.064_549_722_436_790_28;
 
 /// The same of z = κxy: √3/12.
 const TWISTED: f64 = 0.144_337_567_297_406_44;
-
-/// A plane over the cell of a node: height there (m) and slopes.
-#[derive(Clone, Copy, Debug)]
-struct Plane {
-    height: f64,
-    slope: [f64; 2],
-}
 
 impl Plane {
     /// That of a neighbour at `steps` cells of `spacing`, as seen from the node.
@@ -85,17 +78,13 @@ impl PatchNodes {
         self.bed[k] - self.loose[k]
     }
 
-    fn plane(&self, k: usize) -> Plane {
-        Plane { height: self.lower[k], slope: self.slope[k] }
-    }
-
     /// Takes the undersides of the nodes in `range`, which lie below `port` on a lattice of `spacing` (m), as they are in the mean over
     /// their cells. Flat ones stay as they are.
     pub fn fill_cells(&mut self, port: &Port, range: std::ops::Range<usize>, spacing: f64, rows: &mut Rows) {
         let n = [port.frame[0], port.frame[1], port.frame[2]];
         let ground = [-n[0] / n[2], -n[1] / n[2]];
         let level = |s: [f64; 2]| (s[0] - ground[0]).abs() + (s[1] - ground[1]).abs() < ALIKE;
-        if range.clone().all(|k| level(self.slope[k])) {
+        if range.clone().all(|k| level(self.plane[k].slope)) {
             return;
         }
         rows.list(self, range.clone());
@@ -107,7 +96,7 @@ impl PatchNodes {
             // of a cell that is covered in part the underside takes that part of the range
             let part = (self.area[k] * n[2] / (spacing * spacing)).min(1.0);
             let (half, below) = (part * (3.0 * cell.variance).sqrt() * n[2], cell.rise * n[2]);
-            let print = (self.print[k] - self.loose[k]).max(0.0);
+            let print = (self.spread[k].print - self.loose[k]).max(0.0);
             self.spread[k] = Spread::new(half, self.arm[k][0] + below - lowest, print);
             (self.spread[k].whole, self.spread[k].below) = (half / n[2], below);
             self.depth[k] -= below;
@@ -117,7 +106,7 @@ impl PatchNodes {
             for c in 0..3 {
                 self.arm[k][c] += cell.rise * port.direction(c)[2];
             }
-            if cell.slope != self.slope[k] {
+            if cell.slope != self.plane[k].slope {
                 self.facing[k] = Facing::new(port, cell.slope);
             }
             self.facing[k].stretch *= cell.steeper;
@@ -126,11 +115,11 @@ impl PatchNodes {
 
     /// `level`: height of the soil above the underside at node k when the contact began, m.
     fn underside(&self, k: usize, spacing: f64, ground: [f64; 2], level: f64, rows: &Rows) -> Underside {
-        let own = self.plane(k);
+        let own = self.plane[k];
         let [i, j] = self.index[k];
         let seen = |steps: &[i32; 2]| {
             let next = rows.find(self, [i + steps[0], j + steps[1]])?;
-            Some(self.plane(next).seen(*steps, spacing))
+            Some(self.plane[next].seen(*steps, spacing))
         };
         let beside = BESIDE.map(|steps| seen(&steps));
         let edges = beside.map(|plane| plane.and_then(|plane| over_border(&own, &plane, spacing)));

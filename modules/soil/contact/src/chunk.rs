@@ -1,8 +1,8 @@
 //! The nodes of a patch in chunks, for laws that answer many nodes at once: an expression, a module.
 
-use crate::assemble::{displacement, dot};
 use crate::patch::{Local, Patches};
 use crate::spread::Look;
+use crate::vectors::{displacement, dot};
 use terraglue_soil_law::{KeptNodes, ShearResponse, ShearState, Sheared, first_loading};
 use terraglue_subsystem::{MOST_LAW_STATE, Result};
 
@@ -121,9 +121,9 @@ impl Patches {
             }
         }
         let looks = &looks[..count];
-        let first = self.yields_together(law, nodes, looks, 0)?;
+        let first = yields_together(self, law, nodes, looks, 0)?;
         let spread = looks.iter().any(|(_, look)| look.depth[0] != look.depth[1]);
-        let second = if spread { self.yields_together(law, nodes, looks, 1)? } else { first };
+        let second = if spread { yields_together(self, law, nodes, looks, 1)? } else { first };
         for (c, (at, look)) in looks.iter().enumerate() {
             let yields = look.mean([first[c], second[c]]);
             if yields.0 < pressure[*at] {
@@ -131,36 +131,6 @@ impl Patches {
             }
         }
         Ok(())
-    }
-
-    /// Pressures and slopes at which nodes yield at the depth number `which` of their looks.
-    fn yields_together(
-        &self,
-        law: &Local,
-        nodes: &[usize],
-        looks: &[(usize, Look)],
-        which: usize,
-    ) -> Result<[(f64, f64); CHUNK]> {
-        let (n, count) = (&self.nodes, looks.len());
-        let [mut bed, mut bed_slope, mut top, mut loose, mut loose_slope, mut z] = [[0.0; CHUNK]; 6];
-        let mut covered = false;
-        for (c, (at, look)) in looks.iter().enumerate() {
-            let k = nodes[*at];
-            z[c] = look.depth[which];
-            top[c] = n.above_bed(k, z[c]).unwrap_or(0.0);
-            covered |= n.loose[k] > 0.0;
-        }
-        first_loading(&law.curve, &z[..count], &mut bed[..count], &mut bed_slope[..count])?;
-        if covered {
-            first_loading(&law.curve, &top[..count], &mut loose[..count], &mut loose_slope[..count])?;
-        }
-        let mut out = [(0.0, 0.0); CHUNK];
-        for (c, (at, _)) in looks.iter().enumerate() {
-            let k = nodes[*at];
-            let on_bed = (n.loose[k] > 0.0).then_some((loose[c], loose_slope[c]));
-            out[c] = self.yields_from(k, z[c], (bed[c], bed_slope[c]), on_bed, law);
-        }
-        Ok(out)
     }
 
     /// Pressures of a law that keeps a state; what it would keep after the step is dropped.
@@ -234,4 +204,34 @@ impl Patches {
             Ok(())
         })
     }
+}
+
+/// Pressures and slopes at which nodes yield at the depth number `which` of their looks.
+fn yields_together(
+    patches: &Patches,
+    law: &Local,
+    nodes: &[usize],
+    looks: &[(usize, Look)],
+    which: usize,
+) -> Result<[(f64, f64); CHUNK]> {
+    let (n, count) = (&patches.nodes, looks.len());
+    let [mut bed, mut bed_slope, mut top, mut loose, mut loose_slope, mut z] = [[0.0; CHUNK]; 6];
+    let mut covered = false;
+    for (c, (at, look)) in looks.iter().enumerate() {
+        let k = nodes[*at];
+        z[c] = look.depth[which];
+        top[c] = n.above_bed(k, z[c]).unwrap_or(0.0);
+        covered |= n.loose[k] > 0.0;
+    }
+    first_loading(&law.curve, &z[..count], &mut bed[..count], &mut bed_slope[..count])?;
+    if covered {
+        first_loading(&law.curve, &top[..count], &mut loose[..count], &mut loose_slope[..count])?;
+    }
+    let mut out = [(0.0, 0.0); CHUNK];
+    for (c, (at, _)) in looks.iter().enumerate() {
+        let k = nodes[*at];
+        let on_bed = (n.loose[k] > 0.0).then_some((loose[c], loose_slope[c]));
+        out[c] = patches.yields_from(k, z[c], (bed[c], bed_slope[c]), on_bed, law);
+    }
+    Ok(out)
 }

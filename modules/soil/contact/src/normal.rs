@@ -1,7 +1,7 @@
 //! The inverse of the normal law: how deep is the foot under a normal force?
 
-use crate::assemble::{displacement, dot};
 use crate::patch::Patches;
+use crate::vectors::{displacement, dot};
 use terraglue_subsystem::Result;
 
 /// A node that clings to a foot: it lets go at the shift `end` (m); up to there its normal force is `stiffness`·shift −

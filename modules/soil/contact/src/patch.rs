@@ -7,10 +7,11 @@ use crate::cone::{self, Cone};
 use crate::contact_memory::recall;
 use crate::ground::Ground;
 use crate::normal::Clinging;
-use crate::patch_nodes::{Facing, PatchNodes};
+use crate::patch_nodes::{Facing, PatchNodes, Plane};
+use crate::rows::Rows;
 use crate::size::Size;
 use crate::spread::Spread;
-use crate::wall::{self, Beside, Rows, Side, Wall};
+use crate::wall::{self, Beside, Side, Wall};
 use crate::wheel::{Shift, Wheel};
 use terraglue_soil_law::strength::{Inclination, slope_factor};
 use terraglue_soil_law::{Direction, PluginLaw, PressureCurve, PressureLaw, Rolling, ShearLaw};
@@ -225,20 +226,7 @@ impl Patches {
             };
             let mut rows = std::mem::take(&mut self.rows);
             let mut sides = std::mem::take(&mut self.sides);
-            let pressed = |k: usize| {
-                if self.law(k).curve.keeper().is_some() {
-                    // what a law with a state would yield at is its own affair
-                    return Ok(if self.nodes.before[k] > 0.0 { 1.0 } else { 0.0 });
-                }
-                let (p, yields) = (self.pressure(k, self.nodes.depth[k])?.0, self.nodes.bound[k]);
-                Ok(if p <= 0.0 {
-                    0.0
-                } else if yields > p {
-                    p / yields
-                } else {
-                    1.0
-                })
-            };
+            let pressed = |k: usize| yielded(self, k);
             let gathered =
                 wall::gather(&self.nodes, range.clone(), &beside, pressed, &mut rows, &mut sides, &mut wall);
             (self.rows, self.sides) = (rows, sides);
@@ -451,14 +439,12 @@ impl Patches {
         nodes.index.push([node.i, node.j]);
         nodes.reference.push(reference);
         nodes.stamp.push(state.stamp);
-        nodes.lower.push(node.lower);
-        nodes.slope.push(node.slope);
+        nodes.plane.push(Plane { height: node.lower, slope: node.slope });
         nodes.depth.push((reference - node.lower) * n_z);
-        nodes.spread.push(Spread::default());
+        nodes.spread.push(Spread::over(state.print * n_z));
         nodes.permanent.push((state.permanent - state.above) * n_z);
         nodes.bed.push(state.bed * n_z);
         nodes.loose.push(state.loose * n_z);
-        nodes.print.push(state.print * n_z);
         nodes.share.push(1.0);
         nodes.passive.push([0.0; 2]);
         nodes.bound.push(f64::NEG_INFINITY);
@@ -510,6 +496,22 @@ impl Patches {
         let loaded = self.ports[p].nodes.clone().filter(|k| n.area[*k] > 0.0);
         loaded.fold(f64::NEG_INFINITY, |h, k| h.max((n.depth[k] - n.permanent[k]) / n.facing[k].press[0]))
     }
+}
+
+/// Pressure at node k over that at which it yields.
+fn yielded(patches: &Patches, k: usize) -> Result<f64> {
+    if patches.law(k).curve.keeper().is_some() {
+        // what a law with a state would yield at is its own affair
+        return Ok(if patches.nodes.before[k] > 0.0 { 1.0 } else { 0.0 });
+    }
+    let (p, yields) = (patches.pressure(k, patches.nodes.depth[k])?.0, patches.nodes.bound[k]);
+    Ok(if p <= 0.0 {
+        0.0
+    } else if yields > p {
+        p / yields
+    } else {
+        1.0
+    })
 }
 
 /// By how much a body that stands in its own print at the start presses it, m: just so that it touches.

@@ -1,7 +1,7 @@
 //! The nodes below contacts: per node depth, area, history, how the underside faces the soil; one array per quantity.
 
-use crate::assemble::dot;
 use crate::spread::Spread;
+use crate::vectors::dot;
 use terraglue_soil_law::ShearState;
 use terraglue_subsystem::Port;
 
@@ -52,15 +52,22 @@ impl Facing {
     }
 }
 
+/// A plane over the cell of a node: height there (world, m) and slopes.
+#[derive(Clone, Copy, Debug)]
+pub struct Plane {
+    /// Height at the node, m.
+    pub height: f64,
+    /// ∂z/∂x and ∂z/∂y.
+    pub slope: [f64; 2],
+}
+
 /// The nodes of all patches, one array per quantity.
 #[derive(Clone, Debug, Default)]
 pub struct PatchNodes {
     /// Lattice indices.
     pub index: Vec<[i32; 2]>,
-    /// World height of the underside at the node at X = 0, m.
-    pub lower: Vec<f64>,
-    /// Its slopes there.
-    pub slope: Vec<[f64; 2]>,
+    /// The underside at the node at X = 0.
+    pub plane: Vec<Plane>,
     /// Mean depth of the underside in the cell below the reference level of the bed along n at X = 0, m.
     pub depth: Vec<f64>,
     /// How the depths in the cell lie about it.
@@ -72,8 +79,6 @@ pub struct PatchNodes {
     pub bed: Vec<f64>,
     /// Height of the loose soil on it then, along n, m.
     pub loose: Vec<f64>,
-    /// Half the range of depths of the print that lay there then, along n, m.
-    pub print: Vec<f64>,
     /// Part of the pressure of first loading that the soil bears here.
     pub share: Vec<f64>,
     /// Passive pressure that it bears beside, a + b·z: Pa and Pa/m.
@@ -127,14 +132,12 @@ impl PatchNodes {
     /// Forgets all nodes; keeps the room.
     pub fn clear(&mut self) {
         self.index.clear();
-        self.lower.clear();
-        self.slope.clear();
+        self.plane.clear();
         self.depth.clear();
         self.spread.clear();
         self.permanent.clear();
         self.bed.clear();
         self.loose.clear();
-        self.print.clear();
         self.share.clear();
         self.passive.clear();
         self.bound.clear();
@@ -170,17 +173,15 @@ impl PatchNodes {
         self.entered.reserve(count);
         self.stamp.reserve(count);
         self.facing.reserve(count);
-        self.slope.reserve(count);
+        self.plane.reserve(count);
         self.spread.reserve(count);
         for v in [
             &mut self.mobilised,
             &mut self.reference,
-            &mut self.lower,
             &mut self.depth,
             &mut self.permanent,
             &mut self.bed,
             &mut self.loose,
-            &mut self.print,
             &mut self.share,
             &mut self.bound,
             &mut self.before,

@@ -17,25 +17,32 @@ pub struct Spread {
     pub whole: f64,
     /// How much deeper the node lies than the cell in the mean, along n, m.
     pub below: f64,
+    /// Half the range of depths of the print that lay there when the contact began, along n, m.
+    pub print: f64,
 }
 
 impl Spread {
+    /// Of a node of which nothing is known yet but the print that lies there, m.
+    pub fn over(print: f64) -> Self {
+        Self { print, ..Self::default() }
+    }
+
     /// Of an underside whose heights spread evenly over ± `half` (m) have its standard deviation, whose lowest point lies at most
     /// `lowest` (m) below its mean, and of which a print has taken `print` (m) of `half` already.
     pub fn new(half: f64, lowest: f64, print: f64) -> Self {
         let left = half - print.max(0.0);
         if left <= 0.0 || lowest <= 0.0 {
-            return Self { whole: half, ..Self::default() };
+            return Self { whole: half, print, ..Self::default() };
         }
         if half <= lowest {
-            return Self { range: 2.0 * left, low: left, straight: 1.0, whole: half, below: 0.0 };
+            return Self { range: 2.0 * left, low: left, straight: 1.0, whole: half, below: 0.0, print };
         }
         // of h = H·s^(1/a): mean over the range and over the standard deviation are a/(a + 1) and √(a(a + 2))
         let ratio = 3.0 * (lowest / half) * (lowest / half);
         let root = (1.0 + ratio).sqrt();
         let mean = ((root - 1.0) / root).max(LEAST_MEAN);
         let low = lowest * (left / half);
-        Self { range: low / mean, low, straight: 6.0 * mean - 2.0, whole: half, below: 0.0 }
+        Self { range: low / mean, low, straight: 6.0 * mean - 2.0, whole: half, below: 0.0, print }
     }
 
     /// Height of the part `s` of the cell above its lowest point, m, and its change.

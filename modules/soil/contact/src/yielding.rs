@@ -18,26 +18,14 @@ impl Patches {
     pub fn yields(&self, k: usize, z: f64) -> Result<(f64, f64)> {
         let spread = &self.nodes.spread[k];
         if spread.range <= 0.0 {
-            return self.yields_at(k, z);
+            return yields_at(self, k, z);
         }
         match spread.look(z, self.nodes.top(k)) {
             Some(look) => {
-                Ok(look.mean([self.yields_at(k, look.depth[0])?, self.yields_at(k, look.depth[1])?]))
+                Ok(look.mean([yields_at(self, k, look.depth[0])?, yields_at(self, k, look.depth[1])?]))
             }
             None => Ok((0.0, 0.0)),
         }
-    }
-
-    /// The same at a point at the depth z.
-    #[inline]
-    fn yields_at(&self, k: usize, z: f64) -> Result<(f64, f64)> {
-        let law = self.law(k);
-        let bed = law.curve.first_loading(z)?;
-        let loose = match self.nodes.above_bed(k, z) {
-            Some(d) => Some(law.curve.first_loading(d)?),
-            None => None,
-        };
-        Ok(self.yields_from(k, z, bed, loose, law))
     }
 
     /// The same where first loading of the bed, and of a bed in the place of the loose soil, are known.
@@ -100,6 +88,18 @@ impl Patches {
         let tension = stiffness * (n.permanent[k] - z);
         if tension <= law.adhesion { (-tension, stiffness) } else { (0.0, 0.0) }
     }
+}
+
+/// [`Patches::yields`] at a point at the depth z.
+#[inline]
+fn yields_at(patches: &Patches, k: usize, z: f64) -> Result<(f64, f64)> {
+    let law = patches.law(k);
+    let bed = law.curve.first_loading(z)?;
+    let loose = match patches.nodes.above_bed(k, z) {
+        Some(d) => Some(law.curve.first_loading(d)?),
+        None => None,
+    };
+    Ok(patches.yields_from(k, z, bed, loose, law))
 }
 
 impl crate::patch_nodes::PatchNodes {

@@ -69,6 +69,9 @@ fn cpu_us() -> f64 {
 }
 
 /// The parts of a step, recording and the whole, over `seconds` of simulated time; the least of so many runs.
+///
+/// # Errors
+/// The scenario cannot be read or built, or a step fails.
 pub fn measure(case: Case, seconds: f64, runs: usize, recorded: bool) -> Result<Vec<Row>> {
     let mut least: Vec<Row> = Vec::new();
     for _ in 0..runs.max(1) {

@@ -24,7 +24,7 @@ pub struct NodeState {
     /// Depth of the unloaded surface below the reference level, m, vertical; below zero where loose soil lies higher.
     pub permanent: f64,
     /// By how much `permanent` exceeds the depth up to which the foot carries nothing, m, vertical, see
-    /// [`crate::spread::Spread::above`]; 0 where no foot stands.
+    /// `Spread::above`; 0 where no foot stands.
     pub above: f64,
     /// Half the range of the depths that the foot has printed into the cell so far, m, vertical; 0 where no foot stands.
     pub half: f64,

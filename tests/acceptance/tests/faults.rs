@@ -2,9 +2,9 @@
 //! step is held by `tests/python/test_faults.py`.
 
 use terraglue::Testbed;
-use terraglue_acceptance::{build, shipped};
+use terraglue::scenario::{Scenario, Trigger};
+use terraglue_acceptance::{build, read, shipped};
 
-const FAULT_AT: f64 = 3.0;
 const DURATION: f64 = 5.0;
 
 struct Walk {
@@ -18,12 +18,21 @@ struct Walk {
     torques_after: [f64; 2],
 }
 
-fn read(testbed: &Testbed, name: &str) -> f64 {
-    testbed.read(name).unwrap_or_else(|| panic!("no variable {name}"))
+/// Time of the only event, s.
+fn fault_at(scenario: &Scenario) -> f64 {
+    match scenario.events.as_slice() {
+        [event] => match event.trigger {
+            Trigger::At(t) => t,
+            _ => panic!("the fault has a time"),
+        },
+        events => panic!("{} events", events.len()),
+    }
 }
 
 fn walk(name: &str) -> Walk {
-    let mut testbed = build(&shipped(name, &[])).unwrap_or_else(|e| panic!("{e}"));
+    let scenario = shipped(name, &[]);
+    let fault_at = fault_at(&scenario);
+    let mut testbed = build(&scenario).unwrap_or_else(|e| panic!("{e}"));
     let (mut before, mut after, mut knee_rad) = (Vec::new(), None, f64::NAN);
     let (mut lowest, mut torques_after) = (f64::INFINITY, [f64::NAN; 2]);
     let mut last = testbed.energy().mechanical();
@@ -33,9 +42,9 @@ fn walk(name: &str) -> Walk {
         let change = (energy - last).abs();
         last = energy;
         let t = testbed.t_s();
-        if t > FAULT_AT - 0.1 && t < FAULT_AT + 1e-9 {
+        if t > fault_at - 0.1 && t < fault_at + 1e-9 {
             before.push(change);
-        } else if t > FAULT_AT && after.is_none() {
+        } else if t > fault_at && after.is_none() {
             after = Some(change);
             knee_rad = read(&testbed, "robot.LF_j3.angle");
             torques_after = ["LF_j2", "LF_j3"].map(|j| read(&testbed, &format!("robot.{j}.torque")).abs());

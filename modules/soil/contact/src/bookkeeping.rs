@@ -158,6 +158,13 @@ impl Scene<'_> {
                 self.carry_cone(p, &x, ground, ledger)?;
             }
             if loaded > 0 && ground.contacts.any() {
+                let n = [port.frame[0], port.frame[1], port.frame[2]];
+                touch.look_between(
+                    &self.patches.nodes,
+                    patch.nodes.clone(),
+                    n,
+                    ground.heights.lattice().spacing,
+                );
                 touch.under(patch, &wrench, &x, self.h);
                 ground.contacts.tell(port.key, &touch);
             }

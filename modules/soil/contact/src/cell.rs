@@ -113,6 +113,34 @@ impl PatchNodes {
         }
     }
 
+    /// By how much the underside lies lower between node k, the lowest of those in `range`, and its neighbours along the axes, than at
+    /// the node, over ground with the normal `n` on a lattice of `spacing` (m), m. Round bodies bend evenly from slope to slope; no convex
+    /// one lies lower than where the tangent planes meet.
+    pub fn dip(&self, k: usize, range: std::ops::Range<usize>, n: [f64; 3], spacing: f64) -> f64 {
+        let own = self.plane[k];
+        let along = |axis: usize| {
+            let ground = -n[axis] / n[2];
+            let tilt = own.slope[axis] - ground;
+            // down the slope
+            let step = -tilt.signum();
+            let mut at = self.index[k];
+            at[axis] += step as i32;
+            let Some(next) = self.index[range.clone()].iter().position(|index| *index == at) else {
+                return 0.0;
+            };
+            let other = self.plane[range.start + next];
+            let (falls, rises) = (tilt.abs(), step * (other.slope[axis] - ground));
+            if falls == 0.0 || rises <= 0.0 {
+                return 0.0;
+            }
+            let over = other.height - own.height - step * ground * spacing;
+            let bent = falls * falls * spacing / (2.0 * (falls + rises));
+            let meet = falls * (rises * spacing - over) / (falls + rises);
+            bent.min(meet).max(0.0)
+        };
+        along(0) + along(1)
+    }
+
     /// `level`: height of the soil above the underside at node k when the contact began, m.
     fn underside(&self, k: usize, spacing: f64, ground: [f64; 2], level: f64, rows: &Rows) -> Underside {
         let own = self.plane[k];

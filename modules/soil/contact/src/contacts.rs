@@ -96,6 +96,8 @@ pub struct Touch {
     pub largest: f64,
     /// Largest depth, m.
     pub sinkage: f64,
+    /// The node where it is.
+    deepest: usize,
     slip: f64,
     normal: f64,
     pull: f64,
@@ -109,7 +111,23 @@ impl Touch {
         self.area += nodes.area[k];
         self.carried += nodes.area[k] * pressure;
         self.largest = self.largest.max(pressure);
-        self.sinkage = self.sinkage.max(depth);
+        if depth > self.sinkage {
+            (self.sinkage, self.deepest) = (depth, k);
+        }
+    }
+
+    /// Takes the lowest point of the underside, which lies between the nodes in `range` of a lattice of `spacing` (m) over ground with
+    /// the normal `n`.
+    pub fn look_between(
+        &mut self,
+        nodes: &PatchNodes,
+        range: std::ops::Range<usize>,
+        n: [f64; 3],
+        spacing: f64,
+    ) {
+        if self.sinkage > 0.0 {
+            self.sinkage += nodes.dip(self.deepest, range, n, spacing);
+        }
     }
 
     /// Takes the wrench on the body and its motion `x` over `h` seconds.

@@ -16,14 +16,35 @@ const WALKS: f64 = 2.0;
 
 /// All of them; `usual`: the summary of the scenario as it is shipped.
 pub fn figures(context: &Context, usual: &Value) -> Outcome<Vec<Figure>> {
-    let runs = in_parallel(&SOILS, |soil| slow(context, soil));
+    let cases: Vec<(&str, Load)> =
+        [Load::Whole, Load::Straight].into_iter().flat_map(|load| SOILS.map(|soil| (soil, load))).collect();
+    let runs = in_parallel(&cases, |(soil, load)| slow(context, soil, *load));
     let law = Law::pressed()?;
     let mut all = Vec::new();
-    for (soil, stances) in SOILS.iter().zip(runs) {
-        all.push(against_law(&law, soil, &stances?));
+    for ((soil, load), stances) in cases.iter().zip(runs) {
+        all.push(against_law(&law, soil, *load, &stances?));
     }
     all.push(by_step(context, usual)?);
     Ok(all)
+}
+
+/// What a foot bears on the soil with.
+#[derive(Clone, Copy, PartialEq)]
+enum Load {
+    /// As the scenario has it: a foot that carries shear, too, sinks deeper.
+    Whole,
+    /// As the law that is measured straight down: shear has no influence on the depth.
+    Straight,
+}
+
+impl Load {
+    /// End of the figure's id, and what the figure is about.
+    fn names(self) -> [&'static str; 2] {
+        match self {
+            Self::Whole => ["slow", ""],
+            Self::Straight => ["slow_straight", " without the influence of their shear"],
+        }
+    }
 }
 
 /// A foot on the ground from touch-down to lift-off.
@@ -37,12 +58,14 @@ struct Stance {
     depth: f64,
 }
 
-fn slow(context: &Context, soil: &str) -> Outcome<Vec<Stance>> {
+fn slow(context: &Context, soil: &str, load: Load) -> Outcome<Vec<Stance>> {
     let module = format!("soil.module={soil}");
-    let mut options = vec!["--duration", "40", "--csv", "--set", "recording.every_steps=5", "--set", &module];
+    let inclined = format!("soil.load_inclination={}", load == Load::Whole);
+    let mut options = vec!["--duration", "40", "--csv", "--set", "recording.every_steps=5"];
+    options.extend(["--set", &module, "--set", &inclined]);
     options.extend(SLOW.iter().flat_map(|s| ["--set", s]));
     let options = options.into_iter().map(str::to_owned).collect();
-    let run = Run { context, name: format!("prints.{soil}"), options };
+    let run = Run { context, name: format!("prints.{}.{soil}", load.names()[0]), options };
     run.summary()?;
     stances(&run.folder().join("variables.csv"))
 }
@@ -88,16 +111,18 @@ impl Law {
     }
 }
 
-fn against_law(law: &Law, soil: &str, stances: &[Stance]) -> Figure {
+fn against_law(law: &Law, soil: &str, load: Load, stances: &[Stance]) -> Figure {
+    let [id, shear] = load.names();
     let mean = |of: &dyn Fn(&Stance) -> f64| stances.iter().map(of).sum::<f64>() / stances.len() as f64;
     let (depth, expected) = (mean(&|s| s.depth), mean(&|s| law.depth(s.force)));
     let what = format!(
-        "mean print of {} slow steps, {:.1} mm, against the law of a foot pressed straight down by the largest force of each, difference in %",
+        "mean print of {} slow steps{shear}, {:.1} mm, against {:.1} mm by the law of a foot pressed straight down by the largest force of each, difference in %",
         stances.len(),
-        1e3 * depth
+        1e3 * depth,
+        1e3 * expected
     );
     let difference = 100.0 * (depth / expected - 1.0).abs();
-    Figure::new(format!("walk.{soil}.prints.slow"), difference, Limit::AtMost(5.0), what)
+    Figure::new(format!("walk.{soil}.prints.{id}"), difference, Limit::AtMost(5.0), what)
 }
 
 /// The mean print of the scenario as it is shipped with a quarter of the step.

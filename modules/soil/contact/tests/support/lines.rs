@@ -1,7 +1,7 @@
 //! Bodies whose contact is a line or a point no broader than a few cells: pressed straight down, wherever they lie on the lattice.
 #![allow(dead_code, clippy::unwrap_used)]
 
-use super::support::{Fixture, LETE, flat, soil};
+use super::support::{Fixture, LETE, flat, read, soil};
 use terraglue_subsystem::{Geometry, Module};
 
 /// A body: how it is turned about its own axes (quaternion w x y z), and its height above its lowest point then, m.
@@ -60,10 +60,21 @@ pub fn forces<M: Module>(body: &Body, spacing: f64, depth: f64, at: [f64; 2]) ->
     [t[0], t[1]]
 }
 
+/// The depth that the soil tells of a body that was pressed to `depth` (m) at a `place`.
+pub fn told<M: Module>(body: &Body, spacing: f64, depth: f64, place: (f64, [f64; 2])) -> f64 {
+    let mut fixture = placed::<M>(body, spacing, place);
+    let n = fixture.components();
+    for _ in 0..100 {
+        fixture.prescribed_step(&[-0.01 * depth, 0.0, 0.0, 0.0, 0.0, 0.0][..n]);
+    }
+    read(&*fixture.soil, "contact1.sinkage")
+}
+
 fn placed<M: Module>(body: &Body, spacing: f64, (yaw, at): (f64, [f64; 2])) -> Fixture {
     let size = (0.24 / spacing) as u32 | 1;
+    let shown = format!("{}, \"contacts_shown\": 1}}", LETE.trim_end_matches('}'));
     let mut fixture =
-        Fixture::new(soil::<M>(LETE, size, spacing, flat), body.geometry.clone(), 1.0, body.above);
+        Fixture::new(soil::<M>(&shown, size, spacing, flat), body.geometry.clone(), 1.0, body.above);
     fixture.orientation = times(about(2, yaw), body.turned);
     fixture.turned = true;
     fixture.position = [at[0], at[1], body.above];

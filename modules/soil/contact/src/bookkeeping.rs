@@ -563,7 +563,8 @@ fn carry_slip(ground: &mut Ground, lists: &mut Lists, first: usize, entry: Optio
                 let at = [[i + behind[0], *j], [*i, j + behind[1]]][axis];
                 let there = ground.nodes.get(at[0], at[1]);
                 let enters = entry.is_some_and(|e| e[axis] * f64::from(behind[axis]) > 0.5);
-                let brought = match there.stamp == stamp {
+                // what carries nothing has forgotten its slip and brings none
+                let brought = match there.stamp == stamp && there.pressure > 0.0 {
                     true => there.shear.slip,
                     // points of a rim come down in front of the contact and have not slipped yet
                     false if enters => 0.0,

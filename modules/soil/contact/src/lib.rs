@@ -24,6 +24,7 @@ mod compatibility;
 mod cone;
 mod contact_memory;
 mod contacts;
+mod fold;
 mod ground;
 mod law_memory;
 mod mask;

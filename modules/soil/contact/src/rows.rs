@@ -1,48 +1,73 @@
-//! The rows of nodes below a contact, to find the neighbours of a node.
+//! The nodes below a contact on their lattice, to find the neighbours of a node.
 
 use crate::patch_nodes::PatchNodes;
 
-/// Where the rows of a patch begin; the storage is reused.
+/// The lattice around a patch, with a border of one cell; the storage is reused.
 #[derive(Clone, Debug, Default)]
 pub struct Rows {
-    /// Index along y of the first row.
-    first: i32,
-    /// First node of each row, and one past the last node.
-    begins: Vec<usize>,
+    /// Lattice index of the corner of the border.
+    first: [i32; 2],
+    /// Cells along x.
+    width: usize,
+    /// Node of each cell, x fastest; [`NOBODY`] where there is none.
+    cells: Vec<u32>,
+    /// First node of the patch.
+    start: usize,
+    /// How far the slope of each node is meant, 0 … 1.
+    pub weights: Vec<f64>,
     /// Where the sides of a contact lie, world x and y from the port, m.
     pub places: Vec<[f64; 2]>,
 }
 
+/// Room for the cells of most patches: a node alone has nine.
+const CELLS_PER_NODE: usize = 9;
+const NOBODY: u32 = u32::MAX;
+
 impl Rows {
     /// Room for the sides of contacts with `nodes` nodes.
     pub fn reserve(&mut self, nodes: usize) {
-        self.begins.reserve(nodes);
+        self.cells.reserve(CELLS_PER_NODE * nodes);
+        self.weights.reserve(nodes);
         self.places.reserve(nodes);
     }
 
-    /// Lists the rows of the nodes in `range`, which lie row by row.
+    /// Lists the nodes in `range`.
     pub fn list(&mut self, nodes: &PatchNodes, range: std::ops::Range<usize>) {
-        self.begins.clear();
-        self.first = nodes.index.get(range.start).map_or(0, |at| at[1]);
-        for k in range.clone() {
-            // a row without nodes is empty
-            while self.first + self.begins.len() as i32 <= nodes.index[k][1] {
-                self.begins.push(k);
-            }
+        self.start = range.start;
+        self.cells.clear();
+        let Some(&one) = nodes.index.get(range.start) else { return };
+        let (mut low, mut high) = (one, one);
+        for at in &nodes.index[range.clone()] {
+            (low, high) = ([0, 1].map(|c| low[c].min(at[c])), [0, 1].map(|c| high[c].max(at[c])));
         }
-        self.begins.push(range.end);
+        self.first = low.map(|c| c - 1);
+        let [width, height] = [0, 1].map(|c| (high[c] - low[c] + 3) as usize);
+        self.width = width;
+        self.cells.resize(width * height, NOBODY);
+        for k in range {
+            let cell = self.cell(nodes.index[k]);
+            self.cells[cell] = (k - self.start) as u32;
+        }
     }
 
-    /// The node at an index.
-    pub fn find(&self, nodes: &PatchNodes, at: [i32; 2]) -> Option<usize> {
-        let row = usize::try_from(at[1] - self.first).ok()?;
-        let range = *self.begins.get(row)?..*self.begins.get(row + 1)?;
-        let begin = nodes.index.get(range.start)?[0];
-        // mostly the nodes of a row follow one after the other
-        let guess = range.start.checked_add_signed((at[0] - begin) as isize);
-        match guess.filter(|g| range.contains(g) && nodes.index[*g] == at) {
-            Some(guess) => Some(guess),
-            None => nodes.index[range.clone()].iter().position(|index| *index == at).map(|k| range.start + k),
-        }
+    /// How far the slope of node k is meant.
+    #[inline]
+    pub fn weight(&self, k: usize) -> f64 {
+        self.weights[k - self.start]
+    }
+
+    /// The cell at an index of the lattice.
+    #[inline]
+    pub fn cell(&self, at: [i32; 2]) -> usize {
+        let [i, j] = [0, 1].map(|c| (at[c] - self.first[c]) as usize);
+        j * self.width + i
+    }
+
+    /// The node at some steps from a cell that has one.
+    #[inline]
+    pub fn beside(&self, cell: usize, [i, j]: [i32; 2]) -> Option<usize> {
+        let at = cell as isize + j as isize * self.width as isize + i as isize;
+        let found = *self.cells.get(at as usize)?;
+        (found != NOBODY).then_some(self.start + found as usize)
     }
 }

@@ -243,12 +243,13 @@ pub fn gather(
             continue;
         }
         let [i, j] = nodes.index[k];
+        let cell = rows.cell([i, j]);
         let lower = nodes.reference[k] - nodes.depth[k] / n_z;
         let own = covered(Some(k));
         // towards +x, −x, +y and −y: width of the face and, times that, height of the bed above it and of the loose soil on the bed
         let mut faces = [[0.0; 3]; 4];
         for (face, (di, dj)) in faces.iter_mut().zip(NEIGHBOURS) {
-            let next = rows.find(nodes, [i + di, j + dj]);
+            let next = rows.beside(cell, [di, dj]);
             let outside = own - covered(next);
             // soil in a cell that is covered in part stands as high as it did before it was pressed
             let bed = next.map_or_else(|| (beside.levels)(i + di, j + dj)[0], |k| nodes.reference[k]);

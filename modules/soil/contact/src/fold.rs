@@ -1,0 +1,152 @@
+//! The upper envelope of some planes over the cell of a node: an underside with edges.
+
+use crate::patch_nodes::Plane;
+
+/// Points along each side of a cell at which an underside with an edge is looked at.
+const SAMPLES: usize = 4;
+const POINTS: usize = SAMPLES * SAMPLES;
+/// How far the outermost of them lie from the node, in cells.
+const OUTERMOST: f64 = 0.5 - 0.5 / SAMPLES as f64;
+/// The standard deviation of evenly spaced mid-points is smaller than that of what they stand for.
+const MIDPOINTS: f64 = 1.032_795_558_988_644;
+/// Weight of what is not in the soil, so that an underside looks somewhere before it touches.
+const OUTSIDE: f64 = 1e-3;
+/// The plane of the node and those of its eight neighbours.
+const FACES: usize = 9;
+
+/// What the underside is like in a cell, relative to its node; heights vertical.
+pub struct Underside {
+    /// Mean height above the node, m.
+    pub rise: f64,
+    /// Variance of the height above the plane of the ground, m².
+    pub variance: f64,
+    /// ∂z/∂x and ∂z/∂y of what is in the soil.
+    pub slope: [f64; 2],
+    /// Mean of √(1 + slope²) over that of the mean slope.
+    pub steeper: f64,
+}
+
+/// The planes that meet in a cell. The envelope looks where what lies in the soil does: the faces of a wedge that are in the soil press it,
+/// not those above.
+pub struct Fold {
+    planes: [Plane; FACES],
+    count: usize,
+    spacing: f64,
+    ground: [f64; 2],
+}
+
+impl Fold {
+    /// Of the plane of a node alone, in a cell of side `spacing` (m) over ground with the slopes `ground`.
+    pub fn new(own: Plane, spacing: f64, ground: [f64; 2]) -> Self {
+        Self { planes: [own; FACES], count: 1, spacing, ground }
+    }
+
+    /// Adds the plane of a neighbour, if it lies highest at one point at least.
+    pub fn add(&mut self, plane: Plane) {
+        let own = &self.planes[0];
+        let rises = (plane.slope[0] - own.slope[0]).abs() + (plane.slope[1] - own.slope[1]).abs();
+        if plane.height - own.height + OUTERMOST * self.spacing * rises > 0.0 {
+            self.planes[self.count] = plane;
+            self.count += 1;
+        }
+    }
+
+    /// The underside where the soil lies `level` (m) above the node.
+    pub fn underside(&self, level: f64) -> Underside {
+        let own = self.planes[0];
+        if self.count > 1 {
+            return self.envelope(level);
+        }
+        let tilt = [0, 1].map(|c| own.slope[c] - self.ground[c]);
+        let variance = self.spacing * self.spacing / 12.0 * (tilt[0] * tilt[0] + tilt[1] * tilt[1]);
+        Underside { rise: 0.0, variance, slope: own.slope, steeper: 1.0 }
+    }
+
+    fn envelope(&self, level: f64) -> Underside {
+        let planes = &self.planes[..self.count];
+        let own = &planes[0];
+        let mut faces = [Face::default(); FACES];
+        let place: [f64; SAMPLES] =
+            std::array::from_fn(|s| ((s as f64 + 0.5) / SAMPLES as f64 - 0.5) * self.spacing);
+        let (mut top, mut highest) = (heights(own, &place), [0; POINTS]);
+        for (number, plane) in planes.iter().enumerate() {
+            faces[number] = self.face(plane);
+            let z = heights(plane, &place);
+            for s in 0..POINTS {
+                let over = z[s] > top[s];
+                (top[s], highest[s]) = if over { (z[s], number) } else { (top[s], highest[s]) };
+            }
+        }
+        let ground = heights(&Plane { height: own.height, slope: self.ground }, &place);
+        let (mut sum, mut rise, mut square, mut slope, mut stretch, mut weights) =
+            (0.0, 0.0, 0.0, [0.0; 2], 0.0, 0.0);
+        for s in 0..POINTS {
+            let face = &faces[highest[s]];
+            let over = top[s] - ground[s];
+            sum += over;
+            rise += top[s] - own.height;
+            square += over * over;
+            let weight = (face.inside[0] + (level - over) * face.inside[1]).clamp(0.0, 1.0) + OUTSIDE;
+            slope = [slope[0] + weight * face.slope[0], slope[1] + weight * face.slope[1]];
+            stretch += weight * face.stretch;
+            weights += weight;
+        }
+        let count = POINTS as f64;
+        let (mean, [a, b]) = (sum / count, slope.map(|s| s / weights));
+        Underside {
+            rise: rise / count,
+            variance: (square / count - mean * mean).max(0.0) * MIDPOINTS * MIDPOINTS,
+            slope: [a, b],
+            steeper: stretch / weights / (1.0 + a * a + b * b).sqrt(),
+        }
+    }
+
+    fn face(&self, plane: &Plane) -> Face {
+        let [a, b] = plane.slope;
+        let falls = ((a - self.ground[0]).abs() + (b - self.ground[1]).abs()) * self.spacing / SAMPLES as f64;
+        let inside = if falls > 0.0 { [0.5, 1.0 / falls] } else { [1.0, 0.0] };
+        Face { slope: [a, b], stretch: (1.0 + a * a + b * b).sqrt(), inside }
+    }
+}
+
+/// What a face of an underside adds at each point.
+#[derive(Clone, Copy, Default)]
+struct Face {
+    slope: [f64; 2],
+    /// √(1 + slope²).
+    stretch: f64,
+    /// Part of what a point stands for that is in the soil where the point lies at its level, and its change with the height, 1/m: one
+    /// over the height by which the face falls there; one that is level is in the soil as a whole.
+    inside: [f64; 2],
+}
+
+/// Heights of a plane at the points of a cell, x fastest, whose x and y (m) are `place`.
+fn heights(plane: &Plane, place: &[f64; SAMPLES]) -> [f64; POINTS] {
+    let x = place.map(|x| plane.height + plane.slope[0] * x);
+    let y = place.map(|y| plane.slope[1] * y);
+    std::array::from_fn(|s| x[s % SAMPLES] + y[s / SAMPLES])
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use proptest::prelude::*;
+
+    proptest! {
+        /// A plane that lies below the first one at all points changes nothing, and one alone is what the points say.
+        #[test]
+        fn what_lies_lower_everywhere_is_left_out(
+            slope in prop::array::uniform2(-1.0..1.0f64), other in prop::array::uniform2(-2.0..2.0f64), below in -0.01..0.01f64,
+        ) {
+            let own = Plane { height: 0.3, slope };
+            let mut fold = Fold::new(own, 0.01, [0.1, -0.05]);
+            fold.add(Plane { height: own.height - below, slope: other });
+            let [found, points] = [fold.underside(0.001), Fold { count: 2, ..fold }.envelope(0.001)];
+            let near = |a: f64, b: f64, size: f64| (a - b).abs() <= 1e-9 * size;
+            prop_assert!(near(found.rise, points.rise, 0.01));
+            prop_assert!(near(found.variance, points.variance, 1e-6));
+            prop_assert!((0..2).all(|c| near(found.slope[c], points.slope[c], 1.0)));
+            prop_assert!(near(found.steeper, points.steeper, 1.0));
+        }
+    }
+}

@@ -508,6 +508,13 @@ FOURTH_SETS = [
     ("time.step_s=1e-300", "1e-300"),
     ("terrain.spacing_m=1e-300", "1e-300"),
     ("world.gravity_m_s2=[0,0,-1e300]", "out of range"),
+    ("world.gravity_m_s2=[0,0,-1e8]", "from -10000 to 10000"),
+    ("soil.density_kg_m3=1e300", "plausible is at most 1e6 kg/m^3"),
+    (f"robot.object=[{{name='a',model='{ROOT}/models/hexapod.urdf',position_m=[0,0,1e300]}}]", "plausible is at most 1e6"),
+    (f"robot.object=[{{name='a',model='{ROOT}/models/hexapod.urdf',heading_rad=1e300}}]", "a number of at most 1e15"),
+    ("robot.joints.LF_j1=1e300", "`LF_j1` = "),
+    ("robot.stiffness={\"*_j1\"=100.0,\"*_j2\"=-1.0}", "`*_j2` = -1"),
+    ("connect.0.factor=1e300", "plausible is at most 1e15"),
 ]
 
 

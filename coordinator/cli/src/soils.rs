@@ -53,7 +53,8 @@ pub fn soils(name: Option<&str>, file: Option<&Path>, as_json: bool) -> Result<E
             }
             if soils.rows.is_empty() {
                 let help = did_you_mean(part, names.iter().map(String::as_str));
-                let message = format!("no soil matches `{part}` in {}", path.display());
+                let none = if part.contains('*') { "no soil matches" } else { "there is no soil" };
+                let message = format!("{none} `{part}` in {}", path.display());
                 return Err(InputError::plain(message, help).into());
             }
             list(&soils, as_json);

@@ -112,7 +112,7 @@ fn in_range(p: &Parameter, count: Option<usize>, x: f64, value: &Value) -> Resul
 
 /// The magnitudes of quantities by unit, from the smallest of those that must be positive to the largest: far beyond all that is
 /// simulated, and near enough to 1 that products of a few of them are still numbers.
-const MAGNITUDES: [(&str, f64, f64); 7] = [
+const MAGNITUDES: [(&str, f64, f64); 8] = [
     ("m", 1e-9, 1e6),
     ("s", 1e-15, 1e9),
     ("rad", 1e-9, 1e6),
@@ -120,6 +120,7 @@ const MAGNITUDES: [(&str, f64, f64); 7] = [
     ("rad/s", 1e-9, 1e6),
     ("m/s^2", 1e-9, 1e6),
     ("kg", 1e-9, 1e9),
+    ("kg/m^3", 1e-3, 1e6),
 ];
 /// Those of all other quantities and of pure numbers.
 const ANY_MAGNITUDE: [f64; 2] = [1e-30, 1e15];

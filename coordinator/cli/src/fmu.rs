@@ -44,17 +44,7 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
     for problem in &fmu.description().problems {
         log::warn!(target: "terraglue_fmu", "{problem}");
     }
-    let settings = Settings {
-        start: arguments.start.clone(),
-        start_time: arguments.start_time,
-        stop: arguments.stop,
-        step: arguments.step,
-        tolerance: arguments.tolerance,
-        outputs: arguments.output.clone(),
-        event_mode: arguments.event_mode,
-        input: arguments.input.as_deref().map(table).transpose()?.unwrap_or_default().into(),
-        hold_inputs: arguments.hold_inputs,
-    };
+    let settings = settings(arguments)?;
     if let Err(error) = simulate::check(&fmu, &settings, arguments.intermediate.is_some()) {
         return Ok(failed(&arguments.fmu, &error));
     }
@@ -99,6 +89,21 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
         Err(_) if stopped.load(Ordering::Relaxed) => Ok(Exit::Interrupted),
         Err(error) => Ok(failed(&arguments.fmu, &error)),
     }
+}
+
+/// What the options say of a run.
+fn settings(arguments: &FmuRunArguments) -> Result<Settings> {
+    Ok(Settings {
+        start: arguments.start.clone(),
+        start_time: arguments.start_time,
+        stop: arguments.stop,
+        step: arguments.step,
+        tolerance: arguments.tolerance,
+        outputs: arguments.output.clone(),
+        event_mode: arguments.event_mode,
+        input: arguments.input.as_deref().map(table).transpose()?.unwrap_or_default().into(),
+        hold_inputs: arguments.hold_inputs,
+    })
 }
 
 /// Says why a run of an FMU ended, and whose fault it is.

@@ -51,7 +51,8 @@ pub fn compare(arguments: &CompareArguments) -> Result<Exit> {
     judge(&mut rows, arguments)?;
     compare::write(&folder, &rows)?;
     print(arguments, &folder, &rows)?;
-    let is_wrong = tell_wrong(&plans);
+    // what is interrupted while it loads is no wrong value
+    let is_wrong = !cancel.load(Ordering::Relaxed) && tell_wrong(&plans);
     Ok(if cancel.load(Ordering::Relaxed) {
         Exit::Interrupted
     } else {

@@ -61,7 +61,7 @@ SETS = [
     ("terrain.file=x.asc", 2, "no file `x.asc`"),
     ("terrain.pixel_m=1.0", 2, "does not belong to kind"),
     ("soil.module=soil-beker", 2, "`soil-bekker`"),
-    ("soil.module=/no/such.so", 2, "TG02"),
+    ("soil.module=/no/such.so", 2, "relative to the folder of the scenario"),
     ("soil.module=/etc/passwd", 2, "TG"),
     ("soil.module=", 2, "module"),
     ("soil.module=gait", 2, "soil"),
@@ -180,15 +180,24 @@ COMMANDS = [
     ("check-module soil-bekker --only nothing", 2, "nothing"),
     ("check-module soil-bekker --jobs 0", 2, "--jobs"), ("new soil Soil", 2, "Soil"), ("new soil soil-bekker", 2, "soil-bekker"),
     ("new moon x", 2, "moon"), ("new soil x --lang fortran", 2, "fortran"), ("export nothing -o {}/x.fmu", 2, "nothing"),
-    ("export soil-bekker -o {}/none/x.fmu --set soil.parameters=LETE_sand", None, "x.fmu"), ("convert {}/none.ssp", 2, "none.ssp"), ("convert {}/text.ssp", 2, "text.ssp"),
-    ("export soil-bekker -o {}/text.txt --set soil.parameters=LETE_sand", None, "would be lost"), ("export soil-bekker -o {}/pipe --set soil.parameters=LETE_sand", None, "is no file"),
-    ("check-module soil-bekker --level quick --only loads --json {}/pipe", None, "a pipe"), ("check-module soil-bekker --level quick --only loads --junit {}/pipe", None, "a pipe"),
+    ("export soil-bekker -o {}/none/x.fmu --set soil.parameters=LETE_sand", 2, "x.fmu"), ("convert {}/none.ssp", 2, "none.ssp"), ("convert {}/text.ssp", 2, "text.ssp"),
+    ("export soil-bekker -o {}/text.txt --set soil.parameters=LETE_sand", 2, "would be lost"), ("export soil-bekker -o {}/pipe --set soil.parameters=LETE_sand", 2, "is no file"),
+    ("check-module soil-bekker --level quick --only loads --json {}/pipe", 2, "a pipe"), ("check-module soil-bekker --level quick --only loads --junit {}/pipe", 2, "a pipe"),
     ("fit-soil {}/head.csv --law bekker --out {}/pipe", 2, "four readings"), ("fmu info {}/none.fmu", 2, "none.fmu"), ("fmu info {}/text.fmu", 2, "text.fmu"), ("fmu info {}/empty.fmu", 2, "empty.fmu"),
     ("fmu run {}/bad.fmu", 2, "bad.fmu"), ("fmu check {}/bad.fmu", 2, "bad.fmu"), ("fmu run {}/text.fmu --step 0", 2, "text.fmu"),
     ("fit-soil {}/none.csv", 2, "none.csv"), ("fit-soil {}/text.txt", 2, "text.txt"), ("fit-soil {}/head.csv --law bekker", 2, "four readings"),
     ("fit-soil {}/falls.csv --law bekker", 2, "falls"), ("fit-soil {}/words.csv --law bekker", 2, "words.csv"),
     ("fit-soil {}/head.csv --from-mm nan", 2, "--from-mm"), ("fit-soil {}/head.csv --law none", 2, "none"),
-    ("fit-soil {}/head.csv --wheel radius=x", 2, "radius"),
+    ("fit-soil {}/head.csv --wheel radius=x", 2, "radius"), ("fit-soil {}/good.csv --law bekker --out {}/none/x.toml", 2, "/none/x.toml"),
+    ("fit-soil {}/good.csv --law bekker --out {}", 2, "a folder"), ("fit-soil {}/good.csv --law bekker --predict {}/none.csv", 2, "none.csv"),
+    ("check-module soil-bekker --level quick --only loads --json {}/none/x.json", 2, "/none/x.json"),
+    ("check-module soil-bekker --level quick --only loads --junit {}", 2, "attacks"), ("check-module soil-bekker --level hard", 2, "hard"),
+    ("check-module soil-bekker --set nothing=1 --only loads", 2, "nothing"), ("check-module soil-bekker --time-limit 0", 2, "--time-limit"),
+    ("robot {}/text.txt", 2, "text.txt"), ("robot {}/none.urdf", 2, "none.urdf"), ("variables {walk} nothing.at.all", 2, "nothing.at.all"),
+    ("variables {walk} --module-path {}/none", 2, "/none"), ("report {}/none", 2, "none"), ("export {walk} -o {}/x.fmu --fmi 4", 2, "4"),
+    ("export {walk}", 2, "--output"), ("compare {walk} --vary soil.n", 2, "--vary"), ("compare {walk} --vary soil.n=1,,2", 2, "a value is empty"),
+    ("compare {walk} --steps -1", 2, "step_s"), ("compare {walk} --reference-step 1e-3", 2, "--reference"), ("new scenario x", 2, "--robot"),
+    ("run {walk} --checkpoint-every x", 2, "--checkpoint-every"), ("run --resume {}", 2, "checkpoint"), ("soils {}/x moon", 2, "moon"),
 ]
 
 # ---------------------------------------------------------------------------------------------------------------------
@@ -208,6 +217,7 @@ def place(tmp_path_factory):
         (folder / name).mkdir()
         (folder / name / "recording.mcap").write_bytes(data)
     (folder / "head.csv").write_text(PLATE)
+    (folder / "good.csv").write_text(PLATE + "".join(f"{z},{10.0 * z + d / 10},{d}\n" for d in (50, 100) for z in range(4, 40)))
     (folder / "words.csv").write_text(PLATE + "one,two,three\n")
     (folder / "falls.csv").write_text(PLATE + "".join(f"{z},{100.0 / z},50\n" for z in range(4, 40)))
     return folder
@@ -415,7 +425,7 @@ THIRD_SETS = [
     ("soil={}", 2, "needs `module` or `fmu`"),
     ("soil=[]", 2, "unknown key `soil`"),
     ("robot.model=/dev/stdin", 2, "not a regular file"),
-    ("robot.joints={LF_j1=1e9}", 2, "outside the limits"),
+    ("robot.joints={LF_j1=1e5}", 2, "outside the limits"),
     ('robot.motor={"zz*"="velocity"}', 2, "no moving joint is called `zz*`"),
     ('robot.actuator={preset="x"}', 2, "mars-space-climber"),
     ("robot.strict=1", 2, "true or false"),
@@ -470,7 +480,7 @@ THIRD_ROBOTS = [
 
 CRATER = 'terrain={kind="crater",size_m=[6,4],spacing_m=0.02,diameter_m=1.0,depth_m='
 FOURTH_SETS = [
-    ("robot.joints={LF_j1=1e9}", "outside the limits"),
+    ("robot.joints={LF_j1=1e5}", "outside the limits"),
     ('robot.motor={"zz*"="velocity"}', "no moving joint is called `zz*`"),
     ('robot.actuator={preset="x"}', "mars-space-climber"),
     ("robot.position_m=[1.0]", "position_m"),
@@ -487,17 +497,24 @@ FOURTH_SETS = [
     ("gait.links_m=[1,2]", "links_m"),
     ("gait.body_height_m=1.5", "out of reach"),
     ("terrain.rms_m=1e6", "outside ±511 m"),
-    ("terrain.rms_m=1e300", "outside ±511 m"),
+    ("terrain.rms_m=1e5", "outside ±511 m"),
     ("terrain.wavelengths_m=[0.001,3.0]", "cannot be shown"),
     ("terrain.flat_radius_m=9.0", "flattens the whole ground"),
     ('terrain={kind="slope",size_m=[6,4],spacing_m=0.02,angle_rad=1.55}', "is a wall"),
-    ('terrain={kind="flat",size_m=[6,4],spacing_m=0.02,height_m=1e300}', "outside ±511 m"),
+    ('terrain={kind="flat",size_m=[6,4],spacing_m=0.02,height_m=1e6}', "outside ±511 m"),
     (CRATER + "0.1,rim_height_m=0.5}", "is no bowl"),
     (CRATER + "2.0,max_slope_rad=0.1}", "steeper than"),
-    ("time.duration_s=1e300", "1e300 s"),
+    ("time.duration_s=1e9", "1.000e12 steps"),
     ("time.step_s=1e-300", "1e-300"),
     ("terrain.spacing_m=1e-300", "1e-300"),
     ("world.gravity_m_s2=[0,0,-1e300]", "out of range"),
+    ("world.gravity_m_s2=[0,0,-1e8]", "from -10000 to 10000"),
+    ("soil.density_kg_m3=1e300", "plausible is at most 1e6 kg/m^3"),
+    (f"robot.object=[{{name='a',model='{ROOT}/models/hexapod.urdf',position_m=[0,0,1e300]}}]", "plausible is at most 1e6"),
+    (f"robot.object=[{{name='a',model='{ROOT}/models/hexapod.urdf',heading_rad=1e300}}]", "a number of at most 1e15"),
+    ("robot.joints.LF_j1=1e300", "`LF_j1` = "),
+    ("robot.stiffness={\"*_j1\"=100.0,\"*_j2\"=-1.0}", "`*_j2` = -1"),
+    ("connect.0.factor=1e300", "plausible is at most 1e15"),
 ]
 
 
@@ -542,6 +559,50 @@ def test_commands_of_a_fourth_look(place):
     faults = attack(rows)
     assert not faults, "\n\n".join(faults)
     assert not (place / "fourth.fmu").exists()
+
+
+def test_options_of_fmus_that_are_wrong(place):
+    unit, table = place / "options.fmu", place / "options.csv"
+    made = terraglue("export", "soil-bekker", "-o", unit, "--set", "soil.parameters=LETE_sand")
+    assert made.returncode == 0, made.stderr
+    table.write_text("time,nothing\n0,1\n")
+    (place / "letters.csv").write_text("time,\"foot.position[1,1]\"\n0,x\n")
+    (place / "times.csv").write_text("time,\"foot.position[1,1]\"\n0,0\n0,0\n")
+    (place / "late.csv").write_text("time,\"foot.position[1,1]\"\n0,0\n0.005,x\n")
+    rows = [("later --stop", ["--stop", "0"]), ("above 0", ["--step", "nan"]), ("above 0", ["--step", "-1"]), ("above 0", ["--step", "0"]),
+            ("later --stop", ["--stop", "inf"]), ("later --stop", ["--start-time", "nan"]), ("no variable `nothing`", ["--output", "nothing"]),
+            ("no variable `nothing`", ["--start", "nothing=1"]), ("there is no `=`", ["--start", "nothing"]), ("foot.position", ["--start", "foot.position=x"]),
+            ("no variable `nothing`", ["--input", table]), ("no number", ["--input", place / "letters.csv"]), ("does not grow", ["--input", place / "times.csv"]),
+            ("no number", ["--input", place / "late.csv", "--step", "0.001", "--stop", "0.02"]), ("none.csv", ["--input", place / "none.csv"]),
+            ("intermediate", ["--intermediate", place / "between.csv"]), ("/none/", ["--csv", place / "none" / "x.csv"]), ("--timeout", ["--timeout", "0"]),
+            ("--tolerance", ["--tolerance", "-1"]), ("--memory-mb", ["--memory-mb", "x"]), ("--event-mode", ["--event-mode", "maybe"])]
+    rows = [(words, ["fmu", "run", unit, *options, *apart], 2, words, place) for words, options in rows for apart in ([], ["--isolate"])]
+    faults = attack(rows)
+    assert not faults, "\n\n".join(faults)
+    # what is refused before the first row leaves no table behind
+    done = terraglue("fmu", "run", unit, "--output", "nothing", "--csv", place / "unmade.csv")
+    assert done.returncode == 2 and not (place / "unmade.csv").exists()
+
+
+def test_absurd_values(place):
+    export = ["export", "soil-bekker", "-o", place / "absurd.fmu", "--set", "soil.parameters=LETE_sand"]
+    feet = [("foot.radius_m=1e300", "`radius_m`", "100 m"), ("foot.radius_m=1e-300", "`radius_m`", "0.0001"), ("foot.half_length_m=1e9", "`half_length_m`", "100 m"),
+            ("foot.half_extents_m=[1e300,1,1]", "`half_extents_m`", "100 m"), ("foot.half_extents_m=[0.1,0.0,0.1]", "`half_extents_m`", "100 m"),
+            ("foot.duration_s=1e300", "`duration_s`", "1000 s"), ("foot.position_m=[0,0,1e300]", "`position_m`", "1e6 m"),
+            ("terrain.height_m=-1e300", "`height_m`", "1e6 m")]
+    rows = [(edit, [*export, "--set", edit], 2, words, place) for edit, *all_words in feet for words in (*all_words, edit.split("=")[1][-4:].strip("]"))]
+    walk = ["terrain.height_m=1e300", "terrain.size_m=[1e300,1.0]", "robot.stiffness=1e300", "robot.damping=1e300", "robot.position_m=[0,1e300,0.5]",
+            "robot.max_torque=1e300", "robot.heading_rad=1e300", "robot.joints={LF_j1=1e300}", "gait.stand_s=1e300", "gait.ramp_s=1e-300", "gait.ramp_s=1e300",
+            "gait.acceleration_m_s2=1e300", "gait.hip_x_m=1e300", "gait.links_m=[1e300,0.1,0.1,0.1]", "gluing.contact_margin_m=1e300", "time.duration_s=1e300", "soil.K_m=1e300",
+            "soil.K_m=1e-300"]
+    for edit in walk:
+        key = "LF_j1" if "{" in edit else edit.split("=")[0].split(".")[1]
+        span = "at least" if "e-300" in edit else "at most"
+        flat = ["--set", "terrain.kind=flat", "--set"] if key == "height_m" else ["--set"]
+        rows += [(edit, ["check", place / "walk.toml", *flat, edit], 2, words, place) for words in (f"`{key}` = ", f"plausible is {span}")]
+    faults = attack(rows)
+    assert not faults, "\n\n".join(faults)
+    assert not (place / "absurd.fmu").exists()
 
 
 # Text of a robot, words.
@@ -629,9 +690,9 @@ def test_commands_of_a_third_look(place):
             ("nothing built", ["check-module", taken], 2, "build it first", place),
             ("long", ["new", "soil", "x" * 300], 2, "up to 64", place),
             ("no numbers", ["export", "soil-bekker", "-o", place / "none.fmu"], 2, "--set soil.parameters=LETE_sand", place),
-            ("no time", ["fmu", "run", unit, "--stop", "0"], None, "later --stop", place),
-            ("no step", ["fmu", "run", unit, "--step", "nan"], None, "above 0", place),
-            ("too many steps", ["fmu", "run", unit, "--stop", "1e9", "--step", "1e-9"], None, "a longer --step", place),
+            ("no time", ["fmu", "run", unit, "--stop", "0"], 2, "later --stop", place),
+            ("no step", ["fmu", "run", unit, "--step", "nan"], 2, "above 0", place),
+            ("too many steps", ["fmu", "run", unit, "--stop", "1e9", "--step", "1e-9"], 2, "a longer --step", place),
             ("resumed nothing", ["run", "--resume", place / "nowhere"], 2, "--checkpoint-every", place),
             ("two scenarios", ["run", walk, "--resume", taken], 2, "cannot be used", place)]
     faults = attack(rows)

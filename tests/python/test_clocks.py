@@ -186,7 +186,7 @@ def test_without_event_mode_clocks_are_not_there(clocked, tmp_path):
     table = tmp_path / "in.csv"
     table.write_text("time,hit\n0,1\n")
     done = terraglue("fmu", "run", clocked, "--stop", "1", "--step", "0.1", "--input", table)
-    assert done.returncode == 1 and "`hit` cannot be made to tick" in done.stderr, done.stderr
+    assert done.returncode == 2 and "`hit` cannot be made to tick" in done.stderr, done.stderr
 
 
 TOLD = (

@@ -204,7 +204,7 @@ def test_details_show_all_figures(tmp_path):
     ("gluing.strategy=cooperative,iterative", ["--strategies cooperative,iterative"]),
     ("soil.module=soil-bekker", ["--soils soil-bekker"]),
     ("time.step_s=1e-3,2e-3", ["--steps 1e-3,2e-3"]),
-    ("soil.parameters=LETE_sand,LETE_sant", ["LETE_sant", "did you mean `LETE_sand`"]),
+    ("soil.parameters=LETE_sant", ["LETE_sant", "did you mean `LETE_sand`"]),
     ("gait.speed=1", ["speed_m_s"]),
     ("soil.parameters=a,,b", ["a value is empty"]),
     ("soil.parameters", ["KEY.PATH"]),
@@ -281,6 +281,22 @@ def test_modules_can_be_narrowed():
         assert wrong.returncode == 2 and "did you mean `soil-bekker`" in " ".join(wrong.stderr.split())
 
 
+def test_soils_are_listed_by_the_patterns_of_all_lists():
+    everything = {row["name"] for row in json.loads(terraglue("soils", "--json").stdout)}
+    for pattern, wanted in (("lunar*", lambda name: name.startswith("lunar")), ("*_sand*", lambda name: re.fullmatch(".+_sand.+", name)),
+                            ("LETE_s*nd", lambda name: name == "LETE_sand"), ("lete", lambda name: "lete" in name.lower()),
+                            ("LETE_sand", lambda name: name == "LETE_sand")):
+        done = terraglue("soils", pattern, "--json")
+        assert done.returncode == 0, (pattern, done.stderr)
+        names = {row["name"] for row in json.loads(done.stdout)}
+        assert names and names == {name for name in everything if wanted(name)}, pattern
+        shown = terraglue("soils", pattern)
+        assert shown.returncode == 0 and all(name in shown.stdout for name in names), shown.stderr
+    for pattern in ("moon*", "*.*", "lunar_nominl*"):
+        done = terraglue("soils", pattern)
+        assert done.returncode == 2 and f"no soil matches `{pattern}`" in " ".join(done.stderr.split()), done.stderr
+
+
 def test_the_page_begins_with_what_is_asked_first(tmp_path):
     process = terraglue("compare", MOON_WALK, *SMALL, "--out", tmp_path, "--quiet", "--strategies", "cooperative,iterative")
     assert process.returncode == 0, process.stderr
@@ -294,13 +310,45 @@ def test_the_page_begins_with_what_is_asked_first(tmp_path):
 
 
 def test_one_run_that_fails_fails_the_comparison_and_tells_its_own_reason(tmp_path):
-    done = terraglue("compare", MOON_WALK, "--vary", "robot.stiffness=600,1e300", "--duration", "0.02", "--strategies", "cooperative",
+    done = terraglue("compare", MOON_WALK, "--vary", "robot.rotation_rate_rad_s=[0.0,0.0,0.0],[1e6,0.0,0.0]", "--duration", "0.02", "--strategies", "cooperative",
                      "--quiet", "--out", tmp_path / "out")
     assert done.returncode == 1, done.stderr
     good, failed = json.loads((tmp_path / "out/compare.json").read_text())["rows"]
     assert not good.get("error") and "no consistent state" in failed["error"], failed["error"]
     assert "MCAP" not in failed["error"]
     assert "error: 1 of 2 runs did not reach the end" in done.stderr and failed["error"] in done.stderr, done.stderr
+
+
+# What one of two values of a key is refused for: at its own place, by the module, and where another table is read.
+WRONG_VALUES = [
+    (["soil.parameters=LETE_sand,LETE_sandd"], "LETE_sandd", "there is no soil `LETE_sandd`"),
+    (["soil.n=-1,0.8"], "-1", "`n` = -1"),
+    (["robot.max_torque=60,1e300"], "1e300", "`max_torque`"),
+    (["robot.model=nowhere.urdf,../models/hexapod.urdf"], "nowhere.urdf", "nowhere.urdf"),
+    (["robot.joints.LF_j1=0.0,99"], "99", "LF_j1 = 99 is outside the limits"),
+    (["gait.speed_m_s=0.1,fast", "world.seed=1,2"], "fast", "`speed_m_s`"),
+]
+
+
+@pytest.mark.parametrize(("varied", "value", "words"), WRONG_VALUES)
+def test_a_wrong_value_fails_the_comparison_and_the_rest_is_shown(tmp_path, varied, value, words):
+    options = [word for keys in varied for word in ("--vary", keys)]
+    for more in ([], ["--reference", "cooperative"]):
+        out = tmp_path / f"out{len(more)}"
+        done = terraglue("compare", MOON_WALK, *SMALL, *options, "--out", out, *more)
+        told = " ".join(done.stderr.replace("│", " ").split())
+        assert done.returncode == 2, done.stderr
+        assert words in told and "error: " in told and f"{varied[0].split('=')[0]}={value}" in told, done.stderr
+        rows = json.loads((out / "compare.json").read_text())["rows"]
+        refused = [row for row in rows if (row["error"] or "").startswith("refused: ")]
+        assert 2 * len(refused) == len(rows) and all(value in " ".join(row["varied"].values()) for row in refused), rows
+        assert all(not row["error"] and row["distance_m"] is not None for row in rows if row not in refused), rows
+        assert "did not run" in done.stdout and "distance" in done.stdout and value in done.stdout, done.stdout
+
+
+def test_a_comparison_of_wrong_values_only_begins_no_run(tmp_path):
+    done = terraglue("compare", MOON_WALK, "--vary", "soil.n=-1,-2", "--out", tmp_path / "out")
+    assert done.returncode == 2 and "`n` = -1" in done.stderr and not (tmp_path / "out").exists(), done.stderr
 
 
 def test_it_says_at_the_start_what_will_run(pendulum, tmp_path):

@@ -250,7 +250,7 @@ def test_an_fmu_that_does_not_take_an_input_is_named_with_time_and_function(tmp_
 def test_a_cell_without_a_number_is_named(fmus, tmp_path):
     for version, fmu in fmus.items():
         done, found = run(fmu, table(tmp_path, (0, 0), (0.6, 1), (0.7, "x"), (1, 2)))
-        assert done.returncode == 1 and "`u`" in done.stderr and "no number" in done.stderr, (version, done.stderr)
+        assert done.returncode == 2 and "`u`" in done.stderr and "no number" in done.stderr, (version, done.stderr)
         assert found[-1]["time"] == 0.5, version
 
 

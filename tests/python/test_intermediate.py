@@ -142,6 +142,6 @@ def test_calls_outside_a_step_are_not_followed(folder, monkeypatch, tmp_path):
 
 def test_what_is_not_offered_is_refused(folder, tmp_path):
     done = run(folder, 0, "--intermediate", tmp_path / "i.csv", fmu="plain")
-    assert done.returncode == 1 and "intermediate" in done.stderr, done.stderr
+    assert done.returncode == 2 and "intermediate" in done.stderr, done.stderr
     done = run(folder, 0, "--intermediate", tmp_path / "i.csv", "--output", "mode")
-    assert done.returncode == 1 and "intermediateUpdate" in done.stderr, done.stderr
+    assert done.returncode == 2 and "intermediateUpdate" in done.stderr, done.stderr

@@ -74,4 +74,4 @@ def test_inputs_arrive_as_they_are_written(tmp_path):
         assert float(row["x_out"]) == (1.0 + 2 * t if t < 0.5 else 2.0)
     (tmp_path / "in.csv").write_text("time,i_in\n0,1.5\n")
     done = terraglue("fmu", "run", tmp_path / "m.fmu", "--stop", "1", "--step", "0.25", "--input", tmp_path / "in.csv")
-    assert done.returncode == 1 and "i_in" in done.stderr
+    assert done.returncode == 2 and "i_in" in done.stderr

@@ -81,8 +81,8 @@ pub enum Command {
     Robot(RobotArguments),
     /// List the soils that a scenario can name, and those that are refused with the reason.
     Soils {
-        /// Everything about this one, or those with this in their names.
-        #[arg(value_name = "NAME")]
+        /// Everything about this one; a part of names lists those, as does a pattern with `*`.
+        #[arg(value_name = "PATTERN")]
         name: Option<String>,
         /// Another soil table.
         #[arg(long, value_name = "CSV")]
@@ -473,7 +473,7 @@ pub struct CompareArguments {
     #[arg(long, value_name = "KEY.PATH=VALUES", value_parser = parse_vary)]
     pub vary: Vec<(String, Vec<String>)>,
     /// Communication steps in seconds, separated by commas [default: that of the scenario].
-    #[arg(long, value_delimiter = ',', value_name = "SECONDS")]
+    #[arg(long, value_delimiter = ',', value_name = "SECONDS", allow_negative_numbers = true)]
     pub steps: Vec<f64>,
     /// Print all figures, not only those that tell most.
     #[arg(long, visible_alias = "all")]
@@ -483,7 +483,7 @@ pub struct CompareArguments {
     #[arg(long, value_name = "STRATEGY|FOLDER|FILE")]
     pub reference: Option<String>,
     /// Step of the reference in seconds; a smaller one takes longer and leaves less of its own error in the order.
-    #[arg(long, value_name = "SECONDS", requires = "reference")]
+    #[arg(long, value_name = "SECONDS", requires = "reference", allow_negative_numbers = true)]
     pub reference_step: Option<f64>,
 }
 
@@ -608,16 +608,16 @@ pub struct FmuRunArguments {
     #[arg(long = "start", value_name = "NAME=VALUE", value_parser = parse_set)]
     pub start: Vec<(String, String)>,
     /// Time at the start, s [default: what the FMU wants, else 0].
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub start_time: Option<f64>,
     /// Time at the end, s [default: what the FMU wants, else 1].
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub stop: Option<f64>,
     /// Communication step, s [default: what the FMU wants, else a 500th of the run].
-    #[arg(long, value_name = "S")]
+    #[arg(long, value_name = "S", allow_negative_numbers = true)]
     pub step: Option<f64>,
     /// Relative tolerance.
-    #[arg(long, value_parser = positive)]
+    #[arg(long, value_parser = positive, allow_negative_numbers = true)]
     pub tolerance: Option<f64>,
     /// Names to write, separated by commas [default: all outputs].
     #[arg(long, value_delimiter = ',', value_name = "NAMES")]
@@ -626,7 +626,7 @@ pub struct FmuRunArguments {
     #[arg(long)]
     pub isolate: bool,
     /// Longest time of the whole run where it is isolated, s.
-    #[arg(long, value_name = "S", default_value_t = 3600.0, value_parser = positive)]
+    #[arg(long, value_name = "S", default_value_t = 3600.0, value_parser = positive, allow_negative_numbers = true)]
     pub timeout: f64,
     /// Most memory where it is isolated, MiB.
     #[arg(long, value_name = "MIB", default_value_t = 8192)]

@@ -7,7 +7,7 @@ use super::folder::results_folder;
 use super::interrupt::Interrupt;
 use super::output::outln;
 use super::progress::{self, Progress, Waiting};
-use super::{Exit, logger, run};
+use super::{Exit, logger, run, show};
 use indicatif::ProgressBar;
 use plan::Plan;
 use std::path::{Path, PathBuf};
@@ -51,11 +51,34 @@ pub fn compare(arguments: &CompareArguments) -> Result<Exit> {
     judge(&mut rows, arguments)?;
     compare::write(&folder, &rows)?;
     print(arguments, &folder, &rows)?;
+    // what is interrupted while it loads is no wrong value
+    let is_wrong = !cancel.load(Ordering::Relaxed) && tell_wrong(&plans);
     Ok(if cancel.load(Ordering::Relaxed) {
         Exit::Interrupted
     } else {
-        exit(&rows, !(arguments.run.quiet || arguments.run.json))
+        match exit(&rows, !(arguments.run.quiet || arguments.run.json)) {
+            Exit::Done if is_wrong => Exit::WrongInput,
+            other => other,
+        }
     })
+}
+
+/// Says which values of `--vary` do not fit, each once; whether there are any.
+fn tell_wrong(plans: &[Plan]) -> bool {
+    let mut told = Vec::new();
+    for plan in plans.iter().filter(|plan| plan.is_wrong) {
+        let Some(error) = &plan.refused else { continue };
+        let text = error.to_string();
+        if !told.contains(&text) {
+            show::error(error);
+            told.push(text);
+        }
+    }
+    let (wrong, rows) = (plans.iter().filter(|p| p.is_wrong).count(), plans.len());
+    if wrong > 0 {
+        eprintln!("error: {wrong} of {rows} runs did not start: their value of --vary does not fit");
+    }
+    wrong > 0
 }
 
 /// Every run that was started must reach its end; a strategy that cannot glue the scenario is a row that says so.
@@ -89,10 +112,10 @@ fn announced(plans: &[Plan]) -> String {
     let steps: u64 = plans.iter().map(Plan::steps).sum();
     let of_them =
         if references > 0 { format!(" ({references} of them for reference)") } else { String::new() };
-    let refused = match plans.len() - runs {
-        0 => String::new(),
-        n => format!("; {n} more cannot be glued so"),
-    };
+    let wrong = plans.iter().filter(|p| p.is_wrong).count();
+    let more = |count, what| if count > 0 { format!("; {count} more {what}") } else { String::new() };
+    let refused = more(plans.len() - runs - wrong, "cannot be glued so")
+        + &more(wrong, "cannot start with their value of --vary");
     format!("{runs} run{}{of_them}, {steps} steps in all{refused}", if runs == 1 { "" } else { "s" })
 }
 
@@ -159,8 +182,8 @@ fn run_all(
 fn run_one(plan: &Plan, arguments: &RunArguments, cancel: &Arc<AtomicBool>, bar: &ProgressBar) -> CompareRow {
     let mut row = plan.row.clone();
     let _said = logger::of_run(&plan.name);
-    if plan.refused.is_some() {
-        row.error.clone_from(&plan.refused);
+    if let Some(error) = &plan.refused {
+        row.error = Some(plan::reason(error));
         return row;
     }
     if cancel.load(Ordering::Relaxed) {

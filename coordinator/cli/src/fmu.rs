@@ -44,17 +44,10 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
     for problem in &fmu.description().problems {
         log::warn!(target: "terraglue_fmu", "{problem}");
     }
-    let settings = Settings {
-        start: arguments.start.clone(),
-        start_time: arguments.start_time,
-        stop: arguments.stop,
-        step: arguments.step,
-        tolerance: arguments.tolerance,
-        outputs: arguments.output.clone(),
-        event_mode: arguments.event_mode,
-        input: arguments.input.as_deref().map(table).transpose()?.unwrap_or_default().into(),
-        hold_inputs: arguments.hold_inputs,
-    };
+    let settings = settings(arguments)?;
+    if let Err(error) = simulate::check(&fmu, &settings, arguments.intermediate.is_some()) {
+        return Ok(failed(&arguments.fmu, &error));
+    }
     interrupt.run();
     let file = arguments.csv.as_deref().map(TableFile::create).transpose()?;
     let between = arguments.intermediate.as_deref().map(TableFile::create).transpose()?;
@@ -94,14 +87,40 @@ fn run(arguments: &FmuRunArguments) -> Result<Exit> {
             Ok(Exit::Done)
         }
         Err(_) if stopped.load(Ordering::Relaxed) => Ok(Exit::Interrupted),
-        Err(error) => {
-            eprintln!("error: {}: {error}", arguments.fmu.display());
-            eprintln!(
-                "  help: `terraglue fmu check` lists what is wrong with an FMU, `--isolate` keeps it apart"
-            );
-            Ok(Exit::Failed)
-        }
+        Err(error) => Ok(failed(&arguments.fmu, &error)),
     }
+}
+
+/// What the options say of a run.
+fn settings(arguments: &FmuRunArguments) -> Result<Settings> {
+    Ok(Settings {
+        start: arguments.start.clone(),
+        start_time: arguments.start_time,
+        stop: arguments.stop,
+        step: arguments.step,
+        tolerance: arguments.tolerance,
+        outputs: arguments.output.clone(),
+        event_mode: arguments.event_mode,
+        input: arguments.input.as_deref().map(table).transpose()?.unwrap_or_default().into(),
+        hold_inputs: arguments.hold_inputs,
+    })
+}
+
+/// Says why a run of an FMU ended, and whose fault it is.
+fn failed(fmu: &Path, error: &FmiError) -> Exit {
+    eprintln!("error: {}: {error}", fmu.display());
+    let (help, exit) = match error {
+        FmiError::WrongInput(_) => (
+            "`terraglue fmu info` lists the variables of an FMU, `terraglue fmu run --help` the options",
+            Exit::WrongInput,
+        ),
+        _ => (
+            "`terraglue fmu check` lists what is wrong with an FMU, `--isolate` keeps it apart",
+            Exit::Failed,
+        ),
+    };
+    eprintln!("  help: {help}");
+    exit
 }
 
 fn line(file: &TableFile, text: &str) -> terraglue_fmi::Result {

@@ -116,8 +116,16 @@ fn command(command: Command) -> Exit {
 
 /// Exit of a command that an error ended.
 pub fn exit_of(error: &Error) -> Exit {
+    use std::io::ErrorKind::{InvalidInput, IsADirectory, NotADirectory, NotFound, PermissionDenied};
     match error {
         Error::Input(_) => Exit::WrongInput,
+        // the path is wrong; a disk that is full or breaks is not the user's input
+        Error::File { source, .. }
+            if [NotFound, PermissionDenied, IsADirectory, NotADirectory, InvalidInput]
+                .contains(&source.kind()) =>
+        {
+            Exit::WrongInput
+        }
         _ => Exit::Failed,
     }
 }

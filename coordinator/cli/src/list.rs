@@ -51,7 +51,7 @@ pub fn variables(arguments: &VariablesArguments) -> Result<Exit> {
 }
 
 /// Whether a name is one of those that a pattern, or a piece of a name, asks for.
-fn fits(pattern: &str, name: &str) -> bool {
+pub fn fits(pattern: &str, name: &str) -> bool {
     match pattern.contains('*') {
         true => pattern::matches(pattern, name),
         false => name.to_lowercase().contains(&pattern.to_lowercase()),

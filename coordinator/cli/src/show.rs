@@ -65,6 +65,9 @@ fn way_out(error: &InputError) -> String {
     if is_shown && names(file, &ROBOTS) || number == Some("TG10") && names(message, &ROBOTS) {
         return ROBOT_FILES.into();
     }
+    if let (true, Some("TG02")) = (is_shown, number) {
+        return "a path is relative to the folder of the scenario; docs/plugins/errors.md tells more causes of TG02".into();
+    }
     if let Some(number) = number {
         return format!("docs/plugins/errors.md tells causes and cures of {number}");
     }

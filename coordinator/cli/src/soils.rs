@@ -1,5 +1,6 @@
 //! `terraglue soils`: the rows of the soil table.
 
+use super::list::fits;
 use super::output::outln;
 use super::{Exit, show};
 use serde_json::{Map, Value, json};
@@ -48,11 +49,12 @@ pub fn soils(name: Option<&str>, file: Option<&Path>, as_json: bool) -> Result<E
             let names: Vec<String> = soils.rows.iter().map(|r| r.name.clone()).collect();
             match names.iter().any(|name| name == part) {
                 true => soils.rows.retain(|r| r.name == part),
-                false => soils.rows.retain(|r| r.name.to_lowercase().contains(&part.to_lowercase())),
+                false => soils.rows.retain(|r| fits(part, &r.name)),
             }
             if soils.rows.is_empty() {
                 let help = did_you_mean(part, names.iter().map(String::as_str));
-                let message = format!("there is no soil `{part}` in {}", path.display());
+                let none = if part.contains('*') { "no soil matches" } else { "there is no soil" };
+                let message = format!("{none} `{part}` in {}", path.display());
                 return Err(InputError::plain(message, help).into());
             }
             list(&soils, as_json);

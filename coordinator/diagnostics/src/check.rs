@@ -41,13 +41,17 @@ pub fn check_value(parameter: &Parameter, count: Option<usize>, value: &Value) -
         ParameterType::NumberTable => {
             let ok = value.as_object().is_some_and(|o| o.values().all(Value::is_number));
             typed(parameter, count, ok, value)?;
-            let values = value.as_object().into_iter().flat_map(|o| o.values());
-            values.into_iter().try_for_each(|v| in_range(parameter, count, v.as_f64().unwrap_or(f64::NAN), v))
+            let values = value.as_object().into_iter().flatten();
+            values.into_iter().try_for_each(|(key, v)| {
+                in_range(&below(parameter, key), count, v.as_f64().unwrap_or(f64::NAN), v)
+            })
         }
         ParameterType::NumberByName => {
-            by_name(value).try_for_each(|v| check_number(parameter, count, v.as_f64(), v))
+            by_name(parameter, value).try_for_each(|(p, v)| check_number(&p, count, v.as_f64(), v))
         }
-        ParameterType::TextByName => by_name(value).try_for_each(|v| check_text(parameter, count, v)),
+        ParameterType::TextByName => {
+            by_name(parameter, value).try_for_each(|(p, v)| check_text(&p, count, v))
+        }
         ParameterType::Tables => {
             let ok = value.as_array().is_some_and(|list| list.iter().all(Value::is_object));
             typed(parameter, count, ok, value)
@@ -55,12 +59,17 @@ pub fn check_value(parameter: &Parameter, count: Option<usize>, value: &Value) -
     }
 }
 
-/// The values of a table, or the value itself.
-fn by_name(value: &Value) -> Box<dyn Iterator<Item = &Value> + '_> {
+/// The values of a table under their own names, or the value itself.
+fn by_name<'a>(p: &'a Parameter, value: &'a Value) -> Box<dyn Iterator<Item = (Parameter, &'a Value)> + 'a> {
     match value {
-        Value::Object(table) => Box::new(table.values()),
-        one => Box::new(std::iter::once(one)),
+        Value::Object(table) => Box::new(table.iter().map(|(key, value)| (below(p, key), value))),
+        one => Box::new(std::iter::once((p.clone(), one))),
     }
+}
+
+/// A parameter as an entry of its table.
+fn below(p: &Parameter, key: &str) -> Parameter {
+    Parameter { name: format!("{}.{key}", p.name), ..p.clone() }
 }
 
 fn check_number(
@@ -93,12 +102,48 @@ fn in_range(p: &Parameter, count: Option<usize>, x: f64, value: &Value) -> Resul
     let low = p.min.is_none_or(|min| x > min || x == min && !p.above_min);
     let high = p.max.is_none_or(|max| x <= max);
     if x.is_finite() && low && high {
-        return Ok(());
+        return plausible(p, x, value);
     }
     let message =
         format!("`{}` = {value} is out of range: it takes {}", last_part(&p.name), allowed(p, count));
     let degrees = in_radians(&p.unit, x, |x| p.min.is_none_or(|a| x >= a) && p.max.is_none_or(|b| x <= b));
     Err(Complaint { message, help: degrees.or_else(|| help_line(p)) })
+}
+
+/// The magnitudes of quantities by unit, from the smallest of those that must be positive to the largest: far beyond all that is
+/// simulated, and near enough to 1 that products of a few of them are still numbers.
+const MAGNITUDES: [(&str, f64, f64); 8] = [
+    ("m", 1e-9, 1e6),
+    ("s", 1e-15, 1e9),
+    ("rad", 1e-9, 1e6),
+    ("m/s", 1e-9, 1e6),
+    ("rad/s", 1e-9, 1e6),
+    ("m/s^2", 1e-9, 1e6),
+    ("kg", 1e-9, 1e9),
+    ("kg/m^3", 1e-3, 1e6),
+];
+/// Those of all other quantities and of pure numbers.
+const ANY_MAGNITUDE: [f64; 2] = [1e-30, 1e15];
+
+/// Refuses what is far beyond all that the quantity can be, where the parameter itself has no bound on that side.
+fn plausible(p: &Parameter, x: f64, value: &Value) -> Result<(), Complaint> {
+    let own = MAGNITUDES.iter().find(|(unit, ..)| *unit == p.unit).map(|(_, low, high)| [*low, *high]);
+    let [smallest, largest] = own.unwrap_or(ANY_MAGNITUDE);
+    // whole numbers are counts and seeds, whose bounds are those of their type
+    let is_count = p.parameter_type == ParameterType::Integer;
+    let too_small = p.above_min && p.min == Some(0.0) && x < smallest;
+    let too_large = p.max.is_none() && x.abs() > largest;
+    if is_count || !(too_small || too_large) {
+        return Ok(());
+    }
+    let unit = if ["", "1"].contains(&p.unit.as_str()) { String::new() } else { format!(" {}", p.unit) };
+    let span = match () {
+        () if too_small => format!("at least {smallest:e}{unit}"),
+        () if p.min.is_some_and(|min| min >= 0.0) => format!("at most {largest:e}{unit}"),
+        () => format!("at most {largest:e}{unit} in either direction"),
+    };
+    let message = format!("`{}` = {value} is out of range: plausible is {span}", last_part(&p.name));
+    Err(Complaint { message, help: help_line(p) })
 }
 
 fn typed(p: &Parameter, count: Option<usize>, ok: bool, value: &Value) -> Result<(), Complaint> {
@@ -213,5 +258,30 @@ mod tests {
             Some("angles are in radians: 35 degrees are 0.611 rad".into())
         );
         assert_eq!(in_radians("m", 35.0, |_| true).or(in_radians("rad", 0.5, |_| true)), None);
+    }
+
+    #[test]
+    fn what_nothing_can_mean_is_refused_by_its_unit() {
+        let length = Parameter::number("gait.hip_m", "m", 0.1, "Hip").positive();
+        let force = Parameter::of("max", ParameterType::NumberByName, "Force").optional();
+        let seed = Parameter::of("seed", ParameterType::Integer, "Seed").within(0.0, f64::INFINITY);
+        let bounded = Parameter::number("stiff", "m", 1.0, "Own bounds").within(0.0, 1e200);
+        let told = |p: &Parameter, x: Value| check_value(p, None, &x).err().map(|c| c.message);
+        for (p, x) in [
+            (&length, 1e6.into()),
+            (&length, 1e-9.into()),
+            (&force, (-1e15).into()),
+            (&force, 0.0.into()),
+            (&force, 1e-300.into()),
+            (&seed, i64::MAX.into()),
+            (&bounded, 1e150.into()),
+        ] {
+            assert_eq!(told(p, x), None, "{}", p.name);
+        }
+        let refused = |p, x| told(p, x).unwrap_or_default();
+        assert!(refused(&length, 1e7.into()).ends_with("plausible is at most 1e6 m"));
+        assert!(refused(&length, 1e-10.into()).ends_with("plausible is at least 1e-9 m"));
+        let by_name = serde_json::json!({ "arm": 1.0, "leg": -1e16 });
+        assert!(refused(&force, by_name).ends_with("plausible is at most 1e15 in either direction"));
     }
 }

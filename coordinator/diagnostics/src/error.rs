@@ -61,7 +61,7 @@ pub enum Error {
         /// What the system said.
         source: std::io::Error,
     },
-    /// A file could not be read or written (exit code 1).
+    /// A file could not be read or written (exit code 2 where its path is wrong, else 1).
     #[error("{path}: {source}")]
     File {
         /// Path as the user knows it.

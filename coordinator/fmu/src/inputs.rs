@@ -98,9 +98,13 @@ impl Inputs {
         self.all.iter().try_for_each(|input| input.set(instance, &self.table, t))
     }
 
-    /// The error of a step with what may be tried.
-    pub fn way_out(&self, error: Error) -> Error {
+    /// The error of a step to `end` with what may be tried; that of the table where it holds no number for what the FMU asks.
+    pub fn way_out(&self, error: Error, end: f64) -> Error {
+        let mut followed = self.all.iter().filter(|i| i.followed);
         match error {
+            Error::Call { .. } if followed.any(|input| input.numbers(&self.table, end).is_err()) => {
+                Error::WrongInput(error.to_string())
+            }
             Error::Call { function, outcome, log, fatal } if self.all.iter().any(|i| i.followed) => {
                 Error::Call { function, outcome: format!("{outcome} ({WAY_OUT})"), log, fatal }
             }
@@ -180,7 +184,7 @@ impl Input {
             if written.iter().any(|x| !x.is_finite()) {
                 return Err(match written.len() {
                     1 => table.none(*column, t),
-                    n => Error::Refused(format!(
+                    n => Error::WrongInput(format!(
                         "`{}`: the input is not {n} numbers beside t = {t} s",
                         self.variable.name
                     )),
@@ -194,7 +198,7 @@ impl Input {
 /// Sets a variable from text; arrays take their elements separated by spaces.
 pub fn set_text(instance: &FmuInstance, v: &Variable, text: &str) -> Result {
     let wrong =
-        || Error::Refused(format!("`{}` = {text}: it takes {} values of another kind", v.name, v.len()));
+        || Error::WrongInput(format!("`{}` = {text}: it takes {} values of another kind", v.name, v.len()));
     let words: Vec<&str> = text.split_whitespace().collect();
     macro_rules! parsed {
         ($variant:ident, $t:ty) => {{

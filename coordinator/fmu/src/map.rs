@@ -98,7 +98,7 @@ pub(super) fn find<'a>(
     let all = &description.variables;
     all.iter().find(|v| v.name == name).ok_or_else(|| {
         let hint = did_you_mean(name, all.iter().map(|v| v.name.as_str()));
-        terraglue_fmi::Error::Refused(format!(
+        terraglue_fmi::Error::WrongInput(format!(
             "there is no variable `{name}`{}",
             hint.map(|h| format!("; {h}")).unwrap_or_default()
         ))

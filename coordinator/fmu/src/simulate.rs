@@ -48,6 +48,21 @@ const NEARLY_WHOLE: f64 = 1e-5;
 /// Longest run, in steps.
 const STEPS: f64 = 1e9;
 
+/// Whether the times of a run and the names in its settings are those of the FMU, before any of its code runs and any file
+/// is made; `between`: outputs are wanted at intermediate times.
+///
+/// # Errors
+/// [`Error::WrongInput`]: what of the settings does not fit.
+pub fn check(fmu: &Fmu, settings: &Settings, between: bool) -> Result {
+    let description = fmu.description();
+    plan(fmu, settings)?;
+    columns(description, &settings.outputs, settings.event_mode)?;
+    if between {
+        shown_between(description, &settings.outputs)?;
+    }
+    settings.start.iter().try_for_each(|(name, _)| find(description, name).map(drop))
+}
+
 /// Runs an FMU and writes its tables. Answers when the FMU itself asked for the end of the run before its time, s.
 ///
 /// # Errors
@@ -101,7 +116,7 @@ pub fn run(fmu: &Arc<Fmu>, settings: &Settings, sink: Sink, tables: &mut Tables)
         instance.forget_ticks();
         let events;
         let step = halving(&mut instance, &inputs, &mut before, (t, end), &mut tables.intermediate);
-        (ended, events) = step.map_err(|e| at(inputs.way_out(e)))?;
+        (ended, events) = step.map_err(|e| at(inputs.way_out(e, end)))?;
         let now = ended.unwrap_or(end);
         row(&marked(line(&instance, now, &columns).map_err(|e| named(e, now))?, events))
     });
@@ -139,7 +154,7 @@ fn plan(fmu: &Fmu, settings: &Settings) -> Result<Plan> {
         exact.floor()
     };
     if !(step > 0.0 && (1.0..=STEPS).contains(&steps)) {
-        return Err(Error::Refused(no_steps(start, stop, step)));
+        return Err(Error::WrongInput(no_steps(start, stop, step)));
     }
     Ok(Plan { start, stop, step, steps, whole })
 }
@@ -227,7 +242,11 @@ fn halving(
 }
 
 fn named(error: Error, t: f64) -> Error {
-    Error::Refused(format!("at t = {t} s: {error}"))
+    let message = format!("at t = {t} s: {error}");
+    match error {
+        Error::WrongInput(_) => Error::WrongInput(message),
+        _ => Error::Refused(message),
+    }
 }
 
 /// Sets the structural parameters among the start values.
@@ -238,7 +257,7 @@ fn configure(instance: &mut FmuInstance, start: &[(String, String)]) -> Result {
             continue;
         }
         let wrong =
-            || Error::Refused(format!("`{name}` = {text}: a structural parameter takes a whole number"));
+            || Error::WrongInput(format!("`{name}` = {text}: a structural parameter takes a whole number"));
         values.push((name, text.trim().parse().map_err(|_| wrong())?));
     }
     instance.configure(&values)
@@ -264,7 +283,7 @@ fn shown_between(description: &ModelDescription, names: &[String]) -> Result<Vec
         columns(description, names, false)?.into_iter().filter(shown).map(|v| v.name.clone()).collect();
     match all.is_empty() {
         false => Ok(all),
-        true => Err(Error::Refused(
+        true => Err(Error::WrongInput(
             "none of the outputs is a Float64 with intermediateUpdate = \"true\", which can be read at intermediate times"
                 .into(),
         )),

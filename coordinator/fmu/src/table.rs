@@ -83,7 +83,7 @@ impl Table {
 
     /// The error of a column without a number beside t, s.
     pub(super) fn none(&self, column: usize, t: f64) -> Error {
-        Error::Refused(format!("`{}`: the input is no number beside t = {t} s", self.names[column]))
+        Error::WrongInput(format!("`{}`: the input is no number beside t = {t} s", self.names[column]))
     }
 
     /// The cell that holds at t.

@@ -46,9 +46,9 @@ pub struct Energies {
 }
 
 impl Energies {
-    /// The drift over what was turned over; none where one is unknown or nothing was turned over.
+    /// The drift over what was turned over; none where one is unknown or no more was turned over than rounding may be.
     pub fn drift_share(&self) -> Option<f64> {
-        self.drift_j.filter(|_| self.turnover_j > 0.0).map(|d| d / self.turnover_j)
+        self.drift_j.filter(|_| self.turnover_j > ROUNDING_J).map(|d| d / self.turnover_j)
     }
 
     /// Whether the drift is more than 1 % of what was turned over (and than rounding, 1e-9 J).
@@ -197,6 +197,8 @@ mod tests {
         assert!(!drifting(Some(-0.9), 100.0).is_off() && drifting(Some(-1.1), 100.0).is_off());
         assert!(!drifting(Some(9e-10), 0.0).is_off() && drifting(Some(2e-9), 0.0).is_off());
         assert_eq!(drifting(Some(2.0), 0.0).drift_share(), None);
+        // what stands still turns over what rounding leaves: no share of it means anything
+        assert_eq!(drifting(Some(1e-17), 1e-18).drift_share(), None);
     }
 
     #[test]

@@ -118,7 +118,7 @@ fn world() -> Table {
         Parameter { unit: "m/s^2".into(), ..list("gravity_m_s2", "gravity in the world frame, z up") };
     let seed = Parameter::of("seed", ParameterType::Integer, "seed of everything random");
     let keys = vec![
-        Key::from(gravity.or(vec![0.0, 0.0, -9.81]).within(-1e9, 1e9)).form(Form::Count(3)),
+        Key::from(gravity.or(vec![0.0, 0.0, -9.81]).within(-1e4, 1e4)).form(Form::Count(3)),
         seed.or(1).within(0.0, f64::INFINITY).into(),
     ];
     of("world", "Properties of the world.", keys)

@@ -101,7 +101,8 @@ impl Check<'_> {
         // a name of one's own may be a bare number as well as a number with its unit in quotes
         let bare = parameter.name.ends_with(".*") && parameter.parameter_type == ParameterType::Text;
         if !(bare && value.is_number()) {
-            check_value(parameter, None, value).map_err(|c| self.complain(name, c))?;
+            check_value(parameter, None, value)
+                .map_err(|c| self.complain_of_entry(parameter, name, value, c))?;
         }
         match (parameter.parameter_type, value.as_str()) {
             (ParameterType::Path, Some(text)) => {
@@ -182,6 +183,24 @@ impl Check<'_> {
 
     fn complain(&self, name: &str, c: Complaint) -> Box<InputError> {
         self.source.error(&self.source.value_place(&self.path(name)), c.message, c.help)
+    }
+
+    /// The same at the entry that is wrong, where the value is a table: an edit may have added it to those of the file.
+    fn complain_of_entry(
+        &self,
+        parameter: &Parameter,
+        name: &str,
+        value: &Value,
+        c: Complaint,
+    ) -> Box<InputError> {
+        let is_wrong = |key: &String, value: &Value| {
+            let alone = Value::Object([(key.clone(), value.clone())].into_iter().collect());
+            check_value(parameter, None, &alone).is_err()
+        };
+        let entry = value.as_object().and_then(|all| all.iter().find(|(key, value)| is_wrong(key, value)));
+        let mut path = self.path(name);
+        path.extend(entry.map(|(key, _)| key.as_str()));
+        self.source.error(&self.source.value_place(&path), c.message, c.help)
     }
 
     /// Where a parameter was written: in the module's own sub-table, or directly in the subsystem's.

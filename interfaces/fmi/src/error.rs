@@ -71,6 +71,9 @@ pub enum Error {
     /// The FMU does not offer what was asked for.
     #[error("{0}")]
     Refused(String),
+    /// A name, value or time that the caller gave does not fit the FMU.
+    #[error("{0}")]
+    WrongInput(String),
 }
 
 /// Result with this crate's error.

@@ -15,6 +15,9 @@ use terraglue_subsystem::Kind;
 /// order of 2 look like 2.32, at an eighth like 2.02.
 const REFERENCE_PART: f64 = 0.125;
 
+/// The option that gives values of any key.
+const VARY: &str = "--vary";
+
 /// Begins the reason of a row that cannot run.
 pub const REFUSED: &str = "refused: ";
 
@@ -27,7 +30,9 @@ pub struct Plan {
     pub scenario: Scenario,
     pub folder: PathBuf,
     /// Why it cannot run: a row of the comparison.
-    pub refused: Option<String>,
+    pub refused: Option<Error>,
+    /// Whether that is due to a value of `--vary`, which does not fit, and not to the strategy.
+    pub is_wrong: bool,
 }
 
 impl Plan {
@@ -84,7 +89,7 @@ pub fn plan(arguments: &CompareArguments) -> Result<Vec<Plan>> {
     }
     choices.extend(references(arguments, &wanted)?);
     let replaced = soil.filter(|_| !arguments.soils.is_empty());
-    let one = |choice| planned(arguments, replaced.as_ref(), choice, wanted.steps.len() > 1);
+    let one = |choice| planned(arguments, &base, replaced.as_ref(), choice, wanted.steps.len() > 1);
     let plans = choices.into_iter().map(one).collect::<Result<Vec<_>>>()?;
     if let Some(folder) = arguments.reference.as_deref().filter(|name| !STRATEGIES.contains(name)) {
         check_folder(&plans, Path::new(folder))?;
@@ -208,6 +213,7 @@ fn references(arguments: &CompareArguments, wanted: &Wanted) -> Result<Vec<Choic
 
 fn planned(
     arguments: &CompareArguments,
+    base: &Scenario,
     soil: Option<&Soil>,
     choice: Choice,
     name_step: bool,
@@ -225,7 +231,7 @@ fn planned(
     if let Some(soil) = soil {
         add("--soils", format!("{}.module", soil.name), choice.soil.clone());
     }
-    choice.varied.iter().cloned().for_each(|(key, value)| add("--vary", key, value));
+    choice.varied.iter().cloned().for_each(|(key, value)| add(VARY, key, value));
     let mut row = CompareRow {
         strategy: choice.strategy,
         soil: choice.soil,
@@ -238,43 +244,67 @@ fn planned(
     };
     let name = row.name();
     let _said = logger::of_run(&name);
-    let scenario = Scenario::load_by(&arguments.run.scenario.scenario, &sets, &options)?;
-    row.step_s = scenario.time.step_s;
-    Ok(Plan { row, name, scenario, folder: PathBuf::new(), refused: None })
+    let loaded = Scenario::load_by(&arguments.run.scenario.scenario, &sets, &options);
+    let (scenario, refused) = match loaded {
+        Ok(scenario) => (scenario, None),
+        // it does not run, so that any scenario may stand here
+        Err(error) if !row.varied.is_empty() => (base.clone(), Some(error.into())),
+        Err(error) => return Err(error.into()),
+    };
+    row.step_s = choice.step_s.unwrap_or(scenario.time.step_s);
+    let is_wrong = refused.is_some();
+    Ok(Plan { row, name, scenario, folder: PathBuf::new(), refused, is_wrong })
 }
 
 /// An earlier run must be one of the same thing as every row; rows that differ in strategy and step only are alike.
 fn check_folder(plans: &[Plan], folder: &Path) -> Result {
     let same = |a: &Plan, b: &Plan| a.row.soil == b.row.soil && a.row.varied == b.row.varied;
     let first = |(k, plan): &(usize, &Plan)| !plans[..*k].iter().any(|p| same(p, plan));
-    let mut firsts = plans.iter().enumerate().filter(first);
+    let mut firsts = plans.iter().enumerate().filter(|(_, plan)| plan.refused.is_none()).filter(first);
     firsts.try_for_each(|(_, plan)| compare::check_reference(&plan.scenario, folder))
 }
 
-/// Wrong input shows before the first run starts; a strategy that cannot glue the scenario is a row that says so,
-/// as long as another one can and it is not the reference.
+/// Wrong input shows before the first run starts; a strategy that cannot glue the scenario, or a value of `--vary` that does
+/// not fit, is a row that says so, as long as another one can run. A reference must run wherever it is wanted.
 pub fn refuse(plans: &mut [Plan], arguments: &RunArguments, cancel: &Arc<AtomicBool>) -> Result {
-    let mut first = None;
-    for plan in plans.iter_mut() {
+    for plan in plans.iter_mut().filter(|p| p.refused.is_none()) {
         let _said = logger::of_run(&plan.name);
-        let Err(error) = run::build(&plan.scenario, &run::options(arguments, cancel)) else { continue };
-        if plan.row.is_reference {
-            return Err(refused_reference(plan, error));
-        }
-        plan.refused = Some(match &error {
-            Error::Input(input) => match &input.help {
-                Some(help) => format!("{REFUSED}{input}; {help}"),
-                None => format!("{REFUSED}{input}"),
-            },
-            other => format!("{REFUSED}{other}"),
-        });
-        first = first.or(Some(error));
+        plan.refused = run::build(&plan.scenario, &run::options(arguments, cancel)).err();
     }
-    match first {
-        Some(error) if plans.iter().filter(|p| !p.row.is_reference).all(|p| p.refused.is_some()) => {
-            Err(error)
-        }
-        _ => Ok(()),
+    let wrong: Vec<bool> = plans.iter().map(|plan| is_wrong(plan, plans)).collect();
+    plans.iter_mut().zip(wrong).for_each(|(plan, wrong)| plan.is_wrong = wrong);
+    let of_rows = |plan: &&mut Plan| !plan.row.is_reference;
+    if plans.iter_mut().filter(of_rows).all(|plan| plan.refused.is_some()) {
+        let first = plans.iter_mut().filter(of_rows).find_map(|plan| plan.refused.take());
+        return first.map_or(Ok(()), Err);
+    }
+    let mut references = plans.iter_mut().filter(|plan| plan.row.is_reference && !plan.is_wrong);
+    match references.find_map(|plan| Some((plan.refused.take()?, plan))) {
+        Some((error, plan)) => Err(refused_reference(plan, error)),
+        None => Ok(()),
+    }
+}
+
+/// Whether a row is refused for a value of `--vary`: the error points there, or the same row runs with another value.
+fn is_wrong(plan: &Plan, all: &[Plan]) -> bool {
+    let Some(error) = &plan.refused else { return false };
+    let points = matches!(error, Error::Input(input) if input.source_code.name() == VARY);
+    let (a, step_s) = (&plan.row, plan.row.step_s);
+    let same = |b: &CompareRow| {
+        (&b.strategy, &b.soil, b.is_reference) == (&a.strategy, &a.soil, a.is_reference) && b.step_s == step_s
+    };
+    let runs_otherwise = || all.iter().any(|other| other.refused.is_none() && same(&other.row));
+    plan.is_wrong || points || !a.varied.is_empty() && runs_otherwise()
+}
+
+/// What the table says of a row that cannot run.
+pub fn reason(error: &Error) -> String {
+    match error {
+        Error::Input(input) => match &input.help {
+            Some(help) => format!("{REFUSED}{input}; {help}"),
+            None => format!("{REFUSED}{input}"),
+        },
+        other => format!("{REFUSED}{other}"),
     }
 }
 

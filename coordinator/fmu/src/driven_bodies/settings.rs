@@ -5,6 +5,8 @@ use terraglue_subsystem::{Config, Error, Geometry, Kind, Parameter, ParameterTyp
 
 /// Where a foot is that nobody has placed: far above the ground, m.
 const UP_M: f64 = 100.0;
+/// Smallest and largest lengths of a foot, m: a grain of sand, and what no machine stands on.
+const LENGTHS_M: [f64; 2] = [1e-4, 100.0];
 /// Most feet of one instance.
 const MOST: f64 = 1024.0;
 
@@ -18,8 +20,10 @@ pub struct DrivenBodiesSettings {
 
 /// What the module is.
 pub fn schema() -> Schema {
-    let number =
-        |name: &str, default: f64, help: &str| Parameter::number(name, "m", default, help).positive();
+    let [low, high] = LENGTHS_M;
+    let number = |name: &str, default: f64, help: &str| {
+        Parameter::number(name, "m", default, help).within(low, high).usually("m", 1e-3, 2.0)
+    };
     Schema {
         name: NAME.into(),
         kind: Kind::Robot,
@@ -31,18 +35,27 @@ pub fn schema() -> Schema {
                 .choices(&["sphere", "box", "cylinder", "capsule"]),
             number("radius_m", 0.03, "Radius of sphere, cylinder and capsule"),
             number("half_length_m", 0.03, "Half length along z of cylinder and capsule"),
-            Parameter::of("half_extents_m", ParameterType::Numbers, "Half lengths of a box along x, y, z")
-                .or(vec![0.05, 0.05, 0.01]),
-            Parameter::of(
-                "position_m",
-                ParameterType::Numbers,
-                "x, y, z of every foot at the start; far above the ground if silent",
-            )
-            .optional(),
             Parameter {
-                unit: "s".into(),
-                ..number("duration_s", 1e-3, "Time over which a new pose is reached")
+                unit: "m".into(),
+                ..Parameter::of(
+                    "half_extents_m",
+                    ParameterType::Numbers,
+                    "Half lengths of a box along x, y, z",
+                )
+                .or(vec![0.05, 0.05, 0.01])
+                .within(low, high)
             },
+            Parameter {
+                unit: "m".into(),
+                ..Parameter::of(
+                    "position_m",
+                    ParameterType::Numbers,
+                    "x, y, z of every foot at the start; far above the ground if silent",
+                )
+                .optional()
+            },
+            Parameter::number("duration_s", "s", 1e-3, "Time over which a new pose is reached")
+                .within(1e-6, 1e3),
         ],
     }
 }

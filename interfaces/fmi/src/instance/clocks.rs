@@ -181,12 +181,12 @@ impl FmuInstance {
     /// A trigger of what is no triggered input clock, or outside event mode.
     ///
     /// # Errors
-    /// [`Error::Refused`]: it is none, or the FMU is not in event mode.
+    /// [`Error::WrongInput`]: it is none, or the FMU is not in event mode.
     pub fn can_trigger(&self, clock: &Variable) -> Result {
         let good = clock.triggered && clock.causality == Causality::Input && self.event_mode;
         match good && self.phase != InstancePhase::Terminated {
             true => Ok(()),
-            false => Err(Error::Refused(format!(
+            false => Err(Error::WrongInput(format!(
                 "`{}` cannot be made to tick: it is no triggered input clock of an FMU in event mode",
                 clock.name
             ))),

@@ -29,7 +29,7 @@ impl FmuInstance {
         let resized =
             self.description.resized(&sizes).map_err(|e| refused(&names.join(", "), &format!("then {e}")))?;
         let Api::Three(three) = self.api else {
-            return Err(Error::Refused("FMI 2.0 has no structural parameters".into()));
+            return Err(Error::WrongInput("FMI 2.0 has no structural parameters".into()));
         };
         let all = names.join(", ");
         self.call("fmi3EnterConfigurationMode", three.enter_configuration, |f, c| unsafe { f(c) })
@@ -48,10 +48,10 @@ impl FmuInstance {
         let found = self.description.position(name).map(|k| &self.description.variables[k]);
         let found = found.filter(|v| v.causality == Causality::StructuralParameter);
         let Some(v) = found else {
-            return Err(Error::Refused(format!("`{name}` is no structural parameter")));
+            return Err(Error::WrongInput(format!("`{name}` is no structural parameter")));
         };
         let (low, high) = range(v.value_type).ok_or_else(|| {
-            Error::Refused(format!(
+            Error::WrongInput(format!(
                 "`{name}` is a structural parameter of type {:?}; whole numbers are set",
                 v.value_type
             ))
@@ -75,7 +75,7 @@ impl FmuInstance {
     fn set_whole(&self, v: &Variable, value: i128) -> Result {
         macro_rules! narrow {
             ($variant:ident) => {{
-                let own = value.try_into().map_err(|_| Error::Refused("it is out of range".into()))?;
+                let own = value.try_into().map_err(|_| Error::WrongInput("it is out of range".into()))?;
                 self.set(&[v.reference], Values::$variant(&[own]))
             }};
         }
@@ -108,7 +108,7 @@ fn range(value_type: ValueType) -> Option<(i128, i128)> {
 }
 
 fn refused(what: &str, why: &str) -> Error {
-    Error::Refused(format!("the structural parameters cannot be {what}: {why}"))
+    Error::WrongInput(format!("the structural parameters cannot be {what}: {why}"))
 }
 
 /// The error of a call with what was being set.
@@ -118,6 +118,7 @@ fn named(error: Error, what: &str) -> Error {
             let outcome = format!("{outcome} when the structural parameters were to be {what}");
             Error::Call { function, outcome, log, fatal }
         }
-        other => refused(what, &other.to_string()),
+        Error::WrongInput(why) => refused(what, &why),
+        other => Error::Refused(format!("the structural parameters cannot be {what}: {other}")),
     }
 }

@@ -152,14 +152,14 @@ impl FmuInstance {
     /// The numbers in calls of variables that are shown at intermediate times.
     pub(super) fn shown_between(description: &crate::ModelDescription, names: &[String]) -> Result<Vec<Vr>> {
         if !names.is_empty() && !description.capabilities.intermediate_update {
-            return Err(Error::Refused("the FMU does not offer intermediate update".into()));
+            return Err(Error::WrongInput("the FMU does not offer intermediate update".into()));
         }
         let one = |name: &String| {
             let v = description.position(name).map(|k| &description.variables[k]);
-            let v = v.ok_or_else(|| Error::Refused(format!("there is no variable `{name}`")))?;
+            let v = v.ok_or_else(|| Error::WrongInput(format!("there is no variable `{name}`")))?;
             match v.intermediate && v.value_type == ValueType::F64 {
                 true => Ok(v.reference),
-                false => Err(Error::Refused(format!(
+                false => Err(Error::WrongInput(format!(
                     "`{name}` is no Float64 with intermediateUpdate = \"true\": it cannot be read at intermediate times"
                 ))),
             }

@@ -253,7 +253,7 @@ impl FmuInstance {
 fn texts(values: &[String]) -> Result<Vec<CString>> {
     let text = |v: &String| CString::new(v.as_str());
     let all: std::result::Result<Vec<_>, _> = values.iter().map(text).collect();
-    all.map_err(|_| Error::Refused("a text has a zero in it".into()))
+    all.map_err(|_| Error::WrongInput("a text has a zero in it".into()))
 }
 
 #[cold]

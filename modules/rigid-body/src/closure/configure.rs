@@ -125,6 +125,10 @@ pub(crate) fn entries<'a>(config: &'a Config, table: &str) -> Result<Vec<&'a Map
     }
 }
 
+/// Largest number of a table, in any unit, and largest length: no mechanism has larger ones.
+const LARGEST: f64 = 1e15;
+const LARGEST_M: f64 = 1e6;
+
 /// One table of a list.
 pub(crate) struct Entry<'a> {
     pub table: &'a str,
@@ -151,15 +155,21 @@ impl Entry<'_> {
 
     pub fn number(&self, key: &str) -> Result<Option<f64>> {
         let value = self.map.get(key);
-        let number = value.map(|v| v.as_f64().filter(|x| x.is_finite()));
-        number.map(|x| x.ok_or_else(|| self.refuse(key, "a finite number is needed"))).transpose()
+        let number = value.map(|v| v.as_f64().filter(|x| x.abs() <= LARGEST));
+        let refused = || self.refuse(key, &format!("a number of at most {LARGEST:e} is needed"));
+        number.map(|x| x.ok_or_else(refused)).transpose()
     }
 
     pub fn vector(&self, key: &str) -> Result<Option<V3>> {
         let Some(value) = self.map.get(key) else { return Ok(None) };
         let list: Option<Vec<f64>> = value.as_array().and_then(|a| a.iter().map(Value::as_f64).collect());
         match list.as_deref() {
-            Some([x, y, z]) => Ok(Some(V3::new(*x, *y, *z))),
+            Some([x, y, z]) if [x, y, z].iter().all(|x| x.abs() <= LARGEST_M) => {
+                Ok(Some(V3::new(*x, *y, *z)))
+            }
+            Some([_, _, _]) => {
+                Err(self.refuse(key, &format!("{value} is out of range: plausible is at most {LARGEST_M:e}")))
+            }
             _ => Err(self.refuse(key, &format!("{value} is not a list of x, y, z"))),
         }
     }

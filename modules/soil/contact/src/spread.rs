@@ -63,15 +63,20 @@ impl Spread {
         2.0 * height / self.range / (c + (c * c + 4.0 * square * height / self.range).sqrt())
     }
 
-    /// Part of the cell below `top` (m) where its mean depth is `depth`.
+    /// How far the lowest point of an underside at the mean depth `depth` lies below `top`, m.
+    fn inside(&self, depth: f64, top: f64) -> f64 {
+        depth - top + self.low
+    }
+
+    /// Part of a cell whose depths spread that lies below `top` (m) where its mean depth is `depth`.
     pub fn part_below(&self, depth: f64, top: f64) -> f64 {
-        if self.range <= 0.0 { f64::from(u8::from(depth > top)) } else { self.part(depth - top + self.low) }
+        self.part(self.inside(depth, top))
     }
 
     /// By how much the mean depth of the soil's surface exceeds the mean depth of the underside, m, where the surface was at `top` and
     /// the underside, at the mean depth `depth`, has taken along what it met: of a cell that is in the soil in part the rest lies above.
     pub fn above(&self, depth: f64, top: f64) -> f64 {
-        let inside = depth - top + self.low;
+        let inside = self.inside(depth, top);
         if self.range <= 0.0 || inside >= self.range {
             return 0.0;
         }
@@ -82,14 +87,14 @@ impl Spread {
 
     /// Whether some of an underside that spreads, at the mean depth `depth`, lies deeper than `top` (m).
     pub fn reaches(&self, depth: f64, top: f64) -> bool {
-        self.range > 0.0 && depth + self.low > top
+        self.range > 0.0 && self.inside(depth, top) > 0.0
     }
 
     /// Half the range of the depths that an underside at the mean depth `depth` leaves in soil whose surface was at `top` (m), vertical, m:
     /// of a cell that only a corner of it has touched, that corner's.
     pub fn printed(&self, depth: f64, top: f64) -> f64 {
         let share =
-            if self.range > 0.0 { ((depth - top + self.low) / self.range).clamp(0.0, 1.0) } else { 1.0 };
+            if self.range > 0.0 { (self.inside(depth, top) / self.range).clamp(0.0, 1.0) } else { 1.0 };
         share * self.whole
     }
 
@@ -97,8 +102,7 @@ impl Spread {
     /// does.
     #[inline]
     pub fn look(&self, depth: f64, top: f64) -> Option<Look> {
-        let deepest = depth + self.low;
-        let inside = deepest - top;
+        let (deepest, inside) = (depth + self.low, self.inside(depth, top));
         if inside >= self.range || self.range <= 0.0 {
             let at = GAUSS.map(|g| deepest - self.height(g).0);
             return Some(Look { depth: at, part: [1.0, 0.0], change: [1.0; 2] });

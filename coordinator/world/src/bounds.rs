@@ -86,22 +86,18 @@ impl Bounds {
         }
     }
 
-    /// Part of a line origin + t·direction inside, not before t = 0; none: it passes by.
-    pub fn clip(&self, origin: [f64; 3], direction: [f64; 3]) -> Option<[f64; 2]> {
+    /// Part of a line inside, from its start and 1/direction; none: it passes by.
+    #[inline(always)]
+    pub fn clip(&self, origin: [f64; 3], inverse: [f64; 3]) -> Option<[f64; 2]> {
         let (mut first, mut last) = (0.0_f64, f64::INFINITY);
         for k in 0..3 {
-            if direction[k] == 0.0 {
-                if origin[k] < self.low[k] || origin[k] > self.high[k] {
-                    return None;
-                }
-                continue;
-            }
-            let inverse = 1.0 / direction[k];
-            let (a, b) = ((self.low[k] - origin[k]) * inverse, (self.high[k] - origin[k]) * inverse);
-            first = first.max(a.min(b));
-            last = last.min(a.max(b));
+            let a = (self.low[k] - origin[k]) * inverse[k];
+            let b = (self.high[k] - origin[k]) * inverse[k];
+            let (near, far) = if inverse[k] < 0.0 { (b, a) } else { (a, b) };
+            first = if near > first { near } else { first };
+            last = if far < last { far } else { last };
         }
-        (first <= last).then_some([first, last])
+        (first <= last && first < f64::INFINITY).then_some([first, last])
     }
 
     /// Square of the distance of a point, m².

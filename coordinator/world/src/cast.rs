@@ -1,8 +1,8 @@
 //! Rays through everything: grounds, what moves, what is fixed. The nearest hit counts, whatever was looked at first.
 
 use crate::fixed::Met;
-use crate::ground::Path;
-use crate::model::{GROUND_MATERIAL, WorldModel};
+use crate::ground::{Ground, Path};
+use crate::model::{GROUND_MATERIAL, Member, WorldModel};
 use crate::tree::{Line, Stack};
 use std::sync::{Mutex, PoisonError};
 use terraglue_numerics::rotation::{dot, length};
@@ -13,11 +13,11 @@ const BATCH: usize = 256;
 /// Directions that differ from unit length by less than this are taken as they are.
 const UNIT: f64 = 1e-12;
 
-/// Room that one ray after the other uses.
-#[derive(Default)]
-struct Room {
+/// Room that one ray after the other uses, and the grounds that they can meet.
+struct Room<'a> {
     stacks: [Stack; 2],
     path: Path,
+    grounds: Vec<(u32, &'a Member, &'a Ground)>,
 }
 
 /// The nearest thing so far.
@@ -39,12 +39,12 @@ enum What {
 
 impl Nearest {
     /// Whether a hit would count.
-    #[inline]
+    #[inline(always)]
     fn is_beaten_by(&self, distance: f64) -> bool {
         distance <= self.distance && distance < f64::INFINITY
     }
 
-    #[inline]
+    #[inline(always)]
     fn offer(&mut self, distance: f64, key: (u32, u32), what: What) {
         if distance < self.distance || key < self.key {
             *self = Self { distance, key, what };
@@ -71,7 +71,8 @@ impl WorldModel {
     }
 
     fn cast_some(&self, rays: &[Ray], mask: &RayMask, hits: &mut [RayHit]) {
-        let mut room = Room::default();
+        let grounds = self.grounds(mask).collect();
+        let mut room = Room { stacks: Default::default(), path: Path::default(), grounds };
         for (ray, hit) in rays.iter().zip(hits) {
             *hit = match line(ray) {
                 Some(line) => self.cast_line(&line, ray, mask, &mut room),
@@ -80,15 +81,16 @@ impl WorldModel {
         }
     }
 
+    #[inline(always)]
     fn cast_line(&self, line: &Line, ray: &Ray, mask: &RayMask, room: &mut Room) -> RayHit {
         let share = self.share(ray.time);
         let mut nearest = Nearest { distance: ray.range, key: (u32::MAX, u32::MAX), what: What::Nothing };
-        for (subsystem, member, ground) in self.grounds(mask) {
+        for (subsystem, member, ground) in &room.grounds {
             // what lies exactly at the distance of another still counts by its key
             if let Some((t, normal)) = ground.cast(line, nearest.distance.next_up(), &mut room.path)
                 && nearest.is_beaten_by(t)
             {
-                nearest.offer(t, (member.ground_rank, 0), What::Ground(subsystem, normal));
+                nearest.offer(t, (member.ground_rank, 0), What::Ground(*subsystem, normal));
             }
         }
         if mask.sees & RayMask::SHAPES != 0 {
@@ -97,7 +99,7 @@ impl WorldModel {
         self.hit(line, share, &nearest)
     }
 
-    #[inline]
+    #[inline(always)]
     fn cast_shapes(
         &self,
         (line, share): (&Line, f64),

@@ -23,7 +23,7 @@ pub(crate) struct Solid {
 
 impl Solid {
     /// A line of the world in the frame of the shape.
-    #[inline]
+    #[inline(always)]
     pub fn local(&self, line: &Line) -> Line {
         to_local(line, self.position, &self.rotation)
     }
@@ -101,7 +101,7 @@ impl Fixed {
     }
 
     /// Offers what a line meets, which stands before what `offer` answers.
-    #[inline]
+    #[inline(always)]
     pub fn cast(&self, line: &Line, best: f64, stack: &mut Stack, mut offer: impl FnMut(f64, Met) -> f64) {
         let sheared = Sheared::new(line);
         self.tree.cast(line, best, stack, |k| {
@@ -116,7 +116,7 @@ impl Fixed {
     }
 
     /// Shape and number of the triangle of what was met.
-    #[inline]
+    #[inline(always)]
     pub fn what(&self, met: Met) -> (u32, u32) {
         match met {
             Met::Facet(k) => (self.facets[k as usize].shape, self.facets[k as usize].number),

@@ -31,7 +31,7 @@ pub(crate) struct Carried {
 
 impl Carried {
     /// A line of the world in the frame of the shape.
-    #[inline]
+    #[inline(always)]
     fn local(&self, line: &Line, motion: &Motion, share: f64) -> Line {
         let (position, rotation) = motion.at(share);
         to_local(&to_local(line, position, &rotation), self.position, &self.rotation)
@@ -64,7 +64,7 @@ impl Moving {
 
     /// Offers what a line meets at a share of the step, which stands before what `offer` answers: the distance, the number
     /// of the shape here, and that of the triangle.
-    #[inline]
+    #[inline(always)]
     pub fn cast(
         &self,
         (line, share): (&Line, f64),
@@ -89,7 +89,7 @@ impl Moving {
     }
 
     /// Shape number k.
-    #[inline]
+    #[inline(always)]
     pub fn shape(&self, k: u32) -> &Carried {
         &self.shapes[k as usize]
     }

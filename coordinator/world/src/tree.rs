@@ -15,10 +15,10 @@ use obvhs::ploc::{PlocBuilder, PlocSearchDistance, SortPrecision};
 const ROUNDING: f64 = 1e-6;
 /// Boxes grow by at least this, m.
 const LEAST_MARGIN: f64 = 1e-6;
-/// A component of a direction below this counts as this.
-const LEAST_COMPONENT: f32 = 1e-20;
+/// 1/component of a direction at most.
+pub(crate) const STEEPEST: f64 = 1e20;
 /// Shapes in a leaf at most, where there is time to build well.
-const LEAF: u32 = 8;
+const LARGEST_LEAF: u32 = 8;
 
 /// A half line in double precision.
 #[derive(Clone, Copy, Debug)]
@@ -28,39 +28,44 @@ pub(crate) struct Line {
 }
 
 impl Line {
+    /// 1/direction, finite.
+    #[inline(always)]
+    pub fn inverse(&self) -> [f64; 3] {
+        let [x, y, z] = self.direction;
+        let one = |d: f64| if d.abs() < 1e-300 { 1e300_f64.copysign(d) } else { 1.0 / d };
+        [one(x), one(y), one(z)]
+    }
+
+    #[inline(always)]
     pub fn at(&self, t: f64) -> [f64; 3] {
-        std::array::from_fn(|k| self.origin[k] + t * self.direction[k])
+        let (o, d) = (self.origin, self.direction);
+        [o[0] + t * d[0], o[1] + t * d[1], o[2] + t * d[2]]
     }
 }
+
+/// Marks the shapes of a leaf among what a node holds: LEAF, first place in the order of shapes, 4 bits of their number.
+const LEAF: u32 = 1 << 31;
+/// Bits of the number of shapes of a leaf.
+const COUNT: u32 = 4;
 
 /// Four boxes and what is in them.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 struct Node {
-    low: [Vec4; 3],
-    high: [Vec4; 3],
-    /// First place in the order of shapes, or number of a node.
-    first: [u32; 4],
-    /// Shapes; 0: a node.
-    count: [u32; 4],
+    /// Low and high sides along x, y, z.
+    sides: [[Vec4; 3]; 2],
+    /// Numbers of nodes, or leaves.
+    inside: [u32; 4],
 }
 
 impl Node {
-    const EMPTY: Self =
-        Self { low: [Vec4::INFINITY; 3], high: [Vec4::NEG_INFINITY; 3], first: [0; 4], count: [0; 4] };
+    const EMPTY: Self = Self { sides: [[Vec4::INFINITY; 3], [Vec4::NEG_INFINITY; 3]], inside: [LEAF; 4] };
 }
 
-/// A box that waits: what is in it, and where the ray enters it.
-#[derive(Clone, Copy, Debug, Default)]
-struct Waiting {
-    first: u32,
-    count: u32,
-    near: f32,
-}
-
-/// Room for the boxes that wait, used again by every ray.
+/// Boxes that wait, used again by every ray: the bits of the distance at which the ray enters one, which order as it does, and what
+/// is inside.
 #[derive(Debug, Default)]
-pub(crate) struct Stack(Vec<Waiting>);
+pub(crate) struct Stack(Vec<u64>);
 
 /// What a tree is built with, used again by every building.
 pub(crate) struct Workshop {
@@ -160,12 +165,12 @@ impl Tree {
                 let next = self.nodes.len() as u32;
                 let wide = &mut self.nodes[place as usize];
                 for k in 0..3 {
-                    (wide.low[k][slot], wide.high[k][slot]) = (low[k], high[k]);
+                    (wide.sides[0][k][slot], wide.sides[1][k][slot]) = (low[k], high[k]);
                 }
                 if node.is_leaf() {
-                    (wide.first[slot], wide.count[slot]) = (node.first_index, node.prim_count);
+                    wide.inside[slot] = LEAF | node.first_index << COUNT | node.prim_count;
                 } else {
-                    wide.first[slot] = next;
+                    wide.inside[slot] = next;
                     self.nodes.push(Node::EMPTY);
                     open.push((*child, next, depth + 1));
                 }
@@ -180,64 +185,72 @@ impl Tree {
 
     /// Calls `visit` with shapes near a line, roughly from near to far, as long as their boxes begin before the distance that
     /// it answers: that of the nearest hit so far. `best` is that at the start.
-    #[inline]
+    #[inline(always)]
     pub fn cast(&self, line: &Line, mut best: f64, stack: &mut Stack, mut visit: impl FnMut(u32) -> f64) {
-        let Some([start, end]) = self.bounds.clip(line.origin, line.direction) else { return };
-        if start > best || self.nodes.is_empty() {
+        if self.nodes.is_empty() {
             return;
         }
+        let inverse = line.inverse();
+        let Some([start, end]) = self.bounds.clip(line.origin, inverse).filter(|[start, _]| *start <= best)
+        else {
+            return;
+        };
         best = best.min(end);
         let entry = line.at(start);
-        let origin: [f32; 3] = std::array::from_fn(|k| (entry[k] - self.centre[k]) as f32);
-        let inverse = line.direction.map(|d| {
-            let d = d as f32;
-            if d.abs() < LEAST_COMPONENT { f32::copysign(1.0 / LEAST_COMPONENT, d) } else { 1.0 / d }
-        });
-        let back = inverse.map(|i| i < 0.0);
-        let (origin, inverse) = (origin.map(Vec4::splat), inverse.map(Vec4::splat));
+        let back = inverse.map(|i| usize::from(i < 0.0));
+        let splat = |x: f64| Vec4::splat(x as f32);
+        let origin: [Vec4; 3] = std::array::from_fn(|k| splat(entry[k] - self.centre[k]));
+        let inverse = inverse.map(|i| splat(i.clamp(-STEEPEST, STEEPEST)));
         let farthest = |best: f64| ((best - start) as f32).next_up();
         let mut far = farthest(best);
-        let need = 3 * self.depth + 4;
-        if stack.0.len() < need {
-            stack.0.resize(need, Waiting::default());
+        if stack.0.len() < 3 * self.depth {
+            stack.0.resize(3 * self.depth, 0);
         }
         let waiting = &mut stack.0[..];
-        let mut top = 1;
-        waiting[0] = Waiting::default();
-        while top > 0 {
-            top -= 1;
-            let Waiting { first, count, near } = waiting[top];
-            if near > far {
-                continue;
-            }
-            if count > 0 {
+        let (mut top, mut inside) = (0, 0);
+        loop {
+            if inside & LEAF == 0 {
+                let node = &self.nodes[inside as usize];
+                let (mut near, mut end) = (Vec4::ZERO, Vec4::splat(far));
+                for k in 0..3 {
+                    near = near.max((node.sides[back[k] & 1][k] - origin[k]) * inverse[k]);
+                    end = end.min((node.sides[!back[k] & 1][k] - origin[k]) * inverse[k]);
+                }
+                let (mut met, near) = (near.cmple(end).bitmask(), near.to_array());
+                if met != 0 {
+                    let mut next = || {
+                        let slot = met.trailing_zeros() as usize & 3;
+                        met &= met - 1;
+                        (u64::from(near[slot].to_bits()) << 32 | u64::from(node.inside[slot]), met)
+                    };
+                    let (mut nearest, mut left) = next();
+                    while left != 0 {
+                        let other;
+                        (other, left) = next();
+                        waiting[top] = nearest.max(other);
+                        nearest = nearest.min(other);
+                        top += 1;
+                    }
+                    inside = nearest as u32;
+                    continue;
+                }
+            } else {
+                let (first, count) = ((inside & !LEAF) >> COUNT, inside & ((1 << COUNT) - 1));
                 for k in &self.order[first as usize..(first + count) as usize] {
                     best = best.min(visit(*k));
                 }
                 far = farthest(best);
-                continue;
             }
-            let node = &self.nodes[first as usize];
-            let (mut near, mut end) = (Vec4::ZERO, Vec4::splat(far));
-            for k in 0..3 {
-                let (a, b) = if back[k] { (node.high[k], node.low[k]) } else { (node.low[k], node.high[k]) };
-                near = near.max((a - origin[k]) * inverse[k]);
-                end = end.min((b - origin[k]) * inverse[k]);
-            }
-            let mut met = near.cmple(end).bitmask();
-            let (near, base) = (near.to_array(), top);
-            while met != 0 {
-                let slot = met.trailing_zeros() as usize & 3;
-                met &= met - 1;
-                let new = Waiting { first: node.first[slot], count: node.count[slot], near: near[slot] };
-                let mut place = top;
-                while place > base && waiting[place - 1].near < new.near {
-                    waiting[place] = waiting[place - 1];
-                    place -= 1;
+            loop {
+                if top == 0 {
+                    return;
                 }
-                waiting[place] = new;
-                top += 1;
+                top -= 1;
+                if f32::from_bits((waiting[top] >> 32) as u32) <= far {
+                    break;
+                }
             }
+            inside = waiting[top] as u32;
         }
     }
 
@@ -252,18 +265,19 @@ impl Tree {
         while let Some(place) = open.pop() {
             let node = &self.nodes[place as usize];
             for slot in 0..4 {
-                let beside =
-                    |k: usize| (node.low[k][slot] - local[k]).max(local[k] - node.high[k][slot]).max(0.0);
+                let beside = |k: usize| {
+                    (node.sides[0][k][slot] - local[k]).max(local[k] - node.sides[1][k][slot]).max(0.0)
+                };
                 if (0..3).any(|k| beside(k) > reach) {
                     continue;
                 }
-                match node.count[slot] {
-                    0 => open.push(node.first[slot]),
-                    count => {
-                        let first = node.first[slot] as usize;
-                        self.order[first..first + count as usize].iter().for_each(|k| visit(*k));
-                    }
+                let inside = node.inside[slot];
+                if inside & LEAF == 0 {
+                    open.push(inside);
+                    continue;
                 }
+                let (first, count) = ((inside & !LEAF) >> COUNT, inside & ((1 << COUNT) - 1));
+                self.order[first as usize..(first + count) as usize].iter().for_each(|k| visit(*k));
             }
         }
     }
@@ -279,7 +293,7 @@ impl Workshop {
         self.builder.build_with_bvh(&mut self.binary, distance, &self.boxes, indices, SortPrecision::U64, 0);
         if care == Care::Static {
             ReinsertionOptimizer::default().run(&mut self.binary, 0.15, None);
-            collapse(&mut self.binary, LEAF, 1.0);
+            collapse(&mut self.binary, LARGEST_LEAF, 1.0);
         }
     }
 }

@@ -11,39 +11,75 @@ use terraglue_numerics::rotation::{cross, dot, minus};
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Sheared {
     origin: [f64; 3],
-    /// The axis that the line runs along most, and the others in its order.
-    axes: [usize; 3],
+    /// The axis that the line runs along most is the last, the others before it in their order.
+    most: Axis,
     shear: [f64; 3],
 }
 
+#[derive(Clone, Copy, Debug, PartialEq)]
+enum Axis {
+    X,
+    Y,
+    Z,
+}
+
+impl Axis {
+    /// Components in the order that ends with this axis.
+    #[inline(always)]
+    fn last(self, p: [f64; 3]) -> [f64; 3] {
+        match self {
+            Self::X => [p[1], p[2], p[0]],
+            Self::Y => [p[2], p[0], p[1]],
+            Self::Z => p,
+        }
+    }
+}
+
 impl Sheared {
+    #[inline(always)]
     pub fn new(line: &Line) -> Self {
-        let d = line.direction;
-        let size = d.map(f64::abs);
-        let most = if size[0] > size[1] { 0 } else { 1 };
-        let most = if size[2] > size[most] { 2 } else { most };
-        let axes = [(most + 1) % 3, (most + 2) % 3, most];
-        let along = 1.0 / d[most];
-        Self { origin: line.origin, axes, shear: [d[axes[0]] * along, d[axes[1]] * along, along] }
+        let size = line.direction.map(f64::abs);
+        let most = match () {
+            () if size[2] >= size[0] && size[2] >= size[1] => Axis::Z,
+            () if size[1] >= size[0] => Axis::Y,
+            () => Axis::X,
+        };
+        let d = most.last(line.direction);
+        let along = 1.0 / d[2];
+        Self { origin: most.last(line.origin), most, shear: [d[0] * along, d[1] * along, along] }
+    }
+
+    /// A corner as the line sees it.
+    #[inline(always)]
+    fn seen(&self, p: [f64; 3]) -> [f64; 3] {
+        let (p, o, shear) = (self.most.last(p), self.origin, self.shear);
+        let along = p[2] - o[2];
+        [p[0] - o[0] - shear[0] * along, p[1] - o[1] - shear[1] * along, along]
     }
 
     /// Where the line meets a triangle, not before its start; ∞: it misses. Edges belong to the triangle.
-    #[inline]
+    #[inline(always)]
     pub fn cast(&self, corners: &[[f64; 3]; 3]) -> f64 {
-        let ([x, y, z], shear) = (self.axes, self.shear);
-        let seen = corners.map(|p| {
-            let along = p[z] - self.origin[z];
-            [p[x] - self.origin[x] - shear[0] * along, p[y] - self.origin[y] - shear[1] * along, along]
-        });
-        let [a, b, c] = seen;
+        self.cast_seen([self.seen(corners[0]), self.seen(corners[1]), self.seen(corners[2])])
+    }
+
+    /// Where it meets the triangles a, b, c and b, d, c.
+    #[inline(always)]
+    pub fn cast_pair(&self, [a, b, c, d]: [[f64; 3]; 4]) -> [f64; 2] {
+        let [a, b, c, d] = [self.seen(a), self.seen(b), self.seen(c), self.seen(d)];
+        [self.cast_seen([a, b, c]), self.cast_seen([b, d, c])]
+    }
+
+    #[inline(always)]
+    fn cast_seen(&self, [a, b, c]: [[f64; 3]; 3]) -> f64 {
         let u = c[0] * b[1] - c[1] * b[0];
         let v = a[0] * c[1] - a[1] * c[0];
         let w = b[0] * a[1] - b[1] * a[0];
-        if (u < 0.0 || v < 0.0 || w < 0.0) && (u > 0.0 || v > 0.0 || w > 0.0) {
+        let (least, most) = (u.min(v).min(w), u.max(v).max(w));
+        if least < 0.0 && most > 0.0 {
             return f64::INFINITY;
         }
-        let whole = u + v + w;
-        let t = shear[2] * (u * a[2] + v * b[2] + w * c[2]) / whole;
+        let t = self.shear[2] * (u * a[2] + v * b[2] + w * c[2]) / (u + v + w);
         // what is not a number is no hit: the triangle is seen from its edge or has no area
         if t >= 0.0 { t } else { f64::INFINITY }
     }

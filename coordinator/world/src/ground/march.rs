@@ -1,154 +1,211 @@
 //! A ray over the ground: down the pyramid of blocks from near to far, into those whose heights it can meet, to the two
 //! triangles of a cell.
 //!
-//! Along x and y lengths are counted in cells, so that the borders of blocks are whole numbers. Blocks overlap by more than what
-//! rounding can move a ray, and triangles that share an edge agree on which of them is hit: nothing slips through.
+//! Along x and y lengths are counted in cells, so that the borders of blocks are whole numbers. Which blocks are near is found in
+//! single precision from where the ray enters the ground; blocks are grown by more than it can lose. Triangles that share an edge
+//! agree on which of them is hit: nothing slips through.
 
-use super::Ground;
+use super::{Ground, TILE_LEVEL};
 use crate::bounds::Bounds;
-use crate::tree::Line;
+use crate::tree::{Line, STEEPEST};
 use crate::triangle::{Sheared, normal};
+use glam::{Vec4, vec4};
 
-/// Blocks overlap by this, cells.
-const OVERLAP: f64 = 1e-9;
+/// Blocks are grown by this, cells.
+const OVERLAP: f64 = 1e-6;
+/// And by this share of their distance and height: five times what single precision can lose.
+const ROUNDING: f32 = 1e-6;
 
 /// A block that waits.
 #[derive(Clone, Copy, Debug, Default)]
 struct Block {
+    /// Where the ray enters it.
+    near: f32,
     level: u32,
     at: [u32; 2],
-    /// Where the ray is in it.
-    from: f64,
-    to: f64,
 }
 
-/// Room for the blocks that wait, used again by every ray.
+/// Blocks that wait, used again by every ray.
 #[derive(Debug, Default)]
 pub(crate) struct Path(Vec<Block>);
 
-/// A ray in cells, m and cells.
+/// A ray in cells, cells and m, from where it enters the ground.
 struct Way {
     line: Line,
-    inverse: [f64; 2],
-    /// How far along the ray blocks overlap.
-    overlap: [f64; 2],
     sheared: Sheared,
+    inverse: [Vec4; 3],
+    back: [bool; 3],
+    /// Height of the start, less and more what single precision can lose.
+    start: [Vec4; 2],
 }
 
 impl Way {
-    fn new(line: Line) -> Self {
-        let inverse =
-            [0, 1].map(|k| if line.direction[k] == 0.0 { f64::MAX } else { 1.0 / line.direction[k] });
-        let overlap = [0, 1].map(|k| OVERLAP * inverse[k].abs());
-        Self { line, inverse, overlap, sheared: Sheared::new(&line) }
+    #[inline(always)]
+    fn new(line: Line, inverse: [f64; 3], [low, high]: [f32; 2]) -> Self {
+        let start = line.origin[2] as f32;
+        let room = ROUNDING * (start.abs() + low.abs() + high.abs());
+        Self {
+            line,
+            sheared: Sheared::new(&line),
+            back: inverse.map(|i| i < 0.0),
+            inverse: inverse.map(|i| Vec4::splat(i.clamp(-STEEPEST, STEEPEST) as f32)),
+            start: [start + room, start - room].map(Vec4::splat),
+        }
     }
 
-    /// Lowest and highest the ray gets between two lengths, with room for rounding.
-    #[inline]
-    fn heights(&self, from: f64, to: f64) -> [f64; 2] {
-        let [a, b] = [from, to].map(|t| self.line.origin[2] + t * self.line.direction[2]);
-        let room = 1e-12 * (a.abs() + b.abs());
-        [a.min(b) - room, a.max(b) + room]
+    /// Borders of the lower and of the upper half of a block along axis k, which overlap, from the start of the ray.
+    #[inline(always)]
+    fn borders(&self, k: usize, block: &Block) -> [f32; 4] {
+        let low = f64::from(block.at[k] << block.level) - self.line.origin[k];
+        let half = f64::from(1_u32 << (block.level - 1));
+        let [low, middle, high] = [low, low + half, low + 2.0 * half].map(|x| x as f32);
+        let room = ROUNDING * low.abs().max(high.abs()) + OVERLAP as f32;
+        [low - room, middle - room, middle + room, high + room]
     }
 
-    /// Parts of a block, cut at the whole number `at` along axis k: of the half that the ray enters first and of the other.
-    #[inline]
-    fn cut(&self, k: usize, at: u32, block: &Block) -> [[f64; 2]; 2] {
-        let t = (f64::from(at) - self.line.origin[k]) * self.inverse[k];
-        [[block.from, block.to.min(t + self.overlap[k])], [block.from.max(t - self.overlap[k]), block.to]]
+    /// The parts of a block that the ray can meet before `far`: a bit for each, and where it enters them.
+    #[inline(always)]
+    fn parts(&self, ground: &Ground, block: &Block, far: f32) -> (u32, [f32; 4]) {
+        let quarters = ground.block(block.level, block.at);
+        let [x0, left, right, x1] = self.borders(0, block);
+        let [y0, front, rear, y1] = self.borders(1, block);
+        let sides = [
+            [vec4(x0, left, x0, left), vec4(right, x1, right, x1)],
+            [vec4(y0, y0, front, front), vec4(rear, rear, y1, y1)],
+            [quarters.low - self.start[0], quarters.high - self.start[1]],
+        ];
+        let (mut near, mut end) = (Vec4::ZERO, Vec4::splat(far));
+        for k in 0..3 {
+            let [low, high] = sides[k];
+            let (first, last) = if self.back[k] { (high, low) } else { (low, high) };
+            near = near.max(first * self.inverse[k]);
+            end = end.min(last * self.inverse[k]);
+        }
+        (near.cmple(end).bitmask(), near.to_array())
     }
+}
+
+/// What the ray meets.
+struct Found {
+    t: f64,
+    /// Of a surface over cells, of any length.
+    normal: [f64; 3],
 }
 
 impl Ground {
     /// Distance along a line to the ground if it is below `best`, and the normal there.
+    #[inline(always)]
     pub fn cast(&self, line: &Line, best: f64, path: &mut Path) -> Option<(f64, [f64; 3])> {
         let spacing = self.lattice.spacing;
         let o = self.lattice.coordinates(line.origin[0], line.origin[1]);
         let d = line.direction;
-        let scaled =
-            Line { origin: [o[0], o[1], line.origin[2]], direction: [d[0] / spacing, d[1] / spacing, d[2]] };
-        let whole = self.above.range(self.above.top(), [0, 0]);
+        let origin = [o[0], o[1], line.origin[2]];
+        let scaled = Line { origin, direction: [d[0] / spacing, d[1] / spacing, d[2]] };
+        let inverse = scaled.inverse();
+        let [low, high] = self.above.whole();
+        let room = ROUNDING * (low.abs() + high.abs());
         let cells = self.lattice.size.map(|n| f64::from(n.saturating_sub(1)));
         let bounds = Bounds {
-            low: [-OVERLAP, -OVERLAP, f64::from(whole.low)],
-            high: [cells[0] + OVERLAP, cells[1] + OVERLAP, f64::from(whole.high)],
+            low: [-OVERLAP, -OVERLAP, f64::from(low - room)],
+            high: [cells[0] + OVERLAP, cells[1] + OVERLAP, f64::from(high + room)],
         };
-        if bounds.is_empty() {
-            return None;
-        }
-        let [start, end] = bounds.clip(scaled.origin, scaled.direction)?;
+        let [start, end] = bounds.clip(scaled.origin, inverse).filter(|_| low <= high)?;
         if start > best {
             return None;
         }
-        let way = Way::new(Line { origin: scaled.at(start), ..scaled });
-        let (t, cell, upper) = self.descend(&way, [end - start, best - start], path)?;
-        let corners = triangles(cell, &self.cell(cell))[usize::from(upper)];
-        let world = corners.map(|[x, y, z]| [x * spacing, y * spacing, z]);
-        Some((start + t, normal(&world)))
+        let way = Way::new(Line { origin: scaled.at(start), ..scaled }, inverse, [low, high]);
+        let found = self.descend(&way, [end - start, best - start], path)?;
+        // from cells to m
+        let [x, y, z] = found.normal;
+        Some((start + found.t, [x / spacing, y / spacing, z]))
     }
 
-    /// The first triangle between the ray's start and `end`, before `best`: how far it is, its cell, and which of the two.
-    fn descend(&self, way: &Way, [end, best]: [f64; 2], path: &mut Path) -> Option<(f64, [u32; 2], bool)> {
+    /// The first triangle between the ray's start and `end`, before `best`.
+    #[inline(always)]
+    fn descend(&self, way: &Way, [end, best]: [f64; 2], path: &mut Path) -> Option<Found> {
         let (mut best, mut found) = (best, None);
+        let limit = |best: f64| (best.min(end) as f32 * (1.0 + ROUNDING)).next_up() + ROUNDING;
+        let mut far = limit(best);
         path.0.clear();
-        path.0.push(Block { level: self.top(), at: [0, 0], from: 0.0, to: end });
-        while let Some(block) = path.0.pop() {
-            if block.from > best {
-                continue;
-            }
-            let range = self.range(block.level, block.at);
-            let [low, high] = way.heights(block.from, block.to.min(best));
-            if !(low <= f64::from(range.high) && high >= f64::from(range.low)) {
-                continue;
-            }
-            if block.level > 0 {
-                open(way, &block, path);
-                continue;
-            }
-            let triangles = triangles(block.at, &self.cell(block.at));
-            for (upper, corners) in [(false, &triangles[0]), (true, &triangles[1])] {
-                let t = way.sheared.cast(corners);
-                if t < best {
-                    (best, found) = (t, Some((t, block.at, upper)));
+        let mut block = Block { near: 0.0, level: self.top(), at: [0, 0] };
+        loop {
+            if let Some(hit) = self.leaf(way, &block, best) {
+                if let Some(hit) = hit.filter(|hit| hit.t < best) {
+                    (best, far) = (hit.t, limit(hit.t));
+                    found = Some(hit);
+                }
+            } else {
+                let (mut met, near) = way.parts(self, &block, far);
+                let mut nearest: Option<Block> = None;
+                while met != 0 {
+                    let part = met.trailing_zeros();
+                    met &= met - 1;
+                    let at = [2 * block.at[0] + (part & 1), 2 * block.at[1] + (part >> 1 & 1)];
+                    let new = Block { near: near[part as usize & 3], level: block.level - 1, at };
+                    nearest = Some(match nearest {
+                        None => new,
+                        Some(old) if new.near < old.near => {
+                            path.0.push(old);
+                            new
+                        }
+                        Some(old) => {
+                            path.0.push(new);
+                            old
+                        }
+                    });
+                }
+                if let Some(nearest) = nearest {
+                    block = nearest;
+                    continue;
                 }
             }
+            block = loop {
+                let next = path.0.pop();
+                match next {
+                    None => return found,
+                    Some(next) if next.near <= far => break next,
+                    Some(_) => {}
+                }
+            };
         }
-        found
+    }
+
+    /// What the ray meets in a block that is not divided further, if it is one: a cell, or a level tile.
+    #[inline(always)]
+    fn leaf(&self, way: &Way, block: &Block, best: f64) -> Option<Option<Found>> {
+        if block.level == 0 {
+            return Some(self.in_cell(way, block.at, best));
+        }
+        if block.level != TILE_LEVEL {
+            return None;
+        }
+        let height = self.tile(block.at).level()?;
+        let t = (height - way.line.origin[2]) / way.line.direction[2];
+        let inside = |k: usize| {
+            let from = way.line.at(t)[k] - f64::from(block.at[k] << TILE_LEVEL);
+            from >= -OVERLAP && from <= f64::from(1 << TILE_LEVEL) + OVERLAP
+        };
+        Some((t >= 0.0 && inside(0) && inside(1)).then_some(Found { t, normal: [0.0, 0.0, 1.0] }))
+    }
+
+    #[inline(always)]
+    fn in_cell(&self, way: &Way, at: [u32; 2], best: f64) -> Option<Found> {
+        let [p, q, r, s] = corners(at, &self.cell(at));
+        let [a, b] = way.sheared.cast_pair([p, q, r, s]);
+        let t = if b < a { b } else { a };
+        (t < best).then(|| Found { t, normal: normal(&if b < a { [q, s, r] } else { [p, q, r] }) })
     }
 }
 
-/// Puts the four parts of a block on the path, the nearest on top.
-#[inline]
-fn open(way: &Way, block: &Block, path: &mut Path) {
-    let level = block.level - 1;
-    let middle = block.at.map(|k| (2 * k + 1) << level);
-    let [x, y] = [0, 1].map(|k| way.cut(k, middle[k], block));
-    // the half of the larger numbers comes first where the ray runs backwards
-    let first = [0, 1].map(|k| u32::from(way.inverse[k] < 0.0));
-    let part = |a: usize, b: usize| {
-        let at = [2 * block.at[0] + (first[0] ^ a as u32), 2 * block.at[1] + (first[1] ^ b as u32)];
-        Block { level, at, from: x[a][0].max(y[b][0]), to: x[a][1].min(y[b][1]) }
-    };
-    let (far, mut beside, near) = (part(1, 1), [part(1, 0), part(0, 1)], part(0, 0));
-    if beside[0].from < beside[1].from {
-        beside.swap(0, 1);
-    }
-    for part in [far, beside[0], beside[1], near] {
-        if part.from <= part.to {
-            path.0.push(part);
-        }
-    }
+/// The corners of a cell, in cells and m.
+#[inline(always)]
+fn corners([i, j]: [u32; 2], heights: &[f64; 4]) -> [[f64; 3]; 4] {
+    let (x, y) = (f64::from(i), f64::from(j));
+    [[x, y, heights[0]], [x + 1.0, y, heights[1]], [x, y + 1.0, heights[2]], [x + 1.0, y + 1.0, heights[3]]]
 }
 
 /// The two triangles of a cell, in cells and m.
-#[inline]
-pub(super) fn triangles([i, j]: [u32; 2], heights: &[f64; 4]) -> [[[f64; 3]; 3]; 2] {
-    let (x, y) = (f64::from(i), f64::from(j));
-    let [a, b, c, d] = [
-        [x, y, heights[0]],
-        [x + 1.0, y, heights[1]],
-        [x, y + 1.0, heights[2]],
-        [x + 1.0, y + 1.0, heights[3]],
-    ];
+pub(super) fn triangles(cell: [u32; 2], heights: &[f64; 4]) -> [[[f64; 3]; 3]; 2] {
+    let [a, b, c, d] = corners(cell, heights);
     [[a, b, c], [b, d, c]]
 }

@@ -8,7 +8,7 @@ mod pyramid;
 mod sample;
 mod tile;
 
-use pyramid::{Pyramid, Range};
+use pyramid::{Pyramid, Quarters};
 use terraglue_ground::{Lattice, TILE_EDGE};
 use terraglue_subsystem::{FieldInfo, FieldTile};
 use tile::Tile;
@@ -119,7 +119,6 @@ impl Ground {
             let bounds = self.tiles[*number as usize].measure(&rim);
             self.above.set([a, b], bounds);
         }
-        self.above.join();
         stale.clear();
         self.stale = stale;
     }
@@ -129,31 +128,33 @@ impl Ground {
         if i >= self.lattice.size[0] || j >= self.lattice.size[1] {
             return f64::NAN;
         }
-        let tile = &self.tiles[(j / TILE_EDGE * self.count[0] + i / TILE_EDGE) as usize];
-        tile.height(i % TILE_EDGE, j % TILE_EDGE)
+        self.tile([i / TILE_EDGE, j / TILE_EDGE]).height(i % TILE_EDGE, j % TILE_EDGE)
     }
 
     /// Heights at the corners of a cell: (i, j), (i + 1, j), (i, j + 1), (i + 1, j + 1).
     #[inline]
     fn cell(&self, [i, j]: [u32; 2]) -> [f64; 4] {
-        let tile = &self.tiles[(j / TILE_EDGE * self.count[0] + i / TILE_EDGE) as usize];
-        tile.cell(i % TILE_EDGE, j % TILE_EDGE)
+        self.tile([i / TILE_EDGE, j / TILE_EDGE]).cell(i % TILE_EDGE, j % TILE_EDGE)
     }
 
-    /// Bounds of a block of 2^level cells along an edge.
     #[inline]
-    fn range(&self, level: u32, at: [u32; 2]) -> Range {
-        if level >= TILE_LEVEL {
-            return self.above.range(level - TILE_LEVEL, at);
+    fn tile(&self, [a, b]: [u32; 2]) -> &Tile {
+        &self.tiles[(b * self.count[0] + a) as usize]
+    }
+
+    /// A block of 2^level cells along an edge, 1 ≤ level, in a tile that is not level or of several tiles.
+    #[inline]
+    fn block(&self, level: u32, at: [u32; 2]) -> &Quarters {
+        if level > TILE_LEVEL {
+            return self.above.block(level - TILE_LEVEL - 1, at);
         }
         let down = TILE_LEVEL - level;
-        let tile = &self.tiles[((at[1] >> down) * self.count[0] + (at[0] >> down)) as usize];
-        tile.range(level, at.map(|k| k & ((1 << down) - 1)))
+        self.tile(at.map(|k| k >> down)).block(level, at.map(|k| k & ((1 << down) - 1)))
     }
 
     /// Level of the block that holds everything.
     fn top(&self) -> u32 {
-        TILE_LEVEL + self.above.top()
+        TILE_LEVEL + 1 + self.above.top()
     }
 }
 

@@ -29,33 +29,20 @@ impl Ground {
             return true;
         }
         let u = self.lattice.coordinates(centre[0], centre[1]);
-        let reach = radius / self.lattice.spacing;
-        let last = self.lattice.size.map(|n| f64::from(n) - 2.0);
-        let mut open = vec![(self.top(), [0_u32; 2])];
-        while let Some((level, at)) = open.pop() {
-            let apart = (0..2).any(|k| {
-                let (low, size) = (f64::from(at[k] << level), f64::from(1_u32 << level));
-                u[k] + reach < low || u[k] - reach > low + size || low > last[k]
-            });
-            // what is wholly below the sphere, or no ground
-            if apart || !(f64::from(self.range(level, at).high) >= centre[2] - radius) {
-                continue;
-            }
-            if level > 0 {
-                let halves = [0, 1].map(|b| [0, 1].map(|a| [2 * at[0] + a, 2 * at[1] + b]));
-                open.extend(halves.as_flattened().iter().map(|at| (level - 1, *at)));
-                continue;
-            }
-            let spacing = self.lattice.spacing;
-            let point = [u[0] * spacing, u[1] * spacing, centre[2]];
-            let near = |t: &[[f64; 3]; 3]| {
-                let corners = t.map(|[x, y, z]| [x * spacing, y * spacing, z]);
-                distance_squared(&corners, point) <= radius * radius
-            };
-            if triangles(at, &self.cell(at)).iter().any(near) {
-                return true;
-            }
-        }
-        false
+        let (spacing, cells) = (self.lattice.spacing, self.lattice.size.map(|n| f64::from(n) - 1.0));
+        let reach = radius / spacing;
+        let around = |k: usize| {
+            let low = (u[k] - reach).floor().max(0.0);
+            low as u32..(u[k] + reach).ceil().min(cells[k]).max(low) as u32
+        };
+        let point = [u[0] * spacing, u[1] * spacing, centre[2]];
+        around(1).any(|j| {
+            around(0).any(|i| {
+                triangles([i, j], &self.cell([i, j])).iter().any(|t| {
+                    let corners = t.map(|[x, y, z]| [x * spacing, y * spacing, z]);
+                    distance_squared(&corners, point) <= radius * radius
+                })
+            })
+        })
     }
 }

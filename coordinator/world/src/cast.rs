@@ -85,6 +85,9 @@ impl WorldModel {
     fn cast_line(&self, line: &Line, ray: &Ray, mask: &RayMask, room: &mut Room) -> RayHit {
         let share = self.share(ray.time);
         let mut nearest = Nearest { distance: ray.range, key: (u32::MAX, u32::MAX), what: What::Nothing };
+        if mask.sees & RayMask::SHAPES != 0 {
+            self.cast_shapes((line, share), mask, room, &mut nearest);
+        }
         for (subsystem, member, ground) in &room.grounds {
             // what lies exactly at the distance of another still counts by its key
             if let Some((t, normal)) = ground.cast(line, nearest.distance.next_up(), &mut room.path)
@@ -92,9 +95,6 @@ impl WorldModel {
             {
                 nearest.offer(t, (member.ground_rank, 0), What::Ground(*subsystem, normal));
             }
-        }
-        if mask.sees & RayMask::SHAPES != 0 {
-            self.cast_shapes((line, share), mask, room, &mut nearest);
         }
         self.hit(line, share, &nearest)
     }

@@ -1,8 +1,8 @@
-//! A tree of boxes around shapes, four to a node, that finds the few shapes near a ray.
+//! A tree of boxes around shapes, eight to a node, that finds the few shapes near a ray.
 //!
 //! Single precision: boxes are rounded outwards and grown by more than all rounding on the way, so a shape that is hit is never
 //! passed by; what is hit, and where, is computed in double precision by the caller. The binary tree comes from obvhs. Its own
-//! wide nodes are compressed for graphics processors; taking the bytes apart costs more here than reading four boxes as they are
+//! wide nodes are compressed for graphics processors; taking the bytes apart costs more here than reading boxes as they are
 //! (`docs/performance.md`).
 
 use crate::bounds::Bounds;
@@ -48,18 +48,26 @@ const LEAF: u32 = 1 << 31;
 /// Bits of the number of shapes of a leaf.
 const COUNT: u32 = 4;
 
-/// Four boxes and what is in them.
+/// Boxes in a node.
+const WIDTH: usize = 8;
+/// Vectors of four that hold them.
+const HALVES: usize = WIDTH / 4;
+
+/// Eight boxes and what is in them.
 #[derive(Clone, Copy, Debug)]
 #[repr(align(64))]
 struct Node {
     /// Low and high sides along x, y, z.
-    sides: [[Vec4; 3]; 2],
+    sides: [[[Vec4; HALVES]; 3]; 2],
     /// Numbers of nodes, or leaves.
-    inside: [u32; 4],
+    inside: [u32; WIDTH],
 }
 
 impl Node {
-    const EMPTY: Self = Self { sides: [[Vec4::INFINITY; 3], [Vec4::NEG_INFINITY; 3]], inside: [LEAF; 4] };
+    const EMPTY: Self = Self {
+        sides: [[[Vec4::INFINITY; HALVES]; 3], [[Vec4::NEG_INFINITY; HALVES]; 3]],
+        inside: [LEAF; WIDTH],
+    };
 }
 
 /// Boxes that wait, used again by every ray: the bits of the distance at which the ray enters one, which order as it does, and what
@@ -148,7 +156,7 @@ impl Tree {
         self.widen(workshop);
     }
 
-    /// Takes the binary tree into nodes of four.
+    /// Takes the binary tree into wide nodes.
     fn widen(&mut self, workshop: &mut Workshop) {
         let binary = &workshop.binary;
         let open = &mut workshop.open;
@@ -158,14 +166,15 @@ impl Tree {
         self.depth = 1;
         while let Some((root, place, depth)) = open.pop() {
             self.depth = self.depth.max(depth as usize);
-            let (children, count) = four(binary, root);
+            let (children, count) = widest(binary, root);
             for (slot, child) in children[..count].iter().enumerate() {
                 let node = &binary.nodes[*child as usize];
                 let (low, high) = (node.aabb().min, node.aabb().max);
                 let next = self.nodes.len() as u32;
                 let wide = &mut self.nodes[place as usize];
                 for k in 0..3 {
-                    (wide.sides[0][k][slot], wide.sides[1][k][slot]) = (low[k], high[k]);
+                    let (half, lane) = (slot / 4, slot % 4);
+                    (wide.sides[0][k][half][lane], wide.sides[1][k][half][lane]) = (low[k], high[k]);
                 }
                 if node.is_leaf() {
                     wide.inside[slot] = LEAF | node.first_index << COUNT | node.prim_count;
@@ -203,23 +212,28 @@ impl Tree {
         let inverse = inverse.map(|i| splat(i.clamp(-STEEPEST, STEEPEST)));
         let farthest = |best: f64| ((best - start) as f32).next_up();
         let mut far = farthest(best);
-        if stack.0.len() < 3 * self.depth {
-            stack.0.resize(3 * self.depth, 0);
+        if stack.0.len() < (WIDTH - 1) * self.depth {
+            stack.0.resize((WIDTH - 1) * self.depth, 0);
         }
         let waiting = &mut stack.0[..];
         let (mut top, mut inside) = (0, 0);
         loop {
             if inside & LEAF == 0 {
                 let node = &self.nodes[inside as usize];
-                let (mut near, mut end) = (Vec4::ZERO, Vec4::splat(far));
-                for k in 0..3 {
-                    near = near.max((node.sides[back[k] & 1][k] - origin[k]) * inverse[k]);
-                    end = end.min((node.sides[!back[k] & 1][k] - origin[k]) * inverse[k]);
+                let (mut met, mut near) = (0, [[0.0; 4]; HALVES]);
+                for half in 0..HALVES {
+                    let (mut enter, mut leave) = (Vec4::ZERO, Vec4::splat(far));
+                    for k in 0..3 {
+                        enter = enter.max((node.sides[back[k] & 1][k][half] - origin[k]) * inverse[k]);
+                        leave = leave.min((node.sides[!back[k] & 1][k][half] - origin[k]) * inverse[k]);
+                    }
+                    met |= enter.cmple(leave).bitmask() << (4 * half);
+                    near[half] = enter.to_array();
                 }
-                let (mut met, near) = (near.cmple(end).bitmask(), near.to_array());
+                let near = near.as_flattened();
                 if met != 0 {
                     let mut next = || {
-                        let slot = met.trailing_zeros() as usize & 3;
+                        let slot = met.trailing_zeros() as usize % WIDTH;
                         met &= met - 1;
                         (u64::from(near[slot].to_bits()) << 32 | u64::from(node.inside[slot]), met)
                     };
@@ -264,9 +278,12 @@ impl Tree {
         let mut open = vec![0_u32];
         while let Some(place) = open.pop() {
             let node = &self.nodes[place as usize];
-            for slot in 0..4 {
+            for slot in 0..WIDTH {
+                let (half, lane) = (slot / 4, slot % 4);
                 let beside = |k: usize| {
-                    (node.sides[0][k][slot] - local[k]).max(local[k] - node.sides[1][k][slot]).max(0.0)
+                    (node.sides[0][k][half][lane] - local[k])
+                        .max(local[k] - node.sides[1][k][half][lane])
+                        .max(0.0)
                 };
                 if (0..3).any(|k| beside(k) > reach) {
                     continue;
@@ -292,16 +309,16 @@ impl Workshop {
         };
         self.builder.build_with_bvh(&mut self.binary, distance, &self.boxes, indices, SortPrecision::U64, 0);
         if care == Care::Static {
-            ReinsertionOptimizer::default().run(&mut self.binary, 0.15, None);
+            ReinsertionOptimizer::default().run(&mut self.binary, 1.0, None);
             collapse(&mut self.binary, LARGEST_LEAF, 1.0);
         }
     }
 }
 
-/// Up to four nodes below a node of a binary tree that together hold all that it holds: the largest are opened first.
-fn four(binary: &Bvh2, root: u32) -> ([u32; 4], usize) {
-    let (mut children, mut count) = ([root; 4], 1);
-    while count < 4 {
+/// Up to eight nodes below a node of a binary tree that together hold all that it holds: the largest are opened first.
+fn widest(binary: &Bvh2, root: u32) -> ([u32; WIDTH], usize) {
+    let (mut children, mut count) = ([root; WIDTH], 1);
+    while count < WIDTH {
         let area = |k: &u32| binary.nodes[*k as usize].aabb().half_area();
         let inner = (0..count).filter(|slot| !binary.nodes[children[*slot] as usize].is_leaf());
         let Some(largest) = inner.max_by(|a, b| area(&children[*a]).total_cmp(&area(&children[*b]))) else {

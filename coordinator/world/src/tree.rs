@@ -17,6 +17,8 @@ const ROUNDING: f64 = 1e-6;
 const LEAST_MARGIN: f64 = 1e-6;
 /// 1/component of a direction at most.
 pub(crate) const STEEPEST: f64 = 1e20;
+/// Scatters numbers: 2³² over the golden ratio.
+const SCATTER: u32 = 0x9e37_79b9;
 /// Shapes in a leaf at most, where there is time to build well.
 const LARGEST_LEAF: u32 = 8;
 
@@ -141,12 +143,12 @@ impl Tree {
             Vec3A::from_array(std::array::from_fn(|k| (p[k] - self.centre[k] + by) as f32))
         };
         workshop.boxes.clear();
-        workshop.boxes.extend(
-            indices
-                .iter()
-                .map(|k| &boxes[*k as usize])
-                .map(|b| Aabb { min: local(b.low, -margin), max: local(b.high, margin) }),
-        );
+        workshop.boxes.extend(indices.iter().map(|k| {
+            // no two alike: of thousands at one place, pairs would be found one after the other
+            let margin = margin * (1.0 + f64::from(k.wrapping_mul(SCATTER)) / f64::from(u32::MAX));
+            let Bounds { low, high } = &boxes[*k as usize];
+            Aabb { min: local(*low, -margin), max: local(*high, margin) }
+        }));
         self.order.clone_from(&indices);
         // what obvhs orders are places in the list of shapes that are somewhere
         indices.iter_mut().enumerate().for_each(|(place, k)| *k = place as u32);

@@ -105,7 +105,7 @@ impl WorldBuilder {
             members: self.members,
             bodies: self.bodies,
             movable: (0..).zip(&self.is_fixed).filter(|(_, fixed)| !**fixed).map(|(k, _)| k).collect(),
-            is_fixed: self.is_fixed,
+            is_visible: vec![true; self.shapes.len()],
             shapes: self.shapes,
             fixed: self.fixed,
             moving: self.moving,
@@ -120,7 +120,7 @@ impl WorldBuilder {
     fn add_shape(&mut self, subsystem: u32, first_body: usize, shape: &SceneShape) {
         let number = self.shapes.len() as u32;
         let of = ShapeRef { subsystem, body: shape.body, shape: shape.id };
-        self.shapes.push(Shape { of, material: shape.material, is_visible: true, rank: 0 });
+        self.shapes.push(Shape { of, material: shape.material, rank: 0 });
         let body = first_body + shape.body as usize;
         let bounds = Bounds::of_geometry(&shape.geometry);
         let form = Primitive::of(&shape.geometry).map(Form::Primitive);

@@ -114,9 +114,10 @@ impl WorldModel {
             &mut room.stacks,
             |t, [k, number]| {
                 if nearest.is_beaten_by(t) {
-                    let shape = &self.shapes[self.moving.shape(k).shape as usize];
+                    let shape = self.moving.shape(k).shape;
                     if self.is_met(shape, mask) {
-                        nearest.offer(t, (shape.rank, number), What::Moving([k, number]));
+                        let key = (self.shapes[shape as usize].rank, number);
+                        nearest.offer(t, key, What::Moving([k, number]));
                     }
                 }
                 nearest.distance
@@ -125,9 +126,8 @@ impl WorldModel {
         self.fixed.cast(line, nearest.distance, &mut room.stacks[0], |t, met| {
             if nearest.is_beaten_by(t) {
                 let (shape, number) = self.fixed.what(met);
-                let shape = &self.shapes[shape as usize];
                 if self.is_met(shape, mask) {
-                    nearest.offer(t, (shape.rank, number), What::Fixed(met));
+                    nearest.offer(t, (self.shapes[shape as usize].rank, number), What::Fixed(met));
                 }
             }
             nearest.distance

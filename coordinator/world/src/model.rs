@@ -32,7 +32,6 @@ pub(crate) struct Member {
 pub(crate) struct Shape {
     pub of: ShapeRef,
     pub material: Material,
-    pub is_visible: bool,
     /// Place among all shapes and grounds by name of the subsystem, then id: which of two hits at one distance counts.
     pub rank: u32,
 }
@@ -44,10 +43,11 @@ pub struct WorldModel {
     pub(crate) members: Vec<Member>,
     /// Of all subsystems, one after the other.
     pub(crate) bodies: Vec<Motion>,
-    pub(crate) is_fixed: Vec<bool>,
-    /// Those that are not fixed.
+    /// Those that are not fixed, in ascending order.
     pub(crate) movable: Vec<u32>,
     pub(crate) shapes: Vec<Shape>,
+    /// One flag for each shape.
+    pub(crate) is_visible: Vec<bool>,
     pub(crate) fixed: Fixed,
     pub(crate) moving: Moving,
     pub(crate) parallel: Option<Parallel>,
@@ -67,6 +67,17 @@ impl WorldModel {
         Update { world: self }
     }
 
+    /// Whether a subsystem has bodies that are not fixed; the states of one without need not be told.
+    pub fn moves(&self, subsystem: u32) -> bool {
+        self.member(subsystem).is_ok_and(|member| !self.movable_of(&member.bodies).is_empty())
+    }
+
+    /// Places in the list of movable bodies of those in a range.
+    fn movable_of(&self, bodies: &Range<usize>) -> Range<usize> {
+        let place = |k: usize| self.movable.partition_point(|m| (*m as usize) < k);
+        place(bodies.start)..place(bodies.end)
+    }
+
     /// The part of the step that has passed at a time, 0 … 1.
     pub(crate) fn share(&self, time: f64) -> f64 {
         let [start, end] = self.interval;
@@ -74,10 +85,11 @@ impl WorldModel {
         if time >= end || share.is_nan() { 1.0 } else { share.clamp(0.0, 1.0) }
     }
 
-    /// Whether a mask lets a shape be met.
+    /// Whether a mask lets a shape be met, by its number among all of the world.
     #[inline]
-    pub(crate) fn is_met(&self, shape: &Shape, mask: &RayMask) -> bool {
-        shape.is_visible
+    pub(crate) fn is_met(&self, number: u32, mask: &RayMask) -> bool {
+        let shape = &self.shapes[number as usize];
+        self.is_visible[number as usize]
             && mask.admits(shape.material.class)
             && !mask.skip.names(shape.of.subsystem, shape.of.body)
     }
@@ -110,10 +122,10 @@ impl Update<'_> {
         for given in [before, after] {
             self.world.check_count(subsystem, range.len(), given.len(), "states")?;
         }
-        for (k, (before, after)) in range.zip(before.iter().zip(after)) {
-            if !self.world.is_fixed[k] {
-                self.world.bodies[k] = Motion::new(before, after);
-            }
+        for k in self.world.movable_of(&range) {
+            let k = self.world.movable[k] as usize;
+            let own = k - range.start;
+            self.world.bodies[k] = Motion::new(&before[own], &after[own]);
         }
         Ok(())
     }
@@ -125,7 +137,7 @@ impl Update<'_> {
     pub fn visibility(&mut self, subsystem: u32, is_visible: &[bool]) -> Result {
         let range = self.world.member(subsystem)?.shapes.clone();
         self.world.check_count(subsystem, range.len(), is_visible.len(), "flags")?;
-        self.world.shapes[range].iter_mut().zip(is_visible).for_each(|(s, v)| s.is_visible = *v);
+        self.world.is_visible[range].copy_from_slice(is_visible);
         Ok(())
     }
 
@@ -184,7 +196,7 @@ impl World for WorldModel {
         let Some(member) = self.members.get(shape.subsystem as usize) else { return false };
         let shapes = &self.shapes[member.shapes.clone()];
         let found = shapes.binary_search_by_key(&shape.shape, |s| s.of.shape);
-        found.is_ok_and(|k| shapes[k].is_visible && shapes[k].of == shape)
+        found.is_ok_and(|k| self.is_visible[member.shapes.start + k] && shapes[k].of == shape)
     }
 
     fn pose(&self, body: BodyRef, time: f64) -> Option<BodyState> {

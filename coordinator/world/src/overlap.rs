@@ -12,9 +12,8 @@ impl WorldModel {
         }
         if mask.sees & RayMask::SHAPES != 0 {
             let mut add = |k: u32| {
-                let shape = &self.shapes[k as usize];
-                if self.is_met(shape, mask) {
-                    found.push(shape.of);
+                if self.is_met(k, mask) {
+                    found.push(self.shapes[k as usize].of);
                 }
             };
             self.fixed.overlap(centre, radius, &mut add);

@@ -1,8 +1,8 @@
 //! Random worlds against a loop over all shapes whose intersections are found by other means: the same hit, at the same distance.
 
 use proptest::prelude::*;
-use random_scenes::{Candidate, Heights, Piece, STEP, lend, naive, rays, scenes};
-use terraglue_subsystem::{Ray, RayHit, RayMask, ShapeRef, World};
+use random_scenes::{Heights, Piece, STEP, is_right, lend, naive, rays, scenes};
+use terraglue_subsystem::{Ray, RayHit, RayMask, World};
 use terraglue_world::{WorldBuilder, WorldModel};
 
 /// A world of pieces; the ground belongs to the first.
@@ -28,16 +28,6 @@ fn cast(world: &WorldModel, rays: &[Ray]) -> Vec<RayHit> {
     let mut hits = vec![RayHit::MISS; rays.len()];
     world.cast_rays(rays, &RayMask::ALL, &mut hits);
     hits
-}
-
-/// Whether a hit is right: at the nearest distance, and of something that is there. None: the ray grazes something before.
-fn is_right(hit: &RayHit, candidates: &[Candidate]) -> Option<bool> {
-    let nearest = candidates.iter().map(|c| c.distance).fold(f64::INFINITY, f64::min);
-    let close = |a: f64, b: f64| a == b || (a - b).abs() <= 1e-5_f64.max(1e-5 * b);
-    let of = ShapeRef { subsystem: hit.subsystem, body: hit.body, shape: hit.shape };
-    let there = |c: &&Candidate| c.shape == of && close(c.distance, nearest);
-    let right = close(hit.distance, nearest) && (!hit.is_hit() || candidates.iter().any(|c| there(&c)));
-    if !right && candidates.iter().any(|c| c.depth < 1e-8) { None } else { Some(right) }
 }
 
 /// (wrong, grazing) of some rays through a world of so many bodies.

@@ -79,6 +79,8 @@ fn a_ray_meets_a_moving_body_where_it_is_at_its_own_time() {
     let body = world.body("a", "body0").expect("a body");
     assert_eq!(world.pose(body, 3.0).expect("a pose").world_from_body.position[0], 9.0);
     assert_eq!(world.time(), 4.0);
+    let still = alone(&scene(&[ball(0.5)]), &[BodyState::REST], true);
+    assert!(world.moves(0) && !still.moves(0) && !still.moves(1));
 }
 
 #[test]

@@ -11,7 +11,7 @@ mod random;
 mod stand;
 
 pub use draw::{Piece, rays, scenes};
-pub use naive::{Candidate, Heights, naive};
+pub use naive::{Candidate, Heights, is_right, naive, tolerance};
 pub use random::Random;
 pub use stand::{Stand, sweep};
 

@@ -2,7 +2,10 @@
 
 use crate::draw::Piece;
 use terraglue_numerics::rotation::{Vector, conjugate, cross, dot, length, minus, plus, turned};
-use terraglue_subsystem::{GROUND, Geometry, Pose, Ray, SceneShape, ShapeRef};
+use terraglue_subsystem::{GROUND, Geometry, Pose, Ray, RayHit, SceneShape, ShapeRef};
+
+/// Of a ray that gets no deeper into a shape than this, or passes it no farther away, m, nobody can say whether it meets it.
+const GRAZING: f64 = 1e-8;
 
 /// Heights on a lattice, x fastest; the cells between four of them are two triangles that share the diagonal from (i + 1, j) to (i, j + 1).
 #[derive(Clone, Debug)]
@@ -74,8 +77,24 @@ pub fn naive(pieces: &[Piece], grounds: &[(u32, &Heights)], ray: &Ray) -> Vec<Ca
         found.push(Candidate { shape, distance, depth: f64::INFINITY });
     }
     found.iter_mut().filter(|c| c.distance > ray.range).for_each(|c| c.distance = f64::INFINITY);
-    found.retain(|c| c.distance < f64::INFINITY || c.depth < 1e-8);
+    found.retain(|c| c.distance < f64::INFINITY || c.depth < GRAZING);
     found
+}
+
+/// Whether an answer is right: the nearest distance to 1e-5 or 10 µm, and something that is there. None: nobody can say, the ray grazes
+/// something.
+pub fn is_right(hit: &RayHit, candidates: &[Candidate]) -> Option<bool> {
+    let nearest = candidates.iter().map(|c| c.distance).fold(f64::INFINITY, f64::min);
+    let close = |a: f64, b: f64| a == b || (a - b).abs() <= tolerance(b);
+    let of = ShapeRef { subsystem: hit.subsystem, body: hit.body, shape: hit.shape };
+    let there = |c: &Candidate| c.shape == of && close(c.distance, nearest);
+    let right = close(hit.distance, nearest) && (!hit.is_hit() || candidates.iter().any(there));
+    (right || !candidates.iter().any(|c| c.depth < GRAZING)).then_some(right)
+}
+
+/// How far a distance may be off, m.
+pub fn tolerance(distance: f64) -> f64 {
+    1e-5_f64.max(1e-5 * distance)
 }
 
 /// On a straight line, along the shorter great circle of the quaternions: K. Shoemake, "Animating Rotation with Quaternion

@@ -93,7 +93,8 @@ impl Stand {
             self.shape(frustum, 0.5 * (low + high), MaterialClass::WOOD);
         }
         let branch = |random: &mut Random| {
-            let (z, angle) = (random.between(0.25, 0.95) * height, random.between(0.0, 6.28));
+            let (z, angle) =
+                (random.between(0.25, 0.95) * height, random.between(0.0, std::f64::consts::TAU));
             let (out, wide) = (0.12 * (height - z) + 0.3, 0.15);
             let (s, c) = (libm::sin(angle), libm::cos(angle));
             let tip = [out * c, out * s, z - 0.3 * out];

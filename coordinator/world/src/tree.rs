@@ -72,6 +72,54 @@ impl Node {
     };
 }
 
+impl Node {
+    /// A bit for each box that a line meets before `far`, and where it enters them.
+    #[inline(always)]
+    fn met(&self, way: &Way, far: f32) -> (u32, [f32; WIDTH]) {
+        let (mut met, mut near) = (0, [0.0; WIDTH]);
+        for half in 0..HALVES {
+            let (mut enter, mut leave) = (Vec4::ZERO, Vec4::splat(far));
+            for k in 0..3 {
+                let (first, last) =
+                    (self.sides[way.back[k] & 1][k][half], self.sides[!way.back[k] & 1][k][half]);
+                enter = enter.max((first - way.origin[k]) * way.inverse[k]);
+                leave = leave.min((last - way.origin[k]) * way.inverse[k]);
+            }
+            met |= enter.cmple(leave).bitmask() << (4 * half);
+            near[4 * half..4 * half + 4].copy_from_slice(&enter.to_array());
+        }
+        (met, near)
+    }
+
+    /// Takes a box out of those that are met: where the line enters it, and what is inside.
+    #[inline(always)]
+    fn take(&self, met: &mut u32, near: &[f32; WIDTH]) -> u64 {
+        let slot = met.trailing_zeros() as usize % WIDTH;
+        *met &= *met - 1;
+        u64::from(near[slot].to_bits()) << 32 | u64::from(self.inside[slot])
+    }
+}
+
+/// A line in single precision, from where it enters the whole.
+struct Way {
+    origin: [Vec4; 3],
+    inverse: [Vec4; 3],
+    /// 1 where it runs backwards.
+    back: [usize; 3],
+}
+
+impl Way {
+    #[inline(always)]
+    fn new(entry: [f64; 3], centre: [f64; 3], inverse: [f64; 3]) -> Self {
+        let splat = |x: f64| Vec4::splat(x as f32);
+        Self {
+            origin: [splat(entry[0] - centre[0]), splat(entry[1] - centre[1]), splat(entry[2] - centre[2])],
+            inverse: inverse.map(|i| splat(i.clamp(-STEEPEST, STEEPEST))),
+            back: inverse.map(|i| usize::from(i < 0.0)),
+        }
+    }
+}
+
 /// Boxes that wait, used again by every ray: the bits of the distance at which the ray enters one, which order as it does, and what
 /// is inside.
 #[derive(Debug, Default)]
@@ -202,16 +250,10 @@ impl Tree {
             return;
         }
         let inverse = line.inverse();
-        let Some([start, end]) = self.bounds.clip(line.origin, inverse).filter(|[start, _]| *start <= best)
-        else {
-            return;
-        };
+        let inside = self.bounds.clip(line.origin, inverse);
+        let Some([start, end]) = inside.filter(|[start, _]| *start <= best) else { return };
         best = best.min(end);
-        let entry = line.at(start);
-        let back = inverse.map(|i| usize::from(i < 0.0));
-        let splat = |x: f64| Vec4::splat(x as f32);
-        let origin: [Vec4; 3] = std::array::from_fn(|k| splat(entry[k] - self.centre[k]));
-        let inverse = inverse.map(|i| splat(i.clamp(-STEEPEST, STEEPEST)));
+        let way = Way::new(line.at(start), self.centre, inverse);
         let farthest = |best: f64| ((best - start) as f32).next_up();
         let mut far = farthest(best);
         if stack.0.len() < (WIDTH - 1) * self.depth {
@@ -222,27 +264,11 @@ impl Tree {
         loop {
             if inside & LEAF == 0 {
                 let node = &self.nodes[inside as usize];
-                let (mut met, mut near) = (0, [[0.0; 4]; HALVES]);
-                for half in 0..HALVES {
-                    let (mut enter, mut leave) = (Vec4::ZERO, Vec4::splat(far));
-                    for k in 0..3 {
-                        enter = enter.max((node.sides[back[k] & 1][k][half] - origin[k]) * inverse[k]);
-                        leave = leave.min((node.sides[!back[k] & 1][k][half] - origin[k]) * inverse[k]);
-                    }
-                    met |= enter.cmple(leave).bitmask() << (4 * half);
-                    near[half] = enter.to_array();
-                }
-                let near = near.as_flattened();
+                let (mut met, near) = node.met(&way, far);
                 if met != 0 {
-                    let mut next = || {
-                        let slot = met.trailing_zeros() as usize % WIDTH;
-                        met &= met - 1;
-                        (u64::from(near[slot].to_bits()) << 32 | u64::from(node.inside[slot]), met)
-                    };
-                    let (mut nearest, mut left) = next();
-                    while left != 0 {
-                        let other;
-                        (other, left) = next();
+                    let mut nearest = node.take(&mut met, &near);
+                    while met != 0 {
+                        let other = node.take(&mut met, &near);
                         waiting[top] = nearest.max(other);
                         nearest = nearest.min(other);
                         top += 1;
@@ -251,8 +277,7 @@ impl Tree {
                     continue;
                 }
             } else {
-                let (first, count) = ((inside & !LEAF) >> COUNT, inside & ((1 << COUNT) - 1));
-                for k in &self.order[first as usize..(first + count) as usize] {
+                for k in self.leaf(inside) {
                     best = best.min(visit(*k));
                 }
                 far = farthest(best);
@@ -268,6 +293,13 @@ impl Tree {
             }
             inside = waiting[top] as u32;
         }
+    }
+
+    /// The shapes of a leaf.
+    #[inline(always)]
+    fn leaf(&self, leaf: u32) -> &[u32] {
+        let (first, count) = ((leaf & !LEAF) >> COUNT, leaf & ((1 << COUNT) - 1));
+        &self.order[first as usize..(first + count) as usize]
     }
 
     /// Calls `visit` with the shapes whose boxes come as near to a point as `radius` (m).
@@ -295,8 +327,7 @@ impl Tree {
                     open.push(inside);
                     continue;
                 }
-                let (first, count) = ((inside & !LEAF) >> COUNT, inside & ((1 << COUNT) - 1));
-                self.order[first as usize..(first + count) as usize].iter().for_each(|k| visit(*k));
+                self.leaf(inside).iter().for_each(|k| visit(*k));
             }
         }
     }

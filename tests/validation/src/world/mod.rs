@@ -6,7 +6,6 @@ mod scenes;
 mod speed;
 
 use super::{Context, Figure, Limit, Part};
-use crate::process::Outcome;
 
 /// The parts, in the order of the table.
 pub const PARTS: [Part; 3] =

@@ -1,14 +1,15 @@
 //! What rays cost: in a second, beside Embree, on two threads; and what a step costs, with bodies that move and many that do not.
 
 use super::embree::{Embree, above, os1_64, python, triangles_of, vlp16};
-use super::rays::on_threads;
 use super::scenes::{stand, told};
 use super::{Context, Figure, Limit};
 use crate::process::Outcome;
 use crate::timing::{cpu_s, median};
 use random_scenes::{Piece, Stand, scenes};
 use std::hint::black_box;
+use std::sync::Arc;
 use std::time::Instant;
+use terraglue::host::Workers;
 use terraglue_subsystem::{Ray, RayHit, RayMask, World};
 use terraglue_world::{WorldBuilder, WorldModel};
 
@@ -21,7 +22,11 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
     }
     std::fs::create_dir_all(&context.scratch).map_err(|e| e.to_string())?;
     let trees = Stand::new(1, 250);
-    let (one, two) = (stand(&trees, &trees.scene, None)?, stand(&trees, &trees.scene, Some(on_threads(2)))?);
+    let workers = Workers::new(2);
+    let (one, two) = (
+        stand(&trees, &trees.scene, None)?,
+        stand(&trees, &trees.scene, Some(Arc::new(move |n, job| workers.parallel_for(n, job))))?,
+    );
     let mut out = Vec::new();
     for (name, rays) in [("vlp16", vlp16(above(&trees))), ("os1_64", os1_64(above(&trees)))] {
         out.extend(rates(context, name, &trees, (&one, &two), &rays)?);

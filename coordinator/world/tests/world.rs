@@ -260,6 +260,25 @@ fn a_footprint_is_seen_as_soon_as_its_generation_is_new() {
 }
 
 #[test]
+fn a_node_on_the_rim_of_a_tile_moves_the_cells_of_the_tiles_before_it() {
+    let mut heights = level([100, 70], 0.05);
+    let mut world = ground(&heights, 1);
+    heights.values[32 * 100 + 32] = 0.15;
+    let tiles = heights.tiles();
+    // of the tile of the node alone the generation is new
+    let lend = |a: u32, b: u32| {
+        let generation = if (a, b) == (1, 1) { 2 } else { 1 };
+        Some(FieldTile { generation, values: TileValues::F64(&tiles[(b * 4 + a) as usize]) })
+    };
+    world.update([0.0, 1.0]).ground(0, lend).expect("heights");
+    for (dx, dy, right) in [(-1.0, -1.0, 0.20), (1.0, -1.0, 0.175), (-1.0, 1.0, 0.175), (1.0, 1.0, 0.20)] {
+        let at = [0.6 + dx * 0.0125, -0.4 + dy * 0.0125];
+        let (seen, told) = (5.0 - down(&world, at).distance, height(&world, at));
+        assert!((seen - right).abs() < 1e-12 && (told - right).abs() < 1e-12, "{dx} {dy}: {seen} {told}");
+    }
+}
+
+#[test]
 fn nothing_slips_through_the_ground_at_nodes_and_edges() {
     let mut random = Random::new(4);
     let mut heights = level([67, 40], 0.1);

@@ -3,7 +3,7 @@
 //! Single precision: boxes are rounded outwards and grown by more than all rounding on the way, so a shape that is hit is never
 //! passed by; what is hit, and where, is computed in double precision by the caller. The binary tree comes from obvhs. Its own
 //! wide nodes are compressed for graphics processors; taking the bytes apart costs more here than reading boxes as they are
-//! (`docs/performance.md`).
+//! (`docs/decisions/0026-rays-through-boxes-of-our-own.md`).
 
 use crate::bounds::Bounds;
 use glam::{Vec3A, Vec4};

@@ -61,10 +61,12 @@ fn scene() -> Scene {
         geometry: geometry(k),
         body_from_shape: Pose::IDENTITY,
         collides: true,
+        material: Material::UNKNOWN,
     };
     Scene {
         bodies: (0..25).map(|k| SceneBody { name: format!("link{k}"), mass: 1.0 }).collect(),
         shapes: (0..25).map(shape).collect(),
+        joints: Vec::new(),
     }
 }
 

@@ -31,7 +31,7 @@ pub fn ledger_of(kind: Kind, energy: &Energy) -> Energy {
             electrical: or_none(energy.electrical),
             ..*energy
         },
-        Kind::Controller | Kind::Law => Energy {
+        Kind::Controller | Kind::Law | Kind::Sensor => Energy {
             kinetic: or_none(energy.kinetic),
             potential: or_none(energy.potential),
             dissipated: or_none(energy.dissipated),

@@ -127,7 +127,18 @@ fn surface(shape: &SceneShape) -> Vec<[f64; 3]> {
             }
             points
         }
-        Geometry::ConvexMesh { points, triangles } => {
+        Geometry::ConeFrustum { half_length, radius_bottom, radius_top } => {
+            let level = |k: i32| {
+                let part = f64::from(k + 3) / 6.0;
+                ring(radius_bottom + part * (radius_top - radius_bottom), f64::from(k) / 3.0 * half_length)
+            };
+            (-3..=3).flat_map(level).collect()
+        }
+        Geometry::Ellipsoid { semi_axes } => {
+            let stretched = |p: [f64; 3]| [0, 1, 2].map(|k| semi_axes[k] * p[k]);
+            ball(1.0, 0.0).into_iter().map(stretched).collect()
+        }
+        Geometry::ConvexMesh { points, triangles } | Geometry::Mesh { points, triangles } => {
             let middle = |t: &[u32; 3]| {
                 let corner = |k: usize| points.get(t[k] as usize).copied().unwrap_or_default();
                 [0, 1, 2].map(|axis| (0..3).map(|k| corner(k)[axis]).sum::<f64>() / 3.0)

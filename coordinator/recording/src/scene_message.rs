@@ -69,13 +69,15 @@ fn cube(shape: &SceneShape) -> Option<CubePrimitive> {
 }
 
 fn spheres(shape: &SceneShape) -> Vec<SpherePrimitive> {
-    let sphere = |at: &OwnPose, radius: f64| SpherePrimitive {
+    let stretched = |at: &OwnPose, half: [f64; 3]| SpherePrimitive {
         pose: pose(at),
-        size: Some(vector([2.0 * radius; 3])),
+        size: Some(vector(half.map(|h| 2.0 * h))),
         color: color(shape),
     };
+    let sphere = |at: &OwnPose, radius: f64| stretched(at, [radius; 3]);
     match shape.geometry {
         Geometry::Sphere { radius } => vec![sphere(&shape.body_from_shape, radius)],
+        Geometry::Ellipsoid { semi_axes } => vec![stretched(&shape.body_from_shape, semi_axes)],
         Geometry::Capsule { half_length, radius } => {
             [-half_length, half_length].map(|z| sphere(&shifted(&shape.body_from_shape, z), radius)).into()
         }
@@ -84,16 +86,23 @@ fn spheres(shape: &SceneShape) -> Vec<SpherePrimitive> {
 }
 
 fn cylinder(shape: &SceneShape) -> Option<CylinderPrimitive> {
-    let (Geometry::Cylinder { half_length, radius } | Geometry::Capsule { half_length, radius }) =
-        shape.geometry
-    else {
-        return None;
+    let (half_length, [bottom, top]) = match shape.geometry {
+        Geometry::Cylinder { half_length, radius } | Geometry::Capsule { half_length, radius } => {
+            (half_length, [radius; 2])
+        }
+        Geometry::ConeFrustum { half_length, radius_bottom, radius_top } => {
+            (half_length, [radius_bottom, radius_top])
+        }
+        _ => return None,
     };
+    let radius = bottom.max(top);
+    // of a frustum without any width nothing is drawn but its axis
+    let scale = |end: f64| if radius > 0.0 { end / radius } else { 1.0 };
     Some(CylinderPrimitive {
         pose: pose(&shape.body_from_shape),
         size: Some(vector([2.0 * radius, 2.0 * radius, 2.0 * half_length])),
-        bottom_scale: 1.0,
-        top_scale: 1.0,
+        bottom_scale: scale(bottom),
+        top_scale: scale(top),
         color: color(shape),
     })
 }
@@ -108,7 +117,10 @@ fn shifted(pose: &OwnPose, along_z: f64) -> OwnPose {
 }
 
 fn mesh(shape: &SceneShape) -> Option<TriangleListPrimitive> {
-    let Geometry::ConvexMesh { points, triangles } = &shape.geometry else { return None };
+    let (Geometry::ConvexMesh { points, triangles } | Geometry::Mesh { points, triangles }) = &shape.geometry
+    else {
+        return None;
+    };
     Some(TriangleListPrimitive {
         pose: pose(&shape.body_from_shape),
         points: points.iter().map(|p| Point3 { x: p[0], y: p[1], z: p[2] }).collect(),

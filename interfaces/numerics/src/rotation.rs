@@ -9,26 +9,31 @@ pub type Quaternion = [f64; 4];
 pub const IDENTITY: Quaternion = [1.0, 0.0, 0.0, 0.0];
 
 /// a + b.
+#[inline]
 pub fn plus(a: Vector, b: Vector) -> Vector {
     std::array::from_fn(|k| a[k] + b[k])
 }
 
 /// a − b.
+#[inline]
 pub fn minus(a: Vector, b: Vector) -> Vector {
     std::array::from_fn(|k| a[k] - b[k])
 }
 
 /// a · b.
+#[inline]
 pub fn dot(a: Vector, b: Vector) -> f64 {
     (0..3).map(|k| a[k] * b[k]).sum()
 }
 
 /// a × b.
+#[inline]
 pub fn cross(a: Vector, b: Vector) -> Vector {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 /// |v|.
+#[inline]
 pub fn length(v: Vector) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }

@@ -10,6 +10,7 @@ pub(crate) fn kind(number: u32) -> Option<Kind> {
         TG_ROBOT => Some(Kind::Robot),
         TG_CONTROLLER => Some(Kind::Controller),
         TG_LAW => Some(Kind::Law),
+        TG_SENSOR => Some(Kind::Sensor),
         _ => None,
     }
 }

@@ -51,7 +51,7 @@ unsafe impl Sync for Table {}
 #[macro_export]
 macro_rules! abi_version {
     () => {
-        "3.0"
+        "3.1"
     };
 }
 

@@ -27,9 +27,11 @@ impl Capabilities {
     pub const FEEDTHROUGH: Self = Self(1024);
     /// Makes communication steps of one length only.
     pub const FIXED_STEP: Self = Self(4096);
+    /// `observe` is implemented.
+    pub const SEES: Self = Self(8192);
 
     /// All names, for messages and listings.
-    pub const NAMES: [(Self, &'static str); 11] = [
+    pub const NAMES: [(Self, &'static str); 12] = [
         (Self::FORCE, "force input"),
         (Self::MOTION, "motion input"),
         (Self::ESTIMATE, "estimate_forces"),
@@ -41,6 +43,7 @@ impl Capabilities {
         (Self::SUBCYCLES, "sub-cycles"),
         (Self::FEEDTHROUGH, "direct feed-through"),
         (Self::FIXED_STEP, "steps of one length only"),
+        (Self::SEES, "sight"),
     ];
 
     /// Whether all of `other` is in this set.

@@ -11,7 +11,9 @@
 //!    ([`Subsystem::estimate_forces`], [`Subsystem::solve_compatibility`], [`Subsystem::advance`]), each
 //!    from the committed state at t, in any order, none visible from outside; then one
 //!    [`Subsystem::commit`], which makes the last trial of `advance` or `solve_compatibility` the state at t + h.
-//! 4. `get`, `poses`, fields and `energy` speak of the committed state only.
+//! 4. After all subsystems have committed, those with [`Capabilities::SEES`] get one [`Subsystem::observe`] with the committed
+//!    [`World`], whose states lie between t and t + h.
+//! 5. `get`, `body_states`, fields, streams, overlays and `energy` speak of the committed state only.
 //!
 //! # Packed vectors
 //! T, X, V and A hold one entry per carried component of every port in the order of [`Step::ports`]; port p
@@ -37,14 +39,19 @@ mod error;
 mod field;
 pub mod files;
 mod host;
+mod joint;
+mod material;
 mod node_law;
+mod overlay;
 mod port;
 mod scene;
 mod schema;
+mod stream;
 mod subsystem;
 mod trial;
 pub mod unit;
 mod variable;
+mod world;
 
 pub use advice::Advice;
 pub use capability::Capabilities;
@@ -53,12 +60,17 @@ pub use energy::Energy;
 pub use error::{Error, Result};
 pub use field::{FieldInfo, FieldTile, TileValues};
 pub use host::{Host, LogLevel, Standalone, Terrain, TerrainTile};
+pub use joint::{JointKind, JointVariables, SceneJoint};
+pub use material::{Material, MaterialClass};
 pub use node_law::{
     LawModule, MOST_LAW_STATE, NodeLaw, PressureAnswer, PressureNodes, ShearAnswer, ShearNodes,
 };
+pub use overlay::{Figure, Overlay};
 pub use port::{Law, Node, Port, PortKind, component};
 pub use scene::{BodyState, Geometry, Pose, Scene, SceneBody, SceneShape};
 pub use schema::{Kind, Parameter, ParameterType, Schema, Usual};
+pub use stream::{Message, StreamInfo};
 pub use subsystem::{Module, Subsystem};
 pub use trial::{Batch, Estimate, Input, Level, Motion, Response, Step, flag};
 pub use variable::{Action, Causality, Effect, ValueType, Values, ValuesMut, Variable, element_name};
+pub use world::{BodyRef, GROUND, Ray, RayHit, RayMask, ShapeRef, World};

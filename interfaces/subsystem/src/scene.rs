@@ -1,4 +1,8 @@
-//! What can be seen and hit: shapes with stable ids, described once, and the state of the bodies that carry them.
+//! What can be seen and hit: bodies, the shapes that they carry and the joints between them, described once, and the
+//! state of the bodies.
+
+use crate::joint::SceneJoint;
+use crate::material::Material;
 
 /// Position and orientation: `world_from_x` or `body_from_x` as the name of the value says.
 #[repr(C)]
@@ -68,6 +72,35 @@ pub enum Geometry {
         /// Three indices of corners each, counter-clockwise seen from outside.
         triangles: Vec<[u32; 3]>,
     },
+    /// A cone without its tip: axis along z, flat ends, the centre of the axis at the origin.
+    ConeFrustum {
+        /// Half length along z.
+        half_length: f64,
+        /// Radius of the end at z = −half_length; may be 0.
+        radius_bottom: f64,
+        /// Radius of the end at z = half_length; may be 0.
+        radius_top: f64,
+    },
+    /// Centre at the origin.
+    Ellipsoid {
+        /// Half lengths along x, y, z.
+        semi_axes: [f64; 3],
+    },
+    /// Triangles, open or closed, seen from both sides. It is seen only: soil does not meet it.
+    Mesh {
+        /// Corners, m.
+        points: Vec<[f64; 3]>,
+        /// Three indices of corners each.
+        triangles: Vec<[u32; 3]>,
+    },
+}
+
+impl Geometry {
+    /// Why a shape of this geometry cannot be hit; none where it can.
+    pub fn cannot_collide(&self) -> Option<&'static str> {
+        matches!(self, Self::Mesh { .. })
+            .then_some("a mesh without an inside is seen only; take a convex mesh for what is hit")
+    }
 }
 
 /// Something that moves as a whole.
@@ -94,13 +127,17 @@ pub struct SceneShape {
     pub body_from_shape: Pose,
     /// Whether it can be hit; otherwise it is only seen.
     pub collides: bool,
+    /// What it is made of, for sensors.
+    pub material: Material,
 }
 
-/// All bodies and shapes of a subsystem; constant over the life of an instance.
+/// All bodies, shapes and joints of a subsystem; constant over the life of an instance.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Scene {
     /// Bodies in the order of [`crate::Subsystem::body_states`].
     pub bodies: Vec<SceneBody>,
     /// Shapes in ascending order of id.
     pub shapes: Vec<SceneShape>,
+    /// Joints, a robot's tree from the root on, closures behind.
+    pub joints: Vec<SceneJoint>,
 }

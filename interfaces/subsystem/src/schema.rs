@@ -15,6 +15,8 @@ pub enum Kind {
     Controller = 3,
     /// Pressure and shear over arrays of nodes, state owned by the host.
     Law = 4,
+    /// Looks at the world of the others and answers with signals and streams.
+    Sensor = 5,
 }
 
 /// Static description of a module.

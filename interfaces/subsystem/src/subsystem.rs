@@ -6,11 +6,14 @@ use crate::energy::Energy;
 use crate::error::{Error, Result};
 use crate::field::{FieldInfo, FieldTile};
 use crate::host::Host;
+use crate::overlay::Overlay;
 use crate::port::Law;
 use crate::scene::{BodyState, Scene};
 use crate::schema::Schema;
+use crate::stream::{Message, StreamInfo};
 use crate::trial::{Batch, Estimate, Input, Level, Motion, Response, Step};
 use crate::variable::{Action, Values, ValuesMut, Variable};
+use crate::world::World;
 use std::sync::Arc;
 
 /// The static side of a module: what `export_subsystem!` takes.
@@ -97,6 +100,17 @@ pub trait Subsystem: Send {
     /// # Errors
     /// [`Error::Failed`]: the state at t + h cannot be formed.
     fn commit(&mut self, _step: &Step, _t: &[f64], _partner: &Motion) -> Result {
+        Ok(())
+    }
+
+    /// Looks at the committed world. Called once per step of an instance with [`Capabilities::SEES`], after all subsystems
+    /// have committed the step and before anything reads them; `step` is the one that was committed, or has h = 0 at the
+    /// start of a run. What was seen belongs to the committed state: variables, streams and `save_state` tell it from t + h on.
+    /// Nothing of `world` may be kept.
+    ///
+    /// # Errors
+    /// [`Error::Failed`]: what was seen cannot be told.
+    fn observe(&mut self, _step: &Step, _world: &dyn World) -> Result {
         Ok(())
     }
 
@@ -187,7 +201,7 @@ pub trait Subsystem: Send {
         f64::INFINITY
     }
 
-    /// Bodies and shapes; constant over the life of the instance.
+    /// Bodies, shapes and joints; constant over the life of the instance.
     fn scene(&self) -> Scene {
         Scene::default()
     }
@@ -199,6 +213,35 @@ pub trait Subsystem: Send {
     fn body_states(&self, _out: &mut [BodyState]) -> Result {
         Ok(())
     }
+
+    /// Which of the scene's shapes are shown, in its order; the others are neither drawn nor seen until they are shown again.
+    /// It belongs to the committed state, which `save_state` and `serialize` keep. By default all are shown. Contact with soil
+    /// does not ask for it.
+    ///
+    /// # Errors
+    /// [`Error::Failed`]: it cannot be told.
+    fn shape_visibility(&self, out: &mut [bool]) -> Result {
+        out.fill(true);
+        Ok(())
+    }
+
+    /// Streams of this instance; constant over its life.
+    fn streams(&self) -> &[StreamInfo] {
+        &[]
+    }
+
+    /// The message that the last committed step made on stream number `k`; none: it made none. It may be read any number of
+    /// times, and is borrowed until the next call that changes the instance.
+    ///
+    /// # Errors
+    /// [`Error::Refused`]: there is no such stream. [`Error::Unsupported`]: there are no streams.
+    fn stream(&self, _k: usize) -> Result<Option<Message<'_>>> {
+        Err(Error::Unsupported)
+    }
+
+    /// What this instance shows beside its bodies, of the committed state, behind what `out` holds already. Called only when
+    /// somebody looks or a recording asks, so it may cost what it needs.
+    fn overlays(&self, _out: &mut Vec<Overlay>) {}
 
     /// Fields over the ground. `height`, where offered, is the surface that contact detection reads.
     fn fields(&self) -> &[FieldInfo] {

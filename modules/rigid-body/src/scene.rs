@@ -5,7 +5,7 @@ use crate::model::{Body, Model};
 use crate::state::Motion;
 use nalgebra::Isometry3;
 use terraglue_robot_import::{Heights, Shape, ShapeGeometry};
-use terraglue_subsystem::{BodyState, Geometry, Pose, Scene, SceneBody, SceneShape};
+use terraglue_subsystem::{BodyState, Geometry, Material, Pose, Scene, SceneBody, SceneShape};
 
 /// Name of the body that carries what stands still; `world'`, … where a robot has a body of that name.
 const WORLD: &str = "world";
@@ -28,6 +28,7 @@ pub(crate) fn scene(model: &Model) -> Scene {
             geometry: geometry(&shape.geometry),
             body_from_shape: pose(&shape.body_from_shape),
             collides,
+            material: Material::UNKNOWN,
         });
     };
     for (b, body) in model.bodies.iter().enumerate() {
@@ -41,7 +42,7 @@ pub(crate) fn scene(model: &Model) -> Scene {
         }
         bodies.push(SceneBody { name, mass: 0.0 });
     }
-    Scene { bodies, shapes }
+    Scene { bodies, shapes, joints: Vec::new() }
 }
 
 /// A mesh of a body that is not convex is told as it is: soil meets its triangles. Of what stands still nothing is asked

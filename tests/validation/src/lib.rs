@@ -21,6 +21,7 @@ mod stored;
 mod table;
 mod timing;
 mod walk;
+mod world;
 
 pub use faults::write_page as write_faults_page;
 pub use figure::{Figure, Limit};
@@ -105,13 +106,14 @@ impl Context {
 type Part = (&'static str, fn(&Context) -> Outcome<Vec<Figure>>);
 
 /// Areas with their parts, in the order of the tables.
-const AREAS: [(&str, &[Part]); 6] = [
+const AREAS: [(&str, &[Part]); 7] = [
     ("walk", &[("walk", walk::figures), ("speed", walk::speed::figures)]),
     ("rigid-body", &rigid_body::PARTS),
     ("soil", &soil::PARTS),
     ("gluing", &gluing::PARTS),
     ("fmi", &fmi::PARTS),
     ("plugins", &plugins::PARTS),
+    ("world", &world::PARTS),
 ];
 
 fn area_names() -> Vec<&'static str> {

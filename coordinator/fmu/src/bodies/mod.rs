@@ -61,7 +61,7 @@ impl Bodies {
     /// Bodies without shapes.
     pub fn scene(&self) -> Scene {
         let bodies = self.all.iter().map(|b| SceneBody { name: b.name.clone(), mass: 0.0 });
-        Scene { bodies: bodies.collect(), shapes: Vec::new() }
+        Scene { bodies: bodies.collect(), shapes: Vec::new(), joints: Vec::new() }
     }
 
     /// Components along axes that no force is mapped to, or about axes without a moment, cannot be glued.

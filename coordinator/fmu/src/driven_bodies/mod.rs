@@ -191,10 +191,12 @@ impl Subsystem for DrivenBodies {
             geometry: self.settings.shape.clone(),
             body_from_shape: terraglue_subsystem::Pose::IDENTITY,
             collides: true,
+            material: terraglue_subsystem::Material::UNKNOWN,
         };
         Scene {
             bodies: (0..count).map(|k| SceneBody { name: name(k), mass: 0.0 }).collect(),
             shapes: (0..count).map(shape).collect(),
+            joints: Vec::new(),
         }
     }
 

@@ -25,7 +25,7 @@ pub fn wrap(module: &str, search: &SearchPath) -> Result<(String, &'static str),
     let (name, ground) = match found.schema().kind {
         Kind::Soil => ("soil", GROUND),
         Kind::Robot => ("robot", ""),
-        Kind::Controller | Kind::Law => ("unit", ""),
+        Kind::Controller | Kind::Law | Kind::Sensor => ("unit", ""),
     };
     let quoted = serde_json::Value::from(module).to_string();
     Ok((format!("{COMMON}{ground}\n[{name}]\nmodule = {quoted}\n"), name))

@@ -110,6 +110,12 @@ fn touch(a: &Solid, b: &Solid) -> bool {
     query::distance(at_a, &**a, at_b, &**b).is_ok_and(|d| d.distance < JOINED)
 }
 
+/// Points on an ellipse across the axis.
+fn disc(z: f64, [a, b]: [f64; 2]) -> Vec<Vector> {
+    let angle = |k: u32| libm::sincos(f64::from(k) * std::f64::consts::PI / 16.0);
+    (0..32).map(angle).map(|(s, c)| Vector::new(a * c, b * s, z)).collect()
+}
+
 fn solid(shape: &Shape) -> Solid {
     let along_z = |half: f64| Vector::new(0.0, 0.0, half);
     let mut turn = Rot3::IDENTITY;
@@ -125,7 +131,16 @@ fn solid(shape: &Shape) -> Solid {
             turn = Rot3::from_xyzw(half, 0.0, 0.0, half);
             SharedShape::cylinder(*half_length, *radius)
         }
-        Geometry::ConvexMesh { points, triangles } => {
+        Geometry::Ellipsoid { semi_axes } => {
+            let ring = |z: f64| disc(z * semi_axes[2], [0, 1].map(|k| semi_axes[k] * (1.0 - z * z).sqrt()));
+            let levels = (-8..=8).map(|k| libm::sin(f64::from(k) * std::f64::consts::PI / 16.0));
+            SharedShape::convex_hull(&levels.flat_map(ring).collect::<Vec<_>>())?
+        }
+        Geometry::ConeFrustum { half_length, radius_bottom, radius_top } => {
+            let ends = [disc(-half_length, [*radius_bottom; 2]), disc(*half_length, [*radius_top; 2])];
+            SharedShape::convex_hull(&ends.concat())?
+        }
+        Geometry::ConvexMesh { points, triangles } | Geometry::Mesh { points, triangles } => {
             let corners = points.iter().map(|p| Vector::new(p[0], p[1], p[2])).collect();
             SharedShape::trimesh(corners, triangles.clone()).ok()?
         }

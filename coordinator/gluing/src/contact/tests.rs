@@ -6,8 +6,8 @@ use terraglue_ground::HeightField;
 use terraglue_numerics::extremes::larger;
 use terraglue_scenario::{TerrainKind, TerrainSpec};
 use terraglue_subsystem::{
-    BodyState, Capabilities, FieldInfo, FieldTile, Geometry, Input, Pose, Response, Result as CallResult,
-    Scene, SceneBody, SceneShape, Step, Subsystem, Terrain, component,
+    BodyState, Capabilities, FieldInfo, FieldTile, Geometry, Input, Material, Pose, Response,
+    Result as CallResult, Scene, SceneBody, SceneShape, Step, Subsystem, Terrain, component,
 };
 use terraglue_terrain as terrain;
 
@@ -73,10 +73,12 @@ fn scene(geometries: &[Geometry]) -> Scene {
         geometry: geometry.clone(),
         body_from_shape: Pose::IDENTITY,
         collides: true,
+        material: Material::UNKNOWN,
     };
     Scene {
         bodies: (0..geometries.len()).map(|k| SceneBody { name: name(k), mass: 1.0 }).collect(),
         shapes: geometries.iter().enumerate().map(shape).collect(),
+        joints: Vec::new(),
     }
 }
 

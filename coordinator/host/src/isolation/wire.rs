@@ -1,8 +1,8 @@
 //! Calls and answers as bytes in a shared segment. Whatever stands there is checked: a worker may have been overwritten.
 
 use terraglue_subsystem::{
-    Action, BodyState, Causality, Effect, Energy, FieldInfo, Geometry, Law, Node, Port, Pose, Scene,
-    SceneBody, SceneShape, ValueType, Variable,
+    Action, BodyState, Causality, Effect, Energy, FieldInfo, Geometry, JointKind, JointVariables, Law,
+    Material, Node, Port, Pose, Scene, SceneBody, SceneJoint, SceneShape, ValueType, Variable,
 };
 
 /// Bytes that grow up to the end of an area.
@@ -190,8 +190,21 @@ structure!(BodyState { world_from_body, linear_velocity, angular_velocity });
 structure!(Energy { kinetic, potential, dissipated, port_work, actuator_work, electrical });
 structure!(Action { name, help });
 structure!(SceneBody { name, mass });
-structure!(SceneShape { id, body, name, geometry, body_from_shape, collides });
-structure!(Scene { bodies, shapes });
+structure!(SceneShape { id, body, name, geometry, body_from_shape, collides, material });
+structure!(Material { class, reflectance, transmittance });
+structure!(JointVariables { position, velocity, torque, torque_limit, blocked });
+structure!(SceneJoint {
+    name,
+    parent,
+    child,
+    parent_from_joint,
+    axis,
+    kind,
+    limits,
+    variables,
+    break_action
+});
+structure!(Scene { bodies, shapes, joints });
 structure!(FieldInfo { name, unit, origin, spacing, size, tile_edge });
 structure!(Variable { id, name, value_type, causality, effect, unit, help, min, max, dims, enumeration });
 
@@ -211,6 +224,7 @@ macro_rules! choice {
 choice!(ValueType: F64, F32, I8, I16, I32, I64, U8, U16, U32, U64, Bool, String, Binary, Enumeration, Clock);
 choice!(Causality: Parameter, Input, Output, Local);
 choice!(Effect: Live, NeedsReset, ReadOnly);
+choice!(JointKind: Revolute, Continuous, Prismatic, Spherical, Planar, Fixed, Closure);
 
 impl Wire for Geometry {
     fn put(&self, w: &mut Writer) {
@@ -220,6 +234,11 @@ impl Wire for Geometry {
             Self::Capsule { half_length, radius } => (w.put(&2_u8), w.put(&[*half_length, *radius])).0,
             Self::Cylinder { half_length, radius } => (w.put(&3_u8), w.put(&[*half_length, *radius])).0,
             Self::ConvexMesh { points, triangles } => (w.put(&4_u8), w.put(points), w.put(triangles)).0,
+            Self::ConeFrustum { half_length, radius_bottom, radius_top } => {
+                (w.put(&5_u8), w.put(&[*half_length, *radius_bottom, *radius_top])).0
+            }
+            Self::Ellipsoid { semi_axes } => (w.put(&6_u8), w.put(semi_axes)).0,
+            Self::Mesh { points, triangles } => (w.put(&7_u8), w.put(points), w.put(triangles)).0,
         }
     }
     fn take(r: &mut Reader) -> Option<Self> {
@@ -229,6 +248,11 @@ impl Wire for Geometry {
             2 => Self::Capsule { half_length: r.take()?, radius: r.take()? },
             3 => Self::Cylinder { half_length: r.take()?, radius: r.take()? },
             4 => Self::ConvexMesh { points: r.take()?, triangles: r.take()? },
+            5 => {
+                Self::ConeFrustum { half_length: r.take()?, radius_bottom: r.take()?, radius_top: r.take()? }
+            }
+            6 => Self::Ellipsoid { semi_axes: r.take()? },
+            7 => Self::Mesh { points: r.take()?, triangles: r.take()? },
             _ => return None,
         })
     }

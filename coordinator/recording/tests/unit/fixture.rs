@@ -268,7 +268,7 @@ pub fn scenario(strategy: &str) -> Scenario {
 impl Fixture {
     pub fn new(strategy: &str) -> Self {
         let body = |name: &str, mass: f64| SceneBody { name: name.into(), mass };
-        let mut scene = Scene { bodies: vec![body("body", 19.0)], shapes: Vec::new() };
+        let mut scene = Scene { bodies: vec![body("body", 19.0)], shapes: Vec::new(), joints: Vec::new() };
         let shape = |id: u32, name: &str, geometry: Geometry, collides: bool| SceneShape {
             id,
             body: id,
@@ -276,6 +276,7 @@ impl Fixture {
             geometry,
             body_from_shape: Pose::IDENTITY,
             collides,
+            material: Material::UNKNOWN,
         };
         scene.shapes.push(shape(0, "body", Geometry::Box { half_extents: [0.2, 0.1, 0.05] }, false));
         for (k, foot) in FEET.iter().enumerate() {

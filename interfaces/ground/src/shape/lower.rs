@@ -4,7 +4,7 @@
 //! slabs and cylinders is the intersection of theirs.
 
 use super::Placed;
-use crate::math::dot;
+use crate::math::{cross, dot};
 use terraglue_subsystem::Geometry;
 
 /// Slopes below this are walls along the line: rounding would exceed the accuracy of the quotient.
@@ -31,6 +31,12 @@ impl Placed {
             Geometry::Box { half_extents } => in_box(start, up, *half_extents),
             Geometry::Capsule { half_length, radius } => capsule(start, up, *half_length, *radius),
             Geometry::Cylinder { half_length, radius } => cylinder(start, up, *half_length, *radius),
+            Geometry::Ellipsoid { semi_axes } => ellipsoid(start, up, *semi_axes),
+            Geometry::ConeFrustum { half_length, radius_bottom, radius_top } => {
+                frustum(start, up, *half_length, [*radius_bottom, *radius_top])
+            }
+            // always a tree of triangles, see above
+            Geometry::Mesh { .. } => None,
             Geometry::ConvexMesh { .. } => {
                 let mut line = Interval::ALL;
                 for f in &self.faces {
@@ -85,6 +91,45 @@ fn ball(start: [f64; 3], up: [f64; 3], radius: f64) -> Option<f64> {
     let b = dot(start, up);
     let rest = radius * radius - (dot(start, start) - b * b);
     (rest >= 0.0).then(|| -b - rest.sqrt())
+}
+
+/// Lower end of the line inside an ellipsoid, a ball in coordinates divided by its half lengths.
+fn ellipsoid(start: [f64; 3], up: [f64; 3], semi_axes: [f64; 3]) -> Option<f64> {
+    let divided = |v: [f64; 3]| -> [f64; 3] { std::array::from_fn(|k| v[k] / semi_axes[k]) };
+    let (start, up) = (divided(start), divided(up));
+    let a = dot(up, up);
+    let aside = cross(start, up);
+    let rest = a - dot(aside, aside);
+    (rest >= 0.0).then(|| (-dot(start, up) - rest.sqrt()) / a)
+}
+
+/// Lines that pass the rim of a frustum by less than this part of its size meet it: its side and its ends reckon with
+/// different numbers.
+const RIM: f64 = 1e-12;
+
+/// The line enters a frustum at the lowest of the points where it meets the ends and the side.
+fn frustum(start: [f64; 3], up: [f64; 3], half_length: f64, radii: [f64; 2]) -> Option<f64> {
+    let middle = 0.5 * (radii[0] + radii[1]);
+    let slack = RIM * (half_length + radii[0].max(radii[1]));
+    let widening = 0.5 * (radii[1] - radii[0]) / half_length;
+    let at = |s: f64| -> [f64; 3] { std::array::from_fn(|k| start[k] + s * up[k]) };
+    let on_end = |side: usize| {
+        let z = if side == 0 { -half_length } else { half_length };
+        let s = (z - start[2]) / up[2];
+        let [x, y, _] = at(s);
+        let reach = radii[side] + slack;
+        (up[2].abs() > WALL && x * x + y * y <= reach * reach).then_some(s)
+    };
+    // a·s² + 2·b·s + c = 0 of x² + y² = (middle + widening·z)²
+    let (r, dr) = (middle + widening * start[2], widening * up[2]);
+    let a = up[0] * up[0] + up[1] * up[1] - dr * dr;
+    let b = up[0] * start[0] + up[1] * start[1] - dr * r;
+    let c = start[0] * start[0] + start[1] * start[1] - r * r;
+    let root = (b * b - a * c).sqrt();
+    let q = if b > 0.0 { -b - root } else { -b + root };
+    // no root, or one at infinity: not a number, and dropped
+    let on_side = [q / a, c / q].map(|s| (at(s)[2].abs() <= half_length + slack).then_some(s));
+    [on_end(0), on_end(1), on_side[0], on_side[1]].into_iter().flatten().min_by(f64::total_cmp)
 }
 
 /// Both ends of the line inside the endless cylinder around z.

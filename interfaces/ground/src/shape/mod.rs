@@ -73,6 +73,7 @@ impl Placed {
             Geometry::ConvexMesh { points, triangles } if !mesh::is_convex(points, triangles) => {
                 Some(MeshTree::new(points, triangles))
             }
+            Geometry::Mesh { points, triangles } => Some(MeshTree::new(points, triangles)),
             _ => None,
         };
         let faces = if tree.is_some() { Vec::new() } else { faces_of(geometry) };
@@ -120,10 +121,32 @@ impl Placed {
                 let a = axes[2][k];
                 a.abs() * half_length + radius * (1.0 - a * a).max(0.0).sqrt()
             }),
-            Geometry::ConvexMesh { points, .. } => return self.mesh_box(points),
+            Geometry::Ellipsoid { semi_axes: a } => std::array::from_fn(|k| {
+                let squares = (0..3).map(|c| axes[c][k] * a[c]).map(|x| x * x);
+                squares.sum::<f64>().sqrt()
+            }),
+            Geometry::ConeFrustum { half_length, radius_bottom, radius_top } => {
+                return self.frustum_box(*half_length, [*radius_bottom, *radius_top]);
+            }
+            Geometry::ConvexMesh { points, .. } | Geometry::Mesh { points, .. } => {
+                return self.mesh_box(points);
+            }
         };
         let c = self.world_from_shape.position;
         Aabb { min: std::array::from_fn(|k| c[k] - half[k]), max: std::array::from_fn(|k| c[k] + half[k]) }
+    }
+
+    /// Around the discs at both ends.
+    fn frustum_box(&self, half_length: f64, radii: [f64; 2]) -> Aabb {
+        let (c, axis) = (self.world_from_shape.position, self.rotation.0[2]);
+        let end = |k: usize, side: usize, sign: f64| {
+            let along = if side == 0 { -half_length } else { half_length };
+            c[k] + along * axis[k] + sign * radii[side] * (1.0 - axis[k] * axis[k]).max(0.0).sqrt()
+        };
+        Aabb {
+            min: std::array::from_fn(|k| end(k, 0, -1.0).min(end(k, 1, -1.0))),
+            max: std::array::from_fn(|k| end(k, 0, 1.0).max(end(k, 1, 1.0))),
+        }
     }
 
     fn mesh_box(&self, points: &[[f64; 3]]) -> Aabb {

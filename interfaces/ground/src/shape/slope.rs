@@ -43,6 +43,20 @@ impl Placed {
                     }
                 }
             }
+            Geometry::Ellipsoid { semi_axes } => {
+                face.offer(std::array::from_fn(|k| local[k] / (semi_axes[k] * semi_axes[k])), 0.0);
+            }
+            Geometry::ConeFrustum { half_length, radius_bottom, radius_top } => {
+                let across = (local[0] * local[0] + local[1] * local[1]).sqrt();
+                let widening = 0.5 * (radius_top - radius_bottom) / half_length;
+                let beyond = across - 0.5 * (radius_bottom + radius_top) - widening * local[2];
+                let slant = (1.0 + widening * widening).sqrt();
+                face.offer([local[0], local[1], -widening * across], beyond / slant);
+                face.offer([0.0, 0.0, 1.0], local[2] - half_length);
+                face.offer([0.0, 0.0, -1.0], -local[2] - half_length);
+            }
+            // always a tree of triangles, see above
+            Geometry::Mesh { .. } => {}
             Geometry::ConvexMesh { .. } => {
                 for f in &self.faces {
                     face.offer(f.normal, dot(f.normal, local) - f.offset);

@@ -47,7 +47,23 @@ impl Placed {
                 let reach = if across > 0.0 { radius * blend(across) / across } else { 0.0 };
                 [d[0] * reach, d[1] * reach, half_length * blend(d[2])]
             }
-            Geometry::ConvexMesh { points, .. } => farthest_corner(points, d, tilt),
+            Geometry::Ellipsoid { semi_axes: a } => {
+                let along: [f64; 3] = std::array::from_fn(|k| a[k] * d[k]);
+                let reach = dot(along, along).sqrt();
+                std::array::from_fn(|k| if reach > 0.0 { a[k] * along[k] / reach } else { 0.0 })
+            }
+            Geometry::ConeFrustum { half_length, radius_bottom, radius_top } => {
+                let across = (d[0] * d[0] + d[1] * d[1]).sqrt();
+                let (length, wider) = (2.0 * half_length, radius_top - radius_bottom);
+                let ahead = length * d[2] + wider * across;
+                let share = blend(ahead / (length * length + wider * wider).sqrt());
+                let radius = 0.5 * (radius_bottom + radius_top + wider * share);
+                let reach = if across > 0.0 { radius * blend(across) / across } else { 0.0 };
+                [d[0] * reach, d[1] * reach, half_length * share]
+            }
+            Geometry::ConvexMesh { points, .. } | Geometry::Mesh { points, .. } => {
+                farthest_corner(points, d, tilt)
+            }
         };
         point(&self.world_from_shape, &self.rotation, local)
     }

@@ -3,7 +3,7 @@
 /// Version of the ABI that breaks: host and module must agree.
 pub const TG_ABI_MAJOR: u32 = 3;
 /// Version of the ABI that grows: new fields at the end of `tg_subsystem` and `tg_host`.
-pub const TG_ABI_MINOR: u32 = 0;
+pub const TG_ABI_MINOR: u32 = 1;
 
 /// What a call answers; anything else than the values below counts as `TG_FATAL`.
 pub type TgStatus = i32;
@@ -28,6 +28,8 @@ pub const TG_ROBOT: u32 = 2;
 pub const TG_CONTROLLER: u32 = 3;
 /// `tg_subsystem.kind`: pressure and shear over arrays of nodes.
 pub const TG_LAW: u32 = 4;
+/// `tg_subsystem.kind`: looks at the world of the others, answers with signals and streams. Since 3.1.
+pub const TG_SENSOR: u32 = 5;
 
 /// Bit of `capabilities`: `advance` takes `TG_FORCE`.
 pub const TG_CAN_FORCE: u32 = 1;
@@ -51,6 +53,8 @@ pub const TG_CAN_SUBCYCLE: u32 = 512;
 pub const TG_CAN_FEEDTHROUGH: u32 = 1024;
 /// Bit of `capabilities`: makes communication steps of one length only.
 pub const TG_CAN_FIXED_STEP: u32 = 4096;
+/// Bit of `capabilities`: `observe`. Since 3.1.
+pub const TG_CAN_SEE: u32 = 8192;
 
 /// `tg_port.kind`: one body shape on one ground, unilateral.
 pub const TG_CONTACT: u32 = 0;
@@ -148,6 +152,12 @@ pub const TG_CAPSULE: u32 = 2;
 pub const TG_CYLINDER: u32 = 3;
 /// `tg_shape.geometry`: convex hull of `points`.
 pub const TG_CONVEX_MESH: u32 = 4;
+/// `tg_shape.geometry`: `size` = half length along z, radius at z = -half length, radius at z = half length. Since 3.1.
+pub const TG_CONE_FRUSTUM: u32 = 5;
+/// `tg_shape.geometry`: `size` = half lengths along x, y, z. Since 3.1.
+pub const TG_ELLIPSOID: u32 = 6;
+/// `tg_shape.geometry`: the triangles of `points`, open or closed; is seen only. Since 3.1.
+pub const TG_MESH: u32 = 7;
 
 /// `tg_field_tile.format`: every value equals `scale`; no data.
 pub const TG_TILE_UNIFORM: u32 = 0;

@@ -107,9 +107,14 @@ fn shape(s: &SceneShape, keep: &mut Keep) -> TgShape {
         Geometry::Cylinder { half_length, radius } => {
             (out.geometry, out.size) = (TG_CYLINDER, [*half_length, *radius, 0.0]);
         }
-        Geometry::ConvexMesh { points, triangles } => {
+        Geometry::ConeFrustum { half_length, radius_bottom, radius_top } => {
+            (out.geometry, out.size) = (TG_CONE_FRUSTUM, [*half_length, *radius_bottom, *radius_top]);
+        }
+        Geometry::Ellipsoid { semi_axes } => (out.geometry, out.size) = (TG_ELLIPSOID, *semi_axes),
+        Geometry::ConvexMesh { points, triangles } | Geometry::Mesh { points, triangles } => {
             let corners: Box<[f64]> = points.iter().flatten().copied().collect();
-            out.geometry = TG_CONVEX_MESH;
+            let convex = matches!(s.geometry, Geometry::ConvexMesh { .. });
+            out.geometry = if convex { TG_CONVEX_MESH } else { TG_MESH };
             (out.points, out.n_points) = (corners.as_ptr(), points.len() as u32);
             keep.points.push(corners);
             out.triangles = keep.numbers(triangles.iter().flatten().copied().collect());

@@ -6,7 +6,8 @@ use crate::convert;
 use crate::text::{borrowed, slice};
 use std::ffi::c_char;
 use terraglue_subsystem::{
-    Action, Capabilities, Error, FieldInfo, Geometry, Pose, Result, Scene, SceneBody, SceneShape, Variable,
+    Action, Capabilities, Error, FieldInfo, Geometry, Material, Pose, Result, Scene, SceneBody, SceneShape,
+    Variable,
 };
 
 /// Everything about an instance that never changes.
@@ -160,6 +161,7 @@ unsafe fn scene(s: &TgScene) -> Result<Scene> {
                 orientation: s.body_from_shape.orientation,
             },
             collides: s.collides != 0,
+            material: Material::UNKNOWN,
         });
     }
     Ok(out)
@@ -168,13 +170,15 @@ unsafe fn scene(s: &TgScene) -> Result<Scene> {
 /// # Safety
 /// The pointers of `s` are valid.
 unsafe fn geometry(s: &TgShape, name: &str) -> Result<Geometry> {
-    let [a, b, _] = s.size;
+    let [a, b, c] = s.size;
     Ok(match s.geometry {
         TG_SPHERE => Geometry::Sphere { radius: a },
         TG_BOX => Geometry::Box { half_extents: s.size },
         TG_CAPSULE => Geometry::Capsule { half_length: a, radius: b },
         TG_CYLINDER => Geometry::Cylinder { half_length: a, radius: b },
-        TG_CONVEX_MESH => {
+        TG_CONE_FRUSTUM => Geometry::ConeFrustum { half_length: a, radius_bottom: b, radius_top: c },
+        TG_ELLIPSOID => Geometry::Ellipsoid { semi_axes: s.size },
+        TG_CONVEX_MESH | TG_MESH => {
             // SAFETY: by the contract.
             let (points, triangles) = unsafe {
                 (slice(s.points, 3 * s.n_points as usize), slice(s.triangles, 3 * s.n_triangles as usize))
@@ -184,9 +188,11 @@ unsafe fn geometry(s: &TgShape, name: &str) -> Result<Geometry> {
                     "a face of the shape `{name}` names a corner that does not exist"
                 )));
             }
-            Geometry::ConvexMesh {
-                points: points.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect(),
-                triangles: triangles.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect(),
+            let points = points.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
+            let triangles = triangles.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
+            match s.geometry {
+                TG_MESH => Geometry::Mesh { points, triangles },
+                _ => Geometry::ConvexMesh { points, triangles },
             }
         }
         other => return Err(unknown(&format!("geometry of the shape `{name}`"), other)),

@@ -314,6 +314,7 @@ impl Subsystem for Everything {
             geometry,
             body_from_shape: pose,
             collides: id != 3,
+            material: Material::UNKNOWN,
         };
         let mesh = Geometry::ConvexMesh {
             points: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],

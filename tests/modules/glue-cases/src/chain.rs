@@ -346,7 +346,11 @@ impl Subsystem for MassChain {
 
     fn scene(&self) -> Scene {
         let body = |(k, mass): (usize, &f64)| SceneBody { name: format!("m{k}"), mass: *mass };
-        Scene { bodies: self.mass.iter().enumerate().map(body).collect(), shapes: Vec::new() }
+        Scene {
+            bodies: self.mass.iter().enumerate().map(body).collect(),
+            shapes: Vec::new(),
+            joints: Vec::new(),
+        }
     }
 
     fn body_states(&self, out: &mut [BodyState]) -> Result {

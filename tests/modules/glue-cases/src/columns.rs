@@ -324,7 +324,7 @@ impl Subsystem for PowerColumns {
 
     fn scene(&self) -> Scene {
         let body = |k| SceneBody { name: format!("c{k}"), mass: 0.0 };
-        Scene { bodies: (0..self.columns.len()).map(body).collect(), shapes: Vec::new() }
+        Scene { bodies: (0..self.columns.len()).map(body).collect(), shapes: Vec::new(), joints: Vec::new() }
     }
 
     fn body_states(&self, out: &mut [BodyState]) -> Result {

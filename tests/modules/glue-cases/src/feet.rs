@@ -198,7 +198,7 @@ impl Subsystem for TableOnFeet {
     fn scene(&self) -> Scene {
         let share = self.inertia[0] / self.rows.len().max(1) as f64;
         let body = |k| SceneBody { name: format!("foot{k}"), mass: share };
-        Scene { bodies: (0..self.rows.len()).map(body).collect(), shapes: Vec::new() }
+        Scene { bodies: (0..self.rows.len()).map(body).collect(), shapes: Vec::new(), joints: Vec::new() }
     }
 
     fn body_states(&self, out: &mut [BodyState]) -> Result {

@@ -304,7 +304,11 @@ impl Subsystem for PlanarBodies {
 
     fn scene(&self) -> Scene {
         let body = |(k, mass): (usize, &f64)| SceneBody { name: format!("b{k}"), mass: *mass };
-        Scene { bodies: self.mechanism.mass.iter().enumerate().map(body).collect(), shapes: Vec::new() }
+        Scene {
+            bodies: self.mechanism.mass.iter().enumerate().map(body).collect(),
+            shapes: Vec::new(),
+            joints: Vec::new(),
+        }
     }
 
     fn body_states(&self, out: &mut [BodyState]) -> Result {

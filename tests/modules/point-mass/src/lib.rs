@@ -5,9 +5,9 @@
 
 use std::sync::Arc;
 use terraglue_subsystem::{
-    BodyState, Capabilities, Causality, Config, Energy, Error, Geometry, Host, Input, Kind, Law, Module,
-    Motion, Parameter, ParameterType, Pose, Response, Result, Scene, SceneBody, SceneShape, Schema, Step,
-    Subsystem, ValuesMut, Variable,
+    BodyState, Capabilities, Causality, Config, Energy, Error, Geometry, Host, Input, Kind, Law, Material,
+    Module, Motion, Parameter, ParameterType, Pose, Response, Result, Scene, SceneBody, SceneShape, Schema,
+    Step, Subsystem, ValuesMut, Variable,
 };
 
 /// The module.
@@ -146,7 +146,9 @@ impl Subsystem for PointMass {
                 geometry: Geometry::Sphere { radius: self.radius },
                 body_from_shape: Pose::IDENTITY,
                 collides: true,
+                material: Material::UNKNOWN,
             }],
+            joints: Vec::new(),
         }
     }
 

@@ -30,6 +30,13 @@ fn inside(geometry: &Geometry, p: [f64; 3]) -> bool {
             let normal = [u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]];
             (0..3).map(|k| normal[k] * w[k]).sum::<f64>() <= 0.0
         }),
+        Geometry::ConeFrustum { half_length, radius_bottom, radius_top } => {
+            let up = 0.5 * (1.0 + p[2] / half_length);
+            p[2].abs() <= *half_length && across <= (1.0 - up) * radius_bottom + up * radius_top
+        }
+        Geometry::Ellipsoid { semi_axes: a } => (0..3).map(|k| (p[k] / a[k]).powi(2)).sum::<f64>() <= 1.0,
+        // it has no inside, and soil does not meet it
+        Geometry::Mesh { .. } => false,
     }
 }
 

@@ -1,0 +1,27 @@
+//! Streams: what a subsystem gives that is no variable, such as point clouds, images and maps.
+
+/// A stream of messages of one kind.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StreamInfo {
+    /// Dotted name, unique in the subsystem and different from its variables.
+    pub name: String,
+    /// Name of the schema of its messages, e.g. `foxglove.PointCloud`.
+    pub schema: String,
+    /// How messages are written: `protobuf`, `json`, or another name that its readers know.
+    pub encoding: String,
+    /// Most messages per second, 1/s; 0: whenever something happens.
+    pub rate_hz: f64,
+    /// Most bytes of a message. What is longer is left out with a warning.
+    pub most_bytes: u32,
+    /// One line for people.
+    pub help: String,
+}
+
+/// A message of a stream.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Message<'a> {
+    /// Time of what it tells, s.
+    pub time: f64,
+    /// Its bytes, in the encoding of its stream.
+    pub bytes: &'a [u8],
+}

@@ -25,6 +25,12 @@ pub trait World {
         self.interval()[1]
     }
 
+    /// Changes whenever names or scenes of subsystems do, as by an exchange of code while a run goes on: what was copied of
+    /// them under the same number still holds.
+    fn revision(&self) -> u64 {
+        0
+    }
+
     /// First and last time that can be asked for, s.
     fn interval(&self) -> [f64; 2];
 

@@ -191,7 +191,7 @@ impl Subsystem for DrivenBodies {
             geometry: self.settings.shape.clone(),
             body_from_shape: terraglue_subsystem::Pose::IDENTITY,
             collides: true,
-            material: Material::UNKNOWN,
+            material: terraglue_subsystem::Material::UNKNOWN,
         };
         Scene {
             bodies: (0..count).map(|k| SceneBody { name: name(k), mass: 0.0 }).collect(),

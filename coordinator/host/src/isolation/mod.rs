@@ -10,8 +10,10 @@ mod calls;
 mod channel;
 mod fork_server;
 mod law;
+mod messages;
 mod proxy;
 mod python;
+mod sight;
 mod tiles;
 mod wire;
 mod worker;
@@ -276,6 +278,15 @@ impl Link {
                 return Err(self.lose(why));
             }
         }
+    }
+
+    /// Ends a worker whose exchange has lasted longer than a call may.
+    fn within(&mut self, since: Instant) -> Result {
+        let limit_s = self.isolation.step_timeout_s;
+        if since.elapsed().as_secs_f64() <= limit_s {
+            return Ok(());
+        }
+        Err(self.lose(format!("it went on asking for more than {limit_s} s (step_timeout_s) and was ended")))
     }
 
     /// Ends the worker for good.

@@ -41,6 +41,7 @@ pub mod files;
 mod host;
 mod joint;
 mod material;
+mod mount;
 mod node_law;
 mod overlay;
 mod port;
@@ -62,6 +63,7 @@ pub use field::{FieldInfo, FieldTile, TileValues};
 pub use host::{Host, LogLevel, Standalone, Terrain, TerrainTile};
 pub use joint::{JointKind, JointVariables, SceneJoint};
 pub use material::{Material, MaterialClass};
+pub use mount::Mount;
 pub use node_law::{
     LawModule, MOST_LAW_STATE, NodeLaw, PressureAnswer, PressureNodes, ShearAnswer, ShearNodes,
 };

@@ -3,10 +3,11 @@
 //! # Of what time an answer is
 //! [`crate::Subsystem::observe`] comes once per step [t, t + h], after all subsystems have committed it. Everything that is asked
 //! is of the time that the question names, within [t, t + h] ([`World::interval`]): moving bodies stand where a motion between
-//! their committed states at t and t + h carries them (positions by cubic interpolation of position and velocity, orientations
-//! along the shortest way), so nothing is older or younger than the question, and nothing of what comes after t + h is known.
-//! Times outside of the interval are answered with its nearest end. The ground and the visibility of shapes are those at t + h.
-//! A body that makes a step only every n-th communication point moves when it commits.
+//! their committed states at t and t + h carries them (on a straight line, turning at a constant rate about one axis), so nothing
+//! is older or younger than the question, and nothing of what comes after t + h is known. Times outside of the interval are
+//! answered with its nearest end. The interval is the last communication step also for a sensor that makes a step only every
+//! n-th. The ground and the visibility of shapes are those at t + h. A body that makes a step only every n-th communication
+//! point moves when it commits.
 //!
 //! Answers depend on the question and the committed states alone, never on threads, on the order of subsystems or on what was
 //! asked before.

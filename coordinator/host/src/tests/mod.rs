@@ -9,7 +9,9 @@ mod sight;
 use super::*;
 use soil_column::SoilColumnModule;
 use std::path::{Path, PathBuf};
-use terraglue_subsystem::{Capabilities, Config, Input, Kind, Law, Level, Motion, Port, Response, Step, component};
+use terraglue_subsystem::{
+    Capabilities, Config, Input, Kind, Law, Level, Motion, Port, Response, Step, component,
+};
 
 fn port(key: u64, first: u32, z: f64) -> Port {
     Port {

@@ -386,7 +386,15 @@ impl Fixture {
         let ledgers = self.parts.iter().map(|(_, part)| ledger_of(part.kind, &part.energy()));
         let energy = ledgers.fold(Energy::default(), |sum, ledger| sum.plus(&ledger));
         let h_s = if index == 0 { 0.0 } else { H };
-        look(&View { t_s: t, step_index: index, h_s, subsystems: &views, gluing: &gluing, energy })
+        look(&View {
+            t_s: t,
+            step_index: index,
+            h_s,
+            subsystems: &views,
+            gluing: &gluing,
+            energy,
+            streams: &[],
+        })
     }
 
     /// Goes to step `index`: feet leave their prints.

@@ -171,7 +171,8 @@ class Joint:
     zero, axis in its own frame; limits (rad or m). variables: names by "position", "velocity", "torque", "torque_limit" and
     "blocked"; break_action: the action that breaks it."""
 
-    KINDS = ("revolute", "continuous", "prismatic", "spherical", "planar", "fixed", "closure")
+    KINDS = ("revolute", "continuous", "prismatic", "spherical", "planar", "fixed", "closure", "cylindrical",
+             "universal")
 
     def __init__(self, name, parent, child, kind="revolute", position=(0.0, 0.0, 0.0), orientation=(1.0, 0.0, 0.0, 0.0),
                  axis=(0.0, 0.0, 1.0), limits=(-INFINITY, INFINITY), variables=None, break_action=""):

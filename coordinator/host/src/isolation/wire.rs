@@ -232,7 +232,7 @@ macro_rules! choice {
 choice!(ValueType: F64, F32, I8, I16, I32, I64, U8, U16, U32, U64, Bool, String, Binary, Enumeration, Clock);
 choice!(Causality: Parameter, Input, Output, Local);
 choice!(Effect: Live, NeedsReset, ReadOnly);
-choice!(JointKind: Revolute, Continuous, Prismatic, Spherical, Planar, Fixed, Closure);
+choice!(JointKind: Revolute, Continuous, Prismatic, Spherical, Planar, Fixed, Closure, Cylindrical, Universal);
 
 impl Wire for Geometry {
     fn put(&self, w: &mut Writer) {

@@ -173,6 +173,10 @@ pub const TG_PLANAR: u32 = 4;
 pub const TG_FIXED: u32 = 5;
 /// `tg_joint.kind`: closes a loop of the tree.
 pub const TG_CLOSURE: u32 = 6;
+/// `tg_joint.kind`: slides along its axis and turns about it.
+pub const TG_CYLINDRICAL: u32 = 7;
+/// `tg_joint.kind`: turns about two axes that stay perpendicular.
+pub const TG_UNIVERSAL: u32 = 8;
 
 /// Bit of `tg_ray_mask.sees`: shapes that are not hidden.
 pub const TG_SEES_SHAPES: u32 = 1;

@@ -99,7 +99,7 @@ pub struct TgJoint {
     pub parent: u32,
     /// Index of the body that it carries.
     pub child: u32,
-    /// TG_REVOLUTE ... TG_CLOSURE.
+    /// TG_REVOLUTE ... TG_UNIVERSAL.
     pub kind: u32,
     /// Id of the variable of its position, rad or m; UINT32_MAX: none, here and below.
     pub position: u32,

@@ -23,7 +23,8 @@ pub(crate) struct Topic {
 }
 
 impl Topic {
-    fn with(mut self, key: &str, value: String) -> Self {
+    /// The same with one more line of metadata.
+    pub fn with(mut self, key: &str, value: String) -> Self {
         self.metadata.insert(key.into(), value);
         self
     }

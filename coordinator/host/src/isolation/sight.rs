@@ -4,7 +4,7 @@
 use super::calls::{Call, OwnedStep};
 use super::tiles::Tile;
 use super::wire::{Reader, Wire, Writer};
-use super::worker::Exchange;
+use super::worker::WorkerChannel;
 use std::cell::OnceCell;
 use terraglue_subsystem::{
     BodyRef, BodyState, Error, FieldInfo, FieldTile, Ray, RayHit, RayMask, Result, Scene, ShapeRef,
@@ -129,7 +129,7 @@ type TilesOf = OnceCell<Vec<Vec<OnceCell<Option<Tile>>>>>;
 
 /// The host's world as its worker sees it.
 struct AskingWorld<'a> {
-    exchange: &'a Exchange,
+    channel: &'a WorkerChannel,
     known: &'a Known,
     interval: [f64; 2],
     tiles: Vec<TilesOf>,
@@ -142,27 +142,27 @@ struct AskingWorld<'a> {
 pub fn observe(
     subsystem: &mut dyn Subsystem,
     r: &mut Reader,
-    exchange: &Exchange,
+    channel: &WorkerChannel,
     known: &mut Known,
 ) -> Result {
     let garbled = || Error::Fatal("the call is garbled".into());
     let step = OwnedStep::take(r).ok_or_else(garbled)?;
     let (interval, revision) = (r.take().ok_or_else(garbled)?, r.take().ok_or_else(garbled)?);
     if known.revision != Some(revision) {
-        let names: Vec<String> = ask(exchange, &Question::Names, |r| r.take()).ok_or_else(garbled)?;
+        let names: Vec<String> = ask(channel, &Question::Names, |r| r.take()).ok_or_else(garbled)?;
         let subsystems = names.iter().map(|_| Others::default()).collect();
         *known = Known { revision: Some(revision), names, subsystems };
     }
     let tiles = known.names.iter().map(|_| TilesOf::default()).collect();
-    subsystem.observe(&step.step(), &AskingWorld { exchange, known, interval, tiles })
+    subsystem.observe(&step.step(), &AskingWorld { channel, known, interval, tiles })
 }
 
 fn ask<T>(
-    exchange: &Exchange,
+    channel: &WorkerChannel,
     question: &Question,
     read: impl FnOnce(&mut Reader) -> Option<T>,
 ) -> Option<T> {
-    read_answer(&exchange.ask(|w| question.put(w))?, read)
+    read_answer(&channel.ask(|w| question.put(w))?, read)
 }
 
 fn read_answer<T>(bytes: &[u8], read: impl FnOnce(&mut Reader) -> Option<T>) -> Option<T> {
@@ -185,23 +185,23 @@ impl World for AskingWorld<'_> {
 
     fn scene(&self, subsystem: u32) -> Option<&Scene> {
         let others = self.known.subsystems.get(subsystem as usize)?;
-        let asked = || ask(self.exchange, &Question::Scene(subsystem), take_option).flatten();
+        let asked = || ask(self.channel, &Question::Scene(subsystem), take_option).flatten();
         others.scene.get_or_init(asked).as_ref()
     }
 
     fn is_visible(&self, shape: ShapeRef) -> bool {
-        ask(self.exchange, &Question::Visible(shape), |r| r.take()).unwrap_or(false)
+        ask(self.channel, &Question::Visible(shape), |r| r.take()).unwrap_or(false)
     }
 
     fn pose(&self, body: BodyRef, time: f64) -> Option<BodyState> {
-        ask(self.exchange, &Question::Pose(body, time), take_option).flatten()
+        ask(self.channel, &Question::Pose(body, time), take_option).flatten()
     }
 
     fn cast_rays(&self, rays: &[Ray], mask: &RayMask, hits: &mut [RayHit]) {
         let n = rays.len().min(hits.len());
         hits[..n].fill(RayHit::MISS);
         for (rays, hits) in rays[..n].chunks(BATCH).zip(hits[..n].chunks_mut(BATCH)) {
-            let answer = self.exchange.ask(|w| put_rays(w, mask, rays));
+            let answer = self.channel.ask(|w| put_rays(w, mask, rays));
             let found: Option<Vec<RayHit>> = answer.and_then(|bytes| read_answer(&bytes, |r| r.take()));
             hits.iter_mut().zip(found.into_iter().flatten()).for_each(|(hit, found)| *hit = found);
         }
@@ -211,18 +211,18 @@ impl World for AskingWorld<'_> {
         let n = points.len().min(heights.len());
         heights[..n].fill(f64::NAN);
         for (points, heights) in points[..n].chunks(BATCH).zip(heights[..n].chunks_mut(BATCH)) {
-            ask(self.exchange, &Question::Heights(points.to_vec()), |r| r.fill(heights));
+            ask(self.channel, &Question::Heights(points.to_vec()), |r| r.fill(heights));
         }
     }
 
     fn overlap(&self, centre: [f64; 3], radius: f64, mask: &RayMask, found: &mut Vec<ShapeRef>) {
         let question = Question::Overlap(*mask, centre, radius);
-        *found = ask(self.exchange, &question, |r| r.take()).unwrap_or_default();
+        *found = ask(self.channel, &question, |r| r.take()).unwrap_or_default();
     }
 
     fn fields(&self, subsystem: u32) -> &[FieldInfo] {
         let Some(others) = self.known.subsystems.get(subsystem as usize) else { return &[] };
-        let asked = || ask(self.exchange, &Question::Fields(subsystem), |r| r.take()).unwrap_or_default();
+        let asked = || ask(self.channel, &Question::Fields(subsystem), |r| r.take()).unwrap_or_default();
         others.fields.get_or_init(asked)
     }
 
@@ -241,7 +241,7 @@ impl World for AskingWorld<'_> {
         }
         let cell = &tiles[field][(b * across(0) + a) as usize];
         let question = Question::Tile(subsystem, field as u32, [a, b]);
-        let asked = || ask(self.exchange, &question, take_option).flatten();
+        let asked = || ask(self.channel, &question, take_option).flatten();
         let found: Option<&Tile> = cell.get_or_init(asked).as_ref();
         found.filter(|tile| tile.holds(info.tile_edge)).map(Tile::shown).ok_or_else(none)
     }

@@ -32,13 +32,13 @@ pub fn serve(path: &Path, library: &Library) -> ExitCode {
         channel::end_group(std::process::id());
     });
     let Ok(segment) = Segment::open(path) else { return ExitCode::FAILURE };
-    let exchange = Exchange { segment: RefCell::new(segment), last: Cell::new(0) };
+    let channel = WorkerChannel { segment: RefCell::new(segment), last: Cell::new(0) };
     let mut worker = Worker { library: library.clone(), ..Worker::default() };
     loop {
-        let request = exchange.next(&worker.log.cancel);
+        let request = channel.next(&worker.log.cancel);
         let quits = request.first() == Some(&(Call::Quit as u8));
-        let done = catch_unwind(AssertUnwindSafe(|| worker.answer(&request, &exchange)));
-        let mut segment = exchange.segment.borrow_mut();
+        let done = catch_unwind(AssertUnwindSafe(|| worker.answer(&request, &channel)));
+        let mut segment = channel.segment.borrow_mut();
         let length = done.unwrap_or_else(|_| {
             let mut w = Writer::new(segment.area(1));
             calls::write_outcome(&mut w, &[], &Err(Error::Fatal("panicked in its process".into())));
@@ -55,12 +55,12 @@ pub fn serve(path: &Path, library: &Library) -> ExitCode {
 }
 
 /// The shared segment, and the number of the last call.
-pub struct Exchange {
+pub struct WorkerChannel {
     segment: RefCell<Segment>,
     last: Cell<u32>,
 }
 
-impl Exchange {
+impl WorkerChannel {
     /// Waits for the next call.
     fn next(&self, cancel: &AtomicBool) -> Vec<u8> {
         let mut segment = self.segment.borrow_mut();
@@ -124,7 +124,7 @@ fn garbled() -> Error {
 
 impl Worker {
     /// Does one call and writes its answer; the length.
-    fn answer(&mut self, request: &[u8], exchange: &Exchange) -> usize {
+    fn answer(&mut self, request: &[u8], channel: &WorkerChannel) -> usize {
         let mut r = Reader::new(request);
         let call = r.take::<u8>().and_then(Call::of);
         let mut body = Vec::new();
@@ -139,12 +139,12 @@ impl Worker {
                 }
             }
             Some(Call::Observe) => match &mut self.subsystem {
-                Some(subsystem) => sight::observe(subsystem.as_mut(), &mut r, exchange, &mut self.known),
+                Some(subsystem) => sight::observe(subsystem.as_mut(), &mut r, channel, &mut self.known),
                 None => Err(garbled()),
             },
             Some(call) => self.call(call, &mut r, &mut body),
         };
-        let mut segment = exchange.segment.borrow_mut();
+        let mut segment = channel.segment.borrow_mut();
         let area = segment.area(1);
         let mut w = Writer::new(area);
         let lines = self.log.take();

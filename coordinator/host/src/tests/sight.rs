@@ -162,3 +162,39 @@ fn a_module_that_never_stops_asking_is_ended() {
     let error = looker.observe(&Step::free(1.0, 0.25, 0), &world("endless")).expect_err("no end");
     assert!(matches!(&error, Error::Fatal(text) if text.contains("went on asking")), "{error}");
 }
+
+/// The range finders of the page on sensors, in C and in Python.
+const EXAMPLES: [&str; 2] = [
+    include_str!("../../../../tests/modules/range-finder/range_finder.c"),
+    include_str!("../../../../tests/modules/range-finder/range_finder.py"),
+];
+
+#[test]
+fn the_range_finders_of_the_page_measure_the_same() {
+    let folder = tempfile::tempdir().expect("folder");
+    let config = serde_json::json!({"mount": "unit.leg", "range_m": 10.0});
+    let library = super::compile(folder.path(), "range_finder", EXAMPLES[0], &[]);
+    let module = crate::LoadedModule::load(&library).expect("loads");
+    assert_eq!(module.schema().kind, Kind::Sensor);
+    let made = Config::parse(&config.to_string()).expect("config");
+    let mut c = module.instantiate("eye", made, &super::services()).expect("instance");
+    let path = folder.path().join("range_finder.py");
+    std::fs::write(&path, EXAMPLES[1]).expect("written");
+    let what = What::Python { path, config, python: "python3".into() };
+    let host: Arc<dyn Host> = Arc::new(Standalone::default());
+    let mut python = start(what, &host, &super::services(), Isolation::default()).expect("starts");
+    let step = Step::free(1.0, 0.25, 0);
+    c.observe(&step, &world("ground")).expect("observes");
+    python.observe(&step, &world("ground")).expect("observes");
+    let (mut a, mut b) = ([0.0], [0.0]);
+    c.get(&[0], ValuesMut::F64(&mut a)).expect("a distance");
+    python.get(&[0], ValuesMut::F64(&mut b)).expect("a distance");
+    // the height of the sensor, and the time, which the world of this test adds
+    assert_eq!((a, b), ([1.25], [1.25]));
+    let scan = python.stream(0).expect("a stream").expect("a message");
+    let scan: serde_json::Value = serde_json::from_slice(scan.bytes).expect("JSON");
+    assert_eq!(scan["ranges"], serde_json::json!([1.25]));
+    // a body that there is not is an error with a reason, and no end of the program
+    let error = c.observe(&step, &TestWorld { names: vec!["ground".into()], scene: Scene::default() });
+    assert!(error.expect_err("no body").to_string().contains("the body of `mount` is not there"));
+}

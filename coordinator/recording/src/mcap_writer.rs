@@ -180,8 +180,8 @@ impl McapWriter {
         let (encoding, data) = stream_topics::schema(&stream.info);
         let topic = stream_topics::name(&stream.name);
         let schema = sink.add_schema(&stream.info.schema, encoding, &data);
-        let channel =
-            schema.and_then(|s| sink.add_channel(s, &topic, &stream.info.encoding, &BTreeMap::new()));
+        let about = BTreeMap::from([(topics::STREAM.to_owned(), stream.name.clone())]);
+        let channel = schema.and_then(|s| sink.add_channel(s, &topic, &stream.info.encoding, &about));
         let channel = self.checked(channel)?;
         self.channels.streams.push(channel);
         Ok(())

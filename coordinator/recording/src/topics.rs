@@ -14,6 +14,9 @@ pub(crate) const COLUMNS: &str = "columns";
 /// Key of a channel's metadata: whose variables they are.
 pub(crate) const SUBSYSTEM: &str = "subsystem";
 
+/// Key of a channel's metadata: the full name of a stream.
+pub(crate) const STREAM: &str = "stream";
+
 /// Topic, name of the message type, and its file of descriptors.
 pub(crate) struct Topic {
     pub topic: String,

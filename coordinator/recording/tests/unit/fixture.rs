@@ -285,6 +285,12 @@ fn scan(index: u64, t: f64) -> StreamView {
     StreamView { name: "gait.scan.points".into(), info, messages }
 }
 
+/// A stream with a message in JSON at every step.
+fn note(t: f64) -> StreamView {
+    let info = StreamInfo { encoding: "json".into(), name: "note".into(), ..scan(1, t).info };
+    StreamView { name: "gait.note".into(), info, messages: vec![(t, b"{}".to_vec())] }
+}
+
 /// The joint whose variables are 1 to 3.
 fn hip() -> SceneJoint {
     SceneJoint {
@@ -428,7 +434,7 @@ impl Fixture {
             subsystems: &views,
             gluing: &gluing,
             energy,
-            streams: &[scan(index, t)],
+            streams: &[scan(index, t), note(t)],
         })
     }
 

@@ -235,6 +235,10 @@ fn every_message_is_protobuf_of_the_type_that_its_channel_names() {
     let mut topics = std::collections::BTreeMap::new();
     for message in mcap::MessageStream::new(&bytes).expect("complete") {
         let message = message.expect("whole");
+        // how its messages are written is a matter of the stream
+        if message.channel.metadata.contains_key("stream") {
+            continue;
+        }
         let schema = message.channel.schema.clone().expect("has a schema");
         assert_eq!(
             (schema.encoding.as_str(), message.channel.message_encoding.as_str()),
@@ -260,7 +264,6 @@ fn every_message_is_protobuf_of_the_type_that_its_channel_names() {
         "/energy",
         "/gait",
         "/gait/parameters",
-        "/gait/scan/points",
         "/gluing",
         "/ground",
         "/ground/*",
@@ -665,6 +668,9 @@ fn joints_and_streams_are_messages_that_viewers_know() {
         }
     }
     assert_eq!(states.len(), 21);
+    // messages of JSON are no sign of an earlier version
+    let read = Recording::open(f.path()).expect("readable");
+    assert_eq!(read.end_s(), 0.1);
     for (time, states) in &states {
         let (t, w) = (*time as f64 * 1e-9, 2.0 * std::f64::consts::PI);
         let [hip] = &states.joints[..] else { panic!("one joint moves") };

@@ -72,7 +72,7 @@ pub struct TgRayMask {
 
 /// The committed world at the end of a step, and within the step interpolated to the time asked for; valid during
 /// `observe` only, and to be called from its thread. Nothing of what comes after the step is known. An answer depends on the
-/// question and the committed states alone.
+/// question and the committed states alone. Asked outside of `observe` it answers nothing, and the call counts as TG_FATAL.
 #[repr(C)]
 #[derive(Clone, Copy, Debug)]
 pub struct TgWorld {

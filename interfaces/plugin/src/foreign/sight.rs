@@ -5,14 +5,25 @@ use crate::field_table::{field_out, tile_out};
 use crate::keep::Keep;
 use crate::scene_table::{SceneTable, pose_in};
 use crate::text::{borrowed, c_string, slice, slice_mut};
-use std::cell::OnceCell;
+use std::cell::{Cell, OnceCell, Ref, RefCell};
 use std::ffi::{CString, c_char, c_void};
 use std::panic::{AssertUnwindSafe, catch_unwind};
-use terraglue_subsystem::{BodyRef, BodyState, Figure, Overlay, RayMask, Result, ShapeRef, World};
+use terraglue_subsystem::{BodyRef, BodyState, Error, Figure, Overlay, RayMask, Result, ShapeRef, World};
 
-/// What was copied for an instance of names and scenes; made once for each revision of the world.
-#[derive(Default)]
+/// The world of one instance. It stays at one place as long as the instance: a module that keeps a pointer to it and asks outside of
+/// `observe` gets no answer, and its next call tells of it.
 pub(super) struct Shown {
+    table: Cell<TgWorld>,
+    copies: RefCell<Copies>,
+    /// The world during a call.
+    open: Cell<Option<*const (dyn World + 'static)>>,
+    /// Whether it was asked while it was closed.
+    misused: Cell<bool>,
+}
+
+/// Names and scenes in the form of the ABI; made once for each revision of the world.
+#[derive(Default)]
+struct Copies {
     revision: Option<u64>,
     _names: Vec<CString>,
     pointers: Vec<*const c_char>,
@@ -26,26 +37,15 @@ struct Others {
     fields: OnceCell<(Vec<TgField>, Keep)>,
 }
 
-/// The world during a call.
-struct Open<'a> {
-    world: &'a dyn World,
-    shown: &'a Shown,
-}
-
-impl Shown {
-    /// Calls with the table of the world.
-    pub(super) fn with(&mut self, world: &dyn World, call: impl FnOnce(*const TgWorld) -> Result) -> Result {
-        if self.revision != Some(world.revision()) || self.pointers.len() != world.subsystems().len() {
-            *self = Self::of(world);
-        }
-        let open = Open { world, shown: self };
+impl Default for Shown {
+    fn default() -> Self {
         let table = TgWorld {
             size: size_of::<TgWorld>() as u32,
-            n_subsystems: self.pointers.len() as u32,
-            subsystems: self.pointers.as_ptr(),
-            revision: world.revision(),
-            interval: world.interval(),
-            ctx: (&raw const open).cast_mut().cast(),
+            n_subsystems: 0,
+            subsystems: std::ptr::null(),
+            revision: 0,
+            interval: [f64::NAN; 2],
+            ctx: std::ptr::null_mut(),
             cast_rays: Some(cast_rays),
             ground_heights: Some(ground_heights),
             overlap: Some(overlap),
@@ -58,9 +58,55 @@ impl Shown {
             fields: Some(fields),
             field_tile: Some(field_tile),
         };
-        call(&raw const table)
+        Self {
+            table: Cell::new(table),
+            copies: RefCell::default(),
+            open: Cell::new(None),
+            misused: Cell::new(false),
+        }
+    }
+}
+
+impl Shown {
+    /// Calls with the table of the world.
+    pub(super) fn with(&self, world: &dyn World, call: impl FnOnce(*const TgWorld) -> Result) -> Result {
+        self.check()?;
+        let stale = {
+            let copies = self.copies.borrow();
+            copies.revision != Some(world.revision()) || copies.pointers.len() != world.subsystems().len()
+        };
+        if stale {
+            *self.copies.borrow_mut() = Copies::of(world);
+        }
+        let copies = self.copies.borrow();
+        self.table.set(TgWorld {
+            n_subsystems: copies.pointers.len() as u32,
+            subsystems: copies.pointers.as_ptr(),
+            revision: world.revision(),
+            interval: world.interval(),
+            ctx: std::ptr::from_ref(self).cast_mut().cast(),
+            ..self.table.get()
+        });
+        drop(copies);
+        // SAFETY: only the lifetime changes; the pointer is taken away before this call returns.
+        let world: &'static dyn World = unsafe { std::mem::transmute(world) };
+        self.open.set(Some(world));
+        let done = call(self.table.as_ptr());
+        self.open.set(None);
+        done.and_then(|()| self.check())
     }
 
+    /// Refuses an instance that has asked while the world was closed.
+    pub(super) fn check(&self) -> Result {
+        if !self.misused.get() {
+            return Ok(());
+        }
+        let text = "it asked the world outside of `observe`; a pointer to it holds during this call only";
+        Err(Error::Fatal(text.into()))
+    }
+}
+
+impl Copies {
     fn of(world: &dyn World) -> Self {
         let names: Vec<CString> = world.subsystems().iter().map(|name| c_string(name)).collect();
         Self {
@@ -72,14 +118,20 @@ impl Shown {
     }
 }
 
+/// The world during a call, with what was copied of it.
+struct Open<'a> {
+    world: &'a dyn World,
+    copies: Ref<'a, Copies>,
+}
+
 impl Open<'_> {
     fn scene(&self, subsystem: u32) -> Option<&SceneTable> {
-        let others = self.shown.subsystems.get(subsystem as usize)?;
+        let others = self.copies.subsystems.get(subsystem as usize)?;
         others.scene.get_or_init(|| self.world.scene(subsystem).map(SceneTable::of)).as_ref()
     }
 
     fn fields(&self, subsystem: u32) -> &[TgField] {
-        let Some(others) = self.shown.subsystems.get(subsystem as usize) else { return &[] };
+        let Some(others) = self.copies.subsystems.get(subsystem as usize) else { return &[] };
         let made = others.fields.get_or_init(|| {
             let mut keep = Keep::default();
             (self.world.fields(subsystem).iter().map(|f| field_out(f, &mut keep)).collect(), keep)
@@ -88,14 +140,20 @@ impl Open<'_> {
     }
 }
 
-/// Answers a question; a panic of the host becomes the fallback.
+/// Answers a question; a panic of the host, and a world that is closed, give the fallback.
 ///
 /// # Safety
-/// `ctx` is the context of a world whose `observe` has not returned.
+/// `ctx` is the context of a world whose instance lives.
 unsafe fn answer<T>(ctx: *mut c_void, fallback: T, f: impl FnOnce(&Open) -> T) -> T {
-    // SAFETY: by the contract.
-    let open = unsafe { &*ctx.cast::<Open>() };
-    catch_unwind(AssertUnwindSafe(|| f(open))).unwrap_or(fallback)
+    // SAFETY: by the contract; it is reached through shared references only.
+    let shown = unsafe { &*ctx.cast::<Shown>() };
+    let Some(world) = shown.open.get() else {
+        shown.misused.set(true);
+        return fallback;
+    };
+    // SAFETY: open during `observe` only, which borrows the world.
+    let open = Open { world: unsafe { &*world }, copies: shown.copies.borrow() };
+    catch_unwind(AssertUnwindSafe(|| f(&open))).unwrap_or(fallback)
 }
 
 /// # Safety

@@ -21,7 +21,8 @@ pub struct ForeignSubsystem {
     capabilities: Capabilities,
     descriptions: ForeignDescriptions,
     pub(super) scratch: RefCell<Vec<TgBytes>>,
-    shown: Shown,
+    // At one place as long as the instance, which may have kept a pointer to it.
+    shown: Box<Shown>,
 }
 
 // SAFETY: the ABI asks for calls from one thread at a time, not always the same; `&self` is not shared
@@ -97,7 +98,7 @@ impl ForeignSubsystem {
         let bits = table.capabilities.map_or(0, |f| unsafe { f(instance) });
         let capabilities = Capabilities(bits);
         check_capabilities(capabilities, &table)?;
-        let (scratch, shown) = (RefCell::default(), Shown::default());
+        let (scratch, shown) = (RefCell::default(), Box::<Shown>::default());
         Ok(Self { raw, capabilities, descriptions, scratch, shown })
     }
 
@@ -204,7 +205,8 @@ impl Subsystem for ForeignSubsystem {
         let (step, partner) = (step_out(step)?, motion_out(partner));
         // SAFETY: a live instance; lengths were checked.
         let status = unsafe { f(self.raw.instance, &raw const step, t.as_ptr(), &raw const partner) };
-        self.raw.check(status, f64::NAN)
+        self.raw.check(status, f64::NAN)?;
+        self.shown.check()
     }
 
     fn observe(&mut self, step: &Step, world: &dyn World) -> Result {

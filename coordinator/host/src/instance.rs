@@ -7,8 +7,7 @@ use std::time::{Duration, Instant as Clock};
 use terraglue_diagnostics::error::{Error, Result};
 use terraglue_subsystem::{
     Action, Batch, BodyState, Capabilities, Energy, Error as Failure, Estimate, FieldInfo, FieldTile, Input,
-    Kind, Law, Level, Message, Motion, Response, Scene, Step, StreamInfo, Subsystem, Values, ValuesMut,
-    Variable, World,
+    Kind, Law, Level, Message, Motion, Response, Scene, Step, Subsystem, Values, ValuesMut, Variable, World,
 };
 
 /// How far a trial went.
@@ -335,48 +334,6 @@ impl Instance {
         Ok(())
     }
 
-    /// Shows it the committed world.
-    ///
-    /// # Errors
-    /// [`Error::Module`]: the subsystem failed, or failed for good before.
-    pub fn observe(&mut self, step: &Step, world: &dyn World) -> Result {
-        self.supervision.alive("observe")?;
-        let start = self.watch.begin();
-        let result = self.subsystem.observe(step, world);
-        self.watch.charge(start);
-        self.supervision.outcome("observe", result)
-    }
-
-    /// Which of its shapes are shown.
-    ///
-    /// # Errors
-    /// [`Error::Module`]: the subsystem failed, or failed for good before.
-    pub fn shape_visibility(&self, out: &mut [bool]) -> Result {
-        self.supervision.alive("shape_visibility")?;
-        self.supervision.outcome("shape_visibility", self.subsystem.shape_visibility(out))
-    }
-
-    /// Its streams.
-    pub fn streams(&self) -> &[StreamInfo] {
-        self.subsystem.streams()
-    }
-
-    /// The message that the last step made on a stream.
-    ///
-    /// # Errors
-    /// [`Error::Module`]: the subsystem failed, or failed for good before, or the time of the message is not finite.
-    pub fn stream(&self, k: usize) -> Result<Option<Message<'_>>> {
-        self.supervision.alive("stream")?;
-        let message = self.supervision.outcome("stream", self.subsystem.stream(k))?;
-        match message {
-            Some(m) if !m.time.is_finite() => {
-                let name = self.streams().get(k).map_or("?", |s| &s.name);
-                Err(self.error("stream", format!("the time of a message on `{name}` is not finite")))
-            }
-            message => Ok(message),
-        }
-    }
-
     /// The committed state into a numbered slot.
     ///
     /// # Errors
@@ -579,6 +536,44 @@ impl Instance {
         }
         Err(self.error("energy", "an energy is infinite"))
     }
+}
+
+/// Shows an instance the committed world.
+///
+/// # Errors
+/// [`Error::Module`]: the subsystem failed, or failed for good before.
+pub fn observe(instance: &mut Instance, step: &Step, world: &dyn World) -> Result {
+    const NAME: &str = "observe";
+    instance.supervision.alive(NAME)?;
+    let start = instance.watch.begin();
+    let result = instance.subsystem.observe(step, world);
+    instance.watch.charge(start);
+    instance.supervision.outcome(NAME, result)
+}
+
+/// Which shapes of an instance are shown.
+///
+/// # Errors
+/// [`Error::Module`]: the subsystem failed, or failed for good before.
+pub fn shape_visibility(instance: &Instance, out: &mut [bool]) -> Result {
+    const NAME: &str = "shape_visibility";
+    instance.supervision.alive(NAME)?;
+    instance.supervision.outcome(NAME, instance.subsystem.shape_visibility(out))
+}
+
+/// The message that the last step of an instance made on a stream.
+///
+/// # Errors
+/// [`Error::Module`]: the subsystem failed, or failed for good before, or the time of the message is not finite.
+pub fn message(instance: &Instance, k: usize) -> Result<Option<Message<'_>>> {
+    const NAME: &str = "stream";
+    instance.supervision.alive(NAME)?;
+    let message = instance.supervision.outcome(NAME, instance.subsystem.stream(k))?;
+    if message.is_none_or(|m| m.time.is_finite()) {
+        return Ok(message);
+    }
+    let name = instance.subsystem.streams().get(k).map_or("?", |s| &s.name);
+    Err(instance.error(NAME, format!("the time of a message on `{name}` is not finite")))
 }
 
 /// A trial that ended before the end of its step.

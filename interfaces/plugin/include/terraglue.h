@@ -196,6 +196,10 @@
 #define TG_FIXED 5
 /* `tg_joint.kind`: closes a loop of the tree. */
 #define TG_CLOSURE 6
+/* `tg_joint.kind`: slides along its axis and turns about it. */
+#define TG_CYLINDRICAL 7
+/* `tg_joint.kind`: turns about two axes that stay perpendicular. */
+#define TG_UNIVERSAL 8
 /* Bit of `tg_ray_mask.sees`: shapes that are not hidden. */
 #define TG_SEES_SHAPES 1
 /* Bit of `tg_ray_mask.sees`: height fields. */
@@ -512,7 +516,7 @@ typedef struct {
     uint32_t parent;
     /* Index of the body that it carries. */
     uint32_t child;
-    /* TG_REVOLUTE ... TG_CLOSURE. */
+    /* TG_REVOLUTE ... TG_UNIVERSAL. */
     uint32_t kind;
     /* Id of the variable of its position, rad or m; UINT32_MAX: none, here and below. */
     uint32_t position;
@@ -802,7 +806,7 @@ typedef struct {
 
 /* The committed world at the end of a step, and within the step interpolated to the time asked for; valid during
  * `observe` only, and to be called from its thread. Nothing of what comes after the step is known. An answer depends on the
- * question and the committed states alone. */
+ * question and the committed states alone. Asked outside of `observe` it answers nothing, and the call counts as TG_FATAL. */
 typedef struct {
     /* sizeof(tg_world) of the host. Entries beyond it count as null. */
     uint32_t size;

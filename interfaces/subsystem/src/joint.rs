@@ -1,6 +1,6 @@
 //! Joints between the bodies of a scene: what a viewer draws, plots by name and offers for selection.
 
-use crate::scene::Pose;
+use crate::pose::Pose;
 
 /// A joint between two bodies of a scene, or between a body and the world.
 #[derive(Clone, Debug, PartialEq)]

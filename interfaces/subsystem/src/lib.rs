@@ -45,6 +45,7 @@ mod mount;
 mod node_law;
 mod overlay;
 mod port;
+mod pose;
 mod scene;
 mod schema;
 mod stream;
@@ -69,7 +70,8 @@ pub use node_law::{
 };
 pub use overlay::{Figure, Overlay};
 pub use port::{Law, Node, Port, PortKind, component};
-pub use scene::{BodyState, Geometry, Pose, Scene, SceneBody, SceneShape};
+pub use pose::{BodyState, Pose};
+pub use scene::{Geometry, Scene, SceneBody, SceneShape};
 pub use schema::{Kind, Parameter, ParameterType, Schema, Usual};
 pub use stream::{Message, StreamInfo};
 pub use subsystem::{Module, Subsystem};

@@ -2,7 +2,7 @@
 
 use crate::config::Config;
 use crate::error::{Error, Result};
-use crate::scene::{BodyState, Pose};
+use crate::pose::{BodyState, Pose};
 use crate::schema::{Parameter, ParameterType};
 use crate::world::{BodyRef, World};
 

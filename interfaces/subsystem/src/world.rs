@@ -15,7 +15,8 @@
 use crate::error::{Error, Result};
 use crate::field::{FieldInfo, FieldTile};
 use crate::material::Material;
-use crate::scene::{BodyState, Scene};
+use crate::pose::BodyState;
+use crate::scene::Scene;
 
 /// The committed world at the end of a step, and within the step interpolated to the time asked for.
 ///

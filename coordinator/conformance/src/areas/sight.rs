@@ -6,7 +6,7 @@ use crate::finding::{Stop, Verdict};
 use crate::fixture::outputs;
 use crate::test_context::TestContext;
 use std::cell::Cell;
-use terraglue_host::Instance;
+use terraglue_host::{Instance, message, observe};
 use terraglue_subsystem::{
     BodyRef, BodyState, Capabilities, Input, Kind, Motion, Pose, Ray, RayHit, RayMask, Response, Scene,
     ShapeRef, Step, World,
@@ -105,7 +105,7 @@ fn step(instance: &mut Instance, index: u64) -> Verdict<f64> {
     instance.advance(&step, &input, &mut out)?;
     instance.commit(&step, &[], &Motion { x: &[], v: &[] })?;
     let world = Plane::new(t, end);
-    instance.observe(&step, &world)?;
+    observe(instance, &step, &world)?;
     Ok(world.latest.get())
 }
 
@@ -116,10 +116,10 @@ fn course(context: &TestContext) -> Verdict<Vec<u8>> {
     for index in 0..50 {
         step(&mut instance, index)?;
         all.extend(outputs(&instance)?.iter().flat_map(|x| x.to_bits().to_le_bytes()));
-        for k in 0..instance.streams().len() {
-            if let Some(message) = instance.stream(k)? {
-                all.extend(message.time.to_bits().to_le_bytes());
-                all.extend_from_slice(message.bytes);
+        for k in 0..instance.subsystem().streams().len() {
+            if let Some(made) = message(&instance, k)? {
+                all.extend(made.time.to_bits().to_le_bytes());
+                all.extend_from_slice(made.bytes);
             }
         }
     }
@@ -157,32 +157,32 @@ fn keeps_nothing(context: &TestContext) -> Verdict {
     for index in 0..10 {
         step(&mut instance, index)?;
         outputs(&instance)?;
-        (0..instance.streams().len()).try_for_each(|k| instance.stream(k).map(drop))?;
+        (0..instance.subsystem().streams().len()).try_for_each(|k| message(&instance, k).map(drop))?;
     }
     Ok(())
 }
 
 fn honest_rates(context: &TestContext) -> Verdict {
     let mut instance = seeing(context)?;
-    let streams = instance.streams().to_vec();
+    let streams = instance.subsystem().streams().to_vec();
     let mut last = vec![None; streams.len()];
     for index in 0..100 {
         step(&mut instance, index)?;
         for (k, (info, last)) in streams.iter().zip(&mut last).enumerate() {
-            let Some(message) = instance.stream(k)?.filter(|m| *last != Some(m.time)) else { continue };
+            let Some(made) = message(&instance, k)?.filter(|m| *last != Some(m.time)) else { continue };
             let given = format!("the stream `{}`", info.name);
-            if message.bytes.len() > info.most_bytes as usize {
-                let got = format!("a message of {} bytes", message.bytes.len());
+            if made.bytes.len() > info.most_bytes as usize {
+                let got = format!("a message of {} bytes", made.bytes.len());
                 return Err(Stop::fail("stream", given, got, format!("at most {}", info.most_bytes)));
             }
             if let Some(before) = *last
                 && info.rate_hz > 0.0
-                && message.time - before < 0.5 / info.rate_hz
+                && made.time - before < 0.5 / info.rate_hz
             {
-                let got = format!("a message {} s after the one before", message.time - before);
+                let got = format!("a message {} s after the one before", made.time - before);
                 return Err(Stop::fail("stream", given, got, format!("at most {} per second", info.rate_hz)));
             }
-            *last = Some(message.time);
+            *last = Some(made.time);
         }
     }
     Ok(())

@@ -102,7 +102,7 @@ fn misfit(old: &Instance, new: &Instance) -> Option<String> {
     if old.fields() != new.fields() {
         return Some("its fields changed; start the run again".into());
     }
-    if old.streams() != new.streams() {
+    if old.subsystem().streams() != new.subsystem().streams() {
         return Some("its streams changed; start the run again".into());
     }
     if old.actions().iter().any(|a| !new.actions().iter().any(|b| a.name == b.name)) {

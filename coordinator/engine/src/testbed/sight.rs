@@ -9,7 +9,7 @@ use super::uncoupled::span;
 use std::sync::Arc;
 
 use terraglue_diagnostics::{Error, InputError, Result, did_you_mean};
-use terraglue_host::{Instance, Workers};
+use terraglue_host::{Instance, Workers, observe, shape_visibility};
 use terraglue_scenario::{Scenario, SubsystemSpec};
 use terraglue_subsystem::{BodyState, Capabilities, Mount, Step};
 use terraglue_world::{Parallel, WorldBuilder, WorldModel, fixed_bodies};
@@ -101,7 +101,7 @@ impl Sight {
         let step = Step::free(clock.t, 0.0, clock.index);
         open.update([clock.t; 2], subsystems)?;
         let Open { world, seers, .. } = open.as_mut();
-        seers.iter().try_for_each(|slot| subsystems.instances[*slot].observe(&step, world))
+        seers.iter().try_for_each(|slot| observe(&mut subsystems.instances[*slot], &step, &*world))
     }
 }
 
@@ -115,7 +115,7 @@ impl Open {
         let Subsystems { instances, schedules, .. } = subsystems;
         for slot in &self.seers {
             if let Some(step) = schedules[*slot].step_of(span) {
-                instances[*slot].observe(&step, &self.world)?;
+                observe(&mut instances[*slot], &step, &self.world)?;
             }
         }
         Ok(())
@@ -129,7 +129,7 @@ impl Open {
             update.bodies(slot as u32, before, &members[slot].states).map_err(|e| odd(&e))?;
         }
         for (slot, shown) in &mut self.shown {
-            instances[*slot].shape_visibility(shown)?;
+            shape_visibility(&instances[*slot], shown)?;
             update.visibility(*slot as u32, shown).map_err(|e| odd(&e))?;
         }
         for (slot, field) in &self.grounds {

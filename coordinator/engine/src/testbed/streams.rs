@@ -32,7 +32,7 @@ impl Streams {
     pub fn new(instances: &[Instance]) -> Self {
         let mut all = Self::default();
         for (slot, instance) in instances.iter().enumerate() {
-            for (k, info) in instance.streams().iter().enumerate() {
+            for (k, info) in instance.subsystem().streams().iter().enumerate() {
                 let name = format!("{}.{}", instance.name(), info.name);
                 all.views.push(StreamView { name, info: info.clone(), messages: Vec::new() });
                 all.places.push((slot, k));
@@ -63,7 +63,7 @@ impl Streams {
     pub fn collect(&mut self, instances: &[Instance]) -> Result {
         let all = self.views.iter_mut().zip(&self.places).zip(&mut self.state);
         for ((view, (slot, k)), state) in all {
-            let Some(message) = instances[*slot].stream(*k)? else { continue };
+            let Some(message) = terraglue_host::message(&instances[*slot], *k)? else { continue };
             // told again: the instance has made no step since
             if state.last == Some(message.time) {
                 continue;

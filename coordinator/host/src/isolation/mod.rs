@@ -17,6 +17,7 @@ mod sight;
 mod tiles;
 mod wire;
 mod worker;
+mod worker_channel;
 
 pub use channel::{confine, end_group};
 pub use fork_server::{FORK_SERVER, ForkServer};

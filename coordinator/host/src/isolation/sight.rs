@@ -4,7 +4,7 @@
 use super::calls::{Call, OwnedStep};
 use super::tiles::Tile;
 use super::wire::{Reader, Wire, Writer};
-use super::worker::WorkerChannel;
+use super::worker_channel::WorkerChannel;
 use std::cell::OnceCell;
 use terraglue_subsystem::{
     BodyRef, BodyState, Error, FieldInfo, FieldTile, Ray, RayHit, RayMask, Result, Scene, ShapeRef,

@@ -7,9 +7,9 @@ use super::proxy::ModuleInfo;
 use super::sight;
 use super::tiles::Tiles;
 use super::wire::{Reader, Writer};
+use super::worker_channel::WorkerChannel;
 use super::{Line, Start, What};
 use crate::{HostServices, Library, LoadedModule, TeardownErrors, Workers};
-use std::cell::{Cell, RefCell};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::Path;
 use std::process::ExitCode;
@@ -32,7 +32,7 @@ pub fn serve(path: &Path, library: &Library) -> ExitCode {
         channel::end_group(std::process::id());
     });
     let Ok(segment) = Segment::open(path) else { return ExitCode::FAILURE };
-    let channel = WorkerChannel { segment: RefCell::new(segment), last: Cell::new(0) };
+    let channel = WorkerChannel::new(segment);
     let mut worker = Worker { library: library.clone(), ..Worker::default() };
     loop {
         let request = channel.next(&worker.log.cancel);
@@ -51,36 +51,6 @@ pub fn serve(path: &Path, library: &Library) -> ExitCode {
                 std::thread::sleep(Duration::from_secs(1));
             }
         }
-    }
-}
-
-/// The shared segment, and the number of the last call.
-pub struct WorkerChannel {
-    segment: RefCell<Segment>,
-    last: Cell<u32>,
-}
-
-impl WorkerChannel {
-    /// Waits for the next call.
-    fn next(&self, cancel: &AtomicBool) -> Vec<u8> {
-        let mut segment = self.segment.borrow_mut();
-        let (number, length) = segment.call_after(self.last.get());
-        self.last.set(number);
-        cancel.store(segment.cancel_flag().load(Ordering::Relaxed) != 0, Ordering::Relaxed);
-        segment.area(0)[..length].to_vec()
-    }
-
-    /// Asks the host while it waits for the answer to a call; what it says. None: the question is too long.
-    pub fn ask(&self, write: impl FnOnce(&mut Writer)) -> Option<Vec<u8>> {
-        {
-            let mut segment = self.segment.borrow_mut();
-            let mut w = Writer::new(segment.area(1));
-            calls::write_outcome(&mut w, &[], &Ok(()));
-            write(&mut w);
-            let length = w.length()?;
-            segment.post_answer(length);
-        }
-        Some(self.next(&AtomicBool::new(false)))
     }
 }
 

@@ -23,9 +23,9 @@ fn a_module_of_3_0_gives_the_bits_of_one_of_today() {
     let (mut older, mut newer) = (soil(&older), soil(&newer));
     assert_eq!(drive(&mut older), drive(&mut newer));
     assert!(!older.capabilities().has(Capabilities::SEES));
-    assert!(older.scene().joints.is_empty() && older.streams().is_empty());
+    assert!(older.scene().joints.is_empty() && older.subsystem().streams().is_empty());
     let mut shown = vec![false; older.scene().shapes.len()];
-    older.shape_visibility(&mut shown).expect("all are shown");
+    crate::shape_visibility(&older, &mut shown).expect("all are shown");
     assert!(shown.iter().all(|s| *s));
 }
 

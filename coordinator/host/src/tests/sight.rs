@@ -184,7 +184,7 @@ fn the_range_finders_of_the_page_measure_the_same() {
     let host: Arc<dyn Host> = Arc::new(Standalone::default());
     let mut python = start(what, &host, &super::services(), Isolation::default()).expect("starts");
     let step = Step::free(1.0, 0.25, 0);
-    c.observe(&step, &world("ground")).expect("observes");
+    crate::observe(&mut c, &step, &world("ground")).expect("observes");
     python.observe(&step, &world("ground")).expect("observes");
     let (mut a, mut b) = ([0.0], [0.0]);
     c.get(&[0], ValuesMut::F64(&mut a)).expect("a distance");
@@ -195,6 +195,7 @@ fn the_range_finders_of_the_page_measure_the_same() {
     let scan: serde_json::Value = serde_json::from_slice(scan.bytes).expect("JSON");
     assert_eq!(scan["ranges"], serde_json::json!([1.25]));
     // a body that there is not is an error with a reason, and no end of the program
-    let error = c.observe(&step, &TestWorld { names: vec!["ground".into()], scene: Scene::default() });
+    let empty = TestWorld { names: vec!["ground".into()], scene: Scene::default() };
+    let error = crate::observe(&mut c, &step, &empty);
     assert!(error.expect_err("no body").to_string().contains("the body of `mount` is not there"));
 }

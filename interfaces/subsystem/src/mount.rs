@@ -206,7 +206,8 @@ mod tests {
         ] {
             assert!(matches!(mount(bad), Err(Error::Refused(_))), "{bad}");
         }
-        let turned = mount(r#"{"mount": "robot.mast", "mount_offset": [0, 0, 0, 2, 0, 0, 0]}"#).unwrap();
+        let turned =
+            mount(r#"{"mount": "robot.mast", "mount_offset": [0, 0, 0, 2, 0, 0, 0]}"#).expect("a turn");
         assert_eq!(turned.body_from_sensor(), &Pose::IDENTITY);
     }
 }

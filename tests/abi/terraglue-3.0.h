@@ -660,7 +660,7 @@ typedef struct {
     uint32_t max_nodes;
     /* 0. */
     uint32_t reserved;
-    /* Since ABI 2.1. The law that the scenario names in the parameter `law.plugin` of this subsystem, valid until
+    /* The law that the scenario names in the parameter `law.plugin` of this subsystem, valid until
      * `free`; null: none. */
     const tg_open_law *law;
 } tg_host;
@@ -802,7 +802,7 @@ typedef struct {
     uint32_t law_state_doubles;
     /* 0. */
     uint32_t reserved;
-    /* Since ABI 2.1. Modules of kind TG_LAW: their functions; required, while `instantiate`, `free`,
+    /* Modules of kind TG_LAW: their functions; required, while `instantiate`, `free`,
      * `capabilities`, `advance` and `last_error` are not. Null for the other kinds. */
     const tg_node_law *law;
 } tg_subsystem;

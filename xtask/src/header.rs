@@ -5,7 +5,7 @@ use cbindgen::{Builder, Config, DocumentationStyle, Language, Style};
 use std::path::{Path, PathBuf};
 
 /// Files of the ABI in the order in which the header shows them.
-const SOURCES: [&str; 7] = ["constants", "step", "variable", "scene", "law", "host", "table"];
+const SOURCES: [&str; 8] = ["constants", "step", "variable", "scene", "law", "host", "sight", "table"];
 
 const PROLOGUE: &str = include_str!("header_prologue.txt");
 const EPILOGUE: &str = include_str!("header_epilogue.txt");

@@ -20,6 +20,17 @@ pub struct SubsystemView<'a> {
     pub instance: &'a dyn Subsystem,
 }
 
+/// A stream with the messages of the last nominal step.
+#[derive(Clone, Debug, PartialEq)]
+pub struct StreamView {
+    /// Its full name, `subsystem.stream`.
+    pub name: String,
+    /// What it says about itself.
+    pub info: terraglue_subsystem::StreamInfo,
+    /// Times (s) and bytes, in the order in which they were made.
+    pub messages: Vec<(f64, Vec<u8>)>,
+}
+
 /// The energies of a subsystem as they enter the sum of all: what carries signals only has none, unless it says so, and a
 /// soil has no motors.
 pub fn ledger_of(kind: Kind, energy: &Energy) -> Energy {
@@ -56,6 +67,8 @@ pub struct View<'a> {
     pub gluing: &'a StepReport,
     /// Sum over all subsystems.
     pub energy: Energy,
+    /// All streams, in the order of their subsystems.
+    pub streams: &'a [StreamView],
 }
 
 /// Something that happened or was changed, written so that it can go back into a scenario.

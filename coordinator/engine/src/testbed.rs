@@ -2,7 +2,7 @@
 //!
 //! Order of a communication step, all subsystems: (1) events and `set`; (2) outputs of t become inputs;
 //! (3) a trial of every subsystem without glue; (4) the group of glued subsystems by its strategy;
-//! (5) commit of all, in the order of their names. Reads see committed values only.
+//! (5) commit of all, in the order of their names; then those that see look at the committed world. Reads see committed values only.
 
 use crate::observer::{Event, Observer, SubsystemView, View, ledger_of};
 use crate::signals::Signals;
@@ -26,7 +26,9 @@ mod pieces;
 mod reload;
 mod run_clock;
 mod schedule;
+mod sight;
 mod standing;
+mod streams;
 mod subsystems;
 mod uncoupled;
 
@@ -34,6 +36,8 @@ pub use build::{find, make, services, with_law};
 pub use explain::{ConnectionNote, Explanation};
 use glued::GluedGroups;
 use run_clock::RunClock;
+use sight::Sight;
+use streams::Streams;
 use subsystems::Subsystems;
 use uncoupled::Uncoupled;
 
@@ -118,6 +122,8 @@ pub struct Testbed {
     glued: GluedGroups,
     uncoupled: Uncoupled,
     signals: Signals,
+    sight: Sight,
+    streams: Streams,
     clock: RunClock,
     /// Whether steps may be cut so that one ends at the time of an event.
     exact: bool,
@@ -183,6 +189,7 @@ impl Testbed {
         self.halvings = 0;
         self.report.clear();
         self.report.converged = true;
+        self.streams.clear();
         while self.clock.is_before(end) {
             let (start, times) = uncoupled::watch(&self.clock, !self.glued.groups.is_empty());
             self.apply_events()?;
@@ -251,8 +258,11 @@ impl Testbed {
         let of_step = (h, self.halvings);
         let outcome = self.glued.step(of_step, &self.clock, &mut self.subsystems, &mut self.timings)?;
         if outcome == Outcome::Converged {
+            self.sight.before_commit(&self.subsystems);
             uncoupled::commit(&self.clock, (h, end), &mut self.subsystems)?;
             self.subsystems.read_states()?;
+            self.sight.after_commit(&self.clock, (h, end), &mut self.subsystems)?;
+            self.streams.collect(&self.subsystems.instances)?;
         }
         Ok(outcome)
     }
@@ -317,6 +327,7 @@ impl Testbed {
             subsystems: &subsystems,
             gluing: self.report(),
             energy: self.energy(),
+            streams: self.streams.views(),
         })
     }
 
@@ -417,6 +428,7 @@ impl Testbed {
     /// What a snapshot holds beside the states of the instances.
     fn restore_rest(&mut self, snapshot: &Snapshot) -> Result {
         self.clock = snapshot.clock;
+        self.streams.forget();
         self.signals.time_line.set_fired(&snapshot.fired);
         if let Some(faults) = self.glued.recall(&snapshot.memory) {
             self.signals.faults.recall(faults);

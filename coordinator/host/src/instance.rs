@@ -7,7 +7,7 @@ use std::time::{Duration, Instant as Clock};
 use terraglue_diagnostics::error::{Error, Result};
 use terraglue_subsystem::{
     Action, Batch, BodyState, Capabilities, Energy, Error as Failure, Estimate, FieldInfo, FieldTile, Input,
-    Kind, Law, Level, Motion, Response, Scene, Step, Subsystem, Values, ValuesMut, Variable,
+    Kind, Law, Level, Message, Motion, Response, Scene, Step, Subsystem, Values, ValuesMut, Variable, World,
 };
 
 /// How far a trial went.
@@ -536,6 +536,44 @@ impl Instance {
         }
         Err(self.error("energy", "an energy is infinite"))
     }
+}
+
+/// Shows an instance the committed world.
+///
+/// # Errors
+/// [`Error::Module`]: the subsystem failed, or failed for good before.
+pub fn observe(instance: &mut Instance, step: &Step, world: &dyn World) -> Result {
+    const NAME: &str = "observe";
+    instance.supervision.alive(NAME)?;
+    let start = instance.watch.begin();
+    let result = instance.subsystem.observe(step, world);
+    instance.watch.charge(start);
+    instance.supervision.outcome(NAME, result)
+}
+
+/// Which shapes of an instance are shown.
+///
+/// # Errors
+/// [`Error::Module`]: the subsystem failed, or failed for good before.
+pub fn shape_visibility(instance: &Instance, out: &mut [bool]) -> Result {
+    const NAME: &str = "shape_visibility";
+    instance.supervision.alive(NAME)?;
+    instance.supervision.outcome(NAME, instance.subsystem.shape_visibility(out))
+}
+
+/// The message that the last step of an instance made on a stream.
+///
+/// # Errors
+/// [`Error::Module`]: the subsystem failed, or failed for good before, or the time of the message is not finite.
+pub fn message(instance: &Instance, k: usize) -> Result<Option<Message<'_>>> {
+    const NAME: &str = "stream";
+    instance.supervision.alive(NAME)?;
+    let message = instance.supervision.outcome(NAME, instance.subsystem.stream(k))?;
+    if message.is_none_or(|m| m.time.is_finite()) {
+        return Ok(message);
+    }
+    let name = instance.subsystem.streams().get(k).map_or("?", |s| &s.name);
+    Err(instance.error(NAME, format!("the time of a message on `{name}` is not finite")))
 }
 
 /// A trial that ended before the end of its step.

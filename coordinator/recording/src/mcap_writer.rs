@@ -7,6 +7,7 @@ use crate::columns::{About, Columns};
 use crate::force_message::{DRAWN_EVERY_S, Forces};
 use crate::ground_grid::{GroundGrid, Rectangle};
 use crate::ground_points::GroundPoints;
+use crate::joint_message::Joints;
 use crate::kept_file::KeptFile;
 use crate::layout::{RECORDING, at, nanoseconds, other_at, timestamp};
 use crate::messages::WindowRecord;
@@ -14,7 +15,7 @@ use crate::scene_message::{frame_id, pose, quaternion, scene, vector};
 use crate::selection::Precision;
 use crate::snapshot::{Snapshot, failed};
 use crate::topics::{self, Topic};
-use crate::{energy_message, gluing_message, point_cloud};
+use crate::{energy_message, gluing_message, point_cloud, stream_topics};
 use foxglove::messages::packed_element_field::NumericType;
 use foxglove::messages::{FrameTransform, FrameTransforms, Grid, Log, PackedElementField, Vector2, log};
 use mcap::records::MessageHeader;
@@ -26,7 +27,7 @@ use std::fs::File;
 use std::io::BufWriter;
 use std::path::{Path, PathBuf};
 use terraglue_diagnostics::error::{Error, Result};
-use terraglue_engine::observer::{Event, View};
+use terraglue_engine::observer::{Event, StreamView, View};
 use terraglue_gluing::StepReport;
 use terraglue_numerics::rotation;
 use terraglue_scenario::Scenario;
@@ -88,6 +89,8 @@ struct Channels {
     energy: u16,
     gluing: u16,
     events: u16,
+    joints: Vec<u16>,
+    streams: Vec<u16>,
 }
 
 /// Writes the topics of a run.
@@ -101,6 +104,7 @@ pub(crate) struct McapWriter {
     poses: FrameTransforms,
     /// Of each subsystem: what is written when it changes, and what is written always.
     variables: Vec<[Option<Variables>; 2]>,
+    joints: Vec<Joints>,
     energy: Columns,
     ground: Option<GroundGrid>,
     points: Option<GroundPoints>,
@@ -146,6 +150,7 @@ impl McapWriter {
             message: Vec::new(),
             poses: FrameTransforms::default(),
             variables: Vec::new(),
+            joints: Vec::new(),
             energy: Columns::default(),
             ground: None,
             points: None,
@@ -168,6 +173,39 @@ impl McapWriter {
         let schema = sink.add_schema(&topic.schema, "protobuf", &topic.descriptor);
         let channel = schema.and_then(|s| sink.add_channel(s, &topic.topic, "protobuf", &topic.metadata));
         self.checked(channel)
+    }
+
+    fn add_stream(&mut self, stream: &StreamView) -> Result {
+        let Some(sink) = &mut self.sink else { return Ok(()) };
+        let (encoding, data) = stream_topics::schema(&stream.info);
+        let topic = stream_topics::name(&stream.name);
+        let schema = sink.add_schema(&stream.info.schema, encoding, &data);
+        let about = BTreeMap::from([(topics::STREAM.to_owned(), stream.name.clone())]);
+        let channel = schema.and_then(|s| sink.add_channel(s, &topic, &stream.info.encoding, &about));
+        let channel = self.checked(channel)?;
+        self.channels.streams.push(channel);
+        Ok(())
+    }
+
+    /// Writes the messages of all streams since the step before; called for every step.
+    pub fn streams(&mut self, view: &View) -> Result {
+        for (k, stream) in view.streams.iter().enumerate() {
+            for (time, bytes) in &stream.messages {
+                self.message.clone_from(bytes);
+                self.emit(self.channels.streams[k], *time)?;
+            }
+        }
+        Ok(())
+    }
+
+    fn joint_states(&mut self, view: &View) -> Result {
+        let mut all = std::mem::take(&mut self.joints);
+        let written = all.iter_mut().enumerate().try_for_each(|(k, joints)| {
+            joints.read(view, self.precision)?;
+            self.put(self.channels.joints[k], view.t_s, &joints.message)
+        });
+        self.joints = all;
+        written
     }
 
     /// Announces all topics and writes what stands once at the start: shapes and the whole ground.
@@ -216,7 +254,13 @@ impl McapWriter {
             let others = self.variables(&scalars.name, false, Columns::new(part(false)))?;
             self.variables.push([parameters, others]);
         }
-        Ok(())
+        self.joints = Joints::find(view);
+        let topics: Vec<Topic> = self.joints.iter().map(|joints| joints.topic(view)).collect();
+        for topic in topics {
+            let channel = self.add(topic)?;
+            self.channels.joints.push(channel);
+        }
+        view.streams.iter().try_for_each(|stream| self.add_stream(stream))
     }
 
     fn variables(
@@ -244,6 +288,7 @@ impl McapWriter {
     /// Writes variables, poses, forces, energy and gluing of a communication point.
     pub fn record(&mut self, view: &View, snapshot: &Snapshot) -> Result {
         self.transforms(view)?;
+        self.joint_states(view)?;
         let mut variables = std::mem::take(&mut self.variables);
         let written = snapshot.subsystems.iter().zip(&mut variables).try_for_each(|(scalars, parts)| {
             parts

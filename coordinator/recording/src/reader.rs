@@ -8,7 +8,7 @@ use crate::point_cloud;
 use crate::records::{Piece, Records};
 use crate::solids::{self, Solid};
 use crate::table::Table;
-use crate::topics::{COLUMNS, SUBSYSTEM};
+use crate::topics::{COLUMNS, STREAM, SUBSYSTEM};
 use foxglove::messages::{FrameTransforms, Grid, Log, PointCloud, SceneUpdate};
 use prost::Message;
 use std::collections::BTreeMap;
@@ -230,6 +230,10 @@ impl Recording {
         // Divided, not multiplied by 1e-9: 5 ms are 0.005 s to the bit.
         let t_s = message.log_time as f64 / 1e9;
         let data = &message.data[..];
+        // what a module gives in an encoding of its own says nothing of the run
+        if message.channel.metadata.contains_key(STREAM) {
+            return;
+        }
         self.outdated |= message.channel.message_encoding == "json";
         // A message that does not parse is left out.
         match message.channel.topic.as_str() {

@@ -212,12 +212,14 @@ impl Recorder {
         self.mcap.started(view, &self.snapshot)?;
         viewer_layout::write(&self.folder, view, self.mcap.ground_points(), &self.report)?;
         self.record(view)?;
+        self.mcap.streams(view)?;
         self.mcap.flush(view.t_s)
     }
 
     fn step(&mut self, view: &View) -> Result {
         self.mcap.count(view.gluing);
         self.summary.stepped(view)?;
+        self.mcap.streams(view)?;
         if view.step_index.is_multiple_of(self.every_steps) {
             self.record(view)?;
         }

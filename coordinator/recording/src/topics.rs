@@ -14,6 +14,9 @@ pub(crate) const COLUMNS: &str = "columns";
 /// Key of a channel's metadata: whose variables they are.
 pub(crate) const SUBSYSTEM: &str = "subsystem";
 
+/// Key of a channel's metadata: the full name of a stream.
+pub(crate) const STREAM: &str = "stream";
+
 /// Topic, name of the message type, and its file of descriptors.
 pub(crate) struct Topic {
     pub topic: String,
@@ -23,7 +26,8 @@ pub(crate) struct Topic {
 }
 
 impl Topic {
-    fn with(mut self, key: &str, value: String) -> Self {
+    /// The same with one more line of metadata.
+    pub fn with(mut self, key: &str, value: String) -> Self {
         self.metadata.insert(key.into(), value);
         self
     }

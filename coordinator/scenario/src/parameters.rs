@@ -10,7 +10,8 @@ use terraglue_diagnostics::{Complaint, check_value};
 use terraglue_subsystem::{Config, Kind, Parameter, ParameterType, Schema};
 
 /// Modules that come with the program.
-pub const SHIPPED_MODULES: &[&str] = &["rigid-body", "soil-cellular-automaton", "soil-bekker", "gait"];
+pub const SHIPPED_MODULES: &[&str] =
+    &["rigid-body", "soil-cellular-automaton", "soil-bekker", "gait", "sensor"];
 
 /// Checks names, types, ranges, choices and paths; takes from the offered soil row what the schema names; fills
 /// in the defaults. Sub-tables named after a shipped module other than the chosen one are ignored.

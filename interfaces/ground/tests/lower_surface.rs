@@ -15,8 +15,15 @@ fn inside(geometry: &Geometry, p: [f64; 3]) -> bool {
             (across * across + over * over).sqrt() <= *radius
         }
         Geometry::Cylinder { half_length, radius } => across <= *radius && p[2].abs() <= *half_length,
+        Geometry::ConeFrustum { half_length, radius_bottom, radius_top } => {
+            let share = 0.5 * (p[2] / half_length + 1.0);
+            (0.0..=1.0).contains(&share) && across <= radius_bottom + share * (radius_top - radius_bottom)
+        }
+        Geometry::Ellipsoid { semi_axes } => {
+            (0..3).map(|k| p[k] / semi_axes[k]).map(|x| x * x).sum::<f64>() <= 1.0
+        }
         // A regular octahedron of size 0.1 is the only mesh here.
-        Geometry::ConvexMesh { .. } => p.iter().map(|c| c.abs()).sum::<f64>() <= 0.1,
+        Geometry::ConvexMesh { .. } | Geometry::Mesh { .. } => p.iter().map(|c| c.abs()).sum::<f64>() <= 0.1,
     }
 }
 
@@ -36,13 +43,16 @@ fn octahedron() -> Geometry {
     Geometry::ConvexMesh { points: points.collect(), triangles }
 }
 
-fn shapes() -> [Geometry; 5] {
+fn shapes() -> [Geometry; 8] {
     [
         Geometry::Sphere { radius: 0.08 },
         Geometry::Box { half_extents: [0.1, 0.05, 0.02] },
         Geometry::Capsule { half_length: 0.07, radius: 0.03 },
         Geometry::Cylinder { half_length: 0.03, radius: 0.09 },
         octahedron(),
+        Geometry::ConeFrustum { half_length: 0.08, radius_bottom: 0.05, radius_top: 0.02 },
+        Geometry::ConeFrustum { half_length: 0.05, radius_bottom: 0.0, radius_top: 0.09 },
+        Geometry::Ellipsoid { semi_axes: [0.1, 0.06, 0.04] },
     ]
 }
 
@@ -203,4 +213,34 @@ fn lines_that_graze_a_wheel_do_not_enter_it_below_its_lowest_point() {
         }
     }
     assert!(grazed > 1000, "{grazed}");
+}
+
+#[test]
+fn slopes_of_cones_and_ellipsoids_are_those_of_their_undersides() {
+    let tilt = pose_from([0.9, 0.2, -0.3, 0.1], [0.0, 0.0, 0.5]);
+    for geometry in &shapes()[5..] {
+        let placed = Placed::new(geometry, &tilt);
+        let mut compared = 0;
+        for (a, b) in
+            (-10..=10).flat_map(|a| (-10..=10).map(move |b| (f64::from(a) * 5e-3, f64::from(b) * 5e-3)))
+        {
+            let at = |dx: f64, dy: f64| placed.lower(a + dx, b + dy);
+            let d = 1e-6;
+            let (Some(z), Some(e), Some(w)) = (at(0.0, 0.0), at(d, 0.0), at(-d, 0.0)) else { continue };
+            let (Some(n), Some(s)) = (at(0.0, d), at(0.0, -d)) else { continue };
+            // an edge between: the two sides differ
+            let bent = |p: f64, m: f64| (p + m - 2.0 * z).abs() > 1e-8;
+            let slope = [(e - w) / (2.0 * d), (n - s) / (2.0 * d)];
+            if bent(e, w) || bent(n, s) || slope[0].hypot(slope[1]) > 2.5 {
+                continue;
+            }
+            let told = placed.underside_slope([a, b, z]);
+            assert!(
+                (0..2).all(|k| (told[k] - slope[k]).abs() < 1e-4),
+                "{geometry:?} {a} {b}: {told:?} {slope:?}"
+            );
+            compared += 1;
+        }
+        assert!(compared > 40, "{geometry:?}: {compared}");
+    }
 }

@@ -41,7 +41,7 @@
 /* Version of the ABI that breaks: host and module must agree. */
 #define TG_ABI_MAJOR 3
 /* Version of the ABI that grows: new fields at the end of `tg_subsystem` and `tg_host`. */
-#define TG_ABI_MINOR 0
+#define TG_ABI_MINOR 1
 /* Success. */
 #define TG_OK 0
 /* The step is too long: `reached` (s) says how far it could go. The host may repeat with a shorter step. */
@@ -62,6 +62,8 @@
 #define TG_CONTROLLER 3
 /* `tg_subsystem.kind`: pressure and shear over arrays of nodes. */
 #define TG_LAW 4
+/* `tg_subsystem.kind`: looks at the world of the others, answers with signals and streams. Since 3.1. */
+#define TG_SENSOR 5
 /* Bit of `capabilities`: `advance` takes `TG_FORCE`. */
 #define TG_CAN_FORCE 1
 /* Bit of `capabilities`: `advance` takes `TG_MOTION`. */
@@ -84,6 +86,8 @@
 #define TG_CAN_FEEDTHROUGH 1024
 /* Bit of `capabilities`: makes communication steps of one length only. */
 #define TG_CAN_FIXED_STEP 4096
+/* Bit of `capabilities`: `observe`. Since 3.1. */
+#define TG_CAN_SEE 8192
 /* `tg_port.kind`: one body shape on one ground, unilateral. */
 #define TG_CONTACT 0
 /* `tg_port.kind`: a cut joint, bilateral. */
@@ -172,6 +176,44 @@
 #define TG_CYLINDER 3
 /* `tg_shape.geometry`: convex hull of `points`. */
 #define TG_CONVEX_MESH 4
+/* `tg_shape.geometry`: `size` = half length along z, radius at z = -half length, radius at z = half length. Since 3.1. */
+#define TG_CONE_FRUSTUM 5
+/* `tg_shape.geometry`: `size` = half lengths along x, y, z. Since 3.1. */
+#define TG_ELLIPSOID 6
+/* `tg_shape.geometry`: the triangles of `points`, open or closed; is seen only. Since 3.1. */
+#define TG_MESH 7
+/* `tg_joint.kind`: turns about its axis between limits. */
+#define TG_REVOLUTE 0
+/* `tg_joint.kind`: turns about its axis without limits. */
+#define TG_CONTINUOUS 1
+/* `tg_joint.kind`: slides along its axis. */
+#define TG_PRISMATIC 2
+/* `tg_joint.kind`: turns about a point. */
+#define TG_SPHERICAL 3
+/* `tg_joint.kind`: slides in the plane across its axis and turns about it. */
+#define TG_PLANAR 4
+/* `tg_joint.kind`: does not move. */
+#define TG_FIXED 5
+/* `tg_joint.kind`: closes a loop of the tree. */
+#define TG_CLOSURE 6
+/* `tg_joint.kind`: slides along its axis and turns about it. */
+#define TG_CYLINDRICAL 7
+/* `tg_joint.kind`: turns about two axes that stay perpendicular. */
+#define TG_UNIVERSAL 8
+/* Bit of `tg_ray_mask.sees`: shapes that are not hidden. */
+#define TG_SEES_SHAPES 1
+/* Bit of `tg_ray_mask.sees`: height fields. */
+#define TG_SEES_GROUND 2
+/* `tg_overlay.figure`: lines, two of `points` for each; `size` is their width. */
+#define TG_LINES 0
+/* `tg_overlay.figure`: points of that `size`. */
+#define TG_POINTS 1
+/* `tg_overlay.figure`: arrows, tail and tip of each in `points`; `size` is the width of the shaft. */
+#define TG_ARROWS 2
+/* `tg_overlay.figure`: the edge of an ellipse in the x, y plane of `pose`. */
+#define TG_ELLIPSE 3
+/* `tg_overlay.figure`: `text` from the first of `points` on, `size` high. */
+#define TG_TEXT 4
 /* `tg_field_tile.format`: every value equals `scale`; no data. */
 #define TG_TILE_UNIFORM 0
 /* `tg_field_tile.format`: data are double. */
@@ -422,7 +464,7 @@ typedef struct {
     uint32_t id;
     /* Index of the body. */
     uint32_t body;
-    /* TG_SPHERE, TG_BOX, TG_CAPSULE, TG_CYLINDER or TG_CONVEX_MESH. */
+    /* TG_SPHERE ... TG_MESH. */
     uint32_t geometry;
     /* 1: can be hit; 0: is only seen. */
     uint32_t collides;
@@ -453,6 +495,46 @@ typedef struct {
     /* Number of shapes. */
     uint32_t n_shapes;
 } tg_scene;
+
+/* What a shape is made of, for sensors. Since 3.1. */
+typedef struct {
+    /* 0 unknown, 1 metal, 2 rock, 3 soil, 4 wood, 5 foliage, 6 glass, 7 water; from 16 on free. */
+    uint32_t class_id;
+    /* Part of the light that comes back, 0 ... 1. */
+    float reflectance;
+    /* Part of the light that passes through, 0 ... 1; with the reflectance at most 1. */
+    float transmittance;
+} tg_material;
+
+/* A joint between two bodies of a scene, or between a body and the world. Since 3.1. */
+typedef struct {
+    /* Name, unique in the subsystem. */
+    const char *name;
+    /* The action that breaks it; empty or null: none. */
+    const char *break_action;
+    /* Index of the body that it hangs on; UINT32_MAX: the world. */
+    uint32_t parent;
+    /* Index of the body that it carries. */
+    uint32_t child;
+    /* TG_REVOLUTE ... TG_UNIVERSAL. */
+    uint32_t kind;
+    /* Id of the variable of its position, rad or m; UINT32_MAX: none, here and below. */
+    uint32_t position;
+    /* Id of that of its velocity, rad/s or m/s. */
+    uint32_t velocity;
+    /* Id of that of what its motor gives, N m or N. */
+    uint32_t torque;
+    /* Id of that of the most that its motor can give, N m or N. */
+    uint32_t torque_limit;
+    /* Id of that of whether it is held fast. */
+    uint32_t blocked;
+    /* Pose of the joint in the parent, where the joint stands at zero. */
+    tg_pose parent_from_joint;
+    /* Direction of the axis in the frame of the joint, unit; zero for a kind without an axis. */
+    double axis[3];
+    /* Smallest and largest position, rad or m; -inf, inf: none. */
+    double limits[2];
+} tg_joint;
 
 /* A field over the ground. Nodes (i, j) lie at origin + (i, j) * spacing. */
 typedef struct {
@@ -665,6 +747,185 @@ typedef struct {
     const tg_open_law *law;
 } tg_host;
 
+/* A body of the world. */
+typedef struct {
+    /* Number of the subsystem. */
+    uint32_t subsystem;
+    /* Index into the bodies of its scene. */
+    uint32_t body;
+} tg_body_ref;
+
+/* A shape of the world. */
+typedef struct {
+    /* Number of the subsystem. */
+    uint32_t subsystem;
+    /* Index of the body in its scene; UINT32_MAX: the ground. */
+    uint32_t body;
+    /* Id of the shape; UINT32_MAX: the ground. */
+    uint32_t shape;
+} tg_shape_ref;
+
+/* A half line that looks for the first thing in its way. */
+typedef struct {
+    /* Start, world, m. */
+    double origin[3];
+    /* Direction, world, unit. */
+    double direction[3];
+    /* When it looks, s, within the interval of the world. */
+    double time;
+    /* How far it looks, m; may be inf. */
+    double range;
+} tg_ray;
+
+/* What a ray met first. */
+typedef struct {
+    /* Distance from the start, m; inf: nothing was met, and the rest says nothing. */
+    double distance;
+    /* Unit normal of the surface, world, against the ray. */
+    double normal[3];
+    /* Number of the subsystem. */
+    uint32_t subsystem;
+    /* Index of the body in its scene; UINT32_MAX: the ground. */
+    uint32_t body;
+    /* Id of the shape; UINT32_MAX: the ground. */
+    uint32_t shape;
+    /* What it is made of. */
+    tg_material material;
+} tg_ray_hit;
+
+/* What is not passed by. */
+typedef struct {
+    /* Bits TG_SEES_SHAPES and TG_SEES_GROUND. */
+    uint32_t sees;
+    /* Bit k: material class k is met; bit 31: all classes from 31 on. */
+    uint32_t classes;
+    /* A body that is passed by, such as the one that the sensor sits on. `body` UINT32_MAX: all of the subsystem;
+     * `subsystem` UINT32_MAX: none. */
+    tg_body_ref skip;
+} tg_ray_mask;
+
+/* The committed world at the end of a step, and within the step interpolated to the time asked for; valid during
+ * `observe` only, and to be called from its thread. Nothing of what comes after the step is known. An answer depends on the
+ * question and the committed states alone. Asked outside of `observe` it answers nothing, and the call counts as TG_FATAL. */
+typedef struct {
+    /* sizeof(tg_world) of the host. Entries beyond it count as null. */
+    uint32_t size;
+    /* Number of subsystems. */
+    uint32_t n_subsystems;
+    /* Their names, in the order of their numbers; constant as long as `revision` is the same. */
+    const char *const *subsystems;
+    /* Changes whenever names or scenes of subsystems do. */
+    uint64_t revision;
+    /* First and last time that can be asked for, s: the committed step. Times outside count as the nearest end. */
+    double interval[2];
+    /* First argument of the functions below. */
+    void *ctx;
+    /* The nearest hit of each of n rays, each at its own time, into n hits. Surfaces are seen from both sides.
+     * When: in `observe`. Thread: that of `observe`. */
+    tg_status (*cast_rays)(void *ctx,
+                           size_t n,
+                           const tg_ray *rays,
+                           const tg_ray_mask *mask,
+                           tg_ray_hit *hits);
+    /* Heights (m) of the ground at n points, two numbers each; NaN where there is none.
+     * When: in `observe`. Thread: that of `observe`. */
+    tg_status (*ground_heights)(void *ctx, size_t n, const double *points, double *heights);
+    /* Shapes that a sphere around three coordinates touches or contains, in ascending order: the first `room` of them into
+     * `found`. Answers how many there are.
+     * When: in `observe`. Thread: that of `observe`. */
+    size_t (*overlap)(void *ctx,
+                      const double *centre,
+                      double radius,
+                      const tg_ray_mask *mask,
+                      size_t room,
+                      tg_shape_ref *found);
+    /* A body by the names of its subsystem and its own. TG_REFUSED: there is none.
+     * When: in `observe`. Thread: that of `observe`. */
+    tg_status (*body)(void *ctx, const char *subsystem, const char *body, tg_body_ref *out);
+    /* Pose and twist of a body at a time. TG_REFUSED: there is no such body.
+     * When: in `observe`. Thread: that of `observe`. */
+    tg_status (*pose)(void *ctx, tg_body_ref body, double time, tg_body_state *out);
+    /* Bodies and shapes of a subsystem; constant as long as `revision` is the same. TG_REFUSED: there is no such subsystem.
+     * When: in `observe`. Thread: that of `observe`. */
+    tg_status (*scene)(void *ctx, uint32_t subsystem, tg_scene *out);
+    /* Joints of a subsystem, and their number; constant as its scene.
+     * When: in `observe`. Thread: that of `observe`. */
+    size_t (*scene_joints)(void *ctx, uint32_t subsystem, const tg_joint **first);
+    /* Materials of the shapes of a subsystem, in their order; constant as its scene.
+     * When: in `observe`. Thread: that of `observe`. */
+    size_t (*shape_materials)(void *ctx, uint32_t subsystem, const tg_material **first);
+    /* 1: the shape is there and not hidden.
+     * When: in `observe`. Thread: that of `observe`. */
+    int32_t (*is_visible)(void *ctx, tg_shape_ref shape);
+    /* Fields of a subsystem, and their number; constant as its scene.
+     * When: in `observe`. Thread: that of `observe`. */
+    size_t (*fields)(void *ctx, uint32_t subsystem, const tg_field **first);
+    /* Tile (a, b) of a field of a subsystem; its data are valid until the end of `observe`.
+     * When: in `observe`. Thread: that of `observe`. */
+    tg_status (*field_tile)(void *ctx,
+                            uint32_t subsystem,
+                            size_t field,
+                            uint32_t a,
+                            uint32_t b,
+                            tg_field_tile *out);
+} tg_world;
+
+/* A stream of messages of one kind. Texts are UTF-8, zero-terminated. */
+typedef struct {
+    /* Dotted name, unique in the instance and different from its variables. */
+    const char *name;
+    /* Name of the schema of its messages, e.g. "foxglove.PointCloud". */
+    const char *schema;
+    /* How messages are written: "protobuf", "json" or another name that readers know. */
+    const char *encoding;
+    /* One line for people. */
+    const char *help;
+    /* Most messages per second, 1/s; 0: whenever something happens. */
+    double rate_hz;
+    /* Most bytes of a message. What is longer is left out with a warning. */
+    uint32_t most_bytes;
+    /* 0. */
+    uint32_t reserved;
+} tg_stream;
+
+/* A message of a stream. */
+typedef struct {
+    /* Time of what it tells, s. */
+    double time;
+    /* Its bytes; they stay valid until the next call that may change the committed state. */
+    const uint8_t *bytes;
+    /* Their number. */
+    size_t size;
+    /* 1: the last committed step made a message; 0: it made none, and the rest says nothing. Comes as 0. */
+    uint32_t is_there;
+    /* 0. */
+    uint32_t reserved;
+} tg_message;
+
+/* A figure in a layer that people switch on and off by its name. Lengths in m. */
+typedef struct {
+    /* Name of the layer. */
+    const char *layer;
+    /* What a text says; else null. */
+    const char *text;
+    /* Index of the body of the own scene in whose frame the figure lies; UINT32_MAX: the world. */
+    uint32_t frame;
+    /* TG_LINES ... TG_TEXT. */
+    uint32_t figure;
+    /* Red, green, blue, opacity, 0 ... 1. */
+    float colour[4];
+    /* Points, three numbers each. */
+    const double *points;
+    /* Number of points. */
+    size_t n_points;
+    /* Width of lines and arrows, size of points, height of letters. */
+    double size;
+    /* Centre and axes of an ellipse. */
+    tg_pose pose;
+    /* Half lengths of an ellipse along x and y of its pose. */
+    double semi_axes[2];
+} tg_overlay;
+
 /* A module: what `terraglue_subsystem()` returns. Constant; lives as long as the process. */
 typedef struct {
     /* sizeof(tg_subsystem) of the module. Entries beyond it count as null. */
@@ -673,13 +934,13 @@ typedef struct {
     uint32_t abi_major;
     /* TG_ABI_MINOR of the module. */
     uint32_t abi_minor;
-    /* TG_SOIL, TG_ROBOT, TG_CONTROLLER or TG_LAW. */
+    /* TG_SOIL, TG_ROBOT, TG_CONTROLLER, TG_LAW or TG_SENSOR. */
     uint32_t kind;
     /* Module name, e.g. "soil-bekker". */
     const char *id;
     /* The text of the section .terraglue (see TG_DESCRIBE), or null. */
     const char *description;
-    /* JSON: {"name", "kind": "soil"|"robot"|"controller"|"law", "help", "parameters": [{"name", "type":
+    /* JSON: {"name", "kind": "soil"|"robot"|"controller"|"law"|"sensor", "help", "parameters": [{"name", "type":
      * "number"|"integer"|"bool"|"text"|"path"|"numbers"|"number-table", "unit", "help", "default", "optional",
      * "min", "max", "above_min", "choices"}]}. Constant; null on failure.
      * When: at any time. Thread: any thread, several at once. */
@@ -805,6 +1066,32 @@ typedef struct {
     /* Modules of kind TG_LAW: their functions; required, while `instantiate`, `free`,
      * `capabilities`, `advance` and `last_error` are not. Null for the other kinds. */
     const tg_node_law *law;
+    /* Since 3.1, as all below. Looks at the committed world: with the capability TG_CAN_SEE, after all instances have
+     * committed the step, which `step` shows without ports. What was seen belongs to the committed state: variables,
+     * streams and `save_state` tell it from t + h on. `world` is valid for the call only.
+     * When: once per step, after `commit`; at the start of a run with h = 0. Thread: that of the instance. */
+    tg_status (*observe)(void *instance, const tg_step *step, const tg_world *world);
+    /* All joints of the scene, and their number; valid and constant until `free`. Null: none is told.
+     * When: at any time after `instantiate`. Thread: that of the instance. */
+    size_t (*scene_joints)(void *instance, const tg_joint **first);
+    /* Materials of all shapes of the scene, in their order, and their number; valid and constant until `free`. Null: all
+     * are unknown.
+     * When: at any time after `instantiate`. Thread: that of the instance. */
+    size_t (*shape_materials)(void *instance, const tg_material **first);
+    /* For each of the scene's n shapes 1 where it is shown, 0 where it is hidden; it belongs to the committed state.
+     * Null: all are shown.
+     * When: at any time. Thread: that of the instance. */
+    tg_status (*shape_visibility)(void *instance, size_t n, uint8_t *out);
+    /* All streams, and their number; valid and constant until `free`.
+     * When: at any time after `instantiate`. Thread: that of the instance. */
+    size_t (*streams)(void *instance, const tg_stream **first);
+    /* The message that the last committed step made on a stream; may be asked for any number of times.
+     * When: at any time. Thread: that of the instance. */
+    tg_status (*stream)(void *instance, size_t stream, tg_message *out);
+    /* What is shown beside the bodies, and its number; valid until the next call of the instance. Asked only when
+     * somebody looks.
+     * When: at any time. Thread: that of the instance. */
+    size_t (*overlays)(void *instance, const tg_overlay **first);
 } tg_subsystem;
 
 /* Describes the module in a section that can be read without running the library; once, at file scope:
@@ -818,10 +1105,10 @@ typedef struct {
     __attribute__((section(".terraglue"), used)) static const char tg_description[] =               \
         "terraglue module\nname=" module_name "\nversion=" module_version                           \
         "\nabi=" TG_VERSION_TEXT(TG_ABI_MAJOR, TG_ABI_MINOR) "\n" lines
-/* Kind: "soil", "robot", "controller" or "law". */
+/* Kind: "soil", "robot", "controller", "law" or "sensor". */
 #define TG_IS(kind) "kind=" kind "\n"
 /* The bits of `capabilities` as words: force motion estimate solve derivatives retry state serialize
- * subcycles feedthrough fixed-step. Of a law: its functions, pressure shear. */
+ * subcycles feedthrough fixed-step sees. Of a law: its functions, pressure shear. */
 #define TG_CAN(words) "can=" words "\n"
 /* A variable: its role is parameter, input, output or local, its type f64, f32, i8 ... u64, bool, string, binary or
  * enumeration. A `*` in the name stands for what depends on parameters; units may have alternatives, "N m | N". */
@@ -843,7 +1130,8 @@ typedef struct {
         /* In the order of tg_subsystem, constant: this is called from several threads. */          \
         static const tg_subsystem table = {                                                         \
             sizeof(tg_subsystem), TG_ABI_MAJOR, TG_ABI_MINOR, TG_LAW, law_name, tg_description, tg_law_schema,\
-            0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, &law };\
+            0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, 0, &law,\
+            0, 0, 0, 0, 0, 0, 0 };                                                                  \
         return &table;                                                                              \
     }
 

@@ -11,10 +11,11 @@ SI units. Packed vectors hold one entry per carried component (n, t1, t2, mn, mt
 """
 import array
 import math
+import struct
 
 # What an instance can do beyond `advance`: the sum stands in `Subsystem.can`.
 FORCE, MOTION, ESTIMATE, SOLVE, DERIVATIVES, RETRY = 1, 2, 8, 16, 32, 64
-SUBCYCLES, FEEDTHROUGH = 512, 1024
+SUBCYCLES, FEEDTHROUGH, SEES = 512, 1024, 8192
 # Roles of a variable, what a change of it does, and the types of its elements.
 PARAMETER, INPUT, OUTPUT, LOCAL = range(4)
 LIVE, NEEDS_RESET, READ_ONLY = range(3)
@@ -152,13 +153,52 @@ class Variable:
 
 class Shape:
     """A shape on a body. kind and size: "sphere" (radius,), "box" half lengths, "capsule" and "cylinder" (half length,
-    radius) along z, "mesh" (points, triangles). position and orientation (w, x, y, z) in the frame of the body."""
+    radius) along z, "mesh" (points, triangles), "cone" (half length, radius at -z, radius at z), "ellipsoid" half lengths,
+    "sheet" (points, triangles), which is seen only. position and orientation (w, x, y, z) in the frame of the body. material
+    (class, reflectance, transmittance): 0 unknown, 1 metal, 2 rock, 3 soil, 4 wood, 5 foliage, 6 glass, 7 water."""
 
-    KINDS = ("sphere", "box", "capsule", "cylinder", "mesh")
+    KINDS = ("sphere", "box", "capsule", "cylinder", "mesh", "cone", "ellipsoid", "sheet")
 
-    def __init__(self, body, kind, size, name="", position=(0.0, 0.0, 0.0), orientation=(1.0, 0.0, 0.0, 0.0), collides=True):
+    def __init__(self, body, kind, size, name="", position=(0.0, 0.0, 0.0), orientation=(1.0, 0.0, 0.0, 0.0), collides=True,
+                 material=(0, 0.5, 0.0)):
         self.body, self.kind, self.size, self.name = body, self.KINDS.index(kind), tuple(size), name
-        self.position, self.orientation, self.collides = position, orientation, collides
+        self.position, self.orientation, self.material = position, orientation, tuple(material)
+        self.collides = collides and kind != "sheet"
+
+
+class Joint:
+    """A joint between two bodies, by their places in `bodies`; parent None: the world. Pose in the parent where it stands at
+    zero, axis in its own frame; limits (rad or m). variables: names by "position", "velocity", "torque", "torque_limit" and
+    "blocked"; break_action: the action that breaks it."""
+
+    KINDS = ("revolute", "continuous", "prismatic", "spherical", "planar", "fixed", "closure", "cylindrical",
+             "universal")
+
+    def __init__(self, name, parent, child, kind="revolute", position=(0.0, 0.0, 0.0), orientation=(1.0, 0.0, 0.0, 0.0),
+                 axis=(0.0, 0.0, 1.0), limits=(-INFINITY, INFINITY), variables=None, break_action=""):
+        self.name, self.parent, self.child, self.kind = name, parent, child, self.KINDS.index(kind)
+        self.position, self.orientation, self.axis, self.limits = position, orientation, axis, limits
+        self.variables, self.break_action = dict(variables or {}), break_action
+
+
+class Stream:
+    """A stream of messages: schema ("foxglove.PointCloud", ...), encoding ("protobuf", "json", ...), most messages per second
+    (0: whenever something happens), most bytes of a message."""
+
+    def __init__(self, name, schema, encoding="json", rate_hz=0.0, most_bytes=1 << 20, help=""):
+        self.name, self.schema, self.encoding = name, schema, encoding
+        self.rate_hz, self.most_bytes, self.help = float(rate_hz), most_bytes, help
+
+
+class Overlay:
+    """Shown beside the bodies in a layer. figure: "lines", "points", "arrows" (data: points; size: width), "ellipse" (data:
+    position, orientation, half lengths) or "text" (data: position, text; size: height); frame: place of a body, None: world."""
+
+    FIGURES = ("lines", "points", "arrows", "ellipse", "text")
+
+    def __init__(self, layer, figure, data, size=0.01, colour=(1.0, 1.0, 1.0, 1.0), frame=None):
+        self.layer, self.figure, self.data, self.size = layer, self.FIGURES.index(figure), data, float(size)
+        self.colour, self.frame = colour, frame
 
 
 class Field:
@@ -226,6 +266,93 @@ class Host:
             self._lines.append((level, str(text)[:10000]))
 
 
+class Hits:
+    """What rays met, one each: distance (m; infinite: nothing), normal, subsystem, body, shape (GROUND: the ground), material
+    class, reflectance, transmittance. `raw` takes `numpy.frombuffer(hits.raw, Hits.NUMPY)`."""
+
+    FORM = struct.Struct("<4d4I2f")
+    NUMPY = [("distance", "<f8"), ("normal", "<f8", 3), ("subsystem", "<u4"), ("body", "<u4"), ("shape", "<u4"),
+             ("material", "<u4"), ("reflectance", "<f4"), ("transmittance", "<f4")]
+
+    def __init__(self, raw):
+        self.raw = raw
+
+    def __len__(self):
+        return len(self.raw) // self.FORM.size
+
+    def __getitem__(self, k):
+        if not -len(self) <= k < len(self):
+            raise IndexError(k)
+        d, x, y, z, *rest = self.FORM.unpack_from(self.raw, self.FORM.size * (k % len(self)))
+        return (d, (x, y, z), *rest)
+
+    def distances(self):
+        """Of all rays, m."""
+        return [hit[0] for hit in self.FORM.iter_unpack(self.raw)]
+
+
+#: `body` and `shape` of a hit on the ground.
+GROUND = 0xFFFFFFFF
+#: Bits of `sees`.
+SHAPES, THE_GROUND = 1, 2
+
+
+class World:
+    """The committed world of the step [start, time], valid during `observe`: everything asked is of the time that the
+    question names within it, interpolated between the committed states; nothing of what comes after is known. Subsystems are
+    numbered by their place in `subsystems`, bodies are pairs (subsystem, body). `skip` is a body that rays pass by."""
+
+    def __init__(self, ask, start, time, subsystems):
+        self._ask, self.start, self.time, self.subsystems = ask, start, time, subsystems
+
+    def cast_rays(self, rays, skip=None, sees=SHAPES | THE_GROUND, classes=0xFFFFFFFF):
+        """rays: eight doubles each, origin, direction (unit), time (s), range (m), as a list of tuples or one array (a buffer of
+        doubles); `Hits`, one for each."""
+        flat = rays if not isinstance(rays, (list, tuple)) else array.array("d", [x for ray in rays for x in ray])
+        data = memoryview(flat).cast("B")
+        out, part = [], 64 << 18
+        for at in range(0, len(data), part):
+            piece = data[at:at + part]
+            mask = struct.pack("<4I", sees, classes, *(skip or (GROUND, GROUND)))
+            out.append(self._ask(5, mask + struct.pack("<I", len(piece) // 64), piece).bytes_of(Hits.FORM.size))
+        return Hits(b"".join(out))
+
+    def ground_heights(self, points):
+        """Heights (m) at pairs (x, y); NAN where there is no ground."""
+        flat = array.array("d", [x for point in points for x in point])
+        return list(self._ask(6, struct.pack("<I", len(flat) // 2), flat.tobytes()).doubles())
+
+    def overlap(self, centre, radius, skip=None, sees=SHAPES | THE_GROUND, classes=0xFFFFFFFF):
+        """Triples (subsystem, body, shape) of what a sphere touches."""
+        mask = struct.pack("<4I", sees, classes, *(skip or (GROUND, GROUND)))
+        raw = self._ask(7, mask + struct.pack("<4d", *centre, radius)).bytes_of(12)
+        return list(struct.iter_unpack("<3I", raw))
+
+    def body(self, subsystem, name):
+        """A body by its names; None: there is none."""
+        if subsystem not in self.subsystems:
+            return None
+        number = self.subsystems.index(subsystem)
+        names = [n for n, _ in self.bodies(number)]
+        return (number, names.index(name)) if name in names else None
+
+    def bodies(self, subsystem):
+        """Pairs of name and mass (kg) of the bodies of a subsystem."""
+        return self._ask(2, struct.pack("<I", subsystem)).scene_bodies()
+
+    def pose(self, body, time):
+        """(position, orientation w x y z, velocity, angular velocity) of a body at a time; None: there is none."""
+        answer = self._ask(4, struct.pack("<2Id", *body, time))
+        if not answer.u8():
+            return None
+        v = answer.take(struct.Struct("<13d"))
+        return v[:3], v[3:7], v[7:10], v[10:]
+
+    def is_visible(self, subsystem, body, shape):
+        """Whether a shape is there and not hidden."""
+        return bool(self._ask(3, struct.pack("<3I", subsystem, body, shape)).u8())
+
+
 class Subsystem:
     """An instance: derive from it, set `can`, override what the module offers. Everything to be remembered from step to step
     lies in `self.state` (numbers, texts, lists, tuples, dictionaries, arrays): it is saved, restored and written as bytes
@@ -238,6 +365,8 @@ class Subsystem:
     bodies = ()
     shapes = ()
     fields = ()
+    joints = ()
+    streams = ()
 
     def __init__(self, host, config):
         """`config`: the parameters, each with a value or its default; tables are dictionaries."""
@@ -265,6 +394,22 @@ class Subsystem:
 
     def commit(self, step, t, partner):
         """Paper, step 5: the last trial is accepted under t; the other side moved to `partner`."""
+
+    def observe(self, step, world):
+        """With SEES in `can`: the committed world, once per step after all have committed; what was seen belongs to the state
+        at t + h. At the start of a run step.h = 0."""
+
+    def shape_visibility(self):
+        """For each of `shapes` whether it is shown; None: all are."""
+        return None
+
+    def stream(self, k):
+        """(time, bytes) of the message that the last step made on stream k; None: it made none."""
+        return None
+
+    def overlays(self):
+        """What is shown beside the bodies: a list of `Overlay`; asked only when somebody looks."""
+        return []
 
     def restored(self):
         """Called after `state` was put back, to rebuild what follows from it."""

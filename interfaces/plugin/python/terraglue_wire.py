@@ -9,7 +9,7 @@ import struct
 from terraglue import BINARY, ENUMERATION, I64, NAN, STRING
 
 AREA, START = 64 << 20, 4096
-U32_FORM, OUTCOME, STEP = struct.Struct("<I"), struct.Struct("<IB"), struct.Struct("<ddQQQ")
+ONE, U32_FORM, OUTCOME, STEP = struct.Struct("<d"), struct.Struct("<I"), struct.Struct("<IB"), struct.Struct("<ddQQQ")
 PORT, NODE, LAW, BODY, END = (struct.Struct(f) for f in ("<QIiIIIIII18d", "<ii4d", "<4d", "<13d", "<dI"))
 _TYPES = "dfbhiqBHIQ?"
 _SIZES = [struct.calcsize("<" + c) for c in _TYPES]
@@ -103,6 +103,18 @@ class Call:
         count = U32_FORM.unpack_from(self.memory, self.at)[0]
         self.at = end = at + 8 * count
         return self.memory[at:end].cast("d") if count else _EMPTY
+
+    def bytes_of(self, size):
+        """The bytes of so many structures of a size as are told."""
+        count = size * self.u32()
+        self.at += count
+        return bytes(self.memory[self.at - count:self.at])
+
+    def scene_bodies(self):
+        """Names and masses at the start of a scene; none where there is no scene."""
+        if not self.u8():
+            return []
+        return [(self.text(), *self.take(ONE)) for _ in range(self.u32())]
 
     def values(self, kind):
         count = self.u32()

@@ -12,9 +12,9 @@ import traceback
 import types
 import zlib
 
-from terraglue import (BOOL, ENUMERATION, INFINITY, INFO, NEEDS_RESET, READ_ONLY, STRING, U32, WARNING, Discard, Estimate, Force,
+from terraglue import (BOOL, ENUMERATION, GROUND, INFINITY, INFO, NEEDS_RESET, READ_ONLY, STRING, U32, WARNING, Discard, Estimate, Force,
                        Host, Law, Motion, Node, Port, PressureAnswer, PressureNodes, Refused, Response, ShearAnswer,
-                       ShearNodes, Step, Subsystem, Terrain, Unsupported)
+                       ShearNodes, Step, Subsystem, Terrain, Unsupported, World)
 from terraglue_wire import AREA, BODY, END, LAW, NODE, OUTCOME, PORT, START, STEP, Call, Reply, Segment
 
 _STATE, _SERIALIZE = 128, 256
@@ -100,13 +100,15 @@ class Worker:
     """Makes one instance and answers its calls."""
 
     NAMES = ("", "start", "set_ports", "estimate", "solve", "advance", "jacobian", "commit", "save", "restore", "serialize",
-             "deserialize", "get", "set", "act", "next_event", "body_states", "energy", "pressure", "shear", "quit")
+             "deserialize", "get", "set", "act", "next_event", "body_states", "energy", "pressure", "shear", "quit", "advance_batch",
+             "observe", "answer", "visibility", "overlays")
 
     def __init__(self):
         self.subsystem, self.law, self.lines, self.slots, self.begun = None, None, [], {}, False
         self.ports_seen, self.ports, self.nodes = None, [], []
         self.generation = 0
         self.file = ""
+        self.segment, self.revision, self.others = None, None, []
         self.calls = [getattr(self, "_" + name, None) for name in self.NAMES]
 
     def answer(self, request, length, memory):
@@ -241,7 +243,7 @@ class Worker:
             reply.u32(s.body)
             reply.text(s.name or subsystem.bodies[s.body][0])
             reply.u8(s.kind)
-            if s.kind == 4:
+            if s.kind in (4, 7):
                 points, triangles = s.size
                 reply.u32(len(points))
                 for p in points:
@@ -253,14 +255,100 @@ class Worker:
                 reply.numbers(*s.size)
             reply.numbers(*s.position, *s.orientation)
             reply.u8(bool(s.collides))
+            reply.put(struct.Struct("<I2f"), *s.material)
+        self._joints(reply)
         reply.u32(len(self.fields))
         for f in self.fields:
             reply.text(f.name)
             reply.text(f.unit)
             reply.numbers(*f.origin, f.spacing)
             reply.put(struct.Struct("<3I"), *f.size, f.edge)
+        reply.u32(len(subsystem.streams))
+        for s in subsystem.streams:
+            for text in (s.name, s.schema, s.encoding):
+                reply.text(text)
+            reply.numbers(s.rate_hz)
+            reply.u32(s.most_bytes)
+            reply.text(s.help)
         reply.u8(1)
         self._tiles(reply)
+
+    def _joints(self, reply):
+        numbers = {v.name: k for k, v in enumerate(self.variables)}
+        reply.u32(len(self.subsystem.joints))
+        for j in self.subsystem.joints:
+            unknown = [name for name in j.variables.values() if name not in numbers]
+            if unknown:
+                raise Refused(f"the joint `{j.name}` names the variable `{unknown[0]}`, which there is not")
+            reply.text(j.name)
+            reply.u32(GROUND if j.parent is None else j.parent)
+            reply.u32(j.child)
+            reply.numbers(*j.position, *j.orientation, *j.axis)
+            reply.u32(j.kind)
+            reply.numbers(*j.limits)
+            for role in ("position", "velocity", "torque", "torque_limit", "blocked"):
+                reply.u32(numbers.get(j.variables.get(role), GROUND))
+            reply.text(j.break_action)
+
+    def _messages(self, reply):
+        """What the last step made on the streams."""
+        for k in range(len(self.subsystem.streams)):
+            message = self.subsystem.stream(k)
+            reply.u8(message is not None)
+            if message is not None:
+                reply.numbers(message[0])
+                reply.text(bytes(message[1]))
+
+    def _ask(self, question, *parts):
+        """Asks the host while it waits for the end of `observe`; its answer."""
+        reply = Reply(self.segment.answer)
+        OUTCOME.pack_into(self.segment.answer, 0, 0, 0)
+        reply.u8(question)
+        for part in parts:
+            reply.bytes(part)
+        self.segment.post(reply.at)
+        length = self.segment.next()
+        if self.NAMES[self.segment.call[0]] != "answer":
+            raise RuntimeError("the host has stopped to answer")
+        return Call(self.segment.call, length)
+
+    def _observe(self, call, reply):
+        step = self._step(call)
+        start, end = call.take(TWO)
+        revision, = call.take(struct.Struct("<Q"))
+        if revision != self.revision:
+            answer = self._ask(1)
+            self.others = [answer.text() for _ in range(answer.u32())]
+            self.revision = revision
+        self.subsystem.observe(step, World(self._ask, start, end, self.others))
+        reply.u8(0)
+        self._messages(reply)
+
+    def _visibility(self, call, reply):
+        shown = self.subsystem.shape_visibility()
+        shown = [True] * len(self.subsystem.shapes) if shown is None else shown
+        reply.text(bytes(map(bool, shown)))
+
+    def _overlays(self, call, reply):
+        shown = self.subsystem.overlays()
+        reply.u32(len(shown))
+        for o in shown:
+            reply.text(o.layer)
+            reply.u32(GROUND if o.frame is None else o.frame)
+            reply.put(struct.Struct("<4f"), *o.colour)
+            reply.u8(o.figure)
+            if o.figure < 3:
+                reply.u32(len(o.data))
+                for point in o.data:
+                    reply.numbers(*point)
+                reply.numbers(o.size)
+            elif o.figure == 3:
+                position, orientation, half = o.data
+                reply.numbers(*position, *orientation, *half)
+            else:
+                position, text = o.data
+                reply.numbers(*position, o.size)
+                reply.text(text)
 
     def _tiles(self, reply):
         """What of the fields is new."""
@@ -345,6 +433,7 @@ class Worker:
         self.subsystem.commit(step, call.doubles(), Motion(call.doubles(), call.doubles()))
         self.begun = True
         self._tiles(reply)
+        self._messages(reply)
 
     def _slot(self, call):
         slot = call.u32()
@@ -363,6 +452,7 @@ class Worker:
             raise Refused(f"nothing was saved in slot {slot}")
         _put_back(self.subsystem, self.slots[slot])
         self._tiles(reply)
+        self._messages(reply)
 
     def _serialize(self, call, reply):
         if self.subsystem.state is None:
@@ -374,6 +464,7 @@ class Worker:
             raise Unsupported
         _unpacked_state(self.subsystem, call.bytes())
         self._tiles(reply)
+        self._messages(reply)
 
     def _variable(self, number, kind):
         if number >= len(self.variables):
@@ -426,6 +517,7 @@ class Worker:
             raise Refused(f"there is no action `{action}`")
         self.subsystem.act(action, json.loads(arguments or "{}"))
         self._tiles(reply)
+        self._messages(reply)
 
     def _next_event(self, call, reply):
         reply.numbers(self.subsystem.next_event_time())
@@ -511,12 +603,13 @@ def serve(path):
     # The host asks where a module hangs.
     faulthandler.register(signal.SIGUSR1, sys.__stderr__, all_threads=False)
     segment, worker = Segment(path), Worker()
+    worker.segment = segment
     threading.Thread(target=_follow_the_host, daemon=True).start()
     sys.stdout, sys.stderr = _Print(worker.lines, INFO), _Print(worker.lines, WARNING)
     while True:
         length = segment.next()
         number = segment.call[0]
         segment.post(worker.answer(segment.call, length, segment.answer))
-        if number == len(Worker.NAMES) - 1:
+        if number == Worker.NAMES.index("quit"):
             # The host ends the whole group; nothing of the module runs any more.
             signal.pause()

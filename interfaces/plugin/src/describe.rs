@@ -3,7 +3,7 @@
 use terraglue_subsystem::{Capabilities, LawModule, Variable};
 
 /// What an instance can do, as words.
-pub const WORDS: [(Capabilities, &str); 11] = [
+pub const WORDS: [(Capabilities, &str); 12] = [
     (Capabilities::FORCE, "force"),
     (Capabilities::MOTION, "motion"),
     (Capabilities::ESTIMATE, "estimate"),
@@ -15,6 +15,7 @@ pub const WORDS: [(Capabilities, &str); 11] = [
     (Capabilities::SUBCYCLES, "subcycles"),
     (Capabilities::FEEDTHROUGH, "feedthrough"),
     (Capabilities::FIXED_STEP, "fixed-step"),
+    (Capabilities::SEES, "sees"),
 ];
 
 /// The words of a set of capabilities.

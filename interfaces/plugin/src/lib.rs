@@ -21,9 +21,12 @@ pub mod abi;
 mod convert;
 pub mod describe;
 mod export;
+mod field_table;
 mod foreign;
 mod hosted_law;
+mod keep;
 mod law;
+mod scene_table;
 mod text;
 
 pub use export::{law_table, table};

@@ -234,6 +234,7 @@ fn descriptions_are_equal() {
     assert_eq!(direct.actions(), through.actions());
     assert_eq!(direct.scene(), through.scene());
     assert_eq!(direct.fields(), through.fields());
+    assert_eq!(direct.streams(), through.streams());
 }
 
 #[test]

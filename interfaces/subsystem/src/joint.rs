@@ -1,6 +1,6 @@
 //! Joints between the bodies of a scene: what a viewer draws, plots by name and offers for selection.
 
-use crate::scene::Pose;
+use crate::pose::Pose;
 
 /// A joint between two bodies of a scene, or between a body and the world.
 #[derive(Clone, Debug, PartialEq)]
@@ -48,11 +48,15 @@ pub enum JointKind {
     Fixed = 5,
     /// Closes a loop of the tree: holds two points, axes or bodies together; child and parent are the two sides.
     Closure = 6,
+    /// Slides along its axis and turns about it.
+    Cylindrical = 7,
+    /// Turns about two axes that stay perpendicular; the axis is the one that the parent holds.
+    Universal = 8,
 }
 
 impl JointKind {
     /// All kinds, in the order of their numbers.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 9] = [
         Self::Revolute,
         Self::Continuous,
         Self::Prismatic,
@@ -60,6 +64,8 @@ impl JointKind {
         Self::Planar,
         Self::Fixed,
         Self::Closure,
+        Self::Cylindrical,
+        Self::Universal,
     ];
 }
 

@@ -41,9 +41,11 @@ pub mod files;
 mod host;
 mod joint;
 mod material;
+mod mount;
 mod node_law;
 mod overlay;
 mod port;
+mod pose;
 mod scene;
 mod schema;
 mod stream;
@@ -62,12 +64,14 @@ pub use field::{FieldInfo, FieldTile, TileValues};
 pub use host::{Host, LogLevel, Standalone, Terrain, TerrainTile};
 pub use joint::{JointKind, JointVariables, SceneJoint};
 pub use material::{Material, MaterialClass};
+pub use mount::Mount;
 pub use node_law::{
     LawModule, MOST_LAW_STATE, NodeLaw, PressureAnswer, PressureNodes, ShearAnswer, ShearNodes,
 };
 pub use overlay::{Figure, Overlay};
 pub use port::{Law, Node, Port, PortKind, component};
-pub use scene::{BodyState, Geometry, Pose, Scene, SceneBody, SceneShape};
+pub use pose::{BodyState, Pose};
+pub use scene::{Geometry, Scene, SceneBody, SceneShape};
 pub use schema::{Kind, Parameter, ParameterType, Schema, Usual};
 pub use stream::{Message, StreamInfo};
 pub use subsystem::{Module, Subsystem};

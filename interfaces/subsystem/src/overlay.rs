@@ -1,6 +1,6 @@
 //! Overlays: what a subsystem wants to show in three dimensions beside its bodies.
 
-use crate::scene::Pose;
+use crate::pose::Pose;
 
 /// A figure in a layer that people switch on and off by its name.
 #[derive(Clone, Debug, PartialEq)]

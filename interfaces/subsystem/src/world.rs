@@ -3,10 +3,11 @@
 //! # Of what time an answer is
 //! [`crate::Subsystem::observe`] comes once per step [t, t + h], after all subsystems have committed it. Everything that is asked
 //! is of the time that the question names, within [t, t + h] ([`World::interval`]): moving bodies stand where a motion between
-//! their committed states at t and t + h carries them (positions by cubic interpolation of position and velocity, orientations
-//! along the shortest way), so nothing is older or younger than the question, and nothing of what comes after t + h is known.
-//! Times outside of the interval are answered with its nearest end. The ground and the visibility of shapes are those at t + h.
-//! A body that makes a step only every n-th communication point moves when it commits.
+//! their committed states at t and t + h carries them (on a straight line, turning at a constant rate about one axis), so nothing
+//! is older or younger than the question, and nothing of what comes after t + h is known. Times outside of the interval are
+//! answered with its nearest end. The interval is the last communication step also for a sensor that makes a step only every
+//! n-th. The ground and the visibility of shapes are those at t + h. A body that makes a step only every n-th communication
+//! point moves when it commits.
 //!
 //! Answers depend on the question and the committed states alone, never on threads, on the order of subsystems or on what was
 //! asked before.
@@ -14,7 +15,8 @@
 use crate::error::{Error, Result};
 use crate::field::{FieldInfo, FieldTile};
 use crate::material::Material;
-use crate::scene::{BodyState, Scene};
+use crate::pose::BodyState;
+use crate::scene::Scene;
 
 /// The committed world at the end of a step, and within the step interpolated to the time asked for.
 ///
@@ -23,6 +25,12 @@ pub trait World {
     /// Time of the newest committed states, s: t + h of the step.
     fn time(&self) -> f64 {
         self.interval()[1]
+    }
+
+    /// Changes whenever names or scenes of subsystems do, as by an exchange of code while a run goes on: what was copied of
+    /// them under the same number still holds.
+    fn revision(&self) -> u64 {
+        0
     }
 
     /// First and last time that can be asked for, s.

@@ -1,11 +1,15 @@
 //! What of the robot and of the world in its files can be seen and hit, and where its bodies are.
 
-use crate::math::V3;
-use crate::model::{Body, Model};
+use crate::closure::{Closure, ClosureLaw};
+use crate::math::{Q, V3};
+use crate::model::{Body, Joint, Kind, Model};
 use crate::state::Motion;
+use crate::variables;
 use nalgebra::Isometry3;
 use terraglue_robot_import::{Heights, Shape, ShapeGeometry};
-use terraglue_subsystem::{BodyState, Geometry, Material, Pose, Scene, SceneBody, SceneShape};
+use terraglue_subsystem::{
+    BodyState, Geometry, JointKind, JointVariables, Material, Pose, Scene, SceneBody, SceneJoint, SceneShape,
+};
 
 /// Name of the body that carries what stands still; `world'`, … where a robot has a body of that name.
 const WORLD: &str = "world";
@@ -42,7 +46,72 @@ pub(crate) fn scene(model: &Model) -> Scene {
         }
         bodies.push(SceneBody { name, mass: 0.0 });
     }
-    Scene { bodies, shapes, joints: Vec::new() }
+    let of_tree = model.joints.iter().enumerate();
+    let tree = |(j, joint)| SceneJoint { variables: variables::of_joint(model, j), ..hinge(model, joint) };
+    let mut joints: Vec<SceneJoint> = of_tree.map(tree).collect();
+    joints.extend(model.closures.iter().filter_map(|c| closure(model, c)));
+    if bodies.len() > model.bodies.len() {
+        let mut still = SceneJoint { kind: JointKind::Fixed, ..held(WORLD, model.bodies.len()) };
+        still.break_action.clear();
+        while joints.iter().any(|j| j.name == still.name) {
+            still.name.push('\'');
+        }
+        joints.push(still);
+    }
+    Scene { bodies, shapes, joints }
+}
+
+/// A joint that holds a body where it is.
+fn held(name: &str, child: usize) -> SceneJoint {
+    SceneJoint {
+        name: name.into(),
+        parent: SceneJoint::WORLD,
+        child: child as u32,
+        parent_from_joint: Pose::IDENTITY,
+        axis: [0.0; 3],
+        kind: JointKind::Closure,
+        limits: [f64::NEG_INFINITY, f64::INFINITY],
+        variables: JointVariables::ABSENT,
+        break_action: format!("{name}.break"),
+    }
+}
+
+/// A place on a body, told from its centre of mass, or in the world.
+fn place(model: &Model, body: Option<usize>, point: &V3, turn: Q) -> (u32, Pose) {
+    let at = body.map_or(*point, |b| model.bodies[b].com + point);
+    (body.map_or(SceneJoint::WORLD, |b| b as u32), pose(&Isometry3::from_parts(at.into(), turn)))
+}
+
+fn hinge(model: &Model, j: &Joint) -> SceneJoint {
+    let (parent, parent_from_joint) = place(model, j.parent, &j.parent_anchor, j.parent_frame);
+    let (kind, turns) = match j.kind {
+        Kind::Revolute if j.limits.is_none() => (JointKind::Continuous, true),
+        Kind::Revolute => (JointKind::Revolute, true),
+        Kind::Prismatic => (JointKind::Prismatic, true),
+        Kind::Cylindrical => (JointKind::Cylindrical, true),
+        Kind::Universal => (JointKind::Universal, true),
+        Kind::Planar => (JointKind::Planar, true),
+        Kind::Spherical => (JointKind::Spherical, false),
+        Kind::Fixed => (JointKind::Fixed, false),
+    };
+    let base = held(&j.name, j.child);
+    let (axis, limits) = ([f64::from(u8::from(turns)), 0.0, 0.0], j.limits.unwrap_or(base.limits));
+    SceneJoint { parent, parent_from_joint, kind, axis, limits, ..base }
+}
+
+/// A connection of two bodies; a coupling of two joints has no place.
+fn closure(model: &Model, c: &Closure) -> Option<SceneJoint> {
+    let (child, (parent, parent_from_joint), axis) = match &c.law {
+        ClosureLaw::Joint(j) => {
+            let joint = hinge(model, j);
+            (j.child, (joint.parent, joint.parent_from_joint), joint.axis)
+        }
+        ClosureLaw::Rod(p, _) | ClosureLaw::Spring(p, _) => {
+            (p.child, place(model, p.parent, &p.parent_point, Q::identity()), [0.0; 3])
+        }
+        ClosureLaw::Coupling { .. } => return None,
+    };
+    Some(SceneJoint { parent, parent_from_joint, axis, ..held(&c.name, child) })
 }
 
 /// A mesh of a body that is not convex is told as it is: soil meets its triangles. Of what stands still nothing is asked

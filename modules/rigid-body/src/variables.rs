@@ -8,7 +8,7 @@ use crate::initial;
 use crate::math::euler;
 use crate::model::{Kind, Model};
 use crate::state::{JointState, State};
-use terraglue_subsystem::{Action, Causality, Effect, Error, Result, ValueType, Variable};
+use terraglue_subsystem::{Action, Causality, Effect, Error, JointVariables, Result, ValueType, Variable};
 
 /// Ids per body and per joint.
 const BODY_STRIDE: u32 = 32;
@@ -216,6 +216,19 @@ pub(crate) fn describe(model: &Model, state: &State) -> Vec<Variable> {
         all.push(Variable::real(id, name, "", Causality::Local, help));
     }
     all
+}
+
+/// Where the values of a joint of the tree are found.
+pub(crate) fn of_joint(model: &Model, j: usize) -> JointVariables {
+    let id = model.bodies.len() as u32 * BODY_STRIDE + j as u32 * JOINT_STRIDE;
+    let of = |item: u32| if model.joints[j].moves() { id + item } else { JointVariables::NONE };
+    JointVariables {
+        position: of(ANGLE),
+        velocity: of(VELOCITY),
+        torque: of(TORQUE),
+        torque_limit: of(MAX_TORQUE),
+        blocked: of(BLOCKED),
+    }
 }
 
 /// Refuses names that two variables have: of things that are called alike, or like the robot's own.

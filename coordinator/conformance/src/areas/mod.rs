@@ -10,6 +10,7 @@ mod physics_controller;
 mod physics_robot;
 mod physics_soil;
 mod resources;
+mod sight;
 mod soil_cooperation;
 mod soil_energy;
 mod soil_symmetry;
@@ -20,7 +21,7 @@ use super::definition::Test;
 pub use host_untouched::OUTPUT;
 
 /// The lists of all areas, in the order in which they build on each other.
-pub const ALL: [fn() -> Vec<Test>; 16] = [
+pub const ALL: [fn() -> Vec<Test>; 17] = [
     library::tests,
     host_untouched::at_loading,
     law::tests,
@@ -36,5 +37,6 @@ pub const ALL: [fn() -> Vec<Test>; 16] = [
     soil_energy::tests,
     physics_robot::tests,
     physics_controller::tests,
+    sight::tests,
     resources::tests,
 ];

@@ -6,6 +6,8 @@ use super::group::Group;
 use super::pieces;
 use super::run_clock::RunClock;
 use super::schedule::StepSchedule;
+use super::sight::{Sight, check_mount};
+use super::streams::Streams;
 use super::subsystems::{Member, Subsystems};
 use super::uncoupled::Uncoupled;
 use super::{Options, Testbed};
@@ -31,7 +33,7 @@ use terraglue_scenario::{
     Entry, GlueSpec, GluingSpec, InputError, IsolationSpec, LevelChoice, Scenario, StrategyKind,
     SubsystemSpec,
 };
-use terraglue_subsystem::{BodyState, Capabilities, Config, Kind, Law, Level, Subsystem, Terrain};
+use terraglue_subsystem::{BodyState, Capabilities, Config, Kind, Law, Level, Mount, Subsystem, Terrain};
 use terraglue_terrain as terrain;
 
 impl Testbed {
@@ -81,18 +83,22 @@ impl Testbed {
         with_glue.for_each(|(instance, _)| instance.watch());
         signals.initialize(&mut subsystems.instances)?;
         subsystems.read_states()?;
+        let sight = Sight::new(&subsystems, &services.workers)?;
         if let Err(Error::Simulation { message, .. }) =
             glued.detect_contacts(0.0, scenario.time.step_s, &subsystems)
         {
             let help = "docs/scenario.md has the keys of `[terrain]`, `terraglue modules NAME` those that set a body down";
             return Err(InputError::plain(format!("at the start: {message}"), Some(help.into())).into());
         }
+        let streams = Streams::new(&subsystems.instances);
         Ok(Self {
             exact: takes_parts(scenario, &subsystems.instances),
             subsystems,
             glued,
             uncoupled: Uncoupled::new(services.workers.clone()),
             signals,
+            sight,
+            streams,
             clock: RunClock::new(scenario.time.step_s),
             events: Vec::new(),
             report: StepReport { converged: true, ..StepReport::default() },
@@ -236,7 +242,7 @@ fn instantiate(
     services: &HostServices,
 ) -> Result<Vec<Instance>> {
     let search = SearchPath::standard(&options.module_paths, &scenario.folder);
-    let mut instances = Vec::new();
+    let (mut instances, mut mounted) = (Vec::new(), Vec::new());
     for spec in &scenario.subsystems {
         if terraglue_scenario::ModuleKind::is_fmu(&spec.module) {
             let folder = std::env::current_dir();
@@ -265,8 +271,12 @@ fn instantiate(
         let advice = scenario::advice::law_parameters(module.schema(), spec, &scenario.source);
         advice.iter().for_each(|advice| log::warn!("{advice}"));
         let config = with_law(config, &search, scenario, spec)?;
+        if module.schema().parameters.iter().any(|p| p.name == Mount::KEY) {
+            mounted.push(spec);
+        }
         instances.push(make(scenario, spec, module, config, services)?);
     }
+    mounted.iter().try_for_each(|spec| check_mount(scenario, spec, &instances))?;
     Ok(instances)
 }
 

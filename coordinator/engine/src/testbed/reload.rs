@@ -8,7 +8,8 @@ use terraglue_diagnostics::Error;
 use terraglue_host::{Instance, TeardownErrors};
 use terraglue_subsystem::{
     Action, Batch, BodyState, Capabilities, Energy, Estimate, FieldInfo, FieldTile, Input, Kind, Law, Level,
-    Motion, Response, Scene, Step, Subsystem, Values, ValuesMut, Variable,
+    Message, Motion, Overlay, Response, Scene, Step, StreamInfo, Subsystem, Values, ValuesMut, Variable,
+    World,
 };
 
 impl Testbed {
@@ -101,6 +102,9 @@ fn misfit(old: &Instance, new: &Instance) -> Option<String> {
     if old.fields() != new.fields() {
         return Some("its fields changed; start the run again".into());
     }
+    if old.subsystem().streams() != new.subsystem().streams() {
+        return Some("its streams changed; start the run again".into());
+    }
     if old.actions().iter().any(|a| !new.actions().iter().any(|b| a.name == b.name)) {
         return Some("an action is gone; start the run again".into());
     }
@@ -168,6 +172,21 @@ impl Subsystem for Renumbered {
     }
     fn commit(&mut self, step: &Step, t: &[f64], partner: &Motion) -> terraglue_subsystem::Result {
         self.inner.commit(step, t, partner)
+    }
+    fn observe(&mut self, step: &Step, world: &dyn World) -> terraglue_subsystem::Result {
+        self.inner.observe(step, world)
+    }
+    fn shape_visibility(&self, out: &mut [bool]) -> terraglue_subsystem::Result {
+        self.inner.shape_visibility(out)
+    }
+    fn streams(&self) -> &[StreamInfo] {
+        self.inner.streams()
+    }
+    fn stream(&self, k: usize) -> terraglue_subsystem::Result<Option<Message<'_>>> {
+        self.inner.stream(k)
+    }
+    fn overlays(&self, out: &mut Vec<Overlay>) {
+        self.inner.overlays(out);
     }
     fn save_state(&mut self, slot: u32) -> terraglue_subsystem::Result {
         self.inner.save_state(slot)

@@ -60,6 +60,15 @@ impl StepSchedule {
         Some(make(step))
     }
 
+    /// The step that the subsystem has committed with this one of the testbed, glued or not, without its ports.
+    pub fn step_of(&self, span: &Span) -> Option<Step<'static>> {
+        match (self.glued, self.step_multiple) {
+            _ if self.holds => None,
+            (true, _) | (false, 1) => Some(span.step),
+            (false, _) => self.long_step(span),
+        }
+    }
+
     /// One of `step_multiple` nominal steps is made when its last part is reached, so its outputs never run ahead.
     #[inline(never)]
     fn long_step(&self, span: &Span) -> Option<Step<'static>> {

@@ -1,6 +1,6 @@
 //! The time before the start: what touches the ground comes to rest on it, so that a run begins with a robot that stands.
 //!
-//! Glued subsystems and bodies without glue make steps from −`time.settle_s` to 0. Controllers make none: they stay at
+//! Glued subsystems and bodies without glue make steps from −`time.settle_s` to 0. Controllers and sensors make none: they stay at
 //! t = 0 and hold what they ask for there. Events and faults of signals wait as well. Prints in the ground stay; what is
 //! counted since the start, by the testbed and by modules that offer the action `energy.restart`, counts from t = 0 on.
 
@@ -35,14 +35,17 @@ impl Testbed {
         if count > 0.0 {
             self.stand(count as u64)?;
         }
-        Ok(())
+        self.streams.forget();
+        self.sight.begin(&self.clock, &mut self.subsystems)?;
+        self.streams.collect(&self.subsystems.instances)
     }
 
     /// Steps up to t = 0 in which controllers wait; then all counts begin.
     fn stand(&mut self, count: u64) -> Result {
         let Subsystems { instances, schedules, .. } = &mut self.subsystems;
         for (turn, instance) in schedules.iter_mut().zip(instances) {
-            turn.holds = instance.kind() == Kind::Controller || turn.step_multiple > 1;
+            let waits = matches!(instance.kind(), Kind::Controller | Kind::Sensor);
+            turn.holds = waits || turn.step_multiple > 1;
         }
         let stood = (1..=count).rev().try_for_each(|left| self.stand_step(left));
         self.standing.store(0, Ordering::Relaxed);
@@ -67,6 +70,7 @@ impl Testbed {
         let end = -((left - 1) as f64) * self.clock.step_s;
         let mut longest = self.clock.step_s;
         self.halvings = 0;
+        self.streams.clear();
         while self.clock.is_before(end) {
             self.signals.read(&self.subsystems.instances)?;
             self.signals.write(&mut self.subsystems.instances)?;

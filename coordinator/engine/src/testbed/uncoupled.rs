@@ -92,7 +92,8 @@ fn is_sampled(clock: &RunClock) -> bool {
     clock.index % SAMPLED == FIRST
 }
 
-fn span(clock: &RunClock, h: f64, end: f64) -> Span {
+/// The step of length h that the testbed makes now.
+pub(super) fn span(clock: &RunClock, h: f64, end: f64) -> Span {
     let step = Step::free(clock.t, h, clock.index);
     Span { step, end, nominal: clock.nominal, step_s: clock.step_s, broken: AtomicBool::new(false) }
 }

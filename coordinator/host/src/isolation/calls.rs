@@ -26,7 +26,8 @@ macro_rules! calls {
 
 calls! {
     Start, SetPorts, Estimate, Solve, Advance, Jacobian, Commit, Save, Restore, Serialize, Deserialize, Get, Set, Act,
-    NextEvent, BodyStates, Energy, Pressure, Shear, Quit, AdvanceBatch,
+    NextEvent, BodyStates, Energy, Pressure, Shear, Quit, AdvanceBatch, Observe,
+    Answer, Visibility, Overlays,
 }
 
 impl Call {

@@ -10,11 +10,14 @@ mod calls;
 mod channel;
 mod fork_server;
 mod law;
+mod messages;
 mod proxy;
 mod python;
+mod sight;
 mod tiles;
 mod wire;
 mod worker;
+mod worker_channel;
 
 pub use channel::{confine, end_group};
 pub use fork_server::{FORK_SERVER, ForkServer};
@@ -276,6 +279,15 @@ impl Link {
                 return Err(self.lose(why));
             }
         }
+    }
+
+    /// Ends a worker whose exchange has lasted longer than a call may.
+    fn within(&mut self, since: Instant) -> Result {
+        let limit_s = self.isolation.step_timeout_s;
+        if since.elapsed().as_secs_f64() <= limit_s {
+            return Ok(());
+        }
+        Err(self.lose(format!("it went on asking for more than {limit_s} s (step_timeout_s) and was ended")))
     }
 
     /// Ends the worker for good.

@@ -1,13 +1,17 @@
 //! The host's side of an isolated instance: a subsystem whose every call is made in its worker.
 
 use super::calls::{self, Call};
+use super::messages::Messages;
+use super::sight::Question;
 use super::tiles::Tiles;
 use super::wire::{Reader, Writer};
 use super::{Link, Start};
 use std::cell::RefCell;
+use std::time::Instant;
 use terraglue_subsystem::{
     Action, Batch, BodyState, Capabilities, Energy, Error, Estimate, FieldInfo, FieldTile, Input, Law, Level,
-    Motion, Response, Result, Scene, Step, Subsystem, Terrain, Values, ValuesMut, Variable,
+    Message, Motion, Overlay, Response, Result, Scene, Step, StreamInfo, Subsystem, Terrain, Values,
+    ValuesMut, Variable, World,
 };
 
 /// An instance in a worker.
@@ -15,6 +19,7 @@ pub struct Isolated {
     link: RefCell<Link>,
     about: ModuleInfo,
     tiles: Tiles,
+    messages: Messages,
 }
 
 /// What never changes over its life.
@@ -24,6 +29,7 @@ pub struct ModuleInfo {
     pub actions: Vec<Action>,
     pub scene: Scene,
     pub fields: Vec<FieldInfo>,
+    pub streams: Vec<StreamInfo>,
     /// Whether it books energies and knows events; a functional mock-up unit does not.
     pub is_module: bool,
 }
@@ -35,6 +41,7 @@ impl ModuleInfo {
         w.put(&self.actions);
         w.put(&self.scene);
         w.put(&self.fields);
+        w.put(&self.streams);
         w.put(&self.is_module);
     }
 
@@ -45,6 +52,7 @@ impl ModuleInfo {
             actions: r.take()?,
             scene: r.take()?,
             fields: r.take()?,
+            streams: r.take()?,
             is_module: r.take()?,
         })
     }
@@ -69,13 +77,17 @@ impl Isolated {
                 Some((about, tiles))
             },
         )?;
-        Ok(Self { link: RefCell::new(link), about, tiles })
+        let messages = Messages::new(about.streams.len());
+        Ok(Self { link: RefCell::new(link), about, tiles, messages })
     }
 
-    /// A call after which fields may have changed.
+    /// A call after which fields may have changed, and streams have other messages.
     fn change(&mut self, call: Call, write: impl FnOnce(&mut Writer)) -> Result {
-        let tiles = &mut self.tiles;
-        self.link.get_mut().call(call, write, |r| tiles.receive(r))
+        let (tiles, messages) = (&mut self.tiles, &mut self.messages);
+        self.link.get_mut().call(call, write, |r| {
+            tiles.receive(r)?;
+            messages.receive(r)
+        })
     }
 }
 
@@ -197,6 +209,53 @@ impl Subsystem for Isolated {
             w.put(t);
             calls::put_motion(w, partner);
         })
+    }
+
+    fn observe(&mut self, step: &Step, world: &dyn World) -> Result {
+        let (link, messages) = (self.link.get_mut(), &mut self.messages);
+        let mut read = |r: &mut Reader| {
+            let question = Question::take(r)?;
+            if question.is_none() {
+                messages.receive(r)?;
+            }
+            Some(question)
+        };
+        let since = Instant::now();
+        let begin = |w: &mut Writer| {
+            calls::put_step(w, step);
+            w.put(&world.interval());
+            w.put(&world.revision());
+        };
+        let mut asked = link.call(Call::Observe, begin, &mut read)?;
+        while let Some(question) = asked {
+            // a module that never stops asking hangs like one that never answers
+            link.within(since)?;
+            asked = link.call(Call::Answer, |w| question.answer(world, w), &mut read)?;
+        }
+        Ok(())
+    }
+
+    fn shape_visibility(&self, out: &mut [bool]) -> Result {
+        out.fill(true);
+        if out.is_empty() {
+            return Ok(());
+        }
+        let shown: Vec<bool> = self.link.borrow_mut().call(Call::Visibility, |_| {}, |r| r.take())?;
+        out.iter_mut().zip(shown).for_each(|(out, shown)| *out = shown);
+        Ok(())
+    }
+
+    fn streams(&self) -> &[StreamInfo] {
+        &self.about.streams
+    }
+
+    fn stream(&self, k: usize) -> Result<Option<Message<'_>>> {
+        self.messages.get(k)
+    }
+
+    fn overlays(&self, out: &mut Vec<Overlay>) {
+        let shown: Result<Vec<Overlay>> = self.link.borrow_mut().call(Call::Overlays, |_| {}, |r| r.take());
+        out.extend(shown.into_iter().flatten());
     }
 
     fn save_state(&mut self, slot: u32) -> Result {

@@ -14,7 +14,7 @@ enum Owned {
 
 /// A copy of a tile.
 #[derive(Clone, Debug)]
-struct Tile {
+pub struct Tile {
     generation: u64,
     values: Owned,
 }
@@ -46,7 +46,8 @@ impl Wire for Tile {
 }
 
 impl Tile {
-    fn of(tile: &FieldTile) -> Self {
+    /// Of what is borrowed.
+    pub fn of(tile: &FieldTile) -> Self {
         let values = match tile.values {
             TileValues::Uniform(x) => Owned::Uniform(x),
             TileValues::F64(x) => Owned::F64(x.to_vec()),
@@ -56,7 +57,19 @@ impl Tile {
         Self { generation: tile.generation, values }
     }
 
-    fn holds(&self, edge: u32) -> bool {
+    /// As the interface wants it.
+    pub fn shown(&self) -> FieldTile<'_> {
+        let values = match &self.values {
+            Owned::Uniform(x) => TileValues::Uniform(*x),
+            Owned::F64(x) => TileValues::F64(x),
+            Owned::F32(x) => TileValues::F32(x),
+            Owned::Fixed(data, unit) => TileValues::Fixed { data, unit: *unit },
+        };
+        FieldTile { generation: self.generation, values }
+    }
+
+    /// Whether it has a value for each node.
+    pub fn holds(&self, edge: u32) -> bool {
         let nodes = (edge as usize).saturating_mul(edge as usize);
         match &self.values {
             Owned::Uniform(_) => true,
@@ -121,13 +134,6 @@ impl Tiles {
     pub fn tile(&self, field: usize, a: u32, b: u32) -> Option<FieldTile<'_>> {
         let (along, ..) = self.shapes.get(field)?;
         let k = (a < *along).then_some(b as usize * *along as usize + a as usize)?;
-        let tile = self.tiles.get(field)?.get(k)?.as_ref()?;
-        let values = match &tile.values {
-            Owned::Uniform(x) => TileValues::Uniform(*x),
-            Owned::F64(x) => TileValues::F64(x),
-            Owned::F32(x) => TileValues::F32(x),
-            Owned::Fixed(data, unit) => TileValues::Fixed { data, unit: *unit },
-        };
-        Some(FieldTile { generation: tile.generation, values })
+        self.tiles.get(field)?.get(k)?.as_ref().map(Tile::shown)
     }
 }

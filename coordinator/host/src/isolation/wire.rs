@@ -1,8 +1,9 @@
 //! Calls and answers as bytes in a shared segment. Whatever stands there is checked: a worker may have been overwritten.
 
 use terraglue_subsystem::{
-    Action, BodyState, Causality, Effect, Energy, FieldInfo, Geometry, JointKind, JointVariables, Law,
-    Material, Node, Port, Pose, Scene, SceneBody, SceneJoint, SceneShape, ValueType, Variable,
+    Action, BodyRef, BodyState, Causality, Effect, Energy, FieldInfo, Figure, Geometry, JointKind,
+    JointVariables, Law, Material, Node, Overlay, Port, Pose, Ray, RayHit, RayMask, Scene, SceneBody,
+    SceneJoint, SceneShape, ShapeRef, StreamInfo, ValueType, Variable,
 };
 
 /// Bytes that grow up to the end of an area.
@@ -205,6 +206,13 @@ structure!(SceneJoint {
     break_action
 });
 structure!(Scene { bodies, shapes, joints });
+structure!(StreamInfo { name, schema, encoding, rate_hz, most_bytes, help });
+structure!(BodyRef { subsystem, body });
+structure!(ShapeRef { subsystem, body, shape });
+structure!(Ray { origin, direction, time, range });
+structure!(RayHit { distance, normal, subsystem, body, shape, material });
+structure!(RayMask { sees, classes, skip });
+structure!(Overlay { layer, frame, colour, figure });
 structure!(FieldInfo { name, unit, origin, spacing, size, tile_edge });
 structure!(Variable { id, name, value_type, causality, effect, unit, help, min, max, dims, enumeration });
 
@@ -224,7 +232,7 @@ macro_rules! choice {
 choice!(ValueType: F64, F32, I8, I16, I32, I64, U8, U16, U32, U64, Bool, String, Binary, Enumeration, Clock);
 choice!(Causality: Parameter, Input, Output, Local);
 choice!(Effect: Live, NeedsReset, ReadOnly);
-choice!(JointKind: Revolute, Continuous, Prismatic, Spherical, Planar, Fixed, Closure);
+choice!(JointKind: Revolute, Continuous, Prismatic, Spherical, Planar, Fixed, Closure, Cylindrical, Universal);
 
 impl Wire for Geometry {
     fn put(&self, w: &mut Writer) {
@@ -253,6 +261,28 @@ impl Wire for Geometry {
             }
             6 => Self::Ellipsoid { semi_axes: r.take()? },
             7 => Self::Mesh { points: r.take()?, triangles: r.take()? },
+            _ => return None,
+        })
+    }
+}
+
+impl Wire for Figure {
+    fn put(&self, w: &mut Writer) {
+        match self {
+            Self::Lines { points, width } => (w.put(&0_u8), w.put(points), w.put(width)).0,
+            Self::Points { points, size } => (w.put(&1_u8), w.put(points), w.put(size)).0,
+            Self::Arrows { points, width } => (w.put(&2_u8), w.put(points), w.put(width)).0,
+            Self::Ellipse { pose, semi_axes } => (w.put(&3_u8), w.put(pose), w.put(semi_axes)).0,
+            Self::Text { at, height, text } => (w.put(&4_u8), w.put(at), w.put(height), w.put(text)).0,
+        }
+    }
+    fn take(r: &mut Reader) -> Option<Self> {
+        Some(match r.take::<u8>()? {
+            0 => Self::Lines { points: r.take()?, width: r.take()? },
+            1 => Self::Points { points: r.take()?, size: r.take()? },
+            2 => Self::Arrows { points: r.take()?, width: r.take()? },
+            3 => Self::Ellipse { pose: r.take()?, semi_axes: r.take()? },
+            4 => Self::Text { at: r.take()?, height: r.take()?, text: r.take()? },
             _ => return None,
         })
     }

@@ -2,9 +2,12 @@
 
 use super::calls::{self, Call, OwnedStep};
 use super::channel::{self, Segment};
+use super::messages::Messages;
 use super::proxy::ModuleInfo;
+use super::sight;
 use super::tiles::Tiles;
 use super::wire::{Reader, Writer};
+use super::worker_channel::WorkerChannel;
 use super::{Line, Start, What};
 use crate::{HostServices, Library, LoadedModule, TeardownErrors, Workers};
 use std::panic::{AssertUnwindSafe, catch_unwind};
@@ -28,17 +31,14 @@ pub fn serve(path: &Path, library: &Library) -> ExitCode {
         }
         channel::end_group(std::process::id());
     });
-    let Ok(mut segment) = Segment::open(path) else { return ExitCode::FAILURE };
+    let Ok(segment) = Segment::open(path) else { return ExitCode::FAILURE };
+    let channel = WorkerChannel::new(segment);
     let mut worker = Worker { library: library.clone(), ..Worker::default() };
-    let mut last = 0;
     loop {
-        let (number, length) = segment.call_after(last);
-        last = number;
-        let cancel = segment.cancel_flag().load(Ordering::Relaxed) != 0;
-        worker.log.cancel.store(cancel, Ordering::Relaxed);
-        let request = segment.area(0)[..length].to_vec();
+        let request = channel.next(&worker.log.cancel);
         let quits = request.first() == Some(&(Call::Quit as u8));
-        let done = catch_unwind(AssertUnwindSafe(|| worker.answer(&request, segment.area(1))));
+        let done = catch_unwind(AssertUnwindSafe(|| worker.answer(&request, &channel)));
+        let mut segment = channel.segment.borrow_mut();
         let length = done.unwrap_or_else(|_| {
             let mut w = Writer::new(segment.area(1));
             calls::write_outcome(&mut w, &[], &Err(Error::Fatal("panicked in its process".into())));
@@ -84,6 +84,7 @@ struct Worker {
     subsystem: Option<Box<dyn Subsystem>>,
     is_module: bool,
     tiles: Tiles,
+    known: sight::Known,
     teardown_errors: TeardownErrors,
 }
 
@@ -93,7 +94,7 @@ fn garbled() -> Error {
 
 impl Worker {
     /// Does one call and writes its answer; the length.
-    fn answer(&mut self, request: &[u8], area: &mut [u8]) -> usize {
+    fn answer(&mut self, request: &[u8], channel: &WorkerChannel) -> usize {
         let mut r = Reader::new(request);
         let call = r.take::<u8>().and_then(Call::of);
         let mut body = Vec::new();
@@ -107,8 +108,14 @@ impl Worker {
                     all => Err(Error::Failed(all.join("; "))),
                 }
             }
+            Some(Call::Observe) => match &mut self.subsystem {
+                Some(subsystem) => sight::observe(subsystem.as_mut(), &mut r, channel, &mut self.known),
+                None => Err(garbled()),
+            },
             Some(call) => self.call(call, &mut r, &mut body),
         };
+        let mut segment = channel.segment.borrow_mut();
+        let area = segment.area(1);
         let mut w = Writer::new(area);
         let lines = self.log.take();
         calls::write_outcome(&mut w, &lines, &outcome);
@@ -134,6 +141,7 @@ impl Worker {
                     actions: subsystem.actions().to_vec(),
                     scene: subsystem.scene(),
                     fields: subsystem.fields().to_vec(),
+                    streams: subsystem.streams().to_vec(),
                     is_module: self.is_module,
                 };
                 about.put(w);
@@ -142,6 +150,11 @@ impl Worker {
             }
             Some(Call::Commit | Call::Restore | Call::Deserialize | Call::Act) => {
                 self.tiles.send(subsystem.as_ref(), w);
+                Messages::send(subsystem.as_ref(), w);
+            }
+            Some(Call::Observe) => {
+                w.put(&0_u8);
+                Messages::send(subsystem.as_ref(), w);
             }
             _ => w.bytes(body),
         }
@@ -229,7 +242,19 @@ impl Worker {
                 out.write(|w| w.put(&states))
             }
             Call::Energy => out.write(|w| w.put(&subsystem.energy())),
-            Call::Start | Call::Quit | Call::Pressure | Call::Shear => Err(garbled()),
+            Call::Visibility => {
+                let mut shown = vec![true; subsystem.scene().shapes.len()];
+                subsystem.shape_visibility(&mut shown)?;
+                out.write(|w| w.put(&shown))
+            }
+            Call::Overlays => {
+                let mut shown = Vec::new();
+                subsystem.overlays(&mut shown);
+                out.write(|w| w.put(&shown))
+            }
+            Call::Start | Call::Quit | Call::Pressure | Call::Shear | Call::Observe | Call::Answer => {
+                Err(garbled())
+            }
         }
     }
 }

@@ -3,11 +3,15 @@
 
 mod bad_libraries;
 mod c_soil;
+mod older_abi;
+mod sight;
 
 use super::*;
 use soil_column::SoilColumnModule;
 use std::path::{Path, PathBuf};
-use terraglue_subsystem::{Config, Input, Kind, Law, Level, Motion, Port, Response, Step, component};
+use terraglue_subsystem::{
+    Capabilities, Config, Input, Kind, Law, Level, Motion, Port, Response, Step, component,
+};
 
 fn port(key: u64, first: u32, z: f64) -> Port {
     Port {
@@ -35,6 +39,11 @@ fn step_of(ports: &[Port], n: u32) -> Step<'_> {
 /// Compiles a module in C into `folder`, as a user would.
 fn compile(folder: &Path, name: &str, source: &str, defines: &[&str]) -> PathBuf {
     let include = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../interfaces/plugin/include");
+    compile_with(&include, folder, name, source, defines)
+}
+
+/// The same with the header in another folder.
+fn compile_with(include: &Path, folder: &Path, name: &str, source: &str, defines: &[&str]) -> PathBuf {
     let (code, library) = (folder.join(format!("{name}.c")), folder.join(format!("lib{name}_plugin.so")));
     std::fs::write(&code, source).expect("written");
     let mut command = std::process::Command::new("cc");
@@ -100,7 +109,9 @@ fn drive(soil: &mut Instance) -> Vec<u64> {
             soil.restore_state(1).expect("restore");
         }
     }
-    bits.extend(soil.serialize().expect("serialize").iter().map(|b| u64::from(*b)));
+    if soil.capabilities().has(Capabilities::SERIALIZE) {
+        bits.extend(soil.serialize().expect("serialize").iter().map(|b| u64::from(*b)));
+    }
     bits
 }
 

@@ -2,6 +2,7 @@
 //! tiles that take footprints. Every figure that a recording derives from it is known beforehand.
 
 use terraglue_diagnostics::error::Result;
+use terraglue_engine::observer::StreamView;
 use terraglue_engine::observer::{Event, Observer, SubsystemView, View, ledger_of};
 use terraglue_gluing::{PortReport, StepReport};
 use terraglue_scenario::*;
@@ -235,7 +236,7 @@ pub fn scenario(strategy: &str) -> Scenario {
         name: "synthetic_walk".into(),
         folder: "scenarios".into(),
         time: Time { step_s: H, duration_s: 4.0, settle_s: 0.0 },
-        world: World { gravity_m_s2: [0.0, 0.0, -1.62], seed: 1 },
+        world: terraglue_scenario::World { gravity_m_s2: [0.0, 0.0, -1.62], seed: 1 },
         terrain: None,
         gluing: GluingSpec {
             strategy: StrategyKind::named(strategy).unwrap_or(StrategyKind::Iterative),
@@ -265,10 +266,50 @@ pub fn scenario(strategy: &str) -> Scenario {
     }
 }
 
+/// A stream of the gait with a message at every tenth step.
+fn scan(index: u64, t: f64) -> StreamView {
+    let info = StreamInfo {
+        name: "scan.points".into(),
+        schema: "foxglove.LaserScan".into(),
+        encoding: "protobuf".into(),
+        rate_hz: 0.1 / H,
+        most_bytes: 1000,
+        help: String::new(),
+    };
+    let message = foxglove::messages::LaserScan { ranges: vec![t, 2.0], ..Default::default() };
+    let messages = if index.is_multiple_of(10) {
+        vec![(t, prost::Message::encode_to_vec(&message))]
+    } else {
+        Vec::new()
+    };
+    StreamView { name: "gait.scan.points".into(), info, messages }
+}
+
+/// A stream with a message in JSON at every step.
+fn note(t: f64) -> StreamView {
+    let info = StreamInfo { encoding: "json".into(), name: "note".into(), ..scan(1, t).info };
+    StreamView { name: "gait.note".into(), info, messages: vec![(t, b"{}".to_vec())] }
+}
+
+/// The joint whose variables are 1 to 3.
+fn hip() -> SceneJoint {
+    SceneJoint {
+        name: "LF_j2".into(),
+        parent: 0,
+        child: 1,
+        parent_from_joint: Pose { position: [0.1, 0.2, 0.3], ..Pose::IDENTITY },
+        axis: [0.0, 1.0, 0.0],
+        kind: JointKind::Revolute,
+        limits: [-1.0, f64::INFINITY],
+        variables: JointVariables { position: 1, velocity: 2, torque: 3, ..JointVariables::ABSENT },
+        break_action: String::new(),
+    }
+}
+
 impl Fixture {
     pub fn new(strategy: &str) -> Self {
         let body = |name: &str, mass: f64| SceneBody { name: name.into(), mass };
-        let mut scene = Scene { bodies: vec![body("body", 19.0)], shapes: Vec::new(), joints: Vec::new() };
+        let mut scene = Scene { bodies: vec![body("body", 19.0)], shapes: Vec::new(), joints: vec![hip()] };
         let shape = |id: u32, name: &str, geometry: Geometry, collides: bool| SceneShape {
             id,
             body: id,
@@ -386,7 +427,15 @@ impl Fixture {
         let ledgers = self.parts.iter().map(|(_, part)| ledger_of(part.kind, &part.energy()));
         let energy = ledgers.fold(Energy::default(), |sum, ledger| sum.plus(&ledger));
         let h_s = if index == 0 { 0.0 } else { H };
-        look(&View { t_s: t, step_index: index, h_s, subsystems: &views, gluing: &gluing, energy })
+        look(&View {
+            t_s: t,
+            step_index: index,
+            h_s,
+            subsystems: &views,
+            gluing: &gluing,
+            energy,
+            streams: &[scan(index, t), note(t)],
+        })
     }
 
     /// Goes to step `index`: feet leave their prints.

@@ -159,6 +159,41 @@ pub const TG_ELLIPSOID: u32 = 6;
 /// `tg_shape.geometry`: the triangles of `points`, open or closed; is seen only. Since 3.1.
 pub const TG_MESH: u32 = 7;
 
+/// `tg_joint.kind`: turns about its axis between limits.
+pub const TG_REVOLUTE: u32 = 0;
+/// `tg_joint.kind`: turns about its axis without limits.
+pub const TG_CONTINUOUS: u32 = 1;
+/// `tg_joint.kind`: slides along its axis.
+pub const TG_PRISMATIC: u32 = 2;
+/// `tg_joint.kind`: turns about a point.
+pub const TG_SPHERICAL: u32 = 3;
+/// `tg_joint.kind`: slides in the plane across its axis and turns about it.
+pub const TG_PLANAR: u32 = 4;
+/// `tg_joint.kind`: does not move.
+pub const TG_FIXED: u32 = 5;
+/// `tg_joint.kind`: closes a loop of the tree.
+pub const TG_CLOSURE: u32 = 6;
+/// `tg_joint.kind`: slides along its axis and turns about it.
+pub const TG_CYLINDRICAL: u32 = 7;
+/// `tg_joint.kind`: turns about two axes that stay perpendicular.
+pub const TG_UNIVERSAL: u32 = 8;
+
+/// Bit of `tg_ray_mask.sees`: shapes that are not hidden.
+pub const TG_SEES_SHAPES: u32 = 1;
+/// Bit of `tg_ray_mask.sees`: height fields.
+pub const TG_SEES_GROUND: u32 = 2;
+
+/// `tg_overlay.figure`: lines, two of `points` for each; `size` is their width.
+pub const TG_LINES: u32 = 0;
+/// `tg_overlay.figure`: points of that `size`.
+pub const TG_POINTS: u32 = 1;
+/// `tg_overlay.figure`: arrows, tail and tip of each in `points`; `size` is the width of the shaft.
+pub const TG_ARROWS: u32 = 2;
+/// `tg_overlay.figure`: the edge of an ellipse in the x, y plane of `pose`.
+pub const TG_ELLIPSE: u32 = 3;
+/// `tg_overlay.figure`: `text` from the first of `points` on, `size` high.
+pub const TG_TEXT: u32 = 4;
+
 /// `tg_field_tile.format`: every value equals `scale`; no data.
 pub const TG_TILE_UNIFORM: u32 = 0;
 /// `tg_field_tile.format`: data are double.

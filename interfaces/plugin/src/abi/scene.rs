@@ -41,7 +41,7 @@ pub struct TgShape {
     pub id: u32,
     /// Index of the body.
     pub body: u32,
-    /// TG_SPHERE, TG_BOX, TG_CAPSULE, TG_CYLINDER or TG_CONVEX_MESH.
+    /// TG_SPHERE ... TG_MESH.
     pub geometry: u32,
     /// 1: can be hit; 0: is only seen.
     pub collides: u32,
@@ -73,6 +73,50 @@ pub struct TgScene {
     pub n_bodies: u32,
     /// Number of shapes.
     pub n_shapes: u32,
+}
+
+/// What a shape is made of, for sensors. Since 3.1.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct TgMaterial {
+    /// 0 unknown, 1 metal, 2 rock, 3 soil, 4 wood, 5 foliage, 6 glass, 7 water; from 16 on free.
+    pub class_id: u32,
+    /// Part of the light that comes back, 0 ... 1.
+    pub reflectance: f32,
+    /// Part of the light that passes through, 0 ... 1; with the reflectance at most 1.
+    pub transmittance: f32,
+}
+
+/// A joint between two bodies of a scene, or between a body and the world. Since 3.1.
+#[repr(C)]
+#[derive(Clone, Copy, Debug)]
+pub struct TgJoint {
+    /// Name, unique in the subsystem.
+    pub name: *const c_char,
+    /// The action that breaks it; empty or null: none.
+    pub break_action: *const c_char,
+    /// Index of the body that it hangs on; UINT32_MAX: the world.
+    pub parent: u32,
+    /// Index of the body that it carries.
+    pub child: u32,
+    /// TG_REVOLUTE ... TG_UNIVERSAL.
+    pub kind: u32,
+    /// Id of the variable of its position, rad or m; UINT32_MAX: none, here and below.
+    pub position: u32,
+    /// Id of that of its velocity, rad/s or m/s.
+    pub velocity: u32,
+    /// Id of that of what its motor gives, N m or N.
+    pub torque: u32,
+    /// Id of that of the most that its motor can give, N m or N.
+    pub torque_limit: u32,
+    /// Id of that of whether it is held fast.
+    pub blocked: u32,
+    /// Pose of the joint in the parent, where the joint stands at zero.
+    pub parent_from_joint: TgPose,
+    /// Direction of the axis in the frame of the joint, unit; zero for a kind without an axis.
+    pub axis: [f64; 3],
+    /// Smallest and largest position, rad or m; -inf, inf: none.
+    pub limits: [f64; 2],
 }
 
 /// A field over the ground. Nodes (i, j) lie at origin + (i, j) * spacing.

@@ -2,7 +2,8 @@
 use super::constants::TgStatus;
 use super::host::TgHost;
 use super::law::TgNodeLaw;
-use super::scene::{TgBodyState, TgEnergy, TgField, TgFieldTile, TgScene};
+use super::scene::{TgBodyState, TgEnergy, TgField, TgFieldTile, TgJoint, TgMaterial, TgScene};
+use super::sight::{TgMessage, TgOverlay, TgStream, TgWorld};
 use super::step::{TgEstimate, TgInput, TgLaw, TgMotion, TgResponse, TgStep};
 use super::variable::{TgAction, TgBytes, TgValues, TgVariable};
 use std::ffi::{c_char, c_void};
@@ -17,13 +18,13 @@ pub struct TgSubsystem {
     pub abi_major: u32,
     /// TG_ABI_MINOR of the module.
     pub abi_minor: u32,
-    /// TG_SOIL, TG_ROBOT, TG_CONTROLLER or TG_LAW.
+    /// TG_SOIL, TG_ROBOT, TG_CONTROLLER, TG_LAW or TG_SENSOR.
     pub kind: u32,
     /// Module name, e.g. "soil-bekker".
     pub id: *const c_char,
     /// The text of the section .terraglue (see TG_DESCRIBE), or null.
     pub description: *const c_char,
-    /// JSON: {"name", "kind": "soil"|"robot"|"controller"|"law", "help", "parameters": [{"name", "type":
+    /// JSON: {"name", "kind": "soil"|"robot"|"controller"|"law"|"sensor", "help", "parameters": [{"name", "type":
     /// "number"|"integer"|"bool"|"text"|"path"|"numbers"|"number-table", "unit", "help", "default", "optional",
     /// "min", "max", "above_min", "choices"}]}. Constant; null on failure.
     /// When: at any time. Thread: any thread, several at once.
@@ -211,6 +212,39 @@ pub struct TgSubsystem {
     /// Modules of kind TG_LAW: their functions; required, while `instantiate`, `free`,
     /// `capabilities`, `advance` and `last_error` are not. Null for the other kinds.
     pub law: *const TgNodeLaw,
+
+    /// Since 3.1, as all below. Looks at the committed world: with the capability TG_CAN_SEE, after all instances have
+    /// committed the step, which `step` shows without ports. What was seen belongs to the committed state: variables,
+    /// streams and `save_state` tell it from t + h on. `world` is valid for the call only.
+    /// When: once per step, after `commit`; at the start of a run with h = 0. Thread: that of the instance.
+    pub observe: Option<
+        unsafe extern "C" fn(instance: *mut c_void, step: *const TgStep, world: *const TgWorld) -> TgStatus,
+    >,
+    /// All joints of the scene, and their number; valid and constant until `free`. Null: none is told.
+    /// When: at any time after `instantiate`. Thread: that of the instance.
+    pub scene_joints:
+        Option<unsafe extern "C" fn(instance: *mut c_void, first: *mut *const TgJoint) -> usize>,
+    /// Materials of all shapes of the scene, in their order, and their number; valid and constant until `free`. Null: all
+    /// are unknown.
+    /// When: at any time after `instantiate`. Thread: that of the instance.
+    pub shape_materials:
+        Option<unsafe extern "C" fn(instance: *mut c_void, first: *mut *const TgMaterial) -> usize>,
+    /// For each of the scene's n shapes 1 where it is shown, 0 where it is hidden; it belongs to the committed state.
+    /// Null: all are shown.
+    /// When: at any time. Thread: that of the instance.
+    pub shape_visibility:
+        Option<unsafe extern "C" fn(instance: *mut c_void, n: usize, out: *mut u8) -> TgStatus>,
+    /// All streams, and their number; valid and constant until `free`.
+    /// When: at any time after `instantiate`. Thread: that of the instance.
+    pub streams: Option<unsafe extern "C" fn(instance: *mut c_void, first: *mut *const TgStream) -> usize>,
+    /// The message that the last committed step made on a stream; may be asked for any number of times.
+    /// When: at any time. Thread: that of the instance.
+    pub stream:
+        Option<unsafe extern "C" fn(instance: *mut c_void, stream: usize, out: *mut TgMessage) -> TgStatus>,
+    /// What is shown beside the bodies, and its number; valid until the next call of the instance. Asked only when
+    /// somebody looks.
+    /// When: at any time. Thread: that of the instance.
+    pub overlays: Option<unsafe extern "C" fn(instance: *mut c_void, first: *mut *const TgOverlay) -> usize>,
 }
 
 /// What a module exports under the name `terraglue_subsystem`.

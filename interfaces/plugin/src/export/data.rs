@@ -2,9 +2,10 @@
 
 use super::{Exported, change, look, look_status};
 use crate::abi::*;
+use crate::field_table::tile_out;
 use crate::text::{borrowed, slice, slice_mut};
 use std::ffi::{c_char, c_void};
-use terraglue_subsystem::{Energy, FieldTile, TileValues};
+use terraglue_subsystem::Energy;
 
 pub(super) unsafe extern "C" fn capabilities(instance: *mut c_void) -> u32 {
     // SAFETY: the host passes a live instance.
@@ -40,7 +41,7 @@ pub(super) unsafe extern "C" fn deserialize(instance: *mut c_void, bytes: TgByte
 
 /// # Safety
 /// `instance` is live, `first` a place for a pointer.
-unsafe fn list<T>(
+pub(super) unsafe fn list<T>(
     instance: *mut c_void,
     first: *mut *const T,
     items: impl FnOnce(&Exported) -> &[T],
@@ -88,13 +89,7 @@ pub(super) unsafe extern "C" fn scene(instance: *mut c_void, out: *mut TgScene) 
     // SAFETY: the host passes a live instance and a place for the answer.
     unsafe {
         look_status(instance, |e| {
-            let d = &e.descriptions;
-            *out = TgScene {
-                bodies: d.bodies.as_ptr(),
-                shapes: d.shapes.as_ptr(),
-                n_bodies: d.bodies.len() as u32,
-                n_shapes: d.shapes.len() as u32,
-            };
+            *out = e.descriptions.scene.scene();
             Ok(())
         })
     }
@@ -119,20 +114,10 @@ pub(super) unsafe extern "C" fn field_tile(
     // SAFETY: the host passes a live instance and a place for the answer.
     unsafe {
         look_status(instance, |e| {
-            *out = tile(&e.subsystem.field_tile(field, a, b)?);
+            *out = tile_out(&e.subsystem.field_tile(field, a, b)?);
             Ok(())
         })
     }
-}
-
-fn tile(tile: &FieldTile) -> TgFieldTile {
-    let (format, scale, data, count): (u32, f64, *const c_void, usize) = match tile.values {
-        TileValues::Uniform(value) => (TG_TILE_UNIFORM, value, std::ptr::null(), 0),
-        TileValues::F64(data) => (TG_TILE_F64, 1.0, data.as_ptr().cast(), data.len()),
-        TileValues::F32(data) => (TG_TILE_F32, 1.0, data.as_ptr().cast(), data.len()),
-        TileValues::Fixed { data, unit } => (TG_TILE_FIXED, unit, data.as_ptr().cast(), data.len()),
-    };
-    TgFieldTile { generation: tile.generation, format, reserved: 0, scale, data, count }
 }
 
 pub(super) unsafe extern "C" fn energy(instance: *mut c_void, out: *mut TgEnergy) -> TgStatus {

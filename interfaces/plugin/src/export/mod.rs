@@ -6,6 +6,7 @@
 mod data;
 mod descriptions;
 mod services;
+mod sight;
 mod steps;
 mod values;
 
@@ -33,6 +34,7 @@ struct Exported {
     failure: RefCell<CString>,
     dead: Cell<bool>,
     scratch: RefCell<Scratch>,
+    known: sight::Known,
 }
 
 /// Buffers that are kept from call to call.
@@ -43,6 +45,7 @@ struct Scratch {
     strings: Vec<String>,
     binaries: Vec<Vec<u8>>,
     bytes: Vec<u8>,
+    overlays: Option<(Vec<TgOverlay>, crate::keep::Keep)>,
 }
 
 impl Exported {
@@ -150,6 +153,13 @@ pub fn table<M: Module>(fallback_name: &str, description: &'static [u8]) -> TgSu
         law_state_doubles: 0,
         reserved: 0,
         law: std::ptr::null(),
+        observe: Some(sight::observe),
+        scene_joints: Some(sight::scene_joints),
+        shape_materials: Some(sight::shape_materials),
+        shape_visibility: Some(sight::shape_visibility),
+        streams: Some(sight::streams),
+        stream: Some(sight::stream),
+        overlays: Some(sight::overlays),
     }
 }
 
@@ -229,6 +239,7 @@ unsafe extern "C" fn instantiate<M: Module>(
             failure: RefCell::default(),
             dead: Cell::new(false),
             scratch: RefCell::default(),
+            known: sight::Known::default(),
         }))
     });
     let error = match made {

@@ -9,7 +9,7 @@ use terraglue_subsystem::{Error, Estimate, Input, Motion, Response, Result, Step
 
 /// # Safety
 /// `step` points at a complete step whose arrays outlive `'a`.
-unsafe fn step_of<'a>(step: *const TgStep) -> Step<'a> {
+pub(super) unsafe fn step_of<'a>(step: *const TgStep) -> Step<'a> {
     // SAFETY: by the contract; ports and nodes have the layout of ours (`abi::layout`).
     unsafe {
         let s = &*step;

@@ -3,12 +3,11 @@
 use super::raw::Raw;
 use crate::abi::*;
 use crate::convert;
+use crate::field_table::field_in;
+use crate::scene_table::{scene_in, unknown};
 use crate::text::{borrowed, slice};
 use std::ffi::c_char;
-use terraglue_subsystem::{
-    Action, Capabilities, Error, FieldInfo, Geometry, Material, Pose, Result, Scene, SceneBody, SceneShape,
-    Variable,
-};
+use terraglue_subsystem::{Action, Capabilities, Error, FieldInfo, Result, Scene, StreamInfo, Variable};
 
 /// Everything about an instance that never changes.
 #[derive(Default)]
@@ -17,6 +16,7 @@ pub(super) struct ForeignDescriptions {
     pub(super) actions: Vec<Action>,
     pub(super) scene: Scene,
     pub(super) fields: Vec<FieldInfo>,
+    pub(super) streams: Vec<StreamInfo>,
 }
 
 impl ForeignDescriptions {
@@ -34,13 +34,18 @@ impl ForeignDescriptions {
                 out.actions = list(|first| f(i, first)).iter().map(action).collect::<Result<_>>()?;
             }
             if let Some(f) = t.fields {
-                out.fields = list(|first| f(i, first)).iter().map(|f| field(f)).collect::<Result<_>>()?;
+                out.fields = list(|first| f(i, first)).iter().map(|f| field_in(f)).collect::<Result<_>>()?;
+            }
+            if let Some(f) = t.streams {
+                out.streams = list(|first| f(i, first)).iter().map(|s| stream(s)).collect::<Result<_>>()?;
             }
             if let Some(f) = t.scene {
                 let mut s =
                     TgScene { bodies: std::ptr::null(), shapes: std::ptr::null(), n_bodies: 0, n_shapes: 0 };
                 raw.check(f(i, &raw mut s), f64::NAN)?;
-                out.scene = scene(&s)?;
+                let joints = t.scene_joints.map_or(&[][..], |f| list(|first| f(i, first)));
+                let materials = t.shape_materials.map_or(&[][..], |f| list(|first| f(i, first)));
+                out.scene = scene_in(&s, joints, materials)?;
             }
         }
         if out.variables.windows(2).any(|w| w[0].id >= w[1].id) {
@@ -60,6 +65,7 @@ pub(super) fn check_capabilities(capabilities: Capabilities, t: &TgSubsystem) ->
         (Capabilities::STATE, t.restore_state.is_none(), "restore_state"),
         (Capabilities::SERIALIZE, t.serialize.is_none(), "serialize"),
         (Capabilities::SERIALIZE, t.deserialize.is_none(), "deserialize"),
+        (Capabilities::SEES, t.observe.is_none(), "observe"),
     ] {
         if missing && capabilities.has(capability) {
             return Err(Error::Fatal(format!(
@@ -72,7 +78,7 @@ pub(super) fn check_capabilities(capabilities: Capabilities, t: &TgSubsystem) ->
 
 /// # Safety
 /// `f` fills the pointer with an array of as many elements as it answers.
-unsafe fn list<'a, T>(f: impl FnOnce(*mut *const T) -> usize) -> &'a [T] {
+pub(super) unsafe fn list<'a, T>(f: impl FnOnce(*mut *const T) -> usize) -> &'a [T] {
     let mut first = std::ptr::null();
     let count = f(&raw mut first);
     // SAFETY: by the contract.
@@ -84,10 +90,6 @@ unsafe fn list<'a, T>(f: impl FnOnce(*mut *const T) -> usize) -> &'a [T] {
 unsafe fn text(text: *const c_char) -> Result<String> {
     // SAFETY: the same contract.
     unsafe { borrowed(text) }.map(str::to_owned)
-}
-
-fn unknown(what: &str, number: u32) -> Error {
-    Error::Fatal(format!("{what} is the unknown number {number}"))
 }
 
 /// # Safety
@@ -117,84 +119,13 @@ unsafe fn variable(v: &TgVariable) -> Result<Variable> {
 }
 
 /// # Safety
-/// The pointers of `f` are valid.
-unsafe fn field(f: &TgField) -> Result<FieldInfo> {
-    // SAFETY: by the contract.
-    let (name, unit) = unsafe { (text(f.name)?, text(f.unit)?) };
-    if f.tile_edge == 0 || !(f.spacing > 0.0 && f.spacing.is_finite()) {
-        return Err(Error::Fatal(format!(
-            "the field `{name}` has tile edge {} and spacing {}",
-            f.tile_edge, f.spacing
-        )));
-    }
-    Ok(FieldInfo { name, unit, origin: f.origin, spacing: f.spacing, size: f.size, tile_edge: f.tile_edge })
-}
-
-/// # Safety
 /// The pointers of `s` are valid.
-unsafe fn scene(s: &TgScene) -> Result<Scene> {
+unsafe fn stream(s: &TgStream) -> Result<StreamInfo> {
     // SAFETY: by the contract.
-    let (bodies, shapes) =
-        unsafe { (slice(s.bodies, s.n_bodies as usize), slice(s.shapes, s.n_shapes as usize)) };
-    let mut out = Scene::default();
-    for body in bodies {
-        // SAFETY: by the contract.
-        out.bodies.push(SceneBody { name: unsafe { text(body.name)? }, mass: body.mass });
+    let (name, schema, encoding, help) =
+        unsafe { (text(s.name)?, text(s.schema)?, text(s.encoding)?, text(s.help)?) };
+    if !(s.rate_hz >= 0.0 && s.rate_hz.is_finite()) {
+        return Err(Error::Fatal(format!("the stream `{name}` makes {} messages per second", s.rate_hz)));
     }
-    for s in shapes {
-        // SAFETY: by the contract.
-        let name = unsafe { text(s.name)? };
-        if s.body >= out.bodies.len() as u32 {
-            return Err(Error::Fatal(format!(
-                "the shape `{name}` belongs to body {}, which does not exist",
-                s.body
-            )));
-        }
-        out.shapes.push(SceneShape {
-            id: s.id,
-            body: s.body,
-            // SAFETY: by the contract.
-            geometry: unsafe { geometry(s, &name)? },
-            name,
-            body_from_shape: Pose {
-                position: s.body_from_shape.position,
-                orientation: s.body_from_shape.orientation,
-            },
-            collides: s.collides != 0,
-            material: Material::UNKNOWN,
-        });
-    }
-    Ok(out)
-}
-
-/// # Safety
-/// The pointers of `s` are valid.
-unsafe fn geometry(s: &TgShape, name: &str) -> Result<Geometry> {
-    let [a, b, c] = s.size;
-    Ok(match s.geometry {
-        TG_SPHERE => Geometry::Sphere { radius: a },
-        TG_BOX => Geometry::Box { half_extents: s.size },
-        TG_CAPSULE => Geometry::Capsule { half_length: a, radius: b },
-        TG_CYLINDER => Geometry::Cylinder { half_length: a, radius: b },
-        TG_CONE_FRUSTUM => Geometry::ConeFrustum { half_length: a, radius_bottom: b, radius_top: c },
-        TG_ELLIPSOID => Geometry::Ellipsoid { semi_axes: s.size },
-        TG_CONVEX_MESH | TG_MESH => {
-            // SAFETY: by the contract.
-            let (points, triangles) = unsafe {
-                (slice(s.points, 3 * s.n_points as usize), slice(s.triangles, 3 * s.n_triangles as usize))
-            };
-            if triangles.iter().any(|k| *k >= s.n_points) {
-                return Err(Error::Fatal(format!(
-                    "a face of the shape `{name}` names a corner that does not exist"
-                )));
-            }
-            let points = points.chunks_exact(3).map(|p| [p[0], p[1], p[2]]).collect();
-            let triangles = triangles.chunks_exact(3).map(|t| [t[0], t[1], t[2]]).collect();
-            match s.geometry {
-                TG_MESH => Geometry::Mesh { points, triangles },
-                _ => Geometry::ConvexMesh { points, triangles },
-            }
-        }
-        other => return Err(unknown(&format!("geometry of the shape `{name}`"), other)),
-    })
+    Ok(StreamInfo { name, schema, encoding, help, rate_hz: s.rate_hz, most_bytes: s.most_bytes })
 }

@@ -3,6 +3,7 @@
 mod descriptions;
 mod raw;
 mod services;
+mod sight;
 mod subsystem;
 mod values;
 

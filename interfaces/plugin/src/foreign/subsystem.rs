@@ -1,15 +1,18 @@
 //! A foreign instance as a [`Subsystem`]: every call goes through the table, nothing is allocated on success.
 
-use super::descriptions::{ForeignDescriptions, check_capabilities};
+use super::descriptions::{ForeignDescriptions, check_capabilities, list};
 use super::raw::Raw;
 use super::services::Services;
+use super::sight::{Shown, overlay_in};
 use crate::abi::*;
+use crate::field_table::{NO_TILE, tile_in};
 use crate::text::{c_string, slice};
 use std::cell::RefCell;
 use std::ffi::c_void;
 use terraglue_subsystem::{
     Action, BodyState, Capabilities, Energy, Error, Estimate, FieldInfo, FieldTile, Input, Law, Level,
-    Motion, Response, Result, Scene, Step, Subsystem, TileValues, Values, ValuesMut, Variable,
+    Message, Motion, Overlay, Response, Result, Scene, Step, StreamInfo, Subsystem, Values, ValuesMut,
+    Variable, World,
 };
 
 /// An instance of a foreign module.
@@ -18,6 +21,8 @@ pub struct ForeignSubsystem {
     capabilities: Capabilities,
     descriptions: ForeignDescriptions,
     pub(super) scratch: RefCell<Vec<TgBytes>>,
+    // At one place as long as the instance, which may have kept a pointer to it.
+    shown: Box<Shown>,
 }
 
 // SAFETY: the ABI asks for calls from one thread at a time, not always the same; `&self` is not shared
@@ -93,7 +98,8 @@ impl ForeignSubsystem {
         let bits = table.capabilities.map_or(0, |f| unsafe { f(instance) });
         let capabilities = Capabilities(bits);
         check_capabilities(capabilities, &table)?;
-        Ok(Self { raw, capabilities, descriptions, scratch: RefCell::default() })
+        let (scratch, shown) = (RefCell::default(), Box::<Shown>::default());
+        Ok(Self { raw, capabilities, descriptions, scratch, shown })
     }
 
     /// Runs a call that answers with a response.
@@ -199,7 +205,59 @@ impl Subsystem for ForeignSubsystem {
         let (step, partner) = (step_out(step)?, motion_out(partner));
         // SAFETY: a live instance; lengths were checked.
         let status = unsafe { f(self.raw.instance, &raw const step, t.as_ptr(), &raw const partner) };
+        self.raw.check(status, f64::NAN)?;
+        self.shown.check()
+    }
+
+    fn observe(&mut self, step: &Step, world: &dyn World) -> Result {
+        let f = self.raw.table.observe.ok_or(Error::Unsupported)?;
+        let step = step_out(step)?;
+        let raw = &self.raw;
+        self.shown.with(world, |world| {
+            // SAFETY: a live instance; the world is valid during the call.
+            raw.check(unsafe { f(raw.instance, &raw const step, world) }, f64::NAN)
+        })
+    }
+
+    fn shape_visibility(&self, out: &mut [bool]) -> Result {
+        out.fill(true);
+        let Some(f) = self.raw.table.shape_visibility else { return Ok(()) };
+        enough(&[(out.len(), self.descriptions.scene.shapes.len())])?;
+        let first: *mut u8 = out.as_mut_ptr().cast();
+        // SAFETY: a live instance and room for all shapes.
+        let status = unsafe { f(self.raw.instance, out.len(), first) };
+        for k in 0..out.len() {
+            // SAFETY: inside `out`, as bytes: what the module wrote need not be a bool yet.
+            unsafe { *first.add(k) = u8::from(*first.add(k) != 0) }
+        }
         self.raw.check(status, f64::NAN)
+    }
+
+    fn streams(&self) -> &[StreamInfo] {
+        &self.descriptions.streams
+    }
+
+    fn stream(&self, k: usize) -> Result<Option<Message<'_>>> {
+        let f = self.raw.table.stream.ok_or(Error::Unsupported)?;
+        if k >= self.descriptions.streams.len() {
+            return Err(Error::Refused(format!("no stream number {k}")));
+        }
+        let mut out =
+            TgMessage { time: f64::NAN, bytes: std::ptr::null(), size: 0, is_there: 0, reserved: 0 };
+        // SAFETY: a live instance and a place for the answer.
+        self.raw.check(unsafe { f(self.raw.instance, k, &raw mut out) }, f64::NAN)?;
+        // SAFETY: valid until a call that takes `&mut self`.
+        let bytes = unsafe { slice(out.bytes, out.size) };
+        Ok((out.is_there != 0).then_some(Message { time: out.time, bytes }))
+    }
+
+    fn overlays(&self, out: &mut Vec<Overlay>) {
+        if let Some(f) = self.raw.table.overlays {
+            // SAFETY: a live instance; the figures are copied before its next call.
+            let shown = unsafe { list(|first| f(self.raw.instance, first)) };
+            // SAFETY: the pointers of a figure are valid until the next call.
+            out.extend(shown.iter().filter_map(|o| unsafe { overlay_in(o) }));
+        }
     }
 
     fn save_state(&mut self, slot: u32) -> Result {
@@ -280,34 +338,11 @@ impl Subsystem for ForeignSubsystem {
         let f = self.raw.table.field_tile.ok_or(Error::Unsupported)?;
         let info =
             self.fields().get(field).ok_or_else(|| Error::Failed(format!("no field number {field}")))?;
-        let mut out = TgFieldTile {
-            generation: 0,
-            format: TG_TILE_UNIFORM,
-            reserved: 0,
-            scale: f64::NAN,
-            data: std::ptr::null(),
-            count: 0,
-        };
+        let mut out = NO_TILE;
         // SAFETY: a live instance and a place for the answer.
         self.raw.check(unsafe { f(self.raw.instance, field, a, b, &raw mut out) }, f64::NAN)?;
-        let needed = (info.tile_edge as usize).pow(2);
-        if out.format != TG_TILE_UNIFORM && (out.count < needed || out.data.is_null()) {
-            return Err(Error::Failed(format!(
-                "a tile of `{}` has {} of {needed} values",
-                info.name, out.count
-            )));
-        }
-        // SAFETY: at least `needed` values, valid until a call that takes `&mut self`.
-        let values = unsafe {
-            match out.format {
-                TG_TILE_UNIFORM => TileValues::Uniform(out.scale),
-                TG_TILE_F64 => TileValues::F64(slice(out.data.cast(), needed)),
-                TG_TILE_F32 => TileValues::F32(slice(out.data.cast(), needed)),
-                TG_TILE_FIXED => TileValues::Fixed { data: slice(out.data.cast(), needed), unit: out.scale },
-                other => return Err(Error::Failed(format!("a tile has the unknown format {other}"))),
-            }
-        };
-        Ok(FieldTile { generation: out.generation, values })
+        // SAFETY: valid until a call that takes `&mut self`.
+        unsafe { tile_in(&out, info) }
     }
 
     fn energy(&self) -> Energy {

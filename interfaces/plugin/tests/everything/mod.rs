@@ -28,6 +28,8 @@ pub struct Everything {
     variables: Vec<Variable>,
     actions: Vec<Action>,
     fields: Vec<FieldInfo>,
+    streams: Vec<StreamInfo>,
+    message: Vec<u8>,
 }
 
 pub const TYPES: [ValueType; 14] = [
@@ -108,6 +110,15 @@ impl Module for Everything {
             variables,
             actions: vec![Action { name: "joint.break".into(), help: "Breaks".into() }],
             fields: ["height", "sinkage", "load", "flat"].map(field).into(),
+            streams: vec![StreamInfo {
+                name: "scan.points".into(),
+                schema: "foxglove.PointCloud".into(),
+                encoding: "protobuf".into(),
+                rate_hz: 12.5,
+                most_bytes: 4096,
+                help: "What is seen".into(),
+            }],
+            message: Vec::new(),
         }))
     }
 }
@@ -158,7 +169,7 @@ fn digest(step: &Step) -> f64 {
 
 impl Subsystem for Everything {
     fn capabilities(&self) -> Capabilities {
-        Capabilities(0x7fb)
+        Capabilities(0x7fb) | Capabilities::SEES
     }
 
     fn set_ports(&mut self, step: &Step, laws: &mut [Law], now: &mut Response) -> Result {
@@ -217,6 +228,73 @@ impl Subsystem for Everything {
     fn commit(&mut self, step: &Step, t: &[f64], partner: &Motion) -> Result {
         self.state += digest(step) + t.iter().chain(partner.x).chain(partner.v).sum::<f64>();
         Ok(())
+    }
+
+    fn observe(&mut self, step: &Step, world: &dyn World) -> Result {
+        self.trouble()?;
+        self.message.clear();
+        let mut put = |x: f64| self.message.extend(x.to_le_bytes());
+        [step.t, step.h, world.time(), world.interval()[0]].into_iter().for_each(&mut put);
+        let ray = Ray { origin: [1.0, 2.0, 3.0], direction: [0.0, 0.0, -1.0], time: step.t, range: 9.0 };
+        let mut hits = [RayHit::MISS; 2];
+        let own = world.body("unit", "leg").ok_or_else(|| Error::Failed("no body".into()))?;
+        world.cast_rays(&[ray, Ray { range: 0.5, ..ray }], &RayMask::without(own), &mut hits);
+        for hit in &hits {
+            [hit.distance, hit.normal[2], f64::from(hit.shape), f64::from(hit.material.reflectance)]
+                .into_iter()
+                .for_each(&mut put);
+        }
+        let mut heights = [0.0; 2];
+        world.ground_heights(&[[0.5, 0.25], [1e9, 0.0]], &mut heights);
+        heights.into_iter().for_each(&mut put);
+        let mut found = Vec::new();
+        world.overlap([0.0; 3], 40.0, &RayMask::ALL, &mut found);
+        found.iter().for_each(|s| put(f64::from(s.subsystem + s.body + s.shape)));
+        let state = world.pose(own, step.t).ok_or_else(|| Error::Failed("no pose".into()))?;
+        state.world_from_body.position.into_iter().chain(state.angular_velocity).for_each(&mut put);
+        put(f64::from(u8::from(world.pose(BodyRef { body: 99, ..own }, 0.0).is_none())));
+        put(f64::from(u8::from(world.body("unit", "tail").is_none())));
+        for k in 0..world.subsystems().len() as u32 + 1 {
+            let (scene, fields) = (world.scene(k), world.fields(k));
+            put(scene.map_or(-1.0, |s| (s.shapes.len() + 10 * s.joints.len() + 100 * s.bodies.len()) as f64));
+            put(fields.first().map_or(-1.0, |f| f.spacing));
+            put(world.field_tile(k, 0, 1, 2).map_or(-1.0, |t| t.values.at(0)));
+            put(f64::from(u8::from(world.is_visible(ShapeRef { subsystem: k, body: 0, shape: 1 }))));
+        }
+        Ok(())
+    }
+
+    fn shape_visibility(&self, out: &mut [bool]) -> Result {
+        out.iter_mut().enumerate().for_each(|(k, shown)| *shown = k % 2 == 0);
+        Ok(())
+    }
+
+    fn streams(&self) -> &[StreamInfo] {
+        &self.streams
+    }
+
+    fn stream(&self, k: usize) -> Result<Option<Message<'_>>> {
+        match (k, self.message.is_empty()) {
+            (0, true) => Ok(None),
+            (0, false) => Ok(Some(Message { time: self.state, bytes: &self.message })),
+            _ => Err(Error::Refused(format!("no stream {k}"))),
+        }
+    }
+
+    fn overlays(&self, out: &mut Vec<Overlay>) {
+        let points = || vec![[0.0, 1.0, 2.0], [self.state, 4.0, 5.0]];
+        let pose = Pose { position: [1.0, 2.0, 3.0], ..Pose::IDENTITY };
+        let figures = [
+            Figure::Lines { points: points(), width: 0.01 },
+            Figure::Points { points: points(), size: 0.02 },
+            Figure::Arrows { points: points(), width: 0.03 },
+            Figure::Ellipse { pose, semi_axes: [0.5, 0.25] },
+            Figure::Text { at: [7.0, 8.0, 9.0], height: 0.1, text: "Größe".into() },
+        ];
+        for (k, figure) in figures.into_iter().enumerate() {
+            let frame = if k == 0 { Overlay::WORLD } else { 1 };
+            out.push(Overlay { layer: format!("layer {k}"), frame, colour: [0.1, 0.2, 0.3, 1.0], figure });
+        }
     }
 
     fn save_state(&mut self, slot: u32) -> Result {
@@ -314,11 +392,26 @@ impl Subsystem for Everything {
             geometry,
             body_from_shape: pose,
             collides: id != 3,
-            material: Material::UNKNOWN,
+            material: Material { class: id, reflectance: 0.25, transmittance: 0.5 },
         };
         let mesh = Geometry::ConvexMesh {
             points: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]],
             triangles: vec![[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]],
+        };
+        let sheet = Geometry::Mesh {
+            points: vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]],
+            triangles: vec![[0, 1, 2]],
+        };
+        let joint = SceneJoint {
+            name: "hip".into(),
+            parent: SceneJoint::WORLD,
+            child: 1,
+            parent_from_joint: pose,
+            axis: [0.0, 0.6, 0.8],
+            kind: JointKind::Prismatic,
+            limits: [-0.5, f64::INFINITY],
+            variables: JointVariables { position: 3, torque: 6, ..JointVariables::ABSENT },
+            break_action: "joint.break".into(),
         };
         Scene {
             bodies: ["body", "leg"].map(|n| SceneBody { name: n.into(), mass: 2.5 }).into(),
@@ -328,7 +421,11 @@ impl Subsystem for Everything {
                 shape(3, Geometry::Capsule { half_length: 0.4, radius: 0.05 }),
                 shape(4, Geometry::Cylinder { half_length: 0.5, radius: 0.06 }),
                 shape(9, mesh),
+                shape(10, Geometry::ConeFrustum { half_length: 0.5, radius_bottom: 0.2, radius_top: 0.1 }),
+                shape(11, Geometry::Ellipsoid { semi_axes: [0.1, 0.2, 0.3] }),
+                SceneShape { collides: false, ..shape(12, sheet) },
             ],
+            joints: vec![joint],
         }
     }
 

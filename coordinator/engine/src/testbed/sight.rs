@@ -1,0 +1,161 @@
+//! Sight: after every step the committed world is shown to the subsystems that see.
+//!
+//! Where nobody sees there is no world, and a step costs nothing for it.
+
+use super::run_clock::RunClock;
+use super::schedule::Span;
+use super::subsystems::Subsystems;
+use super::uncoupled::span;
+use std::sync::Arc;
+
+use terraglue_diagnostics::{Error, InputError, Result, did_you_mean};
+use terraglue_host::{Instance, Workers, observe, shape_visibility};
+use terraglue_scenario::{Scenario, SubsystemSpec};
+use terraglue_subsystem::{BodyState, Capabilities, Mount, Step};
+use terraglue_world::{Parallel, WorldBuilder, WorldModel, fixed_bodies};
+
+/// The world of a run, where somebody looks at it.
+#[derive(Default)]
+pub(super) struct Sight {
+    open: Option<Box<Open>>,
+}
+
+struct Open {
+    world: WorldModel,
+    /// Slots of those that see.
+    seers: Vec<usize>,
+    /// Fields `height`: slots and numbers of fields.
+    grounds: Vec<(usize, usize)>,
+    /// Slots of those that have shapes, with room for what is shown.
+    shown: Vec<(usize, Vec<bool>)>,
+    /// States of the bodies at the start of the step.
+    before: Vec<Vec<BodyState>>,
+}
+
+/// What the world says that is wrong with a scene.
+fn odd(error: &terraglue_world::Error) -> Error {
+    InputError::plain(format!("what can be seen: {error}"), None).into()
+}
+
+impl Sight {
+    /// For the instances of a run.
+    ///
+    /// # Errors
+    /// [`Error::Input`]: a scene that cannot be seen, or the mount of a sensor names no body.
+    pub fn new(subsystems: &Subsystems, workers: &Arc<Workers>) -> Result<Self> {
+        let instances = &subsystems.instances;
+        let sees = |slot: &usize| instances[*slot].capabilities().has(Capabilities::SEES);
+        let seers: Vec<usize> = (0..instances.len()).filter(sees).collect();
+        if seers.is_empty() {
+            return Ok(Self::default());
+        }
+        let mut builder = WorldBuilder::new();
+        let (mut grounds, mut shown) = (Vec::new(), Vec::new());
+        for (slot, (instance, member)) in instances.iter().zip(&subsystems.members).enumerate() {
+            let (scene, states) = (instance.scene(), &member.states);
+            let number = builder.subsystem(instance.name(), scene, states, &fixed_bodies(scene));
+            let number = number.map_err(|e| odd(&e))?;
+            if let Some(field) = instance.fields().iter().position(|f| f.name == "height") {
+                builder.ground(number, &instance.fields()[field]).map_err(|e| odd(&e))?;
+                grounds.push((slot, field));
+            }
+            if !scene.shapes.is_empty() {
+                shown.push((slot, vec![true; scene.shapes.len()]));
+            }
+        }
+        let workers = workers.clone();
+        let parallel: Parallel = Arc::new(move |n, job| workers.parallel_for(n, job));
+        builder.parallel(parallel);
+        let before = subsystems.members.iter().map(|m| m.states.clone()).collect();
+        let world = builder.build(0.0);
+        Ok(Self { open: Some(Box::new(Open { world, seers, grounds, shown, before })) })
+    }
+
+    /// Keeps where bodies are before the step is committed.
+    #[inline]
+    pub fn before_commit(&mut self, subsystems: &Subsystems) {
+        if let Some(open) = &mut self.open {
+            let all = open.before.iter_mut().zip(&subsystems.members);
+            all.for_each(|(before, member)| before.clone_from(&member.states));
+        }
+    }
+
+    /// Shows the step from t to t + h that was committed.
+    #[inline]
+    pub fn after_commit(
+        &mut self,
+        clock: &RunClock,
+        (h, end): (f64, f64),
+        subsystems: &mut Subsystems,
+    ) -> Result {
+        match &mut self.open {
+            None => Ok(()),
+            Some(open) => open.show(&span(clock, h, end), subsystems),
+        }
+    }
+
+    /// Shows the start of the run, where nothing moves yet.
+    pub fn begin(&mut self, clock: &RunClock, subsystems: &mut Subsystems) -> Result {
+        self.before_commit(subsystems);
+        let Some(open) = &mut self.open else { return Ok(()) };
+        let step = Step::free(clock.t, 0.0, clock.index);
+        open.update([clock.t; 2], subsystems)?;
+        let Open { world, seers, .. } = open.as_mut();
+        seers.iter().try_for_each(|slot| observe(&mut subsystems.instances[*slot], &step, &*world))
+    }
+}
+
+impl Open {
+    fn show(&mut self, span: &Span, subsystems: &mut Subsystems) -> Result {
+        let Subsystems { schedules, .. } = &*subsystems;
+        if !self.seers.iter().any(|slot| schedules[*slot].step_of(span).is_some()) {
+            return Ok(());
+        }
+        self.update([span.step.t, span.step.t + span.step.h], subsystems)?;
+        let Subsystems { instances, schedules, .. } = subsystems;
+        for slot in &self.seers {
+            if let Some(step) = schedules[*slot].step_of(span) {
+                observe(&mut instances[*slot], &step, &self.world)?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Takes what the step has changed.
+    fn update(&mut self, interval: [f64; 2], subsystems: &Subsystems) -> Result {
+        let Subsystems { instances, members, .. } = subsystems;
+        let mut update = self.world.update(interval);
+        for (slot, before) in self.before.iter().enumerate().filter(|(_, before)| !before.is_empty()) {
+            update.bodies(slot as u32, before, &members[slot].states).map_err(|e| odd(&e))?;
+        }
+        for (slot, shown) in &mut self.shown {
+            shape_visibility(&instances[*slot], shown)?;
+            update.visibility(*slot as u32, shown).map_err(|e| odd(&e))?;
+        }
+        for (slot, field) in &self.grounds {
+            let instance: &Instance = &instances[*slot];
+            let tile = |a: u32, b: u32| instance.field_tile(*field, a, b).ok();
+            update.ground(*slot as u32, tile).map_err(|e| odd(&e))?;
+        }
+        Ok(())
+    }
+}
+
+/// Refuses the mount on a body that there is not.
+pub(super) fn check_mount(scenario: &Scenario, spec: &SubsystemSpec, instances: &[Instance]) -> Result {
+    let Some(name) = spec.parameters.get(Mount::KEY).and_then(|v| v.as_str()) else { return Ok(()) };
+    let wrong = |message: String, help: Option<String>| -> Result {
+        Err(scenario.source.error_at_value(&[&spec.name, Mount::KEY], message, help).into())
+    };
+    let (subsystem, body) = name.split_once('.').unwrap_or((name, ""));
+    let with_bodies = || instances.iter().filter(|i| !i.scene().bodies.is_empty());
+    let Some(found) = instances.iter().find(|i| i.name() == subsystem) else {
+        let help = did_you_mean(subsystem, with_bodies().map(Instance::name));
+        return wrong(format!("there is no subsystem `{subsystem}` to sit on"), help);
+    };
+    let names = || found.scene().bodies.iter().map(|b| b.name.as_str());
+    if names().any(|n| n == body) {
+        return Ok(());
+    }
+    wrong(format!("`{subsystem}` has no body `{body}` to sit on"), did_you_mean(body, names()))
+}

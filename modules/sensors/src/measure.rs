@@ -1,0 +1,56 @@
+//! What the sensors that sit on a body find in the world, without any error.
+
+use crate::kind::{MOST, SensorKind};
+use terraglue_subsystem::{Mount, Ray, RayHit, RayMask, Result, World};
+
+/// Velocity of the sensor and its time at the last sample: an accelerometer tells the mean between two samples.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(crate) struct Before {
+    pub time: f64,
+    pub velocity: [f64; 3],
+}
+
+/// True values of all channels at a time, and the switch.
+pub(crate) struct Truth {
+    pub values: [f64; MOST],
+    pub switch: bool,
+}
+
+/// Specific force and angular rate in the axes of the sensor. Without a sample before, or at its time, the sensor counts as not
+/// accelerated.
+pub(crate) fn imu(
+    mount: &mut Mount,
+    world: &dyn World,
+    time: f64,
+    gravity: [f64; 3],
+    before: &mut Option<Before>,
+) -> Result<Truth> {
+    let state = mount.state(world, time)?;
+    let velocity = state.linear_velocity;
+    let acceleration = match before {
+        Some(b) if time > b.time => [0, 1, 2].map(|k| (velocity[k] - b.velocity[k]) / (time - b.time)),
+        _ => [0.0; 3],
+    };
+    *before = Some(Before { time, velocity });
+    let felt = [0, 1, 2].map(|k| acceleration[k] - gravity[k]);
+    let [x, y, z] = state.world_from_body.turned_back(felt);
+    let [p, q, r] = state.world_from_body.turned_back(state.angular_velocity);
+    Ok(Truth { values: [x, y, z, p, q, r], switch: false })
+}
+
+/// Distance along x of the sensor; `range_m` where nothing is met. The body that it sits on is not met.
+pub(crate) fn range(mount: &mut Mount, world: &dyn World, time: f64, range_m: f64) -> Result<Truth> {
+    let (body, pose) = (mount.find(world)?, mount.state(world, time)?.world_from_body);
+    let ray = Ray { origin: pose.position, direction: pose.turned([1.0, 0.0, 0.0]), time, range: range_m };
+    let mut hits = [RayHit::MISS];
+    world.cast_rays(&[ray], &RayMask::without(body), &mut hits);
+    let mut values = [0.0; MOST];
+    values[0] = hits[0].distance.min(range_m);
+    Ok(Truth { values, switch: hits[0].is_hit() })
+}
+
+/// What a sensor makes of its inputs.
+pub(crate) fn inputs(kind: SensorKind, values: [f64; MOST], threshold_n: f64, was: bool) -> Truth {
+    let limit = if was { 0.5 * threshold_n } else { threshold_n };
+    Truth { values, switch: kind == SensorKind::ContactSwitch && values[0] >= limit }
+}

@@ -4,8 +4,8 @@ use divan::Bencher;
 use terraglue::contact::{BodySide, ContactDetector, GroundSide, Now};
 use terraglue::scenario::{TerrainKind, TerrainSpec};
 use terraglue::subsystem::{
-    BodyState, Capabilities, FieldInfo, FieldTile, Geometry, Input, Pose, Response, Result, Scene, SceneBody,
-    SceneShape, Step, Subsystem,
+    BodyState, Capabilities, FieldInfo, FieldTile, Geometry, Input, Material, Pose, Response, Result, Scene,
+    SceneBody, SceneShape, Step, Subsystem,
 };
 use terraglue_ground::HeightField;
 

@@ -108,6 +108,8 @@ SETS = [
     ("event=[{set={\"robot.LF_j2.max_torque\"=0.0}}]", 2, "`at_s` or `when`"),
     ("event=[{at_s=1.0,set={\"robot.LF_j2.max_torqe\"=0.0}}]", 2, "max_torque`?"),
     ("event=[{at_s=1.0,set={\"robot.LF_j2.max_torque\"=nan}}]", 2, "finite"),
+    ("event=[{at_s=1.0,set={\"robot.LF_j2.max_torque\"=1e300}}]", 2, "plausible is at most 1e15 N m"),
+    ("event=[{when=\"robot.body.z<1\",set={\"gait.heading\"=-1e300}}]", 2, "plausible is at most 1e6 rad in either direction"),
     ("event=[{at_s=1.0,act=\"robot.LF_j2.explode\"}]", 2, "explode"),
     ("event=[{when=\"robot.body.z\",act=\"robot.LF_j2.break\"}]", 2, "no comparison"),
     ("event=[{when=\"robot.body.z < high\",act=\"robot.LF_j2.break\"}]", 2, "no number"),

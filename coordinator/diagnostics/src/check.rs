@@ -125,10 +125,19 @@ const MAGNITUDES: [(&str, f64, f64); 8] = [
 /// Those of all other quantities and of pure numbers.
 const ANY_MAGNITUDE: [f64; 2] = [1e-30, 1e15];
 
+/// The largest magnitude that a quantity of such a unit can plausibly have: more is refused where it has no bound of its own.
+pub fn largest_plausible(unit: &str) -> f64 {
+    magnitudes(unit)[1]
+}
+
+fn magnitudes(unit: &str) -> [f64; 2] {
+    let own = MAGNITUDES.iter().find(|(name, ..)| *name == unit).map(|(_, low, high)| [*low, *high]);
+    own.unwrap_or(ANY_MAGNITUDE)
+}
+
 /// Refuses what is far beyond all that the quantity can be, where the parameter itself has no bound on that side.
 fn plausible(p: &Parameter, x: f64, value: &Value) -> Result<(), Complaint> {
-    let own = MAGNITUDES.iter().find(|(unit, ..)| *unit == p.unit).map(|(_, low, high)| [*low, *high]);
-    let [smallest, largest] = own.unwrap_or(ANY_MAGNITUDE);
+    let [smallest, largest] = magnitudes(&p.unit);
     // whole numbers are counts and seeds, whose bounds are those of their type
     let is_count = p.parameter_type == ParameterType::Integer;
     let too_small = p.above_min && p.min == Some(0.0) && x < smallest;

@@ -11,7 +11,7 @@ mod fingerprint;
 mod input_error;
 mod nearest;
 
-pub use check::{Complaint, LARGEST_WHOLE, allowed, allowed_values, check_value};
+pub use check::{Complaint, LARGEST_WHOLE, allowed, allowed_values, check_value, largest_plausible};
 pub use error::{Error, Result};
 pub use fingerprint::fingerprint;
 pub use input_error::InputError;

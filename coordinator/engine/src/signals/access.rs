@@ -1,6 +1,7 @@
 //! Variables of all subsystems by their full names, read and written as what a scenario can hold.
 
 use serde_json::Value;
+use terraglue_diagnostics::largest_plausible;
 use terraglue_host::{Instance, Reply};
 use terraglue_subsystem::{Effect, Error, Result, ValueType, Values, ValuesMut, Variable};
 
@@ -121,7 +122,10 @@ impl VariableRef {
             }
             (other, _) => other.as_f64().ok_or_else(refused)?,
         };
-        if number >= v.min && number <= v.max && fits(v, number) { Ok(Some(number)) } else { Err(refused()) }
+        if !(number >= v.min && number <= v.max && fits(v, number)) {
+            return Err(refused());
+        }
+        implausible(v, number, value).map_or(Ok(Some(number)), Err)
     }
 
     /// Why a value could never be set, if so.
@@ -155,6 +159,18 @@ impl VariableRef {
             }
         }
     }
+}
+
+/// Why a number cannot be meant, where the variable has no bound of its own on that side: as of a parameter.
+fn implausible(v: &Variable, number: f64, value: &Value) -> Option<String> {
+    let real = matches!(v.value_type, ValueType::F64 | ValueType::F32);
+    let bound = if number > 0.0 { v.max } else { v.min };
+    let largest = largest_plausible(&v.unit);
+    (real && bound.is_infinite() && number.abs() > largest).then(|| {
+        let unit = if ["", "1"].contains(&v.unit.as_str()) { String::new() } else { format!(" {}", v.unit) };
+        let directions = if v.min >= 0.0 { "" } else { " in either direction" };
+        format!("`{}` = {value} is out of range: plausible is at most {largest:e}{unit}{directions}", v.name)
+    })
 }
 
 /// Whether the variable's type can hold the number exactly.

@@ -75,31 +75,36 @@ fn waves([shortest, longest]: [f64; 2], seed: u64) -> impl Iterator<Item = Wave>
 /// Waves that are added side by side: each waits for its own product only.
 const ABREAST: usize = 8;
 
-/// A wave on its way along a row.
-#[derive(Clone, Copy, Default)]
-struct Phasor {
-    re: f64,
-    im: f64,
-    c: f64,
-    s: f64,
+/// Waves on their way along a row, the same part of all of them side by side.
+#[derive(Clone, Copy)]
+struct Phasors {
+    re: [f64; ABREAST],
+    im: [f64; ABREAST],
+}
+
+impl Phasors {
+    /// Turned by the angles of which c and s are cosine and sine.
+    fn turned(&self, [c, s]: &[[f64; ABREAST]; 2]) -> Self {
+        let Self { re, im } = self;
+        Self {
+            re: std::array::from_fn(|k| re[k] * c[k] - im[k] * s[k]),
+            im: std::array::from_fn(|k| re[k] * s[k] + im[k] * c[k]),
+        }
+    }
 }
 
 /// Adds some waves row by row; along a row the phasor of each turns by a constant angle, so that a node costs a product.
 fn add_waves(heights: &mut [f64], lattice: &Lattice, waves: &[Wave; ABREAST]) {
-    let turn = |wave: &Wave| wave.kx * lattice.spacing;
-    let turns = waves.each_ref().map(|wave| [libm::cos(turn(wave)), libm::sin(turn(wave))]);
+    let turns = [libm::cos, libm::sin].map(|part| waves.each_ref().map(|w| part(w.kx * lattice.spacing)));
     for (j, row) in heights.chunks_exact_mut(lattice.size[0] as usize).enumerate() {
         let [x, y] = lattice.position(0, j as i32);
-        let mut phasors: [Phasor; ABREAST] = std::array::from_fn(|k| {
-            let (wave, [c, s]) = (&waves[k], turns[k]);
-            let start = wave.kx * x + wave.ky * y + wave.phase;
-            Phasor { re: wave.amplitude * libm::cos(start), im: wave.amplitude * libm::sin(start), c, s }
-        });
+        let at = |part: fn(f64) -> f64| {
+            waves.each_ref().map(|w| w.amplitude * part(w.kx * x + w.ky * y + w.phase))
+        };
+        let mut phasors = Phasors { re: at(libm::cos), im: at(libm::sin) };
         for h in row {
-            for Phasor { re, im, c, s } in &mut phasors {
-                *h += *im;
-                (*re, *im) = (*re * *c - *im * *s, *re * *s + *im * *c);
-            }
+            *h = phasors.im.iter().fold(*h, |h, im| h + im);
+            phasors = phasors.turned(&turns);
         }
     }
 }

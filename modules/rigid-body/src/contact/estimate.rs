@@ -146,8 +146,23 @@ impl Estimator {
         Ok(false)
     }
 
+    /// Room for `n` components, however many of them will be held.
+    fn make_room(&mut self, n: usize) {
+        fn room<T>(buffer: &mut Vec<T>, n: usize) {
+            buffer.reserve(n.saturating_sub(buffer.len()));
+        }
+        for numbers in [&mut self.unknowns, &mut self.normals, &mut self.order, &mut self.pressing] {
+            room(numbers, n);
+        }
+        let all = [&mut self.rhs, &mut self.normal_gap, &mut self.normal_rhs, &mut self.solution];
+        all.into_iter().chain([&mut self.open, &mut self.before, &mut self.rounds]).for_each(|v| room(v, n));
+        room(&mut self.matrix, n * n);
+        room(&mut self.slipping, n);
+    }
+
     fn classify(&mut self, p: &Problem) {
         let n = p.gap.len();
+        self.make_room(n);
         self.status.clear();
         self.status.resize(n, Status::Open);
         self.normals.clear();

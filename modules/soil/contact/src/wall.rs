@@ -242,8 +242,7 @@ pub fn gather(
         if part <= 0.0 || nodes.area[k] <= 0.0 {
             continue;
         }
-        let [i, j] = nodes.index[k];
-        let cell = rows.cell([i, j]);
+        let ([i, j], cell) = (nodes.index[k], rows.cell(nodes.index[k]));
         let lower = nodes.reference[k] - nodes.depth[k] / n_z;
         let own = covered(Some(k));
         // towards +x, −x, +y and −y: width of the face and, times that, height of the bed above it and of the loose soil on the bed

@@ -146,10 +146,10 @@ pub fn until_up(testbed: &mut Testbed) -> Outcome {
     Err("the foot sinks for ever".into())
 }
 
-/// Statics: implicit Euler with long steps of a foot of the same weight and a millionth of the mass, so that inertia
+/// Statics: implicit Euler with long steps of a foot of the same weight and a thousandth of the mass, so that inertia
 /// does not carry it beyond its place of rest.
 fn at_rest(foot: &Foot) -> Outcome<f64> {
-    let light = Foot { speed: 0.0, mass: 1e-6 * foot.mass, gravity: 1e6 * foot.gravity, ..*foot };
+    let light = Foot { speed: 0.0, mass: 1e-3 * foot.mass, gravity: 1e3 * foot.gravity, ..*foot };
     let mut testbed = build(&light.text(&Setting::iterative(1.0, [0.0; 3]), "implicit-euler", ""))?;
     for _ in 0..4 {
         testbed.step().map_err(|e| e.to_string())?;

@@ -332,7 +332,7 @@ def test_modules_of_every_released_minor_run(tmp_path, header):
 
 
 def test_a_later_minor_runs_and_a_later_major_is_refused(tmp_path):
-    text = HEADERS[-1].read_text()
+    text = (ROOT / "interfaces" / "plugin" / "include" / "terraglue.h").read_text()
     minor = int(re.search(r"#define TG_ABI_MINOR (\d+)", text).group(1))
     assert text.count("} tg_subsystem;") == 1
     later = text.replace(f"#define TG_ABI_MINOR {minor}", f"#define TG_ABI_MINOR {minor + 1}")

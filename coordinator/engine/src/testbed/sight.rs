@@ -28,8 +28,8 @@ struct Open {
     grounds: Vec<(usize, usize)>,
     /// Slots of those that have shapes, with room for what is shown.
     shown: Vec<(usize, Vec<bool>)>,
-    /// States of the bodies at the start of the step.
-    before: Vec<Vec<BodyState>>,
+    /// Slots of those that have bodies that move, with their states at the start of the step.
+    before: Vec<(usize, Vec<BodyState>)>,
 }
 
 /// What the world says that is wrong with a scene.
@@ -66,8 +66,9 @@ impl Sight {
         let workers = workers.clone();
         let parallel: Parallel = Arc::new(move |n, job| workers.parallel_for(n, job));
         builder.parallel(parallel);
-        let before = subsystems.members.iter().map(|m| m.states.clone()).collect();
         let world = builder.build(0.0);
+        let moving = (0..instances.len()).filter(|slot| world.moves(*slot as u32));
+        let before = moving.map(|slot| (slot, subsystems.members[slot].states.clone())).collect();
         Ok(Self { open: Some(Box::new(Open { world, seers, grounds, shown, before })) })
     }
 
@@ -75,8 +76,9 @@ impl Sight {
     #[inline]
     pub fn before_commit(&mut self, subsystems: &Subsystems) {
         if let Some(open) = &mut self.open {
-            let all = open.before.iter_mut().zip(&subsystems.members);
-            all.for_each(|(before, member)| before.clone_from(&member.states));
+            for (slot, before) in &mut open.before {
+                before.clone_from(&subsystems.members[*slot].states);
+            }
         }
     }
 
@@ -125,8 +127,8 @@ impl Open {
     fn update(&mut self, interval: [f64; 2], subsystems: &Subsystems) -> Result {
         let Subsystems { instances, members, .. } = subsystems;
         let mut update = self.world.update(interval);
-        for (slot, before) in self.before.iter().enumerate().filter(|(_, before)| !before.is_empty()) {
-            update.bodies(slot as u32, before, &members[slot].states).map_err(|e| odd(&e))?;
+        for (slot, before) in &self.before {
+            update.bodies(*slot as u32, before, &members[*slot].states).map_err(|e| odd(&e))?;
         }
         for (slot, shown) in &mut self.shown {
             shape_visibility(&instances[*slot], shown)?;

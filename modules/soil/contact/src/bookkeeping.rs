@@ -158,7 +158,7 @@ impl Scene<'_> {
                 self.carry_cone(p, &x, ground, ledger)?;
             }
             if loaded > 0 && ground.contacts.any() {
-                let n = [port.frame[0], port.frame[1], port.frame[2]];
+                let n = port.direction(0);
                 touch.look_between(
                     &self.patches.nodes,
                     patch.nodes.clone(),

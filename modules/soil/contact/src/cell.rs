@@ -68,15 +68,14 @@ impl PatchNodes {
     }
 
     /// Takes the undersides of the nodes in `range`, which lie below `port` on a lattice of `spacing` (m), as they are in the mean over
-    /// their cells. Flat ones stay as they are.
+    /// their cells. Flat ones stay as they are. `rows` lists them.
     pub fn fill_cells(&mut self, port: &Port, range: std::ops::Range<usize>, spacing: f64, rows: &mut Rows) {
-        let n = [port.frame[0], port.frame[1], port.frame[2]];
+        let n = port.direction(0);
         let ground = [-n[0] / n[2], -n[1] / n[2]];
         let level = |s: [f64; 2]| (s[0] - ground[0]).abs() + (s[1] - ground[1]).abs() < ALIKE;
         if range.clone().all(|k| level(self.plane[k].slope)) {
             return;
         }
-        rows.list(self, range.clone());
         rows.weights.clear();
         rows.weights.extend(self.plane[range.clone()].iter().map(Plane::weight));
         // nothing of a body lies lower than its lowest point

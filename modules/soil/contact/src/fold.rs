@@ -69,7 +69,8 @@ impl Fold {
         let place: [f64; SAMPLES] =
             std::array::from_fn(|s| ((s as f64 + 0.5) / SAMPLES as f64 - 0.5) * self.spacing);
         let (mut top, mut highest) = (heights(own, &place), [0; POINTS]);
-        for (number, plane) in planes.iter().enumerate() {
+        faces[0] = self.face(own);
+        for (number, plane) in planes.iter().enumerate().skip(1) {
             faces[number] = self.face(plane);
             let z = heights(plane, &place);
             for s in 0..POINTS {

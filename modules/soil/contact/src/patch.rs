@@ -205,6 +205,7 @@ impl Patches {
         // a sphere has no extent and does not roll
         let found = || Wheel::find(&self.nodes, range.clone(), spacing, recall(&ground.wheels, port.key));
         let wheel = (port.extent[0] > 0.0 && port.extent[1] > 0.0).then(found).flatten();
+        self.rows.list(&self.nodes, range.clone());
         if !laws.iter().any(|law| law.pressure.keeps()) {
             self.nodes.fill_cells(port, range.clone(), spacing, &mut self.rows);
         }

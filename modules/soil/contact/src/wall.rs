@@ -220,7 +220,7 @@ const NEIGHBOURS: [(i32, i32); 4] = [(1, 0), (-1, 0), (0, 1), (0, -1)];
 
 /// Gathers the sides of the contact whose nodes are `range`: where the covered part of the cells falls from a node to its
 /// neighbour and soil stands above the underside. The parts of a node make one side, so that the normal follows the
-/// outline and not the lattice. `pressed`: pressure at a node over that at which it yields: where
+/// outline and not the lattice. `rows` lists the nodes. `pressed`: pressure at a node over that at which it yields: where
 /// the underside rises again, as behind the lowest line of a wheel, it leaves the soil that the sides have pushed away.
 pub fn gather(
     nodes: &PatchNodes,
@@ -233,7 +233,6 @@ pub fn gather(
 ) -> Result {
     let first = sides.len();
     let (spacing, n_z) = (beside.lattice.spacing, beside.n_z);
-    rows.list(nodes, range.clone());
     rows.places.clear();
     let (mut arm, mut sum, mut face) = ([0.0; 3], 0.0, 0.0);
     let covered = |k: Option<usize>| k.map_or(0.0, |k| nodes.area[k] * n_z / (spacing * spacing));

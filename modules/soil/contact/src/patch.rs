@@ -196,16 +196,13 @@ impl Patches {
     }
 
     fn read_port(&mut self, port: &Port, step: &Step, ground: &Ground, laws: &[Laws]) -> Result<Patch> {
-        let (first, n_z) = (self.nodes.index.len(), port.frame[2]);
-        for node in port.nodes(step.nodes) {
-            self.read_node(port, node, ground, laws);
-        }
-        let range = first..self.nodes.index.len();
+        let range = read_nodes(&mut self.nodes, port, step, ground, laws);
+        self.rows.list(&self.nodes, range.clone());
+        let n_z = port.frame[2];
         let spacing = ground.heights.lattice().spacing;
         // a sphere has no extent and does not roll
         let found = || Wheel::find(&self.nodes, range.clone(), spacing, recall(&ground.wheels, port.key));
         let wheel = (port.extent[0] > 0.0 && port.extent[1] > 0.0).then(found).flatten();
-        self.rows.list(&self.nodes, range.clone());
         if !laws.iter().any(|law| law.pressure.keeps()) {
             self.nodes.fill_cells(port, range.clone(), spacing, &mut self.rows);
         }
@@ -427,41 +424,6 @@ impl Patches {
         Ok(())
     }
 
-    fn read_node(&mut self, port: &Port, node: &Node, ground: &Ground, laws: &[Laws]) {
-        let state = ground.nodes.get(node.i, node.j);
-        let number = ground.mask.at(node.i, node.j);
-        let n_z = port.frame[2];
-        let [x, y] = ground.heights.lattice().position(node.i, node.j);
-        let reference = ground.reference(node.i, node.j, &state);
-        let offset = [x - port.origin[0], y - port.origin[1], node.lower - port.origin[2]];
-        let along = |c: usize| port.direction(c).iter().zip(&offset).map(|(a, b)| a * b).sum::<f64>();
-        let area = node.area / n_z;
-        let nodes = &mut self.nodes;
-        nodes.index.push([node.i, node.j]);
-        nodes.reference.push(reference);
-        nodes.stamp.push(state.stamp);
-        nodes.plane.push(Plane { height: node.lower, slope: node.slope });
-        nodes.depth.push((reference - node.lower) * n_z);
-        nodes.spread.push(Spread::over(state.print * n_z));
-        nodes.permanent.push((state.permanent - state.above) * n_z);
-        nodes.bed.push(state.bed * n_z);
-        nodes.loose.push(state.loose * n_z);
-        nodes.share.push(1.0);
-        nodes.passive.push([0.0; 2]);
-        nodes.bound.push(f64::NEG_INFINITY);
-        nodes.before.push(state.pressure);
-        nodes.entered.push(false);
-        nodes.relief.push(f64::NAN);
-        nodes.area.push(area);
-        nodes.loaded_part.push(if state.area < area { state.area / area } else { 1.0 });
-        nodes.arm.push([along(0), along(1), along(2)]);
-        nodes.law.push(number);
-        nodes.shear.push(state.shear);
-        ground.law_memory.read([node.i, node.j], &mut nodes.memory);
-        nodes.mobilised.push(laws[number].shear.mobilised(state.shear.slip));
-        nodes.facing.push(Facing::new(port, node.slope));
-    }
-
     /// Where two ports cover a node, the deeper one presses; the other one's area there becomes 0.
     fn share_nodes(&mut self, step: &Step) {
         for b in 1..self.ports.len() {
@@ -497,6 +459,55 @@ impl Patches {
         let loaded = self.ports[p].nodes.clone().filter(|k| n.area[*k] > 0.0);
         loaded.fold(f64::NEG_INFINITY, |h, k| h.max((n.depth[k] - n.permanent[k]) / n.facing[k].press[0]))
     }
+}
+
+/// Reads the nodes of a port; row by row.
+fn read_nodes(
+    nodes: &mut PatchNodes,
+    port: &Port,
+    step: &Step,
+    ground: &Ground,
+    laws: &[Laws],
+) -> std::ops::Range<usize> {
+    let first = nodes.index.len();
+    for node in port.nodes(step.nodes) {
+        read_node(nodes, port, node, ground, laws);
+    }
+    first..nodes.index.len()
+}
+
+fn read_node(nodes: &mut PatchNodes, port: &Port, node: &Node, ground: &Ground, laws: &[Laws]) {
+    let state = ground.nodes.get(node.i, node.j);
+    let number = ground.mask.at(node.i, node.j);
+    let n_z = port.frame[2];
+    let [x, y] = ground.heights.lattice().position(node.i, node.j);
+    let reference = ground.reference(node.i, node.j, &state);
+    let offset = [x - port.origin[0], y - port.origin[1], node.lower - port.origin[2]];
+    let along = |c: usize| port.direction(c).iter().zip(&offset).map(|(a, b)| a * b).sum::<f64>();
+    let area = node.area / n_z;
+    nodes.index.push([node.i, node.j]);
+    nodes.reference.push(reference);
+    nodes.stamp.push(state.stamp);
+    nodes.plane.push(Plane { height: node.lower, slope: node.slope });
+    nodes.depth.push((reference - node.lower) * n_z);
+    nodes.spread.push(Spread::over(state.print * n_z));
+    nodes.permanent.push((state.permanent - state.above) * n_z);
+    nodes.bed.push(state.bed * n_z);
+    nodes.loose.push(state.loose * n_z);
+    nodes.share.push(1.0);
+    nodes.passive.push([0.0; 2]);
+    nodes.bound.push(f64::NEG_INFINITY);
+    nodes.before.push(state.pressure);
+    nodes.entered.push(false);
+    nodes.relief.push(f64::NAN);
+    nodes.area.push(area);
+    nodes.loaded_part.push(if state.area < area { state.area / area } else { 1.0 });
+    nodes.arm.push([along(0), along(1), along(2)]);
+    nodes.law.push(number);
+    nodes.shear.push(state.shear);
+    ground.law_memory.read([node.i, node.j], &mut nodes.memory);
+    nodes.mobilised.push(laws[number].shear.mobilised(state.shear.slip));
+    nodes.facing.push(Facing::new(port, node.slope));
 }
 
 /// Pressure at node k over that at which it yields.

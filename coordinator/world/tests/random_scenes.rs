@@ -1,28 +1,9 @@
 //! Random worlds against a loop over all shapes whose intersections are found by other means: the same hit, at the same distance.
 
 use proptest::prelude::*;
-use random_scenes::{Heights, Piece, STEP, is_right, lend, naive, rays, scenes};
+use random_scenes::{drawn, is_right, naive, rays, scenes};
 use terraglue_subsystem::{Ray, RayHit, RayMask, World};
-use terraglue_world::{WorldBuilder, WorldModel};
-
-/// A world of pieces; the ground belongs to the first.
-fn world(pieces: &[Piece], heights: &Heights) -> WorldModel {
-    let mut builder = WorldBuilder::new();
-    for piece in pieces {
-        builder.subsystem(&piece.name, &piece.scene, piece.states().0, &piece.is_fixed()).expect("a scene");
-    }
-    builder.ground(0, &heights.info()).expect("a ground");
-    let mut world = builder.build(STEP[0]);
-    let mut update = world.update(STEP);
-    for (k, piece) in (0..).zip(pieces) {
-        let (before, after) = piece.states();
-        update.bodies(k, before, after).expect("states");
-    }
-    let tiles = heights.tiles();
-    update.ground(0, lend(&tiles, heights, 1)).expect("heights");
-    drop(update);
-    world
-}
+use terraglue_world::WorldModel;
 
 fn cast(world: &WorldModel, rays: &[Ray]) -> Vec<RayHit> {
     let mut hits = vec![RayHit::MISS; rays.len()];
@@ -33,7 +14,8 @@ fn cast(world: &WorldModel, rays: &[Ray]) -> Vec<RayHit> {
 /// (wrong, grazing) of some rays through a world of so many bodies.
 fn wrong(seed: u64, bodies: usize, count: usize) -> (Vec<String>, usize) {
     let (pieces, heights) = scenes(seed, bodies);
-    let world = world(&pieces, &heights);
+    let order: Vec<usize> = (0..pieces.len()).collect();
+    let world = drawn(&pieces, &heights, &order, None).expect("a world");
     let rays = rays(seed, bodies, count);
     let (mut wrong, mut grazing) = (Vec::new(), 0);
     for (ray, hit) in rays.iter().zip(cast(&world, &rays)) {

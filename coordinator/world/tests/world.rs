@@ -1,6 +1,6 @@
 //! What a world promises apart from the right hit: times, masks, hidden shapes, ties, threads, grounds, and that nothing is too odd for it.
 
-use random_scenes::{Heights, Piece, Random, STEP, lend, rays, scenes};
+use random_scenes::{Heights, Random, STEP, drawn, lend, rays, scenes};
 use std::sync::Arc;
 use terraglue_numerics::rotation::quaternion;
 use terraglue_subsystem::{
@@ -137,36 +137,12 @@ fn of_two_at_one_distance_the_first_name_and_then_the_lowest_id_counts() {
     }
 }
 
-/// A drawn world, with its subsystems in some order.
-fn drawn(pieces: &[Piece], heights: &Heights, order: &[usize], parallel: Option<Parallel>) -> WorldModel {
-    let mut builder = WorldBuilder::new();
-    for k in order {
-        let piece = &pieces[*k];
-        builder.subsystem(&piece.name, &piece.scene, piece.states().0, &piece.is_fixed()).expect("a scene");
-    }
-    let owner = order.iter().position(|k| *k == 0).expect("the owner of the ground") as u32;
-    builder.ground(owner, &heights.info()).expect("a ground");
-    if let Some(parallel) = parallel {
-        builder.parallel(parallel);
-    }
-    let mut world = builder.build(STEP[0]);
-    let mut update = world.update(STEP);
-    for (number, k) in (0..).zip(order) {
-        let (before, after) = pieces[*k].states();
-        update.bodies(number, before, after).expect("states");
-    }
-    let tiles = heights.tiles();
-    update.ground(owner, lend(&tiles, heights, 1)).expect("heights");
-    drop(update);
-    world
-}
-
 #[test]
 fn nothing_depends_on_the_order_of_subsystems() {
     let (pieces, heights) = scenes(5, 300);
     let rays = rays(5, 300, 3000);
     let answers = [[0, 1, 2], [2, 0, 1], [1, 2, 0]].map(|order| {
-        let world = drawn(&pieces, &heights, &order, None);
+        let world = drawn(&pieces, &heights, &order, None).expect("a world");
         let mut hits = vec![RayHit::MISS; rays.len()];
         world.cast_rays(&rays, &RayMask::ALL, &mut hits);
         let renumbered = |h: &RayHit| match h.is_hit() {
@@ -194,7 +170,7 @@ fn nothing_depends_on_threads_or_on_how_rays_are_batched() {
     let (pieces, heights) = scenes(6, 200);
     let rays = rays(6, 200, 5000);
     let cast = |parallel| {
-        let world = drawn(&pieces, &heights, &[0, 1, 2], parallel);
+        let world = drawn(&pieces, &heights, &[0, 1, 2], parallel).expect("a world");
         let mut hits = vec![RayHit::MISS; rays.len()];
         world.cast_rays(&rays, &RayMask::ALL, &mut hits);
         (world, hits.iter().map(bits).collect::<Vec<_>>())
@@ -412,7 +388,7 @@ fn nothing_slips_out_of_a_closed_mesh() {
 #[test]
 fn a_world_far_from_its_origin_looks_the_same() {
     let (pieces, heights) = scenes(8, 100);
-    let near = drawn(&pieces, &heights, &[0, 1, 2], None);
+    let near = drawn(&pieces, &heights, &[0, 1, 2], None).expect("a world");
     let far = [500_000.0, 5_600_000.0, 300.0];
     let away = |p: [f64; 3]| std::array::from_fn::<f64, 3, _>(|k| p[k] + far[k]);
     let move_all = |states: &[BodyState]| -> Vec<BodyState> {
@@ -444,7 +420,7 @@ fn a_world_far_from_its_origin_looks_the_same() {
 #[test]
 fn everything_that_a_short_ray_meets_is_found_by_a_sphere() {
     let (pieces, heights) = scenes(3, 60);
-    let mut world = drawn(&pieces, &heights, &[0, 1, 2], None);
+    let mut world = drawn(&pieces, &heights, &[0, 1, 2], None).expect("a world");
     // the sphere sees the end of the step
     let mut random = Random::new(2);
     let (mut met, mut alone) = (0, 0);

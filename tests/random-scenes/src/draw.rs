@@ -41,6 +41,17 @@ fn first_of(piece: &Piece, count: usize) -> Piece {
     few
 }
 
+/// A shape that is seen only.
+pub(crate) fn seen(
+    id: u32,
+    body: u32,
+    geometry: Geometry,
+    body_from_shape: Pose,
+    material: Material,
+) -> SceneShape {
+    SceneShape { id, body, name: format!("shape{id}"), geometry, body_from_shape, collides: false, material }
+}
+
 fn piece(random: &mut Random, name: &str, bodies: usize, room: f64, moves: bool) -> Piece {
     let mut out =
         Piece { name: name.into(), scene: Scene::default(), moves, before: Vec::new(), after: Vec::new() };
@@ -50,17 +61,7 @@ fn piece(random: &mut Random, name: &str, bodies: usize, room: f64, moves: bool)
             let id = 3 * out.scene.shapes.len() as u32 + random.below(3) as u32;
             let geometry = geometry(random);
             let body_from_shape = pose(random, 0.3);
-            let name = format!("shape{id}");
-            let (body, material) = (body as u32, Material::UNKNOWN);
-            out.scene.shapes.push(SceneShape {
-                id,
-                body,
-                name,
-                geometry,
-                body_from_shape,
-                collides: false,
-                material,
-            });
+            out.scene.shapes.push(seen(id, body as u32, geometry, body_from_shape, Material::UNKNOWN));
         }
         let before = BodyState { world_from_body: pose(random, room), ..BodyState::REST };
         let mut after = before;

@@ -5,11 +5,13 @@
 //! ray is outside it falls and then rises along the ray: a search by thirds finds the deepest point, bisection where the
 //! ray comes in and where it leaves. Triangles are met by Cramer's rule.
 
+mod build;
 mod draw;
 mod naive;
 mod random;
 mod stand;
 
+pub use build::drawn;
 pub use draw::{Piece, rays, scenes};
 pub use naive::{Candidate, Heights, is_right, naive, tolerance};
 pub use random::Random;

@@ -1,12 +1,11 @@
 //! A stand of trees from a seed, on a ground with footprints: stems as cones without tips, branches and bushes as triangles; and
 //! the rays of laser scanners that turn.
 
+use crate::draw::seen;
 use crate::naive::Heights;
 use crate::random::Random;
 use terraglue_numerics::rotation::{product, quaternion};
-use terraglue_subsystem::{
-    BodyState, Geometry, Material, MaterialClass, Pose, Ray, Scene, SceneBody, SceneShape,
-};
+use terraglue_subsystem::{BodyState, Geometry, Material, MaterialClass, Pose, Ray, Scene, SceneBody};
 
 /// A stand.
 #[derive(Clone, Debug)]
@@ -65,17 +64,7 @@ impl Stand {
         let id = self.scene.shapes.len() as u32;
         let body = self.scene.bodies.len() as u32 - 1;
         let body_from_shape = Pose { position: [0.0, 0.0, z], ..Pose::IDENTITY };
-        let name = format!("shape{id}");
-        let material = Material::of(class, 0.5);
-        self.scene.shapes.push(SceneShape {
-            id,
-            body,
-            name,
-            geometry,
-            body_from_shape,
-            collides: false,
-            material,
-        });
+        self.scene.shapes.push(seen(id, body, geometry, body_from_shape, Material::of(class, 0.5)));
     }
 
     /// Four pieces of stem and forty triangles of branches.

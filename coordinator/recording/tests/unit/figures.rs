@@ -34,13 +34,9 @@ fn what_a_controller_tells_is_of_the_step_before_and_what_it_is_told_of_the_next
         fixture.parts[0].1.tell(Variable::real(0, "speed", "m/s", causality, "speed"));
         let mut observer = SummaryObserver::new(&fixture.scenario);
         fixture.parts[0].1.speed = 0.0;
-        fixture
-            .view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut observer, v))
-            .expect("started");
+        fixture.start(&mut observer).expect("started");
         fixture.parts[0].1.speed = 0.2;
-        fixture
-            .view(1, &mut |v| terraglue_engine::observer::Observer::stepped(&mut observer, v))
-            .expect("stepped");
+        fixture.show(1, &mut observer).expect("stepped");
         observer.summary(1.0, 1.0, None, Status::Done).motion.commanded_distance_m
     };
     assert_eq!(asked(Causality::Parameter), Some(0.0));

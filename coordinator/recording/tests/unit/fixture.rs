@@ -452,9 +452,19 @@ impl Fixture {
         }
     }
 
+    /// Lets an observer see the start.
+    pub fn start(&self, observer: &mut dyn Observer) -> Result {
+        self.view(0, &mut |view| observer.started(view))
+    }
+
+    /// Lets an observer see a step, with the parts as they are.
+    pub fn show(&self, index: u64, observer: &mut dyn Observer) -> Result {
+        self.view(index, &mut |view| observer.stepped(view))
+    }
+
     /// Runs `steps` steps under an observer, with one event at step 700.
     pub fn run(&mut self, observer: &mut dyn Observer, steps: u64) -> Result {
-        self.view(0, &mut |view| observer.started(view))?;
+        self.start(observer)?;
         self.go_on(observer, 0, steps)
     }
 
@@ -472,7 +482,7 @@ impl Fixture {
                 observer.event(&Event { t_s: index as f64 * H, what })?;
             }
             self.advance(index);
-            if let Err(error) = self.view(index, &mut |view| observer.stepped(view)) {
+            if let Err(error) = self.show(index, observer) {
                 self.view(index, &mut |view| observer.finished(view, Some(&error)))?;
                 return Err(error);
             }

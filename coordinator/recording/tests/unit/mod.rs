@@ -46,9 +46,7 @@ fn a_recorder_goes_on_in_another_process_to_the_same_bytes() {
         let f = folder();
         let mut fixture = Fixture::new("iterative");
         let mut recorder = Recorder::create(f.path(), &fixture.scenario, options).expect("created");
-        fixture
-            .view(0, &mut |view| terraglue_engine::observer::Observer::started(&mut recorder, view))
-            .expect("started");
+        fixture.start(&mut recorder).expect("started");
         fixture.steps(&mut recorder, 0, at).expect("stepped");
         let (mut state, mut again) = (Vec::new(), None);
         fixture.view(at, &mut |view| recorder.state(view).map(|s| s.write(&mut state))).expect("a state");
@@ -214,14 +212,10 @@ fn what_was_flushed_is_on_disk_before_the_end() {
     let mut fixture = Fixture::new("cooperative");
     let mut recorder =
         Recorder::create(f.path(), &fixture.scenario, RecorderOptions::default()).expect("created");
-    fixture
-        .view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut recorder, v))
-        .expect("started");
+    fixture.start(&mut recorder).expect("started");
     for k in 1..=250 {
         fixture.parts.iter_mut().for_each(|p| p.1.t = k as f64 * H);
-        fixture
-            .view(k, &mut |v| terraglue_engine::observer::Observer::stepped(&mut recorder, v))
-            .expect("stepped");
+        fixture.show(k, &mut recorder).expect("stepped");
     }
     let r = Recording::open(f.path()).expect("readable");
     assert!((r.end_s() - 0.2).abs() < 1e-12);
@@ -285,14 +279,10 @@ fn a_parameter_is_written_when_it_changes_and_read_at_every_row() {
     let mut fixture = Fixture::new("cooperative");
     let mut recorder =
         Recorder::create(f.path(), &fixture.scenario, RecorderOptions::default()).expect("created");
-    fixture
-        .view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut recorder, v))
-        .expect("started");
+    fixture.start(&mut recorder).expect("started");
     for step in [5, 10, 15, 20] {
         fixture.parts[0].1.speed = if step < 15 { 0.15 } else { 0.2 };
-        fixture
-            .view(step, &mut |v| terraglue_engine::observer::Observer::stepped(&mut recorder, v))
-            .expect("stepped");
+        fixture.show(step, &mut recorder).expect("stepped");
     }
     recorder.finish(1.0, 1.0, None, Status::Done).expect("finished");
     let bytes = std::fs::read(f.path().join(RECORDING)).expect("written");
@@ -464,13 +454,9 @@ fn a_nan_is_refused_by_name_and_the_recording_stays_complete() {
     fixture.run(&mut recorder, 0).expect("started");
     let mut recorder =
         Recorder::create(f.path(), &fixture.scenario, RecorderOptions::default()).expect("created");
-    fixture
-        .view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut recorder, v))
-        .expect("started");
+    fixture.start(&mut recorder).expect("started");
     fixture.parts[1].1.nan = true;
-    let error = fixture
-        .view(5, &mut |v| terraglue_engine::observer::Observer::stepped(&mut recorder, v))
-        .expect_err("refused");
+    let error = fixture.show(5, &mut recorder).expect_err("refused");
     let text = error.to_string();
     assert!(text.contains("robot") && text.contains("body.x") && text.contains("NaN"), "{text}");
     let error = Some(&error);
@@ -614,9 +600,7 @@ fn cost_of_recording() {
     fixture.parts[1].1.widen(700);
     let mut recorder =
         Recorder::create(f.path(), &fixture.scenario, RecorderOptions::default()).expect("created");
-    fixture
-        .view(0, &mut |v| terraglue_engine::observer::Observer::started(&mut recorder, v))
-        .expect("started");
+    fixture.start(&mut recorder).expect("started");
     let (mut in_recorder, n) = (std::time::Duration::ZERO, 5000);
     for index in 1..=n {
         fixture.parts.iter_mut().for_each(|p| p.1.t = index as f64 * H);

@@ -1,11 +1,11 @@
 //! Rays through worlds drawn at random against a loop over all shapes whose intersections are found by other means; the same
 //! answers in any order of subsystems and on any number of threads.
 
-use super::scenes::{cast, drawn};
+use super::scenes::{cast, told};
 use super::{Context, Figure, Limit};
 use crate::parallel::in_parallel;
 use crate::process::Outcome;
-use random_scenes::{Heights, Piece, is_right, naive, rays, scenes, tolerance};
+use random_scenes::{Heights, Piece, drawn, is_right, naive, rays, scenes, tolerance};
 use std::sync::Arc;
 use terraglue_numerics::extremes::larger;
 use terraglue_subsystem::RayHit;
@@ -80,7 +80,7 @@ pub fn figures(context: &Context) -> Outcome<Vec<Figure>> {
 
 fn compared(seed: u64, bodies: usize, count: usize) -> Outcome<Tally> {
     let (pieces, heights) = scenes(seed, bodies);
-    let world = drawn(&pieces, &heights, &[0, 1, 2], None)?;
+    let world = told(drawn(&pieces, &heights, &[0, 1, 2], None))?;
     let rays = rays(seed, bodies, count);
     let mut tally = Tally { rays: count, ..Tally::default() };
     for (ray, hit) in rays.iter().zip(cast(&world, &rays)) {
@@ -110,7 +110,7 @@ fn order(pieces: &[Piece], heights: &Heights) -> Outcome<Figure> {
     let rays = rays(1, 300, 5000);
     let mut answers = Vec::new();
     for order in [[0, 1, 2], [2, 0, 1], [1, 2, 0]] {
-        let world = drawn(pieces, heights, &order, None)?;
+        let world = told(drawn(pieces, heights, &order, None))?;
         let named = |hit: RayHit| match order.get(hit.subsystem as usize) {
             Some(piece) => bits(&RayHit { subsystem: *piece as u32, ..hit }),
             None => bits(&hit),
@@ -138,7 +138,7 @@ fn threads(pieces: &[Piece], heights: &Heights) -> Outcome<Figure> {
     let rays = rays(2, 300, 5000);
     let mut answers = Vec::new();
     for parallel in [None, Some(1), Some(2), Some(5)] {
-        let world = drawn(pieces, heights, &[0, 1, 2], parallel.map(on_threads))?;
+        let world = told(drawn(pieces, heights, &[0, 1, 2], parallel.map(on_threads)))?;
         answers.push(cast(&world, &rays).iter().map(bits).collect::<Vec<_>>());
     }
     let differ =

@@ -27,6 +27,8 @@ pub use terraglue_terrain as terrain;
 #[cfg(feature = "program")]
 pub use terraglue_checkpoint as checkpoint;
 #[cfg(feature = "program")]
+pub use terraglue_compare as compare;
+#[cfg(feature = "program")]
 pub use terraglue_conformance as conformance;
 #[cfg(feature = "program")]
 pub use terraglue_recording as recording;

@@ -16,8 +16,6 @@ const HOUSE: [&str; 3] = ["interfaces", "modules", "coordinator"];
 const MOST_FLOORS: usize = 8;
 /// Most lines of source of a crate, tests included.
 const MOST_LINES: usize = 10_000;
-/// Crates above [`MOST_LINES`], with the most that they may have.
-const LARGER: [(&str, usize); 1] = [("terraglue-recording", 10_200)];
 
 /// A crate of the workspace.
 struct Room {
@@ -122,9 +120,8 @@ fn limits(rooms: &Rooms, floors: &BTreeMap<&str, usize>) -> Outcome {
         return Err(format!("the coordinator has {} floors, more than {MOST_FLOORS}", own.len()));
     }
     for (name, room) in rooms {
-        let most = LARGER.iter().find(|(large, _)| large == name).map_or(MOST_LINES, |(_, lines)| *lines);
-        if room.lines > most {
-            return Err(format!("{name} has {} lines, more than {most}: split it", room.lines));
+        if room.lines > MOST_LINES {
+            return Err(format!("{name} has {} lines, more than {MOST_LINES}: split it", room.lines));
         }
         let allowed = |used: &&String| {
             let used = &rooms[used.as_str()].folder;

@@ -3,10 +3,11 @@
 use crate::Options;
 use crate::check::{inertial, isometry, mass_spread, not_positive};
 use crate::error::{Error, Source};
-use crate::inertia::{Inertial, repair};
+use crate::inertia::Inertial;
 use crate::merge::{Merged, merge};
 use crate::model::{AxisData, Base, Body, Coupling, Joint, JointKind, Robot, Shape};
 use crate::plausible;
+use crate::repair::repair;
 use crate::shapes::Shapes;
 use crate::tree::{LinkPlace, order};
 use crate::unread;
@@ -60,16 +61,8 @@ fn build(
         bodies.push(Body { name: name.clone(), mass, com, inertia, shapes: Vec::new() });
     }
     let folders = options.folders(source.file);
-    let (mut shapes, mut world_shapes) = (Shapes::new(source, &folders), Vec::new());
-    for place in order {
-        let (frame, body) = (merged.body_from_link(place.link), merged.group[place.link].checked_sub(shift));
-        let found = shapes.of(&robot.links[place.link], body.is_none())?;
-        let moved = found.into_iter().map(|s| Shape { body_from_shape: frame * s.body_from_shape, ..s });
-        match body {
-            Some(body) => bodies[body].shapes.extend(moved),
-            None => world_shapes.extend(moved),
-        }
-    }
+    let mut shapes = Shapes::new(source, &folders);
+    let world_shapes = give_shapes(robot, order, merged, &mut shapes, &mut bodies)?;
     let base = match merged.chief[0] {
         Some(link) => Base::Free(merged.group_from_link[link]),
         None => Base::World,
@@ -103,6 +96,28 @@ fn build(
         warnings,
         notices,
     })
+}
+
+/// Gives the bodies the shapes of their links; what stands still in the world is left.
+fn give_shapes(
+    robot: &urdf_rs::Robot,
+    order: &[LinkPlace],
+    merged: &Merged,
+    shapes: &mut Shapes,
+    bodies: &mut [Body],
+) -> Result<Vec<Shape>, Error> {
+    let shift = usize::from(merged.chief[0].is_none());
+    let mut still = Vec::new();
+    for place in order {
+        let (frame, body) = (merged.body_from_link(place.link), merged.group[place.link].checked_sub(shift));
+        let found = shapes.of(&robot.links[place.link], body.is_none())?;
+        let moved = found.into_iter().map(|s| Shape { body_from_shape: frame * s.body_from_shape, ..s });
+        match body {
+            Some(body) => bodies[body].shapes.extend(moved),
+            None => still.extend(moved),
+        }
+    }
+    Ok(still)
 }
 
 /// Pairs of bodies with fixed joints only between them, or one joint that moves besides: their shapes overlap where they are joined,

@@ -497,6 +497,11 @@ impl Persist for Mode {
     }
 }
 
+/// Whether two rates count as the same.
+pub(crate) fn at_rest(u: f64) -> bool {
+    u.abs() <= RATE_TOLERANCE
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

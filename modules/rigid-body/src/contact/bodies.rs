@@ -11,7 +11,7 @@ use crate::contact::plane::Plane;
 use crate::contact::surfaces::Surfaces;
 use crate::dense::{cholesky, cholesky_solve};
 use crate::model::Model;
-use crate::state::Motion;
+use crate::motion::Motion;
 use terraglue_contact_solver::lcp::{Facets, Method, Outcome, Pyramid};
 use terraglue_contact_solver::{Options, Problem, Solver};
 use terraglue_linear_solver::{Path, Tree};

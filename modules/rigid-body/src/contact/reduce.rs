@@ -2,8 +2,7 @@
 //!
 //! A foot on a mesh of centimetres touches hundreds of triangles; a rigid body needs three points of one plane.
 
-use crate::contact::detection::frame;
-use crate::math::V3;
+use crate::math::{V3, frame_of_normal};
 
 /// Points of one plane that are kept at most.
 const MOST: usize = 9;
@@ -59,7 +58,7 @@ fn thin(plane: &mut [Found]) -> usize {
     if count <= MOST {
         return count;
     }
-    let [normal, t1, t2] = frame(plane[0].normal);
+    let [normal, t1, t2] = frame_of_normal(plane[0].normal);
     let middle = plane[..count].iter().map(|f| f.on_ground).sum::<V3>() / count as f64;
     let (a, b) = (DIAGONAL * (t1 + t2), DIAGONAL * (t1 - t2));
     let directions = [V3::zeros(), t1, -t1, t2, -t2, a, -a, b, -b];

@@ -4,7 +4,7 @@
 //! through an [`observer::Observer`]. Several live side by side in one process; there are no globals.
 //!
 //! Each part is a crate of its own below `coordinator/`; this one gives them one name. Without the feature `program`
-//! neither the command line nor recordings nor the checker are compiled.
+//! neither recordings nor the checker nor the modules that come with the program are compiled.
 
 /// The examples of the README, which the tests compile.
 #[cfg(doctest)]

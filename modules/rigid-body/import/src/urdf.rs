@@ -42,24 +42,7 @@ fn build(
     if world {
         check_world(source, robot, merged, options.fixed_base)?;
     }
-    let shift = usize::from(world);
-    let (mut bodies, mut joints) = (Vec::new(), Vec::new());
-    for group in shift..merged.chief.len() {
-        let (first, above) = merged.first[group];
-        let name = &robot.links[merged.chief[group].unwrap_or(first)].name;
-        let Some(Inertial { mass, com, tensor: inertia }) = merged.together(group, inertials) else {
-            let problem =
-                "moves on a joint but has no mass; give it an <inertial>, or make a joint next to it fixed";
-            return Err(source.link(name, problem));
-        };
-        if mass <= 0.0 {
-            return Err(source.link(name, not_positive(mass)));
-        }
-        if let Some(j) = above {
-            joints.push(joint(source, robot, merged, j, first, bodies.len(), shift)?);
-        }
-        bodies.push(Body { name: name.clone(), mass, com, inertia, shapes: Vec::new() });
-    }
+    let (mut bodies, joints) = bodies_and_joints(source, robot, inertials, merged)?;
     let folders = options.folders(source.file);
     let mut shapes = Shapes::new(source, &folders);
     let world_shapes = give_shapes(robot, order, merged, &mut shapes, &mut bodies)?;
@@ -96,6 +79,34 @@ fn build(
         warnings,
         notices,
     })
+}
+
+/// The bodies that are left of the links, without shapes, and the joints between them.
+fn bodies_and_joints(
+    source: &Source,
+    robot: &urdf_rs::Robot,
+    inertials: &[Option<Inertial>],
+    merged: &Merged,
+) -> Result<(Vec<Body>, Vec<Joint>), Error> {
+    let shift = usize::from(merged.chief[0].is_none());
+    let (mut bodies, mut joints) = (Vec::new(), Vec::new());
+    for group in shift..merged.chief.len() {
+        let (first, above) = merged.first[group];
+        let name = &robot.links[merged.chief[group].unwrap_or(first)].name;
+        let Some(Inertial { mass, com, tensor: inertia }) = merged.together(group, inertials) else {
+            let problem =
+                "moves on a joint but has no mass; give it an <inertial>, or make a joint next to it fixed";
+            return Err(source.link(name, problem));
+        };
+        if mass <= 0.0 {
+            return Err(source.link(name, not_positive(mass)));
+        }
+        if let Some(j) = above {
+            joints.push(joint(source, robot, merged, j, first, bodies.len(), shift)?);
+        }
+        bodies.push(Body { name: name.clone(), mass, com, inertia, shapes: Vec::new() });
+    }
+    Ok((bodies, joints))
 }
 
 /// Gives the bodies the shapes of their links; what stands still in the world is left.

@@ -80,12 +80,7 @@ pub(super) fn geom(d: &Defaults, e: &Element, around: Around) -> Result<Geom, Er
                 "is a height field on a body; they belong to the world, it is left out".into(),
             ));
         }
-        "hfield" => {
-            let wanted = d.text(e, "hfield").unwrap_or_default();
-            let unknown = || d.wrong(e, format!("there is no <hfield> `{wanted}` in <asset>"));
-            let field = around.assets.fields.get(wanted).ok_or_else(unknown)?;
-            ShapeGeometry::Heights(field.clone().map_err(|why| d.wrong(e, format!("hfield {why}")))?)
-        }
+        "hfield" => heights(d, e, around)?,
         "sphere" => ShapeGeometry::Sphere { radius: at(0)? },
         "capsule" => ShapeGeometry::Capsule { radius: at(0)?, half_length: half(1)? },
         "cylinder" => ShapeGeometry::Cylinder { radius: at(0)?, half_length: half(1)? },
@@ -128,6 +123,14 @@ fn friction(d: &Defaults, e: &Element) -> Result<Option<f64>, Error> {
         Some(bad) => Err(d.wrong(e, format!("friction = {bad} is negative: it would drive what slides"))),
         None => Ok(friction),
     }
+}
+
+/// The height field that a geom names.
+fn heights(d: &Defaults, e: &Element, around: Around) -> Result<ShapeGeometry, Error> {
+    let wanted = d.text(e, "hfield").unwrap_or_default();
+    let unknown = || d.wrong(e, format!("there is no <hfield> `{wanted}` in <asset>"));
+    let field = around.assets.fields.get(wanted).ok_or_else(unknown)?;
+    Ok(ShapeGeometry::Heights(field.clone().map_err(|why| d.wrong(e, format!("hfield {why}")))?))
 }
 
 /// Types of geoms that MJCF has.

@@ -29,7 +29,6 @@ mod balance;
 mod closure;
 mod contact;
 mod cut;
-mod dense;
 mod drive;
 mod dynamics;
 mod initial;

@@ -240,7 +240,7 @@ impl Robot {
             let [mut way, mut turn] =
                 [0, 3].map(|k| V3::from_row_slice(&dynamics.trial.solution[at + k..][..3]));
             if !dynamics.integrator.is_second_order() {
-                let kick = dynamics.kick(b);
+                let kick = dynamics.trial.kick(b, &dynamics.kkt, &dynamics.start);
                 way -= 0.5 * V3::from_row_slice(&kick[..3]);
                 turn -= 0.5 * V3::from_row_slice(&kick[3..]);
             }

@@ -108,7 +108,7 @@ impl Ports {
     /// Change of the rate along component i by the impulses of the trial.
     pub fn kick(&self, dynamics: &Dynamics, i: usize) -> f64 {
         let Component { body, row, .. } = &self.components[i];
-        dynamics.kick(*body).iter().zip(row).map(|(k, r)| k * r).sum()
+        dynamics.trial.kick(*body, &dynamics.kkt, &dynamics.start).iter().zip(row).map(|(k, r)| k * r).sum()
     }
 
     /// dX_r/d(wrench c), as last computed by [`Ports::compliance`].

@@ -63,7 +63,7 @@ impl Dynamics {
         }
         self.hold_joints(state);
         self.closing.rest_into(&self.model, &self.start, &self.kkt, &mut self.rhs);
-        self.drift(state);
+        drift(self, state);
         self.kkt.factor(&self.closing.cuts)?;
         self.kkt.factored = false;
         self.kkt.factor_count += 1;
@@ -102,20 +102,27 @@ impl Dynamics {
             self.kkt.push(&mut self.rhs, joint, &self.kkt.rows[j], free, torque);
         }
     }
+}
 
-    /// Takes from the right-hand side what opens of joints and loops when all bodies go on at their rates for a moment, forwards and
-    /// backwards.
-    fn drift(&mut self, state: &State) {
-        for dt in [START_DIFFERENCE_S, -START_DIFFERENCE_S] {
-            for (end, m) in self.trial.ends.iter_mut().zip(&state.bodies) {
-                *end = Motion { c: m.c + dt * m.v, q: cayley(&(dt * m.w)) * m.q, ..*m };
-            }
-            for (j, joint) in self.model.joints.iter().enumerate() {
-                let at = self.kkt.joint_at[j];
-                let open = gap(joint, &self.trial.ends);
-                (0..6).for_each(|r| self.rhs[at + r] -= open[r] / (dt * dt));
-            }
-            self.closing.drift_into(&self.model, &self.start, &self.trial.ends, &self.kkt, dt, &mut self.rhs);
+/// Takes from the right-hand side what opens of joints and loops when all bodies go on at their rates for a moment, forwards and
+/// backwards.
+fn drift(dynamics: &mut Dynamics, state: &State) {
+    for dt in [START_DIFFERENCE_S, -START_DIFFERENCE_S] {
+        for (end, m) in dynamics.trial.ends.iter_mut().zip(&state.bodies) {
+            *end = Motion { c: m.c + dt * m.v, q: cayley(&(dt * m.w)) * m.q, ..*m };
         }
+        for (j, joint) in dynamics.model.joints.iter().enumerate() {
+            let at = dynamics.kkt.joint_at[j];
+            let open = gap(joint, &dynamics.trial.ends);
+            (0..6).for_each(|r| dynamics.rhs[at + r] -= open[r] / (dt * dt));
+        }
+        dynamics.closing.drift_into(
+            &dynamics.model,
+            &dynamics.start,
+            &dynamics.trial.ends,
+            &dynamics.kkt,
+            dt,
+            &mut dynamics.rhs,
+        );
     }
 }

@@ -281,12 +281,6 @@ impl Dynamics {
         0.5 * (at(&self.start.free) + at(&self.trial.solution))
     }
 
-    /// Change of the rates of a body by all impulses of the trial.
-    pub fn kick(&self, body: usize) -> [f64; 6] {
-        let at = self.kkt.body_at[body];
-        std::array::from_fn(|k| self.trial.solution[at + k] - self.start.free[at + k])
-    }
-
     fn factor(&mut self) -> Result<(), SolverError> {
         let weight = self.integrator.force_weight();
         for (j, joint) in self.model.joints.iter().enumerate() {

@@ -72,7 +72,7 @@ impl Dynamics {
     /// Corrects the mean rates until forces balance and joints are closed on the present branches.
     pub(super) fn solve_branch_second_order(&mut self) -> Result<(), Failure> {
         self.trial.solution.copy_from_slice(&self.start.free);
-        let noise = self.noise();
+        let noise = noise(self);
         let (mut least, mut last, mut mixed) = (f64::INFINITY, f64::INFINITY, None);
         for round in 0..MAX_CORRECTIONS {
             self.find_ends_second_order();
@@ -103,14 +103,6 @@ impl Dynamics {
             (least, last) = (least.min(share), share);
         }
         Err(Failure::NotConverged { corrections: MAX_CORRECTIONS })
-    }
-
-    /// To what rates of jointed bodies can be told, m/s and rad/s.
-    fn noise(&self) -> f64 {
-        let jointed = self.model.joints.iter().flat_map(|j| [Some(j.child), j.parent]).flatten();
-        let looped = (0..self.start.bodies.len()).filter(|_| self.closing.any());
-        let far = jointed.chain(looped).fold(0.0_f64, |m, b| m.max(1.0).max(self.start.bodies[b].c.amax()));
-        ROUNDING * far / self.h + REST
     }
 
     /// The free axis of a joint.
@@ -146,21 +138,6 @@ impl Dynamics {
         }
     }
 
-    /// What is missing to the equilibrium of body b at the end of the trial.
-    fn equilibrium(&self, b: usize) -> Six {
-        let (body, gravity, load) = (&self.model.bodies[b], &self.model.gravity, &self.start.loads[b]);
-        let end = &self.trial.ends[b];
-        match &self.integrator {
-            Integrator::EnergyMomentum => {
-                midpoint::equilibrium(body, gravity, load, (&self.start.bodies[b], end), self.h)
-            }
-            Integrator::SymplecticEuler | Integrator::GeneralizedAlpha(_) => {
-                let real = &self.trial.accelerations[b].real;
-                alpha::equilibrium(body, gravity, load, (end, real), self.impulse_per_force())
-            }
-        }
-    }
-
     /// Fills `correction` with what is missing to equilibrium at the end and to closed joints.
     pub(super) fn residual_second_order(&mut self) {
         let weight = self.integrator.force_weight();
@@ -172,7 +149,7 @@ impl Dynamics {
             self.correction[at..at + 3].iter_mut().zip(&moment).for_each(|(c, m)| *c += m);
         }
         for b in 0..self.trial.ends.len() {
-            let (missing, at) = (self.equilibrium(b), self.kkt.body_at[b]);
+            let (missing, at) = (equilibrium(self, b), self.kkt.body_at[b]);
             self.correction[at..at + 6].iter_mut().zip(missing).for_each(|(c, m)| *c += m);
         }
         for (j, joint) in self.model.joints.iter().enumerate() {
@@ -212,6 +189,30 @@ impl Dynamics {
             (self.h, &self.integrator),
             &mut self.correction,
         );
+    }
+}
+
+/// To what rates of jointed bodies can be told, m/s and rad/s.
+fn noise(dynamics: &Dynamics) -> f64 {
+    let jointed = dynamics.model.joints.iter().flat_map(|j| [Some(j.child), j.parent]).flatten();
+    let looped = (0..dynamics.start.bodies.len()).filter(|_| dynamics.closing.any());
+    let far = jointed.chain(looped).fold(0.0_f64, |m, b| m.max(1.0).max(dynamics.start.bodies[b].c.amax()));
+    ROUNDING * far / dynamics.h + REST
+}
+
+/// What is missing to the equilibrium of body b at the end of the trial.
+fn equilibrium(dynamics: &Dynamics, b: usize) -> Six {
+    let (body, gravity, load) =
+        (&dynamics.model.bodies[b], &dynamics.model.gravity, &dynamics.start.loads[b]);
+    let end = &dynamics.trial.ends[b];
+    match &dynamics.integrator {
+        Integrator::EnergyMomentum => {
+            midpoint::equilibrium(body, gravity, load, (&dynamics.start.bodies[b], end), dynamics.h)
+        }
+        Integrator::SymplecticEuler | Integrator::GeneralizedAlpha(_) => {
+            let real = &dynamics.trial.accelerations[b].real;
+            alpha::equilibrium(body, gravity, load, (end, real), dynamics.impulse_per_force())
+        }
     }
 }
 

@@ -1,7 +1,7 @@
 //! The outcome of a trial: rates and impulses, and where bodies end by them.
 
 use super::kkt::Kkt;
-use super::scheme::Acceleration;
+use super::scheme::{Acceleration, Six};
 use super::start::StepStart;
 use crate::math::{Q, V3, cayley};
 use crate::model::Body;
@@ -52,5 +52,11 @@ impl Trial {
         let momentum = kkt.inertia[b] * (w - start.free_rate[b] + begin.w);
         let rate = q * (body.inverse_inertia * q.inverse_transform_vector(&momentum));
         (self.ends[b].v, self.ends[b].w) = (v, rate);
+    }
+
+    /// Change of the rates of a body by all impulses.
+    pub fn kick(&self, body: usize, kkt: &Kkt, start: &StepStart) -> Six {
+        let at = kkt.body_at[body];
+        std::array::from_fn(|k| self.solution[at + k] - start.free[at + k])
     }
 }

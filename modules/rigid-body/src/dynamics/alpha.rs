@@ -1,7 +1,6 @@
 //! Generalized-α in maximal coordinates: rates at the end of the step, equilibrium there, a consistent start.
 
-use super::scheme::{Acceleration, Weights};
-use super::second_order::{BodyEnd, inertial_moment, rates};
+use super::scheme::{Acceleration, BodyEnd, Weights, inertial_moment, rates};
 use super::{Dynamics, Failure};
 use crate::dynamics::joint_rows::{gap, rows};
 use crate::math::{V3, cayley};

@@ -6,8 +6,7 @@
 
 use super::joint_rows::rows;
 use super::kkt::Kkt;
-use super::scheme::Integrator;
-use super::second_order::rates;
+use super::scheme::{Integrator, rates};
 use super::start::StepStart;
 use super::trial::Trial;
 use super::{Dynamics, Failure};

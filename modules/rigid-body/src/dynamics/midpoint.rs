@@ -7,8 +7,7 @@
 //! 1996; for rigid bodies Betsch and Leyendecker 2006). In terms of the mean rate u = (Δc, θ)/h:
 //! M(u − v) = ½·h·f and v⁺ = 2u − v.
 
-use super::scheme::Acceleration;
-use super::second_order::{BodyEnd, rates};
+use super::scheme::{Acceleration, BodyEnd, rates};
 use crate::math::{V3, cayley};
 use crate::model::Body;
 use crate::motion::Motion;

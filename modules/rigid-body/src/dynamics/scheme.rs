@@ -10,6 +10,9 @@
 //! and equilibrium M·v̇⁺ + gyroscopic terms = f⁺ + J⁺ᵀλ⁺ at the end. As function of u this is M(u − …) = θ·h·f⁺
 //! with θ = β(1 − α_f)/(1 − α_m): the matrix of the first-order step serves both, forces alone weigh θ.
 
+use crate::math::{M3, V3};
+use crate::motion::Motion;
+
 /// Six rates or accelerations of a body: centre of mass, rotation; world axes.
 pub(crate) type Six = [f64; 6];
 
@@ -104,6 +107,26 @@ impl Weights {
         }
         (rate, end)
     }
+}
+
+/// Where a body ends.
+pub(super) struct BodyEnd {
+    pub motion: Motion,
+    /// Rotation vector of the step before the Cayley transform.
+    pub turn: V3,
+    pub acceleration: Acceleration,
+}
+
+/// Rates of a motion.
+pub(super) fn rates(m: &Motion) -> Six {
+    [m.v.x, m.v.y, m.v.z, m.w.x, m.w.y, m.w.z]
+}
+
+/// I·ω̇ + ω × I·ω in world axes.
+pub(super) fn inertial_moment(inertia: &M3, m: &Motion, acceleration: &V3) -> V3 {
+    let local = |v: &V3| m.q.inverse_transform_vector(v);
+    let w = local(&m.w);
+    m.q * (inertia * local(acceleration) + w.cross(&(inertia * w)))
 }
 
 terraglue_subsystem::persist!(Acceleration { algorithmic, real });

@@ -4,11 +4,9 @@
 //! the matrix leaves out (gyroscopic terms, turning of the rows under load) costs iterations, not accuracy. Joints
 //! are closed on the level of positions. The two rules are [`super::alpha`] and [`super::midpoint`].
 
-use super::scheme::{Acceleration, Integrator, Six, Weights};
+use super::scheme::{Integrator, Six, Weights, rates};
 use super::{AxisResult, Dynamics, Failure, alpha, midpoint};
 use crate::dynamics::joint_rows::{coordinate, gap, mean_rows, rows};
-use crate::math::V3;
-use crate::motion::Motion;
 use crate::state::State;
 
 /// Most corrections of a step.
@@ -24,19 +22,6 @@ const RATE_CHANGE: f64 = 1e-11;
 const ROUNDING: f64 = 16.0 * f64::EPSILON;
 /// Rates below this are rest, m/s and rad/s.
 const REST: f64 = 1e-14;
-
-/// Where a body ends.
-pub(super) struct BodyEnd {
-    pub motion: Motion,
-    /// Rotation vector of the step before the Cayley transform.
-    pub turn: V3,
-    pub acceleration: Acceleration,
-}
-
-/// Rates of a motion.
-pub(super) fn rates(m: &Motion) -> Six {
-    [m.v.x, m.v.y, m.v.z, m.w.x, m.w.y, m.w.z]
-}
 
 impl Dynamics {
     /// Linearises about the motion with unchanged accelerations.
@@ -222,11 +207,4 @@ fn largest(rates: &[f64]) -> [f64; 2] {
         let most = |k: usize| v[k..k + 3].iter().fold(m[k / 3], |m, v| m.max(v.abs()));
         [most(0), most(3)]
     })
-}
-
-/// I·ω̇ + ω × I·ω in world axes.
-pub(super) fn inertial_moment(inertia: &crate::math::M3, m: &Motion, acceleration: &V3) -> V3 {
-    let local = |v: &V3| m.q.inverse_transform_vector(v);
-    let w = local(&m.w);
-    m.q * (inertia * local(acceleration) + w.cross(&(inertia * w)))
 }

@@ -1,7 +1,7 @@
 //! `recording.mcap`: all topics of a run in one append-only file.
 //!
-//! Equal runs give equal bytes: times are simulated, chunks end by a count of steps, nothing is compressed on
-//! other threads, and no name of a machine or folder is written. What was flushed survives `kill -9`.
+//! Equal runs give equal bytes: times are simulated, chunks end by a count of steps, one thread compresses them in their
+//! order, and no name of a machine or folder is written. What was flushed survives `kill -9`.
 
 use crate::columns::{About, Columns};
 use crate::force_message::{DRAWN_EVERY_S, Forces};
@@ -34,13 +34,13 @@ use terraglue_scenario::Scenario;
 use terraglue_subsystem::Pose;
 
 mod resume;
+mod sink;
 pub(crate) use resume::McapState;
 use resume::Pending;
+use sink::Sink;
 
 /// A chunk ends every so many steps; that many can be lost when the process is killed.
 pub(crate) const FLUSH_STEPS: u64 = 200;
-
-type Sink = mcap::Writer<NoSeek<BufWriter<KeptFile>>>;
 
 /// How every recording is laid out, also a mended one.
 pub(crate) fn options() -> mcap::WriteOptions {
@@ -96,7 +96,7 @@ struct Channels {
 /// Writes the topics of a run.
 pub(crate) struct McapWriter {
     path: PathBuf,
-    sink: Option<Sink>,
+    sink: Sink,
     channels: Channels,
     sequence: u32,
     message: Vec<u8>,
@@ -116,9 +116,7 @@ pub(crate) struct McapWriter {
     precision: Precision,
     packed: Vec<u8>,
     window: WindowRecord,
-    /// Bytes and simulated time (s) of what can be read whatever comes after.
-    kept: (u64, f64),
-    /// The messages behind those, where checkpoints ask for them.
+    /// The messages behind what is kept, where checkpoints ask for them.
     pending: Option<Vec<Pending>>,
 }
 
@@ -138,13 +136,13 @@ impl McapWriter {
         scenario: &Scenario,
     ) -> Result<Self> {
         // No chunk size: chunks end by count only.
-        let sink = options().chunk_size(None).create(NoSeek::new(BufWriter::new(file)));
-        let mut sink = sink.map_err(other_at(&path))?;
+        let encoder = options().chunk_size(None).create(NoSeek::new(BufWriter::new(file)));
+        let mut encoder = encoder.map_err(other_at(&path))?;
         let about = mcap::records::Metadata { name: "terraglue".into(), metadata: about };
-        sink.write_metadata(&about).map_err(other_at(&path))?;
+        encoder.write_metadata(&about).map_err(other_at(&path))?;
         let mut writer = Self {
+            sink: Sink::new(&path, encoder),
             path,
-            sink: Some(sink),
             channels: Channels::default(),
             sequence: 0,
             message: Vec::new(),
@@ -161,7 +159,6 @@ impl McapWriter {
             precision: Precision::digits(scenario.recording.digits),
             packed: Vec::new(),
             window: WindowRecord::default(),
-            kept: (0, 0.0),
             pending: None,
         };
         writer.channels.events = writer.add(topics::of::<Log>("/events"))?;
@@ -169,19 +166,19 @@ impl McapWriter {
     }
 
     fn add(&mut self, topic: Topic) -> Result<u16> {
-        let Some(sink) = &mut self.sink else { return Ok(0) };
-        let schema = sink.add_schema(&topic.schema, "protobuf", &topic.descriptor);
-        let channel = schema.and_then(|s| sink.add_channel(s, &topic.topic, "protobuf", &topic.metadata));
+        let Some(encoder) = self.sink.encoder() else { return Ok(0) };
+        let schema = encoder.add_schema(&topic.schema, "protobuf", &topic.descriptor);
+        let channel = schema.and_then(|s| encoder.add_channel(s, &topic.topic, "protobuf", &topic.metadata));
         self.checked(channel)
     }
 
     fn add_stream(&mut self, stream: &StreamView) -> Result {
-        let Some(sink) = &mut self.sink else { return Ok(()) };
+        let Some(encoder) = self.sink.encoder() else { return Ok(()) };
         let (encoding, data) = stream_topics::schema(&stream.info);
         let topic = stream_topics::name(&stream.name);
-        let schema = sink.add_schema(&stream.info.schema, encoding, &data);
+        let schema = encoder.add_schema(&stream.info.schema, encoding, &data);
         let about = BTreeMap::from([(topics::STREAM.to_owned(), stream.name.clone())]);
-        let channel = schema.and_then(|s| sink.add_channel(s, &topic, &stream.info.encoding, &about));
+        let channel = schema.and_then(|s| encoder.add_channel(s, &topic, &stream.info.encoding, &about));
         let channel = self.checked(channel)?;
         self.channels.streams.push(channel);
         Ok(())
@@ -218,7 +215,9 @@ impl McapWriter {
             self.put(channel, view.t_s, &cloud)?;
         }
         self.whole_ground(view)?;
-        self.ground_tiles(view, (0..self.channels.tiles.len()).collect())
+        self.ground_tiles(view, (0..self.channels.tiles.len()).collect())?;
+        self.sink.start();
+        Ok(())
     }
 
     /// What of the view is recorded in forms of its own.
@@ -461,34 +460,32 @@ impl McapWriter {
         let log_time = nanoseconds(t_s);
         let header = MessageHeader { channel_id, sequence: self.sequence, log_time, publish_time: log_time };
         self.sequence = self.sequence.wrapping_add(1);
-        let Some(sink) = &mut self.sink else { return Ok(()) };
         if let Some(pending) = &mut self.pending {
             pending.push(Pending::of(&header, &self.message));
         }
-        let written = sink.write_to_known_channel(&header, &self.message);
+        let written = self.sink.write(&header, &mut self.message);
         self.checked(written)
     }
 
     /// Ends the chunk and hands everything up to time `t_s` to the operating system.
     pub fn flush(&mut self, t_s: f64) -> Result {
-        let Some(sink) = &mut self.sink else { return Ok(()) };
-        let flushed = sink.flush();
+        let flushed = self.sink.flush(t_s);
         self.checked(flushed)?;
         self.pending.iter_mut().for_each(Vec::clear);
-        self.kept = (std::fs::metadata(&self.path).map_or(self.kept.0, |m| m.len()), t_s);
         Ok(())
     }
 
     /// Simulated time up to which all can be read whatever comes after, s.
     pub fn kept_s(&self) -> f64 {
-        self.kept.1
+        self.sink.kept().1
     }
 
     /// After a write that failed the file ends with what was whole before, and nothing more is written.
     fn checked<T>(&mut self, written: mcap::McapResult<T>) -> Result<T> {
         written.map_err(|e| {
-            self.sink = None;
-            let cut = File::options().write(true).open(&self.path).and_then(|f| f.set_len(self.kept.0));
+            self.sink.abandon();
+            let kept = self.sink.kept().0;
+            let cut = File::options().write(true).open(&self.path).and_then(|f| f.set_len(kept));
             if let Err(e) = cut {
                 ::log::warn!("{}: its end cannot be cut off: {e}", self.path.display());
             }
@@ -501,10 +498,7 @@ impl McapWriter {
 
     /// Writes the footer; later calls do nothing.
     pub fn close(&mut self) -> Result {
-        let Some(mut sink) = self.sink.take() else { return Ok(()) };
-        use std::io::Write;
-        let finished = sink.finish();
-        let finished = finished.and_then(|_| Ok(sink.into_inner().into_inner().flush()?));
-        self.checked(finished)
+        let closed = self.sink.close();
+        self.checked(closed)
     }
 }

@@ -3,7 +3,8 @@
 //!
 //! Chunks end where they would end without checkpoints: of an open chunk a checkpoint keeps the messages.
 
-use super::{McapWriter, Sink};
+use super::McapWriter;
+use super::sink::Encoder;
 use crate::keep::Keep;
 use crate::kept_file::{KeptFile, shorter};
 use crate::layout::{RECORDING, at, other_at};
@@ -66,6 +67,8 @@ impl McapWriter {
 
     /// What another process needs to go on from here.
     pub fn state(&mut self, view: &View) -> Result<McapState> {
+        let waited = self.sink.wait();
+        self.checked(waited)?;
         let (mut ground, mut unseen) = (Block::default(), Vec::new());
         if let Some(grid) = &self.ground {
             grid.keep(&mut ground.0);
@@ -74,7 +77,7 @@ impl McapWriter {
         let parts = self.variables.iter().flatten().flatten();
         let pending = self.pending.iter().flatten();
         Ok(McapState {
-            kept: self.kept,
+            kept: self.sink.kept(),
             sequence: self.sequence,
             pending: pending.map(|p| Pending::of(&p.header(), &p.data.0)).collect(),
             written: parts.map(|part| part.written.clone()).collect(),
@@ -98,18 +101,19 @@ impl McapWriter {
         let length = state.kept.0;
         let file = KeptFile::repeat(&path, length).map_err(at(&path))?;
         let mut writer = Self::over(file, path.clone(), about, scenario)?;
-        writer.kept = state.kept;
+        writer.sink.keep(state.kept);
         let before = File::open(&path).map_err(at(&path))?;
-        if let Some(sink) = &mut writer.sink {
-            repeat(BufReader::new(before).take(length), sink).map_err(at(&path))?;
+        if let Some(encoder) = writer.sink.encoder() {
+            repeat(BufReader::new(before).take(length), encoder).map_err(at(&path))?;
         }
         writer.find(view)?;
         writer.announce(view, snapshot)?;
         writer.take(state).map_err(other_at(&path))?;
-        let Some(sink) = &mut writer.sink else { return Ok(writer) };
+        let Some(encoder) = writer.sink.encoder() else { return Ok(writer) };
         let mut again = writer.pending.iter().flatten();
-        let again = again.try_for_each(|p| sink.write_to_known_channel(&p.header(), &p.data.0));
+        let again = again.try_for_each(|p| encoder.write_to_known_channel(&p.header(), &p.data.0));
         writer.checked(again)?;
+        writer.sink.start();
         Ok(writer)
     }
 
@@ -133,7 +137,7 @@ impl McapWriter {
 }
 
 /// Gives a sink everything behind the head of a recording, chunk by chunk as it stands there.
-fn repeat(mut from: impl Read, sink: &mut Sink) -> std::io::Result<()> {
+fn repeat(mut from: impl Read, sink: &mut Encoder) -> std::io::Result<()> {
     let other = |e: McapError| match e {
         McapError::Io(source) => source,
         other => std::io::Error::new(ErrorKind::InvalidData, other),
@@ -157,7 +161,7 @@ fn repeat(mut from: impl Read, sink: &mut Sink) -> std::io::Result<()> {
 }
 
 /// All records of a chunk, and its end. Numbers of schemas and channels come again as they are given in turn.
-fn repeat_chunk(records: Vec<Record>, sink: &mut Sink) -> McapResult<()> {
+fn repeat_chunk(records: Vec<Record>, sink: &mut Encoder) -> McapResult<()> {
     for record in records {
         match record {
             Record::Schema { header, data } => {

@@ -1,0 +1,228 @@
+//! Where messages go: a file of chunks, at first in the thread of the run, then behind a bounded queue on a thread of its own, which
+//! encodes chunks, compresses them and writes.
+//!
+//! One thread takes all messages in their order, so the bytes of a recording do not depend on it. What a step pays is a copy of
+//! its messages; a full queue makes it wait. An error of the thread is returned by the call after it.
+
+use crate::kept_file::KeptFile;
+use mcap::records::MessageHeader;
+use mcap::write::NoSeek;
+use mcap::{McapError, McapResult};
+use std::io::{BufWriter, Write};
+use std::path::{Path, PathBuf};
+use std::sync::mpsc::{Receiver, SyncSender, channel, sync_channel};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::thread::JoinHandle;
+
+/// The encoder of the file.
+pub(super) type Encoder = mcap::Writer<NoSeek<BufWriter<KeptFile>>>;
+
+/// Messages that may wait.
+const WAITING: usize = 1024;
+
+/// Bytes of the file and simulated time (s) of what can be read whatever comes after.
+pub(super) type Kept = (u64, f64);
+
+/// What the thread is asked to do.
+enum Job {
+    Message(MessageHeader, Vec<u8>),
+    /// Ends the chunk and hands everything up to this time to the operating system.
+    Flush(f64),
+    /// Answers when all before it is done.
+    Answer(SyncSender<()>),
+}
+
+/// A file of chunks.
+pub(super) struct Sink {
+    path: PathBuf,
+    place: Place,
+    progress: Arc<Mutex<Progress>>,
+}
+
+/// Where the encoder is.
+enum Place {
+    Here(Box<Encoder>),
+    Behind(Queue),
+    /// Closed, or gone after an error.
+    Gone,
+}
+
+struct Queue {
+    jobs: SyncSender<Job>,
+    /// Buffers of messages that are written.
+    spent: Receiver<Vec<u8>>,
+    thread: JoinHandle<Option<Box<Encoder>>>,
+}
+
+/// What the thread has come to.
+#[derive(Default)]
+struct Progress {
+    kept: Kept,
+    failed: Option<McapError>,
+}
+
+impl Sink {
+    /// Over an encoder that has written nothing that is kept.
+    pub fn new(path: &Path, encoder: Encoder) -> Self {
+        Self { path: path.to_owned(), place: Place::Here(Box::new(encoder)), progress: Arc::default() }
+    }
+
+    /// The encoder before [`Sink::start`], for what announces topics; none later.
+    pub fn encoder(&mut self) -> Option<&mut Encoder> {
+        match &mut self.place {
+            Place::Here(encoder) => Some(encoder),
+            _ => None,
+        }
+    }
+
+    /// From now on messages are written by a thread of their own; where none can be made, as before.
+    pub fn start(&mut self) {
+        let Place::Here(encoder) = std::mem::replace(&mut self.place, Place::Gone) else { return };
+        let (jobs, todo) = sync_channel(WAITING);
+        let (done, spent) = channel();
+        let (path, progress) = (self.path.clone(), Arc::clone(&self.progress));
+        // handed over by a cell: a thread that cannot be made drops what it was given
+        let given = Arc::new(Mutex::new(Some(encoder)));
+        let taken = Arc::clone(&given);
+        let work = move || {
+            let encoder = lock(&taken).take()?;
+            write_all(encoder, &path, &progress, &todo, |buffer| drop(done.send(buffer)))
+        };
+        self.place = match std::thread::Builder::new().name("recording".into()).spawn(work) {
+            Ok(thread) => Place::Behind(Queue { jobs, spent, thread }),
+            Err(e) => {
+                log::warn!("{}: written by the thread of the run: {e}", self.path.display());
+                lock(&given).take().map_or(Place::Gone, Place::Here)
+            }
+        };
+    }
+
+    /// Writes a message; what `message` holds afterwards does not matter.
+    pub fn write(&mut self, header: &MessageHeader, message: &mut Vec<u8>) -> McapResult<()> {
+        match &mut self.place {
+            Place::Here(encoder) => encoder.write_to_known_channel(header, message),
+            Place::Behind(queue) => {
+                let empty = queue.spent.try_recv().unwrap_or_default();
+                let job = Job::Message(*header, std::mem::replace(message, empty));
+                self.ask(job)
+            }
+            Place::Gone => Ok(()),
+        }
+    }
+
+    /// Ends the chunk and hands everything up to time `t_s` to the operating system, at once or by the thread.
+    pub fn flush(&mut self, t_s: f64) -> McapResult<()> {
+        match &mut self.place {
+            Place::Here(encoder) => flush(encoder, &self.path, t_s, &self.progress),
+            Place::Behind(_) => self.ask(Job::Flush(t_s)),
+            Place::Gone => Ok(()),
+        }
+    }
+
+    /// Returns when all that was asked for is done.
+    pub fn wait(&mut self) -> McapResult<()> {
+        if !matches!(self.place, Place::Behind(_)) {
+            return Ok(());
+        }
+        let (done, answer) = sync_channel(1);
+        self.ask(Job::Answer(done))?;
+        // an error on the way ends the thread, which answers nothing then
+        if answer.recv().is_err() { self.ended() } else { Ok(()) }
+    }
+
+    /// What can be read whatever comes after; behind a queue it may lag what was flushed, until [`Sink::wait`].
+    pub fn kept(&self) -> Kept {
+        lock(&self.progress).kept
+    }
+
+    /// Takes what is there from an earlier process for kept.
+    pub fn keep(&mut self, kept: Kept) {
+        lock(&self.progress).kept = kept;
+    }
+
+    /// Writes the footer; later calls do nothing.
+    pub fn close(&mut self) -> McapResult<()> {
+        self.wait()?;
+        let Some(mut encoder) = self.take() else { return Ok(()) };
+        encoder.finish()?;
+        Ok(encoder.into_inner().into_inner().flush()?)
+    }
+
+    /// Stops writing, and waits for the thread; the file ends where that has come to.
+    pub fn abandon(&mut self) {
+        drop(self.take());
+    }
+
+    fn take(&mut self) -> Option<Box<Encoder>> {
+        match std::mem::replace(&mut self.place, Place::Gone) {
+            Place::Here(encoder) => Some(encoder),
+            Place::Behind(Queue { jobs, thread, .. }) => {
+                drop(jobs);
+                thread.join().ok().flatten()
+            }
+            Place::Gone => None,
+        }
+    }
+
+    fn ask(&mut self, job: Job) -> McapResult<()> {
+        match &self.place {
+            Place::Behind(queue) if queue.jobs.send(job).is_err() => self.ended(),
+            _ => Ok(()),
+        }
+    }
+
+    /// Why the thread has ended before its time.
+    fn ended(&mut self) -> McapResult<()> {
+        self.abandon();
+        let why = lock(&self.progress).failed.take();
+        Err(why.unwrap_or_else(|| McapError::Io(std::io::Error::other("the thread of the recording has ended"))))
+    }
+}
+
+impl Drop for Sink {
+    fn drop(&mut self) {
+        self.abandon();
+    }
+}
+
+/// Does what comes in, until nothing can come any more, or something fails.
+fn write_all(
+    mut encoder: Box<Encoder>,
+    path: &Path,
+    progress: &Mutex<Progress>,
+    todo: &Receiver<Job>,
+    spent: impl Fn(Vec<u8>),
+) -> Option<Box<Encoder>> {
+    for job in todo {
+        let done = match job {
+            Job::Message(header, message) => {
+                let written = encoder.write_to_known_channel(&header, &message);
+                spent(message);
+                written
+            }
+            Job::Flush(t_s) => flush(&mut encoder, path, t_s, progress),
+            Job::Answer(done) => {
+                done.send(()).unwrap_or_default();
+                Ok(())
+            }
+        };
+        if let Err(e) = done {
+            // the encoder ends before the error is told: what it still writes is cut off then
+            drop(encoder);
+            lock(progress).failed = Some(e);
+            return None;
+        }
+    }
+    Some(encoder)
+}
+
+fn flush(encoder: &mut Encoder, path: &Path, t_s: f64, progress: &Mutex<Progress>) -> McapResult<()> {
+    encoder.flush()?;
+    let mut progress = lock(progress);
+    progress.kept = (std::fs::metadata(path).map_or(progress.kept.0, |m| m.len()), t_s);
+    Ok(())
+}
+
+fn lock<T>(of: &Mutex<T>) -> MutexGuard<'_, T> {
+    of.lock().unwrap_or_else(PoisonError::into_inner)
+}

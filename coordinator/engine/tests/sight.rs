@@ -27,7 +27,7 @@ impl Module for Mover {
 
 impl Subsystem for Mover {
     fn capabilities(&self) -> Capabilities {
-        Capabilities::RETRY
+        Capabilities::RETRY | Capabilities::HIDES
     }
     fn advance(&mut self, step: &Step, _: &Input, _: &mut Response) -> Result {
         let end = step.t + step.h;

@@ -46,6 +46,7 @@ mod mcap_writer;
 mod mend;
 mod messages;
 mod motor_work;
+mod overlays;
 mod point_cloud;
 mod prints;
 mod reader;
@@ -63,6 +64,7 @@ mod table;
 mod topics;
 mod trace;
 mod viewer_layout;
+mod visibility;
 
 pub mod compare;
 pub mod report;

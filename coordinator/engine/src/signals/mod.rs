@@ -10,6 +10,7 @@ mod fault;
 mod initial;
 mod modifier;
 pub mod pattern;
+mod stream_link;
 mod table;
 mod traffic;
 
@@ -19,4 +20,5 @@ pub use discrete::Discrete;
 pub use event::{Due, TimeLine};
 pub use fault::Faults;
 pub use initial::initialize;
+pub use stream_link::{StreamLink, streams};
 pub use traffic::Signals;

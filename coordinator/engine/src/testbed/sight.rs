@@ -26,7 +26,7 @@ struct Open {
     seers: Vec<usize>,
     /// Fields `height`: slots and numbers of fields.
     grounds: Vec<(usize, usize)>,
-    /// Slots of those that have shapes, with room for what is shown.
+    /// Slots of those that can hide shapes, with room for what is shown.
     shown: Vec<(usize, Vec<bool>)>,
     /// Slots of those that have bodies that move, with their states at the start of the step.
     before: Vec<(usize, Vec<BodyState>)>,
@@ -59,7 +59,7 @@ impl Sight {
                 builder.ground(number, &instance.fields()[field]).map_err(|e| odd(&e))?;
                 grounds.push((slot, field));
             }
-            if !scene.shapes.is_empty() {
+            if instance.capabilities().has(Capabilities::HIDES) {
                 shown.push((slot, vec![true; scene.shapes.len()]));
             }
         }

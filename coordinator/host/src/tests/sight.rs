@@ -9,7 +9,7 @@ import terraglue as tg
 
 
 class Looker(tg.Subsystem):
-    can = tg.FORCE | tg.SEES
+    can = tg.FORCE | tg.SEES | tg.HIDES
     bodies = [("head", 1.0)]
     shapes = [
         tg.Shape(0, "cone", (0.5, 0.2, 0.1), material=(4, 0.25, 0.0)),
@@ -20,11 +20,13 @@ class Looker(tg.Subsystem):
     streams = [tg.Stream("seen", "test.Text", "text", 100.0, 4096)]
     neck = 0.5
     text = None
+    broken = False
 
     def advance(self, step, given, out):
         pass
 
     def observe(self, step, world):
+        self.broken = world.subsystems[0] == "broken"
         if world.subsystems[0] == "endless":
             while True:
                 world.pose((1, 0), step.t)
@@ -39,6 +41,8 @@ class Looker(tg.Subsystem):
         ])
 
     def stream(self, k):
+        if self.broken:
+            raise ValueError("the lens is dirty")
         return None if self.text is None else (self.neck, self.text.encode())
 
     def shape_visibility(self):
@@ -161,6 +165,17 @@ fn a_module_that_never_stops_asking_is_ended() {
     let mut looker = looker(0.4);
     let error = looker.observe(&Step::free(1.0, 0.25, 0), &world("endless")).expect_err("no end");
     assert!(matches!(&error, Error::Fatal(text) if text.contains("went on asking")), "{error}");
+}
+
+#[test]
+fn a_stream_that_fails_in_a_process_of_its_own_is_an_error_and_no_silence() {
+    let mut looker = looker(30.0);
+    let step = Step::free(1.0, 0.25, 0);
+    looker.observe(&step, &world("broken")).expect("it sees");
+    assert_eq!(looker.stream(0), Err(Error::Failed("the lens is dirty".into())));
+    let instance = crate::Instance::new("eye", "looker", Kind::Sensor, looker);
+    let told = crate::message(&instance, 0).expect_err("told with name and function").to_string();
+    assert!(["`stream`", "`eye`", "the lens is dirty"].iter().all(|word| told.contains(word)), "{told}");
 }
 
 /// The range finders of the page on sensors, in C and in Python.

@@ -248,6 +248,7 @@ pub fn scenario(strategy: &str) -> Scenario {
         recording: RecordingSpec {
             ground_every_steps: 100,
             every_steps: 5,
+            overlays: false,
             digits: 17,
             include: Vec::new(),
             exclude: Vec::new(),

@@ -26,6 +26,7 @@ mod pieces;
 mod reload;
 mod run_clock;
 mod schedule;
+mod shown;
 mod sight;
 mod standing;
 mod streams;

@@ -4,6 +4,7 @@
 
 use super::run_clock::RunClock;
 use super::schedule::Span;
+use super::shown::Shown;
 use super::subsystems::Subsystems;
 use super::uncoupled::span;
 use std::sync::Arc;
@@ -102,8 +103,8 @@ impl Sight {
         let Some(open) = &mut self.open else { return Ok(()) };
         let step = Step::free(clock.t, 0.0, clock.index);
         open.update([clock.t; 2], subsystems)?;
-        let Open { world, seers, .. } = open.as_mut();
-        seers.iter().try_for_each(|slot| observe(&mut subsystems.instances[*slot], &step, &*world))
+        let Open { world, seers, .. } = open.as_ref();
+        seers.iter().try_for_each(|slot| look(world, &mut subsystems.instances, *slot, &step))
     }
 }
 
@@ -117,7 +118,7 @@ impl Open {
         let Subsystems { instances, schedules, .. } = subsystems;
         for slot in &self.seers {
             if let Some(step) = schedules[*slot].step_of(span) {
-                observe(&mut instances[*slot], &step, &self.world)?;
+                look(&self.world, instances, *slot, &step)?;
             }
         }
         Ok(())
@@ -140,6 +141,13 @@ impl Open {
             update.ground(*slot as u32, tile).map_err(|e| odd(&e))?;
         }
         Ok(())
+    }
+}
+
+fn look(world: &WorldModel, instances: &mut [Instance], slot: usize, step: &Step) -> Result {
+    match Shown::to(world, instances, slot) {
+        Some((instance, shown)) => observe(instance, step, &shown),
+        None => Ok(()),
     }
 }
 

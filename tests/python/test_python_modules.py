@@ -13,7 +13,7 @@ from conftest import ROOT, terraglue
 from test_plugins import made, played
 
 PAGE = ROOT / "docs" / "plugins" / "python.md"
-KINDS = ["soil", "robot", "controller", "law"]
+KINDS = ["soil", "robot", "controller", "law", "sensor"]
 
 
 def flat(text):

@@ -40,6 +40,14 @@ def test_a_new_soil_passes_the_checker(tmp_path):
     assert "in a process of its own" in flat(process.stdout)
 
 
+def test_a_new_sensor_passes_the_checker(tmp_path):
+    place, commands = made(tmp_path, "sensor", "python")
+    process = terraglue("check-module", place, "--level", "quick", "--jobs", "2")
+    assert process.returncode == 0, process.stdout
+    for test in ("same-view", "no-future", "keeps-nothing", "honest-rates"):
+        assert f"pass     {test}" in process.stdout, process.stdout
+
+
 def test_a_new_law_is_at_most_forty_lines_and_passes_the_checker(tmp_path):
     place, commands = made(tmp_path, "law", "python")
     assert len((place / "my_law.py").read_text().splitlines()) <= 40

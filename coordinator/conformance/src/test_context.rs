@@ -13,7 +13,7 @@ use terraglue_subsystem::{Config, Kind, Mount, Parameter, ParameterType, Schema}
 use terraglue_terrain::SplitMix64;
 
 /// The body that a sensor sits on, of the world that it is shown.
-const MOUNTED: &str = "others.body";
+pub const MOUNTED: &str = "others.body";
 
 /// Numbers of a loose lunar soil (Apollo, nominal), for parameters without a default that carry these names.
 const SOIL: [(&str, f64); 8] = [

@@ -86,7 +86,9 @@ impl Overlays {
         match frame {
             Overlay::WORLD => Some("world".into()),
             Overlay::MOUNT => self.mounts.get(s.name).cloned(),
-            body => s.scene.bodies.get(body as usize).map(|b| crate::scene_message::frame_id(s.name, &b.name)),
+            body => {
+                s.scene.bodies.get(body as usize).map(|b| crate::scene_message::frame_id(s.name, &b.name))
+            }
         }
     }
 

@@ -206,10 +206,9 @@ fn scenario(kind: Kind, language: Language) -> &'static [File] {
             ("scenario.toml", "it moves an arm", include_str!("templates/scenario-controller.toml.in")),
             ARM,
         ],
-        Kind::Sensor => &[
-            ("scenario.toml", "it sits on an arm", include_str!("templates/scenario-sensor.toml.in")),
-            ARM,
-        ],
+        Kind::Sensor => {
+            &[("scenario.toml", "it sits on an arm", include_str!("templates/scenario-sensor.toml.in")), ARM]
+        }
     }
 }
 

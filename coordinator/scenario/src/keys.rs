@@ -401,13 +401,24 @@ fn fault() -> Table {
     let seconds = |name, help| required(name, "s", help).within(0.0, f64::INFINITY);
     let value = required("value", "", "override: the value; offset: is added; gain: the factor");
     let keys = vec![
-        text("variable", "`subsystem.variable`: an output on all its connections, or an input; or `subsystem.stream`").into(),
+        text(
+            "variable",
+            "`subsystem.variable`: an output on all its connections, or an input; or `subsystem.stream`",
+        )
+        .into(),
         text("kind", "what is wrong with its number").choices(FAULTS).into(),
         Key::from(value).only(&["override", "offset", "gain"]),
         Key::from(required("rate_per_s", "", "what is added grows by this")).only(&["ramp"]),
         Key::from(required("delay_s", "s", "how old the number is").positive()).only(&["delay"]),
-        Key::from(required("probability", "", "of each step that the last number stays, of each message of a stream that it is lost").within(0.0, 1.0))
-            .only(&["drop-out"]),
+        Key::from(
+            required(
+                "probability",
+                "",
+                "of each step that the last number stays, of each message of a stream that it is lost",
+            )
+            .within(0.0, 1.0),
+        )
+        .only(&["drop-out"]),
         Key::from(
             required("deviation", "", "standard deviation of what is added").within(0.0, f64::INFINITY),
         )

@@ -8,8 +8,8 @@ use crate::walker::Walker;
 use std::sync::Arc;
 use terraglue_subsystem::bytes;
 use terraglue_subsystem::{
-    Capabilities, Config, Error, Host, Input, Module, Motion, Overlay, Response, Result, Schema, Step, Subsystem,
-    Values, ValuesMut, Variable,
+    Capabilities, Config, Error, Host, Input, Module, Motion, Overlay, Response, Result, Schema, Step,
+    Subsystem, Values, ValuesMut, Variable,
 };
 
 /// Version of its states as bytes.

@@ -30,9 +30,8 @@ pub(crate) fn of(walker: &Walker, settings: &Settings, out: &mut Vec<Overlay>) {
     show("foot targets", [0.2, 0.5, 0.9, 1.0], Figure::Points { points, size: POINT_M });
     let stance_s = settings.duty(walker.pattern) * settings.cycle_s(walker.pattern);
     let flying = walker.feet.iter().zip(settings.neutral).filter(|(f, _)| f.airborne);
-    let landing = |(f, neutral): (&Foot, [f64; 2])| {
-        [target(f), low(walker.twist.pass_below(neutral, -0.5 * stance_s))]
-    };
+    let landing =
+        |(f, neutral): (&Foot, [f64; 2])| [target(f), low(walker.twist.pass_below(neutral, -0.5 * stance_s))];
     let points: Vec<[f64; 3]> = flying.flat_map(landing).collect();
     if walker.mode == Mode::Walking && !points.is_empty() {
         show("next footholds", [0.2, 0.5, 0.9, 0.6], Figure::Arrows { points, width: WIDTH_M });

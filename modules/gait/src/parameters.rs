@@ -57,7 +57,8 @@ pub fn schema() -> Schema {
     parameters.extend(ground());
     parameters.extend(geometry());
     parameters.extend(feedback());
-    let help = "Body that it walks, SUBSYSTEM.BODY, in whose frame it shows overlays; none are shown without it";
+    let help =
+        "Body that it walks, SUBSYSTEM.BODY, in whose frame it shows overlays; none are shown without it";
     parameters.push(Parameter::of(Mount::KEY, ParameterType::Text, help).optional());
     Schema {
         name: "gait".into(),

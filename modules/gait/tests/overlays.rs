@@ -14,7 +14,9 @@ fn points(gait: &Gait, layer: &str) -> Vec<[f64; 3]> {
     gait.overlays(&mut all);
     assert!(all.iter().all(|o| o.frame == Overlay::MOUNT));
     let own = all.into_iter().filter(|o| o.layer == layer).map(|o| match o.figure {
-        Figure::Lines { points, .. } | Figure::Points { points, .. } | Figure::Arrows { points, .. } => points,
+        Figure::Lines { points, .. } | Figure::Points { points, .. } | Figure::Arrows { points, .. } => {
+            points
+        }
         other => panic!("{other:?}"),
     });
     own.flatten().collect()

@@ -6,8 +6,8 @@ use crate::measure::{self, Before, Truth};
 use crate::settings::{self, Settings};
 use std::sync::Arc;
 use terraglue_subsystem::{
-    Capabilities, Config, Error, Figure, Host, Input, Module, Motion, Overlay, Pose, Response, Result, Schema, Step, Subsystem,
-    ValueType, Values, ValuesMut, Variable, World, bytes, persist,
+    Capabilities, Config, Error, Figure, Host, Input, Module, Motion, Overlay, Pose, Response, Result,
+    Schema, Step, Subsystem, ValueType, Values, ValuesMut, Variable, World, bytes, persist,
 };
 
 /// Form of the serialized state.

@@ -224,7 +224,10 @@ fn a_range_finder_shows_its_ray_in_the_frame_of_its_body() {
         panic!("one ray: {all:?}")
     };
     let tip = [0.1, 0.0, -0.5 - distance];
-    assert!(points[0] == [0.1, 0.0, -0.5] && (0..3).all(|k| (points[1][k] - tip[k]).abs() < 1e-9), "{points:?}");
+    assert!(
+        points[0] == [0.1, 0.0, -0.5] && (0..3).all(|k| (points[1][k] - tip[k]).abs() < 1e-9),
+        "{points:?}"
+    );
     let mut none = Vec::new();
     sensor(r#"{"kind": "imu", "mount": "robot.body"}"#).overlays(&mut none);
     assert!(none.is_empty());

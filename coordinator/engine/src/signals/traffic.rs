@@ -24,7 +24,8 @@ pub struct Signals {
 impl Signals {
     /// Number of variables that are fed by another one.
     pub fn connections(&self) -> usize {
-        self.links.numbers.iter().map(Link::count).sum::<usize>() + self.links.discrete.len()
+        self.links.numbers.iter().map(Link::count).sum::<usize>()
+            + self.links.discrete.len()
             + self.links.streams.len()
     }
 

@@ -80,7 +80,13 @@ impl Sight<'_> {
         let places: Vec<_> = streams(self.instances).map(|(_, place)| place).collect();
         let messages = self.links.streams.iter().map(|l| {
             let (slot, k) = places[l.stream()];
-            ConnectionEnds { from: (slot, k as u32), to: variable(l.to()), conversion: None, by_table: false, stream: true }
+            ConnectionEnds {
+                from: (slot, k as u32),
+                to: variable(l.to()),
+                conversion: None,
+                by_table: false,
+                stream: true,
+            }
         });
         numbers.chain(discrete).chain(messages).collect()
     }
@@ -172,7 +178,8 @@ impl Sight<'_> {
             to: format!("{}.{input}", to.name()),
             value: "each message".into(),
             delay: "1".into(),
-            why: "set at the start of the step after the one that made it, and held until the next message".into(),
+            why: "set at the start of the step after the one that made it, and held until the next message"
+                .into(),
         }
     }
 

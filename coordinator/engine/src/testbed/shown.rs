@@ -2,7 +2,8 @@
 
 use terraglue_host::Instance;
 use terraglue_subsystem::{
-    BodyRef, BodyState, Capabilities, Error, FieldInfo, FieldTile, Ray, RayHit, RayMask, Result, Scene, ShapeRef, World,
+    BodyRef, BodyState, Capabilities, Error, FieldInfo, FieldTile, Ray, RayHit, RayMask, Result, Scene,
+    ShapeRef, World,
 };
 use terraglue_world::WorldModel;
 
@@ -30,7 +31,8 @@ impl<'a> Shown<'a> {
     fn other(&self, subsystem: u32) -> Option<&Instance> {
         let slot = subsystem as usize;
         let own = self.before.len();
-        let found = if slot < own { self.before.get(slot) } else { self.behind.get(slot.checked_sub(own + 1)?) };
+        let found =
+            if slot < own { self.before.get(slot) } else { self.behind.get(slot.checked_sub(own + 1)?) };
         found.filter(|instance| !instance.capabilities().has(Capabilities::SEES))
     }
 }

@@ -61,7 +61,19 @@ pub(crate) struct McapState {
     /// Which shapes were shown.
     shown: Vec<Vec<bool>>,
 }
-persist!(McapState { kept, sequence, pending, written, ground, unseen, drawn, forces_next_s, window, layers, shown });
+persist!(McapState {
+    kept,
+    sequence,
+    pending,
+    written,
+    ground,
+    unseen,
+    drawn,
+    forces_next_s,
+    window,
+    layers,
+    shown
+});
 
 impl McapWriter {
     /// From now on [`McapWriter::state`] can be asked for.

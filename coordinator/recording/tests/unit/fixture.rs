@@ -181,7 +181,11 @@ impl Subsystem for Synthetic {
                 show("the way", 0, Figure::Arrows { points, width: 0.01 });
                 if self.t >= 0.25 {
                     show("name", 0, Figure::Text { at: [0.0, 0.0, 0.2], height: 0.1, text: "walker".into() });
-                    show("name", Overlay::WORLD, Figure::Points { points: vec![[1.0, 2.0, 3.0]], size: 0.02 });
+                    show(
+                        "name",
+                        Overlay::WORLD,
+                        Figure::Points { points: vec![[1.0, 2.0, 3.0]], size: 0.02 },
+                    );
                     show("name", 99, Figure::Points { points: vec![[0.0; 3]], size: 0.02 });
                 }
             }

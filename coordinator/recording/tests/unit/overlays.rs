@@ -17,7 +17,8 @@ fn fixture(overlays: bool) -> Fixture {
 }
 
 fn run(folder: &Path, fixture: &mut Fixture, steps: u64) {
-    let mut recorder = Recorder::create(folder, &fixture.scenario, RecorderOptions::default()).expect("created");
+    let mut recorder =
+        Recorder::create(folder, &fixture.scenario, RecorderOptions::default()).expect("created");
     fixture.run(&mut recorder, steps).expect("ran");
     recorder.finish(2.0, 1.5, None, Status::Done).expect("finished");
 }
@@ -69,7 +70,10 @@ fn every_layer_is_a_topic_in_the_frames_of_its_figures() {
     assert!((arrow.shaft_length + arrow.head_length - length).abs() < 1e-6);
     let polygon = scenes(f.path(), "/overlays/gait/polygon");
     let entity = &polygon[0].1.entities[0];
-    assert_eq!((entity.frame_id.as_str(), entity.lines.len(), entity.lines[0].points.len()), ("robot/body", 2, 2));
+    assert_eq!(
+        (entity.frame_id.as_str(), entity.lines.len(), entity.lines[0].points.len()),
+        ("robot/body", 2, 2)
+    );
     let far = entity.lines[1].points.iter().map(|p| f64::hypot(p.x / 0.2, p.y / 0.1));
     assert!(far.into_iter().all(|r| (r - 1.0).abs() < 1e-6));
     // a layer that comes later, in two frames; the figure in a frame that there is not is left out

@@ -1,6 +1,5 @@
 //! Variables of all subsystems by their full names, read and written as what a scenario can hold.
 
-use super::stream_link;
 use serde_json::Value;
 use terraglue_diagnostics::largest_plausible;
 use terraglue_host::{Instance, Reply};
@@ -24,6 +23,15 @@ pub struct Directory {
     streams: Vec<String>,
 }
 
+/// Full names (`subsystem.stream`) of all streams with the slots of their subsystems and their numbers in them, in the
+/// order in which they are counted.
+pub fn streams(instances: &[Instance]) -> impl Iterator<Item = (String, (usize, usize))> {
+    instances.iter().enumerate().flat_map(|(slot, instance)| {
+        let all = instance.subsystem().streams().iter().enumerate();
+        all.map(move |(k, info)| (format!("{}.{}", instance.name(), info.name), (slot, k)))
+    })
+}
+
 impl Directory {
     /// Lists the variables of all instances.
     pub fn new(instances: &[Instance]) -> Self {
@@ -34,7 +42,7 @@ impl Directory {
                 directory.refs.push(VariableRef { slot, variable });
             }
         }
-        directory.streams = stream_link::streams(instances).map(|(name, _)| name).collect();
+        directory.streams = streams(instances).map(|(name, _)| name).collect();
         directory
     }
 

@@ -11,15 +11,6 @@ use terraglue_host::{Instance, Reply};
 use terraglue_scenario::Connection;
 use terraglue_subsystem::{Causality, ValueType, Values};
 
-/// Full names (`subsystem.stream`) of all streams with the slots of their subsystems and their numbers in them, in the
-/// order in which they are counted.
-pub fn streams(instances: &[Instance]) -> impl Iterator<Item = (String, (usize, usize))> {
-    instances.iter().enumerate().flat_map(|(slot, instance)| {
-        let all = instance.subsystem().streams().iter().enumerate();
-        all.map(move |(k, info)| (format!("{}.{}", instance.name(), info.name), (slot, k)))
-    })
-}
-
 /// One connection of a stream.
 #[derive(Debug)]
 pub struct StreamLink {

@@ -9,7 +9,8 @@ use terraglue_scenario::Scenario;
 fn fixture(overlays: bool) -> Fixture {
     let mut fixture = Fixture::new("iterative");
     fixture.scenario.recording.overlays = overlays;
-    let text = "[gait]\nmodule = \"gait\"\nmount = \"robot.body\"\n";
+    let text =
+        "[time]\nstep_s = 0.001\nduration_s = 1.0\n[gait]\nmodule = \"gait\"\nmount = \"robot.body\"\n";
     let mounted = Scenario::parse(text, "mounted.toml", &[]).expect("a scenario");
     fixture.scenario.subsystems[0].parameters = mounted.subsystems[0].parameters.clone();
     fixture.parts[1].1.hides = true;

@@ -51,7 +51,8 @@ fn lines_are_as_long_as_the_pressure_and_the_cone_as_high_as_the_force() {
     // 5 mm deep under a plate of 0.1 m: k_c/b + k_phi times the depth
     let expected = (1400.0 / 0.1 + 820_000.0) * 5e-3;
     for [low, high] in &pressure {
-        assert!((low[2] + 5e-3).abs() < 2e-4 && low[..2] == high[..2], "{low:?}");
+        // from the surface that the soil would spring back to
+        assert!((-5e-3..-3e-3).contains(&low[2]) && low[..2] == high[..2], "{low:?}");
         let told = (high[2] - low[2]) / 1e-6;
         assert!((told / expected - 1.0).abs() < 0.02, "{told} {expected}");
     }

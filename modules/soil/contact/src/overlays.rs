@@ -18,7 +18,7 @@ const LINES: u32 = 8;
 
 /// A node with pressure.
 struct Pressed {
-    /// On the surface, m.
+    /// On the surface that the soil springs back to without the contact, m.
     at: [f64; 3],
     /// Height of the ground before the contact, m.
     reference: f64,

@@ -8,12 +8,15 @@ use terraglue_host::Library;
 use terraglue_scenario::Scenario;
 use terraglue_subsystem::*;
 
+/// Number of the next step, and the last message with its time.
+type Scanned = (u64, Option<(f64, Vec<u8>)>);
+
 /// Gives a cloud of three points after each of its steps; their height is the number of the step.
 struct Scanner {
     step: u64,
     cloud: Option<(f64, Vec<u8>)>,
     streams: [StreamInfo; 1],
-    saved: Vec<Option<(u64, Option<(f64, Vec<u8>)>)>>,
+    saved: Vec<Option<Scanned>>,
 }
 
 impl Module for Scanner {

@@ -217,3 +217,69 @@ fn the_range_finders_of_the_page_measure_the_same() {
     let error = crate::observe(&mut c, &step, &empty);
     assert!(error.expect_err("no body").to_string().contains("the body of `mount` is not there"));
 }
+
+/// An open mesh that says it can be hit.
+struct Sheet;
+
+impl Module for Sheet {
+    fn schema() -> Schema {
+        Schema { name: "sheet".into(), kind: Kind::Robot, help: "A sheet".into(), parameters: Vec::new() }
+    }
+    fn instantiate(_: &Config, _: Arc<dyn Host>) -> Result<Box<dyn Subsystem>> {
+        Ok(Box::new(Self))
+    }
+}
+
+impl Subsystem for Sheet {
+    fn capabilities(&self) -> Capabilities {
+        Capabilities::FORCE
+    }
+    fn advance(&mut self, _: &Step, _: &Input, _: &mut Response) -> Result {
+        Ok(())
+    }
+    fn scene(&self) -> Scene {
+        let points = vec![[0.0; 3], [1.0, 0.0, 0.0], [0.0, 1.0, 0.0]];
+        let shape = SceneShape {
+            id: 0,
+            body: 0,
+            name: "leaf".into(),
+            geometry: Geometry::Mesh { points, triangles: vec![[0, 1, 2]] },
+            body_from_shape: Pose::IDENTITY,
+            collides: true,
+            material: Material::UNKNOWN,
+        };
+        let bodies = vec![SceneBody { name: "leaf".into(), mass: 1.0 }];
+        Scene { bodies, shapes: vec![shape], joints: Vec::new() }
+    }
+}
+
+const PYTHON_SHEET: &str = r#""""A sheet.
+
+[module]
+name = "sheet"
+kind = "robot"
+"""
+import terraglue as tg
+
+
+class Sheet(tg.Subsystem):
+    bodies = [("leaf", 1.0)]
+    shapes = [tg.Shape(0, "sheet", ([(0, 0, 0), (1, 0, 0), (0, 1, 0)], [(0, 1, 2)]), "leaf")]
+    shapes[0].collides = True
+
+    def advance(self, step, input, out):
+        pass
+"#;
+
+#[test]
+fn an_open_mesh_that_collides_is_refused_from_rust_and_python() {
+    let folder = tempfile::tempdir().expect("folder");
+    let path = folder.path().join("sheet.py");
+    std::fs::write(&path, PYTHON_SHEET).expect("written");
+    let python = crate::LoadedModule::load(&path).expect("loads");
+    for module in [crate::LoadedModule::builtin::<Sheet>(), python] {
+        let refused = module.instantiate("sheet", Config::default(), &super::services());
+        let told = refused.err().expect("refused").to_string();
+        assert!(told.contains("the shape `leaf`") && told.contains("is seen only"), "{told}");
+    }
+}

@@ -234,6 +234,7 @@ STOCK = {
     "my.urdf": copied("models/hexapod.urdf"),
     "husky.urdf": copied("models/rover.urdf"),
     "go1.urdf": lambda place, name: (place / name).write_text(quadruped()),
+    "go2.urdf": lambda place, name: (place / name).write_text(quadruped()),
     "plates.csv": copied("tests/reference/terramechanics/cmu_plate_pressure_sinkage_d60_d100.csv"),
     "wheel.csv": copied("tests/reference/terramechanics/cmu_smooth_beta0_mean.csv"),
     "pump.fmu": pump,

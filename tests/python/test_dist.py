@@ -1,7 +1,9 @@
 """The archive for users runs where nothing else is: an empty environment, another folder, no source beside it."""
 
 import json
+import os
 import pathlib
+import shutil
 import subprocess
 import tarfile
 
@@ -44,6 +46,46 @@ def test_a_scenario_runs_in_an_empty_environment_from_another_folder(unpacked, t
     assert json.loads(done.stdout)["status"] == "done"
     assert (tmp_path / "runs" / scenario / "report.html").is_file()
     assert str(ROOT) not in done.stderr
+
+
+@pytest.fixture
+def bare_root(unpacked, tmp_path):
+    """A root folder that holds the archive as /opt and the C library, with /proc, /dev/null and an empty /tmp: what the emptiest container offers."""
+    root = tmp_path / "root"
+    files = [unpacked / "bin/terraglue", *(unpacked / "lib/terraglue").glob("*.so")]
+    listed = subprocess.run(["ldd", *files], capture_output=True, text=True).stdout
+    libraries = {word for word in listed.split() if word.startswith("/lib")}
+    for library in libraries:
+        place = root / library.lstrip("/")
+        place.parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(library, place)
+    shutil.copytree(unpacked, root / "opt")
+    for name in ("dev", "proc", "tmp", "work"):
+        (root / name).mkdir()
+    if os.geteuid() != 0 or subprocess.run(["mount", "-t", "proc", "proc", root / "proc"], capture_output=True).returncode:
+        pytest.skip("needs the right to mount /proc and to change the root folder")
+    (root / "dev/null").touch()
+    try:
+        yield root, {pathlib.Path(library).name for library in libraries}
+    finally:
+        subprocess.run(["umount", root / "proc"])
+
+
+def test_the_archive_runs_in_a_root_folder_with_the_c_library_alone(bare_root):
+    root, libraries = bare_root
+    assert {name.split(".")[0] for name in libraries} <= {"libc", "libm", "libgcc_s", "ld-linux-x86-64", "ld-linux-aarch64"}
+
+    def run(*arguments):
+        program = [shutil.which("chroot") or "/usr/sbin/chroot", root, "/opt/bin/terraglue", *arguments]
+        return subprocess.run(["env", "-i", *program], capture_output=True, text=True, timeout=120)
+
+    isolated = ["--set", "soil.isolate=true", "--set", "gait.isolate=true"]
+    walk = run("run", "/opt/share/terraglue/scenarios/moon_walk.toml", "--duration", "0.05", "--json", "--out", "/work/out", *isolated)
+    assert walk.returncode == 0, walk.stderr
+    assert json.loads(walk.stdout)["status"] == "done"
+    assert {"report.html", "recording.mcap", "summary.json"} <= {p.name for p in (root / "work/out").iterdir()}
+    checked = run("check-module", "/opt/lib/terraglue/libsensor_plugin.so", "--level", "quick")
+    assert checked.returncode == 0, checked.stdout + checked.stderr
 
 
 def test_modules_and_soils_are_those_of_the_archive(unpacked, tmp_path):

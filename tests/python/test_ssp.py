@@ -181,7 +181,7 @@ def test_a_structure_that_is_wrong_is_refused_by_place(files, tmp_path, old, new
     path = pack(files, tmp_path / "wrong.ssp", SYSTEM.replace(old, new))
     done = terraglue("run", path, "--quiet", "--out", tmp_path / "out")
     assert done.returncode == 2 and not (tmp_path / "out").exists(), done.stderr
-    flat = " ".join(done.stderr.replace("│", " ").split())
+    flat = " ".join(done.stderr.replace("│", " ").replace("|", " ").split())
     assert all(word in flat for word in says), done.stderr
 
 

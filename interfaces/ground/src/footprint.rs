@@ -14,7 +14,8 @@ const CHUNK: usize = 64;
 /// tell how the underside goes on.
 ///
 /// `area` is the covered part of the cell: exact for spheres, boxes and upright cylinders and capsules, of polygons with 34
-/// corners for other cylinders and capsules, and from 8 × 8 points for meshes. `lower` is the exact underside at the node;
+/// corners for other cylinders and capsules, of the hull of corners farthest in 32 directions for convex meshes, and from 8 × 8 points for
+/// other shapes. `lower` is the exact underside at the node;
 /// where the vertical line through the node misses the shape, that of the nearest covered point. A mesh that is not convex:
 /// see [`nodes_below_parts`].
 pub fn nodes_below<S: Surface + ?Sized>(shape: &Placed, surface: &S, margin: f64, out: &mut Vec<Node>) {

@@ -130,6 +130,7 @@ impl Outline {
             Geometry::Cylinder { half_length, radius } => rounded_outline(shape, *half_length, *radius, true),
             Geometry::Capsule { half_length, radius } => rounded_outline(shape, *half_length, *radius, false),
             Geometry::Box { half_extents } => box_outline(shape, *half_extents),
+            Geometry::ConvexMesh { points, .. } if shape.is_convex() => mesh_outline(shape, points),
             _ => Self::Sampled,
         }
     }
@@ -281,6 +282,39 @@ fn rounded_outline(shape: &Placed, half_length: f64, radius: f64, flat: bool) ->
     }
     // its corners lie outside of the shape by so much
     polygon.inwards = 1.2 * (wider - 1.0);
+    Outline::Polygon(polygon)
+}
+
+/// Directions in which the corners of a mesh are looked for.
+const DIRECTIONS: usize = 32;
+
+/// Hull of the corners of a convex mesh that lie farthest in each of 32 horizontal directions: all its corners seen from above but
+/// those at which the outline turns by less than 11°, beside which it lies inside by at most 0.5 % of its width.
+fn mesh_outline(shape: &Placed, corners: &[[f64; 3]]) -> Outline {
+    let directions: [[f64; 2]; DIRECTIONS] = std::array::from_fn(|k| {
+        let (s, c) = libm::sincos(std::f64::consts::TAU * k as f64 / DIRECTIONS as f64);
+        [c, s]
+    });
+    let mut farthest = [([0.0; 2], f64::NEG_INFINITY); DIRECTIONS];
+    for corner in corners {
+        let turned = shape.rotation().to_world(*corner);
+        for ([c, s], (place, reach)) in directions.iter().zip(&mut farthest) {
+            let here = turned[0] * c + turned[1] * s;
+            if here > *reach {
+                (*place, *reach) = ([turned[0], turned[1]], here);
+            }
+        }
+    }
+    let centre = shape.pose().position;
+    let mut polygon = Polygon { points: [[0.0; 2]; MOST_CORNERS], count: 0, inwards: 1e-9 };
+    let mut before = farthest[DIRECTIONS - 1].0;
+    for (place, _) in farthest {
+        if place != before {
+            polygon.points[polygon.count] = [centre[0] + place[0], centre[1] + place[1]];
+            polygon.count += 1;
+        }
+        before = place;
+    }
     Outline::Polygon(polygon)
 }
 

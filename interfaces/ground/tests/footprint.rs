@@ -77,8 +77,82 @@ fn prism() -> Geometry {
     Geometry::ConvexMesh { points: (0..12).map(corner).collect(), triangles }
 }
 
+/// A ball of 572 triangles, as meshes of feet come from robot files.
+fn faceted_ball() -> Geometry {
+    const ROUND: usize = 26;
+    const RINGS: usize = 11;
+    let ring = |k: usize| std::f64::consts::PI * (k + 1) as f64 / (RINGS + 1) as f64;
+    let mut points = vec![[0.0, 0.0, BALL], [0.0, 0.0, -BALL]];
+    for (k, j) in (0..RINGS).flat_map(|k| (0..ROUND).map(move |j| (k, j))) {
+        let (s, c) = (std::f64::consts::TAU * j as f64 / ROUND as f64).sin_cos();
+        points.push([BALL * ring(k).sin() * c, BALL * ring(k).sin() * s, BALL * ring(k).cos()]);
+    }
+    let at = |k: usize, j: usize| 2 + k * ROUND + j % ROUND;
+    let mut triangles = Vec::new();
+    for j in 0..ROUND {
+        triangles.extend([[0, at(0, j), at(0, j + 1)], [1, at(RINGS - 1, j + 1), at(RINGS - 1, j)]]);
+        for k in 0..RINGS - 1 {
+            triangles.extend([
+                [at(k, j), at(k + 1, j), at(k + 1, j + 1)],
+                [at(k, j), at(k + 1, j + 1), at(k, j + 1)],
+            ]);
+        }
+    }
+    let triangles = triangles.into_iter().map(|t| t.map(|c| c as u32)).collect();
+    Geometry::ConvexMesh { points, triangles }
+}
+
+/// Its radius, m.
+const BALL: f64 = 0.04;
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(96))]
+
+    #[test]
+    fn a_mesh_of_many_faces_covers_what_a_ball_does_and_changes_smoothly(
+        x in -0.02..0.02f64, y in -0.02..0.02f64, tilt in -3.0..3.0f64, turn in 0.0..3.0f64, way in 0.0..6.3f64,
+    ) {
+        let ((s, c), (sl, cl)) = ((0.5 * turn).sin_cos(), (0.5 * tilt).sin_cos());
+        let orientation = product([c, 0.0, 0.0, s], [cl, sl, 0.0, 0.0]);
+        let ball = faceted_ball();
+        prop_assert!(Placed::new(&ball, &Pose::IDENTITY).is_convex());
+        let below = |shift: f64| {
+            let position = [x + shift * way.cos(), y + shift * way.sin(), 0.02];
+            nodes(&ball, &Pose { position, orientation }, 0.0)
+        };
+        let here = below(0.0);
+        // the circle in which the ball lies below the ground, at nodes that it reaches
+        let covered: f64 = here.iter().map(|n| n.area).sum();
+        let whole = std::f64::consts::PI * BALL * BALL;
+        prop_assert!(covered < 1.001 * whole && covered > 0.6 * whole, "{} of {}", covered, whole);
+        let shift = 1e-7;
+        for (a, b) in here.iter().filter_map(|a| Some((a, *below(shift).iter().find(|b| (b.i, b.j) == (a.i, a.j))?))) {
+            // an edge through a cell sweeps no more than its diagonal
+            prop_assert!((a.area - b.area).abs() < 1.5 * shift * 0.01, "{:?} {:?}", a, b);
+        }
+    }
+
+    #[test]
+    fn the_slope_of_a_mesh_is_that_of_its_heights(u in -0.9..0.9f64, v in -0.9..0.9f64, tilt in -3.0..3.0f64) {
+        let (sl, cl) = (0.5 * tilt).sin_cos();
+        let pose = Pose { position: [0.3, -0.2, 0.1], orientation: [cl, sl, 0.0, 0.0] };
+        let ball = Placed::new(&faceted_ball(), &pose);
+        let (x, y) = (0.3 + 0.6 * BALL * u, -0.2 + 0.6 * BALL * v);
+        let lower = |x, y| ball.lower(x, y).expect("below the ball");
+        let step = 1e-7;
+        let slope = ball.underside_slope([x, y, lower(x, y)]);
+        let found = [lower(x + step, y) - lower(x - step, y), lower(x, y + step) - lower(x, y - step)];
+        // within a face; across an edge the two lie between those of its faces
+        let within = (lower(x + step, y) + lower(x - step, y) - 2.0 * lower(x, y)).abs()
+            + (lower(x, y + step) + lower(x, y - step) - 2.0 * lower(x, y)).abs() < 1e-14;
+        prop_assume!(within);
+        for k in 0..2 {
+            prop_assert!((slope[k] - found[k] / (2.0 * step)).abs() < 1e-6, "{:?} {:?}", slope, found);
+        }
+        // the facets stay inside the ball by a hundredth of its radius
+        let round = 0.1 - (BALL * BALL - (x - 0.3) * (x - 0.3) - (y + 0.2) * (y + 0.2)).sqrt();
+        prop_assert!(lower(x, y) >= round - 1e-12 && lower(x, y) < round + 0.05 * BALL);
+    }
 
     #[test]
     fn a_shape_that_is_turned_with_the_lattice_covers_the_same_cells(

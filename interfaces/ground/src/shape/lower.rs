@@ -22,6 +22,9 @@ impl Placed {
         if let Some(tree) = &self.tree {
             return tree.lowest(&self.rotation, [dx, dy]).map(|hit| centre[2] + hit.z);
         }
+        if let Geometry::ConvexMesh { .. } = &self.geometry {
+            return self.planes.lower(dx, dy).map(|z| centre[2] + z);
+        }
         // Points of the line in the shape's frame: start + s·up, s = height above the shape's origin.
         let start = self.rotation.to_shape([dx, dy, 0.0]);
         let axes = &self.rotation.0;
@@ -35,15 +38,8 @@ impl Placed {
             Geometry::ConeFrustum { half_length, radius_bottom, radius_top } => {
                 frustum(start, up, *half_length, [*radius_bottom, *radius_top])
             }
-            // always a tree of triangles, see above
-            Geometry::Mesh { .. } => None,
-            Geometry::ConvexMesh { .. } => {
-                let mut line = Interval::ALL;
-                for f in &self.faces {
-                    line.keep(dot(f.normal, start) - f.offset, dot(f.normal, up));
-                }
-                line.low()
-            }
+            // a tree of triangles or planes, see above
+            Geometry::Mesh { .. } | Geometry::ConvexMesh { .. } => None,
         };
         s.map(|s| centre[2] + s)
     }

@@ -2,6 +2,7 @@
 
 mod lower;
 mod mesh;
+mod planes;
 mod slope;
 mod support;
 
@@ -9,6 +10,7 @@ pub use slope::STEEPEST_SLOPE;
 
 use crate::math::{Rotation, cross, dot, point};
 use mesh::MeshTree;
+use planes::Planes;
 use terraglue_subsystem::{Geometry, Pose};
 
 /// A plane of a convex mesh: outward unit normal and offset, normal·p ≤ offset inside.
@@ -61,6 +63,8 @@ pub struct Placed {
     rotation: Rotation,
     /// Of a convex mesh.
     faces: Vec<Face>,
+    /// The same at the pose.
+    planes: Planes,
     /// Of a mesh that is not convex.
     tree: Option<MeshTree>,
 }
@@ -77,7 +81,16 @@ impl Placed {
             _ => None,
         };
         let faces = if tree.is_some() { Vec::new() } else { faces_of(geometry) };
-        Self { geometry: geometry.clone(), world_from_shape: *world_from_shape, rotation, faces, tree }
+        let mut planes = Planes::reserved(&faces);
+        planes.turn(&faces, &rotation);
+        Self {
+            geometry: geometry.clone(),
+            world_from_shape: *world_from_shape,
+            rotation,
+            faces,
+            planes,
+            tree,
+        }
     }
 
     /// Whether it has no dents: true for all but meshes whose triangles are not the faces of a convex body.
@@ -89,6 +102,7 @@ impl Placed {
     pub fn move_to(&mut self, world_from_shape: &Pose) {
         self.world_from_shape = *world_from_shape;
         self.rotation = Rotation::from_quaternion(world_from_shape.orientation);
+        self.planes.turn(&self.faces, &self.rotation);
     }
 
     /// Its geometry.

@@ -1,7 +1,6 @@
 //! The slope of the underside of every shape: which way a body presses the soil at a node.
 
 use super::Placed;
-use crate::math::dot;
 use terraglue_subsystem::Geometry;
 
 /// Largest slope that is reported (72°); the side of a shape is a wall and no underside.
@@ -21,6 +20,10 @@ impl Placed {
         if let Some(tree) = &self.tree {
             let hit = tree.lowest(&self.rotation, [p[0] - centre[0], p[1] - centre[1]]);
             return hit.map_or([0.0; 2], |hit| slope_of(hit.normal));
+        }
+        if let Geometry::ConvexMesh { .. } = &self.geometry {
+            let [a, b] = self.planes.slope(p[0] - centre[0], p[1] - centre[1]);
+            return slope_of([a, b, -1.0]);
         }
         let local = self.rotation.to_shape(std::array::from_fn(|k| p[k] - centre[k]));
         let mut face = Downwards { placed: self, distance: f64::NEG_INFINITY, normal: [0.0, 0.0, -1.0] };
@@ -55,13 +58,8 @@ impl Placed {
                 face.offer([0.0, 0.0, 1.0], local[2] - half_length);
                 face.offer([0.0, 0.0, -1.0], -local[2] - half_length);
             }
-            // always a tree of triangles, see above
-            Geometry::Mesh { .. } => {}
-            Geometry::ConvexMesh { .. } => {
-                for f in &self.faces {
-                    face.offer(f.normal, dot(f.normal, local) - f.offset);
-                }
-            }
+            // a tree of triangles or planes, see above
+            Geometry::Mesh { .. } | Geometry::ConvexMesh { .. } => {}
         }
         slope_of(face.normal)
     }
